@@ -11,22 +11,22 @@ use std::hint::black_box;
 use std::sync::Arc;
 use taut::case::Experiment;
 use taut::friction::{Friction, Law, Shape};
+use taut::machine::axis::{CART, DRIVE};
+use taut::machine::{BeltMake, Machine, Travel};
 use taut::mechanism::Shown;
 use taut::signal::{Hold, Signal};
 use taut::solve::{Begun, Bench, Differentiated, Flow, Solver, Variable, simulate, stream};
-use taut::stage::axis::{CART, DRIVE};
-use taut::stage::{BeltMake, Stage, Travel};
 
 fn pulse() -> Signal {
     Signal::Pulse { value: 5.0, duration: 0.25, at: 0.0 }
 }
 
-fn streamed(stage: &Stage, experiment: &Experiment) -> usize {
-    streamed_by(Solver::Exact, stage, experiment)
+fn streamed(machine: &Machine, experiment: &Experiment) -> usize {
+    streamed_by(Solver::Exact, machine, experiment)
 }
 
-fn streamed_by(solver: Solver, stage: &Stage, experiment: &Experiment) -> usize {
-    let outcome = stream(stage, experiment, solver, &mut |block| {
+fn streamed_by(solver: Solver, machine: &Machine, experiment: &Experiment) -> usize {
+    let outcome = stream(machine, experiment, solver, &mut |block| {
         black_box(block);
         Flow::Continue
     });
@@ -35,40 +35,40 @@ fn streamed_by(solver: Solver, stage: &Stage, experiment: &Experiment) -> usize 
 
 /// Table 4, 5 V for 0.25 s, one second, 1000 intervals, every column.
 fn table4(c: &mut Criterion) {
-    let (stage, experiment) = (common::table4(), common::experiment(pulse(), 1.0));
+    let (machine, experiment) = (common::table4(), common::experiment(pulse(), 1.0));
     let mut group = c.benchmark_group("table 4, 5 V pulse, 1 s, 1001 rows, 15 events");
-    group.bench_function("taut, handed on in blocks", |b| b.iter(|| streamed(&stage, &experiment)));
+    group.bench_function("taut, handed on in blocks", |b| b.iter(|| streamed(&machine, &experiment)));
     group.bench_function("taut, kept in memory", |b| {
-        b.iter(|| simulate(&stage, &experiment, Solver::Exact).expect("the machine is sound"));
+        b.iter(|| simulate(&machine, &experiment, Solver::Exact).expect("the machine is sound"));
     });
     group.finish();
 }
 
 fn rows(c: &mut Criterion) {
-    let stage = common::table4();
+    let machine = common::table4();
     let mut group = c.benchmark_group("against the number of rows");
     for rows in [100_i32, 1_000, 10_000, 100_000] {
         let experiment = Experiment { every: 1.0 / f64::from(rows), ..common::experiment(pulse(), 1.0) };
         group.throughput(Throughput::Elements(rows as u64));
-        group.bench_with_input(BenchmarkId::from_parameter(rows), &experiment, |b, e| b.iter(|| streamed(&stage, e)));
+        group.bench_with_input(BenchmarkId::from_parameter(rows), &experiment, |b, e| b.iter(|| streamed(&machine, e)));
     }
     group.finish();
 }
 
 /// A triangle wave that sticks and slips all the time, with hardly any rows: the throughput is events.
 fn events(c: &mut Criterion) {
-    let stage = common::table4();
+    let machine = common::table4();
     let input = Signal::Triangle { amplitude: 3.0, frequency: 10.0 };
     let experiment = Experiment { every: 0.1, ..common::experiment(input, 1.0) };
     let mut group = c.benchmark_group("events of a triangle wave, 11 rows");
-    group.throughput(Throughput::Elements(streamed(&stage, &experiment) as u64));
-    group.bench_function("3 V, 10 Hz", |b| b.iter(|| streamed(&stage, &experiment)));
+    group.throughput(Throughput::Elements(streamed(&machine, &experiment) as u64));
+    group.bench_function("3 V, 10 Hz", |b| b.iter(|| streamed(&machine, &experiment)));
     group.finish();
 }
 
 /// A recorded input of 10 kHz, held and joined, on rows of 1 kHz.
 fn edges(c: &mut Criterion) {
-    let stage = common::table4();
+    let machine = common::table4();
     let times: Vec<f64> = (0..10_000).map(|k| f64::from(k) * 1e-4 + 3e-5).collect();
     let values: Vec<f64> = times.iter().map(|t| 4.0 * (20.0 * t).sin() + 2.0 * (313.0 * t).sin()).collect();
     let mut group = c.benchmark_group("edges of a sampled input");
@@ -76,7 +76,7 @@ fn edges(c: &mut Criterion) {
     for (name, hold) in [("held", Hold::Zero), ("joined", Hold::Linear)] {
         let input = Signal::Sampled { times: times.clone(), values: values.clone(), hold };
         let experiment = common::experiment(input, 1.0);
-        group.bench_function(name, |b| b.iter(|| streamed(&stage, &experiment)));
+        group.bench_function(name, |b| b.iter(|| streamed(&machine, &experiment)));
     }
     group.finish();
 }
@@ -86,16 +86,16 @@ fn edges(c: &mut Criterion) {
 fn general(c: &mut Criterion) {
     let experiment = common::experiment(pulse(), 1.0);
     let dry = |law: Law| {
-        let mut stage = common::table4();
-        let r = stage.pulley_radius;
-        stage.cart.friction = Friction::with_breakaway(19.0424, 0.2, 0.26).following(law);
+        let mut machine = common::table4();
+        let r = machine.pulley_radius;
+        machine.cart.friction = Friction::with_breakaway(19.0424, 0.2, 0.26).following(law);
         let pulley = Friction::with_breakaway(0.0016, 0.015, 0.0195);
-        (stage.drive_pulley.friction, stage.idler_pulley.friction) = (pulley, pulley);
+        (machine.drive_pulley.friction, machine.idler_pulley.friction) = (pulley, pulley);
         if let Law::Stribeck { velocity, shape } = law {
             let law = Law::Stribeck { velocity: velocity / r, shape };
-            (stage.drive_pulley.friction.law, stage.idler_pulley.friction.law) = (law, law);
+            (machine.drive_pulley.friction.law, machine.idler_pulley.friction.law) = (law, law);
         }
-        stage
+        machine
     };
     let mut follows = common::table4();
     let make = BeltMake { modulus: 8.335e9, section: 5.5626e-6, spans: [0.34925, 0.34925, 0.7874] };
@@ -111,42 +111,42 @@ fn general(c: &mut Criterion) {
         ("spans that follow the cart", follows),
     ];
     let mut group = c.benchmark_group("general, 5 V pulse, 1 s, 1001 rows");
-    for (name, stage) in &cases {
-        group.bench_function(*name, |b| b.iter(|| streamed_by(Solver::GENERAL, stage, &experiment)));
+    for (name, machine) in &cases {
+        group.bench_function(*name, |b| b.iter(|| streamed_by(Solver::GENERAL, machine, &experiment)));
     }
     group.finish();
 }
 
 /// The derivatives of two columns by ten numbers of the machine, and the run that they belong to.
 fn derivatives(c: &mut Criterion) {
-    let (stage, experiment) = (common::table4(), common::experiment(pulse(), 1.0));
-    let changes: [fn(&mut Stage, f64); 10] = [
-        |stage, by| stage.motor.resistance *= 1.0 + by,
-        |stage, by| stage.motor.torque_constant *= 1.0 + by,
-        |stage, by| stage.motor.back_emf_constant *= 1.0 + by,
-        |stage, by| stage.drive_pulley.inertia *= 1.0 + by,
-        |stage, by| stage.idler_pulley.inertia *= 1.0 + by,
-        |stage, by| stage.cart.mass *= 1.0 + by,
-        |stage, by| stage.belt.stiffness[0] *= 1.0 + by,
-        |stage, by| stage.belt.stiffness[1] *= 1.0 + by,
-        |stage, by| stage.belt.stiffness[2] *= 1.0 + by,
-        |stage, by| stage.pulley_radius *= 1.0 + by,
+    let (machine, experiment) = (common::table4(), common::experiment(pulse(), 1.0));
+    let changes: [fn(&mut Machine, f64); 10] = [
+        |machine, by| machine.motor.resistance *= 1.0 + by,
+        |machine, by| machine.motor.torque_constant *= 1.0 + by,
+        |machine, by| machine.motor.back_emf_constant *= 1.0 + by,
+        |machine, by| machine.drive_pulley.inertia *= 1.0 + by,
+        |machine, by| machine.idler_pulley.inertia *= 1.0 + by,
+        |machine, by| machine.cart.mass *= 1.0 + by,
+        |machine, by| machine.belt.stiffness[0] *= 1.0 + by,
+        |machine, by| machine.belt.stiffness[1] *= 1.0 + by,
+        |machine, by| machine.belt.stiffness[2] *= 1.0 + by,
+        |machine, by| machine.pulley_radius *= 1.0 + by,
     ];
     let variables = changes.map(|change| {
         Variable::central(1e-5, |by| {
-            let mut stage = stage.clone();
-            change(&mut stage, by);
-            let mechanism = Arc::new(stage.mechanism());
+            let mut machine = machine.clone();
+            change(&mut machine, by);
+            let mechanism = Arc::new(machine.mechanism());
             Begun { start: experiment.initial.state(&mechanism), mechanism }
         })
     });
     let outputs = [Shown::Position(DRIVE, 1.0), Shown::Position(CART, 1.0)].map(Differentiated::Shown);
     let mut group = c.benchmark_group("derivatives, 5 V pulse, 1 s, 1001 rows");
-    group.bench_function("the run alone", |b| b.iter(|| streamed(&stage, &experiment)));
+    group.bench_function("the run alone", |b| b.iter(|| streamed(&machine, &experiment)));
     group.bench_function("two columns by ten parameters", |b| {
         b.iter(|| {
             let mut bench = Bench::default();
-            bench.mount(&stage).expect("the machine is sound");
+            bench.mount(&machine).expect("the machine is sound");
             bench.sensitivities(&experiment, &variables, &outputs).expect("the machine is sound").is_some()
         });
     });

@@ -11,12 +11,12 @@ use std::hint::black_box;
 use std::time::Instant;
 use taut::case::{Case, Experiment, GantryCase, TEMPLATE};
 use taut::control::{Controller, Loop, Observation, close};
+use taut::machine::axis::DRIVE;
+use taut::machine::{GearPlay, Machine};
 use taut::mechanism::Mechanism;
 use taut::signal::profile::{Leg, Limits, Profile};
 use taut::signal::{Hold, Signal};
-use taut::solve::{Course, Detail, Flow, Machine, Solver, stream, stream_mechanism};
-use taut::stage::axis::DRIVE;
-use taut::stage::{GearPlay, Stage};
+use taut::solve::{Course, Detail, Flow, Simulator, Solver, stream, stream_mechanism};
 use taut::sweep::Sweep;
 
 /// A work: its name, and what does it; the number depends on what came out.
@@ -60,7 +60,7 @@ fn works() -> taut::Result<Vec<Work>> {
 }
 
 /// One second, 1001 rows, every column.
-fn run(stage: Stage, experiment: Experiment, solver: Solver) -> Box<dyn Fn() -> f64> {
+fn run(stage: Machine, experiment: Experiment, solver: Solver) -> Box<dyn Fn() -> f64> {
     Box::new(move || {
         let outcome = stream(&stage, &experiment, solver, &mut |block| {
             black_box(block);
@@ -72,7 +72,7 @@ fn run(stage: Stage, experiment: Experiment, solver: Solver) -> Box<dyn Fn() -> 
 
 /// The Table 4 machine with an inductance, limits of voltage and current, and a gear that loses, gives way and has
 /// play.
-fn geared() -> Stage {
+fn geared() -> Machine {
     let mut stage = common::table4();
     stage.motor.inductance = 0.3e-3;
     stage.motor.rotor_inertia = 1e-6;
@@ -95,7 +95,7 @@ fn sweep() -> taut::Result<Box<dyn Fn() -> f64>> {
 /// A proportional controller along a move, one second at 1 kHz, with all figures of the move: what a search for gains
 /// calls.
 fn closed() -> taut::Result<Box<dyn Fn() -> f64>> {
-    let stage = Case::from_text("axis.toml", TEMPLATE)?.stage;
+    let stage = Case::from_text("axis.toml", TEMPLATE)?.machine;
     let profile = profile()?;
     let timing = Loop { every: 1e-3, delay: 0.0, limit: Some(LIMIT), lead: 0.0 };
     Ok(Box::new(move || {
@@ -139,8 +139,8 @@ fn h_frame() -> taut::Result<Box<dyn Fn() -> f64>> {
 
 /// The same loop without figures, stepped from outside every millisecond.
 fn stepping() -> taut::Result<Box<dyn Fn() -> f64>> {
-    let stage = Case::from_text("axis.toml", TEMPLATE)?.stage;
-    let start = Machine::new(&stage, Solver::Exact)?;
+    let stage = Case::from_text("axis.toml", TEMPLATE)?.machine;
+    let start = Simulator::new(&stage, Solver::Exact)?;
     let profile = profile()?;
     Ok(Box::new(move || {
         let (mut machine, mut events) = (start.clone(), Vec::new());

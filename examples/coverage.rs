@@ -249,9 +249,9 @@ fn recorded(cell: &Cell, truth: [f64; 3], chance: &mut Chance) -> Case {
                 }
                 _ => share.get(place).copied().unwrap_or(0.0),
             };
-            let mut stage = case.stage.clone();
-            stage.cart.mass = truth[2];
-            let friction = &mut stage.cart.friction;
+            let mut machine = case.machine.clone();
+            machine.cart.mass = truth[2];
+            let friction = &mut machine.cart.friction;
             for side in [&mut friction.forward, &mut friction.backward] {
                 side.viscous = truth[0] * (1.0 + off);
                 side.coulomb = truth[1] * (1.0 + off);
@@ -272,8 +272,9 @@ fn recorded(cell: &Cell, truth: [f64; 3], chance: &mut Chance) -> Case {
             let mut experiment = pattern.clone();
             (experiment.input, experiment.initial, experiment.every) = (input, initial, EVERY);
             experiment.until = (end - begin) as f64 * EVERY;
-            let run =
-                simulate(&stage, &experiment, Solver::of(&stage)).unwrap_or_else(|error| panic!("{error}")).trajectory;
+            let run = simulate(&machine, &experiment, Solver::of(&machine))
+                .unwrap_or_else(|error| panic!("{error}"))
+                .trajectory;
             let column = |name: &str| run.get(name).unwrap_or_else(|| panic!("no column {name}"));
             let last = |name: &str| *column(name).last().unwrap_or(&0.0);
             angle.extend_from_slice(&column("drive_angle")[usize::from(part > 0)..]);
@@ -321,11 +322,11 @@ fn known(cell: &Cell, case: &Case, plan: &Plan, truth: [f64; 3], noise: &[(Quant
         _ => return None,
     };
     let mut case = case.clone();
-    let friction = &mut case.stage.cart.friction;
+    let friction = &mut case.machine.cart.friction;
     for side in [&mut friction.forward, &mut friction.backward] {
         (side.viscous, side.coulomb, side.breakaway) = (truth[0], truth[1], truth[1]);
     }
-    case.stage.cart.mass = truth[2];
+    case.machine.cart.mass = truth[2];
     let mut problem = Problem::new(&case, plan).ok()?;
     for &(quantity, deviation) in noise {
         problem.weigh(quantity, deviation, true);
@@ -349,7 +350,7 @@ fn known(cell: &Cell, case: &Case, plan: &Plan, truth: [f64; 3], noise: &[(Quant
             let mut moves: Vec<f64> = (0..n).map(|k| influence[(first + k, j)] * run.seen[0].weights[k]).collect();
             // The start is known by the first value, and as far as that is.
             for (k, deviation) in run.extras.iter().filter_map(|extra| extra.known).enumerate() {
-                moves[0] += influence[(first + n + k, j)] * case.stage.pulley_radius / deviation;
+                moves[0] += influence[(first + n + k, j)] * case.machine.pulley_radius / deviation;
             }
             sum += moves.iter().map(|w| w * w * white).sum::<f64>();
             for (deviation, time) in &slow {

@@ -11,9 +11,9 @@ use taut::case::{Case, Plan, TEMPLATE};
 use taut::chance::normal;
 use taut::fit::fit;
 use taut::log::{Log, Output, Quantity};
+use taut::machine::AmplifierMode;
 use taut::signal::{Hold, Signal};
 use taut::solve::{Flow, Solver, simulate};
-use taut::stage::AmplifierMode;
 
 /// Between samples, s.
 const EVERY: f64 = 1e-3;
@@ -116,22 +116,22 @@ fn input(fault: Fault, chance: &mut Chance, count: usize) -> Vec<f64> {
 fn made(fault: Fault, seed: u64) -> Case {
     let mut chance = Chance(Pcg64::seed_from_u64(seed));
     let mut case = Case::from_text("axis.toml", TEMPLATE).unwrap_or_else(|error| panic!("{error}"));
-    let stage = &mut case.stage;
+    let machine = &mut case.machine;
     if fault == Fault::Newtons {
-        stage.amplifier.mode = AmplifierMode::Current;
-        stage.amplifier.gain = 0.5;
-        (stage.motor.torque_constant, stage.motor.back_emf_constant) = (stage.pulley_radius, 0.0);
+        machine.amplifier.mode = AmplifierMode::Current;
+        machine.amplifier.gain = 0.5;
+        (machine.motor.torque_constant, machine.motor.back_emf_constant) = (machine.pulley_radius, 0.0);
     }
     if fault == Fault::Resonance {
-        stage.belt.stiffness = [3e3; 3];
-        stage.cart.friction.forward.coulomb *= 0.1;
-        stage.cart.friction.backward.coulomb *= 0.1;
-        stage.cart.friction.forward.breakaway *= 0.1;
-        stage.cart.friction.backward.breakaway *= 0.1;
-        stage.cart.friction.forward.viscous *= 0.05;
-        stage.cart.friction.backward.viscous *= 0.05;
+        machine.belt.stiffness = [3e3; 3];
+        machine.cart.friction.forward.coulomb *= 0.1;
+        machine.cart.friction.backward.coulomb *= 0.1;
+        machine.cart.friction.forward.breakaway *= 0.1;
+        machine.cart.friction.backward.breakaway *= 0.1;
+        machine.cart.friction.forward.viscous *= 0.05;
+        machine.cart.friction.backward.viscous *= 0.05;
     }
-    let mut truth = stage.clone();
+    let mut truth = machine.clone();
     let rough = |chance: &mut Chance| 2f64.powf(chance.between(-1.0, 1.0));
     truth.cart.mass *= if fault == Fault::Resonance { 1.1 } else { rough(&mut chance) };
     let (b, c) = (rough(&mut chance), rough(&mut chance));
@@ -152,7 +152,7 @@ fn made(fault: Fault, seed: u64) -> Case {
     let mut counted = |values: Vec<f64>, step: f64, tremble: f64| -> Vec<f64> {
         values.iter().map(|v| step * ((v + tremble * normal(&mut chance.0)) / step).round()).collect()
     };
-    let arm = case.stage.pulley_radius;
+    let arm = case.machine.pulley_radius;
     let output = |quantity, values| Output { quantity, absolute: false, values };
     let mut outputs = match fault {
         Fault::Millimetres | Fault::Resonance => {

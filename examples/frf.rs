@@ -12,9 +12,9 @@ use taut::control::{Controller, Loop, Observation, close};
 use taut::frf::{Cut, Frf, Known, estimate, fit};
 use taut::linear::{Hold, Operation, StateSpace};
 use taut::log::{Log, Output, Quantity};
+use taut::machine::Machine;
 use taut::signal::profile::{Leg, Limits, Profile};
 use taut::solve::Solver;
-use taut::stage::Stage;
 
 /// Between samples, s; length of a log, s; counts in a turn of the drive pulley.
 const EVERY: f64 = 1e-3;
@@ -71,7 +71,7 @@ impl Controller for Exciter {
 }
 
 /// A log of this stage.
-fn log(stage: &Stage, closed: bool, delay: f64, seed: u64) -> taut::Result<Log> {
+fn log(machine: &Machine, closed: bool, delay: f64, seed: u64) -> taut::Result<Log> {
     let mut exciter = Exciter {
         random: Pcg64::seed_from_u64(seed),
         closed,
@@ -80,13 +80,13 @@ fn log(stage: &Stage, closed: bool, delay: f64, seed: u64) -> taut::Result<Log> 
         input: Vec::new(),
         reference: Vec::new(),
         angle: Vec::new(),
-        radius: stage.pulley_radius,
+        radius: machine.pulley_radius,
         before: 0.0,
     };
     let limits = Limits { speed: 1.0, acceleration: 10.0, jerk: None, snap: None };
     let profile = Profile::new(0.0, &[Leg::To(1e-3, limits)])?;
     let timing = Loop { every: EVERY, delay, limit: None, lead: 0.0 };
-    close(stage, &mut exciter, &timing, &profile, LENGTH, 1.0, Solver::of(stage))?;
+    close(machine, &mut exciter, &timing, &profile, LENGTH, 1.0, Solver::of(machine))?;
     // Once everything slides: the first second is left out.
     let from = (1.0 / EVERY) as usize;
     let cut = |values: &[f64]| values[from..].to_vec();
@@ -105,8 +105,8 @@ fn log(stage: &Stage, closed: bool, delay: f64, seed: u64) -> taut::Result<Log> 
 }
 
 /// The true response.
-fn truth(stage: &Stage, delay: f64, frf: &Frf) -> taut::Result<Vec<Complex<f64>>> {
-    let system = StateSpace::of(stage, Operation::default())?;
+fn truth(machine: &Machine, delay: f64, frf: &Frf) -> taut::Result<Vec<Complex<f64>>> {
+    let system = StateSpace::of(machine, Operation::default())?;
     let output = system.output("drive_angle").unwrap_or_default();
     let model = system.discrete(EVERY, Hold::Zero, delay)?;
     Ok(frf.points.iter().map(|point| model.at(point.omega)[output]).collect())
@@ -122,7 +122,7 @@ struct Tally {
 
 fn main() -> taut::Result<()> {
     let count: u64 = std::env::args().nth(1).and_then(|text| text.parse().ok()).unwrap_or(40);
-    let base = Stage { encoder: None, ..Case::read("stages/sollmann-jouaneh/table4.toml")?.stage };
+    let base = Machine { encoder: None, ..Case::read("stages/sollmann-jouaneh/table4.toml")?.machine };
     println!("| loop | band, Hz | points | mean error of G | rms error | held by the circle |");
     println!("|---|---|---|---|---|---|");
     let mut fitted = Vec::new();
@@ -133,17 +133,17 @@ fn main() -> taut::Result<()> {
         for seed in 0..count / 2 {
             let mut random = Pcg64::seed_from_u64(1000 + 2 * seed + u64::from(closed));
             let mut between = |low: f64, high: f64| low + (high - low) * uniform(&mut random);
-            let mut stage = base.clone();
-            stage.cart.mass *= between(0.8, 1.2);
+            let mut machine = base.clone();
+            machine.cart.mass *= between(0.8, 1.2);
             let (stiffer, ratio) = (between(0.7, 1.4), between(2e-5, 8e-5));
-            let named = stage.belt.stiffness;
-            stage.belt.make = None;
-            stage.belt.stiffness = named.map(|k| k * stiffer);
-            stage.belt.damping = stage.belt.stiffness.map(|k| k * ratio);
+            let named = machine.belt.stiffness;
+            machine.belt.make = None;
+            machine.belt.stiffness = named.map(|k| k * stiffer);
+            machine.belt.damping = machine.belt.stiffness.map(|k| k * ratio);
             let delay = between(0.1e-3, 1.4e-3);
-            let log = log(&stage, closed, delay, seed)?;
+            let log = log(&machine, closed, delay, seed)?;
             let frfs = estimate(&log, &Cut::default())?;
-            let exact = truth(&stage, delay, &frfs[0])?;
+            let exact = truth(&machine, delay, &frfs[0])?;
             for (point, truth) in frfs[0].points.iter().zip(&exact) {
                 let hertz = point.omega / (2.0 * PI);
                 let band = BANDS.iter().position(|band| (band[0]..band[1]).contains(&hertz));
@@ -156,7 +156,7 @@ fn main() -> taut::Result<()> {
                     tally.square += error.norm_sqr();
                 }
             }
-            let mut model = stage.clone();
+            let mut model = machine.clone();
             model.belt.stiffness = named;
             let found = fit(&model, &Known { place: 0.0, delay: 0.7e-3 }, &frfs)?;
             let holds =

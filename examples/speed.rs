@@ -14,16 +14,16 @@ mod common;
 use std::hint::black_box;
 use std::time::Instant;
 use taut::case::Experiment;
+use taut::machine::Machine;
 use taut::signal::Signal;
 use taut::solve::{Flow, Solution, Solver, simulate, stream};
-use taut::stage::Stage;
 
 /// The cart's rest position with Coulomb friction by independent solutions, m: close reading of the paper, golden
 /// numbers.
 const CART_AT_REST: f64 = 0.053746653033;
 
 /// Problems by name.
-fn problems() -> [(&'static str, Stage); 5] {
+fn problems() -> [(&'static str, Machine); 5] {
     let table4 = common::table4;
     [
         ("coulomb", table4()),
@@ -44,9 +44,9 @@ fn best(calls: u32, work: &dyn Fn()) -> f64 {
     timed.fold(f64::INFINITY, f64::min)
 }
 
-fn seconds(stage: &Stage, experiment: &Experiment, solver: Solver, calls: u32) -> f64 {
+fn seconds(machine: &Machine, experiment: &Experiment, solver: Solver, calls: u32) -> f64 {
     best(calls, &|| {
-        black_box(stream(stage, experiment, solver, &mut |block| {
+        black_box(stream(machine, experiment, solver, &mut |block| {
             black_box(block);
             Flow::Continue
         }))
@@ -60,22 +60,22 @@ fn main() {
     match &arguments[..] {
         [problem, solver, runs] => {
             let found = problems().into_iter().find(|(name, _)| name == problem);
-            let (_, stage) = found.expect("coulomb, stribeck, lugre-1e4, lugre-1e7 or follows");
+            let (_, machine) = found.expect("coulomb, stribeck, lugre-1e4, lugre-1e7 or follows");
             let solver = match solver.as_str() {
                 "exact" => Solver::Exact,
                 tolerance => Solver::General { tolerance: tolerance.parse().expect("exact or a tolerance") },
             };
             let calls = runs.parse().expect("a number of runs");
-            rows(&stage, &experiment, solver, calls);
+            rows(&machine, &experiment, solver, calls);
         }
         _ => summary(&experiment, arguments.first().and_then(|runs| runs.parse().ok()).unwrap_or(2000)),
     }
 }
 
 /// The same lines that authorities/cvode.c prints.
-fn rows(stage: &Stage, experiment: &Experiment, solver: Solver, calls: u32) {
-    let solution = simulate(stage, experiment, solver).expect("the machine is sound");
-    println!("{:e} {}", seconds(stage, experiment, solver, calls), solution.outcome.events.len());
+fn rows(machine: &Machine, experiment: &Experiment, solver: Solver, calls: u32) {
+    let solution = simulate(machine, experiment, solver).expect("the machine is sound");
+    println!("{:e} {}", seconds(machine, experiment, solver, calls), solution.outcome.events.len());
     let [drive, cart, idler] = ["drive_angle", "cart_position", "idler_angle"]
         .map(|name| solution.trajectory.get(name).expect("in every run"));
     for ((drive, cart), idler) in drive.iter().zip(cart).zip(idler) {
@@ -84,8 +84,8 @@ fn rows(stage: &Stage, experiment: &Experiment, solver: Solver, calls: u32) {
 }
 
 /// The largest difference at the belt, m.
-fn apart(stage: &Stage, a: &Solution, b: &Solution) -> f64 {
-    let arms = [("drive_angle", stage.pulley_radius), ("cart_position", 1.0), ("idler_angle", stage.pulley_radius)];
+fn apart(machine: &Machine, a: &Solution, b: &Solution) -> f64 {
+    let arms = [("drive_angle", machine.pulley_radius), ("cart_position", 1.0), ("idler_angle", machine.pulley_radius)];
     let worst = arms.map(|(name, arm)| {
         let column = |solution: &Solution| solution.trajectory.get(name).expect("in every run").to_vec();
         column(a).iter().zip(column(b)).fold(0.0, |worst: f64, (a, b)| worst.max(arm * (a - b).abs()))
@@ -94,7 +94,7 @@ fn apart(stage: &Stage, a: &Solution, b: &Solution) -> f64 {
 }
 
 fn summary(experiment: &Experiment, calls: u32) {
-    let run = |stage: &Stage, solver: Solver| simulate(stage, experiment, solver).expect("the machine is sound");
+    let run = |machine: &Machine, solver: Solver| simulate(machine, experiment, solver).expect("the machine is sound");
     let table4 = common::table4();
     let exact = run(&table4, Solver::Exact);
     let cart = exact.trajectory.get("cart_position").expect("every run has it");
@@ -102,12 +102,12 @@ fn summary(experiment: &Experiment, calls: u32) {
     let streamed = seconds(&table4, experiment, Solver::Exact, calls);
     let kept = best(calls, &|| _ = black_box(run(&table4, Solver::Exact)));
     let mut texts = Vec::new();
-    for (name, stage) in problems() {
-        let tight = run(&stage, Solver::General { tolerance: 1e-13 });
+    for (name, machine) in problems() {
+        let tight = run(&machine, Solver::General { tolerance: 1e-13 });
         for tolerance in [1e-4, 1e-6, 1e-9] {
             let solver = Solver::General { tolerance };
-            let solution = run(&stage, solver);
-            let (error, time) = (apart(&stage, &solution, &tight), seconds(&stage, experiment, solver, calls / 10));
+            let solution = run(&machine, solver);
+            let (error, time) = (apart(&machine, &solution, &tight), seconds(&machine, experiment, solver, calls / 10));
             let (events, cost) = (solution.outcome.events.len(), solution.outcome.cost);
             texts.push(format!(
                 "{{\"problem\": \"{name}\", \"tolerance\": {tolerance:e}, \"seconds_per_run\": {time:e}, \

@@ -1,5 +1,5 @@
 //! Times a simulated second of 1 ms steps: a proportional controller in the library's closed loop, and the same stepped
-//! from outside through a [`Machine`]; prints JSON.
+//! from outside through a [`Simulator`]; prints JSON.
 //!
 //! `cargo run --release --package taut --example stepping [-- CALLS]`
 
@@ -9,7 +9,7 @@ use taut::case::{Case, TEMPLATE};
 use taut::control::{Controller, Loop, Observation, close};
 use taut::signal::Signal;
 use taut::signal::profile::{Leg, Limits, Profile};
-use taut::solve::{Machine, Solver};
+use taut::solve::{Simulator, Solver};
 
 const GAIN: f64 = 3000.0;
 const LIMIT: f64 = 12.0;
@@ -42,11 +42,11 @@ fn main() -> Result<()> {
     let profile = Profile::new(0.0, &[Leg::To(0.05, limits)])?;
     let timing = Loop { every: 1e-3, delay: 0.0, limit: Some(LIMIT), lead: 0.0 };
     let (closed, at) = best(calls, || {
-        let run = close(&case.stage, &mut Proportional, &timing, &profile, 1.0, 50e-6, Solver::Exact)?;
+        let run = close(&case.machine, &mut Proportional, &timing, &profile, 1.0, 50e-6, Solver::Exact)?;
         Ok(run.figures.final_cart_error + profile.target())
     })?;
-    let start = Machine::new(&case.stage, Solver::Exact)?;
-    let (radius, shaft) = (case.stage.pulley_radius, start.mechanism().drives[0].shaft);
+    let start = Simulator::new(&case.machine, Solver::Exact)?;
+    let (radius, shaft) = (case.machine.pulley_radius, start.mechanism().drives[0].shaft);
     let (stepped, there) = best(calls, || {
         let (mut machine, mut events) = (start.clone(), Vec::new());
         for k in 0..1000 {
@@ -58,7 +58,7 @@ fn main() -> Result<()> {
                 break;
             }
         }
-        Ok(machine.state().position[taut::stage::axis::CART])
+        Ok(machine.state().position[taut::machine::axis::CART])
     })?;
     println!(
         "{{\"closed_loop_s\": {closed:.3e}, \"stepped_s\": {stepped:.3e}, \"ratio\": {:.2}, \"apart_m\": {:.1e}}}",

@@ -57,7 +57,7 @@ fn machine(path: &str, seed: u64) -> taut::Result<Case> {
     let mut changes = Vec::new();
     for key in DRAWN {
         let factor = 2f64.powf(2.0 * uniform(&mut random) - 1.0);
-        if let Some(value) = taut::parameter::value(&base.stage, key) {
+        if let Some(value) = taut::parameter::value(&base.machine, key) {
             changes.push(format!("{key}={}", factor * value));
         }
     }

@@ -36,7 +36,7 @@ use crate::case::Case;
 use crate::control::measures_cart;
 use crate::error::{Error, Result};
 use crate::log::{Log, Quantity};
-use crate::stage::EncoderPlace;
+use crate::machine::EncoderPlace;
 use nalgebra::Complex;
 use rustfft::FftPlanner;
 use std::f64::consts::PI;
@@ -305,7 +305,7 @@ pub struct Measurement {
 /// Measures the responses of all logs of a case, and what follows from them.
 pub fn measure(case: &Case, cut: &Cut, known: Known) -> Result<Measurement> {
     case.complete()?;
-    let stage = &case.stage;
+    let machine = &case.machine;
     let mut frfs = Vec::new();
     for log in case.experiments.iter().filter_map(|experiment| experiment.log.as_ref()) {
         frfs.extend(estimate(log, cut)?);
@@ -316,9 +316,9 @@ pub fn measure(case: &Case, cut: &Cut, known: Known) -> Result<Measurement> {
         ));
     }
     let kinematic: Vec<Frf> = frfs.iter().filter(|frf| is_kinematic(frf.quantity)).cloned().collect();
-    let fit = fit(stage, &known, &kinematic);
+    let fit = fit(machine, &known, &kinematic);
     let mut fitted = fit.as_ref().map(|fit| fit.curves.clone()).unwrap_or_default().into_iter();
-    let place = match (stage.encoder, measures_cart(stage)) {
+    let place = match (machine.encoder, measures_cart(machine)) {
         (_, true) => Quantity::CartPosition,
         (Some(encoder), _) if encoder.at != EncoderPlace::DrivePulley => Quantity::RotorAngle,
         _ => Quantity::DriveAngle,
@@ -327,12 +327,12 @@ pub fn measure(case: &Case, cut: &Cut, known: Known) -> Result<Measurement> {
     for frf in frfs {
         // Without play in a gear the rotor's angle, divided by its ratio, is that of the pulley.
         let is_own = frf.quantity == place || place == Quantity::RotorAngle && frf.quantity == Quantity::DriveAngle;
-        let length = if measures_cart(stage) { 1.0 } else { stage.pulley_radius };
+        let length = if measures_cart(machine) { 1.0 } else { machine.pulley_radius };
         let margins = match &case.controller {
-            Some(design) if is_own => measured(&frf, design, stage, length).ok(),
+            Some(design) if is_own => measured(&frf, design, machine, length).ok(),
             _ => None,
         };
-        let model = fit::model(stage, known.place, known.delay, &frf).unwrap_or_default();
+        let model = fit::model(machine, known.place, known.delay, &frf).unwrap_or_default();
         let fitted = if is_kinematic(frf.quantity) { fitted.next().unwrap_or_default() } else { Vec::new() };
         responses.push(Response { frf, model, fitted, margins });
     }

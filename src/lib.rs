@@ -13,12 +13,12 @@
 //! let experiment = &case.experiments[0];
 //!
 //! // The motion, exact to rounding.
-//! let solution = simulate(&case.stage, experiment, Solver::Exact)?;
+//! let solution = simulate(&case.machine, experiment, Solver::Exact)?;
 //! assert_eq!(solution.outcome.ending, Ending::Complete);
 //!
 //! // Where the cart is, and where an encoder at the drive pulley says it is.
 //! let last = |column: &str| *solution.trajectory.get(column).unwrap().last().unwrap();
-//! let (cart, encoder) = (last("cart_position"), case.stage.pulley_radius * last("drive_angle"));
+//! let (cart, encoder) = (last("cart_position"), case.machine.pulley_radius * last("drive_angle"));
 //! assert!(cart > 0.04 && (cart - encoder).abs() < 5e-6);
 //!
 //! // Who stuck and slipped, and when.
@@ -26,8 +26,8 @@
 //! assert_eq!((first.time, first.part.name(), first.to.word()), (0.0, "drive pulley", "forward"));
 //!
 //! // The key figures.
-//! let mut meter = Meter::new(&case.stage, experiment);
-//! let outcome = stream_observed(&case.stage, experiment, Solver::Exact, &mut meter, &mut |_| Flow::Continue)?;
+//! let mut meter = Meter::new(&case.machine, experiment);
+//! let outcome = stream_observed(&case.machine, experiment, Solver::Exact, &mut meter, &mut |_| Flow::Continue)?;
 //! let metrics = meter.finish(&outcome.events);
 //! assert!(metrics.settled && metrics.stop_time < Some(0.5));
 //! # Ok::<(), taut::Error>(())
@@ -75,6 +75,7 @@ pub mod friction;
 pub mod json;
 pub mod linear;
 pub mod log;
+pub mod machine;
 pub mod measure;
 pub mod mechanism;
 pub mod metrics;
@@ -87,7 +88,6 @@ pub mod quantity;
 pub mod reduction;
 pub mod signal;
 pub mod solve;
-pub mod stage;
 pub mod sweep;
 pub mod trajectory;
 pub mod tune;

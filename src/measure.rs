@@ -11,9 +11,9 @@
 use crate::case::Experiment;
 use crate::chance::normal;
 use crate::error::{Error, Result};
+use crate::machine::{AmplifierMode, Channel, Encoder, EncoderPlace, Machine, Measurement, Quantity};
 use crate::signal::Signal;
 use crate::solve::{self, Flow, Grid, Outcome, Solution, Solver};
-use crate::stage::{AmplifierMode, Channel, Encoder, EncoderPlace, Measurement, Quantity, Stage};
 use crate::trajectory::{Column, Trajectory};
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
@@ -36,14 +36,19 @@ const FARTHEST: f64 = 0.5;
 /// use taut::case::{Case, TEMPLATE};
 /// use taut::{measure::measure, solve::Solver, stage::Measurement};
 /// let case = Case::from_text("axis.toml", TEMPLATE)?;
-/// let log = measure(&case.stage, &Measurement::default(), &case.experiments[0], Solver::Exact)?.trajectory;
+/// let log = measure(&case.machine, &Measurement::default(), &case.experiments[0], Solver::Exact)?.trajectory;
 /// let headings: Vec<String> = log.columns.iter().map(|column| column.heading()).collect();
 /// assert_eq!(headings, ["time_s", "voltage_V", "encoder_count", "drive_angle_rad"]);
 /// # Ok::<(), taut::Error>(())
 /// ```
-pub fn measure(stage: &Stage, measurement: &Measurement, experiment: &Experiment, solver: Solver) -> Result<Solution> {
+pub fn measure(
+    machine: &Machine,
+    measurement: &Measurement,
+    experiment: &Experiment,
+    solver: Solver,
+) -> Result<Solution> {
     let mut trajectory = Trajectory::default();
-    let outcome = stream(stage, measurement, experiment, solver, &mut |block| {
+    let outcome = stream(machine, measurement, experiment, solver, &mut |block| {
         trajectory.append(block);
         Flow::Continue
     })?;
@@ -52,27 +57,27 @@ pub fn measure(stage: &Stage, measurement: &Measurement, experiment: &Experiment
 
 /// The same, handing the samples to `sink` in blocks, so that memory stays bounded.
 pub fn stream(
-    stage: &Stage,
+    machine: &Machine,
     measurement: &Measurement,
     experiment: &Experiment,
     solver: Solver,
     sink: &mut dyn FnMut(&Trajectory) -> Flow,
 ) -> Result<Outcome> {
-    if stage.encoder.is_none() && measurement.channels.is_empty() {
+    if machine.encoder.is_none() && measurement.channels.is_empty() {
         return Err(Error::new("nothing is recorded: there is no encoder and no other recorded quantity")
             .next("add [encoder], or [measurement] with a quantity such as motor_current = { step = \"10 mA\" }"));
     }
     // A recorder keeps its rhythm: what is left of the run behind its last beat it does not see.
     let grid = Grid::new(measurement.every.unwrap_or(experiment.every), experiment.until).beats();
     let raster = Raster::new(grid.interval(), measurement);
-    let devices = Device::all(stage, measurement, experiment);
+    let devices = Device::all(machine, measurement, experiment);
 
     // At rest before time zero: the first row without an input.
     let still =
         Experiment { input: Signal::Step { value: 0.0, at: 0.0 }, until: grid.interval(), ..experiment.clone() };
     let still = Experiment { every: still.until, ..still };
     let mut before = Vec::new();
-    solve::stream(stage, &still, solver, &mut |block| {
+    solve::stream(machine, &still, solver, &mut |block| {
         if before.is_empty() {
             before = devices.iter().map(|device| device.source(block).map_or(f64::NAN, |values| values[0])).collect();
         }
@@ -95,9 +100,9 @@ pub fn stream(
         instant: 0.0,
         block: Trajectory::default(),
     };
-    recorder.block.columns = recorder.headings(stage);
+    recorder.block.columns = recorder.headings(machine);
     recorder.instant = recorder.draw();
-    solve::stream(stage, &fine, solver, &mut |rows| recorder.take(rows, sink))
+    solve::stream(machine, &fine, solver, &mut |rows| recorder.take(rows, sink))
 }
 
 /// The points at which the run is solved, seen from the samples.
@@ -194,8 +199,8 @@ impl Recorder<'_> {
     }
 
     /// The columns of a log, without rows.
-    fn headings(&self, stage: &Stage) -> Vec<Column> {
-        let (input, unit) = match stage.amplifier.mode {
+    fn headings(&self, machine: &Machine) -> Vec<Column> {
+        let (input, unit) = match machine.amplifier.mode {
             AmplifierMode::Voltage => ("voltage", "V"),
             AmplifierMode::Current => ("current", "A"),
         };
@@ -220,10 +225,10 @@ enum Device {
 }
 
 impl Device {
-    fn all(stage: &Stage, measurement: &Measurement, experiment: &Experiment) -> Vec<Self> {
-        let counts = |encoder: Encoder| encoder.counts_per_unit(stage.motor.gear_ratio);
-        let encoder = stage.encoder.map(|encoder| Device::Encoder { at: encoder.at, counts: counts(encoder) });
-        let scale = stage.scale.map(|scale| Device::Scale { counts: counts(scale) });
+    fn all(machine: &Machine, measurement: &Measurement, experiment: &Experiment) -> Vec<Self> {
+        let counts = |encoder: Encoder| encoder.counts_per_unit(machine.motor.gear_ratio);
+        let encoder = machine.encoder.map(|encoder| Device::Encoder { at: encoder.at, counts: counts(encoder) });
+        let scale = machine.scale.map(|scale| Device::Scale { counts: counts(scale) });
         let converter = |&channel: &Channel| {
             let noise = random(measurement.seed, &experiment.name, channel.quantity.name());
             Device::Converter { channel, noise }

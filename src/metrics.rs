@@ -13,10 +13,10 @@ pub use watch::{Sum, Watch, Watched};
 
 use crate::case::Experiment;
 use crate::friction::Motion;
+use crate::machine::Machine;
+use crate::machine::axis::{BODIES, CART, DRIVE, ROTOR};
 use crate::mechanism::{AmplifierMode, Mode, State};
 use crate::solve::{Closer, Curve, Event, Gap, Gaps, Observe, QUANTITIES, Reading, Stretch, reading};
-use crate::stage::Stage;
-use crate::stage::axis::{BODIES, CART, DRIVE, ROTOR};
 
 /// Share of the run that a stretch of constant input has to last before a steady speed is sought in it.
 const SHORTEST: f64 = 0.02;
@@ -189,7 +189,7 @@ pub enum Sought {
 /// Gathers [`Metrics`] from a run that it observes.
 #[derive(Debug, Clone)]
 pub struct Meter {
-    stage: Stage,
+    machine: Machine,
     /// The peaks that are sought, and whether the motion has to be followed at all.
     sought: [bool; PEAKS],
     follows: bool,
@@ -206,22 +206,22 @@ pub struct Meter {
 
 impl Meter {
     /// A meter for a run of `experiment` on `stage`.
-    pub fn new(stage: &Stage, experiment: &Experiment) -> Self {
-        Self::with(stage, Held::last(experiment))
+    pub fn new(machine: &Machine, experiment: &Experiment) -> Self {
+        Self::with(machine, Held::last(experiment))
     }
 
     /// The same where the last stretch of constant input is known.
-    pub(crate) fn with(stage: &Stage, held: Option<Held>) -> Self {
+    pub(crate) fn with(machine: &Machine, held: Option<Held>) -> Self {
         Self {
-            stage: stage.clone(),
+            machine: machine.clone(),
             sought: [true; PEAKS],
             follows: true,
-            shaft: if stage.motor.gear_play.is_some() { ROTOR } else { DRIVE },
+            shaft: if machine.motor.gear_play.is_some() { ROTOR } else { DRIVE },
             peaks: [Peak::default(); PEAKS],
             seen: Metrics::default(),
             plateau: held.map(Plateau::new),
             moved: false,
-            rotor: stage.motor.gear_play.map(|_| Rotor::new(reading::ROTOR_SPEED)),
+            rotor: machine.motor.gear_play.map(|_| Rotor::new(reading::ROTOR_SPEED)),
         }
     }
 
@@ -256,7 +256,7 @@ impl Meter {
         metrics.peak_force = std::array::from_fn(|span| peak(reading::FORCE + span));
         metrics.peak_current = peak(reading::CURRENT);
         metrics.peak_encoder_error = metrics.peak_stretch[0];
-        metrics.steady_speed = self.plateau.and_then(|plateau| plateau.steady_speed(&self.stage));
+        metrics.steady_speed = self.plateau.and_then(|plateau| plateau.steady_speed(&self.machine));
         for event in events {
             if let Some(body) = event.body() {
                 metrics.events[body].add(event);
@@ -342,7 +342,7 @@ impl Observe for Meter {
         let seen = &mut self.seen;
         seen.end = time;
         seen.final_drive_angle = state.position[DRIVE];
-        seen.final_drive_travel = self.stage.pulley_radius * state.position[DRIVE];
+        seen.final_drive_travel = self.machine.pulley_radius * state.position[DRIVE];
         seen.final_cart_position = state.position[CART];
         seen.final_cart_speed = state.speed[CART];
         seen.final_rotor_speed = state.speed[self.shaft];
@@ -499,13 +499,13 @@ impl Plateau {
         self.take(-speed.negative().greatest(from, 1.0).1);
     }
 
-    fn steady_speed(&self, stage: &Stage) -> Option<SteadySpeed> {
+    fn steady_speed(&self, machine: &Machine) -> Option<SteadySpeed> {
         let (value, change) = (self.last?, self.range.1 - self.range.0);
         Some(SteadySpeed {
             value,
             change,
             reached: change <= STEADY * value.abs(),
-            analytic: balanced_speed(stage, self.held.input, value),
+            analytic: balanced_speed(machine, self.held.input, value),
             input: self.held.input,
             stretch: (self.held.begin, self.held.end),
         })
@@ -538,12 +538,12 @@ impl Balance {
 ///
 /// Everything slides in the direction of the input, by its friction law, and limits of voltage and current hold. Where
 /// a law's curve lets the forces balance at several speeds, it is the one that the axis comes to from `near`, m/s.
-pub fn balanced_speed(stage: &Stage, input: f64, near: f64) -> Balance {
-    if stage.changes_along_travel() || stage.cart.forces.by_speed.is_some() {
+pub fn balanced_speed(machine: &Machine, input: f64, near: f64) -> Balance {
+    if machine.changes_along_travel() || machine.cart.forces.by_speed.is_some() {
         return Balance::Changing;
     }
-    let (motor, amplifier) = (&stage.motor, &stage.amplifier);
-    let (r, n, eta) = (stage.pulley_radius, motor.gear_ratio, motor.gear_efficiency);
+    let (motor, amplifier) = (&machine.motor, &machine.amplifier);
+    let (r, n, eta) = (machine.pulley_radius, motor.gear_ratio, motor.gear_efficiency);
     let output = amplifier.gain * input;
     let forward = output >= 0.0;
     let direction = if forward { 1.0 } else { -1.0 };
@@ -569,8 +569,8 @@ pub fn balanced_speed(stage: &Stage, input: f64, near: f64) -> Balance {
     // Sum of (16), r (17) and (18) without accelerations, with v = ẋ = r φ̇₁ = r φ̇₃ and the constant force F on the
     // cart:
     //   excess(v) = τ_M + r F − τ_f1 − τ_f2 − r F_f
-    let bodies = [(stage.drive_pulley.friction, r), (stage.cart.friction, 1.0), (stage.idler_pulley.friction, r)];
-    let load = direction * r * stage.cart.constant_force();
+    let bodies = [(machine.drive_pulley.friction, r), (machine.cart.friction, 1.0), (machine.idler_pulley.friction, r)];
+    let load = direction * r * machine.cart.constant_force();
     let viscous: f64 = bodies.iter().map(|(law, radius)| r / radius * (r / radius) * law.side(forward).viscous).sum();
     let dry = |v: f64| bodies.iter().map(|(law, radius)| r / radius * law.dry(forward, v / radius)).sum::<f64>();
     let excess = |v: f64| {

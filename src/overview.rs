@@ -10,8 +10,8 @@ mod limits;
 
 use crate::case::Opened;
 use crate::error::Result;
+use crate::machine::{AmplifierMode, BeltSheet, Motor};
 use crate::number::engineering;
-use crate::stage::{AmplifierMode, BeltSheet, Motor};
 
 /// Typical damping ratios of belts, and where they are from.
 pub const TYPICAL_DAMPING: &str = "0.013 to 0.019 follow from the tables of Sollmann and Jouaneh (2011), and 0.1 is what Klipper's input \

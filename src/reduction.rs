@@ -2,9 +2,9 @@
 
 use crate::case::Experiment;
 use crate::error::Result;
+use crate::machine::{Belt, BeltModel, Machine};
 use crate::metrics::{Meter, Peak, largest};
 use crate::solve::{Ending, Flow, Solver, stream_observed};
-use crate::stage::{Belt, BeltModel, Stage};
 use crate::trajectory::Trajectory;
 
 /// How far a reduced model is from the elastic one on one experiment.
@@ -25,13 +25,13 @@ pub struct Reduction {
 impl Reduction {
     /// Runs `experiment` on the reduced `stage` and on its elastic model; none where there is nothing to compare: the
     /// stage is not reduced, no stiffness is given, or one of the runs does not reach its end.
-    pub fn of(stage: &Stage, experiment: &Experiment, solver: Solver) -> Result<Option<Self>> {
-        let known = stage.belt.stiffness.iter().all(|k| k.is_finite());
-        if stage.belt.model == BeltModel::Elastic || !known {
+    pub fn of(machine: &Machine, experiment: &Experiment, solver: Solver) -> Result<Option<Self>> {
+        let known = machine.belt.stiffness.iter().all(|k| k.is_finite());
+        if machine.belt.model == BeltModel::Elastic || !known {
             return Ok(None);
         }
-        let elastic = Stage { belt: Belt { model: BeltModel::Elastic, ..stage.belt.clone() }, ..stage.clone() };
-        let (Some(ours), Some(theirs)) = (travel(stage, experiment, solver)?, travel(&elastic, experiment, solver)?)
+        let elastic = Machine { belt: Belt { model: BeltModel::Elastic, ..machine.belt.clone() }, ..machine.clone() };
+        let (Some(ours), Some(theirs)) = (travel(machine, experiment, solver)?, travel(&elastic, experiment, solver)?)
         else {
             return Ok(None);
         };
@@ -64,14 +64,14 @@ struct Travel {
     stretch: Peak,
 }
 
-fn travel(stage: &Stage, experiment: &Experiment, solver: Solver) -> Result<Option<Travel>> {
+fn travel(machine: &Machine, experiment: &Experiment, solver: Solver) -> Result<Option<Travel>> {
     let (mut time, mut cart, mut drive) = (Vec::new(), Vec::new(), Vec::new());
-    let mut meter = Meter::new(stage, experiment);
-    let outcome = stream_observed(stage, experiment, solver, &mut meter, &mut |rows: &Trajectory| {
+    let mut meter = Meter::new(machine, experiment);
+    let outcome = stream_observed(machine, experiment, solver, &mut meter, &mut |rows: &Trajectory| {
         let column = |name| rows.get(name).unwrap_or(&[]);
         time.extend(column("time"));
         cart.extend(column("cart_position"));
-        drive.extend(column("drive_angle").iter().map(|phi| stage.pulley_radius * phi));
+        drive.extend(column("drive_angle").iter().map(|phi| machine.pulley_radius * phi));
         Flow::Continue
     })?;
     let metrics = meter.finish(&outcome.events);

@@ -8,9 +8,9 @@
 use serde_json::Value;
 use taut::case::{Experiment, Initial};
 use taut::friction::{Friction, Side};
+use taut::machine::{Amplifier, AmplifierMode, Belt, Cart, Machine, Motor, Pulley};
 use taut::signal::Signal;
 use taut::solve::{Ending, Solver, simulate};
-use taut::stage::{Amplifier, AmplifierMode, Belt, Cart, Motor, Pulley, Stage};
 
 fn number(value: &Value, key: &str) -> f64 {
     value[key].as_f64().unwrap_or_else(|| panic!("{key} is no number in {value}"))
@@ -25,10 +25,10 @@ fn friction(value: &Value) -> Friction {
     Friction::sided(side("forward"), side("backward"))
 }
 
-fn stage(value: &Value) -> Stage {
+fn machine(value: &Value) -> Machine {
     let get = |key| number(value, key);
     let pulley = |inertia, law| Pulley { inertia: get(inertia), friction: friction(&value[law]) };
-    Stage {
+    Machine {
         motor: Motor {
             torque_constant: get("torque_constant"),
             back_emf_constant: get("back_emf_constant"),
@@ -112,7 +112,7 @@ fn compare(text: &str) -> usize {
             initial: Initial::default(),
             log: None,
         };
-        let solution = simulate(&stage(&case["stage"]), &experiment, Solver::Exact).unwrap();
+        let solution = simulate(&machine(&case["stage"]), &experiment, Solver::Exact).unwrap();
         if solution.outcome.ending != Ending::Complete {
             faults.push(format!("{name}: ended with {:?}", solution.outcome.ending));
             continue;

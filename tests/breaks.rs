@@ -122,7 +122,7 @@ impl Draw {
         let (corner, louder) = (self.decades(50.0, 300.0), self.decades(0.5, 2.0));
         let mut case = Case::from_text("loop.toml", &text).unwrap_or_else(|error| panic!("{error}\n{text}"));
         let design = case.controller.clone().unwrap();
-        let mut design = place(&design, &case.stage, hertz, damping).unwrap_or(design);
+        let mut design = place(&design, &case.machine, hertz, damping).unwrap_or(design);
         match &mut design.structure {
             taut::design::Structure::Pid(pid) => pid.filter = corner,
             taut::design::Structure::Cascade(cascade) => {
@@ -137,15 +137,15 @@ impl Draw {
             other => panic!("{other:?}"),
         }
         case.controller = Some(design);
-        case.stage.encoder.iter_mut().chain(&mut case.stage.scale).for_each(|encoder| encoder.lines = FINE);
+        case.machine.encoder.iter_mut().chain(&mut case.machine.scale).for_each(|encoder| encoder.lines = FINE);
         case
     }
 }
 
 fn margins(case: &Case) -> Margins {
     let design = case.controller.as_ref().unwrap();
-    let feedback = Feedback::new(design, &case.stage).unwrap();
-    Margins::of(&Plant::of(&case.stage, 0.0, design, &feedback.corners()).unwrap(), &feedback)
+    let feedback = Feedback::new(design, &case.machine).unwrap();
+    Margins::of(&Plant::of(&case.machine, 0.0, design, &feedback.corners()).unwrap(), &feedback)
 }
 
 /// The least of a figure over all breaks, and whether a break has it.

@@ -4,8 +4,8 @@ use proptest::prelude::*;
 use std::path::Path;
 use taut::case::{Case, TEMPLATE};
 use taut::friction::Friction;
+use taut::machine::{AmplifierMode, EncoderPlace};
 use taut::signal::{Signal, Slot};
-use taut::stage::{AmplifierMode, EncoderPlace};
 
 fn preset(name: &str) -> Case {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("stages/sollmann-jouaneh").join(name);
@@ -24,23 +24,23 @@ fn told(changes: &[&str]) -> String {
 #[test]
 fn presets_hold_the_numbers_of_the_tables() {
     let (t1, t2, t4) = (preset("table1.toml"), preset("table2.toml"), preset("table4.toml"));
-    assert_eq!(t1.stage.belt.stiffness, [2.6552e5, 2.6552e5, 11.777e4]);
-    assert_eq!(t2.stage.belt.stiffness, [1.3276e5, 1.3276e5, 5.8885e4]);
-    assert_eq!(t4.stage.belt, t2.stage.belt);
-    assert_eq!(t4.stage.motor, t1.stage.motor);
-    assert_eq!(t1.stage.motor.torque_constant, 0.023);
-    assert_eq!(t1.stage.motor.back_emf_constant, 0.023);
-    assert_eq!(t1.stage.motor.resistance, 0.71);
-    assert_eq!((t1.stage.drive_pulley.inertia, t1.stage.idler_pulley.inertia), (7e-5, 7e-5));
-    assert_eq!((t4.stage.drive_pulley.inertia, t4.stage.idler_pulley.inertia), (6.3e-5, 6.3e-5));
-    assert_eq!(t1.stage.cart.friction, Friction::symmetric(40.6518, 0.0));
-    assert_eq!(t1.stage.drive_pulley.friction, Friction::symmetric(0.0042, 0.0));
-    assert_eq!(t2.stage.cart.friction, Friction::symmetric(20.3259, 0.0));
-    assert_eq!(t2.stage.idler_pulley.friction, Friction::symmetric(0.0021, 0.0));
-    assert_eq!(t4.stage.cart.friction, Friction::symmetric(19.0424, 0.2));
-    assert_eq!(t4.stage.drive_pulley.friction, Friction::symmetric(0.0016, 0.015));
+    assert_eq!(t1.machine.belt.stiffness, [2.6552e5, 2.6552e5, 11.777e4]);
+    assert_eq!(t2.machine.belt.stiffness, [1.3276e5, 1.3276e5, 5.8885e4]);
+    assert_eq!(t4.machine.belt, t2.machine.belt);
+    assert_eq!(t4.machine.motor, t1.machine.motor);
+    assert_eq!(t1.machine.motor.torque_constant, 0.023);
+    assert_eq!(t1.machine.motor.back_emf_constant, 0.023);
+    assert_eq!(t1.machine.motor.resistance, 0.71);
+    assert_eq!((t1.machine.drive_pulley.inertia, t1.machine.idler_pulley.inertia), (7e-5, 7e-5));
+    assert_eq!((t4.machine.drive_pulley.inertia, t4.machine.idler_pulley.inertia), (6.3e-5, 6.3e-5));
+    assert_eq!(t1.machine.cart.friction, Friction::symmetric(40.6518, 0.0));
+    assert_eq!(t1.machine.drive_pulley.friction, Friction::symmetric(0.0042, 0.0));
+    assert_eq!(t2.machine.cart.friction, Friction::symmetric(20.3259, 0.0));
+    assert_eq!(t2.machine.idler_pulley.friction, Friction::symmetric(0.0021, 0.0));
+    assert_eq!(t4.machine.cart.friction, Friction::symmetric(19.0424, 0.2));
+    assert_eq!(t4.machine.drive_pulley.friction, Friction::symmetric(0.0016, 0.015));
     for case in [t1, t2, t4] {
-        assert_eq!((case.stage.pulley_radius, case.stage.cart.mass), (0.0194, 0.362));
+        assert_eq!((case.machine.pulley_radius, case.machine.cart.mass), (0.0194, 0.362));
         let names: Vec<String> = case.experiments.iter().map(|e| e.file_name()).collect();
         assert_eq!(names, ["5-v-pulse", "10-v-pulse"]);
         assert_eq!(case.experiments[1].input, Signal::Pulse { value: 10.0, duration: 0.25, at: 0.0 });
@@ -54,7 +54,7 @@ fn the_template_reads() {
     let case = with(&[]);
     assert_eq!(case.title, "My axis");
     assert_eq!(case.experiments.len(), 2);
-    assert_eq!(case.stage.encoder.map(|e| (e.at, e.lines)), Some((EncoderPlace::Motor, 512.0)));
+    assert_eq!(case.machine.encoder.map(|e| (e.at, e.lines)), Some((EncoderPlace::Motor, 512.0)));
     assert_eq!(case.text, TEMPLATE);
 }
 
@@ -65,7 +65,7 @@ fn every_remark_of_the_template_that_shows_a_line_is_a_line() {
         assert!(shown.contains(&format!("\n# {key} ")), "{key}");
         shown = shown.replace(&format!("\n# {key} "), &format!("\n{key} "));
     }
-    assert!(Case::from_text("axis.toml", &shown).is_ok_and(|case| case.stage == with(&[]).stage));
+    assert!(Case::from_text("axis.toml", &shown).is_ok_and(|case| case.machine == with(&[]).machine));
     let recorded = ["[measurement]", "delay = \"0 s\"", "motor_current "]
         .iter()
         .fold(TEMPLATE.to_string(), |t, k| t.replace(&format!("\n# {k}"), &format!("\n{k}")));
@@ -81,19 +81,19 @@ fn every_remark_of_the_template_that_shows_a_line_is_a_line() {
     let made = TEMPLATE.replace("\nstiffness", "\n# stiffness");
     let made =
         ["modulus", "section", "spans"].iter().fold(made, |t, k| t.replace(&format!("\n# {k} "), &format!("\n{k} ")));
-    let k = Case::from_text("axis.toml", &made).unwrap().stage.belt.stiffness;
+    let k = Case::from_text("axis.toml", &made).unwrap().machine.belt.stiffness;
     assert!((k[0] / 1.3276e5 - 1.0).abs() < 1e-4 && (k[2] / 5.8885e4 - 1.0).abs() < 1e-4, "{k:?}");
 }
 
 #[test]
 fn set_changes_the_text_and_keeps_its_remarks() {
     let case = with(&["cart.mass=0.5 kg", "experiment.1.until=2s", "motor.gear_ratio=5.9"]);
-    assert_eq!(case.stage.cart.mass, 0.5);
+    assert_eq!(case.machine.cart.mass, 0.5);
     assert_eq!(case.experiments[1].until, 2.0);
-    assert_eq!(case.stage.motor.gear_ratio, 5.9);
+    assert_eq!(case.machine.motor.gear_ratio, 5.9);
     assert!(case.text.contains("mass     = \"0.5 kg\"                # with its load"), "{}", case.text);
     let again = Case::from_text("axis.toml", &case.text).unwrap();
-    assert_eq!((again.stage, again.text), (case.stage, case.text));
+    assert_eq!((again.machine, again.text), (case.machine, case.text));
 }
 
 #[test]
@@ -107,15 +107,15 @@ fn set_reaches_lists_inline_tables_and_what_is_not_there_yet() {
         "experiment.0.input={ step = \"2 V\", at = 0.1 }",
         "title=\"Another axis\"",
     ]);
-    assert_eq!(case.stage.belt.stiffness, [1e5, 2e3, 4.0]);
-    assert_eq!(case.stage.cart.friction, Friction::with_breakaway(19.0, 0.2, 0.3));
-    assert_eq!(case.stage.drive_pulley.friction.backward.breakaway, 0.02);
-    assert_eq!(case.stage.drive_pulley.friction.forward.breakaway, 0.015);
+    assert_eq!(case.machine.belt.stiffness, [1e5, 2e3, 4.0]);
+    assert_eq!(case.machine.cart.friction, Friction::with_breakaway(19.0, 0.2, 0.3));
+    assert_eq!(case.machine.drive_pulley.friction.backward.breakaway, 0.02);
+    assert_eq!(case.machine.drive_pulley.friction.forward.breakaway, 0.015);
     assert_eq!(case.experiments[0].initial.cart_position, 0.012);
     assert_eq!(case.experiments[0].input, Signal::Step { value: 2.0, at: 0.1 });
     assert_eq!(case.title, "Another axis");
     let again = Case::from_text("axis.toml", &case.text).unwrap();
-    assert_eq!((again.stage, again.text), (case.stage, case.text));
+    assert_eq!((again.machine, again.text), (case.machine, case.text));
 }
 
 #[test]
@@ -123,7 +123,7 @@ fn set_makes_missing_tables() {
     let (begin, end) = (TEMPLATE.find("[amplifier]").unwrap(), TEMPLATE.find("# ── The mechanics").unwrap());
     let text = format!("{}{}", &TEMPLATE[..begin], &TEMPLATE[end..]);
     let case = Case::from_text_with("axis.toml", &text, &["amplifier.gain=2"]).unwrap_or_else(|e| panic!("{e}"));
-    assert_eq!((case.stage.amplifier.gain, case.stage.amplifier.mode), (2.0, AmplifierMode::Voltage));
+    assert_eq!((case.machine.amplifier.gain, case.machine.amplifier.mode), (2.0, AmplifierMode::Voltage));
 }
 
 #[test]
@@ -251,12 +251,12 @@ fn a_pulley_and_a_belt_by_what_they_are_made_of() {
         "drive_pulley={ teeth = 60, pitch = '0.08 in', inertia = { outer_diameter = '38 mm', width = '10 mm', density = '2.7 g/cm^3' } }",
         "belt={ modulus = [{ share = '2/3', modulus = '6 MPa' }, { share = '1/3', modulus = '50 GPa' }], section = { plain = '5.5626 mm^2', toothed = '50 mm^2', toothed_share = 0.5 }, spans = ['13.75 in', '13.75 in', '31 in'] }",
     ]);
-    assert!((case.stage.pulley_radius - 60.0 * 2.032e-3 / (2.0 * std::f64::consts::PI)).abs() < 1e-16);
-    let make = case.stage.belt.make.expect("a make");
+    assert!((case.machine.pulley_radius - 60.0 * 2.032e-3 / (2.0 * std::f64::consts::PI)).abs() < 1e-16);
+    let make = case.machine.belt.make.expect("a make");
     assert!((make.modulus / (2.0 / 3.0 * 6e6 + 50e9 / 3.0) - 1.0).abs() < 1e-15);
     assert!((make.section / (1.0 / (0.5 / 50e-6 + 0.5 / 5.5626e-6)) - 1.0).abs() < 1e-15);
     assert_eq!(make.spans, [0.34925, 0.34925, 0.7874]);
-    assert!((case.stage.drive_pulley.inertia / 5.527e-6 - 1.0).abs() < 1e-3, "{}", case.stage.drive_pulley.inertia);
+    assert!((case.machine.drive_pulley.inertia / 5.527e-6 - 1.0).abs() < 1e-3, "{}", case.machine.drive_pulley.inertia);
 }
 
 #[test]

@@ -3,9 +3,9 @@
 use std::fs;
 use std::path::Path;
 use taut::case::{Case, GantryCase};
+use taut::machine::BELTS;
 use taut::number::engineering;
 use taut::parameter::{free_markdown, markdown, sections};
-use taut::stage::BELTS;
 
 /// Sections of the table of parameters that a gantry alone has.
 const OF_GANTRIES: [&str; 2] = ["bridge", "gantry.initial"];
@@ -99,7 +99,7 @@ fn the_examples_of_the_reference_read() {
             other = other.replace("pitch    = \"2.03 mm\"\n", "");
         }
         let case = Case::from_text("docs/case-file.md", &other).unwrap_or_else(|error| panic!("{error}"));
-        assert_eq!(case.stage.belt.make.is_some(), table == "[belt]");
+        assert_eq!(case.machine.belt.make.is_some(), table == "[belt]");
     }
     let case = Case::from_text("docs/case-file.md", &whole).unwrap_or_else(|error| panic!("{error}\n{whole}"));
     assert!(case.experiments.len() > 5);

@@ -37,9 +37,9 @@ proptest! {
 
     /// A stretch of a good file left out, doubled or replaced.
     #[test]
-    fn mutations(stage in any::<bool>(), from in any::<usize>(), long in 0..40_usize, to in any::<usize>(),
+    fn mutations(machine in any::<bool>(), from in any::<usize>(), long in 0..40_usize, to in any::<usize>(),
                  put in "\\PC{0,12}", kind in 0..3) {
-        let text = if stage { STAGE } else { TEMPLATE };
+        let text = if machine { STAGE } else { TEMPLATE };
         let start = cut(text, from);
         let end = cut(text, (start + long).min(text.len())).max(start);
         let mut changed = format!("{}{}", &text[..start], &text[end..]);

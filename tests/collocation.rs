@@ -12,17 +12,17 @@ use proptest::prelude::*;
 use proptest::strategy::ValueTree;
 use proptest::test_runner::{RngAlgorithm, TestRng, TestRunner};
 use taut::friction::{Friction, Law, Side};
+use taut::machine::{BeltMake, Machine, Travel};
 use taut::polyline::Polyline;
 use taut::signal::Signal;
 use taut::solve::{Ending, Solution, Solver, simulate};
-use taut::stage::{BeltMake, Stage, Travel};
 
 const RADIUS: f64 = 0.0194;
 
 /// The machine, with all that its equations need beside it.
 #[derive(Debug, Clone)]
 struct Problem {
-    stage: Stage,
+    machine: Machine,
     /// V and Hz
     sine: (f64, f64),
 }
@@ -30,7 +30,7 @@ struct Problem {
 impl Problem {
     /// The stiffness of a span that follows the cart, or of one that does not.
     fn stiffness(&self, span: usize, x: f64) -> f64 {
-        let belt = &self.stage.belt;
+        let belt = &self.machine.belt;
         match belt.make.filter(|_| belt.follows_cart) {
             Some(make) => make.modulus * make.section / (make.spans[span] + [-x, x, 0.0][span]),
             None => belt.stiffness[span],
@@ -60,17 +60,17 @@ impl Problem {
 /// φ₁, φ̇₁, x, ẋ, φ₃, φ̇₃, and the bristles of the three bodies.
 impl FirstOrderSystem for Problem {
     fn derivative(&self, t: f64, y: &[f64], rate: &mut [f64]) {
-        let (stage, motor, x) = (&self.stage, &self.stage.motor, y[2]);
+        let (machine, motor, x) = (&self.machine, &self.machine.motor, y[2]);
         let u = self.sine.0 * (2.0 * std::f64::consts::PI * self.sine.1 * t).sin();
         let f1 = self.stiffness(0, x) * (RADIUS * y[0] - x);
         let f2 = self.stiffness(1, x) * (x - RADIUS * y[4]);
         let f3 = self.stiffness(2, x) * RADIUS * (y[4] - y[0]);
         let torque = motor.torque_constant * (u - motor.back_emf_constant * y[1]) / motor.resistance;
         let loads = [torque - RADIUS * f1 + RADIUS * f3, f1 - f2, RADIUS * f2 - RADIUS * f3];
-        let laws = [stage.drive_pulley.friction, stage.cart.friction, stage.idler_pulley.friction];
-        let inertia = [stage.drive_pulley.inertia, stage.cart.mass, stage.idler_pulley.inertia];
+        let laws = [machine.drive_pulley.friction, machine.cart.friction, machine.idler_pulley.friction];
+        let inertia = [machine.drive_pulley.inertia, machine.cart.mass, machine.idler_pulley.inertia];
         for body in 0..3 {
-            let factor = stage.cart.along.as_ref().filter(|_| body == 1).map_or(1.0, |along| along.value(x));
+            let factor = machine.cart.along.as_ref().filter(|_| body == 1).map_or(1.0, |along| along.value(x));
             let (friction, bristle) = Self::friction(&laws[body], factor, y[2 * body + 1], y[6 + body]);
             rate[2 * body] = y[2 * body + 1];
             rate[2 * body + 1] = (loads[body] - friction) / inertia[body];
@@ -124,15 +124,15 @@ fn problem() -> impl Strategy<Value = Problem> {
         };
         let make = BeltMake { modulus: 8.335e9, section: 5.5626e-6, spans: [0.3, 0.4, 0.7] };
         let (pulley, cart) = (of(RADIUS, 4.0, 0.7), of(1.0, 19.0, 0.2));
-        let mut stage = common::paper_stage(make.stiffness(), 6.3e-5, pulley, cart);
+        let mut machine = common::paper_stage(make.stiffness(), 6.3e-5, pulley, cart);
         if belt.0 {
-            (stage.belt.make, stage.belt.follows_cart) = (Some(make), true);
-            stage.travel = Some(Travel { min: -0.25, max: 0.25, stop: None });
+            (machine.belt.make, machine.belt.follows_cart) = (Some(make), true);
+            machine.travel = Some(Travel { min: -0.25, max: 0.25, stop: None });
         }
         if belt.1 {
-            stage.cart.along = Polyline::new(vec![[-0.2, 1.4], [-0.01, 1.0], [0.03, 1.6], [0.2, 0.7]]);
+            machine.cart.along = Polyline::new(vec![[-0.2, 1.4], [-0.01, 1.0], [0.03, 1.6], [0.2, 0.7]]);
         }
-        Problem { stage, sine }
+        Problem { machine, sine }
     })
 }
 
@@ -144,7 +144,7 @@ proptest! {
         let (until, every) = (0.3, 1e-3);
         let input = Signal::Sine { amplitude: problem.sine.0, frequency: problem.sine.1, phase: 0.0, offset: 0.0 };
         let experiment = common::experiment(input, until);
-        let solution = simulate(&problem.stage, &experiment, Solver::General { tolerance: 1e-11 }).unwrap();
+        let solution = simulate(&problem.machine, &experiment, Solver::General { tolerance: 1e-11 }).unwrap();
         prop_assert_eq!(solution.outcome.ending, Ending::Complete);
         let mut rows = Rows { every, rows: Vec::new() };
         let (relative, absolute) = (Tolerance::Scalar(1e-12), Tolerance::Scalar(1e-14));
@@ -174,7 +174,7 @@ fn a_tolerance_is_about_what_positions_are_off_by() {
         let problem = problem().new_tree(&mut runner).unwrap().current();
         let input = Signal::Sine { amplitude: problem.sine.0, frequency: problem.sine.1, phase: 0.0, offset: 0.0 };
         let experiment = common::experiment(input, 0.2);
-        let run = |tolerance| simulate(&problem.stage, &experiment, Solver::General { tolerance }).unwrap();
+        let run = |tolerance| simulate(&problem.machine, &experiment, Solver::General { tolerance }).unwrap();
         let (usual, tight) = (run(1e-9), run(1e-13));
         let columns = [("drive_angle", RADIUS), ("cart_position", 1.0), ("idler_angle", RADIUS)];
         let apart = columns.map(|(name, lever)| {

@@ -38,7 +38,7 @@ every = 1e-3
 
 fn run(changes: &[&str]) -> (Case, Solution) {
     let case = Case::from_text_with("axis.toml", AXIS, changes).unwrap();
-    let solution = simulate(&case.stage, &case.experiments[0], Solver::of(&case.stage)).unwrap();
+    let solution = simulate(&case.machine, &case.experiments[0], Solver::of(&case.machine)).unwrap();
     assert_eq!(solution.outcome.ending, Ending::Complete, "{changes:?}");
     (case, solution)
 }
@@ -70,7 +70,7 @@ fn play_and_losses_by_both_solvers() {
         ["motor.gear_efficiency=0.6", "motor.gear_stiffness=300", "motor.backlash=0.01", "motor.gear_damping=0.05"];
     let (case, exact) = run(&changes);
     assert!(exact.trajectory.get("gear_state").unwrap().contains(&-1.0));
-    let general = simulate(&case.stage, &case.experiments[0], Solver::General { tolerance: 1e-11 }).unwrap();
+    let general = simulate(&case.machine, &case.experiments[0], Solver::General { tolerance: 1e-11 }).unwrap();
     let off = apart(&exact, &general, "cart_position");
     assert!(off < 1e-8, "{off:e}");
     assert_eq!(exact.outcome.events.len(), general.outcome.events.len());
@@ -105,14 +105,14 @@ fn a_two_mass_belt_that_follows_the_cart() {
         "experiment.there.until=0.2",
     ];
     let (case, solution) = run(&smooth);
-    let (stage, motor) = (&case.stage, &case.stage.motor);
-    let (r, n, ea) = (stage.pulley_radius, motor.gear_ratio, 8e9 * 5e-6);
-    let inertia = stage.drive_pulley.inertia + stage.idler_pulley.inertia + n * n * motor.rotor_inertia;
+    let (machine, motor) = (&case.machine, &case.machine.motor);
+    let (r, n, ea) = (machine.pulley_radius, motor.gear_ratio, 8e9 * 5e-6);
+    let inertia = machine.drive_pulley.inertia + machine.idler_pulley.inertia + n * n * motor.rotor_inertia;
     let rate = |[phi, omega, x, v]: [f64; 4]| {
         // k₁ = E A/(l₁ − x); 2 and 3 in series are one span of l₂ + l₃ + x.
         let force = (ea / (0.4 - x) + ea / (0.45 + 0.85 + x)) * (r * phi - x);
         let torque = n * motor.torque_constant * (6.0 - motor.back_emf_constant * n * omega) / motor.resistance;
-        [omega, (torque - 2e-3 * omega - r * force) / inertia, v, (force - 4.0 * v) / stage.cart.mass]
+        [omega, (torque - 2e-3 * omega - r * force) / inertia, v, (force - 4.0 * v) / machine.cart.mass]
     };
     let (mut y, h) = ([0.0; 4], 1e-6);
     let add = |y: [f64; 4], k: [f64; 4], h: f64| std::array::from_fn(|j| y[j] + h * k[j]);
@@ -135,6 +135,6 @@ fn a_two_mass_belt_that_follows_the_cart() {
 #[test]
 fn a_rigid_belt_follows_the_cart_too() {
     let (case, follows) = run(&["belt.follows_cart=true", "belt.model=rigid"]);
-    assert_eq!(Solver::of(&case.stage), Solver::Exact);
+    assert_eq!(Solver::of(&case.machine), Solver::Exact);
     assert_eq!(apart(&follows, &run(&["belt.model=rigid"]).1, "cart_position"), 0.0);
 }

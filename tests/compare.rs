@@ -21,7 +21,7 @@ fn made(truth: &[&str], seed: u64) -> Case {
     let step = std::f64::consts::TAU / 2048.0;
     let mut chance = Chance::new(seed);
     case.experiments.remove(0);
-    let run = simulate(&real.stage, &real.experiments[1], Solver::Exact).unwrap().trajectory;
+    let run = simulate(&real.machine, &real.experiments[1], Solver::Exact).unwrap().trajectory;
     let angle = run.get("drive_angle").unwrap().iter();
     let values = angle.map(|v| step * ((v + 1e-3 * chance.normal()) / step).round()).collect();
     let name = case.experiments[0].name.clone();
@@ -59,7 +59,7 @@ fn the_law_of_the_machine_is_chosen() {
         assert!(found.candidates.windows(2).all(|pair| pair[0].held_out <= pair[1].held_out));
         let viscous = found.candidates.iter().find(|one| one.law == FrictionLaw::Viscous).unwrap();
         assert!(viscous.held_out > 3.0 * chosen.held_out, "{viscous:?} {chosen:?}");
-        let backward = found.fit.stage.cart.friction.backward.coulomb;
+        let backward = found.fit.machine.cart.friction.backward.coulomb;
         assert!((backward - if law == FrictionLaw::Asymmetric { 0.9 } else { 0.2 }).abs() < 0.06, "{backward}");
     }
 }
@@ -157,7 +157,7 @@ fn campaigns_have_parameters_for_themselves() {
         }
         let texts = [0, 1].map(|part| found.case_text_of(&case, "axis.toml".as_ref(), part).unwrap());
         let coulomb =
-            texts.map(|text| Case::from_text("fitted.toml", &text).unwrap().stage.cart.friction.forward.coulomb);
+            texts.map(|text| Case::from_text("fitted.toml", &text).unwrap().machine.cart.friction.forward.coulomb);
         assert!((coulomb[0] - 0.2).abs() < 0.1 && (coulomb[1] - 1.2).abs() < 0.1, "{coulomb:?}");
     }
 }
@@ -209,7 +209,7 @@ fn the_start_of_a_log_that_is_held_out_is_fitted() {
 fn a_force_that_is_missing_is_seen() {
     let case = made(&["cart.load=0.8"], 4);
     let found = fit(&case, &plan(&[]), None, &mut |_| Flow::Continue).unwrap();
-    let own = residual_force(&found.stage, &found.logs[0]).unwrap();
+    let own = residual_force(&found.machine, &found.logs[0]).unwrap();
     let mean = own.force.iter().sum::<f64>() / own.force.len() as f64;
     assert!((mean - 0.8).abs() < 0.08, "{mean}");
     assert!(own.time.len() > 1000 && own.position.len() == own.force.len());

@@ -9,10 +9,10 @@ use taut::case::Case;
 use taut::control::compensation::Compensation;
 use taut::control::{Loop, Rows, Setup, Standard, closed_loop, riccati, sliding, spread, stream};
 use taut::design::*;
+use taut::machine::rigid::Rigid;
+use taut::machine::{Encoder, EncoderPlace, Machine};
 use taut::signal::profile::{Leg, Limits, Profile, Reference, Stroke};
 use taut::solve::{Ending, Flow, Solver};
-use taut::stage::rigid::Rigid;
-use taut::stage::{Encoder, EncoderPlace, Stage};
 
 fn limits() -> impl Strategy<Value = Limits> {
     (
@@ -167,9 +167,9 @@ fn closed_loops_agree_with_the_authority() {
                 current: None,
             }),
         };
-        let mut stage = common::table4();
+        let mut machine = common::table4();
         let at_cart = case["at"] == "cart";
-        stage.encoder = match get("counts_per_turn") {
+        machine.encoder = match get("counts_per_turn") {
             _ if at_cart => Some(Encoder { at: EncoderPlace::Cart, lines: 1e12 }),
             0.0 => None,
             counts => Some(Encoder { at: EncoderPlace::DrivePulley, lines: counts / 4.0 }),
@@ -187,11 +187,11 @@ fn closed_loops_agree_with_the_authority() {
         let profile = Profile::new(0.0, &[Leg::To(distance, limits)]).unwrap();
         let rows = case["rows"].as_array().unwrap();
         for (solver, tolerance) in [(Solver::Exact, 1e-9), (Solver::General { tolerance: 1e-11 }, 1e-8)] {
-            let mut controller = Standard::new(&design, &stage).unwrap();
+            let mut controller = Standard::new(&design, &machine).unwrap();
             let mut trajectory = taut::trajectory::Trajectory::default();
             let every = get("every") * get("row");
             let run = stream(
-                &stage,
+                &machine,
                 &mut controller,
                 &Loop::of(&design),
                 &profile,
@@ -289,8 +289,8 @@ const SLIDING: SlidingMode =
     SlidingMode { bandwidth: 15.0, reaching: 7.0, boundary: 0.7, integral: 4000.0, filter: 200.0 };
 
 /// The paper's machine with the encoder of its rig.
-fn rig() -> Stage {
-    Stage { encoder: Some(Encoder { at: EncoderPlace::DrivePulley, lines: 3020.0 }), ..common::table4() }
+fn rig() -> Machine {
+    Machine { encoder: Some(Encoder { at: EncoderPlace::DrivePulley, lines: 3020.0 }), ..common::table4() }
 }
 
 proptest! {
@@ -307,12 +307,12 @@ proptest! {
         (distance, acceleration) in (0.005..0.1_f64, 1.0..100.0_f64),
         (compensate, observer, cart) in any::<(bool, bool, bool)>(),
     ) {
-        let mut stage = rig();
-        stage.amplifier.voltage_limit = Some(voltage);
-        stage.amplifier.current_limit = Some(current);
-        stage.motor.inductance = inductance;
+        let mut machine = rig();
+        machine.amplifier.voltage_limit = Some(voltage);
+        machine.amplifier.current_limit = Some(current);
+        machine.motor.inductance = inductance;
         if cart {
-            stage.encoder = Some(Encoder { at: EncoderPlace::Cart, lines: 250_000.0 });
+            machine.encoder = Some(Encoder { at: EncoderPlace::Cart, lines: 250_000.0 });
         }
         let design = Design {
             delay,
@@ -324,16 +324,16 @@ proptest! {
         };
         let limits = Limits { speed: 0.5, acceleration, jerk: None, snap: None };
         let profile = Profile::new(0.0, &[Leg::To(distance, limits)]).unwrap();
-        let mut controller = Standard::new(&design, &stage).unwrap();
+        let mut controller = Standard::new(&design, &machine).unwrap();
         let timing = Loop::of(&design);
         let rows = Rows { until: 3.0, every: 1e-3, window: 1e-3 };
-        let run = stream(&stage, &mut controller, &timing, &profile, &rows, Solver::Exact, true, &mut |_| Flow::Continue).unwrap();
+        let run = stream(&machine, &mut controller, &timing, &profile, &rows, Solver::Exact, true, &mut |_| Flow::Continue).unwrap();
         prop_assert_eq!(run.outcome.ending, Ending::Complete);
         prop_assert!(run.kept.iter().all(|s| s.given.abs() <= limit && s.asked.is_finite()));
         let end = run.figures.final_cart_error;
         prop_assert!(end.abs() < 5e-3, "{:?} ends {end} off", design.structure.name());
         // The same again gives the same: the controller forgets.
-        let again = stream(&stage, &mut controller, &timing, &profile, &rows, Solver::Exact, true, &mut |_| Flow::Continue).unwrap();
+        let again = stream(&machine, &mut controller, &timing, &profile, &rows, Solver::Exact, true, &mut |_| Flow::Continue).unwrap();
         prop_assert_eq!(run.kept, again.kept);
     }
 }
@@ -342,19 +342,19 @@ proptest! {
 /// reaching gain allows.
 #[test]
 fn sliding_mode_keeps_its_bounds() {
-    let stage = rig();
+    let machine = rig();
     let forward = FeedForward { model: FeedForwardModel::Elastic, compensate_stretch: true, ..FeedForward::NONE };
     let design = Design { feed_forward: forward, ..design(Structure::SlidingMode(SLIDING)) };
     let limits = Limits { speed: 0.3, acceleration: 5.0, jerk: Some(300.0), snap: Some(4e4) };
     let profile = Profile::new(0.0, &[Leg::To(0.1, limits)]).unwrap();
-    let needed = sliding::required(&SLIDING, &Rigid::of(&stage), 0.2, limits.speed, limits.acceleration);
+    let needed = sliding::required(&SLIDING, &Rigid::of(&machine), 0.2, limits.speed, limits.acceleration);
     assert!(needed < SLIDING.reaching, "{needed}");
-    let axes = spread(&stage, 0.2);
+    let axes = spread(&machine, 0.2);
     assert!(axes.len() >= 16);
     for (name, axis) in axes {
         let setup = Setup {
-            stage: &axis,
-            model: &stage,
+            machine: &axis,
+            model: &machine,
             design: &design,
             profile: &profile,
             until: 1.0,
@@ -372,11 +372,11 @@ fn sliding_mode_keeps_its_bounds() {
 fn elastic_feed_forward_beats_pid_fivefold() {
     let errors = |name: &str| -> Vec<f64> {
         let case = Case::read(format!("stages/sollmann-jouaneh/controllers/{name}.toml")).unwrap();
-        let (stage, design) = (&case.stage, case.controller.as_ref().unwrap());
+        let (machine, design) = (&case.machine, case.controller.as_ref().unwrap());
         let error = |motion: &taut::case::Move| {
             let setup = Setup {
-                stage,
-                model: stage,
+                machine,
+                model: machine,
                 design,
                 profile: &motion.profile,
                 until: motion.until,
@@ -398,12 +398,12 @@ fn elastic_feed_forward_beats_pid_fivefold() {
 /// exactly.
 #[test]
 fn the_compensated_reference_balances_the_belt() {
-    let stage = common::table4();
+    let machine = common::table4();
     let settings = FeedForward { model: FeedForwardModel::Elastic, compensate_stretch: true, ..FeedForward::NONE };
-    let compensation = Compensation::new(&stage, &settings);
+    let compensation = Compensation::new(&machine, &settings);
     let y = Reference { position: 0.1, speed: 0.2, acceleration: 3.0, ..Reference::default() };
     let needed = compensation.needed(&y);
-    let (r, [k1, k2, k3]) = (stage.pulley_radius, stage.belt.stiffness);
+    let (r, [k1, k2, k3]) = (machine.pulley_radius, machine.belt.stiffness);
     let (y1, y3) = (needed.drive.position, needed.idler[0]);
     let (f1, f2, f3) = (k1 * (y1 - y.position), k2 * (y.position - y3), k3 * (y3 - y1));
     // M ẍ = f₁ − f₂ − b ẋ − F_c and J₂ φ̈₃ = r f₂ − r f₃ − B φ̇₃ − τ_c
@@ -426,11 +426,11 @@ fn a_timing_that_is_none_is_refused() {
         }
         fn reset(&mut self) {}
     }
-    let (stage, limits) = (rig(), Limits { speed: 0.3, acceleration: 5.0, jerk: None, snap: None });
+    let (machine, limits) = (rig(), Limits { speed: 0.3, acceleration: 5.0, jerk: None, snap: None });
     let profile = Profile::new(0.0, &[Leg::To(0.01, limits)]).unwrap();
     let told = |timing: Loop, window: f64| {
         let rows = Rows { until: 0.1, every: 1e-3, window };
-        let run = stream(&stage, &mut Idle, &timing, &profile, &rows, Solver::Exact, false, &mut |_| Flow::Continue);
+        let run = stream(&machine, &mut Idle, &timing, &profile, &rows, Solver::Exact, false, &mut |_| Flow::Continue);
         run.err().map(|error| error.to_string())
     };
     let good = Loop { every: 1e-3, delay: 0.0, limit: None, lead: 0.0 };
@@ -516,37 +516,37 @@ fn a_spread_that_is_no_share_is_refused() {
     let case = Case::read("stages/sollmann-jouaneh/controllers/pid.toml").unwrap();
     let (design, motion) = (case.controller.as_ref().unwrap(), &case.moves[0]);
     for share in [f64::NAN, -0.2, 0.0, 1.0, f64::INFINITY] {
-        let told = taut::control::worst(&case.stage, design, motion, share, Solver::Exact, &|| false).unwrap_err();
+        let told = taut::control::worst(&case.machine, design, motion, share, Solver::Exact, &|| false).unwrap_err();
         let expected = format!(
             "parameters cannot be off by a share of {share:?}\n  allowed: above 0, below 1\n  next: write 0.2 for 20 %"
         );
         assert_eq!(told.to_string(), expected);
     }
-    let stopped = taut::control::worst(&case.stage, design, motion, 0.2, Solver::Exact, &|| true).unwrap();
+    let stopped = taut::control::worst(&case.machine, design, motion, 0.2, Solver::Exact, &|| true).unwrap();
     assert_eq!(stopped, None);
 }
 
 /// The feed-forward of WPILib and LinuxCNC is the rigid feed-forward, and the torque of ODrive is that of the motor.
 #[test]
 fn gains_for_drives_make_the_same_command() {
-    let stage = Case::read("stages/sollmann-jouaneh/table4.toml").unwrap().stage;
-    let rigid = taut::stage::rigid::Rigid::of(&stage);
-    let gains = taut::control::drives::drive_gains(&stage);
+    let machine = Case::read("stages/sollmann-jouaneh/table4.toml").unwrap().machine;
+    let rigid = taut::machine::rigid::Rigid::of(&machine);
+    let gains = taut::control::drives::drive_gains(&machine);
     let value = |name: &str| gains.iter().find(|gain| gain.name == name).unwrap().value;
     let (speed, acceleration) = (0.3, 4.0);
     let force = rigid.mass * acceleration + rigid.viscous[0] * speed + rigid.coulomb[0];
-    let wanted = rigid.command(force, 0.0, speed) * stage.amplifier.gain;
+    let wanted = rigid.command(force, 0.0, speed) * machine.amplifier.gain;
     let wpilib = value("kS") + value("kV") * speed + value("kA") * acceleration;
     assert!((wpilib - wanted).abs() < 1e-12 * wanted, "{wpilib} {wanted}");
     let linuxcnc = value("FF1") * 1e3 * speed + value("FF2") * 1e3 * acceleration + value("kS");
     assert!((linuxcnc - wanted).abs() < 1e-12 * wanted, "{linuxcnc} {wanted}");
     // Turns of the motor per metre, and its torque from the current.
-    let turns = stage.motor.gear_ratio / (2.0 * std::f64::consts::PI * stage.pulley_radius);
+    let turns = machine.motor.gear_ratio / (2.0 * std::f64::consts::PI * machine.pulley_radius);
     let torque = value("config.inertia") * acceleration * turns
         + value("input_torque per input_vel") * speed * turns
         + value("input_torque against dry friction");
-    let current = (wanted - rigid.brake * speed) / stage.motor.resistance;
-    assert!((torque - stage.motor.torque_constant * current).abs() < 1e-12, "{torque} {current}");
+    let current = (wanted - rigid.brake * speed) / machine.motor.resistance;
+    assert!((torque - machine.motor.torque_constant * current).abs() < 1e-12, "{torque} {current}");
     let inertia = value("P-AXIS-00391 load") - value("3140:07 load inertia");
-    assert_eq!(inertia, stage.motor.rotor_inertia);
+    assert_eq!(inertia, machine.motor.rotor_inertia);
 }

@@ -2,19 +2,19 @@
 
 use crate::common;
 use common::experiment;
+use taut::machine::{GearPlay, Machine};
 use taut::signal::Signal;
 use taut::solve::{Cost, Solver, simulate};
-use taut::stage::{GearPlay, Stage};
 
-fn cost(stage: &Stage, solver: Solver) -> Cost {
+fn cost(machine: &Machine, solver: Solver) -> Cost {
     let input = Signal::Pulse { value: 5.0, duration: 0.25, at: 0.0 };
-    simulate(stage, &experiment(input, 1.0), solver).unwrap().outcome.cost
+    simulate(machine, &experiment(input, 1.0), solver).unwrap().outcome.cost
 }
 
 /// No count is more than a quarter above what it was when this was written.
 #[track_caller]
-fn costs(stage: &Stage, solver: Solver, written: Cost) {
-    let now = cost(stage, solver);
+fn costs(machine: &Machine, solver: Solver, written: Cost) {
+    let now = cost(machine, solver);
     let counts = |cost: &Cost| {
         let Cost { samples, pieces, modes, propagators, steps, looks, series, evaluations } = *cost;
         [samples, pieces, modes, propagators, steps, looks, series, evaluations]
@@ -45,11 +45,11 @@ fn dry_friction_costs_a_look_now_and_then() {
 
 #[test]
 fn limits_and_a_gear_with_play_cost_more() {
-    let mut stage = common::table4();
-    stage.amplifier.voltage_limit = Some(3.0);
-    stage.motor.rotor_inertia = 1e-6;
-    stage.motor.gear_play = Some(GearPlay { backlash: 1e-2, stiffness: 50.0, damping: 0.01 });
+    let mut machine = common::table4();
+    machine.amplifier.voltage_limit = Some(3.0);
+    machine.motor.rotor_inertia = 1e-6;
+    machine.motor.gear_play = Some(GearPlay { backlash: 1e-2, stiffness: 50.0, damping: 0.01 });
     let zero = Cost { samples: 1001, pieces: 3, modes: 21, ..Cost::default() };
-    costs(&stage, Solver::Exact, Cost { propagators: 46, steps: 1287, looks: 995, series: 118, ..zero });
-    costs(&stage, Solver::GENERAL, Cost { propagators: 34, steps: 1272, looks: 193, evaluations: 1272, ..zero });
+    costs(&machine, Solver::Exact, Cost { propagators: 46, steps: 1287, looks: 995, series: 118, ..zero });
+    costs(&machine, Solver::GENERAL, Cost { propagators: 34, steps: 1272, looks: 193, evaluations: 1272, ..zero });
 }

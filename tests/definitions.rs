@@ -203,9 +203,9 @@ fn noise_steps_and_counts_are_those_of_the_document() {
             "motor.gear_ratio=5.9",
         ]);
         let (experiment, measurement) = (&case.experiments[0], case.measurement.as_ref().unwrap());
-        let log = measure(&case.stage, measurement, experiment, Solver::Exact).unwrap().trajectory;
-        let run = simulate(&case.stage, experiment, Solver::Exact).unwrap().trajectory;
-        let encoder = case.stage.encoder.unwrap();
+        let log = measure(&case.machine, measurement, experiment, Solver::Exact).unwrap().trajectory;
+        let run = simulate(&case.machine, experiment, Solver::Exact).unwrap().trajectory;
+        let encoder = case.machine.encoder.unwrap();
         let (mut noise, mut other) =
             (device(seed, "5 V pulse", "motor_current").1, device(seed, "5 V pulse", "cart_speed").1);
         let counts = 4.0 * 5.9 * encoder.lines / (2.0 * PI);
@@ -235,10 +235,10 @@ fn jitter_is_clipped_at_half_an_interval() {
         "measurement.seed=3",
     ]);
     let (experiment, measurement) = (&case.experiments[0], case.measurement.as_ref().unwrap());
-    let log = measure(&case.stage, measurement, experiment, Solver::Exact).unwrap().trajectory;
+    let log = measure(&case.machine, measurement, experiment, Solver::Exact).unwrap().trajectory;
     // The run at every T/100, and beyond its end.
     let fine = Experiment { every: 1e-5, until: 1.002, log: None, ..experiment.clone() };
-    let run = simulate(&case.stage, &fine, Solver::Exact).unwrap().trajectory;
+    let run = simulate(&case.machine, &fine, Solver::Exact).unwrap().trajectory;
     let truth = run.get("cart_position").unwrap();
     let (mut random, mut clipped) = (device(3, "5 V pulse", "jitter").1, 0);
     for k in 0..=1000 {

@@ -39,7 +39,7 @@ fn compare(controller: &str, mut made: Made, around: impl Fn(&Case, &Reference) 
          [[move]]\nname = \"m\"\nto = 0.01\nspeed = 0.3\nacceleration = 5\nuntil = 1\n"
     );
     let case = Case::from_text_with("axis.toml", &text, &AXIS).unwrap_or_else(|error| panic!("{error}"));
-    let mut ours = Standard::new(case.controller.as_ref().unwrap(), &case.stage).unwrap();
+    let mut ours = Standard::new(case.controller.as_ref().unwrap(), &case.machine).unwrap();
     ours.reset();
     let mut random = Pcg::new(5);
     let mut draw = |size: f64| size * random.normal();
@@ -199,10 +199,10 @@ fn cascades_are_those_of_the_document() {
         },
     );
     let split = |case: &Case, y: &Reference| {
-        let (stage, one) = (&case.stage, Mass::of(case));
-        let motor = &stage.motor;
-        let r = stage.pulley_radius;
-        let voltage = motor.gear_ratio * motor.back_emf_constant * y.speed / (r * stage.amplifier.gain);
+        let (machine, one) = (&case.machine, Mass::of(case));
+        let motor = &machine.motor;
+        let r = machine.pulley_radius;
+        let voltage = motor.gear_ratio * motor.back_emf_constant * y.speed / (r * machine.amplifier.gain);
         let rest = rigid_command(case, y) - voltage;
         [voltage, rest * one.push * r / (motor.gear_ratio * motor.torque_constant)]
     };
@@ -275,7 +275,7 @@ struct Mass {
 
 impl Mass {
     fn of(case: &Case) -> Self {
-        let s = &case.stage;
+        let s = &case.machine;
         let (r, n) = (s.pulley_radius, s.motor.gear_ratio);
         let pulleys = s.drive_pulley.inertia + n * n * s.motor.rotor_inertia + s.idler_pulley.inertia;
         let (drive, idler, cart) = (s.drive_pulley.friction, s.idler_pulley.friction, s.cart.friction);
@@ -299,7 +299,7 @@ fn sign(y: &Reference) -> f64 {
 
 /// The command for a force and its rate at a speed, in voltage mode.
 fn command(case: &Case, force: f64, rate: f64, speed: f64) -> f64 {
-    let (s, motor) = (&case.stage, &case.stage.motor);
+    let (s, motor) = (&case.machine, &case.machine.motor);
     let n = motor.gear_ratio;
     let eta = if force * speed < 0.0 { 1.0 / motor.gear_efficiency } else { motor.gear_efficiency };
     let current = |f: f64| f * s.pulley_radius / (eta * n * motor.torque_constant);
@@ -312,22 +312,22 @@ fn rigid_command(case: &Case, y: &Reference) -> f64 {
     let (one, s) = (Mass::of(case), sign(y));
     let side = usize::from(s < 0.0);
     let friction = one.viscous[side] * y.speed + s * one.coulomb[side];
-    let force = 0.9 * one.mass * y.acceleration + 0.7 * friction - case.stage.cart.load;
+    let force = 0.9 * one.mass * y.acceleration + 0.7 * friction - case.machine.cart.load;
     command(case, force, 0.9 * one.mass * y.jerk, y.speed)
 }
 
 /// y₁ with two derivatives, and F and Ḟ with all of inertia and friction.
 fn elastic(case: &Case, y: &Reference) -> (Reference, f64, f64) {
-    let stage = &case.stage;
-    let (r, n, s) = (stage.pulley_radius, stage.motor.gear_ratio, sign(y));
+    let machine = &case.machine;
+    let (r, n, s) = (machine.pulley_radius, machine.motor.gear_ratio, sign(y));
     let forward = s >= 0.0;
-    let (cart, idler) = (stage.cart.friction.side(forward), stage.idler_pulley.friction.side(forward));
-    let drive = stage.drive_pulley.friction.side(forward);
-    let [k1, k2, k3] = stage.belt.stiffness;
-    let (m, j2) = (stage.cart.mass, stage.idler_pulley.inertia);
-    let j1 = stage.drive_pulley.inertia + n * n * stage.motor.rotor_inertia;
+    let (cart, idler) = (machine.cart.friction.side(forward), machine.idler_pulley.friction.side(forward));
+    let drive = machine.drive_pulley.friction.side(forward);
+    let [k1, k2, k3] = machine.belt.stiffness;
+    let (m, j2) = (machine.cart.mass, machine.idler_pulley.inertia);
+    let j1 = machine.drive_pulley.inertia + n * n * machine.motor.rotor_inertia;
     let load = [
-        m * y.acceleration + cart.viscous * y.speed + s * cart.coulomb - stage.cart.load,
+        m * y.acceleration + cart.viscous * y.speed + s * cart.coulomb - machine.cart.load,
         m * y.jerk + cart.viscous * y.acceleration,
         m * y.snap + cart.viscous * y.jerk,
     ];
@@ -363,7 +363,7 @@ fn elastic_command(case: &Case, y: &Reference) -> f64 {
 fn the_disturbance_observer_is_that_of_the_document() {
     use nalgebra::{Matrix3, Matrix4, RowVector3, Vector3};
     let case = Case::from_text_with("axis.toml", TEMPLATE, &AXIS).unwrap_or_else(|error| panic!("{error}"));
-    let (one, motor, r) = (Mass::of(&case), case.stage.motor, case.stage.pulley_radius);
+    let (one, motor, r) = (Mass::of(&case), case.machine.motor, case.machine.pulley_radius);
     let n = motor.gear_ratio;
     let d = one.viscous[0] + n * n * motor.torque_constant * motor.back_emf_constant / (motor.resistance * r * r);
     // ẏ = v, v̇ = −(d/M) v + (g/M)(u + w), ẇ = 0, held over T: e^{[A B; 0 0] T} by its series
@@ -404,7 +404,7 @@ fn the_disturbance_observer_is_that_of_the_document() {
     );
     let dry = |case: &Case, y: &Reference| {
         let (one, s) = (Mass::of(case), sign(y));
-        [0.0, (s * one.coulomb[usize::from(s < 0.0)] - case.stage.cart.load) / one.push]
+        [0.0, (s * one.coulomb[usize::from(s < 0.0)] - case.machine.cart.load) / one.push]
     };
     compare("pid = { proportional = 1500 }\ndisturbance_observer = { bandwidth = 8 }", made, dry, false);
 }

@@ -4,8 +4,8 @@
 use taut::case::{Case, TEMPLATE};
 use taut::fit::experiment_design::{Criterion, Kind, Request, design, verify};
 use taut::log::Quantity;
+use taut::machine::Channel;
 use taut::solve::{Solver, simulate};
-use taut::stage::Channel;
 
 fn template() -> Case {
     Case::from_text("axis.toml", TEMPLATE).unwrap()
@@ -83,9 +83,9 @@ fn what_is_written_is_what_was_judged_and_keeps_its_limits() {
         let experiment = read.experiments.last().unwrap();
         assert_eq!((&experiment.input, experiment.until), (&found.shape.signal(), 0.6), "{kind:?}\n{text}");
         for mass in [0.8, 1.0, 1.2] {
-            let mut stage = read.stage.clone();
-            stage.cart.mass *= mass;
-            let run = simulate(&stage, experiment, Solver::of(&stage)).unwrap().trajectory;
+            let mut machine = read.machine.clone();
+            machine.cart.mass *= mass;
+            let run = simulate(&machine, experiment, Solver::of(&machine)).unwrap().trajectory;
             let most = |name: &str| run.get(name).unwrap().iter().fold(0.0_f64, |most, value| most.max(value.abs()));
             assert!(most("motor_current") <= 0.9 * 2.0 * 1.002, "{kind:?}: {}", most("motor_current"));
             let x = run.get("cart_position").unwrap();
@@ -104,10 +104,10 @@ fn what_no_input_can_tell_is_told() {
     let case = template();
     let names = ["cart.friction.viscous", "drive_pulley.friction.viscous", "cart.mass"];
     let request = request(&names, &[Kind::Trapezoid]);
-    let mut stage = case.clone();
-    stage.stage.belt.model = taut::stage::BeltModel::Rigid;
-    stage.stage.drive_pulley.friction = taut::friction::Friction::symmetric(1e-3, 1e-3);
-    let found = design(&stage, &request, &|| false, &mut |_| {}).unwrap();
+    let mut machine = case.clone();
+    machine.machine.belt.model = taut::machine::BeltModel::Rigid;
+    machine.machine.drive_pulley.friction = taut::friction::Friction::symmetric(1e-3, 1e-3);
+    let found = design(&machine, &request, &|| false, &mut |_| {}).unwrap();
     let determined: Vec<bool> = names
         .iter()
         .map(|name| found.promises.iter().find(|promise| promise.name == *name).unwrap().is_determined())
@@ -140,7 +140,7 @@ fn what_cannot_be_designed_is_told() {
     let unknown = request(&["cart.mas"], &[]);
     assert!(told(&case, &unknown).contains("`cart.mas`"), "{}", told(&case, &unknown));
     let mut blind = case.clone();
-    blind.stage.encoder = None;
+    blind.machine.encoder = None;
     assert!(told(&blind, &one).contains("nothing is measured in this case"));
     let mut endless = case.clone();
     endless.experiments.clear();
@@ -148,7 +148,7 @@ fn what_cannot_be_designed_is_told() {
     let amplitude = Request { input: Some(5.0), ..one.clone() };
     assert!(told(&endless, &amplitude).contains("nothing limits the way of the cart"));
     let mut limited = case.clone();
-    limited.stage.amplifier.voltage_limit = Some(12.0);
+    limited.machine.amplifier.voltage_limit = Some(12.0);
     let beyond = Request { input: Some(20.0), ..one.clone() };
     assert!(told(&limited, &beyond).contains("an input of 20 is beyond what the amplifier gives"));
     let short = Request { duration: 5e-3, ..one.clone() };

@@ -159,8 +159,8 @@ fn a_breakaway_is_never_told_below_coulomb_friction() {
     let truth = ["cart.friction.viscous=24", "cart.friction.coulomb=0.6"];
     for seed in 1..5 {
         let mut case = with_logs_of(recorded(&truth, seed, 2e-3));
-        case.stage.cart.friction.forward.breakaway = 0.3;
-        case.stage.cart.friction.backward.breakaway = 0.3;
+        case.machine.cart.friction.forward.breakaway = 0.3;
+        case.machine.cart.friction.backward.breakaway = 0.3;
         let keys = ["cart.friction.viscous", "cart.friction.coulomb", "cart.friction.static"];
         let found = fit(&case, &plan(&keys), None, &mut |_| Flow::Continue).unwrap();
         let value = |key: &str| found.estimates.iter().find(|one| one.name == key).unwrap().value;
@@ -179,7 +179,7 @@ fn recorded(changes: &[&str], seed: u64, noise: f64) -> Case {
     let step = std::f64::consts::TAU / 2048.0;
     let mut chance = Chance::new(seed);
     for experiment in &mut case.experiments {
-        let run = simulate(&case.stage, experiment, Solver::of(&case.stage)).unwrap().trajectory;
+        let run = simulate(&case.machine, experiment, Solver::of(&case.machine)).unwrap().trajectory;
         let angle = run.get("drive_angle").unwrap().iter();
         let values = angle.map(|v| step * ((v + noise * chance.normal()) / step).round()).collect();
         experiment.log = Some(logged(&experiment.name, &run, values));
@@ -217,7 +217,7 @@ fn a_machine_is_found_again() {
     // What is written is what was found.
     let text = found.case_text(&case, "axis.toml".as_ref()).unwrap();
     let again = Case::from_text("fitted.toml", &text).unwrap();
-    assert!((again.stage.cart.mass - found.estimates[2].value).abs() < 1e-12, "{text}");
+    assert!((again.machine.cart.mass - found.estimates[2].value).abs() < 1e-12, "{text}");
 }
 
 /// The case of the file with the logs of `truth`, which answers so many rows late.
@@ -351,17 +351,17 @@ every = "1 ms"
     ] {
         let case = Case::from_text("axis.toml", &TEXT.replace("BELT", belt)).unwrap_or_else(|error| panic!("{error}"));
         let whole = ["belt.stiffness", "belt.damping", "belt.spans", "cart.friction.along.factor"];
-        let keys = values(&case.stage).into_iter().map(|(key, _)| key).chain(whole.map(str::to_string));
+        let keys = values(&case.machine).into_iter().map(|(key, _)| key).chain(whole.map(str::to_string));
         for key in keys {
-            let Ok(free) = Free::new(&case.stage, &key, &[], &[]) else { continue };
+            let Ok(free) = Free::new(&case.machine, &key, &[], &[]) else { continue };
             let value = if free.start == 0.0 { 0.01 } else { 0.99 * free.start };
-            found.stage = case.stage.clone();
-            free.set(&mut found.stage, value);
+            found.machine = case.machine.clone();
+            free.set(&mut found.machine, value);
             let sets = free.keys.iter().map(|(key, factor)| (key.clone(), factor * value)).collect();
             found.estimates = vec![Estimate { name: key.clone(), value, sets, ..estimate.clone() }];
             let text = found.case_text(&case, "axis.toml".as_ref()).unwrap_or_else(|error| panic!("{key}: {error}"));
             let written = Case::from_text("fitted.toml", &text).unwrap_or_else(|error| panic!("{key}: {error}"));
-            for ((name, wanted), (_, own)) in values(&found.stage).into_iter().zip(values(&written.stage)) {
+            for ((name, wanted), (_, own)) in values(&found.machine).into_iter().zip(values(&written.machine)) {
                 assert!(
                     (own - wanted).abs() <= 1e-12 * wanted.abs(),
                     "{key}: {name} is {own} and not {wanted}\n{text}"
@@ -422,7 +422,7 @@ fn forces_that_are_lines_are_found_again() {
         }
         // What is written is the machine that was found.
         let text = found.case_text(&case, "axis.toml".as_ref()).unwrap();
-        let again = Case::from_text("fitted.toml", &text).unwrap().stage.cart.forces;
+        let again = Case::from_text("fitted.toml", &text).unwrap().machine.cart.forces;
         let written = again.along.or(again.by_speed).unwrap();
         for (point, estimate) in written.points().iter().zip(&found.estimates) {
             assert!((point[1] - estimate.value).abs() < 1e-9, "{text}");
@@ -452,12 +452,12 @@ fn the_profile_of_what_is_well_known_is_that_of_a_linear_model() {
 /// Tied parameters stay within the bounds of each of their keys.
 #[test]
 fn bounds_hold_for_all_that_is_tied() {
-    let stage = Case::from_text("axis.toml", TEMPLATE).unwrap().stage;
+    let machine = Case::from_text("axis.toml", TEMPLATE).unwrap().machine;
     let keys = ["drive_pulley.friction.viscous", "cart.friction.viscous"];
-    let ratio = stage.cart.friction.forward.viscous / stage.drive_pulley.friction.forward.viscous;
+    let ratio = machine.cart.friction.forward.viscous / machine.drive_pulley.friction.forward.viscous;
     let parameter = |bounds: &[(&str, [f64; 2])]| {
         let bounds: Vec<(String, [f64; 2])> = bounds.iter().map(|(key, ends)| (key.to_string(), *ends)).collect();
-        Free::new(&stage, &keys.join(" = "), &[], &bounds)
+        Free::new(&machine, &keys.join(" = "), &[], &bounds)
     };
     let near = |a: f64, b: f64| assert!((a / b - 1.0).abs() < 1e-12, "{a} {b}");
     let second = parameter(&[(keys[1], [10.0, 30.0])]).unwrap();
@@ -487,10 +487,10 @@ fn a_loop_is_closed_again() {
     let profile =
         Profile::new(0.0, &[Leg::To(0.08, limits), Leg::Wait(0.1), Leg::To(0.02, limits), Leg::Wait(0.2)]).unwrap();
     let rows = Rows { until: profile.end(), every: 1e-3, window: 1e-4 };
-    let mut controller = Standard::new(&design, &case.stage).unwrap();
+    let mut controller = Standard::new(&design, &case.machine).unwrap();
     let mut run = Trajectory::default();
     let timing = Loop::of(&design);
-    stream(&real.stage, &mut controller, &timing, &profile, &rows, Solver::Exact, false, &mut |block| {
+    stream(&real.machine, &mut controller, &timing, &profile, &rows, Solver::Exact, false, &mut |block| {
         run.append(block);
         Flow::Continue
     })

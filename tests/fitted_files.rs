@@ -60,10 +60,10 @@ fn drawn(chance: &mut Chance, free: &[&str], off: f64) -> Case {
         let factor = off.powf(2.0 * chance.uniform() - 1.0);
         match *key {
             "belt.stiffness" => {
-                let spans = truth.stage.belt.stiffness.map(|k| (factor * k).to_string());
+                let spans = truth.machine.belt.stiffness.map(|k| (factor * k).to_string());
                 format!("{key}=[{}]", spans.join(", "))
             }
-            _ => format!("{key}={}", factor * value(&truth.stage, key).unwrap()),
+            _ => format!("{key}={}", factor * value(&truth.machine, key).unwrap()),
         }
     });
     let changes: Vec<String> = changes.chain([belt.to_string()]).collect();
@@ -71,7 +71,7 @@ fn drawn(chance: &mut Chance, free: &[&str], off: f64) -> Case {
     let mut case = Case::from_text_with("axis.toml", TEMPLATE, &changes).unwrap();
     let noise = 1e-3 * 10f64.powf(chance.uniform());
     for (own, other) in case.experiments.iter_mut().zip(&truth.experiments) {
-        let run = simulate(&truth.stage, other, Solver::of(&truth.stage)).unwrap().trajectory;
+        let run = simulate(&truth.machine, other, Solver::of(&truth.machine)).unwrap().trajectory;
         let angle = run.get("drive_angle").unwrap().iter();
         own.log = Some(logged(&other.name, &run, angle.map(|v| v + noise * chance.normal()).collect()));
     }
@@ -132,7 +132,7 @@ fn a_file_has_the_errors_of_its_fit_where_parameters_are_not_determined() {
         }
         // What no log shows keeps its value to the digit.
         for estimate in found.estimates.iter().filter(|estimate| estimate.name == "belt.stiffness") {
-            if case.stage.belt.model == taut::stage::BeltModel::Rigid {
+            if case.machine.belt.model == taut::machine::BeltModel::Rigid {
                 assert_eq!(estimate.value, estimate.start, "seed {seed}, {free:?}");
             }
         }
@@ -151,18 +151,18 @@ fn of_machines_that_are_alike_the_nearest_is_written() {
         let mut chance = Chance::new(seed);
         let mut case = truth.clone();
         for key in free {
-            let own = Free::new(&truth.stage, key, &[], &[]).unwrap();
-            own.set(&mut case.stage, own.start * 2f64.powf(2.0 * chance.uniform() - 1.0));
+            let own = Free::new(&truth.machine, key, &[], &[]).unwrap();
+            own.set(&mut case.machine, own.start * 2f64.powf(2.0 * chance.uniform() - 1.0));
         }
         for (own, other) in case.experiments.iter_mut().zip(&truth.experiments) {
-            let run = simulate(&truth.stage, other, Solver::of(&truth.stage)).unwrap().trajectory;
+            let run = simulate(&truth.machine, other, Solver::of(&truth.machine)).unwrap().trajectory;
             let angle = run.get("drive_angle").unwrap().iter();
             own.log = Some(logged(&other.name, &run, angle.map(|v| v + 1e-3 * chance.normal()).collect()));
         }
         let found = fitted(&case, &Plan { free: free.map(str::to_string).to_vec(), ..Plan::default() });
         // The nearest point of a surface m r² + J₁ + J₃ = J to the start, in relative changes: by a search on a grid of
         // the two inertias, the mass making up for the rest.
-        let r = case.stage.pulley_radius;
+        let r = case.machine.pulley_radius;
         let [m, a, b] = [0, 1, 2].map(|j| found.estimates[j].value);
         let [m0, a0, b0] = [0, 1, 2].map(|j| found.estimates[j].start);
         let total = m * r * r + a + b;
@@ -190,15 +190,15 @@ fn a_damping_that_is_given_as_a_ratio_stays_that_of_the_fit() {
         let text = TEMPLATE.replace("[belt]\n", &format!("[belt]\n{given}\n"));
         let truth = Case::from_text_with("axis.toml", &text, &["cart.mass=0.5"]).unwrap();
         let mut case = Case::from_text("axis.toml", &text).unwrap();
-        let run = simulate(&truth.stage, &truth.experiments[0], Solver::Exact).unwrap().trajectory;
+        let run = simulate(&truth.machine, &truth.experiments[0], Solver::Exact).unwrap().trajectory;
         let angle = run.get("drive_angle").unwrap().to_vec();
         case.experiments.truncate(1);
         case.experiments[0].log = Some(logged("run", &run, angle));
         let plan = Plan { free: vec!["cart.mass".to_string()], ..Plan::default() };
         let found = fitted(&case, &plan);
         let written = found.case_text(&case, std::path::Path::new("fitted.toml")).unwrap();
-        let again = Case::from_text("fitted.toml", &written).unwrap().stage;
-        for (read, is) in again.belt.damping.iter().zip(found.stage.belt.damping) {
+        let again = Case::from_text("fitted.toml", &written).unwrap().machine;
+        for (read, is) in again.belt.damping.iter().zip(found.machine.belt.damping) {
             assert!((read - is).abs() <= 1e-9 * is && is > 0.0, "{given}: {read} {is}");
         }
         assert!(!written.contains("static =") && !written.contains("\ndamping ="), "{written}");

@@ -7,18 +7,18 @@ use taut::case::Case;
 use taut::frf::{Cut, Frf, Known, estimate, fit, measure, measured};
 use taut::linear::{Discrete, Hold, Operation, StateSpace};
 use taut::log::{Log, Output, Quantity};
-use taut::stage::Stage;
+use taut::machine::Machine;
 
 const EVERY: f64 = 1e-3;
 
-fn stage() -> Stage {
-    let mut stage = Case::read("stages/sollmann-jouaneh/table4.toml").unwrap().stage;
+fn stage() -> Machine {
+    let mut stage = Case::read("stages/sollmann-jouaneh/table4.toml").unwrap().machine;
     stage.belt.make = None;
     stage.belt.damping = stage.belt.stiffness.map(|k| 5e-5 * k);
     stage
 }
 
-fn model(stage: &Stage, delay: f64) -> (Discrete, usize) {
+fn model(stage: &Machine, delay: f64) -> (Discrete, usize) {
     let system = StateSpace::of(stage, Operation::default()).unwrap();
     let output = system.output("drive_angle").unwrap();
     (system.discrete(EVERY, Hold::Zero, delay).unwrap(), output)
@@ -212,7 +212,7 @@ fn what_cannot_be_measured_is_told() {
     let mut signless = good.clone();
     signless.outputs[0].absolute = true;
     assert!(told(&signless, plain).contains("no output has a sign"), "{}", told(&signless, plain));
-    let rigid = Case::read("stages/emps/emps.toml").unwrap().stage;
+    let rigid = Case::read("stages/emps/emps.toml").unwrap().machine;
     let frfs = estimate(&good, &plain).unwrap();
     let known = Known { place: 0.0, delay: 0.0 };
     assert!(fit(&rigid, &known, &frfs).unwrap_err().what.contains("a rigid belt has no stiffness"));

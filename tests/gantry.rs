@@ -3,9 +3,9 @@
 use serde_json::Value;
 use taut::case::GantryCase;
 use taut::linear::{GantryAnalysis, Natural, Root};
+use taut::machine::gantry::Routing;
 use taut::metrics::{GantryMeter, GantryMetrics, Peak};
 use taut::solve::{Course, Detail, Ending, ErrorEstimate, Event, Flow, Solver, stream_mechanism};
-use taut::stage::gantry::Routing;
 use taut::trajectory::Trajectory;
 
 /// The result of the first experiment of a case.

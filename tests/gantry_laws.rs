@@ -4,11 +4,11 @@ use crate::common;
 use proptest::prelude::*;
 use taut::case::{GantryCase, GantryExperiment};
 use taut::friction::Friction;
+use taut::machine::gantry::{Belts, Gantry, Routing, Slide};
+use taut::machine::{BeltSheet, Pulley};
 use taut::mechanism::{Amplifier, AmplifierMode, Motor, State};
 use taut::signal::Signal;
 use taut::solve::{Course, Detail, Ending, Event, Flow, Solver, stream_mechanism};
-use taut::stage::gantry::{Belts, Gantry, Routing, Slide};
-use taut::stage::{BeltSheet, Pulley};
 use taut::trajectory::Trajectory;
 
 /// The result of the first experiment of a case.

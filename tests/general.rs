@@ -5,24 +5,24 @@ use common::random::{self, Dry};
 use proptest::prelude::*;
 use taut::case::{Experiment, Initial};
 use taut::friction::{Friction, Law, Shape};
+use taut::machine::{BeltMake, Machine, Travel};
 use taut::polyline::Polyline;
 use taut::signal::Signal;
 use taut::solve::{Ending, Solution, Solver, simulate};
-use taut::stage::{BeltMake, Stage, Travel};
 
 fn experiment(input: &Signal, until: f64, every: f64) -> Experiment {
     Experiment { name: "general".into(), input: input.clone(), until, every, initial: Initial::default(), log: None }
 }
 
-fn run(stage: &Stage, experiment: &Experiment, solver: Solver) -> Solution {
-    let solution = simulate(stage, experiment, solver).unwrap_or_else(|error| panic!("{error}"));
+fn run(machine: &Machine, experiment: &Experiment, solver: Solver) -> Solution {
+    let solution = simulate(machine, experiment, solver).unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(solution.outcome.ending, Ending::Complete);
     solution
 }
 
 /// The largest difference at the belt, m.
-fn apart(stage: &Stage, a: &Solution, b: &Solution) -> f64 {
-    let arms = [("drive_angle", stage.pulley_radius), ("cart_position", 1.0), ("idler_angle", stage.pulley_radius)];
+fn apart(machine: &Machine, a: &Solution, b: &Solution) -> f64 {
+    let arms = [("drive_angle", machine.pulley_radius), ("cart_position", 1.0), ("idler_angle", machine.pulley_radius)];
     let mut worst: f64 = 0.0;
     for (name, arm) in arms {
         let (a, b) = (a.trajectory.get(name).unwrap(), b.trajectory.get(name).unwrap());
@@ -34,13 +34,13 @@ fn apart(stage: &Stage, a: &Solution, b: &Solution) -> f64 {
 
 #[test]
 fn the_papers_machine_as_the_exact_solver_has_it() {
-    let stage = common::table4();
+    let machine = common::table4();
     for (volts, until) in [(5.0, 1.0), (10.0, 1.0)] {
         let experiment = experiment(&Signal::Pulse { value: volts, duration: 0.25, at: 0.0 }, until, 1e-3);
-        let exact = run(&stage, &experiment, Solver::Exact);
+        let exact = run(&machine, &experiment, Solver::Exact);
         for (tolerance, allowed, moment) in [(1e-6, 1e-8, 1e-4), (1e-9, 1e-11, 1e-8), (1e-12, 1e-13, 1e-10)] {
-            let general = run(&stage, &experiment, Solver::General { tolerance });
-            let difference = apart(&stage, &exact, &general);
+            let general = run(&machine, &experiment, Solver::General { tolerance });
+            let difference = apart(&machine, &exact, &general);
             println!("{volts} V, {tolerance:e}: {difference:.1e} m, {:?}", general.outcome.cost);
             assert!(difference < allowed, "{volts} V, {tolerance:e}: {difference:e}");
             assert_eq!(general.outcome.events.len(), exact.outcome.events.len(), "{volts} V, {tolerance:e}");
@@ -57,14 +57,14 @@ proptest! {
     /// Where both solvers apply they agree.
     #[test]
     fn general_is_exact(
-        stage in prop_oneof![random::stage(Dry::Any).boxed(), random::lined(Dry::Any).boxed()],
+        machine in prop_oneof![random::machine(Dry::Any).boxed(), random::lined(Dry::Any).boxed()],
         input in random::input()
     ) {
         // Flanks and spans that rattle undamped are chaotic.
-        let until = if random::rattles(&stage) { 0.04 } else { 0.3 };
+        let until = if random::rattles(&machine) { 0.04 } else { 0.3 };
         let experiment = experiment(&input, until, 1e-3);
-        let (a, b) = (run(&stage, &experiment, Solver::Exact), run(&stage, &experiment, Solver::General { tolerance: 1e-11 }));
-        let difference = apart(&stage, &a, &b);
+        let (a, b) = (run(&machine, &experiment, Solver::Exact), run(&machine, &experiment, Solver::General { tolerance: 1e-11 }));
+        let difference = apart(&machine, &a, &b);
         prop_assert!(difference < 1e-9, "{difference:e} m");
     }
 }
@@ -89,7 +89,7 @@ fn at_the_rim(law: Law, r: f64) -> Law {
 }
 
 /// The machine of Table 4 with breakaway 30 % above Coulomb friction and this law on all three bodies.
-fn stage_of(law: Law) -> Stage {
+fn stage_of(law: Law) -> Machine {
     let r = 0.0194;
     let pulley = Friction::with_breakaway(0.0016, 0.015, 0.0195).following(at_the_rim(law, r));
     let cart = Friction::with_breakaway(19.0424, 0.2, 0.26).following(law);
@@ -97,13 +97,13 @@ fn stage_of(law: Law) -> Stage {
 }
 
 /// The same machine with a belt of 0.3 m, 0.4 m and 0.7 m whose spans follow the cart.
-fn following(law: Law) -> Stage {
+fn following(law: Law) -> Machine {
     let make = BeltMake { modulus: 8.335e9, section: 5.5626e-6, spans: [0.3, 0.4, 0.7] };
-    let mut stage = stage_of(law);
-    stage.belt.stiffness = make.stiffness();
-    (stage.belt.make, stage.belt.follows_cart) = (Some(make), true);
-    stage.travel = Some(Travel { min: -0.2, max: 0.25, stop: None });
-    stage
+    let mut machine = stage_of(law);
+    machine.belt.stiffness = make.stiffness();
+    (machine.belt.make, machine.belt.follows_cart) = (Some(make), true);
+    machine.travel = Some(Travel { min: -0.2, max: 0.25, stop: None });
+    machine
 }
 
 fn pulse() -> Signal {
@@ -114,12 +114,12 @@ fn pulse() -> Signal {
 #[test]
 fn power_is_balanced_under_every_law() {
     for law in LAWS {
-        for mut stage in [stage_of(law), following(law)] {
-            stage.cart.along = Polyline::new(vec![[0.0, 1.0], [0.05, 1.5], [0.1, 0.8]]);
+        for mut machine in [stage_of(law), following(law)] {
+            machine.cart.along = Polyline::new(vec![[0.0, 1.0], [0.05, 1.5], [0.1, 0.8]]);
             let every = 1e-5;
-            let solution = run(&stage, &experiment(&pulse(), 0.4, every), Solver::General { tolerance: 1e-12 });
+            let solution = run(&machine, &experiment(&pulse(), 0.4, every), Solver::General { tolerance: 1e-12 });
             let column = |name: &str| solution.trajectory.get(name).unwrap();
-            let r = stage.pulley_radius;
+            let r = machine.pulley_radius;
             let [w1, v, w3] = ["drive_speed", "cart_speed", "idler_speed"].map(column);
             let [f1, f2, f3] = ["span1_force", "span2_force", "span3_force"].map(column);
             let [t1, f, t3] = ["drive_friction", "cart_friction", "idler_friction"].map(column);
@@ -261,9 +261,9 @@ fn stribeck_as_a_plain_integration_has_it() {
     for shape in [Shape::Gaussian, Shape::Exponential] {
         for follows in [false, true] {
             let law = Law::Stribeck { velocity: 0.05, shape };
-            let stage = if follows { following(law) } else { stage_of(law) };
-            let solution = run(&stage, &experiment(&pulse(), 0.4, 1e-3), Solver::General { tolerance: 1e-12 });
-            let want = plain::Plain { shape, follows, k: stage.belt.stiffness }.run(401);
+            let machine = if follows { following(law) } else { stage_of(law) };
+            let solution = run(&machine, &experiment(&pulse(), 0.4, 1e-3), Solver::General { tolerance: 1e-12 });
+            let want = plain::Plain { shape, follows, k: machine.belt.stiffness }.run(401);
             let columns = ["drive_angle", "drive_speed", "cart_position", "cart_speed", "idler_angle", "idler_speed"];
             for (j, (name, tolerance)) in columns.into_iter().zip([5e-9, 1e-5, 1e-10, 1e-7, 5e-9, 1e-5]).enumerate() {
                 let got = solution.trajectory.get(name).unwrap();
@@ -279,12 +279,12 @@ fn stribeck_as_a_plain_integration_has_it() {
 #[test]
 fn every_law_converges() {
     for law in LAWS {
-        for stage in [stage_of(law), following(law)] {
+        for machine in [stage_of(law), following(law)] {
             let experiment = experiment(&pulse(), 1.0, 1e-3);
-            let tight = run(&stage, &experiment, Solver::General { tolerance: 1e-13 });
-            let usual = run(&stage, &experiment, Solver::GENERAL);
-            let loose = run(&stage, &experiment, Solver::General { tolerance: 1e-6 });
-            let (near, far) = (apart(&stage, &usual, &tight), apart(&stage, &loose, &tight));
+            let tight = run(&machine, &experiment, Solver::General { tolerance: 1e-13 });
+            let usual = run(&machine, &experiment, Solver::GENERAL);
+            let loose = run(&machine, &experiment, Solver::General { tolerance: 1e-6 });
+            let (near, far) = (apart(&machine, &usual, &tight), apart(&machine, &loose, &tight));
             println!("{law:?}: {near:.1e} m, {far:.1e} m, {:?}", usual.outcome.cost);
             assert!(near < 1e-10 && far < 1e-7, "{law:?}: {near:e} m and {far:e} m");
             assert_eq!(usual.outcome.events.len(), tight.outcome.events.len());
@@ -297,13 +297,13 @@ fn every_law_converges() {
 
 #[test]
 fn a_factor_along_the_travel_is_coulomb_friction_times_it() {
-    let mut stage = common::table4();
+    let mut machine = common::table4();
     let twice = experiment(&pulse(), 0.5, 1e-3);
-    stage.cart.along = Polyline::new(vec![[0.0, 2.0], [0.1, 2.0]]);
-    let along = run(&stage, &twice, Solver::GENERAL);
-    stage.cart = taut::stage::Cart { friction: Friction::symmetric(19.0424, 0.4), along: None, ..stage.cart };
-    let exact = run(&stage, &twice, Solver::Exact);
-    assert!(apart(&stage, &along, &exact) < 1e-10);
+    machine.cart.along = Polyline::new(vec![[0.0, 2.0], [0.1, 2.0]]);
+    let along = run(&machine, &twice, Solver::GENERAL);
+    machine.cart = taut::machine::Cart { friction: Friction::symmetric(19.0424, 0.4), along: None, ..machine.cart };
+    let exact = run(&machine, &twice, Solver::Exact);
+    assert!(apart(&machine, &along, &exact) < 1e-10);
     let friction = |s: &Solution| s.trajectory.get("cart_friction").unwrap().to_vec();
     for (a, b) in friction(&along).iter().zip(friction(&exact)) {
         assert!((a - b).abs() < 1e-5, "{a} and {b}");
@@ -313,13 +313,13 @@ fn a_factor_along_the_travel_is_coulomb_friction_times_it() {
 /// Below breakaway a LuGre cart is a spring: deflection load / σ₀, and it goes back.
 #[test]
 fn bristles_hold_like_springs() {
-    let mut stage = stage_of(Law::LuGre { stiffness: 1e5, damping: 190.0, velocity: 0.05 });
-    stage.amplifier.mode = taut::stage::AmplifierMode::Current;
+    let mut machine = stage_of(Law::LuGre { stiffness: 1e5, damping: 190.0, velocity: 0.05 });
+    machine.amplifier.mode = taut::machine::AmplifierMode::Current;
     // 0.2 mN m of 15: far from slipping.
     let input = Signal::Pulse { value: 0.0002 / 0.023, duration: 0.5, at: 0.0 };
-    let solution = run(&stage, &experiment(&input, 1.0, 1e-3), Solver::GENERAL);
+    let solution = run(&machine, &experiment(&input, 1.0, 1e-3), Solver::GENERAL);
     let at = |name: &str, row: usize| solution.trajectory.get(name).unwrap()[row];
-    let r = stage.pulley_radius;
+    let r = machine.pulley_radius;
     let held = 1e5 * (r * at("drive_bristle", 490) + at("cart_bristle", 490) + r * at("idler_bristle", 490));
     assert!((held - 0.0002 / r).abs() < 1e-4 * held, "{held}");
     assert!((at("cart_friction", 490) - 1e5 * at("cart_bristle", 490)).abs() < 1e-6);
@@ -332,11 +332,11 @@ fn bristles_hold_like_springs() {
 /// The exact solver once called this too many events: having left its travel, the cart left it a hundred times more.
 #[test]
 fn the_cart_ends_the_run_where_its_travel_ends() {
-    let fixed = Stage { travel: Some(Travel { min: -0.2, max: 0.05, stop: None }), ..common::table4() };
+    let fixed = Machine { travel: Some(Travel { min: -0.2, max: 0.05, stop: None }), ..common::table4() };
     let mut follows = following(Law::Coulomb);
     follows.travel = fixed.travel;
-    for (stage, solver) in [(&fixed, Solver::Exact), (&fixed, Solver::GENERAL), (&follows, Solver::GENERAL)] {
-        let solution = simulate(stage, &experiment(&pulse(), 1.0, 1e-3), solver).unwrap();
+    for (machine, solver) in [(&fixed, Solver::Exact), (&fixed, Solver::GENERAL), (&follows, Solver::GENERAL)] {
+        let solution = simulate(machine, &experiment(&pulse(), 1.0, 1e-3), solver).unwrap();
         let Ending::LeftTravel { time } = solution.outcome.ending else { panic!("{:?}", solution.outcome.ending) };
         let x = solution.trajectory.get("cart_position").unwrap();
         assert!(x.iter().all(|x| *x <= 0.05) && x[x.len() - 1] > 0.049 && (time * 1e3) as usize + 1 == x.len());
@@ -345,8 +345,8 @@ fn the_cart_ends_the_run_where_its_travel_ends() {
 
 #[test]
 fn the_exact_solver_says_what_it_cannot_take() {
-    let refused = |stage: &Stage| {
-        simulate(stage, &experiment(&pulse(), 1.0, 1e-3), Solver::Exact).map(|_| ()).unwrap_err().to_string()
+    let refused = |machine: &Machine| {
+        simulate(machine, &experiment(&pulse(), 1.0, 1e-3), Solver::Exact).map(|_| ()).unwrap_err().to_string()
     };
     assert!(refused(&stage_of(LAWS[0])).starts_with("the friction law of the drive pulley is no straight line"));
     assert!(refused(&following(Law::Coulomb)).starts_with("the belt's spans follow the cart"));

@@ -34,7 +34,7 @@ fn lines(path: &str) -> String {
                     rows.append(block);
                     Flow::Continue
                 };
-                stream(&case.stage, experiment, Solver::of(&case.stage), &mut take).unwrap();
+                stream(&case.machine, experiment, Solver::of(&case.machine), &mut take).unwrap();
                 told(&experiment.name, &rows);
             }
         }

@@ -8,24 +8,24 @@ use proptest::prelude::*;
 use std::time::Instant;
 use taut::case::{Experiment, Initial};
 use taut::friction::{Friction, Motion, Side};
+use taut::machine::axis::{BODIES, CART, DRIVE};
+use taut::machine::{Amplifier, AmplifierMode, Belt, GearPlay, Machine};
 use taut::signal::{Hold, Signal, Slot};
 use taut::solve::{Ending, Flow, Solution, Solver, simulate, stream};
-use taut::stage::axis::{BODIES, CART, DRIVE};
-use taut::stage::{Amplifier, AmplifierMode, Belt, GearPlay, Stage};
 use taut::trajectory::Trajectory;
 
 const STATES: [&str; 6] = ["drive_angle", "drive_speed", "cart_position", "cart_speed", "idler_angle", "idler_speed"];
 
-fn run(stage: &Stage, experiment: &Experiment) -> Solution {
-    let solution = simulate(stage, experiment, Solver::Exact).unwrap();
+fn run(machine: &Machine, experiment: &Experiment) -> Solution {
+    let solution = simulate(machine, experiment, Solver::Exact).unwrap();
     for column in &solution.trajectory.columns {
         assert!(column.values.iter().all(|v| v.is_finite()), "{} is not finite", column.name);
     }
     solution
 }
 
-fn complete(stage: &Stage, experiment: &Experiment) -> Solution {
-    let solution = run(stage, experiment);
+fn complete(machine: &Machine, experiment: &Experiment) -> Solution {
+    let solution = run(machine, experiment);
     assert_eq!(solution.outcome.ending, Ending::Complete);
     solution
 }
@@ -38,24 +38,24 @@ fn pulse(value: f64) -> Signal {
     Signal::Pulse { value, duration: 0.25, at: 0.0 }
 }
 
-fn friction(stage: &mut Stage) -> [&mut Friction; 3] {
-    [&mut stage.drive_pulley.friction, &mut stage.cart.friction, &mut stage.idler_pulley.friction]
+fn friction(machine: &mut Machine) -> [&mut Friction; 3] {
+    [&mut machine.drive_pulley.friction, &mut machine.cart.friction, &mut machine.idler_pulley.friction]
 }
 
-fn set_friction(stage: &mut Stage, laws: [Friction; 3]) {
-    for (to, law) in friction(stage).into_iter().zip(laws) {
+fn set_friction(machine: &mut Machine, laws: [Friction; 3]) {
+    for (to, law) in friction(machine).into_iter().zip(laws) {
         *to = law;
     }
 }
 
 /// The input at which the motor's torque on the standing drive pulley is `torque`.
-fn voltage_of(stage: &Stage, torque: f64) -> f64 {
-    torque * stage.motor.resistance / stage.motor.torque_constant
+fn voltage_of(machine: &Machine, torque: f64) -> f64 {
+    torque * machine.motor.resistance / machine.motor.torque_constant
 }
 
 /// The torque that a voltage puts on the standing drive pulley.
-fn load_at(stage: &Stage, voltage: f64) -> f64 {
-    stage.motor.torque_constant * (voltage / stage.motor.resistance)
+fn load_at(machine: &Machine, voltage: f64) -> f64 {
+    machine.motor.torque_constant * (voltage / machine.motor.resistance)
 }
 
 // --- extreme parameters ---------------------------------------------------------------------------------------------
@@ -75,14 +75,14 @@ proptest! {
         value in decades(0.1, 100.0),
         kind in 0..3,
     ) {
-        let mut stage = table4();
-        stage.belt.stiffness = stiffness;
-        stage.cart.mass = mass;
-        stage.drive_pulley.inertia = inertia[0];
-        stage.idler_pulley.inertia = inertia[1];
-        stage.motor.inductance = inductance;
+        let mut machine = table4();
+        machine.belt.stiffness = stiffness;
+        machine.cart.mass = mass;
+        machine.drive_pulley.inertia = inertia[0];
+        machine.idler_pulley.inertia = inertia[1];
+        machine.motor.inductance = inductance;
         let pulley = Friction::symmetric(viscous * 1e-4, coulomb * 0.02);
-        set_friction(&mut stage, [pulley, Friction::symmetric(viscous, coulomb), pulley]);
+        set_friction(&mut machine, [pulley, Friction::symmetric(viscous, coulomb), pulley]);
         let input = match kind {
             0 => Signal::Pulse { value, duration: 0.02, at: 0.0 },
             1 => Signal::Triangle { amplitude: value, frequency: 40.0 },
@@ -91,12 +91,12 @@ proptest! {
         let mut experiment = experiment(input, 0.04);
         experiment.every = 1e-3;
         let begin = Instant::now();
-        let solution = run(&stage, &experiment);
+        let solution = run(&machine, &experiment);
         let took = begin.elapsed().as_secs_f64();
         prop_assert_eq!(solution.outcome.ending, Ending::Complete);
         prop_assert_eq!(solution.trajectory.len(), 41);
         if took > 0.5 {
-            println!("{took:.2} s, {} events, {:?}: {stage:?}", solution.outcome.events.len(), solution.outcome.cost);
+            println!("{took:.2} s, {} events, {:?}: {machine:?}", solution.outcome.events.len(), solution.outcome.cost);
         }
     }
 }
@@ -108,8 +108,8 @@ proptest! {
 #[test]
 fn breakaway_is_passed_only_above_it() {
     for volts in [0.3, 0.4630434782608695, 1.0, 7.7] {
-        let mut stage = table4();
-        let load = load_at(&stage, volts);
+        let mut machine = table4();
+        let load = load_at(&machine, volts);
         for (breakaway, moves) in [
             (load, false),
             (load.next_up(), false),
@@ -120,8 +120,8 @@ fn breakaway_is_passed_only_above_it() {
             (load * (1.0 - 1e-9), true),
         ] {
             for sign in [1.0, -1.0] {
-                stage.drive_pulley.friction = Friction::with_breakaway(0.0016, 0.5 * load, breakaway);
-                let solution = complete(&stage, &experiment(Signal::Step { value: sign * volts, at: 0.0 }, 0.01));
+                machine.drive_pulley.friction = Friction::with_breakaway(0.0016, 0.5 * load, breakaway);
+                let solution = complete(&machine, &experiment(Signal::Step { value: sign * volts, at: 0.0 }, 0.01));
                 assert_eq!(!solution.outcome.events.is_empty(), moves, "breakaway {breakaway:e} under {load:e}");
                 if !moves {
                     assert!(STATES.iter().all(|s| solution.trajectory.get(s).unwrap().iter().all(|&v| v == 0.0)));
@@ -142,9 +142,9 @@ fn beside_each_breakaway() {
     let [k1, k2, k3] = all.belt.stiffness;
     for factor in [0.98, 1.0 - 1e-9, 1.0, 1.0 + 1e-9, 1.02] {
         for body in 0..BODIES {
-            let mut stage = all.clone();
+            let mut machine = all.clone();
             // Only this one may leave.
-            for (j, law) in friction(&mut stage).into_iter().enumerate() {
+            for (j, law) in friction(&mut machine).into_iter().enumerate() {
                 if j != body {
                     *law = Friction::with_breakaway(law.forward.viscous, law.forward.coulomb, 1e3);
                 }
@@ -159,7 +159,7 @@ fn beside_each_breakaway() {
                 // −r² (k₂ + k₃) φ₃ = τ
                 _ => experiment.initial.idler_angle = -factor * 0.015 / (r * r * (k2 + k3)),
             }
-            let solution = complete(&stage, &experiment);
+            let solution = complete(&machine, &experiment);
             let first = solution.outcome.events.first();
             if factor > 1.0 {
                 let first = first.unwrap_or_else(|| panic!("{body:?} stays at {factor}"));
@@ -179,19 +179,19 @@ fn all_three_stop_at_once() {
     for deceleration in [0.3, 1.0, 7.0] {
         for viscous in [0.0, 2.0] {
             for direction in [1.0, -1.0] {
-                let mut stage = table4();
-                let r = stage.pulley_radius;
-                stage.motor.torque_constant = 1e-300; // no brake
-                stage.motor.back_emf_constant = 1e-300;
-                let (j, m) = (stage.drive_pulley.inertia, stage.cart.mass);
+                let mut machine = table4();
+                let r = machine.pulley_radius;
+                machine.motor.torque_constant = 1e-300; // no brake
+                machine.motor.back_emf_constant = 1e-300;
+                let (j, m) = (machine.drive_pulley.inertia, machine.cart.mass);
                 // c = a m of each, on its own axis: r a of a pulley is a J/r; b v likewise
                 let pulley = Friction::symmetric(viscous * j, deceleration * j / r);
-                set_friction(&mut stage, [pulley, Friction::symmetric(viscous * m, deceleration * m), pulley]);
+                set_friction(&mut machine, [pulley, Friction::symmetric(viscous * m, deceleration * m), pulley]);
                 let speed = 0.1 * direction;
                 let mut experiment = experiment(Signal::Step { value: 0.0, at: 0.0 }, 1.0);
                 experiment.initial =
                     Initial { drive_speed: speed / r, cart_speed: speed, idler_speed: speed / r, ..Initial::default() };
-                let solution = complete(&stage, &experiment);
+                let solution = complete(&machine, &experiment);
                 // v̇ = −a − b v / m
                 let stop = if viscous == 0.0 {
                     0.1 / deceleration
@@ -218,16 +218,16 @@ fn all_three_stop_at_once() {
 /// Without any friction or motor the bodies swing for ever: momentum and energy stay.
 #[test]
 fn no_friction_at_all() {
-    let mut stage = table4();
-    set_friction(&mut stage, [Friction::default(); 3]);
-    stage.motor.torque_constant = 1e-300;
-    stage.motor.back_emf_constant = 1e-300;
+    let mut machine = table4();
+    set_friction(&mut machine, [Friction::default(); 3]);
+    machine.motor.torque_constant = 1e-300;
+    machine.motor.back_emf_constant = 1e-300;
     let mut experiment = experiment(Signal::Step { value: 0.0, at: 0.0 }, 10.0);
     experiment.initial.drive_speed = 10.0;
-    let solution = complete(&stage, &experiment);
+    let solution = complete(&machine, &experiment);
     assert!(solution.outcome.events.is_empty());
-    let r = stage.pulley_radius;
-    let (j, m) = (stage.drive_pulley.inertia, stage.cart.mass);
+    let r = machine.pulley_radius;
+    let (j, m) = (machine.drive_pulley.inertia, machine.cart.mass);
     for row in [0, 1, 777, 10_000] {
         let get = |name: &str| solution.trajectory.get(name).unwrap()[row];
         let momentum = (get("drive_speed") + get("idler_speed")) * j / r + get("cart_speed") * m;
@@ -237,7 +237,7 @@ fn no_friction_at_all() {
         for body in 0..BODIES {
             (state.position[body], state.speed[body]) = (get(STATES[2 * body]), get(STATES[2 * body + 1]));
         }
-        let energy = stage.mechanism().energy(&state);
+        let energy = machine.mechanism().energy(&state);
         assert!((energy - 50.0 * j).abs() < 1e-7 * 50.0 * j, "{energy}");
     }
 }
@@ -250,9 +250,9 @@ fn small_inductance_is_nearly_none() {
     let without = complete(&table4(), &experiment(pulse(5.0), 0.5));
     let mut before = None;
     for inductance in [1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-12, 1e-13] {
-        let mut stage = table4();
-        stage.motor.inductance = inductance;
-        let with = complete(&stage, &experiment(pulse(5.0), 0.5));
+        let mut machine = table4();
+        machine.motor.inductance = inductance;
+        let with = complete(&machine, &experiment(pulse(5.0), 0.5));
         let (a, b) = (with.trajectory.get("cart_position").unwrap(), without.trajectory.get("cart_position").unwrap());
         let difference = a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         println!("L {inductance:e}: {difference:e} m, {:?}", with.outcome.cost);
@@ -276,15 +276,15 @@ struct Rigid {
 }
 
 impl Rigid {
-    fn of(stage: &Stage) -> Self {
-        let r = stage.pulley_radius;
-        let motor = &stage.motor;
+    fn of(machine: &Machine) -> Self {
+        let r = machine.pulley_radius;
+        let motor = &machine.motor;
         let brake = motor.torque_constant * motor.back_emf_constant / motor.resistance;
         let side = |f: &Friction| f.forward;
         let (drive, cart, idler) =
-            (side(&stage.drive_pulley.friction), side(&stage.cart.friction), side(&stage.idler_pulley.friction));
+            (side(&machine.drive_pulley.friction), side(&machine.cart.friction), side(&machine.idler_pulley.friction));
         Self {
-            mass: (stage.drive_pulley.inertia + stage.idler_pulley.inertia) / (r * r) + stage.cart.mass,
+            mass: (machine.drive_pulley.inertia + machine.idler_pulley.inertia) / (r * r) + machine.cart.mass,
             viscous: (drive.viscous + idler.viscous + brake) / (r * r) + cart.viscous,
             coulomb: (drive.coulomb + idler.coulomb) / r + cart.coulomb,
         }
@@ -311,14 +311,14 @@ impl Rigid {
 #[test]
 fn a_stiff_belt_is_rigid() {
     for decade in [1e5, 1e6, 1e7, 1e8, 1e9] {
-        let mut stage = table4();
-        stage.belt.stiffness = [decade, decade, 0.5 * decade];
+        let mut machine = table4();
+        machine.belt.stiffness = [decade, decade, 0.5 * decade];
         // Damped, so that no swing is left to stop on.
         let damping = 2.0 * 0.3 * (decade * 0.1_f64).sqrt();
-        stage.belt.damping = [damping; 3];
-        let rigid = Rigid::of(&stage);
-        let solution = complete(&stage, &experiment(pulse(5.0), 0.6));
-        let force = load_at(&stage, 5.0) / stage.pulley_radius;
+        machine.belt.damping = [damping; 3];
+        let rigid = Rigid::of(&machine);
+        let solution = complete(&machine, &experiment(pulse(5.0), 0.6));
+        let force = load_at(&machine, 5.0) / machine.pulley_radius;
         let want = rigid.pulse(force, 0.25);
         let got = last(&solution, "cart_position");
         println!(
@@ -397,10 +397,10 @@ fn many_rows_are_streamed() {
 /// A light pulley that a fast square wave turns back 2e8 times a second: a clear word, not a hang.
 #[test]
 fn too_many_events_are_told() {
-    let mut stage = table4();
-    stage.drive_pulley.inertia = 1e-12;
+    let mut machine = table4();
+    machine.drive_pulley.inertia = 1e-12;
     let input = Signal::Square { amplitude: 5.0, frequency: 1e8, duty: 0.5 };
-    let solution = run(&stage, &experiment(input, 0.002));
+    let solution = run(&machine, &experiment(input, 0.002));
     assert!(matches!(solution.outcome.ending, Ending::TooManyEvents { .. }), "{:?}", solution.outcome.ending);
 }
 
@@ -442,10 +442,10 @@ fn grazing() {
 
 #[test]
 fn no_machine_is_refused() {
-    let refused = |change: fn(&mut Stage)| {
-        let mut stage = table4();
-        change(&mut stage);
-        simulate(&stage, &experiment(pulse(5.0), 0.1), Solver::Exact).unwrap_err();
+    let refused = |change: fn(&mut Machine)| {
+        let mut machine = table4();
+        change(&mut machine);
+        simulate(&machine, &experiment(pulse(5.0), 0.1), Solver::Exact).unwrap_err();
     };
     refused(|s| s.cart.mass = f64::NAN);
     refused(|s| s.cart.mass = 0.0);
@@ -483,16 +483,16 @@ fn table3_that_runs_away_is_told() {
 #[test]
 fn a_gear_whose_torque_is_zero_but_for_rounding() {
     let side = |viscous, coulomb, breakaway| Side { viscous, coulomb, breakaway };
-    let mut stage = table4();
-    stage.motor.torque_constant = 0.05208461186091644;
-    stage.motor.rotor_inertia = 7.803031526692751e-7;
-    stage.motor.gear_efficiency = 0.954513808626461;
-    stage.amplifier = Amplifier::ideal(AmplifierMode::Current, 1.0460908509847053);
-    stage.pulley_radius = 0.005046775092618381;
-    stage.drive_pulley.inertia = 0.00042132278224457344;
-    stage.cart.mass = 0.4559614569640354;
-    stage.idler_pulley.inertia = 0.00013362595977205803;
-    stage.belt.stiffness = [12617.547858467795, 15616.28024091606, 67333.92593411065];
+    let mut machine = table4();
+    machine.motor.torque_constant = 0.05208461186091644;
+    machine.motor.rotor_inertia = 7.803031526692751e-7;
+    machine.motor.gear_efficiency = 0.954513808626461;
+    machine.amplifier = Amplifier::ideal(AmplifierMode::Current, 1.0460908509847053);
+    machine.pulley_radius = 0.005046775092618381;
+    machine.drive_pulley.inertia = 0.00042132278224457344;
+    machine.cart.mass = 0.4559614569640354;
+    machine.idler_pulley.inertia = 0.00013362595977205803;
+    machine.belt.stiffness = [12617.547858467795, 15616.28024091606, 67333.92593411065];
     let laws = [
         (
             side(0.0029053388374507983, 0.01642142650741023, 0.01642142650741023),
@@ -504,9 +504,9 @@ fn a_gear_whose_torque_is_zero_but_for_rounding() {
         ),
         (side(0.0, 0.075, 0.075), side(0.001497581210236506, 0.01693911090990089, 0.022323434819222106)),
     ];
-    set_friction(&mut stage, laws.map(|(forward, backward)| Friction::sided(forward, backward)));
+    set_friction(&mut machine, laws.map(|(forward, backward)| Friction::sided(forward, backward)));
     let input = Signal::Triangle { amplitude: -1.9295822438179058, frequency: 27.727307116916247 };
-    complete(&stage, &Experiment { every: 0.01, ..experiment(input, 0.3) });
+    complete(&machine, &Experiment { every: 0.01, ..experiment(input, 0.3) });
 }
 
 /// The bound of a gear that gives way and loses power took the torque on its rotor, T/e, for that on the pulley: the
@@ -514,35 +514,35 @@ fn a_gear_whose_torque_is_zero_but_for_rounding() {
 /// nm off.
 #[test]
 fn a_gear_that_gives_way_and_loses_power_parts_when_it_does() {
-    let mut stage = table4();
-    stage.motor.torque_constant = 0.017822451212881535;
-    stage.motor.back_emf_constant = 0.014257960970305229;
-    stage.motor.resistance = 3.705478161157106;
-    stage.amplifier.gain = 1.1422442272322024;
-    stage.motor.rotor_inertia = 1.5853980855471624e-6;
-    stage.motor.gear_efficiency = 0.5303047401379443;
-    stage.motor.gear_play =
+    let mut machine = table4();
+    machine.motor.torque_constant = 0.017822451212881535;
+    machine.motor.back_emf_constant = 0.014257960970305229;
+    machine.motor.resistance = 3.705478161157106;
+    machine.amplifier.gain = 1.1422442272322024;
+    machine.motor.rotor_inertia = 1.5853980855471624e-6;
+    machine.motor.gear_efficiency = 0.5303047401379443;
+    machine.motor.gear_play =
         Some(GearPlay { backlash: 0.0040151766291686465, stiffness: 77.28461755195906, damping: 0.0 });
-    stage.pulley_radius = 0.027357644336011414;
-    stage.drive_pulley.inertia = 0.00017305296445412391;
-    stage.idler_pulley.inertia = 0.00018001301078886188;
-    stage.cart.mass = 0.1582856021577527;
-    stage.cart.load = 1.7505221994316564;
+    machine.pulley_radius = 0.027357644336011414;
+    machine.drive_pulley.inertia = 0.00017305296445412391;
+    machine.idler_pulley.inertia = 0.00018001301078886188;
+    machine.cart.mass = 0.1582856021577527;
+    machine.cart.load = 1.7505221994316564;
     let one_way = |viscous: f64, coulomb: f64, breakaway: f64| {
         let mut friction = Friction::symmetric(0.0, 0.0);
         friction.forward = Side { viscous, coulomb, breakaway };
         friction
     };
-    stage.drive_pulley.friction = one_way(0.001991154854383248, 0.005628679256048761, 0.005842646265053341);
-    stage.cart.friction = one_way(0.0, 0.5677712144542374, 0.5677712144542374);
-    stage.idler_pulley.friction = one_way(0.0011521033948317448, 0.0, 0.0);
-    stage.belt = Belt::given([8710.378407135133, 91374.4855975486, 41394.706151733386], [1.0, 0.0, 0.0]);
+    machine.drive_pulley.friction = one_way(0.001991154854383248, 0.005628679256048761, 0.005842646265053341);
+    machine.cart.friction = one_way(0.0, 0.5677712144542374, 0.5677712144542374);
+    machine.idler_pulley.friction = one_way(0.0011521033948317448, 0.0, 0.0);
+    machine.belt = Belt::given([8710.378407135133, 91374.4855975486, 41394.706151733386], [1.0, 0.0, 0.0]);
     let input = Signal::Table {
         points: vec![[0.04814496182410192, -1.488502439088769], [0.054835734233441166, -1.2427537126632635]],
     };
     let events = |every: f64| {
         let every_so_often = Experiment { every, ..experiment(input.clone(), 0.06) };
-        simulate(&stage, &every_so_often, Solver::Exact).unwrap().outcome.events
+        simulate(&machine, &every_so_often, Solver::Exact).unwrap().outcome.events
     };
     let coarse = events(0.01);
     assert!(coarse.len() >= 20, "{}", coarse.len());

@@ -5,10 +5,10 @@ use common::random::{self, Dry};
 use proptest::prelude::*;
 use taut::case::{Case, Experiment, Initial};
 use taut::friction::Motion;
+use taut::machine::axis::{CART, DRIVE};
+use taut::machine::{AmplifierMode, BeltModel, Machine};
 use taut::signal::Signal;
 use taut::solve::{Ending, Event, Solution, Solver, simulate};
-use taut::stage::axis::{CART, DRIVE};
-use taut::stage::{AmplifierMode, BeltModel, Stage};
 
 const SOLVERS: [Solver; 2] = [Solver::Exact, Solver::General { tolerance: 1e-11 }];
 const POSITIONS: [&str; 3] = ["drive_angle", "cart_position", "idler_angle"];
@@ -43,7 +43,7 @@ fn clipped(changes: &[&str]) -> Case {
     Case::from_text_with("clipped.toml", CLIPPED, changes).unwrap()
 }
 
-fn run(stage: &Stage, input: &Signal, until: f64, solver: Solver) -> Solution {
+fn run(machine: &Machine, input: &Signal, until: f64, solver: Solver) -> Solution {
     let experiment = Experiment {
         name: "instant".into(),
         input: input.clone(),
@@ -52,7 +52,7 @@ fn run(stage: &Stage, input: &Signal, until: f64, solver: Solver) -> Solution {
         initial: Initial::default(),
         log: None,
     };
-    simulate(stage, &experiment, solver).unwrap()
+    simulate(machine, &experiment, solver).unwrap()
 }
 
 fn of_bodies(events: &[Event]) -> Vec<(usize, Motion, Motion)> {
@@ -77,7 +77,7 @@ fn a_body_broke_away_with_a_voltage_that_the_amplifier_cannot_give() {
     for changes in cases {
         let case = clipped(changes);
         for solver in SOLVERS {
-            let solution = simulate(&case.stage, &case.experiments[0], solver).unwrap();
+            let solution = simulate(&case.machine, &case.experiments[0], solver).unwrap();
             let moved = solution.trajectory.get("cart_position").unwrap().iter().fold(0.0, |m: f64, x| m.max(x.abs()));
             // An elastic belt gives way to the pulley until the cart holds it.
             let most = if changes == elastic { 1e-4 } else { 0.0 };
@@ -105,7 +105,7 @@ fn a_span_that_is_slack_at_time_zero_moved_bodies() {
     ];
     let case = clipped(&changes);
     for solver in SOLVERS {
-        let solution = simulate(&case.stage, &case.experiments[0], solver).unwrap();
+        let solution = simulate(&case.machine, &case.experiments[0], solver).unwrap();
         let at_once = |e: &&Event| e.time == 0.0 && e.body() == Some(CART);
         let cart = solution.outcome.events.iter().find(at_once);
         assert!(cart.is_none(), "{solver:?}: {cart:?}");
@@ -113,13 +113,15 @@ fn a_span_that_is_slack_at_time_zero_moved_bodies() {
 }
 
 /// Stages whose breakaway is above their Coulomb friction, so that it matters which load decides.
-fn sticky() -> impl Strategy<Value = Stage> {
-    (random::equipped(Dry::Any), 1.2..4.0_f64).prop_map(|(mut stage, over)| {
-        for friction in [&mut stage.drive_pulley.friction, &mut stage.cart.friction, &mut stage.idler_pulley.friction] {
+fn sticky() -> impl Strategy<Value = Machine> {
+    (random::equipped(Dry::Any), 1.2..4.0_f64).prop_map(|(mut machine, over)| {
+        for friction in
+            [&mut machine.drive_pulley.friction, &mut machine.cart.friction, &mut machine.idler_pulley.friction]
+        {
             friction.forward.breakaway *= over;
             friction.backward.breakaway *= over;
         }
-        stage
+        machine
     })
 }
 
@@ -151,31 +153,31 @@ proptest! {
 
     /// Where the current follows at once, an input beyond the voltage limit is the limit itself.
     #[test]
-    fn beyond_the_voltage_limit_is_at_the_limit(stage in sticky(), input in held(), limit in 0.2..5.0_f64) {
-        let mut stage = stage;
-        stage.amplifier.mode = AmplifierMode::Voltage;
-        stage.amplifier.bandwidth = None;
-        stage.motor.inductance = 0.0;
-        stage.amplifier.voltage_limit = Some(limit);
+    fn beyond_the_voltage_limit_is_at_the_limit(machine in sticky(), input in held(), limit in 0.2..5.0_f64) {
+        let mut machine = machine;
+        machine.amplifier.mode = AmplifierMode::Voltage;
+        machine.amplifier.bandwidth = None;
+        machine.motor.inductance = 0.0;
+        machine.amplifier.voltage_limit = Some(limit);
         // The same machine without the limit, asked for no more than that.
-        let mut plain = stage.clone();
+        let mut plain = machine.clone();
         plain.amplifier.voltage_limit = None;
-        let asked = clamped(&input, limit / stage.amplifier.gain);
-        let until = if random::rattles(&stage) { 0.05 } else { 0.15 };
+        let asked = clamped(&input, limit / machine.amplifier.gain);
+        let until = if random::rattles(&machine) { 0.05 } else { 0.15 };
         for solver in SOLVERS {
-            let (a, b) = (run(&stage, &input, until, solver), run(&plain, &asked, until, solver));
+            let (a, b) = (run(&machine, &input, until, solver), run(&plain, &asked, until, solver));
             let (mut events, mut wanted) = (of_bodies(&a.outcome.events), of_bodies(&b.outcome.events));
             if solver != Solver::Exact {
                 // Which of two bodies that start within its tolerance is first is chance.
                 [&mut events, &mut wanted].into_iter().for_each(|list| list.sort_by_key(|(body, ..)| *body));
             }
             // So is which way a flank that touches within it pushes first a pulley that nothing holds.
-            if solver == Solver::Exact || !random::rattles(&stage) {
+            if solver == Solver::Exact || !random::rattles(&machine) {
                 prop_assert_eq!(events, wanted, "{:?}", solver);
             }
             let tolerance = if solver == Solver::Exact { 1e-12 } else { 1e-9 };
             for name in POSITIONS {
-                let lever = if name == "cart_position" { 1.0 } else { stage.pulley_radius };
+                let lever = if name == "cart_position" { 1.0 } else { machine.pulley_radius };
                 let (a, b) = (a.trajectory.get(name).unwrap(), b.trajectory.get(name).unwrap());
                 for (row, (a, b)) in a.iter().zip(b).enumerate() {
                     prop_assert!(lever * (a - b).abs() <= tolerance, "{solver:?}, {name} at row {row}: {a:e}, {b:e}");
@@ -186,22 +188,22 @@ proptest! {
 
     /// A body leaves rest only where the load that the limits, spans and stops leave passes its breakaway.
     #[test]
-    fn bodies_break_away_with_loads_that_exist(stage in sticky(), input in held(), limit in 0.05..3.0_f64) {
-        let mut stage = stage;
-        stage.amplifier.current_limit = Some(limit);
+    fn bodies_break_away_with_loads_that_exist(machine in sticky(), input in held(), limit in 0.05..3.0_f64) {
+        let mut machine = machine;
+        machine.amplifier.current_limit = Some(limit);
         for solver in SOLVERS {
-            let solution = run(&stage, &input, 0.05, solver);
+            let solution = run(&machine, &input, 0.05, solver);
             prop_assert_eq!(solution.outcome.ending, Ending::Complete);
             for event in &solution.outcome.events {
                 let Some(body) = event.body() else { continue };
                 let forward = event.to == Motion::Forward;
-                if event.from != Motion::Stuck || event.to == Motion::Stuck || stage.belt.model != BeltModel::Elastic {
+                if event.from != Motion::Stuck || event.to == Motion::Stuck || machine.belt.model != BeltModel::Elastic {
                     continue;
                 }
                 let friction = match body {
-                    DRIVE => stage.drive_pulley.friction,
-                    CART => stage.cart.friction,
-                    _ => stage.idler_pulley.friction,
+                    DRIVE => machine.drive_pulley.friction,
+                    CART => machine.cart.friction,
+                    _ => machine.idler_pulley.friction,
                 };
                 let holds = friction.breakaway(forward);
                 let load = if forward { event.load } else { -event.load };

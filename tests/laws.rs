@@ -5,19 +5,19 @@ use common::random::{self, Dry};
 use proptest::prelude::*;
 use taut::case::{Experiment, Initial};
 use taut::friction::Motion;
+use taut::machine::axis::{LABELS, ROTOR, SPANS};
+use taut::machine::{AmplifierMode, Machine};
 use taut::mechanism::{Contact, Limit, Mode, Power, State};
 use taut::signal::Signal;
 use taut::solve::{Ending, Solution, Solver, simulate};
-use taut::stage::axis::{LABELS, ROTOR, SPANS};
-use taut::stage::{AmplifierMode, Stage};
 use taut::trajectory::Trajectory;
 
 const STATES: [&str; 6] = ["drive_angle", "drive_speed", "cart_position", "cart_speed", "idler_angle", "idler_speed"];
 
-fn run(stage: &Stage, input: &Signal, until: f64, every: f64) -> Solution {
+fn run(machine: &Machine, input: &Signal, until: f64, every: f64) -> Solution {
     let experiment =
         Experiment { name: "law".into(), input: input.clone(), until, every, initial: Initial::default(), log: None };
-    let solution = simulate(stage, &experiment, Solver::Exact).unwrap();
+    let solution = simulate(machine, &experiment, Solver::Exact).unwrap();
     assert_eq!(solution.outcome.ending, Ending::Complete);
     solution
 }
@@ -57,21 +57,21 @@ proptest! {
     /// The energy that comes in goes into heat or is stored, over every interval without an event: by quadrature of
     /// the powers along the computed motion, so that it is the motion that is tested.
     #[test]
-    fn power_is_balanced(stage in random::stage(Dry::Any), input in random::input()) {
-        let mechanism = stage.mechanism();
+    fn power_is_balanced(machine in random::machine(Dry::Any), input in random::input()) {
+        let mechanism = machine.mechanism();
         // Boole's rule over eight samples; the fastest swing of these stages is resolved many times over.
-        let motor = &stage.motor;
+        let motor = &machine.motor;
         let kn2 = motor.torque_constant * motor.back_emf_constant * motor.gear_ratio.powi(2);
-        let inertia = stage.drive_pulley.inertia;
+        let inertia = machine.drive_pulley.inertia;
         let fastest = match motor.inductance {
             0.0 => kn2 / (motor.resistance * inertia),
             inductance => motor.resistance / inductance + (kn2 / (inductance * inertia)).sqrt(),
         };
         let every = f64::min(2e-6, 0.01 / fastest);
-        let solution = run(&stage, &input, 2000.0 * every, every);
+        let solution = run(&machine, &input, 2000.0 * every, every);
         let trajectory = &solution.trajectory;
-        let (time, gain) = (trajectory.get("time").unwrap(), stage.amplifier.gain);
-        let input_at = |row: usize| match stage.amplifier.mode {
+        let (time, gain) = (trajectory.get("time").unwrap(), machine.amplifier.gain);
+        let input_at = |row: usize| match machine.amplifier.mode {
             AmplifierMode::Voltage => trajectory.get("voltage").unwrap()[row] / gain,
             AmplifierMode::Current => trajectory.get("motor_current").unwrap()[row] / gain,
         };
@@ -95,7 +95,7 @@ proptest! {
         for first in (0..trajectory.len() - 9).step_by(160) {
             let last = first + 8;
             let seam = input.piece(time[first]).end;
-            if disturbed(time[first], time[last]) || (stage.motor.gear_efficiency < 1.0) || seam < time[last] + every {
+            if disturbed(time[first], time[last]) || (machine.motor.gear_efficiency < 1.0) || seam < time[last] + every {
                 continue;
             }
             let mut integral = 0.0;
@@ -118,9 +118,9 @@ proptest! {
     /// The same balance at every row with limits, backlash, slack spans and end stops; limits hold to the last bit, and
     /// what is slack or apart carries nothing.
     #[test]
-    fn every_element_keeps_the_balance(stage in random::lined(Dry::Any), input in random::input()) {
-        let mechanism = stage.mechanism();
-        let solution = run(&stage, &input, 0.2, 1e-3);
+    fn every_element_keeps_the_balance(machine in random::lined(Dry::Any), input in random::input()) {
+        let mechanism = machine.mechanism();
+        let solution = run(&machine, &input, 0.2, 1e-3);
         let trajectory = &solution.trajectory;
         for row in 0..trajectory.len() {
             let at = |name: &str| trajectory.get(name).map(|values| values[row]);
@@ -138,7 +138,7 @@ proptest! {
                 v if v < 0.0 => Contact::Low,
                 _ => Contact::Apart,
             };
-            let amplifier = &stage.amplifier;
+            let amplifier = &machine.amplifier;
             let command = at("input").map_or(voltage, |input| amplifier.gain * input);
             let commanded = |bound| limit(command, bound);
             let (voltage_mode, current_mode) = match amplifier.mode {
@@ -149,10 +149,10 @@ proptest! {
             for (span, slack) in mode.slack.iter_mut().enumerate().take(SPANS) {
                 *slack = at(&format!("span{}_slack", span + 1)) == Some(1.0);
             }
-            if stage.motor.gear_play.is_some() {
+            if machine.motor.gear_play.is_some() {
                 mode.contact[SPANS] = side(at("gear_state").unwrap_or(0.0));
                 // A gear with losses holds a rotor that does not turn.
-                if stage.motor.gear_efficiency < 1.0 {
+                if machine.motor.gear_efficiency < 1.0 {
                     mode.motion[ROTOR] = motion(state.speed[ROTOR].partial_cmp(&0.0).map_or(0.0, |way| f64::from(way as i8)));
                 }
             }
@@ -162,19 +162,19 @@ proptest! {
             prop_assert!(amplifier.current_limit.is_none_or(|limit| {
                 amplifier.bandwidth.is_some() && amplifier.mode == AmplifierMode::Current || current.abs() <= limit
             }), "{current:e} A");
-            let pretension = stage.belt.pretension.unwrap_or(0.0);
+            let pretension = machine.belt.pretension.unwrap_or(0.0);
             for (span, slack) in (1..=3).zip(mode.slack) {
                 let force = at(&format!("span{span}_force")).unwrap();
                 if slack {
                     prop_assert!(force == -pretension, "span {span} is slack and carries {:e} N", force + pretension);
                 }
                 prop_assert!(
-                    stage.belt.pretension.is_none() || force >= -pretension * (1.0 + 1e-12) - 1e-9,
+                    machine.belt.pretension.is_none() || force >= -pretension * (1.0 + 1e-12) - 1e-9,
                     "span {span} pushes: {force:e} N"
                 );
             }
             if let (Some(0.0), Some(torque)) = (at("gear_state"), at("gear_torque"))
-                && stage.motor.gear_play.is_some_and(|play| play.backlash > 0.0)
+                && machine.motor.gear_play.is_some_and(|play| play.backlash > 0.0)
             {
                 prop_assert!(torque == 0.0);
             }
@@ -192,11 +192,11 @@ proptest! {
     /// u → −u turns the motion around, bit for bit.
     #[test]
     fn the_mirror_image_moves_as_the_image(
-        stage in prop_oneof![random::stage(Dry::Symmetric).boxed(), random::lined(Dry::Symmetric).boxed()],
+        machine in prop_oneof![random::machine(Dry::Symmetric).boxed(), random::lined(Dry::Symmetric).boxed()],
         input in random::input()
     ) {
-        let there = run(&stage, &input, 0.3, 1e-3);
-        let back = run(&stage, &random::mirrored(&input), 0.3, 1e-3);
+        let there = run(&machine, &input, 0.3, 1e-3);
+        let back = run(&machine, &random::mirrored(&input), 0.3, 1e-3);
         for name in STATES {
             let (a, b) = (there.trajectory.get(name).unwrap(), back.trajectory.get(name).unwrap());
             for (a, b) in a.iter().zip(b) {
@@ -214,13 +214,13 @@ proptest! {
     /// `authorities.rs`.)
     #[test]
     fn the_output_interval_changes_nothing(
-        stage in prop_oneof![random::stage(Dry::Any).boxed(), random::lined(Dry::Any).boxed()],
+        machine in prop_oneof![random::machine(Dry::Any).boxed(), random::lined(Dry::Any).boxed()],
         input in random::input()
     ) {
         // Flanks and spans that rattle undamped are chaotic: an error of the last bit grows tenfold every few impacts.
-        let until = if random::rattles(&stage) { 0.06 } else { 0.3 };
-        let coarse = run(&stage, &input, until, 0.01);
-        let fine = run(&stage, &input, until, 0.01 / 16.0);
+        let until = if random::rattles(&machine) { 0.06 } else { 0.3 };
+        let coarse = run(&machine, &input, until, 0.01);
+        let fine = run(&machine, &input, until, 0.01 / 16.0);
         let [length, speed] = extents(&fine.trajectory);
         for name in STATES {
             let tolerance = 1e-9 * if name.ends_with("speed") { speed } else { length };
@@ -233,8 +233,8 @@ proptest! {
 
     /// Stiffness, inertia, mass, friction and torque constant by one factor: the same motion.
     #[test]
-    fn scaling_all_forces_changes_nothing(stage in random::stage(Dry::Any), input in random::input(), factor in 0.1..10.0_f64) {
-        let mut scaled = stage.clone();
+    fn scaling_all_forces_changes_nothing(machine in random::machine(Dry::Any), input in random::input(), factor in 0.1..10.0_f64) {
+        let mut scaled = machine.clone();
         let side = |s: &mut taut::friction::Side| {
             s.viscous *= factor;
             s.coulomb *= factor;
@@ -250,7 +250,7 @@ proptest! {
         scaled.motor.rotor_inertia *= factor;
         scaled.cart.mass *= factor;
         scaled.motor.torque_constant *= factor;
-        let (a, b) = (run(&stage, &input, 0.3, 1e-3), run(&scaled, &input, 0.3, 1e-3));
+        let (a, b) = (run(&machine, &input, 0.3, 1e-3), run(&scaled, &input, 0.3, 1e-3));
         let [length, speed] = extents(&a.trajectory);
         for name in STATES {
             let tolerance = 1e-8 * if name.ends_with("speed") { speed } else { length };
@@ -262,19 +262,19 @@ proptest! {
 
     /// A load inside breakaway moves nothing by one bit, for ever.
     #[test]
-    fn at_rest_nothing_moves(stage in random::stage(Dry::Any), share in -0.999..0.999_f64, until in random::decades(1e-3, 1e6)) {
-        let mut stage = stage;
-        let law = &mut stage.drive_pulley.friction;
+    fn at_rest_nothing_moves(machine in random::machine(Dry::Any), share in -0.999..0.999_f64, until in random::decades(1e-3, 1e6)) {
+        let mut machine = machine;
+        let law = &mut machine.drive_pulley.friction;
         law.forward.coulomb = law.forward.coulomb.max(1e-3);
         law.backward.coulomb = law.backward.coulomb.max(1e-3);
         law.forward.breakaway = law.forward.breakaway.max(law.forward.coulomb);
         law.backward.breakaway = law.backward.breakaway.max(law.backward.coulomb);
         // The input that a forward (or backward) load just inside breakaway needs; a lossy gear only holds more.
         let breakaway = if share > 0.0 { law.forward.breakaway } else { law.backward.breakaway };
-        let torque_per_unit = stage.motor.torque_constant * stage.motor.gear_ratio * stage.amplifier.gain;
+        let torque_per_unit = machine.motor.torque_constant * machine.motor.gear_ratio * machine.amplifier.gain;
         let value = share * breakaway / torque_per_unit
-            * if stage.amplifier.mode == AmplifierMode::Voltage { stage.motor.resistance } else { 1.0 };
-        let solution = run(&stage, &Signal::Step { value, at: 0.0 }, until, until / 50.0);
+            * if machine.amplifier.mode == AmplifierMode::Voltage { machine.motor.resistance } else { 1.0 };
+        let solution = run(&machine, &Signal::Step { value, at: 0.0 }, until, until / 50.0);
         prop_assert!(solution.outcome.events.is_empty(), "{:?}", solution.outcome.events);
         for name in STATES {
             prop_assert!(solution.trajectory.get(name).unwrap().iter().all(|&v| v == 0.0), "{name}");
@@ -283,11 +283,11 @@ proptest! {
 
     /// Nothing coming in, the energy never grows.
     #[test]
-    fn energy_decays_by_itself(stage in random::stage(Dry::Any), speeds in [-20.0..20.0_f64, -0.4..0.4, -20.0..20.0], offset in -1e-4..1e-4_f64) {
+    fn energy_decays_by_itself(machine in random::machine(Dry::Any), speeds in [-20.0..20.0_f64, -0.4..0.4, -20.0..20.0], offset in -1e-4..1e-4_f64) {
         // A motor whose two constants differ is no passive machine.
-        let mut stage = stage;
-        stage.motor.back_emf_constant = stage.motor.torque_constant;
-        let mechanism = stage.mechanism();
+        let mut machine = machine;
+        machine.motor.back_emf_constant = machine.motor.torque_constant;
+        let mechanism = machine.mechanism();
         let initial = Initial {
             drive_speed: speeds[0],
             cart_speed: speeds[1],
@@ -297,7 +297,7 @@ proptest! {
         };
         let experiment =
             Experiment { name: "law".into(), input: Signal::Step { value: 0.0, at: 0.0 }, until: 0.3, every: 1e-3, initial, log: None };
-        let solution = simulate(&stage, &experiment, Solver::Exact).unwrap();
+        let solution = simulate(&machine, &experiment, Solver::Exact).unwrap();
         let first = mechanism.energy(&state(&solution.trajectory, 0));
         let mut before = f64::INFINITY;
         for row in 0..solution.trajectory.len() {

@@ -2,7 +2,7 @@
 //! hold for any stage.
 
 use crate::common;
-use common::random::{Dry, cases, equipped, stage};
+use common::random::{Dry, cases, equipped, machine};
 use common::{experiment, table1, table2, table4};
 use nalgebra::Complex;
 use proptest::prelude::*;
@@ -11,9 +11,9 @@ use std::f64::consts::PI;
 use taut::case::Case;
 use taut::friction::{Friction, Law, Shape};
 use taut::linear::{Hold, Natural, Operation, Range, Root, StateSpace, places, travel, undamped};
+use taut::machine::{Belt, BeltMake, BeltModel, Machine};
 use taut::signal::Signal;
 use taut::solve::{Solver, simulate};
-use taut::stage::{Belt, BeltMake, BeltModel, Stage};
 
 fn complex(value: &Value) -> Complex<f64> {
     Complex::new(value[0].as_f64().unwrap(), value[1].as_f64().unwrap())
@@ -53,9 +53,9 @@ fn two_hundred_random_stages() {
     for case in all {
         let name = case["name"].as_str().unwrap();
         let number = |key: &str| case[key].as_f64().unwrap();
-        let stage = Case::from_text("case.toml", case["case"].as_str().unwrap()).unwrap().stage;
+        let machine = Case::from_text("case.toml", case["case"].as_str().unwrap()).unwrap().machine;
         let operation = Operation { speed: number("speed"), ..Operation::default() };
-        let system = StateSpace::of(&stage, operation).unwrap();
+        let system = StateSpace::of(&machine, operation).unwrap();
         let sampled = system.discrete(number("sample_time"), Hold::Zero, 0.0).unwrap();
         // Index, our distance to 60 digits, to python-control, and how far that is from the 60 digits.
         let mut check = |index: usize, what: &str, exact: f64, control: f64, doubt: &str| {
@@ -124,10 +124,10 @@ proptest! {
 
     /// A stage without a source of energy does not grow: the motor gives no more than it takes only with K_t = K_e.
     #[test]
-    fn poles_of_a_passive_stage_do_not_grow(mut stage in equipped(Dry::Any)) {
-        stage.motor.back_emf_constant = stage.motor.torque_constant;
+    fn poles_of_a_passive_stage_do_not_grow(mut machine in equipped(Dry::Any)) {
+        machine.motor.back_emf_constant = machine.motor.torque_constant;
         for operation in [Operation::default(), Operation { speed: -0.1, ..Operation::default() }] {
-            let poles = StateSpace::of(&stage, operation).unwrap().poles().unwrap();
+            let poles = StateSpace::of(&machine, operation).unwrap().poles().unwrap();
             let largest = poles.iter().map(|p| p.norm()).fold(0.0, f64::max);
             prop_assert!(poles.iter().all(|p| p.re <= 1e-12 * largest), "{poles:?}");
         }
@@ -135,21 +135,21 @@ proptest! {
 
     /// An output that is the drive angle stands still where everything else swings with the drive pulley clamped.
     #[test]
-    fn antiresonance_is_resonance_with_the_drive_pulley_clamped(stage in stage(Dry::Any)) {
-        let free = StateSpace::of(&stage, Operation::default()).unwrap();
+    fn antiresonance_is_resonance_with_the_drive_pulley_clamped(machine in machine(Dry::Any)) {
+        let free = StateSpace::of(&machine, Operation::default()).unwrap();
         let held = Operation { held: [true, false, false], ..Operation::default() };
-        let held = StateSpace::of(&stage, held).unwrap().poles().unwrap();
+        let held = StateSpace::of(&machine, held).unwrap().poles().unwrap();
         let zeros = free.zeros(free.output("drive_angle").unwrap()).unwrap().unwrap().values;
         // With an inductance the current goes on by itself while the pulley is held: −R/L, no zero.
-        let electrical = Complex::new(-stage.motor.resistance / stage.motor.inductance, 0.0);
+        let electrical = Complex::new(-machine.motor.resistance / machine.motor.inductance, 0.0);
         let of_motion: Vec<_> = held.iter().copied().filter(|p| (p - electrical).norm() > 1e-6 * p.norm()).collect();
         prop_assert!(apart(&of_motion, &zeros) < 1e-9, "{of_motion:?} {zeros:?}");
     }
 
     /// Poles and zeros together are the transfer function.
     #[test]
-    fn the_response_is_that_of_its_poles_and_zeros(stage in equipped(Dry::Any)) {
-        let system = StateSpace::of(&stage, Operation::default()).unwrap();
+    fn the_response_is_that_of_its_poles_and_zeros(machine in equipped(Dry::Any)) {
+        let system = StateSpace::of(&machine, Operation::default()).unwrap();
         let transfers = system.transfers().unwrap();
         for omega in [3.0, 40.0, 700.0, 2e4] {
             for (got, transfer) in system.at(omega).into_iter().zip(&transfers) {
@@ -167,18 +167,18 @@ proptest! {
 
     /// A model for a sample time does what the exact solver does with an input that stands between samples.
     #[test]
-    fn sampled_models_step_like_the_exact_solver(mut stage in stage(Dry::Any), late in 0.0..2.5_f64) {
-        for law in [&mut stage.drive_pulley.friction, &mut stage.cart.friction, &mut stage.idler_pulley.friction] {
+    fn sampled_models_step_like_the_exact_solver(mut machine in machine(Dry::Any), late in 0.0..2.5_f64) {
+        for law in [&mut machine.drive_pulley.friction, &mut machine.cart.friction, &mut machine.idler_pulley.friction] {
             // Without dry friction the linear model is the whole one.
             (law.backward, law.forward.coulomb, law.forward.breakaway) = (law.forward, 0.0, 0.0);
             law.backward = law.forward;
         }
-        stage.motor.gear_efficiency = 1.0;
+        machine.motor.gear_efficiency = 1.0;
         let (period, late) = (1e-3, (late * 4.0).round() / 4.0);
-        let system = StateSpace::of(&stage, Operation::default()).unwrap();
+        let system = StateSpace::of(&machine, Operation::default()).unwrap();
         let model = system.discrete(period, Hold::Zero, late * period).unwrap();
         let run = experiment(Signal::Pulse { value: 3.0, duration: 5.0 * period, at: late * period }, 0.02);
-        let trajectory = simulate(&stage, &run, Solver::Exact).unwrap().trajectory;
+        let trajectory = simulate(&machine, &run, Solver::Exact).unwrap().trajectory;
         let mut x = nalgebra::DVector::zeros(model.a.nrows());
         let column = trajectory.get("cart_position").unwrap();
         let row = system.output("cart_position").unwrap();
@@ -195,11 +195,11 @@ proptest! {
 /// A small sine on top of steady sliding, run by the exact solver, swings as the frequency response says.
 #[test]
 fn the_response_is_what_a_run_shows() {
-    for (stage, hertz) in [(table4(), 20.0), (table4(), 130.0), (table2(), 300.0), (table1(), 60.0)] {
-        let system = StateSpace::of(&stage, Operation::default()).unwrap();
+    for (machine, hertz) in [(table4(), 20.0), (table4(), 130.0), (table2(), 300.0), (table1(), 60.0)] {
+        let system = StateSpace::of(&machine, Operation::default()).unwrap();
         let mut run = experiment(Signal::Sine { amplitude: 0.2, frequency: hertz, phase: 0.0, offset: 4.0 }, 3.0);
         run.every = 1.0 / (40.0 * hertz);
-        let trajectory = simulate(&stage, &run, Solver::Exact).unwrap().trajectory;
+        let trajectory = simulate(&machine, &run, Solver::Exact).unwrap().trajectory;
         let (time, speed) = (trajectory.get("time").unwrap(), trajectory.get("cart_speed").unwrap());
         // The last 20 periods, by correlation.
         let from = time.len() - 1 - 800;
@@ -218,14 +218,14 @@ fn the_response_is_what_a_run_shows() {
 #[test]
 fn bristles_slide_like_the_curve_and_hold_like_a_spring() {
     let with = |law: Law| {
-        let mut stage = undamped(&table2());
-        stage.cart.friction = Friction::with_breakaway(19.0, 0.2, 0.3).following(law);
-        stage
+        let mut machine = undamped(&table2());
+        machine.cart.friction = Friction::with_breakaway(19.0, 0.2, 0.3).following(law);
+        machine
     };
     let bristles = with(Law::LuGre { stiffness: 1e5, damping: 30.0, velocity: 0.1 });
     let curve = with(Law::Stribeck { velocity: 0.1, shape: Shape::Gaussian });
-    let gain = |stage: &Stage, speed: f64| {
-        let system = StateSpace::of(stage, Operation { speed, ..Operation::default() }).unwrap();
+    let gain = |machine: &Machine, speed: f64| {
+        let system = StateSpace::of(machine, Operation { speed, ..Operation::default() }).unwrap();
         system.transfers().unwrap()[system.output("cart_speed").unwrap()].low_frequency()
     };
     for speed in [0.02, 0.1, -0.3] {
@@ -241,14 +241,14 @@ fn bristles_slide_like_the_curve_and_hold_like_a_spring() {
 /// Two inertias on one spring: ω² = k (1/J + 1/J′), clamped k/J′.
 #[test]
 fn two_masses_by_hand() {
-    let mut stage = undamped(&table2());
-    stage.belt.model = BeltModel::TwoMass;
-    let [k1, k2, k3] = stage.belt.stiffness;
+    let mut machine = undamped(&table2());
+    machine.belt.model = BeltModel::TwoMass;
+    let [k1, k2, k3] = machine.belt.stiffness;
     let k = k1 + k2 * k3 / (k2 + k3);
-    let r2 = stage.pulley_radius.powi(2);
-    let pulleys = (stage.drive_pulley.inertia + stage.idler_pulley.inertia) / r2;
-    let m = stage.cart.mass;
-    let found = &travel(&stage, Operation::default(), &[0.0]).unwrap()[0];
+    let r2 = machine.pulley_radius.powi(2);
+    let pulleys = (machine.drive_pulley.inertia + machine.idler_pulley.inertia) / r2;
+    let m = machine.cart.mass;
+    let found = &travel(&machine, Operation::default(), &[0.0]).unwrap()[0];
     let by_hand = |omega2: f64| omega2.sqrt() / (2.0 * PI);
     assert!((found.undamped_resonances[0] / by_hand(k * (1.0 / m + 1.0 / pulleys)) - 1.0).abs() < 1e-12);
     assert!((found.undamped_antiresonances[0] / by_hand(k / m) - 1.0).abs() < 1e-12);
@@ -259,21 +259,21 @@ fn two_masses_by_hand() {
 fn spans_that_follow_the_cart() {
     let make = BeltMake { modulus: 4e9, section: 4e-6, spans: [0.4, 0.4, 0.8] };
     let belt = Belt { make: Some(make), follows_cart: true, ..Belt::given(make.stiffness(), [0.0; 3]) };
-    let stage = Stage { belt, ..table2() };
+    let machine = Machine { belt, ..table2() };
     assert_eq!(places(&table2(), 5), None);
-    let positions = places(&stage, 5).unwrap();
+    let positions = places(&machine, 5).unwrap();
     assert!((positions[0] + 0.38).abs() < 1e-12 && (positions[4] - 0.38).abs() < 1e-12);
-    let along = travel(&stage, Operation::default(), &positions).unwrap();
+    let along = travel(&machine, Operation::default(), &positions).unwrap();
     // Near the drive pulley the cart hangs on a short span.
     assert!(along[4].undamped_antiresonances[1] > 2.0 * along[2].undamped_antiresonances[1], "{along:?}");
     // Where the axis is built symmetric it is so for the anti-resonance with both pulleys held.
     let both = Operation { held: [true, false, true], ..Operation::default() };
-    let at = |position| hertz(&StateSpace::of(&stage, Operation { position, ..both }).unwrap());
+    let at = |position| hertz(&StateSpace::of(&machine, Operation { position, ..both }).unwrap());
     assert!((at(0.2)[0] / at(-0.2)[0] - 1.0).abs() < 1e-12);
     let [k1, k2] = make.stiffness_at(0.2);
-    let poles = StateSpace::of(&stage, Operation { position: 0.2, ..both }).unwrap().poles().unwrap();
-    assert!((poles[0].norm_sqr() / ((k1 + k2) / stage.cart.mass) - 1.0).abs() < 1e-12);
-    let beyond = StateSpace::of(&stage, Operation { position: 0.41, ..Operation::default() });
+    let poles = StateSpace::of(&machine, Operation { position: 0.2, ..both }).unwrap().poles().unwrap();
+    assert!((poles[0].norm_sqr() / ((k1 + k2) / machine.cart.mass) - 1.0).abs() < 1e-12);
+    let beyond = StateSpace::of(&machine, Operation { position: 0.41, ..Operation::default() });
     assert!(beyond.unwrap_err().to_string().contains("between -0.4 m and 0.4 m"));
 }
 
@@ -380,9 +380,9 @@ fn natural_modes_have_the_poles_of_the_state_space() {
     geared.motor.gear_efficiency = 0.8;
     geared.motor.rotor_inertia = 4e-6;
     geared.belt.damping = [3.0, 4.0, 5.0];
-    for stage in [table4(), geared] {
-        let natural = Natural::of(&stage.mechanism(), &[0.0; 6]).unwrap();
-        let system = StateSpace::of(&stage, Operation::default()).unwrap();
+    for machine in [table4(), geared] {
+        let natural = Natural::of(&machine.mechanism(), &[0.0; 6]).unwrap();
+        let system = StateSpace::of(&machine, Operation::default()).unwrap();
         let size = |root: &Root| match *root {
             Root::Zero => 0.0,
             Root::Real(s) => s.abs(),
@@ -396,9 +396,9 @@ fn natural_modes_have_the_poles_of_the_state_space() {
         for (have, want) in have.iter().zip(&want) {
             assert!((have - want).abs() <= 1e-9 * want, "{have} {want}");
         }
-        let bare = StateSpace::of(&undamped(&stage), Operation::default()).unwrap().poles().unwrap();
+        let bare = StateSpace::of(&undamped(&machine), Operation::default()).unwrap().poles().unwrap();
         let hertz = Root::of(&bare).into_iter().filter_map(Root::hertz);
-        if stage.motor.gear_efficiency == 1.0 {
+        if machine.motor.gear_efficiency == 1.0 {
             for (mode, want) in natural.elastic.iter().zip(hertz) {
                 assert!((mode.hertz() / want - 1.0).abs() < 1e-9);
             }

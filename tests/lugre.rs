@@ -13,8 +13,8 @@
 
 use serde_json::Value;
 use taut::case::Case;
+use taut::machine::BeltModel;
 use taut::solve::{Ending, Solution, Solver, simulate};
-use taut::stage::BeltModel;
 
 const SOLVER: Solver = Solver::General { tolerance: 1e-11 };
 
@@ -35,11 +35,11 @@ fn solve(case: &str) -> Solution {
     // Pulleys as light as the authority's are refused. The lightest ones are heavier, and the mass less by as much.
     let mut case = Case::from_text("lugre.toml", &case.replace("inertia = 1e-18", "inertia = 1e-15"))
         .unwrap_or_else(|error| panic!("{error}"));
-    if case.stage.belt.model == BeltModel::Rigid {
-        let r = case.stage.pulley_radius;
-        case.stage.cart.mass -= 2.0 * (1e-15 - 1e-18) / (r * r);
+    if case.machine.belt.model == BeltModel::Rigid {
+        let r = case.machine.pulley_radius;
+        case.machine.cart.mass -= 2.0 * (1e-15 - 1e-18) / (r * r);
     }
-    let solution = simulate(&case.stage, &case.experiments[0], SOLVER).unwrap();
+    let solution = simulate(&case.machine, &case.experiments[0], SOLVER).unwrap();
     assert_eq!(solution.outcome.ending, Ending::Complete);
     assert!(solution.outcome.events.is_empty(), "bristles neither stick nor slip: they bend");
     solution

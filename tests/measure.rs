@@ -3,25 +3,30 @@
 use std::path::Path;
 use taut::case::{Case, Experiment, TEMPLATE};
 use taut::log::read_columns;
+use taut::machine::{Channel, Encoder, EncoderPlace, Machine, Measurement, Quantity};
 use taut::measure::measure;
 use taut::solve::{Solver, simulate};
-use taut::stage::{Channel, Encoder, EncoderPlace, Measurement, Quantity, Stage};
 use taut::trajectory::{CsvWriter, Trajectory};
 
 /// The template's axis, its first experiment, and this measurement of it.
-fn case(changes: &[&str]) -> (Stage, Measurement, Experiment) {
+fn case(changes: &[&str]) -> (Machine, Measurement, Experiment) {
     let case = Case::from_text_with("axis.toml", TEMPLATE, changes).unwrap_or_else(|error| panic!("{error}"));
-    (case.stage, case.measurement.unwrap_or_default(), case.experiments[0].clone())
+    (case.machine, case.measurement.unwrap_or_default(), case.experiments[0].clone())
 }
 
-fn log((stage, measurement, experiment): &(Stage, Measurement, Experiment)) -> Trajectory {
-    measure(stage, measurement, experiment, Solver::Exact).unwrap().trajectory
+fn log((machine, measurement, experiment): &(Machine, Measurement, Experiment)) -> Trajectory {
+    measure(machine, measurement, experiment, Solver::Exact).unwrap().trajectory
 }
 
 /// A column of the run itself, with a row every `every` seconds up to `until`.
-fn exact((stage, _, experiment): &(Stage, Measurement, Experiment), every: f64, until: f64, name: &str) -> Vec<f64> {
+fn exact(
+    (machine, _, experiment): &(Machine, Measurement, Experiment),
+    every: f64,
+    until: f64,
+    name: &str,
+) -> Vec<f64> {
     let experiment = Experiment { every, until, ..experiment.clone() };
-    simulate(stage, &experiment, Solver::Exact).unwrap().trajectory.get(name).unwrap().to_vec()
+    simulate(machine, &experiment, Solver::Exact).unwrap().trajectory.get(name).unwrap().to_vec()
 }
 
 fn column<'a>(log: &'a Trajectory, name: &str) -> &'a [f64] {

@@ -12,10 +12,10 @@ use proptest::prelude::*;
 use taut::case::{Case, Experiment, Initial};
 use taut::friction::{Friction, Law, Shape, Side};
 use taut::linear::{Operation, StateSpace};
+use taut::machine::{BeltModel, Machine};
 use taut::polyline::Polyline;
 use taut::signal::Signal;
 use taut::solve::{Ending, Solution, Solver, simulate};
-use taut::stage::{BeltModel, Stage};
 
 const AXIS: &str = r#"
 [motor]
@@ -43,11 +43,11 @@ until = 0.5
 every = 1e-3
 "#;
 
-fn axis() -> Stage {
-    Case::from_text("axis.toml", AXIS).unwrap().stage
+fn axis() -> Machine {
+    Case::from_text("axis.toml", AXIS).unwrap().machine
 }
 
-fn run(stage: &Stage, input: &Signal, until: f64, tolerance: f64) -> Solution {
+fn run(machine: &Machine, input: &Signal, until: f64, tolerance: f64) -> Solution {
     let experiment = Experiment {
         name: "merged".into(),
         input: input.clone(),
@@ -57,7 +57,7 @@ fn run(stage: &Stage, input: &Signal, until: f64, tolerance: f64) -> Solution {
         log: None,
     };
     let solution =
-        simulate(stage, &experiment, Solver::General { tolerance }).unwrap_or_else(|error| panic!("{error}"));
+        simulate(machine, &experiment, Solver::General { tolerance }).unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(solution.outcome.ending, Ending::Complete);
     solution
 }
@@ -154,13 +154,13 @@ struct Written {
 type Vector = [f64; 7];
 
 impl Written {
-    fn of(stage: &Stage) -> Self {
-        let r = stage.pulley_radius;
+    fn of(machine: &Machine) -> Self {
+        let r = machine.pulley_radius;
         let member = |friction: Friction, ratio: f64| Member { friction, ratio, along: None };
-        let cart = Member { along: stage.cart.along.clone(), ..member(stage.cart.friction, 1.0) };
-        let motor = &stage.motor;
+        let cart = Member { along: machine.cart.along.clone(), ..member(machine.cart.friction, 1.0) };
+        let motor = &machine.motor;
         let n = motor.gear_ratio;
-        let pulleys = stage.drive_pulley.inertia + stage.idler_pulley.inertia;
+        let pulleys = machine.drive_pulley.inertia + machine.idler_pulley.inertia;
         let whole = |lever: f64| {
             [
                 n * motor.torque_constant / motor.resistance * lever,
@@ -169,12 +169,12 @@ impl Written {
             ]
         };
         let group = |mass: f64, members: Vec<Member>| Group { mass, members, motion: 0.0 };
-        let [drive, idler] = [stage.drive_pulley.friction, stage.idler_pulley.friction];
-        let [k, c] = [stage.belt.stiffness, stage.belt.damping];
-        match stage.belt.model {
+        let [drive, idler] = [machine.drive_pulley.friction, machine.idler_pulley.friction];
+        let [k, c] = [machine.belt.stiffness, machine.belt.damping];
+        match machine.belt.model {
             BeltModel::Rigid => Self {
                 groups: vec![group(
-                    stage.cart.mass + pulleys / (r * r),
+                    machine.cart.mass + pulleys / (r * r),
                     vec![member(drive, 1.0 / r), cart, member(idler, 1.0 / r)],
                 )],
                 lever: [1.0, 1.0],
@@ -184,7 +184,7 @@ impl Written {
             BeltModel::TwoMass => Self {
                 groups: vec![
                     group(pulleys, vec![member(drive, 1.0), member(idler, 1.0)]),
-                    group(stage.cart.mass, vec![cart]),
+                    group(machine.cart.mass, vec![cart]),
                 ],
                 lever: [r, 1.0],
                 spring: [
@@ -317,13 +317,13 @@ impl Written {
 }
 
 /// The largest difference at the belt between a run and the written-out equation, m.
-fn against_the_equation(stage: &Stage, input: &Signal, until: f64) -> f64 {
-    let solution = run(stage, input, until, 1e-11);
-    let mut written = Written::of(stage);
+fn against_the_equation(machine: &Machine, input: &Signal, until: f64) -> f64 {
+    let solution = run(machine, input, until, 1e-11);
+    let mut written = Written::of(machine);
     let rows = written.rows(input, until, 2e-6);
     let (drive, cart) = (column(&solution, "drive_angle"), column(&solution, "cart_position"));
-    let r = stage.pulley_radius;
-    let rigid = stage.belt.model == BeltModel::Rigid;
+    let r = machine.pulley_radius;
+    let rigid = machine.belt.model == BeltModel::Rigid;
     let mut worst: f64 = 0.0;
     for (row, y) in rows.iter().enumerate() {
         let (of_drive, of_cart) = if rigid { (y[0], y[0]) } else { (r * y[0], y[1]) };
@@ -363,19 +363,20 @@ fn friction(r: f64) -> impl Strategy<Value = Friction> {
 }
 
 /// Machines whose belt makes bodies one, each with a law of its own, most of them curved.
-fn merged() -> impl Strategy<Value = Stage> {
+fn merged() -> impl Strategy<Value = Machine> {
     let r = 0.02;
     let along = prop::option::weighted(0.3, (0.5..2.0_f64, 0.5..2.0_f64));
     let gear = prop_oneof![3 => Just(1.0), 1 => 0.5..0.95_f64];
     (friction(r), friction(1.0), friction(r), any::<bool>(), along, gear, 0.3..2.0_f64).prop_map(
         |(drive, cart, idler, rigid, along, gear, mass)| {
-            let mut stage = axis();
-            (stage.drive_pulley.friction, stage.cart.friction, stage.idler_pulley.friction) = (drive, cart, idler);
-            stage.cart.mass = mass;
-            stage.belt.model = if rigid { BeltModel::Rigid } else { BeltModel::TwoMass };
-            stage.cart.along = along.and_then(|(a, b)| Polyline::new(vec![[-0.02, a], [0.0, 1.0], [0.03, b]]));
-            stage.motor.gear_efficiency = gear;
-            stage
+            let mut machine = axis();
+            (machine.drive_pulley.friction, machine.cart.friction, machine.idler_pulley.friction) =
+                (drive, cart, idler);
+            machine.cart.mass = mass;
+            machine.belt.model = if rigid { BeltModel::Rigid } else { BeltModel::TwoMass };
+            machine.cart.along = along.and_then(|(a, b)| Polyline::new(vec![[-0.02, a], [0.0, 1.0], [0.03, b]]));
+            machine.motor.gear_efficiency = gear;
+            machine
         },
     )
 }
@@ -390,25 +391,25 @@ proptest! {
     #![proptest_config(random::cases(200))]
 
     #[test]
-    fn laws_add_up_as_the_written_out_equation_has_it(stage in merged(), input in square()) {
-        let off = against_the_equation(&stage, &input, 0.15);
+    fn laws_add_up_as_the_written_out_equation_has_it(machine in merged(), input in square()) {
+        let off = against_the_equation(&machine, &input, 0.15);
         prop_assert!(off < 2e-9, "{off:e} m");
     }
 
     /// A stage that goes forward with the input goes backward with its opposite, if the laws are turned round.
     #[test]
-    fn a_mirror_image_moves_as_its_image(stage in merged(), input in square()) {
-        let mut image = stage.clone();
+    fn a_mirror_image_moves_as_its_image(machine in merged(), input in square()) {
+        let mut image = machine.clone();
         let turned = |friction: Friction| Friction { forward: friction.backward, backward: friction.forward, ..friction };
-        image.drive_pulley.friction = turned(stage.drive_pulley.friction);
-        image.cart.friction = turned(stage.cart.friction);
-        image.idler_pulley.friction = turned(stage.idler_pulley.friction);
-        image.cart.along = stage.cart.along.as_ref().and_then(|along| {
+        image.drive_pulley.friction = turned(machine.drive_pulley.friction);
+        image.cart.friction = turned(machine.cart.friction);
+        image.idler_pulley.friction = turned(machine.idler_pulley.friction);
+        image.cart.along = machine.cart.along.as_ref().and_then(|along| {
             Polyline::new(along.points().iter().rev().map(|[x, factor]| [-x, *factor]).collect())
         });
         let Signal::Square { amplitude, frequency, .. } = input else { panic!() };
         let opposite = wave(-amplitude, frequency);
-        let (a, b) = (run(&stage, &input, 0.15, 1e-11), run(&image, &opposite, 0.15, 1e-11));
+        let (a, b) = (run(&machine, &input, 0.15, 1e-11), run(&image, &opposite, 0.15, 1e-11));
         for (a, b) in column(&a, "cart_position").iter().zip(column(&b, "cart_position")) {
             prop_assert!((a + b).abs() < 1e-10, "{a} {b}");
         }
@@ -417,10 +418,10 @@ proptest! {
     /// The motor's work less that of friction is the machine's energy: M v²/2 = ∫ (K i − F_f) v dt with friction as the
     /// column has it.
     #[test]
-    fn power_is_balanced(stage in merged(), input in square()) {
-        let mut stage = stage;
-        stage.belt.model = BeltModel::Rigid;
-        stage.motor.gear_efficiency = 1.0;
+    fn power_is_balanced(machine in merged(), input in square()) {
+        let mut machine = machine;
+        machine.belt.model = BeltModel::Rigid;
+        machine.motor.gear_efficiency = 1.0;
         let experiment = Experiment {
             name: "power".into(),
             input: input.clone(),
@@ -429,10 +430,10 @@ proptest! {
             initial: Initial::default(),
             log: None,
         };
-        let solution = simulate(&stage, &experiment, Solver::General { tolerance: 1e-10 }).unwrap();
+        let solution = simulate(&machine, &experiment, Solver::General { tolerance: 1e-10 }).unwrap();
         let [current, speed, friction] = ["motor_current", "cart_speed", "cart_friction"].map(|name| column(&solution, name));
-        let (r, motor) = (stage.pulley_radius, &stage.motor);
-        let mass = stage.cart.mass + (stage.drive_pulley.inertia + stage.idler_pulley.inertia) / (r * r);
+        let (r, motor) = (machine.pulley_radius, &machine.motor);
+        let mass = machine.cart.mass + (machine.drive_pulley.inertia + machine.idler_pulley.inertia) / (r * r);
         let power = |row: usize| (motor.gear_ratio * motor.torque_constant / r * current[row] - friction[row]) * speed[row];
         let (mut work, mut moved) = (0.0, 0.0);
         let Signal::Square { frequency, .. } = input else { panic!() };
@@ -449,15 +450,15 @@ proptest! {
 }
 
 /// One of each law, so that each kind meets each other.
-fn of_all_kinds() -> Stage {
-    let mut stage = axis();
-    let r = stage.pulley_radius;
-    stage.drive_pulley.friction = Friction::with_breakaway(2.0 * r * r, 0.4 * r, 0.6 * r)
+fn of_all_kinds() -> Machine {
+    let mut machine = axis();
+    let r = machine.pulley_radius;
+    machine.drive_pulley.friction = Friction::with_breakaway(2.0 * r * r, 0.4 * r, 0.6 * r)
         .following(Law::Stribeck { velocity: 0.05 / r, shape: Shape::Gaussian });
-    stage.cart.friction =
+    machine.cart.friction =
         Friction::with_breakaway(3.0, 0.5, 0.7).following(Law::LuGre { stiffness: 1e4, damping: 30.0, velocity: 0.05 });
-    stage.idler_pulley.friction = Friction::with_breakaway(r * r, 0.3 * r, 0.4 * r);
-    stage
+    machine.idler_pulley.friction = Friction::with_breakaway(r * r, 0.3 * r, 0.4 * r);
+    machine
 }
 
 /// The stiffer the belt, the nearer the elastic machine is to the rigid one, whatever law each body has.
@@ -469,11 +470,11 @@ fn a_stiff_belt_tends_to_a_rigid_one() {
     let limit = run(&rigid, &input, 0.2, 1e-10);
     assert!(column(&limit, "cart_state").contains(&0.0) && column(&limit, "cart_state").contains(&1.0));
     let off = [1e5, 1e6, 1e7].map(|k| {
-        let mut stage = of_all_kinds();
-        stage.belt.stiffness = [k; 3];
+        let mut machine = of_all_kinds();
+        machine.belt.stiffness = [k; 3];
         // As well damped at any stiffness
-        stage.belt.damping = [0.15 * k.sqrt(); 3];
-        apart(&limit, &run(&stage, &input, 0.2, 1e-10), "cart_position")
+        machine.belt.damping = [0.15 * k.sqrt(); 3];
+        apart(&limit, &run(&machine, &input, 0.2, 1e-10), "cart_position")
     });
     println!("{off:?}");
     assert!(off[0] < 1e-3 && off[1] < 0.2 * off[0] && off[2] < 0.2 * off[1], "{off:?}");
@@ -485,12 +486,12 @@ fn a_stiff_belt_tends_to_a_rigid_one() {
 fn a_flat_curve_is_coulomb_friction() {
     let input = wave(6.0, 10.0);
     for model in [BeltModel::Rigid, BeltModel::TwoMass] {
-        let mut stage = axis();
-        stage.belt.model = model;
-        let r = stage.pulley_radius;
-        stage.drive_pulley.friction = Friction::symmetric(1e-4, 0.4 * r);
-        stage.cart.friction = Friction::symmetric(3.0, 0.5);
-        stage.idler_pulley.friction = Friction::symmetric(0.0, 0.3 * r);
+        let mut machine = axis();
+        machine.belt.model = model;
+        let r = machine.pulley_radius;
+        machine.drive_pulley.friction = Friction::symmetric(1e-4, 0.4 * r);
+        machine.cart.friction = Friction::symmetric(3.0, 0.5);
+        machine.idler_pulley.friction = Friction::symmetric(0.0, 0.3 * r);
         let experiment = Experiment {
             name: "flat".into(),
             input: input.clone(),
@@ -499,9 +500,9 @@ fn a_flat_curve_is_coulomb_friction() {
             initial: Initial::default(),
             log: None,
         };
-        let exact = simulate(&stage, &experiment, Solver::Exact).unwrap();
-        stage.idler_pulley.friction.law = Law::Stribeck { velocity: 1.0, shape: Shape::Gaussian };
-        let general = run(&stage, &input, 0.2, 1e-11);
+        let exact = simulate(&machine, &experiment, Solver::Exact).unwrap();
+        machine.idler_pulley.friction.law = Law::Stribeck { velocity: 1.0, shape: Shape::Gaussian };
+        let general = run(&machine, &input, 0.2, 1e-11);
         assert!(apart(&exact, &general, "cart_position") < 1e-10);
         assert_eq!(exact.outcome.events.len(), general.outcome.events.len());
     }
@@ -511,20 +512,20 @@ fn a_flat_curve_is_coulomb_friction() {
 /// body's bristles are a state.
 #[test]
 fn bristles_of_bodies_made_one_are_states_of_their_own() {
-    let mut stage = of_all_kinds();
-    let r = stage.pulley_radius;
-    stage.drive_pulley.friction = Friction::with_breakaway(2.0 * r * r, 0.4 * r, 0.6 * r).following(Law::LuGre {
+    let mut machine = of_all_kinds();
+    let r = machine.pulley_radius;
+    machine.drive_pulley.friction = Friction::with_breakaway(2.0 * r * r, 0.4 * r, 0.6 * r).following(Law::LuGre {
         stiffness: 3e3 * r * r,
         damping: 10.0 * r * r,
         velocity: 0.05 / r,
     });
-    stage.idler_pulley.friction = Friction::symmetric(r * r, 0.0);
-    let mut rigid = stage.clone();
+    machine.idler_pulley.friction = Friction::symmetric(r * r, 0.0);
+    let mut rigid = machine.clone();
     rigid.belt.model = BeltModel::Rigid;
     let rigid = StateSpace::of(&rigid, Operation::default()).unwrap();
     assert_eq!(rigid.states.iter().filter(|state| state.name.ends_with("bristle")).count(), 2);
-    stage.belt.stiffness = [1e9; 3];
-    let stiff = StateSpace::of(&stage, Operation::default()).unwrap();
+    machine.belt.stiffness = [1e9; 3];
+    let stiff = StateSpace::of(&machine, Operation::default()).unwrap();
     let (rigid, stiff) = (rigid.poles().unwrap(), stiff.poles().unwrap());
     for pole in rigid {
         let nearest = stiff.iter().map(|other| (other - pole).norm()).fold(f64::INFINITY, f64::min);
@@ -535,14 +536,14 @@ fn bristles_of_bodies_made_one_are_states_of_their_own() {
 /// r · (1/r) is 1 only but for rounding: a span between bodies that move as one must not be stretched by their motion.
 #[test]
 fn spans_between_bodies_that_move_as_one_have_no_arms() {
-    let mut stage = table4();
-    stage.belt.model = BeltModel::Rigid;
+    let mut machine = table4();
+    machine.belt.model = BeltModel::Rigid;
     for k in 0..2000 {
-        stage.pulley_radius = 1e-3 * (1.0 + f64::from(k) * 0.1234567);
-        let mechanism = stage.mechanism();
+        machine.pulley_radius = 1e-3 * (1.0 + f64::from(k) * 0.1234567);
+        let mechanism = machine.mechanism();
         for spring in 0..3 {
             let arms = mechanism.leading_arms(spring);
-            assert!(arms.iter().all(|arm| *arm == 0.0), "r = {} m, span {spring}: {arms:?}", stage.pulley_radius);
+            assert!(arms.iter().all(|arm| *arm == 0.0), "r = {} m, span {spring}: {arms:?}", machine.pulley_radius);
         }
     }
 }

@@ -6,18 +6,18 @@ use common::{experiment, table1, table4};
 use proptest::prelude::*;
 use taut::case::Experiment;
 use taut::friction::{Friction, Law, Shape};
+use taut::machine::{AmplifierMode, BeltModel, GearPlay, Machine};
 use taut::metrics::{Balance, Meter, Metrics, Peak, balanced_speed, largest};
 use taut::polyline::Polyline;
 use taut::signal::{Signal, Slot};
 use taut::solve::{Ending, Flow, Method, Solution, Solver, stream_observed};
-use taut::stage::{AmplifierMode, BeltModel, GearPlay, Stage};
 use taut::trajectory::Trajectory;
 
 /// Runs it with a meter beside.
-fn watched(stage: &Stage, experiment: &Experiment, solver: Solver) -> (Solution, Metrics) {
-    let mut meter = Meter::new(stage, experiment);
+fn watched(machine: &Machine, experiment: &Experiment, solver: Solver) -> (Solution, Metrics) {
+    let mut meter = Meter::new(machine, experiment);
     let mut trajectory = Trajectory::default();
-    let outcome = stream_observed(stage, experiment, solver, &mut meter, &mut |block| {
+    let outcome = stream_observed(machine, experiment, solver, &mut meter, &mut |block| {
         trajectory.append(block);
         Flow::Continue
     })
@@ -26,13 +26,13 @@ fn watched(stage: &Stage, experiment: &Experiment, solver: Solver) -> (Solution,
     (Solution { trajectory, outcome }, metrics)
 }
 
-fn run(stage: &Stage, input: Signal, until: f64) -> (Solution, Metrics) {
-    watched(stage, &experiment(input, until), Solver::Exact)
+fn run(machine: &Machine, input: Signal, until: f64) -> (Solution, Metrics) {
+    watched(machine, &experiment(input, until), Solver::Exact)
 }
 
 /// The same with another output interval.
-fn every(stage: &Stage, input: &Signal, until: f64, every: f64, solver: Solver) -> (Solution, Metrics) {
-    watched(stage, &Experiment { every, ..experiment(input.clone(), until) }, solver)
+fn every(machine: &Machine, input: &Signal, until: f64, every: f64, solver: Solver) -> (Solution, Metrics) {
+    watched(machine, &Experiment { every, ..experiment(input.clone(), until) }, solver)
 }
 
 /// Peaks with their names.
@@ -50,9 +50,9 @@ fn peaks(metrics: &Metrics) -> Vec<(String, Peak)> {
 }
 
 /// The largest magnitudes in rows, in the same order.
-fn largest_rows(stage: &Stage, trajectory: &Trajectory) -> Vec<f64> {
+fn largest_rows(machine: &Machine, trajectory: &Trajectory) -> Vec<f64> {
     let get = |name: &str| trajectory.get(name).unwrap().to_vec();
-    let r = stage.pulley_radius;
+    let r = machine.pulley_radius;
     let [p1, x, p3] = ["drive_angle", "cart_position", "idler_angle"].map(get);
     let apart = |a: &[f64], ra: f64, b: &[f64], rb: f64| a.iter().zip(b).map(|(a, b)| ra * a - rb * b).collect();
     let speed: Vec<f64> = get("drive_speed").iter().map(|w| r * w).collect();
@@ -66,11 +66,11 @@ proptest! {
     #![proptest_config(random::cases(64))]
     /// Peaks were those of rows: a current 26 % low, a force in a span 14.5 % low where a stage howls.
     #[test]
-    fn peaks_are_those_of_a_fine_run(stage in random::equipped(Dry::Any), input in random::input()) {
-        let (coarse, metrics) = every(&stage, &input, 0.1, 1e-3, Solver::Exact);
-        let (fine, _) = every(&stage, &input, 0.1, 2e-6, Solver::Exact);
+    fn peaks_are_those_of_a_fine_run(machine in random::equipped(Dry::Any), input in random::input()) {
+        let (coarse, metrics) = every(&machine, &input, 0.1, 1e-3, Solver::Exact);
+        let (fine, _) = every(&machine, &input, 0.1, 2e-6, Solver::Exact);
         prop_assume!(coarse.outcome.ending == Ending::Complete && fine.outcome.ending == Ending::Complete);
-        for ((name, peak), row) in peaks(&metrics).iter().zip(largest_rows(&stage, &fine.trajectory)) {
+        for ((name, peak), row) in peaks(&metrics).iter().zip(largest_rows(&machine, &fine.trajectory)) {
             let found = peak.value.abs();
             prop_assert!(row <= found * (1.0 + 1e-7) + 1e-13, "{name}: a row has {row}, the peak is {found}");
             // A machine may change faster than the fine rows tell, but not by much.
@@ -80,8 +80,8 @@ proptest! {
 
     /// Metrics were made of rows: "no constant input lasts 20 samples", and other peaks with another interval.
     #[test]
-    fn metrics_do_not_depend_on_the_output_interval(stage in random::equipped(Dry::Any), input in random::input()) {
-        let [one, fine, odd] = [1e-3, 1e-4, 0.37e-3].map(|h| every(&stage, &input, 0.3, h, Solver::Exact));
+    fn metrics_do_not_depend_on_the_output_interval(machine in random::equipped(Dry::Any), input in random::input()) {
+        let [one, fine, odd] = [1e-3, 1e-4, 0.37e-3].map(|h| every(&machine, &input, 0.3, h, Solver::Exact));
         for (other, metrics) in [&fine, &odd] {
             prop_assume!(one.0.outcome.ending == Ending::Complete && other.outcome.ending == Ending::Complete);
             prop_assume!(one.0.outcome.events.len() == other.outcome.events.len());
@@ -102,11 +102,11 @@ proptest! {
     }
 
     #[test]
-    fn metrics_are_what_their_definitions_say(stage in random::stage(Dry::Any), input in random::input()) {
-        let (solution, metrics) = run(&stage, input.clone(), 0.4);
+    fn metrics_are_what_their_definitions_say(machine in random::machine(Dry::Any), input in random::input()) {
+        let (solution, metrics) = run(&machine, input.clone(), 0.4);
         let get = |name: &str| solution.trajectory.get(name).unwrap();
         let last = |name: &str| *get(name).last().unwrap();
-        let r = stage.pulley_radius;
+        let r = machine.pulley_radius;
         prop_assert_eq!(metrics.end, 0.4);
         prop_assert_eq!(metrics.final_cart_position, last("cart_position"));
         prop_assert_eq!(metrics.final_drive_travel, r * last("drive_angle"));
@@ -129,7 +129,7 @@ proptest! {
         if let Some(found) = metrics.steady_speed {
             let (begin, end) = found.stretch;
             prop_assert!(end - begin >= 0.008 - 1e-12 && found.input != 0.0);
-            let (fine, _) = every(&stage, &input, 0.4, 1e-5, Solver::Exact);
+            let (fine, _) = every(&machine, &input, 0.4, 1e-5, Solver::Exact);
             let (time, speed) = (fine.trajectory.get("time").unwrap(), fine.trajectory.get("cart_speed").unwrap());
             let late: Vec<f64> = time.iter().zip(speed).filter(|(t, _)| (end - 0.1 * (end - begin) - 1e-9..=end + 1e-9).contains(*t)).map(|(_, v)| *v).collect();
             let change = late.iter().fold(f64::MIN, |a, v| a.max(*v)) - late.iter().fold(f64::MAX, |a, v| a.min(*v));
@@ -146,8 +146,8 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
     /// Under a constant input every machine without a breakaway to hold it ends at the speed of the balance.
     #[test]
-    fn a_long_step_ends_at_the_balance_of_forces(stage in random::stage(Dry::Any), input in prop_oneof![3.0..12.0f64, -12.0..-3.0f64]) {
-        let (_, metrics) = run(&stage, Signal::Step { value: input, at: 0.0 }, 5.0);
+    fn a_long_step_ends_at_the_balance_of_forces(machine in random::machine(Dry::Any), input in prop_oneof![3.0..12.0f64, -12.0..-3.0f64]) {
+        let (_, metrics) = run(&machine, Signal::Step { value: input, at: 0.0 }, 5.0);
         let steady = metrics.steady_speed.unwrap();
         if let Balance::At(analytic) = steady.analytic
             && steady.reached
@@ -161,8 +161,8 @@ proptest! {
 
 #[test]
 fn the_five_volt_pulse_of_the_paper() {
-    let stage = table4();
-    let (_, metrics) = run(&stage, Signal::Pulse { value: 5.0, duration: 0.25, at: 0.0 }, 1.0);
+    let machine = table4();
+    let (_, metrics) = run(&machine, Signal::Pulse { value: 5.0, duration: 0.25, at: 0.0 }, 1.0);
     assert!((metrics.final_drive_travel - 0.053744890394).abs() < 1e-9);
     assert!((metrics.final_cart_position - 0.053746653033).abs() < 1e-9);
     let (stops, starts) = metrics.events.iter().fold((0, 0), |(a, b), e| (a + e.stops, b + e.starts));
@@ -178,38 +178,38 @@ fn the_five_volt_pulse_of_the_paper() {
 #[test]
 fn the_balance_by_hand() {
     // Table 4 at 5 V: τ = K_t u / R − T = 0.161972 − 0.03388 N m over 2 B + b r² + K_t K_e / R = 0.011112 N m s.
-    let stage = table4();
+    let machine = table4();
     let total = 2.0 * 0.0016 + 19.0424 * 0.0194 * 0.0194 + 0.023 * 0.023 / 0.71;
     let speed = 0.0194 * (0.023 * 5.0 / 0.71 - 2.0 * 0.015 - 0.0194 * 0.2) / total;
-    assert!((balanced_speed(&stage, 5.0, 0.0).speed().unwrap() - speed).abs() < 1e-12);
-    assert!((balanced_speed(&stage, -5.0, 0.0).speed().unwrap() + speed).abs() < 1e-12);
-    assert_eq!(balanced_speed(&stage, 1.0, 0.0), Balance::At(0.0));
-    assert_eq!(balanced_speed(&stage, 0.0, 0.0), Balance::At(0.0));
+    assert!((balanced_speed(&machine, 5.0, 0.0).speed().unwrap() - speed).abs() < 1e-12);
+    assert!((balanced_speed(&machine, -5.0, 0.0).speed().unwrap() + speed).abs() < 1e-12);
+    assert_eq!(balanced_speed(&machine, 1.0, 0.0), Balance::At(0.0));
+    assert_eq!(balanced_speed(&machine, 0.0, 0.0), Balance::At(0.0));
 
-    let mut stage = table1();
-    stage.amplifier.mode = AmplifierMode::Current;
-    stage.drive_pulley.friction = Friction::default();
-    stage.idler_pulley.friction = Friction::default();
+    let mut machine = table1();
+    machine.amplifier.mode = AmplifierMode::Current;
+    machine.drive_pulley.friction = Friction::default();
+    machine.idler_pulley.friction = Friction::default();
     let speed = 0.0194 * 0.023 * 2.0 / (40.6518 * 0.0194 * 0.0194);
-    assert!((balanced_speed(&stage, 2.0, 0.0).speed().unwrap() - speed).abs() < 1e-12);
-    stage.cart.friction = Friction::default();
-    assert_eq!(balanced_speed(&stage, 2.0, 0.0), Balance::Never);
+    assert!((balanced_speed(&machine, 2.0, 0.0).speed().unwrap() - speed).abs() < 1e-12);
+    machine.cart.friction = Friction::default();
+    assert_eq!(balanced_speed(&machine, 2.0, 0.0), Balance::Never);
 }
 
 /// Once the balance left out what a friction law adds to b v + F_c, and what changes along the travel.
 #[test]
 fn a_friction_curve_counts_in_the_balance() {
     let of = |law| {
-        let mut stage = table4();
-        let r = stage.pulley_radius;
-        stage.cart.friction = Friction::with_breakaway(19.0424, 0.2, 1.2).following(law);
+        let mut machine = table4();
+        let r = machine.pulley_radius;
+        machine.cart.friction = Friction::with_breakaway(19.0424, 0.2, 1.2).following(law);
         let pulley = Friction::with_breakaway(0.0016, 0.015, 0.02);
-        (stage.drive_pulley.friction, stage.idler_pulley.friction) = (pulley, pulley);
-        stage.drive_pulley.friction.law = match law {
+        (machine.drive_pulley.friction, machine.idler_pulley.friction) = (pulley, pulley);
+        machine.drive_pulley.friction.law = match law {
             Law::Smooth { breakaway_velocity: v } => Law::Smooth { breakaway_velocity: v / r },
             _ => Law::Coulomb,
         };
-        stage
+        machine
     };
     let laws = [
         Law::Stribeck { velocity: 0.1, shape: Shape::Gaussian },
@@ -219,9 +219,9 @@ fn a_friction_curve_counts_in_the_balance() {
     ];
     for law in laws {
         for volts in [4.0, -4.0] {
-            let stage = of(law);
+            let machine = of(law);
             let step = experiment(Signal::Step { value: volts, at: 0.0 }, 2.0);
-            let steady = watched(&stage, &step, Solver::GENERAL).1.steady_speed.unwrap();
+            let steady = watched(&machine, &step, Solver::GENERAL).1.steady_speed.unwrap();
             let balance = steady.analytic.speed().unwrap();
             assert!((steady.value - balance).abs() < 1e-9, "{law:?}: {steady:?}");
             // The curve is worth more than half a millimetre per second there.
@@ -233,11 +233,11 @@ fn a_friction_curve_counts_in_the_balance() {
 
 #[test]
 fn where_a_curve_has_several_balances_the_one_nearby_counts() {
-    let mut stage = table4();
-    stage.cart.friction =
+    let mut machine = table4();
+    machine.cart.friction =
         Friction::with_breakaway(5.0, 0.2, 1.2).following(Law::Stribeck { velocity: 0.01, shape: Shape::Gaussian });
     // 1.5 V: too little to set out, enough to keep sliding.
-    let (slow, fast) = (balanced_speed(&stage, 1.5, 0.0), balanced_speed(&stage, 1.5, 0.2));
+    let (slow, fast) = (balanced_speed(&machine, 1.5, 0.0), balanced_speed(&machine, 1.5, 0.2));
     assert_eq!(slow, Balance::At(0.0));
     // All forces by hand at the speed found: the curve is over there.
     let v = fast.speed().unwrap();
@@ -245,8 +245,8 @@ fn where_a_curve_has_several_balances_the_one_nearby_counts() {
         (0.023 * (1.5 - 0.023 * v / 0.0194) / 0.71, 0.03 + 0.0032 * v / 0.0194 + 0.0194 * (0.2 + 5.0 * v));
     assert!(v > 0.04 && (drive - load).abs() < 1e-9, "{v}: {drive} and {load}");
 
-    stage.cart.along = Polyline::new(vec![[0.0, 1.0], [0.1, 2.0]]);
-    assert_eq!(balanced_speed(&stage, 1.5, 0.0), Balance::Changing);
+    machine.cart.along = Polyline::new(vec![[0.0, 1.0], [0.1, 2.0]]);
+    assert_eq!(balanced_speed(&machine, 1.5, 0.0), Balance::Changing);
 }
 
 #[test]
@@ -282,33 +282,33 @@ fn what_never_moves_has_stopped_at_once_and_what_has_no_dry_friction_never_stops
 /// Table 3 freezes speeds instead of stopping: its run must not claim a stop.
 #[test]
 fn table3_does_not_stop() {
-    let stage = table4();
+    let machine = table4();
     let pulse = experiment(Signal::Pulse { value: 5.0, duration: 0.25, at: 0.0 }, 1.0);
     let solver = Solver::Table3 { step: 1e-4, method: Method::RungeKutta4 };
-    let (_, metrics) = watched(&stage, &pulse, solver);
+    let (_, metrics) = watched(&machine, &pulse, solver);
     assert_eq!(metrics.stop_time, None);
 }
 
 /// A rotor behind a gear with play went on spinning in runs that were "settled": nothing looked at it.
 #[test]
 fn a_spinning_rotor_behind_play_is_not_settled() {
-    let mut stage = table4();
-    stage.motor.rotor_inertia = 2e-6;
+    let mut machine = table4();
+    machine.motor.rotor_inertia = 2e-6;
     // Half a turn of play: the rotor turns freely in it.
-    stage.motor.gear_play = Some(GearPlay { backlash: 3.0, stiffness: 50.0, damping: 0.01 });
+    machine.motor.gear_play = Some(GearPlay { backlash: 3.0, stiffness: 50.0, damping: 0.01 });
     // Pushed off for 20 ms, it coasts against its own back-EMF and has not arrived at the flank yet.
     let input = Signal::Pulse { value: 0.3, duration: 0.02, at: 0.0 };
-    let (spinning, metrics) = run(&stage, input.clone(), 0.03);
+    let (spinning, metrics) = run(&machine, input.clone(), 0.03);
     let speed = *spinning.trajectory.get("rotor_speed").unwrap().last().unwrap();
     assert!(speed > 0.1, "{speed}");
     assert!(metrics.bodies_rest && !metrics.rotor_rests && !metrics.settled, "{metrics:?}");
     assert_eq!((metrics.stop_time, metrics.final_rotor_speed), (None, speed));
 
     // In time it comes to rest, at one time whatever the rows.
-    let stops = [1e-3, 1e-4, 0.37e-3].map(|h| every(&stage, &input, 5.0, h, Solver::Exact).1);
+    let stops = [1e-3, 1e-4, 0.37e-3].map(|h| every(&machine, &input, 5.0, h, Solver::Exact).1);
     let stop = stops[0].stop_time.unwrap();
     assert!(stops.iter().all(|m| m.settled && (m.stop_time.unwrap() - stop).abs() < 1e-9), "{stops:?}");
-    let (fine, _) = every(&stage, &input, 5.0, 1e-4, Solver::Exact);
+    let (fine, _) = every(&machine, &input, 5.0, 1e-4, Solver::Exact);
     let (time, speed) = (fine.trajectory.get("time").unwrap(), fine.trajectory.get("rotor_speed").unwrap());
     let fastest = speed.iter().fold(0.0, |most: f64, v| most.max(v.abs()));
     let last = speed.iter().rposition(|v| v.abs() > 1e-6 * fastest).unwrap();
@@ -318,15 +318,15 @@ fn a_spinning_rotor_behind_play_is_not_settled() {
 /// Both solvers see the same between their steps.
 #[test]
 fn both_solvers_have_the_same_metrics() {
-    let mut stage = table4();
-    stage.motor.inductance = 5e-4;
-    stage.amplifier.voltage_limit = Some(4.0);
+    let mut machine = table4();
+    machine.motor.inductance = 5e-4;
+    machine.amplifier.voltage_limit = Some(4.0);
     let input = Signal::sequence(vec![
         Slot { signal: Signal::Sine { amplitude: 5.0, frequency: 7.0, phase: 0.3, offset: 0.5 }, lasts: 0.3 },
         Slot { signal: Signal::Step { value: -3.0, at: 0.0 }, lasts: f64::INFINITY },
     ]);
-    let [exact, general] =
-        [Solver::Exact, Solver::General { tolerance: 1e-11 }].map(|solver| every(&stage, &input, 0.6, 1e-3, solver).1);
+    let [exact, general] = [Solver::Exact, Solver::General { tolerance: 1e-11 }]
+        .map(|solver| every(&machine, &input, 0.6, 1e-3, solver).1);
     for ((name, a), (_, b)) in peaks(&exact).iter().zip(peaks(&general)) {
         assert!((a.value - b.value).abs() <= 1e-6 * a.value.abs(), "{name}: {a:?} {b:?}");
         assert!((a.time - b.time).abs() <= 1e-5, "{name}: {a:?} {b:?}");
@@ -356,7 +356,7 @@ fn the_largest_of_three_spans() {
 /// where its bend opens upwards, and the search gave up there.
 #[test]
 fn a_peak_between_rows_was_missed() {
-    let stage = Stage {
+    let machine = Machine {
         pulley_radius: 0.03078099495363096,
         ..common::paper_stage(
             [87477.38907513424, 79069.40378532857, 70358.68780123326],
@@ -365,17 +365,17 @@ fn a_peak_between_rows_was_missed() {
             Friction::symmetric(16.15582836699769, 0.26837771083315987),
         )
     };
-    let mut stage = stage;
-    stage.motor.torque_constant = 0.03369331371314996;
-    stage.motor.back_emf_constant = 0.019990956069626295;
-    stage.motor.resistance = 0.7433128634257781;
-    stage.idler_pulley.inertia = 4.2653608154370274e-5;
-    stage.idler_pulley.friction = Friction::symmetric(0.0023822508314399362, 0.01711309278367658);
-    stage.cart.mass = 0.5371313945176149;
+    let mut machine = machine;
+    machine.motor.torque_constant = 0.03369331371314996;
+    machine.motor.back_emf_constant = 0.019990956069626295;
+    machine.motor.resistance = 0.7433128634257781;
+    machine.idler_pulley.inertia = 4.2653608154370274e-5;
+    machine.idler_pulley.friction = Friction::symmetric(0.0023822508314399362, 0.01711309278367658);
+    machine.cart.mass = 0.5371313945176149;
     let input = Signal::Pulse { value: 5.0, duration: 0.25, at: 0.0 };
-    let (_, known) = every(&stage, &input, 0.3, 2e-6, Solver::Exact);
+    let (_, known) = every(&machine, &input, 0.3, 2e-6, Solver::Exact);
     for rows in [1e-4, 2e-4, 0.37e-3, 5e-4, 1e-3, 2e-3, 0.1] {
-        let (_, metrics) = every(&stage, &input, 0.3, rows, Solver::Exact);
+        let (_, metrics) = every(&machine, &input, 0.3, rows, Solver::Exact);
         for ((name, a), (_, b)) in peaks(&metrics).iter().zip(peaks(&known)) {
             assert!((a.value - b.value).abs() <= 3e-9 * b.value.abs(), "{name}, rows of {rows} s: {a:?} and {b:?}");
         }
@@ -386,23 +386,23 @@ fn a_peak_between_rows_was_missed() {
 /// output interval. It is largest at the end of the pulse; a current at its limit is largest from its beginning on.
 #[test]
 fn the_time_of_a_plateaus_peak_depended_on_the_output_interval() {
-    let mut stage = table4();
+    let mut machine = table4();
     // No swing goes beyond the steady speed.
-    stage.belt.model = BeltModel::Rigid;
+    machine.belt.model = BeltModel::Rigid;
     let pulse = |duration| Signal::Pulse { value: 5.0, duration, at: 0.0 };
     for duration in [1.0, 1.2345678] {
         for rows in [1e-2, 1e-3, 0.37e-3, 2e-5] {
-            let (_, metrics) = every(&stage, &pulse(duration), 1.5, rows, Solver::Exact);
+            let (_, metrics) = every(&machine, &pulse(duration), 1.5, rows, Solver::Exact);
             let peak = metrics.peak_cart_speed;
             assert!((peak.time - duration).abs() < 1e-12, "{duration} s, rows of {rows} s: {peak:?}");
         }
     }
     // The current that the voltage asks for is beyond its limit while the machine speeds up.
-    stage.amplifier.current_limit = Some(2.0);
-    let (_, known) = every(&stage, &pulse(1.0), 1.5, 1e-3, Solver::Exact);
+    machine.amplifier.current_limit = Some(2.0);
+    let (_, known) = every(&machine, &pulse(1.0), 1.5, 1e-3, Solver::Exact);
     assert!(known.peak_current.value == 2.0, "{:?}", known.peak_current);
     for rows in [1e-2, 0.37e-3, 2e-5] {
-        let (_, metrics) = every(&stage, &pulse(1.0), 1.5, rows, Solver::Exact);
+        let (_, metrics) = every(&machine, &pulse(1.0), 1.5, rows, Solver::Exact);
         let (a, b) = (metrics.peak_current, known.peak_current);
         assert!(a.value == b.value && (a.time - b.time).abs() < 1e-9, "rows of {rows} s: {a:?}, {b:?}");
     }

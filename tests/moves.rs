@@ -8,12 +8,12 @@ use taut::trajectory::Trajectory;
 /// A move of a controller's case with a row every `every`, and these rows.
 fn moved(case: &Case, motion: &Move, every: f64) -> (MoveRun, Trajectory) {
     let design = case.controller.as_ref().unwrap();
-    let mut controller = Standard::new(design, &case.stage).unwrap();
+    let mut controller = Standard::new(design, &case.machine).unwrap();
     let profile = motion.reference(design);
     let rows = Rows { until: motion.until, every, window: motion.window };
     let mut trajectory = Trajectory::default();
-    let solver = Solver::of(&case.stage);
-    let run = stream(&case.stage, &mut controller, &Loop::of(design), &profile, &rows, solver, false, &mut |block| {
+    let solver = Solver::of(&case.machine);
+    let run = stream(&case.machine, &mut controller, &Loop::of(design), &profile, &rows, solver, false, &mut |block| {
         trajectory.append(block);
         Flow::Continue
     })
@@ -43,7 +43,7 @@ fn integrals_are_those_of_a_dense_quadrature() {
     for (name, limit) in [("pid-elastic", None), ("cascade", None), ("pid", Some("limit"))] {
         let changes: &[&str] = if limit.is_some() { &["controller.limit=5 V"] } else { &[] };
         let case = case(name, changes);
-        let (motor, motion) = (case.stage.motor, &case.moves[0]);
+        let (motor, motion) = (case.machine.motor, &case.moves[0]);
         let h = 1e-5;
         let (run, rows) = moved(&case, motion, h);
         let get = |name: &str| rows.get(name).unwrap();
@@ -68,7 +68,7 @@ fn integrals_are_those_of_a_dense_quadrature() {
         near("rms voltage", figures.voltage.1, rms(&|k, _| voltage[k]), 1e-8);
         near("rms current", figures.current.1, rms(&current), 1e-8);
         near("rms error", figures.cart.rms, rms(&|_, at| error[at]), 1e-7);
-        let r = case.stage.pulley_radius;
+        let r = case.machine.pulley_radius;
         near("rms following", figures.following.rms, rms(&|_, at| r * drive[at] - reference[at]), 1e-7);
 
         // Peaks: no row passes them, and the nearest comes close.

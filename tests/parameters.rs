@@ -4,8 +4,8 @@ use std::path::PathBuf;
 use std::sync::LazyLock;
 use taut::case::{Case, Given, Opened};
 use taut::fit::Problem;
+use taut::machine::Machine;
 use taut::parameter::{self, Field, Free, Off, Parameter, all, every, free_markdown, kinds, named, values};
-use taut::stage::Stage;
 use taut::sweep::Sweep;
 
 /// A machine with all parts that go together. Numbers are sums of few powers of two, so that twice or a quarter of them
@@ -116,7 +116,7 @@ fn read(name: &str, text: &str, changes: &[&str]) -> Case {
     Case::from_text_with(name, text, changes).unwrap_or_else(|error| panic!("{error}\n{changes:?}"))
 }
 
-fn value_of(stage: &Stage, key: &str) -> Option<f64> {
+fn value_of(stage: &Machine, key: &str) -> Option<f64> {
     values(stage).into_iter().find(|(own, _)| own == key).map(|(_, value)| value)
 }
 
@@ -127,15 +127,15 @@ fn every_number_is_set_where_a_case_file_has_it() {
     let mut seen: Vec<&str> = Vec::new();
     for (name, text) in cases() {
         let case = read(&name, &text, &[]);
-        for (key, value) in values(&case.stage) {
+        for (key, value) in values(&case.machine) {
             let row = named(&key).unwrap();
             seen.push(row.key);
             let part = if row.key.ends_with(".position") { value + 0.25 } else { 0.25 * value };
             // What stands by itself in the file goes by itself.
             let given: Vec<&str> = all().map(|row| row.key).filter(|key| case.value(key).is_ok()).collect();
-            let free = Free::new(&case.stage, &key, &given, &[]).unwrap_or_else(|error| panic!("{error}"));
+            let free = Free::new(&case.machine, &key, &given, &[]).unwrap_or_else(|error| panic!("{error}"));
             assert_eq!((free.start, free.unit), (value, row.unit), "{key}");
-            let mut stage = case.stage.clone();
+            let mut stage = case.machine.clone();
             free.set(&mut stage, part);
             let held = value_of(&stage, &key.replace("static", "coulomb")).unwrap();
             assert_eq!(
@@ -152,7 +152,7 @@ fn every_number_is_set_where_a_case_file_has_it() {
                     Err(error) => {
                         assert!(key.contains(".static") && error.what.contains("less than the Coulomb"), "{error}")
                     }
-                    Ok(written) => assert_eq!(written.stage, stage, "{key}"),
+                    Ok(written) => assert_eq!(written.machine, stage, "{key}"),
                 }
             }
         }
@@ -171,14 +171,14 @@ fn every_number_is_set_where_a_case_file_has_it() {
 fn every_number_is_free_in_a_fit_and_varied_in_a_sweep() {
     for (name, text) in cases() {
         let case = read(&name, &text, &[]);
-        for (key, value) in values(&case.stage) {
+        for (key, value) in values(&case.machine) {
             let fitted = read(&name, &text, &[&format!("fit.free=[\"{key}\"]")]);
             let plan = fitted.fit.as_ref().unwrap();
             let problem = Problem::new(&fitted, plan).unwrap_or_else(|error| panic!("{error}"));
             let mut x = problem.start();
-            assert_eq!(problem.stage_at(&x), case.stage, "{key}");
+            assert_eq!(problem.stage_at(&x), case.machine, "{key}");
             x[0] += 0.125;
-            assert_ne!(problem.stage_at(&x), case.stage, "{key}");
+            assert_ne!(problem.stage_at(&x), case.machine, "{key}");
 
             let vary = format!("sweep.vary.\"{key}\"={{ factors = [1, 0.25, 2] }}");
             let swept = read(&name, &text, &["sweep.design=grid", &vary]);
@@ -187,7 +187,7 @@ fn every_number_is_free_in_a_fit_and_varied_in_a_sweep() {
                 assert!(!named(&key).unwrap().range.contains(2.0 * value), "{key}");
                 continue;
             };
-            assert_eq!(sweep.machine(0).axis(), Some(&case.stage), "{key}");
+            assert_eq!(sweep.machine(0).axis(), Some(&case.machine), "{key}");
             let less = value_of(sweep.machine(1).axis().unwrap(), &key).unwrap();
             assert!(less == 0.25 * value || key.contains(".static") && less < value, "{key}");
             assert_eq!(sweep.columns()[1].name, key);
@@ -199,7 +199,7 @@ fn every_number_is_free_in_a_fit_and_varied_in_a_sweep() {
 #[test]
 fn the_numbers_of_a_list_go_together() {
     for (name, text) in cases() {
-        let stage = read(&name, &text, &[]).stage;
+        let stage = read(&name, &text, &[]).machine;
         let lists = [
             "belt.stiffness",
             "belt.damping",
@@ -228,7 +228,7 @@ fn the_numbers_of_a_list_go_together() {
 #[test]
 fn the_order_in_which_numbers_are_set_does_not_count() {
     let (name, text) = cases().remove(0);
-    let stage = read(&name, &text, &[]).stage;
+    let stage = read(&name, &text, &[]).machine;
     let keys =
         ["idler_pulley.friction.coulomb", "idler_pulley.friction.static", "drive_pulley.friction.stribeck.force"];
     let keys = [&keys[..], &["drive_pulley.friction.coulomb"]].concat();
@@ -245,9 +245,9 @@ fn the_order_in_which_numbers_are_set_does_not_count() {
 /// A key that this machine has not, or that is no number of a machine, is refused with what there is instead.
 #[test]
 fn keys_that_cannot_be_free_say_what_can() {
-    let whole = read(&cases()[0].0, &cases()[0].1, &[]).stage;
-    let plain = Case::from_text("axis.toml", taut::case::TEMPLATE).unwrap().stage;
-    let told = |stage: &Stage, key: &str| Free::new(stage, key, &[], &[]).unwrap_err().to_string();
+    let whole = read(&cases()[0].0, &cases()[0].1, &[]).machine;
+    let plain = Case::from_text("axis.toml", taut::case::TEMPLATE).unwrap().machine;
+    let told = |stage: &Machine, key: &str| Free::new(stage, key, &[], &[]).unwrap_err().to_string();
     assert_eq!(
         told(&plain, "cart.friction.lugre.stiffness"),
         "`cart.friction.lugre.stiffness` has no value in this case\n  \
@@ -281,7 +281,7 @@ fn keys_that_cannot_be_free_say_what_can() {
         let told = told(stage, key);
         assert!(told.contains(part), "{key}: {told}");
     }
-    let made = read(&cases()[1].0, &cases()[1].1, &[]).stage;
+    let made = read(&cases()[1].0, &cases()[1].1, &[]).machine;
     assert!(
         told(&made, "belt.stiffness.0").contains("next: it follows from modulus, section and spans: name one of these")
     );
@@ -291,7 +291,7 @@ fn keys_that_cannot_be_free_say_what_can() {
 #[test]
 fn numbers_that_are_off_keep_their_ties() {
     for (name, text) in cases() {
-        let stage = read(&name, &text, &[]).stage;
+        let stage = read(&name, &text, &[]).machine;
         let mut seen: Vec<String> = Vec::new();
         for kind in kinds(&stage) {
             let mut off = stage.clone();
@@ -375,7 +375,7 @@ fn the_table_is_of_one_piece() {
 /// The parameters that `--vary all` varies on the paper's machine.
 #[test]
 fn everything_of_the_papers_machine() {
-    let stage = Case::from_text("table4.toml", include_str!("../stages/sollmann-jouaneh/table4.toml")).unwrap().stage;
+    let stage = Case::from_text("table4.toml", include_str!("../stages/sollmann-jouaneh/table4.toml")).unwrap().machine;
     let keys = [
         "motor.torque_constant",
         "motor.back_emf_constant",
@@ -414,7 +414,7 @@ fn everything_of_the_papers_machine() {
 #[test]
 fn numbers_out_of_their_ranges_are_refused_by_their_keys() {
     for (name, text) in cases() {
-        let stage = read(&name, &text, &[]).stage;
+        let stage = read(&name, &text, &[]).machine;
         parameter::check(&stage).unwrap();
         for (key, _) in values(&stage) {
             let row = named(&key).unwrap();
@@ -434,7 +434,7 @@ fn numbers_out_of_their_ranges_are_refused_by_their_keys() {
             }
         }
     }
-    let mut stage = Case::from_text("axis.toml", taut::case::TEMPLATE).unwrap().stage;
+    let mut stage = Case::from_text("axis.toml", taut::case::TEMPLATE).unwrap().machine;
     stage.motor.resistance = -1.0;
     let error = parameter::check(&stage).unwrap_err().to_string();
     assert_eq!(error, "motor.resistance cannot be -1 ohm\n  allowed: from 1e-15 ohm to 1e15 ohm");
@@ -445,7 +445,7 @@ fn numbers_out_of_their_ranges_are_refused_by_their_keys() {
 fn a_point_is_set_by_the_name_of_its_part() {
     let (name, text) = cases().remove(0);
     let case = read(&name, &text, &["cart.friction.along.1.factor=1.5", "cart.friction.along.0.position=-125 cm"]);
-    assert_eq!(case.stage.cart.along.as_ref().unwrap().points()[..2], [[-1.25, 1.0], [0.5, 1.5]]);
+    assert_eq!(case.machine.cart.along.as_ref().unwrap().points()[..2], [[-1.25, 1.0], [0.5, 1.5]]);
     assert_eq!(case.value("cart.friction.along.0.position").unwrap(), Given::Number(-1.25));
     assert_eq!(case.value("cart.friction.along.1.1").unwrap(), Given::Number(1.5));
     for (change, part) in [

@@ -24,7 +24,7 @@ fn with_log(viscous: f64, coulomb: f64, seed: u64) -> Case {
     let changes = [format!("{VISCOUS}={viscous}"), format!("{COULOMB}={coulomb}")];
     let changes: Vec<&str> = rows.into_iter().chain(changes.iter().map(String::as_str)).collect();
     let truth = Case::from_text_with("axis.toml", TEMPLATE, &changes).unwrap();
-    let run = simulate(&truth.stage, &truth.experiments[0], Solver::Exact).unwrap().trajectory;
+    let run = simulate(&truth.machine, &truth.experiments[0], Solver::Exact).unwrap().trajectory;
     let mut chance = Chance::new(seed);
     let values = run.get("drive_angle").unwrap().iter().map(|v| v + NOISE * chance.normal()).collect();
     case.experiments[0].log = Some(logged(&case.experiments[0].name, &run, values));
@@ -161,12 +161,12 @@ fn a_band_of_drawn_machines_contains_the_truth() {
     std::fs::remove_dir_all(&folder).unwrap();
 
     // At the end of the pulse and at rest.
-    let position = |stage: &taut::stage::Stage| {
-        let run = simulate(stage, &case.experiments[0], Solver::Exact).unwrap().trajectory;
+    let position = |machine: &taut::machine::Machine| {
+        let run = simulate(machine, &case.experiments[0], Solver::Exact).unwrap().trajectory;
         let column = run.get("cart_position").unwrap();
         [column[column.len() / 2], *column.last().unwrap()]
     };
-    let mut truth = case.stage.clone();
+    let mut truth = case.machine.clone();
     for side in [&mut truth.cart.friction.forward, &mut truth.cart.friction.backward] {
         (side.viscous, side.coulomb, side.breakaway) = (22.0, 0.3, 0.3);
     }

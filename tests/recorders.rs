@@ -13,9 +13,9 @@ use std::path::{Path, PathBuf};
 use taut::case::{Case, Experiment, Plan, TEMPLATE};
 use taut::fit::fit;
 use taut::log::{In, Log, PRESETS, Pick, Quantity, Survey};
+use taut::machine::Machine;
 use taut::signal::Signal;
 use taut::solve::{Flow, Solver, simulate};
-use taut::stage::Stage;
 use taut::trajectory::Trajectory;
 
 /// An experiment, which a case has to have.
@@ -41,13 +41,13 @@ fn to_and_fro() -> Signal {
 }
 
 /// A run of it, every millisecond.
-fn run(stage: &Stage) -> Trajectory {
+fn run(stage: &Machine) -> Trajectory {
     let experiment = Experiment { every: 1e-3, ..common::experiment(to_and_fro(), 0.5) };
     simulate(stage, &experiment, Solver::Exact).unwrap().trajectory
 }
 
-fn stage() -> Stage {
-    Case::from_text("case.toml", &format!("{}\n{STEP}", machine())).unwrap_or_else(|error| panic!("{error}")).stage
+fn stage() -> Machine {
+    Case::from_text("case.toml", &format!("{}\n{STEP}", machine())).unwrap_or_else(|error| panic!("{error}")).machine
 }
 
 fn read(folder: &Path, log: &str) -> Result<Case, String> {
@@ -72,7 +72,7 @@ fn agrees(log: &Log, quantity: Quantity, run: &[f64], within: f64) {
 
 /// A generator of RepRapFirmware's closed-loop data: heading and formats as in ClosedLoop.cpp, the columns of a
 /// firmware with 24 channels; `end` is its last line.
-fn reprapfirmware(stage: &Stage, run: &Trajectory, end: &str) -> String {
+fn reprapfirmware(stage: &Machine, run: &Trajectory, end: &str) -> String {
     let column = |name: &str| run.get(name).unwrap();
     let mut text = String::from(
         "Sample,Timestamp,Raw Encoder Reading,Measured Motor Steps,Target Motor Steps,Current Error,PID Control Signal,PID P Term,\
@@ -132,7 +132,7 @@ fn a_window_before_the_end_has_lost_nothing() {
 
 /// A generator of the messages of Klipper's data_logger.py: those that readlog.py reads, and an answer that it passes
 /// over.
-fn klipper(stage: &Stage, run: &Trajectory, acceleration: &[f64]) -> Vec<u8> {
+fn klipper(stage: &Machine, run: &Trajectory, acceleration: &[f64]) -> Vec<u8> {
     let column = |name: &str| run.get(name).unwrap();
     let mut text = String::from("{\"q\":\"status\",\"params\":{\"eventtime\":1.5,\"status\":{}}}\u{3}");
     let begin = 100.0;
@@ -282,7 +282,7 @@ fn an_accelerometer_beside_the_angle_is_fitted() {
         let text = format!("{before}{belt}\n\n{behind}\n{end}");
         Case::from_text(folder.join("case.toml"), &text).unwrap_or_else(|error| panic!("{error}"))
     };
-    let truth = case(softer, STEP).stage;
+    let truth = case(softer, STEP).machine;
     let experiment = Experiment { every: 1e-5, ..common::experiment(to_and_fro(), 0.5) };
     let run = simulate(&truth, &experiment, Solver::Exact).unwrap().trajectory;
     let acceleration = rate(&run, "cart_speed");
@@ -295,7 +295,7 @@ fn an_accelerometer_beside_the_angle_is_fitted() {
     fs::write(folder.join("log.csv"), text).unwrap();
     let log = "[[experiment]]\nname = \"run\"\nlog = { file = \"log.csv\", time = \"t\", input = \"u\", drive_angle = \"phi\", cart_acceleration = \"a\" }\n";
     let logged = case(&softer.replace("119.484", "132.76").replace("52.9965", "58.885"), log);
-    let survey = Survey::new(logged.experiments[0].log.as_deref().unwrap(), &logged.stage);
+    let survey = Survey::new(logged.experiments[0].log.as_deref().unwrap(), &logged.machine);
     assert!(!survey.has("wraps") && !survey.has("outliers") && !survey.has("unit"), "{survey}");
     let plan = Plan { free: vec!["belt.stiffness".into()], ..Plan::default() };
     let found = fit(&logged, &plan, None, &mut |_| Flow::Continue).unwrap();

@@ -2,21 +2,21 @@
 //! 1e-7 m/s and 1e-5 rad/s, event times within 1e-9 s, the same modes in the same order.
 
 use crate::common;
+use taut::machine::Machine;
 use taut::signal::Signal;
 use taut::solve::{Ending, Solver, simulate};
-use taut::stage::Stage;
 
 fn rows(text: &str) -> Vec<Vec<f64>> {
     text.lines().skip(1).map(|line| line.split(',').map(|f| f.parse().unwrap()).collect()).collect()
 }
 
-fn compare(case: &str, stage: Stage, input: Signal) {
+fn compare(case: &str, machine: Machine, input: Signal) {
     let Some(folder) = common::data::reference() else { return };
     let read = |name: String| rows(&std::fs::read_to_string(folder.join(name)).unwrap());
     let want = read(format!("{case}.csv"));
     let events = read(format!("{case}.events.csv"));
     let experiment = common::experiment(input, want.last().unwrap()[0]);
-    let got = simulate(&stage, &experiment, Solver::Exact).unwrap();
+    let got = simulate(&machine, &experiment, Solver::Exact).unwrap();
     assert_eq!(got.outcome.ending, Ending::Complete);
     assert_eq!(got.trajectory.len(), want.len());
 

@@ -4,13 +4,13 @@ use crate::common;
 use common::table4;
 use taut::case::{Case, Experiment, Initial};
 use taut::friction::{Friction, Law, Motion, Shape, Side};
+use taut::machine::axis::{CART, LABELS};
+use taut::machine::{Amplifier, AmplifierMode, Machine};
 use taut::signal::Signal;
 use taut::solve::{Ending, ErrorEstimate, Event, Flow, Solution, Solver, simulate, stream};
-use taut::stage::axis::{CART, LABELS};
-use taut::stage::{Amplifier, AmplifierMode, Stage};
 
-fn complete(stage: &Stage, experiment: &Experiment, solver: Solver) -> Solution {
-    let solution = simulate(stage, experiment, solver).unwrap();
+fn complete(machine: &Machine, experiment: &Experiment, solver: Solver) -> Solution {
+    let solution = simulate(machine, experiment, solver).unwrap();
     assert_eq!(solution.outcome.ending, Ending::Complete);
     solution
 }
@@ -20,15 +20,16 @@ fn experiment(input: Signal, until: f64, every: f64) -> Experiment {
 }
 
 /// An experiment from rest at `start`, the pulleys turned to where the belt is not strained.
-fn from(start: f64, stage: &Stage, input: Signal, until: f64) -> Experiment {
-    let angle = start / stage.pulley_radius;
+fn from(start: f64, machine: &Machine, input: Signal, until: f64) -> Experiment {
+    let angle = start / machine.pulley_radius;
     let initial = Initial { drive_angle: angle, cart_position: start, idler_angle: angle, ..Initial::default() };
     Experiment { initial, ..experiment(input, until, 1e-3) }
 }
 
 /// Largest difference of r φ₁, x and r φ₃ (m), each counted from where it began.
-fn apart(stage: &Stage, a: &Solution, b: &Solution) -> f64 {
-    let columns = [("drive_angle", stage.pulley_radius), ("cart_position", 1.0), ("idler_angle", stage.pulley_radius)];
+fn apart(machine: &Machine, a: &Solution, b: &Solution) -> f64 {
+    let columns =
+        [("drive_angle", machine.pulley_radius), ("cart_position", 1.0), ("idler_angle", machine.pulley_radius)];
     let mut worst: f64 = 0.0;
     for (name, lever) in columns {
         let (a, b) = (a.trajectory.get(name).unwrap(), b.trajectory.get(name).unwrap());
@@ -48,15 +49,15 @@ fn bodies(events: &[Event]) -> Vec<(usize, i8, i8)> {
 /// Forces carried k ε |x|: 1 km from the origin 1 g on 1e8 N/m shook by itself, and events were listed that are none.
 #[test]
 fn a_start_far_from_the_origin_cost_accuracy() {
-    let mut stage = table4();
-    stage.belt.stiffness = [1e8, 1e8, 5e7];
-    stage.cart.mass = 1e-3;
+    let mut machine = table4();
+    machine.belt.stiffness = [1e8, 1e8, 5e7];
+    machine.cart.mass = 1e-3;
     let input = Signal::Pulse { value: 2.0, duration: 0.05, at: 0.0 };
-    let near = complete(&stage, &from(0.0, &stage, input.clone(), 0.2), Solver::Exact);
+    let near = complete(&machine, &from(0.0, &machine, input.clone(), 0.2), Solver::Exact);
     for start in [1.0, 1e3, -1e3] {
-        let far = complete(&stage, &from(start, &stage, input.clone(), 0.2), Solver::Exact);
+        let far = complete(&machine, &from(start, &machine, input.clone(), 0.2), Solver::Exact);
         // A position at 1 km is told to 1.1e-13 m.
-        let worst = apart(&stage, &near, &far);
+        let worst = apart(&machine, &near, &far);
         assert!(worst < 1e-9, "{worst:e} m, from {start} m");
         assert_eq!(bodies(&near.outcome.events), bodies(&far.outcome.events), "from {start} m");
         let error = far.outcome.error.unwrap();
@@ -68,18 +69,18 @@ fn a_start_far_from_the_origin_cost_accuracy() {
 #[test]
 fn stiff_belts_lost_accuracy_far_from_the_origin() {
     for stiffness in [1e11, 1e13] {
-        let mut stage = table4();
-        stage.belt.stiffness = [stiffness, stiffness, 0.5 * stiffness];
-        let mut rigid = stage.clone();
-        rigid.belt.model = taut::stage::BeltModel::Rigid;
+        let mut machine = table4();
+        machine.belt.stiffness = [stiffness, stiffness, 0.5 * stiffness];
+        let mut rigid = machine.clone();
+        rigid.belt.model = taut::machine::BeltModel::Rigid;
         let input = Signal::Pulse { value: 10.0, duration: 0.25, at: 0.0 };
-        let near = complete(&stage, &from(0.0, &stage, input.clone(), 0.5), Solver::Exact);
-        let far = complete(&stage, &from(1.0, &stage, input.clone(), 0.5), Solver::Exact);
+        let near = complete(&machine, &from(0.0, &machine, input.clone(), 0.5), Solver::Exact);
+        let far = complete(&machine, &from(1.0, &machine, input.clone(), 0.5), Solver::Exact);
         let limit = complete(&rigid, &from(0.0, &rigid, input, 0.5), Solver::Exact);
-        let worst = apart(&stage, &near, &far);
+        let worst = apart(&machine, &near, &far);
         assert!(worst < 1e-9, "{stiffness:e} N/m: {worst:e} m");
         // Breakaway equals Coulomb friction, so the elastic axis tends to the rigid one.
-        let limit = apart(&stage, &near, &limit);
+        let limit = apart(&machine, &near, &limit);
         assert!(limit < 1e-7, "{stiffness:e} N/m: {limit:e} m from the rigid axis");
     }
 }
@@ -87,13 +88,13 @@ fn stiff_belts_lost_accuracy_far_from_the_origin() {
 /// A belt so stiff that rounding hides the motion was called solved exactly.
 #[test]
 fn what_rounding_hides_is_told() {
-    let mut stage = table4();
-    stage.belt.stiffness = [1e15, 1e15, 1e15];
-    stage.cart.mass = 1e-9;
-    stage.drive_pulley.inertia = 1e-13;
-    stage.idler_pulley.inertia = 1e-13;
+    let mut machine = table4();
+    machine.belt.stiffness = [1e15, 1e15, 1e15];
+    machine.cart.mass = 1e-9;
+    machine.drive_pulley.inertia = 1e-13;
+    machine.idler_pulley.inertia = 1e-13;
     let step = Signal::Step { value: 5.0, at: 0.0 };
-    let solution = complete(&stage, &experiment(step, 1e-6, 1e-7), Solver::Exact);
+    let solution = complete(&machine, &experiment(step, 1e-6, 1e-7), Solver::Exact);
     let error = solution.outcome.error.unwrap();
     assert!(error.value > 0.0 && error.way > 0.0, "{error:?}");
     // The bound grows with the radians of the fastest swing.
@@ -111,7 +112,7 @@ fn the_error_of_the_general_solver_was_stated_for_all() {
         Friction::with_breakaway(19.0, 0.2, 0.4).following(Law::Stribeck { velocity: 0.01, shape: Shape::Gaussian });
     let square = || Signal::Square { amplitude: 8.0, frequency: 11.0, duty: 0.4 };
     let pulse = || Signal::Pulse { value: 5.0, duration: 0.25, at: 0.0 };
-    for (stage, input, tolerance) in [
+    for (machine, input, tolerance) in [
         (table4(), pulse(), 1e-6),
         (table4(), square(), 1e-6),
         (table4(), square(), 1e-9),
@@ -120,19 +121,20 @@ fn the_error_of_the_general_solver_was_stated_for_all() {
         (curved, square(), 1e-9),
     ] {
         let experiment = experiment(input, 0.5, 1e-3);
-        let exact = Solver::of(&stage) == Solver::Exact;
+        let exact = Solver::of(&machine) == Solver::Exact;
         let best = if exact { Solver::Exact } else { Solver::General { tolerance: 1e-13 } };
-        let best = complete(&stage, &experiment, best);
-        let mut estimate = ErrorEstimate::new(&stage, &experiment);
+        let best = complete(&machine, &experiment, best);
+        let mut estimate = ErrorEstimate::new(&machine, &experiment);
         let solver = Solver::General { tolerance };
-        let outcome = stream(&stage, &experiment, solver, &mut |rows| {
+        let outcome = stream(&machine, &experiment, solver, &mut |rows| {
             estimate.take(rows);
             Flow::Continue
         })
         .unwrap();
-        let error = estimate.finish(&stage, &experiment, tolerance, &outcome, &mut || Flow::Continue).unwrap().unwrap();
-        let general = complete(&stage, &experiment, solver);
-        let true_error = apart(&stage, &best, &general);
+        let error =
+            estimate.finish(&machine, &experiment, tolerance, &outcome, &mut || Flow::Continue).unwrap().unwrap();
+        let general = complete(&machine, &experiment, solver);
+        let true_error = apart(&machine, &best, &general);
         // Of dry friction nothing is left but rounding.
         let said = error.value + 1e-15;
         assert!(true_error <= said, "{tolerance:e}: off by {true_error:e} m, said {error:?}");
@@ -143,40 +145,41 @@ fn the_error_of_the_general_solver_was_stated_for_all() {
 // --- on the edge ----------------------------------------------------------------------------------------------------
 
 /// An axis with a lossy gear, an inductance and a rotor, whose drive pulley has viscous friction only.
-fn geared() -> Stage {
-    let mut stage = table4();
-    stage.pulley_radius = 0.02;
-    stage.motor.gear_efficiency = 0.94;
-    stage.motor.gear_ratio = 3.0;
-    stage.motor.rotor_inertia = 5e-6;
-    stage.motor.inductance = 1e-3;
-    stage.drive_pulley.friction = Friction::symmetric(1e-3, 0.0);
-    stage.cart.friction = Friction::with_breakaway(10.0, 0.3, 0.5);
-    stage.idler_pulley.friction = Friction::symmetric(1e-3, 0.002);
-    stage
+fn geared() -> Machine {
+    let mut machine = table4();
+    machine.pulley_radius = 0.02;
+    machine.motor.gear_efficiency = 0.94;
+    machine.motor.gear_ratio = 3.0;
+    machine.motor.rotor_inertia = 5e-6;
+    machine.motor.inductance = 1e-3;
+    machine.drive_pulley.friction = Friction::symmetric(1e-3, 0.0);
+    machine.cart.friction = Friction::with_breakaway(10.0, 0.3, 0.5);
+    machine.idler_pulley.friction = Friction::symmetric(1e-3, 0.002);
+    machine
 }
 
 /// Starts where r φ and x differ in the last bit ended as "too many events" at 1e-35 s, or listed a pair of events that
 /// is not there: the sign of the gear's torque turned with every term of the series that is nothing but rounding.
 #[test]
 fn a_gear_turned_its_sign_without_a_moment_passing() {
-    let stage = geared();
+    let machine = geared();
     let inputs = [
         Signal::Ramp { value: 4.0, over: 0.2, at: 0.0 },
         Signal::Sine { amplitude: 4.0, frequency: 5.0, phase: 0.0, offset: 0.0 },
         Signal::Triangle { amplitude: 4.0, frequency: 5.0 },
     ];
     for input in inputs {
-        let wanted = bodies(&complete(&stage, &from(0.0, &stage, input.clone(), 0.1), Solver::Exact).outcome.events);
+        let wanted =
+            bodies(&complete(&machine, &from(0.0, &machine, input.clone(), 0.1), Solver::Exact).outcome.events);
         assert!(!wanted.is_empty());
         for k in 0..300_i64 {
             let start = 0.0705 + 1e-3 * (k - 150) as f64;
-            let mut experiment = from(start, &stage, input.clone(), 0.1);
+            let mut experiment = from(start, &machine, input.clone(), 0.1);
             // Next to the angle that fits, on either side.
             let near = |angle: f64, off: i64| f64::from_bits((angle.to_bits() as i64 + off) as u64);
             experiment.initial.drive_angle = near(experiment.initial.drive_angle, k % 3 - 1);
             experiment.initial.idler_angle = near(experiment.initial.idler_angle, k % 5 - 2);
-            let solution = complete(&stage, &experiment, Solver::Exact);
+            let solution = complete(&machine, &experiment, Solver::Exact);
             assert_eq!(bodies(&solution.outcome.events), wanted, "from {start} m, {input:?}");
         }
     }
@@ -185,26 +188,26 @@ fn a_gear_turned_its_sign_without_a_moment_passing() {
 /// A gear's torque that is zero, strained by less than rounding, while nothing comes in: nothing happens.
 #[test]
 fn a_gear_at_rest_has_no_events() {
-    let stage = geared();
-    let mut experiment = from(0.07, &stage, Signal::Step { value: 0.0, at: 0.0 }, 0.1);
+    let machine = geared();
+    let mut experiment = from(0.07, &machine, Signal::Step { value: 0.0, at: 0.0 }, 0.1);
     experiment.initial.drive_angle = 3.5000000000000004;
-    let solution = complete(&stage, &experiment, Solver::Exact);
+    let solution = complete(&machine, &experiment, Solver::Exact);
     assert!(solution.outcome.events.is_empty(), "{:?}", solution.outcome.events);
 }
 
 /// An overdamped body without Coulomb friction approaches rest for ever; where rounding ends that, the event says so.
 #[test]
 fn a_stop_that_rounding_decides_is_marked() {
-    let mut stage = table4();
-    for friction in [&mut stage.drive_pulley.friction, &mut stage.idler_pulley.friction] {
+    let mut machine = table4();
+    for friction in [&mut machine.drive_pulley.friction, &mut machine.idler_pulley.friction] {
         *friction = Friction::symmetric(1e-3, 0.0);
     }
     // It holds when it rests, and nothing but oil brakes it while it moves.
     let side = Side { viscous: 60.0, coulomb: 0.0, breakaway: 0.1 };
-    stage.cart.friction = Friction::sided(side, side);
-    stage.belt.model = taut::stage::BeltModel::Rigid;
+    machine.cart.friction = Friction::sided(side, side);
+    machine.belt.model = taut::machine::BeltModel::Rigid;
     let pulse = Signal::Pulse { value: 5.0, duration: 0.1, at: 0.0 };
-    let solution = complete(&stage, &experiment(pulse.clone(), 60.0, 0.1), Solver::Exact);
+    let solution = complete(&machine, &experiment(pulse.clone(), 60.0, 0.1), Solver::Exact);
     let stops: Vec<_> = solution.outcome.events.iter().filter(|e| e.to == Motion::Stuck).collect();
     assert!(!stops.is_empty() && stops.iter().all(|e| e.by_rounding), "{stops:?}");
 
@@ -216,18 +219,18 @@ fn a_stop_that_rounding_decides_is_marked() {
 /// The tolerance at a breakaway held only for bodies that had come to rest, not for one at rest from the start.
 #[test]
 fn a_load_at_breakaway_but_for_rounding_broke_it_at_time_zero() {
-    let mut stage = table4();
-    stage.amplifier = Amplifier::ideal(AmplifierMode::Voltage, 1.0);
+    let mut machine = table4();
+    machine.amplifier = Amplifier::ideal(AmplifierMode::Voltage, 1.0);
     for k in 0..200 {
         let breakaway = 0.01 + 0.0013 * f64::from(k);
-        stage.drive_pulley.friction = Friction::with_breakaway(1e-3, 0.5 * breakaway, breakaway);
-        let at = breakaway * stage.motor.resistance / stage.motor.torque_constant;
+        machine.drive_pulley.friction = Friction::with_breakaway(1e-3, 0.5 * breakaway, breakaway);
+        let at = breakaway * machine.motor.resistance / machine.motor.torque_constant;
         for value in [at, at * (1.0 + 2.0 * f64::EPSILON), at * (1.0 - 2.0 * f64::EPSILON)] {
-            let solution = complete(&stage, &experiment(Signal::Step { value, at: 0.0 }, 0.01, 1e-3), Solver::Exact);
+            let solution = complete(&machine, &experiment(Signal::Step { value, at: 0.0 }, 0.01, 1e-3), Solver::Exact);
             assert!(solution.outcome.events.is_empty(), "{value} V: {:?}", solution.outcome.events);
         }
         let above = Signal::Step { value: at * (1.0 + 1e-12), at: 0.0 };
-        assert!(!complete(&stage, &experiment(above, 0.01, 1e-3), Solver::Exact).outcome.events.is_empty());
+        assert!(!complete(&machine, &experiment(above, 0.01, 1e-3), Solver::Exact).outcome.events.is_empty());
     }
 }
 
@@ -239,12 +242,12 @@ fn an_exponential_stribeck_curve_overflowed_past_zero_speed() {
     for share in [1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 2e-2] {
         let law = Law::Stribeck { velocity: 0.5 * share, shape: Shape::Exponential };
         for value in [3.0, 5.0, 10.0] {
-            let mut stage = table4();
-            stage.cart.friction = Friction::with_breakaway(19.0, 0.2, 0.4).following(law);
+            let mut machine = table4();
+            machine.cart.friction = Friction::with_breakaway(19.0, 0.2, 0.4).following(law);
             let turn = Law::Stribeck { velocity: 25.0 * share, shape: Shape::Exponential };
-            stage.drive_pulley.friction = Friction::with_breakaway(1.6e-3, 0.015, 0.02).following(turn);
+            machine.drive_pulley.friction = Friction::with_breakaway(1.6e-3, 0.015, 0.02).following(turn);
             let input = Signal::Square { amplitude: value, frequency: 5.0, duty: 0.5 };
-            let solution = complete(&stage, &experiment(input, 0.3, 1e-3), Solver::GENERAL);
+            let solution = complete(&machine, &experiment(input, 0.3, 1e-3), Solver::GENERAL);
             assert!(!solution.outcome.events.is_empty());
         }
     }
@@ -257,8 +260,8 @@ fn a_run_that_would_not_end_is_told_and_can_be_stopped() {
     let changes =
         ["drive_pulley.radius=1e9 mm", "motor.gear_ratio=5", "motor.gear_efficiency=0.9", "motor.rotor_inertia=1e-5"];
     let case = Case::from_text_with("axis.toml", text, &changes).unwrap();
-    let (stage, experiment) = (&case.stage, &case.experiments[0]);
-    match simulate(stage, experiment, Solver::Exact) {
+    let (machine, experiment) = (&case.machine, &case.experiments[0]);
+    match simulate(machine, experiment, Solver::Exact) {
         Err(_) => {}
         Ok(solution) => {
             let ending = solution.outcome.ending;
@@ -269,14 +272,14 @@ fn a_run_that_would_not_end_is_told_and_can_be_stopped() {
         }
     }
     // Whoever asks it to stop is heard before the first row is full.
-    let mut stage = table4();
-    stage.belt.stiffness = [1e13, 1e13, 1e13];
-    stage.motor.back_emf_constant = 1e3;
+    let mut machine = table4();
+    machine.belt.stiffness = [1e13, 1e13, 1e13];
+    machine.motor.back_emf_constant = 1e3;
     let mut asked = 0;
     let sine = Signal::Sine { amplitude: 5.0, frequency: 3.0, phase: 0.0, offset: 0.0 };
     let long = self::experiment(sine, 100.0, 10.0);
     for solver in [Solver::Exact, Solver::General { tolerance: 1e-9 }] {
-        let outcome = stream(&stage, &long, solver, &mut |_| {
+        let outcome = stream(&machine, &long, solver, &mut |_| {
             asked += 1;
             Flow::Stop
         });
@@ -299,10 +302,10 @@ fn what_the_hunt_found_stays_found() {
     for file in files {
         let name = file.file_name().unwrap().to_string_lossy().into_owned();
         let case = Case::read(&file).unwrap();
-        let (stage, experiment) = (&case.stage, &case.experiments[0]);
-        let exact = complete(stage, experiment, Solver::Exact);
-        let general = complete(stage, experiment, Solver::General { tolerance: 1e-11 });
-        let worst = apart(stage, &exact, &general);
+        let (machine, experiment) = (&case.machine, &case.experiments[0]);
+        let exact = complete(machine, experiment, Solver::Exact);
+        let general = complete(machine, experiment, Solver::General { tolerance: 1e-11 });
+        let worst = apart(machine, &exact, &general);
         if worst > 1e-8 {
             faults.push(format!("{name}: {worst:e} m apart"));
         }
@@ -326,7 +329,7 @@ fn a_breakaway_was_forgiven_what_rounding_does_to_the_other_side() {
     let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/hunted/one-sided-breakaway-2786.toml");
     let case = Case::read(file).unwrap();
     for solver in [Solver::Exact, Solver::GENERAL] {
-        let solution = complete(&case.stage, &case.experiments[0], solver);
+        let solution = complete(&case.machine, &case.experiments[0], solver);
         let first = solution.outcome.events.iter().find(|e| e.body() == Some(CART)).unwrap();
         assert!(first.time < 1e-12, "{solver:?}: {first:?}");
     }

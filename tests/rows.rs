@@ -19,11 +19,11 @@ fn column<'a>(trajectory: &'a Trajectory, name: &str) -> &'a [f64] {
 /// A run of 1 s with a row every 0.3 s ended at 0.9 s without a word, here before the pulse was over.
 #[test]
 fn the_last_row_is_at_the_end_whatever_the_interval() {
-    let stage = table4();
+    let machine = table4();
     let table3 = Solver::Table3 { step: 1e-4, method: Method::RungeKutta4 };
     for (solver, near) in [(Solver::Exact, 1e-11), (Solver::GENERAL, 1e-8), (table3, 1e-9)] {
         let (odd, even) = (every(0.3, 1.0), every(1e-2, 1.0));
-        let (rows, fine) = (simulate(&stage, &odd, solver).unwrap(), simulate(&stage, &even, solver).unwrap());
+        let (rows, fine) = (simulate(&machine, &odd, solver).unwrap(), simulate(&machine, &even, solver).unwrap());
         assert_eq!(rows.outcome.ending, Ending::Complete);
         assert_eq!(column(&rows.trajectory, "time"), [0.0, 0.3, 0.6, 0.9, 1.0], "{solver:?}");
         assert_eq!((odd.samples(), rows.outcome.cost.samples), (5, 5));
@@ -43,8 +43,8 @@ fn a_log_keeps_to_whole_beats() {
     let changes = ["experiment.0.every=0.3 s", "experiment.0.until=1 s"];
     let case = Case::from_text_with("axis.toml", TEMPLATE, &changes).unwrap();
     for jitter in [0.0, 1e-3] {
-        let measurement = taut::stage::Measurement { jitter, ..case.measurement.clone().unwrap_or_default() };
-        let log = measure(&case.stage, &measurement, &case.experiments[0], Solver::Exact).unwrap().trajectory;
+        let measurement = taut::machine::Measurement { jitter, ..case.measurement.clone().unwrap_or_default() };
+        let log = measure(&case.machine, &measurement, &case.experiments[0], Solver::Exact).unwrap().trajectory;
         assert_eq!(column(&log, "time"), [0.0, 0.3, 0.6, 0.9]);
         assert!(column(&log, "drive_angle").iter().all(|angle| angle.is_finite()));
     }
@@ -69,12 +69,12 @@ fn times_read_as_they_were_written() {
 /// The first row of a sine had -1.03e-14 V, and files had -0.
 #[test]
 fn what_is_zero_is_written_as_zero() {
-    let mut stage = table4();
-    stage.encoder = Some(taut::stage::Encoder { at: taut::stage::EncoderPlace::DrivePulley, lines: 512.0 });
+    let mut machine = table4();
+    machine.encoder = Some(taut::machine::Encoder { at: taut::machine::EncoderPlace::DrivePulley, lines: 512.0 });
     for amplitude in [5.0, -5.0] {
         let sine = Signal::Sine { amplitude, frequency: 5.0, phase: 0.0, offset: 0.0 };
         for solver in [Solver::Exact, Solver::GENERAL] {
-            let run = simulate(&stage, &experiment(sine.clone(), 0.5), solver).unwrap();
+            let run = simulate(&machine, &experiment(sine.clone(), 0.5), solver).unwrap();
             let voltage = column(&run.trajectory, "voltage");
             for row in [0, 100, 200, 300, 400, 500] {
                 assert_eq!(voltage[row], 0.0, "{solver:?} {row}");
@@ -91,17 +91,17 @@ fn what_is_zero_is_written_as_zero() {
 /// it goes on.
 #[test]
 fn rows_at_rest_are_those_that_are_asked_for_one_by_one() {
-    let stage = table4();
+    let machine = table4();
     let pulse = |at: f64| Signal::Pulse { value: 5.0, duration: 0.0505, at };
     for at in [0.0, 0.1, 0.7003, 0.512] {
         let experiment = experiment(pulse(at), 1.9);
-        let whole = simulate(&stage, &experiment, Solver::Exact).unwrap().trajectory;
+        let whole = simulate(&machine, &experiment, Solver::Exact).unwrap().trajectory;
         let mut single: Vec<Vec<f64>> = vec![Vec::new(); whole.columns.len()];
         let mut sink = |rows: &Trajectory| {
             single.iter_mut().zip(&rows.columns).for_each(|(all, rows)| all.extend(&rows.values));
             Flow::Continue
         };
-        let mut run = Run::new(&stage, &experiment, Solver::Exact, Detail::Full, None, &mut sink).unwrap();
+        let mut run = Run::new(&machine, &experiment, Solver::Exact, Detail::Full, None, &mut sink).unwrap();
         for k in 0..1900 {
             // Row by row, and up to the edges of the pulse.
             let (begin, end) = (1e-3 * f64::from(k), 1e-3 * f64::from(k + 1));
@@ -130,13 +130,13 @@ fn rows_at_rest_are_those_that_are_asked_for_one_by_one() {
 /// before.
 #[test]
 fn a_receiver_that_wants_no_more_is_heard_at_rest() {
-    let (stage, mut rows) = (table4(), 0);
+    let (machine, mut rows) = (table4(), 0);
     let mut sink = |block: &Trajectory| {
         rows += block.columns[0].values.len();
         if rows >= 512 { Flow::Stop } else { Flow::Continue }
     };
     let still = experiment(Signal::Pulse { value: 5.0, duration: 0.1, at: 5.0 }, 6.0);
-    let outcome = stream(&stage, &still, Solver::Exact, &mut sink).unwrap();
+    let outcome = stream(&machine, &still, Solver::Exact, &mut sink).unwrap();
     assert_eq!(rows, 512);
     assert!(
         matches!(outcome.ending, Ending::Interrupted { time } if (time - 0.511).abs() < 1e-12),
@@ -149,12 +149,12 @@ fn a_receiver_that_wants_no_more_is_heard_at_rest() {
 /// A run of which no row is due is ended by whoever takes its rows all the same: it is shown that there is none yet.
 #[test]
 fn a_run_between_two_rows_is_ended_by_its_receiver() {
-    let stage = table4();
+    let machine = table4();
     let signal = Signal::Square { amplitude: 5.0, frequency: 10.0, duty: 0.5 };
     let long = Experiment { every: 1e4, ..experiment(signal, 1e4) };
     for solver in [Solver::Exact, Solver::GENERAL] {
         let mut shown = 0;
-        let outcome = stream(&stage, &long, solver, &mut |rows| {
+        let outcome = stream(&machine, &long, solver, &mut |rows| {
             assert!(rows.get("time").is_none_or(|times| times.len() <= 1));
             shown += 1;
             if shown == 3 { Flow::Stop } else { Flow::Continue }

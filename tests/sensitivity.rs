@@ -7,10 +7,10 @@ use proptest::strategy::ValueTree;
 use proptest::test_runner::TestRunner;
 use std::sync::Arc;
 use taut::case::{Experiment, Initial};
+use taut::machine::Machine;
 use taut::parameter::{self, Free};
 use taut::signal::{Hold, Signal};
 use taut::solve::{Begun, Bench, Detail, Differentiated, Ending, Flow, Sensitivities, Variable};
-use taut::stage::Stage;
 
 /// Columns that are differentiated.
 const COLUMNS: [&str; 6] =
@@ -19,7 +19,7 @@ const COLUMNS: [&str; 6] =
 /// A stage, and what is done with it.
 #[derive(Debug, Clone)]
 struct Setup {
-    stage: Stage,
+    machine: Machine,
     times: Vec<f64>,
     values: Vec<f64>,
     hold: Hold,
@@ -36,7 +36,7 @@ impl Setup {
     fn experiment(&self) -> Experiment {
         let times = self.times.iter().map(|t| t + self.delay).collect();
         let values = self.values.iter().map(|u| u + self.offset).collect();
-        let r = self.stage.pulley_radius;
+        let r = self.machine.pulley_radius;
         let initial = Initial {
             cart_position: self.position,
             drive_angle: self.position / r,
@@ -54,7 +54,7 @@ impl Setup {
     fn run(&self) -> Option<(Vec<Vec<f64>>, Vec<String>)> {
         let mut columns = vec![Vec::new(); COLUMNS.len()];
         let mut bench = Bench::default();
-        bench.mount(&self.stage).ok()?;
+        bench.mount(&self.machine).ok()?;
         let outcome = bench.run(&self.experiment(), Detail::Full, &mut |block| {
             for (column, name) in columns.iter_mut().zip(COLUMNS) {
                 column.extend_from_slice(block.get(name).unwrap_or(&[]));
@@ -67,13 +67,13 @@ impl Setup {
     }
 
     fn begun(&self) -> Begun {
-        let mechanism = Arc::new(self.stage.mechanism());
+        let mechanism = Arc::new(self.machine.mechanism());
         Begun { start: self.experiment().initial.state(&mechanism), mechanism }
     }
 
     /// The outputs that belong to the columns it has.
     fn outputs(&self) -> Vec<(usize, Differentiated)> {
-        let mechanism = self.stage.mechanism();
+        let mechanism = self.machine.mechanism();
         let shown = |name: &str| mechanism.columns.iter().find(|heading| heading.name == name).map(|h| h.shown);
         let found = COLUMNS.iter().enumerate().filter_map(|(i, name)| Some((i, Differentiated::Shown(shown(name)?))));
         found.collect()
@@ -115,7 +115,7 @@ impl Change {
     fn moved(&self, setup: &Setup, by: f64) -> Setup {
         let mut moved = setup.clone();
         match self {
-            Change::Number(free) => free.set(&mut moved.stage, free.start + by),
+            Change::Number(free) => free.set(&mut moved.machine, free.start + by),
             Change::Delay => moved.delay += by,
             Change::Offset => moved.offset += by,
             Change::Speed => moved.speed += by,
@@ -136,9 +136,9 @@ impl Change {
 }
 
 /// Keys of numbers that are no machine's: tables, and what other numbers follow from.
-fn numbers(stage: &Stage) -> Vec<Free> {
-    let own = parameter::values(stage).into_iter().filter(|(_, value)| *value != 0.0 && value.is_finite());
-    own.filter_map(|(key, _)| Free::new(stage, &key, &[], &[]).ok()).collect()
+fn numbers(machine: &Machine) -> Vec<Free> {
+    let own = parameter::values(machine).into_iter().filter(|(_, value)| *value != 0.0 && value.is_finite());
+    own.filter_map(|(key, _)| Free::new(machine, &key, &[], &[]).ok()).collect()
 }
 
 fn setup(dry: Dry) -> impl Strategy<Value = Setup> {
@@ -146,7 +146,7 @@ fn setup(dry: Dry) -> impl Strategy<Value = Setup> {
     let start = prop_oneof![2 => Just((0.0, 0.0)), 1 => (-0.5..0.5_f64, -0.02..0.02_f64)];
     let hold = prop_oneof![2 => Just(Hold::Zero), 1 => Just(Hold::Linear)];
     (lined(dry), prop::collection::vec(sample, 6..30), hold, 1e-5..3e-3_f64, start).prop_map(
-        |(stage, samples, hold, delay, (speed, position))| {
+        |(machine, samples, hold, delay, (speed, position))| {
             let (mut time, mut times, mut values) = (0.0, Vec::new(), Vec::new());
             for (wait, value) in samples {
                 times.push(time);
@@ -154,11 +154,11 @@ fn setup(dry: Dry) -> impl Strategy<Value = Setup> {
                 time += wait;
             }
             // Within the stops.
-            let position = match &stage.travel {
+            let position = match &machine.travel {
                 Some(travel) => 0.5 * position.clamp(travel.min, travel.max),
                 None => position,
             };
-            Setup { stage, times, values, hold, delay, offset: 0.0, speed, position }
+            Setup { machine, times, values, hold, delay, offset: 0.0, speed, position }
         },
     )
 }
@@ -234,7 +234,7 @@ fn compare(setup: &Setup, changes: &[Change], count: &mut Count) -> Result<(), S
     let variables: Vec<Variable> = changes.iter().map(|change| change.variable(setup)).collect();
     let shown: Vec<Differentiated> = outputs.iter().map(|(_, shown)| *shown).collect();
     let mut bench = Bench::default();
-    bench.mount(&setup.stage).map_err(|error| error.to_string())?;
+    bench.mount(&setup.machine).map_err(|error| error.to_string())?;
     let exact = bench.sensitivities(&setup.experiment(), &variables, &shown).map_err(|error| error.to_string())?;
     count.stages += 1;
     let Some(Sensitivities { columns, .. }) = exact else {
@@ -276,7 +276,7 @@ fn sensitivities_are_what_differences_tend_to() {
     let strategy = (setup(Dry::Any), prop::collection::vec(0.0..1.0_f64, 4));
     for number in 0..200 {
         let (setup, picks) = strategy.new_tree(&mut runner).expect("a stage").current();
-        let own = numbers(&setup.stage);
+        let own = numbers(&setup.machine);
         let mut changes: Vec<Change> =
             picks.iter().map(|pick| Change::Number(own[(pick * own.len() as f64) as usize].clone())).collect();
         changes.extend([Change::Delay, Change::Offset, Change::Position]);
@@ -301,17 +301,17 @@ fn sensitivities_are_what_differences_tend_to() {
 #[test]
 fn where_there_are_no_derivatives_there_are_none() {
     let experiment = common::experiment(Signal::Step { value: 5.0, at: 0.0 }, 0.05);
-    let speed = Differentiated::Shown(taut::mechanism::Shown::Speed(taut::stage::axis::CART, 1.0));
-    let derivatives = |stage: &Stage, key: &str| {
-        let free = Free::new(stage, key, &[], &[]).unwrap();
+    let speed = Differentiated::Shown(taut::mechanism::Shown::Speed(taut::machine::axis::CART, 1.0));
+    let derivatives = |machine: &Machine, key: &str| {
+        let free = Free::new(machine, key, &[], &[]).unwrap();
         let variable = Variable::central(1e-3, |by| {
-            let mut stage = stage.clone();
-            free.set(&mut stage, free.start + by);
-            let mechanism = Arc::new(stage.mechanism());
+            let mut machine = machine.clone();
+            free.set(&mut machine, free.start + by);
+            let mechanism = Arc::new(machine.mechanism());
             Begun { start: experiment.initial.state(&mechanism), mechanism }
         });
         let mut bench = Bench::default();
-        bench.mount(stage).unwrap();
+        bench.mount(machine).unwrap();
         bench.sensitivities(&experiment, &[variable], &[speed]).unwrap()
     };
     assert!(derivatives(&common::table4(), "cart.friction.coulomb").is_some());

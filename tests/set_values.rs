@@ -45,13 +45,13 @@ fn run(opened: &Opened) -> Option<(Outcome, f64)> {
             let mut experiment = case.experiments[0].clone();
             experiment.until = experiment.until.min(0.02);
             experiment.every = experiment.until / 40.0;
-            let mut estimate = ErrorEstimate::new(&case.stage, &experiment);
-            let outcome = stream(&case.stage, &experiment, GENERAL, &mut |rows| {
+            let mut estimate = ErrorEstimate::new(&case.machine, &experiment);
+            let outcome = stream(&case.machine, &experiment, GENERAL, &mut |rows| {
                 estimate.take(rows);
                 enough()
             });
             let outcome = outcome.ok()?;
-            let error = estimate.finish(&case.stage, &experiment, TOLERANCE, &outcome, &mut flow);
+            let error = estimate.finish(&case.machine, &experiment, TOLERANCE, &outcome, &mut flow);
             (outcome, error.unwrap())
         }
         Opened::Gantry(case) => {
@@ -119,7 +119,7 @@ fn any_number_of_any_machine_may_be_set() {
             if below(3) > 0 {
                 // A number that the machine has.
                 let own = opened(path, text, &[]).map(|opened| match opened {
-                    Opened::Axis(case) => values(&case.stage),
+                    Opened::Axis(case) => values(&case.machine),
                     Opened::Gantry(case) => values(&case.gantry),
                 });
                 let own = own.unwrap();

@@ -626,7 +626,7 @@ fn an_authority_agrees() {
     for one in value["resonances"].as_array().unwrap() {
         let case = Case::from_text("authority.toml", one["toml"].as_str().unwrap()).unwrap();
         let drive = if one["drive"] == "held" { Drive::Held } else { Drive::Free };
-        let found = resonances(&case.stage, drive).unwrap();
+        let found = resonances(&case.machine, drive).unwrap();
         let expected = one["modes"].as_array().unwrap();
         assert!(!expected.is_empty());
         for mode in expected {
@@ -647,8 +647,8 @@ fn a_stage_without_a_measurement() {
         "stages/two-mass/two-mass.toml",
     ] {
         for drive in [Drive::Held, Drive::Free] {
-            let stage = Case::read(case).unwrap().stage;
-            let modes = resonances(&stage, drive).unwrap();
+            let machine = Case::read(case).unwrap().machine;
+            let modes = resonances(&machine, drive).unwrap();
             assert!(modes.iter().all(|mode| mode.frequency > 1.0 && mode.damping >= 0.0 && mode.share <= 1.0));
             let main = modes.iter().find(|mode| mode.share == 1.0).unwrap();
             let criterion = Criterion::default().with_damping(main.damping).unwrap();
@@ -664,7 +664,7 @@ fn a_stage_without_a_measurement() {
             }
         }
     }
-    let rigid = Case::read("stages/emps/emps.toml").unwrap().stage;
+    let rigid = Case::read("stages/emps/emps.toml").unwrap().machine;
     assert!(resonances(&rigid, Drive::Held).unwrap_err().what.contains("rigid"));
 }
 

@@ -5,14 +5,14 @@ use std::f64::consts::TAU;
 use taut::case::{Case, GantryCase, TEMPLATE, gantry_template};
 use taut::linear::{Natural, undamped};
 use taut::log::{Log, Output, Quantity, Survey};
+use taut::machine::gantry::Routing;
+use taut::machine::{BeltModel, Machine, SimpleDrive, slowest_swing};
 use taut::parameter::{Free, set, value};
 use taut::signal::Hold;
-use taut::stage::gantry::Routing;
-use taut::stage::{BeltModel, SimpleDrive, Stage, slowest_swing};
 
 /// The template with another table in the place of one of its own.
-fn with(table: &str, other: &str) -> Stage {
-    read(table, other).unwrap_or_else(|error| panic!("{error}")).stage
+fn with(table: &str, other: &str) -> Machine {
+    read(table, other).unwrap_or_else(|error| panic!("{error}")).machine
 }
 
 fn read(table: &str, other: &str) -> taut::Result<Case> {
@@ -105,12 +105,12 @@ fn a_belt_by_its_type_is_one_of_its_specific_stiffness() {
 
 #[test]
 fn a_specific_stiffness_is_free_and_a_modulus_is_not() {
-    let mut stage = with("belt", "[belt]\nspecific_stiffness = \"280 kN\"\nspans = [0.3, 0.4, 0.7]\n");
-    let free = Free::new(&stage, "belt.specific_stiffness", &[], &[]).unwrap();
-    set(&mut stage, [(&free, 140e3)]);
-    near(stage.belt.stiffness[1], 140e3 / 0.4);
+    let mut machine = with("belt", "[belt]\nspecific_stiffness = \"280 kN\"\nspans = [0.3, 0.4, 0.7]\n");
+    let free = Free::new(&machine, "belt.specific_stiffness", &[], &[]).unwrap();
+    set(&mut machine, [(&free, 140e3)]);
+    near(machine.belt.stiffness[1], 140e3 / 0.4);
     for key in ["belt.modulus", "belt.stiffness"] {
-        let error = Free::new(&stage, key, &[], &[]).unwrap_err().to_string();
+        let error = Free::new(&machine, key, &[], &[]).unwrap_err().to_string();
         assert!(error.contains("it follows from specific_stiffness and spans: name one of these"), "{error}");
     }
 }
@@ -122,17 +122,17 @@ fn teeth_take_the_pitch_of_the_belt() {
     let end = begin + text[begin..].find("\n[").unwrap();
     let belt = "[belt]\ntype = \"GT2\"\nwidth = \"6 mm\"\nspans = [0.3, 0.3, 0.6]\n";
     let text = format!("{}{belt}{}", &text[..begin], &text[end..]);
-    near(Case::from_text("axis.toml", &text).unwrap().stage.pulley_radius, 20.0 * 2e-3 / TAU);
+    near(Case::from_text("axis.toml", &text).unwrap().machine.pulley_radius, 20.0 * 2e-3 / TAU);
     let same = text.replace("teeth = 20", "teeth = 20\npitch = \"2 mm\"");
-    near(Case::from_text("axis.toml", &same).unwrap().stage.pulley_radius, 20.0 * 2e-3 / TAU);
+    near(Case::from_text("axis.toml", &same).unwrap().machine.pulley_radius, 20.0 * 2e-3 / TAU);
     let other = text.replace("teeth = 20", "teeth = 20\npitch = \"3 mm\"");
     let error = Case::from_text("axis.toml", &other).unwrap_err().to_string();
     assert!(error.contains("drive_pulley.pitch: the belt's type has a pitch of 2 mm"), "{error}");
 }
 
 /// The damping ratio of the slowest mode of a machine whose belt alone takes energy.
-fn slowest_ratio(stage: &Stage) -> f64 {
-    let bare = Stage { belt: stage.belt.clone(), ..undamped(stage) };
+fn slowest_ratio(machine: &Machine) -> f64 {
+    let bare = Machine { belt: machine.belt.clone(), ..undamped(machine) };
     let modes = Natural::of(&bare.mechanism(), &[0.0; 6]).unwrap();
     modes.elastic[0].damping().unwrap()
 }
@@ -143,20 +143,20 @@ fn the_slowest_mode_has_the_damping_ratio_that_was_asked_for() {
         [("elastic", "damping_ratio = 0.03"), ("two-mass", "damping_ratio = 0.03"), ("elastic", "loss_factor = 0.06")]
     {
         let text = format!("[belt]\nstiffness = [132e3, 150e3, 60e3]\nmodel = \"{model}\"\n{said}\n");
-        let stage = with("belt", &text);
-        assert!((slowest_ratio(&stage) - 0.03).abs() < 1e-9, "{model}: {}", slowest_ratio(&stage));
+        let machine = with("belt", &text);
+        assert!((slowest_ratio(&machine) - 0.03).abs() < 1e-9, "{model}: {}", slowest_ratio(&machine));
         // In proportion to the stiffness.
-        near(stage.belt.damping[2] / stage.belt.stiffness[2], stage.belt.damping[0] / stage.belt.stiffness[0]);
+        near(machine.belt.damping[2] / machine.belt.stiffness[2], machine.belt.damping[0] / machine.belt.stiffness[0]);
     }
 }
 
 #[test]
 fn both_ways_to_the_slowest_swing_agree() {
     for model in [BeltModel::Elastic, BeltModel::TwoMass] {
-        let mut stage = common::table4();
-        stage.belt.model = model;
-        let hertz = Natural::frequencies(&stage.mechanism(), &[0.0; 6]).unwrap()[0];
-        near(slowest_swing(&stage.mechanism()).unwrap(), TAU * hertz);
+        let mut machine = common::table4();
+        machine.belt.model = model;
+        let hertz = Natural::frequencies(&machine.mechanism(), &[0.0; 6]).unwrap()[0];
+        near(slowest_swing(&machine.mechanism()).unwrap(), TAU * hertz);
     }
     let mut rigid = common::table4();
     rigid.belt.model = BeltModel::Rigid;
@@ -170,29 +170,32 @@ fn both_ways_to_the_slowest_swing_agree() {
 
 #[test]
 fn a_drive_pushes_with_its_force_and_drags() {
-    let mut stage = with("motor", "[drive]\nforce_per_input = \"0.65 N/V\"\ndrag = \"12 N s/m\"\n");
-    let drive = SimpleDrive::of(&stage.motor, stage.pulley_radius).unwrap();
+    let mut machine = with("motor", "[drive]\nforce_per_input = \"0.65 N/V\"\ndrag = \"12 N s/m\"\n");
+    let drive = SimpleDrive::of(&machine.motor, machine.pulley_radius).unwrap();
     near(drive.force, 0.65);
     near(drive.drag, 12.0);
-    assert_eq!((value(&stage, "drive.drag").map(f64::round), value(&stage, "motor.resistance")), (Some(12.0), None));
+    assert_eq!(
+        (value(&machine, "drive.drag").map(f64::round), value(&machine, "motor.resistance")),
+        (Some(12.0), None)
+    );
     // Both are set, in either order.
     let keys = ["drive.force_per_input", "drive.drag"];
-    let [force, drag] = keys.map(|key| Free::new(&stage, key, &keys, &[]).unwrap());
+    let [force, drag] = keys.map(|key| Free::new(&machine, key, &keys, &[]).unwrap());
     for order in [[(&force, 2.0), (&drag, 5.0)], [(&drag, 5.0), (&force, 2.0)]] {
-        set(&mut stage, order);
-        let drive = SimpleDrive::of(&stage.motor, stage.pulley_radius).unwrap();
+        set(&mut machine, order);
+        let drive = SimpleDrive::of(&machine.motor, machine.pulley_radius).unwrap();
         near(drive.force, 2.0);
         near(drive.drag, 5.0);
     }
-    let error = Free::new(&stage, "motor.torque_constant", &[], &[]).unwrap_err().to_string();
+    let error = Free::new(&machine, "motor.torque_constant", &[], &[]).unwrap_err().to_string();
     assert!(error.contains("this case has a [drive] instead of [motor]"), "{error}");
 }
 
 #[test]
 fn counts_are_four_to_a_line() {
-    let stage = with("encoder", "[encoder]\nat = \"cart\"\ncounts = 25059.1\n");
-    near(stage.encoder.unwrap().counts_per_unit(1.0), 25059.1);
-    assert_eq!(value(&stage, "encoder.lines"), Some(25059.1 / 4.0));
+    let machine = with("encoder", "[encoder]\nat = \"cart\"\ncounts = 25059.1\n");
+    near(machine.encoder.unwrap().counts_per_unit(1.0), 25059.1);
+    assert_eq!(value(&machine, "encoder.lines"), Some(25059.1 / 4.0));
 }
 
 /// A log of a cart that goes to and fro in steps of an encoder with so many counts per metre.
@@ -216,9 +219,9 @@ fn counted(counts: f64) -> Log {
 
 #[test]
 fn a_log_that_steps_otherwise_than_the_encoder_is_told() {
-    let stage = with("encoder", "[encoder]\nat = \"cart\"\ncounts = 25000\n");
-    assert!(!Survey::new(&counted(25000.0), &stage).has("encoder-step"));
-    let survey = Survey::new(&counted(6250.0), &stage);
+    let machine = with("encoder", "[encoder]\nat = \"cart\"\ncounts = 25000\n");
+    assert!(!Survey::new(&counted(25000.0), &machine).has("encoder-step"));
+    let survey = Survey::new(&counted(6250.0), &machine);
     let note = survey.notes.iter().find(|note| note.code == "encoder-step").unwrap();
     assert_eq!(
         note.text,

@@ -96,12 +96,12 @@ fn curve_of_axis(path: &Path, case: &Case) -> String {
         return text;
     }
     for experiment in &case.experiments {
-        let run = simulate(&case.stage, experiment, Solver::Exact).unwrap();
+        let run = simulate(&case.machine, experiment, Solver::Exact).unwrap();
         assert_eq!(run.outcome.ending, Ending::Complete, "{}: {}", path.display(), experiment.name);
         let column = |name: &str| run.trajectory.get(name).unwrap();
         for kept in 0..=KEPT {
             let row = (run.trajectory.len() - 1) * kept / KEPT;
-            let drive = case.stage.pulley_radius * column("drive_angle")[row];
+            let drive = case.machine.pulley_radius * column("drive_angle")[row];
             let (time, cart) = (column("time")[row], column("cart_position")[row]);
             let file = path.file_name().unwrap().to_string_lossy();
             let _ = writeln!(text, "{file},{},{time},{drive:e},{cart:e}", experiment.name);
@@ -158,7 +158,7 @@ fn the_logs_of_the_procedure_are_made_by_table_4() {
     let encoder = ["encoder.at=drive_pulley", "encoder.lines=3020.8"];
     let case = Case::read_with(stages().join("sollmann-jouaneh/table4.toml"), &encoder).unwrap();
     for experiment in &case.experiments {
-        let log = measure(&case.stage, &case.measurement.clone().unwrap_or_default(), experiment, Solver::Exact);
+        let log = measure(&case.machine, &case.measurement.clone().unwrap_or_default(), experiment, Solver::Exact);
         let file = std::env::temp_dir().join(format!("taut-{}-{}.csv", std::process::id(), experiment.file_name()));
         let mut writer = CsvWriter::create(&file).unwrap();
         writer.write(&log.unwrap().trajectory).unwrap();
@@ -176,7 +176,7 @@ fn the_procedure_of_the_paper_comes_out() {
     let fitted = |name: &str| {
         let case = Case::read(stages().join(PROCEDURE).join(name)).unwrap();
         let plan = case.fit.clone().unwrap();
-        (fit(&case, &plan, None, &mut |_| Flow::Continue), case.stage.pulley_radius)
+        (fit(&case, &plan, None, &mut |_| Flow::Continue), case.machine.pulley_radius)
     };
     let way = |fit: &Fit, r: f64| {
         fit.logs
@@ -213,12 +213,12 @@ fn the_procedure_of_the_paper_comes_out() {
 fn the_rig_moves_as_table_4_says() {
     let [rig, table4] =
         ["rig", "table4"].map(|name| Case::read(stages().join(format!("sollmann-jouaneh/{name}.toml"))).unwrap());
-    for (a, b) in rig.stage.belt.stiffness.iter().zip([1.3276e5, 1.3276e5, 5.8885e4]) {
+    for (a, b) in rig.machine.belt.stiffness.iter().zip([1.3276e5, 1.3276e5, 5.8885e4]) {
         assert!((a / b - 1.0).abs() < 1e-5, "{a}");
     }
     for (mine, theirs) in rig.experiments.iter().zip(&table4.experiments) {
         let end = |case: &Case, experiment: &Experiment| {
-            let run = simulate(&case.stage, experiment, Solver::Exact).unwrap();
+            let run = simulate(&case.machine, experiment, Solver::Exact).unwrap();
             *run.trajectory.get("cart_position").unwrap().last().unwrap()
         };
         let (mine, theirs) = (end(&rig, mine), end(&table4, theirs));
@@ -240,7 +240,7 @@ fn the_cart_of_pendule_pi_moves_as_recorded() {
         let input = Signal::Step { value: pwm, at: 0.0 };
         let until = (rows - 1) as f64 * 5e-3;
         let experiment = Experiment { input, until, every: 5e-3, ..case.experiments[0].clone() };
-        let run = simulate(&case.stage, &experiment, Solver::Exact).unwrap().trajectory;
+        let run = simulate(&case.machine, &experiment, Solver::Exact).unwrap().trajectory;
         let travel = run.get("cart_position").unwrap();
         for (time, position) in times.iter().zip(positions) {
             let row = ((time - times[0]) * 1e-6 / 5e-3).round() as usize;

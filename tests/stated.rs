@@ -8,12 +8,12 @@ use proptest::strategy::ValueTree;
 use proptest::test_runner::{RngAlgorithm, TestRng, TestRunner};
 use taut::case::{Case, Experiment, Initial};
 use taut::friction::{Friction, Law, Shape};
+use taut::machine::axis::CART;
+use taut::machine::{BeltMake, BeltModel, Machine, Travel};
 use taut::mechanism::{Limit, Status, What};
 use taut::polyline::Polyline;
 use taut::signal::Signal;
-use taut::solve::{Ending, ErrorEstimate, Flow, Machine, Outcome, PositionError, Solution, Solver, simulate};
-use taut::stage::axis::CART;
-use taut::stage::{BeltMake, BeltModel, Stage, Travel};
+use taut::solve::{Ending, ErrorEstimate, Flow, Outcome, PositionError, Simulator, Solution, Solver, simulate};
 
 /// Inputs that change with time.
 fn moving() -> impl Strategy<Value = Signal> {
@@ -45,7 +45,7 @@ fn law(lever: f64) -> impl Strategy<Value = Law> {
 }
 
 /// Machines with every feature now and then, and curves.
-fn curved() -> impl Strategy<Value = Stage> {
+fn curved() -> impl Strategy<Value = Machine> {
     let laws = (law(0.01), law(1.0), law(0.01));
     let follows = prop::option::weighted(0.25, (0.2..0.5_f64, 0.2..0.5_f64));
     let along = prop::option::weighted(0.2, (0.3..2.0_f64, 0.3..2.0_f64, 0.3..2.0_f64));
@@ -74,7 +74,7 @@ fn curved() -> impl Strategy<Value = Stage> {
 }
 
 /// A run, and the accuracy that it states.
-fn run(stage: &Stage, input: &Signal, (until, every): (f64, f64), solver: Solver) -> (Solution, PositionError) {
+fn run(stage: &Machine, input: &Signal, (until, every): (f64, f64), solver: Solver) -> (Solution, PositionError) {
     let experiment =
         Experiment { name: "run".into(), input: input.clone(), until, every, initial: Initial::default(), log: None };
     let solution = simulate(stage, &experiment, solver).unwrap();
@@ -91,7 +91,7 @@ fn run(stage: &Stage, input: &Signal, (until, every): (f64, f64), solver: Solver
 
 /// The largest difference of positions at the belt in rows of the same time, the first of which are every so many rows
 /// of each run.
-fn apart(stage: &Stage, (a, of_a): (&Solution, usize), (b, of_b): (&Solution, usize)) -> f64 {
+fn apart(stage: &Machine, (a, of_a): (&Solution, usize), (b, of_b): (&Solution, usize)) -> f64 {
     let r = stage.pulley_radius;
     let column = |solution: &Solution, name: &str, rows: usize| -> Vec<f64> {
         let values = solution.trajectory.get(name).unwrap();
@@ -118,7 +118,7 @@ const LEAST: f64 = 1e-12;
 
 /// What is wrong with the accuracies stated at two output intervals, the second `times` as short; and how much of the
 /// first one's statement its error is.
-fn fault(stage: &Stage, input: &Signal, times: usize, solver: Solver) -> (Option<String>, PositionError, f64) {
+fn fault(stage: &Machine, input: &Signal, times: usize, solver: Solver) -> (Option<String>, PositionError, f64) {
     let best = match solver {
         Solver::General { .. } => Solver::General { tolerance: 1e-13 },
         other => other,
@@ -155,7 +155,7 @@ fn runner() -> TestRunner {
 }
 
 /// Tries the law on so many machines, with all tolerances by turns; the faults.
-fn faults(machines: impl Strategy<Value = Stage>, count: usize, solvers: &[Solver]) -> Vec<String> {
+fn faults(machines: impl Strategy<Value = Machine>, count: usize, solvers: &[Solver]) -> Vec<String> {
     let mut runner = runner();
     let drawn = (machines, moving(), 2..30_usize);
     let (mut found, mut stated, mut shares, mut hidden) = (Vec::new(), Vec::new(), Vec::new(), 0);
@@ -281,7 +281,7 @@ fn a_pulley_broke_away_before_its_load_reached_the_breakaway() {
         for input in INPUTS {
             let case =
                 Case::from_text_with("moving.toml", &text, &[&format!("experiment.moving.input={input}")]).unwrap();
-            let (stage, input) = (&case.stage, &case.experiments[0].input);
+            let (stage, input) = (&case.machine, &case.experiments[0].input);
             let mut before: Option<(f64, f64)> = None;
             for every in [1e-2, 1e-3, 1e-4] {
                 let (solution, stated) = run(stage, input, (1.0, every), Solver::GENERAL);
@@ -320,7 +320,7 @@ fn a_pulley_broke_away_before_its_load_reached_the_breakaway() {
 #[test]
 fn a_misplaced_event_was_not_in_the_accuracy() {
     let case = Case::from_text("moving.toml", PLAIN).unwrap();
-    let (stage, experiment) = (&case.stage, &case.experiments[0]);
+    let (stage, experiment) = (&case.machine, &case.experiments[0]);
     let solution = simulate(stage, experiment, Solver::GENERAL).unwrap();
     let stated = |outcome: &Outcome| {
         let mut estimate = ErrorEstimate::new(stage, experiment);
@@ -346,7 +346,7 @@ fn a_voltage_limit_was_reached_and_left_at_its_level() {
     ] {
         let case =
             Case::from_text_with("limited.toml", LIMITED, &[&format!("experiment.moving.input={input}")]).unwrap();
-        let (stage, input) = (&case.stage, &case.experiments[0].input);
+        let (stage, input) = (&case.machine, &case.experiments[0].input);
         let (first, stated) = run(stage, input, (0.2, 2e-3), Solver::GENERAL);
         let (second, also) = run(stage, input, (0.2, 2e-4), Solver::General { tolerance: 1e-12 });
         let off = apart(stage, (&first, 1), (&second, 10));
@@ -369,9 +369,10 @@ fn a_machine_stepped_under_a_moving_input_does_what_a_run_does() {
     for text in [PLAIN, LIMITED] {
         let case = Case::from_text("moving.toml", text).unwrap();
         let experiment = &case.experiments[0];
-        let (run, stated) = run(&case.stage, &experiment.input, (experiment.until, experiment.every), Solver::GENERAL);
+        let (run, stated) =
+            run(&case.machine, &experiment.input, (experiment.until, experiment.every), Solver::GENERAL);
         for step in [7e-4, 1e-2] {
-            let mut machine = Machine::new(&case.stage, Solver::GENERAL).unwrap();
+            let mut machine = Simulator::new(&case.machine, Solver::GENERAL).unwrap();
             let mut events = Vec::new();
             while machine.time() < experiment.until {
                 let piece = experiment.input.piece(machine.time());
@@ -388,7 +389,7 @@ fn a_machine_stepped_under_a_moving_input_does_what_a_run_does() {
 /// The equations of machines with Stribeck curves written down a second time, by Runge and Kutta's formula in steps of
 /// two microseconds that are halved down to each event.
 struct Plain<'a> {
-    stage: &'a Stage,
+    stage: &'a Machine,
     input: &'a Signal,
 }
 
@@ -493,16 +494,16 @@ impl Plain<'_> {
 }
 
 /// Machines that a plain integration can take: straight or Stribeck friction, voltage, nothing that strikes.
-fn stribeck() -> impl Strategy<Value = Stage> {
+fn stribeck() -> impl Strategy<Value = Machine> {
     let law = |lever: f64| {
         (decades(0.01, 0.3), any::<bool>()).prop_map(move |(velocity, gaussian)| Law::Stribeck {
             velocity: velocity / lever,
             shape: if gaussian { Shape::Gaussian } else { Shape::Exponential },
         })
     };
-    (random::stage(Dry::Any), law(0.01), law(1.0), law(0.01)).prop_map(|(mut stage, drive, cart, idler)| {
+    (random::machine(Dry::Any), law(0.01), law(1.0), law(0.01)).prop_map(|(mut stage, drive, cart, idler)| {
         (stage.motor.inductance, stage.motor.gear_efficiency) = (0.0, 1.0);
-        stage.amplifier = taut::stage::Amplifier::ideal(taut::stage::AmplifierMode::Voltage, stage.amplifier.gain);
+        stage.amplifier = taut::machine::Amplifier::ideal(taut::machine::AmplifierMode::Voltage, stage.amplifier.gain);
         stage.drive_pulley.friction.law = drive;
         stage.cart.friction.law = cart;
         stage.idler_pulley.friction.law = idler;

@@ -5,16 +5,16 @@ use common::random::{self, Dry};
 use proptest::prelude::*;
 
 use taut::case::{Experiment, GantryCase, Initial};
+use taut::machine::Machine;
 use taut::mechanism::{Mechanism, State};
 use taut::signal::Signal;
-use taut::solve::{Course, Detail, Event, Flow, Machine, Solver, simulate, stream_mechanism};
-use taut::stage::Stage;
+use taut::solve::{Course, Detail, Event, Flow, Simulator, Solver, simulate, stream_mechanism};
 use taut::trajectory::Trajectory;
 
 const UNTIL: f64 = 0.2;
 
 /// The last row of one run, by the names of its columns, and its events.
-fn in_one_go(stage: &Stage, input: &Signal, solver: Solver) -> (Vec<(String, f64)>, Vec<Event>) {
+fn in_one_go(stage: &Machine, input: &Signal, solver: Solver) -> (Vec<(String, f64)>, Vec<Event>) {
     let experiment = Experiment {
         name: "all".into(),
         input: input.clone(),
@@ -30,7 +30,13 @@ fn in_one_go(stage: &Stage, input: &Signal, solver: Solver) -> (Vec<(String, f64
 
 /// Steps a machine to the end by these shares of the time, each piece of its inputs as it begins. With `copies`, now
 /// and then a copy goes on in its place, after the machine itself has gone astray.
-fn stepped(mut machine: Machine, inputs: &[Signal], until: f64, shares: &[f64], copies: bool) -> (Machine, Vec<Event>) {
+fn stepped(
+    mut machine: Simulator,
+    inputs: &[Signal],
+    until: f64,
+    shares: &[f64],
+    copies: bool,
+) -> (Simulator, Vec<Event>) {
     let mut times: Vec<f64> = shares.iter().map(|share| share * until).collect();
     times.push(until);
     for input in inputs {
@@ -42,7 +48,7 @@ fn stepped(mut machine: Machine, inputs: &[Signal], until: f64, shares: &[f64], 
     }
     times.sort_by(f64::total_cmp);
     let mut events = Vec::new();
-    let set = |machine: &mut Machine| {
+    let set = |machine: &mut Simulator| {
         for (drive, input) in inputs.iter().enumerate() {
             machine.set_input(drive, &input.piece(machine.time())).unwrap();
         }
@@ -91,7 +97,7 @@ fn shares() -> impl Strategy<Value = Vec<f64>> {
 }
 
 /// Largest difference of the columns, angles and lengths each in its unit.
-fn apart(machine: &Machine, last: &[(String, f64)]) -> f64 {
+fn apart(machine: &Simulator, last: &[(String, f64)]) -> f64 {
     let mut outputs = vec![0.0; machine.columns().len()];
     machine.outputs(&mut outputs);
     let mut worst: f64 = 0.0;
@@ -109,10 +115,10 @@ proptest! {
 
     #[test]
     fn any_steps_lead_to_the_same_end(
-        stage in random::stage(Dry::Any), input in random::input(), shares in shares(), copies in any::<bool>(),
+        stage in random::machine(Dry::Any), input in random::input(), shares in shares(), copies in any::<bool>(),
     ) {
         let (last, events) = in_one_go(&stage, &input, Solver::Exact);
-        let machine = Machine::new(&stage, Solver::Exact).unwrap();
+        let machine = Simulator::new(&stage, Solver::Exact).unwrap();
         let (machine, stepped) = stepped(machine, &[input], UNTIL, &shares, copies);
         prop_assert!((machine.time() - UNTIL).abs() < 1e-15);
         same(&stepped, &events, 1e-10)?;
@@ -132,18 +138,18 @@ fn a_thousand_patterns_of_steps_end_within_a_picometre() {
     ];
     let lined = taut::case::Case::from_text_with("axis.toml", taut::case::TEMPLATE, &lines).unwrap();
     let input = Signal::Square { amplitude: 8.0, frequency: 13.0, duty: 0.4 };
-    for stage in [&case.stage, &lined.stage] {
+    for stage in [&case.machine, &lined.machine] {
         steps_end_where_one_go_does(stage, &input);
     }
 }
 
-fn steps_end_where_one_go_does(stage: &Stage, input: &Signal) {
+fn steps_end_where_one_go_does(stage: &Machine, input: &Signal) {
     let (last, events) = in_one_go(stage, input, Solver::Exact);
     assert!(events.len() > 10);
     let mut runner = proptest::test_runner::TestRunner::new(random::cases(1000));
     runner
         .run(&(shares(), any::<bool>()), |(shares, copies)| {
-            let machine = Machine::new(stage, Solver::Exact).unwrap();
+            let machine = Simulator::new(stage, Solver::Exact).unwrap();
             let (machine, stepped) = stepped(machine, std::slice::from_ref(input), UNTIL, &shares, copies);
             same(&stepped, &events, 1e-11)?;
             let at = |name: &str| last.iter().find(|(column, _)| column == name).unwrap().1;
@@ -166,9 +172,9 @@ fn outputs_are_the_row_of_a_run() {
         let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(name);
         let case = taut::case::Case::read(path).unwrap();
         let input = Signal::Pulse { value: 2.0, duration: 0.05, at: 0.0 };
-        let solver = Solver::of(&case.stage);
-        let (last, _) = in_one_go(&case.stage, &input, solver);
-        let (machine, _) = stepped(Machine::new(&case.stage, solver).unwrap(), &[input], UNTIL, &[0.1, 0.37], true);
+        let solver = Solver::of(&case.machine);
+        let (last, _) = in_one_go(&case.machine, &input, solver);
+        let (machine, _) = stepped(Simulator::new(&case.machine, solver).unwrap(), &[input], UNTIL, &[0.1, 0.37], true);
         let mut outputs = vec![0.0; machine.columns().len()];
         machine.outputs(&mut outputs);
         for (heading, have) in machine.columns().iter().zip(outputs) {
@@ -184,8 +190,8 @@ fn the_general_solver_and_gantries_step_too() {
     let case = taut::case::Case::from_text("axis.toml", taut::case::TEMPLATE).unwrap();
     let input = Signal::Sine { amplitude: 8.0, frequency: 5.0, phase: 0.3, offset: 0.0 };
     for solver in [Solver::Exact, Solver::GENERAL] {
-        let (last, events) = in_one_go(&case.stage, &input, solver);
-        let machine = Machine::new(&case.stage, solver).unwrap();
+        let (last, events) = in_one_go(&case.machine, &input, solver);
+        let machine = Simulator::new(&case.machine, solver).unwrap();
         let (machine, own) = stepped(machine, std::slice::from_ref(&input), UNTIL, &[0.03, 0.5, 0.51, 0.777], true);
         same(&own, &events, 1e-7).unwrap();
         assert!(apart(&machine, &last) < if solver == Solver::Exact { 1e-11 } else { 1e-7 });
@@ -201,7 +207,7 @@ fn the_general_solver_and_gantries_step_too() {
             every: experiment.every,
         };
         let (state, events) = whole(&mechanism, &course);
-        let machine = Machine::of_mechanism(&mechanism, &course.start, Solver::Exact, 1e-3).unwrap();
+        let machine = Simulator::of_mechanism(&mechanism, &course.start, Solver::Exact, 1e-3).unwrap();
         let (machine, own) = stepped(machine, &course.inputs, course.until, &[0.1, 0.123, 0.5, 0.9], true);
         same(&own, &events, 1e-11).unwrap();
         let off = (0..4).map(|b| (machine.state().position[b] - state.position[b]).abs()).fold(0.0, f64::max);
@@ -224,7 +230,7 @@ fn whole(mechanism: &Mechanism, course: &Course) -> (State, Vec<Event>) {
 #[test]
 fn what_cannot_be_stepped_is_told() {
     let case = taut::case::Case::from_text("axis.toml", taut::case::TEMPLATE).unwrap();
-    let mut machine = Machine::new(&case.stage, Solver::Exact).unwrap();
+    let mut machine = Simulator::new(&case.machine, Solver::Exact).unwrap();
     let held = Signal::Step { value: 1.0, at: 0.0 }.piece(0.0);
     assert!(machine.set_input(1, &held).unwrap_err().to_string().contains("there is no drive 1"));
     let mut late = held;
@@ -237,9 +243,9 @@ fn what_cannot_be_stepped_is_told() {
     machine.advance(0.1, &mut Vec::new()).unwrap();
     machine.advance(0.05, &mut Vec::new()).unwrap();
     assert_eq!(machine.time(), 0.1);
-    assert!(Machine::of_mechanism(&case.stage.mechanism(), &State::default(), Solver::Exact, 0.0).is_err());
+    assert!(Simulator::of_mechanism(&case.machine.mechanism(), &State::default(), Solver::Exact, 0.0).is_err());
     fn is_send<T: Send + Clone>() {}
-    is_send::<Machine>();
+    is_send::<Simulator>();
 }
 
 /// A run that is finished before its end said that it was complete, at its end.
@@ -253,7 +259,7 @@ fn a_run_that_is_finished_early_was_called_complete() {
             rows += block.len();
             Flow::Continue
         };
-        let mut run = taut::solve::Run::new(&case.stage, experiment, solver, Detail::Full, None, sink).unwrap();
+        let mut run = taut::solve::Run::new(&case.machine, experiment, solver, Detail::Full, None, sink).unwrap();
         assert!(run.hold(&[5.0], 0.1) && run.time() == 0.1);
         let outcome = run.finish();
         assert_eq!(outcome.ending, taut::solve::Ending::Interrupted { time: 0.1 }, "{solver:?}");

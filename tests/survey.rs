@@ -4,12 +4,12 @@ use crate::common;
 use std::f64::consts::TAU;
 use taut::case::{Case, TEMPLATE};
 use taut::log::{Log, Output, Quantity, Severity, Survey};
+use taut::machine::Machine;
 use taut::signal::{Hold, Signal};
 use taut::solve::{Solver, simulate};
-use taut::stage::Stage;
 
 /// The paper's machine on a square wave of ±5 V: a clean log of angle, position, speed and current every millisecond.
-fn clean() -> (Stage, Log) {
+fn clean() -> (Machine, Log) {
     let stage = common::table4();
     let input = Signal::Square { amplitude: 5.0, frequency: 1.0, duty: 0.5 };
     let experiment = common::experiment(input.clone(), 2.0);
@@ -229,7 +229,7 @@ fn measured_data_of_others() {
         let text = format!("{machine}[[experiment]]\nname = \"run\"\nlog = {{ {log} }}\n");
         let case = Case::from_text(data.join("case.toml"), &text).unwrap_or_else(|error| panic!("{error}"));
         for experiment in case.experiments {
-            let survey = Survey::new(experiment.log.as_ref().unwrap(), &case.stage);
+            let survey = Survey::new(experiment.log.as_ref().unwrap(), &case.machine);
             println!("{survey}\n");
             assert!(survey.motion.as_ref().unwrap().moves, "{survey}");
             assert!(!survey.has("swapped") && !survey.has("sign") && !survey.has("unit"), "{survey}");

@@ -44,7 +44,7 @@ free = ["cart.mass", "cart.friction.viscous", "cart.friction.coulomb"]
 fn drawn(seed: u64, noise: f64, late: usize) -> Case {
     let mut chance = Chance::new(seed);
     let mut case = Case::from_text("axis.toml", AXIS).unwrap();
-    let mut truth = case.stage.clone();
+    let mut truth = case.machine.clone();
     let mut off = || 2f64.powf(chance.uniform() - 0.5);
     truth.cart.mass *= off();
     let (b, c) = (off(), off());
@@ -160,7 +160,7 @@ fn a_cart_on_a_soft_belt_is_not_taken_for_a_wrong_sign_or_unit() {
         let mut case = Case::from_text_with("axis.toml", TEMPLATE, &[&soft[..], &[&input]].concat()).unwrap();
         case.experiments.truncate(1);
         let experiment = &mut case.experiments[0];
-        let run = simulate(&case.stage, experiment, Solver::of(&case.stage)).unwrap().trajectory;
+        let run = simulate(&case.machine, experiment, Solver::of(&case.machine)).unwrap().trajectory;
         let column = |name: &str| run.get(name).unwrap().to_vec();
         let mut chance = Chance::new(tenths);
         let mut output = |quantity, name, noise: f64| {
@@ -185,7 +185,7 @@ fn a_cart_on_a_soft_belt_is_not_taken_for_a_wrong_sign_or_unit() {
             outputs,
             ended: None,
         }));
-        let survey = taut::log::Survey::new(experiment.log.as_ref().unwrap(), &case.stage);
+        let survey = taut::log::Survey::new(experiment.log.as_ref().unwrap(), &case.machine);
         reported += usize::from(survey.has("sign") || survey.has("unit"));
         let plan = Plan { free: vec!["cart.mass".into(), "cart.friction.viscous".into()], ..Plan::default() };
         let found = fit(&case, &plan, None, &mut |_| Flow::Continue).unwrap();

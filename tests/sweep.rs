@@ -5,9 +5,9 @@ mod gantry;
 
 use crate::common;
 use taut::case::{Case, Sampling};
+use taut::machine::Machine;
 use taut::metrics::Meter;
 use taut::solve::{Bench, Flow, Solver, stream_observed};
-use taut::stage::Stage;
 use taut::sweep::{DIMENSIONS, OF_EXPERIMENT, Ranked, Sobol, Spread, Status, Sweep, indices};
 use taut::trajectory::Trajectory;
 
@@ -23,7 +23,7 @@ fn rows(sweep: &Sweep, first: u64, count: usize) -> Trajectory {
 }
 
 /// The axis of a run.
-fn machine(sweep: &Sweep, run: u64) -> Stage {
+fn machine(sweep: &Sweep, run: u64) -> Machine {
     sweep.machine(run).axis().expect("an axis").clone()
 }
 
@@ -304,7 +304,7 @@ fn a_bench_shows_what_a_stream_shows() {
         }
         let case = Case::read(path).unwrap();
         for share in [0.0, 0.15] {
-            let mut stage = case.stage.clone();
+            let mut stage = case.machine.clone();
             stage.cart.mass *= 1.0 + share;
             bench.mount(&stage).unwrap();
             for experiment in &case.experiments {

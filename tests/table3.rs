@@ -4,13 +4,13 @@ use crate::common;
 use common::experiment;
 use taut::case::Experiment;
 use taut::friction::Friction;
+use taut::machine::Machine;
 use taut::signal::Signal;
 use taut::solve::{Ending, Method, Solver, simulate};
-use taut::stage::Stage;
 use taut::trajectory::Trajectory;
 
-fn run(stage: &Stage, experiment: &Experiment, solver: Solver) -> Trajectory {
-    let solution = simulate(stage, experiment, solver).unwrap();
+fn run(machine: &Machine, experiment: &Experiment, solver: Solver) -> Trajectory {
+    let solution = simulate(machine, experiment, solver).unwrap();
     assert_eq!(solution.outcome.ending, Ending::Complete);
     solution.trajectory
 }
@@ -20,10 +20,10 @@ fn last(run: &Trajectory, column: &str) -> f64 {
 }
 
 /// The largest difference of any position (m) or speed (m/s) at the end from the exact one.
-fn error(stage: &Stage, experiment: &Experiment, method: Method, step: f64) -> f64 {
-    let exact = run(stage, experiment, Solver::Exact);
-    let stepped = run(stage, experiment, Solver::Table3 { step, method });
-    let r = stage.pulley_radius;
+fn error(machine: &Machine, experiment: &Experiment, method: Method, step: f64) -> f64 {
+    let exact = run(machine, experiment, Solver::Exact);
+    let stepped = run(machine, experiment, Solver::Table3 { step, method });
+    let r = machine.pulley_radius;
     let columns =
         [("drive_angle", r), ("drive_speed", r), ("cart_position", 1.0), ("cart_speed", 1.0), ("idler_angle", r)];
     let difference = |(name, scale): (&str, f64)| scale * (last(&exact, name) - last(&stepped, name)).abs();
@@ -37,9 +37,9 @@ fn the_formulas_have_their_order() {
     let ramp = experiment(Signal::Ramp { value: 20.0, over: 0.02, at: 0.0 }, 0.02);
     let mut slow = common::table2();
     slow.motor.inductance = 1e-3;
-    for stage in [common::table2(), slow] {
+    for machine in [common::table2(), slow] {
         for (method, order) in [(Method::RungeKutta4, 4), (Method::DormandPrince5, 5)] {
-            let [coarse, middle, fine] = [2e-4, 1e-4, 5e-5].map(|step| error(&stage, &ramp, method, step));
+            let [coarse, middle, fine] = [2e-4, 1e-4, 5e-5].map(|step| error(&machine, &ramp, method, step));
             // Without damping, a part of the error may fall sooner.
             for found in [(coarse / middle).log2(), (middle / fine).log2()] {
                 assert!(found > f64::from(order) - 0.5, "{method:?}: order {found}");
@@ -53,10 +53,10 @@ fn the_formulas_have_their_order() {
 /// the cart creeps on.
 #[test]
 fn friction_is_coulombs_above_the_band_and_frozen_within() {
-    let stage = common::table4();
+    let machine = common::table4();
     let pulse = experiment(Signal::Pulse { value: 5.0, duration: 0.25, at: 0.0 }, 1.0);
-    let exact = run(&stage, &pulse, Solver::Exact);
-    let stepped = run(&stage, &pulse, Solver::Table3 { step: 1e-5, method: Method::RungeKutta4 });
+    let exact = run(&machine, &pulse, Solver::Exact);
+    let stepped = run(&machine, &pulse, Solver::Table3 { step: 1e-5, method: Method::RungeKutta4 });
     let at = |run: &Trajectory, column: &str, row: usize| run.get(column).unwrap()[row];
     // Row 200 is 0.2 s: all slide.
     let apart = (at(&exact, "cart_position", 200) - at(&stepped, "cart_position", 200)).abs();
@@ -76,10 +76,10 @@ fn friction_is_coulombs_above_the_band_and_frozen_within() {
 /// The other way round it is the same with the other sign.
 #[test]
 fn backward_is_the_mirror_image() {
-    let stage = common::table4();
+    let machine = common::table4();
     let [there, back] = [5.0, -5.0].map(|value| {
         let pulse = experiment(Signal::Pulse { value, duration: 0.25, at: 0.0 }, 0.5);
-        run(&stage, &pulse, Solver::Table3 { step: 1e-4, method: Method::DormandPrince5 })
+        run(&machine, &pulse, Solver::Table3 { step: 1e-4, method: Method::DormandPrince5 })
     });
     for column in ["cart_position", "cart_speed", "drive_state", "idler_friction"] {
         let mirrored = there.get(column).unwrap().iter().zip(back.get(column).unwrap()).all(|(a, b)| *a == -*b);
@@ -89,21 +89,21 @@ fn backward_is_the_mirror_image() {
 
 #[test]
 fn what_the_table_does_not_know_is_refused() {
-    let told = |change: &dyn Fn(&mut Stage)| {
-        let mut stage = common::table4();
-        change(&mut stage);
+    let told = |change: &dyn Fn(&mut Machine)| {
+        let mut machine = common::table4();
+        change(&mut machine);
         let pulse = experiment(Signal::Pulse { value: 5.0, duration: 0.25, at: 0.0 }, 1.0);
         let solver = Solver::Table3 { step: 1e-4, method: Method::RungeKutta4 };
-        simulate(&stage, &pulse, solver).unwrap_err().what
+        simulate(&machine, &pulse, solver).unwrap_err().what
     };
     let breakaway = |friction: &mut Friction| {
         let mut side = friction.forward;
         side.breakaway *= 1.5;
         *friction = Friction::sided(side, friction.backward);
     };
-    assert!(told(&|stage| breakaway(&mut stage.cart.friction)).contains("does not know the friction of the cart"));
-    assert!(told(&|stage| stage.motor.gear_efficiency = 0.9).contains("gear efficiency below 1"));
-    assert!(told(&|stage| stage.amplifier.voltage_limit = Some(3.0)).contains("Table 3 does not know"));
+    assert!(told(&|machine| breakaway(&mut machine.cart.friction)).contains("does not know the friction of the cart"));
+    assert!(told(&|machine| machine.motor.gear_efficiency = 0.9).contains("gear efficiency below 1"));
+    assert!(told(&|machine| machine.amplifier.voltage_limit = Some(3.0)).contains("Table 3 does not know"));
 }
 
 /// A step too long for the belt's swing: that the state is none of a machine is told at the first row where it is.

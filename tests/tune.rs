@@ -11,9 +11,9 @@ use taut::control::feedback::Feedback;
 use taut::control::filter::Biquad;
 use taut::control::{Controller, Observation, Setup, Standard, closed_loop};
 use taut::design::{Design, Structure};
+use taut::machine::rigid::Rigid;
 use taut::signal::profile::Reference;
 use taut::solve::{Ending, Solver};
-use taut::stage::rigid::Rigid;
 use taut::tune::{Corner, Family, Figure, Judgement, Margins, Plant, evaluate, hunting, minimise, place, tune};
 
 fn case(name: &str, changes: &[&str]) -> Case {
@@ -45,10 +45,10 @@ fn the_linear_controller_is_what_the_controller_does() {
         changes.push("controller.feed_forward={ model = \"none\" }");
         let case = case(name, &changes);
         let design = case.controller.clone().unwrap();
-        let feedback = Feedback::new(&design, &case.stage).unwrap();
+        let feedback = Feedback::new(&design, &case.machine).unwrap();
         for hertz in [4.0, 40.0, 170.0, 430.0] {
             let (t, omega) = (design.every, 2.0 * PI * hertz);
-            let mut controller = Standard::new(&Design { limit: None, ..design.clone() }, &case.stage).unwrap();
+            let mut controller = Standard::new(&Design { limit: None, ..design.clone() }, &case.machine).unwrap();
             // Whole periods: 1000 samples at 1 kHz and whole Hz.
             let (n, from) = (1000, 4000);
             let (mut sum, mut seen_sum) = (Complex::new(0.0, 0.0), Complex::new(0.0, 0.0));
@@ -96,8 +96,8 @@ fn placement_gives_the_asked_bandwidth_and_damping() {
     for (name, rigid_poles) in [("pid.toml", true), ("cascade.toml", false), ("cascade-current.toml", false)] {
         for (hertz, damping) in [(5.0, 1.0), (9.0, 0.6), (14.0, 0.8)] {
             let case = case(name, &[]);
-            let design = place(case.controller.as_ref().unwrap(), &case.stage, hertz, damping).unwrap();
-            let rigid = Rigid::of(&case.stage);
+            let design = place(case.controller.as_ref().unwrap(), &case.machine, hertz, damping).unwrap();
+            let rigid = Rigid::of(&case.machine);
             let w = 2.0 * PI * hertz;
             match &design.structure {
                 Structure::Pid(gains) if rigid_poles => {
@@ -145,11 +145,11 @@ fn a_placed_loop_swings_as_asked() {
         "idler_pulley.friction={ viscous = 0, coulomb = 0 }",
     ];
     let case = case("pid.toml", &changes);
-    let design = place(case.controller.as_ref().unwrap(), &case.stage, hertz, damping).unwrap();
-    let feedback = Feedback::new(&design, &case.stage).unwrap();
-    let plant = Plant::of(&case.stage, 0.0, &design, &[]).unwrap();
+    let design = place(case.controller.as_ref().unwrap(), &case.machine, hertz, damping).unwrap();
+    let feedback = Feedback::new(&design, &case.machine).unwrap();
+    let plant = Plant::of(&case.machine, 0.0, &design, &[]).unwrap();
     // |T| of a PD loop on M s² + d s: (2ζ′ω s + ω²)/(s² + 2ζω s + ω²), ζ′ what K_d gives of ζ
-    let rigid = Rigid::of(&case.stage);
+    let rigid = Rigid::of(&case.machine);
     let Structure::Pid(gains) = &design.structure else { panic!() };
     let (g, w) = (rigid.force_per_command(), 2.0 * PI * hertz);
     let most = (0..20_000)
@@ -232,7 +232,7 @@ fn the_worst_axis_is_worse_than_random_ones() {
         let tuned = evaluate(&case, &tuning).unwrap();
         let family: &Family = &tuned.family;
         let design = &tuned.after.design;
-        let feedback = Feedback::new(design, &case.stage).unwrap();
+        let feedback = Feedback::new(design, &case.machine).unwrap();
         let mut random = Pcg64::seed_from_u64(1);
         let mut most = 0.0_f64;
         for draw in 0..200 {
@@ -257,8 +257,8 @@ fn the_worst_axis_is_worse_than_random_ones() {
                 }
                 let motion = &case.moves[0];
                 let setup = Setup {
-                    stage: &stage,
-                    model: &case.stage,
+                    machine: &stage,
+                    model: &case.machine,
                     design,
                     profile: &motion.profile,
                     until: 8.0,
@@ -283,7 +283,7 @@ fn hunting_is_found_where_there_is_stiction() {
     let fine = "encoder.lines=1e7";
     let gains = "controller.pid={ proportional = \"800 V/m\", integral = \"8 V/(mm s)\", derivative = \"4 V s/m\" }";
     let found = case("pid.toml", &[sticky, fine, gains]);
-    let hunt = hunting(&found.stage, found.controller.as_ref().unwrap()).unwrap();
+    let hunt = hunting(&found.machine, found.controller.as_ref().unwrap()).unwrap();
     let hunt = hunt.expect("a limit cycle");
     println!("{hunt:?}");
     assert!(hunt.amplitude > 1e-7 && hunt.period > 1e-2, "{hunt:?}");
@@ -291,7 +291,7 @@ fn hunting_is_found_where_there_is_stiction() {
     let none = |body: &str| format!("{body}.friction={{ viscous = \"1.6e-3 N m s\", coulomb = 0 }}");
     let (a, b) = (none("drive_pulley"), none("idler_pulley"));
     let smooth = case("pid.toml", &["cart.friction={ viscous = \"19 N s/m\", coulomb = 0 }", &a, &b, fine, gains]);
-    assert_eq!(hunting(&smooth.stage, smooth.controller.as_ref().unwrap()).unwrap(), None);
+    assert_eq!(hunting(&smooth.machine, smooth.controller.as_ref().unwrap()).unwrap(), None);
 }
 
 /// Play in the gear was not among the causes: a loop that chatters through it was said to swing "whatever is left out".
@@ -309,7 +309,7 @@ fn a_limit_cycle_through_play_has_its_name() {
         let gear =
             ["motor.rotor_inertia=1e-5", "motor.gear_stiffness=300", "encoder={ at = \"cart\", lines = 250000 }"];
         let case = case("pid.toml", &[gear[0], gear[1], &play, &a, &b, &c, &pid, gear[2]]);
-        hunting(&case.stage, case.controller.as_ref().unwrap()).unwrap()
+        hunting(&case.machine, case.controller.as_ref().unwrap()).unwrap()
     };
     let even = ["1 deg", "3 deg", "10 deg"].map(|play| hunt("1", play).expect("a limit cycle"));
     for swing in &even {
@@ -453,9 +453,9 @@ fn a_brief_run_shows_what_a_whole_one_does() {
         let case = case(name, &[]);
         let design = case.controller.as_ref().unwrap();
         for motion in &case.moves {
-            let (stage, profile) = (&case.stage, &motion.profile);
+            let (stage, profile) = (&case.machine, &motion.profile);
             let (until, window, solver) = (motion.until, motion.window, taut::solve::Solver::of(stage));
-            let setup = taut::control::Setup { stage, model: stage, design, profile, until, window, solver };
+            let setup = taut::control::Setup { machine: stage, model: stage, design, profile, until, window, solver };
             let whole = taut::control::closed_loop(&setup).unwrap().figures;
             let brief = taut::tune::look(stage, stage, design, motion).unwrap();
             assert_eq!(brief.error, whole.cart.peak.value.abs(), "{name}: {}", motion.name);
@@ -507,7 +507,7 @@ fn a_search_keeps_to_its_samples() {
 fn draws_of_a_posterior_are_the_family() {
     let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join("tune-posterior.csv");
     let mut text = String::from("cart.mass_kg,cart.friction.viscous_N s m^-1\n");
-    let stage = case("pid.toml", &[]).stage;
+    let stage = case("pid.toml", &[]).machine;
     let (mass, viscous) = (stage.cart.mass, stage.cart.friction.forward.viscous);
     // A heavier cart has less friction.
     for k in 0..80 {

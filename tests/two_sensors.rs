@@ -7,10 +7,10 @@ use taut::case::Case;
 use taut::control::feedback::Feedback;
 use taut::control::{Controller, MoveRun, Observation, Setup, Standard, closed_loop, reads_scale};
 use taut::design::Design;
+use taut::machine::Measurement;
 use taut::measure::measure;
 use taut::signal::profile::Reference;
 use taut::solve::{Solver, simulate};
-use taut::stage::Measurement;
 use taut::tune::{Margins, Plant};
 
 const SCALE: &str = "scale={ lines = 1e9 }";
@@ -23,16 +23,16 @@ fn case(name: &str, changes: &[&str]) -> Case {
 /// The first move, of which the controller knows all but the load on the cart.
 fn run(case: &Case, until: f64) -> MoveRun {
     let motion = &case.moves[0];
-    let mut model = case.stage.clone();
+    let mut model = case.machine.clone();
     model.cart.load = 0.0;
     closed_loop(&Setup {
-        stage: &case.stage,
+        machine: &case.machine,
         model: &model,
         design: case.controller.as_ref().unwrap(),
         profile: &motion.profile,
         until,
         window: motion.window,
-        solver: Solver::of(&case.stage),
+        solver: Solver::of(&case.machine),
     })
     .unwrap()
 }
@@ -43,9 +43,9 @@ fn a_scale_takes_away_the_stretch_that_the_motor_does_not_see() {
     let [load, smooth, fine] = ["cart.load=-8", "cart.friction={ viscous = 19, coulomb = 0 }", "encoder.lines=1e6"];
     let both = case("two-sensors/cascade", &[load, smooth, fine]);
     let one = case("controllers/cascade", &[load, smooth, fine, "controller.feed_forward={ model = \"elastic\" }"]);
-    assert!(reads_scale(both.controller.as_ref().unwrap(), &both.stage) && one.stage.scale.is_none());
+    assert!(reads_scale(both.controller.as_ref().unwrap(), &both.machine) && one.machine.scale.is_none());
     // f = k₁ (y₁ − x) + k₂ k₃/(k₂ + k₃) (y₁ − x) = 8 N
-    let [k1, k2, k3] = one.stage.belt.stiffness;
+    let [k1, k2, k3] = one.machine.belt.stiffness;
     let stretch = 8.0 / (k1 + k2 * k3 / (k2 + k3));
     let [with, without] = [&both, &one].map(|case| run(case, 3.0).figures.final_cart_error);
     assert!((without.abs() / stretch - 1.0).abs() < 0.15, "{without} {stretch}");
@@ -66,7 +66,7 @@ fn the_linear_view_has_both_sensors() {
         let all: Vec<&str> = changes.iter().copied().chain([NO_FORWARD, SCALE]).collect();
         let case = case(&format!("controllers/{name}"), &all);
         let design = Design { limit: None, ..case.controller.clone().unwrap() };
-        let feedback = Feedback::new(&design, &case.stage).unwrap();
+        let feedback = Feedback::new(&design, &case.machine).unwrap();
         for hertz in [4.0, 40.0, 170.0, 430.0] {
             for at_cart in [false, true] {
                 let omega = 2.0 * PI * hertz;
@@ -83,7 +83,7 @@ fn the_linear_view_has_both_sensors() {
 
 /// The command over the position at one sensor, while the other stands still.
 fn response(case: &Case, design: &Design, omega: f64, at_cart: bool) -> Complex<f64> {
-    let mut controller = Standard::new(design, &case.stage).unwrap();
+    let mut controller = Standard::new(design, &case.machine).unwrap();
     // Whole periods: 1000 samples at 1 kHz and whole Hz.
     let (n, from) = (1000, 4000);
     let mut samples = Vec::new();
@@ -140,8 +140,8 @@ fn a_disturbance_observer_of_both_sensors_keeps_more_margin() {
     let peak = |changes: &[&str]| {
         let case = case("controllers/pid-observer", changes);
         let design = case.controller.clone().unwrap();
-        let feedback = Feedback::new(&design, &case.stage).unwrap();
-        let plant = Plant::of(&case.stage, 0.0, &design, &feedback.corners()).unwrap();
+        let feedback = Feedback::new(&design, &case.machine).unwrap();
+        let plant = Plant::of(&case.machine, 0.0, &design, &feedback.corners()).unwrap();
         Margins::of(&plant, &feedback)
     };
     let softer = "controller.pid={ proportional = 1500, integral = 0, derivative = 5, filter = 200 }";
@@ -154,13 +154,13 @@ fn a_disturbance_observer_of_both_sensors_keeps_more_margin() {
 #[test]
 fn counts_of_both_sensors_are_shown() {
     let table = case("table4", &["encoder={ at = \"motor\", lines = 512 }", "scale={ counts = 200000 }"]);
-    assert_eq!(table.stage.scale.map(|scale| scale.lines), Some(50_000.0));
+    assert_eq!(table.machine.scale.map(|scale| scale.lines), Some(50_000.0));
     let experiment = &table.experiments[0];
-    let run = simulate(&table.stage, experiment, Solver::Exact).unwrap();
+    let run = simulate(&table.machine, experiment, Solver::Exact).unwrap();
     let [counts, cart] = ["scale_count", "cart_position"].map(|name| run.trajectory.get(name).unwrap());
     assert!(cart.iter().any(|x| x.abs() > 0.01));
     assert!(counts.iter().zip(cart).all(|(count, x)| *count == (x * 200_000.0).round()));
-    let log = measure(&table.stage, &Measurement::default(), experiment, Solver::Exact).unwrap().trajectory;
+    let log = measure(&table.machine, &Measurement::default(), experiment, Solver::Exact).unwrap().trajectory;
     let recorded = log.get("scale_count").unwrap();
     assert!(recorded.iter().any(|count| count.abs() > 2000.0) && log.get("encoder_count").is_some());
 }

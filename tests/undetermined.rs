@@ -5,11 +5,11 @@ use common::{random, table4};
 use proptest::prelude::*;
 use taut::case::{Case, Experiment};
 use taut::friction::{Friction, Motion};
+use taut::machine::Machine;
+use taut::machine::axis::CART;
 use taut::polyline::Polyline;
 use taut::signal::Signal;
 use taut::solve::{ErrorEstimate, Flow, PositionError, Solution, Solver, simulate};
-use taut::stage::Stage;
-use taut::stage::axis::CART;
 use taut::sweep::{Status, Sweep};
 
 /// A cart that stands at `start`, beside the top of a hill at `top`: λ = √(κ/m) = 25.8 1/s with the pulleys' inertia.
@@ -25,7 +25,7 @@ fn hill(model: &str, top: f64, start: f64, until: f64) -> Case {
     Case::from_text("hill.toml", &text).unwrap()
 }
 
-fn estimated(stage: &Stage, experiment: &Experiment, solution: &Solution, tolerance: f64) -> PositionError {
+fn estimated(stage: &Machine, experiment: &Experiment, solution: &Solution, tolerance: f64) -> PositionError {
     let mut estimate = ErrorEstimate::new(stage, experiment);
     estimate.take(&solution.trajectory);
     estimate.finish(stage, experiment, tolerance, &solution.outcome, &mut || Flow::Continue).unwrap().unwrap()
@@ -36,7 +36,7 @@ fn estimated(stage: &Stage, experiment: &Experiment, solution: &Solution, tolera
 #[test]
 fn errors_that_a_hill_makes_grow_were_not_stated() {
     let case = hill("rigid", 0.3, 0.300_000_001, 0.8);
-    let (stage, experiment) = (&case.stage, &case.experiments[0]);
+    let (stage, experiment) = (&case.machine, &case.experiments[0]);
     let mass = 1.0 + 2.0 * 1e-4 / (0.02_f64 * 0.02);
     let lambda = (1000.0 / mass).sqrt();
     // The top is at 300/1000 m, of which the double is 1.1e-17 m too little.
@@ -54,12 +54,12 @@ fn errors_that_a_hill_makes_grow_were_not_stated() {
     }
     // On an elastic belt the same hill does the same.
     let elastic = hill("elastic", 0.3, 0.300_000_001, 0.8);
-    let error = simulate(&elastic.stage, &elastic.experiments[0], Solver::Exact).unwrap().outcome.error.unwrap();
+    let error = simulate(&elastic.machine, &elastic.experiments[0], Solver::Exact).unwrap().outcome.error.unwrap();
     assert!((1e-8..1e-5).contains(&error.value), "{error:?}");
     // Closer to the top and for longer, a thousandth of the motion is rounding, and on the top all of it.
     for (start, is_undetermined) in [(0.100_000_000_001, false), (0.1, true)] {
         let case = hill("rigid", 0.1, start, 1.1);
-        let error = simulate(&case.stage, &case.experiments[0], Solver::Exact).unwrap().outcome.error.unwrap();
+        let error = simulate(&case.machine, &case.experiments[0], Solver::Exact).unwrap().outcome.error.unwrap();
         assert!(error.hides_motion() && error.is_undetermined() == is_undetermined, "{start} m: {error:?}");
     }
 }
@@ -86,10 +86,10 @@ fn a_line_that_holds_keeps_its_accuracy() {
     let pulse = Signal::Pulse { value: 5.0, duration: 0.25, at: 0.0 };
     let experiment = common::experiment(pulse, 1.0);
     let plain = simulate(&table4(), &experiment, Solver::Exact).unwrap().outcome.error.unwrap();
-    let mut stage = table4();
-    stage.cart.forces.along = Polyline::new(vec![[-1.0, 5.0], [0.02, 0.1], [1.0, -5.0]]);
-    stage.cart.forces.by_speed = Polyline::new(vec![[-2.0, 3.0], [0.0, 0.0], [2.0, -3.0]]);
-    let held = simulate(&stage, &experiment, Solver::Exact).unwrap().outcome.error.unwrap();
+    let mut machine = table4();
+    machine.cart.forces.along = Polyline::new(vec![[-1.0, 5.0], [0.02, 0.1], [1.0, -5.0]]);
+    machine.cart.forces.by_speed = Polyline::new(vec![[-2.0, 3.0], [0.0, 0.0], [2.0, -3.0]]);
+    let held = simulate(&machine, &experiment, Solver::Exact).unwrap().outcome.error.unwrap();
     assert!(held.value < 10.0 * plain.value, "{held:?}, {plain:?}");
 }
 
@@ -97,24 +97,24 @@ fn a_line_that_holds_keeps_its_accuracy() {
 /// but the documents said that this happens.
 #[test]
 fn a_tie_was_not_told() {
-    let mut stage = table4();
+    let mut machine = table4();
     let breakaway = 0.0371;
-    stage.drive_pulley.friction = Friction::with_breakaway(1e-3, 0.5 * breakaway, breakaway);
-    let at = breakaway * stage.motor.resistance / stage.motor.torque_constant;
-    let ties = |stage: &Stage, value: f64| {
+    machine.drive_pulley.friction = Friction::with_breakaway(1e-3, 0.5 * breakaway, breakaway);
+    let at = breakaway * machine.motor.resistance / machine.motor.torque_constant;
+    let ties = |machine: &Machine, value: f64| {
         let experiment = common::experiment(Signal::Step { value, at: 0.31 }, 0.5);
-        simulate(stage, &experiment, Solver::Exact).unwrap().outcome.ties
+        simulate(machine, &experiment, Solver::Exact).unwrap().outcome.ties
     };
     for value in [at, at * (1.0 + f64::EPSILON), at * (1.0 - f64::EPSILON), -at] {
-        let told = ties(&stage, value);
+        let told = ties(&machine, value);
         assert!(told.len() == 1 && told[0].time == 0.31 && told[0].part.key() == "drive", "{value} V: {told:?}");
     }
     for value in [0.0, 0.9 * at, at * (1.0 - 1e-10), at * (1.0 + 1e-10), 5.0] {
-        assert!(ties(&stage, value).is_empty(), "{value} V");
+        assert!(ties(&machine, value).is_empty(), "{value} V");
     }
     // What sets in gently makes no difference.
-    stage.drive_pulley.friction = Friction::symmetric(1e-3, breakaway);
-    assert!(ties(&stage, at).is_empty());
+    machine.drive_pulley.friction = Friction::symmetric(1e-3, breakaway);
+    assert!(ties(&machine, at).is_empty());
 }
 
 /// Times of the stops of a body at which it goes on at once.
@@ -133,20 +133,20 @@ proptest! {
         amplitude in 1.0..6.0f64, frequency in 3.0..40.0f64, drag in 0.1..4.0f64, coulomb in 0.0..0.5f64,
         along in prop::bool::ANY,
     ) {
-        let mut stage = table4();
-        for pulley in [&mut stage.drive_pulley, &mut stage.idler_pulley] {
+        let mut machine = table4();
+        for pulley in [&mut machine.drive_pulley, &mut machine.idler_pulley] {
             pulley.friction = Friction::default();
         }
-        stage.cart.friction = Friction::symmetric(1.0, coulomb);
+        machine.cart.friction = Friction::symmetric(1.0, coulomb);
         if along {
-            stage.cart.forces.along = Polyline::new(vec![[-1.0, drag], [0.0, 0.0], [1.0, -3.0 * drag]]);
+            machine.cart.forces.along = Polyline::new(vec![[-1.0, drag], [0.0, 0.0], [1.0, -3.0 * drag]]);
         }
-        stage.cart.forces.by_speed = Polyline::new(vec![[-1.0, drag], [0.0, 0.0], [1.0, -2.0 * drag]]);
+        machine.cart.forces.by_speed = Polyline::new(vec![[-1.0, drag], [0.0, 0.0], [1.0, -2.0 * drag]]);
         let input = Signal::Sine { amplitude, frequency, phase: 0.0, offset: 0.0 };
         let mut counts = Vec::new();
         for every in [1e-3, 1e-2, 0.37e-3] {
             let experiment = Experiment { every, ..common::experiment(input.clone(), 0.5) };
-            let solution = simulate(&stage, &experiment, Solver::Exact).unwrap();
+            let solution = simulate(&machine, &experiment, Solver::Exact).unwrap();
             let phantoms = stops_without_a_stay(&solution);
             prop_assert!(phantoms.is_empty(), "{phantoms:?}");
             counts.push(solution.outcome.events.iter().filter(|e| e.body().is_some()).count());
@@ -167,7 +167,7 @@ fn a_cart_on_a_sine_turned_by_a_stop_and_a_start() {
     for every in [1e-3, 1e-2, 1e-4] {
         let experiment = Experiment { every, ..case.experiments[0].clone() };
         for solver in [Solver::Exact, Solver::GENERAL] {
-            let solution = simulate(&case.stage, &experiment, solver).unwrap();
+            let solution = simulate(&case.machine, &experiment, solver).unwrap();
             let phantoms = stops_without_a_stay(&solution);
             assert!(phantoms.is_empty(), "rows of {every} s, {solver:?}: {phantoms:?}");
             assert_eq!(

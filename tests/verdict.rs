@@ -16,7 +16,7 @@ fn made(own: &[&str], truth: &[&str], experiments: &[usize], mut noise: impl FnM
     let step = std::f64::consts::TAU / 2048.0;
     case.experiments = experiments.iter().map(|&index| case.experiments[index].clone()).collect();
     for (experiment, index) in case.experiments.iter_mut().zip(experiments) {
-        let run = simulate(&real.stage, &real.experiments[*index], Solver::of(&real.stage)).unwrap().trajectory;
+        let run = simulate(&real.machine, &real.experiments[*index], Solver::of(&real.machine)).unwrap().trajectory;
         let angle = run.get("drive_angle").unwrap();
         let values = angle.iter().enumerate().map(|(k, v)| step * ((v + noise(k, *v)) / step).round()).collect();
         experiment.log = Some(logged(&experiment.name, &run, values));
@@ -158,16 +158,16 @@ fn a_law_that_was_not_asked_for_widens_intervals_and_is_named() {
 fn last_digits_of_a_log_speak_for_no_law() {
     for digits in [6, 7, 12] {
         let mut case = Case::from_text("axis.toml", TEMPLATE).unwrap();
-        let stage = case.stage.clone();
+        let machine = case.machine.clone();
         for experiment in &mut case.experiments {
-            let run = simulate(&stage, experiment, Solver::of(&stage)).unwrap().trajectory;
+            let run = simulate(&machine, experiment, Solver::of(&machine)).unwrap().trajectory;
             let told = |angle: &f64| format!("{angle:.digits$}").parse().unwrap();
             let values = run.get("drive_angle").unwrap().iter().map(told).collect();
             experiment.log = Some(logged(&experiment.name, &run, values));
         }
         let found = fitted(&case, &plan(&["cart.mass", KEYS[0], KEYS[1]]));
         assert_eq!(found.other_law.map(|law| law.words), None, "{digits} digits");
-        assert!((found.estimates[0].value / stage.cart.mass - 1.0).abs() < 1e-5);
+        assert!((found.estimates[0].value / machine.cart.mass - 1.0).abs() < 1e-5);
     }
 }
 
@@ -220,10 +220,10 @@ fn ratios_are_told_where_a_gain_is_free() {
             assert!(low < truth / 0.2 && truth / 0.2 < high && high - low < 0.5 * truth / 0.2, "{ratio:?}");
         }
         let text = found.case_text(&case, "axis.toml".as_ref()).unwrap();
-        let written = Case::from_text("fitted.toml", &text).unwrap().stage;
+        let written = Case::from_text("fitted.toml", &text).unwrap().machine;
         // All four give way, so that their ratios are those of the logs.
         assert!((written.cart.mass / written.amplifier.gain / (0.5 / 0.2) - 1.0).abs() < 0.05);
-        assert!(written.amplifier.gain != 0.2 && written.cart.mass != case.stage.cart.mass);
+        assert!(written.amplifier.gain != 0.2 && written.cart.mass != case.machine.cart.mass);
     }
 }
 
@@ -250,14 +250,14 @@ fn what_is_determined_beside_what_is_not_keeps_its_interval() {
         // B₁ + r² b, r² within what the belt gives way.
         let words: Vec<&str> = combination.name.split(' ').collect();
         let factor: f64 = words[2].parse().unwrap();
-        let r = case.stage.pulley_radius;
+        let r = case.machine.pulley_radius;
         assert!((factor / (r * r) - 1.0).abs() < 0.1, "{}", combination.name);
-        let truth = case.stage.drive_pulley.friction.forward.viscous + factor * 24.0;
+        let truth = case.machine.drive_pulley.friction.forward.viscous + factor * 24.0;
         let [low, high] = combination.interval;
         assert!(low < truth && truth < high && high - low < 0.05 * truth, "{low} {truth} {high}: {combination:?}");
         // What is written has the sum.
         let text = found.case_text(&case, "axis.toml".as_ref()).unwrap();
-        let written = Case::from_text("fitted.toml", &text).unwrap().stage;
+        let written = Case::from_text("fitted.toml", &text).unwrap().machine;
         let sum = written.drive_pulley.friction.forward.viscous + factor * written.cart.friction.forward.viscous;
         assert!((sum / combination.value - 1.0).abs() < 1e-3, "{sum} {combination:?}");
         // Nothing ties newtons to newton metres.
@@ -313,7 +313,7 @@ fn the_other_way_round_gives_what_is_promised() {
     let mut real = Case::from_text_with("axis.toml", TEMPLATE, &truth).unwrap();
     let taut::signal::Signal::Pulse { value, .. } = &mut real.experiments[0].input else { panic!() };
     *value = -*value;
-    let run = simulate(&real.stage, &real.experiments[0], Solver::Exact).unwrap().trajectory;
+    let run = simulate(&real.machine, &real.experiments[0], Solver::Exact).unwrap().trajectory;
     let (step, mut noise) = (std::f64::consts::TAU / 2048.0, noise(2));
     let angle = run.get("drive_angle").unwrap().iter().enumerate();
     let values = angle.map(|(k, v)| step * ((v + noise(k, *v)) / step).round()).collect();

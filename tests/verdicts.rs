@@ -13,7 +13,7 @@ fn case(name: &str) -> Case {
 #[test]
 fn an_axis_that_slips_after_a_minute_hunts() {
     let case = case("hunts-slowly.toml");
-    let hunt = hunting(&case.stage, case.controller.as_ref().unwrap()).unwrap().expect("it hunts");
+    let hunt = hunting(&case.machine, case.controller.as_ref().unwrap()).unwrap().expect("it hunts");
     println!("{hunt:?}");
     assert!(hunt.amplitude > 2e-4 && hunt.amplitude < 2e-3, "{hunt:?}");
     assert!(hunt.slips_every > 1.0 && hunt.slips_every < 200.0, "{hunt:?}");
@@ -21,7 +21,7 @@ fn an_axis_that_slips_after_a_minute_hunts() {
     // Without the integral nothing moves it.
     let still = case.text.replace("integral = \"3000 V/(m s)\", ", "");
     let still = Case::from_text("still.toml", &still).unwrap();
-    assert_eq!(hunting(&still.stage, still.controller.as_ref().unwrap()).unwrap(), None);
+    assert_eq!(hunting(&still.machine, still.controller.as_ref().unwrap()).unwrap(), None);
 }
 
 /// Gains were worse on seven axes, "forced by" nothing; the limit that those of the file break was not named.
@@ -40,7 +40,7 @@ fn what_is_worse_has_its_reason() {
 fn what_was_never_fitted_keeps_its_spread() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("stages/sollmann-jouaneh/controllers");
     let plain = Case::read(folder.join("pid-elastic.toml")).unwrap();
-    let mass = plain.stage.cart.mass;
+    let mass = plain.machine.cart.mass;
     let text =
         format!("{}\n[uncertainty]\n\"cart.mass\" = {{ low = {}, high = {} }}\n", plain.text, 0.99 * mass, 1.01 * mass);
     let fitted = Case::from_text(folder.join("fitted.toml"), &text).unwrap();
@@ -86,7 +86,7 @@ fn suggested_gains_have_margins_on_drawn_axes() {
     let mut random = rand_pcg::Pcg64::new(11, 7);
     let mut factor = |most: f64| most.powf(2.0 * taut::chance::uniform(&mut random) - 1.0);
     for k in 0..40 {
-        let template = Case::from_text("axis.toml", TEMPLATE).unwrap().stage;
+        let template = Case::from_text("axis.toml", TEMPLATE).unwrap().machine;
         let stiffness = template.belt.stiffness.map(|stiffness| stiffness * factor(4.0));
         let (mass, every) = (template.cart.mass * factor(6.0), 1e-3 * factor(3.0));
         let mode = if k % 2 == 0 { "voltage" } else { "current" };
@@ -105,8 +105,8 @@ fn suggested_gains_have_margins_on_drawn_axes() {
         let hint = told.split("add for example ").nth(1).unwrap_or_else(|| panic!("{told}")).trim();
         let case = Case::from_text_with("axis.toml", &format!("{head}{hint}\n"), &sets).unwrap();
         let design = case.controller.as_ref().unwrap();
-        let plant = Plant::of(&case.stage, 0.0, design, &[]).unwrap();
-        let margins = Margins::of(&plant, &Feedback::new(design, &case.stage).unwrap());
+        let plant = Plant::of(&case.machine, 0.0, design, &[]).unwrap();
+        let margins = Margins::of(&plant, &Feedback::new(design, &case.machine).unwrap());
         assert!(margins.excess(1.7, 1.7) <= 1.0, "{hint}, every {every}: {margins:?}\n{sets:?}");
     }
 }

@@ -131,7 +131,7 @@ fn the_table_reads_back_to_the_bits_that_were_computed() {
          cart_friction_N,idler_friction_N_m,drive_state,cart_state,idler_state"
     );
     let case = taut::case::Case::read(table4()).unwrap();
-    let solution = simulate(&case.stage, &case.experiments[0], Solver::Exact).unwrap();
+    let solution = simulate(&case.machine, &case.experiments[0], Solver::Exact).unwrap();
     for (row, line) in lines.enumerate() {
         for (column, number) in solution.trajectory.columns.iter().zip(line.split(',')) {
             assert_eq!(number.parse::<f64>().unwrap().to_bits(), column.values[row].to_bits(), "{} {row}", column.name);
@@ -150,7 +150,7 @@ fn the_written_case_repeats_the_run() {
         assert!(read("one") == read("two"), "{name} differs");
     }
     let summary = json(&folder.path().join("two/summary.json"));
-    assert_eq!(summary["stage"]["cart_mass_kg"], 0.5);
+    assert_eq!(summary["machine"]["cart_mass_kg"], 0.5);
     assert_eq!(summary["experiments"][0]["metrics"]["end_time_s"], 0.3);
 }
 

@@ -91,8 +91,8 @@ impl Writer {
         Self { read: Files::new(), words: [words(first).collect(), words(second).collect()] }
     }
 
-    fn reading(mut self, name: &str, stage: &str) -> Self {
-        self.read.insert(name.into(), fs::read(stages(stage)).unwrap());
+    fn reading(mut self, name: &str, machine: &str) -> Self {
+        self.read.insert(name.into(), fs::read(stages(machine)).unwrap());
         self
     }
 

@@ -26,11 +26,11 @@ fn measured(folder: &Path) -> String {
     let told = taut(&[&args[..], &["--set", EXPERIMENT, "--set", change, "--out", out]].concat());
     assert!(told.status.success(), "{told:?}");
     let text = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(TABLE4)).unwrap();
-    let stage = &text[..text.find("[[experiment]]").unwrap()];
+    let machine = &text[..text.find("[[experiment]]").unwrap()];
     let log = "[[experiment]]\nname = \"noise\"\n\
                log = { file = \"sim/noise.measured.csv\", time = \"time_s\", input = \"voltage_V\", drive_angle = \"drive_angle_rad\" }\n";
     let case = folder.join("frf.toml");
-    fs::write(&case, format!("{stage}{log}")).unwrap();
+    fs::write(&case, format!("{machine}{log}")).unwrap();
     case.to_str().unwrap().to_string()
 }
 

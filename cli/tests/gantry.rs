@@ -12,7 +12,7 @@ fn taut(folder: &Path) -> Command {
     command
 }
 
-fn stage(name: &str) -> PathBuf {
+fn machine(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../stages").join(name)
 }
 
@@ -36,7 +36,7 @@ fn refused(args: &[&str], case: &Path) -> String {
 #[test]
 fn simulate_writes_a_whole_folder() {
     let folder = TempDir::new().unwrap();
-    let case = stage("h-frame/h-frame.toml");
+    let case = machine("h-frame/h-frame.toml");
     let run = taut(folder.path()).arg("simulate").arg(&case).args(["--out", "out"]).assert().success();
     let out = text(&run.get_output().stdout);
     for word in [
@@ -83,7 +83,7 @@ fn simulate_writes_a_whole_folder() {
 #[test]
 fn the_summary_is_data() {
     let folder = TempDir::new().unwrap();
-    let case = stage("core-xy/core-xy.toml");
+    let case = machine("core-xy/core-xy.toml");
     let more = ["--json", "--experiment", "along x", "--set", "bridge.mass=1 kg"];
     let run = taut(folder.path()).arg("simulate").arg(&case).args(more).assert().success();
     let told = json(&run.get_output().stdout);
@@ -114,7 +114,8 @@ fn spans_that_follow_are_solved_in_general_with_an_error_that_is_estimated() {
     let folder = TempDir::new().unwrap();
     for name in ["h-frame/follows.toml", "core-xy/follows.toml"] {
         let told = |more: &[&str]| {
-            let run = taut(folder.path()).arg("simulate").arg(stage(name)).arg("--json").args(more).assert().success();
+            let run =
+                taut(folder.path()).arg("simulate").arg(machine(name)).arg("--json").args(more).assert().success();
             json(&run.get_output().stdout)
         };
         let (usual, fine) = (told(&[]), told(&["--solver", "general", "--tolerance", "1e-12"]));
@@ -127,7 +128,7 @@ fn spans_that_follow_are_solved_in_general_with_an_error_that_is_estimated() {
             assert!((at(&usual, key) - at(&fine, key)).abs() <= error && error < 2e-9, "{name}: {key}");
         }
     }
-    let told = refused(&["simulate", "--solver", "exact"], &stage("h-frame/follows.toml"));
+    let told = refused(&["simulate", "--solver", "exact"], &machine("h-frame/follows.toml"));
     assert_eq!(
         told,
         "error: the belt's spans follow the cart: this solver does not take it\n  \
@@ -139,7 +140,7 @@ fn spans_that_follow_are_solved_in_general_with_an_error_that_is_estimated() {
 fn who_leaves_the_travel_is_named() {
     let folder = TempDir::new().unwrap();
     let short = ["--set", "cart.travel.min=-20mm"];
-    let run = taut(folder.path()).arg("simulate").arg(stage("h-frame/h-frame.toml")).args(short).assert().code(1);
+    let run = taut(folder.path()).arg("simulate").arg(machine("h-frame/h-frame.toml")).args(short).assert().code(1);
     let output = run.get_output();
     assert!(text(&output.stdout).contains("the cart leaves its travel there, and nothing stops it"));
     assert!(text(&output.stderr).starts_with("error: the run \"one motor\" ended at "), "{}", text(&output.stderr));
@@ -147,7 +148,7 @@ fn who_leaves_the_travel_is_named() {
 
 #[test]
 fn options_of_an_axis_are_refused() {
-    let case = stage("h-frame/h-frame.toml");
+    let case = machine("h-frame/h-frame.toml");
     for (args, told) in [
         (
             &["simulate", "--as-measured", "--out", "out"][..],
@@ -188,7 +189,7 @@ fn options_of_an_axis_are_refused() {
 #[test]
 fn modes_tells_rigid_and_elastic_ones_and_maps_the_area() {
     let folder = TempDir::new().unwrap();
-    let case = stage("core-xy/follows.toml");
+    let case = machine("core-xy/follows.toml");
     let run = taut(folder.path()).arg("modes").arg(&case).args(["--out", "out"]).assert().success();
     let out = text(&run.get_output().stdout);
     for word in [
@@ -222,7 +223,7 @@ fn modes_tells_rigid_and_elastic_ones_and_maps_the_area() {
     assert_eq!([row[2], row[3]], [0, 1].map(|mode: usize| grid[mode][0][1].as_f64().unwrap()));
     assert!(read("report.html").contains("Elastic mode 2") && folder.path().join("out/plots/elastic-1.svg").exists());
 
-    let same = taut(folder.path()).arg("modes").arg(stage("h-frame/h-frame.toml")).arg("--json").assert().success();
+    let same = taut(folder.path()).arg("modes").arg(machine("h-frame/h-frame.toml")).arg("--json").assert().success();
     let told = json(&same.get_output().stdout);
     assert_eq!((&told["stiffness_depends_on_position"], &told["map"]), (&Value::Bool(false), &Value::Null));
     assert!((told["elastic"][0]["frequency_Hz"].as_f64().unwrap() - 196.643946994).abs() < 1e-9);
@@ -230,7 +231,7 @@ fn modes_tells_rigid_and_elastic_ones_and_maps_the_area() {
 
 #[test]
 fn modes_refuses_what_is_asked_of_an_axis() {
-    let case = stage("h-frame/h-frame.toml");
+    let case = machine("h-frame/h-frame.toml");
     for option in
         [["--at", "1mm"], ["--speed", "0.1"], ["--stuck", "cart"], ["--sample-time", "1ms"], ["--from", "1Hz"]]
     {
@@ -243,7 +244,7 @@ fn modes_refuses_what_is_asked_of_an_axis() {
 /// Options that a gantry does not have are refused, at the line that makes it one.
 #[test]
 fn commands_for_an_axis_say_what_takes_a_gantry() {
-    let case = stage("core-xy/core-xy.toml");
+    let case = machine("core-xy/core-xy.toml");
     for command in ["fit", "tune", "move", "check", "shape"] {
         assert_eq!(
             refused(&[command], &case),
@@ -261,7 +262,7 @@ fn a_sweep_writes_a_whole_folder_that_repeats_it() {
     let folder = TempDir::new().unwrap();
     let plan =
         ["--runs", "24", "--design", "sobol", "--vary", "all=20%", "--trajectories", "--threads", "2", "--out", "out"];
-    let run = taut(folder.path()).arg("sweep").arg(stage("h-frame/h-frame.toml")).args(plan).assert().success();
+    let run = taut(folder.path()).arg("sweep").arg(machine("h-frame/h-frame.toml")).args(plan).assert().success();
     let told = text(&run.get_output().stdout);
     for word in [
         "24 runs of 3 simulations each: 21 parameters, sobol",
@@ -300,7 +301,7 @@ fn a_sweep_writes_a_whole_folder_that_repeats_it() {
 #[test]
 fn a_sweep_of_a_case_file_has_its_designs() {
     let folder = TempDir::new().unwrap();
-    let whole = fs::read_to_string(stage("core-xy/core-xy.toml")).unwrap();
+    let whole = fs::read_to_string(machine("core-xy/core-xy.toml")).unwrap();
     for (design, runs) in [
         ("design = \"one-at-a-time\"\n[sweep.vary]\nall = \"factors(2, 0.5)\"\n", "47 runs"),
         (
@@ -321,7 +322,7 @@ fn a_sweep_of_a_case_file_has_its_designs() {
 
 #[test]
 fn a_sweep_that_a_gantry_cannot_have_is_told() {
-    let case = stage("h-frame/h-frame.toml");
+    let case = machine("h-frame/h-frame.toml");
     let told =
         |vary: &str, more: &[&str]| refused(&[&["sweep", "--runs", "4", "--vary", vary][..], more].concat(), &case);
     for (vary, message) in [
@@ -386,7 +387,9 @@ fn a_sweep_that_was_interrupted_goes_on() {
     let folder = TempDir::new().unwrap();
     let run = |out: &str| {
         let mut run = Program::new(env!("CARGO_BIN_EXE_taut"));
-        run.arg("sweep").arg(stage("core-xy/core-xy.toml")).args(["--runs", "1200", "--vary", "all=20%", "--out", out]);
+        run.arg("sweep")
+            .arg(machine("core-xy/core-xy.toml"))
+            .args(["--runs", "1200", "--vary", "all=20%", "--out", out]);
         run.current_dir(folder.path()).stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::null());
         crate::faults::by_default(&mut run);
         run

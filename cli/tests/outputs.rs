@@ -13,7 +13,7 @@ fn taut(folder: &Path) -> Command {
     command
 }
 
-fn stage(name: &str) -> String {
+fn machine(name: &str) -> String {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../stages").join(name);
     fs::read_to_string(path).unwrap()
 }
@@ -52,7 +52,7 @@ fn with_a_log(log: &str) -> TempDir {
     let folder = TempDir::new().unwrap();
     let rows: String = (0..200).map(|k| format!("{},{},{}\n", 0.001 * f64::from(k), 5, 1e-4 * f64::from(k))).collect();
     fs::write(folder.path().join(log), format!("time_s,voltage_V,angle_rad\n{rows}")).unwrap();
-    let mut text = stage("sollmann-jouaneh/table4.toml");
+    let mut text = machine("sollmann-jouaneh/table4.toml");
     text = text[..text.find("[[experiment]]").unwrap()].to_string();
     text += &format!(
         r#"
@@ -268,7 +268,7 @@ fn long_names_of_many_bytes_have_files() {
     let folder = TempDir::new().unwrap();
     let at = folder.path();
     let long = "轴".repeat(100);
-    let text = stage("sollmann-jouaneh/table4.toml").replacen("5 V pulse", &long, 1);
+    let text = machine("sollmann-jouaneh/table4.toml").replacen("5 V pulse", &long, 1);
     let text = text.replacen("10 V pulse", &format!("{}带", "轴".repeat(99)), 1);
     fs::write(at.join("case.toml"), text).unwrap();
     taut(at)

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use taut::log::read_columns;
 use tempfile::TempDir;
 
-fn stage(name: &str) -> String {
+fn machine(name: &str) -> String {
     format!("{}/../stages/sollmann-jouaneh/{name}", env!("CARGO_MANIFEST_DIR"))
 }
 
@@ -55,7 +55,7 @@ fn wait_for(child: &mut Child, folder: &Path, wanted: usize) {
 #[test]
 fn figures_are_chosen_and_those_that_nothing_has_are_told() {
     let folder = TempDir::new().unwrap();
-    let (case, sweep) = (stage("table4.toml"), ["--runs", "3", "--vary", "cart.mass=20%", "--out", "runs.csv"]);
+    let (case, sweep) = (machine("table4.toml"), ["--runs", "3", "--vary", "cart.mass=20%", "--out", "runs.csv"]);
     let with = |figures: &'static str| [&[case.as_str(), "--figures", figures][..], &sweep].concat();
     done(folder.path(), &with("peak_cart_speed, stop_time"));
     let text = fs::read_to_string(folder.path().join("runs.csv")).unwrap();
@@ -82,7 +82,7 @@ fn the_file_is_the_same_on_any_number_of_threads() {
             .iter()
             .map(|threads| {
                 let out = format!("{threads}.{ending}");
-                let case = stage("table4.toml");
+                let case = machine("table4.toml");
                 done(
                     folder.path(),
                     &[&case, "--runs", "300", "--vary", "all=20%", "--threads", threads, "--out", &out],
@@ -111,7 +111,7 @@ fn the_file_is_the_same_on_any_number_of_threads() {
 #[test]
 fn a_killed_sweep_goes_on() {
     let folder = TempDir::new().unwrap();
-    let case = stage("table4.toml");
+    let case = machine("table4.toml");
     let plan = |out: &'static str| {
         [&case as &str, "--runs", "6000", "--design", "sobol", "--vary", "all=20%", "--threads", "2", "--out", out]
             .map(str::to_string)
@@ -168,7 +168,7 @@ fn a_folder_has_rows_summary_case_report_and_plots() {
         "--vary",
         "motor.resistance=normal(0.71 ohm, 0.02 ohm)",
     ];
-    let case = stage("table4.toml");
+    let case = machine("table4.toml");
     let text = done(folder.path(), &[&[&case as &str, "--out", "out"], &arguments[..]].concat());
     assert!(text.contains("512 runs of 2 simulations each: 2 parameters, sobol, for Sobol' indices"), "{text}");
     let out = folder.path().join("out");
@@ -190,7 +190,7 @@ fn a_folder_has_rows_summary_case_report_and_plots() {
 #[test]
 fn trajectories_are_written_on_request() {
     let folder = TempDir::new().unwrap();
-    let case = stage("table4.toml");
+    let case = machine("table4.toml");
     done(folder.path(), &[&case, "--runs", "3", "--vary", "cart.mass=20%", "--trajectories", "--out", "r.parquet"]);
     let names = ["run", "experiment", "time_s", "cart_position_m"];
     let columns = read_columns(&folder.path().join("r-trajectories.parquet"), &names).unwrap();
@@ -203,7 +203,7 @@ fn trajectories_are_written_on_request() {
 #[test]
 fn mistakes_on_the_command_line_are_told() {
     let folder = TempDir::new().unwrap();
-    let case = stage("table4.toml");
+    let case = machine("table4.toml");
     for (arguments, message) in [
         (vec![], "this case does not say what is varied"),
         (vec!["--runs", "10"], "nothing is varied"),
@@ -239,7 +239,7 @@ fn mistakes_on_the_command_line_are_told() {
 #[test]
 fn a_sweep_says_before_it_begins_what_it_takes() {
     let folder = TempDir::new().unwrap();
-    let case = stage("table4.toml");
+    let case = machine("table4.toml");
     let sweep = |more: &[&str]| {
         let mut run = Command::new(env!("CARGO_BIN_EXE_taut"));
         run.current_dir(folder.path()).args(["sweep", &case, "--vary", "all=20%", "--no-report"]).args(more);
@@ -276,7 +276,7 @@ fn the_papers_study_is_a_sweep() {
         let checks = claim["checks"].as_array().unwrap();
         checks.iter().map(|c| (c["what"].as_str().unwrap().to_string(), c["value"].as_f64().unwrap())).collect()
     };
-    let summary: Value = serde_json::from_str(&done(folder.path(), &[&stage("sweep.toml"), "--json"])).unwrap();
+    let summary: Value = serde_json::from_str(&done(folder.path(), &[&machine("sweep.toml"), "--json"])).unwrap();
     let relative = |experiment: usize, parameter: &str, which: usize| -> f64 {
         let figures = summary["experiments"][experiment]["figures"].as_array().unwrap();
         let figure = figures.iter().find(|figure| figure["name"] == "final_drive_travel").unwrap();

@@ -5,7 +5,7 @@ use taut::control::Stepped;
 use taut::export::fmu::{Model, REFERENCES, Role};
 use taut::mechanism::{DRIVES, Mechanism};
 use taut::signal::{DEGREE, Piece};
-use taut::solve::{Dynamics, Machine, Solver};
+use taut::solve::{Dynamics, Simulator, Solver};
 
 /// How a function ended, as the standard counts it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -122,7 +122,7 @@ pub(crate) enum Plant {
     /// None yet, or not with the present numbers.
     None,
     /// It moves by itself.
-    Machine(Box<Machine>),
+    Machine(Box<Simulator>),
     /// It is moved.
     Dynamics(Box<Dynamics>),
 }
@@ -343,7 +343,7 @@ impl Instance {
             Use::ModelExchange => Plant::Dynamics(Box::new(Dynamics::new(&mechanism, &state)?)),
             Use::CoSimulation { .. } => {
                 let solver = Solver::of_mechanism(&mechanism);
-                Plant::Machine(Box::new(Machine::of_mechanism(&mechanism, &state, solver, self.model.every)?))
+                Plant::Machine(Box::new(Simulator::of_mechanism(&mechanism, &state, solver, self.model.every)?))
             }
         };
         Ok(())

@@ -4,7 +4,7 @@ use crate::instance::{Instance, Phase, Plant, Refusal, Told, place};
 use taut::export::fmu::{Causality, Kind, Role, Variability, Variable};
 use taut::mechanism::{DRIVES, Shown};
 use taut::signal::DEGREE;
-use taut::solve::{Dynamics, Machine, Quantity};
+use taut::solve::{Dynamics, Quantity, Simulator};
 
 /// Phases in which values can be read.
 pub(crate) const READ: [Phase; 5] =
@@ -314,7 +314,7 @@ impl Instance {
     }
 
     /// A copy of the machine that has taken the inputs as they are set now.
-    fn as_set(&self) -> Told<Machine> {
+    fn as_set(&self) -> Told<Simulator> {
         let mut copy = self.clone();
         copy.prepare()?;
         copy.refresh()?;

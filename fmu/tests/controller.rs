@@ -1,6 +1,6 @@
 //! The controller inside does what `taut move` shows of it.
 
-use crate::unit::{OK, Unit, stage};
+use crate::unit::{OK, Unit, machine};
 use taut::case::Case;
 use taut::control::{Setup, closed_loop};
 use taut::solve::Solver;
@@ -20,15 +20,15 @@ fn feed_forward_inside_is_that_of_a_move() {
 
 fn is_that_of_a_move(name: &str, most: f64) {
     let name = format!("sollmann-jouaneh/controllers/{name}.toml");
-    let case = Case::read(stage(&name)).unwrap();
+    let case = Case::read(machine(&name)).unwrap();
     let (design, shown) = (case.controller.as_ref().unwrap(), &case.moves[0]);
     let unit = Unit::of(&name, true);
     // Into the stroke, before its end, and at rest; steps of a sample, and of a third of one.
     for (milliseconds, parts) in [(30, 1), (80, 3), (600, 1), (600, 3)] {
         let until = f64::from(milliseconds) * 1e-3;
         let setup = Setup {
-            stage: &case.stage,
-            model: &case.stage,
+            machine: &case.machine,
+            model: &case.machine,
             design,
             profile: &shown.profile,
             until,

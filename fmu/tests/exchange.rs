@@ -1,6 +1,6 @@
 //! Model exchange: an integrator of the tests' own finds the solver's motion by rates and conditions alone.
 
-use crate::unit::{OK, Three, Unit, stage};
+use crate::unit::{OK, Three, Unit, machine};
 use taut::case::Case;
 use taut::solve::{self, Solver};
 use taut_fmu::fmi3;
@@ -130,8 +130,8 @@ impl<'i, 'u> Importer<'i, 'u> {
 #[test]
 fn an_integrator_finds_every_event_of_the_pulse() {
     let unit = Unit::of("sollmann-jouaneh/table4.toml", false);
-    let case = Case::read(stage("sollmann-jouaneh/table4.toml")).unwrap();
-    let solution = solve::simulate(&case.stage, &case.experiments[0], Solver::Exact).unwrap();
+    let case = Case::read(machine("sollmann-jouaneh/table4.toml")).unwrap();
+    let solution = solve::simulate(&case.machine, &case.experiments[0], Solver::Exact).unwrap();
     let wanted = solution.trajectory.get("cart_position").unwrap();
     let one = unit.exchange();
     let mut importer = Importer::new(&one);
@@ -157,8 +157,8 @@ fn an_integrator_bends_bristles() {
         ["cart.friction={ viscous = 19, coulomb = 0.2, static = 0.3, lugre = { stiffness = 1e4, damping = 50, \
                     velocity = 0.01 } }"];
     let unit = Unit::with("sollmann-jouaneh/table4.toml", &changes, false);
-    let case = Case::read_with(stage("sollmann-jouaneh/table4.toml"), &changes).unwrap();
-    let solution = solve::simulate(&case.stage, &case.experiments[0], Solver::General { tolerance: 1e-11 }).unwrap();
+    let case = Case::read_with(machine("sollmann-jouaneh/table4.toml"), &changes).unwrap();
+    let solution = solve::simulate(&case.machine, &case.experiments[0], Solver::General { tolerance: 1e-11 }).unwrap();
     let one = unit.exchange();
     let mut importer = Importer::new(&one);
     assert_eq!(one.set("command", 5.0), OK);

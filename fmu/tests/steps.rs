@@ -1,6 +1,6 @@
 //! Co-simulation is as exact as the solver, whatever the steps are.
 
-use crate::unit::{OK, Random, Three, Unit, stage};
+use crate::unit::{OK, Random, Three, Unit, machine};
 use std::ffi::c_void;
 use taut::case::{Case, Opened};
 use taut::signal::Signal;
@@ -13,8 +13,8 @@ const SAME: f64 = 1e-12;
 
 /// The pulse of the paper's Table 4: 10 V until 0.25 s, and where the cart is at each millisecond.
 fn expected() -> Vec<[f64; 2]> {
-    let case = Case::read(stage("sollmann-jouaneh/table4.toml")).unwrap();
-    let solution = solve::simulate(&case.stage, &case.experiments[1], Solver::Exact).unwrap();
+    let case = Case::read(machine("sollmann-jouaneh/table4.toml")).unwrap();
+    let solution = solve::simulate(&case.machine, &case.experiments[1], Solver::Exact).unwrap();
     let column = |name| solution.trajectory.get(name).unwrap();
     column("time").iter().zip(column("cart_position")).map(|(time, x)| [*time, *x]).collect()
 }
@@ -123,14 +123,14 @@ fn ramps_of_inputs_are_exact_and_not_stairs() {
     let unit = Unit::of("sollmann-jouaneh/table4.toml", false);
     let case = Case::from_text(
         "ramp.toml",
-        &std::fs::read_to_string(stage("sollmann-jouaneh/table4.toml")).unwrap().replacen(
+        &std::fs::read_to_string(machine("sollmann-jouaneh/table4.toml")).unwrap().replacen(
             "{ pulse = \"5 V\", for = \"0.25 s\" }",
             "{ ramp = \"12 V\", over = \"1 s\" }",
             1,
         ),
     )
     .unwrap();
-    let solution = solve::simulate(&case.stage, &case.experiments[0], Solver::Exact).unwrap();
+    let solution = solve::simulate(&case.machine, &case.experiments[0], Solver::Exact).unwrap();
     let wanted = *solution.trajectory.get("cart_position").unwrap().last().unwrap();
     let (one, command, order, slope) = (unit.two(1, &unit.token()), unit.reference("command"), 1, 12.0);
     let (mut x, at) = (0.0, unit.reference("cart_position"));
@@ -310,7 +310,7 @@ fn gantries_and_general_stages_end_where_their_solver_does() {
     for (name, tolerance) in
         [("core-xy/core-xy.toml", SAME), ("h-frame/h-frame.toml", SAME), ("core-xy/follows.toml", 1e-9)]
     {
-        let case = Opened::read_with(stage(name), &[]).unwrap();
+        let case = Opened::read_with(machine(name), &[]).unwrap();
         let Opened::Gantry(case) = &case else { panic!("a gantry") };
         let (mechanism, mut end) = (case.gantry.mechanism(), Vec::new());
         let inputs = [6.0, -2.0].map(|value| Signal::Step { value, at: 0.0 }).to_vec();
@@ -384,7 +384,7 @@ fn the_callback_within_a_step_sees_events_and_may_end_it() {
 }
 
 fn expected_of_five() -> f64 {
-    let case = Case::read(stage("sollmann-jouaneh/table4.toml")).unwrap();
-    let solution = solve::simulate(&case.stage, &case.experiments[0], Solver::Exact).unwrap();
+    let case = Case::read(machine("sollmann-jouaneh/table4.toml")).unwrap();
+    let solution = solve::simulate(&case.machine, &case.experiments[0], Solver::Exact).unwrap();
     *solution.trajectory.get("cart_position").unwrap().last().unwrap()
 }

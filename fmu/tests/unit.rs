@@ -26,7 +26,7 @@ impl Unit {
 
     /// The same with changes of the case.
     pub fn with(case: &str, changes: &[&str], with_controller: bool) -> Self {
-        let opened = Opened::read_with(stage(case), changes).unwrap();
+        let opened = Opened::read_with(machine(case), changes).unwrap();
         let model = Model::new(&opened, with_controller).unwrap();
         let folder = TempDir::new().unwrap();
         std::fs::write(folder.path().join("machine.toml"), &model.resource).unwrap();
@@ -184,7 +184,7 @@ impl Three<'_> {
 }
 
 /// A case of the repository.
-pub fn stage(name: &str) -> PathBuf {
+pub fn machine(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../stages").join(name)
 }
 

@@ -12,11 +12,11 @@ use taut::control::{Loop, Rows, Standard};
 use taut::fit;
 use taut::linear::{GantryAnalysis, Operation, Root, StateSpace};
 use taut::log::{Accelerometer, ColumnId, Dialect, Filter, Log, Mapping, Quantity, Source, Survey, read_accelerometer};
+use taut::machine::Machine;
 use taut::metrics::GantryMeter;
 use taut::signal::gcode::legs;
 use taut::signal::profile::{Limits, Profile};
 use taut::solve::{self, Course, Detail, Ending, Flow, Outcome, Solver};
-use taut::stage::Stage;
 use taut::sweep::Sweep;
 use taut::{Error, quantity};
 
@@ -79,13 +79,13 @@ pub(crate) fn case(bytes: &[u8]) -> Reached {
         Err(error) => return refused(&error),
     };
     let again = Case::from_text(&name, &case.text).unwrap_or_else(|error| panic!("its own text is refused: {error}"));
-    assert!(again.text == case.text && again.stage == case.stage, "its own text reads otherwise");
-    let Some(longest) = longest(&case.stage) else { return Reached::Read };
+    assert!(again.text == case.text && again.machine == case.machine, "its own text reads otherwise");
+    let Some(longest) = longest(&case.machine) else { return Reached::Read };
     if let Some(experiment) = case.experiments.first() {
-        run(&case.stage, experiment, longest);
+        run(&case.machine, experiment, longest);
     }
     if let (Some(design), Some(motion)) = (&case.controller, case.moves.first()) {
-        drive(&case.stage, design, motion, longest);
+        drive(&case.machine, design, motion, longest);
     }
     if case.sweep.is_some() {
         match Sweep::new(&case) {
@@ -130,13 +130,13 @@ fn gantry(name: &Path, case: &GantryCase) -> Reached {
 }
 
 /// How long a machine may run, s; none where its equations say nothing.
-fn longest(stage: &Stage) -> Option<f64> {
+fn longest(stage: &Machine) -> Option<f64> {
     let poles = StateSpace::of(stage, Operation::default()).and_then(|model| model.poles()).ok()?;
     let fastest = poles.iter().map(|pole| pole.norm()).fold(0.0, f64::max);
     fastest.is_finite().then(|| LONGEST.min(PHASE / fastest.max(1e-300)))
 }
 
-fn run(stage: &Stage, experiment: &Experiment, longest: f64) {
+fn run(stage: &Machine, experiment: &Experiment, longest: f64) {
     let until = experiment.until.min(longest);
     let every = experiment.every.min(until).max(until / ROWS);
     let short = Experiment { until, every, ..experiment.clone() };
@@ -163,7 +163,7 @@ fn judge(outcome: Result<Outcome, Error>, finite: bool) {
     }
 }
 
-fn drive(stage: &Stage, design: &taut::design::Design, motion: &Move, longest: f64) {
+fn drive(stage: &Machine, design: &taut::design::Design, motion: &Move, longest: f64) {
     let until = motion.until.min(longest).min(ROWS * design.every);
     let rows = Rows { until, every: motion.every.min(until).max(until / ROWS), window: motion.window };
     let done = Standard::new(design, stage).and_then(|mut controller| {
@@ -243,8 +243,8 @@ pub(crate) fn log(bytes: &[u8]) -> Reached {
 }
 
 fn surveyed(log: &Log) {
-    static STAGE: OnceLock<Stage> = OnceLock::new();
-    let stage = STAGE.get_or_init(|| Case::from_text("axis.toml", TEMPLATE).expect("the template is a case").stage);
+    static STAGE: OnceLock<Machine> = OnceLock::new();
+    let stage = STAGE.get_or_init(|| Case::from_text("axis.toml", TEMPLATE).expect("the template is a case").machine);
     assert!(log.time.windows(2).all(|pair| pair[0] < pair[1]), "times that do not increase");
     assert!(log.time.iter().chain(&log.input).all(|value| value.is_finite()), "a time or an input is no number");
     assert!(log.outputs.iter().all(|output| output.values.len() == log.len()), "columns of different lengths");

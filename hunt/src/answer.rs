@@ -4,7 +4,7 @@ use crate::c;
 use crate::double::Double;
 use crate::exchange;
 use crate::law::Motion;
-use crate::machine::{BODIES, Machine};
+use crate::machine::{BODIES, Model};
 use crate::solve::Event;
 use crate::steps;
 use crate::subject::{Fed, Subject};
@@ -110,7 +110,7 @@ pub fn ask(subject: &Subject, by: By) -> Result<Answer, String> {
 /// Whether the machine of a subject is linear piece by piece.
 pub fn is_piecewise_linear(subject: &Subject) -> bool {
     match subject {
-        Subject::Axis(case) | Subject::Loop(case) => case.stage.is_piecewise_linear(),
+        Subject::Axis(case) | Subject::Loop(case) => case.machine.is_piecewise_linear(),
         Subject::Gantry(case) => case.gantry.mechanism().is_piecewise_linear(),
     }
 }
@@ -118,7 +118,7 @@ pub fn is_piecewise_linear(subject: &Subject) -> bool {
 /// The mechanism of a subject.
 pub fn mechanism(subject: &Subject) -> Mechanism {
     match subject {
-        Subject::Axis(case) | Subject::Loop(case) => case.stage.mechanism(),
+        Subject::Axis(case) | Subject::Loop(case) => case.machine.mechanism(),
         Subject::Gantry(case) => case.gantry.mechanism(),
     }
 }
@@ -136,7 +136,7 @@ pub(crate) fn solved(subject: &Subject, solver: Solver) -> Result<Answer, String
     };
     let (outcome, stated): (Outcome, Option<f64>) = match subject {
         Subject::Axis(case) => {
-            let (stage, experiment) = (&case.stage, &case.experiments[0]);
+            let (stage, experiment) = (&case.machine, &case.experiments[0]);
             let outcome = stream(stage, experiment, solver, &mut keep).map_err(told)?;
             let stated = estimated(solver, &outcome, &trajectory, ErrorEstimate::new(stage, experiment), |estimate| {
                 estimate.finish(stage, experiment, TOLERANCE, &outcome, &mut || Flow::Continue)
@@ -156,13 +156,14 @@ pub(crate) fn solved(subject: &Subject, solver: Solver) -> Result<Answer, String
         Subject::Loop(case) => {
             let design = case.controller.as_ref().ok_or("the case has no controller")?;
             let motion = &case.moves[0];
-            let mut controller = Standard::new(design, &case.stage).map_err(told)?;
+            let mut controller = Standard::new(design, &case.machine).map_err(told)?;
             let lead = design.feed_forward.lead.unwrap_or(design.delay + 0.5 * design.every);
             let timing = Loop { every: design.every, delay: design.delay, limit: design.limit, lead };
             let rows = Rows { until: motion.until, every: motion.every, window: motion.window };
             let profile = motion.reference(design);
-            let run = control::stream(&case.stage, &mut controller, &timing, &profile, &rows, solver, false, &mut keep)
-                .map_err(told)?;
+            let run =
+                control::stream(&case.machine, &mut controller, &timing, &profile, &rows, solver, false, &mut keep)
+                    .map_err(told)?;
             let stated = run.outcome.error.map(|error| error.value);
             (run.outcome, stated)
         }
@@ -234,6 +235,6 @@ fn body_events(outcome: &Outcome) -> Vec<Event> {
 }
 
 /// Rows of positions in taut's units along a subject's bodies.
-pub fn rows(subject: &Subject, machine: &Machine, positions: &[Vec<f64>]) -> Vec<[Double; BODIES]> {
+pub fn rows(subject: &Subject, machine: &Model, positions: &[Vec<f64>]) -> Vec<[Double; BODIES]> {
     positions.iter().map(|positions| subject.along_the_belt(machine, positions)).collect()
 }

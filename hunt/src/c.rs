@@ -200,7 +200,7 @@ fn plant_main(subject: &Subject, fed: &Fed, ticks: usize, parts: usize) -> Strin
 fn loop_main(subject: &Subject, ticks: usize, parts: usize) -> Result<String, String> {
     let Subject::Loop(case) = subject else { return Err("no loop".into()) };
     let design = case.controller.as_ref().ok_or("the case has no controller")?;
-    if case.stage.encoder.is_some() {
+    if case.machine.encoder.is_some() {
         return Err("the loop in C is run without counts".into());
     }
     let samples = ticks / 4 + 1;
@@ -256,7 +256,7 @@ fn loop_main(subject: &Subject, ticks: usize, parts: usize) -> Result<String, St
          if (status != AXIS_DONE) {{ printf(\"status %d\\n\", (int)status); return 0; }}\n        }}\n        row();\n    }}\n    \
          return 0;\n}}",
         ticks + late + 4,
-        number(case.stage.pulley_radius),
+        number(case.machine.pulley_radius),
     );
     Ok(text)
 }

@@ -293,7 +293,7 @@ mod tests {
         };
         let mut wrong = subject.clone();
         let Subject::Axis(case) = &mut wrong else { panic!() };
-        case.stage.belt.stiffness[0] *= 1.001;
+        case.machine.belt.stiffness[0] *= 1.001;
         assert_eq!(judged(&subject), Verdict::Agrees);
         assert!(judged(&wrong).is_unexplained());
     }

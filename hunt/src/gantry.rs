@@ -6,11 +6,10 @@
 
 use crate::double::Double;
 use crate::machine::{
-    BODIES, CURRENT, Follows, Friction, Machine, ROTOR, SPEED, STATES, Span, Taken, WAY, drive, ends, friction,
-    is_strain,
+    BODIES, CURRENT, Follows, Friction, Model, ROTOR, SPEED, STATES, Span, Taken, WAY, drive, ends, friction, is_strain,
 };
 use taut::case::GantryExperiment;
-use taut::stage::gantry::{Gantry, Routing};
+use taut::machine::gantry::{Gantry, Routing};
 
 /// Elongation of a span by r φ₁, r φ₂, x, y, and the change of its length with x, y.
 type Row = ([f64; BODIES], [f64; 2]);
@@ -38,7 +37,7 @@ fn pulleys(routing: Routing) -> [[f64; 2]; 2] {
 }
 
 /// The gantry at the start of `experiment`; every number passes `taken` once.
-pub fn machine(gantry: &Gantry, experiment: &GantryExperiment, taken: Taken) -> Machine {
+pub fn machine(gantry: &Gantry, experiment: &GantryExperiment, taken: Taken) -> Model {
     let r = taken(gantry.pulley_radius);
     let initial = &experiment.initial;
     let [x, y] = [2, 3].map(|body| Double::from(initial.position[body]));
@@ -81,7 +80,7 @@ pub fn machine(gantry: &Gantry, experiment: &GantryExperiment, taken: Taken) -> 
         z[CURRENT[body]] = taken(initial.current[body]);
         (z[ROTOR[body][0]], z[ROTOR[body][1]]) = (z[WAY[body]], z[SPEED[body]]);
     }
-    Machine {
+    Model {
         bodies: 4,
         leader: [0, 1, 2, 3],
         // The cart rides along with the bridge.

@@ -3,7 +3,7 @@
 use crate::curve::{self, Curved, Kind, Ramp};
 use crate::double::Double;
 use crate::machine::{
-    BODIES, BRISTLE, CURRENT, Curve, DRIVES, Drive, Ends, Flanks, Line, Machine, Play, ROTOR, SPEED, STATES, State, WAY,
+    BODIES, BRISTLE, CURRENT, Curve, DRIVES, Drive, Ends, Flanks, Line, Model, Play, ROTOR, SPEED, STATES, State, WAY,
 };
 use crate::root::Polynomial;
 use crate::series::{Form, Rates, Row};
@@ -137,7 +137,7 @@ fn sign(value: f64) -> Double {
 
 /// The equations under construction.
 struct Builder<'a> {
-    machine: &'a Machine,
+    machine: &'a Model,
     mode: Mode,
     parts: Vec<(Form, Change)>,
     bodies: Vec<(Form, Change)>,
@@ -147,7 +147,7 @@ struct Builder<'a> {
 
 impl Law {
     /// The equations of `machine` in `mode`.
-    pub fn new(machine: &Machine, mode: Mode) -> Self {
+    pub fn new(machine: &Model, mode: Mode) -> Self {
         let mut builder =
             Builder { machine, mode, parts: Vec::new(), bodies: Vec::new(), curved: Vec::new(), currents: Vec::new() };
         let rates = builder.rates();

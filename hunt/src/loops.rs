@@ -3,14 +3,14 @@
 
 use crate::double::Double;
 use crate::input::Piece;
-use crate::machine::{Machine, ROTOR, Taken, WAY};
+use crate::machine::{Model, ROTOR, Taken, WAY};
 use crate::solve::{Ending, Pieces, Run, Solver};
 use std::f64::consts::PI;
 use taut::case::Case;
 use taut::control::{Controller, Observation, Standard};
 use taut::design::{Cascade, Design, FeedForwardModel, Fuzzy, Pid, SlidingMode, Structure};
+use taut::machine::{AmplifierMode, EncoderPlace, Machine};
 use taut::signal::profile::Reference;
-use taut::stage::{AmplifierMode, EncoderPlace, Stage};
 
 /// The reference that feed-forward sees.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -37,19 +37,19 @@ fn later(y: &Reference, t: f64) -> Reference {
 
 /// Runs the first move of a case on this machine, which its controller takes for `model`.
 pub fn run(
-    (case, model, looks): (&Case, &Stage, Looks),
-    machine: &Machine,
+    (case, model, looks): (&Case, &Machine, Looks),
+    own: &Model,
     times: &[f64],
     kept: Option<Taken>,
 ) -> Result<Run, String> {
     let design = case.controller.as_ref().ok_or("the case has no controller")?;
-    let (stage, profile) = (&case.stage, &case.moves[0].profile);
+    let (machine, profile) = (&case.machine, &case.moves[0].profile);
     let end = times.last().copied().unwrap_or(0.0);
     let mut law = Law::new(design, model)?;
     let (every, delay) = (design.every, design.delay);
     let lead = design.feed_forward.lead.unwrap_or(delay + 0.5 * every);
     let whole = (delay / every).round();
-    let mut solver = Solver::new(machine, times, kept);
+    let mut solver = Solver::new(own, times, kept);
     let none = || -> Pieces { Default::default() };
     let mut acting = none();
     // Commands on their way: when each acts, and what it is.
@@ -75,11 +75,11 @@ pub fn run(
         }
         let current = solver.current(0, &acting).high;
         let z = solver.state();
-        let at_belt = |place: usize| (z[place] + machine.origin[0]).high;
-        let shaft = if machine.drives[0].play.is_some() { ROTOR[0][0] } else { WAY[0] };
+        let at_belt = |place: usize| (z[place] + own.origin[0]).high;
+        let shaft = if own.drives[0].play.is_some() { ROTOR[0][0] } else { WAY[0] };
         let (motor, pulley, cart) = (at_belt(shaft), at_belt(WAY[0]), at_belt(WAY[1]));
-        let position = measured(stage, [motor, pulley, cart]);
-        let scale = stage.scale.as_ref().map(|scale| in_counts(cart, 4.0 * scale.lines));
+        let position = measured(machine, [motor, pulley, cart]);
+        let scale = machine.scale.as_ref().map(|scale| in_counts(cart, 4.0 * scale.lines));
         let reference = profile.at(sample);
         let ahead = match looks {
             Looks::Ahead => profile.at(sample + lead),
@@ -114,11 +114,11 @@ fn pieces(at: f64, value: f64) -> Pieces {
 }
 
 /// The measured position along the belt.
-fn measured(stage: &Stage, [motor, pulley, cart]: [f64; 3]) -> f64 {
-    let r = stage.pulley_radius;
-    let Some(encoder) = &stage.encoder else { return motor };
+fn measured(machine: &Machine, [motor, pulley, cart]: [f64; 3]) -> f64 {
+    let r = machine.pulley_radius;
+    let Some(encoder) = &machine.encoder else { return motor };
     match encoder.at {
-        EncoderPlace::Motor => r * in_counts(motor / r, 4.0 * stage.motor.gear_ratio * encoder.lines / (2.0 * PI)),
+        EncoderPlace::Motor => r * in_counts(motor / r, 4.0 * machine.motor.gear_ratio * encoder.lines / (2.0 * PI)),
         EncoderPlace::DrivePulley => r * in_counts(pulley / r, 4.0 * encoder.lines / (2.0 * PI)),
         EncoderPlace::Cart => in_counts(cart, 4.0 * encoder.lines),
     }
@@ -162,8 +162,8 @@ enum Kind {
 }
 
 impl Law {
-    fn new(design: &Design, stage: &Stage) -> Result<Self, String> {
-        let rigid = Rigid::of(stage);
+    fn new(design: &Design, machine: &Machine) -> Result<Self, String> {
+        let rigid = Rigid::of(machine);
         let own = design.filters.is_empty()
             && design.disturbance_observer.is_none()
             && design.shaper.is_empty()
@@ -179,7 +179,7 @@ impl Law {
             | Structure::SlidingMode(_)
             | Structure::Fuzzy(_)
             | Structure::StateFeedback(_) => {
-                let mut standard = Standard::new(design, stage).map_err(|error| error.to_string())?;
+                let mut standard = Standard::new(design, machine).map_err(|error| error.to_string())?;
                 standard.reset();
                 Kind::Borrowed(Box::new(standard))
             }
@@ -350,39 +350,39 @@ struct Rigid {
     push: f64,
     inertia: f64,
     dry: f64,
-    stage: Stage,
+    machine: Machine,
 }
 
 impl Rigid {
-    fn of(stage: &Stage) -> Self {
-        let (r, motor) = (stage.pulley_radius, &stage.motor);
-        let (j1, j2, n) = (stage.drive_pulley.inertia, stage.idler_pulley.inertia, motor.gear_ratio);
+    fn of(machine: &Machine) -> Self {
+        let (r, motor) = (machine.pulley_radius, &machine.motor);
+        let (j1, j2, n) = (machine.drive_pulley.inertia, machine.idler_pulley.inertia, motor.gear_ratio);
         // M = m + (J₁ + n² J_r + J₂)/r²
-        let mass = stage.cart.mass + (j1 + n * n * motor.rotor_inertia + j2) / (r * r);
-        let sides = [&stage.cart.friction, &stage.drive_pulley.friction, &stage.idler_pulley.friction];
+        let mass = machine.cart.mass + (j1 + n * n * motor.rotor_inertia + j2) / (r * r);
+        let sides = [&machine.cart.friction, &machine.drive_pulley.friction, &machine.idler_pulley.friction];
         let sum = |of: fn(&taut::friction::Side) -> f64, backward: bool, arm: f64| {
             let side = |f: &taut::friction::Friction| of(if backward { &f.backward } else { &f.forward });
             side(sides[0]) + (side(sides[1]) + side(sides[2])) / arm
         };
-        let per_volt = motor.gear_efficiency * n * motor.torque_constant / r * stage.amplifier.gain;
+        let per_volt = motor.gear_efficiency * n * motor.torque_constant / r * machine.amplifier.gain;
         Self {
             mass,
             viscous: [false, true].map(|back| sum(|side| side.viscous, back, r * r)),
             coulomb: [false, true].map(|back| sum(|side| side.coulomb, back, r)),
-            load: stage.cart.constant_force(),
-            push: match stage.amplifier.mode {
+            load: machine.cart.constant_force(),
+            push: match machine.amplifier.mode {
                 AmplifierMode::Voltage => per_volt / motor.resistance,
                 AmplifierMode::Current => per_volt,
             },
             inertia: 1.0,
             dry: 1.0,
-            stage: stage.clone(),
+            machine: machine.clone(),
         }
     }
 
     /// F = p M y″ + q (b y′ + s F_c) − F_L, and the command for it.
     fn command(&self, y: &Reference) -> f64 {
-        let (motor, amplifier, r) = (&self.stage.motor, &self.stage.amplifier, self.stage.pulley_radius);
+        let (motor, amplifier, r) = (&self.machine.motor, &self.machine.amplifier, self.machine.pulley_radius);
         // s = sgn y′ where abs(y′) > 1 µm/s, else sgn y″ where abs(y″) > 1 mm/s², else 0
         let s = match (y.speed.abs() > 1e-6, y.acceleration.abs() > 1e-3) {
             (true, _) => y.speed.signum(),

@@ -6,9 +6,9 @@
 
 use crate::double::Double;
 use taut::case::Experiment;
+use taut::machine::{AmplifierMode, BeltModel, GRAVITY, Machine, Travel};
 use taut::mechanism::{Amplifier, Motor};
 use taut::polyline::Polyline;
-use taut::stage::{AmplifierMode, BeltModel, GRAVITY, Stage, Travel};
 
 /// Bodies that a machine can have beside its rotors, and its drives.
 pub const BODIES: usize = 4;
@@ -164,7 +164,7 @@ pub struct Drive {
 
 /// The machine and its start.
 #[derive(Debug, Clone)]
-pub struct Machine {
+pub struct Model {
     /// How many bodies there are.
     pub bodies: usize,
     /// The body that each one moves with.
@@ -202,44 +202,44 @@ pub struct Machine {
 /// How a number of the case becomes one of ours: as it is, or perturbed.
 pub type Taken<'a> = &'a mut dyn FnMut(f64) -> Double;
 
-impl Machine {
+impl Model {
     /// The axis `stage` at the start of `experiment`; every number passes `taken` once.
-    pub fn new(stage: &Stage, experiment: &Experiment, taken: Taken) -> Self {
-        let r = taken(stage.pulley_radius);
+    pub fn new(machine: &Machine, experiment: &Experiment, taken: Taken) -> Self {
+        let r = taken(machine.pulley_radius);
         let r2 = r * r;
-        let cart = friction(&stage.cart.friction, taken, Double::ONE);
-        let pulleys = [&stage.drive_pulley, &stage.idler_pulley].map(|pulley| friction(&pulley.friction, taken, r));
+        let cart = friction(&machine.cart.friction, taken, Double::ONE);
+        let pulleys = [&machine.drive_pulley, &machine.idler_pulley].map(|pulley| friction(&pulley.friction, taken, r));
         let mut mass = [Double::ZERO; BODIES];
-        mass[0] = taken(stage.drive_pulley.inertia) / r2;
-        mass[1] = taken(stage.cart.mass);
-        mass[2] = taken(stage.idler_pulley.inertia) / r2;
+        mass[0] = taken(machine.drive_pulley.inertia) / r2;
+        mass[1] = taken(machine.cart.mass);
+        mass[2] = taken(machine.idler_pulley.inertia) / r2;
         // F_L − M g sin θ
-        let slope = taken(stage.cart.inclination).sin_cos().0;
-        let force = taken(stage.cart.load) - mass[1] * slope * GRAVITY;
+        let slope = taken(machine.cart.inclination).sin_cos().0;
+        let force = taken(machine.cart.load) - mass[1] * slope * GRAVITY;
         let cart_start = Double::from(experiment.initial.cart_position);
-        let forces = &stage.cart.forces;
+        let forces = &machine.cart.forces;
         let mut ends = [None; BODIES];
-        ends[1] = stage.travel.map(|travel| self::ends(travel, taken, cart_start));
-        let (start, beyond) = start(stage, experiment, taken, r, cart_start);
+        ends[1] = machine.travel.map(|travel| self::ends(travel, taken, cart_start));
+        let (start, beyond) = start(machine, experiment, taken, r, cart_start);
         Self {
             bodies: 3,
-            leader: match stage.belt.model {
+            leader: match machine.belt.model {
                 BeltModel::Elastic => [0, 1, 2, 3],
                 BeltModel::TwoMass => [0, 1, 0, 3],
                 BeltModel::Rigid => [1, 1, 1, 3],
             },
             mass,
             friction: [pulleys[0], cart, pulleys[1], Friction::default()],
-            along: line(stage.cart.along.as_ref(), taken, cart_start),
-            spans: spans(stage, taken, cart_start),
-            pretension: stage.belt.pretension.map(&mut *taken),
+            along: line(machine.cart.along.as_ref(), taken, cart_start),
+            spans: spans(machine, taken, cart_start),
+            pretension: machine.belt.pretension.map(&mut *taken),
             force,
             lines: [
                 line(forces.along.as_ref(), taken, cart_start),
                 line(forces.by_speed.as_ref(), taken, Double::ZERO),
             ],
             ends,
-            drives: vec![drive(0, &stage.motor, &stage.amplifier, taken, r)],
+            drives: vec![drive(0, &machine.motor, &machine.amplifier, taken, r)],
             start,
             beyond,
             origin: [cart_start; BODIES],
@@ -384,9 +384,9 @@ pub fn friction(law: &taut::friction::Friction, taken: Taken, r: Double) -> Fric
 }
 
 /// Spans 1 (drive pulley to cart), 2 (cart to idler pulley) and 3 (back), or 1 and the other two in series.
-fn spans(stage: &Stage, taken: Taken, cart_start: Double) -> Vec<Span> {
-    let [k, c] = [stage.belt.stiffness, stage.belt.damping].map(|values| values.map(&mut *taken));
-    let make = stage.belt.make.filter(|_| stage.belt.follows_cart);
+fn spans(machine: &Machine, taken: Taken, cart_start: Double) -> Vec<Span> {
+    let [k, c] = [machine.belt.stiffness, machine.belt.damping].map(|values| values.map(&mut *taken));
+    let make = machine.belt.make.filter(|_| machine.belt.follows_cart);
     // l₁ − x, l₂ + x; the third span keeps its length.
     let follows = make.map(|make| {
         let rigidity = taken(make.modulus) * taken(make.section);
@@ -403,7 +403,7 @@ fn spans(stage: &Stage, taken: Taken, cart_start: Double) -> Vec<Span> {
         }
     };
     let first = [1.0, -1.0, 0.0, 0.0];
-    match stage.belt.model {
+    match machine.belt.model {
         BeltModel::Rigid => Vec::new(),
         BeltModel::Elastic => [first, [0.0, 1.0, -1.0, 0.0], [-1.0, 0.0, 1.0, 0.0]]
             .into_iter()
@@ -431,13 +431,19 @@ pub fn is_strain(strain: Double, origin: Double) -> bool {
 /// number, too.
 const LAST_PLACES: f64 = 4.0;
 
-fn start(stage: &Stage, experiment: &Experiment, taken: Taken, r: Double, origin: Double) -> (State, [Double; BODIES]) {
+fn start(
+    machine: &Machine,
+    experiment: &Experiment,
+    taken: Taken,
+    r: Double,
+    origin: Double,
+) -> (State, [Double; BODIES]) {
     let initial = &experiment.initial;
     let mut z = [Double::ZERO; STATES];
     let mut beyond = [Double::ZERO; BODIES];
     for (body, angle) in [(0, initial.drive_angle), (2, initial.idler_angle)] {
         // Strains, not positions: a number of 64 bits holds the first to their own last place.
-        let strain = Double::from(stage.pulley_radius) * angle - origin;
+        let strain = Double::from(machine.pulley_radius) * angle - origin;
         match is_strain(strain, origin) {
             true => z[WAY[body]] = strain * taken(1.0),
             false => beyond[body] = strain,
@@ -446,7 +452,7 @@ fn start(stage: &Stage, experiment: &Experiment, taken: Taken, r: Double, origin
     z[SPEED[0]] = taken(initial.drive_speed) * r;
     z[SPEED[1]] = taken(initial.cart_speed);
     z[SPEED[2]] = taken(initial.idler_speed) * r;
-    match stage.belt.model {
+    match machine.belt.model {
         BeltModel::Elastic => {}
         BeltModel::TwoMass => (z[WAY[2]], z[SPEED[2]]) = (z[WAY[0]], z[SPEED[0]]),
         BeltModel::Rigid => (z[SPEED[0]], z[SPEED[2]]) = (z[SPEED[1]], z[SPEED[1]]),

@@ -9,7 +9,7 @@
 use crate::double::Double;
 use crate::input::Piece;
 use crate::law::{Change, Guard, Law, Limit, Mode, Motion, Touch};
-use crate::machine::{BODIES, BRISTLE, CURRENT, DRIVES, Machine, ROTOR, SPEED, STATES, State, Taken, WAY};
+use crate::machine::{BODIES, BRISTLE, CURRENT, DRIVES, Model, ROTOR, SPEED, STATES, State, Taken, WAY};
 use crate::root::{self, Polynomial};
 use crate::series::{Noise, ORDER, PLACES, Series, Size};
 use std::collections::HashMap;
@@ -64,7 +64,7 @@ pub type Pieces = [Piece; DRIVES];
 
 /// Runs a machine under these chains of inputs, a chain for each drive, and gives the positions at `times`, which grow.
 /// `kept` rounds the state after each step, as if it were kept in fewer bits.
-pub fn run(machine: &Machine, chains: &[Vec<Piece>], times: &[f64], kept: Option<Taken>) -> Run {
+pub fn run(machine: &Model, chains: &[Vec<Piece>], times: &[f64], kept: Option<Taken>) -> Run {
     let end = times.last().copied().unwrap_or(0.0);
     let mut solver = Solver::new(machine, times, kept);
     let mut starts: Vec<Double> = chains.iter().flatten().map(|piece| piece.start).collect();
@@ -92,7 +92,7 @@ struct Prepared {
 
 /// A machine under way.
 pub struct Solver<'a, 'b> {
-    machine: &'a Machine,
+    machine: &'a Model,
     times: &'a [f64],
     kept: Option<Taken<'b>>,
     z: State,
@@ -112,7 +112,7 @@ pub struct Solver<'a, 'b> {
 
 impl<'a, 'b> Solver<'a, 'b> {
     /// At its start.
-    pub fn new(machine: &'a Machine, times: &'a [f64], kept: Option<Taken<'b>>) -> Self {
+    pub fn new(machine: &'a Model, times: &'a [f64], kept: Option<Taken<'b>>) -> Self {
         let z = machine.start;
         let mut motion = [Motion::Free; BODIES];
         for (body, motion) in motion.iter_mut().enumerate().take(machine.bodies) {

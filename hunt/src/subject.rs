@@ -3,11 +3,11 @@
 use crate::double::Double;
 use crate::input::{self, Piece};
 use crate::loops::{self, Looks};
-use crate::machine::{BODIES, Machine, Taken};
+use crate::machine::{BODIES, Model, Taken};
 use crate::solve::{self, Run};
 use taut::case::{Case, Experiment, GantryCase, Initial, Move, Opened};
+use taut::machine::Machine;
 use taut::signal::Signal;
-use taut::stage::Stage;
 
 /// What is run.
 #[derive(Debug, Clone)]
@@ -28,7 +28,7 @@ pub enum Fed {
     /// Held between multiples of this time, s: the values of each drive.
     Held(f64, Vec<Vec<f64>>),
     /// By a controller that takes the machine for this one.
-    ByModel(Box<Stage>),
+    ByModel(Box<Machine>),
     /// By a controller that is shown the reference at its samples alone, and goes on from there to look ahead.
     Sampled,
 }
@@ -111,11 +111,13 @@ impl Subject {
     }
 
     /// The machine at its start.
-    pub fn machine(&self, taken: Taken) -> Machine {
+    pub fn machine(&self, taken: Taken) -> Model {
         match self {
-            Subject::Axis(case) => Machine::new(&case.stage, &case.experiments[0], taken),
+            Subject::Axis(case) => Model::new(&case.machine, &case.experiments[0], taken),
             Subject::Gantry(case) => crate::gantry::machine(&case.gantry, &case.experiments[0], taken),
-            Subject::Loop(case) => Machine::new(&case.stage, &at_rest(&case.moves[0], case.stage.pulley_radius), taken),
+            Subject::Loop(case) => {
+                Model::new(&case.machine, &at_rest(&case.moves[0], case.machine.pulley_radius), taken)
+            }
         }
     }
 
@@ -138,7 +140,7 @@ impl Subject {
         let machine = self.machine(numbers.machine);
         let end = times.last().copied().unwrap_or(0.0);
         if let Subject::Loop(case) = self {
-            let model = if let Fed::ByModel(model) = fed { model } else { &case.stage };
+            let model = if let Fed::ByModel(model) = fed { model } else { &case.machine };
             let looks = if *fed == Fed::Sampled { Looks::OnFromSample } else { Looks::Ahead };
             return loops::run((case, model, looks), &machine, times, numbers.kept);
         }
@@ -156,7 +158,7 @@ impl Subject {
     }
 
     /// Positions in taut's units as positions along the belt from the start.
-    pub fn along_the_belt(&self, machine: &Machine, positions: &[f64]) -> [Double; BODIES] {
+    pub fn along_the_belt(&self, machine: &Model, positions: &[f64]) -> [Double; BODIES] {
         std::array::from_fn(|body| match positions.get(body) {
             Some(&position) => machine.lever[body] * position - machine.origin[body],
             None => Double::ZERO,

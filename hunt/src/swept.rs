@@ -5,7 +5,7 @@ use crate::double::Double;
 use crate::machine::BODIES;
 use crate::subject::{Fed, Subject};
 use taut::case::Opened;
-use taut::sweep::{Machine, Sweep};
+use taut::sweep::{Sweep, Swept};
 
 /// The run of the sweep that is taken.
 const RUN: u64 = 1;
@@ -38,8 +38,8 @@ pub fn run(subject: &Subject) -> Result<Answer, String> {
     };
     let mut swept = subject.clone();
     match (&mut swept, sweep.machine(RUN)) {
-        (Subject::Axis(case) | Subject::Loop(case), Machine::Axis(stage)) => case.stage = *stage,
-        (Subject::Gantry(case), Machine::Gantry(gantry)) => case.gantry = *gantry,
+        (Subject::Axis(case) | Subject::Loop(case), Swept::Axis(stage)) => case.machine = *stage,
+        (Subject::Gantry(case), Swept::Gantry(gantry)) => case.gantry = *gantry,
         _ => return Err("the sweep has another kind of machine".into()),
     }
     let machine = swept.machine(&mut Double::from);
@@ -71,7 +71,7 @@ pub fn run(subject: &Subject) -> Result<Answer, String> {
     let farthest = machine.origin.iter().map(|origin| origin.high.abs()).fold(0.0, f64::max);
     let allowed = if is_piecewise_linear(&swept) { LEAST * (1.0 + farthest) } else { 1e-8 };
     let fed = match subject {
-        Subject::Loop(case) => Fed::ByModel(Box::new(case.stage.clone())),
+        Subject::Loop(case) => Fed::ByModel(Box::new(case.machine.clone())),
         Subject::Axis(_) | Subject::Gantry(_) => Fed::AsGiven,
     };
     let rows = if end == End::Complete { vec![row] } else { Vec::new() };

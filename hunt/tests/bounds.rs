@@ -79,7 +79,7 @@ fn fed(random: &mut Random) -> String {
 fn stated(text: &str) -> (Compared, f64, f64) {
     let compared = compare("drawn.toml", text, &[By::Exact], &[]).remove(0);
     let case = Case::from_text("drawn.toml", text).unwrap_or_else(|error| panic!("{error}\n{text}"));
-    let outcome = simulate(&case.stage, &case.experiments[0], Solver::Exact).unwrap().outcome;
+    let outcome = simulate(&case.machine, &case.experiments[0], Solver::Exact).unwrap().outcome;
     let error = outcome.error.unwrap();
     (compared, error.value, error.way)
 }

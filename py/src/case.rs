@@ -19,10 +19,10 @@ use taut::fit::{Posterior, Profile, check_watched, drift, fit, posterior, profil
 use taut::frf::{Cut, Known, measure};
 use taut::json;
 use taut::linear::{Analysis, GantryAnalysis};
+use taut::machine::{Channel, Quantity};
 use taut::nuts::Effort;
 use taut::overview::Overview;
 use taut::solve::{Choice, Flow, Kind as SolverKind, Method};
-use taut::stage::{Channel, Quantity};
 use taut::tune::{evaluate, tune};
 
 /// Draws that tune a chain.
@@ -177,7 +177,7 @@ impl Case {
         let choice = Choice { solver, tolerance, step, method };
         match &self.inner {
             Inner::Axis(case) => {
-                let solver = guarded(|| choice.solver(&case.stage))?.told(py)?;
+                let solver = guarded(|| choice.solver(&case.machine))?.told(py)?;
                 runs::simulate(py, case, &self.path, &names, solver)
             }
             Inner::Gantry(case) => {

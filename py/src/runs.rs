@@ -117,7 +117,7 @@ impl Run {
     /// The key figures.
     fn figures<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let of_axis = |metrics: &Metrics, case: &Case| {
-            serde_json::to_value(json::Metrics::of(metrics, case.stage.amplifier.mode)).unwrap_or_default()
+            serde_json::to_value(json::Metrics::of(metrics, case.machine.amplifier.mode)).unwrap_or_default()
         };
         let told = guarded(|| match &self.what {
             What::Experiment { case, metrics, .. } => of_axis(metrics, case),
@@ -222,15 +222,15 @@ const COLUMNS: usize = 24;
 const FEWER: &str = "take a longer interval `every`, or write rows to a file as they come: taut simulate --out DIR";
 
 fn one(py: Python<'_>, case: &Arc<Case>, experiment: &Experiment, solver: Solver) -> PyResult<Run> {
-    let stage = &case.stage;
+    let machine = &case.machine;
     columns::fit(py, experiment.samples() as f64, COLUMNS, FEWER)?;
     let interrupt = Interrupt::listen();
     let found = unlocked(py, || {
         let begin = Instant::now();
-        let mut meter = Meter::new(stage, experiment);
+        let mut meter = Meter::new(machine, experiment);
         let mut trajectory = Trajectory::default();
         let rows = experiment.samples().min(1 << 20) as usize + 1;
-        let outcome = solve::stream_observed(stage, experiment, solver, &mut meter, &mut |block| {
+        let outcome = solve::stream_observed(machine, experiment, solver, &mut meter, &mut |block| {
             if trajectory.columns.is_empty() {
                 trajectory = Trajectory::with_capacity(&block.columns, rows);
             }
@@ -239,7 +239,7 @@ fn one(py: Python<'_>, case: &Arc<Case>, experiment: &Experiment, solver: Solver
         });
         let found = outcome.and_then(|outcome| {
             let metrics = meter.finish(&outcome.events);
-            let reduction = Reduction::of(stage, experiment, solver)?;
+            let reduction = Reduction::of(machine, experiment, solver)?;
             Ok((trajectory, outcome, metrics, reduction))
         });
         (found, begin.elapsed().as_secs_f64())
@@ -310,7 +310,7 @@ pub fn motion(
     share: Option<f64>,
 ) -> PyResult<Vec<Run>> {
     let (design, moves) = case.moves_named(path, names).told(py)?;
-    let (stage, solver) = (&case.stage, Solver::of(&case.stage));
+    let (machine, solver) = (&case.machine, Solver::of(&case.machine));
     let usual = Loop::of(design);
     let timing = Loop {
         every: every.unwrap_or(usual.every),
@@ -344,11 +344,11 @@ pub fn motion(
         let run = match controller {
             Some(object) => {
                 let mut own = Own::new(object, &interrupt)?;
-                guarded(|| stream(stage, &mut own, &timing, &profile, &rows, solver, false, &mut take))
+                guarded(|| stream(machine, &mut own, &timing, &profile, &rows, solver, false, &mut take))
             }
             None => unlocked(py, || {
-                let mut controller = Standard::new(design, stage)?;
-                stream(stage, &mut controller, &timing, &profile, &rows, solver, false, &mut take)
+                let mut controller = Standard::new(design, machine)?;
+                stream(machine, &mut controller, &timing, &profile, &rows, solver, false, &mut take)
             }),
         };
         interrupt.finish()?;
@@ -356,7 +356,7 @@ pub fn motion(
         let worst = match share {
             Some(share) => {
                 let interrupt = Interrupt::listen();
-                let found = unlocked(py, || worst(stage, design, motion, share, solver, &|| interrupt.stop()));
+                let found = unlocked(py, || worst(machine, design, motion, share, solver, &|| interrupt.stop()));
                 interrupt.finish()?;
                 found?.told(py)?
             }
@@ -406,7 +406,7 @@ pub fn simulation<'py>(py: Python<'py>, runs: Vec<PyRef<'py, Run>>) -> PyResult<
     let beside: Vec<_> = runs
         .iter()
         .map(|run| match &run.what {
-            What::Experiment { case, index, .. } => taut::fit::beside_log(&case.stage, &case.experiments[*index]),
+            What::Experiment { case, index, .. } => taut::fit::beside_log(&case.machine, &case.experiments[*index]),
             What::Gantry { .. } | What::Move { .. } => None,
         })
         .collect();
@@ -458,9 +458,9 @@ pub fn moves<'py>(py: Python<'py>, runs: Vec<PyRef<'py, Run>>) -> PyResult<Bound
         .map(|run| match &run.what {
             What::Move { case, index, run: moved, timing, .. } => {
                 let (design, profile) = (case.controller.as_ref(), &case.moves[*index].profile);
-                let trouble = design.and_then(|design| trouble(&case.stage, design, moved, profile.target()));
+                let trouble = design.and_then(|design| trouble(&case.machine, design, moved, profile.target()));
                 let profile = profile.clone().shaped(design.map_or(&[], |design| &design.shaper));
-                (trouble, shortfalls(&case.stage, timing.limit, &profile))
+                (trouble, shortfalls(&case.machine, timing.limit, &profile))
             }
             What::Experiment { .. } | What::Gantry { .. } => (None, Vec::new()),
         })
@@ -485,5 +485,5 @@ pub fn moves<'py>(py: Python<'py>, runs: Vec<PyRef<'py, Run>>) -> PyResult<Bound
         What::Experiment { .. } | What::Gantry { .. } => None,
     });
     let Some((case, structure, timing)) = first else { return Ok(py.None().into_bound(py)) };
-    value::json(py, &guarded(|| json::moves(&case.title, structure, timing, &case.stage, &told))?)
+    value::json(py, &guarded(|| json::moves(&case.title, structure, timing, &case.machine, &told))?)
 }

@@ -3,8 +3,8 @@
 use super::svg::{self, Anchor, Colour, Svg, n};
 use std::f64::consts::PI;
 use taut::friction::Friction;
+use taut::machine::{AmplifierMode, EncoderPlace, Machine, Pulley};
 use taut::number::{engineering, significant};
-use taut::stage::{AmplifierMode, EncoderPlace, Pulley, Stage};
 
 const WIDTH: f64 = 860.0;
 const DRIVE: (f64, f64) = (120.0, 200.0);
@@ -17,12 +17,12 @@ const CART: (f64, f64) = (120.0, 46.0);
 ///
 /// The cart stands where the span lengths put it (in the middle if they are not known, and never so near a
 /// pulley that a spring has no room). Works in light and dark.
-pub fn stage_drawing(stage: &Stage) -> String {
+pub fn stage_drawing(machine: &Machine) -> String {
     let mut out = Svg::new(WIDTH, 452.0);
     let top = DRIVE.1 - RADIUS;
     let bottom = DRIVE.1 + RADIUS;
     // l₁ and l₂ divide the way between the pulleys; the springs need some room.
-    let share = stage.belt.make.map_or(0.5, |make| make.spans[0] / (make.spans[0] + make.spans[1]));
+    let share = machine.belt.make.map_or(0.5, |make| make.spans[0] / (make.spans[0] + make.spans[1]));
     let share = if share.is_finite() { share.clamp(0.36, 0.64) } else { 0.5 };
     let cart = DRIVE.0 + share * (IDLER.0 - DRIVE.0);
     let (left, right) = (cart - CART.0 / 2.0, cart + CART.0 / 2.0);
@@ -34,31 +34,31 @@ pub fn stage_drawing(stage: &Stage) -> String {
     spring(&mut out, (right, top), IDLER.0, middles[1]);
     spring(&mut out, (DRIVE.0, bottom), IDLER.0, middles[2]);
     for (i, y) in [top - 18.0, top - 18.0, bottom + 30.0].into_iter().enumerate() {
-        span_label(&mut out, stage, i, (middles[i], y));
+        span_label(&mut out, machine, i, (middles[i], y));
     }
 
     draw_cart(&mut out, cart, top);
-    shaft(&mut out, stage);
+    shaft(&mut out, machine);
     pulley(&mut out, DRIVE, "φ₁");
     pulley(&mut out, IDLER, "φ₃");
-    motor(&mut out, stage);
-    encoder(&mut out, stage, cart, top);
-    if let Some(lines) = stage.scale.map(|scale| scale.lines) {
+    motor(&mut out, machine);
+    encoder(&mut out, machine, cart, top);
+    if let Some(lines) = machine.scale.map(|scale| scale.lines) {
         rail(&mut out, &format!("scale, {} lines/m", engineering(lines, "", 6)), cart, top);
     }
 
     // Above the labels of the spans, which damping makes higher.
-    let base = top - if stage.belt.damping == [0.0; 3] { 36.0 } else { 58.0 };
+    let base = top - if machine.belt.damping == [0.0; 3] { 36.0 } else { 58.0 };
     let of = |pulley: &Pulley, i: u8| {
         let mut lines = vec![format!("J_{i} = {}", engineering(pulley.inertia, "kg m^2", 4))];
         let symbols = [format!("B_{i}"), format!("τ_c{i}"), format!("τ_s{i}")];
         lines.extend(friction(&pulley.friction, symbols.each_ref().map(String::as_str), ["N m s", "N m"]));
         lines
     };
-    block(&mut out, DRIVE.0, base, "Drive pulley", &of(&stage.drive_pulley, 1));
-    block(&mut out, IDLER.0, base, "Idler pulley", &of(&stage.idler_pulley, 2));
-    let mut lines = vec![format!("M = {}", engineering(stage.cart.mass, "kg", 4))];
-    lines.extend(friction(&stage.cart.friction, ["b", "F_c", "F_s"], ["N s/m", "N"]));
+    block(&mut out, DRIVE.0, base, "Drive pulley", &of(&machine.drive_pulley, 1));
+    block(&mut out, IDLER.0, base, "Idler pulley", &of(&machine.idler_pulley, 2));
+    let mut lines = vec![format!("M = {}", engineering(machine.cart.mass, "kg", 4))];
+    lines.extend(friction(&machine.cart.friction, ["b", "F_c", "F_s"], ["N s/m", "N"]));
     block(&mut out, cart, top - 52.0, "Cart", &lines);
     out.finish("The stage: motor, drive pulley, belt with three spans, cart and idler pulley")
 }
@@ -122,11 +122,11 @@ fn spring(out: &mut Svg, from: (f64, f64), to: f64, middle: f64) {
     out.path(&d, Colour::Blue.paint(), 1.7, "");
 }
 
-fn span_label(out: &mut Svg, stage: &Stage, i: usize, (x, y): (f64, f64)) {
+fn span_label(out: &mut Svg, machine: &Machine, i: usize, (x, y): (f64, f64)) {
     let number = ["₁", "₂", "₃"][i];
-    let mut text = format!("k{number} = {}", engineering(stage.belt.stiffness[i], "N/m", 5));
-    if stage.belt.damping[i] != 0.0 {
-        text += &format!(", c{number} = {}", engineering(stage.belt.damping[i], "N s/m", 3));
+    let mut text = format!("k{number} = {}", engineering(machine.belt.stiffness[i], "N/m", 5));
+    if machine.belt.damping[i] != 0.0 {
+        text += &format!(", c{number} = {}", engineering(machine.belt.damping[i], "N s/m", 3));
     }
     // Damping makes it long: in two lines above, in one below.
     let (first, second) = match text.split_once(", ") {
@@ -180,7 +180,7 @@ fn pulley(out: &mut Svg, (x, y): (f64, f64), symbol: &str) {
 }
 
 /// The pulley's face and, in front of it, the shaft from its hub down to the motor.
-fn shaft(out: &mut Svg, stage: &Stage) {
+fn shaft(out: &mut Svg, machine: &Machine) {
     for centre in [DRIVE, IDLER] {
         out.circle(centre, RADIUS - 4.0, svg::SOFT, svg::AXIS, 1.2);
     }
@@ -190,12 +190,12 @@ fn shaft(out: &mut Svg, stage: &Stage) {
     let end = (x + RADIUS * 0.64, y + RADIUS * 0.77);
     out.line(IDLER, end, svg::MARK, 1.1);
     out.line(end, (end.0 + 10.0, end.1 + 12.0), svg::MARK, 1.1);
-    let text = format!("r = {}", engineering(stage.pulley_radius, "m", 5));
+    let text = format!("r = {}", engineering(machine.pulley_radius, "m", 5));
     out.symbol((end.0 + 8.0, end.1 + 26.0), 12.5, Anchor::Start, svg::MARK, "", &text);
 }
 
-fn motor(out: &mut Svg, stage: &Stage) {
-    let m = &stage.motor;
+fn motor(out: &mut Svg, machine: &Machine) {
+    let m = &machine.motor;
     let centre = (DRIVE.0, 384.0);
     if m.gear_ratio != 1.0 {
         out.rect((DRIVE.0 - 32.0, 288.0), (64.0, 34.0), 4.0, svg::SOFT, svg::INK, 1.6);
@@ -206,12 +206,12 @@ fn motor(out: &mut Svg, stage: &Stage) {
     out.text((centre.0, centre.1 + 6.0), 17.0, Anchor::Middle, svg::INK, " font-weight=\"600\"", "M");
 
     // The input from the left, through the amplifier where it does something.
-    let symbol = match stage.amplifier.mode {
+    let symbol = match machine.amplifier.mode {
         AmplifierMode::Voltage => "u",
         AmplifierMode::Current => "i",
     };
     let ink = svg::INK;
-    if stage.amplifier.gain == 1.0 {
+    if machine.amplifier.gain == 1.0 {
         out.arrow((44.0, centre.1), (centre.0 - 31.0, centre.1), ink, 1.5);
         out.symbol((36.0, centre.1 + 4.5), 14.0, Anchor::End, ink, "", symbol);
     } else {
@@ -219,7 +219,7 @@ fn motor(out: &mut Svg, stage: &Stage) {
         out.fill(&format!("M34 {}L62 {}L34 {}Z", n(centre.1 - 18.0), n(centre.1), n(centre.1 + 18.0)), svg::SOFT);
         out.path(&format!("M34 {}L62 {}L34 {}Z", n(centre.1 - 18.0), n(centre.1), n(centre.1 + 18.0)), ink, 1.5, "");
         out.arrow((62.0, centre.1), (centre.0 - 31.0, centre.1), ink, 1.5);
-        let gain = format!("gain {}", significant(stage.amplifier.gain, 3));
+        let gain = format!("gain {}", significant(machine.amplifier.gain, 3));
         out.symbol((42.0, centre.1 + 38.0), 12.5, Anchor::Middle, svg::MARK, "", &gain);
     }
 
@@ -245,8 +245,8 @@ fn motor(out: &mut Svg, stage: &Stage) {
 }
 
 /// A small disc with lines where the encoder sits, or lines along the rail.
-fn encoder(out: &mut Svg, stage: &Stage, cart: f64, top: f64) {
-    let Some(encoder) = stage.encoder else { return };
+fn encoder(out: &mut Svg, machine: &Machine, cart: f64, top: f64) {
+    let Some(encoder) = machine.encoder else { return };
     let green = Colour::Green.paint();
     let per = if encoder.at == EncoderPlace::Cart { " lines/m" } else { " lines" };
     let text = format!("encoder, {}{per}", engineering(encoder.lines, "", 6));

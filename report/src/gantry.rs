@@ -4,10 +4,10 @@
 use super::drawing::friction;
 use super::svg::{self, Anchor, Colour, Paint, Svg, n};
 use std::f64::consts::PI;
+use taut::machine::gantry::{Gantry, Routing, Slide};
+use taut::machine::{AmplifierMode, EncoderPlace};
 use taut::mechanism::{Amplifier, Motor};
 use taut::number::engineering;
-use taut::stage::gantry::{Gantry, Routing, Slide};
-use taut::stage::{AmplifierMode, EncoderPlace};
 
 const WIDTH: f64 = 860.0;
 const HEIGHT: f64 = 664.0;

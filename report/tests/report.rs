@@ -3,15 +3,15 @@
 use resvg::tiny_skia::Pixmap;
 use resvg::usvg::roxmltree::{Document, ParsingOptions};
 use taut::friction::Friction;
-use taut::stage::*;
+use taut::machine::*;
 use taut_report::diagram::Sign;
 use taut_report::*;
 
 const NASTY: &str = "<script>alert(\"1\")</script> & 'two' \u{0}\u{1b}]]>";
 
-fn stage(encoder: Option<Encoder>) -> Stage {
+fn machine(encoder: Option<Encoder>) -> Machine {
     let pulley = Pulley { inertia: 6.3e-5, friction: Friction::with_breakaway(0.0016, 0.015, 0.02) };
-    Stage {
+    Machine {
         motor: Motor {
             torque_constant: 0.023,
             back_emf_constant: 0.023,
@@ -96,7 +96,7 @@ fn page() -> Page {
     page.equation(maud::html! { math { mi { "φ" } mo { "=" } mn { "0" } } }, Some("(1)"));
     page.embed(NASTY, NASTY);
     figures().iter().for_each(|f| page.figure(f));
-    page.drawing(&stage_drawing(&stage(None)), NASTY);
+    page.drawing(&stage_drawing(&machine(None)), NASTY);
     page.footer(NASTY);
     page
 }
@@ -113,7 +113,7 @@ fn well_formed(svg: &str) {
 fn every_picture_is_well_formed_and_can_be_rasterised() {
     let mut pictures: Vec<String> = figures().iter().map(Figure::svg).collect();
     for at in [EncoderPlace::Motor, EncoderPlace::DrivePulley, EncoderPlace::Cart] {
-        pictures.push(stage_drawing(&stage(Some(Encoder { at, lines: 512.0 }))));
+        pictures.push(stage_drawing(&machine(Some(Encoder { at, lines: 512.0 }))));
     }
     let bodies = [0, 1, 4].map(|n| body("Cart", n));
     pictures.extend(bodies.iter().map(body_diagram));
@@ -132,9 +132,9 @@ fn every_picture_is_well_formed_and_can_be_rasterised() {
 #[test]
 fn a_scale_beside_an_encoder_is_drawn() {
     let encoder = Encoder { at: EncoderPlace::Motor, lines: 512.0 };
-    let alone = stage(Some(encoder));
+    let alone = machine(Some(encoder));
     let scale = Some(Encoder { at: EncoderPlace::Cart, lines: 50e3 });
-    let [without, with] = [alone.clone(), Stage { scale, ..alone }].map(|stage| stage_drawing(&stage));
+    let [without, with] = [alone.clone(), Machine { scale, ..alone }].map(|machine| stage_drawing(&machine));
     well_formed(&with);
     assert!(with.contains("encoder, 512 lines") && with.contains("scale, 50000 lines/m"), "{with}");
     assert!(without.contains("encoder, 512 lines") && !without.contains("lines/m"));

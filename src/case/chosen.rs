@@ -41,7 +41,7 @@ impl Case {
         let Some(design) = self.controller.as_ref().filter(|_| !self.moves.is_empty()) else {
             return Err(Error::new("this case has no move and no controller to run it").in_file(path).next(format!(
                 "add [controller] with for example {}, and [[move]] with name, to, speed, acceleration and until",
-                suggestion::controller(&self.stage)
+                suggestion::controller(&self.machine)
             )));
         };
         let known = || self.moves.iter().map(|m| m.name.as_str());
@@ -64,12 +64,12 @@ impl Case {
 impl Case {
     /// Keys of `[controller]` that run on this axis, in its unit.
     pub(crate) fn suggested_controller(&self) -> String {
-        suggestion::controller(&self.stage)
+        suggestion::controller(&self.machine)
     }
 
     /// The derivative of a PID controller that is sampled as `design` is.
     pub(crate) fn suggested_derivative(&self, design: &Design) -> String {
-        suggestion::derivative(&self.stage, design.every, design.delay)
+        suggestion::derivative(&self.machine, design.every, design.delay)
     }
 }
 

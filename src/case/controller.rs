@@ -4,7 +4,7 @@ use super::reader::{Field, Table};
 use super::suggestion;
 use crate::design::*;
 use crate::error::Result;
-use crate::stage::{AmplifierMode, EncoderPlace, Stage};
+use crate::machine::{AmplifierMode, EncoderPlace, Machine};
 
 /// The structures by their keys; exactly one of them.
 const STRUCTURES: [&str; 5] = ["pid", "cascade", "state_feedback", "sliding_mode", "fuzzy"];
@@ -12,9 +12,9 @@ const STRUCTURES: [&str; 5] = ["pid", "cascade", "state_feedback", "sliding_mode
 /// Most samples that a delay may take.
 const MOST_DELAY: f64 = 1000.0;
 
-pub(super) fn controller(root: &Table, stage: &Stage) -> Result<Option<Design>> {
+pub(super) fn controller(root: &Table, machine: &Machine) -> Result<Option<Design>> {
     let Some(field) = root.optional("controller") else { return Ok(None) };
-    let input_unit = if stage.amplifier.mode == AmplifierMode::Current { "A" } else { "V" };
+    let input_unit = if machine.amplifier.mode == AmplifierMode::Current { "A" } else { "V" };
     let field = Field { input_unit, ..field };
     let table = field.table()?;
     table.check_keys(&[], &[])?;
@@ -27,12 +27,12 @@ pub(super) fn controller(root: &Table, stage: &Stage) -> Result<Option<Design>> 
             .fail(format!("a delay of {} samples", (delay / every).round()))
             .allowed(format!("up to {MOST_DELAY} samples")));
     }
-    let structure = structure(&table, stage, (every, delay))?;
+    let structure = structure(&table, machine, (every, delay))?;
     Ok(Some(Design {
         every,
         delay,
         limit: table.number_if_given("limit")?,
-        feed_forward: feed_forward(&table, &structure, stage)?,
+        feed_forward: feed_forward(&table, &structure, machine)?,
         structure,
         disturbance_observer: match table.optional("disturbance_observer") {
             None => None,
@@ -47,7 +47,7 @@ pub(super) fn controller(root: &Table, stage: &Stage) -> Result<Option<Design>> 
     }))
 }
 
-fn structure(table: &Table, stage: &Stage, (every, delay): (f64, f64)) -> Result<Structure> {
+fn structure(table: &Table, machine: &Machine, (every, delay): (f64, f64)) -> Result<Structure> {
     let given: Vec<Field> = STRUCTURES.iter().filter_map(|key| table.optional(key)).collect();
     let field = match &given[..] {
         [field] => field.clone(),
@@ -56,7 +56,7 @@ fn structure(table: &Table, stage: &Stage, (every, delay): (f64, f64)) -> Result
                 .field
                 .fail("the structure is not said")
                 .allowed(STRUCTURES.join(", "))
-                .next(format!("add for example {}", suggestion::pid(stage, every, delay))));
+                .next(format!("add for example {}", suggestion::pid(machine, every, delay))));
         }
         [first, second, ..] => {
             return Err(second
@@ -72,7 +72,7 @@ fn structure(table: &Table, stage: &Stage, (every, delay): (f64, f64)) -> Result
             proportional: match own.number_if_given("proportional")? {
                 Some(value) => value,
                 None => {
-                    let such_as = || format!("add for example {}", suggestion::proportional(stage, every, delay));
+                    let such_as = || format!("add for example {}", suggestion::proportional(machine, every, delay));
                     own.number("proportional").map_err(|error| error.next(such_as()))?
                 }
             },
@@ -82,7 +82,7 @@ fn structure(table: &Table, stage: &Stage, (every, delay): (f64, f64)) -> Result
             reference_speed: own.number("reference_speed")?,
             tracking: own.number("tracking")?,
         }),
-        "cascade" => Structure::Cascade(cascade(&field, stage)?),
+        "cascade" => Structure::Cascade(cascade(&field, machine)?),
         "state_feedback" => Structure::StateFeedback(StateFeedback {
             position: own.number("position")?,
             speed: own.number_if_given("speed")?,
@@ -103,10 +103,10 @@ fn structure(table: &Table, stage: &Stage, (every, delay): (f64, f64)) -> Result
     })
 }
 
-fn cascade(field: &Field, stage: &Stage) -> Result<Cascade> {
+fn cascade(field: &Field, machine: &Machine) -> Result<Cascade> {
     let current = match field.table()?.optional("current") {
         None => None,
-        Some(current) if stage.amplifier.mode == AmplifierMode::Current => {
+        Some(current) if machine.amplifier.mode == AmplifierMode::Current => {
             return Err(current
                 .fail("the amplifier commands the current itself: there is no loop to close")
                 .next("leave it out, or set amplifier.mode = \"voltage\""));
@@ -173,7 +173,7 @@ fn fuzzy(table: &Table) -> Result<Fuzzy> {
     })
 }
 
-fn feed_forward(table: &Table, structure: &Structure, stage: &Stage) -> Result<FeedForward> {
+fn feed_forward(table: &Table, structure: &Structure, machine: &Machine) -> Result<FeedForward> {
     let Some(field) = table.optional("feed_forward") else {
         // A sliding mode's equivalent control is that of the model; state feedback has its states from it.
         let model = match structure {
@@ -190,14 +190,14 @@ fn feed_forward(table: &Table, structure: &Structure, stage: &Stage) -> Result<F
     let compensate = table.optional("compensate_stretch");
     let compensate_stretch = compensate.as_ref().map_or(Ok(false), Field::truth)?;
     if let (true, Some(field), Some(EncoderPlace::Cart)) =
-        (compensate_stretch, compensate, stage.encoder.map(|encoder| encoder.at))
+        (compensate_stretch, compensate, machine.encoder.map(|encoder| encoder.at))
     {
         return Err(field
             .fail("an encoder at the cart sees no stretch of the belt")
             .next("leave it out: it is for an encoder at motor or drive pulley"));
     }
     if let (true, Some(field), Structure::Cascade(_), Some(_)) =
-        (compensate_stretch, table.optional("compensate_stretch"), structure, stage.scale)
+        (compensate_stretch, table.optional("compensate_stretch"), structure, machine.scale)
     {
         return Err(field
             .fail("with a scale the cascade closes its position loop at the cart, where no stretch is seen")

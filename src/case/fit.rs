@@ -4,8 +4,8 @@ use super::Experiment;
 use super::reader::{Field, Table, nearest};
 use super::tree::Kind;
 use crate::error::Result;
+use crate::machine::Machine;
 use crate::parameter::{self, Free, INPUT, Numbers, Parameter, Range};
-use crate::stage::Stage;
 
 /// The free parameters of a fit, and how it is done.
 #[derive(Debug, Clone, PartialEq)]
@@ -171,7 +171,7 @@ pub enum Scope {
 
 /// The plan of a fit; `whole` is false where not all files were read: which experiments have a log is
 /// not known then.
-pub(super) fn plan(root: &Table, stage: &Stage, experiments: &[Experiment], whole: bool) -> Result<Option<Plan>> {
+pub(super) fn plan(root: &Table, stage: &Machine, experiments: &[Experiment], whole: bool) -> Result<Option<Plan>> {
     let Some(field) = root.optional("fit") else { return Ok(None) };
     let table = field.table()?;
     let known =

@@ -4,13 +4,13 @@ use super::files::{Experiments, Folder};
 use super::friction::friction;
 use super::reader::{Field, Table};
 use super::{
-    Case, Files, InputFile, Sweeping, Unread, input, listed, named, set, sheet, stage, sweep, times, title, unique,
+    Case, Files, InputFile, Sweeping, Unread, input, listed, machine, named, set, sheet, sweep, times, title, unique,
 };
 use crate::error::{Error, Result};
+use crate::machine::gantry::{BRIDGE, Belts, CART, Gantry, LEFT, Make, RIGHT, Routing, Slide};
+use crate::machine::{AmplifierMode, BeltSheet, Encoder, EncoderPlace};
 use crate::mechanism::{Amplifier, DRIVES, Motor, State};
 use crate::signal::Signal;
-use crate::stage::gantry::{BRIDGE, Belts, CART, Gantry, LEFT, Make, RIGHT, Routing, Slide};
-use crate::stage::{AmplifierMode, BeltSheet, Encoder, EncoderPlace};
 use crate::trajectory::Grid;
 use std::collections::HashMap;
 use std::path::Path;
@@ -274,8 +274,8 @@ fn gantry(root: &Table, routing: Routing) -> Result<Gantry> {
         routing,
         motors: drives.map(|(motor, _)| motor),
         amplifiers: drives.map(|(_, amplifier)| amplifier),
-        pulley_radius: stage::radius(&pulley, sheet::pitch(root)?)?,
-        drive_pulley: stage::pulley(&pulley)?,
+        pulley_radius: machine::radius(&pulley, sheet::pitch(root)?)?,
+        drive_pulley: machine::pulley(&pulley)?,
         bridge,
         cart,
         belts,
@@ -309,8 +309,8 @@ fn drive(root: &Table, side: &str) -> Result<(Motor, Amplifier)> {
         Some(motor) => motor,
         None => table(root, "motor", "torque_constant, back_emf_constant and resistance")?,
     };
-    let amplifier = stage::amplifier(part("amplifier")?.as_ref(), Some(&motor))?;
-    Ok((stage::motor(&motor)?, amplifier))
+    let amplifier = machine::amplifier(part("amplifier")?.as_ref(), Some(&motor))?;
+    Ok((machine::motor(&motor)?, amplifier))
 }
 
 /// The bridge, or the cart on it: both have the same keys.
@@ -318,7 +318,7 @@ fn slide(root: &Table, name: &str) -> Result<Slide> {
     let field = root.required(name, &format!("a table [{name}] with mass"))?.named("bridge");
     let table = field.table()?;
     table.check_keys(&[], &[])?;
-    let travel = table.optional("travel").map(|field| stage::travel(&field.table()?)).transpose()?;
+    let travel = table.optional("travel").map(|field| machine::travel(&field.table()?)).transpose()?;
     Ok(Slide { mass: table.number("mass")?, friction: friction(&table)?, travel })
 }
 
@@ -352,7 +352,7 @@ fn belts(table: &Table, routing: Routing) -> Result<Belts> {
         let what = format!("for example stiffness = [{example}], or modulus, section and spans");
         return Err(table.missing("stiffness", &what));
     }
-    let (modulus, section, is_specific) = stage::rigidity(table, &sheet)?;
+    let (modulus, section, is_specific) = machine::rigidity(table, &sheet)?;
     let spans = vec!["\"0.5 m\""; count].join(", ");
     let lengths = table.required("spans", &format!("for example spans = [{spans}]"))?.numbers(count, &per_span)?;
     let make = Make { modulus, section, spans: lengths };

@@ -42,7 +42,7 @@ impl Case {
     /// ```
     pub fn value(&self, key: &str) -> Result<Given> {
         let place = |section: &str| section.to_string();
-        value(&self.text, key, &Rows { input_unit: |_| self.stage.amplifier.mode.unit(), place: &place })
+        value(&self.text, key, &Rows { input_unit: |_| self.machine.amplifier.mode.unit(), place: &place })
     }
 }
 
@@ -178,9 +178,9 @@ impl Opened {
         let machine: &dyn parameter::Numbers = match self {
             Opened::Axis(case) => {
                 let same = |section: &str| section.to_string();
-                let unit = case.stage.amplifier.mode.unit();
+                let unit = case.machine.amplifier.mode.unit();
                 collect(&tree, ("", ""), &Rows { input_unit: |_| unit, place: &same }, &mut numbers);
-                &case.stage
+                &case.machine
             }
             Opened::Gantry(case) => {
                 let unit = |section: &str| {

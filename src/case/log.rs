@@ -6,10 +6,10 @@ use super::reader::{Field, Table};
 use super::tree::Kind;
 use crate::error::{Error, Result};
 use crate::log::{Clock, ColumnId, Dialect, Filter, In, Log, Mapping, PRESETS, Preset, Quantity, Source, Unit};
+use crate::machine::{BeltModel, EncoderPlace, Machine};
 use crate::parameter::Parameter;
 use crate::quantity::{self, shortest};
 use crate::signal::Hold;
-use crate::stage::{BeltModel, EncoderPlace, Stage};
 use std::f64::consts::TAU;
 
 /// Keys of the table beside its quantities.
@@ -33,7 +33,12 @@ const KEYS: &[&str] = &[
 ];
 
 /// Reads the runs of a log; `driven` says that the experiment has an input of its own.
-pub(super) fn logs(field: &Field, stage: &Stage, folder: &Folder, driven: bool) -> Result<Vec<(Option<String>, Log)>> {
+pub(super) fn logs(
+    field: &Field,
+    machine: &Machine,
+    folder: &Folder,
+    driven: bool,
+) -> Result<Vec<(Option<String>, Log)>> {
     let table = field.table()?;
     let keys: Vec<&str> = KEYS.iter().copied().chain(Quantity::ALL.map(Quantity::name)).collect();
     table.check_keys(&keys, &[])?;
@@ -52,7 +57,7 @@ pub(super) fn logs(field: &Field, stage: &Stage, folder: &Folder, driven: bool) 
     };
     // What was meant goes before what was logged, unless the table names a column itself.
     columns.retain(|(key, ..)| *key != "input" || !driven);
-    let sources = Sources::new(&table, columns, stage)?;
+    let sources = Sources::new(&table, columns, machine)?;
 
     let input = input(field, &table, &sources, driven)?;
     let added = sources.source("added", field.input_unit)?;
@@ -123,7 +128,7 @@ fn outputs(field: &Field, table: &Table, sources: &Sources) -> Result<Vec<(Quant
     let mut outputs = Vec::new();
     for quantity in Quantity::ALL {
         if quantity == Quantity::CartAcceleration
-            && sources.stage.belt.model == BeltModel::Rigid
+            && sources.machine.belt.model == BeltModel::Rigid
             && sources.is_named(quantity.name())
         {
             let field = table.optional(quantity.name()).unwrap_or_else(|| field.clone());
@@ -151,12 +156,12 @@ struct Sources<'a> {
     offset: Option<Table<'a>>,
     /// The columns that a preset knows.
     columns: Vec<(&'static str, ColumnId, In)>,
-    stage: &'a Stage,
+    machine: &'a Machine,
     steps_per_turn: f64,
 }
 
 impl<'a> Sources<'a> {
-    fn new(table: &'a Table<'a>, known: Vec<(&'static str, ColumnId, In)>, stage: &'a Stage) -> Result<Self> {
+    fn new(table: &'a Table<'a>, known: Vec<(&'static str, ColumnId, In)>, machine: &'a Machine) -> Result<Self> {
         let part = |key: &str| table.optional(key).map(|field| field.table()).transpose();
         let steps_per_turn = table.number("steps_per_turn")?;
         if let Some(field) = table.optional("steps_per_turn")
@@ -166,7 +171,7 @@ impl<'a> Sources<'a> {
             return Err(error.next("leave it out, or name the preset whose file counts in them"));
         }
         let (units, scale, offset) = (part("units")?, part("scale")?, part("offset")?);
-        let sources = Self { units, scale, offset, table, columns: known, stage, steps_per_turn };
+        let sources = Self { units, scale, offset, table, columns: known, machine, steps_per_turn };
         for part in [&sources.units, &sources.scale, &sources.offset].into_iter().flatten() {
             let columns = ["time", "input", "added", "reference"].into_iter().chain(Quantity::ALL.map(Quantity::name));
             let named: Vec<&'static str> = columns.clone().filter(|key| sources.is_named(key)).collect();
@@ -219,9 +224,9 @@ impl<'a> Sources<'a> {
     /// The unit of a preset's column: of turns and steps of the motor, one of them behind the gear.
     fn known_unit(&self, key: &str, of: In) -> Option<Unit> {
         let turn = match key {
-            "reference" => TAU * self.stage.pulley_radius,
+            "reference" => TAU * self.machine.pulley_radius,
             _ => TAU,
-        } / self.stage.motor.gear_ratio;
+        } / self.machine.motor.gear_ratio;
         match of {
             In::Own => None,
             In::Unit(name) => Some(Unit::Name(name.to_string())),
@@ -248,7 +253,7 @@ impl<'a> Sources<'a> {
 
     /// The size of a count of the encoder.
     fn count(&self, field: &Field) -> Result<f64> {
-        let Some(encoder) = self.stage.encoder else {
+        let Some(encoder) = self.machine.encoder else {
             return Err(field
                 .fail("there is no encoder whose counts these could be")
                 .next("add [encoder] with at and lines"));
@@ -264,7 +269,7 @@ impl<'a> Sources<'a> {
                 .fail(format!("the encoder of this case counts {at}"))
                 .next("name the unit of this column"));
         }
-        Ok(1.0 / encoder.counts_per_unit(self.stage.motor.gear_ratio))
+        Ok(1.0 / encoder.counts_per_unit(self.machine.motor.gear_ratio))
     }
 }
 

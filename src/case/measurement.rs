@@ -3,24 +3,24 @@
 use super::reader::{Field, Table};
 use super::{Experiment, MOST_SAMPLES};
 use crate::error::Result;
+use crate::machine::{Channel, EncoderPlace, Machine, Measurement, Quantity};
 use crate::parameter;
 use crate::quantity::{rounded, show};
-use crate::stage::{Channel, EncoderPlace, Measurement, Quantity, Stage};
 
 /// Largest jitter, as a share of the interval: samples keep their order.
 const MOST_JITTER: f64 = 0.25;
 
-pub(super) fn measurement(root: &Table, stage: &Stage, experiments: &[Experiment]) -> Result<Option<Measurement>> {
+pub(super) fn measurement(root: &Table, machine: &Machine, experiments: &[Experiment]) -> Result<Option<Measurement>> {
     let Some(field) = root.optional("measurement") else { return Ok(None) };
     let table = field.table()?;
     table.check_keys(&[], &[])?;
     let mut channels = Vec::new();
     for quantity in Quantity::ALL {
         if let Some(field) = table.optional(quantity.name()) {
-            channels.push(channel(&field, quantity, stage)?);
+            channels.push(channel(&field, quantity, machine)?);
         }
     }
-    if channels.is_empty() && stage.encoder.is_none() {
+    if channels.is_empty() && machine.encoder.is_none() {
         return Err(field
             .fail("without [encoder] and without a quantity nothing is recorded")
             .next("add [encoder], or a quantity such as motor_current = { step = \"10 mA\", noise = \"5 mA\" }"));
@@ -39,10 +39,10 @@ pub(super) fn measurement(root: &Table, stage: &Stage, experiments: &[Experiment
 }
 
 /// A quantity and its converter.
-fn channel(field: &Field, quantity: Quantity, stage: &Stage) -> Result<Channel> {
+fn channel(field: &Field, quantity: Quantity, machine: &Machine) -> Result<Channel> {
     let table = field.table()?;
     table.check_keys(&[], &[])?;
-    let counted = stage.encoder.map(|encoder| match encoder.at {
+    let counted = machine.encoder.map(|encoder| match encoder.at {
         EncoderPlace::Motor | EncoderPlace::DrivePulley => Quantity::DriveAngle,
         EncoderPlace::Cart => Quantity::CartPosition,
     });

@@ -10,13 +10,13 @@ mod gantry;
 mod get;
 mod input;
 mod log;
+mod machine;
 mod measurement;
 mod motion;
 mod reader;
 mod set;
 mod sheet;
 mod source;
-mod stage;
 mod suggestion;
 mod sweep;
 mod template;
@@ -37,9 +37,9 @@ use crate::chance::hash;
 use crate::design::Design;
 use crate::error::{Error, Result};
 use crate::log::Log;
+use crate::machine::{AmplifierMode, Machine, Measurement};
 use crate::mechanism::{Mechanism, State};
 use crate::signal::Signal;
-use crate::stage::{AmplifierMode, Measurement, Stage};
 use crate::trajectory::Grid;
 use files::{Experiments, Folder};
 use reader::{Field, Table};
@@ -63,7 +63,7 @@ pub struct Case {
     /// The title of the file; its name where it has none.
     pub title: String,
     /// The machine.
-    pub stage: Stage,
+    pub machine: Machine,
     /// How its runs are recorded, where the file says so.
     pub measurement: Option<Measurement>,
     /// The experiments, in the file's order.
@@ -88,7 +88,7 @@ pub struct Case {
     pub files: Vec<InputFile>,
 }
 
-/// One run of the stage.
+/// One run of the machine.
 #[derive(Debug, Clone)]
 pub struct Experiment {
     /// Its name, unique within the case.
@@ -166,7 +166,7 @@ impl Case {
     /// ```
     /// use taut::case::{Case, TEMPLATE};
     /// let case = Case::from_text("axis.toml", TEMPLATE)?;
-    /// assert_eq!(case.stage.pulley_radius, 0.0194);
+    /// assert_eq!(case.machine.pulley_radius, 0.0194);
     ///
     /// let misspelt = TEMPLATE.replace("torque_constant", "torque_konstant");
     /// let error = Case::from_text("axis.toml", &misspelt).unwrap_err();
@@ -182,7 +182,7 @@ impl Case {
     /// ```
     /// use taut::case::{Case, TEMPLATE};
     /// let case = Case::from_text_with("axis.toml", TEMPLATE, &["cart.mass=0.5 kg", "experiment.0.until=2s"])?;
-    /// assert_eq!(case.stage.cart.mass, 0.5);
+    /// assert_eq!(case.machine.cart.mass, 0.5);
     /// assert_eq!(case.experiments[0].until, 2.0);
     /// # Ok::<(), taut::Error>(())
     /// ```
@@ -233,21 +233,21 @@ impl Case {
         root.check_keys(&tables, &[])?;
 
         let title = title(&root, name)?;
-        let stage = stage::stage(&root)?;
+        let machine = machine::machine(&root)?;
         let folder = Folder::of(name, files);
-        let controller = controller::controller(&root, &stage)?;
-        let moves = motion::moves(&root, &stage, controller.as_ref())?;
+        let controller = controller::controller(&root, &machine)?;
+        let moves = motion::moves(&root, &machine, controller.as_ref())?;
         // A case of moves needs no experiments, nor does one of a controller that is to be tuned.
         let (experiments, unread) = match root.optional("experiment") {
             None if !moves.is_empty() || controller.is_some() => (Vec::new(), Vec::new()),
-            _ => experiments(&root, &stage, &folder)?,
+            _ => experiments(&root, &machine, &folder)?,
         };
-        let measurement = measurement::measurement(&root, &stage, &experiments)?;
-        let fit = fit::plan(&root, &stage, &experiments, unread.is_empty())?;
-        let tune = tune::tuning(&root, &stage, controller.as_ref(), &moves)?;
+        let measurement = measurement::measurement(&root, &machine, &experiments)?;
+        let fit = fit::plan(&root, &machine, &experiments, unread.is_empty())?;
+        let tune = tune::tuning(&root, &machine, controller.as_ref(), &moves)?;
         let known = tune::known(&root)?;
         let context = sweep::Context {
-            machine: &stage,
+            machine: &machine,
             experiments: experiments.iter().map(|experiment| (experiment.name.as_str(), experiment.until)).collect(),
             fit: fit.as_ref(),
             known: &known,
@@ -258,7 +258,7 @@ impl Case {
         let text = source.text.clone();
         Ok(Self {
             title,
-            stage,
+            machine,
             measurement,
             experiments,
             unread,
@@ -361,7 +361,7 @@ fn listed<'a>(root: &Table<'a>) -> Result<Vec<Field<'a>>> {
     Ok(list)
 }
 
-fn experiments(root: &Table, stage: &Stage, folder: &Folder) -> Result<Experiments<Experiment, Initial>> {
+fn experiments(root: &Table, machine: &Machine, folder: &Folder) -> Result<Experiments<Experiment, Initial>> {
     let (mut experiments, mut unread) = (Vec::new(), Vec::new());
     let mut files = HashMap::new();
     for (place, field) in listed(root)?.into_iter().enumerate() {
@@ -369,10 +369,10 @@ fn experiments(root: &Table, stage: &Stage, folder: &Folder) -> Result<Experimen
         let table = own.table()?;
         let name = named(&table)?;
         let initial = || match table.optional("initial") {
-            Some(field) => initial(&field.table()?, stage),
+            Some(field) => initial(&field.table()?, machine),
             None => Ok(Initial::default()),
         };
-        match folder.experiment((place, &name), &table, || experiment(&own, stage, folder), initial)? {
+        match folder.experiment((place, &name), &table, || experiment(&own, machine, folder), initial)? {
             Ok(runs) => {
                 for run in runs {
                     unique(&field, &run.name, &mut files)?;
@@ -409,9 +409,9 @@ fn unique(field: &Field, name: &str, files: &mut HashMap<String, String>) -> Res
 }
 
 /// The experiment of a table; several, if its log is split into runs.
-fn experiment(field: &Field, stage: &Stage, folder: &Folder) -> Result<Vec<Experiment>> {
+fn experiment(field: &Field, machine: &Machine, folder: &Folder) -> Result<Vec<Experiment>> {
     let field = Field {
-        input_unit: match stage.amplifier.mode {
+        input_unit: match machine.amplifier.mode {
             AmplifierMode::Voltage => "V",
             AmplifierMode::Current => "A",
         },
@@ -421,7 +421,7 @@ fn experiment(field: &Field, stage: &Stage, folder: &Folder) -> Result<Vec<Exper
     table.check_keys(&["name", "input", "log", "campaign"], &[])?;
     let name = named(&table)?;
     let initial = match table.optional("initial") {
-        Some(field) => initial(&field.table()?, stage)?,
+        Some(field) => initial(&field.table()?, machine)?,
         None => Initial::default(),
     };
     let input = table.optional("input");
@@ -433,7 +433,7 @@ fn experiment(field: &Field, stage: &Stage, folder: &Folder) -> Result<Vec<Exper
             input::signal(&input.ok_or_else(|| table.missing("input", &such_as))?, &input::Context { folder, until })?;
         return Ok(vec![Experiment { name, input, until, every, initial, log: None }]);
     };
-    let runs = log::logs(&log, stage, folder, input.is_some())?;
+    let runs = log::logs(&log, machine, folder, input.is_some())?;
     let of_run = |(run, mut log): (Option<String>, Log)| {
         let (until, every) = times(&table, Some(&log))?;
         let input = match &input {
@@ -492,10 +492,10 @@ fn check_name(field: &Field) -> Result<()> {
     }
 }
 
-fn initial(table: &Table, stage: &Stage) -> Result<Initial> {
+fn initial(table: &Table, machine: &Machine) -> Result<Initial> {
     table.check_keys(&[], &[])?;
     if let Some(current) = table.optional("motor_current")
-        && !stage.mechanism().drives.iter().any(|drive| drive.has_current_state())
+        && !machine.mechanism().drives.iter().any(|drive| drive.has_current_state())
     {
         return Err(current.fail("this current would have no effect").next(
             "it needs motor.inductance above zero in voltage mode, or amplifier.bandwidth in current mode; or leave it out",

@@ -5,10 +5,10 @@ use super::suggestion;
 use super::{MOST_SAMPLES, check_name, file_name};
 use crate::design::Design;
 use crate::error::Result;
+use crate::machine::Machine;
 use crate::quantity::{rounded, show};
 use crate::signal::gcode;
 use crate::signal::profile::{Leg, Limits, Profile};
-use crate::stage::Stage;
 
 /// A move in closed loop: where the cart should be, and what is looked at.
 #[derive(Debug, Clone)]
@@ -37,7 +37,7 @@ impl Move {
     }
 }
 
-pub(super) fn moves(root: &Table, stage: &Stage, design: Option<&Design>) -> Result<Vec<Move>> {
+pub(super) fn moves(root: &Table, machine: &Machine, design: Option<&Design>) -> Result<Vec<Move>> {
     let Some(field) = root.optional("move") else { return Ok(Vec::new()) };
     if field.is_table() {
         return Err(field
@@ -47,12 +47,12 @@ pub(super) fn moves(root: &Table, stage: &Stage, design: Option<&Design>) -> Res
     let Some(design) = design else {
         return Err(field
             .fail("there is no controller that could follow it")
-            .next(format!("add [controller] with for example {}", suggestion::controller(stage))));
+            .next(format!("add [controller] with for example {}", suggestion::controller(machine))));
     };
     let mut moves: Vec<Move> = Vec::new();
     for field in field.filled_list()? {
         let table = field.clone().named("move").table()?;
-        let one = one(&table, stage, design)?;
+        let one = one(&table, machine, design)?;
         if let Some(other) = moves.iter().find(|other| other.file_name() == one.file_name()) {
             let name = table.required("name", "a name")?;
             return Err(name
@@ -69,7 +69,7 @@ pub(super) fn moves(root: &Table, stage: &Stage, design: Option<&Design>) -> Res
     Ok(moves)
 }
 
-fn one(table: &Table, stage: &Stage, design: &Design) -> Result<Move> {
+fn one(table: &Table, machine: &Machine, design: &Design) -> Result<Move> {
     table.check_keys(&["name", "gcode"], &[])?;
     let name = table.required("name", "for example name = \"short fast\"")?;
     check_name(&name)?;
@@ -96,7 +96,7 @@ fn one(table: &Table, stage: &Stage, design: &Design) -> Result<Move> {
             .fail(format!("the run ends before the move, which takes {}", show(profile.end(), "s")))
             .allowed(format!("from {} on", show(profile.end(), "s"))));
     }
-    if let Some(travel) = stage.travel {
+    if let Some(travel) = machine.travel {
         let places = std::iter::once(from).chain(profile.strokes().map(|(_, from, distance, _)| from + distance));
         if let Some(out) = places.into_iter().find(|x| !(travel.min..=travel.max).contains(x)) {
             return Err(table.field.fail(format!("it leads to {}, off the travel", show(out, "mm"))).allowed(format!(

@@ -3,10 +3,10 @@
 use super::reader::{Field, Table, nearest};
 use super::tree::Kind;
 use crate::error::Result;
+use crate::machine::{BELTS, BeltSheet, BeltType, Rating, SimpleDrive, slowest_swing};
 use crate::mechanism::Mechanism;
 use crate::parameter::{Parameter, Range};
 use crate::quantity::{self, Dimension, show};
-use crate::stage::{BELTS, BeltSheet, BeltType, Rating, SimpleDrive, slowest_swing};
 
 /// K_t, K_e and R of a motor: as they are given, else from its speed constant, else from its rating.
 pub(super) fn constants(motor: &Table) -> Result<[f64; 3]> {

@@ -2,8 +2,8 @@
 
 use crate::design::placement::{first, place};
 use crate::design::{Design, FeedForward, Pid, Structure};
-use crate::stage::rigid::Rigid;
-use crate::stage::{AmplifierMode, Stage, slowest_swing};
+use crate::machine::rigid::Rigid;
+use crate::machine::{AmplifierMode, Machine, slowest_swing};
 use std::f64::consts::PI;
 
 /// Sample time where none is given, s, and how it is written.
@@ -23,9 +23,9 @@ const LEAST: f64 = 0.1;
 const HELD: f64 = 1e6;
 
 /// A PID controller for an axis, as a case file has it.
-pub(super) fn pid(stage: &Stage, every: f64, delay: f64) -> String {
-    let Pid { proportional, integral, derivative, .. } = gains(stage, every, delay);
-    let unit = unit(stage);
+pub(super) fn pid(machine: &Machine, every: f64, delay: f64) -> String {
+    let Pid { proportional, integral, derivative, .. } = gains(machine, every, delay);
+    let unit = unit(machine);
     format!(
         "pid = {{ proportional = \"{} {unit}/mm\", integral = \"{} {unit}/(mm s)\", derivative = \"{} {unit} s/m\" }}",
         two(1e-3 * proportional),
@@ -35,27 +35,27 @@ pub(super) fn pid(stage: &Stage, every: f64, delay: f64) -> String {
 }
 
 /// A whole controller for an axis, as keys of `[controller]`.
-pub(super) fn controller(stage: &Stage) -> String {
-    format!("every = \"{}\" and {}", EVERY.1, pid(stage, EVERY.0, 0.0))
+pub(super) fn controller(machine: &Machine) -> String {
+    format!("every = \"{}\" and {}", EVERY.1, pid(machine, EVERY.0, 0.0))
 }
 
 /// The derivative of a PID controller of this axis, as a case file has it.
-pub(crate) fn derivative(stage: &Stage, every: f64, delay: f64) -> String {
-    format!("derivative = \"{} {} s/m\"", two(gains(stage, every, delay).derivative), unit(stage))
+pub(crate) fn derivative(machine: &Machine, every: f64, delay: f64) -> String {
+    format!("derivative = \"{} {} s/m\"", two(gains(machine, every, delay).derivative), unit(machine))
 }
 
 /// The proportional gain, as a case file has it.
-pub(super) fn proportional(stage: &Stage, every: f64, delay: f64) -> String {
-    format!("proportional = \"{} {}/mm\"", two(1e-3 * gains(stage, every, delay).proportional), unit(stage))
+pub(super) fn proportional(machine: &Machine, every: f64, delay: f64) -> String {
+    format!("proportional = \"{} {}/mm\"", two(1e-3 * gains(machine, every, delay).proportional), unit(machine))
 }
 
-fn unit(stage: &Stage) -> &'static str {
-    if stage.amplifier.mode == AmplifierMode::Current { "A" } else { "V" }
+fn unit(machine: &Machine) -> &'static str {
+    if machine.amplifier.mode == AmplifierMode::Current { "A" } else { "V" }
 }
 
 /// Gains placed well below the slowest swing and what sampling, delay and the derivative's filter allow; ordinary ones for
 /// an axis that has none.
-fn gains(stage: &Stage, every: f64, delay: f64) -> Pid {
+fn gains(machine: &Machine, every: f64, delay: f64) -> Pid {
     let ordinary = Pid {
         proportional: 2000.0,
         integral: 2e4,
@@ -75,12 +75,12 @@ fn gains(stage: &Stage, every: f64, delay: f64) -> Pid {
         filters: Vec::new(),
         shaper: Vec::new(),
     };
-    let most = first(&start, antiresonance(stage).map(|swing| BELOW * swing));
-    let hertz = match antiresonance(stage) {
-        Some(_) => most.min(damped(stage).max(LEAST * most)),
+    let most = first(&start, antiresonance(machine).map(|swing| BELOW * swing));
+    let hertz = match antiresonance(machine) {
+        Some(_) => most.min(damped(machine).max(LEAST * most)),
         None => most,
     };
-    match place(&start, stage, hertz, DAMPING) {
+    match place(&start, machine, hertz, DAMPING) {
         Some(Design { structure: Structure::Pid(placed), .. }) => placed,
         _ => ordinary,
     }
@@ -90,17 +90,17 @@ fn gains(stage: &Stage, every: f64, delay: f64) -> Pid {
 ///
 /// At a resonance the speed of the drive pulley per force on it is at most 1/d₁ with its own drag d₁, so the derivative
 /// g K_d = 3 ζ ω₀ M − d may be at most `AT_RESONANCE` d₁.
-fn damped(stage: &Stage) -> f64 {
-    let rigid = Rigid::of(stage);
-    let idle = rigid.viscous[0] - stage.drive_pulley.friction.side(true).viscous / stage.pulley_radius.powi(2);
+fn damped(machine: &Machine) -> f64 {
+    let rigid = Rigid::of(machine);
+    let idle = rigid.viscous[0] - machine.drive_pulley.friction.side(true).viscous / machine.pulley_radius.powi(2);
     let own = rigid.drag() - idle;
     (AT_RESONANCE * own + rigid.drag()) / (3.0 * DAMPING * rigid.mass) / (2.0 * PI)
 }
 
 /// The slowest swing of cart and idler pulley with the motor held, Hz; none of a belt that does not stretch.
-fn antiresonance(stage: &Stage) -> Option<f64> {
-    let mut held = stage.clone();
-    held.drive_pulley.inertia = HELD * Rigid::of(stage).mass * stage.pulley_radius.powi(2);
+fn antiresonance(machine: &Machine) -> Option<f64> {
+    let mut held = machine.clone();
+    held.drive_pulley.inertia = HELD * Rigid::of(machine).mass * machine.pulley_radius.powi(2);
     slowest_swing(&held.mechanism()).map(|swing| swing / (2.0 * PI))
 }
 

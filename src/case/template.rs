@@ -1,6 +1,6 @@
 //! The case that `taut init` writes.
 
-use crate::stage::gantry::Routing;
+use crate::machine::gantry::Routing;
 
 /// A commented case file that runs as it stands.
 pub const TEMPLATE: &str = include_str!("template.toml");
@@ -9,7 +9,7 @@ pub const TEMPLATE: &str = include_str!("template.toml");
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Template {
     /// A linear stage: a rated motor, an AT5 belt.
-    Stage,
+    Machine,
     /// An axis of a printer: a motor by its K_v, a GT2 belt.
     Printer,
     /// A CoreXY gantry.
@@ -22,7 +22,7 @@ impl Template {
     /// ```
     /// use taut::case::{Opened, Template};
     /// use taut::overview::Overview;
-    /// for template in [Template::Stage, Template::Printer, Template::Gantry] {
+    /// for template in [Template::Machine, Template::Printer, Template::Gantry] {
     ///     let case = Opened::from_text_with("machine.toml", template.text(), &[])?;
     ///     assert!(Overview::of(&case)?.value("largest_force").unwrap() > 10.0);
     /// }
@@ -30,7 +30,7 @@ impl Template {
     /// ```
     pub fn text(self) -> &'static str {
         match self {
-            Template::Stage => include_str!("templates/stage.toml"),
+            Template::Machine => include_str!("templates/stage.toml"),
             Template::Printer => include_str!("templates/printer.toml"),
             Template::Gantry => include_str!("templates/gantry.toml"),
         }
@@ -41,7 +41,7 @@ impl Template {
 ///
 /// ```
 /// use taut::case::{GantryCase, gantry_template};
-/// use taut::stage::gantry::Routing;
+/// use taut::machine::gantry::Routing;
 /// for routing in [Routing::HFrame, Routing::CoreXy] {
 ///     let case = GantryCase::from_text_with("gantry.toml", &gantry_template(routing), &[])?;
 ///     assert_eq!(case.gantry.routing, routing);

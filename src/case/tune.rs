@@ -7,7 +7,7 @@ use super::suggestion;
 use super::tree::Kind;
 use crate::design::{Design, Structure};
 use crate::error::Result;
-use crate::stage::Stage;
+use crate::machine::Machine;
 use std::path::PathBuf;
 
 /// The goal of `taut tune`.
@@ -95,14 +95,19 @@ pub struct Known {
     pub error: Option<f64>,
 }
 
-pub(super) fn tuning(root: &Table, stage: &Stage, design: Option<&Design>, moves: &[Move]) -> Result<Option<Tuning>> {
+pub(super) fn tuning(
+    root: &Table,
+    machine: &Machine,
+    design: Option<&Design>,
+    moves: &[Move],
+) -> Result<Option<Tuning>> {
     let Some(field) = root.optional("tune") else { return Ok(None) };
     let table = field.table()?;
     table.check_keys(&["cost"], &[])?;
     let Some(design) = design else {
         return Err(field
             .fail("there is no controller to tune")
-            .next(format!("add [controller] with for example {}", suggestion::controller(stage))));
+            .next(format!("add [controller] with for example {}", suggestion::controller(machine))));
     };
     let placed = matches!(design.structure, Structure::Pid(_) | Structure::Cascade(_));
     if !placed && !matches!(design.structure, Structure::StateFeedback(_)) {

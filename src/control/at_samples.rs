@@ -7,18 +7,18 @@ use super::outcome::{Deviation, Figures, at_rest, unrecorded};
 use super::sampled::Loop;
 use super::standard::Standard;
 use crate::error::Result;
+use crate::machine::Machine;
+use crate::machine::axis::CART;
 use crate::mechanism::State;
 use crate::metrics::{Meter, Peak};
 use crate::signal::profile::Profile;
 use crate::solve::{self, Solver};
-use crate::stage::Stage;
-use crate::stage::axis::CART;
 
 /// Runs a move and gathers the cart's error, settling and the root mean square of the current at samples alone, with
 /// straight lines between; the figures, and how the run ended. Motion and commands are those of
 /// [`closed_loop`](super::closed_loop).
 pub(crate) fn closed_loop_at_samples(
-    stage: &Stage,
+    machine: &Machine,
     controller: &mut Standard,
     timing: &Loop,
     profile: &Profile,
@@ -26,10 +26,10 @@ pub(crate) fn closed_loop_at_samples(
     solver: Solver,
 ) -> Result<(Figures, solve::Ending)> {
     timing.check(until)?;
-    let experiment = at_rest(stage, profile, until, timing.every.min(until));
+    let experiment = at_rest(machine, profile, until, timing.every.min(until));
     let mut gathered = Gathered::new(profile, window);
     let see = |time: f64, state: &State, current: f64| gathered.see(time, state, current);
-    let outcome = unrecorded((stage, &experiment), controller, (timing, profile), solver, None::<&mut Meter>, see)?;
+    let outcome = unrecorded((machine, &experiment), controller, (timing, profile), solver, None::<&mut Meter>, see)?;
     Ok((gathered.finish(), outcome.ending))
 }
 

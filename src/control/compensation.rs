@@ -1,9 +1,9 @@
 //! Feed-forward from the reference alone: the command for an axis of one mass, and for one whose belt stretches.
 
 use crate::design::{FeedForward, FeedForwardModel};
+use crate::machine::rigid::{REST_ACCELERATION, REST_SPEED, Rigid};
+use crate::machine::{BeltModel, EncoderPlace, Machine};
 use crate::signal::profile::Reference;
-use crate::stage::rigid::{REST_ACCELERATION, REST_SPEED, Rigid};
-use crate::stage::{BeltModel, EncoderPlace, Stage};
 
 /// Direction in which the axis moves, or is about to move: 1, −1 or 0.
 pub fn direction(reference: &Reference) -> f64 {
@@ -18,7 +18,7 @@ pub fn direction(reference: &Reference) -> f64 {
 #[derive(Debug, Clone)]
 pub struct Compensation {
     settings: FeedForward,
-    stage: Stage,
+    machine: Machine,
     /// The axis as one mass.
     pub rigid: Rigid,
     /// Whether the encoder sits before the belt.
@@ -43,12 +43,12 @@ pub struct Needed {
 
 impl Compensation {
     /// From a model of the axis.
-    pub fn new(stage: &Stage, settings: &FeedForward) -> Self {
-        let at = stage.encoder.map_or(EncoderPlace::Motor, |encoder| encoder.at);
+    pub fn new(machine: &Machine, settings: &FeedForward) -> Self {
+        let at = machine.encoder.map_or(EncoderPlace::Motor, |encoder| encoder.at);
         Self {
             settings: *settings,
-            stage: stage.clone(),
-            rigid: Rigid::of(stage),
+            machine: machine.clone(),
+            rigid: Rigid::of(machine),
             before_belt: at != EncoderPlace::Cart,
             before_gear: at == EncoderPlace::Motor,
         }
@@ -57,24 +57,24 @@ impl Compensation {
     /// The motion of the pulleys with which the cart follows `y`: quasi-static in the idler's own swing, exact
     /// otherwise.
     pub fn needed(&self, y: &Reference) -> Needed {
-        let stage = &self.stage;
-        let (r, sign) = (stage.pulley_radius, direction(y));
+        let machine = &self.machine;
+        let (r, sign) = (machine.pulley_radius, direction(y));
         let forward = sign >= 0.0;
         let &Reference { position, speed, acceleration, jerk, snap } = y;
-        let [k1, k2] = match (stage.belt.make, stage.belt.follows_cart) {
+        let [k1, k2] = match (machine.belt.make, machine.belt.follows_cart) {
             (Some(make), true) => make.stiffness_at(position),
-            _ => [stage.belt.stiffness[0], stage.belt.stiffness[1]],
+            _ => [machine.belt.stiffness[0], machine.belt.stiffness[1]],
         };
-        let k3 = stage.belt.stiffness[2];
+        let k3 = machine.belt.stiffness[2];
         // L = f₁ − f₂ = M y″ + b y′ + F_c sgn y′ − F                             (17)
-        let (mass, cart) = (stage.cart.mass, stage.cart.friction.side(forward));
+        let (mass, cart) = (machine.cart.mass, machine.cart.friction.side(forward));
         let load = [
-            mass * acceleration + cart.viscous * speed + cart.coulomb * sign - stage.cart.constant_force(),
+            mass * acceleration + cart.viscous * speed + cart.coulomb * sign - machine.cart.constant_force(),
             mass * jerk + cart.viscous * acceleration,
             mass * snap + cart.viscous * jerk,
         ];
         // P = f₂ − f₃ = (J₂ y″/r + B₂ y′/r + τ_c2 sgn y′)/r                      (18)
-        let (inertia, idler) = (stage.idler_pulley.inertia, stage.idler_pulley.friction.side(forward));
+        let (inertia, idler) = (machine.idler_pulley.inertia, machine.idler_pulley.friction.side(forward));
         let pull = [
             (inertia * acceleration / r + idler.viscous * speed / r + idler.coulomb * sign) / r,
             (inertia * jerk / r + idler.viscous * acceleration / r) / r,
@@ -82,12 +82,12 @@ impl Compensation {
         ];
         // With y₃ − y = (k₃ (y₁ − y) − P)/(k₂ + k₃):  y₁ − y = (L + k₂ P/(k₂ + k₃))/k,  k = k₁ + k₂ k₃/(k₂ + k₃)
         let (share, k) = (k2 / (k2 + k3), k1 + k2 * k3 / (k2 + k3));
-        let stretch: [f64; 3] = std::array::from_fn(|j| match stage.belt.model {
+        let stretch: [f64; 3] = std::array::from_fn(|j| match machine.belt.model {
             BeltModel::Elastic => (load[j] + share * pull[j]) / k,
             BeltModel::TwoMass => load[j] / k,
             BeltModel::Rigid => 0.0,
         });
-        let behind: [f64; 2] = std::array::from_fn(|j| match stage.belt.model {
+        let behind: [f64; 2] = std::array::from_fn(|j| match machine.belt.model {
             BeltModel::Elastic => (k3 * stretch[j] - pull[j]) / (k2 + k3),
             _ => stretch[j],
         });
@@ -98,14 +98,14 @@ impl Compensation {
             ..*y
         };
         // τ/r = ((J₁ + n² J_r) y₁″ + B₁ y₁′)/r² + τ_c1 sgn y′/r + L + P           (16)
-        let n = stage.motor.gear_ratio;
-        let own = (stage.drive_pulley.inertia + n * n * stage.motor.rotor_inertia) / (r * r);
-        let side = stage.drive_pulley.friction.side(forward);
+        let n = machine.motor.gear_ratio;
+        let own = (machine.drive_pulley.inertia + n * n * machine.motor.rotor_inertia) / (r * r);
+        let side = machine.drive_pulley.friction.side(forward);
         let viscous = side.viscous / (r * r);
         let force = own * drive.acceleration + viscous * drive.speed + side.coulomb * sign / r + load[0] + pull[0];
         let rate = own * jerk + viscous * drive.acceleration + load[1] + pull[1];
         // f₁ = k₁ (y₁ − y),  f₂ = k₂ (y − y₃),  f₃ = k₃ (y₃ − y₁)
-        let spans = match stage.belt.model {
+        let spans = match machine.belt.model {
             BeltModel::Elastic => [k1 * stretch[0], -k2 * behind[0], k3 * (behind[0] - stretch[0])],
             BeltModel::TwoMass | BeltModel::Rigid => [0.0; 3],
         };
@@ -119,9 +119,9 @@ impl Compensation {
         }
         let needed = self.needed(y);
         let mut target = needed.drive;
-        if let Some(play) = self.stage.motor.gear_play.filter(|_| self.before_gear) {
+        if let Some(play) = self.machine.motor.gear_play.filter(|_| self.before_gear) {
             // The twist of the gear: T/k_g, and half the play.
-            let (r, sign) = (self.stage.pulley_radius, direction(y));
+            let (r, sign) = (self.machine.pulley_radius, direction(y));
             let torque = r * needed.force[0] - self.rotor(needed.drive.acceleration);
             target.position += r * (torque / play.stiffness + 0.5 * play.backlash * sign);
         }
@@ -130,8 +130,8 @@ impl Compensation {
 
     /// Torque that the rotor itself takes at the pulley, N m.
     fn rotor(&self, acceleration: f64) -> f64 {
-        let n = self.stage.motor.gear_ratio;
-        n * n * self.stage.motor.rotor_inertia * acceleration / self.stage.pulley_radius
+        let n = self.machine.motor.gear_ratio;
+        n * n * self.machine.motor.rotor_inertia * acceleration / self.machine.pulley_radius
     }
 
     /// The command that the reference asks for, V or A.
@@ -176,8 +176,8 @@ mod tests {
     fn what_rounding_leaves_of_a_reference_at_rest_commands_no_friction() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("stages/sollmann-jouaneh/controllers");
         let case = Case::read(folder.join("pid-elastic.toml")).unwrap();
-        let mut stage = case.stage.clone();
-        (stage.motor.gear_efficiency, stage.cart.load) = (0.8, 3.0);
+        let mut machine = case.machine.clone();
+        (machine.motor.gear_efficiency, machine.cart.load) = (0.8, 3.0);
         let mut number = 1_u64;
         let mut noise = |size: f64| {
             number = number.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
@@ -186,7 +186,7 @@ mod tests {
         for model in [FeedForwardModel::Rigid, FeedForwardModel::Elastic] {
             let settings =
                 FeedForward { model, compensate_stretch: true, ..case.controller.as_ref().unwrap().feed_forward };
-            let compensation = Compensation::new(&stage, &settings);
+            let compensation = Compensation::new(&machine, &settings);
             let still = Reference { position: 0.1, ..Reference::default() };
             let [command, dry] = [compensation.command(&still), compensation.dry(&still)];
             let target = compensation.target(&still).position;

@@ -16,8 +16,8 @@
 //! the controller: the torque is `inertia` times the change of the speed in turn/s per second, in N m. Beckhoff Information System, AX8xxx object 3140:07 "Load
 //! inertia/mass", TF5200 P-AXIS-00391 "Load inertia": the total at the motor shaft.
 
-use crate::stage::rigid::Rigid;
-use crate::stage::{AmplifierMode, Stage};
+use crate::machine::rigid::Rigid;
+use crate::machine::{AmplifierMode, Machine};
 use std::f64::consts::PI;
 
 /// A gain of a drive.
@@ -34,17 +34,17 @@ pub struct DriveGain {
 }
 
 /// The gains for an axis going forward; those in volts where a voltage is commanded.
-pub fn drive_gains(stage: &Stage) -> Vec<DriveGain> {
-    let rigid = Rigid::of(stage);
-    let motor = &stage.motor;
+pub fn drive_gains(machine: &Machine) -> Vec<DriveGain> {
+    let rigid = Rigid::of(machine);
+    let motor = &machine.motor;
     // Before the amplifier's gain, which is the drive's own affair: the voltage or current at the motor.
-    let gain = stage.amplifier.gain;
+    let gain = machine.amplifier.gain;
     let friction = rigid.coulomb[0];
     let at_rest = |force: f64| rigid.command(force, 0.0, 0.0) * gain;
     let moving = |force: f64| rigid.command(force, 0.0, 1.0) * gain;
     let (s, v, a) = (at_rest(friction), moving(rigid.viscous[0]), at_rest(rigid.mass));
     let one = |system, name, value, unit| DriveGain { system, name, value, unit };
-    let mut all = match stage.amplifier.mode {
+    let mut all = match machine.amplifier.mode {
         AmplifierMode::Voltage => {
             let jerk = motor.inductance * rigid.mass / (rigid.force_per_ampere * motor.gear_efficiency);
             vec![
@@ -61,7 +61,7 @@ pub fn drive_gains(stage: &Stage) -> Vec<DriveGain> {
         }
     };
     // Of the motor's shaft: a way x is an angle n x/r.
-    let arm = stage.pulley_radius / motor.gear_ratio;
+    let arm = machine.pulley_radius / motor.gear_ratio;
     let loss = motor.gear_efficiency;
     let total = rigid.mass * arm * arm;
     all.extend([

@@ -3,10 +3,10 @@
 use super::compensation::{Compensation, direction};
 use crate::case::{Case, Move};
 use crate::design::FeedForward;
+use crate::machine::rigid::Rigid;
+use crate::machine::{AmplifierMode, Machine};
 use crate::number::engineering;
 use crate::signal::profile::{Profile, Reference};
-use crate::stage::rigid::Rigid;
-use crate::stage::{AmplifierMode, Stage};
 
 /// Instants of a reference that are looked at.
 const INSTANTS: usize = 4000;
@@ -45,21 +45,21 @@ struct Need {
 /// The limits that `profile`, shaper included, exceeds on this machine under a controller with this limit of its command
 /// (V or A); none if the reference can be followed. Friction counts as viscous and Coulomb friction, the idler's own
 /// swing as quasi-static.
-pub fn shortfalls(stage: &Stage, limit: Option<f64>, profile: &Profile) -> Vec<Shortfall> {
-    let needs = needs(stage, profile);
-    let (volts, amperes) = limits(stage, limit);
-    let belt = &stage.belt;
+pub fn shortfalls(machine: &Machine, limit: Option<f64>, profile: &Profile) -> Vec<Shortfall> {
+    let needs = needs(machine, profile);
+    let (volts, amperes) = limits(machine, limit);
+    let belt = &machine.belt;
     let off = |need: &Need| -need.spans.iter().copied().fold(0.0, f64::min);
     let tension = |need: &Need| belt.pretension.unwrap_or(0.0) + need.spans.iter().copied().fold(0.0, f64::max);
-    let carried = belt.sheet.mesh(stage.pulley_radius).and_then(|(_, carried)| carried);
+    let carried = belt.sheet.mesh(machine.pulley_radius).and_then(|(_, carried)| carried);
     // Of each limit: how the motion comes by what it needs, and what there is.
     let found = [
-        of_speed(stage, volts, &needs).or_else(|| {
+        of_speed(machine, volts, &needs).or_else(|| {
             exceeded(&needs, ("voltage", "V"), volts, |need| need.voltage.abs(), ["needs", "", "; the limit is"])
         }),
         exceeded(&needs, ("current", "A"), amperes, |need| need.current.abs(), ["needs", "", "; the limit is"]),
-        of_breakaway(stage, (volts, amperes), &needs),
-        of_travel(stage, &needs),
+        of_breakaway(machine, (volts, amperes), &needs),
+        of_travel(machine, &needs),
         exceeded(
             &needs,
             ("slack", "N"),
@@ -129,8 +129,8 @@ fn exceeded(
 }
 
 /// The voltage, where the largest speed needs too much of it without any acceleration.
-fn of_speed(stage: &Stage, volts: Option<f64>, needs: &[Need]) -> Option<Shortfall> {
-    let (volts, rigid) = (volts?, Rigid::of(stage));
+fn of_speed(machine: &Machine, volts: Option<f64>, needs: &[Need]) -> Option<Shortfall> {
+    let (volts, rigid) = (volts?, Rigid::of(machine));
     most(needs, volts, |need| need.voltage.abs())?;
     let steady = |speed: f64| {
         let (viscous, dry) = rigid.friction(speed, speed.signum());
@@ -156,21 +156,21 @@ fn of_speed(stage: &Stage, volts: Option<f64>, needs: &[Need]) -> Option<Shortfa
 }
 
 /// The force that moves everything from rest, where the motor gives less at standstill.
-fn of_breakaway(stage: &Stage, (volts, amperes): (Option<f64>, Option<f64>), needs: &[Need]) -> Option<Shortfall> {
-    let (current, voltage) = Rigid::of(stage).electrical(1.0, 0.0, 0.0);
+fn of_breakaway(machine: &Machine, (volts, amperes): (Option<f64>, Option<f64>), needs: &[Need]) -> Option<Shortfall> {
+    let (current, voltage) = Rigid::of(machine).electrical(1.0, 0.0, 0.0);
     let force = [volts.map(|volts| volts / voltage), amperes.map(|amperes| amperes / current)];
     let force = force.into_iter().flatten().reduce(f64::min)?;
     needs.iter().find_map(|need| {
         let side = direction(&need.y);
-        let needed = stage.breakaway(side, need.y.position);
+        let needed = machine.breakaway(side, need.y.position);
         let words = || format!("to break away takes {}; the motor gives {}", told(needed, "N"), told(force, "N"));
         (side != 0.0 && needed > force).then(|| need.beyond("breakaway", [needed, force], "N", words()))
     })
 }
 
 /// The end of the travel, where the reference goes beyond it.
-fn of_travel(stage: &Stage, needs: &[Need]) -> Option<Shortfall> {
-    let travel = stage.travel?;
+fn of_travel(machine: &Machine, needs: &[Need]) -> Option<Shortfall> {
+    let travel = machine.travel?;
     let need = most(needs, 0.0, |need| (need.y.position - travel.max).max(travel.min - need.y.position))?;
     let position = need.y.position;
     let end = if position > travel.max { travel.max } else { travel.min };
@@ -186,7 +186,7 @@ fn of_travel(stage: &Stage, needs: &[Need]) -> Option<Shortfall> {
 /// The shortfalls of each move of a case under its controller, with the name of the move; moves without one are left out.
 pub fn of_moves(case: &Case) -> Vec<(&str, Vec<Shortfall>)> {
     let Some(design) = &case.controller else { return Vec::new() };
-    let short = |motion: &Move| shortfalls(&case.stage, design.limit, &motion.reference(design));
+    let short = |motion: &Move| shortfalls(&case.machine, design.limit, &motion.reference(design));
     let moves = case.moves.iter().map(|motion| (&*motion.name, short(motion)));
     moves.filter(|(_, short)| !short.is_empty()).collect()
 }
@@ -198,8 +198,8 @@ pub fn sentence(name: &str, short: &[Shortfall]) -> String {
 }
 
 /// The tightest limits of voltage and current, V and A.
-fn limits(stage: &Stage, limit: Option<f64>) -> (Option<f64>, Option<f64>) {
-    let amplifier = &stage.amplifier;
+fn limits(machine: &Machine, limit: Option<f64>) -> (Option<f64>, Option<f64>) {
+    let amplifier = &machine.amplifier;
     let commanded = limit.map(|limit| limit * amplifier.gain.abs());
     let least = |a: Option<f64>, b: Option<f64>| a.into_iter().chain(b).reduce(f64::min);
     match amplifier.mode {
@@ -208,9 +208,9 @@ fn limits(stage: &Stage, limit: Option<f64>) -> (Option<f64>, Option<f64>) {
     }
 }
 
-fn needs(stage: &Stage, profile: &Profile) -> Vec<Need> {
-    let compensation = Compensation::new(stage, &FeedForward::NONE);
-    let lines = &stage.cart.forces;
+fn needs(machine: &Machine, profile: &Profile) -> Vec<Need> {
+    let compensation = Compensation::new(machine, &FeedForward::NONE);
+    let lines = &machine.cart.forces;
     let need = |time: f64| {
         let y = profile.at(time);
         let needed = compensation.needed(&y);
@@ -228,15 +228,15 @@ fn needs(stage: &Stage, profile: &Profile) -> Vec<Need> {
 mod tests {
     use super::*;
     use crate::control::{Setup, closed_loop};
+    use crate::machine::Travel;
     use crate::metrics::{Balance, balanced_speed};
     use crate::solve::Solver;
-    use crate::stage::Travel;
     use std::path::Path;
 
     fn case() -> Case {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("stages/sollmann-jouaneh/controllers");
         let mut case = Case::read(folder.join("pid-elastic.toml")).unwrap();
-        (case.stage.amplifier.voltage_limit, case.stage.amplifier.current_limit) = (None, None);
+        (case.machine.amplifier.voltage_limit, case.machine.amplifier.current_limit) = (None, None);
         case
     }
 
@@ -247,8 +247,8 @@ mod tests {
         let design = case.controller.as_ref().unwrap();
         for motion in &case.moves {
             let setup = Setup {
-                stage: &case.stage,
-                model: &case.stage,
+                machine: &case.machine,
+                model: &case.machine,
                 design,
                 profile: &motion.profile,
                 until: motion.until,
@@ -256,7 +256,7 @@ mod tests {
                 solver: Solver::Exact,
             };
             let figures = closed_loop(&setup).unwrap().figures;
-            let needs = needs(&case.stage, &motion.profile);
+            let needs = needs(&case.machine, &motion.profile);
             let most = |value: fn(&Need) -> f64| needs.iter().map(value).fold(0.0, |most, x| x.abs().max(most));
             let (volts, amperes) = (most(|need| need.voltage), most(|need| need.current));
             let (given, taken) = (figures.voltage.0.value.abs(), figures.current.0.value.abs());
@@ -270,43 +270,43 @@ mod tests {
     fn each_limit_is_named_where_it_is_exceeded() {
         let case = case();
         let motion = &case.moves[0];
-        let needs = needs(&case.stage, &motion.profile);
+        let needs = needs(&case.machine, &motion.profile);
         let most = |value: &dyn Fn(&Need) -> f64| needs.iter().map(value).fold(0.0, f64::max);
         let volts = most(&|need| need.voltage.abs());
         let amperes = most(&|need| need.current.abs());
         let far = most(&|need| need.y.position);
         let off = most(&|need| -need.spans.iter().copied().fold(0.0, f64::min));
         let on = most(&|need| need.spans.iter().copied().fold(0.0, f64::max));
-        let away = case.stage.breakaway(1.0, 0.0) / Rigid::of(&case.stage).force_per_command();
-        type Set = fn(&mut Stage, f64) -> Option<f64>;
+        let away = case.machine.breakaway(1.0, 0.0) / Rigid::of(&case.machine).force_per_command();
+        type Set = fn(&mut Machine, f64) -> Option<f64>;
         let limits: [(&str, f64, Set); 6] = [
-            ("voltage", volts, |stage, most| {
-                stage.amplifier.voltage_limit = Some(most);
+            ("voltage", volts, |machine, most| {
+                machine.amplifier.voltage_limit = Some(most);
                 None
             }),
             ("voltage", volts, |_, most| Some(most)),
-            ("current", amperes, |stage, most| {
-                stage.amplifier.current_limit = Some(most);
+            ("current", amperes, |machine, most| {
+                machine.amplifier.current_limit = Some(most);
                 None
             }),
-            ("travel", far, |stage, most| {
-                stage.travel = Some(Travel { min: -1.0, max: most, stop: None });
+            ("travel", far, |machine, most| {
+                machine.travel = Some(Travel { min: -1.0, max: most, stop: None });
                 None
             }),
-            ("slack", off, |stage, most| {
-                stage.belt.pretension = Some(most);
+            ("slack", off, |machine, most| {
+                machine.belt.pretension = Some(most);
                 None
             }),
-            ("tension", on, |stage, most| {
-                stage.belt.sheet.allowed_tension = Some(most);
+            ("tension", on, |machine, most| {
+                machine.belt.sheet.allowed_tension = Some(most);
                 None
             }),
         ];
         for (limit, needed, set) in limits {
             for share in [0.9, 1.1] {
-                let mut stage = case.stage.clone();
-                let own = set(&mut stage, share * needed);
-                let found = shortfalls(&stage, own, &motion.profile);
+                let mut machine = case.machine.clone();
+                let own = set(&mut machine, share * needed);
+                let found = shortfalls(&machine, own, &motion.profile);
                 if share > 1.0 {
                     assert_eq!(found, [], "{limit} at {share}");
                     continue;
@@ -318,7 +318,7 @@ mod tests {
             }
         }
         let names = |limit: f64| -> Vec<&str> {
-            shortfalls(&case.stage, Some(limit), &motion.profile).iter().map(|short| short.limit).collect()
+            shortfalls(&case.machine, Some(limit), &motion.profile).iter().map(|short| short.limit).collect()
         };
         assert!(names(0.9 * away).contains(&"breakaway") && !names(1.1 * away).contains(&"breakaway"));
     }
@@ -328,10 +328,10 @@ mod tests {
     fn the_speed_that_is_reached_is_the_steady_one() {
         let case = case();
         let motion = &case.moves[0];
-        let volts = needs(&case.stage, &motion.profile).iter().fold(0.0, |most, need| need.voltage.max(most)) * 0.5;
-        let found = shortfalls(&case.stage, Some(volts), &motion.profile);
+        let volts = needs(&case.machine, &motion.profile).iter().fold(0.0, |most, need| need.voltage.max(most)) * 0.5;
+        let found = shortfalls(&case.machine, Some(volts), &motion.profile);
         let short = found.iter().find(|short| short.limit == "voltage").unwrap();
-        let Balance::At(speed) = balanced_speed(&case.stage, volts, 0.1) else { panic!("no steady speed") };
+        let Balance::At(speed) = balanced_speed(&case.machine, volts, 0.1) else { panic!("no steady speed") };
         let told = engineering(speed, "m/s", 3);
         assert!(short.words.ends_with(&format!("reach {told}")), "{} and {told}", short.words);
     }

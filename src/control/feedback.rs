@@ -7,8 +7,8 @@ use super::standard::observed;
 use super::state_feedback::{Law, StateFeedbackState};
 use crate::design::{Cascade, Design, Pid, Structure};
 use crate::error::{Error, Result};
-use crate::stage::Stage;
-use crate::stage::rigid::Rigid;
+use crate::machine::Machine;
+use crate::machine::rigid::Rigid;
 use nalgebra::{Complex, DMatrix, DVector, Schur};
 use std::f64::consts::PI;
 
@@ -74,7 +74,7 @@ impl Turn {
 
 impl Feedback {
     /// That of a design for a model of the axis; fails for structures that are not linear.
-    pub fn new(design: &Design, model: &Stage) -> Result<Self> {
+    pub fn new(design: &Design, model: &Machine) -> Result<Self> {
         let core = match &design.structure {
             Structure::Pid(gains) => Core::Pid(*gains),
             Structure::Cascade(gains) => Core::Cascade(*gains),

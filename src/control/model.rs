@@ -1,9 +1,9 @@
 //! The axis as a sampled linear system, for observers and regulators: everything slides, dry friction apart.
 
 use super::measures_cart;
+use crate::machine::axis::{CART, DRIVE, SPANS};
+use crate::machine::{EncoderPlace, Machine};
 use crate::mechanism::{BODIES, Contact, Form, Mode, State};
-use crate::stage::axis::{CART, DRIVE, SPANS};
-use crate::stage::{EncoderPlace, Stage};
 use nalgebra::{DMatrix, DVector, RowDVector};
 
 /// ẋ = A x + B u + E w, with w a force on the cart; measured position and the cart's position and speed from x. SI
@@ -51,9 +51,9 @@ impl Quantity {
 
 impl Linear {
     /// That of `stage`.
-    pub fn of(stage: &Stage) -> Self {
-        let mechanism = stage.mechanism();
-        let r = stage.pulley_radius;
+    pub fn of(machine: &Machine) -> Self {
+        let mechanism = machine.mechanism();
+        let r = machine.pulley_radius;
         let mut mode = Mode::of([]);
         if mechanism.drives[0].has_rotor() {
             // Flanks of a gear with play touch.
@@ -89,17 +89,17 @@ impl Linear {
             a.set_row(i, &of_form(&form));
             b[i] = form.input[0];
             if state == Quantity::Speed(CART) {
-                e[i] = 1.0 / stage.cart.mass;
+                e[i] = 1.0 / machine.cart.mass;
             }
         }
         let at = |body: usize| row(&unit(body));
-        let measured = match stage.encoder.map(|encoder| encoder.at) {
-            _ if measures_cart(stage) => at(CART),
+        let measured = match machine.encoder.map(|encoder| encoder.at) {
+            _ if measures_cart(machine) => at(CART),
             Some(EncoderPlace::DrivePulley) => at(DRIVE) * r,
             _ => at(mechanism.drives[0].shaft) * r,
         };
         let cart_speed = of_form(&Form::speed(CART));
-        let scale = stage.scale.map(|_| at(CART));
+        let scale = machine.scale.map(|_| at(CART));
         Self { a, b, e, measured, scale, cart: at(CART), cart_speed, states }
     }
 

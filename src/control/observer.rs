@@ -1,7 +1,7 @@
 //! An observer of the disturbance at the command.
 
 use super::memory::{Memory, optional};
-use crate::stage::rigid::Rigid;
+use crate::machine::rigid::Rigid;
 use nalgebra::{Complex, Matrix3, RowVector3, Vector3};
 
 /// Estimates position, speed and a constant disturbance of an axis of one mass from its measured position.

@@ -6,13 +6,13 @@ use super::standard::Standard;
 use crate::case::{Experiment, Initial};
 use crate::design::Design;
 use crate::error::{Error, Result};
+use crate::machine::Machine;
+use crate::machine::axis::{CART, DRIVE};
 use crate::mechanism::{Limit, Mode, State};
 use crate::metrics::{Meter, Metrics, Peak};
 use crate::signal::Signal;
 use crate::signal::profile::Profile;
 use crate::solve::{self, Curve, Detail, Flow, Gap, Observe, Polynomial, Solver, TERMS, reading};
-use crate::stage::Stage;
-use crate::stage::axis::{CART, DRIVE};
 use crate::trajectory::{Column, Trajectory};
 
 /// A difference over time.
@@ -77,9 +77,9 @@ pub struct MoveRun {
 #[derive(Debug, Clone, Copy)]
 pub struct Setup<'a> {
     /// The axis.
-    pub stage: &'a Stage,
+    pub machine: &'a Machine,
     /// The machine that the controller assumes; mostly the same.
-    pub model: &'a Stage,
+    pub model: &'a Machine,
     /// The controller.
     pub design: &'a Design,
     /// The reference of the cart.
@@ -97,14 +97,14 @@ pub fn closed_loop(setup: &Setup) -> Result<MoveRun> {
     let mut controller = Standard::new(setup.design, setup.model)?;
     let profile = setup.profile.clone().shaped(&setup.design.shaper);
     let timing = Loop::of(setup.design);
-    close(setup.stage, &mut controller, &timing, &profile, setup.until, setup.window, setup.solver)
+    close(setup.machine, &mut controller, &timing, &profile, setup.until, setup.window, setup.solver)
 }
 
 /// The same of a search that runs it a thousand times, with a controller and a shaped profile that are made once: of the
 /// figures the cart's error, settling and the root mean square of the current, equal to those of [`closed_loop`] (root
 /// mean squares to rounding, the others to the last bit), and how it ended.
 pub(crate) fn closed_loop_briefly(
-    stage: &Stage,
+    machine: &Machine,
     controller: &mut Standard,
     timing: &Loop,
     profile: &Profile,
@@ -112,16 +112,16 @@ pub(crate) fn closed_loop_briefly(
     solver: Solver,
 ) -> Result<(Figures, solve::Ending)> {
     timing.check(until)?;
-    let experiment = at_rest(stage, profile, until, timing.every.min(until));
-    let mut gauge = Gauge { is_brief: true, ..Gauge::new(stage, &experiment, profile, window) };
+    let experiment = at_rest(machine, profile, until, timing.every.min(until));
+    let mut gauge = Gauge { is_brief: true, ..Gauge::new(machine, &experiment, profile, window) };
     let outcome =
-        unrecorded((stage, &experiment), controller, (timing, profile), solver, Some(&mut gauge), |_, _, _| {})?;
+        unrecorded((machine, &experiment), controller, (timing, profile), solver, Some(&mut gauge), |_, _, _| {})?;
     Ok((gauge.finish(&outcome.events).0, outcome.ending))
 }
 
 /// Runs a controller along a profile without rows; `see` is shown its samples, as [`Sampled::drive`] says.
 pub(super) fn unrecorded(
-    (stage, experiment): (&Stage, &Experiment),
+    (machine, experiment): (&Machine, &Experiment),
     controller: &mut Standard,
     (timing, profile): (&Loop, &Profile),
     solver: Solver,
@@ -129,18 +129,18 @@ pub(super) fn unrecorded(
     see: impl FnMut(f64, &State, f64),
 ) -> Result<solve::Outcome> {
     controller.reset();
-    let mut sampled = Sampled::new(stage, controller, *timing, profile, false).until(experiment.until);
+    let mut sampled = Sampled::new(machine, controller, *timing, profile, false).until(experiment.until);
     let sink = &mut |_: &Trajectory| Flow::Continue;
     let observer = observer.map(|observer| observer as &mut dyn Observe);
-    let mut run = solve::Run::new(stage, experiment, solver, Detail::None, observer, sink)?;
+    let mut run = solve::Run::new(machine, experiment, solver, Detail::None, observer, sink)?;
     sampled.drive(&mut run, experiment.until, see);
     Ok(run.finish())
 }
 
 /// A run from rest at the start of a profile, without an input of its own.
-pub(super) fn at_rest(stage: &Stage, profile: &Profile, until: f64, every: f64) -> Experiment {
+pub(super) fn at_rest(machine: &Machine, profile: &Profile, until: f64, every: f64) -> Experiment {
     let start = profile.start();
-    let angle = start / stage.pulley_radius;
+    let angle = start / machine.pulley_radius;
     Experiment {
         name: String::new(),
         input: Signal::Step { value: 0.0, at: 0.0 },
@@ -154,7 +154,7 @@ pub(super) fn at_rest(stage: &Stage, profile: &Profile, until: f64, every: f64) 
 /// Runs any controller along a profile, from rest at its start, for `until` s; the cart has settled within `window` (m)
 /// of its target.
 pub fn close(
-    stage: &Stage,
+    machine: &Machine,
     controller: &mut dyn Controller,
     timing: &Loop,
     profile: &Profile,
@@ -163,7 +163,7 @@ pub fn close(
     solver: Solver,
 ) -> Result<MoveRun> {
     let rows = Rows { until, every: timing.every.min(until), window };
-    run(stage, controller, timing, profile, &rows, solver, (Detail::None, false), &mut |_| Flow::Continue)
+    run(machine, controller, timing, profile, &rows, solver, (Detail::None, false), &mut |_| Flow::Continue)
 }
 
 /// Which rows are put out, and the window.
@@ -180,7 +180,7 @@ pub struct Rows {
 /// The same, handing each block of rows on to `sink`, with columns `reference` and `cart_error` behind the others.
 #[allow(clippy::too_many_arguments)] // each is one thing, and the functions above leave most out
 pub fn stream(
-    stage: &Stage,
+    machine: &Machine,
     controller: &mut dyn Controller,
     timing: &Loop,
     profile: &Profile,
@@ -191,12 +191,12 @@ pub fn stream(
 ) -> Result<MoveRun> {
     let mut wide = Wide::default();
     let sink = &mut |block: &Trajectory| sink(wide.of(profile, block));
-    run(stage, controller, timing, profile, rows, solver, (Detail::Full, keep), sink)
+    run(machine, controller, timing, profile, rows, solver, (Detail::Full, keep), sink)
 }
 
 #[allow(clippy::too_many_arguments)]
 fn run(
-    stage: &Stage,
+    machine: &Machine,
     controller: &mut dyn Controller,
     timing: &Loop,
     profile: &Profile,
@@ -209,11 +209,11 @@ fn run(
     if !(rows.window > 0.0 && rows.window.is_finite()) {
         return Err(Error::new(format!("the cart cannot settle within {:?} m", rows.window)).allowed("above zero"));
     }
-    let experiment = at_rest(stage, profile, rows.until, rows.every);
+    let experiment = at_rest(machine, profile, rows.until, rows.every);
     controller.reset();
-    let mut sampled = Sampled::new(stage, controller, *timing, profile, keep).until(rows.until);
-    let mut gauge = Gauge::new(stage, &experiment, profile, rows.window);
-    let mut run = solve::Run::new(stage, &experiment, solver, detail, Some(&mut gauge), sink)?;
+    let mut sampled = Sampled::new(machine, controller, *timing, profile, keep).until(rows.until);
+    let mut gauge = Gauge::new(machine, &experiment, profile, rows.window);
+    let mut run = solve::Run::new(machine, &experiment, solver, detail, Some(&mut gauge), sink)?;
     sampled.drive(&mut run, experiment.until, |_, _, _| {});
     let outcome = run.finish();
     let (mut figures, metrics) = gauge.finish(&outcome.events);
@@ -228,8 +228,8 @@ fn run(
 /// its input is not asked for. Positions are read exactly: a count more or less at a sample would make what comes out
 /// jump as parameters change.
 pub(crate) fn follow(
-    stage: &Stage,
-    model: &Stage,
+    machine: &Machine,
+    model: &Machine,
     design: &Design,
     (profile, added): (&Profile, Option<&Added>),
     experiment: &Experiment,
@@ -237,9 +237,9 @@ pub(crate) fn follow(
     sink: &mut dyn FnMut(&Trajectory) -> Flow,
 ) -> Result<solve::Outcome> {
     let mut controller = Standard::new(design, model)?;
-    let mut sampled = Sampled::new(stage, &mut controller, Loop::of(design), profile, false).exactly().with(added);
-    let stage = Stage { encoder: None, ..stage.clone() };
-    let mut run = solve::Run::new(&stage, experiment, solver, Detail::Full, None, sink)?;
+    let mut sampled = Sampled::new(machine, &mut controller, Loop::of(design), profile, false).exactly().with(added);
+    let machine = Machine { encoder: None, ..machine.clone() };
+    let mut run = solve::Run::new(&machine, experiment, solver, Detail::Full, None, sink)?;
     sampled.drive(&mut run, experiment.until, |_, _, _| {});
     Ok(run.finish())
 }
@@ -267,13 +267,13 @@ struct Gauge<'a> {
 }
 
 impl<'a> Gauge<'a> {
-    fn new(stage: &Stage, experiment: &Experiment, profile: &'a Profile, window: f64) -> Self {
+    fn new(machine: &Machine, experiment: &Experiment, profile: &'a Profile, window: f64) -> Self {
         let last = profile.strokes().last().map_or((0.0, 0.0), |(begin, _, distance, _)| (begin, distance));
         Self {
-            meter: Meter::new(stage, experiment),
+            meter: Meter::new(machine, experiment),
             profile,
             window,
-            radius: stage.pulley_radius,
+            radius: machine.pulley_radius,
             last_stroke: last,
             target: profile.target(),
             seen: Figures::default(),

@@ -223,7 +223,7 @@ fn model(args: &Question, file: &Path) -> Result<(Source, Vec<PathBuf>)> {
     let changes: Vec<&str> = args.changes.iter().map(String::as_str).collect();
     let case = Case::read_with(file, &changes)?;
     let drive = args.drive.unwrap_or(Drive::Held);
-    let modes = resonances(&case.stage, drive).map_err(|e| e.in_file(file))?;
+    let modes = resonances(&case.machine, drive).map_err(|e| e.in_file(file))?;
     let also = case.files.into_iter().map(|file| file.path).collect();
     Ok((Source::Model { title: case.title, drive, modes }, also))
 }

@@ -1,7 +1,7 @@
 //! The frequencies at which a stage vibrates, along its travel, from its masses and springs.
 
 use crate::error::{Error, Result};
-use crate::stage::{AmplifierMode, BeltModel, Stage};
+use crate::machine::{AmplifierMode, BeltModel, Machine};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use std::f64::consts::PI;
 
@@ -88,12 +88,12 @@ impl Reach {
 /// belt's damping and, where a free motor is fed by a voltage, its back-EMF. Frequencies are of K and M alone; damping
 /// ratios ζ = φᵀ C φ / (2 ω φᵀ M φ) hold for light damping. Modes that are damped so much that they do not vibrate are
 /// left out.
-pub fn resonances(stage: &Stage, drive: Drive) -> Result<Vec<Resonance>> {
-    if stage.belt.model == BeltModel::Rigid {
+pub fn resonances(machine: &Machine, drive: Drive) -> Result<Vec<Resonance>> {
+    if machine.belt.model == BeltModel::Rigid {
         let error = Error::new("a rigid belt has no resonance").allowed("belt.model = \"elastic\" or \"two-mass\"");
         return Err(error.next("describe the belt's stiffness, or give a measured spectrum"));
     }
-    let places = match (&stage.travel, stage.belt.follows_cart) {
+    let places = match (&machine.travel, machine.belt.follows_cart) {
         (Some(travel), true) => {
             let part = |k: usize| k as f64 / (PLACES - 1) as f64;
             (0..PLACES).map(|k| travel.min + part(k) * (travel.max - travel.min)).collect()
@@ -102,7 +102,7 @@ pub fn resonances(stage: &Stage, drive: Drive) -> Result<Vec<Resonance>> {
     };
     let mut all = Vec::new();
     for position in places {
-        let mut here = at(stage, drive, position);
+        let mut here = at(machine, drive, position);
         let most = here.iter().map(|mode| mode.share).fold(0.0, f64::max);
         here.retain(|mode| mode.share > LEAST * most);
         for mode in &mut here {
@@ -118,8 +118,8 @@ pub fn resonances(stage: &Stage, drive: Drive) -> Result<Vec<Resonance>> {
 }
 
 /// The modes with the cart at one place; `share` is not yet relative.
-fn at(stage: &Stage, drive: Drive, position: f64) -> Vec<Resonance> {
-    let (m, c, k) = matrices(stage, drive, position);
+fn at(machine: &Machine, drive: Drive, position: f64) -> Vec<Resonance> {
+    let (m, c, k) = matrices(machine, drive, position);
     // With the drive pulley held it is no coordinate, but what it does is felt through its column of K.
     let first = if drive == Drive::Held { 1 } else { 0 };
     let size = m.nrows() - first;
@@ -153,33 +153,33 @@ fn at(stage: &Stage, drive: Drive, position: f64) -> Vec<Resonance> {
 }
 
 /// M, C and K over φ₁, x and φ₃; over φ₁ and x where both pulleys are one.
-fn matrices(stage: &Stage, drive: Drive, position: f64) -> (DMatrix<f64>, DMatrix<f64>, DMatrix<f64>) {
-    let motor = &stage.motor;
+fn matrices(machine: &Machine, drive: Drive, position: f64) -> (DMatrix<f64>, DMatrix<f64>, DMatrix<f64>) {
+    let motor = &machine.motor;
     let n = motor.gear_ratio;
-    let mut stiffness = stage.belt.stiffness;
-    if let (true, Some(make)) = (stage.belt.follows_cart, &stage.belt.make) {
+    let mut stiffness = machine.belt.stiffness;
+    if let (true, Some(make)) = (machine.belt.follows_cart, &machine.belt.make) {
         let [k1, k2] = make.stiffness_at(position);
         stiffness = [k1, k2, stiffness[2]];
     }
-    let mechanism = stage.mechanism();
+    let mechanism = machine.mechanism();
     let arm = |span: usize, body: usize| mechanism.stretch_rate(span).speed[body];
     // Σ k dᵀ d over the spans' stretches d
     let sum = |values: [f64; 3]| {
         DMatrix::from_fn(3, 3, |i, j| (0..3).map(|s| values[s] * arm(s, i) * arm(s, j)).sum::<f64>())
     };
     let rotor = n * n * motor.rotor_inertia;
-    let masses = [stage.drive_pulley.inertia + rotor, stage.cart.mass, stage.idler_pulley.inertia];
-    let frictions = [stage.drive_pulley.friction, stage.cart.friction, stage.idler_pulley.friction];
+    let masses = [machine.drive_pulley.inertia + rotor, machine.cart.mass, machine.idler_pulley.inertia];
+    let frictions = [machine.drive_pulley.friction, machine.cart.friction, machine.idler_pulley.friction];
     let mut resisting = frictions.map(|friction| 0.5 * (friction.forward.viscous + friction.backward.viscous));
-    if drive == Drive::Free && stage.amplifier.mode == AmplifierMode::Voltage {
+    if drive == Drive::Free && machine.amplifier.mode == AmplifierMode::Voltage {
         // n² K_t K_e / R, of an armature without inductance
         resisting[0] += n * n * motor.torque_constant * motor.back_emf_constant / motor.resistance;
     }
     let diagonal = |values: &[f64]| DMatrix::from_diagonal(&DVector::from_column_slice(values));
-    if stage.belt.model == BeltModel::TwoMass {
+    if machine.belt.model == BeltModel::TwoMass {
         // Spans 2 and 3 in series between the cart and both pulleys, which turn as one.
-        let r = stage.pulley_radius;
-        let [[k1, k2, k3], [c1, c2, c3]] = [stiffness, stage.belt.damping];
+        let r = machine.pulley_radius;
+        let [[k1, k2, k3], [c1, c2, c3]] = [stiffness, machine.belt.damping];
         let all = k2 + k3;
         let (k, c) = (k1 + k2 * k3 / all, c1 + (c2 * k3 * k3 + c3 * k2 * k2) / (all * all));
         let both = |value: f64| DMatrix::from_row_slice(2, 2, &[r * r * value, -r * value, -r * value, value]);
@@ -187,7 +187,7 @@ fn matrices(stage: &Stage, drive: Drive, position: f64) -> (DMatrix<f64>, DMatri
         return (two(masses), both(c) + two(resisting), both(k));
     }
     // A pulley without inertia follows at once; the smallest weight keeps the matrix of masses regular.
-    let tiny = 1e-9 * stage.cart.mass * stage.pulley_radius * stage.pulley_radius;
+    let tiny = 1e-9 * machine.cart.mass * machine.pulley_radius * machine.pulley_radius;
     let masses = masses.map(|mass| mass.max(tiny));
-    (diagonal(&masses), sum(stage.belt.damping) + diagonal(&resisting), sum(stiffness))
+    (diagonal(&masses), sum(machine.belt.damping) + diagonal(&resisting), sum(stiffness))
 }

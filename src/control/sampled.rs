@@ -5,12 +5,12 @@ use super::rest::Rest;
 use super::stepped::{Clocked, Decision};
 use crate::design::{Design, Structure};
 use crate::error::{Error, Result};
+use crate::machine::axis::{CART, DRIVE};
+use crate::machine::{Encoder, EncoderPlace, Machine};
 use crate::mechanism::State;
 use crate::quantity::rounded;
 use crate::signal::profile::{Profile, Reference};
 use crate::solve::Run;
-use crate::stage::axis::{CART, DRIVE};
-use crate::stage::{Encoder, EncoderPlace, Stage};
 
 /// Measurements and references that a controller has at a sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -49,7 +49,7 @@ pub struct Observation {
 /// let limits = Limits { speed: 0.2, acceleration: 2.0, jerk: None, snap: None };
 /// let profile = Profile::new(0.0, &[Leg::To(0.05, limits)])?;
 /// let timing = Loop { every: 1e-3, delay: 0.0, limit: Some(12.0), lead: 0.0 };
-/// let run = close(&case.stage, &mut Proportional(3000.0), &timing, &profile, 1.0, 50e-6, Solver::Exact)?;
+/// let run = close(&case.machine, &mut Proportional(3000.0), &timing, &profile, 1.0, 50e-6, Solver::Exact)?;
 /// assert!(run.figures.final_cart_error.abs() < 1e-3);
 /// # Ok::<(), taut::Error>(())
 /// ```
@@ -133,7 +133,7 @@ impl Added {
 
 impl<'a> Sampled<'a> {
     pub(super) fn new(
-        stage: &Stage,
+        machine: &Machine,
         controller: &'a mut dyn Controller,
         timing: Loop,
         profile: &'a Profile,
@@ -142,7 +142,7 @@ impl<'a> Sampled<'a> {
         Self {
             controller,
             profile,
-            clocked: Clocked::new(stage, timing),
+            clocked: Clocked::new(machine, timing),
             limited: 0,
             held_back: 0.0,
             turns: 0,
@@ -252,8 +252,8 @@ pub(super) struct Sensors {
 }
 
 impl Sensors {
-    pub(super) fn new(stage: &Stage) -> Self {
-        Self { encoder: Sensor::new(stage), scale: Sensor::of_scale(stage) }
+    pub(super) fn new(machine: &Machine) -> Self {
+        Self { encoder: Sensor::new(machine), scale: Sensor::of_scale(machine) }
     }
 
     pub(super) fn exactly(self) -> Self {
@@ -283,20 +283,20 @@ pub(super) struct Sensor {
 }
 
 impl Sensor {
-    pub(super) fn new(stage: &Stage) -> Self {
-        let counts = stage.encoder.map(|encoder: Encoder| encoder.counts_per_unit(stage.motor.gear_ratio));
-        let r = stage.pulley_radius;
-        let (body, length) = match stage.encoder.map(|encoder| encoder.at) {
+    pub(super) fn new(machine: &Machine) -> Self {
+        let counts = machine.encoder.map(|encoder: Encoder| encoder.counts_per_unit(machine.motor.gear_ratio));
+        let r = machine.pulley_radius;
+        let (body, length) = match machine.encoder.map(|encoder| encoder.at) {
             Some(EncoderPlace::Cart) => (CART, 1.0),
             Some(EncoderPlace::DrivePulley) => (DRIVE, r),
-            Some(EncoderPlace::Motor) | None => (stage.mechanism().drives[0].shaft, r),
+            Some(EncoderPlace::Motor) | None => (machine.mechanism().drives[0].shaft, r),
         };
         Self { body, length, counts }
     }
 
     /// That of the scale beside the encoder, if there is one.
-    pub(super) fn of_scale(stage: &Stage) -> Option<Self> {
-        let counts = stage.scale?.counts_per_unit(stage.motor.gear_ratio);
+    pub(super) fn of_scale(machine: &Machine) -> Option<Self> {
+        let counts = machine.scale?.counts_per_unit(machine.motor.gear_ratio);
         Some(Self { body: CART, length: 1.0, counts: Some(counts) })
     }
 
@@ -312,18 +312,18 @@ impl Sensor {
 }
 
 /// Whether the encoder of this stage sits at the cart.
-pub fn measures_cart(stage: &Stage) -> bool {
-    stage.encoder.is_some_and(|encoder| encoder.at == EncoderPlace::Cart)
+pub fn measures_cart(machine: &Machine) -> bool {
+    machine.encoder.is_some_and(|encoder| encoder.at == EncoderPlace::Cart)
 }
 
 /// Whether a controller on this stage reads the scale beside the encoder: a cascade, state feedback and a disturbance
 /// observer do.
-pub fn reads_scale(design: &Design, stage: &Stage) -> bool {
+pub fn reads_scale(design: &Design, machine: &Machine) -> bool {
     let structure = match &design.structure {
         Structure::Cascade(_) | Structure::StateFeedback(_) => true,
         Structure::Pid(_) | Structure::SlidingMode(_) | Structure::Fuzzy(_) => false,
     };
-    stage.scale.is_some() && (structure || design.disturbance_observer.is_some())
+    machine.scale.is_some() && (structure || design.disturbance_observer.is_some())
 }
 
 /// Most samples that a command may wait for.

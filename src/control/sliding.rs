@@ -3,8 +3,8 @@
 use super::memory::Memory;
 use super::sampled::Speed;
 use crate::design::SlidingMode;
+use crate::machine::rigid::Rigid;
 use crate::signal::profile::Reference;
-use crate::stage::rigid::Rigid;
 
 /// A sliding-mode controller on the side of the encoder: σ = ė + λ e + κ ∫e dt (A. Hace et al., "Robust motion control
 /// and trajectory planning for planar laser cutting system", 2005, for belts).

@@ -4,21 +4,21 @@ use super::{Loop, Rows, Standard, stream};
 use crate::case::Move;
 use crate::design::Design;
 use crate::error::{Error, Result};
+use crate::machine::Machine;
 use crate::parameter::{Free, kinds};
 use crate::solve::{Ending, Flow, Solver};
-use crate::stage::Stage;
 use crate::trajectory::Trajectory;
 
 /// `stage` with one thing at a time that may be off, and all that is tied to it by nature, times 1 + `share` and times
 /// 1 − `share`; and what that is.
-pub fn spread(stage: &Stage, share: f64) -> Vec<(String, Stage)> {
+pub fn spread(machine: &Machine, share: f64) -> Vec<(String, Machine)> {
     let axis = |kind: &Free, word: &str, factor: f64| {
-        let mut other = stage.clone();
+        let mut other = machine.clone();
         kind.set(&mut other, factor);
         (format!("{} {} % {word}", kind.name, crate::quantity::rounded(100.0 * share)), other)
     };
     let both = |kind: &Free| [axis(kind, "more", 1.0 + share), axis(kind, "less", 1.0 - share)];
-    kinds(stage).iter().flat_map(both).collect()
+    kinds(machine).iter().flat_map(both).collect()
 }
 
 /// The worst of axes whose parameters are off.
@@ -39,7 +39,7 @@ pub struct Worst {
 /// The same controller, made for `stage`, on axes of which each parameter is off by a `share`. None where `stop` said
 /// so, which is asked with every block of rows.
 pub fn worst(
-    stage: &Stage,
+    machine: &Machine,
     design: &Design,
     motion: &Move,
     share: f64,
@@ -55,8 +55,8 @@ pub fn worst(
     let profile = motion.reference(design);
     let timing = Loop::of(design);
     let rows = Rows { until: motion.until, every: timing.every.min(motion.until), window: motion.window };
-    for (axis, other) in spread(stage, share) {
-        let mut controller = Standard::new(design, stage)?;
+    for (axis, other) in spread(machine, share) {
+        let mut controller = Standard::new(design, machine)?;
         let mut sink = |_: &Trajectory| if stop() { Flow::Stop } else { Flow::Continue };
         let run = stream(&other, &mut controller, &timing, &profile, &rows, solver, false, &mut sink)?;
         if stop() {

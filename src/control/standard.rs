@@ -11,9 +11,9 @@ use super::sliding::SlidingState;
 use super::state_feedback::StateFeedbackState;
 use crate::design::{Design, Structure};
 use crate::error::{Error, Result};
+use crate::machine::rigid::Rigid;
+use crate::machine::{AmplifierMode, Machine};
 use crate::signal::profile::Reference;
-use crate::stage::rigid::Rigid;
-use crate::stage::{AmplifierMode, Stage};
 
 /// A controller that a [`Design`] describes, made with a model of the axis: the stage itself, or what one takes it for.
 #[derive(Debug, Clone)]
@@ -41,7 +41,7 @@ enum Core {
 
 impl Standard {
     /// The controller of `design` for a `model` of the axis.
-    pub fn new(design: &Design, model: &Stage) -> Result<Self> {
+    pub fn new(design: &Design, model: &Machine) -> Result<Self> {
         check(design, model)?;
         let every = design.every;
         let compensation = Compensation::new(model, &design.feed_forward);
@@ -77,7 +77,7 @@ impl Standard {
 
 /// Weights of encoder and scale in the position that a disturbance observer is given: the share of the mass that moves
 /// with each, so that it sees the common motion, in which the belt does not swing. All of the encoder without a scale.
-pub(super) fn observed(model: &Stage, rigid: &Rigid) -> [f64; 2] {
+pub(super) fn observed(model: &Machine, rigid: &Rigid) -> [f64; 2] {
     match model.scale {
         None => [1.0, 0.0],
         Some(_) => [rigid.driving / rigid.mass, 1.0 - rigid.driving / rigid.mass],
@@ -85,7 +85,7 @@ pub(super) fn observed(model: &Stage, rigid: &Rigid) -> [f64; 2] {
 }
 
 /// Refuses what no controller can be.
-fn check(design: &Design, model: &Stage) -> Result<()> {
+fn check(design: &Design, model: &Machine) -> Result<()> {
     let Design { every, delay, limit, .. } = *design;
     if !((1e-9..=1e9).contains(&every) && (0.0..=1000.0 * every).contains(&delay)) {
         return Err(Error::new(format!("a controller cannot be sampled every {every} s with a delay of {delay} s"))

@@ -8,10 +8,10 @@ use super::riccati;
 use super::sampled::Sensor;
 use crate::design::{Design, StateFeedback};
 use crate::error::Result;
+use crate::machine::Machine;
+use crate::machine::axis::{CART, IDLER};
+use crate::machine::rigid::Rigid;
 use crate::signal::profile::Reference;
-use crate::stage::Stage;
-use crate::stage::axis::{CART, IDLER};
-use crate::stage::rigid::Rigid;
 use nalgebra::{DMatrix, DVector};
 
 /// A linear-quadratic regulator on the states that a Kalman filter estimates, both for the sampled axis with its delay.
@@ -79,8 +79,8 @@ impl StateFeedbackState {
     }
 
     /// For a model of the axis.
-    pub fn new(weights: &StateFeedback, stage: &Stage, design: &Design) -> Result<Self> {
-        let linear = Linear::of(stage);
+    pub fn new(weights: &StateFeedback, machine: &Machine, design: &Design) -> Result<Self> {
+        let linear = Linear::of(machine);
         let n = linear.a.nrows();
         let every = design.every;
         let ratio = design.delay / every;
@@ -141,18 +141,18 @@ impl StateFeedbackState {
 
         // The filter is the same problem transposed; what is unknown acts at the command, and as the same force at the
         // cart.
-        let force = Rigid::of(stage).force_per_command();
+        let force = Rigid::of(machine).force_per_command();
         let mut noise = DMatrix::zeros(n, n);
         for (column, scale) in [(0, weights.disturbance), (1, weights.disturbance * force)] {
             let effect = both.column(column) * scale;
             noise += &effect * effect.transpose();
         }
-        let (sensors, residual) = filter(&linear, &phi, &noise, weights, stage)?;
+        let (sensors, residual) = filter(&linear, &phi, &noise, weights, machine)?;
         let gain = regulator.gain.row(0).transpose();
         let law = Law { every, phi, now, before, sensors, gain, pending, has_integral: integral };
         Ok(Self {
             law,
-            radius: stage.pulley_radius,
+            radius: machine.pulley_radius,
             states: linear.states,
             estimate: DVector::zeros(n),
             scratch: DVector::zeros(n),
@@ -265,12 +265,12 @@ fn filter(
     phi: &DMatrix<f64>,
     noise: &DMatrix<f64>,
     weights: &StateFeedback,
-    stage: &Stage,
+    machine: &Machine,
 ) -> Result<(Vec<Corrected>, f64)> {
     let n = phi.nrows();
     let spread = |sensor: Sensor| weights.noise.max(0.3 * sensor.step());
-    let mut all = vec![(linear.measured.transpose(), spread(Sensor::new(stage)))];
-    if let (Some(row), Some(sensor)) = (&linear.scale, Sensor::of_scale(stage)) {
+    let mut all = vec![(linear.measured.transpose(), spread(Sensor::new(machine)))];
+    if let (Some(row), Some(sensor)) = (&linear.scale, Sensor::of_scale(machine)) {
         all.push((row.transpose(), spread(sensor)));
     }
     let mut rows = DMatrix::zeros(n, all.len());

@@ -5,9 +5,9 @@ use super::sampled::{Controller, Loop, Observation, Sensors};
 use super::standard::Standard;
 use crate::design::Design;
 use crate::error::Result;
+use crate::machine::Machine;
 use crate::mechanism::State;
 use crate::signal::profile::Reference;
-use crate::stage::Stage;
 use crate::trajectory::Interval;
 use std::collections::VecDeque;
 
@@ -38,12 +38,12 @@ pub(super) struct Decision {
 }
 
 impl Clocked {
-    pub fn new(stage: &Stage, timing: Loop) -> Self {
+    pub fn new(machine: &Machine, timing: Loop) -> Self {
         let (whole, rest) = timing.samples_late();
         Self {
             timing,
             clock: Interval::of(timing.every),
-            sensors: Sensors::new(stage),
+            sensors: Sensors::new(machine),
             k: 0,
             halfway: false,
             rest,
@@ -135,10 +135,10 @@ pub struct Stepped {
 
 impl Stepped {
     /// The controller of `design` on `stage`, its first sample at time zero.
-    pub fn new(design: &Design, stage: &Stage) -> Result<Self> {
+    pub fn new(design: &Design, machine: &Machine) -> Result<Self> {
         let timing = Loop::of(design);
         timing.check(timing.every)?;
-        Ok(Self { controller: Standard::new(design, stage)?, clocked: Clocked::new(stage, timing) })
+        Ok(Self { controller: Standard::new(design, machine)?, clocked: Clocked::new(machine, timing) })
     }
 
     /// When it decides next, s.

@@ -1,8 +1,8 @@
 //! Gains from bandwidth and damping: poles of the axis taken as one mass with its drag.
 
 use super::{Cascade, CurrentLoop, Design, Pid, Structure};
-use crate::stage::rigid::Rigid;
-use crate::stage::{AmplifierMode, Stage};
+use crate::machine::rigid::Rigid;
+use crate::machine::{AmplifierMode, Machine};
 use std::f64::consts::PI;
 
 /// By what factor each inner loop of a cascade is quicker than the one around it.
@@ -15,8 +15,8 @@ pub const CASCADE: f64 = 4.0;
 /// Cascade: K_v = ω₀, the speed loop s² + 2ζω_v s + ω_v² with ω_v = 4 ω₀ (without its integral the pole −ω_v), and the
 /// current loop −4 ω_v, or −1/(2 (T/2 + delay)) where sampling allows no more. A damping that the drag of the axis
 /// exceeds by itself takes a twentieth of the gain, for a search to change.
-pub fn place(design: &Design, stage: &Stage, bandwidth: f64, damping: f64) -> Option<Design> {
-    let rigid = Rigid::of(stage);
+pub fn place(design: &Design, machine: &Machine, bandwidth: f64, damping: f64) -> Option<Design> {
+    let rigid = Rigid::of(machine);
     let (mass, w) = (rigid.mass, 2.0 * PI * bandwidth);
     let sign = rigid.force_per_command().signum();
     let structure = match &design.structure {
@@ -40,10 +40,10 @@ pub fn place(design: &Design, stage: &Stage, bandwidth: f64, damping: f64) -> Op
             let current = old.current.map(|inner| {
                 let late = 0.5 * design.every + design.delay;
                 let pole = (CASCADE * speed).min(0.5 / late.max(f64::MIN_POSITIVE));
-                let gain = stage.amplifier.gain;
+                let gain = machine.amplifier.gain;
                 CurrentLoop {
-                    proportional: pole * stage.motor.inductance / gain,
-                    integral: pole * stage.motor.resistance / gain,
+                    proportional: pole * machine.motor.inductance / gain,
+                    integral: pole * machine.motor.resistance / gain,
                     ..inner
                 }
             });
@@ -80,7 +80,7 @@ pub fn first(design: &Design, swing: Option<f64>) -> f64 {
 }
 
 /// Whether a current is commanded, by amplifier or inner loop.
-pub fn commands_current(design: &Design, stage: &Stage) -> bool {
-    stage.amplifier.mode == AmplifierMode::Current
+pub fn commands_current(design: &Design, machine: &Machine) -> bool {
+    machine.amplifier.mode == AmplifierMode::Current
         || matches!(&design.structure, Structure::Cascade(Cascade { current: Some(_), .. }))
 }

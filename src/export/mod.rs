@@ -185,7 +185,7 @@ pub fn export(case: &Opened, target: Target, stem: &str, options: &Options) -> R
 /// The mechanism of a case.
 pub fn mechanism(case: &Opened) -> crate::mechanism::Mechanism {
     match case {
-        Opened::Axis(case) => case.stage.mechanism(),
+        Opened::Axis(case) => case.machine.mechanism(),
         Opened::Gantry(case) => case.gantry.mechanism(),
     }
 }

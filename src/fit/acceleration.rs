@@ -1,6 +1,6 @@
 //! The cart's acceleration, as an accelerometer on it shows: of the forces in the rows of a run.
 
-use crate::stage::Cart;
+use crate::machine::Cart;
 use crate::trajectory::Trajectory;
 
 /// M·x″ = F₁ − F₂ − friction + what else pulls at the cart. Empty where the rows lack the forces, as with a rigid belt.

@@ -3,8 +3,8 @@
 use super::{Estimate, Fit};
 use crate::case::{Case, Files, Given};
 use crate::error::{Error, Result};
+use crate::machine::Machine;
 use crate::parameter::{self, Field, Parameter, named, values};
-use crate::stage::Stage;
 use std::path::Path;
 
 impl Fit {
@@ -23,24 +23,24 @@ impl Fit {
     }
 
     fn text(&self, case: &Case, name: &Path, part: usize) -> Result<String> {
-        let stage = self.parts.get(part).map_or(&self.stage, |(_, stage)| stage);
+        let machine = self.parts.get(part).map_or(&self.machine, |(_, machine)| machine);
         let is_own = |estimate: &&Estimate| estimate.part.is_none_or(|own| own == part);
         let sets = || self.estimates.iter().filter(is_own).flat_map(|estimate| &estimate.sets);
         let text = without_other_forms(&case.text, sets().map(|(key, _)| key.as_str()));
-        let mut changes: Vec<String> = sets().flat_map(|(key, value)| changes_of(stage, case, key, *value)).collect();
+        let mut changes: Vec<String> = sets().flat_map(|(key, value)| changes_of(machine, case, key, *value)).collect();
         let read = |changes: &[String]| {
             let changes: Vec<&str> = changes.iter().map(String::as_str).collect();
             Case::from_text_for(name, &text, &changes, Files::Nothing)
         };
         let mut fitted = read(&changes);
-        if let Some(change) = fitted.as_ref().ok().and_then(|fitted| damping_share(case, &fitted.stage, stage)) {
+        if let Some(change) = fitted.as_ref().ok().and_then(|fitted| damping_share(case, &fitted.machine, machine)) {
             changes.push(change);
             fitted = read(&changes);
         }
-        if fitted.as_ref().map_or(true, |fitted| differs(&fitted.stage, stage).is_some()) {
+        if fitted.as_ref().map_or(true, |fitted| differs(&fitted.machine, machine).is_some()) {
             // The other direction, or the breakaway, stands in the text and went with what was fitted.
             let is_fitted = |body: &str| sets().any(|(key, _)| key.starts_with(&format!("{body}.friction.")));
-            for (key, value) in values(stage) {
+            for (key, value) in values(machine) {
                 let went_along = named(&key).is_some_and(|row| !row.follows.is_empty());
                 if went_along && key.split_once(".friction.").is_some_and(|(body, _)| is_fitted(body)) {
                     changes.push(format!("{key}={value}"));
@@ -50,7 +50,7 @@ impl Fit {
         }
         let fitted = fitted?;
         // A file that is another machine than the fit has other errors than those that are told of it.
-        if let Some((key, is, read)) = differs(stage, &fitted.stage) {
+        if let Some((key, is, read)) = differs(machine, &fitted.machine) {
             return Err(Error::new(format!("the fit cannot be written: `{key}` would be read as {read}, and is {is}"))
                 .in_file(name)
                 .next("give the case file a value of its own for it, or leave it out of [fit]"));
@@ -106,8 +106,8 @@ impl Fit {
 /// fitted mass or stiffness changes. None where the text gives neither, or `read` has that damping.
 ///
 /// c = 2 ζ k / ω₀
-fn damping_share(case: &Case, read: &Stage, stage: &Stage) -> Option<String> {
-    let (is, read) = (stage.belt.damping[0], read.belt.damping[0]);
+fn damping_share(case: &Case, read: &Machine, machine: &Machine) -> Option<String> {
+    let (is, read) = (machine.belt.damping[0], read.belt.damping[0]);
     let mut keys = ["belt.damping_ratio", "belt.loss_factor"].into_iter();
     let (key, given) = keys.find_map(|key| match case.value(key) {
         Ok(Given::Number(given)) => Some((key, given)),
@@ -117,9 +117,9 @@ fn damping_share(case: &Case, read: &Stage, stage: &Stage) -> Option<String> {
 }
 
 /// The changes of the text with which `key` is `value`.
-fn changes_of(stage: &Stage, case: &Case, key: &str, value: f64) -> Vec<String> {
+fn changes_of(machine: &Machine, case: &Case, key: &str, value: f64) -> Vec<String> {
     let Some(row) = named(key) else { return Vec::new() };
-    let own: Vec<(String, f64)> = values(stage)
+    let own: Vec<(String, f64)> = values(machine)
         .into_iter()
         .filter(|(element, _)| named(element).is_some_and(|other| other.key == row.key))
         .collect();
@@ -161,7 +161,7 @@ fn without_other_forms<'a>(text: &str, keys: impl Iterator<Item = &'a str>) -> S
 }
 
 /// A number that two machines do not share but for rounding in text, and what it is in each; NaN where it is not there.
-fn differs(a: &Stage, b: &Stage) -> Option<(String, f64, f64)> {
+fn differs(a: &Machine, b: &Machine) -> Option<(String, f64, f64)> {
     let near = |a: f64, b: f64| a == b || (a - b).abs() <= 1e-9 * a.abs().max(b.abs());
     let (a, b) = (values(a), values(b));
     let of = |all: &[(String, f64)], key: &str| all.iter().find(|(own, _)| own == key).map_or(f64::NAN, |own| own.1);

@@ -91,9 +91,9 @@ fn named(
     }
     let (va, vb) = (problem.value(a, x[a]), problem.value(b, x[b]));
     let (ua, ub) = (problem.parameters[a].unit, problem.parameters[b].unit);
-    let stage = problem.stage_at(x);
+    let machine = problem.stage_at(x);
     // Relative changes are by `whole`, which is more than the value of what is small.
-    let relative = |j: usize, value: f64| problem.slope(j, value) * problem.whole(&stage, j, x[j]) / value;
+    let relative = |j: usize, value: f64| problem.slope(j, value) * problem.whole(&machine, j, x[j]) / value;
     let (ra, rb) = (relative(a, va), relative(b, vb));
     if va == 0.0 || vb == 0.0 || !ra.is_finite() || !rb.is_finite() {
         return None;

@@ -4,19 +4,19 @@
 use crate::case::Case;
 use crate::control::{Controller, Loop, Observation, Standard};
 use crate::log::{Log, Quantity};
+use crate::machine::{EncoderPlace, Machine};
 use crate::signal::profile::Profile;
-use crate::stage::{EncoderPlace, Stage};
 
 /// The share of the logged input that the controller of `case` makes of reference and position of a log, 100 (1 − ‖u −
 /// û‖/‖u − ū‖); none without a controller, a reference or a position.
 pub(super) fn reproduced(case: &Case, log: &Log) -> Option<f64> {
     let (design, reference) = (case.controller.as_ref()?, log.reference.as_ref()?);
-    let position = position(&case.stage, log)?;
-    let scale = match case.stage.scale {
+    let position = position(&case.machine, log)?;
+    let scale = match case.machine.scale {
         Some(_) => Some(filled(log, Quantity::CartPosition, 1.0)?),
         None => None,
     };
-    let mut controller = Standard::new(design, &case.stage).ok()?;
+    let mut controller = Standard::new(design, &case.machine).ok()?;
     let profile = Profile::sampled(&log.time, reference).shaped(&design.shaper);
     let timing = Loop::of(design);
     let end = *log.time.last()?;
@@ -62,10 +62,10 @@ pub(super) fn reproduced(case: &Case, log: &Log) -> Option<f64> {
 }
 
 /// The reading of the controller's encoder along a log, m along the belt, gaps filled.
-fn position(stage: &Stage, log: &Log) -> Option<Vec<f64>> {
+fn position(machine: &Machine, log: &Log) -> Option<Vec<f64>> {
     let cart = filled(log, Quantity::CartPosition, 1.0);
-    let angle = filled(log, Quantity::DriveAngle, stage.pulley_radius);
-    match stage.encoder.map(|encoder| encoder.at) {
+    let angle = filled(log, Quantity::DriveAngle, machine.pulley_radius);
+    match machine.encoder.map(|encoder| encoder.at) {
         Some(EncoderPlace::Cart) => cart.or(angle),
         Some(EncoderPlace::DrivePulley | EncoderPlace::Motor) | None => angle.or(cart),
     }

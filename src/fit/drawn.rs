@@ -4,8 +4,8 @@ use super::problem::parameters;
 use crate::case::{Case, Plan};
 use crate::error::{Error, Result};
 use crate::log::read_columns;
+use crate::machine::Machine;
 use crate::parameter::{self, Free};
-use crate::stage::Stage;
 use crate::trajectory::Column;
 use std::path::Path;
 
@@ -14,10 +14,10 @@ use std::path::Path;
 ///
 /// Numbers that are none of the machine, a log's delay say, are passed over. Errors: a column that is not there, values
 /// that are missing.
-pub fn machines(case: &Case, plan: &Plan, file: &Path) -> Result<Vec<Stage>> {
+pub fn machines(case: &Case, plan: &Plan, file: &Path) -> Result<Vec<Machine>> {
     let (parameters, columns) = drawn(case, plan, &[], file)?;
     let machine = |row: usize| {
-        let mut stage = case.stage.clone();
+        let mut stage = case.machine.clone();
         parameter::set(&mut stage, parameters.iter().zip(columns.iter().map(|column| column[row])));
         stage
     };
@@ -27,7 +27,7 @@ pub fn machines(case: &Case, plan: &Plan, file: &Path) -> Result<Vec<Stage>> {
 /// The draws themselves: what is free, and its values by draw. Keys that are set by others do not go along with any of
 /// it.
 pub fn drawn(case: &Case, plan: &Plan, others: &[&str], file: &Path) -> Result<(Vec<Free>, Vec<Vec<f64>>)> {
-    let parameters = parameters(&case.stage, plan, others)?;
+    let parameters = parameters(&case.machine, plan, others)?;
     if parameters.is_empty() {
         return Err(Error::new("nothing is searched for").next("add free = [\"cart.mass\"] to [fit]"));
     }

@@ -107,12 +107,12 @@ fn errors(found: &Searched) -> Vec<Together> {
 
 /// The plans with one change each.
 fn singles(case: &Case, plan: &Plan, none: &Plan) -> Vec<Plan> {
-    let stage = &case.stage;
+    let machine = &case.machine;
     let mut taken: Vec<Free> = Vec::new();
     let mut plans = Vec::new();
     let mut single = |own: Plan| {
         let Some(name) = own.names().next() else { return };
-        let Ok(free) = Free::new(stage, &name, &[], &plan.bounds) else { return };
+        let Ok(free) = Free::new(machine, &name, &[], &plan.bounds) else { return };
         let same = |other: &Free| other.keys == free.keys;
         if !taken.iter().any(same) {
             taken.push(free);
@@ -122,7 +122,7 @@ fn singles(case: &Case, plan: &Plan, none: &Plan) -> Vec<Plan> {
             });
         }
     };
-    for key in plan.free.iter().cloned().chain(parameter::every(stage)).chain(["cart.load".to_string()]) {
+    for key in plan.free.iter().cloned().chain(parameter::every(machine)).chain(["cart.load".to_string()]) {
         single(Plan { free: vec![key], ..none.clone() });
     }
     for keys in &plan.tied {

@@ -4,9 +4,9 @@
 use super::run::Run;
 use crate::case::{Experiment, Initial};
 use crate::log::Quantity;
+use crate::machine::Machine;
 use crate::signal::{Hold, Signal};
 use crate::solve::{Bench, Detail, Ending, Flow};
-use crate::stage::Stage;
 use crate::trajectory::Trajectory;
 
 /// Columns of the state, in the order of [`Initial`].
@@ -14,7 +14,7 @@ const STATE: [&str; 6] = ["drive_angle", "drive_speed", "cart_position", "cart_s
 
 /// Weighted residuals, model minus log, of machines that follow each other in equal parts of the log; false where the
 /// log is not one of an open loop at even times, or a machine does not get through its part.
-pub(super) fn residuals(run: &Run, stages: &[Stage], extras: &[f64], out: &mut [f64]) -> bool {
+pub(super) fn residuals(run: &Run, stages: &[Machine], extras: &[f64], out: &mut [f64]) -> bool {
     let is_known = |seen: &Quantity| !seen.name().starts_with("rotor") && *seen != Quantity::CartAcceleration;
     let quantities: Vec<Quantity> = run.seen.iter().map(|seen| seen.quantity).collect();
     if !run.is_even() || run.is_closed() || !quantities.iter().all(is_known) {
@@ -23,20 +23,20 @@ pub(super) fn residuals(run: &Run, stages: &[Stage], extras: &[f64], out: &mut [
     let n = run.time.len();
     let mut columns = vec![Vec::with_capacity(n); quantities.len()];
     let mut initial = None;
-    for (part, stage) in stages.iter().enumerate() {
+    for (part, machine) in stages.iter().enumerate() {
         let at = |part: usize| (n - 1) * part / stages.len();
         let (begin, end) = (at(part), at(part + 1));
         if begin == end {
             continue;
         }
-        let mut stage = stage.clone();
-        let whole = run.experiment(&mut stage, extras);
-        stage.encoder = None;
+        let mut machine = machine.clone();
+        let whole = run.experiment(&mut machine, extras);
+        machine.encoder = None;
         let Some(input) = later(&whole.input, run.time[begin]) else { return false };
         let initial_here = initial.unwrap_or(whole.initial);
         let until = whole.every * (end - begin) as f64;
         let experiment = Experiment { input, initial: initial_here, until, ..whole };
-        let Some((rows, last)) = rows(&stage, &experiment, &quantities) else { return false };
+        let Some((rows, last)) = rows(&machine, &experiment, &quantities) else { return false };
         if rows[0].len() != end - begin + 1 {
             return false;
         }
@@ -49,11 +49,11 @@ pub(super) fn residuals(run: &Run, stages: &[Stage], extras: &[f64], out: &mut [
 }
 
 /// The outputs of an experiment, and the state at its end.
-fn rows(stage: &Stage, experiment: &Experiment, quantities: &[Quantity]) -> Option<(Vec<Vec<f64>>, Initial)> {
+fn rows(machine: &Machine, experiment: &Experiment, quantities: &[Quantity]) -> Option<(Vec<Vec<f64>>, Initial)> {
     let mut columns = vec![Vec::new(); quantities.len()];
     let mut state = [0.0; 6];
     let mut bench = Bench::default();
-    bench.mount(stage).ok()?;
+    bench.mount(machine).ok()?;
     let mut take = |block: &Trajectory| {
         for (column, quantity) in columns.iter_mut().zip(quantities) {
             column.extend_from_slice(super::run::column(block, *quantity));

@@ -10,9 +10,9 @@ use super::trials::{self, is_borne_out};
 use super::{Fit, Wave};
 use crate::case::{Case, Plan, Scope};
 use crate::log::{Note, Remedy, Severity};
+use crate::machine::AmplifierMode;
 use crate::number::engineering;
 use crate::solve::Bench;
-use crate::stage::AmplifierMode;
 
 /// Standard errors that a kink may promise and not keep.
 const KINK: f64 = 2.0;
@@ -114,7 +114,7 @@ fn of_logs(case: &Case, plan: &Plan, found: &Searched) -> Vec<Finding> {
 fn grade(note: &Note, case: &Case, plan: &Plan) -> Grade {
     match (note.severity, note.code) {
         (Severity::Suspicion, _) | (_, "still") => Grade::Warning,
-        (_, "saturation") if case.stage.travel.is_none() || note.column == Some("input") => Grade::Warning,
+        (_, "saturation") if case.machine.travel.is_none() || note.column == Some("input") => Grade::Warning,
         (_, "outliers") if !plan.huber => Grade::Warning,
         _ => Grade::Note,
     }
@@ -272,9 +272,9 @@ fn of_search(fit: &Fit) -> Vec<Finding> {
 
 /// Whether K_t and K_e can be those of one motor.
 fn of_motor(case: &Case, fit: &Fit) -> Option<Finding> {
-    let motor = &fit.stage.motor;
+    let motor = &fit.machine.motor;
     let (k_t, k_e) = (motor.torque_constant, motor.back_emf_constant);
-    if motor.is_simple || case.stage.amplifier.mode != AmplifierMode::Voltage || k_t <= 0.0 || k_e <= 0.0 {
+    if motor.is_simple || case.machine.amplifier.mode != AmplifierMode::Voltage || k_t <= 0.0 || k_e <= 0.0 {
         return None;
     }
     let ratio = k_t / k_e;

@@ -3,16 +3,16 @@
 use super::scores::LogFit;
 use super::{Combination, Disagreement, Ending, Finding, Grade, Identifiability, OtherLaw, Wave};
 use crate::log::Quantity;
-use crate::stage::Stage;
+use crate::machine::Machine;
 
 /// The result of a fit.
 #[derive(Debug, Clone)]
 pub struct Fit {
     /// The machine with the estimates. Of the machines that meet the logs alike, it is the nearest to that of the case.
-    pub stage: Stage,
+    pub machine: Machine,
     /// The machine of each campaign, or log, that has parameters for itself: `stage` is the first. Empty where nothing
     /// is separate.
-    pub parts: Vec<(String, Stage)>,
+    pub parts: Vec<(String, Machine)>,
     /// The estimates: free parameters, then what all logs share.
     pub estimates: Vec<Estimate>,
     /// Correlations of the estimates, row by row; NaN where one is at a bound.

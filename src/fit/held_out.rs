@@ -5,8 +5,8 @@ use super::problem::Problem;
 use super::run::{Extra, Nuisance, Run};
 use super::scores::{LogFit, compared};
 use crate::log::Quantity;
+use crate::machine::Machine;
 use crate::solve::Flow;
-use crate::stage::Stage;
 
 /// Fewest rows that a start is fitted to.
 const FEWEST: usize = 20;
@@ -23,7 +23,7 @@ pub(super) struct Known<'a> {
 
 /// A log beside `stage`: delay, gain and offsets are what the fitted logs say. Where it starts is fitted to the first
 /// `share` of its rows.
-pub(super) fn met(run: &Run, stage: &Stage, known: &Known, share: f64) -> LogFit {
+pub(super) fn met(run: &Run, machine: &Machine, known: &Known, share: f64) -> LogFit {
     let is_start = |what| matches!(what, Nuisance::StartPosition | Nuisance::StartSpeed);
     let mut alone = run.clone();
     for extra in alone.extras.iter_mut().filter(|extra| !is_start(extra.what)) {
@@ -34,7 +34,7 @@ pub(super) fn met(run: &Run, stage: &Stage, known: &Known, share: f64) -> LogFit
     alone.share(&[]);
     let rows = alone.time.len();
     alone.fitted_rows = ((rows as f64 * share).ceil() as usize).clamp(FEWEST.min(rows), rows);
-    let mut problem = Problem::alone(stage.clone(), alone);
+    let mut problem = Problem::alone(machine.clone(), alone);
     problem.weigh_by(known.noise);
     let mut x = problem.start();
     if !x.is_empty() {
@@ -52,7 +52,7 @@ pub(super) fn met(run: &Run, stage: &Stage, known: &Known, share: f64) -> LogFit
     let told = told.collect();
     let mut shown = alone.clone();
     shown.fitted_rows = run.fitted_rows;
-    compared(&shown, stage, &extras, told)
+    compared(&shown, machine, &extras, told)
 }
 
 /// An extra that has this value.

@@ -209,18 +209,18 @@ impl Identifiability {
                 }
             }
             let best = (0..m).max_by(|&a, &b| left[(a, a)].total_cmp(&left[(b, b)])).unwrap_or(0);
-            let stage = problem.stage_at(x);
+            let machine = problem.stage_at(x);
             // ∂/∂p of what is determined
             let weights: Vec<f64> = members
                 .iter()
                 .enumerate()
                 .map(|(a, &j)| {
                     let value = problem.value(j, x[j]);
-                    left[(a, best)] / (problem.slope(j, value) * problem.whole(&stage, j, x[j]))
+                    left[(a, best)] / (problem.slope(j, value) * problem.whole(&machine, j, x[j]))
                 })
                 .collect();
             let parameters: Vec<&Free> = members.iter().map(|&j| &problem.parameters[j]).collect();
-            if let Some(sum) = sum_of(&stage, &parameters, &weights) {
+            if let Some(sum) = sum_of(&machine, &parameters, &weights) {
                 return format!("of {} only the combination {sum} is identifiable", listed(&names));
             }
         }
@@ -312,8 +312,8 @@ impl Directions {
         }
         let columns: Vec<usize> = which.iter().copied().chain(globals..jacobian.ncols()).collect();
         let mut own = projected(&jacobian.select_columns(&columns), which.len())?;
-        let stage = problem.stage_at(x);
-        let whole: Vec<f64> = (0..globals).map(|j| problem.whole(&stage, j, x[j])).collect();
+        let machine = problem.stage_at(x);
+        let whole: Vec<f64> = (0..globals).map(|j| problem.whole(&machine, j, x[j])).collect();
         for (column, &j) in which.iter().enumerate() {
             own.column_mut(column).scale_mut(whole[j]);
         }
@@ -394,7 +394,7 @@ fn sum_with(key: &str) -> Option<Sum> {
 }
 
 /// A sum over the bodies that these weights are, in symbols and numbers.
-pub(super) fn sum_of(stage: &crate::stage::Stage, parameters: &[&Free], weights: &[f64]) -> Option<String> {
+pub(super) fn sum_of(machine: &crate::machine::Machine, parameters: &[&Free], weights: &[f64]) -> Option<String> {
     // Each one's keys must be parts of one sum.
     let sum = sum_with(&parameters.first()?.keys.first()?.0)?;
     let mut parts = Vec::new();
@@ -408,9 +408,9 @@ pub(super) fn sum_of(stage: &crate::stage::Stage, parameters: &[&Free], weights:
         let mut own = 0.0;
         for (key, factor) in &free.keys {
             let (arm, symbol) = arm_and_symbol(key)?;
-            own += factor * arm.of(stage);
+            own += factor * arm.of(machine);
             parts.push(arm.times(symbol));
-            total += arm.of(stage) * value(stage, key)?;
+            total += arm.of(machine) * value(machine, key)?;
         }
         // All weights are the same number of times the arms, within a tenth: the belt gives way a little.
         let ratio = weight / own;
@@ -422,15 +422,15 @@ pub(super) fn sum_of(stage: &crate::stage::Stage, parameters: &[&Free], weights:
     let is_free = |key: &str| parameters.iter().any(|free| free.keys.iter().any(|(own, _)| own == key));
     for row in sum.parts(true).filter(|row| !is_free(row.key)) {
         let (arm, symbol) = arm_and_symbol(row.key)?;
-        let own = arm.of(stage) * value(stage, row.key).unwrap_or(0.0);
+        let own = arm.of(machine) * value(machine, row.key).unwrap_or(0.0);
         if own != 0.0 {
             total += own;
             parts.push(arm.times(symbol));
         }
     }
-    let motor = &stage.motor;
+    let motor = &machine.motor;
     if sum == Sum::Viscous
-        && stage.amplifier.mode == crate::stage::AmplifierMode::Voltage
+        && machine.amplifier.mode == crate::machine::AmplifierMode::Voltage
         && motor.back_emf_constant != 0.0
     {
         let n2 = motor.gear_ratio * motor.gear_ratio;

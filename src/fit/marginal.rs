@@ -128,11 +128,11 @@ impl<'a> Marginal<'a> {
         let stages = self.problem.stages(all);
         let of = |shifts: &Shifts| {
             let run = &self.problem.runs[shifts.run];
-            let stage = &stages[run.part];
+            let machine = &stages[run.part];
             let mut matrix = DMatrix::zeros(run.rows(), shifts.own.len());
-            let extras = self.problem.own_shifts(shifts.run, stage);
+            let extras = self.problem.own_shifts(shifts.run, machine);
             for ((_, extra), mut column) in extras.iter().zip(matrix.column_iter_mut()) {
-                run.shift(stage, extra, column.as_mut_slice());
+                run.shift(machine, extra, column.as_mut_slice());
             }
             let (q, r) = matrix.qr().unpack();
             Columns { q, r }
@@ -334,7 +334,7 @@ mod tests {
         let rows = ["experiment.0.every=10ms", "experiment.0.until=0.5s"];
         let mut case = Case::from_text_with("axis.toml", TEMPLATE, &rows).unwrap();
         case.experiments.truncate(1);
-        let run = simulate(&case.stage, &case.experiments[0], Solver::Exact).unwrap().trajectory;
+        let run = simulate(&case.machine, &case.experiments[0], Solver::Exact).unwrap().trajectory;
         let column = |name: &str| run.get(name).unwrap().to_vec();
         let noise = |k: usize, size: f64| size * (1.0 + (2.1 * k as f64).sin());
         let outputs = [(Quantity::DriveAngle, 10e-3), (Quantity::CartPosition, 1e-4)].map(|(quantity, size)| {

@@ -115,8 +115,8 @@ pub(super) fn nearest(
         if lost.ncols() == 0 {
             return Some(judged);
         }
-        let stage = problem.stage_at(&best.x);
-        let whole: Vec<f64> = (0..lost.nrows()).map(|j| problem.whole(&stage, j, best.x[j])).collect();
+        let machine = problem.stage_at(&best.x);
+        let whole: Vec<f64> = (0..lost.nrows()).map(|j| problem.whole(&machine, j, best.x[j])).collect();
         let Some(found) = round(problem, best, (given, &whole), &lost, (&options, most), watch, work) else { break };
         let moved = (0..lost.nrows()).map(|j| ((found.x[j] - best.x[j]) / whole[j]).abs()).fold(0.0, f64::max);
         *best = found;

@@ -20,9 +20,9 @@ use super::search::Searched;
 use super::uncertainty::{Judged, NORMAL, inverse_of_square};
 use crate::friction::{Friction, Law, Shape};
 use crate::log::Quantity;
+use crate::machine::Machine;
 use crate::number::engineering;
 use crate::solve::Bench;
-use crate::stage::Stage;
 use nalgebra::{DMatrix, DVector};
 
 /// Stribeck velocities that are tried, as shares of the body's greatest speed.
@@ -87,11 +87,11 @@ impl Body {
         }
     }
 
-    fn friction(self, stage: &mut Stage) -> &mut Friction {
+    fn friction(self, machine: &mut Machine) -> &mut Friction {
         match self {
-            Body::Drive => &mut stage.drive_pulley.friction,
-            Body::Cart => &mut stage.cart.friction,
-            Body::Idler => &mut stage.idler_pulley.friction,
+            Body::Drive => &mut machine.drive_pulley.friction,
+            Body::Cart => &mut machine.cart.friction,
+            Body::Idler => &mut machine.idler_pulley.friction,
         }
     }
 }
@@ -122,8 +122,8 @@ impl Candidate {
     }
 
     /// Puts so much of the law into a machine, at this share of a log.
-    fn put(self, stage: &mut Stage, amplitude: f64, share: f64) {
-        let friction = self.body.friction(stage);
+    fn put(self, machine: &mut Machine, amplitude: f64, share: f64) {
+        let friction = self.body.friction(machine);
         match self.kind {
             Kind::Stribeck(velocity) => {
                 friction.law = Law::Stribeck { velocity, shape: Shape::Gaussian };
@@ -245,12 +245,12 @@ pub(super) fn other_law(found: &Searched, judged: &Judged) -> Option<OtherLaw> {
 
 /// The laws to be tried: of bodies whose friction is free, and only of Coulomb's law.
 fn candidates(problem: &Problem, x: &[f64]) -> Vec<Candidate> {
-    let mut stage = problem.stage_at(x);
+    let mut machine = problem.stage_at(x);
     let mut all = Vec::new();
     for body in Body::ALL {
         let prefix = format!("{}.friction.", body.key());
         let is_free = problem.parameters.iter().flat_map(|own| &own.keys).any(|(key, _)| key.starts_with(&prefix));
-        let friction = *body.friction(&mut stage);
+        let friction = *body.friction(&mut machine);
         let (forward, backward) = (friction.forward, friction.backward);
         let coulomb = f64::min(forward.coulomb, backward.coulomb);
         let alike = forward == backward && forward.breakaway <= forward.coulomb;
@@ -271,8 +271,8 @@ fn fastest(problem: &Problem, x: &[f64], body: Body) -> f64 {
     let mut most: f64 = 0.0;
     let mut speeds = [Vec::new()];
     for (index, run) in problem.runs.iter().enumerate() {
-        let stage = problem.stage_of(run.part, x);
-        if run.predict(&mut bench, &stage, &problem.extras_of(index, x), &[quantity], &mut speeds) {
+        let machine = problem.stage_of(run.part, x);
+        if run.predict(&mut bench, &machine, &problem.extras_of(index, x), &[quantity], &mut speeds) {
             most = speeds[0].iter().fold(most, |most, v| most.max(v.abs()));
         }
     }
@@ -288,16 +288,16 @@ impl Place<'_> {
         for (index, run) in self.problem.runs.iter().enumerate() {
             let first = self.problem.first_row(index);
             let extras = self.problem.extras_of(index, self.x);
-            let stage = self.problem.stage_of(run.part, self.x);
+            let machine = self.problem.stage_of(run.part, self.x);
             let with = |share: f64| {
-                let mut stage = stage.clone();
-                candidate.put(&mut stage, step, share);
-                stage
+                let mut machine = machine.clone();
+                candidate.put(&mut machine, step, share);
+                machine
             };
             let rows = &mut moved[first..first + run.rows()];
             let good = match candidate.kind {
                 Kind::Drift => {
-                    let stages: Vec<Stage> = (0..PARTS).map(|k| with((k as f64 + 0.5) / PARTS as f64)).collect();
+                    let stages: Vec<Machine> = (0..PARTS).map(|k| with((k as f64 + 0.5) / PARTS as f64)).collect();
                     drifting::residuals(run, &stages, &extras, rows)
                 }
                 Kind::Stribeck(_) | Kind::Sided => run.residuals(&mut bench, &with(0.5), &extras, rows),

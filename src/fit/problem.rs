@@ -5,9 +5,9 @@ use super::run::{Extra, MeasuredOutput, Nuisance, Run, Setting, is_position, rou
 use crate::case::{Case, Nuisances, Plan, Scope, matches};
 use crate::error::{Error, Result};
 use crate::log::Quantity;
+use crate::machine::{AmplifierMode, Machine};
 use crate::parameter::{self, Free};
 use crate::solve::Bench;
-use crate::stage::{AmplifierMode, Stage};
 use nalgebra::DMatrix;
 
 /// Share of how far a quantity ranges that numbers in files and solvers may be off by.
@@ -26,7 +26,7 @@ const SHARED: f64 = 5.0;
 #[derive(Clone)]
 pub struct Problem<'a> {
     /// The machine as the case has it.
-    pub stage: Stage,
+    pub machine: Machine,
     /// The free parameters of it.
     pub parameters: Vec<Free>,
     /// The part of the logs that each of these is for, by its place in `parts`; none where it is for all of them.
@@ -99,8 +99,8 @@ impl<'a> Problem<'a> {
     /// The problem that `plan` poses with the logs of `case`.
     pub fn new(case: &Case, plan: &Plan) -> Result<Self> {
         case.complete()?;
-        let stage = case.stage.clone();
-        let (parameters, of, parts) = separated(case, plan, parameters(&stage, plan, &[])?)?;
+        let machine = case.machine.clone();
+        let (parameters, of, parts) = separated(case, plan, parameters(&machine, plan, &[])?)?;
         let mut runs = Vec::new();
         let mut held_out = Vec::new();
         for experiment in &case.experiments {
@@ -122,8 +122,8 @@ impl<'a> Problem<'a> {
             ));
         }
         let mut problem = Self {
-            units: parameters.iter().map(|parameter| scale(&stage, parameter, &runs)).collect(),
-            stage,
+            units: parameters.iter().map(|parameter| scale(&machine, parameter, &runs)).collect(),
+            machine,
             parameters,
             of,
             parts,
@@ -141,10 +141,10 @@ impl<'a> Problem<'a> {
     }
 
     /// A single run of a machine that is known.
-    pub(super) fn alone(stage: Stage, mut run: Run) -> Self {
+    pub(super) fn alone(machine: Machine, mut run: Run) -> Self {
         run.part = 0;
         Self {
-            stage,
+            machine,
             parameters: Vec::new(),
             of: Vec::new(),
             parts: Vec::new(),
@@ -185,7 +185,7 @@ impl<'a> Problem<'a> {
         let offset = Extra { what: Nuisance::InputOffset, start: 0.0, unit: most, low: -most, high: most, known: None };
         let scopes = [(delay, late), (input_gain, gain), (input_offset, offset)];
         self.shared = scopes.iter().filter(|(scope, _)| *scope == Scope::Shared).map(|(_, extra)| *extra).collect();
-        let r = self.stage.pulley_radius;
+        let r = self.machine.pulley_radius;
         let noise = self.noise();
         for run in self.runs.iter_mut().chain(&mut self.held_out) {
             let own = scopes.iter().filter(|(scope, _)| *scope == Scope::Each).map(|(_, extra)| *extra);
@@ -325,7 +325,7 @@ impl<'a> Problem<'a> {
     /// of a position, as far as noise that neighbouring values share can be more than what they differ by; beyond that
     /// it is the model that is off, and not the value.
     pub fn doubt_starts(&mut self, quantity: Quantity, deviation: f64) {
-        let r = self.stage.pulley_radius;
+        let r = self.machine.pulley_radius;
         for run in &mut self.runs {
             let Some(first) = run.seen.iter().find(|seen| is_position(seen.quantity)) else { continue };
             if first.quantity != quantity {
@@ -391,11 +391,11 @@ impl<'a> Problem<'a> {
     }
 
     /// The same with the parameters of a machine, as far as it has them within their bounds.
-    pub(super) fn point_of(&self, stage: &Stage) -> Vec<f64> {
+    pub(super) fn point_of(&self, machine: &Machine) -> Vec<f64> {
         let mut x = self.start();
         let bounds = self.bounds();
         for (j, parameter) in self.parameters.iter().enumerate() {
-            let own = parameter.value_in(stage).map(|value| self.variable(j, value));
+            let own = parameter.value_in(machine).map(|value| self.variable(j, value));
             x[j] = own.filter(|own| own.is_finite()).map_or(x[j], |own| own.clamp(bounds.low[j], bounds.high[j]));
         }
         x
@@ -433,10 +433,10 @@ impl<'a> Problem<'a> {
 
     /// The change of the variable that counts as 100 %, of a machine like `stage`: where it may be zero, its value or a
     /// typical one.
-    pub fn whole(&self, stage: &Stage, j: usize, x: f64) -> f64 {
+    pub fn whole(&self, machine: &Machine, j: usize, x: f64) -> f64 {
         match self.units.get(j) {
             Some(Scale::Linear(unit)) => {
-                let typical = typical(stage, &self.parameters[j], &self.runs);
+                let typical = typical(machine, &self.parameters[j], &self.runs);
                 // Of what has no size by nature, the value itself, or where it started.
                 typical.map_or(if x == 0.0 { 1.0 } else { x.abs() }, |typical| x.abs().max(typical / unit))
             }
@@ -460,8 +460,8 @@ impl<'a> Problem<'a> {
         let mut own = x.to_vec();
         for (j, (parameter, unit)) in self.parameters.iter().zip(&self.units).enumerate() {
             let asked = unit.value(x[j]);
-            let stage = self.stage_of(self.of[j].unwrap_or(0), x);
-            match parameter.value_in(&stage) {
+            let machine = self.stage_of(self.of[j].unwrap_or(0), x);
+            match parameter.value_in(&machine) {
                 Some(set) if (set - asked).abs() > 1e-9 * set.abs() => own[j] = unit.variable(set),
                 _ => {}
             }
@@ -470,21 +470,21 @@ impl<'a> Problem<'a> {
     }
 
     /// The machine with these values; of what parts of the logs have for themselves, those of the first.
-    pub fn stage_at(&self, x: &[f64]) -> Stage {
+    pub fn stage_at(&self, x: &[f64]) -> Machine {
         self.stage_of(0, x)
     }
 
     /// The machine with the values for a part of the logs.
-    pub fn stage_of(&self, part: usize, x: &[f64]) -> Stage {
-        let mut stage = self.stage.clone();
+    pub fn stage_of(&self, part: usize, x: &[f64]) -> Machine {
+        let mut machine = self.machine.clone();
         let values = self.parameters.iter().zip(&self.units).zip(x).zip(&self.of);
         let own = values.filter(|(_, of)| of.is_none_or(|of| of == part));
-        parameter::set(&mut stage, own.map(|(((parameter, unit), x), _)| (parameter, unit.value(*x))));
-        stage
+        parameter::set(&mut machine, own.map(|(((parameter, unit), x), _)| (parameter, unit.value(*x))));
+        machine
     }
 
     /// The machines of all parts of the logs.
-    pub(super) fn stages(&self, x: &[f64]) -> Vec<Stage> {
+    pub(super) fn stages(&self, x: &[f64]) -> Vec<Machine> {
         (0..self.parts.len().max(1)).map(|part| self.stage_of(part, x)).collect()
     }
 
@@ -521,9 +521,9 @@ impl<'a> Problem<'a> {
     }
 
     /// Those of them that do no more than shift outputs.
-    pub(super) fn own_shifts(&self, index: usize, stage: &Stage) -> Vec<(usize, Extra)> {
+    pub(super) fn own_shifts(&self, index: usize, machine: &Machine) -> Vec<(usize, Extra)> {
         let mut own = self.own_variables(index);
-        own.retain(|(_, extra)| self.runs[index].only_shifts(stage, extra));
+        own.retain(|(_, extra)| self.runs[index].only_shifts(machine, extra));
         own
     }
 
@@ -555,11 +555,11 @@ impl<'a> Problem<'a> {
     }
 
     /// The columns of what only shifts the outputs of a run.
-    fn shifts(&self, stage: &Stage, (index, first): (usize, usize), jacobian: &mut DMatrix<f64>) {
+    fn shifts(&self, machine: &Machine, (index, first): (usize, usize), jacobian: &mut DMatrix<f64>) {
         let run = &self.runs[index];
         let mut shift = vec![0.0; run.rows()];
-        for (j, extra) in self.own_shifts(index, stage) {
-            run.shift(stage, &extra, &mut shift);
+        for (j, extra) in self.own_shifts(index, machine) {
+            run.shift(machine, &extra, &mut shift);
             jacobian.view_mut((first, j), (shift.len(), 1)).copy_from_slice(&shift);
         }
     }
@@ -583,14 +583,14 @@ impl<'a> Problem<'a> {
             if self.is_stopped() {
                 return None;
             }
-            let (stage, rows) = (&stages[self.runs[index].part], self.runs[index].rows());
+            let (machine, rows) = (&stages[self.runs[index].part], self.runs[index].rows());
             let mut own = residuals.as_mut().map(|residuals| &mut residuals[first..first + rows]);
-            self.shifts(stage, (index, first), &mut jacobian);
-            let columns = self.movers(index, stage, bounds);
+            self.shifts(machine, (index, first), &mut jacobian);
+            let columns = self.movers(index, machine, bounds);
             let block = (index, first);
             let out = (&mut jacobian, own.as_deref_mut());
-            if !is_exact || !self.exact_block((&mut bench, stage), block, (x, bounds), &columns, out) {
-                if own.is_some_and(|own| !self.one(&mut bench, index, stage, x, own)) {
+            if !is_exact || !self.exact_block((&mut bench, machine), block, (x, bounds), &columns, out) {
+                if own.is_some_and(|own| !self.one(&mut bench, index, machine, x, own)) {
                     return None;
                 }
                 left.push((index, first, columns));
@@ -625,9 +625,9 @@ impl<'a> Problem<'a> {
                 let (stages, mut bench) = (self.stages(&moved), Bench::default());
                 for &(index, first, ref columns) in left {
                     let run = &self.runs[index];
-                    let (rows, stage) = (run.rows(), &stages[run.part]);
+                    let (rows, machine) = (run.rows(), &stages[run.part]);
                     if columns.contains(&j)
-                        && !self.one(&mut bench, index, stage, &moved, &mut out[first..first + rows])
+                        && !self.one(&mut bench, index, machine, &moved, &mut out[first..first + rows])
                     {
                         return false;
                     }
@@ -643,13 +643,13 @@ impl<'a> Problem<'a> {
         true
     }
 
-    fn one(&mut self, bench: &mut Bench, index: usize, stage: &Stage, x: &[f64], out: &mut [f64]) -> bool {
+    fn one(&mut self, bench: &mut Bench, index: usize, machine: &Machine, x: &[f64], out: &mut [f64]) -> bool {
         if self.is_stopped() {
             return false;
         }
         self.simulations += 1;
         let extras = self.extras_of(index, x);
-        self.runs[index].residuals(bench, stage, &extras, out)
+        self.runs[index].residuals(bench, machine, &extras, out)
     }
 }
 
@@ -700,10 +700,10 @@ fn separated(case: &Case, plan: &Plan, all: Vec<Free>) -> Result<Separated> {
 }
 
 /// The free parameters of `plan` in a machine of which `others` are set, too.
-pub fn parameters(stage: &Stage, plan: &Plan, others: &[&str]) -> Result<Vec<Free>> {
+pub fn parameters(machine: &Machine, plan: &Plan, others: &[&str]) -> Result<Vec<Free>> {
     let own = plan.free.iter().chain(plan.tied.iter().flatten()).map(String::as_str);
     let all: Vec<&str> = own.chain(others.iter().copied()).collect();
-    plan.names().map(|name| Free::new(stage, &name, &all, &plan.bounds)).collect()
+    plan.names().map(|name| Free::new(machine, &name, &all, &plan.bounds)).collect()
 }
 
 /// Extras that have room to vary and belong to the run alone.
@@ -735,27 +735,27 @@ fn slope_at_start(run: &Run, r: f64, noise: &Noise) -> (f64, f64) {
 }
 
 /// The scale on which a parameter is searched for.
-fn scale(stage: &Stage, parameter: &Free, runs: &[Run]) -> Scale {
+fn scale(machine: &Machine, parameter: &Free, runs: &[Run]) -> Scale {
     if parameter.logarithmic() && parameter.start > 0.0 {
         Scale::Log(parameter.start)
     } else if parameter.start != 0.0 {
         Scale::Linear(parameter.start.abs())
     } else {
-        Scale::Linear(typical(stage, parameter, runs).unwrap_or(1.0))
+        Scale::Linear(typical(machine, parameter, runs).unwrap_or(1.0))
     }
 }
 
 /// A typical value of a quantity that may be zero: of friction a tenth of the motor's force at the greatest input; none
 /// where that depends on the machine alone, as the gain of an amplifier, which has whatever unit its input has.
-fn typical(stage: &Stage, parameter: &Free, runs: &[Run]) -> Option<f64> {
+fn typical(machine: &Machine, parameter: &Free, runs: &[Run]) -> Option<f64> {
     let most = runs.iter().flat_map(|run| run.logged.iter()).fold(0.0, |most: f64, u| most.max(u.abs()));
-    let motor = &stage.motor;
-    let per_unit = match stage.amplifier.mode {
+    let motor = &machine.motor;
+    let per_unit = match machine.amplifier.mode {
         AmplifierMode::Voltage => motor.torque_constant / motor.resistance,
         AmplifierMode::Current => motor.torque_constant,
     };
-    let torque = (0.1 * per_unit * motor.gear_ratio * stage.amplifier.gain * most).abs();
-    let r = stage.pulley_radius;
+    let torque = (0.1 * per_unit * motor.gear_ratio * machine.amplifier.gain * most).abs();
+    let r = machine.pulley_radius;
     let speed = runs
         .iter()
         .flat_map(|run| run.seen.iter().map(move |seen| (run, seen)))

@@ -7,8 +7,8 @@ use super::run::is_position;
 use super::search::Searched;
 use super::uncertainty::Judged;
 use crate::log::Quantity;
+use crate::machine::{AmplifierMode, BeltModel, Machine};
 use crate::solve::Bench;
-use crate::stage::{AmplifierMode, BeltModel, Stage};
 use nalgebra::DMatrix;
 
 /// One more experiment.
@@ -33,7 +33,7 @@ struct Idea {
     /// The quantities to measure beside those of the logs; a deviation for each.
     measured: Measured,
     /// The change of the machine.
-    change: fn(&mut Stage),
+    change: fn(&mut Machine),
     /// Whether the input is turned round.
     reversed: bool,
     /// Whether the logs have that already, or the model says nothing of it.
@@ -52,7 +52,7 @@ fn with(noise: &[(Quantity, f64)], quantity: Quantity, deviation: f64) -> Vec<(Q
 
 /// The deviation of a position of the cart, if an encoder like that of the logs were there.
 fn cart_noise(problem: &Problem, noise: &[(Quantity, f64)]) -> f64 {
-    let r = problem.stage.pulley_radius;
+    let r = problem.machine.pulley_radius;
     let known = noise.iter().find(|(quantity, _)| is_position(*quantity));
     known.map_or(10e-6, |(quantity, sigma)| if *quantity == Quantity::CartPosition { *sigma } else { sigma * r })
 }
@@ -82,32 +82,32 @@ const IDEAS: &[Idea] = &[
     Idea {
         name: "the same inputs with a known mass added to the cart, as heavy as the cart",
         measured: same,
-        change: |stage| stage.cart.mass *= 2.0,
+        change: |machine| machine.cart.mass *= 2.0,
         reversed: false,
         is_there: |_| false,
     },
     Idea {
         name: "the same inputs with the belt taken off: the drive pulley alone",
         measured: |problem, noise| {
-            let r = problem.stage.pulley_radius;
+            let r = problem.machine.pulley_radius;
             vec![(Quantity::DriveAngle, cart_noise(problem, noise) / r)]
         },
-        change: |stage| {
-            stage.belt.stiffness = [1e-6; 3];
-            stage.belt.damping = [0.0; 3];
-            stage.belt.model = BeltModel::Elastic;
+        change: |machine| {
+            machine.belt.stiffness = [1e-6; 3];
+            machine.belt.damping = [0.0; 3];
+            machine.belt.model = BeltModel::Elastic;
             // Spans that follow the cart have a stiffness by their make.
-            stage.belt.follows_cart = false;
-            stage.belt.pretension = None;
+            machine.belt.follows_cart = false;
+            machine.belt.pretension = None;
         },
         reversed: false,
-        is_there: |problem| problem.stage.belt.model == BeltModel::Rigid,
+        is_there: |problem| problem.machine.belt.model == BeltModel::Rigid,
     },
     Idea {
         name: "the drive pulley locked and the current measured, to 1 % of its peak",
         measured: |problem, _| vec![(Quantity::MotorCurrent, 0.01 * peak_current(problem))],
-        change: |stage| {
-            for side in [&mut stage.drive_pulley.friction.forward, &mut stage.drive_pulley.friction.backward] {
+        change: |machine| {
+            for side in [&mut machine.drive_pulley.friction.forward, &mut machine.drive_pulley.friction.backward] {
                 side.breakaway = 1e9;
             }
         },
@@ -118,10 +118,10 @@ const IDEAS: &[Idea] = &[
 
 fn peak_current(problem: &Problem) -> f64 {
     let most = problem.runs.iter().flat_map(|run| run.logged.iter()).fold(0.0, |most: f64, u| most.max(u.abs()));
-    let amplifier = &problem.stage.amplifier;
+    let amplifier = &problem.machine.amplifier;
     let output = (most * amplifier.gain).abs().max(1e-9);
     match amplifier.mode {
-        AmplifierMode::Voltage => output / problem.stage.motor.resistance,
+        AmplifierMode::Voltage => output / problem.machine.motor.resistance,
         AmplifierMode::Current => output,
     }
 }
@@ -231,15 +231,15 @@ fn with_rows(
 /// The outputs of run `index` with the idea, in standard deviations; none where the model does not reach its end.
 fn answer(problem: &Problem, idea: &Idea, measured: &[(Quantity, f64)], index: usize, x: &[f64]) -> Option<Vec<f64>> {
     let run = &problem.runs[index];
-    let mut stage = problem.stage_at(x);
-    (idea.change)(&mut stage);
+    let mut machine = problem.stage_at(x);
+    (idea.change)(&mut machine);
     if idea.reversed {
-        stage.amplifier.gain = -stage.amplifier.gain;
+        machine.amplifier.gain = -machine.amplifier.gain;
     }
     let quantities: Vec<Quantity> = measured.iter().map(|(quantity, _)| *quantity).collect();
     let extras = problem.extras_of(index, x);
     let mut columns = vec![Vec::new(); quantities.len()];
-    if !run.predict(&mut Bench::default(), &stage, &extras, &quantities, &mut columns) {
+    if !run.predict(&mut Bench::default(), &machine, &extras, &quantities, &mut columns) {
         return None;
     }
     let mut values = Vec::new();
@@ -267,5 +267,5 @@ fn has(problem: &Problem, quantity: Quantity) -> bool {
 
 /// Whether the current is measured, or is what is fed in.
 fn knows_current(problem: &Problem) -> bool {
-    has(problem, Quantity::MotorCurrent) || problem.stage.amplifier.mode == AmplifierMode::Current
+    has(problem, Quantity::MotorCurrent) || problem.machine.amplifier.mode == AmplifierMode::Current
 }

@@ -11,8 +11,8 @@
 use super::problem::Problem;
 use super::run::{Run, is_position};
 use crate::log::Quantity;
+use crate::machine::{AmplifierMode, Machine};
 use crate::parameter::{Free, Sum, at_pulley, value};
-use crate::stage::{AmplifierMode, Stage};
 use nalgebra::{DMatrix, DVector};
 
 /// Rows that are averaged into one equation, so that noise in derivatives counts less.
@@ -54,7 +54,7 @@ pub fn regression(problem: &Problem) -> Option<Balance> {
 /// A log with the derivatives of its position.
 pub(super) struct Smoothed<'a> {
     run: &'a Run,
-    stage: &'a Stage,
+    machine: &'a Machine,
     output: usize,
     /// Rows without derivatives at each end.
     margin: usize,
@@ -69,7 +69,7 @@ pub(super) fn smoothed<'a>(problem: &'a Problem) -> Vec<Smoothed<'a>> {
     for run in problem.runs.iter().filter(|run| run.is_even()) {
         let seen = run.seen.iter().position(|seen| is_position(seen.quantity) && !seen.absolute);
         if let Some(output) = seen {
-            all.extend(Smoothed::new(run, &problem.stage, output, noise.of(run.seen[output].quantity)));
+            all.extend(Smoothed::new(run, &problem.machine, output, noise.of(run.seen[output].quantity)));
         }
     }
     all
@@ -104,7 +104,7 @@ pub(super) fn balance(logs: &[Smoothed], late: usize) -> Option<Balance> {
 
 impl<'a> Smoothed<'a> {
     /// That of one output of a run; none where it is too short.
-    fn new(run: &'a Run, stage: &'a Stage, output: usize, noise: f64) -> Option<Self> {
+    fn new(run: &'a Run, machine: &'a Machine, output: usize, noise: f64) -> Option<Self> {
         let seen = &run.seen[output];
         let (n, h) = (run.fitted_rows.min(run.time.len()), run.interval());
         let mut derivatives = None;
@@ -121,17 +121,17 @@ impl<'a> Smoothed<'a> {
         }
         let (width, mut derivatives) = derivatives?;
         if seen.quantity == Quantity::CartPosition {
-            derivatives.iter_mut().flatten().for_each(|value| *value /= stage.pulley_radius);
+            derivatives.iter_mut().flatten().for_each(|value| *value /= machine.pulley_radius);
         }
-        Some(Self { run, stage, output, margin: reach(width), derivatives })
+        Some(Self { run, machine, output, margin: reach(width), derivatives })
     }
 
     /// Adds its equations: φ̈, φ̇, sgn φ̇, 1 and the torque.
     fn add_to(&self, late: usize, rows: &mut Vec<[f64; 5]>) {
-        let Self { run, stage, .. } = self;
+        let Self { run, machine, .. } = self;
         let seen = &run.seen[self.output];
-        let motor = &stage.motor;
-        let (n_gear, amplifier) = (motor.gear_ratio, &stage.amplifier);
+        let motor = &machine.motor;
+        let (n_gear, amplifier) = (motor.gear_ratio, &machine.amplifier);
         let per_ampere = motor.gear_efficiency * n_gear * motor.torque_constant;
         let mut block: Vec<[f64; 5]> = Vec::with_capacity(BLOCK);
         for (k, &[speed, acceleration]) in self.derivatives.iter().enumerate() {
@@ -194,14 +194,14 @@ impl Balance {
     pub fn guess(&self, problem: &Problem) -> Vec<f64> {
         let mut values: Vec<f64> = problem.parameters.iter().map(|parameter| parameter.start).collect();
         let totals = [(Sum::Inertia, self.inertia), (Sum::Viscous, self.viscous), (Sum::Coulomb, self.coulomb)];
-        let stage = &problem.stage;
+        let machine = &problem.machine;
         for ((sum, wanted), forward) in totals.into_iter().flat_map(|total| [(total, true), (total, false)]) {
             let keys: Vec<&str> = sum.parts(forward).map(|row| row.key).collect();
             let own = |free: &Free| free.keys.iter().all(|(key, _)| keys.contains(&key.as_str()));
             let part = |free: &Free| -> f64 {
-                free.keys.iter().map(|(key, factor)| factor * free.start * at_pulley(stage, key)).sum()
+                free.keys.iter().map(|(key, factor)| factor * free.start * at_pulley(machine, key)).sum()
             };
-            let total: f64 = keys.iter().map(|key| value(stage, key).unwrap_or(0.0) * at_pulley(stage, key)).sum();
+            let total: f64 = keys.iter().map(|key| value(machine, key).unwrap_or(0.0) * at_pulley(machine, key)).sum();
             // Of what each campaign has for itself, that of the first.
             let first = |(_, of): &(&Free, &Option<usize>)| of.is_none_or(|of| of == 0);
             let counted = problem.parameters.iter().zip(&problem.of).filter(first).map(|(free, _)| free);
@@ -218,8 +218,8 @@ impl Balance {
             .zip(&problem.parameters)
             .filter(|(_, parameter)| parameter.keys.iter().any(|(key, _)| key == "cart.load"))
         {
-            let other = stage.cart.constant_force() - stage.cart.load;
-            *value = (-self.load / stage.pulley_radius - other).clamp(parameter.low, parameter.high);
+            let other = machine.cart.constant_force() - machine.cart.load;
+            *value = (-self.load / machine.pulley_radius - other).clamp(parameter.low, parameter.high);
         }
         values
     }

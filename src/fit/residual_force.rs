@@ -14,8 +14,8 @@ use super::regression::{derived, reach};
 use super::run::is_position;
 use super::scores::LogFit;
 use crate::log::Quantity;
+use crate::machine::{AmplifierMode, Machine};
 use crate::parameter::{Sum, at_pulley, value};
-use crate::stage::{AmplifierMode, Stage};
 
 /// Widths of the Gaussian that are tried, rows.
 const WIDTHS: [f64; 12] = [2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 32.0, 48.0, 64.0, 96.0];
@@ -59,7 +59,7 @@ impl ResidualForce {
 
 /// The force that a log lacks beside `stage`; none without an evenly sampled position, or where the model does not
 /// reach the end.
-pub fn residual_force(stage: &Stage, log: &LogFit) -> Option<ResidualForce> {
+pub fn residual_force(machine: &Machine, log: &LogFit) -> Option<ResidualForce> {
     let output = log.outputs.iter().find(|output| is_position(output.quantity)).filter(|_| log.complete)?;
     let n = log.time.len();
     let h = (log.time.last()? - log.time.first()?) / (n.max(2) - 1) as f64;
@@ -67,15 +67,15 @@ pub fn residual_force(stage: &Stage, log: &LogFit) -> Option<ResidualForce> {
     if n < 60 || !is_even || output.seen.iter().any(|v| !v.is_finite()) {
         return None;
     }
-    let r = stage.pulley_radius;
+    let r = machine.pulley_radius;
     let arm = if output.quantity == Quantity::CartPosition { 1.0 } else { r };
     let way: Vec<f64> = output.seen.iter().map(|v| arm * v).collect();
     let error: Vec<f64> = output.seen.iter().zip(&output.model).map(|(seen, model)| arm * (seen - model)).collect();
     let total = |sum: Sum| -> f64 {
-        sum.parts(true).map(|row| value(stage, row.key).unwrap_or(0.0) * at_pulley(stage, row.key)).sum::<f64>()
+        sum.parts(true).map(|row| value(machine, row.key).unwrap_or(0.0) * at_pulley(machine, row.key)).sum::<f64>()
             / (r * r)
     };
-    let (motor, amplifier) = (&stage.motor, &stage.amplifier);
+    let (motor, amplifier) = (&machine.motor, &machine.amplifier);
     let gear = motor.gear_ratio;
     let brake = match amplifier.mode {
         AmplifierMode::Voltage => {

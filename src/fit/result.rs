@@ -69,7 +69,7 @@ pub(super) fn result(found: &Searched, judged: Option<&Judged>) -> Fit {
         let unit = match extra.what {
             Nuisance::Delay => "s",
             Nuisance::InputGain => "",
-            Nuisance::InputOffset => problem.stage.amplifier.mode.unit(),
+            Nuisance::InputOffset => problem.machine.amplifier.mode.unit(),
             // Each log has its own: they are never shared.
             Nuisance::StartPosition | Nuisance::StartSpeed | Nuisance::Bias(_) => "",
         };
@@ -109,7 +109,7 @@ pub(super) fn result(found: &Searched, judged: Option<&Judged>) -> Fit {
     logs.extend(problem.held_out.iter().map(|run| met(run, &stages[run.part], &known, 1.0)));
     Fit {
         parts: problem.parts.iter().cloned().zip(stages.iter().cloned()).collect(),
-        stage: stages[0].clone(),
+        machine: stages[0].clone(),
         estimates,
         correlation,
         noise: noise.clone(),

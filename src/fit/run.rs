@@ -5,10 +5,10 @@ use crate::case::{Case, Experiment, Initial};
 use crate::control::{Added, follow};
 use crate::design::Design;
 use crate::log::{Log, Quantity};
+use crate::machine::{AmplifierMode, Machine};
 use crate::signal::Signal;
 use crate::signal::profile::Profile;
 use crate::solve::{Bench, Detail, Ending, Flow, Solver};
-use crate::stage::{AmplifierMode, Stage};
 use crate::trajectory::{Grid, Trajectory};
 use std::sync::Arc;
 
@@ -139,7 +139,7 @@ pub struct Run {
 struct Closed {
     design: Design,
     /// The machine that the controller assumes: that of the case, whatever is fitted.
-    model: Stage,
+    model: Machine,
     profile: Profile,
     added: Option<Added>,
 }
@@ -243,7 +243,7 @@ impl Run {
         if let (Some(design), Some(reference)) = (&case.controller, &log.reference) {
             let profile = Profile::sampled(&log.time, reference).shaped(&design.shaper);
             let added = log.added.as_ref().map(|values| Added { times: log.time.clone(), values: values.clone() });
-            let amplifier = &case.stage.amplifier;
+            let amplifier = &case.machine.amplifier;
             let (quantity, limit, late) = match amplifier.mode {
                 AmplifierMode::Voltage => (Quantity::MotorVoltage, amplifier.voltage_limit, None),
                 AmplifierMode::Current => (Quantity::MotorCurrent, amplifier.current_limit, amplifier.bandwidth),
@@ -254,7 +254,8 @@ impl Run {
                 };
                 self.seen.push(MeasuredOutput::new(quantity, false, self.logged.iter().map(given).collect()));
             }
-            self.closed = Some(Arc::new(Closed { design: design.clone(), model: case.stage.clone(), profile, added }));
+            self.closed =
+                Some(Arc::new(Closed { design: design.clone(), model: case.machine.clone(), profile, added }));
         }
     }
 
@@ -282,9 +283,9 @@ impl Run {
     }
 
     /// Whether an extra does no more than shift outputs.
-    pub(super) fn only_shifts(&self, stage: &Stage, extra: &Extra) -> bool {
+    pub(super) fn only_shifts(&self, machine: &Machine, extra: &Extra) -> bool {
         // Whether it matters where the cart is, and not only how far it goes.
-        let is_placed = stage.changes_along_travel() || stage.travel.is_some();
+        let is_placed = machine.changes_along_travel() || machine.travel.is_some();
         match extra.what {
             Nuisance::Bias(_) => true,
             Nuisance::StartPosition => self.seen.iter().all(|seen| !seen.absolute) && !is_placed,
@@ -293,12 +294,12 @@ impl Run {
     }
 
     /// ∂r/∂x of an extra that only shifts outputs, x being its variable.
-    pub fn shift(&self, stage: &Stage, extra: &Extra, out: &mut [f64]) {
+    pub fn shift(&self, machine: &Machine, extra: &Extra, out: &mut [f64]) {
         let n = self.time.len();
         for (i, seen) in self.seen.iter().enumerate() {
             let per_unit = match extra.what {
                 Nuisance::Bias(index) if index == i => 1.0,
-                Nuisance::StartPosition => per_position(seen.quantity, stage.pulley_radius),
+                Nuisance::StartPosition => per_position(seen.quantity, machine.pulley_radius),
                 _ => 0.0,
             };
             for (out, weight) in out[i * n..(i + 1) * n].iter_mut().zip(&seen.weights) {
@@ -338,9 +339,9 @@ impl Run {
     }
 
     /// Where the model begins with these values of the extras, which set the gain of its amplifier, too.
-    pub(super) fn initial(&self, stage: &mut Stage, extras: &[f64]) -> Initial {
-        stage.amplifier.gain *= self.extra(Nuisance::InputGain, extras).unwrap_or(1.0);
-        let r = stage.pulley_radius;
+    pub(super) fn initial(&self, machine: &mut Machine, extras: &[f64]) -> Initial {
+        machine.amplifier.gain *= self.extra(Nuisance::InputGain, extras).unwrap_or(1.0);
+        let r = machine.pulley_radius;
         let mut initial = self.initial;
         if let Some(position) = self.extra(Nuisance::StartPosition, extras) {
             (initial.cart_position, initial.drive_angle, initial.idler_angle) = (position, position / r, position / r);
@@ -352,8 +353,8 @@ impl Run {
     }
 
     /// The experiment that the model is put through, with these values of the extras.
-    pub fn experiment(&self, stage: &mut Stage, extras: &[f64]) -> Experiment {
-        let initial = self.initial(stage, extras);
+    pub fn experiment(&self, machine: &mut Machine, extras: &[f64]) -> Experiment {
+        let initial = self.initial(machine, extras);
         let delay = self.extra(Nuisance::Delay, extras).unwrap_or(0.0);
         let offset = self.extra(Nuisance::InputOffset, extras).unwrap_or(0.0);
         let mut input = match &self.input {
@@ -381,17 +382,17 @@ impl Run {
     pub fn predict(
         &self,
         bench: &mut Bench,
-        stage: &Stage,
+        machine: &Machine,
         extras: &[f64],
         quantities: &[Quantity],
         out: &mut [Vec<f64>],
     ) -> bool {
-        let mut stage = stage.clone();
-        let experiment = self.experiment(&mut stage, extras);
+        let mut machine = machine.clone();
+        let experiment = self.experiment(&mut machine, extras);
         let mut slopes: Vec<Vec<f64>> = vec![Vec::new(); quantities.len()];
         out.iter_mut().for_each(Vec::clear);
-        let solver = Solver::of(&stage);
-        let cart = stage.cart.clone();
+        let solver = Solver::of(&machine);
+        let cart = machine.cart.clone();
         let mut take = |block: &Trajectory| {
             for (i, quantity) in quantities.iter().enumerate() {
                 match quantity {
@@ -409,16 +410,16 @@ impl Run {
         let outcome = match &self.closed {
             Some(closed) => {
                 let Closed { design, model, profile, added } = closed.as_ref();
-                follow(&stage, model, design, (profile, added.as_ref()), &experiment, solver, &mut take)
+                follow(&machine, model, design, (profile, added.as_ref()), &experiment, solver, &mut take)
             }
             None => {
-                stage.encoder = None;
+                machine.encoder = None;
                 // A rotor of its own has columns that only the whole table has, and so have all forces at the cart.
                 let is_beyond = |quantity: &Quantity| {
                     quantity.name().starts_with("rotor") || *quantity == Quantity::CartAcceleration
                 };
                 let detail = if quantities.iter().any(is_beyond) { Detail::Full } else { Detail::Lean };
-                bench.mount(&stage).and_then(|()| bench.run(&experiment, detail, &mut take))
+                bench.mount(&machine).and_then(|()| bench.run(&experiment, detail, &mut take))
             }
         };
         if !outcome.is_ok_and(|outcome| outcome.ending == Ending::Complete) {
@@ -433,10 +434,10 @@ impl Run {
     }
 
     /// Weighted residuals, model minus log, with this model and these extras.
-    pub fn residuals(&self, bench: &mut Bench, stage: &Stage, extras: &[f64], out: &mut [f64]) -> bool {
+    pub fn residuals(&self, bench: &mut Bench, machine: &Machine, extras: &[f64], out: &mut [f64]) -> bool {
         let quantities: Vec<Quantity> = self.seen.iter().map(|seen| seen.quantity).collect();
         let mut columns = vec![Vec::with_capacity(self.time.len()); self.seen.len()];
-        if !self.predict(bench, stage, extras, &quantities, &mut columns) {
+        if !self.predict(bench, machine, extras, &quantities, &mut columns) {
             return false;
         }
         self.compare(&columns, extras, out)
@@ -630,7 +631,7 @@ mod tests {
         let changes = ["belt={ model = \"rigid\" }"];
         let case = Case::from_text_with("axis.toml", TEMPLATE, &changes).unwrap();
         let mut experiment = case.experiments[1].clone();
-        let rows = simulate(&case.stage, &experiment, Solver::of(&case.stage)).unwrap().trajectory;
+        let rows = simulate(&case.machine, &experiment, Solver::of(&case.machine)).unwrap().trajectory;
         let column = |name: &str| rows.get(name).unwrap().to_vec();
         let outputs = [Quantity::CartPosition, Quantity::CartSpeed];
         let log = Log {
@@ -652,7 +653,7 @@ mod tests {
             run.extras = known.iter().map(|(what, _)| extra(*what)).collect();
             let values: Vec<f64> = known.iter().map(|(_, value)| *value).collect();
             let mut columns = vec![Vec::new(); 2];
-            assert!(run.predict(&mut Bench::default(), &case.stage, &values, &outputs, &mut columns));
+            assert!(run.predict(&mut Bench::default(), &case.machine, &values, &outputs, &mut columns));
             columns
         };
         let late = (Nuisance::Delay, 12e-3);

@@ -4,8 +4,8 @@ use super::run::{Nuisance, Run, Setting};
 use super::uncertainty;
 use crate::case::Experiment;
 use crate::log::Quantity;
+use crate::machine::Machine;
 use crate::solve::Bench;
-use crate::stage::Stage;
 
 /// How a log is met.
 #[derive(Debug, Clone)]
@@ -62,17 +62,22 @@ pub struct Score {
 
 /// A run beside the log of its experiment, with nothing fitted: it starts where the experiment does, and sensors have
 /// no offset. None where the experiment has no log.
-pub fn beside_log(stage: &Stage, experiment: &Experiment) -> Option<LogFit> {
+pub fn beside_log(machine: &Machine, experiment: &Experiment) -> Option<LogFit> {
     let log = experiment.log.as_ref()?;
     let run = Run::all(experiment, log, &Setting::default()).pop()?;
-    Some(compared(&run, stage, &[], Vec::new()))
+    Some(compared(&run, machine, &[], Vec::new()))
 }
 
 /// Model and log side by side.
-pub(super) fn compared(run: &Run, stage: &Stage, extras: &[f64], told: Vec<(Nuisance, f64, Option<f64>)>) -> LogFit {
+pub(super) fn compared(
+    run: &Run,
+    machine: &Machine,
+    extras: &[f64],
+    told: Vec<(Nuisance, f64, Option<f64>)>,
+) -> LogFit {
     let quantities: Vec<Quantity> = run.seen.iter().map(|seen| seen.quantity).collect();
     let mut columns = vec![Vec::new(); quantities.len()];
-    let complete = run.predict(&mut Bench::default(), stage, extras, &quantities, &mut columns);
+    let complete = run.predict(&mut Bench::default(), machine, extras, &quantities, &mut columns);
     let n = run.time.len();
     let outputs = run
         .seen

@@ -10,8 +10,8 @@ use crate::case::{Case, Plan};
 use crate::chance;
 use crate::error::{Error, Result};
 use crate::log::Quantity;
+use crate::machine::Machine;
 use crate::solve::Flow;
-use crate::stage::Stage;
 use nalgebra::DMatrix;
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
@@ -60,13 +60,13 @@ pub(super) fn search<'a>(
     stop: Option<Stop<'a>>,
     watch: &mut dyn FnMut(&[f64], f64) -> Flow,
 ) -> Result<Searched<'a>> {
-    search_near(case, &case.stage, plan, stop, watch)
+    search_near(case, &case.machine, plan, stop, watch)
 }
 
 /// The same; what is not determined comes as near to the values of `given` as the logs allow.
 pub(super) fn search_near<'a>(
     case: &Case,
-    given: &Stage,
+    given: &Machine,
     plan: &Plan,
     stop: Option<Stop<'a>>,
     watch: &mut dyn FnMut(&[f64], f64) -> Flow,
@@ -216,7 +216,7 @@ fn uniform(problem: &Problem) -> bool {
 /// weight.
 fn told_beforehand(problem: &Problem, noise: &[(Quantity, f64)]) -> bool {
     let most = noise.iter().map(|(_, deviation)| *deviation).fold(0.0, f64::max);
-    let arm = problem.stage.pulley_radius.min(1.0);
+    let arm = problem.machine.pulley_radius.min(1.0);
     problem.runs.iter().flat_map(|run| &run.extras).any(|extra| extra.known.is_some_and(|own| own > 0.1 * arm * most))
 }
 

@@ -4,11 +4,11 @@ use super::least_squares::{Bounds, Differences, Step};
 use super::problem::Problem;
 use super::run::{Nuisance, Run, between, heading_of, per_position, speed_of};
 use crate::log::Quantity;
+use crate::machine::Machine;
+use crate::machine::axis::{CART, DRIVE};
 use crate::mechanism::Mechanism;
 use crate::signal::Signal;
 use crate::solve::{Begun, Bench, Differentiated, Variable};
-use crate::stage::Stage;
-use crate::stage::axis::{CART, DRIVE};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
@@ -24,13 +24,13 @@ impl Problem<'_> {
     /// variables, and the residuals where they are asked for; false where derivatives cannot be told exactly.
     pub(super) fn exact_block(
         &mut self,
-        (bench, stage): (&mut Bench, &Stage),
+        (bench, machine): (&mut Bench, &Machine),
         (index, first): (usize, usize),
         (x, bounds): (&[f64], &Bounds),
         columns: &[usize],
         (jacobian, residuals): (&mut DMatrix<f64>, Option<&mut [f64]>),
     ) -> bool {
-        if self.runs[index].is_closed() || !stage.is_piecewise_linear() {
+        if self.runs[index].is_closed() || !machine.is_piecewise_linear() {
             return false;
         }
         let variables = |is_moved: bool| {
@@ -39,9 +39,9 @@ impl Problem<'_> {
         };
         // Where it does not matter where the cart begins, it begins at the origin, so that all runs count from there
         // and share what the machine has made ready; but angles there depend on the radius.
-        let mut is_moved = self.runs[index].is_shifted(stage);
+        let mut is_moved = self.runs[index].is_shifted(machine);
         let Some(mut all) = variables(is_moved) else { return false };
-        if is_moved && all.iter().any(|variable| changes_radius(stage, variable)) {
+        if is_moved && all.iter().any(|variable| changes_radius(machine, variable)) {
             is_moved = false;
             match variables(is_moved) {
                 Some(own) => all = own,
@@ -50,7 +50,7 @@ impl Problem<'_> {
         }
         let variables = all;
         let extras = self.extras_from(index, x, is_moved);
-        let Some(slopes) = self.runs[index].slopes(bench, stage, &extras, &variables) else { return false };
+        let Some(slopes) = self.runs[index].slopes(bench, machine, &extras, &variables) else { return false };
         self.simulations += 1;
         let run = &self.runs[index];
         let rows = run.time.len();
@@ -58,7 +58,7 @@ impl Problem<'_> {
             let own = self.extras_of(index, x);
             let start = if is_moved { run.extra(Nuisance::StartPosition, &own).unwrap_or(0.0) } else { 0.0 };
             let shown = run.seen.iter().zip(&slopes).map(|(seen, (values, _))| {
-                let by = start * per_position(seen.quantity, stage.pulley_radius);
+                let by = start * per_position(seen.quantity, machine.pulley_radius);
                 values.iter().map(|value| value + by).collect()
             });
             let shown: Vec<Vec<f64>> = shown.collect();
@@ -134,9 +134,9 @@ impl Problem<'_> {
     }
 
     /// The variables that move run `index` otherwise than by a shift of its outputs.
-    pub(super) fn movers(&self, index: usize, stage: &Stage, bounds: &Bounds) -> Vec<usize> {
+    pub(super) fn movers(&self, index: usize, machine: &Machine, bounds: &Bounds) -> Vec<usize> {
         let run = &self.runs[index];
-        let own = self.own_variables(index).into_iter().filter(|(_, extra)| !run.only_shifts(stage, extra));
+        let own = self.own_variables(index).into_iter().filter(|(_, extra)| !run.only_shifts(machine, extra));
         let concerns = |j: &usize| self.of.get(*j).copied().flatten().is_none_or(|part| part == run.part);
         let globals = (0..self.globals()).filter(|&j| !bounds.hold(j)).filter(concerns);
         globals.chain(own.map(|(j, _)| j)).collect()
@@ -148,24 +148,30 @@ type Sloped = (Vec<f64>, Vec<Vec<f64>>);
 
 impl Run {
     /// Whether its start only shifts its outputs.
-    fn is_shifted(&self, stage: &Stage) -> bool {
+    fn is_shifted(&self, machine: &Machine) -> bool {
         let mut starts = self.extras.iter().filter(|extra| extra.what == Nuisance::StartPosition);
-        starts.any(|extra| self.only_shifts(stage, extra))
+        starts.any(|extra| self.only_shifts(machine, extra))
     }
 
     /// The machine that the model's side of this run is, and where it begins.
-    fn begun(&self, stage: &Stage, extras: &[f64]) -> Begun {
-        let mut stage = Stage { encoder: None, ..stage.clone() };
-        let initial = self.initial(&mut stage, extras);
-        let mechanism = Arc::new(stage.mechanism());
+    fn begun(&self, machine: &Machine, extras: &[f64]) -> Begun {
+        let mut machine = Machine { encoder: None, ..machine.clone() };
+        let initial = self.initial(&mut machine, extras);
+        let mechanism = Arc::new(machine.mechanism());
         Begun { start: initial.state(&mechanism), mechanism }
     }
 
     /// Each output with its derivatives by the variables at the log's times; none where they cannot be told exactly.
-    fn slopes(&self, bench: &mut Bench, stage: &Stage, extras: &[f64], variables: &[Variable]) -> Option<Vec<Sloped>> {
-        let mut stage = Stage { encoder: None, ..stage.clone() };
-        let experiment = self.experiment(&mut stage, extras);
-        let mechanism = stage.mechanism();
+    fn slopes(
+        &self,
+        bench: &mut Bench,
+        machine: &Machine,
+        extras: &[f64],
+        variables: &[Variable],
+    ) -> Option<Vec<Sloped>> {
+        let mut machine = Machine { encoder: None, ..machine.clone() };
+        let experiment = self.experiment(&mut machine, extras);
+        let mechanism = machine.mechanism();
         let mut outputs = Vec::new();
         for seen in &self.seen {
             outputs.push(differentiated(&mechanism, seen.quantity)?);
@@ -180,7 +186,7 @@ impl Run {
                 }
             }
         }
-        bench.mount(&stage).ok()?;
+        bench.mount(&machine).ok()?;
         let mut found = bench.sensitivities(&experiment, variables, &outputs).ok()??;
         if self.is_even() {
             let full = found.values.iter().all(|values| values.len() == self.time.len());
@@ -224,7 +230,7 @@ fn differentiated(mechanism: &Mechanism, quantity: Quantity) -> Option<Different
 }
 
 /// Whether a variable changes the radius of the pulleys.
-fn changes_radius(stage: &Stage, variable: &Variable) -> bool {
-    let is_other = |begun: &Begun| begun.mechanism.bodies[DRIVE].kind.lever() != stage.pulley_radius;
+fn changes_radius(machine: &Machine, variable: &Variable) -> bool {
+    let is_other = |begun: &Begun| begun.mechanism.bodies[DRIVE].kind.lever() != machine.pulley_radius;
     matches!(variable, Variable::Machine { points, .. } if points.iter().any(is_other))
 }

@@ -47,7 +47,7 @@ pub(super) struct Late {
 pub(super) fn surveys(case: &Case, plan: &Plan, found: &Searched) -> Vec<Survey> {
     let logs = case.experiments.iter().filter_map(|experiment| experiment.log.as_ref());
     let tested = |log: &Arc<Log>| {
-        let mut survey = Survey::new(log, &case.stage);
+        let mut survey = Survey::new(log, &case.machine);
         survey.notes.retain(|note| match &note.remedy {
             Some(remedy) if note.severity != Severity::Fact => is_borne_out(case, plan, found, &log.name, remedy),
             _ => true,

@@ -19,8 +19,8 @@
 use super::{Frf, Point};
 use crate::error::{Error, Result};
 use crate::linear::{Hold, Operation, StateSpace};
+use crate::machine::{BeltModel, Machine};
 use crate::number::engineering;
-use crate::stage::{BeltModel, Stage};
 use nalgebra::{Complex, DMatrix, DVector};
 use std::f64::consts::PI;
 
@@ -91,25 +91,25 @@ pub(super) const ALIKE: [f64; 2] = [0.25723, -0.08250];
 const UNKNOWNS: usize = 4;
 
 /// The stage with its belt so many times as stiff, and damped.
-fn changed(stage: &Stage, known: &Known, x: &[f64]) -> Stage {
-    let mut stage = stage.clone();
-    if let (true, Some(make)) = (stage.belt.follows_cart, stage.belt.make) {
+fn changed(machine: &Machine, known: &Known, x: &[f64]) -> Machine {
+    let mut machine = machine.clone();
+    if let (true, Some(make)) = (machine.belt.follows_cart, machine.belt.make) {
         let [k1, k2] = make.stiffness_at(known.place);
-        (stage.belt.stiffness[0], stage.belt.stiffness[1]) = (k1, k2);
+        (machine.belt.stiffness[0], machine.belt.stiffness[1]) = (k1, k2);
     }
-    (stage.belt.follows_cart, stage.belt.make) = (false, None);
-    for (k, c) in stage.belt.stiffness.iter_mut().zip(&mut stage.belt.damping) {
+    (machine.belt.follows_cart, machine.belt.make) = (false, None);
+    for (k, c) in machine.belt.stiffness.iter_mut().zip(&mut machine.belt.damping) {
         *k *= x[0].exp();
         *c = x[1].exp() * *k;
     }
-    stage
+    machine
 }
 
 /// The same as the averages see it: Σ W Ĝ/Σ W about each line, where the input is white. Of whole periods
 /// nothing is smeared.
-fn smeared(stage: &Stage, place: f64, delay: f64, frf: &Frf) -> Result<Vec<Complex<f64>>> {
+fn smeared(machine: &Machine, place: f64, delay: f64, frf: &Frf) -> Result<Vec<Complex<f64>>> {
     if frf.periodic {
-        return model(stage, place, delay, frf);
+        return model(machine, place, delay, frf);
     }
     let line = 2.0 * PI / (frf.length as f64 * frf.every);
     let sum: f64 = WINDOW.iter().map(|one| one.1).sum();
@@ -117,7 +117,7 @@ fn smeared(stage: &Stage, place: f64, delay: f64, frf: &Frf) -> Result<Vec<Compl
     for (distance, weight) in WINDOW {
         let points = frf.points.iter().map(|point| Point { omega: point.omega + distance * line, ..*point }).collect();
         let moved = Frf { points, ..frf.clone() };
-        for (sum_of, value) in seen.iter_mut().zip(model(stage, place, delay, &moved)?) {
+        for (sum_of, value) in seen.iter_mut().zip(model(machine, place, delay, &moved)?) {
             *sum_of += value * (weight / sum);
         }
     }
@@ -125,8 +125,8 @@ fn smeared(stage: &Stage, place: f64, delay: f64, frf: &Frf) -> Result<Vec<Compl
 }
 
 /// The sampled model's response at these points.
-pub(super) fn model(stage: &Stage, place: f64, delay: f64, frf: &Frf) -> Result<Vec<Complex<f64>>> {
-    let system = StateSpace::of(stage, Operation { position: place, ..Operation::default() })?;
+pub(super) fn model(machine: &Machine, place: f64, delay: f64, frf: &Frf) -> Result<Vec<Complex<f64>>> {
+    let system = StateSpace::of(machine, Operation { position: place, ..Operation::default() })?;
     let Some(output) = system.output(frf.quantity.name()) else {
         return Err(Error::new(format!("the model has no {}", frf.quantity.name())).next("log another quantity"));
     };
@@ -135,17 +135,17 @@ pub(super) fn model(stage: &Stage, place: f64, delay: f64, frf: &Frf) -> Result<
 }
 
 struct Problem<'a> {
-    stage: &'a Stage,
+    machine: &'a Machine,
     known: &'a Known,
     frfs: &'a [Frf],
 }
 
 impl Problem<'_> {
     fn curves(&self, x: &[f64]) -> Result<Vec<Vec<Complex<f64>>>> {
-        let stage = changed(self.stage, self.known, x);
+        let machine = changed(self.machine, self.known, x);
         let gain = x[3].exp();
         let one = |frf: &Frf| {
-            let curve = smeared(&stage, self.known.place, x[2].max(0.0), frf)?;
+            let curve = smeared(&machine, self.known.place, x[2].max(0.0), frf)?;
             Ok(curve.into_iter().map(|value| value * gain).collect())
         };
         self.frfs.iter().map(one).collect()
@@ -208,18 +208,18 @@ fn is_used(point: &Point) -> bool {
 }
 
 /// Fits the belt and the delay of a stage to frequency responses.
-pub fn fit(stage: &Stage, known: &Known, frfs: &[Frf]) -> Result<FrfFit> {
-    if stage.belt.model == BeltModel::Rigid {
+pub fn fit(machine: &Machine, known: &Known, frfs: &[Frf]) -> Result<FrfFit> {
+    if machine.belt.model == BeltModel::Rigid {
         return Err(Error::new("a rigid belt has no stiffness to be fitted").next("give belt.model = \"elastic\""));
     }
-    let problem = Problem { stage, known, frfs };
+    let problem = Problem { machine, known, frfs };
     let points: usize = frfs.iter().map(|frf| frf.points.iter().filter(|point| is_used(point)).count()).sum();
     if points < FEWEST {
         return Err(Error::new(format!("{points} points with a coherence of at least {}", super::COHERENT))
             .allowed(format!("at least {FEWEST}"))
             .next("excite the axis harder or for longer, or give a shorter --segment"));
     }
-    let ratio = stage.belt.damping.iter().zip(&stage.belt.stiffness).map(|(c, k)| c / k).sum::<f64>() / 3.0;
+    let ratio = machine.belt.damping.iter().zip(&machine.belt.stiffness).map(|(c, k)| c / k).sum::<f64>() / 3.0;
     let mut best: Option<(f64, Vec<f64>)> = None;
     // Resonances that are far off hide from each other: from several stiffnesses and dampings, until noise explains
     // what is left.
@@ -250,7 +250,7 @@ pub fn fit(stage: &Stage, known: &Known, frfs: &[Frf]) -> Result<FrfFit> {
     };
     let grown = |j: usize| (x[j].exp(), [(x[j] - wide(j)).exp(), (x[j] + wide(j)).exp()]);
     let delay = x[2].max(0.0);
-    let found = changed(stage, known, &x);
+    let found = changed(machine, known, &x);
     let mode = StateSpace::of(&found, Operation { position: known.place, ..Operation::default() })
         .and_then(|system| system.poles())
         .ok()

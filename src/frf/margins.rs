@@ -4,7 +4,7 @@ use super::{Frf, Point};
 use crate::control::feedback::Feedback;
 use crate::design::Design;
 use crate::error::{Error, Result};
-use crate::stage::Stage;
+use crate::machine::Machine;
 use nalgebra::Complex;
 use std::f64::consts::PI;
 
@@ -24,8 +24,8 @@ pub struct Measured {
 }
 
 /// Those of a design around a response of the position that it measures; `length` is metres per unit of it.
-pub fn measured(frf: &Frf, design: &Design, stage: &Stage, length: f64) -> Result<Measured> {
-    let feedback = Feedback::new(design, stage)?;
+pub fn measured(frf: &Frf, design: &Design, machine: &Machine, length: f64) -> Result<Measured> {
+    let feedback = Feedback::new(design, machine)?;
     if (frf.every / design.every - 1.0).abs() > 1e-6 {
         return Err(Error::new(format!(
             "the log is sampled every {} s, the controller every {} s",

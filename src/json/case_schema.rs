@@ -5,8 +5,8 @@
 
 use crate::design::FeedForwardModel;
 use crate::log::PRESETS;
+use crate::machine::{BELTS, Quantity};
 use crate::parameter::{self, Fallback, Parameter};
-use crate::stage::{BELTS, Quantity};
 use serde_json::{Map, Value, json};
 
 /// The schema, as JSON Schema draft 2020-12. Its `$id` is `urn:taut:case:1`: editors refuse one that is no whole URI.

@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 pub fn export(case: &Opened) -> Result<Value> {
     let mechanism = export::mechanism(case);
     let (kind, numbers): (&str, &dyn Numbers) = match case {
-        Opened::Axis(case) => ("axis", &case.stage),
+        Opened::Axis(case) => ("axis", &case.machine),
         Opened::Gantry(case) => (case.gantry.routing.word(), &case.gantry),
     };
     let equations = match mechanism.is_piecewise_linear() {
@@ -21,7 +21,7 @@ pub fn export(case: &Opened) -> Result<Value> {
         false => None,
     };
     let linear = match case {
-        Opened::Axis(case) => Some(linear(&StateSpace::of(&case.stage, Operation::default())?)),
+        Opened::Axis(case) => Some(linear(&StateSpace::of(&case.machine, Operation::default())?)),
         Opened::Gantry(_) => None,
     };
     Ok(json!({

@@ -4,10 +4,10 @@ use super::simulation::{
     CostTold, CountTold, EndingTold, Event, MOST_EVENTS, PeakTold, SolverUsed, TieTold, error_basis, is_determined,
 };
 use crate::case::{GantryCase, GantryExperiment};
+use crate::machine::gantry::{Gantry, LABELS, Routing};
 use crate::mechanism::{DRIVES, Mechanism};
 use crate::metrics::{GantryMetrics, Peak};
 use crate::solve::{Outcome, Solver};
-use crate::stage::gantry::{Gantry, LABELS, Routing};
 use serde::Serialize;
 use serde_json::{Map, Value};
 

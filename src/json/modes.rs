@@ -2,7 +2,7 @@
 
 use super::number;
 use crate::linear::{Analysis, Discrete, Place, Root, Transfer, Variable};
-use crate::stage::axis::LABELS;
+use crate::machine::axis::LABELS;
 use nalgebra::{Complex, DMatrix, DVector};
 use serde_json::{Value, json};
 use std::f64::consts::PI;

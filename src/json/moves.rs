@@ -5,7 +5,7 @@ use crate::case::Move;
 use crate::control::drives::{DriveGain, drive_gains};
 use crate::control::feasible::Shortfall;
 use crate::control::{Deviation, Loop, MoveRun, Worst};
-use crate::stage::Stage;
+use crate::machine::Machine;
 use crate::tune::trouble::Trouble;
 use serde_json::{Value, json};
 
@@ -27,7 +27,7 @@ pub struct Moved<'a> {
 }
 
 /// The moves of a case of this title under a controller of this name, on this stage.
-pub fn moves(title: &str, structure: &str, timing: &Loop, stage: &Stage, moved: &[Moved]) -> Value {
+pub fn moves(title: &str, structure: &str, timing: &Loop, machine: &Machine, moved: &[Moved]) -> Value {
     let gain =
         |gain: DriveGain| json!({ "system": gain.system, "name": gain.name, "value": gain.value, "unit": gain.unit });
     json!({
@@ -38,7 +38,7 @@ pub fn moves(title: &str, structure: &str, timing: &Loop, stage: &Stage, moved: 
         "every_s": timing.every,
         "delay_s": timing.delay,
         "moves": moved.iter().map(motion).collect::<Vec<_>>(),
-        "drive_gains": drive_gains(stage).into_iter().map(gain).collect::<Vec<_>>(),
+        "drive_gains": drive_gains(machine).into_iter().map(gain).collect::<Vec<_>>(),
     })
 }
 

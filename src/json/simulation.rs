@@ -3,11 +3,11 @@
 use super::fit::score;
 use crate::case::{Case, Experiment};
 use crate::fit::LogFit;
+use crate::machine::{AmplifierMode, Machine, axis};
 use crate::mechanism::Mechanism;
 use crate::metrics::{self, Peak, SteadySpeed};
 use crate::reduction::Reduction;
 use crate::solve::{self, Method, Outcome, Solver};
-use crate::stage::{AmplifierMode, Stage, axis};
 use serde::Serialize;
 use serde_json::{Value, json};
 
@@ -40,7 +40,7 @@ pub struct Simulation {
     title: String,
     version: &'static str,
     solver: SolverUsed,
-    stage: StageFigures,
+    machine: StageFigures,
     experiments: Vec<ExperimentFigures>,
 }
 
@@ -214,8 +214,11 @@ impl Simulation {
             title: case.title.clone(),
             version: env!("CARGO_PKG_VERSION"),
             solver: SolverUsed::of(solver),
-            stage: StageFigures::of(&case.stage),
-            experiments: runs.iter().map(|run| ExperimentFigures::of(run, case.stage.amplifier.mode, solver)).collect(),
+            machine: StageFigures::of(&case.machine),
+            experiments: runs
+                .iter()
+                .map(|run| ExperimentFigures::of(run, case.machine.amplifier.mode, solver))
+                .collect(),
         }
     }
 }
@@ -239,10 +242,10 @@ impl SolverUsed {
 }
 
 impl StageFigures {
-    fn of(stage: &Stage) -> Self {
-        let (n, r) = (stage.motor.gear_ratio, stage.pulley_radius);
-        let rotor = n * n * stage.motor.rotor_inertia;
-        let (j1, j2, m) = (stage.drive_pulley.inertia, stage.idler_pulley.inertia, stage.cart.mass);
+    fn of(machine: &Machine) -> Self {
+        let (n, r) = (machine.motor.gear_ratio, machine.pulley_radius);
+        let rotor = n * n * machine.motor.rotor_inertia;
+        let (j1, j2, m) = (machine.drive_pulley.inertia, machine.idler_pulley.inertia, machine.cart.mass);
         Self {
             pulley_radius_m: r,
             cart_mass_kg: m,
@@ -251,7 +254,7 @@ impl StageFigures {
             rotor_inertia_at_pulley_kg_m2: rotor,
             total_inertia_kg_m2: j1 + j2 + rotor + m * r * r,
             gear_ratio: n,
-            belt_stiffness_newton_per_m: stage.belt.stiffness,
+            belt_stiffness_newton_per_m: machine.belt.stiffness,
         }
     }
 }

@@ -160,7 +160,7 @@ fn verdict(tuned: &Tuned, verdict: &Verdict) -> Value {
 /// The gains of a design.
 fn values(tuned: &Tuned, design: &Design) -> Vec<Value> {
     let gain = |gain: crate::tune::Gain| json!({ "key": gain.key, "unit": gain.unit, "value": gain.value });
-    gains(design, &tuned.family.stage).into_iter().map(gain).collect()
+    gains(design, &tuned.family.machine).into_iter().map(gain).collect()
 }
 
 fn least_worse(tuned: &Tuned, least: &Least) -> Value {

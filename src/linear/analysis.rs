@@ -75,18 +75,18 @@ impl<'a> Analysis<'a> {
             position: question.at.unwrap_or(usual.position),
             held: question.held,
         };
-        let stage = &case.stage;
+        let machine = &case.machine;
         numbers(question)?;
         within(case, question)?;
-        let system = StateSpace::of(stage, operation).map_err(|error| error.in_file("--at"))?;
+        let system = StateSpace::of(machine, operation).map_err(|error| error.in_file("--at"))?;
         let transfers = system.transfers()?;
         let frequencies = frequencies(&transfers, question)?;
         let responses = system.responses(&transfers, &frequencies);
-        let along = places(stage, PLACES).map(|places| travel(stage, operation, &places)).transpose()?;
-        let here = travel(stage, operation, &[operation.position])?.swap_remove(0);
+        let along = places(machine, PLACES).map(|places| travel(machine, operation, &places)).transpose()?;
+        let here = travel(machine, operation, &[operation.position])?.swap_remove(0);
         let discrete = question.sample_time.map(|time| system.discrete(time, question.hold, question.delay));
         let discrete = discrete.transpose().map_err(|error| error.in_file("--sample-time"))?;
-        let (words, sticks) = (assumptions(stage, operation), sticks(stage, operation));
+        let (words, sticks) = (assumptions(machine, operation), sticks(machine, operation));
         Ok(Self { case, operation, system, transfers, words, sticks, here, travel: along, responses, discrete })
     }
 }
@@ -110,7 +110,7 @@ fn numbers(question: &Question) -> Result<()> {
 
 /// Refuses a place outside the travel.
 fn within(case: &Case, question: &Question) -> Result<()> {
-    match (question.at, case.stage.travel) {
+    match (question.at, case.machine.travel) {
         (Some(at), Some(travel)) if !(travel.min..=travel.max).contains(&at) => {
             Err(Error::new(format!("{at} m is outside the travel"))
                 .in_file("--at")

@@ -2,9 +2,9 @@
 
 use super::model::Variable;
 use crate::friction::Law;
+use crate::machine::axis::{BODIES, CART, DRIVE, ROTOR};
+use crate::machine::{BeltModel, Machine};
 use crate::mechanism::{Form, Mechanism};
-use crate::stage::axis::{BODIES, CART, DRIVE, ROTOR};
-use crate::stage::{BeltModel, Stage};
 use nalgebra::{DMatrix, DVector};
 
 /// Speeds: of the three bodies, and of the rotor.
@@ -76,7 +76,7 @@ const BRISTLES: [Variable; 3] = [
 
 impl Frame {
     /// Angles and speeds, body by body, of what moves by itself.
-    pub(super) fn outer(stage: &Stage, plant: &Mechanism, held: [bool; 3], speed: f64) -> Self {
+    pub(super) fn outer(machine: &Machine, plant: &Mechanism, held: [bool; 3], speed: f64) -> Self {
         let moving: Vec<usize> = moving(plant, held);
         let mut kinds: Vec<Kind> = Vec::new();
         for &j in moving.iter().filter(|&&j| j != ROTOR) {
@@ -87,17 +87,17 @@ impl Frame {
             kinds.extend([Kind::Angle(ROTOR), Kind::Speed(ROTOR)]);
         }
         kinds.extend(bristles(plant, held, speed));
-        Self::new(stage, plant, kinds, false)
+        Self::new(machine, plant, kinds, false)
     }
 
     /// The cart's position and stretches, so that what does not depend on where the axis is has coefficients that are
     /// exactly zero. The outer frame where a body is held: then positions are stretches.
-    pub(super) fn inner(stage: &Stage, plant: &Mechanism, held: [bool; 3], speed: f64) -> Self {
+    pub(super) fn inner(machine: &Machine, plant: &Mechanism, held: [bool; 3], speed: f64) -> Self {
         if held.contains(&true) {
-            return Self::outer(stage, plant, held, speed);
+            return Self::outer(machine, plant, held, speed);
         }
         let mut kinds = vec![Kind::Angle(1)];
-        kinds.extend(match stage.belt.model {
+        kinds.extend(match machine.belt.model {
             BeltModel::Elastic => vec![Kind::Stretch(0), Kind::Stretch(1)],
             BeltModel::TwoMass => vec![Kind::Stretch(0)],
             BeltModel::Rigid => Vec::new(),
@@ -106,11 +106,11 @@ impl Frame {
         kinds.extend(moving(plant, held).into_iter().map(Kind::Speed));
         kinds.extend(plant.drives[0].has_current_state().then_some(Kind::Current));
         kinds.extend(bristles(plant, held, speed));
-        Self::new(stage, plant, kinds, true)
+        Self::new(machine, plant, kinds, true)
     }
 
-    fn new(stage: &Stage, plant: &Mechanism, kinds: Vec<Kind>, relative: bool) -> Self {
-        let r = stage.pulley_radius;
+    fn new(machine: &Machine, plant: &Mechanism, kinds: Vec<Kind>, relative: bool) -> Self {
+        let r = machine.pulley_radius;
         let n = kinds.len();
         let place = |kind: Kind| kinds.iter().position(|k| *k == kind);
         let unit = |kind: Kind, factor: f64| {
@@ -136,7 +136,7 @@ impl Frame {
             let x = unit(Kind::Angle(CART), 1.0);
             let (d1, twist) = (unit(Kind::Stretch(0), 1.0), unit(Kind::Stretch(TWIST), 1.0));
             // x − r φ₃; with both pulleys as one it is x − r φ₁
-            let d2 = match stage.belt.model {
+            let d2 = match machine.belt.model {
                 BeltModel::Elastic => unit(Kind::Stretch(1), 1.0),
                 _ => -d1.clone(),
             };

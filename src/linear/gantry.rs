@@ -4,9 +4,9 @@ use super::Natural;
 use crate::case::GantryCase;
 use crate::error::Result;
 use crate::friction::Law;
+use crate::machine::Travel;
+use crate::machine::gantry::{BRIDGE, CART};
 use crate::mechanism::{AmplifierMode, BODIES, Mechanism};
-use crate::stage::Travel;
-use crate::stage::gantry::{BRIDGE, CART};
 
 /// Places along either way of the map.
 const PLACES: usize = 33;

@@ -3,9 +3,9 @@
 use super::frame::{Frame, has_rotor};
 use crate::error::{Error, Result};
 use crate::friction::{Law, Motion};
+use crate::machine::axis::{BODIES, ROTOR, SPANS};
+use crate::machine::{BeltModel, Machine};
 use crate::mechanism::{AmplifierMode, Contact, Form, Mechanism, Mode, Over, SpringLaw};
-use crate::stage::axis::{BODIES, ROTOR, SPANS};
-use crate::stage::{BeltModel, Stage};
 use nalgebra::{DMatrix, DVector};
 
 /// About what a stage is linearised.
@@ -82,7 +82,7 @@ impl StateSpace {
     /// use taut::linear::{Operation, StateSpace};
     ///
     /// let case = Case::from_text("axis.toml", TEMPLATE)?;
-    /// let axis = StateSpace::of(&case.stage, Operation::default())?;
+    /// let axis = StateSpace::of(&case.machine, Operation::default())?;
     /// assert_eq!(axis.states.len(), 6);
     /// // One integrator, and all else dies away.
     /// let poles = axis.poles()?;
@@ -90,20 +90,20 @@ impl StateSpace {
     /// assert!(poles.iter().all(|p| p.re <= 0.0));
     /// # Ok::<(), taut::Error>(())
     /// ```
-    pub fn of(stage: &Stage, operation: Operation) -> Result<Self> {
-        let stage = placed(stage, operation.position)?;
-        let plant = stage.mechanism();
+    pub fn of(machine: &Machine, operation: Operation) -> Result<Self> {
+        let machine = placed(machine, operation.position)?;
+        let plant = machine.mechanism();
         let held =
             std::array::from_fn(|body| plant.followers(plant.leader(body)).any(|b| b < BODIES && operation.held[b]));
-        let frame = Frame::outer(&stage, &plant, held, operation.speed);
-        let inner = Frame::inner(&stage, &plant, held, operation.speed);
+        let frame = Frame::outer(&machine, &plant, held, operation.speed);
+        let inner = Frame::inner(&machine, &plant, held, operation.speed);
         let mode = mode(&plant, held, operation.speed);
-        let equations = Linear { stage: &stage, plant: &plant, operation, held, mode };
+        let equations = Linear { machine: &machine, plant: &plant, operation, held, mode };
         let (a, b) = equations.rates(&frame);
         let (inner_a, inner_b) = equations.rates(&inner);
         let (outputs, c, d) = equations.outputs(&frame);
         let (_, inner_c, _) = equations.outputs(&inner);
-        let input = match stage.amplifier.mode {
+        let input = match machine.amplifier.mode {
             AmplifierMode::Voltage => Variable { name: "voltage_command", unit: "V" },
             AmplifierMode::Current => Variable { name: "current_command", unit: "A" },
         };
@@ -132,9 +132,9 @@ impl StateSpace {
 }
 
 /// The stage with its spans as stiff as they are with the cart at `x`.
-fn placed(stage: &Stage, x: f64) -> Result<Stage> {
-    let mut stage = stage.clone();
-    if let (true, Some(make)) = (stage.belt.follows_cart, stage.belt.make) {
+fn placed(machine: &Machine, x: f64) -> Result<Machine> {
+    let mut machine = machine.clone();
+    if let (true, Some(make)) = (machine.belt.follows_cart, machine.belt.make) {
         let [l1, l2, _] = make.spans;
         if !(-l2 < x && x < l1) {
             return Err(Error::new(format!("the cart cannot be at {x} m: a span would have no length"))
@@ -142,9 +142,9 @@ fn placed(stage: &Stage, x: f64) -> Result<Stage> {
                 .next("name a place between the pulleys"));
         }
         let [k1, k2] = make.stiffness_at(x);
-        (stage.belt.stiffness[0], stage.belt.stiffness[1]) = (k1, k2);
+        (machine.belt.stiffness[0], machine.belt.stiffness[1]) = (k1, k2);
     }
-    Ok(stage)
+    Ok(machine)
 }
 
 /// The mode of steady sliding.
@@ -175,7 +175,7 @@ fn mode(plant: &Mechanism, held: [bool; 3], speed: f64) -> Mode {
 
 /// The equations to be written out in a frame.
 struct Linear<'a> {
-    stage: &'a Stage,
+    machine: &'a Machine,
     plant: &'a Mechanism,
     operation: Operation,
     held: [bool; 3],
@@ -295,9 +295,9 @@ impl Linear<'_> {
         if has_rotor(plant) {
             add("rotor_speed", "rad/s", frame.row(&Form::speed(ROTOR)));
         }
-        if self.stage.belt.model != BeltModel::Rigid {
+        if self.machine.belt.model != BeltModel::Rigid {
             for (span, name) in ["span1_force", "span2_force", "span3_force"].into_iter().enumerate() {
-                let alike = self.stage.span_alike(span).unwrap_or(span);
+                let alike = self.machine.span_alike(span).unwrap_or(span);
                 add(name, "N", frame.row(&plant.spring_force(alike, &self.mode)));
             }
         }

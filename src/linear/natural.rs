@@ -86,7 +86,7 @@ impl Natural {
     /// use taut::case::{Case, TEMPLATE};
     /// use taut::linear::Natural;
     /// let case = Case::from_text("axis.toml", TEMPLATE)?;
-    /// let modes = Natural::of(&case.stage.mechanism(), &[0.0; 6])?;
+    /// let modes = Natural::of(&case.machine.mechanism(), &[0.0; 6])?;
     /// // An axis moves as a whole, and swings in two ways.
     /// assert_eq!((modes.rigid.len(), modes.elastic.len()), (1, 2));
     /// assert!(modes.elastic[0].hertz() > 100.0);

@@ -3,7 +3,7 @@
 use super::{Operation, Root, StateSpace};
 use crate::error::Result;
 use crate::friction::{Friction, Law, Side};
-use crate::stage::{Amplifier, AmplifierMode, CartForces, Stage};
+use crate::machine::{Amplifier, AmplifierMode, CartForces, Machine};
 
 /// The resonances with the cart at one place. All frequencies in Hz, the lowest first.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,11 +24,11 @@ pub struct Place {
 
 /// Places spread evenly over the travel, or, where none is given, from a twentieth of span 2 before the idler pulley to
 /// a twentieth of span 1 before the drive pulley; none where the stiffness does not depend on the place.
-pub fn places(stage: &Stage, count: usize) -> Option<Vec<f64>> {
-    let make = stage.belt.make.filter(|_| stage.belt.follows_cart)?;
+pub fn places(machine: &Machine, count: usize) -> Option<Vec<f64>> {
+    let make = machine.belt.make.filter(|_| machine.belt.follows_cart)?;
     let [l1, l2, _] = make.spans;
     let (mut low, mut high) = (-0.95 * l2, 0.95 * l1);
-    if let Some(travel) = stage.travel {
+    if let Some(travel) = machine.travel {
         (low, high) = (low.max(travel.min), high.min(travel.max));
     }
     let steps = count.max(2) - 1;
@@ -36,25 +36,25 @@ pub fn places(stage: &Stage, count: usize) -> Option<Vec<f64>> {
 }
 
 /// The stage with the cart at each of `positions`, m; all else as `operation` says.
-pub fn travel(stage: &Stage, operation: Operation, positions: &[f64]) -> Result<Vec<Place>> {
-    let bare = undamped(stage);
+pub fn travel(machine: &Machine, operation: Operation, positions: &[f64]) -> Result<Vec<Place>> {
+    let bare = undamped(machine);
     let drive_held = Operation { held: [true, operation.held[1], operation.held[2]], ..operation };
     let place = |&position: &f64| {
-        let pairs = |stage: &Stage, about: Operation| -> Result<Vec<Root>> {
-            let poles = StateSpace::of(stage, Operation { position, ..about })?.poles()?;
+        let pairs = |machine: &Machine, about: Operation| -> Result<Vec<Root>> {
+            let poles = StateSpace::of(machine, Operation { position, ..about })?.poles()?;
             Ok(Root::of(&poles).into_iter().filter(|root| root.hertz().is_some()).collect())
         };
         let hertz = |roots: Vec<Root>| roots.into_iter().filter_map(Root::hertz).collect();
-        let [k1, k2, _] = stage.belt.stiffness;
-        let stiffness = match stage.belt.make {
-            Some(make) if stage.belt.follows_cart => make.stiffness_at(position),
+        let [k1, k2, _] = machine.belt.stiffness;
+        let stiffness = match machine.belt.make {
+            Some(make) if machine.belt.follows_cart => make.stiffness_at(position),
             _ => [k1, k2],
         };
         Ok(Place {
             position,
             stiffness,
-            resonances: pairs(stage, operation)?,
-            antiresonances: pairs(stage, drive_held)?,
+            resonances: pairs(machine, operation)?,
+            antiresonances: pairs(machine, drive_held)?,
             undamped_resonances: hertz(pairs(&bare, operation)?),
             undamped_antiresonances: hertz(pairs(&bare, drive_held)?),
         })
@@ -64,8 +64,8 @@ pub fn travel(stage: &Stage, operation: Operation, positions: &[f64]) -> Result<
 
 /// The same masses and springs and nothing that takes energy: no friction, no damping, no back-EMF, a motor that is
 /// given its current.
-pub fn undamped(stage: &Stage) -> Stage {
-    let mut bare = stage.clone();
+pub fn undamped(machine: &Machine) -> Machine {
+    let mut bare = machine.clone();
     let none = Friction { forward: Side::default(), backward: Side::default(), law: Law::Coulomb };
     (bare.drive_pulley.friction, bare.cart.friction, bare.idler_pulley.friction) = (none, none, none);
     (bare.cart.along, bare.cart.forces) = (None, CartForces::default());

@@ -2,14 +2,14 @@
 
 use super::Operation;
 use crate::friction::Law;
+use crate::machine::axis::{BODIES, CART};
+use crate::machine::{BeltModel, Machine};
 use crate::mechanism::Mechanism;
 use crate::number::engineering_typed;
-use crate::stage::axis::{BODIES, CART};
-use crate::stage::{BeltModel, Stage};
 
 /// The operating point and the assumptions: a sentence for each part that makes the stage more than a linear system.
-pub fn assumptions(stage: &Stage, operation: Operation) -> Vec<String> {
-    let plant = stage.mechanism();
+pub fn assumptions(machine: &Machine, operation: Operation) -> Vec<String> {
+    let plant = machine.mechanism();
     let held = |body: usize| operation.held[body] || operation.held[plant.leader(body)];
     let moving: Vec<usize> = leaders(&plant).filter(|body| !held(*body)).collect();
     let mut words = Vec::new();
@@ -19,11 +19,11 @@ pub fn assumptions(stage: &Stage, operation: Operation) -> Vec<String> {
     }
     words.extend(sliding(&plant, operation, &moving));
     words.extend(curves(&plant, operation, &moving));
-    if stage.cart.along.is_some() && moving.contains(&plant.leader(CART)) {
+    if machine.cart.along.is_some() && moving.contains(&plant.leader(CART)) {
         let at = engineering_typed(operation.position, "m", 4);
         words.push(format!("friction that changes along the travel is taken as it is at x = {at}, and not followed"));
     }
-    let forces = &stage.cart.forces;
+    let forces = &machine.cart.forces;
     if forces.along.is_some() {
         words.push("the force that changes along the travel is taken as it is at the place, and not followed".into());
     }
@@ -31,11 +31,11 @@ pub fn assumptions(stage: &Stage, operation: Operation) -> Vec<String> {
         let at = engineering_typed(operation.speed, "m/s", 4);
         words.push(format!("the force that changes with the speed is a damper as steep as it is at {at}"));
     }
-    let amplifier = &stage.amplifier;
+    let amplifier = &machine.amplifier;
     if amplifier.voltage_limit.is_some() || amplifier.current_limit.is_some() {
         words.push("the amplifier is taken within its limits".into());
     }
-    if let Some(play) = stage.motor.gear_play.filter(|play| play.backlash > 0.0) {
+    if let Some(play) = machine.motor.gear_play.filter(|play| play.backlash > 0.0) {
         let width = engineering_typed(play.backlash, "rad", 3);
         words.push(format!(
             "the gear is taken with its driving flank in contact; within its play of {width} the motor moves nothing but its rotor"
@@ -45,26 +45,26 @@ pub fn assumptions(stage: &Stage, operation: Operation) -> Vec<String> {
         words
             .push("the gear is taken as driven by the motor: it passes on its efficiency's share of the torque".into());
     }
-    if stage.belt.pretension.is_some() {
+    if machine.belt.pretension.is_some() {
         words.push("the spans are taken taut; forces are those beyond pretension".into());
     }
-    match stage.belt.model {
+    match machine.belt.model {
         BeltModel::Elastic => {}
         BeltModel::TwoMass => words.push("the belt's model is two-mass: both pulleys are one inertia".into()),
         BeltModel::Rigid => words.push("the belt's model is rigid: it does not stretch, so it has no resonance".into()),
     }
-    if stage.travel.is_some_and(|travel| travel.stop.is_some()) {
+    if machine.travel.is_some_and(|travel| travel.stop.is_some()) {
         words.push("the cart is taken between its end stops".into());
     }
-    if stage.cart.constant_force() != 0.0 {
+    if machine.cart.constant_force() != 0.0 {
         words.push("the constant force on the cart changes where the stage is, not how it swings".into());
     }
     words
 }
 
 /// Whether dry friction can hold a body that moves in this model at rest.
-pub fn sticks(stage: &Stage, operation: Operation) -> bool {
-    let plant = stage.mechanism();
+pub fn sticks(machine: &Machine, operation: Operation) -> bool {
+    let plant = machine.mechanism();
     leaders(&plant).any(|body| !operation.held[body] && plant.friction(body).breakaway(true) > 0.0)
 }
 
@@ -98,7 +98,7 @@ fn sliding(plant: &Mechanism, operation: Operation, moving: &[usize]) -> Option<
         (true, false) if curve => format!("linearised while it moves {way} {pace}"),
         (true, false) => "linear as it stands: nothing sticks".into(),
         (false, true) => format!(
-            "at rest this stage sticks: dry friction holds {}, and what is held answers no input; \
+            "at rest this machine sticks: dry friction holds {}, and what is held answers no input; \
              linearised instead while everything slides {way}, {pace}; --stuck takes who is held out",
             holds.join(", ")
         ),

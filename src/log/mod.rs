@@ -17,7 +17,7 @@ mod sheet;
 mod survey;
 mod words;
 
-pub use crate::stage::Quantity;
+pub use crate::machine::Quantity;
 pub use accelerometer::{Accelerometer, read_accelerometer};
 pub use guess::{Guess, Looked, Seen, look};
 pub use mapping::{Clock, Mapping, Source, Unit};

@@ -7,7 +7,7 @@
 //! ```
 //!
 //! Friction, limits, slack and play make this piecewise linear; within one [`Mode`] it is linear, and
-//! [`Mechanism::equations`] gives it. Which bodies there are, and what they are called, is [`crate::stage`]'s to say.
+//! [`Mechanism::equations`] gives it. Which bodies there are, and what they are called, is [`crate::machine`]'s to say.
 
 mod drive;
 mod elements;

@@ -3,9 +3,9 @@
 
 use super::watch::{Sum, Watch, Watched};
 use super::{EventCount, Peak};
+use crate::machine::gantry::{BODIES, Gantry};
 use crate::mechanism::{DRIVES, Mechanism, Mode, Roles, Shown, State};
 use crate::solve::{Closer, Curve, Event, Gap, Observe, Stretch};
-use crate::stage::gantry::{BODIES, Gantry};
 
 /// Peaks before those of the spans: speeds of bridge and cart, errors of both, currents, speeds of the motors.
 const FIRST_SPAN: usize = 8;
@@ -30,10 +30,10 @@ pub struct GantryMetrics {
     /// Speeds of the left and the right motor behind its gear, of largest magnitude, rad/s: those of the pulleys where
     /// the gear is stiff.
     pub peak_drive_speed: [Peak; DRIVES],
-    /// Stretch of each span of largest magnitude, m, in the order of [`Routing::spans`](crate::stage::gantry::Routing).
+    /// Stretch of each span of largest magnitude, m, in the order of [`Routing::spans`](crate::machine::gantry::Routing).
     pub peak_stretch: Vec<Peak>,
     /// Force in each span of largest magnitude, N, damping included, in the order of
-    /// [`Routing::spans`](crate::stage::gantry::Routing).
+    /// [`Routing::spans`](crate::machine::gantry::Routing).
     pub peak_force: Vec<Peak>,
     /// When everything came to rest, s, if it has; 0 if nothing ever moved. None while anything moves, and where a body
     /// has no dry friction to stick by.

@@ -6,28 +6,28 @@ use crate::case::Case;
 use crate::control::feasible::{of_moves, sentence};
 use crate::error::Result;
 use crate::linear::{Operation, Root, places, travel};
-use crate::stage::{AmplifierMode, BeltModel, Stage};
+use crate::machine::{AmplifierMode, BeltModel, Machine};
 use std::f64::consts::PI;
 
 /// Places along the travel.
 const PLACES: usize = 7;
 
 pub(super) fn overview(case: &Case) -> Result<Overview> {
-    let stage = &case.stage;
+    let machine = &case.machine;
     let mut notes = Vec::new();
-    let masses = masses(stage);
+    let masses = masses(machine);
     let inputs = case.experiments.iter().map(|experiment| (&experiment.input, experiment.until));
     let most = most(case.controller.as_ref().and_then(|design| design.limit), inputs);
-    let along = places(stage, PLACES);
+    let along = places(machine, PLACES);
     let positions = along.clone().unwrap_or_else(|| vec![0.0]);
-    let found = travel(stage, Operation::default(), &positions)?;
-    let places: Vec<Place> = found.iter().map(|place| self::place(stage, place)).collect();
-    let mut groups = vec![drive(stage, &mut notes), inertia(stage, &masses, &mut notes)];
-    groups.extend(belt(stage, &places));
-    groups.extend(limits(stage, &masses, most.as_ref(), &mut notes));
-    of_constants(&stage.motor, "", &mut notes);
-    if stage.belt.model != BeltModel::Rigid {
-        of_belt(&stage.belt.sheet, &stage.belt.damping, stage.pulley_radius, &mut notes);
+    let found = travel(machine, Operation::default(), &positions)?;
+    let places: Vec<Place> = found.iter().map(|place| self::place(machine, place)).collect();
+    let mut groups = vec![drive(machine, &mut notes), inertia(machine, &masses, &mut notes)];
+    groups.extend(belt(machine, &places));
+    groups.extend(limits(machine, &masses, most.as_ref(), &mut notes));
+    of_constants(&machine.motor, "", &mut notes);
+    if machine.belt.model != BeltModel::Rigid {
+        of_belt(&machine.belt.sheet, &machine.belt.damping, machine.pulley_radius, &mut notes);
     }
     notes.extend(
         of_moves(case).iter().map(|(name, short)| Note { code: "move-out-of-reach", text: sentence(name, short) }),
@@ -45,34 +45,34 @@ struct Masses {
     total: f64,
 }
 
-fn masses(stage: &Stage) -> Masses {
-    let r = stage.pulley_radius;
-    let [drive, idler] = [&stage.drive_pulley, &stage.idler_pulley].map(|pulley| pulley.inertia / (r * r));
+fn masses(machine: &Machine) -> Masses {
+    let r = machine.pulley_radius;
+    let [drive, idler] = [&machine.drive_pulley, &machine.idler_pulley].map(|pulley| pulley.inertia / (r * r));
     // n² J_r / r²
-    let rotor = stage.motor.rotor_inertia * (stage.motor.gear_ratio / r).powi(2);
-    Masses { drive, idler, rotor, total: stage.cart.mass + drive + idler + rotor }
+    let rotor = machine.motor.rotor_inertia * (machine.motor.gear_ratio / r).powi(2);
+    Masses { drive, idler, rotor, total: machine.cart.mass + drive + idler + rotor }
 }
 
-fn drive(stage: &Stage, notes: &mut Vec<Note>) -> Group {
+fn drive(machine: &Machine, notes: &mut Vec<Note>) -> Group {
     let mut group = Group::new("drive", "Drive");
-    motor_rows(&mut group, "", &stage.motor);
-    let r = stage.pulley_radius;
-    let amplifier = (stage.amplifier.mode, stage.amplifier.gain);
-    let (force, drag) = drive_at_belt(&stage.motor, amplifier, r);
-    let (per_input, input) = match stage.amplifier.mode {
+    motor_rows(&mut group, "", &machine.motor);
+    let r = machine.pulley_radius;
+    let amplifier = (machine.amplifier.mode, machine.amplifier.gain);
+    let (force, drag) = drive_at_belt(&machine.motor, amplifier, r);
+    let (per_input, input) = match machine.amplifier.mode {
         AmplifierMode::Voltage => ("N/V", "V"),
         AmplifierMode::Current => ("N/A", "A"),
     };
     group.add("force_per_input", "force at the belt per input", force, per_input);
     if drag > 0.0 {
-        group.add("drag", "drag of the drive at the cart", drag, "N s/m").how(match stage.motor.is_simple {
+        group.add("drag", "drag of the drive at the cart", drag, "N s/m").how(match machine.motor.is_simple {
             true => "",
             false => "of the back-EMF",
         });
     }
-    group.add("travel_per_turn", "travel per turn of the motor", 2.0 * PI * r / stage.motor.gear_ratio, "m");
+    group.add("travel_per_turn", "travel per turn of the motor", 2.0 * PI * r / machine.motor.gear_ratio, "m");
     if force > 0.0 {
-        let [forward, backward] = [1.0, -1.0].map(|side| stage.breakaway(side, 0.0) / force);
+        let [forward, backward] = [1.0, -1.0].map(|side| machine.breakaway(side, 0.0) / force);
         let row = group.add("breakaway_input", breakaway_name(input), forward, input);
         row.how("that friction holds against, the belt pulling all bodies along");
         if (backward - forward).abs() > 1e-3 * forward.abs() {
@@ -90,40 +90,40 @@ fn breakaway_name(input: &str) -> &'static str {
     if input == "V" { "breakaway voltage" } else { "breakaway current" }
 }
 
-fn inertia(stage: &Stage, masses: &Masses, notes: &mut Vec<Note>) -> Group {
+fn inertia(machine: &Machine, masses: &Masses, notes: &mut Vec<Note>) -> Group {
     let mut group = Group::new("inertia", "Moved mass, at the cart");
-    group.add("cart_mass", "cart", stage.cart.mass, "kg");
+    group.add("cart_mass", "cart", machine.cart.mass, "kg");
     group.add("drive_pulley_mass", "drive pulley", masses.drive, "kg").how("J/r²");
     group.add("idler_pulley_mass", "idler pulley", masses.idler, "kg").how("J/r²");
     if masses.rotor > 0.0 {
         group.add("rotor_mass", "rotor", masses.rotor, "kg").how("n² J/r²");
     }
     group.add("total_mass", "all of it", masses.total, "kg");
-    let reflected = masses.total - stage.cart.mass;
+    let reflected = masses.total - machine.cart.mass;
     group.add("reflected_share", "share of what turns", reflected / masses.total, "");
-    let length = stage.belt.make.map(|make| make.spans.iter().sum::<f64>() + 2.0 * PI * stage.pulley_radius);
-    belt_mass(&mut group, notes, &stage.belt.sheet, length, masses.total);
+    let length = machine.belt.make.map(|make| make.spans.iter().sum::<f64>() + 2.0 * PI * machine.pulley_radius);
+    belt_mass(&mut group, notes, &machine.belt.sheet, length, masses.total);
     group
 }
 
-fn belt(stage: &Stage, places: &[Place]) -> Option<Group> {
-    if stage.belt.model == BeltModel::Rigid {
+fn belt(machine: &Machine, places: &[Place]) -> Option<Group> {
+    if machine.belt.model == BeltModel::Rigid {
         return None;
     }
     let mut group = Group::new("belt", "Belt, with the cart at x = 0");
-    if let Some(make) = stage.belt.make {
+    if let Some(make) = machine.belt.make {
         group.add("specific_stiffness", "specific stiffness E A", make.modulus * make.section, "N");
     }
-    for (span, stiffness) in stage.belt.stiffness.iter().enumerate() {
+    for (span, stiffness) in machine.belt.stiffness.iter().enumerate() {
         group.add(format!("span{}_stiffness", span + 1), format!("stiffness of span {}", span + 1), *stiffness, "N/m");
     }
-    let stretch = compliance(stage, 0.0);
+    let stretch = compliance(machine, 0.0);
     group
         .add("stiffness_at_cart", "stiffness at the cart", 1.0 / stretch, "N/m")
         .how("the drive pulley held: k1 + k2 k3/(k2 + k3)");
     group.add("stretch_per_force", "stretch per newton", stretch, "m/N");
-    if stage.belt.damping.iter().any(|c| *c > 0.0) {
-        for (span, damping) in stage.belt.damping.iter().enumerate() {
+    if machine.belt.damping.iter().any(|c| *c > 0.0) {
+        for (span, damping) in machine.belt.damping.iter().enumerate() {
             group.add(format!("span{}_damping", span + 1), format!("damping of span {}", span + 1), *damping, "N s/m");
         }
     }
@@ -147,15 +147,15 @@ fn belt(stage: &Stage, places: &[Place]) -> Option<Group> {
 
 /// By how much the cart gives way per force, the drive pulley held, m/N: the idler pulley turns freely between spans 2
 /// and 3.
-fn compliance(stage: &Stage, x: f64) -> f64 {
-    let [mut k1, mut k2, k3] = stage.belt.stiffness;
-    if let Some(make) = stage.belt.make.filter(|_| stage.belt.follows_cart) {
+fn compliance(machine: &Machine, x: f64) -> f64 {
+    let [mut k1, mut k2, k3] = machine.belt.stiffness;
+    if let Some(make) = machine.belt.make.filter(|_| machine.belt.follows_cart) {
         [k1, k2] = make.stiffness_at(x);
     }
     1.0 / (k1 + k2 * k3 / (k2 + k3))
 }
 
-fn place(stage: &Stage, found: &crate::linear::Place) -> Place {
+fn place(machine: &Machine, found: &crate::linear::Place) -> Place {
     let [k1, k2] = found.stiffness;
     let damped = |k: usize| match found.resonances.get(k) {
         // Where damping makes fewer pairs, which is which cannot be told.
@@ -165,16 +165,16 @@ fn place(stage: &Stage, found: &crate::linear::Place) -> Place {
     let modes = found.undamped_resonances.iter().enumerate().map(|(k, hertz)| (*hertz, damped(k))).collect();
     Place {
         position: vec![found.position],
-        stiffness: vec![k1, k2, stage.belt.stiffness[2]],
-        stretch: vec![compliance(stage, found.position)],
+        stiffness: vec![k1, k2, machine.belt.stiffness[2]],
+        stretch: vec![compliance(machine, found.position)],
         modes,
         held: found.undamped_antiresonances.first().copied(),
     }
 }
 
-fn limits(stage: &Stage, masses: &Masses, most: Option<&Most>, notes: &mut Vec<Note>) -> Option<Group> {
-    let r = stage.pulley_radius;
-    let Some((power, from)) = Power::of(&stage.motor, &stage.amplifier, r, most) else {
+fn limits(machine: &Machine, masses: &Masses, most: Option<&Most>, notes: &mut Vec<Note>) -> Option<Group> {
+    let r = machine.pulley_radius;
+    let Some((power, from)) = Power::of(&machine.motor, &machine.amplifier, r, most) else {
         let text = "nothing bounds the input: give amplifier.voltage_limit or current_limit to see the largest speed and \
                     acceleration";
         notes.push(Note { code: "no-limit", text: text.to_string() });
@@ -184,17 +184,17 @@ fn limits(stage: &Stage, masses: &Masses, most: Option<&Most>, notes: &mut Vec<N
     group.add("largest_force", "largest force of the motor at the belt", power.force, "N").how(format!("by {from}"));
     for (side, end) in [(1.0, ""), (-1.0, "_backward")] {
         let side_of = |forward: bool| {
-            let pulleys = [&stage.drive_pulley, &stage.idler_pulley].map(|pulley| pulley.friction.side(forward));
-            let cart = stage.cart.friction.side(forward);
+            let pulleys = [&machine.drive_pulley, &machine.idler_pulley].map(|pulley| pulley.friction.side(forward));
+            let cart = machine.cart.friction.side(forward);
             let coulomb = cart.coulomb + pulleys.iter().map(|side| side.coulomb).sum::<f64>() / r;
             let viscous = cart.viscous + pulleys.iter().map(|side| side.viscous).sum::<f64>() / (r * r);
             (coulomb, viscous)
         };
         let (coulomb, viscous) = side_of(side > 0.0);
-        if side < 0.0 && stage.cart.constant_force() == 0.0 && side_of(true) == side_of(false) {
+        if side < 0.0 && machine.cart.constant_force() == 0.0 && side_of(true) == side_of(false) {
             break;
         }
-        let against = -side * stage.cart.constant_force();
+        let against = -side * machine.cart.constant_force();
         let words = if end.is_empty() { "" } else { " backward" };
         let left = (power.force - coulomb - against) / masses.total;
         group
@@ -217,19 +217,19 @@ fn limits(stage: &Stage, masses: &Masses, most: Option<&Most>, notes: &mut Vec<N
             notes.push(Note { code: "does-not-move", text });
         }
     }
-    if stage.belt.model != BeltModel::Rigid {
+    if machine.belt.model != BeltModel::Rigid {
         group
-            .add("largest_stretch", "stretch of the belt under it", power.force * compliance(stage, 0.0), "m")
+            .add("largest_stretch", "stretch of the belt under it", power.force * compliance(machine, 0.0), "m")
             .how("at the cart, the drive held");
-        safety(&mut group, notes, &stage.belt.sheet, stage.belt.pretension, r, power.force);
-        notes.extend(little_pretension(stage, power.force));
+        safety(&mut group, notes, &machine.belt.sheet, machine.belt.pretension, r, power.force);
+        notes.extend(little_pretension(machine, power.force));
     }
     Some(group)
 }
 
 /// Of a belt that the largest force makes slack.
-fn little_pretension(stage: &Stage, force: f64) -> Option<Note> {
-    let pretension = stage.belt.pretension.filter(|pretension| *pretension < 0.5 * force)?;
+fn little_pretension(machine: &Machine, force: f64) -> Option<Note> {
+    let pretension = machine.belt.pretension.filter(|pretension| *pretension < 0.5 * force)?;
     let text = format!(
         "a pretension of {} is less than half of the largest force, {}: a span may go slack",
         told(pretension, "N"),

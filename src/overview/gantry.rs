@@ -5,9 +5,9 @@ use super::{Group, Note, Overview, Place, belt_mass, drive_at_belt, motor_rows, 
 use crate::case::GantryCase;
 use crate::error::Result;
 use crate::linear::Natural;
+use crate::machine::gantry::{BRIDGE, CART, Gantry};
+use crate::machine::{AmplifierMode, Travel};
 use crate::mechanism::BODIES;
-use crate::stage::gantry::{BRIDGE, CART, Gantry};
-use crate::stage::{AmplifierMode, Travel};
 use std::f64::consts::PI;
 
 /// The drives, as rows call them.

@@ -1,8 +1,8 @@
 //! How fast and how quickly a drive can go, and what its belt takes then.
 
 use super::{Group, Note, told};
+use crate::machine::{Amplifier, AmplifierMode, BeltSheet, Motor};
 use crate::signal::Signal;
-use crate::stage::{Amplifier, AmplifierMode, BeltSheet, Motor};
 
 /// The power of a drive: at the belt, per direction alike.
 #[derive(Debug, Clone, Copy)]

@@ -1,12 +1,12 @@
 //! Where a parameter sits in a machine, how it is read there and how it is set.
 
 use crate::friction::{Friction, Law, Shape, decay_of_velocity, velocity_of_decay};
-use crate::stage::gantry::{Gantry, Slide};
-use crate::stage::{Belt, BeltModel, SimpleDrive, Stage};
+use crate::machine::gantry::{Gantry, Slide};
+use crate::machine::{Belt, BeltModel, Machine, SimpleDrive};
 
 /// Where a parameter sits in a machine of one kind: an axis, or a [`Gantry`].
 #[derive(Debug)]
-pub enum Field<M = Stage> {
+pub enum Field<M = Machine> {
     /// In no machine: it is a number of a run, a recorder, a controller, a method, or of a machine of the other kind.
     Elsewhere,
     /// In a machine.
@@ -19,7 +19,7 @@ pub enum Field<M = Stage> {
 
 /// Reads and sets a number of a machine, or each of a list.
 #[derive(Debug)]
-pub struct Accessor<M = Stage> {
+pub struct Accessor<M = Machine> {
     /// How its elements are named.
     pub(super) list: List,
     /// How many it has.
@@ -129,15 +129,15 @@ impl<M> Field<M> {
 
 impl Field {
     /// A number of each span.
-    pub(super) const fn spans(get: fn(&Stage, usize) -> Option<f64>, set: fn(&mut Stage, usize, f64)) -> Self {
+    pub(super) const fn spans(get: fn(&Machine, usize) -> Option<f64>, set: fn(&mut Machine, usize, f64)) -> Self {
         Self::Machine(Accessor::new(List::Numbers, |_| 3, get, set))
     }
 
     /// A number of each point of a line.
     pub(super) const fn points(
-        count: fn(&Stage) -> usize,
-        get: fn(&Stage, usize) -> Option<f64>,
-        set: fn(&mut Stage, usize, f64),
+        count: fn(&Machine) -> usize,
+        get: fn(&Machine, usize) -> Option<f64>,
+        set: fn(&mut Machine, usize, f64),
     ) -> Self {
         Self::Machine(Accessor::new(List::Points, count, get, set))
     }
@@ -463,12 +463,12 @@ macro_rules! of_law {
 pub(super) use {always, amplifier, everywhere, make, motor, of_drive, of_friction, of_law, of_simple, of_slide, part};
 
 /// The drive that is given by force and drag, if it is.
-pub(super) fn simple(stage: &Stage) -> Option<SimpleDrive> {
+pub(super) fn simple(stage: &Machine) -> Option<SimpleDrive> {
     SimpleDrive::of(&stage.motor, stage.pulley_radius)
 }
 
 /// Sets the radius; a drive that is given by its force keeps it.
-pub(super) fn set_radius(stage: &mut Stage, radius: f64) {
+pub(super) fn set_radius(stage: &mut Machine, radius: f64) {
     let drive = simple(stage);
     stage.pulley_radius = radius;
     if let Some(drive) = drive {
@@ -476,7 +476,7 @@ pub(super) fn set_radius(stage: &mut Stage, radius: f64) {
     }
 }
 
-pub(super) fn set_simple(stage: &mut Stage, change: impl FnOnce(&mut SimpleDrive)) {
+pub(super) fn set_simple(stage: &mut Machine, change: impl FnOnce(&mut SimpleDrive)) {
     if let Some(mut drive) = simple(stage) {
         change(&mut drive);
         stage.motor = drive.motor(stage.pulley_radius);

@@ -3,10 +3,10 @@
 use super::field::{DRIVES, List, SLIDES};
 use super::{Field, Parameter, named};
 use crate::friction::Friction;
-use crate::stage::Stage;
-use crate::stage::gantry::Gantry;
+use crate::machine::Machine;
+use crate::machine::gantry::Gantry;
 
-/// A machine whose numbers stand in the table: a [`Stage`] or a [`Gantry`].
+/// A machine whose numbers stand in the table: a [`Machine`] or a [`Gantry`].
 pub trait Numbers {
     /// Where it has the number of a row.
     fn sits(&self, row: &Parameter) -> Sits;
@@ -25,7 +25,7 @@ pub trait Numbers {
     fn frictions(&mut self) -> Vec<&mut Friction>;
 
     /// It, where it is an axis.
-    fn axis(&self) -> Option<&Stage>;
+    fn axis(&self) -> Option<&Machine>;
 }
 
 /// Where a machine has the number of a row.
@@ -65,7 +65,7 @@ impl Sits {
     }
 }
 
-impl Numbers for Stage {
+impl Numbers for Machine {
     fn sits(&self, row: &Parameter) -> Sits {
         Sits::of(&row.field, self)
     }
@@ -88,7 +88,7 @@ impl Numbers for Stage {
         vec![&mut self.drive_pulley.friction, &mut self.cart.friction, &mut self.idler_pulley.friction]
     }
 
-    fn axis(&self) -> Option<&Stage> {
+    fn axis(&self) -> Option<&Machine> {
         Some(self)
     }
 }
@@ -122,7 +122,7 @@ impl Numbers for Gantry {
         vec![&mut self.drive_pulley.friction, &mut self.bridge.friction, &mut self.cart.friction]
     }
 
-    fn axis(&self) -> Option<&Stage> {
+    fn axis(&self) -> Option<&Machine> {
         None
     }
 }

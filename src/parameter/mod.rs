@@ -16,9 +16,9 @@ pub use machine::{Numbers, Sits};
 pub use markdown::{free_markdown, markdown};
 
 use crate::error::{Error, Result};
+use crate::machine::Machine;
+use crate::machine::gantry::Gantry;
 use crate::quantity::{rounded, shortest};
-use crate::stage::Stage;
-use crate::stage::gantry::Gantry;
 use table::SECTIONS;
 
 /// One number of the case file.
@@ -125,7 +125,7 @@ pub enum Arm {
 
 impl Arm {
     /// Its value in a machine.
-    pub fn of(self, stage: &Stage) -> f64 {
+    pub fn of(self, stage: &Machine) -> f64 {
         let power = |base: f64, power: i32| (0..power).fold(1.0, |product, _| product * base);
         match self {
             Arm::One => 1.0,
@@ -300,7 +300,7 @@ pub fn sections() -> impl Iterator<Item = &'static str> {
 
 /// The weight of a parameter at the drive pulley: r² for a mass or a viscous friction of the cart, r for its Coulomb
 /// friction, n² for the rotor's inertia.
-pub fn at_pulley(stage: &Stage, key: &str) -> f64 {
+pub fn at_pulley(stage: &Machine, key: &str) -> f64 {
     named(key).and_then(|row| row.part).map_or(1.0, |(_, arm)| arm.of(stage))
 }
 

@@ -6,11 +6,11 @@ use super::Course;
 use crate::case::Experiment;
 use crate::error::{Error, Result};
 use crate::friction::Law;
+use crate::machine::axis::CART;
+use crate::machine::{BeltModel, Machine};
 use crate::mechanism::{AmplifierMode, Mechanism, SpringLaw, State};
 use crate::parameter;
 use crate::polyline::MOST_POINTS;
-use crate::stage::axis::CART;
-use crate::stage::{BeltModel, Stage};
 use std::f64::consts::PI;
 
 /// The range of anything that has to be above zero, as in a case file.
@@ -24,13 +24,13 @@ const FASTEST: f64 = 1e13;
 const MOST_ROWS: f64 = 1e12;
 
 /// Refuses what is no machine.
-pub(crate) fn stage(stage: &Stage) -> Result<()> {
-    let motor = &stage.motor;
-    let r = stage.pulley_radius;
-    let bodies = [stage.drive_pulley.inertia, stage.cart.mass, stage.idler_pulley.inertia];
-    let laws = [stage.drive_pulley.friction, stage.cart.friction, stage.idler_pulley.friction];
+pub(crate) fn machine(machine: &Machine) -> Result<()> {
+    let motor = &machine.motor;
+    let r = machine.pulley_radius;
+    let bodies = [machine.drive_pulley.inertia, machine.cart.mass, machine.idler_pulley.inertia];
+    let laws = [machine.drive_pulley.friction, machine.cart.friction, machine.idler_pulley.friction];
 
-    parameter::check(stage)?;
+    parameter::check(machine)?;
     // `Err` for whatever is not above zero; a value that is no number is never.
     let positive =
         |what: &str, values: &[f64]| match values.iter().find(|value| !(LEAST..=MOST).contains(*value)) {
@@ -38,21 +38,21 @@ pub(crate) fn stage(stage: &Stage) -> Result<()> {
                 .allowed("above zero: from 1e-15 to 1e15, in SI units")),
             None => Ok(()),
         };
-    let rigid = stage.belt.model == BeltModel::Rigid;
+    let rigid = machine.belt.model == BeltModel::Rigid;
     if !rigid {
-        positive("the stiffness of a span", &stage.belt.stiffness)?;
+        positive("the stiffness of a span", &machine.belt.stiffness)?;
     }
-    let amplifier = &stage.amplifier;
+    let amplifier = &machine.amplifier;
     if motor.gear_play.is_some() {
         positive("the inertia of a rotor that turns by itself", &[motor.rotor_inertia])?;
     }
-    if stage.travel.is_some_and(|travel| travel.min >= travel.max) {
+    if machine.travel.is_some_and(|travel| travel.min >= travel.max) {
         return Err(Error::new("the travel ends before it begins").allowed("max above min"));
     }
-    if stage.cart.along.as_ref().is_some_and(|along| !along.grows()) {
+    if machine.cart.along.as_ref().is_some_and(|along| !along.grows()) {
         return Err(Error::new("the positions of cart.friction.along do not grow").allowed("each above the one before"));
     }
-    let lines = [("along", &stage.cart.forces.along), ("by_speed", &stage.cart.forces.by_speed)];
+    let lines = [("along", &machine.cart.forces.along), ("by_speed", &machine.cart.forces.by_speed)];
     for (name, line) in lines.into_iter().filter_map(|(name, line)| Some((name, line.as_ref()?))) {
         if !line.grows() {
             return Err(Error::new(format!("the points of cart.force_{name} do not grow"))
@@ -79,15 +79,15 @@ pub(crate) fn stage(stage: &Stage) -> Result<()> {
             Law::Coulomb | Law::Stribeck { .. } | Law::Smooth { .. } => {}
             Law::LuGre { .. } => {
                 positive("Coulomb friction under bristles", &[law.forward.coulomb, law.backward.coulomb])?;
-                if let Some(along) = stage.cart.along.as_ref().filter(|_| body == CART) {
+                if let Some(along) = machine.cart.along.as_ref().filter(|_| body == CART) {
                     let factors: Vec<f64> = along.points().iter().map(|point| point[1]).collect();
                     positive("the factor of friction along the travel, under bristles,", &factors)?;
                 }
             }
         }
     }
-    if stage.belt.follows_cart {
-        let (Some(make), Some(travel)) = (stage.belt.make, stage.travel) else {
+    if machine.belt.follows_cart {
+        let (Some(make), Some(travel)) = (machine.belt.make, machine.travel) else {
             return Err(Error::new("spans that follow the cart need modulus, section, spans and a travel"));
         };
         let [l1, l2, _] = make.spans;
@@ -107,12 +107,12 @@ pub(crate) fn stage(stage: &Stage) -> Result<()> {
             return Err(too_fast("the current", rate).next("leave the inductance out: it does not show at this size"));
         }
     }
-    let [k1, k2, k3] = if rigid { [0.0; 3] } else { stage.belt.stiffness };
-    let [c1, c2, c3] = stage.belt.damping;
+    let [k1, k2, k3] = if rigid { [0.0; 3] } else { machine.belt.stiffness };
+    let [c1, c2, c3] = machine.belt.damping;
     let n = motor.gear_ratio;
     let brake = motor.torque_constant * motor.back_emf_constant * n * n / motor.resistance / motor.gear_efficiency;
     let brake =
-        if motor.inductance > 0.0 || stage.amplifier.mode == AmplifierMode::Current { 0.0 } else { brake.abs() };
+        if motor.inductance > 0.0 || machine.amplifier.mode == AmplifierMode::Current { 0.0 } else { brake.abs() };
     let around = [(k1 + k3, c1 + c3, r * r, brake), (k1 + k2, c1 + c2, 1.0, 0.0), (k2 + k3, c2 + c3, r * r, 0.0)];
     for (((k, c, arm, brake), inertia), law) in around.into_iter().zip(bodies).zip(laws) {
         let drag = c * arm + brake + law.forward.viscous.max(law.backward.viscous);

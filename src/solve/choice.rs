@@ -2,8 +2,8 @@
 
 use super::{Method, Solver};
 use crate::error::{Error, Result};
+use crate::machine::Machine;
 use crate::mechanism::Mechanism;
-use crate::stage::Stage;
 
 /// The name of a solver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -32,8 +32,8 @@ pub struct Choice {
 impl Choice {
     /// The solver that is asked for, or else the one for this stage. Options that do not go with it are told by the
     /// names of the command line.
-    pub fn solver(&self, stage: &Stage) -> Result<Solver> {
-        self.instead_of(Solver::of(stage))
+    pub fn solver(&self, machine: &Machine) -> Result<Solver> {
+        self.instead_of(Solver::of(machine))
     }
 
     /// The same for a machine that is no axis, which Table 3 does not know.

@@ -163,12 +163,12 @@ impl Coordinates {
 mod tests {
     use super::*;
     use crate::case::{Case, TEMPLATE};
+    use crate::machine::axis::{CART, DRIVE, IDLER};
     use crate::mechanism::Mechanism;
-    use crate::stage::axis::{CART, DRIVE, IDLER};
 
     fn mechanism() -> (Mechanism, f64) {
-        let stage = Case::from_text("axis.toml", TEMPLATE).unwrap().stage;
-        (stage.mechanism(), stage.pulley_radius)
+        let machine = Case::from_text("axis.toml", TEMPLATE).unwrap().machine;
+        (machine.mechanism(), machine.pulley_radius)
     }
 
     fn at(drive: f64, cart: f64, idler: f64) -> State {

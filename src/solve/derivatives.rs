@@ -7,7 +7,7 @@
 //! s⁽ⁿ⁺¹⁾ = A v⁽ⁿ⁾      v⁽ⁿ⁺¹⁾ = a·(s, v, i, u)⁽ⁿ⁾      i⁽ⁿ⁺¹⁾ = e·(s, v, i, u)⁽ⁿ⁾
 //! ```
 
-use super::machine::Machine;
+use super::simulator::Simulator;
 use crate::friction::Motion;
 use crate::mechanism::{DRIVES, Equations, Form, SPRINGS, Shown, State};
 use crate::signal::DEGREE;
@@ -30,8 +30,8 @@ impl Level {
     }
 }
 
-impl Machine {
-    /// The derivative of `order`, one and more, of each of [`Machine::columns`] with respect to time, as it is right
+impl Simulator {
+    /// The derivative of `order`, one and more, of each of [`Simulator::columns`] with respect to time, as it is right
     /// after now; `into` has a place for each. None, and nothing is done, of a machine that is not linear between its
     /// events.
     pub fn derivatives(&self, order: usize, into: &mut [f64]) -> Option<()> {

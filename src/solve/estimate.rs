@@ -6,9 +6,9 @@ use super::run::{Run, Start};
 use super::{Course, Detail, Ending, Flow, Outcome, PositionError, Solver};
 use crate::case::Experiment;
 use crate::error::Result;
+use crate::machine::Machine;
 use crate::mechanism::{Mechanism, Shown};
 use crate::signal::Signal;
-use crate::stage::Stage;
 use crate::trajectory::Trajectory;
 use std::sync::Arc;
 
@@ -54,7 +54,7 @@ type Sink<'a> = dyn FnMut(&Trajectory) -> Flow + 'a;
 /// use taut::case::{Case, TEMPLATE};
 /// use taut::solve::{ErrorEstimate, Flow, Solver, stream};
 /// let case = Case::from_text("axis.toml", TEMPLATE)?;
-/// let (stage, experiment) = (&case.stage, &case.experiments[0]);
+/// let (stage, experiment) = (&case.machine, &case.experiments[0]);
 /// let mut estimate = ErrorEstimate::new(stage, experiment);
 /// let outcome = stream(stage, experiment, Solver::GENERAL, &mut |rows| {
 ///     estimate.take(rows);
@@ -80,8 +80,8 @@ pub struct ErrorEstimate {
 
 impl ErrorEstimate {
     /// For a run of this experiment on this stage.
-    pub fn new(stage: &Stage, experiment: &Experiment) -> Self {
-        let mechanism = stage.mechanism();
+    pub fn new(machine: &Machine, experiment: &Experiment) -> Self {
+        let mechanism = machine.mechanism();
         Self::of_mechanism(&mechanism, &course(&mechanism, experiment))
     }
 
@@ -116,13 +116,13 @@ impl ErrorEstimate {
     /// said no.
     pub fn finish(
         self,
-        stage: &Stage,
+        machine: &Machine,
         experiment: &Experiment,
         tolerance: f64,
         outcome: &Outcome,
         flow: &mut dyn FnMut() -> Flow,
     ) -> Result<Option<PositionError>> {
-        let mechanism = stage.mechanism();
+        let mechanism = machine.mechanism();
         let course = course(&mechanism, experiment);
         self.finish_mechanism(&mechanism, &course, tolerance, outcome, flow)
     }

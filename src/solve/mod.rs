@@ -8,7 +8,6 @@ mod estimate;
 mod exact;
 mod general;
 mod inputs;
-mod machine;
 mod observe;
 mod pace;
 mod propagator;
@@ -18,25 +17,26 @@ mod rounding;
 mod run;
 mod saved;
 mod sensitivity;
+mod simulator;
 mod table3;
 
 pub use crate::trajectory::Grid;
 pub use choice::{Choice, Kind};
 pub use estimate::ErrorEstimate;
 pub use general::{Dynamics, Quantity};
-pub use machine::Machine;
 use observe::Output;
 pub use observe::{Closer, Curve, Gap, Gaps, Observe, Polynomial, QUANTITIES, Reading, Stretch, TERMS, reading};
 pub use run::{Course, Run};
 pub use sensitivity::{Begun, Differentiated, Sensitivities, Variable};
+pub use simulator::Simulator;
 
-pub(crate) use check::stage as check_stage;
+pub(crate) use check::machine as check_stage;
 
 use crate::case::Experiment;
 use crate::error::{Error, Result};
 use crate::friction::Motion;
+use crate::machine::Machine;
 use crate::mechanism::{Mechanism, Part, Status, What};
-use crate::stage::Stage;
 use crate::trajectory::Trajectory;
 use std::fmt;
 use std::sync::Arc;
@@ -66,8 +66,8 @@ impl Solver {
     pub const GENERAL: Self = Self::General { tolerance: 1e-9 };
 
     /// The solver for this stage: the exact one where it can be.
-    pub fn of(stage: &Stage) -> Self {
-        if stage.is_piecewise_linear() { Self::Exact } else { Self::GENERAL }
+    pub fn of(machine: &Machine) -> Self {
+        if machine.is_piecewise_linear() { Self::Exact } else { Self::GENERAL }
     }
 
     /// The same for a mechanism.
@@ -230,7 +230,7 @@ impl fmt::Display for Ending {
     }
 }
 
-/// What [`Machine::advance`] and [`Dynamics::settle`] end with where they cannot go on.
+/// What [`Simulator::advance`] and [`Dynamics::settle`] end with where they cannot go on.
 impl std::error::Error for Ending {}
 
 /// The cost of a run, in pieces of work rather than seconds.
@@ -337,20 +337,20 @@ pub enum Detail {
 /// [`stream`] gives, sooner.
 #[derive(Default)]
 pub struct Bench {
-    mounted: Option<(Stage, Arc<Mechanism>)>,
+    mounted: Option<(Machine, Arc<Mechanism>)>,
     known: exact::Known,
 }
 
 impl Bench {
     /// Takes up a stage, unless it is there already. Errors: what makes no sense as a machine.
-    pub fn mount(&mut self, stage: &Stage) -> Result<()> {
-        if self.mounted.as_ref().is_some_and(|(mounted, _)| mounted == stage) {
+    pub fn mount(&mut self, machine: &Machine) -> Result<()> {
+        if self.mounted.as_ref().is_some_and(|(mounted, _)| mounted == machine) {
             return Ok(());
         }
         self.known.clear();
         self.mounted = None;
-        check::stage(stage)?;
-        self.mounted = Some((stage.clone(), Arc::new(stage.mechanism())));
+        check::machine(machine)?;
+        self.mounted = Some((machine.clone(), Arc::new(machine.mechanism())));
         Ok(())
     }
 
@@ -371,10 +371,10 @@ impl Bench {
     }
 
     fn go(&mut self, experiment: &Experiment, output: Output) -> Result<Outcome> {
-        let Some((stage, mechanism)) = &self.mounted else { return Err(nothing_mounted()) };
+        let Some((machine, mechanism)) = &self.mounted else { return Err(nothing_mounted()) };
         check::experiment(mechanism, experiment)?;
         let known = std::mem::take(&mut self.known);
-        let (outcome, known) = go(mechanism, experiment, Solver::of(stage), known, output)?;
+        let (outcome, known) = go(mechanism, experiment, Solver::of(machine), known, output)?;
         self.known = known;
         Ok(outcome)
     }
@@ -390,17 +390,17 @@ fn nothing_mounted() -> Error {
 /// use taut::case::{Case, TEMPLATE};
 /// use taut::solve::{Ending, Solver, simulate};
 /// let case = Case::from_text("axis.toml", TEMPLATE)?;
-/// let solution = simulate(&case.stage, &case.experiments[0], Solver::Exact)?;
+/// let solution = simulate(&case.machine, &case.experiments[0], Solver::Exact)?;
 /// assert_eq!(solution.outcome.ending, Ending::Complete);
 /// let positions = solution.trajectory.get("cart_position").unwrap();
 /// assert_eq!(positions.len() as u64, case.experiments[0].samples());
 /// # Ok::<(), taut::Error>(())
 /// ```
-pub fn simulate(stage: &Stage, experiment: &Experiment, solver: Solver) -> Result<Solution> {
+pub fn simulate(machine: &Machine, experiment: &Experiment, solver: Solver) -> Result<Solution> {
     // What does not fit at once is asked for as it comes.
     let rows = Grid::new(experiment.every, experiment.until).intervals().min(1 << 20) as usize + 1;
     let mut trajectory = Trajectory::default();
-    let outcome = stream(stage, experiment, solver, &mut |block| {
+    let outcome = stream(machine, experiment, solver, &mut |block| {
         if trajectory.is_empty() {
             trajectory = Trajectory::with_capacity(&block.columns, rows);
         }
@@ -419,7 +419,7 @@ pub fn simulate(stage: &Stage, experiment: &Experiment, solver: Solver) -> Resul
 /// let case = Case::from_text("axis.toml", TEMPLATE)?;
 /// // How far does the cart get?
 /// let mut farthest: f64 = 0.0;
-/// let outcome = stream(&case.stage, &case.experiments[0], Solver::Exact, &mut |rows| {
+/// let outcome = stream(&case.machine, &case.experiments[0], Solver::Exact, &mut |rows| {
 ///     for &x in rows.get("cart_position").unwrap() {
 ///         farthest = farthest.max(x);
 ///     }
@@ -429,12 +429,12 @@ pub fn simulate(stage: &Stage, experiment: &Experiment, solver: Solver) -> Resul
 /// # Ok::<(), taut::Error>(())
 /// ```
 pub fn stream(
-    stage: &Stage,
+    machine: &Machine,
     experiment: &Experiment,
     solver: Solver,
     sink: &mut dyn FnMut(&Trajectory) -> Flow,
 ) -> Result<Outcome> {
-    run(stage, experiment, solver, Output { detail: Detail::Full, sink, observer: None })
+    run(machine, experiment, solver, Output { detail: Detail::Full, sink, observer: None })
 }
 
 /// The same, with an observer that sees what is between the rows, too: a [`crate::metrics::Meter`], or one's own.
@@ -445,28 +445,28 @@ pub fn stream(
 /// use taut::solve::{Flow, Solver, stream_observed};
 /// let case = Case::from_text("axis.toml", TEMPLATE)?;
 /// let experiment = &case.experiments[0];
-/// let mut meter = Meter::new(&case.stage, experiment);
-/// let outcome = stream_observed(&case.stage, experiment, Solver::Exact, &mut meter, &mut |_| Flow::Continue)?;
+/// let mut meter = Meter::new(&case.machine, experiment);
+/// let outcome = stream_observed(&case.machine, experiment, Solver::Exact, &mut meter, &mut |_| Flow::Continue)?;
 /// assert!(meter.finish(&outcome.events).peak_current.value > 1.0);
 /// # Ok::<(), taut::Error>(())
 /// ```
 pub fn stream_observed(
-    stage: &Stage,
+    machine: &Machine,
     experiment: &Experiment,
     solver: Solver,
     observer: &mut dyn Observe,
     sink: &mut dyn FnMut(&Trajectory) -> Flow,
 ) -> Result<Outcome> {
-    run(stage, experiment, solver, Output { detail: Detail::Full, sink, observer: Some(observer) })
+    run(machine, experiment, solver, Output { detail: Detail::Full, sink, observer: Some(observer) })
 }
 
-fn run(stage: &Stage, experiment: &Experiment, solver: Solver, output: Output) -> Result<Outcome> {
-    check::stage(stage)?;
-    let mechanism = Arc::new(stage.mechanism());
+fn run(machine: &Machine, experiment: &Experiment, solver: Solver, output: Output) -> Result<Outcome> {
+    check::machine(machine)?;
+    let mechanism = Arc::new(machine.mechanism());
     check::experiment(&mechanism, experiment)?;
     if let Solver::Table3 { step, method } = solver {
         check::piecewise_linear(&mechanism)?;
-        return table3::run(stage, &mechanism, experiment, step, method, output);
+        return table3::run(machine, &mechanism, experiment, step, method, output);
     }
     Ok(go(&mechanism, experiment, solver, exact::Known::default(), output)?.0)
 }

@@ -6,9 +6,9 @@ use super::observe::{Observe, Output};
 use super::{Detail, Flow, Outcome, Solver, check, general};
 use crate::case::{Experiment, GantryExperiment};
 use crate::error::{Error, Result};
+use crate::machine::Machine;
 use crate::mechanism::{Mechanism, State};
 use crate::signal::Signal;
-use crate::stage::Stage;
 use crate::trajectory::Trajectory;
 use std::sync::Arc;
 
@@ -95,7 +95,7 @@ impl<'a> Make for OfExact<'_, 'a> {
 /// ```
 /// use taut::case::{Case, TEMPLATE};
 /// use taut::solve::{Detail, Ending, Flow, Run, Solver};
-/// use taut::stage::axis::CART;
+/// use taut::machine::axis::CART;
 ///
 /// // Full voltage until the cart has gone far enough, looked at every millisecond.
 /// let case = Case::from_text("axis.toml", TEMPLATE)?;
@@ -105,7 +105,7 @@ impl<'a> Make for OfExact<'_, 'a> {
 ///     last = rows.get("cart_position").unwrap().last().copied().unwrap();
 ///     Flow::Continue
 /// };
-/// let mut run = Run::new(&case.stage, experiment, Solver::Exact, Detail::Full, None, &mut sink)?;
+/// let mut run = Run::new(&case.machine, experiment, Solver::Exact, Detail::Full, None, &mut sink)?;
 /// for k in 1..=1000 {
 ///     let voltage = if run.state().position[CART] < 0.05 { 10.0 } else { 0.0 };
 ///     if !run.hold(&[voltage], 1e-3 * f64::from(k)) {
@@ -127,15 +127,15 @@ impl<'a> Run<'a> {
     /// A run of `experiment` on `stage`; the experiment's own input counts for nothing. Rows go to `sink` in blocks,
     /// all that is between them to `observer`. Not for the paper's Table 3.
     pub fn new(
-        stage: &Stage,
+        machine: &Machine,
         experiment: &Experiment,
         solver: Solver,
         detail: Detail,
         observer: Option<&'a mut dyn Observe>,
         sink: &'a mut dyn FnMut(&Trajectory) -> Flow,
     ) -> Result<Self> {
-        check::stage(stage)?;
-        let mechanism = Arc::new(stage.mechanism());
+        check::machine(machine)?;
+        let mechanism = Arc::new(machine.mechanism());
         check::experiment(&mechanism, experiment)?;
         let start = experiment.start(&mechanism);
         Self::of(&mechanism, &start, (solver, 0), Known::default(), Output { detail, sink, observer })

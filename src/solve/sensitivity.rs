@@ -80,7 +80,7 @@ impl Bench {
     /// use std::sync::Arc;
     ///
     /// let case = Case::from_text("axis.toml", TEMPLATE)?;
-    /// let (stage, experiment) = (&case.stage, &case.experiments[0]);
+    /// let (stage, experiment) = (&case.machine, &case.experiments[0]);
     /// let mass = Free::new(stage, "cart.mass", &[], &[])?;
     /// let heavier = |by: f64| {
     ///     let mut stage = stage.clone();
@@ -90,7 +90,7 @@ impl Bench {
     /// };
     /// let mut bench = Bench::default();
     /// bench.mount(stage)?;
-    /// let speed = Differentiated::Shown(Shown::Speed(taut::stage::axis::CART, 1.0));
+    /// let speed = Differentiated::Shown(Shown::Speed(taut::machine::axis::CART, 1.0));
     /// let variable = Variable::central(1e-6, heavier);
     /// let slopes = bench.sensitivities(experiment, &[variable], &[speed])?.expect("a plain axis");
     /// // A heavier cart starts more slowly.

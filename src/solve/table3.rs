@@ -10,10 +10,10 @@ use super::{Cost, Ending, Flow, Grid, Method, Outcome};
 use crate::case::Experiment;
 use crate::error::{Error, Result};
 use crate::friction::Motion;
+use crate::machine::Machine;
+use crate::machine::axis::BODIES;
 use crate::mechanism::{DRIVES, Form, Layout, Mechanism, Mode, State};
 use crate::signal::Piece;
-use crate::stage::Stage;
-use crate::stage::axis::BODIES;
 use std::sync::Arc;
 
 /// Half-width of Table 3's band of "zero" speed, rad/s for the pulleys and m/s for the cart.
@@ -24,14 +24,14 @@ const BOUND: f64 = 1e9;
 
 /// Runs the experiment with steps of `step` or a little less, so that they fill the output interval.
 pub(crate) fn run(
-    stage: &Stage,
+    machine: &Machine,
     mechanism: &Arc<Mechanism>,
     experiment: &Experiment,
     step: f64,
     method: Method,
     output: Output,
 ) -> Result<Outcome> {
-    let model = Model::new(stage, mechanism)?;
+    let model = Model::new(machine, mechanism)?;
     let grid = Grid::new(experiment.every, experiment.until);
     let steps = |interval: f64| (interval / step - 1e-9).ceil().max(1.0);
     let substeps = steps(grid.interval());
@@ -137,7 +137,7 @@ struct Model<'a> {
 }
 
 impl<'a> Model<'a> {
-    fn new(stage: &Stage, mechanism: &'a Mechanism) -> Result<Self> {
+    fn new(machine: &Machine, mechanism: &'a Mechanism) -> Result<Self> {
         let unfit = |what: String| {
             Error::new(what)
                 .allowed("one viscous and one Coulomb value for each body, and a gear without losses")
@@ -156,10 +156,10 @@ impl<'a> Model<'a> {
             viscous[body] = law.forward.viscous;
             coulomb[body] = law.forward.coulomb;
         }
-        if stage.motor.gear_efficiency < 1.0 {
+        if machine.motor.gear_efficiency < 1.0 {
             return Err(unfit("the paper's Table 3 does not know a gear efficiency below 1".into()));
         }
-        if let Some(part) = stage.beyond_the_paper() {
+        if let Some(part) = machine.beyond_the_paper() {
             return Err(unfit(format!("the paper's Table 3 does not know {part}")));
         }
         let free = Mode::of([]);

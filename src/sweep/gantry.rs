@@ -4,10 +4,10 @@ use super::measures::{OfPart, of_gantry};
 use super::{Group, Status, put_figures, status};
 use crate::case::{GantryCase, GantryExperiment, Sweeping};
 use crate::error::{Error, Result};
+use crate::machine::gantry::Gantry;
 use crate::metrics::{GantryMeter, GantryMetrics};
 use crate::parameter;
 use crate::solve::{Course, Detail, Flow, Outcome, Solver, stream_mechanism};
-use crate::stage::gantry::Gantry;
 use crate::trajectory::Trajectory;
 
 /// A gantry, and what each of its machines does.

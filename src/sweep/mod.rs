@@ -40,10 +40,10 @@ pub use summary::{Drawn, Measured, Shown, Summary};
 
 use crate::case::Sampling;
 use crate::error::Result;
+use crate::machine::Machine;
+use crate::machine::gantry::Gantry;
 use crate::parameter::{self, Free, Numbers};
 use crate::solve::{Ending, Flow, Outcome, PositionError};
-use crate::stage::Stage;
-use crate::stage::gantry::Gantry;
 use crate::trajectory::{Column, Trajectory};
 use points::Points;
 use std::sync::Arc;
@@ -117,27 +117,27 @@ struct Draws {
 
 /// A machine of a sweep.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Machine {
+pub enum Swept {
     /// An axis.
-    Axis(Box<Stage>),
+    Axis(Box<Machine>),
     /// A gantry.
     Gantry(Box<Gantry>),
 }
 
-impl Machine {
+impl Swept {
     /// It, where it is an axis.
-    pub fn axis(&self) -> Option<&Stage> {
+    pub fn axis(&self) -> Option<&Machine> {
         match self {
-            Machine::Axis(stage) => Some(stage),
-            Machine::Gantry(_) => None,
+            Swept::Axis(stage) => Some(stage),
+            Swept::Gantry(_) => None,
         }
     }
 
     /// It, where it is a gantry.
     pub fn gantry(&self) -> Option<&Gantry> {
         match self {
-            Machine::Axis(_) => None,
-            Machine::Gantry(gantry) => Some(gantry),
+            Swept::Axis(_) => None,
+            Swept::Gantry(gantry) => Some(gantry),
         }
     }
 }
@@ -166,7 +166,7 @@ enum Subject {
 impl Subject {
     fn numbers(&self) -> &dyn Numbers {
         match self {
-            Subject::Axis(axis) => &axis.stage,
+            Subject::Axis(axis) => &axis.machine,
             Subject::Gantry(swept) => &swept.gantry,
         }
     }
@@ -286,10 +286,10 @@ impl Sweep {
     }
 
     /// The machine of a run.
-    pub fn machine(&self, run: u64) -> Machine {
+    pub fn machine(&self, run: u64) -> Swept {
         match &self.subject {
-            Subject::Axis(axis) => Machine::Axis(Box::new(self.with_run(&axis.stage, run))),
-            Subject::Gantry(swept) => Machine::Gantry(Box::new(self.with_run(&swept.gantry, run))),
+            Subject::Axis(axis) => Swept::Axis(Box::new(self.with_run(&axis.machine, run))),
+            Subject::Gantry(swept) => Swept::Gantry(Box::new(self.with_run(&swept.gantry, run))),
         }
     }
 
@@ -325,7 +325,7 @@ impl Sweep {
     /// blocks. Errors: a machine that cannot be run.
     pub fn stream(&self, run: u64, experiment: usize, sink: &mut dyn FnMut(&Trajectory) -> Flow) -> Result<Outcome> {
         match &self.subject {
-            Subject::Axis(axis) => axis.stream(&self.with_run(&axis.stage, run), experiment, sink),
+            Subject::Axis(axis) => axis.stream(&self.with_run(&axis.machine, run), experiment, sink),
             Subject::Gantry(swept) => swept.stream(&self.with_run(&swept.gantry, run), experiment, sink),
         }
     }

@@ -4,7 +4,7 @@ use super::verdict::Verdict;
 use super::work::Work;
 use crate::design::{Design, FeedForward, FeedForwardModel, Structure};
 use crate::error::Result;
-use crate::stage::{BeltModel, EncoderPlace, Stage};
+use crate::machine::{BeltModel, EncoderPlace, Machine};
 
 /// Share of the largest error that has to remain at most, so that feed-forward is advised.
 const PAYS: f64 = 0.9;
@@ -26,7 +26,7 @@ impl Ahead {
 }
 
 /// The forms of feed-forward that go beyond a design's own on this stage.
-fn forms(stage: &Stage, design: &Design) -> Vec<FeedForward> {
+fn forms(machine: &Machine, design: &Design) -> Vec<FeedForward> {
     let own = &design.feed_forward;
     // State feedback and sliding mode have their model already.
     if !matches!(design.structure, Structure::Pid(_) | Structure::Cascade(_) | Structure::Fuzzy(_)) {
@@ -37,9 +37,9 @@ fn forms(stage: &Stage, design: &Design) -> Vec<FeedForward> {
         FeedForwardModel::Rigid => &[FeedForwardModel::Elastic],
         FeedForwardModel::Elastic => &[],
     };
-    let is_elastic = stage.belt.model != BeltModel::Rigid;
-    let sees_stretch = stage.encoder.is_some_and(|encoder| encoder.at == EncoderPlace::Cart)
-        || matches!(design.structure, Structure::Cascade(_)) && stage.scale.is_some();
+    let is_elastic = machine.belt.model != BeltModel::Rigid;
+    let sees_stretch = machine.encoder.is_some_and(|encoder| encoder.at == EncoderPlace::Cart)
+        || matches!(design.structure, Structure::Cascade(_)) && machine.scale.is_some();
     let mut forms = Vec::new();
     for &model in models.iter().filter(|model| is_elastic || **model != FeedForwardModel::Elastic) {
         for compensate_stretch in [own.compensate_stretch, true] {
@@ -57,7 +57,7 @@ impl Work<'_> {
     /// or more; none where none does.
     pub fn ahead(&self, after: &Verdict) -> Result<Option<Ahead>> {
         let mut best: Option<Verdict> = None;
-        for feed_forward in forms(&self.case.stage, &after.design) {
+        for feed_forward in forms(&self.case.machine, &after.design) {
             if (self.stop)() {
                 return Ok(None);
             }

@@ -12,8 +12,8 @@ use crate::case::{Cost, Move};
 use crate::chance::uniform;
 use crate::design::{Design, Structure};
 use crate::error::Result;
+use crate::machine::Machine;
 use crate::signal::profile::Profile;
-use crate::stage::Stage;
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
 
@@ -93,21 +93,21 @@ pub(super) struct Bars<'a> {
 
 impl Work<'_> {
     /// The figures of all moves on one axis.
-    pub fn looked(&self, runner: &mut Runner, design: &Design, stage: &Stage) -> Result<Vec<MoveFigures>> {
+    pub fn looked(&self, runner: &mut Runner, design: &Design, machine: &Machine) -> Result<Vec<MoveFigures>> {
         let one = |(motion, shaped): (&Move, &Profile)| {
             self.spend(design, motion);
-            runner.look(stage, motion, shaped)
+            runner.look(machine, motion, shaped)
         };
         self.moves.iter().zip(&self.shaped).map(one).collect()
     }
 
     /// The figures of each move on all axes, at samples.
     pub fn glanced(&self, design: &Design) -> Result<Vec<Vec<MoveFigures>>> {
-        let mut runner = Runner::new(&self.case.stage, design)?;
+        let mut runner = Runner::new(&self.case.machine, design)?;
         let mut of_move = |(motion, shaped): (&Move, &Profile)| {
-            let one = |stage: &Stage| {
+            let one = |machine: &Machine| {
                 self.spend(design, motion);
-                runner.glance(stage, motion, shaped)
+                runner.glance(machine, motion, shaped)
             };
             self.stages.iter().map(one).collect::<Result<Vec<_>>>()
         };
@@ -119,7 +119,7 @@ impl Work<'_> {
     /// smaller.
     pub fn run(&self, design: &Design, watch: &Watch, weighed: &Weighed, bar: f64) -> (Vec<AtWorst>, f64) {
         let nothing = (Vec::new(), f64::INFINITY);
-        let Ok(mut runner) = Runner::new(&self.case.stage, design) else { return nothing };
+        let Ok(mut runner) = Runner::new(&self.case.machine, design) else { return nothing };
         let left_out = watch.left_out;
         let mut seen: Vec<Vec<MoveFigures>> = vec![Vec::new(); self.moves.len()];
         let mut worst: Vec<AtWorst> = self.least.borrow().iter().map(|&current| AtWorst::at_least(current)).collect();

@@ -101,7 +101,7 @@ impl Work<'_> {
     /// These powers with the loop as much slower as the limits make it on the set; where half as fast is not enough, how
     /// far it is beyond them.
     fn eased(&mut self, finalist: &Finalist, powers: &[f64]) -> std::result::Result<Vec<f64>, f64> {
-        let slowing = slowing(&finalist.start, finalist.own, &self.case.stage);
+        let slowing = slowing(&finalist.start, finalist.own, &self.case.machine);
         let at = |log: f64| -> Vec<f64> { powers.iter().zip(&slowing).map(|(x, slow)| x + log * slow).collect() };
         let mut beyond = |x: &[f64]| self.on_set(&rounded(&shaped(&finalist.start, finalist.own, x))).0;
         if beyond(powers) == 0.0 {

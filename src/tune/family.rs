@@ -10,9 +10,9 @@ use crate::design::Design;
 use crate::error::{Error, Result};
 use crate::fit::drawn;
 use crate::linear::{Operation, Place, places, travel};
+use crate::machine::Machine;
 use crate::number::engineering;
 use crate::parameter::{self, Free, kinds};
-use crate::stage::Stage;
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
 use std::path::Path;
@@ -50,7 +50,7 @@ pub struct Corner {
 #[derive(Debug, Clone)]
 pub struct Family {
     /// The axis as it is taken for.
-    pub stage: Stage,
+    pub machine: Machine,
     /// The parameters that can be off.
     pub unknowns: Vec<Unknown>,
     /// Where that is from.
@@ -83,14 +83,14 @@ impl Family {
         if let Some(file) = &tuning.draws {
             return Self::of_draws(case, tuning, file);
         }
-        let stage = case.stage.clone();
+        let machine = case.machine.clone();
         let keys: Vec<&str> = case.known.iter().flat_map(|known| known.name.split(" = ")).collect();
         let (mut unknowns, source) = match tuning.spread {
             None if !case.known.is_empty() => {
                 let mut unknowns = Vec::new();
                 // What is fitted along with a log has no key.
                 for known in case.known.iter().filter(|known| known.name.contains('.')) {
-                    let free = Free::new(&stage, &known.name, &keys, &[])?;
+                    let free = Free::new(&machine, &known.name, &keys, &[])?;
                     let least = if free.start > 0.0 { 1e-3 * free.start } else { f64::NEG_INFINITY };
                     unknowns.push(match known.interval {
                         Some(interval) => Unknown::fitted(free, interval.map(|end| end.max(least))),
@@ -98,17 +98,18 @@ impl Family {
                         None => Unknown::spread(free, SPREAD),
                     });
                 }
-                (with_the_rest(unknowns, &stage), Source::Fit)
+                (with_the_rest(unknowns, &machine), Source::Fit)
             }
             given => {
                 let share = given.unwrap_or(SPREAD);
                 let unknown = |free: Free| Unknown::spread(free, share);
-                (kinds(&stage).into_iter().map(unknown).collect(), Source::Spread(share))
+                (kinds(&machine).into_iter().map(unknown).collect(), Source::Spread(share))
             }
         };
         tie(&mut unknowns);
         let (places, loads) = (along(case, tuning.places), tuning.loads.clone());
-        let mut family = Self { places, loads, stage, unknowns, source, machines: Vec::new(), corners: tuning.corners };
+        let mut family =
+            Self { places, loads, machine, unknowns, source, machines: Vec::new(), corners: tuning.corners };
         family.machines = family.drawn(MACHINES);
         Ok(family)
     }
@@ -134,13 +135,14 @@ impl Family {
         };
         let drawn: Vec<Unknown> = frees.into_iter().zip(&columns).map(unknown).collect();
         let count = drawn.len();
-        let mut unknowns = with_the_rest(drawn, &case.stage);
+        let mut unknowns = with_the_rest(drawn, &case.machine);
         tie(&mut unknowns);
         // What the draws have they have together.
         unknowns.iter_mut().take(count).enumerate().for_each(|(place, unknown)| unknown.with = place);
         let (places, loads) = (along(case, tuning.places), tuning.loads.clone());
-        let (stage, source) = (case.stage.clone(), Source::Posterior(rows));
-        let mut family = Self { places, loads, stage, unknowns, source, machines: Vec::new(), corners: tuning.corners };
+        let (machine, source) = (case.machine.clone(), Source::Posterior(rows));
+        let mut family =
+            Self { places, loads, machine, unknowns, source, machines: Vec::new(), corners: tuning.corners };
         let count = MACHINES.min(rows);
         family.machines = family.drawn(count);
         let first = family.machines.len() - count;
@@ -207,12 +209,12 @@ impl Family {
     }
 
     /// The machine at a corner.
-    pub fn stage_at(&self, corner: &Corner) -> Stage {
-        let mut stage = self.stage.clone();
+    pub fn stage_at(&self, corner: &Corner) -> Machine {
+        let mut machine = self.machine.clone();
         let off = self.unknowns.iter().zip(&corner.off).filter(|(_, off)| **off != 0.0);
-        parameter::set(&mut stage, off.map(|(unknown, &off)| (&unknown.free, unknown.value(off))));
-        stage.cart.mass += corner.load;
-        stage
+        parameter::set(&mut machine, off.map(|(unknown, &off)| (&unknown.free, unknown.value(off))));
+        machine.cart.mass += corner.load;
+        machine
     }
 
     /// Its response, as the controller of `design` sees it.
@@ -377,26 +379,26 @@ fn moved<'a>(change: impl Fn(&mut Corner) + 'a) -> Step<'a> {
 }
 
 /// The stage with spans that are as long as they are along the travel, whatever the runs assume.
-fn following(mut stage: Stage) -> Stage {
-    stage.belt.follows_cart |= stage.belt.make.is_some();
-    stage
+fn following(mut machine: Machine) -> Machine {
+    machine.belt.follows_cart |= machine.belt.make.is_some();
+    machine
 }
 
 /// Resonance and anti-resonance of a stage at these places along its travel.
-pub(super) fn modes_along(stage: &Stage, places: &[f64]) -> Result<Vec<Place>> {
-    travel(&following(stage.clone()), Operation::default(), places)
+pub(super) fn modes_along(machine: &Machine, places: &[f64]) -> Result<Vec<Place>> {
+    travel(&following(machine.clone()), Operation::default(), places)
 }
 
 /// Places along the travel: of `[travel]`, or where the moves lead.
 fn along(case: &Case, count: usize) -> Vec<f64> {
-    let stage = following(case.stage.clone());
-    let Some(whole) = places(&stage, count) else { return vec![0.0] };
+    let machine = following(case.machine.clone());
+    let Some(whole) = places(&machine, count) else { return vec![0.0] };
     let (low, high) = case
         .moves
         .iter()
         .flat_map(|motion| motion.profile.strokes().flat_map(|(_, from, distance, _)| [from, from + distance]))
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
-    if stage.travel.is_some() || low > high {
+    if machine.travel.is_some() || low > high {
         return whole;
     }
     let steps = count.max(2) - 1;

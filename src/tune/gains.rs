@@ -2,8 +2,8 @@
 
 use crate::design::placement::commands_current;
 use crate::design::{Design, Filter, Structure};
+use crate::machine::{AmplifierMode, Machine};
 use crate::parameter::{find, unit_for};
-use crate::stage::{AmplifierMode, Stage};
 
 /// Digits that a gain is given with behind its first one.
 const DIGITS: usize = 3;
@@ -29,10 +29,10 @@ pub struct Gain {
 }
 
 /// The gains of a design that are not zero, in the order of the case file.
-pub fn gains(design: &Design, stage: &Stage) -> Vec<Gain> {
+pub fn gains(design: &Design, machine: &Machine) -> Vec<Gain> {
     let mut copy = design.clone();
-    let amperes = commands_current(design, stage);
-    let amplifier = if stage.amplifier.mode == AmplifierMode::Current { "A" } else { "V" };
+    let amperes = commands_current(design, machine);
+    let amplifier = if machine.amplifier.mode == AmplifierMode::Current { "A" } else { "V" };
     let input = if amperes && matches!(design.structure, Structure::Cascade(_)) { "A" } else { amplifier };
     let gain = |(key, value, searched): (&'static str, &mut f64, bool)| Gain {
         key,

@@ -9,10 +9,10 @@ use crate::control::{Loop, Rows, Standard, stream};
 use crate::design::{Design, Structure};
 use crate::error::Result;
 use crate::friction::Side;
+use crate::machine::rigid::Rigid;
+use crate::machine::{Encoder, Machine};
 use crate::signal::profile::{Leg, Limits, Profile};
 use crate::solve::{Flow, Solver};
-use crate::stage::rigid::Rigid;
-use crate::stage::{Encoder, Stage};
 
 /// Way out before the slow reversal, m, half of which it goes back; enough to break away. Less on a short travel.
 const WAY: f64 = 10e-3;
@@ -63,45 +63,45 @@ pub struct Hunt {
 
 /// Watches the closed loop after a slow reversal; none if the cart comes to rest. A loop that is not stable hunts as
 /// well, and needs nothing of what is listed.
-pub fn hunting(stage: &Stage, design: &Design) -> Result<Option<Hunt>> {
-    let Some(hunt) = hunts(stage, design)? else { return Ok(None) };
-    let watched = watch(stage, design);
+pub fn hunting(machine: &Machine, design: &Design) -> Result<Option<Hunt>> {
+    let Some(hunt) = hunts(machine, design)? else { return Ok(None) };
+    let watched = watch(machine, design);
     let mut needs = Vec::new();
-    let mut without = |word: &'static str, stage_without: &Stage, design: &Design| -> Result<()> {
-        let seen = seen(stage_without, design, stage, (watched, 0.25 * watched))?;
+    let mut without = |word: &'static str, stage_without: &Machine, design: &Design| -> Result<()> {
+        let seen = seen(stage_without, design, machine, (watched, 0.25 * watched))?;
         if seen.swing.is_none() && seen.next(stage_without).is_none() {
             needs.push(word);
         }
         Ok(())
     };
     if let Some(other) = integral_times(design, 0.0) {
-        without("integral action", stage, &other)?;
+        without("integral action", machine, &other)?;
     }
-    let other = friction(stage, |side| (side.coulomb, side.breakaway) = (0.0, 0.0));
-    if other != *stage {
+    let other = friction(machine, |side| (side.coulomb, side.breakaway) = (0.0, 0.0));
+    if other != *machine {
         without("dry friction", &other, design)?;
     }
-    let other = friction(stage, |side| side.breakaway = side.coulomb);
-    if other != *stage {
+    let other = friction(machine, |side| side.breakaway = side.coulomb);
+    if other != *machine {
         without("breakaway above Coulomb friction", &other, design)?;
     }
-    if stage.motor.gear_play.is_some() {
-        let mut other = stage.clone();
+    if machine.motor.gear_play.is_some() {
+        let mut other = machine.clone();
         other.motor.gear_play = None;
         without("play in the gear", &other, design)?;
     }
-    if stage.encoder.is_some() {
+    if machine.encoder.is_some() {
         let finer = |encoder: Option<Encoder>| encoder.map(|one| Encoder { lines: 1e6 * one.lines, ..one });
-        let finer = Stage { encoder: finer(stage.encoder), scale: finer(stage.scale), ..stage.clone() };
+        let finer = Machine { encoder: finer(machine.encoder), scale: finer(machine.scale), ..machine.clone() };
         without("encoder counts", &finer, design)?;
     }
     Ok(Some(Hunt { needs, ..hunt }))
 }
 
 /// The limit cycle alone, without what it needs.
-pub(super) fn hunts(stage: &Stage, design: &Design) -> Result<Option<Hunt>> {
-    let short = watch(stage, design);
-    let first = seen(stage, design, stage, (short, 0.25 * short))?;
+pub(super) fn hunts(machine: &Machine, design: &Design) -> Result<Option<Hunt>> {
+    let short = watch(machine, design);
+    let first = seen(machine, design, machine, (short, 0.25 * short))?;
     let hunt = |Swing { amplitude, period, irregular, slips_every }: Swing, watched: f64| Hunt {
         amplitude,
         period,
@@ -113,7 +113,7 @@ pub(super) fn hunts(stage: &Stage, design: &Design) -> Result<Option<Hunt>> {
     if let Some(swing) = first.swing {
         return Ok(Some(hunt(swing, short)));
     }
-    let Some((next, most)) = first.next(stage) else { return Ok(None) };
+    let Some((next, most)) = first.next(machine) else { return Ok(None) };
     let unseen = |next: f64, watched: f64| {
         let swing = Swing { amplitude: f64::NAN, period: f64::NAN, irregular: false, slips_every: next };
         hunt(swing, watched)
@@ -123,8 +123,8 @@ pub(super) fn hunts(stage: &Stage, design: &Design) -> Result<Option<Hunt>> {
         return Ok(Some(unseen(next, short)));
     }
     let watched = (short + SLIPS * most).min(bound);
-    let second = seen(stage, design, stage, (watched, 0.25 * short))?;
-    Ok(match (second.swing.or_else(|| rare(&second.cart)), second.next(stage)) {
+    let second = seen(machine, design, machine, (watched, 0.25 * short))?;
+    Ok(match (second.swing.or_else(|| rare(&second.cart)), second.next(machine)) {
         (Some(swing), _) => Some(hunt(swing, watched)),
         // It slips, though not often enough for a swing to be seen.
         (None, Some((next, _))) => Some(unseen(next, watched)),
@@ -139,8 +139,8 @@ impl Hunt {
     }
 }
 
-fn friction(stage: &Stage, change: fn(&mut Side)) -> Stage {
-    let mut other = stage.clone();
+fn friction(machine: &Machine, change: fn(&mut Side)) -> Machine {
+    let mut other = machine.clone();
     for law in [&mut other.drive_pulley.friction, &mut other.cart.friction, &mut other.idler_pulley.friction] {
         change(&mut law.forward);
         change(&mut law.backward);
@@ -164,12 +164,12 @@ pub(super) fn integral_times(design: &Design, factor: f64) -> Option<Design> {
 }
 
 /// How long to watch, s: some of the times in which the integral takes the command from one breakaway to the other.
-fn watch(stage: &Stage, design: &Design) -> f64 {
-    let rigid = Rigid::of(stage);
+fn watch(machine: &Machine, design: &Design) -> f64 {
+    let rigid = Rigid::of(machine);
     let dry: f64 = rigid.coulomb.iter().sum();
-    let count = stage.encoder.map_or(1e-6, |encoder| {
-        let length = if crate::control::measures_cart(stage) { 1.0 } else { stage.pulley_radius };
-        length / encoder.counts_per_unit(stage.motor.gear_ratio)
+    let count = machine.encoder.map_or(1e-6, |encoder| {
+        let length = if crate::control::measures_cart(machine) { 1.0 } else { machine.pulley_radius };
+        length / encoder.counts_per_unit(machine.motor.gear_ratio)
     });
     // Command per second and metre of error that stays.
     let rate = match &design.structure {
@@ -205,12 +205,12 @@ struct Seen {
 impl Seen {
     /// How long it is until the command of a stuck axis has reached its breakaway, and how long it is from one breakaway
     /// to the other, s; none where the command does not go there.
-    fn next(&self, stage: &Stage) -> Option<(f64, f64)> {
-        let (rigid, r) = (Rigid::of(stage), stage.pulley_radius);
+    fn next(&self, machine: &Machine) -> Option<(f64, f64)> {
+        let (rigid, r) = (Rigid::of(machine), machine.pulley_radius);
         let most = |side: &Side| side.coulomb.max(side.breakaway);
         let of = |friction: &crate::friction::Friction| most(&friction.forward).max(most(&friction.backward));
-        let pulleys = (of(&stage.drive_pulley.friction) + of(&stage.idler_pulley.friction)) / r;
-        let breakaway = pulleys + of(&stage.cart.friction);
+        let pulleys = (of(&machine.drive_pulley.friction) + of(&machine.idler_pulley.friction)) / r;
+        let breakaway = pulleys + of(&machine.cart.friction);
         let (force, slope) = (rigid.force_per_command(), self.slope?);
         // g u + f = ±b
         let ends = [1.0, -1.0].map(|sign| (sign * breakaway - rigid.constant) / force);
@@ -229,10 +229,10 @@ fn slope(command: &[(f64, f64)]) -> Option<f64> {
 }
 
 /// What the cart does at rest, watched so long and from so long after the reversal on, s.
-fn seen(stage: &Stage, design: &Design, model: &Stage, (watched, skipped): (f64, f64)) -> Result<Seen> {
+fn seen(machine: &Machine, design: &Design, model: &Machine, (watched, skipped): (f64, f64)) -> Result<Seen> {
     let limits = Limits { speed: SPEED, acceleration: 0.2, jerk: None, snap: None };
     // From 0, to the side that has more room.
-    let way = stage.travel.map_or(WAY, |travel| match travel.max >= -travel.min {
+    let way = machine.travel.map_or(WAY, |travel| match travel.max >= -travel.min {
         true => travel.max.clamp(0.0, 2.0 * WAY) * 0.5,
         false => travel.min.clamp(-2.0 * WAY, 0.0) * 0.5,
     });
@@ -242,8 +242,8 @@ fn seen(stage: &Stage, design: &Design, model: &Stage, (watched, skipped): (f64,
     let mut controller = Standard::new(design, model)?;
     let rows = Rows { until, every: design.every.min(until), window: 1e-4 };
     let mut cart: Vec<(f64, f64)> = Vec::new();
-    let solver = Solver::of(stage);
-    let run = stream(stage, &mut controller, &Loop::of(design), &profile, &rows, solver, true, &mut |block| {
+    let solver = Solver::of(machine);
+    let run = stream(machine, &mut controller, &Loop::of(design), &profile, &rows, solver, true, &mut |block| {
         let (time, x) = (block.get("time").unwrap_or(&[]), block.get("cart_position").unwrap_or(&[]));
         let late = time.iter().zip(x).filter(|(t, _)| **t > from + skipped);
         cart.extend(late.map(|(t, x)| (*t, *x)));

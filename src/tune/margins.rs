@@ -16,7 +16,7 @@ use crate::control::measures_cart;
 use crate::design::Design;
 use crate::error::Result;
 use crate::linear::{Discrete, Hold, Operation, Range, StateSpace};
-use crate::stage::{EncoderPlace, Stage};
+use crate::machine::{EncoderPlace, Machine};
 use nalgebra::Complex;
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
@@ -79,17 +79,17 @@ pub struct Plant {
 
 impl Plant {
     /// That of `stage` with the cart at `place`, as the controller of `design` samples it.
-    pub fn of(stage: &Stage, place: f64, design: &Design, corners: &[f64]) -> Result<Self> {
+    pub fn of(machine: &Machine, place: f64, design: &Design, corners: &[f64]) -> Result<Self> {
         let t = design.every;
-        let system = StateSpace::of(stage, Operation { position: place, ..Operation::default() })?;
+        let system = StateSpace::of(machine, Operation { position: place, ..Operation::default() })?;
         let model = system.discrete(t, Hold::Zero, design.delay)?;
         let frequency = grid(&model, t, corners);
-        let output = match stage.encoder.map(|encoder| encoder.at) {
-            _ if measures_cart(stage) => "cart_position",
+        let output = match machine.encoder.map(|encoder| encoder.at) {
+            _ if measures_cart(machine) => "cart_position",
             Some(EncoderPlace::DrivePulley) => "drive_angle",
             _ => "rotor_angle",
         };
-        let length = if measures_cart(stage) { 1.0 } else { stage.pulley_radius };
+        let length = if measures_cart(machine) { 1.0 } else { machine.pulley_radius };
         let measured = system.output(output).or(system.output("drive_angle")).unwrap_or_default();
         let of = |name: &str| system.output(name).unwrap_or_default();
         let outputs = [measured, of("cart_position"), of("motor_current")];

@@ -44,7 +44,7 @@ use crate::case::{Case, Cost, EFFORTS, Files, Move, Tuning};
 use crate::control::feedback::Feedback;
 use crate::design::{Design, Pid, Structure};
 use crate::error::{Error, Result};
-use crate::stage::BeltModel;
+use crate::machine::BeltModel;
 use by_moves::{Bars, Tried, WIDE, Weighed};
 use std::path::Path;
 use verdict::{compare, forced_by_file, worse};
@@ -150,7 +150,7 @@ pub fn tune(case: &Case, tuning: &Tuning, stop: &dyn Fn() -> bool) -> Result<Tun
     let Some(cost) = tuning.cost else {
         let (swing, bandwidth) = (work.modes()?.1, tuning.bandwidth);
         let hertz = bandwidth.unwrap_or(first(design, swing));
-        let placed = place(design, &case.stage, hertz, tuning.damping).unwrap_or(design.clone());
+        let placed = place(design, &case.machine, hertz, tuning.damping).unwrap_or(design.clone());
         let after = work.verdict(&gains::rounded(&placed))?;
         let forced = work.way_back(&before, after.clone())?.1;
         return ended(&work, before, (after, forced), Vec::new(), Some(hertz));
@@ -204,7 +204,7 @@ fn beginning<'a>(case: &'a Case, tuning: &Tuning) -> Result<(&'a Design, Family,
         Error::new("this case has no controller to tune")
             .next(format!("add [controller] with for example {}", case.suggested_controller()))
     })?;
-    Feedback::new(design, &case.stage)?;
+    Feedback::new(design, &case.machine)?;
     if !EFFORTS.contains(&tuning.effort) {
         let (least, most) = (EFFORTS.start(), EFFORTS.end());
         return Err(
@@ -373,7 +373,7 @@ fn ended(
     let least = if judgement == Judgement::Worse { work.least(&before) } else { None };
     let before = work.watched(before)?;
     let after = if before.design == after.design { before.clone() } else { work.watched(after)? };
-    let belt = &work.case.stage.belt;
+    let belt = &work.case.machine.belt;
     let modes = work.modes().map(|(modes, _)| modes).unwrap_or_default();
     let is_undamped = belt.model != BeltModel::Rigid && belt.damping.iter().all(|damping| *damping == 0.0);
     let advice = (judgement == Judgement::Worse).then(|| without_derivative(work.case, &before.design)).flatten();
@@ -401,9 +401,9 @@ fn ended(
 impl Tuned {
     /// Gains before and after, by key; the same unit.
     pub fn changes(&self) -> Vec<(Gain, f64)> {
-        let after = gains(&self.after.design, &self.family.stage);
+        let after = gains(&self.after.design, &self.family.machine);
         let now = |key: &str| after.iter().find(|gain| gain.key == key).map_or(0.0, |gain| gain.value);
-        gains(&self.before.design, &self.family.stage).into_iter().map(|gain| (gain.clone(), now(gain.key))).collect()
+        gains(&self.before.design, &self.family.machine).into_iter().map(|gain| (gain.clone(), now(gain.key))).collect()
     }
 
     /// The filters of the command as the case file has them, before and after, where they are not the same.

@@ -5,9 +5,9 @@ use crate::control::compensation::Compensation;
 use crate::control::measures_cart;
 use crate::design::{Design, FeedForward};
 use crate::error::Result;
+use crate::machine::rigid::Rigid;
+use crate::machine::{AmplifierMode, Machine};
 use crate::signal::profile::{Leg, Limits, Profile};
-use crate::stage::rigid::Rigid;
-use crate::stage::{AmplifierMode, Stage};
 
 /// Share of what the command's limit allows of speed and of force that a standard move takes.
 const SPEED: f64 = 0.5;
@@ -28,13 +28,13 @@ const WINDOW: f64 = 50e-6;
 /// The moves of a case; where it has none a standard set: a short and a long move as quick as travel and limits allow,
 /// and a slow reversal.
 pub fn of(case: &Case, design: &Design) -> Result<Vec<Move>> {
-    if case.moves.is_empty() { standard(&case.stage, design) } else { Ok(case.moves.clone()) }
+    if case.moves.is_empty() { standard(&case.machine, design) } else { Ok(case.moves.clone()) }
 }
 
 /// Short, long, and a slow reversal.
-fn standard(stage: &Stage, design: &Design) -> Result<Vec<Move>> {
-    let (speed, acceleration) = limits(stage, design);
-    let travel = stage.travel.map(|travel| (travel.min, travel.max - travel.min));
+fn standard(machine: &Machine, design: &Design) -> Result<Vec<Move>> {
+    let (speed, acceleration) = limits(machine, design);
+    let travel = machine.travel.map(|travel| (travel.min, travel.max - travel.min));
     let (from, way) = travel
         .map_or((0.0, [SHORT, 10.0 * SHORT]), |(min, length)| (min + 0.1 * length, SHARES.map(|share| share * length)));
     let (jerk, quick) = (60.0 * acceleration, 8000.0 * acceleration);
@@ -46,9 +46,9 @@ fn standard(stage: &Stage, design: &Design) -> Result<Vec<Move>> {
         ("long", vec![Leg::To(from + way[1], limits)]),
         ("slow reversal", vec![Leg::To(from + back, slow), Leg::To(from, slow)]),
     ];
-    let count = stage.encoder.map_or(0.0, |encoder| {
-        let length = if measures_cart(stage) { 1.0 } else { stage.pulley_radius };
-        length / encoder.counts_per_unit(stage.motor.gear_ratio)
+    let count = machine.encoder.map_or(0.0, |encoder| {
+        let length = if measures_cart(machine) { 1.0 } else { machine.pulley_radius };
+        length / encoder.counts_per_unit(machine.motor.gear_ratio)
     });
     let one = |(name, legs): (&str, Vec<Leg>)| {
         let profile = Profile::new(from, &legs)?;
@@ -59,11 +59,11 @@ fn standard(stage: &Stage, design: &Design) -> Result<Vec<Move>> {
 }
 
 /// Speed (m/s) and acceleration (m/s²) that leave room below the limits of controller and amplifier.
-fn limits(stage: &Stage, design: &Design) -> (f64, f64) {
-    let rigid = Rigid::of(stage);
-    let amplifier = match stage.amplifier.mode {
-        AmplifierMode::Voltage => stage.amplifier.voltage_limit.map(|limit| limit / stage.amplifier.gain.abs()),
-        AmplifierMode::Current => stage.amplifier.current_limit.map(|limit| limit / stage.amplifier.gain.abs()),
+fn limits(machine: &Machine, design: &Design) -> (f64, f64) {
+    let rigid = Rigid::of(machine);
+    let amplifier = match machine.amplifier.mode {
+        AmplifierMode::Voltage => machine.amplifier.voltage_limit.map(|limit| limit / machine.amplifier.gain.abs()),
+        AmplifierMode::Current => machine.amplifier.current_limit.map(|limit| limit / machine.amplifier.gain.abs()),
     };
     let Some(limit) = [design.limit, amplifier].into_iter().flatten().reduce(f64::min) else { return MODEST };
     let dry = rigid.coulomb[0];
@@ -78,8 +78,8 @@ fn limits(stage: &Stage, design: &Design) -> (f64, f64) {
 }
 
 /// Root mean square over the run of the current that a move asks of the axis as the file has it, A.
-pub fn asked(stage: &Stage, motion: &Move) -> f64 {
-    let compensation = Compensation::new(stage, &FeedForward::NONE);
+pub fn asked(machine: &Machine, motion: &Move) -> f64 {
+    let compensation = Compensation::new(machine, &FeedForward::NONE);
     let count = 1000;
     let end = motion.profile.end();
     let square = |k: i32| {

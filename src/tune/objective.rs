@@ -16,9 +16,9 @@ use crate::case::{Cost, Move};
 use crate::control::{Figures, Loop, Standard, closed_loop_at_samples, closed_loop_briefly};
 use crate::design::Design;
 use crate::error::Result;
+use crate::machine::Machine;
 use crate::signal::profile::Profile;
 use crate::solve::{Ending, Solver};
-use crate::stage::Stage;
 
 /// How much each figure counts: a_e, a_s, a_i.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -56,8 +56,8 @@ pub struct MoveFigures {
 }
 
 /// A move on one axis.
-pub fn look(stage: &Stage, model: &Stage, design: &Design, motion: &Move) -> Result<MoveFigures> {
-    Runner::new(model, design)?.look(stage, motion, &motion.reference(design))
+pub fn look(machine: &Machine, model: &Machine, design: &Design, motion: &Move) -> Result<MoveFigures> {
+    Runner::new(model, design)?.look(machine, motion, &motion.reference(design))
 }
 
 /// A controller that is made once and run through many moves.
@@ -68,23 +68,23 @@ pub(super) struct Runner {
 
 impl Runner {
     /// That of a design for a model of the axis.
-    pub fn new(model: &Stage, design: &Design) -> Result<Self> {
+    pub fn new(model: &Machine, design: &Design) -> Result<Self> {
         Ok(Self { controller: Standard::new(design, model)?, timing: Loop::of(design) })
     }
 
     /// A move on one axis, its profile being shaped already.
-    pub fn look(&mut self, stage: &Stage, motion: &Move, shaped: &Profile) -> Result<MoveFigures> {
+    pub fn look(&mut self, machine: &Machine, motion: &Move, shaped: &Profile) -> Result<MoveFigures> {
         let seen = (motion.until, motion.window);
         let (figures, ending) =
-            closed_loop_briefly(stage, &mut self.controller, &self.timing, shaped, seen, Solver::of(stage))?;
+            closed_loop_briefly(machine, &mut self.controller, &self.timing, shaped, seen, Solver::of(machine))?;
         Ok(figures_of(&figures, ending, motion))
     }
 
     /// The same at samples alone, in a third of the time.
-    pub fn glance(&mut self, stage: &Stage, motion: &Move, shaped: &Profile) -> Result<MoveFigures> {
+    pub fn glance(&mut self, machine: &Machine, motion: &Move, shaped: &Profile) -> Result<MoveFigures> {
         let seen = (motion.until, motion.window);
         let (figures, ending) =
-            closed_loop_at_samples(stage, &mut self.controller, &self.timing, shaped, seen, Solver::of(stage))?;
+            closed_loop_at_samples(machine, &mut self.controller, &self.timing, shaped, seen, Solver::of(machine))?;
         Ok(figures_of(&figures, ending, motion))
     }
 }
@@ -189,11 +189,11 @@ mod tests {
         for name in ["pid-elastic.toml", "cascade-current.toml", "lqi.toml"] {
             let case = Case::read(folder.join(name)).unwrap();
             let design = case.controller.as_ref().unwrap();
-            let mut runner = Runner::new(&case.stage, design).unwrap();
+            let mut runner = Runner::new(&case.machine, design).unwrap();
             for motion in &case.moves {
                 let shaped = motion.reference(design);
-                let whole = runner.look(&case.stage, motion, &shaped).unwrap();
-                let glance = runner.glance(&case.stage, motion, &shaped).unwrap();
+                let whole = runner.look(&case.machine, motion, &shaped).unwrap();
+                let glance = runner.glance(&case.machine, motion, &shaped).unwrap();
                 let told = format!("{name}: {}: {whole:?} {glance:?}", motion.name);
                 assert!(glance.error <= whole.error && glance.error > 0.98 * whole.error, "{told}");
                 assert!((glance.rms / whole.rms - 1.0).abs() < 0.02, "{told}");

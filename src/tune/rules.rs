@@ -2,8 +2,8 @@
 
 use crate::design::placement::{first, place};
 use crate::design::{Design, Filter, Pid, StateFeedback, Structure};
-use crate::stage::rigid::Rigid;
-use crate::stage::{AmplifierMode, Stage};
+use crate::machine::rigid::Rigid;
+use crate::machine::{AmplifierMode, Machine};
 use std::f64::consts::PI;
 
 /// Damping ratios of placements beside that of the file.
@@ -23,7 +23,7 @@ const NOTCHES: usize = 2;
 /// its own weights and slower filters.
 pub fn starts(
     design: &Design,
-    stage: &Stage,
+    machine: &Machine,
     swing: Option<f64>,
     bandwidth: Option<f64>,
     damping: f64,
@@ -31,8 +31,8 @@ pub fn starts(
     let hertz = bandwidth.unwrap_or(first(design, swing));
     let dampings = std::iter::once(damping).chain(DAMPINGS);
     let mut all: Vec<(Design, Option<f64>)> =
-        dampings.filter_map(|damping| Some((place(design, stage, hertz, damping)?, Some(hertz)))).collect();
-    all.extend(simc(design, stage).map(|design| (design, None)));
+        dampings.filter_map(|damping| Some((place(design, machine, hertz, damping)?, Some(hertz)))).collect();
+    all.extend(simc(design, machine).map(|design| (design, None)));
     if let Structure::StateFeedback(weights) = &design.structure {
         // A slower filter of the same regulator.
         all.extend(SLOWER.map(|share| {
@@ -47,13 +47,13 @@ pub fn starts(
 ///
 /// S. Skogestad, "Simple analytic rules for model reduction and PID controller tuning", Journal of Process Control 13
 /// (2003).
-fn simc(design: &Design, stage: &Stage) -> Option<Design> {
+fn simc(design: &Design, machine: &Machine) -> Option<Design> {
     let Structure::Pid(old) = &design.structure else { return None };
-    let rigid = Rigid::of(stage);
+    let rigid = Rigid::of(machine);
     let late = design.delay + 0.5 * design.every + 1.0 / (2.0 * PI * old.filter);
     let (drag, push) = (rigid.drag(), rigid.force_per_command());
     // M ẍ + d ẋ = g u:  k = g/d, τ = M/d; without drag k/τ is what counts.
-    let (lag, gain) = match stage.amplifier.mode {
+    let (lag, gain) = match machine.amplifier.mode {
         _ if drag <= 0.0 => return None,
         AmplifierMode::Voltage | AmplifierMode::Current => (rigid.mass / drag, push / drag),
     };

@@ -5,7 +5,7 @@ use crate::control::MoveRun;
 use crate::control::feedback::Feedback;
 use crate::design::Design;
 use crate::linear::{Operation, travel};
-use crate::stage::{AmplifierMode, Stage};
+use crate::machine::{AmplifierMode, Machine};
 use std::f64::consts::PI;
 
 /// Share of the samples at the limit from which on a command counts as saturated.
@@ -59,10 +59,10 @@ pub struct Trouble {
 }
 
 /// The trouble of a move that was run to `target`, m; none if it has none.
-pub fn trouble(stage: &Stage, design: &Design, run: &MoveRun, target: f64) -> Option<Trouble> {
-    let model = unstable(stage, design, target);
+pub fn trouble(machine: &Machine, design: &Design, run: &MoveRun, target: f64) -> Option<Trouble> {
+    let model = unstable(machine, design, target);
     let (swing, (samples, limited)) = (run.swing, run.samples);
-    let limit = limit(stage, design).unwrap_or(f64::INFINITY);
+    let limit = limit(machine, design).unwrap_or(f64::INFINITY);
     let cycles = swing.cycles >= CYCLES;
     let loud = swing.late > LOUD * limit && cycles;
     let grows = swing.late > GROWS * swing.early && cycles && (swing.late > LEAST * limit || limit.is_infinite());
@@ -77,7 +77,7 @@ pub fn trouble(stage: &Stage, design: &Design, run: &MoveRun, target: f64) -> Op
         _ if loud => (Kind::Howling, seen),
         _ => return None,
     };
-    let cause = cause(stage, design, kind, frequency, target);
+    let cause = cause(machine, design, kind, frequency, target);
     let at = frequency.map_or(String::new(), |hertz| format!(" at {hertz:.1} Hz"));
     let what = match kind {
         Kind::Unstable => format!("the loop is unstable and swings{at}"),
@@ -90,30 +90,30 @@ pub fn trouble(stage: &Stage, design: &Design, run: &MoveRun, target: f64) -> Op
 }
 
 /// Where the sampled loop swings, Hz, if it is not stable; none too for structures that are not linear.
-fn unstable(stage: &Stage, design: &Design, place: f64) -> Option<f64> {
-    let feedback = Feedback::new(design, stage).ok()?;
-    let plant = Plant::of(stage, place, design, &feedback.corners()).ok()?;
+fn unstable(machine: &Machine, design: &Design, place: f64) -> Option<f64> {
+    let feedback = Feedback::new(design, machine).ok()?;
+    let plant = Plant::of(machine, place, design, &feedback.corners()).ok()?;
     let margins = Margins::of(&plant, &feedback);
     (!margins.stable).then_some(margins.at / (2.0 * PI))
 }
 
-fn limit(stage: &Stage, design: &Design) -> Option<f64> {
-    let amplifier = match stage.amplifier.mode {
-        AmplifierMode::Voltage => stage.amplifier.voltage_limit,
-        AmplifierMode::Current => stage.amplifier.current_limit,
+fn limit(machine: &Machine, design: &Design) -> Option<f64> {
+    let amplifier = match machine.amplifier.mode {
+        AmplifierMode::Voltage => machine.amplifier.voltage_limit,
+        AmplifierMode::Current => machine.amplifier.current_limit,
     };
-    let amplifier = amplifier.map(|limit| limit / stage.amplifier.gain.abs());
+    let amplifier = amplifier.map(|limit| limit / machine.amplifier.gain.abs());
     [design.limit, amplifier].into_iter().flatten().reduce(f64::min)
 }
 
-fn cause(stage: &Stage, design: &Design, kind: Kind, frequency: Option<f64>, place: f64) -> String {
+fn cause(machine: &Machine, design: &Design, kind: Kind, frequency: Option<f64>, place: f64) -> String {
     let Some(hertz) = frequency else {
         return match kind {
             Kind::Saturated => "the move asks for more than the limit of the command allows".into(),
             Kind::Unstable | Kind::Howling => "its gains are too high".into(),
         };
     };
-    let places = travel(stage, Operation::default(), &[place]).unwrap_or_default();
+    let places = travel(machine, Operation::default(), &[place]).unwrap_or_default();
     let mut modes = places.iter().flat_map(|place| place.undamped_resonances.iter().copied());
     if let Some(mode) = modes.find(|mode| (mode / hertz).ln().abs() < NEAR) {
         return format!(

@@ -2,9 +2,9 @@
 
 use super::family::SPREAD;
 use crate::chance::normal_quantile;
+use crate::machine::Machine;
 use crate::number::engineering;
 use crate::parameter::{Free, kinds_without};
-use crate::stage::Stage;
 
 /// A parameter that is not known exactly.
 #[derive(Debug, Clone)]
@@ -89,9 +89,9 @@ pub(super) fn tie(unknowns: &mut [Unknown]) {
 
 /// What no fit knows anything of keeps its default spread. Of the two constants of a motor, which are one number, the one
 /// that was not fitted is off by as large a share as the other.
-pub(super) fn with_the_rest(mut fitted: Vec<Unknown>, stage: &Stage) -> Vec<Unknown> {
+pub(super) fn with_the_rest(mut fitted: Vec<Unknown>, machine: &Machine) -> Vec<Unknown> {
     let frees: Vec<&Free> = fitted.iter().map(|unknown| &unknown.free).collect();
-    let rest = kinds_without(stage, &frees).into_iter().map(|free| {
+    let rest = kinds_without(machine, &frees).into_iter().map(|free| {
         let is_constant =
             |name: &str| name.contains("motor.torque_constant") || name.contains("motor.back_emf_constant");
         let own = |name: &str| is_constant(name).then(|| kin(name));

@@ -249,7 +249,7 @@ impl Work<'_> {
     /// A verdict with its limit cycle at rest, and with what that needs.
     pub fn watched(&self, verdict: Verdict) -> Result<Verdict> {
         let hunt =
-            if verdict.nominal.stable && !(self.stop)() { hunting(&self.case.stage, &verdict.design)? } else { None };
+            if verdict.nominal.stable && !(self.stop)() { hunting(&self.case.machine, &verdict.design)? } else { None };
         Ok(Verdict { hunt, ..verdict })
     }
 
@@ -282,7 +282,7 @@ impl Work<'_> {
         if is_worse || !verdict.nominal.stable || (self.stop)() {
             return Ok(verdict);
         }
-        Ok(Verdict { hunt: hunts(&self.case.stage, &verdict.design)?, ..verdict })
+        Ok(Verdict { hunt: hunts(&self.case.machine, &verdict.design)?, ..verdict })
     }
 
     fn judged(&self, design: &Design, (bar, order): (f64, &[usize])) -> Result<Option<Verdict>> {
@@ -303,9 +303,9 @@ impl Work<'_> {
         let Some(all) = self.seen(design, &machines, (bar, order, left_out))? else { return Ok(None) };
         let mut moves = Vec::new();
         for (motion, seen) in self.moves.iter().zip(all) {
-            let (stage, until, window) = (&self.case.stage, motion.until, motion.window);
-            let (profile, solver) = (&motion.profile, Solver::of(stage));
-            let own = closed_loop(&Setup { stage, model: stage, design, profile, until, window, solver })?;
+            let (machine, until, window) = (&self.case.machine, motion.until, motion.window);
+            let (profile, solver) = (&motion.profile, Solver::of(machine));
+            let own = closed_loop(&Setup { machine, model: machine, design, profile, until, window, solver })?;
             let at_worst = AtWorst::of(&seen, left_out);
             moves.push(MoveVerdict {
                 name: motion.name.clone(),
@@ -335,7 +335,7 @@ impl Work<'_> {
         (bar, order, left_out): (f64, &[usize], usize),
     ) -> Result<Option<Vec<Vec<MoveFigures>>>> {
         let cost = self.tuning.cost.unwrap_or(Cost::Moves);
-        let mut runner = Runner::new(&self.case.stage, design)?;
+        let mut runner = Runner::new(&self.case.machine, design)?;
         let mut found: Vec<(usize, Vec<MoveFigures>)> = Vec::with_capacity(machines.len());
         let of = |found: &[(usize, Vec<MoveFigures>)], k: usize| -> Vec<MoveFigures> {
             found.iter().map(|(_, figures)| figures[k]).collect()
@@ -343,14 +343,14 @@ impl Work<'_> {
         for place in order.iter().copied().filter(|place| *place < machines.len()) {
             // A corner that is none of the machines has no axis made ready.
             let corner;
-            let stage = match self.stages.get(place) {
-                Some(stage) => stage,
+            let machine = match self.stages.get(place) {
+                Some(machine) => machine,
                 None => {
                     corner = self.family.stage_at(&machines[place]);
                     &corner
                 }
             };
-            found.push((place, self.looked(&mut runner, design, stage)?));
+            found.push((place, self.looked(&mut runner, design, machine)?));
             if bar.is_finite() && found.len() > left_out {
                 let worst: Vec<AtWorst> =
                     (0..self.moves.len()).map(|k| AtWorst::of(&of(&found, k), left_out)).collect();

@@ -11,7 +11,7 @@ use super::verdict::{Forced, Verdict, compare, forced};
 use super::work::Work;
 use crate::design::Design;
 use crate::error::Result;
-use crate::stage::Stage;
+use crate::machine::Machine;
 
 /// Stretches of the way that are looked at from the file on, and halvings of the last of them.
 const STRETCHES: usize = 16;
@@ -25,7 +25,7 @@ impl Work<'_> {
         if compare(before, &after) != Judgement::Worse || is_kept || (self.stop)() {
             return Ok((after, None));
         }
-        let Some(powers) = powers(&after.design, &before.design, &self.case.stage) else { return Ok((after, None)) };
+        let Some(powers) = powers(&after.design, &before.design, &self.case.machine) else { return Ok((after, None)) };
         let at = |part: f64| {
             let powers: Vec<f64> = powers.iter().map(|power| part * power).collect();
             rounded(&shaped(&after.design, after.design.filters.len(), &powers))
@@ -67,8 +67,8 @@ impl Work<'_> {
 }
 
 /// What leads from the gains of a design to those of another; none where one of them is zero in one of the two.
-fn powers(from: &Design, to: &Design, stage: &Stage) -> Option<Vec<f64>> {
-    let [from, to] = [from, to].map(|design| gains(design, stage));
+fn powers(from: &Design, to: &Design, machine: &Machine) -> Option<Vec<f64>> {
+    let [from, to] = [from, to].map(|design| gains(design, machine));
     let pairs = from.iter().zip(&to).filter(|(from, _)| from.searched);
     let all = from.len() == to.len() && from.iter().zip(&to).all(|(a, b)| a.key == b.key && a.value * b.value > 0.0);
     all.then(|| pairs.map(|(from, to)| (to.value / from.value).ln()).collect())
@@ -99,14 +99,14 @@ mod tests {
     fn the_way_ends_at_the_gains_of_the_file() {
         let case = pid();
         let file = case.controller.clone().unwrap();
-        let powers = powers(&calmer(&file), &file, &case.stage).unwrap();
+        let powers = powers(&calmer(&file), &file, &case.machine).unwrap();
         assert_eq!(rounded(&shaped(&calmer(&file), file.filters.len(), &powers)), rounded(&file));
         assert!((powers[1] - 2f64.ln()).abs() < 1e-12 && powers[0] == 0.0, "{powers:?}");
         // There is no way in logarithms to a gain that is zero.
         let mut without = file.clone();
         let Structure::Pid(pid) = &mut without.structure else { panic!("not a PID") };
         pid.integral = 0.0;
-        assert_eq!(super::powers(&file, &without, &case.stage), None);
+        assert_eq!(super::powers(&file, &without, &case.machine), None);
     }
 
     /// What is taken from the way keeps the limits, and a little nearer to the file they are broken.

@@ -11,8 +11,8 @@ use crate::case::{Case, Move, Tuning};
 use crate::control::feedback::Feedback;
 use crate::design::Design;
 use crate::error::Result;
+use crate::machine::Machine;
 use crate::signal::profile::Profile;
-use crate::stage::Stage;
 use std::cell::{Cell, RefCell};
 use std::f64::consts::PI;
 
@@ -50,7 +50,7 @@ pub(super) struct Work<'a> {
     /// The moves as the shaper of the controller makes them, which no search changes.
     pub shaped: Vec<Profile>,
     /// The axes of all machines of the family, and what a controller sees of them over frequency.
-    pub stages: Vec<Stage>,
+    pub stages: Vec<Machine>,
     pub plants: Vec<Plant>,
     /// Machines on which the limits have to hold while searching.
     set: Vec<usize>,
@@ -97,10 +97,10 @@ impl<'a> Work<'a> {
         design: &Design,
         stop: &'a dyn Fn() -> bool,
     ) -> Result<Self> {
-        let corners = Feedback::new(design, &case.stage)?.corners();
+        let corners = Feedback::new(design, &case.machine)?.corners();
         let plant = |corner| family.plant(corner, design, &corners);
         let plants = family.machines.iter().map(plant).collect::<Result<Vec<_>>>()?;
-        let asked = moves.iter().map(|motion| super::moves::asked(&case.stage, motion)).collect();
+        let asked = moves.iter().map(|motion| super::moves::asked(&case.machine, motion)).collect();
         Ok(Self {
             case,
             family,
@@ -123,7 +123,7 @@ impl<'a> Work<'a> {
     }
 
     pub fn feedback(&self, design: &Design) -> Result<Feedback> {
-        Feedback::new(design, &self.case.stage)
+        Feedback::new(design, &self.case.machine)
     }
 
     pub fn excess(&self, margins: &Margins) -> f64 {
@@ -188,7 +188,7 @@ impl<'a> Work<'a> {
     /// Modes of the axis that a command swings, each in the middle of where it goes along the travel, Hz; and the first
     /// anti-resonance.
     pub fn modes(&self) -> Result<(Vec<f64>, Option<f64>)> {
-        let places = modes_along(&self.case.stage, &self.family.places)?;
+        let places = modes_along(&self.case.machine, &self.family.places)?;
         let swing = places.iter().filter_map(|place| place.undamped_antiresonances.first().copied()).reduce(f64::min);
         let most = 0.4 / self.design().every;
         let mut modes = Vec::new();
@@ -218,7 +218,7 @@ impl<'a> Work<'a> {
         let mut placed = None;
         for layout in layouts(given, &modes) {
             let mut best: Option<(f64, Design)> = None;
-            let mut all = starts(&layout, &self.case.stage, swing, self.tuning.bandwidth, self.tuning.damping);
+            let mut all = starts(&layout, &self.case.machine, swing, self.tuning.bandwidth, self.tuning.damping);
             all.push((layout.clone(), None));
             // With the gains that were best with fewer filters, too.
             let least = found.iter().min_by(|a, b| a.value.total_cmp(&b.value));
@@ -265,7 +265,7 @@ impl<'a> Work<'a> {
         if is_good {
             return Ok(found);
         }
-        let slowing = slowing(given, own, &self.case.stage);
+        let slowing = slowing(given, own, &self.case.machine);
         for (j, power) in slowing.iter().enumerate() {
             // Weights of state feedback grow where a loop is to be slower, gains become less.
             let step = if *power < 0.0 { ALONE } else { -ALONE };
@@ -291,7 +291,7 @@ impl<'a> Work<'a> {
     fn softened(&mut self, start: &Design, own: usize) -> Result<Option<(Design, f64)>> {
         let mut factor = 1.0;
         while factor > 1e-3 && !(self.stop)() {
-            let design = rounded(&slower(start, own, &self.case.stage, factor));
+            let design = rounded(&slower(start, own, &self.case.machine, factor));
             if self.on_set(&design).0 == 0.0 && !self.passes(&design)? {
                 return Ok(Some((design, factor)));
             }
@@ -366,7 +366,7 @@ impl<'a> Work<'a> {
 }
 
 /// A design with a loop slower by this factor.
-fn slower(design: &Design, own: usize, stage: &Stage, factor: f64) -> Design {
+fn slower(design: &Design, own: usize, stage: &Machine, factor: f64) -> Design {
     if factor == 1.0 {
         return design.clone();
     }
@@ -376,7 +376,7 @@ fn slower(design: &Design, own: usize, stage: &Stage, factor: f64) -> Design {
 
 /// The power of the speed of a loop that each gain, and each number of filters from number `own` on, is to be multiplied
 /// by: of a PID or a cascade as if time went by more slowly, of state feedback by its weights.
-pub(super) fn slowing(design: &Design, own: usize, stage: &Stage) -> Vec<f64> {
+pub(super) fn slowing(design: &Design, own: usize, stage: &Machine) -> Vec<f64> {
     let power = |key: &str| match key {
         "controller.pid.proportional" => 2.0,
         "controller.pid.integral" => 3.0,

@@ -6,10 +6,10 @@ use std::f64::consts::PI;
 use taut::case::Case;
 use taut::control::Stepped;
 use taut::linear::{Operation, StateSpace};
+use taut::machine::axis::{CART, DRIVE};
+use taut::machine::{EncoderPlace, Machine};
 use taut::mechanism::State;
 use taut::signal::profile::Reference;
-use taut::stage::axis::{CART, DRIVE};
-use taut::stage::{EncoderPlace, Stage};
 
 type Matrix = DMatrix<f64>;
 
@@ -53,26 +53,26 @@ pub struct AtBreak {
 
 impl Loop {
     pub fn of(case: &Case) -> Self {
-        let stage = &case.stage;
+        let machine = &case.machine;
         // Every number is a count.
-        assert!(stage.encoder.iter().chain(&stage.scale).all(|encoder| encoder.lines >= FINE));
+        assert!(machine.encoder.iter().chain(&machine.scale).all(|encoder| encoder.lines >= FINE));
         let mut design = case.controller.clone().unwrap();
         design.limit = None;
         let (t, ratio) = (design.every, design.delay / design.every);
         let rest = if (ratio - ratio.round()).abs() < 1e-9 { 0.0 } else { ratio.fract() * t };
-        let body = match stage.encoder.unwrap().at {
+        let body = match machine.encoder.unwrap().at {
             EncoderPlace::Cart => CART,
             EncoderPlace::DrivePulley => DRIVE,
-            EncoderPlace::Motor => stage.mechanism().drives[0].shaft,
+            EncoderPlace::Motor => machine.mechanism().drives[0].shaft,
         };
-        let length = if body == CART { 1.0 } else { stage.pulley_radius };
+        let length = if body == CART { 1.0 } else { machine.pulley_radius };
 
         // The controller: one whole sample from each number of its memory and each measurement.
-        let mut stepped = Stepped::new(&design, stage).unwrap();
+        let mut stepped = Stepped::new(&design, machine).unwrap();
         let sample = |stepped: &mut Stepped, seen: [f64; MEASURED]| -> (Vec<f64>, f64) {
             let mut state = State::default();
             state.position[body] = seen[0] / length;
-            if stage.scale.is_some() {
+            if machine.scale.is_some() {
                 state.position[CART] = seen[1];
             }
             stepped.decide(&state, seen[2], &Reference::default());
@@ -108,7 +108,7 @@ impl Loop {
         };
 
         // The axis: what is held for the rest of the delay, and then for the rest of the sample.
-        let axis = StateSpace::of(&case.stage, Operation::default()).unwrap();
+        let axis = StateSpace::of(&case.machine, Operation::default()).unwrap();
         let n = axis.a.nrows();
         let held = |time: f64| {
             let mut whole = Matrix::zeros(n + 1, n + 1);
@@ -118,7 +118,7 @@ impl Loop {
             (done.view((0, 0), (n, n)).into_owned(), done.view((0, n), (n, 1)).column(0).into_owned())
         };
         let ((early, first), (late, second)) = (held(rest), held(t - rest));
-        let angle = if body == CART { "cart_position" } else { sensor(&case.stage, &axis) };
+        let angle = if body == CART { "cart_position" } else { sensor(&case.machine, &axis) };
         let outputs = [(angle, length), ("cart_position", 1.0), ("motor_current", 1.0)];
         let mut measured = Matrix::zeros(MEASURED, n);
         let mut direct = DVector::zeros(MEASURED);
@@ -231,8 +231,8 @@ impl Loop {
 }
 
 /// The angle that an encoder at the motor or the drive pulley reads.
-fn sensor(stage: &Stage, axis: &StateSpace) -> &'static str {
-    match stage.encoder.unwrap().at {
+fn sensor(machine: &Machine, axis: &StateSpace) -> &'static str {
+    match machine.encoder.unwrap().at {
         EncoderPlace::Motor if axis.output("rotor_angle").is_some() => "rotor_angle",
         _ => "drive_angle",
     }

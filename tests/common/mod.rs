@@ -13,13 +13,13 @@ pub mod wrong;
 
 use taut::case::{Experiment, Initial};
 use taut::friction::{Friction, Law, Shape};
+use taut::machine::{Amplifier, AmplifierMode, Belt, BeltMake, Cart, Machine, Motor, Pulley, Travel};
 use taut::signal::Signal;
-use taut::stage::{Amplifier, AmplifierMode, Belt, BeltMake, Cart, Motor, Pulley, Stage, Travel};
 
 /// A stage with the paper's motor and radius.
-pub fn paper_stage(stiffness: [f64; 3], inertia: f64, pulley: Friction, cart: Friction) -> Stage {
+pub fn paper_stage(stiffness: [f64; 3], inertia: f64, pulley: Friction, cart: Friction) -> Machine {
     let pulley = Pulley { inertia, friction: pulley };
-    Stage {
+    Machine {
         motor: Motor {
             torque_constant: 0.023,
             back_emf_constant: 0.023,
@@ -44,19 +44,19 @@ pub fn paper_stage(stiffness: [f64; 3], inertia: f64, pulley: Friction, cart: Fr
 }
 
 /// Table 1.
-pub fn table1() -> Stage {
+pub fn table1() -> Machine {
     let viscous = (Friction::symmetric(0.0042, 0.0), Friction::symmetric(40.6518, 0.0));
     paper_stage([2.6552e5, 2.6552e5, 11.777e4], 7e-5, viscous.0, viscous.1)
 }
 
 /// Table 2.
-pub fn table2() -> Stage {
+pub fn table2() -> Machine {
     let viscous = (Friction::symmetric(0.0021, 0.0), Friction::symmetric(20.3259, 0.0));
     paper_stage([1.3276e5, 1.3276e5, 5.8885e4], 6.3e-5, viscous.0, viscous.1)
 }
 
 /// Friction of Table 4, the rest of Table 2.
-pub fn table4() -> Stage {
+pub fn table4() -> Machine {
     let dry = (Friction::symmetric(0.0016, 0.015), Friction::symmetric(19.0424, 0.2));
     paper_stage([1.3276e5, 1.3276e5, 5.8885e4], 6.3e-5, dry.0, dry.1)
 }
@@ -67,35 +67,35 @@ pub fn experiment(input: Signal, until: f64) -> Experiment {
 }
 
 /// F_s = 0.3 F_c on top of each body's Coulomb friction, v_s = 0.05 m/s at the belt.
-pub fn with_stribeck(mut stage: Stage) -> Stage {
-    let r = stage.pulley_radius;
+pub fn with_stribeck(mut machine: Machine) -> Machine {
+    let r = machine.pulley_radius;
     let bodies = [
-        (&mut stage.drive_pulley.friction, 0.05 / r),
-        (&mut stage.cart.friction, 0.05),
-        (&mut stage.idler_pulley.friction, 0.05 / r),
+        (&mut machine.drive_pulley.friction, 0.05 / r),
+        (&mut machine.cart.friction, 0.05),
+        (&mut machine.idler_pulley.friction, 0.05 / r),
     ];
     for (friction, velocity) in bodies {
         friction.forward.breakaway = 1.3 * friction.forward.coulomb;
         friction.backward.breakaway = 1.3 * friction.backward.coulomb;
         friction.law = Law::Stribeck { velocity, shape: Shape::Gaussian };
     }
-    stage
+    machine
 }
 
 /// Bristles under the cart: breakaway 30 % above its Coulomb friction, v_s = 0.01 m/s, σ₁ = 60 N s/m.
-pub fn with_bristles(mut stage: Stage, stiffness: f64) -> Stage {
-    let friction = &mut stage.cart.friction;
+pub fn with_bristles(mut machine: Machine, stiffness: f64) -> Machine {
+    let friction = &mut machine.cart.friction;
     friction.forward.breakaway = 1.3 * friction.forward.coulomb;
     friction.backward.breakaway = 1.3 * friction.backward.coulomb;
     friction.law = Law::LuGre { stiffness, damping: 60.0, velocity: 0.01 };
-    stage
+    machine
 }
 
 /// A belt of the paper's lengths whose spans follow the cart.
-pub fn with_following_spans(mut stage: Stage) -> Stage {
+pub fn with_following_spans(mut machine: Machine) -> Machine {
     let make = BeltMake { modulus: 8.335e9, section: 5.5626e-6, spans: [0.34925, 0.34925, 0.7874] };
-    (stage.belt.make, stage.belt.follows_cart) = (Some(make), true);
-    stage.belt.stiffness = make.stiffness();
-    stage.travel = Some(Travel { min: -0.3, max: 0.3, stop: None });
-    stage
+    (machine.belt.make, machine.belt.follows_cart) = (Some(make), true);
+    machine.belt.stiffness = make.stiffness();
+    machine.travel = Some(Travel { min: -0.3, max: 0.3, stop: None });
+    machine
 }

@@ -3,11 +3,11 @@
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use taut::friction::{Friction, Side};
+use taut::machine::{
+    Amplifier, AmplifierMode, Belt, BeltModel, Cart, CartForces, EndStop, GearPlay, Machine, Motor, Pulley, Travel,
+};
 use taut::polyline::Polyline;
 use taut::signal::Signal;
-use taut::stage::{
-    Amplifier, AmplifierMode, Belt, BeltModel, Cart, CartForces, EndStop, GearPlay, Motor, Pulley, Stage, Travel,
-};
 
 /// As many random cases, the same ones in every run: of a law on sensitive machines a few in a hundred thousand miss
 /// their tolerance because an error of the last bit has grown. `PROPTEST_RNG_SEED=…` draws others, `TAUT_CASES=…` more.
@@ -58,7 +58,7 @@ fn friction(viscous: f64, coulomb: f64, dry: Dry) -> BoxedStrategy<Friction> {
 }
 
 /// Machines within a decade or so of the paper's, with every feature now and then.
-pub fn stage(dry: Dry) -> impl Strategy<Value = Stage> {
+pub fn machine(dry: Dry) -> impl Strategy<Value = Machine> {
     let motor = (
         decades(0.005, 0.1),
         prop_oneof![3 => Just(1.0), 1 => 0.8..1.2],
@@ -90,7 +90,7 @@ pub fn stage(dry: Dry) -> impl Strategy<Value = Stage> {
     let belt = ([stiffness(), stiffness(), stiffness()], [damping(), damping(), damping()])
         .prop_map(|(stiffness, damping)| Belt::given(stiffness, damping));
     (motor, amplifier, decades(0.005, 0.04), pulley(), cart, pulley(), belt).prop_map(
-        |(motor, amplifier, pulley_radius, drive_pulley, cart, idler_pulley, belt)| Stage {
+        |(motor, amplifier, pulley_radius, drive_pulley, cart, idler_pulley, belt)| Machine {
             motor,
             amplifier,
             pulley_radius,
@@ -137,7 +137,7 @@ fn line(most: f64, value: f64, dry: Dry) -> BoxedStrategy<Polyline> {
 
 /// Such machines with limits, backlash, slack spans, end stops, and reduced models; with `Symmetric` ones that have a
 /// mirror image.
-pub fn equipped(dry: Dry) -> impl Strategy<Value = Stage> {
+pub fn equipped(dry: Dry) -> impl Strategy<Value = Machine> {
     let limits = (now_and_then(0.5..10.0_f64), now_and_then(decades(0.3, 6.0)), now_and_then(decades(20.0, 2000.0)));
     let gear = now_and_then((
         prop_oneof![1 => Just(0.0), 3 => decades(1e-4, 5e-2)],
@@ -149,50 +149,50 @@ pub fn equipped(dry: Dry) -> impl Strategy<Value = Stage> {
         now_and_then((decades(1e-3, 5e-2), decades(1e3, 1e5), prop_oneof![1 => Just(0.0), 1 => decades(1.0, 100.0)]));
     let model = prop_oneof![3 => Just(BeltModel::Elastic), 1 => Just(BeltModel::TwoMass), 1 => Just(BeltModel::Rigid)];
     let more = (now_and_then(decades(0.2, 30.0)), now_and_then(-2.0..2.0_f64), model);
-    (stage(dry), limits, gear, stops, more).prop_map(move |(mut stage, limits, gear, stops, more)| {
+    (machine(dry), limits, gear, stops, more).prop_map(move |(mut machine, limits, gear, stops, more)| {
         let (voltage_limit, current_limit, bandwidth) = limits;
-        let amplifier = &mut stage.amplifier;
+        let amplifier = &mut machine.amplifier;
         amplifier.voltage_limit = voltage_limit;
         amplifier.current_limit = current_limit;
         if amplifier.mode == AmplifierMode::Current {
             amplifier.bandwidth = bandwidth;
-            if voltage_limit.is_some() && bandwidth.is_some() != (stage.motor.inductance > 0.0) {
+            if voltage_limit.is_some() && bandwidth.is_some() != (machine.motor.inductance > 0.0) {
                 amplifier.voltage_limit = None;
             }
         }
         if let Some((backlash, stiffness, damping, rotor)) = gear {
-            stage.motor.gear_play = Some(GearPlay { backlash, stiffness, damping });
-            stage.motor.rotor_inertia = rotor;
+            machine.motor.gear_play = Some(GearPlay { backlash, stiffness, damping });
+            machine.motor.rotor_inertia = rotor;
         }
-        stage.travel = stops.map(|(end, stiffness, damping)| Travel {
+        machine.travel = stops.map(|(end, stiffness, damping)| Travel {
             min: -end,
             max: end,
             stop: Some(EndStop { stiffness, damping }),
         });
         let (pretension, load, model) = more;
-        stage.belt.model = model;
+        machine.belt.model = model;
         // A belt pulls and does not push: the image of a slack span is a tight one.
-        stage.belt.pretension = pretension.filter(|_| model != BeltModel::Rigid && dry == Dry::Any);
+        machine.belt.pretension = pretension.filter(|_| model != BeltModel::Rigid && dry == Dry::Any);
         if dry == Dry::Any {
-            stage.cart.load = load.unwrap_or(0.0);
+            machine.cart.load = load.unwrap_or(0.0);
         }
-        stage
+        machine
     })
 }
 
 /// Such machines with forces that are lines over the cart's way and speed.
-pub fn lined(dry: Dry) -> impl Strategy<Value = Stage> {
+pub fn lined(dry: Dry) -> impl Strategy<Value = Machine> {
     (equipped(dry), now_and_then(line(0.05, 1.0, dry)), now_and_then(line(0.5, 1.0, dry))).prop_map(
-        |(mut stage, along, by_speed)| {
-            stage.cart.forces = CartForces { along, by_speed };
-            stage
+        |(mut machine, along, by_speed)| {
+            machine.cart.forces = CartForces { along, by_speed };
+            machine
         },
     )
 }
 
 /// Whether flanks, spans or end stops may strike again and again, so that an error grows tenfold every few strikes.
-pub fn rattles(stage: &Stage) -> bool {
-    stage.motor.gear_play.is_some() || stage.travel.is_some() || stage.belt.pretension.is_some()
+pub fn rattles(machine: &Machine) -> bool {
+    machine.motor.gear_play.is_some() || machine.travel.is_some() || machine.belt.pretension.is_some()
 }
 
 /// Inputs made of straight pieces whose edges fall anywhere.

@@ -20,11 +20,11 @@ pub const LINEAR: [&str; 5] = [
 pub fn is_that_of_runs(name: &str, case: &Case, every: usize) {
     let design = case.controller.as_ref().unwrap();
     let louder = |step: usize| {
-        let mut stage = case.stage.clone();
-        stage.amplifier.gain *= 1.2f64.powi(step as i32 - 12);
-        stage
+        let mut machine = case.machine.clone();
+        machine.amplifier.gain *= 1.2f64.powi(step as i32 - 12);
+        machine
     };
-    let feedback = Feedback::new(design, &case.stage).unwrap();
+    let feedback = Feedback::new(design, &case.machine).unwrap();
     let told = |step: usize| {
         let plant = Plant::of(&louder(step), 0.0, design, &feedback.corners()).unwrap();
         Margins::of(&plant, &feedback).stable
@@ -34,8 +34,8 @@ pub fn is_that_of_runs(name: &str, case: &Case, every: usize) {
     // At the limit itself it grows and dies out too slowly to be seen.
     for step in (1..29).step_by(every).filter(|&step| told[step - 1] == told[step + 1]) {
         let run = closed_loop(&Setup {
-            stage: &louder(step),
-            model: &case.stage,
+            machine: &louder(step),
+            model: &case.machine,
             design,
             profile: &case.moves[0].profile,
             until: 12.0,

@@ -2,10 +2,10 @@
 
 use super::{bits, rows};
 use taut::case::{GantryCase, Given, Sampling};
+use taut::machine::gantry::Routing;
 use taut::metrics::{GantryMeter, GantryMetrics};
 use taut::parameter::{Free, every, values};
 use taut::solve::{Course, Detail, Flow, Solver, stream_mechanism};
-use taut::stage::gantry::Routing;
 use taut::sweep::{Status, Sweep, of_gantry};
 use taut::trajectory::Trajectory;
 

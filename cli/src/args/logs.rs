@@ -5,7 +5,7 @@ use crate::command::Common;
 use clap::ValueEnum;
 use std::path::PathBuf;
 use taut::fit::experiment_design::{Criterion, Kind as InputKind};
-use taut::stage::Channel;
+use taut::machine::Channel;
 
 /// Say what the logs of a case can tell of the parameters in its [fit], before any fit.
 ///

@@ -4,8 +4,8 @@ use super::values::{count, share, step};
 use crate::command::Common;
 use clap::ValueEnum;
 use std::path::PathBuf;
+use taut::machine::Machine;
 use taut::solve::{Choice, Kind as SolverKind, Method, Solver};
-use taut::stage::Stage;
 
 /// Run the experiments of a case file.
 ///
@@ -183,8 +183,8 @@ pub enum Format {
 
 impl Simulate {
     /// The solver that is asked for, or else the one for this stage.
-    pub fn solver(&self, stage: &Stage) -> taut::Result<Solver> {
-        self.choice().solver(stage)
+    pub fn solver(&self, machine: &Machine) -> taut::Result<Solver> {
+        self.choice().solver(machine)
     }
 
     /// The solver that is asked for, with its settings.

@@ -3,8 +3,8 @@
 use taut::case::EFFORTS;
 use taut::control::recommendation::Damping;
 use taut::control::shaper::Form;
+use taut::machine::{Channel, Quantity};
 use taut::quantity;
-use taut::stage::{Channel, Quantity};
 
 /// A number of draws or chains.
 pub fn count(text: &str) -> Result<usize, String> {

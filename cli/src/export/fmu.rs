@@ -39,7 +39,7 @@ fn object() -> Result<Cow<'static, [u8]>> {
 
 fn drawing(case: &Opened) -> String {
     match case {
-        Opened::Axis(case) => stage_drawing(&case.stage),
+        Opened::Axis(case) => stage_drawing(&case.machine),
         Opened::Gantry(case) => gantry_drawing(&case.gantry),
     }
 }

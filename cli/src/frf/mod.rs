@@ -29,7 +29,7 @@ pub fn run(args: &Args) -> Outcome {
         finished.files.push(("frf.csv".into(), csv(&found)));
     }
     if common.reports() {
-        let figures = figures(&found, &case.stage);
+        let figures = figures(&found, &case.machine);
         let page = page(&case, &found, &figures);
         let pictures = figures.into_iter().map(|(name, figure)| (name, figure.into()));
         finished.report = Some(Report { page, pictures: pictures.collect() });

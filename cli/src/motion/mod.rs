@@ -53,7 +53,7 @@ pub fn run(args: &Args) -> Outcome {
         [one] => {
             let mut text = table::text(one);
             if args.drives {
-                text.push_str(&table::drives(&one.case.stage));
+                text.push_str(&table::drives(&one.case.machine));
             }
             (json::text(&told(one)), text, "add --out DIR for files and a report")
         }
@@ -88,7 +88,7 @@ fn names(args: &Args, case: &Case, path: &Path) -> Result<Vec<String>> {
 fn told(tried: &Tried) -> impl serde::Serialize + use<> {
     let moved: Vec<Moved> = tried.done.iter().map(Done::told).collect();
     let (design, case) = (tried.design, tried.case);
-    json::moves(&case.title, design.structure.name(), &Loop::of(design), &case.stage, &moved)
+    json::moves(&case.title, design.structure.name(), &Loop::of(design), &case.machine, &moved)
 }
 
 /// Runs one move.
@@ -100,16 +100,16 @@ fn one<'a>(
     folder: Option<&Folder>,
     interrupt: &Interrupt,
 ) -> std::result::Result<Done<'a>, Failure> {
-    let stage = &case.stage;
-    let mut controller = Standard::new(design, stage)?;
+    let machine = &case.machine;
+    let mut controller = Standard::new(design, machine)?;
     let profile = motion.reference(design);
     let rows = Rows { until: motion.until, every: motion.every, window: motion.window };
     let name = motion.file_name();
     let writer = folder.map(|folder| CsvWriter::create(folder.path(format!("{name}.csv")))).transpose();
     let mut writer = writer.map_err(Failure::work)?;
-    let mut curves = folder.is_some().then(|| Curves::new(stage)).filter(|_| !args.common.no_report);
+    let mut curves = folder.is_some().then(|| Curves::new(machine)).filter(|_| !args.common.no_report);
     let mut trouble = None;
-    let solver = Solver::of(stage);
+    let solver = Solver::of(machine);
     let mut take = |block: &Trajectory| {
         if let Some(curves) = &mut curves {
             curves.take(block);
@@ -118,7 +118,7 @@ fn one<'a>(
         if trouble.is_some() || interrupt.signal().is_some() { Flow::Stop } else { Flow::Continue }
     };
     let keep = folder.is_some();
-    let run = stream(stage, &mut controller, &Loop::of(design), &profile, &rows, solver, keep, &mut take)?;
+    let run = stream(machine, &mut controller, &Loop::of(design), &profile, &rows, solver, keep, &mut take)?;
     if let Some(trouble) = trouble {
         return Err(Failure::work(trouble));
     }
@@ -130,17 +130,17 @@ fn one<'a>(
         files.push(write_samples(folder, &name, case, &run).map_err(Failure::work)?);
     }
     let worst = match args.spread.filter(|_| interrupt.signal().is_none()) {
-        Some(share) => worst(&case.stage, design, motion, share, solver, &|| interrupt.signal().is_some())?,
+        Some(share) => worst(&case.machine, design, motion, share, solver, &|| interrupt.signal().is_some())?,
         None => None,
     };
-    let trouble = trouble::trouble(stage, design, &run, motion.profile.target());
-    let shortfalls = shortfalls(stage, design.limit, &profile);
+    let trouble = trouble::trouble(machine, design, &run, motion.profile.target());
+    let shortfalls = shortfalls(machine, design.limit, &profile);
     Ok(Done { motion, run, curves, worst, trouble, shortfalls, files })
 }
 
 /// The controller's samples as CSV.
 fn write_samples(folder: &Folder, name: &str, case: &Case, run: &MoveRun) -> Result<String> {
-    let unit = if case.stage.amplifier.mode == taut::stage::AmplifierMode::Current { "A" } else { "V" };
+    let unit = if case.machine.amplifier.mode == taut::machine::AmplifierMode::Current { "A" } else { "V" };
     let mut text = format!("time_s,reference_m,measured_m,asked_{unit},given_{unit}\n");
     for s in &run.kept {
         let _ =

@@ -3,13 +3,13 @@
 use crate::terminal::bold;
 use std::fmt::Write;
 use taut::control::drives::drive_gains;
-use taut::stage::{AmplifierMode, Stage};
+use taut::machine::{AmplifierMode, Machine};
 use taut_report::motion::{Tried, controller, length, lines};
 use taut_report::simulate::{early_end, value};
 
 /// Text on the terminal for one case.
 pub fn text(tried: &Tried) -> String {
-    let mut text = format!("{}\n{}\n", bold(&tried.case.title), controller(tried.design, &tried.case.stage));
+    let mut text = format!("{}\n{}\n", bold(&tried.case.title), controller(tried.design, &tried.case.machine));
     for done in &tried.done {
         let _ = write!(text, "\n{}\n", bold(&done.motion.name));
         if let Some(told) = early_end(&done.run.outcome.ending) {
@@ -32,7 +32,7 @@ pub fn comparison(tried: &[Tried]) -> String {
         }
     }
     let spread = tried.iter().flat_map(|tried| &tried.done).any(|done| done.worst.is_some());
-    let amperes = tried.iter().any(|tried| tried.case.stage.amplifier.mode == AmplifierMode::Current);
+    let amperes = tried.iter().any(|tried| tried.case.machine.amplifier.mode == AmplifierMode::Current);
     let mut text = String::new();
     for name in names {
         let _ = writeln!(text, "{}", bold(name));
@@ -89,9 +89,9 @@ pub fn comparison(tried: &[Tried]) -> String {
 }
 
 /// Feed-forward gains as drives of others take them.
-pub fn drives(stage: &Stage) -> String {
+pub fn drives(machine: &Machine) -> String {
     let mut text = format!("\n{}\n", bold("Feed-forward for drives, of the axis as one mass going forward"));
-    for gain in drive_gains(stage) {
+    for gain in drive_gains(machine) {
         let value = value(gain.value, gain.unit);
         let _ = writeln!(text, "  {:<10}{:<34}{value}", gain.system, gain.name);
     }

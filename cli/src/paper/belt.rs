@@ -2,7 +2,7 @@
 
 use super::model::Sets;
 use std::f64::consts::PI;
-use taut::stage::{BeltMake, composite_modulus, cylinder_inertia, pitch_radius, toothed_section};
+use taut::machine::{BeltMake, composite_modulus, cylinder_inertia, pitch_radius, toothed_section};
 
 /// Cross-section A, m² (Tables 1 and 2).
 pub const SECTION: f64 = 5.5626e-6;
@@ -86,15 +86,15 @@ impl Belt {
                 length_rounding: 0.5e-3 / length,
             }
         };
-        let [k1, _, k3] = sets.table1.stage.belt.stiffness;
-        let [m1, _, m3] = sets.table2.stage.belt.stiffness;
-        let stage = &sets.table1.stage;
-        let r = stage.pulley_radius;
-        let inertia = stage.drive_pulley.inertia;
+        let [k1, _, k3] = sets.table1.machine.belt.stiffness;
+        let [m1, _, m3] = sets.table2.machine.belt.stiffness;
+        let machine = &sets.table1.machine;
+        let r = machine.pulley_radius;
+        let inertia = machine.drive_pulley.inertia;
         let per_metre = cylinder_inertia(2.0 * r, 0.0, 1.0, DENSITY[0]);
         let length = 2.0 * PRINTED.1 + 2.0 * PI * r;
         let mass = SECTION * length * (PARTS[0].0 * DENSITY[1] + PARTS[1].0 * DENSITY[2]);
-        let moving = stage.cart.mass + 2.0 * inertia / (r * r);
+        let moving = machine.cart.mass + 2.0 * inertia / (r * r);
         // A stretch with teeth of plain neoprene carries A E as before plus the tooth's own section times 6e6 Pa.
         let tooth = 1.0 + PARTS[0].1 / composite;
         Self {

@@ -1,21 +1,21 @@
 //! Figures 18 and 19: block diagrams whose coefficients are read from the equations that run.
 
+use taut::machine::Machine;
+use taut::machine::axis::{CART, DRIVE, IDLER};
 use taut::mechanism::{Form, Mechanism, Mode, State};
 use taut::number::engineering;
-use taut::stage::Stage;
-use taut::stage::axis::{CART, DRIVE, IDLER};
 use taut_report::diagram::Sign;
 use taut_report::{BodyEquation, FrictionTerm, Inertia, MotorEquation, Term, axis_diagram, body_diagram};
 
 /// Figure 18: the drive pulley, eq. (16).
-pub fn drive_pulley(stage: &Stage) -> String {
-    body_diagram(&body(stage, &stage.mechanism(), DRIVE))
+pub fn drive_pulley(machine: &Machine) -> String {
+    body_diagram(&body(machine, &machine.mechanism(), DRIVE))
 }
 
 /// Figure 19: the whole.
-pub fn whole(stage: &Stage) -> String {
-    let mechanism = stage.mechanism();
-    let [drive, cart, idler] = [DRIVE, CART, IDLER].map(|b| body(stage, &mechanism, b));
+pub fn whole(machine: &Machine) -> String {
+    let mechanism = machine.mechanism();
+    let [drive, cart, idler] = [DRIVE, CART, IDLER].map(|b| body(machine, &mechanism, b));
     let load = mechanism.load(DRIVE, true, &Mode::of([]));
     let motor = MotorEquation {
         input: "V_in".into(),
@@ -35,7 +35,7 @@ const WAYS: [&str; 3] = ["x₁ = φ₁", "x₃ = x", "x₅ = φ₃"];
 const SPEEDS: [&str; 3] = ["x₂ = φ̇₁", "x₄ = ẋ", "x₆ = φ̇₃"];
 
 /// Eq. (16), (17) or (18), with symbols beside the coefficients of the form that the solver uses.
-fn body(stage: &Stage, mechanism: &Mechanism, body: usize) -> BodyEquation {
+fn body(machine: &Machine, mechanism: &Mechanism, body: usize) -> BodyEquation {
     let form: Form = mechanism.load(body, true, &Mode::of([]));
     let State { position, speed, .. } = form.on_state(mechanism);
     // What the coefficients of φ₁, x, φ₃ and φ̇₁ are called.
@@ -55,9 +55,9 @@ fn body(stage: &Stage, mechanism: &Mechanism, body: usize) -> BodyEquation {
     terms.retain(|t| t.value != 0.0);
     let law = mechanism.friction(body).forward;
     let (index, symbols, inertia) = match body {
-        DRIVE => ("1", ["φ̈₁", "φ̇₁", "φ₁"], ("J₁", stage.drive_pulley.inertia)),
-        CART => ("", ["ẍ", "ẋ", "x"], ("M", stage.cart.mass)),
-        _ => ("2", ["φ̈₃", "φ̇₃", "φ₃"], ("J₂", stage.idler_pulley.inertia)),
+        DRIVE => ("1", ["φ̈₁", "φ̇₁", "φ₁"], ("J₁", machine.drive_pulley.inertia)),
+        CART => ("", ["ẍ", "ẋ", "x"], ("M", machine.cart.mass)),
+        _ => ("2", ["φ̈₃", "φ̇₃", "φ₃"], ("J₂", machine.idler_pulley.inertia)),
     };
     let parameters = if torque {
         vec![

@@ -53,7 +53,7 @@ fn speeds(widest: f64, steps: u32) -> (Vec<f64>, usize) {
 
 /// Eq. (14) and (15).
 pub fn laws(f: &Findings) -> [Plot; 2] {
-    let side = f.sets.table4.stage.cart.friction.forward;
+    let side = f.sets.table4.machine.cart.friction.forward;
     let (b, fc) = (side.viscous, side.coulomb);
     let (v, middle) = speeds(WIDEST, 200);
     let sided = |law: &dyn Fn(f64, f64) -> f64| -> Vec<f64> {
@@ -108,7 +108,7 @@ pub fn laws(f: &Findings) -> [Plot; 2] {
 
 /// Every friction law of the case file, as the solvers have it.
 pub fn beyond(f: &Findings) -> Plot {
-    let side = f.sets.table4.stage.cart.friction.forward;
+    let side = f.sets.table4.machine.cart.friction.forward;
     let (b, fc, fb) = (side.viscous, side.coulomb, side.coulomb + STATIC);
     let velocity = velocity_of_decay(DECAY);
     let stribeck = |shape| Law::Stribeck { velocity, shape };

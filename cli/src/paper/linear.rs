@@ -2,15 +2,15 @@
 
 use super::model::{PULSE, UNTIL};
 use nalgebra::{Complex, SMatrix, SVector, linalg::Schur};
+use taut::machine::Machine;
 use taut::mechanism::Mode;
-use taut::stage::Stage;
 
 /// A of eq. (5), with the state of eq. (6).
 pub type Matrix = SMatrix<f64, 6, 6>;
 
 /// A and b of the equations that run, without dry friction: φ₁, φ₁′, x, x′, φ₃, φ₃′.
-pub fn matrices(stage: &Stage) -> (Matrix, SVector<f64, 6>) {
-    let mechanism = stage.mechanism();
+pub fn matrices(machine: &Machine) -> (Matrix, SVector<f64, 6>) {
+    let mechanism = machine.mechanism();
     let equations = mechanism.equations(Mode::of([]));
     let mut a = Matrix::zeros();
     let mut b = SVector::<f64, 6>::zeros();
@@ -28,14 +28,14 @@ pub fn matrices(stage: &Stage) -> (Matrix, SVector<f64, 6>) {
 }
 
 /// A of eq. (7), entry by entry as printed, or with −b/M where +b/M is printed.
-pub fn printed(stage: &Stage, sign_corrected: bool) -> Matrix {
-    let r2 = stage.pulley_radius.powi(2);
-    let [k1, k2, k3] = stage.belt.stiffness;
-    let (j1, j2, m) = (stage.drive_pulley.inertia, stage.idler_pulley.inertia, stage.cart.mass);
+pub fn printed(machine: &Machine, sign_corrected: bool) -> Matrix {
+    let r2 = machine.pulley_radius.powi(2);
+    let [k1, k2, k3] = machine.belt.stiffness;
+    let (j1, j2, m) = (machine.drive_pulley.inertia, machine.idler_pulley.inertia, machine.cart.mass);
     let viscous = |law: &taut::friction::Friction| law.forward.viscous;
-    let (b1, b2) = (viscous(&stage.drive_pulley.friction), viscous(&stage.idler_pulley.friction));
-    let b = viscous(&stage.cart.friction) * if sign_corrected { -1.0 } else { 1.0 };
-    let motor = &stage.motor;
+    let (b1, b2) = (viscous(&machine.drive_pulley.friction), viscous(&machine.idler_pulley.friction));
+    let b = viscous(&machine.cart.friction) * if sign_corrected { -1.0 } else { 1.0 };
+    let motor = &machine.motor;
     let back_emf = motor.torque_constant * motor.back_emf_constant / (motor.resistance * j1);
     #[rustfmt::skip]
     let a = Matrix::from_row_slice(&[
@@ -140,18 +140,18 @@ pub const NEAREST: f64 = 0.05;
 impl Linear {
     /// Computes it.
     pub fn new(sets: &super::model::Sets) -> Self {
-        let stages = [&sets.table1.stage, &sets.table2.stage, &sets.table4.stage];
-        let all = stages.map(|stage| poles(&matrices(stage).0));
+        let stages = [&sets.table1.machine, &sets.table2.machine, &sets.table4.machine];
+        let all = stages.map(|machine| poles(&matrices(machine).0));
         let slowest = |poles: &[Complex<f64>]| {
             poles.iter().filter(|p| p.im == 0.0 && p.re < -1e-3).map(|p| p.re).fold(f64::NEG_INFINITY, f64::max)
         };
-        let rigid = |stage: &Stage| {
-            let r2 = stage.pulley_radius.powi(2);
-            let inertia = stage.drive_pulley.inertia + stage.idler_pulley.inertia + stage.cart.mass * r2;
-            -total_viscous(stage) / inertia
+        let rigid = |machine: &Machine| {
+            let r2 = machine.pulley_radius.powi(2);
+            let inertia = machine.drive_pulley.inertia + machine.idler_pulley.inertia + machine.cart.mass * r2;
+            -total_viscous(machine) / inertia
         };
         let rightmost = |a: &Matrix| poles(a).first().map_or(f64::NAN, |p| p.re);
-        let both = |signed: bool| [stages[0], stages[1]].map(|stage| rightmost(&printed(stage, signed)));
+        let both = |signed: bool| [stages[0], stages[1]].map(|machine| rightmost(&printed(machine, signed)));
         let first = stages[0];
         let r = first.pulley_radius;
         let (a, b) = matrices(first);
@@ -174,24 +174,24 @@ impl Linear {
 }
 
 /// B₁ + B₂ + b r² + K_t K_e/R, N m s: all that resists in proportion to speed.
-fn total_viscous(stage: &Stage) -> f64 {
+fn total_viscous(machine: &Machine) -> f64 {
     let b = |law: &taut::friction::Friction| law.forward.viscous;
-    let motor = &stage.motor;
-    b(&stage.drive_pulley.friction)
-        + b(&stage.idler_pulley.friction)
-        + b(&stage.cart.friction) * stage.pulley_radius.powi(2)
+    let motor = &machine.motor;
+    b(&machine.drive_pulley.friction)
+        + b(&machine.idler_pulley.friction)
+        + b(&machine.cart.friction) * machine.pulley_radius.powi(2)
         + motor.torque_constant * motor.back_emf_constant / motor.resistance
 }
 
 /// The modes with spans 1 and 2 as long as the cart's place makes them; their stiffness times length stays.
-fn travel(stage: &Stage) -> Vec<(f64, [f64; 2])> {
+fn travel(machine: &Machine) -> Vec<(f64, [f64; 2])> {
     let middle = super::belt::INCHES.0;
-    let product = stage.belt.stiffness[0] * middle;
+    let product = machine.belt.stiffness[0] * middle;
     let count = 120;
     (0..=count)
         .map(|i| {
             let l1 = NEAREST + (middle - NEAREST) * 2.0 * f64::from(i) / f64::from(count);
-            let mut moved = stage.clone();
+            let mut moved = machine.clone();
             moved.belt.stiffness[0] = product / l1;
             moved.belt.stiffness[1] = product / (2.0 * middle - l1);
             let modes = oscillations(&poles(&matrices(&moved).0));

@@ -10,7 +10,7 @@ pub fn statements(f: &Findings) -> Vec<Claim> {
     let mut all = vec![
         Claim::new("pitch-diameter", Statement, "section 2.2", "60 grooves of 2.03 mm: \"a pitch diameter of 38.8 mm\"")
             .decide("pitch diameter from 60 grooves of 2.03 mm", 2.0 * b.radius, "m", near(38.8e-3, 0.05e-3))
-            .further("the tables' radius, doubled", 2.0 * f.sets.table1.stage.pulley_radius, "m", near(38.8e-3, 0.05e-3)),
+            .further("the tables' radius, doubled", 2.0 * f.sets.table1.machine.pulley_radius, "m", near(38.8e-3, 0.05e-3)),
         Claim::new("composite-modulus", Statement, "section 2.3.1, Table 1", "2/3 neoprene and 1/3 fibreglass: E = 16.67e9 N/m²")
             .decide("2/3 · 6e6 + 1/3 · 50e9", b.composite, "Pa", near(16.67e9, 0.005e9)),
         Claim::new("toothed-section", Statement, "section 2.3.1, eq. (12)–(13)",

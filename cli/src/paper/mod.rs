@@ -80,11 +80,11 @@ fn write(folder: &Folder, common: &Common, findings: &Findings, plots: &[Plot]) 
     }
     let figures = folder.path("figures");
     folder.make("figures")?;
-    let stage = &findings.sets.table4.stage;
+    let machine = &findings.sets.table4.machine;
     let drawings = [
-        ("figure-01-02", taut_report::stage_drawing(&findings.sets.table1.stage)),
-        ("figure-18", diagrams::drive_pulley(stage)),
-        ("figure-19", diagrams::whole(stage)),
+        ("figure-01-02", taut_report::stage_drawing(&findings.sets.table1.machine)),
+        ("figure-18", diagrams::drive_pulley(machine)),
+        ("figure-19", diagrams::whole(machine)),
     ];
     drawings.par_iter().try_for_each(|(name, svg)| picture(&figures, name, svg, common.png))?;
     plots.par_iter().try_for_each(|plot| picture(&figures, &plot.file, &plot.figure.svg(), common.png))

@@ -3,9 +3,9 @@
 use taut::case::{Case, Experiment, Initial};
 use taut::error::Result;
 use taut::friction::{Friction, Motion, Side};
+use taut::machine::Machine;
 use taut::signal::Signal;
 use taut::solve::{Event, Solver, simulate};
-use taut::stage::Stage;
 
 /// Length of the pulses, s (section 3).
 pub const PULSE: f64 = 0.25;
@@ -145,20 +145,21 @@ pub fn pulse(volts: f64, every: f64) -> Experiment {
 }
 
 /// The stage's response to a pulse, by the exact solver.
-pub fn respond(stage: &Stage, volts: f64) -> Result<Response> {
-    run(stage, &pulse(volts, EVERY), Solver::Exact)
+pub fn respond(machine: &Machine, volts: f64) -> Result<Response> {
+    run(machine, &pulse(volts, EVERY), Solver::Exact)
 }
 
 /// Any run, in the paper's terms.
-pub fn run(stage: &Stage, experiment: &Experiment, solver: Solver) -> Result<Response> {
-    let solution = simulate(stage, experiment, solver)?;
-    let r = stage.pulley_radius;
+pub fn run(machine: &Machine, experiment: &Experiment, solver: Solver) -> Result<Response> {
+    let solution = simulate(machine, experiment, solver)?;
+    let r = machine.pulley_radius;
     let column = |name: &str| solution.trajectory.get(name).unwrap_or_default().to_vec();
     let metres = |name: &str| column(name).into_iter().map(|angle| r * angle).collect();
     let (speed, cart_speed): (Vec<f64>, Vec<f64>) = (metres("drive_speed"), column("cart_speed"));
     let idler_speed: Vec<f64> = metres("idler_speed");
     // Inertias as masses on the belt: J₁/r², M, J₂/r².
-    let [m1, m2, m3] = [stage.drive_pulley.inertia / (r * r), stage.cart.mass, stage.idler_pulley.inertia / (r * r)];
+    let [m1, m2, m3] =
+        [machine.drive_pulley.inertia / (r * r), machine.cart.mass, machine.idler_pulley.inertia / (r * r)];
     let mean = |((a, b), c): ((&f64, &f64), &f64)| (m1 * a + m2 * b + m3 * c) / (m1 + m2 + m3);
     Ok(Response {
         time: column("time"),
@@ -199,38 +200,38 @@ impl Change {
     }
 
     /// The stage with that parameter times `factor`.
-    pub fn apply(self, stage: &Stage, factor: f64) -> Stage {
-        let mut stage = stage.clone();
+    pub fn apply(self, machine: &Machine, factor: f64) -> Machine {
+        let mut machine = machine.clone();
         match self {
-            Change::Stiffness => stage.belt.stiffness = stage.belt.stiffness.map(|k| k * factor),
+            Change::Stiffness => machine.belt.stiffness = machine.belt.stiffness.map(|k| k * factor),
             Change::PulleyInertia | Change::AllInertia => {
-                stage.drive_pulley.inertia *= factor;
-                stage.idler_pulley.inertia *= factor;
+                machine.drive_pulley.inertia *= factor;
+                machine.idler_pulley.inertia *= factor;
                 if self == Change::AllInertia {
-                    stage.cart.mass *= factor;
+                    machine.cart.mass *= factor;
                 }
             }
             Change::Friction => {
-                for law in frictions(&mut stage) {
+                for law in frictions(&mut machine) {
                     *law = scaled(law, factor);
                 }
             }
         }
-        stage
+        machine
     }
 }
 
 /// Everything that resists or drives times `factor`: no voltage-to-position response can tell (P7).
-pub fn scale_everything(stage: &Stage, factor: f64) -> Stage {
-    let mut stage =
-        Change::Friction.apply(&Change::AllInertia.apply(&Change::Stiffness.apply(stage, factor), factor), factor);
-    stage.motor.torque_constant *= factor;
-    stage
+pub fn scale_everything(machine: &Machine, factor: f64) -> Machine {
+    let mut machine =
+        Change::Friction.apply(&Change::AllInertia.apply(&Change::Stiffness.apply(machine, factor), factor), factor);
+    machine.motor.torque_constant *= factor;
+    machine
 }
 
 /// The friction laws of the three bodies.
-pub fn frictions(stage: &mut Stage) -> [&mut Friction; 3] {
-    [&mut stage.drive_pulley.friction, &mut stage.cart.friction, &mut stage.idler_pulley.friction]
+pub fn frictions(machine: &mut Machine) -> [&mut Friction; 3] {
+    [&mut machine.drive_pulley.friction, &mut machine.cart.friction, &mut machine.idler_pulley.friction]
 }
 
 fn scaled(law: &Friction, factor: f64) -> Friction {

@@ -123,10 +123,10 @@ impl Report<'_> {
     fn parameters(&mut self) {
         let f = self.f;
         let page = &mut *self.page;
-        page.section("The stage and its parameters");
+        page.section("The machine and its parameters");
         page.drawing(
-            &stage_drawing(&f.sets.table1.stage),
-            html! { b { "Figures 1 and 2. " } "The stage as it is modelled, with the values of Table 1. \
+            &stage_drawing(&f.sets.table1.machine),
+            html! { b { "Figures 1 and 2. " } "The machine as it is modelled, with the values of Table 1. \
             Rotation and position count positive in the sense of the arrows." },
         );
         page.prose(
@@ -134,8 +134,8 @@ impl Report<'_> {
              Table 2 is Table 1 with \
              other stiffness, friction and inertia:",
         );
-        let ratio = |pick: fn(&taut::stage::Stage) -> f64| {
-            taut::number::engineering(pick(&f.sets.table2.stage) / pick(&f.sets.table1.stage), "", 4)
+        let ratio = |pick: fn(&taut::machine::Machine) -> f64| {
+            taut::number::engineering(pick(&f.sets.table2.machine) / pick(&f.sets.table1.machine), "", 4)
         };
         page.definitions([
             (
@@ -242,7 +242,7 @@ impl Report<'_> {
         let m = &self.f.matched;
         self.page.section("A linear set against two voltages");
         self.page.prose(format!(
-            "A linear stage goes exactly twice as far for twice the voltage; here {} times. With the \
+            "A linear machine goes exactly twice as far for twice the voltage; here {} times. With the \
              friction of Table 4 it goes {} times as far. \
              No linear set can therefore agree with Table 4 at both voltages.",
             significant(m.ratio.0, 5),
@@ -272,11 +272,11 @@ impl Report<'_> {
         self.page.subsection("The equations that run");
         self.page.prose("The gains are read from the solver's own equations, with the values of Table 4.");
         self.page.drawing(
-            &diagrams::drive_pulley(&f.sets.table4.stage),
+            &diagrams::drive_pulley(&f.sets.table4.machine),
             html! { b { "Figure 18. " } "Equation (16), the drive pulley." },
         );
         self.page.drawing(
-            &diagrams::whole(&f.sets.table4.stage),
+            &diagrams::whole(&f.sets.table4.machine),
             html! { b { "Figure 19. " } "The whole: motor, drive pulley, cart and idler pulley, equations \
             (4) and (16)–(18)." },
         );

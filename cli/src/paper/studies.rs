@@ -6,8 +6,8 @@ use super::model::{
 use rayon::prelude::*;
 use taut::error::Result;
 use taut::friction::Friction;
+use taut::machine::Machine;
 use taut::solve::{Method, Solver, simulate};
-use taut::stage::Stage;
 
 /// The factors by which parameters are varied.
 pub const FACTORS: [f64; 2] = [2.0, 0.5];
@@ -66,25 +66,26 @@ pub struct Runs {
 impl Runs {
     /// Runs them all.
     pub fn new(sets: &Sets) -> Result<Self> {
-        let both =
-            |stage: &Stage| -> Result<[Response; 2]> { Ok([respond(stage, VOLTS[0])?, respond(stage, VOLTS[1])?]) };
+        let both = |machine: &Machine| -> Result<[Response; 2]> {
+            Ok([respond(machine, VOLTS[0])?, respond(machine, VOLTS[1])?])
+        };
         let (table1, table2, table4) =
-            (both(&sets.table1.stage)?, both(&sets.table2.stage)?, both(&sets.table4.stage)?);
+            (both(&sets.table1.machine)?, both(&sets.table2.machine)?, both(&sets.table4.machine)?);
         let mut jobs = Vec::new();
-        for (from, stage, base) in
-            [(From::Table1, &sets.table1.stage, &table1), (From::Table4, &sets.table4.stage, &table4)]
+        for (from, machine, base) in
+            [(From::Table1, &sets.table1.machine, &table1), (From::Table4, &sets.table4.machine, &table4)]
         {
             for change in Change::ALL {
                 for factor in FACTORS {
                     for (volts, base) in VOLTS.into_iter().zip(base) {
-                        jobs.push((from, stage, base, change, factor, volts));
+                        jobs.push((from, machine, base, change, factor, volts));
                     }
                 }
             }
         }
         let effects = jobs
             .into_par_iter()
-            .map(|(from, stage, base, change, factor, volts)| effect(from, stage, base, change, factor, volts))
+            .map(|(from, machine, base, change, factor, volts)| effect(from, machine, base, change, factor, volts))
             .collect::<Result<_>>()?;
         Ok(Self { table1, table2, table4, effects })
     }
@@ -100,8 +101,8 @@ impl Runs {
     }
 }
 
-fn effect(from: From, stage: &Stage, base: &Response, change: Change, factor: f64, volts: f64) -> Result<Effect> {
-    let response = respond(&change.apply(stage, factor), volts)?;
+fn effect(from: From, machine: &Machine, base: &Response, change: Change, factor: f64, volts: f64) -> Result<Effect> {
+    let response = respond(&change.apply(machine, factor), volts)?;
     let relative = |f: fn(&Response) -> f64| f(&response) / f(base) - 1.0;
     Ok(Effect {
         from,
@@ -171,7 +172,7 @@ const STEPS: [f64; 4] = [1e-3, 1e-4, 1e-5, 1e-6];
 impl Table3 {
     /// Runs it.
     pub fn new(sets: &Sets) -> Result<Self> {
-        let stage = &sets.table4.stage;
+        let machine = &sets.table4.machine;
         let mut jobs = Vec::new();
         for method in [Method::RungeKutta4, Method::DormandPrince5] {
             for step in STEPS {
@@ -184,7 +185,7 @@ impl Table3 {
             .into_par_iter()
             .rev()
             .map(|(method, step, volts)| {
-                let response = run(stage, &pulse(volts, 1e-3), Solver::Table3 { step, method })?;
+                let response = run(machine, &pulse(volts, 1e-3), Solver::Table3 { step, method })?;
                 let half = response.position[response.row(0.5)];
                 let late = &response.speed[response.row(0.35)..];
                 Ok(Frozen {
@@ -199,31 +200,31 @@ impl Table3 {
             })
             .collect::<Result<_>>()?;
         runs.reverse();
-        let exact = |volts: f64| run(stage, &pulse(volts, 1e-3), Solver::Exact);
+        let exact = |volts: f64| run(machine, &pulse(volts, 1e-3), Solver::Exact);
         let (five, ten) = (exact(VOLTS[0])?, exact(VOLTS[1])?);
-        let motor = &stage.motor;
+        let motor = &machine.motor;
         let torque = motor.torque_constant / motor.resistance * VOLTS[0];
-        let (j, coulomb) = (stage.drive_pulley.inertia, stage.drive_pulley.friction.forward.coulomb);
+        let (j, coulomb) = (machine.drive_pulley.inertia, machine.drive_pulley.friction.forward.coulomb);
         Ok(Self {
             runs,
-            exact_creep: rest_motion(stage, VOLTS[0])?.max(rest_motion(stage, VOLTS[1])?),
+            exact_creep: rest_motion(machine, VOLTS[0])?.max(rest_motion(machine, VOLTS[1])?),
             time: five.time,
             exact: [five.position, ten.position],
-            band_edge: 0.01 * stage.pulley_radius * 0.5 * UNTIL,
+            band_edge: 0.01 * machine.pulley_radius * 0.5 * UNTIL,
             start: (torque / j, (torque - coulomb) / j),
         })
     }
 }
 
 /// How far any position still moves after the last body has come to rest, m (exact solver).
-fn rest_motion(stage: &Stage, volts: f64) -> Result<f64> {
-    let solution = simulate(stage, &pulse(volts, EVERY), Solver::Exact)?;
+fn rest_motion(machine: &Machine, volts: f64) -> Result<f64> {
+    let solution = simulate(machine, &pulse(volts, EVERY), Solver::Exact)?;
     let stop = solution.outcome.events.last().map_or(f64::NAN, |e| e.time);
     let time = solution.trajectory.get("time").unwrap_or_default();
     let Some(first) = time.iter().position(|t| *t > stop) else { return Ok(f64::NAN) };
     let mut most: f64 = 0.0;
     for (name, factor) in
-        [("drive_angle", stage.pulley_radius), ("cart_position", 1.0), ("idler_angle", stage.pulley_radius)]
+        [("drive_angle", machine.pulley_radius), ("cart_position", 1.0), ("idler_angle", machine.pulley_radius)]
     {
         let values = &solution.trajectory.get(name).unwrap_or_default()[first..];
         most = values.iter().map(|v| factor * (v - values[0]).abs()).fold(most, f64::max);
@@ -269,17 +270,17 @@ impl Identifiability {
     /// Computes it.
     pub fn new(sets: &Sets, runs: &Runs) -> Result<Self> {
         const FACTOR: f64 = 3.7;
-        let stage = &sets.table4.stage;
-        let r = stage.pulley_radius;
+        let machine = &sets.table4.machine;
+        let r = machine.pulley_radius;
         let mut scaled: f64 = 0.0;
         for (volts, base) in VOLTS.into_iter().zip(&runs.table4) {
-            scaled = scaled.max(respond(&scale_everything(stage, FACTOR), volts)?.position_distance(base));
+            scaled = scaled.max(respond(&scale_everything(machine, FACTOR), volts)?.position_distance(base));
         }
         let law = |f: &Friction| (f.forward.viscous, f.forward.coulomb);
         let ((b1, t1), (b, fc), (b2, t2)) =
-            (law(&stage.drive_pulley.friction), law(&stage.cart.friction), law(&stage.idler_pulley.friction));
+            (law(&machine.drive_pulley.friction), law(&machine.cart.friction), law(&machine.idler_pulley.friction));
         let (viscous, coulomb) = (b1 + b2 + b * r * r, t1 + t2 + r * fc);
-        let motor = &stage.motor;
+        let motor = &machine.motor;
         // Shares of drive pulley, cart and idler pulley in the two totals.
         let shares: [(&'static str, [f64; 3], [f64; 3]); 3] = [
             ("viscous friction at the cart alone", [0.0, 1.0, 0.0], [t1 / coulomb, r * fc / coulomb, t2 / coulomb]),
@@ -288,12 +289,12 @@ impl Identifiability {
         ];
         let sharing = shares
             .into_par_iter()
-            .map(|(name, v, c)| sharing(name, stage, runs, (viscous, v), (coulomb, c)))
+            .map(|(name, v, c)| sharing(name, machine, runs, (viscous, v), (coulomb, c)))
             .collect::<Result<_>>()?;
-        let mut gear = stage.clone();
+        let mut gear = machine.clone();
         gear.motor.gear_ratio = 5.9;
         let start = t1 * motor.resistance / motor.torque_constant;
-        let below = respond_to_step(stage, 0.98 * start)?;
+        let below = respond_to_step(machine, 0.98 * start)?;
         Ok(Self {
             factor: FACTOR,
             scaled,
@@ -309,29 +310,29 @@ impl Identifiability {
 }
 
 /// How far r φ₁ gets in 1 s under a constant voltage, m.
-fn respond_to_step(stage: &Stage, volts: f64) -> Result<f64> {
+fn respond_to_step(machine: &Machine, volts: f64) -> Result<f64> {
     let mut experiment = pulse(volts, EVERY);
     experiment.input = taut::signal::Signal::Step { value: volts, at: 0.0 };
-    let response = run(stage, &experiment, Solver::Exact)?;
+    let response = run(machine, &experiment, Solver::Exact)?;
     Ok(response.position.iter().map(|x| x.abs()).fold(0.0, f64::max))
 }
 
 fn sharing(
     name: &'static str,
-    stage: &Stage,
+    machine: &Machine,
     runs: &Runs,
     (viscous, v): (f64, [f64; 3]),
     (coulomb, c): (f64, [f64; 3]),
 ) -> Result<Sharing> {
-    let r = stage.pulley_radius;
+    let r = machine.pulley_radius;
     let shared = |p: f64, q: f64| {
-        let mut stage = stage.clone();
+        let mut machine = machine.clone();
         // At the cart a torque T is a force T/r, and B a coefficient B/r².
         let arm = [1.0, r, 1.0];
-        for (i, law) in frictions(&mut stage).into_iter().enumerate() {
+        for (i, law) in frictions(&mut machine).into_iter().enumerate() {
             *law = Friction::symmetric(p * viscous * v[i] / (arm[i] * arm[i]), q * coulomb * c[i] / arm[i]);
         }
-        stage
+        machine
     };
     let respond_both = |p: f64, q: f64| -> Result<[Response; 2]> {
         Ok([respond(&shared(p, q), VOLTS[0])?, respond(&shared(p, q), VOLTS[1])?])

@@ -5,14 +5,14 @@ use super::findings::Findings;
 use super::model::VOLTS;
 use super::studies::{Effect, From};
 use super::words::{signed, symbols};
+use taut::machine::Machine;
 use taut::number::{engineering, significant};
 use taut::solve::Method;
-use taut::stage::Stage;
 use taut_report::{Cell, Table};
 
 /// Tables 1, 2 and 4: the printed symbol, ours, and what runs.
 pub fn parameters(f: &Findings) -> Table {
-    type Pick = fn(&Stage) -> f64;
+    type Pick = fn(&Machine) -> f64;
     let rows: [(&str, &str, &str, &str, Pick); 16] = [
         ("R", "r", "drive_pulley.radius", "m", |s| s.pulley_radius),
         ("k_1", "k_1", "belt.stiffness", "N/m", |s| s.belt.stiffness[0]),
@@ -50,7 +50,7 @@ pub fn parameters(f: &Findings) -> Table {
         ]);
     }
     for (printed, ours, key, si, pick) in rows {
-        let [t1, t2, t4] = [&f.sets.table1, &f.sets.table2, &f.sets.table4].map(|case| pick(&case.stage));
+        let [t1, t2, t4] = [&f.sets.table1, &f.sets.table2, &f.sets.table4].map(|case| pick(&case.machine));
         table.row([
             symbols(&if printed == ours { printed.to_string() } else { format!("{printed} → {ours}") }).into(),
             maud::html! { small { code { (key) } } }.into(),

@@ -4,8 +4,8 @@ use super::run::Setting;
 use rayon::prelude::*;
 use taut::case::Experiment;
 use taut::chance::quantile;
+use taut::machine::Machine;
 use taut::solve::{self, Ending, Flow};
-use taut::stage::Stage;
 use taut::trajectory::{Column, CsvWriter, Trajectory};
 use taut::{Error, Result};
 use taut_report::simulate::Band;
@@ -26,7 +26,7 @@ const QUANTITIES: [Quantity; 3] = [
 ];
 
 /// Evenly chosen ones of all machines.
-pub fn chosen(mut machines: Vec<Stage>, count: usize) -> Vec<Stage> {
+pub fn chosen(mut machines: Vec<Machine>, count: usize) -> Vec<Machine> {
     let all = machines.len();
     if count >= all {
         return machines;
@@ -41,10 +41,10 @@ pub fn chosen(mut machines: Vec<Stage>, count: usize) -> Vec<Stage> {
 }
 
 /// Runs the experiment with each machine, on all processors; none where it was interrupted.
-pub fn of(setting: &Setting, machines: &[Stage], experiment: &Experiment) -> Result<Option<Band>> {
+pub fn of(setting: &Setting, machines: &[Machine], experiment: &Experiment) -> Result<Option<Band>> {
     let every = experiment.samples().div_ceil(ROWS).max(1) as usize;
     let runs: Vec<Option<[Vec<f64>; 4]>> =
-        machines.par_iter().map(|stage| run(setting, stage, experiment, every)).collect::<Result<_>>()?;
+        machines.par_iter().map(|machine| run(setting, machine, experiment, every)).collect::<Result<_>>()?;
     if setting.interrupt.signal().is_some() {
         return Ok(None);
     }
@@ -76,17 +76,17 @@ pub fn write(band: &Band, setting: &Setting, experiment: &Experiment) -> Result<
 }
 
 /// Time and quantities of one machine, every so many rows; none where it does not reach the end.
-fn run(setting: &Setting, stage: &Stage, experiment: &Experiment, every: usize) -> Result<Option<[Vec<f64>; 4]>> {
+fn run(setting: &Setting, machine: &Machine, experiment: &Experiment, every: usize) -> Result<Option<[Vec<f64>; 4]>> {
     let mut columns: [Vec<f64>; 4] = Default::default();
     let mut row = 0;
-    let outcome = solve::stream(stage, experiment, setting.solver, &mut |block| {
+    let outcome = solve::stream(machine, experiment, setting.solver, &mut |block| {
         let column = |name: &str| block.get(name).unwrap_or(&[]);
         let (time, angle, position) = (column("time"), column("drive_angle"), column("cart_position"));
         for ((t, angle), position) in time.iter().zip(angle).zip(position) {
             if row % every == 0 {
                 columns[0].push(*t);
                 for ((_, _, value), column) in QUANTITIES.iter().zip(&mut columns[1..]) {
-                    column.push(value(*angle, *position, stage.pulley_radius));
+                    column.push(value(*angle, *position, machine.pulley_radius));
                 }
             }
             row += 1;

@@ -18,8 +18,8 @@ use std::path::Path;
 use taut::case::{Case, Files, Opened};
 use taut::files::Claim;
 use taut::json::{self, Simulation};
+use taut::machine::Machine;
 use taut::solve::{self, Ending, Solver};
-use taut::stage::Stage;
 use taut::{Error, Result};
 use taut_report::simulate::{Run, early_end, figures, hidden, named, page};
 
@@ -81,7 +81,7 @@ fn several(args: &Simulate) -> Outcome {
 
 fn axis(args: &Simulate, path: &Path, case: &Case) -> Outcome {
     let common = &args.common;
-    let solver = args.solver(&case.stage)?;
+    let solver = args.solver(&case.machine)?;
     let experiments = case.experiments_named(path, &args.experiments)?;
     if args.as_measured {
         measurable(case, solver, path)?;
@@ -149,7 +149,7 @@ fn names(
 }
 
 /// The machines of --draws.
-fn machines(case: &Case, args: &Simulate, path: &Path) -> Result<Vec<Stage>> {
+fn machines(case: &Case, args: &Simulate, path: &Path) -> Result<Vec<Machine>> {
     let Some(file) = &args.draws else { return Ok(Vec::new()) };
     let plan = case.fit.as_ref().ok_or_else(|| {
         Error::new("this case does not say which parameters were drawn")
@@ -161,7 +161,7 @@ fn machines(case: &Case, args: &Simulate, path: &Path) -> Result<Vec<Stage>> {
 
 /// Refuses to log what nobody measures, and what would not be the run.
 fn measurable(case: &Case, solver: Solver, path: &Path) -> Result<()> {
-    if case.stage.encoder.is_none() && case.measurement.is_none() {
+    if case.machine.encoder.is_none() && case.measurement.is_none() {
         return Err(Error::new("--as-measured: this case does not say how it is measured").in_file(path).next(
             "add [encoder] with for example at = \"motor\" and lines = 512, \
              or [measurement] with a quantity such as motor_current = { step = \"10 mA\" }",

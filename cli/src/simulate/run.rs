@@ -11,11 +11,11 @@ use std::time::Instant;
 use taut::Error;
 use taut::case::{Case, Experiment};
 use taut::fit::beside_log;
+use taut::machine::Machine;
 use taut::measure;
 use taut::metrics::Meter;
 use taut::reduction::Reduction;
 use taut::solve::{self, ErrorEstimate, Flow, Solver};
-use taut::stage::Stage;
 use taut::trajectory::{CsvWriter, Trajectory};
 use taut_report::simulate::{Curves, Run, Samples};
 
@@ -27,21 +27,21 @@ pub struct Setting<'a> {
     pub folder: Option<&'a Folder>,
     pub interrupt: &'a Interrupt,
     /// Machines drawn from a posterior.
-    pub machines: &'a [Stage],
+    pub machines: &'a [Machine],
 }
 
 impl<'a> Setting<'a> {
     /// Runs `experiment`.
     pub fn run(&self, experiment: &'a Experiment) -> std::result::Result<Run<'a>, Failure> {
         let begin = Instant::now();
-        let stage = &self.case.stage;
+        let machine = &self.case.machine;
         let mut writers = writers(self.folder, &experiment.file_name(), &self.args.format).map_err(Failure::work)?;
-        let mut meter = Meter::new(stage, experiment);
-        let mut curves = (self.folder.is_some() && !self.args.common.no_report).then(|| Curves::new(stage));
+        let mut meter = Meter::new(machine, experiment);
+        let mut curves = (self.folder.is_some() && !self.args.common.no_report).then(|| Curves::new(machine));
         let progress = Progress::new(&experiment.name, Some(experiment.samples()), self.args.common.quiet);
         let mut trouble: Option<Error> = None;
         let mut estimate = match self.solver {
-            Solver::General { tolerance } => Some((ErrorEstimate::new(stage, experiment), tolerance)),
+            Solver::General { tolerance } => Some((ErrorEstimate::new(machine, experiment), tolerance)),
             Solver::Exact | Solver::Table3 { .. } => None,
         };
 
@@ -56,10 +56,10 @@ impl<'a> Setting<'a> {
             progress.add(block.len() as u64);
             if trouble.is_some() || self.interrupt.signal().is_some() { Flow::Stop } else { Flow::Continue }
         };
-        let mut outcome = solve::stream_observed(stage, experiment, self.solver, &mut meter, &mut take)?;
+        let mut outcome = solve::stream_observed(machine, experiment, self.solver, &mut meter, &mut take)?;
         if let Some((estimate, tolerance)) = estimate {
             let mut go_on = || if self.interrupt.signal().is_some() { Flow::Stop } else { Flow::Continue };
-            outcome.error = estimate.finish(stage, experiment, tolerance, &outcome, &mut go_on)?;
+            outcome.error = estimate.finish(machine, experiment, tolerance, &outcome, &mut go_on)?;
         }
         progress.clear();
         if let Some(trouble) = trouble {
@@ -90,25 +90,25 @@ impl<'a> Setting<'a> {
         let took = begin.elapsed();
         let (mut reduction, mut log) = (None, None);
         if self.interrupt.signal().is_none() {
-            reduction = Reduction::of(stage, experiment, self.solver)?;
-            log = beside_log(stage, experiment);
+            reduction = Reduction::of(machine, experiment, self.solver)?;
+            log = beside_log(machine, experiment);
         }
-        let model = stage.belt.model;
+        let model = machine.belt.model;
         Ok(Run { experiment, outcome, metrics, curves, samples, band, log, model, reduction, files, took })
     }
 
     /// Runs it once more, as its recorder sees it, and writes the log.
     fn record(&self, experiment: &Experiment, folder: &Folder) -> std::result::Result<Samples, Failure> {
-        let Case { stage, measurement, .. } = self.case;
+        let Case { machine, measurement, .. } = self.case;
         let mut writer = CsvWriter::create(folder.path(log_name(experiment))).map_err(Failure::work)?;
-        let mut samples = Samples::new(stage);
+        let mut samples = Samples::new(machine);
         let mut trouble: Option<Error> = None;
         let mut take = |block: &Trajectory| {
             samples.take(block);
             trouble = writer.write(block).err();
             if trouble.is_some() || self.interrupt.signal().is_some() { Flow::Stop } else { Flow::Continue }
         };
-        measure::stream(stage, &measurement.clone().unwrap_or_default(), experiment, self.solver, &mut take)?;
+        measure::stream(machine, &measurement.clone().unwrap_or_default(), experiment, self.solver, &mut take)?;
         match trouble {
             Some(trouble) => Err(Failure::work(trouble)),
             None => writer.finish().map(|()| samples).map_err(Failure::work),

@@ -6,7 +6,7 @@ use taut::export::mechanism;
 use taut::mechanism::State;
 use taut::signal::Signal;
 use taut::signal::profile::Reference;
-use taut::solve::{Machine, Solver};
+use taut::solve::{Simulator, Solver};
 
 /// Steps of a run, and how long each is, s.
 pub const STEPS: usize = 1000;
@@ -50,7 +50,7 @@ pub fn pulse(value: f64, steps: usize) -> Commands {
 /// The ways of the bodies by taut's own solver.
 pub fn ways(case: &Opened, commands: &Commands) -> Ways {
     let mechanism = mechanism(case);
-    let mut machine = Machine::of_mechanism(&mechanism, &State::default(), Solver::Exact, STEP).unwrap();
+    let mut machine = Simulator::of_mechanism(&mechanism, &State::default(), Solver::Exact, STEP).unwrap();
     let levers: Vec<f64> = mechanism.bodies.iter().map(|body| body.kind.lever()).collect();
     let mut events = Vec::new();
     let mut ways = Vec::new();
@@ -87,7 +87,7 @@ const NOISE: [f64; 5] = [1e-9, 0.9e-6, 0.9e-3, 0.0, 0.0];
 /// The same as [`observed`] with references that never stand quite still.
 pub fn noisy(case: &Case, which: usize, seed: u64) -> Vec<([f64; 12], f64)> {
     let design = case.controller.as_ref().unwrap();
-    let mut own = Standard::new(design, &case.stage).unwrap();
+    let mut own = Standard::new(design, &case.machine).unwrap();
     let mut number = seed;
     let mut next = || {
         number = number.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
@@ -137,10 +137,10 @@ impl Controller for Watched {
 pub fn observed(case: &Case, which: usize) -> Vec<([f64; 12], f64)> {
     let design = case.controller.as_ref().unwrap();
     let one = &case.moves[which];
-    let mut watched = Watched { own: Standard::new(design, &case.stage).unwrap(), seen: Vec::new() };
+    let mut watched = Watched { own: Standard::new(design, &case.machine).unwrap(), seen: Vec::new() };
     let profile = one.reference(design);
     let timing = Loop::of(design);
-    close(&case.stage, &mut watched, &timing, &profile, one.until, one.window, Solver::of(&case.stage)).unwrap();
+    close(&case.machine, &mut watched, &timing, &profile, one.until, one.window, Solver::of(&case.machine)).unwrap();
     let flat = |seen: &Observation| {
         let five = |r: Reference| [r.position, r.speed, r.acceleration, r.jerk, r.snap];
         let mut all = [0.0; 12];

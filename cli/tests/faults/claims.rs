@@ -11,8 +11,8 @@ use tempfile::TempDir;
 
 fn cases() -> Files {
     let mut read = identification("", "", "").read;
-    for (name, stage) in [("table4.toml", "table4.toml"), ("pid.toml", "controllers/pid.toml")] {
-        read.insert(name.into(), fs::read(stages(stage)).unwrap());
+    for (name, machine) in [("table4.toml", "table4.toml"), ("pid.toml", "controllers/pid.toml")] {
+        read.insert(name.into(), fs::read(stages(machine)).unwrap());
     }
     read
 }

@@ -8,7 +8,7 @@ use taut::solve::{Solver, simulate};
 
 /// Input, cart and current of the experiment on the machine of the case.
 pub fn figure(case: &Case, found: &Designed) -> Result<Figure> {
-    let run = simulate(&case.stage, &found.experiment(), Solver::of(&case.stage))?.trajectory;
+    let run = simulate(&case.machine, &found.experiment(), Solver::of(&case.machine))?.trajectory;
     let column = |name: &str| run.get(name).unwrap_or_default().to_vec();
     let time = column("time");
     let input: Vec<f64> = time.iter().map(|&t| found.shape.signal().value(t)).collect();

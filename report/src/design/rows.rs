@@ -73,7 +73,7 @@ pub fn limits(found: &Designed) -> Vec<[String; 4]> {
 
 /// Outputs that are measured, and how well.
 pub fn measured(found: &Designed) -> String {
-    let one = |channel: &taut::stage::Channel| {
+    let one = |channel: &taut::machine::Channel| {
         let unit = channel.quantity.unit();
         let step = channel.step.map(|step| format!("in steps of {}", value(step, unit, 3)));
         let noise = (channel.noise > 0.0).then(|| format!("with a noise of {}", value(channel.noise, unit, 3)));

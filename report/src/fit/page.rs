@@ -193,7 +193,7 @@ fn table_of(page: &mut Page, fit: &Fit, quantity: Quantity) {
 fn residual(page: &mut Page, fit: &Fit) {
     let mut all = ResidualForce::default();
     for log in &fit.logs {
-        if let Some(own) = residual_force(&fit.stage, log) {
+        if let Some(own) = residual_force(&fit.machine, log) {
             all.join(&own);
         }
     }
@@ -205,7 +205,7 @@ fn residual(page: &mut Page, fit: &Fit) {
         page.figure(&figure);
     }
     let worst = plots::worst(&fit.logs, &fit.noise).into_iter();
-    if let Some((log, own)) = worst.filter_map(|log| Some((log, residual_force(&fit.stage, log)?))).next() {
+    if let Some((log, own)) = worst.filter_map(|log| Some((log, residual_force(&fit.machine, log)?))).next() {
         page.figure(&plots::residual_over_time(log, &own));
     }
 }

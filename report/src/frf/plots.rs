@@ -4,19 +4,19 @@ use crate::{Axis, Colour, Figure, Panel, Series, Style};
 use nalgebra::Complex;
 use std::f64::consts::PI;
 use taut::frf::{COHERENT, Measurement, Response};
-use taut::stage::Stage;
+use taut::machine::Machine;
 
 /// One for each response.
-pub fn figures(found: &Measurement, stage: &Stage) -> Vec<(String, Figure)> {
-    let one = |(k, response): (usize, &Response)| (format!("response-{}", k + 1), bode(response, stage));
+pub fn figures(found: &Measurement, machine: &Machine) -> Vec<(String, Figure)> {
+    let one = |(k, response): (usize, &Response)| (format!("response-{}", k + 1), bode(response, machine));
     found.responses.iter().enumerate().map(one).collect()
 }
 
-fn bode(one: &Response, stage: &Stage) -> Figure {
+fn bode(one: &Response, machine: &Machine) -> Figure {
     let frf = &one.frf;
-    let unit = match stage.amplifier.mode {
-        taut::stage::AmplifierMode::Voltage => "V",
-        taut::stage::AmplifierMode::Current => "A",
+    let unit = match machine.amplifier.mode {
+        taut::machine::AmplifierMode::Voltage => "V",
+        taut::machine::AmplifierMode::Current => "A",
     };
     let hertz: Vec<f64> = frf.points.iter().map(|point| point.omega / (2.0 * PI)).collect();
     let decibels = |value: f64| 20.0 * value.max(1e-300).log10();

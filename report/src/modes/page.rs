@@ -13,7 +13,7 @@ pub fn page(analysis: &Analysis, figures: &[Named]) -> Page {
     page.section("What was linearised");
     let head = if analysis.sticks { "While it slides" } else { "As it is" };
     page.callout(Callout::Note, head, analysis.words.join("; "));
-    page.drawing(&stage_drawing(&analysis.case.stage), "Symbols, values and positive directions.");
+    page.drawing(&stage_drawing(&analysis.case.machine), "Symbols, values and positive directions.");
     page.section("Poles");
     let mut rows = Table::new("").column("Where", "").column("What", "");
     for root in poles(analysis) {

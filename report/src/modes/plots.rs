@@ -28,7 +28,7 @@ pub fn figures(analysis: &Analysis) -> Vec<Named> {
 
 /// Magnitude and phase over frequency; angles and their rates as they are at the belt, so that the two can be compared.
 fn bode(analysis: &Analysis, title: &str, outputs: &[&str]) -> Option<Figure> {
-    let radius = analysis.case.stage.pulley_radius;
+    let radius = analysis.case.machine.pulley_radius;
     let unit = match outputs.first()? {
         name if name.contains("force") => "N",
         name if name.contains("speed") => "m/s",

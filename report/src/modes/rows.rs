@@ -4,8 +4,8 @@ use nalgebra::Complex;
 use std::f64::consts::PI;
 use taut::linear::Analysis;
 use taut::linear::{Root, Transfer};
+use taut::machine::BeltModel;
 use taut::number::engineering_typed;
-use taut::stage::BeltModel;
 
 /// Of each pole or pair, the slowest first.
 pub fn poles(analysis: &Analysis) -> Vec<Root> {
@@ -103,9 +103,9 @@ pub fn z(value: &Complex<f64>) -> String {
 
 /// Whether the stiffness or the friction of the stage depends on where the cart is, in words.
 pub fn along(analysis: &Analysis) -> &'static str {
-    let stage = &analysis.case.stage;
-    match (&analysis.travel, stage.belt.make) {
-        _ if stage.belt.model == BeltModel::Rigid => "a rigid belt has no spans that could change with the position",
+    let machine = &analysis.case.machine;
+    match (&analysis.travel, machine.belt.make) {
+        _ if machine.belt.model == BeltModel::Rigid => "a rigid belt has no spans that could change with the position",
         (Some(_), _) => "spans 1 and 2 follow the cart: k = A E / l with the length that is left",
         (None, Some(_)) => {
             "the same along the travel: this file's stiffness does not depend on the position \

@@ -9,10 +9,10 @@ use taut::control::drives::drive_gains;
 
 /// The page; `text` is the case that repeats the moves.
 pub fn page(tried: &Tried, text: &str, figures: &[Vec<Named>]) -> Page {
-    let words = controller(tried.design, &tried.case.stage);
+    let words = controller(tried.design, &tried.case.machine);
     let mut page = Page::new(tried.case.title.clone()).subtitle(format!("Moves in closed loop: {words}."));
     page.section("The stage");
-    page.drawing(&stage_drawing(&tried.case.stage), "Symbols, values and positive directions.");
+    page.drawing(&stage_drawing(&tried.case.machine), "Symbols, values and positive directions.");
     for (done, figures) in tried.done.iter().zip(figures) {
         page.section(&done.motion.name);
         if let Some(told) = early_end(&done.run.outcome.ending) {
@@ -26,7 +26,7 @@ pub fn page(tried: &Tried, text: &str, figures: &[Vec<Named>]) -> Page {
     page.section("Feed-forward for drives");
     page.prose("Of the axis as one mass going forward, as others name the gains and in their units.");
     let mut rows = Table::new("").column("System", "").column("Gain", "").column("Value", "").column("Unit", "");
-    for gain in drive_gains(&tried.case.stage) {
+    for gain in drive_gains(&tried.case.machine) {
         rows.row([Cell::from(gain.system), gain.name.into(), Cell::number(gain.value, 5), gain.unit.into()]);
     }
     page.table(&rows);

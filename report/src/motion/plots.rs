@@ -3,7 +3,7 @@
 use super::Done;
 use crate::simulate::{Named, decimator};
 use crate::{Axis, Colour, Decimator, Figure, Panel, Series, Style};
-use taut::stage::Stage;
+use taut::machine::Machine;
 use taut::trajectory::Trajectory;
 
 /// Columns that are shown; what ends on an angle or its speed is shown at the belt.
@@ -31,9 +31,9 @@ pub struct Curves {
 
 impl Curves {
     /// No points yet.
-    pub fn new(stage: &Stage) -> Self {
+    pub fn new(machine: &Machine) -> Self {
         let thinned = COLUMNS.iter().map(|_| decimator()).collect();
-        Self { radius: stage.pulley_radius, thinned, following: decimator(), scratch: Vec::new() }
+        Self { radius: machine.pulley_radius, thinned, following: decimator(), scratch: Vec::new() }
     }
 
     /// Takes the next rows.

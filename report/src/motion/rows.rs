@@ -6,9 +6,9 @@ use crate::simulate::{plain, time, value};
 use std::fmt::Write;
 use taut::control::sliding;
 use taut::design::{Design, FeedForwardModel, Structure};
+use taut::machine::rigid::Rigid;
+use taut::machine::{EncoderPlace, Machine};
 use taut::metrics::largest;
-use taut::stage::rigid::Rigid;
-use taut::stage::{EncoderPlace, Stage};
 
 /// A length in µm, in mm from 10 mm on.
 pub fn length(metres: f64) -> String {
@@ -19,7 +19,7 @@ pub fn length(metres: f64) -> String {
 }
 
 /// The controller in a line.
-pub fn controller(design: &Design, stage: &Stage) -> String {
+pub fn controller(design: &Design, machine: &Machine) -> String {
     let mut words = vec![design.structure.name().to_string()];
     match design.feed_forward.model {
         FeedForwardModel::None => {}
@@ -42,13 +42,13 @@ pub fn controller(design: &Design, stage: &Stage) -> String {
     }
     let timing = format!("every {}", time(design.every));
     words.push(if design.delay > 0.0 { format!("{timing}, delay {}", time(design.delay)) } else { timing });
-    words.push(match stage.encoder.map(|encoder| encoder.at) {
+    words.push(match machine.encoder.map(|encoder| encoder.at) {
         None => "measured exactly at the motor".into(),
         Some(at) => {
             let step = match at {
                 EncoderPlace::Cart => 1.0,
-                _ => stage.pulley_radius,
-            } / stage.encoder.map_or(1.0, |encoder| encoder.counts_per_unit(stage.motor.gear_ratio));
+                _ => machine.pulley_radius,
+            } / machine.encoder.map_or(1.0, |encoder| encoder.counts_per_unit(machine.motor.gear_ratio));
             let place = match at {
                 EncoderPlace::Motor => "motor",
                 EncoderPlace::DrivePulley => "drive pulley",
@@ -62,7 +62,7 @@ pub fn controller(design: &Design, stage: &Stage) -> String {
 
 /// The key figures of a move with their names.
 pub fn lines(tried: &Tried, done: &Done) -> Vec<(&'static str, String)> {
-    let (stage, run) = (&tried.case.stage, &done.run);
+    let (machine, run) = (&tried.case.machine, &done.run);
     let figures = &run.figures;
     let deviation = |d: &taut::control::Deviation| {
         format!("at most {} at {}, {} rms", length(d.peak.value), time(d.peak.time), length(d.rms))
@@ -74,7 +74,7 @@ pub fn lines(tried: &Tried, done: &Done) -> Vec<(&'static str, String)> {
         None => format!("not within {} until the end", length(done.motion.window)),
     };
     let mut held = format!("{} of {} samples", run.samples.1, run.samples.0);
-    if stage.amplifier.voltage_limit.is_some() || stage.amplifier.current_limit.is_some() {
+    if machine.amplifier.voltage_limit.is_some() || machine.amplifier.current_limit.is_some() {
         let _ = write!(held, "; the amplifier for {}", time(figures.amplifier_limited));
     }
     let mut lines = vec![
@@ -93,7 +93,7 @@ pub fn lines(tried: &Tried, done: &Done) -> Vec<(&'static str, String)> {
     ];
     if let Structure::SlidingMode(gains) = &tried.design.structure {
         let (speed, acceleration) = peaks(done);
-        let needed = sliding::required(gains, &Rigid::of(stage), 0.2, speed, acceleration);
+        let needed = sliding::required(gains, &Rigid::of(machine), 0.2, speed, acceleration);
         let verdict = if gains.reaching > needed { "holds" } else { "does not hold" };
         lines.push((
             "reaching",

@@ -37,7 +37,7 @@ pub fn page(case: &Opened, overview: &Overview, figures: &[Named]) -> Page {
     page.section("The machine");
     match case {
         Opened::Axis(case) => {
-            page.drawing(&stage_drawing(&case.stage), "Symbols, values and positive directions.");
+            page.drawing(&stage_drawing(&case.machine), "Symbols, values and positive directions.");
         }
         Opened::Gantry(case) => {
             page.drawing(

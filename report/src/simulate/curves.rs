@@ -1,7 +1,7 @@
 //! The curves of a run, thinned out as its rows come, so that a plot of any run needs the same memory.
 
 use crate::Decimator;
-use taut::stage::Stage;
+use taut::machine::Machine;
 use taut::trajectory::Trajectory;
 
 /// Points that a curve keeps: more than a plot has pixels.
@@ -69,8 +69,8 @@ pub struct Samples {
 
 impl Samples {
     /// No samples yet.
-    pub fn new(stage: &Stage) -> Self {
-        Self { radius: stage.pulley_radius, thinned: LOGGED.iter().map(|_| decimator()).collect() }
+    pub fn new(machine: &Machine) -> Self {
+        Self { radius: machine.pulley_radius, thinned: LOGGED.iter().map(|_| decimator()).collect() }
     }
 
     /// Takes the next rows of the log.
@@ -99,8 +99,8 @@ pub struct Curves {
 
 impl Curves {
     /// No points yet, of an axis.
-    pub fn new(stage: &Stage) -> Self {
-        Self::of(of_axis(stage.pulley_radius))
+    pub fn new(machine: &Machine) -> Self {
+        Self::of(of_axis(machine.pulley_radius))
     }
 
     /// The same of these curves.

@@ -19,10 +19,10 @@ use std::time::Duration;
 use taut::case::Experiment;
 use taut::fit::LogFit;
 use taut::json::{self, Simulated};
+use taut::machine::BeltModel;
 use taut::metrics::Metrics;
 use taut::reduction::Reduction;
 use taut::solve;
-use taut::stage::BeltModel;
 
 /// An experiment after it ran.
 pub struct Run<'a> {

@@ -17,7 +17,7 @@ const MOST_EVENTS: usize = 200;
 pub fn page(case: &Case, text: &str, solver: Solver, runs: &[Run], figures: &[Vec<Named>]) -> Page {
     let mut page = Page::new(case.title.clone()).subtitle(how(solver));
     page.section("The stage");
-    page.drawing(&stage_drawing(&case.stage), "Symbols, values and positive directions.");
+    page.drawing(&stage_drawing(&case.machine), "Symbols, values and positive directions.");
     for (run, figures) in runs.iter().zip(figures) {
         experiment(&mut page, run, figures, solver);
     }

@@ -5,7 +5,7 @@ use super::curves::{Curves, Samples};
 use super::marks;
 use crate::{Axis, Colour, Figure, Panel, Picture, Series, Style};
 use taut::case::Case;
-use taut::stage::AmplifierMode;
+use taut::machine::AmplifierMode;
 
 /// A figure and its name in file names.
 pub type Named = (&'static str, Figure);
@@ -18,7 +18,7 @@ pub fn figures(case: &Case, run: &Run) -> Vec<Named> {
     let plot = Plot { curves, samples: run.samples.as_ref() };
 
     let mut input = figure("input");
-    let commanded = case.stage.amplifier.mode == AmplifierMode::Current;
+    let commanded = case.machine.amplifier.mode == AmplifierMode::Current;
     if curves.get("input").is_some() {
         let axis = Axis::new("Input", if commanded { "A" } else { "V" });
         input = input.panel(plot.panel(axis, &[("input", "u")]));

@@ -3,12 +3,12 @@
 use super::Run;
 use super::band::Band;
 use crate::fit::outputs;
+use taut::machine::BeltModel;
 use taut::mechanism::Part;
 use taut::metrics::{Balance, Metrics, largest};
 use taut::number;
 use taut::reduction::Reduction;
 use taut::solve::{Cost, Ending, Event, Method, Outcome, PositionError, Solver, Tie};
-use taut::stage::BeltModel;
 
 /// A value with its unit for people, spaces and signs as a terminal and `grep` like them.
 pub fn value(value: f64, unit: &str) -> String {

@@ -46,7 +46,7 @@ fn frequency(work: &Work) -> Result<Vec<Named>> {
     let mut complementary = Panel::new(Axis::new("|T|", "").logarithmic());
     let (mut peak, mut last) = (f64::INFINITY, 0.0);
     for (name, verdict, corner, colour, style) in curves {
-        let feedback = Feedback::new(&verdict.design, &work.case.stage)?;
+        let feedback = Feedback::new(&verdict.design, &work.case.machine)?;
         let plant = tuned.family.plant(corner, &verdict.design, &feedback.corners())?;
         let open = loops(&plant, &feedback);
         let breaks = breaks(&feedback);
@@ -108,7 +108,7 @@ fn bode(work: &Work) -> Result<Figure> {
     let mut phase = Panel::new(Axis::new("Phase of L", "°"));
     let mut last = 0.0_f64;
     for (name, verdict, colour) in [("before", &tuned.before, Colour::Amber), ("after", &tuned.after, Colour::Blue)] {
-        let feedback = Feedback::new(&verdict.design, &work.case.stage)?;
+        let feedback = Feedback::new(&verdict.design, &work.case.machine)?;
         let plant = tuned.family.plant(&nominal, &verdict.design, &feedback.corners())?;
         let open = loops(&plant, &feedback);
         let hertz: Vec<f64> = plant.frequency.iter().map(|omega| omega / (2.0 * PI)).collect();
@@ -154,7 +154,7 @@ fn ways(work: &Work) -> Result<Vec<Way>> {
     let both = [("before", &work.tuned.before, Colour::Amber), ("after", &work.tuned.after, Colour::Blue)];
     let mut all = Vec::new();
     for (name, verdict, colour) in both.into_iter().filter(|(_, verdict, _)| verdict.nominal.stable) {
-        let feedback = Feedback::new(&verdict.design, &work.case.stage)?;
+        let feedback = Feedback::new(&verdict.design, &work.case.machine)?;
         let plant = work.tuned.family.plant(&nominal, &verdict.design, &feedback.corners())?;
         let way = loops(&plant, &feedback).iter().map(Open::reference_to_cart).collect();
         all.push((name, colour, plant.frequency, way));
@@ -232,7 +232,7 @@ fn step_response(frequency: &[f64], way: &[Complex<f64>], every: f64, until: f64
 
 /// The cart's error in a move, before and after, and the command.
 fn moved(work: &Work, motion: &Move) -> Result<Figure> {
-    let stage = &work.case.stage;
+    let stage = &work.case.machine;
     let mut error = Panel::new(Axis::new("Cart x − y", "m").shown_as("µm", 1e6)).weight(1.6);
     let mut command = Panel::new(Axis::new("Voltage", "V"));
     for (name, verdict, colour) in

@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::export::controller::{DERIVATIVES, program};
 use crate::export::program::{Expr, Node, Operator, Program, Statement, Test};
 use crate::export::shaper_remark;
-use crate::stage::Stage;
+use crate::machine::Machine;
 use std::fmt::Write;
 
 const HEADER: &str = include_str!("controller.h");
@@ -20,9 +20,9 @@ pub(super) struct Controller {
 }
 
 impl Controller {
-    pub(super) fn new(design: &Design, stage: &Stage) -> Result<Self> {
-        let unit = stage.amplifier.mode.unit();
-        Ok(Self { design: design.clone(), program: program(design, stage)?, unit })
+    pub(super) fn new(design: &Design, machine: &Machine) -> Result<Self> {
+        let unit = machine.amplifier.mode.unit();
+        Ok(Self { design: design.clone(), program: program(design, machine)?, unit })
     }
 
     pub(super) fn facts(&self) -> Vec<(String, String)> {

@@ -29,7 +29,7 @@ pub(super) fn named(case: &Opened, part: Part, (stem, name): (&str, &str), optio
     }
     if part.has_controller() {
         let (case, design) = super::controller(case)?;
-        let controller = controller::Controller::new(design, &case.stage)?;
+        let controller = controller::Controller::new(design, &case.machine)?;
         header += &controller.header(&writer);
         source += &controller.source(&writer);
         facts.extend(controller.facts());

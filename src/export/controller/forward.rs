@@ -3,12 +3,12 @@
 use super::Target;
 use crate::design::{Design, FeedForward, FeedForwardModel};
 use crate::export::program::{Expr, Program, Relation, Test, number, variable};
-use crate::stage::rigid::{REST_ACCELERATION, REST_SPEED, Rigid};
-use crate::stage::{AmplifierMode, BeltModel, EncoderPlace, Stage};
+use crate::machine::rigid::{REST_ACCELERATION, REST_SPEED, Rigid};
+use crate::machine::{AmplifierMode, BeltModel, EncoderPlace, Machine};
 
 /// Feed-forward of a model of the axis.
 pub(super) struct Forward<'s> {
-    stage: &'s Stage,
+    machine: &'s Machine,
     settings: FeedForward,
     pub(super) rigid: Rigid,
     before_belt: bool,
@@ -23,12 +23,12 @@ pub(super) struct Needed {
 }
 
 impl<'s> Forward<'s> {
-    pub(super) fn new(stage: &'s Stage, design: &Design) -> Self {
-        let at = stage.encoder.map_or(EncoderPlace::Motor, |encoder| encoder.at);
+    pub(super) fn new(machine: &'s Machine, design: &Design) -> Self {
+        let at = machine.encoder.map_or(EncoderPlace::Motor, |encoder| encoder.at);
         Self {
-            stage,
+            machine,
             settings: design.feed_forward,
-            rigid: Rigid::of(stage),
+            rigid: Rigid::of(machine),
             before_belt: at != EncoderPlace::Cart,
             before_gear: at == EncoderPlace::Motor,
         }
@@ -67,13 +67,13 @@ impl<'s> Forward<'s> {
 
     /// The command that makes the motor push with `force`, changing at `rate`, at `speed`.
     pub(super) fn command_of(&self, p: &mut Program, name: &str, force: Expr, rate: Expr, speed: Expr) -> Expr {
-        let motor = &self.stage.motor;
+        let motor = &self.machine.motor;
         let force = p.local(&format!("{name}_force"), force);
         let both = [motor.gear_efficiency, 1.0 / motor.gear_efficiency].map(|e| self.rigid.force_per_ampere * e);
         let per_ampere = self.per_ampere(p, name, &force, &speed, both);
         let current = p.local(&format!("{name}_current"), force / per_ampere.clone());
-        let gain = self.stage.amplifier.gain;
-        match self.stage.amplifier.mode {
+        let gain = self.machine.amplifier.gain;
+        match self.machine.amplifier.mode {
             AmplifierMode::Current => current / gain,
             // v = R i + L di/dt + K_e n φ̇
             AmplifierMode::Voltage => {
@@ -107,10 +107,10 @@ impl<'s> Forward<'s> {
 
     /// The motion of the pulleys with which the cart follows the reference `y`.
     pub(super) fn needed(&self, p: &mut Program, name: &str, y: &Target) -> Needed {
-        let stage = self.stage;
-        let r = stage.pulley_radius;
+        let machine = self.machine;
+        let r = machine.pulley_radius;
         let way = self.direction(p, name, y);
-        let [k1, k2] = match (stage.belt.make, stage.belt.follows_cart) {
+        let [k1, k2] = match (machine.belt.make, machine.belt.follows_cart) {
             (Some(make), true) => {
                 let (rigidity, [l1, l2, _]) = (make.section * make.modulus, make.spans);
                 // k₁ = A E/(l₁ − x), k₂ = A E/(l₂ + x)
@@ -119,29 +119,29 @@ impl<'s> Forward<'s> {
                     p.local(&format!("{name}_k2"), rigidity / (l2 + &y.position)),
                 ]
             }
-            _ => [number(stage.belt.stiffness[0]), number(stage.belt.stiffness[1])],
+            _ => [number(machine.belt.stiffness[0]), number(machine.belt.stiffness[1])],
         };
-        let k3 = number(stage.belt.stiffness[2]);
+        let k3 = number(machine.belt.stiffness[2]);
         let mut of = |what: &str, both: [f64; 2]| self.side(p, &format!("{name}_{what}"), &way, both);
-        let cart = [stage.cart.friction.forward, stage.cart.friction.backward];
+        let cart = [machine.cart.friction.forward, machine.cart.friction.backward];
         let (viscous, coulomb) = (of("cart_b", cart.map(|s| s.viscous)), of("cart_c", cart.map(|s| s.coulomb)));
-        let idler = [stage.idler_pulley.friction.forward, stage.idler_pulley.friction.backward];
+        let idler = [machine.idler_pulley.friction.forward, machine.idler_pulley.friction.backward];
         let (idler_b, idler_c) = (of("idler_b", idler.map(|s| s.viscous)), of("idler_c", idler.map(|s| s.coulomb)));
-        let drive = [stage.drive_pulley.friction.forward, stage.drive_pulley.friction.backward];
+        let drive = [machine.drive_pulley.friction.forward, machine.drive_pulley.friction.backward];
         let drive_b = of("drive_b", drive.map(|s| s.viscous / (r * r)));
         let drive_c = of("drive_c", drive.map(|s| s.coulomb));
         let Target { position, speed, acceleration, jerk, snap } = y;
         // L = f₁ − f₂ = M y″ + b y′ + F_c sgn y′ − F                             (17)
-        let mass = stage.cart.mass;
+        let mass = machine.cart.mass;
         let load = [
-            mass * acceleration + &viscous * speed + &coulomb * &way - number(stage.cart.constant_force()),
+            mass * acceleration + &viscous * speed + &coulomb * &way - number(machine.cart.constant_force()),
             mass * jerk + &viscous * acceleration,
             mass * snap + &viscous * jerk,
         ];
         let load: Vec<Expr> =
             load.into_iter().enumerate().map(|(j, load)| p.local(&format!("{name}_load{j}"), load)).collect();
         // P = f₂ − f₃ = (J₂ y″/r + B₂ y′/r + τ_c2 sgn y′)/r                      (18)
-        let inertia = stage.idler_pulley.inertia;
+        let inertia = machine.idler_pulley.inertia;
         let pull = [
             (inertia * acceleration / r + &idler_b * speed / r + &idler_c * &way) / r,
             (inertia * jerk / r + &idler_b * acceleration / r) / r,
@@ -155,7 +155,7 @@ impl<'s> Forward<'s> {
         let k = p.local(&format!("{name}_k"), k1 + &k2 * &k3 / both.clone());
         let stretch: Vec<Expr> = (0..3)
             .map(|j| {
-                let value = match stage.belt.model {
+                let value = match machine.belt.model {
                     BeltModel::Elastic => (load[j].clone() + &share * &pull[j]) / k.clone(),
                     BeltModel::TwoMass => &load[j] / &k,
                     BeltModel::Rigid => number(0.0),
@@ -164,7 +164,7 @@ impl<'s> Forward<'s> {
             })
             .collect();
         let behind: Vec<Expr> = (0..2)
-            .map(|j| match stage.belt.model {
+            .map(|j| match machine.belt.model {
                 BeltModel::Elastic => (&k3 * &stretch[j] - pull[j].clone()) / both.clone(),
                 BeltModel::TwoMass | BeltModel::Rigid => stretch[j].clone(),
             })
@@ -178,8 +178,8 @@ impl<'s> Forward<'s> {
             snap: snap.clone(),
         };
         // τ/r = ((J₁ + n² J_r) y₁″ + B₁ y₁′)/r² + τ_c1 sgn y′/r + L + P           (16)
-        let n = stage.motor.gear_ratio;
-        let own = (stage.drive_pulley.inertia + n * n * stage.motor.rotor_inertia) / (r * r);
+        let n = machine.motor.gear_ratio;
+        let own = (machine.drive_pulley.inertia + n * n * machine.motor.rotor_inertia) / (r * r);
         let force = own * &drive.acceleration
             + &drive_b * &drive.speed
             + &drive_c * &way / r
@@ -202,11 +202,11 @@ impl<'s> Forward<'s> {
         }
         let needed = self.needed(p, "target", y);
         let mut target = needed.drive;
-        if let Some(play) = self.stage.motor.gear_play.filter(|_| self.before_gear) {
+        if let Some(play) = self.machine.motor.gear_play.filter(|_| self.before_gear) {
             let way = variable("target_way");
-            let (r, n) = (self.stage.pulley_radius, self.stage.motor.gear_ratio);
+            let (r, n) = (self.machine.pulley_radius, self.machine.motor.gear_ratio);
             // The twist of the gear: T/k_g, and half the play.
-            let rotor = n * n * self.stage.motor.rotor_inertia * &target.acceleration / r;
+            let rotor = n * n * self.machine.motor.rotor_inertia * &target.acceleration / r;
             let torque = p.local("target_torque", r * &needed.force[0] - rotor);
             let twist = r * (torque / play.stiffness + 0.5 * play.backlash * &way);
             target.position = p.local("target_position", target.position + twist);

@@ -10,8 +10,8 @@ use crate::control::observer::DisturbanceState;
 use crate::control::{Standard, reads_scale};
 use crate::design::{Design, Filter};
 use crate::error::{Error, Result};
-use crate::stage::Stage;
-use crate::stage::rigid::Rigid;
+use crate::machine::Machine;
+use crate::machine::rigid::Rigid;
 use forward::Forward;
 use structure::Core;
 
@@ -38,7 +38,7 @@ impl Target {
 }
 
 /// The program of a design for a model of the axis. Errors: what no controller can be.
-pub(super) fn program(design: &Design, model: &Stage) -> Result<Program> {
+pub(super) fn program(design: &Design, model: &Machine) -> Result<Program> {
     // Designs that `taut move` refuses are refused here.
     Standard::new(design, model)?;
     if reads_scale(design, model) {
@@ -124,7 +124,7 @@ struct Observer {
 
 const OBSERVED: [&str; 3] = ["observed_position", "observed_speed", "observed_disturbance"];
 
-fn observer(p: &mut Program, design: &Design, model: &Stage) -> Result<Option<Observer>> {
+fn observer(p: &mut Program, design: &Design, model: &Machine) -> Result<Option<Observer>> {
     let Some(observer) = design.disturbance_observer else { return Ok(None) };
     let state = DisturbanceState::new(observer.bandwidth, &Rigid::of(model), design.every)
         .ok_or_else(|| Error::new("a disturbance observer cannot be made for this axis and sample time"))?;

@@ -8,8 +8,8 @@ use crate::control::state_feedback::{Law, StateFeedbackState};
 use crate::design::{Cascade, Design, Fuzzy, Pid, SlidingMode, Structure};
 use crate::error::{Error, Result};
 use crate::export::program::{Expr, Program, Relation, Test, number, variable};
-use crate::stage::Stage;
-use crate::stage::axis::{CART, IDLER};
+use crate::machine::Machine;
+use crate::machine::axis::{CART, IDLER};
 use std::f64::consts::PI;
 
 /// Samples that a command of a state feedback may wait for.
@@ -31,7 +31,7 @@ pub(super) struct Mass {
 }
 
 impl<'d> Core<'d> {
-    pub(super) fn new(design: &'d Design, model: &Stage) -> Result<Self> {
+    pub(super) fn new(design: &'d Design, model: &Machine) -> Result<Self> {
         let every = design.every;
         Ok(match &design.structure {
             Structure::Pid(gains) => Core::Pid(gains, every),
@@ -46,7 +46,7 @@ impl<'d> Core<'d> {
                 Core::StateFeedback(Box::new(law), Linear::of(model).states, model.pulley_radius)
             }
             Structure::SlidingMode(gains) => {
-                let rigid = crate::stage::rigid::Rigid::of(model);
+                let rigid = crate::machine::rigid::Rigid::of(model);
                 let mass = Mass { mass: rigid.mass, force_per_command: rigid.force_per_command() };
                 Core::SlidingMode(gains, every, mass)
             }

@@ -7,11 +7,11 @@ use crate::chance::hash;
 use crate::design::Design;
 use crate::error::{Error, Result};
 use crate::export::{controller, without_controller};
+use crate::machine::gantry::Gantry;
+use crate::machine::{Machine, axis};
 use crate::mechanism::{Amplifier, AmplifierMode, DRIVES, Drive, Heading, Label, Mechanism, Motor, Shown, State};
 use crate::parameter::{self, Free, Numbers, Parameter, unit_for};
 use crate::solve::{Dynamics, Quantity, check_stage};
-use crate::stage::gantry::Gantry;
-use crate::stage::{Stage, axis};
 
 /// Where the references of each group begin: they stay when another group grows. Zero is time.
 const INPUTS: u32 = 1;
@@ -23,8 +23,8 @@ const CONDITIONS: u32 = 5000;
 
 /// The machine itself.
 #[derive(Debug, Clone)]
-enum Machine {
-    Axis(Box<Stage>),
+enum Owned {
+    Axis(Box<Machine>),
     Gantry(Box<Gantry>),
 }
 
@@ -51,7 +51,7 @@ pub struct Model {
     pub conditions: usize,
     /// The bodies on which a force can be put.
     pub loads: Vec<usize>,
-    machine: Machine,
+    machine: Owned,
     start: State,
     parameters: Vec<(Free, &'static Parameter)>,
 }
@@ -69,8 +69,8 @@ impl Model {
         let case = Opened::from_text_with("machine.toml", text, &[])?;
         let [until, every] = resource::times(&case);
         let (machine, design) = match &case {
-            Opened::Axis(case) => (Machine::Axis(Box::new(case.stage.clone())), case.controller.clone()),
-            Opened::Gantry(case) => (Machine::Gantry(Box::new(case.gantry.clone())), None),
+            Opened::Axis(case) => (Owned::Axis(Box::new(case.machine.clone())), case.controller.clone()),
+            Opened::Gantry(case) => (Owned::Gantry(Box::new(case.gantry.clone())), None),
         };
         if with_controller && design.is_none() {
             let missing = controller(&case).map(|_| ());
@@ -117,10 +117,10 @@ impl Model {
     }
 
     /// The axis with these parameters, where it is one.
-    pub fn stage(&self, parameters: &[f64]) -> Option<Stage> {
+    pub fn stage(&self, parameters: &[f64]) -> Option<Machine> {
         match self.set(parameters) {
-            Machine::Axis(stage) => Some(*stage),
-            Machine::Gantry(_) => None,
+            Owned::Axis(stage) => Some(*stage),
+            Owned::Gantry(_) => None,
         }
     }
 
@@ -134,13 +134,13 @@ impl Model {
             }
         }
         let mechanism = match self.set(parameters) {
-            Machine::Axis(stage) => {
+            Owned::Axis(stage) => {
                 check_stage(&stage)?;
                 let mut mechanism = stage.mechanism();
                 mechanism.drives.push(push(axis::CART));
                 mechanism
             }
-            Machine::Gantry(gantry) => {
+            Owned::Gantry(gantry) => {
                 gantry.check()?;
                 gantry.mechanism()
             }
@@ -167,16 +167,16 @@ impl Model {
     /// number of a body.
     pub fn force_input(&self, load: usize) -> Option<usize> {
         match self.machine {
-            Machine::Axis(_) => Some(1 + load),
-            Machine::Gantry(_) => None,
+            Owned::Axis(_) => Some(1 + load),
+            Owned::Gantry(_) => None,
         }
     }
 
     /// The drives of the machine itself.
     pub fn drives(&self) -> usize {
         match self.machine {
-            Machine::Axis(_) => 1,
-            Machine::Gantry(_) => DRIVES,
+            Owned::Axis(_) => 1,
+            Owned::Gantry(_) => DRIVES,
         }
     }
 
@@ -225,7 +225,7 @@ impl Model {
         self.quantities.iter().map(|(quantity, _)| of(quantity)).collect()
     }
 
-    fn set(&self, parameters: &[f64]) -> Machine {
+    fn set(&self, parameters: &[f64]) -> Owned {
         let mut machine = self.machine.clone();
         let changed = self.parameters.iter().zip(parameters).filter(|((free, _), value)| free.start != **value);
         let changed: Vec<(&Free, f64)> = changed.map(|((free, _), value)| (free, *value)).collect();
@@ -238,8 +238,8 @@ impl Model {
     /// The unit of what the amplifiers take.
     fn input_unit(&self) -> &'static str {
         match &self.machine {
-            Machine::Axis(stage) => stage.amplifier.mode.unit(),
-            Machine::Gantry(gantry) => gantry.amplifiers[0].mode.unit(),
+            Owned::Axis(stage) => stage.amplifier.mode.unit(),
+            Owned::Gantry(gantry) => gantry.amplifiers[0].mode.unit(),
         }
     }
 
@@ -373,18 +373,18 @@ impl Model {
 
 const SIDES: [&str; DRIVES] = ["left", "right"];
 
-impl Machine {
+impl Owned {
     fn numbers(&self) -> &dyn Numbers {
         match self {
-            Machine::Axis(stage) => &**stage,
-            Machine::Gantry(gantry) => &**gantry,
+            Owned::Axis(stage) => &**stage,
+            Owned::Gantry(gantry) => &**gantry,
         }
     }
 
     fn numbers_mut(&mut self) -> &mut dyn Numbers {
         match self {
-            Machine::Axis(stage) => &mut **stage,
-            Machine::Gantry(gantry) => &mut **gantry,
+            Owned::Axis(stage) => &mut **stage,
+            Owned::Gantry(gantry) => &mut **gantry,
         }
     }
 }

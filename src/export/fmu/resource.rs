@@ -63,7 +63,7 @@ fn at_rest(case: &Opened) -> Item {
         table
     };
     match case {
-        Opened::Axis(case) => value(step(case.stage.amplifier.mode.unit())),
+        Opened::Axis(case) => value(step(case.machine.amplifier.mode.unit())),
         Opened::Gantry(case) => {
             let mut table = toml_edit::InlineTable::new();
             for (side, amplifier) in ["left", "right"].into_iter().zip(&case.gantry.amplifiers) {

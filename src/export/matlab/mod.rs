@@ -82,7 +82,7 @@ fn variables(case: &Opened, tables: &Tables, step: f64) -> Result<Vec<(&'static 
         ("outputs_first", whole(&packed.outputs)),
     ];
     if let Opened::Axis(case) = case {
-        let system = StateSpace::of(&case.stage, Operation::default())?;
+        let system = StateSpace::of(&case.machine, Operation::default())?;
         let matrix = |m: &nalgebra::DMatrix<f64>| {
             Variable::Numbers(m.row_iter().map(|row| row.iter().copied().collect()).collect())
         };

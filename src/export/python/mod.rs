@@ -5,7 +5,7 @@ use super::{Exported, Options, STEP, Tables, mechanism};
 use crate::case::Opened;
 use crate::error::Result;
 use crate::linear::{Operation, StateSpace};
-use crate::stage::Stage;
+use crate::machine::Machine;
 use std::fmt::{Debug, Write};
 
 const SCRIPT: &str = include_str!("model.py");
@@ -15,7 +15,7 @@ pub(super) fn export(case: &Opened, stem: &str, options: &Options) -> Result<Exp
     let tables = Tables::new(&mechanism(case))?;
     let packed = Packed::new(&tables);
     let linear = match case {
-        Opened::Axis(case) => linear(&case.stage)?,
+        Opened::Axis(case) => linear(&case.machine)?,
         Opened::Gantry(_) => "None".into(),
     };
     let mut text = SCRIPT.replace("@tables@", lists(&tables, &packed).trim_end()).replace("@linear@", &linear);
@@ -72,8 +72,8 @@ fn lists(tables: &Tables, packed: &Packed) -> String {
     text
 }
 
-fn linear(stage: &Stage) -> Result<String> {
-    let system = StateSpace::of(stage, Operation::default())?;
+fn linear(machine: &Machine) -> Result<String> {
+    let system = StateSpace::of(machine, Operation::default())?;
     let rows = |m: &nalgebra::DMatrix<f64>| -> Vec<Vec<f64>> {
         m.row_iter().map(|row| row.iter().copied().collect()).collect()
     };

@@ -18,8 +18,8 @@ pub(super) fn export(case: &Opened, part: Option<Part>, stem: &str) -> Result<Ex
             .in_file("--part")
             .next("leave --part out; `taut export fmu` has the machine"));
     }
-    let program = program(design, &case.stage)?;
-    let unit = case.stage.amplifier.mode.unit();
+    let program = program(design, &case.machine)?;
+    let unit = case.machine.amplifier.mode.unit();
     let lead = design.feed_forward.lead.unwrap_or(design.delay + 0.5 * design.every);
     let read = program.read_inputs();
     let inputs = program.inputs.iter().filter(|input| read.contains(&input.name));

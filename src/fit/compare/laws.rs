@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use crate::fit::run::is_position;
 use crate::friction::Friction;
 use crate::log::Quantity;
-use crate::stage::Stage;
+use crate::machine::Machine;
 use std::path::Path;
 use toml_edit::{Array, DocumentMut, InlineTable, Item, Value};
 
@@ -124,7 +124,7 @@ pub(super) fn with(
     plan: &Plan,
     law: FrictionLaw,
     sided: bool,
-    from: &Stage,
+    from: &Machine,
 ) -> Result<(Case, Plan)> {
     let body = body(plan);
     let friction = if body == "cart" { from.cart.friction } else { from.drive_pulley.friction };
@@ -262,8 +262,8 @@ fn table(
             keys.extend(others.map(|k| format!("along.{k}.factor")));
         }
         FrictionLaw::LuGre => {
-            let stiffness = coulomb / BEND * if body == "cart" { 1.0 } else { case.stage.pulley_radius };
-            let mass = if body == "cart" { case.stage.cart.mass } else { case.stage.drive_pulley.inertia };
+            let stiffness = coulomb / BEND * if body == "cart" { 1.0 } else { case.machine.pulley_radius };
+            let mass = if body == "cart" { case.machine.cart.mass } else { case.machine.drive_pulley.inertia };
             let mut own = InlineTable::new();
             own.insert("stiffness", Value::from(stiffness));
             own.insert("damping", Value::from((stiffness * mass).sqrt()));
@@ -322,7 +322,7 @@ fn rewrite(
 
 /// The greatest speed of the cart that the logs show, m/s, roughly.
 fn fastest(case: &Case) -> f64 {
-    let r = case.stage.pulley_radius;
+    let r = case.machine.pulley_radius;
     let logs = case.experiments.iter().filter_map(|experiment| experiment.log.as_ref());
     let speeds = logs.flat_map(|log| {
         log.outputs.iter().map(move |output| {
@@ -348,7 +348,7 @@ fn over_travel(case: &Case) -> impl Iterator<Item = f64> {
 
 /// Where the cart is in the logs, m.
 fn travel(case: &Case) -> (f64, f64) {
-    let r = case.stage.pulley_radius;
+    let r = case.machine.pulley_radius;
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
     for log in case.experiments.iter().filter_map(|experiment| experiment.log.as_ref()) {
         for output in log.outputs.iter().filter(|output| is_position(output.quantity)) {
@@ -374,20 +374,20 @@ mod tests {
         let text = format!("{TEMPLATE}\n[fit]\nfree = [\"cart.friction.coulomb\"]\n");
         let case = Case::from_text("axis.toml", &text).unwrap();
         let plan = Plan { free: vec!["cart.friction.coulomb".into()], ..Plan::default() };
-        let coulomb = case.stage.cart.friction.forward.coulomb;
+        let coulomb = case.machine.cart.friction.forward.coulomb;
         for (law, key, ends) in [
             (FrictionLaw::LuGre, "cart.friction.static", [1.0, 4.0]),
             (FrictionLaw::Stribeck, "cart.friction.stribeck.force", [0.0, 3.0]),
         ] {
-            let (own, plan) = with(&case, "axis.toml".as_ref(), &plan, law, false, &case.stage).unwrap();
+            let (own, plan) = with(&case, "axis.toml".as_ref(), &plan, law, false, &case.machine).unwrap();
             assert_eq!(own.fit.as_ref().map(|own| own.bounds.clone()), Some(plan.bounds.clone()));
-            let free = Free::new(&own.stage, key, &[], &plan.bounds).unwrap();
+            let free = Free::new(&own.machine, key, &[], &plan.bounds).unwrap();
             assert_eq!([free.low, free.high], ends.map(|end| end * coulomb));
         }
         // Bounds that are given stand alone.
         let key = "cart.friction.static".to_string();
         let given = Plan { bounds: vec![(key.clone(), [0.0, 9.0 * coulomb])], ..plan };
-        let (own, plan) = with(&case, "axis.toml".as_ref(), &given, FrictionLaw::LuGre, false, &case.stage).unwrap();
-        assert_eq!(Free::new(&own.stage, &key, &[], &plan.bounds).unwrap().high, 9.0 * coulomb);
+        let (own, plan) = with(&case, "axis.toml".as_ref(), &given, FrictionLaw::LuGre, false, &case.machine).unwrap();
+        assert_eq!(Free::new(&own.machine, &key, &[], &plan.bounds).unwrap().high, 9.0 * coulomb);
     }
 }

@@ -23,8 +23,8 @@ use super::told;
 use crate::case::{Case, Files, Plan};
 use crate::error::{Error, Result};
 use crate::log::Quantity;
+use crate::machine::Machine;
 use crate::solve::Flow;
-use crate::stage::Stage;
 use parts::{Fold, Parts};
 use std::path::Path;
 
@@ -160,14 +160,14 @@ pub fn compare(
         .next("give four logs or more, or leave `loop` out of [fit]"));
     }
     let mut course = Course { case, name, plan, parts, stop, work: Work::default(), tried: Vec::new() };
-    let mut from = case.stage.clone();
+    let mut from = case.machine.clone();
     let mut laws = setting.laws.clone();
     laws.sort_by_key(|law| FrictionLaw::ALL.iter().position(|own| own == law));
     laws.dedup();
     for law in laws {
         let sided = law == FrictionLaw::Asymmetric || (law.is_above() && course.is_sided_better());
         let (own, searched) = laws::with(case, name, plan, law, sided, &from)?;
-        let mut start = own.stage.clone();
+        let mut start = own.machine.clone();
         let windows = match law.is_curved() {
             true => course.best_window().map_or(setting.windows.clone(), |window| vec![window]),
             false => setting.windows.clone(),
@@ -178,12 +178,12 @@ pub fn compare(
                 return Err(Error::new("interrupted before all laws were compared"));
             }
             let found = course.try_one(&own, &searched, told, &start);
-            if let Some(stage) = found {
+            if let Some(machine) = found {
                 // A law without dry friction leads where a cart with it stands still.
                 if window == setting.windows[0] && !law.is_above() && law != FrictionLaw::Viscous {
-                    from = stage.clone();
+                    from = machine.clone();
                 }
-                start = stage;
+                start = machine;
             }
         }
     }
@@ -209,7 +209,7 @@ struct Tried {
     training: Vec<(Quantity, f64)>,
     case: Case,
     /// The machine of the case's text, where its search did not begin.
-    given: Stage,
+    given: Machine,
     plan: Plan,
 }
 
@@ -222,16 +222,16 @@ impl Tried {
 
 impl Course<'_> {
     /// Fits a candidate to all logs and to all but a part; the machine of the fit to all.
-    fn try_one(&mut self, case: &Case, plan: &Plan, mut candidate: Candidate, start: &Stage) -> Option<Stage> {
+    fn try_one(&mut self, case: &Case, plan: &Plan, mut candidate: Candidate, start: &Machine) -> Option<Machine> {
         let plan = Plan { windows: candidate.window, starts: 1, ..plan.clone() };
-        let (given, case) = (case.stage.clone(), Case { stage: start.clone(), ..case.clone() });
-        let (mut errors, mut training, mut stage) = (Vec::new(), Vec::new(), None);
+        let (given, case) = (case.machine.clone(), Case { machine: start.clone(), ..case.clone() });
+        let (mut errors, mut training, mut machine) = (Vec::new(), Vec::new(), None);
         match self.whole(&case, &plan) {
-            Ok((own, met)) => (stage, training) = (Some(own), met),
+            Ok((own, met)) => (machine, training) = (Some(own), met),
             Err(error) => candidate.failed = Some(error.what),
         }
-        if let Some(stage) = &stage {
-            let near = Case { stage: stage.clone(), ..case.clone() };
+        if let Some(machine) = &machine {
+            let near = Case { machine: machine.clone(), ..case.clone() };
             for part in 0..self.parts.folds.len() {
                 match self.fold(&near, &plan, part) {
                     Ok(found) => errors.push(found),
@@ -243,11 +243,11 @@ impl Course<'_> {
             }
         }
         self.tried.push(Tried { candidate, errors, training, case, given, plan });
-        stage
+        machine
     }
 
     /// The fit to all logs, and its errors over whole logs with their starts fitted.
-    fn whole(&mut self, case: &Case, plan: &Plan) -> Result<(Stage, Vec<(Quantity, f64)>)> {
+    fn whole(&mut self, case: &Case, plan: &Plan) -> Result<(Machine, Vec<(Quantity, f64)>)> {
         let found = search_as_far(case, plan, self.stop, &compared(STEPS), &mut |_, _| Flow::Continue)?;
         self.work.add(&found.work);
         let stages = found.problem.stages(&found.best.x);
@@ -267,12 +267,12 @@ impl Course<'_> {
         let own = Case { experiments: fitted.clone(), ..case.clone() };
         let found = search_as_far(&own, &plan, self.stop, &compared(STEPS_IN_PART), &mut |_, _| Flow::Continue)?;
         self.work.add(&found.work);
-        let stage = found.problem.stage_at(&found.best.x);
+        let machine = found.problem.stage_at(&found.best.x);
         let known = known(&found);
         let held = Case { experiments: held_out.clone(), ..case.clone() };
         let scored = Plan { windows: None, nuisance: plan.nuisance, ..nothing(&plan) };
         let logs: Vec<_> =
-            Problem::new(&held, &scored)?.runs.iter().map(|run| met(run, &stage, &known, BEGIN)).collect();
+            Problem::new(&held, &scored)?.runs.iter().map(|run| met(run, &machine, &known, BEGIN)).collect();
         let errors = together(&logs, |_| String::new());
         Ok(errors.iter().map(|one| (one.quantity, one.rmse.powi(2) * one.count as f64, one.count)).collect())
     }
@@ -366,7 +366,8 @@ impl Course<'_> {
             let changes: Vec<&str> = change.iter().map(String::as_str).collect();
             let text = without_windows(&case.text);
             let read = Case::from_text_for(self.name, &text, &changes, Files::Nothing)?;
-            case = Case { experiments: self.case.experiments.clone(), unread: Vec::new(), stage: case.stage, ..read };
+            case =
+                Case { experiments: self.case.experiments.clone(), unread: Vec::new(), machine: case.machine, ..read };
         }
         let found = search_near(&case, &own.given, &plan, self.stop, &mut |_, _| Flow::Continue)?;
         self.work.add(&found.work);

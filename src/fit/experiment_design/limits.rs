@@ -3,9 +3,9 @@
 use super::Request;
 use crate::case::{Case, Experiment, Initial};
 use crate::error::{Error, Result};
+use crate::machine::{AmplifierMode, Machine, Travel};
 use crate::signal::Signal;
 use crate::solve::{Bench, Detail, Ending, Flow};
-use crate::stage::{AmplifierMode, Stage, Travel};
 
 /// Where a limit comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -66,7 +66,7 @@ impl Reached {
 
 impl Limits {
     pub(super) fn new(case: &Case, request: &Request) -> Result<Self> {
-        let amplifier = &case.stage.amplifier;
+        let amplifier = &case.machine.amplifier;
         let seen = seen(case);
         let most = |of: fn(&Reached) -> f64| {
             seen.iter().map(of).filter(|value| *value > 0.0).reduce(f64::max).map(|value| (value, Origin::Experiments))
@@ -89,7 +89,7 @@ impl Limits {
                 .next("ask for less with --amplitude: beyond its limit the amplifier gives a constant"));
         }
         let current = asked(request.current).or(amplifier.current_limit.map(|limit| (limit, Origin::Machine)));
-        let own = case.stage.travel.map(|Travel { min, max, .. }| (max - min, Origin::Machine));
+        let own = case.machine.travel.map(|Travel { min, max, .. }| (max - min, Origin::Machine));
         if let (Some((length, _)), Some(asked)) = (own, request.travel)
             && asked > length
         {
@@ -100,7 +100,7 @@ impl Limits {
             Error::new("nothing limits the way of the cart: the case has no [travel] and no experiment")
                 .next("say how far it may go with --travel \"0.4 m\", or add [travel] with min and max")
         })?;
-        let middle = case.stage.travel.map(|travel| 0.5 * (travel.min + travel.max));
+        let middle = case.machine.travel.map(|travel| 0.5 * (travel.min + travel.max));
         Ok(Self { input, current, travel, middle, margin: request.margin })
     }
 
@@ -114,7 +114,7 @@ impl Limits {
 
 /// A machine that the cart does not leave: how far it goes is looked at afterwards. Spans that follow the cart need
 /// their travel.
-pub(super) fn unbounded(stage: &Stage) -> Stage {
+pub(super) fn unbounded(stage: &Machine) -> Machine {
     let mut stage = stage.clone();
     if !stage.belt.follows_cart {
         stage.travel = None;
@@ -124,7 +124,7 @@ pub(super) fn unbounded(stage: &Stage) -> Stage {
 
 /// How far the case's own experiments go; those that do not get to their end are left out.
 fn seen(case: &Case) -> Vec<Reached> {
-    let stage = unbounded(&case.stage);
+    let stage = unbounded(&case.machine);
     let one = |experiment: &Experiment| {
         reach(&stage, &experiment.input, experiment.initial, experiment.every, experiment.until)
     };
@@ -132,7 +132,7 @@ fn seen(case: &Case) -> Vec<Reached> {
 }
 
 /// How far an input goes on a machine; none where the run does not get to its end.
-pub(super) fn reach(stage: &Stage, input: &Signal, initial: Initial, every: f64, until: f64) -> Option<Reached> {
+pub(super) fn reach(stage: &Machine, input: &Signal, initial: Initial, every: f64, until: f64) -> Option<Reached> {
     let mut reached = Reached { positions: [f64::INFINITY, f64::NEG_INFINITY], ..Reached::default() };
     let experiment = Experiment { name: String::new(), input: input.clone(), until, every, initial, log: None };
     let mut bench = Bench::default();

@@ -30,7 +30,7 @@ use super::problem::{Problem, Stop, parameters};
 use crate::case::{Case, Plan};
 use crate::error::{Error, Result};
 use crate::log::Quantity;
-use crate::stage::{Channel, EncoderPlace, Measurement};
+use crate::machine::{Channel, EncoderPlace, Measurement};
 
 /// Length of an experiment that nothing else is said of, s.
 pub const DURATION: f64 = 4.0;
@@ -184,7 +184,7 @@ impl<'a> Task<'a> {
         }
         case.complete()?;
         let plan = plan_of(case, request)?;
-        let all: Vec<String> = parameters(&case.stage, &plan, &[])?.into_iter().map(|free| free.name).collect();
+        let all: Vec<String> = parameters(&case.machine, &plan, &[])?.into_iter().map(|free| free.name).collect();
         let named = request.names.iter().map(|name| {
             all.iter()
                 .position(|own| own == name || own.split(" = ").any(|key| key == name))
@@ -258,12 +258,12 @@ fn measured(case: &Case, request: &Request) -> Result<Vec<Channel>> {
         return Ok(request.measured.clone());
     }
     let mut all = Vec::new();
-    if let Some(encoder) = case.stage.encoder {
+    if let Some(encoder) = case.machine.encoder {
         let quantity = match encoder.at {
             EncoderPlace::Motor | EncoderPlace::DrivePulley => Quantity::DriveAngle,
             EncoderPlace::Cart => Quantity::CartPosition,
         };
-        let step = Some(1.0 / encoder.counts_per_unit(case.stage.motor.gear_ratio));
+        let step = Some(1.0 / encoder.counts_per_unit(case.machine.motor.gear_ratio));
         all.push(Channel { quantity, step, noise: 0.0, range: None });
     }
     let of_recorder = case.measurement.iter().flat_map(|Measurement { channels, .. }| channels.iter().copied());

@@ -10,8 +10,8 @@ use crate::error::{Error, Result};
 use crate::fit::cmaes;
 use crate::fit::least_squares::Differences;
 use crate::fit::problem::parameters;
+use crate::machine::{Channel, Machine};
 use crate::signal::Signal;
-use crate::stage::{Channel, Stage};
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
 
@@ -255,14 +255,14 @@ fn refined(task: &Task, kind: Kind, from: &[f64], score: f64, tried: &mut usize)
 }
 
 /// The machine with each free parameter off to either side.
-fn doubtful(task: &Task) -> Result<Vec<Stage>> {
+fn doubtful(task: &Task) -> Result<Vec<Machine>> {
     if task.doubt == 0.0 {
         return Ok(Vec::new());
     }
     let mut all = Vec::new();
-    for free in parameters(&task.case.stage, &task.plan, &[])? {
+    for free in parameters(&task.case.machine, &task.plan, &[])? {
         for factor in [1.0 - task.doubt, 1.0 + task.doubt] {
-            let mut stage = task.case.stage.clone();
+            let mut stage = task.case.machine.clone();
             free.set(&mut stage, (factor * free.start).clamp(free.low, free.high));
             all.push(stage);
         }
@@ -272,7 +272,7 @@ fn doubtful(task: &Task) -> Result<Vec<Stage>> {
 
 impl Task<'_> {
     /// An input that keeps the limits on all of these machines, too, and what it surely tells.
-    fn finally(&self, shape: Shape, doubtful: &[Stage]) -> Option<Judged> {
+    fn finally(&self, shape: Shape, doubtful: &[Machine]) -> Option<Judged> {
         let (shape, initial, reached) = self.fitted(shape, doubtful)?;
         // What does not break away tells nothing.
         if reached.speed == 0.0 {
@@ -308,7 +308,7 @@ impl Task<'_> {
             undetermined: known.groups.iter().map(|group| (group.clone(), known.choices(problem, group))).collect(),
             name,
             shape,
-            unit: case.stage.amplifier.mode.unit(),
+            unit: case.machine.amplifier.mode.unit(),
             duration: self.duration,
             every: self.every,
             initial,

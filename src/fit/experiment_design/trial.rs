@@ -9,9 +9,9 @@ use crate::chance::{hash, normal};
 use crate::fit::least_squares::{Differences, Residuals};
 use crate::fit::problem::Problem;
 use crate::log::{Log, Output, Quantity};
+use crate::machine::{Channel, Machine};
 use crate::signal::{Hold, Signal};
 use crate::solve::{Bench, Detail, Ending, Flow};
-use crate::stage::{Channel, Stage};
 use crate::trajectory::{Grid, Trajectory};
 use nalgebra::DMatrix;
 use rand_pcg::Pcg64;
@@ -24,31 +24,31 @@ const SMALLER: usize = 8;
 impl Task<'_> {
     /// Where an input begins so that its way is in the middle of the travel, and how far it goes; none where the run
     /// does not get to its end.
-    pub(super) fn placed(&self, stage: &Stage, input: &Signal) -> Option<(Initial, Reached)> {
-        let stage = unbounded(stage);
+    pub(super) fn placed(&self, machine: &Machine, input: &Signal) -> Option<(Initial, Reached)> {
+        let machine = unbounded(machine);
         let at = |x: f64| {
-            let angle = x / stage.pulley_radius;
+            let angle = x / machine.pulley_radius;
             Initial { cart_position: x, drive_angle: angle, idler_angle: angle, ..Initial::default() }
         };
         let mut initial = at(self.limits.middle.unwrap_or(0.0));
-        let mut reached = reach(&stage, input, initial, self.every, self.duration)?;
+        let mut reached = reach(&machine, input, initial, self.every, self.duration)?;
         if let Some(middle) = self.limits.middle {
             let off = 0.5 * (reached.positions[0] + reached.positions[1]) - middle;
             initial = at(round(initial.cart_position - off));
-            reached = reach(&stage, input, initial, self.every, self.duration)?;
+            reached = reach(&machine, input, initial, self.every, self.duration)?;
         }
         Some((initial, reached))
     }
 
     /// The input with an amplitude that keeps the limits, as it is or smaller; none where that is not found.
-    pub(super) fn fitted(&self, shape: Shape, stages: &[Stage]) -> Option<(Shape, Initial, Reached)> {
+    pub(super) fn fitted(&self, shape: Shape, stages: &[Machine]) -> Option<(Shape, Initial, Reached)> {
         let mut shape = shape;
         for _ in 0..SMALLER {
             let signal = shape.signal();
-            let (initial, reached) = self.placed(&self.case.stage, &signal)?;
+            let (initial, reached) = self.placed(&self.case.machine, &signal)?;
             let mut used = self.limits.used(&reached);
-            for stage in stages {
-                let reached = reach(&unbounded(stage), &signal, initial, self.every, self.duration)?;
+            for machine in stages {
+                let reached = reach(&unbounded(machine), &signal, initial, self.every, self.duration)?;
                 used = used.max(self.limits.used(&reached));
             }
             // Four digits.
@@ -71,7 +71,7 @@ impl Task<'_> {
             Experiment { name: name.to_string(), input: input.clone(), until, every: self.every, initial, log: None };
         let mut columns: Vec<Vec<f64>> = vec![Vec::new(); self.measured.len()];
         let mut bench = Bench::default();
-        bench.mount(&self.case.stage).ok()?;
+        bench.mount(&self.case.machine).ok()?;
         let outcome = bench.run(&experiment, Detail::Full, &mut |block| {
             for (column, channel) in columns.iter_mut().zip(&self.measured) {
                 column.extend_from_slice(source(block, channel.quantity));

@@ -34,7 +34,7 @@ pub struct Verified {
 /// estimates are from what they should be.
 pub fn verify(case: &Case, request: &Request, found: &Designed, logs: usize, stop: Stop) -> Result<Vec<Verified>> {
     let task = Task::new(case, request, stop)?;
-    let frees = parameters(&case.stage, &task.plan, &[])?;
+    let frees = parameters(&case.machine, &task.plan, &[])?;
     let mut seen: Vec<Vec<(f64, bool)>> = vec![Vec::new(); frees.len()];
     let mut random = Pcg64::seed_from_u64(task.seed);
     for k in 0..logs {
@@ -45,8 +45,8 @@ pub fn verify(case: &Case, request: &Request, found: &Designed, logs: usize, sto
         let mut initial = found.initial;
         let off = uniform(&mut random) * step(&task);
         initial.cart_position += off;
-        initial.drive_angle += off / case.stage.pulley_radius;
-        initial.idler_angle += off / case.stage.pulley_radius;
+        initial.drive_angle += off / case.machine.pulley_radius;
+        initial.idler_angle += off / case.machine.pulley_radius;
         let noise = task.seed.wrapping_add(1 + k as u64);
         let experiment = task
             .experiment(&found.name, &found.shape.signal(), initial, noise)
@@ -54,7 +54,7 @@ pub fn verify(case: &Case, request: &Request, found: &Designed, logs: usize, sto
         let mut own = Case { experiments: vec![experiment], ..task.case.clone() };
         for free in &frees {
             let start = free.start * (1.0 + OFF * (2.0 * uniform(&mut random) - 1.0));
-            free.set(&mut own.stage, start.clamp(free.low, free.high));
+            free.set(&mut own.machine, start.clamp(free.low, free.high));
         }
         let fit = fit(&own, &task.plan, Some(stop), &mut |_| Flow::Continue)?;
         if fit.ending == Ending::Interrupted {
@@ -83,7 +83,8 @@ pub fn verify(case: &Case, request: &Request, found: &Designed, logs: usize, sto
 
 /// The coarsest step of a position that is recorded, m at the cart.
 fn step(task: &Task) -> f64 {
-    let arm = |quantity: Quantity| if quantity == Quantity::CartPosition { 1.0 } else { task.case.stage.pulley_radius };
+    let arm =
+        |quantity: Quantity| if quantity == Quantity::CartPosition { 1.0 } else { task.case.machine.pulley_radius };
     let positions = task.measured.iter().filter(|channel| is_position(channel.quantity));
     positions.map(|channel| arm(channel.quantity) * channel.step.unwrap_or(0.0)).fold(0.0, f64::max)
 }

@@ -15,8 +15,8 @@ pub use remedy::Remedy;
 pub use timing::{Gap, Timing};
 
 use super::{Log, Quantity};
+use crate::machine::Machine;
 use crate::number::engineering_typed;
-use crate::stage::Stage;
 use std::fmt;
 
 /// The survey of a log.
@@ -90,9 +90,9 @@ impl Survey {
     /// assert!(survey.has("unit"));
     /// # Ok::<(), taut::Error>(())
     /// ```
-    pub fn new(log: &Log, stage: &Stage) -> Self {
+    pub fn new(log: &Log, machine: &Machine) -> Self {
         let timing = Timing::new(&log.time);
-        let mut channels = vec![Channel::new("input", units::input_unit(stage), &log.input, &log.time)];
+        let mut channels = vec![Channel::new("input", units::input_unit(machine), &log.input, &log.time)];
         for output in &log.outputs {
             channels.push(Channel::new(output.quantity.name(), output.quantity.unit(), &output.values, &log.time));
         }
@@ -115,7 +115,7 @@ impl Survey {
             )),
         }
         notes.extend(motion.as_ref().and_then(|motion| motion.across_gaps(log, &timing)));
-        notes.extend(units::notes(log, stage, &channels, motion.as_ref()));
+        notes.extend(units::notes(log, machine, &channels, motion.as_ref()));
         notes.sort_by_key(|note| std::cmp::Reverse(note.severity));
         Self { log: log.name.clone(), timing, channels, motion, notes }
     }

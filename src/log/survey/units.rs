@@ -4,8 +4,8 @@ use super::super::{Log, Output, Quantity};
 use super::channel::Channel;
 use super::motion::Motion;
 use super::{Note, Remedy, Severity, quantile, shown};
+use crate::machine::{AmplifierMode, EncoderPlace, Machine};
 use crate::quantity::{self, rounded};
-use crate::stage::{AmplifierMode, EncoderPlace, Stage};
 
 /// Measured and expected may differ by this factor without a suspicion: the machine's parameters may be rough.
 const ROUGH: f64 = 30.0;
@@ -29,14 +29,14 @@ const FEWEST_LEVELS: usize = 10;
 const MOST_VOLTS: f64 = 800.0;
 const MOST_AMPERES: f64 = 300.0;
 
-pub(super) fn input_unit(stage: &Stage) -> &'static str {
+pub(super) fn input_unit(stage: &Machine) -> &'static str {
     match stage.amplifier.mode {
         AmplifierMode::Voltage => "V",
         AmplifierMode::Current => "A",
     }
 }
 
-pub(super) fn notes(log: &Log, stage: &Stage, channels: &[Channel], motion: Option<&Motion>) -> Vec<Note> {
+pub(super) fn notes(log: &Log, stage: &Machine, channels: &[Channel], motion: Option<&Motion>) -> Vec<Note> {
     let mut notes = Vec::new();
     let input = input_note(stage, &channels[0]);
     let swapped = swapped_note(log, channels);
@@ -57,7 +57,7 @@ pub(super) fn notes(log: &Log, stage: &Stage, channels: &[Channel], motion: Opti
 }
 
 /// Steps of a position that are not those of the case's encoder.
-fn encoder_note(stage: &Stage, channels: &[Channel]) -> Option<Note> {
+fn encoder_note(stage: &Machine, channels: &[Channel]) -> Option<Note> {
     let encoder = stage.encoder?;
     let counted: &[&'static str] = match encoder.at {
         EncoderPlace::Motor => &["drive_angle", "rotor_angle"],
@@ -95,7 +95,7 @@ fn encoder_note(stage: &Stage, channels: &[Channel]) -> Option<Note> {
 }
 
 /// An input that no such amplifier gives.
-fn input_note(stage: &Stage, input: &Channel) -> Option<Note> {
+fn input_note(stage: &Machine, input: &Channel) -> Option<Note> {
     let peak = (stage.amplifier.gain * input.greatest).abs().max((stage.amplifier.gain * input.least).abs());
     let (most, unit, milli) = match stage.amplifier.mode {
         AmplifierMode::Voltage => (MOST_VOLTS, "V", "mV"),
@@ -133,7 +133,7 @@ fn swapped_note(log: &Log, channels: &[Channel]) -> Option<Note> {
 }
 
 /// Positions along the belt, m per unit.
-fn lever(quantity: Quantity, stage: &Stage) -> f64 {
+fn lever(quantity: Quantity, stage: &Machine) -> f64 {
     match quantity {
         Quantity::CartPosition | Quantity::CartSpeed | Quantity::CartAcceleration => 1.0,
         _ => stage.pulley_radius,
@@ -141,7 +141,7 @@ fn lever(quantity: Quantity, stage: &Stage) -> f64 {
 }
 
 /// Outputs compared with each other: all positions are the belt's, and speeds their rates.
-fn consistency(log: &Log, stage: &Stage, channels: &[Channel]) -> Vec<Note> {
+fn consistency(log: &Log, stage: &Machine, channels: &[Channel]) -> Vec<Note> {
     use Quantity::{CartPosition, CartSpeed, DriveAngle, DriveSpeed, IdlerAngle, IdlerSpeed, RotorAngle, RotorSpeed};
     let usable = |output: &&Output| {
         let channel = channels.iter().find(|channel| channel.name == output.quantity.name());
@@ -228,7 +228,7 @@ fn kind(ratio: f64) -> Option<Kind> {
     Some(Kind::Factor(times.replace(".0000", "")))
 }
 
-fn ratio_note(ratio: f64, base: &Output, other: &Output, stage: &Stage, what: &str) -> Option<Note> {
+fn ratio_note(ratio: f64, base: &Output, other: &Output, stage: &Machine, what: &str) -> Option<Note> {
     let (b, o) = (base.quantity, other.quantity);
     // Swapped, the two levers go the wrong way: once too often each.
     let levers = lever(o, stage) / lever(b, stage);
@@ -279,7 +279,7 @@ fn confused(quantity: Quantity, ratio: f64) -> Option<&'static str> {
 }
 
 /// The largest speed and acceleration, against what the machine of the case would do.
-fn magnitude(log: &Log, stage: &Stage, motion: &Motion) -> Option<Note> {
+fn magnitude(log: &Log, stage: &Machine, motion: &Motion) -> Option<Note> {
     let lever = lever(motion.quantity, stage);
     let (name, unit) = (motion.quantity.name(), motion.unit());
     let Some(expected) = expected(log, stage) else { return idle(log, stage, motion) };
@@ -306,7 +306,7 @@ fn magnitude(log: &Log, stage: &Stage, motion: &Motion) -> Option<Note> {
 }
 
 /// A log that moves with an input that would not move the machine of the case.
-fn idle(log: &Log, stage: &Stage, motion: &Motion) -> Option<Note> {
+fn idle(log: &Log, stage: &Machine, motion: &Motion) -> Option<Note> {
     let most = log.input.iter().fold(0.0_f64, |most, u| most.max(u.abs()));
     if most == 0.0 {
         return None;
@@ -359,7 +359,7 @@ struct Drive {
     brake: f64,
 }
 
-fn drive(stage: &Stage) -> Drive {
+fn drive(stage: &Machine) -> Drive {
     let (motor, r) = (&stage.motor, stage.pulley_radius);
     let per_ampere = motor.torque_constant * motor.gear_ratio * motor.gear_efficiency / r;
     match stage.amplifier.mode {
@@ -372,7 +372,7 @@ fn drive(stage: &Stage) -> Drive {
 }
 
 /// Viscous and Coulomb friction of all bodies at the cart, N s/m and N.
-fn resistance(stage: &Stage) -> (f64, f64) {
+fn resistance(stage: &Machine) -> (f64, f64) {
     let (cart, r) = (&stage.cart.friction.forward, stage.pulley_radius);
     let pulleys = [&stage.drive_pulley.friction.forward, &stage.idler_pulley.friction.forward];
     let viscous = cart.viscous + pulleys.iter().map(|side| side.viscous).sum::<f64>() / (r * r);
@@ -386,7 +386,7 @@ struct Expected {
 }
 
 /// The motion of the machine as one rigid mass; none if it would hardly move.
-fn expected(log: &Log, stage: &Stage) -> Option<Expected> {
+fn expected(log: &Log, stage: &Machine) -> Option<Expected> {
     let r = stage.pulley_radius;
     let (motor, cart) = (&stage.motor, &stage.cart);
     let pulleys = [&stage.drive_pulley, &stage.idler_pulley];
@@ -425,7 +425,7 @@ fn expected(log: &Log, stage: &Stage) -> Option<Expected> {
 }
 
 /// Whether it moves against its input.
-fn direction(log: &Log, stage: &Stage, motion: &Motion) -> Option<Note> {
+fn direction(log: &Log, stage: &Machine, motion: &Motion) -> Option<Note> {
     if motion.absolute {
         return None;
     }
@@ -448,7 +448,7 @@ fn direction(log: &Log, stage: &Stage, motion: &Motion) -> Option<Note> {
 }
 
 /// A current that this motor cannot draw from this voltage.
-fn current_note(log: &Log, stage: &Stage) -> Option<Note> {
+fn current_note(log: &Log, stage: &Machine) -> Option<Note> {
     let output = log.output(Quantity::MotorCurrent)?;
     let peak = quantile(&output.values.iter().map(|i| i.abs()).collect::<Vec<_>>(), 0.995);
     let most = log.input.iter().fold(0.0_f64, |most, u| most.max((stage.amplifier.gain * u).abs()));
@@ -470,7 +470,7 @@ fn current_note(log: &Log, stage: &Stage) -> Option<Note> {
 #[cfg(test)]
 mod tests {
     use super::super::is_speed;
-    use crate::stage::Quantity;
+    use crate::machine::Quantity;
 
     #[test]
     fn every_quantity_is_of_one_kind() {

@@ -21,12 +21,12 @@ mod shown;
 
 use super::coordinates::Coordinates;
 use super::inputs::Pieces;
-use super::machine::Engine;
 use super::pace::{Pace, STEPS_BETWEEN_QUESTIONS};
 use super::record::Extra;
 use super::roots;
 use super::rounding::Rounding;
 use super::saved::{Pass, Passed};
+use super::simulator::Engine;
 use super::{Cost, Ending, Event, PositionError, Tie};
 use crate::mechanism::{Cause, DRIVES, Form, Layout, Mechanism, Mode, State};
 use ellipsoid::Ellipsoid;

@@ -4,8 +4,8 @@ use super::{Core, Event};
 use crate::error::Result;
 use crate::friction::Motion;
 use crate::mechanism::{BODIES, Cause, DRIVES, Layout, Mechanism, Mode, SpringLaw, State};
-use crate::solve::machine::{Engine, shown};
 use crate::solve::saved::{Pass, Passed, restored};
+use crate::solve::simulator::{Engine, shown};
 use crate::solve::{Ending, check};
 use std::sync::Arc;
 
@@ -203,7 +203,7 @@ impl Dynamics {
         shown(&self.core, into);
     }
 
-    /// Goes on with other numbers of the same mechanism; [`crate::solve::Machine::replace`] says which.
+    /// Goes on with other numbers of the same mechanism; [`crate::solve::Simulator::replace`] says which.
     pub fn replace(&mut self, mechanism: &Mechanism) {
         self.core.replace(mechanism);
     }

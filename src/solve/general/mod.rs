@@ -24,10 +24,10 @@ mod stretch;
 
 use super::coordinates::Coordinates;
 use super::inputs::Pieces;
-use super::machine::Engine;
 use super::pace::{Pace, STEPS_BETWEEN_QUESTIONS, most_events};
 use super::record::Extra;
 use super::saved::{Pass, Passed};
+use super::simulator::Engine;
 use super::{Cost, Ending, Event, PositionError};
 use crate::error::{Error, Result};
 use crate::friction::{Law, Motion};

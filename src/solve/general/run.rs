@@ -6,10 +6,10 @@ use super::stretch::Stretch;
 use super::{Core, Way, Witness};
 use crate::mechanism::{DRIVES, Layout, Mechanism, State};
 use crate::solve::inputs::Pieces;
-use crate::solve::machine::Engine;
 use crate::solve::observe::Output;
 use crate::solve::record::{Recorder, STATE};
 use crate::solve::run::{Running, Start};
+use crate::solve::simulator::Engine;
 use crate::solve::{Detail, Ending, Flow, Grid, Outcome};
 
 /// A run under way.

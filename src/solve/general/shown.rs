@@ -5,8 +5,8 @@ use super::radau::inverse;
 use super::run::Rows;
 use super::{Core, Way};
 use crate::mechanism::{DRIVES, Mechanism, Mode, Shown as Quantity};
-use crate::solve::machine::Engine;
 use crate::solve::observe::{Curve, Gap, QUANTITIES, Reading, Readout, TERMS};
+use crate::solve::simulator::Engine;
 
 /// Places within a step at which it is shown, its ends among them: as many as a curve has terms.
 const PLACES: usize = TERMS;

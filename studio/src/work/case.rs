@@ -49,7 +49,7 @@ fn span(case: &Opened, key: &str) -> Option<&'static str> {
 /// The numbers of a case with what the table of parameters says of them.
 pub fn parameters(case: &Opened, numbers: &[Number]) -> Value {
     let machine: &dyn Numbers = match case {
-        Opened::Axis(case) => &case.stage,
+        Opened::Axis(case) => &case.machine,
         Opened::Gantry(case) => &case.gantry,
     };
     let one = |number: &Number| {

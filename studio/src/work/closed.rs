@@ -91,7 +91,8 @@ pub fn closed(request: &Request, context: &Context) -> Result<Reply> {
     let tried = Tried { case: &case, design, done: vec![done] };
     let done = &tried.done[0];
     let lines = taut_report::motion::lines(&tried, done);
-    let told = taut::json::moves(&case.title, design.structure.name(), &Loop::of(design), &case.stage, &[done.told()]);
+    let told =
+        taut::json::moves(&case.title, design.structure.name(), &Loop::of(design), &case.machine, &[done.told()]);
     let opened = Opened::Axis(Box::new(case.clone()));
     let mut reply = Reply::of(json!({
         "title": case.title,
@@ -100,7 +101,7 @@ pub fn closed(request: &Request, context: &Context) -> Result<Reply> {
         "move": place,
         "until": motion.until,
         "profile_end": motion.profile.end(),
-        "controller": taut_report::motion::controller(design, &case.stage),
+        "controller": taut_report::motion::controller(design, &case.machine),
         "rows": lines.iter().map(|(name, value)| json!([name, value.replace('-', "−")])).collect::<Vec<_>>(),
         "ending": taut_report::simulate::early_end(&done.run.outcome.ending),
         "trouble": warnings(done),
@@ -135,8 +136,8 @@ pub fn moved<'a>(
     context: &Context,
     sink: &mut dyn FnMut(&Trajectory),
 ) -> Result<Done<'a>> {
-    let stage = &case.stage;
-    let mut controller = Standard::new(design, stage)?;
+    let machine = &case.machine;
+    let mut controller = Standard::new(design, machine)?;
     let profile = motion.reference(design);
     let count = (motion.until / motion.every).ceil().max(1.0) as u64;
     let rows =
@@ -145,9 +146,10 @@ pub fn moved<'a>(
         sink(block);
         context.flow()
     };
-    let run = stream(stage, &mut controller, &Loop::of(design), &profile, &rows, Solver::of(stage), false, &mut take)?;
-    let trouble = trouble::trouble(stage, design, &run, motion.profile.target());
-    let shortfalls = shortfalls(stage, design.limit, &profile);
+    let run =
+        stream(machine, &mut controller, &Loop::of(design), &profile, &rows, Solver::of(machine), false, &mut take)?;
+    let trouble = trouble::trouble(machine, design, &run, motion.profile.target());
+    let shortfalls = shortfalls(machine, design.limit, &profile);
     Ok(Done { motion, run, curves: None, worst: None, trouble, shortfalls, files: Vec::new() })
 }
 
@@ -162,7 +164,7 @@ fn warnings(done: &Done) -> Option<String> {
 /// at the worst break.
 fn nyquist(case: &Case, design: &Design) -> Result<(Margins, f64, [Vec<f64>; 5])> {
     let tuning = case.tune.clone().unwrap_or_default();
-    let feedback = Feedback::new(design, &case.stage)?;
+    let feedback = Feedback::new(design, &case.machine)?;
     let family = Family::of(case, &tuning)?;
     let plant = family.plant(&family.nominal(), design, &feedback.corners())?;
     let margins = Margins::of(&plant, &feedback);

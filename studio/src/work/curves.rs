@@ -2,10 +2,10 @@
 
 use serde_json::{Value, json};
 use taut::case::Opened;
+use taut::machine::axis;
+use taut::machine::gantry::{Gantry, LABELS, Routing};
+use taut::machine::{BeltModel, Machine};
 use taut::mechanism::Heading;
-use taut::stage::axis;
-use taut::stage::gantry::{Gantry, LABELS, Routing};
-use taut::stage::{BeltModel, Stage};
 use taut::trajectory::Trajectory;
 
 /// A curve: the columns that it is a sum of, each with its weight.
@@ -64,7 +64,7 @@ impl Panel {
 /// The panels of a machine with these columns.
 pub fn panels(case: &Opened, columns: &[Heading]) -> Vec<Panel> {
     let mut panels = match case {
-        Opened::Axis(case) => of_axis(&case.stage),
+        Opened::Axis(case) => of_axis(&case.machine),
         Opened::Gantry(case) => of_gantry(&case.gantry),
     };
     for panel in &mut panels {
@@ -75,8 +75,8 @@ pub fn panels(case: &Opened, columns: &[Heading]) -> Vec<Panel> {
     panels
 }
 
-fn of_axis(stage: &Stage) -> Vec<Panel> {
-    let r = stage.pulley_radius;
+fn of_axis(machine: &Machine) -> Vec<Panel> {
+    let r = machine.pulley_radius;
     let mut panels = vec![
         panel("position", "Position", "Where the belt is at the drive pulley and where the cart is", MM)
             .curve("drive_travel", "drive r φ₁", &[("drive_angle", r)])
@@ -116,7 +116,7 @@ fn of_axis(stage: &Stage) -> Vec<Panel> {
             .column("span2_slack", "")
             .column("span3_slack", ""),
     ];
-    if stage.belt.model == BeltModel::Rigid {
+    if machine.belt.model == BeltModel::Rigid {
         panels.retain(|panel| panel.key != "error");
     }
     panels

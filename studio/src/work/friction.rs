@@ -13,13 +13,13 @@ pub fn page(case: &Opened, speed: f64) -> Page {
     let linear = (Axis::new("Speed", "m/s").shown_as("mm/s", 1e3), Axis::new("Friction force", "N"));
     let (radius, bodies) = match case {
         Opened::Axis(case) => {
-            let stage = &case.stage;
+            let machine = &case.machine;
             let bodies = vec![
-                ("Drive pulley", &stage.drive_pulley.friction, true),
-                ("Cart", &stage.cart.friction, false),
-                ("Idler pulley", &stage.idler_pulley.friction, true),
+                ("Drive pulley", &machine.drive_pulley.friction, true),
+                ("Cart", &machine.cart.friction, false),
+                ("Idler pulley", &machine.idler_pulley.friction, true),
             ];
-            (stage.pulley_radius, bodies)
+            (machine.pulley_radius, bodies)
         }
         Opened::Gantry(case) => {
             let gantry = &case.gantry;

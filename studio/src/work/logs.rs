@@ -206,11 +206,11 @@ impl<'a> Live<'a> {
     /// A log and the model's side of it, thinned out.
     fn log(&self, k: usize, x: &[f64], bench: &mut Bench) -> Option<Value> {
         let run: &Run = &self.problem.runs[k];
-        let stage = self.problem.stage_of(run.part, x);
+        let machine = self.problem.stage_of(run.part, x);
         let extras = self.problem.extras_of(k, x);
         let quantity = run.seen.first()?.quantity;
         let mut out = vec![Vec::with_capacity(run.time.len())];
-        if !run.predict(bench, &stage, &extras, &[quantity], &mut out) {
+        if !run.predict(bench, &machine, &extras, &[quantity], &mut out) {
             return None;
         }
         let bias = run.bias(0, &extras);

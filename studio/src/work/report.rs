@@ -14,7 +14,7 @@ use taut_report::simulate;
 pub fn report(request: &Request, context: &Context) -> Result<Reply> {
     let page = match &opened(request, context)? {
         Opened::Axis(case) => {
-            let solver = Solver::of(&case.stage);
+            let solver = Solver::of(&case.machine);
             let experiments = case.experiments.iter();
             let runs = experiments.map(|one| simulate_axis(case, one, solver, context, &mut Keep::Curves));
             let runs = runs.collect::<Result<Vec<_>>>()?;

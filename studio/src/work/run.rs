@@ -82,11 +82,11 @@ fn axis<E>(
 }
 
 fn axis_run(case: &Case, place: usize, context: &Context) -> Result<(Simulated, Kept)> {
-    let (stage, experiment) = (&case.stage, &case.experiments[place]);
+    let (machine, experiment) = (&case.machine, &case.experiments[place]);
     let opened = Opened::Axis(Box::new(case.clone()));
-    let panels = panels(&opened, &stage.mechanism().columns);
+    let panels = panels(&opened, &machine.mechanism().columns);
     let shown = Experiment { every: interval(experiment.every, experiment.samples()), ..experiment.clone() };
-    let solver = Solver::of(stage);
+    let solver = Solver::of(machine);
     let mut kept = Kept::new(&panels);
     let run = simulate_axis(case, &shown, solver, context, &mut Keep::Columns(&mut kept))?;
     let lines = simulate::lines(&run, solver);
@@ -107,11 +107,11 @@ fn axis_run(case: &Case, place: usize, context: &Context) -> Result<(Simulated, 
 fn move_run(case: &Case, place: usize, context: &Context) -> Result<(Simulated, Kept)> {
     let (design, moves) = case.moves_named(context.state.name(), &[])?;
     let opened = Opened::Axis(Box::new(case.clone()));
-    let panels = panels(&opened, &case.stage.mechanism().columns);
+    let panels = panels(&opened, &case.machine.mechanism().columns);
     let mut kept = Kept::new(&panels);
     let done = super::closed::moved(case, design, moves[place], context, &mut |block| kept.take(block))?;
     let timing = Loop::of(design);
-    let json = taut::json::moves(&case.title, design.structure.name(), &timing, &case.stage, &[done.told()]);
+    let json = taut::json::moves(&case.title, design.structure.name(), &timing, &case.machine, &[done.told()]);
     let tried = Tried { case, design, done: vec![done] };
     let rows = lines_told(taut_report::motion::lines(&tried, &tried.done[0]).into_iter());
     let outcome = tried.done.into_iter().next().map(|done| done.run.outcome);
@@ -138,10 +138,10 @@ pub fn simulate_axis<'a>(
     keep: &mut Keep,
 ) -> Result<simulate::Run<'a>> {
     let begun = Instant::now();
-    let stage = &case.stage;
-    let mut meter = Meter::new(stage, experiment);
-    let mut curves = matches!(keep, Keep::Curves).then(|| Curves::new(stage));
-    let outcome = stream_observed(stage, experiment, solver, &mut meter, &mut |block| {
+    let machine = &case.machine;
+    let mut meter = Meter::new(machine, experiment);
+    let mut curves = matches!(keep, Keep::Curves).then(|| Curves::new(machine));
+    let outcome = stream_observed(machine, experiment, solver, &mut meter, &mut |block| {
         if let Keep::Columns(kept) = keep {
             kept.take(block);
         }
@@ -151,8 +151,8 @@ pub fn simulate_axis<'a>(
         context.flow()
     })?;
     let metrics = meter.finish(&outcome.events);
-    let reduction = Reduction::of(stage, experiment, solver)?;
-    let (model, took) = (stage.belt.model, begun.elapsed());
+    let reduction = Reduction::of(machine, experiment, solver)?;
+    let (model, took) = (machine.belt.model, begun.elapsed());
     Ok(simulate::Run {
         experiment,
         outcome,

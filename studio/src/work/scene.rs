@@ -2,21 +2,21 @@
 
 use serde_json::{Value, json};
 use taut::case::Opened;
-use taut::stage::Travel;
-use taut::stage::gantry::Routing;
+use taut::machine::Travel;
+use taut::machine::gantry::Routing;
 
 /// Kind, radius and travels, m.
 pub fn scene(case: &Opened) -> Value {
     let travel = |travel: Option<Travel>| travel.map(|travel| [travel.min, travel.max]);
     match case {
         Opened::Axis(case) => {
-            let stage = &case.stage;
+            let machine = &case.machine;
             json!({
                 "kind": "axis",
-                "radius": stage.pulley_radius,
-                "x": travel(stage.travel),
+                "radius": machine.pulley_radius,
+                "x": travel(machine.travel),
                 "spans": ["span1_force", "span2_force", "span3_force"],
-                "pretension": stage.belt.pretension,
+                "pretension": machine.belt.pretension,
             })
         }
         Opened::Gantry(case) => {

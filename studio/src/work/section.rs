@@ -9,7 +9,7 @@ use taut::case::Opened;
 use taut::error::{Error, Result};
 use taut::mechanism::{Mechanism, State};
 use taut::signal::Signal;
-use taut::solve::{Flow, Machine, Solver};
+use taut::solve::{Flow, Simulator, Solver};
 
 /// Points of a section at most.
 const POINTS: f64 = 10_001.0;
@@ -26,7 +26,7 @@ pub fn section(request: &Request, context: &Context) -> Result<Reply> {
     let (mechanism, inputs, start, (until, every)) = match &case {
         Opened::Axis(case) => {
             let experiment = &case.experiments[chosen(request, case.experiments.len())?];
-            let mechanism = case.stage.mechanism();
+            let mechanism = case.machine.mechanism();
             let start = experiment.initial.state(&mechanism);
             (mechanism, vec![experiment.input.clone()], start, (experiment.until, experiment.every))
         }
@@ -85,7 +85,7 @@ fn rows(
     context: &Context,
 ) -> Result<()> {
     let interval = window.interval(every);
-    let mut machine = Machine::of_mechanism(mechanism, start, Solver::of_mechanism(mechanism), interval)?;
+    let mut machine = Simulator::of_mechanism(mechanism, start, Solver::of_mechanism(mechanism), interval)?;
     let headings = mechanism.columns.clone();
     let (mut row, mut next) = (vec![0.0; headings.len()], 0);
     while context.flow() == Flow::Continue {
@@ -115,7 +115,7 @@ fn rows(
 }
 
 /// Goes on to `until`, and looks from time to time whether anybody still waits; false where it ended before.
-fn advance(machine: &mut Machine, until: f64, interval: f64, context: &Context) -> bool {
+fn advance(machine: &mut Simulator, until: f64, interval: f64, context: &Context) -> bool {
     let mut events = Vec::new();
     while context.flow() == Flow::Continue {
         let next = until.min(machine.time() + BETWEEN_LOOKS * interval);

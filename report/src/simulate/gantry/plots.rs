@@ -6,8 +6,8 @@ use crate::simulate::marks;
 use crate::simulate::plots::Named;
 use crate::{Axis, Colour, Figure, Panel, Plane, Series, Style};
 use taut::case::GantryCase;
-use taut::stage::AmplifierMode;
-use taut::stage::gantry::{Gantry, LABELS, Routing};
+use taut::machine::AmplifierMode;
+use taut::machine::gantry::{Gantry, LABELS, Routing};
 
 /// The curves that a report shows, and the way of the cart, before the first row.
 pub fn curves(gantry: &Gantry) -> (Curves, Way) {

@@ -2,10 +2,10 @@
 
 use super::Run;
 use crate::simulate::rows::{self, accuracy, cost, events, speed, time, travel, value};
+use taut::machine::gantry::{Gantry, Routing};
 use taut::metrics::{GantryMetrics, Peak};
 use taut::number::engineering_typed;
 use taut::solve::{Ending, Solver};
-use taut::stage::gantry::{Gantry, Routing};
 
 /// Lengths (m) and forces (N) up to these are shown as nothing: less than rounding makes of a symmetric motion.
 const LEAST_LENGTH: f64 = 1e-13;
@@ -35,7 +35,7 @@ pub fn early_end(run: &Run, gantry: &Gantry) -> Option<String> {
     let Ending::LeftTravel { time: at } = run.outcome.ending else { return rows::early_end(&run.outcome.ending) };
     // Whichever is nearer to an end of its travel, or beyond.
     let [x, y] = run.metrics.final_position;
-    let left = |position: f64, travel: Option<taut::stage::Travel>| {
+    let left = |position: f64, travel: Option<taut::machine::Travel>| {
         travel.map_or(f64::INFINITY, |travel| (position - travel.min).min(travel.max - position))
     };
     let which = if left(x, gantry.bridge.travel) <= left(y, gantry.cart.travel) { "bridge" } else { "cart" };

@@ -6,9 +6,9 @@ use super::record::Extra;
 use super::saved::{Pass, Passed, restored};
 use super::{Ending, Event, PositionError, Solver, check, general};
 use crate::error::{Error, Result};
+use crate::machine::Machine;
 use crate::mechanism::{DRIVES, Form, Heading, Layout, Mechanism, Mode, Shown, SpringLaw, State, What};
 use crate::signal::{DEGREE, Piece};
-use crate::stage::Stage;
 use std::sync::Arc;
 
 /// The interval that steps are computed fastest for, where none is named, s; and its halves, quarters and so on.
@@ -20,11 +20,11 @@ const INTERVAL: f64 = 1e-3;
 /// ```
 /// use taut::case::{Case, TEMPLATE};
 /// use taut::signal::Signal;
-/// use taut::solve::{Machine, Solver};
-/// use taut::stage::axis::CART;
+/// use taut::solve::{Simulator, Solver};
+/// use taut::machine::axis::CART;
 ///
 /// let case = Case::from_text("axis.toml", TEMPLATE)?;
-/// let mut machine = Machine::new(&case.stage, Solver::Exact)?;
+/// let mut machine = Simulator::new(&case.machine, Solver::Exact)?;
 /// let mut events = Vec::new();
 /// machine.set_input(0, &Signal::Step { value: 10.0, at: 0.0 }.piece(0.0))?;
 /// while machine.state().position[CART] < 0.05 {
@@ -36,14 +36,14 @@ const INTERVAL: f64 = 1e-3;
 /// assert!(copy.state().position[CART] > machine.state().position[CART]);
 /// # Ok::<(), taut::Error>(())
 /// ```
-pub struct Machine {
+pub struct Simulator {
     engine: Box<dyn Engine>,
     inputs: Pieces,
     /// Whether inputs were set since it was advanced last.
     is_set: bool,
 }
 
-impl Clone for Machine {
+impl Clone for Simulator {
     fn clone(&self) -> Self {
         Self { engine: self.engine.copy(), inputs: self.inputs, is_set: self.is_set }
     }
@@ -117,12 +117,12 @@ impl Make for Exact<'_> {
     }
 }
 
-impl Machine {
+impl Simulator {
     /// An axis at rest at the origin, its inputs zero. Errors: what makes no sense as a machine, or what the solver
     /// does not take.
-    pub fn new(stage: &Stage, solver: Solver) -> Result<Self> {
-        check::stage(stage)?;
-        Self::of_mechanism(&stage.mechanism(), &State::default(), solver, INTERVAL)
+    pub fn new(machine: &Machine, solver: Solver) -> Result<Self> {
+        check::machine(machine)?;
+        Self::of_mechanism(&machine.mechanism(), &State::default(), solver, INTERVAL)
     }
 
     /// Any mechanism in `start` at time zero, its inputs zero. Steps of `interval`, s, and of its halves, quarters and
@@ -225,12 +225,12 @@ impl Machine {
         self.engine.error()
     }
 
-    /// The columns that [`Machine::outputs`] gives: those of a run.
+    /// The columns that [`Simulator::outputs`] gives: those of a run.
     pub fn columns(&self) -> &[Heading] {
         &self.mechanism().columns
     }
 
-    /// The value of each of [`Machine::columns`] now, in SI units; `into` has a place for each.
+    /// The value of each of [`Simulator::columns`] now, in SI units; `into` has a place for each.
     pub fn outputs(&self, into: &mut [f64]) {
         shown(&*self.engine, into);
     }
@@ -250,7 +250,7 @@ impl Machine {
         Some(list)
     }
 
-    /// Goes on from what [`Machine::save`] gave, bit for bit, of a machine of the same numbers that began in the same
+    /// Goes on from what [`Simulator::save`] gave, bit for bit, of a machine of the same numbers that began in the same
     /// state. None, and nothing has changed, where `saved` is not of such a machine.
     pub fn restore(&mut self, saved: &[u64]) -> Option<()> {
         let (degree, rest) = saved.split_first()?;

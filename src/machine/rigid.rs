@@ -1,6 +1,6 @@
 //! An axis as one mass along its belt.
 
-use super::{AmplifierMode, Stage};
+use super::{AmplifierMode, Machine};
 
 /// Largest speed of a reference that counts as rest, m/s, and largest acceleration that counts as none, m/s²: what
 /// rounding leaves of a generated trajectory, in single precision too, has no direction.
@@ -34,28 +34,29 @@ pub struct Rigid {
 
 impl Rigid {
     /// That of `stage`.
-    pub fn of(stage: &Stage) -> Self {
-        let (r, motor) = (stage.pulley_radius, &stage.motor);
+    pub fn of(machine: &Machine) -> Self {
+        let (r, motor) = (machine.pulley_radius, &machine.motor);
         let n = motor.gear_ratio;
-        let pulleys = stage.drive_pulley.inertia + n * n * motor.rotor_inertia + stage.idler_pulley.inertia;
-        let [drive, cart, idler] = [stage.drive_pulley.friction, stage.cart.friction, stage.idler_pulley.friction];
+        let pulleys = machine.drive_pulley.inertia + n * n * motor.rotor_inertia + machine.idler_pulley.inertia;
+        let [drive, cart, idler] =
+            [machine.drive_pulley.friction, machine.cart.friction, machine.idler_pulley.friction];
         Self {
-            mass: stage.cart.mass + pulleys / (r * r),
-            driving: (stage.drive_pulley.inertia + n * n * motor.rotor_inertia) / (r * r),
+            mass: machine.cart.mass + pulleys / (r * r),
+            driving: (machine.drive_pulley.inertia + n * n * motor.rotor_inertia) / (r * r),
             viscous: [true, false].map(|forward| {
                 cart.side(forward).viscous + (drive.side(forward).viscous + idler.side(forward).viscous) / (r * r)
             }),
             coulomb: [true, false].map(|forward| {
                 cart.side(forward).coulomb + (drive.side(forward).coulomb + idler.side(forward).coulomb) / r
             }),
-            constant: stage.cart.constant_force(),
+            constant: machine.cart.constant_force(),
             force_per_ampere: n * motor.torque_constant / r,
             efficiency: motor.gear_efficiency,
             brake: n * motor.back_emf_constant / r,
             resistance: motor.resistance,
             inductance: motor.inductance,
-            gain: stage.amplifier.gain,
-            mode: stage.amplifier.mode,
+            gain: machine.amplifier.gain,
+            mode: machine.amplifier.mode,
         }
     }
 

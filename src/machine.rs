@@ -15,7 +15,7 @@ pub use swing::slowest_swing;
 
 /// A single-axis belt drive (paper, Fig. 1 and 2).
 #[derive(Debug, Clone, PartialEq)]
-pub struct Stage {
+pub struct Machine {
     /// The DC motor and its gear.
     pub motor: Motor,
     /// The amplifier between the input and the motor.
@@ -38,7 +38,7 @@ pub struct Stage {
     pub scale: Option<Encoder>,
 }
 
-impl Stage {
+impl Machine {
     /// Force at the belt that moves everything from rest with the cart at `position` (m), N; the sign of `side` is the
     /// direction.
     pub fn breakaway(&self, side: f64, position: f64) -> f64 {

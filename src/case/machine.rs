@@ -4,10 +4,10 @@ use super::friction::{along, friction, line};
 use super::reader::{Field, Table};
 use super::sheet;
 use crate::error::Result;
+use crate::machine::*;
 use crate::quantity::{rounded, show};
-use crate::stage::*;
 
-pub(super) fn stage(root: &Table) -> Result<Stage> {
+pub(super) fn machine(root: &Table) -> Result<Machine> {
     let table = |name: &str, holds: &str| root.required(name, &format!("a table [{name}] with {holds}"))?.table();
     let simple = sheet::simple_drive(root)?;
     let motor = match simple {
@@ -29,7 +29,7 @@ pub(super) fn stage(root: &Table) -> Result<Stage> {
     idler.check_keys(&[], &[])?;
     cart.check_keys(&[], &[])?;
     let pulley_radius = radius(&drive, sheet::pitch(root)?)?;
-    let mut stage = Stage {
+    let mut machine = Machine {
         motor: match (&motor, simple) {
             (Some(motor), _) => self::motor(motor)?,
             (None, Some(simple)) => simple.motor(pulley_radius),
@@ -55,11 +55,11 @@ pub(super) fn stage(root: &Table) -> Result<Stage> {
         encoder: encoder.map(|table| self::encoder(&table)).transpose()?,
         scale: None,
     };
-    stage.scale = scale.map(|field| self::scale(&field, stage.encoder)).transpose()?;
-    if let Some(proportion) = sheet::proportion(&belt, &stage.mechanism())? {
-        stage.belt.damping = stage.belt.stiffness.map(|stiffness| proportion * stiffness);
+    machine.scale = scale.map(|field| self::scale(&field, machine.encoder)).transpose()?;
+    if let Some(proportion) = sheet::proportion(&belt, &machine.mechanism())? {
+        machine.belt.damping = machine.belt.stiffness.map(|stiffness| proportion * stiffness);
     }
-    Ok(stage)
+    Ok(machine)
 }
 
 pub(super) fn motor(table: &Table) -> Result<Motor> {

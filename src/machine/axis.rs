@@ -11,7 +11,7 @@
 //!  travel  (       1             )     x
 //! ```
 
-use super::{BeltModel, EncoderPlace, Stage};
+use super::{BeltModel, EncoderPlace, Machine};
 use crate::friction::Law;
 use crate::mechanism::{
     Body, Drive, Follows, Heading, Kind, Label, Mechanism, Over, Roles, Shown, Spring, SpringLaw, State,
@@ -50,7 +50,7 @@ const LINE_LABELS: [Label; 2] = [
     Label { key: "force_by_speed", name: "force by speed" },
 ];
 
-impl Stage {
+impl Machine {
     /// Its bodies, springs and drive.
     pub fn mechanism(&self) -> Mechanism {
         let mut springs = self.spans();
