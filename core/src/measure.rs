@@ -8,10 +8,10 @@
 //!
 //! A sample from before time zero shows the state at the start, with no input yet.
 
-use crate::plan::Experiment;
 use crate::chance::normal;
 use crate::error::{Error, Result};
 use crate::machine::{AmplifierMode, Channel, Encoder, EncoderPlace, Machine, Measurement, Quantity};
+use crate::plan::Experiment;
 use crate::signal::Signal;
 use crate::solve::{self, Flow, Grid, Outcome, Solution, Solver};
 use crate::trajectory::{Column, Trajectory};

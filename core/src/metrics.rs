@@ -11,11 +11,11 @@ mod watch;
 pub use gantry::{GantryMeter, GantryMetrics};
 pub use watch::{Sum, Watch, Watched};
 
-use crate::plan::Experiment;
 use crate::friction::Motion;
 use crate::machine::Machine;
 use crate::machine::axis::{BODIES, CART, DRIVE, ROTOR};
 use crate::mechanism::{AmplifierMode, Mode, State};
+use crate::plan::Experiment;
 use crate::solve::{Closer, Curve, Event, Gap, Gaps, Observe, QUANTITIES, Reading, Stretch, reading};
 
 /// Share of the run that a stretch of constant input has to last before a steady speed is sought in it.

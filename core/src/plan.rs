@@ -180,4 +180,3 @@ impl Log {
         *steps.select_nth_unstable_by(middle, f64::total_cmp).1
     }
 }
-

@@ -8,11 +8,7 @@ use std::path::Path;
 
 impl Case {
     /// Something of the first experiment of the text, whether or not its files were read.
-    pub fn first<T>(
-        &self,
-        of: impl Fn(&Experiment) -> T,
-        left: impl Fn(&Unread<Initial>) -> Option<T>,
-    ) -> Option<T> {
+    pub fn first<T>(&self, of: impl Fn(&Experiment) -> T, left: impl Fn(&Unread<Initial>) -> Option<T>) -> Option<T> {
         match self.unread.first().filter(|one| one.place == 0) {
             Some(one) => left(one),
             None => self.experiments.first().map(of),

@@ -24,13 +24,13 @@ mod template;
 mod tree;
 mod tune;
 
+pub use crate::plan::{Experiment, GantryExperiment, Initial, file_name};
 pub use bounds::LARGEST_FILE;
-pub use drawn::{draws_are_of_one_machine, drawn, machines, parameters};
+pub use drawn::{drawn, draws_are_of_one_machine, machines, parameters};
 pub use files::{Files, InputFile, Unread};
 pub use fit::{Nuisances, Per, Plan, Prior, Scope, matches};
 pub use gantry::{GantryCase, Opened};
 pub use get::{Given, Number};
-pub use crate::plan::{Experiment, GantryExperiment, Initial, file_name};
 pub use motion::Move;
 pub use sweep::{Kinds, Origin, Sampling, Sweeping, Variation};
 pub use template::{TEMPLATE, Template, gantry_template};

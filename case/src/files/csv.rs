@@ -1,8 +1,8 @@
 //! Trajectories out as CSV.
 
-use crate::trajectory::{Column, Trajectory};
 use crate::error::Result;
 use crate::files::Draft;
+use crate::trajectory::{Column, Trajectory};
 use std::path::Path;
 
 /// Bytes collected before they are written.

@@ -1,8 +1,8 @@
 //! Trajectories out as Parquet.
 
-use crate::trajectory::{Column, Trajectory};
 use crate::error::{Error, Result};
 use crate::files::Draft;
+use crate::trajectory::{Column, Trajectory};
 use parquet::basic::{Repetition, Type as PhysicalType};
 use parquet::data_type::DoubleType;
 use parquet::errors::Result as ParquetResult;

@@ -37,17 +37,21 @@ pub struct StateFeedbackState {
 /// The part of it that does not change in time.
 #[derive(Debug, Clone)]
 pub struct Law {
+    /// Sample interval, s.
     pub every: f64,
     /// Φ.
     pub phi: DMatrix<f64>,
     /// Effect over a sample of the command that takes over within it, and of the one before.
     pub now: DVector<f64>,
+    /// Effect of the command before it.
     pub before: DVector<f64>,
     /// The encoder; behind it the scale, if there is one. Each corrects the estimate that the one before has left.
     pub sensors: Vec<Corrected>,
     /// u = −K (x − x*), then of commands under way, then of the integral.
     pub gain: DVector<f64>,
+    /// Number of commands under way.
     pub pending: usize,
+    /// True if the last state is the integral of the error.
     pub has_integral: bool,
 }
 

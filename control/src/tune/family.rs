@@ -3,12 +3,12 @@
 
 use super::margins::{Margins, Plant};
 use super::unknown::{Unknown, tie, with_the_rest};
+use crate::case::drawn;
 use crate::case::{Case, Tuning};
 use crate::chance::{quantile, uniform};
 use crate::control::feedback::Feedback;
 use crate::design::Design;
 use crate::error::{Error, Result};
-use crate::case::drawn;
 use crate::linear::{Operation, Place, places, travel};
 use crate::machine::Machine;
 use crate::number::engineering;

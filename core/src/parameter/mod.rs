@@ -193,6 +193,7 @@ pub struct Range {
 }
 
 impl Range {
+    /// From `low` to `high`, both allowed.
     pub const fn new(low: f64, high: f64) -> Self {
         Self { low, high, above: false, below: false, whole: false }
     }
@@ -204,6 +205,7 @@ impl Range {
     /// Of either sign.
     pub const ANY: Self = Self::new(-1e15, 1e15);
 
+    /// Whole numbers from `low` to `high`.
     pub const fn whole(low: f64, high: f64) -> Self {
         Self { whole: true, ..Self::new(low, high) }
     }

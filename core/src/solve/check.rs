@@ -3,13 +3,13 @@
 //! The case reader checks what is in a file, and says on which line; here it is what a program built by itself.
 
 use super::Course;
-use crate::plan::Experiment;
 use crate::error::{Error, Result};
 use crate::friction::Law;
 use crate::machine::axis::CART;
 use crate::machine::{BeltModel, Machine};
 use crate::mechanism::{AmplifierMode, Mechanism, SpringLaw, State};
 use crate::parameter;
+use crate::plan::Experiment;
 use crate::polyline::MOST_POINTS;
 use std::f64::consts::PI;
 

@@ -32,11 +32,11 @@ pub use simulator::Simulator;
 
 pub use check::machine as check_stage;
 
-use crate::plan::Experiment;
 use crate::error::{Error, Result};
 use crate::friction::Motion;
 use crate::machine::Machine;
 use crate::mechanism::{Mechanism, Part, Status, What};
+use crate::plan::Experiment;
 use crate::trajectory::Trajectory;
 use std::fmt;
 use std::sync::Arc;

@@ -6,9 +6,9 @@
 
 use super::exact::{Following, in_kernel};
 use super::{Bench, Solver, check};
-use crate::plan::Experiment;
 use crate::error::Result;
 use crate::mechanism::{Mechanism, Shown, State};
+use crate::plan::Experiment;
 use std::sync::Arc;
 
 /// A machine, and the state it begins in.

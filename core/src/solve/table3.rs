@@ -7,12 +7,12 @@ use super::coordinates::Coordinates;
 use super::observe::{Gap, Output, QUANTITIES, Reading, Readout};
 use super::record::{Recorder, STATE};
 use super::{Cost, Ending, Flow, Grid, Method, Outcome};
-use crate::plan::Experiment;
 use crate::error::{Error, Result};
 use crate::friction::Motion;
 use crate::machine::Machine;
 use crate::machine::axis::BODIES;
 use crate::mechanism::{DRIVES, Form, Layout, Mechanism, Mode, State};
+use crate::plan::Experiment;
 use crate::signal::Piece;
 use std::sync::Arc;
 

@@ -112,6 +112,7 @@ const WHOLE: f64 = 9_007_199_254_740_992.0;
 const LARGEST: f64 = 1e6;
 
 impl Interval {
+    /// The interval of this length, s.
     pub fn of(length: f64) -> Self {
         let (over, under) = decimal(length).or_else(|| fraction(length)).unwrap_or((length, 1.0));
         let exact = if over.fract() == 0.0 { (WHOLE / over) as u64 } else { 0 };

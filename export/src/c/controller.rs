@@ -1,12 +1,12 @@
 //! The controller in C: its program written out.
 
 use super::{Writer, plain};
+use crate::controller::{DERIVATIVES, program};
 use crate::design::Design;
 use crate::error::Result;
-use crate::controller::{DERIVATIVES, program};
+use crate::machine::Machine;
 use crate::program::{Expr, Node, Operator, Program, Statement, Test};
 use crate::shaper_remark;
-use crate::machine::Machine;
 use std::fmt::Write;
 
 const HEADER: &str = include_str!("controller.h");

@@ -2,10 +2,10 @@
 
 use super::{Writer, number, plain};
 use crate::error::{Error, Result};
-use crate::tables::{Element, ElementKind, Row, Tables, Then};
-use crate::{Does, Real};
 use crate::friction::Motion;
 use crate::mechanism::AmplifierMode;
+use crate::tables::{Element, ElementKind, Row, Tables, Then};
+use crate::{Does, Real};
 use std::collections::HashMap;
 use std::fmt::Write;
 

@@ -2,9 +2,9 @@
 
 use super::Target;
 use crate::design::{Design, FeedForward, FeedForwardModel};
-use crate::program::{Expr, Program, Relation, Test, number, variable};
 use crate::machine::rigid::{REST_ACCELERATION, REST_SPEED, Rigid};
 use crate::machine::{AmplifierMode, BeltModel, EncoderPlace, Machine};
+use crate::program::{Expr, Program, Relation, Test, number, variable};
 
 /// Feed-forward of a model of the axis.
 pub(super) struct Forward<'s> {

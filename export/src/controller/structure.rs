@@ -7,9 +7,9 @@ use crate::control::model::{Linear, Quantity};
 use crate::control::state_feedback::{Law, StateFeedbackState};
 use crate::design::{Cascade, Design, Fuzzy, Pid, SlidingMode, Structure};
 use crate::error::{Error, Result};
-use crate::program::{Expr, Program, Relation, Test, number, variable};
 use crate::machine::Machine;
 use crate::machine::axis::{CART, IDLER};
+use crate::program::{Expr, Program, Relation, Test, number, variable};
 use std::f64::consts::PI;
 
 /// Samples that a command of a state feedback may wait for.

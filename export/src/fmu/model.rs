@@ -6,12 +6,12 @@ use crate::case::Opened;
 use crate::chance::hash;
 use crate::design::Design;
 use crate::error::{Error, Result};
-use crate::{controller, without_controller};
 use crate::machine::gantry::Gantry;
 use crate::machine::{Machine, axis};
 use crate::mechanism::{Amplifier, AmplifierMode, DRIVES, Drive, Heading, Label, Mechanism, Motor, Shown, State};
 use crate::parameter::{self, Free, Numbers, Parameter, unit_for};
 use crate::solve::{Dynamics, Quantity, check_stage};
+use crate::{controller, without_controller};
 
 /// Where the references of each group begin: they stay when another group grows. Zero is time.
 const INPUTS: u32 = 1;

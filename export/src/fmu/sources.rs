@@ -3,12 +3,12 @@
 //! co-simulation.
 
 use super::{BINARY, Causality, Kind, Model, Role, Variability, Variable, Version};
-use crate::error::{Error, Result};
 use crate::STEP;
 use crate::c;
-use crate::tables::{ElementKind, Tables};
+use crate::error::{Error, Result};
 use crate::mechanism::{Form, Mechanism, Shown, State};
 use crate::solve::Quantity;
+use crate::tables::{ElementKind, Tables};
 use std::fmt::Write;
 
 const INSTANCE: &str = include_str!("sources/instance.c");

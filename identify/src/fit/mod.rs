@@ -40,9 +40,9 @@ mod trials;
 mod triangle;
 mod uncertainty;
 
+pub use crate::case::{drawn, machines};
 pub use check::{Check, check, check_watched};
 pub use combinations::Combination;
-pub use crate::case::{drawn, machines};
 pub use drift::{Change, Drift, drift};
 pub use findings::{Finding, Grade};
 pub use found::{Estimate, Fit, Work};

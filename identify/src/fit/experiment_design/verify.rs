@@ -2,9 +2,9 @@
 
 use super::{Designed, Request, Task};
 use crate::case::Case;
+use crate::case::parameters;
 use crate::chance::uniform;
 use crate::error::{Error, Result};
-use crate::case::parameters;
 use crate::fit::problem::Stop;
 use crate::fit::run::is_position;
 use crate::fit::{Ending, fit};
