@@ -80,7 +80,6 @@ pub mod measure;
 pub mod mechanism;
 pub mod metrics;
 pub mod number;
-pub mod nuts;
 pub mod overview;
 pub mod parameter;
 pub mod polyline;
