@@ -74,7 +74,7 @@ pub use taut_core::{
     polyline, quantity, signal, solve,
 };
 pub use taut_export as export;
-pub use taut_identify::{fit, nuts};
+pub use taut_identify::fit;
 
 /// Columns with units, and their files.
 pub mod trajectory {

@@ -6,4 +6,3 @@ use taut_control::*;
 use taut_core::*;
 
 pub mod fit;
-pub mod nuts;

@@ -1,8 +1,8 @@
 //! The case file with the estimates in it.
 
-use super::{Estimate, Fit};
 use crate::case::{Case, Files, Given};
 use crate::error::{Error, Result};
+use crate::fit::trust::found::{Estimate, Fit};
 use crate::machine::Machine;
 use crate::parameter::{self, Field, Parameter, named, values};
 use std::path::Path;

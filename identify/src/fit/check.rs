@@ -1,11 +1,15 @@
 //! Before a fit: what the logs show, what they determine, and what one more experiment would.
 
-use super::identify::{Group, Identifiability};
-use super::proposals::{Proposal, proposals};
-use super::regression::{Balance, regression};
-use super::{Fit, Stop, search, told, trials};
 use crate::case::{Case, Plan};
 use crate::error::Result;
+use crate::fit::asked::problem::Stop;
+use crate::fit::search::regression::{Balance, regression};
+use crate::fit::trust::found::Fit;
+use crate::fit::trust::identify::{Group, Identifiability};
+use crate::fit::trust::nearest::search;
+use crate::fit::trust::proposals::{Proposal, proposals};
+use crate::fit::trust::result::told;
+use crate::fit::trust::trials;
 use crate::log::Survey;
 use crate::solve::Flow;
 
@@ -47,8 +51,9 @@ pub fn check_watched(
     stop: Option<Stop>,
     watch: &mut dyn FnMut(&[f64], f64) -> Flow,
 ) -> Result<Check> {
-    let found = search(case, plan, stop, watch)?;
-    let judged = found.judged(case, plan);
+    let settled = search(case, plan, stop, watch)?;
+    let judged = settled.judged(case, plan);
+    let found = settled.searched;
     let experiments = judged.as_ref().map_or(Vec::new(), |judged| proposals(&found, judged));
     let noise: Vec<String> = found
         .noise

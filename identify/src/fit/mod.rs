@@ -3,69 +3,58 @@
 //! Output error: the model is put through every log's input, and what it would have shown is compared with what was
 //! seen, all logs at once. The recipe is [`fit`]; before it, [`check`] says what the logs can determine.
 
-mod acceleration;
-mod bundle;
+mod asked;
 mod case_text;
 mod check;
-mod cmaes;
-mod combinations;
 pub mod compare;
-mod controller;
-mod density;
-mod drift;
-mod drifting;
-pub mod experiment_design;
-mod findings;
-mod found;
-mod held_out;
-mod identify;
-pub mod least_squares;
-mod marginal;
-mod nearest;
+mod design;
 mod noise;
-mod other_laws;
 mod posterior;
-mod problem;
-mod profile;
-mod proposals;
-mod regression;
-mod residual_force;
-mod result;
-mod run;
-mod scores;
 mod search;
-mod sensitivity;
-mod sub_records;
-mod trials;
-mod triangle;
-mod uncertainty;
+mod trust;
+
+/// The experiment that determines parameters best.
+pub mod experiment_design {
+    pub use super::design::*;
+}
+
+/// Bounded non-linear least squares.
+pub mod least_squares {
+    pub use super::asked::residuals::{Bounds, Differences, Residuals, Step};
+    pub use super::search::least_squares::minimise;
+    pub use super::search::point::{Ending, Minimum, Options};
+}
 
 pub use crate::case::{drawn, machines};
+pub use asked::problem::{Problem, Stop};
+pub use asked::run::{Extra, MeasuredOutput, Nuisance, Run};
 pub use check::{Check, check, check_watched};
-pub use combinations::Combination;
-pub use drift::{Change, Drift, drift};
-pub use findings::{Finding, Grade};
-pub use found::{Estimate, Fit, Work};
-pub use identify::{Group, Identifiability, LIMIT, MODEL, SHOWS};
-pub use least_squares::Ending;
+pub use compare::drift::{Change, Drift, drift};
 pub use noise::Wave;
-pub use other_laws::OtherLaw;
+pub use noise::student::student;
+pub use posterior::nuts::Effort;
 pub use posterior::{Credible, EFFECTIVE, Posterior, R_HAT, posterior};
-pub use problem::{Problem, Stop};
-pub use profile::{Profile, profiles};
-pub use proposals::Proposal;
-pub use regression::{Balance, regression};
-pub use residual_force::{ResidualForce, residual_force};
-pub use run::{Extra, MeasuredOutput, Nuisance, Run};
-pub use scores::{LogFit, OutputFit, Score, Together, beside_log, together};
-use search::{HUBER, Searched, search};
-pub use sub_records::Disagreement;
-use uncertainty::Judged;
-pub use uncertainty::{Covariance, inverse_of_square, student};
+pub use search::point::Ending;
+pub use search::regression::{Balance, regression};
+pub use search::starts::Work;
+pub use search::triangle::inverse_of_square;
+pub use trust::combinations::Combination;
+pub use trust::directions::LIMIT;
+pub use trust::doubts::{Disagreement, OtherLaw};
+pub use trust::finding::{Finding, Grade};
+pub use trust::found::{Estimate, Fit};
+pub use trust::identify::{Group, Identifiability, MODEL, SHOWS};
+pub use trust::profile::{Profile, profiles};
+pub use trust::proposals::Proposal;
+pub use trust::residual_force::{ResidualForce, residual_force};
+pub use trust::scores::{LogFit, OutputFit, Score, Together, beside_log, together};
+pub use trust::uncertainty::Covariance;
 
 use crate::case::{Case, Plan};
 use crate::error::Result;
 use crate::solve::Flow;
+use trust::nearest::search;
+use trust::result::told;
 
 /// Finds the parameters of `plan` from the logs of `case`.
 ///
@@ -81,14 +70,7 @@ pub fn fit_watched(
     stop: Option<Stop>,
     watch: &mut dyn FnMut(&[f64], f64) -> Flow,
 ) -> Result<Fit> {
-    let found = search(case, plan, stop, watch)?;
-    let judged = found.judged(case, plan);
-    Ok(told(case, plan, &found, judged.as_ref()))
-}
-
-/// The result, and what is to be known of it.
-fn told(case: &Case, plan: &Plan, found: &Searched, judged: Option<&Judged>) -> Fit {
-    let mut fit = result::result(found, judged);
-    fit.findings = findings::findings(case, plan, found, &fit);
-    fit
+    let settled = search(case, plan, stop, watch)?;
+    let judged = settled.judged(case, plan);
+    Ok(told(case, plan, &settled.searched, judged.as_ref()))
 }

@@ -2,7 +2,7 @@
 
 use crate::case::{Case, Files, Plan};
 use crate::error::{Error, Result};
-use crate::fit::run::is_position;
+use crate::fit::asked::run::is_position;
 use crate::friction::Friction;
 use crate::log::Quantity;
 use crate::machine::Machine;

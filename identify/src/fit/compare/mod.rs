@@ -6,25 +6,26 @@
 //! exceeds that of the best by no more than a standard error of the differences e_cf − e_bf (the rule of one standard
 //! error, L. Breiman and others 1984).
 
+pub(crate) mod drift;
 mod laws;
 mod parts;
 
 pub use laws::FrictionLaw;
 
-use super::drift::nothing;
-use super::found::{Fit, Work};
-use super::held_out::met;
-use super::least_squares::Options;
-use super::problem::{Problem, Stop};
-use super::result::known;
-use super::scores::together;
-use super::search::{search_as_far, search_near};
-use super::told;
 use crate::case::{Case, Files, Plan};
 use crate::error::{Error, Result};
+use crate::fit::asked::problem::{Problem, Stop};
+use crate::fit::search::point::Options;
+use crate::fit::search::starts::{Work, search_as_far};
+use crate::fit::trust::found::Fit;
+use crate::fit::trust::held_out::met;
+use crate::fit::trust::nearest::search_near;
+use crate::fit::trust::result::{known, told};
+use crate::fit::trust::scores::together;
 use crate::log::Quantity;
 use crate::machine::Machine;
 use crate::solve::Flow;
+use drift::nothing;
 use parts::{Fold, Parts};
 use std::path::Path;
 
@@ -369,9 +370,10 @@ impl Course<'_> {
             case =
                 Case { experiments: self.case.experiments.clone(), unread: Vec::new(), machine: case.machine, ..read };
         }
-        let found = search_near(&case, &own.given, &plan, self.stop, &mut |_, _| Flow::Continue)?;
+        let settled = search_near(&case, &own.given, &plan, self.stop, &mut |_, _| Flow::Continue)?;
+        let judged = settled.judged(&case, &plan);
+        let found = settled.searched;
         self.work.add(&found.work);
-        let judged = found.judged(&case, &plan);
         let fit = told(&case, &plan, &found, judged.as_ref());
         Ok(Comparison {
             chosen,

@@ -20,14 +20,15 @@ mod filter;
 mod place;
 mod scale;
 mod series;
+pub(crate) mod student;
 
-use super::problem::Problem;
-use super::run::is_position;
-use super::uncertainty::student_share;
+use crate::fit::asked::problem::Problem;
+use crate::fit::asked::run::is_position;
 use crate::log::Quantity;
 use nalgebra::{DMatrix, DVector};
 use series::Series;
 use std::f64::consts::TAU;
+use student::student_share;
 
 /// Ratio of neighbouring time constants of the grid, and of neighbouring powers.
 const TIMES: f64 = 2.2;

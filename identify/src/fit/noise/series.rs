@@ -1,7 +1,7 @@
 //! The rows of a quantity, taken together where they are many or share an error of rounding.
 
-use super::super::problem::Problem;
-use super::super::run::is_position;
+use crate::fit::asked::problem::Problem;
+use crate::fit::asked::run::is_position;
 use crate::log::Quantity;
 use nalgebra::DMatrix;
 
