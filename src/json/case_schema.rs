@@ -14,7 +14,7 @@ pub fn case_schema() -> Value {
     let mut schema = object(&root());
     let head = json!({
         "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "$id": super::result_schema::address("case"),
+        "$id": super::address("case"),
         "title": "A case file of taut",
         "description": "A belt-driven machine in TOML, and what is done with it.",
         "$defs": { "input": input(), "friction": friction("cart.friction"), "pulley_friction": friction("drive_pulley.friction") },

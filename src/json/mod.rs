@@ -74,3 +74,8 @@ pub fn ending(ending: Ending, end: f64) -> (&'static str, f64) {
 fn peak(peak: Peak) -> Value {
     json!({ "value": peak.value, "time_s": peak.time })
 }
+
+/// The URI of a schema.
+fn address(name: &str) -> String {
+    format!("urn:taut:{name}:1")
+}

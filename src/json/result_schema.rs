@@ -50,7 +50,7 @@ pub fn schema(name: &str) -> Option<Value> {
     }
     let mut schema = root.schema();
     schema["$schema"] = json!("https://json-schema.org/draft/2020-12/schema");
-    schema["$id"] = json!(address(name));
+    schema["$id"] = json!(super::address(name));
     schema["title"] = json!(words);
     // A list has no word of its own.
     if root.element.is_none() {
@@ -62,11 +62,6 @@ pub fn schema(name: &str) -> Option<Value> {
 /// The word that a result of this name begins with.
 pub fn identity(name: &str) -> String {
     format!("taut/{name}/1")
-}
-
-/// The URI of a schema.
-pub(super) fn address(name: &str) -> String {
-    format!("urn:taut:{name}:1")
 }
 
 /// A key and what is below it.

@@ -31,7 +31,7 @@ pub struct Batch {
 impl Batch {
     /// Begins files for the folder `root`, which exists.
     pub fn begin(root: &Path) -> Result<Self> {
-        let name = |k: usize| root.join(format!(".{k}{}", temporary::ENDING));
+        let name = |k: usize| root.join(format!(".{k}{}", unfinished::ENDING));
         let (hidden, open) = temporary::claim(name, create).map_err(|e| cannot_write(root, &e))?;
         Ok(Self { root: root.to_path_buf(), hidden, _open: open })
     }
@@ -90,7 +90,7 @@ impl Drop for Batch {
 /// A path as it is told to people: without the hidden folder that its file is written in.
 pub fn shown(path: &Path) -> PathBuf {
     let hidden = |part: &OsStr| {
-        let digits = part.to_str().and_then(|part| part.strip_prefix('.')?.strip_suffix(temporary::ENDING));
+        let digits = part.to_str().and_then(|part| part.strip_prefix('.')?.strip_suffix(unfinished::ENDING));
         digits.is_some_and(|digits| !digits.is_empty() && digits.bytes().all(|b| b.is_ascii_digit()))
     };
     path.components().filter(|part| !hidden(part.as_os_str())).collect()
@@ -107,7 +107,7 @@ fn create(path: &Path) -> io::Result<File> {
 #[cfg(not(unix))]
 fn create(path: &Path) -> io::Result<File> {
     fs::create_dir(path)?;
-    File::create(path.join(format!(".lock{}", temporary::ENDING)))
+    File::create(path.join(format!(".lock{}", unfinished::ENDING)))
 }
 
 fn list(folder: &Path, below: &Path, names: &mut Vec<PathBuf>) -> io::Result<()> {
@@ -117,7 +117,7 @@ fn list(folder: &Path, below: &Path, names: &mut Vec<PathBuf>) -> io::Result<()>
         let below = below.join(&name);
         if entry.file_type()?.is_dir() {
             list(&entry.path(), &below, names)?;
-        } else if !name.to_string_lossy().ends_with(temporary::ENDING) {
+        } else if !name.to_string_lossy().ends_with(unfinished::ENDING) {
             names.push(below);
         }
     }

@@ -1,13 +1,10 @@
 //! Temporary files and folders: locked while their program runs, so that those of a killed one can be told and removed.
 
-use super::unfinished;
+use super::unfinished::{self, ENDING};
 use std::ffi::{OsStr, OsString};
 use std::fs::{self, File, TryLockError};
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
-
-/// How their names end; they begin with a point.
-pub(super) const ENDING: &str = ".taut.tmp";
 
 /// Longest name that a file may have on the usual file systems, bytes.
 const LONGEST: usize = 255;

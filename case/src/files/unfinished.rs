@@ -6,6 +6,9 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
 use std::time::{Duration, Instant};
 
+/// How their names end; they begin with a point.
+pub(super) const ENDING: &str = ".taut.tmp";
+
 /// Temporary files, hidden folders and locks that exist now, and folders that were made for results.
 static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
@@ -59,7 +62,7 @@ pub fn abandon() {
 
 /// Removes a file, a hidden folder with what is in it, or another folder if it is empty.
 fn remove(path: &Path) {
-    let is_hidden = path.file_name().is_some_and(|name| name.to_string_lossy().ends_with(super::temporary::ENDING));
+    let is_hidden = path.file_name().is_some_and(|name| name.to_string_lossy().ends_with(ENDING));
     match fs::symlink_metadata(path) {
         Ok(data) if !data.is_dir() => drop(fs::remove_file(path)),
         // Another thread may be writing a file in it.

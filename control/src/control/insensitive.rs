@@ -19,7 +19,7 @@
 //! solution is known: V(x) = V T_m(β cos πx/2) with Chebyshev's polynomial. From there Newton's method follows it as
 //! the damping grows.
 
-use super::shaper::Kind;
+use super::kind::Kind;
 use nalgebra::{Complex, DMatrix, DVector};
 use std::f64::consts::PI;
 

@@ -10,6 +10,7 @@
 mod at_samples;
 pub mod compare;
 pub mod compensation;
+mod criterion;
 pub mod damping;
 pub mod drives;
 pub mod feasible;
@@ -17,6 +18,7 @@ pub mod feedback;
 pub mod filter;
 pub mod fuzzy;
 mod insensitive;
+mod kind;
 mod memory;
 pub mod model;
 pub mod observer;

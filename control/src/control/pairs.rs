@@ -5,8 +5,8 @@
 //! W. Singhose, E. Crain, W. Seering, "Convolved and simultaneous two-mode input shapers", *IEE Proceedings - Control
 //! Theory and Applications* 144 (1997) 515-520.
 
+use super::criterion::{ALLOWED_SMOOTHING, Criterion, Target, score};
 use super::shaper::{Form, Pattern, Shaper, max_acceleration, smoothing};
-use super::shaping::{ALLOWED_SMOOTHING, Criterion, Target, score};
 
 /// Frequencies of each shaper that are tried, at equal ratios.
 const GRID: usize = 40;

@@ -1,11 +1,19 @@
 //! Coordinates: which quantities are the states, and what every stretch, speed and angle is in terms of them.
 
-use super::model::Variable;
 use crate::friction::Law;
 use crate::machine::axis::{BODIES, CART, DRIVE, ROTOR};
 use crate::machine::{BeltModel, Machine};
 use crate::mechanism::{Form, Mechanism};
 use nalgebra::{DMatrix, DVector};
+
+/// A quantity with its unit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Variable {
+    /// As the columns of a run are called.
+    pub name: &'static str,
+    /// Its unit.
+    pub unit: &'static str,
+}
 
 /// Speeds: of the three bodies, and of the rotor.
 pub(super) const SPEEDS: usize = 4;

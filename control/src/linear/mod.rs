@@ -24,8 +24,9 @@ mod zeros;
 
 pub use analysis::{Analysis, Question};
 pub use discrete::{Discrete, Hold};
+pub use frame::Variable;
 pub use gantry::{GantryAnalysis, ResonanceMap};
-pub use model::{Operation, StateSpace, Variable};
+pub use model::{Operation, StateSpace};
 pub use natural::{ElasticMode, Natural, RigidMode};
 pub use response::{Range, Response, Transfer};
 pub use travel::{Place, places, travel, undamped};

@@ -1,6 +1,6 @@
 //! The equations of a stage, linearised about steady sliding, as matrices.
 
-use super::frame::{Frame, has_rotor};
+use super::frame::{Frame, Variable, has_rotor};
 use crate::error::{Error, Result};
 use crate::friction::{Law, Motion};
 use crate::machine::axis::{BODIES, ROTOR, SPANS};
@@ -26,15 +26,6 @@ impl Default for Operation {
     fn default() -> Self {
         Self { speed: 0.1, position: 0.0, held: [false; 3] }
     }
-}
-
-/// A quantity with its unit.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Variable {
-    /// As the columns of a run are called.
-    pub name: &'static str,
-    /// Its unit.
-    pub unit: &'static str,
 }
 
 /// ẋ = A x + b u, y = C x + d u: small motions on top of steady sliding.

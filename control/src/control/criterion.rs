@@ -1,0 +1,178 @@
+//! What shapers are chosen for, and by what: the vibration that is left, smoothing, and the score of both.
+
+use super::kind::{Kind, TOLERANCE};
+use super::resonance::Resonance;
+use super::shaper::{Corner, Firmware, Form, Shaper, USUAL_DAMPING, check_damping};
+use super::spectrum::Spectrum;
+use crate::error::Result;
+
+/// The highest frequency of a shaper for a spectrum, Hz; it is not reached.
+const HIGHEST: f64 = 150.0;
+/// Steps of a shaper's frequency within one hertz.
+const STEPS: f64 = 5.0;
+/// Smoothing that is not too much, m: what the greatest acceleration is suggested for.
+pub const ALLOWED_SMOOTHING: f64 = 0.12e-3;
+
+/// Where within the uncertainty of its frequency a mode is looked at.
+const PARTS: [f64; 5] = [-1.0, -0.5, 0.0, 0.5, 1.0];
+
+/// The vibration that a shaper is chosen for.
+#[derive(Debug, Clone, Copy)]
+pub enum Target<'a> {
+    /// Density over frequency; damping is not known.
+    Spectrum(&'a Spectrum),
+    /// Several of them: what remains of the one of which most does counts.
+    Spectra(&'a [Spectrum]),
+    /// Modes of known damping, each at its own time: the one that keeps the most counts.
+    Modes {
+        /// At all places of the travel.
+        modes: &'a [Resonance],
+        /// By which part their true frequencies may be higher or lower.
+        uncertainty: f64,
+    },
+}
+
+/// By what shapers are chosen.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Criterion {
+    /// Damping ratio that shapers are designed for.
+    pub damping: f64,
+    /// Damping ratios of the machine at which a spectrum's vibration is looked at; the worst counts.
+    pub tested: Vec<f64>,
+    /// The corner at which smoothing is compared.
+    pub corner: Corner,
+    /// Most smoothing that is allowed, m.
+    pub max_smoothing: Option<f64>,
+    /// Most vibration that is wanted, of that without a shaper.
+    pub max_vibrations: Option<f64>,
+    /// Whose definitions and rule.
+    pub firmware: Firmware,
+    /// Forms that are fitted.
+    pub forms: Vec<Form>,
+    /// Those of them that may be recommended.
+    pub candidates: Vec<Form>,
+    /// Whether pairs of them, convolved, are looked at, too.
+    pub pairs: bool,
+}
+
+impl Default for Criterion {
+    /// As Klipper's: designed for a damping ratio of 0.1, looked at from 0.075 to 0.15. ZVD is fitted, but not a
+    /// candidate: it is as long as EI and covers less.
+    fn default() -> Self {
+        let forms: Vec<Form> = Kind::ALL.map(Form::from).to_vec();
+        let candidates = forms.iter().copied().filter(|form| form.kind() != Kind::Zvd).collect();
+        let mut criterion = Self {
+            damping: 0.0,
+            tested: Vec::new(),
+            corner: Corner::default(),
+            max_smoothing: None,
+            max_vibrations: None,
+            firmware: Firmware::default(),
+            forms,
+            candidates,
+            pairs: false,
+        };
+        criterion.assume(USUAL_DAMPING);
+        criterion
+    }
+}
+
+impl Criterion {
+    /// Designs for a damping ratio ζ, and looks at ¾ ζ, ζ and 1½ ζ.
+    pub fn with_damping(mut self, damping: f64) -> Result<Self> {
+        check_damping(damping)?;
+        self.assume(damping);
+        Ok(self)
+    }
+
+    /// Fits these forms alone; each may be recommended.
+    pub fn with_forms(mut self, forms: &[Form]) -> Self {
+        self.forms = forms.to_vec();
+        self.candidates = forms.to_vec();
+        self
+    }
+
+    fn assume(&mut self, damping: f64) {
+        self.damping = damping;
+        self.tested = vec![0.75 * damping, damping, (1.5 * damping).min(0.999)];
+        self.tested.dedup();
+    }
+}
+
+impl Target<'_> {
+    /// Vibration that a shaper leaves, of that without one: 0 to 1; of a spectrum what is above a twentieth of the
+    /// highest peak.
+    pub fn remaining(&self, shaper: &Shaper, dampings: &[f64]) -> f64 {
+        self.weighed(dampings, &mut |f, zeta| shaper.residual_vibration(f, zeta))
+    }
+
+    /// The same of anything that leaves V(f, ζ), which is asked for always in the same order.
+    pub(super) fn weighed(&self, dampings: &[f64], left: &mut dyn FnMut(f64, f64) -> f64) -> f64 {
+        match self {
+            Target::Spectrum(spectrum) => of_spectrum(spectrum, left, dampings),
+            Target::Spectra(spectra) => {
+                spectra.iter().map(|spectrum| of_spectrum(spectrum, left, dampings)).fold(0.0, f64::max)
+            }
+            // max V w / w_max over modes and over f (1 − u) to f (1 + u); nothing is taken off, as a model has no noise
+            Target::Modes { modes, uncertainty } => {
+                let most = modes.iter().map(|mode| mode.share).fold(0.0, f64::max);
+                let mut at = |mode: &Resonance, part: f64| {
+                    let f = mode.frequency * (1.0 + part * uncertainty);
+                    left(f, mode.damping) * mode.share / most
+                };
+                let mut worst = |mode: &Resonance| PARTS.iter().map(|part| at(mode, *part)).fold(0.0, f64::max);
+                modes.iter().map(&mut worst).fold(0.0, f64::max)
+            }
+        }
+    }
+
+    /// The spectrum that is left behind a shaper, at the worst of the damping ratios.
+    pub fn left(spectrum: &Spectrum, shaper: &Shaper, dampings: &[f64]) -> Vec<f64> {
+        let worst = |f: f64| dampings.iter().map(|z| shaper.residual_vibration(f, *z)).fold(0.0, f64::max);
+        spectrum.frequency.iter().zip(&spectrum.density).map(|(f, p)| worst(*f) * p).collect()
+    }
+
+    /// Frequencies that are tried for a kind, ascending.
+    pub(super) fn grid(&self, kind: Kind) -> Vec<f64> {
+        match self {
+            Target::Spectrum(_) | Target::Spectra(_) => {
+                let first = lowest(kind) * STEPS;
+                let count = (HIGHEST * STEPS - first) as usize;
+                (0..count).map(|k| (first + k as f64) / STEPS).collect()
+            }
+            Target::Modes { modes, .. } => {
+                let low = modes.iter().map(|mode| mode.frequency).fold(f64::INFINITY, f64::min);
+                let high = modes.iter().map(|mode| mode.frequency).fold(0.0, f64::max);
+                let step = low / 200.0;
+                let count = ((3.0 * high - 0.5 * low) / step) as usize;
+                (0..count.min(20_000)).map(|k| 0.5 * low + k as f64 * step).collect()
+            }
+        }
+    }
+}
+
+/// Σ max(V P − P_max/20, 0) / Σ max(P − P_max/20, 0), at the worst of the damping ratios.
+fn of_spectrum(spectrum: &Spectrum, v: &mut dyn FnMut(f64, f64) -> f64, dampings: &[f64]) -> f64 {
+    let floor = TOLERANCE * spectrum.greatest();
+    let above = |p: f64| (p - floor).max(0.0);
+    let lines = || spectrum.frequency.iter().zip(&spectrum.density).filter(|(_, p)| **p > floor);
+    let whole: f64 = lines().map(|(_, p)| above(*p)).sum();
+    let left = |zeta: &f64| -> f64 { lines().map(|(f, p)| above(v(*f, *zeta) * p)).sum() };
+    dampings.iter().map(left).fold(0.0, f64::max) / whole
+}
+
+/// The lowest frequency that is tried on a spectrum, Hz: below, hardly 1500 mm/s² would be left.
+fn lowest(kind: Kind) -> f64 {
+    match kind {
+        Kind::Zv => 21.0,
+        Kind::Mzv => 23.0,
+        Kind::Zvd | Kind::Ei => 29.0,
+        Kind::TwoHumpEi => 39.0,
+        Kind::ThreeHumpEi => 48.0,
+    }
+}
+
+/// Smoothing in mm times (v^1.5 + 0.2 v + 0.01): with little vibration v left it is smoothing that counts.
+pub(super) fn score(smoothing: f64, v: f64) -> f64 {
+    smoothing * 1e3 * (v.powf(1.5) + 0.2 * v + 0.01)
+}
