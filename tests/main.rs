@@ -45,6 +45,7 @@ mod quantity;
 mod recorders;
 mod reference;
 
+mod rooms;
 mod rounding;
 mod rows;
 mod sensitivity;

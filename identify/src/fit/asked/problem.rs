@@ -4,23 +4,12 @@ use super::residuals::{Bounds, Differences, Residuals, Step};
 use super::run::{Extra, MeasuredOutput, Nuisance, Run, Setting, is_position, rounding_at_rest};
 use crate::case::{Case, Nuisances, Plan, Scope, matches, parameters};
 use crate::error::{Error, Result};
+use crate::fit::limits::{FILE_ROUNDING, KNOWN_DELAY, SLOW_BY_DIFFERENCE, STARTS_MOVING};
 use crate::log::Quantity;
 use crate::machine::{AmplifierMode, Machine};
 use crate::parameter::{self, Free};
 use crate::solve::Bench;
 use nalgebra::DMatrix;
-
-/// Share of how far a quantity ranges that numbers in files and solvers may be off by.
-pub(crate) const ROUNDING: f64 = 1e-10;
-
-/// A delay that is known to so many samples is known.
-const LATE: f64 = 10.0;
-
-/// Standard errors of its speed by which a log has to begin in motion, to be taken to.
-const MOVES: f64 = 5.0;
-
-/// Noise of first order that keeps to itself for 30 samples is so many times what neighbouring values differ by.
-const SHARED: f64 = 5.0;
 
 /// The variables of a fit, and its logs.
 #[derive(Clone)]
@@ -231,7 +220,7 @@ impl<'a> Problem<'a> {
                 let (slope, doubt) = slope_at_start(run, r, &noise);
                 // A log begins at rest, unless it shows that it does not: a start at rest sticks, and a search from
                 // there sees nothing of the speed.
-                let start = if windowed || slope.abs() > MOVES * doubt { slope } else { 0.0 };
+                let start = if windowed || slope.abs() > STARTS_MOVING * doubt { slope } else { 0.0 };
                 let (low, high) = (start - 20.0 * fast, start + 20.0 * fast);
                 run.extras.push(Extra { what: Nuisance::StartSpeed, start, unit: fast, low, high, known: None });
             }
@@ -335,7 +324,7 @@ impl<'a> Problem<'a> {
             for extra in run.extras.iter_mut().filter(|extra| extra.what == Nuisance::StartPosition) {
                 if let Some(known) = &mut extra.known {
                     // Its unit is what neighbouring values differ by.
-                    *known = known.max(deviation.min(SHARED * extra.unit));
+                    *known = known.max(deviation.min(SLOW_BY_DIFFERENCE * extra.unit));
                     let room = 6.0 * *known;
                     (extra.low, extra.high) = (extra.low.min(extra.start - room), extra.high.max(extra.start + room));
                 }
@@ -343,11 +332,12 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// Residuals that are rounding, with the present weights: of each quantity `ROUNDING` of how far it ranges.
+    /// Residuals that are rounding, with the present weights: of each quantity `FILE_ROUNDING` of how far it ranges.
     pub fn rounding(&self) -> f64 {
         let seen = self.runs.iter().flat_map(|run| &run.seen);
-        let of =
-            |seen: &MeasuredOutput| ROUNDING * extent(&seen.values) * seen.weights.iter().copied().fold(0.0, f64::max);
+        let of = |seen: &MeasuredOutput| {
+            FILE_ROUNDING * extent(&seen.values) * seen.weights.iter().copied().fold(0.0, f64::max)
+        };
         seen.map(of).fold(0.0, f64::max)
     }
 
@@ -443,7 +433,7 @@ impl<'a> Problem<'a> {
             Some(Scale::Log(_)) => 1.0,
             None => match self.shared[j - self.parameters.len()].what {
                 // Its unit is a sample's interval, to which few logs tell a delay.
-                Nuisance::Delay => LATE,
+                Nuisance::Delay => KNOWN_DELAY,
                 _ => 1.0,
             },
         }

@@ -4,6 +4,7 @@ use super::acceleration::cart_acceleration;
 use crate::case::{Case, Experiment, Initial};
 use crate::control::{Added, follow};
 use crate::design::Design;
+use crate::fit::limits::{DITHER_STEPS, EVEN_RASTER, INPUT_BEFORE_WINDOW, RASTER_POINTS};
 use crate::log::{Log, Quantity};
 use crate::machine::{AmplifierMode, Machine};
 use crate::signal::Signal;
@@ -11,20 +12,6 @@ use crate::signal::profile::Profile;
 use crate::solve::{Bench, Detail, Ending, Flow, Solver};
 use crate::trajectory::{Grid, Trajectory};
 use std::sync::Arc;
-
-/// Share of an interval by which times may be off an even raster and still count as on it: the solver then answers at
-/// the raster's times. What that makes of a value is at most its rate of change times this share of an interval.
-const EVEN: f64 = 1e-3;
-
-/// So often up and so often down, and that in every hundred, go values at rest that tremble.
-const FEWEST: usize = 2;
-
-/// Points of the raster per interval where times are uneven; between them positions follow cubics through positions and
-/// speeds, all else straight lines. With h the raster, that is off by at most h⁴|x⁗|/384, and h²|ÿ|/8.
-const RASTER: f64 = 8.0;
-
-/// Rows of input that are kept from before a window: more than a delay that is fitted along comes to.
-const EARLIER: usize = 60;
 
 /// A nuisance of a log: fitted along, one for each log.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -185,14 +172,14 @@ impl Run {
         let n = time.len();
         let (first, last) = (time[0], time[n - 1]);
         let interval = (last - first) / (n - 1) as f64;
-        let even = first.abs() <= EVEN * interval
-            && time.iter().enumerate().all(|(k, t)| (t - first - k as f64 * interval).abs() <= EVEN * interval);
+        let even = first.abs() <= EVEN_RASTER * interval
+            && time.iter().enumerate().all(|(k, t)| (t - first - k as f64 * interval).abs() <= EVEN_RASTER * interval);
         let (every, until) = if even {
             (interval, interval * (n - 1) as f64)
         } else {
             let mut steps: Vec<f64> = time.windows(2).map(|pair| pair[1] - pair[0]).collect();
             let middle = steps.len() / 2;
-            let every = *steps.select_nth_unstable_by(middle, f64::total_cmp).1 / RASTER;
+            let every = *steps.select_nth_unstable_by(middle, f64::total_cmp).1 / RASTER_POINTS;
             (every, every * (last / every).ceil().max(1.0))
         };
         // On the raster, where the solver need not stop twice for a sample.
@@ -203,7 +190,7 @@ impl Run {
             experiment.input.clone()
         } else {
             // A window that is late still has the input of what came before it.
-            let earlier = rows.start.saturating_sub(EARLIER)..rows.start;
+            let earlier = rows.start.saturating_sub(INPUT_BEFORE_WINDOW)..rows.start;
             let before = log.time[earlier.clone()].iter().map(|t| t - shift);
             let values = log.input[earlier].iter().chain(&logged).copied().collect();
             Signal::Sampled { times: before.chain(times).collect(), values, hold: log.hold }
@@ -577,7 +564,7 @@ fn alike(values: &[f64], step: f64) -> Vec<f64> {
             down += usize::from(values[last] < values[last - 1]);
             last += 1;
         }
-        if up.min(down) >= FEWEST.max((last - first) / 100) {
+        if up.min(down) >= DITHER_STEPS.max((last - first) / 100) {
             alike[first..last].fill((last - first) as f64);
         }
         first = last;

@@ -3,6 +3,7 @@
 use super::problem::Problem;
 use super::residuals::{Bounds, Differences, Step};
 use super::run::{Nuisance, Run, between, heading_of, per_position, speed_of};
+use crate::fit::limits::{EQUATION_STEP, START_STEP};
 use crate::log::Quantity;
 use crate::machine::Machine;
 use crate::machine::axis::{CART, DRIVE};
@@ -11,13 +12,6 @@ use crate::signal::Signal;
 use crate::solve::{Begun, Bench, Differentiated, Variable};
 use nalgebra::DMatrix;
 use std::sync::Arc;
-
-/// How far apart machines are that equations are compared of, by a share of a variable or of its unit: what differences
-/// of three numbers as they are in fractions are off by balances what rounding does where one of many terms changes.
-const APART: f64 = 3e-5;
-
-/// The part of its unit by which a start is moved: the state depends on it in a straight line.
-const START: f64 = 1e-2;
 
 impl Problem<'_> {
     /// Puts the derivatives of the residuals of run `index`, which begin at row `first`, into the columns of these
@@ -119,10 +113,10 @@ impl Problem<'_> {
             Some((Nuisance::InputOffset, unit)) => Some(Variable::Offset(unit, run.begins(&self.extras_of(index, x))?)),
             Some((Nuisance::Bias(_), _)) => None,
             Some((Nuisance::StartPosition | Nuisance::StartSpeed, _)) => {
-                Some(Variable::central(START, |by| begun(x[j] + by)))
+                Some(Variable::central(START_STEP, |by| begun(x[j] + by)))
             }
             None | Some((Nuisance::InputGain, _)) => {
-                let steps = Differences::Coarse(x.iter().map(|x| APART * x.abs().max(1.0)).collect());
+                let steps = Differences::Coarse(x.iter().map(|x| EQUATION_STEP * x.abs().max(1.0)).collect());
                 let step = Step::new(x, bounds, j, &steps);
                 let second = step.second?;
                 Some(Variable::Machine {

@@ -4,6 +4,7 @@
 use crate::case::{Case, Nuisances, Plan, Scope};
 use crate::error::Result;
 use crate::fit::asked::problem::Stop;
+use crate::fit::limits::CHANGE_ALIKE;
 use crate::fit::search::starts::{Searched, Work};
 use crate::fit::trust::found::Estimate;
 use crate::fit::trust::nearest::{Settled, search};
@@ -13,9 +14,6 @@ use crate::fit::trust::uncertainty::Judged;
 use crate::log::Quantity;
 use crate::parameter::{self, Free};
 use crate::solve::Flow;
-
-/// Changes that leave as much of the sum of squares as the best one but for this part are as good.
-const ALIKE: f64 = 0.02;
 
 /// The effect of single changes on the errors of a machine.
 #[derive(Debug, Clone)]
@@ -48,7 +46,7 @@ impl Drift {
     /// The changes that leave as little as the best one, the best among them.
     pub fn best(&self) -> impl Iterator<Item = &Change> {
         let least = self.changes.first().map_or(0.0, |change| change.left);
-        self.changes.iter().take_while(move |change| change.left <= least * (1.0 + ALIKE) + 1e-12)
+        self.changes.iter().take_while(move |change| change.left <= least * (1.0 + CHANGE_ALIKE) + 1e-12)
     }
 }
 

@@ -3,30 +3,12 @@
 use crate::case::{Case, Files, Plan};
 use crate::error::{Error, Result};
 use crate::fit::asked::run::is_position;
+use crate::fit::limits::{BRISTLE_BEND, MOST_BREAKAWAY, SPEED_POINTS, STRIBECK_ABOVE, STRIBECK_FALL, TRAVEL_POINTS};
 use crate::friction::Friction;
 use crate::log::Quantity;
 use crate::machine::Machine;
 use std::path::Path;
 use toml_edit::{Array, DocumentMut, InlineTable, Item, Value};
-
-/// Points of friction and of forces along the travel.
-const POINTS: usize = 7;
-
-/// Speeds at which a force by speed has points, as shares of the greatest one.
-const SPEEDS: [f64; 7] = [-1.0, -0.5, -0.125, 0.0, 0.125, 0.5, 1.0];
-
-/// Share of the Coulomb friction that a Stribeck curve begins above it, and share of the greatest speed over which it
-/// falls.
-const ABOVE: f64 = 0.2;
-
-/// Breakaway at most, as a multiple of the Coulomb friction that a search begins with: where a log never rests, a
-/// breakaway that holds for ever meets it as well, and holds the next log for ever.
-const BREAKAWAY: f64 = 4.0;
-
-const FALL: f64 = 0.05;
-
-/// Way over which bristles bend, m of the cart, where a search begins.
-const BEND: f64 = 2e-5;
 
 /// A friction law of a body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -134,9 +116,9 @@ pub(super) fn with(
     let (table, keys) = table(case, law, sided, &friction, fastest, body);
     let coulomb = table.get("coulomb").and_then(Value::as_float).unwrap_or_default();
     let near = match law {
-        FrictionLaw::Stribeck => Some(("stribeck.force", [0.0, (BREAKAWAY - 1.0) * coulomb])),
+        FrictionLaw::Stribeck => Some(("stribeck.force", [0.0, (MOST_BREAKAWAY - 1.0) * coulomb])),
         // Below Coulomb friction it would change nothing.
-        FrictionLaw::LuGre => Some(("static", [coulomb, BREAKAWAY * coulomb])),
+        FrictionLaw::LuGre => Some(("static", [coulomb, MOST_BREAKAWAY * coulomb])),
         _ => None,
     };
     let mut free: Vec<String> = keys.iter().map(|key| format!("{body}.friction.{key}")).collect();
@@ -199,15 +181,15 @@ struct Line {
 fn line(case: &Case, law: FrictionLaw, is_held: bool) -> Option<Line> {
     match law {
         FrictionLaw::ForceAlong => {
-            let free = (0..POINTS).filter(|k| !(is_held && *k == POINTS / 2)).collect();
+            let free = (0..TRAVEL_POINTS).filter(|k| !(is_held && *k == TRAVEL_POINTS / 2)).collect();
             Some(Line { key: "force_along", over: over_travel(case).collect(), free })
         }
         FrictionLaw::ForceBySpeed => {
             // What goes with the speed is viscous friction, and what has its sign Coulomb friction.
             let fastest = fastest(case);
-            let is_free = |k: &usize| SPEEDS[*k] != 0.0 && SPEEDS[*k].abs() != 1.0;
-            let free = (0..SPEEDS.len()).filter(is_free).collect();
-            Some(Line { key: "force_by_speed", over: SPEEDS.iter().map(|share| share * fastest).collect(), free })
+            let is_free = |k: &usize| SPEED_POINTS[*k] != 0.0 && SPEED_POINTS[*k].abs() != 1.0;
+            let free = (0..SPEED_POINTS.len()).filter(is_free).collect();
+            Some(Line { key: "force_by_speed", over: SPEED_POINTS.iter().map(|share| share * fastest).collect(), free })
         }
         _ => None,
     }
@@ -240,7 +222,7 @@ fn table(
         put("viscous_backward", backward.viscous);
         put("coulomb_backward", if backward.coulomb > 0.0 { backward.coulomb } else { coulomb });
     }
-    let velocity = FALL * fastest;
+    let velocity = STRIBECK_FALL * fastest;
     match law {
         FrictionLaw::Viscous
         | FrictionLaw::Coulomb
@@ -249,7 +231,7 @@ fn table(
         | FrictionLaw::ForceBySpeed => {}
         FrictionLaw::Stribeck => {
             let mut own = InlineTable::new();
-            own.insert("force", Value::from(ABOVE * coulomb));
+            own.insert("force", Value::from(STRIBECK_ABOVE * coulomb));
             own.insert("velocity", Value::from(velocity));
             table.insert("stribeck", Value::InlineTable(own));
             keys.extend(["stribeck.force", "stribeck.velocity"].map(String::from));
@@ -258,17 +240,17 @@ fn table(
             let point = |x: f64| Value::Array(Array::from_iter([x, 1.0]));
             table.insert("along", Value::Array(over_travel(case).map(point).collect()));
             // One of them is 1: Coulomb friction is what the factors are of.
-            let others = (0..POINTS).filter(|k| *k != POINTS / 2);
+            let others = (0..TRAVEL_POINTS).filter(|k| *k != TRAVEL_POINTS / 2);
             keys.extend(others.map(|k| format!("along.{k}.factor")));
         }
         FrictionLaw::LuGre => {
-            let stiffness = coulomb / BEND * if body == "cart" { 1.0 } else { case.machine.pulley_radius };
+            let stiffness = coulomb / BRISTLE_BEND * if body == "cart" { 1.0 } else { case.machine.pulley_radius };
             let mass = if body == "cart" { case.machine.cart.mass } else { case.machine.drive_pulley.inertia };
             let mut own = InlineTable::new();
             own.insert("stiffness", Value::from(stiffness));
             own.insert("damping", Value::from((stiffness * mass).sqrt()));
             own.insert("velocity", Value::from(velocity));
-            table.insert("static", Value::from((1.0 + ABOVE) * coulomb.max(backward.coulomb)));
+            table.insert("static", Value::from((1.0 + STRIBECK_ABOVE) * coulomb.max(backward.coulomb)));
             table.insert("lugre", Value::InlineTable(own));
             keys.extend(["static", "lugre.stiffness", "lugre.velocity"].map(String::from));
         }
@@ -343,7 +325,7 @@ fn fastest(case: &Case) -> f64 {
 /// Places along the way that the logs show, m.
 fn over_travel(case: &Case) -> impl Iterator<Item = f64> {
     let (low, high) = travel(case);
-    (0..POINTS).map(move |k| low + (high - low) * k as f64 / (POINTS - 1) as f64)
+    (0..TRAVEL_POINTS).map(move |k| low + (high - low) * k as f64 / (TRAVEL_POINTS - 1) as f64)
 }
 
 /// Where the cart is in the logs, m.

@@ -15,6 +15,7 @@ pub use laws::FrictionLaw;
 use crate::case::{Case, Files, Plan};
 use crate::error::{Error, Result};
 use crate::fit::asked::problem::{Problem, Stop};
+use crate::fit::limits::{ROUGH_TOLERANCE, START_SHARE, STEPS, STEPS_IN_PART};
 use crate::fit::search::point::Options;
 use crate::fit::search::starts::{Work, search_as_far};
 use crate::fit::trust::found::Fit;
@@ -29,18 +30,11 @@ use drift::nothing;
 use parts::{Fold, Parts};
 use std::path::Path;
 
-/// Share of a record to which its start is fitted; the rest of it is foretold.
-const BEGIN: f64 = 0.1;
-
 /// How far the fits go that are compared: what another step would move them by is far less than what laws differ by in
 /// records that were held out. Fits to parts begin where that to the whole ended.
 fn compared(iterations: usize) -> Options {
-    Options { tolerance: 0.1, iterations, evolutions: 0, ..Options::default() }
+    Options { tolerance: ROUGH_TOLERANCE, iterations, evolutions: 0, ..Options::default() }
 }
-
-/// Most steps of a fit to all logs, and of one to a part of them.
-const STEPS: usize = 20;
-const STEPS_IN_PART: usize = 10;
 
 /// The laws and windows to compare.
 #[derive(Debug, Clone, PartialEq)]
@@ -273,7 +267,7 @@ impl Course<'_> {
         let held = Case { experiments: held_out.clone(), ..case.clone() };
         let scored = Plan { windows: None, nuisance: plan.nuisance, ..nothing(&plan) };
         let logs: Vec<_> =
-            Problem::new(&held, &scored)?.runs.iter().map(|run| met(run, &machine, &known, BEGIN)).collect();
+            Problem::new(&held, &scored)?.runs.iter().map(|run| met(run, &machine, &known, START_SHARE)).collect();
         let errors = together(&logs, |_| String::new());
         Ok(errors.iter().map(|one| (one.quantity, one.rmse.powi(2) * one.count as f64, one.count)).collect())
     }

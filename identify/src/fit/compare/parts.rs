@@ -2,18 +2,10 @@
 
 use crate::case::Plan;
 use crate::case::{Case, Experiment, matches};
+use crate::fit::limits::{BLOCK_SAMPLES, FEWEST_LOGS, FOLDS, LOG_BLOCKS};
 use crate::log::{Log, Output};
 use std::ops::Range;
 use std::sync::Arc;
-
-/// From so many logs on, whole logs are held out; of fewer, each is cut into blocks.
-const FEWEST_LOGS: usize = 4;
-
-/// How many parts logs are taken in, into how many blocks fewer logs are cut, and the fewest samples of a block: errors
-/// add up along a block as they do along a record, so blocks are long.
-const FOLDS: usize = 5;
-const BLOCKS: usize = 4;
-const SAMPLES: usize = 60;
 
 /// The parts that are fitted, and those that are held out.
 pub(super) struct Fold {
@@ -69,7 +61,7 @@ fn by_block(logs: &[&Experiment]) -> Vec<Fold> {
     let mut folds = Vec::new();
     for (index, experiment) in logs.iter().enumerate() {
         let Some(log) = &experiment.log else { continue };
-        let blocks = BLOCKS.div_ceil(logs.len()).max(2).min(log.len() / SAMPLES);
+        let blocks = LOG_BLOCKS.div_ceil(logs.len()).max(2).min(log.len() / BLOCK_SAMPLES);
         if blocks < 2 {
             continue;
         }
@@ -89,7 +81,7 @@ fn by_block(logs: &[&Experiment]) -> Vec<Fold> {
 /// Some rows of an experiment's log as an experiment; none if they are too few.
 fn cut(experiment: &Experiment, rows: Range<usize>) -> Option<Experiment> {
     let log = experiment.log.as_ref()?;
-    if rows.len() < SAMPLES / 2 {
+    if rows.len() < BLOCK_SAMPLES / 2 {
         return None;
     }
     let begin = log.time[rows.start];

@@ -1,5 +1,6 @@
 //! The inputs to choose among, each a few numbers.
 
+use crate::fit::limits::{MOST_BITS, MOST_CYCLES, MULTISINE_TONES, REST_AT_END, SWEEP_SINES};
 use crate::signal::{Signal, Slot, Tone};
 use std::f64::consts::PI;
 
@@ -52,17 +53,6 @@ pub(super) struct Room {
     /// Lowest and highest frequency, Hz.
     pub frequencies: [f64; 2],
 }
-
-/// Share of an experiment at its end in which the input is zero: how the axis comes to rest is seen, too.
-const REST: f64 = 0.08;
-
-/// Most trapezoids there and back, sines of a sweep, and sines of a multisine.
-const CYCLES: f64 = 8.0;
-const SINES: f64 = 8.0;
-const TONES: f64 = 20.0;
-
-/// Most bits of a binary sequence.
-const BITS: f64 = 400.0;
 
 /// An input of a kind, its numbers rounded to what is written.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -149,13 +139,13 @@ impl Shape {
     /// That of a kind at a point of the unit cube.
     pub(super) fn at(kind: Kind, share: &[f64], room: &Room) -> Self {
         let &Room { input, duration, frequencies: [low, high] } = room;
-        let busy = duration * (1.0 - REST);
+        let busy = duration * (1.0 - REST_AT_END);
         let amplitude = round(between(share[0], 0.05 * input, input));
         let frequency = |share: f64| round(between(share, low, high));
         let apart = |a: f64, b: f64| if a < b { (a, b) } else { (b, round(a.max(b * 1.05))) };
         match kind {
             Kind::Trapezoid => {
-                let cycles = between(share[1], 1.0, CYCLES).round();
+                let cycles = between(share[1], 1.0, MOST_CYCLES).round();
                 let half = busy / (2.0 * cycles);
                 let (ramp, rest) = (0.45 * between(share[2], 0.002, 1.0), 0.6 * share[3]);
                 let [ramp, rest] = [round(ramp * half * (1.0 - rest)), round(rest * half)];
@@ -164,7 +154,7 @@ impl Shape {
                 Self::Trapezoid { amplitude, ramp, hold, rest, ratio, cycles: cycles as usize }
             }
             Kind::Sweep => {
-                let sines = between(share[3], 1.0, SINES).round();
+                let sines = between(share[3], 1.0, SWEEP_SINES).round();
                 let (from, to) = (frequency(share[1]), frequency(share[2]));
                 let each = round(busy / sines);
                 Self::Sweep { amplitude, from, to, sines: sines as usize, tilt: round(share[4]), each }
@@ -174,11 +164,11 @@ impl Shape {
             }
             Kind::Multisine => {
                 let (from, to) = apart(frequency(share[1]), frequency(share[2]));
-                let tones = between(share[3], 2.0, TONES).round() as usize;
+                let tones = between(share[3], 2.0, MULTISINE_TONES).round() as usize;
                 Self::Multisine { amplitude, from, to, tones, lasts: round(busy) }
             }
             Kind::Prbs => {
-                let least = (0.5 / high).max(duration / BITS);
+                let least = (0.5 / high).max(duration / MOST_BITS);
                 let bit = round(between(share[1], least, 0.25 * duration));
                 let seed = 1 + (share[2] * 9.0).floor() as u64;
                 Self::Prbs { amplitude, bit, seed, lasts: round(busy) }

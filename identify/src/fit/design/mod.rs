@@ -28,18 +28,10 @@ pub use verify::{Verified, verify};
 use crate::case::{Case, Plan, parameters};
 use crate::error::{Error, Result};
 use crate::fit::asked::problem::{Problem, Stop};
+use crate::fit::limits::{DURATION, MOST_ROWS, SAMPLE_INTERVAL};
 use crate::fit::trust::identify::Group;
 use crate::log::Quantity;
 use crate::machine::{Channel, EncoderPlace, Measurement};
-
-/// Length of an experiment that nothing else is said of, s.
-pub const DURATION: f64 = 4.0;
-
-/// Between samples where nothing says so, s.
-const EVERY: f64 = 1e-3;
-
-/// Most rows of an experiment.
-const MOST_ROWS: f64 = 200_000.0;
 
 /// The measure that is made small.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -248,7 +240,7 @@ fn plan_of(case: &Case, request: &Request) -> Result<Plan> {
 fn usual_interval(case: &Case) -> f64 {
     let recorder = case.measurement.as_ref().and_then(|measurement| measurement.every);
     let shortest = case.experiments.iter().map(|experiment| experiment.every).reduce(f64::min);
-    recorder.or(shortest).unwrap_or(EVERY)
+    recorder.or(shortest).unwrap_or(SAMPLE_INTERVAL)
 }
 
 /// Outputs that are measured, and how well: as asked for; else the encoder and the recorder of the case; else the

@@ -9,33 +9,15 @@ use crate::case::{Case, Experiment, Initial};
 use crate::chance::uniform;
 use crate::error::{Error, Result};
 use crate::fit::asked::residuals::Differences;
+use crate::fit::limits::{
+    DESIGN_BARREN, FINALISTS, FIRST_POINTS, FIRST_SIGMA, HOPEFUL, MOST_COMPARED, MOST_PERIODS, MOST_ROWS, MOST_VALUES,
+    OF_RATE,
+};
 use crate::fit::search::cmaes;
 use crate::machine::{Channel, Machine};
 use crate::signal::Signal;
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
-
-/// Points of each kind that are looked at first, kinds that are looked at on doubtful machines in the end, and
-/// generations without a gain after which an evolution ends.
-const SPREAD: usize = 16;
-const FINALISTS: usize = 3;
-const BARREN: usize = 6;
-
-/// How many times as large as the best a kind's mean relative error may be after its first points, and still be
-/// searched.
-const HOPEFUL: f64 = 1.6;
-
-/// First step of the evolution, in the logit of a share, and values that it may ask for: of every kind, and once more
-/// of the best.
-const SIGMA: f64 = 0.7;
-const VALUES: usize = 60;
-
-/// Highest frequency that is thought of, as a share of the rate of samples, and as periods in the experiment.
-const OF_RATE: f64 = 0.1;
-const PERIODS: f64 = 400.0;
-
-/// Most experiments of the case that the design is compared with.
-const COMPARED: usize = 8;
 
 /// Promise of an experiment for a parameter.
 #[derive(Debug, Clone, PartialEq)]
@@ -193,7 +175,7 @@ fn nothing(task: &Task) -> Error {
 }
 
 fn room(task: &Task) -> Room {
-    let high = (OF_RATE / task.every).min(PERIODS / task.duration);
+    let high = (OF_RATE / task.every).min(MOST_PERIODS / task.duration);
     let low = (1.0 / task.duration).min(0.5 * high);
     Room { input: task.limits.input.0, duration: task.duration, frequencies: [low, high] }
 }
@@ -210,13 +192,13 @@ fn look(task: &Task, kind: Kind, point: &[f64], tried: &mut usize) -> Option<(Sh
 fn screened(task: &Task, kind: Kind, tried: &mut usize) -> Option<(Shape, Vec<f64>, f64)> {
     let n = kind.numbers();
     let mut random = Pcg64::seed_from_u64(task.seed);
-    let orders: Vec<Vec<usize>> = (0..n).map(|_| shuffled(SPREAD, &mut random)).collect();
+    let orders: Vec<Vec<usize>> = (0..n).map(|_| shuffled(FIRST_POINTS, &mut random)).collect();
     let mut best: Option<(Shape, Vec<f64>, f64)> = None;
-    for k in 0..SPREAD {
+    for k in 0..FIRST_POINTS {
         if (task.stop)() {
             break;
         }
-        let point: Vec<f64> = orders.iter().map(|order| (order[k] as f64 + 0.5) / SPREAD as f64).collect();
+        let point: Vec<f64> = orders.iter().map(|order| (order[k] as f64 + 0.5) / FIRST_POINTS as f64).collect();
         if let Some((shape, score)) = look(task, kind, &point, tried)
             && best.as_ref().is_none_or(|(_, _, least)| score < *least)
         {
@@ -239,8 +221,8 @@ fn refined(task: &Task, kind: Kind, from: &[f64], score: f64, tried: &mut usize)
     let logit: Vec<f64> = from.iter().map(|share| (share / (1.0 - share)).ln()).collect();
     let mut best: Option<(Shape, Vec<f64>, f64)> = None;
     let first = *tried;
-    cmaes::search(kind.numbers(), SIGMA, BARREN, &mut |z| {
-        if (task.stop)() || *tried - first >= VALUES {
+    cmaes::search(kind.numbers(), FIRST_SIGMA, DESIGN_BARREN, &mut |z| {
+        if (task.stop)() || *tried - first >= MOST_VALUES {
             return (f64::INFINITY, false);
         }
         let point: Vec<f64> = logit.iter().zip(z.iter()).map(|(a, z)| 1.0 / (1.0 + (-a - z).exp())).collect();
@@ -319,7 +301,7 @@ impl Task<'_> {
             criterion: self.criterion,
             score,
             alternatives,
-            own: case.experiments.iter().take(COMPARED).filter_map(|experiment| self.own(experiment)).collect(),
+            own: case.experiments.iter().take(MOST_COMPARED).filter_map(|experiment| self.own(experiment)).collect(),
             tried,
             interrupted: (self.stop)(),
         }
@@ -327,7 +309,7 @@ impl Task<'_> {
 
     /// Information of an experiment of the case, measured as the design is.
     fn own(&self, experiment: &Experiment) -> Option<Own> {
-        if (self.stop)() || experiment.until / self.every > super::MOST_ROWS || experiment.until < 10.0 * self.every {
+        if (self.stop)() || experiment.until / self.every > MOST_ROWS || experiment.until < 10.0 * self.every {
             return None;
         }
         let task = Task {

@@ -8,6 +8,7 @@ use crate::case::{Experiment, Initial};
 use crate::chance::{hash, normal};
 use crate::fit::asked::problem::Problem;
 use crate::fit::asked::residuals::{Differences, Residuals};
+use crate::fit::limits::SMALLER;
 use crate::log::{Log, Output, Quantity};
 use crate::machine::{Channel, Machine};
 use crate::signal::{Hold, Signal};
@@ -17,9 +18,6 @@ use nalgebra::DMatrix;
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
 use std::sync::Arc;
-
-/// How often an amplitude is made smaller until an input keeps the limits.
-const SMALLER: usize = 8;
 
 impl Task<'_> {
     /// Where an input begins so that its way is in the middle of the travel, and how far it goes; none where the run

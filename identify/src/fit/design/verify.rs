@@ -7,14 +7,12 @@ use crate::error::{Error, Result};
 use crate::fit::asked::problem::Stop;
 use crate::fit::asked::run::is_position;
 use crate::fit::fit;
+use crate::fit::limits::START_OFF;
 use crate::fit::search::point::Ending;
 use crate::log::Quantity;
 use crate::solve::Flow;
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
-
-/// By what share the starts of the fits are off, to either side.
-const OFF: f64 = 0.1;
 
 /// Findings of the fits of simulated logs for a parameter.
 #[derive(Debug, Clone, PartialEq)]
@@ -54,7 +52,7 @@ pub fn verify(case: &Case, request: &Request, found: &Designed, logs: usize, sto
             .ok_or_else(|| Error::new("the designed experiment cannot be simulated"))?;
         let mut own = Case { experiments: vec![experiment], ..task.case.clone() };
         for free in &frees {
-            let start = free.start * (1.0 + OFF * (2.0 * uniform(&mut random) - 1.0));
+            let start = free.start * (1.0 + START_OFF * (2.0 * uniform(&mut random) - 1.0));
             free.set(&mut own.machine, start.clamp(free.low, free.high));
         }
         let fit = fit(&own, &task.plan, Some(stop), &mut |_| Flow::Continue)?;

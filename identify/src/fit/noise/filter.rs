@@ -8,9 +8,7 @@
 
 use super::Slow;
 use super::series::Series;
-
-/// Most slow noises at once.
-const STATES: usize = 2;
+use crate::fit::limits::SLOW_NOISES;
 
 /// Products Σ v vᵀ/F of the innovations of all columns, upper half, and Σ ln F.
 pub(super) fn filter(series: &Series, slow: &[Slow]) -> (Vec<f64>, f64) {
@@ -45,7 +43,7 @@ pub(super) fn innovations(
     match slow.len() {
         0 => innovations_of::<0>(series, rows, wide, slow, each),
         1 => innovations_of::<1>(series, rows, wide, slow, each),
-        _ => innovations_of::<STATES>(series, rows, wide, slow, each),
+        _ => innovations_of::<SLOW_NOISES>(series, rows, wide, slow, each),
     }
 }
 

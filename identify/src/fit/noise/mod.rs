@@ -24,37 +24,15 @@ pub(crate) mod student;
 
 use crate::fit::asked::problem::Problem;
 use crate::fit::asked::run::is_position;
+use crate::fit::limits::{
+    LEAST_POWER, MOST_POWERS, NOISE_TURNS, NOTHING, POWER_RATIO, ROUNDED, TIME_RATIO, TIMES_APART, TWO_BEFOREHAND,
+    WAVE_CLEAR, WAVES, WHITE_BEFOREHAND,
+};
 use crate::log::Quantity;
 use nalgebra::{DMatrix, DVector};
 use series::Series;
 use std::f64::consts::TAU;
 use student::student_share;
-
-/// Ratio of neighbouring time constants of the grid, and of neighbouring powers.
-const TIMES: f64 = 2.2;
-const POWERS: f64 = 3.0;
-
-/// Least power at low frequencies, as a multiple of that of white noise, and how many are tried.
-const LEAST_POWER: f64 = 0.1;
-const MOST_POWERS: usize = 14;
-
-/// The shares of white noise and of two slow noises before anything is seen.
-const WHITE: f64 = 0.3;
-const TWO: f64 = 0.35;
-
-/// Logarithm of the ratio of two time constants from which on they are two.
-const APART: f64 = 1.0;
-
-/// How often one of two slow noises is sought anew beside the other.
-const TURNS: usize = 3;
-
-/// Most waves along the way, and the least amplitude of one in steps of the converter: rounding alone makes waves of 1/π
-/// of them.
-const WAVES: usize = 3;
-const ROUNDED: f64 = 0.5;
-
-/// Share of how far a quantity ranges below which a wave is nothing.
-const NOTHING: f64 = 1e-6;
 
 /// A slow noise.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -296,15 +274,15 @@ impl Estimate {
         let mut time = interval;
         while time < 1.5 * longest {
             times.push(time);
-            time *= TIMES;
+            time *= TIME_RATIO;
         }
         // Power at low frequencies over that of white noise: 2 τ σ² g²/Δ
-        let powers: Vec<f64> = (0..MOST_POWERS).map(|k| LEAST_POWER * POWERS.powi(k as i32)).collect();
+        let powers: Vec<f64> = (0..MOST_POWERS).map(|k| LEAST_POWER * POWER_RATIO.powi(k as i32)).collect();
         let variance = |power: f64, time: f64| power * interval / (2.0 * time * gain);
         // One slow noise after the other, alone or beside another whose time is not much the same.
         let along = |beside: Option<Slow>| {
             let mut told = Vec::new();
-            let apart = |time: &&f64| beside.is_none_or(|other| (*time / other.time).ln().abs() > APART);
+            let apart = |time: &&f64| beside.is_none_or(|other| (*time / other.time).ln().abs() > TIMES_APART);
             for &time in times.iter().filter(apart) {
                 let mut falling = 0;
                 let mut before = f64::NEG_INFINITY;
@@ -327,14 +305,14 @@ impl Estimate {
             told.iter_mut().for_each(|one| one.weight += before.ln());
             told
         };
-        let mut all = counted(self.likelihood(&[]).into_iter().collect(), WHITE);
+        let mut all = counted(self.likelihood(&[]).into_iter().collect(), WHITE_BEFOREHAND);
         let one = along(None);
         let first = best(&one).map(|one| one.slow[0]);
-        all.extend(counted(one, (1.0 - WHITE - TWO) / (times.len() * powers.len()) as f64));
+        all.extend(counted(one, (1.0 - WHITE_BEFOREHAND - TWO_BEFOREHAND) / (times.len() * powers.len()) as f64));
         let Some(mut first) = first else { return all };
         // Two: each beside the best of the other.
         let mut turns: Vec<Vec<Told>> = Vec::new();
-        for _ in 0..TURNS {
+        for _ in 0..NOISE_TURNS {
             let two = along(Some(first));
             let Some(top) = best(&two) else { return all };
             first = top.slow[0];
@@ -344,9 +322,9 @@ impl Estimate {
         let (Some(a), Some(b)) = (turns.pop(), turns.pop()) else { return all };
         let top = best(&a).map_or(0.0, |one| one.weight);
         let as_good = |told: &[Told]| told.iter().map(|one| (one.weight - top).exp()).sum::<f64>();
-        let apart = |(i, j): (usize, usize)| (times[j] / times[i]).ln() > APART;
+        let apart = |(i, j): (usize, usize)| (times[j] / times[i]).ln() > TIMES_APART;
         let pairs = (0..times.len()).flat_map(|j| (0..j).map(move |i| (i, j))).filter(|&pair| apart(pair)).count();
-        let each = 0.5 * TWO / (pairs * powers.len() * powers.len()).max(1) as f64;
+        let each = 0.5 * TWO_BEFOREHAND / (pairs * powers.len() * powers.len()).max(1) as f64;
         let (for_a, for_b) = (each * as_good(&b), each * as_good(&a));
         all.extend(counted(a, for_a));
         all.extend(counted(b, for_b));
@@ -443,7 +421,7 @@ impl Estimate {
             let found = place::wave(&self.series, amplitudes.as_slice(), &noise.slow, noise.white);
             let Some(place::Found { kappa, gain, amplitude, travel, tried }) = found else { break };
             let least = (ROUNDED * self.step).max(NOTHING * travel);
-            if gain < place::CLEAR + (tried as f64).ln() || amplitude / self.weight < least {
+            if gain < WAVE_CLEAR + (tried as f64).ln() || amplitude / self.weight < least {
                 break;
             }
             let columns: Vec<_> = self.series.iter().map(|series| place::columns(series, kappa)).collect();

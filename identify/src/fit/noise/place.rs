@@ -11,24 +11,8 @@
 use super::Slow;
 use super::filter::innovations;
 use super::series::Series;
+use crate::fit::limits::{BOTH_WAYS, FEWEST_WAVES, MOST_WAVE_NUMBERS, WAVE_CLEAR, WAVE_HALVINGS, WAVE_STEP};
 use std::f64::consts::TAU;
-
-/// Fewest waves in the travel: what does not come again there is a law, not a place.
-const FEWEST: f64 = 2.0;
-
-/// How much of the travel is passed forward and backward at least: what is wrong in a law turns with the direction, what
-/// belongs to a place does not, and one way does not tell them apart.
-const BOTH_WAYS: f64 = 0.5;
-
-/// Steps of a wave in the travel, and the most wave numbers.
-const STEP: f64 = 0.5;
-const MOST: usize = 200;
-
-/// How often the step is halved around the best.
-const FINER: usize = 4;
-
-/// By so much waves have to raise the logarithm of the likelihood beyond that of the number that was tried.
-pub(super) const CLEAR: f64 = 6.0;
 
 /// A wave along the way.
 pub(super) struct Found {
@@ -63,14 +47,14 @@ pub(super) fn wave(all: &[Series], amplitudes: &[f64], slow: &[Slow], white: f64
         return None;
     }
     let once = TAU / travel;
-    let first = FEWEST * once;
-    let count = (((TAU / (2.0 * coarse) - first) / (STEP * once)).max(0.0) as usize).min(MOST);
+    let first = FEWEST_WAVES * once;
+    let count = (((TAU / (2.0 * coarse) - first) / (WAVE_STEP * once)).max(0.0) as usize).min(MOST_WAVE_NUMBERS);
     let of = |kappa: f64| gain(all, amplitudes, slow, kappa);
-    let tried = (0..count).map(|k| first + STEP * once * k as f64).map(|kappa| (kappa, of(kappa)));
+    let tried = (0..count).map(|k| first + WAVE_STEP * once * k as f64).map(|kappa| (kappa, of(kappa)));
     let (mut kappa, mut most) = tried.max_by(|a, b| a.1.0.total_cmp(&b.1.0))?;
-    if most.0 >= CLEAR * white {
-        let mut step = 0.5 * STEP * once;
-        for _ in 0..FINER {
+    if most.0 >= WAVE_CLEAR * white {
+        let mut step = 0.5 * WAVE_STEP * once;
+        for _ in 0..WAVE_HALVINGS {
             for near in [(kappa - step).max(first), kappa + step] {
                 let gain = of(near);
                 if gain.0 > most.0 {

@@ -15,19 +15,7 @@
 use super::Slow;
 use super::filter::innovations;
 use super::series::Series;
-
-/// Classes, and the fewest blocks of one.
-const CLASSES: usize = 6;
-const FEWEST: usize = 12;
-
-/// Share of the greatest speed below which a block is at rest.
-const REST: f64 = 0.01;
-
-/// The least size of a class, in that of all.
-const LEAST: f64 = 0.01;
-
-/// By so much classes have to raise the logarithm of the likelihood.
-const CLEAR: f64 = 3.0;
+use crate::fit::limits::{BLOCK_AT_REST, CLASSES_CLEAR, FEWEST_BLOCKS, LEAST_SIZE, SPEED_CLASSES};
 
 /// The size of the noise in each block of each series; none where it is the same as far as the residuals show it.
 pub(super) fn scales(all: &[Series], slow: &[Slow]) -> Option<Vec<Vec<f64>>> {
@@ -40,16 +28,16 @@ pub(super) fn scales(all: &[Series], slow: &[Slow]) -> Option<Vec<Vec<f64>>> {
     let n = squares.len() as f64;
     let mean = squares.iter().sum::<f64>() / n;
     let raised = |classes: &[usize]| {
-        let (mut sums, mut counts) = ([0.0; CLASSES], [0.0; CLASSES]);
+        let (mut sums, mut counts) = ([0.0; SPEED_CLASSES], [0.0; SPEED_CLASSES]);
         for (&class, square) in classes.iter().zip(&squares) {
             sums[class] += square;
             counts[class] += 1.0;
         }
         // What is exact at rest is not infinitely so.
-        sums.iter_mut().zip(counts).for_each(|(sum, count)| *sum = sum.max(LEAST * LEAST * mean * count));
-        let there = (0..CLASSES).filter(|&k| counts[k] > 0.0);
+        sums.iter_mut().zip(counts).for_each(|(sum, count)| *sum = sum.max(LEAST_SIZE * LEAST_SIZE * mean * count));
+        let there = (0..SPEED_CLASSES).filter(|&k| counts[k] > 0.0);
         let gain: f64 = there.clone().map(|k| 0.5 * counts[k] * (mean * counts[k] / sums[k]).ln()).sum();
-        let sizes: [f64; CLASSES] = std::array::from_fn(|k| (sums[k] / (counts[k] * mean)).sqrt());
+        let sizes: [f64; SPEED_CLASSES] = std::array::from_fn(|k| (sums[k] / (counts[k] * mean)).sqrt());
         (gain - 0.5 * (there.count() as f64 - 1.0) * n.ln(), sizes)
     };
     let best = [by_speed(all), by_time(all)]
@@ -61,7 +49,7 @@ pub(super) fn scales(all: &[Series], slow: &[Slow]) -> Option<Vec<Vec<f64>>> {
         })
         .max_by(|a, b| a.0.total_cmp(&b.0))?;
     let (gain, classes, sizes) = best;
-    if gain.is_nan() || gain < CLEAR {
+    if gain.is_nan() || gain < CLASSES_CLEAR {
         return None;
     }
     let mut sizes = classes.into_iter().map(|class| sizes[class]);
@@ -71,15 +59,15 @@ pub(super) fn scales(all: &[Series], slow: &[Slow]) -> Option<Vec<Vec<f64>>> {
 /// Classes of speed: at rest, and the rest in equal numbers; none where too few blocks are in one.
 fn by_speed(all: &[Series]) -> Option<Vec<usize>> {
     let speeds: Vec<f64> = all.iter().flat_map(|series| &series.speed).copied().collect();
-    let rest = REST * speeds.iter().copied().fold(0.0, f64::max);
+    let rest = BLOCK_AT_REST * speeds.iter().copied().fold(0.0, f64::max);
     let mut moving: Vec<f64> = speeds.iter().copied().filter(|v| *v > rest).collect();
     let resting = speeds.len() - moving.len();
-    if moving.len() < (CLASSES - 1) * FEWEST {
+    if moving.len() < (SPEED_CLASSES - 1) * FEWEST_BLOCKS {
         return None;
     }
     moving.sort_by(f64::total_cmp);
-    let edges: Vec<f64> = (1..CLASSES - 1).map(|k| moving[k * moving.len() / (CLASSES - 1)]).collect();
-    let class = |v: f64| match v > rest || resting < FEWEST {
+    let edges: Vec<f64> = (1..SPEED_CLASSES - 1).map(|k| moving[k * moving.len() / (SPEED_CLASSES - 1)]).collect();
+    let class = |v: f64| match v > rest || resting < FEWEST_BLOCKS {
         true => 1 + edges.iter().filter(|edge| v >= **edge).count(),
         false => 0,
     };
@@ -89,15 +77,15 @@ fn by_speed(all: &[Series]) -> Option<Vec<usize>> {
 /// Classes of time: parts of one log, or logs.
 fn by_time(all: &[Series]) -> Option<Vec<usize>> {
     let blocks: usize = all.iter().map(|series| series.time.len()).sum();
-    let parts = (CLASSES / all.len()).max(1);
-    if blocks < CLASSES * FEWEST {
+    let parts = (SPEED_CLASSES / all.len()).max(1);
+    if blocks < SPEED_CLASSES * FEWEST_BLOCKS {
         return None;
     }
     let mut classes = Vec::with_capacity(blocks);
     for (index, series) in all.iter().enumerate() {
         let n = series.time.len();
-        classes.extend((0..n).map(|k| match all.len() > CLASSES {
-            true => index * CLASSES / all.len(),
+        classes.extend((0..n).map(|k| match all.len() > SPEED_CLASSES {
+            true => index * SPEED_CLASSES / all.len(),
             false => index * parts + k * parts / n,
         }));
     }

@@ -2,11 +2,9 @@
 
 use crate::fit::asked::problem::Problem;
 use crate::fit::asked::run::is_position;
+use crate::fit::limits::BLOCKS;
 use crate::log::Quantity;
 use nalgebra::DMatrix;
-
-/// Most blocks of rows into which the values of one quantity are taken together.
-const BLOCKS: usize = 700;
 
 /// Rows taken together, of one output of one run. A block of n equally good rows is their sum over √n, so that white
 /// noise is as large in it as in a row.

@@ -1,7 +1,6 @@
 //! Student's t and its limit, the normal distribution.
 
-/// Standard deviations that 95 % of a normal distribution keep to.
-pub(crate) const NORMAL: f64 = 1.959_963_985;
+use crate::fit::limits::NORMAL;
 
 /// The share of Student's t beyond ± `t`: by the normal distribution of a t that is made normal (D. L. Wallace 1959),
 /// to about 1e-3 of itself from three degrees of freedom on.
@@ -14,7 +13,7 @@ pub(crate) fn student_share(t: f64, freedom: f64) -> f64 {
 /// The value below which Student's t stays with 97.5 %, for so many degrees of freedom (Hill's expansion, to 1e-3 from
 /// 3 on).
 pub fn student(freedom: usize) -> f64 {
-    let (z, n) = (1.959_963_985, freedom.max(1) as f64);
+    let (z, n) = (NORMAL, freedom.max(1) as f64);
     match freedom {
         0 | 1 => 12.706,
         2 => 4.303,

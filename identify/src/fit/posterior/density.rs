@@ -21,25 +21,11 @@
 use super::nuts::{Draws, Effort, LogDensity, Watch, sample, walk};
 use crate::chance::normal;
 use crate::fit::asked::residuals::{Bounds, Differences, Residuals};
+use crate::fit::limits::{FELT, MOST_BENT, PAST_KINKS, SLOPE_PLACES, SLOPES_OFF};
 use nalgebra::{DMatrix, DVector};
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
 use std::sync::Mutex;
-
-/// A bound further away than so many standard errors is not felt.
-const FELT: f64 = 1e3;
-
-/// How far the slopes at the fit may be off, where one is a standard error's, before they are not followed.
-const OFF: f64 = 0.3;
-
-/// Most variables for which the Jacobian's own derivatives are measured.
-const MOST_BENT: usize = 16;
-
-/// Places at which they are compared.
-const PLACES: usize = 6;
-
-/// Steps of measured slopes, in standard errors: past the kinks that sticks and slips make.
-const STEP: f64 = 0.3;
 
 /// The logarithm of a variable's prior density, and its slope.
 pub type Prior<'a> = Box<dyn Fn(f64) -> (f64, f64) + Sync + 'a>;
@@ -247,7 +233,7 @@ impl<'a, R: Residuals + Clone + Send> Density<'a, R> {
         if !problem.evaluate(x, &mut residuals) {
             return None;
         }
-        let steps = self.errors.iter().map(|error| STEP * error).collect();
+        let steps = self.errors.iter().map(|error| PAST_KINKS * error).collect();
         let jacobian = problem.jacobian(x, &residuals, &self.ingredients.bounds, &Differences::Coarse(steps))?;
         Some((residuals, jacobian))
     }
@@ -327,7 +313,7 @@ impl<'a, R: Residuals + Clone + Send> Density<'a, R> {
     fn is_straight(&self, random: &mut Pcg64) -> bool {
         let n = self.errors.len();
         let (mut squares, mut count) = (0.0, 0);
-        for _ in 0..PLACES {
+        for _ in 0..SLOPE_PLACES {
             let z: Vec<f64> = (0..n).map(|_| normal(random)).collect();
             let (mut a, mut b) = (vec![0.0; n], vec![0.0; n]);
             if self.log(&z, Some(&mut a)).is_some() && self.log_with(None, &z, Some(&mut b)).is_some() {
@@ -335,7 +321,7 @@ impl<'a, R: Residuals + Clone + Send> Density<'a, R> {
                 count += n;
             }
         }
-        count > 0 && squares <= OFF * OFF * count as f64
+        count > 0 && squares <= SLOPES_OFF * SLOPES_OFF * count as f64
     }
 
     /// Somewhere to begin, drawn from the covariance at the fit.

@@ -20,16 +20,11 @@
 use crate::chance::{normal, normal_quantile, uniform};
 use crate::fit::asked::problem::Problem;
 use crate::fit::asked::residuals::{Bounds, Differences, Residuals};
+use crate::fit::limits::{FAR_BOUND, FAR_TAIL};
 use nalgebra::{DMatrix, DVector};
 use rand_pcg::Pcg64;
 use std::borrow::Cow;
 use std::f64::consts::{PI, SQRT_2};
-
-/// A bound that is further away than so many standard deviations is not felt.
-const FAR: f64 = 6.0;
-
-/// Where the tail of a normal distribution is taken for that of an exponential one.
-const FAR_OUT: f64 = -30.0;
 
 /// The problem in the variables that stay.
 #[derive(Clone)]
@@ -74,7 +69,7 @@ impl<'a> Marginal<'a> {
         stays: &dyn Fn(usize) -> bool,
     ) -> Self {
         let is_far = |j: usize| {
-            let room = FAR * deviations[j];
+            let room = FAR_BOUND * deviations[j];
             at[j] - bounds.low[j] > room && bounds.high[j] - at[j] > room
         };
         let stages = problem.stages(at);
@@ -248,7 +243,7 @@ impl Between {
     /// By the inverse of its distribution; far out it falls as e^{−|z| Δz}.
     fn draw(self, random: &mut Pcg64) -> f64 {
         let (sign, a, b) = if self.low > 0.0 { (-1.0, -self.high, -self.low) } else { (1.0, self.low, self.high) };
-        let z = if b > FAR_OUT {
+        let z = if b > FAR_TAIL {
             let (below, above) = (log_share(a).exp(), log_share(b).exp());
             normal_quantile(below + uniform(random) * (above - below))
         } else {
@@ -262,7 +257,7 @@ impl Between {
 
 /// ln Φ(z); far below zero by Φ(z) ≈ φ(z)/|z| (1 − 1/z²).
 fn log_share(z: f64) -> f64 {
-    if z > FAR_OUT {
+    if z > FAR_TAIL {
         return (0.5 * libm::erfc(-z / SQRT_2)).ln();
     }
     -0.5 * z * z - (-z).ln() - 0.5 * (2.0 * PI).ln() + (-1.0 / (z * z)).ln_1p()

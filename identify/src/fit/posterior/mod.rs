@@ -15,8 +15,8 @@ use crate::error::{Error, Result};
 use crate::fit::asked::problem::Problem;
 use crate::fit::asked::residuals::{Bounds, Differences, Residuals};
 use crate::fit::asked::run::{Extra, Nuisance, Run};
+use crate::fit::limits::{DIVERGING, EFFECTIVE, HUBER, NORMAL, R_HAT};
 use crate::fit::search::point::Ending;
-use crate::fit::search::starts::HUBER;
 use crate::fit::search::triangle::inverse_of_square;
 use crate::fit::trust::found::{Estimate, Fit};
 use crate::fit::trust::uncertainty::Covariance;
@@ -27,15 +27,6 @@ use nalgebra::DMatrix;
 use nuts::{Draws, Effort, Watch};
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
-
-/// R̂ above which nothing counts as converged.
-pub const R_HAT: f64 = 1.01;
-
-/// Effective draws below which nothing counts as converged.
-pub const EFFECTIVE: f64 = 400.0;
-
-/// Share of divergent transitions that is passed over.
-const DIVERGING: f64 = 0.01;
 
 /// The draws, and whether to believe them.
 #[derive(Debug, Clone)]
@@ -241,7 +232,7 @@ fn inflation(problem: &Problem, residuals: &[f64], jacobian: &DMatrix<f64>, at: 
     let own =
         |(k, &j): (usize, &usize)| (j < problem.globals()).then(|| found.matrix[(k, k)] / (inverse[(k, k)] * variance));
     let most = found.free.iter().enumerate().filter_map(own).fold(1.0, f64::max);
-    (most * (found.reach / 1.96).powi(2).max(1.0), variance)
+    (most * (found.reach / NORMAL).powi(2).max(1.0), variance)
 }
 
 /// How a variable of the search is a number.

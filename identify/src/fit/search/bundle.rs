@@ -17,23 +17,9 @@
 
 use super::point::{Minimum, cost_of};
 use crate::fit::asked::residuals::{Bounds, Differences, Residuals};
+use crate::fit::limits::{CONTRADICTS, FIRM, HALVINGS, KEPT, SPARE_PIECES};
 use crate::solve::Flow;
 use nalgebra::{DMatrix, DVector};
-
-/// The part of its promise that a step has to keep.
-const KEPT: f64 = 0.1;
-
-/// The part of the promise by which a piece has to contradict a step, for the next one to be another.
-const CONTRADICTS: f64 = 0.5;
-
-/// How often a step that is neither good nor tells anything new is halved.
-const HALVINGS: usize = 12;
-
-/// Gradients that are kept, beside as many as there are variables.
-const BESIDE: usize = 10;
-
-/// A direction counts as determined as if there were residuals that tell each variable so much of what all do.
-const FIRM: f64 = 1e-3;
 
 /// Where a descent ended.
 pub(crate) struct Balanced {
@@ -160,7 +146,7 @@ pub(crate) fn descend(
 
 /// Keeps the pieces that stand nearest to the cost, and those that made the last step.
 fn forget(pieces: &mut Vec<Piece>, u: &DVector<f64>, cost: f64, weights: &[f64]) {
-    let most = u.len() + BESIDE;
+    let most = u.len() + SPARE_PIECES;
     if pieces.len() <= most {
         return;
     }

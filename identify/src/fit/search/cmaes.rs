@@ -10,12 +10,10 @@
 //! ```
 
 use crate::chance::normal;
+use crate::fit::limits::SMALLEST_STEP;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
-
-/// Step size along the longest axis below which a search is at its end.
-const SMALLEST: f64 = 0.01;
 
 /// Searches around zero in `n` dimensions with the first step size `sigma`, for so many generations at most, or until
 /// none of `barren` in a row showed anything. `evaluate` gives the cost of a point, infinite where there is none, and
@@ -46,7 +44,7 @@ pub fn search(n: usize, mut sigma: f64, barren: usize, evaluate: &mut dyn FnMut(
         // C = B D² Bᵀ
         let Some(eigen) = SymmetricEigen::try_new(c.clone(), 1e-14, 1000) else { break };
         let (b, d) = (&eigen.eigenvectors, eigen.eigenvalues.map(|value| value.max(1e-20).sqrt()));
-        if sigma * d.max() < SMALLEST || generation > fruitful + barren {
+        if sigma * d.max() < SMALLEST_STEP || generation > fruitful + barren {
             break;
         }
         let mut offspring: Vec<(f64, DVector<f64>)> = Vec::with_capacity(lambda);

@@ -20,30 +20,9 @@ use super::cmaes;
 use super::point::{Ending, Minimum, Options, cost_of};
 use super::triangle::shortened;
 use crate::fit::asked::residuals::{Bounds, Differences, Residuals};
+use crate::fit::limits::{BARREN, COARSE, KINK, MOST_EVOLVED, NEAR, PAST_KINKS, SHOWS};
 use crate::solve::Flow;
 use nalgebra::{DMatrix, DVector};
-
-/// Steps of coarse derivatives, in standard errors of a variable by itself, tried one after the other.
-const COARSER: [f64; 2] = [1.0, 10.0];
-
-/// So many standard errors from where it leads, a search takes derivatives over this part of a standard error: where
-/// the cost has kinks, they see past the small ones; where it has none, they are as good as others.
-const NEAR: f64 = 1.0;
-const FINE: f64 = 0.3;
-
-/// Most variables that are searched by evolution.
-const MOST_EVOLVED: usize = 16;
-
-/// Generations without a gain that shows, after which an evolution ends.
-const BARREN: usize = 8;
-
-/// Where the cost has kinks, the standard errors that the last step may promise: all the gradients around together, or
-/// one by itself, and no step of any length fulfilled it.
-const KINK: f64 = 0.1;
-
-/// Two steps after each other that gain less than this many standard errors, and little of what they promised, are at a
-/// kink; and so are steps after which twice that is still promised.
-const SHOWS: f64 = 0.1;
 
 /// Searches from `start` for the least cost. `watch` sees the best point and its cost after each step, and may end it.
 pub fn minimise(
@@ -127,7 +106,7 @@ pub fn minimise(
         }
         if best.decrement < NEAR && how == Differences::Forward && !is_exact {
             let errors = model.errors(&held, deviation);
-            how = Differences::Coarse(errors.iter().map(|error| FINE * error).collect());
+            how = Differences::Coarse(errors.iter().map(|error| PAST_KINKS * error).collect());
         } else if best.decrement < 100.0 * options.tolerance && coarser == 0 {
             how = Differences::Central;
         }
@@ -209,10 +188,10 @@ pub fn minimise(
                     return best;
                 }
             }
-        } else if coarser < COARSER.len() {
+        } else if coarser < COARSE.len() {
             let errors = model.errors(&held, deviation);
-            how = Differences::Coarse(errors.iter().map(|error| COARSER[coarser] * error).collect());
-            best.coarse = COARSER[coarser];
+            how = Differences::Coarse(errors.iter().map(|error| COARSE[coarser] * error).collect());
+            best.coarse = COARSE[coarser];
             coarser += 1;
         } else if best.decrement > 1.0
             && evolved < options.evolutions
@@ -220,7 +199,7 @@ pub fn minimise(
         {
             evolved += 1;
             best.evolved = evolved;
-            coarser = COARSER.len() - 1;
+            coarser = COARSE.len() - 1;
         } else {
             best.ending = Ending::Stalled;
             return best;

@@ -11,22 +11,11 @@
 use super::triangle::inverse_of_square;
 use crate::fit::asked::problem::Problem;
 use crate::fit::asked::run::{Run, is_position};
+use crate::fit::limits::{REGRESSION_BLOCK, REGRESSION_NOISE, REST_ROWS, WIDEST_IN_REGRESSION, WIDTHS};
 use crate::log::Quantity;
 use crate::machine::{AmplifierMode, Machine};
 use crate::parameter::{Free, Sum, at_pulley, value};
 use nalgebra::{DMatrix, DVector};
-
-/// Rows that are averaged into one equation, so that noise in derivatives counts less.
-const BLOCK: usize = 5;
-
-/// After so many equal positions in a row an axis counts as at rest, where friction takes what it must.
-const REST: f64 = 20.0;
-
-/// Widths of the Gaussian that are tried, rows.
-const WIDTHS: [f64; 9] = [2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 32.0];
-
-/// Part of the root mean square acceleration that noise may be; the least width that keeps to it is taken.
-const NOISE: f64 = 0.2;
 
 /// The balance of torques of a rigid axis, at the drive pulley.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -109,14 +98,14 @@ impl<'a> Smoothed<'a> {
         let seen = &run.seen[output];
         let (n, h) = (run.fitted_rows.min(run.time.len()), run.interval());
         let mut derivatives = None;
-        for width in WIDTHS {
+        for width in WIDTHS.into_iter().filter(|width| *width <= WIDEST_IN_REGRESSION) {
             let Some(found) = derived(&seen.values[..n], width, h) else { break };
             let size = (found.iter().map(|[_, a]| a * a).sum::<f64>() / found.len() as f64).sqrt();
             // Deviation of white noise behind the second derivative of a Gaussian: σ √(3/(8 √π)) / w^(5/2), per
             // interval squared
             let trembles = noise * (3.0 / (8.0 * std::f64::consts::PI.sqrt())).sqrt() / width.powf(2.5) / (h * h);
             derivatives = Some((width, found));
-            if trembles < NOISE * size {
+            if trembles < REGRESSION_NOISE * size {
                 break;
             }
         }
@@ -134,7 +123,7 @@ impl<'a> Smoothed<'a> {
         let motor = &machine.motor;
         let (n_gear, amplifier) = (motor.gear_ratio, &machine.amplifier);
         let per_ampere = motor.gear_efficiency * n_gear * motor.torque_constant;
-        let mut block: Vec<[f64; 5]> = Vec::with_capacity(BLOCK);
+        let mut block: Vec<[f64; 5]> = Vec::with_capacity(REGRESSION_BLOCK);
         for (k, &[speed, acceleration]) in self.derivatives.iter().enumerate() {
             let row = k + self.margin;
             let given = amplifier.gain * run.logged[row.saturating_sub(late)];
@@ -148,14 +137,16 @@ impl<'a> Smoothed<'a> {
                 }
             };
             let torque = per_ampere * clipped(current, amplifier.current_limit);
-            let moves = speed != 0.0 && seen.repeats[row] < REST && seen.alike[row] < REST;
+            let moves = speed != 0.0 && seen.repeats[row] < REST_ROWS && seen.alike[row] < REST_ROWS;
             if moves && torque.is_finite() && acceleration.is_finite() {
                 block.push([acceleration, speed, speed.signum(), 1.0, torque]);
             } else {
                 block.clear();
             }
-            if block.len() == BLOCK {
-                rows.push(std::array::from_fn(|j| block.iter().map(|row| row[j]).sum::<f64>() / BLOCK as f64));
+            if block.len() == REGRESSION_BLOCK {
+                rows.push(std::array::from_fn(|j| {
+                    block.iter().map(|row| row[j]).sum::<f64>() / REGRESSION_BLOCK as f64
+                }));
                 block.clear();
             }
         }

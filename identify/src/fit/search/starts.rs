@@ -6,22 +6,14 @@ use super::regression::regression;
 use crate::case::{Case, Plan};
 use crate::chance;
 use crate::error::{Error, Result};
-use crate::fit::asked::problem::{Problem, ROUNDING, Stop, extent};
+use crate::fit::asked::problem::{Problem, Stop, extent};
 use crate::fit::asked::residuals::Residuals;
+use crate::fit::limits::{FILE_ROUNDING, HUBER, ROUGH_TOLERANCE, TRIAL_ITERATIONS, WEIGHT_ROUNDS};
 use crate::log::Quantity;
 use crate::solve::Flow;
 use nalgebra::DMatrix;
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
-
-/// Standard deviations beyond which Huber's loss counts linearly: 95 % efficient with Gaussian noise.
-pub(crate) const HUBER: f64 = 1.345;
-
-/// Rounds in which weights are estimated anew.
-const ROUNDS: usize = 4;
-
-/// Jacobians that a start other than the first may take before the best of them goes on.
-const TRIAL_ITERATIONS: usize = 12;
 
 /// The effort of a fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -91,7 +83,7 @@ pub(crate) fn search_as_far<'a>(
         let trial = descend(
             &mut problem,
             &x,
-            &Options { iterations: TRIAL_ITERATIONS, tolerance: whole.tolerance.max(0.1), ..whole },
+            &Options { iterations: TRIAL_ITERATIONS, tolerance: whole.tolerance.max(ROUGH_TOLERANCE), ..whole },
         );
         let near = trial.cost < 1.2 * best.cost;
         let trial =
@@ -104,7 +96,7 @@ pub(crate) fn search_as_far<'a>(
 
     // Weights from what the residuals are, until they stay.
     let mut noise: Vec<(Quantity, f64)> = Vec::new();
-    for round in 0..ROUNDS {
+    for round in 0..WEIGHT_ROUNDS {
         if problem.is_stopped() || best.ending == Ending::Interrupted {
             break;
         }
@@ -258,7 +250,10 @@ fn noise_of(problem: &Problem, at: &Minimum, robust: bool) -> Vec<(Quantity, f64
             let middle = sizes.len() / 2;
             deviation = 1.4826 * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1;
         }
-        noise.push((quantity, deviation.max(step / 12f64.sqrt()).max(ROUNDING * wide).max(f64::MIN_POSITIVE * 1e10)));
+        noise.push((
+            quantity,
+            deviation.max(step / 12f64.sqrt()).max(FILE_ROUNDING * wide).max(f64::MIN_POSITIVE * 1e10),
+        ));
     }
     noise
 }

@@ -4,10 +4,8 @@
 //! rows after the other, with the columns that are not zero there, leaves a triangle of each: M = Q M′ with QᵀQ = I, so
 //! that MᵀM = M′ᵀM′, and nothing is squared on the way.
 
+use crate::fit::limits::STRETCH;
 use nalgebra::DMatrix;
-
-/// Rows that are made small at once.
-const STRETCH: usize = 256;
 
 /// A matrix of no more rows and at least as many as columns, unless there are fewer, that is the same but for a
 /// rotation of its rows.

@@ -3,10 +3,8 @@
 
 use super::directions::Directions;
 use crate::fit::asked::problem::Problem;
+use crate::fit::limits::{NORMAL, WHOLE_POWER};
 use nalgebra::{DMatrix, DVector};
-
-/// A ratio of the powers of two parameters is whole to within this.
-const WHOLE: f64 = 0.03;
 
 /// A combination of parameters that the logs determine.
 #[derive(Debug, Clone, PartialEq)]
@@ -65,7 +63,7 @@ pub(crate) fn of(
                 along[i] = (0..n).map(|j| c[j] * v[(j, i)]).sum();
             }
             let error = of(&along) * value.abs();
-            let reach = 1.959_963_985 * error;
+            let reach = NORMAL * error;
             if error.is_finite() {
                 found.push(Combination { name, unit, value, error, interval: [value - reach, value + reach] });
             }
@@ -100,7 +98,7 @@ fn named(
     }
     // d ln a = power d ln b
     let power = ratio * ra / rb;
-    let near = |to: f64| (power / to - 1.0).abs() < WHOLE;
+    let near = |to: f64| (power / to - 1.0).abs() < WHOLE_POWER;
     if near(1.0) {
         // The gain of an amplifier, or what drives, below the line.
         let below = |j: usize| names[j].starts_with("amplifier") || names[j].starts_with("motor");

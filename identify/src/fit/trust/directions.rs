@@ -1,21 +1,9 @@
 //! The directions in which the parameters of a problem move, by how much the logs show of each.
 
 use crate::fit::asked::problem::Problem;
+use crate::fit::limits::{MOST_SWEEPS, SHARE_LOST, SINGULAR_ROUNDING, UNDETERMINED};
 use crate::fit::search::triangle::shortened;
 use nalgebra::{DMatrix, SVD};
-
-/// Relative standard error from which on a combination counts as not determined.
-pub const LIMIT: f64 = 1.0;
-
-/// A parameter of which this much goes with a combination that is not determined is not determined either.
-pub(crate) const SHARE: f64 = 0.1;
-
-/// Singular values below this share of the greatest are rounding: differences are good to about 1e-9 of the largest
-/// column.
-const ROUNDING: f64 = 1e-8;
-
-/// Iterations of a singular value decomposition before it is given up.
-const MOST_SWEEPS: usize = 10_000;
 
 /// The directions in which the parameters move, by how much they show.
 pub(crate) struct Directions {
@@ -66,7 +54,7 @@ impl Directions {
         }
         singular.resize(which.len(), 0.0);
         let most = singular.iter().copied().fold(0.0, f64::max);
-        let alive = singular.iter().filter(|s| **s > ROUNDING * most).count();
+        let alive = singular.iter().filter(|s| **s > SINGULAR_ROUNDING * most).count();
         Some(Self { v, singular, norms, alive, whole, rows: problem.counted().max(1) as f64 })
     }
 }
@@ -75,9 +63,9 @@ impl Directions {
     /// Root mean square by which a change by 100 % along the strongest of the lost directions of these members moves
     /// the values, if noise alone would leave all of them determined.
     pub fn told_by_noise(&self, lost: &[usize], members: &[usize], off: &[f64]) -> Option<f64> {
-        let goes = |i: &&usize| members.iter().map(|&j| self.v[(j, **i)].powi(2)).sum::<f64>() > SHARE;
+        let goes = |i: &&usize| members.iter().map(|&j| self.v[(j, **i)].powi(2)).sum::<f64>() > SHARE_LOST;
         let own: Vec<usize> = lost.iter().filter(goes).copied().collect();
-        let is_told = |&i: &usize| i < self.alive && off[i] <= LIMIT;
+        let is_told = |&i: &usize| i < self.alive && off[i] <= UNDETERMINED;
         let strongest = own.iter().map(|&i| self.singular[i]).fold(0.0, f64::max);
         (!own.is_empty() && own.iter().all(is_told)).then(|| strongest / self.rows.sqrt())
     }

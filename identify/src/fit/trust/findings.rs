@@ -7,6 +7,9 @@ use crate::case::{Case, Plan, Scope};
 use crate::fit::asked::controller::reproduced;
 use crate::fit::asked::problem::Problem;
 use crate::fit::asked::run::is_position;
+use crate::fit::limits::{
+    KINK_PROMISE, LONGEST_DELAY, MOTOR_CONSTANTS, OPPOSITE, POOR_FIT, REPRODUCED, SHORTEST_DELAY, SUSPECT_DELAY,
+};
 use crate::fit::noise::Wave;
 use crate::fit::search::point::Ending;
 use crate::fit::search::regression::{Balance, balance, smoothed};
@@ -15,27 +18,6 @@ use crate::log::{Note, Remedy, Severity};
 use crate::machine::AmplifierMode;
 use crate::number::engineering;
 use crate::solve::Bench;
-
-/// Standard errors that a kink may promise and not keep.
-const KINK: f64 = 2.0;
-
-/// Below this share of what was seen a model explains nothing, %.
-const POOR: f64 = 50.0;
-
-/// K_t and K_e of one motor are the same number in SI units: so far apart they are not.
-const MOTOR: f64 = 1.5;
-
-/// Correlation of what the model does and what was seen, below which it goes the other way.
-const OPPOSITE: f64 = -0.5;
-
-/// Most rows by which an input may be late and be found so, the fewest that are looked into, and the part of the torque
-/// that is unexplained, relative to that without a delay, from which on they are.
-const LATEST: usize = 40;
-const LATE: usize = 2;
-const SUSPECT: f64 = 0.95;
-
-/// Share of the logged input that the controller of a case has to make of a log, %.
-const REPRODUCED: f64 = 90.0;
 
 /// All there is to say, warnings first.
 pub(crate) fn findings(case: &Case, plan: &Plan, found: &Searched, fit: &Fit) -> Vec<Finding> {
@@ -134,9 +116,9 @@ fn of_delay(case: &Case, plan: &Plan, found: &Searched) -> Option<Finding> {
         return None;
     }
     let logs = smoothed(&found.problem);
-    let left: Vec<f64> = (0..=LATEST).map_while(|late| Some(balance(&logs, late)?.unexplained)).collect();
+    let left: Vec<f64> = (0..=LONGEST_DELAY).map_while(|late| Some(balance(&logs, late)?.unexplained)).collect();
     let late = (0..left.len()).min_by(|&a, &b| left[a].total_cmp(&left[b]))?;
-    if late < LATE || left[late] > SUSPECT * left[0] {
+    if late < SHORTEST_DELAY || left[late] > SUSPECT_DELAY * left[0] {
         return None;
     }
     let late = trials::late(case, plan, found, late as f64 * found.problem.runs[0].interval())?;
@@ -158,7 +140,7 @@ fn rounded_time(value: f64) -> String {
 fn of_search(fit: &Fit) -> Vec<Finding> {
     let mut all = Vec::new();
     match fit.ending {
-        Ending::Stalled if fit.decrement > KINK => all.push(finding(
+        Ending::Stalled if fit.decrement > KINK_PROMISE => all.push(finding(
             Grade::Warning,
             "slope",
             format!(
@@ -241,7 +223,7 @@ fn of_motor(case: &Case, fit: &Fit) -> Option<Finding> {
         return None;
     }
     let ratio = k_t / k_e;
-    if (1.0 / MOTOR..MOTOR).contains(&ratio) {
+    if (1.0 / MOTOR_CONSTANTS..MOTOR_CONSTANTS).contains(&ratio) {
         return None;
     }
     let text = format!(
@@ -259,7 +241,7 @@ fn of_residuals(fit: &Fit) -> Vec<Finding> {
     let mut all = Vec::new();
     for log in fit.logs.iter().filter(|log| !log.held_out) {
         for output in &log.outputs {
-            let Some(score) = output.fitted.filter(|score| score.percent < POOR) else { continue };
+            let Some(score) = output.fitted.filter(|score| score.percent < POOR_FIT) else { continue };
             let text = format!(
                 "{}: the model explains {:.0} % of it only: look at the units, signs and columns of this log, and at what the model lacks",
                 output.quantity.name(),

@@ -3,14 +3,12 @@
 use super::scores::{LogFit, compared};
 use crate::fit::asked::problem::Problem;
 use crate::fit::asked::run::{Extra, Nuisance, Run};
+use crate::fit::limits::{HELD_OUT_ROWS, REFIT_TOLERANCE};
 use crate::fit::search::least_squares::minimise;
 use crate::fit::search::point::{Ending, Options};
 use crate::log::Quantity;
 use crate::machine::Machine;
 use crate::solve::Flow;
-
-/// Fewest rows that a start is fitted to.
-const FEWEST: usize = 20;
 
 /// Results of the fitted logs beside parameters.
 pub(crate) struct Known<'a> {
@@ -34,12 +32,13 @@ pub(crate) fn met(run: &Run, machine: &Machine, known: &Known, share: f64) -> Lo
     alone.extras.extend(known.shared.iter().map(|(extra, value)| held(extra, *value)));
     alone.share(&[]);
     let rows = alone.time.len();
-    alone.fitted_rows = ((rows as f64 * share).ceil() as usize).clamp(FEWEST.min(rows), rows);
+    alone.fitted_rows = ((rows as f64 * share).ceil() as usize).clamp(HELD_OUT_ROWS.min(rows), rows);
     let mut problem = Problem::alone(machine.clone(), alone);
     problem.weigh_by(known.noise);
     let mut x = problem.start();
     if !x.is_empty() {
-        let options = Options { iterations: 15, tolerance: 0.05, rounding: problem.rounding(), ..Options::default() };
+        let options =
+            Options { iterations: 15, tolerance: REFIT_TOLERANCE, rounding: problem.rounding(), ..Options::default() };
         let bounds = problem.bounds();
         let found = minimise(&mut problem, &x, &bounds, &options, &mut |_, _| Flow::Continue);
         if found.ending != Ending::Failed {

@@ -3,22 +3,15 @@
 //! With J the derivatives of the weighted outputs with respect to relative changes of the parameters, and what else is
 //! fitted along projected out, J = U S Vᵀ: along vᵢ the outputs change by sᵢ standard deviations of white noise. How
 //! far off that combination may be, the noise that the residuals show says ([`crate::fit::noise`]); where that is more than
-//! [`LIMIT`], or where the outputs move by less than a machine shows ([`SHOWS`], [`MODEL`]), it is not determined.
+//! [`UNDETERMINED`], or where the outputs move by less than a machine shows ([`LEAST_SHOWN`], [`MODEL_ERROR`]), it is not determined.
 
 use super::combinations::{self, Combination};
-use super::directions::{Directions, LIMIT, SHARE};
+use super::directions::Directions;
 use crate::fit::asked::problem::{Problem, extent};
 use crate::fit::asked::run::MeasuredOutput;
+use crate::fit::limits::{LEAST_SHOWN, MODEL_ERROR, SHARE_LOST, UNDETERMINED};
 use crate::parameter::{Arm, Free, Sum, named, value};
 use nalgebra::DMatrix;
-
-/// Root mean square, as a share of what the converter rounds, of what a change by 100 % makes of a value: below that a
-/// combination counts as not determined however many values there are. Averages of thousands of values would tell it of
-/// a machine that is the model to a fraction of what one value shows, and no machine is.
-pub const SHOWS: f64 = 0.2;
-
-/// The same as a share of how far the values range.
-pub const MODEL: f64 = 2e-4;
 
 /// The information of the logs on the parameters.
 #[derive(Debug, Clone)]
@@ -84,15 +77,15 @@ impl Identifiability {
         let sensitivity = norms.iter().map(|norm| norm / deviation / rows.sqrt()).collect();
         let least = shows(problem).least * rows.sqrt();
         let lost: Vec<usize> =
-            (0..v.ncols()).filter(|&i| i >= *alive || singular[i] < least || off[i] > LIMIT).collect();
+            (0..v.ncols()).filter(|&i| i >= *alive || singular[i] < least || off[i] > UNDETERMINED).collect();
         let goes_with = |j: usize| lost.iter().map(|&i| v[(j, i)].powi(2)).sum::<f64>().sqrt();
         let error = (0..n)
             .map(|j| {
                 // Along what is lost no further than by all of it.
                 let row: Vec<f64> = (0..*alive)
-                    .map(|i| if lost.contains(&i) { v[(j, i)] * (LIMIT / off[i]).min(1.0) } else { v[(j, i)] })
+                    .map(|i| if lost.contains(&i) { v[(j, i)] * (UNDETERMINED / off[i]).min(1.0) } else { v[(j, i)] })
                     .collect();
-                if goes_with(j) > SHARE { f64::INFINITY } else { of(&row) }
+                if goes_with(j) > SHARE_LOST { f64::INFINITY } else { of(&row) }
             })
             .collect();
         let singular = singular.iter().map(|s| s / deviation).collect();
@@ -127,7 +120,7 @@ impl Identifiability {
             while next < members.len() {
                 let i = members[next];
                 for (j, seen) in seen.iter_mut().enumerate() {
-                    if !*seen && is_hidden(j) && hidden(i, j).abs() > SHARE * SHARE {
+                    if !*seen && is_hidden(j) && hidden(i, j).abs() > SHARE_LOST * SHARE_LOST {
                         *seen = true;
                         members.push(j);
                     }
@@ -157,12 +150,12 @@ impl Identifiability {
         let names: Vec<&str> = members.iter().map(|&j| self.names[j].as_str()).collect();
         let Least { least, range } = shows(problem);
         let percent = |share: f64| crate::number::significant(100.0 * share, 2);
-        let by = match least > MODEL * range {
+        let by = match least > MODEL_ERROR * range {
             true => "less than a fifth of what their converter rounds".to_string(),
             false => format!(
                 "{} % of how far they range, and no model is good to less than {} %",
                 percent(strongest / range),
-                percent(MODEL)
+                percent(MODEL_ERROR)
             ),
         };
         let verb = if names.len() == 1 { "shows" } else { "show" };
@@ -287,7 +280,7 @@ fn shows(problem: &Problem) -> Least {
     let of = |seen: &MeasuredOutput| {
         let weight = seen.weights.iter().copied().fold(0.0, f64::max);
         let range = weight * extent(&seen.values);
-        Least { least: f64::max(weight * SHOWS * seen.step / 12f64.sqrt(), MODEL * range), range }
+        Least { least: f64::max(weight * LEAST_SHOWN * seen.step / 12f64.sqrt(), MODEL_ERROR * range), range }
     };
     let all = seen.map(of).filter(|one| one.least > 0.0 && one.least < 1e300);
     all.min_by(|a, b| a.least.total_cmp(&b.least)).unwrap_or(Least { least: 1e300, range: 1e300 })

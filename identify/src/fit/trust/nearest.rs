@@ -18,26 +18,13 @@ use crate::case::{Case, Plan};
 use crate::error::Result;
 use crate::fit::asked::problem::{Problem, Stop};
 use crate::fit::asked::residuals::{Bounds, Differences, Residuals};
+use crate::fit::limits::{COST_GROWTH, HUBER, NEAREST_ALL, NEAREST_ITERATIONS, NEAREST_ROUNDS, NEAREST_SETTLED};
 use crate::fit::search::least_squares::minimise;
 use crate::fit::search::point::{Ending, Minimum, Options, cost_of};
-use crate::fit::search::starts::{HUBER, Searched, Work, search_as_far};
+use crate::fit::search::starts::{Searched, Work, search_as_far};
 use crate::machine::Machine;
 use crate::solve::Flow;
 use nalgebra::{DMatrix, DVector};
-
-/// ε: the part of itself by which the cost may grow in a round.
-const GROWTH: f64 = 3e-3;
-
-/// Rounds, and the relative change below which none follows.
-const ROUNDS: usize = 3;
-const SETTLED: f64 = 1e-3;
-
-/// A parameter of which at least this square share belongs to what is not determined keeps its value exactly, if the
-/// logs are met as well with it.
-const ALL: f64 = 0.99;
-
-/// Most Jacobians of a round.
-const ITERATIONS: usize = 40;
 
 /// A search that has settled on the point nearest to the values of the case.
 pub(crate) struct Settled<'a> {
@@ -171,9 +158,9 @@ fn nearest(
     watch: &mut dyn FnMut(&[f64], f64) -> Flow,
     work: &mut Work,
 ) -> Option<Judged> {
-    let options = Options { iterations: ITERATIONS, evolutions: 0, ..*options };
-    let most = best.cost * (1.0 + ROUNDS as f64 * GROWTH) + f64::MIN_POSITIVE;
-    for _ in 0..ROUNDS {
+    let options = Options { iterations: NEAREST_ITERATIONS, evolutions: 0, ..*options };
+    let most = best.cost * (1.0 + NEAREST_ROUNDS as f64 * COST_GROWTH) + f64::MIN_POSITIVE;
+    for _ in 0..NEAREST_ROUNDS {
         let none = vec![false; best.x.len()];
         let judged = Judged::new(problem, &best.residuals, &best.jacobian, &best.x, &none)?;
         let lost = judged.identifiability.lost.clone();
@@ -185,7 +172,7 @@ fn nearest(
         let Some(found) = round(problem, best, (given, &whole), &lost, (&options, most), watch, work) else { break };
         let moved = (0..lost.nrows()).map(|j| ((found.x[j] - best.x[j]) / whole[j]).abs()).fold(0.0, f64::max);
         *best = found;
-        if moved < SETTLED {
+        if moved < NEAREST_SETTLED {
             break;
         }
     }
@@ -214,11 +201,11 @@ fn round(
         return None;
     }
     // ½ ρ² ‖Vᵀ D⁻¹ (x₁ − x₀)‖² = ε C(x₁)
-    let rho = (2.0 * GROWTH * best.cost).sqrt().max(f64::MIN_POSITIVE) / distance;
+    let rho = (2.0 * COST_GROWTH * best.cost).sqrt().max(f64::MIN_POSITIVE) / distance;
     rows *= rho;
     let at = &rows * DVector::from_fn(best.x.len(), |j, _| if j < globals { given[j] } else { 0.0 });
 
-    let hidden: Vec<usize> = (0..globals).filter(|&j| lost.row(j).norm_squared() > ALL).collect();
+    let hidden: Vec<usize> = (0..globals).filter(|&j| lost.row(j).norm_squared() > NEAREST_ALL).collect();
     let mut held = open.clone();
     let mut kept = best.x.clone();
     for &j in &hidden {

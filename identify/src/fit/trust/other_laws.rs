@@ -15,9 +15,12 @@
 use super::doubts::OtherLaw;
 use super::uncertainty::Judged;
 use crate::fit::asked::drifting;
-use crate::fit::asked::problem::{Problem, ROUNDING};
+use crate::fit::asked::problem::Problem;
 use crate::fit::asked::run::Run;
-use crate::fit::noise::student::NORMAL;
+use crate::fit::limits::{
+    DRIFT_PARTS, FILE_ROUNDING, LAW_DUST, LAW_FIRST, LAW_LEAST, LAW_MOST, LAW_ROUNDS, LAW_SHOWN, NORMAL,
+    STRIBECK_SHARES,
+};
 use crate::fit::noise::{half_width, spreads};
 use crate::fit::search::starts::Searched;
 use crate::fit::search::triangle::inverse_of_square;
@@ -27,26 +30,6 @@ use crate::machine::Machine;
 use crate::number::engineering;
 use crate::solve::Bench;
 use nalgebra::{DMatrix, DVector};
-
-/// Stribeck velocities that are tried, as shares of the body's greatest speed.
-const SHARES: [f64; 4] = [0.02, 0.06, 0.18, 0.5];
-
-/// The first amplitude, of Coulomb friction, and the least and the greatest that a law may have.
-const FIRST: f64 = 0.2;
-const LEAST: f64 = 0.01;
-const MOST: f64 = 3.0;
-
-/// Standard errors of its amplitude by which a law has to show.
-const SHOWN: f64 = 3.0;
-
-/// Share of how far the outputs range that a law has to move them by: below are the last digits of logs and solvers.
-const DUST: f64 = 1e-6;
-
-/// Parts of a log along which friction drifts.
-const PARTS: usize = 10;
-
-/// How often the column is taken anew at the amplitude that it led to.
-const ROUNDS: usize = 3;
 
 /// A body of an axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -106,7 +89,7 @@ struct Candidate {
 impl Candidate {
     /// The amplitude that is tried first.
     fn first(self) -> f64 {
-        FIRST * if self.kind == Kind::Drift { 1.0 } else { self.coulomb }
+        LAW_FIRST * if self.kind == Kind::Drift { 1.0 } else { self.coulomb }
     }
 
     /// Puts so much of the law into a machine, at this share of a log.
@@ -139,7 +122,7 @@ impl Candidate {
     /// Amplitudes that the law may have.
     fn range(self) -> (f64, f64) {
         match self.kind {
-            Kind::Stribeck(_) => (LEAST * self.coulomb, MOST * self.coulomb),
+            Kind::Stribeck(_) => (LAW_LEAST * self.coulomb, LAW_MOST * self.coulomb),
             Kind::Sided => (-0.9 * self.coulomb, 0.9 * self.coulomb),
             Kind::Drift => (-0.9, 0.9),
         }
@@ -222,10 +205,10 @@ pub(crate) fn other_law(found: &Searched, judged: &Judged) -> Option<OtherLaw> {
     let tried = candidates.into_iter().filter_map(|candidate| place.attempt(candidate, candidate.first()));
     let mut tried = tried.max_by(|a, b| a.gain.total_cmp(&b.gain))?;
     // Independent residuals would have to show it, too.
-    if tried.gain.sqrt() < SHOWN * judged.covariance.deviation {
+    if tried.gain.sqrt() < LAW_SHOWN * judged.covariance.deviation {
         return None;
     }
-    for _ in 1..ROUNDS {
+    for _ in 1..LAW_ROUNDS {
         tried = place.attempt(tried.candidate, tried.amplitude)?;
     }
     place.judged(&tried, judged)
@@ -246,7 +229,7 @@ fn candidates(problem: &Problem, x: &[f64]) -> Vec<Candidate> {
             continue;
         }
         let fastest = fastest(problem, x, body);
-        all.extend(SHARES.map(|share| Candidate { body, kind: Kind::Stribeck(share * fastest), coulomb }));
+        all.extend(STRIBECK_SHARES.map(|share| Candidate { body, kind: Kind::Stribeck(share * fastest), coulomb }));
         all.extend([Kind::Sided, Kind::Drift].map(|kind| Candidate { body, kind, coulomb }));
     }
     all
@@ -285,7 +268,8 @@ impl Place<'_> {
             let rows = &mut moved[first..first + run.rows()];
             let good = match candidate.kind {
                 Kind::Drift => {
-                    let stages: Vec<Machine> = (0..PARTS).map(|k| with((k as f64 + 0.5) / PARTS as f64)).collect();
+                    let stages: Vec<Machine> =
+                        (0..DRIFT_PARTS).map(|k| with((k as f64 + 0.5) / DRIFT_PARTS as f64)).collect();
                     drifting::residuals(run, &stages, &extras, rows)
                 }
                 Kind::Stribeck(_) | Kind::Sided => run.residuals(&mut bench, &with(0.5), &extras, rows),
@@ -317,7 +301,7 @@ impl Place<'_> {
         columns.columns_mut(g + 1, n - g).copy_from(&self.jacobian.columns(g, n - g));
         // Of logs without noise any law takes off some of what their last digits left.
         let moved = (&tried.column * tried.amplitude).amax();
-        if moved < DUST / ROUNDING * self.problem.rounding() {
+        if moved < LAW_DUST / FILE_ROUNDING * self.problem.rounding() {
             return None;
         }
         let inverse = inverse_of_square(&columns)?;
@@ -326,7 +310,7 @@ impl Place<'_> {
         let unit = |j: usize| DVector::from_fn(g + 1, |k, _| f64::from(u8::from(k == j)));
         let error = half_width(&spreads, &unit(g)) / NORMAL;
         let standard_errors = tried.amplitude.abs() / error;
-        if !standard_errors.is_finite() || standard_errors < SHOWN {
+        if !standard_errors.is_finite() || standard_errors < LAW_SHOWN {
             return None;
         }
         let shift = tried.along.rows(0, g) * -tried.amplitude;

@@ -8,25 +8,13 @@ use super::found::Fit;
 use crate::case::{Case, Plan};
 use crate::error::Result;
 use crate::fit::asked::problem::{Problem, Stop};
+use crate::fit::limits::{
+    CROOKED, HUBER, MOST_PROFILED, PROFILE_AT, PROFILE_SIMULATIONS, PROFILE_WORK, REFIT_TOLERANCE,
+};
 use crate::fit::search::least_squares::minimise;
 use crate::fit::search::point::{Ending, Options};
-use crate::fit::search::starts::HUBER;
 use crate::fit::search::triangle::inverse_of_square;
 use crate::solve::Flow;
-
-/// Where a parameter is held, in standard errors off its estimate; outwards, so that each starts where the one before
-/// it ended.
-const AT: [[f64; 3]; 2] = [[-1.0, -2.0, -3.0], [1.0, 2.0, 3.0]];
-
-/// Most parameters that are profiled.
-const MOST: usize = 12;
-
-/// Simulated logs that profiles may take, as a multiple of what the fit took; and so many at any rate.
-const WORK: u64 = 4;
-const FEWEST_SIMULATIONS: u64 = 1000;
-
-/// How far the growth two standard errors off may be from that of a linear model, as a share, before it is told.
-const CROOKED: f64 = 0.25;
 
 /// The profile of one parameter.
 #[derive(Debug, Clone, PartialEq)]
@@ -65,10 +53,10 @@ impl Profile {
 pub fn profiles(case: &Case, plan: &Plan, fit: &Fit, stop: Option<Stop>) -> Result<Vec<Profile>> {
     let mut problem = Problem::new(case, plan)?.stopped_by(stop);
     problem.weigh_by(&fit.noise);
-    let most = FEWEST_SIMULATIONS.max(WORK * fit.work.simulations);
+    let most = PROFILE_SIMULATIONS.max(PROFILE_WORK * fit.work.simulations);
     let mut profiles = Vec::new();
     let Some(bottom) = Bottom::new(&mut problem, plan, fit) else { return Ok(profiles) };
-    for j in 0..problem.parameters.len().min(MOST) {
+    for j in 0..problem.parameters.len().min(MOST_PROFILED) {
         if problem.simulations > most || problem.is_stopped() {
             break;
         }
@@ -89,8 +77,13 @@ struct Bottom {
 impl Bottom {
     fn new(problem: &mut Problem, plan: &Plan, fit: &Fit) -> Option<Self> {
         let huber = if plan.huber { HUBER } else { f64::INFINITY };
-        let options =
-            Options { iterations: 6, tolerance: 0.05, huber, rounding: problem.rounding(), ..Options::default() };
+        let options = Options {
+            iterations: 6,
+            tolerance: REFIT_TOLERANCE,
+            huber,
+            rounding: problem.rounding(),
+            ..Options::default()
+        };
         let bounds = problem.bounds();
         if fit.point.len() != problem.variables() {
             return None;
@@ -115,7 +108,7 @@ impl Bottom {
         // On the scale of the search, where the interval is symmetric.
         let off = error / problem.slope(j, estimate.value);
         let mut points = vec![(problem.value(j, self.x[j]), 0.0, 0.0)];
-        for side in AT {
+        for side in PROFILE_AT {
             let mut start = self.x.clone();
             for errors in side {
                 let mut bounds = problem.bounds();

@@ -1,11 +1,11 @@
 //! Proposals of one more experiment: the sensitivities of its outputs beside those of the logs.
 
-use super::directions::LIMIT;
 use super::identify::Identifiability;
 use super::uncertainty::Judged;
 use crate::fit::asked::problem::Problem;
 use crate::fit::asked::residuals::{Differences, Step};
 use crate::fit::asked::run::is_position;
+use crate::fit::limits::UNDETERMINED;
 use crate::fit::search::starts::Searched;
 use crate::log::Quantity;
 use crate::machine::{AmplifierMode, BeltModel, Machine};
@@ -21,7 +21,7 @@ pub struct Proposal {
     pub told: String,
     /// Parameters determined with it.
     pub determined: usize,
-    /// Sum of the logarithms of the relative errors, those that are not determined counted as [`LIMIT`].
+    /// Sum of the logarithms of the relative errors, those that are not determined counted as [`UNDETERMINED`].
     score: f64,
 }
 
@@ -134,7 +134,7 @@ pub(crate) fn proposals(found: &Searched, judged: &Judged) -> Vec<Proposal> {
     let deviation = judged.covariance.deviation * judged.inflation;
     let Some(now) = Identifiability::new(problem, &best.jacobian, &best.x, deviation) else { return Vec::new() };
     let score = |found: &Identifiability| {
-        found.error.iter().map(|e| if e.is_finite() { e.clamp(1e-12, LIMIT).ln() } else { 0.0 }).sum::<f64>()
+        found.error.iter().map(|e| if e.is_finite() { e.clamp(1e-12, UNDETERMINED).ln() } else { 0.0 }).sum::<f64>()
     };
     let count = |found: &Identifiability| found.error.iter().filter(|e| e.is_finite()).count();
     let before = (count(&now), score(&now));

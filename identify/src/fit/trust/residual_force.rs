@@ -12,19 +12,11 @@
 
 use super::scores::LogFit;
 use crate::fit::asked::run::is_position;
+use crate::fit::limits::{CART_AT_REST, RESIDUAL_FORCE_NOISE, WIDTHS};
 use crate::fit::search::regression::{derived, reach};
 use crate::log::Quantity;
 use crate::machine::{AmplifierMode, Machine};
 use crate::parameter::{Sum, at_pulley, value};
-
-/// Widths of the Gaussian that are tried, rows.
-const WIDTHS: [f64; 12] = [2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 32.0, 48.0, 64.0, 96.0];
-
-/// Part of the residual force that noise of the log may be; the least width that keeps to it is taken.
-const NOISE: f64 = 0.3;
-
-/// Below this share of the greatest speed the cart counts as at rest, where friction takes what it must.
-const REST: f64 = 0.02;
 
 /// A force that is missing along a log.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -98,7 +90,7 @@ pub fn residual_force(machine: &Machine, log: &LogFit) -> Option<ResidualForce> 
         // squared
         let trembles = mass * noise * (3.0 / (8.0 * std::f64::consts::PI.sqrt())).sqrt() / width.powf(2.5) / (h * h);
         found = Some((width, force));
-        if trembles < NOISE * size {
+        if trembles < RESIDUAL_FORCE_NOISE * size {
             break;
         }
     }
@@ -111,7 +103,7 @@ pub fn residual_force(machine: &Machine, log: &LogFit) -> Option<ResidualForce> 
     let mut all = ResidualForce::default();
     for (k, ([speed, _], force)) in motion.iter().zip(&force).enumerate() {
         let row = k + margin;
-        if speed.abs() < REST * fastest {
+        if speed.abs() < CART_AT_REST * fastest {
             continue;
         }
         all.time.push(log.time[row]);

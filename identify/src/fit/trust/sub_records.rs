@@ -16,6 +16,7 @@ use super::doubts::Disagreement;
 use super::uncertainty::Judged;
 use crate::case::{Case, Plan};
 use crate::fit::asked::problem::Problem;
+use crate::fit::limits::{COLOURED, FEWEST_WINDOWS, REFIT_TOLERANCE, WINDOW_SAMPLES, WINDOWS_OFF};
 use crate::fit::noise::student::student;
 use crate::fit::search::least_squares::minimise;
 use crate::fit::search::point::{Ending, Options};
@@ -23,16 +24,6 @@ use crate::fit::search::starts::Searched;
 use crate::fit::search::triangle::inverse_of_square;
 use crate::solve::Flow;
 use nalgebra::{DMatrix, DVector};
-
-/// Fewest windows, and the fewest samples of one.
-const WINDOWS: f64 = 6.0;
-const SAMPLES: f64 = 100.0;
-
-/// Residuals that make errors less than so many times those of white noise hide no other model.
-const COLOURED: f64 = 1.1;
-
-/// Standard errors by which the windows may be off the whole, and the windows off each other.
-const OFF: f64 = 2.3;
 
 /// Compares windows with the whole; none where they agree within noise, or tell too little.
 pub(crate) fn disagreement(case: &Case, plan: &Plan, found: &Searched, judged: &Judged) -> Option<Disagreement> {
@@ -46,7 +37,7 @@ pub(crate) fn disagreement(case: &Case, plan: &Plan, found: &Searched, judged: &
     let total: f64 = lengths.clone().sum();
     let shortest = lengths.fold(f64::INFINITY, f64::min);
     let samples = whole.runs.iter().map(|run| run.time.len()).sum::<usize>() as f64;
-    let length = (total / WINDOWS).min(0.5 * shortest).max(SAMPLES * total / samples);
+    let length = (total / FEWEST_WINDOWS).min(0.5 * shortest).max(WINDOW_SAMPLES * total / samples);
     let windowed = Plan { windows: Some(length), ..plan.clone() };
     let mut problem = Problem::new(case, &windowed).ok()?;
     for &(quantity, deviation) in &found.noise {
@@ -56,7 +47,8 @@ pub(crate) fn disagreement(case: &Case, plan: &Plan, found: &Searched, judged: &
     let mut start = problem.start();
     start[..g].copy_from_slice(&found.best.x[..g]);
     let bounds = problem.bounds();
-    let options = Options { iterations: 30, tolerance: 0.05, rounding: problem.rounding(), ..Options::default() };
+    let options =
+        Options { iterations: 30, tolerance: REFIT_TOLERANCE, rounding: problem.rounding(), ..Options::default() };
     let best = minimise(&mut problem, &start, &bounds, &options, &mut |_, _| Flow::Continue);
     if matches!(best.ending, Ending::Failed | Ending::Interrupted) || best.at_bound[..g].contains(&true) {
         return None;
@@ -88,14 +80,14 @@ pub(crate) fn disagreement(case: &Case, plan: &Plan, found: &Searched, judged: &
     let between = &inverse * squares * &inverse * (clusters / (clusters - 1.0));
     let shift = DVector::from_fn(g, |j, _| best.x[j] - found.best.x[j]);
     // Of windows, noise makes a variance that is off by √(2/(G − 1)) of itself.
-    let most = 1.0 + OFF * (2.0 / (clusters - 1.0)).sqrt();
+    let most = 1.0 + WINDOWS_OFF * (2.0 / (clusters - 1.0)).sqrt();
     let off: Vec<f64> = (0..g)
         .map(|j| {
             let error = noise.covariance.error(j).unwrap_or(f64::INFINITY);
-            f64::max(shift[j].abs() / error, OFF * (between[(j, j)].sqrt() / error / most))
+            f64::max(shift[j].abs() / error, WINDOWS_OFF * (between[(j, j)].sqrt() / error / most))
         })
         .collect();
-    if !off.iter().all(|off| off.is_finite()) || off.iter().all(|off| *off < OFF) {
+    if !off.iter().all(|off| off.is_finite()) || off.iter().all(|off| *off < WINDOWS_OFF) {
         return None;
     }
     let wider = (student(windows - 1) / student(1_000_000)).powi(2);

@@ -8,32 +8,15 @@ use super::uncertainty::Judged;
 use crate::case::{Case, Plan, Scope};
 use crate::fit::asked::problem::Problem;
 use crate::fit::asked::run::Nuisance;
+use crate::fit::limits::{
+    DELAY_ERRORS, DELAY_MENDS, HUBER, MENDED, NO_WORSE, ROUGH_TOLERANCE, STAND_OUT, TRIAL_FIT_ITERATIONS, UNIT_WORSE,
+};
 use crate::fit::search::least_squares::minimise;
 use crate::fit::search::point::{Ending, Minimum, Options};
-use crate::fit::search::starts::{HUBER, Searched};
+use crate::fit::search::starts::Searched;
 use crate::log::{Log, Quantity, Remedy, Severity, Survey};
 use crate::solve::Flow;
 use std::sync::Arc;
-
-/// Part of the cost of a quantity's values that may be left by what is said to be wrong with a log, and what the cost of
-/// all may be then: of two columns that contradict each other, a fit may have left one alone.
-const MENDED: f64 = 0.5;
-const NO_WORSE: f64 = 1.05;
-
-/// A unit that does not fit to the machine of the case is one unless the log is met so many times worse without it: the
-/// parameters that are free may make up for a factor.
-const WORSE: f64 = 2.0;
-
-/// Mean square of the residuals of samples that are said to be wrong, over that of the others where they do not count.
-const STAND_OUT: f64 = 9.0;
-
-/// The same of a delay, and how many standard errors it has to be away from none.
-const LATE: f64 = 0.8;
-const ERRORS: f64 = 4.0;
-
-/// Most Jacobians of a trial, and the standard errors that its last step may promise.
-const ITERATIONS: usize = 15;
-const TOLERANCE: f64 = 0.1;
 
 /// A delay that logs bear out.
 pub(crate) struct Late {
@@ -64,7 +47,7 @@ pub(crate) fn is_borne_out(case: &Case, plan: &Plan, found: &Searched, name: &st
         return true;
     }
     let most = |before: usize, after: usize| match remedy {
-        Remedy::Unit(..) => WORSE,
+        Remedy::Unit(..) => UNIT_WORSE,
         // C n = C₁ k + s C₁ (n − k), k values that are kept
         Remedy::Leave(..) => {
             let (n, kept) = (before.max(1) as f64, after as f64);
@@ -150,8 +133,8 @@ fn descend(problem: &mut Problem, plan: &Plan, start: &[f64]) -> Option<(Minimum
     }
     let huber = if plan.huber { HUBER } else { f64::INFINITY };
     let options = Options {
-        iterations: ITERATIONS,
-        tolerance: TOLERANCE,
+        iterations: TRIAL_FIT_ITERATIONS,
+        tolerance: ROUGH_TOLERANCE,
         huber,
         evolutions: 0,
         rounding: problem.rounding(),
@@ -183,5 +166,5 @@ pub(crate) fn late(case: &Case, plan: &Plan, found: &Searched, about: f64) -> Op
     let left = (cost / found.best.cost.max(f64::MIN_POSITIVE)).sqrt();
     let judged = Judged::new(&problem, &minimum.residuals, &minimum.jacobian, &minimum.x, &minimum.at_bound)?;
     let (delay, error) = (unit * minimum.x[place], unit * judged.covariance.error(place)?);
-    (left < LATE && delay > ERRORS * error).then_some(Late { delay, left })
+    (left < DELAY_MENDS && delay > DELAY_ERRORS * error).then_some(Late { delay, left })
 }

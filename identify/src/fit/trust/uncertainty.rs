@@ -8,7 +8,7 @@ use super::directions::Directions;
 use super::doubts::{Disagreement, OtherLaw};
 use super::identify::Identifiability;
 use crate::fit::asked::problem::Problem;
-use crate::fit::noise::student::NORMAL;
+use crate::fit::limits::NORMAL;
 use crate::fit::noise::{self, Spread, Wave, half_width};
 use crate::fit::search::triangle::inverse_of_square;
 use nalgebra::{DMatrix, DVector};

@@ -1,5 +1,6 @@
 //! Adaptation of a chain before its draws count: the step, by dual averaging, and the covariance, in windows.
 
+use crate::fit::limits::ACCEPTANCE;
 use libm::{exp, log, pow, sqrt};
 use nalgebra::DMatrix;
 
@@ -16,9 +17,6 @@ pub struct Steps {
 }
 
 impl Steps {
-    /// δ: the acceptance that is wanted.
-    pub const WANTED: f64 = 0.8;
-
     /// From this step on.
     pub fn new(step: f64) -> Self {
         Self { mu: log(10.0 * step), lack: 0.0, mean: log(step), count: 0.0 }
@@ -32,7 +30,7 @@ impl Steps {
         self.count += 1.0;
         let m = self.count;
         // H̄ = (1 − 1/(m + t₀)) H̄ + (δ − α)/(m + t₀); ln ε = μ − √m/γ H̄; ln ε̄ = m^−κ ln ε + (1 − m^−κ) ln ε̄ (6)
-        self.lack += (Self::WANTED - acceptance - self.lack) / (m + T0);
+        self.lack += (ACCEPTANCE - acceptance - self.lack) / (m + T0);
         let next = self.mu - sqrt(m) / GAMMA * self.lack;
         let eta = pow(m, -KAPPA);
         self.mean = eta * next + (1.0 - eta) * self.mean;

@@ -11,17 +11,11 @@
 //! ```
 
 use super::LogDensity;
-use super::adaptation::Steps;
 use crate::chance::{normal, uniform};
+use crate::fit::limits::{ACCEPTANCE, LARGEST_ERROR, MOST_DOUBLINGS};
 use libm::{exp, log, log1p};
 use nalgebra::{DMatrix, DVector};
 use rand_pcg::Pcg64;
-
-/// A path whose energy is off by more than this has diverged.
-const LARGEST_ERROR: f64 = 1000.0;
-
-/// A path has at most 2 to this many steps.
-const MOST_DOUBLINGS: usize = 10;
 
 /// A point of a path.
 #[derive(Clone)]
@@ -161,7 +155,7 @@ impl<'a> Chain<'a> {
         for _ in 0..50 {
             self.kick();
             let error = self.at.energy() - self.leap(&self.at.clone(), Way::Forth).energy();
-            let grow = error > log(Steps::WANTED);
+            let grow = error > log(ACCEPTANCE);
             if *grows.get_or_insert(grow) != grow {
                 return;
             }

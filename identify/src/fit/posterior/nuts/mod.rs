@@ -10,6 +10,7 @@ mod mixing;
 mod walk;
 
 use crate::error::{Error, Result};
+use crate::fit::limits::{MOST_CHAINS, MOST_DRAWS};
 use adaptation::{Steps, Windows, factor};
 use chain::Chain;
 use rand_pcg::Pcg64;
@@ -34,12 +35,6 @@ impl Default for Effort {
         Self { chains: 4, tune: 500, draws: 500, seed: 1 }
     }
 }
-
-/// Most chains: each is a thread.
-const MOST_CHAINS: usize = 100;
-
-/// Most draws of all chains together: they stay in memory.
-const MOST_DRAWS: usize = 10_000_000;
 
 impl Effort {
     /// Refuses what no sampler can do.

@@ -8,25 +8,16 @@
 //! s = 2.38/√n to begin with                    (A. Gelman, G. O. Roberts, W. R. Gilks 1996)
 //! ```
 //!
-//! A step is worth 0.33/n of an independent draw, so a draw is what [`STEPS`] n of them come to.
+//! A step is worth 0.33/n of an independent draw, so a draw is what [`WALK_STEPS`] n of them come to.
 
 use super::adaptation::{Windows, factor};
 use super::{Drawn, Job, Plain};
 use crate::chance::{normal, uniform};
 use crate::error::{Error, Result};
+use crate::fit::limits::{WALK_LENGTH, WALK_STEPS, WALK_TAKEN, WALK_TAKEN_OF_ONE};
 use libm::{exp, log, pow, sqrt};
 use nalgebra::{DMatrix, DVector};
 use rand_pcg::Pcg64;
-
-/// Steps of a draw for each variable.
-const STEPS: usize = 3;
-
-/// Length of a step in standard deviations, times √n.
-const LENGTH: f64 = 2.38;
-
-/// Share of steps that is taken at best, of many variables, and by how much more of one.
-const TAKEN: f64 = 0.234;
-const OF_ONE: f64 = 0.206;
 
 /// A walk at its present draw.
 struct Walk<'a> {
@@ -47,7 +38,7 @@ impl Walk<'_> {
     /// A draw, and the share of its steps that were taken; none once `goes_on` says no.
     fn draw(&mut self, goes_on: &dyn Fn() -> bool) -> Option<f64> {
         let n = self.position.len();
-        let steps = STEPS * n;
+        let steps = WALK_STEPS * n;
         let mut taken = 0;
         for _ in 0..steps {
             if !goes_on() {
@@ -70,7 +61,7 @@ impl Walk<'_> {
     /// Learns steps and covariance; whether it was not interrupted.
     fn tune(&mut self, job: &Job) -> bool {
         let n = self.position.len() as f64;
-        let wanted = TAKEN + OF_ONE / n;
+        let wanted = WALK_TAKEN + WALK_TAKEN_OF_ONE / n;
         let Windows { begin, ends } = Windows::new(job.effort.tune);
         let (mut window, mut since) = (Vec::new(), 0.0);
         for k in 1..=job.effort.tune {
@@ -84,7 +75,7 @@ impl Walk<'_> {
             }
             if ends.contains(&k) {
                 if let Some(factor) = factor(&window) {
-                    (self.factor, self.length, since) = (factor, log(LENGTH / sqrt(n)), 0.0);
+                    (self.factor, self.length, since) = (factor, log(WALK_LENGTH / sqrt(n)), 0.0);
                 }
                 window.clear();
             }
@@ -101,7 +92,7 @@ pub(super) fn chain(job: &Job, density: &Plain, start: &[f64], random: Pcg64) ->
         density,
         random,
         factor: DMatrix::identity(n, n),
-        length: log(LENGTH / sqrt(n as f64)),
+        length: log(WALK_LENGTH / sqrt(n as f64)),
         position: DVector::from_column_slice(start),
         log: log_start.ok_or_else(nowhere)?,
         evaluations: 1,

@@ -1,0 +1,822 @@
+//! Limits and thresholds of the fit, room by room.
+//!
+//! Each has its meaning, its unit (1 for a ratio), its source, and where there is one a test of what it does. A source
+//! of "chosen" marks a number of judgement. Rooms declare no numbers of their own: `tests/rooms.rs` looks for them.
+
+// asked: what is compared with what
+
+/// Error that numbers in files and solvers may have, as a share of the range of a quantity.
+///
+/// Unit: 1. Source: ten digits, which the usual logs of simulations have.
+pub(crate) const FILE_ROUNDING: f64 = 1e-10;
+
+/// Error of a delay that counts as 100 %: one known no better is not known.
+///
+/// Unit: samples. Source: chosen: few logs tell a delay to a sample. Test:
+/// `a_delay_is_found_in_windows_as_in_the_whole_log`.
+pub(crate) const KNOWN_DELAY: f64 = 10.0;
+
+/// Initial speed at which a log is taken to begin in motion.
+///
+/// Unit: standard errors of the speed. Source: chosen. Test: `a_log_that_begins_at_rest_does_so_in_its_first_window`.
+pub(crate) const STARTS_MOVING: f64 = 5.0;
+
+/// Standard deviation of noise that neighbouring values share, relative to what they differ by.
+///
+/// Unit: 1. Source: noise of first order with a time constant of 30 samples.
+pub(crate) const SLOW_BY_DIFFERENCE: f64 = 5.0;
+
+/// Deviation of a sample time from an even raster up to which the solver answers at the raster's time. The error of a
+/// value is at most its rate of change times this share of an interval.
+///
+/// Unit: sample intervals. Source: chosen.
+pub(crate) const EVEN_RASTER: f64 = 1e-3;
+
+/// Minimum up and down steps (and per 100 samples) for a resting signal to count as dithering.
+///
+/// Unit: steps. Source: chosen. Test: `what_trembles_at_rest_is_told_from_what_moves`.
+pub(crate) const DITHER_STEPS: usize = 2;
+
+/// Points of the raster per interval where times are uneven; between them positions follow cubics through positions and
+/// speeds, all else straight lines. With h the raster, the error is at most h⁴|x⁗|/384, and h²|ÿ|/8.
+///
+/// Unit: 1/interval. Source: chosen; error bounds of Hermite and linear interpolation. Test:
+/// `cubics_go_through_cubics`.
+pub(crate) const RASTER_POINTS: f64 = 8.0;
+
+/// Rows of input kept from before a window: more than a fitted delay comes to.
+///
+/// Unit: samples. Source: chosen; above `LONGEST_DELAY`. Test:
+/// `a_window_that_is_late_goes_on_with_the_input_from_before_it`.
+pub(crate) const INPUT_BEFORE_WINDOW: usize = 60;
+
+/// Step of the central differences of the equations of motion, relative to a variable or its unit: truncation and
+/// rounding of one of many terms balance there.
+///
+/// Unit: 1. Source: balance of truncation and rounding.
+pub(crate) const EQUATION_STEP: f64 = 3e-5;
+
+/// Step by which a start is moved; the state is linear in it.
+///
+/// Unit: units of the variable. Source: any step is exact.
+pub(crate) const START_STEP: f64 = 1e-2;
+
+// search: where the least is
+
+/// Residual beyond which Huber's loss is linear.
+///
+/// Unit: standard deviations. Source: P. J. Huber 1964: 95 % efficient for Gaussian noise.
+pub(crate) const HUBER: f64 = 1.345;
+
+/// Steps of coarse derivatives, tried one after the other.
+///
+/// Unit: standard errors of a variable by itself. Source: chosen.
+pub(crate) const COARSE: [f64; 2] = [1.0, 10.0];
+
+/// Promised gain below which a search measures derivatives over `PAST_KINKS`.
+///
+/// Unit: standard errors. Source: chosen.
+pub(crate) const NEAR: f64 = 1.0;
+
+/// Step of derivatives near a minimum and in a posterior: it passes over the small kinks that sticks and slips make,
+/// and is as good as another where there are none.
+///
+/// Unit: standard errors of a variable by itself. Source: chosen.
+pub(crate) const PAST_KINKS: f64 = 0.3;
+
+/// Maximum number of variables that evolution searches.
+///
+/// Unit: variables. Source: chosen; its cost grows with their square.
+pub(crate) const MOST_EVOLVED: usize = 16;
+
+/// Generations without a gain of `SHOWS` after which an evolution ends.
+///
+/// Unit: generations. Source: chosen.
+pub(crate) const BARREN: usize = 8;
+
+/// Promised gain at which a minimum on a kink counts as converged: of all gradients around together, or of one that no
+/// step of any length fulfilled.
+///
+/// Unit: standard errors. Source: a tenth of what noise makes of an estimate. Test: `a_minimum_on_a_kink_is_one`.
+pub(crate) const KINK: f64 = 0.1;
+
+/// Two consecutive steps with a gain below this, and far below the promised one, indicate a kink; so do steps after
+/// which twice this is still promised.
+///
+/// Unit: standard errors. Source: a tenth of what noise makes of an estimate.
+pub(crate) const SHOWS: f64 = 0.1;
+
+/// Step size along the longest axis at which an evolution ends.
+///
+/// Unit: units of the search, here standard errors. Source: chosen. Test: `the_lowest_point_of_a_long_valley_is_found`.
+pub(crate) const SMALLEST_STEP: f64 = 0.01;
+
+/// Share of its promised gain that a step of a bundle must keep to be taken.
+///
+/// Unit: 1. Source: chosen.
+pub(crate) const KEPT: f64 = 0.1;
+
+/// Share of the promised gain by which a new piece must contradict a step for the next step to be another.
+///
+/// Unit: 1. Source: chosen.
+pub(crate) const CONTRADICTS: f64 = 0.5;
+
+/// Maximum halvings of a step of a bundle that is neither good nor informative.
+///
+/// Unit: halvings. Source: chosen.
+pub(crate) const HALVINGS: usize = 12;
+
+/// Gradients that a bundle keeps beyond the number of variables.
+///
+/// Unit: gradients. Source: chosen.
+pub(crate) const SPARE_PIECES: usize = 10;
+
+/// Regularisation of the metric of a bundle, relative to the norm of a variable's own column.
+///
+/// Unit: 1. Source: chosen.
+pub(crate) const FIRM: f64 = 1e-3;
+
+/// Maximum rounds in which weights are estimated from the residuals.
+///
+/// Unit: rounds. Source: chosen.
+pub(crate) const WEIGHT_ROUNDS: usize = 4;
+
+/// Maximum Jacobians of a start other than the first, before the best of them goes on.
+///
+/// Unit: Jacobians. Source: chosen.
+pub(crate) const TRIAL_ITERATIONS: usize = 12;
+
+/// Gain that the last step may promise in a fit that is only compared with another: a trial, a candidate law, a start.
+///
+/// Unit: standard errors. Source: a tenth of what noise makes of an estimate.
+pub(crate) const ROUGH_TOLERANCE: f64 = 0.1;
+
+/// The same in a fit whose values count: of windows, profiles, and starts of held-out logs.
+///
+/// Unit: standard errors. Source: chosen.
+pub(crate) const REFIT_TOLERANCE: f64 = 0.05;
+
+/// Rows averaged into one equation of the regression, against noise in derivatives.
+///
+/// Unit: samples. Source: chosen.
+pub(crate) const REGRESSION_BLOCK: usize = 5;
+
+/// Number of equal positions after which an axis counts as at rest, where friction is not determined.
+///
+/// Unit: samples. Source: chosen.
+pub(crate) const REST_ROWS: f64 = 20.0;
+
+/// Widths of the Gaussian for derivatives of logs; the least that keeps to the permitted noise is taken.
+///
+/// Unit: samples. Source: steps of about 4/3 and 3/2.
+pub(crate) const WIDTHS: [f64; 12] = [2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 32.0, 48.0, 64.0, 96.0];
+
+/// Widest of `WIDTHS` that a regression tries.
+///
+/// Unit: samples. Source: chosen: beyond it a move is smeared.
+pub(crate) const WIDEST_IN_REGRESSION: f64 = 32.0;
+
+/// Noise permitted in the acceleration of a regression, relative to its root mean square.
+///
+/// Unit: 1. Source: chosen.
+pub(crate) const REGRESSION_NOISE: f64 = 0.2;
+
+/// Rows of a tall matrix that are reduced at once.
+///
+/// Unit: rows. Source: speed. Test: `products_of_columns_stay`.
+pub(crate) const STRETCH: usize = 256;
+
+// noise: what residuals are like
+
+/// Half-width of the central 95 % of a normal distribution.
+///
+/// Unit: standard deviations. Source: Φ⁻¹(0.975).
+pub(crate) const NORMAL: f64 = 1.959_963_985;
+
+/// Ratio of neighbouring time constants in the grid of slow noises.
+///
+/// Unit: 1. Source: chosen.
+pub(crate) const TIME_RATIO: f64 = 2.2;
+
+/// Ratio of neighbouring powers in the grid of slow noises.
+///
+/// Unit: 1. Source: chosen.
+pub(crate) const POWER_RATIO: f64 = 3.0;
+
+/// Least power of a slow noise at low frequencies, relative to white noise.
+///
+/// Unit: 1. Source: chosen.
+pub(crate) const LEAST_POWER: f64 = 0.1;
+
+/// Number of powers in the grid of slow noises.
+///
+/// Unit: 1. Source: chosen: 0.1 · 3¹³ = 1.6e5.
+pub(crate) const MOST_POWERS: usize = 14;
+
+/// Prior probability of white noise.
+///
+/// Unit: 1. Source: chosen.
+pub(crate) const WHITE_BEFOREHAND: f64 = 0.3;
+
+/// Prior probability of two slow noises.
+///
+/// Unit: 1. Source: chosen.
+pub(crate) const TWO_BEFOREHAND: f64 = 0.35;
+
+/// Least ratio of the time constants of two slow noises, as a logarithm.
+///
+/// Unit: 1. Source: chosen.
+pub(crate) const TIMES_APART: f64 = 1.0;
+
+/// Rounds in which each of two slow noises is sought again beside the other.
+///
+/// Unit: rounds. Source: chosen.
+pub(crate) const NOISE_TURNS: usize = 3;
+
+/// Maximum number of waves along the travel.
+///
+/// Unit: waves. Source: chosen. Test: `an_error_that_comes_again_at_the_same_place_is_named`.
+pub(crate) const WAVES: usize = 3;
+
+/// Least amplitude of a wave: rounding alone makes waves of 1/π steps.
+///
+/// Unit: steps of the converter. Source: above 1/π.
+pub(crate) const ROUNDED: f64 = 0.5;
+
+/// Least amplitude of a wave, as a share of the range of its quantity.
+///
+/// Unit: 1. Source: below are the last digits of logs and solvers. Test: `last_digits_of_a_log_speak_for_no_law`.
+pub(crate) const NOTHING: f64 = 1e-6;
+
+/// Maximum number of blocks into which the values of a quantity are averaged.
+///
+/// Unit: blocks. Source: speed.
+pub(crate) const BLOCKS: usize = 700;
+
+/// Maximum number of slow noises at once.
+///
+/// Unit: states of the filter. Source: two noises describe the residuals tried so far.
+pub(crate) const SLOW_NOISES: usize = 2;
+
+/// Least number of waves in the travel: an error that does not repeat is one of a law, not of a place.
+///
+/// Unit: waves. Source: chosen.
+pub(crate) const FEWEST_WAVES: f64 = 2.0;
+
+/// Share of the travel that must be passed in both directions: the error of a law changes with the direction, that of a
+/// place does not.
+///
+/// Unit: 1. Source: chosen.
+pub(crate) const BOTH_WAYS: f64 = 0.5;
+
+/// Step of the wave numbers that are tried.
+///
+/// Unit: waves in the travel. Source: chosen: half of what can be resolved.
+pub(crate) const WAVE_STEP: f64 = 0.5;
+
+/// Maximum number of wave numbers that are tried.
+///
+/// Unit: 1. Source: speed.
+pub(crate) const MOST_WAVE_NUMBERS: usize = 200;
+
+/// Halvings of the step around the best wave number.
+///
+/// Unit: halvings. Source: chosen.
+pub(crate) const WAVE_HALVINGS: usize = 4;
+
+/// Gain in log-likelihood that waves must have beyond the logarithm of the number tried.
+///
+/// Unit: 1. Source: chosen. Test: `the_right_law_is_not_suspected`.
+pub(crate) const WAVE_CLEAR: f64 = 6.0;
+
+/// Maximum number of classes of speed with a size of noise each.
+///
+/// Unit: classes. Source: chosen.
+pub(crate) const SPEED_CLASSES: usize = 6;
+
+/// Least number of blocks in a class of speed.
+///
+/// Unit: blocks. Source: chosen.
+pub(crate) const FEWEST_BLOCKS: usize = 12;
+
+/// Speed below which a block is at rest, relative to the greatest.
+///
+/// Unit: 1. Source: chosen. Test: `noise_that_grows_with_speed_is_not_taken_to_be_as_large_at_rest`.
+pub(crate) const BLOCK_AT_REST: f64 = 0.01;
+
+/// Least noise of a class of speed, relative to that of all.
+///
+/// Unit: 1. Source: chosen.
+pub(crate) const LEAST_SIZE: f64 = 0.01;
+
+/// Gain in log-likelihood that classes of speed must have.
+///
+/// Unit: 1. Source: chosen.
+pub(crate) const CLASSES_CLEAR: f64 = 3.0;
+
+// trust: what may be believed
+
+/// Relative standard error from which on a combination counts as not determined.
+///
+/// Unit: 1. Source: the value and its error are alike. Test: `what_an_encoder_cannot_tell_is_said_in_words`.
+pub const UNDETERMINED: f64 = 1.0;
+
+/// Root mean square of what a change by 100 % makes of a value, below which a combination counts as not determined
+/// however many values there are: averages of thousands of values would determine it only for a machine that follows
+/// the model to a fraction of one step, and no machine does.
+///
+/// Unit: steps of the converter, as standard deviations of rounding. Source: chosen.
+pub const LEAST_SHOWN: f64 = 0.2;
+
+/// The same, as a share of the range of the values.
+///
+/// Unit: 1. Source: chosen: no model of an axis is better.
+pub const MODEL_ERROR: f64 = 2e-4;
+
+/// Share of a parameter in directions that are not determined, above which it is not determined either.
+///
+/// Unit: 1. Source: chosen. Test: `what_is_determined_beside_what_is_not_keeps_its_interval`.
+pub(crate) const SHARE_LOST: f64 = 0.1;
+
+/// Singular values below this share of the greatest are rounding.
+///
+/// Unit: 1. Source: differences are good to about 1e-9 of the largest column.
+pub(crate) const SINGULAR_ROUNDING: f64 = 1e-8;
+
+/// Maximum iterations of a singular value decomposition.
+///
+/// Unit: iterations. Source: far beyond what one takes.
+pub(crate) const MOST_SWEEPS: usize = 10_000;
+
+/// Deviation from 1 up to which the ratio of two powers counts as 1.
+///
+/// Unit: 1. Source: chosen. Test: `ratios_are_told_where_a_gain_is_free`.
+pub(crate) const WHOLE_POWER: f64 = 0.03;
+
+/// Least number of windows that are compared with the whole logs.
+///
+/// Unit: windows. Source: chosen.
+pub(crate) const FEWEST_WINDOWS: f64 = 6.0;
+
+/// Least length of a window that is compared with the whole logs.
+///
+/// Unit: samples. Source: chosen.
+pub(crate) const WINDOW_SAMPLES: f64 = 100.0;
+
+/// Inflation of standard errors by slow noise, below which residuals hide no other model.
+///
+/// Unit: 1. Source: chosen.
+pub(crate) const COLOURED: f64 = 1.1;
+
+/// Deviation of the windows from the whole logs, and from each other, above which they disagree.
+///
+/// Unit: standard errors. Source: chosen: 2 % of normal deviates.
+pub(crate) const WINDOWS_OFF: f64 = 2.3;
+
+/// ε: relative growth of the cost that a round towards the nearest point may make.
+///
+/// Unit: 1. Source: chosen.
+pub(crate) const COST_GROWTH: f64 = 3e-3;
+
+/// Maximum rounds towards the nearest point.
+///
+/// Unit: rounds. Source: chosen.
+pub(crate) const NEAREST_ROUNDS: usize = 3;
+
+/// Relative change of the variables below which no further round follows.
+///
+/// Unit: 1. Source: chosen.
+pub(crate) const NEAREST_SETTLED: f64 = 1e-3;
+
+/// Square share of a parameter in directions that are not determined, from which on it keeps its given value exactly if
+/// the logs are met as well with it.
+///
+/// Unit: 1. Source: chosen. Test: `what_is_determined_beside_what_is_not_keeps_its_interval`.
+pub(crate) const NEAREST_ALL: f64 = 0.99;
+
+/// Maximum Jacobians of a round towards the nearest point.
+///
+/// Unit: Jacobians. Source: chosen.
+pub(crate) const NEAREST_ITERATIONS: usize = 40;
+
+/// Stribeck velocities that are tried, relative to the greatest speed of the body.
+///
+/// Unit: 1. Source: steps of 3. Test: `a_law_that_was_not_asked_for_widens_intervals_and_is_named`.
+pub(crate) const STRIBECK_SHARES: [f64; 4] = [0.02, 0.06, 0.18, 0.5];
+
+/// First amplitude of another law, relative to Coulomb friction.
+///
+/// Unit: 1. Source: chosen.
+pub(crate) const LAW_FIRST: f64 = 0.2;
+
+/// Least amplitude of another law, relative to Coulomb friction.
+///
+/// Unit: 1. Source: chosen.
+pub(crate) const LAW_LEAST: f64 = 0.01;
+
+/// Greatest amplitude of another law, relative to Coulomb friction.
+///
+/// Unit: 1. Source: chosen.
+pub(crate) const LAW_MOST: f64 = 3.0;
+
+/// Amplitude from which on another law is reported.
+///
+/// Unit: standard errors of the amplitude. Source: chosen: 0.3 % of normal deviates. Test:
+/// `the_right_law_is_not_suspected`.
+pub(crate) const LAW_SHOWN: f64 = 3.0;
+
+/// Change of the outputs that another law must make, as a share of their range.
+///
+/// Unit: 1. Source: below are the last digits of logs and solvers. Test: `last_digits_of_a_log_speak_for_no_law`.
+pub(crate) const LAW_DUST: f64 = 1e-6;
+
+/// Segments of a log along which friction drifts.
+///
+/// Unit: segments. Source: chosen.
+pub(crate) const DRIFT_PARTS: usize = 10;
+
+/// Rounds in which the column of another law is taken again at the amplitude that it led to.
+///
+/// Unit: rounds. Source: chosen.
+pub(crate) const LAW_ROUNDS: usize = 3;
+
+/// Gain that a kink may promise and not keep before it is reported.
+///
+/// Unit: standard errors. Source: chosen.
+pub(crate) const KINK_PROMISE: f64 = 2.0;
+
+/// Explained share of an output below which a model explains nothing.
+///
+/// Unit: %. Source: chosen.
+pub(crate) const POOR_FIT: f64 = 50.0;
+
+/// Ratio of K_t and K_e of one motor that is reported; in SI units they are the same number.
+///
+/// Unit: 1. Source: chosen. Test: `bounds_and_motors_that_cannot_be_are_said`.
+pub(crate) const MOTOR_CONSTANTS: f64 = 1.5;
+
+/// Correlation of model and log below which the log is taken to have the opposite sign.
+///
+/// Unit: 1. Source: chosen. Test: `signs_and_ratios_are_found_beside_narrow_band_noise`.
+pub(crate) const OPPOSITE: f64 = -0.5;
+
+/// Longest delay of an input that is looked for.
+///
+/// Unit: samples. Source: chosen; below `INPUT_BEFORE_WINDOW`.
+pub(crate) const LONGEST_DELAY: usize = 40;
+
+/// Shortest delay of an input that is tested.
+///
+/// Unit: samples. Source: chosen.
+pub(crate) const SHORTEST_DELAY: usize = 2;
+
+/// Unexplained torque with a delay, relative to that without, below which the delay is tested.
+///
+/// Unit: 1. Source: chosen. Test: `a_delay_is_found_beside_narrow_band_noise`.
+pub(crate) const SUSPECT_DELAY: f64 = 0.95;
+
+/// Share of the logged input that the controller of a case must explain.
+///
+/// Unit: %. Source: chosen. Test: `a_loop_is_closed_again`.
+pub(crate) const REPRODUCED: f64 = 90.0;
+
+/// Cost of a quantity with a log corrected, relative to that as it is, below which the correction is borne out.
+///
+/// Unit: 1. Source: chosen. Test: `signs_and_ratios_are_found_beside_narrow_band_noise`.
+pub(crate) const MENDED: f64 = 0.5;
+
+/// The cost of all values may then be, relative to that of the log as it is: of two columns that contradict each other,
+/// a fit may have left one alone.
+///
+/// Unit: 1. Source: chosen.
+pub(crate) const NO_WORSE: f64 = 1.05;
+
+/// A unit counts as wrong unless the cost grows by this factor with the log corrected: free parameters may make up for
+/// a factor.
+///
+/// Unit: 1. Source: chosen. Test: `a_cart_on_a_soft_belt_is_not_taken_for_a_wrong_sign_or_unit`.
+pub(crate) const UNIT_WORSE: f64 = 2.0;
+
+/// Mean square residual of samples that are said to be wrong, relative to that of the others where these do not count.
+///
+/// Unit: 1. Source: three standard deviations, squared.
+pub(crate) const STAND_OUT: f64 = 9.0;
+
+/// Root mean square residual with a delay, relative to that without, below which the delay is borne out.
+///
+/// Unit: 1. Source: chosen. Test: `narrow_band_noise_is_no_delay`.
+pub(crate) const DELAY_MENDS: f64 = 0.8;
+
+/// Least delay that is borne out.
+///
+/// Unit: standard errors. Source: chosen. Test: `narrow_band_noise_is_no_delay`.
+pub(crate) const DELAY_ERRORS: f64 = 4.0;
+
+/// Maximum Jacobians of the fit to a corrected log.
+///
+/// Unit: Jacobians. Source: chosen.
+pub(crate) const TRIAL_FIT_ITERATIONS: usize = 15;
+
+/// Where a profile holds its parameter, off the estimate; outwards, so that each fit starts where the one before ended.
+///
+/// Unit: standard errors. Source: chosen. Test: `the_profile_of_what_is_well_known_is_that_of_a_linear_model`.
+pub(crate) const PROFILE_AT: [[f64; 3]; 2] = [[-1.0, -2.0, -3.0], [1.0, 2.0, 3.0]];
+
+/// Maximum number of parameters that are profiled.
+///
+/// Unit: parameters. Source: chosen.
+pub(crate) const MOST_PROFILED: usize = 12;
+
+/// Simulated logs that profiles may take, relative to those of the fit.
+///
+/// Unit: 1. Source: chosen.
+pub(crate) const PROFILE_WORK: u64 = 4;
+
+/// Simulated logs that profiles may take in any case.
+///
+/// Unit: simulations. Source: chosen.
+pub(crate) const PROFILE_SIMULATIONS: u64 = 1000;
+
+/// Relative deviation of the cost two standard errors off from that of a linear model, above which it is reported.
+///
+/// Unit: 1. Source: chosen. Test: `the_profile_of_what_is_well_known_is_that_of_a_linear_model`.
+pub(crate) const CROOKED: f64 = 0.25;
+
+/// Noise permitted in a residual force, relative to its root mean square.
+///
+/// Unit: 1. Source: chosen. Test: `a_force_that_is_missing_is_seen`.
+pub(crate) const RESIDUAL_FORCE_NOISE: f64 = 0.3;
+
+/// Speed below which the cart counts as at rest, relative to its greatest; friction is not determined there.
+///
+/// Unit: 1. Source: chosen.
+pub(crate) const CART_AT_REST: f64 = 0.02;
+
+/// Least number of rows to which the start of a held-out log is fitted.
+///
+/// Unit: samples. Source: chosen. Test: `the_start_of_a_log_that_is_held_out_is_fitted`.
+pub(crate) const HELD_OUT_ROWS: usize = 20;
+
+// posterior: the posterior and its sampler
+
+/// R̂ above which a chain does not count as converged.
+///
+/// Unit: 1. Source: A. Vehtari and others 2021.
+pub const R_HAT: f64 = 1.01;
+
+/// Effective draws below which a posterior does not count as converged.
+///
+/// Unit: draws. Source: A. Vehtari and others 2021: 100 for each of four chains.
+pub const EFFECTIVE: f64 = 400.0;
+
+/// Share of divergent transitions that is not reported.
+///
+/// Unit: 1. Source: chosen.
+pub(crate) const DIVERGING: f64 = 0.01;
+
+/// Distance from which on a bound does not cut off what is integrated over.
+///
+/// Unit: standard deviations. Source: a share of 1e-9 of a normal distribution is beyond. Test:
+/// `what_stays_has_the_density_of_quadrature`.
+pub(crate) const FAR_BOUND: f64 = 6.0;
+
+/// Where the tail of a normal distribution is taken for that of an exponential one.
+///
+/// Unit: standard deviations. Source: relative error 1/30². Test: `shares_far_out_have_their_logarithms`.
+pub(crate) const FAR_TAIL: f64 = -30.0;
+
+/// Distance from which on a bound of a sampled variable is not felt.
+///
+/// Unit: standard errors. Source: chosen; only the change of variables depends on it. Test:
+/// `a_bound_cuts_the_posterior_off`.
+pub(crate) const FELT: f64 = 1e3;
+
+/// Error of the slopes from the fit's Jacobian, relative to that of a standard error, above which they are not used.
+///
+/// Unit: 1. Source: chosen.
+pub(crate) const SLOPES_OFF: f64 = 0.3;
+
+/// Maximum number of variables for which derivatives of the Jacobian are measured.
+///
+/// Unit: variables. Source: cost.
+pub(crate) const MOST_BENT: usize = 16;
+
+/// Places at which the slopes are compared.
+///
+/// Unit: points. Source: chosen.
+pub(crate) const SLOPE_PLACES: usize = 6;
+
+/// Maximum number of chains; each is a thread.
+///
+/// Unit: chains. Source: chosen. Test: `an_effort_that_cannot_be_is_refused`.
+pub(crate) const MOST_CHAINS: usize = 100;
+
+/// Maximum number of draws of all chains together; they stay in memory.
+///
+/// Unit: draws. Source: 80 MB for each variable. Test: `an_effort_that_cannot_be_is_refused`.
+pub(crate) const MOST_DRAWS: usize = 10_000_000;
+
+/// Error of the energy from which on a path has diverged.
+///
+/// Unit: 1. Source: M. D. Hoffman, A. Gelman 2014, Δ_max. Test: `a_funnel_shows_divergent_transitions`.
+pub(crate) const LARGEST_ERROR: f64 = 1000.0;
+
+/// Maximum doublings of a path, which then has 2 to this many steps.
+///
+/// Unit: doublings. Source: Stan's default.
+pub(crate) const MOST_DOUBLINGS: usize = 10;
+
+/// δ: acceptance at which the step size aims.
+///
+/// Unit: 1. Source: Stan's default. Test: `steps_find_the_acceptance_that_is_wanted`.
+pub(crate) const ACCEPTANCE: f64 = 0.8;
+
+/// Steps of a random walk for a draw, for each variable.
+///
+/// Unit: steps. Source: chosen.
+pub(crate) const WALK_STEPS: usize = 3;
+
+/// Length of a step of a random walk, times √n.
+///
+/// Unit: standard deviations. Source: A. Gelman, G. O. Roberts, W. R. Gilks 1996.
+pub(crate) const WALK_LENGTH: f64 = 2.38;
+
+/// Best acceptance of a random walk in many variables.
+///
+/// Unit: 1. Source: G. O. Roberts, A. Gelman, W. R. Gilks 1997. Test: `a_density_of_kinks_has_its_moments`.
+pub(crate) const WALK_TAKEN: f64 = 0.234;
+
+/// What is added to it in one variable: 0.44 together.
+///
+/// Unit: 1. Source: A. Gelman, G. O. Roberts, W. R. Gilks 1996.
+pub(crate) const WALK_TAKEN_OF_ONE: f64 = 0.206;
+
+// compare: laws and windows
+
+/// Number of logs from which on whole logs are held out; fewer are cut into blocks.
+///
+/// Unit: logs. Source: chosen.
+pub(crate) const FEWEST_LOGS: usize = 4;
+
+/// Maximum number of parts that are held out in turn.
+///
+/// Unit: parts. Source: usual (L. Breiman, P. Spector 1992).
+pub(crate) const FOLDS: usize = 5;
+
+/// Blocks into which a log is cut where there are few.
+///
+/// Unit: blocks. Source: chosen.
+pub(crate) const LOG_BLOCKS: usize = 4;
+
+/// Least length of such a block: errors add up along it as along a log.
+///
+/// Unit: samples. Source: chosen.
+pub(crate) const BLOCK_SAMPLES: usize = 60;
+
+/// Relative excess over the least sum of squares up to which a change explains a drift as well.
+///
+/// Unit: 1. Source: chosen. Test: `a_known_change_between_campaigns_is_named`.
+pub(crate) const CHANGE_ALIKE: f64 = 0.02;
+
+/// Share of a held-out log to which its start is fitted; the rest is predicted.
+///
+/// Unit: 1. Source: chosen.
+pub(crate) const START_SHARE: f64 = 0.1;
+
+/// Maximum Jacobians of the fit of a law to all logs.
+///
+/// Unit: Jacobians. Source: chosen. Test: `curved_laws_come_to_an_end`.
+pub(crate) const STEPS: usize = 20;
+
+/// Maximum Jacobians of the fit of a law to a part of the logs.
+///
+/// Unit: Jacobians. Source: chosen. Test: `curved_laws_come_to_an_end`.
+pub(crate) const STEPS_IN_PART: usize = 10;
+
+/// Points of a friction or force along the travel.
+///
+/// Unit: points. Source: chosen.
+pub(crate) const TRAVEL_POINTS: usize = 7;
+
+/// Speeds of the points of a force by speed, relative to the greatest.
+///
+/// Unit: 1. Source: chosen: closer near rest.
+pub(crate) const SPEED_POINTS: [f64; 7] = [-1.0, -0.5, -0.125, 0.0, 0.125, 0.5, 1.0];
+
+/// Excess of static over Coulomb friction at which the search for a Stribeck curve begins.
+///
+/// Unit: 1. Source: chosen.
+pub(crate) const STRIBECK_ABOVE: f64 = 0.2;
+
+/// Greatest breakaway friction, relative to the Coulomb friction at which a search begins: where a log never rests, a
+/// greater one meets it as well and holds the next log for ever.
+///
+/// Unit: 1. Source: chosen. Test: `a_breakaway_stays_near_coulomb_friction`.
+pub(crate) const MOST_BREAKAWAY: f64 = 4.0;
+
+/// Stribeck velocity at which a search begins, relative to the greatest speed.
+///
+/// Unit: 1. Source: chosen.
+pub(crate) const STRIBECK_FALL: f64 = 0.05;
+
+/// Deflection of bristles at which a search begins.
+///
+/// Unit: m of the cart. Source: chosen.
+pub(crate) const BRISTLE_BEND: f64 = 2e-5;
+
+// design: the best experiment
+
+/// Length of an experiment where none is given.
+///
+/// Unit: s. Source: chosen.
+pub const DURATION: f64 = 4.0;
+
+/// Sample interval of an experiment where none is given.
+///
+/// Unit: s. Source: chosen.
+pub(crate) const SAMPLE_INTERVAL: f64 = 1e-3;
+
+/// Maximum rows of an experiment.
+///
+/// Unit: samples. Source: memory. Test: `what_cannot_be_designed_is_told`.
+pub(crate) const MOST_ROWS: f64 = 200_000.0;
+
+/// Points of each kind of input that are tried first.
+///
+/// Unit: points. Source: chosen.
+pub(crate) const FIRST_POINTS: usize = 16;
+
+/// Kinds of input that are evaluated on doubtful machines in the end.
+///
+/// Unit: kinds. Source: chosen.
+pub(crate) const FINALISTS: usize = 3;
+
+/// Generations without a gain after which the evolution of an input ends.
+///
+/// Unit: generations. Source: chosen.
+pub(crate) const DESIGN_BARREN: usize = 6;
+
+/// Mean relative error of a kind after its first points, relative to the best, up to which it is searched.
+///
+/// Unit: 1. Source: chosen.
+pub(crate) const HOPEFUL: f64 = 1.6;
+
+/// First step size of the evolution of an input.
+///
+/// Unit: logit of a share. Source: chosen.
+pub(crate) const FIRST_SIGMA: f64 = 0.7;
+
+/// Values that the evolution may ask for, of every kind, and again of the best.
+///
+/// Unit: evaluations. Source: chosen.
+pub(crate) const MOST_VALUES: usize = 60;
+
+/// Highest frequency of an input, relative to the sample rate.
+///
+/// Unit: 1. Source: chosen: ten samples a period.
+pub(crate) const OF_RATE: f64 = 0.1;
+
+/// Highest frequency of an input, in periods of the experiment.
+///
+/// Unit: periods. Source: chosen.
+pub(crate) const MOST_PERIODS: f64 = 400.0;
+
+/// Maximum number of experiments of the case with which a design is compared.
+///
+/// Unit: experiments. Source: chosen.
+pub(crate) const MOST_COMPARED: usize = 8;
+
+/// Share of an experiment at its end in which the input is zero: how the axis comes to rest is observed, too.
+///
+/// Unit: 1. Source: chosen.
+pub(crate) const REST_AT_END: f64 = 0.08;
+
+/// Maximum number of trapezoids there and back.
+///
+/// Unit: cycles. Source: chosen.
+pub(crate) const MOST_CYCLES: f64 = 8.0;
+
+/// Maximum number of sines of a stepped sweep.
+///
+/// Unit: sines. Source: chosen.
+pub(crate) const SWEEP_SINES: f64 = 8.0;
+
+/// Maximum number of sines of a multisine.
+///
+/// Unit: sines. Source: chosen.
+pub(crate) const MULTISINE_TONES: f64 = 20.0;
+
+/// Maximum bits of a binary sequence.
+///
+/// Unit: bits. Source: chosen.
+pub(crate) const MOST_BITS: f64 = 400.0;
+
+/// Reductions of an amplitude until an input keeps the limits.
+///
+/// Unit: reductions. Source: chosen. Test: `what_is_written_is_what_was_judged_and_keeps_its_limits`.
+pub(crate) const SMALLER: usize = 8;
+
+/// Deviation of the starts of verifying fits from the truth, to either side.
+///
+/// Unit: 1. Source: chosen. Test: `promises_hold_on_simulated_logs`.
+pub(crate) const START_OFF: f64 = 0.1;
