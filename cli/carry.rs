@@ -17,7 +17,17 @@ pub fn carry() {
     let wanted = env::var_os("CARGO_FEATURE_FMU").is_some() && env::var("PROFILE").is_ok_and(|name| name == "release");
     let mut text = String::new();
     if wanted && source.is_file() {
-        for path in ["../src", "../fmu/src", "../fmu/Cargo.toml", "../Cargo.toml", "../Cargo.lock", "../cli/carry.rs"] {
+        for path in [
+            "../case",
+            "../control",
+            "../core",
+            "../export",
+            "../fmu/src",
+            "../fmu/Cargo.toml",
+            "../Cargo.toml",
+            "../Cargo.lock",
+            "../cli/carry.rs",
+        ] {
             println!("cargo::rerun-if-changed={path}");
         }
         let object = build(source, &out.join("fmu"));
@@ -98,7 +108,7 @@ fn notices(source: &Path) -> String {
         let (package, licence) = line.split_once('|').unwrap_or((line, ""));
         let mut words = package.split(' ');
         let (Some(name), Some(version)) = (words.next(), words.next()) else { continue };
-        if name == "taut" || name == "taut-fmu" {
+        if name.starts_with("taut-") {
             continue;
         }
         let licence = licence.trim_end_matches(" (*)").to_string();

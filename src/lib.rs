@@ -61,35 +61,25 @@
 //! `parquet` adds Parquet files; `json` adds results as data. Without them the library is the physics alone. Figures
 //! and reports are a crate of their own, `taut-report`.
 
-pub mod case;
-pub mod chance;
-pub mod control;
-pub mod design;
-pub mod error;
-pub mod export;
-pub mod files;
-pub mod fit;
-pub mod frf;
-pub mod friction;
 #[cfg(feature = "json")]
 pub mod json;
-pub mod linear;
-pub mod log;
-pub mod machine;
-pub mod measure;
-pub mod mechanism;
-pub mod metrics;
-pub mod number;
-pub mod nuts;
 pub mod overview;
-pub mod parameter;
-pub mod polyline;
-pub mod quantity;
 pub mod reduction;
-pub mod signal;
-pub mod solve;
 pub mod sweep;
-pub mod trajectory;
-pub mod tune;
 
-pub use error::{Error, Result};
+pub use taut_case::{case, files, log};
+pub use taut_control::{control, frf, linear, tune};
+pub use taut_core::{
+    Error, Result, chance, design, error, friction, machine, measure, mechanism, metrics, number, parameter, plan,
+    polyline, quantity, signal, solve,
+};
+pub use taut_export as export;
+pub use taut_identify::fit;
+
+/// Columns with units, and their files.
+pub mod trajectory {
+    pub use taut_case::files::CsvWriter;
+    #[cfg(feature = "parquet")]
+    pub use taut_case::files::ParquetWriter;
+    pub use taut_core::trajectory::*;
+}

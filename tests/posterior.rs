@@ -5,9 +5,9 @@ use crate::common::logged;
 use chance::Chance;
 use logged::logged;
 use taut::case::{Case, Plan, Prior, TEMPLATE};
+use taut::fit::Effort;
 use taut::fit::least_squares::Residuals;
 use taut::fit::{Fit, Posterior, Problem, fit, machines, posterior};
-use taut::nuts::Effort;
 use taut::solve::{Flow, Solver, simulate};
 
 const COULOMB: &str = "cart.friction.coulomb";

@@ -21,6 +21,7 @@ mod paper;
 mod schemas;
 mod shape;
 mod show;
+mod structure;
 mod studio;
 mod studio_work;
 mod sweep;

@@ -6,7 +6,7 @@ use std::ffi::{CStr, CString, c_char, c_int, c_void};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 use std::sync::Arc;
-use taut::export::fmu::Model;
+use taut_export::fmu::Model;
 
 /// Where messages go.
 pub(crate) enum Log {

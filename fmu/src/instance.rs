@@ -1,11 +1,11 @@
 //! A machine under way as the standard sees it: which function is allowed when, and what it does.
 
 use std::sync::Arc;
-use taut::control::Stepped;
-use taut::export::fmu::{Model, REFERENCES, Role};
-use taut::mechanism::{DRIVES, Mechanism};
-use taut::signal::{DEGREE, Piece};
-use taut::solve::{Dynamics, Simulator, Solver};
+use taut_control::control::Stepped;
+use taut_core::mechanism::{DRIVES, Mechanism};
+use taut_core::signal::{DEGREE, Piece};
+use taut_core::solve::{Dynamics, Simulator, Solver};
+use taut_export::fmu::{Model, REFERENCES, Role};
 
 /// How a function ended, as the standard counts it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -37,8 +37,8 @@ impl Refusal {
     }
 }
 
-impl From<taut::Error> for Refusal {
-    fn from(error: taut::Error) -> Self {
+impl From<taut_core::Error> for Refusal {
+    fn from(error: taut_core::Error) -> Self {
         Self::error(error.to_string())
     }
 }

@@ -1,5 +1,5 @@
 //! The shared object inside the FMUs that `taut export fmu` writes: the functions of FMI 2.0 and 3.0, for model
-//! exchange and co-simulation, over [`taut::solve::Simulator`] and [`taut::solve::Dynamics`].
+//! exchange and co-simulation, over [`taut_core::solve::Simulator`] and [`taut_core::solve::Dynamics`].
 //!
 //! [`instance`] is a machine under way as the standard sees it, in safe Rust: its phases, its variables, its steps.
 //! `fmi2` and `fmi3` are the functions that importers call, `both` those that are alike in the two: they turn pointers

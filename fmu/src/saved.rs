@@ -1,7 +1,7 @@
 //! The state of an instance as bytes, and back.
 
 use crate::instance::{Input, Instance, Phase, Plant, Refusal, Told};
-use taut::control::Stepped;
+use taut_control::control::Stepped;
 
 /// The first eight of such bytes.
 const MARK: u64 = u64::from_le_bytes(*b"tautfmu2");
@@ -19,7 +19,7 @@ const PHASES: [Phase; 7] = [
 impl Instance {
     /// All of its state. Errors: one whose machine has ended the run.
     pub fn bytes(&self) -> Told<Vec<u8>> {
-        let mut list = vec![MARK, taut::chance::hash(self.model.token.bytes()), u64::from(self.exchanges())];
+        let mut list = vec![MARK, taut_core::chance::hash(self.model.token.bytes()), u64::from(self.exchanges())];
         list.push(PHASES.iter().position(|phase| *phase == self.phase).unwrap_or_default() as u64);
         list.extend([self.is_set, self.is_over, self.stop.is_some()].map(u64::from));
         let numbers = [self.time, self.begin, self.stop.unwrap_or(0.0)];
@@ -59,7 +59,7 @@ impl Instance {
         let mut list = words.map(|word| u64::from_le_bytes(std::array::from_fn(|k| word[k])));
         let mut next = || list.next().ok_or_else(wrong);
         let mut other = Self::new(self.model.clone(), self.purpose);
-        let head = [MARK, taut::chance::hash(self.model.token.bytes()), u64::from(self.exchanges())];
+        let head = [MARK, taut_core::chance::hash(self.model.token.bytes()), u64::from(self.exchanges())];
         for wanted in head {
             if next()? != wanted {
                 return Err(wrong());

@@ -1,10 +1,10 @@
 //! Time goes on: steps of co-simulation, and what an integrator asks of model exchange.
 
 use crate::instance::{Instance, Phase, Plant, Refusal, Status, Told};
-use taut::export::fmu::REFERENCES;
-use taut::mechanism::Shown;
-use taut::signal::profile::Reference;
-use taut::solve::{Ending, Event};
+use taut_core::mechanism::Shown;
+use taut_core::signal::profile::Reference;
+use taut_core::solve::{Ending, Event};
+use taut_export::fmu::REFERENCES;
 
 /// Part of a step that a clock may be off by.
 const NEAR: f64 = 1e-9;

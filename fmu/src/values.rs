@@ -1,10 +1,10 @@
 //! Variables read and set.
 
 use crate::instance::{Instance, Phase, Plant, Refusal, Told, place};
-use taut::export::fmu::{Causality, Kind, Role, Variability, Variable};
-use taut::mechanism::{DRIVES, Shown};
-use taut::signal::DEGREE;
-use taut::solve::{Dynamics, Quantity, Simulator};
+use taut_core::mechanism::{DRIVES, Shown};
+use taut_core::signal::DEGREE;
+use taut_core::solve::{Dynamics, Quantity, Simulator};
+use taut_export::fmu::{Causality, Kind, Role, Variability, Variable};
 
 /// Phases in which values can be read.
 pub(crate) const READ: [Phase; 5] =
@@ -105,7 +105,7 @@ impl Instance {
         self.prepare()?;
         if self.columns.is_none() {
             let mut values = Vec::new();
-            let count = |mechanism: &taut::mechanism::Mechanism| mechanism.columns.len();
+            let count = |mechanism: &taut_core::mechanism::Mechanism| mechanism.columns.len();
             if self.is_set && matches!(self.plant, Plant::Machine(_)) {
                 // On a copy, as other inputs may yet be set at this time.
                 let machine = self.as_set()?;
@@ -136,7 +136,8 @@ impl Instance {
         let Plant::Machine(machine) = &self.plant else { return Ok(self.quantities.clone()) };
         let state = machine.state();
         let bristle = |body: usize| {
-            let is_it = |heading: &taut::mechanism::Heading| heading.shown == taut::mechanism::Shown::Bristle(body);
+            let is_it =
+                |heading: &taut_core::mechanism::Heading| heading.shown == taut_core::mechanism::Shown::Bristle(body);
             machine.columns().iter().position(is_it)
         };
         let places: Vec<(Quantity, Option<usize>)> = (self.model.quantities.iter())

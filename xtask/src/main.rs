@@ -49,7 +49,18 @@ const STEPS: [Step; 9] = [
     step("lints", &["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"]),
     step(
         "the library without its features",
-        &["clippy", "--package", "taut", "--lib", "--no-default-features", "--", "-D", "warnings"],
+        &[
+            "clippy",
+            "--package",
+            "taut",
+            "--package",
+            "taut-case",
+            "--lib",
+            "--no-default-features",
+            "--",
+            "-D",
+            "warnings",
+        ],
     ),
     Step {
         what: "documentation",

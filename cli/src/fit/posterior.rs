@@ -7,8 +7,8 @@ use crate::terminal::bold;
 use std::fmt::Write;
 use taut::Result;
 use taut::case::{Case, Plan};
+use taut::fit::Effort;
 use taut::fit::{Fit, Posterior, posterior};
-use taut::nuts::Effort;
 use taut_report::fit::posterior::{effort, ending, words};
 
 /// Draws that tune a chain.

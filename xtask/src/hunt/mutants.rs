@@ -14,8 +14,16 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
 /// The places that are changed.
-const AREAS: [&str; 8] =
-    ["src/solve", "src/mechanism", "src/friction", "src/quantity", "src/fit", "src/tune", "src/control", "src/export"];
+const AREAS: [&str; 8] = [
+    "core/src/solve",
+    "core/src/mechanism",
+    "core/src/friction",
+    "core/src/quantity",
+    "identify/src/fit",
+    "control/src/tune",
+    "control/src/control",
+    "export/src",
+];
 
 /// Changes and tests tried side by side.
 const WORKERS: usize = 2;

@@ -37,10 +37,16 @@ pub fn on(k: usize) -> bool {
 /// The features that the library is built with.
 const FEATURES: &str = "json,parquet";
 
-/// The programs of tests: name, arguments of cargo. `lib` are the tests within the library, `all` those beside it, `hunt`
+/// The programs of tests: name, arguments of cargo. `lib`, `core`, `case`, `control`, `identify` and
+/// `export` are the tests within the crates of the library, `all` those beside it, `hunt`
 /// those of the small hunt, `fmu` those of the shared object.
-const PROGRAMS: [(&str, &[&str]); 4] = [
+const PROGRAMS: [(&str, &[&str]); 9] = [
     ("lib", &["--package", "taut", "--features", FEATURES, "--lib"]),
+    ("core", &["--package", "taut-core", "--lib"]),
+    ("case", &["--package", "taut-case", "--lib"]),
+    ("control", &["--package", "taut-control", "--lib"]),
+    ("identify", &["--package", "taut-identify", "--lib"]),
+    ("export", &["--package", "taut-export", "--lib"]),
     ("all", &["--package", "taut", "--features", FEATURES, "--test", "all"]),
     ("hunt", &["--package", "taut-hunt", "--test", "small"]),
     ("fmu", &["--package", "taut-fmu", "--test", "all"]),
@@ -98,10 +104,10 @@ impl Tree {
             let made = to.parent().map_or(Ok(()), fs::create_dir_all).and_then(|()| fs::copy(name, &to));
             made.map_err(|error| format!("{}: {error}", to.display()))?;
         }
-        let library = root.join("src/lib.rs");
+        let library = root.join("core/src/lib.rs");
         let text = fs::read_to_string(&library).map_err(|error| error.to_string())?;
         write(&library, &(text + "\npub mod mutant;\n"))?;
-        write(&root.join("src/mutant.rs"), SWITCH)?;
+        write(&root.join("core/src/mutant.rs"), SWITCH)?;
         Ok(Self { root })
     }
 

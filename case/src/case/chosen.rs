@@ -1,0 +1,140 @@
+//! Parts of a case that are asked for by name; where one is missing, the error names the command line's option.
+
+use super::{Case, Experiment, GantryCase, GantryExperiment, Initial, Move, Opened, Plan, Unread, suggestion};
+use crate::design::Design;
+use crate::error::{Error, Result};
+use crate::mechanism::State;
+use std::path::Path;
+
+impl Case {
+    /// Something of the first experiment of the text, whether or not its files were read.
+    pub fn first<T>(&self, of: impl Fn(&Experiment) -> T, left: impl Fn(&Unread<Initial>) -> Option<T>) -> Option<T> {
+        match self.unread.first().filter(|one| one.place == 0) {
+            Some(one) => left(one),
+            None => self.experiments.first().map(of),
+        }
+    }
+
+    /// Refuses a case of which a file was not read, with the line that names it.
+    pub fn complete(&self) -> Result<()> {
+        complete(&self.unread)
+    }
+
+    /// The experiments of these names, in the case's order; all if none is named. `path` is the case's own.
+    pub fn experiments_named(&self, path: &Path, names: &[String]) -> Result<Vec<&Experiment>> {
+        if self.experiments.is_empty() && self.unread.is_empty() {
+            let has = if self.moves.is_empty() { "neither experiments nor moves" } else { "moves, and no experiments" };
+            return Err(Error::new(format!("\"{}\" has {has}", self.title))
+                .in_file(path)
+                .next("run its moves with `taut move`, or add an [[experiment]]"));
+        }
+        experiments_named(&self.experiments, &self.unread, |experiment| &experiment.name, names)
+    }
+
+    /// The controller, and the moves of these names in the case's order; all if none is named. `path` is the case's
+    /// own.
+    pub fn moves_named(&self, path: &Path, names: &[String]) -> Result<(&Design, Vec<&Move>)> {
+        let Some(design) = self.controller.as_ref().filter(|_| !self.moves.is_empty()) else {
+            return Err(Error::new("this case has no move and no controller to run it").in_file(path).next(format!(
+                "add [controller] with for example {}, and [[move]] with name, to, speed, acceleration and until",
+                suggestion::controller(&self.machine)
+            )));
+        };
+        let known = || self.moves.iter().map(|m| m.name.as_str());
+        if let Some(name) = names.iter().find(|name| known().all(|other| other != **name)) {
+            return Err(Error::new(format!("there is no move \"{name}\"")).in_file("--move").allowed(quoted(known())));
+        }
+        Ok((design, self.moves.iter().filter(|m| names.is_empty() || names.contains(&m.name)).collect()))
+    }
+
+    /// The plan of its fit. `path` is the case's own.
+    pub fn fit_plan(&self, path: &Path) -> Result<Plan> {
+        self.fit.clone().ok_or_else(|| {
+            Error::new("this case does not say what is searched for").in_file(path).next(
+                "add a table [fit] with for example free = [\"cart.friction.viscous\", \"cart.friction.coulomb\"]",
+            )
+        })
+    }
+}
+
+impl Case {
+    /// Keys of `[controller]` that run on this axis, in its unit.
+    pub fn suggested_controller(&self) -> String {
+        suggestion::controller(&self.machine)
+    }
+
+    /// The derivative of a PID controller that is sampled as `design` is.
+    pub fn suggested_derivative(&self, design: &Design) -> String {
+        suggestion::derivative(&self.machine, design.every, design.delay)
+    }
+}
+
+impl GantryCase {
+    /// Something of the first experiment of the text, whether or not its files were read.
+    pub fn first<T>(
+        &self,
+        of: impl Fn(&GantryExperiment) -> T,
+        left: impl Fn(&Unread<State>) -> Option<T>,
+    ) -> Option<T> {
+        match self.unread.first().filter(|one| one.place == 0) {
+            Some(one) => left(one),
+            None => self.experiments.first().map(of),
+        }
+    }
+
+    /// Refuses a case of which a file was not read, with the line that names it.
+    pub fn complete(&self) -> Result<()> {
+        complete(&self.unread)
+    }
+
+    /// The experiments of these names, in the case's order; all if none is named.
+    pub fn experiments_named(&self, names: &[String]) -> Result<Vec<&GantryExperiment>> {
+        experiments_named(&self.experiments, &self.unread, |experiment| &experiment.name, names)
+    }
+}
+
+impl Opened {
+    /// Refuses a case of which a file was not read, with the line that names it.
+    pub fn complete(&self) -> Result<()> {
+        match self {
+            Opened::Axis(case) => case.complete(),
+            Opened::Gantry(case) => case.complete(),
+        }
+    }
+
+    /// The experiments that were left out because a file of theirs could not be read, each with why.
+    pub fn left_out(&self) -> Vec<(&str, &Error)> {
+        match self {
+            Opened::Axis(case) => case.unread.iter().map(|one| (one.name.as_str(), &one.error)).collect(),
+            Opened::Gantry(case) => case.unread.iter().map(|one| (one.name.as_str(), &one.error)).collect(),
+        }
+    }
+}
+
+fn complete<S>(unread: &[Unread<S>]) -> Result<()> {
+    unread.first().map_or(Ok(()), |one| Err(one.error.clone()))
+}
+
+fn experiments_named<'a, E, S>(
+    all: &'a [E],
+    unread: &[Unread<S>],
+    name: fn(&E) -> &String,
+    names: &[String],
+) -> Result<Vec<&'a E>> {
+    let asked = |one: &&Unread<S>| names.is_empty() || names.iter().any(|name| one.holds(name));
+    if let Some(one) = unread.iter().find(asked) {
+        return Err(one.error.clone());
+    }
+    let known = || all.iter().map(|one| name(one).as_str()).chain(unread.iter().map(|one| one.name.as_str()));
+    if let Some(name) = names.iter().find(|name| known().all(|other| other != **name)) {
+        return Err(Error::new(format!("there is no experiment \"{name}\""))
+            .in_file("--experiment")
+            .allowed(quoted(known()))
+            .next("name one of these, or leave --experiment out to run them all"));
+    }
+    Ok(all.iter().filter(|experiment| names.is_empty() || names.contains(name(experiment))).collect())
+}
+
+fn quoted<'a>(names: impl Iterator<Item = &'a str>) -> String {
+    names.map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join(", ")
+}

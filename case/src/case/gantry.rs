@@ -1,0 +1,427 @@
+//! The case file of a gantry: two drives, a bridge, a cart on it.
+
+use super::files::{Experiments, Folder};
+use super::friction::friction;
+use super::reader::{Field, Table};
+use super::{
+    Case, Files, InputFile, Sweeping, Unread, input, listed, machine, named, set, sheet, sweep, times, title, unique,
+};
+use crate::error::{Error, Result};
+use crate::friction::Friction;
+use crate::machine::{
+    AmplifierMode, Belt, BeltMake, BeltSheet, DriveUnit, Encoder, EncoderPlace, Kind, Machine, Pulley, Slide, Spans,
+};
+use crate::mechanism::State;
+use crate::plan::GantryExperiment;
+use crate::signal::Signal;
+use std::collections::HashMap;
+use std::path::Path;
+
+/// Everything needed to repeat a run of a gantry.
+#[derive(Debug, Clone)]
+pub struct GantryCase {
+    /// The title of the file; its name where it has none.
+    pub title: String,
+    /// The machine.
+    pub gantry: Machine,
+    /// The experiments, in the file's order.
+    pub experiments: Vec<GantryExperiment>,
+    /// The experiments whose files were not read; none but where [`Opened::read_for`] left them out.
+    pub unread: Vec<Unread<State>>,
+    /// The sweep, where the file has one.
+    pub sweep: Option<Sweeping>,
+    /// The text it was read from, with `--set` applied: read again, it gives the same case.
+    pub text: String,
+    /// The files that its inputs name, in the text's order.
+    pub files: Vec<InputFile>,
+}
+
+/// A case of either kind.
+#[derive(Debug, Clone)]
+pub enum Opened {
+    /// Of an axis.
+    Axis(Box<Case>),
+    /// Of a gantry.
+    Gantry(Box<GantryCase>),
+}
+
+impl Opened {
+    /// Reads a case file of either kind with changes, each as `KEY=VALUE`.
+    pub fn read_with(path: impl AsRef<Path>, changes: &[&str]) -> Result<Self> {
+        let path = path.as_ref();
+        Self::from_text_with(path, &super::read_text(path)?, changes)
+    }
+
+    /// The same with the files of these experiments only. An experiment whose files are not read, or cannot be, is none
+    /// of the case's experiments; whoever asks for it is told why.
+    pub fn read_for(path: impl AsRef<Path>, changes: &[&str], files: Files) -> Result<Self> {
+        let path = path.as_ref();
+        Self::from_text_for(path, &super::read_text(path)?, changes, files)
+    }
+
+    /// The same from text; `name` stands in messages, and paths in the text are relative to its folder.
+    pub fn from_text_with(name: impl AsRef<Path>, text: &str, changes: &[&str]) -> Result<Self> {
+        let case = Self::from_text_for(name, text, changes, Files::All)?;
+        case.complete()?;
+        Ok(case)
+    }
+
+    /// The same with the files of these experiments only, as [`Opened::read_for`] has it.
+    pub fn from_text_for(name: impl AsRef<Path>, text: &str, changes: &[&str], files: Files) -> Result<Self> {
+        let name = name.as_ref();
+        let source = set::apply(name, text.strip_prefix('\u{feff}').unwrap_or(text), changes)?;
+        let tree = source.tree()?;
+        match kind(&Field::root(&source, &tree).table()?)? {
+            Some(_) => GantryCase::from_text_for(name, text, changes, files).map(|case| Self::Gantry(Box::new(case))),
+            None => Case::from_text_for(name, text, changes, files).map(|case| Self::Axis(Box::new(case))),
+        }
+    }
+
+    /// The title of the file; its name where it has none.
+    pub fn title(&self) -> &str {
+        match self {
+            Opened::Axis(case) => &case.title,
+            Opened::Gantry(case) => &case.title,
+        }
+    }
+
+    /// The text it was read from, with `--set` applied: read again, it gives the same case.
+    pub fn text(&self) -> &str {
+        match self {
+            Opened::Axis(case) => &case.text,
+            Opened::Gantry(case) => &case.text,
+        }
+    }
+
+    /// The files that it names, in the text's order.
+    pub fn files(&self) -> &[InputFile] {
+        match self {
+            Opened::Axis(case) => &case.files,
+            Opened::Gantry(case) => &case.files,
+        }
+    }
+
+    /// The sweep, where the file has one.
+    pub fn sweep(&self) -> Option<&Sweeping> {
+        match self {
+            Opened::Axis(case) => case.sweep.as_ref(),
+            Opened::Gantry(case) => case.sweep.as_ref(),
+        }
+    }
+}
+
+/// Which gantry the file describes; none for an axis.
+pub(super) fn kind(root: &Table) -> Result<Option<Kind>> {
+    let kinds = [("axis", None), ("h-frame", Some(Kind::HFrame)), ("core-xy", Some(Kind::CoreXy))];
+    root.optional("kind").map_or(Ok(None), |field| field.choice(&kinds))
+}
+
+/// The error where an axis is wanted.
+pub(super) fn no_axis(root: &Table, kind: Kind) -> Error {
+    let field = root.optional("kind").unwrap_or_else(|| root.field.clone());
+    let what = format!("this needs a single axis, and the case describes a gantry ({})", kind.name());
+    field.fail(what).allowed("kind = \"axis\", or no kind at all").next(
+        "`taut simulate`, `taut modes` and `taut sweep` take gantries; control, fit and tuning of them are yet to come",
+    )
+}
+
+impl GantryCase {
+    /// Reads a gantry from text with changes, each as `KEY=VALUE`.
+    ///
+    /// ```
+    /// use taut::case::GantryCase;
+    /// let text = r#"
+    /// kind = "h-frame"
+    /// motor = { torque_constant = "23 mN m/A", back_emf_constant = "23 mV s/rad", resistance = "0.71 ohm" }
+    /// drive_pulley = { radius = "19.4 mm", inertia = "6.3e-5 kg m^2" }
+    /// bridge = { mass = "0.838 kg" }
+    /// cart = { mass = "0.362 kg" }
+    /// belt = { stiffness = ["132.76 kN/m", "132.76 kN/m", "58.885 kN/m"] }
+    /// [[experiment]]
+    /// name = "pulse"
+    /// input = { left = { pulse = "5 V", for = "0.25 s" } }
+    /// until = 1
+    /// every = 1e-3
+    /// "#;
+    /// let case = GantryCase::from_text_with("frame.toml", text, &["bridge.mass=1 kg"])?;
+    /// assert_eq!(case.gantry.first_slide().mass, 1.0);
+    /// # Ok::<(), taut::Error>(())
+    /// ```
+    pub fn from_text_with(name: impl AsRef<Path>, text: &str, changes: &[&str]) -> Result<Self> {
+        let case = Self::from_text_for(name, text, changes, Files::All)?;
+        case.complete()?;
+        Ok(case)
+    }
+
+    /// The same with the files of these experiments only, as [`Opened::read_for`] has it.
+    pub fn from_text_for(name: impl AsRef<Path>, text: &str, changes: &[&str], files: Files) -> Result<Self> {
+        let name = name.as_ref();
+        let source = set::apply(name, text.strip_prefix('\u{feff}').unwrap_or(text), changes)?;
+        let tree = source.tree()?;
+        let root = Field::root(&source, &tree).table()?;
+        let Some(kind) = kind(&root)? else {
+            return Err(Error::new("this case describes an axis, not a gantry")
+                .in_file(name)
+                .next("write kind = \"h-frame\" or \"core-xy\" at its top"));
+        };
+        for key in ["travel", "idler_pulley"] {
+            if let Some(field) = root.optional(key) {
+                return Err(field.fail("this belongs to an axis").next(match key {
+                    "travel" => "give the travel of each: bridge.travel and cart.travel",
+                    _ => "the idlers of a gantry have neither inertia nor friction here: leave it out",
+                }));
+            }
+        }
+        for key in ["measurement", "controller", "move", "fit", "tune", "uncertainty"] {
+            if let Some(field) = root.optional(key) {
+                return Err(field.fail("this is not there yet for a gantry").next("leave it out for now"));
+            }
+        }
+        let tables = [
+            "title",
+            "kind",
+            "motor",
+            "drive",
+            "amplifier",
+            "left_drive",
+            "right_drive",
+            "drive_pulley",
+            "bridge",
+            "cart",
+            "belt",
+            "encoder",
+            "experiment",
+            "sweep",
+        ];
+        root.check_keys(&tables, &[])?;
+        let folder = Folder::of(name, files);
+        let gantry = gantry(&root, kind)?;
+        gantry.check_gantry().map_err(|error| if error.place.is_none() { error.in_file(name) } else { error })?;
+        let (experiments, unread) = experiments(&root, &gantry, &folder)?;
+        let title = title(&root, name)?;
+        let context = sweep::Context {
+            machine: &gantry,
+            experiments: experiments.iter().map(|experiment| (experiment.name.as_str(), experiment.until)).collect(),
+            fit: None,
+            known: &[],
+            folder: &folder,
+        };
+        let sweep = sweep::sweeping(&root, &context)?;
+        Ok(Self { title, gantry, experiments, unread, sweep, text: source.text.clone(), files: folder.files() })
+    }
+
+    /// Reads a gantry from a file with changes.
+    pub fn read_with(path: impl AsRef<Path>, changes: &[&str]) -> Result<Self> {
+        let path = path.as_ref();
+        Self::from_text_with(path, &super::read_text(path)?, changes)
+    }
+}
+
+fn table<'a>(root: &Table<'a>, name: &str, holds: &str) -> Result<Table<'a>> {
+    root.required(name, &format!("a table [{name}] with {holds}"))?.table()
+}
+
+fn gantry(root: &Table, kind: Kind) -> Result<Machine> {
+    let drives = [drive(root, "left_drive")?, drive(root, "right_drive")?];
+    let pulley = table(root, "drive_pulley", "radius and inertia")?;
+    pulley.check_keys(&[], &[])?;
+    let belt = table(root, "belt", "stiffness")?;
+    let belts = belts(&belt, kind)?;
+    if let Some(field) = root.optional("drive") {
+        return Err(field
+            .fail("this belongs to an axis")
+            .next("give the data of the gantry's motors in [motor], such as speed_constant and resistance"));
+    }
+    let [bridge, cart] = [slide(root, "bridge")?, slide(root, "cart")?];
+    if let Some(field) = belt.optional("follows_cart").filter(|_| belts.follows_cart) {
+        for (name, slide) in [("bridge", &bridge), ("cart", &cart)] {
+            if slide.travel.is_none() {
+                return Err(field
+                    .fail(format!(
+                        "spans that follow bridge and cart need the travel of both, and {name}.travel is missing"
+                    ))
+                    .next(format!("add for example travel = {{ min = \"-0.2 m\", max = \"0.2 m\" }} to [{name}]")));
+            }
+        }
+    }
+    let encoder = root.optional("encoder").map(|field| encoder(&field.table()?)).transpose()?;
+    let mut gantry = Machine {
+        kind,
+        drives: drives.into(),
+        pulley_radius: machine::radius(&pulley, sheet::pitch(root)?)?,
+        drive_pulley: machine::pulley(&pulley)?,
+        idler_pulley: Pulley { inertia: 0.0, friction: Friction::default() },
+        bridge: Some(bridge),
+        cart,
+        belt: belts,
+        encoder,
+        scale: None,
+    };
+    if let Some(proportion) = sheet::proportion(&belt, &gantry.mechanism())? {
+        gantry.belt.damping = gantry.belt.stiffness.map(|stiffness| proportion * stiffness);
+    }
+    Ok(gantry)
+}
+
+/// Motor and amplifier of a side: those of both, with what its own table says.
+fn drive(root: &Table, side: &str) -> Result<DriveUnit> {
+    let own = root.optional(side).map(|field| field.table()).transpose()?;
+    if let Some(own) = &own {
+        own.check_keys(&["motor", "amplifier"], &[])?;
+    }
+    let part = |name: &str| -> Result<Option<Table>> {
+        let both = root.optional(name).map(|field| field.table()).transpose()?;
+        let own = own.as_ref().and_then(|own| own.optional(name));
+        match own {
+            None => Ok(both),
+            Some(own) => {
+                let own = own.named(name).table()?;
+                own.check_keys(if name == "amplifier" { &["mode"] } else { &[] }, &[])?;
+                Ok(Some(own.over(both)))
+            }
+        }
+    };
+    let motor = match part("motor")? {
+        Some(motor) => motor,
+        None => table(root, "motor", "torque_constant, back_emf_constant and resistance")?,
+    };
+    let amplifier = machine::amplifier(part("amplifier")?.as_ref(), Some(&motor))?;
+    Ok(DriveUnit { motor: machine::motor(&motor)?, amplifier })
+}
+
+/// The bridge, or the cart on it: both have the same keys.
+fn slide(root: &Table, name: &str) -> Result<Slide> {
+    let field = root.required(name, &format!("a table [{name}] with mass"))?.named("bridge");
+    let table = field.table()?;
+    table.check_keys(&[], &[])?;
+    let travel = table.optional("travel").map(|field| machine::travel(&field.table()?)).transpose()?;
+    Ok(Slide { travel, ..Slide::new(table.number("mass")?, friction(&table)?) })
+}
+
+fn belts(table: &Table, kind: Kind) -> Result<Belt> {
+    table.check_keys(&["follows_cart", "type"], &[])?;
+    let sheet = sheet::belt(table)?;
+    let labels: Vec<&str> = kind.geometry().span_labels().map(|span| span.name.trim_end_matches(" span")).collect();
+    let count = labels.len();
+    let per_span = format!("{count} values: {}", labels.join(", "));
+    let pretension = table.number_if_given("pretension")?;
+    let per_span_of = |field: &Field| -> Result<Spans> { Ok(field.numbers(count, &per_span)?.into_iter().collect()) };
+    let damping = table.optional("damping").map_or(Ok(Spans::all(count, 0.0)), |field| per_span_of(&field))?;
+    let follows = table.optional("follows_cart").map_or(Ok(false), |field| field.truth())?;
+    let make = ["modulus", "section", "specific_stiffness", "spans"];
+    if let Some(stiffness) = table.optional("stiffness") {
+        if let Some(other) = make.iter().find_map(|key| table.optional(key)) {
+            return Err(other.fail("the stiffness is given already").next(match other.key() {
+                "specific_stiffness" => "give either stiffness, or specific_stiffness and spans",
+                _ => "give either stiffness, or modulus, section and spans",
+            }));
+        }
+        if let Some(field) = table.optional("follows_cart").filter(|_| follows) {
+            return Err(field
+                .fail("a given stiffness does not say how it changes with the length of a span")
+                .next("give modulus, section and spans instead of stiffness"));
+        }
+        return Ok(Belt { pretension, sheet, ..Belt::given(per_span_of(&stiffness)?, damping) });
+    }
+    if make.iter().all(|key| table.optional(key).is_none()) && sheet.kind.is_none() {
+        let example = vec!["\"100 kN/m\""; count].join(", ");
+        let what = format!("for example stiffness = [{example}], or modulus, section and spans");
+        return Err(table.missing("stiffness", &what));
+    }
+    let (modulus, section, is_specific) = machine::rigidity(table, &sheet)?;
+    let spans = vec!["\"0.5 m\""; count].join(", ");
+    let spans = per_span_of(&table.required("spans", &format!("for example spans = [{spans}]"))?)?;
+    let make = BeltMake { modulus, section, spans };
+    let stiffness = make.stiffness();
+    for k in &stiffness {
+        table.computed("stiffness", &table.field, *k)?;
+    }
+    let sheet = BeltSheet { is_specific, ..sheet };
+    Ok(Belt { pretension, make: Some(make), follows_cart: follows, sheet, ..Belt::given(stiffness, damping) })
+}
+
+fn encoder(table: &Table) -> Result<Encoder> {
+    table.check_keys(&["at"], &[])?;
+    let places = [("motor", EncoderPlace::Motor), ("drive_pulley", EncoderPlace::DrivePulley)];
+    let at = table.required("at", "for example at = \"motor\"")?.choice(&places)?;
+    Ok(Encoder { at, lines: sheet::lines(table)? })
+}
+
+fn experiments(root: &Table, gantry: &Machine, folder: &Folder) -> Result<Experiments<GantryExperiment, State>> {
+    let (mut experiments, mut unread, mut files) = (Vec::new(), Vec::new(), HashMap::new());
+    for (place, field) in listed(root)?.into_iter().enumerate() {
+        let field = field.named("experiment");
+        let table = field.table()?;
+        let name = named(&table)?;
+        unique(&field, &name, &mut files)?;
+        let initial = || match table.optional("initial") {
+            Some(field) => initial(&field.named("gantry.initial").table()?, gantry),
+            None => Ok(State::default()),
+        };
+        match folder.experiment((place, &name), &table, || experiment(&field, gantry, folder), initial)? {
+            Ok(experiment) => experiments.push(experiment),
+            Err(left) => unread.push(left),
+        }
+    }
+    Ok((experiments, unread))
+}
+
+fn experiment(field: &Field, gantry: &Machine, folder: &Folder) -> Result<GantryExperiment> {
+    let table = field.table()?;
+    table.check_keys(&["name", "input"], &["log"])?;
+    let name = named(&table)?;
+    let (until, every) = times(&table, None)?;
+    let such_as = "for example input = { left = { pulse = \"5 V\", for = \"0.25 s\" }, right = { step = \"0 V\" } }";
+    let inputs = table.required("input", such_as)?.table()?;
+    let sides = ["left", "right"];
+    if let Some(key) = inputs.keys().find(|key| !sides.contains(key)) {
+        let field = inputs.optional(key).unwrap_or_else(|| inputs.field.clone());
+        return Err(field
+            .fail(format!("a gantry has two inputs, and `{key}` is none of them"))
+            .allowed("left, right")
+            .next(such_as));
+    }
+    let signal = |side: usize| match inputs.optional(sides[side]) {
+        None => Ok(Signal::Step { value: 0.0, at: 0.0 }),
+        Some(field) => {
+            let input_unit = match gantry.drives[side].amplifier.mode {
+                AmplifierMode::Voltage => "V",
+                AmplifierMode::Current => "A",
+            };
+            input::signal(&Field { input_unit, ..field }, &input::Context { folder, until })
+        }
+    };
+    let initial = match table.optional("initial") {
+        Some(field) => initial(&field.named("gantry.initial").table()?, gantry)?,
+        None => State::default(),
+    };
+    Ok(GantryExperiment { name, inputs: [signal(0)?, signal(1)?], until, every, initial })
+}
+
+/// Where bridge and cart are; the pulleys where the belt is without strain, unless they are given.
+fn initial(table: &Table, gantry: &Machine) -> Result<State> {
+    table.check_keys(&[], &[])?;
+    let two = |of: [&str; 2]| -> Result<[f64; 2]> { Ok([table.number(of[0])?, table.number(of[1])?]) };
+    let (positions, speeds) = (["bridge_position", "cart_position"], ["bridge_speed", "cart_speed"]);
+    let mut state = gantry.without_strain(&two(positions)?, &two(speeds)?);
+    for (index, (drive, side)) in gantry.mechanism().drives.iter().zip(["left", "right"]).enumerate() {
+        let body = drive.pulley;
+        if let Some(angle) = table.number_if_given(&format!("{side}_angle"))? {
+            state.position[body] = angle;
+        }
+        if let Some(speed) = table.number_if_given(&format!("{side}_speed"))? {
+            state.speed[body] = speed;
+        }
+        // The rotor in the middle of its play.
+        (state.position[drive.shaft], state.speed[drive.shaft]) = (state.position[body], state.speed[body]);
+        if let Some(field) = table.optional(&format!("{side}_current")) {
+            if !drive.has_current_state() {
+                return Err(field.fail("this current would have no effect").next(
+                    "it needs an inductance above zero in voltage mode, or a bandwidth in current mode; or leave it out",
+                ));
+            }
+            state.current[index] = field.number()?;
+        }
+    }
+    Ok(state)
+}

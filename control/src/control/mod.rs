@@ -1,0 +1,50 @@
+//! Control of an axis: controllers stepped in time around the exact plant, input shapers, and the spectra that these
+//! are chosen from.
+//!
+//! [`closed_loop`] runs a [`Design`] on a stage along a [`Profile`]; [`close`] does so with any [`Controller`], a
+//! user's own too.
+//!
+//! [`Design`]: crate::design::Design
+//! [`Profile`]: crate::signal::profile::Profile
+
+mod at_samples;
+pub mod compare;
+pub mod compensation;
+pub mod damping;
+pub mod drives;
+pub mod feasible;
+pub mod feedback;
+pub mod filter;
+pub mod fuzzy;
+mod insensitive;
+mod memory;
+pub mod model;
+pub mod observer;
+mod outcome;
+pub mod pairs;
+pub mod pid;
+pub mod recommendation;
+pub mod resonance;
+mod rest;
+pub mod riccati;
+mod sampled;
+pub mod shaper;
+pub mod shaping;
+pub mod sliding;
+pub mod spectrum;
+mod spread;
+mod standard;
+pub mod state_feedback;
+mod stepped;
+mod welch;
+
+pub(crate) use at_samples::closed_loop_at_samples;
+pub use outcome::{Deviation, Figures, MoveRun, Rows, Setup, close, closed_loop, stream};
+pub use outcome::{closed_loop_briefly, follow};
+pub use rest::Swing;
+pub use sampled::Added;
+pub use sampled::{Controller, Loop, Observation, Sample, measures_cart, reads_scale};
+pub use spread::{Worst, spread, worst};
+pub use standard::Standard;
+pub use stepped::Stepped;
+pub use welch::power_spectral_density;

@@ -1,0 +1,415 @@
+//! The loop closed: samples, counts, delay and limit between a controller and the axis.
+
+use super::memory::{Memory, last};
+use super::rest::Rest;
+use super::stepped::{Clocked, Decision};
+use crate::design::{Design, Structure};
+use crate::error::{Error, Result};
+use crate::machine::axis::{CART, DRIVE};
+use crate::machine::{Encoder, EncoderPlace, Machine};
+use crate::mechanism::State;
+use crate::quantity::rounded;
+use crate::signal::profile::{Profile, Reference};
+use crate::solve::Run;
+
+/// Measurements and references that a controller has at a sample.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Observation {
+    /// Time of the sample, s.
+    pub time: f64,
+    /// Where the cart should be now.
+    pub reference: Reference,
+    /// Where it should be when the command acts, or as far ahead as the controller asked to look.
+    pub ahead: Reference,
+    /// Measured position, m along the belt: whole counts.
+    pub position: f64,
+    /// The cart's position on a scale beside that encoder, m: whole counts; none without a scale.
+    pub scale: Option<f64>,
+    /// Measured motor current, A.
+    pub current: f64,
+}
+
+/// A controller, stepped once a sample. A user's own implements this.
+///
+/// ```
+/// use taut::case::{Case, TEMPLATE};
+/// use taut::control::{Controller, Loop, Observation, close};
+/// use taut::signal::profile::{Leg, Limits, Profile};
+/// use taut::solve::Solver;
+///
+/// /// So many volts per metre.
+/// struct Proportional(f64);
+/// impl Controller for Proportional {
+///     fn step(&mut self, seen: &Observation) -> f64 {
+///         self.0 * (seen.reference.position - seen.position)
+///     }
+///     fn reset(&mut self) {}
+/// }
+/// let case = Case::from_text("axis.toml", TEMPLATE)?;
+/// let limits = Limits { speed: 0.2, acceleration: 2.0, jerk: None, snap: None };
+/// let profile = Profile::new(0.0, &[Leg::To(0.05, limits)])?;
+/// let timing = Loop { every: 1e-3, delay: 0.0, limit: Some(12.0), lead: 0.0 };
+/// let run = close(&case.machine, &mut Proportional(3000.0), &timing, &profile, 1.0, 50e-6, Solver::Exact)?;
+/// assert!(run.figures.final_cart_error.abs() < 1e-3);
+/// # Ok::<(), taut::Error>(())
+/// ```
+pub trait Controller {
+    /// The command that follows from what is seen, V or A.
+    fn step(&mut self, seen: &Observation) -> f64;
+
+    /// Is told what the limit left of the command just asked for.
+    fn limited(&mut self, _given: f64) {}
+
+    /// Forgets all it has seen.
+    fn reset(&mut self);
+}
+
+/// The timing of a loop.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Loop {
+    /// Sample time T, s.
+    pub every: f64,
+    /// Time from a sample to its command, s.
+    pub delay: f64,
+    /// Largest command either way, V or A.
+    pub limit: Option<f64>,
+    /// How far ahead of a sample [`Observation::ahead`] is, s.
+    pub lead: f64,
+}
+
+/// A controller's sample, kept.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sample {
+    /// s.
+    pub time: f64,
+    /// Reference of the cart, m.
+    pub reference: f64,
+    /// Measured position, m.
+    pub measured: f64,
+    /// Command before the limit, V or A.
+    pub asked: f64,
+    /// Command after it.
+    pub given: f64,
+}
+
+/// Decides the input: samples, asks the controller, limits, and hands on when the delay is over.
+pub(super) struct Sampled<'a> {
+    controller: &'a mut dyn Controller,
+    profile: &'a Profile,
+    clocked: Clocked,
+    /// Samples at the limit, and for how long their commands were held, s.
+    pub(super) limited: u64,
+    pub(super) held_back: f64,
+    /// Changes of direction of what acts, and the last change of it that was none of zero.
+    pub(super) turns: u64,
+    way: f64,
+    /// End of the run, s.
+    until: f64,
+    pub(super) samples: u64,
+    /// The command after the profile.
+    pub(super) at_rest: Rest,
+    pub(super) kept: Option<Vec<Sample>>,
+    /// An input added to the command.
+    added: Option<&'a Added>,
+}
+
+/// A known input that is added to what a controller commands, held between its times.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Added {
+    /// s, increasing.
+    pub times: Vec<f64>,
+    /// V or A.
+    pub values: Vec<f64>,
+}
+
+impl Added {
+    /// The value at `time`, and when the next one comes.
+    fn at(&self, time: f64) -> (f64, f64) {
+        let next = self.times.partition_point(|t| *t <= time);
+        let value = next.checked_sub(1).and_then(|k| self.values.get(k)).copied().unwrap_or(0.0);
+        (value, self.times.get(next).copied().unwrap_or(f64::INFINITY))
+    }
+}
+
+impl<'a> Sampled<'a> {
+    pub(super) fn new(
+        machine: &Machine,
+        controller: &'a mut dyn Controller,
+        timing: Loop,
+        profile: &'a Profile,
+        keep: bool,
+    ) -> Self {
+        Self {
+            controller,
+            profile,
+            clocked: Clocked::new(machine, timing),
+            limited: 0,
+            held_back: 0.0,
+            turns: 0,
+            way: 0.0,
+            until: f64::INFINITY,
+            samples: 0,
+            at_rest: Rest::new(f64::INFINITY, f64::INFINITY),
+            kept: keep.then(Vec::new),
+            added: None,
+        }
+    }
+}
+
+impl<'a> Sampled<'a> {
+    /// For a run that ends there: what is held then is held no longer.
+    pub(super) fn until(mut self, until: f64) -> Self {
+        self.until = until;
+        self.at_rest = Rest::new(self.profile.end(), until);
+        self
+    }
+
+    /// With a known input added to its commands.
+    pub(super) fn with(mut self, added: Option<&'a Added>) -> Self {
+        self.added = added;
+        self
+    }
+
+    /// With positions read exactly and not in counts.
+    pub(super) fn exactly(mut self) -> Self {
+        self.clocked = self.clocked.exactly();
+        self
+    }
+}
+
+impl Sampled<'_> {
+    /// Drives a run to its end, `until`, s: the input is held from one decision to the next. `see` is shown time, state
+    /// and the motor's current, A, at each of them and at the end.
+    pub(super) fn drive(&mut self, run: &mut Run, until: f64, mut see: impl FnMut(f64, &State, f64)) {
+        loop {
+            let (state, current) = (run.state(), run.current(0));
+            see(run.time(), &state, current);
+            let (input, end) = self.decide(&state, current);
+            let is_at_end = run.time() >= until;
+            if !self.hold(run, input, end) || is_at_end {
+                return;
+            }
+        }
+    }
+
+    /// Holds a command, with what is added to it, until `end`, s; false where the run ends.
+    fn hold(&self, run: &mut Run, command: f64, end: f64) -> bool {
+        let Some(added) = self.added else { return run.hold(&[command], end) };
+        loop {
+            // A hundredth of a sample is what clocks of logs are off by.
+            let near = 1e-2 * self.clocked.timing.every;
+            let (value, next) = added.at(run.time() + near);
+            let next = if next < end - near { next } else { end };
+            if !run.hold(&[command + value], next) {
+                return false;
+            }
+            if next >= end {
+                return true;
+            }
+        }
+    }
+
+    /// The input from now on and until when it is held, s, told the state and the motor's current, A, just before.
+    fn decide(&mut self, state: &State, current: f64) -> (f64, f64) {
+        let Loop { every, lead, .. } = self.clocked.timing;
+        let (time, before) = (self.clocked.next(), self.clocked.acting());
+        // A command that was delayed needs no reference.
+        let [reference, ahead] = match self.clocked.is_at_sample() {
+            false => [Reference::default(); 2],
+            true => {
+                let reference = self.profile.at(time);
+                [reference, if lead == 0.0 { reference } else { self.profile.at(time + lead) }]
+            }
+        };
+        if let Some(Decision { seen, asked, given }) =
+            self.clocked.decide(self.controller, (state, current), &reference, &ahead)
+        {
+            self.samples += 1;
+            self.at_rest.see(time, given);
+            if given != asked {
+                self.limited += 1;
+                self.held_back += every.min(self.until - time).max(0.0);
+            }
+            if let Some(kept) = &mut self.kept {
+                kept.push(Sample { time, reference: seen.reference.position, measured: seen.position, asked, given });
+            }
+        }
+        let acting = self.clocked.acting();
+        let change = acting - before;
+        if time < self.until {
+            self.turns += u64::from(change * self.way < 0.0);
+            self.way = if change == 0.0 { self.way } else { change };
+        }
+        (acting, self.clocked.next())
+    }
+}
+
+/// All that a controller reads of an axis.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Sensors {
+    encoder: Sensor,
+    scale: Option<Sensor>,
+}
+
+impl Sensors {
+    pub(super) fn new(machine: &Machine) -> Self {
+        Self { encoder: Sensor::new(machine), scale: Sensor::of_scale(machine) }
+    }
+
+    pub(super) fn exactly(self) -> Self {
+        let exact = |sensor: Sensor| Sensor { counts: None, ..sensor };
+        Self { encoder: exact(self.encoder), scale: self.scale.map(exact) }
+    }
+
+    /// The measured position, m along the belt.
+    pub(super) fn position(&self, state: &State) -> f64 {
+        self.encoder.read(state)
+    }
+
+    /// The cart on the scale, m.
+    pub(super) fn scale(&self, state: &State) -> Option<f64> {
+        self.scale.map(|scale| scale.read(state))
+    }
+}
+
+/// The encoder as a controller reads it, m along the belt; exact where the stage has none.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Sensor {
+    body: usize,
+    /// m per unit of what it watches.
+    length: f64,
+    /// Counts per unit of that.
+    counts: Option<f64>,
+}
+
+impl Sensor {
+    pub(super) fn new(machine: &Machine) -> Self {
+        let counts =
+            machine.encoder.map(|encoder: Encoder| encoder.counts_per_unit(machine.drives[0].motor.gear_ratio));
+        let r = machine.pulley_radius;
+        let (body, length) = match machine.encoder.map(|encoder| encoder.at) {
+            Some(EncoderPlace::Cart) => (CART, 1.0),
+            Some(EncoderPlace::DrivePulley) => (DRIVE, r),
+            Some(EncoderPlace::Motor) | None => (machine.mechanism().drives[0].shaft, r),
+        };
+        Self { body, length, counts }
+    }
+
+    /// That of the scale beside the encoder, if there is one.
+    pub(super) fn of_scale(machine: &Machine) -> Option<Self> {
+        let counts = machine.scale?.counts_per_unit(machine.drives[0].motor.gear_ratio);
+        Some(Self { body: CART, length: 1.0, counts: Some(counts) })
+    }
+
+    pub(super) fn read(&self, state: &State) -> f64 {
+        let value = state.position[self.body];
+        self.length * self.counts.map_or(value, |counts| (value * counts).round() / counts)
+    }
+
+    /// One count, m; 0 where it reads exactly.
+    pub(super) fn step(&self) -> f64 {
+        self.counts.map_or(0.0, |counts| self.length / counts)
+    }
+}
+
+/// Whether the encoder of this stage sits at the cart.
+pub fn measures_cart(machine: &Machine) -> bool {
+    machine.encoder.is_some_and(|encoder| encoder.at == EncoderPlace::Cart)
+}
+
+/// Whether a controller on this stage reads the scale beside the encoder: a cascade, state feedback and a disturbance
+/// observer do.
+pub fn reads_scale(design: &Design, machine: &Machine) -> bool {
+    let structure = match &design.structure {
+        Structure::Cascade(_) | Structure::StateFeedback(_) => true,
+        Structure::Pid(_) | Structure::SlidingMode(_) | Structure::Fuzzy(_) => false,
+    };
+    machine.scale.is_some() && (structure || design.disturbance_observer.is_some())
+}
+
+/// Most samples that a command may wait for.
+const MOST_DELAY: f64 = 1000.0;
+
+/// Most samples of a run.
+const MOST_SAMPLES: f64 = 1e9;
+
+impl Loop {
+    /// Refuses what is no timing of a run that ends at `until`, s.
+    pub(super) fn check(&self, until: f64) -> Result<()> {
+        let &Self { every, delay, limit, lead } = self;
+        let wrong = |what: String, allowed: &str| Err(Error::new(what).allowed(allowed));
+        if !(every > 0.0 && every.is_finite()) {
+            return wrong(format!("a loop cannot be sampled every {every:?} s"), "above zero");
+        }
+        if until / every > MOST_SAMPLES {
+            let samples = rounded(until / every);
+            return wrong(format!("a sample every {every:?} s makes {samples} of them in {until:?} s"), "up to 1e9")
+                .map_err(|error| error.next("take a longer sample time, or a shorter run"));
+        }
+        if !(0.0..=MOST_DELAY * every).contains(&delay) {
+            return wrong(format!("a command cannot be {delay:?} s late"), "from zero to 1000 sample times");
+        }
+        if !limit.is_none_or(|limit| limit > 0.0 && limit.is_finite()) {
+            let limit = limit.unwrap_or(f64::NAN);
+            return wrong(
+                format!("the limit of the command cannot be {limit:?}"),
+                "above zero, in V or A; none at all",
+            );
+        }
+        if !(lead >= 0.0 && lead.is_finite()) {
+            return wrong(format!("a controller cannot look {lead:?} s ahead"), "from zero on");
+        }
+        Ok(())
+    }
+
+    /// The delay in whole samples, and what is left of it, s.
+    pub(super) fn samples_late(&self) -> (usize, f64) {
+        let ratio = self.delay / self.every;
+        // A delay of whole samples is one, whatever rounding says.
+        let near = ratio.round();
+        if (ratio - near).abs() < 1e-9 * near.max(1.0) {
+            (near as usize, 0.0)
+        } else {
+            (ratio.floor() as usize, self.delay - ratio.floor() * self.every)
+        }
+    }
+
+    /// That of a design.
+    pub fn of(design: &crate::design::Design) -> Self {
+        let lead = design.feed_forward.lead.unwrap_or(design.delay + 0.5 * design.every);
+        Self { every: design.every, delay: design.delay, limit: design.limit, lead }
+    }
+}
+
+/// Speed from a measured position: differences through a filter of first order.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Speed {
+    every: f64,
+    keep: f64,
+    last: Option<f64>,
+    value: f64,
+}
+
+impl Speed {
+    /// With a corner at `filter`, Hz.
+    pub(super) fn new(every: f64, filter: f64) -> Self {
+        Self { every, keep: (-2.0 * std::f64::consts::PI * filter * every).exp(), last: None, value: 0.0 }
+    }
+
+    pub(super) fn step(&mut self, position: f64) -> f64 {
+        let difference = (position - self.last.unwrap_or(position)) / self.every;
+        self.last = Some(position);
+        self.value = self.keep * self.value + (1.0 - self.keep) * difference;
+        self.value
+    }
+
+    pub(super) fn reset(&mut self) {
+        (self.last, self.value) = (None, 0.0);
+    }
+
+    /// Shows its memory to a function that takes all of it.
+    pub(super) fn memory(&mut self, memory: &mut Memory) -> Option<()> {
+        last(&mut self.last, memory)?;
+        memory(&mut self.value)
+    }
+}

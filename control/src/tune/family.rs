@@ -1,0 +1,406 @@
+//! All the axes that a controller may meet: parameters that are off, loads, places along the travel; and the worst of
+//! them.
+
+use super::margins::{Margins, Plant};
+use super::unknown::{Unknown, tie, with_the_rest};
+use crate::case::drawn;
+use crate::case::{Case, Tuning};
+use crate::chance::{quantile, uniform};
+use crate::control::feedback::Feedback;
+use crate::design::Design;
+use crate::error::{Error, Result};
+use crate::linear::{Operation, Place, places, travel};
+use crate::machine::Machine;
+use crate::number::engineering;
+use crate::parameter::{self, Free, kinds};
+use rand_pcg::Pcg64;
+use rand_pcg::rand_core::SeedableRng;
+use std::path::Path;
+
+/// Share by which parameters are off where nothing else is said.
+pub const SPREAD: f64 = 0.2;
+
+/// Axes that are drawn, beside the axis of the file with each load.
+pub const MACHINES: usize = 40;
+
+/// Share of the axes that a figure at worst leaves out at its bad end: the other end of the central 95 %.
+const LEFT_OUT: f64 = 0.025;
+
+/// Rounds of the search for the worst axis.
+const ROUNDS: usize = 6;
+
+/// Corners that are drawn to begin another search from.
+const DRAWS: usize = 16;
+
+/// A change of a corner.
+type Step<'a> = Box<dyn Fn(&Corner) -> Corner + 'a>;
+
+/// One of the axes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Corner {
+    /// Where the cart is, m.
+    pub place: f64,
+    /// Mass added to it, kg.
+    pub load: f64,
+    /// How far each unknown is off, from −1 to 1.
+    pub off: Vec<f64>,
+}
+
+/// All of them.
+#[derive(Debug, Clone)]
+pub struct Family {
+    /// The axis as it is taken for.
+    pub machine: Machine,
+    /// The parameters that can be off.
+    pub unknowns: Vec<Unknown>,
+    /// Where that is from.
+    pub source: Source,
+    /// Places along the travel, m; a single one where nothing changes along it.
+    pub places: Vec<f64>,
+    /// Loads, kg.
+    pub loads: Vec<f64>,
+    /// The axis of the file with each load, and a Latin hypercube of axes that can be.
+    pub machines: Vec<Corner>,
+    /// Whether all parameters may be at their ends at once.
+    pub corners: bool,
+}
+
+/// Where the uncertainty is from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Source {
+    /// The intervals of a fit.
+    Fit,
+    /// So many draws from the posterior of a fit.
+    Posterior(usize),
+    /// A share of each parameter.
+    Spread(f64),
+}
+
+impl Family {
+    /// That of a case. Its machines are a Latin hypercube: within a spread all values are as likely, within the
+    /// interval of a fit they are normal; what was never fitted is off by the default spread. With `tuning.corners` the worst corner of all intervals joins them.
+    pub fn of(case: &Case, tuning: &Tuning) -> Result<Self> {
+        if let Some(file) = &tuning.draws {
+            return Self::of_draws(case, tuning, file);
+        }
+        let machine = case.machine.clone();
+        let keys: Vec<&str> = case.known.iter().flat_map(|known| known.name.split(" = ")).collect();
+        let (mut unknowns, source) = match tuning.spread {
+            None if !case.known.is_empty() => {
+                let mut unknowns = Vec::new();
+                // What is fitted along with a log has no key.
+                for known in case.known.iter().filter(|known| known.name.contains('.')) {
+                    let free = Free::new(&machine, &known.name, &keys, &[])?;
+                    let least = if free.start > 0.0 { 1e-3 * free.start } else { f64::NEG_INFINITY };
+                    unknowns.push(match known.interval {
+                        Some(interval) => Unknown::fitted(free, interval.map(|end| end.max(least))),
+                        // What the fit knows nothing of is off by a share.
+                        None => Unknown::spread(free, SPREAD),
+                    });
+                }
+                (with_the_rest(unknowns, &machine), Source::Fit)
+            }
+            given => {
+                let share = given.unwrap_or(SPREAD);
+                let unknown = |free: Free| Unknown::spread(free, share);
+                (kinds(&machine).into_iter().map(unknown).collect(), Source::Spread(share))
+            }
+        };
+        tie(&mut unknowns);
+        let (places, loads) = (along(case, tuning.places), tuning.loads.clone());
+        let mut family =
+            Self { places, loads, machine, unknowns, source, machines: Vec::new(), corners: tuning.corners };
+        family.machines = family.drawn(MACHINES);
+        Ok(family)
+    }
+
+    /// That of the draws of a posterior: machines that the logs allow, with what they say of parameters together, at
+    /// places and with loads that are drawn.
+    fn of_draws(case: &Case, tuning: &Tuning, file: &Path) -> Result<Self> {
+        let plan = case.fit.as_ref().ok_or_else(|| {
+            Error::new("draws are of what a fit searched for, and this case has no [fit]")
+                .in_file(file)
+                .next("use --draws with the fitted.toml of the same folder, or with the case that was fitted")
+        })?;
+        let (frees, columns) = drawn(case, plan, &[], file)?;
+        let rows = columns.first().map_or(0, Vec::len);
+        let unknown = |(free, column): (Free, &Vec<f64>)| {
+            let mut sorted = column.clone();
+            sorted.sort_by(f64::total_cmp);
+            // The machine of the file lies between, if only just.
+            let least = 1e-6 * free.start.abs().max(f64::MIN_POSITIVE);
+            let low = quantile(&sorted, 0.025).min(free.start - least);
+            let high = quantile(&sorted, 0.975).max(free.start + least);
+            Unknown::fitted(free, [low, high])
+        };
+        let drawn: Vec<Unknown> = frees.into_iter().zip(&columns).map(unknown).collect();
+        let count = drawn.len();
+        let mut unknowns = with_the_rest(drawn, &case.machine);
+        tie(&mut unknowns);
+        // What the draws have they have together.
+        unknowns.iter_mut().take(count).enumerate().for_each(|(place, unknown)| unknown.with = place);
+        let (places, loads) = (along(case, tuning.places), tuning.loads.clone());
+        let (machine, source) = (case.machine.clone(), Source::Posterior(rows));
+        let mut family =
+            Self { places, loads, machine, unknowns, source, machines: Vec::new(), corners: tuning.corners };
+        let count = MACHINES.min(rows);
+        family.machines = family.drawn(count);
+        let first = family.machines.len() - count;
+        for k in 0..count {
+            let row = k * rows / count;
+            let offs: Vec<f64> =
+                columns.iter().zip(&family.unknowns).map(|(column, unknown)| unknown.off(column[row])).collect();
+            for (unknown, own) in family.unknowns.iter().zip(&mut family.machines[first + k].off) {
+                *own = offs.get(unknown.with).copied().unwrap_or(*own);
+            }
+        }
+        Ok(family)
+    }
+
+    /// The axis of the file with each load, and `count` axes of a Latin hypercube over what is off, loads and places.
+    fn drawn(&self, count: usize) -> Vec<Corner> {
+        let nominal = self.nominal();
+        let mut all: Vec<Corner> = self.loads.iter().map(|&load| Corner { load, ..nominal.clone() }).collect();
+        let mut random = Pcg64::seed_from_u64(15);
+        // A share of each stratum in an order of its own.
+        let mut column = || -> Vec<f64> {
+            let mut order: Vec<usize> = (0..count).collect();
+            for i in (1..count).rev() {
+                order.swap(i, (uniform(&mut random) * (i + 1) as f64) as usize);
+            }
+            order.into_iter().map(|stratum| (stratum as f64 + uniform(&mut random)) / count as f64).collect()
+        };
+        let (at, load) = (column(), column());
+        let off: Vec<Vec<f64>> = self.unknowns.iter().map(|_| column()).collect();
+        let (first, last) = (self.places.first().copied(), self.places.last().copied());
+        let (from, to) = (first.unwrap_or_default(), last.unwrap_or_default());
+        all.extend((0..count).map(|draw| Corner {
+            place: from + at[draw] * (to - from),
+            load: self.loads.get((load[draw] * self.loads.len() as f64) as usize).copied().unwrap_or_default(),
+            off: self.unknowns.iter().map(|unknown| unknown.quantile(off[unknown.with][draw])).collect(),
+        }));
+        all
+    }
+
+    /// How many axes of so many a figure at worst leaves out: none with corners.
+    pub fn left_out(&self, of: usize) -> usize {
+        if self.corners { 0 } else { (LEFT_OUT * of as f64) as usize }
+    }
+
+    /// Sets what is off of an unknown and of all that vary with it.
+    fn put(&self, corner: &mut Corner, unknown: usize, off: f64) {
+        for (other, value) in self.unknowns.iter().zip(&mut corner.off) {
+            if other.with == unknown {
+                *value = off;
+            }
+        }
+    }
+
+    /// The unknowns that vary by themselves.
+    fn leading(&self) -> impl Iterator<Item = usize> {
+        self.unknowns.iter().enumerate().filter(|(place, unknown)| unknown.with == *place).map(|(place, _)| place)
+    }
+
+    /// The axis as it is taken for, in the middle of its places, with the least load.
+    pub fn nominal(&self) -> Corner {
+        let middle = self.places.get(self.places.len() / 2).copied().unwrap_or_default();
+        let least = self.loads.iter().copied().fold(f64::INFINITY, f64::min);
+        Corner { place: middle, load: if least.is_finite() { least } else { 0.0 }, off: vec![0.0; self.unknowns.len()] }
+    }
+
+    /// The machine at a corner.
+    pub fn stage_at(&self, corner: &Corner) -> Machine {
+        let mut machine = self.machine.clone();
+        let off = self.unknowns.iter().zip(&corner.off).filter(|(_, off)| **off != 0.0);
+        parameter::set(&mut machine, off.map(|(unknown, &off)| (&unknown.free, unknown.value(off))));
+        machine.cart.mass += corner.load;
+        machine
+    }
+
+    /// Its response, as the controller of `design` sees it.
+    pub fn plant(&self, corner: &Corner, design: &Design, corners: &[f64]) -> Result<Plant> {
+        Plant::of(&following(self.stage_at(corner)), corner.place, design, corners)
+    }
+
+    /// Steps to these ends of each unknown, to these places and loads.
+    fn steps<'a>(&'a self, ends: &[f64], places: &[f64], loads: &[f64]) -> Vec<Step<'a>> {
+        let mut steps: Vec<Step<'a>> = Vec::new();
+        steps.extend(places.iter().map(|&place| moved(move |corner| corner.place = place)));
+        steps.extend(loads.iter().map(|&load| moved(move |corner| corner.load = load)));
+        for unknown in self.leading() {
+            steps.extend(ends.iter().map(|&end| moved(move |corner| self.put(corner, unknown, end))));
+        }
+        steps
+    }
+
+    /// The corner in words: what is off, the load, the place.
+    pub fn words(&self, corner: &Corner) -> String {
+        let off = |(unknown, &off): (&Unknown, &f64)| (off != 0.0).then(|| unknown.words(off));
+        let mut words: Vec<String> = self.unknowns.iter().zip(&corner.off).filter_map(off).collect();
+        if self.loads.len() > 1 {
+            words.push(format!("load {}", engineering(corner.load, "kg", 4)));
+        }
+        if self.places.len() > 1 {
+            words.push(format!("cart at {:.0} mm", 1e3 * corner.place));
+        }
+        if words.is_empty() { "as the file has it".into() } else { words.join(", ") }
+    }
+
+    /// The corner at which `badness` is largest, and its margins: from the axis as it is taken for and from what each
+    /// unknown does by itself, and from the worst of some draws, one coordinate after another as long as it gets worse.
+    pub fn worst(
+        &self,
+        design: &Design,
+        feedback: &Feedback,
+        badness: &dyn Fn(&Margins) -> f64,
+    ) -> Result<(Corner, Margins)> {
+        let corners = feedback.corners();
+        let look = |corner: &Corner| -> Result<(f64, Margins)> {
+            let margins = Margins::of(&self.plant(corner, design, &corners)?, feedback);
+            let value = badness(&margins);
+            Ok((if value.is_nan() { f64::INFINITY } else { value }, margins))
+        };
+        let nominal = self.nominal();
+        let mut best = (nominal.clone(), look(&nominal)?);
+        let start = best.1.0;
+        // What each unknown does by itself.
+        let mut signs = nominal;
+        for unknown in self.leading() {
+            let mut most = start;
+            for end in [-1.0, 1.0] {
+                let mut corner = best.0.clone();
+                corner.off = vec![0.0; self.unknowns.len()];
+                self.put(&mut corner, unknown, end);
+                let (value, _) = look(&corner)?;
+                if value > most * (1.0 + 1e-9) {
+                    most = value;
+                    self.put(&mut signs, unknown, end);
+                }
+            }
+        }
+        let found = look(&signs)?;
+        if found.0 > best.1.0 {
+            best = (signs, found);
+        }
+        // And what is found by chance, for what no single unknown says.
+        let mut random = Pcg64::seed_from_u64(1);
+        let mut share = || uniform(&mut random);
+        let mut other: Option<(Corner, (f64, Margins))> = None;
+        for _ in 0..DRAWS {
+            let pick = |values: &[f64], share: f64| values.get((share * values.len() as f64) as usize).copied();
+            let corner = Corner {
+                place: pick(&self.places, share()).unwrap_or_default(),
+                load: pick(&self.loads, share()).unwrap_or_default(),
+                off: vec![0.0; self.unknowns.len()],
+            };
+            let mut corner = corner;
+            for unknown in self.leading() {
+                self.put(&mut corner, unknown, if share() < 0.5 { -1.0 } else { 1.0 });
+            }
+            let found = look(&corner)?;
+            if other.as_ref().is_none_or(|(_, most)| found.0 > most.0) {
+                other = Some((corner, found));
+            }
+        }
+        // A notch makes the worst one lie between the ends: there a drawn axis is nearer to it.
+        let mut inner: Option<(Corner, (f64, Margins))> = None;
+        for corner in &self.machines {
+            let found = look(corner)?;
+            if inner.as_ref().is_none_or(|(_, most)| found.0 > most.0) {
+                inner = Some((corner.clone(), found));
+            }
+        }
+        let ends = self.steps(&[-1.0, 0.0, 1.0], &self.places, &self.loads);
+        best = climb(best, &ends, ROUNDS, &look)?;
+        if let Some(other) = other {
+            let other = climb(other, &ends, ROUNDS, &look)?;
+            if other.1.0 > best.1.0 {
+                best = other;
+            }
+        }
+        // Seldom the worst lies between the ends.
+        let between = self.steps(&[-0.75, -0.5, -0.25, 0.25, 0.5, 0.75], &halves(&self.places), &halves(&self.loads));
+        let all: Vec<Step> = ends.into_iter().chain(between).collect();
+        if let Some(inner) = inner {
+            let inner = climb(inner, &all, 3, &look)?;
+            if inner.1.0 > best.1.0 {
+                best = inner;
+            }
+        }
+        best = climb(best, &all, 2, &look)?;
+        let margins = Margins::of(&self.plant(&best.0, design, &corners)?, feedback);
+        Ok((best.0, margins))
+    }
+}
+
+type Look<'a> = &'a dyn Fn(&Corner) -> Result<(f64, Margins)>;
+
+/// From a corner to worse ones, one step after another, as long as it gets worse or for so many rounds.
+fn climb(
+    mut best: (Corner, (f64, Margins)),
+    steps: &[Step],
+    rounds: usize,
+    look: Look,
+) -> Result<(Corner, (f64, Margins))> {
+    for _ in 0..rounds {
+        let before = best.1.0;
+        if before == f64::INFINITY {
+            break;
+        }
+        for step in steps {
+            let corner = step(&best.0);
+            if corner == best.0 {
+                continue;
+            }
+            let found = look(&corner)?;
+            if found.0 > best.1.0 * (1.0 + 1e-9) {
+                best = (corner, found);
+            }
+        }
+        if best.1.0 <= before * (1.0 + 1e-6) {
+            break;
+        }
+    }
+    Ok(best)
+}
+
+/// The middles between neighbours.
+fn halves(values: &[f64]) -> Vec<f64> {
+    values.windows(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect()
+}
+
+/// A corner with one thing changed.
+fn moved<'a>(change: impl Fn(&mut Corner) + 'a) -> Step<'a> {
+    Box::new(move |corner| {
+        let mut other = corner.clone();
+        change(&mut other);
+        other
+    })
+}
+
+/// The stage with spans that are as long as they are along the travel, whatever the runs assume.
+fn following(mut machine: Machine) -> Machine {
+    machine.belt.follows_cart |= machine.belt.make.is_some();
+    machine
+}
+
+/// Resonance and anti-resonance of a stage at these places along its travel.
+pub(super) fn modes_along(machine: &Machine, places: &[f64]) -> Result<Vec<Place>> {
+    travel(&following(machine.clone()), Operation::default(), places)
+}
+
+/// Places along the travel: of `[travel]`, or where the moves lead.
+fn along(case: &Case, count: usize) -> Vec<f64> {
+    let machine = following(case.machine.clone());
+    let Some(whole) = places(&machine, count) else { return vec![0.0] };
+    let (low, high) = case
+        .moves
+        .iter()
+        .flat_map(|motion| motion.profile.strokes().flat_map(|(_, from, distance, _)| [from, from + distance]))
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
+    if machine.cart.travel.is_some() || low > high {
+        return whole;
+    }
+    let steps = count.max(2) - 1;
+    (0..=steps).map(|i| low + (high - low) * i as f64 / steps as f64).collect()
+}

@@ -1,0 +1,33 @@
+//! Machines with belts as data, and their motion computed exactly: no file, no text format, no thread.
+//!
+//! The ground of `taut`, whose facade re-exports these modules. In the order of dependence; each uses only those above
+//! it.
+//!
+//! - [`error`]: what is wrong, where, what is allowed, what to do next. [`number`]: numbers written for people.
+//!   [`chance`]: random numbers, hashes, quantiles.
+//! - [`quantity`]: `"19.4 mm"` becomes 0.0194, with the dimension checked. Everywhere else numbers are in SI units.
+//! - [`trajectory`]: named columns with units.
+//! - [`friction`], [`mechanism`]: bodies, springs and drives as data, and their equations of motion, mode by mode.
+//! - [`machine`]: what a person has. [`parameter`]: the one table of everything a case file can say.
+//! - [`signal`]: inputs, and the references of moves. [`design`]: what a controller is, in data. [`plan`]: experiments
+//!   and their logs.
+//! - [`solve`]: the motion. [`measure`]: what a recorder makes of it. [`metrics`]: what it shows.
+
+pub mod chance;
+pub mod design;
+pub mod error;
+pub mod friction;
+pub mod machine;
+pub mod measure;
+pub mod mechanism;
+pub mod metrics;
+pub mod number;
+pub mod parameter;
+pub mod plan;
+pub mod polyline;
+pub mod quantity;
+pub mod signal;
+pub mod solve;
+pub mod trajectory;
+
+pub use error::{Error, Result};

@@ -1,0 +1,462 @@
+//! The machine: motor, amplifier, pulleys, belt, cart, encoder, recorder. Everything in SI units.
+
+pub mod axis;
+pub mod gantry;
+mod geometry;
+mod kind;
+mod parts;
+pub mod rigid;
+mod sheet;
+mod spans;
+mod swing;
+
+use crate::friction::Friction;
+pub use crate::mechanism::{Amplifier, AmplifierMode, GearPlay, Motor};
+use crate::polyline::Polyline;
+pub use geometry::{BodyAt, DriveAt, Geometry, Lever, Part, SlideAt, SpanAt};
+pub use kind::Kind;
+pub use sheet::{BELTS, BeltSheet, BeltType, Rating, SimpleDrive, Width};
+pub use spans::Spans;
+use std::f64::consts::PI;
+pub use swing::slowest_swing;
+
+/// A belt-driven machine: an axis (paper, Fig. 1 and 2), or a gantry with two drives.
+///
+/// [`Kind`] has its geometry; how many drives, spans and slides there are follows from it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Machine {
+    /// The geometry.
+    pub kind: Kind,
+    /// The drives, in the order of the geometry.
+    pub drives: Vec<DriveUnit>,
+    /// Pitch radius r of all pulleys, m.
+    pub pulley_radius: f64,
+    /// The pulley at each motor; that of an axis has the angle φ₁.
+    pub drive_pulley: Pulley,
+    /// The pulley at the far end of an axis; its angle is φ₃. Idlers of gantries have neither inertia nor friction.
+    pub idler_pulley: Pulley,
+    /// The bridge of a gantry; its position is x.
+    pub bridge: Option<Slide>,
+    /// The cart; its position is x on an axis (the paper's x₂′), y on a gantry's bridge.
+    pub cart: Slide,
+    /// The belt, or belts.
+    pub belt: Belt,
+    /// How the motion of each drive is measured, if it is; of an axis it may be that of the cart.
+    pub encoder: Option<Encoder>,
+    /// A second encoder at the cart, beside one at motor or drive pulley.
+    pub scale: Option<Encoder>,
+}
+
+/// A motor and the amplifier that feeds it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DriveUnit {
+    /// The DC motor and its gear.
+    pub motor: Motor,
+    /// The amplifier between the input and the motor.
+    pub amplifier: Amplifier,
+}
+
+impl Machine {
+    /// Force at the belt that moves everything from rest with the cart at `position` (m), N; the sign of `side` is the
+    /// direction.
+    pub fn breakaway(&self, side: f64, position: f64) -> f64 {
+        let (forward, cart) = (side > 0.0, &self.cart);
+        let [drive, idler] =
+            [&self.drive_pulley, &self.idler_pulley].map(|pulley| pulley.friction.side(forward).breakaway);
+        let along = cart.along.as_ref().map_or(1.0, |along| along.value(position));
+        let lines = [(&cart.forces.along, position), (&cart.forces.by_speed, 0.0)];
+        let of_lines = lines.iter().filter_map(|(line, at)| Some(line.as_ref()?.value(*at))).sum::<f64>();
+        let own = along * cart.friction.side(forward).breakaway;
+        own + (drive + idler) / self.pulley_radius - side * (cart.constant_force() + of_lines)
+    }
+
+    /// What slides, in the order of the geometry: the cart, behind the bridge where there is one.
+    pub fn slides(&self) -> impl Iterator<Item = &Slide> {
+        self.bridge.iter().chain(std::iter::once(&self.cart))
+    }
+
+    /// What carries the rest: the bridge, or a cart that there is alone.
+    pub fn first_slide(&self) -> &Slide {
+        self.bridge.as_ref().unwrap_or(&self.cart)
+    }
+
+    /// The slide with this number.
+    pub fn slide(&self, index: usize) -> Option<&Slide> {
+        self.slides().nth(index)
+    }
+
+    /// The same, to be changed.
+    pub fn slide_mut(&mut self, index: usize) -> Option<&mut Slide> {
+        self.bridge.iter_mut().chain(std::iter::once(&mut self.cart)).nth(index)
+    }
+
+    /// Whether its equations are linear but for stick, slip and other changes of mode: what the exact solver takes.
+    pub fn is_piecewise_linear(&self) -> bool {
+        let pulleys = [self.drive_pulley.friction, self.idler_pulley.friction];
+        let mut laws = pulleys.iter().chain(self.slides().map(|slide| &slide.friction));
+        // A belt that does not stretch does so at any length.
+        let follows = self.belt.follows_cart && self.belt.model != BeltModel::Rigid;
+        laws.all(Friction::is_piecewise_linear) && self.slides().all(|slide| slide.along.is_none()) && !follows
+    }
+
+    /// Whether it is another machine elsewhere along its travel, but for the ends.
+    pub fn changes_along_travel(&self) -> bool {
+        self.slides().any(|slide| slide.along.is_some() || slide.forces.along.is_some()) || self.belt.follows_cart
+    }
+
+    /// The first part of it that the paper's equations do not have, in words.
+    pub fn beyond_the_paper(&self) -> Option<&'static str> {
+        let DriveUnit { motor, amplifier } = &self.drives[0];
+        let parts = [
+            (self.kind != Kind::Axis, "a second drive"),
+            (amplifier.voltage_limit.is_some(), "a voltage limit"),
+            (amplifier.current_limit.is_some(), "a current limit"),
+            (amplifier.bandwidth.is_some(), "a current loop of finite bandwidth"),
+            (motor.gear_play.is_some(), "a compliant gear"),
+            (self.belt.pretension.is_some(), "spans that go slack"),
+            (self.belt.model != BeltModel::Elastic, "a reduced model of the belt"),
+            (self.cart.constant_force() != 0.0, "a constant force on the cart"),
+            (self.cart.forces != SlideForces::default(), "a force on the cart that changes"),
+            (self.cart.travel.is_some(), "the ends of the travel"),
+        ];
+        parts.into_iter().find(|(there, _)| *there).map(|(_, words)| words)
+    }
+}
+
+/// A pulley that turns with friction.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pulley {
+    /// Moment of inertia J, kg m².
+    pub inertia: f64,
+    /// Friction torque, N m over rad/s.
+    pub friction: Friction,
+}
+
+/// What slides: the cart, or the bridge that carries it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Slide {
+    /// Mass M with its load, kg; of a bridge without its cart.
+    pub mass: f64,
+    /// Friction force, N over m/s.
+    pub friction: Friction,
+    /// How its dry friction changes along the travel, if it does.
+    pub along: Option<Polyline>,
+    /// Forces on it that change along the travel or with its speed, if any.
+    pub forces: SlideForces,
+    /// A constant force on it F_L, N, positive towards larger x: what a hanging mass or a spring of constant force
+    /// pulls.
+    pub load: f64,
+    /// Inclination of its travel, rad: positive if it climbs towards larger x.
+    pub inclination: f64,
+    /// How far it may go, if that is bounded.
+    pub travel: Option<Travel>,
+}
+
+/// Forces that are the same in both directions of motion, N over m and over m/s, positive towards larger x: what a
+/// cable chain, magnets, a tilted rail or a fan do, and what a model leaves.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct SlideForces {
+    /// Over the position.
+    pub along: Option<Polyline>,
+    /// Over the speed.
+    pub by_speed: Option<Polyline>,
+}
+
+/// Standard acceleration of gravity, m/s² (CGPM 1901).
+pub const GRAVITY: f64 = 9.80665;
+
+impl Slide {
+    /// What slides on the level, without ends and with nothing pulling at it.
+    pub fn new(mass: f64, friction: Friction) -> Self {
+        let forces = SlideForces::default();
+        Self { mass, friction, along: None, forces, load: 0.0, inclination: 0.0, travel: None }
+    }
+
+    /// The constant force on it, N: F_L − M g sin θ.
+    pub fn constant_force(&self) -> f64 {
+        self.load - self.mass * GRAVITY * self.inclination.sin()
+    }
+}
+
+/// The spans of the belt, or of both belts, in the order of the geometry. Of an axis these are 1 drive pulley to cart, 2
+/// cart to idler pulley, 3 idler pulley back to drive pulley.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Belt {
+    /// Span stiffness k₁, k₂, k₃, N/m, at the origin; infinite in a rigid model that is given none.
+    pub stiffness: Spans,
+    /// Span damping c₁, c₂, c₃, N s/m.
+    pub damping: Spans,
+    /// The make that the stiffness was computed from, where it was not given as such.
+    pub make: Option<BeltMake>,
+    /// Tension T₀ of every span at rest, N. A span whose tension is used up goes slack; none for spans that can push.
+    pub pretension: Option<f64>,
+    /// Whether spans get shorter and longer, and so stiffer and softer, as what slides moves; needs `make`.
+    pub follows_cart: bool,
+    /// How many of the three inertias move by themselves.
+    pub model: BeltModel,
+    /// Its data sheet.
+    pub sheet: BeltSheet,
+}
+
+impl Belt {
+    /// Spans of given stiffness (N/m) and damping (N s/m) and no more.
+    pub fn given(stiffness: impl Into<Spans>, damping: impl Into<Spans>) -> Self {
+        let (stiffness, damping) = (stiffness.into(), damping.into());
+        let (model, sheet) = (BeltModel::Elastic, BeltSheet::default());
+        Self { stiffness, damping, make: None, pretension: None, follows_cart: false, model, sheet }
+    }
+
+    /// Takes up what was changed of the make.
+    pub fn follow_make(&mut self) {
+        if let Some(make) = &self.make {
+            self.stiffness = make.stiffness();
+        }
+    }
+
+    /// The make of spans that follow what slides.
+    pub fn following(&self) -> Option<BeltMake> {
+        self.make.filter(|_| self.follows_cart)
+    }
+}
+
+/// The bodies that the model of the belt lets move by themselves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum BeltModel {
+    /// All three inertias: the paper's model.
+    #[default]
+    Elastic,
+    /// Both pulleys as one inertia, and the cart on spans 1 and, in series, 2 and 3 (as Hace et al. 2005).
+    TwoMass,
+    /// Everything as one inertia: a belt that does not stretch (as Li & Rehani 1996).
+    Rigid,
+}
+
+impl BeltModel {
+    /// As in the case file.
+    pub fn word(self) -> &'static str {
+        match self {
+            BeltModel::Elastic => "elastic",
+            BeltModel::TwoMass => "two-mass",
+            BeltModel::Rigid => "rigid",
+        }
+    }
+}
+
+/// How far something may go.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Travel {
+    /// Least position x, m.
+    pub min: f64,
+    /// Greatest position x, m.
+    pub max: f64,
+    /// The end stop there; without, a run ends when the cart leaves its travel.
+    pub stop: Option<EndStop>,
+}
+
+/// An elastic end stop.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EndStop {
+    /// Stiffness k_s, N/m.
+    pub stiffness: f64,
+    /// Damping c_s, N s/m.
+    pub damping: f64,
+}
+
+/// The make of a belt; gives its stiffness by eq. (11).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BeltMake {
+    /// Modulus E, Pa.
+    pub modulus: f64,
+    /// Cross-section A that carries the load, m².
+    pub section: f64,
+    /// Span lengths l₁, l₂, l₃, m, at the origin.
+    pub spans: Spans,
+}
+
+impl BeltMake {
+    /// Stiffness of each span.
+    pub fn stiffness(&self) -> Spans {
+        let &BeltMake { modulus: e, section: a, spans } = self;
+        // k = A E / l                                                              (11)
+        spans.map(|l| a * e / l)
+    }
+
+    /// E A, N.
+    pub fn rigidity(&self) -> f64 {
+        self.modulus * self.section
+    }
+
+    /// Stiffness of spans 1 and 2 of an axis with the cart at `x`, m: the drive pulley is at the positive end.
+    pub fn stiffness_at(&self, x: f64) -> [f64; 2] {
+        let &BeltMake { modulus: e, section: a, spans } = self;
+        let [l1, l2, _] = spans.three();
+        // k₁ = A E / (l₁ − x), k₂ = A E / (l₂ + x)                                (11)
+        [a * e / (l1 - x), a * e / (l2 + x)]
+    }
+}
+
+/// Modulus of a composite whose parts, given as (share of the section, modulus in Pa), act as springs in parallel
+/// (2.3.1).
+pub fn composite_modulus(parts: &[(f64, f64)]) -> f64 {
+    parts.iter().map(|&(share, modulus)| share * modulus).sum()
+}
+
+/// The uniform section that is as stiff as a toothed belt: toothed and plain stretches in series.
+///
+/// `toothed_share` is the part of the length on which the section is `toothed`; sections in m².
+pub fn toothed_section(plain: f64, toothed: f64, toothed_share: f64) -> f64 {
+    // 1/k_eff = 1/k_t + 1/k_nt, with k = A E / l of each share of the length        (12)
+    1.0 / (toothed_share / toothed + (1.0 - toothed_share) / plain)
+}
+
+/// Moment of inertia, kg m², of a hollow cylinder about its axis; lengths in m, density in kg/m³.
+pub fn cylinder_inertia(outer_diameter: f64, bore_diameter: f64, width: f64, density: f64) -> f64 {
+    // J = π ρ w (d_o⁴ − d_i⁴) / 32
+    PI * density * width * (outer_diameter.powi(4) - bore_diameter.powi(4)) / 32.0
+}
+
+/// Pitch radius, m, of a pulley with so many teeth (grooves) at a pitch in m.
+pub fn pitch_radius(teeth: f64, pitch: f64) -> f64 {
+    // 2 π r = z p
+    teeth * pitch / (2.0 * PI)
+}
+
+/// An incremental encoder.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Encoder {
+    /// Where it sits.
+    pub at: EncoderPlace,
+    /// Lines per turn (per metre at the cart); in quadrature four counts each.
+    pub lines: f64,
+}
+
+/// The shaft or slide that an encoder watches.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum EncoderPlace {
+    /// The motor's own shaft, before the gear.
+    Motor,
+    /// The drive pulley, after the gear.
+    DrivePulley,
+    /// The cart, on a linear scale.
+    Cart,
+}
+
+impl Encoder {
+    /// Counts per radian of the drive pulley, or at the cart per metre; in quadrature every line gives four.
+    pub fn counts_per_unit(&self, gear_ratio: f64) -> f64 {
+        match self.at {
+            EncoderPlace::Motor => 4.0 * self.lines * gear_ratio / (2.0 * PI),
+            EncoderPlace::DrivePulley => 4.0 * self.lines / (2.0 * PI),
+            EncoderPlace::Cart => 4.0 * self.lines,
+        }
+    }
+}
+
+/// How a run is recorded: when samples are taken, and what converters make of them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Measurement {
+    /// Interval between samples, s; the experiment's where there is none.
+    pub every: Option<f64>,
+    /// How old a sample is when it is recorded, s.
+    pub delay: f64,
+    /// Standard deviation of the instant of a sample, s.
+    pub jitter: f64,
+    /// Which noise and jitter; the same seed gives the same ones.
+    pub seed: u64,
+    /// The quantities that are recorded beside the encoder's counts.
+    pub channels: Vec<Channel>,
+}
+
+impl Default for Measurement {
+    /// An ideal recorder of the encoder alone.
+    fn default() -> Self {
+        Self { every: None, delay: 0.0, jitter: 0.0, seed: 1, channels: Vec::new() }
+    }
+}
+
+/// A recorded quantity and its analogue-to-digital converter, all in the quantity's own unit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Channel {
+    /// The quantity that is recorded.
+    pub quantity: Quantity,
+    /// Step of the converter; none where it does not round.
+    pub step: Option<f64>,
+    /// Standard deviation of the noise before the converter.
+    pub noise: f64,
+    /// Greatest absolute value that the converter gives; none where it does not clip.
+    pub range: Option<f64>,
+}
+
+/// Quantities that can be measured; a recorder takes those up to [`Quantity::CartSpeed`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Quantity {
+    /// Current of the armature, A.
+    MotorCurrent,
+    /// Voltage at the motor, V.
+    MotorVoltage,
+    /// φ₁, rad.
+    DriveAngle,
+    /// φ₁′, rad/s.
+    DriveSpeed,
+    /// x, m.
+    CartPosition,
+    /// x′, m/s.
+    CartSpeed,
+    /// φ₃, rad.
+    IdlerAngle,
+    /// φ₃′, rad/s.
+    IdlerSpeed,
+    /// φ_r, rad: the rotor's, divided by the gear ratio.
+    RotorAngle,
+    /// φ_r′, rad/s.
+    RotorSpeed,
+    /// x″, m/s².
+    CartAcceleration,
+}
+
+impl Quantity {
+    /// All of them, in the order of a log.
+    pub const ALL: [Quantity; 11] = [
+        Quantity::MotorCurrent,
+        Quantity::MotorVoltage,
+        Quantity::DriveAngle,
+        Quantity::DriveSpeed,
+        Quantity::CartPosition,
+        Quantity::CartSpeed,
+        Quantity::IdlerAngle,
+        Quantity::IdlerSpeed,
+        Quantity::RotorAngle,
+        Quantity::RotorSpeed,
+        Quantity::CartAcceleration,
+    ];
+
+    /// Its name, in case files and as a column.
+    pub fn name(self) -> &'static str {
+        match self {
+            Quantity::MotorCurrent => "motor_current",
+            Quantity::MotorVoltage => "motor_voltage",
+            Quantity::DriveAngle => "drive_angle",
+            Quantity::DriveSpeed => "drive_speed",
+            Quantity::CartPosition => "cart_position",
+            Quantity::CartSpeed => "cart_speed",
+            Quantity::IdlerAngle => "idler_angle",
+            Quantity::IdlerSpeed => "idler_speed",
+            Quantity::RotorAngle => "rotor_angle",
+            Quantity::RotorSpeed => "rotor_speed",
+            Quantity::CartAcceleration => "cart_acceleration",
+        }
+    }
+
+    /// Its unit.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Quantity::MotorCurrent => "A",
+            Quantity::MotorVoltage => "V",
+            Quantity::DriveAngle | Quantity::IdlerAngle | Quantity::RotorAngle => "rad",
+            Quantity::DriveSpeed | Quantity::IdlerSpeed | Quantity::RotorSpeed => "rad/s",
+            Quantity::CartPosition => "m",
+            Quantity::CartSpeed => "m/s",
+            Quantity::CartAcceleration => "m/s^2",
+        }
+    }
+}

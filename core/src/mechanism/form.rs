@@ -1,0 +1,164 @@
+//! Linear forms of the state: forces written as the paper writes them, and evaluated, differentiated and bounded by
+//! machine.
+
+use super::{BODIES, DRIVES, Layout, Mechanism, SPRINGS, State};
+use std::ops::{Add, Mul, Neg, Sub};
+
+/// A force, torque, current or rate as a linear form of the springs' lengths, speeds, currents, inputs, and one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Form {
+    /// Coefficients of the springs' lengths s = A q.
+    pub stretch: [f64; SPRINGS],
+    /// Coefficients of the bodies' speeds.
+    pub speed: [f64; BODIES],
+    /// Coefficients of the armature currents, where they are states.
+    pub current: [f64; DRIVES],
+    /// Coefficients of the inputs.
+    pub input: [f64; DRIVES],
+    /// The constant part.
+    pub constant: f64,
+}
+
+impl Form {
+    /// The form that is always zero.
+    pub const ZERO: Form = Form {
+        stretch: [0.0; SPRINGS],
+        speed: [0.0; BODIES],
+        current: [0.0; DRIVES],
+        input: [0.0; DRIVES],
+        constant: 0.0,
+    };
+
+    /// The length of a spring.
+    pub fn stretch(spring: usize) -> Form {
+        let mut form = Form::ZERO;
+        form.stretch[spring] = 1.0;
+        form
+    }
+
+    /// The speed of a body.
+    pub fn speed(body: usize) -> Form {
+        let mut form = Form::ZERO;
+        form.speed[body] = 1.0;
+        form
+    }
+
+    /// The armature current of a drive as a state.
+    pub fn current(drive: usize) -> Form {
+        let mut form = Form::ZERO;
+        form.current[drive] = 1.0;
+        form
+    }
+
+    /// The input of a drive.
+    pub fn input(drive: usize) -> Form {
+        let mut form = Form::ZERO;
+        form.input[drive] = 1.0;
+        form
+    }
+
+    /// A number.
+    pub fn constant(value: f64) -> Form {
+        Form { constant: value, ..Form::ZERO }
+    }
+
+    /// Takes `factor` times another one off.
+    pub(super) fn subtract(&mut self, factor: f64, other: &Form) {
+        fn off<const N: usize>(own: &mut [f64; N], factor: f64, other: &[f64; N]) {
+            own.iter_mut().zip(other).for_each(|(own, other)| *own -= other * factor);
+        }
+        off(&mut self.stretch, factor, &other.stretch);
+        off(&mut self.speed, factor, &other.speed);
+        off(&mut self.current, factor, &other.current);
+        off(&mut self.input, factor, &other.input);
+        self.constant -= other.constant * factor;
+    }
+
+    /// Its coefficients with respect to ways, speeds and currents of a whole state.
+    pub fn on_state(&self, mechanism: &Mechanism) -> State {
+        let mut row = State { position: [0.0; BODIES], speed: self.speed, current: self.current };
+        for (spring, factor) in mechanism.springs.iter().zip(self.stretch) {
+            for &(body, arm) in &spring.arms {
+                row.position[body] += factor * arm;
+            }
+        }
+        row
+    }
+
+    /// Its value, from lengths rather than from large positions, so that little is lost to cancellation.
+    pub fn value(&self, mechanism: &Mechanism, state: &State, input: &[f64; DRIVES]) -> f64 {
+        let mut stretch = [0.0; SPRINGS];
+        for (index, stretch) in stretch.iter_mut().enumerate().take(mechanism.springs.len()) {
+            *stretch = mechanism.length(index, &state.position);
+        }
+        self.value_at(&stretch, state, input)
+    }
+
+    /// Its value at these lengths; speeds and currents from `state`, in whichever coordinates.
+    #[inline]
+    pub(crate) fn value_at(&self, stretch: &[f64; SPRINGS], state: &State, input: &[f64; DRIVES]) -> f64 {
+        fn add(sum: f64, coefficients: &[f64], values: &[f64]) -> f64 {
+            coefficients.iter().zip(values).fold(sum, |sum, (coefficient, value)| sum + coefficient * value)
+        }
+        let sum = add(0.0, &self.stretch, stretch);
+        let sum = add(sum, &self.speed, &state.speed);
+        add(add(sum, &self.current, &state.current), &self.input, input) + self.constant
+    }
+
+    /// An estimate of the rounding error of its value; `inner` is a state in the solvers' coordinates.
+    pub(crate) fn noise(&self, layout: &Layout, inner: &State, input: &[f64; DRIVES]) -> f64 {
+        fn sizes(coefficients: &[f64], values: &[f64]) -> f64 {
+            coefficients.iter().zip(values).map(|(coefficient, value)| (coefficient * value).abs()).sum()
+        }
+        let row = layout.on_coordinates(self);
+        let size = self.constant.abs()
+            + sizes(&self.input, input)
+            + sizes(&row.position, &inner.position)
+            + sizes(&row.speed, &inner.speed)
+            + sizes(&row.current, &inner.current);
+        ROUNDING * size
+    }
+}
+
+/// The rounding error of the value of a form, as a share of its largest parts.
+pub const ROUNDING: f64 = 5e-15;
+
+impl Add for Form {
+    type Output = Form;
+    fn add(self, other: Form) -> Form {
+        Form {
+            stretch: std::array::from_fn(|j| self.stretch[j] + other.stretch[j]),
+            speed: std::array::from_fn(|j| self.speed[j] + other.speed[j]),
+            current: std::array::from_fn(|j| self.current[j] + other.current[j]),
+            input: std::array::from_fn(|j| self.input[j] + other.input[j]),
+            constant: self.constant + other.constant,
+        }
+    }
+}
+
+impl Mul<f64> for Form {
+    type Output = Form;
+    fn mul(self, factor: f64) -> Form {
+        Form {
+            stretch: self.stretch.map(|c| c * factor),
+            speed: self.speed.map(|c| c * factor),
+            current: self.current.map(|c| c * factor),
+            input: self.input.map(|c| c * factor),
+            constant: self.constant * factor,
+        }
+    }
+}
+
+impl Neg for Form {
+    type Output = Form;
+    fn neg(self) -> Form {
+        self * -1.0
+    }
+}
+
+impl Sub for Form {
+    type Output = Form;
+    fn sub(self, other: Form) -> Form {
+        self + -other
+    }
+}

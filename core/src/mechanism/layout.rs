@@ -1,0 +1,200 @@
+//! Which quantities are the states of the solvers, and where what stands among them.
+//!
+//! A force of k (r φ₁ − x) computed from positions carries the rounding of those positions times k. With the stretch as
+//! a state it carries the rounding of the stretch, however far from the origin the machine is. So the lengths of
+//! springs that hang a pulley on other bodies stand in the places of the pulleys' angles, as long as they are
+//! independent; ways of bodies that slide are counted from where the run begins. For the axis, c = A′ q:
+//!
+//! ```text
+//! c = (r φ₁ − x,  x − x₀,  x − r φ₃,  φ_r − φ₁)
+//! ```
+
+use super::{BODIES, DRIVES, Form, Kind, Mechanism, SPRINGS, State};
+
+/// Coefficients up to this share of those they come from are zero but for rounding.
+const NOTHING: f64 = 1e-12;
+
+/// A spring's length in the place of a body's way.
+#[derive(Debug, Clone)]
+pub struct Replaced {
+    /// The body.
+    pub body: usize,
+    /// Its arm.
+    pub own: f64,
+    /// The arms of the others.
+    pub others: Vec<(usize, f64)>,
+    /// Whether one of them is replaced itself.
+    pub on_replaced: bool,
+}
+
+/// Where what stands in the solvers' state.
+#[derive(Debug, Clone)]
+pub struct Layout {
+    bodies: usize,
+    /// Lengths that stand in the places of ways, each behind those that it needs.
+    pub replaced: Vec<Replaced>,
+    /// Every spring's length from the coordinates: (spring, body in whose place the coordinate stands, weight).
+    terms: Vec<(usize, usize, f64)>,
+    /// Place of each body's coordinate, and of its speed.
+    pub coordinate: [usize; BODIES],
+    /// Place of each body's speed.
+    pub speed: [usize; BODIES],
+    /// Place of each drive's current, where it is a state.
+    pub current: [Option<usize>; DRIVES],
+    /// Number of places.
+    pub states: usize,
+    /// Number of inputs.
+    pub inputs: usize,
+}
+
+impl Layout {
+    /// That of a mechanism: bodies in their order, each with its coordinate and its speed, then the currents, then
+    /// rotors.
+    pub fn new(mechanism: &Mechanism) -> Self {
+        let bodies = mechanism.bodies.len();
+        let held = mechanism.held_bodies().len();
+        let (mut current, mut currents) = ([None; DRIVES], 0);
+        for (index, _) in mechanism.drives.iter().enumerate().filter(|(_, drive)| drive.has_current_state()) {
+            current[index] = Some(2 * held + currents);
+            currents += 1;
+        }
+        let place = |body: usize| 2 * body + if body < held { 0 } else { currents };
+        let mut layout = Self {
+            bodies,
+            replaced: Vec::new(),
+            terms: Vec::new(),
+            coordinate: std::array::from_fn(place),
+            speed: std::array::from_fn(|body| place(body) + 1),
+            current,
+            states: 2 * bodies + currents,
+            inputs: mechanism.drives.len(),
+        };
+        // Rows that are taken as coordinates, by the body in whose place they stand.
+        let mut taken: [Option<[f64; BODIES]>; BODIES] = [None; BODIES];
+        let mut weights = Vec::new();
+        for spring in &mechanism.springs {
+            let mut row = [0.0; BODIES];
+            for &(body, arm) in &spring.arms {
+                row[body] += arm;
+            }
+            let size: f64 = row.iter().map(|arm| arm.abs()).sum();
+            let (mut left, mut weight) = (row, [0.0; BODIES]);
+            // What is left of the row when the lengths taken so far are subtracted, weight by weight.
+            while let Some((body, by)) = (0..bodies).find_map(|b| taken[b].filter(|_| left[b] != 0.0).map(|by| (b, by)))
+            {
+                let factor = left[body] / by[body];
+                weight[body] += factor;
+                for (left, by) in left.iter_mut().zip(by) {
+                    *left -= factor * by;
+                    if left.abs() <= NOTHING * size {
+                        *left = 0.0;
+                    }
+                }
+                left[body] = 0.0;
+            }
+            let turns = |&b: &usize| left[b] != 0.0 && matches!(mechanism.bodies[b].kind, Kind::Rotary { .. });
+            match (0..bodies).find(turns) {
+                // The row as it is becomes a coordinate, in the place of a pulley that hangs on it.
+                Some(body) if spring.arms.len() > 1 => {
+                    taken[body] = Some(row);
+                    let others = spring.arms.iter().copied().filter(|&(other, _)| other != body).collect::<Vec<_>>();
+                    let on_replaced = others.iter().any(|&(other, _)| taken[other].is_some());
+                    layout.replaced.push(Replaced { body, own: row[body], others, on_replaced });
+                    weight = [0.0; BODIES];
+                    weight[body] = 1.0;
+                }
+                _ => (0..bodies).for_each(|b| weight[b] += left[b]),
+            }
+            weights.push(weight);
+        }
+        for (spring, weight) in weights.iter().enumerate() {
+            assert!(weight.iter().filter(|weight| **weight != 0.0).count() <= 2, "a length of two coordinates at most");
+            layout.terms.extend((0..bodies).filter(|&b| weight[b] != 0.0).map(|b| (spring, b, weight[b])));
+        }
+        layout
+    }
+
+    /// Number of bodies.
+    pub fn bodies(&self) -> usize {
+        self.bodies
+    }
+
+    /// Lengths of the springs in a state in these coordinates.
+    #[inline]
+    pub fn stretches(&self, inner: &State) -> [f64; SPRINGS] {
+        let mut stretch = [0.0; SPRINGS];
+        for &(spring, body, weight) in &self.terms {
+            stretch[spring] += weight * inner.position[body];
+        }
+        stretch
+    }
+
+    /// Value of a form in a state in these coordinates.
+    #[inline]
+    pub fn value(&self, form: &Form, inner: &State, input: &[f64; DRIVES]) -> f64 {
+        form.value_at(&self.stretches(inner), inner, input)
+    }
+
+    /// Coefficients of a form in these coordinates.
+    pub fn on_coordinates(&self, form: &Form) -> State {
+        let mut row = State { position: [0.0; BODIES], speed: form.speed, current: form.current };
+        for &(spring, body, weight) in &self.terms {
+            row.position[body] += form.stretch[spring] * weight;
+        }
+        row
+    }
+
+    /// The same into the places of a vector: lengths as coordinates, speeds and currents.
+    #[inline]
+    pub fn put(&self, form: &Form, row: &mut [f64]) {
+        for body in 0..self.bodies {
+            row[self.speed[body]] = form.speed[body];
+        }
+        for &(spring, body, weight) in &self.terms {
+            row[self.coordinate[body]] += form.stretch[spring] * weight;
+        }
+        for (place, current) in self.current.iter().zip(form.current) {
+            if let Some(place) = place {
+                row[*place] = current;
+            }
+        }
+    }
+
+    /// By how much each spring gets longer per unit of each coordinate: (body in whose place it stands, weight).
+    pub fn weights(&self, spring: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
+        self.terms.iter().filter(move |term| term.0 == spring).map(|&(_, body, weight)| (body, weight))
+    }
+
+    /// Whether a length stands in the place of this body's way.
+    pub fn is_replaced(&self, body: usize) -> bool {
+        self.replaced.iter().any(|replaced| replaced.body == body)
+    }
+
+    /// Where ways are counted from in a run that begins in `start`.
+    pub fn origin(&self, start: &State) -> [f64; BODIES] {
+        std::array::from_fn(|b| if b < self.bodies && !self.is_replaced(b) { start.position[b] } else { 0.0 })
+    }
+
+    /// By how much a spring is longer than what its coordinates say, ways being counted from `origin`.
+    pub fn shift(&self, spring: usize, origin: &[f64; BODIES]) -> f64 {
+        self.weights(spring).map(|(body, weight)| weight * origin[body]).sum()
+    }
+
+    /// The form of a coordinate's rate: a speed, or the rate of a spring's length.
+    pub fn rate(&self, mechanism: &Mechanism, body: usize) -> Form {
+        match self.replaced.iter().find(|replaced| replaced.body == body) {
+            None => Form::speed(body),
+            Some(replaced) => {
+                let together = |&(other, _): &(usize, f64)| mechanism.leader(other) == mechanism.leader(body);
+                if replaced.others.iter().all(together) {
+                    return Form::ZERO;
+                }
+                let mut rate = Form::speed(body) * replaced.own;
+                for &(other, arm) in &replaced.others {
+                    rate.speed[other] += arm;
+                }
+                rate
+            }
+        }
+    }
+}

@@ -1,0 +1,448 @@
+//! A machine as data: bodies, springs between them, drives on them, and what is shown of it.
+//!
+//! With the bodies' ways q, a spring's length is a row of lever arms on them, and everything else follows:
+//!
+//! ```text
+//! s = A q,   f = K s + C ṡ,   M q̈ = −Aᵀ f + G i − F_f(q̇) + F
+//! ```
+//!
+//! Friction, limits, slack and play make this piecewise linear; within one [`Mode`] it is linear, and
+//! [`Mechanism::equations`] gives it. Which bodies there are, and what they are called, is [`crate::machine`]'s to say.
+
+mod drive;
+mod elements;
+mod equations;
+mod form;
+mod layout;
+mod mode;
+mod nudge;
+mod power;
+
+pub use drive::{Amplifier, AmplifierMode, GearPlay, Motor};
+pub use equations::Equations;
+pub use form::Form;
+pub use form::ROUNDING;
+pub use layout::{Layout, Replaced};
+pub use mode::{Cause, Contact, DriveMode, Guard, Limit, Mode, Part, Status, Switch, What};
+pub use power::Power;
+
+use crate::friction::Friction;
+use crate::polyline::Polyline;
+use std::borrow::Cow;
+use std::sync::Arc;
+
+/// Room for bodies.
+pub const BODIES: usize = 6;
+/// Room for springs.
+pub const SPRINGS: usize = 8;
+/// Room for drives.
+pub const DRIVES: usize = 2;
+
+/// How something is called.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Label {
+    /// In column headings and keys.
+    pub key: &'static str,
+    /// For people.
+    pub name: &'static str,
+}
+
+/// An inertia that turns or slides.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Body {
+    /// Its name.
+    pub label: Label,
+    /// Whether it turns (rad) or slides (m).
+    pub kind: Kind,
+    /// Moment of inertia, kg m², or mass, kg; without what is geared to it.
+    pub inertia: f64,
+    /// Its friction, N m over rad/s or N over m/s.
+    pub friction: Friction,
+    /// A constant torque or force on it, N m or N.
+    pub force: f64,
+    /// How its dry friction changes along its way, if it does.
+    pub along: Option<Polyline>,
+    /// The body that it moves with, and its way per way of that one; itself and 1, unless something makes both one.
+    pub leader: (usize, f64),
+    /// Whether it is the rotor of a drive, which nothing but the gear holds.
+    pub is_rotor: bool,
+}
+
+/// How a body moves.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Kind {
+    /// It turns; the belt runs over it at this pitch radius, m.
+    Rotary {
+        /// m
+        radius: f64,
+    },
+    /// It slides.
+    Linear,
+}
+
+impl Kind {
+    /// Way at the belt per way of the body: its pitch radius, or 1.
+    pub fn lever(self) -> f64 {
+        match self {
+            Kind::Rotary { radius } => radius,
+            Kind::Linear => 1.0,
+        }
+    }
+
+    /// Unit of a way, of a speed, and of what acts on the body.
+    pub fn units(self) -> [&'static str; 3] {
+        match self {
+            Kind::Rotary { .. } => ["rad", "rad/s", "N m"],
+            Kind::Linear => ["m", "m/s", "N"],
+        }
+    }
+}
+
+/// Something between bodies that has a length: a span of the belt, a gear, an end stop.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Spring {
+    /// Its name.
+    pub label: Label,
+    /// A row of A: by how much it gets longer per way of each body.
+    pub arms: Vec<(usize, f64)>,
+    /// Stiffness, N/m or N m/rad.
+    pub stiffness: f64,
+    /// Damping, N s/m or N m s/rad.
+    pub damping: f64,
+    /// When it pushes and pulls.
+    pub law: SpringLaw,
+    /// How its stiffness changes with the bodies' ways, if it does.
+    pub follows: Option<Follows>,
+}
+
+/// When a spring pushes and pulls.
+#[derive(Debug, Clone, PartialEq)]
+pub enum SpringLaw {
+    /// Always.
+    TwoSided,
+    /// It only pulls: its force is counted from a tension T₀, N, and it goes slack where that is used up.
+    Tension {
+        /// T₀, N
+        pretension: f64,
+    },
+    /// It only pushes, beyond either end of a play: the flanks of a gear, end stops.
+    Gap {
+        /// Where the negative side begins.
+        low: f64,
+        /// Where the positive side begins.
+        high: f64,
+    },
+    /// As a line says, whose x is its length or the rate of it: what pulls in either direction alike, and keeps no
+    /// energy.
+    Line {
+        /// Its x.
+        over: Over,
+        /// Force, N or N m.
+        line: Polyline,
+    },
+    /// Never; a run ends where its length leaves these bounds.
+    Bounds {
+        /// Least length.
+        low: f64,
+        /// Greatest length.
+        high: f64,
+    },
+    /// Never: its length is only looked at.
+    None,
+}
+
+impl SpringLaw {
+    /// The steepest slope of its line: as a stiffness and as a damping, N/m and N s/m or the like.
+    pub(crate) fn steepest(&self) -> (f64, f64) {
+        let SpringLaw::Line { over, line } = self else { return (0.0, 0.0) };
+        let slopes = (0..=line.points().len()).map(|piece| line.piece(piece)[1].abs());
+        let most = slopes.fold(0.0, f64::max);
+        if *over == Over::Length { (most, 0.0) } else { (0.0, most) }
+    }
+}
+
+/// What a force is a line over.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Over {
+    /// The length of a spring.
+    Length,
+    /// The rate of it.
+    Rate,
+}
+
+/// A span whose length, and so its stiffness, changes with the ways of bodies: k = E A/(l + Σ a_j q_j).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Follows {
+    /// E A, N.
+    pub rigidity: f64,
+    /// l: its length at the origin, m.
+    pub length: f64,
+    /// a_j: by how much it gets longer per way of each body.
+    pub arms: Vec<(usize, f64)>,
+}
+
+impl Follows {
+    /// k = E A / l                                                                  (11)
+    pub fn stiffness(&self, position: impl Fn(usize) -> f64) -> f64 {
+        let change: f64 = self.arms.iter().map(|&(body, arm)| arm * position(body)).sum();
+        self.rigidity / (self.length + change)
+    }
+}
+
+/// A motor with gear and amplifier that turns a body.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Drive {
+    /// Its name.
+    pub label: Label,
+    /// The name of its limits.
+    pub voltage: Label,
+    /// The same.
+    pub current: Label,
+    /// The body behind the gear.
+    pub pulley: usize,
+    /// The body that the motor's shaft turns with: the pulley, or a rotor of its own where the gear is compliant.
+    pub shaft: usize,
+    /// The motor.
+    pub motor: Motor,
+    /// The amplifier that feeds it.
+    pub amplifier: Amplifier,
+}
+
+impl Drive {
+    /// Whether the rotor is an inertia of its own.
+    pub fn has_rotor(&self) -> bool {
+        self.shaft != self.pulley
+    }
+
+    /// Whether its gear loses power.
+    pub fn loses(&self) -> bool {
+        self.motor.gear_efficiency < 1.0
+    }
+
+    /// Whether the armature current is a state of its own.
+    pub fn has_current_state(&self) -> bool {
+        match self.amplifier.mode {
+            AmplifierMode::Voltage => self.motor.inductance > 0.0,
+            AmplifierMode::Current => self.amplifier.bandwidth.is_some(),
+        }
+    }
+
+    /// Whether its input differs from the voltage at its terminals, and is worth a column of its own.
+    pub fn shows_input(&self) -> bool {
+        let amplifier = &self.amplifier;
+        amplifier.gain != 1.0
+            || amplifier.mode == AmplifierMode::Current
+            || amplifier.voltage_limit.is_some()
+            || amplifier.current_limit.is_some()
+    }
+}
+
+/// A quantity that is shown.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Shown {
+    /// Time, s.
+    Time,
+    /// Input of a drive, V or A.
+    Input(usize),
+    /// Voltage at a motor's terminals, V.
+    Voltage(usize),
+    /// Current of a motor, A.
+    Current(usize),
+    /// Way of a body, times a factor.
+    Position(usize, f64),
+    /// Speed of a body, times a factor.
+    Speed(usize, f64),
+    /// Length of a spring; nothing where one body carries both its ends.
+    Stretch(usize),
+    /// Force of a spring, times a factor.
+    Force(usize, f64),
+    /// Friction on a body.
+    Friction(usize),
+    /// The motion of a body, as [`Status::code`] has it.
+    Motion(usize),
+    /// Deflection of the bristles of a body.
+    Bristle(usize),
+    /// Whether a spring is slack, or which side of it pushes.
+    Contact(usize),
+    /// Whole counts of an encoder on a body, so many per unit of its way.
+    Counts(usize, f64),
+}
+
+/// A column of a run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Heading {
+    /// Its name.
+    pub name: Cow<'static, str>,
+    /// Its unit.
+    pub unit: &'static str,
+    /// The quantity in it.
+    pub shown: Shown,
+    /// Whether it is there also where only what a controller or a comparison needs is asked for.
+    pub lean: bool,
+}
+
+/// Ways and speeds of the bodies and currents of the drives, by their numbers; what is not there is zero.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct State {
+    /// rad or m
+    pub position: [f64; BODIES],
+    /// rad/s or m/s
+    pub speed: [f64; BODIES],
+    /// A; only where the current is a state of its own.
+    pub current: [f64; DRIVES],
+}
+
+/// The roles of the parts of a machine, by their numbers. Who asks for figures asks here, and takes keys and names from
+/// the labels.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Roles {
+    /// Bodies that it is there to move.
+    pub loads: Vec<usize>,
+    /// Springs that carry the drives' motion to them.
+    pub spans: Vec<usize>,
+}
+
+/// Bodies, springs and drives.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Mechanism {
+    /// The inertias; rotors behind all others.
+    pub bodies: Vec<Body>,
+    /// The springs between them.
+    pub springs: Vec<Spring>,
+    /// The drives that move them. The inputs are one for each.
+    pub drives: Vec<Drive>,
+    /// The columns of a run.
+    pub columns: Vec<Heading>,
+    /// The readings of an observer, in their order: no more than [`crate::solve::QUANTITIES`].
+    pub readings: Vec<Shown>,
+    /// The roles of its parts.
+    pub roles: Roles,
+    /// Where ways are counted from: what follows them or changes along them begins there.
+    pub origin: [f64; BODIES],
+    /// Friction of each body and of those that move with it, as far as it is straight, and whether it sticks.
+    friction: Vec<(Friction, bool)>,
+}
+
+impl Mechanism {
+    /// The mechanism of these parts. Rotors stand behind all other bodies, and no list is longer than there is room
+    /// for.
+    pub fn new(bodies: Vec<Body>, springs: Vec<Spring>, drives: Vec<Drive>) -> Self {
+        assert!(bodies.len() <= BODIES && springs.len() <= SPRINGS && drives.len() <= DRIVES);
+        assert!(bodies.iter().is_sorted_by_key(|body| body.is_rotor));
+        let mut friction = vec![(Friction::default(), Friction::default()); bodies.len()];
+        for part in &bodies {
+            let ((leader, ratio), mut own) = (part.leader, part.friction);
+            let (all, sticking) = &mut friction[leader];
+            if own.law.never_sticks() {
+                // What is not b v is no part of the straight equations.
+                for side in [&mut own.forward, &mut own.backward] {
+                    (side.coulomb, side.breakaway) = (0.0, 0.0);
+                }
+            } else {
+                sticking.add(&own, ratio);
+            }
+            all.add(&own, ratio);
+        }
+        let friction = friction.into_iter().map(|(all, sticking)| (all, !sticking.is_linear())).collect();
+        let (columns, readings, roles) = (Vec::new(), Vec::new(), Roles::default());
+        Self { bodies, springs, drives, columns, readings, roles, origin: [0.0; BODIES], friction }
+    }
+
+    /// The body that this one moves with: itself, unless something makes several bodies one.
+    pub fn leader(&self, body: usize) -> usize {
+        self.bodies[body].leader.0
+    }
+
+    /// Way of this body per way of its leader.
+    pub fn ratio(&self, body: usize) -> f64 {
+        self.bodies[body].leader.1
+    }
+
+    /// Bodies that move by themselves.
+    pub fn leaders(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.bodies.len()).filter(|&body| self.leader(body) == body)
+    }
+
+    /// Bodies that move with `leader`, itself included.
+    pub fn followers(&self, leader: usize) -> impl Iterator<Item = usize> + '_ {
+        (0..self.bodies.len()).filter(move |&body| self.leader(body) == leader)
+    }
+
+    /// Bodies other than rotors.
+    pub fn held_bodies(&self) -> std::ops::Range<usize> {
+        0..self.bodies.iter().take_while(|body| !body.is_rotor).count()
+    }
+
+    /// Friction of a body and of those that move with it, as far as it is b v ± F_c and a breakaway: what the equations
+    /// of a mode have. The friction of a body: one that never sticks has nothing but b v. None for a body that another
+    /// leads.
+    pub fn friction(&self, body: usize) -> &Friction {
+        &self.friction[body].0
+    }
+
+    /// Whether a body can stick or has a direction-dependent law, so that its motion has modes at all.
+    pub fn has_modes(&self, body: usize) -> bool {
+        let leader = self.leader(body);
+        let by_gear = |drive: &Drive| drive.loses() && self.leader(drive.shaft) == leader;
+        self.friction[leader].1 || self.drives.iter().any(by_gear)
+    }
+
+    /// Whether its equations are linear but for changes of mode: what the exact solver takes.
+    pub fn is_piecewise_linear(&self) -> bool {
+        let straight = |body: &Body| body.friction.is_piecewise_linear() && body.along.is_none();
+        self.bodies.iter().all(straight) && self.springs.iter().all(|spring| spring.follows.is_none())
+    }
+
+    /// Length of a spring.
+    pub fn length(&self, spring: usize, position: &[f64; BODIES]) -> f64 {
+        self.springs[spring].arms.iter().map(|&(body, arm)| arm * position[body]).sum()
+    }
+
+    /// How the length of a spring changes per way of each body that moves by itself; nothing where one body carries all
+    /// its ends.
+    pub fn leading_arms(&self, spring: usize) -> [f64; BODIES] {
+        let (mut arms, mut size) = ([0.0; BODIES], 0.0);
+        for &(body, arm) in &self.springs[spring].arms {
+            let arm = arm * self.ratio(body);
+            arms[self.leader(body)] += arm;
+            size += arm.abs();
+        }
+        // r · (1/r) is 1 but for rounding.
+        arms.map(|arm| if arm.abs() <= 1e-12 * size { 0.0 } else { arm })
+    }
+
+    /// The rate of a spring's length.
+    pub fn stretch_rate(&self, spring: usize) -> Form {
+        let mut rate = Form::ZERO;
+        for &(body, arm) in &self.springs[spring].arms {
+            rate.speed[body] += arm;
+        }
+        rate
+    }
+
+    /// The same as [`Mechanism::seen_from`], itself where that is where it counts from already.
+    pub(crate) fn seen_by(self: &Arc<Self>, layout: &Layout, start: &State) -> Arc<Self> {
+        if layout.origin(start) == self.origin { Arc::clone(self) } else { Arc::new(self.seen_from(layout, start)) }
+    }
+
+    /// The same with ways counted from where `start` is: ends and bounds move there, before anything is multiplied with
+    /// them.
+    pub(crate) fn seen_from(&self, layout: &Layout, start: &State) -> Self {
+        let mut seen = self.clone();
+        seen.origin = layout.origin(start);
+        for (index, spring) in seen.springs.iter_mut().enumerate() {
+            let shift = layout.shift(index, &seen.origin);
+            match &mut spring.law {
+                SpringLaw::Gap { low, high } | SpringLaw::Bounds { low, high } => {
+                    (*low, *high) = (*low - shift, *high - shift);
+                }
+                SpringLaw::Line { over: Over::Length, line } => *line = line.shifted(shift),
+                SpringLaw::Line { over: Over::Rate, .. }
+                | SpringLaw::TwoSided
+                | SpringLaw::Tension { .. }
+                | SpringLaw::None => {}
+            }
+        }
+        seen
+    }
+}

@@ -1,0 +1,340 @@
+//! Modes: which linear equations hold, what ends them, and what follows.
+
+use super::{BODIES, DRIVES, Form, Label, Mechanism, SPRINGS};
+use crate::friction::Motion;
+
+/// Which linear equations hold: what each body, each spring and each drive does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Mode {
+    /// Motion of each body.
+    pub motion: [Motion; BODIES],
+    /// Whether a spring that only pulls is slack.
+    pub slack: [bool; SPRINGS],
+    /// Which side of a spring that only pushes touches.
+    pub contact: [Contact; SPRINGS],
+    /// Which piece of its line a spring is on.
+    pub piece: [u8; SPRINGS],
+    /// The state of each drive.
+    pub drive: [DriveMode; DRIVES],
+}
+
+/// The states of the parts of a drive.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct DriveMode {
+    /// Whether the torque through the gear is positive; matters only where the gear loses power.
+    pub torque_positive: bool,
+    /// Whether the voltage limit binds.
+    pub voltage: Limit,
+    /// Whether the current limit binds.
+    pub current: Limit,
+}
+
+impl DriveMode {
+    /// Nothing out of the ordinary.
+    pub const ORDINARY: Self = Self { torque_positive: true, voltage: Limit::Inside, current: Limit::Inside };
+}
+
+impl Mode {
+    /// Bodies that move so, in their order, and nothing else out of the ordinary; those that are not named are free.
+    pub fn of(motion: impl IntoIterator<Item = Motion>) -> Self {
+        let mut mode = Self {
+            motion: [Motion::Free; BODIES],
+            slack: [false; SPRINGS],
+            contact: [Contact::Apart; SPRINGS],
+            piece: [0; SPRINGS],
+            drive: [DriveMode::ORDINARY; DRIVES],
+        };
+        for (own, motion) in mode.motion.iter_mut().zip(motion) {
+            *own = motion;
+        }
+        mode
+    }
+
+    /// The same with all gears carrying this way.
+    pub fn with_torque(mut self, positive: bool) -> Self {
+        self.drive.iter_mut().for_each(|drive| drive.torque_positive = positive);
+        self
+    }
+
+    /// The state of a part.
+    pub fn status(&self, what: What) -> Status {
+        match what {
+            What::Body(body) => Status::Motion(self.motion[body]),
+            What::Span(spring) => Status::Slack(self.slack[spring]),
+            What::Gap(spring) => Status::Contact(self.contact[spring]),
+            What::Line(spring) => Status::Piece(self.piece[spring]),
+            What::Voltage(drive) => Status::Limit(self.drive[drive].voltage),
+            What::Current(drive) => Status::Limit(self.drive[drive].current),
+        }
+    }
+
+    /// Makes a part other than a body do something else.
+    pub(crate) fn switch(&mut self, to: Switch) {
+        match to {
+            Switch::Span(spring, slack) => self.slack[spring] = slack,
+            Switch::Gap(spring, contact) => self.contact[spring] = contact,
+            Switch::Line(spring, piece) => self.piece[spring] = piece,
+            Switch::Voltage(drive, limit) => self.drive[drive].voltage = limit,
+            Switch::Current(drive, limit) => self.drive[drive].current = limit,
+        }
+    }
+}
+
+/// Whether a limit binds, and on which side.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Limit {
+    /// At the negative limit.
+    Low,
+    /// Within the limits.
+    #[default]
+    Inside,
+    /// At the positive limit.
+    High,
+}
+
+impl Limit {
+    /// −1, 0 or 1.
+    pub fn sign(self) -> f64 {
+        match self {
+            Limit::Low => -1.0,
+            Limit::Inside => 0.0,
+            Limit::High => 1.0,
+        }
+    }
+}
+
+/// Whether two elastic flanks touch, and on which side. A flank only pushes: one that its damper holds back from
+/// following carries nothing, though it has not left.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Contact {
+    /// The negative side carries.
+    Low,
+    /// The negative side is within reach and carries nothing.
+    LowLoose,
+    /// Neither side.
+    #[default]
+    Apart,
+    /// The positive side is within reach and carries nothing.
+    HighLoose,
+    /// The positive side carries.
+    High,
+}
+
+impl Contact {
+    /// The side that carries: −1, 0 or 1.
+    pub fn code(self) -> i8 {
+        match self {
+            Contact::Low => -1,
+            Contact::High => 1,
+            _ => 0,
+        }
+    }
+}
+
+/// Which part of a mechanism, by its number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum What {
+    /// A body.
+    Body(usize),
+    /// A spring that only pulls.
+    Span(usize),
+    /// A spring that only pushes: flanks of a gear, end stops.
+    Gap(usize),
+    /// A spring whose force is a line.
+    Line(usize),
+    /// A drive's voltage limit.
+    Voltage(usize),
+    /// A drive's current limit.
+    Current(usize),
+}
+
+/// A part of a mechanism that can change what it does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Part {
+    /// Which.
+    pub what: What,
+    /// Its name.
+    pub label: Label,
+}
+
+impl Part {
+    /// That of a mechanism.
+    pub fn of(mechanism: &Mechanism, what: What) -> Self {
+        let label = match what {
+            What::Body(body) => mechanism.bodies[body].label,
+            What::Span(spring) | What::Gap(spring) | What::Line(spring) => mechanism.springs[spring].label,
+            What::Voltage(drive) => mechanism.drives[drive].voltage,
+            What::Current(drive) => mechanism.drives[drive].current,
+        };
+        Self { what, label }
+    }
+
+    /// Its name for people.
+    pub fn name(self) -> &'static str {
+        self.label.name
+    }
+
+    /// Its name in column headings and keys.
+    pub fn key(self) -> &'static str {
+        self.label.key
+    }
+}
+
+/// The state of a part.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Status {
+    /// Of a body.
+    Motion(Motion),
+    /// Of a span: whether it is slack.
+    Slack(bool),
+    /// Of a limit.
+    Limit(Limit),
+    /// Of gear and end stops.
+    Contact(Contact),
+    /// Of a line: which piece.
+    Piece(u8),
+}
+
+impl Status {
+    /// As in the result files: a body −1 backward, 0 stuck, 1 forward, 2 free; a span 1 if slack; a limit, gear or stop
+    /// the side that binds or carries, or 0; a line always 0, for from piece to piece its force does not jump.
+    pub fn code(self) -> i8 {
+        match self {
+            Status::Motion(motion) => motion.code(),
+            Status::Slack(slack) => i8::from(slack),
+            Status::Limit(limit) => limit.sign() as i8,
+            Status::Contact(contact) => contact.code(),
+            Status::Piece(_) => 0,
+        }
+    }
+
+    /// The word for it.
+    pub fn word(self) -> &'static str {
+        match self {
+            Status::Motion(motion) => motion.word(),
+            Status::Slack(true) => "slack",
+            Status::Slack(false) => "taut",
+            Status::Limit(Limit::Inside) => "within",
+            Status::Limit(Limit::High) => "at the positive limit",
+            Status::Limit(Limit::Low) => "at the negative limit",
+            Status::Contact(contact) => ["negative side", "apart", "positive side"][(contact.code() + 1) as usize],
+            Status::Piece(_) => "on a piece of its line",
+        }
+    }
+}
+
+impl PartialEq<Motion> for Status {
+    fn eq(&self, other: &Motion) -> bool {
+        *self == Status::Motion(*other)
+    }
+}
+
+/// A condition of a mode: the mode holds while `form` ≥ 0.
+#[derive(Debug, Clone, Copy)]
+pub struct Guard {
+    /// The form that must not become negative.
+    pub form: Form,
+    /// The cause of the change where it does.
+    pub cause: Cause,
+}
+
+/// Why a mode ends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Cause {
+    /// A sliding body comes to zero speed.
+    Stop(usize),
+    /// The load on a stuck body passes its breakaway forward.
+    BreakForward(usize),
+    /// The load on a stuck body passes its breakaway backward.
+    BreakBackward(usize),
+    /// The torque through the gear of a drive changes sign.
+    GearTorque(usize),
+    /// Another part begins to do something else.
+    Switch(Switch),
+    /// The length of a spring leaves its bounds.
+    Leave(usize),
+}
+
+impl Cause {
+    /// Room for the kinds that [`Cause::kind`] tells apart: two for each body, one for each gear, three each for a
+    /// drive's limits and for a spring.
+    pub(crate) const KINDS: usize = 2 * BODIES + 7 * DRIVES + 3 * SPRINGS;
+
+    /// Which condition it belongs to; breakaway forward stands with the body, breakaway backward, which may be of quite
+    /// another size, by itself.
+    pub fn kind(self) -> usize {
+        const GEAR: usize = 2 * BODIES;
+        const LIMITS: usize = GEAR + DRIVES;
+        const SPRING: usize = LIMITS + 6 * DRIVES;
+        let limit = |limit| match limit {
+            Limit::Inside => 0,
+            Limit::High => 1,
+            Limit::Low => 2,
+        };
+        let contact = |contact| match contact {
+            Contact::Apart => 0,
+            Contact::High | Contact::HighLoose => 1,
+            Contact::Low | Contact::LowLoose => 2,
+        };
+        match self {
+            Cause::Stop(body) | Cause::BreakForward(body) => body,
+            Cause::BreakBackward(body) => BODIES + body,
+            Cause::GearTorque(drive) => GEAR + drive,
+            Cause::Switch(Switch::Voltage(drive, to)) => LIMITS + 6 * drive + limit(to),
+            Cause::Switch(Switch::Current(drive, to)) => LIMITS + 6 * drive + 3 + limit(to),
+            Cause::Switch(Switch::Span(spring, _)) | Cause::Leave(spring) => SPRING + 3 * spring,
+            Cause::Switch(Switch::Gap(spring, to)) => SPRING + 3 * spring + contact(to),
+            // The piece before, this one, the one behind: no two of them alike.
+            Cause::Switch(Switch::Line(spring, to)) => SPRING + 3 * spring + usize::from(to % 3),
+        }
+    }
+
+    /// Which of several conditions that have fallen at one instant is settled first: limits, flanks, spans and stops,
+    /// which follow from the state and the input alone; then the gears' torques, which follow from them; then bodies,
+    /// which break away with the load that all of these leave.
+    pub fn rank(self) -> u8 {
+        match self {
+            Cause::Leave(_) => 0,
+            Cause::Switch(_) => 1,
+            Cause::GearTorque(_) => 2,
+            Cause::Stop(_) | Cause::BreakForward(_) | Cause::BreakBackward(_) => 3,
+        }
+    }
+
+    /// Whether both are of the same part, and it is no body.
+    pub(crate) fn is_of_same_part(self, other: Cause) -> bool {
+        match (self, other) {
+            (Cause::GearTorque(a), Cause::GearTorque(b)) => a == b,
+            (Cause::Switch(a), Cause::Switch(b)) => a.what() == b.what(),
+            _ => false,
+        }
+    }
+}
+
+/// The next state of a part other than a body.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Switch {
+    /// A spring that only pulls goes slack, or is taut again.
+    Span(usize, bool),
+    /// A spring that only pushes is touched, or left.
+    Gap(usize, Contact),
+    /// A spring whose force is a line comes to another piece of it.
+    Line(usize, u8),
+    /// The voltage limit of a drive.
+    Voltage(usize, Limit),
+    /// The current limit of a drive.
+    Current(usize, Limit),
+}
+
+impl Switch {
+    /// The part.
+    pub fn what(self) -> What {
+        match self {
+            Switch::Span(spring, _) => What::Span(spring),
+            Switch::Gap(spring, _) => What::Gap(spring),
+            Switch::Line(spring, _) => What::Line(spring),
+            Switch::Voltage(drive, _) => What::Voltage(drive),
+            Switch::Current(drive, _) => What::Current(drive),
+        }
+    }
+}

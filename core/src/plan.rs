@@ -1,0 +1,182 @@
+//! Experiments and their logs as plain data: what a simulation runs, and what a fit compares it with.
+
+use crate::chance::hash;
+use crate::machine::Quantity;
+use crate::mechanism::{DRIVES, Mechanism, State};
+use crate::signal::{Hold, Signal};
+use crate::trajectory::Grid;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// Longest name of an experiment's files, in bytes: file systems allow 255, and `-peak-motor-current-histogram.svg`
+/// follows.
+const LONGEST_FILE_NAME: usize = 200;
+
+/// One run of the machine.
+#[derive(Debug, Clone)]
+pub struct Experiment {
+    /// Its name, unique within the case.
+    pub name: String,
+    /// The input of the amplifier.
+    pub input: Signal,
+    /// End of the run, s.
+    pub until: f64,
+    /// Output interval, s.
+    pub every: f64,
+    /// Where it starts from.
+    pub initial: Initial,
+    /// Its log, if the file names one. Its times are the experiment's.
+    pub log: Option<Arc<Log>>,
+}
+
+/// The state at time zero; at rest at the origin unless said otherwise.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Initial {
+    /// φ₁, rad.
+    pub drive_angle: f64,
+    /// φ₁′, rad/s.
+    pub drive_speed: f64,
+    /// x, m.
+    pub cart_position: f64,
+    /// x′, m/s.
+    pub cart_speed: f64,
+    /// φ₃, rad.
+    pub idler_angle: f64,
+    /// φ₃′, rad/s.
+    pub idler_speed: f64,
+    /// Armature current, A; matters only with an inductance.
+    pub motor_current: f64,
+}
+
+impl Initial {
+    /// The state that it stands for.
+    pub fn state(&self, mechanism: &Mechanism) -> State {
+        let mut state = State::default();
+        let has_current = mechanism.drives.iter().any(|drive| drive.has_current_state());
+        // The rotor in the middle of its play.
+        state.position[..4].copy_from_slice(&[
+            self.drive_angle,
+            self.cart_position,
+            self.idler_angle,
+            self.drive_angle,
+        ]);
+        state.speed[..4].copy_from_slice(&[self.drive_speed, self.cart_speed, self.idler_speed, self.drive_speed]);
+        state.current[0] = if has_current { self.motor_current } else { 0.0 };
+        state
+    }
+}
+
+impl Experiment {
+    /// Its name as that of a file, without ending: in lower case, what is neither letter nor digit as `-`.
+    pub fn file_name(&self) -> String {
+        file_name(&self.name)
+    }
+
+    /// Number of rows of its result, the first at time zero, the last at its end.
+    pub fn samples(&self) -> u64 {
+        Grid::new(self.every, self.until).intervals().saturating_add(1)
+    }
+}
+
+/// A name as that of a file: `5 V pulse` becomes `5-v-pulse`. Of a name that is too long for one, the end is a hash.
+pub fn file_name(name: &str) -> String {
+    let plain: String = name.to_lowercase().chars().map(|c| if c.is_alphanumeric() { c } else { '-' }).collect();
+    if plain.len() <= LONGEST_FILE_NAME {
+        return plain;
+    }
+    let hash = format!("-{:016x}", hash(name.bytes()));
+    format!("{}{hash}", &plain[..plain.floor_char_boundary(LONGEST_FILE_NAME - hash.len())])
+}
+
+/// One run of a gantry.
+#[derive(Debug, Clone)]
+pub struct GantryExperiment {
+    /// Its name, unique within the case.
+    pub name: String,
+    /// The inputs of the left and the right amplifier.
+    pub inputs: [Signal; DRIVES],
+    /// End of the run, s.
+    pub until: f64,
+    /// Output interval, s.
+    pub every: f64,
+    /// Where it starts from.
+    pub initial: State,
+}
+
+impl GantryExperiment {
+    /// Its name as that of a file, without ending.
+    pub fn file_name(&self) -> String {
+        file_name(&self.name)
+    }
+
+    /// Number of rows of its result.
+    pub fn samples(&self) -> u64 {
+        Grid::new(self.every, self.until).intervals().saturating_add(1)
+    }
+}
+
+/// A measured run: what went in and what was seen, at its own times.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Log {
+    /// Its experiment's name.
+    pub name: String,
+    /// The file that it was read from.
+    pub file: PathBuf,
+    /// Times, s: increasing, not always evenly. Zero is the log's first row, or where its window begins.
+    pub time: Vec<f64>,
+    /// The input of the amplifier at those times, V or A before its gain; with any input that was added to it.
+    pub input: Vec<f64>,
+    /// The part of it that was added behind the controller, if the log says so: a known disturbance.
+    pub added: Option<Vec<f64>>,
+    /// The input between them.
+    pub hold: Hold,
+    /// Where the cart should have been at those times, m, if the log was made in closed loop and says so.
+    pub reference: Option<Vec<f64>>,
+    /// The outputs; at least one.
+    pub outputs: Vec<Output>,
+    /// With which words the recorder ended the file early.
+    pub ended: Option<String>,
+}
+
+/// One measured quantity over time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Output {
+    /// The quantity.
+    pub quantity: Quantity,
+    /// Whether its sign was lost, as by a counter of pulses: then it is to be compared with an absolute value.
+    pub absolute: bool,
+    /// A value for each time, SI; NaN where one is missing.
+    pub values: Vec<f64>,
+}
+
+impl Log {
+    /// Number of samples.
+    pub fn len(&self) -> usize {
+        self.time.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.time.is_empty()
+    }
+
+    /// The output of that quantity, if it was measured.
+    pub fn output(&self, quantity: Quantity) -> Option<&Output> {
+        self.outputs.iter().find(|output| output.quantity == quantity)
+    }
+
+    /// The input as a signal, to be fed into a model.
+    pub fn signal(&self) -> Signal {
+        Signal::Sampled { times: self.time.clone(), values: self.input.clone(), hold: self.hold }
+    }
+
+    /// The usual interval between samples, s: the median, which a few gaps do not change.
+    pub fn interval(&self) -> f64 {
+        let mut steps: Vec<f64> = self.time.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        if steps.is_empty() {
+            return 0.0;
+        }
+        let middle = steps.len() / 2;
+        *steps.select_nth_unstable_by(middle, f64::total_cmp).1
+    }
+}

@@ -1,0 +1,419 @@
+//! References of motion: moves from rest to rest within limits of speed, acceleration, jerk and snap, one after
+//! another.
+//!
+//! The speed of a move over a distance D is D times a chain of moving averages, of lengths T₁ (speed), T₂
+//! (acceleration), T₃ (jerk) and T₄ (snap), as many as there are limits. With T₃ ≥ T₄, T₂ ≥ T₃ + T₄ and T₁ ≥ T₂ + T₃ +
+//! T₄ its peaks are D/T₁, D/(T₁T₂), D/(T₁T₂T₃) and D/(T₁T₂T₃T₄), and it takes T₁ + T₂ + T₃ + T₄. The shortest such
+//! lengths are found from the last to the first, each as long as the limits above it allow: the trapezoid, the seven
+//! segments of third order, and the fifteen of fourth (P. Lambrechts, M. Boerlage, M. Steinbuch, "Trajectory planning
+//! and feedforward design for electromechanical motion systems", Control Engineering Practice 13, 2005).
+
+use crate::error::{Error, Result};
+
+/// Limits of a move. SI units; all above zero.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Limits {
+    /// Speed, m/s.
+    pub speed: f64,
+    /// Acceleration, m/s².
+    pub acceleration: f64,
+    /// Jerk, m/s³; without it the acceleration jumps.
+    pub jerk: Option<f64>,
+    /// Snap, m/s⁴; needs a jerk limit. Without it the jerk jumps.
+    pub snap: Option<f64>,
+}
+
+/// Where the cart should be, and the first four derivatives of that.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Reference {
+    /// y, m.
+    pub position: f64,
+    /// y′, m/s.
+    pub speed: f64,
+    /// y″, m/s².
+    pub acceleration: f64,
+    /// y‴, m/s³; zero for a trapezoid, whose acceleration jumps.
+    pub jerk: f64,
+    /// y⁗, m/s⁴; zero where the jerk jumps.
+    pub snap: f64,
+}
+
+impl Reference {
+    /// At rest there.
+    pub fn at(position: f64) -> Self {
+        Self { position, ..Self::default() }
+    }
+
+    /// Itself and `weight` times another.
+    pub fn plus(self, weight: f64, other: Self) -> Self {
+        Self {
+            position: self.position + weight * other.position,
+            speed: self.speed + weight * other.speed,
+            acceleration: self.acceleration + weight * other.acceleration,
+            jerk: self.jerk + weight * other.jerk,
+            snap: self.snap + weight * other.snap,
+        }
+    }
+}
+
+/// A move from rest to rest over some distance.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stroke {
+    distance: f64,
+    duration: f64,
+    /// Begin, and position and its derivatives there, of each piece of the first half; the last derivative is constant
+    /// on it.
+    pieces: Vec<(f64, [f64; 5])>,
+}
+
+impl Stroke {
+    /// The end of the polynomial that holds `t` after the beginning.
+    fn seam(&self, t: f64) -> f64 {
+        let middle = 0.5 * self.duration;
+        let first = t <= middle;
+        let tau = if first { t } else { self.duration - t };
+        let index = self.pieces.partition_point(|(begin, _)| *begin <= tau).max(1) - 1;
+        let begins = |index: usize| self.pieces.get(index).map(|(begin, _)| *begin);
+        // The second half mirrors the first.
+        if first {
+            begins(index + 1).map_or(middle, |next| next.min(middle))
+        } else {
+            self.duration - begins(index).unwrap_or(0.0)
+        }
+    }
+
+    /// The quickest of its kind over `distance` (m, of either sign) within `limits`.
+    ///
+    /// ```
+    /// use taut::signal::profile::{Limits, Stroke};
+    /// let limits = Limits { speed: 0.5, acceleration: 5.0, jerk: None, snap: None };
+    /// // Up to speed in 0.1 s and 25 mm, as much to stop, and 150 mm between: 0.5 s.
+    /// let stroke = Stroke::new(0.2, &limits)?;
+    /// assert!((stroke.duration() - 0.5).abs() < 1e-15);
+    /// assert_eq!(stroke.at(0.5).position, 0.2);
+    /// # Ok::<(), taut::Error>(())
+    /// ```
+    pub fn new(distance: f64, limits: &Limits) -> Result<Self> {
+        let values = [Some(limits.speed), Some(limits.acceleration), limits.jerk, limits.snap];
+        if values.iter().flatten().any(|v| !(1e-15..=1e15).contains(v))
+            || limits.jerk.is_none() && limits.snap.is_some()
+        {
+            return Err(Error::new("these limits of a move are none")
+                .allowed("speed, acceleration, jerk and snap above zero; snap only with jerk"));
+        }
+        if distance.is_nan() || distance.abs() > 1e9 {
+            return Err(Error::new(format!("a move over {distance} m")).allowed("a finite distance"));
+        }
+        let far = distance.abs();
+        if far == 0.0 {
+            return Ok(Self { distance, duration: 0.0, pieces: Vec::new() });
+        }
+        let limits: Vec<f64> = values.into_iter().flatten().collect();
+        let times = lengths(far, &limits);
+        Ok(Self { distance, duration: times.iter().sum(), pieces: pieces(distance, &times) })
+    }
+
+    /// How long it takes, s.
+    pub fn duration(&self) -> f64 {
+        self.duration
+    }
+
+    /// Where it is `t` after its beginning.
+    pub fn at(&self, t: f64) -> Reference {
+        if t >= self.duration {
+            return Reference::at(self.distance);
+        }
+        if t <= 0.0 {
+            return Reference::default();
+        }
+        // The second half mirrors the first.
+        let first = t <= 0.5 * self.duration;
+        let tau = if first { t } else { self.duration - t };
+        let index = self.pieces.partition_point(|(begin, _)| *begin <= tau).max(1) - 1;
+        let Some(&(begin, [p, v, a, j, s])) = self.pieces.get(index) else { return Reference::at(self.distance) };
+        let h = tau - begin;
+        let position = p + h * (v + h * (a / 2.0 + h * (j / 6.0 + h * s / 24.0)));
+        let speed = v + h * (a + h * (j / 2.0 + h * s / 6.0));
+        let acceleration = a + h * (j + h * s / 2.0);
+        let jerk = j + h * s;
+        if first {
+            Reference { position, speed, acceleration, jerk, snap: s }
+        } else {
+            Reference { position: self.distance - position, speed, acceleration: -acceleration, jerk, snap: -s }
+        }
+    }
+}
+
+/// The lengths T₁, T₂, … of the averages, for as many limits.
+fn lengths(distance: f64, limits: &[f64]) -> Vec<f64> {
+    let order = limits.len();
+    let mut times = vec![0.0; order];
+    let last = limits[order - 1];
+    for m in (0..order).rev() {
+        let longest = if m == 0 {
+            // D = p T₁, p being the peak of speed
+            let peak = times[1..].iter().product::<f64>() * last;
+            distance / peak
+        } else {
+            // The greatest T_m such that, with all before it as short as it lets them, no peak passes its limit.
+            let fits = |t: f64| {
+                let mut trial = times.clone();
+                trial[m] = t;
+                for k in (0..m).rev() {
+                    trial[k] = trial[k + 1..].iter().sum();
+                }
+                let mut peak = last;
+                for k in (1..order).rev() {
+                    peak *= trial[k];
+                    // After the lengths from k on, this is the peak of derivative k (1: speed).
+                    if k <= m && peak > limits[k - 1] {
+                        return false;
+                    }
+                }
+                peak * trial[0] <= distance
+            };
+            greatest(fits, distance, limits)
+        };
+        times[m] = longest;
+    }
+    times
+}
+
+/// The greatest t for which `fits`, which does below some t and not above it.
+fn greatest(fits: impl Fn(f64) -> bool, distance: f64, limits: &[f64]) -> f64 {
+    let mut high = distance / limits[0] + limits.windows(2).map(|pair| pair[0] / pair[1]).sum::<f64>();
+    let mut low = 0.0;
+    while fits(high) {
+        low = high;
+        high *= 2.0;
+    }
+    // To the last bit: the middle in the logarithm first, as t may be anything.
+    if low == 0.0 {
+        low = high;
+        while !fits(low) {
+            high = low;
+            low *= 0.5;
+        }
+    }
+    for _ in 0..64 {
+        let middle = 0.5 * (low + high);
+        if middle <= low || middle >= high {
+            break;
+        }
+        if fits(middle) { low = middle } else { high = middle }
+    }
+    low
+}
+
+/// The pieces of the first half. The highest derivative jumps up or down at each sum of some of the lengths but T₁, and
+/// these come in the order of binary numbers: 0, T₄, T₃, T₃ + T₄, T₂, …; then it cruises.
+fn pieces(distance: f64, times: &[f64]) -> Vec<(f64, [f64; 5])> {
+    let order = times.len();
+    let height = distance / times.iter().product::<f64>();
+    let count = 1_usize << (order - 1);
+    let mut pieces = Vec::with_capacity(count);
+    let (mut begin, mut state) = (0.0, [0.0; 5]);
+    for k in 0..count {
+        let level = match (k % 2, k.count_ones() % 2) {
+            (1, _) => 0.0,
+            (_, 0) => height,
+            _ => -height,
+        };
+        // Where one pulse, two, or four have done their part, as many derivatives are zero, to the last bit.
+        let lowest = (k + 1).trailing_zeros() as usize;
+        state[order + 1 - lowest..=order].fill(0.0);
+        state[order] = level;
+        pieces.push((begin, state));
+        // The next jump is where the lowest bit that is not set is: after its length less those below it.
+        if k + 1 < count {
+            let below: f64 = times[order - lowest..].iter().sum();
+            let length = times[order - 1 - lowest] - below;
+            state = moved(&state, length);
+            begin += length;
+        }
+    }
+    pieces
+}
+
+/// Position and derivatives after `h` of constant highest derivative.
+fn moved(state: &[f64; 5], h: f64) -> [f64; 5] {
+    let mut next = [0.0; 5];
+    for (k, next) in next.iter_mut().enumerate() {
+        let mut term = 1.0;
+        for (i, value) in state[k..].iter().enumerate() {
+            *next += term * value;
+            term *= h / (i + 1) as f64;
+        }
+    }
+    next
+}
+
+/// One move of a chain, or a wait.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Leg {
+    /// To a position, m.
+    To(f64, Limits),
+    /// Rest for so long, s.
+    Wait(f64),
+}
+
+/// Moves one after another, each from rest to rest.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Profile {
+    /// When each stroke begins, where from, where to, and the stroke.
+    strokes: Vec<(f64, [f64; 2], Stroke)>,
+    start: f64,
+    end: f64,
+    /// Impulses (time, s; amplitude) that it is convolved with; empty for none.
+    shaper: Vec<[f64; 2]>,
+    /// Times and references that a log has instead of strokes.
+    samples: Vec<(f64, Reference)>,
+}
+
+impl Profile {
+    /// The chain of `legs` from `start` (m), the first beginning at time zero.
+    pub fn new(start: f64, legs: &[Leg]) -> Result<Self> {
+        let (mut time, mut position) = (0.0, start);
+        let mut strokes = Vec::new();
+        for leg in legs {
+            match *leg {
+                Leg::Wait(length) => {
+                    if !(0.0..=1e9).contains(&length) {
+                        return Err(Error::new(format!("a wait of {length} s")).allowed("from 0 s to 1e9 s"));
+                    }
+                    time += length;
+                }
+                Leg::To(target, ref limits) => {
+                    let stroke = Stroke::new(target - position, limits)?;
+                    let duration = stroke.duration();
+                    strokes.push((time, [position, target], stroke));
+                    (time, position) = (time + duration, target);
+                }
+            }
+        }
+        Ok(Self { strokes, start, end: time, shaper: Vec::new(), samples: Vec::new() })
+    }
+
+    /// A reference of which `positions` (m) at increasing `times` (s) are known: straight lines between them. Speed and
+    /// acceleration are those of the parabola through a sample and its neighbours; jerk and snap are not known, and
+    /// zero.
+    pub fn sampled(times: &[f64], positions: &[f64]) -> Self {
+        let n = times.len().min(positions.len());
+        let samples = (0..n)
+            .map(|k| {
+                let mut reference = Reference::at(positions[k]);
+                if k > 0 && k + 1 < n {
+                    let (before, after) = (times[k] - times[k - 1], times[k + 1] - times[k]);
+                    let slopes =
+                        [(positions[k] - positions[k - 1]) / before, (positions[k + 1] - positions[k]) / after];
+                    reference.speed = (after * slopes[0] + before * slopes[1]) / (before + after);
+                    reference.acceleration = 2.0 * (slopes[1] - slopes[0]) / (before + after);
+                }
+                (times[k], reference)
+            })
+            .collect();
+        let start = positions.first().copied().unwrap_or(0.0);
+        let end = times.last().copied().unwrap_or(0.0);
+        Self { strokes: Vec::new(), start, end, shaper: Vec::new(), samples }
+    }
+
+    /// The same through a shaper: impulses (time, s; amplitude) whose amplitudes add up to 1.
+    pub fn shaped(mut self, shaper: &[[f64; 2]]) -> Self {
+        self.shaper = shaper.to_vec();
+        self
+    }
+
+    /// Where the reference is at time `t`, s.
+    pub fn at(&self, t: f64) -> Reference {
+        if self.shaper.is_empty() {
+            return self.plain(t);
+        }
+        self.shaper.iter().fold(Reference::default(), |sum, &[late, part]| sum.plus(part, self.plain(t - late)))
+    }
+
+    fn plain(&self, t: f64) -> Reference {
+        if let Some((_, last)) = self.samples.last() {
+            let k = self.samples.partition_point(|(time, _)| *time <= t);
+            let Some((after, next)) = self.samples.get(k) else { return *last };
+            let Some((before, this)) = k.checked_sub(1).map(|k| &self.samples[k]) else {
+                return Reference::at(self.start);
+            };
+            let share = (t - before) / (after - before);
+            return Reference::default().plus(1.0 - share, *this).plus(share, *next);
+        }
+        let index = self.strokes.partition_point(|(begin, ..)| *begin <= t);
+        let Some((begin, [from, to], stroke)) = index.checked_sub(1).and_then(|index| self.strokes.get(index)) else {
+            return Reference::at(self.start);
+        };
+        if t - begin >= stroke.duration {
+            return Reference::at(*to);
+        }
+        let mut reference = stroke.at(t - begin);
+        reference.position += from;
+        reference
+    }
+
+    /// The position from `t` on as a polynomial Σ c_k (time − t)ᵏ, m, and until when it holds, s.
+    pub fn piece(&self, t: f64) -> ([f64; 5], f64) {
+        if self.shaper.is_empty() {
+            return self.plain_piece(t);
+        }
+        let mut sum = ([0.0; 5], f64::INFINITY);
+        for &[late, part] in &self.shaper {
+            let (coefficients, until) = self.plain_piece(t - late);
+            sum.0.iter_mut().zip(coefficients).for_each(|(sum, c)| *sum += part * c);
+            sum.1 = sum.1.min(until + late);
+        }
+        sum
+    }
+
+    fn plain_piece(&self, t: f64) -> ([f64; 5], f64) {
+        let rest = |position: f64, until: Option<f64>| ([position, 0.0, 0.0, 0.0, 0.0], until.unwrap_or(f64::INFINITY));
+        if let Some((_, last)) = self.samples.last() {
+            let k = self.samples.partition_point(|(time, _)| *time <= t);
+            let Some((after, next)) = self.samples.get(k) else { return rest(last.position, None) };
+            let Some((before, this)) = k.checked_sub(1).map(|k| &self.samples[k]) else {
+                return rest(self.start, Some(*after));
+            };
+            let slope = (next.position - this.position) / (after - before);
+            return ([this.position + slope * (t - before), slope, 0.0, 0.0, 0.0], *after);
+        }
+        let index = self.strokes.partition_point(|(begin, ..)| *begin <= t);
+        let next = self.strokes.get(index).map(|(begin, ..)| *begin);
+        let Some((begin, [from, to], stroke)) = index.checked_sub(1).and_then(|index| self.strokes.get(index)) else {
+            return rest(self.start, next);
+        };
+        if t - begin >= stroke.duration {
+            return rest(*to, next);
+        }
+        let Reference { position, speed, acceleration, jerk, snap } = stroke.at(t - begin);
+        let coefficients = [from + position, speed, acceleration / 2.0, jerk / 6.0, snap / 24.0];
+        (coefficients, begin + stroke.seam(t - begin))
+    }
+
+    /// When the last leg ends, s, a shaper apart.
+    pub fn end(&self) -> f64 {
+        self.end
+    }
+
+    /// When the reference rests for good, s: its end, and behind it what a shaper adds.
+    pub fn rest(&self) -> f64 {
+        self.end + self.shaper.iter().fold(0.0, |late, impulse| f64::max(late, impulse[0]))
+    }
+
+    /// Where it begins, m.
+    pub fn start(&self) -> f64 {
+        self.start
+    }
+
+    /// Where it ends, m.
+    pub fn target(&self) -> f64 {
+        let sampled = self.samples.last().map(|(_, reference)| reference.position);
+        sampled.unwrap_or_else(|| self.strokes.last().map_or(self.start, |(_, [_, to], _)| *to))
+    }
+
+    /// Begin (s), start (m), distance (m) and duration (s) of each stroke.
+    pub fn strokes(&self) -> impl Iterator<Item = (f64, f64, f64, f64)> {
+        self.strokes.iter().map(|(begin, [from, _], stroke)| (*begin, *from, stroke.distance, stroke.duration))
+    }
+}

@@ -1,0 +1,225 @@
+//! From the solvers' coordinates to angles and positions: where a run begins, and what stands still.
+//!
+//! ```text
+//! q_b = q_b0 + (c_b − c_b0 − Σ a_j (q_j − q_j0))/a_b        c_b = Σ a_j q_j, the length that stands in the place of q_b
+//! ```
+
+use super::saved::{Pass, Passed};
+use crate::friction::Motion;
+use crate::mechanism::{BODIES, Layout, Mode, Replaced, State};
+
+/// Parts of the last place by which positions at the start may contradict each other and still mean a belt without
+/// strain.
+const LAST_PLACES: f64 = 4.0;
+
+/// Where a run begins, and the angles of pulleys at rest.
+#[derive(Debug, Clone)]
+pub(crate) struct Coordinates {
+    start: State,
+    /// Where ways are counted from.
+    origin: [f64; BODIES],
+    /// Lengths at the start, by the bodies in whose places they stand.
+    strain: [f64; BODIES],
+    /// Angles of pulleys while they are stuck, rad: they keep every bit while the rest moves.
+    held: [Option<f64>; BODIES],
+}
+
+impl Coordinates {
+    /// Those of a run that begins in `start`, and `start` in them.
+    pub(crate) fn new(layout: &Layout, start: &State) -> (Self, State) {
+        let origin = layout.origin(start);
+        let mut inner = *start;
+        for (position, origin) in inner.position.iter_mut().zip(origin) {
+            *position -= origin;
+        }
+        let mut strain = [0.0; BODIES];
+        for replaced in &layout.replaced {
+            // One rounding; and angles that differ from x/r by the rounding of the numbers given mean no strain.
+            let own = start.position[replaced.body];
+            let (mut others, mut size) = (0.0, (replaced.own * own).abs());
+            for &(other, arm) in &replaced.others {
+                others += arm * start.position[other];
+                size = size.max((arm * start.position[other]).abs());
+            }
+            let length = replaced.own.mul_add(own, others);
+            strain[replaced.body] = if length.abs() <= LAST_PLACES * f64::EPSILON * size { 0.0 } else { length };
+            inner.position[replaced.body] = strain[replaced.body];
+        }
+        (Self { start: *start, origin, strain, held: [None; BODIES] }, inner)
+    }
+
+    /// The same where angles are as in `state`, whatever lengths say.
+    pub(crate) fn at(&self, state: &State) -> Self {
+        Self { held: state.position.map(Some), ..self.clone() }
+    }
+
+    /// As plain numbers.
+    pub(super) fn pass(&mut self, pass: &mut Pass) -> Passed {
+        pass.state(&mut self.start)?;
+        pass.numbers(&mut self.origin)?;
+        pass.numbers(&mut self.strain)?;
+        self.held.iter_mut().try_for_each(|held| pass.optional(held))
+    }
+
+    /// The state in which it begins.
+    pub(super) fn start(&self) -> &State {
+        &self.start
+    }
+
+    /// Where ways are counted from.
+    pub(crate) fn origin(&self) -> &[f64; BODIES] {
+        &self.origin
+    }
+
+    /// The state in angles and positions.
+    #[inline]
+    pub(crate) fn state(&self, layout: &Layout, inner: &State) -> State {
+        let mut state = *inner;
+        for (position, origin) in state.position.iter_mut().zip(&self.origin) {
+            *position += origin;
+        }
+        for replaced in &layout.replaced {
+            let body = replaced.body;
+            let length = inner.position[body];
+            state.position[body] = match self.held[body] {
+                Some(angle) => angle,
+                // What hangs on a pulley is as far as that one is.
+                None if replaced.on_replaced => {
+                    let others: f64 = replaced.others.iter().map(|&(other, arm)| arm * state.position[other]).sum();
+                    (length - others) / replaced.own
+                }
+                None => {
+                    let mut change = length - self.strain[body];
+                    for &(other, arm) in &replaced.others {
+                        change -= arm * inner.position[other];
+                    }
+                    self.start.position[body] + change / replaced.own
+                }
+            };
+        }
+        state
+    }
+
+    /// The way of a body that is not held, as weights of the positions in the solvers' coordinates and a constant.
+    pub(super) fn way(&self, layout: &Layout, body: usize) -> ([f64; BODIES], f64) {
+        let mut weights = [0.0; BODIES];
+        let Some(replaced) = layout.replaced.iter().find(|replaced| replaced.body == body) else {
+            weights[body] = 1.0;
+            return (weights, self.origin[body]);
+        };
+        weights[body] = 1.0 / replaced.own;
+        if replaced.on_replaced {
+            let mut constant = 0.0;
+            for &(other, arm) in &replaced.others {
+                let (theirs, at) = self.way(layout, other);
+                weights.iter_mut().zip(theirs).for_each(|(own, their)| *own -= arm * their / replaced.own);
+                constant -= arm * at / replaced.own;
+            }
+            return (weights, constant);
+        }
+        for &(other, arm) in &replaced.others {
+            weights[other] -= arm / replaced.own;
+        }
+        (weights, self.start.position[body] - self.strain[body] / replaced.own)
+    }
+
+    /// The ways of a body whose place a length takes, row by row: `own` has that length, `others` gives coordinates of
+    /// bodies, and ways of those that are placed already.
+    #[inline(always)]
+    pub(crate) fn place<'v>(&self, replaced: &Replaced, own: &mut [f64], others: impl Fn(usize) -> &'v [f64]) {
+        let body = replaced.body;
+        if let Some(angle) = self.held[body] {
+            own.fill(angle);
+            return;
+        }
+        let begin = if replaced.on_replaced { 0.0 } else { self.strain[body] };
+        let start = if replaced.on_replaced { 0.0 } else { self.start.position[body] };
+        if let [(other, arm)] = replaced.others[..] {
+            let ways = own.iter_mut().zip(others(other));
+            ways.for_each(|(own, way)| *own = start + ((*own - begin) - arm * way) / replaced.own);
+            return;
+        }
+        own.iter_mut().for_each(|length| *length -= begin);
+        for &(other, arm) in &replaced.others {
+            own.iter_mut().zip(others(other)).for_each(|(length, way)| *length -= arm * way);
+        }
+        own.iter_mut().for_each(|change| *change = start + *change / replaced.own);
+    }
+
+    /// Remembers the angles of pulleys that have come to rest in `mode`, and forgets those of pulleys that move.
+    pub(crate) fn hold(&mut self, layout: &Layout, mode: &Mode, inner: &State) {
+        let is_stuck = |body: usize| mode.motion[body] == Motion::Stuck;
+        if layout.replaced.iter().any(|replaced| is_stuck(replaced.body) != self.held[replaced.body].is_some()) {
+            let state = self.state(layout, inner);
+            for replaced in &layout.replaced {
+                let (body, held) = (replaced.body, self.held[replaced.body]);
+                self.held[body] = is_stuck(body).then_some(held.unwrap_or(state.position[body]));
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::machine::axis::{CART, DRIVE, IDLER};
+    use crate::mechanism::{Body, Kind, Label, Mechanism, Spring, SpringLaw};
+
+    /// Two pulleys and a cart on three spans, as the paper's axis.
+    fn mechanism() -> (Mechanism, f64) {
+        let r = 0.0194;
+        let label = Label { key: "part", name: "part" };
+        let body = |index: usize, kind, inertia| Body {
+            label,
+            kind,
+            inertia,
+            friction: Default::default(),
+            force: 0.0,
+            along: None,
+            leader: (index, 1.0),
+            is_rotor: false,
+        };
+        let turns = Kind::Rotary { radius: r };
+        let bodies = vec![body(DRIVE, turns, 6.3e-5), body(CART, Kind::Linear, 0.362), body(IDLER, turns, 3.3e-5)];
+        let arms = [[(DRIVE, r), (CART, -1.0)], [(CART, 1.0), (IDLER, -r)], [(IDLER, r), (DRIVE, -r)]];
+        let spring = |arms: [(usize, f64); 2]| Spring {
+            label,
+            arms: arms.to_vec(),
+            stiffness: 1e5,
+            damping: 0.0,
+            law: SpringLaw::TwoSided,
+            follows: None,
+        };
+        (Mechanism::new(bodies, arms.map(spring).to_vec(), Vec::new()), r)
+    }
+
+    fn at(drive: f64, cart: f64, idler: f64) -> State {
+        let mut state = State::default();
+        state.position[..3].copy_from_slice(&[drive, cart, idler]);
+        state
+    }
+
+    #[test]
+    fn a_start_that_differs_in_the_last_bit_is_no_strain() {
+        let (mechanism, r) = mechanism();
+        let layout = Layout::new(&mechanism);
+        for x in [0.07, 1.0, 1000.0, -350.1] {
+            let angle = f64::from_bits((x / r).to_bits() + 1);
+            let start = at(angle, x, x / r);
+            let (coordinates, inner) = Coordinates::new(&layout, &start);
+            assert_eq!((inner.position[DRIVE], inner.position[IDLER]), (0.0, 0.0), "{x}");
+            // The state is the one that was given, to the last bit.
+            assert_eq!(coordinates.state(&layout, &inner), start);
+        }
+    }
+
+    #[test]
+    fn a_strain_that_is_meant_is_kept_far_from_the_origin() {
+        let (mechanism, r) = mechanism();
+        let layout = Layout::new(&mechanism);
+        let (x, d) = (1000.0, 1e-6);
+        let (_, inner) = Coordinates::new(&layout, &at((x + d) / r, x, x / r));
+        assert!((inner.position[DRIVE] - d).abs() < 1e-12 && inner.position[IDLER] == 0.0, "{inner:?}");
+        assert_eq!(inner.position[CART], 0.0);
+    }
+}

@@ -1,0 +1,230 @@
+//! The error of a run of the general solver, by a second run with another tolerance, other steps and coarser rounding.
+
+use super::exact::Known;
+use super::observe::Output;
+use super::run::{Run, Start};
+use super::{Course, Detail, Ending, Flow, Outcome, PositionError, Solver};
+use crate::error::Result;
+use crate::machine::Machine;
+use crate::mechanism::{Mechanism, Shown};
+use crate::plan::Experiment;
+use crate::signal::Signal;
+use crate::trajectory::Trajectory;
+use std::sync::Arc;
+
+/// Rows that are compared, at most.
+const MOST_ROWS: u64 = 1000;
+
+/// The tolerance of the second run, as a multiple of the first one's.
+const FACTOR: f64 = 100.0;
+
+/// Rows of the second run for each that is compared: not a power of two, so that none of its steps, which are halves and
+/// doubles of its output interval, is as long as one of the first run.
+const ROWS: u64 = 3;
+
+/// The estimate as a multiple of what the two runs differ by, and its least value as a share of the tolerance: where
+/// neither run's steps are limited by the tolerance (corners of a friction curve, of a line along the travel), both are
+/// off by about as much.
+const SAFETY: f64 = 10.0;
+const LEAST: f64 = 0.1;
+
+/// Relative change of the start in the second run: the last digits of a start can decide where a line feeds the motion.
+const OF_START: f64 = 4.0 * f64::EPSILON;
+
+/// Relative changes of speeds by which the second run shows how rounding grows: 64 times what rounding does to them.
+const NOISE: f64 = 64.0 * f64::EPSILON;
+
+/// Where rows go.
+type Sink<'a> = dyn FnMut(&Trajectory) -> Flow + 'a;
+
+/// Keeps some of a run's rows, and compares them with those of a second run.
+///
+/// The error of a step is about in proportion to the tolerance, so the second run, with a hundred times the tolerance, is
+/// off by far more than the first: ten times their difference is an estimate on the safe side, and it is never below a
+/// tenth of the tolerance. Steps and rows of the second run are others, so that no event is located in the same step of
+/// both. Its machine has inertias, forces and force lines that are off by some roundings, and its speeds are changed at
+/// random by 64 times what rounding does to them, so that a motion that magnifies rounding shows by how much. Where the
+/// motion is sensitive to its last digits (flanks that rattle, loads just at a breakaway) both runs differ by what that
+/// makes of them.
+///
+/// The estimate is at least the whole way where a run has located an event whose own condition does not hold there
+/// ([`Outcome::unmet`]), or where the second run ends otherwise.
+///
+/// ```
+/// use taut::case::{Case, TEMPLATE};
+/// use taut::solve::{ErrorEstimate, Flow, Solver, stream};
+/// let case = Case::from_text("axis.toml", TEMPLATE)?;
+/// let (stage, experiment) = (&case.machine, &case.experiments[0]);
+/// let mut estimate = ErrorEstimate::new(stage, experiment);
+/// let outcome = stream(stage, experiment, Solver::GENERAL, &mut |rows| {
+///     estimate.take(rows);
+///     Flow::Continue
+/// })?;
+/// let error = estimate.finish(stage, experiment, 1e-9, &outcome, &mut || Flow::Continue)?.unwrap();
+/// assert!(error.value < 1e-9 && error.way > 0.05);
+/// # Ok::<(), taut::Error>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct ErrorEstimate {
+    /// Columns of the ways that are compared, and what makes lengths at the belt of them.
+    ways: Vec<(String, f64)>,
+    every: f64,
+    until: f64,
+    stride: u64,
+    rows: u64,
+    /// Time of each row kept.
+    times: Vec<f64>,
+    /// Its ways at the belt, one row after the other.
+    kept: Vec<f64>,
+}
+
+impl ErrorEstimate {
+    /// For a run of this experiment on this stage.
+    pub fn new(machine: &Machine, experiment: &Experiment) -> Self {
+        let mechanism = machine.mechanism();
+        Self::of_mechanism(&mechanism, &course(&mechanism, experiment))
+    }
+
+    /// For a run of a mechanism that is no stage of an axis: of every body but the rotors.
+    pub fn of_mechanism(mechanism: &Mechanism, course: &Course) -> Self {
+        let way = |heading: &crate::mechanism::Heading| match heading.shown {
+            Shown::Position(body, 1.0) if heading.lean && !mechanism.bodies[body].is_rotor => {
+                Some((heading.name.to_string(), mechanism.bodies[body].kind.lever()))
+            }
+            _ => None,
+        };
+        let ways = mechanism.columns.iter().filter_map(way).collect();
+        let (every, until) = (course.every, course.until);
+        let intervals = (until / every).clamp(1.0, 1e15) as u64;
+        let stride = intervals.div_ceil(MOST_ROWS).max(1);
+        Self { ways, every, until, stride, rows: 0, times: Vec::new(), kept: Vec::new() }
+    }
+
+    /// Takes the next rows of the run.
+    pub fn take(&mut self, block: &Trajectory) {
+        let columns = columns(&self.ways, block);
+        for (row, &time) in block.get("time").unwrap_or(&[]).iter().enumerate() {
+            if (self.rows + row as u64).is_multiple_of(self.stride) {
+                self.times.push(time);
+                self.kept.extend(columns.iter().map(|way| way.at(row)));
+            }
+        }
+        self.rows += block.len() as u64;
+    }
+
+    /// Runs it again with another tolerance and compares; `flow` is asked now and then whether to go on. None where it
+    /// said no.
+    pub fn finish(
+        self,
+        machine: &Machine,
+        experiment: &Experiment,
+        tolerance: f64,
+        outcome: &Outcome,
+        flow: &mut dyn FnMut() -> Flow,
+    ) -> Result<Option<PositionError>> {
+        let mechanism = machine.mechanism();
+        let course = course(&mechanism, experiment);
+        self.finish_mechanism(&mechanism, &course, tolerance, outcome, flow)
+    }
+
+    /// The same of a run of a mechanism.
+    pub fn finish_mechanism(
+        self,
+        mechanism: &Mechanism,
+        course: &Course,
+        tolerance: f64,
+        outcome: &Outcome,
+        flow: &mut dyn FnMut() -> Flow,
+    ) -> Result<Option<PositionError>> {
+        let every = course.every * self.stride as f64 / ROWS as f64;
+        let mut start = Start { state: course.start, until: course.until, every, noise: NOISE };
+        let state = &mut start.state;
+        let values = state.position.iter_mut().chain(&mut state.speed).chain(&mut state.current);
+        values.for_each(|value| *value *= 1.0 + OF_START);
+        let (solver, degree) = (coarser(tolerance), course.inputs.iter().map(Signal::degree).max().unwrap_or(0));
+        let mechanism = Arc::new(mechanism.nudged());
+        self.compare((outcome, tolerance), flow, &mut |sink| {
+            let output = Output { detail: Detail::Lean, sink, observer: None };
+            Ok(Run::of(&mechanism, &start, (solver, degree), Known::default(), output)?.along(&course.inputs).0)
+        })
+    }
+
+    fn compare(
+        self,
+        (outcome, tolerance): (&Outcome, f64),
+        flow: &mut dyn FnMut() -> Flow,
+        again: &mut dyn FnMut(&mut Sink) -> Result<Outcome>,
+    ) -> Result<Option<PositionError>> {
+        // An early end is compared as far as it came.
+        let until = outcome.ending.time().unwrap_or(self.until);
+        let (mut apart, mut way, mut largest): (f64, f64, f64) = (0.0, 0.0, 0.0);
+        let width = self.ways.len();
+        for row in self.kept.chunks(width.max(1)) {
+            for (value, start) in row.iter().zip(&self.kept) {
+                (way, largest) = (way.max((value - start).abs()), largest.max(value.abs()));
+            }
+        }
+        let (mut row, mut interrupted) = (0, false);
+        let second = again(&mut |block| {
+            let columns = columns(&self.ways, block);
+            for (j, &time) in block.get("time").unwrap_or(&[]).iter().enumerate() {
+                // The last row of the two may be at different times.
+                let near = 1e-9 * self.every;
+                while self.times.get(row).is_some_and(|t| *t < time - near) {
+                    row += 1;
+                }
+                let Some(&t) = self.times.get(row) else { break };
+                if t > time + near || t > until {
+                    continue;
+                }
+                for (first, way) in self.kept[row * width..].iter().zip(&columns) {
+                    let difference = (first - way.at(j)).abs();
+                    apart = if difference.is_nan() { f64::INFINITY } else { apart.max(difference) };
+                }
+            }
+            interrupted |= flow() == Flow::Stop;
+            if interrupted { Flow::Stop } else { Flow::Continue }
+        })?;
+        // What is far from the origin is rounded where it is put out.
+        let mut value = (SAFETY * apart + 2.0 * f64::EPSILON * largest).max(LEAST * tolerance);
+        if outcome.unmet > 0 || second.unmet > 0 || !ends_alike(outcome.ending, second.ending) {
+            value = value.max(way);
+        }
+        Ok((!interrupted).then_some(PositionError { value, way }))
+    }
+}
+
+/// The course of a stage in an experiment.
+fn course(mechanism: &Mechanism, experiment: &Experiment) -> Course {
+    let &Experiment { ref input, until, every, ref initial, .. } = experiment;
+    Course { inputs: vec![input.clone()], start: initial.state(mechanism), until, every }
+}
+
+/// Whether two runs end in the same way; one that was asked to stop says nothing of another.
+fn ends_alike(first: Ending, second: Ending) -> bool {
+    let is_stopped = |ending| matches!(ending, Ending::Interrupted { .. });
+    is_stopped(first) || is_stopped(second) || std::mem::discriminant(&first) == std::mem::discriminant(&second)
+}
+
+/// A column of ways, and its lever.
+struct Way<'a> {
+    values: &'a [f64],
+    lever: f64,
+}
+
+impl Way<'_> {
+    /// At the belt, m; not a number in a row that it does not have.
+    fn at(&self, row: usize) -> f64 {
+        self.values.get(row).map_or(f64::NAN, |value| self.lever * value)
+    }
+}
+
+/// The columns of these ways.
+fn columns<'a>(ways: &[(String, f64)], block: &'a Trajectory) -> Vec<Way<'a>> {
+    ways.iter().map(|(name, lever)| Way { values: block.get(name).unwrap_or(&[]), lever: *lever }).collect()
+}
+
+fn coarser(tolerance: f64) -> Solver {
+    let coarse = if FACTOR * tolerance <= 1e-2 { FACTOR * tolerance } else { tolerance / FACTOR };
+    Solver::General { tolerance: coarse }
+}

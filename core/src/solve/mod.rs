@@ -1,0 +1,507 @@
+//! Runs an experiment on a stage: the choice of solver, the events, how it ended and what it cost.
+
+mod check;
+mod choice;
+mod coordinates;
+mod derivatives;
+mod estimate;
+mod exact;
+mod general;
+mod inputs;
+mod observe;
+mod pace;
+mod propagator;
+mod record;
+mod roots;
+mod rounding;
+mod run;
+mod saved;
+mod sensitivity;
+mod simulator;
+mod table3;
+
+pub use crate::trajectory::Grid;
+pub use choice::{Choice, Kind};
+pub use estimate::ErrorEstimate;
+pub use general::{Dynamics, Quantity};
+use observe::Output;
+pub use observe::{Closer, Curve, Gap, Gaps, Observe, Polynomial, QUANTITIES, Reading, Stretch, TERMS, reading};
+pub use run::{Course, Run};
+pub use sensitivity::{Begun, Differentiated, Sensitivities, Variable};
+pub use simulator::Simulator;
+
+pub use check::machine as check_stage;
+
+use crate::error::{Error, Result};
+use crate::friction::Motion;
+use crate::machine::Machine;
+use crate::mechanism::{Mechanism, Part, Status, What};
+use crate::plan::Experiment;
+use crate::trajectory::Trajectory;
+use std::fmt;
+use std::sync::Arc;
+
+/// How the equations are solved.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Solver {
+    /// Modes and matrix exponentials: exact to rounding.
+    #[default]
+    Exact,
+    /// Collocation with steps by their error between located events: any friction law, spans that follow the cart.
+    General {
+        /// About what positions at the belt are off by, m.
+        tolerance: f64,
+    },
+    /// The paper's Table 3 with a fixed step: a reproduction, not a recommendation.
+    Table3 {
+        /// Step, s; shortened so that steps fill the output interval.
+        step: f64,
+        /// Formula.
+        method: Method,
+    },
+}
+
+impl Solver {
+    /// The general solver with the default tolerance, a nanometre; [`ErrorEstimate`] says how far any run is off.
+    pub const GENERAL: Self = Self::General { tolerance: 1e-9 };
+
+    /// The solver for this stage: the exact one where it can be.
+    pub fn of(machine: &Machine) -> Self {
+        if machine.is_piecewise_linear() { Self::Exact } else { Self::GENERAL }
+    }
+
+    /// The same for a mechanism.
+    pub fn of_mechanism(mechanism: &Mechanism) -> Self {
+        if mechanism.is_piecewise_linear() { Self::Exact } else { Self::GENERAL }
+    }
+}
+
+/// A fixed-step formula.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Method {
+    /// The classical formula of order four (Simulink's ode4).
+    #[default]
+    RungeKutta4,
+    /// Order five (Simulink's ode5).
+    DormandPrince5,
+}
+
+/// A body that starts to slide, stops, or turns back, or another part that begins to do something else.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Event {
+    /// When, s.
+    pub time: f64,
+    /// Which part.
+    pub part: Part,
+    /// The state before.
+    pub from: Status,
+    /// The state after.
+    pub to: Status,
+    /// The force (N) or torque (N m) on a body at that moment, friction apart; 0 for other parts.
+    pub load: f64,
+    /// Whether rounding decided when it happened: a stop of a body whose speed tends to zero and in exact numbers never
+    /// gets there.
+    pub by_rounding: bool,
+}
+
+impl Event {
+    /// The number of the body, if it is one.
+    pub fn body(&self) -> Option<usize> {
+        match self.part.what {
+            What::Body(body) => Some(body),
+            _ => None,
+        }
+    }
+
+    /// Adds it to `events`, unless nothing that shows has changed. A part other than a body that passes through a state
+    /// without staying there goes straight.
+    fn note(mut self, events: &mut Vec<Event>) {
+        // A body that is at once what it was before has done nothing, and one that stops and goes on at once, turned.
+        let at_once = |e: &Event| self.time - e.time <= 4.0 * f64::EPSILON * self.time;
+        let last = events.iter().rposition(|e| e.part == self.part).filter(|&last| at_once(&events[last]));
+        if let Some(last) = last.filter(|&last| self.body().is_some() && events[last].from.code() == self.to.code()) {
+            events.remove(last);
+            return;
+        }
+        if let Some(last) = last.filter(|&last| self.body().is_some() && events[last].to.code() == self.from.code())
+            && events[last].to == Motion::Stuck
+        {
+            self.from = events.remove(last).from;
+        }
+        let passed = |e: &Event| e.part == self.part && e.body().is_none();
+        let now = events.iter().rev().take_while(|e| e.time == self.time);
+        if let Some(back) = now.into_iter().position(passed) {
+            self.from = events.remove(events.len() - 1 - back).from;
+        }
+        if self.from.code() != self.to.code() {
+            events.push(self);
+        }
+    }
+}
+
+/// A decision that lies within rounding: whether a body at rest breaks away whose load is its breakaway, or one that
+/// rounding turns back again and again rests. Numbers that differ in their last bit may have it go on otherwise.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tie {
+    /// When, s.
+    pub time: f64,
+    /// Which body.
+    pub part: Part,
+}
+
+impl Tie {
+    /// Ties that are kept.
+    const MOST: usize = 1000;
+
+    /// Adds it to `ties`, unless the same body lies there since an earlier one.
+    fn note(self, ties: &mut Vec<Tie>, events: &[Event]) {
+        let is_new = match ties.iter().rfind(|tie| tie.part == self.part) {
+            Some(tie) => events.iter().rev().any(|e| e.part == self.part && e.time > tie.time && e.time <= self.time),
+            None => true,
+        };
+        if is_new && ties.len() < Self::MOST {
+            ties.push(self);
+        }
+    }
+}
+
+/// How a run ended.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Ending {
+    /// At the end of the experiment.
+    Complete,
+    /// More events than the bound allows.
+    TooManyEvents {
+        /// Time reached, s.
+        time: f64,
+    },
+    /// The cart left its travel, and nothing stands there to stop it.
+    LeftTravel {
+        /// Time reached, s.
+        time: f64,
+    },
+    /// A state became infinite or not a number; with a fixed step, already one beyond 1e9 m, rad, m/s, rad/s or A.
+    Diverged {
+        /// Time reached, s.
+        time: f64,
+    },
+    /// Something in it changes so fast that at the pace so far it would need more than 1e10 steps.
+    TooStiff {
+        /// Time reached, s.
+        time: f64,
+        /// Steps forecast for the whole run.
+        steps: f64,
+    },
+    /// The receiver of the results asked to stop.
+    Interrupted {
+        /// Time reached, s.
+        time: f64,
+    },
+}
+
+impl Ending {
+    /// The time reached, s, where it was not the end of the experiment.
+    pub fn time(&self) -> Option<f64> {
+        match *self {
+            Ending::Complete => None,
+            Ending::TooManyEvents { time }
+            | Ending::LeftTravel { time }
+            | Ending::Diverged { time }
+            | Ending::TooStiff { time, .. }
+            | Ending::Interrupted { time } => Some(time),
+        }
+    }
+}
+
+impl fmt::Display for Ending {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Ending::Complete => write!(f, "the run is complete"),
+            Ending::TooManyEvents { time } => write!(f, "too many events at {time} s: they accumulate there"),
+            Ending::LeftTravel { time } => write!(f, "the cart left its travel at {time} s"),
+            Ending::Diverged { time } => write!(f, "a state became infinite, or no number, at {time} s"),
+            Ending::TooStiff { time, steps } => write!(
+                f,
+                "too stiff at {time} s: the run would need some {steps:.0e} steps, and {:.0e} are allowed",
+                pace::MOST_STEPS
+            ),
+            Ending::Interrupted { time } => write!(f, "the run was interrupted at {time} s"),
+        }
+    }
+}
+
+/// What [`Simulator::advance`] and [`Dynamics::settle`] end with where they cannot go on.
+impl std::error::Error for Ending {}
+
+/// The cost of a run, in pieces of work rather than seconds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Cost {
+    /// Rows put out.
+    pub samples: u64,
+    /// Pieces of the input.
+    pub pieces: u64,
+    /// Modes for which equations were set up.
+    pub modes: u64,
+    /// Propagator matrices computed.
+    pub propagators: u64,
+    /// Steps taken: products of a propagator and a state, or steps of a fixed-step method.
+    pub steps: u64,
+    /// Intervals looked at for an event.
+    pub looks: u64,
+    /// Taylor series of the state expanded.
+    pub series: u64,
+    /// Evaluations of the equations of motion (all but the exact solver).
+    pub evaluations: u64,
+}
+
+/// Everything about a run but its rows.
+#[derive(Debug, Clone)]
+pub struct Outcome {
+    /// Every stick, slip and reversal, in order.
+    pub events: Vec<Event>,
+    /// Decisions within rounding, as far as the exact solver knows of them; of many the first ones.
+    pub ties: Vec<Tie>,
+    /// How it ended.
+    pub ending: Ending,
+    /// Its cost.
+    pub cost: Cost,
+    /// By how much positions may be off: of the exact solver a bound of what rounding does under the inputs that were
+    /// given, whoever gave them; the general solver's is estimated by [`ErrorEstimate`]. Table 3 with
+    /// a fixed step has none, nor has a run without rows of a machine in which errors can grow.
+    pub error: Option<PositionError>,
+    /// Events of the general solver whose own condition (a speed of zero, a load at its breakaway, a limit at its level)
+    /// does not hold at their time: found too late to be located. A run that has any is not to be relied on.
+    pub unmet: u64,
+}
+
+/// By how much positions at the belt (r φ₁, x, r φ₃) may be off.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PositionError {
+    /// That much, m.
+    pub value: f64,
+    /// How far the axis went at most from where it began, m.
+    pub way: f64,
+}
+
+impl PositionError {
+    /// Up to here a result is called exact, m.
+    pub const EXACT: f64 = 1e-9;
+
+    /// Whether it is small enough for the result to be called exact.
+    pub fn is_exact(self) -> bool {
+        self.value <= Self::EXACT
+    }
+
+    /// Whether it is more than a thousandth of the motion, so that the result is not to be relied on.
+    pub fn hides_motion(self) -> bool {
+        !self.is_exact() && self.value > 1e-3 * self.way
+    }
+
+    /// Whether it is as large as the motion: nothing of it is determined by numbers of 64 bits.
+    pub fn is_undetermined(self) -> bool {
+        self.hides_motion() && self.value >= self.way
+    }
+}
+
+/// A whole run in memory.
+#[derive(Debug, Clone)]
+pub struct Solution {
+    /// The columns of every quantity.
+    pub trajectory: Trajectory,
+    /// Events, ending and cost.
+    pub outcome: Outcome,
+}
+
+/// The answer of the receiver of a block of rows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Flow {
+    /// More.
+    Continue,
+    /// No more.
+    Stop,
+}
+
+/// Which columns a run puts out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Detail {
+    /// All of them.
+    #[default]
+    Full,
+    /// Position, speeds, voltage, current, forces and states, without friction, encoder and what the stage adds.
+    Lean,
+    /// No rows at all: for an observer.
+    None,
+}
+
+/// Runs one experiment after another on one stage after another, and keeps what can be used again: bit for bit what
+/// [`stream`] gives, sooner.
+#[derive(Default)]
+pub struct Bench {
+    mounted: Option<(Machine, Arc<Mechanism>)>,
+    known: exact::Known,
+}
+
+impl Bench {
+    /// Takes up a stage, unless it is there already. Errors: what makes no sense as a machine.
+    pub fn mount(&mut self, machine: &Machine) -> Result<()> {
+        if self.mounted.as_ref().is_some_and(|(mounted, _)| mounted == machine) {
+            return Ok(());
+        }
+        self.known.clear();
+        self.mounted = None;
+        check::machine(machine)?;
+        self.mounted = Some((machine.clone(), Arc::new(machine.mechanism())));
+        Ok(())
+    }
+
+    /// Runs an experiment on it by the solver for that stage.
+    pub fn run(
+        &mut self,
+        experiment: &Experiment,
+        detail: Detail,
+        sink: &mut dyn FnMut(&Trajectory) -> Flow,
+    ) -> Result<Outcome> {
+        self.go(experiment, Output { detail, sink, observer: None })
+    }
+
+    /// The same for an observer alone: no rows are made.
+    pub fn observe(&mut self, experiment: &Experiment, observer: &mut dyn Observe) -> Result<Outcome> {
+        let sink = &mut |_: &Trajectory| Flow::Continue;
+        self.go(experiment, Output { detail: Detail::None, sink, observer: Some(observer) })
+    }
+
+    fn go(&mut self, experiment: &Experiment, output: Output) -> Result<Outcome> {
+        let Some((machine, mechanism)) = &self.mounted else { return Err(nothing_mounted()) };
+        check::experiment(mechanism, experiment)?;
+        let known = std::mem::take(&mut self.known);
+        let (outcome, known) = go(mechanism, experiment, Solver::of(machine), known, output)?;
+        self.known = known;
+        Ok(outcome)
+    }
+}
+
+fn nothing_mounted() -> Error {
+    Error::new("there is no stage to run").next("take one up with Bench::mount")
+}
+
+/// Runs `experiment` on `stage` and keeps everything in memory.
+///
+/// ```
+/// use taut::case::{Case, TEMPLATE};
+/// use taut::solve::{Ending, Solver, simulate};
+/// let case = Case::from_text("axis.toml", TEMPLATE)?;
+/// let solution = simulate(&case.machine, &case.experiments[0], Solver::Exact)?;
+/// assert_eq!(solution.outcome.ending, Ending::Complete);
+/// let positions = solution.trajectory.get("cart_position").unwrap();
+/// assert_eq!(positions.len() as u64, case.experiments[0].samples());
+/// # Ok::<(), taut::Error>(())
+/// ```
+pub fn simulate(machine: &Machine, experiment: &Experiment, solver: Solver) -> Result<Solution> {
+    // What does not fit at once is asked for as it comes.
+    let rows = Grid::new(experiment.every, experiment.until).intervals().min(1 << 20) as usize + 1;
+    let mut trajectory = Trajectory::default();
+    let outcome = stream(machine, experiment, solver, &mut |block| {
+        if trajectory.is_empty() {
+            trajectory = Trajectory::with_capacity(&block.columns, rows);
+        }
+        trajectory.append(block);
+        Flow::Continue
+    })?;
+    Ok(Solution { trajectory, outcome })
+}
+
+/// Runs `experiment` on `stage` and hands its rows to `sink` in blocks, so that memory stays bounded however long it
+/// is.
+///
+/// ```
+/// use taut::case::{Case, TEMPLATE};
+/// use taut::solve::{Ending, Flow, Solver, stream};
+/// let case = Case::from_text("axis.toml", TEMPLATE)?;
+/// // How far does the cart get?
+/// let mut farthest: f64 = 0.0;
+/// let outcome = stream(&case.machine, &case.experiments[0], Solver::Exact, &mut |rows| {
+///     for &x in rows.get("cart_position").unwrap() {
+///         farthest = farthest.max(x);
+///     }
+///     Flow::Continue
+/// })?;
+/// assert!(farthest > 0.05 && outcome.ending == Ending::Complete);
+/// # Ok::<(), taut::Error>(())
+/// ```
+pub fn stream(
+    machine: &Machine,
+    experiment: &Experiment,
+    solver: Solver,
+    sink: &mut dyn FnMut(&Trajectory) -> Flow,
+) -> Result<Outcome> {
+    run(machine, experiment, solver, Output { detail: Detail::Full, sink, observer: None })
+}
+
+/// The same, with an observer that sees what is between the rows, too: a [`crate::metrics::Meter`], or one's own.
+///
+/// ```
+/// use taut::case::{Case, TEMPLATE};
+/// use taut::metrics::Meter;
+/// use taut::solve::{Flow, Solver, stream_observed};
+/// let case = Case::from_text("axis.toml", TEMPLATE)?;
+/// let experiment = &case.experiments[0];
+/// let mut meter = Meter::new(&case.machine, experiment);
+/// let outcome = stream_observed(&case.machine, experiment, Solver::Exact, &mut meter, &mut |_| Flow::Continue)?;
+/// assert!(meter.finish(&outcome.events).peak_current.value > 1.0);
+/// # Ok::<(), taut::Error>(())
+/// ```
+pub fn stream_observed(
+    machine: &Machine,
+    experiment: &Experiment,
+    solver: Solver,
+    observer: &mut dyn Observe,
+    sink: &mut dyn FnMut(&Trajectory) -> Flow,
+) -> Result<Outcome> {
+    run(machine, experiment, solver, Output { detail: Detail::Full, sink, observer: Some(observer) })
+}
+
+fn run(machine: &Machine, experiment: &Experiment, solver: Solver, output: Output) -> Result<Outcome> {
+    check::machine(machine)?;
+    let mechanism = Arc::new(machine.mechanism());
+    check::experiment(&mechanism, experiment)?;
+    if let Solver::Table3 { step, method } = solver {
+        check::piecewise_linear(&mechanism)?;
+        return table3::run(machine, &mechanism, experiment, step, method, output);
+    }
+    Ok(go(&mechanism, experiment, solver, exact::Known::default(), output)?.0)
+}
+
+/// Runs a mechanism along its inputs, and hands rows to `sink` and all that is between them to `observer`: what
+/// [`stream_observed`] does, for a machine that is no axis.
+pub fn stream_mechanism(
+    mechanism: &Mechanism,
+    course: &Course,
+    solver: Solver,
+    (detail, observer): (Detail, Option<&mut dyn Observe>),
+    sink: &mut dyn FnMut(&Trajectory) -> Flow,
+) -> Result<Outcome> {
+    let observer = observer.map(|observer| -> &mut dyn Observe { observer });
+    let run = Run::of_mechanism(mechanism, course, solver, (detail, observer), sink)?;
+    Ok(run.along(&course.inputs).0)
+}
+
+/// Runs an experiment that was checked along its own input.
+fn go(
+    mechanism: &Arc<Mechanism>,
+    experiment: &Experiment,
+    solver: Solver,
+    known: exact::Known,
+    output: Output,
+) -> Result<(Outcome, exact::Known)> {
+    // Smooth inputs carry their derivatives along.
+    let degree = experiment.input.degree();
+    let start = experiment.start(mechanism);
+    let run = Run::of(mechanism, &start, (solver, degree), known, output)?;
+    Ok(run.along(std::slice::from_ref(&experiment.input)))
+}
+
+impl Experiment {
+    fn start(&self, mechanism: &Mechanism) -> run::Start {
+        run::Start { state: self.initial.state(mechanism), until: self.until, every: self.every, noise: 0.0 }
+    }
+}

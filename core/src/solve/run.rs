@@ -1,0 +1,233 @@
+//! Runs: a machine and a recorder, stepped by whoever decides its inputs.
+
+use super::exact::{self, Known, Make};
+use super::inputs::Pieces;
+use super::observe::{Observe, Output};
+use super::{Detail, Flow, Outcome, Solver, check, general};
+use crate::error::{Error, Result};
+use crate::machine::Machine;
+use crate::mechanism::{Mechanism, State};
+use crate::plan::{Experiment, GantryExperiment};
+use crate::signal::Signal;
+use crate::trajectory::Trajectory;
+use std::sync::Arc;
+
+/// Where a run begins, when it ends, and when there are rows.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Start {
+    pub(super) state: State,
+    pub(super) until: f64,
+    pub(super) every: f64,
+    /// Relative changes of speeds after each step of the general solver, at random; zero in any run but the second one
+    /// of an [`super::ErrorEstimate`].
+    pub(super) noise: f64,
+}
+
+/// The course of one run of a mechanism.
+#[derive(Debug, Clone)]
+pub struct Course {
+    /// The input of each drive's amplifier.
+    pub inputs: Vec<Signal>,
+    /// The state at time zero.
+    pub start: State,
+    /// End of the run, s.
+    pub until: f64,
+    /// Output interval, s.
+    pub every: f64,
+}
+
+impl Course {
+    /// The course of a gantry in this experiment.
+    pub fn of(experiment: &GantryExperiment) -> Self {
+        let &GantryExperiment { ref inputs, until, every, initial, .. } = experiment;
+        Self { inputs: inputs.to_vec(), start: initial, until, every }
+    }
+}
+
+/// A run of one of the solvers.
+pub(super) trait Running {
+    /// Takes up new inputs, now.
+    fn set_input(&mut self, pieces: &Pieces);
+
+    /// Takes up what these signals do from `time`, which is now, on, and says until when that is.
+    fn set_signals(&mut self, signals: &[Signal], time: f64) -> f64 {
+        let pieces = Pieces::of(signals, time);
+        self.set_input(&pieces);
+        pieces.end
+    }
+
+    /// Goes on to `until`, or to the end of the run; false if it ends before.
+    fn advance(&mut self, until: f64) -> bool;
+
+    fn state(&self) -> State;
+
+    fn current(&self, drive: usize) -> f64;
+
+    /// Ends the run where it stands: at its end, where the last row is put out, or before.
+    fn finish(&mut self, is_at_end: bool) -> Outcome;
+
+    /// The modes that it has made ready.
+    fn known(&mut self) -> Known {
+        Known::default()
+    }
+}
+
+/// Makes a run of the exact solver.
+struct OfExact<'m, 'a> {
+    mechanism: &'m Arc<Mechanism>,
+    space: exact::Space,
+    start: &'m Start,
+    known: Known,
+    output: Output<'a>,
+}
+
+impl<'a> Make for OfExact<'_, 'a> {
+    type Made = Box<dyn Running + 'a>;
+
+    fn make<const N: usize>(self) -> Self::Made {
+        let Self { mechanism, space, start, known, output } = self;
+        Box::new(exact::Run::<N>::new(mechanism, space, start, known, output))
+    }
+}
+
+/// A run whose inputs are set from outside: a sampled controller's, or those of anything else that answers the motion.
+///
+/// ```
+/// use taut::case::{Case, TEMPLATE};
+/// use taut::solve::{Detail, Ending, Flow, Run, Solver};
+/// use taut::machine::axis::CART;
+///
+/// // Full voltage until the cart has gone far enough, looked at every millisecond.
+/// let case = Case::from_text("axis.toml", TEMPLATE)?;
+/// let experiment = &case.experiments[0];
+/// let mut last = 0.0;
+/// let mut sink = |rows: &taut::trajectory::Trajectory| {
+///     last = rows.get("cart_position").unwrap().last().copied().unwrap();
+///     Flow::Continue
+/// };
+/// let mut run = Run::new(&case.machine, experiment, Solver::Exact, Detail::Full, None, &mut sink)?;
+/// for k in 1..=1000 {
+///     let voltage = if run.state().position[CART] < 0.05 { 10.0 } else { 0.0 };
+///     if !run.hold(&[voltage], 1e-3 * f64::from(k)) {
+///         break;
+///     }
+/// }
+/// let outcome = run.finish();
+/// assert!(outcome.ending == Ending::Complete && last > 0.05 && last < 0.08);
+/// # Ok::<(), taut::Error>(())
+/// ```
+pub struct Run<'a> {
+    running: Box<dyn Running + 'a>,
+    /// Where it stands, s, and where it is to end.
+    time: f64,
+    end: f64,
+}
+
+impl<'a> Run<'a> {
+    /// A run of `experiment` on `stage`; the experiment's own input counts for nothing. Rows go to `sink` in blocks,
+    /// all that is between them to `observer`. Not for the paper's Table 3.
+    pub fn new(
+        machine: &Machine,
+        experiment: &Experiment,
+        solver: Solver,
+        detail: Detail,
+        observer: Option<&'a mut dyn Observe>,
+        sink: &'a mut dyn FnMut(&Trajectory) -> Flow,
+    ) -> Result<Self> {
+        check::machine(machine)?;
+        let mechanism = Arc::new(machine.mechanism());
+        check::experiment(&mechanism, experiment)?;
+        let start = experiment.start(&mechanism);
+        Self::of(&mechanism, &start, (solver, 0), Known::default(), Output { detail, sink, observer })
+    }
+
+    /// The same of a mechanism that was checked, with inputs of at most this degree.
+    pub(super) fn of(
+        mechanism: &Arc<Mechanism>,
+        start: &Start,
+        (solver, degree): (Solver, usize),
+        known: Known,
+        output: Output<'a>,
+    ) -> Result<Self> {
+        let end = start.until;
+        let running: Box<dyn Running + 'a> = match solver {
+            Solver::Exact => {
+                check::piecewise_linear(mechanism)?;
+                let space = exact::Space::new(mechanism, degree);
+                exact::in_kernel(space.size(), OfExact { mechanism, space, start, known, output: output.within() })
+            }
+            Solver::General { tolerance } => {
+                let fastest = check::fastest_rate(mechanism);
+                general::check(fastest, start.until, tolerance)?;
+                Box::new(general::Run::new(mechanism, start, (tolerance, fastest), output.within()))
+            }
+            Solver::Table3 { .. } => {
+                return Err(Error::new("the paper's Table 3 has a fixed step and no sampled input")
+                    .next("take the exact solver, or the general one"));
+            }
+        };
+        Ok(Self { running, time: 0.0, end })
+    }
+
+    /// A run of a mechanism that is no stage of an axis. Errors: what the solver does not take.
+    pub fn of_mechanism(
+        mechanism: &Mechanism,
+        course: &Course,
+        solver: Solver,
+        (detail, observer): (Detail, Option<&'a mut dyn Observe>),
+        sink: &'a mut dyn FnMut(&Trajectory) -> Flow,
+    ) -> Result<Self> {
+        check::course(mechanism, course)?;
+        let start = Start { state: course.start, until: course.until, every: course.every, noise: 0.0 };
+        let degree = course.inputs.iter().map(Signal::degree).max().unwrap_or(0);
+        let output = Output { detail, sink, observer };
+        Self::of(&Arc::new(mechanism.clone()), &start, (solver, degree), Known::default(), output)
+    }
+
+    /// Holds these inputs, one for each drive, from now until `until`, s, or to the end of the run; false if something
+    /// ended it before.
+    pub fn hold(&mut self, inputs: &[f64], until: f64) -> bool {
+        self.running.set_input(&Pieces::held(inputs, self.time, until));
+        self.advance(until)
+    }
+
+    /// Goes on to `until`, s, or to the end of the run; false if something ended it before.
+    fn advance(&mut self, until: f64) -> bool {
+        let goes_on = self.time >= self.end || self.running.advance(until);
+        if goes_on {
+            self.time = self.time.max(until.min(self.end));
+        }
+        goes_on
+    }
+
+    /// Where it stands, s.
+    pub fn time(&self) -> f64 {
+        self.time
+    }
+
+    /// The state now, in angles and positions.
+    pub fn state(&self) -> State {
+        self.running.state()
+    }
+
+    /// The current of a drive's motor now, A.
+    pub fn current(&self, drive: usize) -> f64 {
+        self.running.current(drive)
+    }
+
+    /// Ends the run where it stands: complete, with its last row, if it has come to its end, and interrupted before.
+    pub fn finish(mut self) -> Outcome {
+        self.running.finish(self.time >= self.end)
+    }
+
+    /// Runs to the end along these signals.
+    pub(super) fn along(mut self, signals: &[Signal]) -> (Outcome, Known) {
+        loop {
+            let until = self.running.set_signals(signals, self.time);
+            if self.time >= self.end || !self.advance(until) {
+                break;
+            }
+        }
+        (self.running.finish(self.time >= self.end), self.running.known())
+    }
+}

@@ -1,0 +1,172 @@
+//! The controller in C: its program written out.
+
+use super::{Writer, plain};
+use crate::controller::{DERIVATIVES, program};
+use crate::design::Design;
+use crate::error::Result;
+use crate::machine::Machine;
+use crate::program::{Expr, Node, Operator, Program, Statement, Test};
+use crate::shaper_remark;
+use std::fmt::Write;
+
+const HEADER: &str = include_str!("controller.h");
+const SOURCE: &str = include_str!("controller.c");
+
+/// A controller as its header and its source.
+pub(super) struct Controller {
+    design: Design,
+    program: Program,
+    unit: &'static str,
+}
+
+impl Controller {
+    pub(super) fn new(design: &Design, machine: &Machine) -> Result<Self> {
+        let unit = machine.drives[0].amplifier.mode.unit();
+        Ok(Self { design: design.clone(), program: program(design, machine)?, unit })
+    }
+
+    pub(super) fn facts(&self) -> Vec<(String, String)> {
+        vec![
+            ("controller".into(), self.design.structure.name().into()),
+            ("sample time".into(), format!("{:?} s", self.design.every)),
+            ("delay of its command".into(), format!("{:?} s", self.design.delay)),
+            ("numbers that it keeps".into(), self.program.states.len().to_string()),
+        ]
+    }
+
+    pub(super) fn header(&self, writer: &Writer) -> String {
+        let fields = DERIVATIVES.map(|(name, unit)| format!("    @name@_real {name}; /* {unit} */"));
+        let lead = self.design.feed_forward.lead.unwrap_or(self.design.delay + 0.5 * self.design.every);
+        let shaper: String = shaper_remark(&self.design).iter().map(|line| format!(" * {line}\n")).collect();
+        let text = HEADER.replace("@fields@", &fields.join("\n")).replace("@shaper@", &shaper);
+        writer.fill(
+            &text,
+            &[
+                ("@structure@", &plain(self.design.structure.name())),
+                ("@every@", &writer.number(self.design.every)),
+                ("@delay@", &writer.number(self.design.delay)),
+                ("@lead@", &writer.number(lead)),
+                ("@unit@", self.unit),
+            ],
+        )
+    }
+
+    pub(super) fn source(&self, writer: &Writer) -> String {
+        let program = &self.program;
+        let read = program.read_inputs();
+        let mut fields = String::new();
+        for state in &program.states {
+            let _ = writeln!(fields, "    @name@_real {}; /* {} */", state.name, plain(&state.about));
+        }
+        let resets: Vec<String> = program
+            .states
+            .iter()
+            .map(|state| format!("    control.{} = {};", state.name, writer.number(state.start)))
+            .collect();
+        let mut body = String::new();
+        for input in program.inputs.iter().filter(|input| read.contains(&input.name)) {
+            let from = match input.name.split_once('_') {
+                Some((of @ ("now" | "ahead"), part)) => format!("{of}->{part}"),
+                _ => continue,
+            };
+            let _ = writeln!(body, "    const @name@_real {} = {from};", input.name);
+        }
+        for local in &program.locals {
+            let _ = writeln!(body, "    @name@_real {local};");
+        }
+        for of in ["now", "ahead"] {
+            let begins = format!("{of}_");
+            if !read.iter().any(|name| name.starts_with(&begins)) {
+                let _ = writeln!(body, "    (void){of};");
+            }
+        }
+        for input in ["measured", "current"] {
+            if !read.contains(input) {
+                let _ = writeln!(body, "    (void){input};");
+            }
+        }
+        let printer = Printer { writer, program };
+        printer.block(&program.body, 1, &mut body);
+        let (fields, resets) = match program.states.is_empty() {
+            true => ("    @name@_real nothing;\n".to_string(), vec!["    control.nothing = R(0.0);".to_string()]),
+            false => (fields, resets),
+        };
+        let text = SOURCE
+            .replace("@fields@", fields.trim_end())
+            .replace("@resets@", &resets.join("\n"))
+            .replace("@body@", body.trim_end())
+            .replace("@result@", &program.result);
+        writer.fill(&text, &[])
+    }
+}
+
+/// Writes statements.
+struct Printer<'p> {
+    writer: &'p Writer,
+    program: &'p Program,
+}
+
+impl Printer<'_> {
+    fn block(&self, body: &[Statement], depth: usize, text: &mut String) {
+        let indent = "    ".repeat(depth);
+        for statement in body {
+            let _ = match statement {
+                Statement::Remark(remark) => writeln!(text, "{indent}/* {} */", plain(remark)),
+                Statement::Set(name, value) => {
+                    writeln!(text, "{indent}{} = {};", self.place(name), self.whole(value))
+                }
+                Statement::If(Test(relation, a, b), yes, no) => {
+                    let test = format!("{} {} {}", self.term(a), relation.sign(), self.term(b));
+                    match yes.is_empty() {
+                        true => {
+                            let _ = writeln!(text, "{indent}if (!({test})) {{");
+                            self.block(no, depth + 1, text);
+                        }
+                        false => {
+                            let _ = writeln!(text, "{indent}if ({test}) {{");
+                            self.block(yes, depth + 1, text);
+                            if !no.is_empty() {
+                                let _ = writeln!(text, "{indent}}} else {{");
+                                self.block(no, depth + 1, text);
+                            }
+                        }
+                    }
+                    writeln!(text, "{indent}}}")
+                }
+            };
+        }
+    }
+
+    fn place(&self, name: &str) -> String {
+        match self.program.states.iter().any(|state| state.name == name) {
+            true => format!("control.{name}"),
+            false => name.to_string(),
+        }
+    }
+
+    /// An expression that stands by itself.
+    fn whole(&self, value: &Expr) -> String {
+        let text = self.term(value);
+        match value.node() {
+            Node::Two(..) => text[1..text.len() - 1].to_string(),
+            _ => text,
+        }
+    }
+
+    /// An expression as a part of another: every operation in parentheses, so that the order is the one meant.
+    fn term(&self, value: &Expr) -> String {
+        match value.node() {
+            Node::Number(value) if *value < 0.0 => format!("({})", self.writer.number(*value)),
+            Node::Number(value) => self.writer.number(*value),
+            Node::Variable(name) => self.place(name),
+            Node::Minus(a) => format!("(-{})", self.term(a)),
+            Node::Whole(a) => format!("(@name@_real)(int32_t){}", self.term(a)),
+            Node::Two(operator, a, b) => {
+                let sign = match operator {
+                    Operator::Plus | Operator::Minus | Operator::Times | Operator::Over => operator.sign(),
+                };
+                format!("({} {sign} {})", self.term(a), self.term(b))
+            }
+        }
+    }
+}

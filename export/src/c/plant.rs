@@ -1,0 +1,473 @@
+//! The plant in C: its tables, and the solver around them.
+
+use super::{Writer, number, plain};
+use crate::error::{Error, Result};
+use crate::friction::Motion;
+use crate::mechanism::AmplifierMode;
+use crate::tables::{Element, ElementKind, Row, Tables, Then};
+use crate::{Does, Real};
+use std::collections::HashMap;
+use std::fmt::Write;
+
+/// Events that a step may have before it is given up.
+const EVENTS: usize = 16;
+
+/// Largest ‖A‖ d of a series, and its order: what is left out is less than 3e-17 of the leading term, or 1e-9 of it in
+/// single precision.
+const DOUBLE: [(f64, usize); 4] = [(0.25, 12), (0.55, 15), (1.15, 19), (2.0, 23)];
+const FLOAT: [(f64, usize); 4] = [(0.25, 7), (0.55, 9), (1.15, 12), (2.0, 16)];
+
+/// Series that the step of a plant may be made of.
+const MOST_SERIES: f64 = 1000.0;
+
+/// Turns of Newton's method for a root, after which bisections follow.
+const NEWTON: usize = 8;
+
+/// Halvings that all series of a step may have.
+const HALVINGS_OF_STEP: usize = 64;
+
+/// The type of its numbers, before the name is filled in.
+const REAL: &str = "@name@_real";
+
+const HEADER: &str = include_str!("plant.h");
+const SOURCE: &str = include_str!("plant.c");
+
+/// A plant with its step.
+pub(super) struct Plant<'t> {
+    tables: &'t Tables,
+    step: f64,
+    real: Real,
+    /// Series of a step without an event, and their order.
+    parts: usize,
+    order: usize,
+}
+
+/// Products and quotients; sums and differences.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Work(usize, usize);
+
+impl std::ops::Add for Work {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self(self.0 + other.0, self.1 + other.1)
+    }
+}
+
+impl std::ops::Mul<usize> for Work {
+    type Output = Self;
+
+    fn mul(self, times: usize) -> Self {
+        Self(self.0 * times, self.1 * times)
+    }
+}
+
+/// The rows of weights of all tables, each once.
+#[derive(Default)]
+struct Pool {
+    weights: Vec<Vec<f64>>,
+    places: HashMap<Vec<u64>, usize>,
+    /// For each table, where its entries begin, and what it depends on.
+    first: Vec<usize>,
+    depends: Vec<Vec<usize>>,
+    entries: Vec<usize>,
+}
+
+impl Pool {
+    /// Adds a table and returns its number.
+    fn add(&mut self, row: &Row) -> usize {
+        self.first.push(self.entries.len());
+        self.depends.push(row.depends.clone());
+        for weights in &row.weights {
+            let bits = weights.iter().map(|w| (w + 0.0).to_bits()).collect();
+            let place = *self.places.entry(bits).or_insert_with(|| {
+                self.weights.push(weights.clone());
+                self.weights.len() - 1
+            });
+            self.entries.push(place);
+        }
+        self.first.len() - 1
+    }
+}
+
+impl<'t> Plant<'t> {
+    /// Errors: a step that takes too many series.
+    pub(super) fn new(tables: &'t Tables, step: f64, real: Real) -> Result<Self> {
+        let orders = match real {
+            Real::Float => FLOAT,
+            Real::Double => DOUBLE,
+        };
+        let parts = (tables.fastest * step / 2.0).ceil().max(1.0);
+        if parts > MOST_SERIES || !(step > 0.0 && step.is_finite()) {
+            // Rounded to six digits, and still short enough.
+            let fits = crate::quantity::rounded((1.0 - 1e-5) * Self::longest_step(tables));
+            return Err(Error::new(format!("a step of {step:?} s takes {parts} series of this machine"))
+                .in_file("--step")
+                .allowed(format!("steps of up to {fits} s"))
+                .next("name a shorter --step"));
+        }
+        let reach = tables.fastest * step / parts;
+        let order = orders.iter().find(|(most, _)| reach <= *most).map_or(orders[3].1, |(_, order)| *order);
+        Ok(Self { tables, step, real, parts: parts as usize, order })
+    }
+
+    /// The longest step that it can have, s.
+    pub(super) fn longest_step(tables: &Tables) -> f64 {
+        MOST_SERIES * 2.0 / tables.fastest
+    }
+
+    fn number(&self, value: f64) -> String {
+        number(self.real, value)
+    }
+
+    /// Most series of a step: those of a step without an event, and two more for each event.
+    fn series(&self) -> usize {
+        self.parts + 2 * EVENTS
+    }
+
+    /// Bits of a number's mantissa.
+    fn bits(&self) -> usize {
+        match self.real {
+            Real::Float => 24,
+            Real::Double => 53,
+        }
+    }
+
+    /// Conditions that are watched at once, at most.
+    fn active(&self) -> usize {
+        let guards = &self.tables.guards;
+        let of = |place: Option<(usize, usize)>| guards.iter().filter(|guard| guard.of == place).count();
+        let element = |(index, element): (usize, &Element)| {
+            (0..element.states.len()).map(|state| of(Some((index, state)))).max().unwrap_or(0)
+        };
+        of(None) + self.tables.elements.iter().enumerate().map(element).sum::<usize>()
+    }
+
+    /// Products and quotients, and sums and differences, of one step at most, from the bounds of the loops in `plant.c`.
+    fn work(&self) -> Work {
+        let (n, z, o, g) = (self.tables.rates.len(), self.tables.size(), self.order, self.active());
+        let gears = self.tables.resting_torque.iter().flatten().count();
+        let events = EVENTS;
+        let (series, terms) = (self.series(), o + 1);
+        // A row's value, and its rounding.
+        let value = Work(z, z);
+        let noise = Work(z + 1, z);
+        let look = (value + noise + Work(1, 1)) * g;
+        let expand = Work(o + n * (z + 1) + (o - 1) * n * (n + 1), n * z + (o - 1) * n * n);
+        let sizes = Work(o * (1 + n * (z + 1)), o * n * z);
+        let along = Work(z + o * n + 2 * terms, z + o * n);
+        let first_term = Work(terms * (z + 2), terms * z);
+        let hull = Work(4 * terms, 2 * terms + terms * terms);
+        let fall = along + hull;
+        let root = Work(1, 1) + Work(2 * terms + 3, 2 * terms + 3) * (NEWTON + self.bits());
+        let add = Work(n * o, n * (o + 4));
+        // Of each series: twice along each guard, and once more where it begins at zero.
+        let advance = look + expand + sizes + (fall * 2 + along + first_term + Work(1, 0)) * g + add + Work(5, 4);
+        // A series in which a guard falls ends with an event, or with the one that is too many.
+        let roots = root * (g * (events + 1));
+        let halvings = (fall + Work(1, 0)) * HALVINGS_OF_STEP;
+        let resting = value * gears;
+        let of_body = (resting + value + noise) * 3 + Work(3, 3);
+        let of_element = (value + noise + Work(2, 1)) * g;
+        let change = value + noise + Work(1, 0) + of_body + of_element;
+        let fallen = look + expand + sizes + (along + first_term) * g;
+        // Settled at the input and after each event: a turn for each event, one at the edge, and the last of each time.
+        let settle =
+            fallen * (2 * events + 3) + (noise + Work(1, 0)) * g + (value + noise + Work(1, 0)) * (g * (events + 1));
+        advance * series + roots + halvings + change * (events + 1) + settle + Work(0, n + z)
+    }
+
+    pub(super) fn facts(&self) -> Vec<(String, String)> {
+        let (series, Work(products, sums)) = (self.series(), self.work());
+        vec![
+            ("step".into(), format!("{:?} s", self.step)),
+            ("states".into(), self.tables.rates.len().to_string()),
+            ("modes".into(), self.tables.modes().to_string()),
+            ("rows of equations".into(), self.tables.rows().to_string()),
+            ("order of a Taylor series".into(), self.order.to_string()),
+            ("series in a step without an event".into(), self.parts.to_string()),
+            ("series in a step at most".into(), series.to_string()),
+            ("products and quotients in a step at most".into(), products.to_string()),
+            ("sums and differences in a step at most".into(), sums.to_string()),
+        ]
+    }
+
+    pub(super) fn header(&self, writer: &Writer, title: &str) -> String {
+        let mechanism = &self.tables.mechanism;
+        let name = writer.name.to_uppercase();
+        let mut numbers = String::new();
+        let mut list = |what: &str, keys: Vec<&str>| {
+            let _ = writeln!(numbers, "#define {name}_{what} {}U", keys.len().max(1));
+            for (index, key) in keys.iter().enumerate() {
+                let key = super::identifier(key).to_uppercase();
+                let _ = writeln!(
+                    numbers,
+                    "#define {name}_{}_{key} {index}U",
+                    what.trim_end_matches("IES").trim_end_matches('S')
+                );
+            }
+        };
+        list("BODIES", mechanism.bodies.iter().map(|body| body.label.key).collect());
+        list("DRIVES", mechanism.drives.iter().map(|drive| drive.label.key).collect());
+        list("SPRINGS", mechanism.springs.iter().map(|spring| spring.label.key).collect());
+        let numbers = numbers.replace("_BOD_", "_BODY_");
+        let Work(products, sums) = self.work();
+        writer.fill(
+            HEADER,
+            &[
+                ("@title@", &plain(title)),
+                ("@numbers@", numbers.trim_end()),
+                ("@events@", &EVENTS.to_string()),
+                ("@series@", &self.series().to_string()),
+                ("@products@", &products.to_string()),
+                ("@sums@", &sums.to_string()),
+                ("@step@", &self.number(self.step)),
+            ],
+        )
+    }
+
+    pub(super) fn source(&self, writer: &Writer) -> String {
+        let limits = [("@halvings@", &*HALVINGS_OF_STEP.to_string()), ("@newton@", &*NEWTON.to_string())];
+        writer.fill(&SOURCE.replace("@tables@", self.tables().trim_end()), &limits)
+    }
+
+    /// All tables.
+    fn tables(&self) -> String {
+        let tables = self.tables;
+        let mut pool = Pool::default();
+        tables.rates.iter().for_each(|row| {
+            pool.add(row);
+        });
+        let guards: Vec<usize> = tables.guards.iter().map(|guard| pool.add(&guard.row)).collect();
+        let currents = pool.first.len();
+        tables.currents.iter().for_each(|row| {
+            pool.add(row);
+        });
+        let voltages = pool.first.len();
+        tables.voltages.iter().for_each(|row| {
+            pool.add(row);
+        });
+        let forces = pool.first.len();
+        let none = Row { depends: Vec::new(), weights: vec![vec![0.0; tables.size()]], forms: Vec::new() };
+        match tables.forces.is_empty() {
+            true => {
+                pool.add(&none);
+            }
+            false => tables.forces.iter().for_each(|row| {
+                pool.add(row);
+            }),
+        }
+        let resting: Vec<usize> =
+            tables.resting_torque.iter().map(|row| row.as_ref().map_or(0, |row| pool.add(row))).collect();
+        let others = pool.first.len();
+        tables.others.iter().for_each(|row| {
+            pool.add(row);
+        });
+
+        let mut text = String::new();
+        let mut define = |word: &str, value: String| {
+            let _ = writeln!(text, "#define {word} {value}");
+        };
+        define("STATES", format!("{}U", tables.rates.len()));
+        define("SIZE", format!("{}U", tables.size()));
+        define("ORDER", format!("{}U", self.order));
+        define("ROOM_ELEMENTS", format!("{}U", tables.elements.len() + 1));
+        define("ROOM_GUARDS", format!("{}U", tables.guards.len() + 1));
+        define("ROOM_SLOTS", format!("{}U", tables.slots + 1));
+        define("CURRENT_TABLE", format!("{currents}U"));
+        define("VOLTAGE_TABLE", format!("{voltages}U"));
+        define("FORCE_TABLE", format!("{forces}U"));
+        if !tables.others.is_empty() {
+            define("OTHER_TABLE", format!("{others}U"));
+        }
+        let (epsilon, rounding) = match self.real {
+            Real::Float => (f64::from(f32::EPSILON), 2.7e-6),
+            Real::Double => (f64::EPSILON, crate::mechanism::ROUNDING),
+        };
+        let reach = self.step / self.parts as f64;
+        define("EPSILON", self.number(epsilon));
+        define("ROUNDING", self.number(rounding));
+        define("BITS", format!("{}U", self.bits()));
+        define("REACH", self.number(reach));
+        define("SOON", self.number(1e-6 * 0.125 * reach));
+        define("MOMENT", self.number(1e-12 * 0.125 * reach));
+        let _ = writeln!(text);
+        let layout = &tables.layout;
+        for (word, count) in [
+            ("ELEMENTS", tables.elements.len()),
+            ("GUARDS", tables.guards.len()),
+            ("SLOTS", tables.slots),
+            ("REPLACED", layout.replaced.len()),
+        ] {
+            let _ = writeln!(text, "static const uint32_t {word} = {count}U;");
+        }
+        let _ = writeln!(text, "\n/* 1/k */");
+        let reciprocal = (0..=self.order).map(|k| self.number(1.0 / k.max(1) as f64));
+        text += &list(REAL, "RECIPROCAL", reciprocal);
+        let _ = writeln!(text, "\n/* Rows of weights on z, and which of them each table has: see row_of. */");
+        let _ = writeln!(text, "static const {REAL} WEIGHT[][SIZE] = {{");
+        for weights in &pool.weights {
+            let row: Vec<String> = weights.iter().map(|w| self.number(w + 0.0)).collect();
+            let _ = writeln!(text, "    {{{}}},", row.join(", "));
+        }
+        let _ = writeln!(text, "}};");
+        let whole = |values: &[usize]| values.iter().map(|v| format!("{v}U")).collect::<Vec<_>>();
+        text += &list("uint16_t", "ENTRY", whole(&pool.entries));
+        text += &list("uint16_t", "ENTRY_FIRST", whole(&pool.first));
+        let mut ends = vec![0];
+        pool.depends.iter().for_each(|depends| ends.push(ends.last().unwrap_or(&0) + depends.len()));
+        text += &list("uint16_t", "DEPENDS_FIRST", whole(&ends));
+        text += &list("uint8_t", "DEPENDS", whole(&pool.depends.concat()));
+        text += &self.elements(&resting, &whole);
+        text += &self.guards(&guards);
+        text += &self.places(&whole);
+        text
+    }
+
+    /// Elements, bodies among them, and limits of currents that are states.
+    fn elements(&self, resting: &[usize], whole: &dyn Fn(&[usize]) -> Vec<String>) -> String {
+        let tables = self.tables;
+        let mechanism = &tables.mechanism;
+        let (mut kinds, mut data) = (Vec::new(), Vec::new());
+        let (mut bodies, mut limits, mut moves) = (Vec::new(), Vec::new(), Vec::new());
+        for (index, element) in tables.elements.iter().enumerate() {
+            let (kind, datum) = match element.kind {
+                ElementKind::Body(body) => {
+                    let first = moves.len();
+                    let others = mechanism.followers(body).filter(|other| *other != body);
+                    moves.extend(std::iter::once(body).chain(others).map(|b| tables.layout.speed[b]));
+                    bodies.push(self.body(index, body, (first, moves.len())));
+                    (0, bodies.len() - 1)
+                }
+                ElementKind::GearTorque(drive) => (1, resting[drive]),
+                ElementKind::Current(drive) => {
+                    let part = &mechanism.drives[drive];
+                    match tables.layout.current[drive] {
+                        Some(place) if part.amplifier.mode == AmplifierMode::Voltage => {
+                            let limit = part.amplifier.current_limit.unwrap_or(0.0);
+                            limits.push(format!("{{{}, {place}U}}", self.number(limit)));
+                            (3, limits.len() - 1)
+                        }
+                        _ => (2, 0),
+                    }
+                }
+                ElementKind::Voltage(_) => (2, 0),
+                ElementKind::Span(_) | ElementKind::Gap(_) | ElementKind::Line(_) => (4, 0),
+            };
+            kinds.push(kind);
+            data.push(datum);
+        }
+        let states: Vec<usize> = tables.elements.iter().map(|element| element.states.len()).collect();
+        let mut text = String::from("\n/* Elements: how many things each can do, and what kind it is. */\n");
+        text += &list("uint8_t", "ELEMENT_STATES", whole(&states));
+        text += &list("uint8_t", "ELEMENT_KIND", whole(&kinds));
+        text += &list("uint16_t", "ELEMENT_DATA", whole(&data));
+        text += &list("uint8_t", "AT_REST", whole(&tables.at_rest()));
+        text += &format!(
+            "\nstatic const struct {{\n    {REAL} drop_forward; /* breakaway above Coulomb friction */\n    {REAL} \
+             drop_backward;\n    uint8_t break_forward; /* guards */\n    uint8_t break_backward;\n    uint8_t fresh;\n    \
+             uint8_t moves_first; /* speeds that end with its own */\n    uint8_t moves_end;\n}} BODY_DATA[] = "
+        );
+        text += &records(&bodies, "{0, 0, 0U, 0U, 0U, 0U, 0U}");
+        text += &list("uint8_t", "MOVES", whole(&moves));
+        text += &format!("static const struct {{\n    {REAL} limit;\n    uint8_t place;\n}} LIMIT_DATA[] = ");
+        text += &records(&limits, "{0, 0U}");
+        text
+    }
+
+    fn body(&self, index: usize, body: usize, (first, end): (usize, usize)) -> String {
+        let tables = self.tables;
+        let law = tables.mechanism.friction(body);
+        let code = |does: Does| tables.elements[index].states.iter().position(|own| *own == does).unwrap_or(0);
+        let breaks = |to: Motion| {
+            let then = Then::Become(code(Does::Moves(to)));
+            tables
+                .guards
+                .iter()
+                .position(|guard| guard.of == Some((index, code(Does::Moves(Motion::Stuck)))) && guard.then == then)
+        };
+        let [forward, backward] = [Motion::Forward, Motion::Backward].map(|to| breaks(to).unwrap_or(0));
+        let stop = tables
+            .guards
+            .iter()
+            .find(|guard| guard.then == Then::Stop && guard.of.is_some_and(|(element, _)| element == index));
+        let fresh = stop.map_or(0, |guard| guard.fresh);
+        let drop = [law.forward, law.backward].map(|side| self.number(side.breakaway - side.coulomb));
+        format!("{{{}, {}, {forward}U, {backward}U, {fresh}U, {first}U, {end}U}}", drop[0], drop[1])
+    }
+
+    fn guards(&self, numbers: &[usize]) -> String {
+        let tables = self.tables;
+        let row = |(guard, table): (&crate::TableGuard, &usize)| {
+            let (element, state) = guard.of.unwrap_or((255, 0));
+            let then = match guard.then {
+                Then::Become(code) => code,
+                Then::Stop => 254,
+                Then::Leave => 255,
+            };
+            let slot = guard.slot.unwrap_or(tables.slots);
+            format!("{{{table}U, {element}U, {state}U, {then}U, {}U, {slot}U, {}U}}", guard.rank, guard.fresh)
+        };
+        let rows: Vec<String> = tables.guards.iter().zip(numbers).map(row).collect();
+        let mut text = String::from(
+            "\n/* Guards: table of the row; element and state in which it is one; what follows; which is settled first; \
+             its own tolerance and note of a fresh start. */\nstatic const struct {\n    uint16_t table;\n    uint8_t \
+             element;\n    uint8_t state;\n    uint8_t then;\n    uint8_t rank;\n    uint8_t slot;\n    uint8_t \
+             fresh;\n} GUARD[] = ",
+        );
+        text += &records(&rows, "{0U, 255U, 0U, 0U, 0U, 0U, 0U}");
+        text
+    }
+
+    /// Where bodies stand in z, and lengths in the places of angles.
+    fn places(&self, whole: &dyn Fn(&[usize]) -> Vec<String>) -> String {
+        let tables = self.tables;
+        let (layout, mechanism) = (&tables.layout, &tables.mechanism);
+        let bodies = mechanism.bodies.len();
+        let motion = |body: usize| {
+            let leader = mechanism.leader(body);
+            tables.elements.iter().position(|e| e.kind == ElementKind::Body(leader)).unwrap_or(255)
+        };
+        let mut text = String::from("\n/* Places of the bodies in z, and lengths of the belt in those of angles. */\n");
+        text += &list("uint8_t", "COORDINATE", whole(&layout.coordinate[..bodies]));
+        text += &list("uint8_t", "SPEED", whole(&layout.speed[..bodies]));
+        text += &list("uint8_t", "MOTION_OF", whole(&(0..bodies).map(motion).collect::<Vec<_>>()));
+        let replaced = &layout.replaced;
+        let (mut ends, mut others, mut arms) = (vec![0], Vec::new(), Vec::new());
+        for one in replaced {
+            others.extend(one.others.iter().map(|(other, _)| *other));
+            arms.extend(one.others.iter().map(|(_, arm)| self.number(*arm)));
+            ends.push(others.len());
+        }
+        text += &list("uint8_t", "REPLACED_BODY", whole(&replaced.iter().map(|one| one.body).collect::<Vec<_>>()));
+        text += &list(REAL, "REPLACED_ARM", replaced.iter().map(|one| self.number(one.own)));
+        text += &list("uint8_t", "OTHERS_FIRST", whole(&ends));
+        text += &list("uint8_t", "OTHERS", whole(&others));
+        text += &list(REAL, "OTHERS_ARM", arms);
+        text
+    }
+}
+
+/// A table of numbers; one zero where there are none.
+fn list(kind: &str, name: &str, values: impl IntoIterator<Item = String>) -> String {
+    let mut values: Vec<String> = values.into_iter().collect();
+    if values.is_empty() {
+        values.push("0".into());
+    }
+    let mut text = format!("static const {kind} {name}[] = {{");
+    for (k, value) in values.iter().enumerate() {
+        text += match (k, k % 16) {
+            (0, _) => "",
+            (_, 0) => ",\n    ",
+            _ => ", ",
+        };
+        text += value;
+    }
+    text + "};\n"
+}
+
+/// A table of records; an empty one where there are none.
+fn records(rows: &[String], none: &str) -> String {
+    let rows = if rows.is_empty() { vec![none.to_string()] } else { rows.to_vec() };
+    format!("{{\n    {},\n}};\n", rows.join(",\n    "))
+}

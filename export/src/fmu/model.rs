@@ -1,0 +1,445 @@
+//! The variables of a machine: the one list that its description is written from and its shared object works by.
+
+use super::variable::{Kind, Role, Variable, named, plain, rate_unit, typed, typical, words};
+use super::{REFERENCES, resource};
+use crate::case::Opened;
+use crate::chance::hash;
+use crate::design::Design;
+use crate::error::{Error, Result};
+use crate::machine::{Machine, axis};
+use crate::mechanism::{Amplifier, AmplifierMode, DRIVES, Drive, Heading, Label, Mechanism, Motor, Shown, State};
+use crate::parameter::{self, Free, Parameter, unit_for};
+use crate::solve::{Dynamics, Quantity, check_stage};
+use crate::{controller, without_controller};
+
+/// Where the references of each group begin: they stay when another group grows. Zero is time.
+const INPUTS: u32 = 1;
+const PARAMETERS: u32 = 1000;
+const OUTPUTS: u32 = 2000;
+const STATES: u32 = 3000;
+const RATES: u32 = 4000;
+const CONDITIONS: u32 = 5000;
+
+/// The machine itself.
+#[derive(Debug, Clone)]
+enum Owned {
+    Axis(Box<Machine>),
+    Gantry(Box<Machine>),
+}
+
+/// A machine with its variables.
+#[derive(Debug, Clone)]
+pub struct Model {
+    /// The title of its case.
+    pub title: String,
+    /// The machine as a case file.
+    pub resource: String,
+    /// The mark of this machine and of this list of variables.
+    pub token: String,
+    /// All variables, references growing.
+    pub variables: Vec<Variable>,
+    /// The controller inside, if it is to be.
+    pub design: Option<Design>,
+    /// End and interval of the experiment that it stands for, s.
+    pub until: f64,
+    /// s
+    pub every: f64,
+    /// The integrated quantities, with their values at the start.
+    pub quantities: Vec<(Quantity, f64)>,
+    /// How many conditions its modes have.
+    pub conditions: usize,
+    /// The bodies on which a force can be put.
+    pub loads: Vec<usize>,
+    machine: Owned,
+    start: State,
+    parameters: Vec<(Free, &'static Parameter)>,
+}
+
+impl Model {
+    /// The machine of a case, with the controller inside if it is asked for. Errors: a controller that the case has
+    /// not.
+    pub fn new(case: &Opened, with_controller: bool) -> Result<Self> {
+        let resource = resource::resource(case)?;
+        Self::of_resource(&resource, with_controller)
+    }
+
+    /// The same of what [`super::resource`] gave.
+    pub fn of_resource(text: &str, with_controller: bool) -> Result<Self> {
+        let case = Opened::from_text_with("machine.toml", text, &[])?;
+        let [until, every] = resource::times(&case);
+        let (machine, design) = match &case {
+            Opened::Axis(case) => (Owned::Axis(Box::new(case.machine.clone())), case.controller.clone()),
+            Opened::Gantry(case) => (Owned::Gantry(Box::new(case.gantry.clone())), None),
+        };
+        if with_controller && design.is_none() {
+            let missing = controller(&case).map(|_| ());
+            missing.map_err(|error| without_controller(&case, error, "leave --part out for the machine alone"))?;
+        }
+        let design = design.filter(|_| with_controller);
+        let mut model = Self {
+            title: case.title().to_string(),
+            resource: text.to_string(),
+            token: String::new(),
+            variables: Vec::new(),
+            design,
+            until,
+            every,
+            quantities: Vec::new(),
+            conditions: 0,
+            loads: Vec::new(),
+            parameters: parameters(machine.numbers())?,
+            machine,
+            start: State::default(),
+        };
+        let mechanism = model.mechanism(&model.defaults())?;
+        model.start = match &case {
+            Opened::Axis(case) => {
+                case.first(|one| one.initial, |left| Some(left.initial)).map(|own| own.state(&mechanism))
+            }
+            Opened::Gantry(case) => case.first(|one| one.initial, |left| Some(left.initial)),
+        }
+        .unwrap_or_default();
+        let dynamics = Dynamics::new(&mechanism, &model.start)?;
+        let mut values = vec![0.0; dynamics.quantities().len()];
+        dynamics.values(&mut values);
+        model.quantities = dynamics.quantities().iter().copied().zip(values).collect();
+        model.conditions = dynamics.conditions();
+        model.loads = mechanism.roles.loads.clone();
+        model.variables = model.list(&mechanism);
+        model.token = model.token();
+        Ok(model)
+    }
+
+    /// The values of the parameters as the case has them, in the order of [`Role::Parameter`].
+    pub fn defaults(&self) -> Vec<f64> {
+        self.parameters.iter().map(|(free, _)| free.start).collect()
+    }
+
+    /// The axis with these parameters, where it is one.
+    pub fn stage(&self, parameters: &[f64]) -> Option<Machine> {
+        match self.set(parameters) {
+            Owned::Axis(stage) => Some(*stage),
+            Owned::Gantry(_) => None,
+        }
+    }
+
+    /// The mechanism with these parameters, and with room for a force on the cart where a drive leaves some. Errors: a
+    /// value that none of its kind can have.
+    pub fn mechanism(&self, parameters: &[f64]) -> Result<Mechanism> {
+        for ((free, row), value) in self.parameters.iter().zip(parameters) {
+            if !row.range.contains(*value) {
+                return Err(Error::new(format!("{} cannot be {value}", free.name))
+                    .allowed(row.range.describe(unit_for(row.unit, self.input_unit()))));
+            }
+        }
+        let mechanism = match self.set(parameters) {
+            Owned::Axis(stage) => {
+                check_stage(&stage)?;
+                let mut mechanism = stage.mechanism();
+                mechanism.drives.push(push(axis::CART));
+                mechanism
+            }
+            Owned::Gantry(gantry) => {
+                gantry.check_gantry()?;
+                gantry.mechanism()
+            }
+        };
+        let has = |drive: usize| self.quantities.iter().any(|(quantity, _)| *quantity == Quantity::Current(drive));
+        let own = mechanism.drives.iter().enumerate();
+        let changed = own.filter(|(drive, own)| own.has_current_state() != has(*drive)).map(|(_, own)| own).next();
+        match changed.filter(|_| !self.quantities.is_empty()) {
+            None => Ok(mechanism),
+            Some(drive) => {
+                Err(Error::new(format!("the inductance of the {} decides which states there are", drive.label.name))
+                    .allowed("zero where it is zero in the case, above zero where it is")
+                    .next("change it in the case, and export that"))
+            }
+        }
+    }
+
+    /// Whether it is linear between its events.
+    pub fn is_piecewise_linear(&self) -> bool {
+        self.mechanism(&self.defaults()).is_ok_and(|mechanism| mechanism.is_piecewise_linear())
+    }
+
+    /// Whether a force is an input of the mechanism beside those of the drives, and its place there; else it is a
+    /// number of a body.
+    pub fn force_input(&self, load: usize) -> Option<usize> {
+        match self.machine {
+            Owned::Axis(_) => Some(1 + load),
+            Owned::Gantry(_) => None,
+        }
+    }
+
+    /// The drives of the machine itself.
+    pub fn drives(&self) -> usize {
+        match self.machine {
+            Owned::Axis(_) => 1,
+            Owned::Gantry(_) => DRIVES,
+        }
+    }
+
+    /// The state in which the machine begins, with these values of the integrated quantities.
+    pub fn state(&self, mechanism: &Mechanism, values: &[f64]) -> State {
+        let mut state = self.start;
+        for ((quantity, _), &value) in self.quantities.iter().zip(values) {
+            match *quantity {
+                Quantity::Position(leader) => {
+                    let way = value - self.start.position[leader];
+                    for body in mechanism.followers(leader).filter(|body| *body != leader) {
+                        state.position[body] = self.start.position[body] + mechanism.ratio(body) * way;
+                    }
+                    state.position[leader] = value;
+                }
+                Quantity::Speed(leader) => {
+                    mechanism.followers(leader).for_each(|body| state.speed[body] = mechanism.ratio(body) * value);
+                }
+                Quantity::Current(drive) => state.current[drive] = value,
+                // Bristles begin straight.
+                Quantity::Bristle(_) => {}
+            }
+        }
+        state
+    }
+
+    /// The state in which the case has the machine begin.
+    pub(super) fn start(&self) -> &State {
+        &self.start
+    }
+
+    /// The variable with this reference.
+    pub fn variable(&self, reference: u32) -> Option<&Variable> {
+        self.variables.binary_search_by_key(&reference, |variable| variable.reference).ok().map(|k| &self.variables[k])
+    }
+
+    /// A unit size of each integrated quantity, for the tolerances of integrators.
+    pub fn nominals(&self, mechanism: &Mechanism) -> Vec<f64> {
+        let lever = |body: usize| mechanism.bodies[body].kind.lever();
+        let of = |quantity: &Quantity| match *quantity {
+            Quantity::Position(body) => 0.01 / lever(body),
+            Quantity::Speed(body) => 0.1 / lever(body),
+            Quantity::Current(_) => 1.0,
+            Quantity::Bristle(body) => 1e-5 / lever(body),
+        };
+        self.quantities.iter().map(|(quantity, _)| of(quantity)).collect()
+    }
+
+    fn set(&self, parameters: &[f64]) -> Owned {
+        let mut machine = self.machine.clone();
+        let changed = self.parameters.iter().zip(parameters).filter(|((free, _), value)| free.start != **value);
+        let changed: Vec<(&Free, f64)> = changed.map(|((free, _), value)| (free, *value)).collect();
+        if !changed.is_empty() {
+            parameter::set(machine.numbers_mut(), changed);
+        }
+        machine
+    }
+
+    /// The unit of what the amplifiers take.
+    fn input_unit(&self) -> &'static str {
+        match &self.machine {
+            Owned::Axis(stage) => stage.drives[0].amplifier.mode.unit(),
+            Owned::Gantry(gantry) => gantry.drives[0].amplifier.mode.unit(),
+        }
+    }
+
+    fn list(&self, mechanism: &Mechanism) -> Vec<Variable> {
+        let mut list = vec![plain(0, "time", "Time.", "s", Role::Time)];
+        list.extend(self.inputs(mechanism));
+        for (index, (free, row)) in self.parameters.iter().enumerate() {
+            let unit = unit_for(row.unit, self.input_unit());
+            let role = Role::Parameter(index, is_tunable(&free.name));
+            let words = match row.symbol {
+                "" => row.sentence.to_string(),
+                symbol => format!("{symbol}: {}", row.sentence),
+            };
+            let far = |end: f64| end.abs() < 1e8;
+            list.push(Variable {
+                shown: typed(row.example),
+                start: Some(free.start),
+                range: Some([row.range.low, row.range.high]).filter(|range| range.iter().any(|end| far(*end))),
+                ..plain(PARAMETERS + index as u32, &free.name, &words, unit, role)
+            });
+        }
+        list.extend(self.outputs(mechanism));
+        list.extend(self.inner(mechanism, &list));
+        list
+    }
+
+    fn inputs(&self, mechanism: &Mechanism) -> Vec<Variable> {
+        let mut list = Vec::new();
+        let mut add = |name: String, words: String, unit, shown: &str, role| {
+            let reference = INPUTS + list.len() as u32;
+            let (start, shown) = (Some(0.0), shown.to_string());
+            list.push(Variable { start, shown, ..plain(reference, &name, &words, unit, role) });
+        };
+        if self.design.is_some() {
+            let what = [
+                "Reference of the cart: where it should be.",
+                "Its speed.",
+                "Its acceleration.",
+                "Its jerk.",
+                "Its snap.",
+            ];
+            let names: [String; REFERENCES] =
+                ["", "_speed", "_acceleration", "_jerk", "_snap"].map(|end| format!("reference{end}"));
+            let units = [("m", "mm"), ("m/s", "mm/s"), ("m/s^2", ""), ("m/s^3", ""), ("m/s^4", "")];
+            for (k, ((name, words), (unit, shown))) in names.into_iter().zip(what).zip(units).enumerate() {
+                add(name, words.into(), unit, shown, Role::Reference(k));
+            }
+        } else {
+            for (index, drive) in mechanism.drives.iter().take(self.drives()).enumerate() {
+                let name = if self.drives() == 1 { "command".into() } else { format!("{}_command", SIDES[index]) };
+                let unit = drive.amplifier.mode.unit();
+                add(name, format!("Input of the amplifier of the {}.", drive.label.name), unit, "", Role::Input(index));
+            }
+        }
+        for (index, body) in self.loads.iter().enumerate() {
+            let label = mechanism.bodies[*body].label;
+            let words = format!("Force on the {} from outside, towards larger positions.", label.name);
+            add(format!("{}_force", label.key), words, "N", "", Role::Force(index));
+        }
+        list
+    }
+
+    fn outputs(&self, mechanism: &Mechanism) -> Vec<Variable> {
+        let mut list = Vec::new();
+        for (column, heading) in mechanism.columns.iter().enumerate().filter(|(_, h)| h.shown != Shown::Time) {
+            let quantity = self.quantities.iter().position(|(quantity, _)| shows(heading, *quantity));
+            let kind = match heading.shown {
+                Shown::Motion(_) | Shown::Contact(_) => Kind::Whole,
+                _ => Kind::Real,
+            };
+            // A column may be named as an input is: the voltage of a drive without limits.
+            let name = heading.name.to_string();
+            list.push(Variable {
+                shown: typical(heading.unit).into(),
+                kind,
+                start: quantity.map(|quantity| self.quantities[quantity].1),
+                quantity,
+                ..plain(OUTPUTS + column as u32, &name, &words(heading, mechanism), heading.unit, Role::Output(column))
+            });
+        }
+        if let Some(design) = &self.design {
+            let next = OUTPUTS + mechanism.columns.len() as u32;
+            list.push(Variable {
+                shown: "mm".into(),
+                ..plain(next, "error", "The cart from its reference, x − y.", "m", Role::Error)
+            });
+            let words = format!("What the {} commands.", design.structure.name());
+            list.push(plain(next + 1, "command", &words, self.input_unit(), Role::Command));
+        }
+        list
+    }
+
+    /// Variables of integrated quantities that no column shows, of their rates, and of the conditions.
+    fn inner(&self, mechanism: &Mechanism, before: &[Variable]) -> Vec<Variable> {
+        let mut list = Vec::new();
+        for (index, (quantity, start)) in self.quantities.iter().enumerate() {
+            if before.iter().any(|variable| variable.quantity == Some(index)) {
+                continue;
+            }
+            let (name, unit) = named(*quantity, mechanism);
+            let (reference, words) = (STATES + index as u32, "A quantity that is integrated.");
+            let role = Role::Quantity(index);
+            list.push(Variable {
+                start: Some(*start),
+                quantity: Some(index),
+                ..plain(reference, &name, words, unit, role)
+            });
+        }
+        for (index, (quantity, _)) in self.quantities.iter().enumerate() {
+            let all = || before.iter().chain(&list);
+            let of = all().find(|variable| variable.quantity == Some(index)).map(|variable| variable.name.clone());
+            let name = format!("der({})", of.unwrap_or_default());
+            let unit = rate_unit(named(*quantity, mechanism).1);
+            list.push(plain(RATES + index as u32, &name, "Its rate.", unit, Role::Rate(index)));
+        }
+        for index in 0..self.conditions {
+            let words = "What is left until a part does something else: to breakaway, to rest, to a limit.";
+            let name = format!("condition_{}", index + 1);
+            list.push(plain(CONDITIONS + index as u32, &name, words, "", Role::Condition(index)));
+        }
+        list
+    }
+
+    fn token(&self) -> String {
+        let list = format!("{:?}{}{}", self.variables, self.resource, env!("CARGO_PKG_VERSION"));
+        let halves = [hash(list.bytes()), hash(list.bytes().rev())];
+        let [a, b] = halves.map(|half| format!("{half:016x}"));
+        format!("{{{}-{}-{}-{}-{}}}", &a[..8], &a[8..12], &a[12..], &b[..4], &b[4..])
+    }
+}
+
+const SIDES: [&str; DRIVES] = ["left", "right"];
+
+impl Owned {
+    fn numbers(&self) -> &Machine {
+        match self {
+            Owned::Axis(stage) => &**stage,
+            Owned::Gantry(gantry) => &**gantry,
+        }
+    }
+
+    fn numbers_mut(&mut self) -> &mut Machine {
+        match self {
+            Owned::Axis(stage) => &mut **stage,
+            Owned::Gantry(gantry) => &mut **gantry,
+        }
+    }
+}
+
+/// The numbers of a machine that can be set, each by itself.
+fn parameters(machine: &Machine) -> Result<Vec<(Free, &'static Parameter)>> {
+    let own = parameter::own(machine);
+    let keys: Vec<&str> = own.iter().map(|(key, _)| key.as_str()).collect();
+    let of = |(key, row): &(String, &'static Parameter)| Ok((Free::new(machine, key, &keys, &[])?, *row));
+    own.iter().map(of).collect()
+}
+
+/// Whether a number can change while the machine runs: what it carries, what it rubs, what warmth and supply do. What
+/// tells its geometry, or which quantities its states are, cannot.
+fn is_tunable(key: &str) -> bool {
+    let drive = ["left_drive.", "right_drive."].into_iter().find_map(|side| key.strip_prefix(side));
+    let key = drive.unwrap_or(key);
+    let fixed = ["lugre", "stribeck", "smooth", "along"];
+    let last = key.rsplit('.').next().unwrap_or_default();
+    match key.split('.').next().unwrap_or_default() {
+        "cart" | "bridge" | "drive_pulley" | "idler_pulley" if key.contains(".friction.") => {
+            !fixed.iter().any(|part| key.contains(part))
+        }
+        "cart" | "bridge" => ["mass", "load", "inclination"].contains(&last),
+        "motor" => ["torque_constant", "back_emf_constant", "resistance"].contains(&last),
+        "belt" => key.contains(".stiffness") || key.contains(".damping"),
+        "amplifier" => ["gain", "voltage_limit", "current_limit"].contains(&last),
+        _ => false,
+    }
+}
+
+/// A drive that is nothing but a force: u in N is its current, K_t = 1 N/A.
+fn push(body: usize) -> Drive {
+    let label = Label { key: "force", name: "force" };
+    let motor = Motor {
+        torque_constant: 1.0,
+        back_emf_constant: 0.0,
+        resistance: 1.0,
+        inductance: 0.0,
+        rotor_inertia: 0.0,
+        gear_ratio: 1.0,
+        gear_efficiency: 1.0,
+        gear_play: None,
+        is_simple: true,
+    };
+    let amplifier = Amplifier::ideal(AmplifierMode::Current, 1.0);
+    Drive { label, voltage: label, current: label, pulley: body, shaft: body, motor, amplifier }
+}
+
+/// Whether a column is an integrated quantity as it stands.
+fn shows(heading: &Heading, quantity: Quantity) -> bool {
+    heading.shown
+        == match quantity {
+            Quantity::Position(body) => Shown::Position(body, 1.0),
+            Quantity::Speed(body) => Shown::Speed(body, 1.0),
+            Quantity::Current(drive) => Shown::Current(drive),
+            Quantity::Bristle(body) => Shown::Bristle(body),
+        }
+}

@@ -1,0 +1,209 @@
+//! Machines and controllers for other tools: C, Structured Text, MATLAB, Python.
+//!
+//! Exports are made of the mechanism's own equations ([`crate::mechanism::Mechanism::equations`]), written out as
+//! tables: [`Tables`]. The texts around them are in the folder of each target.
+
+// Paths below `crate` are those of the facade: a module is named alike wherever it lives.
+use taut_case::*;
+use taut_control::*;
+use taut_core::*;
+
+mod c;
+mod controller;
+pub mod fmu;
+mod matlab;
+mod packed;
+mod place;
+mod program;
+mod python;
+mod st;
+mod tables;
+
+pub use place::Place;
+pub use tables::{Does, Element, ElementKind, Row, StateName, TableGuard, Tables, Then};
+
+use crate::case::{Case, Opened};
+use crate::error::{Error, Result};
+
+/// A target whose files are made here.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Target {
+    /// C99.
+    C,
+    /// IEC 61131-3 Structured Text.
+    StructuredText,
+    /// MATLAB and Octave.
+    Matlab,
+    /// Python.
+    Python,
+}
+
+impl Target {
+    /// The ending of its main file.
+    pub fn ending(self) -> &'static str {
+        match self {
+            Target::C => "c",
+            Target::StructuredText => "st",
+            Target::Matlab => "m",
+            Target::Python => "py",
+        }
+    }
+}
+
+/// A part of a case.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    /// The machine.
+    Plant,
+    /// The controller.
+    Controller,
+    /// Both.
+    Both,
+}
+
+impl Part {
+    /// Whether the plant is in it.
+    pub fn has_plant(self) -> bool {
+        self != Part::Controller
+    }
+
+    /// Whether the controller is in it.
+    pub fn has_controller(self) -> bool {
+        self != Part::Plant
+    }
+}
+
+/// The numbers that exported C computes in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Real {
+    /// 32 bits.
+    Float,
+    /// 64 bits.
+    #[default]
+    Double,
+}
+
+/// Wishes beside the target.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Options {
+    /// Which part; none for what the target has by itself.
+    pub part: Option<Part>,
+    /// The numbers of C.
+    pub real: Real,
+    /// Step of the plant, s; none for 1 ms.
+    pub step: Option<f64>,
+}
+
+/// The step of a plant where none is named, s.
+pub const STEP: f64 = 1e-3;
+
+/// The files of a target.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Exported {
+    /// Names and contents; the first is what the others belong to.
+    pub files: Vec<(String, Vec<u8>)>,
+    /// Figures of it: what, and how much.
+    pub facts: Vec<(String, String)>,
+    /// Notes that a user should read.
+    pub notes: Vec<String>,
+}
+
+/// A name as C, Structured Text, MATLAB and Python take it: letters, digits and `_`, a letter first.
+pub fn identifier(name: &str) -> String {
+    let mut plain = String::new();
+    for c in name.chars() {
+        match c {
+            c if c.is_ascii_alphanumeric() => plain.push(c.to_ascii_lowercase()),
+            _ if plain.ends_with('_') || plain.is_empty() => {}
+            _ => plain.push('_'),
+        }
+    }
+    let plain = plain.trim_end_matches('_');
+    // 31 letters are what compilers tell apart, with room for what is put behind.
+    let plain = &plain[..plain.len().min(20)];
+    match plain.chars().next() {
+        Some(c) if c.is_ascii_alphabetic() => plain.to_string(),
+        _ => format!("axis_{plain}").trim_end_matches('_').to_string(),
+    }
+}
+
+/// The controller of a case. Errors: a case without one; what to do about it is the caller's to say.
+pub fn controller(case: &Opened) -> Result<(&Case, &crate::design::Design)> {
+    match case {
+        Opened::Gantry(_) => Err(Error::new("a gantry has no controller")),
+        Opened::Axis(case) => match &case.controller {
+            Some(design) => Ok((case, design)),
+            None => Err(Error::new("this case has no controller")),
+        },
+    }
+}
+
+/// The next step where a controller is missing: to add one, where the case can have one, or `instead`.
+fn without_controller(case: &Opened, error: Error, instead: &str) -> Error {
+    error.next(match case {
+        Opened::Axis(_) => format!("add a [controller], as in docs/control.md, or {instead}"),
+        Opened::Gantry(_) => instead.to_string(),
+    })
+}
+
+/// The part that is asked for, or else what there is: a controller that is asked for must be there.
+pub fn part(case: &Opened, asked: Option<Part>) -> Result<Part> {
+    let part = asked.unwrap_or(match controller(case) {
+        Ok(_) => Part::Both,
+        Err(_) => Part::Plant,
+    });
+    if part.has_controller() {
+        // C takes no curves.
+        let instead = match mechanism(case).is_piecewise_linear() {
+            true => "leave --part out for the machine alone",
+            false => "take the machine with `taut export fmu`",
+        };
+        controller(case).map_err(|error| without_controller(case, error, instead))?;
+    }
+    Ok(part)
+}
+
+/// Note that a controller is exported without its input shaper: how many impulses, and what to do.
+fn shaper_note(design: &crate::design::Design) -> Option<String> {
+    let impulses = &design.shaper;
+    (!impulses.is_empty())
+        .then(|| format!("the input shaper of {} impulses is not in it: shape the reference before it", impulses.len()))
+}
+
+/// The same as lines of a comment, with the impulses.
+fn shaper_remark(design: &crate::design::Design) -> Vec<String> {
+    let Some(note) = shaper_note(design) else { return Vec::new() };
+    let of = |[time, amplitude]: &[f64; 2]| format!("  {amplitude:?} of the reference {time:?} s ago");
+    std::iter::once(format!("{note}, to the sum of")).chain(design.shaper.iter().map(of)).collect()
+}
+
+/// The files of a target, called `stem`. Errors: what the target cannot do, and what can be done instead.
+pub fn export(case: &Opened, target: Target, stem: &str, options: &Options) -> Result<Exported> {
+    match target {
+        Target::C => c::export(case, part(case, options.part)?, stem, options),
+        Target::StructuredText => st::export(case, options.part, stem),
+        Target::Matlab => matlab::export(plant_of(case, options.part)?, stem, options),
+        Target::Python => python::export(plant_of(case, options.part)?, stem, options),
+    }
+}
+
+/// The mechanism of a case.
+pub fn mechanism(case: &Opened) -> crate::mechanism::Mechanism {
+    match case {
+        Opened::Axis(case) => case.machine.mechanism(),
+        Opened::Gantry(case) => case.gantry.mechanism(),
+    }
+}
+
+/// Refuses a controller where only the plant is exported.
+fn plant_of(case: &Opened, asked: Option<Part>) -> Result<&Opened> {
+    if asked.is_some_and(Part::has_controller) {
+        let error = Error::new("only the machine is exported to this").in_file("--part");
+        return Err(error.next(match controller(case) {
+            _ if !mechanism(case).is_piecewise_linear() => "take the machine with `taut export fmu`",
+            Ok(_) => "leave --part out; `taut export c` and `taut export st` have the controller",
+            Err(_) => "leave --part out",
+        }));
+    }
+    Ok(case)
+}

@@ -1,0 +1,83 @@
+//! Whether the controller of a case is the one that made a log: what it makes of the logged positions, beside the
+//! logged input.
+
+use crate::case::Case;
+use crate::control::{Controller, Loop, Observation, Standard};
+use crate::log::{Log, Quantity};
+use crate::machine::{EncoderPlace, Machine};
+use crate::signal::profile::Profile;
+
+/// The share of the logged input that the controller of `case` makes of reference and position of a log, 100 (1 − ‖u −
+/// û‖/‖u − ū‖); none without a controller, a reference or a position.
+pub(crate) fn reproduced(case: &Case, log: &Log) -> Option<f64> {
+    let (design, reference) = (case.controller.as_ref()?, log.reference.as_ref()?);
+    let position = position(&case.machine, log)?;
+    let scale = match case.machine.scale {
+        Some(_) => Some(filled(log, Quantity::CartPosition, 1.0)?),
+        None => None,
+    };
+    let mut controller = Standard::new(design, &case.machine).ok()?;
+    let profile = Profile::sampled(&log.time, reference).shaped(&design.shaper);
+    let timing = Loop::of(design);
+    let end = *log.time.last()?;
+    // Straight lines between samples.
+    let at = |values: &[f64], t: f64| {
+        let after = log.time.partition_point(|time| *time <= t).clamp(1, log.time.len() - 1);
+        let (a, b) = (log.time[after - 1], log.time[after]);
+        let share = ((t - a) / (b - a)).clamp(0.0, 1.0);
+        values[after - 1] + share * (values[after] - values[after - 1])
+    };
+    let current = log.output(Quantity::MotorCurrent);
+    let late = 0.1 * log.interval().min(timing.every);
+    let (mut made, mut logged) = (Vec::new(), Vec::new());
+    let mut k = 0u64;
+    loop {
+        let time = k as f64 * timing.every;
+        if time + timing.delay > end || k > 100_000_000 {
+            break;
+        }
+        let seen = Observation {
+            time,
+            reference: profile.at(time),
+            ahead: profile.at(time + timing.lead),
+            position: at(&position, time),
+            scale: scale.as_ref().map(|scale| at(scale, time)),
+            current: current.map_or(0.0, |output| at(&output.values, time)),
+        };
+        let asked = controller.step(&seen);
+        let given = timing.limit.map_or(asked, |limit| asked.clamp(-limit, limit));
+        controller.limited(given);
+        // What acts when the command is due; clocks of logs are off by a little.
+        let acts = time + timing.delay + late;
+        let row = log.time.partition_point(|time| *time <= acts).checked_sub(1)?;
+        made.push(given);
+        logged.push(log.input[row] - log.added.as_ref().map_or(0.0, |added| added[row]));
+        k += 1;
+    }
+    let mean = logged.iter().sum::<f64>() / logged.len().max(1) as f64;
+    let left: f64 = made.iter().zip(&logged).map(|(made, logged)| (made - logged).powi(2)).sum();
+    let whole: f64 = logged.iter().map(|logged| (logged - mean).powi(2)).sum();
+    let percent = 100.0 * (1.0 - (left / whole).sqrt());
+    percent.is_finite().then_some(percent)
+}
+
+/// The reading of the controller's encoder along a log, m along the belt, gaps filled.
+fn position(machine: &Machine, log: &Log) -> Option<Vec<f64>> {
+    let cart = filled(log, Quantity::CartPosition, 1.0);
+    let angle = filled(log, Quantity::DriveAngle, machine.pulley_radius);
+    match machine.encoder.map(|encoder| encoder.at) {
+        Some(EncoderPlace::Cart) => cart.or(angle),
+        Some(EncoderPlace::DrivePulley | EncoderPlace::Motor) | None => angle.or(cart),
+    }
+}
+
+/// A quantity of a log times `arm`, gaps filled.
+fn filled(log: &Log, quantity: Quantity, arm: f64) -> Option<Vec<f64>> {
+    let output = log.output(quantity).filter(|output| !output.absolute)?;
+    let mut last = output.values.iter().copied().find(|value| value.is_finite())?;
+    let filled = output.values.iter().map(|value| {
+        last = if value.is_finite() { *value } else { last };
+        arm * last
+    });
+    Some(filled.collect())
+}

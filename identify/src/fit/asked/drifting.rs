@@ -1,0 +1,86 @@
+//! A run of a machine that changes along it: part by part, each with a machine of its own, from where the one before
+//! ended.
+
+use super::run::Run;
+use crate::case::{Experiment, Initial};
+use crate::log::Quantity;
+use crate::machine::Machine;
+use crate::signal::{Hold, Signal};
+use crate::solve::{Bench, Detail, Ending, Flow};
+use crate::trajectory::Trajectory;
+
+/// Columns of the state, in the order of [`Initial`].
+const STATE: [&str; 6] = ["drive_angle", "drive_speed", "cart_position", "cart_speed", "idler_angle", "idler_speed"];
+
+/// Weighted residuals, model minus log, of machines that follow each other in equal parts of the log; false where the
+/// log is not one of an open loop at even times, or a machine does not get through its part.
+pub(crate) fn residuals(run: &Run, stages: &[Machine], extras: &[f64], out: &mut [f64]) -> bool {
+    let is_known = |seen: &Quantity| !seen.name().starts_with("rotor") && *seen != Quantity::CartAcceleration;
+    let quantities: Vec<Quantity> = run.seen.iter().map(|seen| seen.quantity).collect();
+    if !run.is_even() || run.is_closed() || !quantities.iter().all(is_known) {
+        return false;
+    }
+    let n = run.time.len();
+    let mut columns = vec![Vec::with_capacity(n); quantities.len()];
+    let mut initial = None;
+    for (part, machine) in stages.iter().enumerate() {
+        let at = |part: usize| (n - 1) * part / stages.len();
+        let (begin, end) = (at(part), at(part + 1));
+        if begin == end {
+            continue;
+        }
+        let mut machine = machine.clone();
+        let whole = run.experiment(&mut machine, extras);
+        machine.encoder = None;
+        let Some(input) = later(&whole.input, run.time[begin]) else { return false };
+        let initial_here = initial.unwrap_or(whole.initial);
+        let until = whole.every * (end - begin) as f64;
+        let experiment = Experiment { input, initial: initial_here, until, ..whole };
+        let Some((rows, last)) = rows(&machine, &experiment, &quantities) else { return false };
+        if rows[0].len() != end - begin + 1 {
+            return false;
+        }
+        for (column, rows) in columns.iter_mut().zip(&rows) {
+            column.extend_from_slice(&rows[usize::from(part > 0)..]);
+        }
+        initial = Some(Initial { motor_current: initial_here.motor_current, ..last });
+    }
+    run.compare(&columns, extras, out)
+}
+
+/// The outputs of an experiment, and the state at its end.
+fn rows(machine: &Machine, experiment: &Experiment, quantities: &[Quantity]) -> Option<(Vec<Vec<f64>>, Initial)> {
+    let mut columns = vec![Vec::new(); quantities.len()];
+    let mut state = [0.0; 6];
+    let mut bench = Bench::default();
+    bench.mount(machine).ok()?;
+    let mut take = |block: &Trajectory| {
+        for (column, quantity) in columns.iter_mut().zip(quantities) {
+            column.extend_from_slice(super::run::column(block, *quantity));
+        }
+        for (value, name) in state.iter_mut().zip(STATE) {
+            *value = block.get(name).and_then(|own| own.last().copied()).unwrap_or(f64::NAN);
+        }
+        Flow::Continue
+    };
+    let outcome = bench.run(experiment, Detail::Full, &mut take).ok()?;
+    let [drive_angle, drive_speed, cart_position, cart_speed, idler_angle, idler_speed] = state;
+    let last =
+        Initial { drive_angle, drive_speed, cart_position, cart_speed, idler_angle, idler_speed, motor_current: 0.0 };
+    (outcome.ending == Ending::Complete && state.iter().all(|v| v.is_finite())).then_some((columns, last))
+}
+
+/// A sampled input as it goes on from time `from`, s; none of another kind.
+fn later(input: &Signal, from: f64) -> Option<Signal> {
+    let Signal::Sampled { times, values, hold } = input else { return None };
+    let first = times.partition_point(|&t| t <= from).saturating_sub(1);
+    let mut own_times: Vec<f64> = times[first..].iter().map(|t| t - from).collect();
+    let mut own_values = values[first..].to_vec();
+    if own_times[0] < 0.0 {
+        if let (Hold::Linear, [a, b, ..], [low, high, ..]) = (*hold, &own_times[..], &own_values[..]) {
+            own_values[0] = low + (high - low) * (0.0 - a) / (b - a);
+        }
+        own_times[0] = 0.0;
+    }
+    Some(Signal::Sampled { times: own_times, values: own_values, hold: *hold })
+}

@@ -1,0 +1,9 @@
+//! What is compared with what: logs as runs of the model, and their residuals as a function of the variables.
+
+mod acceleration;
+pub(crate) mod controller;
+pub(crate) mod drifting;
+pub(crate) mod problem;
+pub(crate) mod residuals;
+pub(crate) mod run;
+mod sensitivity;

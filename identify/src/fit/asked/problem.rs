@@ -1,0 +1,797 @@
+//! All logs of a case as one least-squares problem.
+
+use super::residuals::{Bounds, Differences, Residuals, Step};
+use super::run::{Extra, MeasuredOutput, Nuisance, Run, Setting, is_position, rounding_at_rest};
+use crate::case::{Case, Nuisances, Plan, Scope, matches, parameters};
+use crate::error::{Error, Result};
+use crate::log::Quantity;
+use crate::machine::{AmplifierMode, Machine};
+use crate::parameter::{self, Free};
+use crate::solve::Bench;
+use nalgebra::DMatrix;
+
+/// Share of how far a quantity ranges that numbers in files and solvers may be off by.
+pub(crate) const ROUNDING: f64 = 1e-10;
+
+/// A delay that is known to so many samples is known.
+const LATE: f64 = 10.0;
+
+/// Standard errors of its speed by which a log has to begin in motion, to be taken to.
+const MOVES: f64 = 5.0;
+
+/// Noise of first order that keeps to itself for 30 samples is so many times what neighbouring values differ by.
+const SHARED: f64 = 5.0;
+
+/// The variables of a fit, and its logs.
+#[derive(Clone)]
+pub struct Problem<'a> {
+    /// The machine as the case has it.
+    pub machine: Machine,
+    /// The free parameters of it.
+    pub parameters: Vec<Free>,
+    /// The part of the logs that each of these is for, by its place in `parts`; none where it is for all of them.
+    pub of: Vec<Option<usize>>,
+    /// Names of the parts of the logs that have parameters for themselves: campaigns, or logs.
+    pub parts: Vec<String>,
+    /// Nuisances that all logs share.
+    pub shared: Vec<Extra>,
+    /// The logs that are fitted.
+    pub runs: Vec<Run>,
+    /// Those that are only compared.
+    pub held_out: Vec<Run>,
+    /// Simulated runs so far.
+    pub simulations: u64,
+    /// Runs that the last Jacobian took differences of.
+    pub differences: usize,
+    units: Vec<Scale>,
+    /// Whether to end the work.
+    stop: Option<Stop<'a>>,
+}
+
+/// Standard deviations by quantity.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Noise(pub Vec<(Quantity, f64)>);
+
+impl Noise {
+    /// That of a quantity; a picometre or its like where there is none.
+    pub fn of(&self, quantity: Quantity) -> f64 {
+        self.0.iter().find(|(own, _)| *own == quantity).map_or(1e-12, |(_, deviation)| *deviation)
+    }
+}
+
+/// Asked whether to stop: Ctrl-C, say.
+pub type Stop<'a> = &'a (dyn Fn() -> bool + Sync);
+
+/// How a variable of the search becomes the value of a free parameter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Scale {
+    /// p = start · eˣ
+    Log(f64),
+    /// p = unit · x
+    Linear(f64),
+}
+
+impl Scale {
+    fn value(self, x: f64) -> f64 {
+        match self {
+            Scale::Log(start) => start * x.exp(),
+            Scale::Linear(unit) => unit * x,
+        }
+    }
+
+    fn variable(self, value: f64) -> f64 {
+        match self {
+            Scale::Log(start) => (value / start).ln(),
+            Scale::Linear(unit) => value / unit,
+        }
+    }
+
+    /// dp/dx
+    fn slope(self, value: f64) -> f64 {
+        match self {
+            Scale::Log(_) => value,
+            Scale::Linear(unit) => unit,
+        }
+    }
+}
+
+impl<'a> Problem<'a> {
+    /// The problem that `plan` poses with the logs of `case`.
+    pub fn new(case: &Case, plan: &Plan) -> Result<Self> {
+        case.complete()?;
+        let machine = case.machine.clone();
+        let (parameters, of, parts) = separated(case, plan, parameters(&machine, plan, &[])?)?;
+        let mut runs = Vec::new();
+        let mut held_out = Vec::new();
+        for experiment in &case.experiments {
+            let Some(log) = &experiment.log else { continue };
+            let held = plan.held_out.iter().any(|pattern| matches(&experiment.name, pattern));
+            let setting = Setting { window: plan.windows, fitted_until: plan.until, held_out: held };
+            let part = plan.part(&experiment.name);
+            for mut run in Run::all(experiment, log, &setting) {
+                run.part = parts.iter().position(|name| name == part).unwrap_or(0);
+                if plan.closed_loop {
+                    run.close(case, log);
+                }
+                if held { held_out.push(run) } else { runs.push(run) }
+            }
+        }
+        if runs.is_empty() {
+            return Err(Error::new("there is no log to fit").next(
+                "add log = { file = \"...\", time = \"...\", input = \"...\", drive_angle = \"...\" } to an experiment",
+            ));
+        }
+        let mut problem = Self {
+            units: parameters.iter().map(|parameter| scale(&machine, parameter, &runs)).collect(),
+            machine,
+            parameters,
+            of,
+            parts,
+            shared: Vec::new(),
+            runs,
+            held_out,
+            simulations: 0,
+            differences: 0,
+            stop: None,
+        };
+        problem.add_extras(case, plan);
+        problem.prepare();
+        problem.weigh_first();
+        Ok(problem)
+    }
+
+    /// A single run of a machine that is known.
+    pub(crate) fn alone(machine: Machine, mut run: Run) -> Self {
+        run.part = 0;
+        Self {
+            machine,
+            parameters: Vec::new(),
+            of: Vec::new(),
+            parts: Vec::new(),
+            shared: Vec::new(),
+            runs: vec![run],
+            held_out: Vec::new(),
+            simulations: 0,
+            differences: 0,
+            units: Vec::new(),
+            stop: None,
+        }
+    }
+
+    /// Ends the work early once `stop` says so.
+    pub fn stopped_by(mut self, stop: Option<Stop<'a>>) -> Self {
+        self.stop = stop;
+        self
+    }
+
+    /// What is asked.
+    pub(crate) fn stop(&self) -> Option<Stop<'a>> {
+        self.stop
+    }
+
+    /// Whether it is asked to end.
+    pub fn is_stopped(&self) -> bool {
+        self.stop.is_some_and(|stop| stop())
+    }
+
+    fn add_extras(&mut self, case: &Case, plan: &Plan) {
+        let &Nuisances { delay, input_gain, input_offset, initial_state, bias } = &plan.nuisance;
+        let interval = self.runs[0].interval();
+        let most = self.runs.iter().flat_map(|run| run.logged.iter()).fold(0.0, |most: f64, u| most.max(u.abs()));
+        let most = if most > 0.0 { most } else { 1.0 };
+        let late =
+            Extra { what: Nuisance::Delay, start: 0.0, unit: interval, low: 0.0, high: 50.0 * interval, known: None };
+        let gain = Extra { what: Nuisance::InputGain, start: 1.0, unit: 1.0, low: 0.2, high: 5.0, known: None };
+        let offset = Extra { what: Nuisance::InputOffset, start: 0.0, unit: most, low: -most, high: most, known: None };
+        let scopes = [(delay, late), (input_gain, gain), (input_offset, offset)];
+        self.shared = scopes.iter().filter(|(scope, _)| *scope == Scope::Shared).map(|(_, extra)| *extra).collect();
+        let r = self.machine.pulley_radius;
+        let noise = self.noise();
+        for run in self.runs.iter_mut().chain(&mut self.held_out) {
+            let own = scopes.iter().filter(|(scope, _)| *scope == Scope::Each).map(|(_, extra)| *extra);
+            run.extras.extend(own);
+            let given = case.experiments.iter().any(|e| e.name == run.name && e.initial != Default::default());
+            let position = run.seen.iter().find(|seen| is_position(seen.quantity));
+            let first = position.and_then(|seen| {
+                let value = seen.values.iter().copied().find(|v| v.is_finite())?;
+                Some(if seen.quantity == Quantity::CartPosition { value } else { value * r })
+            });
+            let span = position.map_or(0.0, |seen| {
+                let arm = if seen.quantity == Quantity::CartPosition { 1.0 } else { r };
+                arm * extent(&seen.values)
+            });
+            let fastest = run.seen.iter().find(|seen| !is_position(seen.quantity)).map_or(0.0, |seen| {
+                let arm = if seen.quantity == Quantity::CartSpeed { 1.0 } else { r };
+                arm * extent(&seen.values)
+            });
+            let long = run.time.last().copied().unwrap_or(1.0);
+            let fast = f64::max(span / long, fastest).max(1e-6);
+            let wide = span.max(1e-6);
+            // A window in the middle of a log begins in motion; the first begins as the log does.
+            let windowed = run.window > 0;
+            if let Some(start) = first {
+                let free = initial_state || windowed;
+                // Positions count from where the log begins, unless the case says where that is; its first value says
+                // that no better than any other value says where the cart is.
+                let arm = position.map_or(1.0, |seen| if seen.quantity == Quantity::CartPosition { 1.0 } else { r });
+                let noise = arm * position.map_or(0.0, |seen| noise.of(seen.quantity));
+                let (unit, room) = if free { (1e-2 * wide, wide) } else { (noise, 6.0 * noise) };
+                if free || !given {
+                    run.extras.push(Extra {
+                        what: Nuisance::StartPosition,
+                        start,
+                        unit,
+                        low: start - room,
+                        high: start + room,
+                        known: if free { None } else { Some(noise) },
+                    });
+                }
+            }
+            if initial_state || windowed {
+                let (slope, doubt) = slope_at_start(run, r, &noise);
+                // A log begins at rest, unless it shows that it does not: a start at rest sticks, and a search from
+                // there sees nothing of the speed.
+                let start = if windowed || slope.abs() > MOVES * doubt { slope } else { 0.0 };
+                let (low, high) = (start - 20.0 * fast, start + 20.0 * fast);
+                run.extras.push(Extra { what: Nuisance::StartSpeed, start, unit: fast, low, high, known: None });
+            }
+            for (index, seen) in run.seen.iter().enumerate() {
+                let counted =
+                    is_position(seen.quantity) && run.seen.iter().position(|s| is_position(s.quantity)) == Some(index);
+                if bias && !counted {
+                    let wide = extent(&seen.values).max(1e-9);
+                    run.extras.push(Extra {
+                        what: Nuisance::Bias(index),
+                        start: 0.0,
+                        unit: 1e-2 * wide,
+                        low: -wide,
+                        high: wide,
+                        known: None,
+                    });
+                }
+            }
+            // What has no room is no variable, but a number: see `extras_of`.
+        }
+    }
+
+    /// The noise of each quantity: its correlation from one value to the next, and the rounding of its converter.
+    pub fn noise(&self) -> Noise {
+        let mut noise = Vec::new();
+        for quantity in self.quantities() {
+            let mut sizes = Vec::new();
+            let (mut step, mut wide): (f64, f64) = (0.0, 0.0);
+            for seen in self.runs.iter().flat_map(|run| &run.seen).filter(|seen| seen.quantity == quantity) {
+                step = step.max(seen.step);
+                wide = wide.max(extent(&seen.values));
+                // Third differences of noise have √20 times its deviation, those of smooth motion next to nothing.
+                let third = |w: &[f64]| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).abs();
+                sizes.extend(seen.values.windows(4).map(third).filter(|d| d.is_finite()));
+            }
+            let middle = sizes.len() / 2;
+            let rough = if sizes.is_empty() {
+                0.0
+            } else {
+                1.4826 * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1 / 20f64.sqrt()
+            };
+            noise.push((quantity, rough.max(step / 12f64.sqrt()).max(1e-6 * wide).max(1e-12)));
+        }
+        Noise(noise)
+    }
+
+    /// Weights before anything is fitted: one deviation for each quantity, a hundredth of how far it ranges, or what
+    /// its converter rounds if that is more.
+    pub(crate) fn weigh_first(&mut self) {
+        for quantity in self.quantities() {
+            let seen = || self.runs.iter().flat_map(|run| &run.seen).filter(|seen| seen.quantity == quantity);
+            let wide = seen().map(|seen| extent(&seen.values)).fold(0.0, f64::max);
+            let step = seen().map(|seen| seen.step).fold(0.0, f64::max);
+            let deviation = f64::max(1e-2 * wide, step / 12f64.sqrt()).max(1e-12);
+            self.weigh(quantity, deviation, false);
+        }
+    }
+
+    /// Weighs all quantities by the deviations of their residuals, and doubts starts as much.
+    pub fn weigh_by(&mut self, noise: &[(Quantity, f64)]) {
+        for &(quantity, deviation) in noise {
+            self.weigh(quantity, deviation, true);
+            self.doubt_starts(quantity, deviation);
+        }
+    }
+
+    /// Weighs a quantity: each value with the variance σ² of the noise and of what rounding makes of m equal values in
+    /// a row, which is one error and not one for each: σ² + (m − 1) Δ²/12; or of m that go to and fro at rest:
+    /// `rounding_at_rest`.
+    pub fn weigh(&mut self, quantity: Quantity, deviation: f64, rounding: bool) {
+        for run in &mut self.runs {
+            let fitted = run.fitted_rows;
+            // Of the deviation, rounding has its part.
+            let trembles = |step: f64| (deviation * deviation - step * step / 12.0).max(0.0).sqrt();
+            for seen in run.seen.iter_mut().filter(|seen| seen.quantity == quantity) {
+                for k in 0..seen.values.len() {
+                    let (equal, alike) = (seen.repeats[k] - 1.0, seen.alike[k] - 1.0);
+                    let common = match rounding {
+                        false => 0.0,
+                        true if alike > 0.0 => alike * rounding_at_rest(seen.step, trembles(seen.step)),
+                        true => equal * seen.step * seen.step / 12.0,
+                    };
+                    let counts = k < fitted && seen.values[k].is_finite();
+                    seen.weights[k] = if counts { 1.0 / (deviation * deviation + common).sqrt() } else { 0.0 };
+                }
+            }
+        }
+    }
+
+    /// A first value is no better than any other: what is known of starts beforehand is as uncertain as this deviation
+    /// of a position, as far as noise that neighbouring values share can be more than what they differ by; beyond that
+    /// it is the model that is off, and not the value.
+    pub fn doubt_starts(&mut self, quantity: Quantity, deviation: f64) {
+        let r = self.machine.pulley_radius;
+        for run in &mut self.runs {
+            let Some(first) = run.seen.iter().find(|seen| is_position(seen.quantity)) else { continue };
+            if first.quantity != quantity {
+                continue;
+            }
+            let deviation = deviation * if quantity == Quantity::CartPosition { 1.0 } else { r };
+            for extra in run.extras.iter_mut().filter(|extra| extra.what == Nuisance::StartPosition) {
+                if let Some(known) = &mut extra.known {
+                    // Its unit is what neighbouring values differ by.
+                    *known = known.max(deviation.min(SHARED * extra.unit));
+                    let room = 6.0 * *known;
+                    (extra.low, extra.high) = (extra.low.min(extra.start - room), extra.high.max(extra.start + room));
+                }
+            }
+        }
+    }
+
+    /// Residuals that are rounding, with the present weights: of each quantity `ROUNDING` of how far it ranges.
+    pub fn rounding(&self) -> f64 {
+        let seen = self.runs.iter().flat_map(|run| &run.seen);
+        let of =
+            |seen: &MeasuredOutput| ROUNDING * extent(&seen.values) * seen.weights.iter().copied().fold(0.0, f64::max);
+        seen.map(of).fold(0.0, f64::max)
+    }
+
+    /// The quantities that the fitted logs hold.
+    pub fn quantities(&self) -> Vec<Quantity> {
+        let mut all = Vec::new();
+        for seen in self.runs.iter().flat_map(|run| &run.seen) {
+            if !all.contains(&seen.quantity) {
+                all.push(seen.quantity);
+            }
+        }
+        all
+    }
+
+    /// Number of variables: free parameters, what is shared, and the extras of each run.
+    pub fn variables(&self) -> usize {
+        self.globals() + self.runs.iter().map(|run| variable_extras(run).count()).sum::<usize>()
+    }
+
+    /// Number of those that concern all runs.
+    pub fn globals(&self) -> usize {
+        self.parameters.len() + self.shared.len()
+    }
+
+    /// Number of values that count.
+    pub fn counted(&self) -> usize {
+        self.runs.iter().flat_map(|run| &run.seen).flat_map(|seen| &seen.weights).filter(|w| **w > 0.0).count()
+    }
+
+    /// As how many independent values they count: those that share an error of rounding count for less.
+    pub fn independent(&self) -> f64 {
+        self.runs.iter().flat_map(|run| (0..run.seen.len()).map(|output| run.independent(output))).sum()
+    }
+
+    /// Where the case starts.
+    pub fn start(&self) -> Vec<f64> {
+        let mut x: Vec<f64> =
+            self.parameters.iter().zip(&self.units).map(|(parameter, unit)| unit.variable(parameter.start)).collect();
+        x.resize(self.variables(), 0.0);
+        x
+    }
+
+    /// The same with the parameters of a machine, as far as it has them within their bounds.
+    pub(crate) fn point_of(&self, machine: &Machine) -> Vec<f64> {
+        let mut x = self.start();
+        let bounds = self.bounds();
+        for (j, parameter) in self.parameters.iter().enumerate() {
+            let own = parameter.value_in(machine).map(|value| self.variable(j, value));
+            x[j] = own.filter(|own| own.is_finite()).map_or(x[j], |own| own.clamp(bounds.low[j], bounds.high[j]));
+        }
+        x
+    }
+
+    /// The box of the variables.
+    pub fn bounds(&self) -> Bounds {
+        let parameters = self.parameters.iter().zip(&self.units);
+        let mut bounds = Bounds {
+            low: parameters.clone().map(|(parameter, unit)| unit.variable(parameter.low)).collect(),
+            high: parameters.map(|(parameter, unit)| unit.variable(parameter.high)).collect(),
+        };
+        let own = self.runs.iter().flat_map(variable_extras);
+        for extra in self.shared.iter().chain(own) {
+            bounds.low.push((extra.low - extra.start) / extra.unit);
+            bounds.high.push((extra.high - extra.start) / extra.unit);
+        }
+        bounds
+    }
+
+    /// The value of parameter `j` for its variable.
+    pub fn value(&self, j: usize, x: f64) -> f64 {
+        self.units[j].value(x)
+    }
+
+    /// The variable of parameter `j` for its value.
+    pub fn variable(&self, j: usize, value: f64) -> f64 {
+        self.units[j].variable(value)
+    }
+
+    /// dp/dx of parameter `j`.
+    pub fn slope(&self, j: usize, value: f64) -> f64 {
+        self.units[j].slope(value)
+    }
+
+    /// The change of the variable that counts as 100 %, of a machine like `stage`: where it may be zero, its value or a
+    /// typical one.
+    pub fn whole(&self, machine: &Machine, j: usize, x: f64) -> f64 {
+        match self.units.get(j) {
+            Some(Scale::Linear(unit)) => {
+                let typical = typical(machine, &self.parameters[j], &self.runs);
+                // Of what has no size by nature, the value itself, or where it started.
+                typical.map_or(if x == 0.0 { 1.0 } else { x.abs() }, |typical| x.abs().max(typical / unit))
+            }
+            Some(Scale::Log(_)) => 1.0,
+            None => match self.shared[j - self.parameters.len()].what {
+                // Its unit is a sample's interval, to which few logs tell a delay.
+                Nuisance::Delay => LATE,
+                _ => 1.0,
+            },
+        }
+    }
+
+    /// Whether parameter `j` is searched for on a logarithmic scale.
+    pub fn is_log(&self, j: usize) -> bool {
+        matches!(self.units[j], Scale::Log(_))
+    }
+
+    /// The same machine, with each variable as the machine has it: a breakaway that was asked for below Coulomb friction
+    /// is at it.
+    pub fn as_set(&self, x: &[f64]) -> Vec<f64> {
+        let mut own = x.to_vec();
+        for (j, (parameter, unit)) in self.parameters.iter().zip(&self.units).enumerate() {
+            let asked = unit.value(x[j]);
+            let machine = self.stage_of(self.of[j].unwrap_or(0), x);
+            match parameter.value_in(&machine) {
+                Some(set) if (set - asked).abs() > 1e-9 * set.abs() => own[j] = unit.variable(set),
+                _ => {}
+            }
+        }
+        own
+    }
+
+    /// The machine with these values; of what parts of the logs have for themselves, those of the first.
+    pub fn stage_at(&self, x: &[f64]) -> Machine {
+        self.stage_of(0, x)
+    }
+
+    /// The machine with the values for a part of the logs.
+    pub fn stage_of(&self, part: usize, x: &[f64]) -> Machine {
+        let mut machine = self.machine.clone();
+        let values = self.parameters.iter().zip(&self.units).zip(x).zip(&self.of);
+        let own = values.filter(|(_, of)| of.is_none_or(|of| of == part));
+        parameter::set(&mut machine, own.map(|(((parameter, unit), x), _)| (parameter, unit.value(*x))));
+        machine
+    }
+
+    /// The machines of all parts of the logs.
+    pub(crate) fn stages(&self, x: &[f64]) -> Vec<Machine> {
+        (0..self.parts.len().max(1)).map(|part| self.stage_of(part, x)).collect()
+    }
+
+    /// Where the extras of run `index` begin among the variables.
+    fn place(&self, index: usize) -> usize {
+        self.globals() + self.runs[..index].iter().map(|run| variable_extras(run).count()).sum::<usize>()
+    }
+
+    /// The values of a run's extras, and of the shared ones, as [`Run::experiment`] wants them.
+    pub fn extras_of(&self, index: usize, x: &[f64]) -> Vec<f64> {
+        let mut at = self.place(index);
+        let own = self.runs[index].extras.iter().map(|extra| {
+            if extra.low < extra.high {
+                at += 1;
+                extra.start + extra.unit * x[at - 1]
+            } else {
+                extra.start
+            }
+        });
+        let own: Vec<f64> = own.collect();
+        own.into_iter().chain(self.shared_values(x)).collect()
+    }
+
+    /// Values of what is shared.
+    pub fn shared_values(&self, x: &[f64]) -> Vec<f64> {
+        let first = self.parameters.len();
+        self.shared.iter().enumerate().map(|(i, extra)| extra.start + extra.unit * x[first + i]).collect()
+    }
+
+    /// The names of a run's variables and the places of the variables.
+    pub fn own_variables(&self, index: usize) -> Vec<(usize, Extra)> {
+        let first = self.place(index);
+        variable_extras(&self.runs[index]).enumerate().map(|(i, extra)| (first + i, *extra)).collect()
+    }
+
+    /// Those of them that do no more than shift outputs.
+    pub(crate) fn own_shifts(&self, index: usize, machine: &Machine) -> Vec<(usize, Extra)> {
+        let mut own = self.own_variables(index);
+        own.retain(|(_, extra)| self.runs[index].only_shifts(machine, extra));
+        own
+    }
+
+    fn prepare(&mut self) {
+        let shared = self.shared.clone();
+        for run in self.runs.iter_mut().chain(&mut self.held_out) {
+            run.share(&shared);
+        }
+    }
+
+    /// Where the residuals of run `index` begin.
+    pub fn first_row(&self, index: usize) -> usize {
+        self.runs[..index].iter().map(Run::rows).sum()
+    }
+
+    /// Residuals of all runs.
+    fn residuals(&mut self, x: &[f64], r: &mut [f64]) -> bool {
+        let stages = self.stages(x);
+        let mut bench = Bench::default();
+        let mut first = 0;
+        for index in 0..self.runs.len() {
+            let (rows, own) = (self.runs[index].rows(), self.runs[index].part);
+            if !self.one(&mut bench, index, &stages[own], x, &mut r[first..first + rows]) {
+                return false;
+            }
+            first += rows;
+        }
+        true
+    }
+
+    /// The columns of what only shifts the outputs of a run.
+    fn shifts(&self, machine: &Machine, (index, first): (usize, usize), jacobian: &mut DMatrix<f64>) {
+        let run = &self.runs[index];
+        let mut shift = vec![0.0; run.rows()];
+        for (j, extra) in self.own_shifts(index, machine) {
+            run.shift(machine, &extra, &mut shift);
+            jacobian.view_mut((first, j), (shift.len(), 1)).copy_from_slice(&shift);
+        }
+    }
+
+    /// The Jacobian as far as it is exact, and the runs that are left with where their residuals begin and the
+    /// variables that move them; the residuals of all runs, where they are asked for. None where a run cannot be
+    /// computed.
+    fn blocks(
+        &mut self,
+        x: &[f64],
+        mut residuals: Option<&mut [f64]>,
+        bounds: &Bounds,
+        how: &Differences,
+    ) -> Option<(DMatrix<f64>, Vec<Left>)> {
+        let mut jacobian = DMatrix::zeros(self.rows(), x.len());
+        let stages = self.stages(x);
+        let mut bench = Bench::default();
+        let is_exact = !matches!(how, Differences::Coarse(_));
+        let (mut first, mut left) = (0, Vec::new());
+        for index in 0..self.runs.len() {
+            if self.is_stopped() {
+                return None;
+            }
+            let (machine, rows) = (&stages[self.runs[index].part], self.runs[index].rows());
+            let mut own = residuals.as_mut().map(|residuals| &mut residuals[first..first + rows]);
+            self.shifts(machine, (index, first), &mut jacobian);
+            let columns = self.movers(index, machine, bounds);
+            let block = (index, first);
+            let out = (&mut jacobian, own.as_deref_mut());
+            if !is_exact || !self.exact_block((&mut bench, machine), block, (x, bounds), &columns, out) {
+                if own.is_some_and(|own| !self.one(&mut bench, index, machine, x, own)) {
+                    return None;
+                }
+                left.push((index, first, columns));
+            }
+            first += rows;
+        }
+        self.differences = left.len();
+        Some((jacobian, left))
+    }
+
+    /// The columns of `left`, runs with where their residuals begin and the variables that move them, by differences;
+    /// false where a run cannot be computed.
+    fn by_differences(
+        &mut self,
+        left: &[Left],
+        (x, r): (&[f64], &[f64]),
+        bounds: &Bounds,
+        how: &Differences,
+        jacobian: &mut DMatrix<f64>,
+    ) -> bool {
+        let mut moved = x.to_vec();
+        let (mut a, mut b) = (vec![0.0; r.len()], vec![0.0; r.len()]);
+        for j in 0..x.len() {
+            if !left.iter().any(|(.., columns)| columns.contains(&j)) {
+                continue;
+            }
+            let step = Step::new(x, bounds, j, how);
+            let points = [Some((step.first, &mut a)), step.second.map(|second| (second, &mut b))];
+            for (to, out) in points.into_iter().flatten() {
+                moved[j] = to;
+                // Runs of one machine share what it has made ready.
+                let (stages, mut bench) = (self.stages(&moved), Bench::default());
+                for &(index, first, ref columns) in left {
+                    let run = &self.runs[index];
+                    let (rows, machine) = (run.rows(), &stages[run.part]);
+                    if columns.contains(&j)
+                        && !self.one(&mut bench, index, machine, &moved, &mut out[first..first + rows])
+                    {
+                        return false;
+                    }
+                }
+            }
+            moved[j] = x[j];
+            for (index, first, _) in left.iter().filter(|(.., columns)| columns.contains(&j)) {
+                for k in *first..first + self.runs[*index].rows() {
+                    jacobian[(k, j)] = step.slope(r[k], a[k], b[k]);
+                }
+            }
+        }
+        true
+    }
+
+    fn one(&mut self, bench: &mut Bench, index: usize, machine: &Machine, x: &[f64], out: &mut [f64]) -> bool {
+        if self.is_stopped() {
+            return false;
+        }
+        self.simulations += 1;
+        let extras = self.extras_of(index, x);
+        self.runs[index].residuals(bench, machine, &extras, out)
+    }
+}
+
+/// A run, where its residuals begin, and the variables that move them.
+type Left = (usize, usize, Vec<usize>);
+
+/// Parameters, the part of the logs that each is for, and the names of the parts.
+type Separated = (Vec<Free>, Vec<Option<usize>>, Vec<String>);
+
+/// Each separate parameter once for every part of the logs, the part that each is for, and the names of the parts.
+fn separated(case: &Case, plan: &Plan, all: Vec<Free>) -> Result<Separated> {
+    if plan.separate.is_empty() {
+        let of = vec![None; all.len()];
+        return Ok((all, of, Vec::new()));
+    }
+    let is_held = |name: &str| plan.held_out.iter().any(|pattern| matches(name, pattern));
+    let logged = || case.experiments.iter().filter(|experiment| experiment.log.is_some());
+    let mut parts: Vec<String> = Vec::new();
+    for experiment in logged().filter(|experiment| !is_held(&experiment.name)) {
+        let part = plan.part(&experiment.name);
+        if !parts.iter().any(|known| known == part) {
+            parts.push(part.to_string());
+        }
+    }
+    let unknown = |name: &str| !parts.iter().any(|known| known == plan.part(name));
+    if let Some(experiment) = logged().find(|experiment| unknown(&experiment.name)) {
+        return Err(Error::new(format!(
+            "\"{}\" is held out, and no log is fitted that shares its separate parameters",
+            experiment.name
+        ))
+        .next("hold out some logs of a campaign only, or leave `separate` out of [fit]"));
+    }
+    let (mut parameters, mut of) = (Vec::new(), Vec::new());
+    for parameter in all {
+        if !plan.separate.contains(&parameter.name) {
+            parameters.push(parameter);
+            of.push(None);
+            continue;
+        }
+        for (place, part) in parts.iter().enumerate() {
+            let mut own = parameter.clone();
+            own.name = format!("{} [{part}]", parameter.name);
+            parameters.push(own);
+            of.push(Some(place));
+        }
+    }
+    Ok((parameters, of, parts))
+}
+
+/// Extras that have room to vary and belong to the run alone.
+pub(crate) fn variable_extras(run: &Run) -> impl Iterator<Item = &Extra> {
+    run.extras.iter().filter(|extra| extra.low < extra.high)
+}
+
+/// Greatest minus least.
+pub(crate) fn extent(values: &[f64]) -> f64 {
+    let finite = values.iter().filter(|v| v.is_finite());
+    let (low, high) = finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &v| (low.min(v), high.max(v)));
+    if high >= low { high - low } else { 0.0 }
+}
+
+/// Speed of the cart at the start of a log or window, m/s, from a line through its first rows, and its standard error.
+fn slope_at_start(run: &Run, r: f64, noise: &Noise) -> (f64, f64) {
+    let Some(seen) = run.seen.iter().find(|seen| is_position(seen.quantity)) else { return (0.0, 0.0) };
+    let rows: Vec<usize> = (0..run.time.len().min(15)).filter(|&k| seen.values[k].is_finite()).collect();
+    let n = rows.len().max(1) as f64;
+    let (t, y) =
+        (rows.iter().map(|&k| run.time[k]).sum::<f64>() / n, rows.iter().map(|&k| seen.values[k]).sum::<f64>() / n);
+    let (mut above, mut below) = (0.0, 0.0);
+    for &k in &rows {
+        above += (run.time[k] - t) * (seen.values[k] - y);
+        below += (run.time[k] - t).powi(2);
+    }
+    let arm = if seen.quantity == Quantity::CartPosition { 1.0 } else { r };
+    if below > 0.0 { (arm * above / below, arm * noise.of(seen.quantity) / below.sqrt()) } else { (0.0, 0.0) }
+}
+
+/// The scale on which a parameter is searched for.
+fn scale(machine: &Machine, parameter: &Free, runs: &[Run]) -> Scale {
+    if parameter.logarithmic() && parameter.start > 0.0 {
+        Scale::Log(parameter.start)
+    } else if parameter.start != 0.0 {
+        Scale::Linear(parameter.start.abs())
+    } else {
+        Scale::Linear(typical(machine, parameter, runs).unwrap_or(1.0))
+    }
+}
+
+/// A typical value of a quantity that may be zero: of friction a tenth of the motor's force at the greatest input; none
+/// where that depends on the machine alone, as the gain of an amplifier, which has whatever unit its input has.
+fn typical(machine: &Machine, parameter: &Free, runs: &[Run]) -> Option<f64> {
+    let most = runs.iter().flat_map(|run| run.logged.iter()).fold(0.0, |most: f64, u| most.max(u.abs()));
+    let motor = &machine.drives[0].motor;
+    let per_unit = match machine.drives[0].amplifier.mode {
+        AmplifierMode::Voltage => motor.torque_constant / motor.resistance,
+        AmplifierMode::Current => motor.torque_constant,
+    };
+    let torque = (0.1 * per_unit * motor.gear_ratio * machine.drives[0].amplifier.gain * most).abs();
+    let r = machine.pulley_radius;
+    let speed = runs
+        .iter()
+        .flat_map(|run| run.seen.iter().map(move |seen| (run, seen)))
+        .map(|(run, seen)| {
+            let along = if seen.quantity.name().starts_with("cart") { 1.0 / r } else { 1.0 };
+            let wide = extent(&seen.values) * along;
+            if is_position(seen.quantity) { 2.0 * wide / run.time.last().copied().unwrap_or(1.0) } else { wide }
+        })
+        .fold(0.0, f64::max)
+        .max(1e-3);
+    let unit = match parameter.unit {
+        "N m" => torque,
+        "N" => torque / r,
+        "N m s/rad" => torque / speed,
+        "N s/m" => torque / (speed * r * r),
+        "rad" => 0.01,
+        "H" => 1e-3 * motor.resistance,
+        _ if parameter.high.is_finite() && parameter.high < 1e14 => 0.1 * parameter.high.abs().max(parameter.low.abs()),
+        _ => return None,
+    };
+    Some(if unit > 0.0 && unit.is_finite() { unit } else { 1.0 })
+}
+
+impl Residuals for Problem<'_> {
+    fn rows(&self) -> usize {
+        self.runs.iter().map(Run::rows).sum()
+    }
+
+    fn evaluate(&mut self, x: &[f64], r: &mut [f64]) -> bool {
+        self.residuals(x, r)
+    }
+
+    fn jacobian(&mut self, x: &[f64], r: &[f64], bounds: &Bounds, how: &Differences) -> Option<DMatrix<f64>> {
+        let (mut jacobian, left) = self.blocks(x, None, bounds, how)?;
+        self.by_differences(&left, (x, r), bounds, how, &mut jacobian).then_some(jacobian)
+    }
+
+    fn linearised(&mut self, x: &[f64], r: &mut [f64], bounds: &Bounds, how: &Differences) -> Option<DMatrix<f64>> {
+        let (mut jacobian, left) = self.blocks(x, Some(r), bounds, how)?;
+        self.by_differences(&left, (x, r), bounds, how, &mut jacobian).then_some(jacobian)
+    }
+
+    fn is_exact(&self) -> bool {
+        self.differences == 0
+    }
+}

@@ -1,0 +1,688 @@
+//! A log made ready to be compared: when the model is asked, what it is told, and what its answer is weighed with.
+
+use super::acceleration::cart_acceleration;
+use crate::case::{Case, Experiment, Initial};
+use crate::control::{Added, follow};
+use crate::design::Design;
+use crate::log::{Log, Quantity};
+use crate::machine::{AmplifierMode, Machine};
+use crate::signal::Signal;
+use crate::signal::profile::Profile;
+use crate::solve::{Bench, Detail, Ending, Flow, Solver};
+use crate::trajectory::{Grid, Trajectory};
+use std::sync::Arc;
+
+/// Share of an interval by which times may be off an even raster and still count as on it: the solver then answers at
+/// the raster's times. What that makes of a value is at most its rate of change times this share of an interval.
+const EVEN: f64 = 1e-3;
+
+/// So often up and so often down, and that in every hundred, go values at rest that tremble.
+const FEWEST: usize = 2;
+
+/// Points of the raster per interval where times are uneven; between them positions follow cubics through positions and
+/// speeds, all else straight lines. With h the raster, that is off by at most h⁴|x⁗|/384, and h²|ÿ|/8.
+const RASTER: f64 = 8.0;
+
+/// Rows of input that are kept from before a window: more than a delay that is fitted along comes to.
+const EARLIER: usize = 60;
+
+/// A nuisance of a log: fitted along, one for each log.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Nuisance {
+    /// The input acts this much later, s.
+    Delay,
+    /// Factor on the input.
+    InputGain,
+    /// Added to the input.
+    InputOffset,
+    /// Position at the start, m of the cart.
+    StartPosition,
+    /// Speed at the start, m/s of the cart.
+    StartSpeed,
+    /// Added to an output.
+    Bias(usize),
+}
+
+impl Nuisance {
+    /// Its name in results.
+    pub fn name(self) -> &'static str {
+        match self {
+            Nuisance::Delay => "delay",
+            Nuisance::InputGain => "input_gain",
+            Nuisance::InputOffset => "input_offset",
+            Nuisance::StartPosition => "start_position",
+            Nuisance::StartSpeed => "start_speed",
+            Nuisance::Bias(_) => "bias",
+        }
+    }
+}
+
+/// A nuisance of a run, and how it is searched.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Extra {
+    /// Which.
+    pub what: Nuisance,
+    /// Value at zero of its variable.
+    pub start: f64,
+    /// The unit of its variable.
+    pub unit: f64,
+    /// Least and greatest value.
+    pub low: f64,
+    /// The greatest.
+    pub high: f64,
+    /// Its prior standard deviation around `start`. A residual like any other.
+    pub known: Option<f64>,
+}
+
+/// One output of a log with its weights.
+#[derive(Debug, Clone)]
+pub struct MeasuredOutput {
+    /// The quantity.
+    pub quantity: Quantity,
+    /// Whether its sign was lost.
+    pub absolute: bool,
+    /// The values, NaN where missing.
+    pub values: Vec<f64>,
+    /// 1/σ of each; zero for what does not count.
+    pub weights: Vec<f64>,
+    /// Step of the converter as far as the values show it; 0 where they show none.
+    pub step: f64,
+    /// How many equal values stand in a row here: what rounds them is the same for all of them.
+    pub repeats: Vec<f64>,
+    /// How many values stand in a row here that go to and fro within two steps: at rest, with noise.
+    pub alike: Vec<f64>,
+}
+
+impl MeasuredOutput {
+    /// Values that do not count yet.
+    fn new(quantity: Quantity, absolute: bool, values: Vec<f64>) -> Self {
+        let step = step_of(&values);
+        let (weights, repeats, alike) = (vec![0.0; values.len()], repeats(&values), alike(&values, step));
+        Self { quantity, absolute, weights, repeats, alike, values, step }
+    }
+}
+
+/// A log, or a window of one, and the model's side of it.
+#[derive(Debug, Clone)]
+pub struct Run {
+    /// The experiment's name.
+    pub name: String,
+    /// Which window of it, from 0; 0 where it is whole.
+    pub window: usize,
+    /// Times, s.
+    pub time: Vec<f64>,
+    /// The input at these times.
+    pub logged: Vec<f64>,
+    /// The outputs.
+    pub seen: Vec<MeasuredOutput>,
+    /// The part of the logs that it is of, as far as these have parameters for themselves.
+    pub part: usize,
+    /// Whether none of it is fitted.
+    pub held_out: bool,
+    /// From which row on nothing is fitted.
+    pub fitted_rows: usize,
+    /// The nuisances.
+    pub extras: Vec<Extra>,
+    /// The nuisances of all logs at once; their values stand behind those of `extras`.
+    shared: Vec<Extra>,
+    /// The closed loop, where the input is not as logged.
+    closed: Option<Arc<Closed>>,
+    input: Signal,
+    initial: Initial,
+    every: f64,
+    until: f64,
+    even: bool,
+}
+
+/// A controller that follows a logged reference again.
+#[derive(Debug, Clone)]
+struct Closed {
+    design: Design,
+    /// The machine that the controller assumes: that of the case, whatever is fitted.
+    model: Machine,
+    profile: Profile,
+    added: Option<Added>,
+}
+
+/// How a run is made of a log.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Setting {
+    /// Length of a window, s; the whole log without.
+    pub window: Option<f64>,
+    /// After this time nothing is fitted.
+    pub fitted_until: Option<f64>,
+    /// Whether none of it is fitted.
+    pub held_out: bool,
+}
+
+impl Run {
+    /// The runs of an experiment's log: one, or one for each window.
+    pub fn all(experiment: &Experiment, log: &Log, setting: &Setting) -> Vec<Self> {
+        let end = log.time.last().copied().unwrap_or(0.0);
+        let Some(window) = setting.window.filter(|window| *window < end) else {
+            return vec![Self::of(experiment, log, 0..log.time.len(), 0, setting)];
+        };
+        let count = (end / window).round().max(1.0) as usize;
+        let mut runs = Vec::new();
+        let mut first = 0;
+        for k in 0..count {
+            let until = if k + 1 == count { f64::INFINITY } else { end * (k + 1) as f64 / count as f64 };
+            let last = log.time.partition_point(|&t| t < until);
+            if last > first + 4 {
+                // The row at the seam belongs to both.
+                runs.push(Self::of(experiment, log, first..(last + 1).min(log.time.len()), k, setting));
+                first = last;
+            }
+        }
+        runs
+    }
+
+    fn of(experiment: &Experiment, log: &Log, rows: std::ops::Range<usize>, window: usize, setting: &Setting) -> Self {
+        let whole = rows.len() == log.time.len();
+        let shift = if whole { 0.0 } else { log.time[rows.start] };
+        let time: Vec<f64> = log.time[rows.clone()].iter().map(|t| t - shift).collect();
+        let logged = log.input[rows.clone()].to_vec();
+        let n = time.len();
+        let (first, last) = (time[0], time[n - 1]);
+        let interval = (last - first) / (n - 1) as f64;
+        let even = first.abs() <= EVEN * interval
+            && time.iter().enumerate().all(|(k, t)| (t - first - k as f64 * interval).abs() <= EVEN * interval);
+        let (every, until) = if even {
+            (interval, interval * (n - 1) as f64)
+        } else {
+            let mut steps: Vec<f64> = time.windows(2).map(|pair| pair[1] - pair[0]).collect();
+            let middle = steps.len() / 2;
+            let every = *steps.select_nth_unstable_by(middle, f64::total_cmp).1 / RASTER;
+            (every, every * (last / every).ceil().max(1.0))
+        };
+        // On the raster, where the solver need not stop twice for a sample.
+        let grid = Grid::new(every, until);
+        let times = if even { (0..n as u64).map(|k| grid.time(k)).collect() } else { time.clone() };
+        let is_logged = matches!(&experiment.input, Signal::Sampled { times: own, .. } if *own == log.time);
+        let input = if whole && !is_logged {
+            experiment.input.clone()
+        } else {
+            // A window that is late still has the input of what came before it.
+            let earlier = rows.start.saturating_sub(EARLIER)..rows.start;
+            let before = log.time[earlier.clone()].iter().map(|t| t - shift);
+            let values = log.input[earlier].iter().chain(&logged).copied().collect();
+            Signal::Sampled { times: before.chain(times).collect(), values, hold: log.hold }
+        };
+        let limit = setting.fitted_until.map_or(f64::INFINITY, |until| until - shift);
+        let fitted_rows = if setting.held_out { 0 } else { time.partition_point(|&t| t < limit) };
+        let seen = log
+            .outputs
+            .iter()
+            .map(|output| MeasuredOutput::new(output.quantity, output.absolute, output.values[rows.clone()].to_vec()))
+            .collect();
+        Self {
+            name: experiment.name.clone(),
+            window,
+            time,
+            logged,
+            seen,
+            part: 0,
+            held_out: setting.held_out,
+            fitted_rows,
+            extras: Vec::new(),
+            shared: Vec::new(),
+            closed: None,
+            input,
+            initial: experiment.initial,
+            every,
+            until,
+            even,
+        }
+    }
+
+    /// Has the controller of a case follow the reference of the log, instead of taking the input as logged.
+    ///
+    /// A loop hides in its output what it makes up for, and shows it in its command: what was logged as the input is
+    /// compared, too.
+    pub fn close(&mut self, case: &Case, log: &Log) {
+        if let (Some(design), Some(reference)) = (&case.controller, &log.reference) {
+            let profile = Profile::sampled(&log.time, reference).shaped(&design.shaper);
+            let added = log.added.as_ref().map(|values| Added { times: log.time.clone(), values: values.clone() });
+            let amplifier = &case.machine.drives[0].amplifier;
+            let (quantity, limit, late) = match amplifier.mode {
+                AmplifierMode::Voltage => (Quantity::MotorVoltage, amplifier.voltage_limit, None),
+                AmplifierMode::Current => (Quantity::MotorCurrent, amplifier.current_limit, amplifier.bandwidth),
+            };
+            if late.is_none() && !self.seen.iter().any(|seen| seen.quantity == quantity) {
+                let given = |input: &f64| {
+                    limit.map_or(amplifier.gain * input, |limit| (amplifier.gain * input).clamp(-limit, limit))
+                };
+                self.seen.push(MeasuredOutput::new(quantity, false, self.logged.iter().map(given).collect()));
+            }
+            self.closed =
+                Some(Arc::new(Closed { design: design.clone(), model: case.machine.clone(), profile, added }));
+        }
+    }
+
+    /// Says what is fitted along for all logs.
+    pub fn share(&mut self, shared: &[Extra]) {
+        self.shared = shared.to_vec();
+    }
+
+    /// Number of residuals: every output at every time, and what is known of extras beforehand.
+    pub fn rows(&self) -> usize {
+        self.seen.len() * self.time.len() + self.extras.iter().filter(|extra| extra.known.is_some()).count()
+    }
+
+    /// As how many independent values those of an output count: those that share an error of rounding count for less.
+    pub fn independent(&self, output: usize) -> f64 {
+        let weights = &self.seen[output].weights;
+        let most = weights.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+        weights.iter().map(|weight| (weight / most).powi(2)).sum()
+    }
+
+    /// Residuals of the extras of which something is known, in standard deviations.
+    fn beforehand(&self, extras: &[f64]) -> impl Iterator<Item = f64> {
+        let pairs = self.extras.iter().zip(extras);
+        pairs.filter_map(|(extra, value)| extra.known.map(|deviation| (value - extra.start) / deviation))
+    }
+
+    /// Whether an extra does no more than shift outputs.
+    pub(crate) fn only_shifts(&self, machine: &Machine, extra: &Extra) -> bool {
+        // Whether it matters where the cart is, and not only how far it goes.
+        let is_placed = machine.changes_along_travel() || machine.cart.travel.is_some();
+        match extra.what {
+            Nuisance::Bias(_) => true,
+            Nuisance::StartPosition => self.seen.iter().all(|seen| !seen.absolute) && !is_placed,
+            Nuisance::Delay | Nuisance::InputGain | Nuisance::InputOffset | Nuisance::StartSpeed => false,
+        }
+    }
+
+    /// ∂r/∂x of an extra that only shifts outputs, x being its variable.
+    pub fn shift(&self, machine: &Machine, extra: &Extra, out: &mut [f64]) {
+        let n = self.time.len();
+        for (i, seen) in self.seen.iter().enumerate() {
+            let per_unit = match extra.what {
+                Nuisance::Bias(index) if index == i => 1.0,
+                Nuisance::StartPosition => per_position(seen.quantity, machine.pulley_radius),
+                _ => 0.0,
+            };
+            for (out, weight) in out[i * n..(i + 1) * n].iter_mut().zip(&seen.weights) {
+                *out = per_unit * extra.unit * weight;
+            }
+        }
+        let known = self.extras.iter().filter(|extra| extra.known.is_some());
+        for (out, own) in out[self.seen.len() * n..].iter_mut().zip(known) {
+            *out = if own.what == extra.what { own.known.map_or(0.0, |deviation| own.unit / deviation) } else { 0.0 };
+        }
+    }
+
+    /// Mean interval between its samples, s.
+    pub fn interval(&self) -> f64 {
+        self.time.last().unwrap_or(&0.0) / (self.time.len().max(2) - 1) as f64
+    }
+
+    /// Whether a controller makes its input.
+    pub fn is_closed(&self) -> bool {
+        self.closed.is_some()
+    }
+
+    /// Whether it is solved at its own times.
+    pub fn is_even(&self) -> bool {
+        self.even
+    }
+
+    /// The value of an extra among these; none if it has no such one.
+    pub(crate) fn extra(&self, what: Nuisance, extras: &[f64]) -> Option<f64> {
+        let mut pairs = self.extras.iter().chain(&self.shared).zip(extras);
+        pairs.find(|(extra, _)| extra.what == what).map(|(_, value)| *value)
+    }
+
+    /// The input as logged, or as the case gives it.
+    pub(crate) fn input(&self) -> &Signal {
+        &self.input
+    }
+
+    /// Where the model begins with these values of the extras, which set the gain of its amplifier, too.
+    pub(crate) fn initial(&self, machine: &mut Machine, extras: &[f64]) -> Initial {
+        machine.drives[0].amplifier.gain *= self.extra(Nuisance::InputGain, extras).unwrap_or(1.0);
+        let r = machine.pulley_radius;
+        let mut initial = self.initial;
+        if let Some(position) = self.extra(Nuisance::StartPosition, extras) {
+            (initial.cart_position, initial.drive_angle, initial.idler_angle) = (position, position / r, position / r);
+        }
+        if let Some(speed) = self.extra(Nuisance::StartSpeed, extras) {
+            (initial.cart_speed, initial.drive_speed, initial.idler_speed) = (speed, speed / r, speed / r);
+        }
+        initial
+    }
+
+    /// The experiment that the model is put through, with these values of the extras.
+    pub fn experiment(&self, machine: &mut Machine, extras: &[f64]) -> Experiment {
+        let initial = self.initial(machine, extras);
+        let delay = self.extra(Nuisance::Delay, extras).unwrap_or(0.0);
+        let offset = self.extra(Nuisance::InputOffset, extras).unwrap_or(0.0);
+        let mut input = match &self.input {
+            Signal::Sampled { times, values, hold } if delay != 0.0 || offset != 0.0 => Signal::Sampled {
+                times: times.iter().map(|t| t + delay).collect(),
+                values: values.iter().map(|u| u + offset).collect(),
+                hold: *hold,
+            },
+            other => other.clone(),
+        };
+        if !matches!(input, Signal::Sampled { .. }) {
+            if delay > 0.0 {
+                let nothing = solve_slot(Signal::Step { value: 0.0, at: 0.0 }, delay);
+                input = Signal::sequence(vec![nothing, solve_slot(input, f64::INFINITY)]);
+            }
+            if offset != 0.0 {
+                input = Signal::Sum(vec![input, Signal::Step { value: offset, at: 0.0 }]);
+            }
+        }
+        Experiment { input, initial, until: self.until, every: self.every, ..empty() }
+    }
+
+    /// The model's outputs at the log's times, one column for each, biases not yet added; false where it does not
+    /// reach the end.
+    pub fn predict(
+        &self,
+        bench: &mut Bench,
+        machine: &Machine,
+        extras: &[f64],
+        quantities: &[Quantity],
+        out: &mut [Vec<f64>],
+    ) -> bool {
+        let mut machine = machine.clone();
+        let experiment = self.experiment(&mut machine, extras);
+        let mut slopes: Vec<Vec<f64>> = vec![Vec::new(); quantities.len()];
+        out.iter_mut().for_each(Vec::clear);
+        let solver = Solver::of(&machine);
+        let cart = machine.cart.clone();
+        let mut take = |block: &Trajectory| {
+            for (i, quantity) in quantities.iter().enumerate() {
+                match quantity {
+                    Quantity::CartAcceleration => out[i].extend(cart_acceleration(block, &cart)),
+                    _ => out[i].extend_from_slice(column(block, *quantity)),
+                }
+                if !self.even
+                    && let Some(speed) = speed_of(*quantity)
+                {
+                    slopes[i].extend_from_slice(column(block, speed));
+                }
+            }
+            Flow::Continue
+        };
+        let outcome = match &self.closed {
+            Some(closed) => {
+                let Closed { design, model, profile, added } = closed.as_ref();
+                follow(&machine, model, design, (profile, added.as_ref()), &experiment, solver, &mut take)
+            }
+            None => {
+                machine.encoder = None;
+                // A rotor of its own has columns that only the whole table has, and so have all forces at the cart.
+                let is_beyond = |quantity: &Quantity| {
+                    quantity.name().starts_with("rotor") || *quantity == Quantity::CartAcceleration
+                };
+                let detail = if quantities.iter().any(is_beyond) { Detail::Full } else { Detail::Lean };
+                bench.mount(&machine).and_then(|()| bench.run(&experiment, detail, &mut take))
+            }
+        };
+        if !outcome.is_ok_and(|outcome| outcome.ending == Ending::Complete) {
+            return false;
+        }
+        if !self.even {
+            for (values, slopes) in out.iter_mut().zip(&slopes) {
+                *values = self.time.iter().map(|&t| between(values, slopes, t / self.every, self.every)).collect();
+            }
+        }
+        out.iter().all(|values| values.len() == self.time.len())
+    }
+
+    /// Weighted residuals, model minus log, with this model and these extras.
+    pub fn residuals(&self, bench: &mut Bench, machine: &Machine, extras: &[f64], out: &mut [f64]) -> bool {
+        let quantities: Vec<Quantity> = self.seen.iter().map(|seen| seen.quantity).collect();
+        let mut columns = vec![Vec::with_capacity(self.time.len()); self.seen.len()];
+        if !self.predict(bench, machine, extras, &quantities, &mut columns) {
+            return false;
+        }
+        self.compare(&columns, extras, out)
+    }
+
+    /// Weighted residuals of what a model answered, one column for each output; false where it is too short.
+    pub(crate) fn compare(&self, columns: &[Vec<f64>], extras: &[f64], out: &mut [f64]) -> bool {
+        if columns.iter().any(|column| column.len() != self.time.len()) {
+            return false;
+        }
+        let n = self.time.len();
+        for (out, own) in out[self.seen.len() * n..].iter_mut().zip(self.beforehand(extras)) {
+            *out = own;
+        }
+        for (i, (seen, column)) in self.seen.iter().zip(columns).enumerate() {
+            let bias = self.bias(i, extras);
+            let out = &mut out[i * n..(i + 1) * n];
+            for k in 0..n {
+                let value = if seen.absolute { column[k].abs() } else { column[k] } + bias;
+                out[k] = if seen.weights[k] == 0.0 { 0.0 } else { seen.weights[k] * (value - seen.values[k]) };
+            }
+        }
+        true
+    }
+
+    /// The bias of output `index`.
+    pub fn bias(&self, index: usize, extras: &[f64]) -> f64 {
+        let own = self.extras.iter().zip(extras).filter(|(extra, _)| extra.what == Nuisance::Bias(index));
+        own.map(|(_, bias)| bias).sum()
+    }
+}
+
+/// An experiment without anything.
+fn empty() -> Experiment {
+    Experiment {
+        name: String::new(),
+        input: Signal::Step { value: 0.0, at: 0.0 },
+        until: 1.0,
+        every: 1.0,
+        initial: Initial::default(),
+        log: None,
+    }
+}
+
+fn solve_slot(signal: Signal, lasts: f64) -> crate::signal::Slot {
+    crate::signal::Slot { signal, lasts }
+}
+
+/// The column of a run that an output is compared with.
+pub(crate) fn column(block: &Trajectory, quantity: Quantity) -> &[f64] {
+    let (name, other) = heading_of(quantity);
+    block.get(name).or_else(|| block.get(other)).unwrap_or(&[])
+}
+
+/// The heading of the column of a quantity, and of that which takes its place where there is none.
+pub(crate) fn heading_of(quantity: Quantity) -> (&'static str, &'static str) {
+    let name = quantity.name();
+    let other = match name {
+        "motor_voltage" => "voltage",
+        "rotor_angle" => "drive_angle",
+        "rotor_speed" => "drive_speed",
+        _ => name,
+    };
+    (name, other)
+}
+
+/// The speed that belongs to a position.
+pub(crate) fn speed_of(quantity: Quantity) -> Option<Quantity> {
+    match quantity {
+        Quantity::DriveAngle => Some(Quantity::DriveSpeed),
+        Quantity::CartPosition => Some(Quantity::CartSpeed),
+        _ => None,
+    }
+}
+
+/// Whether it is a way, so that a constant added to it changes nothing else.
+pub fn is_position(quantity: Quantity) -> bool {
+    quantity.name().ends_with("_angle") || quantity.name().ends_with("_position")
+}
+
+/// By how much a quantity is more for each metre that the start is further on.
+pub(crate) fn per_position(quantity: Quantity, pulley_radius: f64) -> f64 {
+    match (quantity.name().ends_with("_position"), is_position(quantity)) {
+        (true, _) => 1.0,
+        (_, true) => 1.0 / pulley_radius,
+        (_, false) => 0.0,
+    }
+}
+
+/// The value at `at` rows of a raster of `h`.
+pub(crate) fn between(values: &[f64], slopes: &[f64], at: f64, h: f64) -> f64 {
+    let cell = (at.floor().max(0.0) as usize).min(values.len().saturating_sub(2));
+    let s = at - cell as f64;
+    let (a, b) = (values[cell], values[cell + 1]);
+    if slopes.is_empty() {
+        return a + s * (b - a);
+    }
+    let (va, vb) = (h * slopes[cell], h * slopes[cell + 1]);
+    // Hermite's cubic.
+    let (s2, s3) = (s * s, s * s * s);
+    a + (3.0 * s2 - 2.0 * s3) * (b - a) + (s - 2.0 * s2 + s3) * va + (s3 - s2) * vb
+}
+
+/// The step of which all differences between neighbours are multiples; 0 if there is none.
+fn step_of(values: &[f64]) -> f64 {
+    let differences: Vec<f64> =
+        values.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|d| d.is_finite() && *d > 0.0).collect();
+    let size = values.iter().filter(|v| v.is_finite()).fold(0.0, |most: f64, v| most.max(v.abs()));
+    let real: Vec<f64> = differences.into_iter().filter(|d| *d > 1e-9 * size).collect();
+    let Some(least) = real.iter().copied().min_by(f64::total_cmp) else { return 0.0 };
+    // Numbers in files are rounded themselves.
+    let whole = |d: &&f64| (*d / least - (*d / least).round()).abs() <= 0.05;
+    let many = real.iter().filter(whole).count();
+    if many as f64 >= 0.98 * real.len() as f64 && real.len() >= 3 { least } else { 0.0 }
+}
+
+/// For each value how many equal ones stand around it in a row.
+fn repeats(values: &[f64]) -> Vec<f64> {
+    values.chunk_by(|a, b| a == b).flat_map(|same| std::iter::repeat_n(same.len() as f64, same.len())).collect()
+}
+
+/// For each value how many stand around it in a row within two steps, often to and fro; 1 where they do not.
+fn alike(values: &[f64], step: f64) -> Vec<f64> {
+    let mut alike = vec![1.0; values.len()];
+    let mut first = 0;
+    while step > 0.0 && first < values.len() {
+        let (mut low, mut high) = (values[first], values[first]);
+        let (mut up, mut down) = (0, 0);
+        let mut last = first + 1;
+        while last < values.len() && values[last].is_finite() {
+            let (least, most) = (low.min(values[last]), high.max(values[last]));
+            if most - least > 2.5 * step {
+                break;
+            }
+            (low, high) = (least, most);
+            up += usize::from(values[last] > values[last - 1]);
+            down += usize::from(values[last] < values[last - 1]);
+            last += 1;
+        }
+        if up.min(down) >= FEWEST.max((last - first) / 100) {
+            alike[first..last].fill((last - first) as f64);
+        }
+        first = last;
+    }
+    alike
+}
+
+/// Variance of what remains of rounding to this step in the mean of many values at rest, over all places of rest, where
+/// they tremble by a normal deviation σ: Δ²/12 without noise, as good as nothing from σ = Δ/2 on.
+///
+/// The mean of a rounded value is off by Σₖ (−1)ᵏ Δ/(πk) e^(−2π²k²σ²/Δ²) sin(2πkx/Δ) (Widrow 1956); over all x that has
+/// the variance Σₖ Δ²/(2π²k²) e^(−4π²k²σ²/Δ²).
+pub fn rounding_at_rest(step: f64, deviation: f64) -> f64 {
+    use std::f64::consts::PI;
+    let term = |k: u32| {
+        let k2 = f64::from(k * k);
+        (-4.0 * PI * PI * k2 * (deviation / step).powi(2)).exp() / k2
+    };
+    if step > 0.0 { step * step / (2.0 * PI * PI) * (1..200).map(term).sum::<f64>() } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::case::TEMPLATE;
+    use crate::log::Output;
+    use crate::signal::Hold;
+    use crate::solve::simulate;
+
+    #[test]
+    fn steps_of_converters_are_found() {
+        let counts: Vec<f64> = (0..200).map(|k| (f64::from(k) * 1.37).round() * 0.01).collect();
+        assert!((step_of(&counts) - 0.01).abs() < 1e-12);
+        let smooth: Vec<f64> = (0..200).map(|k| (f64::from(k) * 0.1).sin()).collect();
+        assert_eq!(step_of(&smooth), 0.0);
+    }
+
+    #[test]
+    fn what_trembles_at_rest_is_told_from_what_moves() {
+        let values = [0.0, 1.0, 2.0, 3.0, 3.0, 4.0, 3.0, 3.0, 5.0, 4.0, 3.0, 6.0, 7.0];
+        let found = alike(&values, 1.0);
+        assert_eq!((&found[..3], &found[3..11], &found[11..]), (&[1.0; 3][..], &[8.0; 8][..], &[1.0; 2][..]));
+        assert!((rounding_at_rest(2.0, 0.0) / (4.0 / 12.0) - 1.0).abs() < 5e-3);
+        assert!(rounding_at_rest(2.0, 2.0) < 1e-15);
+    }
+
+    /// The input of a window was nothing until the delay had passed, as if the machine had been switched on there: the
+    /// model's windows left the whole run at their first rows, and a delay could not be found in them.
+    #[test]
+    fn a_window_that_is_late_goes_on_with_the_input_from_before_it() {
+        let changes = ["belt={ model = \"rigid\" }"];
+        let case = Case::from_text_with("axis.toml", TEMPLATE, &changes).unwrap();
+        let mut experiment = case.experiments[1].clone();
+        let rows = simulate(&case.machine, &experiment, Solver::of(&case.machine)).unwrap().trajectory;
+        let column = |name: &str| rows.get(name).unwrap().to_vec();
+        let outputs = [Quantity::CartPosition, Quantity::CartSpeed];
+        let log = Log {
+            name: experiment.name.clone(),
+            file: Default::default(),
+            time: column("time"),
+            input: column("voltage"),
+            added: None,
+            hold: Hold::Zero,
+            reference: None,
+            outputs: outputs
+                .map(|quantity| Output { quantity, absolute: false, values: column(quantity.name()) })
+                .to_vec(),
+            ended: None,
+        };
+        experiment.input = Signal::Sampled { times: log.time.clone(), values: log.input.clone(), hold: log.hold };
+        let predicted = |run: &mut Run, known: &[(Nuisance, f64)]| {
+            let extra = |what| Extra { what, start: 0.0, unit: 1.0, low: -1.0, high: 1.0, known: None };
+            run.extras = known.iter().map(|(what, _)| extra(*what)).collect();
+            let values: Vec<f64> = known.iter().map(|(_, value)| *value).collect();
+            let mut columns = vec![Vec::new(); 2];
+            assert!(run.predict(&mut Bench::default(), &case.machine, &values, &outputs, &mut columns));
+            columns
+        };
+        let late = (Nuisance::Delay, 12e-3);
+        let whole = predicted(&mut Run::all(&experiment, &log, &Setting::default())[0], &[late]);
+        // Windows of 40 rows: seams in every phase of the pulses, and more delay than some inputs last in a window.
+        let setting = Setting { window: Some(0.04), ..Setting::default() };
+        let mut first = 0;
+        for mut run in Run::all(&experiment, &log, &setting) {
+            let begin = [(Nuisance::StartPosition, whole[0][first]), (Nuisance::StartSpeed, whole[1][first])];
+            let own = predicted(&mut run, &[late, begin[0], begin[1]]);
+            for (own, whole) in own.iter().zip(&whole) {
+                for (k, (own, whole)) in own.iter().zip(&whole[first..]).enumerate() {
+                    assert!((own - whole).abs() < 1e-9, "window {}, row {k}: {own} {whole}", run.window);
+                }
+            }
+            first += run.time.len() - 1;
+        }
+        assert_eq!(first + 1, log.time.len());
+    }
+
+    #[test]
+    fn cubics_go_through_cubics() {
+        let (h, f) = (0.5, |t: f64| 1.0 + t - 2.0 * t * t + 0.5 * t * t * t);
+        let slope = |t: f64| 1.0 - 4.0 * t + 1.5 * t * t;
+        let at = |k: usize| k as f64 * h;
+        let values: Vec<f64> = (0..5).map(|k| f(at(k))).collect();
+        let slopes: Vec<f64> = (0..5).map(|k| slope(at(k))).collect();
+        for t in [0.0, 0.2, 0.77, 1.9, 2.0] {
+            assert!((between(&values, &slopes, t / h, h) - f(t)).abs() < 1e-12);
+        }
+    }
+}

@@ -1,0 +1,236 @@
+//! The Jacobian of a fit by exact sensitivities: one run for all variables, instead of one or two for each.
+
+use super::problem::Problem;
+use super::residuals::{Bounds, Differences, Step};
+use super::run::{Nuisance, Run, between, heading_of, per_position, speed_of};
+use crate::log::Quantity;
+use crate::machine::Machine;
+use crate::machine::axis::{CART, DRIVE};
+use crate::mechanism::Mechanism;
+use crate::signal::Signal;
+use crate::solve::{Begun, Bench, Differentiated, Variable};
+use nalgebra::DMatrix;
+use std::sync::Arc;
+
+/// How far apart machines are that equations are compared of, by a share of a variable or of its unit: what differences
+/// of three numbers as they are in fractions are off by balances what rounding does where one of many terms changes.
+const APART: f64 = 3e-5;
+
+/// The part of its unit by which a start is moved: the state depends on it in a straight line.
+const START: f64 = 1e-2;
+
+impl Problem<'_> {
+    /// Puts the derivatives of the residuals of run `index`, which begin at row `first`, into the columns of these
+    /// variables, and the residuals where they are asked for; false where derivatives cannot be told exactly.
+    pub(crate) fn exact_block(
+        &mut self,
+        (bench, machine): (&mut Bench, &Machine),
+        (index, first): (usize, usize),
+        (x, bounds): (&[f64], &Bounds),
+        columns: &[usize],
+        (jacobian, residuals): (&mut DMatrix<f64>, Option<&mut [f64]>),
+    ) -> bool {
+        if self.runs[index].is_closed() || !machine.is_piecewise_linear() {
+            return false;
+        }
+        let variables = |is_moved: bool| {
+            let all = columns.iter().map(|&j| self.variable_of((index, j), x, bounds, is_moved));
+            all.collect::<Option<Vec<_>>>()
+        };
+        // Where it does not matter where the cart begins, it begins at the origin, so that all runs count from there
+        // and share what the machine has made ready; but angles there depend on the radius.
+        let mut is_moved = self.runs[index].is_shifted(machine);
+        let Some(mut all) = variables(is_moved) else { return false };
+        if is_moved && all.iter().any(|variable| changes_radius(machine, variable)) {
+            is_moved = false;
+            match variables(is_moved) {
+                Some(own) => all = own,
+                None => return false,
+            }
+        }
+        let variables = all;
+        let extras = self.extras_from(index, x, is_moved);
+        let Some(slopes) = self.runs[index].slopes(bench, machine, &extras, &variables) else { return false };
+        self.simulations += 1;
+        let run = &self.runs[index];
+        let rows = run.time.len();
+        if let Some(residuals) = residuals {
+            let own = self.extras_of(index, x);
+            let start = if is_moved { run.extra(Nuisance::StartPosition, &own).unwrap_or(0.0) } else { 0.0 };
+            let shown = run.seen.iter().zip(&slopes).map(|(seen, (values, _))| {
+                let by = start * per_position(seen.quantity, machine.pulley_radius);
+                values.iter().map(|value| value + by).collect()
+            });
+            let shown: Vec<Vec<f64>> = shown.collect();
+            if !run.compare(&shown, &own, residuals) {
+                return false;
+            }
+        }
+        for (i, (seen, (values, slopes))) in run.seen.iter().zip(&slopes).enumerate() {
+            for (&j, slopes) in columns.iter().zip(slopes) {
+                let mut column = jacobian.column_mut(j);
+                for k in 0..rows {
+                    // d|y| = ± dy
+                    let sign = if seen.absolute && values[k] < 0.0 { -1.0 } else { 1.0 };
+                    column[first + i * rows + k] = sign * seen.weights[k] * slopes[k];
+                }
+            }
+        }
+        // What is known of the run's own beforehand.
+        let known = run.extras.iter().filter(|extra| extra.known.is_some());
+        for (at, extra) in known.enumerate() {
+            let own = self.own_variables(index).into_iter().find(|(_, own)| own.what == extra.what);
+            if let (Some((j, extra)), Some(deviation)) = (own, extra.known)
+                && columns.contains(&j)
+            {
+                jacobian[(first + run.seen.len() * rows + at, j)] = extra.unit / deviation;
+            }
+        }
+        true
+    }
+
+    /// The extras of a run, with its start moved to the origin or not.
+    fn extras_from(&self, index: usize, x: &[f64], is_moved: bool) -> Vec<f64> {
+        let mut extras = self.extras_of(index, x);
+        for (extra, value) in self.runs[index].extras.iter().zip(&mut extras) {
+            if is_moved && extra.what == Nuisance::StartPosition {
+                *value = 0.0;
+            }
+        }
+        extras
+    }
+
+    /// What variable `j` of the search is to run `index`; none for what is no number of a machine, nor known how it
+    /// moves the input.
+    fn variable_of(&self, (index, j): (usize, usize), x: &[f64], bounds: &Bounds, is_moved: bool) -> Option<Variable> {
+        let extra = match j.checked_sub(self.parameters.len()) {
+            None => None,
+            Some(shared) if j < self.globals() => Some(self.shared[shared]),
+            Some(_) => self.own_variables(index).into_iter().find(|(own, _)| *own == j).map(|(_, extra)| extra),
+        };
+        let run = &self.runs[index];
+        let begun = |to: f64| {
+            let mut moved = x.to_vec();
+            moved[j] = to;
+            run.begun(&self.stage_of(run.part, &moved), &self.extras_from(index, &moved, is_moved))
+        };
+        match extra.map(|extra| (extra.what, extra.unit)) {
+            Some((Nuisance::Delay, unit)) => Some(Variable::Delay(unit)),
+            Some((Nuisance::InputOffset, unit)) => Some(Variable::Offset(unit, run.begins(&self.extras_of(index, x))?)),
+            Some((Nuisance::Bias(_), _)) => None,
+            Some((Nuisance::StartPosition | Nuisance::StartSpeed, _)) => {
+                Some(Variable::central(START, |by| begun(x[j] + by)))
+            }
+            None | Some((Nuisance::InputGain, _)) => {
+                let steps = Differences::Coarse(x.iter().map(|x| APART * x.abs().max(1.0)).collect());
+                let step = Step::new(x, bounds, j, &steps);
+                let second = step.second?;
+                Some(Variable::Machine {
+                    points: Box::new([begun(step.first), begun(second)]),
+                    weights: step.weights(),
+                })
+            }
+        }
+    }
+
+    /// The variables that move run `index` otherwise than by a shift of its outputs.
+    pub(crate) fn movers(&self, index: usize, machine: &Machine, bounds: &Bounds) -> Vec<usize> {
+        let run = &self.runs[index];
+        let own = self.own_variables(index).into_iter().filter(|(_, extra)| !run.only_shifts(machine, extra));
+        let concerns = |j: &usize| self.of.get(*j).copied().flatten().is_none_or(|part| part == run.part);
+        let globals = (0..self.globals()).filter(|&j| !bounds.hold(j)).filter(concerns);
+        globals.chain(own.map(|(j, _)| j)).collect()
+    }
+}
+
+/// An output and its derivatives by the variables.
+type Sloped = (Vec<f64>, Vec<Vec<f64>>);
+
+impl Run {
+    /// Whether its start only shifts its outputs.
+    fn is_shifted(&self, machine: &Machine) -> bool {
+        let mut starts = self.extras.iter().filter(|extra| extra.what == Nuisance::StartPosition);
+        starts.any(|extra| self.only_shifts(machine, extra))
+    }
+
+    /// The machine that the model's side of this run is, and where it begins.
+    fn begun(&self, machine: &Machine, extras: &[f64]) -> Begun {
+        let mut machine = Machine { encoder: None, ..machine.clone() };
+        let initial = self.initial(&mut machine, extras);
+        let mechanism = Arc::new(machine.mechanism());
+        Begun { start: initial.state(&mechanism), mechanism }
+    }
+
+    /// Each output with its derivatives by the variables at the log's times; none where they cannot be told exactly.
+    fn slopes(
+        &self,
+        bench: &mut Bench,
+        machine: &Machine,
+        extras: &[f64],
+        variables: &[Variable],
+    ) -> Option<Vec<Sloped>> {
+        let mut machine = Machine { encoder: None, ..machine.clone() };
+        let experiment = self.experiment(&mut machine, extras);
+        let mechanism = machine.mechanism();
+        let mut outputs = Vec::new();
+        for seen in &self.seen {
+            outputs.push(differentiated(&mechanism, seen.quantity)?);
+        }
+        // Between rows positions go by speeds.
+        let mut bends = vec![None; self.seen.len()];
+        if !self.is_even() {
+            for (bend, seen) in bends.iter_mut().zip(&self.seen) {
+                if let Some(speed) = speed_of(seen.quantity) {
+                    *bend = Some(outputs.len());
+                    outputs.push(differentiated(&mechanism, speed)?);
+                }
+            }
+        }
+        bench.mount(&machine).ok()?;
+        let mut found = bench.sensitivities(&experiment, variables, &outputs).ok()??;
+        if self.is_even() {
+            let full = found.values.iter().all(|values| values.len() == self.time.len());
+            return full.then(|| found.values.into_iter().zip(found.columns).collect());
+        }
+        let every = experiment.every;
+        let at_times = |values: &[f64], slopes: &[f64]| -> Vec<f64> {
+            self.time.iter().map(|&t| between(values, slopes, t / every, every)).collect()
+        };
+        let mut all = Vec::new();
+        for (i, bend) in bends.into_iter().enumerate() {
+            let values = at_times(&found.values[i], bend.map_or(&[], |bend| &found.values[bend]));
+            let columns = std::mem::take(&mut found.columns[i]);
+            let slopes = columns.iter().enumerate();
+            let slopes = slopes.map(|(j, own)| at_times(own, bend.map_or(&[], |bend| &found.columns[bend][j])));
+            all.push((values, slopes.collect()));
+        }
+        Some(all)
+    }
+
+    /// When what is added to the input begins to be, s; none where the input has no such moment.
+    fn begins(&self, extras: &[f64]) -> Option<f64> {
+        let delay = self.extra(Nuisance::Delay, extras);
+        match self.input() {
+            Signal::Sampled { times, .. } => Some(times.first()? + delay.unwrap_or(0.0)),
+            // It is added from the first instant on, whenever the rest comes.
+            _ if delay.is_none() => Some(0.0),
+            _ => None,
+        }
+    }
+}
+
+/// A quantity of a log as what is differentiated.
+fn differentiated(mechanism: &Mechanism, quantity: Quantity) -> Option<Differentiated> {
+    let shown = |name: &str| mechanism.columns.iter().find(|heading| heading.name == name);
+    if quantity == Quantity::CartAcceleration {
+        return shown("span1_force").map(|_| Differentiated::Acceleration(CART));
+    }
+    let (name, other) = heading_of(quantity);
+    shown(name).or_else(|| shown(other)).map(|heading| Differentiated::Shown(heading.shown))
+}
+
+/// Whether a variable changes the radius of the pulleys.
+fn changes_radius(machine: &Machine, variable: &Variable) -> bool {
+    let is_other = |begun: &Begun| begun.mechanism.bodies[DRIVE].kind.lever() != machine.pulley_radius;
+    matches!(variable, Variable::Machine { points, .. } if points.iter().any(is_other))
+}

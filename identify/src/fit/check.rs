@@ -1,0 +1,79 @@
+//! Before a fit: what the logs show, what they determine, and what one more experiment would.
+
+use crate::case::{Case, Plan};
+use crate::error::Result;
+use crate::fit::asked::problem::Stop;
+use crate::fit::search::regression::{Balance, regression};
+use crate::fit::trust::found::Fit;
+use crate::fit::trust::identify::{Group, Identifiability};
+use crate::fit::trust::nearest::search;
+use crate::fit::trust::proposals::{Proposal, proposals};
+use crate::fit::trust::result::told;
+use crate::fit::trust::trials;
+use crate::log::Survey;
+use crate::solve::Flow;
+
+/// The result of a check: all that there is to know before a fit.
+#[derive(Debug, Clone)]
+pub struct Check {
+    /// The survey of each log.
+    pub logs: Vec<Survey>,
+    /// The balance of torques of a rigid axis, by regression; none where the logs do not allow one.
+    pub balance: Option<Balance>,
+    /// The parameters that they determine together; none where every free parameter ended at a bound.
+    pub identifiability: Option<Identifiability>,
+    /// Advice for each group that is not determined.
+    pub choices: Vec<Vec<String>>,
+    /// Which errors that is for.
+    pub noise_words: String,
+    /// Proposals of one more experiment, the best first.
+    pub experiments: Vec<Proposal>,
+    /// The fit that says so.
+    pub fit: Fit,
+}
+
+impl Check {
+    /// Groups of parameters that are not determined, and what to do about each.
+    pub fn groups(&self) -> impl Iterator<Item = (&Group, &Vec<String>)> {
+        self.identifiability.iter().flat_map(|known| &known.groups).zip(&self.choices)
+    }
+}
+
+/// Looks at the logs of a case: by a fit, whose verdict it gives.
+pub fn check(case: &Case, plan: &Plan) -> Result<Check> {
+    check_watched(case, plan, None, &mut |_, _| Flow::Continue)
+}
+
+/// The same; `watch` sees the variables and the cost after each step, and `stop` ends the search with the best so far.
+pub fn check_watched(
+    case: &Case,
+    plan: &Plan,
+    stop: Option<Stop>,
+    watch: &mut dyn FnMut(&[f64], f64) -> Flow,
+) -> Result<Check> {
+    let settled = search(case, plan, stop, watch)?;
+    let judged = settled.judged(case, plan);
+    let found = settled.searched;
+    let experiments = judged.as_ref().map_or(Vec::new(), |judged| proposals(&found, judged));
+    let noise: Vec<String> = found
+        .noise
+        .iter()
+        .map(|(quantity, sigma)| {
+            let sigma = crate::number::engineering(*sigma, quantity.unit(), 2).replace('\u{a0}', " ");
+            format!("{} {sigma}", quantity.name())
+        })
+        .collect();
+    let alike = judged.as_ref().map_or(String::new(), |judged| format!(", {}", judged.slow_words(&found.problem)));
+    let noise_words = format!("for what the best model leaves ({}){alike}", noise.join(", "));
+    let balance = regression(&found.problem);
+    let fit = told(case, plan, &found, judged.as_ref());
+    Ok(Check {
+        balance,
+        logs: trials::surveys(case, plan, &found),
+        identifiability: judged.map(|judged| judged.identifiability),
+        choices: fit.choices.clone(),
+        noise_words,
+        experiments,
+        fit,
+    })
+}

@@ -1,0 +1,158 @@
+//! Which single change of a machine explains logs that it does not meet: those of another day, after a repair, with
+//! another load.
+
+use crate::case::{Case, Nuisances, Plan, Scope};
+use crate::error::Result;
+use crate::fit::asked::problem::Stop;
+use crate::fit::search::starts::{Searched, Work};
+use crate::fit::trust::found::Estimate;
+use crate::fit::trust::nearest::{Settled, search};
+use crate::fit::trust::result::result;
+use crate::fit::trust::scores::{Together, together};
+use crate::fit::trust::uncertainty::Judged;
+use crate::log::Quantity;
+use crate::parameter::{self, Free};
+use crate::solve::Flow;
+
+/// Changes that leave as much of the sum of squares as the best one but for this part are as good.
+const ALIKE: f64 = 0.02;
+
+/// The effect of single changes on the errors of a machine.
+#[derive(Debug, Clone)]
+pub struct Drift {
+    /// The errors of the machine as it is.
+    pub unchanged: Vec<Together>,
+    /// Single changes, the one that explains most first.
+    pub changes: Vec<Change>,
+    /// The effort.
+    pub work: Work,
+}
+
+/// A single change.
+#[derive(Debug, Clone)]
+pub struct Change {
+    /// The parameter, with its old and its new value.
+    pub estimate: Estimate,
+    /// The errors with it.
+    pub errors: Vec<Together>,
+    /// The share of the sum of squares that is left; of several quantities, the mean.
+    pub left: f64,
+}
+
+impl Drift {
+    /// The quantities that the logs hold.
+    pub fn quantities(&self) -> Vec<Quantity> {
+        self.unchanged.iter().filter(|one| !one.held_out).map(|one| one.quantity).collect()
+    }
+
+    /// The changes that leave as little as the best one, the best among them.
+    pub fn best(&self) -> impl Iterator<Item = &Change> {
+        let least = self.changes.first().map_or(0.0, |change| change.left);
+        self.changes.iter().take_while(move |change| change.left <= least * (1.0 + ALIKE) + 1e-12)
+    }
+}
+
+/// Changes one parameter of the machine after the other, each by itself, to meet the logs of `case`: what `plan`
+/// searches for, whatever else may be off, and delay, gain and offset of the input.
+pub fn drift(case: &Case, plan: &Plan, stop: Option<Stop>, watch: &mut dyn FnMut(&str) -> Flow) -> Result<Drift> {
+    let none = nothing(plan);
+    let quiet = &mut |_: &[f64], _| Flow::Continue;
+    watch("the machine as it is");
+    let found = search(case, &none, stop, quiet)?.searched;
+    let unchanged = errors(&found);
+    let mut work = found.work;
+    let mut changes = Vec::new();
+    for single in singles(case, plan, &none) {
+        let name = single.names().next().unwrap_or_else(|| "the input".into());
+        if watch(&name) == Flow::Stop || stop.is_some_and(|stop| stop()) {
+            break;
+        }
+        // What cannot be changed so that the model gets through the logs explains nothing.
+        let Ok(Settled { searched: found, .. }) = search(case, &single, stop, quiet) else { continue };
+        work.add(&found.work);
+        let judged = Judged::new(
+            &found.problem,
+            &found.best.residuals,
+            &found.best.jacobian,
+            &found.best.x,
+            &found.best.at_bound,
+        );
+        let shared = plan.nuisance != single.nuisance;
+        let fit = result(&found, judged.as_ref());
+        let own = if shared { fit.estimates.last() } else { fit.estimates.first() };
+        let Some(estimate) = own.cloned() else { continue };
+        let errors = together(&fit.logs, |_| String::new());
+        let left = left(&unchanged, &errors);
+        changes.push(Change { estimate, errors, left });
+    }
+    changes.sort_by(|a, b| a.left.total_cmp(&b.left));
+    Ok(Drift { unchanged, changes, work })
+}
+
+/// The same logs, and nothing searched for in them.
+pub(crate) fn nothing(plan: &Plan) -> Plan {
+    Plan {
+        free: Vec::new(),
+        tied: Vec::new(),
+        lumped: Vec::new(),
+        separate: Vec::new(),
+        priors: Vec::new(),
+        bounds: Vec::new(),
+        ..plan.clone()
+    }
+}
+
+fn errors(found: &Searched) -> Vec<Together> {
+    together(&result(found, None).logs, |_| String::new())
+}
+
+/// The plans with one change each.
+fn singles(case: &Case, plan: &Plan, none: &Plan) -> Vec<Plan> {
+    let machine = &case.machine;
+    let mut taken: Vec<Free> = Vec::new();
+    let mut plans = Vec::new();
+    let mut single = |own: Plan| {
+        let Some(name) = own.names().next() else { return };
+        let Ok(free) = Free::new(machine, &name, &[], &plan.bounds) else { return };
+        let same = |other: &Free| other.keys == free.keys;
+        if !taken.iter().any(same) {
+            taken.push(free);
+            plans.push(Plan {
+                bounds: plan.bounds.iter().filter(|(known, _)| *known == name).cloned().collect(),
+                ..own
+            });
+        }
+    };
+    for key in plan.free.iter().cloned().chain(parameter::every(machine)).chain(["cart.load".to_string()]) {
+        single(Plan { free: vec![key], ..none.clone() });
+    }
+    for keys in &plan.tied {
+        single(Plan { tied: vec![keys.clone()], ..none.clone() });
+    }
+    for name in &plan.lumped {
+        single(Plan { lumped: vec![name.clone()], ..none.clone() });
+    }
+    let nuisance = none.nuisance;
+    if !plan.closed_loop {
+        if nuisance.delay == Scope::Off {
+            plans.push(Plan { nuisance: Nuisances { delay: Scope::Shared, ..nuisance }, ..none.clone() });
+        }
+        if nuisance.input_offset == Scope::Off {
+            plans.push(Plan { nuisance: Nuisances { input_offset: Scope::Shared, ..nuisance }, ..none.clone() });
+        }
+    }
+    if nuisance.input_gain == Scope::Off {
+        plans.push(Plan { nuisance: Nuisances { input_gain: Scope::Shared, ..nuisance }, ..none.clone() });
+    }
+    plans
+}
+
+/// The share of the sum of squares that is left, in the mean over quantities.
+fn left(before: &[Together], after: &[Together]) -> f64 {
+    let of = |one: &Together| {
+        let own = after.iter().find(|other| other.quantity == one.quantity && other.held_out == one.held_out);
+        own.map_or(f64::INFINITY, |own| (own.rmse / one.rmse.max(f64::MIN_POSITIVE)).powi(2))
+    };
+    let quantities: Vec<f64> = before.iter().filter(|one| !one.held_out).map(of).collect();
+    quantities.iter().sum::<f64>() / quantities.len().max(1) as f64
+}

@@ -1,0 +1,393 @@
+//! The friction laws that are compared: what each makes of the text of a case, and what is searched for then.
+
+use crate::case::{Case, Files, Plan};
+use crate::error::{Error, Result};
+use crate::fit::asked::run::is_position;
+use crate::friction::Friction;
+use crate::log::Quantity;
+use crate::machine::Machine;
+use std::path::Path;
+use toml_edit::{Array, DocumentMut, InlineTable, Item, Value};
+
+/// Points of friction and of forces along the travel.
+const POINTS: usize = 7;
+
+/// Speeds at which a force by speed has points, as shares of the greatest one.
+const SPEEDS: [f64; 7] = [-1.0, -0.5, -0.125, 0.0, 0.125, 0.5, 1.0];
+
+/// Share of the Coulomb friction that a Stribeck curve begins above it, and share of the greatest speed over which it
+/// falls.
+const ABOVE: f64 = 0.2;
+
+/// Breakaway at most, as a multiple of the Coulomb friction that a search begins with: where a log never rests, a
+/// breakaway that holds for ever meets it as well, and holds the next log for ever.
+const BREAKAWAY: f64 = 4.0;
+
+const FALL: f64 = 0.05;
+
+/// Way over which bristles bend, m of the cart, where a search begins.
+const BEND: f64 = 2e-5;
+
+/// A friction law of a body.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FrictionLaw {
+    /// b v alone.
+    Viscous,
+    /// The same and Coulomb friction.
+    Coulomb,
+    /// Each direction with its own values.
+    Asymmetric,
+    /// A Stribeck curve above the better one of the two before.
+    Stribeck,
+    /// The better one of these, with a factor on dry friction that changes along the travel.
+    Along,
+    /// Bristles in place of a Stribeck curve.
+    LuGre,
+    /// The better one of the straight laws, with a force that changes along the travel and is the same in both
+    /// directions.
+    ForceAlong,
+    /// The same with a force that changes with the speed.
+    ForceBySpeed,
+}
+
+impl FrictionLaw {
+    /// All of them, the simplest first.
+    pub const ALL: [Self; 8] = [
+        Self::Viscous,
+        Self::Coulomb,
+        Self::Asymmetric,
+        Self::Stribeck,
+        Self::Along,
+        Self::ForceAlong,
+        Self::ForceBySpeed,
+        Self::LuGre,
+    ];
+
+    /// Those that are compared unless others are named: bristles take long, and a force is no friction.
+    pub const USUAL: [Self; 5] = [Self::Viscous, Self::Coulomb, Self::Asymmetric, Self::Stribeck, Self::Along];
+
+    /// Its name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Viscous => "viscous",
+            Self::Coulomb => "coulomb",
+            Self::Asymmetric => "asymmetric",
+            Self::Stribeck => "stribeck",
+            Self::Along => "along",
+            Self::LuGre => "lugre",
+            Self::ForceAlong => "force-along",
+            Self::ForceBySpeed => "force-by-speed",
+        }
+    }
+
+    /// The law of this name.
+    pub fn named(name: &str) -> Result<Self> {
+        Self::ALL.into_iter().find(|law| law.name() == name).ok_or_else(|| {
+            Error::new(format!("there is no friction law \"{name}\" to compare"))
+                .allowed(Self::ALL.map(Self::name).join(", "))
+        })
+    }
+
+    /// Whether it stands above one of the laws of straight lines.
+    pub(super) fn is_above(self) -> bool {
+        match self {
+            Self::Viscous | Self::Coulomb | Self::Asymmetric => false,
+            Self::Stribeck | Self::Along | Self::LuGre | Self::ForceAlong | Self::ForceBySpeed => true,
+        }
+    }
+
+    /// Whether it curves with speed: a run takes a hundred times as long then.
+    pub(super) fn is_curved(self) -> bool {
+        match self {
+            Self::Viscous | Self::Coulomb | Self::Asymmetric | Self::Along | Self::ForceAlong | Self::ForceBySpeed => {
+                false
+            }
+            Self::Stribeck | Self::LuGre => true,
+        }
+    }
+}
+
+/// The body whose friction is compared: that of which most is searched for; the cart where that is none.
+pub(super) fn body(plan: &Plan) -> &'static str {
+    let count = |body: &str| {
+        let own = plan.free.iter().chain(plan.tied.iter().flatten());
+        own.filter(|key| key.starts_with(&format!("{body}.friction."))).count()
+    };
+    if count("drive_pulley") > count("cart") { "drive_pulley" } else { "cart" }
+}
+
+/// The case with this law above `sided` friction or not, beginning at the machine `from`, and what is searched for in
+/// it.
+pub(super) fn with(
+    case: &Case,
+    name: &Path,
+    plan: &Plan,
+    law: FrictionLaw,
+    sided: bool,
+    from: &Machine,
+) -> Result<(Case, Plan)> {
+    let body = body(plan);
+    let friction = if body == "cart" { from.cart.friction } else { from.drive_pulley.friction };
+    let mut document: DocumentMut = case.text.parse().map_err(|_| Error::new("this is not TOML").in_file(name))?;
+    let fastest = fastest(case) / if body == "cart" { 1.0 } else { from.pulley_radius };
+    let sided = sided || law == FrictionLaw::Asymmetric;
+    let (table, keys) = table(case, law, sided, &friction, fastest, body);
+    let coulomb = table.get("coulomb").and_then(Value::as_float).unwrap_or_default();
+    let near = match law {
+        FrictionLaw::Stribeck => Some(("stribeck.force", [0.0, (BREAKAWAY - 1.0) * coulomb])),
+        // Below Coulomb friction it would change nothing.
+        FrictionLaw::LuGre => Some(("static", [coulomb, BREAKAWAY * coulomb])),
+        _ => None,
+    };
+    let mut free: Vec<String> = keys.iter().map(|key| format!("{body}.friction.{key}")).collect();
+    put(&mut document, body, "friction", Value::InlineTable(table));
+    let loaded = plan.free.iter().any(|key| key == "cart.load");
+    let line = line(case, law, sided || loaded);
+    if let Some(Line { key, over, free: numbers }) = &line {
+        let point = |x: &f64| Value::Array(Array::from_iter([*x, 0.0]));
+        put(&mut document, "cart", key, Value::Array(over.iter().map(point).collect()));
+        free.extend(numbers.iter().map(|number| format!("cart.{key}.{number}.force")));
+    }
+    let is_own = |key: &str| {
+        key.starts_with(&format!("{body}.friction."))
+            || matches!(key, "total.viscous" | "total.coulomb")
+            || line.as_ref().is_some_and(|line| key.starts_with(&format!("cart.{}.", line.key)))
+    };
+    let offset = sided && loaded;
+    if offset {
+        // Both directions hold it.
+        put(&mut document, "cart", "load", Value::from(0.0));
+    }
+    let kept = plan.free.iter().filter(|key| !(is_own(key) || offset && *key == "cart.load"));
+    free = kept.cloned().chain(free).collect();
+    let tied: Vec<Vec<String>> = plan.tied.iter().filter(|keys| !keys.iter().any(|key| is_own(key))).cloned().collect();
+    let lumped: Vec<String> = plan.lumped.iter().filter(|name| !is_own(name)).cloned().collect();
+    let separate = plan.separate.iter().filter(|name| free.contains(name)).cloned().collect();
+    let mut bounds: Vec<(String, [f64; 2])> =
+        plan.bounds.iter().filter(|(key, _)| free.contains(key) || !is_own(key)).cloned().collect();
+    let near = near.map(|(key, ends)| (format!("{body}.friction.{key}"), ends));
+    // Bounds that are given stand alone.
+    let near = near.filter(|(key, _)| !bounds.iter().any(|(given, _)| given == key));
+    bounds.extend(near.clone());
+    let priors = plan.priors.iter().filter(|(key, _)| free.contains(key) || !is_own(key)).cloned().collect();
+    rewrite(&mut document, &free, &tied, &lumped, &is_own);
+    if let Some((key, ends)) = near
+        && let Some(fit) = document.get_mut("fit").and_then(Item::as_table_like_mut)
+        && let Some(bounds) =
+            fit.entry("bounds").or_insert(Item::Value(Value::InlineTable(InlineTable::new()))).as_table_like_mut()
+    {
+        bounds.entry(&key).or_insert(Item::Value(Value::Array(Array::from_iter(ends))));
+    }
+    // The logs are those that are there already.
+    let read = Case::from_text_for(name, &document.to_string(), &[], Files::Nothing)?;
+    let own = Case { experiments: case.experiments.clone(), unread: Vec::new(), ..read };
+    Ok((own, Plan { free, tied, lumped, separate, bounds, priors, ..plan.clone() }))
+}
+
+/// A force beside the friction that is a line over the travel or the speed, zero to start from.
+struct Line {
+    /// Under `[cart]`.
+    key: &'static str,
+    /// m or m/s, of its points.
+    over: Vec<f64>,
+    /// The numbers of the points whose force is searched for.
+    free: Vec<usize>,
+}
+
+/// The force that a law has beside the friction. `is_held` says that something else has a constant part, so that one
+/// point stays at zero.
+fn line(case: &Case, law: FrictionLaw, is_held: bool) -> Option<Line> {
+    match law {
+        FrictionLaw::ForceAlong => {
+            let free = (0..POINTS).filter(|k| !(is_held && *k == POINTS / 2)).collect();
+            Some(Line { key: "force_along", over: over_travel(case).collect(), free })
+        }
+        FrictionLaw::ForceBySpeed => {
+            // What goes with the speed is viscous friction, and what has its sign Coulomb friction.
+            let fastest = fastest(case);
+            let is_free = |k: &usize| SPEEDS[*k] != 0.0 && SPEEDS[*k].abs() != 1.0;
+            let free = (0..SPEEDS.len()).filter(is_free).collect();
+            Some(Line { key: "force_by_speed", over: SPEEDS.iter().map(|share| share * fastest).collect(), free })
+        }
+        _ => None,
+    }
+}
+
+/// The table of the friction, and the keys in it that are searched for.
+fn table(
+    case: &Case,
+    law: FrictionLaw,
+    sided: bool,
+    from: &Friction,
+    fastest: f64,
+    body: &str,
+) -> (InlineTable, Vec<String>) {
+    let mut table = InlineTable::new();
+    let mut keys = Vec::new();
+    let mut put = |key: &str, value: f64| {
+        table.insert(key, Value::from(value));
+        keys.push(key.to_string());
+    };
+    let (forward, backward) = (from.forward, from.backward);
+    let mean = |a: f64, b: f64| if sided { a } else { 0.5 * (a + b) };
+    put("viscous", mean(forward.viscous, backward.viscous));
+    let coulomb = mean(forward.coulomb, backward.coulomb);
+    let coulomb = if coulomb > 0.0 { coulomb } else { 0.05 * forward.viscous * fastest };
+    if law != FrictionLaw::Viscous {
+        put("coulomb", coulomb);
+    }
+    if sided {
+        put("viscous_backward", backward.viscous);
+        put("coulomb_backward", if backward.coulomb > 0.0 { backward.coulomb } else { coulomb });
+    }
+    let velocity = FALL * fastest;
+    match law {
+        FrictionLaw::Viscous
+        | FrictionLaw::Coulomb
+        | FrictionLaw::Asymmetric
+        | FrictionLaw::ForceAlong
+        | FrictionLaw::ForceBySpeed => {}
+        FrictionLaw::Stribeck => {
+            let mut own = InlineTable::new();
+            own.insert("force", Value::from(ABOVE * coulomb));
+            own.insert("velocity", Value::from(velocity));
+            table.insert("stribeck", Value::InlineTable(own));
+            keys.extend(["stribeck.force", "stribeck.velocity"].map(String::from));
+        }
+        FrictionLaw::Along => {
+            let point = |x: f64| Value::Array(Array::from_iter([x, 1.0]));
+            table.insert("along", Value::Array(over_travel(case).map(point).collect()));
+            // One of them is 1: Coulomb friction is what the factors are of.
+            let others = (0..POINTS).filter(|k| *k != POINTS / 2);
+            keys.extend(others.map(|k| format!("along.{k}.factor")));
+        }
+        FrictionLaw::LuGre => {
+            let stiffness = coulomb / BEND * if body == "cart" { 1.0 } else { case.machine.pulley_radius };
+            let mass = if body == "cart" { case.machine.cart.mass } else { case.machine.drive_pulley.inertia };
+            let mut own = InlineTable::new();
+            own.insert("stiffness", Value::from(stiffness));
+            own.insert("damping", Value::from((stiffness * mass).sqrt()));
+            own.insert("velocity", Value::from(velocity));
+            table.insert("static", Value::from((1.0 + ABOVE) * coulomb.max(backward.coulomb)));
+            table.insert("lugre", Value::InlineTable(own));
+            keys.extend(["static", "lugre.stiffness", "lugre.velocity"].map(String::from));
+        }
+    }
+    (table, keys)
+}
+
+/// Puts a value into a table of the document, in place of what is there.
+fn put(document: &mut DocumentMut, table: &str, key: &str, value: Value) {
+    if let Some(table) = document.get_mut(table).and_then(Item::as_table_like_mut) {
+        table.remove(key);
+        table.insert(key, Item::Value(value));
+    }
+}
+
+/// Puts what is searched for into the table of the fit.
+fn rewrite(
+    document: &mut DocumentMut,
+    free: &[String],
+    tied: &[Vec<String>],
+    lumped: &[String],
+    is_own: &dyn Fn(&str) -> bool,
+) {
+    let Some(fit) = document.get_mut("fit").and_then(Item::as_table_like_mut) else { return };
+    let list = |names: &[String]| Value::Array(names.iter().map(String::as_str).collect());
+    for key in ["free", "tied", "lumped"] {
+        fit.remove(key);
+    }
+    fit.insert("free", Item::Value(list(free)));
+    if !tied.is_empty() {
+        fit.insert("tied", Item::Value(Value::Array(tied.iter().map(|keys| list(keys)).collect())));
+    }
+    if !lumped.is_empty() {
+        fit.insert("lumped", Item::Value(list(lumped)));
+    }
+    for key in ["bounds", "priors"] {
+        let Some(table) = fit.get_mut(key).and_then(Item::as_table_like_mut) else { continue };
+        let gone: Vec<String> = table
+            .iter()
+            .map(|(name, _)| name.to_string())
+            .filter(|name| is_own(name) && !free.contains(name))
+            .collect();
+        gone.iter().for_each(|name| {
+            table.remove(name);
+        });
+    }
+    if let Some(names) = fit.get_mut("separate").and_then(Item::as_array_mut) {
+        names.retain(|name| name.as_str().is_some_and(|name| free.iter().any(|own| own == name)));
+    }
+}
+
+/// The greatest speed of the cart that the logs show, m/s, roughly.
+fn fastest(case: &Case) -> f64 {
+    let r = case.machine.pulley_radius;
+    let logs = case.experiments.iter().filter_map(|experiment| experiment.log.as_ref());
+    let speeds = logs.flat_map(|log| {
+        log.outputs.iter().map(move |output| {
+            let arm = if output.quantity.name().starts_with("cart") { 1.0 } else { r };
+            let values = &output.values;
+            if !is_position(output.quantity) {
+                return arm * values.iter().filter(|v| v.is_finite()).fold(0.0, |most: f64, v| most.max(v.abs()));
+            }
+            let step = (values.len() / 100).max(1);
+            let pairs = (step..values.len()).step_by(step);
+            let slope = pairs.map(|k| (values[k] - values[k - step]) / (log.time[k] - log.time[k - step]));
+            arm * slope.filter(|v| v.is_finite()).fold(0.0, |most: f64, v| most.max(v.abs()))
+        })
+    });
+    speeds.fold(1e-3, f64::max)
+}
+
+/// Places along the way that the logs show, m.
+fn over_travel(case: &Case) -> impl Iterator<Item = f64> {
+    let (low, high) = travel(case);
+    (0..POINTS).map(move |k| low + (high - low) * k as f64 / (POINTS - 1) as f64)
+}
+
+/// Where the cart is in the logs, m.
+fn travel(case: &Case) -> (f64, f64) {
+    let r = case.machine.pulley_radius;
+    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+    for log in case.experiments.iter().filter_map(|experiment| experiment.log.as_ref()) {
+        for output in log.outputs.iter().filter(|output| is_position(output.quantity)) {
+            let arm = if output.quantity == Quantity::CartPosition { 1.0 } else { r };
+            for value in output.values.iter().filter(|value| value.is_finite()) {
+                (low, high) = (low.min(arm * value), high.max(arm * value));
+            }
+        }
+    }
+    if high > low { (low, high) } else { (-1.0, 1.0) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::case::TEMPLATE;
+    use crate::parameter::Free;
+
+    /// On EMPS a breakaway of 11 kN beside 21 N of Coulomb friction met three quarters of the record, which never rest,
+    /// and held the fourth for ever.
+    #[test]
+    fn a_breakaway_stays_near_coulomb_friction() {
+        let text = format!("{TEMPLATE}\n[fit]\nfree = [\"cart.friction.coulomb\"]\n");
+        let case = Case::from_text("axis.toml", &text).unwrap();
+        let plan = Plan { free: vec!["cart.friction.coulomb".into()], ..Plan::default() };
+        let coulomb = case.machine.cart.friction.forward.coulomb;
+        for (law, key, ends) in [
+            (FrictionLaw::LuGre, "cart.friction.static", [1.0, 4.0]),
+            (FrictionLaw::Stribeck, "cart.friction.stribeck.force", [0.0, 3.0]),
+        ] {
+            let (own, plan) = with(&case, "axis.toml".as_ref(), &plan, law, false, &case.machine).unwrap();
+            assert_eq!(own.fit.as_ref().map(|own| own.bounds.clone()), Some(plan.bounds.clone()));
+            let free = Free::new(&own.machine, key, &[], &plan.bounds).unwrap();
+            assert_eq!([free.low, free.high], ends.map(|end| end * coulomb));
+        }
+        // Bounds that are given stand alone.
+        let key = "cart.friction.static".to_string();
+        let given = Plan { bounds: vec![(key.clone(), [0.0, 9.0 * coulomb])], ..plan };
+        let (own, plan) = with(&case, "axis.toml".as_ref(), &given, FrictionLaw::LuGre, false, &case.machine).unwrap();
+        assert_eq!(Free::new(&own.machine, &key, &[], &plan.bounds).unwrap().high, 9.0 * coulomb);
+    }
+}

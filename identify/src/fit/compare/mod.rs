@@ -1,0 +1,465 @@
+//! Which friction law and which windows: those whose fit to some of the records predicts the others best.
+//!
+//! A law with more parameters meets the records that it is fitted to better, and others worse once it fits what does
+//! not come again. So each candidate is fitted with a part of the records left out, and judged by its error there. With
+//! e_cf the squared error of candidate c in part f, the fewest parameters are chosen with which a mean error
+//! exceeds that of the best by no more than a standard error of the differences e_cf − e_bf (the rule of one standard
+//! error, L. Breiman and others 1984).
+
+pub(crate) mod drift;
+mod laws;
+mod parts;
+
+pub use laws::FrictionLaw;
+
+use crate::case::{Case, Files, Plan};
+use crate::error::{Error, Result};
+use crate::fit::asked::problem::{Problem, Stop};
+use crate::fit::search::point::Options;
+use crate::fit::search::starts::{Work, search_as_far};
+use crate::fit::trust::found::Fit;
+use crate::fit::trust::held_out::met;
+use crate::fit::trust::nearest::search_near;
+use crate::fit::trust::result::{known, told};
+use crate::fit::trust::scores::together;
+use crate::log::Quantity;
+use crate::machine::Machine;
+use crate::solve::Flow;
+use drift::nothing;
+use parts::{Fold, Parts};
+use std::path::Path;
+
+/// Share of a record to which its start is fitted; the rest of it is foretold.
+const BEGIN: f64 = 0.1;
+
+/// How far the fits go that are compared: what another step would move them by is far less than what laws differ by in
+/// records that were held out. Fits to parts begin where that to the whole ended.
+fn compared(iterations: usize) -> Options {
+    Options { tolerance: 0.1, iterations, evolutions: 0, ..Options::default() }
+}
+
+/// Most steps of a fit to all logs, and of one to a part of them.
+const STEPS: usize = 20;
+const STEPS_IN_PART: usize = 10;
+
+/// The laws and windows to compare.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Setting {
+    /// Friction laws.
+    pub laws: Vec<FrictionLaw>,
+    /// Lengths of windows, s; none for whole logs.
+    pub windows: Vec<Option<f64>>,
+}
+
+impl Setting {
+    /// The usual laws; whole logs, and windows of a fifth and of a twentieth of the longest.
+    pub fn usual(case: &Case, plan: &Plan) -> Self {
+        let ends = case.experiments.iter().filter_map(|experiment| experiment.log.as_ref()?.time.last().copied());
+        let long = ends.fold(0.0, f64::max);
+        // To two digits.
+        let short = |part: f64| {
+            let unit = 10f64.powf((long / part).log10().floor() - 1.0);
+            Some((long / part / unit).round() * unit)
+        };
+        let mut windows = vec![None, short(5.0), short(20.0)];
+        if plan.closed_loop {
+            windows.truncate(1);
+        }
+        Self { laws: FrictionLaw::USUAL.to_vec(), windows }
+    }
+}
+
+/// Candidates beside each other.
+#[derive(Debug, Clone)]
+pub struct Comparison {
+    /// All of them, the one that predicts best first.
+    pub candidates: Vec<Candidate>,
+    /// The one that is chosen.
+    pub chosen: usize,
+    /// The one with the least training error.
+    pub by_training: usize,
+    /// The parts that were held out, in words.
+    pub held_out: String,
+    /// The body whose friction is compared.
+    pub body: &'static str,
+    /// The quantities that errors are of; where there are several, errors are shares of the least of each.
+    pub quantities: Vec<Quantity>,
+    /// The case with the chosen law, what is searched for in it, and the fit to all logs.
+    pub case: Case,
+    /// The free parameters.
+    pub plan: Plan,
+    /// The fit to all logs.
+    pub fit: Fit,
+    /// The effort.
+    pub work: Work,
+}
+
+/// A law with a length of windows.
+#[derive(Debug, Clone)]
+pub struct Candidate {
+    /// The law.
+    pub law: FrictionLaw,
+    /// Whether each direction has its own values.
+    pub sided: bool,
+    /// Length of windows, s; none for whole logs.
+    pub window: Option<f64>,
+    /// How many parameters of the machine are searched for.
+    pub parameters: usize,
+    /// Root mean square over whole logs that it was fitted to; NaN where it has none.
+    pub training: f64,
+    /// The same of what was held out; infinite where a model did not get through, or no fit ended.
+    pub held_out: f64,
+    /// Standard error of the difference of its squared error to that of the best, as one of `held_out`.
+    pub error: f64,
+    /// Mean square of each part that was held out.
+    pub squares: Vec<f64>,
+    /// Why there is no result; none where there is one.
+    pub failed: Option<String>,
+}
+
+impl Candidate {
+    /// In words.
+    pub fn name(&self) -> String {
+        let law = match (self.law.is_above(), self.sided) {
+            (true, true) => format!("{} above asymmetric", self.law.name()),
+            _ => self.law.name().to_string(),
+        };
+        match self.window {
+            Some(window) => format!("{law}, windows of {}", crate::quantity::show(window, "s")),
+            None => format!("{law}, whole logs"),
+        }
+    }
+}
+
+/// Compares laws and windows for the logs of `case`, whose file is `name`; `watch` is told what is fitted.
+pub fn compare(
+    case: &Case,
+    name: &Path,
+    plan: &Plan,
+    setting: &Setting,
+    stop: Option<Stop>,
+    watch: &mut dyn FnMut(&str) -> Flow,
+) -> Result<Comparison> {
+    if setting.laws.is_empty() || setting.windows.is_empty() {
+        return Err(
+            Error::new("there is nothing to compare").next("name a law and a length of windows, or leave both out")
+        );
+    }
+    if let Some(window) = setting.windows.iter().flatten().find(|window| !(**window > 0.0 && window.is_finite())) {
+        return Err(Error::new(format!("{window} s is no length of windows")).allowed("above zero"));
+    }
+    let parts = Parts::new(case, plan);
+    if parts.folds.len() < 2 {
+        return Err(
+            Error::new("the logs are too short to hold parts of them out").next("log for longer, or more often")
+        );
+    }
+    if plan.closed_loop && parts.is_cut {
+        return Err(Error::new(
+            "a controller begins with the log, so blocks of a log in closed loop cannot be held out",
+        )
+        .next("give four logs or more, or leave `loop` out of [fit]"));
+    }
+    let mut course = Course { case, name, plan, parts, stop, work: Work::default(), tried: Vec::new() };
+    let mut from = case.machine.clone();
+    let mut laws = setting.laws.clone();
+    laws.sort_by_key(|law| FrictionLaw::ALL.iter().position(|own| own == law));
+    laws.dedup();
+    for law in laws {
+        let sided = law == FrictionLaw::Asymmetric || (law.is_above() && course.is_sided_better());
+        let (own, searched) = laws::with(case, name, plan, law, sided, &from)?;
+        let mut start = own.machine.clone();
+        let windows = match law.is_curved() {
+            true => course.best_window().map_or(setting.windows.clone(), |window| vec![window]),
+            false => setting.windows.clone(),
+        };
+        for window in windows {
+            let told = Candidate::new(law, sided, window, searched.names().count());
+            if watch(&told.name()) == Flow::Stop || stop.is_some_and(|stop| stop()) {
+                return Err(Error::new("interrupted before all laws were compared"));
+            }
+            let found = course.try_one(&own, &searched, told, &start);
+            if let Some(machine) = found {
+                // A law without dry friction leads where a cart with it stands still.
+                if window == setting.windows[0] && !law.is_above() && law != FrictionLaw::Viscous {
+                    from = machine.clone();
+                }
+                start = machine;
+            }
+        }
+    }
+    course.chosen()
+}
+
+/// A comparison on its way.
+struct Course<'a> {
+    case: &'a Case,
+    name: &'a Path,
+    plan: &'a Plan,
+    parts: Parts,
+    stop: Option<Stop<'a>>,
+    work: Work,
+    /// Candidates with errors of each quantity in each part, the machine, the case and the plan.
+    tried: Vec<Tried>,
+}
+
+struct Tried {
+    candidate: Candidate,
+    /// By part and quantity: sum of squares, values.
+    errors: Vec<Vec<(Quantity, f64, usize)>>,
+    training: Vec<(Quantity, f64)>,
+    case: Case,
+    /// The machine of the case's text, where its search did not begin.
+    given: Machine,
+    plan: Plan,
+}
+
+impl Tried {
+    /// The sum over all that was held out.
+    fn squares(&self) -> f64 {
+        self.errors.iter().flatten().map(|(_, squares, _)| squares).sum()
+    }
+}
+
+impl Course<'_> {
+    /// Fits a candidate to all logs and to all but a part; the machine of the fit to all.
+    fn try_one(&mut self, case: &Case, plan: &Plan, mut candidate: Candidate, start: &Machine) -> Option<Machine> {
+        let plan = Plan { windows: candidate.window, starts: 1, ..plan.clone() };
+        let (given, case) = (case.machine.clone(), Case { machine: start.clone(), ..case.clone() });
+        let (mut errors, mut training, mut machine) = (Vec::new(), Vec::new(), None);
+        match self.whole(&case, &plan) {
+            Ok((own, met)) => (machine, training) = (Some(own), met),
+            Err(error) => candidate.failed = Some(error.what),
+        }
+        if let Some(machine) = &machine {
+            let near = Case { machine: machine.clone(), ..case.clone() };
+            for part in 0..self.parts.folds.len() {
+                match self.fold(&near, &plan, part) {
+                    Ok(found) => errors.push(found),
+                    Err(error) => {
+                        candidate.failed = Some(error.what);
+                        break;
+                    }
+                }
+            }
+        }
+        self.tried.push(Tried { candidate, errors, training, case, given, plan });
+        machine
+    }
+
+    /// The fit to all logs, and its errors over whole logs with their starts fitted.
+    fn whole(&mut self, case: &Case, plan: &Plan) -> Result<(Machine, Vec<(Quantity, f64)>)> {
+        let found = search_as_far(case, plan, self.stop, &compared(STEPS), &mut |_, _| Flow::Continue)?;
+        self.work.add(&found.work);
+        let stages = found.problem.stages(&found.best.x);
+        let known = known(&found);
+        let whole = Plan { windows: None, held_out: plan.held_out.clone(), ..nothing(plan) };
+        let logs: Vec<_> =
+            Problem::new(case, &whole)?.runs.iter().map(|run| met(run, &stages[run.part], &known, 1.0)).collect();
+        let errors = together(&logs, |_| String::new());
+        Ok((stages[0].clone(), errors.iter().map(|one| (one.quantity, one.rmse)).collect()))
+    }
+
+    /// The errors in a part that is not fitted.
+    fn fold(&mut self, case: &Case, plan: &Plan, part: usize) -> Result<Vec<(Quantity, f64, usize)>> {
+        let Fold { fitted, held_out } = &self.parts.folds[part];
+        let mut plan = Plan { held_out: Vec::new(), separate: Vec::new(), ..plan.clone() };
+        plan.nuisance.initial_state |= self.parts.is_cut;
+        let own = Case { experiments: fitted.clone(), ..case.clone() };
+        let found = search_as_far(&own, &plan, self.stop, &compared(STEPS_IN_PART), &mut |_, _| Flow::Continue)?;
+        self.work.add(&found.work);
+        let machine = found.problem.stage_at(&found.best.x);
+        let known = known(&found);
+        let held = Case { experiments: held_out.clone(), ..case.clone() };
+        let scored = Plan { windows: None, nuisance: plan.nuisance, ..nothing(&plan) };
+        let logs: Vec<_> =
+            Problem::new(&held, &scored)?.runs.iter().map(|run| met(run, &machine, &known, BEGIN)).collect();
+        let errors = together(&logs, |_| String::new());
+        Ok(errors.iter().map(|one| (one.quantity, one.rmse.powi(2) * one.count as f64, one.count)).collect())
+    }
+
+    /// The windows with which the laws of straight lines predict best; none where none was tried yet.
+    fn best_window(&self) -> Option<Option<f64>> {
+        let is_simple = |tried: &&Tried| tried.candidate.failed.is_none() && !tried.candidate.law.is_above();
+        let tried = self.tried.iter().filter(is_simple);
+        tried.min_by(|a, b| a.squares().total_cmp(&b.squares())).map(|tried| tried.candidate.window)
+    }
+
+    /// Whether friction with a value for each direction predicts better than without, as far as both were tried.
+    fn is_sided_better(&self) -> bool {
+        let of = |law: FrictionLaw| {
+            let own = self.tried.iter().filter(|tried| tried.candidate.law == law && tried.candidate.failed.is_none());
+            own.map(Tried::squares).min_by(f64::total_cmp)
+        };
+        match (of(FrictionLaw::Coulomb), of(FrictionLaw::Asymmetric)) {
+            (Some(one), Some(each)) => each < one,
+            (None, Some(_)) => true,
+            (_, None) => false,
+        }
+    }
+
+    /// Mean square of a candidate by part; of several quantities, each over the least that any candidate has of it.
+    fn rank(&mut self) -> Vec<Quantity> {
+        let mut quantities: Vec<Quantity> = Vec::new();
+        for (quantity, ..) in self.tried.iter().flat_map(|tried| tried.errors.iter().flatten()) {
+            if !quantities.contains(quantity) {
+                quantities.push(*quantity);
+            }
+        }
+        let mean = |errors: &[Vec<(Quantity, f64, usize)>], quantity: Quantity| {
+            let own = errors.iter().flatten().filter(|one| one.0 == quantity);
+            let (squares, count) = own.fold((0.0, 0), |(s, n), (_, squares, count)| (s + squares, n + count));
+            squares / count.max(1) as f64
+        };
+        let least = |quantity| {
+            let all = self.tried.iter().filter(|tried| tried.candidate.failed.is_none());
+            all.map(|tried| mean(&tried.errors, quantity)).fold(f64::INFINITY, f64::min)
+        };
+        let units: Vec<f64> = match quantities[..] {
+            [_] => vec![1.0],
+            _ => quantities.iter().map(|quantity| least(*quantity).max(f64::MIN_POSITIVE)).collect(),
+        };
+        let shares = quantities.len().max(1) as f64;
+        for tried in &mut self.tried {
+            let value = |one: &[Vec<(Quantity, f64, usize)>]| {
+                quantities.iter().zip(&units).map(|(quantity, unit)| mean(one, *quantity) / unit).sum::<f64>() / shares
+            };
+            let candidate = &mut tried.candidate;
+            candidate.squares = tried.errors.iter().map(|part| value(std::slice::from_ref(part))).collect();
+            candidate.held_out = if candidate.failed.is_some() { f64::INFINITY } else { value(&tried.errors).sqrt() };
+            let of = |quantity: &Quantity| {
+                tried.training.iter().find(|(own, _)| own == quantity).map_or(f64::NAN, |(_, rmse)| *rmse)
+            };
+            let training =
+                quantities.iter().zip(&units).map(|(quantity, unit)| of(quantity).powi(2) / unit).sum::<f64>();
+            candidate.training = (training / shares).sqrt();
+        }
+        self.tried.sort_by(|a, b| a.candidate.held_out.total_cmp(&b.candidate.held_out));
+        quantities
+    }
+
+    fn chosen(mut self) -> Result<Comparison> {
+        let quantities = self.rank();
+        let Some(best) = self.tried.first().filter(|tried| tried.candidate.held_out.is_finite()) else {
+            let why = self.tried.iter().find_map(|tried| tried.candidate.failed.clone()).unwrap_or_default();
+            return Err(Error::new(format!("no law of friction gets through the parts of these logs: {why}"))
+                .next("run `taut fit` with one law to see why"));
+        };
+        let best = best.candidate.squares.clone();
+        for tried in &mut self.tried {
+            tried.candidate.error = standard_error(&tried.candidate, &best);
+        }
+        let top = self.tried[0].candidate.held_out;
+        let near = |one: &Candidate| one.held_out.powi(2) - top * top <= one.error;
+        let fewest = self.tried.iter().map(|tried| &tried.candidate).filter(|one| one.failed.is_none() && near(one));
+        let fewest = fewest.map(|one| one.parameters).min().unwrap_or(usize::MAX);
+        // The first of so many parameters predicts best of them.
+        let chosen = self.tried.iter().position(|tried| tried.candidate.parameters == fewest).unwrap_or(0);
+        let by_training = (0..self.tried.len())
+            .filter(|&k| self.tried[k].candidate.failed.is_none())
+            .min_by(|&a, &b| self.tried[a].candidate.training.total_cmp(&self.tried[b].candidate.training))
+            .unwrap_or(chosen);
+        let own = &self.tried[chosen];
+        let plan = Plan { starts: self.plan.starts, ..own.plan.clone() };
+        let mut case = own.case.clone();
+        if plan.windows != self.plan.windows {
+            let change = plan.windows.map(|window| format!("fit.windows={window}"));
+            let changes: Vec<&str> = change.iter().map(String::as_str).collect();
+            let text = without_windows(&case.text);
+            let read = Case::from_text_for(self.name, &text, &changes, Files::Nothing)?;
+            case =
+                Case { experiments: self.case.experiments.clone(), unread: Vec::new(), machine: case.machine, ..read };
+        }
+        let settled = search_near(&case, &own.given, &plan, self.stop, &mut |_, _| Flow::Continue)?;
+        let judged = settled.judged(&case, &plan);
+        let found = settled.searched;
+        self.work.add(&found.work);
+        let fit = told(&case, &plan, &found, judged.as_ref());
+        Ok(Comparison {
+            chosen,
+            by_training,
+            held_out: self.parts.words(),
+            body: laws::body(self.plan),
+            quantities,
+            candidates: self.tried.into_iter().map(|tried| tried.candidate).collect(),
+            case,
+            plan,
+            fit,
+            work: self.work,
+        })
+    }
+}
+
+impl Candidate {
+    fn new(law: FrictionLaw, sided: bool, window: Option<f64>, parameters: usize) -> Self {
+        let (training, held_out, error) = (f64::NAN, f64::INFINITY, 0.0);
+        Self { law, sided, window, parameters, training, held_out, error, squares: Vec::new(), failed: None }
+    }
+}
+
+impl Comparison {
+    /// Why the chosen one is chosen, and what training errors would have chosen, in sentences.
+    pub fn words(&self) -> Vec<String> {
+        let shown = |candidate: &Candidate| {
+            let error = |value: f64| self.shown(value);
+            format!(
+                "{} ({} held out, {} in training)",
+                candidate.name(),
+                error(candidate.held_out),
+                error(candidate.training)
+            )
+        };
+        let (chosen, best, trained) =
+            (&self.candidates[self.chosen], &self.candidates[0], &self.candidates[self.by_training]);
+        let why = match self.chosen {
+            0 => format!("{} predicts best what was held out", shown(chosen)),
+            _ => format!(
+                "{} predicts best of those with {} parameters, the fewest with which an error is within one standard \
+                 error of the least, that of {}",
+                shown(chosen),
+                chosen.parameters,
+                shown(best)
+            ),
+        };
+        let training = match trained.name() == chosen.name() {
+            true => "the training error is least for it, too".to_string(),
+            false => format!(
+                "by its training error {} would have been chosen, which predicts {:.2} times as badly",
+                shown(trained),
+                trained.held_out / chosen.held_out
+            ),
+        };
+        vec![why, training]
+    }
+
+    /// An error with its unit; a multiple of the least where there are several quantities.
+    pub fn shown(&self, value: f64) -> String {
+        match self.quantities[..] {
+            [quantity] if value.is_finite() => {
+                crate::number::engineering(value, quantity.unit(), 3).replace(['\u{a0}', '\u{202f}'], " ")
+            }
+            _ if value.is_finite() => format!("{value:.3}"),
+            _ => "–".into(),
+        }
+    }
+}
+
+/// Standard error of the mean of the differences between the mean squares of the parts and those of the best.
+fn standard_error(candidate: &Candidate, best: &[f64]) -> f64 {
+    let differences: Vec<f64> = candidate.squares.iter().zip(best).map(|(own, best)| own - best).collect();
+    let n = differences.len() as f64;
+    if differences.len() < 2 || differences.len() < best.len() {
+        return 0.0;
+    }
+    let mean = differences.iter().sum::<f64>() / n;
+    (differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0) / n).sqrt()
+}
+
+/// The text of a case without windows in its fit.
+fn without_windows(text: &str) -> String {
+    let Ok(mut document) = text.parse::<toml_edit::DocumentMut>() else { return text.to_string() };
+    if let Some(fit) = document.get_mut("fit").and_then(toml_edit::Item::as_table_like_mut) {
+        fit.remove("windows");
+    }
+    document.to_string()
+}

@@ -1,0 +1,57 @@
+//! The knowledge that a fit would have, as one number.
+
+use super::Criterion;
+use crate::fit::asked::problem::Problem;
+use crate::fit::trust::directions::Directions;
+use crate::fit::trust::identify::Identifiability;
+use nalgebra::{Cholesky, DMatrix};
+
+/// The derivatives of a problem, and what follows from them.
+pub(super) struct Information {
+    pub problem: Problem<'static>,
+    pub x: Vec<f64>,
+    pub known: Identifiability,
+    /// Covariance of the relative changes of the parameters that count, what is known beforehand in it.
+    covariance: DMatrix<f64>,
+    whole: Vec<f64>,
+}
+
+impl Information {
+    /// From derivatives at `x`; none if numbers fail.
+    pub fn new(problem: Problem<'static>, jacobian: DMatrix<f64>, x: Vec<f64>, wanted: &[usize]) -> Option<Self> {
+        let all: Vec<usize> = (0..problem.globals()).collect();
+        let Directions { v, singular, whole, .. } = Directions::new(&problem, &jacobian, &x, &all)?;
+        let known = Identifiability::new(&problem, &jacobian, &x, 1.0)?;
+        // C = V (S² + I)⁻¹ Vᵀ
+        let k = wanted.len();
+        let covariance = DMatrix::from_fn(k, k, |a, b| {
+            let (a, b) = (wanted[a], wanted[b]);
+            singular.iter().enumerate().map(|(i, s)| v[(a, i)] * v[(b, i)] / (s * s + 1.0)).sum()
+        });
+        Some(Self { problem, x, known, covariance, whole })
+    }
+
+    /// The mean relative error by a criterion: 1 where nothing is known.
+    pub fn score(&self, criterion: Criterion) -> f64 {
+        let k = self.covariance.nrows() as f64;
+        match criterion {
+            // det C^(1/2k)
+            Criterion::D => Cholesky::new(self.covariance.clone()).map_or(f64::INFINITY, |root| {
+                (root.l_dirty().diagonal().iter().map(|l| l.ln()).sum::<f64>() / k).exp()
+            }),
+            Criterion::A => (self.covariance.trace() / k).sqrt(),
+        }
+    }
+
+    /// The standard error of parameter `j` by itself, in SI units; infinite where it is not determined.
+    pub fn error(&self, j: usize) -> f64 {
+        let value = self.problem.value(j, self.x[j]);
+        self.known.error[j] * self.whole[j] * self.problem.slope(j, value).abs()
+    }
+
+    /// About a standard error of variable `j`.
+    pub fn step(&self, j: usize) -> f64 {
+        let own = self.known.error.get(j).map_or(0.0, |error| error * self.whole[j]);
+        if own.is_finite() { own.min(0.3) } else { 0.1 }
+    }
+}

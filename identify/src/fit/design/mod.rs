@@ -1,0 +1,301 @@
+//! The experiment that determines parameters best: an input within travel, input and current that makes their standard
+//! errors small.
+//!
+//! With J the derivatives of the weighted outputs with respect to relative changes of the parameters, what else is
+//! fitted along projected out, and what is known beforehand of each parameter taken as its value give or take 100 %,
+//! the covariance of the relative changes is
+//!
+//! ```text
+//! C = (JᵀJ + I)⁻¹        D-optimal: least det C^(1/2k)        A-optimal: least (tr C / k)^(1/2)
+//! ```
+//!
+//! for the k parameters that count; the others are free, too. J is that of a fit: the same problem is posed with a log
+//! that the model makes.
+
+mod candidates;
+mod criterion;
+mod limits;
+mod search;
+mod text;
+mod trial;
+mod verify;
+
+pub use candidates::{Kind, Shape};
+pub use limits::{Limits, Origin, Reached};
+pub use search::{Alternative, Designed, Own, Promise};
+pub use verify::{Verified, verify};
+
+use crate::case::{Case, Plan, parameters};
+use crate::error::{Error, Result};
+use crate::fit::asked::problem::{Problem, Stop};
+use crate::fit::trust::identify::Group;
+use crate::log::Quantity;
+use crate::machine::{Channel, EncoderPlace, Measurement};
+
+/// Length of an experiment that nothing else is said of, s.
+pub const DURATION: f64 = 4.0;
+
+/// Between samples where nothing says so, s.
+const EVERY: f64 = 1e-3;
+
+/// Most rows of an experiment.
+const MOST_ROWS: f64 = 200_000.0;
+
+/// The measure that is made small.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Criterion {
+    /// The volume of the confidence ellipsoid: the geometric mean of the errors along its axes.
+    #[default]
+    D,
+    /// The mean square of the errors.
+    A,
+}
+
+impl Criterion {
+    /// In a word.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::D => "D-optimal",
+            Self::A => "A-optimal",
+        }
+    }
+}
+
+/// The experiment that is wanted; what is not said follows from the case.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Request {
+    /// The parameters that count; the free ones of `[fit]` where none is named.
+    pub names: Vec<String>,
+    /// The inputs to choose among; all where none is named.
+    pub kinds: Vec<Kind>,
+    /// The measure that is made small.
+    pub criterion: Criterion,
+    /// Length, s.
+    pub duration: f64,
+    /// Between samples, s.
+    pub every: Option<f64>,
+    /// Share of each limit that is left free.
+    pub margin: f64,
+    /// By what share each free parameter may be off, the limits still being kept.
+    pub doubt: f64,
+    /// Greatest input, V or A.
+    pub input: Option<f64>,
+    /// Greatest current, A.
+    pub current: Option<f64>,
+    /// Length of the travel, m.
+    pub travel: Option<f64>,
+    /// Outputs that are measured; the case's encoder and recorder where nothing is named.
+    pub measured: Vec<Channel>,
+    /// Which search, and which noise.
+    pub seed: u64,
+}
+
+impl Default for Request {
+    fn default() -> Self {
+        Self {
+            names: Vec::new(),
+            kinds: Vec::new(),
+            criterion: Criterion::D,
+            duration: DURATION,
+            every: None,
+            margin: 0.1,
+            doubt: 0.2,
+            input: None,
+            current: None,
+            travel: None,
+            measured: Vec::new(),
+            seed: 1,
+        }
+    }
+}
+
+impl Request {
+    /// That its numbers can be.
+    fn checked(&self) -> Result<()> {
+        let sizes = [
+            ("duration", Some(self.duration)),
+            ("interval between samples", self.every),
+            ("greatest input", self.input),
+            ("greatest current", self.current),
+            ("travel", self.travel),
+        ];
+        for (name, value) in sizes.iter().filter_map(|(name, value)| value.map(|value| (name, value))) {
+            if !(value > 0.0 && value.is_finite()) {
+                return Err(Error::new(format!("a {name} of {value} cannot be")).allowed("above 0"));
+            }
+        }
+        for (name, value) in [("margin", self.margin), ("doubt", self.doubt)] {
+            if !(0.0..=0.9).contains(&value) {
+                return Err(Error::new(format!("a {name} of {value} cannot be")).allowed("0 to 0.9"));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A request with all that follows from the case.
+pub(super) struct Task<'a> {
+    pub case: Case,
+    pub plan: Plan,
+    /// Places of the parameters that count, among the problem's.
+    pub wanted: Vec<usize>,
+    pub names: Vec<String>,
+    pub criterion: Criterion,
+    pub duration: f64,
+    pub every: f64,
+    pub doubt: f64,
+    pub limits: Limits,
+    pub measured: Vec<Channel>,
+    pub seed: u64,
+    pub stop: Stop<'a>,
+}
+
+/// Designs an experiment for a case; `stop` is asked now and then and ends the search with the best so far, `watch` is
+/// told of each kind of input that is looked at.
+///
+/// ```
+/// use taut::case::{Case, TEMPLATE};
+/// use taut::fit::experiment_design::{Kind, Request, design};
+/// let case = Case::from_text("axis.toml", TEMPLATE)?;
+/// let names = ["cart.mass", "cart.friction.coulomb"].map(String::from).to_vec();
+/// let request = Request { names, kinds: vec![Kind::Trapezoid], duration: 1.0, ..Request::default() };
+/// let found = design(&case, &request, &|| false, &mut |_| {})?;
+/// assert!(found.promises.iter().all(|promise| promise.relative < 0.05));
+/// assert!(found.case_text(&case, "axis.toml".as_ref())?.contains("designed"));
+/// # Ok::<(), taut::Error>(())
+/// ```
+pub fn design(case: &Case, request: &Request, stop: Stop, watch: &mut dyn FnMut(&str)) -> Result<Designed> {
+    let task = Task::new(case, request, stop)?;
+    search::best(&task, case, &request.kinds, watch)
+}
+
+impl<'a> Task<'a> {
+    fn new(case: &Case, request: &Request, stop: Stop<'a>) -> Result<Self> {
+        request.checked()?;
+        let every = request.every.unwrap_or_else(|| usual_interval(case));
+        if request.duration < 10.0 * every || request.duration / every > MOST_ROWS {
+            return Err(Error::new(format!(
+                "an experiment of {} s with a sample every {every} s has {} of them",
+                request.duration,
+                crate::quantity::rounded((request.duration / every).floor())
+            ))
+            .allowed(format!("10 to {MOST_ROWS}"))
+            .next("choose another --duration or --every"));
+        }
+        case.complete()?;
+        let plan = plan_of(case, request)?;
+        let all: Vec<String> = parameters(&case.machine, &plan, &[])?.into_iter().map(|free| free.name).collect();
+        let named = request.names.iter().map(|name| {
+            all.iter()
+                .position(|own| own == name || own.split(" = ").any(|key| key == name))
+                .ok_or_else(|| Error::new(format!("`{name}` is no parameter of this fit")).allowed(all.join(", ")))
+        });
+        let mut wanted = named.collect::<Result<Vec<_>>>()?;
+        if wanted.is_empty() {
+            wanted = (0..all.len()).collect();
+        }
+        wanted.sort_unstable();
+        wanted.dedup();
+        let measured = measured(case, request)?;
+        let limits = Limits::new(case, request)?;
+        let mut own = case.clone();
+        own.experiments.clear();
+        let names = wanted.iter().map(|&j| all[j].clone()).collect();
+        Ok(Self {
+            case: own,
+            plan,
+            wanted,
+            names,
+            criterion: request.criterion,
+            duration: request.duration,
+            every,
+            doubt: request.doubt,
+            limits,
+            measured,
+            seed: request.seed,
+            stop,
+        })
+    }
+}
+
+/// The plan of the fit that the experiment is for: that of the case with the named parameters free, too, and nothing of
+/// logs that are there.
+fn plan_of(case: &Case, request: &Request) -> Result<Plan> {
+    let mut plan = case.fit.clone().unwrap_or_default();
+    let known: Vec<String> =
+        plan.names().flat_map(|name| name.split(" = ").map(String::from).collect::<Vec<_>>()).collect();
+    for name in request.names.iter().filter(|name| !known.contains(name)) {
+        let sum = crate::parameter::Sum::ALL.iter().any(|sum| sum.name() == name);
+        if sum { plan.lumped.push(name.clone()) } else { plan.free.push(name.clone()) }
+    }
+    if plan.names().next().is_none() {
+        return Err(Error::new("there is nothing to determine: the case has no [fit]")
+            .next("name parameters with --for cart.mass,cart.friction.coulomb, or add [fit] with free = [...]"));
+    }
+    Ok(Plan {
+        separate: Vec::new(),
+        held_out: Vec::new(),
+        until: None,
+        windows: None,
+        closed_loop: false,
+        huber: false,
+        starts: 1,
+        ..plan
+    })
+}
+
+/// The recorder's interval, else the shortest of the experiments.
+fn usual_interval(case: &Case) -> f64 {
+    let recorder = case.measurement.as_ref().and_then(|measurement| measurement.every);
+    let shortest = case.experiments.iter().map(|experiment| experiment.every).reduce(f64::min);
+    recorder.or(shortest).unwrap_or(EVERY)
+}
+
+/// Outputs that are measured, and how well: as asked for; else the encoder and the recorder of the case; else the
+/// outputs of its logs, with the noise that they show.
+fn measured(case: &Case, request: &Request) -> Result<Vec<Channel>> {
+    if !request.measured.is_empty() {
+        return Ok(request.measured.clone());
+    }
+    let mut all = Vec::new();
+    if let Some(encoder) = case.machine.encoder {
+        let quantity = match encoder.at {
+            EncoderPlace::Motor | EncoderPlace::DrivePulley => Quantity::DriveAngle,
+            EncoderPlace::Cart => Quantity::CartPosition,
+        };
+        let step = Some(1.0 / encoder.counts_per_unit(case.machine.drives[0].motor.gear_ratio));
+        all.push(Channel { quantity, step, noise: 0.0, range: None });
+    }
+    let of_recorder = case.measurement.iter().flat_map(|Measurement { channels, .. }| channels.iter().copied());
+    all.extend(of_recorder);
+    if all.is_empty() && case.experiments.iter().any(|experiment| experiment.log.is_some()) {
+        let plan = Plan { held_out: Vec::new(), ..case.fit.clone().unwrap_or_default() };
+        let problem = Problem::new(case, &plan)?;
+        let of = |(quantity, noise): &(Quantity, f64)| Channel {
+            quantity: *quantity,
+            step: None,
+            noise: *noise,
+            range: None,
+        };
+        all.extend(problem.noise().0.iter().map(of));
+    }
+    let exact = all.iter().find(|channel| channel.step.is_none() && channel.noise == 0.0);
+    if let Some(channel) = exact {
+        return Err(Error::new(format!(
+            "{} is recorded without any error: every standard error would be zero",
+            channel.quantity.name()
+        ))
+        .next(
+            "give it a step or a noise in [measurement], or name what is measured with --measure drive_angle=1mrad",
+        ));
+    }
+    match all.is_empty() {
+        true => Err(Error::new("nothing is measured in this case: there is no [encoder], no [measurement] and no log").next(
+            "add [encoder], or name what is measured and its noise: --measure drive_angle=1mrad --measure motor_current=10mA",
+        )),
+        false => Ok(all),
+    }
+}
+
+/// Groups of parameters that the experiment does not tell apart, and what to do about each.
+pub type Undetermined = Vec<(Group, Vec<String>)>;

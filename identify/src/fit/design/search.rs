@@ -1,0 +1,352 @@
+//! The search: points spread over what each kind of input can be, then an evolution strategy from the best of them.
+
+use super::candidates::{Kind, Room, Shape};
+use super::criterion::Information;
+use super::limits::{Limits, Reached};
+use super::{Criterion, Task, Undetermined};
+use crate::case::parameters;
+use crate::case::{Case, Experiment, Initial};
+use crate::chance::uniform;
+use crate::error::{Error, Result};
+use crate::fit::asked::residuals::Differences;
+use crate::fit::search::cmaes;
+use crate::machine::{Channel, Machine};
+use crate::signal::Signal;
+use rand_pcg::Pcg64;
+use rand_pcg::rand_core::SeedableRng;
+
+/// Points of each kind that are looked at first, kinds that are looked at on doubtful machines in the end, and
+/// generations without a gain after which an evolution ends.
+const SPREAD: usize = 16;
+const FINALISTS: usize = 3;
+const BARREN: usize = 6;
+
+/// How many times as large as the best a kind's mean relative error may be after its first points, and still be
+/// searched.
+const HOPEFUL: f64 = 1.6;
+
+/// First step of the evolution, in the logit of a share, and values that it may ask for: of every kind, and once more
+/// of the best.
+const SIGMA: f64 = 0.7;
+const VALUES: usize = 60;
+
+/// Highest frequency that is thought of, as a share of the rate of samples, and as periods in the experiment.
+const OF_RATE: f64 = 0.1;
+const PERIODS: f64 = 400.0;
+
+/// Most experiments of the case that the design is compared with.
+const COMPARED: usize = 8;
+
+/// Promise of an experiment for a parameter.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Promise {
+    /// Its name.
+    pub name: String,
+    /// SI unit.
+    pub unit: &'static str,
+    /// The value that it is promised for, that of the case.
+    pub value: f64,
+    /// Standard error; infinite where it is not determined.
+    pub error: f64,
+    /// The same relative to the value, or to a typical one where the value may be zero.
+    pub relative: f64,
+    /// Whether it is one of those that count.
+    pub wanted: bool,
+}
+
+impl Promise {
+    /// Whether the experiment determines it.
+    pub fn is_determined(&self) -> bool {
+        self.error.is_finite()
+    }
+}
+
+/// The best input of a kind.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Alternative {
+    /// The input.
+    pub shape: Shape,
+    /// The mean relative error.
+    pub score: f64,
+    /// Whether it was searched beyond the first points.
+    pub refined: bool,
+}
+
+/// An experiment of the case, measured in the same way.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Own {
+    /// Its name.
+    pub name: String,
+    /// Length, s.
+    pub duration: f64,
+    /// The mean relative error.
+    pub score: f64,
+    /// Parameters that count and that it determines.
+    pub determined: usize,
+}
+
+/// The experiment that was found.
+#[derive(Debug, Clone)]
+pub struct Designed {
+    /// The input.
+    pub shape: Shape,
+    /// Its name in the case file.
+    pub name: String,
+    /// The unit of the input.
+    pub unit: &'static str,
+    /// Length, s.
+    pub duration: f64,
+    /// Between samples, s.
+    pub every: f64,
+    /// Where it begins.
+    pub initial: Initial,
+    /// How far it goes on the machine of the case.
+    pub reached: Reached,
+    /// How far it may go.
+    pub limits: Limits,
+    /// By what share each free parameter may be off and the limits hold.
+    pub doubt: f64,
+    /// Outputs that are measured, and how well.
+    pub measured: Vec<Channel>,
+    /// Its promise for every free parameter.
+    pub promises: Vec<Promise>,
+    /// The measure that was made small, and the mean relative error by it.
+    pub criterion: Criterion,
+    /// The same.
+    pub score: f64,
+    /// Parameters that it does not tell apart, and what to do about them.
+    pub undetermined: Undetermined,
+    /// The best of each kind, the best first.
+    pub alternatives: Vec<Alternative>,
+    /// The case's own experiments.
+    pub own: Vec<Own>,
+    /// Inputs that were looked at.
+    pub tried: usize,
+    /// Whether the search was ended early.
+    pub interrupted: bool,
+}
+
+/// An input of which is known what it tells.
+struct Judged {
+    shape: Shape,
+    initial: Initial,
+    reached: Reached,
+    information: Information,
+    score: f64,
+}
+
+/// The best input of these kinds, of all where none is named.
+pub(super) fn best(task: &Task, case: &Case, kinds: &[Kind], watch: &mut dyn FnMut(&str)) -> Result<Designed> {
+    let kinds = if kinds.is_empty() { &Kind::ALL[..] } else { kinds };
+    let mut tried = 0;
+    let mut found: Vec<(Alternative, Vec<f64>)> = Vec::new();
+    for &kind in kinds {
+        watch(kind.word());
+        if let Some((shape, point, score)) = screened(task, kind, &mut tried) {
+            found.push((Alternative { shape, score, refined: false }, point));
+        }
+        if (task.stop)() && !found.is_empty() {
+            break;
+        }
+    }
+    found.sort_by(|a, b| a.0.score.total_cmp(&b.0.score));
+    for round in 0..2 {
+        let count = if round == 0 { found.len() } else { 1 };
+        let least = found.first().map_or(f64::INFINITY, |(best, _)| best.score);
+        for (alternative, point) in found.iter_mut().take(count) {
+            if (task.stop)() || alternative.score > HOPEFUL * least {
+                break;
+            }
+            let kind = alternative.shape.kind();
+            watch(kind.word());
+            if let Some((shape, better, score)) = refined(task, kind, point, alternative.score, &mut tried) {
+                (alternative.shape, *point, alternative.score) = (shape, better, score);
+            }
+            alternative.refined = true;
+        }
+        found.sort_by(|a, b| a.0.score.total_cmp(&b.0.score));
+    }
+    let doubtful = doubtful(task)?;
+    let mut best: Option<Judged> = None;
+    for (alternative, _) in found.iter_mut().take(FINALISTS) {
+        let Some(judged) = task.finally(alternative.shape, &doubtful) else { continue };
+        (alternative.shape, alternative.score) = (judged.shape, judged.score);
+        if best.as_ref().is_none_or(|best| judged.score < best.score) {
+            best = Some(judged);
+        }
+    }
+    let best = best.ok_or_else(|| nothing(task))?;
+    found.sort_by(|a, b| a.0.score.total_cmp(&b.0.score));
+    let alternatives = found.into_iter().map(|(alternative, _)| alternative).collect();
+    Ok(task.told(case, best, alternatives, tried))
+}
+
+fn nothing(task: &Task) -> Error {
+    let what = match (task.stop)() {
+        true => "the search was ended before any input was found",
+        false => "no input was found that stays within the limits and moves the cart",
+    };
+    Error::new(what).next(
+        "look with `taut simulate` whether the axis moves at all within its limits; allow more with --travel, \
+         --amplitude or --current, or a smaller --margin",
+    )
+}
+
+fn room(task: &Task) -> Room {
+    let high = (OF_RATE / task.every).min(PERIODS / task.duration);
+    let low = (1.0 / task.duration).min(0.5 * high);
+    Room { input: task.limits.input.0, duration: task.duration, frequencies: [low, high] }
+}
+
+/// Value of an input at a point of the unit cube.
+fn look(task: &Task, kind: Kind, point: &[f64], tried: &mut usize) -> Option<(Shape, f64)> {
+    *tried += 1;
+    let (shape, initial, _) = task.fitted(Shape::at(kind, point, &room(task)), &[])?;
+    let score = task.information(&shape.signal(), initial, &Differences::Forward)?.score(task.criterion);
+    score.is_finite().then_some((shape, score))
+}
+
+/// The best of points that are spread evenly along each number, in random order.
+fn screened(task: &Task, kind: Kind, tried: &mut usize) -> Option<(Shape, Vec<f64>, f64)> {
+    let n = kind.numbers();
+    let mut random = Pcg64::seed_from_u64(task.seed);
+    let orders: Vec<Vec<usize>> = (0..n).map(|_| shuffled(SPREAD, &mut random)).collect();
+    let mut best: Option<(Shape, Vec<f64>, f64)> = None;
+    for k in 0..SPREAD {
+        if (task.stop)() {
+            break;
+        }
+        let point: Vec<f64> = orders.iter().map(|order| (order[k] as f64 + 0.5) / SPREAD as f64).collect();
+        if let Some((shape, score)) = look(task, kind, &point, tried)
+            && best.as_ref().is_none_or(|(_, _, least)| score < *least)
+        {
+            best = Some((shape, point, score));
+        }
+    }
+    best
+}
+
+fn shuffled(count: usize, random: &mut Pcg64) -> Vec<usize> {
+    let mut all: Vec<usize> = (0..count).collect();
+    for i in (1..count).rev() {
+        all.swap(i, ((i + 1) as f64 * uniform(random)) as usize);
+    }
+    all
+}
+
+/// The best that an evolution strategy finds from a point, if that is better.
+fn refined(task: &Task, kind: Kind, from: &[f64], score: f64, tried: &mut usize) -> Option<(Shape, Vec<f64>, f64)> {
+    let logit: Vec<f64> = from.iter().map(|share| (share / (1.0 - share)).ln()).collect();
+    let mut best: Option<(Shape, Vec<f64>, f64)> = None;
+    let first = *tried;
+    cmaes::search(kind.numbers(), SIGMA, BARREN, &mut |z| {
+        if (task.stop)() || *tried - first >= VALUES {
+            return (f64::INFINITY, false);
+        }
+        let point: Vec<f64> = logit.iter().zip(z.iter()).map(|(a, z)| 1.0 / (1.0 + (-a - z).exp())).collect();
+        let Some((shape, value)) = look(task, kind, &point, tried) else { return (f64::INFINITY, false) };
+        let least = best.as_ref().map_or(score, |(.., least)| *least);
+        if value < least {
+            best = Some((shape, point, value));
+        }
+        (value.ln(), value < 0.99 * least)
+    });
+    best
+}
+
+/// The machine with each free parameter off to either side.
+fn doubtful(task: &Task) -> Result<Vec<Machine>> {
+    if task.doubt == 0.0 {
+        return Ok(Vec::new());
+    }
+    let mut all = Vec::new();
+    for free in parameters(&task.case.machine, &task.plan, &[])? {
+        for factor in [1.0 - task.doubt, 1.0 + task.doubt] {
+            let mut stage = task.case.machine.clone();
+            free.set(&mut stage, (factor * free.start).clamp(free.low, free.high));
+            all.push(stage);
+        }
+    }
+    Ok(all)
+}
+
+impl Task<'_> {
+    /// An input that keeps the limits on all of these machines, too, and what it surely tells.
+    fn finally(&self, shape: Shape, doubtful: &[Machine]) -> Option<Judged> {
+        let (shape, initial, reached) = self.fitted(shape, doubtful)?;
+        // What does not break away tells nothing.
+        if reached.speed == 0.0 {
+            return None;
+        }
+        let information = self.surely(self.information(&shape.signal(), initial, &Differences::Central)?)?;
+        let score = information.score(self.criterion);
+        Some(Judged { shape, initial, reached, information, score })
+    }
+
+    fn told(&self, case: &Case, best: Judged, alternatives: Vec<Alternative>, tried: usize) -> Designed {
+        let Judged { shape, initial, reached, information, score } = best;
+        let known = &information.known;
+        let problem = &information.problem;
+        let promise = |(j, parameter): (usize, &crate::parameter::Free)| Promise {
+            name: parameter.name.clone(),
+            unit: parameter.unit,
+            value: problem.value(j, information.x[j]),
+            error: information.error(j),
+            relative: known.error[j],
+            wanted: self.wanted.contains(&j),
+        };
+        let is_taken = |name: &str| case.experiments.iter().any(|experiment| experiment.name == name);
+        let mut name = "designed".to_string();
+        for k in 2.. {
+            if !is_taken(&name) {
+                break;
+            }
+            name = format!("designed {k}");
+        }
+        Designed {
+            promises: problem.parameters.iter().enumerate().map(promise).collect(),
+            undetermined: known.groups.iter().map(|group| (group.clone(), known.choices(problem, group))).collect(),
+            name,
+            shape,
+            unit: case.machine.drives[0].amplifier.mode.unit(),
+            duration: self.duration,
+            every: self.every,
+            initial,
+            reached,
+            limits: self.limits,
+            doubt: self.doubt,
+            measured: self.measured.clone(),
+            criterion: self.criterion,
+            score,
+            alternatives,
+            own: case.experiments.iter().take(COMPARED).filter_map(|experiment| self.own(experiment)).collect(),
+            tried,
+            interrupted: (self.stop)(),
+        }
+    }
+
+    /// Information of an experiment of the case, measured as the design is.
+    fn own(&self, experiment: &Experiment) -> Option<Own> {
+        if (self.stop)() || experiment.until / self.every > super::MOST_ROWS || experiment.until < 10.0 * self.every {
+            return None;
+        }
+        let task = Task {
+            duration: experiment.until,
+            case: self.case.clone(),
+            plan: self.plan.clone(),
+            wanted: self.wanted.clone(),
+            names: self.names.clone(),
+            measured: self.measured.clone(),
+            ..*self
+        };
+        let input: &Signal = &experiment.input;
+        let information = task.information(input, experiment.initial, &Differences::Central)?;
+        let determined = self.wanted.iter().filter(|&&j| information.known.error[j].is_finite()).count();
+        Some(Own {
+            name: experiment.name.clone(),
+            duration: experiment.until,
+            score: information.score(self.criterion),
+            determined,
+        })
+    }
+}

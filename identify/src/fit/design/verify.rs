@@ -1,0 +1,91 @@
+//! Whether a promise holds: logs of the experiment with noise, each fitted from a start that is off.
+
+use super::{Designed, Request, Task};
+use crate::case::{Case, parameters};
+use crate::chance::uniform;
+use crate::error::{Error, Result};
+use crate::fit::asked::problem::Stop;
+use crate::fit::asked::run::is_position;
+use crate::fit::fit;
+use crate::fit::search::point::Ending;
+use crate::log::Quantity;
+use crate::solve::Flow;
+use rand_pcg::Pcg64;
+use rand_pcg::rand_core::SeedableRng;
+
+/// By what share the starts of the fits are off, to either side.
+const OFF: f64 = 0.1;
+
+/// Findings of the fits of simulated logs for a parameter.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Verified {
+    /// Its name.
+    pub name: String,
+    /// Root mean square of estimate − truth, over the standard error that was promised.
+    pub ratio: f64,
+    /// Mean of estimate − truth, over the same.
+    pub bias: f64,
+    /// Share of the fits whose own 95 % interval holds the truth.
+    pub coverage: f64,
+    /// Fits that determined it.
+    pub fits: usize,
+}
+
+/// Simulates `logs` logs of a designed experiment and fits each; of every parameter that it determines, how far the
+/// estimates are from what they should be.
+pub fn verify(case: &Case, request: &Request, found: &Designed, logs: usize, stop: Stop) -> Result<Vec<Verified>> {
+    let task = Task::new(case, request, stop)?;
+    let frees = parameters(&case.machine, &task.plan, &[])?;
+    let mut seen: Vec<Vec<(f64, bool)>> = vec![Vec::new(); frees.len()];
+    let mut random = Pcg64::seed_from_u64(task.seed);
+    for k in 0..logs {
+        if stop() {
+            break;
+        }
+        // Somewhere within a step of a converter, so that rounding is another each time.
+        let mut initial = found.initial;
+        let off = uniform(&mut random) * step(&task);
+        initial.cart_position += off;
+        initial.drive_angle += off / case.machine.pulley_radius;
+        initial.idler_angle += off / case.machine.pulley_radius;
+        let noise = task.seed.wrapping_add(1 + k as u64);
+        let experiment = task
+            .experiment(&found.name, &found.shape.signal(), initial, noise)
+            .ok_or_else(|| Error::new("the designed experiment cannot be simulated"))?;
+        let mut own = Case { experiments: vec![experiment], ..task.case.clone() };
+        for free in &frees {
+            let start = free.start * (1.0 + OFF * (2.0 * uniform(&mut random) - 1.0));
+            free.set(&mut own.machine, start.clamp(free.low, free.high));
+        }
+        let fit = fit(&own, &task.plan, Some(stop), &mut |_| Flow::Continue)?;
+        if fit.ending == Ending::Interrupted {
+            break;
+        }
+        for ((seen, free), promise) in seen.iter_mut().zip(&frees).zip(&found.promises) {
+            let Some(estimate) = fit.estimates.iter().find(|estimate| estimate.name == free.name) else { continue };
+            if let (true, Some([low, high])) = (promise.is_determined() && estimate.is_determined(), estimate.interval)
+            {
+                seen.push(((estimate.value - promise.value) / promise.error, (low..=high).contains(&promise.value)));
+            }
+        }
+    }
+    let told = |(free, seen): (&crate::parameter::Free, Vec<(f64, bool)>)| {
+        let n = seen.len().max(1) as f64;
+        Verified {
+            name: free.name.clone(),
+            ratio: (seen.iter().map(|(z, _)| z * z).sum::<f64>() / n).sqrt(),
+            bias: seen.iter().map(|(z, _)| z).sum::<f64>() / n,
+            coverage: seen.iter().filter(|(_, holds)| *holds).count() as f64 / n,
+            fits: seen.len(),
+        }
+    };
+    Ok(frees.iter().zip(seen).map(told).filter(|one| one.fits > 0).collect())
+}
+
+/// The coarsest step of a position that is recorded, m at the cart.
+fn step(task: &Task) -> f64 {
+    let arm =
+        |quantity: Quantity| if quantity == Quantity::CartPosition { 1.0 } else { task.case.machine.pulley_radius };
+    let positions = task.measured.iter().filter(|channel| is_position(channel.quantity));
+    positions.map(|channel| arm(channel.quantity) * channel.step.unwrap_or(0.0)).fold(0.0, f64::max)
+}

@@ -1,0 +1,76 @@
+//! Parameters from logs, and what the logs cannot tell.
+//!
+//! Output error: the model is put through every log's input, and what it would have shown is compared with what was
+//! seen, all logs at once. The recipe is [`fit`]; before it, [`check`] says what the logs can determine.
+
+mod asked;
+mod case_text;
+mod check;
+pub mod compare;
+mod design;
+mod noise;
+mod posterior;
+mod search;
+mod trust;
+
+/// The experiment that determines parameters best.
+pub mod experiment_design {
+    pub use super::design::*;
+}
+
+/// Bounded non-linear least squares.
+pub mod least_squares {
+    pub use super::asked::residuals::{Bounds, Differences, Residuals, Step};
+    pub use super::search::least_squares::minimise;
+    pub use super::search::point::{Ending, Minimum, Options};
+}
+
+pub use crate::case::{drawn, machines};
+pub use asked::problem::{Problem, Stop};
+pub use asked::run::{Extra, MeasuredOutput, Nuisance, Run};
+pub use check::{Check, check, check_watched};
+pub use compare::drift::{Change, Drift, drift};
+pub use noise::Wave;
+pub use noise::student::student;
+pub use posterior::nuts::Effort;
+pub use posterior::{Credible, EFFECTIVE, Posterior, R_HAT, posterior};
+pub use search::point::Ending;
+pub use search::regression::{Balance, regression};
+pub use search::starts::Work;
+pub use search::triangle::inverse_of_square;
+pub use trust::combinations::Combination;
+pub use trust::directions::LIMIT;
+pub use trust::doubts::{Disagreement, OtherLaw};
+pub use trust::finding::{Finding, Grade};
+pub use trust::found::{Estimate, Fit};
+pub use trust::identify::{Group, Identifiability, MODEL, SHOWS};
+pub use trust::profile::{Profile, profiles};
+pub use trust::proposals::Proposal;
+pub use trust::residual_force::{ResidualForce, residual_force};
+pub use trust::scores::{LogFit, OutputFit, Score, Together, beside_log, together};
+pub use trust::uncertainty::Covariance;
+
+use crate::case::{Case, Plan};
+use crate::error::Result;
+use crate::solve::Flow;
+use trust::nearest::search;
+use trust::result::told;
+
+/// Finds the parameters of `plan` from the logs of `case`.
+///
+/// `watch` sees the cost after each step; `stop` ends the search, which then gives the best so far.
+pub fn fit(case: &Case, plan: &Plan, stop: Option<Stop>, watch: &mut dyn FnMut(f64) -> Flow) -> Result<Fit> {
+    fit_watched(case, plan, stop, &mut |_, cost| watch(cost))
+}
+
+/// The same; `watch` sees the variables after each step, too, as a [`Problem`] of this case and plan has them.
+pub fn fit_watched(
+    case: &Case,
+    plan: &Plan,
+    stop: Option<Stop>,
+    watch: &mut dyn FnMut(&[f64], f64) -> Flow,
+) -> Result<Fit> {
+    let settled = search(case, plan, stop, watch)?;
+    let judged = settled.judged(case, plan);
+    Ok(told(case, plan, &settled.searched, judged.as_ref()))
+}

@@ -1,0 +1,567 @@
+//! Noise that is alike from sample to sample: how much, over which times, and what it makes of estimates.
+//!
+//! The residuals of an output are taken for white noise and one or two slow ones, as large everywhere or larger in some
+//! places ([`scale`]), beside errors that come again at the same place ([`place`]),
+//!
+//! ```text
+//! r(t) = J(t) δ + d(t) (w(t) (x₁(t) + x₂(t)) + s ε(t)) + Σ a cos κ ŷ(t) + b sin κ ŷ(t)
+//! cov x(t), x(u) = σ² e^{−|t−u|/τ}
+//! ```
+//!
+//! with the derivatives J of the model, as a fit has moved its residuals along them: what is slow in noise looks like a
+//! change of a parameter, and a fit takes it away. So the likelihood is that of what no change of the parameters can
+//! make (restricted likelihood, H. D. Patterson and R. Thompson 1971), by a Kalman filter that takes all columns of J
+//! along with the residuals.
+//!
+//! How slow noise is cannot be told well by a short record, so no single answer is taken: over a grid of σ and τ each
+//! counts by its likelihood, and an interval holds 95 % of what all of them say together.
+
+mod filter;
+mod place;
+mod scale;
+mod series;
+pub(crate) mod student;
+
+use crate::fit::asked::problem::Problem;
+use crate::fit::asked::run::is_position;
+use crate::log::Quantity;
+use nalgebra::{DMatrix, DVector};
+use series::Series;
+use std::f64::consts::TAU;
+use student::student_share;
+
+/// Ratio of neighbouring time constants of the grid, and of neighbouring powers.
+const TIMES: f64 = 2.2;
+const POWERS: f64 = 3.0;
+
+/// Least power at low frequencies, as a multiple of that of white noise, and how many are tried.
+const LEAST_POWER: f64 = 0.1;
+const MOST_POWERS: usize = 14;
+
+/// The shares of white noise and of two slow noises before anything is seen.
+const WHITE: f64 = 0.3;
+const TWO: f64 = 0.35;
+
+/// Logarithm of the ratio of two time constants from which on they are two.
+const APART: f64 = 1.0;
+
+/// How often one of two slow noises is sought anew beside the other.
+const TURNS: usize = 3;
+
+/// Most waves along the way, and the least amplitude of one in steps of the converter: rounding alone makes waves of 1/π
+/// of them.
+const WAVES: usize = 3;
+const ROUNDED: f64 = 0.5;
+
+/// Share of how far a quantity ranges below which a wave is nothing.
+const NOTHING: f64 = 1e-6;
+
+/// A slow noise.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Slow {
+    /// Variance, of the weighted residuals' unit, over that of the white noise.
+    pub variance: f64,
+    /// Time constant, s.
+    pub time: f64,
+}
+
+/// An error that comes again at the same place.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Wave {
+    /// Of what.
+    pub quantity: Quantity,
+    /// The way from one crest to the next, in the quantity's unit.
+    pub length: f64,
+    /// Its amplitude, in the same unit.
+    pub amplitude: f64,
+}
+
+/// Noise of a quantity as one of the grid has it.
+struct Told {
+    /// Logarithm of the likelihood and of what it counted for before.
+    weight: f64,
+    /// s², the variance of the white noise.
+    white: f64,
+    slow: Vec<Slow>,
+    /// Freedom of s².
+    freedom: f64,
+}
+
+/// Normal equations.
+struct Normal {
+    /// Of the globals, the waves and the residuals.
+    sum: DMatrix<f64>,
+    /// Logarithm of the determinants of the noise and of what was eliminated.
+    determinant: f64,
+    /// Blocks, and columns of one run.
+    count: usize,
+    own: usize,
+}
+
+/// The spread of the parameters from noise of one quantity.
+#[derive(Debug, Clone)]
+pub(super) struct Spread {
+    /// Weights and covariances of the globals; and those of noise that is larger in some places, where it is.
+    parts: Vec<(f64, DMatrix<f64>, Option<DMatrix<f64>>)>,
+    freedom: f64,
+    /// What errors that come again at the same place have moved the globals by.
+    shift: DVector<f64>,
+    /// Mean covariance, with the square of the shift.
+    pub covariance: DMatrix<f64>,
+    /// The most likely slow noises.
+    pub slow: Vec<Slow>,
+    /// Errors that come again at the same place.
+    pub waves: Vec<Wave>,
+    /// How many times larger noise is in some places than in others.
+    pub unevenness: f64,
+}
+
+impl Spread {
+    /// Half of the 95 % interval of Σ c_j δ_j: what all kinds of noise leave with 5 % together, beside the shift.
+    pub fn half_width(&self, combination: &DVector<f64>) -> f64 {
+        let variance = |own: &DMatrix<f64>| (own * combination).dot(combination).max(0.0);
+        let greater = |even, uneven: &Option<DMatrix<f64>>| uneven.as_ref().map_or(0.0, variance).max(variance(even));
+        let parts = self.parts.iter();
+        let variances: Vec<(f64, f64)> = parts.map(|(weight, even, uneven)| (*weight, greater(even, uneven))).collect();
+        let shift = self.shift.dot(combination).abs();
+        let most = variances.iter().map(|(_, v)| *v).fold(0.0, f64::max).sqrt() + shift;
+        if most <= 0.0 || !most.is_finite() {
+            return most;
+        }
+        // P(e > c) of noise of this variance.
+        let above = |c: f64, variance: f64| {
+            let both = if variance > 0.0 { student_share(c.abs() / variance.sqrt(), self.freedom) } else { 0.0 };
+            if c >= 0.0 { 0.5 * both } else { 1.0 - 0.5 * both }
+        };
+        // P(|e + d| > c) − 5 %
+        let beyond = |c: f64| -> f64 {
+            let both = |v: f64| match shift {
+                0.0 => 2.0 * above(c, v),
+                _ => above(c - shift, v) + above(c + shift, v),
+            };
+            variances.iter().map(|(weight, v)| weight * both(*v)).sum::<f64>() - 0.05
+        };
+        zero(&beyond, 0.0, 20.0 * most)
+    }
+}
+
+/// Where a function has its zero between two places at which it has opposite signs, to twelve digits of the greater one
+/// (T. R. Chandrupatla 1997: inverse quadratic interpolation where that is known to help, halves elsewhere).
+fn zero(of: &dyn Fn(f64) -> f64, low: f64, high: f64) -> f64 {
+    let (mut a, mut b) = ((low, of(low)), (high, of(high)));
+    let mut part = 0.5;
+    for _ in 0..100 {
+        let x = a.0 + part * (b.0 - a.0);
+        let there = (x, of(x));
+        let last = if (there.1 > 0.0) == (a.1 > 0.0) { a } else { std::mem::replace(&mut b, a) };
+        a = there;
+        let best = if a.1.abs() < b.1.abs() { a } else { b };
+        let nearest = 1e-12 * high.abs().max(low.abs()) / (b.0 - a.0).abs();
+        if nearest > 0.5 || best.1 == 0.0 {
+            return best.0;
+        }
+        let (xi, phi) = ((a.0 - b.0) / (last.0 - b.0), (a.1 - b.1) / (last.1 - b.1));
+        let is_inverse = phi * phi < xi && (1.0 - phi) * (1.0 - phi) < 1.0 - xi;
+        part = match is_inverse {
+            true => {
+                a.1 / (b.1 - a.1) * last.1 / (b.1 - last.1)
+                    + (last.0 - a.0) / (b.0 - a.0) * a.1 / (last.1 - a.1) * b.1 / (last.1 - b.1)
+            }
+            false => 0.5,
+        };
+        part = part.clamp(nearest, 1.0 - nearest);
+    }
+    0.5 * (a.0 + b.0)
+}
+
+/// Half of the 95 % interval of a combination for the noise of all quantities.
+pub(super) fn half_width(spreads: &[Spread], combination: &DVector<f64>) -> f64 {
+    spreads.iter().map(|spread| spread.half_width(combination).powi(2)).sum::<f64>().sqrt()
+}
+
+/// The spread that the noise of each quantity makes of the first columns of a Jacobian, which concern all runs; the
+/// others concern one.
+pub(super) fn spreads(
+    problem: &Problem,
+    residuals: &[f64],
+    jacobian: &DMatrix<f64>,
+    globals: usize,
+    inverse: &DMatrix<f64>,
+) -> Vec<Spread> {
+    let estimates: Vec<Estimate> = problem
+        .quantities()
+        .into_iter()
+        .map(|quantity| {
+            let (series, weight) = series::series(problem, quantity, residuals, jacobian, globals);
+            let influence = influence(&series, globals, inverse);
+            let seen = problem.runs.iter().flat_map(|run| &run.seen).filter(|seen| seen.quantity == quantity);
+            let step = seen.map(|seen| seen.step).fold(0.0, f64::max);
+            Estimate { quantity, weight, step, series, globals, influence }
+        })
+        .filter(|estimate| estimate.blocks() >= 4)
+        .collect();
+    // (JᵀJ)⁻¹ is what white noise makes of all quantities, and what is known beforehand, and what blocks leave out.
+    let mut rest = inverse.view((0, 0), (globals, globals)).into_owned();
+    for estimate in &estimates {
+        rest -= estimate.white_part(None);
+    }
+    rest /= estimates.len().max(1) as f64;
+    estimates.into_iter().filter_map(|estimate| estimate.spread(&rest)).collect()
+}
+
+/// The noise of one quantity.
+struct Estimate {
+    quantity: Quantity,
+    /// The greatest weight of its values.
+    weight: f64,
+    /// The greatest step of its converters.
+    step: f64,
+    series: Vec<Series>,
+    globals: usize,
+    /// By how much each block moves each global, by series, as the fit weighs them.
+    influence: Vec<Vec<f64>>,
+}
+
+impl Estimate {
+    fn blocks(&self) -> usize {
+        self.series.iter().map(|series| series.time.len()).sum()
+    }
+
+    /// The spread, `rest` being the covariance that white noise makes of what no block shows.
+    fn spread(mut self, rest: &DMatrix<f64>) -> Option<Spread> {
+        let mut told = self.told();
+        let slow = best(&told)?.slow.clone();
+        let scales = scale::scales(&self.series, &slow);
+        let all = || scales.iter().flatten().flatten().copied();
+        let unevenness =
+            if scales.is_some() { all().fold(0.0, f64::max) / all().fold(f64::INFINITY, f64::min) } else { 1.0 };
+        let lengths = if is_position(self.quantity) { self.find_waves(best(&told)?) } else { Vec::new() };
+        if !lengths.is_empty() {
+            told = self.told();
+        }
+        let first = best(&told)?;
+        let (top, freedom, slow) = (first.weight, first.freedom, first.slow.clone());
+        let (waves, shift, unsure) = self.waves(first, &lengths);
+        told.retain(|one| one.weight > top - 12.0);
+        told.sort_by(|a, b| b.weight.total_cmp(&a.weight));
+        let total: f64 = told.iter().map(|one| (one.weight - top).exp()).sum();
+        let of = |scales: Option<&Vec<Vec<f64>>>| self.parts(&told, scales.map(Vec::as_slice), rest, &unsure);
+        let (even, uneven) = (of(None), scales.as_ref().map(|scales| of(Some(scales))));
+        let mut covariance = &shift * shift.transpose();
+        let mut parts = Vec::new();
+        let mut uneven = uneven.into_iter().flatten();
+        for (one, own) in told.iter().zip(even) {
+            let weight = (one.weight - top).exp() / total;
+            covariance += &own * weight;
+            parts.push((weight, own, uneven.next()));
+        }
+        parts.retain(|(weight, ..)| *weight > 1e-5);
+        Some(Spread { parts, freedom, shift, covariance, slow, waves, unevenness })
+    }
+
+    /// The covariances of the globals that these kinds of noise make, of these sizes along the series.
+    fn parts(
+        &self,
+        told: &[Told],
+        scales: Option<&[Vec<f64>]>,
+        rest: &DMatrix<f64>,
+        unsure: &DMatrix<f64>,
+    ) -> Vec<DMatrix<f64>> {
+        let white = self.white_part(scales) + rest;
+        let mut known: Vec<(f64, DMatrix<f64>)> = Vec::new();
+        let of = |one: &Told| {
+            let mut own = white.clone();
+            for slow in &one.slow {
+                let place = known.iter().position(|(time, _)| *time == slow.time).unwrap_or_else(|| {
+                    known.push((slow.time, self.slow_part(slow.time, scales)));
+                    known.len() - 1
+                });
+                own += &known[place].1 * slow.variance;
+            }
+            own * one.white + unsure
+        };
+        told.iter().map(of).collect()
+    }
+
+    /// All kinds of noise that are tried, with their likelihoods.
+    fn told(&self) -> Vec<Told> {
+        let long = |series: &Series| series.time.last().unwrap_or(&0.0) - series.time.first().unwrap_or(&0.0);
+        let longest = self.series.iter().map(long).fold(0.0, f64::max);
+        let blocks = self.blocks();
+        let sum: f64 = self.series.iter().map(long).sum();
+        let interval = (sum / blocks.max(2) as f64).max(1e-12);
+        // Of one block the gain is √m.
+        let gain = self.series.iter().flat_map(|s| &s.gain).map(|g| g * g).sum::<f64>() / blocks as f64;
+        let mut times = Vec::new();
+        let mut time = interval;
+        while time < 1.5 * longest {
+            times.push(time);
+            time *= TIMES;
+        }
+        // Power at low frequencies over that of white noise: 2 τ σ² g²/Δ
+        let powers: Vec<f64> = (0..MOST_POWERS).map(|k| LEAST_POWER * POWERS.powi(k as i32)).collect();
+        let variance = |power: f64, time: f64| power * interval / (2.0 * time * gain);
+        // One slow noise after the other, alone or beside another whose time is not much the same.
+        let along = |beside: Option<Slow>| {
+            let mut told = Vec::new();
+            let apart = |time: &&f64| beside.is_none_or(|other| (*time / other.time).ln().abs() > APART);
+            for &time in times.iter().filter(apart) {
+                let mut falling = 0;
+                let mut before = f64::NEG_INFINITY;
+                for &power in &powers {
+                    let slow = Slow { variance: variance(power, time), time };
+                    let both: Vec<Slow> = std::iter::once(slow).chain(beside).collect();
+                    let Some(one) = self.likelihood(&both) else { continue };
+                    falling = if one.weight < before { falling + 1 } else { 0 };
+                    before = one.weight;
+                    told.push(one);
+                    // The likelihood has one peak along the power.
+                    if falling >= 4 {
+                        break;
+                    }
+                }
+            }
+            told
+        };
+        let counted = |mut told: Vec<Told>, before: f64| {
+            told.iter_mut().for_each(|one| one.weight += before.ln());
+            told
+        };
+        let mut all = counted(self.likelihood(&[]).into_iter().collect(), WHITE);
+        let one = along(None);
+        let first = best(&one).map(|one| one.slow[0]);
+        all.extend(counted(one, (1.0 - WHITE - TWO) / (times.len() * powers.len()) as f64));
+        let Some(mut first) = first else { return all };
+        // Two: each beside the best of the other.
+        let mut turns: Vec<Vec<Told>> = Vec::new();
+        for _ in 0..TURNS {
+            let two = along(Some(first));
+            let Some(top) = best(&two) else { return all };
+            first = top.slow[0];
+            turns.push(two);
+        }
+        // The best of one stands for all of its kind that are about as good: Σ e^{L − L*} of them.
+        let (Some(a), Some(b)) = (turns.pop(), turns.pop()) else { return all };
+        let top = best(&a).map_or(0.0, |one| one.weight);
+        let as_good = |told: &[Told]| told.iter().map(|one| (one.weight - top).exp()).sum::<f64>();
+        let apart = |(i, j): (usize, usize)| (times[j] / times[i]).ln() > APART;
+        let pairs = (0..times.len()).flat_map(|j| (0..j).map(move |i| (i, j))).filter(|&pair| apart(pair)).count();
+        let each = 0.5 * TWO / (pairs * powers.len() * powers.len()).max(1) as f64;
+        let (for_a, for_b) = (each * as_good(&b), each * as_good(&a));
+        all.extend(counted(a, for_a));
+        all.extend(counted(b, for_b));
+        all
+    }
+
+    /// The restricted likelihood of the residuals with these slow noises.
+    fn likelihood(&self, slow: &[Slow]) -> Option<Told> {
+        let Normal { mut sum, mut determinant, count, own } = self.normal(slow);
+        let n = sum.ncols() - 1;
+        let mut rank = 0;
+        for k in 0..n {
+            let pivot = sum[(k, k)];
+            if pivot <= 1e-300 {
+                continue;
+            }
+            rank += 1;
+            determinant += pivot.ln();
+            for i in k + 1..=n {
+                let factor = sum[(k, i)] / pivot;
+                for j in i..=n {
+                    sum[(i, j)] -= factor * sum[(k, j)];
+                }
+            }
+        }
+        let freedom = count as f64 - (rank + own) as f64;
+        let squares = sum[(n, n)];
+        if freedom < 2.0 || squares <= 0.0 || !squares.is_finite() || !determinant.is_finite() {
+            return None;
+        }
+        Some(Told {
+            weight: -0.5 * determinant - 0.5 * freedom * squares.ln(),
+            white: squares / freedom,
+            slow: slow.to_vec(),
+            freedom,
+        })
+    }
+
+    /// The normal equations of the globals, the waves and the residuals under these slow noises, without what columns of
+    /// one run can do.
+    fn normal(&self, slow: &[Slow]) -> Normal {
+        let g = self.globals;
+        let n = g + self.series.first().map_or(0, |series| series.more);
+        let mut normal = Normal { sum: DMatrix::zeros(n + 1, n + 1), determinant: 0.0, count: 0, own: 0 };
+        for series in &self.series {
+            let (mut m, logs) = filter::filter(series, slow);
+            normal.determinant += logs;
+            normal.count += series.time.len();
+            let wide = series.wide();
+            for k in 0..series.own {
+                let pivot = m[k * wide + k];
+                if pivot <= 1e-300 {
+                    continue;
+                }
+                normal.own += 1;
+                normal.determinant += pivot.ln();
+                for i in k + 1..wide {
+                    let factor = m[k * wide + i] / pivot;
+                    for j in i..wide {
+                        m[i * wide + j] -= factor * m[k * wide + j];
+                    }
+                }
+            }
+            let place = |c: usize| series.moved.get(c).copied().unwrap_or_else(|| g + c - series.moved.len());
+            for i in series.own..wide {
+                for j in i..wide {
+                    let (a, b) = (place(i), place(j));
+                    normal.sum[(a, b)] += m[i * wide + j];
+                    if a != b {
+                        normal.sum[(b, a)] += m[i * wide + j];
+                    }
+                }
+            }
+        }
+        normal
+    }
+
+    /// The amplitudes of the waves in the rows under this noise, and their covariance.
+    fn amplitudes(&self, noise: &Told) -> Option<(DVector<f64>, DMatrix<f64>)> {
+        let sum = self.normal(&noise.slow).sum;
+        let n = sum.ncols() - 1;
+        let inverse = sum.view((0, 0), (n, n)).into_owned().try_inverse()?;
+        let (waves, more) = (self.globals, n - self.globals);
+        let amplitudes = (&inverse * sum.view((0, n), (n, 1))).rows(waves, more).column(0).into_owned();
+        Some((amplitudes, inverse.view((waves, waves), (more, more)) * noise.white))
+    }
+
+    /// Finds errors that come again at the same place beside this noise, and puts them into the rows: the lengths of
+    /// their waves.
+    fn find_waves(&mut self, noise: &Told) -> Vec<f64> {
+        let mut lengths = Vec::new();
+        let mut amplitudes = DVector::zeros(0);
+        while lengths.len() < WAVES {
+            let found = place::wave(&self.series, amplitudes.as_slice(), &noise.slow, noise.white);
+            let Some(place::Found { kappa, gain, amplitude, travel, tried }) = found else { break };
+            let least = (ROUNDED * self.step).max(NOTHING * travel);
+            if gain < place::CLEAR + (tried as f64).ln() || amplitude / self.weight < least {
+                break;
+            }
+            let columns: Vec<_> = self.series.iter().map(|series| place::columns(series, kappa)).collect();
+            self.series.iter_mut().zip(&columns).for_each(|(series, own)| series.append(own));
+            lengths.push(TAU / kappa);
+            let Some((with, _)) = self.amplitudes(noise) else { break };
+            amplitudes = with;
+        }
+        lengths
+    }
+
+    /// The waves in the rows under this noise, what they have moved the globals by, and the covariance of that.
+    fn waves(&self, noise: &Told, lengths: &[f64]) -> (Vec<Wave>, DVector<f64>, DMatrix<f64>) {
+        let g = self.globals;
+        let nothing = (Vec::new(), DVector::zeros(g), DMatrix::zeros(g, g));
+        if lengths.is_empty() {
+            return nothing;
+        }
+        let Some((amplitudes, covariance)) = self.amplitudes(noise) else { return nothing };
+        // Wᵀ c
+        let mut moves = DMatrix::<f64>::zeros(g, amplitudes.len());
+        for (series, influence) in self.series.iter().zip(&self.influence) {
+            let (wide, more) = (series.wide(), series.more);
+            for (k, row) in series.rows.chunks(wide).enumerate() {
+                for (i, column) in row[wide - 1 - more..wide - 1].iter().enumerate() {
+                    for j in 0..g {
+                        moves[(j, i)] += influence[k * g + j] * column;
+                    }
+                }
+            }
+        }
+        let pairs = lengths.iter().zip(amplitudes.as_slice().chunks(2));
+        let wave = |(&length, own): (&f64, &[f64])| {
+            let amplitude = f64::hypot(own[0], own[1]) / self.weight;
+            Wave { quantity: self.quantity, length, amplitude }
+        };
+        let waves = pairs.map(wave).collect();
+        (waves, &moves * &amplitudes, &moves * covariance * moves.transpose())
+    }
+
+    /// Σ W d² Wᵀ for white noise of one: what it makes of the globals.
+    fn white_part(&self, scales: Option<&[Vec<f64>]>) -> DMatrix<f64> {
+        let g = self.globals;
+        let mut sum = DMatrix::zeros(g, g);
+        for (index, rows) in self.influence.iter().enumerate() {
+            for (k, row) in rows.chunks(g.max(1)).enumerate() {
+                let d = scales.map_or(1.0, |scales| scales[index][k]);
+                for i in 0..g {
+                    for j in 0..g {
+                        sum[(i, j)] += d * d * row[i] * row[j];
+                    }
+                }
+            }
+        }
+        sum
+    }
+
+    /// Σ_tu W(t) d(t) g(t) e^{−|t−u|/τ} g(u) d(u) W(u)ᵀ for a slow noise of one.
+    fn slow_part(&self, tau: f64, scales: Option<&[Vec<f64>]>) -> DMatrix<f64> {
+        let g = self.globals;
+        let mut sum = DMatrix::zeros(g, g);
+        for (index, (series, rows)) in self.series.iter().zip(&self.influence).enumerate() {
+            let mut state = vec![0.0; g];
+            let mut last = None;
+            for (k, row) in rows.chunks(g.max(1)).enumerate() {
+                let d = scales.map_or(1.0, |scales| scales[index][k]);
+                let (gain, time) = (series.gain[k] * d, series.time[k]);
+                let decay = (-(time - last.unwrap_or(time)) / tau).exp();
+                last = Some(time);
+                state.iter_mut().for_each(|x| *x *= decay);
+                for i in 0..g {
+                    for j in 0..g {
+                        sum[(i, j)] += gain * (row[i] * state[j] + row[j] * state[i]) + gain * gain * row[i] * row[j];
+                    }
+                }
+                for (x, w) in state.iter_mut().zip(row) {
+                    *x += gain * w;
+                }
+            }
+        }
+        sum
+    }
+}
+
+/// The most likely of them.
+fn best(told: &[Told]) -> Option<&Told> {
+    told.iter().max_by(|a, b| a.weight.total_cmp(&b.weight)).filter(|one| one.weight.is_finite())
+}
+
+/// W = J (JᵀJ)⁻¹: by how much each block moves each global, by series.
+fn influence(all: &[Series], globals: usize, inverse: &DMatrix<f64>) -> Vec<Vec<f64>> {
+    let of = |series: &Series| {
+        let mut own = vec![0.0; series.time.len() * globals];
+        for (row, out) in series.rows.chunks(series.wide()).zip(own.chunks_mut(globals.max(1))) {
+            for (value, &c) in row.iter().zip(&series.moved) {
+                for (j, out) in out.iter_mut().enumerate() {
+                    *out += value * inverse[(c, j)];
+                }
+            }
+        }
+        own
+    };
+    all.iter().map(of).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_zero_is_found_wherever_it_is() {
+        for root in [1e-9, 0.3, 0.5, 1.7, 19.99] {
+            let steep = |x: f64| (root / x.max(1e-300)).min(1e3) - 1.0;
+            let flat = |x: f64| -(x - root).powi(3);
+            let normal = |x: f64| libm::erfc(x) - libm::erfc(root);
+            assert!((zero(&steep, 0.0, 20.0) - root).abs() < 1e-9, "{root}");
+            assert!((zero(&flat, 0.0, 20.0) - root).abs() < 1e-3, "{root}");
+            assert!(root > 5.0 || (zero(&normal, 0.0, 20.0) - root).abs() < 1e-9, "{root}");
+        }
+    }
+}

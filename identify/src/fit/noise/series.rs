@@ -1,0 +1,128 @@
+//! The rows of a quantity, taken together where they are many or share an error of rounding.
+
+use crate::fit::asked::problem::Problem;
+use crate::fit::asked::run::is_position;
+use crate::log::Quantity;
+use nalgebra::DMatrix;
+
+/// Most blocks of rows into which the values of one quantity are taken together.
+const BLOCKS: usize = 700;
+
+/// Rows taken together, of one output of one run. A block of n equally good rows is their sum over √n, so that white
+/// noise is as large in it as in a row.
+pub(super) struct Series {
+    /// Columns of the Jacobian that are not zero here: those of the run alone first.
+    pub moved: Vec<usize>,
+    /// How many of them are the run's alone.
+    pub own: usize,
+    /// How many columns stand between them and the residual that are not of the Jacobian.
+    pub more: usize,
+    /// Block by block the moved columns, those that are not of the Jacobian, and the residual.
+    pub rows: Vec<f64>,
+    /// The answer of each to a slow noise of one, √n.
+    pub gain: Vec<f64>,
+    /// Times, s.
+    pub time: Vec<f64>,
+    /// The value of the model.
+    pub value: Vec<f64>,
+    /// Its speed if it is a position, else its size.
+    pub speed: Vec<f64>,
+}
+
+impl Series {
+    /// Columns, the residual's included.
+    pub fn wide(&self) -> usize {
+        self.moved.len() + self.more + 1
+    }
+
+    /// Puts further columns before the residual.
+    pub fn append(&mut self, columns: &[Vec<f64>]) {
+        let wide = self.wide();
+        let mut rows = Vec::with_capacity(self.rows.len() + columns.len() * self.time.len());
+        for (place, row) in self.rows.chunks(wide).enumerate() {
+            rows.extend_from_slice(&row[..wide - 1]);
+            rows.extend(columns.iter().map(|column| column[place]));
+            rows.push(row[wide - 1]);
+        }
+        self.rows = rows;
+        self.more += columns.len();
+    }
+}
+
+/// The rows of a quantity: as many together as share an error of rounding, and so many that no more than [`BLOCKS`]
+/// remain; and the greatest weight of a value. Columns from `globals` on concern one run.
+pub(super) fn series(
+    problem: &Problem,
+    quantity: Quantity,
+    residuals: &[f64],
+    jacobian: &DMatrix<f64>,
+    globals: usize,
+) -> (Vec<Series>, f64) {
+    let mut all = Vec::new();
+    let outputs = || {
+        problem.runs.iter().enumerate().flat_map(|(index, run)| {
+            let own = run.seen.iter().enumerate().filter(|(_, seen)| seen.quantity == quantity);
+            own.map(move |(output, seen)| (index, output, seen))
+        })
+    };
+    let most = outputs().flat_map(|(_, _, seen)| &seen.weights).copied().fold(0.0, f64::max);
+    let total: f64 = outputs().map(|(index, output, _)| problem.runs[index].independent(output)).sum();
+    let enough = (total / BLOCKS as f64).max(1.0) - 1e-6;
+    for (index, output, seen) in outputs() {
+        let run = &problem.runs[index];
+        let n = run.time.len();
+        let first = problem.first_row(index) + output * n;
+        let rows: Vec<usize> = (0..n).filter(|&k| seen.weights[k] > 0.0).collect();
+        let is_moved = |c: &usize| rows.iter().any(|&k| jacobian[(first + k, *c)] != 0.0);
+        let mut moved: Vec<usize> = (globals..jacobian.ncols()).filter(is_moved).collect();
+        let own = moved.len();
+        moved.extend((0..globals).filter(is_moved));
+        let wide = moved.len() + 1;
+        let mut series = Series {
+            moved,
+            own,
+            more: 0,
+            rows: Vec::new(),
+            gain: Vec::new(),
+            time: Vec::new(),
+            value: Vec::new(),
+            speed: Vec::new(),
+        };
+        let mut block = vec![0.0; wide];
+        let (mut information, mut time, mut value, mut count) = (0.0, 0.0, 0.0, 0.0);
+        for (place, &k) in rows.iter().enumerate() {
+            let w = seen.weights[k] / most;
+            for (sum, &c) in block.iter_mut().zip(&series.moved) {
+                *sum += w * jacobian[(first + k, c)];
+            }
+            block[wide - 1] += w * residuals[first + k];
+            information += w * w;
+            time += run.time[k];
+            // r = w (ŷ − y)
+            value += seen.values[k] + residuals[first + k] / seen.weights[k];
+            count += 1.0;
+            if information >= enough || place + 1 == rows.len() {
+                let scale = 1.0 / f64::sqrt(information);
+                series.rows.extend(block.iter().map(|v| v * scale));
+                series.gain.push(f64::sqrt(information));
+                series.time.push(time / count);
+                series.value.push(value / count);
+                block.fill(0.0);
+                (information, time, value, count) = (0.0, 0.0, 0.0, 0.0);
+            }
+        }
+        let blocks = series.time.len();
+        series.speed = match is_position(quantity) && blocks > 1 {
+            true => (0..blocks)
+                .map(|k| {
+                    let (before, after) = (k.saturating_sub(1), (k + 1).min(blocks - 1));
+                    let past = series.time[after] - series.time[before];
+                    ((series.value[after] - series.value[before]) / past).abs()
+                })
+                .collect(),
+            false => series.value.iter().map(|value| value.abs()).collect(),
+        };
+        all.push(series);
+    }
+    (all, most)
+}

@@ -1,0 +1,356 @@
+//! Draws from the posterior of a fit's parameters: what priors and logs together leave possible.
+//!
+//! The likelihood is normal, with the deviation of each quantity that the fit found, or Huber's where the fit is
+//! robust. Residuals that are alike from sample to sample tell less than their number says: the logarithm of the
+//! likelihood is divided by the greatest factor by which the covariance of the fit grows for that reason, so that with
+//! flat priors and a model that is linear no interval is narrower than the fit's. How it is drawn from stands in
+//! `density.rs`.
+
+mod density;
+mod marginal;
+pub(crate) mod nuts;
+
+use crate::case::{Case, Plan, Prior, file_name};
+use crate::error::{Error, Result};
+use crate::fit::asked::problem::Problem;
+use crate::fit::asked::residuals::{Bounds, Differences, Residuals};
+use crate::fit::asked::run::{Extra, Nuisance, Run};
+use crate::fit::search::point::Ending;
+use crate::fit::search::starts::HUBER;
+use crate::fit::search::triangle::inverse_of_square;
+use crate::fit::trust::found::{Estimate, Fit};
+use crate::fit::trust::uncertainty::Covariance;
+use crate::trajectory::{Column, Trajectory};
+use density::{Ingredients, Prior as OnVariable, Sampled, draw};
+use marginal::Marginal;
+use nalgebra::DMatrix;
+use nuts::{Draws, Effort, Watch};
+use rand_pcg::Pcg64;
+use rand_pcg::rand_core::SeedableRng;
+
+/// R̂ above which nothing counts as converged.
+pub const R_HAT: f64 = 1.01;
+
+/// Effective draws below which nothing counts as converged.
+pub const EFFECTIVE: f64 = 400.0;
+
+/// Share of divergent transitions that is passed over.
+const DIVERGING: f64 = 0.01;
+
+/// The draws, and whether to believe them.
+#[derive(Debug, Clone)]
+pub struct Posterior {
+    /// The variables: parameters, nuisances that all logs share, then those of each log.
+    pub variables: Vec<Credible>,
+    /// How many of them stand among the estimates of the fit, in its order.
+    pub globals: usize,
+    /// The draws, SI.
+    pub draws: Draws,
+    /// The divisor of the logarithm of the likelihood, for autocorrelated residuals.
+    pub inflation: f64,
+    /// Whether paths followed the slopes at the fit; it was a random walk otherwise.
+    pub fixed_slopes: bool,
+}
+
+/// The posterior of one number.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Credible {
+    /// Its name; with the log's before it, where it is the log's own.
+    pub name: String,
+    /// SI unit.
+    pub unit: &'static str,
+    /// Mean of the draws.
+    pub mean: f64,
+    /// Their standard deviation.
+    pub deviation: f64,
+    /// Their median.
+    pub median: f64,
+    /// 2.5 % of the draws lie below, and 2.5 % above.
+    pub interval: [f64; 2],
+    /// Rank-normalised split R̂.
+    pub r_hat: f64,
+    /// Bulk effective sample size.
+    pub effective: f64,
+}
+
+/// Draws from the posterior of the parameters of `plan` about `fit`, which was made of the same case and plan.
+///
+/// `watch` sees how many draws are made, and may end it early. Errors: a fit that was interrupted, an estimate that is
+/// not determined, priors outside the bounds.
+pub fn posterior(case: &Case, plan: &Plan, fit: &Fit, effort: Effort, watch: &Watch) -> Result<Posterior> {
+    if matches!(fit.ending, Ending::Interrupted | Ending::Failed) {
+        return Err(Error::new("draws begin at a fit that has ended, and this one has not").next("fit it again"));
+    }
+    if !plan.separate.is_empty() {
+        return Err(crate::case::draws_are_of_one_machine());
+    }
+    if fit.estimates.is_empty() {
+        return Err(Error::new("nothing is searched for").next("add free = [\"cart.mass\"] to [fit]"));
+    }
+    refuse_undetermined(fit)?;
+    let mut problem = Problem::new(case, plan)?;
+    problem.weigh_by(&fit.noise);
+    let mut bounds = problem.bounds();
+    let at = fit.point.clone();
+    let mut residuals = vec![0.0; problem.rows()];
+    let failed = || Error::new("the model does not get through these logs at the fit");
+    if at.len() != problem.variables() || !problem.evaluate(&at, &mut residuals) {
+        return Err(failed());
+    }
+    let jacobian = problem.jacobian(&at, &residuals, &bounds, &Differences::Central).ok_or_else(failed)?;
+    let (inflation, variance) = inflation(&problem, &residuals, &jacobian, &at, &bounds);
+    let scales = scales(&problem);
+    let priors = priors(&scales, plan, &mut bounds)?;
+    let huber = if plan.huber { HUBER } else { f64::INFINITY };
+    let variance = variance * inflation;
+    // Starts and offsets are integrated over, where the loss is a square.
+    let known: Vec<bool> = priors.iter().map(|prior| huber.is_finite() || prior.is_some()).collect();
+    let deviations = inverse_of_square(&jacobian).map(|inverse| inverse.diagonal().map(|own| (own * variance).sqrt()));
+    let deviations = deviations.map_or_else(|| vec![f64::INFINITY; at.len()], |own| own.as_slice().to_vec());
+    let marginal = Marginal::new(problem.clone(), (&at, &bounds), variance, &deviations, &|j| known[j]);
+    let kept = marginal.kept().to_vec();
+    let jacobian =
+        marginal.clone().jacobian(&marginal.of(&at), &[], &marginal.bounds_of(&bounds), &Differences::Central);
+    let ingredients = Ingredients {
+        problem: marginal.clone(),
+        at: marginal.of(&at),
+        jacobian: jacobian.ok_or_else(failed)?,
+        bounds: marginal.bounds_of(&bounds),
+        priors: priors.into_iter().enumerate().filter(|(j, _)| kept.contains(j)).map(|(_, prior)| prior).collect(),
+        inflation: variance,
+        huber,
+    };
+    let Sampled { mut draws, fixed } = draw(&ingredients, effort, watch)?;
+    complete(&mut draws, &marginal, effort, watch);
+    for draw in draws.chains.iter_mut().flatten() {
+        for (value, scale) in draw.iter_mut().zip(&scales) {
+            *value = scale.value(*value);
+        }
+    }
+    let variables = scales
+        .iter()
+        .enumerate()
+        .map(|(j, scale)| Credible {
+            name: scale.name.clone(),
+            unit: scale.unit,
+            mean: draws.mean(j),
+            deviation: draws.deviation(j),
+            median: draws.quantile(j, 0.5),
+            interval: [draws.quantile(j, 0.025), draws.quantile(j, 0.975)],
+            r_hat: draws.r_hat(j),
+            effective: draws.effective(j),
+        })
+        .collect();
+    Ok(Posterior { variables, globals: problem.globals(), draws, inflation, fixed_slopes: fixed })
+}
+
+/// Draws the shifts that were integrated over beside each draw; if that is ended early, as many of each chain are left.
+fn complete(draws: &mut Draws, marginal: &Marginal, effort: Effort, watch: &Watch) {
+    let made = effort.chains * (effort.tune + effort.draws);
+    // What there was when it was interrupted is completed: that takes one simulation each.
+    let goes_on = || draws.interrupted || watch(made);
+    let one = |number: usize, chain: &[Vec<f64>]| {
+        let mut random = Pcg64::seed_from_u64(effort.seed.wrapping_add(number as u64) ^ 0xc0de);
+        let mut marginal = marginal.clone();
+        let completed = |draw: &Vec<f64>| goes_on().then(|| marginal.completed(draw, &mut random));
+        chain.iter().map_while(completed).collect::<Vec<_>>()
+    };
+    let chains: Vec<Vec<Vec<f64>>> = std::thread::scope(|scope| {
+        let one = &one;
+        let chains = draws.chains.iter().enumerate();
+        let threads: Vec<_> = chains.map(|(number, chain)| scope.spawn(move || one(number, chain))).collect();
+        threads.into_iter().map(|thread| thread.join().unwrap_or_default()).collect()
+    });
+    let shortest = chains.iter().map(Vec::len).min().unwrap_or(0);
+    draws.interrupted |= shortest < draws.chains.first().map_or(0, Vec::len);
+    draws.chains = chains;
+    draws.chains.iter_mut().for_each(|chain| chain.truncate(shortest));
+}
+
+/// Draws of what the logs do not determine would wander between its bounds for as long as one waits.
+fn refuse_undetermined(fit: &Fit) -> Result<()> {
+    let undetermined = |estimate: &&Estimate| estimate.error.is_some_and(f64::is_infinite);
+    let names: Vec<&str> = fit.estimates.iter().filter(undetermined).map(|estimate| &*estimate.name).collect();
+    if names.is_empty() {
+        return Ok(());
+    }
+    let are = if names.len() == 1 { "is" } else { "are" };
+    Err(Error::new(format!("no posterior: {} {are} not determined by these logs", names.join(", ")))
+        .next("take it out of fit.free, or add a log that determines it; `taut check` proposes some"))
+}
+
+impl Posterior {
+    /// Why it does not count as converged; empty if it does.
+    pub fn doubts(&self) -> Vec<String> {
+        let mut doubts = Vec::new();
+        if self.draws.interrupted {
+            doubts.push("it was interrupted".to_string());
+        }
+        // What is no number is no good either.
+        let worst = |of: fn(&Credible) -> f64, bad: fn(f64, f64) -> bool| {
+            let number = |c: &Credible| if of(c).is_finite() { of(c) } else { f64::NAN };
+            self.variables
+                .iter()
+                .map(|c| (number(c), &c.name))
+                .reduce(|a, b| if a.0.is_nan() || (!b.0.is_nan() && !bad(b.0, a.0)) { a } else { b })
+        };
+        if let Some((r_hat, name)) = worst(|c| c.r_hat, |new, old| new > old).filter(|(r, _)| r.is_nan() || *r > R_HAT)
+        {
+            doubts.push(format!("R\u{302} of {name} is {r_hat:.3}, above {R_HAT}"));
+        }
+        if let Some((count, name)) =
+            worst(|c| c.effective, |new, old| new < old).filter(|(n, _)| n.is_nan() || *n < EFFECTIVE)
+        {
+            doubts.push(format!("{name} has {count:.0} effective draws, fewer than {EFFECTIVE}"));
+        }
+        let all = self.count() as f64;
+        if self.draws.divergences as f64 > DIVERGING * all {
+            doubts.push(format!("{} of {all} transitions were divergent", self.draws.divergences));
+        }
+        doubts
+    }
+
+    /// Draws of all chains together.
+    pub fn count(&self) -> usize {
+        self.draws.chains.iter().map(Vec::len).sum()
+    }
+
+    /// The draws as columns: chain, draw, and each variable with its unit.
+    pub fn table(&self) -> Trajectory {
+        let mut columns = vec![Column::new("chain", ""), Column::new("draw", "")];
+        columns.extend(self.variables.iter().map(|variable| Column::new(variable.name.clone(), variable.unit)));
+        for (chain, draws) in self.draws.chains.iter().enumerate() {
+            for (k, draw) in draws.iter().enumerate() {
+                let row = [chain as f64, k as f64].into_iter().chain(draw.iter().copied());
+                columns.iter_mut().zip(row).for_each(|(column, value)| column.values.push(value));
+            }
+        }
+        Trajectory { columns }
+    }
+}
+
+/// The factor by which autocorrelated residuals widen the covariance of the fit, at most, and the variance of weighted
+/// residuals.
+fn inflation(problem: &Problem, residuals: &[f64], jacobian: &DMatrix<f64>, at: &[f64], bounds: &Bounds) -> (f64, f64) {
+    let held: Vec<bool> = (0..at.len()).map(|j| at[j] <= bounds.low[j] || at[j] >= bounds.high[j]).collect();
+    let squares: f64 = residuals.iter().map(|r| r * r).sum();
+    let white = squares / (problem.independent() - at.len() as f64).max(1.0);
+    let Some(found) = Covariance::new(problem, residuals, jacobian, &held) else { return (1.0, white) };
+    let variance = found.deviation * found.deviation;
+    let Some(inverse) = inverse_of_square(&jacobian.select_columns(&found.free)) else { return (1.0, variance) };
+    let own =
+        |(k, &j): (usize, &usize)| (j < problem.globals()).then(|| found.matrix[(k, k)] / (inverse[(k, k)] * variance));
+    let most = found.free.iter().enumerate().filter_map(own).fold(1.0, f64::max);
+    (most * (found.reach / 1.96).powi(2).max(1.0), variance)
+}
+
+/// How a variable of the search is a number.
+struct Scale<'a> {
+    name: String,
+    unit: &'static str,
+    /// The names that a prior may have, and what their number is per unit of this one: all keys of a tie.
+    known_as: Vec<(String, f64)>,
+    value: Box<dyn Fn(f64) -> f64 + Sync + 'a>,
+    variable: Box<dyn Fn(f64) -> f64 + Sync + 'a>,
+    /// dp/dx at this value.
+    slope: Box<dyn Fn(f64) -> f64 + Sync + 'a>,
+    /// d ln(dp/dx)/dx
+    bend: f64,
+}
+
+impl Scale<'_> {
+    fn value(&self, x: f64) -> f64 {
+        (self.value)(x)
+    }
+
+    fn of_extra(name: String, unit: &'static str, extra: Extra) -> Self {
+        Scale {
+            name,
+            unit,
+            known_as: vec![(extra.what.name().to_string(), 1.0)],
+            value: Box::new(move |x| extra.start + extra.unit * x),
+            variable: Box::new(move |value| (value - extra.start) / extra.unit),
+            slope: Box::new(move |_| extra.unit),
+            bend: 0.0,
+        }
+    }
+}
+
+fn scales<'a>(problem: &'a Problem<'a>) -> Vec<Scale<'a>> {
+    let of_input = |what: Nuisance| match what {
+        Nuisance::Delay => "s",
+        Nuisance::InputOffset if problem.machine.drives[0].amplifier.mode == crate::machine::AmplifierMode::Current => {
+            "A"
+        }
+        Nuisance::InputOffset => "V",
+        Nuisance::StartPosition => "m",
+        Nuisance::StartSpeed => "m/s",
+        _ => "",
+    };
+    let mut scales = Vec::new();
+    for (j, parameter) in problem.parameters.iter().enumerate() {
+        scales.push(Scale {
+            name: parameter.name.clone(),
+            unit: parameter.unit,
+            known_as: parameter.keys.iter().cloned().chain([(parameter.name.clone(), 1.0)]).collect(),
+            value: Box::new(move |x| problem.value(j, x)),
+            variable: Box::new(move |value| problem.variable(j, value)),
+            slope: Box::new(move |value| problem.slope(j, value)),
+            bend: if problem.is_log(j) { 1.0 } else { 0.0 },
+        });
+    }
+    for extra in &problem.shared {
+        scales.push(Scale::of_extra(extra.what.name().to_string(), of_input(extra.what), *extra));
+    }
+    let of_log = |run: &Run| match run.window {
+        0 => file_name(&run.name),
+        window => format!("{}-{}", file_name(&run.name), window + 1),
+    };
+    for (index, run) in problem.runs.iter().enumerate() {
+        for (_, extra) in problem.own_variables(index) {
+            let (name, unit) = match extra.what {
+                Nuisance::Bias(output) => {
+                    let quantity = run.seen[output].quantity;
+                    (format!("bias_{}", quantity.name()), quantity.unit())
+                }
+                what => (what.name().to_string(), of_input(what)),
+            };
+            scales.push(Scale::of_extra(format!("{}.{name}", of_log(run)), unit, extra));
+        }
+    }
+    scales
+}
+
+/// The priors on the variables of the search; a uniform one narrows the bounds.
+fn priors<'a>(scales: &'a [Scale<'a>], plan: &Plan, bounds: &mut Bounds) -> Result<Vec<Option<OnVariable<'a>>>> {
+    let mut all: Vec<Option<OnVariable>> = Vec::new();
+    for (j, scale) in scales.iter().enumerate() {
+        let meant = |(name, prior): &'_ (String, Prior)| {
+            scale.known_as.iter().find(|(own, _)| own == name).map(|(own, factor)| (own.clone(), *factor, *prior))
+        };
+        let Some((name, factor, prior)) = plan.priors.iter().find_map(meant) else {
+            all.push(None);
+            continue;
+        };
+        let (low, high) = match prior {
+            Prior::Normal { .. } => (f64::NEG_INFINITY, f64::INFINITY),
+            Prior::LogNormal { .. } => ((scale.variable)(0.0), f64::INFINITY),
+            Prior::Uniform { low, high } => ((scale.variable)(low / factor), (scale.variable)(high / factor)),
+        };
+        // ln 0 and what is below have no place on a logarithmic scale: no bound there.
+        bounds.low[j] = bounds.low[j].max(if low.is_nan() { f64::NEG_INFINITY } else { low });
+        bounds.high[j] = bounds.high[j].min(high);
+        if bounds.low[j] >= bounds.high[j] {
+            return Err(Error::new(format!("the prior of {name} leaves nothing of its bounds"))
+                .next("widen the prior, or [fit.bounds]"));
+        }
+        all.push(Some(Box::new(move |x| {
+            let p = scale.value(x);
+            let slope = (scale.slope)(p);
+            // ln π(p) and its derivative; then ln dp/dx
+            let (log, derivative) = prior.log(factor * p);
+            (log + slope.abs().ln(), derivative * factor * slope + scale.bend)
+        })));
+    }
+    Ok(all)
+}

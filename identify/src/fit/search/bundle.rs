@@ -1,0 +1,270 @@
+//! Descent past kinks by a proximal bundle method (C. Lemaréchal 1975; K. C. Kiwiel 1990; for costs that are not
+//! convex, M. M. Mäkelä and P. Neittaanmäki 1992).
+//!
+//! Between two changes in the order of sticks and slips the cost is smooth, and its gradient exact; across them it has
+//! a kink. At a minimum on kinks no gradient is zero: those of the pieces that meet there balance. So the gradients gₖ
+//! at points yₖ around are kept, in coordinates u with the standard error for their unit, in which each smooth piece
+//! has the second derivative I, and each is continued to where the search is:
+//!
+//! ```text
+//! φₖ(d) = φ − αₖ + g̃ₖ·d + ½ ‖d‖²       g̃ₖ = gₖ − (yₖ − u)       αₖ = φ − φ(yₖ) − gₖ·(u − yₖ) − ½ ‖u − yₖ‖²
+//! min over d of max over k of φₖ(d):     d = −Σ λₖ g̃ₖ with min ½ ‖Σ λₖ g̃ₖ‖² + Σ λₖ αₖ, λ ≥ 0, Σ λₖ = 1
+//! ```
+//!
+//! A step that keeps a part of that promise is taken; of one that does not, the gradient where it led says more about
+//! the kink. Where the promise is next to nothing, the pieces balance: that is the minimum, and Σ λₖ Jₖ the Jacobian
+//! with Jᵀr ≈ 0 there.
+
+use super::point::{Minimum, cost_of};
+use crate::fit::asked::residuals::{Bounds, Differences, Residuals};
+use crate::solve::Flow;
+use nalgebra::{DMatrix, DVector};
+
+/// The part of its promise that a step has to keep.
+const KEPT: f64 = 0.1;
+
+/// The part of the promise by which a piece has to contradict a step, for the next one to be another.
+const CONTRADICTS: f64 = 0.5;
+
+/// How often a step that is neither good nor tells anything new is halved.
+const HALVINGS: usize = 12;
+
+/// Gradients that are kept, beside as many as there are variables.
+const BESIDE: usize = 10;
+
+/// A direction counts as determined as if there were residuals that tell each variable so much of what all do.
+const FIRM: f64 = 1e-3;
+
+/// Where a descent ended.
+pub(crate) struct Balanced {
+    /// The gain that the next step promises, in standard errors.
+    pub promise: f64,
+    /// Σ λₖ Jₖ
+    pub jacobian: DMatrix<f64>,
+    /// How many points are in it.
+    pub pieces: usize,
+}
+
+/// The coordinates of a search: u = R (x − x₀)/σ over the variables that are free.
+pub(crate) struct Coordinates<'a> {
+    free: Vec<usize>,
+    r: DMatrix<f64>,
+    deviation: f64,
+    bounds: &'a Bounds,
+    huber: f64,
+    start: Vec<f64>,
+}
+
+/// A smooth piece of the cost, by a point on it.
+struct Piece {
+    x: Vec<f64>,
+    y: DVector<f64>,
+    /// Cost there, in units of σ².
+    cost: f64,
+    gradient: DVector<f64>,
+}
+
+impl Piece {
+    /// g̃ and α, seen from a point with this cost.
+    fn seen_from(&self, u: &DVector<f64>, cost: f64) -> (DVector<f64>, f64) {
+        let away = &self.y - u;
+        let own = self.cost - self.gradient.dot(&away) + 0.5 * away.norm_squared();
+        // Where the cost is not convex a piece may stand above: it counts for less the further away it is.
+        (&self.gradient - &away, (cost - own).abs())
+    }
+}
+
+/// The step that all pieces together promise most for.
+struct Promise {
+    weights: Vec<f64>,
+    /// −d
+    mean: DVector<f64>,
+    /// By how much the cost falls, in units of σ².
+    fall: f64,
+}
+
+impl Promise {
+    fn of(pieces: &[Piece], u: &DVector<f64>, cost: f64) -> Self {
+        let seen: Vec<(DVector<f64>, f64)> = pieces.iter().map(|piece| piece.seen_from(u, cost)).collect();
+        let weights = balance(&seen);
+        let (mut mean, mut beyond) = (DVector::zeros(u.len()), 0.0);
+        for ((g, alpha), weight) in seen.iter().zip(&weights) {
+            mean += g * *weight;
+            beyond += alpha * weight;
+        }
+        let fall = 0.5 * mean.norm_squared() + beyond;
+        Self { weights, mean, fall }
+    }
+
+    /// Whether a piece says otherwise of that step.
+    fn is_contradicted(&self, (g, alpha): &(DVector<f64>, f64)) -> bool {
+        -alpha - g.dot(&self.mean) + 0.5 * self.mean.norm_squared() >= -CONTRADICTS * self.fall
+    }
+}
+
+/// Goes down from `best`, which is changed, until the pieces balance to within `tolerance` standard errors, or `most`
+/// gradients are taken; none where the model does not get through, or it was told to stop.
+pub(crate) fn descend(
+    problem: &mut dyn Residuals,
+    best: &mut Minimum,
+    at: &Coordinates,
+    (tolerance, most): (f64, usize),
+    watch: &mut dyn FnMut(&[f64], f64) -> Flow,
+) -> Option<Balanced> {
+    let unit = 1.0 / (at.deviation * at.deviation);
+    let mut u = DVector::zeros(at.free.len());
+    let first = problem.jacobian(&best.x, &best.residuals, at.bounds, &Differences::Central)?;
+    let mut pieces = vec![at.piece(best, &first)?];
+    let mut trial = best.clone();
+    let mut taken = 1;
+    loop {
+        let cost = unit * best.cost;
+        let promise = Promise::of(&pieces, &u, cost);
+        let expected = (2.0 * promise.fall).sqrt();
+        if expected <= tolerance || taken >= most {
+            best.iterations += taken;
+            return at.mean_jacobian(problem, &pieces, (&promise.weights, expected));
+        }
+        if watch(&best.x, best.cost) == Flow::Stop {
+            return None;
+        }
+        let mut length = 1.0;
+        for _ in 0..HALVINGS {
+            taken += 1;
+            best.evaluations += 1;
+            trial.x = at.place(&(&u - &promise.mean * length));
+            let how = Differences::Central;
+            let Some(jacobian) = problem.linearised(&trial.x, &mut trial.residuals, at.bounds, &how) else {
+                length *= 0.5;
+                continue;
+            };
+            trial.cost = cost_of(&trial.residuals, at.huber);
+            let piece = at.piece(&trial, &jacobian)?;
+            let (y, seen) = (piece.y.clone(), piece.seen_from(&u, cost));
+            pieces.push(piece);
+            if unit * (best.cost - trial.cost) >= KEPT * length * promise.fall {
+                best.x.clone_from(&trial.x);
+                best.residuals.copy_from_slice(&trial.residuals);
+                best.cost = trial.cost;
+                u = y;
+                break;
+            }
+            if promise.is_contradicted(&seen) {
+                break;
+            }
+            length *= 0.5;
+        }
+        forget(&mut pieces, &u, unit * best.cost, &promise.weights);
+    }
+}
+
+/// Keeps the pieces that stand nearest to the cost, and those that made the last step.
+fn forget(pieces: &mut Vec<Piece>, u: &DVector<f64>, cost: f64, weights: &[f64]) {
+    let most = u.len() + BESIDE;
+    if pieces.len() <= most {
+        return;
+    }
+    let mut order: Vec<usize> = (0..pieces.len()).collect();
+    let rank = |k: usize| match weights.get(k) {
+        Some(weight) if *weight > 0.0 => -1.0,
+        None => -1.0,
+        Some(_) => pieces[k].seen_from(u, cost).1,
+    };
+    order.sort_by(|&a, &b| rank(a).total_cmp(&rank(b)));
+    let mut kept = order[..most].to_vec();
+    kept.sort_unstable();
+    let mut index = 0;
+    pieces.retain(|_| {
+        index += 1;
+        kept.contains(&(index - 1))
+    });
+}
+
+impl<'a> Coordinates<'a> {
+    /// Those around `best`, of whose Jacobian's QR decomposition `r` is R, over the variables that are free; σ is the
+    /// unit of residuals, beyond `huber` of which they count linearly.
+    pub(crate) fn new(
+        best: &Minimum,
+        r: &DMatrix<f64>,
+        free: Vec<usize>,
+        bounds: &'a Bounds,
+        (deviation, huber): (f64, f64),
+    ) -> Self {
+        let own = r.select_columns(&free);
+        let firm = DMatrix::from_diagonal(&DVector::from_fn(free.len(), |j, _| FIRM * own.column(j).norm()));
+        let mut stacked = own.clone().resize_vertically(own.nrows() + free.len(), 0.0);
+        stacked.view_mut((own.nrows(), 0), firm.shape()).copy_from(&firm);
+        Self { free, r: stacked.qr().unpack_r(), deviation, bounds, huber, start: best.x.clone() }
+    }
+
+    /// x(u), within the box.
+    fn place(&self, u: &DVector<f64>) -> Vec<f64> {
+        let mut x = self.start.clone();
+        let Some(step) = self.r.solve_upper_triangular(&(u * self.deviation)) else { return x };
+        for (&j, by) in self.free.iter().zip(&step) {
+            x[j] = (x[j] + by).clamp(self.bounds.low[j], self.bounds.high[j]);
+        }
+        x
+    }
+
+    /// The piece of the cost at a point with this Jacobian.
+    fn piece(&self, at: &Minimum, jacobian: &DMatrix<f64>) -> Option<Piece> {
+        let n = self.free.len();
+        let moved = DVector::from_fn(n, |i, _| at.x[self.free[i]] - self.start[self.free[i]]);
+        // ρ′(r)
+        let influence = at.residuals.iter().map(|r| r.clamp(-self.huber, self.huber));
+        let influence = DVector::from_iterator(at.residuals.len(), influence);
+        // dφ/du = R⁻ᵀ Jᵀρ′/σ
+        let slope = DVector::from_fn(n, |i, _| jacobian.column(self.free[i]).dot(&influence));
+        let gradient = self.r.tr_solve_upper_triangular(&slope)? / self.deviation;
+        let cost = at.cost / (self.deviation * self.deviation);
+        Some(Piece { x: at.x.clone(), y: &self.r * moved / self.deviation, cost, gradient })
+    }
+
+    /// Σ λₖ Jₖ, with the gain that is still promised.
+    fn mean_jacobian(
+        &self,
+        problem: &mut dyn Residuals,
+        pieces: &[Piece],
+        (weights, promise): (&[f64], f64),
+    ) -> Option<Balanced> {
+        let mut residuals = vec![0.0; problem.rows()];
+        let mut jacobian = DMatrix::zeros(residuals.len(), self.start.len());
+        let counting = || pieces.iter().zip(weights).filter(|(_, weight)| **weight > 0.0);
+        for (piece, weight) in counting() {
+            let own = problem.linearised(&piece.x, &mut residuals, self.bounds, &Differences::Central)?;
+            jacobian += own * *weight;
+        }
+        Some(Balanced { promise, jacobian, pieces: counting().count() })
+    }
+}
+
+/// min ½ ‖Σ λₖ gₖ‖² + Σ λₖ αₖ over λ ≥ 0 with Σ λₖ = 1, by exchange between the two that gain most by it.
+fn balance(seen: &[(DVector<f64>, f64)]) -> Vec<f64> {
+    let n = seen.len();
+    let products = DMatrix::from_fn(n, n, |i, j| seen[i].0.dot(&seen[j].0));
+    let mut weights = vec![0.0; n];
+    // The best one alone to begin with.
+    let alone = |k: usize| 0.5 * products[(k, k)] + seen[k].1;
+    let first = (0..n).min_by(|&a, &b| alone(a).total_cmp(&alone(b))).unwrap_or(0);
+    weights[first] = 1.0;
+    let mut slopes: Vec<f64> = (0..n).map(|k| products[(k, first)] + seen[k].1).collect();
+    for _ in 0..1000 * n {
+        let Some(to) = (0..n).min_by(|&a, &b| slopes[a].total_cmp(&slopes[b])) else { break };
+        let Some(from) = (0..n).filter(|&k| weights[k] > 0.0).max_by(|&a, &b| slopes[a].total_cmp(&slopes[b])) else {
+            break;
+        };
+        let gain = slopes[from] - slopes[to];
+        let bend = products[(from, from)] + products[(to, to)] - 2.0 * products[(from, to)];
+        if gain <= 1e-10 * slopes[from].abs().max(f64::MIN_POSITIVE) {
+            break;
+        }
+        let by = if bend > 0.0 { f64::min(gain / bend, weights[from]) } else { weights[from] };
+        weights[to] += by;
+        weights[from] = if by < weights[from] { weights[from] - by } else { 0.0 };
+        for k in 0..n {
+            slopes[k] += by * (products[(k, to)] - products[(k, from)]);
+        }
+    }
+    weights
+}

@@ -1,0 +1,242 @@
+//! A first guess without simulation: the balance of torques of a rigid axis, as a linear regression.
+//!
+//! ```text
+//! τ_M = J φ̈ + B φ̇ + C sgn φ̇ + T₀                at the drive pulley, everything moving together
+//! ```
+//!
+//! τ_M follows from the logged input, φ̇ and φ̈ from the logged positions by derivatives of a Gaussian that weighs a
+//! few rows. This is the method of the inverse dynamic model (M. Gautier, W. Khalil 1990); noise in positions biases
+//! it, so it only says where a search may begin.
+
+use super::triangle::inverse_of_square;
+use crate::fit::asked::problem::Problem;
+use crate::fit::asked::run::{Run, is_position};
+use crate::log::Quantity;
+use crate::machine::{AmplifierMode, Machine};
+use crate::parameter::{Free, Sum, at_pulley, value};
+use nalgebra::{DMatrix, DVector};
+
+/// Rows that are averaged into one equation, so that noise in derivatives counts less.
+const BLOCK: usize = 5;
+
+/// After so many equal positions in a row an axis counts as at rest, where friction takes what it must.
+const REST: f64 = 20.0;
+
+/// Widths of the Gaussian that are tried, rows.
+const WIDTHS: [f64; 9] = [2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 32.0];
+
+/// Part of the root mean square acceleration that noise may be; the least width that keeps to it is taken.
+const NOISE: f64 = 0.2;
+
+/// The balance of torques of a rigid axis, at the drive pulley.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Balance {
+    /// Total inertia J, kg m².
+    pub inertia: f64,
+    /// Total viscous friction B, N m s/rad, without what the back-EMF brakes.
+    pub viscous: f64,
+    /// Total Coulomb friction C, N m.
+    pub coulomb: f64,
+    /// Constant torque T₀ that the motor has to bring up, N m.
+    pub load: f64,
+    /// Standard errors of the four, as if the equations were independent.
+    pub errors: [f64; 4],
+    /// Root mean square of what is left, as a part of that of the torque.
+    pub unexplained: f64,
+    /// Equations.
+    pub equations: usize,
+}
+
+/// The balance over all logs of a problem; none where they hold no positions on an even raster, or do not move enough.
+pub fn regression(problem: &Problem) -> Option<Balance> {
+    balance(&smoothed(problem), 0)
+}
+
+/// A log with the derivatives of its position.
+pub(crate) struct Smoothed<'a> {
+    run: &'a Run,
+    machine: &'a Machine,
+    output: usize,
+    /// Rows without derivatives at each end.
+    margin: usize,
+    /// φ̇ and φ̈
+    derivatives: Vec<[f64; 2]>,
+}
+
+/// The logs of a problem that hold positions on an even raster, as [`balance`] wants them.
+pub(crate) fn smoothed<'a>(problem: &'a Problem) -> Vec<Smoothed<'a>> {
+    let noise = problem.noise();
+    let mut all = Vec::new();
+    for run in problem.runs.iter().filter(|run| run.is_even()) {
+        let seen = run.seen.iter().position(|seen| is_position(seen.quantity) && !seen.absolute);
+        if let Some(output) = seen {
+            all.extend(Smoothed::new(run, &problem.machine, output, noise.of(run.seen[output].quantity)));
+        }
+    }
+    all
+}
+
+/// The balance with the inputs so many rows later than logged.
+pub(crate) fn balance(logs: &[Smoothed], late: usize) -> Option<Balance> {
+    let mut rows: Vec<[f64; 5]> = Vec::new();
+    for log in logs {
+        log.add_to(late, &mut rows);
+    }
+    let n = rows.len();
+    if n < 12 {
+        return None;
+    }
+    let matrix = DMatrix::from_fn(n, 4, |i, j| rows[i][j]);
+    let torque = DVector::from_fn(n, |i, _| rows[i][4]);
+    let inverse = inverse_of_square(&matrix)?;
+    let found = &inverse * matrix.tr_mul(&torque);
+    let left = (&torque - &matrix * &found).norm_squared();
+    let variance = left / (n - 4) as f64;
+    Some(Balance {
+        inertia: found[0],
+        viscous: found[1],
+        coulomb: found[2],
+        load: found[3],
+        errors: std::array::from_fn(|j| (variance * inverse[(j, j)]).sqrt()),
+        unexplained: (left / torque.norm_squared().max(f64::MIN_POSITIVE)).sqrt(),
+        equations: n,
+    })
+}
+
+impl<'a> Smoothed<'a> {
+    /// That of one output of a run; none where it is too short.
+    fn new(run: &'a Run, machine: &'a Machine, output: usize, noise: f64) -> Option<Self> {
+        let seen = &run.seen[output];
+        let (n, h) = (run.fitted_rows.min(run.time.len()), run.interval());
+        let mut derivatives = None;
+        for width in WIDTHS {
+            let Some(found) = derived(&seen.values[..n], width, h) else { break };
+            let size = (found.iter().map(|[_, a]| a * a).sum::<f64>() / found.len() as f64).sqrt();
+            // Deviation of white noise behind the second derivative of a Gaussian: σ √(3/(8 √π)) / w^(5/2), per
+            // interval squared
+            let trembles = noise * (3.0 / (8.0 * std::f64::consts::PI.sqrt())).sqrt() / width.powf(2.5) / (h * h);
+            derivatives = Some((width, found));
+            if trembles < NOISE * size {
+                break;
+            }
+        }
+        let (width, mut derivatives) = derivatives?;
+        if seen.quantity == Quantity::CartPosition {
+            derivatives.iter_mut().flatten().for_each(|value| *value /= machine.pulley_radius);
+        }
+        Some(Self { run, machine, output, margin: reach(width), derivatives })
+    }
+
+    /// Adds its equations: φ̈, φ̇, sgn φ̇, 1 and the torque.
+    fn add_to(&self, late: usize, rows: &mut Vec<[f64; 5]>) {
+        let Self { run, machine, .. } = self;
+        let seen = &run.seen[self.output];
+        let motor = &machine.drives[0].motor;
+        let (n_gear, amplifier) = (motor.gear_ratio, &machine.drives[0].amplifier);
+        let per_ampere = motor.gear_efficiency * n_gear * motor.torque_constant;
+        let mut block: Vec<[f64; 5]> = Vec::with_capacity(BLOCK);
+        for (k, &[speed, acceleration]) in self.derivatives.iter().enumerate() {
+            let row = k + self.margin;
+            let given = amplifier.gain * run.logged[row.saturating_sub(late)];
+            let clipped = |value: f64, limit: Option<f64>| limit.map_or(value, |limit| value.clamp(-limit, limit));
+            // τ_M = η n K_t i, i = (V − K_e n φ̇)/R
+            let current = match amplifier.mode {
+                AmplifierMode::Current => given,
+                AmplifierMode::Voltage => {
+                    (clipped(given, amplifier.voltage_limit) - motor.back_emf_constant * n_gear * speed)
+                        / motor.resistance
+                }
+            };
+            let torque = per_ampere * clipped(current, amplifier.current_limit);
+            let moves = speed != 0.0 && seen.repeats[row] < REST && seen.alike[row] < REST;
+            if moves && torque.is_finite() && acceleration.is_finite() {
+                block.push([acceleration, speed, speed.signum(), 1.0, torque]);
+            } else {
+                block.clear();
+            }
+            if block.len() == BLOCK {
+                rows.push(std::array::from_fn(|j| block.iter().map(|row| row[j]).sum::<f64>() / BLOCK as f64));
+                block.clear();
+            }
+        }
+    }
+}
+
+/// Rows to each side that a Gaussian of this width weighs.
+pub(crate) fn reach(width: f64) -> usize {
+    (5.0 * width).ceil() as usize
+}
+
+/// First and second derivative of `values` at interval `h`, smoothed, without the margins; exact for parabolas.
+pub(crate) fn derived(values: &[f64], width: f64, h: f64) -> Option<Vec<[f64; 2]>> {
+    let reach = reach(width) as i64;
+    if (values.len() as i64) < 2 * reach + 10 {
+        return None;
+    }
+    let offsets: Vec<f64> = (-reach..=reach).map(|k| k as f64).collect();
+    let bell: Vec<f64> = offsets.iter().map(|x| (-x * x / (2.0 * width * width)).exp()).collect();
+    let total: f64 = bell.iter().sum();
+    let variance = offsets.iter().zip(&bell).map(|(x, g)| x * x * g).sum::<f64>() / total;
+    // Weights x g for the slope, (x² − x̄²) g for the curvature.
+    let first: Vec<f64> = offsets.iter().zip(&bell).map(|(x, g)| x * g).collect();
+    let second: Vec<f64> = offsets.iter().zip(&bell).map(|(x, g)| (x * x - variance) * g).collect();
+    let slope = h * offsets.iter().zip(&first).map(|(x, w)| x * w).sum::<f64>();
+    let curvature = h * h * offsets.iter().zip(&second).map(|(x, w)| x * x * w).sum::<f64>() / 2.0;
+    let found = values.windows(offsets.len()).map(|window| {
+        let sum = |weights: &[f64]| window.iter().zip(weights).map(|(v, w)| v * w).sum::<f64>();
+        [sum(&first) / slope, sum(&second) / curvature]
+    });
+    Some(found.collect())
+}
+
+impl Balance {
+    /// The values of the free parameters that make the machine's totals those of the balance, where that is a machine
+    /// of its kind.
+    pub fn guess(&self, problem: &Problem) -> Vec<f64> {
+        let mut values: Vec<f64> = problem.parameters.iter().map(|parameter| parameter.start).collect();
+        let totals = [(Sum::Inertia, self.inertia), (Sum::Viscous, self.viscous), (Sum::Coulomb, self.coulomb)];
+        let machine = &problem.machine;
+        for ((sum, wanted), forward) in totals.into_iter().flat_map(|total| [(total, true), (total, false)]) {
+            let keys: Vec<&str> = sum.parts(forward).map(|row| row.key).collect();
+            let own = |free: &Free| free.keys.iter().all(|(key, _)| keys.contains(&key.as_str()));
+            let part = |free: &Free| -> f64 {
+                free.keys.iter().map(|(key, factor)| factor * free.start * at_pulley(machine, key)).sum()
+            };
+            let total: f64 = keys.iter().map(|key| value(machine, key).unwrap_or(0.0) * at_pulley(machine, key)).sum();
+            // Of what each campaign has for itself, that of the first.
+            let first = |(_, of): &(&Free, &Option<usize>)| of.is_none_or(|of| of == 0);
+            let counted = problem.parameters.iter().zip(&problem.of).filter(first).map(|(free, _)| free);
+            let searched: f64 = counted.filter(|free| own(free)).map(part).sum();
+            let factor = (wanted - (total - searched)) / searched;
+            if searched > 0.0 && factor > 0.02 && factor < 50.0 {
+                for (value, free) in values.iter_mut().zip(&problem.parameters).filter(|(_, free)| own(free)) {
+                    *value = (free.start * factor).clamp(free.low, free.high);
+                }
+            }
+        }
+        for (value, parameter) in values
+            .iter_mut()
+            .zip(&problem.parameters)
+            .filter(|(_, parameter)| parameter.keys.iter().any(|(key, _)| key == "cart.load"))
+        {
+            let other = machine.cart.constant_force() - machine.cart.load;
+            *value = (-self.load / machine.pulley_radius - other).clamp(parameter.low, parameter.high);
+        }
+        values
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn derivatives_of_a_parabola_are_exact() {
+        let (h, f) = (0.01, |t: f64| 3.0 - 2.0 * t + 5.0 * t * t);
+        let values: Vec<f64> = (0..100).map(|k| f(f64::from(k) * h)).collect();
+        for (k, [speed, acceleration]) in derived(&values, 3.0, h).unwrap().into_iter().enumerate() {
+            let t = (k + reach(3.0)) as f64 * h;
+            assert!((speed - (10.0 * t - 2.0)).abs() < 1e-9 && (acceleration - 10.0).abs() < 1e-7);
+        }
+    }
+}

@@ -1,0 +1,264 @@
+//! The search: starts, and weights from what the residuals are.
+
+use super::least_squares::minimise;
+use super::point::{Ending, Minimum, Options};
+use super::regression::regression;
+use crate::case::{Case, Plan};
+use crate::chance;
+use crate::error::{Error, Result};
+use crate::fit::asked::problem::{Problem, ROUNDING, Stop, extent};
+use crate::fit::asked::residuals::Residuals;
+use crate::log::Quantity;
+use crate::solve::Flow;
+use nalgebra::DMatrix;
+use rand_pcg::Pcg64;
+use rand_pcg::rand_core::SeedableRng;
+
+/// Standard deviations beyond which Huber's loss counts linearly: 95 % efficient with Gaussian noise.
+pub(crate) const HUBER: f64 = 1.345;
+
+/// Rounds in which weights are estimated anew.
+const ROUNDS: usize = 4;
+
+/// Jacobians that a start other than the first may take before the best of them goes on.
+const TRIAL_ITERATIONS: usize = 12;
+
+/// The effort of a fit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Work {
+    /// Jacobians.
+    pub iterations: usize,
+    /// Trial points.
+    pub evaluations: usize,
+    /// Simulated logs.
+    pub simulations: u64,
+}
+
+impl Work {
+    /// Adds what else was done.
+    pub(crate) fn add(&mut self, other: &Work) {
+        self.iterations += other.iterations;
+        self.evaluations += other.evaluations;
+        self.simulations += other.simulations;
+    }
+}
+
+/// Where a search ended.
+pub(crate) struct Searched<'a> {
+    pub problem: Problem<'a>,
+    pub best: Minimum,
+    /// Deviation of each quantity's residuals.
+    pub noise: Vec<(Quantity, f64)>,
+    pub starts: Vec<f64>,
+    pub work: Work,
+}
+
+/// The search of a fit, as far as `whole` says, and to wherever that leads along directions that are not determined.
+pub(crate) fn search_as_far<'a>(
+    case: &Case,
+    plan: &Plan,
+    stop: Option<Stop<'a>>,
+    whole: &Options,
+    watch: &mut dyn FnMut(&[f64], f64) -> Flow,
+) -> Result<Searched<'a>> {
+    let whole = *whole;
+    let mut problem = Problem::new(case, plan)?.stopped_by(stop);
+    let mut work = Work::default();
+    let mut descend = |problem: &mut Problem, x: &[f64], options: &Options| {
+        let options = Options { rounding: problem.rounding(), ..*options };
+        let bounds = problem.bounds();
+        if x.is_empty() {
+            return as_it_is(problem);
+        }
+        let minimum = minimise(problem, x, &bounds, &options, &mut *watch);
+        work.iterations += minimum.iterations;
+        work.evaluations += minimum.evaluations;
+        minimum
+    };
+    let start = first_guess(&mut problem);
+    let mut best = descend(&mut problem, &start, &whole);
+    if best.ending == Ending::Failed {
+        return Err(Error::new("the model does not get through these logs with the values of the case file")
+            .next("run `taut simulate` on the case to see why, or start from other values"));
+    }
+    let mut starts = vec![best.cost];
+    let mut random = Pcg64::seed_from_u64(plan.seed);
+    for _ in 1..plan.starts {
+        if problem.is_stopped() || best.ending == Ending::Interrupted {
+            break;
+        }
+        let x = elsewhere(&problem, &mut random);
+        let trial = descend(
+            &mut problem,
+            &x,
+            &Options { iterations: TRIAL_ITERATIONS, tolerance: whole.tolerance.max(0.1), ..whole },
+        );
+        let near = trial.cost < 1.2 * best.cost;
+        let trial =
+            if near && trial.ending != Ending::Failed { descend(&mut problem, &trial.x, &whole) } else { trial };
+        starts.push(trial.cost);
+        if trial.cost < best.cost {
+            best = trial;
+        }
+    }
+
+    // Weights from what the residuals are, until they stay.
+    let mut noise: Vec<(Quantity, f64)> = Vec::new();
+    for round in 0..ROUNDS {
+        if problem.is_stopped() || best.ending == Ending::Interrupted {
+            break;
+        }
+        let fresh = noise_of(&problem, &best, plan.huber);
+        let settled = noise.len() == fresh.len()
+            && noise.iter().zip(&fresh).all(|((_, old), (_, new))| (new / old - 1.0).abs() < 0.05);
+        if settled {
+            break;
+        }
+        let before = first_weight(&problem);
+        problem.weigh_by(&fresh);
+        let alike = fresh.len() == 1 && !plan.huber && !told_beforehand(&problem, &fresh) && uniform(&problem);
+        noise = fresh;
+        let options = Options { huber: if plan.huber { HUBER } else { f64::INFINITY }, ..whole };
+        if alike && round == 0 && matches!(best.ending, Ending::Converged | Ending::Stalled) {
+            // One weight for all: only the unit of the residuals changes.
+            if let (Some(now), Some(before)) = (first_weight(&problem), before) {
+                rescale(&mut best, now / before);
+                break;
+            }
+        }
+        best = descend(&mut problem, &best.x.clone(), &options);
+    }
+    if problem.is_stopped() {
+        best.ending = Ending::Interrupted;
+    }
+    if noise.is_empty() {
+        noise = noise_of(&problem, &best, plan.huber);
+    }
+    work.simulations = problem.simulations;
+    Ok(Searched { problem, best, noise, starts, work })
+}
+
+/// Where nothing is searched for.
+fn as_it_is(problem: &mut Problem) -> Minimum {
+    let mut residuals = vec![0.0; problem.rows()];
+    let good = problem.evaluate(&[], &mut residuals);
+    Minimum {
+        x: Vec::new(),
+        cost: 0.5 * residuals.iter().map(|r| r * r).sum::<f64>(),
+        jacobian: DMatrix::zeros(residuals.len(), 0),
+        residuals,
+        decrement: 0.0,
+        at_bound: Vec::new(),
+        ending: if good { Ending::Converged } else { Ending::Failed },
+        coarse: 0.0,
+        pieces: 1,
+        evolved: 0,
+        iterations: 0,
+        evaluations: 1,
+    }
+}
+
+/// The first weight of an output that counts.
+fn first_weight(problem: &Problem) -> Option<f64> {
+    problem.runs.iter().flat_map(|run| &run.seen).flat_map(|seen| &seen.weights).copied().find(|w| *w > 0.0)
+}
+
+fn rescale(minimum: &mut Minimum, factor: f64) {
+    minimum.residuals.iter_mut().for_each(|r| *r *= factor);
+    minimum.jacobian *= factor;
+    minimum.cost *= factor * factor;
+}
+
+/// Whether all that counts has the same weight.
+fn uniform(problem: &Problem) -> bool {
+    let mut weights =
+        problem.runs.iter().flat_map(|run| &run.seen).flat_map(|seen| &seen.weights).filter(|w| **w > 0.0);
+    let Some(first) = weights.next() else { return true };
+    weights.all(|w| (w / first - 1.0).abs() < 1e-3)
+}
+
+/// Whether what is known beforehand of the start could be as wrong as the residuals are: then it depends on their
+/// weight.
+fn told_beforehand(problem: &Problem, noise: &[(Quantity, f64)]) -> bool {
+    let most = noise.iter().map(|(_, deviation)| *deviation).fold(0.0, f64::max);
+    let arm = problem.machine.pulley_radius.min(1.0);
+    problem.runs.iter().flat_map(|run| &run.extras).any(|extra| extra.known.is_some_and(|own| own > 0.1 * arm * most))
+}
+
+/// Where the case starts, or with the totals that a regression finds, whichever is nearer to the logs.
+fn first_guess(problem: &mut Problem) -> Vec<f64> {
+    let start = problem.start();
+    let Some(balance) = regression(problem) else { return start };
+    let bounds = problem.bounds();
+    let mut guess = start.clone();
+    for (j, value) in balance.guess(problem).into_iter().enumerate() {
+        let x = problem.variable(j, value);
+        guess[j] = if x.is_finite() { x.clamp(bounds.low[j], bounds.high[j]) } else { start[j] };
+    }
+    let mut residuals = vec![0.0; problem.rows()];
+    let mut cost = |x: &[f64]| {
+        if problem.evaluate(x, &mut residuals) { residuals.iter().map(|r| r * r).sum() } else { f64::INFINITY }
+    };
+    if cost(&guess) < cost(&start) { guess } else { start }
+}
+
+/// A point within the bounds, near enough to the start to be a machine of its kind: within a factor of ten, or for what
+/// may be zero, between zero and three times its start.
+fn elsewhere(problem: &Problem, random: &mut Pcg64) -> Vec<f64> {
+    let mut x = problem.start();
+    let bounds = problem.bounds();
+    for (j, x) in x.iter_mut().enumerate().take(problem.globals()) {
+        let share = chance::uniform(random);
+        let (low, high) = if j >= problem.parameters.len() {
+            (bounds.low[j], bounds.high[j].min(10.0))
+        } else if problem.is_log(j) {
+            (*x - std::f64::consts::LN_10, *x + std::f64::consts::LN_10)
+        } else {
+            (*x - 3.0, *x + 3.0)
+        };
+        let (low, high) = (low.max(bounds.low[j]), high.min(bounds.high[j]));
+        *x = low + share * (high - low);
+    }
+    x
+}
+
+/// The deviation of each quantity's residuals: root of their mean square, or for a robust fit from their median.
+fn noise_of(problem: &Problem, at: &Minimum, robust: bool) -> Vec<(Quantity, f64)> {
+    let quantities = problem.quantities();
+    let counted = problem.counted() as f64;
+    let freedom = (counted - problem.variables() as f64).max(1.0);
+    let mut noise = Vec::new();
+    for quantity in quantities {
+        let (mut sizes, mut squares, mut weight) = (Vec::new(), 0.0, 0.0);
+        let (mut step, mut wide): (f64, f64) = (0.0, 0.0);
+        for (index, run) in problem.runs.iter().enumerate() {
+            let first = problem.first_row(index);
+            let n = run.time.len();
+            for (output, seen) in run.seen.iter().enumerate().filter(|(_, seen)| seen.quantity == quantity) {
+                step = step.max(seen.step);
+                wide = wide.max(extent(&seen.values));
+                for k in 0..n {
+                    let w = seen.weights[k];
+                    if w > 0.0 {
+                        let r = at.residuals[first + output * n + k] / w;
+                        // Equal values in a row are one, unless they tremble.
+                        let equal = seen.step > 0.0 && seen.alike[k] <= 1.0;
+                        let share = if equal { 1.0 / seen.repeats[k].max(1.0) } else { 1.0 };
+                        squares += share * r * r;
+                        weight += share;
+                        if robust {
+                            sizes.push(r.abs());
+                        }
+                    }
+                }
+            }
+        }
+        let mut deviation = (squares / f64::max(weight, 1.0) * counted / freedom).sqrt();
+        if robust && !sizes.is_empty() {
+            let middle = sizes.len() / 2;
+            deviation = 1.4826 * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1;
+        }
+        noise.push((quantity, deviation.max(step / 12f64.sqrt()).max(ROUNDING * wide).max(f64::MIN_POSITIVE * 1e10)));
+    }
+    noise
+}

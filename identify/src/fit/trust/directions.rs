@@ -1,0 +1,101 @@
+//! The directions in which the parameters of a problem move, by how much the logs show of each.
+
+use crate::fit::asked::problem::Problem;
+use crate::fit::search::triangle::shortened;
+use nalgebra::{DMatrix, SVD};
+
+/// Relative standard error from which on a combination counts as not determined.
+pub const LIMIT: f64 = 1.0;
+
+/// A parameter of which this much goes with a combination that is not determined is not determined either.
+pub(crate) const SHARE: f64 = 0.1;
+
+/// Singular values below this share of the greatest are rounding: differences are good to about 1e-9 of the largest
+/// column.
+const ROUNDING: f64 = 1e-8;
+
+/// Iterations of a singular value decomposition before it is given up.
+const MOST_SWEEPS: usize = 10_000;
+
+/// The directions in which the parameters move, by how much they show.
+pub(crate) struct Directions {
+    /// Each a column, in relative changes.
+    pub v: DMatrix<f64>,
+    /// Singular values in the weights of the problem, falling.
+    pub singular: Vec<f64>,
+    /// Norm of each parameter's own column.
+    pub norms: Vec<f64>,
+    /// How many of them are more than rounding.
+    pub alive: usize,
+    /// A change by 100 %, in the variable of each.
+    pub whole: Vec<f64>,
+    /// Values that count.
+    pub rows: f64,
+}
+
+impl Directions {
+    /// From a Jacobian of `problem` at `x` for these of what concerns all runs, the others held; none if numbers fail.
+    pub fn new(problem: &Problem, jacobian: &DMatrix<f64>, x: &[f64], which: &[usize]) -> Option<Self> {
+        let globals = problem.globals();
+        if which.is_empty() {
+            return None;
+        }
+        let columns: Vec<usize> = which.iter().copied().chain(globals..jacobian.ncols()).collect();
+        let mut own = projected(&jacobian.select_columns(&columns), which.len())?;
+        let machine = problem.stage_at(x);
+        let whole: Vec<f64> = (0..globals).map(|j| problem.whole(&machine, j, x[j])).collect();
+        for (column, &j) in which.iter().enumerate() {
+            own.column_mut(column).scale_mut(whole[j]);
+        }
+        // Of a simulation that was ended early there are no numbers, and the decomposition would panic.
+        if own.iter().any(|entry| !entry.is_finite()) {
+            return None;
+        }
+        let mut norms = vec![0.0; globals];
+        for (column, &j) in which.iter().enumerate() {
+            norms[j] = own.column(column).norm();
+        }
+        let svd = SVD::try_new(own, false, true, 1e-15, MOST_SWEEPS)?;
+        let order = svd.v_t.as_ref()?.transpose();
+        let mut singular: Vec<f64> = svd.singular_values.iter().copied().collect();
+        let mut v = DMatrix::zeros(globals, which.len());
+        for (row, &j) in which.iter().enumerate() {
+            for i in 0..order.ncols() {
+                v[(j, i)] = order[(row, i)];
+            }
+        }
+        singular.resize(which.len(), 0.0);
+        let most = singular.iter().copied().fold(0.0, f64::max);
+        let alive = singular.iter().filter(|s| **s > ROUNDING * most).count();
+        Some(Self { v, singular, norms, alive, whole, rows: problem.counted().max(1) as f64 })
+    }
+}
+
+impl Directions {
+    /// Root mean square by which a change by 100 % along the strongest of the lost directions of these members moves
+    /// the values, if noise alone would leave all of them determined.
+    pub fn told_by_noise(&self, lost: &[usize], members: &[usize], off: &[f64]) -> Option<f64> {
+        let goes = |i: &&usize| members.iter().map(|&j| self.v[(j, **i)].powi(2)).sum::<f64>() > SHARE;
+        let own: Vec<usize> = lost.iter().filter(goes).copied().collect();
+        let is_told = |&i: &usize| i < self.alive && off[i] <= LIMIT;
+        let strongest = own.iter().map(|&i| self.singular[i]).fold(0.0, f64::max);
+        (!own.is_empty() && own.iter().all(is_told)).then(|| strongest / self.rows.sqrt())
+    }
+}
+
+/// Columns of the first `n` variables without what the others can do.
+fn projected(jacobian: &DMatrix<f64>, n: usize) -> Option<DMatrix<f64>> {
+    let all = jacobian.ncols();
+    if all == n {
+        let rows = jacobian.nrows();
+        return if rows > n { Some(shortened(jacobian).qr().unpack_r()) } else { Some(jacobian.clone()) };
+    }
+    // Others first: the last block of R is what they leave of the rest.
+    let order: Vec<usize> = (n..all).chain(0..n).collect();
+    let ordered = jacobian.select_columns(&order);
+    if ordered.nrows() < all {
+        return None;
+    }
+    let r = shortened(&ordered).qr().unpack_r();
+    Some(r.view((all - n, all - n), (n, n)).into_owned())
+}

@@ -1,0 +1,40 @@
+//! What is to be known of a fit, in a sentence each.
+
+/// How much something matters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Grade {
+    /// Good to know.
+    Note,
+    /// The result is not to be relied on.
+    Warning,
+}
+
+impl Grade {
+    /// The first word of the line.
+    pub fn word(self) -> &'static str {
+        match self {
+            Grade::Note => "note",
+            Grade::Warning => "warning",
+        }
+    }
+}
+
+/// Something to be known.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Finding {
+    /// How much it matters.
+    pub grade: Grade,
+    /// Its subject, in a word for programs.
+    pub code: &'static str,
+    /// The log it is about; none if it is about the fit.
+    pub log: Option<String>,
+    /// In a sentence.
+    pub text: String,
+}
+
+impl std::fmt::Display for Finding {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let log = self.log.as_ref().map(|log| format!("{log}: ")).unwrap_or_default();
+        write!(f, "{}: {log}{}", self.grade.word(), self.text)
+    }
+}

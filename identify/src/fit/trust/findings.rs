@@ -1,0 +1,290 @@
+//! Warnings and notes on a fit, before its numbers are used: faults of the logs, and of the search.
+
+use super::finding::{Finding, Grade};
+use super::found::Fit;
+use super::trials::{self, is_borne_out};
+use crate::case::{Case, Plan, Scope};
+use crate::fit::asked::controller::reproduced;
+use crate::fit::asked::problem::Problem;
+use crate::fit::asked::run::is_position;
+use crate::fit::noise::Wave;
+use crate::fit::search::point::Ending;
+use crate::fit::search::regression::{Balance, balance, smoothed};
+use crate::fit::search::starts::Searched;
+use crate::log::{Note, Remedy, Severity};
+use crate::machine::AmplifierMode;
+use crate::number::engineering;
+use crate::solve::Bench;
+
+/// Standard errors that a kink may promise and not keep.
+const KINK: f64 = 2.0;
+
+/// Below this share of what was seen a model explains nothing, %.
+const POOR: f64 = 50.0;
+
+/// K_t and K_e of one motor are the same number in SI units: so far apart they are not.
+const MOTOR: f64 = 1.5;
+
+/// Correlation of what the model does and what was seen, below which it goes the other way.
+const OPPOSITE: f64 = -0.5;
+
+/// Most rows by which an input may be late and be found so, the fewest that are looked into, and the part of the torque
+/// that is unexplained, relative to that without a delay, from which on they are.
+const LATEST: usize = 40;
+const LATE: usize = 2;
+const SUSPECT: f64 = 0.95;
+
+/// Share of the logged input that the controller of a case has to make of a log, %.
+const REPRODUCED: f64 = 90.0;
+
+/// All there is to say, warnings first.
+pub(crate) fn findings(case: &Case, plan: &Plan, found: &Searched, fit: &Fit) -> Vec<Finding> {
+    let mut all = of_logs(case, plan, found);
+    all.extend(of_controller(case, plan));
+    all.extend(of_delay(case, plan, found));
+    all.extend(of_search(fit));
+    all.extend(of_motor(case, fit));
+    all.extend(of_residuals(fit));
+    all.sort_by_key(|finding| std::cmp::Reverse(finding.grade));
+    all
+}
+
+fn finding(grade: Grade, code: &'static str, text: String) -> Finding {
+    Finding { grade, code, log: None, text }
+}
+
+/// The findings of the survey of each log, as far as simulation bears them out.
+fn of_logs(case: &Case, plan: &Plan, found: &Searched) -> Vec<Finding> {
+    let mut all = Vec::new();
+    for survey in trials::surveys(case, plan, found) {
+        let name = &survey.log;
+        for note in survey.notes.iter().filter(|note| note.severity != Severity::Fact) {
+            let grade = grade(note, case, plan);
+            let column = note.column.map(|column| format!("{column}: ")).unwrap_or_default();
+            let text = format!("{column}{}", note.text);
+            all.push(Finding { grade, code: note.code, log: Some(name.clone()), text });
+        }
+        let told = all.iter().any(|one: &Finding| one.code == "sign" && one.log.as_ref() == Some(name));
+        if !told && is_opposite(&found.problem, name) && is_borne_out(case, plan, found, name, &Remedy::Reverse) {
+            let text = "it moves against what the model does with the values of the case: swapped wires, or a sign; \
+                        say scale = { input = -1 }, or -1 for the outputs";
+            all.push(Finding { grade: Grade::Warning, code: "sign", log: Some(name.clone()), text: text.into() });
+        }
+    }
+    all
+}
+
+fn grade(note: &Note, case: &Case, plan: &Plan) -> Grade {
+    match (note.severity, note.code) {
+        (Severity::Suspicion, _) | (_, "still") => Grade::Warning,
+        (_, "saturation") if case.machine.cart.travel.is_none() || note.column == Some("input") => Grade::Warning,
+        (_, "outliers") if !plan.huber => Grade::Warning,
+        _ => Grade::Note,
+    }
+}
+
+/// Whether a log moves against what the model does at the start.
+fn is_opposite(problem: &Problem, name: &str) -> bool {
+    let (x, mut worst) = (problem.start(), None);
+    for (index, run) in problem.runs.iter().enumerate().filter(|(_, run)| run.name == name) {
+        let Some(seen) = run.seen.iter().find(|seen| is_position(seen.quantity) && !seen.absolute) else { continue };
+        let mut column = vec![Vec::new()];
+        let extras = problem.extras_of(index, &x);
+        if !run.predict(&mut Bench::default(), &problem.stage_at(&x), &extras, &[seen.quantity], &mut column) {
+            continue;
+        }
+        let far = (run.time.len() / 50).max(1);
+        let (mut aa, mut ab, mut bb) = (0.0, 0.0, 0.0);
+        for k in far..run.time.len() {
+            let (a, b) = (column[0][k] - column[0][k - far], seen.values[k] - seen.values[k - far]);
+            if b.is_finite() {
+                (aa, ab, bb) = (aa + a * a, ab + a * b, bb + b * b);
+            }
+        }
+        let correlation = ab / (aa * bb).sqrt();
+        if correlation.is_finite() {
+            worst = Some(worst.map_or(correlation, |worst: f64| worst.min(correlation)));
+        }
+    }
+    worst.is_some_and(|correlation| correlation < OPPOSITE)
+}
+
+/// Whether the controller of the case is the one that made the logs.
+fn of_controller(case: &Case, plan: &Plan) -> Vec<Finding> {
+    let logs = case.experiments.iter().filter_map(|experiment| experiment.log.as_ref());
+    let told = logs.filter_map(|log| {
+        let percent = reproduced(case, log)?;
+        let good = percent >= REPRODUCED;
+        let grade = if good || !plan.closed_loop { Grade::Note } else { Grade::Warning };
+        let next = match good {
+            true => "",
+            false => {
+                ": look at its gains, delay, filters and reference_speed, and at the columns of reference and position"
+            }
+        };
+        let text = format!("the controller of the case reproduces the logged input to {:.1} %{next}", percent.max(0.0));
+        Some(Finding { grade, code: "controller", log: Some(log.name.clone()), text })
+    });
+    told.collect()
+}
+
+/// Whether the logs answer their inputs late: a regression that suspects it, and a fit that finds it.
+fn of_delay(case: &Case, plan: &Plan, found: &Searched) -> Option<Finding> {
+    if plan.nuisance.delay != Scope::Off || plan.closed_loop {
+        return None;
+    }
+    let logs = smoothed(&found.problem);
+    let left: Vec<f64> = (0..=LATEST).map_while(|late| Some(balance(&logs, late)?.unexplained)).collect();
+    let late = (0..left.len()).min_by(|&a, &b| left[a].total_cmp(&left[b]))?;
+    if late < LATE || left[late] > SUSPECT * left[0] {
+        return None;
+    }
+    let late = trials::late(case, plan, found, late as f64 * found.problem.runs[0].interval())?;
+    let text = format!(
+        "the logs answer their input about {} late: a fit with that delay leaves errors of {:.0} % of those without; \
+         say nuisance = {{ delay = \"shared\" }} in [fit]",
+        rounded_time(late.delay),
+        100.0 * late.left
+    );
+    Some(finding(Grade::Warning, "delay", text))
+}
+
+/// A time in two digits.
+fn rounded_time(value: f64) -> String {
+    engineering(value, "s", 2).replace('\u{a0}', " ")
+}
+
+/// How the search ended.
+fn of_search(fit: &Fit) -> Vec<Finding> {
+    let mut all = Vec::new();
+    match fit.ending {
+        Ending::Stalled if fit.decrement > KINK => all.push(finding(
+            Grade::Warning,
+            "slope",
+            format!(
+                "the search ended on a slope that promises {:.1} standard errors and that no step fulfils: not the minimum, or no minimum",
+                fit.decrement
+            ),
+        )),
+        Ending::Stalled => all.push(finding(
+            Grade::Note,
+            "kink",
+            format!(
+                "ended at a kink, where sticks and slips change their order: its slope promises {:.1} standard errors",
+                fit.decrement
+            ),
+        )),
+        Ending::OutOfIterations => {
+            all.push(finding(Grade::Warning, "steps", "the search was not at its end when its steps were used up".into()));
+        }
+        Ending::Converged | Ending::Interrupted | Ending::Failed => {}
+    }
+    for estimate in fit.estimates.iter().filter(|estimate| estimate.at_bound) {
+        let zero = estimate.value == 0.0 && estimate.bounds[0] == 0.0;
+        let value = plain(estimate.value, estimate.unit);
+        let text = match zero {
+            true => format!("{} is zero: the logs would have it below, which it cannot be", estimate.name),
+            false => format!("{} ended at its bound of {value}: the logs would have it beyond", estimate.name),
+        };
+        all.push(finding(if zero { Grade::Note } else { Grade::Warning }, "bound", text));
+    }
+    if let Some(found) = &fit.disagreement {
+        let names: Vec<String> = fit
+            .estimates
+            .iter()
+            .zip(&found.off)
+            .filter(|(_, off)| **off > 2.0)
+            .map(|(estimate, off)| format!("{} by {off:.1}", estimate.name))
+            .collect();
+        let text = format!(
+            "{} windows of {} disagree with the whole logs by more than noise, in standard errors of it: {}; something drifts, or \
+             the laws are others; the intervals are widened by that",
+            found.windows,
+            plain(found.length, "s"),
+            names.join(", ")
+        );
+        all.push(finding(Grade::Note, "disagreement", text));
+    }
+    if let Some(found) = &fit.other_law {
+        let moved = fit.estimates.iter().zip(&found.off).filter(|(_, off)| **off > 1.0);
+        let moved: Vec<String> = moved.map(|(estimate, off)| format!("{} by {off:.1}", estimate.name)).collect();
+        let moved = match moved.is_empty() {
+            true => "it would move no parameter by more than its standard error".to_string(),
+            false => {
+                format!("it would move, in standard errors, {}; the intervals are widened by that", moved.join(", "))
+            }
+        };
+        let text = format!(
+            "the residuals speak for {} ({:.1} standard errors): {moved}; `taut fit --compare` tries other laws",
+            found.words, found.standard_errors
+        );
+        all.push(finding(Grade::Note, "other_law", text));
+    }
+    for Wave { quantity, length, amplitude } in &fit.waves {
+        let text = format!(
+            "{}: its error comes again at the same place, by ±{} every {}: a pulley or an encoder out of centre, teeth, a \
+             motor that cogs; the intervals are widened by what that moves",
+            quantity.name(),
+            engineering(*amplitude, quantity.unit(), 2).replace('\u{a0}', " "),
+            plain(*length, quantity.unit())
+        );
+        all.push(finding(Grade::Note, "place", text));
+    }
+    all
+}
+
+/// Whether K_t and K_e can be those of one motor.
+fn of_motor(case: &Case, fit: &Fit) -> Option<Finding> {
+    let motor = &fit.machine.drives[0].motor;
+    let (k_t, k_e) = (motor.torque_constant, motor.back_emf_constant);
+    if motor.is_simple || case.machine.drives[0].amplifier.mode != AmplifierMode::Voltage || k_t <= 0.0 || k_e <= 0.0 {
+        return None;
+    }
+    let ratio = k_t / k_e;
+    if (1.0 / MOTOR..MOTOR).contains(&ratio) {
+        return None;
+    }
+    let text = format!(
+        "K_t = {} and K_e = {} are one number of one motor in SI units, and here {} times apart: tie them, or look for what else \
+         brakes or drives (the gain, the resistance, friction)",
+        plain(k_t, "N m/A"),
+        plain(k_e, "V s/rad"),
+        crate::quantity::rounded((10.0 * ratio.max(1.0 / ratio)).round() / 10.0)
+    );
+    Some(finding(Grade::Warning, "motor", text))
+}
+
+/// Logs that the model does not explain.
+fn of_residuals(fit: &Fit) -> Vec<Finding> {
+    let mut all = Vec::new();
+    for log in fit.logs.iter().filter(|log| !log.held_out) {
+        for output in &log.outputs {
+            let Some(score) = output.fitted.filter(|score| score.percent < POOR) else { continue };
+            let text = format!(
+                "{}: the model explains {:.0} % of it only: look at the units, signs and columns of this log, and at what the model lacks",
+                output.quantity.name(),
+                score.percent.max(0.0)
+            );
+            all.push(Finding { grade: Grade::Warning, code: "unexplained", log: Some(log.name.clone()), text });
+        }
+    }
+    all
+}
+
+fn plain(value: f64, unit: &str) -> String {
+    engineering(value, unit, 4).replace(['\u{a0}', '\u{202f}'], " ").replace('−', "-")
+}
+
+impl Balance {
+    /// The judgement on the share of torque that is left.
+    pub fn words(&self) -> &'static str {
+        match self.unexplained {
+            left if left < 0.1 => "a rigid axis with viscous and Coulomb friction explains these logs",
+            left if left < 0.3 => {
+                "a rigid axis explains most: the rest is noise in derivatives, elasticity, or another friction"
+            }
+            left if left < 0.7 => "much is left: look for a delay, for elasticity, or for another friction",
+            _ => "it explains next to nothing: look at units, signs and columns first",
+        }
+    }
+}

@@ -1,0 +1,137 @@
+//! The result of a fit, and how well it is known.
+
+use super::combinations::Combination;
+use super::doubts::{Disagreement, OtherLaw};
+use super::finding::{Finding, Grade};
+use super::identify::Identifiability;
+use super::scores::LogFit;
+use crate::fit::noise::Wave;
+use crate::fit::search::point::Ending;
+use crate::fit::search::starts::Work;
+use crate::log::Quantity;
+use crate::machine::Machine;
+
+/// The result of a fit.
+#[derive(Debug, Clone)]
+pub struct Fit {
+    /// The machine with the estimates. Of the machines that meet the logs alike, it is the nearest to that of the case.
+    pub machine: Machine,
+    /// The machine of each campaign, or log, that has parameters for itself: `stage` is the first. Empty where nothing
+    /// is separate.
+    pub parts: Vec<(String, Machine)>,
+    /// The estimates: free parameters, then what all logs share.
+    pub estimates: Vec<Estimate>,
+    /// Correlations of the estimates, row by row; NaN where one is at a bound.
+    pub correlation: Vec<Vec<f64>>,
+    /// The standard deviation of each quantity's residuals.
+    pub noise: Vec<(Quantity, f64)>,
+    /// How each log is met: those fitted, then those held out.
+    pub logs: Vec<LogFit>,
+    /// The information of the logs at the estimates.
+    pub identifiability: Option<Identifiability>,
+    /// Advice for each group of parameters that is not determined.
+    pub choices: Vec<Vec<String>>,
+    /// Parts of the logs that say otherwise than the whole, by more than noise would make of it.
+    pub disagreement: Option<Disagreement>,
+    /// A friction law that the case does not have and the residuals speak for.
+    pub other_law: Option<OtherLaw>,
+    /// Errors of an output that come again at the same place.
+    pub waves: Vec<Wave>,
+    /// Findings on logs and search, warnings first.
+    pub findings: Vec<Finding>,
+    /// The variables of the search where it ended.
+    pub point: Vec<f64>,
+    /// How the search ended.
+    pub ending: Ending,
+    /// The gain that the last step promised, in standard errors.
+    pub decrement: f64,
+    /// ½ Σ r² of the weighted residuals.
+    pub cost: f64,
+    /// The cost that each start led to, in the first weights; the first start is that of the case, or what a regression
+    /// makes of it if that is nearer.
+    pub starts: Vec<f64>,
+    /// Steps of derivatives, in standard errors, where the order of events left none; 0 where the cost was smooth.
+    pub coarse: f64,
+    /// How many gradients around the estimates balance there; more than one at a kink.
+    pub pieces: usize,
+    /// How often an evolution strategy, which needs no derivatives, went on.
+    pub evolved: usize,
+    /// Values that count.
+    pub values: usize,
+    /// Variables, what is fitted along included.
+    pub variables: usize,
+    /// The effort.
+    pub work: Work,
+}
+
+/// One parameter's estimate.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Estimate {
+    /// Its key, or those of a tie, or the name of a group.
+    pub name: String,
+    /// SI unit.
+    pub unit: &'static str,
+    /// Where the search started.
+    pub start: f64,
+    /// The estimate.
+    pub value: f64,
+    /// Its standard error; infinite where it is not determined, none where it is at a bound.
+    pub error: Option<f64>,
+    /// 95 % interval; infinite where it is not determined. At a bound it reaches from there to where it would without
+    /// that bound; none where even that cannot be said.
+    pub interval: Option<[f64; 2]>,
+    /// Its bounds.
+    pub bounds: [f64; 2],
+    /// Whether it ended at one of them.
+    pub at_bound: bool,
+    /// The part of the logs that it is for, by its place among the fit's; none where it is for all of them.
+    pub part: Option<usize>,
+    /// The keys that it sets in the case file, with their values.
+    pub sets: Vec<(String, f64)>,
+}
+
+impl Estimate {
+    /// Whether the logs tell it, or it is at a bound.
+    pub fn is_determined(&self) -> bool {
+        self.at_bound || self.error.is_some_and(f64::is_finite)
+    }
+}
+
+impl Fit {
+    /// Whether all that is searched for is determined and nothing warns.
+    pub fn is_reliable(&self) -> bool {
+        self.is_complete() && self.warnings().next().is_none()
+    }
+
+    /// Whether all that is searched for is determined.
+    pub fn is_complete(&self) -> bool {
+        self.estimates.iter().all(Estimate::is_determined)
+    }
+
+    /// The findings that make the result not to be relied on.
+    pub fn warnings(&self) -> impl Iterator<Item = &Finding> {
+        self.findings.iter().filter(|finding| finding.grade == Grade::Warning)
+    }
+
+    /// Whether the search ended at a minimum within the bounds, and nothing warns.
+    pub fn is_converged(&self) -> bool {
+        self.ending == Ending::Converged
+            && !self.estimates.iter().any(|estimate| estimate.at_bound)
+            && self.is_reliable()
+    }
+
+    /// How it ended, for files: `converged` only where it is.
+    pub fn ending_word(&self) -> &'static str {
+        match self.ending {
+            Ending::Converged if self.estimates.iter().any(|estimate| estimate.at_bound) => "at_bound",
+            Ending::Converged if !self.is_complete() => "not_determined",
+            Ending::Converged if !self.is_reliable() => "doubtful",
+            ending => ending.word(),
+        }
+    }
+
+    /// The combinations of undetermined parameters that are determined.
+    pub fn combinations(&self) -> impl Iterator<Item = &Combination> {
+        self.identifiability.iter().flat_map(|found| &found.groups).flat_map(|group| &group.combinations)
+    }
+}

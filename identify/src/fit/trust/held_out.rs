@@ -1,0 +1,62 @@
+//! Logs that are only compared: where they start is fitted to them, and nothing else.
+
+use super::scores::{LogFit, compared};
+use crate::fit::asked::problem::Problem;
+use crate::fit::asked::run::{Extra, Nuisance, Run};
+use crate::fit::search::least_squares::minimise;
+use crate::fit::search::point::{Ending, Options};
+use crate::log::Quantity;
+use crate::machine::Machine;
+use crate::solve::Flow;
+
+/// Fewest rows that a start is fitted to.
+const FEWEST: usize = 20;
+
+/// Results of the fitted logs beside parameters.
+pub(crate) struct Known<'a> {
+    /// Deviation of each quantity's residuals.
+    pub noise: &'a [(Quantity, f64)],
+    /// Delays, gains and offsets of single logs, in the mean.
+    pub means: Vec<(Nuisance, f64)>,
+    /// Nuisances that all logs share, and their values.
+    pub shared: Vec<(Extra, f64)>,
+}
+
+/// A log beside `stage`: delay, gain and offsets are what the fitted logs say. Where it starts is fitted to the first
+/// `share` of its rows.
+pub(crate) fn met(run: &Run, machine: &Machine, known: &Known, share: f64) -> LogFit {
+    let is_start = |what| matches!(what, Nuisance::StartPosition | Nuisance::StartSpeed);
+    let mut alone = run.clone();
+    for extra in alone.extras.iter_mut().filter(|extra| !is_start(extra.what)) {
+        let mean = known.means.iter().find(|(what, _)| *what == extra.what);
+        *extra = held(extra, mean.map_or(extra.start, |(_, mean)| *mean));
+    }
+    alone.extras.extend(known.shared.iter().map(|(extra, value)| held(extra, *value)));
+    alone.share(&[]);
+    let rows = alone.time.len();
+    alone.fitted_rows = ((rows as f64 * share).ceil() as usize).clamp(FEWEST.min(rows), rows);
+    let mut problem = Problem::alone(machine.clone(), alone);
+    problem.weigh_by(known.noise);
+    let mut x = problem.start();
+    if !x.is_empty() {
+        let options = Options { iterations: 15, tolerance: 0.05, rounding: problem.rounding(), ..Options::default() };
+        let bounds = problem.bounds();
+        let found = minimise(&mut problem, &x, &bounds, &options, &mut |_, _| Flow::Continue);
+        if found.ending != Ending::Failed {
+            x = found.x;
+        }
+    }
+    let extras = problem.extras_of(0, &x);
+    let alone = &problem.runs[0];
+    let own = alone.extras.iter().zip(&extras);
+    let told = own.filter(|(extra, _)| is_start(extra.what) && extra.known.is_none()).map(|(e, v)| (e.what, *v, None));
+    let told = told.collect();
+    let mut shown = alone.clone();
+    shown.fitted_rows = run.fitted_rows;
+    compared(&shown, machine, &extras, told)
+}
+
+/// An extra that has this value.
+fn held(extra: &Extra, value: f64) -> Extra {
+    Extra { start: value, low: value, high: value, known: None, ..*extra }
+}

@@ -1,0 +1,20 @@
+//! What may be believed of a minimum: which parameters are determined, how well, and what speaks against it.
+
+pub(crate) mod combinations;
+pub(crate) mod directions;
+pub(crate) mod doubts;
+pub(crate) mod finding;
+pub(crate) mod findings;
+pub(crate) mod found;
+pub(crate) mod held_out;
+pub(crate) mod identify;
+pub(crate) mod nearest;
+pub(crate) mod other_laws;
+pub(crate) mod profile;
+pub(crate) mod proposals;
+pub(crate) mod residual_force;
+pub(crate) mod result;
+pub(crate) mod scores;
+pub(crate) mod sub_records;
+pub(crate) mod trials;
+pub(crate) mod uncertainty;

@@ -1,0 +1,252 @@
+//! Of all machines that meet the logs alike, the one that is nearest to that of the case.
+//!
+//! Where a direction is not determined, a search ends anywhere along it. With x₁ where it ended, x₀ the values of the
+//! case, D what counts as 100 % of each variable, V the directions that are not determined, and C the cost,
+//!
+//! ```text
+//! min C(x) + ½ ρ² ‖Vᵀ D⁻¹ (x − x₀)‖²        ½ ρ² ‖Vᵀ D⁻¹ (x₁ − x₀)‖² = ε C(x₁)
+//! ```
+//!
+//! is at the point of the identified set that is nearest to x₀, where that set is a plane; all that is determined is
+//! optimised again. The sum is no greater there than at x₁, so C grows by no more than ε of itself, however much the
+//! logs tell of these directions. A set that is curved is approached in rounds, each with the directions of the point
+//! that it begins at.
+
+use super::uncertainty::Judged;
+use super::{other_laws, sub_records};
+use crate::case::{Case, Plan};
+use crate::error::Result;
+use crate::fit::asked::problem::{Problem, Stop};
+use crate::fit::asked::residuals::{Bounds, Differences, Residuals};
+use crate::fit::search::least_squares::minimise;
+use crate::fit::search::point::{Ending, Minimum, Options, cost_of};
+use crate::fit::search::starts::{HUBER, Searched, Work, search_as_far};
+use crate::machine::Machine;
+use crate::solve::Flow;
+use nalgebra::{DMatrix, DVector};
+
+/// ε: the part of itself by which the cost may grow in a round.
+const GROWTH: f64 = 3e-3;
+
+/// Rounds, and the relative change below which none follows.
+const ROUNDS: usize = 3;
+const SETTLED: f64 = 1e-3;
+
+/// A parameter of which at least this square share belongs to what is not determined keeps its value exactly, if the
+/// logs are met as well with it.
+const ALL: f64 = 0.99;
+
+/// Most Jacobians of a round.
+const ITERATIONS: usize = 40;
+
+/// A search that has settled on the point nearest to the values of the case.
+pub(crate) struct Settled<'a> {
+    pub searched: Searched<'a>,
+    /// The information of the logs at the best point with no variable left out, where it is known already.
+    seen: Option<Judged>,
+}
+
+impl Settled<'_> {
+    /// The information of the logs there, and whether their parts agree and their law is the right one; none if numbers
+    /// fail.
+    pub fn judged(&self, case: &Case, plan: &Plan) -> Option<Judged> {
+        let Minimum { residuals, jacobian, x, at_bound, .. } = &self.searched.best;
+        let mut judged = match self.seen.as_ref().filter(|_| !at_bound.contains(&true)) {
+            Some(seen) => seen.clone(),
+            None => Judged::new(&self.searched.problem, residuals, jacobian, x, at_bound)?,
+        };
+        let disagreement = sub_records::disagreement(case, plan, &self.searched, &judged);
+        let other_law = other_laws::other_law(&self.searched, &judged);
+        judged.widen(disagreement, other_law);
+        Some(judged)
+    }
+}
+
+/// The search of a fit, and of a check.
+pub(crate) fn search<'a>(
+    case: &Case,
+    plan: &Plan,
+    stop: Option<Stop<'a>>,
+    watch: &mut dyn FnMut(&[f64], f64) -> Flow,
+) -> Result<Settled<'a>> {
+    search_near(case, &case.machine, plan, stop, watch)
+}
+
+/// The same; what is not determined comes as near to the values of `given` as the logs allow.
+pub(crate) fn search_near<'a>(
+    case: &Case,
+    given: &Machine,
+    plan: &Plan,
+    stop: Option<Stop<'a>>,
+    watch: &mut dyn FnMut(&[f64], f64) -> Flow,
+) -> Result<Settled<'a>> {
+    let whole = Options::default();
+    let mut searched = search_as_far(case, plan, stop, &whole, watch)?;
+    let Searched { problem, best, work, .. } = &mut searched;
+    let huber = if plan.huber { HUBER } else { f64::INFINITY };
+    let options = Options { huber, rounding: problem.rounding(), ..whole };
+    let mut seen = None;
+    if best.ending != Ending::Interrupted {
+        let given = problem.point_of(given);
+        seen = nearest(problem, best, &given, &options, watch, work);
+    }
+    let set = problem.as_set(&best.x);
+    if set != best.x {
+        (best.x, seen) = (set, None);
+    }
+    work.simulations = problem.simulations;
+    Ok(Settled { searched, seen })
+}
+
+/// A problem whose variables are drawn to where they began, along some directions.
+struct Anchored<'p, 'a> {
+    problem: &'p mut Problem<'a>,
+    /// ρ Vᵀ D⁻¹
+    rows: DMatrix<f64>,
+    /// ρ Vᵀ D⁻¹ x₀
+    at: DVector<f64>,
+}
+
+impl Anchored<'_, '_> {
+    /// ρ Vᵀ D⁻¹ (x − x₀), into the end of the residuals.
+    fn draw(&self, x: &[f64], r: &mut [f64]) {
+        let first = r.len() - self.at.len();
+        for (k, r) in r[first..].iter_mut().enumerate() {
+            *r = self.rows.row(k).iter().zip(x).map(|(row, x)| row * x).sum::<f64>() - self.at[k];
+        }
+    }
+
+    /// The Jacobian of the problem with the rows of the anchor below.
+    fn below(&self, jacobian: DMatrix<f64>, bounds: &Bounds) -> DMatrix<f64> {
+        let first = jacobian.nrows();
+        let mut whole = jacobian.resize_vertically(first + self.at.len(), 0.0);
+        for j in (0..self.rows.ncols()).filter(|&j| !bounds.hold(j)) {
+            whole.view_mut((first, j), (self.at.len(), 1)).copy_from(&self.rows.column(j));
+        }
+        whole
+    }
+
+    fn own<'r>(&self, r: &'r mut [f64]) -> &'r mut [f64] {
+        let first = r.len() - self.at.len();
+        &mut r[..first]
+    }
+}
+
+impl Residuals for Anchored<'_, '_> {
+    fn rows(&self) -> usize {
+        self.problem.rows() + self.at.len()
+    }
+
+    fn evaluate(&mut self, x: &[f64], r: &mut [f64]) -> bool {
+        self.draw(x, r);
+        let own = self.own(r);
+        self.problem.evaluate(x, own)
+    }
+
+    fn is_exact(&self) -> bool {
+        self.problem.is_exact()
+    }
+
+    fn jacobian(&mut self, x: &[f64], r: &[f64], bounds: &Bounds, how: &Differences) -> Option<DMatrix<f64>> {
+        let own = &r[..r.len() - self.at.len()];
+        let jacobian = self.problem.jacobian(x, own, bounds, how)?;
+        Some(self.below(jacobian, bounds))
+    }
+
+    fn linearised(&mut self, x: &[f64], r: &mut [f64], bounds: &Bounds, how: &Differences) -> Option<DMatrix<f64>> {
+        self.draw(x, r);
+        let own = self.own(r);
+        let jacobian = self.problem.linearised(x, own, bounds, how)?;
+        Some(self.below(jacobian, bounds))
+    }
+}
+
+/// Moves a minimum along what is not determined to the point that is nearest to `given`, and optimises the rest again.
+/// The information of the logs where everything is determined.
+fn nearest(
+    problem: &mut Problem,
+    best: &mut Minimum,
+    given: &[f64],
+    options: &Options,
+    watch: &mut dyn FnMut(&[f64], f64) -> Flow,
+    work: &mut Work,
+) -> Option<Judged> {
+    let options = Options { iterations: ITERATIONS, evolutions: 0, ..*options };
+    let most = best.cost * (1.0 + ROUNDS as f64 * GROWTH) + f64::MIN_POSITIVE;
+    for _ in 0..ROUNDS {
+        let none = vec![false; best.x.len()];
+        let judged = Judged::new(problem, &best.residuals, &best.jacobian, &best.x, &none)?;
+        let lost = judged.identifiability.lost.clone();
+        if lost.ncols() == 0 {
+            return Some(judged);
+        }
+        let machine = problem.stage_at(&best.x);
+        let whole: Vec<f64> = (0..lost.nrows()).map(|j| problem.whole(&machine, j, best.x[j])).collect();
+        let Some(found) = round(problem, best, (given, &whole), &lost, (&options, most), watch, work) else { break };
+        let moved = (0..lost.nrows()).map(|j| ((found.x[j] - best.x[j]) / whole[j]).abs()).fold(0.0, f64::max);
+        *best = found;
+        if moved < SETTLED {
+            break;
+        }
+    }
+    None
+}
+
+/// One round with these directions; none where the logs are not met as well by what it leads to.
+fn round(
+    problem: &mut Problem,
+    best: &Minimum,
+    (given, whole): (&[f64], &[f64]),
+    lost: &DMatrix<f64>,
+    (options, most): (&Options, f64),
+    watch: &mut dyn FnMut(&[f64], f64) -> Flow,
+    work: &mut Work,
+) -> Option<Minimum> {
+    let (open, globals) = (problem.bounds(), lost.nrows());
+    // Vᵀ D⁻¹
+    let mut rows = DMatrix::zeros(lost.ncols(), best.x.len());
+    for (j, width) in whole.iter().enumerate().take(globals) {
+        rows.set_column(j, &(lost.row(j).transpose() / *width));
+    }
+    let far = &rows * DVector::from_fn(best.x.len(), |j, _| if j < globals { best.x[j] - given[j] } else { 0.0 });
+    let distance = far.norm();
+    if !distance.is_finite() || distance == 0.0 {
+        return None;
+    }
+    // ½ ρ² ‖Vᵀ D⁻¹ (x₁ − x₀)‖² = ε C(x₁)
+    let rho = (2.0 * GROWTH * best.cost).sqrt().max(f64::MIN_POSITIVE) / distance;
+    rows *= rho;
+    let at = &rows * DVector::from_fn(best.x.len(), |j, _| if j < globals { given[j] } else { 0.0 });
+
+    let hidden: Vec<usize> = (0..globals).filter(|&j| lost.row(j).norm_squared() > ALL).collect();
+    let mut held = open.clone();
+    let mut kept = best.x.clone();
+    for &j in &hidden {
+        let value = given[j].clamp(open.low[j], open.high[j]);
+        (held.low[j], held.high[j], kept[j]) = (value, value, value);
+    }
+    // What is hidden as it was given; else drawn to it like the rest; else from where the case began.
+    let mut tries = vec![(kept, &held), (best.x.clone(), &open), (given.to_vec(), &open)];
+    if hidden.is_empty() {
+        tries.remove(0);
+    }
+    for (from, bounds) in tries {
+        let mut anchored = Anchored { problem: &mut *problem, rows: rows.clone(), at: at.clone() };
+        let found = minimise(&mut anchored, &from, bounds, options, &mut *watch);
+        work.iterations += found.iterations;
+        work.evaluations += found.evaluations;
+        if found.ending == Ending::Interrupted || problem.is_stopped() {
+            return None;
+        }
+        let residuals = found.residuals[..problem.rows()].to_vec();
+        let cost = cost_of(&residuals, options.huber);
+        if found.ending == Ending::Failed || !cost.is_finite() || cost > most {
+            continue;
+        }
+        let Some(jacobian) = problem.jacobian(&found.x, &residuals, &open, &Differences::Central) else { continue };
+        let mut at_bound = found.at_bound;
+        hidden.iter().for_each(|&j| at_bound[j] &= !bounds.hold(j));
+        return Some(Minimum { x: found.x, residuals, cost, jacobian, at_bound, ..best.clone() });
+    }
+    None
+}

@@ -1,0 +1,342 @@
+//! Whether a friction law that was not asked for would explain what the fitted one leaves.
+//!
+//! Where friction in truth falls with speed, or is not the same in both directions, and the fit has neither, its
+//! parameters take what they can of the difference: residuals stay small, and estimates are off by far more than noise
+//! says. So laws that the case does not have are tried as a further column of the Jacobian. With the residuals r, the
+//! columns J of the fit, the column j of the amplitude a of such a law and A = (JᵀJ)⁻¹
+//!
+//! ```text
+//! j⊥ = j − J A Jᵀ j      a = −j⊥·r / j⊥·j⊥      d = −a A Jᵀ j
+//! ```
+//!
+//! d is what the law would change of the parameters: the bias of a variable that was left out. Where a is more than
+//! noise makes of it, intervals are widened by d, and it is said which law it is.
+
+use super::doubts::OtherLaw;
+use super::uncertainty::Judged;
+use crate::fit::asked::drifting;
+use crate::fit::asked::problem::{Problem, ROUNDING};
+use crate::fit::asked::run::Run;
+use crate::fit::noise::student::NORMAL;
+use crate::fit::noise::{half_width, spreads};
+use crate::fit::search::starts::Searched;
+use crate::fit::search::triangle::inverse_of_square;
+use crate::friction::{Friction, Law, Shape};
+use crate::log::Quantity;
+use crate::machine::Machine;
+use crate::number::engineering;
+use crate::solve::Bench;
+use nalgebra::{DMatrix, DVector};
+
+/// Stribeck velocities that are tried, as shares of the body's greatest speed.
+const SHARES: [f64; 4] = [0.02, 0.06, 0.18, 0.5];
+
+/// The first amplitude, of Coulomb friction, and the least and the greatest that a law may have.
+const FIRST: f64 = 0.2;
+const LEAST: f64 = 0.01;
+const MOST: f64 = 3.0;
+
+/// Standard errors of its amplitude by which a law has to show.
+const SHOWN: f64 = 3.0;
+
+/// Share of how far the outputs range that a law has to move them by: below are the last digits of logs and solvers.
+const DUST: f64 = 1e-6;
+
+/// Parts of a log along which friction drifts.
+const PARTS: usize = 10;
+
+/// How often the column is taken anew at the amplitude that it led to.
+const ROUNDS: usize = 3;
+
+/// A body of an axis.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Body {
+    Drive,
+    Cart,
+    Idler,
+}
+
+impl Body {
+    const ALL: [Body; 3] = [Body::Cart, Body::Drive, Body::Idler];
+
+    fn key(self) -> &'static str {
+        match self {
+            Body::Drive => "drive_pulley",
+            Body::Cart => "cart",
+            Body::Idler => "idler_pulley",
+        }
+    }
+
+    /// Units of its friction and of its speed.
+    fn units(self) -> (&'static str, &'static str) {
+        match self {
+            Body::Drive | Body::Idler => ("N m", "rad/s"),
+            Body::Cart => ("N", "m/s"),
+        }
+    }
+
+    fn friction(self, machine: &mut Machine) -> &mut Friction {
+        match self {
+            Body::Drive => &mut machine.drive_pulley.friction,
+            Body::Cart => &mut machine.cart.friction,
+            Body::Idler => &mut machine.idler_pulley.friction,
+        }
+    }
+}
+
+/// A law that a body might have.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Kind {
+    /// Friction that falls with speed, with this Stribeck velocity.
+    Stribeck(f64),
+    /// More Coulomb friction forward, and as much less backward.
+    Sided,
+    /// All friction less at the begin of each log, and as much more at its end, as a share of it.
+    Drift,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Candidate {
+    body: Body,
+    kind: Kind,
+    /// Coulomb friction of the body as fitted.
+    coulomb: f64,
+}
+
+impl Candidate {
+    /// The amplitude that is tried first.
+    fn first(self) -> f64 {
+        FIRST * if self.kind == Kind::Drift { 1.0 } else { self.coulomb }
+    }
+
+    /// Puts so much of the law into a machine, at this share of a log.
+    fn put(self, machine: &mut Machine, amplitude: f64, share: f64) {
+        let friction = self.body.friction(machine);
+        match self.kind {
+            Kind::Stribeck(velocity) => {
+                friction.law = Law::Stribeck { velocity, shape: Shape::Gaussian };
+                for side in [&mut friction.forward, &mut friction.backward] {
+                    side.breakaway = side.coulomb + amplitude;
+                }
+            }
+            Kind::Sided => {
+                for (side, sign) in [(&mut friction.forward, 1.0), (&mut friction.backward, -1.0)] {
+                    side.coulomb += sign * amplitude;
+                    side.breakaway = side.breakaway.max(side.coulomb);
+                }
+            }
+            Kind::Drift => {
+                let factor = 1.0 + amplitude * (2.0 * share - 1.0);
+                for side in [&mut friction.forward, &mut friction.backward] {
+                    side.viscous *= factor;
+                    side.coulomb *= factor;
+                    side.breakaway *= factor;
+                }
+            }
+        }
+    }
+
+    /// Amplitudes that the law may have.
+    fn range(self) -> (f64, f64) {
+        match self.kind {
+            Kind::Stribeck(_) => (LEAST * self.coulomb, MOST * self.coulomb),
+            Kind::Sided => (-0.9 * self.coulomb, 0.9 * self.coulomb),
+            Kind::Drift => (-0.9, 0.9),
+        }
+    }
+
+    fn words(self, amplitude: f64) -> String {
+        let shown = |value, unit| engineering(value, unit, 2).replace('\u{a0}', " ");
+        let (force, speed) = self.body.units();
+        let whose = self.body.key().replace('_', " ");
+        match self.kind {
+            Kind::Stribeck(velocity) => format!(
+                "friction of the {whose} that falls by {} within some {}",
+                shown(amplitude, force),
+                shown(velocity, speed)
+            ),
+            Kind::Sided => format!(
+                "Coulomb friction of the {whose} that is {} {} forward than backward",
+                shown(2.0 * amplitude.abs(), force),
+                if amplitude > 0.0 { "greater" } else { "less" }
+            ),
+            Kind::Drift => format!(
+                "friction of the {whose} that {} by {} % from the begin of each log to its end",
+                if amplitude > 0.0 { "rises" } else { "falls" },
+                percent(200.0 * amplitude.abs())
+            ),
+        }
+    }
+}
+
+/// Per cent in two digits.
+fn percent(value: f64) -> String {
+    if value >= 0.1 {
+        format!("{:.*}", if value < 1.0 { 2 } else { usize::from(value < 10.0) }, value)
+    } else {
+        format!("{value:.1e}")
+    }
+}
+
+/// A candidate with its column and what comes of it.
+struct Tried {
+    candidate: Candidate,
+    amplitude: f64,
+    /// ∂r/∂a
+    column: DVector<f64>,
+    /// A Jᵀ j
+    along: DVector<f64>,
+    /// Amount that it takes off Σ r².
+    gain: f64,
+}
+
+/// Where the fit ended, as all candidates need it.
+struct Place<'a> {
+    problem: &'a Problem<'a>,
+    x: &'a [f64],
+    residuals: DVector<f64>,
+    jacobian: DMatrix<f64>,
+    inverse: DMatrix<f64>,
+}
+
+/// The law that the residuals speak for most; none where none shows, or where too little is determined.
+pub(crate) fn other_law(found: &Searched, judged: &Judged) -> Option<OtherLaw> {
+    let (problem, best) = (&found.problem, &found.best);
+    let g = problem.globals();
+    if problem.is_stopped()
+        || problem.runs.iter().any(Run::is_closed)
+        || !judged.identifiability.complete()
+        || best.at_bound[..g].contains(&true)
+    {
+        return None;
+    }
+    let candidates = candidates(problem, &best.x);
+    if candidates.is_empty() {
+        return None;
+    }
+    let free: Vec<usize> = (0..best.x.len()).filter(|&j| !best.at_bound[j]).collect();
+    let jacobian = best.jacobian.select_columns(&free);
+    let inverse = inverse_of_square(&jacobian)?;
+    let residuals = DVector::from_column_slice(&best.residuals);
+    let place = Place { problem, x: &best.x, residuals, jacobian, inverse };
+    let tried = candidates.into_iter().filter_map(|candidate| place.attempt(candidate, candidate.first()));
+    let mut tried = tried.max_by(|a, b| a.gain.total_cmp(&b.gain))?;
+    // Independent residuals would have to show it, too.
+    if tried.gain.sqrt() < SHOWN * judged.covariance.deviation {
+        return None;
+    }
+    for _ in 1..ROUNDS {
+        tried = place.attempt(tried.candidate, tried.amplitude)?;
+    }
+    place.judged(&tried, judged)
+}
+
+/// The laws to be tried: of bodies whose friction is free, and only of Coulomb's law.
+fn candidates(problem: &Problem, x: &[f64]) -> Vec<Candidate> {
+    let mut machine = problem.stage_at(x);
+    let mut all = Vec::new();
+    for body in Body::ALL {
+        let prefix = format!("{}.friction.", body.key());
+        let is_free = problem.parameters.iter().flat_map(|own| &own.keys).any(|(key, _)| key.starts_with(&prefix));
+        let friction = *body.friction(&mut machine);
+        let (forward, backward) = (friction.forward, friction.backward);
+        let coulomb = f64::min(forward.coulomb, backward.coulomb);
+        let alike = forward == backward && forward.breakaway <= forward.coulomb;
+        if !is_free || friction.law != Law::Coulomb || !alike || coulomb <= 0.0 {
+            continue;
+        }
+        let fastest = fastest(problem, x, body);
+        all.extend(SHARES.map(|share| Candidate { body, kind: Kind::Stribeck(share * fastest), coulomb }));
+        all.extend([Kind::Sided, Kind::Drift].map(|kind| Candidate { body, kind, coulomb }));
+    }
+    all
+}
+
+/// The greatest speed of a body along the logs, as the model has it.
+fn fastest(problem: &Problem, x: &[f64], body: Body) -> f64 {
+    let quantity = if body == Body::Cart { Quantity::CartSpeed } else { Quantity::DriveSpeed };
+    let mut bench = Bench::default();
+    let mut most: f64 = 0.0;
+    let mut speeds = [Vec::new()];
+    for (index, run) in problem.runs.iter().enumerate() {
+        let machine = problem.stage_of(run.part, x);
+        if run.predict(&mut bench, &machine, &problem.extras_of(index, x), &[quantity], &mut speeds) {
+            most = speeds[0].iter().fold(most, |most, v| most.max(v.abs()));
+        }
+    }
+    most
+}
+
+impl Place<'_> {
+    /// The amplitude that a law would have, from what so much of it makes of the residuals; none where the model does
+    /// not get through with it, or where it is what the parameters do already.
+    fn attempt(&self, candidate: Candidate, step: f64) -> Option<Tried> {
+        let mut moved = vec![0.0; self.residuals.len()];
+        let mut bench = Bench::default();
+        for (index, run) in self.problem.runs.iter().enumerate() {
+            let first = self.problem.first_row(index);
+            let extras = self.problem.extras_of(index, self.x);
+            let machine = self.problem.stage_of(run.part, self.x);
+            let with = |share: f64| {
+                let mut machine = machine.clone();
+                candidate.put(&mut machine, step, share);
+                machine
+            };
+            let rows = &mut moved[first..first + run.rows()];
+            let good = match candidate.kind {
+                Kind::Drift => {
+                    let stages: Vec<Machine> = (0..PARTS).map(|k| with((k as f64 + 0.5) / PARTS as f64)).collect();
+                    drifting::residuals(run, &stages, &extras, rows)
+                }
+                Kind::Stribeck(_) | Kind::Sided => run.residuals(&mut bench, &with(0.5), &extras, rows),
+            };
+            if !good {
+                return None;
+            }
+        }
+        let column = (DVector::from_vec(moved) - &self.residuals) / step;
+        let along = &self.inverse * self.jacobian.tr_mul(&column);
+        let beside = &column - &self.jacobian * &along;
+        let square = beside.norm_squared();
+        if square <= 1e-6 * column.norm_squared() || !square.is_finite() {
+            return None;
+        }
+        let product = beside.dot(&self.residuals);
+        let (least, most) = candidate.range();
+        let amplitude = -product / square;
+        let gain = if amplitude < least { 0.0 } else { product * product / square };
+        Some(Tried { candidate, amplitude: amplitude.clamp(least, most), column, along, gain })
+    }
+
+    /// Whether noise explains it; with the columns of the fit and of the law together.
+    fn judged(&self, tried: &Tried, judged: &Judged) -> Option<OtherLaw> {
+        let (g, n) = (self.problem.globals(), self.jacobian.ncols());
+        let mut columns = DMatrix::zeros(self.jacobian.nrows(), n + 1);
+        columns.columns_mut(0, g).copy_from(&self.jacobian.columns(0, g));
+        columns.set_column(g, &tried.column);
+        columns.columns_mut(g + 1, n - g).copy_from(&self.jacobian.columns(g, n - g));
+        // Of logs without noise any law takes off some of what their last digits left.
+        let moved = (&tried.column * tried.amplitude).amax();
+        if moved < DUST / ROUNDING * self.problem.rounding() {
+            return None;
+        }
+        let inverse = inverse_of_square(&columns)?;
+        let left = &self.residuals + &tried.column * tried.amplitude;
+        let spreads = spreads(self.problem, left.as_slice(), &columns, g + 1, &inverse);
+        let unit = |j: usize| DVector::from_fn(g + 1, |k, _| f64::from(u8::from(k == j)));
+        let error = half_width(&spreads, &unit(g)) / NORMAL;
+        let standard_errors = tried.amplitude.abs() / error;
+        if !standard_errors.is_finite() || standard_errors < SHOWN {
+            return None;
+        }
+        let shift = tried.along.rows(0, g) * -tried.amplitude;
+        let off = (0..g).map(|j| shift[j].abs() / judged.covariance.error(j).unwrap_or(f64::INFINITY)).collect();
+        // (|d| + h)² ≤ 2 (d² + h²), d being as far as an interval reaches, and h what noise makes of both; the law is
+        // one of its kind, and the true one may do half as much again.
+        let square = &shift * shift.transpose();
+        let added = &square * (3.0 / (NORMAL * NORMAL)) + square * (error / tried.amplitude).powi(2);
+        let Candidate { body, .. } = tried.candidate;
+        let words = tried.candidate.words(tried.amplitude);
+        Some(OtherLaw { body: body.key(), words, standard_errors, off, added })
+    }
+}

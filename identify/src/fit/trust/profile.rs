@@ -1,0 +1,148 @@
+//! Profiles: how much worse the logs are met with one parameter held off its estimate and all others fitted anew.
+//!
+//! Where the model is linear, √ of the growth of the sum of squares is a straight line on either side, |p − p̂|/error
+//! on the scale of the search. A profile that is not says how far to trust the interval, and on which side it is too
+//! short.
+
+use super::found::Fit;
+use crate::case::{Case, Plan};
+use crate::error::Result;
+use crate::fit::asked::problem::{Problem, Stop};
+use crate::fit::search::least_squares::minimise;
+use crate::fit::search::point::{Ending, Options};
+use crate::fit::search::starts::HUBER;
+use crate::fit::search::triangle::inverse_of_square;
+use crate::solve::Flow;
+
+/// Where a parameter is held, in standard errors off its estimate; outwards, so that each starts where the one before
+/// it ended.
+const AT: [[f64; 3]; 2] = [[-1.0, -2.0, -3.0], [1.0, 2.0, 3.0]];
+
+/// Most parameters that are profiled.
+const MOST: usize = 12;
+
+/// Simulated logs that profiles may take, as a multiple of what the fit took; and so many at any rate.
+const WORK: u64 = 4;
+const FEWEST_SIMULATIONS: u64 = 1000;
+
+/// How far the growth two standard errors off may be from that of a linear model, as a share, before it is told.
+const CROOKED: f64 = 0.25;
+
+/// The profile of one parameter.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Profile {
+    /// The parameter.
+    pub name: String,
+    /// SI unit.
+    pub unit: &'static str,
+    /// Where it was held, ascending; the estimate among them.
+    pub values: Vec<f64>,
+    /// √ of the growth of the sum of squares, in standard errors.
+    pub growth: Vec<f64>,
+    /// The same for a model that is linear in its parameters: how many standard errors off it was held.
+    pub linear: Vec<f64>,
+}
+
+impl Profile {
+    /// The growth two standard errors below and above the estimate over that of a linear model; none where it was not
+    /// held there.
+    pub fn bends(&self) -> [Option<f64>; 2] {
+        let middle = self.linear.iter().position(|off| *off == 0.0).unwrap_or(0);
+        let at = |mut rows: std::ops::Range<usize>| {
+            rows.find(|&k| self.linear[k] == 2.0).map(|k| self.growth[k] / self.linear[k])
+        };
+        [at(0..middle), at(middle..self.linear.len())]
+    }
+
+    /// Whether an interval that takes the model as linear is far too long or too short on a side.
+    pub fn is_crooked(&self) -> bool {
+        self.bends().into_iter().flatten().any(|ratio| (ratio - 1.0).abs() > CROOKED)
+    }
+}
+
+/// The profiles of what `fit` found for the parameters of `plan` in the logs of `case`, as many as `stop` and what they
+/// cost allow; a parameter that is at a bound or not determined has none.
+pub fn profiles(case: &Case, plan: &Plan, fit: &Fit, stop: Option<Stop>) -> Result<Vec<Profile>> {
+    let mut problem = Problem::new(case, plan)?.stopped_by(stop);
+    problem.weigh_by(&fit.noise);
+    let most = FEWEST_SIMULATIONS.max(WORK * fit.work.simulations);
+    let mut profiles = Vec::new();
+    let Some(bottom) = Bottom::new(&mut problem, plan, fit) else { return Ok(profiles) };
+    for j in 0..problem.parameters.len().min(MOST) {
+        if problem.simulations > most || problem.is_stopped() {
+            break;
+        }
+        profiles.extend(bottom.profile(&mut problem, fit, j));
+    }
+    Ok(profiles)
+}
+
+/// Where the profiles begin.
+struct Bottom {
+    x: Vec<f64>,
+    cost: f64,
+    /// Standard error of each variable for residuals of one; none at a bound.
+    unit: Vec<Option<f64>>,
+    options: Options,
+}
+
+impl Bottom {
+    fn new(problem: &mut Problem, plan: &Plan, fit: &Fit) -> Option<Self> {
+        let huber = if plan.huber { HUBER } else { f64::INFINITY };
+        let options =
+            Options { iterations: 6, tolerance: 0.05, huber, rounding: problem.rounding(), ..Options::default() };
+        let bounds = problem.bounds();
+        if fit.point.len() != problem.variables() {
+            return None;
+        }
+        let found = minimise(problem, &fit.point, &bounds, &options, &mut |_, _| Flow::Continue);
+        if matches!(found.ending, Ending::Failed | Ending::Interrupted) {
+            return None;
+        }
+        let free: Vec<usize> = (0..found.x.len()).filter(|&j| !found.at_bound[j]).collect();
+        let inverse = inverse_of_square(&found.jacobian.select_columns(&free))?;
+        let mut unit = vec![None; found.x.len()];
+        for (place, &j) in free.iter().enumerate() {
+            unit[j] = Some(inverse[(place, place)].sqrt());
+        }
+        Some(Self { x: found.x, cost: found.cost, unit, options })
+    }
+
+    fn profile(&self, problem: &mut Problem, fit: &Fit, j: usize) -> Option<Profile> {
+        let estimate = fit.estimates.get(j)?;
+        let error = estimate.error.filter(|error| error.is_finite() && *error > 0.0)?;
+        let unit = self.unit[j]?;
+        // On the scale of the search, where the interval is symmetric.
+        let off = error / problem.slope(j, estimate.value);
+        let mut points = vec![(problem.value(j, self.x[j]), 0.0, 0.0)];
+        for side in AT {
+            let mut start = self.x.clone();
+            for errors in side {
+                let mut bounds = problem.bounds();
+                let x = self.x[j] + errors * off;
+                if x <= bounds.low[j] || x >= bounds.high[j] {
+                    break;
+                }
+                (bounds.low[j], bounds.high[j]) = (x, x);
+                start[j] = x;
+                let found = minimise(problem, &start, &bounds, &self.options, &mut |_, _| Flow::Continue);
+                if matches!(found.ending, Ending::Failed | Ending::Interrupted) || problem.is_stopped() {
+                    return None;
+                }
+                start = found.x;
+                // A linear model's cost grows by ½ (Δx/unit)², Δx = errors × off: in errors, whatever the residuals are
+                // autocorrelated.
+                let grown = (2.0 * (found.cost - self.cost)).max(0.0).sqrt() * unit / off;
+                points.push((problem.value(j, x), grown, errors.abs()));
+            }
+        }
+        points.sort_by(|a, b| a.0.total_cmp(&b.0));
+        Some(Profile {
+            name: estimate.name.clone(),
+            unit: estimate.unit,
+            values: points.iter().map(|point| point.0).collect(),
+            growth: points.iter().map(|point| point.1).collect(),
+            linear: points.iter().map(|point| point.2).collect(),
+        })
+    }
+}

@@ -1,0 +1,187 @@
+//! Model and log side by side.
+
+use super::uncertainty;
+use crate::case::Experiment;
+use crate::fit::asked::run::{Nuisance, Run, Setting};
+use crate::log::Quantity;
+use crate::machine::Machine;
+use crate::solve::Bench;
+
+/// How a log is met.
+#[derive(Debug, Clone)]
+pub struct LogFit {
+    /// The experiment.
+    pub name: String,
+    /// Which window of it.
+    pub window: usize,
+    /// Whether none of it was fitted.
+    pub held_out: bool,
+    /// Times, s.
+    pub time: Vec<f64>,
+    /// The input as logged.
+    pub input: Vec<f64>,
+    /// First row that was not fitted.
+    pub fitted_rows: usize,
+    /// Each output.
+    pub outputs: Vec<OutputFit>,
+    /// The nuisances: name, value, standard error.
+    pub extras: Vec<(Nuisance, f64, Option<f64>)>,
+    /// Whether the model reached the end of it.
+    pub complete: bool,
+}
+
+/// How an output is met.
+#[derive(Debug, Clone)]
+pub struct OutputFit {
+    /// The quantity.
+    pub quantity: Quantity,
+    /// The measured values.
+    pub seen: Vec<f64>,
+    /// The model's values.
+    pub model: Vec<f64>,
+    /// Over the rows that were fitted.
+    pub fitted: Option<Score>,
+    /// Over those that were not.
+    pub held_out: Option<Score>,
+}
+
+/// How far model and log are apart.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Score {
+    /// Values compared.
+    pub count: usize,
+    /// Root mean square of the residuals.
+    pub rmse: f64,
+    /// Largest residual.
+    pub worst: f64,
+    /// 100 (1 − ‖y − ŷ‖/‖y − ȳ‖)
+    pub percent: f64,
+    /// Correlation of neighbouring residuals.
+    pub memory: f64,
+}
+
+/// A run beside the log of its experiment, with nothing fitted: it starts where the experiment does, and sensors have
+/// no offset. None where the experiment has no log.
+pub fn beside_log(machine: &Machine, experiment: &Experiment) -> Option<LogFit> {
+    let log = experiment.log.as_ref()?;
+    let run = Run::all(experiment, log, &Setting::default()).pop()?;
+    Some(compared(&run, machine, &[], Vec::new()))
+}
+
+/// Model and log side by side.
+pub(crate) fn compared(
+    run: &Run,
+    machine: &Machine,
+    extras: &[f64],
+    told: Vec<(Nuisance, f64, Option<f64>)>,
+) -> LogFit {
+    let quantities: Vec<Quantity> = run.seen.iter().map(|seen| seen.quantity).collect();
+    let mut columns = vec![Vec::new(); quantities.len()];
+    let complete = run.predict(&mut Bench::default(), machine, extras, &quantities, &mut columns);
+    let n = run.time.len();
+    let outputs = run
+        .seen
+        .iter()
+        .zip(columns)
+        .enumerate()
+        .map(|(i, (seen, column))| {
+            let bias = run.bias(i, extras);
+            let mut model: Vec<f64> =
+                column.iter().map(|v| if seen.absolute { v.abs() + bias } else { v + bias }).collect();
+            model.resize(n, f64::NAN);
+            OutputFit {
+                quantity: seen.quantity,
+                fitted: score(&seen.values, &model, 0..run.fitted_rows.min(n)),
+                held_out: score(&seen.values, &model, run.fitted_rows.min(n)..n),
+                seen: seen.values.clone(),
+                model,
+            }
+        })
+        .collect();
+    LogFit {
+        name: run.name.clone(),
+        window: run.window,
+        held_out: run.held_out,
+        time: run.time.clone(),
+        input: run.logged.clone(),
+        fitted_rows: run.fitted_rows,
+        outputs,
+        extras: told,
+        complete,
+    }
+}
+
+fn score(seen: &[f64], model: &[f64], rows: std::ops::Range<usize>) -> Option<Score> {
+    let rows: Vec<usize> = rows.filter(|&k| seen[k].is_finite() && model[k].is_finite()).collect();
+    if rows.is_empty() {
+        return None;
+    }
+    let n = rows.len() as f64;
+    let residuals: Vec<f64> = rows.iter().map(|&k| model[k] - seen[k]).collect();
+    let squares: f64 = residuals.iter().map(|r| r * r).sum();
+    let mean = rows.iter().map(|&k| seen[k]).sum::<f64>() / n;
+    let spread: f64 = rows.iter().map(|&k| (seen[k] - mean).powi(2)).sum();
+    let places: Vec<usize> = (0..residuals.len()).collect();
+    Some(Score {
+        count: rows.len(),
+        rmse: (squares / n).sqrt(),
+        worst: residuals.iter().fold(0.0, |most: f64, r| most.max(r.abs())),
+        percent: 100.0 * (1.0 - (squares / spread.max(f64::MIN_POSITIVE)).sqrt()),
+        memory: uncertainty::memory_of(&residuals, &places),
+    })
+}
+
+/// How several logs are met together.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Together {
+    /// The name that they share; empty where it is all of them.
+    pub name: String,
+    /// How many logs and windows.
+    pub logs: usize,
+    /// The measured values.
+    pub quantity: Quantity,
+    /// Whether this is what was not fitted.
+    pub held_out: bool,
+    /// Values compared.
+    pub count: usize,
+    /// Root mean square of the residuals; infinite where the model does not reach the end of one.
+    pub rmse: f64,
+}
+
+/// How the logs that have the same `name` are met together, in the order in which they come.
+pub fn together(logs: &[LogFit], name: impl Fn(&LogFit) -> String) -> Vec<Together> {
+    let mut all: Vec<Together> = Vec::new();
+    for log in logs {
+        let name = name(log);
+        for output in &log.outputs {
+            let of = |score: Option<Score>, held_out| {
+                score.map(|score| (score.rmse.powi(2) * score.count as f64, score.count, held_out))
+            };
+            let mut parts: Vec<_> =
+                [of(output.fitted, false), of(output.held_out, true)].into_iter().flatten().collect();
+            if !log.complete {
+                // What the model does not reach is missed by as much as can be.
+                parts = vec![(f64::INFINITY, output.seen.len(), log.held_out)];
+            }
+            for (squares, count, held_out) in parts {
+                let quantity = output.quantity;
+                let same = |one: &Together| one.name == name && one.quantity == quantity && one.held_out == held_out;
+                let place = all.iter().position(same).unwrap_or_else(|| {
+                    all.push(Together { name: name.clone(), logs: 0, quantity, held_out, count: 0, rmse: 0.0 });
+                    all.len() - 1
+                });
+                let one = &mut all[place];
+                one.rmse = ((one.rmse.powi(2) * one.count as f64 + squares) / (one.count + count).max(1) as f64).sqrt();
+                (one.count, one.logs) = (one.count + count, one.logs + 1);
+            }
+        }
+    }
+    all
+}
+
+impl LogFit {
+    /// The experiment that the log is of: of a log that is split into runs, what these have in common.
+    pub fn experiment(&self) -> &str {
+        self.name.split_once('/').map_or(&self.name, |(experiment, _)| experiment)
+    }
+}

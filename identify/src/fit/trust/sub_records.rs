@@ -1,0 +1,106 @@
+//! Whether parts of the logs agree with the whole: errors of the model that no noise explains.
+//!
+//! A friction that drifts, or one of another law, leaves residuals that the parameters follow as far as they can: the
+//! estimates go where the integrated error is least, and noise says nothing of how far that is from the truth. So the
+//! logs are cut into windows, each but the first of a log with a start of its own, in which errors cannot add up, and
+//! the same parameters are fitted to all of them. With ĝ_c = J_cᵀ r_c of window c and A = (JᵀJ)⁻¹ the windows disagree
+//! by
+//!
+//! ```text
+//! V = A (Σ_c ĝ_c ĝ_cᵀ) A G/(G−1)           (K.-Y. Liang and S. L. Zeger 1986)
+//! ```
+//!
+//! and with the whole logs by d. If either is more than noise makes of it, intervals are widened by both.
+
+use super::doubts::Disagreement;
+use super::uncertainty::Judged;
+use crate::case::{Case, Plan};
+use crate::fit::asked::problem::Problem;
+use crate::fit::noise::student::student;
+use crate::fit::search::least_squares::minimise;
+use crate::fit::search::point::{Ending, Options};
+use crate::fit::search::starts::Searched;
+use crate::fit::search::triangle::inverse_of_square;
+use crate::solve::Flow;
+use nalgebra::{DMatrix, DVector};
+
+/// Fewest windows, and the fewest samples of one.
+const WINDOWS: f64 = 6.0;
+const SAMPLES: f64 = 100.0;
+
+/// Residuals that make errors less than so many times those of white noise hide no other model.
+const COLOURED: f64 = 1.1;
+
+/// Standard errors by which the windows may be off the whole, and the windows off each other.
+const OFF: f64 = 2.3;
+
+/// Compares windows with the whole; none where they agree within noise, or tell too little.
+pub(crate) fn disagreement(case: &Case, plan: &Plan, found: &Searched, judged: &Judged) -> Option<Disagreement> {
+    let whole = &found.problem;
+    let g = whole.globals();
+    let skipped = plan.windows.is_some() || plan.closed_loop || plan.until.is_some() || judged.inflation < COLOURED;
+    if skipped || whole.is_stopped() || !judged.identifiability.complete() || found.best.at_bound[..g].contains(&true) {
+        return None;
+    }
+    let lengths = whole.runs.iter().map(|run| run.time.last().copied().unwrap_or(0.0));
+    let total: f64 = lengths.clone().sum();
+    let shortest = lengths.fold(f64::INFINITY, f64::min);
+    let samples = whole.runs.iter().map(|run| run.time.len()).sum::<usize>() as f64;
+    let length = (total / WINDOWS).min(0.5 * shortest).max(SAMPLES * total / samples);
+    let windowed = Plan { windows: Some(length), ..plan.clone() };
+    let mut problem = Problem::new(case, &windowed).ok()?;
+    for &(quantity, deviation) in &found.noise {
+        problem.weigh(quantity, deviation, true);
+        problem.doubt_starts(quantity, deviation);
+    }
+    let mut start = problem.start();
+    start[..g].copy_from_slice(&found.best.x[..g]);
+    let bounds = problem.bounds();
+    let options = Options { iterations: 30, tolerance: 0.05, rounding: problem.rounding(), ..Options::default() };
+    let best = minimise(&mut problem, &start, &bounds, &options, &mut |_, _| Flow::Continue);
+    if matches!(best.ending, Ending::Failed | Ending::Interrupted) || best.at_bound[..g].contains(&true) {
+        return None;
+    }
+    // Windows with starts of their own can do what the whole can: where they do not, the search was not at its end.
+    if best.cost > found.best.cost {
+        return None;
+    }
+    let noise = Judged::new(&problem, &best.residuals, &best.jacobian, &best.x, &best.at_bound)?;
+    // A window in which the cart rests shows nothing of the speed with which it starts.
+    let shows = |j: usize| best.jacobian.column(j).iter().any(|v| *v != 0.0);
+    let free: Vec<usize> = (0..best.x.len()).filter(|&j| !best.at_bound[j] && (j < g || shows(j))).collect();
+    let inverse = inverse_of_square(&best.jacobian.select_columns(&free))?;
+    let inverse = inverse.view((0, 0), (g, g)).into_owned();
+    let mut squares = DMatrix::zeros(g, g);
+    let mut windows = 0;
+    for (index, run) in problem.runs.iter().enumerate() {
+        let (first, rows) = (problem.first_row(index), run.rows());
+        let own = best.jacobian.view((first, 0), (rows, g));
+        let residuals = DVector::from_column_slice(&best.residuals[first..first + rows]);
+        let gradient = own.tr_mul(&residuals);
+        windows += usize::from(gradient.norm() > 0.0);
+        squares += &gradient * gradient.transpose();
+    }
+    if windows < 3 {
+        return None;
+    }
+    let clusters = windows as f64;
+    let between = &inverse * squares * &inverse * (clusters / (clusters - 1.0));
+    let shift = DVector::from_fn(g, |j, _| best.x[j] - found.best.x[j]);
+    // Of windows, noise makes a variance that is off by √(2/(G − 1)) of itself.
+    let most = 1.0 + OFF * (2.0 / (clusters - 1.0)).sqrt();
+    let off: Vec<f64> = (0..g)
+        .map(|j| {
+            let error = noise.covariance.error(j).unwrap_or(f64::INFINITY);
+            f64::max(shift[j].abs() / error, OFF * (between[(j, j)].sqrt() / error / most))
+        })
+        .collect();
+    if !off.iter().all(|off| off.is_finite()) || off.iter().all(|off| *off < OFF) {
+        return None;
+    }
+    let wider = (student(windows - 1) / student(1_000_000)).powi(2);
+    // (|d| + h)² ≤ 2 (d² + h²), d being as far as an interval reaches; and windows are still long enough for half as
+    // much again.
+    let added = (&shift * shift.transpose() / student(1_000_000).powi(2) + between * wider) * 3.0;
+    Some(Disagreement { windows, length, off, added })
+}

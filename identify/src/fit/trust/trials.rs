@@ -1,0 +1,187 @@
+//! Suspicions put to the test: the model is fitted to the logs once more as a suspicion would have them, and what the
+//! logs do not bear out is not said.
+//!
+//! Correlations and regressions are quick, and are wrong where noise is narrow-band, where a belt is elastic or where
+//! parameters are far off. A log that is mended, or an input that comes later, has to leave markedly less.
+
+use super::uncertainty::Judged;
+use crate::case::{Case, Plan, Scope};
+use crate::fit::asked::problem::Problem;
+use crate::fit::asked::run::Nuisance;
+use crate::fit::search::least_squares::minimise;
+use crate::fit::search::point::{Ending, Minimum, Options};
+use crate::fit::search::starts::{HUBER, Searched};
+use crate::log::{Log, Quantity, Remedy, Severity, Survey};
+use crate::solve::Flow;
+use std::sync::Arc;
+
+/// Part of the cost of a quantity's values that may be left by what is said to be wrong with a log, and what the cost of
+/// all may be then: of two columns that contradict each other, a fit may have left one alone.
+const MENDED: f64 = 0.5;
+const NO_WORSE: f64 = 1.05;
+
+/// A unit that does not fit to the machine of the case is one unless the log is met so many times worse without it: the
+/// parameters that are free may make up for a factor.
+const WORSE: f64 = 2.0;
+
+/// Mean square of the residuals of samples that are said to be wrong, over that of the others where they do not count.
+const STAND_OUT: f64 = 9.0;
+
+/// The same of a delay, and how many standard errors it has to be away from none.
+const LATE: f64 = 0.8;
+const ERRORS: f64 = 4.0;
+
+/// Most Jacobians of a trial, and the standard errors that its last step may promise.
+const ITERATIONS: usize = 15;
+const TOLERANCE: f64 = 0.1;
+
+/// A delay that logs bear out.
+pub(crate) struct Late {
+    /// s.
+    pub delay: f64,
+    /// Root mean square of the residuals with it, as a part of that without.
+    pub left: f64,
+}
+
+/// The surveys of all logs, without what a fit to the log as it is said to be refutes.
+pub(crate) fn surveys(case: &Case, plan: &Plan, found: &Searched) -> Vec<Survey> {
+    let logs = case.experiments.iter().filter_map(|experiment| experiment.log.as_ref());
+    let tested = |log: &Arc<Log>| {
+        let mut survey = Survey::new(log, &case.machine);
+        survey.notes.retain(|note| match &note.remedy {
+            Some(remedy) if note.severity != Severity::Fact => is_borne_out(case, plan, found, &log.name, remedy),
+            _ => true,
+        });
+        survey
+    };
+    logs.map(tested).collect()
+}
+
+/// Whether the logs are met better with the log of this name as `remedy` has it; true where that cannot be said.
+pub(crate) fn is_borne_out(case: &Case, plan: &Plan, found: &Searched, name: &str, remedy: &Remedy) -> bool {
+    // What was not fitted, or not to its end, says nothing.
+    if found.problem.is_stopped() || !found.problem.runs.iter().any(|run| run.name == name) {
+        return true;
+    }
+    let most = |before: usize, after: usize| match remedy {
+        Remedy::Unit(..) => WORSE,
+        // C n = C₁ k + s C₁ (n − k), k values that are kept
+        Remedy::Leave(..) => {
+            let (n, kept) = (before.max(1) as f64, after as f64);
+            n / (kept + STAND_OUT * (n - kept))
+        }
+        _ => MENDED,
+    };
+    let ways = match remedy {
+        // Either of the two may be wrong.
+        Remedy::Ratio(a, b, ratio) => vec![Remedy::Scale(*a, 1.0 / ratio), Remedy::Scale(*b, *ratio)],
+        other => vec![other.clone()],
+    };
+    let tried: Vec<Mended> = ways.iter().filter_map(|way| mended(case, plan, found, name, way)).collect();
+    let before = found.problem.counted();
+    let is_better = |one: &Mended| match remedy {
+        Remedy::Unit(..) | Remedy::Leave(..) => one.left < most(before, one.counted),
+        _ => one.left < NO_WORSE && one.least < most(before, one.counted),
+    };
+    tried.is_empty() || tried.iter().any(is_better)
+}
+
+/// How a log is met that was mended.
+struct Mended {
+    /// Cost of a value, as a part of that with the log as it is.
+    left: f64,
+    /// The least such part of any quantity.
+    least: f64,
+    /// How many values count.
+    counted: usize,
+}
+
+/// Mean square of the weighted residuals of each quantity.
+fn squares(problem: &Problem, residuals: &[f64]) -> Vec<(Quantity, f64)> {
+    let of = |quantity: Quantity| {
+        let (mut sum, mut count) = (0.0, 0);
+        for (index, run) in problem.runs.iter().enumerate() {
+            let (first, n) = (problem.first_row(index), run.time.len());
+            for (output, seen) in run.seen.iter().enumerate().filter(|(_, seen)| seen.quantity == quantity) {
+                let rows = &residuals[first + output * n..first + (output + 1) * n];
+                sum += rows.iter().map(|r| r * r).sum::<f64>();
+                count += seen.weights.iter().filter(|weight| **weight > 0.0).count();
+            }
+        }
+        (quantity, sum / f64::max(count as f64, 1.0))
+    };
+    problem.quantities().into_iter().map(of).collect()
+}
+
+/// How the logs are met with one that was mended; none where no model gets through.
+fn mended(case: &Case, plan: &Plan, found: &Searched, name: &str, remedy: &Remedy) -> Option<Mended> {
+    let mut own = case.clone();
+    for experiment in own.experiments.iter_mut().filter(|experiment| experiment.name == name) {
+        let log: &mut Log = Arc::make_mut(experiment.log.as_mut()?);
+        remedy.apply(log);
+    }
+    let mut problem = Problem::new(&own, plan).ok()?.stopped_by(found.problem.stop());
+    problem.weigh_by(&found.noise);
+    if let Remedy::Scale(quantity, factor) | Remedy::Unit(quantity, factor) = remedy {
+        // Residuals in the unit that they had.
+        let runs = problem.runs.iter_mut().filter(|run| run.name == name);
+        for seen in runs.flat_map(|run| &mut run.seen).filter(|seen| seen.quantity == *quantity) {
+            seen.weights.iter_mut().for_each(|weight| *weight /= factor.abs());
+        }
+    }
+    let before = found.best.cost / found.problem.counted().max(1) as f64;
+    let starts = [problem.start(), found.best.x.clone()];
+    let ends: Vec<_> = starts.iter().filter_map(|start| descend(&mut problem, plan, start)).collect();
+    let (end, cost) = ends.into_iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
+    let counted = problem.counted();
+    let own = squares(&found.problem, &found.best.residuals);
+    let part = |(quantity, square): (Quantity, f64)| {
+        let (_, own) = own.iter().find(|(other, _)| *other == quantity)?;
+        Some(square / own.max(f64::MIN_POSITIVE))
+    };
+    let least = squares(&problem, &end.residuals).into_iter().filter_map(part).fold(f64::INFINITY, f64::min);
+    Some(Mended { left: cost / counted.max(1) as f64 / before.max(f64::MIN_POSITIVE), least, counted })
+}
+
+/// Where a short search from `start` leads, and the cost there.
+fn descend(problem: &mut Problem, plan: &Plan, start: &[f64]) -> Option<(Minimum, f64)> {
+    if start.len() != problem.variables() || problem.is_stopped() {
+        return None;
+    }
+    let huber = if plan.huber { HUBER } else { f64::INFINITY };
+    let options = Options {
+        iterations: ITERATIONS,
+        tolerance: TOLERANCE,
+        huber,
+        evolutions: 0,
+        rounding: problem.rounding(),
+        ..Options::default()
+    };
+    let bounds = problem.bounds();
+    let found = minimise(problem, start, &bounds, &options, &mut |_, _| Flow::Continue);
+    let cost = found.cost;
+    (!matches!(found.ending, Ending::Failed | Ending::Interrupted) && cost.is_finite()).then_some((found, cost))
+}
+
+/// The delay of all inputs with which the logs are met markedly better; `about` is where its search begins, s.
+pub(crate) fn late(case: &Case, plan: &Plan, found: &Searched, about: f64) -> Option<Late> {
+    let mut own = plan.clone();
+    own.nuisance.delay = Scope::Shared;
+    let mut problem = Problem::new(case, &own).ok()?.stopped_by(found.problem.stop());
+    problem.weigh_by(&found.noise);
+    let place = problem.parameters.len() + problem.shared.iter().position(|extra| extra.what == Nuisance::Delay)?;
+    let unit = problem.shared[place - problem.parameters.len()].unit;
+    let with = |x: &[f64]| {
+        let mut start = x.to_vec();
+        start.insert(place, about / unit);
+        start
+    };
+    let (minimum, cost) = [found.best.x.clone(), found.problem.start()]
+        .iter()
+        .filter_map(|x| descend(&mut problem, &own, &with(x)))
+        .min_by(|a, b| a.1.total_cmp(&b.1))?;
+    let left = (cost / found.best.cost.max(f64::MIN_POSITIVE)).sqrt();
+    let judged = Judged::new(&problem, &minimum.residuals, &minimum.jacobian, &minimum.x, &minimum.at_bound)?;
+    let (delay, error) = (unit * minimum.x[place], unit * judged.covariance.error(place)?);
+    (left < LATE && delay > ERRORS * error).then_some(Late { delay, left })
+}

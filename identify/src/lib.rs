@@ -1,0 +1,8 @@
+//! Parameters from logs, what the logs cannot tell, and the experiments that would.
+
+// Paths below `crate` are those of the facade: a module is named alike wherever it lives.
+use taut_case::*;
+use taut_control::*;
+use taut_core::*;
+
+pub mod fit;
