@@ -98,9 +98,9 @@ fn general(c: &mut Criterion) {
         machine
     };
     let mut follows = common::table4();
-    let make = BeltMake { modulus: 8.335e9, section: 5.5626e-6, spans: [0.34925, 0.34925, 0.7874] };
+    let make = BeltMake { modulus: 8.335e9, section: 5.5626e-6, spans: [0.34925, 0.34925, 0.7874].into() };
     (follows.belt.make, follows.belt.follows_cart) = (Some(make), true);
-    follows.travel = Some(Travel { min: -0.3, max: 0.3, stop: None });
+    follows.cart.travel = Some(Travel { min: -0.3, max: 0.3, stop: None });
     let curve = Law::Stribeck { velocity: 0.05, shape: Shape::Gaussian };
     let bristles = Law::LuGre { stiffness: 1e4, damping: 60.0, velocity: 0.01 };
     let cases = [
@@ -121,9 +121,9 @@ fn general(c: &mut Criterion) {
 fn derivatives(c: &mut Criterion) {
     let (machine, experiment) = (common::table4(), common::experiment(pulse(), 1.0));
     let changes: [fn(&mut Machine, f64); 10] = [
-        |machine, by| machine.motor.resistance *= 1.0 + by,
-        |machine, by| machine.motor.torque_constant *= 1.0 + by,
-        |machine, by| machine.motor.back_emf_constant *= 1.0 + by,
+        |machine, by| machine.drives[0].motor.resistance *= 1.0 + by,
+        |machine, by| machine.drives[0].motor.torque_constant *= 1.0 + by,
+        |machine, by| machine.drives[0].motor.back_emf_constant *= 1.0 + by,
         |machine, by| machine.drive_pulley.inertia *= 1.0 + by,
         |machine, by| machine.idler_pulley.inertia *= 1.0 + by,
         |machine, by| machine.cart.mass *= 1.0 + by,

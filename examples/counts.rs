@@ -74,13 +74,13 @@ fn run(stage: Machine, experiment: Experiment, solver: Solver) -> Box<dyn Fn() -
 /// play.
 fn geared() -> Machine {
     let mut stage = common::table4();
-    stage.motor.inductance = 0.3e-3;
-    stage.motor.rotor_inertia = 1e-6;
-    stage.motor.gear_ratio = 2.0;
-    stage.motor.gear_efficiency = 0.9;
-    stage.motor.gear_play = Some(GearPlay { backlash: 2e-3, stiffness: 200.0, damping: 0.01 });
-    stage.amplifier.voltage_limit = Some(4.0);
-    stage.amplifier.current_limit = Some(3.0);
+    stage.drives[0].motor.inductance = 0.3e-3;
+    stage.drives[0].motor.rotor_inertia = 1e-6;
+    stage.drives[0].motor.gear_ratio = 2.0;
+    stage.drives[0].motor.gear_efficiency = 0.9;
+    stage.drives[0].motor.gear_play = Some(GearPlay { backlash: 2e-3, stiffness: 200.0, damping: 0.01 });
+    stage.drives[0].amplifier.voltage_limit = Some(4.0);
+    stage.drives[0].amplifier.current_limit = Some(3.0);
     stage
 }
 

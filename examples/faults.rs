@@ -118,12 +118,13 @@ fn made(fault: Fault, seed: u64) -> Case {
     let mut case = Case::from_text("axis.toml", TEMPLATE).unwrap_or_else(|error| panic!("{error}"));
     let machine = &mut case.machine;
     if fault == Fault::Newtons {
-        machine.amplifier.mode = AmplifierMode::Current;
-        machine.amplifier.gain = 0.5;
-        (machine.motor.torque_constant, machine.motor.back_emf_constant) = (machine.pulley_radius, 0.0);
+        machine.drives[0].amplifier.mode = AmplifierMode::Current;
+        machine.drives[0].amplifier.gain = 0.5;
+        (machine.drives[0].motor.torque_constant, machine.drives[0].motor.back_emf_constant) =
+            (machine.pulley_radius, 0.0);
     }
     if fault == Fault::Resonance {
-        machine.belt.stiffness = [3e3; 3];
+        machine.belt.stiffness = [3e3; 3].into();
         machine.cart.friction.forward.coulomb *= 0.1;
         machine.cart.friction.backward.coulomb *= 0.1;
         machine.cart.friction.forward.breakaway *= 0.1;

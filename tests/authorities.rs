@@ -8,7 +8,7 @@
 use serde_json::Value;
 use taut::case::{Experiment, Initial};
 use taut::friction::{Friction, Side};
-use taut::machine::{Amplifier, AmplifierMode, Belt, Cart, Machine, Motor, Pulley};
+use taut::machine::{Amplifier, AmplifierMode, Belt, DriveUnit, Kind, Machine, Motor, Pulley, Slide};
 use taut::signal::Signal;
 use taut::solve::{Ending, Solver, simulate};
 
@@ -29,31 +29,34 @@ fn machine(value: &Value) -> Machine {
     let get = |key| number(value, key);
     let pulley = |inertia, law| Pulley { inertia: get(inertia), friction: friction(&value[law]) };
     Machine {
-        motor: Motor {
-            torque_constant: get("torque_constant"),
-            back_emf_constant: get("back_emf_constant"),
-            resistance: get("resistance"),
-            inductance: get("inductance"),
-            rotor_inertia: get("rotor_inertia"),
-            gear_ratio: get("gear_ratio"),
-            gear_efficiency: get("gear_efficiency"),
-            gear_play: None,
-            is_simple: false,
-        },
-        amplifier: Amplifier::ideal(
-            match value["amplifier_mode"].as_str() {
-                Some("voltage") => AmplifierMode::Voltage,
-                Some("current") => AmplifierMode::Current,
-                other => panic!("amplifier mode {other:?}"),
+        kind: Kind::Axis,
+        drives: vec![DriveUnit {
+            motor: Motor {
+                torque_constant: get("torque_constant"),
+                back_emf_constant: get("back_emf_constant"),
+                resistance: get("resistance"),
+                inductance: get("inductance"),
+                rotor_inertia: get("rotor_inertia"),
+                gear_ratio: get("gear_ratio"),
+                gear_efficiency: get("gear_efficiency"),
+                gear_play: None,
+                is_simple: false,
             },
-            get("amplifier_gain"),
-        ),
+            amplifier: Amplifier::ideal(
+                match value["amplifier_mode"].as_str() {
+                    Some("voltage") => AmplifierMode::Voltage,
+                    Some("current") => AmplifierMode::Current,
+                    other => panic!("amplifier mode {other:?}"),
+                },
+                get("amplifier_gain"),
+            ),
+        }],
+        bridge: None,
         pulley_radius: get("pulley_radius"),
         drive_pulley: pulley("drive_inertia", "drive_friction"),
-        cart: Cart::new(get("cart_mass"), friction(&value["cart_friction"])),
+        cart: Slide::new(get("cart_mass"), friction(&value["cart_friction"])),
         idler_pulley: pulley("idler_inertia", "idler_friction"),
         belt: Belt::given(["k1", "k2", "k3"].map(get), ["c1", "c2", "c3"].map(get)),
-        travel: None,
         encoder: None,
         scale: None,
     }

@@ -27,10 +27,10 @@ fn presets_hold_the_numbers_of_the_tables() {
     assert_eq!(t1.machine.belt.stiffness, [2.6552e5, 2.6552e5, 11.777e4]);
     assert_eq!(t2.machine.belt.stiffness, [1.3276e5, 1.3276e5, 5.8885e4]);
     assert_eq!(t4.machine.belt, t2.machine.belt);
-    assert_eq!(t4.machine.motor, t1.machine.motor);
-    assert_eq!(t1.machine.motor.torque_constant, 0.023);
-    assert_eq!(t1.machine.motor.back_emf_constant, 0.023);
-    assert_eq!(t1.machine.motor.resistance, 0.71);
+    assert_eq!(t4.machine.drives[0].motor, t1.machine.drives[0].motor);
+    assert_eq!(t1.machine.drives[0].motor.torque_constant, 0.023);
+    assert_eq!(t1.machine.drives[0].motor.back_emf_constant, 0.023);
+    assert_eq!(t1.machine.drives[0].motor.resistance, 0.71);
     assert_eq!((t1.machine.drive_pulley.inertia, t1.machine.idler_pulley.inertia), (7e-5, 7e-5));
     assert_eq!((t4.machine.drive_pulley.inertia, t4.machine.idler_pulley.inertia), (6.3e-5, 6.3e-5));
     assert_eq!(t1.machine.cart.friction, Friction::symmetric(40.6518, 0.0));
@@ -90,7 +90,7 @@ fn set_changes_the_text_and_keeps_its_remarks() {
     let case = with(&["cart.mass=0.5 kg", "experiment.1.until=2s", "motor.gear_ratio=5.9"]);
     assert_eq!(case.machine.cart.mass, 0.5);
     assert_eq!(case.experiments[1].until, 2.0);
-    assert_eq!(case.machine.motor.gear_ratio, 5.9);
+    assert_eq!(case.machine.drives[0].motor.gear_ratio, 5.9);
     assert!(case.text.contains("mass     = \"0.5 kg\"                # with its load"), "{}", case.text);
     let again = Case::from_text("axis.toml", &case.text).unwrap();
     assert_eq!((again.machine, again.text), (case.machine, case.text));
@@ -123,7 +123,10 @@ fn set_makes_missing_tables() {
     let (begin, end) = (TEMPLATE.find("[amplifier]").unwrap(), TEMPLATE.find("# ── The mechanics").unwrap());
     let text = format!("{}{}", &TEMPLATE[..begin], &TEMPLATE[end..]);
     let case = Case::from_text_with("axis.toml", &text, &["amplifier.gain=2"]).unwrap_or_else(|e| panic!("{e}"));
-    assert_eq!((case.machine.amplifier.gain, case.machine.amplifier.mode), (2.0, AmplifierMode::Voltage));
+    assert_eq!(
+        (case.machine.drives[0].amplifier.gain, case.machine.drives[0].amplifier.mode),
+        (2.0, AmplifierMode::Voltage)
+    );
 }
 
 #[test]

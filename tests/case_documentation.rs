@@ -72,7 +72,7 @@ fn the_example_of_a_gantry_reads() {
     for (text, is_following) in [(&whole, false), (&follows, true)] {
         let case =
             GantryCase::from_text_with("docs/gantry.md", text, &[]).unwrap_or_else(|error| panic!("{error}\n{text}"));
-        assert!(case.gantry.belts.follows.is_some() == is_following && case.experiments.len() == 2);
+        assert!(case.gantry.belt.follows_cart == is_following && case.experiments.len() == 2);
     }
 }
 

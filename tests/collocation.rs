@@ -60,7 +60,7 @@ impl Problem {
 /// φ₁, φ̇₁, x, ẋ, φ₃, φ̇₃, and the bristles of the three bodies.
 impl FirstOrderSystem for Problem {
     fn derivative(&self, t: f64, y: &[f64], rate: &mut [f64]) {
-        let (machine, motor, x) = (&self.machine, &self.machine.motor, y[2]);
+        let (machine, motor, x) = (&self.machine, &self.machine.drives[0].motor, y[2]);
         let u = self.sine.0 * (2.0 * std::f64::consts::PI * self.sine.1 * t).sin();
         let f1 = self.stiffness(0, x) * (RADIUS * y[0] - x);
         let f2 = self.stiffness(1, x) * (x - RADIUS * y[4]);
@@ -122,12 +122,12 @@ fn problem() -> impl Strategy<Value = Problem> {
             let law = law(smooth, velocity / lever, stiffness * square, damping * square);
             Friction::sided(side(forward), side(backward)).following(law)
         };
-        let make = BeltMake { modulus: 8.335e9, section: 5.5626e-6, spans: [0.3, 0.4, 0.7] };
+        let make = BeltMake { modulus: 8.335e9, section: 5.5626e-6, spans: [0.3, 0.4, 0.7].into() };
         let (pulley, cart) = (of(RADIUS, 4.0, 0.7), of(1.0, 19.0, 0.2));
         let mut machine = common::paper_stage(make.stiffness(), 6.3e-5, pulley, cart);
         if belt.0 {
             (machine.belt.make, machine.belt.follows_cart) = (Some(make), true);
-            machine.travel = Some(Travel { min: -0.25, max: 0.25, stop: None });
+            machine.cart.travel = Some(Travel { min: -0.25, max: 0.25, stop: None });
         }
         if belt.1 {
             machine.cart.along = Polyline::new(vec![[-0.2, 1.4], [-0.01, 1.0], [0.03, 1.6], [0.2, 0.7]]);

@@ -105,7 +105,7 @@ fn a_two_mass_belt_that_follows_the_cart() {
         "experiment.there.until=0.2",
     ];
     let (case, solution) = run(&smooth);
-    let (machine, motor) = (&case.machine, &case.machine.motor);
+    let (machine, motor) = (&case.machine, &case.machine.drives[0].motor);
     let (r, n, ea) = (machine.pulley_radius, motor.gear_ratio, 8e9 * 5e-6);
     let inertia = machine.drive_pulley.inertia + machine.idler_pulley.inertia + n * n * motor.rotor_inertia;
     let rate = |[phi, omega, x, v]: [f64; 4]| {

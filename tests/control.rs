@@ -308,9 +308,9 @@ proptest! {
         (compensate, observer, cart) in any::<(bool, bool, bool)>(),
     ) {
         let mut machine = rig();
-        machine.amplifier.voltage_limit = Some(voltage);
-        machine.amplifier.current_limit = Some(current);
-        machine.motor.inductance = inductance;
+        machine.drives[0].amplifier.voltage_limit = Some(voltage);
+        machine.drives[0].amplifier.current_limit = Some(current);
+        machine.drives[0].motor.inductance = inductance;
         if cart {
             machine.encoder = Some(Encoder { at: EncoderPlace::Cart, lines: 250_000.0 });
         }
@@ -403,7 +403,7 @@ fn the_compensated_reference_balances_the_belt() {
     let compensation = Compensation::new(&machine, &settings);
     let y = Reference { position: 0.1, speed: 0.2, acceleration: 3.0, ..Reference::default() };
     let needed = compensation.needed(&y);
-    let (r, [k1, k2, k3]) = (machine.pulley_radius, machine.belt.stiffness);
+    let (r, [k1, k2, k3]) = (machine.pulley_radius, machine.belt.stiffness.three());
     let (y1, y3) = (needed.drive.position, needed.idler[0]);
     let (f1, f2, f3) = (k1 * (y1 - y.position), k2 * (y.position - y3), k3 * (y3 - y1));
     // M ẍ = f₁ − f₂ − b ẋ − F_c and J₂ φ̈₃ = r f₂ − r f₃ − B φ̇₃ − τ_c
@@ -535,18 +535,18 @@ fn gains_for_drives_make_the_same_command() {
     let value = |name: &str| gains.iter().find(|gain| gain.name == name).unwrap().value;
     let (speed, acceleration) = (0.3, 4.0);
     let force = rigid.mass * acceleration + rigid.viscous[0] * speed + rigid.coulomb[0];
-    let wanted = rigid.command(force, 0.0, speed) * machine.amplifier.gain;
+    let wanted = rigid.command(force, 0.0, speed) * machine.drives[0].amplifier.gain;
     let wpilib = value("kS") + value("kV") * speed + value("kA") * acceleration;
     assert!((wpilib - wanted).abs() < 1e-12 * wanted, "{wpilib} {wanted}");
     let linuxcnc = value("FF1") * 1e3 * speed + value("FF2") * 1e3 * acceleration + value("kS");
     assert!((linuxcnc - wanted).abs() < 1e-12 * wanted, "{linuxcnc} {wanted}");
     // Turns of the motor per metre, and its torque from the current.
-    let turns = machine.motor.gear_ratio / (2.0 * std::f64::consts::PI * machine.pulley_radius);
+    let turns = machine.drives[0].motor.gear_ratio / (2.0 * std::f64::consts::PI * machine.pulley_radius);
     let torque = value("config.inertia") * acceleration * turns
         + value("input_torque per input_vel") * speed * turns
         + value("input_torque against dry friction");
-    let current = (wanted - rigid.brake * speed) / machine.motor.resistance;
-    assert!((torque - machine.motor.torque_constant * current).abs() < 1e-12, "{torque} {current}");
+    let current = (wanted - rigid.brake * speed) / machine.drives[0].motor.resistance;
+    assert!((torque - machine.drives[0].motor.torque_constant * current).abs() < 1e-12, "{torque} {current}");
     let inertia = value("P-AXIS-00391 load") - value("3140:07 load inertia");
-    assert_eq!(inertia, machine.motor.rotor_inertia);
+    assert_eq!(inertia, machine.drives[0].motor.rotor_inertia);
 }

@@ -46,9 +46,9 @@ fn dry_friction_costs_a_look_now_and_then() {
 #[test]
 fn limits_and_a_gear_with_play_cost_more() {
     let mut machine = common::table4();
-    machine.amplifier.voltage_limit = Some(3.0);
-    machine.motor.rotor_inertia = 1e-6;
-    machine.motor.gear_play = Some(GearPlay { backlash: 1e-2, stiffness: 50.0, damping: 0.01 });
+    machine.drives[0].amplifier.voltage_limit = Some(3.0);
+    machine.drives[0].motor.rotor_inertia = 1e-6;
+    machine.drives[0].motor.gear_play = Some(GearPlay { backlash: 1e-2, stiffness: 50.0, damping: 0.01 });
     let zero = Cost { samples: 1001, pieces: 3, modes: 21, ..Cost::default() };
     costs(&machine, Solver::Exact, Cost { propagators: 46, steps: 1287, looks: 995, series: 118, ..zero });
     costs(&machine, Solver::GENERAL, Cost { propagators: 34, steps: 1272, looks: 193, evaluations: 1272, ..zero });

@@ -200,9 +200,9 @@ fn cascades_are_those_of_the_document() {
     );
     let split = |case: &Case, y: &Reference| {
         let (machine, one) = (&case.machine, Mass::of(case));
-        let motor = &machine.motor;
+        let motor = &machine.drives[0].motor;
         let r = machine.pulley_radius;
-        let voltage = motor.gear_ratio * motor.back_emf_constant * y.speed / (r * machine.amplifier.gain);
+        let voltage = motor.gear_ratio * motor.back_emf_constant * y.speed / (r * machine.drives[0].amplifier.gain);
         let rest = rigid_command(case, y) - voltage;
         [voltage, rest * one.push * r / (motor.gear_ratio * motor.torque_constant)]
     };
@@ -276,15 +276,19 @@ struct Mass {
 impl Mass {
     fn of(case: &Case) -> Self {
         let s = &case.machine;
-        let (r, n) = (s.pulley_radius, s.motor.gear_ratio);
-        let pulleys = s.drive_pulley.inertia + n * n * s.motor.rotor_inertia + s.idler_pulley.inertia;
+        let (r, n) = (s.pulley_radius, s.drives[0].motor.gear_ratio);
+        let pulleys = s.drive_pulley.inertia + n * n * s.drives[0].motor.rotor_inertia + s.idler_pulley.inertia;
         let (drive, idler, cart) = (s.drive_pulley.friction, s.idler_pulley.friction, s.cart.friction);
         let side = |forward: bool| (drive.side(forward), idler.side(forward), cart.side(forward));
         Self {
             mass: s.cart.mass + pulleys / (r * r),
             viscous: [true, false].map(|f| side(f).2.viscous + (side(f).0.viscous + side(f).1.viscous) / (r * r)),
             coulomb: [true, false].map(|f| side(f).2.coulomb + (side(f).0.coulomb + side(f).1.coulomb) / r),
-            push: s.amplifier.gain * s.motor.gear_efficiency * n * s.motor.torque_constant / (r * s.motor.resistance),
+            push: s.drives[0].amplifier.gain
+                * s.drives[0].motor.gear_efficiency
+                * n
+                * s.drives[0].motor.torque_constant
+                / (r * s.drives[0].motor.resistance),
         }
     }
 }
@@ -299,12 +303,12 @@ fn sign(y: &Reference) -> f64 {
 
 /// The command for a force and its rate at a speed, in voltage mode.
 fn command(case: &Case, force: f64, rate: f64, speed: f64) -> f64 {
-    let (s, motor) = (&case.machine, &case.machine.motor);
+    let (s, motor) = (&case.machine, &case.machine.drives[0].motor);
     let n = motor.gear_ratio;
     let eta = if force * speed < 0.0 { 1.0 / motor.gear_efficiency } else { motor.gear_efficiency };
     let current = |f: f64| f * s.pulley_radius / (eta * n * motor.torque_constant);
     let back = n * motor.back_emf_constant * speed / s.pulley_radius;
-    (motor.resistance * current(force) + motor.inductance * current(rate) + back) / s.amplifier.gain
+    (motor.resistance * current(force) + motor.inductance * current(rate) + back) / s.drives[0].amplifier.gain
 }
 
 /// p = 0.9, q = 0.7.
@@ -319,13 +323,13 @@ fn rigid_command(case: &Case, y: &Reference) -> f64 {
 /// y₁ with two derivatives, and F and Ḟ with all of inertia and friction.
 fn elastic(case: &Case, y: &Reference) -> (Reference, f64, f64) {
     let machine = &case.machine;
-    let (r, n, s) = (machine.pulley_radius, machine.motor.gear_ratio, sign(y));
+    let (r, n, s) = (machine.pulley_radius, machine.drives[0].motor.gear_ratio, sign(y));
     let forward = s >= 0.0;
     let (cart, idler) = (machine.cart.friction.side(forward), machine.idler_pulley.friction.side(forward));
     let drive = machine.drive_pulley.friction.side(forward);
-    let [k1, k2, k3] = machine.belt.stiffness;
+    let [k1, k2, k3] = machine.belt.stiffness.three();
     let (m, j2) = (machine.cart.mass, machine.idler_pulley.inertia);
-    let j1 = machine.drive_pulley.inertia + n * n * machine.motor.rotor_inertia;
+    let j1 = machine.drive_pulley.inertia + n * n * machine.drives[0].motor.rotor_inertia;
     let load = [
         m * y.acceleration + cart.viscous * y.speed + s * cart.coulomb - machine.cart.load,
         m * y.jerk + cart.viscous * y.acceleration,
@@ -363,7 +367,7 @@ fn elastic_command(case: &Case, y: &Reference) -> f64 {
 fn the_disturbance_observer_is_that_of_the_document() {
     use nalgebra::{Matrix3, Matrix4, RowVector3, Vector3};
     let case = Case::from_text_with("axis.toml", TEMPLATE, &AXIS).unwrap_or_else(|error| panic!("{error}"));
-    let (one, motor, r) = (Mass::of(&case), case.machine.motor, case.machine.pulley_radius);
+    let (one, motor, r) = (Mass::of(&case), case.machine.drives[0].motor, case.machine.pulley_radius);
     let n = motor.gear_ratio;
     let d = one.viscous[0] + n * n * motor.torque_constant * motor.back_emf_constant / (motor.resistance * r * r);
     // ẏ = v, v̇ = −(d/M) v + (g/M)(u + w), ẇ = 0, held over T: e^{[A B; 0 0] T} by its series

@@ -148,7 +148,7 @@ fn what_cannot_be_designed_is_told() {
     let amplitude = Request { input: Some(5.0), ..one.clone() };
     assert!(told(&endless, &amplitude).contains("nothing limits the way of the cart"));
     let mut limited = case.clone();
-    limited.machine.amplifier.voltage_limit = Some(12.0);
+    limited.machine.drives[0].amplifier.voltage_limit = Some(12.0);
     let beyond = Request { input: Some(20.0), ..one.clone() };
     assert!(told(&limited, &beyond).contains("an input of 20 is beyond what the amplifier gives"));
     let short = Request { duration: 5e-3, ..one.clone() };

@@ -60,7 +60,7 @@ fn drawn(chance: &mut Chance, free: &[&str], off: f64) -> Case {
         let factor = off.powf(2.0 * chance.uniform() - 1.0);
         match *key {
             "belt.stiffness" => {
-                let spans = truth.machine.belt.stiffness.map(|k| (factor * k).to_string());
+                let spans = truth.machine.belt.stiffness.three().map(|k| (factor * k).to_string());
                 format!("{key}=[{}]", spans.join(", "))
             }
             _ => format!("{key}={}", factor * value(&truth.machine, key).unwrap()),

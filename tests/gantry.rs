@@ -3,7 +3,7 @@
 use serde_json::Value;
 use taut::case::GantryCase;
 use taut::linear::{GantryAnalysis, Natural, Root};
-use taut::machine::gantry::Routing;
+use taut::machine::Kind;
 use taut::metrics::{GantryMeter, GantryMetrics, Peak};
 use taut::solve::{Course, Detail, Ending, ErrorEstimate, Event, Flow, Solver, stream_mechanism};
 use taut::trajectory::Trajectory;
@@ -122,19 +122,26 @@ fn peaks(metrics: &GantryMetrics) -> Vec<Peak> {
 /// The stretch of each span by its lever arms, s = A q, from columns of q.
 fn stretches(case: &GantryCase, q: [&[f64]; 4]) -> Vec<Vec<f64>> {
     let r = case.gantry.pulley_radius;
-    let arms: &[[f64; 4]] = match case.gantry.routing {
-        Routing::HFrame => &[[r, 0.0, 1.0, 1.0], [0.0, -r, 1.0, -1.0], [-r, r, -2.0, 0.0]],
-        Routing::CoreXy => &[[r, 0.0, -1.0, -1.0], [-r, 0.0, 1.0, 1.0], [0.0, r, -1.0, 1.0], [0.0, -r, 1.0, -1.0]],
+    let arms: &[[f64; 4]] = match case.gantry.kind {
+        Kind::HFrame => &[[r, 0.0, 1.0, 1.0], [0.0, -r, 1.0, -1.0], [-r, r, -2.0, 0.0]],
+        Kind::Axis | Kind::CoreXy => {
+            &[[r, 0.0, -1.0, -1.0], [-r, 0.0, 1.0, 1.0], [0.0, r, -1.0, 1.0], [0.0, -r, 1.0, -1.0]]
+        }
     };
     let at = |arms: &[f64; 4], row: usize| arms.iter().zip(q).map(|(arm, column)| arm * column[row]).sum();
     arms.iter().map(|arms| (0..q[0].len()).map(|row| at(arms, row)).collect()).collect()
+}
+
+/// Where the drives have bridge and cart.
+fn place(case: &GantryCase, [left, right]: [f64; 2]) -> [f64; 2] {
+    case.gantry.by_drives(&[left, right, 0.0, 0.0, 0.0, 0.0]).try_into().unwrap()
 }
 
 /// The largest magnitudes in rows, in the same order.
 fn largest_rows(case: &GantryCase, rows: &Trajectory) -> Vec<f64> {
     let get = |name: &str| rows.get(name).unwrap().to_vec();
     let [left, right, x, y] = ["left_angle", "right_angle", "bridge_position", "cart_position"].map(get);
-    let places = left.iter().zip(&right).map(|(left, right)| case.gantry.place([*left, *right]));
+    let places = left.iter().zip(&right).map(|(left, right)| place(&case, [*left, *right]));
     let errors: Vec<[f64; 2]> = places.zip(x.iter().zip(&y)).map(|([xd, yd], (x, y))| [xd - x, yd - y]).collect();
     let mut columns = vec![get("bridge_speed"), get("cart_speed")];
     columns.extend([0, 1].map(|k| errors.iter().map(|error| error[k]).collect()));
@@ -146,7 +153,7 @@ fn largest_rows(case: &GantryCase, rows: &Trajectory) -> Vec<f64> {
     }));
     let stretches = stretches(case, [&left, &right, &x, &y]);
     columns.extend(stretches);
-    columns.extend(case.gantry.routing.spans().iter().map(|span| get(&format!("{}_force", span.key))));
+    columns.extend(case.gantry.kind.geometry().span_labels().map(|span| get(&format!("{}_force", span.key))));
     columns.iter().map(|column| column.iter().fold(0.0, |most: f64, v| most.max(v.abs()))).collect()
 }
 
@@ -265,7 +272,7 @@ fn the_machines_of_the_note() {
         }
         // r φ₁ and r φ₂ of bridge and cart alone, as the pulleys turn without strain.
         for (mode, [x, y]) in analysis.modes.rigid.iter().zip([[1.0, 0.0], [0.0, 1.0]]) {
-            let want = [case.gantry.angles(x, y), [x, y]].concat();
+            let want = case.gantry.without_strain(&[x, y], &[]).position;
             assert!(mode.shape.iter().zip(&want).all(|(a, b)| (a - b).abs() < 1e-9), "{:?}", mode.shape);
         }
     }
@@ -296,7 +303,7 @@ fn a_swing_of_a_gantry_dies_out_with_its_damping_ratio() {
     let rows = run(&case, Solver::Exact).rows;
     let energy = |row: usize| {
         let at = |name: &str| rows.get(name).unwrap()[row];
-        let [x, y] = case.gantry.place([at("left_angle"), at("right_angle")]);
+        let [x, y] = place(&case, [at("left_angle"), at("right_angle")]);
         (x - at("bridge_position")).hypot(y - at("cart_position"))
     };
     // The largest strain in each of the first two periods.
@@ -329,10 +336,10 @@ fn resonances_follow_bridge_and_cart() {
         assert!(most > 1.01 * least, "{name}: {least} to {most}");
         // One place by itself: the stiffnesses written down.
         let (i, j) = (3, 20);
-        let lengths = case.gantry.lengths(map.bridge[i], map.cart[j]).unwrap();
+        let lengths = case.gantry.span_lengths(&[map.bridge[i], map.cart[j]]).unwrap();
         let mut there = case.gantry.clone();
-        let (rigidity, _) = there.belts.follows.take().unwrap();
-        there.belts.stiffness = lengths.iter().map(|length| rigidity / length).collect();
+        there.belt.follows_cart = false;
+        there.belt.stiffness = lengths.map(|length| there.belt.make.unwrap().rigidity() / length);
         for (hertz, want) in map.hertz.iter().zip(Natural::frequencies(&there.mechanism(), &[0.0; 6]).unwrap()) {
             assert!((hertz[i][j] / want - 1.0).abs() < 1e-12);
         }

@@ -4,8 +4,7 @@ use crate::common;
 use proptest::prelude::*;
 use taut::case::{GantryCase, GantryExperiment};
 use taut::friction::Friction;
-use taut::machine::gantry::{Belts, Gantry, Routing, Slide};
-use taut::machine::{BeltSheet, Pulley};
+use taut::machine::{Belt, DriveUnit, Kind, Machine, Pulley, Slide, Spans};
 use taut::mechanism::{Amplifier, AmplifierMode, Motor, State};
 use taut::signal::Signal;
 use taut::solve::{Course, Detail, Ending, Event, Flow, Solver, stream_mechanism};
@@ -66,36 +65,31 @@ fn dry(viscous: f64, coulomb: f64) -> impl Strategy<Value = Friction> {
 }
 
 fn slide(mass: f64) -> impl Strategy<Value = Slide> {
-    (0.3 * mass..3.0 * mass, dry(30.0, 1.0)).prop_map(|(mass, friction)| Slide { mass, friction, travel: None })
+    (0.3 * mass..3.0 * mass, dry(30.0, 1.0)).prop_map(|(mass, friction)| Slide::new(mass, friction))
 }
 
 /// Gantries with one motor for both drives.
-fn gantry() -> impl Strategy<Value = Gantry> {
+fn gantry() -> impl Strategy<Value = Machine> {
     let stiffness = || prop::collection::vec(2e4..3e5_f64, 4);
     let damping = prop_oneof![Just(vec![0.0; 4]), prop::collection::vec(0.0..50.0_f64, 4)];
     let pulley = (1e-5..2e-4_f64, dry(2e-3, 0.02)).prop_map(|(inertia, friction)| Pulley { inertia, friction });
     (any::<bool>(), motor(), 0.005..0.03_f64, pulley, slide(0.8), slide(0.4), stiffness(), damping).prop_map(
         |(core, motor, pulley_radius, drive_pulley, bridge, cart, mut stiffness, mut damping)| {
-            let routing = if core { Routing::CoreXy } else { Routing::HFrame };
-            stiffness.truncate(routing.spans().len());
-            damping.truncate(routing.spans().len());
-            Gantry {
-                routing,
-                motors: [motor; 2],
-                amplifiers: [Amplifier::ideal(AmplifierMode::Voltage, 1.0); 2],
+            let kind = if core { Kind::CoreXy } else { Kind::HFrame };
+            stiffness.truncate(kind.geometry().spans.len());
+            damping.truncate(kind.geometry().spans.len());
+            let (stiffness, damping): (Spans, Spans) = (stiffness.into_iter().collect(), damping.into_iter().collect());
+            Machine {
+                kind,
+                drives: vec![DriveUnit { motor, amplifier: Amplifier::ideal(AmplifierMode::Voltage, 1.0) }; 2],
                 pulley_radius,
                 drive_pulley,
-                bridge,
+                idler_pulley: Pulley { inertia: 0.0, friction: Friction::default() },
+                bridge: Some(bridge),
                 cart,
-                belts: Belts {
-                    stiffness,
-                    damping,
-                    pretension: None,
-                    make: None,
-                    follows: None,
-                    sheet: BeltSheet::default(),
-                },
+                belt: Belt::given(stiffness, damping),
                 encoder: None,
+                scale: None,
             }
         },
     )
@@ -112,7 +106,7 @@ fn inputs() -> impl Strategy<Value = [Signal; 2]> {
     (pulse(), pulse()).prop_map(|(left, right)| [left, right])
 }
 
-fn follow(gantry: &Gantry, inputs: &[Signal; 2]) -> Run {
+fn follow(gantry: &Machine, inputs: &[Signal; 2]) -> Run {
     let mechanism = gantry.mechanism();
     let course = Course { inputs: inputs.to_vec(), start: State::default(), until: 0.15, every: 1e-3 };
     let mut rows = Trajectory::default();
@@ -148,7 +142,7 @@ proptest! {
     #[test]
     fn belts_are_closed(gantry in gantry(), x in -0.3..0.3_f64, y in -0.3..0.3_f64) {
         let mechanism = gantry.mechanism();
-        let belts: &[&[usize]] = if gantry.routing == Routing::HFrame { &[&[0, 1, 2]] } else { &[&[0, 1], &[2, 3]] };
+        let belts: &[&[usize]] = if gantry.kind == Kind::HFrame { &[&[0, 1, 2]] } else { &[&[0, 1], &[2, 3]] };
         for belt in belts {
             let mut sum = [0.0; 4];
             for span in *belt {
@@ -156,10 +150,8 @@ proptest! {
             }
             prop_assert_eq!(sum, [0.0; 4]);
         }
-        let [left, right] = gantry.angles(x, y);
-        let mut state = State::default();
-        state.position[..4].copy_from_slice(&[left, right, x, y]);
-        let stiffest = gantry.belts.stiffness.iter().fold(0.0, |most: f64, k| most.max(*k));
+        let mut state = gantry.without_strain(&[x, y], &[]);
+        let stiffest = gantry.belt.stiffness.iter().fold(0.0, |most: f64, k| most.max(*k));
         prop_assert!(mechanism.energy(&state) <= stiffest * (1e-15_f64).powi(2));
         state.position[0] += 1e-3;
         prop_assert!(mechanism.energy(&state) > 0.0);
@@ -199,15 +191,15 @@ proptest! {
     #[test]
     fn left_and_right_mirror_each_other(gantry in gantry(), inputs in inputs()) {
         let mut mirrored = gantry.clone();
-        let order: &[usize] = if gantry.routing == Routing::HFrame { &[1, 0, 2] } else { &[2, 3, 0, 1] };
-        mirrored.belts.stiffness = order.iter().map(|span| gantry.belts.stiffness[*span]).collect();
-        mirrored.belts.damping = order.iter().map(|span| gantry.belts.damping[*span]).collect();
+        let order: &[usize] = if gantry.kind == Kind::HFrame { &[1, 0, 2] } else { &[2, 3, 0, 1] };
+        mirrored.belt.stiffness = order.iter().map(|span| gantry.belt.stiffness[*span]).collect();
+        mirrored.belt.damping = order.iter().map(|span| gantry.belt.damping[*span]).collect();
         // r φ₁ = −x − y and r φ₂ = x − y: the pulleys of an H-frame turn against each other, those of CoreXY alike.
-        let sign = if gantry.routing == Routing::HFrame { -1.0 } else { 1.0 };
+        let sign = if gantry.kind == Kind::HFrame { -1.0 } else { 1.0 };
         let [left, right] = &inputs;
-        let exchanged = match gantry.routing {
-            Routing::HFrame => [negative(right), negative(left)],
-            Routing::CoreXy => [right.clone(), left.clone()],
+        let exchanged = match gantry.kind {
+            Kind::HFrame => [negative(right), negative(left)],
+            Kind::Axis | Kind::CoreXy => [right.clone(), left.clone()],
         };
         let (a, b) = (follow(&gantry, &inputs), follow(&mirrored, &exchanged));
         proportional((&a, "bridge_position"), (&b, "bridge_position"), 1.0, 1e-12)?;
@@ -220,15 +212,16 @@ proptest! {
     fn scaled_machines_move_alike(gantry in gantry(), inputs in inputs()) {
         let mut large = gantry.clone();
         let scale = |value: &mut f64| *value *= 10.0;
-        for motor in &mut large.motors {
+        for motor in large.drives.iter_mut().map(|unit| &mut unit.motor) {
             scale(&mut motor.torque_constant);
             scale(&mut motor.rotor_inertia);
         }
         scale(&mut large.drive_pulley.inertia);
-        scale(&mut large.bridge.mass);
+        let bridge = large.bridge.as_mut().unwrap();
+        scale(&mut bridge.mass);
         scale(&mut large.cart.mass);
-        large.belts.stiffness.iter_mut().chain(&mut large.belts.damping).for_each(scale);
-        for friction in [&mut large.drive_pulley.friction, &mut large.bridge.friction, &mut large.cart.friction] {
+        large.belt.stiffness.iter_mut().chain(&mut large.belt.damping).for_each(scale);
+        for friction in [&mut large.drive_pulley.friction, &mut bridge.friction, &mut large.cart.friction] {
             for side in [&mut friction.forward, &mut friction.backward] {
                 [&mut side.viscous, &mut side.coulomb, &mut side.breakaway].into_iter().for_each(scale);
             }
@@ -243,10 +236,10 @@ proptest! {
     /// x and y of an H-frame are coupled through k_l − k_r alone, where nothing sticks.
     #[test]
     fn equal_spans_do_not_couple(gantry in gantry(), volts in 1.0..12.0_f64) {
-        let mut gantry = Gantry { routing: Routing::HFrame, ..gantry };
-        gantry.belts.stiffness = vec![1e5, 1e5, 6e4];
-        gantry.belts.damping = vec![3.0, 3.0, 1.0];
-        for friction in [&mut gantry.drive_pulley.friction, &mut gantry.bridge.friction, &mut gantry.cart.friction] {
+        let mut gantry = Machine { kind: Kind::HFrame, ..gantry };
+        gantry.belt.stiffness = [1e5, 1e5, 6e4].into();
+        gantry.belt.damping = [3.0, 3.0, 1.0].into();
+        for friction in [&mut gantry.drive_pulley.friction, &mut gantry.bridge.as_mut().unwrap().friction, &mut gantry.cart.friction] {
             *friction = Friction::symmetric(friction.forward.viscous, 0.0);
         }
         let step = |value: f64| Signal::Pulse { value, duration: 0.1, at: 0.0 };

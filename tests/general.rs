@@ -98,11 +98,11 @@ fn stage_of(law: Law) -> Machine {
 
 /// The same machine with a belt of 0.3 m, 0.4 m and 0.7 m whose spans follow the cart.
 fn following(law: Law) -> Machine {
-    let make = BeltMake { modulus: 8.335e9, section: 5.5626e-6, spans: [0.3, 0.4, 0.7] };
+    let make = BeltMake { modulus: 8.335e9, section: 5.5626e-6, spans: [0.3, 0.4, 0.7].into() };
     let mut machine = stage_of(law);
     machine.belt.stiffness = make.stiffness();
     (machine.belt.make, machine.belt.follows_cart) = (Some(make), true);
-    machine.travel = Some(Travel { min: -0.2, max: 0.25, stop: None });
+    machine.cart.travel = Some(Travel { min: -0.2, max: 0.25, stop: None });
     machine
 }
 
@@ -263,7 +263,7 @@ fn stribeck_as_a_plain_integration_has_it() {
             let law = Law::Stribeck { velocity: 0.05, shape };
             let machine = if follows { following(law) } else { stage_of(law) };
             let solution = run(&machine, &experiment(&pulse(), 0.4, 1e-3), Solver::General { tolerance: 1e-12 });
-            let want = plain::Plain { shape, follows, k: machine.belt.stiffness }.run(401);
+            let want = plain::Plain { shape, follows, k: machine.belt.stiffness.three() }.run(401);
             let columns = ["drive_angle", "drive_speed", "cart_position", "cart_speed", "idler_angle", "idler_speed"];
             for (j, (name, tolerance)) in columns.into_iter().zip([5e-9, 1e-5, 1e-10, 1e-7, 5e-9, 1e-5]).enumerate() {
                 let got = solution.trajectory.get(name).unwrap();
@@ -301,7 +301,7 @@ fn a_factor_along_the_travel_is_coulomb_friction_times_it() {
     let twice = experiment(&pulse(), 0.5, 1e-3);
     machine.cart.along = Polyline::new(vec![[0.0, 2.0], [0.1, 2.0]]);
     let along = run(&machine, &twice, Solver::GENERAL);
-    machine.cart = taut::machine::Cart { friction: Friction::symmetric(19.0424, 0.4), along: None, ..machine.cart };
+    machine.cart = taut::machine::Slide { friction: Friction::symmetric(19.0424, 0.4), along: None, ..machine.cart };
     let exact = run(&machine, &twice, Solver::Exact);
     assert!(apart(&machine, &along, &exact) < 1e-10);
     let friction = |s: &Solution| s.trajectory.get("cart_friction").unwrap().to_vec();
@@ -314,7 +314,7 @@ fn a_factor_along_the_travel_is_coulomb_friction_times_it() {
 #[test]
 fn bristles_hold_like_springs() {
     let mut machine = stage_of(Law::LuGre { stiffness: 1e5, damping: 190.0, velocity: 0.05 });
-    machine.amplifier.mode = taut::machine::AmplifierMode::Current;
+    machine.drives[0].amplifier.mode = taut::machine::AmplifierMode::Current;
     // 0.2 mN m of 15: far from slipping.
     let input = Signal::Pulse { value: 0.0002 / 0.023, duration: 0.5, at: 0.0 };
     let solution = run(&machine, &experiment(&input, 1.0, 1e-3), Solver::GENERAL);
@@ -332,9 +332,10 @@ fn bristles_hold_like_springs() {
 /// The exact solver once called this too many events: having left its travel, the cart left it a hundred times more.
 #[test]
 fn the_cart_ends_the_run_where_its_travel_ends() {
-    let fixed = Machine { travel: Some(Travel { min: -0.2, max: 0.05, stop: None }), ..common::table4() };
+    let mut fixed = common::table4();
+    fixed.cart.travel = Some(Travel { min: -0.2, max: 0.05, stop: None });
     let mut follows = following(Law::Coulomb);
-    follows.travel = fixed.travel;
+    follows.cart.travel = fixed.cart.travel;
     for (machine, solver) in [(&fixed, Solver::Exact), (&fixed, Solver::GENERAL), (&follows, Solver::GENERAL)] {
         let solution = simulate(machine, &experiment(&pulse(), 1.0, 1e-3), solver).unwrap();
         let Ending::LeftTravel { time } = solution.outcome.ending else { panic!("{:?}", solution.outcome.ending) };

@@ -50,12 +50,12 @@ fn set_friction(machine: &mut Machine, laws: [Friction; 3]) {
 
 /// The input at which the motor's torque on the standing drive pulley is `torque`.
 fn voltage_of(machine: &Machine, torque: f64) -> f64 {
-    torque * machine.motor.resistance / machine.motor.torque_constant
+    torque * machine.drives[0].motor.resistance / machine.drives[0].motor.torque_constant
 }
 
 /// The torque that a voltage puts on the standing drive pulley.
 fn load_at(machine: &Machine, voltage: f64) -> f64 {
-    machine.motor.torque_constant * (voltage / machine.motor.resistance)
+    machine.drives[0].motor.torque_constant * (voltage / machine.drives[0].motor.resistance)
 }
 
 // --- extreme parameters ---------------------------------------------------------------------------------------------
@@ -76,11 +76,11 @@ proptest! {
         kind in 0..3,
     ) {
         let mut machine = table4();
-        machine.belt.stiffness = stiffness;
+        machine.belt.stiffness = stiffness.into();
         machine.cart.mass = mass;
         machine.drive_pulley.inertia = inertia[0];
         machine.idler_pulley.inertia = inertia[1];
-        machine.motor.inductance = inductance;
+        machine.drives[0].motor.inductance = inductance;
         let pulley = Friction::symmetric(viscous * 1e-4, coulomb * 0.02);
         set_friction(&mut machine, [pulley, Friction::symmetric(viscous, coulomb), pulley]);
         let input = match kind {
@@ -139,7 +139,7 @@ fn breakaway_is_passed_only_above_it() {
 fn beside_each_breakaway() {
     let all = table4();
     let r = all.pulley_radius;
-    let [k1, k2, k3] = all.belt.stiffness;
+    let [k1, k2, k3] = all.belt.stiffness.three();
     for factor in [0.98, 1.0 - 1e-9, 1.0, 1.0 + 1e-9, 1.02] {
         for body in 0..BODIES {
             let mut machine = all.clone();
@@ -181,8 +181,8 @@ fn all_three_stop_at_once() {
             for direction in [1.0, -1.0] {
                 let mut machine = table4();
                 let r = machine.pulley_radius;
-                machine.motor.torque_constant = 1e-300; // no brake
-                machine.motor.back_emf_constant = 1e-300;
+                machine.drives[0].motor.torque_constant = 1e-300; // no brake
+                machine.drives[0].motor.back_emf_constant = 1e-300;
                 let (j, m) = (machine.drive_pulley.inertia, machine.cart.mass);
                 // c = a m of each, on its own axis: r a of a pulley is a J/r; b v likewise
                 let pulley = Friction::symmetric(viscous * j, deceleration * j / r);
@@ -220,8 +220,8 @@ fn all_three_stop_at_once() {
 fn no_friction_at_all() {
     let mut machine = table4();
     set_friction(&mut machine, [Friction::default(); 3]);
-    machine.motor.torque_constant = 1e-300;
-    machine.motor.back_emf_constant = 1e-300;
+    machine.drives[0].motor.torque_constant = 1e-300;
+    machine.drives[0].motor.back_emf_constant = 1e-300;
     let mut experiment = experiment(Signal::Step { value: 0.0, at: 0.0 }, 10.0);
     experiment.initial.drive_speed = 10.0;
     let solution = complete(&machine, &experiment);
@@ -251,7 +251,7 @@ fn small_inductance_is_nearly_none() {
     let mut before = None;
     for inductance in [1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-12, 1e-13] {
         let mut machine = table4();
-        machine.motor.inductance = inductance;
+        machine.drives[0].motor.inductance = inductance;
         let with = complete(&machine, &experiment(pulse(5.0), 0.5));
         let (a, b) = (with.trajectory.get("cart_position").unwrap(), without.trajectory.get("cart_position").unwrap());
         let difference = a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
@@ -278,7 +278,7 @@ struct Rigid {
 impl Rigid {
     fn of(machine: &Machine) -> Self {
         let r = machine.pulley_radius;
-        let motor = &machine.motor;
+        let motor = &machine.drives[0].motor;
         let brake = motor.torque_constant * motor.back_emf_constant / motor.resistance;
         let side = |f: &Friction| f.forward;
         let (drive, cart, idler) =
@@ -312,10 +312,10 @@ impl Rigid {
 fn a_stiff_belt_is_rigid() {
     for decade in [1e5, 1e6, 1e7, 1e8, 1e9] {
         let mut machine = table4();
-        machine.belt.stiffness = [decade, decade, 0.5 * decade];
+        machine.belt.stiffness = [decade, decade, 0.5 * decade].into();
         // Damped, so that no swing is left to stop on.
         let damping = 2.0 * 0.3 * (decade * 0.1_f64).sqrt();
-        machine.belt.damping = [damping; 3];
+        machine.belt.damping = [damping; 3].into();
         let rigid = Rigid::of(&machine);
         let solution = complete(&machine, &experiment(pulse(5.0), 0.6));
         let force = load_at(&machine, 5.0) / machine.pulley_radius;
@@ -452,9 +452,9 @@ fn no_machine_is_refused() {
     refused(|s| s.drive_pulley.inertia = -1.0);
     refused(|s| s.belt.stiffness[1] = f64::INFINITY);
     refused(|s| s.belt.damping[1] = -1.0);
-    refused(|s| s.motor.inductance = 1e-30);
-    refused(|s| s.motor.resistance = 1e-300);
-    refused(|s| s.motor.gear_efficiency = 2.0);
+    refused(|s| s.drives[0].motor.inductance = 1e-30);
+    refused(|s| s.drives[0].motor.resistance = 1e-300);
+    refused(|s| s.drives[0].motor.gear_efficiency = 2.0);
     refused(|s| s.cart.friction.forward.breakaway = 0.1);
     for (until, every) in
         [(f64::NAN, 1e-3), (1.0, f64::NAN), (f64::INFINITY, 1.0), (1.0, 0.0), (1.0, -1.0), (1.0, 1e-300)]
@@ -484,15 +484,15 @@ fn table3_that_runs_away_is_told() {
 fn a_gear_whose_torque_is_zero_but_for_rounding() {
     let side = |viscous, coulomb, breakaway| Side { viscous, coulomb, breakaway };
     let mut machine = table4();
-    machine.motor.torque_constant = 0.05208461186091644;
-    machine.motor.rotor_inertia = 7.803031526692751e-7;
-    machine.motor.gear_efficiency = 0.954513808626461;
-    machine.amplifier = Amplifier::ideal(AmplifierMode::Current, 1.0460908509847053);
+    machine.drives[0].motor.torque_constant = 0.05208461186091644;
+    machine.drives[0].motor.rotor_inertia = 7.803031526692751e-7;
+    machine.drives[0].motor.gear_efficiency = 0.954513808626461;
+    machine.drives[0].amplifier = Amplifier::ideal(AmplifierMode::Current, 1.0460908509847053);
     machine.pulley_radius = 0.005046775092618381;
     machine.drive_pulley.inertia = 0.00042132278224457344;
     machine.cart.mass = 0.4559614569640354;
     machine.idler_pulley.inertia = 0.00013362595977205803;
-    machine.belt.stiffness = [12617.547858467795, 15616.28024091606, 67333.92593411065];
+    machine.belt.stiffness = [12617.547858467795, 15616.28024091606, 67333.92593411065].into();
     let laws = [
         (
             side(0.0029053388374507983, 0.01642142650741023, 0.01642142650741023),
@@ -515,13 +515,13 @@ fn a_gear_whose_torque_is_zero_but_for_rounding() {
 #[test]
 fn a_gear_that_gives_way_and_loses_power_parts_when_it_does() {
     let mut machine = table4();
-    machine.motor.torque_constant = 0.017822451212881535;
-    machine.motor.back_emf_constant = 0.014257960970305229;
-    machine.motor.resistance = 3.705478161157106;
-    machine.amplifier.gain = 1.1422442272322024;
-    machine.motor.rotor_inertia = 1.5853980855471624e-6;
-    machine.motor.gear_efficiency = 0.5303047401379443;
-    machine.motor.gear_play =
+    machine.drives[0].motor.torque_constant = 0.017822451212881535;
+    machine.drives[0].motor.back_emf_constant = 0.014257960970305229;
+    machine.drives[0].motor.resistance = 3.705478161157106;
+    machine.drives[0].amplifier.gain = 1.1422442272322024;
+    machine.drives[0].motor.rotor_inertia = 1.5853980855471624e-6;
+    machine.drives[0].motor.gear_efficiency = 0.5303047401379443;
+    machine.drives[0].motor.gear_play =
         Some(GearPlay { backlash: 0.0040151766291686465, stiffness: 77.28461755195906, damping: 0.0 });
     machine.pulley_radius = 0.027357644336011414;
     machine.drive_pulley.inertia = 0.00017305296445412391;

@@ -155,14 +155,14 @@ proptest! {
     #[test]
     fn beyond_the_voltage_limit_is_at_the_limit(machine in sticky(), input in held(), limit in 0.2..5.0_f64) {
         let mut machine = machine;
-        machine.amplifier.mode = AmplifierMode::Voltage;
-        machine.amplifier.bandwidth = None;
-        machine.motor.inductance = 0.0;
-        machine.amplifier.voltage_limit = Some(limit);
+        machine.drives[0].amplifier.mode = AmplifierMode::Voltage;
+        machine.drives[0].amplifier.bandwidth = None;
+        machine.drives[0].motor.inductance = 0.0;
+        machine.drives[0].amplifier.voltage_limit = Some(limit);
         // The same machine without the limit, asked for no more than that.
         let mut plain = machine.clone();
-        plain.amplifier.voltage_limit = None;
-        let asked = clamped(&input, limit / machine.amplifier.gain);
+        plain.drives[0].amplifier.voltage_limit = None;
+        let asked = clamped(&input, limit / machine.drives[0].amplifier.gain);
         let until = if random::rattles(&machine) { 0.05 } else { 0.15 };
         for solver in SOLVERS {
             let (a, b) = (run(&machine, &input, until, solver), run(&plain, &asked, until, solver));
@@ -190,7 +190,7 @@ proptest! {
     #[test]
     fn bodies_break_away_with_loads_that_exist(machine in sticky(), input in held(), limit in 0.05..3.0_f64) {
         let mut machine = machine;
-        machine.amplifier.current_limit = Some(limit);
+        machine.drives[0].amplifier.current_limit = Some(limit);
         for solver in SOLVERS {
             let solution = run(&machine, &input, 0.05, solver);
             prop_assert_eq!(solution.outcome.ending, Ending::Complete);

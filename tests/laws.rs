@@ -60,7 +60,7 @@ proptest! {
     fn power_is_balanced(machine in random::machine(Dry::Any), input in random::input()) {
         let mechanism = machine.mechanism();
         // Boole's rule over eight samples; the fastest swing of these stages is resolved many times over.
-        let motor = &machine.motor;
+        let motor = &machine.drives[0].motor;
         let kn2 = motor.torque_constant * motor.back_emf_constant * motor.gear_ratio.powi(2);
         let inertia = machine.drive_pulley.inertia;
         let fastest = match motor.inductance {
@@ -70,8 +70,8 @@ proptest! {
         let every = f64::min(2e-6, 0.01 / fastest);
         let solution = run(&machine, &input, 2000.0 * every, every);
         let trajectory = &solution.trajectory;
-        let (time, gain) = (trajectory.get("time").unwrap(), machine.amplifier.gain);
-        let input_at = |row: usize| match machine.amplifier.mode {
+        let (time, gain) = (trajectory.get("time").unwrap(), machine.drives[0].amplifier.gain);
+        let input_at = |row: usize| match machine.drives[0].amplifier.mode {
             AmplifierMode::Voltage => trajectory.get("voltage").unwrap()[row] / gain,
             AmplifierMode::Current => trajectory.get("motor_current").unwrap()[row] / gain,
         };
@@ -95,7 +95,7 @@ proptest! {
         for first in (0..trajectory.len() - 9).step_by(160) {
             let last = first + 8;
             let seam = input.piece(time[first]).end;
-            if disturbed(time[first], time[last]) || (machine.motor.gear_efficiency < 1.0) || seam < time[last] + every {
+            if disturbed(time[first], time[last]) || (machine.drives[0].motor.gear_efficiency < 1.0) || seam < time[last] + every {
                 continue;
             }
             let mut integral = 0.0;
@@ -138,7 +138,7 @@ proptest! {
                 v if v < 0.0 => Contact::Low,
                 _ => Contact::Apart,
             };
-            let amplifier = &machine.amplifier;
+            let amplifier = &machine.drives[0].amplifier;
             let command = at("input").map_or(voltage, |input| amplifier.gain * input);
             let commanded = |bound| limit(command, bound);
             let (voltage_mode, current_mode) = match amplifier.mode {
@@ -149,10 +149,10 @@ proptest! {
             for (span, slack) in mode.slack.iter_mut().enumerate().take(SPANS) {
                 *slack = at(&format!("span{}_slack", span + 1)) == Some(1.0);
             }
-            if machine.motor.gear_play.is_some() {
+            if machine.drives[0].motor.gear_play.is_some() {
                 mode.contact[SPANS] = side(at("gear_state").unwrap_or(0.0));
                 // A gear with losses holds a rotor that does not turn.
-                if machine.motor.gear_efficiency < 1.0 {
+                if machine.drives[0].motor.gear_efficiency < 1.0 {
                     mode.motion[ROTOR] = motion(state.speed[ROTOR].partial_cmp(&0.0).map_or(0.0, |way| f64::from(way as i8)));
                 }
             }
@@ -174,7 +174,7 @@ proptest! {
                 );
             }
             if let (Some(0.0), Some(torque)) = (at("gear_state"), at("gear_torque"))
-                && machine.motor.gear_play.is_some_and(|play| play.backlash > 0.0)
+                && machine.drives[0].motor.gear_play.is_some_and(|play| play.backlash > 0.0)
             {
                 prop_assert!(torque == 0.0);
             }
@@ -247,9 +247,9 @@ proptest! {
         scaled.belt.stiffness.iter_mut().chain(&mut scaled.belt.damping).for_each(|k| *k *= factor);
         scaled.drive_pulley.inertia *= factor;
         scaled.idler_pulley.inertia *= factor;
-        scaled.motor.rotor_inertia *= factor;
+        scaled.drives[0].motor.rotor_inertia *= factor;
         scaled.cart.mass *= factor;
-        scaled.motor.torque_constant *= factor;
+        scaled.drives[0].motor.torque_constant *= factor;
         let (a, b) = (run(&machine, &input, 0.3, 1e-3), run(&scaled, &input, 0.3, 1e-3));
         let [length, speed] = extents(&a.trajectory);
         for name in STATES {
@@ -271,9 +271,9 @@ proptest! {
         law.backward.breakaway = law.backward.breakaway.max(law.backward.coulomb);
         // The input that a forward (or backward) load just inside breakaway needs; a lossy gear only holds more.
         let breakaway = if share > 0.0 { law.forward.breakaway } else { law.backward.breakaway };
-        let torque_per_unit = machine.motor.torque_constant * machine.motor.gear_ratio * machine.amplifier.gain;
+        let torque_per_unit = machine.drives[0].motor.torque_constant * machine.drives[0].motor.gear_ratio * machine.drives[0].amplifier.gain;
         let value = share * breakaway / torque_per_unit
-            * if machine.amplifier.mode == AmplifierMode::Voltage { machine.motor.resistance } else { 1.0 };
+            * if machine.drives[0].amplifier.mode == AmplifierMode::Voltage { machine.drives[0].motor.resistance } else { 1.0 };
         let solution = run(&machine, &Signal::Step { value, at: 0.0 }, until, until / 50.0);
         prop_assert!(solution.outcome.events.is_empty(), "{:?}", solution.outcome.events);
         for name in STATES {
@@ -286,7 +286,7 @@ proptest! {
     fn energy_decays_by_itself(machine in random::machine(Dry::Any), speeds in [-20.0..20.0_f64, -0.4..0.4, -20.0..20.0], offset in -1e-4..1e-4_f64) {
         // A motor whose two constants differ is no passive machine.
         let mut machine = machine;
-        machine.motor.back_emf_constant = machine.motor.torque_constant;
+        machine.drives[0].motor.back_emf_constant = machine.drives[0].motor.torque_constant;
         let mechanism = machine.mechanism();
         let initial = Initial {
             drive_speed: speeds[0],

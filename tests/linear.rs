@@ -125,7 +125,7 @@ proptest! {
     /// A stage without a source of energy does not grow: the motor gives no more than it takes only with K_t = K_e.
     #[test]
     fn poles_of_a_passive_stage_do_not_grow(mut machine in equipped(Dry::Any)) {
-        machine.motor.back_emf_constant = machine.motor.torque_constant;
+        machine.drives[0].motor.back_emf_constant = machine.drives[0].motor.torque_constant;
         for operation in [Operation::default(), Operation { speed: -0.1, ..Operation::default() }] {
             let poles = StateSpace::of(&machine, operation).unwrap().poles().unwrap();
             let largest = poles.iter().map(|p| p.norm()).fold(0.0, f64::max);
@@ -141,7 +141,7 @@ proptest! {
         let held = StateSpace::of(&machine, held).unwrap().poles().unwrap();
         let zeros = free.zeros(free.output("drive_angle").unwrap()).unwrap().unwrap().values;
         // With an inductance the current goes on by itself while the pulley is held: −R/L, no zero.
-        let electrical = Complex::new(-machine.motor.resistance / machine.motor.inductance, 0.0);
+        let electrical = Complex::new(-machine.drives[0].motor.resistance / machine.drives[0].motor.inductance, 0.0);
         let of_motion: Vec<_> = held.iter().copied().filter(|p| (p - electrical).norm() > 1e-6 * p.norm()).collect();
         prop_assert!(apart(&of_motion, &zeros) < 1e-9, "{of_motion:?} {zeros:?}");
     }
@@ -173,7 +173,7 @@ proptest! {
             (law.backward, law.forward.coulomb, law.forward.breakaway) = (law.forward, 0.0, 0.0);
             law.backward = law.forward;
         }
-        machine.motor.gear_efficiency = 1.0;
+        machine.drives[0].motor.gear_efficiency = 1.0;
         let (period, late) = (1e-3, (late * 4.0).round() / 4.0);
         let system = StateSpace::of(&machine, Operation::default()).unwrap();
         let model = system.discrete(period, Hold::Zero, late * period).unwrap();
@@ -233,7 +233,7 @@ fn bristles_slide_like_the_curve_and_hold_like_a_spring() {
         assert!(zero == 0 && none == 0 && (a / b - 1.0).abs() < 1e-9, "{speed}: {a} {b}");
     }
     let rest = Operation { speed: 0.0, held: [true, false, true], ..Operation::default() };
-    let [k1, k2, _] = bristles.belt.stiffness;
+    let [k1, k2, _] = bristles.belt.stiffness.three();
     let swing = StateSpace::of(&bristles, rest).unwrap().poles().unwrap().pop().unwrap().norm_sqr();
     assert!((swing / ((k1 + k2 + 1e5) / bristles.cart.mass) - 1.0).abs() < 1e-12, "{swing}");
 }
@@ -243,7 +243,7 @@ fn bristles_slide_like_the_curve_and_hold_like_a_spring() {
 fn two_masses_by_hand() {
     let mut machine = undamped(&table2());
     machine.belt.model = BeltModel::TwoMass;
-    let [k1, k2, k3] = machine.belt.stiffness;
+    let [k1, k2, k3] = machine.belt.stiffness.three();
     let k = k1 + k2 * k3 / (k2 + k3);
     let r2 = machine.pulley_radius.powi(2);
     let pulleys = (machine.drive_pulley.inertia + machine.idler_pulley.inertia) / r2;
@@ -257,7 +257,7 @@ fn two_masses_by_hand() {
 /// k = A E / l with the length that is left of a span.
 #[test]
 fn spans_that_follow_the_cart() {
-    let make = BeltMake { modulus: 4e9, section: 4e-6, spans: [0.4, 0.4, 0.8] };
+    let make = BeltMake { modulus: 4e9, section: 4e-6, spans: [0.4, 0.4, 0.8].into() };
     let belt = Belt { make: Some(make), follows_cart: true, ..Belt::given(make.stiffness(), [0.0; 3]) };
     let machine = Machine { belt, ..table2() };
     assert_eq!(places(&table2(), 5), None);
@@ -376,10 +376,10 @@ fn a_question_whose_numbers_are_none_is_refused() {
 #[test]
 fn natural_modes_have_the_poles_of_the_state_space() {
     let mut geared = table2();
-    geared.motor.gear_ratio = 3.0;
-    geared.motor.gear_efficiency = 0.8;
-    geared.motor.rotor_inertia = 4e-6;
-    geared.belt.damping = [3.0, 4.0, 5.0];
+    geared.drives[0].motor.gear_ratio = 3.0;
+    geared.drives[0].motor.gear_efficiency = 0.8;
+    geared.drives[0].motor.rotor_inertia = 4e-6;
+    geared.belt.damping = [3.0, 4.0, 5.0].into();
     for machine in [table4(), geared] {
         let natural = Natural::of(&machine.mechanism(), &[0.0; 6]).unwrap();
         let system = StateSpace::of(&machine, Operation::default()).unwrap();
@@ -398,7 +398,7 @@ fn natural_modes_have_the_poles_of_the_state_space() {
         }
         let bare = StateSpace::of(&undamped(&machine), Operation::default()).unwrap().poles().unwrap();
         let hertz = Root::of(&bare).into_iter().filter_map(Root::hertz);
-        if machine.motor.gear_efficiency == 1.0 {
+        if machine.drives[0].motor.gear_efficiency == 1.0 {
             for (mode, want) in natural.elastic.iter().zip(hertz) {
                 assert!((mode.hertz() / want - 1.0).abs() < 1e-9);
             }

@@ -164,7 +164,7 @@ fn csv_in_many_dialects() {
         r#"log = { file = "log.csv", time = "time (ms)", input = "u [mV]", drive_angle = "enc", drive_speed = "speed_rpm", units = { drive_angle = "count", drive_speed = "rpm" }, scale = { drive_angle = -1 }, offset = { drive_angle = "90 deg" } }"#,
     );
     let log = case.experiments[0].log.as_ref().unwrap();
-    let counts = case.machine.encoder.unwrap().counts_per_unit(case.machine.motor.gear_ratio);
+    let counts = case.machine.encoder.unwrap().counts_per_unit(case.machine.drives[0].motor.gear_ratio);
     let angle = output(log, Quantity::DriveAngle);
     assert!((log.time[1] - 0.01).abs() < 1e-15 && log.input == [5.0, 5.0, 0.0]);
     assert_eq!(angle[0], std::f64::consts::FRAC_PI_2);

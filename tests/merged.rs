@@ -158,7 +158,7 @@ impl Written {
         let r = machine.pulley_radius;
         let member = |friction: Friction, ratio: f64| Member { friction, ratio, along: None };
         let cart = Member { along: machine.cart.along.clone(), ..member(machine.cart.friction, 1.0) };
-        let motor = &machine.motor;
+        let motor = &machine.drives[0].motor;
         let n = motor.gear_ratio;
         let pulleys = machine.drive_pulley.inertia + machine.idler_pulley.inertia;
         let whole = |lever: f64| {
@@ -375,7 +375,7 @@ fn merged() -> impl Strategy<Value = Machine> {
             machine.cart.mass = mass;
             machine.belt.model = if rigid { BeltModel::Rigid } else { BeltModel::TwoMass };
             machine.cart.along = along.and_then(|(a, b)| Polyline::new(vec![[-0.02, a], [0.0, 1.0], [0.03, b]]));
-            machine.motor.gear_efficiency = gear;
+            machine.drives[0].motor.gear_efficiency = gear;
             machine
         },
     )
@@ -421,7 +421,7 @@ proptest! {
     fn power_is_balanced(machine in merged(), input in square()) {
         let mut machine = machine;
         machine.belt.model = BeltModel::Rigid;
-        machine.motor.gear_efficiency = 1.0;
+        machine.drives[0].motor.gear_efficiency = 1.0;
         let experiment = Experiment {
             name: "power".into(),
             input: input.clone(),
@@ -432,7 +432,7 @@ proptest! {
         };
         let solution = simulate(&machine, &experiment, Solver::General { tolerance: 1e-10 }).unwrap();
         let [current, speed, friction] = ["motor_current", "cart_speed", "cart_friction"].map(|name| column(&solution, name));
-        let (r, motor) = (machine.pulley_radius, &machine.motor);
+        let (r, motor) = (machine.pulley_radius, &machine.drives[0].motor);
         let mass = machine.cart.mass + (machine.drive_pulley.inertia + machine.idler_pulley.inertia) / (r * r);
         let power = |row: usize| (motor.gear_ratio * motor.torque_constant / r * current[row] - friction[row]) * speed[row];
         let (mut work, mut moved) = (0.0, 0.0);
@@ -471,9 +471,9 @@ fn a_stiff_belt_tends_to_a_rigid_one() {
     assert!(column(&limit, "cart_state").contains(&0.0) && column(&limit, "cart_state").contains(&1.0));
     let off = [1e5, 1e6, 1e7].map(|k| {
         let mut machine = of_all_kinds();
-        machine.belt.stiffness = [k; 3];
+        machine.belt.stiffness = [k; 3].into();
         // As well damped at any stiffness
-        machine.belt.damping = [0.15 * k.sqrt(); 3];
+        machine.belt.damping = [0.15 * k.sqrt(); 3].into();
         apart(&limit, &run(&machine, &input, 0.2, 1e-10), "cart_position")
     });
     println!("{off:?}");
@@ -524,7 +524,7 @@ fn bristles_of_bodies_made_one_are_states_of_their_own() {
     rigid.belt.model = BeltModel::Rigid;
     let rigid = StateSpace::of(&rigid, Operation::default()).unwrap();
     assert_eq!(rigid.states.iter().filter(|state| state.name.ends_with("bristle")).count(), 2);
-    machine.belt.stiffness = [1e9; 3];
+    machine.belt.stiffness = [1e9; 3].into();
     let stiff = StateSpace::of(&machine, Operation::default()).unwrap();
     let (rigid, stiff) = (rigid.poles().unwrap(), stiff.poles().unwrap());
     for pole in rigid {

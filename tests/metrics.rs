@@ -187,7 +187,7 @@ fn the_balance_by_hand() {
     assert_eq!(balanced_speed(&machine, 0.0, 0.0), Balance::At(0.0));
 
     let mut machine = table1();
-    machine.amplifier.mode = AmplifierMode::Current;
+    machine.drives[0].amplifier.mode = AmplifierMode::Current;
     machine.drive_pulley.friction = Friction::default();
     machine.idler_pulley.friction = Friction::default();
     let speed = 0.0194 * 0.023 * 2.0 / (40.6518 * 0.0194 * 0.0194);
@@ -293,9 +293,9 @@ fn table3_does_not_stop() {
 #[test]
 fn a_spinning_rotor_behind_play_is_not_settled() {
     let mut machine = table4();
-    machine.motor.rotor_inertia = 2e-6;
+    machine.drives[0].motor.rotor_inertia = 2e-6;
     // Half a turn of play: the rotor turns freely in it.
-    machine.motor.gear_play = Some(GearPlay { backlash: 3.0, stiffness: 50.0, damping: 0.01 });
+    machine.drives[0].motor.gear_play = Some(GearPlay { backlash: 3.0, stiffness: 50.0, damping: 0.01 });
     // Pushed off for 20 ms, it coasts against its own back-EMF and has not arrived at the flank yet.
     let input = Signal::Pulse { value: 0.3, duration: 0.02, at: 0.0 };
     let (spinning, metrics) = run(&machine, input.clone(), 0.03);
@@ -319,8 +319,8 @@ fn a_spinning_rotor_behind_play_is_not_settled() {
 #[test]
 fn both_solvers_have_the_same_metrics() {
     let mut machine = table4();
-    machine.motor.inductance = 5e-4;
-    machine.amplifier.voltage_limit = Some(4.0);
+    machine.drives[0].motor.inductance = 5e-4;
+    machine.drives[0].amplifier.voltage_limit = Some(4.0);
     let input = Signal::sequence(vec![
         Slot { signal: Signal::Sine { amplitude: 5.0, frequency: 7.0, phase: 0.3, offset: 0.5 }, lasts: 0.3 },
         Slot { signal: Signal::Step { value: -3.0, at: 0.0 }, lasts: f64::INFINITY },
@@ -366,9 +366,9 @@ fn a_peak_between_rows_was_missed() {
         )
     };
     let mut machine = machine;
-    machine.motor.torque_constant = 0.03369331371314996;
-    machine.motor.back_emf_constant = 0.019990956069626295;
-    machine.motor.resistance = 0.7433128634257781;
+    machine.drives[0].motor.torque_constant = 0.03369331371314996;
+    machine.drives[0].motor.back_emf_constant = 0.019990956069626295;
+    machine.drives[0].motor.resistance = 0.7433128634257781;
     machine.idler_pulley.inertia = 4.2653608154370274e-5;
     machine.idler_pulley.friction = Friction::symmetric(0.0023822508314399362, 0.01711309278367658);
     machine.cart.mass = 0.5371313945176149;
@@ -398,7 +398,7 @@ fn the_time_of_a_plateaus_peak_depended_on_the_output_interval() {
         }
     }
     // The current that the voltage asks for is beyond its limit while the machine speeds up.
-    machine.amplifier.current_limit = Some(2.0);
+    machine.drives[0].amplifier.current_limit = Some(2.0);
     let (_, known) = every(&machine, &pulse(1.0), 1.5, 1e-3, Solver::Exact);
     assert!(known.peak_current.value == 2.0, "{:?}", known.peak_current);
     for rows in [1e-2, 0.37e-3, 2e-5] {

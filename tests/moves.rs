@@ -43,7 +43,7 @@ fn integrals_are_those_of_a_dense_quadrature() {
     for (name, limit) in [("pid-elastic", None), ("cascade", None), ("pid", Some("limit"))] {
         let changes: &[&str] = if limit.is_some() { &["controller.limit=5 V"] } else { &[] };
         let case = case(name, changes);
-        let (motor, motion) = (case.machine.motor, &case.moves[0]);
+        let (motor, motion) = (case.machine.drives[0].motor, &case.moves[0]);
         let h = 1e-5;
         let (run, rows) = moved(&case, motion, h);
         let get = |name: &str| rows.get(name).unwrap();

@@ -2,10 +2,10 @@
 
 use std::path::PathBuf;
 use std::sync::LazyLock;
-use taut::case::{Case, Given, Opened};
+use taut::case::{Case, GantryCase, Given, Opened, TEMPLATE, gantry_template};
 use taut::fit::Problem;
-use taut::machine::Machine;
-use taut::parameter::{self, Field, Free, Off, Parameter, all, every, free_markdown, kinds, named, values};
+use taut::machine::{Kind, Machine};
+use taut::parameter::{self, Field, Free, Off, Parameter, Sits, all, every, free_markdown, kinds, named, values};
 use taut::sweep::Sweep;
 
 /// A machine with all parts that go together. Numbers are sums of few powers of two, so that twice or a quarter of them
@@ -327,6 +327,9 @@ fn named_kind(key: &str) -> &'static str {
 /// Keys that other rows name are there, and friction is tied alike on all bodies.
 #[test]
 fn the_table_is_of_one_piece() {
+    let axis = Case::from_text("axis.toml", TEMPLATE).unwrap().machine;
+    let text = gantry_template(Kind::CoreXy);
+    let gantry = GantryCase::from_text_with("gantry.toml", &text, &[]).unwrap().gantry;
     let row = |key: &str| -> &'static Parameter { parameter::find(key).unwrap_or_else(|| panic!("no row {key}")) };
     for parameter in all() {
         for key in parameter.follows {
@@ -337,17 +340,13 @@ fn the_table_is_of_one_piece() {
             Field::Elsewhere => assert!(parameter.part.is_none(), "{}", parameter.key),
             Field::Machine(_) => {}
         }
-        match parameter.gantry {
-            Field::Form(of, _) | Field::PartOf(of) => assert!(matches!(row(of).gantry, Field::Machine(_)), "{of}"),
-            Field::Elsewhere | Field::Machine(_) => {}
-        }
-        let places = [matches!(parameter.field, Field::Elsewhere), matches!(parameter.gantry, Field::Elsewhere)];
-        assert!(parameter.off == Off::No || places != [true; 2], "{}", parameter.key);
+        let is_elsewhere = matches!(parameter.field, Field::Elsewhere);
+        assert!(parameter.off == Off::No || !is_elsewhere, "{}", parameter.key);
         // What only data sheets say: a machine keeps what follows from it, or nothing but what is told of it.
         let sheets =
             ["motor.speed_constant", "motor.rated.", "belt.width", "belt.mass_per_length", "belt.allowed_tension"];
         if sheets.iter().any(|key| parameter.key.starts_with(key)) {
-            assert_eq!(places, [true; 2], "{}", parameter.key);
+            assert!(is_elsewhere, "{}", parameter.key);
             continue;
         }
         let machine = [
@@ -363,11 +362,11 @@ fn the_table_is_of_one_piece() {
             "scale.",
         ];
         let is_machine = machine.iter().any(|table| parameter.key.starts_with(table));
-        assert_eq!(is_machine, !places[0], "{}", parameter.key);
+        assert_eq!(is_machine, axis.sits(parameter) != Sits::Elsewhere, "{}", parameter.key);
         // The cart of a gantry has the rows of its bridge.
-        let gantry = ["motor.", "amplifier.", "drive_pulley.", "bridge.", "belt.", "encoder."];
-        let is_gantry = gantry.iter().any(|table| parameter.key.starts_with(table));
-        assert_eq!(is_gantry, !places[1], "{}", parameter.key);
+        let tables = ["motor.", "amplifier.", "drive_pulley.", "bridge.", "belt.", "encoder."];
+        let is_gantry = tables.iter().any(|table| parameter.key.starts_with(table));
+        assert_eq!(is_gantry, gantry.sits(parameter) != Sits::Elsewhere, "{}", parameter.key);
     }
     assert!(free_markdown().contains("| `cart.friction.static` | axis | yes | cart's dry friction | `coulomb` |"));
 }
@@ -435,7 +434,7 @@ fn numbers_out_of_their_ranges_are_refused_by_their_keys() {
         }
     }
     let mut stage = Case::from_text("axis.toml", taut::case::TEMPLATE).unwrap().machine;
-    stage.motor.resistance = -1.0;
+    stage.drives[0].motor.resistance = -1.0;
     let error = parameter::check(&stage).unwrap_err().to_string();
     assert_eq!(error, "motor.resistance cannot be -1 ohm\n  allowed: from 1e-15 ohm to 1e15 ohm");
 }

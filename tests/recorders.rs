@@ -80,7 +80,7 @@ fn reprapfirmware(stage: &Machine, run: &Trajectory, end: &str) -> String {
          Phase Shift,Phase Current A,Phase Current B,Phase Current C,Current D,Current Q,Voltage D,Voltage Q\n",
     );
     for k in 0..run.len() {
-        let steps = column("drive_angle")[k] * stage.motor.gear_ratio * 400.0 / TAU;
+        let steps = column("drive_angle")[k] * stage.drives[0].motor.gear_ratio * 400.0 / TAU;
         let [t, u, i] = ["time", "voltage", "motor_current"].map(|name| column(name)[k]);
         let _ = writeln!(
             text,
@@ -138,7 +138,7 @@ fn klipper(stage: &Machine, run: &Trajectory, acceleration: &[f64]) -> Vec<u8> {
     let begin = 100.0;
     for rows in (0..run.len()).collect::<Vec<_>>().chunks(50) {
         let counts = |k: &usize| {
-            let turns = column("drive_angle")[*k] * stage.motor.gear_ratio / TAU;
+            let turns = column("drive_angle")[*k] * stage.drives[0].motor.gear_ratio / TAU;
             format!("[{:.6},{}]", begin + column("time")[*k], (turns * 65536.0).round())
         };
         let rates = |k: &usize| format!("[{:.6},{:.3},0,9806.65]", begin + column("time")[*k], 1e3 * acceleration[*k]);

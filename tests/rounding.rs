@@ -50,7 +50,7 @@ fn bodies(events: &[Event]) -> Vec<(usize, i8, i8)> {
 #[test]
 fn a_start_far_from_the_origin_cost_accuracy() {
     let mut machine = table4();
-    machine.belt.stiffness = [1e8, 1e8, 5e7];
+    machine.belt.stiffness = [1e8, 1e8, 5e7].into();
     machine.cart.mass = 1e-3;
     let input = Signal::Pulse { value: 2.0, duration: 0.05, at: 0.0 };
     let near = complete(&machine, &from(0.0, &machine, input.clone(), 0.2), Solver::Exact);
@@ -70,7 +70,7 @@ fn a_start_far_from_the_origin_cost_accuracy() {
 fn stiff_belts_lost_accuracy_far_from_the_origin() {
     for stiffness in [1e11, 1e13] {
         let mut machine = table4();
-        machine.belt.stiffness = [stiffness, stiffness, 0.5 * stiffness];
+        machine.belt.stiffness = [stiffness, stiffness, 0.5 * stiffness].into();
         let mut rigid = machine.clone();
         rigid.belt.model = taut::machine::BeltModel::Rigid;
         let input = Signal::Pulse { value: 10.0, duration: 0.25, at: 0.0 };
@@ -89,7 +89,7 @@ fn stiff_belts_lost_accuracy_far_from_the_origin() {
 #[test]
 fn what_rounding_hides_is_told() {
     let mut machine = table4();
-    machine.belt.stiffness = [1e15, 1e15, 1e15];
+    machine.belt.stiffness = [1e15, 1e15, 1e15].into();
     machine.cart.mass = 1e-9;
     machine.drive_pulley.inertia = 1e-13;
     machine.idler_pulley.inertia = 1e-13;
@@ -148,10 +148,10 @@ fn the_error_of_the_general_solver_was_stated_for_all() {
 fn geared() -> Machine {
     let mut machine = table4();
     machine.pulley_radius = 0.02;
-    machine.motor.gear_efficiency = 0.94;
-    machine.motor.gear_ratio = 3.0;
-    machine.motor.rotor_inertia = 5e-6;
-    machine.motor.inductance = 1e-3;
+    machine.drives[0].motor.gear_efficiency = 0.94;
+    machine.drives[0].motor.gear_ratio = 3.0;
+    machine.drives[0].motor.rotor_inertia = 5e-6;
+    machine.drives[0].motor.inductance = 1e-3;
     machine.drive_pulley.friction = Friction::symmetric(1e-3, 0.0);
     machine.cart.friction = Friction::with_breakaway(10.0, 0.3, 0.5);
     machine.idler_pulley.friction = Friction::symmetric(1e-3, 0.002);
@@ -220,11 +220,11 @@ fn a_stop_that_rounding_decides_is_marked() {
 #[test]
 fn a_load_at_breakaway_but_for_rounding_broke_it_at_time_zero() {
     let mut machine = table4();
-    machine.amplifier = Amplifier::ideal(AmplifierMode::Voltage, 1.0);
+    machine.drives[0].amplifier = Amplifier::ideal(AmplifierMode::Voltage, 1.0);
     for k in 0..200 {
         let breakaway = 0.01 + 0.0013 * f64::from(k);
         machine.drive_pulley.friction = Friction::with_breakaway(1e-3, 0.5 * breakaway, breakaway);
-        let at = breakaway * machine.motor.resistance / machine.motor.torque_constant;
+        let at = breakaway * machine.drives[0].motor.resistance / machine.drives[0].motor.torque_constant;
         for value in [at, at * (1.0 + 2.0 * f64::EPSILON), at * (1.0 - 2.0 * f64::EPSILON)] {
             let solution = complete(&machine, &experiment(Signal::Step { value, at: 0.0 }, 0.01, 1e-3), Solver::Exact);
             assert!(solution.outcome.events.is_empty(), "{value} V: {:?}", solution.outcome.events);
@@ -273,8 +273,8 @@ fn a_run_that_would_not_end_is_told_and_can_be_stopped() {
     }
     // Whoever asks it to stop is heard before the first row is full.
     let mut machine = table4();
-    machine.belt.stiffness = [1e13, 1e13, 1e13];
-    machine.motor.back_emf_constant = 1e3;
+    machine.belt.stiffness = [1e13, 1e13, 1e13].into();
+    machine.drives[0].motor.back_emf_constant = 1e3;
     let mut asked = 0;
     let sine = Signal::Sine { amplitude: 5.0, frequency: 3.0, phase: 0.0, offset: 0.0 };
     let long = self::experiment(sine, 100.0, 10.0);

@@ -154,7 +154,7 @@ fn setup(dry: Dry) -> impl Strategy<Value = Setup> {
                 time += wait;
             }
             // Within the stops.
-            let position = match &machine.travel {
+            let position = match &machine.cart.travel {
                 Some(travel) => 0.5 * position.clamp(travel.min, travel.max),
                 None => position,
             };

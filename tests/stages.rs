@@ -81,7 +81,9 @@ fn curve_of_gantry(path: &Path, case: &GantryCase) -> String {
         for kept in 0..=KEPT {
             let row = (rows.len() - 1) * kept / KEPT;
             let at = |name: &str| rows.get(name).unwrap()[row];
-            let [x, y] = case.gantry.place([at("left_angle"), at("right_angle")]).map(|way| way + 0.0);
+            let angles = [at("left_angle"), at("right_angle"), 0.0, 0.0, 0.0, 0.0];
+            let places: [f64; 2] = case.gantry.by_drives(&angles).try_into().unwrap();
+            let [x, y] = places.map(|way| way + 0.0);
             let (time, bridge, cart) = (at("time"), at("bridge_position"), at("cart_position"));
             let file = path.file_name().unwrap().to_string_lossy();
             let _ = writeln!(text, "{file},{},{time},{x:e},{y:e},{bridge:e},{cart:e}", experiment.name);

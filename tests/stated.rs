@@ -60,11 +60,11 @@ fn curved() -> impl Strategy<Value = Machine> {
         put(&mut stage.cart.friction, laws.1);
         put(&mut stage.idler_pulley.friction, laws.2);
         if let Some((l1, l2)) = follows.filter(|_| stage.belt.model == BeltModel::Elastic) {
-            let make = BeltMake { modulus: 8.335e9, section: 2e-6, spans: [l1, l2, l1 + l2] };
+            let make = BeltMake { modulus: 8.335e9, section: 2e-6, spans: [l1, l2, l1 + l2].into() };
             (stage.belt.make, stage.belt.follows_cart) = (Some(make), true);
             stage.belt.stiffness = make.stiffness();
-            let stop = stage.travel.and_then(|travel| travel.stop);
-            stage.travel = Some(Travel { min: -0.9 * l2, max: 0.9 * l1, stop });
+            let stop = stage.cart.travel.and_then(|travel| travel.stop);
+            stage.cart.travel = Some(Travel { min: -0.9 * l2, max: 0.9 * l1, stop });
         }
         if let Some((a, b, c)) = along {
             stage.cart.along = Polyline::new(vec![[-0.05, a], [0.0, 1.0], [0.01, b], [0.08, c]]);
@@ -397,14 +397,14 @@ type State = [f64; 6];
 
 impl Plain<'_> {
     fn loads(&self, y: &State, u: f64) -> [f64; 3] {
-        let (stage, motor, r) = (self.stage, &self.stage.motor, self.stage.pulley_radius);
+        let (stage, motor, r) = (self.stage, &self.stage.drives[0].motor, self.stage.pulley_radius);
         let force =
             |span: usize, long: f64, fast: f64| stage.belt.stiffness[span] * long + stage.belt.damping[span] * fast;
         let f1 = force(0, r * y[0] - y[2], r * y[1] - y[3]);
         let f2 = force(1, y[2] - r * y[4], y[3] - r * y[5]);
         let f3 = force(2, r * (y[4] - y[0]), r * (y[5] - y[1]));
         let n = motor.gear_ratio;
-        let voltage = stage.amplifier.gain * u - motor.back_emf_constant * n * y[1];
+        let voltage = stage.drives[0].amplifier.gain * u - motor.back_emf_constant * n * y[1];
         [n * motor.torque_constant * voltage / motor.resistance - r * f1 + r * f3, f1 - f2, r * f2 - r * f3]
     }
 
@@ -414,7 +414,7 @@ impl Plain<'_> {
 
     fn rate(&self, y: &State, u: f64, mode: &[f64; 3]) -> State {
         let (stage, load) = (self.stage, self.loads(y, u));
-        let rotor = stage.motor.rotor_inertia * stage.motor.gear_ratio.powi(2);
+        let rotor = stage.drives[0].motor.rotor_inertia * stage.drives[0].motor.gear_ratio.powi(2);
         let inertia = [stage.drive_pulley.inertia + rotor, stage.cart.mass, stage.idler_pulley.inertia];
         let mut rate = [0.0; 6];
         for body in (0..3).filter(|body| mode[*body] != 0.0) {
@@ -502,8 +502,9 @@ fn stribeck() -> impl Strategy<Value = Machine> {
         })
     };
     (random::machine(Dry::Any), law(0.01), law(1.0), law(0.01)).prop_map(|(mut stage, drive, cart, idler)| {
-        (stage.motor.inductance, stage.motor.gear_efficiency) = (0.0, 1.0);
-        stage.amplifier = taut::machine::Amplifier::ideal(taut::machine::AmplifierMode::Voltage, stage.amplifier.gain);
+        (stage.drives[0].motor.inductance, stage.drives[0].motor.gear_efficiency) = (0.0, 1.0);
+        stage.drives[0].amplifier =
+            taut::machine::Amplifier::ideal(taut::machine::AmplifierMode::Voltage, stage.drives[0].amplifier.gain);
         stage.drive_pulley.friction.law = drive;
         stage.cart.friction.law = cart;
         stage.idler_pulley.friction.law = idler;

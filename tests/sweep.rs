@@ -103,10 +103,10 @@ fn one_at_a_time_leaves_all_others_as_they_are() {
     let nominal = common::table4();
     assert_eq!(machine(&sweep, 0), nominal);
     let mut doubled = nominal.clone();
-    doubled.motor.torque_constant *= 2.0;
+    doubled.drives[0].motor.torque_constant *= 2.0;
     assert_eq!(machine(&sweep, 1), doubled);
     let mut halved = nominal;
-    halved.motor.torque_constant *= 0.5;
+    halved.drives[0].motor.torque_constant *= 0.5;
     assert_eq!(machine(&sweep, 2), halved);
 }
 

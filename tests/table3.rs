@@ -36,7 +36,7 @@ fn error(machine: &Machine, experiment: &Experiment, method: Method, step: f64) 
 fn the_formulas_have_their_order() {
     let ramp = experiment(Signal::Ramp { value: 20.0, over: 0.02, at: 0.0 }, 0.02);
     let mut slow = common::table2();
-    slow.motor.inductance = 1e-3;
+    slow.drives[0].motor.inductance = 1e-3;
     for machine in [common::table2(), slow] {
         for (method, order) in [(Method::RungeKutta4, 4), (Method::DormandPrince5, 5)] {
             let [coarse, middle, fine] = [2e-4, 1e-4, 5e-5].map(|step| error(&machine, &ramp, method, step));
@@ -102,8 +102,8 @@ fn what_the_table_does_not_know_is_refused() {
         *friction = Friction::sided(side, friction.backward);
     };
     assert!(told(&|machine| breakaway(&mut machine.cart.friction)).contains("does not know the friction of the cart"));
-    assert!(told(&|machine| machine.motor.gear_efficiency = 0.9).contains("gear efficiency below 1"));
-    assert!(told(&|machine| machine.amplifier.voltage_limit = Some(3.0)).contains("Table 3 does not know"));
+    assert!(told(&|machine| machine.drives[0].motor.gear_efficiency = 0.9).contains("gear efficiency below 1"));
+    assert!(told(&|machine| machine.drives[0].amplifier.voltage_limit = Some(3.0)).contains("Table 3 does not know"));
 }
 
 /// A step too long for the belt's swing: that the state is none of a machine is told at the first row where it is.

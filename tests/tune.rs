@@ -404,7 +404,7 @@ fn what_is_one_number_by_nature_varies_as_one() {
     let mut masses = Vec::new();
     for corner in &family.machines {
         let stage = family.stage_at(corner);
-        let motor = &stage.motor;
+        let motor = &stage.drives[0].motor;
         assert!((motor.torque_constant / motor.back_emf_constant - 1.0).abs() < 1e-12, "{motor:?}");
         assert!((stage.drive_pulley.inertia / stage.idler_pulley.inertia - 1.0).abs() < 1e-12);
         masses.push(stage.cart.mass / 0.362);

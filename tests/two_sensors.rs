@@ -45,7 +45,7 @@ fn a_scale_takes_away_the_stretch_that_the_motor_does_not_see() {
     let one = case("controllers/cascade", &[load, smooth, fine, "controller.feed_forward={ model = \"elastic\" }"]);
     assert!(reads_scale(both.controller.as_ref().unwrap(), &both.machine) && one.machine.scale.is_none());
     // f = k₁ (y₁ − x) + k₂ k₃/(k₂ + k₃) (y₁ − x) = 8 N
-    let [k1, k2, k3] = one.machine.belt.stiffness;
+    let [k1, k2, k3] = one.machine.belt.stiffness.three();
     let stretch = 8.0 / (k1 + k2 * k3 / (k2 + k3));
     let [with, without] = [&both, &one].map(|case| run(case, 3.0).figures.final_cart_error);
     assert!((without.abs() / stretch - 1.0).abs() < 0.15, "{without} {stretch}");

@@ -100,7 +100,7 @@ fn a_tie_was_not_told() {
     let mut machine = table4();
     let breakaway = 0.0371;
     machine.drive_pulley.friction = Friction::with_breakaway(1e-3, 0.5 * breakaway, breakaway);
-    let at = breakaway * machine.motor.resistance / machine.motor.torque_constant;
+    let at = breakaway * machine.drives[0].motor.resistance / machine.drives[0].motor.torque_constant;
     let ties = |machine: &Machine, value: f64| {
         let experiment = common::experiment(Signal::Step { value, at: 0.31 }, 0.5);
         simulate(machine, &experiment, Solver::Exact).unwrap().outcome.ties

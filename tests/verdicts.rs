@@ -97,7 +97,7 @@ fn suggested_gains_have_margins_on_drawn_axes() {
         let sets = [
             format!("cart.mass={mass}"),
             format!("belt.stiffness=[{}, {}, {}]", stiffness[0], stiffness[1], stiffness[2]),
-            format!("motor.resistance={}", template.motor.resistance * factor(3.0)),
+            format!("motor.resistance={}", template.drives[0].motor.resistance * factor(3.0)),
         ];
         let sets: Vec<&str> = sets.iter().map(String::as_str).collect();
         let head = format!("{base}\n[controller]\nevery = {every}\n");

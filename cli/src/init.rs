@@ -7,7 +7,7 @@ use crate::terminal;
 use taut::Error;
 use taut::case::{TEMPLATE, Template, gantry_template};
 use taut::files::write_atomically;
-use taut::machine::gantry::Routing;
+use taut::machine::Kind;
 
 /// Writes the template.
 pub fn run(args: &Init) -> Outcome {
@@ -37,8 +37,8 @@ pub fn run(args: &Init) -> Outcome {
     let text = match (template, args.kind) {
         (Some(template), _) => template.text().to_string(),
         (None, KindName::Axis) => TEMPLATE.to_string(),
-        (None, KindName::HFrame) => gantry_template(Routing::HFrame),
-        (None, KindName::CoreXy) => gantry_template(Routing::CoreXy),
+        (None, KindName::HFrame) => gantry_template(Kind::HFrame),
+        (None, KindName::CoreXy) => gantry_template(Kind::CoreXy),
     };
     write_atomically(file, text).map_err(Failure::work)?;
     let name = quoted(&file.display().to_string());

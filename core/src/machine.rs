@@ -2,40 +2,58 @@
 
 pub mod axis;
 pub mod gantry;
+mod geometry;
+mod kind;
+mod parts;
 pub mod rigid;
 mod sheet;
+mod spans;
 mod swing;
 
 use crate::friction::Friction;
 pub use crate::mechanism::{Amplifier, AmplifierMode, GearPlay, Motor};
 use crate::polyline::Polyline;
+pub use geometry::{BodyAt, DriveAt, Geometry, Lever, Part, SlideAt, SpanAt};
+pub use kind::Kind;
 pub use sheet::{BELTS, BeltSheet, BeltType, Rating, SimpleDrive, Width};
+pub use spans::Spans;
 use std::f64::consts::PI;
 pub use swing::slowest_swing;
 
-/// A single-axis belt drive (paper, Fig. 1 and 2).
+/// A belt-driven machine: an axis (paper, Fig. 1 and 2), or a gantry with two drives.
+///
+/// [`Kind`] has its geometry; how many drives, spans and slides there are follows from it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Machine {
+    /// The geometry.
+    pub kind: Kind,
+    /// The drives, in the order of the geometry.
+    pub drives: Vec<DriveUnit>,
+    /// Pitch radius r of all pulleys, m.
+    pub pulley_radius: f64,
+    /// The pulley at each motor; that of an axis has the angle φ₁.
+    pub drive_pulley: Pulley,
+    /// The pulley at the far end of an axis; its angle is φ₃. Idlers of gantries have neither inertia nor friction.
+    pub idler_pulley: Pulley,
+    /// The bridge of a gantry; its position is x.
+    pub bridge: Option<Slide>,
+    /// The cart; its position is x on an axis (the paper's x₂′), y on a gantry's bridge.
+    pub cart: Slide,
+    /// The belt, or belts.
+    pub belt: Belt,
+    /// How the motion of each drive is measured, if it is; of an axis it may be that of the cart.
+    pub encoder: Option<Encoder>,
+    /// A second encoder at the cart, beside one at motor or drive pulley.
+    pub scale: Option<Encoder>,
+}
+
+/// A motor and the amplifier that feeds it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DriveUnit {
     /// The DC motor and its gear.
     pub motor: Motor,
     /// The amplifier between the input and the motor.
     pub amplifier: Amplifier,
-    /// Pitch radius r of both pulleys, m.
-    pub pulley_radius: f64,
-    /// The pulley at the motor; its angle is φ₁.
-    pub drive_pulley: Pulley,
-    /// The cart; its position is x (the paper's x₂′).
-    pub cart: Cart,
-    /// The pulley at the far end; its angle is φ₃.
-    pub idler_pulley: Pulley,
-    /// The belt's three spans.
-    pub belt: Belt,
-    /// How far the cart may go, if that is bounded.
-    pub travel: Option<Travel>,
-    /// How the motion is measured, if it is.
-    pub encoder: Option<Encoder>,
-    /// A second encoder at the cart, beside one at motor or drive pulley.
-    pub scale: Option<Encoder>,
 }
 
 impl Machine {
@@ -52,32 +70,54 @@ impl Machine {
         own + (drive + idler) / self.pulley_radius - side * (cart.constant_force() + of_lines)
     }
 
+    /// What slides, in the order of the geometry: the cart, behind the bridge where there is one.
+    pub fn slides(&self) -> impl Iterator<Item = &Slide> {
+        self.bridge.iter().chain(std::iter::once(&self.cart))
+    }
+
+    /// What carries the rest: the bridge, or a cart that there is alone.
+    pub fn first_slide(&self) -> &Slide {
+        self.bridge.as_ref().unwrap_or(&self.cart)
+    }
+
+    /// The slide with this number.
+    pub fn slide(&self, index: usize) -> Option<&Slide> {
+        self.slides().nth(index)
+    }
+
+    /// The same, to be changed.
+    pub fn slide_mut(&mut self, index: usize) -> Option<&mut Slide> {
+        self.bridge.iter_mut().chain(std::iter::once(&mut self.cart)).nth(index)
+    }
+
     /// Whether its equations are linear but for stick, slip and other changes of mode: what the exact solver takes.
     pub fn is_piecewise_linear(&self) -> bool {
-        let laws = [self.drive_pulley.friction, self.cart.friction, self.idler_pulley.friction];
+        let pulleys = [self.drive_pulley.friction, self.idler_pulley.friction];
+        let mut laws = pulleys.iter().chain(self.slides().map(|slide| &slide.friction));
         // A belt that does not stretch does so at any length.
         let follows = self.belt.follows_cart && self.belt.model != BeltModel::Rigid;
-        laws.iter().all(Friction::is_piecewise_linear) && self.cart.along.is_none() && !follows
+        laws.all(Friction::is_piecewise_linear) && self.slides().all(|slide| slide.along.is_none()) && !follows
     }
 
     /// Whether it is another machine elsewhere along its travel, but for the ends.
     pub fn changes_along_travel(&self) -> bool {
-        self.cart.along.is_some() || self.cart.forces.along.is_some() || self.belt.follows_cart
+        self.slides().any(|slide| slide.along.is_some() || slide.forces.along.is_some()) || self.belt.follows_cart
     }
 
     /// The first part of it that the paper's equations do not have, in words.
     pub fn beyond_the_paper(&self) -> Option<&'static str> {
-        let amplifier = &self.amplifier;
+        let DriveUnit { motor, amplifier } = &self.drives[0];
         let parts = [
+            (self.kind != Kind::Axis, "a second drive"),
             (amplifier.voltage_limit.is_some(), "a voltage limit"),
             (amplifier.current_limit.is_some(), "a current limit"),
             (amplifier.bandwidth.is_some(), "a current loop of finite bandwidth"),
-            (self.motor.gear_play.is_some(), "a compliant gear"),
+            (motor.gear_play.is_some(), "a compliant gear"),
             (self.belt.pretension.is_some(), "spans that go slack"),
             (self.belt.model != BeltModel::Elastic, "a reduced model of the belt"),
             (self.cart.constant_force() != 0.0, "a constant force on the cart"),
-            (self.cart.forces != CartForces::default(), "a force on the cart that changes"),
-            (self.travel.is_some(), "the ends of the travel"),
+            (self.cart.forces != SlideForces::default(), "a force on the cart that changes"),
+            (self.cart.travel.is_some(), "the ends of the travel"),
         ];
         parts.into_iter().find(|(there, _)| *there).map(|(_, words)| words)
     }
@@ -92,61 +132,65 @@ pub struct Pulley {
     pub friction: Friction,
 }
 
-/// The cart.
+/// What slides: the cart, or the bridge that carries it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Cart {
-    /// Mass M with its load, kg.
+pub struct Slide {
+    /// Mass M with its load, kg; of a bridge without its cart.
     pub mass: f64,
     /// Friction force, N over m/s.
     pub friction: Friction,
     /// How its dry friction changes along the travel, if it does.
     pub along: Option<Polyline>,
-    /// Forces on the cart that change along the travel or with its speed, if any.
-    pub forces: CartForces,
-    /// A constant force on the cart F_L, N, positive towards larger x: what a hanging mass or a spring of constant
-    /// force pulls.
+    /// Forces on it that change along the travel or with its speed, if any.
+    pub forces: SlideForces,
+    /// A constant force on it F_L, N, positive towards larger x: what a hanging mass or a spring of constant force
+    /// pulls.
     pub load: f64,
-    /// Inclination of the axis, rad: positive if the cart climbs towards larger x.
+    /// Inclination of its travel, rad: positive if it climbs towards larger x.
     pub inclination: f64,
+    /// How far it may go, if that is bounded.
+    pub travel: Option<Travel>,
 }
 
-/// Forces on the cart that are the same in both directions of motion, N over m and over m/s, positive towards larger x:
-/// what a cable chain, magnets, a tilted rail or a fan do, and what a model leaves.
+/// Forces that are the same in both directions of motion, N over m and over m/s, positive towards larger x: what a
+/// cable chain, magnets, a tilted rail or a fan do, and what a model leaves.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct CartForces {
-    /// Over the cart's position.
+pub struct SlideForces {
+    /// Over the position.
     pub along: Option<Polyline>,
-    /// Over its speed.
+    /// Over the speed.
     pub by_speed: Option<Polyline>,
 }
 
 /// Standard acceleration of gravity, m/s² (CGPM 1901).
 pub const GRAVITY: f64 = 9.80665;
 
-impl Cart {
-    /// A cart on a level axis with nothing pulling at it.
+impl Slide {
+    /// What slides on the level, without ends and with nothing pulling at it.
     pub fn new(mass: f64, friction: Friction) -> Self {
-        Self { mass, friction, along: None, forces: CartForces::default(), load: 0.0, inclination: 0.0 }
+        let forces = SlideForces::default();
+        Self { mass, friction, along: None, forces, load: 0.0, inclination: 0.0, travel: None }
     }
 
-    /// The constant force on the cart, N: F_L − M g sin θ.
+    /// The constant force on it, N: F_L − M g sin θ.
     pub fn constant_force(&self) -> f64 {
         self.load - self.mass * GRAVITY * self.inclination.sin()
     }
 }
 
-/// Three spans: 1 drive pulley to cart, 2 cart to idler pulley, 3 idler pulley back to drive pulley.
+/// The spans of the belt, or of both belts, in the order of the geometry. Of an axis these are 1 drive pulley to cart, 2
+/// cart to idler pulley, 3 idler pulley back to drive pulley.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Belt {
-    /// Span stiffness k₁, k₂, k₃, N/m; infinite in a rigid model that is given none.
-    pub stiffness: [f64; 3],
+    /// Span stiffness k₁, k₂, k₃, N/m, at the origin; infinite in a rigid model that is given none.
+    pub stiffness: Spans,
     /// Span damping c₁, c₂, c₃, N s/m.
-    pub damping: [f64; 3],
+    pub damping: Spans,
     /// The make that the stiffness was computed from, where it was not given as such.
     pub make: Option<BeltMake>,
     /// Tension T₀ of every span at rest, N. A span whose tension is used up goes slack; none for spans that can push.
     pub pretension: Option<f64>,
-    /// Whether spans 1 and 2 get shorter and longer, and so stiffer and softer, as the cart moves; needs `make`.
+    /// Whether spans get shorter and longer, and so stiffer and softer, as what slides moves; needs `make`.
     pub follows_cart: bool,
     /// How many of the three inertias move by themselves.
     pub model: BeltModel,
@@ -156,9 +200,22 @@ pub struct Belt {
 
 impl Belt {
     /// Spans of given stiffness (N/m) and damping (N s/m) and no more.
-    pub fn given(stiffness: [f64; 3], damping: [f64; 3]) -> Self {
+    pub fn given(stiffness: impl Into<Spans>, damping: impl Into<Spans>) -> Self {
+        let (stiffness, damping) = (stiffness.into(), damping.into());
         let (model, sheet) = (BeltModel::Elastic, BeltSheet::default());
         Self { stiffness, damping, make: None, pretension: None, follows_cart: false, model, sheet }
+    }
+
+    /// Takes up what was changed of the make.
+    pub fn follow_make(&mut self) {
+        if let Some(make) = &self.make {
+            self.stiffness = make.stiffness();
+        }
+    }
+
+    /// The make of spans that follow what slides.
+    pub fn following(&self) -> Option<BeltMake> {
+        self.make.filter(|_| self.follows_cart)
     }
 }
 
@@ -185,7 +242,7 @@ impl BeltModel {
     }
 }
 
-/// How far the cart may go.
+/// How far something may go.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Travel {
     /// Least position x, m.
@@ -212,21 +269,27 @@ pub struct BeltMake {
     pub modulus: f64,
     /// Cross-section A that carries the load, m².
     pub section: f64,
-    /// Span lengths l₁, l₂, l₃, m.
-    pub spans: [f64; 3],
+    /// Span lengths l₁, l₂, l₃, m, at the origin.
+    pub spans: Spans,
 }
 
 impl BeltMake {
     /// Stiffness of each span.
-    pub fn stiffness(&self) -> [f64; 3] {
+    pub fn stiffness(&self) -> Spans {
         let &BeltMake { modulus: e, section: a, spans } = self;
         // k = A E / l                                                              (11)
         spans.map(|l| a * e / l)
     }
 
-    /// Stiffness of spans 1 and 2 with the cart at `x`, m: the drive pulley is at the positive end.
+    /// E A, N.
+    pub fn rigidity(&self) -> f64 {
+        self.modulus * self.section
+    }
+
+    /// Stiffness of spans 1 and 2 of an axis with the cart at `x`, m: the drive pulley is at the positive end.
     pub fn stiffness_at(&self, x: f64) -> [f64; 2] {
-        let &BeltMake { modulus: e, section: a, spans: [l1, l2, _] } = self;
+        let &BeltMake { modulus: e, section: a, spans } = self;
+        let [l1, l2, _] = spans.three();
         // k₁ = A E / (l₁ − x), k₂ = A E / (l₂ + x)                                (11)
         [a * e / (l1 - x), a * e / (l2 + x)]
     }

@@ -200,7 +200,7 @@ impl Recorder<'_> {
 
     /// The columns of a log, without rows.
     fn headings(&self, machine: &Machine) -> Vec<Column> {
-        let (input, unit) = match machine.amplifier.mode {
+        let (input, unit) = match machine.drives[0].amplifier.mode {
             AmplifierMode::Voltage => ("voltage", "V"),
             AmplifierMode::Current => ("current", "A"),
         };
@@ -226,7 +226,7 @@ enum Device {
 
 impl Device {
     fn all(machine: &Machine, measurement: &Measurement, experiment: &Experiment) -> Vec<Self> {
-        let counts = |encoder: Encoder| encoder.counts_per_unit(machine.motor.gear_ratio);
+        let counts = |encoder: Encoder| encoder.counts_per_unit(machine.drives[0].motor.gear_ratio);
         let encoder = machine.encoder.map(|encoder| Device::Encoder { at: encoder.at, counts: counts(encoder) });
         let scale = machine.scale.map(|scale| Device::Scale { counts: counts(scale) });
         let converter = |&channel: &Channel| {

@@ -216,12 +216,12 @@ impl Meter {
             machine: machine.clone(),
             sought: [true; PEAKS],
             follows: true,
-            shaft: if machine.motor.gear_play.is_some() { ROTOR } else { DRIVE },
+            shaft: if machine.drives[0].motor.gear_play.is_some() { ROTOR } else { DRIVE },
             peaks: [Peak::default(); PEAKS],
             seen: Metrics::default(),
             plateau: held.map(Plateau::new),
             moved: false,
-            rotor: machine.motor.gear_play.map(|_| Rotor::new(reading::ROTOR_SPEED)),
+            rotor: machine.drives[0].motor.gear_play.map(|_| Rotor::new(reading::ROTOR_SPEED)),
         }
     }
 
@@ -542,7 +542,7 @@ pub fn balanced_speed(machine: &Machine, input: f64, near: f64) -> Balance {
     if machine.changes_along_travel() || machine.cart.forces.by_speed.is_some() {
         return Balance::Changing;
     }
-    let (motor, amplifier) = (&machine.motor, &machine.amplifier);
+    let (motor, amplifier) = (&machine.drives[0].motor, &machine.drives[0].amplifier);
     let (r, n, eta) = (machine.pulley_radius, motor.gear_ratio, motor.gear_efficiency);
     let output = amplifier.gain * input;
     let forward = output >= 0.0;

@@ -9,7 +9,7 @@ use crate::machine::{
     BODIES, CURRENT, Follows, Friction, Model, ROTOR, SPEED, STATES, Span, Taken, WAY, drive, ends, friction, is_strain,
 };
 use taut::case::GantryExperiment;
-use taut::machine::gantry::{Gantry, Routing};
+use taut::machine::{Kind, Machine};
 
 /// Elongation of a span by r φ₁, r φ₂, x, y, and the change of its length with x, y.
 type Row = ([f64; BODIES], [f64; 2]);
@@ -27,30 +27,32 @@ const CORE_XY: [Row; 4] = [
 ];
 
 /// Changes of r φ₁ and r φ₂ with x and with y where no span is strained.
-fn pulleys(routing: Routing) -> [[f64; 2]; 2] {
-    match routing {
+fn pulleys(kind: Kind) -> [[f64; 2]; 2] {
+    match kind {
         // r φ₁ = −x − y, r φ₂ = x − y
-        Routing::HFrame => [[-1.0, 1.0], [-1.0, -1.0]],
+        Kind::HFrame => [[-1.0, 1.0], [-1.0, -1.0]],
         // r φ_A = x + y, r φ_B = x − y
-        Routing::CoreXy => [[1.0, 1.0], [1.0, -1.0]],
+        Kind::CoreXy => [[1.0, 1.0], [1.0, -1.0]],
+        Kind::Axis => panic!("an axis has one drive"),
     }
 }
 
 /// The gantry at the start of `experiment`; every number passes `taken` once.
-pub fn machine(gantry: &Gantry, experiment: &GantryExperiment, taken: Taken) -> Model {
+pub fn machine(gantry: &Machine, experiment: &GantryExperiment, taken: Taken) -> Model {
     let r = taken(gantry.pulley_radius);
     let initial = &experiment.initial;
     let [x, y] = [2, 3].map(|body| Double::from(initial.position[body]));
-    let [of_x, of_y] = pulleys(gantry.routing);
+    let [of_x, of_y] = pulleys(gantry.kind);
     let origin = [x * of_x[0] + y * of_y[0], x * of_x[1] + y * of_y[1], x, y];
-    let rows: &[Row] = match gantry.routing {
-        Routing::HFrame => &H_FRAME,
-        Routing::CoreXy => &CORE_XY,
+    let rows: &[Row] = match gantry.kind {
+        Kind::HFrame => &H_FRAME,
+        Kind::CoreXy => &CORE_XY,
+        Kind::Axis => panic!("an axis has one drive"),
     };
-    let follows =
-        gantry.belts.follows.as_ref().map(|(rigidity, lengths)| {
-            (taken(*rigidity), lengths.iter().map(|&length| taken(length)).collect::<Vec<_>>())
-        });
+    let follows = gantry
+        .belt
+        .following()
+        .map(|make| (taken(make.rigidity()), make.spans.iter().map(|&length| taken(length)).collect::<Vec<_>>()));
     let mut spans = Vec::new();
     for (j, &(arms, [a, b])) in rows.iter().enumerate() {
         let follows = follows.as_ref().map(|(rigidity, lengths)| Follows {
@@ -58,13 +60,13 @@ pub fn machine(gantry: &Gantry, experiment: &GantryExperiment, taken: Taken) -> 
             length: lengths[j] + x * a + y * b,
             of: [0.0, 0.0, a, b],
         });
-        let (stiffness, damping) = (taken(gantry.belts.stiffness[j]), taken(gantry.belts.damping[j]));
+        let (stiffness, damping) = (taken(gantry.belt.stiffness[j]), taken(gantry.belt.damping[j]));
         spans.push(Span { arms, stiffness, damping, follows });
     }
     let cart = taken(gantry.cart.mass);
     let pulley = taken(gantry.drive_pulley.inertia) / (r * r);
     let own: Friction = friction(&gantry.drive_pulley.friction, taken, r);
-    let slides = [&gantry.bridge, &gantry.cart];
+    let slides = [gantry.first_slide(), &gantry.cart];
     let [of_bridge, of_cart] = slides.map(|slide| friction(&slide.friction, taken, Double::ONE));
     let [end_x, end_y] = [0, 1].map(|i| slides[i].travel.map(|travel| ends(travel, taken, if i == 0 { x } else { y })));
     let mut z = [Double::ZERO; STATES];
@@ -84,15 +86,15 @@ pub fn machine(gantry: &Gantry, experiment: &GantryExperiment, taken: Taken) -> 
         bodies: 4,
         leader: [0, 1, 2, 3],
         // The cart rides along with the bridge.
-        mass: [pulley, pulley, taken(gantry.bridge.mass) + cart, cart],
+        mass: [pulley, pulley, taken(gantry.first_slide().mass) + cart, cart],
         friction: [own, own, of_bridge, of_cart],
         along: None,
         spans,
-        pretension: gantry.belts.pretension.map(&mut *taken),
+        pretension: gantry.belt.pretension.map(&mut *taken),
         force: Double::ZERO,
         lines: [None, None],
         ends: [None, None, end_x, end_y],
-        drives: (0..2).map(|i| drive(i, &gantry.motors[i], &gantry.amplifiers[i], taken, r)).collect(),
+        drives: (0..2).map(|i| drive(i, &gantry.drives[i].motor, &gantry.drives[i].amplifier, taken, r)).collect(),
         start: z,
         beyond,
         origin,

@@ -118,7 +118,9 @@ fn measured(machine: &Machine, [motor, pulley, cart]: [f64; 3]) -> f64 {
     let r = machine.pulley_radius;
     let Some(encoder) = &machine.encoder else { return motor };
     match encoder.at {
-        EncoderPlace::Motor => r * in_counts(motor / r, 4.0 * machine.motor.gear_ratio * encoder.lines / (2.0 * PI)),
+        EncoderPlace::Motor => {
+            r * in_counts(motor / r, 4.0 * machine.drives[0].motor.gear_ratio * encoder.lines / (2.0 * PI))
+        }
         EncoderPlace::DrivePulley => r * in_counts(pulley / r, 4.0 * encoder.lines / (2.0 * PI)),
         EncoderPlace::Cart => in_counts(cart, 4.0 * encoder.lines),
     }
@@ -355,7 +357,7 @@ struct Rigid {
 
 impl Rigid {
     fn of(machine: &Machine) -> Self {
-        let (r, motor) = (machine.pulley_radius, &machine.motor);
+        let (r, motor) = (machine.pulley_radius, &machine.drives[0].motor);
         let (j1, j2, n) = (machine.drive_pulley.inertia, machine.idler_pulley.inertia, motor.gear_ratio);
         // M = m + (J₁ + n² J_r + J₂)/r²
         let mass = machine.cart.mass + (j1 + n * n * motor.rotor_inertia + j2) / (r * r);
@@ -364,13 +366,13 @@ impl Rigid {
             let side = |f: &taut::friction::Friction| of(if backward { &f.backward } else { &f.forward });
             side(sides[0]) + (side(sides[1]) + side(sides[2])) / arm
         };
-        let per_volt = motor.gear_efficiency * n * motor.torque_constant / r * machine.amplifier.gain;
+        let per_volt = motor.gear_efficiency * n * motor.torque_constant / r * machine.drives[0].amplifier.gain;
         Self {
             mass,
             viscous: [false, true].map(|back| sum(|side| side.viscous, back, r * r)),
             coulomb: [false, true].map(|back| sum(|side| side.coulomb, back, r)),
             load: machine.cart.constant_force(),
-            push: match machine.amplifier.mode {
+            push: match machine.drives[0].amplifier.mode {
                 AmplifierMode::Voltage => per_volt / motor.resistance,
                 AmplifierMode::Current => per_volt,
             },
@@ -382,7 +384,8 @@ impl Rigid {
 
     /// F = p M y″ + q (b y′ + s F_c) − F_L, and the command for it.
     fn command(&self, y: &Reference) -> f64 {
-        let (motor, amplifier, r) = (&self.machine.motor, &self.machine.amplifier, self.machine.pulley_radius);
+        let (motor, amplifier, r) =
+            (&self.machine.drives[0].motor, &self.machine.drives[0].amplifier, self.machine.pulley_radius);
         // s = sgn y′ where abs(y′) > 1 µm/s, else sgn y″ where abs(y″) > 1 mm/s², else 0
         let s = match (y.speed.abs() > 1e-6, y.acceleration.abs() > 1e-3) {
             (true, _) => y.speed.signum(),

@@ -219,7 +219,7 @@ impl Model {
         let cart_start = Double::from(experiment.initial.cart_position);
         let forces = &machine.cart.forces;
         let mut ends = [None; BODIES];
-        ends[1] = machine.travel.map(|travel| self::ends(travel, taken, cart_start));
+        ends[1] = machine.cart.travel.map(|travel| self::ends(travel, taken, cart_start));
         let (start, beyond) = start(machine, experiment, taken, r, cart_start);
         Self {
             bodies: 3,
@@ -239,7 +239,7 @@ impl Model {
                 line(forces.by_speed.as_ref(), taken, Double::ZERO),
             ],
             ends,
-            drives: vec![drive(0, &machine.motor, &machine.amplifier, taken, r)],
+            drives: vec![drive(0, &machine.drives[0].motor, &machine.drives[0].amplifier, taken, r)],
             start,
             beyond,
             origin: [cart_start; BODIES],
@@ -385,12 +385,12 @@ pub fn friction(law: &taut::friction::Friction, taken: Taken, r: Double) -> Fric
 
 /// Spans 1 (drive pulley to cart), 2 (cart to idler pulley) and 3 (back), or 1 and the other two in series.
 fn spans(machine: &Machine, taken: Taken, cart_start: Double) -> Vec<Span> {
-    let [k, c] = [machine.belt.stiffness, machine.belt.damping].map(|values| values.map(&mut *taken));
+    let [k, c] = [machine.belt.stiffness, machine.belt.damping].map(|values| values.three().map(&mut *taken));
     let make = machine.belt.make.filter(|_| machine.belt.follows_cart);
     // l₁ − x, l₂ + x; the third span keeps its length.
     let follows = make.map(|make| {
         let rigidity = taken(make.modulus) * taken(make.section);
-        let [l1, l2, l3] = make.spans.map(&mut *taken);
+        let [l1, l2, l3] = make.spans.three().map(&mut *taken);
         (rigidity, l1 - cart_start, l2 + cart_start, l3)
     });
     let follows = |which: usize, more: bool| {

@@ -105,7 +105,7 @@ impl Case {
     fn kind(&self) -> &str {
         match &self.inner {
             Inner::Axis(_) => "axis",
-            Inner::Gantry(case) => case.gantry.routing.word(),
+            Inner::Gantry(case) => case.gantry.kind.word(),
         }
     }
 

@@ -117,11 +117,11 @@ impl Run {
     /// The key figures.
     fn figures<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let of_axis = |metrics: &Metrics, case: &Case| {
-            serde_json::to_value(json::Metrics::of(metrics, case.machine.amplifier.mode)).unwrap_or_default()
+            serde_json::to_value(json::Metrics::of(metrics, case.machine.drives[0].amplifier.mode)).unwrap_or_default()
         };
         let told = guarded(|| match &self.what {
             What::Experiment { case, metrics, .. } => of_axis(metrics, case),
-            What::Gantry { case, metrics, .. } => json::gantry_metrics(metrics, case.gantry.routing),
+            What::Gantry { case, metrics, .. } => json::gantry_metrics(metrics, case.gantry.kind),
             What::Move { case, index, run, worst, .. } => {
                 let moved = Moved {
                     motion: &case.moves[*index],

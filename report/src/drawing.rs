@@ -195,7 +195,7 @@ fn shaft(out: &mut Svg, machine: &Machine) {
 }
 
 fn motor(out: &mut Svg, machine: &Machine) {
-    let m = &machine.motor;
+    let m = &machine.drives[0].motor;
     let centre = (DRIVE.0, 384.0);
     if m.gear_ratio != 1.0 {
         out.rect((DRIVE.0 - 32.0, 288.0), (64.0, 34.0), 4.0, svg::SOFT, svg::INK, 1.6);
@@ -206,12 +206,12 @@ fn motor(out: &mut Svg, machine: &Machine) {
     out.text((centre.0, centre.1 + 6.0), 17.0, Anchor::Middle, svg::INK, " font-weight=\"600\"", "M");
 
     // The input from the left, through the amplifier where it does something.
-    let symbol = match machine.amplifier.mode {
+    let symbol = match machine.drives[0].amplifier.mode {
         AmplifierMode::Voltage => "u",
         AmplifierMode::Current => "i",
     };
     let ink = svg::INK;
-    if machine.amplifier.gain == 1.0 {
+    if machine.drives[0].amplifier.gain == 1.0 {
         out.arrow((44.0, centre.1), (centre.0 - 31.0, centre.1), ink, 1.5);
         out.symbol((36.0, centre.1 + 4.5), 14.0, Anchor::End, ink, "", symbol);
     } else {
@@ -219,7 +219,7 @@ fn motor(out: &mut Svg, machine: &Machine) {
         out.fill(&format!("M34 {}L62 {}L34 {}Z", n(centre.1 - 18.0), n(centre.1), n(centre.1 + 18.0)), svg::SOFT);
         out.path(&format!("M34 {}L62 {}L34 {}Z", n(centre.1 - 18.0), n(centre.1), n(centre.1 + 18.0)), ink, 1.5, "");
         out.arrow((62.0, centre.1), (centre.0 - 31.0, centre.1), ink, 1.5);
-        let gain = format!("gain {}", significant(machine.amplifier.gain, 3));
+        let gain = format!("gain {}", significant(machine.drives[0].amplifier.gain, 3));
         out.symbol((42.0, centre.1 + 38.0), 12.5, Anchor::Middle, svg::MARK, "", &gain);
     }
 

@@ -4,8 +4,7 @@
 use super::drawing::friction;
 use super::svg::{self, Anchor, Colour, Paint, Svg, n};
 use std::f64::consts::PI;
-use taut::machine::gantry::{Gantry, Routing, Slide};
-use taut::machine::{AmplifierMode, EncoderPlace};
+use taut::machine::{AmplifierMode, EncoderPlace, Kind, Machine, Slide};
 use taut::mechanism::{Amplifier, Motor};
 use taut::number::engineering;
 
@@ -28,13 +27,13 @@ const IDLER: f64 = 12.0;
 const CART: ((f64, f64), (f64, f64)) = ((382.0, 288.0), (96.0, 84.0));
 
 /// Belts, drive pulleys, idlers, bridge and cart as they run, with positive directions. Works in light and dark.
-pub fn gantry_drawing(gantry: &Gantry) -> String {
+pub fn gantry_drawing(gantry: &Machine) -> String {
     let mut out = Svg::new(WIDTH, HEIGHT);
     rails(&mut out);
     bridge(&mut out);
-    match gantry.routing {
-        Routing::HFrame => h_frame(&mut out, gantry),
-        Routing::CoreXy => core_xy(&mut out, gantry),
+    match gantry.kind {
+        Kind::HFrame => h_frame(&mut out, gantry),
+        Kind::Axis | Kind::CoreXy => core_xy(&mut out, gantry),
     }
     directions(&mut out);
     for side in 0..2 {
@@ -47,10 +46,10 @@ pub fn gantry_drawing(gantry: &Gantry) -> String {
     ];
     lines.extend(friction(&pulley.friction, ["B", "τ_c", "τ_s"], ["N m s", "N m"]));
     block(&mut out, (430.0, 508.0), Anchor::Middle, "Drive pulleys", &lines);
-    block(&mut out, (16.0, 276.0), Anchor::Start, "Bridge", &slide(&gantry.bridge, "m_b", "x"));
-    let cart = if gantry.routing == Routing::HFrame { 496.0 } else { 430.0 };
+    block(&mut out, (16.0, 276.0), Anchor::Start, "Bridge", &slide(gantry.first_slide(), "m_b", "x"));
+    let cart = if gantry.kind == Kind::HFrame { 496.0 } else { 430.0 };
     block(&mut out, (cart, 184.0), Anchor::Middle, "Cart", &slide(&gantry.cart, "m_c", "y"));
-    out.finish(&format!("The gantry in plan view, {}: two drive pulleys, belt, bridge and cart", gantry.routing.name()))
+    out.finish(&format!("The gantry in plan view, {}: two drive pulleys, belt, bridge and cart", gantry.kind.name()))
 }
 
 /// The numbers of bridge or cart.
@@ -91,7 +90,7 @@ fn bridge(out: &mut Svg) {
 
 /// One belt: from the cart over the bridge's idlers to a motor on either side, and from there round the far end and
 /// across the bridge.
-fn h_frame(out: &mut Svg, gantry: &Gantry) {
+fn h_frame(out: &mut Svg, gantry: &Machine) {
     let belt = Colour::Blue.paint();
     let far = FAR + RADIUS;
     let [left, right] = [CART.0.0, CART.0.0 + CART.1.0];
@@ -122,7 +121,7 @@ fn h_frame(out: &mut Svg, gantry: &Gantry) {
 
 /// Two belts: each from the cart straight back to its motor, and out from there round the far end to the cart's other
 /// side.
-fn core_xy(out: &mut Svg, gantry: &Gantry) {
+fn core_xy(out: &mut Svg, gantry: &Machine) {
     let [left, right] = [CART.0.0, CART.0.0 + CART.1.0];
     let paints = [Colour::Blue.paint(), Colour::Purple.paint()];
     for side in 0..2 {
@@ -214,9 +213,9 @@ fn zigzag(out: &mut Svg, (x, y): (f64, f64), (to_x, to_y): (f64, f64), belt: &Pa
 }
 
 /// The name of a span, and its stiffness and damping.
-fn label(out: &mut Svg, gantry: &Gantry, span: usize, (x, y): (f64, f64), anchor: Anchor, paint: &Paint) {
-    let belts = &gantry.belts;
-    let name = gantry.routing.spans()[span].name;
+fn label(out: &mut Svg, gantry: &Machine, span: usize, (x, y): (f64, f64), anchor: Anchor, paint: &Paint) {
+    let belts = &gantry.belt;
+    let name = gantry.geometry().spans[span].label.name;
     let mut values = vec![format!("k = {}", engineering(belts.stiffness[span], "N/m", 5))];
     if belts.damping[span] != 0.0 {
         values.push(format!("c = {}", engineering(belts.damping[span], "N s/m", 3)));
@@ -245,16 +244,16 @@ fn directions(out: &mut Svg) {
 }
 
 /// Pulley, the way it turns, its motor's values and what feeds it.
-fn drive(out: &mut Svg, gantry: &Gantry, side: usize) {
+fn drive(out: &mut Svg, gantry: &Machine, side: usize) {
     let (x, y) = MOTORS[side];
-    let (motor, amplifier) = (&gantry.motors[side], &gantry.amplifiers[side]);
+    let (motor, amplifier) = (&gantry.drives[side].motor, &gantry.drives[side].amplifier);
     out.circle((x, y), RADIUS - 4.0, svg::SOFT, svg::AXIS, 1.2);
     out.circle((x, y), 3.5, svg::PAPER, svg::INK, 1.4);
-    let (symbol, clockwise) = match (gantry.routing, side) {
-        (Routing::HFrame, 0) => ("φ₁", true),
-        (Routing::HFrame, _) => ("φ₂", true),
-        (Routing::CoreXy, 0) => ("φ_A", false),
-        (Routing::CoreXy, _) => ("φ_B", true),
+    let (symbol, clockwise) = match (gantry.kind, side) {
+        (Kind::HFrame, 0) => ("φ₁", true),
+        (Kind::HFrame, _) => ("φ₂", true),
+        (Kind::Axis | Kind::CoreXy, 0) => ("φ_A", false),
+        (Kind::Axis | Kind::CoreXy, _) => ("φ_B", true),
     };
     turn(out, (x, y), clockwise);
     out.symbol((x, y - 40.0), 14.0, Anchor::Middle, Colour::Vermillion.paint(), "", symbol);
@@ -272,7 +271,7 @@ fn drive(out: &mut Svg, gantry: &Gantry, side: usize) {
         _ => ("Right motor", 700.0),
     };
     let heading =
-        if gantry.routing == Routing::CoreXy { format!("{heading} ({})", ["A", "B"][side]) } else { heading.into() };
+        if gantry.kind == Kind::CoreXy { format!("{heading} ({})", ["A", "B"][side]) } else { heading.into() };
     let mut lines = motor_lines(motor, amplifier);
     if let Some(encoder) = gantry.encoder {
         let at = if encoder.at == EncoderPlace::Motor { "motor" } else { "pulley" };

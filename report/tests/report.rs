@@ -12,24 +12,27 @@ const NASTY: &str = "<script>alert(\"1\")</script> & 'two' \u{0}\u{1b}]]>";
 fn machine(encoder: Option<Encoder>) -> Machine {
     let pulley = Pulley { inertia: 6.3e-5, friction: Friction::with_breakaway(0.0016, 0.015, 0.02) };
     Machine {
-        motor: Motor {
-            torque_constant: 0.023,
-            back_emf_constant: 0.023,
-            resistance: 0.71,
-            inductance: 1e-3,
-            rotor_inertia: 1e-6,
-            gear_ratio: 5.9,
-            gear_efficiency: 0.8,
-            gear_play: None,
-            is_simple: false,
-        },
-        amplifier: Amplifier::ideal(AmplifierMode::Voltage, 2.0),
+        kind: Kind::Axis,
+        drives: vec![DriveUnit {
+            motor: Motor {
+                torque_constant: 0.023,
+                back_emf_constant: 0.023,
+                resistance: 0.71,
+                inductance: 1e-3,
+                rotor_inertia: 1e-6,
+                gear_ratio: 5.9,
+                gear_efficiency: 0.8,
+                gear_play: None,
+                is_simple: false,
+            },
+            amplifier: Amplifier::ideal(AmplifierMode::Voltage, 2.0),
+        }],
+        bridge: None,
         pulley_radius: 0.0194,
         drive_pulley: pulley,
-        cart: Cart::new(0.362, Friction::symmetric(19.0424, 0.2)),
+        cart: Slide::new(0.362, Friction::symmetric(19.0424, 0.2)),
         idler_pulley: pulley,
         belt: Belt::given([132.76e3, 132.76e3, f64::NAN], [0.0, 3.0, 0.0]),
-        travel: None,
         encoder,
         scale: None,
     }

@@ -5,16 +5,17 @@ use crate::case::Opened;
 use crate::error::Result;
 use crate::export::{self, ElementKind, Exported, Row, Tables, Then};
 use crate::linear::{Operation, StateSpace, Variable};
+use crate::machine::Machine;
 use crate::mechanism::{Kind, Mechanism, Over, SpringLaw};
-use crate::parameter::{self, Numbers};
+use crate::parameter;
 use serde_json::{Value, json};
 
 /// Parameters, parts, equations of every mode and the linear model.
 pub fn export(case: &Opened) -> Result<Value> {
     let mechanism = export::mechanism(case);
-    let (kind, numbers): (&str, &dyn Numbers) = match case {
+    let (kind, numbers): (&str, &Machine) = match case {
         Opened::Axis(case) => ("axis", &case.machine),
-        Opened::Gantry(case) => (case.gantry.routing.word(), &case.gantry),
+        Opened::Gantry(case) => (case.gantry.kind.word(), &case.gantry),
     };
     let equations = match mechanism.is_piecewise_linear() {
         true => Some(equations(&Tables::new(&mechanism)?)),
@@ -53,7 +54,7 @@ pub fn exported(title: &str, target: &str, exported: &Exported) -> Value {
     })
 }
 
-fn parameters(machine: &dyn Numbers) -> Vec<Value> {
+fn parameters(machine: &Machine) -> Vec<Value> {
     let one = |(key, value): (String, f64)| {
         let row = parameter::find(&key).or_else(|| parameter::named(&key));
         json!({

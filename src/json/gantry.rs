@@ -4,8 +4,8 @@ use super::simulation::{
     CostTold, CountTold, EndingTold, Event, MOST_EVENTS, PeakTold, SolverUsed, TieTold, error_basis, is_determined,
 };
 use crate::case::{GantryCase, GantryExperiment};
-use crate::machine::gantry::{Gantry, LABELS, Routing};
-use crate::mechanism::{DRIVES, Mechanism};
+use crate::machine::{Kind, Machine, Motor};
+use crate::mechanism::Mechanism;
 use crate::metrics::{GantryMetrics, Peak};
 use crate::solve::{Outcome, Solver};
 use serde::Serialize;
@@ -41,8 +41,8 @@ struct MachineFigures {
     pulley_radius_m: f64,
     drive_pulley_inertia_kg_m2: f64,
     /// Left and right, with the gear's ratio squared.
-    rotor_inertia_at_pulley_kg_m2: [f64; DRIVES],
-    gear_ratio: [f64; DRIVES],
+    rotor_inertia_at_pulley_kg_m2: Vec<f64>,
+    gear_ratio: Vec<f64>,
     bridge_mass_kg: f64,
     cart_mass_kg: f64,
     /// By span, with bridge and cart at zero.
@@ -97,51 +97,52 @@ struct MetricsTold {
 }
 
 /// The key figures of one run.
-pub fn gantry_metrics(metrics: &GantryMetrics, routing: Routing) -> Value {
-    serde_json::to_value(MetricsTold::of(metrics, routing)).unwrap_or_default()
+pub fn gantry_metrics(metrics: &GantryMetrics, kind: Kind) -> Value {
+    serde_json::to_value(MetricsTold::of(metrics, kind)).unwrap_or_default()
 }
 
 impl GantrySimulation {
     /// Of the runs of a case.
     pub fn new(case: &GantryCase, solver: Solver, runs: &[GantrySimulated]) -> Self {
         let mechanism = case.gantry.mechanism();
-        let routing = case.gantry.routing;
+        let kind = case.gantry.kind;
         Self {
             schema: super::identity("gantry-simulate"),
             title: case.title.clone(),
             version: env!("CARGO_PKG_VERSION"),
-            kind: routing.word(),
+            kind: kind.word(),
             solver: SolverUsed::of(solver),
             machine: MachineFigures::of(&case.gantry),
-            experiments: runs.iter().map(|run| ExperimentFigures::of(run, &mechanism, routing, solver)).collect(),
+            experiments: runs.iter().map(|run| ExperimentFigures::of(run, &mechanism, kind, solver)).collect(),
         }
     }
 }
 
 impl MachineFigures {
-    fn of(gantry: &Gantry) -> Self {
-        let stiffness = gantry.belts.stiffness.iter().map(|k| super::number(*k));
+    fn of(gantry: &Machine) -> Self {
+        let of_motors = |number: fn(&Motor) -> f64| gantry.drives.iter().map(|unit| number(&unit.motor)).collect();
+        let stiffness = gantry.belt.stiffness.iter().map(|k| super::number(*k));
         Self {
             pulley_radius_m: gantry.pulley_radius,
             drive_pulley_inertia_kg_m2: gantry.drive_pulley.inertia,
-            rotor_inertia_at_pulley_kg_m2: gantry.motors.map(|motor| motor.gear_ratio.powi(2) * motor.rotor_inertia),
-            gear_ratio: gantry.motors.map(|motor| motor.gear_ratio),
-            bridge_mass_kg: gantry.bridge.mass,
+            rotor_inertia_at_pulley_kg_m2: of_motors(|motor| motor.gear_ratio.powi(2) * motor.rotor_inertia),
+            gear_ratio: of_motors(|motor| motor.gear_ratio),
+            bridge_mass_kg: gantry.first_slide().mass,
             cart_mass_kg: gantry.cart.mass,
-            span_stiffness_newton_per_m: by_span(gantry.routing, stiffness),
-            spans_follow: gantry.belts.follows.is_some(),
+            span_stiffness_newton_per_m: by_span(gantry.kind, stiffness),
+            spans_follow: gantry.belt.follows_cart,
         }
     }
 }
 
 impl ExperimentFigures {
-    fn of(run: &GantrySimulated, mechanism: &Mechanism, routing: Routing, solver: Solver) -> Self {
+    fn of(run: &GantrySimulated, mechanism: &Mechanism, kind: Kind, solver: Solver) -> Self {
         let outcome = run.outcome;
         Self {
             name: run.experiment.name.clone(),
             files: run.files.to_vec(),
             ending: EndingTold::of(outcome, run.metrics.end),
-            metrics: MetricsTold::of(run.metrics, routing),
+            metrics: MetricsTold::of(run.metrics, kind),
             position_error_m: outcome.error.map(|error| error.value),
             position_error_basis: error_basis(outcome, solver),
             is_determined: is_determined(outcome),
@@ -154,14 +155,14 @@ impl ExperimentFigures {
 }
 
 impl MetricsTold {
-    fn of(metrics: &GantryMetrics, routing: Routing) -> Self {
+    fn of(metrics: &GantryMetrics, kind: Kind) -> Self {
         let [bridge, cart] = metrics.final_position;
         let [bridge_speed, cart_speed] = metrics.final_speed;
         let [bridge_by_drives, cart_by_drives] = metrics.final_by_drives;
         let [peak_bridge_speed, peak_cart_speed] = metrics.peak_speed.map(PeakTold::from);
         let [bridge_error, cart_error] = metrics.peak_error.map(PeakTold::from);
         let [left_speed, right_speed] = metrics.peak_drive_speed.map(PeakTold::from);
-        let peaks = |peaks: &[Peak]| by_span(routing, peaks.iter().map(|peak| super::peak(*peak)));
+        let peaks = |peaks: &[Peak]| by_span(kind, peaks.iter().map(|peak| super::peak(*peak)));
         let [left_current, right_current] = metrics.peak_current.map(PeakTold::from);
         Self {
             end_time_s: metrics.end,
@@ -183,16 +184,18 @@ impl MetricsTold {
             force: peaks(&metrics.peak_force),
             stop_time_s: metrics.stop_time,
             settled: metrics.settled,
-            event_counts: LABELS
+            event_counts: kind
+                .geometry()
+                .bodies
                 .iter()
                 .zip(metrics.events)
-                .map(|(label, count)| CountTold::of(label.key, count))
+                .map(|(body, count)| CountTold::of(body.label.key, count))
                 .collect(),
         }
     }
 }
 
 /// Values of the spans by their keys.
-fn by_span(routing: Routing, values: impl Iterator<Item = Value>) -> Map<String, Value> {
-    routing.spans().iter().map(|span| span.key.to_string()).zip(values).collect()
+fn by_span(kind: Kind, values: impl Iterator<Item = Value>) -> Map<String, Value> {
+    kind.geometry().span_labels().map(|span| span.key.to_string()).zip(values).collect()
 }

@@ -10,7 +10,7 @@ pub fn gantry_modes(analysis: &GantryAnalysis) -> Value {
     let gantry = &analysis.case.gantry;
     let mechanism = gantry.mechanism();
     let modes = &analysis.modes;
-    let spans = gantry.routing.spans().iter().zip(&gantry.belts.stiffness);
+    let spans = gantry.kind.geometry().span_labels().zip(&gantry.belt.stiffness);
     let elastic = modes.elastic.iter().map(|mode| {
         json!({
             "frequency_Hz": mode.hertz(),
@@ -31,7 +31,7 @@ pub fn gantry_modes(analysis: &GantryAnalysis) -> Value {
         "schema": super::identity("gantry-modes"),
         "title": analysis.case.title,
         "version": env!("CARGO_PKG_VERSION"),
-        "kind": gantry.routing.word(),
+        "kind": gantry.kind.word(),
         "assumptions": analysis.words,
         "here": {
             "bridge_position_m": 0.0,

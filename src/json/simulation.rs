@@ -217,7 +217,7 @@ impl Simulation {
             machine: StageFigures::of(&case.machine),
             experiments: runs
                 .iter()
-                .map(|run| ExperimentFigures::of(run, case.machine.amplifier.mode, solver))
+                .map(|run| ExperimentFigures::of(run, case.machine.drives[0].amplifier.mode, solver))
                 .collect(),
         }
     }
@@ -243,8 +243,8 @@ impl SolverUsed {
 
 impl StageFigures {
     fn of(machine: &Machine) -> Self {
-        let (n, r) = (machine.motor.gear_ratio, machine.pulley_radius);
-        let rotor = n * n * machine.motor.rotor_inertia;
+        let (n, r) = (machine.drives[0].motor.gear_ratio, machine.pulley_radius);
+        let rotor = n * n * machine.drives[0].motor.rotor_inertia;
         let (j1, j2, m) = (machine.drive_pulley.inertia, machine.idler_pulley.inertia, machine.cart.mass);
         Self {
             pulley_radius_m: r,
@@ -254,7 +254,7 @@ impl StageFigures {
             rotor_inertia_at_pulley_kg_m2: rotor,
             total_inertia_kg_m2: j1 + j2 + rotor + m * r * r,
             gear_ratio: n,
-            belt_stiffness_newton_per_m: machine.belt.stiffness,
+            belt_stiffness_newton_per_m: machine.belt.stiffness.three(),
         }
     }
 }

@@ -25,7 +25,7 @@ pub(super) fn overview(case: &Case) -> Result<Overview> {
     let mut groups = vec![drive(machine, &mut notes), inertia(machine, &masses, &mut notes)];
     groups.extend(belt(machine, &places));
     groups.extend(limits(machine, &masses, most.as_ref(), &mut notes));
-    of_constants(&machine.motor, "", &mut notes);
+    of_constants(&machine.drives[0].motor, "", &mut notes);
     if machine.belt.model != BeltModel::Rigid {
         of_belt(&machine.belt.sheet, &machine.belt.damping, machine.pulley_radius, &mut notes);
     }
@@ -49,28 +49,35 @@ fn masses(machine: &Machine) -> Masses {
     let r = machine.pulley_radius;
     let [drive, idler] = [&machine.drive_pulley, &machine.idler_pulley].map(|pulley| pulley.inertia / (r * r));
     // n² J_r / r²
-    let rotor = machine.motor.rotor_inertia * (machine.motor.gear_ratio / r).powi(2);
+    let rotor = machine.drives[0].motor.rotor_inertia * (machine.drives[0].motor.gear_ratio / r).powi(2);
     Masses { drive, idler, rotor, total: machine.cart.mass + drive + idler + rotor }
 }
 
 fn drive(machine: &Machine, notes: &mut Vec<Note>) -> Group {
     let mut group = Group::new("drive", "Drive");
-    motor_rows(&mut group, "", &machine.motor);
+    motor_rows(&mut group, "", &machine.drives[0].motor);
     let r = machine.pulley_radius;
-    let amplifier = (machine.amplifier.mode, machine.amplifier.gain);
-    let (force, drag) = drive_at_belt(&machine.motor, amplifier, r);
-    let (per_input, input) = match machine.amplifier.mode {
+    let amplifier = (machine.drives[0].amplifier.mode, machine.drives[0].amplifier.gain);
+    let (force, drag) = drive_at_belt(&machine.drives[0].motor, amplifier, r);
+    let (per_input, input) = match machine.drives[0].amplifier.mode {
         AmplifierMode::Voltage => ("N/V", "V"),
         AmplifierMode::Current => ("N/A", "A"),
     };
     group.add("force_per_input", "force at the belt per input", force, per_input);
     if drag > 0.0 {
-        group.add("drag", "drag of the drive at the cart", drag, "N s/m").how(match machine.motor.is_simple {
-            true => "",
-            false => "of the back-EMF",
-        });
+        group.add("drag", "drag of the drive at the cart", drag, "N s/m").how(
+            match machine.drives[0].motor.is_simple {
+                true => "",
+                false => "of the back-EMF",
+            },
+        );
     }
-    group.add("travel_per_turn", "travel per turn of the motor", 2.0 * PI * r / machine.motor.gear_ratio, "m");
+    group.add(
+        "travel_per_turn",
+        "travel per turn of the motor",
+        2.0 * PI * r / machine.drives[0].motor.gear_ratio,
+        "m",
+    );
     if force > 0.0 {
         let [forward, backward] = [1.0, -1.0].map(|side| machine.breakaway(side, 0.0) / force);
         let row = group.add("breakaway_input", breakaway_name(input), forward, input);
@@ -148,7 +155,7 @@ fn belt(machine: &Machine, places: &[Place]) -> Option<Group> {
 /// By how much the cart gives way per force, the drive pulley held, m/N: the idler pulley turns freely between spans 2
 /// and 3.
 fn compliance(machine: &Machine, x: f64) -> f64 {
-    let [mut k1, mut k2, k3] = machine.belt.stiffness;
+    let [mut k1, mut k2, k3] = machine.belt.stiffness.three();
     if let Some(make) = machine.belt.make.filter(|_| machine.belt.follows_cart) {
         [k1, k2] = make.stiffness_at(x);
     }
@@ -174,7 +181,7 @@ fn place(machine: &Machine, found: &crate::linear::Place) -> Place {
 
 fn limits(machine: &Machine, masses: &Masses, most: Option<&Most>, notes: &mut Vec<Note>) -> Option<Group> {
     let r = machine.pulley_radius;
-    let Some((power, from)) = Power::of(&machine.motor, &machine.amplifier, r, most) else {
+    let Some((power, from)) = Power::of(&machine.drives[0].motor, &machine.drives[0].amplifier, r, most) else {
         let text = "nothing bounds the input: give amplifier.voltage_limit or current_limit to see the largest speed and \
                     acceleration";
         notes.push(Note { code: "no-limit", text: text.to_string() });

@@ -5,8 +5,8 @@ use super::{Group, Note, Overview, Place, belt_mass, drive_at_belt, motor_rows, 
 use crate::case::GantryCase;
 use crate::error::Result;
 use crate::linear::Natural;
-use crate::machine::gantry::{BRIDGE, CART, Gantry};
-use crate::machine::{AmplifierMode, Travel};
+use crate::machine::gantry::{BRIDGE, CART};
+use crate::machine::{AmplifierMode, BeltMake, DriveUnit, Machine, Travel};
 use crate::mechanism::BODIES;
 use std::f64::consts::PI;
 
@@ -25,34 +25,34 @@ pub(super) fn overview(case: &GantryCase) -> Result<Overview> {
     let mut groups =
         vec![drive(gantry, &mut notes), inertia(gantry, &mut notes), belt(gantry, &place(gantry, [0.0, 0.0])?)];
     groups.extend(limits(case, &mut notes));
-    for (motor, side) in gantry.motors.iter().zip(SIDES) {
+    for (motor, side) in gantry.drives.iter().map(|unit| &unit.motor).zip(SIDES) {
         of_constants(motor, &format!("{side} drive: "), &mut notes);
     }
     notes.dedup_by(|a, b| {
         a.code == b.code && a.text.split_once(": ").map(|t| t.1) == b.text.split_once(": ").map(|t| t.1)
     });
-    of_belt(&gantry.belts.sheet, &gantry.belts.damping, gantry.pulley_radius, &mut notes);
-    let (title, kind) = (case.title.clone(), gantry.routing.word());
+    of_belt(&gantry.belt.sheet, &gantry.belt.damping, gantry.pulley_radius, &mut notes);
+    let (title, kind) = (case.title.clone(), gantry.kind.word());
     Ok(Overview { title, kind, groups, places, depends_on_place, notes })
 }
 
 /// The middle of the working area and its corners, where the place makes a difference; else the origin.
-fn corners(gantry: &Gantry) -> Vec<[f64; 2]> {
-    let (Some(_), Some(x), Some(y)) = (&gantry.belts.follows, gantry.bridge.travel, gantry.cart.travel) else {
+fn corners(gantry: &Machine) -> Vec<[f64; 2]> {
+    let (Some(_), Some(x), Some(y)) = (gantry.belt.following(), gantry.first_slide().travel, gantry.cart.travel) else {
         return vec![[0.0, 0.0]];
     };
     let middle = |travel: Travel| 0.5 * (travel.min + travel.max);
     vec![[middle(x), middle(y)], [x.min, y.min], [x.min, y.max], [x.max, y.min], [x.max, y.max]]
 }
 
-fn drive(gantry: &Gantry, notes: &mut Vec<Note>) -> Group {
+fn drive(gantry: &Machine, notes: &mut Vec<Note>) -> Group {
     let mut group = Group::new("drive", "Drives");
     let r = gantry.pulley_radius;
-    let alike = gantry.motors[0] == gantry.motors[1] && gantry.amplifiers[0] == gantry.amplifiers[1];
+    let alike = gantry.drives[0] == gantry.drives[1];
     for (k, side) in SIDES.into_iter().enumerate().take(if alike { 1 } else { 2 }) {
         let prefix = if alike { String::new() } else { format!("{side}_") };
         let before = group.rows.len();
-        let (motor, amplifier) = (&gantry.motors[k], &gantry.amplifiers[k]);
+        let (motor, amplifier) = (&gantry.drives[k].motor, &gantry.drives[k].amplifier);
         motor_rows(&mut group, &prefix, motor);
         let (force, drag) = drive_at_belt(motor, (amplifier.mode, amplifier.gain), r);
         let (per_input, input) = match amplifier.mode {
@@ -86,25 +86,28 @@ fn drive(gantry: &Gantry, notes: &mut Vec<Note>) -> Group {
 }
 
 /// Breakaway along x and along y, N at what moves: that of both pulleys, and of the bridge or the cart.
-fn breakaway(gantry: &Gantry) -> [f64; 2] {
+fn breakaway(gantry: &Machine) -> [f64; 2] {
     let pulleys = 2.0 * gantry.drive_pulley.friction.forward.breakaway / gantry.pulley_radius;
-    [pulleys + gantry.bridge.friction.forward.breakaway, pulleys + gantry.cart.friction.forward.breakaway]
+    [pulleys + gantry.first_slide().friction.forward.breakaway, pulleys + gantry.cart.friction.forward.breakaway]
 }
 
 /// The mass of both pulleys and rotors at the belt, kg.
-fn turning(gantry: &Gantry) -> f64 {
+fn turning(gantry: &Machine) -> f64 {
     let r = gantry.pulley_radius;
-    let rotors: f64 = gantry.motors.iter().map(|motor| motor.rotor_inertia * motor.gear_ratio.powi(2)).sum();
+    let rotors: f64 = {
+        let rotor = |unit: &DriveUnit| unit.motor.rotor_inertia * unit.motor.gear_ratio.powi(2);
+        gantry.drives.iter().map(rotor).sum()
+    };
     (2.0 * gantry.drive_pulley.inertia + rotors) / (r * r)
 }
 
 /// Moved mass along x and along y, kg: both pulleys turn with either.
-fn masses(gantry: &Gantry) -> [f64; 2] {
+fn masses(gantry: &Machine) -> [f64; 2] {
     let turning = turning(gantry);
-    [gantry.bridge.mass + gantry.cart.mass + turning, gantry.cart.mass + turning]
+    [gantry.first_slide().mass + gantry.cart.mass + turning, gantry.cart.mass + turning]
 }
 
-fn inertia(gantry: &Gantry, notes: &mut Vec<Note>) -> Group {
+fn inertia(gantry: &Machine, notes: &mut Vec<Note>) -> Group {
     let mut group = Group::new("inertia", "Moved mass");
     let turning = turning(gantry);
     group.add("turning_mass", "both pulleys and rotors, at the belt", turning, "kg").how("(2 J + n² J_r of both)/r²");
@@ -112,17 +115,17 @@ fn inertia(gantry: &Gantry, notes: &mut Vec<Note>) -> Group {
         group.add(format!("total_mass_{way}"), words, mass, "kg");
         group.add(format!("reflected_share_{way}"), "share of what turns", turning / mass, "");
     }
-    let length = gantry.belts.make.as_ref().map(|make| make.spans.iter().sum::<f64>());
-    belt_mass(&mut group, notes, &gantry.belts.sheet, length, masses(gantry)[0]);
+    let length = gantry.belt.make.as_ref().map(|make| make.spans.iter().sum::<f64>());
+    belt_mass(&mut group, notes, &gantry.belt.sheet, length, masses(gantry)[0]);
     group
 }
 
-fn belt(gantry: &Gantry, place: &Place) -> Group {
+fn belt(gantry: &Machine, place: &Place) -> Group {
     let mut group = Group::new("belt", "Belt, with bridge and cart at zero");
-    if let Some(make) = &gantry.belts.make {
+    if let Some(make) = &gantry.belt.make {
         group.add("specific_stiffness", "specific stiffness E A", make.rigidity(), "N");
     }
-    for (label, stiffness) in gantry.routing.spans().iter().zip(&gantry.belts.stiffness) {
+    for (label, stiffness) in gantry.kind.geometry().span_labels().zip(&gantry.belt.stiffness) {
         group.add(format!("{}_stiffness", label.key), format!("stiffness, {}", label.name), *stiffness, "N/m");
     }
     for ((way, _), stretch) in WAYS.into_iter().zip(&place.stretch) {
@@ -142,19 +145,16 @@ fn belt(gantry: &Gantry, place: &Place) -> Group {
 }
 
 /// The machine with the bridge at x and the cart at y.
-fn place(gantry: &Gantry, [x, y]: [f64; 2]) -> Result<Place> {
+fn place(gantry: &Machine, [x, y]: [f64; 2]) -> Result<Place> {
     let mechanism = gantry.mechanism();
     let mut position = [0.0; BODIES];
     (position[BRIDGE], position[CART]) = (x, y);
     let modes = Natural::of(&mechanism, &position)?;
     let modes = modes.elastic.iter().map(|mode| (mode.hertz(), mode.damping())).collect();
-    let stiffness: Vec<f64> = match gantry.lengths(x, y) {
-        Some(lengths) => {
-            let rigidity = gantry.belts.follows.as_ref().map_or(0.0, |(rigidity, _)| *rigidity);
-            lengths.iter().map(|length| rigidity / length).collect()
-        }
-        None => gantry.belts.stiffness.clone(),
-    };
+    let lengths = gantry.span_lengths(&[x, y]).zip(gantry.belt.make);
+    let stiffness =
+        lengths.map_or(gantry.belt.stiffness, |(lengths, make)| BeltMake { spans: lengths, ..make }.stiffness());
+
     // K = Σ k a aᵀ over what bridge and cart do to the spans, the pulleys held; its inverse says by how much they give
     // way.
     let mut k = [[0.0; 2]; 2];
@@ -169,7 +169,7 @@ fn place(gantry: &Gantry, [x, y]: [f64; 2]) -> Result<Place> {
     }
     let determinant = k[0][0] * k[1][1] - k[0][1] * k[1][0];
     let stretch = vec![k[1][1] / determinant, k[0][0] / determinant];
-    Ok(Place { position: vec![x, y], stiffness, stretch, modes, held: None })
+    Ok(Place { position: vec![x, y], stiffness: stiffness.to_vec(), stretch, modes, held: None })
 }
 
 fn limits(case: &GantryCase, notes: &mut Vec<Note>) -> Option<Group> {
@@ -177,7 +177,7 @@ fn limits(case: &GantryCase, notes: &mut Vec<Note>) -> Option<Group> {
     let r = gantry.pulley_radius;
     let inputs = case.experiments.iter().flat_map(|done| done.inputs.iter().map(|input| (input, done.until)));
     let most = most(None, inputs);
-    let power = |k: usize| Power::of(&gantry.motors[k], &gantry.amplifiers[k], r, most.as_ref());
+    let power = |k: usize| Power::of(&gantry.drives[k].motor, &gantry.drives[k].amplifier, r, most.as_ref());
     let (Some((left, from)), Some((right, _))) = (power(0), power(1)) else {
         let text = "nothing bounds the inputs: give amplifier.voltage_limit or current_limit to see the largest speeds and accelerations";
         notes.push(Note { code: "no-limit", text: text.to_string() });
@@ -187,7 +187,7 @@ fn limits(case: &GantryCase, notes: &mut Vec<Note>) -> Option<Group> {
     let force = left.force.min(right.force);
     group.add("largest_force", "largest force of a motor at the belt", force, "N").how(format!("by {from}"));
     let pulleys = &gantry.drive_pulley.friction.forward;
-    let slides = [&gantry.bridge.friction.forward, &gantry.cart.friction.forward];
+    let slides = [&gantry.first_slide().friction.forward, &gantry.cart.friction.forward];
     for (((way, _), mass), slide) in WAYS.into_iter().zip(masses(gantry)).zip(slides) {
         let coulomb = slide.coulomb + 2.0 * pulleys.coulomb / r;
         let viscous = slide.viscous + 2.0 * pulleys.viscous / (r * r);
@@ -211,6 +211,6 @@ fn limits(case: &GantryCase, notes: &mut Vec<Note>) -> Option<Group> {
                 .how("in the long run");
         }
     }
-    safety(&mut group, notes, &gantry.belts.sheet, gantry.belts.pretension, r, force);
+    safety(&mut group, notes, &gantry.belt.sheet, gantry.belt.pretension, r, force);
     Some(group)
 }

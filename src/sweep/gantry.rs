@@ -4,7 +4,7 @@ use super::measures::{OfPart, of_gantry};
 use super::{Group, Status, put_figures, status};
 use crate::case::{GantryCase, GantryExperiment, Sweeping};
 use crate::error::{Error, Result};
-use crate::machine::gantry::Gantry;
+use crate::machine::Machine;
 use crate::metrics::{GantryMeter, GantryMetrics};
 use crate::parameter;
 use crate::solve::{Course, Detail, Flow, Outcome, Solver, stream_mechanism};
@@ -13,7 +13,7 @@ use crate::trajectory::Trajectory;
 /// A gantry, and what each of its machines does.
 #[derive(Debug, Clone)]
 pub(super) struct Swept {
-    pub gantry: Gantry,
+    pub gantry: Machine,
     experiments: Vec<GantryExperiment>,
     figures: Vec<OfPart>,
 }
@@ -51,7 +51,7 @@ impl Swept {
     /// Runs one experiment of a machine, for its rows.
     pub fn stream(
         &self,
-        gantry: &Gantry,
+        gantry: &Machine,
         experiment: usize,
         sink: &mut dyn FnMut(&Trajectory) -> Flow,
     ) -> Result<Outcome> {
@@ -63,7 +63,7 @@ impl Swept {
     }
 
     /// Adds status and figures of all that a machine does.
-    pub fn run(&self, gantry: &Gantry, values: &mut Vec<f64>) {
+    pub fn run(&self, gantry: &Machine, values: &mut Vec<f64>) {
         let machine = check(gantry).map(|()| gantry.mechanism());
         for experiment in &self.experiments {
             let run = |mechanism: &_| -> Result<(Status, GantryMetrics)> {
@@ -80,7 +80,7 @@ impl Swept {
 }
 
 /// Refuses numbers that are no machine.
-fn check(gantry: &Gantry) -> Result<()> {
+fn check(gantry: &Machine) -> Result<()> {
     parameter::check(gantry)?;
-    gantry.check()
+    gantry.check_gantry()
 }

@@ -41,8 +41,7 @@ pub use summary::{Drawn, Measured, Shown, Summary};
 use crate::case::Sampling;
 use crate::error::Result;
 use crate::machine::Machine;
-use crate::machine::gantry::Gantry;
-use crate::parameter::{self, Free, Numbers};
+use crate::parameter::{self, Free};
 use crate::solve::{Ending, Flow, Outcome, PositionError};
 use crate::trajectory::{Column, Trajectory};
 use points::Points;
@@ -121,7 +120,7 @@ pub enum Swept {
     /// An axis.
     Axis(Box<Machine>),
     /// A gantry.
-    Gantry(Box<Gantry>),
+    Gantry(Box<Machine>),
 }
 
 impl Swept {
@@ -134,7 +133,7 @@ impl Swept {
     }
 
     /// It, where it is a gantry.
-    pub fn gantry(&self) -> Option<&Gantry> {
+    pub fn gantry(&self) -> Option<&Machine> {
         match self {
             Swept::Axis(_) => None,
             Swept::Gantry(gantry) => Some(gantry),
@@ -164,7 +163,7 @@ enum Subject {
 }
 
 impl Subject {
-    fn numbers(&self) -> &dyn Numbers {
+    fn numbers(&self) -> &Machine {
         match self {
             Subject::Axis(axis) => &axis.machine,
             Subject::Gantry(swept) => &swept.gantry,
@@ -190,7 +189,7 @@ impl Subject {
 /// Runs machines of a subject, one after another.
 enum Worker<'a> {
     Axis(Box<axis::Worker<'a>>),
-    Gantry(&'a gantry::Swept, Box<Gantry>),
+    Gantry(&'a gantry::Swept, Box<Machine>),
 }
 
 impl<'a> Worker<'a> {
@@ -202,7 +201,7 @@ impl<'a> Worker<'a> {
     }
 
     /// The machine as the case has it, for numbers to be set.
-    fn reset(&mut self) -> &mut dyn Numbers {
+    fn reset(&mut self) -> &mut Machine {
         match self {
             Worker::Axis(worker) => worker.reset(),
             Worker::Gantry(swept, gantry) => {
@@ -294,7 +293,7 @@ impl Sweep {
     }
 
     /// The same machine with the numbers of a run.
-    fn with_run<M: Numbers + Clone>(&self, nominal: &M, run: u64) -> M {
+    fn with_run(&self, nominal: &Machine, run: u64) -> Machine {
         let mut machine = nominal.clone();
         let mut values = Vec::with_capacity(self.inputs());
         self.put_values(run, &mut values);
@@ -347,7 +346,7 @@ impl Sweep {
     }
 
     /// Sets everything to its value in this run.
-    fn set(&self, machine: &mut dyn Numbers, run: u64, values: &[f64]) {
+    fn set(&self, machine: &mut Machine, run: u64, values: &[f64]) {
         let drawn = self.draws.iter().flat_map(|draws| &draws.free);
         let varied = self.parameters.iter().enumerate();
         let free = drawn

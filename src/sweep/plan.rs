@@ -6,7 +6,8 @@ use super::{DIMENSIONS, Distribution, Draws, Group, Parameter, Subject, Sweep, a
 use crate::case::{Case, GantryCase, Kinds, Known, Opened, Origin, Prior, Sampling, Sweeping, Variation};
 use crate::error::{Error, Result};
 use crate::fit;
-use crate::parameter::{Free, Numbers, every};
+use crate::machine::Machine;
+use crate::parameter::{Free, every};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -122,7 +123,7 @@ fn keys(plan: &Sweeping) -> impl Iterator<Item = &str> {
 
 /// The numbers that are varied by themselves, and how.
 fn chosen(
-    machine: &dyn Numbers,
+    machine: &Machine,
     known: &[Known],
     plan: &Sweeping,
     draws: Option<&Draws>,
@@ -173,14 +174,14 @@ fn chosen(
 }
 
 /// The range of a parameter: that in the table of parameters, and that of the plan.
-fn allowed(machine: &dyn Numbers, free: &Free, variation: &Variation) -> [f64; 2] {
+fn allowed(machine: &Machine, free: &Free, variation: &Variation) -> [f64; 2] {
     let row = free.keys.first().and_then(|(key, _)| machine.row(key)).filter(|_| !free.name.starts_with("total."));
     let [low, high] = row.map_or([0.0, f64::MAX], |row| [row.range.low, row.range.high]);
     let [least, most] = variation.within.unwrap_or([low, high]);
     [low.max(least), high.min(most)]
 }
 
-fn distribution(machine: &dyn Numbers, free: &Free, variation: &Variation, design: Sampling) -> Result<Distribution> {
+fn distribution(machine: &Machine, free: &Free, variation: &Variation, design: Sampling) -> Result<Distribution> {
     let start = free.start;
     let within = allowed(machine, free, variation);
     let inside = |values: Vec<f64>| match values.iter().find(|value| !(within[0]..=within[1]).contains(*value)) {

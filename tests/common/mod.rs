@@ -13,31 +13,36 @@ pub mod wrong;
 
 use taut::case::{Experiment, Initial};
 use taut::friction::{Friction, Law, Shape};
-use taut::machine::{Amplifier, AmplifierMode, Belt, BeltMake, Cart, Machine, Motor, Pulley, Travel};
+use taut::machine::{
+    Amplifier, AmplifierMode, Belt, BeltMake, DriveUnit, Kind, Machine, Motor, Pulley, Slide, Spans, Travel,
+};
 use taut::signal::Signal;
 
 /// A stage with the paper's motor and radius.
-pub fn paper_stage(stiffness: [f64; 3], inertia: f64, pulley: Friction, cart: Friction) -> Machine {
+pub fn paper_stage(stiffness: impl Into<Spans>, inertia: f64, pulley: Friction, cart: Friction) -> Machine {
     let pulley = Pulley { inertia, friction: pulley };
     Machine {
-        motor: Motor {
-            torque_constant: 0.023,
-            back_emf_constant: 0.023,
-            resistance: 0.71,
-            inductance: 0.0,
-            rotor_inertia: 0.0,
-            gear_ratio: 1.0,
-            gear_efficiency: 1.0,
-            gear_play: None,
-            is_simple: false,
-        },
-        amplifier: Amplifier::ideal(AmplifierMode::Voltage, 1.0),
+        kind: Kind::Axis,
+        drives: vec![DriveUnit {
+            motor: Motor {
+                torque_constant: 0.023,
+                back_emf_constant: 0.023,
+                resistance: 0.71,
+                inductance: 0.0,
+                rotor_inertia: 0.0,
+                gear_ratio: 1.0,
+                gear_efficiency: 1.0,
+                gear_play: None,
+                is_simple: false,
+            },
+            amplifier: Amplifier::ideal(AmplifierMode::Voltage, 1.0),
+        }],
+        bridge: None,
         pulley_radius: 0.0194,
         drive_pulley: pulley,
         idler_pulley: pulley,
-        cart: Cart::new(0.362, cart),
+        cart: Slide::new(0.362, cart),
         belt: Belt::given(stiffness, [0.0; 3]),
-        travel: None,
         encoder: None,
         scale: None,
     }
@@ -93,9 +98,9 @@ pub fn with_bristles(mut machine: Machine, stiffness: f64) -> Machine {
 
 /// A belt of the paper's lengths whose spans follow the cart.
 pub fn with_following_spans(mut machine: Machine) -> Machine {
-    let make = BeltMake { modulus: 8.335e9, section: 5.5626e-6, spans: [0.34925, 0.34925, 0.7874] };
+    let make = BeltMake { modulus: 8.335e9, section: 5.5626e-6, spans: [0.34925, 0.34925, 0.7874].into() };
     (machine.belt.make, machine.belt.follows_cart) = (Some(make), true);
     machine.belt.stiffness = make.stiffness();
-    machine.travel = Some(Travel { min: -0.3, max: 0.3, stop: None });
+    machine.cart.travel = Some(Travel { min: -0.3, max: 0.3, stop: None });
     machine
 }

@@ -4,7 +4,8 @@ use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use taut::friction::{Friction, Side};
 use taut::machine::{
-    Amplifier, AmplifierMode, Belt, BeltModel, Cart, CartForces, EndStop, GearPlay, Machine, Motor, Pulley, Travel,
+    Amplifier, AmplifierMode, Belt, BeltModel, DriveUnit, EndStop, GearPlay, Kind, Machine, Motor, Pulley, Slide,
+    SlideForces, Travel,
 };
 use taut::polyline::Polyline;
 use taut::signal::Signal;
@@ -84,21 +85,21 @@ pub fn machine(dry: Dry) -> impl Strategy<Value = Machine> {
     let pulley = move || {
         (decades(1e-5, 5e-4), friction(0.0016, 0.015, dry)).prop_map(|(inertia, friction)| Pulley { inertia, friction })
     };
-    let cart = (decades(0.05, 3.0), friction(19.0, 0.2, dry)).prop_map(|(mass, friction)| Cart::new(mass, friction));
+    let cart = (decades(0.05, 3.0), friction(19.0, 0.2, dry)).prop_map(|(mass, friction)| Slide::new(mass, friction));
     let stiffness = || decades(2e3, 5e5);
     let damping = || prop_oneof![2 => Just(0.0), 1 => decades(0.1, 30.0)];
     let belt = ([stiffness(), stiffness(), stiffness()], [damping(), damping(), damping()])
         .prop_map(|(stiffness, damping)| Belt::given(stiffness, damping));
     (motor, amplifier, decades(0.005, 0.04), pulley(), cart, pulley(), belt).prop_map(
         |(motor, amplifier, pulley_radius, drive_pulley, cart, idler_pulley, belt)| Machine {
-            motor,
-            amplifier,
+            kind: Kind::Axis,
+            drives: vec![DriveUnit { motor, amplifier }],
+            bridge: None,
             pulley_radius,
             drive_pulley,
             cart,
             idler_pulley,
             belt,
-            travel: None,
             encoder: None,
             scale: None,
         },
@@ -151,20 +152,20 @@ pub fn equipped(dry: Dry) -> impl Strategy<Value = Machine> {
     let more = (now_and_then(decades(0.2, 30.0)), now_and_then(-2.0..2.0_f64), model);
     (machine(dry), limits, gear, stops, more).prop_map(move |(mut machine, limits, gear, stops, more)| {
         let (voltage_limit, current_limit, bandwidth) = limits;
-        let amplifier = &mut machine.amplifier;
+        let DriveUnit { amplifier, motor } = &mut machine.drives[0];
         amplifier.voltage_limit = voltage_limit;
         amplifier.current_limit = current_limit;
         if amplifier.mode == AmplifierMode::Current {
             amplifier.bandwidth = bandwidth;
-            if voltage_limit.is_some() && bandwidth.is_some() != (machine.motor.inductance > 0.0) {
+            if voltage_limit.is_some() && bandwidth.is_some() != (motor.inductance > 0.0) {
                 amplifier.voltage_limit = None;
             }
         }
         if let Some((backlash, stiffness, damping, rotor)) = gear {
-            machine.motor.gear_play = Some(GearPlay { backlash, stiffness, damping });
-            machine.motor.rotor_inertia = rotor;
+            motor.gear_play = Some(GearPlay { backlash, stiffness, damping });
+            motor.rotor_inertia = rotor;
         }
-        machine.travel = stops.map(|(end, stiffness, damping)| Travel {
+        machine.cart.travel = stops.map(|(end, stiffness, damping)| Travel {
             min: -end,
             max: end,
             stop: Some(EndStop { stiffness, damping }),
@@ -184,7 +185,7 @@ pub fn equipped(dry: Dry) -> impl Strategy<Value = Machine> {
 pub fn lined(dry: Dry) -> impl Strategy<Value = Machine> {
     (equipped(dry), now_and_then(line(0.05, 1.0, dry)), now_and_then(line(0.5, 1.0, dry))).prop_map(
         |(mut machine, along, by_speed)| {
-            machine.cart.forces = CartForces { along, by_speed };
+            machine.cart.forces = SlideForces { along, by_speed };
             machine
         },
     )
@@ -192,7 +193,7 @@ pub fn lined(dry: Dry) -> impl Strategy<Value = Machine> {
 
 /// Whether flanks, spans or end stops may strike again and again, so that an error grows tenfold every few strikes.
 pub fn rattles(machine: &Machine) -> bool {
-    machine.motor.gear_play.is_some() || machine.travel.is_some() || machine.belt.pretension.is_some()
+    machine.drives[0].motor.gear_play.is_some() || machine.cart.travel.is_some() || machine.belt.pretension.is_some()
 }
 
 /// Inputs made of straight pieces whose edges fall anywhere.

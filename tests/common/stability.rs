@@ -21,7 +21,7 @@ pub fn is_that_of_runs(name: &str, case: &Case, every: usize) {
     let design = case.controller.as_ref().unwrap();
     let louder = |step: usize| {
         let mut machine = case.machine.clone();
-        machine.amplifier.gain *= 1.2f64.powi(step as i32 - 12);
+        machine.drives[0].amplifier.gain *= 1.2f64.powi(step as i32 - 12);
         machine
     };
     let feedback = Feedback::new(design, &case.machine).unwrap();

@@ -2,7 +2,7 @@
 
 use super::{bits, rows};
 use taut::case::{GantryCase, Given, Sampling};
-use taut::machine::gantry::Routing;
+use taut::machine::Kind;
 use taut::metrics::{GantryMeter, GantryMetrics};
 use taut::parameter::{Free, every, values};
 use taut::solve::{Course, Detail, Flow, Solver, stream_mechanism};
@@ -142,16 +142,16 @@ fn figures_are_those_of_the_columns() {
             let [left, right, x, y] = ["left_angle", "right_angle", "bridge_position", "cart_position"].map(column);
             let r = gantry.pulley_radius;
             // Two spans tell of all: those of a belt add up to nothing.
-            let (spans, signs) = match gantry.routing {
-                Routing::HFrame => (["left_span", "right_span"], [[1.0, 1.0, 1.0], [-1.0, 1.0, -1.0]]),
-                Routing::CoreXy => (["a_out_span", "b_out_span"], [[1.0, -1.0, -1.0], [1.0, -1.0, 1.0]]),
+            let (spans, signs) = match gantry.kind {
+                Kind::HFrame => (["left_span", "right_span"], [[1.0, 1.0, 1.0], [-1.0, 1.0, -1.0]]),
+                Kind::Axis | Kind::CoreXy => (["a_out_span", "b_out_span"], [[1.0, -1.0, -1.0], [1.0, -1.0, 1.0]]),
             };
             for ((span, [of_angle, of_x, of_y]), angle) in spans.into_iter().zip(signs).zip([left, right]) {
                 let stretch =
                     angle.iter().zip(x).zip(y).map(|((angle, x), y)| of_angle * r * angle + of_x * x + of_y * y);
                 near(&format!("peak_{span}_stretch"), most(stretch), 50e-9);
             }
-            for span in gantry.routing.spans() {
+            for span in gantry.kind.geometry().span_labels() {
                 near(
                     &format!("peak_{}_force", span.key),
                     most(column(&format!("{}_force", span.key)).iter().copied()),
@@ -226,16 +226,16 @@ fn drives_that_are_alike_are_off_alike() {
     assert_eq!((other.start, left.start, other.overlaps(&left)), (0.71, 0.8, false));
     let mut gantry = apart;
     other.set(&mut gantry, 1.0);
-    assert_eq!(gantry.motors.map(|motor| motor.resistance), [0.8, 1.0]);
+    assert_eq!(gantry.drives.iter().map(|unit| unit.motor.resistance).collect::<Vec<_>>(), [0.8, 1.0]);
 
     // Off by a share is a factor on the value, the same for both.
     let sweep = sweep(H_FRAME, &["sweep.runs=20", "sweep.vary.all=20 %"]);
     for run in 0..20 {
         let machine = sweep.machine(run);
         let gantry = machine.gantry().unwrap();
-        assert_eq!(gantry.motors[0], gantry.motors[1]);
-        assert!((0.8 * 0.71..1.2 * 0.71).contains(&gantry.motors[0].resistance));
-        for friction in [gantry.drive_pulley.friction, gantry.bridge.friction, gantry.cart.friction] {
+        assert_eq!(gantry.drives[0].motor, gantry.drives[1].motor);
+        assert!((0.8 * 0.71..1.2 * 0.71).contains(&gantry.drives[0].motor.resistance));
+        for friction in [gantry.drive_pulley.friction, gantry.first_slide().friction, gantry.cart.friction] {
             assert_eq!(friction.forward, friction.backward);
             assert!(friction.forward.breakaway >= friction.forward.coulomb);
         }

@@ -14,7 +14,7 @@ const MOST_DELAY: f64 = 1000.0;
 
 pub(super) fn controller(root: &Table, machine: &Machine) -> Result<Option<Design>> {
     let Some(field) = root.optional("controller") else { return Ok(None) };
-    let input_unit = if machine.amplifier.mode == AmplifierMode::Current { "A" } else { "V" };
+    let input_unit = if machine.drives[0].amplifier.mode == AmplifierMode::Current { "A" } else { "V" };
     let field = Field { input_unit, ..field };
     let table = field.table()?;
     table.check_keys(&[], &[])?;
@@ -106,7 +106,7 @@ fn structure(table: &Table, machine: &Machine, (every, delay): (f64, f64)) -> Re
 fn cascade(field: &Field, machine: &Machine) -> Result<Cascade> {
     let current = match field.table()?.optional("current") {
         None => None,
-        Some(current) if machine.amplifier.mode == AmplifierMode::Current => {
+        Some(current) if machine.drives[0].amplifier.mode == AmplifierMode::Current => {
             return Err(current
                 .fail("the amplifier commands the current itself: there is no loop to close")
                 .next("leave it out, or set amplifier.mode = \"voltage\""));

@@ -5,7 +5,7 @@ use super::reader::{Field, Table, nearest};
 use super::tree::Kind;
 use crate::error::Result;
 use crate::machine::Machine;
-use crate::parameter::{self, Free, INPUT, Numbers, Parameter, Range};
+use crate::parameter::{self, Free, INPUT, Parameter, Range};
 
 /// The free parameters of a fit, and how it is done.
 #[derive(Debug, Clone, PartialEq)]
@@ -335,7 +335,7 @@ fn closed(field: &Field, table: &Table, root: &Table, experiments: &[Experiment]
 }
 
 /// Refuses a name that is no parameter of this machine.
-pub(super) fn free(field: &Field, name: &str, machine: &dyn Numbers) -> Result<()> {
+pub(super) fn free(field: &Field, name: &str, machine: &Machine) -> Result<()> {
     Free::new(machine, name, &[], &[]).map(|_| ()).map_err(|error| {
         let mut told = field.fail(error.what);
         (told.allowed, told.next) = (error.allowed, error.next);

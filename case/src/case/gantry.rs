@@ -7,9 +7,11 @@ use super::{
     Case, Files, InputFile, Sweeping, Unread, input, listed, machine, named, set, sheet, sweep, times, title, unique,
 };
 use crate::error::{Error, Result};
-use crate::machine::gantry::{BRIDGE, Belts, CART, Gantry, LEFT, Make, RIGHT, Routing, Slide};
-use crate::machine::{AmplifierMode, BeltSheet, Encoder, EncoderPlace};
-use crate::mechanism::{Amplifier, Motor, State};
+use crate::friction::Friction;
+use crate::machine::{
+    AmplifierMode, Belt, BeltMake, BeltSheet, DriveUnit, Encoder, EncoderPlace, Kind, Machine, Pulley, Slide, Spans,
+};
+use crate::mechanism::State;
 use crate::plan::GantryExperiment;
 use crate::signal::Signal;
 use std::collections::HashMap;
@@ -21,7 +23,7 @@ pub struct GantryCase {
     /// The title of the file; its name where it has none.
     pub title: String,
     /// The machine.
-    pub gantry: Gantry,
+    pub gantry: Machine,
     /// The experiments, in the file's order.
     pub experiments: Vec<GantryExperiment>,
     /// The experiments whose files were not read; none but where [`Opened::read_for`] left them out.
@@ -109,15 +111,15 @@ impl Opened {
 }
 
 /// Which gantry the file describes; none for an axis.
-pub(super) fn kind(root: &Table) -> Result<Option<Routing>> {
-    let kinds = [("axis", None), ("h-frame", Some(Routing::HFrame)), ("core-xy", Some(Routing::CoreXy))];
+pub(super) fn kind(root: &Table) -> Result<Option<Kind>> {
+    let kinds = [("axis", None), ("h-frame", Some(Kind::HFrame)), ("core-xy", Some(Kind::CoreXy))];
     root.optional("kind").map_or(Ok(None), |field| field.choice(&kinds))
 }
 
 /// The error where an axis is wanted.
-pub(super) fn no_axis(root: &Table, routing: Routing) -> Error {
+pub(super) fn no_axis(root: &Table, kind: Kind) -> Error {
     let field = root.optional("kind").unwrap_or_else(|| root.field.clone());
-    let what = format!("this needs a single axis, and the case describes a gantry ({})", routing.name());
+    let what = format!("this needs a single axis, and the case describes a gantry ({})", kind.name());
     field.fail(what).allowed("kind = \"axis\", or no kind at all").next(
         "`taut simulate`, `taut modes` and `taut sweep` take gantries; control, fit and tuning of them are yet to come",
     )
@@ -142,7 +144,7 @@ impl GantryCase {
     /// every = 1e-3
     /// "#;
     /// let case = GantryCase::from_text_with("frame.toml", text, &["bridge.mass=1 kg"])?;
-    /// assert_eq!(case.gantry.bridge.mass, 1.0);
+    /// assert_eq!(case.gantry.first_slide().mass, 1.0);
     /// # Ok::<(), taut::Error>(())
     /// ```
     pub fn from_text_with(name: impl AsRef<Path>, text: &str, changes: &[&str]) -> Result<Self> {
@@ -157,7 +159,7 @@ impl GantryCase {
         let source = set::apply(name, text.strip_prefix('\u{feff}').unwrap_or(text), changes)?;
         let tree = source.tree()?;
         let root = Field::root(&source, &tree).table()?;
-        let Some(routing) = kind(&root)? else {
+        let Some(kind) = kind(&root)? else {
             return Err(Error::new("this case describes an axis, not a gantry")
                 .in_file(name)
                 .next("write kind = \"h-frame\" or \"core-xy\" at its top"));
@@ -193,8 +195,8 @@ impl GantryCase {
         ];
         root.check_keys(&tables, &[])?;
         let folder = Folder::of(name, files);
-        let gantry = gantry(&root, routing)?;
-        gantry.check().map_err(|error| if error.place.is_none() { error.in_file(name) } else { error })?;
+        let gantry = gantry(&root, kind)?;
+        gantry.check_gantry().map_err(|error| if error.place.is_none() { error.in_file(name) } else { error })?;
         let (experiments, unread) = experiments(&root, &gantry, &folder)?;
         let title = title(&root, name)?;
         let context = sweep::Context {
@@ -219,19 +221,19 @@ fn table<'a>(root: &Table<'a>, name: &str, holds: &str) -> Result<Table<'a>> {
     root.required(name, &format!("a table [{name}] with {holds}"))?.table()
 }
 
-fn gantry(root: &Table, routing: Routing) -> Result<Gantry> {
+fn gantry(root: &Table, kind: Kind) -> Result<Machine> {
     let drives = [drive(root, "left_drive")?, drive(root, "right_drive")?];
     let pulley = table(root, "drive_pulley", "radius and inertia")?;
     pulley.check_keys(&[], &[])?;
     let belt = table(root, "belt", "stiffness")?;
-    let belts = belts(&belt, routing)?;
+    let belts = belts(&belt, kind)?;
     if let Some(field) = root.optional("drive") {
         return Err(field
             .fail("this belongs to an axis")
             .next("give the data of the gantry's motors in [motor], such as speed_constant and resistance"));
     }
     let [bridge, cart] = [slide(root, "bridge")?, slide(root, "cart")?];
-    if let Some(field) = belt.optional("follows_cart").filter(|_| belts.follows.is_some()) {
+    if let Some(field) = belt.optional("follows_cart").filter(|_| belts.follows_cart) {
         for (name, slide) in [("bridge", &bridge), ("cart", &cart)] {
             if slide.travel.is_none() {
                 return Err(field
@@ -243,25 +245,26 @@ fn gantry(root: &Table, routing: Routing) -> Result<Gantry> {
         }
     }
     let encoder = root.optional("encoder").map(|field| encoder(&field.table()?)).transpose()?;
-    let mut gantry = Gantry {
-        routing,
-        motors: drives.map(|(motor, _)| motor),
-        amplifiers: drives.map(|(_, amplifier)| amplifier),
+    let mut gantry = Machine {
+        kind,
+        drives: drives.into(),
         pulley_radius: machine::radius(&pulley, sheet::pitch(root)?)?,
         drive_pulley: machine::pulley(&pulley)?,
-        bridge,
+        idler_pulley: Pulley { inertia: 0.0, friction: Friction::default() },
+        bridge: Some(bridge),
         cart,
-        belts,
+        belt: belts,
         encoder,
+        scale: None,
     };
     if let Some(proportion) = sheet::proportion(&belt, &gantry.mechanism())? {
-        gantry.belts.damping = gantry.belts.stiffness.iter().map(|stiffness| proportion * stiffness).collect();
+        gantry.belt.damping = gantry.belt.stiffness.map(|stiffness| proportion * stiffness);
     }
     Ok(gantry)
 }
 
 /// Motor and amplifier of a side: those of both, with what its own table says.
-fn drive(root: &Table, side: &str) -> Result<(Motor, Amplifier)> {
+fn drive(root: &Table, side: &str) -> Result<DriveUnit> {
     let own = root.optional(side).map(|field| field.table()).transpose()?;
     if let Some(own) = &own {
         own.check_keys(&["motor", "amplifier"], &[])?;
@@ -283,7 +286,7 @@ fn drive(root: &Table, side: &str) -> Result<(Motor, Amplifier)> {
         None => table(root, "motor", "torque_constant, back_emf_constant and resistance")?,
     };
     let amplifier = machine::amplifier(part("amplifier")?.as_ref(), Some(&motor))?;
-    Ok((machine::motor(&motor)?, amplifier))
+    Ok(DriveUnit { motor: machine::motor(&motor)?, amplifier })
 }
 
 /// The bridge, or the cart on it: both have the same keys.
@@ -292,17 +295,18 @@ fn slide(root: &Table, name: &str) -> Result<Slide> {
     let table = field.table()?;
     table.check_keys(&[], &[])?;
     let travel = table.optional("travel").map(|field| machine::travel(&field.table()?)).transpose()?;
-    Ok(Slide { mass: table.number("mass")?, friction: friction(&table)?, travel })
+    Ok(Slide { travel, ..Slide::new(table.number("mass")?, friction(&table)?) })
 }
 
-fn belts(table: &Table, routing: Routing) -> Result<Belts> {
+fn belts(table: &Table, kind: Kind) -> Result<Belt> {
     table.check_keys(&["follows_cart", "type"], &[])?;
     let sheet = sheet::belt(table)?;
-    let labels: Vec<&str> = routing.spans().iter().map(|span| span.name.trim_end_matches(" span")).collect();
+    let labels: Vec<&str> = kind.geometry().span_labels().map(|span| span.name.trim_end_matches(" span")).collect();
     let count = labels.len();
     let per_span = format!("{count} values: {}", labels.join(", "));
     let pretension = table.number_if_given("pretension")?;
-    let damping = table.optional("damping").map_or(Ok(vec![0.0; count]), |field| field.numbers(count, &per_span))?;
+    let per_span_of = |field: &Field| -> Result<Spans> { Ok(field.numbers(count, &per_span)?.into_iter().collect()) };
+    let damping = table.optional("damping").map_or(Ok(Spans::all(count, 0.0)), |field| per_span_of(&field))?;
     let follows = table.optional("follows_cart").map_or(Ok(false), |field| field.truth())?;
     let make = ["modulus", "section", "specific_stiffness", "spans"];
     if let Some(stiffness) = table.optional("stiffness") {
@@ -317,8 +321,7 @@ fn belts(table: &Table, routing: Routing) -> Result<Belts> {
                 .fail("a given stiffness does not say how it changes with the length of a span")
                 .next("give modulus, section and spans instead of stiffness"));
         }
-        let stiffness = stiffness.numbers(count, &per_span)?;
-        return Ok(Belts { stiffness, damping, pretension, make: None, follows: None, sheet });
+        return Ok(Belt { pretension, sheet, ..Belt::given(per_span_of(&stiffness)?, damping) });
     }
     if make.iter().all(|key| table.optional(key).is_none()) && sheet.kind.is_none() {
         let example = vec!["\"100 kN/m\""; count].join(", ");
@@ -327,15 +330,14 @@ fn belts(table: &Table, routing: Routing) -> Result<Belts> {
     }
     let (modulus, section, is_specific) = machine::rigidity(table, &sheet)?;
     let spans = vec!["\"0.5 m\""; count].join(", ");
-    let lengths = table.required("spans", &format!("for example spans = [{spans}]"))?.numbers(count, &per_span)?;
-    let make = Make { modulus, section, spans: lengths };
+    let spans = per_span_of(&table.required("spans", &format!("for example spans = [{spans}]"))?)?;
+    let make = BeltMake { modulus, section, spans };
     let stiffness = make.stiffness();
     for k in &stiffness {
         table.computed("stiffness", &table.field, *k)?;
     }
-    let follows = follows.then(|| (make.rigidity(), make.spans.clone()));
     let sheet = BeltSheet { is_specific, ..sheet };
-    Ok(Belts { stiffness, damping, pretension, make: Some(make), follows, sheet })
+    Ok(Belt { pretension, make: Some(make), follows_cart: follows, sheet, ..Belt::given(stiffness, damping) })
 }
 
 fn encoder(table: &Table) -> Result<Encoder> {
@@ -345,7 +347,7 @@ fn encoder(table: &Table) -> Result<Encoder> {
     Ok(Encoder { at, lines: sheet::lines(table)? })
 }
 
-fn experiments(root: &Table, gantry: &Gantry, folder: &Folder) -> Result<Experiments<GantryExperiment, State>> {
+fn experiments(root: &Table, gantry: &Machine, folder: &Folder) -> Result<Experiments<GantryExperiment, State>> {
     let (mut experiments, mut unread, mut files) = (Vec::new(), Vec::new(), HashMap::new());
     for (place, field) in listed(root)?.into_iter().enumerate() {
         let field = field.named("experiment");
@@ -364,7 +366,7 @@ fn experiments(root: &Table, gantry: &Gantry, folder: &Folder) -> Result<Experim
     Ok((experiments, unread))
 }
 
-fn experiment(field: &Field, gantry: &Gantry, folder: &Folder) -> Result<GantryExperiment> {
+fn experiment(field: &Field, gantry: &Machine, folder: &Folder) -> Result<GantryExperiment> {
     let table = field.table()?;
     table.check_keys(&["name", "input"], &["log"])?;
     let name = named(&table)?;
@@ -382,7 +384,7 @@ fn experiment(field: &Field, gantry: &Gantry, folder: &Folder) -> Result<GantryE
     let signal = |side: usize| match inputs.optional(sides[side]) {
         None => Ok(Signal::Step { value: 0.0, at: 0.0 }),
         Some(field) => {
-            let input_unit = match gantry.amplifiers[side].mode {
+            let input_unit = match gantry.drives[side].amplifier.mode {
                 AmplifierMode::Voltage => "V",
                 AmplifierMode::Current => "A",
             };
@@ -397,31 +399,28 @@ fn experiment(field: &Field, gantry: &Gantry, folder: &Folder) -> Result<GantryE
 }
 
 /// Where bridge and cart are; the pulleys where the belt is without strain, unless they are given.
-fn initial(table: &Table, gantry: &Gantry) -> Result<State> {
+fn initial(table: &Table, gantry: &Machine) -> Result<State> {
     table.check_keys(&[], &[])?;
-    let mut state = State::default();
-    let [x, y] = [table.number("bridge_position")?, table.number("cart_position")?];
-    let [vx, vy] = [table.number("bridge_speed")?, table.number("cart_speed")?];
-    (state.position[BRIDGE], state.position[CART]) = (x, y);
-    (state.speed[BRIDGE], state.speed[CART]) = (vx, vy);
-    let (angles, speeds) = (gantry.angles(x, y), gantry.angles(vx, vy));
-    let mut shaft = 4;
-    for (body, side) in [(LEFT, "left"), (RIGHT, "right")] {
-        state.position[body] = table.number_if_given(&format!("{side}_angle"))?.unwrap_or(angles[body]);
-        state.speed[body] = table.number_if_given(&format!("{side}_speed"))?.unwrap_or(speeds[body]);
+    let two = |of: [&str; 2]| -> Result<[f64; 2]> { Ok([table.number(of[0])?, table.number(of[1])?]) };
+    let (positions, speeds) = (["bridge_position", "cart_position"], ["bridge_speed", "cart_speed"]);
+    let mut state = gantry.without_strain(&two(positions)?, &two(speeds)?);
+    for (index, (drive, side)) in gantry.mechanism().drives.iter().zip(["left", "right"]).enumerate() {
+        let body = drive.pulley;
+        if let Some(angle) = table.number_if_given(&format!("{side}_angle"))? {
+            state.position[body] = angle;
+        }
+        if let Some(speed) = table.number_if_given(&format!("{side}_speed"))? {
+            state.speed[body] = speed;
+        }
+        // The rotor in the middle of its play.
+        (state.position[drive.shaft], state.speed[drive.shaft]) = (state.position[body], state.speed[body]);
         if let Some(field) = table.optional(&format!("{side}_current")) {
-            let drive = &gantry.mechanism().drives[body];
             if !drive.has_current_state() {
                 return Err(field.fail("this current would have no effect").next(
                     "it needs an inductance above zero in voltage mode, or a bandwidth in current mode; or leave it out",
                 ));
             }
-            state.current[body] = field.number()?;
-        }
-        if gantry.motors[body].gear_play.is_some() {
-            // The rotor in the middle of its play.
-            (state.position[shaft], state.speed[shaft]) = (state.position[body], state.speed[body]);
-            shaft += 1;
+            state.current[index] = field.number()?;
         }
     }
     Ok(state)

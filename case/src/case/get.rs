@@ -4,6 +4,7 @@ use super::source::Source;
 use super::tree::{Kind, Node};
 use super::{Case, GantryCase, Opened, set};
 use crate::error::{Error, Result};
+use crate::machine::Machine;
 use crate::parameter::{self, Fallback, Parameter};
 use crate::quantity;
 use std::path::Path;
@@ -42,7 +43,7 @@ impl Case {
     /// ```
     pub fn value(&self, key: &str) -> Result<Given> {
         let place = |section: &str| section.to_string();
-        value(&self.text, key, &Rows { input_unit: |_| self.machine.amplifier.mode.unit(), place: &place })
+        value(&self.text, key, &Rows { input_unit: |_| self.machine.drives[0].amplifier.mode.unit(), place: &place })
     }
 }
 
@@ -60,7 +61,7 @@ impl GantryCase {
     pub fn value(&self, key: &str) -> Result<Given> {
         let unit = |section: &str| {
             let right = section.split('.').any(|step| step == "right");
-            self.gantry.amplifiers[usize::from(right)].mode.unit()
+            self.gantry.drives[usize::from(right)].amplifier.mode.unit()
         };
         value(&self.text, key, &Rows { input_unit: unit, place: &of_gantry })
     }
@@ -175,17 +176,17 @@ impl Opened {
     pub fn numbers(&self) -> Result<Vec<Number>> {
         let tree = Source::new(Path::new(""), self.text().to_string()).tree()?;
         let mut numbers = Vec::new();
-        let machine: &dyn parameter::Numbers = match self {
+        let machine: &Machine = match self {
             Opened::Axis(case) => {
                 let same = |section: &str| section.to_string();
-                let unit = case.machine.amplifier.mode.unit();
+                let unit = case.machine.drives[0].amplifier.mode.unit();
                 collect(&tree, ("", ""), &Rows { input_unit: |_| unit, place: &same }, &mut numbers);
                 &case.machine
             }
             Opened::Gantry(case) => {
                 let unit = |section: &str| {
                     let right = section.split('.').any(|step| step == "right");
-                    case.gantry.amplifiers[usize::from(right)].mode.unit()
+                    case.gantry.drives[usize::from(right)].amplifier.mode.unit()
                 };
                 collect(&tree, ("", ""), &Rows { input_unit: unit, place: &of_gantry }, &mut numbers);
                 &case.gantry

@@ -226,7 +226,7 @@ impl<'a> Sources<'a> {
         let turn = match key {
             "reference" => TAU * self.machine.pulley_radius,
             _ => TAU,
-        } / self.machine.motor.gear_ratio;
+        } / self.machine.drives[0].motor.gear_ratio;
         match of {
             In::Own => None,
             In::Unit(name) => Some(Unit::Name(name.to_string())),
@@ -269,7 +269,7 @@ impl<'a> Sources<'a> {
                 .fail(format!("the encoder of this case counts {at}"))
                 .next("name the unit of this column"));
         }
-        Ok(1.0 / encoder.counts_per_unit(self.machine.motor.gear_ratio))
+        Ok(1.0 / encoder.counts_per_unit(self.machine.drives[0].motor.gear_ratio))
     }
 }
 

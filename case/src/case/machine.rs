@@ -29,32 +29,38 @@ pub(super) fn machine(root: &Table) -> Result<Machine> {
     idler.check_keys(&[], &[])?;
     cart.check_keys(&[], &[])?;
     let pulley_radius = radius(&drive, sheet::pitch(root)?)?;
-    let mut machine = Machine {
+    let unit = DriveUnit {
         motor: match (&motor, simple) {
             (Some(motor), _) => self::motor(motor)?,
             (None, Some(simple)) => simple.motor(pulley_radius),
             (None, None) => return Err(root.missing("motor", "a table [motor], or [drive]")),
         },
         amplifier: self::amplifier(amplifier.as_ref(), motor.as_ref())?,
+    };
+    let mut machine = Machine {
+        kind: Kind::Axis,
+        drives: vec![unit],
         pulley_radius,
         drive_pulley: pulley(&drive)?,
-        cart: Cart {
+        bridge: None,
+        cart: Slide {
             mass: cart.number("mass")?,
             friction: friction(&cart)?,
             along: along(&cart)?,
-            forces: CartForces {
+            forces: SlideForces {
                 along: cart.optional("force_along").map(|field| line(&field, ["position", "force"])).transpose()?,
                 by_speed: cart.optional("force_by_speed").map(|field| line(&field, ["speed", "force"])).transpose()?,
             },
             load: cart.number("load")?,
             inclination: cart.number("inclination")?,
+            travel: None,
         },
         idler_pulley: pulley(&idler)?,
         belt: self::belt(&belt, travel.as_ref())?,
-        travel: travel.as_ref().map(self::travel).transpose()?,
         encoder: encoder.map(|table| self::encoder(&table)).transpose()?,
         scale: None,
     };
+    machine.cart.travel = travel.as_ref().map(self::travel).transpose()?;
     machine.scale = scale.map(|field| self::scale(&field, machine.encoder)).transpose()?;
     if let Some(proportion) = sheet::proportion(&belt, &machine.mechanism())? {
         machine.belt.damping = machine.belt.stiffness.map(|stiffness| proportion * stiffness);
@@ -221,10 +227,9 @@ fn belt(table: &Table, travel: Option<&Table>) -> Result<Belt> {
     }
     let follows_cart = table.optional("follows_cart").map_or(Ok(false), |field| field.truth())?;
     let follows = table.optional("follows_cart").filter(|_| follows_cart);
-    let given =
-        |stiffness| Belt { stiffness, damping: [0.0; 3], make: None, pretension, follows_cart: false, model, sheet };
     let make = ["modulus", "section", "specific_stiffness", "spans"];
     let damping = table.optional("damping").map_or(Ok([0.0; 3]), |field| field.three())?;
+    let given = |stiffness: Spans| Belt { pretension, model, sheet, ..Belt::given(stiffness, damping) };
     if let Some(stiffness) = table.optional("stiffness") {
         if let Some(other) = make.iter().find_map(|key| table.optional(key)) {
             return Err(other.fail("the stiffness is given already").next(match other.key() {
@@ -237,11 +242,11 @@ fn belt(table: &Table, travel: Option<&Table>) -> Result<Belt> {
                 .fail("a given stiffness does not say how it changes with the length of a span")
                 .next("give modulus, section and spans instead of stiffness"));
         }
-        return Ok(Belt { damping, ..given(stiffness.three()?) });
+        return Ok(given(stiffness.three()?.into()));
     }
     let none = make.iter().all(|key| table.optional(key).is_none());
     if none && model == BeltModel::Rigid {
-        return Ok(Belt { damping, ..given([f64::INFINITY; 3]) });
+        return Ok(given(Spans::all(3, f64::INFINITY)));
     }
     if none && sheet.kind.is_none() {
         return Err(table.missing(
@@ -250,7 +255,8 @@ fn belt(table: &Table, travel: Option<&Table>) -> Result<Belt> {
         ));
     }
     let (modulus, section, is_specific) = rigidity(table, &sheet)?;
-    let spans = table.required("spans", "for example spans = [\"0.34925 m\", \"0.34925 m\", \"0.7874 m\"]")?.three()?;
+    let spans =
+        table.required("spans", "for example spans = [\"0.34925 m\", \"0.34925 m\", \"0.7874 m\"]")?.three()?.into();
     let make = BeltMake { modulus, section, spans };
     let stiffness = make.stiffness();
     for k in stiffness {
@@ -260,7 +266,7 @@ fn belt(table: &Table, travel: Option<&Table>) -> Result<Belt> {
         spans_left(&field, &make, travel)?;
     }
     let sheet = BeltSheet { is_specific, ..sheet };
-    Ok(Belt { damping, make: Some(make), follows_cart, sheet, ..given(stiffness) })
+    Ok(Belt { make: Some(make), follows_cart, sheet, ..given(stiffness) })
 }
 
 /// E and A of a belt; of one that is given by E A itself that and 1 m², and that it is so.
@@ -289,7 +295,7 @@ fn spans_left(follows: &Field, make: &BeltMake, travel: Option<&Table>) -> Resul
             .next("add a table [travel] with min and max, such as min = \"-0.3 m\" and max = \"0.3 m\""));
     };
     let Travel { min, max, .. } = self::travel(table)?;
-    let [l1, l2, _] = make.spans;
+    let [l1, l2, _] = make.spans.three();
     let (key, what, allowed) = match (min > -l2, max < l1) {
         (true, true) => return Ok(()),
         (false, _) => ("min", "span 2 would have no length left", format!("above {}", show(-l2, "m"))),

@@ -168,8 +168,8 @@ impl Case {
             "uncertainty",
             "sweep",
         ];
-        if let Some(routing) = gantry::kind(&root)? {
-            return Err(gantry::no_axis(&root, routing));
+        if let Some(kind) = gantry::kind(&root)? {
+            return Err(gantry::no_axis(&root, kind));
         }
         root.check_keys(&tables, &[])?;
 
@@ -330,7 +330,7 @@ fn unique(field: &Field, name: &str, files: &mut HashMap<String, String>) -> Res
 /// The experiment of a table; several, if its log is split into runs.
 fn experiment(field: &Field, machine: &Machine, folder: &Folder) -> Result<Vec<Experiment>> {
     let field = Field {
-        input_unit: match machine.amplifier.mode {
+        input_unit: match machine.drives[0].amplifier.mode {
             AmplifierMode::Voltage => "V",
             AmplifierMode::Current => "A",
         },

@@ -96,7 +96,7 @@ fn one(table: &Table, machine: &Machine, design: &Design) -> Result<Move> {
             .fail(format!("the run ends before the move, which takes {}", show(profile.end(), "s")))
             .allowed(format!("from {} on", show(profile.end(), "s"))));
     }
-    if let Some(travel) = machine.travel {
+    if let Some(travel) = machine.cart.travel {
         let places = std::iter::once(from).chain(profile.strokes().map(|(_, from, distance, _)| from + distance));
         if let Some(out) = places.into_iter().find(|x| !(travel.min..=travel.max).contains(x)) {
             return Err(table.field.fail(format!("it leads to {}, off the travel", show(out, "mm"))).allowed(format!(

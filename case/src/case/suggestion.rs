@@ -50,7 +50,7 @@ pub(super) fn proportional(machine: &Machine, every: f64, delay: f64) -> String 
 }
 
 fn unit(machine: &Machine) -> &'static str {
-    if machine.amplifier.mode == AmplifierMode::Current { "A" } else { "V" }
+    if machine.drives[0].amplifier.mode == AmplifierMode::Current { "A" } else { "V" }
 }
 
 /// Gains placed well below the slowest swing and what sampling, delay and the derivative's filter allow; ordinary ones for

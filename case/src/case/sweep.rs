@@ -5,7 +5,8 @@ use super::reader::{Field, Table};
 use super::tree::{Entry, Kind, Node};
 use super::{Folder, Known, Plan, Prior};
 use crate::error::Result;
-use crate::parameter::{Numbers, Parameter, Range};
+use crate::machine::Machine;
+use crate::parameter::{Parameter, Range};
 use std::path::PathBuf;
 
 /// Most values of a grid, of one parameter.
@@ -124,7 +125,7 @@ pub enum Origin {
 
 /// Other parts of the case that count.
 pub(super) struct Context<'a> {
-    pub machine: &'a dyn Numbers,
+    pub machine: &'a Machine,
     /// Name of each experiment, and when it ends, s.
     pub experiments: Vec<(&'a str, f64)>,
     pub fit: Option<&'a Plan>,
@@ -190,7 +191,7 @@ pub(super) fn sweeping(root: &Table, context: &Context) -> Result<Option<Sweepin
 
 fn origin(field: &Field, context: &Context) -> Result<Origin> {
     let text = field.text()?;
-    if context.machine.axis().is_none() {
+    if context.machine.bridge.is_some() {
         return Err(field
             .fail("a gantry is not fitted yet, so nothing is known of how its parameters are spread")
             .next("leave it out, and say in [sweep.vary] how each parameter varies"));
@@ -221,7 +222,7 @@ const KINDS: &str = "\"20 %\", uniform = [least, most], normal = [mean, deviatio
                      values = [...], grid = [from, to, count], factors = [...]";
 
 /// The variation at a key of `[sweep.vary]`.
-fn variation(field: &Field, key: &str, design: Sampling, machine: &dyn Numbers) -> Result<Variation> {
+fn variation(field: &Field, key: &str, design: Sampling, machine: &Machine) -> Result<Variation> {
     let row = machine.row(key.split(" = ").next().unwrap_or(key));
     check_key(field, key, machine)?;
     let node = match &field.node.kind {
@@ -294,7 +295,7 @@ const FACTOR: Parameter = Parameter::unwritten("", Range::new(1e-6, 1e6), "2");
 const COUNT: Parameter = Parameter::unwritten("", Range::whole(2.0, MOST_VALUES as f64), "11");
 
 /// Refuses names that are no parameter of this machine.
-fn check_key(field: &Field, key: &str, machine: &dyn Numbers) -> Result<()> {
+fn check_key(field: &Field, key: &str, machine: &Machine) -> Result<()> {
     match key {
         "all" => Ok(()),
         _ => free(field, key, machine),

@@ -1,6 +1,6 @@
 //! The case that `taut init` writes.
 
-use crate::machine::gantry::Routing;
+use crate::machine::Kind;
 
 /// A commented case file that runs as it stands.
 pub const TEMPLATE: &str = include_str!("template.toml");
@@ -41,14 +41,14 @@ impl Template {
 ///
 /// ```
 /// use taut::case::{GantryCase, gantry_template};
-/// use taut::machine::gantry::Routing;
-/// for routing in [Routing::HFrame, Routing::CoreXy] {
-///     let case = GantryCase::from_text_with("gantry.toml", &gantry_template(routing), &[])?;
-///     assert_eq!(case.gantry.routing, routing);
+/// use taut::machine::Kind;
+/// for kind in [Kind::HFrame, Kind::CoreXy] {
+///     let case = GantryCase::from_text_with("gantry.toml", &gantry_template(kind), &[])?;
+///     assert_eq!(case.gantry.kind, kind);
 /// }
 /// # Ok::<(), taut::Error>(())
 /// ```
-pub fn gantry_template(routing: Routing) -> String {
+pub fn gantry_template(kind: Kind) -> String {
     const H_FRAME: &str = "\
 #    (O)───┐          ┌───(O)     idlers at the far end
 #     │    │          │    │
@@ -63,19 +63,19 @@ pub fn gantry_template(routing: Routing) -> String {
 #     │   ┌──[    ]──────┐  │              y to the right
 #     │   │              │  │
 #    (left)              (right)   drive pulleys A and B";
-    let [kind, other] = match routing {
-        Routing::HFrame => [Routing::HFrame, Routing::CoreXy],
-        Routing::CoreXy => [Routing::CoreXy, Routing::HFrame],
+    let [word, other] = match kind {
+        Kind::HFrame => [Kind::HFrame, Kind::CoreXy],
+        Kind::Axis | Kind::CoreXy => [Kind::CoreXy, Kind::HFrame],
     }
-    .map(Routing::word);
-    let (drawing, stiffness, lengths, left) = match routing {
-        Routing::HFrame => (
+    .map(Kind::word);
+    let (drawing, stiffness, lengths, left) = match kind {
+        Kind::HFrame => (
             H_FRAME,
             ["132.76 kN/m", "132.76 kN/m", "58.885 kN/m"].as_slice(),
             ["0.7 m", "0.7 m", "1.6 m"].as_slice(),
             "-5 V",
         ),
-        Routing::CoreXy => (
+        Kind::Axis | Kind::CoreXy => (
             CORE_XY,
             ["60 kN/m", "130 kN/m", "60 kN/m", "130 kN/m"].as_slice(),
             ["1.6 m", "0.7 m", "1.6 m", "0.7 m"].as_slice(),
@@ -83,9 +83,9 @@ pub fn gantry_template(routing: Routing) -> String {
         ),
     };
     let list = |values: &[&str]| values.iter().map(|value| format!("\"{value}\"")).collect::<Vec<_>>().join(", ");
-    let spans: Vec<&str> = routing.spans().iter().map(|span| span.name.trim_end_matches(" span")).collect();
+    let spans: Vec<&str> = kind.geometry().span_labels().map(|span| span.name.trim_end_matches(" span")).collect();
     [
-        ("{kind}", kind.to_string()),
+        ("{kind}", word.to_string()),
         ("{other}", other.to_string()),
         ("{drawing}", drawing.to_string()),
         ("{stiffness}", list(stiffness)),

@@ -66,7 +66,7 @@ fn status(found: &Designed, interrupt: &Interrupt) -> Status {
 /// The request, from the command line.
 fn request(args: &Args, case: &Case) -> Result<Request> {
     let input = args.amplitude.as_deref().map(|text| {
-        let unit = case.machine.amplifier.mode.unit();
+        let unit = case.machine.drives[0].amplifier.mode.unit();
         let value = match text.trim().parse() {
             Ok(number) => number,
             Err(_) => quantity::read(text, unit).map_err(|error| Error::new(format!("--amplitude: {}", error.what)))?,

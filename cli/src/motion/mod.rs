@@ -140,7 +140,7 @@ fn one<'a>(
 
 /// The controller's samples as CSV.
 fn write_samples(folder: &Folder, name: &str, case: &Case, run: &MoveRun) -> Result<String> {
-    let unit = if case.machine.amplifier.mode == taut::machine::AmplifierMode::Current { "A" } else { "V" };
+    let unit = if case.machine.drives[0].amplifier.mode == taut::machine::AmplifierMode::Current { "A" } else { "V" };
     let mut text = format!("time_s,reference_m,measured_m,asked_{unit},given_{unit}\n");
     for s in &run.kept {
         let _ =

@@ -32,7 +32,7 @@ pub fn comparison(tried: &[Tried]) -> String {
         }
     }
     let spread = tried.iter().flat_map(|tried| &tried.done).any(|done| done.worst.is_some());
-    let amperes = tried.iter().any(|tried| tried.case.machine.amplifier.mode == AmplifierMode::Current);
+    let amperes = tried.iter().any(|tried| tried.case.machine.drives[0].amplifier.mode == AmplifierMode::Current);
     let mut text = String::new();
     for name in names {
         let _ = writeln!(text, "{}", bold(name));

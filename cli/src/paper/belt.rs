@@ -71,7 +71,7 @@ impl Belt {
         let composite = composite_modulus(&PARTS);
         let row = |table, symbol, printed: f64, half_digit, modulus: f64, share: f64, third: bool| {
             let of = |modulus: f64, (l1, l3): (f64, f64)| {
-                let k = BeltMake { modulus, section: SECTION, spans: [l1, l1, l3] }.stiffness();
+                let k = BeltMake { modulus, section: SECTION, spans: [l1, l1, l3] }.stiffness().three();
                 if third { k[2] } else { k[0] }
             };
             let length = if third { PRINTED.1 } else { PRINTED.0 };
@@ -86,8 +86,8 @@ impl Belt {
                 length_rounding: 0.5e-3 / length,
             }
         };
-        let [k1, _, k3] = sets.table1.machine.belt.stiffness;
-        let [m1, _, m3] = sets.table2.machine.belt.stiffness;
+        let [k1, _, k3] = sets.table1.machine.belt.stiffness.three();
+        let [m1, _, m3] = sets.table2.machine.belt.stiffness.three();
         let machine = &sets.table1.machine;
         let r = machine.pulley_radius;
         let inertia = machine.drive_pulley.inertia;

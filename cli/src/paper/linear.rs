@@ -30,12 +30,12 @@ pub fn matrices(machine: &Machine) -> (Matrix, SVector<f64, 6>) {
 /// A of eq. (7), entry by entry as printed, or with −b/M where +b/M is printed.
 pub fn printed(machine: &Machine, sign_corrected: bool) -> Matrix {
     let r2 = machine.pulley_radius.powi(2);
-    let [k1, k2, k3] = machine.belt.stiffness;
+    let [k1, k2, k3] = machine.belt.stiffness.three();
     let (j1, j2, m) = (machine.drive_pulley.inertia, machine.idler_pulley.inertia, machine.cart.mass);
     let viscous = |law: &taut::friction::Friction| law.forward.viscous;
     let (b1, b2) = (viscous(&machine.drive_pulley.friction), viscous(&machine.idler_pulley.friction));
     let b = viscous(&machine.cart.friction) * if sign_corrected { -1.0 } else { 1.0 };
-    let motor = &machine.motor;
+    let motor = &machine.drives[0].motor;
     let back_emf = motor.torque_constant * motor.back_emf_constant / (motor.resistance * j1);
     #[rustfmt::skip]
     let a = Matrix::from_row_slice(&[
@@ -156,7 +156,7 @@ impl Linear {
         let r = first.pulley_radius;
         let (a, b) = matrices(first);
         let corrected = after_pulse(&printed(first, true), &b, 5.0);
-        let motor = &first.motor;
+        let motor = &first.drives[0].motor;
         let impulse = motor.torque_constant / motor.resistance * 5.0 * PULSE;
         Self {
             modes: [0, 1, 2].map(|i| oscillations(&all[i])),
@@ -176,7 +176,7 @@ impl Linear {
 /// B₁ + B₂ + b r² + K_t K_e/R, N m s: all that resists in proportion to speed.
 fn total_viscous(machine: &Machine) -> f64 {
     let b = |law: &taut::friction::Friction| law.forward.viscous;
-    let motor = &machine.motor;
+    let motor = &machine.drives[0].motor;
     b(&machine.drive_pulley.friction)
         + b(&machine.idler_pulley.friction)
         + b(&machine.cart.friction) * machine.pulley_radius.powi(2)

@@ -225,7 +225,7 @@ impl Change {
 pub fn scale_everything(machine: &Machine, factor: f64) -> Machine {
     let mut machine =
         Change::Friction.apply(&Change::AllInertia.apply(&Change::Stiffness.apply(machine, factor), factor), factor);
-    machine.motor.torque_constant *= factor;
+    machine.drives[0].motor.torque_constant *= factor;
     machine
 }
 

@@ -14,7 +14,7 @@ pub fn readings(f: &Findings) -> Vec<Claim> {
     // 30.3 V at 800 rpm behind a gear of 5.9 : 1
     let motor_speed = 800.0 * 5.9 * 2.0 * PI / 60.0;
     let back_emf = 30.3 / motor_speed;
-    let printed = f.sets.table1.machine.motor.back_emf_constant;
+    let printed = f.sets.table1.machine.drives[0].motor.back_emf_constant;
     let belt = &f.belt.stiffness;
     let worst = |pick: fn(&super::belt::Stiffness) -> f64| {
         belt.iter().map(|s| (pick(s) - s.printed).abs() / s.half_digit).fold(0.0, f64::max)

@@ -202,7 +202,7 @@ impl Table3 {
         runs.reverse();
         let exact = |volts: f64| run(machine, &pulse(volts, 1e-3), Solver::Exact);
         let (five, ten) = (exact(VOLTS[0])?, exact(VOLTS[1])?);
-        let motor = &machine.motor;
+        let motor = &machine.drives[0].motor;
         let torque = motor.torque_constant / motor.resistance * VOLTS[0];
         let (j, coulomb) = (machine.drive_pulley.inertia, machine.drive_pulley.friction.forward.coulomb);
         Ok(Self {
@@ -280,7 +280,7 @@ impl Identifiability {
         let ((b1, t1), (b, fc), (b2, t2)) =
             (law(&machine.drive_pulley.friction), law(&machine.cart.friction), law(&machine.idler_pulley.friction));
         let (viscous, coulomb) = (b1 + b2 + b * r * r, t1 + t2 + r * fc);
-        let motor = &machine.motor;
+        let motor = &machine.drives[0].motor;
         // Shares of drive pulley, cart and idler pulley in the two totals.
         let shares: [(&'static str, [f64; 3], [f64; 3]); 3] = [
             ("viscous friction at the cart alone", [0.0, 1.0, 0.0], [t1 / coulomb, r * fc / coulomb, t2 / coulomb]),
@@ -292,7 +292,7 @@ impl Identifiability {
             .map(|(name, v, c)| sharing(name, machine, runs, (viscous, v), (coulomb, c)))
             .collect::<Result<_>>()?;
         let mut gear = machine.clone();
-        gear.motor.gear_ratio = 5.9;
+        gear.drives[0].motor.gear_ratio = 5.9;
         let start = t1 * motor.resistance / motor.torque_constant;
         let below = respond_to_step(machine, 0.98 * start)?;
         Ok(Self {

@@ -27,9 +27,9 @@ pub fn parameters(f: &Findings) -> Table {
         ("J", "J_1", "drive_pulley.inertia", "kg m^2", |s| s.drive_pulley.inertia),
         ("J", "J_2", "idler_pulley.inertia", "kg m^2", |s| s.idler_pulley.inertia),
         ("M", "M", "cart.mass", "kg", |s| s.cart.mass),
-        ("K_t", "K_t", "motor.torque_constant", "N m/A", |s| s.motor.torque_constant),
-        ("K_e", "K_e", "motor.back_emf_constant", "V s/rad", |s| s.motor.back_emf_constant),
-        ("R", "R", "motor.resistance", "ohm", |s| s.motor.resistance),
+        ("K_t", "K_t", "motor.torque_constant", "N m/A", |s| s.drives[0].motor.torque_constant),
+        ("K_e", "K_e", "motor.back_emf_constant", "V s/rad", |s| s.drives[0].motor.back_emf_constant),
+        ("R", "R", "motor.resistance", "ohm", |s| s.drives[0].motor.resistance),
     ];
     let mut table = Table::new("Tables 1, 2 and 4 as they run")
         .column("Printed, here", "")

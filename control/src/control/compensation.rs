@@ -98,8 +98,8 @@ impl Compensation {
             ..*y
         };
         // τ/r = ((J₁ + n² J_r) y₁″ + B₁ y₁′)/r² + τ_c1 sgn y′/r + L + P           (16)
-        let n = machine.motor.gear_ratio;
-        let own = (machine.drive_pulley.inertia + n * n * machine.motor.rotor_inertia) / (r * r);
+        let n = machine.drives[0].motor.gear_ratio;
+        let own = (machine.drive_pulley.inertia + n * n * machine.drives[0].motor.rotor_inertia) / (r * r);
         let side = machine.drive_pulley.friction.side(forward);
         let viscous = side.viscous / (r * r);
         let force = own * drive.acceleration + viscous * drive.speed + side.coulomb * sign / r + load[0] + pull[0];
@@ -119,7 +119,7 @@ impl Compensation {
         }
         let needed = self.needed(y);
         let mut target = needed.drive;
-        if let Some(play) = self.machine.motor.gear_play.filter(|_| self.before_gear) {
+        if let Some(play) = self.machine.drives[0].motor.gear_play.filter(|_| self.before_gear) {
             // The twist of the gear: T/k_g, and half the play.
             let (r, sign) = (self.machine.pulley_radius, direction(y));
             let torque = r * needed.force[0] - self.rotor(needed.drive.acceleration);
@@ -130,8 +130,8 @@ impl Compensation {
 
     /// Torque that the rotor itself takes at the pulley, N m.
     fn rotor(&self, acceleration: f64) -> f64 {
-        let n = self.machine.motor.gear_ratio;
-        n * n * self.machine.motor.rotor_inertia * acceleration / self.machine.pulley_radius
+        let n = self.machine.drives[0].motor.gear_ratio;
+        n * n * self.machine.drives[0].motor.rotor_inertia * acceleration / self.machine.pulley_radius
     }
 
     /// The command that the reference asks for, V or A.
@@ -177,7 +177,7 @@ mod tests {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("stages/sollmann-jouaneh/controllers");
         let case = Case::read(folder.join("pid-elastic.toml")).unwrap();
         let mut machine = case.machine.clone();
-        (machine.motor.gear_efficiency, machine.cart.load) = (0.8, 3.0);
+        (machine.drives[0].motor.gear_efficiency, machine.cart.load) = (0.8, 3.0);
         let mut number = 1_u64;
         let mut noise = |size: f64| {
             number = number.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);

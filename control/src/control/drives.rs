@@ -36,15 +36,15 @@ pub struct DriveGain {
 /// The gains for an axis going forward; those in volts where a voltage is commanded.
 pub fn drive_gains(machine: &Machine) -> Vec<DriveGain> {
     let rigid = Rigid::of(machine);
-    let motor = &machine.motor;
+    let motor = &machine.drives[0].motor;
     // Before the amplifier's gain, which is the drive's own affair: the voltage or current at the motor.
-    let gain = machine.amplifier.gain;
+    let gain = machine.drives[0].amplifier.gain;
     let friction = rigid.coulomb[0];
     let at_rest = |force: f64| rigid.command(force, 0.0, 0.0) * gain;
     let moving = |force: f64| rigid.command(force, 0.0, 1.0) * gain;
     let (s, v, a) = (at_rest(friction), moving(rigid.viscous[0]), at_rest(rigid.mass));
     let one = |system, name, value, unit| DriveGain { system, name, value, unit };
-    let mut all = match machine.amplifier.mode {
+    let mut all = match machine.drives[0].amplifier.mode {
         AmplifierMode::Voltage => {
             let jerk = motor.inductance * rigid.mass / (rigid.force_per_ampere * motor.gear_efficiency);
             vec![

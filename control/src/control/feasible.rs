@@ -170,7 +170,7 @@ fn of_breakaway(machine: &Machine, (volts, amperes): (Option<f64>, Option<f64>),
 
 /// The end of the travel, where the reference goes beyond it.
 fn of_travel(machine: &Machine, needs: &[Need]) -> Option<Shortfall> {
-    let travel = machine.travel?;
+    let travel = machine.cart.travel?;
     let need = most(needs, 0.0, |need| (need.y.position - travel.max).max(travel.min - need.y.position))?;
     let position = need.y.position;
     let end = if position > travel.max { travel.max } else { travel.min };
@@ -199,7 +199,7 @@ pub fn sentence(name: &str, short: &[Shortfall]) -> String {
 
 /// The tightest limits of voltage and current, V and A.
 fn limits(machine: &Machine, limit: Option<f64>) -> (Option<f64>, Option<f64>) {
-    let amplifier = &machine.amplifier;
+    let amplifier = &machine.drives[0].amplifier;
     let commanded = limit.map(|limit| limit * amplifier.gain.abs());
     let least = |a: Option<f64>, b: Option<f64>| a.into_iter().chain(b).reduce(f64::min);
     match amplifier.mode {
@@ -236,7 +236,7 @@ mod tests {
     fn case() -> Case {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("stages/sollmann-jouaneh/controllers");
         let mut case = Case::read(folder.join("pid-elastic.toml")).unwrap();
-        (case.machine.amplifier.voltage_limit, case.machine.amplifier.current_limit) = (None, None);
+        (case.machine.drives[0].amplifier.voltage_limit, case.machine.drives[0].amplifier.current_limit) = (None, None);
         case
     }
 
@@ -281,16 +281,16 @@ mod tests {
         type Set = fn(&mut Machine, f64) -> Option<f64>;
         let limits: [(&str, f64, Set); 6] = [
             ("voltage", volts, |machine, most| {
-                machine.amplifier.voltage_limit = Some(most);
+                machine.drives[0].amplifier.voltage_limit = Some(most);
                 None
             }),
             ("voltage", volts, |_, most| Some(most)),
             ("current", amperes, |machine, most| {
-                machine.amplifier.current_limit = Some(most);
+                machine.drives[0].amplifier.current_limit = Some(most);
                 None
             }),
             ("travel", far, |machine, most| {
-                machine.travel = Some(Travel { min: -1.0, max: most, stop: None });
+                machine.cart.travel = Some(Travel { min: -1.0, max: most, stop: None });
                 None
             }),
             ("slack", off, |machine, most| {

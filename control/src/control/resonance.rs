@@ -1,7 +1,7 @@
 //! The frequencies at which a stage vibrates, along its travel, from its masses and springs.
 
 use crate::error::{Error, Result};
-use crate::machine::{AmplifierMode, BeltModel, Machine};
+use crate::machine::{AmplifierMode, BeltModel, Machine, Spans};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use std::f64::consts::PI;
 
@@ -93,7 +93,7 @@ pub fn resonances(machine: &Machine, drive: Drive) -> Result<Vec<Resonance>> {
         let error = Error::new("a rigid belt has no resonance").allowed("belt.model = \"elastic\" or \"two-mass\"");
         return Err(error.next("describe the belt's stiffness, or give a measured spectrum"));
     }
-    let places = match (&machine.travel, machine.belt.follows_cart) {
+    let places = match (&machine.cart.travel, machine.belt.follows_cart) {
         (Some(travel), true) => {
             let part = |k: usize| k as f64 / (PLACES - 1) as f64;
             (0..PLACES).map(|k| travel.min + part(k) * (travel.max - travel.min)).collect()
@@ -154,9 +154,9 @@ fn at(machine: &Machine, drive: Drive, position: f64) -> Vec<Resonance> {
 
 /// M, C and K over φ₁, x and φ₃; over φ₁ and x where both pulleys are one.
 fn matrices(machine: &Machine, drive: Drive, position: f64) -> (DMatrix<f64>, DMatrix<f64>, DMatrix<f64>) {
-    let motor = &machine.motor;
+    let motor = &machine.drives[0].motor;
     let n = motor.gear_ratio;
-    let mut stiffness = machine.belt.stiffness;
+    let [mut stiffness, damping] = [machine.belt.stiffness, machine.belt.damping].map(Spans::three);
     if let (true, Some(make)) = (machine.belt.follows_cart, &machine.belt.make) {
         let [k1, k2] = make.stiffness_at(position);
         stiffness = [k1, k2, stiffness[2]];
@@ -171,7 +171,7 @@ fn matrices(machine: &Machine, drive: Drive, position: f64) -> (DMatrix<f64>, DM
     let masses = [machine.drive_pulley.inertia + rotor, machine.cart.mass, machine.idler_pulley.inertia];
     let frictions = [machine.drive_pulley.friction, machine.cart.friction, machine.idler_pulley.friction];
     let mut resisting = frictions.map(|friction| 0.5 * (friction.forward.viscous + friction.backward.viscous));
-    if drive == Drive::Free && machine.amplifier.mode == AmplifierMode::Voltage {
+    if drive == Drive::Free && machine.drives[0].amplifier.mode == AmplifierMode::Voltage {
         // n² K_t K_e / R, of an armature without inductance
         resisting[0] += n * n * motor.torque_constant * motor.back_emf_constant / motor.resistance;
     }
@@ -179,7 +179,7 @@ fn matrices(machine: &Machine, drive: Drive, position: f64) -> (DMatrix<f64>, DM
     if machine.belt.model == BeltModel::TwoMass {
         // Spans 2 and 3 in series between the cart and both pulleys, which turn as one.
         let r = machine.pulley_radius;
-        let [[k1, k2, k3], [c1, c2, c3]] = [stiffness, machine.belt.damping];
+        let [[k1, k2, k3], [c1, c2, c3]] = [stiffness, damping];
         let all = k2 + k3;
         let (k, c) = (k1 + k2 * k3 / all, c1 + (c2 * k3 * k3 + c3 * k2 * k2) / (all * all));
         let both = |value: f64| DMatrix::from_row_slice(2, 2, &[r * r * value, -r * value, -r * value, value]);
@@ -189,5 +189,5 @@ fn matrices(machine: &Machine, drive: Drive, position: f64) -> (DMatrix<f64>, DM
     // A pulley without inertia follows at once; the smallest weight keeps the matrix of masses regular.
     let tiny = 1e-9 * machine.cart.mass * machine.pulley_radius * machine.pulley_radius;
     let masses = masses.map(|mass| mass.max(tiny));
-    (diagonal(&masses), sum(machine.belt.damping) + diagonal(&resisting), sum(stiffness))
+    (diagonal(&masses), sum(damping) + diagonal(&resisting), sum(stiffness))
 }

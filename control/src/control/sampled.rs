@@ -284,7 +284,8 @@ pub(super) struct Sensor {
 
 impl Sensor {
     pub(super) fn new(machine: &Machine) -> Self {
-        let counts = machine.encoder.map(|encoder: Encoder| encoder.counts_per_unit(machine.motor.gear_ratio));
+        let counts =
+            machine.encoder.map(|encoder: Encoder| encoder.counts_per_unit(machine.drives[0].motor.gear_ratio));
         let r = machine.pulley_radius;
         let (body, length) = match machine.encoder.map(|encoder| encoder.at) {
             Some(EncoderPlace::Cart) => (CART, 1.0),
@@ -296,7 +297,7 @@ impl Sensor {
 
     /// That of the scale beside the encoder, if there is one.
     pub(super) fn of_scale(machine: &Machine) -> Option<Self> {
-        let counts = machine.scale?.counts_per_unit(machine.motor.gear_ratio);
+        let counts = machine.scale?.counts_per_unit(machine.drives[0].motor.gear_ratio);
         Some(Self { body: CART, length: 1.0, counts: Some(counts) })
     }
 

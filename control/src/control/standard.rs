@@ -96,7 +96,7 @@ fn check(design: &Design, model: &Machine) -> Result<()> {
     }
     if let Structure::Cascade(cascade) = &design.structure
         && cascade.current.is_some()
-        && model.amplifier.mode == AmplifierMode::Current
+        && model.drives[0].amplifier.mode == AmplifierMode::Current
     {
         return Err(Error::new("the amplifier commands the current itself: there is no current loop to close")
             .next("leave the current loop out, or set amplifier.mode = \"voltage\""));
@@ -112,7 +112,7 @@ fn check(design: &Design, model: &Machine) -> Result<()> {
     if !design.shaper.is_empty() && (sum - 1.0).abs() > 1e-6 {
         return Err(Error::new(format!("the shaper's amplitudes add up to {sum}")).allowed("1"));
     }
-    if model.motor.torque_constant == 0.0 || model.amplifier.gain == 0.0 {
+    if model.drives[0].motor.torque_constant == 0.0 || model.drives[0].amplifier.gain == 0.0 {
         return Err(Error::new("the command moves nothing: torque constant or gain is zero").allowed("above zero"));
     }
     Ok(())

@@ -260,7 +260,7 @@ pub fn fit(machine: &Machine, known: &Known, frfs: &[Frf]) -> Result<FrfFit> {
         });
     Ok(FrfFit {
         stiffness: grown(0),
-        spans: found.belt.stiffness,
+        spans: found.belt.stiffness.three(),
         damping: grown(1),
         delay: (delay, [(delay - wide(2)).max(0.0), delay + wide(2)]),
         gain: grown(3),

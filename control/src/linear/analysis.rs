@@ -110,7 +110,7 @@ fn numbers(question: &Question) -> Result<()> {
 
 /// Refuses a place outside the travel.
 fn within(case: &Case, question: &Question) -> Result<()> {
-    match (question.at, case.machine.travel) {
+    match (question.at, case.machine.cart.travel) {
         (Some(at), Some(travel)) if !(travel.min..=travel.max).contains(&at) => {
             Err(Error::new(format!("{at} m is outside the travel"))
                 .in_file("--at")

@@ -4,8 +4,8 @@ use super::Natural;
 use crate::case::GantryCase;
 use crate::error::Result;
 use crate::friction::Law;
-use crate::machine::Travel;
 use crate::machine::gantry::{BRIDGE, CART};
+use crate::machine::{DriveUnit, Travel};
 use crate::mechanism::{AmplifierMode, BODIES, Mechanism};
 
 /// Places along either way of the map.
@@ -52,7 +52,7 @@ impl<'a> GantryAnalysis<'a> {
     pub fn of(case: &'a GantryCase) -> Result<Self> {
         let mechanism = case.gantry.mechanism();
         let modes = Natural::of(&mechanism, &[0.0; BODIES])?;
-        let map = match (&case.gantry.belts.follows, case.gantry.bridge.travel, case.gantry.cart.travel) {
+        let map = match (case.gantry.belt.following(), case.gantry.first_slide().travel, case.gantry.cart.travel) {
             (Some(_), Some(bridge), Some(cart)) => Some(ResonanceMap::of(&mechanism, bridge, cart)?),
             _ => None,
         };
@@ -110,24 +110,21 @@ fn words(case: &GantryCase, mechanism: &Mechanism) -> Vec<String> {
     if bodies().any(|body| body.friction.forward.viscous != body.friction.backward.viscous) {
         words.push("viscous friction is that of forward motion".into());
     }
-    if gantry
-        .motors
-        .iter()
-        .zip(&gantry.amplifiers)
-        .any(|(motor, amplifier)| amplifier.mode == AmplifierMode::Voltage && motor.inductance != 0.0)
-    {
+    let is_sluggish = |unit: &DriveUnit| unit.amplifier.mode == AmplifierMode::Voltage && unit.motor.inductance != 0.0;
+    if gantry.drives.iter().any(is_sluggish) {
         words.push("a motor with an inductance counts as giving no torque: what its current damps is left out".into());
     }
-    if gantry.motors.iter().any(|motor| motor.gear_play.is_some_and(|play| play.backlash > 0.0)) {
+    if gantry.drives.iter().any(|unit| unit.motor.gear_play.is_some_and(|play| play.backlash > 0.0)) {
         words.push("gears with play are taken with a flank in contact".into());
     }
     if mechanism.drives.iter().any(|drive| drive.loses()) {
         words.push("gears are taken as driven by their motors".into());
     }
-    if gantry.belts.pretension.is_some() {
+    if gantry.belt.pretension.is_some() {
         words.push("the spans are taken taut".into());
     }
-    if [&gantry.bridge, &gantry.cart].iter().any(|slide| slide.travel.is_some_and(|travel| travel.stop.is_some())) {
+    if [gantry.first_slide(), &gantry.cart].iter().any(|slide| slide.travel.is_some_and(|travel| travel.stop.is_some()))
+    {
         words.push("bridge and cart are taken between their end stops".into());
     }
     words

@@ -94,7 +94,7 @@ impl StateSpace {
         let (inner_a, inner_b) = equations.rates(&inner);
         let (outputs, c, d) = equations.outputs(&frame);
         let (_, inner_c, _) = equations.outputs(&inner);
-        let input = match machine.amplifier.mode {
+        let input = match machine.drives[0].amplifier.mode {
             AmplifierMode::Voltage => Variable { name: "voltage_command", unit: "V" },
             AmplifierMode::Current => Variable { name: "current_command", unit: "A" },
         };
@@ -126,7 +126,7 @@ impl StateSpace {
 fn placed(machine: &Machine, x: f64) -> Result<Machine> {
     let mut machine = machine.clone();
     if let (true, Some(make)) = (machine.belt.follows_cart, machine.belt.make) {
-        let [l1, l2, _] = make.spans;
+        let [l1, l2, _] = make.spans.three();
         if !(-l2 < x && x < l1) {
             return Err(Error::new(format!("the cart cannot be at {x} m: a span would have no length"))
                 .allowed(format!("between {} m and {l1} m", -l2))

@@ -3,7 +3,7 @@
 use super::{Operation, Root, StateSpace};
 use crate::error::Result;
 use crate::friction::{Friction, Law, Side};
-use crate::machine::{Amplifier, AmplifierMode, CartForces, Machine};
+use crate::machine::{Amplifier, AmplifierMode, Machine, SlideForces};
 
 /// The resonances with the cart at one place. All frequencies in Hz, the lowest first.
 #[derive(Debug, Clone, PartialEq)]
@@ -26,9 +26,9 @@ pub struct Place {
 /// a twentieth of span 1 before the drive pulley; none where the stiffness does not depend on the place.
 pub fn places(machine: &Machine, count: usize) -> Option<Vec<f64>> {
     let make = machine.belt.make.filter(|_| machine.belt.follows_cart)?;
-    let [l1, l2, _] = make.spans;
+    let [l1, l2, _] = make.spans.three();
     let (mut low, mut high) = (-0.95 * l2, 0.95 * l1);
-    if let Some(travel) = machine.travel {
+    if let Some(travel) = machine.cart.travel {
         (low, high) = (low.max(travel.min), high.min(travel.max));
     }
     let steps = count.max(2) - 1;
@@ -45,7 +45,7 @@ pub fn travel(machine: &Machine, operation: Operation, positions: &[f64]) -> Res
             Ok(Root::of(&poles).into_iter().filter(|root| root.hertz().is_some()).collect())
         };
         let hertz = |roots: Vec<Root>| roots.into_iter().filter_map(Root::hertz).collect();
-        let [k1, k2, _] = machine.belt.stiffness;
+        let [k1, k2, _] = machine.belt.stiffness.three();
         let stiffness = match machine.belt.make {
             Some(make) if machine.belt.follows_cart => make.stiffness_at(position),
             _ => [k1, k2],
@@ -68,12 +68,12 @@ pub fn undamped(machine: &Machine) -> Machine {
     let mut bare = machine.clone();
     let none = Friction { forward: Side::default(), backward: Side::default(), law: Law::Coulomb };
     (bare.drive_pulley.friction, bare.cart.friction, bare.idler_pulley.friction) = (none, none, none);
-    (bare.cart.along, bare.cart.forces) = (None, CartForces::default());
-    bare.belt.damping = [0.0; 3];
-    if let Some(play) = &mut bare.motor.gear_play {
+    (bare.cart.along, bare.cart.forces) = (None, SlideForces::default());
+    bare.belt.damping = [0.0; 3].into();
+    if let Some(play) = &mut bare.drives[0].motor.gear_play {
         play.damping = 0.0;
     }
-    bare.motor.gear_efficiency = 1.0;
-    bare.amplifier = Amplifier::ideal(AmplifierMode::Current, bare.amplifier.gain);
+    bare.drives[0].motor.gear_efficiency = 1.0;
+    bare.drives[0].amplifier = Amplifier::ideal(AmplifierMode::Current, bare.drives[0].amplifier.gain);
     bare
 }

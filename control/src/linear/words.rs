@@ -31,11 +31,11 @@ pub fn assumptions(machine: &Machine, operation: Operation) -> Vec<String> {
         let at = engineering_typed(operation.speed, "m/s", 4);
         words.push(format!("the force that changes with the speed is a damper as steep as it is at {at}"));
     }
-    let amplifier = &machine.amplifier;
+    let amplifier = &machine.drives[0].amplifier;
     if amplifier.voltage_limit.is_some() || amplifier.current_limit.is_some() {
         words.push("the amplifier is taken within its limits".into());
     }
-    if let Some(play) = machine.motor.gear_play.filter(|play| play.backlash > 0.0) {
+    if let Some(play) = machine.drives[0].motor.gear_play.filter(|play| play.backlash > 0.0) {
         let width = engineering_typed(play.backlash, "rad", 3);
         words.push(format!(
             "the gear is taken with its driving flank in contact; within its play of {width} the motor moves nothing but its rotor"
@@ -53,7 +53,7 @@ pub fn assumptions(machine: &Machine, operation: Operation) -> Vec<String> {
         BeltModel::TwoMass => words.push("the belt's model is two-mass: both pulleys are one inertia".into()),
         BeltModel::Rigid => words.push("the belt's model is rigid: it does not stretch, so it has no resonance".into()),
     }
-    if machine.travel.is_some_and(|travel| travel.stop.is_some()) {
+    if machine.cart.travel.is_some_and(|travel| travel.stop.is_some()) {
         words.push("the cart is taken between its end stops".into());
     }
     if machine.cart.constant_force() != 0.0 {

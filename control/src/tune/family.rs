@@ -398,7 +398,7 @@ fn along(case: &Case, count: usize) -> Vec<f64> {
         .iter()
         .flat_map(|motion| motion.profile.strokes().flat_map(|(_, from, distance, _)| [from, from + distance]))
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
-    if machine.travel.is_some() || low > high {
+    if machine.cart.travel.is_some() || low > high {
         return whole;
     }
     let steps = count.max(2) - 1;

@@ -32,7 +32,7 @@ pub struct Gain {
 pub fn gains(design: &Design, machine: &Machine) -> Vec<Gain> {
     let mut copy = design.clone();
     let amperes = commands_current(design, machine);
-    let amplifier = if machine.amplifier.mode == AmplifierMode::Current { "A" } else { "V" };
+    let amplifier = if machine.drives[0].amplifier.mode == AmplifierMode::Current { "A" } else { "V" };
     let input = if amperes && matches!(design.structure, Structure::Cascade(_)) { "A" } else { amplifier };
     let gain = |(key, value, searched): (&'static str, &mut f64, bool)| Gain {
         key,

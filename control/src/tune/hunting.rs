@@ -85,9 +85,9 @@ pub fn hunting(machine: &Machine, design: &Design) -> Result<Option<Hunt>> {
     if other != *machine {
         without("breakaway above Coulomb friction", &other, design)?;
     }
-    if machine.motor.gear_play.is_some() {
+    if machine.drives[0].motor.gear_play.is_some() {
         let mut other = machine.clone();
-        other.motor.gear_play = None;
+        other.drives[0].motor.gear_play = None;
         without("play in the gear", &other, design)?;
     }
     if machine.encoder.is_some() {
@@ -169,7 +169,7 @@ fn watch(machine: &Machine, design: &Design) -> f64 {
     let dry: f64 = rigid.coulomb.iter().sum();
     let count = machine.encoder.map_or(1e-6, |encoder| {
         let length = if crate::control::measures_cart(machine) { 1.0 } else { machine.pulley_radius };
-        length / encoder.counts_per_unit(machine.motor.gear_ratio)
+        length / encoder.counts_per_unit(machine.drives[0].motor.gear_ratio)
     });
     // Command per second and metre of error that stays.
     let rate = match &design.structure {
@@ -232,7 +232,7 @@ fn slope(command: &[(f64, f64)]) -> Option<f64> {
 fn seen(machine: &Machine, design: &Design, model: &Machine, (watched, skipped): (f64, f64)) -> Result<Seen> {
     let limits = Limits { speed: SPEED, acceleration: 0.2, jerk: None, snap: None };
     // From 0, to the side that has more room.
-    let way = machine.travel.map_or(WAY, |travel| match travel.max >= -travel.min {
+    let way = machine.cart.travel.map_or(WAY, |travel| match travel.max >= -travel.min {
         true => travel.max.clamp(0.0, 2.0 * WAY) * 0.5,
         false => travel.min.clamp(-2.0 * WAY, 0.0) * 0.5,
     });

@@ -34,7 +34,7 @@ pub fn of(case: &Case, design: &Design) -> Result<Vec<Move>> {
 /// Short, long, and a slow reversal.
 fn standard(machine: &Machine, design: &Design) -> Result<Vec<Move>> {
     let (speed, acceleration) = limits(machine, design);
-    let travel = machine.travel.map(|travel| (travel.min, travel.max - travel.min));
+    let travel = machine.cart.travel.map(|travel| (travel.min, travel.max - travel.min));
     let (from, way) = travel
         .map_or((0.0, [SHORT, 10.0 * SHORT]), |(min, length)| (min + 0.1 * length, SHARES.map(|share| share * length)));
     let (jerk, quick) = (60.0 * acceleration, 8000.0 * acceleration);
@@ -48,7 +48,7 @@ fn standard(machine: &Machine, design: &Design) -> Result<Vec<Move>> {
     ];
     let count = machine.encoder.map_or(0.0, |encoder| {
         let length = if measures_cart(machine) { 1.0 } else { machine.pulley_radius };
-        length / encoder.counts_per_unit(machine.motor.gear_ratio)
+        length / encoder.counts_per_unit(machine.drives[0].motor.gear_ratio)
     });
     let one = |(name, legs): (&str, Vec<Leg>)| {
         let profile = Profile::new(from, &legs)?;
@@ -61,9 +61,13 @@ fn standard(machine: &Machine, design: &Design) -> Result<Vec<Move>> {
 /// Speed (m/s) and acceleration (m/s²) that leave room below the limits of controller and amplifier.
 fn limits(machine: &Machine, design: &Design) -> (f64, f64) {
     let rigid = Rigid::of(machine);
-    let amplifier = match machine.amplifier.mode {
-        AmplifierMode::Voltage => machine.amplifier.voltage_limit.map(|limit| limit / machine.amplifier.gain.abs()),
-        AmplifierMode::Current => machine.amplifier.current_limit.map(|limit| limit / machine.amplifier.gain.abs()),
+    let amplifier = match machine.drives[0].amplifier.mode {
+        AmplifierMode::Voltage => {
+            machine.drives[0].amplifier.voltage_limit.map(|limit| limit / machine.drives[0].amplifier.gain.abs())
+        }
+        AmplifierMode::Current => {
+            machine.drives[0].amplifier.current_limit.map(|limit| limit / machine.drives[0].amplifier.gain.abs())
+        }
     };
     let Some(limit) = [design.limit, amplifier].into_iter().flatten().reduce(f64::min) else { return MODEST };
     let dry = rigid.coulomb[0];

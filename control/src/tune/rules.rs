@@ -53,7 +53,7 @@ fn simc(design: &Design, machine: &Machine) -> Option<Design> {
     let late = design.delay + 0.5 * design.every + 1.0 / (2.0 * PI * old.filter);
     let (drag, push) = (rigid.drag(), rigid.force_per_command());
     // M ẍ + d ẋ = g u:  k = g/d, τ = M/d; without drag k/τ is what counts.
-    let (lag, gain) = match machine.amplifier.mode {
+    let (lag, gain) = match machine.drives[0].amplifier.mode {
         _ if drag <= 0.0 => return None,
         AmplifierMode::Voltage | AmplifierMode::Current => (rigid.mass / drag, push / drag),
     };

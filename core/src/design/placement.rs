@@ -40,10 +40,10 @@ pub fn place(design: &Design, machine: &Machine, bandwidth: f64, damping: f64) -
             let current = old.current.map(|inner| {
                 let late = 0.5 * design.every + design.delay;
                 let pole = (CASCADE * speed).min(0.5 / late.max(f64::MIN_POSITIVE));
-                let gain = machine.amplifier.gain;
+                let gain = machine.drives[0].amplifier.gain;
                 CurrentLoop {
-                    proportional: pole * machine.motor.inductance / gain,
-                    integral: pole * machine.motor.resistance / gain,
+                    proportional: pole * machine.drives[0].motor.inductance / gain,
+                    integral: pole * machine.drives[0].motor.resistance / gain,
                     ..inner
                 }
             });
@@ -81,6 +81,6 @@ pub fn first(design: &Design, swing: Option<f64>) -> f64 {
 
 /// Whether a current is commanded, by amplifier or inner loop.
 pub fn commands_current(design: &Design, machine: &Machine) -> bool {
-    machine.amplifier.mode == AmplifierMode::Current
+    machine.drives[0].amplifier.mode == AmplifierMode::Current
         || matches!(&design.structure, Structure::Cascade(Cascade { current: Some(_), .. }))
 }

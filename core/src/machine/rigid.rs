@@ -35,7 +35,7 @@ pub struct Rigid {
 impl Rigid {
     /// That of `stage`.
     pub fn of(machine: &Machine) -> Self {
-        let (r, motor) = (machine.pulley_radius, &machine.motor);
+        let (r, motor) = (machine.pulley_radius, &machine.drives[0].motor);
         let n = motor.gear_ratio;
         let pulleys = machine.drive_pulley.inertia + n * n * motor.rotor_inertia + machine.idler_pulley.inertia;
         let [drive, cart, idler] =
@@ -55,8 +55,8 @@ impl Rigid {
             brake: n * motor.back_emf_constant / r,
             resistance: motor.resistance,
             inductance: motor.inductance,
-            gain: machine.amplifier.gain,
-            mode: machine.amplifier.mode,
+            gain: machine.drives[0].amplifier.gain,
+            mode: machine.drives[0].amplifier.mode,
         }
     }
 

@@ -3,7 +3,8 @@
 
 use super::watch::{Sum, Watch, Watched};
 use super::{EventCount, Peak};
-use crate::machine::gantry::{BODIES, Gantry};
+use crate::machine::Machine;
+use crate::machine::gantry::BODIES;
 use crate::mechanism::{DRIVES, Mechanism, Mode, Roles, Shown, State};
 use crate::solve::{Closer, Curve, Event, Gap, Observe, Stretch};
 
@@ -30,10 +31,10 @@ pub struct GantryMetrics {
     /// Speeds of the left and the right motor behind its gear, of largest magnitude, rad/s: those of the pulleys where
     /// the gear is stiff.
     pub peak_drive_speed: [Peak; DRIVES],
-    /// Stretch of each span of largest magnitude, m, in the order of [`Routing::spans`](crate::machine::gantry::Routing).
+    /// Stretch of each span of largest magnitude, m, in the order of [`Kind::spans`](crate::machine::Kind).
     pub peak_stretch: Vec<Peak>,
     /// Force in each span of largest magnitude, N, damping included, in the order of
-    /// [`Routing::spans`](crate::machine::gantry::Routing).
+    /// [`Kind::spans`](crate::machine::Kind).
     pub peak_force: Vec<Peak>,
     /// When everything came to rest, s, if it has; 0 if nothing ever moved. None while anything moves, and where a body
     /// has no dry friction to stick by.
@@ -73,45 +74,43 @@ pub struct GantryMetrics {
 /// ```
 #[derive(Debug, Clone)]
 pub struct GantryMeter {
-    gantry: Gantry,
+    gantry: Machine,
     roles: Roles,
-    /// The bodies that the drives' pulleys are.
-    pulleys: [usize; DRIVES],
     watch: Watch,
 }
 
 impl GantryMeter {
     /// A meter for a run of this gantry.
-    pub fn new(gantry: &Gantry) -> Self {
+    pub fn new(gantry: &Machine) -> Self {
         Self::of(gantry, &gantry.mechanism())
     }
 
     /// The same where its mechanism is there already.
-    pub fn of(gantry: &Gantry, mechanism: &Mechanism) -> Self {
+    pub fn of(gantry: &Machine, mechanism: &Mechanism) -> Self {
         let (roles, drives) = (mechanism.roles.clone(), &mechanism.drives);
         let alone = |shown: Shown| vec![(shown, 1.0)];
         let stretches =
             |sum: &[(usize, f64)]| sum.iter().map(|&(span, weight)| (Shown::Stretch(span), weight)).collect();
         let mut sums: Vec<Sum> = roles.loads.iter().map(|load| alone(Shown::Speed(*load, 1.0))).collect();
-        sums.extend(gantry.routing.drive_error().map(|sum| stretches(&sum)));
+        sums.extend(gantry.geometry().slides.iter().map(|slide| stretches(slide.error)));
         sums.extend((0..DRIVES).map(|drive| alone(Shown::Current(drive))));
         sums.extend(drives.iter().map(|drive| alone(Shown::Speed(drive.shaft, 1.0))));
-        sums.extend(gantry.routing.stretches().iter().map(|sum| stretches(sum)));
+        sums.extend(gantry.geometry().spans.iter().map(|span| stretches(span.by_others)));
         sums.extend(roles.spans.iter().map(|span| alone(Shown::Force(*span, 1.0))));
-        let pulleys = std::array::from_fn(|drive| drives[drive].pulley);
-        Self { gantry: gantry.clone(), roles, pulleys, watch: Watch::new(mechanism, &sums) }
+        Self { gantry: gantry.clone(), roles, watch: Watch::new(mechanism, &sums) }
     }
 
     /// The metrics of the run that was observed and whose events these are.
     pub fn finish(self, events: &[Event]) -> GantryMetrics {
-        let Self { gantry, roles, pulleys, watch } = self;
+        let Self { gantry, roles, watch } = self;
         let Watched { end, state, peaks, stop_time, bodies_rest, rotors_rest, events } = watch.finish(events);
         let (stretches, forces) = peaks[FIRST_SPAN..].split_at(roles.spans.len());
+        let by_drives = gantry.by_drives(&state.position);
         GantryMetrics {
             end,
             final_position: std::array::from_fn(|load| state.position[roles.loads[load]]),
             final_speed: std::array::from_fn(|load| state.speed[roles.loads[load]]),
-            final_by_drives: gantry.place(pulleys.map(|pulley| state.position[pulley])),
+            final_by_drives: std::array::from_fn(|slide| by_drives[slide]),
             peak_speed: [peaks[0], peaks[1]],
             peak_error: [peaks[2], peaks[3]],
             peak_current: [peaks[4], peaks[5]],

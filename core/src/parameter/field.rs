@@ -1,51 +1,64 @@
 //! Where a parameter sits in a machine, how it is read there and how it is set.
 
 use crate::friction::{Friction, Law, Shape, decay_of_velocity, velocity_of_decay};
-use crate::machine::gantry::{Gantry, Slide};
 use crate::machine::{Belt, BeltModel, Machine, SimpleDrive};
 
-/// Where a parameter sits in a machine of one kind: an axis, or a [`Gantry`].
-#[derive(Debug)]
-pub enum Field<M = Machine> {
-    /// In no machine: it is a number of a run, a recorder, a controller, a method, or of a machine of the other kind.
+/// Where a parameter sits in a machine.
+#[derive(Debug, Clone, Copy)]
+pub enum Field {
+    /// In no machine: it is a number of a run, a recorder, a controller or a method.
     Elsewhere,
     /// In a machine.
-    Machine(Accessor<M>),
+    Machine(Accessor),
     /// In a machine, where it is another form of the number with this key.
-    Form(&'static str, Accessor<M>),
+    Form(&'static str, Accessor),
     /// The number with this key is computed from it and from others, and the machine keeps the result alone.
     PartOf(&'static str),
 }
 
-/// Reads and sets a number of a machine, or each of a list.
-#[derive(Debug)]
-pub struct Accessor<M = Machine> {
-    /// How its elements are named.
-    pub(super) list: List,
-    /// How many it has.
-    pub(super) count: fn(&M) -> usize,
-    /// The value at a place in the list; none where the machine has no such part, or computes it from others.
-    pub(super) get: fn(&M, usize) -> Option<f64>,
+/// Reads and sets a number of a machine, or of each of its parts of a kind.
+#[derive(Debug, Clone, Copy)]
+pub struct Accessor {
+    /// Whose number it is.
+    pub(super) of: Of,
+    /// The value of a part; none where the machine has no such part, or computes it from others.
+    pub(super) get: fn(&Machine, usize) -> Option<f64>,
     /// Sets it, and what is computed from it; does nothing where the machine has no such part.
-    pub(super) set: fn(&mut M, usize, f64),
+    pub(super) set: fn(&mut Machine, usize, f64),
 }
 
-// By hand, as a derived one would ask the same of the machine.
-impl<M> Clone for Accessor<M> {
-    fn clone(&self) -> Self {
-        *self
+/// Whose number a parameter is.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Of {
+    /// The machine's: there is one.
+    Machine,
+    /// The same of a machine with one drive and one slide alone: others have a row of each slide, or no such part.
+    Axis,
+    /// Each drive's.
+    Drive,
+    /// Each slide's, of a machine with more than one.
+    Slide,
+    /// Each span's.
+    Span,
+    /// Each point's of a line of an axis, of which there are so many.
+    Point(fn(&Machine) -> usize),
+}
+
+impl Accessor {
+    /// How its elements are named in this machine, and how many there are; none where it has no such number.
+    pub(super) fn listed(&self, machine: &Machine) -> Option<(List, usize)> {
+        let (drives, slides) = (machine.drives.len(), machine.slides().count());
+        match self.of {
+            Of::Machine => Some((List::None, 1)),
+            Of::Axis => (slides == 1).then_some((List::None, 1)),
+            Of::Drive if drives == 1 => Some((List::None, 1)),
+            Of::Drive => Some((List::Drives, drives)),
+            Of::Slide => (slides > 1).then_some((List::Slides, slides)),
+            Of::Span => Some((List::Numbers, machine.belt.stiffness.len())),
+            Of::Point(count) => (slides == 1).then(|| (List::Points, count(machine))),
+        }
     }
 }
-
-impl<M> Copy for Accessor<M> {}
-
-impl<M> Clone for Field<M> {
-    fn clone(&self) -> Self {
-        *self
-    }
-}
-
-impl<M> Copy for Field<M> {}
 
 /// How the elements of a parameter are named.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -92,25 +105,19 @@ impl List {
     }
 }
 
-impl<M> Accessor<M> {
-    const fn new(
-        list: List,
-        count: fn(&M) -> usize,
-        get: fn(&M, usize) -> Option<f64>,
-        set: fn(&mut M, usize, f64),
-    ) -> Self {
-        Self { list, count, get, set }
+impl Field {
+    /// A number of the machine that it may have.
+    pub(super) const fn number(get: fn(&Machine, usize) -> Option<f64>, set: fn(&mut Machine, usize, f64)) -> Self {
+        Self::of(Of::Machine, get, set)
     }
-}
 
-impl<M> Field<M> {
-    /// A number that a machine may have.
-    pub(super) const fn number(get: fn(&M, usize) -> Option<f64>, set: fn(&mut M, usize, f64)) -> Self {
-        Self::Machine(Accessor::new(List::None, |_| 1, get, set))
+    /// A number of each of these.
+    pub(super) const fn of(of: Of, get: fn(&Machine, usize) -> Option<f64>, set: fn(&mut Machine, usize, f64)) -> Self {
+        Self::Machine(Accessor { of, get, set })
     }
 
     /// Another form of the number with the key `of`.
-    const fn form(self, of: &'static str) -> Self {
+    pub(super) const fn form(self, of: &'static str) -> Self {
         match self {
             Self::Machine(accessor) | Self::Form(_, accessor) => Self::Form(of, accessor),
             Self::Elsewhere => Self::Elsewhere,
@@ -119,7 +126,7 @@ impl<M> Field<M> {
     }
 
     /// How a machine's number is read and set.
-    pub(super) fn accessor(&self) -> Option<&Accessor<M>> {
+    pub(super) fn accessor(&self) -> Option<&Accessor> {
         match self {
             Self::Machine(accessor) | Self::Form(_, accessor) => Some(accessor),
             Self::Elsewhere | Self::PartOf(_) => None,
@@ -127,109 +134,18 @@ impl<M> Field<M> {
     }
 }
 
-impl Field {
-    /// A number of each span.
-    pub(super) const fn spans(get: fn(&Machine, usize) -> Option<f64>, set: fn(&mut Machine, usize, f64)) -> Self {
-        Self::Machine(Accessor::new(List::Numbers, |_| 3, get, set))
-    }
-
-    /// A number of each point of a line.
-    pub(super) const fn points(
-        count: fn(&Machine) -> usize,
-        get: fn(&Machine, usize) -> Option<f64>,
-        set: fn(&mut Machine, usize, f64),
-    ) -> Self {
-        Self::Machine(Accessor::new(List::Points, count, get, set))
-    }
-}
-
-impl Field<Gantry> {
-    /// A number of each span.
-    pub(super) const fn gantry_spans(get: fn(&Gantry, usize) -> Option<f64>, set: fn(&mut Gantry, usize, f64)) -> Self {
-        Self::Machine(Accessor::new(List::Numbers, |gantry| gantry.belts.stiffness.len(), get, set))
-    }
-
-    /// A number of each drive.
-    pub(super) const fn drives(get: fn(&Gantry, usize) -> Option<f64>, set: fn(&mut Gantry, usize, f64)) -> Self {
-        Self::Machine(Accessor::new(List::Drives, |_| 2, get, set))
-    }
-
-    /// A number of bridge and cart.
-    pub(super) const fn slides(get: fn(&Gantry, usize) -> Option<f64>, set: fn(&mut Gantry, usize, f64)) -> Self {
-        Self::Machine(Accessor::new(List::Slides, |_| 2, get, set))
-    }
-}
-
-/// Where a parameter sits in machines of either kind.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Place {
-    pub axis: Field,
-    pub gantry: Field<Gantry>,
-}
-
-impl Place {
-    /// In an axis alone.
-    pub const fn axis(axis: Field) -> Self {
-        Self { axis, gantry: Field::Elsewhere }
-    }
-
-    /// In a gantry alone.
-    pub const fn gantry(gantry: Field<Gantry>) -> Self {
-        Self { axis: Field::Elsewhere, gantry }
-    }
-
-    /// Another form of the number with the key `of`.
-    pub const fn form(self, of: &'static str) -> Self {
-        Self { axis: self.axis.form(of), gantry: self.gantry.form(of) }
-    }
-
-    /// The same in an axis alone.
-    pub const fn part_of_axis(whole: &'static str) -> Self {
-        Self::axis(Field::PartOf(whole))
-    }
-
-    /// In neither: the number with the key `whole` is computed from it.
-    pub const fn part_of(whole: &'static str) -> Self {
-        Self { axis: Field::PartOf(whole), gantry: Field::PartOf(whole) }
-    }
-}
-
-/// The thing that slides with this number: 0 for the bridge, 1 for the cart.
-pub(super) fn slide(gantry: &Gantry, index: usize) -> &Slide {
-    if index == 0 { &gantry.bridge } else { &gantry.cart }
-}
-
-pub(super) fn slide_mut(gantry: &mut Gantry, index: usize) -> &mut Slide {
-    if index == 0 { &mut gantry.bridge } else { &mut gantry.cart }
-}
-
-/// A number that every axis has.
+/// A number in this place of every machine, or of every axis.
 macro_rules! always {
-    (|$machine:ident| $($place:tt)*) => {
-        Place::axis(Field::number(|$machine, _| Some($($place)*), |$machine, _, value| $($place)* = value))
-    };
-}
-
-/// A number that every axis and every gantry has, in the same place.
-macro_rules! everywhere {
-    (|$machine:ident| $($place:tt)*) => {
-        Place {
-            gantry: Field::number(|$machine, _| Some($($place)*), |$machine, _, value| $($place)* = value),
-            ..always!(|$machine| $($place)*)
-        }
+    ($of:ident, |$machine:ident| $($place:tt)*) => {
+        Field::of(Of::$of, |$machine, _| Some($($place)*), |$machine, _, value| $($place)* = value)
     };
 }
 
 /// A number of a part that stands in an `Option`.
 macro_rules! part {
-    (both |$machine:ident| $part:expr, $reach:expr => $name:ident) => {
-        Place {
-            axis: part!(field |$machine| $part, $reach => $name),
-            gantry: part!(field |$machine| $part, $reach => $name),
-        }
-    };
-    (field |$machine:ident| $part:expr, $reach:expr => $name:ident) => {
-        Field::number(
+    ($of:ident, |$machine:ident| $part:expr, $reach:expr => $name:ident) => {
+        Field::of(
+            Of::$of,
             |$machine, _| $part.map(|part| part.$name),
             |$machine, _, value| {
                 if let Some(part) = $reach {
@@ -238,133 +154,61 @@ macro_rules! part {
             },
         )
     };
-    (|$machine:ident| $part:expr, $reach:expr => $name:ident) => {
-        Place::axis(part!(field |$machine| $part, $reach => $name))
-    };
 }
 
-/// A number of the belt's make, from which its stiffness is computed.
+/// A number of the belt's make, from which its stiffness is computed: of one that is given by E A where `specific` is
+/// true, or by E and A.
 macro_rules! make {
-    (material, |$make:ident| $($place:tt)*) => {
-        Place {
-            axis: Field::number(
-                |stage, _| stage.belt.make.filter(|_| !stage.belt.sheet.is_specific).map(|$make| $($place)*),
-                |stage, _, value| {
-                    if let Some($make) = stage.belt.make.as_mut().filter(|_| !stage.belt.sheet.is_specific) {
-                        $($place)* = value;
-                        // k = A E / l                                                      (11)
-                        stage.belt.stiffness = $make.stiffness();
-                    }
-                },
-            ),
-            gantry: Field::number(
-                |gantry, _| {
-                    gantry.belts.make.as_ref().filter(|_| !gantry.belts.sheet.is_specific).map(|$make| $($place)*)
-                },
-                |gantry, _, value| {
-                    if let Some($make) = gantry.belts.make.as_mut().filter(|_| !gantry.belts.sheet.is_specific) {
-                        $($place)* = value;
-                        gantry.belts.follow_make();
-                    }
-                },
-            ),
-        }
-    };
-    (specific) => {
-        Place {
-            axis: Field::number(
-                |stage, _| stage.belt.make.filter(|_| stage.belt.sheet.is_specific).map(|make| make.modulus),
-                |stage, _, value| {
-                    if let Some(make) = stage.belt.make.as_mut().filter(|_| stage.belt.sheet.is_specific) {
-                        make.modulus = value;
-                        stage.belt.stiffness = make.stiffness();
-                    }
-                },
-            ),
-            gantry: Field::number(
-                |gantry, _| {
-                    gantry.belts.make.as_ref().filter(|_| gantry.belts.sheet.is_specific).map(|make| make.modulus)
-                },
-                |gantry, _, value| {
-                    if let Some(make) = gantry.belts.make.as_mut().filter(|_| gantry.belts.sheet.is_specific) {
-                        make.modulus = value;
-                        gantry.belts.follow_make();
-                    }
-                },
-            ),
-        }
-    };
-    (spans, |$make:ident, $span:pat_param| $($place:tt)*) => {
-        Place {
-            axis: make!(axis spans, |$make, $span| $($place)*),
-            gantry: make!(gantry gantry_spans, |$make, $span| $($place)*),
-        }
-    };
-    (axis $constructor:ident, |$make:ident, $span:pat_param| $($place:tt)*) => {
-        Field::$constructor(
-            |stage, $span| stage.belt.make.map(|$make| $($place)*),
-            |stage, $span, value| {
-                if let Some($make) = &mut stage.belt.make {
+    ($of:ident, |$belt:ident| $applies:expr, |$make:ident, $span:pat_param| $($place:tt)*) => {
+        Field::of(
+            Of::$of,
+            |machine, $span| {
+                let $belt = &machine.belt;
+                $belt.make.filter(|_| $applies).map(|$make| $($place)*)
+            },
+            |machine, $span, value| {
+                let $belt = &mut machine.belt;
+                let applies = $applies;
+                if let Some($make) = $belt.make.as_mut().filter(|_| applies) {
                     $($place)* = value;
                     // k = A E / l                                                      (11)
-                    stage.belt.stiffness = $make.stiffness();
-                }
-            },
-        )
-    };
-    (gantry $constructor:ident, |$make:ident, $span:pat_param| $($place:tt)*) => {
-        Field::$constructor(
-            |gantry, $span| gantry.belts.make.as_ref().map(|$make| $($place)*),
-            |gantry, $span, value| {
-                if let Some($make) = &mut gantry.belts.make {
-                    $($place)* = value;
-                    gantry.belts.follow_make();
+                    machine.belt.follow_make();
                 }
             },
         )
     };
 }
 
-/// A number of the motor or the amplifier, of which a gantry has two.
+/// A number of each motor or amplifier.
 macro_rules! of_drive {
-    ($one:ident, $each:ident, |$part:ident| $get:expr, |$new:ident, $value:ident| $set:expr) => {
-        Place {
-            axis: Field::number(
-                |stage, _| {
-                    let $part = &stage.$one;
-                    $get
-                },
-                |stage, _, $value| {
-                    let $new = &mut stage.$one;
+    ($part:ident, |$old:ident| $get:expr, |$new:ident, $value:ident| $set:expr) => {
+        Field::of(
+            Of::Drive,
+            |machine, drive| {
+                let $old = &machine.drives.get(drive)?.$part;
+                $get
+            },
+            |machine, drive, $value| {
+                if let Some(unit) = machine.drives.get_mut(drive) {
+                    let $new = &mut unit.$part;
                     $set
-                },
-            ),
-            gantry: Field::drives(
-                |gantry, drive| {
-                    let $part = gantry.$each.get(drive)?;
-                    $get
-                },
-                |gantry, drive, $value| {
-                    if let Some($new) = gantry.$each.get_mut(drive) {
-                        $set
-                    }
-                },
-            ),
-        }
+                }
+            },
+        )
     };
 }
 
-/// A number of the motor.
+/// A number of each motor.
 macro_rules! motor {
     ($name:ident) => {
-        of_drive!(motor, motors, |motor| (!motor.is_simple).then_some(motor.$name), |motor, value| {
+        of_drive!(motor, |motor| (!motor.is_simple).then_some(motor.$name), |motor, value| {
             if !motor.is_simple {
                 motor.$name = value;
             }
         })
     };
     (play $name:ident) => {
-        of_drive!(motor, motors, |motor| motor.gear_play.map(|play| play.$name), |motor, value| {
+        of_drive!(motor, |motor| motor.gear_play.map(|play| play.$name), |motor, value| {
             if let Some(play) = &mut motor.gear_play {
                 play.$name = value;
             }
@@ -375,56 +219,57 @@ macro_rules! motor {
 /// A number of a drive that is given by force and drag.
 macro_rules! of_simple {
     ($name:ident) => {
-        Place::axis(Field::number(
-            |stage, _| simple(stage).map(|drive| drive.$name),
-            |stage, _, value| set_simple(stage, |drive| drive.$name = value),
-        ))
+        Field::of(
+            Of::Axis,
+            |machine, _| simple(machine).map(|drive| drive.$name),
+            |machine, _, value| set_simple(machine, |drive| drive.$name = value),
+        )
     };
 }
 
-/// A number of the amplifier that it need not have.
+/// A number of each amplifier that it need not have.
 macro_rules! amplifier {
     ($name:ident) => {
-        of_drive!(amplifier, amplifiers, |amplifier| amplifier.$name, |amplifier, value| {
+        of_drive!(amplifier, |amplifier| amplifier.$name, |amplifier, value| {
             amplifier.$name = amplifier.$name.map(|_| value)
         })
     };
 }
 
-/// A number of what slides in a gantry.
+/// A number of each of several slides.
 macro_rules! of_slide {
     (|$part:ident| $get:expr, |$new:ident, $value:ident| $set:expr) => {
-        Place::gantry(Field::slides(
-            |gantry, index| {
-                let $part = slide(gantry, index);
+        Field::of(
+            Of::Slide,
+            |machine, index| {
+                let $part = machine.slide(index)?;
                 $get
             },
-            |gantry, index, $value| {
-                let $new = slide_mut(gantry, index);
-                $set
-            },
-        ))
-    };
-}
-
-/// A number of a body's friction: of the drive pulley in both kinds of machine, of what slides in a gantry, or of
-/// another body of an axis.
-macro_rules! of_friction {
-    (field $body:ident, |$law:ident| $get:expr, |$new:ident, $value:ident| $set:expr) => {
-        Field::number(
-            |machine, _| {
-                let $law = &machine.$body.friction;
-                $get
-            },
-            |machine, _, $value| {
-                let $new = &mut machine.$body.friction;
-                $set
+            |machine, index, $value| {
+                if let Some($new) = machine.slide_mut(index) {
+                    $set
+                }
             },
         )
     };
-    (drive_pulley, $($how:tt)*) => {
-        Place { axis: of_friction!(field drive_pulley, $($how)*), gantry: of_friction!(field drive_pulley, $($how)*) }
+    (travel $name:ident) => {
+        of_slide!(|slide| slide.travel.map(|travel| travel.$name), |slide, value| {
+            if let Some(travel) = &mut slide.travel {
+                travel.$name = value;
+            }
+        })
     };
+    (stop $name:ident) => {
+        of_slide!(|slide| slide.travel.and_then(|travel| travel.stop).map(|stop| stop.$name), |slide, value| {
+            if let Some(stop) = slide.travel.as_mut().and_then(|travel| travel.stop.as_mut()) {
+                stop.$name = value;
+            }
+        })
+    };
+}
+
+/// A number of a body's friction: of the drive pulleys, of each of several slides (`bridge`), or of a body of an axis.
+macro_rules! of_friction {
     (bridge, |$law:ident| $get:expr, |$new:ident, $value:ident| $set:expr) => {
         of_slide!(
             |slide| {
@@ -437,8 +282,24 @@ macro_rules! of_friction {
             }
         )
     };
+    (drive_pulley, $($how:tt)*) => {
+        of_friction!(Machine drive_pulley, $($how)*)
+    };
     ($body:ident, $($how:tt)*) => {
-        Place::axis(of_friction!(field $body, $($how)*))
+        of_friction!(Axis $body, $($how)*)
+    };
+    ($of:ident $body:ident, |$law:ident| $get:expr, |$new:ident, $value:ident| $set:expr) => {
+        Field::of(
+            Of::$of,
+            |machine, _| {
+                let $law = &machine.$body.friction;
+                $get
+            },
+            |machine, _, $value| {
+                let $new = &mut machine.$body.friction;
+                $set
+            },
+        )
     };
 }
 
@@ -460,26 +321,26 @@ macro_rules! of_law {
     };
 }
 
-pub(super) use {always, amplifier, everywhere, make, motor, of_drive, of_friction, of_law, of_simple, of_slide, part};
+pub(super) use {always, amplifier, make, motor, of_drive, of_friction, of_law, of_simple, of_slide, part};
 
-/// The drive that is given by force and drag, if it is.
-pub(super) fn simple(stage: &Machine) -> Option<SimpleDrive> {
-    SimpleDrive::of(&stage.motor, stage.pulley_radius)
+/// The drive of an axis that is given by force and drag, if it is.
+pub(super) fn simple(machine: &Machine) -> Option<SimpleDrive> {
+    SimpleDrive::of(&machine.drives.first()?.motor, machine.pulley_radius)
 }
 
 /// Sets the radius; a drive that is given by its force keeps it.
-pub(super) fn set_radius(stage: &mut Machine, radius: f64) {
-    let drive = simple(stage);
-    stage.pulley_radius = radius;
-    if let Some(drive) = drive {
-        stage.motor = drive.motor(radius);
+pub(super) fn set_radius(machine: &mut Machine, radius: f64) {
+    let drive = simple(machine);
+    machine.pulley_radius = radius;
+    if let (Some(drive), Some(unit)) = (drive, machine.drives.first_mut()) {
+        unit.motor = drive.motor(radius);
     }
 }
 
-pub(super) fn set_simple(stage: &mut Machine, change: impl FnOnce(&mut SimpleDrive)) {
-    if let Some(mut drive) = simple(stage) {
+pub(super) fn set_simple(machine: &mut Machine, change: impl FnOnce(&mut SimpleDrive)) {
+    if let Some(mut drive) = simple(machine) {
         change(&mut drive);
-        stage.motor = drive.motor(stage.pulley_radius);
+        machine.drives[0].motor = drive.motor(machine.pulley_radius);
     }
 }
 
@@ -546,16 +407,16 @@ pub(super) fn set_stribeck_decay(friction: &mut Friction, decay: f64) {
 
 /// A number of each point of a line of the cart: 0 for what it is over, 1 for the value.
 macro_rules! points {
-    ($part:literal, |$stage:ident| $($line:tt)*) => {
-        Place::axis(Field::points(
-            |$stage| $($line)*.as_ref().map_or(0, |line| line.points().len()),
-            |$stage, point| $($line)*.as_ref()?.points().get(point).map(|point| point[$part]),
-            |$stage, point, value| {
+    ($part:literal, |$machine:ident| $($line:tt)*) => {
+        Field::of(
+            Of::Point(|$machine| $($line)*.as_ref().map_or(0, |line| line.points().len())),
+            |$machine, point| $($line)*.as_ref()?.points().get(point).map(|point| point[$part]),
+            |$machine, point, value| {
                 if let Some(line) = &mut $($line)* {
                     line.set(point, $part, value);
                 }
             },
-        ))
+        )
     };
 }
 pub(super) use points;

@@ -2,9 +2,10 @@
 //! along.
 
 use super::field::List;
-use super::{Field, Numbers, Off, Parameter, Sits, Sum, all, at_pulley};
+use super::{Field, Off, Parameter, Sits, Sum, all, at_pulley};
 use crate::error::{Error, Result};
 use crate::friction::Friction;
+use crate::machine::Machine;
 
 /// A number of a machine: a row of the table, and its place where that is a list.
 #[derive(Debug, Clone, Copy)]
@@ -16,8 +17,8 @@ struct Number {
 impl PartialEq for Number {
     /// Two forms of one number are the same.
     fn eq(&self, other: &Self) -> bool {
-        let own = |row: &Parameter| match (&row.field, &row.gantry) {
-            (Field::Form(of, _), _) | (_, Field::Form(of, _)) => *of,
+        let own = |row: &Parameter| match row.field {
+            Field::Form(of, _) => of,
             _ => row.key,
         };
         own(self.row) == own(other.row) && self.index == other.index
@@ -25,12 +26,12 @@ impl PartialEq for Number {
 }
 
 impl Number {
-    fn value(self, machine: &dyn Numbers) -> Option<f64> {
+    fn value(self, machine: &Machine) -> Option<f64> {
         machine.get(self.row, self.index)
     }
 
     /// Its key, as `--set` names it.
-    fn key(self, machine: &dyn Numbers) -> String {
+    fn key(self, machine: &Machine) -> String {
         machine.sits(self.row).key(self.row, self.index)
     }
 }
@@ -77,7 +78,7 @@ impl Free {
     /// assert!(error.to_string().contains("has no value in this case"));
     /// # Ok::<(), taut::Error>(())
     /// ```
-    pub fn new(machine: &dyn Numbers, name: &str, free: &[&str], bounds: &GivenBounds) -> Result<Self> {
+    pub fn new(machine: &Machine, name: &str, free: &[&str], bounds: &GivenBounds) -> Result<Self> {
         if name.starts_with("total.") {
             return Self::sum(machine, name, free, bounds);
         }
@@ -120,23 +121,23 @@ impl Free {
     }
 
     /// A sum over all bodies, at the drive pulley; its parts keep their ratios.
-    fn sum(machine: &dyn Numbers, name: &str, free: &[&str], bounds: &GivenBounds) -> Result<Self> {
-        let Some(stage) = machine.axis() else {
+    fn sum(machine: &Machine, name: &str, free: &[&str], bounds: &GivenBounds) -> Result<Self> {
+        if machine.bridge.is_some() {
             return Err(Error::new(format!(
                 "`{name}` is a sum over the bodies of a single axis, and this is a gantry"
             ))
             .next("name a number of the gantry as --set does, such as cart.mass or bridge.friction.viscous"));
-        };
+        }
         let Some(sum) = Sum::named(name) else {
             return Err(Error::new(format!("there is no group `{name}`")).allowed(Sum::ALL.map(Sum::name).join(", ")));
         };
         let mut parts: Vec<(String, Number, f64)> = Vec::new();
         for row in sum.parts(true) {
-            for number in numbers(stage, row.key, &[])?.0 {
-                parts.push((number.key(stage), number, number.value(stage).unwrap_or(0.0)));
+            for number in numbers(machine, row.key, &[])?.0 {
+                parts.push((number.key(machine), number, number.value(machine).unwrap_or(0.0)));
             }
         }
-        let total: f64 = parts.iter().map(|(key, _, value)| value * at_pulley(stage, key)).sum();
+        let total: f64 = parts.iter().map(|(key, _, value)| value * at_pulley(machine, key)).sum();
         if total <= 0.0 {
             let keys: Vec<&str> = parts.iter().map(|(key, ..)| key.as_str()).collect();
             return Err(Error::new(format!("all parts of `{name}` are zero, so their ratios are not known"))
@@ -146,7 +147,7 @@ impl Free {
         let mut members = Vec::new();
         for (_, number, value) in &parts {
             members.push((*number, value / total));
-            members.extend(followers(stage, *number, &is_free).map(|number| (number, value / total)));
+            members.extend(followers(machine, *number, &is_free).map(|number| (number, value / total)));
         }
         let (low, high) = limits(name, &[], total, (0.0, 1e15), bounds)?;
         let keys = parts.into_iter().map(|(key, _, value)| (key, value / total)).collect();
@@ -154,13 +155,13 @@ impl Free {
     }
 
     /// Puts `value` into a machine. Of several free parameters that is for [`set`].
-    pub fn set(&self, machine: &mut dyn Numbers, value: f64) {
+    pub fn set(&self, machine: &mut Machine, value: f64) {
         set(machine, [(self, value)]);
     }
 
     /// The value that it has in a machine: another than was put in where that cannot be, as a breakaway below Coulomb
     /// friction.
-    pub fn value_in(&self, machine: &dyn Numbers) -> Option<f64> {
+    pub fn value_in(&self, machine: &Machine) -> Option<f64> {
         let (number, factor) = self.members.first()?;
         Some(number.value(machine)? / factor)
     }
@@ -177,7 +178,7 @@ impl Free {
 }
 
 /// Puts values of free parameters into a machine, in whatever order.
-pub fn set<'a>(machine: &mut dyn Numbers, values: impl IntoIterator<Item = (&'a Free, f64)>) {
+pub fn set<'a>(machine: &mut Machine, values: impl IntoIterator<Item = (&'a Free, f64)>) {
     for (free, value) in values {
         for (number, factor) in &free.members {
             machine.set(number.row, number.index, value * factor);
@@ -191,12 +192,12 @@ pub fn set<'a>(machine: &mut dyn Numbers, values: impl IntoIterator<Item = (&'a 
 }
 
 /// The present value of a parameter, of a list the first one.
-pub fn value(machine: &dyn Numbers, key: &str) -> Option<f64> {
+pub fn value(machine: &Machine, key: &str) -> Option<f64> {
     numbers(machine, key, &[]).ok()?.0.first()?.value(machine)
 }
 
 /// All numbers of a machine by their keys, of every form.
-pub fn values(machine: &dyn Numbers) -> Vec<(String, f64)> {
+pub fn values(machine: &Machine) -> Vec<(String, f64)> {
     let of = |row: &'static Parameter| {
         let sits = machine.sits(row);
         let (_, count) = sits.listed()?;
@@ -208,7 +209,7 @@ pub fn values(machine: &dyn Numbers) -> Vec<(String, f64)> {
 
 /// The numbers of a machine by their keys, with their rows: each in one form, and without those that go along with
 /// another as long as they have its value.
-pub fn own(machine: &dyn Numbers) -> Vec<(String, &'static Parameter)> {
+pub fn own(machine: &Machine) -> Vec<(String, &'static Parameter)> {
     let of = |row: &'static Parameter| {
         let is_one = matches!(machine.sits(row), Sits::Machine(..));
         let numbers = present(machine, row).filter(|(number, _)| !follows_any(machine, *number));
@@ -220,7 +221,7 @@ pub fn own(machine: &dyn Numbers) -> Vec<(String, &'static Parameter)> {
 
 /// The keys of everything of a machine that may be off and is not zero. Directions and breakaways that have the same
 /// value, and drives that are alike, count once.
-pub fn every(machine: &dyn Numbers) -> Vec<String> {
+pub fn every(machine: &Machine) -> Vec<String> {
     let mut keys = Vec::new();
     for row in all().filter(|row| row.off != Off::No) {
         let there: Vec<(Number, f64)> = present(machine, row).filter(|(_, value)| *value != 0.0).collect();
@@ -246,7 +247,7 @@ pub fn every(machine: &dyn Numbers) -> Vec<String> {
 }
 
 /// The numbers of a machine that may be off, each as a factor on all numbers that are tied by nature.
-pub fn kinds(machine: &dyn Numbers) -> Vec<Free> {
+pub fn kinds(machine: &Machine) -> Vec<Free> {
     let mut kinds: Vec<Free> = Vec::new();
     for row in all() {
         let Off::With(name) = row.off else { continue };
@@ -270,7 +271,7 @@ pub fn kinds(machine: &dyn Numbers) -> Vec<Free> {
 }
 
 /// The same without the numbers that others set; what is left of a kind has the keys of that as its name.
-pub fn kinds_without(machine: &dyn Numbers, others: &[&Free]) -> Vec<Free> {
+pub fn kinds_without(machine: &Machine, others: &[&Free]) -> Vec<Free> {
     let is_set = |number: &Number| others.iter().any(|other| other.members.iter().any(|(set, _)| set == number));
     let mut kinds = kinds(machine);
     for kind in &mut kinds {
@@ -286,7 +287,7 @@ pub fn kinds_without(machine: &dyn Numbers, others: &[&Free]) -> Vec<Free> {
 }
 
 /// The numbers of a row that a machine has, with their finite values.
-fn present<'a>(machine: &'a dyn Numbers, row: &'static Parameter) -> impl Iterator<Item = (Number, f64)> + 'a {
+fn present<'a>(machine: &'a Machine, row: &'static Parameter) -> impl Iterator<Item = (Number, f64)> + 'a {
     let count = machine.sits(row).listed().map_or(0, |(_, count)| count);
     (0..count).filter_map(move |index| {
         let number = Number { row, index };
@@ -295,20 +296,20 @@ fn present<'a>(machine: &'a dyn Numbers, row: &'static Parameter) -> impl Iterat
 }
 
 /// Whether both drives of a gantry have this number, and the same one: it is then that of the motor that both are.
-fn are_alike_drives(machine: &dyn Numbers, row: &'static Parameter) -> bool {
+fn are_alike_drives(machine: &Machine, row: &'static Parameter) -> bool {
     let Some((List::Drives, count)) = machine.sits(row).listed() else { return false };
     let first = machine.get(row, 0);
     first.is_some() && (1..count).all(|index| machine.get(row, index) == first)
 }
 
 /// Whether it has the value of something that it follows.
-fn follows_any(machine: &dyn Numbers, number: Number) -> bool {
+fn follows_any(machine: &Machine, number: Number) -> bool {
     leads(machine, number).next().is_some()
 }
 
 /// The numbers that a number follows, as far as it has the same value: of the same body, the one that is asked first
 /// first.
-fn leads<'a>(machine: &'a dyn Numbers, number: Number) -> impl Iterator<Item = Number> + 'a {
+fn leads<'a>(machine: &'a Machine, number: Number) -> impl Iterator<Item = Number> + 'a {
     let Number { row, index } = number;
     let own = number.value(machine);
     let followed = row.follows.iter().filter_map(move |key| Some(Number { row: super::find(key)?, index }));
@@ -317,7 +318,7 @@ fn leads<'a>(machine: &'a dyn Numbers, number: Number) -> impl Iterator<Item = N
 
 /// The numbers that go along with `number` where `is_free` are set by themselves.
 fn followers<'a>(
-    machine: &'a dyn Numbers,
+    machine: &'a Machine,
     number: Number,
     is_free: &'a dyn Fn(&str) -> bool,
 ) -> impl Iterator<Item = Number> + 'a {
@@ -331,7 +332,7 @@ fn followers<'a>(
 }
 
 /// The number that another goes with: itself if that is free, or what it follows, directly or by way of another one.
-fn leader(machine: &dyn Numbers, number: Number, is_free: &dyn Fn(&str) -> bool) -> Option<Number> {
+fn leader(machine: &Machine, number: Number, is_free: &dyn Fn(&str) -> bool) -> Option<Number> {
     let is_free_itself = |number: &Number| is_free(&number.key(machine));
     if is_free_itself(&number) {
         return Some(number);
@@ -342,7 +343,7 @@ fn leader(machine: &dyn Numbers, number: Number, is_free: &dyn Fn(&str) -> bool)
 
 /// The numbers that a key names, without those of a drive that are among `free` by themselves, and its row. Errors: a
 /// key that names none, or one that this machine has not.
-fn numbers(machine: &dyn Numbers, key: &str, free: &[&str]) -> Result<(Vec<Number>, &'static Parameter)> {
+fn numbers(machine: &Machine, key: &str, free: &[&str]) -> Result<(Vec<Number>, &'static Parameter)> {
     let row = machine.row(key).ok_or_else(|| unknown(machine, key))?;
     let sits = machine.sits(row);
     let (list, count) = match sits {
@@ -351,7 +352,7 @@ fn numbers(machine: &dyn Numbers, key: &str, free: &[&str]) -> Result<(Vec<Numbe
             return Err(Error::new(format!("`{key}` is only a part of what `{whole}` is computed from"))
                 .next(format!("name `{whole}` instead")));
         }
-        Sits::Elsewhere if machine.axis().is_none() => {
+        Sits::Elsewhere if machine.bridge.is_some() => {
             let what = if row.field.accessor().is_some() {
                 "is of a single axis, and this is a gantry"
             } else {
@@ -430,29 +431,29 @@ fn limits(
     Ok((low, high))
 }
 
-fn unknown(machine: &dyn Numbers, key: &str) -> Error {
+fn unknown(machine: &Machine, key: &str) -> Error {
     let error = Error::new(format!("`{key}` is no parameter of the machine"));
     let whole = |row: &Parameter| machine.sits(row).listed().is_some_and(|(list, _)| list.has_whole());
     let whole = all().filter(|row| whole(row)).map(|row| row.key.to_string());
     let known: Vec<String> = whole.chain(values(machine).into_iter().map(|(key, _)| key)).collect();
     let distance = |name: &str| strsim::damerau_levenshtein(name, key);
     let near = known.iter().min_by_key(|name| distance(name)).filter(|near| distance(near) * 3 <= key.len());
-    let error = if machine.axis().is_none() { of_gantries(machine, error) } else { error };
+    let error = if machine.bridge.is_some() { of_gantries(machine, error) } else { error };
     match near {
         Some(near) => error.next(format!("did you mean `{near}`?")),
-        None if machine.axis().is_none() => error,
+        None if machine.bridge.is_some() => error,
         None => error.next("name a machine's number as --set does, such as cart.mass or cart.friction.viscous"),
     }
 }
 
 /// The keys that a gantry has instead.
-fn of_gantries(machine: &dyn Numbers, error: Error) -> Error {
+fn of_gantries(machine: &Machine, error: Error) -> Error {
     let keys = keys_there(machine).join(", ");
     error.allowed(keys).next("of one drive alone write for example left_drive.motor.resistance")
 }
 
 /// The keys of the numbers that a machine has, lists and both drives together where they have a key of their own.
-fn keys_there(machine: &dyn Numbers) -> Vec<String> {
+fn keys_there(machine: &Machine) -> Vec<String> {
     let keys = |row: &'static Parameter| -> Vec<String> {
         let sits = machine.sits(row);
         match sits.listed() {
@@ -464,7 +465,7 @@ fn keys_there(machine: &dyn Numbers) -> Vec<String> {
 }
 
 /// Of a parameter that this machine has not: what it has in the same table, and what to do.
-fn not_there(machine: &dyn Numbers, key: &str, row: &Parameter) -> Error {
+fn not_there(machine: &Machine, key: &str, row: &Parameter) -> Error {
     let table = match key.split_once(".friction.") {
         Some((body, _)) => format!("{body}.friction."),
         None => format!("{}.", key.split('.').next().unwrap_or_default()),

@@ -1,32 +1,9 @@
-//! Machines as the table of parameters sees them: numbers that are read and set by row.
+//! Machines by the table of parameters: numbers that are read and set by row.
 
 use super::field::{DRIVES, List, SLIDES};
-use super::{Field, Parameter, named};
+use super::{Field, Parameter, find, named};
 use crate::friction::Friction;
 use crate::machine::Machine;
-use crate::machine::gantry::Gantry;
-
-/// A machine whose numbers stand in the table: a [`Machine`] or a [`Gantry`].
-pub trait Numbers {
-    /// Where it has the number of a row.
-    fn sits(&self, row: &Parameter) -> Sits;
-
-    /// The value of a row, at a place where that is a list; none where the machine has no such part, or computes it
-    /// from others.
-    fn get(&self, row: &Parameter, index: usize) -> Option<f64>;
-
-    /// Sets it, and what is computed from it; does nothing where the machine has no such part.
-    fn set(&mut self, row: &Parameter, index: usize, value: f64);
-
-    /// The row that a key of its case file names, with or without places in lists.
-    fn row(&self, key: &str) -> Option<&'static Parameter>;
-
-    /// The friction of each of its bodies.
-    fn frictions(&mut self) -> Vec<&mut Friction>;
-
-    /// It, where it is an axis.
-    fn axis(&self) -> Option<&Machine>;
-}
 
 /// Where a machine has the number of a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -42,15 +19,6 @@ pub enum Sits {
 }
 
 impl Sits {
-    fn of<M>(field: &Field<M>, machine: &M) -> Self {
-        match field {
-            Field::Elsewhere => Self::Elsewhere,
-            Field::Machine(accessor) => Self::Machine(accessor.list, (accessor.count)(machine)),
-            Field::Form(of, accessor) => Self::Form(of, accessor.list, (accessor.count)(machine)),
-            Field::PartOf(whole) => Self::PartOf(whole),
-        }
-    }
-
     /// How its elements are named and how many there are; none where the machine has no such number.
     pub(super) fn listed(self) -> Option<(List, usize)> {
         match self {
@@ -65,50 +33,45 @@ impl Sits {
     }
 }
 
-impl Numbers for Machine {
-    fn sits(&self, row: &Parameter) -> Sits {
-        Sits::of(&row.field, self)
+impl Machine {
+    /// Where it has the number of a row.
+    pub fn sits(&self, row: &Parameter) -> Sits {
+        let listed = |accessor: &super::Accessor| accessor.listed(self);
+        match &row.field {
+            Field::Elsewhere => Sits::Elsewhere,
+            Field::Machine(accessor) => {
+                listed(accessor).map_or(Sits::Elsewhere, |(list, count)| Sits::Machine(list, count))
+            }
+            Field::Form(of, accessor) => {
+                listed(accessor).map_or(Sits::Elsewhere, |(list, count)| Sits::Form(of, list, count))
+            }
+            Field::PartOf(whole) => match find(whole).map(|whole| self.sits(whole)) {
+                None | Some(Sits::Elsewhere) => Sits::Elsewhere,
+                Some(_) => Sits::PartOf(whole),
+            },
+        }
     }
 
-    fn get(&self, row: &Parameter, index: usize) -> Option<f64> {
-        (row.field.accessor()?.get)(self, index)
+    /// The value of a row, at a place where that is a list; none where the machine has no such part, or computes it
+    /// from others.
+    pub fn get(&self, row: &Parameter, index: usize) -> Option<f64> {
+        let accessor = row.field.accessor()?;
+        let (_, count) = accessor.listed(self)?;
+        if index < count { (accessor.get)(self, index) } else { None }
     }
 
-    fn set(&mut self, row: &Parameter, index: usize, value: f64) {
+    /// Sets it, and what is computed from it; does nothing where the machine has no such part.
+    pub fn set(&mut self, row: &Parameter, index: usize, value: f64) {
         if let Some(accessor) = row.field.accessor() {
             (accessor.set)(self, index, value);
         }
     }
 
-    fn row(&self, key: &str) -> Option<&'static Parameter> {
-        named(key)
-    }
-
-    fn frictions(&mut self) -> Vec<&mut Friction> {
-        vec![&mut self.drive_pulley.friction, &mut self.cart.friction, &mut self.idler_pulley.friction]
-    }
-
-    fn axis(&self) -> Option<&Machine> {
-        Some(self)
-    }
-}
-
-impl Numbers for Gantry {
-    fn sits(&self, row: &Parameter) -> Sits {
-        Sits::of(&row.gantry, self)
-    }
-
-    fn get(&self, row: &Parameter, index: usize) -> Option<f64> {
-        (row.gantry.accessor()?.get)(self, index)
-    }
-
-    fn set(&mut self, row: &Parameter, index: usize, value: f64) {
-        if let Some(accessor) = row.gantry.accessor() {
-            (accessor.set)(self, index, value);
+    /// The row that a key of its case file names, with or without places in lists.
+    pub fn row(&self, key: &str) -> Option<&'static Parameter> {
+        if self.slides().count() == 1 {
+            return named(key);
         }
-    }
-
-    fn row(&self, key: &str) -> Option<&'static Parameter> {
         // The cart of a gantry has the rows of its bridge, and each drive those of an axis's.
         let of_cart = key.strip_prefix(SLIDES[1]).map(|rest| format!("{}{rest}", SLIDES[0]));
         let of_drive = DRIVES.iter().find_map(|drive| key.strip_prefix(drive));
@@ -118,11 +81,10 @@ impl Numbers for Gantry {
         (of_drive.is_none() || list == Some(List::Drives)).then_some(row)
     }
 
-    fn frictions(&mut self) -> Vec<&mut Friction> {
-        vec![&mut self.drive_pulley.friction, &mut self.bridge.friction, &mut self.cart.friction]
-    }
-
-    fn axis(&self) -> Option<&Machine> {
-        None
+    /// The friction of each of its bodies.
+    pub fn frictions(&mut self) -> impl Iterator<Item = &mut Friction> {
+        let pulleys = [&mut self.drive_pulley, &mut self.idler_pulley].map(|pulley| &mut pulley.friction);
+        let slides = self.bridge.iter_mut().chain([&mut self.cart]).map(|slide| &mut slide.friction);
+        pulleys.into_iter().chain(slides)
     }
 }

@@ -1,6 +1,6 @@
 //! The table as text for the documents.
 
-use super::field::List;
+use super::field::{List, Of};
 use super::table::SECTIONS;
 use super::{Fallback, Field, Off, Parameter, all};
 use crate::quantity::shortest;
@@ -38,28 +38,24 @@ pub fn free_markdown() -> String {
     let mut text =
         String::from("| key | machine | `--vary all` | off together with | goes along with |\n|---|---|---|---|---|\n");
     for row in all() {
-        let of_axis = row.field.accessor().map(|accessor| accessor.list);
-        let of_gantry = row.gantry.accessor().map(|accessor| accessor.list);
-        let (machine, Some(list)) = (
-            match (of_axis, of_gantry) {
-                (Some(_), Some(_)) => "both",
-                (Some(_), None) => "axis",
-                (None, _) => "gantry",
-            },
-            of_axis.or(of_gantry),
-        ) else {
-            continue;
+        let Some(accessor) = row.field.accessor() else { continue };
+        let (machine, list) = match accessor.of {
+            Of::Machine | Of::Drive => ("both", List::None),
+            Of::Span => ("both", List::Numbers),
+            Of::Axis => ("axis", List::None),
+            Of::Point(_) => ("axis", List::Points),
+            Of::Slide => ("gantry", List::Slides),
         };
         let all = match row.off {
             Off::No => "–",
             Off::Alone | Off::With(_) => "yes",
         };
         let kind = match row.off {
-            Off::With(kind) if of_axis.is_some() => kind,
+            Off::With(kind) if machine != "gantry" => kind,
             Off::With(_) | Off::No | Off::Alone => "–",
         };
-        let form = match (&row.field, &row.gantry) {
-            (Field::Form(of, _), _) | (_, Field::Form(of, _)) => Some(of),
+        let form = match row.field {
+            Field::Form(of, _) => Some(of),
             _ => None,
         };
         let along = match (form, row.follows) {

@@ -12,12 +12,11 @@ mod table;
 
 pub use field::{Accessor, Field, List};
 pub use free::{Free, GivenBounds, every, kinds, kinds_without, own, set, value, values};
-pub use machine::{Numbers, Sits};
+pub use machine::Sits;
 pub use markdown::{free_markdown, markdown};
 
 use crate::error::{Error, Result};
 use crate::machine::Machine;
-use crate::machine::gantry::Gantry;
 use crate::quantity::{rounded, shortest};
 use table::SECTIONS;
 
@@ -38,10 +37,8 @@ pub struct Parameter {
     pub sentence: &'static str,
     /// How it is typically written.
     pub example: &'static str,
-    /// Where it sits in an axis.
+    /// Where it sits in a machine.
     pub field: Field,
-    /// Where it sits in a gantry.
-    pub gantry: Field<Gantry>,
     /// Whether it may be off where nobody names it, and with which others.
     pub off: Off,
     /// The keys that it goes with as long as it has the same value and is not named itself, the one that is asked first
@@ -130,7 +127,7 @@ impl Arm {
         match self {
             Arm::One => 1.0,
             Arm::Radius(n) => power(stage.pulley_radius, n),
-            Arm::Gear(n) => power(stage.motor.gear_ratio, n),
+            Arm::Gear(n) => power(stage.drives[0].motor.gear_ratio, n),
         }
     }
 
@@ -307,7 +304,7 @@ pub fn at_pulley(stage: &Machine, key: &str) -> f64 {
 }
 
 /// Refuses a machine with a number out of its range.
-pub fn check(machine: &dyn Numbers) -> Result<()> {
+pub fn check(machine: &Machine) -> Result<()> {
     for row in all() {
         let Sits::Machine(list, count) = machine.sits(row) else { continue };
         for index in 0..count {

@@ -1,9 +1,9 @@
 //! The rows: every number that a case file can hold.
 
 use super::field::{
-    Place, always, amplifier, breakaway, everywhere, make, motor, of_drive, of_friction, of_law, of_simple, of_slide,
-    part, points, set_coulomb, set_radius, set_simple, set_stribeck_decay, set_stribeck_force, set_stribeck_velocity,
-    simple, slide, slide_mut, stiffness, stribeck_decay, stribeck_force, stribeck_velocity,
+    Of, always, amplifier, breakaway, make, motor, of_drive, of_friction, of_law, of_simple, of_slide, part, points,
+    set_coulomb, set_radius, set_simple, set_stribeck_decay, set_stribeck_force, set_stribeck_velocity, simple,
+    stiffness, stribeck_decay, stribeck_force, stribeck_velocity,
 };
 use super::{Arm, Fallback, Field, INPUT, Off, Parameter, Range, Sum};
 use crate::friction::Law;
@@ -17,8 +17,8 @@ const fn row(
     example: &'static str,
     sentence: &'static str,
 ) -> Parameter {
-    let (field, gantry, off) = (Field::Elsewhere, Field::Elsewhere, Off::No);
-    Parameter { key, symbol, unit, default, range, sentence, example, field, gantry, off, follows: &[], part: None }
+    let (field, off) = (Field::Elsewhere, Off::No);
+    Parameter { key, symbol, unit, default, range, sentence, example, field, off, follows: &[], part: None }
 }
 
 impl Parameter {
@@ -28,8 +28,8 @@ impl Parameter {
     }
 
     /// It sits there in machines.
-    const fn at(self, place: Place) -> Self {
-        Self { field: place.axis, gantry: place.gantry, ..self }
+    const fn at(self, field: Field) -> Self {
+        Self { field, ..self }
     }
 
     /// It may be off, with all others of that name.
@@ -241,7 +241,7 @@ macro_rules! friction {
 
 /// Inertia of one pulley: given, or from its geometry.
 macro_rules! pulley {
-    ($body:ident, $inertia:literal, $place:expr, $part_of:path) => {
+    ($body:ident, $inertia:literal, $place:expr) => {
         [
             row(
                 concat!(stringify!($body), ".inertia"),
@@ -264,7 +264,7 @@ macro_rules! pulley {
                 "38.3 mm",
                 "Outer diameter of the hollow cylinder that stands for the pulley.",
             )
-            .at($part_of(concat!(stringify!($body), ".inertia"))),
+            .at(Field::PartOf(concat!(stringify!($body), ".inertia"))),
             row(
                 concat!(stringify!($body), ".inertia.bore_diameter"),
                 "d_i",
@@ -274,9 +274,9 @@ macro_rules! pulley {
                 "6.35 mm",
                 "Diameter of its bore; smaller than the outer one.",
             )
-            .at($part_of(concat!(stringify!($body), ".inertia"))),
+            .at(Field::PartOf(concat!(stringify!($body), ".inertia"))),
             row(concat!(stringify!($body), ".inertia.width"), "w", "m", Required, POSITIVE, "12.7 mm", "Its width.")
-                .at($part_of(concat!(stringify!($body), ".inertia"))),
+                .at(Field::PartOf(concat!(stringify!($body), ".inertia"))),
             row(
                 concat!(stringify!($body), ".inertia.density"),
                 "ρ",
@@ -286,7 +286,7 @@ macro_rules! pulley {
                 "2.7 g/cm^3",
                 "Density of its material.",
             )
-            .at($part_of(concat!(stringify!($body), ".inertia"))),
+            .at(Field::PartOf(concat!(stringify!($body), ".inertia"))),
         ]
     };
 }
@@ -341,7 +341,7 @@ const MOTOR: &[Parameter] = &[
     row("motor.gear_ratio", "n", "", Value(1.0), Range::new(1e-6, 1e6), "5.9", "Motor turns per turn of the drive pulley.")
         .at(motor!(gear_ratio)),
     row("motor.gear_efficiency", "η", "", Value(1.0), UP_TO_ONE, "0.73", "The part of the power that passes the gear, whichever side drives.")
-        .at(of_drive!(motor, motors, |m| (m.gear_play.is_none() && !m.is_simple).then_some(m.gear_efficiency), |m, value| m.gear_efficiency = value)),
+        .at(of_drive!(motor, |m| (m.gear_play.is_none() && !m.is_simple).then_some(m.gear_efficiency), |m, value| m.gear_efficiency = value)),
     row("motor.backlash", "2α", "rad", Value(0.0), Range { below: true, ..Range::new(0.0, 6.3) }, "0.5 deg", "Play of the gear: by how much the drive pulley can turn while the rotor stands. Needs `gear_stiffness`.")
         .at(motor!(play backlash)).off("gear's backlash"),
     row("motor.gear_stiffness", "k_g", "N m/rad", Words("stiff"), POSITIVE, "300 N m/rad", "Stiffness of the gear between rotor and drive pulley, at the pulley; makes the rotor an inertia of its own.")
@@ -367,7 +367,7 @@ const DRIVE: &[Parameter] = &[
 #[rustfmt::skip]
 const AMPLIFIER: &[Parameter] = &[
     row("amplifier.gain", "", "", Value(1.0), ANY, "1", "Output, V or A, per unit of input; negative where the wires are swapped.")
-        .at(of_drive!(amplifier, amplifiers, |a| Some(a.gain), |a, value| a.gain = value)),
+        .at(of_drive!(amplifier, |a| Some(a.gain), |a, value| a.gain = value)),
     row("amplifier.voltage_limit", "V_max", "V", Words("none"), POSITIVE, "24 V", "Largest voltage at the motor's terminals, either way.")
         .at(amplifier!(voltage_limit)),
     row("amplifier.current_limit", "I_max", "A", Words("none"), POSITIVE, "12 A", "Largest current, either way.")
@@ -379,91 +379,76 @@ const AMPLIFIER: &[Parameter] = &[
 #[rustfmt::skip]
 const RADIUS: &[Parameter] = &[
     row("drive_pulley.radius", "r", "m", Words("from `teeth` and `pitch`"), POSITIVE, "19.4 mm", "Pitch radius, the same for both pulleys.")
-        .at(Place {
-            axis: Field::number(|s, _| Some(s.pulley_radius), |s, _, value| set_radius(s, value)),
-            gantry: Field::number(|g, _| Some(g.pulley_radius), |g, _, value| g.pulley_radius = value),
-        }).alone(),
+        .at(Field::number(|s, _| Some(s.pulley_radius), |s, _, value| set_radius(s, value))).alone(),
     row("drive_pulley.teeth", "z", "", Words("not used with `radius`"), Range::whole(1.0, 1e6), "60", "Number of teeth or grooves; instead of `radius`, with `pitch`.")
-        .at(Place::part_of("drive_pulley.radius")),
+        .at(Field::PartOf("drive_pulley.radius")),
     row("drive_pulley.pitch", "p", "m", Words("not used with `radius`"), POSITIVE, "2.03 mm", "Distance from tooth to tooth along the belt.")
-        .at(Place::part_of("drive_pulley.radius")),
+        .at(Field::PartOf("drive_pulley.radius")),
 ];
 
 #[rustfmt::skip]
 const CART: &[Parameter] = &[
     row("cart.mass", "M", "kg", Required, POSITIVE, "0.362 kg", "Mass of the cart with its load.")
-        .at(always!(|s| s.cart.mass)).off("mass").part(Sum::Inertia, Radius(2)),
+        .at(always!(Axis, |s| s.cart.mass)).off("mass").part(Sum::Inertia, Radius(2)),
     row("cart.load", "F_L", "N", Value(0.0), ANY, "-3 N", "Constant force on the cart, positive towards larger x.")
-        .at(always!(|s| s.cart.load)).off("load"),
+        .at(always!(Axis, |s| s.cart.load)).off("load"),
     row("cart.inclination", "θ", "rad", Value(0.0), Range::new(-std::f64::consts::FRAC_PI_2, std::f64::consts::FRAC_PI_2), "10 deg", "Inclination of the axis, positive if the cart climbs towards larger x; adds −M g sin θ to the load.")
-        .at(always!(|s| s.cart.inclination)),
+        .at(always!(Axis, |s| s.cart.inclination)),
 ];
 
 #[rustfmt::skip]
 const BELT: &[Parameter] = &[
     row("belt.stiffness", "k₁ k₂ k₃", "N/m", Words("from `modulus`, `section` and `spans`"), POSITIVE, "132.76 kN/m",
         "Stiffness of each span: drive pulley to cart, cart to idler pulley, and the way back. Three values in a list.")
-        .at(Place {
-            axis: Field::spans(|s, span| stiffness(&s.belt, span), |s, span, value| s.belt.stiffness[span] = value),
-            gantry: Field::gantry_spans(
-                |g, span| g.belts.stiffness.get(span).copied().filter(|_| g.belts.make.is_none()),
-                |g, span, value| g.belts.stiffness[span] = value,
-            ),
-        })
+        .at(Field::of(Of::Span, |s, span| stiffness(&s.belt, span), |s, span, value| s.belt.stiffness[span] = value))
         .off("belt's stiffness").part(Sum::Stiffness, One),
     row("belt.modulus", "E", "Pa", Words("not used with `stiffness`"), POSITIVE, "8.335 GPa",
         "Modulus of elasticity, eq. (11); or a list of parts, each `{ share, modulus }`, for a composite.")
-        .at(make!(material, |make| make.modulus)).off("belt's stiffness"),
+        .at(make!(Machine, |belt| !belt.sheet.is_specific, |make, _| make.modulus)).off("belt's stiffness"),
     row("belt.modulus.share", "", "", Required, UP_TO_ONE, "1/3", "Share of the section that is of this material; all shares add up to 1.")
-        .at(Place::part_of("belt.modulus")),
+        .at(Field::PartOf("belt.modulus")),
     row("belt.modulus.modulus", "E", "Pa", Required, POSITIVE, "50 GPa", "Modulus of this material.")
-        .at(Place::part_of("belt.modulus")),
+        .at(Field::PartOf("belt.modulus")),
     row("belt.section", "A", "m^2", Words("not used with `stiffness`"), POSITIVE, "5.5626 mm^2",
         "Cross-section that carries the load; or `{ plain, toothed, toothed_share }` for a toothed belt, eq. (12).")
-        .at(make!(material, |make| make.section)),
+        .at(make!(Machine, |belt| !belt.sheet.is_specific, |make, _| make.section)),
     row("belt.section.plain", "A_nt", "m^2", Required, POSITIVE, "5.5626 mm^2", "Cross-section between the teeth.")
-        .at(Place::part_of("belt.section")),
+        .at(Field::PartOf("belt.section")),
     row("belt.section.toothed", "A_t", "m^2", Required, POSITIVE, "10.4 mm^2", "Cross-section at a tooth.")
-        .at(Place::part_of("belt.section")),
+        .at(Field::PartOf("belt.section")),
     row("belt.section.toothed_share", "", "", Required, Range::new(0.0, 1.0), "0.5", "Share of the belt's length that has the cross-section `toothed`.")
-        .at(Place::part_of("belt.section")),
+        .at(Field::PartOf("belt.section")),
     row("belt.specific_stiffness", "E A", "N", Words("of the `type`; not used with `stiffness`"), POSITIVE, "140 kN",
         "Force per unit strain, C_spez of catalogues, instead of modulus and section; in N/m, N/mm it is that per width, and `width` goes with it.")
-        .at(make!(specific)).off("belt's stiffness"),
+        .at(make!(Machine, |belt| belt.sheet.is_specific, |make, _| make.modulus)).off("belt's stiffness"),
     row("belt.width", "b", "m", Words("needed with `type`, or a stiffness per width"), POSITIVE, "10 mm", "Width of the belt."),
     row("belt.mass_per_length", "", "kg/m", Words("of the `type`, or unknown"), POSITIVE, "0.03 kg/m", "Mass per length; not in the equations, `taut show` says what its share is."),
     row("belt.allowed_tension", "F_zul", "N", Words("of the `type`, or unknown"), POSITIVE, "560 N", "Tension that the belt may have; `taut show` says what is left of it."),
     row("belt.spans", "l₁ l₂ l₃", "m", Words("not used with `stiffness`"), POSITIVE, "0.34925 m", "Length of each span. Three values in a list.")
-        .at(make!(spans, |make, span| make.spans[span])),
+        .at(make!(Span, |_belt| true, |make, span| make.spans[span])),
     row("belt.damping", "c₁ c₂ c₃", "N s/m", Value(0.0), NOT_NEGATIVE, "0 N s/m", "Damping of each span, parallel to its stiffness. Three values in a list.")
-        .at(Place {
-            axis: Field::spans(|s, span| Some(s.belt.damping[span]), |s, span, value| s.belt.damping[span] = value),
-            gantry: Field::gantry_spans(|g, span| g.belts.damping.get(span).copied(), |g, span, value| g.belts.damping[span] = value),
-        })
+        .at(Field::of(Of::Span, |s, span| s.belt.damping.get(span).copied(), |s, span, value| s.belt.damping[span] = value))
         .off("belt's damping"),
     row("belt.damping_ratio", "ζ", "", Words("not used with `damping`"), Range { below: true, ..Range::new(0.0, 1.0) }, "0.02",
         "Damping ratio of the slowest elastic mode at x = 0; every span is damped in proportion to its stiffness, c = 2 ζ k / ω₀.")
-        .at(Place::part_of("belt.damping")),
+        .at(Field::PartOf("belt.damping")),
     row("belt.loss_factor", "η", "", Words("not used with `damping`"), Range { below: true, ..Range::new(0.0, 2.0) }, "0.04",
         "Loss factor of the belt at that mode: η = 2 ζ.")
-        .at(Place::part_of("belt.damping")),
+        .at(Field::PartOf("belt.damping")),
     row("belt.pretension", "T₀", "N", Words("none: spans can push"), POSITIVE, "50 N", "Tension of every span at rest; a span whose tension is used up goes slack and carries nothing.")
-        .at(Place {
-            axis: Field::number(|s, _| s.belt.pretension, |s, _, value| s.belt.pretension = s.belt.pretension.map(|_| value)),
-            gantry: Field::number(|g, _| g.belts.pretension, |g, _, value| g.belts.pretension = g.belts.pretension.map(|_| value)),
-        }).off("belt's pretension"),
+        .at(Field::number(|s, _| s.belt.pretension, |s, _, value| s.belt.pretension = s.belt.pretension.map(|_| value))).off("belt's pretension"),
 ];
 
 #[rustfmt::skip]
 const TRAVEL: &[Parameter] = &[
     row("travel.min", "x_min", "m", Required, ANY, "-0.2 m", "Least position of the cart.")
-        .at(part!(|s| s.travel, &mut s.travel => min)),
+        .at(part!(Axis, |s| s.cart.travel, &mut s.cart.travel => min)),
     row("travel.max", "x_max", "m", Required, ANY, "0.3 m", "Greatest position of the cart; above `min`.")
-        .at(part!(|s| s.travel, &mut s.travel => max)),
+        .at(part!(Axis, |s| s.cart.travel, &mut s.cart.travel => max)),
     row("travel.stop_stiffness", "k_s", "N/m", Words("no stops: a run ends there"), POSITIVE, "20 kN/m", "Stiffness of the end stops.")
-        .at(part!(|s| s.travel.and_then(|travel| travel.stop), s.travel.as_mut().and_then(|travel| travel.stop.as_mut()) => stiffness)),
+        .at(part!(Axis, |s| s.cart.travel.and_then(|travel| travel.stop), s.cart.travel.as_mut().and_then(|travel| travel.stop.as_mut()) => stiffness)),
     row("travel.stop_damping", "c_s", "N s/m", Value(0.0), NOT_NEGATIVE, "50 N s/m", "Their damping.")
-        .at(part!(|s| s.travel.and_then(|travel| travel.stop), s.travel.as_mut().and_then(|travel| travel.stop.as_mut()) => damping)),
+        .at(part!(Axis, |s| s.cart.travel.and_then(|travel| travel.stop), s.cart.travel.as_mut().and_then(|travel| travel.stop.as_mut()) => damping)),
 ];
 
 #[rustfmt::skip]
@@ -489,17 +474,17 @@ const FORCES: &[Parameter] = &[
 #[rustfmt::skip]
 const ENCODER: &[Parameter] = &[
     row("encoder.lines", "", "", Words("from `counts`"), POSITIVE, "512", "Lines per turn, or at the cart per metre; in quadrature each gives four counts.")
-        .at(part!(both |s| s.encoder, &mut s.encoder => lines)),
+        .at(part!(Machine, |s| s.encoder, &mut s.encoder => lines)),
     row("encoder.counts", "", "", Words("from `lines`"), POSITIVE, "2048", "Counts per turn, or at the cart per metre, every edge counted; instead of `lines`.")
-        .at(Place::part_of("encoder.lines")),
+        .at(Field::PartOf("encoder.lines")),
 ];
 
 #[rustfmt::skip]
 const SCALE: &[Parameter] = &[
     row("scale.lines", "", "", Words("from `counts`"), POSITIVE, "50000", "Lines per metre of a scale at the cart, beside an encoder at motor or drive pulley; in quadrature each gives four counts.")
-        .at(part!(|s| s.scale, &mut s.scale => lines)),
+        .at(part!(Axis, |s| s.scale, &mut s.scale => lines)),
     row("scale.counts", "", "", Words("from `lines`"), POSITIVE, "200000", "Counts per metre, every edge counted; instead of `lines`.")
-        .at(Place::axis(Field::PartOf("scale.lines"))),
+        .at(Field::PartOf("scale.lines")),
 ];
 
 #[rustfmt::skip]
@@ -548,29 +533,13 @@ const BRIDGE: &[Parameter] = &[
     row("bridge.mass", "m", "kg", Required, POSITIVE, "0.838 kg", "Mass of the bridge without the cart; of the cart with its load.")
         .at(of_slide!(|s| Some(s.mass), |s, value| s.mass = value)).off("mass"),
     row("bridge.travel.min", "", "m", Required, ANY, "-0.2 m", "Least position.")
-        .at(of_slide!(|s| s.travel.map(|travel| travel.min), |s, value| {
-            if let Some(travel) = &mut s.travel {
-                travel.min = value;
-            }
-        })),
+        .at(of_slide!(travel min)),
     row("bridge.travel.max", "", "m", Required, ANY, "0.2 m", "Greatest position; above `min`.")
-        .at(of_slide!(|s| s.travel.map(|travel| travel.max), |s, value| {
-            if let Some(travel) = &mut s.travel {
-                travel.max = value;
-            }
-        })),
+        .at(of_slide!(travel max)),
     row("bridge.travel.stop_stiffness", "k_s", "N/m", Words("no stops: a run ends there"), POSITIVE, "20 kN/m", "Stiffness of the end stops.")
-        .at(of_slide!(|s| s.travel.and_then(|travel| travel.stop).map(|stop| stop.stiffness), |s, value| {
-            if let Some(stop) = s.travel.as_mut().and_then(|travel| travel.stop.as_mut()) {
-                stop.stiffness = value;
-            }
-        })),
+        .at(of_slide!(stop stiffness)),
     row("bridge.travel.stop_damping", "c_s", "N s/m", Value(0.0), NOT_NEGATIVE, "50 N s/m", "Their damping.")
-        .at(of_slide!(|s| s.travel.and_then(|travel| travel.stop).map(|stop| stop.damping), |s, value| {
-            if let Some(stop) = s.travel.as_mut().and_then(|travel| travel.stop.as_mut()) {
-                stop.damping = value;
-            }
-        })),
+        .at(of_slide!(stop damping)),
 ];
 
 #[rustfmt::skip]
@@ -714,7 +683,7 @@ pub(super) const SECTIONS: &[(&str, &[&[Parameter]])] = &[
         "drive_pulley",
         &[
             RADIUS,
-            &pulley!(drive_pulley, "J₁", everywhere!(|s| s.drive_pulley.inertia), Place::part_of),
+            &pulley!(drive_pulley, "J₁", always!(Machine, |s| s.drive_pulley.inertia)),
             &friction!(
                 "drive_pulley",
                 drive_pulley,
@@ -742,7 +711,7 @@ pub(super) const SECTIONS: &[(&str, &[&[Parameter]])] = &[
     (
         "idler_pulley",
         &[
-            &pulley!(idler_pulley, "J₂", always!(|s| s.idler_pulley.inertia), Place::part_of_axis),
+            &pulley!(idler_pulley, "J₂", always!(Axis, |s| s.idler_pulley.inertia)),
             &friction!(
                 "idler_pulley",
                 idler_pulley,

@@ -25,7 +25,7 @@ const MOST_ROWS: f64 = 1e12;
 
 /// Refuses what is no machine.
 pub fn machine(machine: &Machine) -> Result<()> {
-    let motor = &machine.motor;
+    let motor = &machine.drives[0].motor;
     let r = machine.pulley_radius;
     let bodies = [machine.drive_pulley.inertia, machine.cart.mass, machine.idler_pulley.inertia];
     let laws = [machine.drive_pulley.friction, machine.cart.friction, machine.idler_pulley.friction];
@@ -42,11 +42,11 @@ pub fn machine(machine: &Machine) -> Result<()> {
     if !rigid {
         positive("the stiffness of a span", &machine.belt.stiffness)?;
     }
-    let amplifier = &machine.amplifier;
+    let amplifier = &machine.drives[0].amplifier;
     if motor.gear_play.is_some() {
         positive("the inertia of a rotor that turns by itself", &[motor.rotor_inertia])?;
     }
-    if machine.travel.is_some_and(|travel| travel.min >= travel.max) {
+    if machine.cart.travel.is_some_and(|travel| travel.min >= travel.max) {
         return Err(Error::new("the travel ends before it begins").allowed("max above min"));
     }
     if machine.cart.along.as_ref().is_some_and(|along| !along.grows()) {
@@ -87,10 +87,10 @@ pub fn machine(machine: &Machine) -> Result<()> {
         }
     }
     if machine.belt.follows_cart {
-        let (Some(make), Some(travel)) = (machine.belt.make, machine.travel) else {
+        let (Some(make), Some(travel)) = (machine.belt.make, machine.cart.travel) else {
             return Err(Error::new("spans that follow the cart need modulus, section, spans and a travel"));
         };
-        let [l1, l2, _] = make.spans;
+        let [l1, l2, _] = make.spans.three();
         if !(-l2 < travel.min && travel.min < travel.max && travel.max < l1) {
             let what = format!("a travel from {} m to {} m leaves no span", travel.min, travel.max);
             return Err(Error::new(what).allowed(format!("above {} m, below {l1} m", -l2)));
@@ -107,12 +107,15 @@ pub fn machine(machine: &Machine) -> Result<()> {
             return Err(too_fast("the current", rate).next("leave the inductance out: it does not show at this size"));
         }
     }
-    let [k1, k2, k3] = if rigid { [0.0; 3] } else { machine.belt.stiffness };
-    let [c1, c2, c3] = machine.belt.damping;
+    let [k1, k2, k3] = if rigid { [0.0; 3] } else { machine.belt.stiffness.three() };
+    let [c1, c2, c3] = machine.belt.damping.three();
     let n = motor.gear_ratio;
     let brake = motor.torque_constant * motor.back_emf_constant * n * n / motor.resistance / motor.gear_efficiency;
-    let brake =
-        if motor.inductance > 0.0 || machine.amplifier.mode == AmplifierMode::Current { 0.0 } else { brake.abs() };
+    let brake = if motor.inductance > 0.0 || machine.drives[0].amplifier.mode == AmplifierMode::Current {
+        0.0
+    } else {
+        brake.abs()
+    };
     let around = [(k1 + k3, c1 + c3, r * r, brake), (k1 + k2, c1 + c2, 1.0, 0.0), (k2 + k3, c2 + c3, r * r, 0.0)];
     for (((k, c, arm, brake), inertia), law) in around.into_iter().zip(bodies).zip(laws) {
         let drag = c * arm + brake + law.forward.viscous.max(law.backward.viscous);

@@ -156,7 +156,7 @@ impl<'a> Model<'a> {
             viscous[body] = law.forward.viscous;
             coulomb[body] = law.forward.coulomb;
         }
-        if machine.motor.gear_efficiency < 1.0 {
+        if machine.drives[0].motor.gear_efficiency < 1.0 {
             return Err(unfit("the paper's Table 3 does not know a gear efficiency below 1".into()));
         }
         if let Some(part) = machine.beyond_the_paper() {

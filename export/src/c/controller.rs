@@ -21,7 +21,7 @@ pub(super) struct Controller {
 
 impl Controller {
     pub(super) fn new(design: &Design, machine: &Machine) -> Result<Self> {
-        let unit = machine.amplifier.mode.unit();
+        let unit = machine.drives[0].amplifier.mode.unit();
         Ok(Self { design: design.clone(), program: program(design, machine)?, unit })
     }
 

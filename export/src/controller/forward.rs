@@ -67,13 +67,13 @@ impl<'s> Forward<'s> {
 
     /// The command that makes the motor push with `force`, changing at `rate`, at `speed`.
     pub(super) fn command_of(&self, p: &mut Program, name: &str, force: Expr, rate: Expr, speed: Expr) -> Expr {
-        let motor = &self.machine.motor;
+        let motor = &self.machine.drives[0].motor;
         let force = p.local(&format!("{name}_force"), force);
         let both = [motor.gear_efficiency, 1.0 / motor.gear_efficiency].map(|e| self.rigid.force_per_ampere * e);
         let per_ampere = self.per_ampere(p, name, &force, &speed, both);
         let current = p.local(&format!("{name}_current"), force / per_ampere.clone());
-        let gain = self.machine.amplifier.gain;
-        match self.machine.amplifier.mode {
+        let gain = self.machine.drives[0].amplifier.gain;
+        match self.machine.drives[0].amplifier.mode {
             AmplifierMode::Current => current / gain,
             // v = R i + L di/dt + K_e n φ̇
             AmplifierMode::Voltage => {
@@ -112,7 +112,7 @@ impl<'s> Forward<'s> {
         let way = self.direction(p, name, y);
         let [k1, k2] = match (machine.belt.make, machine.belt.follows_cart) {
             (Some(make), true) => {
-                let (rigidity, [l1, l2, _]) = (make.section * make.modulus, make.spans);
+                let (rigidity, [l1, l2, _]) = (make.rigidity(), make.spans.three());
                 // k₁ = A E/(l₁ − x), k₂ = A E/(l₂ + x)
                 [
                     p.local(&format!("{name}_k1"), rigidity / (l1 - &y.position)),
@@ -178,8 +178,8 @@ impl<'s> Forward<'s> {
             snap: snap.clone(),
         };
         // τ/r = ((J₁ + n² J_r) y₁″ + B₁ y₁′)/r² + τ_c1 sgn y′/r + L + P           (16)
-        let n = machine.motor.gear_ratio;
-        let own = (machine.drive_pulley.inertia + n * n * machine.motor.rotor_inertia) / (r * r);
+        let n = machine.drives[0].motor.gear_ratio;
+        let own = (machine.drive_pulley.inertia + n * n * machine.drives[0].motor.rotor_inertia) / (r * r);
         let force = own * &drive.acceleration
             + &drive_b * &drive.speed
             + &drive_c * &way / r
@@ -202,11 +202,11 @@ impl<'s> Forward<'s> {
         }
         let needed = self.needed(p, "target", y);
         let mut target = needed.drive;
-        if let Some(play) = self.machine.motor.gear_play.filter(|_| self.before_gear) {
+        if let Some(play) = self.machine.drives[0].motor.gear_play.filter(|_| self.before_gear) {
             let way = variable("target_way");
-            let (r, n) = (self.machine.pulley_radius, self.machine.motor.gear_ratio);
+            let (r, n) = (self.machine.pulley_radius, self.machine.drives[0].motor.gear_ratio);
             // The twist of the gear: T/k_g, and half the play.
-            let rotor = n * n * self.machine.motor.rotor_inertia * &target.acceleration / r;
+            let rotor = n * n * self.machine.drives[0].motor.rotor_inertia * &target.acceleration / r;
             let torque = p.local("target_torque", r * &needed.force[0] - rotor);
             let twist = r * (torque / play.stiffness + 0.5 * play.backlash * &way);
             target.position = p.local("target_position", target.position + twist);

@@ -6,10 +6,9 @@ use crate::case::Opened;
 use crate::chance::hash;
 use crate::design::Design;
 use crate::error::{Error, Result};
-use crate::machine::gantry::Gantry;
 use crate::machine::{Machine, axis};
 use crate::mechanism::{Amplifier, AmplifierMode, DRIVES, Drive, Heading, Label, Mechanism, Motor, Shown, State};
-use crate::parameter::{self, Free, Numbers, Parameter, unit_for};
+use crate::parameter::{self, Free, Parameter, unit_for};
 use crate::solve::{Dynamics, Quantity, check_stage};
 use crate::{controller, without_controller};
 
@@ -25,7 +24,7 @@ const CONDITIONS: u32 = 5000;
 #[derive(Debug, Clone)]
 enum Owned {
     Axis(Box<Machine>),
-    Gantry(Box<Gantry>),
+    Gantry(Box<Machine>),
 }
 
 /// A machine with its variables.
@@ -141,7 +140,7 @@ impl Model {
                 mechanism
             }
             Owned::Gantry(gantry) => {
-                gantry.check()?;
+                gantry.check_gantry()?;
                 gantry.mechanism()
             }
         };
@@ -238,8 +237,8 @@ impl Model {
     /// The unit of what the amplifiers take.
     fn input_unit(&self) -> &'static str {
         match &self.machine {
-            Owned::Axis(stage) => stage.amplifier.mode.unit(),
-            Owned::Gantry(gantry) => gantry.amplifiers[0].mode.unit(),
+            Owned::Axis(stage) => stage.drives[0].amplifier.mode.unit(),
+            Owned::Gantry(gantry) => gantry.drives[0].amplifier.mode.unit(),
         }
     }
 
@@ -374,14 +373,14 @@ impl Model {
 const SIDES: [&str; DRIVES] = ["left", "right"];
 
 impl Owned {
-    fn numbers(&self) -> &dyn Numbers {
+    fn numbers(&self) -> &Machine {
         match self {
             Owned::Axis(stage) => &**stage,
             Owned::Gantry(gantry) => &**gantry,
         }
     }
 
-    fn numbers_mut(&mut self) -> &mut dyn Numbers {
+    fn numbers_mut(&mut self) -> &mut Machine {
         match self {
             Owned::Axis(stage) => &mut **stage,
             Owned::Gantry(gantry) => &mut **gantry,
@@ -390,7 +389,7 @@ impl Owned {
 }
 
 /// The numbers of a machine that can be set, each by itself.
-fn parameters(machine: &dyn Numbers) -> Result<Vec<(Free, &'static Parameter)>> {
+fn parameters(machine: &Machine) -> Result<Vec<(Free, &'static Parameter)>> {
     let own = parameter::own(machine);
     let keys: Vec<&str> = own.iter().map(|(key, _)| key.as_str()).collect();
     let of = |(key, row): &(String, &'static Parameter)| Ok((Free::new(machine, key, &keys, &[])?, *row));

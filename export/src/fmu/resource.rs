@@ -63,11 +63,11 @@ fn at_rest(case: &Opened) -> Item {
         table
     };
     match case {
-        Opened::Axis(case) => value(step(case.machine.amplifier.mode.unit())),
+        Opened::Axis(case) => value(step(case.machine.drives[0].amplifier.mode.unit())),
         Opened::Gantry(case) => {
             let mut table = toml_edit::InlineTable::new();
-            for (side, amplifier) in ["left", "right"].into_iter().zip(&case.gantry.amplifiers) {
-                table.insert(side, step(amplifier.mode.unit()).into());
+            for (side, unit) in ["left", "right"].into_iter().zip(&case.gantry.drives) {
+                table.insert(side, step(unit.amplifier.mode.unit()).into());
             }
             value(table)
         }

@@ -19,7 +19,7 @@ pub(super) fn export(case: &Opened, part: Option<Part>, stem: &str) -> Result<Ex
             .next("leave --part out; `taut export fmu` has the machine"));
     }
     let program = program(design, &case.machine)?;
-    let unit = case.machine.amplifier.mode.unit();
+    let unit = case.machine.drives[0].amplifier.mode.unit();
     let lead = design.feed_forward.lead.unwrap_or(design.delay + 0.5 * design.every);
     let read = program.read_inputs();
     let inputs = program.inputs.iter().filter(|input| read.contains(&input.name));

@@ -14,7 +14,7 @@ pub fn figures(found: &Measurement, machine: &Machine) -> Vec<(String, Figure)> 
 
 fn bode(one: &Response, machine: &Machine) -> Figure {
     let frf = &one.frf;
-    let unit = match machine.amplifier.mode {
+    let unit = match machine.drives[0].amplifier.mode {
         taut::machine::AmplifierMode::Voltage => "V",
         taut::machine::AmplifierMode::Current => "A",
     };

@@ -45,10 +45,11 @@ pub fn controller(design: &Design, machine: &Machine) -> String {
     words.push(match machine.encoder.map(|encoder| encoder.at) {
         None => "measured exactly at the motor".into(),
         Some(at) => {
-            let step = match at {
-                EncoderPlace::Cart => 1.0,
-                _ => machine.pulley_radius,
-            } / machine.encoder.map_or(1.0, |encoder| encoder.counts_per_unit(machine.motor.gear_ratio));
+            let step =
+                match at {
+                    EncoderPlace::Cart => 1.0,
+                    _ => machine.pulley_radius,
+                } / machine.encoder.map_or(1.0, |encoder| encoder.counts_per_unit(machine.drives[0].motor.gear_ratio));
             let place = match at {
                 EncoderPlace::Motor => "motor",
                 EncoderPlace::DrivePulley => "drive pulley",
@@ -74,7 +75,7 @@ pub fn lines(tried: &Tried, done: &Done) -> Vec<(&'static str, String)> {
         None => format!("not within {} until the end", length(done.motion.window)),
     };
     let mut held = format!("{} of {} samples", run.samples.1, run.samples.0);
-    if machine.amplifier.voltage_limit.is_some() || machine.amplifier.current_limit.is_some() {
+    if machine.drives[0].amplifier.voltage_limit.is_some() || machine.drives[0].amplifier.current_limit.is_some() {
         let _ = write!(held, "; the amplifier for {}", time(figures.amplifier_limited));
     }
     let mut lines = vec![

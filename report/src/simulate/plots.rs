@@ -18,7 +18,7 @@ pub fn figures(case: &Case, run: &Run) -> Vec<Named> {
     let plot = Plot { curves, samples: run.samples.as_ref() };
 
     let mut input = figure("input");
-    let commanded = case.machine.amplifier.mode == AmplifierMode::Current;
+    let commanded = case.machine.drives[0].amplifier.mode == AmplifierMode::Current;
     if curves.get("input").is_some() {
         let axis = Axis::new("Input", if commanded { "A" } else { "V" });
         input = input.panel(plot.panel(axis, &[("input", "u")]));

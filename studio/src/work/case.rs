@@ -6,7 +6,8 @@ use crate::message::Request;
 use serde_json::{Value, json};
 use taut::case::{Number, Opened};
 use taut::error::{Error, Result};
-use taut::parameter::{Fallback, Free, Numbers};
+use taut::machine::Machine;
+use taut::parameter::{Fallback, Free};
 
 /// The case: `text`, changed by `set`, a list of keys and values, and by `changes`, a list of `KEY=VALUE`.
 pub fn opened(request: &Request, context: &Context) -> Result<Opened> {
@@ -48,7 +49,7 @@ fn span(case: &Opened, key: &str) -> Option<&'static str> {
 
 /// The numbers of a case with what the table of parameters says of them.
 pub fn parameters(case: &Opened, numbers: &[Number]) -> Value {
-    let machine: &dyn Numbers = match case {
+    let machine: &Machine = match case {
         Opened::Axis(case) => &case.machine,
         Opened::Gantry(case) => &case.gantry,
     };

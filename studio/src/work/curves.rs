@@ -2,9 +2,7 @@
 
 use serde_json::{Value, json};
 use taut::case::Opened;
-use taut::machine::axis;
-use taut::machine::gantry::{Gantry, LABELS, Routing};
-use taut::machine::{BeltModel, Machine};
+use taut::machine::{BeltModel, Machine, axis};
 use taut::mechanism::Heading;
 use taut::trajectory::Trajectory;
 
@@ -122,13 +120,13 @@ fn of_axis(machine: &Machine) -> Vec<Panel> {
     panels
 }
 
-fn of_gantry(gantry: &Gantry) -> Vec<Panel> {
-    let half = 0.5 * gantry.pulley_radius;
-    // As Gantry::place has it, term by term.
-    let [x, y] = match gantry.routing {
-        Routing::HFrame => [[-half, half], [-half, -half]],
-        Routing::CoreXy => [[half, half], [half, -half]],
+fn of_gantry(gantry: &Machine) -> Vec<Panel> {
+    // As Machine::by_drives has it, term by term.
+    let weights = |slide: usize| {
+        let weights = gantry.geometry().slides[slide].by_drives;
+        [0, 1].map(|drive: usize| weights[drive] * gantry.pulley_radius)
     };
+    let [x, y] = [0, 1].map(weights);
     let drives = |[left, right]: [f64; 2]| [("left_angle", left), ("right_angle", right)];
     let error = |weights: [f64; 2], slide: &'static str| {
         let [left, right] = weights.map(|weight| -weight);
@@ -136,11 +134,11 @@ fn of_gantry(gantry: &Gantry) -> Vec<Panel> {
     };
     let mut force =
         panel("force", "Span forces", "Force of each span beyond its pretension; positive pulls", ("N", 1.0));
-    for label in gantry.routing.spans() {
+    for label in gantry.kind.geometry().span_labels() {
         force = force.column(&format!("{}_force", label.key), label.name);
     }
     let mut state = panel("state", "Stick and slip", "What each body is doing: forward, stuck, backward", ("", 1.0));
-    for label in LABELS {
+    for label in gantry.geometry().bodies.iter().map(|body| body.label) {
         state = state.column(&format!("{}_state", label.key), label.name);
     }
     vec![
@@ -233,7 +231,7 @@ impl Kept {
 pub fn spans(case: &Opened) -> Vec<&'static str> {
     match case {
         Opened::Axis(_) => AXIS_SPANS.to_vec(),
-        Opened::Gantry(case) => case.gantry.routing.spans().iter().map(|label| label.name).collect(),
+        Opened::Gantry(case) => case.gantry.kind.geometry().span_labels().map(|label| label.name).collect(),
     }
 }
 
@@ -241,6 +239,6 @@ pub fn spans(case: &Opened) -> Vec<&'static str> {
 pub fn bodies(case: &Opened) -> Vec<&'static str> {
     match case {
         Opened::Axis(_) => axis::LABELS.iter().map(|label| label.key).collect(),
-        Opened::Gantry(_) => LABELS.iter().map(|label| label.key).collect(),
+        Opened::Gantry(case) => case.gantry.geometry().bodies.iter().map(|body| body.label.key).collect(),
     }
 }

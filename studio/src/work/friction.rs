@@ -25,7 +25,7 @@ pub fn page(case: &Opened, speed: f64) -> Page {
             let gantry = &case.gantry;
             let bodies = vec![
                 ("Drive pulleys", &gantry.drive_pulley.friction, true),
-                ("Bridge", &gantry.bridge.friction, false),
+                ("Bridge", &gantry.first_slide().friction, false),
                 ("Cart", &gantry.cart.friction, false),
             ];
             (gantry.pulley_radius, bodies)

@@ -3,7 +3,6 @@
 use serde_json::{Value, json};
 use taut::case::Opened;
 use taut::machine::Travel;
-use taut::machine::gantry::Routing;
 
 /// Kind, radius and travels, m.
 pub fn scene(case: &Opened) -> Value {
@@ -14,7 +13,7 @@ pub fn scene(case: &Opened) -> Value {
             json!({
                 "kind": "axis",
                 "radius": machine.pulley_radius,
-                "x": travel(machine.travel),
+                "x": travel(machine.cart.travel),
                 "spans": ["span1_force", "span2_force", "span3_force"],
                 "pretension": machine.belt.pretension,
             })
@@ -22,17 +21,14 @@ pub fn scene(case: &Opened) -> Value {
         Opened::Gantry(case) => {
             let gantry = &case.gantry;
             let spans: Vec<String> =
-                gantry.routing.spans().iter().map(|label| format!("{}_force", label.key)).collect();
+                gantry.kind.geometry().span_labels().map(|label| format!("{}_force", label.key)).collect();
             json!({
-                "kind": match gantry.routing {
-                    Routing::HFrame => "h-frame",
-                    Routing::CoreXy => "core-xy",
-                },
+                "kind": gantry.kind.word(),
                 "radius": gantry.pulley_radius,
-                "x": travel(gantry.bridge.travel),
+                "x": travel(gantry.first_slide().travel),
                 "y": travel(gantry.cart.travel),
                 "spans": spans,
-                "pretension": gantry.belts.pretension,
+                "pretension": gantry.belt.pretension,
             })
         }
     }

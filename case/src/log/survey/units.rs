@@ -30,7 +30,7 @@ const MOST_VOLTS: f64 = 800.0;
 const MOST_AMPERES: f64 = 300.0;
 
 pub(super) fn input_unit(stage: &Machine) -> &'static str {
-    match stage.amplifier.mode {
+    match stage.drives[0].amplifier.mode {
         AmplifierMode::Voltage => "V",
         AmplifierMode::Current => "A",
     }
@@ -64,7 +64,7 @@ fn encoder_note(stage: &Machine, channels: &[Channel]) -> Option<Note> {
         EncoderPlace::DrivePulley => &["drive_angle"],
         EncoderPlace::Cart => &["cart_position"],
     };
-    let count = 1.0 / encoder.counts_per_unit(stage.motor.gear_ratio);
+    let count = 1.0 / encoder.counts_per_unit(stage.drives[0].motor.gear_ratio);
     let (channel, step) = channels.iter().find_map(|channel| {
         let step = channel.step.filter(|_| counted.contains(&channel.name) && channel.levels > FEWEST_LEVELS)?;
         Some((channel, step))
@@ -79,7 +79,7 @@ fn encoder_note(stage: &Machine, channels: &[Channel]) -> Option<Note> {
     };
     let of_turn = match encoder.at {
         EncoderPlace::Cart => 1.0,
-        EncoderPlace::Motor => std::f64::consts::TAU / stage.motor.gear_ratio,
+        EncoderPlace::Motor => std::f64::consts::TAU / stage.drives[0].motor.gear_ratio,
         EncoderPlace::DrivePulley => std::f64::consts::TAU,
     };
     let text = format!(
@@ -96,8 +96,10 @@ fn encoder_note(stage: &Machine, channels: &[Channel]) -> Option<Note> {
 
 /// An input that no such amplifier gives.
 fn input_note(stage: &Machine, input: &Channel) -> Option<Note> {
-    let peak = (stage.amplifier.gain * input.greatest).abs().max((stage.amplifier.gain * input.least).abs());
-    let (most, unit, milli) = match stage.amplifier.mode {
+    let peak = (stage.drives[0].amplifier.gain * input.greatest)
+        .abs()
+        .max((stage.drives[0].amplifier.gain * input.least).abs());
+    let (most, unit, milli) = match stage.drives[0].amplifier.mode {
         AmplifierMode::Voltage => (MOST_VOLTS, "V", "mV"),
         AmplifierMode::Current => (MOST_AMPERES, "A", "mA"),
     };
@@ -311,7 +313,7 @@ fn idle(log: &Log, stage: &Machine, motion: &Motion) -> Option<Note> {
     if most == 0.0 {
         return None;
     }
-    let force = drive(stage).force * (stage.amplifier.gain * most).abs();
+    let force = drive(stage).force * (stage.drives[0].amplifier.gain * most).abs();
     let coulomb = resistance(stage).1;
     if force * IDLE > coulomb {
         return None;
@@ -360,9 +362,9 @@ struct Drive {
 }
 
 fn drive(stage: &Machine) -> Drive {
-    let (motor, r) = (&stage.motor, stage.pulley_radius);
+    let (motor, r) = (&stage.drives[0].motor, stage.pulley_radius);
     let per_ampere = motor.torque_constant * motor.gear_ratio * motor.gear_efficiency / r;
-    match stage.amplifier.mode {
+    match stage.drives[0].amplifier.mode {
         AmplifierMode::Current => Drive { force: per_ampere, brake: 0.0 },
         AmplifierMode::Voltage => {
             let force = per_ampere / motor.resistance;
@@ -388,7 +390,7 @@ struct Expected {
 /// The motion of the machine as one rigid mass; none if it would hardly move.
 fn expected(log: &Log, stage: &Machine) -> Option<Expected> {
     let r = stage.pulley_radius;
-    let (motor, cart) = (&stage.motor, &stage.cart);
+    let (motor, cart) = (&stage.drives[0].motor, &stage.cart);
     let pulleys = [&stage.drive_pulley, &stage.idler_pulley];
     let mass = cart.mass
         + pulleys.iter().map(|pulley| pulley.inertia).sum::<f64>() / (r * r)
@@ -400,7 +402,7 @@ fn expected(log: &Log, stage: &Machine) -> Option<Expected> {
     for k in 1..log.len() {
         let dt = log.time[k] - log.time[k - 1];
         // F = K i − b v, and with a voltage i = (u − K_e n v / r) / R
-        let force = drive.force * stage.amplifier.gain * log.input[k - 1];
+        let force = drive.force * stage.drives[0].amplifier.gain * log.input[k - 1];
         let driven = force.abs() > coulomb || v != 0.0;
         let direction = if v == 0.0 { force.signum() } else { v.signum() };
         if driven {
@@ -414,8 +416,8 @@ fn expected(log: &Log, stage: &Machine) -> Option<Expected> {
         }
         speed = speed.max(v.abs());
     }
-    let most = log.input.iter().fold(0.0_f64, |most, u| most.max((stage.amplifier.gain * u).abs()));
-    let free = match stage.amplifier.mode {
+    let most = log.input.iter().fold(0.0_f64, |most, u| most.max((stage.drives[0].amplifier.gain * u).abs()));
+    let free = match stage.drives[0].amplifier.mode {
         AmplifierMode::Voltage if motor.back_emf_constant > 0.0 => {
             most * r / (motor.back_emf_constant * motor.gear_ratio)
         }
@@ -431,7 +433,7 @@ fn direction(log: &Log, stage: &Machine, motion: &Motion) -> Option<Note> {
     }
     let (mut uu, mut uv, mut vv) = (0.0, 0.0, 0.0);
     for (u, v) in log.input.iter().zip(&motion.speed).filter(|(_, v)| v.is_finite()) {
-        let u = u * stage.amplifier.gain;
+        let u = u * stage.drives[0].amplifier.gain;
         uu += u * u;
         uv += u * v;
         vv += v * v;
@@ -451,9 +453,9 @@ fn direction(log: &Log, stage: &Machine, motion: &Motion) -> Option<Note> {
 fn current_note(log: &Log, stage: &Machine) -> Option<Note> {
     let output = log.output(Quantity::MotorCurrent)?;
     let peak = quantile(&output.values.iter().map(|i| i.abs()).collect::<Vec<_>>(), 0.995);
-    let most = log.input.iter().fold(0.0_f64, |most, u| most.max((stage.amplifier.gain * u).abs()));
-    let most = match stage.amplifier.mode {
-        AmplifierMode::Voltage => 2.0 * most / stage.motor.resistance,
+    let most = log.input.iter().fold(0.0_f64, |most, u| most.max((stage.drives[0].amplifier.gain * u).abs()));
+    let most = match stage.drives[0].amplifier.mode {
+        AmplifierMode::Voltage => 2.0 * most / stage.drives[0].motor.resistance,
         AmplifierMode::Current => most,
     };
     if most == 0.0 || peak < ROUGH * most {

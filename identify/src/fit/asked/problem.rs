@@ -732,12 +732,12 @@ fn scale(machine: &Machine, parameter: &Free, runs: &[Run]) -> Scale {
 /// where that depends on the machine alone, as the gain of an amplifier, which has whatever unit its input has.
 fn typical(machine: &Machine, parameter: &Free, runs: &[Run]) -> Option<f64> {
     let most = runs.iter().flat_map(|run| run.logged.iter()).fold(0.0, |most: f64, u| most.max(u.abs()));
-    let motor = &machine.motor;
-    let per_unit = match machine.amplifier.mode {
+    let motor = &machine.drives[0].motor;
+    let per_unit = match machine.drives[0].amplifier.mode {
         AmplifierMode::Voltage => motor.torque_constant / motor.resistance,
         AmplifierMode::Current => motor.torque_constant,
     };
-    let torque = (0.1 * per_unit * motor.gear_ratio * machine.amplifier.gain * most).abs();
+    let torque = (0.1 * per_unit * motor.gear_ratio * machine.drives[0].amplifier.gain * most).abs();
     let r = machine.pulley_radius;
     let speed = runs
         .iter()

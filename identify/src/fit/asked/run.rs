@@ -230,7 +230,7 @@ impl Run {
         if let (Some(design), Some(reference)) = (&case.controller, &log.reference) {
             let profile = Profile::sampled(&log.time, reference).shaped(&design.shaper);
             let added = log.added.as_ref().map(|values| Added { times: log.time.clone(), values: values.clone() });
-            let amplifier = &case.machine.amplifier;
+            let amplifier = &case.machine.drives[0].amplifier;
             let (quantity, limit, late) = match amplifier.mode {
                 AmplifierMode::Voltage => (Quantity::MotorVoltage, amplifier.voltage_limit, None),
                 AmplifierMode::Current => (Quantity::MotorCurrent, amplifier.current_limit, amplifier.bandwidth),
@@ -272,7 +272,7 @@ impl Run {
     /// Whether an extra does no more than shift outputs.
     pub(crate) fn only_shifts(&self, machine: &Machine, extra: &Extra) -> bool {
         // Whether it matters where the cart is, and not only how far it goes.
-        let is_placed = machine.changes_along_travel() || machine.travel.is_some();
+        let is_placed = machine.changes_along_travel() || machine.cart.travel.is_some();
         match extra.what {
             Nuisance::Bias(_) => true,
             Nuisance::StartPosition => self.seen.iter().all(|seen| !seen.absolute) && !is_placed,
@@ -327,7 +327,7 @@ impl Run {
 
     /// Where the model begins with these values of the extras, which set the gain of its amplifier, too.
     pub(crate) fn initial(&self, machine: &mut Machine, extras: &[f64]) -> Initial {
-        machine.amplifier.gain *= self.extra(Nuisance::InputGain, extras).unwrap_or(1.0);
+        machine.drives[0].amplifier.gain *= self.extra(Nuisance::InputGain, extras).unwrap_or(1.0);
         let r = machine.pulley_radius;
         let mut initial = self.initial;
         if let Some(position) = self.extra(Nuisance::StartPosition, extras) {

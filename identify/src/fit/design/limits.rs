@@ -66,7 +66,7 @@ impl Reached {
 
 impl Limits {
     pub(super) fn new(case: &Case, request: &Request) -> Result<Self> {
-        let amplifier = &case.machine.amplifier;
+        let amplifier = &case.machine.drives[0].amplifier;
         let seen = seen(case);
         let most = |of: fn(&Reached) -> f64| {
             seen.iter().map(of).filter(|value| *value > 0.0).reduce(f64::max).map(|value| (value, Origin::Experiments))
@@ -89,7 +89,7 @@ impl Limits {
                 .next("ask for less with --amplitude: beyond its limit the amplifier gives a constant"));
         }
         let current = asked(request.current).or(amplifier.current_limit.map(|limit| (limit, Origin::Machine)));
-        let own = case.machine.travel.map(|Travel { min, max, .. }| (max - min, Origin::Machine));
+        let own = case.machine.cart.travel.map(|Travel { min, max, .. }| (max - min, Origin::Machine));
         if let (Some((length, _)), Some(asked)) = (own, request.travel)
             && asked > length
         {
@@ -100,7 +100,7 @@ impl Limits {
             Error::new("nothing limits the way of the cart: the case has no [travel] and no experiment")
                 .next("say how far it may go with --travel \"0.4 m\", or add [travel] with min and max")
         })?;
-        let middle = case.machine.travel.map(|travel| 0.5 * (travel.min + travel.max));
+        let middle = case.machine.cart.travel.map(|travel| 0.5 * (travel.min + travel.max));
         Ok(Self { input, current, travel, middle, margin: request.margin })
     }
 
@@ -117,7 +117,7 @@ impl Limits {
 pub(super) fn unbounded(stage: &Machine) -> Machine {
     let mut stage = stage.clone();
     if !stage.belt.follows_cart {
-        stage.travel = None;
+        stage.cart.travel = None;
     }
     stage
 }

@@ -255,7 +255,7 @@ fn measured(case: &Case, request: &Request) -> Result<Vec<Channel>> {
             EncoderPlace::Motor | EncoderPlace::DrivePulley => Quantity::DriveAngle,
             EncoderPlace::Cart => Quantity::CartPosition,
         };
-        let step = Some(1.0 / encoder.counts_per_unit(case.machine.motor.gear_ratio));
+        let step = Some(1.0 / encoder.counts_per_unit(case.machine.drives[0].motor.gear_ratio));
         all.push(Channel { quantity, step, noise: 0.0, range: None });
     }
     let of_recorder = case.measurement.iter().flat_map(|Measurement { channels, .. }| channels.iter().copied());

@@ -290,7 +290,7 @@ impl Task<'_> {
             undetermined: known.groups.iter().map(|group| (group.clone(), known.choices(problem, group))).collect(),
             name,
             shape,
-            unit: case.machine.amplifier.mode.unit(),
+            unit: case.machine.drives[0].amplifier.mode.unit(),
             duration: self.duration,
             every: self.every,
             initial,

@@ -270,7 +270,9 @@ impl Scale<'_> {
 fn scales<'a>(problem: &'a Problem<'a>) -> Vec<Scale<'a>> {
     let of_input = |what: Nuisance| match what {
         Nuisance::Delay => "s",
-        Nuisance::InputOffset if problem.machine.amplifier.mode == crate::machine::AmplifierMode::Current => "A",
+        Nuisance::InputOffset if problem.machine.drives[0].amplifier.mode == crate::machine::AmplifierMode::Current => {
+            "A"
+        }
         Nuisance::InputOffset => "V",
         Nuisance::StartPosition => "m",
         Nuisance::StartSpeed => "m/s",

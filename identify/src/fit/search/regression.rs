@@ -120,8 +120,8 @@ impl<'a> Smoothed<'a> {
     fn add_to(&self, late: usize, rows: &mut Vec<[f64; 5]>) {
         let Self { run, machine, .. } = self;
         let seen = &run.seen[self.output];
-        let motor = &machine.motor;
-        let (n_gear, amplifier) = (motor.gear_ratio, &machine.amplifier);
+        let motor = &machine.drives[0].motor;
+        let (n_gear, amplifier) = (motor.gear_ratio, &machine.drives[0].amplifier);
         let per_ampere = motor.gear_efficiency * n_gear * motor.torque_constant;
         let mut block: Vec<[f64; 5]> = Vec::with_capacity(REGRESSION_BLOCK);
         for (k, &[speed, acceleration]) in self.derivatives.iter().enumerate() {

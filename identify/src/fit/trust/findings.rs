@@ -59,7 +59,7 @@ fn of_logs(case: &Case, plan: &Plan, found: &Searched) -> Vec<Finding> {
 fn grade(note: &Note, case: &Case, plan: &Plan) -> Grade {
     match (note.severity, note.code) {
         (Severity::Suspicion, _) | (_, "still") => Grade::Warning,
-        (_, "saturation") if case.machine.travel.is_none() || note.column == Some("input") => Grade::Warning,
+        (_, "saturation") if case.machine.cart.travel.is_none() || note.column == Some("input") => Grade::Warning,
         (_, "outliers") if !plan.huber => Grade::Warning,
         _ => Grade::Note,
     }
@@ -217,9 +217,9 @@ fn of_search(fit: &Fit) -> Vec<Finding> {
 
 /// Whether K_t and K_e can be those of one motor.
 fn of_motor(case: &Case, fit: &Fit) -> Option<Finding> {
-    let motor = &fit.machine.motor;
+    let motor = &fit.machine.drives[0].motor;
     let (k_t, k_e) = (motor.torque_constant, motor.back_emf_constant);
-    if motor.is_simple || case.machine.amplifier.mode != AmplifierMode::Voltage || k_t <= 0.0 || k_e <= 0.0 {
+    if motor.is_simple || case.machine.drives[0].amplifier.mode != AmplifierMode::Voltage || k_t <= 0.0 || k_e <= 0.0 {
         return None;
     }
     let ratio = k_t / k_e;

@@ -326,9 +326,9 @@ pub(crate) fn sum_of(machine: &crate::machine::Machine, parameters: &[&Free], we
             parts.push(arm.times(symbol));
         }
     }
-    let motor = &machine.motor;
+    let motor = &machine.drives[0].motor;
     if sum == Sum::Viscous
-        && machine.amplifier.mode == crate::machine::AmplifierMode::Voltage
+        && machine.drives[0].amplifier.mode == crate::machine::AmplifierMode::Voltage
         && motor.back_emf_constant != 0.0
     {
         let n2 = motor.gear_ratio * motor.gear_ratio;

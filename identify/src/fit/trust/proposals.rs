@@ -94,8 +94,8 @@ const IDEAS: &[Idea] = &[
             vec![(Quantity::DriveAngle, cart_noise(problem, noise) / r)]
         },
         change: |machine| {
-            machine.belt.stiffness = [1e-6; 3];
-            machine.belt.damping = [0.0; 3];
+            machine.belt.stiffness = [1e-6; 3].into();
+            machine.belt.damping = [0.0; 3].into();
             machine.belt.model = BeltModel::Elastic;
             // Spans that follow the cart have a stiffness by their make.
             machine.belt.follows_cart = false;
@@ -119,10 +119,10 @@ const IDEAS: &[Idea] = &[
 
 fn peak_current(problem: &Problem) -> f64 {
     let most = problem.runs.iter().flat_map(|run| run.logged.iter()).fold(0.0, |most: f64, u| most.max(u.abs()));
-    let amplifier = &problem.machine.amplifier;
+    let amplifier = &problem.machine.drives[0].amplifier;
     let output = (most * amplifier.gain).abs().max(1e-9);
     match amplifier.mode {
-        AmplifierMode::Voltage => output / problem.machine.motor.resistance,
+        AmplifierMode::Voltage => output / problem.machine.drives[0].motor.resistance,
         AmplifierMode::Current => output,
     }
 }
@@ -235,7 +235,7 @@ fn answer(problem: &Problem, idea: &Idea, measured: &[(Quantity, f64)], index: u
     let mut machine = problem.stage_at(x);
     (idea.change)(&mut machine);
     if idea.reversed {
-        machine.amplifier.gain = -machine.amplifier.gain;
+        machine.drives[0].amplifier.gain = -machine.drives[0].amplifier.gain;
     }
     let quantities: Vec<Quantity> = measured.iter().map(|(quantity, _)| *quantity).collect();
     let extras = problem.extras_of(index, x);
@@ -268,5 +268,5 @@ fn has(problem: &Problem, quantity: Quantity) -> bool {
 
 /// Whether the current is measured, or is what is fed in.
 fn knows_current(problem: &Problem) -> bool {
-    has(problem, Quantity::MotorCurrent) || problem.machine.amplifier.mode == AmplifierMode::Current
+    has(problem, Quantity::MotorCurrent) || problem.machine.drives[0].amplifier.mode == AmplifierMode::Current
 }

@@ -67,7 +67,7 @@ pub fn residual_force(machine: &Machine, log: &LogFit) -> Option<ResidualForce> 
         sum.parts(true).map(|row| value(machine, row.key).unwrap_or(0.0) * at_pulley(machine, row.key)).sum::<f64>()
             / (r * r)
     };
-    let (motor, amplifier) = (&machine.motor, &machine.amplifier);
+    let (motor, amplifier) = (&machine.drives[0].motor, &machine.drives[0].amplifier);
     let gear = motor.gear_ratio;
     let brake = match amplifier.mode {
         AmplifierMode::Voltage => {

@@ -80,7 +80,7 @@ pub(crate) fn result(found: &Searched, judged: Option<&Judged>) -> Fit {
         let unit = match extra.what {
             Nuisance::Delay => "s",
             Nuisance::InputGain => "",
-            Nuisance::InputOffset => problem.machine.amplifier.mode.unit(),
+            Nuisance::InputOffset => problem.machine.drives[0].amplifier.mode.unit(),
             // Each log has its own: they are never shared.
             Nuisance::StartPosition | Nuisance::StartSpeed | Nuisance::Bias(_) => "",
         };

@@ -6,26 +6,24 @@ use crate::simulate::marks;
 use crate::simulate::plots::Named;
 use crate::{Axis, Colour, Figure, Panel, Plane, Series, Style};
 use taut::case::GantryCase;
-use taut::machine::AmplifierMode;
-use taut::machine::gantry::{Gantry, LABELS, Routing};
+use taut::machine::{AmplifierMode, DriveAt, Machine};
 
 /// The curves that a report shows, and the way of the cart, before the first row.
-pub fn curves(gantry: &Gantry) -> (Curves, Way) {
+pub fn curves(gantry: &Machine) -> (Curves, Way) {
     let mut sources: Vec<Source> = gantry
         .mechanism()
         .columns
         .iter()
         .map(|heading| (heading.name.to_string(), vec![(heading.name.to_string(), 1.0)]))
         .collect();
-    // x and y as the drives say, minus what they are: as Gantry::place has it, term by term.
-    let half = 0.5 * gantry.pulley_radius;
-    let [x, y] = match gantry.routing {
-        Routing::HFrame => [[-half, half], [-half, -half]],
-        Routing::CoreXy => [[half, half], [half, -half]],
-    };
-    for (name, [left, right], slide) in [("x error", x, "bridge_position"), ("y error", y, "cart_position")] {
-        let terms = [("left_angle", left), ("right_angle", right), (slide, -1.0)];
-        sources.push((name.into(), terms.map(|(column, weight)| (column.to_string(), weight)).to_vec()));
+    // x and y as the drives say, minus what they are: as `Machine::by_drives` has it, term by term.
+    let geometry = gantry.geometry();
+    for (name, slide) in ["x error", "y error"].into_iter().zip(geometry.slides) {
+        let angle = |drive: &DriveAt| format!("{}_angle", geometry.label(drive.pulley).key);
+        let drives = geometry.drives.iter().zip(slide.by_drives);
+        let mut terms: Vec<_> = drives.map(|(drive, weight)| (angle(drive), weight * gantry.pulley_radius)).collect();
+        terms.push((format!("{}_position", geometry.label(slide.body).key), -1.0));
+        sources.push((name.into(), terms));
     }
     (Curves::of(sources), Way::new(["cart_position", "bridge_position"]))
 }
@@ -56,7 +54,7 @@ pub fn figures(case: &GantryCase, run: &Run) -> Vec<Named> {
 
     let mut drives = figure("drives");
     if curves.get("left_input").is_some() || curves.get("right_input").is_some() {
-        let commanded = gantry.amplifiers[0].mode == AmplifierMode::Current;
+        let commanded = gantry.drives[0].amplifier.mode == AmplifierMode::Current;
         drives = drives.panel(two(Axis::new("Input", if commanded { "A" } else { "V" }), "input"));
     }
     let drives = drives
@@ -88,17 +86,19 @@ pub fn figures(case: &GantryCase, run: &Run) -> Vec<Named> {
         .panel(two(Axis::new("Pulleys", "rad/s"), "speed"))
         .caption("Speeds of bridge and cart, and of the drive pulleys.");
     let spans: Vec<(String, &str)> =
-        gantry.routing.spans().iter().map(|span| (format!("{}_force", span.key), span.name)).collect();
+        gantry.kind.geometry().span_labels().map(|span| (format!("{}_force", span.key), span.name)).collect();
     let spans: Vec<(&str, &str)> = spans.iter().map(|(column, name)| (column.as_str(), *name)).collect();
-    let forces =
-        figure("forces").panel(panel(Axis::new("Force", "N"), &spans)).caption(match gantry.belts.pretension {
-            Some(_) => "Forces in the spans beyond pretension.",
-            None => "Forces in the spans, without the belt's pretension.",
-        });
-    let of_bodies = |suffix: &str| LABELS.map(|label| (format!("{}_{suffix}", label.key), label.name));
+    let forces = figure("forces").panel(panel(Axis::new("Force", "N"), &spans)).caption(match gantry.belt.pretension {
+        Some(_) => "Forces in the spans beyond pretension.",
+        None => "Forces in the spans, without the belt's pretension.",
+    });
+    let of_bodies = |suffix: &str| -> Vec<(String, &str)> {
+        let labels = gantry.geometry().bodies.iter().map(|body| body.label);
+        labels.map(|label| (format!("{}_{suffix}", label.key), label.name)).collect()
+    };
     let friction = of_bodies("friction");
     let states = of_bodies("state");
-    let of = |axis: Axis, list: &[(String, &'static str)]| {
+    let of = |axis: Axis, list: &[(String, &str)]| {
         let names: Vec<(&str, &str)> = list.iter().map(|(column, name)| (column.as_str(), *name)).collect();
         panel(axis, &names)
     };
@@ -130,7 +130,7 @@ pub fn way(case: &GantryCase, run: &Run) -> Option<Plane> {
             "The way of the cart in the plane, at one scale for both directions and seen as the drawing is: x upward, y to the right. \
              It begins at the open circle.",
         );
-    if let (Some(bridge), Some(cart)) = (case.gantry.bridge.travel, case.gantry.cart.travel) {
+    if let (Some(bridge), Some(cart)) = (case.gantry.first_slide().travel, case.gantry.cart.travel) {
         plane = plane.bounds((cart.min, cart.max), (bridge.min, bridge.max));
         plane.caption += " The dotted frame is the travel of both.";
     }

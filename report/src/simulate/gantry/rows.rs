@@ -2,7 +2,7 @@
 
 use super::Run;
 use crate::simulate::rows::{self, accuracy, cost, events, speed, time, travel, value};
-use taut::machine::gantry::{Gantry, Routing};
+use taut::machine::{Kind, Machine};
 use taut::metrics::{GantryMetrics, Peak};
 use taut::number::engineering_typed;
 use taut::solve::{Ending, Solver};
@@ -12,18 +12,15 @@ const LEAST_LENGTH: f64 = 1e-13;
 const LEAST_FORCE: f64 = 1e-9;
 
 /// The machine in a line.
-pub fn machine(gantry: &Gantry) -> String {
-    let belts = match gantry.routing {
-        Routing::HFrame => "one belt round both drives",
-        Routing::CoreXy => "a belt for each drive",
-    };
+pub fn machine(gantry: &Machine) -> String {
+    let belts = if gantry.kind == Kind::HFrame { "one belt round both drives" } else { "a belt for each drive" };
     let short = |value: f64, unit: &str| engineering_typed(value, unit, 4);
-    let stiffness: Vec<String> = gantry.belts.stiffness.iter().map(|k| short(*k, "N/m")).collect();
-    let follow = if gantry.belts.follows.is_some() { " at x = y = 0, following bridge and cart" } else { "" };
+    let stiffness: Vec<String> = gantry.belt.stiffness.iter().map(|k| short(*k, "N/m")).collect();
+    let follow = if gantry.belt.follows_cart { " at x = y = 0, following bridge and cart" } else { "" };
     format!(
         "{}, {belts}: bridge {}, cart {}, r = {}, spans {}{follow}",
-        gantry.routing.name(),
-        short(gantry.bridge.mass, "kg"),
+        gantry.kind.name(),
+        short(gantry.first_slide().mass, "kg"),
         short(gantry.cart.mass, "kg"),
         short(gantry.pulley_radius, "m"),
         stiffness.join(", "),
@@ -31,19 +28,19 @@ pub fn machine(gantry: &Gantry) -> String {
 }
 
 /// How a run ended that did not reach its end.
-pub fn early_end(run: &Run, gantry: &Gantry) -> Option<String> {
+pub fn early_end(run: &Run, gantry: &Machine) -> Option<String> {
     let Ending::LeftTravel { time: at } = run.outcome.ending else { return rows::early_end(&run.outcome.ending) };
     // Whichever is nearer to an end of its travel, or beyond.
     let [x, y] = run.metrics.final_position;
     let left = |position: f64, travel: Option<taut::machine::Travel>| {
         travel.map_or(f64::INFINITY, |travel| (position - travel.min).min(travel.max - position))
     };
-    let which = if left(x, gantry.bridge.travel) <= left(y, gantry.cart.travel) { "bridge" } else { "cart" };
+    let which = if left(x, gantry.first_slide().travel) <= left(y, gantry.cart.travel) { "bridge" } else { "cart" };
     Some(format!("ended at {}: the {which} leaves its travel there, and nothing stops it", time(at)))
 }
 
 /// The key figures of a run with their names.
-pub fn lines(run: &Run, gantry: &Gantry, solver: Solver) -> Vec<(&'static str, String)> {
+pub fn lines(run: &Run, gantry: &Machine, solver: Solver) -> Vec<(&'static str, String)> {
     let metrics = &run.metrics;
     let two = |[bridge, cart]: [String; 2]| format!("bridge {bridge}, cart {cart}");
     let sides = |[left, right]: [String; 2]| format!("left {left}, right {right}");
@@ -53,7 +50,7 @@ pub fn lines(run: &Run, gantry: &Gantry, solver: Solver) -> Vec<(&'static str, S
         true => format!("0 {unit}"),
         false => format!("{text} at {}", time(peak.time)),
     };
-    let spans = gantry.routing.spans().iter().zip(&metrics.peak_force).map(|(span, force)| {
+    let spans = gantry.kind.geometry().span_labels().zip(&metrics.peak_force).map(|(span, force)| {
         format!("{} {}", span.name.trim_end_matches(" span"), at(*force, "N", value(force.value, "N")))
     });
     let error = |k: usize| {

@@ -1,0 +1,140 @@
+//! The geometry of a machine: which bodies there are, how the belt runs between them, and what the drives move.
+
+use crate::mechanism::Label;
+
+/// The geometry of a kind of machine.
+#[derive(Debug)]
+pub struct Geometry {
+    /// As in the case file.
+    pub word: &'static str,
+    /// For people.
+    pub name: &'static str,
+    /// The drives.
+    pub drives: &'static [DriveAt],
+    /// The bodies other than rotors, by their numbers.
+    pub bodies: &'static [BodyAt],
+    /// The spans of the belt, by their numbers.
+    pub spans: &'static [SpanAt],
+    /// What slides, by its number: a row of coordinates.
+    pub slides: &'static [SlideAt],
+}
+
+/// A drive.
+#[derive(Debug)]
+pub struct DriveAt {
+    /// Its name.
+    pub label: Label,
+    /// The name of its limit of voltage; its key is the column of the voltage.
+    pub voltage: Label,
+    /// The name of its limit of current.
+    pub current: Label,
+    /// The column of its current.
+    pub current_column: &'static str,
+    /// The body that its gear turns.
+    pub pulley: usize,
+    /// Its gear, where that is compliant.
+    pub gear: Label,
+    /// Its rotor there.
+    pub rotor: Label,
+    /// What stands before the key of an axis' part: `left_drive.`.
+    pub key: &'static str,
+    /// What stands before the column of an axis: `left_`. Without the line it is its input's name.
+    pub prefix: &'static str,
+}
+
+/// A body.
+#[derive(Debug)]
+pub struct BodyAt {
+    /// Its name.
+    pub label: Label,
+    /// The part of a machine that it is.
+    pub part: Part,
+    /// Where it is with the belt without strain, as a sum over the slides' positions: divided by the radius, an angle.
+    pub by_slides: &'static [f64],
+}
+
+/// The part of a machine that a body is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    /// A pulley at a motor.
+    DrivePulley,
+    /// The pulley at the far end of an axis.
+    IdlerPulley,
+    /// The bridge, with the cart that rides on it.
+    Bridge,
+    /// The cart.
+    Cart,
+}
+
+/// A span of the belt: a row of A.
+#[derive(Debug)]
+pub struct SpanAt {
+    /// Its name.
+    pub label: Label,
+    /// What the columns of its force and slack begin with.
+    pub column: &'static str,
+    /// By how much it gets longer per way of each body.
+    pub arms: &'static [(usize, Lever)],
+    /// By how much its own length, from end to end, changes per way of what slides; nothing where it does not.
+    pub follows: &'static [(usize, f64)],
+    /// Its stretch as a sum over the stretches of [`Geometry::telling_spans`]: the spans of a belt add up to nothing.
+    pub by_others: &'static [(usize, f64)],
+}
+
+/// A lever arm.
+#[derive(Debug, Clone, Copy)]
+pub enum Lever {
+    /// So many times the pulleys' radius.
+    Radius(f64),
+    /// This number.
+    One(f64),
+}
+
+impl Lever {
+    /// Its length on pulleys of radius `r`.
+    pub fn of(self, r: f64) -> f64 {
+        match self {
+            Lever::Radius(weight) => weight * r,
+            Lever::One(weight) => weight,
+        }
+    }
+}
+
+/// Something that slides, and so a coordinate of the machine.
+#[derive(Debug)]
+pub struct SlideAt {
+    /// Its body.
+    pub body: usize,
+    /// What stands at its ends.
+    pub stop: Label,
+    /// The column of a force on it along its travel, and what that is.
+    pub force_along: Label,
+    /// The same of a force by its speed.
+    pub force_by_speed: Label,
+    /// Where the drives have it, as a sum over the angles of their pulleys, times the radius.
+    pub by_drives: &'static [f64],
+    /// What that is more than where it is, as a sum over stretches of spans, (span, weight).
+    pub error: &'static [(usize, f64)],
+}
+
+impl Geometry {
+    /// The name of a slide's or drive pulley's body.
+    pub fn label(&self, body: usize) -> Label {
+        self.bodies[body].label
+    }
+
+    /// The names of the spans.
+    pub fn span_labels(&self) -> impl Iterator<Item = Label> {
+        self.spans.iter().map(|span| span.label)
+    }
+
+    /// The body of the cart.
+    pub fn cart(&self) -> usize {
+        self.slides[self.slides.len() - 1].body
+    }
+
+    /// The spans whose stretches tell by how much all drives are off, and from which those of all spans follow.
+    pub fn telling_spans(&self) -> impl Iterator<Item = usize> {
+        self.slides[0].error.iter().map(|(span, _)| *span)
+    }
+}

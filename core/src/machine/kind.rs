@@ -1,0 +1,92 @@
+//! The kinds of machines, each a constant of geometry.
+
+use super::geometry::Geometry;
+use super::{axis, gantry};
+
+/// The kinds of machines.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Kind {
+    /// One drive, one cart, one belt.
+    Axis,
+    /// A cart on a bridge, one belt round both drive pulleys.
+    HFrame,
+    /// A cart on a bridge, two belts, one for each drive pulley.
+    CoreXy,
+}
+
+impl Kind {
+    /// All of them.
+    pub const ALL: [Kind; 3] = [Kind::Axis, Kind::HFrame, Kind::CoreXy];
+
+    /// Its geometry.
+    pub const fn geometry(self) -> &'static Geometry {
+        match self {
+            Kind::Axis => &axis::AXIS,
+            Kind::HFrame => &gantry::H_FRAME,
+            Kind::CoreXy => &gantry::CORE_XY,
+        }
+    }
+
+    /// As in the case file.
+    pub fn word(self) -> &'static str {
+        self.geometry().word
+    }
+
+    /// For people.
+    pub fn name(self) -> &'static str {
+        self.geometry().name
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::geometry::{BodyAt, Part, SpanAt};
+    use super::*;
+    use crate::mechanism::BODIES;
+
+    /// The arms of a span for these positions of the bodies.
+    fn length(span: &SpanAt, r: f64, at: &[f64; BODIES]) -> f64 {
+        span.arms.iter().map(|(body, arm)| arm.of(r) * at[*body]).sum()
+    }
+
+    #[test]
+    fn constants_of_a_geometry_follow_from_its_arms() {
+        let r = 0.02;
+        for kind in Kind::ALL {
+            let geometry = kind.geometry();
+            let turns = |body: usize| matches!(geometry.bodies[body].part, Part::DrivePulley | Part::IdlerPulley);
+            // Without strain no span is stretched, and the drives have everything where it is.
+            for (number, slide) in geometry.slides.iter().enumerate() {
+                let mut at = [0.0; BODIES];
+                for (body, place) in geometry.bodies.iter().enumerate() {
+                    at[body] = match turns(body) {
+                        true => body_at(place, number) / r,
+                        false => f64::from(u8::from(body == slide.body)),
+                    };
+                }
+                for span in geometry.spans {
+                    assert!(length(span, r, &at).abs() < 1e-12, "{} {}", geometry.word, span.label.key);
+                }
+            }
+            // Any position: errors and stretches are what the arms say.
+            let at: [f64; BODIES] = std::array::from_fn(|body| {
+                if body < geometry.bodies.len() { (1.0 + body as f64).sqrt() - 0.3 * body as f64 } else { 0.0 }
+            });
+            let stretch = |span: usize| length(&geometry.spans[span], r, &at);
+            for slide in geometry.slides {
+                let drives = geometry.drives.iter().zip(slide.by_drives);
+                let by_drives: f64 = drives.map(|(drive, weight)| r * weight * at[drive.pulley]).sum();
+                let error: f64 = slide.error.iter().map(|(span, weight)| weight * stretch(*span)).sum();
+                assert!((by_drives - at[slide.body] - error).abs() < 1e-12, "{}", geometry.word);
+            }
+            for (number, span) in geometry.spans.iter().enumerate() {
+                let told: f64 = span.by_others.iter().map(|(span, weight)| weight * stretch(*span)).sum();
+                assert!((told - stretch(number)).abs() < 1e-12, "{} {}", geometry.word, span.label.key);
+            }
+        }
+    }
+
+    fn body_at(body: &BodyAt, slide: usize) -> f64 {
+        body.by_slides.get(slide).copied().unwrap_or_default()
+    }
+}

@@ -1,0 +1,394 @@
+//! A machine as a mechanism: its bodies, springs and drives by its geometry, what is shown of them, and the state
+//! without strain.
+
+use super::{
+    BeltMake, BeltModel, BodyAt, DriveAt, EncoderPlace, Geometry, Machine, Part, Slide, SlideAt, SpanAt, Spans,
+};
+use crate::error::{Error, Result};
+use crate::friction::{Friction, Law};
+use crate::mechanism::{
+    self, BODIES, Body, Drive, Follows, Heading, Label, Mechanism, Over, Roles, Shown, Spring, SpringLaw, State,
+};
+
+impl Machine {
+    /// Its geometry.
+    pub fn geometry(&self) -> &'static Geometry {
+        self.kind.geometry()
+    }
+
+    /// Its bodies, springs and drives.
+    pub fn mechanism(&self) -> Mechanism {
+        let geometry = self.geometry();
+        let (mut bodies, mut springs, mut drives) = (self.bodies(), self.spans(), Vec::new());
+        for (at, unit) in geometry.drives.iter().zip(&self.drives) {
+            let mut shaft = at.pulley;
+            if let Some(play) = unit.motor.gear_play {
+                shaft = bodies.len();
+                let half = 0.5 * play.backlash;
+                springs.push(Spring {
+                    label: at.gear,
+                    arms: vec![(at.pulley, -1.0), (shaft, 1.0)],
+                    stiffness: play.stiffness,
+                    damping: play.damping,
+                    // Without play the flanks never part.
+                    law: if half == 0.0 { SpringLaw::TwoSided } else { SpringLaw::Gap { low: -half, high: half } },
+                    follows: None,
+                });
+                bodies.push(Body {
+                    label: at.rotor,
+                    kind: mechanism::Kind::Rotary { radius: self.pulley_radius },
+                    // n² J_r: seen from behind the gear
+                    inertia: unit.motor.gear_ratio * unit.motor.gear_ratio * unit.motor.rotor_inertia,
+                    friction: Friction::default(),
+                    force: 0.0,
+                    along: None,
+                    leader: (shaft, 1.0),
+                    is_rotor: true,
+                });
+            }
+            let &DriveAt { label, voltage, current, pulley, .. } = at;
+            let (motor, amplifier) = (unit.motor, unit.amplifier);
+            drives.push(Drive { label, voltage, current, pulley, shaft, motor, amplifier });
+        }
+        let slides = || geometry.slides.iter().zip(self.slides());
+        springs.extend(slides().flat_map(|(at, slide)| lines(at, slide)));
+        springs.extend(slides().map(|(at, slide)| way(at, slide)));
+        let mut mechanism = Mechanism::new(bodies, springs, drives);
+        let loads = geometry.slides.iter().map(|slide| slide.body).collect();
+        mechanism.roles = Roles { loads, spans: (0..geometry.spans.len()).collect() };
+        mechanism.readings = self.readings(&mechanism);
+        mechanism.columns = self.columns(&mechanism);
+        mechanism
+    }
+
+    /// Bodies other than rotors.
+    fn bodies(&self) -> Vec<Body> {
+        let bodies = self.geometry().bodies;
+        let number = |part: Part| bodies.iter().position(|body| body.part == part);
+        let body = |(index, &BodyAt { label, part, .. }): (usize, &BodyAt)| {
+            let leader = match (self.belt.model, part) {
+                (BeltModel::TwoMass, Part::IdlerPulley) => number(Part::DrivePulley).map(|drive| (drive, 1.0)),
+                // x = r φ
+                (BeltModel::Rigid, Part::DrivePulley | Part::IdlerPulley) => {
+                    number(Part::Cart).map(|cart| (cart, 1.0 / self.pulley_radius))
+                }
+                _ => None,
+            };
+            let turns = mechanism::Kind::Rotary { radius: self.pulley_radius };
+            let slides = mechanism::Kind::Linear;
+            let bridge = self.bridge.as_ref().unwrap_or(&self.cart);
+            let (kind, inertia, friction, slide) = match part {
+                Part::DrivePulley => (turns, self.drive_pulley.inertia, self.drive_pulley.friction, None),
+                Part::IdlerPulley => (turns, self.idler_pulley.inertia, self.idler_pulley.friction, None),
+                Part::Bridge => (slides, bridge.mass + self.cart.mass, bridge.friction, Some(bridge)),
+                Part::Cart => (slides, self.cart.mass, self.cart.friction, Some(&self.cart)),
+            };
+            Body {
+                label,
+                kind,
+                inertia,
+                friction,
+                force: slide.map_or(0.0, |slide| slide.load - inertia * super::GRAVITY * slide.inclination.sin()),
+                along: slide.and_then(|slide| slide.along.clone()),
+                leader: leader.unwrap_or((index, 1.0)),
+                is_rotor: false,
+            }
+        };
+        bodies.iter().enumerate().map(body).collect()
+    }
+
+    fn spans(&self) -> Vec<Spring> {
+        let [mut k, mut c] = [self.belt.stiffness, self.belt.damping];
+        if self.belt.model == BeltModel::TwoMass {
+            // Spans 2 and 3 in series, the idler pulley between them without inertia or friction of its own:
+            // 1/k₂₃ = 1/k₂ + 1/k₃ and, for slow motion, c₂₃ = (c₂ k₃² + c₃ k₂²)/(k₂ + k₃)²
+            let sum = k[1] + k[2];
+            c[1] = (c[1] * k[2] * k[2] + c[2] * k[1] * k[1]) / (sum * sum);
+            k[1] = k[1] * k[2] / sum;
+        }
+        let law = self.belt.pretension.map_or(SpringLaw::TwoSided, |pretension| SpringLaw::Tension { pretension });
+        let span = |(index, at): (usize, &SpanAt)| {
+            let there = self.span_alike(index) == Some(index);
+            Spring {
+                label: at.label,
+                arms: at.arms.iter().map(|&(body, arm)| (body, arm.of(self.pulley_radius))).collect(),
+                stiffness: if there { k[index] } else { 0.0 },
+                damping: if there { c[index] } else { 0.0 },
+                law: if there { law.clone() } else { SpringLaw::None },
+                follows: self.follows(index, at),
+            }
+        };
+        self.geometry().spans.iter().enumerate().map(span).collect()
+    }
+
+    /// The span that span `index` does alike, if any: itself, but span 3 of a two-mass model carries what span 2 does.
+    pub fn span_alike(&self, index: usize) -> Option<usize> {
+        match (self.belt.model, index) {
+            (BeltModel::Rigid, _) => None,
+            (BeltModel::TwoMass, 2) => Some(1),
+            _ => Some(index),
+        }
+    }
+
+    /// How a span's length follows what slides. Spans 2 and 3 in series are one of their lengths together; their damping
+    /// stays as it is at x = 0.
+    fn follows(&self, index: usize, at: &SpanAt) -> Option<Follows> {
+        let mut make = self.belt.following()?;
+        match self.belt.model {
+            BeltModel::Elastic => {}
+            BeltModel::TwoMass => make.spans[1] += make.spans[2],
+            BeltModel::Rigid => return None,
+        }
+        let follows = Follows { rigidity: make.rigidity(), length: make.spans[index], arms: at.follows.to_vec() };
+        (!at.follows.is_empty()).then_some(follows)
+    }
+
+    /// Of one drive in the order of [`crate::solve::reading`]. Of several speeds of what slides, currents, forces of
+    /// the spans, the stretches that tell what the drives do not see and from which those of all spans follow, and the
+    /// speeds of the motors: of rotors that turn by themselves, or of their pulleys.
+    fn readings(&self, mechanism: &Mechanism) -> Vec<Shown> {
+        let geometry = self.geometry();
+        let spans = 0..geometry.spans.len();
+        let forces = spans.clone().map(|span| Shown::Force(self.span_alike(span).unwrap_or(span), 1.0));
+        let loads = geometry.slides.iter().map(|slide| Shown::Speed(slide.body, 1.0));
+        let currents = (0..mechanism.drives.len()).map(Shown::Current);
+        let shafts = mechanism.drives.iter().map(|drive| Shown::Speed(drive.shaft, 1.0));
+        match &mechanism.drives[..] {
+            [drive] => loads
+                .chain([Shown::Speed(drive.pulley, self.pulley_radius)])
+                .chain(spans.map(Shown::Stretch))
+                .chain(forces)
+                .chain(currents)
+                .chain(shafts)
+                .chain([Shown::Voltage(0), Shown::Position(geometry.cart(), 1.0)])
+                .collect(),
+            _ => {
+                let stretches = geometry.telling_spans().map(Shown::Stretch);
+                loads.chain(currents).chain(forces).chain(stretches).chain(shafts).collect()
+            }
+        }
+    }
+
+    fn columns(&self, mechanism: &Mechanism) -> Vec<Heading> {
+        let geometry = self.geometry();
+        let (bodies, spans) = (geometry.bodies, geometry.spans);
+        let drives = || geometry.drives.iter().zip(&mechanism.drives).enumerate();
+        let units = |body: usize| mechanism.bodies[body].kind.units();
+        let mut columns = Vec::new();
+        let mut add = |name: String, unit, shown, lean| columns.push(Heading { name: name.into(), unit, shown, lean });
+        add("time".into(), "s", Shown::Time, true);
+        for (drive, (at, _)) in drives() {
+            add(at.voltage.key.into(), "V", Shown::Voltage(drive), true);
+        }
+        for (body, BodyAt { label, .. }) in bodies.iter().enumerate() {
+            let way = if mechanism.bodies[body].kind == mechanism::Kind::Linear { "position" } else { "angle" };
+            let [of_way, of_speed, _] = units(body);
+            add(format!("{}_{way}", label.key), of_way, Shown::Position(body, 1.0), true);
+            add(format!("{}_speed", label.key), of_speed, Shown::Speed(body, 1.0), true);
+        }
+        for (drive, (at, _)) in drives() {
+            add(at.current_column.into(), "A", Shown::Current(drive), true);
+        }
+        let alike = |span: usize| self.span_alike(span).unwrap_or(span);
+        for (span, at) in spans.iter().enumerate() {
+            add(format!("{}_force", at.column), "N", Shown::Force(alike(span), 1.0), true);
+        }
+        for (body, BodyAt { label, .. }) in bodies.iter().enumerate() {
+            add(format!("{}_friction", label.key), units(body)[2], Shown::Friction(body), false);
+        }
+        for (body, BodyAt { label, .. }) in bodies.iter().enumerate() {
+            add(format!("{}_state", label.key), "", Shown::Motion(body), true);
+        }
+        for (drive, (at, part)) in drives().filter(|(_, (_, part))| part.shows_input()) {
+            add(format!("{}input", at.prefix), part.amplifier.mode.unit(), Shown::Input(drive), true);
+        }
+        for (_, (at, part)) in drives().filter(|(_, (_, part))| part.has_rotor()) {
+            let gear = mechanism.springs.iter().position(|spring| spring.label == at.gear).unwrap_or_default();
+            add(format!("{}_angle", at.rotor.key), "rad", Shown::Position(part.shaft, 1.0), false);
+            add(format!("{}_speed", at.rotor.key), "rad/s", Shown::Speed(part.shaft, 1.0), false);
+            add(format!("{}_torque", at.gear.key), "N m", Shown::Force(gear, 1.0), false);
+            add(format!("{}_state", at.gear.key), "", Shown::Contact(gear), false);
+        }
+        if self.belt.pretension.is_some() {
+            for (span, at) in spans.iter().enumerate() {
+                add(format!("{}_slack", at.column), "", Shown::Contact(alike(span)), false);
+            }
+        }
+        let stops = geometry.slides.iter().zip(self.slides());
+        for (at, _) in stops.filter(|(_, slide)| slide.travel.is_some_and(|travel| travel.stop.is_some())) {
+            let stop = mechanism.springs.iter().position(|spring| spring.label == at.stop).unwrap_or_default();
+            add(format!("{}_force", at.stop.key), "N", Shown::Force(stop, -1.0), false);
+        }
+        for (index, spring) in mechanism.springs.iter().enumerate() {
+            if let SpringLaw::Line { .. } = spring.law {
+                add(spring.label.key.into(), "N", Shown::Force(index, -1.0), false);
+            }
+        }
+        let mut counted = |name: String, body: usize, counts| add(name, "", Shown::Counts(body, counts), false);
+        for (at, part) in geometry.drives.iter().zip(&mechanism.drives) {
+            let Some(encoder) = self.encoder else { continue };
+            let body = match encoder.at {
+                EncoderPlace::Motor => part.shaft,
+                EncoderPlace::DrivePulley => part.pulley,
+                EncoderPlace::Cart => geometry.cart(),
+            };
+            let counts = encoder.counts_per_unit(part.motor.gear_ratio);
+            counted(format!("{}encoder_count", at.prefix), body, counts);
+        }
+        if let Some(scale) = self.scale {
+            counted("scale_count".into(), geometry.cart(), scale.counts_per_unit(1.0));
+        }
+        for (body, BodyAt { label, .. }) in bodies.iter().enumerate() {
+            if matches!(mechanism.bodies[body].friction.law, Law::LuGre { .. }) {
+                add(format!("{}_bristle", label.key), units(body)[0], Shown::Bristle(body), false);
+            }
+        }
+        columns
+    }
+
+    /// The state at rest with the cart of an axis at `x`, m, and the belt without strain.
+    pub fn at_rest(&self, x: f64) -> State {
+        self.without_strain(&[x], &[])
+    }
+
+    /// The state with what slides at these positions, m, with these speeds, m/s (zero where there is none), and the
+    /// belt without strain; rotors stand in the middle of their play.
+    pub fn without_strain(&self, positions: &[f64], speeds: &[f64]) -> State {
+        State { position: self.ways(positions), speed: self.ways(speeds), ..State::default() }
+    }
+
+    /// The ways of all bodies that go with these of what slides.
+    fn ways(&self, slides: &[f64]) -> [f64; BODIES] {
+        let geometry = self.geometry();
+        let mut ways = [0.0; BODIES];
+        for (way, body) in ways.iter_mut().zip(geometry.bodies) {
+            let along: f64 = body.by_slides.iter().zip(slides).map(|(weight, along)| weight * along).sum();
+            *way = match body.part {
+                Part::DrivePulley | Part::IdlerPulley => along / self.pulley_radius,
+                Part::Bridge | Part::Cart => along,
+            };
+        }
+        let rotors = geometry.drives.iter().zip(&self.drives).filter(|(_, unit)| unit.motor.gear_play.is_some());
+        for (rotor, (drive, _)) in rotors.enumerate() {
+            ways[geometry.bodies.len() + rotor] = ways[drive.pulley];
+        }
+        ways
+    }
+
+    /// Where the drives have what slides, m, by the angles of all bodies.
+    pub fn by_drives(&self, angles: &[f64; BODIES]) -> Vec<f64> {
+        let geometry = self.geometry();
+        let of_slide = |slide: &SlideAt| {
+            let drives = geometry.drives.iter().zip(slide.by_drives);
+            self.pulley_radius * drives.map(|(drive, weight)| weight * angles[drive.pulley]).sum::<f64>()
+        };
+        geometry.slides.iter().map(of_slide).collect()
+    }
+
+    /// Lengths of the spans with what slides at these positions, m, where they follow it.
+    pub fn span_lengths(&self, slides: &[f64]) -> Option<Spans> {
+        let BeltMake { spans, .. } = self.belt.following()?;
+        let geometry = self.geometry();
+        let place = |body: usize| {
+            let number = geometry.slides.iter().position(|slide| slide.body == body);
+            number.and_then(|number| slides.get(number)).copied().unwrap_or_default()
+        };
+        let length = |(length, span): (f64, &SpanAt)| {
+            span.follows.iter().fold(length, |length, &(body, arm)| length + arm * place(body))
+        };
+        Some(spans.into_iter().zip(geometry.spans).map(length).collect())
+    }
+
+    /// Refuses what is no gantry.
+    pub fn check_gantry(&self) -> Result<()> {
+        let geometry = self.geometry();
+        let spans = geometry.spans.len();
+        if self.belt.stiffness.len() != spans || self.belt.damping.len() != spans {
+            return Err(Error::new(format!("the belt of this gantry has {spans} spans"))
+                .allowed(format!("{spans} values of stiffness and of damping")));
+        }
+        let Some(bridge) = self.bridge.as_ref().filter(|_| self.drives.len() == geometry.drives.len()) else {
+            return Err(Error::new("a gantry has two drives and a bridge"));
+        };
+        let positive = |what: &str, value: f64| match (1e-15..=1e15).contains(&value) {
+            true => Ok(()),
+            false => Err(Error::new(format!("{what} cannot be {value:e}")).allowed("above zero: from 1e-15 to 1e15")),
+        };
+        positive("the pulleys' radius", self.pulley_radius)?;
+        positive("an inertia", self.drive_pulley.inertia)?;
+        positive("the bridge's mass", bridge.mass)?;
+        positive("the cart's mass", self.cart.mass)?;
+        self.belt.stiffness.iter().try_for_each(|&k| positive("the stiffness of a span", k))?;
+        for motor in self.drives.iter().map(|unit| &unit.motor) {
+            positive("a resistance", motor.resistance)?;
+            positive("a gear ratio", motor.gear_ratio)?;
+            if motor.gear_play.is_some() {
+                positive("a rotor's inertia", motor.rotor_inertia)?;
+            }
+        }
+        for (at, slide) in geometry.slides.iter().zip(self.slides()) {
+            let name = geometry.label(at.body).name;
+            if slide.travel.is_some_and(|travel| travel.min >= travel.max) {
+                let what = format!("the travel of the {name} ends before it begins");
+                return Err(Error::new(what).allowed("max above min"));
+            }
+            if slide.along.is_some() || slide.forces != super::SlideForces::default() {
+                return Err(Error::new(format!(
+                    "friction and forces of the {name} cannot change along its travel yet"
+                )));
+            }
+        }
+        if self.belt.model != BeltModel::Elastic || self.scale.is_some() {
+            return Err(Error::new("a gantry has an elastic belt, and no scale"));
+        }
+        for friction in [self.drive_pulley.friction, bridge.friction, self.cart.friction] {
+            if matches!(friction.law, Law::LuGre { .. }) {
+                let least = friction.forward.coulomb.min(friction.backward.coulomb);
+                positive("Coulomb friction under bristles", least)?;
+            }
+        }
+        if self.belt.following().is_some() {
+            let (Some(across), Some(along)) = (bridge.travel, self.cart.travel) else {
+                return Err(Error::new("spans that follow bridge and cart need the travel of both"));
+            };
+            for (x, y) in [across.min, across.max].into_iter().flat_map(|x| [(x, along.min), (x, along.max)]) {
+                let lengths = self.span_lengths(&[x, y]);
+                for (length, label) in lengths.into_iter().flatten().zip(geometry.span_labels()) {
+                    if length <= 0.0 {
+                        return Err(Error::new(format!(
+                            "with the bridge at {x} m and the cart at {y} m the {} has no length left",
+                            label.name
+                        ))
+                        .allowed("a travel that leaves something of every span")
+                        .next("make the travel shorter, or the spans longer"));
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Forces on what slides that are lines.
+fn lines(at: &SlideAt, slide: &Slide) -> impl Iterator<Item = Spring> {
+    let body = at.body;
+    let lines =
+        [(at.force_along, Over::Length, &slide.forces.along), (at.force_by_speed, Over::Rate, &slide.forces.by_speed)];
+    lines.into_iter().filter_map(move |(label, over, line): (Label, _, _)| {
+        // A spring pulls it back.
+        let law = SpringLaw::Line { over, line: line.as_ref()?.scaled(-1.0) };
+        Some(Spring { label, arms: vec![(body, 1.0)], stiffness: 0.0, damping: 0.0, law, follows: None })
+    })
+}
+
+/// Where something slides, and what stands at the ends of its travel.
+fn way(at: &SlideAt, slide: &Slide) -> Spring {
+    let stop = slide.travel.and_then(|travel| travel.stop);
+    let (stiffness, damping) = stop.map_or((0.0, 0.0), |stop| (stop.stiffness, stop.damping));
+    let law = match slide.travel {
+        None => SpringLaw::None,
+        Some(travel) if stop.is_some() => SpringLaw::Gap { low: travel.min, high: travel.max },
+        Some(travel) => SpringLaw::Bounds { low: travel.min, high: travel.max },
+    };
+    Spring { label: at.stop, arms: vec![(at.body, 1.0)], stiffness, damping, law, follows: None }
+}

@@ -1,0 +1,105 @@
+//! A number of each span of a belt.
+
+use std::fmt;
+use std::ops::{Deref, DerefMut};
+
+/// Room for spans.
+const ROOM: usize = 4;
+
+/// A number of each span, in the order of the geometry: a slice of them, but one that is copied.
+#[derive(Clone, Copy, PartialEq)]
+pub struct Spans {
+    /// What is behind `count` is zero.
+    values: [f64; ROOM],
+    count: usize,
+}
+
+impl Spans {
+    /// The same number for each of `count` spans.
+    pub fn all(count: usize, value: f64) -> Self {
+        std::iter::repeat_n(value, count).collect()
+    }
+
+    /// The numbers that `change` makes of them.
+    pub fn map(self, change: impl FnMut(f64) -> f64) -> Self {
+        self.into_iter().map(change).collect()
+    }
+
+    /// Those of the three spans of an axis.
+    pub fn three(self) -> [f64; 3] {
+        let [first, second, third, _] = self.values;
+        [first, second, third]
+    }
+}
+
+impl<const N: usize> From<[f64; N]> for Spans {
+    fn from(values: [f64; N]) -> Self {
+        const { assert!(N <= ROOM) };
+        values.into_iter().collect()
+    }
+}
+
+impl FromIterator<f64> for Spans {
+    /// Panics where there are more than a belt has.
+    fn from_iter<I: IntoIterator<Item = f64>>(given: I) -> Self {
+        let (mut values, mut count) = ([0.0; ROOM], 0);
+        for value in given {
+            values[count] = value;
+            count += 1;
+        }
+        Self { values, count }
+    }
+}
+
+impl Deref for Spans {
+    type Target = [f64];
+
+    fn deref(&self) -> &[f64] {
+        &self.values[..self.count]
+    }
+}
+
+impl DerefMut for Spans {
+    fn deref_mut(&mut self) -> &mut [f64] {
+        &mut self.values[..self.count]
+    }
+}
+
+impl IntoIterator for Spans {
+    type Item = f64;
+    type IntoIter = std::iter::Take<std::array::IntoIter<f64, ROOM>>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.values.into_iter().take(self.count)
+    }
+}
+
+impl<'a> IntoIterator for &'a Spans {
+    type Item = &'a f64;
+    type IntoIter = std::slice::Iter<'a, f64>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.iter()
+    }
+}
+
+impl<'a> IntoIterator for &'a mut Spans {
+    type Item = &'a mut f64;
+    type IntoIter = std::slice::IterMut<'a, f64>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.iter_mut()
+    }
+}
+
+impl<const N: usize> PartialEq<[f64; N]> for Spans {
+    fn eq(&self, other: &[f64; N]) -> bool {
+        self[..] == other[..]
+    }
+}
+
+impl fmt::Debug for Spans {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        self[..].fmt(f)
+    }
+}
