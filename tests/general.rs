@@ -6,9 +6,10 @@ use proptest::prelude::*;
 use taut::case::{Experiment, Initial};
 use taut::friction::{Friction, Law, Shape};
 use taut::machine::{BeltMake, Machine, Travel};
+use taut::mechanism::State;
 use taut::polyline::Polyline;
 use taut::signal::Signal;
-use taut::solve::{Ending, Solution, Solver, simulate};
+use taut::solve::{Dynamics, Ending, Solution, Solver, simulate};
 
 fn experiment(input: &Signal, until: f64, every: f64) -> Experiment {
     Experiment { name: "general".into(), input: input.clone(), until, every, initial: Initial::default(), log: None }
@@ -353,4 +354,40 @@ fn the_exact_solver_says_what_it_cannot_take() {
     assert!(refused(&following(Law::Coulomb)).starts_with("the belt's spans follow the cart"));
     assert_eq!(Solver::of(&stage_of(LAWS[3])), Solver::GENERAL);
     assert_eq!(Solver::of(&common::table4()), Solver::Exact);
+}
+
+/// Equations for another integrator counted no events: one that changed an input again and again filled the memory of
+/// whoever kept them.
+#[test]
+fn events_of_equations_for_another_integrator_are_bounded() {
+    let mut machine = common::table4();
+    machine.drives[0].amplifier.voltage_limit = Some(7.0);
+    let mut dynamics = Dynamics::new(&machine.mechanism(), &State::default()).unwrap();
+    let values = vec![0.0; dynamics.quantities().len()];
+    let mut events = Vec::new();
+    let mut count = 0;
+    let ending = (0..200_000_u32).find_map(|k| {
+        let volts = if k % 2 == 0 { 12.0 } else { -12.0 };
+        dynamics.put(1e-9 * f64::from(k), &values, &[volts, 0.0]);
+        let ending = dynamics.settle(&mut events).err();
+        count += events.len();
+        events.clear();
+        ending
+    });
+    assert!(matches!(ending, Some(Ending::TooManyEvents { .. })), "{ending:?} after {count} events");
+    // 1e5, and 1e7 a second more.
+    assert!((100_000..110_000).contains(&count), "{count}");
+}
+
+/// The same of a run: a limit that each edge of a fast square wave meets.
+#[test]
+fn events_of_a_run_are_bounded_as_those_of_the_exact_solver() {
+    let mut machine = common::table4();
+    machine.drives[0].amplifier.voltage_limit = Some(7.0);
+    let square = Signal::Square { amplitude: 12.0, frequency: 1e8, duty: 0.5 };
+    for solver in [Solver::Exact, Solver::GENERAL] {
+        let outcome = simulate(&machine, &experiment(&square, 0.002, 1e-3), solver).unwrap().outcome;
+        assert!(matches!(outcome.ending, Ending::TooManyEvents { .. }), "{:?}", outcome.ending);
+        assert!((100_000..130_000).contains(&outcome.events.len()), "{}", outcome.events.len());
+    }
 }

@@ -1,12 +1,10 @@
 //! The tables of a machine packed into lists of numbers: each row of weights once, and where each table finds its own.
 
 use super::tables::{ElementKind, Row, Tables, Then};
-use crate::mechanism::AmplifierMode;
 use std::collections::HashMap;
 
-/// The codes that follow a condition which ends a body's motion, or the run.
-pub(super) const STOP: i64 = -1;
-pub(super) const LEAVE: i64 = -2;
+/// The code that follows a condition which ends the run.
+pub(super) const LEAVE: i64 = -1;
 
 /// Tables as lists of numbers, counted from 0.
 #[derive(Debug, Clone, Default)]
@@ -18,22 +16,25 @@ pub(super) struct Packed {
     pub entry_first: Vec<i64>,
     pub depends: Vec<i64>,
     pub depends_first: Vec<i64>,
-    /// For each condition: its table, the element (−1 for none) and the state in which it is one, what follows, rank.
-    pub guards: Vec<[i64; 5]>,
-    /// For each element: states, kind (0 body, 1 gear, 2 limit, 3 limit of a current that is a state, 4 spring), what
-    /// it does at rest.
-    pub elements: Vec<[i64; 3]>,
-    /// Speeds that end with a body's: (element, place).
-    pub moves: Vec<[i64; 2]>,
-    /// Currents that a limit holds: (element, place), and the limit.
-    pub held: Vec<[i64; 2]>,
-    pub limits: Vec<f64>,
+    /// For each condition: its table; the element (−1 for none) and the state in which it is one; what follows; its
+    /// rank; and, where the load decides what follows, the conditions on the breakaway forward and backward (else −1).
+    pub guards: Vec<[i64; 7]>,
+    /// What the changes set: (condition, place), and the values.
+    pub resets: Vec<[i64; 2]>,
+    pub reset_values: Vec<f64>,
+    /// Gears that lose power: (element, table of the torque at rest). Loads on bodies at rest are those where such an
+    /// element does 0 if that torque is not negative, and 1 otherwise.
+    pub resting: Vec<[i64; 2]>,
+    /// For each element: states, and what it does at rest.
+    pub elements: Vec<[i64; 2]>,
     /// Places of each body's coordinate and speed, and the element of its motion (−1 for none).
     pub bodies: Vec<[i64; 3]>,
     /// Lengths in the places of angles: (body, other body or −1 for its own, arm).
     pub lengths: Vec<[f64; 3]>,
     /// Numbers of the first table of the currents, the voltages and the forces.
     pub outputs: [i64; 3],
+    /// Number of the first table that was asked for.
+    pub others: i64,
 }
 
 impl Packed {
@@ -43,22 +44,39 @@ impl Packed {
         tables.rates.iter().for_each(|row| {
             packed.add(row, &mut places);
         });
-        for guard in &tables.guards {
+        for (number, guard) in tables.guards.iter().enumerate() {
             let table = packed.add(&guard.row, &mut places);
             let (element, state) = guard.of.map_or((-1, 0), |(element, state)| (element as i64, state as i64));
-            let then = match guard.then {
-                Then::Become(code) => code as i64,
-                Then::Stop => STOP,
-                Then::Leave => LEAVE,
+            let ([forward, backward], then) = match (guard.then, guard.breakaways) {
+                (Then::Decide(rests), Some(both)) => (both.map(|number| number as i64), rests as i64),
+                (Then::Decide(code) | Then::Become(code), _) => ([-1, -1], code as i64),
+                (Then::Leave, _) => ([-1, -1], LEAVE),
             };
-            packed.guards.push([table, element, state, then, i64::from(guard.rank)]);
+            packed.guards.push([table, element, state, then, i64::from(guard.rank), forward, backward]);
+            for (place, value) in &guard.resets {
+                packed.resets.push([number as i64, *place as i64]);
+                packed.reset_values.push(*value);
+            }
         }
-        for (k, rows) in [&tables.currents, &tables.voltages, &tables.forces].into_iter().enumerate() {
+        let none = [Row { depends: Vec::new(), weights: vec![vec![0.0; tables.size()]], forms: Vec::new() }];
+        let forces = if tables.forces.is_empty() { &none[..] } else { &tables.forces };
+        for (k, rows) in [&*tables.currents, &tables.voltages, forces].into_iter().enumerate() {
             packed.outputs[k] = packed.entry_first.len() as i64;
             rows.iter().for_each(|row| {
                 packed.add(row, &mut places);
             });
         }
+        for (drive, row) in tables.resting_torque.iter().enumerate() {
+            let element = tables.elements.iter().position(|element| element.kind == ElementKind::GearTorque(drive));
+            if let (Some(row), Some(element)) = (row, element) {
+                let table = packed.add(row, &mut places);
+                packed.resting.push([element as i64, table]);
+            }
+        }
+        packed.others = packed.entry_first.len() as i64;
+        tables.others.iter().for_each(|row| {
+            packed.add(row, &mut places);
+        });
         packed.parts(tables);
         packed
     }
@@ -82,31 +100,8 @@ impl Packed {
     /// Elements and bodies.
     fn parts(&mut self, tables: &Tables) {
         let (mechanism, layout) = (&tables.mechanism, &tables.layout);
-        let at_rest = tables.at_rest();
-        for (index, element) in tables.elements.iter().enumerate() {
-            let kind = match element.kind {
-                ElementKind::Body(body) => {
-                    let speeds = mechanism.followers(body).map(|b| [index as i64, layout.speed[b] as i64]);
-                    self.moves.extend(speeds);
-                    0
-                }
-                ElementKind::GearTorque(_) => 1,
-                ElementKind::Current(drive) => {
-                    let amplifier = &mechanism.drives[drive].amplifier;
-                    match layout.current[drive].filter(|_| amplifier.mode == AmplifierMode::Voltage) {
-                        Some(place) => {
-                            self.held.push([index as i64, place as i64]);
-                            self.limits.push(amplifier.current_limit.unwrap_or(0.0));
-                            3
-                        }
-                        None => 2,
-                    }
-                }
-                ElementKind::Voltage(_) => 2,
-                ElementKind::Span(_) | ElementKind::Gap(_) | ElementKind::Line(_) => 4,
-            };
-            self.elements.push([element.states.len() as i64, kind, at_rest[index] as i64]);
-        }
+        let states = tables.elements.iter().map(|element| element.states.len() as i64);
+        self.elements = states.zip(tables.at_rest()).map(|(states, at_rest)| [states, at_rest as i64]).collect();
         for body in 0..mechanism.bodies.len() {
             let leader = mechanism.leader(body);
             let motion = tables.elements.iter().position(|e| e.kind == ElementKind::Body(leader));

@@ -12,7 +12,8 @@ mod maker;
 
 use crate::error::{Error, Result};
 use crate::friction::Motion;
-use crate::mechanism::{Cause, Contact, Form, Layout, Limit, Mechanism, Mode, SpringLaw, State, Status, Switch, What};
+use crate::mechanism::{self, Cause, Contact, Form, Layout, Limit, Mechanism, Mode, Next, SpringLaw, State, Status};
+use crate::mechanism::{Switch, What};
 use maker::Maker;
 
 /// A part that can do several things.
@@ -63,6 +64,18 @@ pub enum Does {
 }
 
 impl Does {
+    /// What a part does next.
+    fn next(next: Next) -> Self {
+        match next {
+            Next::Moves(_, motion) => Does::Moves(motion),
+            Next::Torque(_, positive) => Does::Torque(positive),
+            Next::Switch(Switch::Span(_, slack)) => Does::Slack(slack),
+            Next::Switch(Switch::Gap(_, contact)) => Does::Touches(contact),
+            Next::Switch(Switch::Line(_, piece)) => Does::Follows(piece),
+            Next::Switch(Switch::Voltage(_, limit) | Switch::Current(_, limit)) => Does::Limits(limit),
+        }
+    }
+
     /// The word for it.
     pub fn word(self) -> &'static str {
         match self {
@@ -97,12 +110,20 @@ pub struct TableGuard {
     pub of: Option<(usize, usize)>,
     /// The change that follows where it falls.
     pub then: Then,
-    /// Which of several that have fallen at one instant is settled first.
+    /// Which of several that have fallen at one instant is settled first: the one of least rank.
     pub rank: u8,
     /// Which tolerance is its own; none for one that has none.
     pub slot: Option<usize>,
     /// Which note that it starts from zero is its own.
     pub fresh: usize,
+    /// Places of z that the change sets, and their values.
+    pub resets: Vec<(usize, f64)>,
+    /// Of a body: the numbers of the conditions on its breakaway, forward and backward.
+    pub breakaways: Option<[usize; 2]>,
+    /// Of a breakaway: by how much it exceeds the Coulomb friction on that side.
+    pub drop: f64,
+    /// The note of the condition that starts with a slope of zero where the motion has let the part go.
+    pub gently: Option<usize>,
     /// Its value.
     pub row: Row,
 }
@@ -110,8 +131,8 @@ pub struct TableGuard {
 /// The change that follows where a condition falls.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Then {
-    /// A body stops: what it does then its load decides.
-    Stop,
+    /// A body stops: it goes on as the breakaway has it that its load passes, or does this, by its code: it rests.
+    Decide(usize),
     /// The element does this, by its code.
     Become(usize),
     /// The run ends: something left its travel.
@@ -258,7 +279,7 @@ impl Tables {
     }
 
     /// The code that a column shows of what an element does.
-    pub(super) fn shown_code(does: Does) -> i8 {
+    pub fn shown_code(does: Does) -> i8 {
         match does {
             Does::Moves(motion) => Status::Motion(motion).code(),
             Does::Torque(positive) => i8::from(positive),
@@ -354,20 +375,13 @@ impl Element {
         self.states.iter().position(|own| *own == does).unwrap_or(0)
     }
 
-    /// The code of what it does where this condition on it falls.
-    fn after(&self, state: usize, cause: Cause) -> Then {
-        let to = match cause {
-            Cause::Stop(_) => return Then::Stop,
-            Cause::Leave(_) => return Then::Leave,
-            Cause::BreakForward(_) => Does::Moves(Motion::Forward),
-            Cause::BreakBackward(_) => Does::Moves(Motion::Backward),
-            Cause::GearTorque(_) => return Then::Become(1 - state),
-            Cause::Switch(Switch::Span(_, slack)) => Does::Slack(slack),
-            Cause::Switch(Switch::Gap(_, contact)) => Does::Touches(contact),
-            Cause::Switch(Switch::Line(_, piece)) => Does::Follows(piece),
-            Cause::Switch(Switch::Voltage(_, limit) | Switch::Current(_, limit)) => Does::Limits(limit),
-        };
-        Then::Become(self.code(to))
+    /// The next state of it, by its code.
+    fn then(&self, then: mechanism::Then) -> Then {
+        match then {
+            mechanism::Then::Become(next) => Then::Become(self.code(Does::next(next))),
+            mechanism::Then::Decide(_) => Then::Decide(self.code(Does::Moves(Motion::Stuck))),
+            mechanism::Then::Leave => Then::Leave,
+        }
     }
 }
 

@@ -18,6 +18,7 @@ pub mod input;
 pub mod law;
 pub mod loops;
 pub mod machine;
+pub mod replay;
 pub mod root;
 pub mod series;
 pub mod solve;

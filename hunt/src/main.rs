@@ -9,6 +9,7 @@ use std::time::Instant;
 use taut_hunt::answer::By;
 use taut_hunt::compare::compare;
 use taut_hunt::draw;
+use taut_hunt::replay::{self, Tool};
 use taut_hunt::stages::{self, Drawing, Hunt};
 
 /// Hunts for wrong answers of taut.
@@ -25,6 +26,24 @@ enum Part {
     Stages(Stages),
     /// Cases in which each pair of features occurs, curved ones, gantries, loops and exports among them.
     Pairs(Stages),
+    /// Drawn machines event by event: exported C, Python and MATLAB against the exact solver.
+    Replay(Replay),
+}
+
+#[derive(clap::Args)]
+struct Replay {
+    /// How many.
+    #[arg(long, default_value_t = 300)]
+    machines: usize,
+    /// Which ones; the same seed gives the same.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// The number of the first one.
+    #[arg(long, default_value_t = 0)]
+    first: u64,
+    /// c, python or octave; all that are there unless said. Several with commas.
+    #[arg(long, value_delimiter = ',')]
+    tool: Vec<String>,
 }
 
 #[derive(clap::Args)]
@@ -65,6 +84,32 @@ fn main() -> ExitCode {
     match Arguments::parse().part {
         Part::Stages(arguments) => arguments.run(Drawing::Stages),
         Part::Pairs(arguments) => arguments.run(Drawing::Pairs),
+        Part::Replay(arguments) => arguments.run(),
+    }
+}
+
+impl Replay {
+    fn run(&self) -> ExitCode {
+        let machines = replay::machines(self.seed, self.first, self.machines);
+        let mut status = ExitCode::SUCCESS;
+        for tool in Tool::ALL {
+            let is_asked = self.tool.is_empty() || self.tool.iter().any(|name| name == tool.name());
+            let Some(program) = tool.program().filter(|_| is_asked) else { continue };
+            match replay::replay(tool, &program, &machines) {
+                Ok(result) => {
+                    result.different.iter().for_each(|told| println!("# {told}"));
+                    println!("{}", result.told(tool));
+                    if !result.different.is_empty() {
+                        status = ExitCode::FAILURE;
+                    }
+                }
+                Err(error) => {
+                    eprintln!("error: {error}");
+                    status = ExitCode::from(2);
+                }
+            }
+        }
+        status
     }
 }
 

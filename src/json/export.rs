@@ -127,7 +127,7 @@ fn equations(tables: &Tables) -> Value {
     };
     let guard = |guard: &export::TableGuard| {
         let then = match guard.then {
-            Then::Stop => "stop".to_string(),
+            Then::Decide(_) => "stop".to_string(),
             Then::Leave => "leave".to_string(),
             Then::Become(code) => {
                 let of = guard.of.map(|(element, _)| &tables.elements[element]);

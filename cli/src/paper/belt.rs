@@ -71,7 +71,7 @@ impl Belt {
         let composite = composite_modulus(&PARTS);
         let row = |table, symbol, printed: f64, half_digit, modulus: f64, share: f64, third: bool| {
             let of = |modulus: f64, (l1, l3): (f64, f64)| {
-                let k = BeltMake { modulus, section: SECTION, spans: [l1, l1, l3] }.stiffness().three();
+                let k = BeltMake { modulus, section: SECTION, spans: [l1, l1, l3].into() }.stiffness().three();
                 if third { k[2] } else { k[0] }
             };
             let length = if third { PRINTED.1 } else { PRINTED.0 };

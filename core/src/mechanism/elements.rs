@@ -207,7 +207,8 @@ impl Mechanism {
 
     /// The conditions under which limits and springs stay as they are in `mode`.
     pub(super) fn watch_elements(&self, mode: &Mode, guards: &mut Vec<Guard>) {
-        let mut watch = |form: Form, cause: Cause| guards.push(Guard { form, cause });
+        let mut watch =
+            |form: Form, cause: Cause| guards.push(Guard { form, transition: self.transition(cause, mode) });
         for drive in 0..self.drives.len() {
             let mut switch = |form: Form, switch: Switch| watch(form, Cause::Switch(switch));
             self.watch_limits(drive, mode, &mut switch);

@@ -231,6 +231,7 @@ impl Mechanism {
         let mut acceleration = [Form::ZERO; BODIES];
         let inertia = self.inertia(&mode);
         let mut guards = Vec::with_capacity(8);
+        let guard = |form: Form, cause: Cause| Guard { form, transition: self.transition(cause, &mode) };
         // Where no gear loses power, what acts on a body at rest is the same whichever way it would go.
         let loses = self.drives.iter().any(Drive::loses);
         let (forces, mut loads) = (self.forces(&mode), [Form::ZERO; BODIES]);
@@ -250,11 +251,11 @@ impl Mechanism {
             let own = match motion {
                 Motion::Free => sliding(law.forward, 0.0),
                 Motion::Forward => {
-                    guards.push(Guard { form: Form::speed(body), cause: Cause::Stop(body) });
+                    guards.push(guard(Form::speed(body), Cause::Stop(body)));
                     sliding(law.forward, 1.0)
                 }
                 Motion::Backward => {
-                    guards.push(Guard { form: -Form::speed(body), cause: Cause::Stop(body) });
+                    guards.push(guard(-Form::speed(body), Cause::Stop(body)));
                     sliding(law.backward, -1.0)
                 }
                 Motion::Stuck => {
@@ -262,8 +263,8 @@ impl Mechanism {
                         (-load, if loses { self.load_by(&forces, body, false, &mode) } else { load });
                     ahead.constant += law.forward.breakaway;
                     back.constant += law.backward.breakaway;
-                    guards.push(Guard { form: ahead, cause: Cause::BreakForward(body) });
-                    guards.push(Guard { form: back, cause: Cause::BreakBackward(body) });
+                    guards.push(guard(ahead, Cause::BreakForward(body)));
+                    guards.push(guard(back, Cause::BreakBackward(body)));
                     Form::ZERO
                 }
             };
@@ -276,7 +277,7 @@ impl Mechanism {
             if let Some(torque) = self.gear_torque(drive, &mode, &acceleration) {
                 let sign = if mode.drive[drive].torque_positive { 1.0 } else { -1.0 };
                 // First, because the loads that the others watch depend on it.
-                guards.insert(0, Guard { form: torque * sign, cause: Cause::GearTorque(drive) });
+                guards.insert(0, guard(torque * sign, Cause::GearTorque(drive)));
             }
         }
         self.watch_elements(&mode, &mut guards);

@@ -17,6 +17,7 @@ mod layout;
 mod mode;
 mod nudge;
 mod power;
+mod transition;
 
 pub use drive::{Amplifier, AmplifierMode, GearPlay, Motor};
 pub use equations::Equations;
@@ -25,6 +26,7 @@ pub use form::ROUNDING;
 pub use layout::{Layout, Replaced};
 pub use mode::{Cause, Contact, DriveMode, Guard, Limit, Mode, Part, Status, Switch, What};
 pub use power::Power;
+pub use transition::{After, Next, Place, Resets, Then, Transition};
 
 use crate::friction::Friction;
 use crate::polyline::Polyline;

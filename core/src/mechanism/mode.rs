@@ -1,6 +1,6 @@
 //! Modes: which linear equations hold, what ends them, and what follows.
 
-use super::{BODIES, DRIVES, Form, Label, Mechanism, SPRINGS};
+use super::{BODIES, DRIVES, Form, Label, Mechanism, SPRINGS, Transition};
 use crate::friction::Motion;
 
 /// Which linear equations hold: what each body, each spring and each drive does.
@@ -234,8 +234,8 @@ impl PartialEq<Motion> for Status {
 pub struct Guard {
     /// The form that must not become negative.
     pub form: Form,
-    /// The cause of the change where it does.
-    pub cause: Cause,
+    /// What follows where it does.
+    pub transition: Transition,
 }
 
 /// Why a mode ends.

@@ -14,6 +14,7 @@ mod propagator;
 mod record;
 mod roots;
 mod rounding;
+mod rules;
 mod run;
 mod saved;
 mod sensitivity;

@@ -7,15 +7,14 @@
 
 @tables@
 
-#define STUCK 1U
 #define NONE 255U
-#define STOP 254U
 #define LEAVE 255U
-#define BODY 0U
-#define GEAR 1U
-#define LIMIT 2U
-#define CURRENT_STATE 3U
-#define SPRING 4U
+/* Codes of a body's motion: backward is 0. */
+#define STUCK 1U
+#define FORWARD 2U
+/* Ranks of guards. */
+#define RANK_GEARS 2U
+#define RANK_BODIES 3U
 
 /* Changes at one instant after which a body that stops rests. */
 #define TURNS_AT_ONCE 8U
@@ -124,20 +123,27 @@ static const @name@_real *resting_row(uint32_t guard)
     for (k = 0U; k < ELEMENTS; k++) {
         does[k] = plant.does[k];
     }
-    for (k = 0U; k < ELEMENTS; k++) {
-        if (ELEMENT_KIND[k] == GEAR) {
-            does[k] = (uint8_t)((value_of(row_of(ELEMENT_DATA[k], plant.does)) >= R(0.0)) ? 0U : 1U);
-        }
+    for (k = 0U; k < RESTINGS; k++) {
+        does[RESTING[k].element] = (uint8_t)((value_of(row_of(RESTING[k].table, plant.does)) >= R(0.0)) ? 0U : 1U);
     }
     return row_of(GUARD[guard].table, does);
 }
 
+/* Whether a guard is that of a body's breakaway. */
+static int is_breakaway(uint32_t guard)
+{
+    return (GUARD[guard].forward != NONE) && (GUARD[guard].decides == 0U);
+}
+
 static uint32_t fresh_order(uint32_t guard)
 {
-    return ((GUARD[guard].element != NONE) && (GUARD[guard].then != STOP) &&
-            (ELEMENT_KIND[GUARD[guard].element] == BODY))
-               ? 0U
-               : (uint32_t)plant.fresh[GUARD[guard].fresh];
+    return is_breakaway(guard) ? 0U : (uint32_t)plant.fresh[GUARD[guard].fresh];
+}
+
+static void start_fresh(uint32_t note, uint32_t order)
+{
+    plant.fresh[note] = (uint8_t)order;
+    plant.is_fresh = 1U;
 }
 
 static void refreshed(void)
@@ -458,7 +464,7 @@ static uint32_t advance(@name@_real distance, @name@_real *used)
 }
 
 /* A condition on an element that has just become one is zero where it is that but for rounding. */
-static void tolerate(uint32_t element)
+static void hold_part(uint32_t element)
 {
     uint32_t k;
     for (k = 0U; k < plant.active_count; k++) {
@@ -466,77 +472,62 @@ static void tolerate(uint32_t element)
         if (GUARD[guard].element == element) {
             const @name@_real now = value_of(plant.row[k]);
             const @name@_real noise = noise_of(plant.row[k]);
-            const uint32_t slot = GUARD[guard].fresh;
-            plant.tolerance[slot] = R(0.0);
-            plant.fresh[slot] = 0U;
+            @name@_real forgiven = R(0.0);
+            uint32_t order = 0U;
             if (size_of(now) > (R(20.0) * noise)) {
-                if ((ELEMENT_KIND[element] == GEAR) && (plant.changes > TURNS_AT_ONCE)) {
-                    plant.tolerance[slot] = R(2.0) * size_of(now);
+                if ((GUARD[guard].rank == RANK_GEARS) && (plant.changes > TURNS_AT_ONCE)) {
+                    forgiven = R(2.0) * size_of(now);
                 }
             } else if (plant.changes <= TURNS_AT_ONCE) {
-                plant.tolerance[slot] = (now < R(0.0)) ? -now : R(0.0);
-                plant.fresh[slot] = 1U;
+                forgiven = (now < R(0.0)) ? -now : R(0.0);
+                order = 1U;
             } else {
-                plant.tolerance[slot] = R(40.0) * noise;
+                forgiven = R(40.0) * noise;
             }
-            plant.is_fresh = 1U;
+            plant.tolerance[GUARD[guard].fresh] = forgiven;
+            start_fresh(GUARD[guard].fresh, order);
         }
     }
 }
 
-/* The motion of a body at zero speed under its load. */
-static uint32_t decide(uint32_t element)
+/* What a body at zero speed does under its load, which may let it do as its guard says. */
+static uint32_t decide(uint32_t guard)
 {
-    const @name@_real *forward = resting_row(BODY_DATA[ELEMENT_DATA[element]].break_forward);
-    const @name@_real *backward = resting_row(BODY_DATA[ELEMENT_DATA[element]].break_backward);
-    uint32_t to = STUCK;
+    const @name@_real *forward = resting_row(GUARD[guard].forward);
+    const @name@_real *backward = resting_row(GUARD[guard].backward);
+    uint32_t to = GUARD[guard].then;
     if (value_of(forward) < -noise_of(forward)) {
-        to = 2U;
+        to = GUARD[GUARD[guard].forward].then;
     } else if (value_of(backward) < -noise_of(backward)) {
-        to = 0U;
+        to = GUARD[GUARD[guard].backward].then;
     } else {
         /* it stays */
     }
     return to;
 }
 
-static void change_body(uint32_t guard)
+/* The load on a body that goes from one motion to another may pass its breakaways by rounding. */
+static void widen_breakaways(uint32_t guard, uint32_t from, uint32_t to)
 {
-    const uint32_t element = GUARD[guard].element;
-    const uint32_t body = ELEMENT_DATA[element];
-    const uint32_t from = plant.does[element];
-    uint32_t to = GUARD[guard].then;
-    uint32_t side;
-    uint32_t k;
-    const @name@_real *row;
-    @name@_real noise;
-    @name@_real excess;
-    if (to == STOP) {
-        for (k = BODY_DATA[body].moves_first; k < BODY_DATA[body].moves_end; k++) {
-            plant.z[MOVES[k]] = R(0.0);
-            plant.carry[MOVES[k]] = R(0.0);
-        }
-        to = (plant.changes > TURNS_AT_ONCE) ? STUCK : decide(element);
-    }
+    const uint32_t forward = GUARD[guard].forward;
+    const uint32_t backward = GUARD[guard].backward;
     /* Where it stops, the load is the one on the side it came from. */
-    side = (to == STUCK) ? from : to;
-    row = resting_row((side != 0U) ? BODY_DATA[body].break_forward : BODY_DATA[body].break_backward);
-    noise = noise_of(row);
-    excess = ((side != 0U) ? BODY_DATA[body].drop_forward : BODY_DATA[body].drop_backward) - value_of(row);
+    const uint32_t side = (((to == STUCK) ? from : to) != 0U) ? forward : backward;
+    const @name@_real *row = resting_row(side);
+    const @name@_real noise = noise_of(row);
+    const @name@_real excess = GUARD[side].drop - value_of(row);
+    uint32_t order = 1U;
     if (to == STUCK) {
-        plant.fresh[BODY_DATA[body].fresh] = 0U;
-    } else if ((GUARD[guard].then != STOP) && (size_of(excess) <= (R(2.0) * noise))) {
+        order = 0U;
+    } else if ((GUARD[guard].decides == 0U) && (size_of(excess) <= (R(2.0) * noise))) {
         /* Where breakaway equals Coulomb friction the acceleration starts from zero, but for rounding. */
-        plant.fresh[BODY_DATA[body].fresh] = 2U;
+        order = 2U;
     } else {
-        plant.fresh[BODY_DATA[body].fresh] = 1U;
+        /* it is accelerated */
     }
-    plant.is_fresh = 1U;
-    noise *= (plant.changes > TURNS_AT_ONCE) ? R(20.0) : R(2.0);
-    plant.tolerance[GUARD[BODY_DATA[body].break_forward].slot] = noise;
-    plant.tolerance[GUARD[BODY_DATA[body].break_backward].slot] = noise;
-    plant.does[element] = (uint8_t)to;
-    take_up_mode();
+    start_fresh(GUARD[forward].fresh, order);
+    plant.tolerance[GUARD[forward].slot] = ((plant.changes > TURNS_AT_ONCE) ? R(20.0) : R(2.0)) * noise;
+    plant.tolerance[GUARD[backward].slot] = plant.tolerance[GUARD[forward].slot];
 }
 
 /* Goes into the mode that follows where a guard, the k-th active one, falls. */
@@ -544,7 +535,9 @@ static void change(uint32_t k)
 {
     const uint32_t guard = plant.active[k];
     const uint32_t element = GUARD[guard].element;
-    const int gently = size_of(value_of(plant.row[k])) <= (R(20.0) * noise_of(plant.row[k]));
+    const int begun = size_of(value_of(plant.row[k])) <= (R(20.0) * noise_of(plant.row[k]));
+    uint32_t to = GUARD[guard].then;
+    uint32_t i;
     plant.changes = (plant.since_change <= MOMENT) ? (plant.changes + 1U) : 0U;
     plant.since_change = R(0.0);
     if ((plant.events - plant.begin) >= @NAME@_EVENTS) {
@@ -552,29 +545,27 @@ static void change(uint32_t k)
         return;
     }
     plant.events++;
-    if (GUARD[guard].then == LEAVE) {
+    if (to == LEAVE) {
         plant.status = @NAME@_LEFT_TRAVEL;
-    } else if (ELEMENT_KIND[element] == BODY) {
-        change_body(guard);
-    } else {
-        const uint32_t before = plant.does[element];
-        plant.does[element] = GUARD[guard].then;
-        take_up_mode();
-        if ((ELEMENT_KIND[element] == CURRENT_STATE) && (plant.does[element] != 1U)) {
-            /* The current stands at its limit, to the last bit. */
-            const @name@_real limit = LIMIT_DATA[ELEMENT_DATA[element]].limit;
-            plant.z[LIMIT_DATA[ELEMENT_DATA[element]].place] = (plant.does[element] == 0U) ? -limit : limit;
-            plant.carry[LIMIT_DATA[ELEMENT_DATA[element]].place] = R(0.0);
-        }
-        tolerate(element);
-        if ((ELEMENT_KIND[element] == CURRENT_STATE) && (plant.does[element] == 1U) && gently) {
-            /* Let go by the motion, a current leaves its limit with no rate of its own. */
-            for (k = 0U; k < plant.active_count; k++) {
-                if ((GUARD[plant.active[k]].element == element) && (GUARD[plant.active[k]].then == before)) {
-                    plant.fresh[GUARD[plant.active[k]].fresh] = 2U;
-                    plant.is_fresh = 1U;
-                }
-            }
+        return;
+    }
+    for (i = GUARD[guard].resets_first; i < GUARD[guard].resets_end; i++) {
+        plant.z[RESET[i].place] = RESET[i].value;
+        plant.carry[RESET[i].place] = R(0.0);
+    }
+    if ((GUARD[guard].decides != 0U) && (plant.changes <= TURNS_AT_ONCE)) {
+        to = decide(guard);
+    }
+    if (GUARD[guard].forward != NONE) {
+        widen_breakaways(guard, plant.does[element], to);
+    }
+    plant.does[element] = (uint8_t)to;
+    take_up_mode();
+    if (GUARD[guard].forward == NONE) {
+        hold_part(element);
+        if ((GUARD[guard].gently != NONE) && begun) {
+            /* Let go by the motion and not by an edge of the input, a current leaves its limit with no rate. */
+            start_fresh(GUARD[guard].gently, 2U);
         }
     }
 }
@@ -622,13 +613,13 @@ static void settle(void)
     /* A turn changes a mode, or is the one at the edge, or the last. */
     for (turn = 0U; (turn < (@NAME@_EVENTS + 3U)) && (!settled) && (plant.status == @NAME@_DONE); turn++) {
         const uint32_t fallen = fallen_guard();
-        const int is_last = (fallen == NONE) || (GUARD[plant.active[fallen]].rank == 3U);
+        const int is_last = (fallen == NONE) || (GUARD[plant.active[fallen]].rank == RANK_BODIES);
         if ((plant.at_edge != 0U) && is_last) {
             /* The loads on bodies are known now: one that passes a breakaway by rounding alone does not break it. */
             plant.at_edge = 0U;
             for (k = 0U; k < plant.active_count; k++) {
                 const uint32_t guard = plant.active[k];
-                if ((GUARD[guard].rank == 3U) && (GUARD[guard].then != STOP)) {
+                if (is_breakaway(guard)) {
                     const @name@_real noise = R(2.0) * noise_of(plant.row[k]);
                     if (noise > plant.tolerance[GUARD[guard].slot]) {
                         plant.tolerance[GUARD[guard].slot] = noise;
@@ -645,10 +636,9 @@ static void settle(void)
     if (settled) {
         for (k = 0U; k < plant.active_count; k++) {
             const uint32_t guard = plant.active[k];
-            if ((GUARD[guard].rank == 2U) &&
+            if ((GUARD[guard].rank == RANK_GEARS) &&
                 (size_of(value_of(plant.row[k])) <= (R(2.0) * noise_of(plant.row[k])))) {
-                plant.fresh[GUARD[guard].fresh] = 1U;
-                plant.is_fresh = 1U;
+                start_fresh(GUARD[guard].fresh, 1U);
             }
         }
     } else if (plant.status == @NAME@_DONE) {
@@ -694,9 +684,9 @@ void @name@_start(const @name@_real position[@NAME@_BODIES], const @name@_real s
     }
     for (i = 0U; i < ELEMENTS; i++) {
         plant.does[i] = AT_REST[i];
-        if (ELEMENT_KIND[i] == BODY) {
-            const @name@_real now = plant.z[MOVES[BODY_DATA[ELEMENT_DATA[i]].moves_first]];
-            plant.does[i] = (uint8_t)((now > R(0.0)) ? 2U : ((now < R(0.0)) ? 0U : STUCK));
+        if (ELEMENT_SPEED[i] != NONE) {
+            const @name@_real now = plant.z[ELEMENT_SPEED[i]];
+            plant.does[i] = (uint8_t)((now > R(0.0)) ? FORWARD : ((now < R(0.0)) ? 0U : STUCK));
         }
     }
     for (i = 0U; i <= SLOTS; i++) {

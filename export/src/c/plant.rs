@@ -1,12 +1,10 @@
 //! The plant in C: its tables, and the solver around them.
 
 use super::{Writer, number, plain};
+use crate::Real;
 use crate::error::{Error, Result};
-use crate::friction::Motion;
-use crate::mechanism::AmplifierMode;
-use crate::tables::{Element, ElementKind, Row, Tables, Then};
-use crate::{Does, Real};
-use std::collections::HashMap;
+use crate::packed::Packed;
+use crate::tables::{Element, ElementKind, Tables, Then};
 use std::fmt::Write;
 
 /// Events that a step may have before it is given up.
@@ -25,6 +23,9 @@ const NEWTON: usize = 8;
 
 /// Halvings that all series of a step may have.
 const HALVINGS_OF_STEP: usize = 64;
+
+/// No element, no guard, no note, no place; of what follows, the end of the run.
+const NONE: usize = 255;
 
 /// The type of its numbers, before the name is filled in.
 const REAL: &str = "@name@_real";
@@ -59,34 +60,6 @@ impl std::ops::Mul<usize> for Work {
 
     fn mul(self, times: usize) -> Self {
         Self(self.0 * times, self.1 * times)
-    }
-}
-
-/// The rows of weights of all tables, each once.
-#[derive(Default)]
-struct Pool {
-    weights: Vec<Vec<f64>>,
-    places: HashMap<Vec<u64>, usize>,
-    /// For each table, where its entries begin, and what it depends on.
-    first: Vec<usize>,
-    depends: Vec<Vec<usize>>,
-    entries: Vec<usize>,
-}
-
-impl Pool {
-    /// Adds a table and returns its number.
-    fn add(&mut self, row: &Row) -> usize {
-        self.first.push(self.entries.len());
-        self.depends.push(row.depends.clone());
-        for weights in &row.weights {
-            let bits = weights.iter().map(|w| (w + 0.0).to_bits()).collect();
-            let place = *self.places.entry(bits).or_insert_with(|| {
-                self.weights.push(weights.clone());
-                self.weights.len() - 1
-            });
-            self.entries.push(place);
-        }
-        self.first.len() - 1
     }
 }
 
@@ -234,35 +207,9 @@ impl<'t> Plant<'t> {
     /// All tables.
     fn tables(&self) -> String {
         let tables = self.tables;
-        let mut pool = Pool::default();
-        tables.rates.iter().for_each(|row| {
-            pool.add(row);
-        });
-        let guards: Vec<usize> = tables.guards.iter().map(|guard| pool.add(&guard.row)).collect();
-        let currents = pool.first.len();
-        tables.currents.iter().for_each(|row| {
-            pool.add(row);
-        });
-        let voltages = pool.first.len();
-        tables.voltages.iter().for_each(|row| {
-            pool.add(row);
-        });
-        let forces = pool.first.len();
-        let none = Row { depends: Vec::new(), weights: vec![vec![0.0; tables.size()]], forms: Vec::new() };
-        match tables.forces.is_empty() {
-            true => {
-                pool.add(&none);
-            }
-            false => tables.forces.iter().for_each(|row| {
-                pool.add(row);
-            }),
-        }
-        let resting: Vec<usize> =
-            tables.resting_torque.iter().map(|row| row.as_ref().map_or(0, |row| pool.add(row))).collect();
-        let others = pool.first.len();
-        tables.others.iter().for_each(|row| {
-            pool.add(row);
-        });
+        let packed = Packed::new(tables);
+        let [currents, voltages, forces] = packed.outputs;
+        let others = packed.others;
 
         let mut text = String::new();
         let mut define = |word: &str, value: String| {
@@ -297,6 +244,7 @@ impl<'t> Plant<'t> {
             ("ELEMENTS", tables.elements.len()),
             ("GUARDS", tables.guards.len()),
             ("SLOTS", tables.slots),
+            ("RESTINGS", packed.resting.len()),
             ("REPLACED", layout.replaced.len()),
         ] {
             let _ = writeln!(text, "static const uint32_t {word} = {count}U;");
@@ -306,116 +254,83 @@ impl<'t> Plant<'t> {
         text += &list(REAL, "RECIPROCAL", reciprocal);
         let _ = writeln!(text, "\n/* Rows of weights on z, and which of them each table has: see row_of. */");
         let _ = writeln!(text, "static const {REAL} WEIGHT[][SIZE] = {{");
-        for weights in &pool.weights {
-            let row: Vec<String> = weights.iter().map(|w| self.number(w + 0.0)).collect();
+        for weights in &packed.weights {
+            let row: Vec<String> = weights.iter().map(|w| self.number(*w)).collect();
             let _ = writeln!(text, "    {{{}}},", row.join(", "));
         }
         let _ = writeln!(text, "}};");
         let whole = |values: &[usize]| values.iter().map(|v| format!("{v}U")).collect::<Vec<_>>();
-        text += &list("uint16_t", "ENTRY", whole(&pool.entries));
-        text += &list("uint16_t", "ENTRY_FIRST", whole(&pool.first));
-        let mut ends = vec![0];
-        pool.depends.iter().for_each(|depends| ends.push(ends.last().unwrap_or(&0) + depends.len()));
-        text += &list("uint16_t", "DEPENDS_FIRST", whole(&ends));
-        text += &list("uint8_t", "DEPENDS", whole(&pool.depends.concat()));
-        text += &self.elements(&resting, &whole);
-        text += &self.guards(&guards);
+        let counted = |values: &[i64]| values.iter().map(|v| format!("{v}U")).collect::<Vec<_>>();
+        text += &list("uint16_t", "ENTRY", counted(&packed.entry));
+        text += &list("uint16_t", "ENTRY_FIRST", counted(&packed.entry_first));
+        text += &list("uint16_t", "DEPENDS_FIRST", counted(&packed.depends_first));
+        text += &list("uint8_t", "DEPENDS", counted(&packed.depends));
+        text += &self.elements(&packed, &whole);
+        text += &self.guards(&packed);
         text += &self.places(&whole);
         text
     }
 
-    /// Elements, bodies among them, and limits of currents that are states.
-    fn elements(&self, resting: &[usize], whole: &dyn Fn(&[usize]) -> Vec<String>) -> String {
+    /// Elements, and gears that lose power.
+    fn elements(&self, packed: &Packed, whole: &dyn Fn(&[usize]) -> Vec<String>) -> String {
         let tables = self.tables;
-        let mechanism = &tables.mechanism;
-        let (mut kinds, mut data) = (Vec::new(), Vec::new());
-        let (mut bodies, mut limits, mut moves) = (Vec::new(), Vec::new(), Vec::new());
-        for (index, element) in tables.elements.iter().enumerate() {
-            let (kind, datum) = match element.kind {
-                ElementKind::Body(body) => {
-                    let first = moves.len();
-                    let others = mechanism.followers(body).filter(|other| *other != body);
-                    moves.extend(std::iter::once(body).chain(others).map(|b| tables.layout.speed[b]));
-                    bodies.push(self.body(index, body, (first, moves.len())));
-                    (0, bodies.len() - 1)
-                }
-                ElementKind::GearTorque(drive) => (1, resting[drive]),
-                ElementKind::Current(drive) => {
-                    let part = &mechanism.drives[drive];
-                    match tables.layout.current[drive] {
-                        Some(place) if part.amplifier.mode == AmplifierMode::Voltage => {
-                            let limit = part.amplifier.current_limit.unwrap_or(0.0);
-                            limits.push(format!("{{{}, {place}U}}", self.number(limit)));
-                            (3, limits.len() - 1)
-                        }
-                        _ => (2, 0),
-                    }
-                }
-                ElementKind::Voltage(_) => (2, 0),
-                ElementKind::Span(_) | ElementKind::Gap(_) | ElementKind::Line(_) => (4, 0),
-            };
-            kinds.push(kind);
-            data.push(datum);
-        }
         let states: Vec<usize> = tables.elements.iter().map(|element| element.states.len()).collect();
-        let mut text = String::from("\n/* Elements: how many things each can do, and what kind it is. */\n");
-        text += &list("uint8_t", "ELEMENT_STATES", whole(&states));
-        text += &list("uint8_t", "ELEMENT_KIND", whole(&kinds));
-        text += &list("uint16_t", "ELEMENT_DATA", whole(&data));
-        text += &list("uint8_t", "AT_REST", whole(&tables.at_rest()));
-        text += &format!(
-            "\nstatic const struct {{\n    {REAL} drop_forward; /* breakaway above Coulomb friction */\n    {REAL} \
-             drop_backward;\n    uint8_t break_forward; /* guards */\n    uint8_t break_backward;\n    uint8_t fresh;\n    \
-             uint8_t moves_first; /* speeds that end with its own */\n    uint8_t moves_end;\n}} BODY_DATA[] = "
+        let speed = |element: &Element| match element.kind {
+            ElementKind::Body(body) => tables.layout.speed[body],
+            _ => NONE,
+        };
+        let speeds: Vec<usize> = tables.elements.iter().map(speed).collect();
+        let mut text = String::from(
+            "\n/* Elements: how many things each can do, what it does at rest, and the place of the speed whose sign says \
+             how a body moves. */\n",
         );
-        text += &records(&bodies, "{0, 0, 0U, 0U, 0U, 0U, 0U}");
-        text += &list("uint8_t", "MOVES", whole(&moves));
-        text += &format!("static const struct {{\n    {REAL} limit;\n    uint8_t place;\n}} LIMIT_DATA[] = ");
-        text += &records(&limits, "{0, 0U}");
+        text += &list("uint8_t", "ELEMENT_STATES", whole(&states));
+        text += &list("uint8_t", "AT_REST", whole(&tables.at_rest()));
+        text += &list("uint8_t", "ELEMENT_SPEED", whole(&speeds));
+        text += "\n/* Gears that lose power: element, and table of the torque at rest. */\nstatic const struct {\n    \
+                 uint16_t table;\n    uint8_t element;\n} RESTING[] = ";
+        let resting = packed.resting.iter().map(|[element, table]| format!("{{{table}U, {element}U}}"));
+        text += &records(&resting.collect::<Vec<_>>(), "{0U, 0U}");
         text
     }
 
-    fn body(&self, index: usize, body: usize, (first, end): (usize, usize)) -> String {
+    /// Conditions and what follows them.
+    fn guards(&self, packed: &Packed) -> String {
         let tables = self.tables;
-        let law = tables.mechanism.friction(body);
-        let code = |does: Does| tables.elements[index].states.iter().position(|own| *own == does).unwrap_or(0);
-        let breaks = |to: Motion| {
-            let then = Then::Become(code(Does::Moves(to)));
-            tables
-                .guards
-                .iter()
-                .position(|guard| guard.of == Some((index, code(Does::Moves(Motion::Stuck)))) && guard.then == then)
-        };
-        let [forward, backward] = [Motion::Forward, Motion::Backward].map(|to| breaks(to).unwrap_or(0));
-        let stop = tables
-            .guards
-            .iter()
-            .find(|guard| guard.then == Then::Stop && guard.of.is_some_and(|(element, _)| element == index));
-        let fresh = stop.map_or(0, |guard| guard.fresh);
-        let drop = [law.forward, law.backward].map(|side| self.number(side.breakaway - side.coulomb));
-        format!("{{{}, {}, {forward}U, {backward}U, {fresh}U, {first}U, {end}U}}", drop[0], drop[1])
-    }
-
-    fn guards(&self, numbers: &[usize]) -> String {
-        let tables = self.tables;
-        let row = |(guard, table): (&crate::TableGuard, &usize)| {
-            let (element, state) = guard.of.unwrap_or((255, 0));
-            let then = match guard.then {
-                Then::Become(code) => code,
-                Then::Stop => 254,
-                Then::Leave => 255,
+        let mut resets = Vec::new();
+        let mut rows = Vec::new();
+        for (guard, [table, ..]) in tables.guards.iter().zip(&packed.guards) {
+            let (element, state) = guard.of.unwrap_or((NONE, 0));
+            let (then, decides) = match guard.then {
+                Then::Become(code) => (code, 0),
+                Then::Decide(code) => (code, 1),
+                Then::Leave => (NONE, 0),
             };
             let slot = guard.slot.unwrap_or(tables.slots);
-            format!("{{{table}U, {element}U, {state}U, {then}U, {}U, {slot}U, {}U}}", guard.rank, guard.fresh)
-        };
-        let rows: Vec<String> = tables.guards.iter().zip(numbers).map(row).collect();
-        let mut text = String::from(
-            "\n/* Guards: table of the row; element and state in which it is one; what follows; which is settled first; \
-             its own tolerance and note of a fresh start. */\nstatic const struct {\n    uint16_t table;\n    uint8_t \
-             element;\n    uint8_t state;\n    uint8_t then;\n    uint8_t rank;\n    uint8_t slot;\n    uint8_t \
-             fresh;\n} GUARD[] = ",
+            let [forward, backward] = guard.breakaways.unwrap_or([NONE; 2]);
+            let (first, gently) = (resets.len(), guard.gently.unwrap_or(NONE));
+            resets.extend(guard.resets.iter().map(|(place, value)| format!("{{{}, {place}U}}", self.number(*value))));
+            let (drop, rank, fresh, end) = (self.number(guard.drop), guard.rank, guard.fresh, resets.len());
+            rows.push(format!(
+                "{{{drop}, {table}U, {element}U, {state}U, {then}U, {decides}U, {rank}U, {slot}U, {fresh}U, {forward}U, \
+                 {backward}U, {gently}U, {first}U, {end}U}}"
+            ));
+        }
+        let mut text = format!(
+            "\n/* What changes set in z. */\nstatic const struct {{\n    {REAL} value;\n    uint8_t place;\n}} RESET[] = "
         );
-        text += &records(&rows, "{0U, 255U, 0U, 0U, 0U, 0U, 0U}");
+        text += &records(&resets, "{0, 0U}");
+        text += &format!(
+            "\n/* Guards, and what follows where one falls. */\nstatic const struct {{\n    {REAL} drop; /* breakaway \
+             above Coulomb friction */\n    uint16_t table; /* its row */\n    uint8_t element; /* it is one on this */\n    \
+             uint8_t state;   /* while it does this */\n    uint8_t then;    /* what the element does next */\n    \
+             uint8_t decides; /* whether the load on a body decides whether it does */\n    uint8_t rank;    /* which \
+             is settled first */\n    uint8_t slot;    /* its tolerance */\n    uint8_t fresh;   /* its note of a fresh \
+             start */\n    uint8_t forward; /* guards of a body's breakaway */\n    uint8_t backward;\n    uint8_t \
+             gently;  /* note of what starts with no slope */\n    uint8_t resets_first;\n    uint8_t resets_end;\n}} \
+             GUARD[] = "
+        );
+        text += &records(&rows, "{0, 0U, 255U, 0U, 0U, 0U, 0U, 0U, 0U, 255U, 255U, 255U, 0U, 0U}");
         text
     }
 
@@ -426,7 +341,7 @@ impl<'t> Plant<'t> {
         let bodies = mechanism.bodies.len();
         let motion = |body: usize| {
             let leader = mechanism.leader(body);
-            tables.elements.iter().position(|e| e.kind == ElementKind::Body(leader)).unwrap_or(255)
+            tables.elements.iter().position(|e| e.kind == ElementKind::Body(leader)).unwrap_or(NONE)
         };
         let mut text = String::from("\n/* Places of the bodies in z, and lengths of the belt in those of angles. */\n");
         text += &list("uint8_t", "COORDINATE", whole(&layout.coordinate[..bodies]));

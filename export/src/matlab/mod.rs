@@ -3,7 +3,7 @@
 
 mod mat;
 
-use super::packed::Packed;
+use super::packed::{LEAVE, Packed};
 use super::{Exported, Options, Part, Real, STEP, Tables, c, identifier, mechanism};
 use crate::case::Opened;
 use crate::error::Result;
@@ -23,6 +23,7 @@ pub(super) fn export(case: &Opened, stem: &str, options: &Options) -> Result<Exp
         text.replace("@title@", &c::plain(&plain))
             .replace("@version@", env!("CARGO_PKG_VERSION"))
             .replace("@name@", &name)
+            .replace("@leave@", &LEAVE.to_string())
             .replace("@NAME@", &name.to_uppercase())
     };
     let plant = Options { part: Some(Part::Plant), real: Real::Double, step: Some(step) };
@@ -74,9 +75,9 @@ fn variables(case: &Opened, tables: &Tables, step: f64) -> Result<Vec<(&'static 
         ("depends_first", whole(&packed.depends_first)),
         ("guards", rows(packed.guards.iter().map(|row| row.to_vec()).collect())),
         ("elements", rows(packed.elements.iter().map(|row| row.to_vec()).collect())),
-        ("moves", rows(packed.moves.iter().map(|row| row.to_vec()).collect())),
-        ("held", rows(packed.held.iter().map(|row| row.to_vec()).collect())),
-        ("limits", real(&packed.limits)),
+        ("resets", rows(packed.resets.iter().map(|row| row.to_vec()).collect())),
+        ("reset_values", real(&packed.reset_values)),
+        ("resting", rows(packed.resting.iter().map(|row| row.to_vec()).collect())),
         ("body_places", rows(packed.bodies.iter().map(|row| row.to_vec()).collect())),
         ("lengths", Variable::Numbers(packed.lengths.iter().map(|row| row.to_vec()).collect())),
         ("outputs_first", whole(&packed.outputs)),

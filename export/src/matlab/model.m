@@ -27,7 +27,7 @@ s.z = [zeros(n + drives, 1); 1];
 s.time = 0;
 s.does = zeros(0, 1);
 if ~isempty(m.elements)
-  s.does = m.elements(:, 3);
+  s.does = m.elements(:, 2);
 end
 s.events = zeros(0, 3);
 s.cache = {};
@@ -60,10 +60,15 @@ end
 
 % The row of a table in the present mode.
 function row = row_of(m, s, table)
+row = row_in(m, s.does, table);
+end
+
+% The same in another mode.
+function row = row_in(m, does, table)
 index = 0;
 for k = m.depends_first(table + 1) + 1:m.depends_first(table + 2)
   element = m.depends(k) + 1;
-  index = index * m.elements(element, 1) + s.does(element);
+  index = index * m.elements(element, 1) + does(element);
 end
 row = m.weights(m.entry(m.entry_first(table + 1) + index + 1) + 1, :);
 end
@@ -113,28 +118,38 @@ for k = 1:24
 end
 end
 
-% Goes into the mode that follows where a condition falls.
-function s = change(m, s, guard)
-element = m.guards(guard, 2) + 1;
+% What follows a condition: as its column says, or as the breakaway says that the load on a body at rest passes.
+function to = decided(m, s, guard)
 to = m.guards(guard, 4);
-s.events(end + 1, :) = [s.time, element - 1, to];
-if to == -2
-  error('something left its travel at %g s', s.time);
+does = s.does;
+for k = 1:size(m.resting, 1)
+  does(m.resting(k, 1) + 1) = row_of(m, s, m.resting(k, 2)) * s.z < 0;
 end
-if to == -1
-  for k = 1:size(m.moves, 1)
-    if m.moves(k, 1) + 1 == element
-      s.z(m.moves(k, 2) + 1) = 0;
+for breakaway = m.guards(guard, 6:7) + 1
+  if breakaway > 0
+    row = row_in(m, does, m.guards(breakaway, 1));
+    if row * s.z < -1e-13 * (abs(row) * abs(s.z))
+      to = m.guards(breakaway, 4);
+      return
     end
   end
-  to = 1; % stuck, unless its load breaks it away at once
 end
-s.does(element) = to;
-for k = 1:size(m.held, 1)
-  if m.held(k, 1) + 1 == element && to ~= 1
-    s.z(m.held(k, 2) + 1) = m.limits(k) * (to - 1);
+end
+
+% Does what follows where a condition falls.
+function s = change(m, s, guard)
+for k = 1:size(m.resets, 1)
+  if m.resets(k, 1) + 1 == guard
+    s.z(m.resets(k, 2) + 1) = m.reset_values(k);
   end
 end
+element = m.guards(guard, 2) + 1;
+to = decided(m, s, guard);
+s.events(end + 1, :) = [s.time, element - 1, to];
+if to == @leave@
+  error('something left its travel at %g s', s.time);
+end
+s.does(element) = to;
 s = take_up(m, s);
 end
 

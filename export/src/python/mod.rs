@@ -1,6 +1,6 @@
 //! Python: a script on NumPy, SciPy and python-control.
 
-use super::packed::Packed;
+use super::packed::{LEAVE, Packed};
 use super::{Exported, Options, STEP, Tables, mechanism};
 use crate::case::Opened;
 use crate::error::Result;
@@ -24,6 +24,8 @@ pub(super) fn export(case: &Opened, stem: &str, options: &Options) -> Result<Exp
         ("@version@", env!("CARGO_PKG_VERSION").into()),
         ("@step@", format!("{:?}", options.step.unwrap_or(STEP))),
         ("@stem@", plain(stem)),
+        ("@leave@", LEAVE.to_string()),
+        ("@fastest@", format!("{:?}", tables.fastest)),
     ] {
         text = text.replace(place, &part);
     }
@@ -61,11 +63,15 @@ fn lists(tables: &Tables, packed: &Packed) -> String {
     put("ENTRY_FIRST", "where the entries of a table begin", &packed.entry_first);
     put("DEPENDS", "the elements that choose among them, the last one changing fastest", &packed.depends);
     put("DEPENDS_FIRST", "where those of a table begin", &packed.depends_first);
-    put("GUARDS", "conditions: table, element, its state, what follows (-1 stop, -2 leave), rank", &packed.guards);
-    put("ELEMENTS", "elements: states, kind (0 body, 3 current at a limit), what it does at rest", &packed.elements);
-    put("MOVES", "speeds that stop with a body: element, place", &packed.moves);
-    put("HELD", "currents that a limit holds: element, place", &packed.held);
-    put("LIMITS", "the limits", &packed.limits);
+    let guards = format!(
+        "conditions: table, element, its state, what follows ({LEAVE} leave), rank, conditions on the breakaways that \
+         decide (-1 none)"
+    );
+    put("GUARDS", &guards, &packed.guards);
+    put("RESETS", "what a change sets: condition, place", &packed.resets);
+    put("RESET_VALUES", "to these values", &packed.reset_values);
+    put("RESTING", "gears that lose power: element, table of the torque at rest", &packed.resting);
+    put("ELEMENTS", "elements: states, what it does at rest", &packed.elements);
     put("PLACES", "of each body: places of coordinate and speed, element of its motion", &packed.bodies);
     put("LENGTHS", "belt lengths in the places of angles: body, other body (-1 itself), arm", &packed.lengths);
     put("OUTPUTS", "first tables of currents, voltages and forces", &packed.outputs);

@@ -20,8 +20,12 @@ from scipy.integrate import solve_ivp
 LINEAR = @linear@
 
 STEP = @step@
+# Nothing changes faster than this, 1/s: a condition that falls and rises again within a step goes unseen.
+FASTEST = @fastest@
 # The error of an integrator with event location where a sum is zero, as a share of its parts.
 ROUNDING = 1e-11
+# The code that follows where something left its travel.
+LEAVE = @leave@
 N = len(STATES)
 SIZE = N + len(DRIVES) + 1
 WEIGHTS = np.array(WEIGHTS)
@@ -44,14 +48,14 @@ class Machine:
         self.time = 0.0
         self.z = np.zeros(SIZE)
         self.z[-1] = 1.0
-        self.does = [element[2] for element in ELEMENTS]
+        self.does = [element[1] for element in ELEMENTS]
         self.events = []
         self._take_up()
 
-    def _row(self, table):
-        index = 0
+    def _row(self, table, does=None):
+        does, index = does or self.does, 0
         for element in DEPENDS[DEPENDS_FIRST[table] : DEPENDS_FIRST[table + 1]]:
-            index = index * ELEMENTS[element][0] + self.does[element]
+            index = index * ELEMENTS[element][0] + does[element]
         return WEIGHTS[ENTRY[ENTRY_FIRST[table] + index]]
 
     def _take_up(self):
@@ -59,8 +63,9 @@ class Machine:
         self.a = np.zeros((SIZE, SIZE))
         for place in range(N):
             self.a[place] = self._row(place)
-        self.active = [guard for guard in GUARDS if guard[1] < 0 or self.does[guard[1]] == guard[2]]
-        self.rows = [self._row(guard[0]) for guard in self.active]
+        holds = lambda guard: guard[1] < 0 or self.does[guard[1]] == guard[2]
+        self.active = [number for number, guard in enumerate(GUARDS) if holds(guard)]
+        self.rows = [self._row(GUARDS[number][0]) for number in self.active]
 
     def _falls(self, row):
         """Whether a condition falls below zero here: the first of its derivatives that is more than that decides."""
@@ -72,29 +77,37 @@ class Machine:
             value, size = self.a @ value, absolute @ size
         return False
 
-    def _change(self, guard):
-        table, element, _, then, _ = guard
+    def _decided(self, number):
+        """What follows a condition: as its column says, or as the breakaway says that the load on a body at rest passes."""
+        does = list(self.does)
+        for element, table in RESTING:
+            does[element] = 0 if self._row(table) @ self.z >= 0 else 1
+        for breakaway in GUARDS[number][5:]:
+            if breakaway >= 0:
+                row = self._row(GUARDS[breakaway][0], does)
+                if row @ self.z < -ROUNDING * (np.abs(row) @ np.abs(self.z)):
+                    return GUARDS[breakaway][3]
+        return GUARDS[number][3]
+
+    def _change(self, number):
+        """Does what follows where a condition falls."""
+        for (condition, place), value in zip(RESETS, RESET_VALUES):
+            if condition == number:
+                self.z[place] = value
+        element, then = GUARDS[number][1], self._decided(number)
         self.events.append((self.time, element, then))
-        if then == -2:
+        if then == LEAVE:
             raise ValueError(f"something left its travel at {self.time} s")
-        if then == -1:
-            for own, place in MOVES:
-                if own == element:
-                    self.z[place] = 0.0
-            then = 1  # stuck, unless its load breaks it away at once
         self.does[element] = then
-        for (own, place), limit in zip(HELD, LIMITS):
-            if own == element and then != 1:
-                self.z[place] = limit * (then - 1)
         self._take_up()
 
     def _settle(self):
         """Changes modes, without time passing, until every condition holds."""
         for _ in range(100):
-            fallen = [guard for guard, row in zip(self.active, self.rows) if self._falls(row)]
+            fallen = [number for number, row in zip(self.active, self.rows) if self._falls(row)]
             if not fallen:
                 return
-            self._change(min(fallen, key=lambda guard: guard[4]))
+            self._change(min(fallen, key=lambda number: GUARDS[number][4]))
         raise ValueError(f"too many events at {self.time} s")
 
     def set_command(self, values):
@@ -121,12 +134,13 @@ class Machine:
                 method="DOP853",
                 rtol=1e-11,
                 atol=1e-14,
+                max_step=1.0 / FASTEST if FASTEST > 0.0 else np.inf,
                 events=events,
             )
             self.time, self.z[:N] = run.t[-1], run.y[:, -1]
-            fallen = [guard for guard, times in zip(self.active, run.t_events) if len(times) > 0]
+            fallen = [number for number, times in zip(self.active, run.t_events) if len(times) > 0]
             if run.status == 1 and fallen:
-                self._change(min(fallen, key=lambda guard: guard[4]))
+                self._change(min(fallen, key=lambda number: GUARDS[number][4]))
                 self._settle()
 
     def positions(self):

@@ -2,7 +2,7 @@
 
 use super::{Does, Element, ElementKind, MOST_ROWS, Row, TableGuard, Then};
 use crate::error::{Error, Result};
-use crate::mechanism::{Cause, Equations, Form, Layout, Mechanism, Mode, State};
+use crate::mechanism::{After, Cause, Form, Layout, Mechanism, Mode, Place, State, Transition};
 
 /// How many modes are looked at to see what a row depends on.
 const LOOKS: u64 = 48;
@@ -132,46 +132,86 @@ impl Maker<'_> {
 
     /// All conditions, and how many tolerances they have.
     pub fn guards(&self) -> Result<(Vec<TableGuard>, usize)> {
-        let mut guards: Vec<(TableGuard, Cause)> = Vec::new();
+        let mut guards: Vec<(TableGuard, Transition)> = Vec::new();
         for (index, element) in self.elements.iter().enumerate() {
             for state in 0..element.states.len() {
                 let mut does = vec![0; self.elements.len()];
                 does[index] = state;
-                let own = |equations: &Equations| -> Vec<(Cause, Form)> {
-                    let own = equations.guards.iter().filter(|guard| element.kind.owns(guard.cause));
-                    own.map(|guard| (guard.cause, guard.form)).collect()
-                };
-                let causes = own(&self.mechanism.equations(self.mode(&does)));
-                for (k, (cause, _)) in causes.into_iter().enumerate() {
-                    let form = |mode: &Mode| own(&self.mechanism.equations(*mode))[k].1;
-                    let row = self.row_with(Some((index, state)), &form)?;
-                    let then = element.after(state, cause);
-                    let of = Some((index, state));
-                    guards.push((TableGuard { of, then, rank: cause.rank(), slot: None, fresh: 0, row }, cause));
+                let is_own = |transition: &Transition| element.kind.owns(transition.cause);
+                for (k, transition) in self.transitions(&does, is_own).into_iter().enumerate() {
+                    let row = self.row_with(Some((index, state)), &|mode| self.forms(mode, is_own)[k])?;
+                    let then = element.then(transition.then);
+                    guards.push((self.guard(Some((index, state)), then, &transition, row), transition));
                 }
             }
         }
-        let leaves = |equations: &Equations| -> Vec<(Cause, Form)> {
-            let leaves = equations.guards.iter().filter(|guard| matches!(guard.cause, Cause::Leave(_)));
-            leaves.map(|guard| (guard.cause, guard.form)).collect()
-        };
-        let bounds = leaves(&self.mechanism.equations(self.mode(&vec![0; self.elements.len()])));
-        for (k, (cause, _)) in bounds.into_iter().enumerate() {
-            let row = self.row(&|mode| leaves(&self.mechanism.equations(*mode))[k].1)?;
-            let guard = TableGuard { of: None, then: Then::Leave, rank: cause.rank(), slot: None, fresh: 0, row };
-            guards.push((guard, cause));
+        let leaves = |transition: &Transition| matches!(transition.cause, Cause::Leave(_));
+        for (k, transition) in self.transitions(&vec![0; self.elements.len()], leaves).into_iter().enumerate() {
+            let row = self.row(&|mode| self.forms(mode, leaves)[k])?;
+            guards.push((self.guard(None, Then::Leave, &transition, row), transition));
         }
         // A travel without an end on one side has no condition there.
         guards.retain(|(guard, _)| guard.row.weights.iter().flatten().all(|weight| weight.is_finite()));
         // Kinds that there are, counted.
-        let mut kinds: Vec<usize> = guards.iter().map(|(_, cause)| cause.kind()).collect();
+        let mut kinds: Vec<usize> = guards.iter().map(|(_, transition)| transition.cause.kind()).collect();
         kinds.sort_unstable();
         kinds.dedup();
-        for (guard, cause) in &mut guards {
-            guard.fresh = kinds.iter().position(|kind| *kind == cause.kind()).unwrap_or(0);
-            guard.slot = (!matches!(cause, Cause::Stop(_))).then_some(guard.fresh);
+        let note = |cause: Cause| kinds.iter().position(|kind| *kind == cause.kind());
+        let causes: Vec<Cause> = guards.iter().map(|(_, transition)| transition.cause).collect();
+        let number = |cause: Cause| causes.iter().position(|own| *own == cause);
+        for (guard, transition) in &mut guards {
+            guard.fresh = note(transition.cause).unwrap_or(0);
+            guard.slot = (!matches!(transition.cause, Cause::Stop(_))).then_some(guard.fresh);
+            if let After::PartHolds { gently: Some(cause) } = transition.after {
+                guard.gently = note(cause);
+            }
+            let body = match transition.cause {
+                Cause::Stop(body) | Cause::BreakForward(body) | Cause::BreakBackward(body) => Some(body),
+                Cause::GearTorque(_) | Cause::Switch(_) | Cause::Leave(_) => None,
+            };
+            let both = body.map(|body| [Cause::BreakForward(body), Cause::BreakBackward(body)].map(number));
+            if let Some([Some(forward), Some(backward)]) = both {
+                guard.breakaways = Some([forward, backward]);
+            }
         }
         Ok((guards.into_iter().map(|(guard, _)| guard).collect(), kinds.len()))
+    }
+
+    /// What follows where these conditions of a mode fall.
+    fn transitions(&self, does: &[usize], is_one: impl Fn(&Transition) -> bool) -> Vec<Transition> {
+        let all = self.mechanism.equations(self.mode(does)).guards.into_iter().map(|guard| guard.transition);
+        all.filter(|transition| is_one(transition)).collect()
+    }
+
+    /// Their values.
+    fn forms(&self, mode: &Mode, is_one: impl Fn(&Transition) -> bool) -> Vec<Form> {
+        let all = self.mechanism.equations(*mode).guards.into_iter();
+        all.filter(|guard| is_one(&guard.transition)).map(|guard| guard.form).collect()
+    }
+
+    /// A condition as far as it is known by itself.
+    fn guard(&self, of: Option<(usize, usize)>, then: Then, transition: &Transition, row: Row) -> TableGuard {
+        let place = |(place, value): (Place, f64)| {
+            let place = match place {
+                Place::Speed(body) => Some(self.layout.speed[body]),
+                Place::Current(drive) => self.layout.current[drive],
+            };
+            place.map(|place| (place, value))
+        };
+        let drop = match transition.cause {
+            Cause::BreakForward(body) => self.drop(body, true),
+            Cause::BreakBackward(body) => self.drop(body, false),
+            Cause::Stop(_) | Cause::GearTorque(_) | Cause::Switch(_) | Cause::Leave(_) => 0.0,
+        };
+        let resets = transition.resets.each(self.mechanism).filter_map(place).collect();
+        let (rank, slot, fresh) = (transition.rank, None, 0);
+        TableGuard { of, then, rank, slot, fresh, resets, breakaways: None, drop, gently: None, row }
+    }
+
+    /// By how much the breakaway of a body exceeds its Coulomb friction.
+    fn drop(&self, body: usize, forward: bool) -> f64 {
+        let side = self.mechanism.friction(body).side(forward);
+        side.breakaway - side.coulomb
     }
 
     /// A bound of ‖A‖ over all modes: stiffness by its Frobenius norm, then all that damps by its trace, each the most

@@ -22,7 +22,7 @@
 use super::Core;
 use super::matrices::Watch;
 use crate::friction::Motion;
-use crate::mechanism::{Cause, Mechanism, SpringLaw};
+use crate::mechanism::{Mechanism, SpringLaw, Transition};
 use crate::solve::propagator::{EXPONENTIAL_REACH, Matrix};
 use crate::solve::saved::{Pass, Passed};
 
@@ -257,10 +257,10 @@ impl<const N: usize> Core<N> {
     }
 
     /// What an event does to the errors depends on the state before it.
-    pub(super) fn crossing(&self, cause: Cause) -> Option<Crossing<N>> {
+    pub(super) fn crossing(&self, fallen: Transition) -> Option<Crossing<N>> {
         let errors = self.errors.as_ref()?;
         let law = &self.matrices;
-        let watch: &Watch<N> = law.guards.iter().find(|guard| guard.cause == cause)?;
+        let watch: &Watch<N> = law.guards.iter().find(|guard| guard.transition.cause == fallen.cause)?;
         let before = law.rate(&self.z);
         let guard = watch.row.whole();
         let mut sizes = self.z;
@@ -307,17 +307,17 @@ impl<const N: usize> Core<N> {
                 errors.add(&added);
             }
         }
-        let (mode, layout) = (&self.common.mode, &self.common.space.layout);
+        let (mode, layout) = (&self.common.rules.mode, &self.common.space.layout);
         for body in (0..layout.bodies()).filter(|&body| mode.motion[body] == Motion::Stuck) {
             errors.settle(layout.speed[body]);
         }
         self.errors = Some(errors);
     }
 
-    /// Ends the present mode by `cause`, and takes up what follows.
-    pub(super) fn go_through(&mut self, cause: Cause) {
-        let crossing = self.crossing(cause);
-        self.change(cause);
+    /// Ends the present mode where a condition has fallen, and takes up what follows.
+    pub(super) fn go_through(&mut self, fallen: Transition) {
+        let crossing = self.crossing(fallen);
+        self.change(fallen);
         self.resolve();
         self.cross(crossing);
     }

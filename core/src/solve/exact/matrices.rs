@@ -5,7 +5,7 @@ mod shown;
 
 use super::ellipsoid::can_grow;
 use crate::friction::Motion;
-use crate::mechanism::{BODIES, Cause, DRIVES, Equations, Form, Layout, Mechanism, Mode, ROUNDING, SPRINGS, State};
+use crate::mechanism::{BODIES, DRIVES, Equations, Form, Layout, Mechanism, Mode, ROUNDING, SPRINGS, State};
 use crate::signal::DEGREE;
 use crate::solve::propagator::{EXPONENTIAL_REACH, Matrix, SERIES_REACH, Series, series_order};
 use guards::{Beside, LANES, Lanes, Row, Values, side_by_side};
@@ -191,8 +191,6 @@ pub(in crate::solve) struct ModeMatrices<const N: usize> {
     pub(super) guards: Vec<Watch<N>>,
     /// The same side by side.
     beside: Vec<Beside<N>>,
-    /// Whether one of them is the torque of a gear.
-    pub(super) has_gear_torque: bool,
     /// The load on each body without its friction; none where a gear loses power, and it is another at rest.
     load: Option<[Row<N>; BODIES]>,
     /// |b|: how fast √(2V) of ż can grow per unit of |u̇|.
@@ -322,7 +320,7 @@ impl<const N: usize> ModeMatrices<N> {
         let mut beside = vec![Beside::NONE; equations.guards.len().div_ceil(LANES)];
         for (index, guard) in equations.guards.iter().enumerate() {
             let row = row_of(&guard.form);
-            guards.push(Watch::new(&row, guard.cause));
+            guards.push(Watch::new(&row, guard.transition));
             let (dual, beside, lane) = (dual(&guard.form), &mut beside[index / LANES], index % LANES);
             beside.rows.iter_mut().zip(&row).for_each(|(place, weight)| place[lane] = *weight);
             // Motion and current pass energy to each other: only their sum is bounded.
@@ -388,7 +386,6 @@ impl<const N: usize> ModeMatrices<N> {
             mode: *mode,
             guards,
             beside,
-            has_gear_torque: equations.guards.iter().any(|guard| matches!(guard.cause, Cause::GearTorque(_))),
             load,
             forcing,
             speed,

@@ -25,10 +25,11 @@ use super::pace::{Pace, STEPS_BETWEEN_QUESTIONS};
 use super::record::Extra;
 use super::roots;
 use super::rounding::Rounding;
+use super::rules::Rules;
 use super::saved::{Pass, Passed};
 use super::simulator::Engine;
-use super::{Cost, Ending, Event, PositionError, Tie};
-use crate::mechanism::{Cause, DRIVES, Form, Layout, Mechanism, Mode, State};
+use super::{Cost, Ending, Event, PositionError};
+use crate::mechanism::{DRIVES, Form, Layout, Mechanism, Mode, State, Transition};
 use ellipsoid::Ellipsoid;
 use kernel::Modes;
 pub(super) use kernel::{Known, Make, in_kernel};
@@ -69,34 +70,15 @@ pub(super) struct Common {
     pub(super) coordinates: Coordinates,
     /// The interval whose halves there are matrices for, s.
     h: f64,
-    pub(super) mode: Mode,
-    /// How many leading Taylor coefficients of a sliding body's speed are zero by definition, because it starts from
-    /// rest: 1 where it is accelerated, 2 where the load has only just reached its friction. The same for all else that
-    /// is watched.
-    fresh: [u8; Cause::KINDS],
-    is_fresh: bool,
-    /// By how much the load on a stuck body may pass its breakaway before it counts: what rounding can do to the load.
-    /// Without it a body that comes to rest just at its limit would chatter on the last bit. The same for all else that
-    /// is watched where it is zero but for rounding, and would count as wrong in either state. The place behind the
-    /// others stays zero.
-    tolerance: [f64; Cause::KINDS + 1],
-    /// Whether the input has changed, and what rounding does to the loads on stuck bodies is to be looked at anew.
-    at_edge: bool,
+    pub(super) rules: Rules,
     /// Bounds of |u̇| and |ü| on the present pieces.
     input_rate: [f64; DRIVES],
     input_curvature: [f64; DRIVES],
     /// Where it stands: so far behind `base`, s.
     base: f64,
     offset: f64,
-    pub(super) events: Vec<Event>,
-    pub(super) ties: Vec<Tie>,
-    /// How many events were handed on before those.
-    handed_on: usize,
     /// How many modes have been taken up.
     taken: u64,
-    /// Time since the last mode change, s, and how many there have been there.
-    since_change: f64,
-    changes: usize,
     pub(super) cost: Cost,
     rounding: Rounding,
     /// Intervals crossed or halved, how fast the run gets on by them, and to where it is to go.
@@ -105,7 +87,6 @@ pub(super) struct Common {
     end: f64,
     /// Whether somebody is to be asked whether to go on.
     pub(super) asks: bool,
-    pub(super) trouble: Option<Ending>,
 }
 
 /// The verdict of a bound on an interval.
@@ -134,15 +115,6 @@ impl Lanes {
     }
 }
 
-impl Common {
-    fn fresh_order(&self, cause: Cause) -> usize {
-        match cause {
-            Cause::BreakForward(_) | Cause::BreakBackward(_) => 0,
-            cause => usize::from(self.fresh[cause.kind()]),
-        }
-    }
-}
-
 impl<const N: usize> Core<N> {
     /// That of a machine at rest in its mode in `start`. `known` are modes made ready for intervals of any length;
     /// `end` is how far it is to go, to tell whether it gets there.
@@ -166,28 +138,18 @@ impl<const N: usize> Core<N> {
             space,
             coordinates,
             h,
-            mode,
-            fresh: [0; Cause::KINDS],
-            is_fresh: false,
-            tolerance: [0.0; Cause::KINDS + 1],
-            at_edge: true,
+            rules: Rules::new(mode),
             input_rate: [0.0; DRIVES],
             input_curvature: [0.0; DRIVES],
             base: 0.0,
             offset: 0.0,
-            events: Vec::new(),
-            ties: Vec::new(),
-            handed_on: 0,
             taken: 0,
-            since_change: f64::INFINITY,
-            changes: 0,
             cost: Cost { modes: u64::from(is_new), ..Cost::default() },
             rounding,
             questions: 0,
             pace: Pace::default(),
             end,
             asks: false,
-            trouble: None,
         };
         let errors =
             ellipsoid::can_grow(&common.mechanism).then(|| Box::new(Ellipsoid::new(common.space.layout.states)));
@@ -217,7 +179,7 @@ impl<const N: usize> Core<N> {
         let length = until - self.common.base;
         // What a sum of decimal times may be off by; no part of the interval, which may be long.
         let near = (8.0 * f64::EPSILON * until.abs()).min(1e-9 * self.common.h);
-        while length - self.common.offset > near && self.common.trouble.is_none() {
+        while length - self.common.offset > near && self.common.rules.trouble.is_none() {
             self.check();
             // Halves, quarters and eighths of the interval, for which there are matrices, are hit to the last bit.
             let (left, eighth) = (length - self.common.offset, 0.125 * self.common.h);
@@ -236,18 +198,17 @@ impl<const N: usize> Core<N> {
                 self.move_on(safe as f64 * self.common.h);
                 continue;
             }
-            if let Some(cause) = self.advance(left.min(self.common.h), looked) {
-                self.go_through(cause);
-            } else if left <= self.common.h && !self.common.asks && self.common.trouble.is_none() {
+            if let Some(fallen) = self.advance(left.min(self.common.h), looked) {
+                self.go_through(fallen);
+            } else if left <= self.common.h && !self.common.asks && self.common.rules.trouble.is_none() {
                 break;
             }
             self.common.asks = false;
         }
         self.check();
         self.see();
-        self.common.handed_on += self.common.events.len();
-        events.append(&mut self.common.events);
-        match self.common.trouble {
+        self.common.rules.hand_on(events);
+        match self.common.rules.trouble {
             Some(ending) => Err(ending),
             None => {
                 self.count_from(until.max(self.common.base));
@@ -259,8 +220,8 @@ impl<const N: usize> Core<N> {
     /// Takes up new inputs.
     pub(super) fn set_input(&mut self, pieces: &Pieces) {
         self.common.cost.pieces += 1;
-        self.refreshed();
-        self.common.at_edge = true;
+        self.common.rules.refreshed();
+        self.common.rules.at_edge = true;
         for drive in 0..self.common.space.layout.inputs {
             self.take_up(drive, &pieces.coefficients[drive], pieces.end - pieces.start);
         }
@@ -302,7 +263,7 @@ impl<const N: usize> Core<N> {
     /// Notices a state that is no number any more.
     fn check(&mut self) {
         if !self.is_finite() {
-            self.common.trouble = Some(Ending::Diverged { time: self.time() });
+            self.common.rules.trouble = Some(Ending::Diverged { time: self.time() });
         }
     }
 
@@ -319,7 +280,9 @@ impl<const N: usize> Core<N> {
             return (most, resting);
         }
         self.common.cost.looks += 1;
-        if self.common.is_fresh && law.guards.iter().any(|guard| self.common.fresh_order(guard.cause) > 0) {
+        if self.common.rules.is_fresh
+            && law.guards.iter().any(|guard| self.common.rules.fresh_order(guard.transition.cause) > 0)
+        {
             return (0, resting);
         }
         // g(τ) ≥ g − (|w| √2V + |w_u| |u̇|) τ − |w| |b| |u̇| τ²/2
@@ -364,34 +327,27 @@ impl<const N: usize> Core<N> {
             if *value < 0.0 && guard.is_zero(&self.z) {
                 *value = 0.0;
             }
-            *value += self.common.tolerance[guard.tolerance];
-        }
-    }
-
-    /// Nothing is fresh any more.
-    fn refreshed(&mut self) {
-        if self.common.is_fresh {
-            (self.common.fresh, self.common.is_fresh) = ([0; Cause::KINDS], false);
+            *value += self.common.rules.tolerance[guard.tolerance];
         }
     }
 
     /// Advances by `distance`, at most an interval; stops at the first guard that falls and says why. `looked` says
     /// that it has just been looked at where it stands.
-    pub(super) fn advance(&mut self, mut distance: f64, mut looked: bool) -> Option<Cause> {
+    pub(super) fn advance(&mut self, mut distance: f64, mut looked: bool) -> Option<Transition> {
         let law = Arc::clone(&self.matrices);
-        if self.common.is_fresh && distance > 0.0 {
+        if self.common.rules.is_fresh && distance > 0.0 {
             // A speed that starts from zero is told apart from one that falls to zero by its series.
             let first = distance.min(law.far());
-            if let Some(cause) = self.advance_by_series(&law, first, looked) {
-                return Some(cause);
+            if let Some(fallen) = self.advance_by_series(&law, first, looked) {
+                return Some(fallen);
             }
             looked = false;
             distance -= first;
         }
         for level in 0..=law.coarsest {
             while distance >= law.length(level) && self.goes() {
-                if let Some(cause) = self.cross_interval(&law, level, looked) {
-                    return Some(cause);
+                if let Some(fallen) = self.cross_interval(&law, level, looked) {
+                    return Some(fallen);
                 }
                 looked = false;
                 distance -= law.length(level);
@@ -409,7 +365,7 @@ impl<const N: usize> Core<N> {
     }
 
     /// Crosses an interval of h/2^level.
-    fn cross_interval(&mut self, law: &ModeMatrices<N>, level: usize, looked: bool) -> Option<Cause> {
+    fn cross_interval(&mut self, law: &ModeMatrices<N>, level: usize, looked: bool) -> Option<Transition> {
         if !self.goes_on() {
             return None;
         }
@@ -436,22 +392,22 @@ impl<const N: usize> Core<N> {
 
     /// Whether nothing stands against going on.
     fn goes(&self) -> bool {
-        self.common.trouble.is_none() && !self.common.asks
+        self.common.rules.trouble.is_none() && !self.common.asks
     }
 
     /// Wants to be asked now and then whether to go on, and looks whether this leads anywhere; false if not.
     fn goes_on(&mut self) -> bool {
         self.common.questions += 1;
-        if self.common.questions.is_multiple_of(STEPS_BETWEEN_QUESTIONS) && self.common.trouble.is_none() {
+        if self.common.questions.is_multiple_of(STEPS_BETWEEN_QUESTIONS) && self.common.rules.trouble.is_none() {
             self.common.asks = true;
-            self.common.trouble = self.common.pace.too_stiff(self.common.questions, self.time(), self.common.end);
+            self.common.rules.trouble = self.common.pace.too_stiff(self.common.questions, self.time(), self.common.end);
         }
         self.goes()
     }
 
     fn move_on(&mut self, by: f64) {
         self.common.offset += by;
-        self.common.since_change += by;
+        self.common.rules.since_change += by;
     }
 
     /// Decides by the last look, if it can, that no guard falls within `length`.
@@ -510,7 +466,7 @@ impl<const N: usize> Core<N> {
     }
 
     /// Advances by a `distance` within the reach of the Taylor series, to the first guard that falls.
-    fn advance_by_series(&mut self, law: &ModeMatrices<N>, distance: f64, looked: bool) -> Option<Cause> {
+    fn advance_by_series(&mut self, law: &ModeMatrices<N>, distance: f64, looked: bool) -> Option<Transition> {
         if !looked {
             self.look(law);
         }
@@ -519,37 +475,37 @@ impl<const N: usize> Core<N> {
     }
 
     /// The same, where no guards but these can fall.
-    fn advance_by_series_of(&mut self, law: &ModeMatrices<N>, distance: f64, open: Lanes) -> Option<Cause> {
+    fn advance_by_series_of(&mut self, law: &ModeMatrices<N>, distance: f64, open: Lanes) -> Option<Transition> {
         self.common.cost.series += 1;
         law.series(&self.z, distance, &mut self.room.series);
-        let mut first: Option<(f64, Cause)> = None;
+        let mut first: Option<(f64, Transition)> = None;
         let Room { value, series, coefficients, .. } = &mut *self.room;
         for lane in open.numbers() {
             let guard = &law.guards[lane];
             let coefficients = guard.row.along(series, coefficients);
             coefficients[0] = value[lane];
-            let mut order = self.common.fresh_order(guard.cause);
+            let mut order = self.common.rules.fresh_order(guard.transition.cause);
             if order > 0 || coefficients[0] == 0.0 {
                 order = law.first_term(guard, coefficients, (&self.z, distance), order.max(1));
             }
             let sooner = |s: f64| {
-                first.is_none_or(|(earliest, cause)| {
-                    s < earliest || (s == earliest && guard.cause.rank() < cause.rank())
+                first.is_none_or(|(earliest, other)| {
+                    s < earliest || (s == earliest && guard.transition.rank < other.rank)
                 })
             };
             if let Some(s) = roots::first_fall(&coefficients[order..])
                 && sooner(s)
             {
-                first = Some((s, guard.cause));
+                first = Some((s, guard.transition));
             }
         }
         let s = first.map_or(1.0, |(s, _)| s);
         series.add_to(&mut self.z, s);
         self.move_on(s * distance);
         if s * distance > SOON * law.reach() {
-            self.refreshed();
+            self.common.rules.refreshed();
         }
-        first.map(|(_, cause)| cause)
+        first.map(|(_, fallen)| fallen)
     }
 
     /// The state in the solver's coordinates.
@@ -600,7 +556,8 @@ impl<const M: usize> Make for Smoothed<M> {
         }
         z[N - 1] = 1.0;
         let mut known = Vec::new();
-        let (matrices, _) = ModeMatrices::of(&mut known, &common.mechanism, &common.space, &common.mode, common.h);
+        let (matrices, _) =
+            ModeMatrices::of(&mut known, &common.mechanism, &common.space, &common.rules.mode, common.h);
         let room = Box::new(Room::new());
         let errors = errors.map(|errors| Box::new(errors.resized()));
         Box::new(Core::<N> { z, largest: [0.0; N], matrices, known, shared: 0, room, errors, common })
@@ -660,7 +617,7 @@ impl<const N: usize> Engine for Core<N> {
     }
 
     fn mode(&self) -> &Mode {
-        &self.common.mode
+        &self.common.rules.mode
     }
 
     fn input(&self) -> [f64; DRIVES] {

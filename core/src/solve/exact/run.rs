@@ -63,8 +63,8 @@ impl<'a, const N: usize> Run<'a, N> {
             }
             let ahead = if self.row < row { self.grid.interval() } else { offset };
             match self.advance_shown(ahead - self.core.common.offset, looked) {
-                Some(cause) => {
-                    self.core.go_through(cause);
+                Some(fallen) => {
+                    self.core.go_through(fallen);
                     self.jumped();
                 }
                 // Paused in the midst of an interval: it is taken up where it was left.
@@ -89,14 +89,14 @@ impl<'a, const N: usize> Run<'a, N> {
     }
 
     fn goes(&self) -> bool {
-        self.core.common.trouble.is_none()
+        self.core.common.rules.trouble.is_none()
     }
 
     /// Ends where the receiver wants no more.
     #[inline]
     fn heed(&mut self) {
-        if self.recorder.flow == Flow::Stop && self.core.common.trouble.is_none() {
-            self.core.common.trouble = Some(Ending::Interrupted { time: self.time() });
+        if self.recorder.flow == Flow::Stop && self.core.common.rules.trouble.is_none() {
+            self.core.common.rules.trouble = Some(Ending::Interrupted { time: self.time() });
         }
     }
 
@@ -107,12 +107,12 @@ impl<'a, const N: usize> Run<'a, N> {
     /// Puts out the present row, once, and looks whether all is well.
     fn put_out(&mut self) {
         if !self.core.is_finite() {
-            self.core.common.trouble = Some(Ending::Diverged { time: self.time() });
+            self.core.common.rules.trouble = Some(Ending::Diverged { time: self.time() });
         }
-        if self.recorder.next_row() == self.row && self.core.common.trouble.is_none() {
+        if self.recorder.next_row() == self.row && self.core.common.rules.trouble.is_none() {
             let core = &mut self.core;
             core.see();
-            self.recorder.segment(core.common.taken, &core.common.coordinates, &core.common.mode);
+            self.recorder.segment(core.common.taken, &core.common.coordinates, &core.common.rules.mode);
             self.recorder.push(&core.z);
         }
         self.heed();
@@ -130,7 +130,7 @@ impl<'a, const N: usize> Run<'a, N> {
             let (begin, z) = (self.core.time(), self.core.z);
             self.show_way(&law, z, &[z], (begin, safe as f64 * h));
         }
-        self.core.common.since_change += safe as f64 * h;
+        self.core.common.rules.since_change += safe as f64 * h;
         if resting && self.recorder.detail == Detail::None {
             self.recorder.skip(safe - 1);
             self.go_to(self.row + safe);
@@ -174,7 +174,7 @@ impl<'a, const N: usize> Run<'a, N> {
                 self.passed(good, good);
                 step.advance(&mut self.core.z);
                 self.row += 1;
-                self.core.common.trouble = Some(Ending::Diverged { time: self.grid.time(self.row) });
+                self.core.common.rules.trouble = Some(Ending::Diverged { time: self.grid.time(self.row) });
                 return;
             }
             left -= rows as u64;
@@ -216,11 +216,11 @@ impl<const N: usize> Running for Run<'_, N> {
 
     fn advance(&mut self, until: f64) -> bool {
         let end = self.grid.end();
-        if self.core.common.trouble.is_none() {
+        if self.core.common.rules.trouble.is_none() {
             let (row, offset) = locate(&self.grid, self.row, until.min(end));
             self.reach(row, offset);
         }
-        self.core.common.trouble.is_none()
+        self.core.common.rules.trouble.is_none()
     }
 
     fn state(&self) -> State {
@@ -234,19 +234,19 @@ impl<const N: usize> Running for Run<'_, N> {
 
     fn finish(&mut self, is_at_end: bool) -> Outcome {
         self.core.note_ties();
-        if self.core.common.trouble.is_none() {
+        if self.core.common.rules.trouble.is_none() {
             if is_at_end {
                 // Behind a last, shorter interval it stands at the last row, too.
                 self.go_to(self.grid.intervals());
                 self.put_out();
             } else {
-                self.core.common.trouble = Some(Ending::Interrupted { time: self.time() });
+                self.core.common.rules.trouble = Some(Ending::Interrupted { time: self.time() });
             }
         }
         self.end_shown();
         self.recorder.finish();
         self.core.common.cost.samples = self.recorder.rows;
-        let ending = match (self.core.common.trouble, self.recorder.flow) {
+        let ending = match (self.core.common.rules.trouble, self.recorder.flow) {
             (Some(trouble), _) => trouble,
             (None, Flow::Stop) => Ending::Interrupted { time: self.core.time() },
             (None, Flow::Continue) => Ending::Complete,
@@ -256,8 +256,8 @@ impl<const N: usize> Running for Run<'_, N> {
         let is_followed = core.errors.is_some() || !can_grow(&core.common.mechanism);
         let error = is_followed.then(|| core.bound_of_rounding());
         Outcome {
-            events: std::mem::take(&mut core.common.events),
-            ties: std::mem::take(&mut core.common.ties),
+            events: std::mem::take(&mut core.common.rules.events),
+            ties: std::mem::take(&mut core.common.rules.ties),
             ending,
             cost: std::mem::take(&mut core.common.cost),
             error,

@@ -2,6 +2,7 @@
 
 use super::{Core, ModeMatrices};
 use crate::mechanism::{Cause, Mechanism};
+use crate::solve::rules::Between;
 use crate::solve::saved::{Pass, Passed};
 use std::sync::Arc;
 
@@ -9,28 +10,28 @@ impl<const N: usize> Core<N> {
     /// As plain numbers. Whoever puts them into another machine sees to it that this one has the same equations.
     pub(super) fn pass(&mut self, pass: &mut Pass) -> Passed {
         let common = &mut self.common;
-        if common.trouble.is_some() {
+        if common.rules.trouble.is_some() {
             return None;
         }
         let start = *common.coordinates.start();
         pass.numbers(&mut self.z)?;
         pass.numbers(&mut self.largest)?;
         pass.coordinates(&mut common.coordinates)?;
-        pass.mode(&mut common.mode)?;
-        for fresh in &mut common.fresh {
+        pass.mode(&mut common.rules.mode)?;
+        for fresh in &mut common.rules.fresh {
             let mut order = usize::from(*fresh);
             pass.count(&mut order)?;
             *fresh = u8::try_from(order).ok()?;
         }
-        pass.flag(&mut common.is_fresh)?;
-        pass.numbers(&mut common.tolerance)?;
-        pass.flag(&mut common.at_edge)?;
+        pass.flag(&mut common.rules.is_fresh)?;
+        pass.numbers(&mut common.rules.tolerance)?;
+        pass.flag(&mut common.rules.at_edge)?;
         pass.numbers(&mut common.input_rate)?;
         pass.numbers(&mut common.input_curvature)?;
-        let times = [&mut common.base, &mut common.offset, &mut common.since_change, &mut common.end];
+        let times = [&mut common.base, &mut common.offset, &mut common.rules.since_change, &mut common.end];
         times.into_iter().try_for_each(|time| pass.number(time))?;
-        pass.count(&mut common.handed_on)?;
-        pass.count(&mut common.changes)?;
+        pass.count(&mut common.rules.handed_on)?;
+        pass.count(&mut common.rules.changes)?;
         pass.bits(&mut common.taken)?;
         pass.bits(&mut common.cost.steps)?;
         pass.bits(&mut common.cost.series)?;
@@ -38,11 +39,11 @@ impl<const N: usize> Core<N> {
         if let Some(errors) = &mut self.errors {
             errors.pass(pass)?;
         }
-        if *common.coordinates.start() != start || common.tolerance[Cause::KINDS] != 0.0 {
+        if *common.coordinates.start() != start || common.rules.tolerance[Cause::KINDS] != 0.0 {
             return None;
         }
         let (mechanism, space) = (&common.mechanism, &common.space);
-        self.matrices = ModeMatrices::of(&mut self.known, mechanism, space, &common.mode, common.h).0;
+        self.matrices = ModeMatrices::of(&mut self.known, mechanism, space, &common.rules.mode, common.h).0;
         Some(())
     }
 
@@ -50,10 +51,10 @@ impl<const N: usize> Core<N> {
     pub(super) fn replace(&mut self, mechanism: &Mechanism) {
         let common = &mut self.common;
         let seen = mechanism.seen_from(&common.space.layout, common.coordinates.start());
-        seen.take_over(&common.mechanism, &mut common.mode, |body| self.z[common.space.layout.speed[body]]);
+        seen.take_over(&common.mechanism, &mut common.rules.mode, |body| self.z[common.space.layout.speed[body]]);
         common.mechanism = Arc::new(seen);
         self.known = Vec::new();
-        self.refreshed();
+        self.common.rules.refreshed();
         self.take_up_mode();
     }
 }

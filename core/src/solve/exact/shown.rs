@@ -2,7 +2,7 @@
 
 use super::matrices::Shown;
 use super::{ModeMatrices, Run};
-use crate::mechanism::{BODIES, Cause};
+use crate::mechanism::{BODIES, Transition};
 use crate::solve::observe::{Closer, Curve, Gap, Gaps, Observe, QUANTITIES, Reading, Stretch};
 use std::sync::Arc;
 
@@ -133,7 +133,7 @@ impl<const N: usize> Run<'_, N> {
             self.show_way(&law, self.core.z, &[], (self.core.time(), 0.0));
             self.show_later();
         }
-        let (time, state, mode) = (self.core.time(), self.core.state(), self.core.common.mode);
+        let (time, state, mode) = (self.core.time(), self.core.state(), self.core.common.rules.mode);
         if let Some(observer) = &mut self.recorder.observer {
             observer.end(time, &state, &mode);
         }
@@ -418,15 +418,15 @@ impl<const N: usize> Run<'_, N> {
     }
 
     /// The same as [`Core::advance`], and shows the way to whoever observes.
-    pub(super) fn advance_shown(&mut self, distance: f64, looked: bool) -> Option<Cause> {
+    pub(super) fn advance_shown(&mut self, distance: f64, looked: bool) -> Option<Transition> {
         if !self.is_observed() {
             return self.core.advance(distance, looked);
         }
         let core = &mut self.core;
         let (law, before, begin, offset) = (Arc::clone(&core.matrices), core.z, core.time(), core.common.offset);
-        let cause = core.advance(distance, looked);
+        let fallen = core.advance(distance, looked);
         let (after, length) = (core.z, core.common.offset - offset);
         self.show_way(&law, before, &[after], (begin, length));
-        cause
+        fallen
     }
 }

@@ -4,6 +4,7 @@ use super::{Core, Event};
 use crate::error::Result;
 use crate::friction::Motion;
 use crate::mechanism::{BODIES, Cause, DRIVES, Layout, Mechanism, Mode, SpringLaw, State};
+use crate::solve::rules::CHANGES_AT_ONCE;
 use crate::solve::saved::{Pass, Passed, restored};
 use crate::solve::simulator::{Engine, shown};
 use crate::solve::{Ending, check};
@@ -15,9 +16,6 @@ const TOLERANCE: f64 = 1e-9;
 /// Every condition is shown as larger by this, in its SI unit. FMI counts a condition of zero as fallen: one that is zero
 /// where a mode begins, as the speed of a body that breaks away, has to be above zero.
 const SHIFT: f64 = 1.0 / (1_u64 << 40) as f64;
-
-/// Changes of mode at one instant.
-const CHANGES: usize = 100;
 
 /// A quantity that is integrated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -183,7 +181,7 @@ impl Dynamics {
     pub fn settle(&mut self, events: &mut Vec<Event>) -> std::result::Result<bool, Ending> {
         let before = self.core.y;
         self.core.forgive_loads();
-        for _ in 0..CHANGES {
+        for _ in 0..CHANGES_AT_ONCE {
             let fallen = self.watched().filter(|(_, value)| *value <= 0.0).min_by_key(|(cause, _)| cause.rank());
             let Some((cause, _)) = fallen else { break };
             self.core.change(cause);
@@ -194,7 +192,8 @@ impl Dynamics {
         if self.core.trouble.is_none() && self.is_over() {
             self.core.trouble = Some(Ending::TooManyEvents { time: self.core.time() });
         }
-        events.append(&mut self.core.events);
+        self.core.check_events();
+        self.core.hand_on(events);
         self.core.trouble.map_or(Ok(self.core.y != before), Err)
     }
 

@@ -70,7 +70,7 @@ impl Field {
             Guard { row, input: form.input, constant: form.constant }
         };
         let guards = equations.guards.iter().map(|part| guard(&part.form)).collect();
-        let watches = equations.guards.iter().map(|guard| guard.cause).collect();
+        let watches = equations.guards.iter().map(|guard| guard.transition.cause).collect();
         let mut field = Self {
             model: Arc::clone(model),
             mode: *mode,

@@ -26,6 +26,7 @@ use super::coordinates::Coordinates;
 use super::inputs::Pieces;
 use super::pace::{Pace, STEPS_BETWEEN_QUESTIONS, most_events};
 use super::record::Extra;
+use super::rules::{CHANGES_AT_ONCE, MOMENT, TURNS_AT_ONCE};
 use super::saved::{Pass, Passed};
 use super::simulator::Engine;
 use super::{Cost, Ending, Event, PositionError};
@@ -44,12 +45,6 @@ pub(super) use run::Run;
 use std::sync::Arc;
 use step::Room;
 use stretch::Stretch;
-
-/// Mode changes allowed at one instant.
-const CHANGES_AT_ONCE: usize = 100;
-
-/// Turns of a body at one instant after which it is taken to rest.
-const TURNS_AT_ONCE: usize = 20;
 
 /// Most steps of a run, by what is known beforehand of its fastest rate.
 const MOST_STEPS: f64 = 1e10;
@@ -286,7 +281,7 @@ impl Core {
     /// Goes into the mode that follows when `cause` ends the present one.
     fn change(&mut self, cause: Cause) {
         let time = self.time();
-        let at_once = time - self.changed_at <= 1e-15 + 4.0 * f64::EPSILON * time;
+        let at_once = time - self.changed_at <= MOMENT * self.moment + 4.0 * f64::EPSILON * time;
         self.changes = if at_once { self.changes + 1 } else { 0 };
         self.changed_at = time;
         if self.changes > CHANGES_AT_ONCE {
@@ -441,14 +436,26 @@ impl Core {
                     }
                 }
                 None => {
-                    if (self.handed_on + self.events.len()) as f64 > most_events(time) {
-                        self.trouble = Some(Ending::TooManyEvents { time });
-                    }
+                    self.check_events();
                     return;
                 }
             }
         }
         self.trouble = Some(Ending::TooManyEvents { time });
+    }
+
+    /// Ends a run that has had more events than it may have by now.
+    fn check_events(&mut self) {
+        let time = self.time();
+        if (self.handed_on + self.events.len()) as f64 > most_events(time) {
+            self.trouble = Some(Ending::TooManyEvents { time });
+        }
+    }
+
+    /// Hands the events on.
+    fn hand_on(&mut self, events: &mut Vec<Event>) {
+        self.handed_on += self.events.len();
+        events.append(&mut self.events);
     }
 }
 
@@ -487,8 +494,7 @@ impl Engine for Core {
         if self.trouble.is_none() && self.tau < self.stretch.length() {
             self.reach(&mut Nobody);
         }
-        self.handed_on += self.events.len();
-        events.append(&mut self.events);
+        self.hand_on(events);
         self.trouble.map_or(Ok(()), Err)
     }
 

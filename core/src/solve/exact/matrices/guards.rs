@@ -1,7 +1,7 @@
 //! The guards of a mode: one by one, as rows of a few weights, and side by side, for all of them at once.
 
 use super::Size;
-use crate::mechanism::{BODIES, Cause, DRIVES, ROUNDING, SPRINGS};
+use crate::mechanism::{BODIES, Cause, DRIVES, ROUNDING, SPRINGS, Transition};
 use crate::solve::propagator::{SERIES_TERMS, Series};
 
 /// A linear form of the vector z.
@@ -71,15 +71,16 @@ impl<const N: usize> Row<N> {
 /// A condition of the mode on the vector z.
 pub(in crate::solve) struct Watch<const N: usize> {
     pub(in crate::solve::exact) row: Row<N>,
-    pub(in crate::solve::exact) cause: Cause,
+    pub(in crate::solve::exact) transition: Transition,
     /// Where its tolerance stands; the speed of a body that stops has none.
     pub(in crate::solve::exact) tolerance: usize,
 }
 
 impl<const N: usize> Watch<N> {
-    pub(super) fn new(row: &[f64; N], cause: Cause) -> Self {
+    pub(super) fn new(row: &[f64; N], transition: Transition) -> Self {
+        let cause = transition.cause;
         let tolerance = if matches!(cause, Cause::Stop(_)) { Cause::KINDS } else { cause.kind() };
-        Self { row: Row::new(row), cause, tolerance }
+        Self { row: Row::new(row), transition, tolerance }
     }
 
     pub(in crate::solve::exact) fn value(&self, z: &[f64; N]) -> f64 {

@@ -20,7 +20,7 @@ mod tangent;
 use super::run::locate;
 use super::{Core, Known, Make, ModeMatrices, vector};
 use crate::friction::Motion;
-use crate::mechanism::{Cause, DRIVES};
+use crate::mechanism::{DRIVES, Transition};
 use crate::solve::inputs::Pieces;
 use crate::solve::propagator::Series;
 use crate::solve::sensitivity::{Begun, Sensitivities, Task, Variable};
@@ -232,7 +232,7 @@ impl<'t, const N: usize> Follower<'t, N> {
 
     /// Takes up the present mode.
     fn take_up(&mut self) -> Option<()> {
-        if self.core.common.trouble.is_some() {
+        if self.core.common.rules.trouble.is_some() {
             return None;
         }
         let law = &self.core.matrices;
@@ -271,15 +271,15 @@ impl<'t, const N: usize> Follower<'t, N> {
             }
             let ahead = if self.row < row { self.grid.interval() } else { offset };
             let (begin, from) = (self.core.z, self.core.common.offset);
-            let cause = self.core.advance(ahead - from, looked);
+            let fallen = self.core.advance(ahead - from, looked);
             self.core.common.asks = false;
-            if self.core.common.trouble.is_some() {
+            if self.core.common.rules.trouble.is_some() {
                 return None;
             }
-            let is_there = cause.is_none() && (ahead - self.core.common.offset).abs() <= 1e-12 * ahead;
+            let is_there = fallen.is_none() && (ahead - self.core.common.offset).abs() <= 1e-12 * ahead;
             self.follow(&begin, self.core.common.offset - from, is_there);
-            match cause {
-                Some(cause) => self.event(cause)?,
+            match fallen {
+                Some(fallen) => self.event(fallen)?,
                 None if !is_there => {}
                 None if self.row < row => self.go_to(self.row + 1),
                 None => self.core.common.offset = offset,
@@ -300,7 +300,7 @@ impl<'t, const N: usize> Follower<'t, N> {
         self.follow(&begin, self.grid.interval(), true);
         self.core.matrices.step(0).advance(&mut self.core.z);
         self.core.common.cost.steps += 1;
-        self.core.common.since_change += self.grid.interval();
+        self.core.common.rules.since_change += self.grid.interval();
         self.go_to(self.row + 1);
     }
 
@@ -325,9 +325,9 @@ impl<'t, const N: usize> Follower<'t, N> {
     }
 
     /// Goes through an event: a guard falls.
-    fn event(&mut self, cause: Cause) -> Option<()> {
+    fn event(&mut self, fallen: Transition) -> Option<()> {
         let law = Arc::clone(&self.core.matrices);
-        let guard = law.guards.iter().position(|guard| guard.cause == cause)?;
+        let guard = law.guards.iter().position(|guard| guard.transition.cause == fallen.cause)?;
         let (watch, z) = (&law.guards[guard], self.core.z);
         let before = law.rate(&z);
         let fall = watch.value(&before);
@@ -339,7 +339,7 @@ impl<'t, const N: usize> Follower<'t, N> {
             .enumerate()
             .map(|(j, s)| -(watch.value(s) + sloped.guard_slope(j, guard, &z)) / fall)
             .collect();
-        self.core.change(cause);
+        self.core.change(fallen);
         self.core.resolve();
         self.out.events += 1;
         let after = self.core.matrices.rate(&self.core.z);
@@ -391,7 +391,7 @@ fn begin<const N: usize>(seen: &Seen, varied: &Varied) -> [f64; N] {
 
 /// Stuck bodies have no speed, whatever the variables are.
 fn rest<const N: usize>(core: &Core<N>, s: &mut [[f64; N]]) {
-    let (mode, layout) = (&core.common.mode, &core.common.space.layout);
+    let (mode, layout) = (&core.common.rules.mode, &core.common.space.layout);
     for body in (0..layout.bodies()).filter(|&body| mode.motion[body] == Motion::Stuck) {
         s.iter_mut().for_each(|s| s[layout.speed[body]] = 0.0);
     }

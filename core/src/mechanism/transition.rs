@@ -1,0 +1,156 @@
+//! What follows where a condition of a mode falls: the rule of events, as data that is made with the conditions.
+//!
+//! Solvers and exports read it, and none of them decides by itself what follows.
+
+use super::{AmplifierMode, Cause, Drive, Form, Limit, Mechanism, Mode, Switch, What};
+use crate::friction::Motion;
+
+/// What follows where a condition of a mode falls.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Transition {
+    /// The condition.
+    pub cause: Cause,
+    /// Which of several conditions that have fallen at one instant is settled first: the one of least rank.
+    pub rank: u8,
+    /// The next state.
+    pub then: Then,
+    /// Quantities of the state that the change sets.
+    pub resets: Resets,
+    /// What rounding is forgiven after it.
+    pub after: After,
+    /// The part that events name; none for the torque of a gear and for a rotor, which only its gear holds.
+    pub told: Option<What>,
+}
+
+/// The next state.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Then {
+    /// A part does something else.
+    Become(Next),
+    /// A body that has stopped goes on in the direction in which its load passes the breakaway; otherwise it rests.
+    Decide(usize),
+    /// The run ends.
+    Leave,
+}
+
+/// What a part does next.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Next {
+    /// A body, and those that move with it.
+    Moves(usize, Motion),
+    /// The gear of a drive: whether its torque is positive.
+    Torque(usize, bool),
+    /// Any other part.
+    Switch(Switch),
+}
+
+/// Quantities that a change sets.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Resets {
+    /// None.
+    None,
+    /// The speeds of a body and of those that move with it become zero.
+    Speeds(usize),
+    /// The current of a drive stands at its limit, A.
+    Current(usize, f64),
+}
+
+/// A quantity of the state.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Place {
+    /// Speed of a body.
+    Speed(usize),
+    /// Current of a drive.
+    Current(usize),
+}
+
+/// What rounding is forgiven after a change.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum After {
+    /// Nothing.
+    Nothing,
+    /// The conditions on the part hold where they are zero but for rounding.
+    PartHolds {
+        /// The condition whose value starts from zero with a slope of zero, where the motion, and not an edge of the
+        /// input, has let the part go: of a current that leaves its limit.
+        gently: Option<Cause>,
+    },
+    /// The load on the body may pass its breakaways by its rounding.
+    BreakawaysWiden,
+}
+
+impl Resets {
+    /// The quantities, and their values.
+    pub fn each(self, mechanism: &Mechanism) -> impl Iterator<Item = (Place, f64)> + '_ {
+        let (leader, current) = match self {
+            Resets::None => (None, None),
+            Resets::Speeds(body) => (Some(body), None),
+            Resets::Current(drive, value) => (None, Some((Place::Current(drive), value))),
+        };
+        let speeds = leader.into_iter().flat_map(|body| mechanism.followers(body));
+        speeds.map(|body| (Place::Speed(body), 0.0)).chain(current)
+    }
+}
+
+impl Mechanism {
+    /// What follows where this condition of `mode` falls.
+    pub(super) fn transition(&self, cause: Cause, mode: &Mode) -> Transition {
+        let widen = |body, then, resets| (then, resets, After::BreakawaysWiden, self.told(body));
+        let breaks = |body, motion| widen(body, Then::Become(Next::Moves(body, motion)), Resets::None);
+        let (then, resets, after, told) = match cause {
+            Cause::Stop(body) => widen(body, Then::Decide(body), Resets::Speeds(body)),
+            Cause::BreakForward(body) => breaks(body, Motion::Forward),
+            Cause::BreakBackward(body) => breaks(body, Motion::Backward),
+            Cause::GearTorque(drive) => {
+                let next = Next::Torque(drive, !mode.drive[drive].torque_positive);
+                (Then::Become(next), Resets::None, After::PartHolds { gently: None }, None)
+            }
+            Cause::Switch(switch) => {
+                let (resets, gently) = self.current_at_limit(switch, mode);
+                (Then::Become(Next::Switch(switch)), resets, After::PartHolds { gently }, Some(switch.what()))
+            }
+            Cause::Leave(_) => (Then::Leave, Resets::None, After::Nothing, None),
+        };
+        Transition { cause, rank: cause.rank(), then, resets, after, told }
+    }
+
+    /// The part that events of a body name.
+    fn told(&self, body: usize) -> Option<What> {
+        (!self.bodies[body].is_rotor).then_some(What::Body(body))
+    }
+
+    /// What a switch does to a current that is a state and that its limit holds.
+    fn current_at_limit(&self, switch: Switch, mode: &Mode) -> (Resets, Option<Cause>) {
+        let Switch::Current(drive, side) = switch else { return (Resets::None, None) };
+        let part = &self.drives[drive];
+        if !part.has_current_state() || part.amplifier.mode != AmplifierMode::Voltage {
+            return (Resets::None, None);
+        }
+        let left = mode.drive[drive].current;
+        match side {
+            Limit::Inside => (Resets::None, Some(Cause::Switch(Switch::Current(drive, left)))),
+            // It stands at its limit, to the last bit.
+            side => (Resets::Current(drive, side.sign() * part.amplifier.current_limit.unwrap_or(0.0)), None),
+        }
+    }
+
+    /// Makes a part do something else.
+    pub(crate) fn put_next(&self, mode: &mut Mode, next: Next) {
+        match next {
+            Next::Moves(body, motion) => self.followers(body).for_each(|body| mode.motion[body] = motion),
+            Next::Torque(drive, positive) => mode.drive[drive].torque_positive = positive,
+            Next::Switch(switch) => mode.switch(switch),
+        }
+    }
+
+    /// The mode in which loads on bodies at rest are told: gears that lose power carry as they do while bodies rest.
+    /// `value` evaluates a form in the present state.
+    pub(crate) fn resting_mode(&self, mode: &Mode, value: impl Fn(&Form) -> f64) -> Mode {
+        let mut resting = *mode;
+        let losing = |(_, drive): &(usize, &Drive)| drive.loses();
+        for (drive, _) in self.drives.iter().enumerate().filter(losing) {
+            resting.drive[drive].torque_positive = value(&self.torque_at_rest(drive, mode)) >= 0.0;
+        }
+        resting
+    }
+}

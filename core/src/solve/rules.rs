@@ -1,0 +1,350 @@
+//! The rules of events: how modes follow each other at one instant, whatever solver goes on between them.
+//!
+//! What follows a condition that falls is the mechanism's to say ([`Transition`]). Here stands in which order conditions
+//! are settled, what rounding is forgiven after a change, and how many changes there may be. A solver tells what it
+//! knows of its conditions ([`Between`]).
+
+use super::pace::most_events;
+use super::{Ending, Event, Tie};
+use crate::friction::Motion;
+use crate::mechanism::{After, Cause, Mechanism, Mode, Next, Part, Place, Status, Then, Transition, What};
+use std::sync::Arc;
+
+/// The rank of conditions on bodies.
+const BODIES: u8 = 3;
+
+/// The length of one instant, as a share of the time in which the fastest of the machine changes.
+pub(super) const MOMENT: f64 = 1e-12;
+
+/// Mode changes allowed at one instant.
+pub(super) const CHANGES_AT_ONCE: usize = 100;
+
+/// Changes at one instant after which rounding is taken to turn a part back again and again: it then stays as it is.
+pub(super) const TURNS_AT_ONCE: usize = 20;
+
+/// A value that is zero but for rounding is within so many times its noise: where it is looked at, where its condition
+/// has just begun to hold, and what it may be below zero by where rounding moves its part back and forth.
+pub(super) const NEAR: f64 = 2.0;
+pub(super) const BEGUN: f64 = 20.0;
+const BACK_AND_FORTH: f64 = 40.0;
+
+/// The present mode, how it came about, and what it forgives.
+#[derive(Debug, Clone)]
+pub(super) struct Rules {
+    pub(super) mode: Mode,
+    /// How many leading Taylor coefficients of a sliding body's speed are zero by definition, because it starts from
+    /// rest: 1 where it is accelerated, 2 where the load has only just reached its friction. The same for all else that
+    /// is watched.
+    pub(super) fresh: [u8; Cause::KINDS],
+    pub(super) is_fresh: bool,
+    /// By how much the load on a stuck body may pass its breakaway before it counts: what rounding can do to the load.
+    /// Without it a body that comes to rest just at its limit would chatter on the last bit. The same for all else that
+    /// is watched where it is zero but for rounding, and would count as wrong in either state. The place behind the
+    /// others stays zero.
+    pub(super) tolerance: [f64; Cause::KINDS + 1],
+    /// Whether the input has changed, and what rounding does to the loads on stuck bodies is to be looked at anew.
+    pub(super) at_edge: bool,
+    /// Time since the last mode change, s, and how many there have been there.
+    pub(super) since_change: f64,
+    pub(super) changes: usize,
+    pub(super) events: Vec<Event>,
+    pub(super) ties: Vec<Tie>,
+    /// How many events were handed on before those.
+    pub(super) handed_on: usize,
+    pub(super) trouble: Option<Ending>,
+}
+
+/// A value of a condition, and the rounding error of it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Known {
+    pub(super) value: f64,
+    pub(super) noise: f64,
+}
+
+/// The load on a body at rest that would go forward, or backward.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Load {
+    pub(super) value: f64,
+    /// What friction takes of it once the body slides: Coulomb friction, in the direction of the motion.
+    pub(super) sliding: f64,
+    /// What it must pass before the body slides.
+    pub(super) breakaway: f64,
+    pub(super) noise: f64,
+}
+
+/// What the rules ask of a solver, of the present mode and the present state.
+pub(super) trait Between {
+    fn rules(&self) -> &Rules;
+    fn rules_mut(&mut self) -> &mut Rules;
+    fn mechanism(&self) -> &Arc<Mechanism>;
+    fn time(&self) -> f64;
+    /// The time in which the fastest of the machine changes, s.
+    fn reach(&self) -> f64;
+    /// How many conditions the mode has.
+    fn conditions(&self) -> usize;
+    /// What follows where the condition of this number falls.
+    fn transition(&self, index: usize) -> &Transition;
+    /// Its value.
+    fn known(&self, index: usize) -> Known;
+    /// The same where the mode has just begun: the moment at which it did is known to a rounding, too.
+    fn known_at_begin(&self, index: usize) -> Known;
+    /// Looks at all conditions; false if each of them holds for certain.
+    fn look(&mut self) -> bool;
+    /// Whether a condition falls here, by the last look.
+    fn falls(&mut self, index: usize) -> bool;
+    /// The load on a body at rest that would go forward, or backward; gears carry as they do at rest.
+    fn load(&self, body: usize, forward: bool) -> Load;
+    /// Whether the speed of a body tends to zero for ever, and rounding decides when it gets there.
+    fn dies_out(&mut self, body: usize) -> bool;
+    /// Sets a quantity of the state.
+    fn put(&mut self, place: Place, value: f64);
+    /// Takes up the equations of the present mode.
+    fn take_up_mode(&mut self);
+}
+
+impl Rules {
+    /// Those of a run that begins in this mode.
+    pub(super) fn new(mode: Mode) -> Self {
+        Self {
+            mode,
+            fresh: [0; Cause::KINDS],
+            is_fresh: false,
+            tolerance: [0.0; Cause::KINDS + 1],
+            at_edge: true,
+            since_change: f64::INFINITY,
+            changes: 0,
+            events: Vec::new(),
+            ties: Vec::new(),
+            handed_on: 0,
+            trouble: None,
+        }
+    }
+
+    /// How many leading Taylor coefficients of a condition's value are zero by definition.
+    pub(super) fn fresh_order(&self, cause: Cause) -> usize {
+        match cause {
+            Cause::BreakForward(_) | Cause::BreakBackward(_) => 0,
+            cause => usize::from(self.fresh[cause.kind()]),
+        }
+    }
+
+    fn start_fresh(&mut self, cause: Cause, order: u8) {
+        (self.fresh[cause.kind()], self.is_fresh) = (order, true);
+    }
+
+    /// Nothing is fresh any more.
+    pub(super) fn refreshed(&mut self) {
+        if self.is_fresh {
+            (self.fresh, self.is_fresh) = ([0; Cause::KINDS], false);
+        }
+    }
+
+    /// Hands the events on.
+    pub(super) fn hand_on(&mut self, events: &mut Vec<Event>) {
+        self.handed_on += self.events.len();
+        events.append(&mut self.events);
+    }
+
+    /// Ends a run that has had more events than it may have up to `time`.
+    pub(super) fn check_events(&mut self, time: f64) {
+        if (self.handed_on + self.events.len()) as f64 > most_events(time) {
+            self.trouble = Some(Ending::TooManyEvents { time });
+        }
+    }
+
+    /// Whether changes go back and forth at this instant.
+    fn is_back_and_forth(&self) -> bool {
+        self.changes > TURNS_AT_ONCE
+    }
+}
+
+/// Changes modes, without time passing, until every condition holds.
+pub(super) fn settle<B: Between>(solver: &mut B) {
+    for _ in 0..CHANGES_AT_ONCE {
+        let fallen = fallen(solver);
+        // What does not depend on bodies is settled: now their loads are known, and to which rounding.
+        if solver.rules().at_edge && fallen.is_none_or(|fallen| fallen.rank == BODIES) {
+            solver.rules_mut().at_edge = false;
+            widen_all_breakaways(solver);
+            if fallen.is_some() {
+                continue;
+            }
+        }
+        let Some(fallen) = fallen else {
+            start_gears(solver);
+            let time = solver.time();
+            solver.rules_mut().check_events(time);
+            return;
+        };
+        change(solver, fallen);
+        if solver.rules().trouble.is_some() {
+            return;
+        }
+    }
+    solver.rules_mut().trouble = Some(Ending::TooManyEvents { time: solver.time() });
+}
+
+/// The condition that does not hold here; of several, that which is settled first.
+fn fallen<B: Between>(solver: &mut B) -> Option<Transition> {
+    if !solver.look() {
+        return None;
+    }
+    let mut fallen: Option<Transition> = None;
+    for index in 0..solver.conditions() {
+        if solver.falls(index) {
+            let next = *solver.transition(index);
+            if fallen.is_none_or(|first| next.rank < first.rank) {
+                fallen = Some(next);
+            }
+        }
+    }
+    fallen
+}
+
+/// Goes into the mode that follows where a condition falls.
+pub(super) fn change<B: Between>(solver: &mut B, fallen: Transition) {
+    let (time, moment) = (solver.time(), MOMENT * solver.reach());
+    let rules = solver.rules_mut();
+    rules.changes = if rules.since_change <= moment { rules.changes + 1 } else { 0 };
+    rules.since_change = 0.0;
+    if rules.changes > CHANGES_AT_ONCE {
+        rules.trouble = Some(Ending::TooManyEvents { time });
+    }
+    match fallen.then {
+        Then::Become(Next::Moves(body, to)) => move_on(solver, &fallen, body, Some(to)),
+        Then::Decide(body) => move_on(solver, &fallen, body, None),
+        Then::Become(next) => switch(solver, &fallen, next),
+        Then::Leave => rules.trouble = Some(Ending::LeftTravel { time }),
+    }
+}
+
+/// Lets a body do something else; none for what its load decides.
+fn move_on<B: Between>(solver: &mut B, fallen: &Transition, body: usize, to: Option<Motion>) {
+    let mechanism = Arc::clone(solver.mechanism());
+    let stops = to.is_none();
+    let by_rounding = stops && solver.dies_out(body);
+    fallen.resets.each(&mechanism).for_each(|(place, value)| solver.put(place, value));
+    let again = solver.rules().is_back_and_forth();
+    let to = match to {
+        Some(to) => to,
+        // Where rounding turns a body back again and again without a moment passing, it rests.
+        None if again => {
+            note_tie(solver, body);
+            Motion::Stuck
+        }
+        None => decide(solver, body),
+    };
+    // Where it stops, the load is the one on the side it came from.
+    let from = solver.rules().mode.motion[body];
+    let side = if to == Motion::Stuck { from } else { to };
+    let load = solver.load(body, side != Motion::Backward);
+    let order = match to {
+        Motion::Stuck | Motion::Free => 0,
+        _ if stops => 1,
+        // Where breakaway equals Coulomb friction the acceleration starts from zero, but for rounding.
+        _ if (load.value - load.sliding).abs() <= NEAR * load.noise => 2,
+        _ => 1,
+    };
+    let time = solver.time();
+    let rules = solver.rules_mut();
+    rules.start_fresh(Cause::Stop(body), order);
+    mechanism.put_next(&mut rules.mode, Next::Moves(body, to));
+    if fallen.after == After::BreakawaysWiden {
+        for side in [Cause::BreakForward(body), Cause::BreakBackward(body)] {
+            rules.tolerance[side.kind()] = if again { BEGUN } else { NEAR } * load.noise;
+        }
+    }
+    if let Some(what) = fallen.told {
+        let (part, from, to) = (Part::of(&mechanism, what), Status::Motion(from), Status::Motion(to));
+        Event { time, part, from, to, load: load.value, by_rounding }.note(&mut rules.events);
+    }
+    solver.take_up_mode();
+}
+
+/// The motion of a body at zero speed under its present load.
+fn decide<B: Between>(solver: &B, body: usize) -> Motion {
+    let forward = solver.load(body, true);
+    if forward.value > forward.breakaway + forward.noise {
+        return Motion::Forward;
+    }
+    let backward = solver.load(body, false);
+    if backward.value < -backward.breakaway - backward.noise { Motion::Backward } else { Motion::Stuck }
+}
+
+/// Lets a part other than a body do something else.
+fn switch<B: Between>(solver: &mut B, fallen: &Transition, next: Next) {
+    let mechanism = Arc::clone(solver.mechanism());
+    let time = solver.time();
+    let After::PartHolds { gently } = fallen.after else { return };
+    // Let go by the motion and not by an edge of the input, a current leaves its limit with no rate of its own.
+    let begun = |index: &usize| {
+        let Known { value, noise } = solver.known(*index);
+        solver.transition(*index).cause == fallen.cause && value.abs() <= BEGUN * noise
+    };
+    let gently = gently.filter(|_| (0..solver.conditions()).any(|index| begun(&index)));
+    let rules = solver.rules_mut();
+    let from = fallen.told.map(|what| rules.mode.status(what));
+    mechanism.put_next(&mut rules.mode, next);
+    if let (Some(what), Some(from)) = (fallen.told, from) {
+        let (part, to) = (Part::of(&mechanism, what), rules.mode.status(what));
+        Event { time, part, from, to, load: 0.0, by_rounding: false }.note(&mut rules.events);
+    }
+    solver.take_up_mode();
+    fallen.resets.each(&mechanism).for_each(|(place, value)| solver.put(place, value));
+    hold_part(solver, fallen.cause);
+    if let Some(starts) = gently {
+        solver.rules_mut().start_fresh(starts, 2);
+    }
+}
+
+/// Takes what has just become a condition on a part for zero where it is that but for rounding.
+fn hold_part<B: Between>(solver: &mut B, cause: Cause) {
+    for index in 0..solver.conditions() {
+        let own = solver.transition(index).cause;
+        if !own.is_of_same_part(cause) {
+            continue;
+        }
+        let Known { value, noise } = solver.known_at_begin(index);
+        let rules = solver.rules_mut();
+        let (tolerance, order) = match (value.abs() <= BEGUN * noise, rules.is_back_and_forth()) {
+            // A torque that turns again and again without a moment passing is none.
+            (false, true) if matches!(cause, Cause::GearTorque(_)) => (NEAR * value.abs(), 0),
+            (false, _) => (0.0, 0),
+            (true, false) => (f64::max(-value, 0.0), 1),
+            // Where rounding moves a part back and forth without a moment passing, it stays where it is.
+            (true, true) => (BACK_AND_FORTH * noise, 0),
+        };
+        rules.tolerance[own.kind()] = tolerance;
+        rules.start_fresh(own, order);
+    }
+}
+
+/// A load that passes a breakaway by rounding alone does not break it.
+fn widen_all_breakaways<B: Between>(solver: &mut B) {
+    for index in 0..solver.conditions() {
+        if let cause @ (Cause::BreakForward(_) | Cause::BreakBackward(_)) = solver.transition(index).cause {
+            let noise = solver.known(index).noise;
+            let tolerance = &mut solver.rules_mut().tolerance[cause.kind()];
+            *tolerance = tolerance.max(NEAR * noise);
+        }
+    }
+}
+
+/// A torque that starts from zero does so whichever way the gear counts as carrying.
+fn start_gears<B: Between>(solver: &mut B) {
+    for index in 0..solver.conditions() {
+        if let cause @ Cause::GearTorque(_) = solver.transition(index).cause {
+            let Known { value, noise } = solver.known(index);
+            if value.abs() <= NEAR * noise {
+                solver.rules_mut().start_fresh(cause, 1);
+            }
+        }
+    }
+}
+
+/// Notes that rounding decides what a body does.
+pub(super) fn note_tie<B: Between>(solver: &mut B, body: usize) {
+    let tie = Tie { time: solver.time(), part: Part::of(solver.mechanism(), What::Body(body)) };
+    let rules = solver.rules_mut();
+    tie.note(&mut rules.ties, &rules.events);
+}
