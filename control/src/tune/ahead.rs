@@ -1,6 +1,6 @@
 //! Feed-forward beside the gains that were found: it often adds more than any gains.
 
-use super::verdict::Verdict;
+use super::judged::Verdict;
 use super::work::Work;
 use crate::design::{Design, FeedForward, FeedForwardModel, Structure};
 use crate::error::Result;

@@ -6,6 +6,7 @@ use super::evolution::evolve;
 use super::gains::{rounded, shaped};
 use super::objective::{AtWorst, BALANCES, Balance, MoveFigures, Runner, objective};
 use super::search::{Found, minimise_below};
+use super::tried::{Bars, Tried, Weighed};
 use super::watch::Watch;
 use super::work::{FINALISTS, Finalist, Work};
 use crate::case::{Cost, Move};
@@ -66,30 +67,6 @@ const TRIES: usize = 20;
 
 /// Weight of an axis on which the cart settles no more, as a share of that of an error.
 const LOST: f64 = 0.2;
-
-/// A design that was run.
-#[derive(Debug, Clone)]
-pub(super) struct Tried {
-    pub design: Design,
-    pub worst: Vec<AtWorst>,
-    /// The finalist that it was made from, and the powers that lead to it.
-    pub layout: usize,
-    pub powers: Vec<f64>,
-}
-
-/// By what a search by moves weighs a design.
-pub(super) struct Weighed<'a> {
-    pub cost: Cost,
-    /// Figures that none may be worse than.
-    pub bars: Option<Bars<'a>>,
-}
-
-/// Figures before, and how steeply ln J grows with what a figure is worse.
-#[derive(Clone, Copy)]
-pub(super) struct Bars<'a> {
-    pub figures: &'a [AtWorst],
-    pub steep: f64,
-}
 
 impl Work<'_> {
     /// The figures of all moves on one axis.

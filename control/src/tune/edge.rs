@@ -1,8 +1,8 @@
 //! What a search by moves asks of one design at the edge of the limits.
 
-use super::by_moves::{Bars, Tried, Weighed};
 use super::gains::{rounded, shaped};
 use super::objective::{AtWorst, BALANCES};
+use super::tried::{Bars, Tried, Weighed};
 use super::watch::Watch;
 use super::work::{Finalist, STEEP, Work, slowing};
 use super::{HARD, SOFT};

@@ -1,8 +1,9 @@
 //! All the axes that a controller may meet: parameters that are off, loads, places along the travel; and the worst of
 //! them.
 
-use super::margins::{Margins, Plant};
-use super::unknown::{Unknown, tie, with_the_rest};
+use super::margins::Margins;
+use super::plant::Plant;
+use super::unknown::{SPREAD, Unknown, tie, with_the_rest};
 use crate::case::drawn;
 use crate::case::{Case, Tuning};
 use crate::chance::{quantile, uniform};
@@ -16,9 +17,6 @@ use crate::parameter::{self, Free, kinds};
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
 use std::path::Path;
-
-/// Share by which parameters are off where nothing else is said.
-pub const SPREAD: f64 = 0.2;
 
 /// Axes that are drawn, beside the axis of the file with each load.
 pub const MACHINES: usize = 40;

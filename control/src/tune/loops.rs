@@ -11,7 +11,7 @@
 //!
 //! All have the same closed loop, Δ = 0, and margins of their own. With a single measurement both are the same loop.
 
-use super::margins::{Answer, Plant};
+use super::plant::{Answer, Plant};
 use crate::control::feedback::{Feedback, Turn};
 use nalgebra::Complex;
 

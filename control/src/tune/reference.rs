@@ -1,11 +1,12 @@
 //! How far a tuning is from what a long differential evolution of the same objective finds: for tables, and for those
 //! who doubt it.
 
-use super::by_moves::{Bars, Weighed};
 use super::edge::Edge;
 use super::evolution::evolve;
+use super::judged::{Judgement, Verdict};
 use super::search::Found;
-use super::verdict::{Judgement, Verdict, compare};
+use super::tried::{Bars, Weighed};
+use super::verdict::compare;
 use super::work::{Finalist, Work};
 use super::{HARD, Tuned};
 use crate::case::{Case, Cost, Tuning};

@@ -1,6 +1,7 @@
 //! Troubles of a closed loop, as its model and its run show them: not stable, at its limit, howling.
 
-use super::margins::{Margins, Plant};
+use super::margins::Margins;
+use super::plant::Plant;
 use crate::control::MoveRun;
 use crate::control::feedback::Feedback;
 use crate::design::Design;

@@ -1,10 +1,12 @@
 //! Parameters of a machine that are not known exactly.
 
-use super::family::SPREAD;
 use crate::chance::normal_quantile;
 use crate::machine::Machine;
 use crate::number::engineering;
 use crate::parameter::{Free, kinds_without};
+
+/// Share by which parameters are off where nothing else is said.
+pub const SPREAD: f64 = 0.2;
 
 /// A parameter that is not known exactly.
 #[derive(Debug, Clone)]

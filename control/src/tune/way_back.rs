@@ -7,7 +7,8 @@
 
 use super::Judgement;
 use super::gains::{gains, rounded, shaped};
-use super::verdict::{Forced, Verdict, compare, forced};
+use super::judged::{Forced, Verdict};
+use super::verdict::{compare, forced};
 use super::work::Work;
 use crate::design::Design;
 use crate::error::Result;

@@ -1,6 +1,6 @@
 //! Stability of a sampled loop by Nyquist's criterion.
 
-use super::margins::Plant;
+use super::plant::Plant;
 use crate::control::feedback::Turn;
 use nalgebra::Complex;
 use std::f64::consts::PI;

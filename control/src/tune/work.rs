@@ -3,10 +3,11 @@
 
 use super::family::{Family, modes_along};
 use super::gains::{self, rounded, searched, shaped};
-use super::margins::{Margins, Peaks, Plant, Rough};
+use super::judged::Verdict;
+use super::margins::{Margins, Peaks, Rough};
+use super::plant::Plant;
 use super::rules::{layouts, starts};
 use super::search::minimise;
-use super::verdict::Verdict;
 use crate::case::{Case, Move, Tuning};
 use crate::control::feedback::Feedback;
 use crate::design::Design;

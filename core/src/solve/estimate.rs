@@ -1,8 +1,9 @@
 //! The error of a run of the general solver, by a second run with another tolerance, other steps and coarser rounding.
 
-use super::exact::Known;
+use super::known::Known;
 use super::observe::Output;
-use super::run::{Run, Start};
+use super::run::Run;
+use super::running::Start;
 use super::{Course, Detail, Ending, Flow, Outcome, PositionError, Solver};
 use crate::error::Result;
 use crate::machine::Machine;

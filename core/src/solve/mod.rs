@@ -4,10 +4,13 @@ mod check;
 mod choice;
 mod coordinates;
 mod derivatives;
+mod engine;
 mod estimate;
 mod exact;
+mod followed;
 mod general;
 mod inputs;
+mod known;
 mod observe;
 mod pace;
 mod propagator;
@@ -16,6 +19,7 @@ mod roots;
 mod rounding;
 mod rules;
 mod run;
+mod running;
 mod saved;
 mod sensitivity;
 mod simulator;
@@ -339,7 +343,7 @@ pub enum Detail {
 #[derive(Default)]
 pub struct Bench {
     mounted: Option<(Machine, Arc<Mechanism>)>,
-    known: exact::Known,
+    known: known::Known,
 }
 
 impl Bench {
@@ -469,7 +473,7 @@ fn run(machine: &Machine, experiment: &Experiment, solver: Solver, output: Outpu
         check::piecewise_linear(&mechanism)?;
         return table3::run(machine, &mechanism, experiment, step, method, output);
     }
-    Ok(go(&mechanism, experiment, solver, exact::Known::default(), output)?.0)
+    Ok(go(&mechanism, experiment, solver, known::Known::default(), output)?.0)
 }
 
 /// Runs a mechanism along its inputs, and hands rows to `sink` and all that is between them to `observer`: what
@@ -491,9 +495,9 @@ fn go(
     mechanism: &Arc<Mechanism>,
     experiment: &Experiment,
     solver: Solver,
-    known: exact::Known,
+    known: known::Known,
     output: Output,
-) -> Result<(Outcome, exact::Known)> {
+) -> Result<(Outcome, known::Known)> {
     // Smooth inputs carry their derivatives along.
     let degree = experiment.input.degree();
     let start = experiment.start(mechanism);
@@ -502,7 +506,7 @@ fn go(
 }
 
 impl Experiment {
-    fn start(&self, mechanism: &Mechanism) -> run::Start {
-        run::Start { state: self.initial.state(mechanism), until: self.until, every: self.every, noise: 0.0 }
+    fn start(&self, mechanism: &Mechanism) -> running::Start {
+        running::Start { state: self.initial.state(mechanism), until: self.until, every: self.every, noise: 0.0 }
     }
 }

@@ -2,6 +2,7 @@
 
 mod columns;
 mod sheet;
+mod sum;
 
 use super::coordinates::Coordinates;
 use super::observe::{Observe, Output};

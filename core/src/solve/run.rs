@@ -1,8 +1,10 @@
 //! Runs: a machine and a recorder, stepped by whoever decides its inputs.
 
-use super::exact::{self, Known, Make};
+use super::exact::{self, Make};
 use super::inputs::Pieces;
+use super::known::Known;
 use super::observe::{Observe, Output};
+use super::running::{Running, Start};
 use super::{Detail, Flow, Outcome, Solver, check, general};
 use crate::error::{Error, Result};
 use crate::machine::Machine;
@@ -11,17 +13,6 @@ use crate::plan::{Experiment, GantryExperiment};
 use crate::signal::Signal;
 use crate::trajectory::Trajectory;
 use std::sync::Arc;
-
-/// Where a run begins, when it ends, and when there are rows.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Start {
-    pub(super) state: State,
-    pub(super) until: f64,
-    pub(super) every: f64,
-    /// Relative changes of speeds after each step of the general solver, at random; zero in any run but the second one
-    /// of an [`super::ErrorEstimate`].
-    pub(super) noise: f64,
-}
 
 /// The course of one run of a mechanism.
 #[derive(Debug, Clone)]
@@ -41,34 +32,6 @@ impl Course {
     pub fn of(experiment: &GantryExperiment) -> Self {
         let &GantryExperiment { ref inputs, until, every, initial, .. } = experiment;
         Self { inputs: inputs.to_vec(), start: initial, until, every }
-    }
-}
-
-/// A run of one of the solvers.
-pub(super) trait Running {
-    /// Takes up new inputs, now.
-    fn set_input(&mut self, pieces: &Pieces);
-
-    /// Takes up what these signals do from `time`, which is now, on, and says until when that is.
-    fn set_signals(&mut self, signals: &[Signal], time: f64) -> f64 {
-        let pieces = Pieces::of(signals, time);
-        self.set_input(&pieces);
-        pieces.end
-    }
-
-    /// Goes on to `until`, or to the end of the run; false if it ends before.
-    fn advance(&mut self, until: f64) -> bool;
-
-    fn state(&self) -> State;
-
-    fn current(&self, drive: usize) -> f64;
-
-    /// Ends the run where it stands: at its end, where the last row is put out, or before.
-    fn finish(&mut self, is_at_end: bool) -> Outcome;
-
-    /// The modes that it has made ready.
-    fn known(&mut self) -> Known {
-        Known::default()
     }
 }
 

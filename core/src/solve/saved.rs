@@ -1,6 +1,5 @@
 //! A machine under way as plain numbers, and back: what [`Machine::save`](super::Machine::save) hands out.
 
-use super::coordinates::Coordinates;
 use super::inputs::Pieces;
 use crate::friction::Motion;
 use crate::mechanism::{Contact, Limit, Mode, State};
@@ -98,10 +97,6 @@ impl Pass<'_> {
         self.number(&mut pieces.start)?;
         self.number(&mut pieces.end)?;
         pieces.coefficients.iter_mut().try_for_each(|coefficients| self.numbers(coefficients))
-    }
-
-    pub(super) fn coordinates(&mut self, coordinates: &mut Coordinates) -> Passed {
-        coordinates.pass(self)
     }
 }
 

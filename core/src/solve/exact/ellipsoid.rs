@@ -22,7 +22,7 @@
 use super::Core;
 use super::matrices::Watch;
 use crate::friction::Motion;
-use crate::mechanism::{Mechanism, SpringLaw, Transition};
+use crate::mechanism::Transition;
 use crate::solve::propagator::{EXPONENTIAL_REACH, Matrix};
 use crate::solve::saved::{Pass, Passed};
 
@@ -71,14 +71,6 @@ pub(super) struct Crossing<const N: usize> {
     bend: f64,
     /// δg by the rounding of the state alone.
     rounding: f64,
-}
-
-/// Whether errors can grow in a machine of these parts.
-pub(super) fn can_grow(mechanism: &Mechanism) -> bool {
-    mechanism.springs.iter().any(|spring| match spring.law {
-        SpringLaw::Gap { .. } | SpringLaw::Tension { .. } | SpringLaw::Line { .. } => true,
-        SpringLaw::TwoSided | SpringLaw::Bounds { .. } | SpringLaw::None => false,
-    })
 }
 
 impl<const N: usize> Ellipsoid<N> {

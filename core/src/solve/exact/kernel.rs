@@ -27,7 +27,6 @@
 use super::ModeMatrices;
 use crate::mechanism::{BODIES, DRIVES};
 use crate::signal::DEGREE;
-use std::any::Any;
 use std::sync::Arc;
 
 /// Something that is made for one kernel: vectors of `N` places.
@@ -70,23 +69,3 @@ kernels! {
 
 /// The modes of one machine that are ready, in one kernel.
 pub(super) type Modes<const N: usize> = Vec<Arc<ModeMatrices<N>>>;
-
-/// The modes that were made ready, by kernels: what runs of one machine can share.
-#[derive(Default)]
-pub(in crate::solve) struct Known(Vec<Box<dyn Any + Send>>);
-
-impl Known {
-    /// Forgets all of them: another machine.
-    pub(in crate::solve) fn clear(&mut self) {
-        self.0.clear();
-    }
-
-    /// The list of what is of this type, empty where there is none yet: modes of a kernel, or their derivatives.
-    pub(super) fn list<T: Send + 'static>(&mut self) -> &mut Vec<T> {
-        let index = self.0.iter().position(|list| list.is::<Vec<T>>()).unwrap_or_else(|| {
-            self.0.push(Box::new(Vec::<T>::new()));
-            self.0.len() - 1
-        });
-        self.0[index].downcast_mut().expect("a list of this type")
-    }
-}

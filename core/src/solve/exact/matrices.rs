@@ -3,9 +3,8 @@
 mod guards;
 mod shown;
 
-use super::ellipsoid::can_grow;
 use crate::friction::Motion;
-use crate::mechanism::{BODIES, DRIVES, Equations, Form, Layout, Mechanism, Mode, ROUNDING, SPRINGS, State};
+use crate::mechanism::{BODIES, DRIVES, Equations, Form, Layout, Mechanism, Mode, ROUNDING, SPRINGS, SpringLaw, State};
 use crate::signal::DEGREE;
 use crate::solve::propagator::{EXPONENTIAL_REACH, Matrix, SERIES_REACH, Series, series_order};
 use guards::{Beside, LANES, Lanes, Row, Values, side_by_side};
@@ -169,6 +168,14 @@ pub(super) fn straight<const N: usize>(mechanism: &Mechanism, space: &Space, mod
         }
     }
     (equations, rate)
+}
+
+/// Whether errors can grow in a machine of these parts.
+pub(super) fn can_grow(mechanism: &Mechanism) -> bool {
+    mechanism.springs.iter().any(|spring| match spring.law {
+        SpringLaw::Gap { .. } | SpringLaw::Tension { .. } | SpringLaw::Line { .. } => true,
+        SpringLaw::TwoSided | SpringLaw::Bounds { .. } | SpringLaw::None => false,
+    })
 }
 
 /// The size of what the constant parts of accelerations are added up from, where errors can grow.

@@ -20,6 +20,7 @@ mod sensitivity;
 mod shown;
 
 use super::coordinates::Coordinates;
+use super::engine::Engine;
 use super::inputs::Pieces;
 use super::pace::{Pace, STEPS_BETWEEN_QUESTIONS};
 use super::record::Extra;
@@ -27,12 +28,11 @@ use super::roots;
 use super::rounding::Rounding;
 use super::rules::Rules;
 use super::saved::{Pass, Passed};
-use super::simulator::Engine;
 use super::{Cost, Ending, Event, PositionError};
 use crate::mechanism::{DRIVES, Form, Layout, Mechanism, Mode, State, Transition};
 use ellipsoid::Ellipsoid;
 use kernel::Modes;
-pub(super) use kernel::{Known, Make, in_kernel};
+pub(super) use kernel::{Make, in_kernel};
 pub(super) use matrices::Space;
 use matrices::{ModeMatrices, Room, Size};
 pub(super) use run::Run;
@@ -152,7 +152,7 @@ impl<const N: usize> Core<N> {
             asks: false,
         };
         let errors =
-            ellipsoid::can_grow(&common.mechanism).then(|| Box::new(Ellipsoid::new(common.space.layout.states)));
+            matrices::can_grow(&common.mechanism).then(|| Box::new(Ellipsoid::new(common.space.layout.states)));
         Self { z, largest: [0.0; N], matrices, known, shared, room: Box::new(Room::new()), errors, common }
     }
 

@@ -1,13 +1,14 @@
 //! A run: a machine, and a recorder of its rows.
 
-use super::ellipsoid::can_grow;
+use super::matrices::can_grow;
 use super::shown::{ROWS, Watching};
-use super::{Core, Known, ModeMatrices, Space};
+use super::{Core, ModeMatrices, Space};
 use crate::mechanism::{Mechanism, SpringLaw, State};
 use crate::solve::inputs::Pieces;
+use crate::solve::known::Known;
 use crate::solve::observe::Output;
 use crate::solve::record::Recorder;
-use crate::solve::run::{Running, Start};
+use crate::solve::running::{Running, Start};
 use crate::solve::{Detail, Ending, Flow, Grid, Outcome};
 use std::sync::Arc;
 

@@ -16,7 +16,7 @@ impl<const N: usize> Core<N> {
         let start = *common.coordinates.start();
         pass.numbers(&mut self.z)?;
         pass.numbers(&mut self.largest)?;
-        pass.coordinates(&mut common.coordinates)?;
+        common.coordinates.pass(pass)?;
         pass.mode(&mut common.rules.mode)?;
         for fresh in &mut common.rules.fresh {
             let mut order = usize::from(*fresh);

@@ -4,9 +4,9 @@ use super::{Core, Event};
 use crate::error::Result;
 use crate::friction::Motion;
 use crate::mechanism::{BODIES, Cause, DRIVES, Layout, Mechanism, Mode, SpringLaw, State};
+use crate::solve::engine::{Engine, shown};
 use crate::solve::rules::CHANGES_AT_ONCE;
 use crate::solve::saved::{Pass, Passed, restored};
-use crate::solve::simulator::{Engine, shown};
 use crate::solve::{Ending, check};
 use std::sync::Arc;
 

@@ -1,28 +1,20 @@
 //! A run of the general solver: a machine, and a recorder of its rows.
 
-use super::model::Vector;
-use super::shown::Shown;
+use super::rows::Rows;
 use super::stretch::Stretch;
 use super::{Core, Way, Witness};
-use crate::mechanism::{DRIVES, Layout, Mechanism, State};
+use crate::mechanism::{Layout, Mechanism, State};
+use crate::solve::engine::Engine;
 use crate::solve::inputs::Pieces;
 use crate::solve::observe::Output;
 use crate::solve::record::{Recorder, STATE};
-use crate::solve::run::{Running, Start};
-use crate::solve::simulator::Engine;
+use crate::solve::running::{Running, Start};
 use crate::solve::{Detail, Ending, Flow, Grid, Outcome};
 
 /// A run under way.
 pub(in crate::solve) struct Run<'a> {
     core: Core,
     rows: Rows<'a>,
-}
-
-/// Where the rows go, and what is shown.
-pub(super) struct Rows<'a> {
-    grid: Grid,
-    pub(super) recorder: Recorder<'a>,
-    pub(super) shown: Option<Shown>,
 }
 
 impl<'a> Run<'a> {
@@ -95,16 +87,6 @@ impl Running for Run<'_> {
         };
         let events = std::mem::take(&mut core.events);
         Outcome { events, ties: Vec::new(), ending, cost: core.cost, error: None, unmet: core.unmet }
-    }
-}
-
-impl Rows<'_> {
-    /// Puts out a row.
-    fn put_out(&mut self, core: &Core, input: &[f64; DRIVES], y: &Vector) {
-        let model = &core.model;
-        self.recorder.segment(core.taken, &core.coordinates, &core.mode);
-        let extra = model.adds.then(|| model.extra(&core.mode, y));
-        self.recorder.push_state(&model.inner(y), input, extra);
     }
 }
 

@@ -15,7 +15,7 @@ impl Core {
         }
         let start = *self.coordinates.start();
         pass.numbers(&mut self.y)?;
-        pass.coordinates(&mut self.coordinates)?;
+        self.coordinates.pass(pass)?;
         pass.mode(&mut self.mode)?;
         let mut pieces = self.stretch.pieces();
         pass.pieces(&mut pieces)?;

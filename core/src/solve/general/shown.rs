@@ -2,11 +2,11 @@
 
 use super::model::{Model, Vector};
 use super::radau::inverse;
-use super::run::Rows;
+use super::rows::{Rows, Shown};
 use super::{Core, Way};
-use crate::mechanism::{DRIVES, Mechanism, Mode, Shown as Quantity};
+use crate::mechanism::{DRIVES, Mode, Shown as Quantity};
+use crate::solve::engine::Engine;
 use crate::solve::observe::{Curve, Gap, QUANTITIES, Reading, Readout, TERMS};
-use crate::solve::simulator::Engine;
 
 /// Places within a step at which it is shown, its ends among them: as many as a curve has terms.
 const PLACES: usize = TERMS;
@@ -28,22 +28,6 @@ const COEFFICIENTS: [[f64; PLACES]; PLACES] = {
 /// The polynomial through values at k/7.
 fn through(values: &[f64; PLACES]) -> [f64; PLACES] {
     COEFFICIENTS.map(|row| row.iter().zip(values).fold(0.0, |sum, (c, v)| sum + c * v))
-}
-
-/// The readings in a mode, for the mode that was entered last.
-pub(super) struct Shown {
-    mode: Mode,
-    readout: Readout,
-}
-
-impl Shown {
-    fn of<'s>(known: &'s mut Option<Self>, mechanism: &Mechanism, mode: &Mode) -> &'s Readout {
-        let fits = known.as_ref().is_some_and(|known| known.mode == *mode);
-        if !fits {
-            *known = None;
-        }
-        &known.get_or_insert_with(|| Self { mode: *mode, readout: Readout::new(mechanism, mode) }).readout
-    }
 }
 
 impl Rows<'_> {

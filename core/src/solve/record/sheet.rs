@@ -1,7 +1,7 @@
 //! The columns of rows of one mode, made ready once: the forms of forces, currents and voltages, and the quantities
 //! that stand still.
 
-use super::columns::{Places, Sum};
+use super::sum::{Places, Sum};
 use crate::friction::Motion;
 use crate::mechanism::{DriveMode, Mechanism, Mode, SpringLaw, What};
 

@@ -18,12 +18,13 @@
 mod tangent;
 
 use super::run::locate;
-use super::{Core, Known, Make, ModeMatrices, vector};
+use super::{Core, Make, ModeMatrices, vector};
 use crate::friction::Motion;
 use crate::mechanism::{DRIVES, Transition};
+use crate::solve::followed::{Begun, Sensitivities, Task, Variable};
 use crate::solve::inputs::Pieces;
+use crate::solve::known::Known;
 use crate::solve::propagator::Series;
-use crate::solve::sensitivity::{Begun, Sensitivities, Task, Variable};
 use crate::trajectory::Grid;
 use std::sync::Arc;
 pub(super) use tangent::Sloped;

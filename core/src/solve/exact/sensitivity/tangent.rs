@@ -5,8 +5,8 @@ use super::super::matrices::{Space, straight};
 use crate::friction::Motion;
 use crate::mechanism::{Form, Mechanism, Mode, Shown, State};
 use crate::solve::coordinates::Coordinates;
+use crate::solve::followed::Differentiated;
 use crate::solve::propagator::{Columns, Matrix, SlopedStep};
-use crate::solve::sensitivity::Differentiated;
 use std::sync::Arc;
 
 /// Differences up to so many roundings of what they are taken of are none.

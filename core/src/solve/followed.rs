@@ -1,0 +1,69 @@
+//! What is followed with a run: quantities, and the variables that they are differentiated by.
+
+use crate::mechanism::{Mechanism, Shown, State};
+use crate::plan::Experiment;
+use std::sync::Arc;
+
+/// A machine, and the state it begins in.
+#[derive(Debug, Clone)]
+pub struct Begun {
+    /// The machine.
+    pub mechanism: Arc<Mechanism>,
+    /// Its state at time zero.
+    pub start: State,
+}
+
+/// A variable that a run is differentiated by.
+#[derive(Debug, Clone)]
+pub enum Variable {
+    /// A number of the machine, or of its start. Derivatives of the equations by it are differences of the equations:
+    /// w₀ · those of the run's own machine + w₁ · those of the first one here + w₂ · those of the second.
+    Machine {
+        /// The machine and its start at two other values of it.
+        points: Box<[Begun; 2]>,
+        /// w₀, w₁, w₂
+        weights: [f64; 3],
+    },
+    /// All changes of the input come later by so many seconds per unit of it. Where one falls on a row, the derivative
+    /// is that towards later ones.
+    Delay(f64),
+    /// So much is added to the input per unit of it, from the time on, s, at which the input begins.
+    Offset(f64, f64),
+}
+
+impl Variable {
+    /// A number of the machine by central differences of its equations, `machine` being given the distance from where
+    /// it is.
+    pub fn central(h: f64, machine: impl Fn(f64) -> Begun) -> Self {
+        Self::Machine { points: Box::new([machine(h), machine(-h)]), weights: [0.0, 0.5 / h, -0.5 / h] }
+    }
+}
+
+/// The quantity that is differentiated.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Differentiated {
+    /// A column of the run: of way, speed, stretch, force, current, voltage or input.
+    Shown(Shown),
+    /// The acceleration of a body.
+    Acceleration(usize),
+}
+
+/// Derivatives of columns: of each output by each variable, row by row.
+#[derive(Debug, Clone, Default)]
+pub struct Sensitivities {
+    /// The outputs themselves.
+    pub values: Vec<Vec<f64>>,
+    /// Their derivatives, by output, then by variable.
+    pub columns: Vec<Vec<Vec<f64>>>,
+    /// Changes of mode on the way.
+    pub events: u64,
+}
+
+/// Quantities, and the variables that they are differentiated by.
+#[derive(Clone, Copy)]
+pub(super) struct Task<'t> {
+    pub(super) mechanism: &'t Arc<Mechanism>,
+    pub(super) experiment: &'t Experiment,
+    pub(super) variables: &'t [Variable],
+    pub(super) outputs: &'t [Differentiated],
+}

@@ -1,0 +1,23 @@
+//! What runs of one machine can share.
+
+use std::any::Any;
+
+/// The modes that were made ready, by kernels: what runs of one machine can share.
+#[derive(Default)]
+pub(super) struct Known(Vec<Box<dyn Any + Send>>);
+
+impl Known {
+    /// Forgets all of them: another machine.
+    pub(super) fn clear(&mut self) {
+        self.0.clear();
+    }
+
+    /// The list of what is of this type, empty where there is none yet: modes of a kernel, or their derivatives.
+    pub(super) fn list<T: Send + 'static>(&mut self) -> &mut Vec<T> {
+        let index = self.0.iter().position(|list| list.is::<Vec<T>>()).unwrap_or_else(|| {
+            self.0.push(Box::new(Vec::<T>::new()));
+            self.0.len() - 1
+        });
+        self.0[index].downcast_mut().expect("a list of this type")
+    }
+}
