@@ -5,6 +5,7 @@
 //! knows of its conditions ([`Between`]).
 
 use super::pace::most_events;
+use super::saved::{Pass, Passed};
 use super::{Ending, Event, Tie};
 use crate::friction::Motion;
 use crate::mechanism::{After, Cause, Mechanism, Mode, Next, Part, Place, Status, Then, Transition, What};
@@ -17,10 +18,10 @@ const BODIES: u8 = 3;
 pub(super) const MOMENT: f64 = 1e-12;
 
 /// Mode changes allowed at one instant.
-pub(super) const CHANGES_AT_ONCE: usize = 100;
+const CHANGES_AT_ONCE: usize = 100;
 
 /// Changes at one instant after which rounding is taken to turn a part back again and again: it then stays as it is.
-pub(super) const TURNS_AT_ONCE: usize = 20;
+const TURNS_AT_ONCE: usize = 20;
 
 /// A value that is zero but for rounding is within so many times its noise: where it is looked at, where its condition
 /// has just begun to hold, and what it may be below zero by where rounding moves its part back and forth.
@@ -61,7 +62,7 @@ pub(super) struct Known {
     pub(super) noise: f64,
 }
 
-/// The load on a body at rest that would go forward, or backward.
+/// The load on a body at rest that would go forward, or backward, friction apart.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Load {
     pub(super) value: f64,
@@ -78,8 +79,8 @@ pub(super) trait Between {
     fn rules_mut(&mut self) -> &mut Rules;
     fn mechanism(&self) -> &Arc<Mechanism>;
     fn time(&self) -> f64;
-    /// The time in which the fastest of the machine changes, s.
-    fn reach(&self) -> f64;
+    /// The time within which changes count as one instant, s.
+    fn instant(&self) -> f64;
     /// How many conditions the mode has.
     fn conditions(&self) -> usize;
     /// What follows where the condition of this number falls.
@@ -88,6 +89,9 @@ pub(super) trait Between {
     fn known(&self, index: usize) -> Known;
     /// The same where the mode has just begun: the moment at which it did is known to a rounding, too.
     fn known_at_begin(&self, index: usize) -> Known;
+    /// What a condition that has just begun to hold is forgiven beyond that: a solver that knows by their series which
+    /// conditions rise from zero needs nothing.
+    fn margin(&self, index: usize) -> f64;
     /// Looks at all conditions; false if each of them holds for certain.
     fn look(&mut self) -> bool;
     /// Whether a condition falls here, by the last look.
@@ -126,6 +130,23 @@ impl Rules {
             Cause::BreakForward(_) | Cause::BreakBackward(_) => 0,
             cause => usize::from(self.fresh[cause.kind()]),
         }
+    }
+
+    /// As plain numbers; those of a run that has ended early are none.
+    pub(super) fn pass(&mut self, pass: &mut Pass) -> Passed {
+        pass.mode(&mut self.mode)?;
+        for fresh in &mut self.fresh {
+            let mut order = usize::from(*fresh);
+            pass.count(&mut order)?;
+            *fresh = u8::try_from(order).ok()?;
+        }
+        pass.flag(&mut self.is_fresh)?;
+        pass.numbers(&mut self.tolerance)?;
+        pass.flag(&mut self.at_edge)?;
+        pass.number(&mut self.since_change)?;
+        pass.count(&mut self.handed_on)?;
+        pass.count(&mut self.changes)?;
+        (self.tolerance[Cause::KINDS] == 0.0).then_some(())
     }
 
     fn start_fresh(&mut self, cause: Cause, order: u8) {
@@ -203,9 +224,9 @@ fn fallen<B: Between>(solver: &mut B) -> Option<Transition> {
 
 /// Goes into the mode that follows where a condition falls.
 pub(super) fn change<B: Between>(solver: &mut B, fallen: Transition) {
-    let (time, moment) = (solver.time(), MOMENT * solver.reach());
+    let (time, instant) = (solver.time(), solver.instant());
     let rules = solver.rules_mut();
-    rules.changes = if rules.since_change <= moment { rules.changes + 1 } else { 0 };
+    rules.changes = if rules.since_change <= instant { rules.changes + 1 } else { 0 };
     rules.since_change = 0.0;
     if rules.changes > CHANGES_AT_ONCE {
         rules.trouble = Some(Ending::TooManyEvents { time });
@@ -304,13 +325,13 @@ fn hold_part<B: Between>(solver: &mut B, cause: Cause) {
         if !own.is_of_same_part(cause) {
             continue;
         }
-        let Known { value, noise } = solver.known_at_begin(index);
+        let (Known { value, noise }, margin) = (solver.known_at_begin(index), solver.margin(index));
         let rules = solver.rules_mut();
         let (tolerance, order) = match (value.abs() <= BEGUN * noise, rules.is_back_and_forth()) {
             // A torque that turns again and again without a moment passing is none.
             (false, true) if matches!(cause, Cause::GearTorque(_)) => (NEAR * value.abs(), 0),
             (false, _) => (0.0, 0),
-            (true, false) => (f64::max(-value, 0.0), 1),
+            (true, false) => (f64::max(-value, 0.0) + margin, 1),
             // Where rounding moves a part back and forth without a moment passing, it stays where it is.
             (true, true) => (BACK_AND_FORTH * noise, 0),
         };

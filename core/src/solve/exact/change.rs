@@ -3,7 +3,7 @@
 use super::matrices::Room;
 use super::{Core, ModeMatrices};
 use crate::mechanism::{Cause, Mechanism, Place, ROUNDING, Transition};
-use crate::solve::rules::{self, BEGUN, Between, Known, Load, Rules};
+use crate::solve::rules::{self, BEGUN, Between, Known, Load, MOMENT, Rules};
 use std::sync::Arc;
 
 impl<const N: usize> Between for Core<N> {
@@ -23,8 +23,8 @@ impl<const N: usize> Between for Core<N> {
         Core::time(self)
     }
 
-    fn reach(&self) -> f64 {
-        self.matrices.reach()
+    fn instant(&self) -> f64 {
+        MOMENT * self.matrices.reach()
     }
 
     fn conditions(&self) -> usize {
@@ -47,6 +47,10 @@ impl<const N: usize> Between for Core<N> {
         let on_the_way = ROUNDING * law.far() * guard.value(&law.rate(&self.z)).abs();
         let Known { value, noise } = self.known(index);
         Known { value, noise: noise.max(on_the_way) }
+    }
+
+    fn margin(&self, _: usize) -> f64 {
+        0.0
     }
 
     fn look(&mut self) -> bool {

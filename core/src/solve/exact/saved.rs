@@ -1,7 +1,7 @@
 //! The exact solver's machine as plain numbers, and with other numbers of its mechanism.
 
 use super::{Core, ModeMatrices};
-use crate::mechanism::{Cause, Mechanism};
+use crate::mechanism::Mechanism;
 use crate::solve::rules::Between;
 use crate::solve::saved::{Pass, Passed};
 use std::sync::Arc;
@@ -17,21 +17,11 @@ impl<const N: usize> Core<N> {
         pass.numbers(&mut self.z)?;
         pass.numbers(&mut self.largest)?;
         common.coordinates.pass(pass)?;
-        pass.mode(&mut common.rules.mode)?;
-        for fresh in &mut common.rules.fresh {
-            let mut order = usize::from(*fresh);
-            pass.count(&mut order)?;
-            *fresh = u8::try_from(order).ok()?;
-        }
-        pass.flag(&mut common.rules.is_fresh)?;
-        pass.numbers(&mut common.rules.tolerance)?;
-        pass.flag(&mut common.rules.at_edge)?;
+        common.rules.pass(pass)?;
         pass.numbers(&mut common.input_rate)?;
         pass.numbers(&mut common.input_curvature)?;
-        let times = [&mut common.base, &mut common.offset, &mut common.rules.since_change, &mut common.end];
+        let times = [&mut common.base, &mut common.offset, &mut common.end];
         times.into_iter().try_for_each(|time| pass.number(time))?;
-        pass.count(&mut common.rules.handed_on)?;
-        pass.count(&mut common.rules.changes)?;
         pass.bits(&mut common.taken)?;
         pass.bits(&mut common.cost.steps)?;
         pass.bits(&mut common.cost.series)?;
@@ -39,7 +29,7 @@ impl<const N: usize> Core<N> {
         if let Some(errors) = &mut self.errors {
             errors.pass(pass)?;
         }
-        if *common.coordinates.start() != start || common.rules.tolerance[Cause::KINDS] != 0.0 {
+        if *common.coordinates.start() != start {
             return None;
         }
         let (mechanism, space) = (&common.mechanism, &common.space);

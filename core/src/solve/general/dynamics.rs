@@ -5,9 +5,8 @@ use crate::error::Result;
 use crate::friction::Motion;
 use crate::mechanism::{BODIES, Cause, DRIVES, Layout, Mechanism, Mode, SpringLaw, State};
 use crate::solve::engine::{Engine, shown};
-use crate::solve::rules::CHANGES_AT_ONCE;
 use crate::solve::saved::{Pass, Passed, restored};
-use crate::solve::{Ending, check};
+use crate::solve::{Ending, check, rules};
 use std::sync::Arc;
 
 /// Allowance for rounding and for a stranger's integrator, as a share of a quantity.
@@ -44,7 +43,9 @@ impl Dynamics {
     pub fn new(mechanism: &Mechanism, start: &State) -> Result<Self> {
         check::state(start)?;
         let errors = (TOLERANCE, check::fastest_rate(mechanism));
-        let core = Core::new(mechanism, Layout::new(mechanism), start, errors, (f64::INFINITY, f64::INFINITY));
+        let steps = (f64::INFINITY, f64::INFINITY);
+        let mut core = Core::new(mechanism, Layout::new(mechanism), start, errors, steps);
+        core.outside = Some(SHIFT);
         let (quantities, kinds) = (quantities(mechanism), kinds(mechanism));
         Ok(Self { core, quantities, kinds })
     }
@@ -66,7 +67,7 @@ impl Dynamics {
 
     /// The states of its parts.
     pub fn mode(&self) -> &Mode {
-        &self.core.mode
+        &self.core.rules.mode
     }
 
     /// Puts time, s, the quantities and the inputs in place.
@@ -130,11 +131,11 @@ impl Dynamics {
         let rate = core.field().rate(&core.input(), &core.y);
         for (into, quantity) in into.iter_mut().zip(&self.quantities) {
             *into = match *quantity {
-                Quantity::Position(body) if core.mode.motion[body] == Motion::Stuck => 0.0,
+                Quantity::Position(body) if core.rules.mode.motion[body] == Motion::Stuck => 0.0,
                 Quantity::Position(body) => core.y[model.speed(body)],
                 Quantity::Speed(body) => rate[model.speed(body)],
                 Quantity::Current(drive) => model.current[drive].map_or(0.0, |place| rate[place]),
-                Quantity::Bristle(body) => model.bristle_rate(body, &core.mode, &core.y),
+                Quantity::Bristle(body) => model.bristle_rate(body, &core.rules.mode, &core.y),
             } + 0.0;
         }
     }
@@ -159,16 +160,8 @@ impl Dynamics {
         let core = &self.core;
         let field = core.field();
         let values = field.guards(&core.input(), &core.y);
-        let watches: Vec<Cause> = field.watches.to_vec();
-        watches.into_iter().zip(values).map(|(cause, value)| {
-            let tolerance = match cause {
-                Cause::Stop(body) => core.absolute[core.model.speed(body)],
-                Cause::GearTorque(drive) => core.torque_slack[drive],
-                cause => core.slack[cause.kind()],
-            };
-            // A torque that nothing tells from zero is not watched.
-            (cause, if tolerance.is_finite() { value + tolerance + SHIFT } else { 1.0 })
-        })
+        let watches: Vec<Cause> = field.watches.iter().map(|watch| watch.cause).collect();
+        watches.into_iter().zip(values).map(move |(cause, value)| (cause, value + core.forgiven(cause) + SHIFT))
     }
 
     /// Whether a condition has fallen.
@@ -180,21 +173,10 @@ impl Dynamics {
     /// if it put quantities elsewhere: a body that stops has no speed.
     pub fn settle(&mut self, events: &mut Vec<Event>) -> std::result::Result<bool, Ending> {
         let before = self.core.y;
-        self.core.forgive_loads();
-        for _ in 0..CHANGES_AT_ONCE {
-            let fallen = self.watched().filter(|(_, value)| *value <= 0.0).min_by_key(|(cause, _)| cause.rank());
-            let Some((cause, _)) = fallen else { break };
-            self.core.change(cause);
-            if self.core.trouble.is_some() {
-                break;
-            }
-        }
-        if self.core.trouble.is_none() && self.is_over() {
-            self.core.trouble = Some(Ending::TooManyEvents { time: self.core.time() });
-        }
-        self.core.check_events();
-        self.core.hand_on(events);
-        self.core.trouble.map_or(Ok(self.core.y != before), Err)
+        self.core.rules.at_edge = true;
+        rules::settle(&mut self.core);
+        self.core.rules.hand_on(events);
+        self.core.rules.trouble.map_or(Ok(self.core.y != before), Err)
     }
 
     /// The value of each column of the mechanism now, in SI units; `into` has a place for each.

@@ -4,7 +4,7 @@ use super::linear::{Linear, Output, STATES, States};
 use super::model::{MOST_GUARDS, Model, Vector};
 use super::sources::Source;
 use crate::friction::{Law, Motion};
-use crate::mechanism::{BODIES, Cause, DRIVES, Equations, Form, Mode, ROUNDING, Switch};
+use crate::mechanism::{BODIES, Cause, DRIVES, Equations, Form, Mode, ROUNDING, Switch, Transition};
 use std::sync::Arc;
 
 /// A guard as a row.
@@ -19,7 +19,7 @@ pub(super) struct Field {
     pub(super) model: Arc<Model>,
     pub(super) mode: Mode,
     equations: Equations,
-    pub(super) watches: Vec<Cause>,
+    pub(super) watches: Vec<Transition>,
     guards: Vec<Guard>,
     pub(super) linear: Linear,
     pub(super) sources: Vec<Source>,
@@ -70,7 +70,7 @@ impl Field {
             Guard { row, input: form.input, constant: form.constant }
         };
         let guards = equations.guards.iter().map(|part| guard(&part.form)).collect();
-        let watches = equations.guards.iter().map(|guard| guard.transition.cause).collect();
+        let watches = equations.guards.iter().map(|guard| guard.transition).collect();
         let mut field = Self {
             model: Arc::clone(model),
             mode: *mode,
@@ -166,7 +166,7 @@ impl Field {
     fn add_outputs(&mut self) {
         let arguments = self.linear.arguments;
         for (index, guard) in self.guards.iter().enumerate() {
-            let source = self.on_sources(self.watches[index]);
+            let source = self.on_sources(self.watches[index].cause);
             let output = Output { row: guard.row, input: guard.input, constant: guard.constant, source };
             let plain = output.source.iter().all(|weight| *weight == 0.0)
                 && output.constant == 0.0
@@ -291,7 +291,7 @@ impl Field {
                 *value = output.source.iter().zip(&forces).fold(*value, |sum, (weight, force)| sum + weight * force);
             }
             if self.shifted {
-                *value += self.shift(self.watches[index], y);
+                *value += self.shift(self.watches[index].cause, y);
             }
         }
         values

@@ -6,6 +6,7 @@
 //! along which guards are searched for their first fall, so that two crossings within a step are seen. A step with an
 //! event in it is taken again up to the event.
 
+mod change;
 mod dynamics;
 mod fall;
 mod field;
@@ -26,22 +27,19 @@ mod stretch;
 use super::coordinates::Coordinates;
 use super::engine::Engine;
 use super::inputs::Pieces;
-use super::pace::{Pace, STEPS_BETWEEN_QUESTIONS, most_events};
+use super::pace::{Pace, STEPS_BETWEEN_QUESTIONS};
 use super::record::Extra;
-use super::rules::{CHANGES_AT_ONCE, MOMENT, TURNS_AT_ONCE};
+use super::rules::{self, Rules};
 use super::saved::{Pass, Passed};
 use super::{Cost, Ending, Event, PositionError};
 use crate::error::{Error, Result};
-use crate::friction::{Law, Motion};
-use crate::mechanism::{
-    AmplifierMode, Cause, DRIVES, Kind, Layout, Limit, Mechanism, Mode, Part, State, Status, Switch,
-};
-use crate::mechanism::{Form, What};
+use crate::friction::Law;
+use crate::mechanism::{DRIVES, Form, Kind, Layout, Mechanism, Mode, State, Transition};
 use crate::signal::DEGREE;
 pub use dynamics::{Dynamics, Quantity};
 use field::Field;
 use linear::Set;
-use model::{MOST, Model, Vector};
+use model::{MOST, MOST_GUARDS, Model, Vector};
 pub(super) use run::Run;
 use std::sync::Arc;
 use step::Room;
@@ -91,7 +89,7 @@ pub(super) struct Core {
     relative: f64,
     absolute: Vector,
     y: Vector,
-    pub(super) mode: Mode,
+    pub(super) rules: Rules,
     known: Vec<Known>,
     /// The number of the present mode among them.
     present: usize,
@@ -99,26 +97,20 @@ pub(super) struct Core {
     stretch: Stretch,
     /// Where it stands, counted from the beginning of the stretch, s.
     tau: f64,
-    /// By how much the load on a stuck body may pass its limit before it counts, and for a moment after it has changed
-    /// what any other part is watched by.
-    slack: [f64; Cause::KINDS],
-    /// The same for a gear's torque, and the largest torque that it has carried, N m at the motor's shaft.
-    torque_slack: [f64; DRIVES],
+    /// The largest torque that each gear has carried, N m at the motor's shaft.
     torque: [f64; DRIVES],
-    changed_at: f64,
-    changes: usize,
+    /// Values of the conditions at the last look.
+    values: [f64; MOST_GUARDS],
+    /// Where steps do not tell of speeds that pass zero: what a condition may be above zero by and has fallen.
+    outside: Option<f64>,
     pace: Pace,
     end: f64,
-    pub(super) events: Vec<Event>,
-    /// How many events were handed on before those.
-    handed_on: usize,
     /// How many modes have been taken up.
     taken: u64,
     /// Number of events whose own condition does not hold at their time.
     unmet: u64,
     noise: Noise,
     pub(super) cost: Cost,
-    pub(super) trouble: Option<Ending>,
 }
 
 /// Random numbers between −`size` and `size`, the same in every run.
@@ -174,7 +166,7 @@ impl Witness for Nobody {
 struct Hit {
     tau: f64,
     y: Vector,
-    cause: Cause,
+    fallen: Transition,
 }
 
 impl Core {
@@ -226,26 +218,21 @@ impl Core {
             relative: tolerance,
             absolute,
             y,
-            mode,
+            rules: Rules::new(mode),
             known: vec![Known { field, sets: Vec::new() }],
             present: 0,
             room: None,
             stretch: Stretch::of(Pieces::held(&[], 0.0, 0.0), f64::INFINITY),
             tau: 0.0,
-            slack: [0.0; Cause::KINDS],
-            torque_slack: [0.0; DRIVES],
             torque: [0.0; DRIVES],
-            changed_at: f64::NEG_INFINITY,
-            changes: 0,
+            values: [0.0; MOST_GUARDS],
+            outside: None,
             pace: Pace::default(),
             end,
-            events: Vec::new(),
-            handed_on: 0,
             taken: 0,
             unmet: 0,
             noise: Noise::default(),
             cost: Cost { modes: 1, ..Cost::default() },
-            trouble: None,
         }
     }
 
@@ -257,7 +244,8 @@ impl Core {
     fn take_up(&mut self, stretch: Stretch) {
         self.cost.pieces += 1;
         (self.stretch, self.tau) = (stretch, 0.0);
-        self.resolve();
+        self.rules.at_edge = true;
+        rules::settle(self);
     }
 
     /// The present mode made ready.
@@ -265,198 +253,15 @@ impl Core {
         Arc::clone(&self.known[self.present].field)
     }
 
-    /// The motion of a body at zero speed under its present load.
-    fn decide(&self, body: usize, input: &[f64; DRIVES]) -> Motion {
-        let (model, state) = (&*self.model, &self.y);
-        let (mode, noise) = (&self.mode, model.noise(body, &self.mode, state, input));
-        let held = model.bristle_force(body, state);
-        if model.load(body, true, mode, state, input) - held > model.breakaway(body, true, state) + noise {
-            Motion::Forward
-        } else if model.load(body, false, mode, state, input) - held < -model.breakaway(body, false, state) - noise {
-            Motion::Backward
-        } else {
-            Motion::Stuck
-        }
-    }
-
-    /// Goes into the mode that follows when `cause` ends the present one.
-    fn change(&mut self, cause: Cause) {
-        let time = self.time();
-        let at_once = time - self.changed_at <= MOMENT * self.moment + 4.0 * f64::EPSILON * time;
-        self.changes = if at_once { self.changes + 1 } else { 0 };
-        self.changed_at = time;
-        if self.changes > CHANGES_AT_ONCE {
-            self.trouble = Some(Ending::TooManyEvents { time });
-        }
-        let again = self.changes > TURNS_AT_ONCE;
-        let input = &self.input();
-        let by_rounding = self.is_by_tolerance(cause);
-        let (body, to) = match cause {
-            Cause::GearTorque(drive) => {
-                let positive = &mut self.mode.drive[drive].torque_positive;
-                *positive = !*positive;
-                // Where rounding calls it negative either way it is zero.
-                self.torque_slack[drive] = if again { f64::INFINITY } else { self.relative * self.torque[drive] };
-                self.enter();
-                return;
-            }
-            Cause::Switch(switch) => {
-                self.switch(switch);
-                return;
-            }
-            Cause::Leave(_) => {
-                self.trouble = Some(Ending::LeftTravel { time });
-                return;
-            }
-            Cause::Stop(body) => {
-                for follower in self.model.mechanism.followers(body) {
-                    self.y[self.model.speed(follower)] = 0.0;
-                }
-                (body, if again { Motion::Stuck } else { self.decide(body, input) })
-            }
-            Cause::BreakForward(body) => (body, Motion::Forward),
-            Cause::BreakBackward(body) => (body, Motion::Backward),
-        };
-        let from = self.mode.motion[body];
-        let side = if to == Motion::Stuck { from } else { to };
-        let forward = side != Motion::Backward;
-        let load = self.model.load(body, forward, &self.mode, &self.y, input);
-        for (cause, tolerance) in self.tolerances_at_rest(body, input) {
-            self.slack[cause.kind()] = if again { 10.0 } else { 1.0 } * tolerance;
-        }
-        for follower in self.model.mechanism.followers(body) {
-            self.mode.motion[follower] = to;
-        }
-        // That the gear holds a rotor is nobody's stick.
-        if !self.model.mechanism.bodies[body].is_rotor {
-            let part = Part::of(&self.model.mechanism, What::Body(body));
-            let (from, to) = (Status::Motion(from), Status::Motion(to));
-            Event { time, part, from, to, load, by_rounding }.note(&mut self.events);
-        }
-        self.enter();
-    }
-
-    /// By how much the load on a body at rest may pass its breakaway on either side before it counts: what rounding may
-    /// do to it.
-    fn tolerances_at_rest(&self, body: usize, input: &[f64; DRIVES]) -> [(Cause, f64); 2] {
-        let noise = 2.0 * self.model.noise(body, &self.mode, &self.y, input);
-        [(Cause::BreakForward(body), true), (Cause::BreakBackward(body), false)]
-            .map(|(cause, forward)| (cause, noise.max(1e-12 * self.model.breakaway(body, forward, &self.y))))
-    }
-
-    /// Whether a body stops where the tolerance decides: what still slows it down is less than the formula may be off
-    /// by.
-    fn is_by_tolerance(&self, cause: Cause) -> bool {
-        let Cause::Stop(body) = cause else { return false };
-        let rate = self.field().rate(&self.input(), &self.y);
-        let place = self.model.speed(body);
-        // Within the time in which the fastest of it changes.
-        rate[place].abs() * self.moment <= self.absolute[place]
-    }
-
-    /// Lets a part other than a body do something else.
-    fn switch(&mut self, switch: Switch) {
-        let (time, what) = (self.time(), switch.what());
-        let from = self.mode.status(what);
-        self.mode.switch(switch);
-        let (part, to) = (Part::of(&self.model.mechanism, what), self.mode.status(what));
-        Event { time, part, from, to, load: 0.0, by_rounding: false }.note(&mut self.events);
-        if let Switch::Current(drive, side) = switch {
-            let amplifier = &self.model.mechanism.drives[drive].amplifier;
-            if let (Some(place), AmplifierMode::Voltage) = (self.model.current[drive], amplifier.mode)
-                && side != Limit::Inside
-            {
-                // It stands at its limit, to the last bit.
-                self.y[place] = side.sign() * amplifier.current_limit.unwrap_or(0.0);
-            }
-        }
-        self.enter();
-        // What has just become a condition on this part is zero but for what the integrator may be off by.
-        let (field, input) = (self.field(), self.input());
-        let guards = field.guards(&input, &self.y);
-        for (index, cause) in field.watches.iter().enumerate() {
-            if cause.is_of_same_part(Cause::Switch(switch)) {
-                let rounding = field.rounding(index, &self.absolute.map(|absolute| absolute / self.relative));
-                let error = (self.relative * field.size(index, &input, &self.y)).max(rounding);
-                let error = if self.changes > TURNS_AT_ONCE { 10.0 * error } else { error };
-                let zero = guards[index].abs() <= 4.0 * error;
-                self.slack[cause.kind()] = if zero { f64::max(-guards[index], 0.0) + error } else { 0.0 };
-            }
-        }
-    }
-
-    fn enter(&mut self) {
-        self.taken += 1;
-        self.coordinates.hold(&self.model.layout, &self.mode, &self.model.inner(&self.y));
-        self.make_ready();
-    }
-
     /// Has the equations of the mode at hand.
     fn make_ready(&mut self) {
-        let known = self.known.iter().position(|known| known.field.mode == self.mode);
+        let known = self.known.iter().position(|known| known.field.mode == self.rules.mode);
         self.present = known.unwrap_or_else(|| {
-            let field = Arc::new(Field::new(&self.model, &self.mode));
+            let field = Arc::new(Field::new(&self.model, &self.rules.mode));
             self.known.push(Known { field, sets: Vec::new() });
             self.cost.modes += 1;
             self.known.len() - 1
         });
-    }
-
-    /// After an edge of the input too, a load that passes a breakaway by rounding alone does not break it.
-    fn forgive_loads(&mut self) {
-        let (model, input) = (Arc::clone(&self.model), self.input());
-        for body in model.mechanism.leaders().filter(|body| self.mode.motion[*body] == Motion::Stuck) {
-            for (cause, tolerance) in self.tolerances_at_rest(body, &input) {
-                let own = &mut self.slack[cause.kind()];
-                *own = own.max(tolerance);
-            }
-        }
-    }
-
-    /// Changes modes, without time passing, until every load that is held can be.
-    fn resolve(&mut self) {
-        let time = self.time();
-        if self.tau == 0.0 {
-            self.forgive_loads();
-        }
-        for _ in 0..CHANGES_AT_ONCE {
-            let field = self.field();
-            let guards = field.guards(&self.input(), &self.y);
-            let falls = |&(cause, value): &(Cause, f64)| match cause {
-                // A speed tells by itself, over the next step.
-                Cause::Stop(_) => false,
-                Cause::GearTorque(drive) => value < -self.torque_slack[drive],
-                cause => value < -self.slack[cause.kind()],
-            };
-            let fallen = field.watches.iter().copied().zip(guards).filter(falls).min_by_key(|(cause, _)| cause.rank());
-            match fallen {
-                Some((cause, _)) => {
-                    self.change(cause);
-                    if self.trouble.is_some() {
-                        return;
-                    }
-                }
-                None => {
-                    self.check_events();
-                    return;
-                }
-            }
-        }
-        self.trouble = Some(Ending::TooManyEvents { time });
-    }
-
-    /// Ends a run that has had more events than it may have by now.
-    fn check_events(&mut self) {
-        let time = self.time();
-        if (self.handed_on + self.events.len()) as f64 > most_events(time) {
-            self.trouble = Some(Ending::TooManyEvents { time });
-        }
-    }
-
-    /// Hands the events on.
-    fn hand_on(&mut self, events: &mut Vec<Event>) {
-        self.handed_on += self.events.len();
-        events.append(&mut self.events);
     }
 }
 
@@ -492,11 +297,11 @@ impl Engine for Core {
         self.end = until;
         self.pace = Pace::since(self.cost.steps, self.time());
         self.stretch.end = until;
-        if self.trouble.is_none() && self.tau < self.stretch.length() {
+        if self.rules.trouble.is_none() && self.tau < self.stretch.length() {
             self.reach(&mut Nobody);
         }
-        self.hand_on(events);
-        self.trouble.map_or(Ok(()), Err)
+        self.rules.hand_on(events);
+        self.rules.trouble.map_or(Ok(()), Err)
     }
 
     fn state(&self) -> State {
@@ -504,7 +309,7 @@ impl Engine for Core {
     }
 
     fn mode(&self) -> &Mode {
-        &self.mode
+        &self.rules.mode
     }
 
     fn input(&self) -> [f64; DRIVES] {
@@ -516,7 +321,7 @@ impl Engine for Core {
     }
 
     fn extra(&self) -> Extra {
-        self.model.extra(&self.mode, &self.y)
+        self.model.extra(&self.rules.mode, &self.y)
     }
 
     fn replace(&mut self, mechanism: &Mechanism) {

@@ -293,12 +293,8 @@ impl Model {
     /// All forces on a body but its friction, for a body that goes, or is about to go, forward or backward.
     pub(super) fn load(&self, body: usize, forward: bool, mode: &Mode, y: &[f64], input: &[f64; DRIVES]) -> f64 {
         let inner = self.inner(y);
-        let mut settled = *mode;
-        for (drive, _) in self.mechanism.drives.iter().enumerate().filter(|(_, drive)| drive.loses()) {
-            let torque = self.mechanism.torque_at_rest(drive, mode);
-            settled.drive[drive].torque_positive = self.value(&torque, &inner, input) >= 0.0;
-        }
-        self.value(&self.mechanism.load(body, forward, &settled), &inner, input) + self.loads(mode, y)[body]
+        let resting = self.mechanism.resting_mode(mode, |form| self.value(form, &inner, input));
+        self.value(&self.mechanism.load(body, forward, &resting), &inner, input) + self.loads(mode, y)[body]
     }
 
     /// Its rounding error.

@@ -34,8 +34,8 @@ impl Rows<'_> {
     /// Puts out a row.
     pub(super) fn put_out(&mut self, core: &Core, input: &[f64; DRIVES], y: &Vector) {
         let model = &core.model;
-        self.recorder.segment(core.taken, &core.coordinates, &core.mode);
-        let extra = model.adds.then(|| model.extra(&core.mode, y));
+        self.recorder.segment(core.taken, &core.coordinates, &core.rules.mode);
+        let extra = model.adds.then(|| model.extra(&core.rules.mode, y));
         self.recorder.push_state(&model.inner(y), input, extra);
     }
 }

@@ -37,8 +37,8 @@ impl<'a> Run<'a> {
 
     /// Notices that the receiver wants no more.
     fn heed(&mut self) {
-        if self.rows.recorder.flow == Flow::Stop && self.core.trouble.is_none() {
-            self.core.trouble = Some(Ending::Interrupted { time: self.core.time() });
+        if self.rows.recorder.flow == Flow::Stop && self.core.rules.trouble.is_none() {
+            self.core.rules.trouble = Some(Ending::Interrupted { time: self.core.time() });
         }
     }
 }
@@ -49,14 +49,14 @@ impl Running for Run<'_> {
     }
 
     fn advance(&mut self, until: f64) -> bool {
-        if self.core.trouble.is_none() {
+        if self.core.rules.trouble.is_none() {
             let whole = self.core.stretch.end;
             self.core.stretch.end = until.min(whole);
             self.core.reach(&mut self.rows);
             self.core.stretch.end = whole;
         }
         self.heed();
-        self.core.trouble.is_none()
+        self.core.rules.trouble.is_none()
     }
 
     fn state(&self) -> State {
@@ -64,14 +64,14 @@ impl Running for Run<'_> {
     }
 
     fn current(&self, drive: usize) -> f64 {
-        self.core.value(&self.core.model.mechanism.current(drive, &self.core.mode))
+        self.core.value(&self.core.model.mechanism.current(drive, &self.core.rules.mode))
     }
 
     fn finish(&mut self, is_at_end: bool) -> Outcome {
-        if self.core.trouble.is_none() && !is_at_end {
-            self.core.trouble = Some(Ending::Interrupted { time: self.core.time() });
+        if self.core.rules.trouble.is_none() && !is_at_end {
+            self.core.rules.trouble = Some(Ending::Interrupted { time: self.core.time() });
         }
-        if self.core.trouble.is_none() {
+        if self.core.rules.trouble.is_none() {
             let core = &self.core;
             self.rows.put_out(core, &core.input(), &core.y);
             self.heed();
@@ -80,12 +80,12 @@ impl Running for Run<'_> {
         self.rows.recorder.finish();
         let core = &mut self.core;
         core.cost.samples = self.rows.recorder.rows;
-        let ending = match (core.trouble, self.rows.recorder.flow) {
+        let ending = match (core.rules.trouble, self.rows.recorder.flow) {
             (Some(trouble), _) => trouble,
             (None, Flow::Stop) => Ending::Interrupted { time: core.time() },
             (None, Flow::Continue) => Ending::Complete,
         };
-        let events = std::mem::take(&mut core.events);
+        let events = std::mem::take(&mut core.rules.events);
         Outcome { events, ties: Vec::new(), ending, cost: core.cost, error: None, unmet: core.unmet }
     }
 }
@@ -115,8 +115,8 @@ impl Witness for Rows<'_> {
                 break;
             }
         }
-        if self.recorder.flow == Flow::Stop && core.trouble.is_none() {
-            core.trouble = Some(Ending::Interrupted { time: stretch.begin + way.to });
+        if self.recorder.flow == Flow::Stop && core.rules.trouble.is_none() {
+            core.rules.trouble = Some(Ending::Interrupted { time: stretch.begin + way.to });
         }
     }
 

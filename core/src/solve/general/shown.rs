@@ -36,7 +36,7 @@ impl Rows<'_> {
         if self.recorder.observer.is_none() {
             return;
         }
-        let (model, mode) = (&*core.model, &core.mode);
+        let (model, mode) = (&*core.model, &core.rules.mode);
         let readout = Shown::of(&mut self.shown, &model.mechanism, mode);
         // A polynomial of degree seven follows what swings by a radian to 1e-9 of itself.
         let parts = ((way.until - way.from) / core.moment).ceil().clamp(1.0, MOST_PARTS);
@@ -67,7 +67,7 @@ impl Rows<'_> {
 
     /// The run has ended.
     pub(super) fn end_shown(&mut self, core: &Core) {
-        let (model, mode) = (&*core.model, &core.mode);
+        let (model, mode) = (&*core.model, &core.rules.mode);
         let (state, time) = (core.state(), core.time());
         let Some(observer) = &mut self.recorder.observer else { return };
         let readout = Shown::of(&mut self.shown, &model.mechanism, mode);

@@ -8,8 +8,8 @@ use super::radau::{POINTS, REACH, TERMS};
 use super::step::{ARGUMENTS, Begin, Guess, Lanes, Room, SOURCES, Step};
 use super::stretch::Stretch;
 use super::{Core, Hit, STEPS_BETWEEN_QUESTIONS, Way, Witness};
-use crate::mechanism::Cause;
-use crate::solve::Ending;
+use crate::mechanism::{Cause, Transition};
+use crate::solve::{Ending, rules};
 use std::cell::RefCell;
 use std::sync::Arc;
 
@@ -59,11 +59,11 @@ struct Length {
 impl Core {
     /// Advances to the end of the stretch, event by event.
     pub(super) fn reach(&mut self, witness: &mut dyn Witness) {
-        while self.tau < self.stretch.length() && self.trouble.is_none() {
+        while self.tau < self.stretch.length() && self.rules.trouble.is_none() {
             let Some(hit) = self.integrate(witness) else { continue };
             (self.y, self.tau) = (hit.y, hit.tau);
-            self.change(hit.cause);
-            self.resolve();
+            rules::change(self, hit.fallen);
+            rules::settle(self);
         }
     }
 
@@ -78,7 +78,7 @@ impl Core {
         field.forces(&self.y, &mut forces);
         room.begin(&forces);
         let mut hit = None;
-        while hit.is_none() && self.trouble.is_none() {
+        while hit.is_none() && self.rules.trouble.is_none() {
             if stretch.length() - self.tau <= 64.0 * f64::EPSILON * stretch.length() {
                 // What is left is no step, but rounding.
                 self.tau = stretch.length();
@@ -126,7 +126,7 @@ impl Core {
                 }
                 _ if least => {
                     // Not even the smallest step will do: this is no motion any more.
-                    self.trouble = Some(Ending::Diverged { time: stretch.begin + from });
+                    self.rules.trouble = Some(Ending::Diverged { time: stretch.begin + from });
                     return None;
                 }
                 _ => {
@@ -208,13 +208,14 @@ impl Core {
         let (field, start) = (step.field, *step.begin);
         let time = stretch.begin + to;
         if self.cost.steps.is_multiple_of(STEPS_BETWEEN_QUESTIONS) {
-            self.trouble = self.pace.too_stiff(self.cost.steps, time, self.end);
+            self.rules.trouble = self.pace.too_stiff(self.cost.steps, time, self.end);
         }
         let mut dense =
             Dense { field, start, set: step.set, h: step.set.h, whole: step.whole, is_expanded: !step.whole };
         let fall = self.first_fall(room, &mut dense);
         let hit = fall.map(|fall| self.up_to(room, &mut dense, (from, to), &fall));
         let until = hit.as_ref().map_or(to, |hit| hit.tau);
+        self.rules.since_change += until - from;
         let rests = end == *start.y
             && stretch.degree == 0
             && field.rate(&stretch.input(from), start.y).iter().all(|rate| *rate == 0.0);
@@ -228,8 +229,8 @@ impl Core {
             witness.see(self, &Way { stretch, from, until, to, begin: start.y, rests, dense: &at });
         }
         let asks = self.cost.steps.is_multiple_of(STEPS_BETWEEN_QUESTIONS);
-        if (asks || self.trouble.is_some()) && !witness.ask() && self.trouble.is_none() {
-            self.trouble = Some(Ending::Interrupted { time });
+        if (asks || self.rules.trouble.is_some()) && !witness.ask() && self.rules.trouble.is_none() {
+            self.rules.trouble = Some(Ending::Interrupted { time });
         }
         (self.y, self.tau) = (end, to);
         self.shake();
@@ -256,7 +257,7 @@ impl Core {
         if is_told {
             room.tell_guards(field, dense.set, &start);
         }
-        for (index, &cause) in field.watches.iter().enumerate() {
+        for (index, &Transition { cause, .. }) in field.watches.iter().enumerate() {
             let shift = if field.shifted { field.shift(cause, start.y) } else { 0.0 };
             let values: [f64; POINTS] = match is_told {
                 true => room.told[index].map(|value| value + shift),
@@ -268,15 +269,10 @@ impl Core {
             if let Cause::GearTorque(drive) = cause {
                 self.torque[drive] = values.iter().fold(self.torque[drive], |most, value| most.max(value.abs()));
                 // What was told by nothing but rounding is told by the step.
-                self.torque_slack[drive] = self.relative * self.torque[drive];
+                self.rules.tolerance[cause.kind()] = self.relative * self.torque[drive];
             }
-            let slack = match cause {
-                // What the laws' error may do is no stop, least of all where a body has just begun to slide.
-                Cause::Stop(body) => self.absolute[self.model.speed(body)],
-                Cause::GearTorque(drive) => self.torque_slack[drive],
-                cause => self.slack[cause.kind()],
-            };
-            let own = &mut self.slack[cause.kind()];
+            let slack = self.forgiven(cause);
+            let own = &mut self.rules.tolerance[cause.kind()];
             if matches!(cause, Cause::Switch(_)) && values[POINTS - 1] > 10.0 * *own {
                 // A part that has clearly left its edge is watched to the last bit again.
                 *own = 0.0;
@@ -300,7 +296,8 @@ impl Core {
 
     /// The state at a fall: the step is taken again up to there, until it ends at the fall.
     fn up_to(&mut self, room: &mut Room, dense: &mut Dense, (from, to): (f64, f64), fall: &Fall) -> Hit {
-        let (field, stretch, cause) = (dense.field, self.stretch, dense.field.watches[fall.index]);
+        let (field, stretch, fallen) = (dense.field, self.stretch, dense.field.watches[fall.index]);
+        let cause = fallen.cause;
         let (begin, length) = (dense.start.y, to - from);
         let shift = if field.shifted { field.shift(cause, begin) } else { 0.0 };
         // A speed that has fallen through is looked for where it was zero.
@@ -326,7 +323,7 @@ impl Core {
             share = fall::zero_near(&coefficients, room.series.order, 1.0);
         }
         let span = (share * dense.h).min(length);
-        let hit = Hit { tau: from + span, y: dense.at(room, span / dense.h), cause };
+        let hit = Hit { tau: from + span, y: dense.at(room, span / dense.h), fallen };
         let check = Check { index: fall.index, slack, change };
         if self.off(field, &check, &hit).abs() <= 1.0 {
             hit
@@ -352,7 +349,7 @@ impl Core {
             if !dense.shorten(room, &stretch, number, (from, middle)) {
                 break;
             }
-            let there = Hit { tau: from + middle, y: dense.at(room, 1.0), cause: best.cause };
+            let there = Hit { tau: from + middle, y: dense.at(room, 1.0), fallen: best.fallen };
             let off = self.off(field, check, &there);
             if off.abs() < self.off(field, check, &best).abs() {
                 best = there;
@@ -380,7 +377,7 @@ impl Core {
         let input = self.stretch.input(hit.tau);
         let value = field.guards(&input, &hit.y)[check.index] + check.slack;
         let allowed = self.relative * field.size(check.index, &input, &hit.y) + check.change;
-        let allowed = match hit.cause {
+        let allowed = match hit.fallen.cause {
             Cause::Stop(body) => allowed.max(self.absolute[self.model.speed(body)]),
             Cause::BreakForward(_)
             | Cause::BreakBackward(_)
