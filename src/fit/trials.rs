@@ -8,10 +8,11 @@ use super::HUBER;
 use super::least_squares::{Ending, Options, minimise};
 use super::problem::Problem;
 use super::run::Nuisance;
+use super::scores::beside_log;
 use super::search::Searched;
 use super::uncertainty::Judged;
 use crate::case::{Case, Plan, Scope};
-use crate::log::{Log, Quantity, Remedy, Severity, Survey};
+use crate::log::{Log, Note, Quantity, Remedy, Severity, Survey, jumps_text};
 use crate::solve::Flow;
 use std::sync::Arc;
 
@@ -26,6 +27,9 @@ const WORSE: f64 = 2.0;
 
 /// Mean square of the residuals of samples that are said to be wrong, over that of the others where they do not count.
 const STAND_OUT: f64 = 9.0;
+
+/// Part of a jump that the motion of the model has to leave for it to be one.
+const JUMP: f64 = 0.5;
 
 /// The same of a delay, and how many standard errors it has to be away from none.
 const LATE: f64 = 0.8;
@@ -48,13 +52,32 @@ pub(super) fn surveys(case: &Case, plan: &Plan, found: &Searched) -> Vec<Survey>
     let logs = case.experiments.iter().filter_map(|experiment| experiment.log.as_ref());
     let tested = |log: &Arc<Log>| {
         let mut survey = Survey::new(log, &case.machine);
+        survey.notes.iter_mut().for_each(|note| leave_motion(case, found, log, note));
         survey.notes.retain(|note| match &note.remedy {
+            Some(Remedy::Step(_, jumps)) if jumps.is_empty() => false,
             Some(remedy) if note.severity != Severity::Fact => is_borne_out(case, plan, found, &log.name, remedy),
             _ => true,
         });
         survey
     };
     logs.map(tested).collect()
+}
+
+/// Leaves out of a note on jumps those that are motion: the fitted model makes them too, as an axis does that slips
+/// between two samples.
+fn leave_motion(case: &Case, found: &Searched, log: &Log, note: &mut Note) {
+    let Some(Remedy::Step(quantity, jumps)) = &mut note.remedy else { return };
+    let Some(experiment) = case.experiments.iter().find(|experiment| experiment.name == log.name) else { return };
+    let model = beside_log(&found.problem.stage_at(&found.best.x), experiment);
+    let output = model.iter().flat_map(|model| &model.outputs).find(|output| output.quantity == *quantity);
+    let Some(output) = output else { return };
+    jumps.retain(|jump| {
+        let step = |values: &[f64]| values[jump.sample] - values[jump.sample - 1];
+        let left = step(&output.seen) - step(&output.model);
+        // What the model does not reach, it does not explain.
+        left.is_nan() || left * jump.size.signum() > JUMP * jump.size.abs()
+    });
+    note.text = jumps_text(jumps, quantity.unit());
 }
 
 /// Whether the logs are met better with the log of this name as `remedy` has it; true where that cannot be said.

@@ -23,7 +23,8 @@ pub use guess::{Guess, Looked, Seen, look};
 pub use mapping::{Clock, Mapping, Source, Unit};
 pub use presets::{End, In, PRESETS, Pick, Preset};
 pub use sheet::{ColumnId, Dialect, Filter};
-pub use survey::{Channel, Clipped, Gap, Motion, Note, Outlier, Remedy, Severity, Steady, Survey, Timing};
+pub(crate) use survey::jumps_text;
+pub use survey::{Channel, Clipped, Gap, Jump, Motion, Note, Outlier, Remedy, Severity, Steady, Survey, Timing};
 
 use crate::error::Result;
 use crate::signal::{Hold, Signal};
