@@ -45,6 +45,7 @@ enum Fault {
     ClippedOutput,
     Late,
     Wraps,
+    LostCounts,
     Outliers,
     Gap,
     /// Nothing, with parameters that are rough.
@@ -71,6 +72,7 @@ const FAULTS: &[(&str, Fault, &[&str])] = &[
     ("the output is clipped at both ends", Fault::ClippedOutput, &["saturation"]),
     ("the output is 8 ms late", Fault::Late, &["delay"]),
     ("the angle wraps", Fault::Wraps, &["wraps"]),
+    ("the counter loses 300 counts", Fault::LostCounts, &["jumps"]),
     ("five outliers", Fault::Outliers, &["outliers"]),
     ("a gap of 60 ms in motion", Fault::Gap, &["gap-in-motion"]),
     ("good: parameters off by up to 2", Fault::None, &[]),
@@ -191,6 +193,10 @@ fn made(fault: Fault, seed: u64) -> Case {
             shown.rotate_right(8);
             let first = shown[8];
             shown[..8].fill(first);
+        }
+        Fault::LostCounts => {
+            let place = 300 + chance.between(0.0, 2400.0) as usize;
+            shown[place..].iter_mut().for_each(|v| *v -= 300.0 * step);
         }
         Fault::Wraps => shown.iter_mut().for_each(|v| *v = (*v + 3.0).rem_euclid(TAU)),
         Fault::Outliers => {

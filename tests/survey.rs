@@ -184,6 +184,9 @@ fn faults_of_single_columns() {
     let mut wraps = only(&log, Quantity::DriveAngle);
     values(&mut wraps, Quantity::DriveAngle).iter_mut().for_each(|phi| *phi = (*phi + 3.0).rem_euclid(TAU));
     says(&wraps, "wraps", "a full turn");
+    let mut lost = only(&log, Quantity::DriveAngle);
+    values(&mut lost, Quantity::DriveAngle)[700..].iter_mut().for_each(|phi| *phi -= 0.02);
+    says(&lost, "jumps", "mrad at 0.7 s");
     let mut coarse = only(&log, Quantity::CartPosition);
     values(&mut coarse, Quantity::CartPosition).iter_mut().for_each(|x| *x = (*x / 0.01).round() * 0.01);
     says(&coarse, "quantisation", "steps of 10 mm");

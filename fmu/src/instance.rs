@@ -147,6 +147,8 @@ pub struct Instance {
     pub(crate) forces: Vec<f64>,
     pub(crate) plant: Plant,
     pub(crate) control: Option<Stepped>,
+    /// True once a reference ahead of time was other than zero: whoever sets none has it extrapolated.
+    pub(crate) sees_ahead: bool,
     /// Whether inputs were set that the plant does not know yet; and whether the columns are those of now.
     pub(crate) is_set: bool,
     pub(crate) columns: Option<Vec<f64>>,
@@ -170,6 +172,7 @@ impl Instance {
             forces: Vec::new(),
             plant: Plant::None,
             control: None,
+            sees_ahead: false,
             is_set: true,
             columns: None,
             is_over: false,
@@ -216,6 +219,7 @@ impl Instance {
             forces: vec![0.0; model.loads.len()],
             plant: Plant::None,
             control: None,
+            sees_ahead: false,
             is_set: true,
             columns: None,
             is_over: false,
@@ -441,6 +445,7 @@ pub(crate) fn place(model: &Model, role: Role) -> Option<usize> {
         Role::Input(drive) => Some(drive),
         Role::Reference(k) => Some(k),
         Role::Force(load) => Some(first + load),
+        Role::Ahead(k) => Some(first + model.loads.len() + k),
         Role::Time
         | Role::Parameter(..)
         | Role::Output(_)

@@ -4,7 +4,7 @@ use crate::instance::{Input, Instance, Phase, Plant, Refusal, Told};
 use taut_control::control::Stepped;
 
 /// The first eight of such bytes.
-const MARK: u64 = u64::from_le_bytes(*b"tautfmu2");
+const MARK: u64 = u64::from_le_bytes(*b"tautfmu3");
 
 const PHASES: [Phase; 7] = [
     Phase::Instantiated,
@@ -21,7 +21,7 @@ impl Instance {
     pub fn bytes(&self) -> Told<Vec<u8>> {
         let mut list = vec![MARK, taut_core::chance::hash(self.model.token.bytes()), u64::from(self.exchanges())];
         list.push(PHASES.iter().position(|phase| *phase == self.phase).unwrap_or_default() as u64);
-        list.extend([self.is_set, self.is_over, self.stop.is_some()].map(u64::from));
+        list.extend([self.is_set, self.is_over, self.stop.is_some(), self.sees_ahead].map(u64::from));
         let numbers = [self.time, self.begin, self.stop.unwrap_or(0.0)];
         let inputs = self.inputs.iter().flat_map(|input| std::iter::once(&input.since).chain(&input.coefficients));
         let all = numbers
@@ -67,7 +67,7 @@ impl Instance {
         }
         let phase = usize::try_from(next()?).ok().and_then(|phase| PHASES.get(phase));
         other.phase = *phase.ok_or_else(wrong)?;
-        let mut flags = [false; 3];
+        let mut flags = [false; 4];
         for flag in &mut flags {
             *flag = match next()? {
                 0 => false,
@@ -118,6 +118,7 @@ impl Instance {
         [other.is_set, other.is_over] = [flags[0], flags[1]];
         [other.time, other.begin] = [times[0], times[1]];
         other.stop = flags[2].then_some(times[2]);
+        other.sees_ahead = flags[3];
         Ok(other)
     }
 }

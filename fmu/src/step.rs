@@ -1,10 +1,10 @@
 //! Time goes on: steps of co-simulation, and what an integrator asks of model exchange.
 
-use crate::instance::{Instance, Phase, Plant, Refusal, Status, Told};
+use crate::instance::{Instance, Phase, Plant, Refusal, Status, Told, place};
 use taut_core::mechanism::Shown;
 use taut_core::signal::profile::Reference;
 use taut_core::solve::{Ending, Event};
-use taut_export::fmu::REFERENCES;
+use taut_export::fmu::{REFERENCES, Role};
 
 /// Part of a step that a clock may be off by.
 const NEAR: f64 = 1e-9;
@@ -95,10 +95,10 @@ impl Instance {
 
     /// One decision of the controller.
     fn sample(&mut self) -> Told<()> {
-        let (time, inputs) = (self.time, &self.inputs);
-        let [position, speed, acceleration, jerk, snap]: [f64; REFERENCES] =
-            std::array::from_fn(|k| inputs[k].at(time));
-        let reference = Reference { position, speed, acceleration, jerk, snap };
+        let reference = self.referred(Role::Reference);
+        let ahead = self.model.lead().map(|_| self.referred(Role::Ahead));
+        self.sees_ahead |= ahead.is_some_and(|ahead| ahead != Reference::default());
+        let ahead = ahead.filter(|_| self.sees_ahead);
         let quantities = self.integrated()?;
         let (state, column) = match &self.plant {
             Plant::Machine(machine) => {
@@ -114,10 +114,17 @@ impl Instance {
         };
         let current = self.current(column)?;
         if let Some(control) = &mut self.control {
-            control.decide(&state, current, &reference);
+            control.decide(&state, current, &reference, ahead.as_ref());
         }
         (self.is_set, self.columns) = (true, None);
         Ok(())
+    }
+
+    /// A reference from its five inputs now.
+    fn referred(&self, role: fn(usize) -> Role) -> Reference {
+        let value = |k: usize| place(&self.model, role(k)).map_or(0.0, |place| self.inputs[place].at(self.time));
+        let [position, speed, acceleration, jerk, snap]: [f64; REFERENCES] = std::array::from_fn(value);
+        Reference { position, speed, acceleration, jerk, snap }
     }
 
     /// The current of the drive just before inputs that were set act.

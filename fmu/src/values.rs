@@ -60,7 +60,7 @@ impl Instance {
     fn real(&mut self, role: Role) -> Told<f64> {
         Ok(match role {
             Role::Time => self.time,
-            Role::Input(_) | Role::Force(_) | Role::Reference(_) => {
+            Role::Input(_) | Role::Force(_) | Role::Reference(_) | Role::Ahead(_) => {
                 place(&self.model, role).map_or(0.0, |place| self.inputs[place].at(self.time))
             }
             Role::Parameter(index, _) => self.parameters[index],
@@ -232,7 +232,7 @@ impl Instance {
     fn may_set(&self, variable: &Variable) -> Told<()> {
         let before = matches!(self.phase, Phase::Instantiated | Phase::Initialization);
         let may = match variable.role {
-            Role::Input(_) | Role::Force(_) | Role::Reference(_) => true,
+            Role::Input(_) | Role::Force(_) | Role::Reference(_) | Role::Ahead(_) => true,
             // Of model exchange in event mode, of co-simulation between steps too.
             Role::Parameter(_, tunable) => before || (tunable && self.phase != Phase::Continuous),
             Role::Output(_) | Role::Quantity(_) => before && variable.quantity.is_some(),

@@ -75,9 +75,9 @@ impl Loop {
             if machine.scale.is_some() {
                 state.position[CART] = seen[1];
             }
-            stepped.decide(&state, seen[2], &Reference::default());
+            stepped.decide(&state, seen[2], &Reference::default(), None);
             if rest > 0.0 {
-                stepped.decide(&state, seen[2], &Reference::default());
+                stepped.decide(&state, seen[2], &Reference::default(), None);
             }
             let mut saved = stepped.save();
             saved.pop();

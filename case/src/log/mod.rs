@@ -24,7 +24,9 @@ pub use guess::{Guess, Looked, Seen, look};
 pub use mapping::{Clock, Mapping, Source, Unit};
 pub use presets::{End, In, PRESETS, Pick, Preset};
 pub use sheet::{ColumnId, Dialect, Filter};
-pub use survey::{Channel, Clipped, Gap, Motion, Note, Outlier, Remedy, Severity, Steady, Survey, Timing};
+pub use survey::{
+    Channel, Clipped, Gap, Jump, Motion, Note, Outlier, Remedy, Severity, Steady, Survey, Timing, jumps_text,
+};
 
 use crate::error::Result;
 use sheet::Request;

@@ -4,11 +4,13 @@ use super::variable::{Kind, Role, Variable, named, plain, rate_unit, typed, typi
 use super::{REFERENCES, resource};
 use crate::case::Opened;
 use crate::chance::hash;
-use crate::design::Design;
+use crate::control::Loop;
+use crate::design::{Design, FeedForwardModel};
 use crate::error::{Error, Result};
 use crate::machine::{Machine, axis};
 use crate::mechanism::{Amplifier, AmplifierMode, DRIVES, Drive, Heading, Label, Mechanism, Motor, Shown, State};
 use crate::parameter::{self, Free, Parameter, unit_for};
+use crate::quantity::shortest;
 use crate::solve::{Dynamics, Quantity, check_stage};
 use crate::{controller, without_controller};
 
@@ -265,6 +267,12 @@ impl Model {
         list
     }
 
+    /// Lead of the feed-forward inside, s, if it evaluates the reference ahead of time.
+    pub fn lead(&self) -> Option<f64> {
+        let design = self.design.as_ref().filter(|design| design.feed_forward.model != FeedForwardModel::None)?;
+        Some(Loop::of(design).lead).filter(|lead| *lead > 0.0)
+    }
+
     fn inputs(&self, mechanism: &Mechanism) -> Vec<Variable> {
         let mut list = Vec::new();
         let mut add = |name: String, words: String, unit, shown: &str, role| {
@@ -272,6 +280,9 @@ impl Model {
             let (start, shown) = (Some(0.0), shown.to_string());
             list.push(Variable { start, shown, ..plain(reference, &name, &words, unit, role) });
         };
+        const ENDINGS: [&str; REFERENCES] = ["", "_speed", "_acceleration", "_jerk", "_snap"];
+        const UNITS: [(&str, &str); REFERENCES] =
+            [("m", "mm"), ("m/s", "mm/s"), ("m/s^2", ""), ("m/s^3", ""), ("m/s^4", "")];
         if self.design.is_some() {
             let what = [
                 "Reference of the cart: where it should be.",
@@ -280,11 +291,8 @@ impl Model {
                 "Its jerk.",
                 "Its snap.",
             ];
-            let names: [String; REFERENCES] =
-                ["", "_speed", "_acceleration", "_jerk", "_snap"].map(|end| format!("reference{end}"));
-            let units = [("m", "mm"), ("m/s", "mm/s"), ("m/s^2", ""), ("m/s^3", ""), ("m/s^4", "")];
-            for (k, ((name, words), (unit, shown))) in names.into_iter().zip(what).zip(units).enumerate() {
-                add(name, words.into(), unit, shown, Role::Reference(k));
+            for (k, ((end, words), (unit, shown))) in ENDINGS.into_iter().zip(what).zip(UNITS).enumerate() {
+                add(format!("reference{end}"), words.into(), unit, shown, Role::Reference(k));
             }
         } else {
             for (index, drive) in mechanism.drives.iter().take(self.drives()).enumerate() {
@@ -297,6 +305,13 @@ impl Model {
             let label = mechanism.bodies[*body].label;
             let words = format!("Force on the {} from outside, towards larger positions.", label.name);
             add(format!("{}_force", label.key), words, "N", "", Role::Force(index));
+        }
+        if let Some(lead) = self.lead() {
+            let what = ["Reference", "Speed of the reference", "Its acceleration", "Its jerk", "Its snap"];
+            for (k, ((end, what), (unit, shown))) in ENDINGS.into_iter().zip(what).zip(UNITS).enumerate() {
+                let words = format!("{what} {} s ahead of time, for the feed-forward.", shortest(lead));
+                add(format!("reference_ahead{end}"), words, unit, shown, Role::Ahead(k));
+            }
         }
         list
     }

@@ -48,6 +48,8 @@ pub enum Role {
     Force(usize),
     /// Where the controller's cart should be: position, speed, acceleration, jerk, snap.
     Reference(usize),
+    /// The same one lead of the feed-forward later.
+    Ahead(usize),
     /// A number of the machine, by its place among these, and whether it may change under way.
     Parameter(usize, bool),
     /// A column of a run.
@@ -97,7 +99,7 @@ impl Variable {
     pub fn causality(&self) -> Causality {
         match self.role {
             Role::Time => Causality::Independent,
-            Role::Input(_) | Role::Force(_) | Role::Reference(_) => Causality::Input,
+            Role::Input(_) | Role::Force(_) | Role::Reference(_) | Role::Ahead(_) => Causality::Input,
             Role::Parameter(..) => Causality::Parameter,
             Role::Output(_) | Role::Error | Role::Command => Causality::Output,
             Role::Quantity(_) | Role::Rate(_) | Role::Condition(_) => Causality::Local,

@@ -502,6 +502,11 @@ pub(crate) const UNIT_WORSE: f64 = 2.0;
 /// Unit: 1. Source: three standard deviations, squared.
 pub(crate) const STAND_OUT: f64 = 9.0;
 
+/// Share of a jump of a measured position that the motion of the fitted model has to leave for it to be one.
+///
+/// Unit: 1. Source: chosen.
+pub(crate) const JUMP: f64 = 0.5;
+
 /// Root mean square residual with a delay, relative to that without, below which the delay is borne out.
 ///
 /// Unit: 1. Source: chosen. Test: `narrow_band_noise_is_no_delay`.

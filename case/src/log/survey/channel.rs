@@ -1,7 +1,7 @@
 //! One column of a log: its extent, steps, noise, and the samples that stand out.
 
-use super::super::Output;
-use super::timing::Timing;
+use super::super::{Output, Quantity};
+use super::timing::{GAP, Timing};
 use super::{Note, Remedy, Severity, is_position, median, percent, quantile, shown};
 
 /// Unit of an acceleration, which jumps by its nature.
@@ -9,6 +9,11 @@ const ACCELERATION: &str = "m/s^2";
 
 /// An outlier is off by so many times the usual deviation from its neighbours.
 const OUTLYING: f64 = 10.0;
+
+/// A jump is this many times as large as any deviation of the neighbouring steps from their median; and the number of
+/// those on either side.
+const JUMP: f64 = 5.0;
+const BESIDE: usize = 3;
 
 /// The shortest run at an extreme value that may be a limit, samples.
 const CLIPPED: usize = 5;
@@ -43,6 +48,8 @@ pub struct Channel {
     pub clipped: Vec<Clipped>,
     /// Jumps by a full turn, where the column may be an angle that wraps.
     pub wraps: usize,
+    /// Jumps of a position by any other amount.
+    pub jumps: Vec<Jump>,
     /// How many different values there are, counted up to 1000.
     pub levels: usize,
 }
@@ -58,6 +65,17 @@ pub struct Outlier {
     pub value: f64,
     /// The value that its neighbours suggest.
     pub expected: f64,
+}
+
+/// A step from one sample to the next that the motion before and after it does not account for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Jump {
+    /// The first sample after it, from 0.
+    pub sample: usize,
+    /// The time of that sample, s.
+    pub time: f64,
+    /// Its size, beyond the usual step at that place.
+    pub size: f64,
 }
 
 /// A run of equal values at an extreme.
@@ -93,9 +111,13 @@ impl Channel {
             outliers: Vec::new(),
             clipped: Vec::new(),
             wraps: 0,
+            jumps: Vec::new(),
             levels: sorted.len().min(1000),
         };
         channel.wraps = channel.count_wraps(values);
+        if channel.wraps == 0 {
+            channel.jumps = channel.find_jumps(values, time);
+        }
         channel.outliers = channel.find_outliers(values, time);
         channel.clipped = channel.find_clipped(values, time);
         channel
@@ -122,6 +144,31 @@ impl Channel {
         let jumps = values.windows(2).map(|pair| (pair[1] - pair[0]).abs());
         let usual = quantile(&jumps.clone().collect::<Vec<_>>(), 0.95);
         jumps.filter(|jump| (jump - turn).abs() < 0.1 * turn && *jump > 5.0 * usual).count()
+    }
+
+    /// Steps of a position that differ from the steps on both sides by far more than these do among each other.
+    fn find_jumps(&self, values: &[f64], time: &[f64]) -> Vec<Jump> {
+        if !Quantity::ALL.iter().any(|quantity| quantity.name() == self.name && is_position(*quantity)) {
+            return Vec::new();
+        }
+        let steps: Vec<f64> = values.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        let usual_interval = median(&mut time.windows(2).map(|pair| pair[1] - pair[0]).collect::<Vec<_>>());
+        // The step beyond the median of those beside it, and the largest such deviation of these themselves.
+        let beyond = |k: usize| {
+            let beside = [&steps[k - BESIDE..k], &steps[k + 1..=k + BESIDE]].concat();
+            let middle = median(&mut beside.clone());
+            let apart = beside.iter().map(|step| (step - middle).abs()).fold(0.0, f64::max);
+            let is_regular = (k - BESIDE..=k + BESIDE).all(|k| time[k + 1] - time[k] < GAP * usual_interval);
+            let is_known = steps[k - BESIDE..=k + BESIDE].iter().all(|step| step.is_finite());
+            (is_regular && is_known).then_some((steps[k] - middle, apart))
+        };
+        let inner = BESIDE..steps.len().saturating_sub(BESIDE);
+        let all: Vec<(usize, f64, f64)> =
+            inner.filter_map(|k| beyond(k).map(|(size, apart)| (k, size, apart))).collect();
+        let usual = 1.4826 * median(&mut all.iter().map(|(_, size, _)| size.abs()).collect::<Vec<_>>());
+        let least = OUTLYING * usual.max(self.resolution());
+        let found = all.into_iter().filter(|(_, size, apart)| size.abs() > least.max(JUMP * apart));
+        found.map(|(k, size, _)| Jump { sample: k + 1, time: time[k + 1], size }).collect()
     }
 
     /// Single samples that are far from both neighbours, on the same side.
@@ -262,7 +309,11 @@ impl Channel {
                 Severity::Suspicion,
                 format!("it jumps by {turn} {} times: a counter that wraps; unwrap it before use", self.wraps),
             );
-        } else if let Some(first) = self.outliers.first() {
+        }
+        if !self.jumps.is_empty() {
+            note("jumps", Severity::Suspicion, jumps_text(&self.jumps, self.unit));
+        }
+        if let Some(first) = self.outliers.first().filter(|_| self.wraps == 0) {
             let n = self.outliers.len();
             let (is, expected, at) = (value(first.value), value(first.expected), seconds(first.time));
             let text = match n {
@@ -312,6 +363,7 @@ impl Channel {
     fn remedy(&self, code: &str, output: &Output) -> Option<Remedy> {
         match code {
             "wraps" => self.turn().map(|turn| Remedy::Unwrap(output.quantity, turn)),
+            "jumps" => Some(Remedy::Step(output.quantity, self.jumps.clone())),
             "outliers" => {
                 let samples = self.outliers.iter().map(|outlier| outlier.sample).collect();
                 Some(Remedy::Leave(output.quantity, samples))
@@ -328,6 +380,21 @@ impl Channel {
             (_, step) => step.map(|step| 65536.0 * step),
         }
     }
+}
+
+/// The note on jumps of a position in this unit; there is at least one.
+pub fn jumps_text(jumps: &[Jump], unit: &str) -> String {
+    let first = jumps.first().map(|jump| format!("{} at {}", shown(jump.size, unit), shown(jump.time, "s")));
+    let more = match jumps.len() {
+        0 | 1 => String::new(),
+        2 => ", and once more".into(),
+        n => format!(", and {} more times", n - 1),
+    };
+    format!(
+        "it jumps by {}{more}, which is not motion: lost counts, a counter that was reset, or a belt that skipped teeth; take \
+         the jumps out, or split the log there",
+        first.unwrap_or_default()
+    )
 }
 
 /// Length and first sample of the longest run that satisfies `holds`.

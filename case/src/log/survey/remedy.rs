@@ -1,5 +1,6 @@
 //! What would mend a log, if a suspicion were right: a model can be put through both.
 
+use super::Jump;
 use crate::log::{Log, Quantity};
 
 /// A change of a log with which a suspicion would be gone.
@@ -19,6 +20,8 @@ pub enum Remedy {
     Exchange(Quantity, Quantity),
     /// Jumps of this size taken out of an output.
     Unwrap(Quantity, f64),
+    /// Jumps taken out of an output.
+    Step(Quantity, Vec<Jump>),
     /// Samples of an output that do not count.
     Leave(Quantity, Vec<usize>),
 }
@@ -53,6 +56,11 @@ impl Remedy {
                 }
             }
             Self::Unwrap(quantity, turn) => of(quantity, &mut |values| unwrap(values, *turn)),
+            Self::Step(quantity, jumps) => of(quantity, &mut |values| {
+                for &Jump { sample, size, .. } in jumps {
+                    values.iter_mut().skip(sample).for_each(|value| *value -= size);
+                }
+            }),
             Self::Leave(quantity, samples) => of(quantity, &mut |values| {
                 for &k in samples {
                     values[k] = f64::NAN;

@@ -3,7 +3,7 @@
 use super::{Note, Severity, median, percent, shown};
 
 /// Steps longer than so many intervals are gaps.
-const GAP: f64 = 1.75;
+pub(super) const GAP: f64 = 1.75;
 
 /// Steps closer than this, as a share of the interval, are the same.
 const SAME: f64 = 1e-6;

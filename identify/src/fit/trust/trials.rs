@@ -4,17 +4,19 @@
 //! Correlations and regressions are quick, and are wrong where noise is narrow-band, where a belt is elastic or where
 //! parameters are far off. A log that is mended, or an input that comes later, has to leave markedly less.
 
+use super::scores::beside_log;
 use super::uncertainty::Judged;
 use crate::case::{Case, Plan, Scope};
 use crate::fit::asked::problem::Problem;
 use crate::fit::asked::run::Nuisance;
 use crate::fit::limits::{
-    DELAY_ERRORS, DELAY_MENDS, HUBER, MENDED, NO_WORSE, ROUGH_TOLERANCE, STAND_OUT, TRIAL_FIT_ITERATIONS, UNIT_WORSE,
+    DELAY_ERRORS, DELAY_MENDS, HUBER, JUMP, MENDED, NO_WORSE, ROUGH_TOLERANCE, STAND_OUT, TRIAL_FIT_ITERATIONS,
+    UNIT_WORSE,
 };
 use crate::fit::search::least_squares::minimise;
 use crate::fit::search::point::{Ending, Minimum, Options};
 use crate::fit::search::starts::Searched;
-use crate::log::{Log, Quantity, Remedy, Severity, Survey};
+use crate::log::{Log, Note, Quantity, Remedy, Severity, Survey, jumps_text};
 use crate::solve::Flow;
 use std::sync::Arc;
 
@@ -31,13 +33,32 @@ pub(crate) fn surveys(case: &Case, plan: &Plan, found: &Searched) -> Vec<Survey>
     let logs = case.experiments.iter().filter_map(|experiment| experiment.log.as_ref());
     let tested = |log: &Arc<Log>| {
         let mut survey = Survey::new(log, &case.machine);
+        survey.notes.iter_mut().for_each(|note| leave_motion(case, found, log, note));
         survey.notes.retain(|note| match &note.remedy {
+            Some(Remedy::Step(_, jumps)) if jumps.is_empty() => false,
             Some(remedy) if note.severity != Severity::Fact => is_borne_out(case, plan, found, &log.name, remedy),
             _ => true,
         });
         survey
     };
     logs.map(tested).collect()
+}
+
+/// Leaves out of a note on jumps those that are motion: the fitted model makes them too, as an axis does that slips
+/// between two samples.
+fn leave_motion(case: &Case, found: &Searched, log: &Log, note: &mut Note) {
+    let Some(Remedy::Step(quantity, jumps)) = &mut note.remedy else { return };
+    let Some(experiment) = case.experiments.iter().find(|experiment| experiment.name == log.name) else { return };
+    let model = beside_log(&found.problem.stage_at(&found.best.x), experiment);
+    let output = model.iter().flat_map(|model| &model.outputs).find(|output| output.quantity == *quantity);
+    let Some(output) = output else { return };
+    jumps.retain(|jump| {
+        let step = |values: &[f64]| values[jump.sample] - values[jump.sample - 1];
+        let left = step(&output.seen) - step(&output.model);
+        // What the model does not reach, it does not explain.
+        left.is_nan() || left * jump.size.signum() > JUMP * jump.size.abs()
+    });
+    note.text = jumps_text(jumps, quantity.unit());
 }
 
 /// Whether the logs are met better with the log of this name as `remedy` has it; true where that cannot be said.
