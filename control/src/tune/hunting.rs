@@ -133,9 +133,19 @@ pub(super) fn hunts(machine: &Machine, design: &Design) -> Result<Option<Hunt>> 
 }
 
 impl Hunt {
-    /// True if it hunts more than the other: where that one rests, or wider.
+    /// True if it hunts more than the other: where that one rests, or wider; more often where an amplitude is unknown
+    /// because no slip was waited for.
     pub(super) fn is_more_than(&self, other: Option<&Hunt>) -> bool {
-        other.is_none_or(|other| self.amplitude > (1.0 + WIDER) * other.amplitude)
+        let Some(other) = other else { return true };
+        match self.amplitude.is_finite() && other.amplitude.is_finite() {
+            true => self.amplitude > (1.0 + WIDER) * other.amplitude,
+            false => (1.0 + WIDER) * self.interval() < other.interval(),
+        }
+    }
+
+    /// Time from one slip to the next, or the period where the cart never stands, s.
+    fn interval(&self) -> f64 {
+        if self.slips_every.is_finite() { self.slips_every } else { self.period }
     }
 }
 

@@ -126,7 +126,7 @@ pub struct Worse {
     pub motion: Option<usize>,
     /// Which figure.
     pub figure: Figure,
-    /// It, m, s or axes; 0 of an axis that rests.
+    /// It, m, s or axes; 0 of an axis that rests, not a number of a slip that was not waited for.
     pub before: f64,
     /// It, m, s or axes; not a number of a slip that was not waited for.
     pub after: f64,
