@@ -25,9 +25,13 @@ const COEFFICIENTS: [[f64; PLACES]; PLACES] = {
     inverse(places)
 };
 
-/// The polynomial through values at k/7.
+/// The polynomial through values at k/7, made from their differences from the first one: the table's rounding, 1e-11 of
+/// what it is applied to, must not bend what is constant.
 fn through(values: &[f64; PLACES]) -> [f64; PLACES] {
-    COEFFICIENTS.map(|row| row.iter().zip(values).fold(0.0, |sum, (c, v)| sum + c * v))
+    let begin = values[0];
+    let mut terms = COEFFICIENTS.map(|row| row.iter().zip(values).fold(0.0, |sum, (c, v)| sum + c * (v - begin)));
+    terms[0] = begin;
+    terms
 }
 
 impl Rows<'_> {

@@ -11,7 +11,8 @@
 //! at the beginning is a fifth value, which makes the quartic of it as good as that of the force.
 
 use super::model::{Curved, Model, Sliding, Vector};
-use super::radau::{Lane, NODES, QUARTIC, RADAU};
+use super::radau::{Lane, NODES, PLACES, POINTS, QUARTIC, RADAU};
+use super::step::{FOUND, monomials};
 use crate::friction::{Law, Motion};
 
 /// A force, with the arguments that it depends on by their numbers.
@@ -35,6 +36,9 @@ pub(super) enum Source {
         arms: Vec<(usize, f64)>,
     },
 }
+
+/// A step that begins this near a kink, as a share of how far it goes from there, begins at it.
+const AT_KINK: f64 = 1e-8;
 
 /// Bristles that slip by more than this share of their deflection within a step are stiff.
 const STIFF: f64 = 2.0;
@@ -94,18 +98,42 @@ impl Source {
         }
     }
 
-    /// Whether it may have a kink within a step from `y` on, or what is as narrow: its body turns without being held, or
-    /// friction along the travel has corners.
+    /// The share of a step from `y` on at which it has a kink, or something as narrow: its body reverses without
+    /// sticking, or passes a corner of its friction along the travel. A corner that is passed by less than the share
+    /// [`FOUND`] of what `strict` allows counts for nothing, and neither does one at the beginning.
     #[inline(always)]
-    pub(super) fn has_kink(&self, model: &Model, y: &Vector, arguments: &[Lane]) -> bool {
-        match *self {
-            Source::Friction { way: Some(_), .. } => true,
-            Source::Friction { curved, motion: Motion::Free, speed, .. } => {
-                let before = y[model.curved[curved].speed];
-                arguments[speed].iter().any(|v| v * before < 0.0)
+    pub(super) fn kink(&self, model: &Model, y: &Vector, arguments: &[Lane], strict: &[f64]) -> Option<f64> {
+        let &Source::Friction { curved, motion, speed, way } = self else { return None };
+        let curved = &model.curved[curved];
+        let mut first: Option<f64> = None;
+        let mut take = |share: Option<f64>| {
+            first = match (first, share) {
+                (Some(a), Some(b)) => Some(a.min(b)),
+                (a, b) => a.or(b),
             }
-            Source::Friction { .. } | Source::Spring { .. } => false,
+        };
+        if motion == Motion::Free {
+            take(crossing(&course(y[curved.speed], &arguments[speed]), FOUND / strict[speed]));
         }
+        if let (Some(way), Some(along)) = (way, &model.mechanism.bodies[curved.body].along) {
+            let places = course(y[model.coordinate(curved.body)], &arguments[way]);
+            let origin = model.mechanism.origin[curved.body];
+            let (low, high) =
+                places.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
+            let between = along.piece_at(origin + low)..along.piece_at(origin + high);
+            for [corner, _] in along.points().get(between).unwrap_or(&[]) {
+                take(crossing(&places.map(|place| place - (corner - origin)), FOUND / strict[way]));
+            }
+        }
+        first
+    }
+
+    /// The body of a friction force whose speed is zero where the step ends.
+    pub(super) fn reversing(&self, model: &Model, arguments: &[Lane]) -> Option<usize> {
+        let &Source::Friction { curved, motion: Motion::Free, speed, .. } = self else { return None };
+        let speeds = &arguments[speed];
+        let fastest = speeds.iter().fold(0.0, |most: f64, v| most.max(v.abs()));
+        (speeds[NODES - 1].abs() <= AT_KINK * fastest).then_some(model.curved[curved].body)
     }
 
     /// The force at the nodes of a step of length `h` from `y` on; deflections of its bristles go to `bristles`.
@@ -230,6 +258,32 @@ impl Source {
             }
         }
     }
+}
+
+/// An argument at the points of a step.
+#[inline(always)]
+fn course(begin: f64, [a, b, c, d]: &Lane) -> [f64; POINTS] {
+    [begin, *a, *b, *c, *d]
+}
+
+/// The share of a step at which a quartic through these values first changes its sign, if it goes farther than
+/// `negligible` from zero, and not where it begins.
+#[inline(always)]
+fn crossing(values: &[f64; POINTS], negligible: f64) -> Option<f64> {
+    let farthest = values.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
+    let is_at = |value: f64| value.abs() <= AT_KINK * farthest;
+    let pair = (0..NODES).find(|&i| values[i] * values[i + 1] < 0.0 && !(i == 0 && is_at(values[0])))?;
+    if farthest <= negligible {
+        return None;
+    }
+    let powers = monomials(values);
+    let at = |s: f64| powers.iter().rev().fold(0.0, |sum, power| sum * s + power);
+    let (mut low, mut high) = (PLACES[pair], PLACES[pair + 1]);
+    for _ in 0..52 {
+        let middle = 0.5 * (low + high);
+        if at(middle) * values[pair] > 0.0 { low = middle } else { high = middle }
+    }
+    Some(0.5 * (low + high))
 }
 
 /// The matrix of the deflections at the nodes, I + h R diag(a), parted in two triangles.

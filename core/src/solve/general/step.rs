@@ -40,7 +40,7 @@ const COLUMNS: usize = STATES + 1 + DRIVES * (DEGREE + 1) + SOURCES * POINTS;
 const TURNS: usize = 12;
 
 /// A change that is this share of the tolerance counts as found.
-const FOUND: f64 = 0.01;
+pub(super) const FOUND: f64 = 0.01;
 
 /// A contraction above which Newton's method is taken.
 const SLOW: f64 = 0.2;
@@ -347,6 +347,26 @@ impl Room {
         None
     }
 
+    /// The share of the step at which one of its forces first has a kink.
+    pub(super) fn kink(&self, step: &Step) -> Option<f64> {
+        let shares = (0..step.field.sources.len()).filter_map(|source| self.kink_of(step, source));
+        shares.reduce(f64::min)
+    }
+
+    /// Which bodies have friction that turns where the step ends.
+    pub(super) fn reversing(&self, field: &Field) -> [bool; BODIES] {
+        let mut reversing = [false; BODIES];
+        let bodies = field.sources.iter().filter_map(|source| source.reversing(&field.model, &self.arguments));
+        bodies.for_each(|body| reversing[body] = true);
+        reversing
+    }
+
+    #[inline(always)]
+    fn kink_of(&self, step: &Step, source: usize) -> Option<f64> {
+        let Begin { y, strict, .. } = step.begin;
+        step.field.sources[source].kink(&step.field.model, y, &self.arguments, &strict[..])
+    }
+
     /// By how much the arguments are off where the step ends, as a multiple of what is allowed.
     #[inline(always)]
     fn error<const A: usize, const S: usize>(&self, step: &Step) -> f64 {
@@ -364,9 +384,7 @@ impl Room {
             let force = &self.forces[source];
             *off = match &there {
                 // A kink leaves as much to a quartic as to a cubic.
-                _ if field.sources[source].has_kink(&field.model, begin.y, &self.arguments) => {
-                    (0, OF_KINK * cubic(force))
-                }
+                _ if self.kink_of(step, source).is_some() => (0, OF_KINK * cubic(force)),
                 Some((basis, rest)) => {
                     let quartic = basis.iter().zip(force).fold(0.0, |sum, ([weight], value)| sum + weight * value);
                     (POINTS, (self.kept[source] - quartic) / rest)

@@ -32,6 +32,10 @@ const PART_OF_PIECE: f64 = 0.6;
 /// Halvings of a step in which an event is located again.
 const HALVINGS: usize = 60;
 
+/// Solutions of a step that is to end at a kink, and how near to its end that has to be, as a share of it.
+const SOLUTIONS: usize = 6;
+const NEAR_KINK: f64 = 1e-11;
+
 /// Lengths of steps of one mode that are kept.
 const KEPT: usize = 48;
 
@@ -103,13 +107,30 @@ impl Core {
         let (begin, from) = (self.y, self.tau);
         let strict = self.strict(field);
         loop {
-            let length = self.length(field, stretch);
-            let (set, whole) = self.set(field, &length);
-            let input = stretch.inputs(from, set.h);
-            let start = Begin { y: &begin, input, degree: stretch.degree, strict: &strict };
+            let mut length = self.length(field, stretch);
+            let (mut set, mut whole) = self.set(field, &length);
+            let mut start =
+                Begin { y: &begin, input: stretch.inputs(from, set.h), degree: stretch.degree, strict: &strict };
             let number = self.present as u64;
+            let mut error = room.solve(&Step { field, number, set: &set, begin: &start, whole }, guess.of(set.h));
+            // No step goes over a kink of a force: its quartics would not know of it.
+            let mut is_cut = false;
+            for _ in 0..SOLUTIONS {
+                let step = Step { field, number, set: &set, begin: &start, whole };
+                let Some(share) = error.and_then(|_| room.kink(&step)).filter(|share| *share < 1.0 - NEAR_KINK) else {
+                    break;
+                };
+                let (h, longer) = (share * set.h, set.h);
+                if h <= 256.0 * f64::EPSILON * (stretch.begin + from).max(self.moment) {
+                    break;
+                }
+                length = Length { h, to: from + h, regular: false };
+                (set, whole, is_cut) = (Arc::new(Set::new(&field.linear, h, stretch.degree)), false, true);
+                start.input = stretch.inputs(from, h);
+                let step = Step { field, number, set: &set, begin: &start, whole };
+                error = room.solve(&step, Guess::Within(longer).of(h));
+            }
             let step = Step { field, number, set: &set, begin: &start, whole };
-            let error = room.solve(&step, guess.of(set.h));
             let end = error.map(|_| room.end);
             let least = set.h <= 256.0 * f64::EPSILON * (stretch.begin + from).max(self.moment);
             match (error, end) {
@@ -118,7 +139,21 @@ impl Core {
                     room.keep(set.h, field.sources.len());
                     // The error is of sixth order. A step that had to be short says little of much longer ones.
                     self.step = (SAFETY * set.h * error.powf(-1.0 / 6.0)).min(self.step.max(GROW * set.h));
-                    return self.take(room, (stretch, &step), (from, length.to), end, witness);
+                    let reversing = room.reversing(field);
+                    let hit = self.take(room, (stretch, &step), (from, length.to), end, witness);
+                    if is_cut && hit.is_none() {
+                        // What was before the kink says nothing of what comes.
+                        let model = &*self.model;
+                        for body in (0..model.mechanism.bodies.len()).filter(|&body| reversing[body]) {
+                            let leader = model.mechanism.leader(body);
+                            model.mechanism.followers(leader).for_each(|body| self.y[model.speed(body)] = 0.0);
+                        }
+                        let mut forces = [0.0; SOURCES];
+                        field.forces(&self.y, &mut forces);
+                        room.begin(&forces);
+                        *guess = Guess::Constant;
+                    }
+                    return hit;
                 }
                 (Some(error), Some(_)) if error > 1.0 && !least => {
                     self.step = set.h * (SAFETY * error.powf(-1.0 / 6.0)).clamp(SHRINK, 0.9);
