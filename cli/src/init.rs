@@ -14,7 +14,7 @@ pub fn run(args: &Init) -> Outcome {
     let file = &args.file;
     if file.is_dir() {
         let inside = file.join(match (args.template, args.kind) {
-            (Some(TemplateName::Machine), _) => "stage.toml",
+            (Some(TemplateName::Stage), _) => "stage.toml",
             (Some(TemplateName::Printer), _) => "printer.toml",
             (None, KindName::Axis) => "axis.toml",
             (Some(TemplateName::Gantry), _) | (None, KindName::HFrame | KindName::CoreXy) => "gantry.toml",
@@ -30,7 +30,7 @@ pub fn run(args: &Init) -> Outcome {
         return Err(error.next("choose another name, or replace it with --force").into());
     }
     let template = args.template.map(|name| match name {
-        TemplateName::Machine => Template::Machine,
+        TemplateName::Stage => Template::Stage,
         TemplateName::Printer => Template::Printer,
         TemplateName::Gantry => Template::Gantry,
     });

@@ -150,7 +150,7 @@ fn the_written_case_repeats_the_run() {
         assert!(read("one") == read("two"), "{name} differs");
     }
     let summary = json(&folder.path().join("two/summary.json"));
-    assert_eq!(summary["machine"]["cart_mass_kg"], 0.5);
+    assert_eq!(summary["stage"]["cart_mass_kg"], 0.5);
     assert_eq!(summary["experiments"][0]["metrics"]["end_time_s"], 0.3);
 }
 

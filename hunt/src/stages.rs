@@ -319,7 +319,7 @@ pub fn told(seed: u64, outcomes: &[Outcome], all: bool) -> String {
             if compared.verdict.is_unexplained() || (all && compared.verdict != Verdict::Agrees) {
                 let way = compared.by.name();
                 let (number, word, why) = (outcome.number, compared.verdict.word(), compared.verdict.told());
-                let _ = writeln!(text, "# seed {seed}, machine {number}, {way}, {word}: {why}\n{}", outcome.text);
+                let _ = writeln!(text, "# seed {seed}, stage {number}, {way}, {word}: {why}\n{}", outcome.text);
             }
         }
     }

@@ -9,7 +9,7 @@ pub const TEMPLATE: &str = include_str!("template.toml");
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Template {
     /// A linear stage: a rated motor, an AT5 belt.
-    Machine,
+    Stage,
     /// An axis of a printer: a motor by its K_v, a GT2 belt.
     Printer,
     /// A CoreXY gantry.
@@ -22,7 +22,7 @@ impl Template {
     /// ```
     /// use taut::case::{Opened, Template};
     /// use taut::overview::Overview;
-    /// for template in [Template::Machine, Template::Printer, Template::Gantry] {
+    /// for template in [Template::Stage, Template::Printer, Template::Gantry] {
     ///     let case = Opened::from_text_with("machine.toml", template.text(), &[])?;
     ///     assert!(Overview::of(&case)?.value("largest_force").unwrap() > 10.0);
     /// }
@@ -30,7 +30,7 @@ impl Template {
     /// ```
     pub fn text(self) -> &'static str {
         match self {
-            Template::Machine => include_str!("templates/stage.toml"),
+            Template::Stage => include_str!("templates/stage.toml"),
             Template::Printer => include_str!("templates/printer.toml"),
             Template::Gantry => include_str!("templates/gantry.toml"),
         }

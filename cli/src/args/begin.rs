@@ -87,7 +87,7 @@ pub struct Init {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum TemplateName {
     /// A linear stage: a rated motor, an AT5 belt
-    Machine,
+    Stage,
     /// An axis of a printer: a motor by its K_v, a GT2 belt
     Printer,
     /// A CoreXY gantry with GT2 belts

@@ -62,7 +62,7 @@ pub fn readings(f: &Findings) -> Vec<Claim> {
             .remark(format!(
                 "Row 2 of (7) has k_1 r²/J_1 where k_1 r/J_1 is needed, row 4 has k_1/M where k_1 r/M is \
                  needed. The matrix is right for x_3 = x_2'/r: its x_1 ends within {} of the equations \
-                 (1)–(4), its x_3 is {} times the cart's position: {} lengths of the machine (863 mm).",
+                 (1)–(4), its x_3 is {} times the cart's position: {} lengths of the stage (863 mm).",
                 si((l.corrected_end - l.by_exponential).abs(), "m", 1),
                 significant(l.corrected_x3 / cart, 4),
                 significant(l.corrected_x3 / super::belt::RAIL, 3)
@@ -216,7 +216,7 @@ pub fn readings(f: &Findings) -> Vec<Claim> {
         reading(
             "p9-superposition",
             "figures 14, 15, 20, 21",
-            "10 V moves a linear machine 2 times as far as 5 V, Table 4 2.298 times",
+            "10 V moves a linear stage 2 times as far as 5 V, Table 4 2.298 times",
         )
         .decide("Table 2", m.ratio.0, "", near(2.0, 1e-9))
         .decide("Table 4", m.ratio.1, "", near(2.298, 0.5e-3))

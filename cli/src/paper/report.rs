@@ -123,10 +123,10 @@ impl Report<'_> {
     fn parameters(&mut self) {
         let f = self.f;
         let page = &mut *self.page;
-        page.section("The machine and its parameters");
+        page.section("The stage and its parameters");
         page.drawing(
             &stage_drawing(&f.sets.table1.machine),
-            html! { b { "Figures 1 and 2. " } "The machine as it is modelled, with the values of Table 1. \
+            html! { b { "Figures 1 and 2. " } "The stage as it is modelled, with the values of Table 1. \
             Rotation and position count positive in the sense of the arrows." },
         );
         page.prose(
@@ -242,7 +242,7 @@ impl Report<'_> {
         let m = &self.f.matched;
         self.page.section("A linear set against two voltages");
         self.page.prose(format!(
-            "A linear machine goes exactly twice as far for twice the voltage; here {} times. With the \
+            "A linear stage goes exactly twice as far for twice the voltage; here {} times. With the \
              friction of Table 4 it goes {} times as far. \
              No linear set can therefore agree with Table 4 at both voltages.",
             significant(m.ratio.0, 5),

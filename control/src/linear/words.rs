@@ -98,7 +98,7 @@ fn sliding(plant: &Mechanism, operation: Operation, moving: &[usize]) -> Option<
         (true, false) if curve => format!("linearised while it moves {way} {pace}"),
         (true, false) => "linear as it stands: nothing sticks".into(),
         (false, true) => format!(
-            "at rest this machine sticks: dry friction holds {}, and what is held answers no input; \
+            "at rest this stage sticks: dry friction holds {}, and what is held answers no input; \
              linearised instead while everything slides {way}, {pace}; --stuck takes who is held out",
             holds.join(", ")
         ),

@@ -15,6 +15,9 @@ const OUTLYING: f64 = 10.0;
 const JUMP: f64 = 5.0;
 const BESIDE: usize = 3;
 
+/// Steps differ by at least this share of the largest value, or by rounding alone.
+const ROUNDING: f64 = 1e-6;
+
 /// The shortest run at an extreme value that may be a limit, samples.
 const CLIPPED: usize = 5;
 
@@ -166,7 +169,13 @@ impl Channel {
         let all: Vec<(usize, f64, f64)> =
             inner.filter_map(|k| beyond(k).map(|(size, apart)| (k, size, apart))).collect();
         let usual = 1.4826 * median(&mut all.iter().map(|(_, size, _)| size.abs()).collect::<Vec<_>>());
-        let least = OUTLYING * usual.max(self.resolution());
+        // Counts make steps that differ by whole counts, which few samples show where it moves evenly.
+        let largest =
+            values.iter().filter(|value| value.is_finite()).fold(0.0, |most: f64, value| most.max(value.abs()));
+        let sizes = all.iter().map(|(_, size, _)| size.abs()).filter(|size| *size > ROUNDING * largest);
+        let count = sizes.fold(f64::INFINITY, f64::min);
+        let count = if count.is_finite() { count } else { 0.0 };
+        let least = OUTLYING * usual.max(self.resolution()).max(count);
         let found = all.into_iter().filter(|(_, size, apart)| size.abs() > least.max(JUMP * apart));
         found.map(|(k, size, _)| Jump { sample: k + 1, time: time[k + 1], size }).collect()
     }
