@@ -23,7 +23,7 @@ pub mod experiment_design {
 pub mod least_squares {
     pub use super::asked::residuals::{Bounds, Differences, Residuals, Step};
     pub use super::search::least_squares::minimise;
-    pub use super::search::point::{Ending, Minimum, Options};
+    pub use super::search::point::{Ending, Minimum, Options, Strategy};
 }
 
 pub use crate::case::{drawn, machines};
@@ -36,7 +36,7 @@ pub use noise::Wave;
 pub use noise::student::student;
 pub use posterior::nuts::Effort;
 pub use posterior::{Credible, Posterior, posterior};
-pub use search::point::Ending;
+pub use search::point::{Ending, Strategy};
 pub use search::regression::{Balance, regression};
 pub use search::starts::Work;
 pub use search::triangle::inverse_of_square;

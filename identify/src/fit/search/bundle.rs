@@ -15,24 +15,55 @@
 //! the kink. Where the promise is next to nothing, the pieces balance: that is the minimum, and Σ λₖ Jₖ the Jacobian
 //! with Jᵀr ≈ 0 there.
 
-use super::point::{Minimum, cost_of};
+use super::point::{Minimum, Point, Strategy, cost_of};
+use super::rung::{Climb, Rung, Watch};
 use crate::fit::asked::residuals::{Bounds, Differences, Residuals};
-use crate::fit::limits::{CONTRADICTS, FIRM, HALVINGS, KEPT, SPARE_PIECES};
+use crate::fit::limits::{CONTRADICTS, FIRM, HALVINGS, KEPT, KINK, SPARE_PIECES};
 use crate::solve::Flow;
 use nalgebra::{DMatrix, DVector};
 
+/// Descent past the kinks around a point, once in a search.
+#[derive(Default)]
+pub(crate) struct Bundle {
+    is_spent: bool,
+}
+
+impl Rung for Bundle {
+    fn strategy(&self) -> Strategy {
+        Strategy::Bundle
+    }
+
+    fn applies(&self, at: &Point) -> bool {
+        at.is_exact && !self.is_spent
+    }
+
+    fn climb(&mut self, at: &mut Point, problem: &mut dyn Residuals, watch: &mut Watch) -> Climb {
+        self.is_spent = true;
+        let units = (at.deviation, at.options.huber);
+        let coordinates = Coordinates::new(&at.best, &at.model.r, at.free(), at.bounds, units);
+        let limits = (KINK, at.options.iterations);
+        if let Some(found) = descend(problem, &mut at.best, &coordinates, limits, watch) {
+            (at.best.decrement, at.best.jacobian, at.best.pieces) = (found.promise, found.jacobian, found.pieces);
+            if found.promise <= KINK {
+                return Climb::Converged;
+            }
+        }
+        Climb::Lowered
+    }
+}
+
 /// Where a descent ended.
-pub(crate) struct Balanced {
+struct Balanced {
     /// The gain that the next step promises, in standard errors.
-    pub promise: f64,
+    promise: f64,
     /// Σ λₖ Jₖ
-    pub jacobian: DMatrix<f64>,
+    jacobian: DMatrix<f64>,
     /// How many points are in it.
-    pub pieces: usize,
+    pieces: usize,
 }
 
 /// The coordinates of a search: u = R (x − x₀)/σ over the variables that are free.
-pub(crate) struct Coordinates<'a> {
+struct Coordinates<'a> {
     free: Vec<usize>,
     r: DMatrix<f64>,
     deviation: f64,
@@ -90,12 +121,12 @@ impl Promise {
 
 /// Goes down from `best`, which is changed, until the pieces balance to within `tolerance` standard errors, or `most`
 /// gradients are taken; none where the model does not get through, or it was told to stop.
-pub(crate) fn descend(
+fn descend(
     problem: &mut dyn Residuals,
     best: &mut Minimum,
     at: &Coordinates,
     (tolerance, most): (f64, usize),
-    watch: &mut dyn FnMut(&[f64], f64) -> Flow,
+    watch: &mut Watch,
 ) -> Option<Balanced> {
     let unit = 1.0 / (at.deviation * at.deviation);
     let mut u = DVector::zeros(at.free.len());
@@ -169,7 +200,7 @@ fn forget(pieces: &mut Vec<Piece>, u: &DVector<f64>, cost: f64, weights: &[f64])
 impl<'a> Coordinates<'a> {
     /// Those around `best`, of whose Jacobian's QR decomposition `r` is R, over the variables that are free; σ is the
     /// unit of residuals, beyond `huber` of which they count linearly.
-    pub(crate) fn new(
+    fn new(
         best: &Minimum,
         r: &DMatrix<f64>,
         free: Vec<usize>,

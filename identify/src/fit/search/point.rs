@@ -1,6 +1,9 @@
-//! A point of a search: how far to go, and where it ended.
+//! A point of a search: how far to go, where it is, and where it ended.
 
-use nalgebra::DMatrix;
+use super::linear::Linear;
+use crate::fit::asked::residuals::{Bounds, Differences, Residuals};
+use crate::fit::limits::SHOWS;
+use nalgebra::{DMatrix, DVector};
 
 /// How far to go.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -53,6 +56,19 @@ impl Ending {
     }
 }
 
+/// A strategy of a search.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Strategy {
+    /// Damped steps by the derivatives at the point.
+    Damped,
+    /// A bundle of gradients around a kink.
+    Bundle,
+    /// Damped steps by derivatives over this number of standard errors.
+    Coarse(f64),
+    /// An evolution strategy, which needs no derivatives.
+    Evolution,
+}
+
 /// Where a search ended.
 #[derive(Debug, Clone)]
 pub struct Minimum {
@@ -70,6 +86,8 @@ pub struct Minimum {
     pub at_bound: Vec<bool>,
     /// How it ended.
     pub ending: Ending,
+    /// The strategy with which it ended; none where nothing was searched for.
+    pub strategy: Option<Strategy>,
     /// Steps of the derivatives, in standard errors, where the cost has kinks; 0 where it is smooth.
     pub coarse: f64,
     /// How many gradients around balance there; more than one at a kink.
@@ -85,4 +103,120 @@ pub struct Minimum {
 /// ½ Σ ρ(r), ρ = r² up to the threshold and 2 k |r| − k² beyond.
 pub(crate) fn cost_of(r: &[f64], k: f64) -> f64 {
     r.iter().map(|&r| if r.abs() <= k { 0.5 * r * r } else { k * r.abs() - 0.5 * k * k }).sum()
+}
+
+/// A point of a search, with the linear model of the residuals at its last Jacobian.
+#[derive(Debug, Clone)]
+pub(crate) struct Point<'a> {
+    /// The best point so far, and what it took.
+    pub best: Minimum,
+    pub bounds: &'a Bounds,
+    pub options: &'a Options,
+    /// J and r.
+    pub model: Linear,
+    /// D: greatest norms of the columns of J so far.
+    pub scale: DVector<f64>,
+    /// Standard deviation of the residuals, as if they were independent.
+    pub deviation: f64,
+    /// Whether the Jacobian is exact.
+    pub is_exact: bool,
+    /// Whether the Gauss-Newton step changes no digit that counts.
+    is_still: bool,
+}
+
+impl<'a> Point<'a> {
+    /// Where a search starts, put within the bounds; where the residuals cannot be computed there, what is told of it.
+    pub fn new(
+        problem: &mut dyn Residuals,
+        start: &[f64],
+        bounds: &'a Bounds,
+        options: &'a Options,
+    ) -> Result<Self, Box<Minimum>> {
+        let (n, rows) = (start.len(), problem.rows());
+        let mut best = Minimum {
+            x: start.iter().enumerate().map(|(j, x)| x.clamp(bounds.low[j], bounds.high[j])).collect(),
+            residuals: vec![0.0; rows],
+            cost: f64::INFINITY,
+            jacobian: DMatrix::zeros(rows, n),
+            decrement: f64::INFINITY,
+            at_bound: vec![false; n],
+            ending: Ending::Failed,
+            strategy: None,
+            coarse: 0.0,
+            pieces: 1,
+            evolved: 0,
+            iterations: 0,
+            evaluations: 1,
+        };
+        if !problem.evaluate(&best.x, &mut best.residuals) || !best.residuals.iter().all(|r| r.is_finite()) {
+            return Err(Box::new(best));
+        }
+        best.cost = cost_of(&best.residuals, options.huber);
+        let (model, scale) = (Linear::none(n), DVector::zeros(n));
+        Ok(Self { best, bounds, options, model, scale, deviation: 0.0, is_exact: false, is_still: false })
+    }
+
+    /// Measures the Jacobian as `how` says, unless it is `ahead` already, and what the linear model says of the point;
+    /// false where there is no Jacobian.
+    pub fn linearise(&mut self, problem: &mut dyn Residuals, how: &Differences, ahead: Option<DMatrix<f64>>) -> bool {
+        let (bounds, best) = (self.bounds, &mut self.best);
+        let own = ahead.or_else(|| problem.jacobian(&best.x, &best.residuals, bounds, how));
+        let Some(jacobian) = own else { return false };
+        best.iterations += 1;
+        best.jacobian = jacobian;
+        self.is_exact = problem.is_exact();
+        let n = best.x.len();
+        let model = Linear::new(&best.jacobian, &best.residuals, self.options.huber);
+        for j in 0..n {
+            self.scale[j] = f64::max(self.scale[j], model.norm(j));
+        }
+        let gradient = model.gradient();
+        // At a bound and pushed outwards: not free.
+        let is_held = |j: usize| {
+            (best.x[j] <= bounds.low[j] && gradient[j] >= 0.0) || (best.x[j] >= bounds.high[j] && gradient[j] <= 0.0)
+        };
+        best.at_bound = (0..n).map(is_held).collect();
+        let newton = model.step(&best.at_bound, &self.scale, 0.0);
+        let freedom = (best.residuals.len().saturating_sub(n)).max(1) as f64;
+        let spread = (2.0 * best.cost / freedom).sqrt();
+        // What is left of logs that a model made is what rounding made of them.
+        let rounding = self.options.rounding;
+        let is_rounding = spread <= rounding;
+        self.deviation = if is_rounding { rounding } else { spread * inflation(&best.residuals, n) };
+        best.decrement = model.reach(&newton) / self.deviation.max(f64::MIN_POSITIVE);
+        self.is_still = (0..n).all(|j| newton[j].abs() <= 1e-11 * best.x[j].abs().max(1.0));
+        self.model = model;
+        true
+    }
+
+    /// Whether the projected gradient is zero to within the tolerance: the one test of convergence on a smooth piece.
+    pub fn is_at_minimum(&self) -> bool {
+        self.best.decrement <= self.options.tolerance || self.is_still
+    }
+
+    /// Variables that are not held at a bound and show.
+    pub fn free(&self) -> Vec<usize> {
+        (0..self.best.x.len()).filter(|&j| !self.best.at_bound[j] && self.model.norm(j) > 0.0).collect()
+    }
+
+    /// Differences over this part of a standard error of each variable by itself.
+    pub fn differences_over(&self, part: f64) -> Differences {
+        let errors = self.model.errors(&self.best.at_bound, self.deviation);
+        Differences::Coarse(errors.iter().map(|error| part * error).collect())
+    }
+
+    /// The gain in cost that shows.
+    pub fn shows(&self) -> f64 {
+        0.5 * (SHOWS * self.deviation).powi(2)
+    }
+}
+
+/// By how much standard errors are greater than those of as many independent residuals, roughly: √((1 + ρ)/(1 − ρ))
+/// with ρ the correlation of neighbours, as if no fewer than ten residuals for each variable were independent.
+fn inflation(residuals: &[f64], variables: usize) -> f64 {
+    let own: f64 = residuals.iter().map(|r| r * r).sum();
+    let next: f64 = residuals.windows(2).map(|pair| pair[0] * pair[1]).sum();
+    let rho = if own > 0.0 { (next / own).clamp(0.0, 0.999_999) } else { 0.0 };
+    let most = residuals.len() as f64 / (10.0 * variables.max(1) as f64);
+    ((1.0 + rho) / (1.0 - rho)).min(most.max(1.0)).sqrt()
 }

@@ -142,6 +142,7 @@ fn as_it_is(problem: &mut Problem) -> Minimum {
         decrement: 0.0,
         at_bound: Vec::new(),
         ending: if good { Ending::Converged } else { Ending::Failed },
+        strategy: None,
         coarse: 0.0,
         pieces: 1,
         evolved: 0,

@@ -6,7 +6,7 @@ use super::finding::{Finding, Grade};
 use super::identify::Identifiability;
 use super::scores::LogFit;
 use crate::fit::noise::Wave;
-use crate::fit::search::point::Ending;
+use crate::fit::search::point::{Ending, Strategy};
 use crate::fit::search::starts::Work;
 use crate::log::Quantity;
 use crate::machine::Machine;
@@ -43,6 +43,8 @@ pub struct Fit {
     pub point: Vec<f64>,
     /// How the search ended.
     pub ending: Ending,
+    /// The strategy with which it ended; none where nothing was searched for.
+    pub strategy: Option<Strategy>,
     /// The gain that the last step promised, in standard errors.
     pub decrement: f64,
     /// ½ Σ r² of the weighted residuals.

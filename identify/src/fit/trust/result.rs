@@ -136,6 +136,7 @@ pub(crate) fn result(found: &Searched, judged: Option<&Judged>) -> Fit {
         findings: Vec::new(),
         point: best.x.clone(),
         ending: best.ending,
+        strategy: best.strategy,
         decrement: best.decrement,
         cost: best.cost,
         starts: starts.clone(),

@@ -1,0 +1,213 @@
+//! Damped steps: Levenberg and Marquardt's method with an active set for the bounds.
+//!
+//! λ follows the ratio of gain and promise (Nielsen 1999). Derivatives are cheap ones far from a minimum and central
+//! ones near it, or coarse ones, which see past kinks.
+
+use super::linear::Linear;
+use super::point::{Ending, Options, Point, Strategy, cost_of};
+use super::rung::{Climb, Rung, Watch};
+use crate::fit::asked::residuals::{Bounds, Differences, Residuals};
+use crate::fit::limits::{KINK, NEAR, PAST_KINKS, SHOWS};
+use crate::solve::Flow;
+use nalgebra::{DMatrix, DVector};
+
+/// Damped steps as long as they lower the cost.
+pub(crate) struct Damped {
+    /// Step of coarse derivatives, in standard errors; none for those at the point.
+    coarse: Option<f64>,
+    /// Derivatives that were measured last.
+    how: Option<Differences>,
+    /// λ; none before the first step.
+    lambda: Option<f64>,
+    /// Factor by which λ grows when a step is refused.
+    growth: f64,
+    /// The Jacobian at the trial point that was taken, where it came with the residuals.
+    ahead: Option<DMatrix<f64>>,
+    /// Whether the last trial point was taken.
+    is_likely: bool,
+    /// Steps in a row that gained less than shows.
+    slow: usize,
+    trial: Vec<f64>,
+}
+
+impl Damped {
+    /// By derivatives at the point: cheap ones first, where these are asked for.
+    pub fn new(options: &Options) -> Self {
+        let how = if options.frugal { Differences::Forward } else { Differences::Central };
+        Self { how: Some(how), ..Self::coarse(None) }
+    }
+
+    /// By derivatives over this number of standard errors.
+    pub fn over(coarse: f64) -> Self {
+        Self::coarse(Some(coarse))
+    }
+
+    fn coarse(coarse: Option<f64>) -> Self {
+        let (how, lambda, ahead, trial) = (None, None, None, Vec::new());
+        Self { coarse, how, lambda, growth: 2.0, ahead, is_likely: true, slow: 0, trial }
+    }
+
+    /// Goes down from `at` by derivatives that begin as `how` has them.
+    fn descend(
+        &mut self,
+        mut how: Differences,
+        at: &mut Point,
+        problem: &mut dyn Residuals,
+        watch: &mut Watch,
+    ) -> Climb {
+        (self.lambda, self.growth) = (None, 2.0);
+        let end = loop {
+            if watch(&at.best.x, at.best.cost) == Flow::Stop {
+                break Climb::Ended(Ending::Interrupted);
+            }
+            if !at.linearise(problem, &how, self.ahead.take()) {
+                break Climb::Ended(Ending::Stalled);
+            }
+            let is_sharp = how == Differences::Central || self.coarse.is_some() || at.is_exact;
+            if at.is_at_minimum() {
+                if is_sharp {
+                    break Climb::Converged;
+                }
+                how = Differences::Central;
+                continue;
+            }
+            self.sharpen(&mut how, at);
+            if at.best.iterations >= at.options.iterations {
+                break Climb::Ended(Ending::OutOfIterations);
+            }
+            if self.step(at, problem, &how) {
+                continue;
+            }
+            (self.slow, self.ahead) = (0, None);
+            if self.coarse.is_none() && how != Differences::Central && !at.is_exact {
+                // The cheap derivatives may be to blame.
+                (how, self.lambda) = (Differences::Central, None);
+                continue;
+            }
+            break if at.best.decrement <= KINK { Climb::Converged } else { Climb::Passed };
+        };
+        self.how = Some(how);
+        end
+    }
+
+    /// Derivatives for the next Jacobian: better ones near a minimum.
+    fn sharpen(&self, how: &mut Differences, at: &Point) {
+        if self.coarse.is_some() {
+            return;
+        }
+        if at.best.decrement < NEAR && *how == Differences::Forward && !at.is_exact {
+            *how = at.differences_over(PAST_KINKS);
+        } else if at.best.decrement < 100.0 * at.options.tolerance {
+            *how = Differences::Central;
+        }
+    }
+
+    /// Takes a step that lowers the cost, with as much damping as it takes; whether it did, and did not creep.
+    fn step(&mut self, at: &mut Point, problem: &mut dyn Residuals, how: &Differences) -> bool {
+        let (n, shows, bounds) = (at.best.x.len(), at.shows(), at.bounds);
+        let best = &mut at.best;
+        self.trial.resize(best.residuals.len(), 0.0);
+        let mut damping = self.lambda.unwrap_or(1e-3);
+        let mut accepted = false;
+        for _ in 0..30 {
+            let step = within(&at.model, &best.x, bounds, &best.at_bound, &at.scale, damping);
+            let x: Vec<f64> = (0..n).map(|j| (best.x[j] + step[j]).clamp(bounds.low[j], bounds.high[j])).collect();
+            let promised = at.model.promise(&step);
+            if promised <= 0.0 || x == best.x {
+                damping = (damping * self.growth).max(1e-12);
+                self.growth *= 2.0;
+                if x == best.x {
+                    break;
+                }
+                continue;
+            }
+            best.evaluations += 1;
+            // Exact derivatives come with the residuals, for little more than these.
+            let mut with = None;
+            let good = if at.is_exact && self.is_likely {
+                with = problem.linearised(&x, &mut self.trial, bounds, how);
+                with.is_some()
+            } else {
+                problem.evaluate(&x, &mut self.trial)
+            };
+            let cost = if good { cost_of(&self.trial, at.options.huber) } else { f64::INFINITY };
+            let gain = (best.cost - cost) / promised;
+            self.is_likely = cost < best.cost && gain > 1e-4;
+            if self.is_likely {
+                self.ahead = with.filter(|_| problem.is_exact());
+                // λ shrinks the better the linear model was (Nielsen 1999).
+                damping *= f64::max(1.0 / 5.0, 1.0 - (2.0 * gain - 1.0).powi(3));
+                self.growth = 2.0;
+                // Less than shows, far less than was promised: a kink is near.
+                let is_slow = best.cost - cost < shows && (gain < 0.25 || best.decrement > 2.0 * SHOWS);
+                self.slow = if is_slow { self.slow + 1 } else { 0 };
+                best.x = x;
+                best.cost = cost;
+                std::mem::swap(&mut best.residuals, &mut self.trial);
+                accepted = self.slow < 2;
+                break;
+            }
+            damping *= self.growth;
+            self.growth *= 2.0;
+            if damping > 1e16 {
+                break;
+            }
+        }
+        self.lambda = Some(damping.clamp(1e-12, 1e8));
+        self.growth = self.growth.min(8.0);
+        accepted
+    }
+}
+
+impl Rung for Damped {
+    fn strategy(&self) -> Strategy {
+        self.coarse.map_or(Strategy::Damped, Strategy::Coarse)
+    }
+
+    fn applies(&self, _: &Point) -> bool {
+        true
+    }
+
+    fn climb(&mut self, at: &mut Point, problem: &mut dyn Residuals, watch: &mut Watch) -> Climb {
+        // Where it was, with the derivatives that it had.
+        if let Some(how) = self.how.take() {
+            let end = self.descend(how, at, problem, watch);
+            if self.coarse.is_none() || end != Climb::Passed {
+                return end;
+            }
+        }
+        let Some(coarse) = self.coarse else { return Climb::Passed };
+        at.best.coarse = coarse;
+        let how = at.differences_over(coarse);
+        self.descend(how, at, problem, watch)
+    }
+}
+
+/// The step that keeps within the box: what would leave it is put on its edge, and the rest solved anew.
+fn within(
+    model: &Linear,
+    x: &[f64],
+    bounds: &Bounds,
+    held: &[bool],
+    scale: &DVector<f64>,
+    damping: f64,
+) -> DVector<f64> {
+    let n = x.len();
+    let mut fixed: Vec<Option<f64>> = held.iter().map(|&held| held.then_some(0.0)).collect();
+    loop {
+        let step = model.step_with(&fixed, scale, damping);
+        let mut left = false;
+        for j in 0..n {
+            if fixed[j].is_none() {
+                let to = x[j] + step[j];
+                if to < bounds.low[j] || to > bounds.high[j] {
+                    fixed[j] = Some(to.clamp(bounds.low[j], bounds.high[j]) - x[j]);
+                    left = true;
+                }
+            }
+        }
+        if !left {
+            return step;
+        }
+    }
+}
