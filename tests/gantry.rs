@@ -141,7 +141,7 @@ fn place(case: &GantryCase, [left, right]: [f64; 2]) -> [f64; 2] {
 fn largest_rows(case: &GantryCase, rows: &Trajectory) -> Vec<f64> {
     let get = |name: &str| rows.get(name).unwrap().to_vec();
     let [left, right, x, y] = ["left_angle", "right_angle", "bridge_position", "cart_position"].map(get);
-    let places = left.iter().zip(&right).map(|(left, right)| place(&case, [*left, *right]));
+    let places = left.iter().zip(&right).map(|(left, right)| place(case, [*left, *right]));
     let errors: Vec<[f64; 2]> = places.zip(x.iter().zip(&y)).map(|([xd, yd], (x, y))| [xd - x, yd - y]).collect();
     let mut columns = vec![get("bridge_speed"), get("cart_speed")];
     columns.extend([0, 1].map(|k| errors.iter().map(|error| error[k]).collect()));

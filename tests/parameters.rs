@@ -62,6 +62,35 @@ every = 0.0078125
 log = { file = "log.csv", time = "t", input = "u", cart_position = "x" }
 "#;
 
+/// A gantry of one kind, with one friction law.
+const GANTRY: &str = r#"
+kind = "KIND"
+[motor]
+torque_constant = 0.5
+back_emf_constant = 0.5
+resistance = 2
+[drive_pulley]
+radius = 0.5
+inertia = 0.5
+friction = { LAW }
+[bridge]
+mass = 4
+friction = { LAW }
+travel = { min = -2, max = 8, stop_stiffness = 512, stop_damping = 4 }
+[cart]
+mass = 2
+friction = { LAW }
+travel = { min = -1, max = 4, stop_stiffness = 256, stop_damping = 2 }
+[belt]
+stiffness = [SPANS]
+damping = [SPANS]
+[[experiment]]
+name = "step"
+input = { left = { step = 1 } }
+until = 0.03125
+every = 0.0078125
+"#;
+
 /// Friction laws, each on each body by turns.
 const LAWS: [&str; 3] = [
     "viscous = 0.5, coulomb = 0.25, stribeck = { force = 0.125, velocity = 0.25 }",
@@ -120,42 +149,61 @@ fn value_of(stage: &Machine, key: &str) -> Option<f64> {
     values(stage).into_iter().find(|(own, _)| own == key).map(|(_, value)| value)
 }
 
-/// Sets each number of each machine to a quarter of its value: it is read back, and a case file that says so is the
-/// same machine.
+/// Sets each number of a machine to a quarter of its value: it is read back, and a case file that says so is the same
+/// machine.
+fn set_each(
+    machine: &Machine,
+    is_given: &dyn Fn(&str) -> bool,
+    written: &dyn Fn(&str) -> taut::Result<Machine>,
+    seen: &mut Vec<&'static str>,
+) {
+    // What stands by itself in the file goes by itself.
+    let given: Vec<&str> = all().map(|row| row.key).filter(|key| is_given(key)).collect();
+    for (key, value) in values(machine) {
+        let row = machine.row(&key).unwrap();
+        seen.push(row.key);
+        let part = if row.key.ends_with(".position") { value + 0.25 } else { 0.25 * value };
+        let free = Free::new(machine, &key, &given, &[]).unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!((free.start, free.unit), (value, row.unit), "{key}");
+        let mut stage = machine.clone();
+        free.set(&mut stage, part);
+        let held = value_of(&stage, &key.replace("static", "coulomb")).unwrap();
+        assert_eq!(value_of(&stage, &key), Some(part.max(if key.contains(".static") { held } else { part })), "{key}");
+        // A file gives one of two forms.
+        let other_form = (key.ends_with(".velocity") || key.ends_with(".decay")) && !is_given(&key);
+        if !other_form {
+            // At rest a body holds at least what it resists with in motion, and a file may not say otherwise.
+            match written(&format!("{key}={part}")) {
+                Err(error) => {
+                    assert!(key.contains(".static") && error.what.contains("less than the Coulomb"), "{key}: {error}")
+                }
+                Ok(written) => assert_eq!(written, stage, "{key}"),
+            }
+        }
+    }
+}
+
+/// Of axes and of gantries.
 #[test]
 fn every_number_is_set_where_a_case_file_has_it() {
     let mut seen: Vec<&str> = Vec::new();
     for (name, text) in cases() {
         let case = read(&name, &text, &[]);
-        for (key, value) in values(&case.machine) {
-            let row = named(&key).unwrap();
-            seen.push(row.key);
-            let part = if row.key.ends_with(".position") { value + 0.25 } else { 0.25 * value };
-            // What stands by itself in the file goes by itself.
-            let given: Vec<&str> = all().map(|row| row.key).filter(|key| case.value(key).is_ok()).collect();
-            let free = Free::new(&case.machine, &key, &given, &[]).unwrap_or_else(|error| panic!("{error}"));
-            assert_eq!((free.start, free.unit), (value, row.unit), "{key}");
-            let mut stage = case.machine.clone();
-            free.set(&mut stage, part);
-            let held = value_of(&stage, &key.replace("static", "coulomb")).unwrap();
-            assert_eq!(
-                value_of(&stage, &key),
-                Some(part.max(if key.contains(".static") { held } else { part })),
-                "{key}"
-            );
-            // A file gives one of two forms.
-            let other_form = (key.ends_with(".velocity") || key.ends_with(".decay")) && case.value(&key).is_err();
-            if !other_form {
-                let written = Case::from_text_with(&name, &text, &[&format!("{key}={part}")]);
-                // At rest a body holds at least what it resists with in motion, and a file may not say otherwise.
-                match written {
-                    Err(error) => {
-                        assert!(key.contains(".static") && error.what.contains("less than the Coulomb"), "{error}")
-                    }
-                    Ok(written) => assert_eq!(written.machine, stage, "{key}"),
-                }
-            }
-        }
+        let written = |change: &str| Ok(Case::from_text_with(&name, &text, &[change])?.machine);
+        set_each(&case.machine, &|key| case.value(key).is_ok(), &written, &mut seen);
+    }
+    for (kind, law) in ["h-frame", "core-xy", "core-xy"].into_iter().zip(LAWS) {
+        let text = GANTRY.replace("KIND", kind).replace("LAW", law).replace(
+            "SPANS",
+            match kind {
+                "h-frame" => "1024, 1024, 512",
+                _ => "1024, 512, 1024, 512",
+            },
+        );
+        let read = |changes: &[&str]| GantryCase::from_text_with("gantry.toml", &text, changes);
+        let case = read(&[]).unwrap_or_else(|error| panic!("{error}"));
+        let written = |change: &str| Ok(read(&[change])?.gantry);
+        set_each(&case.gantry, &|key| case.value(key).is_ok(), &written, &mut seen);
     }
     for row in all() {
         match row.field {

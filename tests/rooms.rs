@@ -126,10 +126,10 @@ fn rooms_stand_in_order() {
                     let whole = format!("{beside}/{}{name}", path.replace("::", "/"));
                     let parts: Vec<&str> = whole.split('/').filter(|part| !part.is_empty()).collect();
                     let to = rank(parts.first().unwrap_or(&"")).filter(|_| parts[0] != room);
-                    if let (Some(own), Some(to)) = (rank(room), to) {
-                        if to >= own {
-                            upward.push(format!("{file} uses {}", parts[0]));
-                        }
+                    if let (Some(own), Some(to)) = (rank(room), to)
+                        && to >= own
+                    {
+                        upward.push(format!("{file} uses {}", parts[0]));
                     }
                     let found = (1..=parts.len()).rev().map(|n| parts[..n].join("/"));
                     let target = found.into_iter().find(|path| sources.contains_key(path));

@@ -158,8 +158,8 @@ pub struct Group {
 /// The subject of a sweep: a machine as the case has it, with its experiments and moves.
 #[derive(Debug, Clone)]
 enum Subject {
-    Axis(axis::Axis),
-    Gantry(gantry::Swept),
+    Axis(Box<axis::Axis>),
+    Gantry(Box<gantry::Swept>),
 }
 
 impl Subject {

@@ -24,7 +24,7 @@ impl Sweep {
             Some(Origin::Posterior(file)) => Some(Arc::new(draws(case, plan, file)?)),
             _ => None,
         };
-        Self::planned(Subject::Axis(axis::Axis::of(case, plan)), plan, draws, &case.known)
+        Self::planned(Subject::Axis(Box::new(axis::Axis::of(case, plan))), plan, draws, &case.known)
     }
 
     /// The sweep that a gantry's case describes. Errors: as [`Sweep::new`].
@@ -42,7 +42,7 @@ impl Sweep {
     pub fn of_gantry(case: &GantryCase) -> Result<Self> {
         case.complete()?;
         let plan = planned(case.sweep.as_ref())?;
-        Self::planned(Subject::Gantry(gantry::Swept::of(case, plan)), plan, None, &[])
+        Self::planned(Subject::Gantry(Box::new(gantry::Swept::of(case, plan))), plan, None, &[])
     }
 
     /// The sweep that a case of either kind describes.

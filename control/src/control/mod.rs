@@ -30,6 +30,7 @@ pub mod resonance;
 mod rest;
 pub mod riccati;
 mod sampled;
+mod sampling;
 pub mod shaper;
 pub mod shaping;
 pub mod sliding;

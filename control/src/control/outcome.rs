@@ -1,7 +1,8 @@
 //! A move run in closed loop, and what it shows.
 
 use super::rest::Swing;
-use super::sampled::{Added, Controller, Loop, Sample, Sampled};
+use super::sampled::{Added, Controller, Loop, Sample};
+use super::sampling::Sampled;
 use super::standard::Standard;
 use crate::case::{Experiment, Initial};
 use crate::design::Design;

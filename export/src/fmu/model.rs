@@ -390,15 +390,15 @@ const SIDES: [&str; DRIVES] = ["left", "right"];
 impl Owned {
     fn numbers(&self) -> &Machine {
         match self {
-            Owned::Axis(stage) => &**stage,
-            Owned::Gantry(gantry) => &**gantry,
+            Owned::Axis(stage) => stage,
+            Owned::Gantry(gantry) => gantry,
         }
     }
 
     fn numbers_mut(&mut self) -> &mut Machine {
         match self {
-            Owned::Axis(stage) => &mut **stage,
-            Owned::Gantry(gantry) => &mut **gantry,
+            Owned::Axis(stage) => stage,
+            Owned::Gantry(gantry) => gantry,
         }
     }
 }
