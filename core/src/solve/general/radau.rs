@@ -242,6 +242,21 @@ pub(super) const fn inverse<const N: usize>(x: [f64; N]) -> [[f64; N]; N] {
     w
 }
 
+/// A change that is this share of the tolerance counts as found.
+pub(super) const FOUND: f64 = 0.01;
+
+/// The powers of the quartic through five values.
+#[inline(always)]
+pub(super) fn monomials(values: &[f64; POINTS]) -> [f64; POINTS] {
+    let mut powers = [0.0; POINTS];
+    for (power, row) in powers.iter_mut().zip(&MONOMIALS) {
+        for (weight, value) in row.iter().zip(values) {
+            *power += weight * value;
+        }
+    }
+    powers
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

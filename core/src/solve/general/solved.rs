@@ -3,9 +3,9 @@
 use super::field::Field;
 use super::linear::{EIGHTHS, Full, STATES, Set, States};
 use super::model::Vector;
-use super::radau::{POINTS, TERMS};
+use super::radau::{POINTS, TERMS, monomials};
 use super::sources::Source;
-use super::step::{Begin, Room, Step, at_nodes, monomials, states};
+use super::step::{Begin, Room, Step, at_nodes, states};
 
 impl Room {
     /// The numbers that a step depends on, by their columns; how many they are without forces.

@@ -11,8 +11,7 @@
 //! at the beginning is a fifth value, which makes the quartic of it as good as that of the force.
 
 use super::model::{Curved, Model, Sliding, Vector};
-use super::radau::{Lane, NODES, PLACES, POINTS, QUARTIC, RADAU};
-use super::step::{FOUND, monomials};
+use super::radau::{FOUND, Lane, NODES, PLACES, POINTS, QUARTIC, RADAU, monomials};
 use crate::friction::{Law, Motion};
 
 /// A force, with the arguments that it depends on by their numbers.

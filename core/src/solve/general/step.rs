@@ -22,7 +22,7 @@ use super::field::Field;
 use super::linear::{Forcing, STATES, Series, Set, States};
 use super::model::{MOST, MOST_GUARDS, Vector};
 use super::newton::Newton;
-use super::radau::{BACKWARD, C, Lane, MONOMIALS, NODES, POINTS, POWER, POWERS, rest};
+use super::radau::{BACKWARD, C, FOUND, Lane, MONOMIALS, NODES, POINTS, POWER, POWERS, rest};
 use super::sources::{Bristle, Bristles};
 use crate::mechanism::{BODIES, DRIVES, SPRINGS};
 use crate::signal::DEGREE;
@@ -38,9 +38,6 @@ const COLUMNS: usize = STATES + 1 + DRIVES * (DEGREE + 1) + SOURCES * POINTS;
 
 /// Turns of the iteration at most.
 const TURNS: usize = 12;
-
-/// A change that is this share of the tolerance counts as found.
-pub(super) const FOUND: f64 = 0.01;
 
 /// A contraction above which Newton's method is taken.
 const SLOW: f64 = 0.2;
@@ -456,18 +453,6 @@ fn basis<const N: usize>(places: [f64; N]) -> [[f64; N]; POINTS] {
         }
     }
     values
-}
-
-/// The powers of the quartic through five values.
-#[inline(always)]
-pub(super) fn monomials(values: &[f64; POINTS]) -> [f64; POINTS] {
-    let mut powers = [0.0; POINTS];
-    for (power, row) in powers.iter_mut().zip(&MONOMIALS) {
-        for (weight, value) in row.iter().zip(values) {
-            *power += weight * value;
-        }
-    }
-    powers
 }
 
 /// Coordinates, speeds and currents of a whole state; what stands behind them does not count.
