@@ -35,13 +35,14 @@
 //!
 //! # Modules
 //!
-//! In the order of dependence; each uses only those above it.
+//! Those of the crates `taut-core`, `taut-case`, `taut-control`, `taut-identify` and `taut-export`, in the order of
+//! dependence; each uses only those above it.
 //!
 //! - [`error`]: what is wrong, where, what is allowed, what to do next.
 //! - [`files`]: files that appear whole or not at all. [`number`]: numbers written for people.
 //! - [`quantity`]: `"19.4 mm"` becomes 0.0194, with the dimension checked. Everywhere else numbers are in SI units.
 //! - [`trajectory`]: columns with units, and their files.
-//! - [`friction`], [`stage`]: what the machine is.
+//! - [`friction`], [`machine`]: what the machine is.
 //! - [`parameter`]: the one table of everything a case file can say; numbers of a machine that are free.
 //! - [`signal`]: what is fed into it, and the references of its moves. [`design`]: what a controller is, in data.
 //! - [`mechanism`]: a machine as bodies, springs and drives, and its equations of motion, mode by mode.

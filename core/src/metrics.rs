@@ -417,7 +417,7 @@ pub struct Held {
 }
 
 impl Held {
-    /// The last one of an experiment that is not zero and no shorter than [`SHORTEST`] of the run.
+    /// The last one of an experiment that is not zero and no shorter than a fiftieth of the run.
     pub fn last(experiment: &Experiment) -> Option<Self> {
         let until = experiment.until;
         let long = |held: &Held| held.input != 0.0 && held.end - held.begin >= SHORTEST * until * (1.0 - 1e-9);
