@@ -1,7 +1,8 @@
 //! A controller as data: its timing, its structure with its gains, and the parts around it.
 //!
 //! A command is in units of the amplifier's input (V in voltage mode, A in current mode), a position in m along the
-//! belt: of an encoder at motor or pulley r φ, of one at the cart x. the crate `taut-control` steps it in time.
+//! belt: of an encoder at motor or pulley r φ, of one at the cart x. The crate `taut-control` steps
+//! it in time.
 
 pub mod placement;
 
