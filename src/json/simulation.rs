@@ -40,7 +40,7 @@ pub struct Simulation {
     title: String,
     version: &'static str,
     solver: SolverUsed,
-    machine: StageFigures,
+    stage: StageFigures,
     experiments: Vec<ExperimentFigures>,
 }
 
@@ -214,7 +214,7 @@ impl Simulation {
             title: case.title.clone(),
             version: env!("CARGO_PKG_VERSION"),
             solver: SolverUsed::of(solver),
-            machine: StageFigures::of(&case.machine),
+            stage: StageFigures::of(&case.machine),
             experiments: runs
                 .iter()
                 .map(|run| ExperimentFigures::of(run, case.machine.drives[0].amplifier.mode, solver))
