@@ -34,7 +34,7 @@ const FARTHEST: f64 = 0.5;
 ///
 /// ```
 /// use taut::case::{Case, TEMPLATE};
-/// use taut::{measure::measure, solve::Solver, stage::Measurement};
+/// use taut::{measure::measure, solve::Solver, machine::Measurement};
 /// let case = Case::from_text("axis.toml", TEMPLATE)?;
 /// let log = measure(&case.machine, &Measurement::default(), &case.experiments[0], Solver::Exact)?.trajectory;
 /// let headings: Vec<String> = log.columns.iter().map(|column| column.heading()).collect();

@@ -52,7 +52,7 @@ impl GantryCase {
     ///
     /// ```
     /// use taut::case::{GantryCase, Given};
-    /// let case = GantryCase::read_with("stages/h-frame/h-frame.toml", &["left_drive.motor.resistance=800 mohm"])?;
+    /// let case = GantryCase::read_with("../stages/h-frame/h-frame.toml", &["left_drive.motor.resistance=800 mohm"])?;
     /// assert_eq!(case.value("cart.travel.max")?, Given::Number(0.25));
     /// assert_eq!(case.value("left_drive.motor.resistance")?, Given::Number(0.8));
     /// assert_eq!(case.value("experiment.0.input.left.for")?, Given::Number(0.25));

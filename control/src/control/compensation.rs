@@ -174,7 +174,7 @@ mod tests {
     /// A generator that left a speed of 1.9e-16 m/s at the end of its move commanded the whole dry friction for ever.
     #[test]
     fn what_rounding_leaves_of_a_reference_at_rest_commands_no_friction() {
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("stages/sollmann-jouaneh/controllers");
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../stages/sollmann-jouaneh/controllers");
         let case = Case::read(folder.join("pid-elastic.toml")).unwrap();
         let mut machine = case.machine.clone();
         (machine.drives[0].motor.gear_efficiency, machine.cart.load) = (0.8, 3.0);

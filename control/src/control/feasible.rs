@@ -234,7 +234,7 @@ mod tests {
     use std::path::Path;
 
     fn case() -> Case {
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("stages/sollmann-jouaneh/controllers");
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../stages/sollmann-jouaneh/controllers");
         let mut case = Case::read(folder.join("pid-elastic.toml")).unwrap();
         (case.machine.drives[0].amplifier.voltage_limit, case.machine.drives[0].amplifier.current_limit) = (None, None);
         case

@@ -41,7 +41,7 @@ impl<'a> GantryAnalysis<'a> {
     /// ```
     /// use taut::case::GantryCase;
     /// use taut::linear::GantryAnalysis;
-    /// let case = GantryCase::read_with("stages/h-frame/h-frame.toml", &[])?;
+    /// let case = GantryCase::read_with("../stages/h-frame/h-frame.toml", &[])?;
     /// let analysis = GantryAnalysis::of(&case)?;
     /// assert_eq!((analysis.modes.rigid.len(), analysis.modes.elastic.len()), (2, 2));
     /// assert!((analysis.modes.elastic[0].hertz() - 196.643946994).abs() < 1e-9);

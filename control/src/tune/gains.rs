@@ -173,7 +173,7 @@ mod tests {
     /// 4 kHz.
     #[test]
     fn a_searched_filter_neither_amplifies_nor_passes_half_the_sampling_rate() {
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("stages/sollmann-jouaneh/controllers");
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../stages/sollmann-jouaneh/controllers");
         let mut design = Case::read(folder.join("pid.toml")).unwrap().controller.unwrap();
         design.filters = vec![
             Filter::Notch { frequency: 100.0, depth: 0.1, damping: 0.7 },

@@ -185,7 +185,7 @@ mod tests {
     /// A search glances at moves at samples; a figure that is not nearly that of the whole run would lead it astray.
     #[test]
     fn a_glance_is_nearly_a_whole_run() {
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("stages/sollmann-jouaneh/controllers");
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../stages/sollmann-jouaneh/controllers");
         for name in ["pid-elastic.toml", "cascade-current.toml", "lqi.toml"] {
             let case = Case::read(folder.join(name)).unwrap();
             let design = case.controller.as_ref().unwrap();

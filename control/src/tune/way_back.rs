@@ -84,7 +84,7 @@ mod tests {
     use std::path::Path;
 
     fn pid() -> Case {
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("stages/sollmann-jouaneh/controllers");
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../stages/sollmann-jouaneh/controllers");
         Case::read(folder.join("pid-elastic.toml")).unwrap()
     }
 

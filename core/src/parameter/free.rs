@@ -69,7 +69,7 @@ impl Free {
     /// ```
     /// use taut::case::{Case, TEMPLATE};
     /// use taut::parameter::Free;
-    /// let mut stage = Case::from_text("axis.toml", TEMPLATE)?.stage;
+    /// let mut stage = Case::from_text("axis.toml", TEMPLATE)?.machine;
     /// let viscous = Free::new(&stage, "cart.friction.viscous", &[], &[])?;
     /// viscous.set(&mut stage, 20.0);
     /// assert_eq!((stage.cart.friction.forward.viscous, stage.cart.friction.backward.viscous), (20.0, 20.0));

@@ -79,7 +79,7 @@ impl Survey {
     /// use taut::case::{Case, TEMPLATE};
     /// use taut::log::{Log, Output, Quantity, Survey};
     /// use taut::signal::Hold;
-    /// let stage = Case::from_text("axis.toml", TEMPLATE)?.stage;
+    /// let stage = Case::from_text("axis.toml", TEMPLATE)?.machine;
     /// // Half a second of 5 V, the cart's position in millimetres by mistake.
     /// let time: Vec<f64> = (0..500).map(|k| f64::from(k) * 1e-3).collect();
     /// let values = time.iter().map(|t| 224.0 * (t - 0.01 * (1.0 - (-t / 0.01).exp()))).collect();
