@@ -275,7 +275,7 @@ impl Page {
         self.push(html! {
             figure.plot data-axis=[axis] {
                 div.figtitle { span { (figure.title) } button type="button" { "Reset zoom" } }
-                div.machine tabindex="0" role="group" aria-label=(figure.title) { (PreEscaped(svg)) }
+                div.stage tabindex="0" role="group" aria-label=(figure.title) { (PreEscaped(svg)) }
                 script type="application/json" { (PreEscaped(embed::json(figure))) }
                 @if !figure.caption.is_empty() { figcaption { (words(&figure.caption)) } }
             }
