@@ -28,7 +28,7 @@ fn made(truth: &[&str], seed: u64) -> Case {
     let mut log: Log = (*logged(&name, &run, values)).clone();
     // A sine is none that is held between samples.
     log.hold = Hold::Linear;
-    case.experiments[0].input = log.signal();
+    case.experiments[0].inputs[0] = log.signal();
     case.experiments[0].log = Some(Arc::new(log));
     case
 }

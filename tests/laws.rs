@@ -3,7 +3,7 @@
 use crate::common;
 use common::random::{self, Dry};
 use proptest::prelude::*;
-use taut::case::{Experiment, Initial};
+use taut::case::Experiment;
 use taut::friction::Motion;
 use taut::machine::axis::{LABELS, ROTOR, SPANS};
 use taut::machine::{AmplifierMode, Machine};
@@ -16,7 +16,7 @@ const STATES: [&str; 6] = ["drive_angle", "drive_speed", "cart_position", "cart_
 
 fn run(machine: &Machine, input: &Signal, until: f64, every: f64) -> Solution {
     let experiment =
-        Experiment { name: "law".into(), input: input.clone(), until, every, initial: Initial::default(), log: None };
+        Experiment { name: "law".into(), inputs: vec![input.clone()], until, every, initial: State::default(), log: None };
     let solution = simulate(machine, &experiment, Solver::Exact).unwrap();
     assert_eq!(solution.outcome.ending, Ending::Complete);
     solution
@@ -288,12 +288,12 @@ proptest! {
         let mut machine = machine;
         machine.drives[0].motor.back_emf_constant = machine.drives[0].motor.torque_constant;
         let mechanism = machine.mechanism();
-        let initial = Initial {
+        let initial = State {
             drive_speed: speeds[0],
             cart_speed: speeds[1],
             idler_speed: speeds[2],
             cart_position: offset,
-            ..Initial::default()
+            ..State::default()
         };
         let experiment =
             Experiment { name: "law".into(), input: Signal::Step { value: 0.0, at: 0.0 }, until: 0.3, every: 1e-3, initial, log: None };

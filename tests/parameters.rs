@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 use std::sync::LazyLock;
-use taut::case::{Case, GantryCase, Given, Opened, TEMPLATE, gantry_template};
+use taut::case::{Case, Given, TEMPLATE, gantry_template};
 use taut::fit::Problem;
 use taut::machine::{Kind, Machine};
 use taut::parameter::{self, Field, Free, Off, Parameter, Sits, all, every, free_markdown, kinds, named, values};
@@ -329,7 +329,7 @@ fn named_kind(key: &str) -> &'static str {
 fn the_table_is_of_one_piece() {
     let axis = Case::from_text("axis.toml", TEMPLATE).unwrap().machine;
     let text = gantry_template(Kind::CoreXy);
-    let gantry = GantryCase::from_text_with("gantry.toml", &text, &[]).unwrap().gantry;
+    let gantry = Case::from_text_with("gantry.toml", &text, &[]).unwrap().gantry;
     let row = |key: &str| -> &'static Parameter { parameter::find(key).unwrap_or_else(|| panic!("no row {key}")) };
     for parameter in all() {
         for key in parameter.follows {
@@ -471,12 +471,12 @@ fn each_number_of_each_bundled_machine_takes_its_own_value_back() {
     ];
     for path in cases {
         let path = format!("stages/{path}");
-        let case = Opened::read_with(&path, &[]).unwrap();
+        let case = Case::read_with(&path, &[]).unwrap();
         let numbers = case.numbers().unwrap();
         assert!(numbers.len() > 20, "{path} has {} numbers", numbers.len());
         for number in &numbers {
             let change = number.change(number.value);
-            let changed = Opened::from_text_with(&path, case.text(), &[&change]);
+            let changed = Case::from_text_with(&path, case.text.as_str(), &[&change]);
             let changed = changed.unwrap_or_else(|e| panic!("{path}: {change}: {e}"));
             let again = changed.numbers().unwrap();
             let again =

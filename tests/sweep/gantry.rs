@@ -1,7 +1,7 @@
 //! Sweeps of gantries: a row is the run of its machine, and figures are those of its columns.
 
 use super::{bits, rows};
-use taut::case::{GantryCase, Given, Sampling};
+use taut::case::{Case, Given, Sampling};
 use taut::machine::Kind;
 use taut::metrics::{GantryMeter, GantryMetrics};
 use taut::parameter::{Free, every, values};
@@ -12,18 +12,18 @@ use taut::trajectory::Trajectory;
 const H_FRAME: &str = include_str!("../../stages/h-frame/h-frame.toml");
 const CORE_XY: &str = include_str!("../../stages/core-xy/core-xy.toml");
 
-fn case(text: &str, changes: &[&str]) -> GantryCase {
-    GantryCase::from_text_with("gantry.toml", text, changes).unwrap_or_else(|error| panic!("{error}"))
+fn case(text: &str, changes: &[&str]) -> Case {
+    Case::from_text_with("gantry.toml", text, changes).unwrap_or_else(|error| panic!("{error}"))
 }
 
 fn sweep(text: &str, changes: &[&str]) -> Sweep {
-    Sweep::of_gantry(&case(text, changes)).unwrap_or_else(|error| panic!("{error}"))
+    Sweep::new(&case(text, changes)).unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// The key figures that `taut simulate` gives of an experiment.
-fn simulated(case: &GantryCase, experiment: usize) -> GantryMetrics {
-    let mechanism = case.gantry.mechanism();
-    let mut meter = GantryMeter::new(&case.gantry);
+fn simulated(case: &Case, experiment: usize) -> GantryMetrics {
+    let mechanism = case.machine.mechanism();
+    let mut meter = GantryMeter::new(&case.machine);
     let (course, solver) = (Course::of(&case.experiments[experiment]), Solver::of_mechanism(&mechanism));
     let observed = (Detail::Full, Some(&mut meter as _));
     let outcome = stream_mechanism(&mechanism, &course, solver, observed, &mut |_| Flow::Continue).unwrap();
@@ -36,8 +36,8 @@ fn figures_that_are_asked_for_are_those_of_all() {
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/stages/h-frame/h-frame.toml");
     let rows = |more: &[&str]| {
         let plan = ["sweep.runs=3", "sweep.vary.\"cart.mass\"=20 %"];
-        let case = GantryCase::read_with(file, &[&plan[..], more].concat()).unwrap();
-        Sweep::of_gantry(&case).unwrap().rows(0, 3, &|| false).unwrap()
+        let case = Case::read_with(file, &[&plan[..], more].concat()).unwrap();
+        Sweep::new(&case).unwrap().rows(0, 3, &|| false).unwrap()
     };
     let (all, some) = (rows(&[]), rows(&["sweep.figures=[\"peak_belt_force\"]"]));
     let per_experiment = some.columns.iter().filter(|column| column.name.contains('.')).count();
@@ -68,11 +68,11 @@ fn a_row_is_the_run_of_its_machine() {
                 let set: Vec<String> =
                     keys.iter().map(|key| format!("{key}={:?}", table.get(key).unwrap()[row])).collect();
                 let case = case(text, &set.iter().map(String::as_str).collect::<Vec<_>>());
-                assert_eq!(sweep.machine(row as u64).gantry(), Some(&case.gantry));
+                assert_eq!(sweep.machine(row as u64).gantry(), Some(&case.machine));
                 for (number, group) in sweep.groups().iter().enumerate() {
                     assert_eq!(table.get(&format!("{}.status", group.file)).unwrap()[row], Status::Complete.code());
                     let metrics = simulated(&case, number);
-                    for measure in of_gantry(&case.gantry.mechanism()) {
+                    for measure in of_gantry(&case.machine.mechanism()) {
                         let value = table.get(&format!("{}.{}", group.file, measure.figure.name)).unwrap()[row];
                         assert_eq!(
                             value.to_bits(),
@@ -283,7 +283,7 @@ fn every_number_is_set_where_a_case_file_has_it() {
             free.set(&mut gantry, part);
             let set = format!("{key}={part:?}");
             let changes: Vec<&str> = changes.iter().copied().chain([set.as_str()]).collect();
-            match GantryCase::from_text_with("gantry.toml", text, &changes) {
+            match Case::from_text_with("gantry.toml", text, &changes) {
                 Ok(read) => assert_eq!(gantry, read.gantry, "{key}"),
                 // Zero where more is wanted, and another form of what the file has.
                 Err(_) if value == 0.0 || key.contains("stribeck.decay") || key.contains("stribeck.velocity") => {

@@ -11,7 +11,7 @@ pub fn open(_: &Request, context: &Context) -> Result<Reply> {
     let case = context.state.case.as_ref();
     Ok(Reply::of(json!({
         "version": env!("CARGO_PKG_VERSION"),
-        "text": case.map_or_else(|| TEMPLATE.to_string(), |case| case.text()),
+        "text": case.map_or_else(|| TEMPLATE.to_string(), |case| case.text.as_str()),
         "path": case.map(|case| case.path.display().to_string()),
         "name": case.and_then(|case| case.path.file_name()).map_or("studio.toml".into(), |name| name.to_string_lossy().into_owned()),
     })))

@@ -1,6 +1,7 @@
 //! Whether a promise holds: logs of the experiment with noise, each fitted from a start that is off.
 
 use super::{Designed, Request, Task};
+use crate::machine::axis::{CART, DRIVE, IDLER};
 use crate::case::{Case, parameters};
 use crate::chance::uniform;
 use crate::error::{Error, Result};
@@ -45,9 +46,9 @@ pub fn verify(case: &Case, request: &Request, found: &Designed, logs: usize, sto
         // Somewhere within a step of a converter, so that rounding is another each time.
         let mut initial = found.initial;
         let off = uniform(&mut random) * step(&task);
-        initial.cart_position += off;
-        initial.drive_angle += off / case.machine.pulley_radius;
-        initial.idler_angle += off / case.machine.pulley_radius;
+        initial.position[CART] += off;
+        initial.position[DRIVE] += off / case.machine.pulley_radius;
+        initial.position[IDLER] += off / case.machine.pulley_radius;
         let noise = task.seed.wrapping_add(1 + k as u64);
         let experiment = task
             .experiment(&found.name, &found.shape.signal(), initial, noise)
