@@ -137,7 +137,7 @@ fn derivatives(c: &mut Criterion) {
             let mut machine = machine.clone();
             change(&mut machine, by);
             let mechanism = Arc::new(machine.mechanism());
-            Begun { start: experiment.initial.state(&mechanism), mechanism }
+            Begun { start: mechanism.begun(&experiment.initial), mechanism }
         })
     });
     let outputs = [Shown::Position(DRIVE, 1.0), Shown::Position(CART, 1.0)].map(Differentiated::Shown);

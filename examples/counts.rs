@@ -9,7 +9,7 @@ mod common;
 
 use std::hint::black_box;
 use std::time::Instant;
-use taut::case::{Case, Experiment, GantryCase, TEMPLATE};
+use taut::case::{Case, Experiment, TEMPLATE};
 use taut::control::{Controller, Loop, Observation, close};
 use taut::machine::axis::DRIVE;
 use taut::machine::{GearPlay, Machine};
@@ -126,8 +126,9 @@ fn profile() -> taut::Result<Profile> {
 /// The cart along y, one second, 1001 rows.
 fn h_frame() -> taut::Result<Box<dyn Fn() -> f64>> {
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/stages/h-frame/h-frame.toml");
-    let case = GantryCase::read_with(file, &[])?;
-    let (mechanism, course): (Mechanism, Course) = (case.gantry.mechanism(), Course::of(&case.experiments[2]));
+    let case = Case::read_with(file, &[])?;
+    let mechanism: Mechanism = case.machine.mechanism();
+    let course = Course::of(&mechanism, &case.experiments[2]);
     Ok(Box::new(move || {
         let outcome = stream_mechanism(&mechanism, &course, Solver::Exact, (Detail::Full, None), &mut |block| {
             black_box(block);

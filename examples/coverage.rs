@@ -9,12 +9,14 @@ use std::f64::consts::TAU;
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
-use taut::case::{Case, Initial, Plan, TEMPLATE};
+use taut::case::{Case, Plan, TEMPLATE};
 use taut::chance::normal;
 use taut::fit::least_squares::{Differences, Residuals};
 use taut::fit::{Problem, fit, inverse_of_square};
 use taut::friction::{Law, Shape};
 use taut::log::{Log, Output, Quantity};
+use taut::machine::axis::{CART, DRIVE, IDLER};
+use taut::mechanism::State;
 use taut::signal::{Hold, Signal};
 use taut::solve::{Flow, Solver, simulate};
 
@@ -239,7 +241,7 @@ fn recorded(cell: &Cell, truth: [f64; 3], chance: &mut Chance) -> Case {
         }
         let mut angle = Vec::with_capacity(count + 1);
         let parts = if matches!(cell.fault, Fault::Drift(..) | Fault::DriftEither(..)) { PARTS } else { 1 };
-        let mut initial = Initial::default();
+        let mut initial = State::default();
         let sign = if matches!(cell.fault, Fault::DriftEither(..)) { chance.normal().signum() } else { 1.0 };
         for part in 0..parts {
             let (begin, end) = (count * part / parts, count * (part + 1) / parts);
@@ -270,7 +272,7 @@ fn recorded(cell: &Cell, truth: [f64; 3], chance: &mut Chance) -> Case {
                 hold: Hold::Zero,
             };
             let mut experiment = pattern.clone();
-            (experiment.input, experiment.initial, experiment.every) = (input, initial, EVERY);
+            (experiment.inputs[0], experiment.initial, experiment.every) = (input, initial, EVERY);
             experiment.until = (end - begin) as f64 * EVERY;
             let run = simulate(&machine, &experiment, Solver::of(&machine))
                 .unwrap_or_else(|error| panic!("{error}"))
@@ -278,15 +280,13 @@ fn recorded(cell: &Cell, truth: [f64; 3], chance: &mut Chance) -> Case {
             let column = |name: &str| run.get(name).unwrap_or_else(|| panic!("no column {name}"));
             let last = |name: &str| *column(name).last().unwrap_or(&0.0);
             angle.extend_from_slice(&column("drive_angle")[usize::from(part > 0)..]);
-            initial = Initial {
-                drive_angle: last("drive_angle"),
-                drive_speed: last("drive_speed"),
-                cart_position: last("cart_position"),
-                cart_speed: last("cart_speed"),
-                idler_angle: last("idler_angle"),
-                idler_speed: last("idler_speed"),
-                motor_current: 0.0,
-            };
+            for (body, [position, speed]) in [
+                (DRIVE, ["drive_angle", "drive_speed"]),
+                (CART, ["cart_position", "cart_speed"]),
+                (IDLER, ["idler_angle", "idler_speed"]),
+            ] {
+                (initial.position[body], initial.speed[body]) = (last(position), last(speed));
+            }
         }
         let added = cell.fault.add(&angle, chance);
         let step = TAU / COUNTS * if let Fault::Counts(times) = cell.fault { times } else { 1.0 };
@@ -305,7 +305,7 @@ fn recorded(cell: &Cell, truth: [f64; 3], chance: &mut Chance) -> Case {
         };
         let mut experiment = pattern.clone();
         (experiment.name, experiment.until, experiment.every) = (log.name.clone(), until, EVERY);
-        experiment.input = Signal::Sampled { times: time, values: voltage, hold: Hold::Zero };
+        experiment.inputs[0] = Signal::Sampled { times: time, values: voltage, hold: Hold::Zero };
         experiment.log = Some(Arc::new(log));
         case.experiments.push(experiment);
     }

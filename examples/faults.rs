@@ -148,7 +148,7 @@ fn made(fault: Fault, seed: u64) -> Case {
     let mut time: Vec<f64> = (0..count).map(|k| k as f64 * EVERY).collect();
     let mut experiment = case.experiments[0].clone();
     (experiment.until, experiment.every) = ((count - 1) as f64 * EVERY, EVERY);
-    experiment.input = Signal::Sampled { times: time.clone(), values: values.clone(), hold: Hold::Zero };
+    experiment.inputs[0] = Signal::Sampled { times: time.clone(), values: values.clone(), hold: Hold::Zero };
     let run = simulate(&truth, &experiment, Solver::of(&truth)).unwrap_or_else(|error| panic!("{error}")).trajectory;
     let column = |name: &str| run.get(name).unwrap_or_else(|| panic!("no column {name}")).to_vec();
     let step = TAU / COUNTS;
@@ -221,7 +221,7 @@ fn made(fault: Fault, seed: u64) -> Case {
     }
     let _ = arm;
     experiment.name = "log".into();
-    experiment.input = Signal::Sampled { times: time.clone(), values: values.clone(), hold: Hold::Zero };
+    experiment.inputs[0] = Signal::Sampled { times: time.clone(), values: values.clone(), hold: Hold::Zero };
     experiment.log = Some(Arc::new(Log {
         name: "log".into(),
         file: Default::default(),

@@ -8,7 +8,7 @@ mod axis;
 mod gantry;
 mod limits;
 
-use crate::case::Opened;
+use crate::case::Case;
 use crate::error::Result;
 use crate::machine::{AmplifierMode, BeltSheet, Motor};
 use crate::number::engineering;
@@ -97,19 +97,19 @@ impl Overview {
     /// That of a case of either kind.
     ///
     /// ```
-    /// use taut::case::{Opened, TEMPLATE};
+    /// use taut::case::{Case, TEMPLATE};
     /// use taut::overview::Overview;
-    /// let case = Opened::from_text_with("axis.toml", TEMPLATE, &[])?;
+    /// let case = Case::from_text_with("axis.toml", TEMPLATE, &[])?;
     /// let overview = Overview::of(&case)?;
     /// // M + (J₁ + J₂)/r² = 0.362 kg + 2 · 6.3e-5 kg m² / (19.4 mm)²
     /// assert!((overview.value("total_mass").unwrap() - 0.69679).abs() < 1e-5);
     /// assert!(overview.notes.iter().any(|note| note.code == "no-damping"));
     /// # Ok::<(), taut::Error>(())
     /// ```
-    pub fn of(case: &Opened) -> Result<Self> {
-        match case {
-            Opened::Axis(case) => axis::overview(case),
-            Opened::Gantry(case) => gantry::overview(case),
+    pub fn of(case: &Case) -> Result<Self> {
+        match case.is_axis() {
+            true => axis::overview(case),
+            false => gantry::overview(case),
         }
     }
 

@@ -6,9 +6,10 @@
 //! authority's own uncertainty where that is more; the same modes in the same order.
 
 use serde_json::Value;
-use taut::case::{Experiment, Initial};
+use taut::case::Experiment;
 use taut::friction::{Friction, Side};
 use taut::machine::{Amplifier, AmplifierMode, Belt, DriveUnit, Kind, Machine, Motor, Pulley, Slide};
+use taut::mechanism::State;
 use taut::signal::Signal;
 use taut::solve::{Ending, Solver, simulate};
 
@@ -109,10 +110,10 @@ fn compare(text: &str) -> usize {
         let name = case["name"].as_str().unwrap();
         let experiment = Experiment {
             name: name.into(),
-            input: input(&case["input"]),
+            inputs: vec![input(&case["input"])],
             until: number(case, "until"),
             every: number(case, "every"),
-            initial: Initial::default(),
+            initial: State::default(),
             log: None,
         };
         let solution = simulate(&machine(&case["stage"]), &experiment, Solver::Exact).unwrap();

@@ -6,7 +6,7 @@
 use crate::common::wrong::{self, Wrong};
 use std::fs;
 use std::path::Path;
-use taut::case::{Case, Opened};
+use taut::case::Case;
 
 #[test]
 fn every_wrong_case_gives_its_message() {
@@ -33,7 +33,7 @@ fn every_base_is_read() {
     for entry in fs::read_dir("tests/bad/base").unwrap() {
         let path = entry.unwrap().path();
         if path.extension().is_some_and(|extension| extension == "toml") {
-            Opened::read_with(&path, &[]).unwrap_or_else(|error| panic!("{error}"));
+            Case::read_with(&path, &[]).unwrap_or_else(|error| panic!("{error}"));
             count += 1;
         }
     }
@@ -49,8 +49,8 @@ fn case(wrong: &Wrong) -> Option<taut::Error> {
 
 fn opened(wrong: &Wrong) -> Option<taut::Error> {
     match &wrong.text {
-        Some(text) => Opened::from_text_with(&wrong.path, text, &[]).err(),
-        None => Opened::read_with(&wrong.path, &[]).err(),
+        Some(text) => Case::from_text_with(&wrong.path, text, &[]).err(),
+        None => Case::read_with(&wrong.path, &[]).err(),
     }
 }
 

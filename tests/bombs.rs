@@ -176,7 +176,7 @@ mod case {
         };
         let case = Case::from_text("axis.toml", &input(100_000)).unwrap();
         assert!(
-            matches!(&case.experiments[0].input, taut::signal::Signal::Table { points } if points.len() == 100_000)
+            matches!(&case.experiments[0].inputs[0], taut::signal::Signal::Table { points } if points.len() == 100_000)
         );
         let error = Case::from_text("axis.toml", &input(400_000)).unwrap_err().to_string();
         assert!(error.contains(": this case file holds too many values, keys and tables\n"), "{error}");
@@ -201,7 +201,7 @@ mod case {
         let turns: Vec<String> = (0..100_000).map(|k| format!("{{ step = {}, lasts = 1e-5 }}", k % 5)).collect();
         let new = format!("input = {{ sequence = [{}] }}", turns.join(", "));
         let text = TEMPLATE.replacen("input = { pulse = \"5 V\", for = \"0.25 s\" }", &new, 1);
-        let input = &Case::from_text("axis.toml", &text).unwrap().experiments[0].input;
+        let input = &Case::from_text("axis.toml", &text).unwrap().experiments[0].inputs[0];
         let (mut t, mut seams) = (0.0, 0);
         while t < 0.999_995 {
             (t, seams) = (input.piece(t).end, seams + 1);

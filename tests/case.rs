@@ -4,6 +4,7 @@ use proptest::prelude::*;
 use std::path::Path;
 use taut::case::{Case, TEMPLATE};
 use taut::friction::Friction;
+use taut::machine::axis::CART;
 use taut::machine::{AmplifierMode, EncoderPlace};
 use taut::signal::{Signal, Slot};
 
@@ -43,7 +44,7 @@ fn presets_hold_the_numbers_of_the_tables() {
         assert_eq!((case.machine.pulley_radius, case.machine.cart.mass), (0.0194, 0.362));
         let names: Vec<String> = case.experiments.iter().map(|e| e.file_name()).collect();
         assert_eq!(names, ["5-v-pulse", "10-v-pulse"]);
-        assert_eq!(case.experiments[1].input, Signal::Pulse { value: 10.0, duration: 0.25, at: 0.0 });
+        assert_eq!(case.experiments[1].inputs[0], Signal::Pulse { value: 10.0, duration: 0.25, at: 0.0 });
         assert_eq!((case.experiments[0].until, case.experiments[0].every), (1.0, 1e-3));
         assert_eq!(case.experiments[0].samples(), 1001);
     }
@@ -111,8 +112,8 @@ fn set_reaches_lists_inline_tables_and_what_is_not_there_yet() {
     assert_eq!(case.machine.cart.friction, Friction::with_breakaway(19.0, 0.2, 0.3));
     assert_eq!(case.machine.drive_pulley.friction.backward.breakaway, 0.02);
     assert_eq!(case.machine.drive_pulley.friction.forward.breakaway, 0.015);
-    assert_eq!(case.experiments[0].initial.cart_position, 0.012);
-    assert_eq!(case.experiments[0].input, Signal::Step { value: 2.0, at: 0.1 });
+    assert_eq!(case.experiments[0].initial.position[CART], 0.012);
+    assert_eq!(case.experiments[0].inputs[0], Signal::Step { value: 2.0, at: 0.1 });
     assert_eq!(case.title, "Another axis");
     let again = Case::from_text("axis.toml", &case.text).unwrap();
     assert_eq!((again.machine, again.text), (case.machine, case.text));
@@ -166,7 +167,7 @@ fn large_files() {
         &format!("{{ table = [{}] }}\nuntil", points.join(",")),
     );
     let case = Case::from_text("axis.toml", &long).unwrap();
-    assert!(matches!(&case.experiments[0].input, Signal::Table { points } if points.len() == 200_000));
+    assert!(matches!(&case.experiments[0].inputs[0], Signal::Table { points } if points.len() == 200_000));
 
     let one = TEMPLATE.split("[[experiment]]").nth(1).unwrap();
     let many: String =
@@ -181,7 +182,7 @@ fn large_files() {
 
 /// The template's first input replaced by `input`.
 fn input(input: &str) -> Signal {
-    with(&[&format!("experiment.0.input={input}")]).experiments[0].input.clone()
+    with(&[&format!("experiment.0.input={input}")]).experiments[0].inputs[0].clone()
 }
 
 #[test]
@@ -266,7 +267,7 @@ fn a_pulley_and_a_belt_by_what_they_are_made_of() {
 fn a_current_is_commanded_in_amperes() {
     let case =
         with(&["amplifier.mode=current", "experiment.0.input={ step = '2 A' }", "experiment.1.input={ step = 1 }"]);
-    assert_eq!(case.experiments[0].input, Signal::Step { value: 2.0, at: 0.0 });
+    assert_eq!(case.experiments[0].inputs[0], Signal::Step { value: 2.0, at: 0.0 });
 }
 
 proptest! {

@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::path::Path;
-use taut::case::{Case, GantryCase};
+use taut::case::Case;
 use taut::machine::BELTS;
 use taut::number::engineering;
 use taut::parameter::{free_markdown, markdown, sections};
@@ -70,9 +70,8 @@ fn the_example_of_a_gantry_reads() {
     let end = belt + whole[belt..].find("\n[").unwrap();
     let follows = format!("{}{}{}", &whole[..belt], variants[0], &whole[end..]);
     for (text, is_following) in [(&whole, false), (&follows, true)] {
-        let case =
-            GantryCase::from_text_with("docs/gantry.md", text, &[]).unwrap_or_else(|error| panic!("{error}\n{text}"));
-        assert!(case.gantry.belt.follows_cart == is_following && case.experiments.len() == 2);
+        let case = Case::from_text_with("docs/gantry.md", text, &[]).unwrap_or_else(|error| panic!("{error}\n{text}"));
+        assert!(case.machine.belt.follows_cart == is_following && case.experiments.len() == 2);
     }
 }
 

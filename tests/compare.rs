@@ -28,7 +28,7 @@ fn made(truth: &[&str], seed: u64) -> Case {
     let mut log: Log = (*logged(&name, &run, values)).clone();
     // A sine is none that is held between samples.
     log.hold = Hold::Linear;
-    case.experiments[0].input = log.signal();
+    case.experiments[0].inputs[0] = log.signal();
     case.experiments[0].log = Some(Arc::new(log));
     case
 }
@@ -189,7 +189,7 @@ fn the_start_of_a_log_that_is_held_out_is_fitted() {
     log.time.iter_mut().for_each(|t| *t -= first);
     log.name = "later".into();
     let mut later = case.experiments[0].clone();
-    (later.name, later.input) = ("later".into(), log.signal());
+    (later.name, later.inputs) = ("later".into(), vec![log.signal()]);
     later.log = Some(Arc::new(log));
     case.experiments.push(later);
     let own = Plan { held_out: vec!["later".into()], ..plan(&["cart.friction.viscous"]) };

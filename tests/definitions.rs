@@ -20,7 +20,7 @@ fn case(changes: &[&str]) -> Case {
 /// The signal of an input as the case file writes it.
 fn input(text: &str) -> Signal {
     case(&[&format!("experiment.0.input={text}"), "experiment.0.until=60", "experiment.0.every=1"]).experiments[0]
-        .input
+        .inputs[0]
         .clone()
 }
 
@@ -147,7 +147,7 @@ fn a_file_and_a_table_are_zero_before_and_held_after() {
         let changes = [format!("experiment.0.input={input}")];
         let changes: Vec<&str> = changes.iter().map(String::as_str).collect();
         let case = Case::from_text_with(folder.join("axis.toml"), TEMPLATE, &changes);
-        case.unwrap_or_else(|error| panic!("{error}")).experiments[0].input.clone()
+        case.unwrap_or_else(|error| panic!("{error}")).experiments[0].inputs[0].clone()
     };
     let check = |input: &str, formula: &dyn Fn(f64) -> f64| {
         let signal = read(input);

@@ -81,7 +81,7 @@ fn what_is_written_is_what_was_judged_and_keeps_its_limits() {
         let text = found.case_text(&case, "axis.toml".as_ref()).unwrap();
         let read = Case::from_text("designed.toml", &text).unwrap();
         let experiment = read.experiments.last().unwrap();
-        assert_eq!((&experiment.input, experiment.until), (&found.shape.signal(), 0.6), "{kind:?}\n{text}");
+        assert_eq!((&experiment.inputs[0], experiment.until), (&found.shape.signal(), 0.6), "{kind:?}\n{text}");
         for mass in [0.8, 1.0, 1.2] {
             let mut machine = read.machine.clone();
             machine.cart.mass *= mass;

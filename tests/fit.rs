@@ -231,7 +231,7 @@ fn late(mut truth: Case, rows: usize) -> Case {
     let mut case = with_logs_of(truth);
     for experiment in &mut case.experiments {
         let log = experiment.log.as_ref().unwrap();
-        experiment.input = Signal::Sampled { times: log.time.clone(), values: log.input.clone(), hold: log.hold };
+        experiment.inputs[0] = Signal::Sampled { times: log.time.clone(), values: log.input.clone(), hold: log.hold };
     }
     case
 }
@@ -277,7 +277,7 @@ fn a_log_that_begins_at_rest_does_so_in_its_first_window() {
             slow = 0.99 * slow + 3e-3 * 0.0199f64.sqrt() * chance.normal();
         }
         log.input.fill(volts);
-        experiment.input = Signal::Sampled { times: log.time.clone(), values: log.input.clone(), hold: log.hold };
+        experiment.inputs[0] = Signal::Sampled { times: log.time.clone(), values: log.input.clone(), hold: log.hold };
         experiment.name = format!("step of {volts} V");
         case.experiments.push(experiment);
     }

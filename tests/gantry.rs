@@ -1,7 +1,7 @@
 //! Gantries against independent solvers (`authorities/gantry.py`), and laws that hold for any of them.
 
 use serde_json::Value;
-use taut::case::GantryCase;
+use taut::case::Case;
 use taut::linear::{GantryAnalysis, Natural, Root};
 use taut::machine::Kind;
 use taut::metrics::{GantryMeter, GantryMetrics, Peak};
@@ -14,8 +14,8 @@ struct Run {
     events: Vec<Event>,
 }
 
-fn run(case: &GantryCase, solver: Solver) -> Run {
-    let mechanism = case.gantry.mechanism();
+fn run(case: &Case, solver: Solver) -> Run {
+    let mechanism = case.machine.mechanism();
     let mut rows = Trajectory::default();
     let sink = &mut |block: &Trajectory| {
         if rows.is_empty() {
@@ -24,7 +24,7 @@ fn run(case: &GantryCase, solver: Solver) -> Run {
         rows.append(block);
         Flow::Continue
     };
-    let course = Course::of(&case.experiments[0]);
+    let course = Course::of(&mechanism, &case.experiments[0]);
     let outcome = stream_mechanism(&mechanism, &course, solver, (Detail::Full, None), sink).unwrap();
     assert_eq!(outcome.ending, Ending::Complete);
     Run { rows, events: outcome.events }
@@ -49,9 +49,9 @@ fn compare(solver: Solver, (length, speed, time): (f64, f64, f64)) {
     let cases = file["cases"].as_array().unwrap();
     for told_case in cases {
         let name = told_case["name"].as_str().unwrap();
-        let case = GantryCase::from_text_with("gantry.toml", told_case["case"].as_str().unwrap(), &[]).unwrap();
+        let case = Case::from_text_with("gantry.toml", told_case["case"].as_str().unwrap(), &[]).unwrap();
         let run = run(&case, solver);
-        let r = case.gantry.pulley_radius;
+        let r = case.machine.pulley_radius;
         let doubt = |key: &str| 4.0 * told_case["methods_differ_by"][key].as_f64().unwrap();
         for (row, want) in told_case["rows"].as_array().unwrap().iter().zip(told_case["states"].as_array().unwrap()) {
             let row = row.as_u64().unwrap() as usize;
@@ -100,16 +100,16 @@ fn the_general_solver_agrees_with_the_authority() {
 }
 
 /// The figures of a run with a row every so many seconds, and the rows.
-fn metered(case: &GantryCase, solver: Solver, every: f64) -> (GantryMetrics, Trajectory) {
-    let course = Course { every, ..Course::of(&case.experiments[0]) };
-    let mut meter = GantryMeter::new(&case.gantry);
+fn metered(case: &Case, solver: Solver, every: f64) -> (GantryMetrics, Trajectory) {
+    let course = Course { every, ..Course::of(&case.machine.mechanism(), &case.experiments[0]) };
+    let mut meter = GantryMeter::new(&case.machine);
     let mut rows = Trajectory::default();
     let sink = &mut |block: &Trajectory| {
         rows.append(block);
         Flow::Continue
     };
     let outcome =
-        stream_mechanism(&case.gantry.mechanism(), &course, solver, (Detail::Full, Some(&mut meter)), sink).unwrap();
+        stream_mechanism(&case.machine.mechanism(), &course, solver, (Detail::Full, Some(&mut meter)), sink).unwrap();
     (meter.finish(&outcome.events), rows)
 }
 
@@ -120,9 +120,9 @@ fn peaks(metrics: &GantryMetrics) -> Vec<Peak> {
 }
 
 /// The stretch of each span by its lever arms, s = A q, from columns of q.
-fn stretches(case: &GantryCase, q: [&[f64]; 4]) -> Vec<Vec<f64>> {
-    let r = case.gantry.pulley_radius;
-    let arms: &[[f64; 4]] = match case.gantry.kind {
+fn stretches(case: &Case, q: [&[f64]; 4]) -> Vec<Vec<f64>> {
+    let r = case.machine.pulley_radius;
+    let arms: &[[f64; 4]] = match case.machine.kind {
         Kind::HFrame => &[[r, 0.0, 1.0, 1.0], [0.0, -r, 1.0, -1.0], [-r, r, -2.0, 0.0]],
         Kind::Axis | Kind::CoreXy => {
             &[[r, 0.0, -1.0, -1.0], [-r, 0.0, 1.0, 1.0], [0.0, r, -1.0, 1.0], [0.0, -r, 1.0, -1.0]]
@@ -133,12 +133,12 @@ fn stretches(case: &GantryCase, q: [&[f64]; 4]) -> Vec<Vec<f64>> {
 }
 
 /// Where the drives have bridge and cart.
-fn place(case: &GantryCase, [left, right]: [f64; 2]) -> [f64; 2] {
-    case.gantry.by_drives(&[left, right, 0.0, 0.0, 0.0, 0.0]).try_into().unwrap()
+fn place(case: &Case, [left, right]: [f64; 2]) -> [f64; 2] {
+    case.machine.by_drives(&[left, right, 0.0, 0.0, 0.0, 0.0]).try_into().unwrap()
 }
 
 /// The largest magnitudes in rows, in the same order.
-fn largest_rows(case: &GantryCase, rows: &Trajectory) -> Vec<f64> {
+fn largest_rows(case: &Case, rows: &Trajectory) -> Vec<f64> {
     let get = |name: &str| rows.get(name).unwrap().to_vec();
     let [left, right, x, y] = ["left_angle", "right_angle", "bridge_position", "cart_position"].map(get);
     let places = left.iter().zip(&right).map(|(left, right)| place(case, [*left, *right]));
@@ -153,7 +153,7 @@ fn largest_rows(case: &GantryCase, rows: &Trajectory) -> Vec<f64> {
     }));
     let stretches = stretches(case, [&left, &right, &x, &y]);
     columns.extend(stretches);
-    columns.extend(case.gantry.kind.geometry().span_labels().map(|span| get(&format!("{}_force", span.key))));
+    columns.extend(case.machine.kind.geometry().span_labels().map(|span| get(&format!("{}_force", span.key))));
     columns.iter().map(|column| column.iter().fold(0.0, |most: f64, v| most.max(v.abs()))).collect()
 }
 
@@ -162,7 +162,7 @@ fn peaks_are_of_the_motion_and_not_of_its_rows() {
     let file = cases();
     for told in file["cases"].as_array().unwrap().iter().take(24) {
         let name = told["name"].as_str().unwrap();
-        let case = GantryCase::from_text_with("gantry.toml", told["case"].as_str().unwrap(), &[]).unwrap();
+        let case = Case::from_text_with("gantry.toml", told["case"].as_str().unwrap(), &[]).unwrap();
         let (fine, rows) = metered(&case, Solver::Exact, 2e-5);
         let (coarse, _) = metered(&case, Solver::Exact, 0.05);
         let (general, _) = metered(&case, Solver::General { tolerance: 1e-11 }, 0.05);
@@ -183,7 +183,7 @@ fn peaks_are_of_the_motion_and_not_of_its_rows() {
 fn a_rotor_behind_a_gear_with_play_keeps_a_gantry_from_resting() {
     let case = |play: &[&str]| {
         let text = std::fs::read_to_string("stages/core-xy/core-xy.toml").unwrap();
-        GantryCase::from_text_with("core-xy.toml", &text, play).unwrap()
+        Case::from_text_with("core-xy.toml", &text, play).unwrap()
     };
     let (stiff, _) = metered(&case(&[]), Solver::Exact, 1e-3);
     assert!(stiff.settled && stiff.stop_time.unwrap() < 0.4, "{:?}", stiff.stop_time);
@@ -195,10 +195,10 @@ fn a_rotor_behind_a_gear_with_play_keeps_a_gantry_from_resting() {
 #[test]
 fn the_error_of_the_general_solver_is_estimated() {
     let text = std::fs::read_to_string("stages/h-frame/follows.toml").unwrap();
-    let case = GantryCase::from_text_with("follows.toml", &text, &[]).unwrap();
-    let mechanism = case.gantry.mechanism();
+    let case = Case::from_text_with("follows.toml", &text, &[]).unwrap();
+    let mechanism = case.machine.mechanism();
     assert_eq!(Solver::of_mechanism(&mechanism), Solver::GENERAL);
-    let course = Course::of(&case.experiments[0]);
+    let course = Course::of(&mechanism, &case.experiments[0]);
     let go = |tolerance: f64, sink: &mut dyn FnMut(&Trajectory) -> Flow| {
         stream_mechanism(&mechanism, &course, Solver::General { tolerance }, (Detail::Full, None), sink).unwrap()
     };
@@ -215,7 +215,7 @@ fn the_error_of_the_general_solver_is_estimated() {
     });
     let error =
         estimate.finish_mechanism(&mechanism, &course, 1e-7, &outcome, &mut || Flow::Continue).unwrap().unwrap();
-    let r = case.gantry.pulley_radius;
+    let r = case.machine.pulley_radius;
     let mut off: f64 = 0.0;
     for (column, lever) in [("left_angle", r), ("right_angle", r), ("bridge_position", 1.0), ("cart_position", 1.0)] {
         for (a, b) in rows.get(column).unwrap().iter().zip(fine.get(column).unwrap()) {
@@ -231,7 +231,7 @@ fn elastic_modes_are_those_of_the_authority() {
     let told = file["frequencies"].as_array().unwrap();
     assert_eq!(told.len(), 23);
     for told in told {
-        let case = GantryCase::from_text_with("gantry.toml", told["case"].as_str().unwrap(), &[]).unwrap();
+        let case = Case::from_text_with("gantry.toml", told["case"].as_str().unwrap(), &[]).unwrap();
         let analysis = GantryAnalysis::of(&case).unwrap();
         let (name, modes) = (told["name"].as_str().unwrap(), &analysis.modes);
         let want: Vec<f64> = told["elastic_Hz"].as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect();
@@ -258,7 +258,7 @@ fn the_machines_of_the_note() {
             experiment = [{{ name = "run", input = {{}}, until = 1, every = 1e-3 }}]
             "#
         );
-        GantryCase::from_text_with("gantry.toml", &text, &[]).unwrap()
+        Case::from_text_with("gantry.toml", &text, &[]).unwrap()
     };
     for (kind, stiffness, hertz) in [
         ("h-frame", "[132.76e3, 132.76e3, 58.885e3]", [196.643946994, 220.198687165]),
@@ -272,7 +272,7 @@ fn the_machines_of_the_note() {
         }
         // r φ₁ and r φ₂ of bridge and cart alone, as the pulleys turn without strain.
         for (mode, [x, y]) in analysis.modes.rigid.iter().zip([[1.0, 0.0], [0.0, 1.0]]) {
-            let want = case.gantry.without_strain(&[x, y], &[]).position;
+            let want = case.machine.without_strain(&[x, y], &[]).position;
             assert!(mode.shape.iter().zip(&want).all(|(a, b)| (a - b).abs() < 1e-9), "{:?}", mode.shape);
         }
     }
@@ -290,13 +290,13 @@ fn a_swing_of_a_gantry_dies_out_with_its_damping_ratio() {
         belt = { stiffness = [150e3, 90e3, 140e3, 95e3], damping = [3, 4, 5, 6] }
         experiment = [{ name = "run", input = {}, until = 0.05, every = 1e-5 }]
     "#;
-    let mut case = GantryCase::from_text_with("gantry.toml", text, &[]).unwrap();
-    let modes = Natural::of(&case.gantry.mechanism(), &[0.0; 6]).unwrap();
+    let mut case = Case::from_text_with("gantry.toml", text, &[]).unwrap();
+    let modes = Natural::of(&case.machine.mechanism(), &[0.0; 6]).unwrap();
     let last = modes.elastic.last().unwrap();
     let Some(Root::Pair { frequency, damping }) = last.damped else { panic!("{modes:?}") };
     assert!((frequency / last.frequency - 1.0).abs() < 0.05 && damping > 0.01 && damping < 0.5);
     // Begun in the shape of that mode, which damping mixes a little with the others.
-    let r = case.gantry.pulley_radius;
+    let r = case.machine.pulley_radius;
     for (body, shape) in last.shape.iter().enumerate() {
         case.experiments[0].initial.position[body] = 1e-4 * shape / if body < 2 { r } else { 1.0 };
     }
@@ -318,7 +318,7 @@ fn a_swing_of_a_gantry_dies_out_with_its_damping_ratio() {
 #[test]
 fn resonances_follow_bridge_and_cart() {
     for name in ["h-frame", "core-xy"] {
-        let case = GantryCase::read_with(format!("stages/{name}/follows.toml"), &[]).unwrap();
+        let case = Case::read_with(format!("stages/{name}/follows.toml"), &[]).unwrap();
         let analysis = GantryAnalysis::of(&case).unwrap();
         let map = analysis.map.unwrap();
         let middle = (map.bridge.len() / 2, map.cart.len() / 2);
@@ -336,8 +336,8 @@ fn resonances_follow_bridge_and_cart() {
         assert!(most > 1.01 * least, "{name}: {least} to {most}");
         // One place by itself: the stiffnesses written down.
         let (i, j) = (3, 20);
-        let lengths = case.gantry.span_lengths(&[map.bridge[i], map.cart[j]]).unwrap();
-        let mut there = case.gantry.clone();
+        let lengths = case.machine.span_lengths(&[map.bridge[i], map.cart[j]]).unwrap();
+        let mut there = case.machine.clone();
         there.belt.follows_cart = false;
         there.belt.stiffness = lengths.map(|length| there.belt.make.unwrap().rigidity() / length);
         for (hertz, want) in map.hertz.iter().zip(Natural::frequencies(&there.mechanism(), &[0.0; 6]).unwrap()) {

@@ -2,7 +2,7 @@
 
 use crate::common;
 use proptest::prelude::*;
-use taut::case::{GantryCase, GantryExperiment};
+use taut::case::{Case, Experiment};
 use taut::friction::Friction;
 use taut::machine::{Belt, DriveUnit, Kind, Machine, Pulley, Slide, Spans};
 use taut::mechanism::{Amplifier, AmplifierMode, Motor, State};
@@ -16,7 +16,7 @@ struct Run {
     events: Vec<Event>,
 }
 
-fn course(experiment: &GantryExperiment) -> Course {
+fn course(experiment: &Experiment) -> Course {
     Course {
         inputs: experiment.inputs.to_vec(),
         start: experiment.initial,
@@ -25,8 +25,8 @@ fn course(experiment: &GantryExperiment) -> Course {
     }
 }
 
-fn run(case: &GantryCase, solver: Solver) -> Run {
-    let mechanism = case.gantry.mechanism();
+fn run(case: &Case, solver: Solver) -> Run {
+    let mechanism = case.machine.mechanism();
     let mut rows = Trajectory::default();
     let sink = &mut |block: &Trajectory| {
         if rows.is_empty() {
@@ -268,10 +268,10 @@ fn spans_that_follow_the_cart_are_as_stiff_as_they_are_long() {
              initial = {{ bridge_position = 0.05 }}\n"
         )
     };
-    let read = |belt: &str| GantryCase::from_text_with("frame.toml", &text(belt), &[]).unwrap();
+    let read = |belt: &str| Case::from_text_with("frame.toml", &text(belt), &[]).unwrap();
     let make = "modulus = \"8 GPa\", section = \"6 mm^2\", spans = [0.5, 0.6, 1.3]";
     let (fixed, follows) = (read(make), read(&format!("{make}, follows_cart = true")));
-    assert!(fixed.gantry.mechanism().is_piecewise_linear() && !follows.gantry.mechanism().is_piecewise_linear());
+    assert!(fixed.machine.mechanism().is_piecewise_linear() && !follows.machine.mechanism().is_piecewise_linear());
     let (exact, general) = (run(&fixed, Solver::Exact), run(&fixed, Solver::GENERAL));
     let apart = |a: &Run, b: &Run, column: &str| {
         let pairs = a.rows.get(column).unwrap().iter().zip(b.rows.get(column).unwrap());

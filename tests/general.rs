@@ -3,7 +3,7 @@
 use crate::common;
 use common::random::{self, Dry};
 use proptest::prelude::*;
-use taut::case::{Experiment, Initial};
+use taut::case::Experiment;
 use taut::friction::{Friction, Law, Shape};
 use taut::machine::{BeltMake, Machine, Travel};
 use taut::mechanism::State;
@@ -12,7 +12,14 @@ use taut::signal::Signal;
 use taut::solve::{Dynamics, Ending, Solution, Solver, simulate};
 
 fn experiment(input: &Signal, until: f64, every: f64) -> Experiment {
-    Experiment { name: "general".into(), input: input.clone(), until, every, initial: Initial::default(), log: None }
+    Experiment {
+        name: "general".into(),
+        inputs: vec![input.clone()],
+        until,
+        every,
+        initial: State::default(),
+        log: None,
+    }
 }
 
 fn run(machine: &Machine, experiment: &Experiment, solver: Solver) -> Solution {

@@ -2,7 +2,7 @@
 //! --package taut --test all golden::` writes `tests/golden.txt` anew. Everywhere else tolerances are lengths and times.
 
 use std::fmt::Write;
-use taut::case::Opened;
+use taut::case::Case;
 use taut::chance::hash;
 use taut::solve::{Choice, Course, Detail, Flow, Solver, stream, stream_mechanism};
 use taut::trajectory::Trajectory;
@@ -21,13 +21,13 @@ fn bits(rows: &Trajectory) -> u64 {
 }
 
 fn lines(path: &str) -> String {
-    let case = Opened::read_with(path, &[]).unwrap();
+    let case = Case::read_with(path, &[]).unwrap();
     let mut text = String::new();
     let mut told = |name: &str, rows: &Trajectory| {
         let _ = writeln!(text, "{path} {name:?}: {} rows, {:016x}", rows.len(), bits(rows));
     };
     match &case {
-        Opened::Axis(case) => {
+        case if case.is_axis() => {
             for experiment in &case.experiments {
                 let mut rows = Trajectory::default();
                 let mut take = |block: &Trajectory| {
@@ -38,8 +38,8 @@ fn lines(path: &str) -> String {
                 told(&experiment.name, &rows);
             }
         }
-        Opened::Gantry(case) => {
-            let mechanism = case.gantry.mechanism();
+        case => {
+            let mechanism = case.machine.mechanism();
             let solver = Choice::default().solver_of(&mechanism).unwrap();
             for experiment in &case.experiments {
                 let mut rows = Trajectory::default();
@@ -47,7 +47,7 @@ fn lines(path: &str) -> String {
                     rows.append(block);
                     Flow::Continue
                 };
-                let course = Course::of(experiment);
+                let course = Course::of(&mechanism, experiment);
                 stream_mechanism(&mechanism, &course, solver, (Detail::Full, None), &mut take).unwrap();
                 told(&experiment.name, &rows);
             }

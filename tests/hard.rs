@@ -6,9 +6,9 @@ use common::random::decades;
 use common::{experiment, table4};
 use proptest::prelude::*;
 use std::time::Instant;
-use taut::case::{Experiment, Initial};
+use taut::case::Experiment;
 use taut::friction::{Friction, Motion, Side};
-use taut::machine::axis::{BODIES, CART, DRIVE};
+use taut::machine::axis::{BODIES, CART, DRIVE, IDLER};
 use taut::machine::{Amplifier, AmplifierMode, Belt, GearPlay, Machine};
 use taut::signal::{Hold, Signal, Slot};
 use taut::solve::{Ending, Flow, Solution, Solver, simulate, stream};
@@ -152,12 +152,12 @@ fn beside_each_breakaway() {
             let mut experiment = experiment(Signal::Step { value: 0.0, at: 0.0 }, 0.02);
             match body {
                 DRIVE => {
-                    experiment.input = Signal::Step { value: factor * voltage_of(&all, 0.015), at: 0.0 };
+                    experiment.inputs[0] = Signal::Step { value: factor * voltage_of(&all, 0.015), at: 0.0 };
                 }
                 // −(k₁ + k₂) x = F
-                CART => experiment.initial.cart_position = -factor * 0.2 / (k1 + k2),
+                CART => experiment.initial.position[CART] = -factor * 0.2 / (k1 + k2),
                 // −r² (k₂ + k₃) φ₃ = τ
-                _ => experiment.initial.idler_angle = -factor * 0.015 / (r * r * (k2 + k3)),
+                _ => experiment.initial.position[IDLER] = -factor * 0.015 / (r * r * (k2 + k3)),
             }
             let solution = complete(&machine, &experiment);
             let first = solution.outcome.events.first();
@@ -189,8 +189,7 @@ fn all_three_stop_at_once() {
                 set_friction(&mut machine, [pulley, Friction::symmetric(viscous * m, deceleration * m), pulley]);
                 let speed = 0.1 * direction;
                 let mut experiment = experiment(Signal::Step { value: 0.0, at: 0.0 }, 1.0);
-                experiment.initial =
-                    Initial { drive_speed: speed / r, cart_speed: speed, idler_speed: speed / r, ..Initial::default() };
+                experiment.initial = machine.without_strain(&[0.0], &[speed]);
                 let solution = complete(&machine, &experiment);
                 // v̇ = −a − b v / m
                 let stop = if viscous == 0.0 {
@@ -223,7 +222,7 @@ fn no_friction_at_all() {
     machine.drives[0].motor.torque_constant = 1e-300;
     machine.drives[0].motor.back_emf_constant = 1e-300;
     let mut experiment = experiment(Signal::Step { value: 0.0, at: 0.0 }, 10.0);
-    experiment.initial.drive_speed = 10.0;
+    experiment.initial.speed[DRIVE] = 10.0;
     let solution = complete(&machine, &experiment);
     assert!(solution.outcome.events.is_empty());
     let r = machine.pulley_radius;
@@ -408,7 +407,7 @@ fn too_many_events_are_told() {
 fn a_metre_of_stretch() {
     for x in [1.0, -1.0] {
         let mut experiment = experiment(Signal::Step { value: 0.0, at: 0.0 }, 1.0);
-        experiment.initial.cart_position = x;
+        experiment.initial.position[CART] = x;
         complete(&table4(), &experiment);
     }
 }
@@ -465,7 +464,7 @@ fn no_machine_is_refused() {
     let mut experiment = experiment(Signal::Step { value: f64::NAN, at: 0.0 }, 0.1);
     let solution = simulate(&table4(), &experiment, Solver::Exact).unwrap();
     assert!(matches!(solution.outcome.ending, Ending::Diverged { .. }));
-    experiment.initial.cart_speed = f64::NAN;
+    experiment.initial.speed[CART] = f64::NAN;
     simulate(&table4(), &experiment, Solver::Exact).unwrap_err();
 }
 

@@ -3,10 +3,11 @@
 use crate::common;
 use common::random::{self, Dry};
 use proptest::prelude::*;
-use taut::case::{Case, Experiment, Initial};
+use taut::case::{Case, Experiment};
 use taut::friction::Motion;
 use taut::machine::axis::{CART, DRIVE};
 use taut::machine::{AmplifierMode, BeltModel, Machine};
+use taut::mechanism::State;
 use taut::signal::Signal;
 use taut::solve::{Ending, Event, Solution, Solver, simulate};
 
@@ -46,10 +47,10 @@ fn clipped(changes: &[&str]) -> Case {
 fn run(machine: &Machine, input: &Signal, until: f64, solver: Solver) -> Solution {
     let experiment = Experiment {
         name: "instant".into(),
-        input: input.clone(),
+        inputs: vec![input.clone()],
         until,
         every: 1e-3,
-        initial: Initial::default(),
+        initial: State::default(),
         log: None,
     };
     simulate(machine, &experiment, solver).unwrap()

@@ -3,9 +3,9 @@
 use crate::common;
 use common::random::{self, Dry};
 use proptest::prelude::*;
-use taut::case::{Experiment, Initial};
+use taut::case::Experiment;
 use taut::friction::Motion;
-use taut::machine::axis::{LABELS, ROTOR, SPANS};
+use taut::machine::axis::{CART, DRIVE, IDLER, LABELS, ROTOR, SPANS};
 use taut::machine::{AmplifierMode, Machine};
 use taut::mechanism::{Contact, Limit, Mode, Power, State};
 use taut::signal::Signal;
@@ -15,8 +15,14 @@ use taut::trajectory::Trajectory;
 const STATES: [&str; 6] = ["drive_angle", "drive_speed", "cart_position", "cart_speed", "idler_angle", "idler_speed"];
 
 fn run(machine: &Machine, input: &Signal, until: f64, every: f64) -> Solution {
-    let experiment =
-        Experiment { name: "law".into(), input: input.clone(), until, every, initial: Initial::default(), log: None };
+    let experiment = Experiment {
+        name: "law".into(),
+        inputs: vec![input.clone()],
+        until,
+        every,
+        initial: State::default(),
+        log: None,
+    };
     let solution = simulate(machine, &experiment, Solver::Exact).unwrap();
     assert_eq!(solution.outcome.ending, Ending::Complete);
     solution
@@ -288,15 +294,13 @@ proptest! {
         let mut machine = machine;
         machine.drives[0].motor.back_emf_constant = machine.drives[0].motor.torque_constant;
         let mechanism = machine.mechanism();
-        let initial = Initial {
-            drive_speed: speeds[0],
-            cart_speed: speeds[1],
-            idler_speed: speeds[2],
-            cart_position: offset,
-            ..Initial::default()
-        };
+        let mut initial = State::default();
+        initial.position[CART] = offset;
+        for (body, speed) in [DRIVE, CART, IDLER].into_iter().zip(speeds) {
+            initial.speed[body] = speed;
+        }
         let experiment =
-            Experiment { name: "law".into(), input: Signal::Step { value: 0.0, at: 0.0 }, until: 0.3, every: 1e-3, initial, log: None };
+            Experiment { name: "law".into(), inputs: vec![Signal::Step { value: 0.0, at: 0.0 }], until: 0.3, every: 1e-3, initial, log: None };
         let solution = simulate(&machine, &experiment, Solver::Exact).unwrap();
         let first = mechanism.energy(&state(&solution.trajectory, 0));
         let mut before = f64::INFINITY;

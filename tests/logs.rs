@@ -40,8 +40,8 @@ fn a_log_drives_its_experiment() {
     assert_eq!((log.name.as_str(), &log.time, &log.input), ("run", &vec![0.0, 0.1, 0.2], &vec![5.0, 5.0, 0.0]));
     assert_eq!(output(log, Quantity::CartPosition), [0.0, 2.5e-3, 5e-3]);
     assert_eq!(output(log, Quantity::MotorCurrent), [0.1, 0.2, 0.3]);
-    assert_eq!(experiment.input.value(0.15), 5.0);
-    assert_eq!(experiment.input.value(0.2), 0.0);
+    assert_eq!(experiment.inputs[0].value(0.15), 5.0);
+    assert_eq!(experiment.inputs[0].value(0.2), 0.0);
     assert_eq!(case.files.len(), 1);
 }
 

@@ -9,10 +9,11 @@ use crate::common;
 
 use common::{random, table4};
 use proptest::prelude::*;
-use taut::case::{Case, Experiment, Initial};
+use taut::case::{Case, Experiment};
 use taut::friction::{Friction, Law, Shape, Side};
 use taut::linear::{Operation, StateSpace};
 use taut::machine::{BeltModel, Machine};
+use taut::mechanism::State;
 use taut::polyline::Polyline;
 use taut::signal::Signal;
 use taut::solve::{Ending, Solution, Solver, simulate};
@@ -50,10 +51,10 @@ fn axis() -> Machine {
 fn run(machine: &Machine, input: &Signal, until: f64, tolerance: f64) -> Solution {
     let experiment = Experiment {
         name: "merged".into(),
-        input: input.clone(),
+        inputs: vec![input.clone()],
         until,
         every: 1e-3,
-        initial: Initial::default(),
+        initial: State::default(),
         log: None,
     };
     let solution =
@@ -424,10 +425,10 @@ proptest! {
         machine.drives[0].motor.gear_efficiency = 1.0;
         let experiment = Experiment {
             name: "power".into(),
-            input: input.clone(),
+            inputs: vec![input.clone()],
             until: 0.08,
             every: 2e-6,
-            initial: Initial::default(),
+            initial: State::default(),
             log: None,
         };
         let solution = simulate(&machine, &experiment, Solver::General { tolerance: 1e-10 }).unwrap();
@@ -494,10 +495,10 @@ fn a_flat_curve_is_coulomb_friction() {
         machine.idler_pulley.friction = Friction::symmetric(0.0, 0.3 * r);
         let experiment = Experiment {
             name: "flat".into(),
-            input: input.clone(),
+            inputs: vec![input.clone()],
             until: 0.2,
             every: 1e-3,
-            initial: Initial::default(),
+            initial: State::default(),
             log: None,
         };
         let exact = simulate(&machine, &experiment, Solver::Exact).unwrap();

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 use std::sync::LazyLock;
-use taut::case::{Case, GantryCase, Given, Opened, TEMPLATE, gantry_template};
+use taut::case::{Case, Given, TEMPLATE, gantry_template};
 use taut::fit::Problem;
 use taut::machine::{Kind, Machine};
 use taut::parameter::{self, Field, Free, Off, Parameter, Sits, all, every, free_markdown, kinds, named, values};
@@ -200,10 +200,10 @@ fn every_number_is_set_where_a_case_file_has_it() {
                 _ => "1024, 512, 1024, 512",
             },
         );
-        let read = |changes: &[&str]| GantryCase::from_text_with("gantry.toml", &text, changes);
+        let read = |changes: &[&str]| Case::from_text_with("gantry.toml", &text, changes);
         let case = read(&[]).unwrap_or_else(|error| panic!("{error}"));
-        let written = |change: &str| Ok(read(&[change])?.gantry);
-        set_each(&case.gantry, &|key| case.value(key).is_ok(), &written, &mut seen);
+        let written = |change: &str| Ok(read(&[change])?.machine);
+        set_each(&case.machine, &|key| case.value(key).is_ok(), &written, &mut seen);
     }
     for row in all() {
         match row.field {
@@ -235,8 +235,8 @@ fn every_number_is_free_in_a_fit_and_varied_in_a_sweep() {
                 assert!(!named(&key).unwrap().range.contains(2.0 * value), "{key}");
                 continue;
             };
-            assert_eq!(sweep.machine(0).axis(), Some(&case.machine), "{key}");
-            let less = value_of(sweep.machine(1).axis().unwrap(), &key).unwrap();
+            assert_eq!(sweep.machine(0), case.machine, "{key}");
+            let less = value_of(&sweep.machine(1), &key).unwrap();
             assert!(less == 0.25 * value || key.contains(".static") && less < value, "{key}");
             assert_eq!(sweep.columns()[1].name, key);
         }
@@ -377,7 +377,7 @@ fn named_kind(key: &str) -> &'static str {
 fn the_table_is_of_one_piece() {
     let axis = Case::from_text("axis.toml", TEMPLATE).unwrap().machine;
     let text = gantry_template(Kind::CoreXy);
-    let gantry = GantryCase::from_text_with("gantry.toml", &text, &[]).unwrap().gantry;
+    let gantry = Case::from_text_with("gantry.toml", &text, &[]).unwrap().machine;
     let row = |key: &str| -> &'static Parameter { parameter::find(key).unwrap_or_else(|| panic!("no row {key}")) };
     for parameter in all() {
         for key in parameter.follows {
@@ -519,12 +519,12 @@ fn each_number_of_each_bundled_machine_takes_its_own_value_back() {
     ];
     for path in cases {
         let path = format!("stages/{path}");
-        let case = Opened::read_with(&path, &[]).unwrap();
+        let case = Case::read_with(&path, &[]).unwrap();
         let numbers = case.numbers().unwrap();
         assert!(numbers.len() > 20, "{path} has {} numbers", numbers.len());
         for number in &numbers {
             let change = number.change(number.value);
-            let changed = Opened::from_text_with(&path, case.text(), &[&change]);
+            let changed = Case::from_text_with(&path, case.text.as_str(), &[&change]);
             let changed = changed.unwrap_or_else(|e| panic!("{path}: {change}: {e}"));
             let again = changed.numbers().unwrap();
             let again =

@@ -2,9 +2,9 @@
 
 use crate::common;
 use common::table4;
-use taut::case::{Case, Experiment, Initial};
+use taut::case::{Case, Experiment};
 use taut::friction::{Friction, Law, Motion, Shape, Side};
-use taut::machine::axis::{CART, LABELS};
+use taut::machine::axis::{CART, DRIVE, IDLER, LABELS};
 use taut::machine::{Amplifier, AmplifierMode, Machine};
 use taut::signal::Signal;
 use taut::solve::{Ending, ErrorEstimate, Event, Flow, Solution, Solver, simulate, stream};
@@ -21,8 +21,7 @@ fn experiment(input: Signal, until: f64, every: f64) -> Experiment {
 
 /// An experiment from rest at `start`, the pulleys turned to where the belt is not strained.
 fn from(start: f64, machine: &Machine, input: Signal, until: f64) -> Experiment {
-    let angle = start / machine.pulley_radius;
-    let initial = Initial { drive_angle: angle, cart_position: start, idler_angle: angle, ..Initial::default() };
+    let initial = machine.at_rest(start);
     Experiment { initial, ..experiment(input, until, 1e-3) }
 }
 
@@ -177,8 +176,8 @@ fn a_gear_turned_its_sign_without_a_moment_passing() {
             let mut experiment = from(start, &machine, input.clone(), 0.1);
             // Next to the angle that fits, on either side.
             let near = |angle: f64, off: i64| f64::from_bits((angle.to_bits() as i64 + off) as u64);
-            experiment.initial.drive_angle = near(experiment.initial.drive_angle, k % 3 - 1);
-            experiment.initial.idler_angle = near(experiment.initial.idler_angle, k % 5 - 2);
+            experiment.initial.position[DRIVE] = near(experiment.initial.position[DRIVE], k % 3 - 1);
+            experiment.initial.position[IDLER] = near(experiment.initial.position[IDLER], k % 5 - 2);
             let solution = complete(&machine, &experiment, Solver::Exact);
             assert_eq!(bodies(&solution.outcome.events), wanted, "from {start} m, {input:?}");
         }
@@ -190,7 +189,7 @@ fn a_gear_turned_its_sign_without_a_moment_passing() {
 fn a_gear_at_rest_has_no_events() {
     let machine = geared();
     let mut experiment = from(0.07, &machine, Signal::Step { value: 0.0, at: 0.0 }, 0.1);
-    experiment.initial.drive_angle = 3.5000000000000004;
+    experiment.initial.position[DRIVE] = 3.5000000000000004;
     let solution = complete(&machine, &experiment, Solver::Exact);
     assert!(solution.outcome.events.is_empty(), "{:?}", solution.outcome.events);
 }

@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use proptest::strategy::ValueTree;
 use proptest::test_runner::TestRunner;
 use std::sync::Arc;
-use taut::case::{Experiment, Initial};
+use taut::case::Experiment;
 use taut::machine::Machine;
 use taut::parameter::{self, Free};
 use taut::signal::{Hold, Signal};
@@ -36,18 +36,9 @@ impl Setup {
     fn experiment(&self) -> Experiment {
         let times = self.times.iter().map(|t| t + self.delay).collect();
         let values = self.values.iter().map(|u| u + self.offset).collect();
-        let r = self.machine.pulley_radius;
-        let initial = Initial {
-            cart_position: self.position,
-            drive_angle: self.position / r,
-            idler_angle: self.position / r,
-            cart_speed: self.speed,
-            drive_speed: self.speed / r,
-            idler_speed: self.speed / r,
-            motor_current: 0.0,
-        };
+        let initial = self.machine.without_strain(&[self.position], &[self.speed]);
         let input = Signal::Sampled { times, values, hold: self.hold };
-        Experiment { name: "drawn".into(), input, until: UNTIL, every: EVERY, initial, log: None }
+        Experiment { name: "drawn".into(), inputs: vec![input], until: UNTIL, every: EVERY, initial, log: None }
     }
 
     /// The columns of a run, and the number of its events; none where it does not reach its end.
@@ -68,7 +59,7 @@ impl Setup {
 
     fn begun(&self) -> Begun {
         let mechanism = Arc::new(self.machine.mechanism());
-        Begun { start: self.experiment().initial.state(&mechanism), mechanism }
+        Begun { start: mechanism.begun(&self.experiment().initial), mechanism }
     }
 
     /// The outputs that belong to the columns it has.
@@ -308,7 +299,7 @@ fn where_there_are_no_derivatives_there_are_none() {
             let mut machine = machine.clone();
             free.set(&mut machine, free.start + by);
             let mechanism = Arc::new(machine.mechanism());
-            Begun { start: experiment.initial.state(&mechanism), mechanism }
+            Begun { start: mechanism.begun(&experiment.initial), mechanism }
         });
         let mut bench = Bench::default();
         bench.mount(machine).unwrap();

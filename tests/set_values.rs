@@ -3,7 +3,7 @@
 
 use crate::common::chance::Chance;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use taut::case::{Opened, TEMPLATE};
+use taut::case::{Case, TEMPLATE};
 use taut::parameter::{Field, all, values};
 use taut::solve::{Course, Detail, Ending, ErrorEstimate, Flow, Outcome, Solver, stream, stream_mechanism};
 
@@ -30,7 +30,7 @@ fn machines() -> Vec<(&'static str, String)> {
 }
 
 /// Runs the first experiment for a moment, with its accuracy; none where the machine or its run is refused.
-fn run(opened: &Opened) -> Option<(Outcome, f64)> {
+fn run(opened: &Case) -> Option<(Outcome, f64)> {
     let (mut calls, mut more) = (0, 0);
     let mut flow = || {
         more += 1;
@@ -41,7 +41,7 @@ fn run(opened: &Opened) -> Option<(Outcome, f64)> {
         if calls > CALLS { Flow::Stop } else { Flow::Continue }
     };
     let (outcome, error) = match opened {
-        Opened::Axis(case) => {
+        case if case.is_axis() => {
             let mut experiment = case.experiments[0].clone();
             experiment.until = experiment.until.min(0.02);
             experiment.every = experiment.until / 40.0;
@@ -54,9 +54,9 @@ fn run(opened: &Opened) -> Option<(Outcome, f64)> {
             let error = estimate.finish(&case.machine, &experiment, TOLERANCE, &outcome, &mut flow);
             (outcome, error.unwrap())
         }
-        Opened::Gantry(case) => {
-            let mechanism = case.gantry.mechanism();
-            let mut course = Course::of(&case.experiments[0]);
+        case => {
+            let mechanism = case.machine.mechanism();
+            let mut course = Course::of(&mechanism, &case.experiments[0]);
             course.until = course.until.min(0.02);
             course.every = course.until / 40.0;
             let mut estimate = ErrorEstimate::of_mechanism(&mechanism, &course);
@@ -72,9 +72,9 @@ fn run(opened: &Opened) -> Option<(Outcome, f64)> {
     Some((outcome, error.map_or(f64::INFINITY, |error| error.value)))
 }
 
-fn opened(name: &str, text: &str, changes: &[String]) -> Option<Opened> {
+fn opened(name: &str, text: &str, changes: &[String]) -> Option<Case> {
     let changes: Vec<&str> = changes.iter().map(String::as_str).collect();
-    Opened::from_text_with(name, text, &changes).ok()
+    Case::from_text_with(name, text, &changes).ok()
 }
 
 /// The second run has fewer columns than the first, and the rotor of a gantry's gear was not among them.
@@ -117,8 +117,8 @@ fn any_number_of_any_machine_may_be_set() {
             if below(3) > 0 {
                 // A number that the machine has.
                 let own = opened(path, text, &[]).map(|opened| match opened {
-                    Opened::Axis(case) => values(&case.machine),
-                    Opened::Gantry(case) => values(&case.gantry),
+                    case if case.is_axis() => values(&case.machine),
+                    case => values(&case.machine),
                 });
                 let own = own.unwrap();
                 let (key, value) = &own[below(own.len())];

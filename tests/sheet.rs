@@ -2,7 +2,7 @@
 
 use crate::common;
 use std::f64::consts::TAU;
-use taut::case::{Case, GantryCase, TEMPLATE, gantry_template};
+use taut::case::{Case, TEMPLATE, gantry_template};
 use taut::linear::{Natural, undamped};
 use taut::log::{Log, Output, Quantity, Survey};
 use taut::machine::{BeltModel, Kind, Machine, SimpleDrive, slowest_swing};
@@ -72,7 +72,7 @@ fn both_drives_of_a_gantry_take_data_sheets() {
         &text[..begin],
         &text[end..]
     );
-    let gantry = GantryCase::from_text_with("gantry.toml", &text, &[]).unwrap().gantry;
+    let gantry = Case::from_text_with("gantry.toml", &text, &[]).unwrap().machine;
     near(gantry.drives[0].motor.torque_constant, 1.0 / 40.0);
     near(gantry.drives[1].motor.back_emf_constant, 1.0 / 50.0);
 }
@@ -161,7 +161,7 @@ fn both_ways_to_the_slowest_swing_agree() {
     rigid.belt.model = BeltModel::Rigid;
     assert_eq!(slowest_swing(&rigid.mechanism()), None);
     for kind in [Kind::HFrame, Kind::CoreXy] {
-        let gantry = GantryCase::from_text_with("gantry.toml", &gantry_template(kind), &[]).unwrap().gantry;
+        let gantry = Case::from_text_with("gantry.toml", &gantry_template(kind), &[]).unwrap().machine;
         let hertz = Natural::frequencies(&gantry.mechanism(), &[0.0; 6]).unwrap()[0];
         assert!((slowest_swing(&gantry.mechanism()).unwrap() / (TAU * hertz) - 1.0).abs() < 1e-9);
     }

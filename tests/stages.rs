@@ -6,7 +6,7 @@ use crate::common;
 use std::fmt::Write;
 use std::fs;
 use std::path::{Path, PathBuf};
-use taut::case::{Case, Experiment, GantryCase, Opened};
+use taut::case::{Case, Experiment};
 use taut::fit::{Fit, fit};
 use taut::log::read_columns;
 use taut::measure::measure;
@@ -46,24 +46,24 @@ fn curve(path: &Path) -> String {
     if !common::data::of_case(path) {
         return String::new();
     }
-    match Opened::read_with(path, &[]).unwrap_or_else(|error| panic!("{error}")) {
-        Opened::Axis(case) => curve_of_axis(path, &case),
-        Opened::Gantry(case) => curve_of_gantry(path, &case),
+    match Case::read_with(path, &[]).unwrap_or_else(|error| panic!("{error}")) {
+        case if case.is_axis() => curve_of_axis(path, &case),
+        case => curve_of_gantry(path, &case),
     }
 }
 
 /// The heading of the columns of a machine's curves.
 fn heading(machine: &Path) -> &'static str {
-    let is_gantry = |path: &PathBuf| matches!(Opened::read_with(path, &[]), Ok(Opened::Gantry(_)));
+    let is_gantry = |path: &PathBuf| matches!(Case::read_with(path, &[]), Ok(case) if !case.is_axis());
     match cases(machine).iter().any(|(_, path)| is_gantry(path)) {
         true => "case,experiment,time_s,bridge_by_drives_m,cart_by_drives_m,bridge_position_m,cart_position_m\n",
         false => "case,experiment,time_s,drive_travel_m,cart_position_m\n",
     }
 }
 
-fn curve_of_gantry(path: &Path, case: &GantryCase) -> String {
+fn curve_of_gantry(path: &Path, case: &Case) -> String {
     let mut text = String::new();
-    let mechanism = case.gantry.mechanism();
+    let mechanism = case.machine.mechanism();
     // Spans that follow bridge and cart are the general solver's, and its curves as good as it can be.
     let solver = match Solver::of_mechanism(&mechanism) {
         Solver::Exact => Solver::Exact,
@@ -75,14 +75,14 @@ fn curve_of_gantry(path: &Path, case: &GantryCase) -> String {
             rows.append(block);
             Flow::Continue
         };
-        let course = Course::of(experiment);
+        let course = Course::of(&mechanism, experiment);
         let outcome = stream_mechanism(&mechanism, &course, solver, (Detail::Full, None), sink).unwrap();
         assert_eq!(outcome.ending, Ending::Complete, "{}: {}", path.display(), experiment.name);
         for kept in 0..=KEPT {
             let row = (rows.len() - 1) * kept / KEPT;
             let at = |name: &str| rows.get(name).unwrap()[row];
             let angles = [at("left_angle"), at("right_angle"), 0.0, 0.0, 0.0, 0.0];
-            let places: [f64; 2] = case.gantry.by_drives(&angles).try_into().unwrap();
+            let places: [f64; 2] = case.machine.by_drives(&angles).try_into().unwrap();
             let [x, y] = places.map(|way| way + 0.0);
             let (time, bridge, cart) = (at("time"), at("bridge_position"), at("cart_position"));
             let file = path.file_name().unwrap().to_string_lossy();
@@ -241,7 +241,7 @@ fn the_cart_of_pendule_pi_moves_as_recorded() {
         let (times, positions) = (&columns[1][first..first + rows], &columns[2][first..first + rows]);
         let input = Signal::Step { value: pwm, at: 0.0 };
         let until = (rows - 1) as f64 * 5e-3;
-        let experiment = Experiment { input, until, every: 5e-3, ..case.experiments[0].clone() };
+        let experiment = Experiment { inputs: vec![input], until, every: 5e-3, ..case.experiments[0].clone() };
         let run = simulate(&case.machine, &experiment, Solver::Exact).unwrap().trajectory;
         let travel = run.get("cart_position").unwrap();
         for (time, position) in times.iter().zip(positions) {

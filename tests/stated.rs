@@ -6,7 +6,7 @@ use common::random::{self, Dry, decades};
 use proptest::prelude::*;
 use proptest::strategy::ValueTree;
 use proptest::test_runner::{RngAlgorithm, TestRng, TestRunner};
-use taut::case::{Case, Experiment, Initial};
+use taut::case::{Case, Experiment};
 use taut::friction::{Friction, Law, Shape};
 use taut::machine::axis::CART;
 use taut::machine::{BeltMake, BeltModel, Machine, Travel};
@@ -75,8 +75,14 @@ fn curved() -> impl Strategy<Value = Machine> {
 
 /// A run, and the accuracy that it states.
 fn run(stage: &Machine, input: &Signal, (until, every): (f64, f64), solver: Solver) -> (Solution, PositionError) {
-    let experiment =
-        Experiment { name: "run".into(), input: input.clone(), until, every, initial: Initial::default(), log: None };
+    let experiment = Experiment {
+        name: "run".into(),
+        inputs: vec![input.clone()],
+        until,
+        every,
+        initial: taut::mechanism::State::default(),
+        log: None,
+    };
     let solution = simulate(stage, &experiment, solver).unwrap();
     let Solver::General { tolerance } = solver else {
         let error = solution.outcome.error.unwrap();
@@ -281,7 +287,7 @@ fn a_pulley_broke_away_before_its_load_reached_the_breakaway() {
         for input in INPUTS {
             let case =
                 Case::from_text_with("moving.toml", &text, &[&format!("experiment.moving.input={input}")]).unwrap();
-            let (stage, input) = (&case.machine, &case.experiments[0].input);
+            let (stage, input) = (&case.machine, &case.experiments[0].inputs[0]);
             let mut before: Option<(f64, f64)> = None;
             for every in [1e-2, 1e-3, 1e-4] {
                 let (solution, stated) = run(stage, input, (1.0, every), Solver::GENERAL);
@@ -346,7 +352,7 @@ fn a_voltage_limit_was_reached_and_left_at_its_level() {
     ] {
         let case =
             Case::from_text_with("limited.toml", LIMITED, &[&format!("experiment.moving.input={input}")]).unwrap();
-        let (stage, input) = (&case.machine, &case.experiments[0].input);
+        let (stage, input) = (&case.machine, &case.experiments[0].inputs[0]);
         let (first, stated) = run(stage, input, (0.2, 2e-3), Solver::GENERAL);
         let (second, also) = run(stage, input, (0.2, 2e-4), Solver::General { tolerance: 1e-12 });
         let off = apart(stage, (&first, 1), (&second, 10));
@@ -370,12 +376,12 @@ fn a_machine_stepped_under_a_moving_input_does_what_a_run_does() {
         let case = Case::from_text("moving.toml", text).unwrap();
         let experiment = &case.experiments[0];
         let (run, stated) =
-            run(&case.machine, &experiment.input, (experiment.until, experiment.every), Solver::GENERAL);
+            run(&case.machine, &experiment.inputs[0], (experiment.until, experiment.every), Solver::GENERAL);
         for step in [7e-4, 1e-2] {
             let mut machine = Simulator::new(&case.machine, Solver::GENERAL).unwrap();
             let mut events = Vec::new();
             while machine.time() < experiment.until {
-                let piece = experiment.input.piece(machine.time());
+                let piece = experiment.inputs[0].piece(machine.time());
                 machine.set_input(0, &piece).unwrap();
                 machine.advance(piece.end.min(machine.time() + step).min(experiment.until), &mut events).unwrap();
             }

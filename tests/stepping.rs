@@ -4,7 +4,7 @@ use crate::common;
 use common::random::{self, Dry};
 use proptest::prelude::*;
 
-use taut::case::{Experiment, GantryCase, Initial};
+use taut::case::{Case, Experiment};
 use taut::machine::Machine;
 use taut::mechanism::{Mechanism, State};
 use taut::signal::Signal;
@@ -17,10 +17,10 @@ const UNTIL: f64 = 0.2;
 fn in_one_go(stage: &Machine, input: &Signal, solver: Solver) -> (Vec<(String, f64)>, Vec<Event>) {
     let experiment = Experiment {
         name: "all".into(),
-        input: input.clone(),
+        inputs: vec![input.clone()],
         until: UNTIL,
         every: 1e-3,
-        initial: Initial::default(),
+        initial: State::default(),
         log: None,
     };
     let solution = simulate(stage, &experiment, solver).unwrap();
@@ -198,8 +198,8 @@ fn the_general_solver_and_gantries_step_too() {
     }
     let file: serde_json::Value = serde_json::from_str(include_str!("authorities/gantry.json")).unwrap();
     for told in file["cases"].as_array().unwrap().iter().step_by(7) {
-        let case = GantryCase::from_text_with("gantry.toml", told["case"].as_str().unwrap(), &[]).unwrap();
-        let (mechanism, experiment) = (case.gantry.mechanism(), &case.experiments[0]);
+        let case = Case::from_text_with("gantry.toml", told["case"].as_str().unwrap(), &[]).unwrap();
+        let (mechanism, experiment) = (case.machine.mechanism(), &case.experiments[0]);
         let course = Course {
             inputs: experiment.inputs.to_vec(),
             start: experiment.initial,

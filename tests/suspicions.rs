@@ -61,7 +61,7 @@ fn drawn(seed: u64, noise: f64, late: usize) -> Case {
     let time: Vec<f64> = (0..COUNT).map(|k| k as f64 * EVERY).collect();
     let mut experiment = case.experiments[0].clone();
     (experiment.until, experiment.every) = ((COUNT - 1) as f64 * EVERY, EVERY);
-    experiment.input = Signal::Sampled { times: time.clone(), values: input.clone(), hold: Hold::Zero };
+    experiment.inputs[0] = Signal::Sampled { times: time.clone(), values: input.clone(), hold: Hold::Zero };
     let run = simulate(&truth, &experiment, Solver::of(&truth)).unwrap().trajectory;
     // x_k = 2 ρ cos(ω h) x_{k−1} − ρ² x_{k−2} + e_k
     let (zeta, omega) = (0.05, TAU * 15.0);
@@ -172,7 +172,7 @@ fn a_cart_on_a_soft_belt_is_not_taken_for_a_wrong_sign_or_unit() {
             output(Quantity::DriveAngle, "drive_angle", 1e-4),
         ];
         let (time, input) = (column("time"), column("voltage"));
-        experiment.input = Signal::Sampled { times: time.clone(), values: input.clone(), hold: Hold::Zero };
+        experiment.inputs[0] = Signal::Sampled { times: time.clone(), values: input.clone(), hold: Hold::Zero };
         let name = experiment.name.clone();
         experiment.log = Some(Arc::new(Log {
             name,
@@ -248,7 +248,7 @@ fn a_slip_between_two_samples_is_no_jump() {
         }
         let experiment = &mut case.experiments[0];
         (experiment.until, experiment.every) = (399.0 * every, every);
-        experiment.input = Signal::Sampled { times: time.clone(), values: input.clone(), hold: Hold::Zero };
+        experiment.inputs = vec![Signal::Sampled { times: time.clone(), values: input.clone(), hold: Hold::Zero }];
         let run = simulate(&truth, experiment, Solver::of(&truth)).unwrap().trajectory;
         let position = run.get("cart_position").unwrap();
         let values = position.iter().map(|x| x + 1e-5 * chance.normal()).collect();

@@ -283,7 +283,7 @@ fn a_verdict_does_not_depend_on_the_unit_of_the_input() {
         for (own, other) in case.experiments.iter_mut().zip(&real.experiments) {
             let log: &Log = other.log.as_ref().unwrap();
             let input: Vec<f64> = log.input.iter().map(|u| u * unit).collect();
-            own.input =
+            own.inputs[0] =
                 taut::signal::Signal::Sampled { times: log.time.clone(), values: input.clone(), hold: log.hold };
             own.log = Some(Arc::new(Log { input, ..log.clone() }));
         }
@@ -311,7 +311,7 @@ fn the_other_way_round_gives_what_is_promised() {
     // The other way round, with its log.
     let mut both = one.clone();
     let mut real = Case::from_text_with("axis.toml", TEMPLATE, &truth).unwrap();
-    let taut::signal::Signal::Pulse { value, .. } = &mut real.experiments[0].input else { panic!() };
+    let taut::signal::Signal::Pulse { value, .. } = &mut real.experiments[0].inputs[0] else { panic!() };
     *value = -*value;
     let run = simulate(&real.machine, &real.experiments[0], Solver::Exact).unwrap().trajectory;
     let (step, mut noise) = (std::f64::consts::TAU / 2048.0, noise(2));
@@ -359,7 +359,7 @@ fn faults_are_told_and_good_logs_are_not() {
         let mut case = good.clone();
         let mut log: Log = (**case.experiments[0].log.as_ref().unwrap()).clone();
         change(&mut log);
-        case.experiments[0].input = log.signal();
+        case.experiments[0].inputs[0] = log.signal();
         case.experiments[0].log = Some(Arc::new(log));
         fitted(&case, &plan(&KEYS))
     };

@@ -8,7 +8,7 @@ use crate::{interrupt, terminal};
 use rayon::prelude::*;
 use std::io::Read;
 use std::path::{Path, PathBuf};
-use taut::case::{Case, Files, LARGEST_FILE, Opened};
+use taut::case::{Case, Files, LARGEST_FILE};
 use taut::files::write_atomically;
 use taut::{Error, Result};
 use taut_report::{Page, Picture};
@@ -38,17 +38,17 @@ pub struct Common {
 
 impl Common {
     /// Reads the case of either kind at `path` with all its files; `-` is standard input.
-    pub fn open(&self, path: &Path) -> Result<Opened> {
+    pub fn open(&self, path: &Path) -> Result<Case> {
         let case = self.open_for(path, Files::All)?;
         case.complete()?;
         Ok(case)
     }
 
     /// The same with the files of these experiments. One that is missing is told to whoever asks for the experiment.
-    pub fn open_for(&self, path: &Path, files: Files) -> Result<Opened> {
+    pub fn open_for(&self, path: &Path, files: Files) -> Result<Case> {
         match is_standard_input(path) {
-            true => Opened::from_text_for(path, &standard_input()?, &self.changes(), files),
-            false => Opened::read_for(path, &self.changes(), files),
+            true => Case::from_text_for(path, &standard_input()?, &self.changes(), files),
+            false => Case::read_for(path, &self.changes(), files),
         }
     }
 
@@ -62,8 +62,8 @@ impl Common {
     /// The same with the files of these experiments. One that is missing is told to whoever asks for the experiment.
     pub fn case_for(&self, path: &Path, files: Files) -> Result<Case> {
         match is_standard_input(path) {
-            true => Case::from_text_for(path, &standard_input()?, &self.changes(), files),
-            false => Case::read_for(path, &self.changes(), files),
+            true => Case::axis_from_text_for(path, &standard_input()?, &self.changes(), files),
+            false => Case::read_axis_for(path, &self.changes(), files),
         }
     }
 

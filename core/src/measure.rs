@@ -74,7 +74,7 @@ pub fn stream(
 
     // At rest before time zero: the first row without an input.
     let still =
-        Experiment { input: Signal::Step { value: 0.0, at: 0.0 }, until: grid.interval(), ..experiment.clone() };
+        Experiment { inputs: vec![Signal::Step { value: 0.0, at: 0.0 }], until: grid.interval(), ..experiment.clone() };
     let still = Experiment { every: still.until, ..still };
     let mut before = Vec::new();
     solve::stream(machine, &still, solver, &mut |block| {
@@ -91,7 +91,7 @@ pub fn stream(
         grid,
         raster,
         jitter: random(measurement.seed, &experiment.name, "jitter"),
-        input: &experiment.input,
+        input: &experiment.inputs[0],
         last: before.clone(),
         before,
         devices,

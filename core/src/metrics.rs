@@ -423,7 +423,7 @@ impl Held {
         let long = |held: &Held| held.input != 0.0 && held.end - held.begin >= SHORTEST * until * (1.0 - 1e-9);
         let (mut last, mut held, mut time) = (None, Held { input: 0.0, begin: 0.0, end: 0.0 }, 0.0);
         while time < until {
-            let piece = experiment.input.piece(time);
+            let piece = experiment.inputs[0].piece(time);
             let input = if piece.degree() == 0 { piece.coefficients[0] } else { 0.0 };
             if input.to_bits() != held.input.to_bits() {
                 last = Some(held).filter(long).or(last);

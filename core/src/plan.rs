@@ -2,7 +2,7 @@
 
 use crate::chance::hash;
 use crate::machine::Quantity;
-use crate::mechanism::{DRIVES, Mechanism, State};
+use crate::mechanism::State;
 use crate::signal::{Hold, Signal};
 use crate::trajectory::Grid;
 use std::path::PathBuf;
@@ -17,53 +17,17 @@ const LONGEST_FILE_NAME: usize = 200;
 pub struct Experiment {
     /// Its name, unique within the case.
     pub name: String,
-    /// The input of the amplifier.
-    pub input: Signal,
+    /// The input of each drive's amplifier, in the order of the machine's drives.
+    pub inputs: Vec<Signal>,
     /// End of the run, s.
     pub until: f64,
     /// Output interval, s.
     pub every: f64,
-    /// Where it starts from.
-    pub initial: Initial,
+    /// Where it starts from: rotors stand in the middle of their play, and a current that is no state of its own counts
+    /// for nothing.
+    pub initial: State,
     /// Its log, if the file names one. Its times are the experiment's.
     pub log: Option<Arc<Log>>,
-}
-
-/// The state at time zero; at rest at the origin unless said otherwise.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Initial {
-    /// φ₁, rad.
-    pub drive_angle: f64,
-    /// φ₁′, rad/s.
-    pub drive_speed: f64,
-    /// x, m.
-    pub cart_position: f64,
-    /// x′, m/s.
-    pub cart_speed: f64,
-    /// φ₃, rad.
-    pub idler_angle: f64,
-    /// φ₃′, rad/s.
-    pub idler_speed: f64,
-    /// Armature current, A; matters only with an inductance.
-    pub motor_current: f64,
-}
-
-impl Initial {
-    /// The state that it stands for.
-    pub fn state(&self, mechanism: &Mechanism) -> State {
-        let mut state = State::default();
-        let has_current = mechanism.drives.iter().any(|drive| drive.has_current_state());
-        // The rotor in the middle of its play.
-        state.position[..4].copy_from_slice(&[
-            self.drive_angle,
-            self.cart_position,
-            self.idler_angle,
-            self.drive_angle,
-        ]);
-        state.speed[..4].copy_from_slice(&[self.drive_speed, self.cart_speed, self.idler_speed, self.drive_speed]);
-        state.current[0] = if has_current { self.motor_current } else { 0.0 };
-        state
-    }
 }
 
 impl Experiment {
@@ -86,33 +50,6 @@ pub fn file_name(name: &str) -> String {
     }
     let hash = format!("-{:016x}", hash(name.bytes()));
     format!("{}{hash}", &plain[..plain.floor_char_boundary(LONGEST_FILE_NAME - hash.len())])
-}
-
-/// One run of a gantry.
-#[derive(Debug, Clone)]
-pub struct GantryExperiment {
-    /// Its name, unique within the case.
-    pub name: String,
-    /// The inputs of the left and the right amplifier.
-    pub inputs: [Signal; DRIVES],
-    /// End of the run, s.
-    pub until: f64,
-    /// Output interval, s.
-    pub every: f64,
-    /// Where it starts from.
-    pub initial: State,
-}
-
-impl GantryExperiment {
-    /// Its name as that of a file, without ending.
-    pub fn file_name(&self) -> String {
-        file_name(&self.name)
-    }
-
-    /// Number of rows of its result.
-    pub fn samples(&self) -> u64 {
-        Grid::new(self.every, self.until).intervals().saturating_add(1)
-    }
 }
 
 /// A measured run: what went in and what was seen, at its own times.

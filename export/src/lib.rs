@@ -22,7 +22,7 @@ mod tables;
 pub use place::Place;
 pub use tables::{Does, Element, ElementKind, Row, StateName, TableGuard, Tables, Then};
 
-use crate::case::{Case, Opened};
+use crate::case::Case;
 use crate::error::{Error, Result};
 
 /// A target whose files are made here.
@@ -128,26 +128,24 @@ pub fn identifier(name: &str) -> String {
 }
 
 /// The controller of a case. Errors: a case without one; what to do about it is the caller's to say.
-pub fn controller(case: &Opened) -> Result<(&Case, &crate::design::Design)> {
-    match case {
-        Opened::Gantry(_) => Err(Error::new("a gantry has no controller")),
-        Opened::Axis(case) => match &case.controller {
-            Some(design) => Ok((case, design)),
-            None => Err(Error::new("this case has no controller")),
-        },
+pub fn controller(case: &Case) -> Result<(&Case, &crate::design::Design)> {
+    match &case.controller {
+        Some(design) => Ok((case, design)),
+        None if case.is_axis() => Err(Error::new("this case has no controller")),
+        None => Err(Error::new("a gantry has no controller")),
     }
 }
 
 /// The next step where a controller is missing: to add one, where the case can have one, or `instead`.
-fn without_controller(case: &Opened, error: Error, instead: &str) -> Error {
-    error.next(match case {
-        Opened::Axis(_) => format!("add a [controller], as in docs/control.md, or {instead}"),
-        Opened::Gantry(_) => instead.to_string(),
+fn without_controller(case: &Case, error: Error, instead: &str) -> Error {
+    error.next(match case.is_axis() {
+        true => format!("add a [controller], as in docs/control.md, or {instead}"),
+        false => instead.to_string(),
     })
 }
 
 /// The part that is asked for, or else what there is: a controller that is asked for must be there.
-pub fn part(case: &Opened, asked: Option<Part>) -> Result<Part> {
+pub fn part(case: &Case, asked: Option<Part>) -> Result<Part> {
     let part = asked.unwrap_or(match controller(case) {
         Ok(_) => Part::Both,
         Err(_) => Part::Plant,
@@ -178,7 +176,7 @@ fn shaper_remark(design: &crate::design::Design) -> Vec<String> {
 }
 
 /// The files of a target, called `stem`. Errors: what the target cannot do, and what can be done instead.
-pub fn export(case: &Opened, target: Target, stem: &str, options: &Options) -> Result<Exported> {
+pub fn export(case: &Case, target: Target, stem: &str, options: &Options) -> Result<Exported> {
     match target {
         Target::C => c::export(case, part(case, options.part)?, stem, options),
         Target::StructuredText => st::export(case, options.part, stem),
@@ -188,15 +186,12 @@ pub fn export(case: &Opened, target: Target, stem: &str, options: &Options) -> R
 }
 
 /// The mechanism of a case.
-pub fn mechanism(case: &Opened) -> crate::mechanism::Mechanism {
-    match case {
-        Opened::Axis(case) => case.machine.mechanism(),
-        Opened::Gantry(case) => case.gantry.mechanism(),
-    }
+pub fn mechanism(case: &Case) -> crate::mechanism::Mechanism {
+    case.machine.mechanism()
 }
 
 /// Refuses a controller where only the plant is exported.
-fn plant_of(case: &Opened, asked: Option<Part>) -> Result<&Opened> {
+fn plant_of(case: &Case, asked: Option<Part>) -> Result<&Case> {
     if asked.is_some_and(Part::has_controller) {
         let error = Error::new("only the machine is exported to this").in_file("--part");
         return Err(error.next(match controller(case) {

@@ -7,7 +7,7 @@ use std::ffi::CString;
 use std::hint::black_box;
 use std::path::Path;
 use std::time::Instant;
-use taut::case::Opened;
+use taut::case::Case;
 use taut::export::fmu::Model;
 use taut_fmu::fmi3;
 
@@ -15,7 +15,7 @@ const RUNS: u32 = 200;
 
 fn main() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    let case = Opened::read_with(root.join("stages/sollmann-jouaneh/table4.toml"), &[]).expect("a bundled case");
+    let case = Case::read_with(root.join("stages/sollmann-jouaneh/table4.toml"), &[]).expect("a bundled case");
     let model = Model::new(&case, false).expect("a machine");
     let folder = std::env::temp_dir().join(format!("taut-speed-{}", std::process::id()));
     std::fs::create_dir_all(&folder).expect("room for a folder");

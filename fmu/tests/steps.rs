@@ -2,7 +2,7 @@
 
 use crate::unit::{OK, Random, Three, Unit, machine};
 use std::ffi::c_void;
-use taut::case::{Case, Opened};
+use taut::case::Case;
 use taut::signal::Signal;
 use taut::solve::{self, Course, Detail, Flow, Solver};
 use taut::trajectory::Trajectory;
@@ -310,9 +310,8 @@ fn gantries_and_general_stages_end_where_their_solver_does() {
     for (name, tolerance) in
         [("core-xy/core-xy.toml", SAME), ("h-frame/h-frame.toml", SAME), ("core-xy/follows.toml", 1e-9)]
     {
-        let case = Opened::read_with(machine(name), &[]).unwrap();
-        let Opened::Gantry(case) = &case else { panic!("a gantry") };
-        let (mechanism, mut end) = (case.gantry.mechanism(), Vec::new());
+        let case = Case::read_with(machine(name), &[]).unwrap();
+        let (mechanism, mut end) = (case.machine.mechanism(), Vec::new());
         let inputs = [6.0, -2.0].map(|value| Signal::Step { value, at: 0.0 }).to_vec();
         let course = Course { inputs, start: case.experiments[0].initial, until: 0.1, every: 0.01 };
         let mut keep = |block: &Trajectory| {

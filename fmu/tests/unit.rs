@@ -2,7 +2,7 @@
 
 use std::ffi::{CString, c_char, c_int, c_void};
 use std::path::{Path, PathBuf};
-use taut::case::Opened;
+use taut::case::Case;
 use taut::export::fmu::Model;
 use taut_fmu::{fmi2, fmi3};
 use tempfile::TempDir;
@@ -26,7 +26,7 @@ impl Unit {
 
     /// The same with changes of the case.
     pub fn with(case: &str, changes: &[&str], with_controller: bool) -> Self {
-        let opened = Opened::read_with(machine(case), changes).unwrap();
+        let opened = Case::read_with(machine(case), changes).unwrap();
         let model = Model::new(&opened, with_controller).unwrap();
         let folder = TempDir::new().unwrap();
         std::fs::write(folder.path().join("machine.toml"), &model.resource).unwrap();

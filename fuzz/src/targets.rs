@@ -6,7 +6,7 @@ use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
-use taut::case::{Case, Experiment, GantryCase, Move, Opened, TEMPLATE};
+use taut::case::{Case, Experiment, Move, TEMPLATE};
 use taut::control::spectrum::{Axis, Spectrum};
 use taut::control::{Loop, Rows, Standard};
 use taut::fit;
@@ -73,9 +73,9 @@ fn with_file<T>(bytes: &[u8], read: impl FnOnce(&Path) -> T) -> T {
 pub(crate) fn case(bytes: &[u8]) -> Reached {
     let Ok(text) = std::str::from_utf8(bytes) else { return Reached::Refused };
     let name = repository().join("stages/sollmann-jouaneh/identification/input.toml");
-    let case = match Opened::from_text_with(&name, text, &[]) {
-        Ok(Opened::Axis(case)) => case,
-        Ok(Opened::Gantry(case)) => return gantry(&name, &case),
+    let case = match Case::from_text_with(&name, text, &[]) {
+        Ok(case) if !case.is_axis() => return gantry(&name, &case),
+        Ok(case) => case,
         Err(error) => return refused(&error),
     };
     let again = Case::from_text(&name, &case.text).unwrap_or_else(|error| panic!("its own text is refused: {error}"));
@@ -97,10 +97,10 @@ pub(crate) fn case(bytes: &[u8]) -> Reached {
 }
 
 /// A gantry: its modes are found, and it is run, shortly.
-fn gantry(name: &Path, case: &GantryCase) -> Reached {
-    let again = GantryCase::from_text_with(name, &case.text, &[]);
+fn gantry(name: &Path, case: &Case) -> Reached {
+    let again = Case::from_text_with(name, &case.text, &[]);
     let again = again.unwrap_or_else(|error| panic!("its own text is refused: {error}"));
-    assert!(again.text == case.text && again.gantry == case.gantry, "its own text reads otherwise");
+    assert!(again.text == case.text && again.machine == case.machine, "its own text reads otherwise");
     let Ok(analysis) = GantryAnalysis::of(case) else { return Reached::Read };
     let pace = |root: &Root| match *root {
         Root::Zero => 0.0,
@@ -109,11 +109,11 @@ fn gantry(name: &Path, case: &GantryCase) -> Reached {
     };
     let fastest = analysis.modes.poles.iter().map(pace).fold(0.0, f64::max);
     let (Some(experiment), true) = (case.experiments.first(), fastest.is_finite()) else { return Reached::Read };
-    let mut course = Course::of(experiment);
+    let mechanism = case.machine.mechanism();
+    let mut course = Course::of(&mechanism, experiment);
     course.until = course.until.min(LONGEST.min(PHASE / fastest.max(1e-300)));
     course.every = course.every.min(course.until).max(course.until / ROWS);
-    let mechanism = case.gantry.mechanism();
-    let mut meter = GantryMeter::new(&case.gantry);
+    let mut meter = GantryMeter::new(&case.machine);
     let mut finite = true;
     let shown = (Detail::Full, Some(&mut meter as &mut dyn solve::Observe));
     let outcome = solve::stream_mechanism(&mechanism, &course, Solver::of_mechanism(&mechanism), shown, &mut |rows| {

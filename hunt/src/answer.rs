@@ -111,7 +111,7 @@ pub fn ask(subject: &Subject, by: By) -> Result<Answer, String> {
 pub fn is_piecewise_linear(subject: &Subject) -> bool {
     match subject {
         Subject::Axis(case) | Subject::Loop(case) => case.machine.is_piecewise_linear(),
-        Subject::Gantry(case) => case.gantry.mechanism().is_piecewise_linear(),
+        Subject::Gantry(case) => case.machine.mechanism().is_piecewise_linear(),
     }
 }
 
@@ -119,7 +119,7 @@ pub fn is_piecewise_linear(subject: &Subject) -> bool {
 pub fn mechanism(subject: &Subject) -> Mechanism {
     match subject {
         Subject::Axis(case) | Subject::Loop(case) => case.machine.mechanism(),
-        Subject::Gantry(case) => case.gantry.mechanism(),
+        Subject::Gantry(case) => case.machine.mechanism(),
     }
 }
 
@@ -144,7 +144,8 @@ pub(crate) fn solved(subject: &Subject, solver: Solver) -> Result<Answer, String
             (outcome, stated)
         }
         Subject::Gantry(case) => {
-            let (mechanism, course) = (case.gantry.mechanism(), Course::of(&case.experiments[0]));
+            let mechanism = case.machine.mechanism();
+            let course = Course::of(&mechanism, &case.experiments[0]);
             let outcome =
                 stream_mechanism(&mechanism, &course, solver, (Detail::Full, None), &mut keep).map_err(told)?;
             let estimate = ErrorEstimate::of_mechanism(&mechanism, &course);

@@ -133,7 +133,7 @@ fn stepped(subject: &Subject, fewest: usize) -> Result<Answer, String> {
 
 fn without_current(mut subject: Subject) -> Subject {
     match &mut subject {
-        Subject::Axis(case) => case.experiments[0].initial.motor_current = 0.0,
+        Subject::Axis(case) => case.experiments[0].initial.current[0] = 0.0,
         Subject::Gantry(case) => case.experiments[0].initial.current = Default::default(),
         Subject::Loop(_) => {}
     }
@@ -161,7 +161,7 @@ const HEAD: &str = "#include \"axis.h\"\n#include <stdio.h>\n#include <string.h>
 fn head(subject: &Subject) -> String {
     let mechanism = mechanism(subject);
     let state = match subject {
-        Subject::Axis(case) => case.experiments[0].initial.state(&mechanism),
+        Subject::Axis(case) => mechanism.begun(&case.experiments[0].initial),
         Subject::Gantry(case) => case.experiments[0].initial,
         Subject::Loop(_) => taut::mechanism::State::default(),
     };

@@ -4,7 +4,7 @@
 use crate::answer::{Answer, End, rows};
 use crate::double::Double;
 use crate::input::{self, Piece};
-use crate::steps::{Opened, references, told};
+use crate::steps::{Case, references, told};
 use crate::subject::{Fed, Subject};
 use std::sync::Arc;
 use taut_fmu::instance::{Instance, Phase, Use};
@@ -23,7 +23,7 @@ const MOST: usize = 300_000;
 
 struct Importer<'a> {
     instance: Instance,
-    opened: &'a Opened,
+    opened: &'a Case,
     chains: Vec<Vec<Piece>>,
     subject: &'a Subject,
     nominals: Vec<f64>,
@@ -202,7 +202,7 @@ fn steps_of(column: usize) -> usize {
 
 /// Runs it.
 pub fn run(subject: &Subject) -> Result<Answer, String> {
-    let opened = Opened::new(subject)?;
+    let opened = Case::new(subject)?;
     let [until, every] = subject.times();
     let chains = subject.chains(until, &mut Double::from)?;
     let mut edges: Vec<f64> = chains.iter().flatten().map(|piece| piece.start.high).collect();

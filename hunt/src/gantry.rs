@@ -8,7 +8,7 @@ use crate::double::Double;
 use crate::machine::{
     BODIES, CURRENT, Follows, Friction, Model, ROTOR, SPEED, STATES, Span, Taken, WAY, drive, ends, friction, is_strain,
 };
-use taut::case::GantryExperiment;
+use taut::case::Experiment;
 use taut::machine::{Kind, Machine};
 
 /// Elongation of a span by r φ₁, r φ₂, x, y, and the change of its length with x, y.
@@ -38,7 +38,7 @@ fn pulleys(kind: Kind) -> [[f64; 2]; 2] {
 }
 
 /// The gantry at the start of `experiment`; every number passes `taken` once.
-pub fn machine(gantry: &Machine, experiment: &GantryExperiment, taken: Taken) -> Model {
+pub fn machine(gantry: &Machine, experiment: &Experiment, taken: Taken) -> Model {
     let r = taken(gantry.pulley_radius);
     let initial = &experiment.initial;
     let [x, y] = [2, 3].map(|body| Double::from(initial.position[body]));

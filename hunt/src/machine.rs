@@ -6,6 +6,7 @@
 
 use crate::double::Double;
 use taut::case::Experiment;
+use taut::machine::axis::{CART, DRIVE, IDLER};
 use taut::machine::{AmplifierMode, BeltModel, GRAVITY, Machine, Travel};
 use taut::mechanism::{Amplifier, Motor};
 use taut::polyline::Polyline;
@@ -216,7 +217,7 @@ impl Model {
         // F_L − M g sin θ
         let slope = taken(machine.cart.inclination).sin_cos().0;
         let force = taken(machine.cart.load) - mass[1] * slope * GRAVITY;
-        let cart_start = Double::from(experiment.initial.cart_position);
+        let cart_start = Double::from(experiment.initial.position[CART]);
         let forces = &machine.cart.forces;
         let mut ends = [None; BODIES];
         ends[1] = machine.cart.travel.map(|travel| self::ends(travel, taken, cart_start));
@@ -441,7 +442,7 @@ fn start(
     let initial = &experiment.initial;
     let mut z = [Double::ZERO; STATES];
     let mut beyond = [Double::ZERO; BODIES];
-    for (body, angle) in [(0, initial.drive_angle), (2, initial.idler_angle)] {
+    for (body, angle) in [(0, initial.position[DRIVE]), (2, initial.position[IDLER])] {
         // Strains, not positions: a number of 64 bits holds the first to their own last place.
         let strain = Double::from(machine.pulley_radius) * angle - origin;
         match is_strain(strain, origin) {
@@ -449,15 +450,15 @@ fn start(
             false => beyond[body] = strain,
         }
     }
-    z[SPEED[0]] = taken(initial.drive_speed) * r;
-    z[SPEED[1]] = taken(initial.cart_speed);
-    z[SPEED[2]] = taken(initial.idler_speed) * r;
+    z[SPEED[0]] = taken(initial.speed[DRIVE]) * r;
+    z[SPEED[1]] = taken(initial.speed[CART]);
+    z[SPEED[2]] = taken(initial.speed[IDLER]) * r;
     match machine.belt.model {
         BeltModel::Elastic => {}
         BeltModel::TwoMass => (z[WAY[2]], z[SPEED[2]]) = (z[WAY[0]], z[SPEED[0]]),
         BeltModel::Rigid => (z[SPEED[0]], z[SPEED[2]]) = (z[SPEED[1]], z[SPEED[1]]),
     }
-    z[CURRENT[0]] = taken(initial.motor_current);
+    z[CURRENT[0]] = taken(initial.current[0]);
     // The rotor begins in the middle of its play.
     (z[ROTOR[0][0]], z[ROTOR[0][1]]) = (z[WAY[0]], z[SPEED[0]]);
     (z, beyond)

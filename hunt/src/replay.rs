@@ -10,7 +10,7 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::atomic::{AtomicU64, Ordering};
-use taut::case::Opened;
+use taut::case::Case;
 use taut::export::{self, ElementKind, Options, Part, Real, Tables, Target};
 use taut::mechanism::{Mechanism, SpringLaw, State, What};
 use taut::signal::Signal;
@@ -87,7 +87,7 @@ pub struct Drawn {
     pub number: u64,
     /// Its case.
     pub text: String,
-    opened: Opened,
+    opened: Case,
     mechanism: Mechanism,
     tables: Tables,
     step: f64,

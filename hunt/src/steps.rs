@@ -12,13 +12,13 @@ use taut_fmu::instance::{Instance, Refusal, Use};
 const GENERAL: f64 = 1e-8;
 
 /// A model with the references that a run needs.
-pub(crate) struct Opened {
+pub(crate) struct Case {
     pub(crate) model: Arc<Model>,
     pub(crate) inputs: Vec<u32>,
     pub(crate) positions: Vec<u32>,
 }
 
-impl Opened {
+impl Case {
     pub(crate) fn new(subject: &Subject) -> Result<Self, String> {
         let is_loop = matches!(subject, Subject::Loop(_));
         let model =
@@ -54,7 +54,7 @@ pub(crate) fn references(profile: &Profile, time: f64) -> [f64; 5] {
 
 /// Inputs are held between communication points, which in a closed loop are the controller's samples.
 pub fn run(subject: &Subject) -> Result<Answer, String> {
-    let opened = Opened::new(subject)?;
+    let opened = Case::new(subject)?;
     let [until, mut every] = subject.times();
     let (fed, profile) = match subject {
         Subject::Loop(case) => {

@@ -5,7 +5,7 @@ use crate::input::{self, Piece};
 use crate::loops::{self, Looks};
 use crate::machine::{BODIES, Model, Taken};
 use crate::solve::{self, Run};
-use taut::case::{Case, Experiment, GantryCase, Initial, Move, Opened};
+use taut::case::{Case, Experiment, Move};
 use taut::machine::Machine;
 use taut::signal::Signal;
 
@@ -15,7 +15,7 @@ pub enum Subject {
     /// An axis, its first experiment.
     Axis(Box<Case>),
     /// A gantry, its first experiment.
-    Gantry(Box<GantryCase>),
+    Gantry(Box<Case>),
     /// An axis in a closed loop, its first move.
     Loop(Box<Case>),
 }
@@ -46,20 +46,18 @@ pub struct Numbers<'a> {
 impl Subject {
     /// The case in this text; its first move where it has no experiment.
     pub fn new(name: &str, text: &str) -> Result<Self, String> {
-        match Opened::from_text_with(name, text, &[]) {
-            Ok(Opened::Gantry(case)) => Ok(Subject::Gantry(case)),
-            Ok(Opened::Axis(case)) if case.experiments.is_empty() => Ok(Subject::Loop(case)),
-            Ok(Opened::Axis(case)) => Ok(Subject::Axis(case)),
+        match Case::from_text_with(name, text, &[]) {
+            Ok(case) if !case.is_axis() => Ok(Subject::Gantry(Box::new(case))),
+            Ok(case) if case.experiments.is_empty() => Ok(Subject::Loop(Box::new(case))),
+            Ok(case) => Ok(Subject::Axis(Box::new(case))),
             Err(error) => Err(format!("the case is refused: {error}")),
         }
     }
 
     /// The case.
-    pub fn opened(&self) -> Opened {
-        match self {
-            Subject::Axis(case) | Subject::Loop(case) => Opened::Axis(case.clone()),
-            Subject::Gantry(case) => Opened::Gantry(case.clone()),
-        }
+    pub fn opened(&self) -> Case {
+        let (Subject::Axis(case) | Subject::Loop(case) | Subject::Gantry(case)) = self;
+        case.as_ref().clone()
     }
 
     /// End of the run and interval between rows, s.
@@ -104,7 +102,7 @@ impl Subject {
 
     fn signals(&self) -> Vec<&Signal> {
         match self {
-            Subject::Axis(case) => vec![&case.experiments[0].input],
+            Subject::Axis(case) => vec![&case.experiments[0].inputs[0]],
             Subject::Gantry(case) => case.experiments[0].inputs.iter().collect(),
             Subject::Loop(_) => Vec::new(),
         }
@@ -114,10 +112,8 @@ impl Subject {
     pub fn machine(&self, taken: Taken) -> Model {
         match self {
             Subject::Axis(case) => Model::new(&case.machine, &case.experiments[0], taken),
-            Subject::Gantry(case) => crate::gantry::machine(&case.gantry, &case.experiments[0], taken),
-            Subject::Loop(case) => {
-                Model::new(&case.machine, &at_rest(&case.moves[0], case.machine.pulley_radius), taken)
-            }
+            Subject::Gantry(case) => crate::gantry::machine(&case.machine, &case.experiments[0], taken),
+            Subject::Loop(case) => Model::new(&case.machine, &at_rest(&case.moves[0], &case.machine), taken),
         }
     }
 
@@ -174,15 +170,13 @@ fn held_chain(values: &[f64], every: f64) -> Vec<Piece> {
 }
 
 /// The start of a move as that of an experiment.
-fn at_rest(motion: &Move, radius: f64) -> Experiment {
-    let start = motion.profile.start();
-    let angle = start / radius;
+fn at_rest(motion: &Move, machine: &Machine) -> Experiment {
     Experiment {
         name: String::new(),
-        input: Signal::Step { value: 0.0, at: 0.0 },
+        inputs: vec![Signal::Step { value: 0.0, at: 0.0 }],
         until: motion.until,
         every: motion.every,
-        initial: Initial { drive_angle: angle, cart_position: start, idler_angle: angle, ..Initial::default() },
+        initial: machine.at_rest(motion.profile.start()),
         log: None,
     }
 }

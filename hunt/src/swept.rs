@@ -4,8 +4,8 @@ use crate::answer::{Answer, End, LEAST, is_piecewise_linear};
 use crate::double::Double;
 use crate::machine::BODIES;
 use crate::subject::{Fed, Subject};
-use taut::case::Opened;
-use taut::sweep::{Sweep, Swept};
+use taut::case::Case;
+use taut::sweep::Sweep;
 
 /// The run of the sweep that is taken.
 const RUN: u64 = 1;
@@ -24,24 +24,17 @@ design = "random"
 /// Runs it.
 pub fn run(subject: &Subject) -> Result<Answer, String> {
     let told = |error: taut::Error| format!("the sweep is refused: {error}");
-    let text = format!("{}{SWEEP}", subject.opened().text());
-    let opened = Opened::from_text_with("swept.toml", &text, &[]).map_err(told)?;
-    let sweep = match &opened {
-        Opened::Axis(case) => Sweep::new(case),
-        Opened::Gantry(case) => Sweep::of_gantry(case),
-    }
-    .map_err(told)?;
+    let text = format!("{}{SWEEP}", subject.opened().text);
+    let opened = Case::from_text_with("swept.toml", &text, &[]).map_err(told)?;
+    let sweep = Sweep::new(&opened).map_err(told)?;
     let table = sweep.rows(RUN, 1, &|| false).ok_or("the sweep stops")?;
     let column = |ending: &str| {
         let found = table.columns.iter().find(|column| column.name.ends_with(ending));
         found.and_then(|column| column.values.first().copied()).ok_or(format!("the sweep has no {ending}"))
     };
     let mut swept = subject.clone();
-    match (&mut swept, sweep.machine(RUN)) {
-        (Subject::Axis(case) | Subject::Loop(case), Swept::Axis(stage)) => case.machine = *stage,
-        (Subject::Gantry(case), Swept::Gantry(gantry)) => case.gantry = *gantry,
-        _ => return Err("the sweep has another kind of machine".into()),
-    }
+    let (Subject::Axis(case) | Subject::Loop(case) | Subject::Gantry(case)) = &mut swept;
+    case.machine = sweep.machine(RUN);
     let machine = swept.machine(&mut Double::from);
     let status = column(".status")?;
     let nothing = Double::from(f64::NAN);

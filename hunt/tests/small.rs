@@ -112,7 +112,7 @@ fn a_wrong_answer_of_any_kind_is_unexplained() {
         let mut wrong = right.clone();
         match &mut wrong {
             Subject::Axis(case) => case.machine.cart.mass *= 1.001,
-            Subject::Gantry(case) => case.gantry.cart.mass *= 1.001,
+            Subject::Gantry(case) => case.machine.cart.mass *= 1.001,
             Subject::Loop(case) => case.machine.drives[0].motor.torque_constant *= 1.01,
         }
         let known = |subject: &Subject| subject.known_as_is(&answer.fed, &answer.times).unwrap().rows;

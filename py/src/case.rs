@@ -10,7 +10,7 @@ use pyo3::types::{PyDict, PyList};
 use std::path::PathBuf;
 use std::sync::Arc;
 use taut::Error;
-use taut::case::{GantryCase, InputFile, Opened, Plan, TEMPLATE};
+use taut::case::{Files, InputFile, Plan, TEMPLATE};
 use taut::export::{Exported, Options, Part, Place, Real, Target, export};
 use taut::files::{Inputs, write_atomically};
 use taut::fit::Effort;
@@ -40,14 +40,14 @@ pub struct Case {
 /// A case of either kind.
 pub enum Inner {
     Axis(Arc<taut::case::Case>),
-    Gantry(Arc<GantryCase>),
+    Gantry(Arc<taut::case::Case>),
 }
 
-impl From<Opened> for Inner {
-    fn from(opened: Opened) -> Self {
+impl From<taut::case::Case> for Inner {
+    fn from(opened: taut::case::Case) -> Self {
         match opened {
-            Opened::Axis(case) => Inner::Axis(Arc::from(case)),
-            Opened::Gantry(case) => Inner::Gantry(Arc::from(case)),
+            case if case.is_axis() => Inner::Axis(Arc::from(case)),
+            case => Inner::Gantry(Arc::from(case)),
         }
     }
 }
@@ -84,14 +84,14 @@ impl Case {
     #[staticmethod]
     fn read(py: Python<'_>, path: PathBuf, changes: Vec<String>) -> PyResult<Self> {
         let changes: Vec<&str> = changes.iter().map(String::as_str).collect();
-        let inner = unlocked(py, || Opened::read_with(&path, &changes))?.told(py)?.into();
+        let inner = unlocked(py, || taut::case::Case::read_with(&path, &changes))?.told(py)?.into();
         Ok(Self { inner, path })
     }
 
     #[staticmethod]
     fn from_text(py: Python<'_>, path: PathBuf, text: &str, changes: Vec<String>) -> PyResult<Self> {
         let changes: Vec<&str> = changes.iter().map(String::as_str).collect();
-        let inner = unlocked(py, || Opened::from_text_with(&path, text, &changes))?.told(py)?.into();
+        let inner = unlocked(py, || taut::case::Case::from_text_with(&path, text, &changes))?.told(py)?.into();
         Ok(Self { inner, path })
     }
 
@@ -105,7 +105,7 @@ impl Case {
     fn kind(&self) -> &str {
         match &self.inner {
             Inner::Axis(_) => "axis",
-            Inner::Gantry(case) => case.gantry.kind.word(),
+            Inner::Gantry(case) => case.machine.kind.word(),
         }
     }
 
@@ -181,8 +181,8 @@ impl Case {
                 runs::simulate(py, case, &self.path, &names, solver)
             }
             Inner::Gantry(case) => {
-                let solver = guarded(|| choice.solver_of(&case.gantry.mechanism()))?.told(py)?;
-                runs::simulate_gantry(py, case, &names, solver)
+                let solver = guarded(|| choice.solver_of(&case.machine.mechanism()))?.told(py)?;
+                runs::simulate_gantry(py, case, &self.path, &names, solver)
             }
         }
     }
@@ -403,8 +403,8 @@ impl Case {
     /// The overview, as `taut show --json` has it.
     fn show<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let opened = match &self.inner {
-            Inner::Axis(case) => Opened::Axis(Box::new(case.as_ref().clone())),
-            Inner::Gantry(case) => Opened::Gantry(Box::new(case.as_ref().clone())),
+            Inner::Axis(case) => case.as_ref().clone(),
+            Inner::Gantry(case) => case.as_ref().clone(),
         };
         let overview = unlocked(py, || Overview::of(&opened))?.told(py)?;
         value::json(py, &guarded(|| json::show(&overview))?)
@@ -421,13 +421,13 @@ impl Case {
     ) -> PyResult<(Vec<PathBuf>, Vec<String>)> {
         let (part, real, step, fmi) = how;
         let opened = match &self.inner {
-            Inner::Axis(case) => Opened::Axis(Box::new(case.as_ref().clone())),
-            Inner::Gantry(case) => Opened::Gantry(Box::new(case.as_ref().clone())),
+            Inner::Axis(case) => case.as_ref().clone(),
+            Inner::Gantry(case) => case.as_ref().clone(),
         };
         let options = Options { part: exported_part(part.as_deref())?, real: exported_real(&real)?, step };
         let own = self.path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
         let made = unlocked(py, || {
-            let inputs = inputs(opened.files());
+            let inputs = inputs(&opened.files);
             let text = |target: Target| {
                 let place = Place::of(&out, target.ending(), &own);
                 let mut claim = place.claim(target.ending())?;
@@ -477,7 +477,7 @@ impl Case {
             Inner::Axis(case) => Ok(case),
             Inner::Gantry(case) => {
                 // Read as that of an axis, it is told where it says that it is none.
-                let told = guarded(|| taut::case::Case::from_text(&self.path, &case.text))?;
+                let told = guarded(|| taut::case::Case::axis_from_text_for(&self.path, &case.text, &[], Files::All))?;
                 let told = told.err().unwrap_or_else(|| taut::Error::new("this needs a single axis"));
                 Err(crate::error::told(py, told))
             }

@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 use std::path::Path;
-use taut::case::Opened;
+use taut::case::Case;
 use taut::export::fmu::{Carried, Version, object_in, pack};
 use taut::export::{Exported, Part};
 
@@ -12,7 +12,7 @@ mod carried {
 }
 
 /// The FMU of a case, by FMI 2.0 or 3.0, without an icon: what draws it is a part of the program.
-pub fn export(case: &Opened, part: Option<Part>, fmi: u32, stem: &str) -> taut::Result<Exported> {
+pub fn export(case: &Case, part: Option<Part>, fmi: u32, stem: &str) -> taut::Result<Exported> {
     let version = match fmi {
         2 => Version::Two,
         3 => Version::Three,

@@ -13,7 +13,7 @@ use std::cell::Cell;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
-use taut::case::{Case, Experiment, GantryCase, GantryExperiment};
+use taut::case::{Case, Experiment};
 use taut::control::feasible::{Shortfall, shortfalls};
 use taut::control::{Loop, MoveRun, Rows, Standard, Worst, stream, worst};
 use taut::files::Inputs;
@@ -45,7 +45,7 @@ enum What {
         reduction: Option<Reduction>,
     },
     Gantry {
-        case: Arc<GantryCase>,
+        case: Arc<Case>,
         index: usize,
         solver: Solver,
         outcome: Outcome,
@@ -121,7 +121,7 @@ impl Run {
         };
         let told = guarded(|| match &self.what {
             What::Experiment { case, metrics, .. } => of_axis(metrics, case),
-            What::Gantry { case, metrics, .. } => json::gantry_metrics(metrics, case.gantry.kind),
+            What::Gantry { case, metrics, .. } => json::gantry_metrics(metrics, case.machine.kind),
             What::Move { case, index, run, worst, .. } => {
                 let moved = Moved {
                     motion: &case.moves[*index],
@@ -143,7 +143,7 @@ impl Run {
         let events = || -> Vec<json::Event> {
             match &self.what {
                 What::Gantry { case, .. } => {
-                    let mechanism = case.gantry.mechanism();
+                    let mechanism = case.machine.mechanism();
                     list.iter().map(|event| json::Event::on(&mechanism, event)).collect()
                 }
                 What::Experiment { .. } | What::Move { .. } => list.iter().map(json::Event::of).collect(),
@@ -254,23 +254,24 @@ fn one(py: Python<'_>, case: &Arc<Case>, experiment: &Experiment, solver: Solver
 }
 
 /// Runs experiments of a gantry.
-pub fn simulate_gantry(py: Python<'_>, case: &Arc<GantryCase>, names: &[String], solver: Solver) -> PyResult<Vec<Run>> {
-    let experiments = case.experiments_named(names).told(py)?;
+pub fn simulate_gantry(
+    py: Python<'_>,
+    case: &Arc<Case>,
+    path: &Path,
+    names: &[String],
+    solver: Solver,
+) -> PyResult<Vec<Run>> {
+    let experiments = case.experiments_named(path, names).told(py)?;
     experiments.into_iter().map(|experiment| one_of_gantry(py, case, experiment, solver)).collect()
 }
 
-fn one_of_gantry(
-    py: Python<'_>,
-    case: &Arc<GantryCase>,
-    experiment: &GantryExperiment,
-    solver: Solver,
-) -> PyResult<Run> {
-    let mechanism = case.gantry.mechanism();
+fn one_of_gantry(py: Python<'_>, case: &Arc<Case>, experiment: &Experiment, solver: Solver) -> PyResult<Run> {
+    let mechanism = case.machine.mechanism();
     columns::fit(py, experiment.samples() as f64, mechanism.columns.len(), FEWER)?;
     let interrupt = Interrupt::listen();
     let found = unlocked(py, || {
         let begin = Instant::now();
-        let mut meter = GantryMeter::new(&case.gantry);
+        let mut meter = GantryMeter::new(&case.machine);
         let mut trajectory = Trajectory::default();
         let rows = experiment.samples().min(1 << 20) as usize + 1;
         let mut take = |block: &Trajectory| {
@@ -281,7 +282,8 @@ fn one_of_gantry(
             if interrupt.stop() { Flow::Stop } else { Flow::Continue }
         };
         let shown = (Detail::Full, Some(&mut meter as &mut dyn solve::Observe));
-        let outcome = solve::stream_mechanism(&mechanism, &Course::of(experiment), solver, shown, &mut take);
+        let outcome =
+            solve::stream_mechanism(&mechanism, &Course::of(&mechanism, experiment), solver, shown, &mut take);
         let found = outcome.map(|outcome| {
             let metrics = meter.finish(&outcome.events);
             (trajectory, outcome, metrics)

@@ -25,7 +25,7 @@ impl Sweep {
     fn new(py: Python<'_>, case: &Case) -> PyResult<Self> {
         let planned = || match &case.inner {
             Inner::Axis(case) => taut::sweep::Sweep::new(case),
-            Inner::Gantry(case) => taut::sweep::Sweep::of_gantry(case),
+            Inner::Gantry(case) => taut::sweep::Sweep::new(case),
         };
         let inner = unlocked(py, || planned().map_err(|error| error.in_file(&case.path)))?;
         Ok(Self { inner: inner.told(py)? })

@@ -3,6 +3,7 @@
 use super::number;
 use crate::case::Case;
 use crate::fit::experiment_design::{Designed, Limits, Verified};
+use crate::machine::axis::CART;
 use serde_json::{Value, json};
 
 /// The experiment, what it promises, and what else was looked at.
@@ -20,7 +21,7 @@ pub fn design(case: &Case, found: &Designed, verified: &[Verified]) -> Value {
         "toml": found.toml(),
         "duration_s": found.duration,
         "every_s": found.every,
-        "start_m": found.initial.cart_position,
+        "start_m": found.initial.position[CART],
         "criterion": found.criterion.word(),
         "mean_relative_error": number(found.score),
         "complete": found.promises.iter().filter(|promise| promise.wanted).all(|promise| promise.is_determined()),

@@ -1,7 +1,7 @@
 //! A model as data: `taut export json`; and what the other targets wrote: `taut export --json`.
 
 use super::number;
-use crate::case::Opened;
+use crate::case::Case;
 use crate::error::Result;
 use crate::export::{self, ElementKind, Exported, Row, Tables, Then};
 use crate::linear::{Operation, StateSpace, Variable};
@@ -11,26 +11,23 @@ use crate::parameter;
 use serde_json::{Value, json};
 
 /// Parameters, parts, equations of every mode and the linear model.
-pub fn export(case: &Opened) -> Result<Value> {
+pub fn export(case: &Case) -> Result<Value> {
     let mechanism = export::mechanism(case);
-    let (kind, numbers): (&str, &Machine) = match case {
-        Opened::Axis(case) => ("axis", &case.machine),
-        Opened::Gantry(case) => (case.gantry.kind.word(), &case.gantry),
-    };
+    let (kind, numbers) = (case.machine.kind.word(), &case.machine);
     let equations = match mechanism.is_piecewise_linear() {
         true => Some(equations(&Tables::new(&mechanism)?)),
         false => None,
     };
-    let linear = match case {
-        Opened::Axis(case) => Some(linear(&StateSpace::of(&case.machine, Operation::default())?)),
-        Opened::Gantry(_) => None,
+    let linear = match case.is_axis() {
+        true => Some(linear(&StateSpace::of(&case.machine, Operation::default())?)),
+        false => None,
     };
     Ok(json!({
         "schema": super::identity("export"),
-        "title": case.title(),
+        "title": case.title.as_str(),
         "version": env!("CARGO_PKG_VERSION"),
         "kind": kind,
-        "case": case.text(),
+        "case": case.text.as_str(),
         "parameters": parameters(numbers),
         "bodies": bodies(&mechanism),
         "springs": springs(&mechanism),

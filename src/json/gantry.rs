@@ -3,7 +3,7 @@
 use super::simulation::{
     CostTold, CountTold, EndingTold, Event, MOST_EVENTS, PeakTold, SolverUsed, TieTold, error_basis, is_determined,
 };
-use crate::case::{GantryCase, GantryExperiment};
+use crate::case::{Case, Experiment};
 use crate::machine::{Kind, Machine, Motor};
 use crate::mechanism::Mechanism;
 use crate::metrics::{GantryMetrics, Peak};
@@ -15,7 +15,7 @@ use serde_json::{Map, Value};
 #[derive(Debug, Clone, Copy)]
 pub struct GantrySimulated<'a> {
     /// The experiment as the case has it.
-    pub experiment: &'a GantryExperiment,
+    pub experiment: &'a Experiment,
     /// Events, ending and cost.
     pub outcome: &'a Outcome,
     /// Its key figures.
@@ -103,16 +103,16 @@ pub fn gantry_metrics(metrics: &GantryMetrics, kind: Kind) -> Value {
 
 impl GantrySimulation {
     /// Of the runs of a case.
-    pub fn new(case: &GantryCase, solver: Solver, runs: &[GantrySimulated]) -> Self {
-        let mechanism = case.gantry.mechanism();
-        let kind = case.gantry.kind;
+    pub fn new(case: &Case, solver: Solver, runs: &[GantrySimulated]) -> Self {
+        let mechanism = case.machine.mechanism();
+        let kind = case.machine.kind;
         Self {
             schema: super::identity("gantry-simulate"),
             title: case.title.clone(),
             version: env!("CARGO_PKG_VERSION"),
             kind: kind.word(),
             solver: SolverUsed::of(solver),
-            machine: MachineFigures::of(&case.gantry),
+            machine: MachineFigures::of(&case.machine),
             experiments: runs.iter().map(|run| ExperimentFigures::of(run, &mechanism, kind, solver)).collect(),
         }
     }

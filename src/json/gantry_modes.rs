@@ -7,7 +7,7 @@ use serde_json::{Map, Value, json};
 
 /// Rigid and elastic modes, and the map of the working area.
 pub fn gantry_modes(analysis: &GantryAnalysis) -> Value {
-    let gantry = &analysis.case.gantry;
+    let gantry = &analysis.case.machine;
     let mechanism = gantry.mechanism();
     let modes = &analysis.modes;
     let spans = gantry.kind.geometry().span_labels().zip(&gantry.belt.stiffness);

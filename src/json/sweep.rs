@@ -1,18 +1,18 @@
 //! A sweep: `taut sweep --json`, `sweep.json`.
 
-use crate::case::Opened;
+use crate::case::Case;
 use crate::sweep::{Drawn, Estimate, Measured, Shown, Spread, Summary, Sweep};
 use serde_json::{Value, json};
 
 /// The summary of all runs of a case; numbers to the last bit, null for what is no number.
-pub fn sweep(case: &Opened, sweep: &Sweep, summary: &Summary) -> Value {
+pub fn sweep(case: &Case, sweep: &Sweep, summary: &Summary) -> Value {
     json!({
         "schema": super::identity("sweep"),
-        "title": case.title(),
+        "title": case.title.as_str(),
         "version": env!("CARGO_PKG_VERSION"),
         "runs": sweep.runs(),
         "design": sweep.sampling().word(),
-        "seed": case.sweep().map(|sweep| sweep.seed),
+        "seed": case.sweep.as_ref().map(|sweep| sweep.seed),
         "indices": sweep.indices(),
         "shares_of_every": summary.every,
         "columns": sweep.columns().iter().map(|column| column.heading()).collect::<Vec<_>>(),

@@ -16,7 +16,7 @@ pub(super) fn overview(case: &Case) -> Result<Overview> {
     let machine = &case.machine;
     let mut notes = Vec::new();
     let masses = masses(machine);
-    let inputs = case.experiments.iter().map(|experiment| (&experiment.input, experiment.until));
+    let inputs = case.experiments.iter().map(|experiment| (&experiment.inputs[0], experiment.until));
     let most = most(case.controller.as_ref().and_then(|design| design.limit), inputs);
     let along = places(machine, PLACES);
     let positions = along.clone().unwrap_or_else(|| vec![0.0]);

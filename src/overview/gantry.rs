@@ -2,7 +2,7 @@
 
 use super::limits::{Power, most, safety};
 use super::{Group, Note, Overview, Place, belt_mass, drive_at_belt, motor_rows, of_belt, of_constants};
-use crate::case::GantryCase;
+use crate::case::Case;
 use crate::error::Result;
 use crate::linear::Natural;
 use crate::machine::gantry::{BRIDGE, CART};
@@ -16,8 +16,8 @@ const SIDES: [&str; 2] = ["left", "right"];
 /// The directions that it moves in, and what moves then.
 const WAYS: [(&str, &str); 2] = [("x", "bridge and cart along x"), ("y", "cart along y")];
 
-pub(super) fn overview(case: &GantryCase) -> Result<Overview> {
-    let gantry = &case.gantry;
+pub(super) fn overview(case: &Case) -> Result<Overview> {
+    let gantry = &case.machine;
     let mut notes = Vec::new();
     let corners = corners(gantry);
     let depends_on_place = corners.len() > 1;
@@ -172,8 +172,8 @@ fn place(gantry: &Machine, [x, y]: [f64; 2]) -> Result<Place> {
     Ok(Place { position: vec![x, y], stiffness: stiffness.to_vec(), stretch, modes, held: None })
 }
 
-fn limits(case: &GantryCase, notes: &mut Vec<Note>) -> Option<Group> {
-    let gantry = &case.gantry;
+fn limits(case: &Case, notes: &mut Vec<Note>) -> Option<Group> {
+    let gantry = &case.machine;
     let r = gantry.pulley_radius;
     let inputs = case.experiments.iter().flat_map(|done| done.inputs.iter().map(|input| (input, done.until)));
     let most = most(None, inputs);

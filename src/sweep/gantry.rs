@@ -2,37 +2,37 @@
 
 use super::measures::{OfPart, of_gantry};
 use super::{Group, Status, put_figures, status};
-use crate::case::{GantryCase, GantryExperiment, Sweeping};
+use crate::case::{Case, Experiment, Sweeping};
 use crate::error::{Error, Result};
 use crate::machine::Machine;
 use crate::metrics::{GantryMeter, GantryMetrics};
 use crate::parameter;
-use crate::solve::{Course, Detail, Flow, Outcome, Solver, stream_mechanism};
+use crate::solve::{self, Course, Detail, Flow, Outcome, Solver, stream_mechanism};
 use crate::trajectory::Trajectory;
 
 /// A gantry, and what each of its machines does.
 #[derive(Debug, Clone)]
-pub(super) struct Swept {
-    pub gantry: Machine,
-    experiments: Vec<GantryExperiment>,
+pub(super) struct Gantry {
+    pub machine: Machine,
+    experiments: Vec<Experiment>,
     figures: Vec<OfPart>,
 }
 
-impl Swept {
+impl Gantry {
     /// That of a case, as planned.
-    pub fn of(case: &GantryCase, plan: &Sweeping) -> Self {
+    pub fn of(case: &Case, plan: &Sweeping) -> Self {
         let mut experiments = case.experiments.clone();
         for experiment in &mut experiments {
             experiment.every = plan.interval.unwrap_or(experiment.every);
         }
-        let mut figures = of_gantry(&case.gantry.mechanism());
+        let mut figures = of_gantry(&case.machine.mechanism());
         figures.retain(|of_part| plan.tells(&of_part.figure.name));
-        Self { gantry: case.gantry.clone(), experiments, figures }
+        Self { machine: case.machine.clone(), experiments, figures }
     }
 
     /// The experiments of each machine, and their figures.
     pub fn groups(&self) -> Vec<Group> {
-        let group = |experiment: &GantryExperiment| Group {
+        let group = |experiment: &Experiment| Group {
             name: experiment.name.clone(),
             file: experiment.file_name(),
             is_move: false,
@@ -43,9 +43,9 @@ impl Swept {
 
     /// Refuses a case whose own machine cannot be run.
     pub fn check(&self) -> Result<()> {
-        check(&self.gantry)?;
+        check(&self.machine)?;
         (0..self.experiments.len())
-            .try_for_each(|experiment| self.stream(&self.gantry, experiment, &mut |_| Flow::Stop).map(|_| ()))
+            .try_for_each(|experiment| self.stream(&self.machine, experiment, &mut |_| Flow::Stop).map(|_| ()))
     }
 
     /// Runs one experiment of a machine, for its rows.
@@ -57,9 +57,7 @@ impl Swept {
     ) -> Result<Outcome> {
         let experiment = self.experiments.get(experiment).ok_or_else(|| Error::new("there is no such experiment"))?;
         check(gantry)?;
-        let mechanism = gantry.mechanism();
-        let solver = Solver::of_mechanism(&mechanism);
-        stream_mechanism(&mechanism, &Course::of(experiment), solver, (Detail::Full, None), sink)
+        solve::stream(gantry, experiment, Solver::of(gantry), sink)
     }
 
     /// Adds status and figures of all that a machine does.
@@ -68,7 +66,7 @@ impl Swept {
         for experiment in &self.experiments {
             let run = |mechanism: &_| -> Result<(Status, GantryMetrics)> {
                 let mut meter = GantryMeter::of(gantry, mechanism);
-                let (course, solver) = (Course::of(experiment), Solver::of_mechanism(mechanism));
+                let (course, solver) = (Course::of(mechanism, experiment), Solver::of_mechanism(mechanism));
                 let observed = (Detail::None, Some(&mut meter as _));
                 let outcome = stream_mechanism(mechanism, &course, solver, observed, &mut |_| Flow::Continue)?;
                 Ok((status(&outcome), meter.finish(&outcome.events)))

@@ -114,33 +114,6 @@ struct Draws {
     columns: Vec<Vec<f64>>,
 }
 
-/// A machine of a sweep.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Swept {
-    /// An axis.
-    Axis(Box<Machine>),
-    /// A gantry.
-    Gantry(Box<Machine>),
-}
-
-impl Swept {
-    /// It, where it is an axis.
-    pub fn axis(&self) -> Option<&Machine> {
-        match self {
-            Swept::Axis(stage) => Some(stage),
-            Swept::Gantry(_) => None,
-        }
-    }
-
-    /// It, where it is a gantry.
-    pub fn gantry(&self) -> Option<&Machine> {
-        match self {
-            Swept::Axis(_) => None,
-            Swept::Gantry(gantry) => Some(gantry),
-        }
-    }
-}
-
 /// Something that each machine does, and what is told of it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Group {
@@ -159,14 +132,14 @@ pub struct Group {
 #[derive(Debug, Clone)]
 enum Subject {
     Axis(Box<axis::Axis>),
-    Gantry(Box<gantry::Swept>),
+    Gantry(Box<gantry::Gantry>),
 }
 
 impl Subject {
-    fn numbers(&self) -> &Machine {
+    fn machine(&self) -> &Machine {
         match self {
             Subject::Axis(axis) => &axis.machine,
-            Subject::Gantry(swept) => &swept.gantry,
+            Subject::Gantry(swept) => &swept.machine,
         }
     }
 
@@ -189,14 +162,14 @@ impl Subject {
 /// Runs machines of a subject, one after another.
 enum Worker<'a> {
     Axis(Box<axis::Worker<'a>>),
-    Gantry(&'a gantry::Swept, Box<Machine>),
+    Gantry(&'a gantry::Gantry, Box<Machine>),
 }
 
 impl<'a> Worker<'a> {
     fn of(subject: &'a Subject) -> Self {
         match subject {
             Subject::Axis(axis) => Worker::Axis(Box::new(axis::Worker::new(axis))),
-            Subject::Gantry(swept) => Worker::Gantry(swept, Box::new(swept.gantry.clone())),
+            Subject::Gantry(swept) => Worker::Gantry(swept, Box::new(swept.machine.clone())),
         }
     }
 
@@ -205,7 +178,7 @@ impl<'a> Worker<'a> {
         match self {
             Worker::Axis(worker) => worker.reset(),
             Worker::Gantry(swept, gantry) => {
-                gantry.as_mut().clone_from(&swept.gantry);
+                gantry.as_mut().clone_from(&swept.machine);
                 gantry.as_mut()
             }
         }
@@ -285,16 +258,8 @@ impl Sweep {
     }
 
     /// The machine of a run.
-    pub fn machine(&self, run: u64) -> Swept {
-        match &self.subject {
-            Subject::Axis(axis) => Swept::Axis(Box::new(self.with_run(&axis.machine, run))),
-            Subject::Gantry(swept) => Swept::Gantry(Box::new(self.with_run(&swept.gantry, run))),
-        }
-    }
-
-    /// The same machine with the numbers of a run.
-    fn with_run(&self, nominal: &Machine, run: u64) -> Machine {
-        let mut machine = nominal.clone();
+    pub fn machine(&self, run: u64) -> Machine {
+        let mut machine = self.subject.machine().clone();
         let mut values = Vec::with_capacity(self.inputs());
         self.put_values(run, &mut values);
         self.set(&mut machine, run, &values);
@@ -323,9 +288,10 @@ impl Sweep {
     /// Runs one experiment of a machine, the number of its group, and hands every quantity over time to `sink` in
     /// blocks. Errors: a machine that cannot be run.
     pub fn stream(&self, run: u64, experiment: usize, sink: &mut dyn FnMut(&Trajectory) -> Flow) -> Result<Outcome> {
+        let machine = self.machine(run);
         match &self.subject {
-            Subject::Axis(axis) => axis.stream(&self.with_run(&axis.machine, run), experiment, sink),
-            Subject::Gantry(swept) => swept.stream(&self.with_run(&swept.gantry, run), experiment, sink),
+            Subject::Axis(axis) => axis.stream(&machine, experiment, sink),
+            Subject::Gantry(gantry) => gantry.stream(&machine, experiment, sink),
         }
     }
 

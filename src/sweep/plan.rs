@@ -3,7 +3,7 @@
 use super::distribution::ends;
 use super::points::Points;
 use super::{DIMENSIONS, Distribution, Draws, Group, Parameter, Subject, Sweep, axis, gantry, headings};
-use crate::case::{Case, GantryCase, Kinds, Known, Opened, Origin, Prior, Sampling, Sweeping, Variation};
+use crate::case::{Case, Kinds, Known, Origin, Prior, Sampling, Sweeping, Variation};
 use crate::error::{Error, Result};
 use crate::fit;
 use crate::machine::Machine;
@@ -24,37 +24,15 @@ impl Sweep {
             Some(Origin::Posterior(file)) => Some(Arc::new(draws(case, plan, file)?)),
             _ => None,
         };
-        Self::planned(Subject::Axis(Box::new(axis::Axis::of(case, plan))), plan, draws, &case.known)
-    }
-
-    /// The sweep that a gantry's case describes. Errors: as [`Sweep::new`].
-    ///
-    /// ```
-    /// use taut::case::GantryCase;
-    /// use taut::sweep::Sweep;
-    /// let plan = ["sweep.runs=20", "sweep.vary.\"cart.mass\"=20 %", "sweep.vary.\"left_drive.motor.resistance\"=5 %"];
-    /// let case = GantryCase::read_with("stages/h-frame/h-frame.toml", &plan)?;
-    /// let table = Sweep::of_gantry(&case)?.rows(0, 20, &|| false).expect("not stopped");
-    /// let positions = table.get("one-motor.final_bridge_position").expect("a column");
-    /// assert!(positions.iter().all(|x| (-0.1..-0.05).contains(x)));
-    /// # Ok::<(), taut::Error>(())
-    /// ```
-    pub fn of_gantry(case: &GantryCase) -> Result<Self> {
-        case.complete()?;
-        let plan = planned(case.sweep.as_ref())?;
-        Self::planned(Subject::Gantry(Box::new(gantry::Swept::of(case, plan))), plan, None, &[])
-    }
-
-    /// The sweep that a case of either kind describes.
-    pub fn of(case: &Opened) -> Result<Self> {
-        match case {
-            Opened::Axis(case) => Self::new(case),
-            Opened::Gantry(case) => Self::of_gantry(case),
-        }
+        let subject = match case.is_axis() {
+            true => Subject::Axis(Box::new(axis::Axis::of(case, plan))),
+            false => Subject::Gantry(Box::new(gantry::Gantry::of(case, plan))),
+        };
+        Self::planned(subject, plan, draws, &case.known)
     }
 
     fn planned(subject: Subject, plan: &Sweeping, draws: Option<Arc<Draws>>, known: &[Known]) -> Result<Self> {
-        let machine = subject.numbers();
+        let machine = subject.machine();
         let chosen = chosen(machine, known, plan, draws.as_deref())?;
         let mut parameters = Vec::new();
         let mut changes = Vec::new();

@@ -11,11 +11,12 @@ pub mod random;
 pub mod stability;
 pub mod wrong;
 
-use taut::case::{Experiment, Initial};
+use taut::case::Experiment;
 use taut::friction::{Friction, Law, Shape};
 use taut::machine::{
     Amplifier, AmplifierMode, Belt, BeltMake, DriveUnit, Kind, Machine, Motor, Pulley, Slide, Spans, Travel,
 };
+use taut::mechanism::State;
 use taut::signal::Signal;
 
 /// A stage with the paper's motor and radius.
@@ -68,7 +69,7 @@ pub fn table4() -> Machine {
 
 /// An experiment from rest with an output every millisecond.
 pub fn experiment(input: Signal, until: f64) -> Experiment {
-    Experiment { name: "test".into(), input, until, every: 1e-3, initial: Initial::default(), log: None }
+    Experiment { name: "test".into(), inputs: vec![input], until, every: 1e-3, initial: State::default(), log: None }
 }
 
 /// F_s = 0.3 F_c on top of each body's Coulomb friction, v_s = 0.05 m/s at the belt.

@@ -1,7 +1,7 @@
 //! Sweeps of gantries: a row is the run of its machine, and figures are those of its columns.
 
 use super::{bits, rows};
-use taut::case::{GantryCase, Given, Sampling};
+use taut::case::{Case, Given, Sampling};
 use taut::machine::Kind;
 use taut::metrics::{GantryMeter, GantryMetrics};
 use taut::parameter::{Free, every, values};
@@ -12,19 +12,19 @@ use taut::trajectory::Trajectory;
 const H_FRAME: &str = include_str!("../../stages/h-frame/h-frame.toml");
 const CORE_XY: &str = include_str!("../../stages/core-xy/core-xy.toml");
 
-fn case(text: &str, changes: &[&str]) -> GantryCase {
-    GantryCase::from_text_with("gantry.toml", text, changes).unwrap_or_else(|error| panic!("{error}"))
+fn case(text: &str, changes: &[&str]) -> Case {
+    Case::from_text_with("gantry.toml", text, changes).unwrap_or_else(|error| panic!("{error}"))
 }
 
 fn sweep(text: &str, changes: &[&str]) -> Sweep {
-    Sweep::of_gantry(&case(text, changes)).unwrap_or_else(|error| panic!("{error}"))
+    Sweep::new(&case(text, changes)).unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// The key figures that `taut simulate` gives of an experiment.
-fn simulated(case: &GantryCase, experiment: usize) -> GantryMetrics {
-    let mechanism = case.gantry.mechanism();
-    let mut meter = GantryMeter::new(&case.gantry);
-    let (course, solver) = (Course::of(&case.experiments[experiment]), Solver::of_mechanism(&mechanism));
+fn simulated(case: &Case, experiment: usize) -> GantryMetrics {
+    let mechanism = case.machine.mechanism();
+    let mut meter = GantryMeter::new(&case.machine);
+    let (course, solver) = (Course::of(&mechanism, &case.experiments[experiment]), Solver::of_mechanism(&mechanism));
     let observed = (Detail::Full, Some(&mut meter as _));
     let outcome = stream_mechanism(&mechanism, &course, solver, observed, &mut |_| Flow::Continue).unwrap();
     meter.finish(&outcome.events)
@@ -36,8 +36,8 @@ fn figures_that_are_asked_for_are_those_of_all() {
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/stages/h-frame/h-frame.toml");
     let rows = |more: &[&str]| {
         let plan = ["sweep.runs=3", "sweep.vary.\"cart.mass\"=20 %"];
-        let case = GantryCase::read_with(file, &[&plan[..], more].concat()).unwrap();
-        Sweep::of_gantry(&case).unwrap().rows(0, 3, &|| false).unwrap()
+        let case = Case::read_with(file, &[&plan[..], more].concat()).unwrap();
+        Sweep::new(&case).unwrap().rows(0, 3, &|| false).unwrap()
     };
     let (all, some) = (rows(&[]), rows(&["sweep.figures=[\"peak_belt_force\"]"]));
     let per_experiment = some.columns.iter().filter(|column| column.name.contains('.')).count();
@@ -68,11 +68,11 @@ fn a_row_is_the_run_of_its_machine() {
                 let set: Vec<String> =
                     keys.iter().map(|key| format!("{key}={:?}", table.get(key).unwrap()[row])).collect();
                 let case = case(text, &set.iter().map(String::as_str).collect::<Vec<_>>());
-                assert_eq!(sweep.machine(row as u64).gantry(), Some(&case.gantry));
+                assert_eq!(sweep.machine(row as u64), case.machine);
                 for (number, group) in sweep.groups().iter().enumerate() {
                     assert_eq!(table.get(&format!("{}.status", group.file)).unwrap()[row], Status::Complete.code());
                     let metrics = simulated(&case, number);
-                    for measure in of_gantry(&case.gantry.mechanism()) {
+                    for measure in of_gantry(&case.machine.mechanism()) {
                         let value = table.get(&format!("{}.{}", group.file, measure.figure.name)).unwrap()[row];
                         assert_eq!(
                             value.to_bits(),
@@ -120,8 +120,7 @@ fn figures_are_those_of_the_columns() {
                 Flow::Continue
             };
             sweep.stream(row as u64, number, sink).unwrap();
-            let machine = sweep.machine(row as u64);
-            let gantry = machine.gantry().unwrap();
+            let gantry = sweep.machine(row as u64);
             let column = |name: &str| columns.get(name).unwrap_or_else(|| panic!("{name}"));
             let last = |name: &str| *column(name).last().unwrap();
             let mut near = |name: &str, expected: f64, length: f64| {
@@ -208,9 +207,9 @@ fn drives_that_are_alike_are_off_alike() {
         keys.sort();
         keys
     };
-    assert_eq!(sorted(every(&case(H_FRAME, &[]).gantry)), sorted(expected.clone()));
+    assert_eq!(sorted(every(&case(H_FRAME, &[]).machine)), sorted(expected.clone()));
 
-    let apart = case(H_FRAME, &["left_drive.motor.resistance=0.8 ohm"]).gantry;
+    let apart = case(H_FRAME, &["left_drive.motor.resistance=0.8 ohm"]).machine;
     expected.retain(|key| key != "motor.resistance");
     expected.extend(["left_drive.motor.resistance", "right_drive.motor.resistance"].map(str::to_string));
     assert_eq!(sorted(every(&apart)), sorted(expected));
@@ -231,8 +230,7 @@ fn drives_that_are_alike_are_off_alike() {
     // Off by a share is a factor on the value, the same for both.
     let sweep = sweep(H_FRAME, &["sweep.runs=20", "sweep.vary.all=20 %"]);
     for run in 0..20 {
-        let machine = sweep.machine(run);
-        let gantry = machine.gantry().unwrap();
+        let gantry = sweep.machine(run);
         assert_eq!(gantry.drives[0].motor, gantry.drives[1].motor);
         assert!((0.8 * 0.71..1.2 * 0.71).contains(&gantry.drives[0].motor.resistance));
         for friction in [gantry.drive_pulley.friction, gantry.first_slide().friction, gantry.cart.friction] {
@@ -269,22 +267,22 @@ fn every_number_is_set_where_a_case_file_has_it() {
         let in_amperes = H_FRAME.replace(" V\"", " A\"");
         let text = if changes.iter().any(|change| change.contains("current")) { &in_amperes } else { H_FRAME };
         let base = case(text, changes);
-        for (key, value) in values(&base.gantry) {
+        for (key, value) in values(&base.machine) {
             // A breakaway is never below Coulomb friction.
             let factor = if key.contains("friction.static") { 1.5 } else { 0.75 };
             let part = if value == 0.0 { 0.0 } else { factor * value };
             let stands = |key: &str| matches!(base.value(key), Ok(Given::Number(_)));
             let given: Vec<String> =
-                values(&base.gantry).into_iter().map(|(key, _)| key).filter(|key| stands(key)).collect();
+                values(&base.machine).into_iter().map(|(key, _)| key).filter(|key| stands(key)).collect();
             let given: Vec<&str> = given.iter().map(String::as_str).collect();
-            let free = Free::new(&base.gantry, &key, &given, &[]).unwrap_or_else(|error| panic!("{error}"));
+            let free = Free::new(&base.machine, &key, &given, &[]).unwrap_or_else(|error| panic!("{error}"));
             assert_eq!(free.start, value, "{key}");
-            let mut gantry = base.gantry.clone();
+            let mut gantry = base.machine.clone();
             free.set(&mut gantry, part);
             let set = format!("{key}={part:?}");
             let changes: Vec<&str> = changes.iter().copied().chain([set.as_str()]).collect();
-            match GantryCase::from_text_with("gantry.toml", text, &changes) {
-                Ok(read) => assert_eq!(gantry, read.gantry, "{key}"),
+            match Case::from_text_with("gantry.toml", text, &changes) {
+                Ok(read) => assert_eq!(gantry, read.machine, "{key}"),
                 // Zero where more is wanted, and another form of what the file has.
                 Err(_) if value == 0.0 || key.contains("stribeck.decay") || key.contains("stribeck.velocity") => {
                     continue;

@@ -1,23 +1,33 @@
 //! Parts of a case that are asked for by name; where one is missing, the error names the command line's option.
 
-use super::{Case, Experiment, GantryCase, GantryExperiment, Initial, Move, Opened, Plan, Unread, suggestion};
+use super::{Case, Experiment, Move, Plan, Unread, suggestion};
 use crate::design::Design;
 use crate::error::{Error, Result};
-use crate::mechanism::State;
+use crate::machine::Kind;
 use std::path::Path;
 
 impl Case {
     /// Something of the first experiment of the text, whether or not its files were read.
-    pub fn first<T>(&self, of: impl Fn(&Experiment) -> T, left: impl Fn(&Unread<Initial>) -> Option<T>) -> Option<T> {
+    pub fn first<T>(&self, of: impl Fn(&Experiment) -> T, left: impl Fn(&Unread) -> Option<T>) -> Option<T> {
         match self.unread.first().filter(|one| one.place == 0) {
             Some(one) => left(one),
             None => self.experiments.first().map(of),
         }
     }
 
+    /// Whether its machine is a single axis.
+    pub fn is_axis(&self) -> bool {
+        self.machine.kind == Kind::Axis
+    }
+
     /// Refuses a case of which a file was not read, with the line that names it.
     pub fn complete(&self) -> Result<()> {
-        complete(&self.unread)
+        self.unread.first().map_or(Ok(()), |one| Err(one.error.clone()))
+    }
+
+    /// The experiments that were left out because a file of theirs could not be read, each with why.
+    pub fn left_out(&self) -> Vec<(&str, &Error)> {
+        self.unread.iter().map(|one| (one.name.as_str(), &one.error)).collect()
     }
 
     /// The experiments of these names, in the case's order; all if none is named. `path` is the case's own.
@@ -28,7 +38,20 @@ impl Case {
                 .in_file(path)
                 .next("run its moves with `taut move`, or add an [[experiment]]"));
         }
-        experiments_named(&self.experiments, &self.unread, |experiment| &experiment.name, names)
+        let asked = |one: &&Unread| names.is_empty() || names.iter().any(|name| one.holds(name));
+        if let Some(one) = self.unread.iter().find(asked) {
+            return Err(one.error.clone());
+        }
+        let left_out = self.unread.iter().map(|one| one.name.as_str());
+        let known = || self.experiments.iter().map(|one| one.name.as_str()).chain(left_out.clone());
+        if let Some(name) = names.iter().find(|name| known().all(|other| other != **name)) {
+            return Err(Error::new(format!("there is no experiment \"{name}\""))
+                .in_file("--experiment")
+                .allowed(quoted(known()))
+                .next("name one of these, or leave --experiment out to run them all"));
+        }
+        let is_asked = |one: &&Experiment| names.is_empty() || names.contains(&one.name);
+        Ok(self.experiments.iter().filter(is_asked).collect())
     }
 
     /// The controller, and the moves of these names in the case's order; all if none is named. `path` is the case's
@@ -67,72 +90,6 @@ impl Case {
     pub fn suggested_derivative(&self, design: &Design) -> String {
         suggestion::derivative(&self.machine, design.every, design.delay)
     }
-}
-
-impl GantryCase {
-    /// Something of the first experiment of the text, whether or not its files were read.
-    pub fn first<T>(
-        &self,
-        of: impl Fn(&GantryExperiment) -> T,
-        left: impl Fn(&Unread<State>) -> Option<T>,
-    ) -> Option<T> {
-        match self.unread.first().filter(|one| one.place == 0) {
-            Some(one) => left(one),
-            None => self.experiments.first().map(of),
-        }
-    }
-
-    /// Refuses a case of which a file was not read, with the line that names it.
-    pub fn complete(&self) -> Result<()> {
-        complete(&self.unread)
-    }
-
-    /// The experiments of these names, in the case's order; all if none is named.
-    pub fn experiments_named(&self, names: &[String]) -> Result<Vec<&GantryExperiment>> {
-        experiments_named(&self.experiments, &self.unread, |experiment| &experiment.name, names)
-    }
-}
-
-impl Opened {
-    /// Refuses a case of which a file was not read, with the line that names it.
-    pub fn complete(&self) -> Result<()> {
-        match self {
-            Opened::Axis(case) => case.complete(),
-            Opened::Gantry(case) => case.complete(),
-        }
-    }
-
-    /// The experiments that were left out because a file of theirs could not be read, each with why.
-    pub fn left_out(&self) -> Vec<(&str, &Error)> {
-        match self {
-            Opened::Axis(case) => case.unread.iter().map(|one| (one.name.as_str(), &one.error)).collect(),
-            Opened::Gantry(case) => case.unread.iter().map(|one| (one.name.as_str(), &one.error)).collect(),
-        }
-    }
-}
-
-fn complete<S>(unread: &[Unread<S>]) -> Result<()> {
-    unread.first().map_or(Ok(()), |one| Err(one.error.clone()))
-}
-
-fn experiments_named<'a, E, S>(
-    all: &'a [E],
-    unread: &[Unread<S>],
-    name: fn(&E) -> &String,
-    names: &[String],
-) -> Result<Vec<&'a E>> {
-    let asked = |one: &&Unread<S>| names.is_empty() || names.iter().any(|name| one.holds(name));
-    if let Some(one) = unread.iter().find(asked) {
-        return Err(one.error.clone());
-    }
-    let known = || all.iter().map(|one| name(one).as_str()).chain(unread.iter().map(|one| one.name.as_str()));
-    if let Some(name) = names.iter().find(|name| known().all(|other| other != **name)) {
-        return Err(Error::new(format!("there is no experiment \"{name}\""))
-            .in_file("--experiment")
-            .allowed(quoted(known()))
-            .next("name one of these, or leave --experiment out to run them all"));
-    }
-    Ok(all.iter().filter(|experiment| names.is_empty() || names.contains(name(experiment))).collect())
 }
 
 fn quoted<'a>(names: impl Iterator<Item = &'a str>) -> String {

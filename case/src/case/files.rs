@@ -3,6 +3,7 @@
 use super::reader::{Field, Table};
 use super::told;
 use crate::error::{Error, Result};
+use crate::mechanism::State;
 use std::cell::{Cell, RefCell};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -27,22 +28,22 @@ pub struct InputFile {
     pub place: Range<usize>,
 }
 
-/// An experiment whose files were not read; it begins at a state of kind `S`.
+/// An experiment whose files were not read.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Unread<S> {
+pub struct Unread {
     /// Its name; runs of a log that is split have names that begin with it and `/`.
     pub name: String,
     /// Its place among the experiments of the text, from 0.
     pub place: usize,
     /// Where it starts from.
-    pub initial: S,
+    pub initial: State,
     /// End and output interval, as far as the text says so, s.
     pub times: [Option<f64>; 2],
     /// Why it was not read, with the line of the case that names the file.
     pub error: Error,
 }
 
-impl<S> Unread<S> {
+impl Unread {
     /// End and output interval, where the text says both, s.
     pub fn span(&self) -> Option<[f64; 2]> {
         let [until, every] = self.times;
@@ -54,9 +55,6 @@ impl<S> Unread<S> {
         name == self.name || name.strip_prefix(self.name.as_str()).is_some_and(|rest| rest.starts_with('/'))
     }
 }
-
-/// Experiments, and those of which a file was not read.
-pub(super) type Experiments<E, S> = (Vec<E>, Vec<Unread<S>>);
 
 /// Where the paths of a case begin, and the files that it names.
 pub(super) struct Folder<'a> {
@@ -119,13 +117,13 @@ impl<'a> Folder<'a> {
     }
 
     /// An experiment of the text, or what is known of it where one of its files was not read.
-    pub fn experiment<T, S>(
+    pub fn experiment<T>(
         &self,
         (place, name): (usize, &str),
         table: &Table,
         read: impl FnOnce() -> Result<T>,
-        initial: impl FnOnce() -> Result<S>,
-    ) -> Result<std::result::Result<T, Unread<S>>> {
+        initial: impl FnOnce() -> Result<State>,
+    ) -> Result<std::result::Result<T, Unread>> {
         self.experiment.replace(name.to_string());
         self.failed.set(false);
         match read() {

@@ -1,119 +1,21 @@
 //! The case file of a gantry: two drives, a bridge, a cart on it.
 
-use super::files::{Experiments, Folder};
 use super::friction::friction;
 use super::reader::{Field, Table};
-use super::{
-    Case, Files, InputFile, Sweeping, Unread, input, listed, machine, named, set, sheet, sweep, times, title, unique,
-};
+use super::{input, machine, sheet};
 use crate::error::{Error, Result};
 use crate::friction::Friction;
 use crate::machine::{
-    AmplifierMode, Belt, BeltMake, BeltSheet, DriveUnit, Encoder, EncoderPlace, Kind, Machine, Pulley, Slide, Spans,
+    Belt, BeltMake, BeltSheet, DriveUnit, Encoder, EncoderPlace, Kind, Machine, Pulley, Slide, Spans,
 };
 use crate::mechanism::State;
-use crate::plan::GantryExperiment;
 use crate::signal::Signal;
-use std::collections::HashMap;
 use std::path::Path;
 
-/// Everything needed to repeat a run of a gantry.
-#[derive(Debug, Clone)]
-pub struct GantryCase {
-    /// The title of the file; its name where it has none.
-    pub title: String,
-    /// The machine.
-    pub gantry: Machine,
-    /// The experiments, in the file's order.
-    pub experiments: Vec<GantryExperiment>,
-    /// The experiments whose files were not read; none but where [`Opened::read_for`] left them out.
-    pub unread: Vec<Unread<State>>,
-    /// The sweep, where the file has one.
-    pub sweep: Option<Sweeping>,
-    /// The text it was read from, with `--set` applied: read again, it gives the same case.
-    pub text: String,
-    /// The files that its inputs name, in the text's order.
-    pub files: Vec<InputFile>,
-}
-
-/// A case of either kind.
-#[derive(Debug, Clone)]
-pub enum Opened {
-    /// Of an axis.
-    Axis(Box<Case>),
-    /// Of a gantry.
-    Gantry(Box<GantryCase>),
-}
-
-impl Opened {
-    /// Reads a case file of either kind with changes, each as `KEY=VALUE`.
-    pub fn read_with(path: impl AsRef<Path>, changes: &[&str]) -> Result<Self> {
-        let path = path.as_ref();
-        Self::from_text_with(path, &super::read_text(path)?, changes)
-    }
-
-    /// The same with the files of these experiments only. An experiment whose files are not read, or cannot be, is none
-    /// of the case's experiments; whoever asks for it is told why.
-    pub fn read_for(path: impl AsRef<Path>, changes: &[&str], files: Files) -> Result<Self> {
-        let path = path.as_ref();
-        Self::from_text_for(path, &super::read_text(path)?, changes, files)
-    }
-
-    /// The same from text; `name` stands in messages, and paths in the text are relative to its folder.
-    pub fn from_text_with(name: impl AsRef<Path>, text: &str, changes: &[&str]) -> Result<Self> {
-        let case = Self::from_text_for(name, text, changes, Files::All)?;
-        case.complete()?;
-        Ok(case)
-    }
-
-    /// The same with the files of these experiments only, as [`Opened::read_for`] has it.
-    pub fn from_text_for(name: impl AsRef<Path>, text: &str, changes: &[&str], files: Files) -> Result<Self> {
-        let name = name.as_ref();
-        let source = set::apply(name, text.strip_prefix('\u{feff}').unwrap_or(text), changes)?;
-        let tree = source.tree()?;
-        match kind(&Field::root(&source, &tree).table()?)? {
-            Some(_) => GantryCase::from_text_for(name, text, changes, files).map(|case| Self::Gantry(Box::new(case))),
-            None => Case::from_text_for(name, text, changes, files).map(|case| Self::Axis(Box::new(case))),
-        }
-    }
-
-    /// The title of the file; its name where it has none.
-    pub fn title(&self) -> &str {
-        match self {
-            Opened::Axis(case) => &case.title,
-            Opened::Gantry(case) => &case.title,
-        }
-    }
-
-    /// The text it was read from, with `--set` applied: read again, it gives the same case.
-    pub fn text(&self) -> &str {
-        match self {
-            Opened::Axis(case) => &case.text,
-            Opened::Gantry(case) => &case.text,
-        }
-    }
-
-    /// The files that it names, in the text's order.
-    pub fn files(&self) -> &[InputFile] {
-        match self {
-            Opened::Axis(case) => &case.files,
-            Opened::Gantry(case) => &case.files,
-        }
-    }
-
-    /// The sweep, where the file has one.
-    pub fn sweep(&self) -> Option<&Sweeping> {
-        match self {
-            Opened::Axis(case) => case.sweep.as_ref(),
-            Opened::Gantry(case) => case.sweep.as_ref(),
-        }
-    }
-}
-
-/// Which gantry the file describes; none for an axis.
-pub(super) fn kind(root: &Table) -> Result<Option<Kind>> {
-    let kinds = [("axis", None), ("h-frame", Some(Kind::HFrame)), ("core-xy", Some(Kind::CoreXy))];
-    root.optional("kind").map_or(Ok(None), |field| field.choice(&kinds))
+/// The kind of machine that the file describes.
+pub(super) fn kind(root: &Table) -> Result<Kind> {
+    let kinds = Kind::ALL.map(|kind| (kind.word(), kind));
+    root.optional("kind").map_or(Ok(Kind::Axis), |field| field.choice(&kinds))
 }
 
 /// The error where an axis is wanted.
@@ -125,96 +27,44 @@ pub(super) fn no_axis(root: &Table, kind: Kind) -> Error {
     )
 }
 
-impl GantryCase {
-    /// Reads a gantry from text with changes, each as `KEY=VALUE`.
-    ///
-    /// ```
-    /// use taut::case::GantryCase;
-    /// let text = r#"
-    /// kind = "h-frame"
-    /// motor = { torque_constant = "23 mN m/A", back_emf_constant = "23 mV s/rad", resistance = "0.71 ohm" }
-    /// drive_pulley = { radius = "19.4 mm", inertia = "6.3e-5 kg m^2" }
-    /// bridge = { mass = "0.838 kg" }
-    /// cart = { mass = "0.362 kg" }
-    /// belt = { stiffness = ["132.76 kN/m", "132.76 kN/m", "58.885 kN/m"] }
-    /// [[experiment]]
-    /// name = "pulse"
-    /// input = { left = { pulse = "5 V", for = "0.25 s" } }
-    /// until = 1
-    /// every = 1e-3
-    /// "#;
-    /// let case = GantryCase::from_text_with("frame.toml", text, &["bridge.mass=1 kg"])?;
-    /// assert_eq!(case.gantry.first_slide().mass, 1.0);
-    /// # Ok::<(), taut::Error>(())
-    /// ```
-    pub fn from_text_with(name: impl AsRef<Path>, text: &str, changes: &[&str]) -> Result<Self> {
-        let case = Self::from_text_for(name, text, changes, Files::All)?;
-        case.complete()?;
-        Ok(case)
-    }
-
-    /// The same with the files of these experiments only, as [`Opened::read_for`] has it.
-    pub fn from_text_for(name: impl AsRef<Path>, text: &str, changes: &[&str], files: Files) -> Result<Self> {
-        let name = name.as_ref();
-        let source = set::apply(name, text.strip_prefix('\u{feff}').unwrap_or(text), changes)?;
-        let tree = source.tree()?;
-        let root = Field::root(&source, &tree).table()?;
-        let Some(kind) = kind(&root)? else {
-            return Err(Error::new("this case describes an axis, not a gantry")
-                .in_file(name)
-                .next("write kind = \"h-frame\" or \"core-xy\" at its top"));
-        };
-        for key in ["travel", "idler_pulley"] {
-            if let Some(field) = root.optional(key) {
-                return Err(field.fail("this belongs to an axis").next(match key {
-                    "travel" => "give the travel of each: bridge.travel and cart.travel",
-                    _ => "the idlers of a gantry have neither inertia nor friction here: leave it out",
-                }));
-            }
+/// The tables of a gantry's case. Errors: one that belongs to an axis, or that is not there yet.
+pub(super) fn tables(root: &Table) -> Result<&'static [&'static str]> {
+    for key in ["travel", "idler_pulley"] {
+        if let Some(field) = root.optional(key) {
+            return Err(field.fail("this belongs to an axis").next(match key {
+                "travel" => "give the travel of each: bridge.travel and cart.travel",
+                _ => "the idlers of a gantry have neither inertia nor friction here: leave it out",
+            }));
         }
-        for key in ["measurement", "controller", "move", "fit", "tune", "uncertainty"] {
-            if let Some(field) = root.optional(key) {
-                return Err(field.fail("this is not there yet for a gantry").next("leave it out for now"));
-            }
+    }
+    for key in ["measurement", "controller", "move", "fit", "tune", "uncertainty"] {
+        if let Some(field) = root.optional(key) {
+            return Err(field.fail("this is not there yet for a gantry").next("leave it out for now"));
         }
-        let tables = [
-            "title",
-            "kind",
-            "motor",
-            "drive",
-            "amplifier",
-            "left_drive",
-            "right_drive",
-            "drive_pulley",
-            "bridge",
-            "cart",
-            "belt",
-            "encoder",
-            "experiment",
-            "sweep",
-        ];
-        root.check_keys(&tables, &[])?;
-        let folder = Folder::of(name, files);
-        let gantry = gantry(&root, kind)?;
-        gantry.check_gantry().map_err(|error| if error.place.is_none() { error.in_file(name) } else { error })?;
-        let (experiments, unread) = experiments(&root, &gantry, &folder)?;
-        let title = title(&root, name)?;
-        let context = sweep::Context {
-            machine: &gantry,
-            experiments: experiments.iter().map(|experiment| (experiment.name.as_str(), experiment.until)).collect(),
-            fit: None,
-            known: &[],
-            folder: &folder,
-        };
-        let sweep = sweep::sweeping(&root, &context)?;
-        Ok(Self { title, gantry, experiments, unread, sweep, text: source.text.clone(), files: folder.files() })
     }
+    Ok(&[
+        "title",
+        "kind",
+        "motor",
+        "drive",
+        "amplifier",
+        "left_drive",
+        "right_drive",
+        "drive_pulley",
+        "bridge",
+        "cart",
+        "belt",
+        "encoder",
+        "experiment",
+        "sweep",
+    ])
+}
 
-    /// Reads a gantry from a file with changes.
-    pub fn read_with(path: impl AsRef<Path>, changes: &[&str]) -> Result<Self> {
-        let path = path.as_ref();
-        Self::from_text_with(path, &super::read_text(path)?, changes)
-    }
+/// The machine of the file `name`.
+pub(super) fn machine(root: &Table, kind: Kind, name: &Path) -> Result<Machine> {
+    let gantry = gantry(root, kind)?;
+    gantry.check_gantry().map_err(|error| if error.place.is_none() { error.in_file(name) } else { error })?;
+    Ok(gantry)
 }
 
 fn table<'a>(root: &Table<'a>, name: &str, holds: &str) -> Result<Table<'a>> {
@@ -347,32 +197,10 @@ fn encoder(table: &Table) -> Result<Encoder> {
     Ok(Encoder { at, lines: sheet::lines(table)? })
 }
 
-fn experiments(root: &Table, gantry: &Machine, folder: &Folder) -> Result<Experiments<GantryExperiment, State>> {
-    let (mut experiments, mut unread, mut files) = (Vec::new(), Vec::new(), HashMap::new());
-    for (place, field) in listed(root)?.into_iter().enumerate() {
-        let field = field.named("experiment");
-        let table = field.table()?;
-        let name = named(&table)?;
-        unique(&field, &name, &mut files)?;
-        let initial = || match table.optional("initial") {
-            Some(field) => initial(&field.named("gantry.initial").table()?, gantry),
-            None => Ok(State::default()),
-        };
-        match folder.experiment((place, &name), &table, || experiment(&field, gantry, folder), initial)? {
-            Ok(experiment) => experiments.push(experiment),
-            Err(left) => unread.push(left),
-        }
-    }
-    Ok((experiments, unread))
-}
-
-fn experiment(field: &Field, gantry: &Machine, folder: &Folder) -> Result<GantryExperiment> {
-    let table = field.table()?;
-    table.check_keys(&["name", "input"], &["log"])?;
-    let name = named(&table)?;
-    let (until, every) = times(&table, None)?;
+/// The inputs of both drives.
+pub(super) fn inputs(experiment: &Table, gantry: &Machine, context: &input::Context) -> Result<Vec<Signal>> {
     let such_as = "for example input = { left = { pulse = \"5 V\", for = \"0.25 s\" }, right = { step = \"0 V\" } }";
-    let inputs = table.required("input", such_as)?.table()?;
+    let inputs = experiment.required("input", such_as)?.table()?;
     let sides = ["left", "right"];
     if let Some(key) = inputs.keys().find(|key| !sides.contains(key)) {
         let field = inputs.optional(key).unwrap_or_else(|| inputs.field.clone());
@@ -381,25 +209,15 @@ fn experiment(field: &Field, gantry: &Machine, folder: &Folder) -> Result<Gantry
             .allowed("left, right")
             .next(such_as));
     }
-    let signal = |side: usize| match inputs.optional(sides[side]) {
+    let signal = |(side, unit): (&str, &DriveUnit)| match inputs.optional(side) {
         None => Ok(Signal::Step { value: 0.0, at: 0.0 }),
-        Some(field) => {
-            let input_unit = match gantry.drives[side].amplifier.mode {
-                AmplifierMode::Voltage => "V",
-                AmplifierMode::Current => "A",
-            };
-            input::signal(&Field { input_unit, ..field }, &input::Context { folder, until })
-        }
+        Some(field) => input::signal(&Field { input_unit: unit.amplifier.mode.unit(), ..field }, context),
     };
-    let initial = match table.optional("initial") {
-        Some(field) => initial(&field.named("gantry.initial").table()?, gantry)?,
-        None => State::default(),
-    };
-    Ok(GantryExperiment { name, inputs: [signal(0)?, signal(1)?], until, every, initial })
+    sides.into_iter().zip(&gantry.drives).map(signal).collect()
 }
 
 /// Where bridge and cart are; the pulleys where the belt is without strain, unless they are given.
-fn initial(table: &Table, gantry: &Machine) -> Result<State> {
+pub(super) fn initial(table: &Table, gantry: &Machine) -> Result<State> {
     table.check_keys(&[], &[])?;
     let two = |of: [&str; 2]| -> Result<[f64; 2]> { Ok([table.number(of[0])?, table.number(of[1])?]) };
     let (positions, speeds) = (["bridge_position", "cart_position"], ["bridge_speed", "cart_speed"]);

@@ -2,9 +2,9 @@
 
 use super::source::Source;
 use super::tree::{Kind, Node};
-use super::{Case, GantryCase, Opened, set};
+use super::{Case, set};
 use crate::error::{Error, Result};
-use crate::machine::Machine;
+use crate::machine;
 use crate::parameter::{self, Fallback, Parameter};
 use crate::quantity;
 use std::path::Path;
@@ -42,28 +42,19 @@ impl Case {
     /// # Ok::<(), taut::Error>(())
     /// ```
     pub fn value(&self, key: &str) -> Result<Given> {
-        let place = |section: &str| section.to_string();
-        value(&self.text, key, &Rows { input_unit: |_| self.machine.drives[0].amplifier.mode.unit(), place: &place })
+        value(&self.text, key, &self.rows())
     }
-}
 
-impl GantryCase {
-    /// The value of the text under `key`, as [`Case::value`] tells it.
-    ///
-    /// ```
-    /// use taut::case::{GantryCase, Given};
-    /// let case = GantryCase::read_with("../stages/h-frame/h-frame.toml", &["left_drive.motor.resistance=800 mohm"])?;
-    /// assert_eq!(case.value("cart.travel.max")?, Given::Number(0.25));
-    /// assert_eq!(case.value("left_drive.motor.resistance")?, Given::Number(0.8));
-    /// assert_eq!(case.value("experiment.0.input.left.for")?, Given::Number(0.25));
-    /// # Ok::<(), taut::Error>(())
-    /// ```
-    pub fn value(&self, key: &str) -> Result<Given> {
-        let unit = |section: &str| {
+    /// How the numbers of this case are found in the table of parameters.
+    fn rows(&self) -> Rows<impl Fn(&str) -> &'static str> {
+        let drives: Vec<_> = self.machine.drives.iter().map(|unit| unit.amplifier.mode.unit()).collect();
+        let input_unit = move |section: &str| {
             let right = section.split('.').any(|step| step == "right");
-            self.gantry.drives[usize::from(right)].amplifier.mode.unit()
+            drives[if right { drives.len() - 1 } else { 0 }]
         };
-        value(&self.text, key, &Rows { input_unit: unit, place: &of_gantry })
+        let place: fn(&str) -> String =
+            if self.machine.kind == machine::Kind::Axis { str::to_string } else { of_gantry };
+        Rows { input_unit, place }
     }
 }
 
@@ -82,11 +73,11 @@ fn of_gantry(section: &str) -> String {
 }
 
 /// How the rows of the table of parameters are found.
-struct Rows<'a, U: Fn(&str) -> &'static str> {
+struct Rows<U: Fn(&str) -> &'static str> {
     /// The unit of an input that stands in this section.
     input_unit: U,
     /// Where the table has what stands in this section.
-    place: &'a dyn Fn(&str) -> String,
+    place: fn(&str) -> String,
 }
 
 fn value<U: Fn(&str) -> &'static str>(text: &str, key: &str, rows: &Rows<U>) -> Result<Given> {
@@ -160,13 +151,13 @@ pub struct Number {
     pub written: Option<String>,
 }
 
-impl Opened {
+impl Case {
     /// Every number of the case that the table of parameters has: those of its text in the text's order, then the
     /// machine's numbers that have a default and do not stand there.
     ///
     /// ```
-    /// use taut::case::{Opened, TEMPLATE};
-    /// let numbers = Opened::from_text_with("axis.toml", TEMPLATE, &[])?.numbers()?;
+    /// use taut::case::{Case, TEMPLATE};
+    /// let numbers = Case::from_text("axis.toml", TEMPLATE)?.numbers()?;
     /// let find = |key: &str| numbers.iter().find(|number| number.key == key).unwrap();
     /// assert_eq!(find("drive_pulley.radius").value, 0.0194);
     /// assert_eq!(find("experiment.0.input.for").unit, "s");
@@ -174,24 +165,10 @@ impl Opened {
     /// # Ok::<(), taut::Error>(())
     /// ```
     pub fn numbers(&self) -> Result<Vec<Number>> {
-        let tree = Source::new(Path::new(""), self.text().to_string()).tree()?;
+        let tree = Source::new(Path::new(""), self.text.clone()).tree()?;
         let mut numbers = Vec::new();
-        let machine: &Machine = match self {
-            Opened::Axis(case) => {
-                let same = |section: &str| section.to_string();
-                let unit = case.machine.drives[0].amplifier.mode.unit();
-                collect(&tree, ("", ""), &Rows { input_unit: |_| unit, place: &same }, &mut numbers);
-                &case.machine
-            }
-            Opened::Gantry(case) => {
-                let unit = |section: &str| {
-                    let right = section.split('.').any(|step| step == "right");
-                    case.gantry.drives[usize::from(right)].amplifier.mode.unit()
-                };
-                collect(&tree, ("", ""), &Rows { input_unit: unit, place: &of_gantry }, &mut numbers);
-                &case.gantry
-            }
-        };
+        collect(&tree, ("", ""), &self.rows(), &mut numbers);
+        let machine = &self.machine;
         let unwritten = parameter::values(machine).into_iter().filter_map(|(key, value)| {
             let row = machine.row(&key)?;
             let has_default = matches!(row.default, Fallback::Value(_)) && value.is_finite();
@@ -253,8 +230,8 @@ impl Number {
     /// The change that gives it another value, as `--set` takes it: in the unit that the text has, to six digits.
     ///
     /// ```
-    /// use taut::case::{Opened, TEMPLATE};
-    /// let case = Opened::from_text_with("axis.toml", TEMPLATE, &[])?; // with radius = "19.4 mm"
+    /// use taut::case::{Case, TEMPLATE};
+    /// let case = Case::from_text("axis.toml", TEMPLATE)?; // with radius = "19.4 mm"
     /// let radius = case.numbers()?.into_iter().find(|number| number.key == "drive_pulley.radius").unwrap();
     /// assert_eq!(radius.change(0.02), "drive_pulley.radius=20 mm");
     /// # Ok::<(), taut::Error>(())

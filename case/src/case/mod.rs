@@ -24,12 +24,11 @@ mod template;
 mod tree;
 mod tune;
 
-pub use crate::plan::{Experiment, GantryExperiment, Initial, file_name};
+pub use crate::plan::{Experiment, file_name};
 pub use bounds::LARGEST_FILE;
 pub use drawn::{drawn, draws_are_of_one_machine, machines, parameters};
 pub use files::{Files, InputFile, Unread};
 pub use fit::{Nuisances, Per, Plan, Prior, Scope, matches};
-pub use gantry::{GantryCase, Opened};
 pub use get::{Given, Number};
 pub use motion::Move;
 pub use sweep::{Kinds, Origin, Sampling, Sweeping, Variation};
@@ -39,8 +38,10 @@ pub use tune::{Cost, EFFORTS, Known, Tuning};
 use crate::design::Design;
 use crate::error::{Error, Result};
 use crate::log::Log;
-use crate::machine::{AmplifierMode, Machine, Measurement};
-use files::{Experiments, Folder};
+use crate::machine::axis::{CART, LABELS};
+use crate::machine::{Kind, Machine, Measurement};
+use crate::mechanism::State;
+use files::Folder;
 use reader::{Field, Table};
 use std::collections::HashMap;
 use std::path::Path;
@@ -64,7 +65,7 @@ pub struct Case {
     /// The experiments, in the file's order.
     pub experiments: Vec<Experiment>,
     /// The experiments whose files were not read; none but where [`Case::read_for`] left them out.
-    pub unread: Vec<Unread<Initial>>,
+    pub unread: Vec<Unread>,
     /// The controller, where the file has one.
     pub controller: Option<Design>,
     /// Where it should be, in the file's order.
@@ -81,6 +82,13 @@ pub struct Case {
     pub text: String,
     /// The files that its inputs and logs name, in the text's order.
     pub files: Vec<InputFile>,
+}
+
+/// The machines that somebody takes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Accepted {
+    All,
+    Axis,
 }
 
 impl Case {
@@ -100,6 +108,17 @@ impl Case {
     pub fn read_for(path: impl AsRef<Path>, changes: &[&str], files: Files) -> Result<Self> {
         let path = path.as_ref();
         Self::from_text_for(path, &read_text(path)?, changes, files)
+    }
+
+    /// The same for what takes an axis alone: refuses every other kind of machine.
+    pub fn read_axis_for(path: impl AsRef<Path>, changes: &[&str], files: Files) -> Result<Self> {
+        let path = path.as_ref();
+        Self::axis_from_text_for(path, &read_text(path)?, changes, files)
+    }
+
+    /// The same from text, as [`Case::from_text_for`] has it.
+    pub fn axis_from_text_for(name: impl AsRef<Path>, text: &str, changes: &[&str], files: Files) -> Result<Self> {
+        Self::of_kinds(name.as_ref(), text, changes, files, Accepted::Axis)
     }
 
     /// Reads a case from text; `name` stands in messages, and paths in the text are relative to its folder.
@@ -135,7 +154,10 @@ impl Case {
 
     /// The same with the files of these experiments only, as [`Case::read_for`] has it.
     pub fn from_text_for(name: impl AsRef<Path>, text: &str, changes: &[&str], files: Files) -> Result<Self> {
-        let name = name.as_ref();
+        Self::of_kinds(name.as_ref(), text, changes, files, Accepted::All)
+    }
+
+    fn of_kinds(name: &Path, text: &str, changes: &[&str], files: Files, accepted: Accepted) -> Result<Self> {
         let text = text.strip_prefix('\u{feff}').unwrap_or(text);
         let source = set::apply(name, text, changes)?;
         let tree = source.tree()?;
@@ -145,36 +167,17 @@ impl Case {
                 .in_file(name)
                 .next("write a commented one to start from with `taut init`"));
         }
-        let tables = [
-            "title",
-            "kind",
-            "motor",
-            "drive",
-            "amplifier",
-            "drive_pulley",
-            "idler_pulley",
-            "cart",
-            "belt",
-            "travel",
-            "encoder",
-            "scale",
-            "measurement",
-            "experiment",
-            "controller",
-            "move",
-            "fit",
-            "tune",
-            // What a fit says of its own result.
-            "uncertainty",
-            "sweep",
-        ];
-        if let Some(kind) = gantry::kind(&root)? {
+        let kind = gantry::kind(&root)?;
+        if accepted == Accepted::Axis && kind != Kind::Axis {
             return Err(gantry::no_axis(&root, kind));
         }
-        root.check_keys(&tables, &[])?;
+        root.check_keys(if kind == Kind::Axis { &AXIS_TABLES } else { gantry::tables(&root)? }, &[])?;
 
         let title = title(&root, name)?;
-        let machine = machine::machine(&root)?;
+        let machine = match kind {
+            Kind::Axis => machine::machine(&root)?,
+            _ => gantry::machine(&root, kind, name)?,
+        };
         let folder = Folder::of(name, files);
         let controller = controller::controller(&root, &machine)?;
         let moves = motion::moves(&root, &machine, controller.as_ref())?;
@@ -214,6 +217,31 @@ impl Case {
         })
     }
 }
+
+/// The tables of a case of an axis.
+const AXIS_TABLES: [&str; 20] = [
+    "title",
+    "kind",
+    "motor",
+    "drive",
+    "amplifier",
+    "drive_pulley",
+    "idler_pulley",
+    "cart",
+    "belt",
+    "travel",
+    "encoder",
+    "scale",
+    "measurement",
+    "experiment",
+    "controller",
+    "move",
+    "fit",
+    "tune",
+    // What a fit says of its own result.
+    "uncertainty",
+    "sweep",
+];
 
 /// The text of a case with other names for the files of its inputs; it is to lie where these names lead to them.
 pub fn text_with(whole: &str, files: &[InputFile], name: impl Fn(&InputFile) -> String) -> String {
@@ -280,17 +308,14 @@ fn listed<'a>(root: &Table<'a>) -> Result<Vec<Field<'a>>> {
     Ok(list)
 }
 
-fn experiments(root: &Table, machine: &Machine, folder: &Folder) -> Result<Experiments<Experiment, Initial>> {
+fn experiments(root: &Table, machine: &Machine, folder: &Folder) -> Result<(Vec<Experiment>, Vec<Unread>)> {
     let (mut experiments, mut unread) = (Vec::new(), Vec::new());
     let mut files = HashMap::new();
     for (place, field) in listed(root)?.into_iter().enumerate() {
         let own = field.clone().named("experiment");
         let table = own.table()?;
         let name = named(&table)?;
-        let initial = || match table.optional("initial") {
-            Some(field) => initial(&field.table()?, machine),
-            None => Ok(Initial::default()),
-        };
+        let initial = || initial(&table, machine);
         match folder.experiment((place, &name), &table, || experiment(&own, machine, folder), initial)? {
             Ok(runs) => {
                 for run in runs {
@@ -329,29 +354,28 @@ fn unique(field: &Field, name: &str, files: &mut HashMap<String, String>) -> Res
 
 /// The experiment of a table; several, if its log is split into runs.
 fn experiment(field: &Field, machine: &Machine, folder: &Folder) -> Result<Vec<Experiment>> {
-    let field = Field {
-        input_unit: match machine.drives[0].amplifier.mode {
-            AmplifierMode::Voltage => "V",
-            AmplifierMode::Current => "A",
-        },
-        ..field.clone()
-    };
+    let field = Field { input_unit: machine.drives[0].amplifier.mode.unit(), ..field.clone() };
     let table = field.table()?;
-    table.check_keys(&["name", "input", "log", "campaign"], &[])?;
+    let one_drive = machine.drives.len() == 1;
+    match one_drive {
+        true => table.check_keys(&["name", "input", "log", "campaign"], &[])?,
+        false => table.check_keys(&["name", "input"], &["log"])?,
+    }
     let name = named(&table)?;
-    let initial = match table.optional("initial") {
-        Some(field) => initial(&field.table()?, machine)?,
-        None => Initial::default(),
-    };
-    let input = table.optional("input");
-    let Some(log) = table.optional("log") else {
+    let Some(log) = table.optional("log").filter(|_| one_drive) else {
         let (until, every) = times(&table, None)?;
-        let unit = field.input_unit;
-        let such_as = format!("for example input = {{ pulse = \"5 {unit}\", for = \"0.25 s\" }}");
-        let input =
-            input::signal(&input.ok_or_else(|| table.missing("input", &such_as))?, &input::Context { folder, until })?;
-        return Ok(vec![Experiment { name, input, until, every, initial, log: None }]);
+        let context = input::Context { folder, until };
+        let inputs = match one_drive {
+            false => gantry::inputs(&table, machine, &context)?,
+            true => {
+                let unit = field.input_unit;
+                let such_as = format!("for example input = {{ pulse = \"5 {unit}\", for = \"0.25 s\" }}");
+                vec![input::signal(&table.required("input", &such_as)?, &context)?]
+            }
+        };
+        return Ok(vec![Experiment { name, inputs, until, every, initial: initial(&table, machine)?, log: None }]);
     };
+    let (initial, input) = (initial(&table, machine)?, table.optional("input"));
     let runs = log::logs(&log, machine, folder, input.is_some())?;
     let of_run = |(run, mut log): (Option<String>, Log)| {
         let (until, every) = times(&table, Some(&log))?;
@@ -364,7 +388,7 @@ fn experiment(field: &Field, machine: &Machine, folder: &Folder) -> Result<Vec<E
             None => log.signal(),
         };
         log.name = run.map_or(name.clone(), |run| format!("{name}/{run}"));
-        Ok(Experiment { name: log.name.clone(), input, until, every, initial, log: Some(Arc::new(log)) })
+        Ok(Experiment { name: log.name.clone(), inputs: vec![input], until, every, initial, log: Some(Arc::new(log)) })
     };
     runs.into_iter().map(of_run).collect()
 }
@@ -411,7 +435,13 @@ fn check_name(field: &Field) -> Result<()> {
     }
 }
 
-fn initial(table: &Table, machine: &Machine) -> Result<Initial> {
+/// The state at the start of an experiment, at rest at the origin where its table does not say.
+fn initial(experiment: &Table, machine: &Machine) -> Result<State> {
+    let Some(field) = experiment.optional("initial") else { return Ok(State::default()) };
+    if machine.kind != Kind::Axis {
+        return gantry::initial(&field.named("gantry.initial").table()?, machine);
+    }
+    let table = field.table()?;
     table.check_keys(&[], &[])?;
     if let Some(current) = table.optional("motor_current")
         && !machine.mechanism().drives.iter().any(|drive| drive.has_current_state())
@@ -420,13 +450,12 @@ fn initial(table: &Table, machine: &Machine) -> Result<Initial> {
             "it needs motor.inductance above zero in voltage mode, or amplifier.bandwidth in current mode; or leave it out",
         ));
     }
-    Ok(Initial {
-        drive_angle: table.number("drive_angle")?,
-        drive_speed: table.number("drive_speed")?,
-        cart_position: table.number("cart_position")?,
-        cart_speed: table.number("cart_speed")?,
-        idler_angle: table.number("idler_angle")?,
-        idler_speed: table.number("idler_speed")?,
-        motor_current: table.number("motor_current")?,
-    })
+    let mut state = State::default();
+    for (body, label) in LABELS.into_iter().enumerate() {
+        let way = if body == CART { "position" } else { "angle" };
+        state.position[body] = table.number(&format!("{}_{way}", label.key))?;
+        state.speed[body] = table.number(&format!("{}_speed", label.key))?;
+    }
+    state.current[0] = table.number("motor_current")?;
+    Ok(state)
 }

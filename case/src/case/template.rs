@@ -20,10 +20,10 @@ impl Template {
     /// The commented case file, which runs as it stands.
     ///
     /// ```
-    /// use taut::case::{Opened, Template};
+    /// use taut::case::{Case, Template};
     /// use taut::overview::Overview;
     /// for template in [Template::Stage, Template::Printer, Template::Gantry] {
-    ///     let case = Opened::from_text_with("machine.toml", template.text(), &[])?;
+    ///     let case = Case::from_text("machine.toml", template.text())?;
     ///     assert!(Overview::of(&case)?.value("largest_force").unwrap() > 10.0);
     /// }
     /// # Ok::<(), taut::Error>(())
@@ -40,11 +40,11 @@ impl Template {
 /// A commented case file of a gantry that runs as it stands.
 ///
 /// ```
-/// use taut::case::{GantryCase, gantry_template};
+/// use taut::case::{Case, gantry_template};
 /// use taut::machine::Kind;
 /// for kind in [Kind::HFrame, Kind::CoreXy] {
-///     let case = GantryCase::from_text_with("gantry.toml", &gantry_template(kind), &[])?;
-///     assert_eq!(case.gantry.kind, kind);
+///     let case = Case::from_text("gantry.toml", &gantry_template(kind))?;
+///     assert_eq!(case.machine.kind, kind);
 /// }
 /// # Ok::<(), taut::Error>(())
 /// ```

@@ -4,7 +4,7 @@ use crate::args::Export as Args;
 use std::borrow::Cow;
 use std::path::PathBuf;
 use taut::Result;
-use taut::case::Opened;
+use taut::case::Case;
 use taut::export::fmu::{Carried, Version, object_in, pack};
 use taut::export::{Exported, Part};
 use taut_report::{gantry_drawing, png, stage_drawing};
@@ -18,7 +18,7 @@ mod carried {
 const ICON: f32 = 1.0;
 
 /// The files of a functional mock-up unit; `name` is that of the model.
-pub fn make(args: &Args, part: Option<Part>, case: &Opened, name: &str) -> Result<Exported> {
+pub fn make(args: &Args, part: Option<Part>, case: &Case, name: &str) -> Result<Exported> {
     let version = if args.fmi == Some(2) { Version::Two } else { Version::Three };
     let object = object()?;
     let icon = png(&drawing(case), ICON)?;
@@ -37,9 +37,9 @@ fn object() -> Result<Cow<'static, [u8]>> {
     object_in(beside.as_slice()).map(Cow::Owned)
 }
 
-fn drawing(case: &Opened) -> String {
+fn drawing(case: &Case) -> String {
     match case {
-        Opened::Axis(case) => stage_drawing(&case.machine),
-        Opened::Gantry(case) => gantry_drawing(&case.gantry),
+        case if case.is_axis() => stage_drawing(&case.machine),
+        case => gantry_drawing(&case.machine),
     }
 }

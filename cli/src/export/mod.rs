@@ -9,7 +9,7 @@ use crate::folder::{self, Folder};
 use crate::terminal;
 use clap::ValueEnum;
 use std::fmt::Write;
-use taut::case::{Files, Opened};
+use taut::case::{Case, Files};
 use taut::export::{self, Exported, Options, Part, Place, Real, Target};
 use taut::files::{Claim, Inputs, write_atomically};
 use taut::json;
@@ -51,10 +51,10 @@ pub fn run(args: &Args) -> Outcome {
     };
     let place = common.out.as_deref().map(|out| Place::of(out, target.ending(), &own));
     let stem = place.as_ref().map_or(&own, |place| &place.stem);
-    let inputs = folder::inputs(path, case.files());
+    let inputs = folder::inputs(path, &case.files);
     let target_at = place.as_ref().map(|place| claimed(place, target, &inputs)).transpose()?;
     let exported = make(args, target, &case, stem).map_err(|error| error.in_file(path))?;
-    let mut finished = finished(case.title(), target, &exported);
+    let mut finished = finished(case.title.as_str(), target, &exported);
     match (&place, target_at) {
         (Some(place), Some(At::File(mut claim))) => {
             let names = exported.files.iter().map(|(name, _)| place.folder.join(name));
@@ -121,7 +121,7 @@ fn check(args: &Args, target: TargetName) -> Result<()> {
 }
 
 /// The files of a target, called `stem`.
-fn make(args: &Args, target: TargetName, case: &Opened, stem: &str) -> Result<Exported> {
+fn make(args: &Args, target: TargetName, case: &Case, stem: &str) -> Result<Exported> {
     let part = args.part.map(|part| match part {
         PartName::Plant => Part::Plant,
         PartName::Controller => Part::Controller,

@@ -9,7 +9,7 @@ use crate::failure::Outcome;
 use crate::folder::{self, Folder};
 use std::f64::consts::PI;
 use std::fmt::Write;
-use taut::case::{Case, Files, Opened};
+use taut::case::{Case, Files};
 use taut::json;
 use taut::linear::{Analysis, Hold, Question};
 use taut_report::modes::{figures, page};
@@ -17,8 +17,8 @@ use taut_report::modes::{figures, page};
 /// Reads the case, linearises, writes, tells.
 pub fn run(args: &Args) -> Outcome {
     match args.common.open_for(&args.case, Files::Nothing)? {
-        Opened::Axis(case) => axis(args, &case),
-        Opened::Gantry(case) => gantry::run(args, &case),
+        case if case.is_axis() => axis(args, &case),
+        case => gantry::run(args, &case),
     }
 }
 

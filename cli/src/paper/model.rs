@@ -1,9 +1,10 @@
 //! The paper's parameter sets, its pulses, and what it plots of a run: position and speed of the motor in metres.
 
-use taut::case::{Case, Experiment, Initial};
+use taut::case::{Case, Experiment};
 use taut::error::Result;
 use taut::friction::{Friction, Motion, Side};
 use taut::machine::Machine;
+use taut::mechanism::State;
 use taut::signal::Signal;
 use taut::solve::{Event, Solver, simulate};
 
@@ -136,10 +137,10 @@ fn distance(a: &[f64], b: &[f64]) -> f64 {
 pub fn pulse(volts: f64, every: f64) -> Experiment {
     Experiment {
         name: format!("{volts} V pulse"),
-        input: Signal::Pulse { value: volts, duration: PULSE, at: 0.0 },
+        inputs: vec![Signal::Pulse { value: volts, duration: PULSE, at: 0.0 }],
         until: UNTIL,
         every,
-        initial: Initial::default(),
+        initial: State::default(),
         log: None,
     }
 }

@@ -312,7 +312,7 @@ impl Identifiability {
 /// How far r φ₁ gets in 1 s under a constant voltage, m.
 fn respond_to_step(machine: &Machine, volts: f64) -> Result<f64> {
     let mut experiment = pulse(volts, EVERY);
-    experiment.input = taut::signal::Signal::Step { value: volts, at: 0.0 };
+    experiment.inputs[0] = taut::signal::Signal::Step { value: volts, at: 0.0 };
     let response = run(machine, &experiment, Solver::Exact)?;
     Ok(response.position.iter().map(|x| x.abs()).fold(0.0, f64::max))
 }

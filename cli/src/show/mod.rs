@@ -16,7 +16,7 @@ pub fn run(args: &Args) -> Outcome {
     let common = &args.common;
     let case = common.open_for(&args.case, Files::All)?;
     let overview = Overview::of(&case)?;
-    let folder = Folder::wanted(common, || folder::inputs(&args.case, case.files()), ["show.json", "report.html"])?;
+    let folder = Folder::wanted(common, || folder::inputs(&args.case, &case.files), ["show.json", "report.html"])?;
     let advice = "add --out DIR for the same as data and a report";
     let json = ("show.json", json::text(&json::show(&overview)));
     let mut finished = Finished::new("show", json, table::text(&overview), advice);

@@ -15,7 +15,7 @@ use crate::terminal;
 use run::Setting;
 use std::ffi::OsString;
 use std::path::Path;
-use taut::case::{Case, Files, Opened};
+use taut::case::{Case, Files};
 use taut::files::Claim;
 use taut::json::{self, Simulation};
 use taut::machine::Machine;
@@ -35,8 +35,8 @@ pub fn run(args: &Simulate) -> Outcome {
 fn one(args: &Simulate, path: &Path) -> Outcome {
     let files = if args.experiments.is_empty() { Files::All } else { Files::Of(&args.experiments) };
     match args.common.open_for(path, files)? {
-        Opened::Axis(case) => axis(args, path, &case),
-        Opened::Gantry(case) => gantry::run(args, path, &case),
+        case if case.is_axis() => axis(args, path, &case),
+        case => gantry::run(args, path, &case),
     }
 }
 

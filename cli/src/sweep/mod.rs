@@ -19,7 +19,7 @@ use rayon::prelude::*;
 use std::time::{Duration, Instant};
 use store::Store;
 use summary::summary;
-use taut::case::Opened;
+use taut::case::Case;
 use taut::json;
 use taut::sweep::Sweep;
 use taut::{Error, Result};
@@ -31,7 +31,7 @@ const MOST_KEPT: u64 = 100_000;
 /// A sweep that is asked for.
 pub struct Work<'a> {
     pub args: &'a Args,
-    pub case: &'a Opened,
+    pub case: &'a Case,
     pub sweep: &'a Sweep,
     pub interrupt: &'a Interrupt,
 }
@@ -40,7 +40,7 @@ pub struct Work<'a> {
 pub fn run(args: &Args) -> Outcome {
     let common = options::with_changes(args)?;
     let case = common.open(&args.case)?;
-    let sweep = Sweep::of(&case).map_err(|error| error.in_file(&args.case))?;
+    let sweep = Sweep::new(&case).map_err(|error| error.in_file(&args.case))?;
     let target = options::target(args, &case)?;
     if args.trajectories {
         trajectories::check(&sweep)?;
@@ -79,10 +79,10 @@ pub fn run(args: &Args) -> Outcome {
     let folder = match target {
         Target::Nowhere | Target::File(..) => None,
         Target::Folder(folder) => {
-            let text = folder.bring(case.text(), case.files()).map_err(Failure::work)?;
+            let text = folder.bring(case.text.as_str(), &case.files).map_err(Failure::work)?;
             if common.draws() {
                 let figures = figures(&sweep, &summary);
-                let page = page(case.title(), &sweep, &summary, &text, &figures);
+                let page = page(case.title.as_str(), &sweep, &summary, &text, &figures);
                 let pictures = figures.into_iter().map(|(name, figure)| (name, figure.into())).collect();
                 finished.report = Some(Report { page, pictures });
             }

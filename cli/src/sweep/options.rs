@@ -5,7 +5,7 @@ use crate::command::Common;
 use crate::failure::Failure;
 use crate::folder::{self, Folder, Target};
 use std::path::{Path, PathBuf};
-use taut::case::Opened;
+use taut::case::Case;
 use taut::files::Inputs;
 use taut::{Error, Result};
 
@@ -48,8 +48,8 @@ const ROWS: &str = if cfg!(feature = "parquet") { "runs.parquet" } else { "runs.
 pub const PARTS: &str = ".parts";
 
 /// Where `--out` says that the results go; the folder for them is made.
-pub fn target(args: &Args, case: &Opened) -> std::result::Result<Target, Failure> {
-    let inputs = folder::inputs(&args.case, case.files());
+pub fn target(args: &Args, case: &Case) -> std::result::Result<Target, Failure> {
+    let inputs = folder::inputs(&args.case, &case.files);
     let target = named(args, case, &inputs)?;
     if let Some(rows) = rows(&target) {
         inputs.check(&rows)?;
@@ -59,7 +59,7 @@ pub fn target(args: &Args, case: &Opened) -> std::result::Result<Target, Failure
     Ok(target)
 }
 
-fn named(args: &Args, case: &Opened, inputs: &Inputs) -> std::result::Result<Target, Failure> {
+fn named(args: &Args, case: &Case, inputs: &Inputs) -> std::result::Result<Target, Failure> {
     let Some(out) = &args.common.out else { return Ok(Target::Nowhere) };
     let ending = out.extension().map(|ending| ending.to_string_lossy().to_lowercase());
     let parent = out.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
@@ -92,7 +92,7 @@ fn named(args: &Args, case: &Opened, inputs: &Inputs) -> std::result::Result<Tar
             let report = (!args.common.no_report).then(|| "report.html".to_string());
             let names = [ROWS, "sweep.json", "case.toml"].map(str::to_string).into_iter().chain(report);
             let trajectories = args.trajectories.then(|| trajectories(Path::new(ROWS)).display().to_string());
-            let names = names.chain(folder::brought(case.files()).into_values()).chain(trajectories);
+            let names = names.chain(folder::brought(&case.files).into_values()).chain(trajectories);
             Folder::create(out, inputs.clone(), names).map(Target::Folder)
         }
     }

@@ -10,7 +10,7 @@ use taut_report::sweep::{endings, influence, influence_heading, number, plan};
 
 /// Text on the terminal.
 pub fn text(work: &Work, summary: &Summary, took: Duration, run: u64) -> String {
-    let mut text = format!("{}\n{}\n", bold(work.case.title()), plan(work.sweep));
+    let mut text = format!("{}\n{}\n", bold(work.case.title.as_str()), plan(work.sweep));
     for group in &summary.groups {
         let _ = writeln!(text, "\n{}", bold(&group.name));
         if let Some(endings) = endings(group) {

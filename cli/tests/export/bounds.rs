@@ -4,7 +4,7 @@ use super::c::{MACHINES, exported};
 use super::machines::commands;
 use super::tools::{are_there, file, run, write_doubles};
 use std::fs;
-use taut::case::Opened;
+use taut::case::Case;
 
 /// A step once computed 25,499 products where the header said 11,536: halvings, turns of root-finding and changes of
 /// mode were left out.
@@ -14,7 +14,7 @@ fn no_step_computes_more_than_its_header_states() {
         return;
     }
     for (k, (case, changes, size)) in MACHINES.into_iter().enumerate() {
-        let opened = Opened::read_with(file(case), changes).unwrap();
+        let opened = Case::read_with(file(case), changes).unwrap();
         let drives = taut::export::mechanism(&opened).drives.len();
         // Calm commands, wild ones, and steps of another length.
         for (real, step, wild) in [("double", "1 ms", 1.0), ("float", "1 ms", 10.0), ("double", "10 ms", 3.0)] {

@@ -4,7 +4,7 @@ use super::machines::{Commands, commands, noisy, observed, pulse, ways};
 use super::tools::{are_there, doubles, file, run, taut, write_doubles};
 use std::fs;
 use std::path::Path;
-use taut::case::{Case, Opened};
+use taut::case::Case;
 use tempfile::TempDir;
 
 /// Warnings that every compiler is asked for.
@@ -93,8 +93,8 @@ fn flat(commands: &Commands) -> impl Iterator<Item = f64> + '_ {
     commands.iter().flatten().copied()
 }
 
-fn opened(case: &str, changes: &[&str]) -> Opened {
-    Opened::read_with(file(case), changes).unwrap()
+fn opened(case: &str, changes: &[&str]) -> Case {
+    Case::read_with(file(case), changes).unwrap()
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Trajectories and commands that exported machines and controllers are compared with.
 
-use taut::case::{Case, Opened};
+use taut::case::Case;
 use taut::control::{Controller, Loop, Observation, Standard, close};
 use taut::export::mechanism;
 use taut::mechanism::State;
@@ -48,7 +48,7 @@ pub fn pulse(value: f64, steps: usize) -> Commands {
 }
 
 /// The ways of the bodies by taut's own solver.
-pub fn ways(case: &Opened, commands: &Commands) -> Ways {
+pub fn ways(case: &Case, commands: &Commands) -> Ways {
     let mechanism = mechanism(case);
     let mut machine = Simulator::of_mechanism(&mechanism, &State::default(), Solver::Exact, STEP).unwrap();
     let levers: Vec<f64> = mechanism.bodies.iter().map(|body| body.kind.lever()).collect();

@@ -5,7 +5,7 @@ use super::tools::{are_there, doubles, file, python, run, taut, write_doubles};
 use std::fmt::Write;
 use std::fs;
 use std::path::Path;
-use taut::case::{Case, Opened};
+use taut::case::Case;
 
 const TABLE4: &str = "stages/sollmann-jouaneh/table4.toml";
 const PID: &str = "stages/sollmann-jouaneh/controllers/pid.toml";
@@ -19,7 +19,7 @@ const RUNS: [fn(&Ways) -> Vec<Row>; 5] = [in_c, in_structured_text, in_octave, i
 /// Runs them and compares with the table in docs/export.md; `UPDATE_EXPECT=1` writes it there.
 #[test]
 fn every_export_runs_in_its_own_tool() {
-    let case = Opened::read_with(file(TABLE4), &[]).unwrap();
+    let case = Case::read_with(file(TABLE4), &[]).unwrap();
     let own = ways(&case, &pulse(5.0, 250));
     let (mut table, mut whole) = (String::new(), true);
     let _ = writeln!(table, "| target | run in | compared | largest difference | allowed |\n|---|---|---|---|---|");
@@ -182,7 +182,7 @@ fn as_json(own: &Ways) -> Vec<Row> {
     exported(folder.path(), "json", TABLE4, &["--out", "axis.json"]);
     let text = fs::read_to_string(folder.path().join("axis.json")).unwrap();
     let data: serde_json::Value = serde_json::from_str(&text).unwrap();
-    let again = Opened::from_text_with("axis.toml", data["case"].as_str().unwrap(), &[]).unwrap();
+    let again = Case::from_text_with("axis.toml", data["case"].as_str().unwrap(), &[]).unwrap();
     let again = ways(&again, &pulse(5.0, 250));
     let flat: Vec<f64> =
         again.ways.iter().flat_map(|row| row.iter().zip(&again.levers).map(|(way, lever)| way / lever)).collect();

@@ -4,7 +4,7 @@ use super::rest::Swing;
 use super::sampled::{Added, Controller, Loop, Sample};
 use super::sampling::Sampled;
 use super::standard::Standard;
-use crate::case::{Experiment, Initial};
+use crate::case::Experiment;
 use crate::design::Design;
 use crate::error::{Error, Result};
 use crate::machine::Machine;
@@ -141,13 +141,12 @@ pub(super) fn unrecorded(
 /// A run from rest at the start of a profile, without an input of its own.
 pub(super) fn at_rest(machine: &Machine, profile: &Profile, until: f64, every: f64) -> Experiment {
     let start = profile.start();
-    let angle = start / machine.pulley_radius;
     Experiment {
         name: String::new(),
-        input: Signal::Step { value: 0.0, at: 0.0 },
+        inputs: vec![Signal::Step { value: 0.0, at: 0.0 }],
         until,
         every,
-        initial: Initial { drive_angle: angle, cart_position: start, idler_angle: angle, ..Initial::default() },
+        initial: machine.at_rest(start),
         log: None,
     }
 }

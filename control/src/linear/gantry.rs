@@ -1,7 +1,7 @@
 //! All that is told of how a gantry swings: its modes, and a map of its resonances over the working area.
 
 use super::Natural;
-use crate::case::GantryCase;
+use crate::case::Case;
 use crate::error::Result;
 use crate::friction::Law;
 use crate::machine::gantry::{BRIDGE, CART};
@@ -15,7 +15,7 @@ const PLACES: usize = 33;
 #[derive(Debug, Clone)]
 pub struct GantryAnalysis<'a> {
     /// The case whose machine it is.
-    pub case: &'a GantryCase,
+    pub case: &'a Case,
     /// With bridge and cart at zero.
     pub modes: Natural,
     /// Over the working area, where the place makes a difference.
@@ -39,9 +39,9 @@ impl<'a> GantryAnalysis<'a> {
     /// The modes of the machine of `case`, everything sliding.
     ///
     /// ```
-    /// use taut::case::GantryCase;
+    /// use taut::case::Case;
     /// use taut::linear::GantryAnalysis;
-    /// let case = GantryCase::read_with("../stages/h-frame/h-frame.toml", &[])?;
+    /// let case = Case::read_with("../stages/h-frame/h-frame.toml", &[])?;
     /// let analysis = GantryAnalysis::of(&case)?;
     /// assert_eq!((analysis.modes.rigid.len(), analysis.modes.elastic.len()), (2, 2));
     /// assert!((analysis.modes.elastic[0].hertz() - 196.643946994).abs() < 1e-9);
@@ -49,10 +49,10 @@ impl<'a> GantryAnalysis<'a> {
     /// assert!(analysis.map.is_none());
     /// # Ok::<(), taut::Error>(())
     /// ```
-    pub fn of(case: &'a GantryCase) -> Result<Self> {
-        let mechanism = case.gantry.mechanism();
+    pub fn of(case: &'a Case) -> Result<Self> {
+        let mechanism = case.machine.mechanism();
         let modes = Natural::of(&mechanism, &[0.0; BODIES])?;
-        let map = match (case.gantry.belt.following(), case.gantry.first_slide().travel, case.gantry.cart.travel) {
+        let map = match (case.machine.belt.following(), case.machine.first_slide().travel, case.machine.cart.travel) {
             (Some(_), Some(bridge), Some(cart)) => Some(ResonanceMap::of(&mechanism, bridge, cart)?),
             _ => None,
         };
@@ -100,8 +100,8 @@ impl ResonanceMap {
 }
 
 /// The assumptions.
-fn words(case: &GantryCase, mechanism: &Mechanism) -> Vec<String> {
-    let gantry = &case.gantry;
+fn words(case: &Case, mechanism: &Mechanism) -> Vec<String> {
+    let gantry = &case.machine;
     let mut words = vec!["everything slides: dry friction that does not change with speed drops out".to_string()];
     let bodies = || mechanism.bodies.iter().filter(|body| !body.is_rotor);
     if bodies().any(|body| body.friction.law != Law::Coulomb) {

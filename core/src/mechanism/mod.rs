@@ -350,6 +350,18 @@ impl Mechanism {
         Self { bodies, springs, drives, columns, readings, roles, origin: [0.0; BODIES], friction }
     }
 
+    /// The state in which a run begins that is given this one: rotors in the middle of their play, and no current where
+    /// that is no state of its own.
+    pub fn begun(&self, given: &State) -> State {
+        let mut state = *given;
+        for (drive, current) in self.drives.iter().zip(&mut state.current) {
+            state.position[drive.shaft] = given.position[drive.pulley];
+            state.speed[drive.shaft] = given.speed[drive.pulley];
+            *current = if drive.has_current_state() { *current } else { 0.0 };
+        }
+        state
+    }
+
     /// The body that this one moves with: itself, unless something makes several bodies one.
     pub fn leader(&self, body: usize) -> usize {
         self.bodies[body].leader.0

@@ -50,7 +50,7 @@ pub struct GantryMetrics {
 /// Gathers [`GantryMetrics`] from a run that it observes: peaks between rows, too, and not of rows.
 ///
 /// ```
-/// use taut::case::GantryCase;
+/// use taut::case::Case;
 /// use taut::metrics::GantryMeter;
 /// use taut::solve::{Course, Detail, Flow, Solver, stream_mechanism};
 /// # let text = r#"

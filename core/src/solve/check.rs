@@ -6,7 +6,7 @@ use super::Course;
 use crate::error::{Error, Result};
 use crate::friction::Law;
 use crate::machine::axis::CART;
-use crate::machine::{BeltModel, Machine};
+use crate::machine::{BeltModel, Kind, Machine};
 use crate::mechanism::{AmplifierMode, Mechanism, SpringLaw, State};
 use crate::parameter;
 use crate::plan::Experiment;
@@ -25,6 +25,10 @@ const MOST_ROWS: f64 = 1e12;
 
 /// Refuses what is no machine.
 pub fn machine(machine: &Machine) -> Result<()> {
+    if machine.kind != Kind::Axis {
+        parameter::check(machine)?;
+        return machine.check_gantry();
+    }
     let motor = &machine.drives[0].motor;
     let r = machine.pulley_radius;
     let bodies = [machine.drive_pulley.inertia, machine.cart.mass, machine.idler_pulley.inertia];
@@ -229,22 +233,11 @@ fn times(until: f64, every: f64) -> Result<()> {
 
 /// Refuses a run that has no rows, or no state to begin with.
 pub(super) fn experiment(mechanism: &Mechanism, experiment: &Experiment) -> Result<()> {
-    let &Experiment { until, every, ref initial, .. } = experiment;
-    times(until, every)?;
-    let state = [
-        initial.drive_angle,
-        initial.drive_speed,
-        initial.cart_position,
-        initial.cart_speed,
-        initial.idler_angle,
-        initial.idler_speed,
-        initial.motor_current,
-    ];
-    if let Some(value) = state.iter().find(|v| !v.is_finite()) {
-        return Err(Error::new(format!("the state at the start cannot be {value}")).allowed("any finite number"));
-    }
+    state(&experiment.initial)?;
+    let begun = Course::of(mechanism, experiment);
+    course(mechanism, &begun)?;
     // What moves as one begins as one.
-    let state = initial.state(mechanism);
+    let state = begun.start;
     for body in 0..mechanism.bodies.len() {
         let leader = mechanism.leader(body);
         for values in [&state.position, &state.speed] {

@@ -83,7 +83,7 @@ impl ErrorEstimate {
     /// For a run of this experiment on this stage.
     pub fn new(machine: &Machine, experiment: &Experiment) -> Self {
         let mechanism = machine.mechanism();
-        Self::of_mechanism(&mechanism, &course(&mechanism, experiment))
+        Self::of_mechanism(&mechanism, &Course::of(&mechanism, experiment))
     }
 
     /// For a run of a mechanism that is no stage of an axis: of every body but the rotors.
@@ -124,7 +124,7 @@ impl ErrorEstimate {
         flow: &mut dyn FnMut() -> Flow,
     ) -> Result<Option<PositionError>> {
         let mechanism = machine.mechanism();
-        let course = course(&mechanism, experiment);
+        let course = Course::of(&mechanism, experiment);
         self.finish_mechanism(&mechanism, &course, tolerance, outcome, flow)
     }
 
@@ -193,12 +193,6 @@ impl ErrorEstimate {
         }
         Ok((!interrupted).then_some(PositionError { value, way }))
     }
-}
-
-/// The course of a stage in an experiment.
-fn course(mechanism: &Mechanism, experiment: &Experiment) -> Course {
-    let &Experiment { ref input, until, every, ref initial, .. } = experiment;
-    Course { inputs: vec![input.clone()], start: initial.state(mechanism), until, every }
 }
 
 /// Whether two runs end in the same way; one that was asked to stop says nothing of another.

@@ -499,14 +499,14 @@ fn go(
     output: Output,
 ) -> Result<(Outcome, known::Known)> {
     // Smooth inputs carry their derivatives along.
-    let degree = experiment.input.degree();
+    let degree = experiment.inputs.iter().map(|input| input.degree()).max().unwrap_or(0);
     let start = experiment.start(mechanism);
     let run = Run::of(mechanism, &start, (solver, degree), known, output)?;
-    Ok(run.along(std::slice::from_ref(&experiment.input)))
+    Ok(run.along(&experiment.inputs))
 }
 
 impl Experiment {
     fn start(&self, mechanism: &Mechanism) -> running::Start {
-        running::Start { state: self.initial.state(mechanism), until: self.until, every: self.every, noise: 0.0 }
+        running::Start { state: mechanism.begun(&self.initial), until: self.until, every: self.every, noise: 0.0 }
     }
 }

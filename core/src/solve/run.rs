@@ -9,7 +9,7 @@ use super::{Detail, Flow, Outcome, Solver, check, general};
 use crate::error::{Error, Result};
 use crate::machine::Machine;
 use crate::mechanism::{Mechanism, State};
-use crate::plan::{Experiment, GantryExperiment};
+use crate::plan::Experiment;
 use crate::signal::Signal;
 use crate::trajectory::Trajectory;
 use std::sync::Arc;
@@ -28,10 +28,10 @@ pub struct Course {
 }
 
 impl Course {
-    /// The course of a gantry in this experiment.
-    pub fn of(experiment: &GantryExperiment) -> Self {
-        let &GantryExperiment { ref inputs, until, every, initial, .. } = experiment;
-        Self { inputs: inputs.to_vec(), start: initial, until, every }
+    /// The course of this mechanism in an experiment.
+    pub fn of(mechanism: &Mechanism, experiment: &Experiment) -> Self {
+        let &Experiment { ref inputs, until, every, ref initial, .. } = experiment;
+        Self { inputs: inputs.clone(), start: mechanism.begun(initial), until, every }
     }
 }
 

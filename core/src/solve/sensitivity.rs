@@ -32,7 +32,7 @@ impl Bench {
     ///     let mut stage = stage.clone();
     ///     mass.set(&mut stage, mass.start + by);
     ///     let mechanism = Arc::new(stage.mechanism());
-    ///     Begun { start: experiment.initial.state(&mechanism), mechanism }
+    ///     Begun { start: mechanism.begun(&experiment.initial), mechanism }
     /// };
     /// let mut bench = Bench::default();
     /// bench.mount(stage)?;
@@ -63,6 +63,6 @@ impl Bench {
 impl Task<'_> {
     /// Where what stands in the solver's vector of a mechanism.
     pub(super) fn space(&self, mechanism: &Mechanism) -> super::exact::Space {
-        super::exact::Space::new(mechanism, self.experiment.input.degree())
+        super::exact::Space::new(mechanism, self.experiment.inputs[0].degree())
     }
 }

@@ -40,7 +40,7 @@ pub(crate) fn run(
             .allowed("a step above zero, such as 1e-4 s")
             .next("choose a larger step"));
     }
-    let mut state = experiment.initial.state(mechanism);
+    let mut state = mechanism.begun(&experiment.initial);
     let layout = Layout::new(mechanism);
     let coordinates = Coordinates::new(&layout, &State::default()).0;
     let mut recorder =
@@ -55,7 +55,7 @@ pub(crate) fn run(
             ending = Ending::Diverged { time };
             break;
         }
-        let input = experiment.input.value(time);
+        let input = experiment.inputs[0].value(time);
         let motion = model.motion(&state, input);
         // A row shows the state itself: angles of its own, held as they are.
         recorder.segment(row, &coordinates.at(&state), &Mode::of(motion));
@@ -86,7 +86,7 @@ pub(crate) fn run(
         for k in 0..substeps as u64 {
             // A step sees the input as it is at its beginning: an edge at its end belongs to the next one.
             let t = time + k as f64 * h;
-            let step = Step { model: &model, input: experiment.input.piece(t), h };
+            let step = Step { model: &model, input: experiment.inputs[0].piece(t), h };
             state = match method {
                 Method::RungeKutta4 => step.runge_kutta_4(&state),
                 Method::DormandPrince5 => step.dormand_prince_5(&state),
@@ -103,7 +103,7 @@ pub(crate) fn run(
         _ => grid.end(),
     };
     if let Some(observer) = &mut recorder.observer {
-        observer.end(time, &state, &Mode::of(model.motion(&state, experiment.input.value(time))));
+        observer.end(time, &state, &Mode::of(model.motion(&state, experiment.inputs[0].value(time))));
     }
     recorder.finish();
     cost.samples = recorder.rows;

@@ -4,16 +4,16 @@ mod controller;
 mod plant;
 
 use super::{Exported, Options, Part, Real, STEP, Tables, identifier};
-use crate::case::Opened;
+use crate::case::Case;
 use crate::error::Result;
 
 /// The files `STEM.h` and `STEM.c`.
-pub(super) fn export(case: &Opened, part: Part, stem: &str, options: &Options) -> Result<Exported> {
+pub(super) fn export(case: &Case, part: Part, stem: &str, options: &Options) -> Result<Exported> {
     named(case, part, (stem, &identifier(stem)), options)
 }
 
 /// The same with names that begin so.
-pub(super) fn named(case: &Opened, part: Part, (stem, name): (&str, &str), options: &Options) -> Result<Exported> {
+pub(super) fn named(case: &Case, part: Part, (stem, name): (&str, &str), options: &Options) -> Result<Exported> {
     let writer = Writer { name: name.to_string(), real: options.real, local: "" };
     let (mut header, mut source) = (String::new(), String::new());
     let (mut facts, mut notes) = (Vec::new(), Vec::new());
@@ -23,7 +23,7 @@ pub(super) fn named(case: &Opened, part: Part, (stem, name): (&str, &str), optio
             Err(_) => error,
         })?;
         let plant = plant::Plant::new(&tables, options.step.unwrap_or(STEP), options.real)?;
-        header += &plant.header(&writer, case.title());
+        header += &plant.header(&writer, case.title.as_str());
         source += &plant.source(&writer);
         facts.extend(plant.facts());
     }
@@ -35,7 +35,7 @@ pub(super) fn named(case: &Opened, part: Part, (stem, name): (&str, &str), optio
         facts.extend(controller.facts());
         notes.extend(super::shaper_note(design));
     }
-    let (header, source) = (writer.header(case.title(), &header), writer.source(stem, &source));
+    let (header, source) = (writer.header(case.title.as_str(), &header), writer.source(stem, &source));
     let files = vec![(format!("{stem}.c"), source.into_bytes()), (format!("{stem}.h"), header.into_bytes())];
     Ok(Exported { files, facts, notes })
 }

@@ -2,12 +2,12 @@
 
 use super::variable::{Kind, Role, Variable, named, plain, rate_unit, typed, typical, words};
 use super::{REFERENCES, resource};
-use crate::case::Opened;
+use crate::case::Case;
 use crate::chance::hash;
 use crate::control::Loop;
 use crate::design::{Design, FeedForwardModel};
 use crate::error::{Error, Result};
-use crate::machine::{Machine, axis};
+use crate::machine::Machine;
 use crate::mechanism::{Amplifier, AmplifierMode, DRIVES, Drive, Heading, Label, Mechanism, Motor, Shown, State};
 use crate::parameter::{self, Free, Parameter, unit_for};
 use crate::quantity::shortest;
@@ -21,13 +21,6 @@ const OUTPUTS: u32 = 2000;
 const STATES: u32 = 3000;
 const RATES: u32 = 4000;
 const CONDITIONS: u32 = 5000;
-
-/// The machine itself.
-#[derive(Debug, Clone)]
-enum Owned {
-    Axis(Box<Machine>),
-    Gantry(Box<Machine>),
-}
 
 /// A machine with its variables.
 #[derive(Debug, Clone)]
@@ -52,7 +45,7 @@ pub struct Model {
     pub conditions: usize,
     /// The bodies on which a force can be put.
     pub loads: Vec<usize>,
-    machine: Owned,
+    machine: Machine,
     start: State,
     parameters: Vec<(Free, &'static Parameter)>,
 }
@@ -60,26 +53,23 @@ pub struct Model {
 impl Model {
     /// The machine of a case, with the controller inside if it is asked for. Errors: a controller that the case has
     /// not.
-    pub fn new(case: &Opened, with_controller: bool) -> Result<Self> {
+    pub fn new(case: &Case, with_controller: bool) -> Result<Self> {
         let resource = resource::resource(case)?;
         Self::of_resource(&resource, with_controller)
     }
 
     /// The same of what [`super::resource`] gave.
     pub fn of_resource(text: &str, with_controller: bool) -> Result<Self> {
-        let case = Opened::from_text_with("machine.toml", text, &[])?;
+        let case = Case::from_text_with("machine.toml", text, &[])?;
         let [until, every] = resource::times(&case);
-        let (machine, design) = match &case {
-            Opened::Axis(case) => (Owned::Axis(Box::new(case.machine.clone())), case.controller.clone()),
-            Opened::Gantry(case) => (Owned::Gantry(Box::new(case.gantry.clone())), None),
-        };
+        let (machine, design) = (case.machine.clone(), case.controller.clone());
         if with_controller && design.is_none() {
             let missing = controller(&case).map(|_| ());
             missing.map_err(|error| without_controller(&case, error, "leave --part out for the machine alone"))?;
         }
         let design = design.filter(|_| with_controller);
         let mut model = Self {
-            title: case.title().to_string(),
+            title: case.title.as_str().to_string(),
             resource: text.to_string(),
             token: String::new(),
             variables: Vec::new(),
@@ -89,18 +79,13 @@ impl Model {
             quantities: Vec::new(),
             conditions: 0,
             loads: Vec::new(),
-            parameters: parameters(machine.numbers())?,
+            parameters: parameters(&machine)?,
             machine,
             start: State::default(),
         };
         let mechanism = model.mechanism(&model.defaults())?;
-        model.start = match &case {
-            Opened::Axis(case) => {
-                case.first(|one| one.initial, |left| Some(left.initial)).map(|own| own.state(&mechanism))
-            }
-            Opened::Gantry(case) => case.first(|one| one.initial, |left| Some(left.initial)),
-        }
-        .unwrap_or_default();
+        let initial = case.first(|one| one.initial, |left| Some(left.initial));
+        model.start = mechanism.begun(&initial.unwrap_or_default());
         let dynamics = Dynamics::new(&mechanism, &model.start)?;
         let mut values = vec![0.0; dynamics.quantities().len()];
         dynamics.values(&mut values);
@@ -119,10 +104,8 @@ impl Model {
 
     /// The axis with these parameters, where it is one.
     pub fn stage(&self, parameters: &[f64]) -> Option<Machine> {
-        match self.set(parameters) {
-            Owned::Axis(stage) => Some(*stage),
-            Owned::Gantry(_) => None,
-        }
+        let machine = self.set(parameters);
+        (machine.drives.len() == 1).then_some(machine)
     }
 
     /// The mechanism with these parameters, and with room for a force on the cart where a drive leaves some. Errors: a
@@ -134,18 +117,12 @@ impl Model {
                     .allowed(row.range.describe(unit_for(row.unit, self.input_unit()))));
             }
         }
-        let mechanism = match self.set(parameters) {
-            Owned::Axis(stage) => {
-                check_stage(&stage)?;
-                let mut mechanism = stage.mechanism();
-                mechanism.drives.push(push(axis::CART));
-                mechanism
-            }
-            Owned::Gantry(gantry) => {
-                gantry.check_gantry()?;
-                gantry.mechanism()
-            }
-        };
+        let machine = self.set(parameters);
+        check_stage(&machine)?;
+        let mut mechanism = machine.mechanism();
+        if machine.drives.len() < DRIVES {
+            mechanism.drives.push(push(machine.geometry().cart()));
+        }
         let has = |drive: usize| self.quantities.iter().any(|(quantity, _)| *quantity == Quantity::Current(drive));
         let own = mechanism.drives.iter().enumerate();
         let changed = own.filter(|(drive, own)| own.has_current_state() != has(*drive)).map(|(_, own)| own).next();
@@ -167,18 +144,12 @@ impl Model {
     /// Whether a force is an input of the mechanism beside those of the drives, and its place there; else it is a
     /// number of a body.
     pub fn force_input(&self, load: usize) -> Option<usize> {
-        match self.machine {
-            Owned::Axis(_) => Some(1 + load),
-            Owned::Gantry(_) => None,
-        }
+        (self.drives() < DRIVES).then_some(self.drives() + load)
     }
 
     /// The drives of the machine itself.
     pub fn drives(&self) -> usize {
-        match self.machine {
-            Owned::Axis(_) => 1,
-            Owned::Gantry(_) => DRIVES,
-        }
+        self.machine.drives.len()
     }
 
     /// The state in which the machine begins, with these values of the integrated quantities.
@@ -226,22 +197,19 @@ impl Model {
         self.quantities.iter().map(|(quantity, _)| of(quantity)).collect()
     }
 
-    fn set(&self, parameters: &[f64]) -> Owned {
+    fn set(&self, parameters: &[f64]) -> Machine {
         let mut machine = self.machine.clone();
         let changed = self.parameters.iter().zip(parameters).filter(|((free, _), value)| free.start != **value);
         let changed: Vec<(&Free, f64)> = changed.map(|((free, _), value)| (free, *value)).collect();
         if !changed.is_empty() {
-            parameter::set(machine.numbers_mut(), changed);
+            parameter::set(&mut machine, changed);
         }
         machine
     }
 
     /// The unit of what the amplifiers take.
     fn input_unit(&self) -> &'static str {
-        match &self.machine {
-            Owned::Axis(stage) => stage.drives[0].amplifier.mode.unit(),
-            Owned::Gantry(gantry) => gantry.drives[0].amplifier.mode.unit(),
-        }
+        self.machine.drives[0].amplifier.mode.unit()
     }
 
     fn list(&self, mechanism: &Mechanism) -> Vec<Variable> {
@@ -386,22 +354,6 @@ impl Model {
 }
 
 const SIDES: [&str; DRIVES] = ["left", "right"];
-
-impl Owned {
-    fn numbers(&self) -> &Machine {
-        match self {
-            Owned::Axis(stage) => stage,
-            Owned::Gantry(gantry) => gantry,
-        }
-    }
-
-    fn numbers_mut(&mut self) -> &mut Machine {
-        match self {
-            Owned::Axis(stage) => stage,
-            Owned::Gantry(gantry) => gantry,
-        }
-    }
-}
 
 /// The numbers of a machine that can be set, each by itself.
 fn parameters(machine: &Machine) -> Result<Vec<(Free, &'static Parameter)>> {

@@ -2,7 +2,7 @@
 
 use super::{Archive, BINARY, Causality, Kind, MACHINE, Model, Variability, Version};
 use super::{description, platform, sources};
-use crate::case::Opened;
+use crate::case::Case;
 use crate::error::{Error, Result};
 use crate::{Exported, Part, controller, shaper_note};
 use std::fmt::Write;
@@ -38,7 +38,7 @@ pub fn object_in(folders: &[PathBuf]) -> Result<Vec<u8>> {
 
 /// The functional mock-up unit `STEM.fmu` of a case, the controller inside if it is asked for. Errors: what none can be
 /// made of, or a platform that the standard has no name for.
-pub fn pack(case: &Opened, part: Option<Part>, version: Version, stem: &str, carried: &Carried) -> Result<Exported> {
+pub fn pack(case: &Case, part: Option<Part>, version: Version, stem: &str, carried: &Carried) -> Result<Exported> {
     let with_controller = match part {
         None | Some(Part::Plant) => false,
         Some(Part::Both) => true,
@@ -61,7 +61,7 @@ pub fn pack(case: &Opened, part: Option<Part>, version: Version, stem: &str, car
     archive.add("modelDescription.xml", description(&model, version, sources.is_ok())?.as_bytes())?;
     archive.add(&format!("binaries/{folder}/{BINARY}.{ending}"), carried.object)?;
     archive.add(MACHINE, model.resource.as_bytes())?;
-    archive.add("resources/case.toml", case.text().as_bytes())?;
+    archive.add("resources/case.toml", case.text.as_str().as_bytes())?;
     if let Some(icon) = carried.icon {
         archive.add(if version == Version::Two { "model.png" } else { "terminalsAndIcons/icon.png" }, icon)?;
     }

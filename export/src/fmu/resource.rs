@@ -1,6 +1,6 @@
 //! The machine of a case alone, as a case file: what the shared object reads.
 
-use crate::case::{Opened, Unread};
+use crate::case::{Case, Unread};
 use crate::error::{Error, Result};
 use toml_edit::{ArrayOfTables, DocumentMut, Item, Table, value};
 
@@ -9,8 +9,8 @@ const OTHERS: [&str; 8] = ["experiment", "move", "fit", "tune", "uncertainty", "
 
 /// The text of a case without its experiments, logs, fits and sweeps: one experiment is left, which says where the
 /// machine starts from and how long it runs, its inputs zero. It names no other file.
-pub fn resource(case: &Opened) -> Result<String> {
-    let text = case.text();
+pub fn resource(case: &Case) -> Result<String> {
+    let text = case.text.as_str();
     let mut document: DocumentMut =
         text.parse().map_err(|_| Error::new("the text of this case cannot be taken apart"))?;
     let first = first_experiment(&document);
@@ -30,22 +30,18 @@ pub fn resource(case: &Opened) -> Result<String> {
     list.push(experiment);
     document.insert("experiment", Item::ArrayOfTables(list));
     if document.get("title").is_none() {
-        document.insert("title", value(case.title()));
+        document.insert("title", value(case.title.as_str()));
         document.key_mut("title").iter_mut().for_each(|key| key.leaf_decor_mut().clear());
     }
     let text = document.to_string();
     // The shared object must be able to read it.
-    Opened::from_text_with("machine.toml", &text, &[])?;
+    Case::from_text_with("machine.toml", &text, &[])?;
     Ok(text)
 }
 
 /// End and interval of the first experiment, or of a second in milliseconds.
-pub(super) fn times(case: &Opened) -> [f64; 2] {
-    let first = match case {
-        Opened::Axis(case) => case.first(|one| [one.until, one.every], Unread::span),
-        Opened::Gantry(case) => case.first(|one| [one.until, one.every], Unread::span),
-    };
-    first.unwrap_or([1.0, 1e-3])
+pub(super) fn times(case: &Case) -> [f64; 2] {
+    case.first(|one| [one.until, one.every], Unread::span).unwrap_or([1.0, 1e-3])
 }
 
 fn first_experiment(document: &DocumentMut) -> Option<Table> {
@@ -56,20 +52,18 @@ fn first_experiment(document: &DocumentMut) -> Option<Table> {
 }
 
 /// No input.
-fn at_rest(case: &Opened) -> Item {
+fn at_rest(case: &Case) -> Item {
     let step = |unit: &str| {
         let mut table = toml_edit::InlineTable::new();
         table.insert("step", format!("0 {unit}").into());
         table
     };
-    match case {
-        Opened::Axis(case) => value(step(case.machine.drives[0].amplifier.mode.unit())),
-        Opened::Gantry(case) => {
-            let mut table = toml_edit::InlineTable::new();
-            for (side, unit) in ["left", "right"].into_iter().zip(&case.gantry.drives) {
-                table.insert(side, step(unit.amplifier.mode.unit()).into());
-            }
-            value(table)
-        }
+    if case.is_axis() {
+        return value(step(case.machine.drives[0].amplifier.mode.unit()));
     }
+    let mut table = toml_edit::InlineTable::new();
+    for (side, unit) in ["left", "right"].into_iter().zip(&case.machine.drives) {
+        table.insert(side, step(unit.amplifier.mode.unit()).into());
+    }
+    value(table)
 }

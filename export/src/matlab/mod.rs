@@ -5,7 +5,7 @@ mod mat;
 
 use super::packed::{LEAVE, Packed};
 use super::{Exported, Options, Part, Real, STEP, Tables, c, identifier, mechanism};
-use crate::case::Opened;
+use crate::case::Case;
 use crate::error::Result;
 use crate::linear::{Operation, StateSpace};
 use mat::Variable;
@@ -14,11 +14,11 @@ const FUNCTION: &str = include_str!("model.m");
 const MEX: &str = include_str!("mex.c");
 
 /// The files `NAME.m`, `NAME_data.mat`, `NAME_mex.c`, and the C that belongs to it.
-pub(super) fn export(case: &Opened, stem: &str, options: &Options) -> Result<Exported> {
+pub(super) fn export(case: &Case, stem: &str, options: &Options) -> Result<Exported> {
     let name = identifier(stem);
     let tables = Tables::new(&mechanism(case))?;
     let step = options.step.unwrap_or(STEP);
-    let plain: String = case.title().chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
+    let plain: String = case.title.as_str().chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
     let fill = |text: &str| {
         text.replace("@title@", &c::plain(&plain))
             .replace("@version@", env!("CARGO_PKG_VERSION"))
@@ -48,7 +48,7 @@ pub(super) fn export(case: &Opened, stem: &str, options: &Options) -> Result<Exp
 }
 
 /// The content of the MAT-file.
-fn variables(case: &Opened, tables: &Tables, step: f64) -> Result<Vec<(&'static str, Variable)>> {
+fn variables(case: &Case, tables: &Tables, step: f64) -> Result<Vec<(&'static str, Variable)>> {
     let packed = Packed::new(tables);
     let mechanism = &tables.mechanism;
     let whole = |list: &[i64]| Variable::Numbers(list.iter().map(|v| vec![*v as f64]).collect());
@@ -82,7 +82,7 @@ fn variables(case: &Opened, tables: &Tables, step: f64) -> Result<Vec<(&'static 
         ("lengths", Variable::Numbers(packed.lengths.iter().map(|row| row.to_vec()).collect())),
         ("outputs_first", whole(&packed.outputs)),
     ];
-    if let Opened::Axis(case) = case {
+    if case.is_axis() {
         let system = StateSpace::of(&case.machine, Operation::default())?;
         let matrix = |m: &nalgebra::DMatrix<f64>| {
             Variable::Numbers(m.row_iter().map(|row| row.iter().copied().collect()).collect())

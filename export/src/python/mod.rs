@@ -2,7 +2,7 @@
 
 use super::packed::{LEAVE, Packed};
 use super::{Exported, Options, STEP, Tables, mechanism};
-use crate::case::Opened;
+use crate::case::Case;
 use crate::error::Result;
 use crate::linear::{Operation, StateSpace};
 use crate::machine::Machine;
@@ -11,16 +11,16 @@ use std::fmt::{Debug, Write};
 const SCRIPT: &str = include_str!("model.py");
 
 /// The file `STEM.py`.
-pub(super) fn export(case: &Opened, stem: &str, options: &Options) -> Result<Exported> {
+pub(super) fn export(case: &Case, stem: &str, options: &Options) -> Result<Exported> {
     let tables = Tables::new(&mechanism(case))?;
     let packed = Packed::new(&tables);
-    let linear = match case {
-        Opened::Axis(case) => linear(&case.machine)?,
-        Opened::Gantry(_) => "None".into(),
+    let linear = match case.is_axis() {
+        true => linear(&case.machine)?,
+        false => "None".into(),
     };
     let mut text = SCRIPT.replace("@tables@", lists(&tables, &packed).trim_end()).replace("@linear@", &linear);
     for (place, part) in [
-        ("@title@", plain(case.title())),
+        ("@title@", plain(case.title.as_str())),
         ("@version@", env!("CARGO_PKG_VERSION").into()),
         ("@step@", format!("{:?}", options.step.unwrap_or(STEP))),
         ("@stem@", plain(stem)),

@@ -3,14 +3,14 @@
 use super::controller::program;
 use super::program::{Expr, Node, Statement, Test};
 use super::{Exported, Part, controller, identifier, shaper_note, shaper_remark, without_controller};
-use crate::case::Opened;
+use crate::case::Case;
 use crate::error::{Error, Result};
 use std::fmt::Write;
 
 const BLOCK: &str = include_str!("block.st");
 
 /// The file `STEM.st`.
-pub(super) fn export(case: &Opened, part: Option<Part>, stem: &str) -> Result<Exported> {
+pub(super) fn export(case: &Case, part: Option<Part>, stem: &str) -> Result<Exported> {
     let (case, design) =
         controller(case).map_err(|error| without_controller(case, error, "take the machine with `taut export fmu`"))?;
     if part.is_some_and(Part::has_plant) {

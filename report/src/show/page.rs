@@ -4,7 +4,7 @@ use super::rows::{rows, value};
 use crate::modes::printed;
 use crate::simulate::Named;
 use crate::{Axis, Callout, Cell, Colour, Figure, Page, Panel, Series, Table, gantry_drawing, stage_drawing};
-use taut::case::Opened;
+use taut::case::Case;
 use taut::overview::Overview;
 
 /// Frequencies and stretch along the travel of an axis whose spans follow the cart.
@@ -32,16 +32,16 @@ pub fn figures(overview: &Overview) -> Vec<Named> {
 }
 
 /// The page.
-pub fn page(case: &Opened, overview: &Overview, figures: &[Named]) -> Page {
+pub fn page(case: &Case, overview: &Overview, figures: &[Named]) -> Page {
     let mut page = Page::new(overview.title.clone()).subtitle("What follows from its numbers");
     page.section("The machine");
     match case {
-        Opened::Axis(case) => {
+        case if case.is_axis() => {
             page.drawing(&stage_drawing(&case.machine), "Symbols, values and positive directions.");
         }
-        Opened::Gantry(case) => {
+        case => {
             page.drawing(
-                &gantry_drawing(&case.gantry),
+                &gantry_drawing(&case.machine),
                 "In plan view with positive directions; lengths are not to scale.",
             );
         }
@@ -66,6 +66,6 @@ pub fn page(case: &Opened, overview: &Overview, figures: &[Named]) -> Page {
         page.table(&places);
         figures.iter().for_each(|(_, figure)| page.figure(figure));
     }
-    page.case("", "case.toml", case.text());
+    page.case("", "case.toml", case.text.as_str());
     page
 }

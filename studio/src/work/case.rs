@@ -4,24 +4,24 @@ use super::Context;
 use super::curves::spans;
 use crate::message::Request;
 use serde_json::{Value, json};
-use taut::case::{Number, Opened};
+use taut::case::{Case, Number};
 use taut::error::{Error, Result};
 use taut::machine::Machine;
 use taut::parameter::{Fallback, Free};
 
 /// The case: `text`, changed by `set`, a list of keys and values, and by `changes`, a list of `KEY=VALUE`.
-pub fn opened(request: &Request, context: &Context) -> Result<Opened> {
+pub fn opened(request: &Request, context: &Context) -> Result<Case> {
     let (name, text) = (context.state.name(), request.text("text")?);
     let mut changes: Vec<String> =
         request.list("changes").iter().filter_map(Value::as_str).map(str::to_string).collect();
     if !request.list("set").is_empty() {
-        let numbers = Opened::from_text_with(name, text, &[])?.numbers()?;
+        let numbers = Case::from_text_with(name, text, &[])?.numbers()?;
         for pair in request.list("set") {
             changes.push(change(&numbers, pair)?);
         }
     }
     let changes: Vec<&str> = changes.iter().map(String::as_str).collect();
-    Opened::from_text_with(name, text, &changes)
+    Case::from_text_with(name, text, &changes)
 }
 
 /// The change that `[key, value]` means: the value is a number in SI, or a text with a unit.
@@ -42,16 +42,16 @@ fn change(numbers: &[Number], pair: &Value) -> Result<String> {
 }
 
 /// The span that an element of a list of the belt belongs to.
-fn span(case: &Opened, key: &str) -> Option<&'static str> {
+fn span(case: &Case, key: &str) -> Option<&'static str> {
     let (_, place) = key.strip_prefix("belt.")?.split_once('.')?;
     spans(case).get(place.parse::<usize>().ok()?).copied()
 }
 
 /// The numbers of a case with what the table of parameters says of them.
-pub fn parameters(case: &Opened, numbers: &[Number]) -> Value {
+pub fn parameters(case: &Case, numbers: &[Number]) -> Value {
     let machine: &Machine = match case {
-        Opened::Axis(case) => &case.machine,
-        Opened::Gantry(case) => &case.gantry,
+        case if case.is_axis() => &case.machine,
+        case => &case.machine,
     };
     let one = |number: &Number| {
         let Number { key, row, unit, value, written } = number;

@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use std::cell::Cell;
 use std::f64::consts::PI;
 use std::time::{Duration, Instant};
-use taut::case::{Case, Given, Move, Opened, Tuning};
+use taut::case::{Case, Given, Move, Tuning};
 use taut::control::feasible::shortfalls;
 use taut::control::feedback::Feedback;
 use taut::control::{Loop, Rows, Standard, stream};
@@ -71,8 +71,8 @@ fn written(given: &Given) -> String {
 /// The case of a request, which has to be an axis, with `changes`; and its text with them.
 fn axis(request: &Request, context: &Context) -> Result<Case> {
     match opened(request, context)? {
-        Opened::Axis(case) => Ok(*case),
-        Opened::Gantry(_) => {
+        case if case.is_axis() => Ok(case),
+        _ => {
             let error = Error::new("a controller moves an axis, and this case is a gantry");
             Err(error.next("open the case of an axis"))
         }
@@ -93,7 +93,7 @@ pub fn closed(request: &Request, context: &Context) -> Result<Reply> {
     let lines = taut_report::motion::lines(&tried, done);
     let told =
         taut::json::moves(&case.title, design.structure.name(), &Loop::of(design), &case.machine, &[done.told()]);
-    let opened = Opened::Axis(Box::new(case.clone()));
+    let opened = case.clone();
     let mut reply = Reply::of(json!({
         "title": case.title,
         "text": case.text,

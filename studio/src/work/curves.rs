@@ -1,7 +1,7 @@
 //! Which curves are shown of a machine, in which panels: sums of the columns of a run.
 
 use serde_json::{Value, json};
-use taut::case::Opened;
+use taut::case::Case;
 use taut::machine::{BeltModel, Machine, axis};
 use taut::mechanism::Heading;
 use taut::trajectory::Trajectory;
@@ -60,10 +60,10 @@ impl Panel {
 }
 
 /// The panels of a machine with these columns.
-pub fn panels(case: &Opened, columns: &[Heading]) -> Vec<Panel> {
+pub fn panels(case: &Case, columns: &[Heading]) -> Vec<Panel> {
     let mut panels = match case {
-        Opened::Axis(case) => of_axis(&case.machine),
-        Opened::Gantry(case) => of_gantry(&case.gantry),
+        case if case.is_axis() => of_axis(&case.machine),
+        case => of_gantry(&case.machine),
     };
     for panel in &mut panels {
         let there = |name: &str| columns.iter().any(|heading| heading.name == name);
@@ -228,17 +228,17 @@ impl Kept {
 }
 
 /// The names of the spans of a machine, in the order of its case.
-pub fn spans(case: &Opened) -> Vec<&'static str> {
+pub fn spans(case: &Case) -> Vec<&'static str> {
     match case {
-        Opened::Axis(_) => AXIS_SPANS.to_vec(),
-        Opened::Gantry(case) => case.gantry.kind.geometry().span_labels().map(|label| label.name).collect(),
+        case if case.is_axis() => AXIS_SPANS.to_vec(),
+        case => case.machine.kind.geometry().span_labels().map(|label| label.name).collect(),
     }
 }
 
 /// The names of the bodies of a machine.
-pub fn bodies(case: &Opened) -> Vec<&'static str> {
+pub fn bodies(case: &Case) -> Vec<&'static str> {
     match case {
-        Opened::Axis(_) => axis::LABELS.iter().map(|label| label.key).collect(),
-        Opened::Gantry(case) => case.gantry.geometry().bodies.iter().map(|body| body.label.key).collect(),
+        case if case.is_axis() => axis::LABELS.iter().map(|label| label.key).collect(),
+        case => case.machine.geometry().bodies.iter().map(|body| body.label.key).collect(),
     }
 }

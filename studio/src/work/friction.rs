@@ -1,6 +1,6 @@
 //! Friction over speed: a figure for each body.
 
-use taut::case::Opened;
+use taut::case::Case;
 use taut::friction::Friction;
 use taut_report::{Axis, Colour, Figure, Page, Panel, Series, Style};
 
@@ -8,11 +8,11 @@ use taut_report::{Axis, Colour, Figure, Page, Panel, Series, Style};
 const POINTS: usize = 400;
 
 /// A section with the curve of each body, up to `speed`, m/s, of what slides.
-pub fn page(case: &Opened, speed: f64) -> Page {
+pub fn page(case: &Case, speed: f64) -> Page {
     let rotary = (Axis::new("Speed", "rad/s"), Axis::new("Friction torque", "N m").shown_as("mN m", 1e3));
     let linear = (Axis::new("Speed", "m/s").shown_as("mm/s", 1e3), Axis::new("Friction force", "N"));
     let (radius, bodies) = match case {
-        Opened::Axis(case) => {
+        case if case.is_axis() => {
             let machine = &case.machine;
             let bodies = vec![
                 ("Drive pulley", &machine.drive_pulley.friction, true),
@@ -21,8 +21,8 @@ pub fn page(case: &Opened, speed: f64) -> Page {
             ];
             (machine.pulley_radius, bodies)
         }
-        Opened::Gantry(case) => {
-            let gantry = &case.gantry;
+        case => {
+            let gantry = &case.machine;
             let bodies = vec![
                 ("Drive pulleys", &gantry.drive_pulley.friction, true),
                 ("Bridge", &gantry.first_slide().friction, false),

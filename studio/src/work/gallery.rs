@@ -4,7 +4,7 @@ use super::Context;
 use super::scene::scene;
 use crate::message::{Reply, Request};
 use serde_json::{Value, json};
-use taut::case::Opened;
+use taut::case::Case;
 use taut::error::Result;
 
 macro_rules! stages {
@@ -30,8 +30,8 @@ const STAGES: &[(&str, &str)] = stages![
 /// All of them: path, title, text, and what their pictures need.
 pub fn gallery(_: &Request, _: &Context) -> Result<Reply> {
     let one = |(path, text): &(&str, &str)| {
-        let case = Opened::from_text_with(path, text, &[])?;
-        Ok(json!({ "path": path, "title": case.title(), "text": text, "scene": scene(&case) }))
+        let case = Case::from_text_with(path, text, &[])?;
+        Ok(json!({ "path": path, "title": case.title.as_str(), "text": text, "scene": scene(&case) }))
     };
     let stages = STAGES.iter().map(one).collect::<Result<Vec<Value>>>()?;
     Ok(Reply::of(json!({ "stages": stages })))

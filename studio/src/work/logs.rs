@@ -8,7 +8,7 @@ use serde_json::{Map, Value, json};
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
-use taut::case::{Case, Opened, Plan};
+use taut::case::{Case, Plan};
 use taut::error::{Error, Result};
 use taut::fit::{Problem, Run, check_watched, fit_watched, profiles};
 use taut::log::{ColumnId, Looked, PRESETS, Quantity, look};
@@ -80,15 +80,12 @@ fn planned(request: &Request, context: &Context) -> Result<(Case, Plan)> {
     }
     request.body.insert("changes".into(), Value::Array(changes));
     let name = context.state.name();
-    match opened(&request, context)? {
-        Opened::Axis(case) => {
-            let plan = case.fit_plan(name)?;
-            Ok((*case, plan))
-        }
-        Opened::Gantry(_) => {
-            Err(Error::new("a fit takes an axis, and this case is a gantry").next("open the case of an axis"))
-        }
+    let case = opened(&request, context)?;
+    if !case.is_axis() {
+        return Err(Error::new("a fit takes an axis, and this case is a gantry").next("open the case of an axis"));
     }
+    let plan = case.fit_plan(name)?;
+    Ok((case, plan))
 }
 
 /// The survey of the logs, and what they determine: the page of `taut check`.
@@ -151,7 +148,10 @@ pub fn fit(request: &Request, context: &Context) -> Result<Reply> {
 
 /// The text of the page with the estimates in it: its own experiments, not the logs that were fitted.
 fn kept(request: &Request, context: &Context, found: &Found) -> Result<String> {
-    let Opened::Axis(own) = opened(request, context)? else { return Err(Error::new("this case is a gantry")) };
+    let own = opened(request, context)?;
+    if !own.is_axis() {
+        return Err(Error::new("this case is a gantry"));
+    }
     found.fit.case_text(&own, context.state.name())
 }
 

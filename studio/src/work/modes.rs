@@ -4,7 +4,6 @@ use super::case::opened;
 use super::{Context, friction};
 use crate::message::{Reply, Request};
 use serde_json::json;
-use taut::case::Opened;
 use taut::error::Result;
 use taut::linear::{Analysis, GantryAnalysis, Question};
 use taut_report::modes;
@@ -16,12 +15,12 @@ pub fn modes(request: &Request, context: &Context) -> Result<Reply> {
     let speed = request.number("speed").filter(|speed| *speed > 0.0).unwrap_or(1.0);
     let friction = friction::page(&case, speed);
     let (page, result) = match &case {
-        Opened::Axis(case) => {
+        case if case.is_axis() => {
             let analysis = Analysis::of(case, &Question::default())?;
             let figures = modes::figures(&analysis);
             (modes::page(&analysis, &figures), taut::json::modes(&analysis))
         }
-        Opened::Gantry(case) => {
+        case => {
             let analysis = GantryAnalysis::of(case)?;
             let figures = modes::gantry::planes(&analysis);
             (modes::gantry::page(&analysis, &figures), taut::json::gantry_modes(&analysis))

@@ -5,7 +5,6 @@ use super::case::opened;
 use super::run::{Keep, simulate_axis, simulate_gantry};
 use crate::message::{Reply, Request};
 use serde_json::json;
-use taut::case::Opened;
 use taut::error::Result;
 use taut::solve::Solver;
 use taut_report::simulate;
@@ -13,7 +12,7 @@ use taut_report::simulate;
 /// The page as text.
 pub fn report(request: &Request, context: &Context) -> Result<Reply> {
     let page = match &opened(request, context)? {
-        Opened::Axis(case) => {
+        case if case.is_axis() => {
             let solver = Solver::of(&case.machine);
             let experiments = case.experiments.iter();
             let runs = experiments.map(|one| simulate_axis(case, one, solver, context, &mut Keep::Curves));
@@ -21,8 +20,8 @@ pub fn report(request: &Request, context: &Context) -> Result<Reply> {
             let figures: Vec<_> = runs.iter().map(|run| simulate::figures(case, run)).collect();
             simulate::page(case, &case.text, solver, &runs, &figures)
         }
-        Opened::Gantry(case) => {
-            let solver = Solver::of_mechanism(&case.gantry.mechanism());
+        case => {
+            let solver = Solver::of_mechanism(&case.machine.mechanism());
             let experiments = case.experiments.iter();
             let runs =
                 experiments.map(|one| simulate_gantry(case, one, context, &mut Keep::Curves).map(|(run, _)| run));

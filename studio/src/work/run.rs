@@ -8,7 +8,7 @@ use super::scene::scene;
 use crate::message::{Reply, Request};
 use serde_json::{Value, json};
 use std::time::Instant;
-use taut::case::{Case, Experiment, GantryCase, GantryExperiment, Opened};
+use taut::case::{Case, Experiment};
 use taut::control::Loop;
 use taut::error::Result;
 use taut::json::{GantrySimulation, Simulation};
@@ -27,17 +27,17 @@ pub fn run(request: &Request, context: &Context) -> Result<Reply> {
     let case = opened(request, context)?;
     let begun = Instant::now();
     let (simulated, kept) = match &case {
-        Opened::Axis(case) if case.experiments.is_empty() && !case.moves.is_empty() => {
+        case if case.is_axis() && case.experiments.is_empty() && !case.moves.is_empty() => {
             axis(&case.moves, request, |place| move_run(case, place, context))?
         }
-        Opened::Axis(case) => axis(&case.experiments, request, |place| axis_run(case, place, context))?,
-        Opened::Gantry(case) => axis(&case.experiments, request, |place| gantry_run(case, place, context))?,
+        case if case.is_axis() => axis(&case.experiments, request, |place| axis_run(case, place, context))?,
+        case => axis(&case.experiments, request, |place| gantry_run(case, place, context))?,
     };
     let took = begun.elapsed();
     let numbers = case.numbers()?;
     let mut reply = Reply::of(json!({
-        "title": case.title(),
-        "text": case.text(),
+        "title": case.title.as_str(),
+        "text": case.text.as_str(),
         "experiments": names(&case),
         "experiment": simulated.place,
         "until": simulated.until,
@@ -83,7 +83,7 @@ fn axis<E>(
 
 fn axis_run(case: &Case, place: usize, context: &Context) -> Result<(Simulated, Kept)> {
     let (machine, experiment) = (&case.machine, &case.experiments[place]);
-    let opened = Opened::Axis(Box::new(case.clone()));
+    let opened = case.clone();
     let panels = panels(&opened, &machine.mechanism().columns);
     let shown = Experiment { every: interval(experiment.every, experiment.samples()), ..experiment.clone() };
     let solver = Solver::of(machine);
@@ -106,7 +106,7 @@ fn axis_run(case: &Case, place: usize, context: &Context) -> Result<(Simulated, 
 /// A move in closed loop, of a case that has no experiments.
 fn move_run(case: &Case, place: usize, context: &Context) -> Result<(Simulated, Kept)> {
     let (design, moves) = case.moves_named(context.state.name(), &[])?;
-    let opened = Opened::Axis(Box::new(case.clone()));
+    let opened = case.clone();
     let panels = panels(&opened, &case.machine.mechanism().columns);
     let mut kept = Kept::new(&panels);
     let done = super::closed::moved(case, design, moves[place], context, &mut |block| kept.take(block))?;
@@ -168,11 +168,11 @@ pub fn simulate_axis<'a>(
     })
 }
 
-fn gantry_run(case: &GantryCase, place: usize, context: &Context) -> Result<(Simulated, Kept)> {
+fn gantry_run(case: &Case, place: usize, context: &Context) -> Result<(Simulated, Kept)> {
     let experiment = &case.experiments[place];
-    let opened = Opened::Gantry(Box::new(case.clone()));
-    let panels = panels(&opened, &case.gantry.mechanism().columns);
-    let shown = GantryExperiment { every: interval(experiment.every, experiment.samples()), ..experiment.clone() };
+    let opened = case.clone();
+    let panels = panels(&opened, &case.machine.mechanism().columns);
+    let shown = Experiment { every: interval(experiment.every, experiment.samples()), ..experiment.clone() };
     let mut kept = Kept::new(&panels);
     let (run, solver) = simulate_gantry(case, &shown, context, &mut Keep::Columns(&mut kept))?;
     let json = GantrySimulation::new(case, solver, &[run.told()]);
@@ -180,9 +180,9 @@ fn gantry_run(case: &GantryCase, place: usize, context: &Context) -> Result<(Sim
         place,
         until: experiment.until,
         rows: lines_told(
-            simulate::gantry::lines(&run, &case.gantry, solver).into_iter().filter(|(name, _)| *name != "cost"),
+            simulate::gantry::lines(&run, &case.machine, solver).into_iter().filter(|(name, _)| *name != "cost"),
         ),
-        early: simulate::gantry::early_end(&run, &case.gantry),
+        early: simulate::gantry::early_end(&run, &case.machine),
         panels: told(&panels),
         json: serde_json::to_value(json).unwrap_or_default(),
         outcome: run.outcome,
@@ -192,18 +192,18 @@ fn gantry_run(case: &GantryCase, place: usize, context: &Context) -> Result<(Sim
 
 /// Runs an experiment of a gantry, stopped when nobody waits for it.
 pub fn simulate_gantry<'a>(
-    case: &GantryCase,
-    experiment: &'a GantryExperiment,
+    case: &Case,
+    experiment: &'a Experiment,
     context: &Context,
     keep: &mut Keep,
 ) -> Result<(simulate::gantry::Run<'a>, Solver)> {
     let begun = Instant::now();
-    let mechanism = case.gantry.mechanism();
+    let mechanism = case.machine.mechanism();
     let solver = Solver::of_mechanism(&mechanism);
-    let mut meter = GantryMeter::new(&case.gantry);
-    let mut curves = matches!(keep, Keep::Curves).then(|| simulate::gantry::curves(&case.gantry));
+    let mut meter = GantryMeter::new(&case.machine);
+    let mut curves = matches!(keep, Keep::Curves).then(|| simulate::gantry::curves(&case.machine));
     let shown = (Detail::Full, Some(&mut meter as &mut dyn solve::Observe));
-    let outcome = stream_mechanism(&mechanism, &Course::of(experiment), solver, shown, &mut |block| {
+    let outcome = stream_mechanism(&mechanism, &Course::of(&mechanism, experiment), solver, shown, &mut |block| {
         if let Keep::Columns(kept) = keep {
             kept.take(block);
         }
@@ -219,12 +219,14 @@ pub fn simulate_gantry<'a>(
 }
 
 /// Names and lengths of the experiments.
-fn names(case: &Opened) -> Value {
+fn names(case: &Case) -> Value {
     let one = |name: &str, until: f64| json!({ "name": name, "until": until });
     match case {
-        Opened::Axis(case) if case.experiments.is_empty() => case.moves.iter().map(|m| one(&m.name, m.until)).collect(),
-        Opened::Axis(case) => case.experiments.iter().map(|e| one(&e.name, e.until)).collect(),
-        Opened::Gantry(case) => case.experiments.iter().map(|e| one(&e.name, e.until)).collect(),
+        case if case.is_axis() && case.experiments.is_empty() => {
+            case.moves.iter().map(|m| one(&m.name, m.until)).collect()
+        }
+        case if case.is_axis() => case.experiments.iter().map(|e| one(&e.name, e.until)).collect(),
+        case => case.experiments.iter().map(|e| one(&e.name, e.until)).collect(),
     }
 }
 
@@ -243,7 +245,7 @@ fn event(event: &solve::Event) -> Value {
 }
 
 /// Consequences of the numbers at a glance: groups of names and values.
-fn overview(case: &Opened) -> Value {
+fn overview(case: &Case) -> Value {
     let Ok(overview) = Overview::of(case) else { return Value::Null };
     let row = |row: &taut::overview::Row| json!({ "key": row.key, "name": row.name, "value": taut_report::show::value(row), "how": row.how });
     let groups: Vec<Value> = overview

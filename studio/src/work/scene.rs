@@ -1,14 +1,14 @@
 //! The drawing of a machine beside its motion: lengths that do not change.
 
 use serde_json::{Value, json};
-use taut::case::Opened;
+use taut::case::Case;
 use taut::machine::Travel;
 
 /// Kind, radius and travels, m.
-pub fn scene(case: &Opened) -> Value {
+pub fn scene(case: &Case) -> Value {
     let travel = |travel: Option<Travel>| travel.map(|travel| [travel.min, travel.max]);
     match case {
-        Opened::Axis(case) => {
+        case if case.is_axis() => {
             let machine = &case.machine;
             json!({
                 "kind": "axis",
@@ -18,8 +18,8 @@ pub fn scene(case: &Opened) -> Value {
                 "pretension": machine.belt.pretension,
             })
         }
-        Opened::Gantry(case) => {
-            let gantry = &case.gantry;
+        case => {
+            let gantry = &case.machine;
             let spans: Vec<String> =
                 gantry.kind.geometry().span_labels().map(|label| format!("{}_force", label.key)).collect();
             json!({

@@ -5,7 +5,6 @@ use super::case::{chosen, opened};
 use super::curves::{Kept, panels};
 use crate::message::{Reply, Request};
 use serde_json::json;
-use taut::case::Opened;
 use taut::error::{Error, Result};
 use taut::mechanism::{Mechanism, State};
 use taut::signal::Signal;
@@ -24,16 +23,16 @@ pub fn section(request: &Request, context: &Context) -> Result<Reply> {
     let (from, to) = (number("from")?.max(0.0), number("to")?);
     let points = request.number("points").unwrap_or(1001.0).clamp(2.0, POINTS) as usize;
     let (mechanism, inputs, start, (until, every)) = match &case {
-        Opened::Axis(case) => {
+        case if case.is_axis() => {
             let experiment = &case.experiments[chosen(request, case.experiments.len())?];
             let mechanism = case.machine.mechanism();
-            let start = experiment.initial.state(&mechanism);
-            (mechanism, vec![experiment.input.clone()], start, (experiment.until, experiment.every))
+            let start = mechanism.begun(&experiment.initial);
+            (mechanism, vec![experiment.inputs[0].clone()], start, (experiment.until, experiment.every))
         }
-        Opened::Gantry(case) => {
+        case => {
             let experiment = &case.experiments[chosen(request, case.experiments.len())?];
             (
-                case.gantry.mechanism(),
+                case.machine.mechanism(),
                 experiment.inputs.to_vec(),
                 experiment.initial,
                 (experiment.until, experiment.every),

@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::channel;
 use std::time::{Duration, Instant};
-use taut::case::Opened;
+use taut::case::Case;
 use taut::error::{Error, Result};
 use taut::solve::Flow;
 use taut::sweep::{Status, Sweep};
@@ -29,14 +29,14 @@ const ROWS: usize = 400;
 const STEPS: Duration = Duration::from_millis(100);
 
 /// The case of a request with its sweep: `plan`, the table `[sweep]`, the text's own where it is left out.
-fn planned(request: &Request, context: &Context) -> Result<(Opened, Sweep)> {
+fn planned(request: &Request, context: &Context) -> Result<(Case, Sweep)> {
     let mut request = request.clone();
     if let Some(plan) = request.body.get("plan").filter(|plan| plan.is_object()) {
         let changes = json!([format!("sweep={}", toml(plan))]);
         request.body.insert("changes".into(), changes);
     }
     let case = opened(&request, context)?;
-    let sweep = Sweep::of(&case)?;
+    let sweep = Sweep::new(&case)?;
     if sweep.runs() > RUNS {
         let error = Error::new(format!("{} runs are too many for a page", sweep.runs()));
         return Err(error.allowed(format!("up to {RUNS}")).next("use `taut sweep` for more"));
@@ -51,7 +51,7 @@ pub fn sweep(request: &Request, context: &Context) -> Result<Reply> {
     (context.progress)(json!({ "runs": sweep.runs(), "headings": headings(&sweep), "rows": [] }));
     let table = rows(&sweep, context);
     let mut reply = Reply::of(json!({
-        "title": case.title(),
+        "title": case.title.as_str(),
         "runs": sweep.runs(),
         "done": table.len(),
         "stopped": (table.len() as u64) < sweep.runs(),
@@ -141,13 +141,7 @@ pub fn traces(request: &Request, context: &Context) -> Result<Reply> {
         if context.flow() == Flow::Stop {
             break;
         }
-        let machine = sweep.machine(run);
-        let mechanism = match (machine.axis(), machine.gantry()) {
-            (Some(stage), _) => stage.mechanism(),
-            (None, Some(gantry)) => gantry.mechanism(),
-            (None, None) => continue,
-        };
-        let mut panels = panels(&case, &mechanism.columns);
+        let mut panels = panels(&case, &sweep.machine(run).mechanism().columns);
         panels.retain(|panel| panel.is_plotted());
         let mut kept = Kept::new(&panels);
         let outcome = sweep.stream(run, experiment, &mut |block| {

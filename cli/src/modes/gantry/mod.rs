@@ -7,14 +7,14 @@ use crate::command::{Finished, Report};
 use crate::failure::Outcome;
 use crate::folder::{self, Folder};
 use std::fmt::Write;
-use taut::case::GantryCase;
+use taut::case::Case;
 use taut::json;
 use taut::linear::{GantryAnalysis, ResonanceMap};
 use taut::{Error, Result};
 use taut_report::modes::gantry::{page, planes};
 
 /// Finds the modes, writes, tells.
-pub fn run(args: &Args, case: &GantryCase) -> Outcome {
+pub fn run(args: &Args, case: &Case) -> Outcome {
     refuse(args)?;
     let common = &args.common;
     let analysis = GantryAnalysis::of(case)?;

@@ -13,7 +13,7 @@ const PLACES: usize = 5;
 
 /// The text on the terminal.
 pub fn text(analysis: &GantryAnalysis) -> String {
-    let gantry = &analysis.case.gantry;
+    let gantry = &analysis.case.machine;
     let mechanism = gantry.mechanism();
     let mut text = format!("{}\n{}\n", bold(&analysis.case.title), machine(gantry));
     for note in &analysis.words {

@@ -11,7 +11,7 @@ use crate::folder::{self, Folder};
 use crate::interrupt::Interrupt;
 use run::Setting;
 use std::path::Path;
-use taut::case::GantryCase;
+use taut::case::Case;
 use taut::json::{self, GantrySimulation};
 use taut::{Error, Result};
 use taut_report::simulate::gantry::{Run, early_end, figures, page, way};
@@ -19,12 +19,12 @@ use taut_report::simulate::named;
 use taut_report::{Picture, gantry_drawing};
 
 /// Simulates, measures, reports.
-pub fn run(args: &Simulate, path: &Path, case: &GantryCase) -> Outcome {
+pub fn run(args: &Simulate, path: &Path, case: &Case) -> Outcome {
     refuse(args)?;
     let common = &args.common;
-    let mechanism = case.gantry.mechanism();
+    let mechanism = case.machine.mechanism();
     let solver = args.choice().solver_of(&mechanism)?;
-    let experiments = case.experiments_named(&args.experiments)?;
+    let experiments = case.experiments_named(path, &args.experiments)?;
     let brought = folder::brought(&case.files).into_values();
     let files = names(args, brought, experiments.iter().map(|one| one.file_name()));
     let folder = Folder::wanted(common, || folder::inputs(path, &case.files), files)?;
@@ -50,7 +50,7 @@ pub fn run(args: &Simulate, path: &Path, case: &GantryCase) -> Outcome {
     }
     let ended: Vec<Ended> = runs
         .iter()
-        .map(|run| Ended { name: &run.experiment.name, outcome: &run.outcome, early: early_end(run, &case.gantry) })
+        .map(|run| Ended { name: &run.experiment.name, outcome: &run.outcome, early: early_end(run, &case.machine) })
         .collect();
     (finished.status, finished.remarks) = status(&ended, solver, &interrupt);
     finished.finish(common, folder)
@@ -63,7 +63,7 @@ fn report(setting: &Setting, text: &str, runs: &[Run]) -> Report {
     let ways: Vec<_> = runs.iter().map(|run| way(case, run)).collect();
     let page = page(case, text, setting.solver, runs, &figures, &ways);
     let names = || runs.iter().map(|run| run.experiment.file_name());
-    let mut pictures = vec![("machine".to_string(), Picture::Drawing(gantry_drawing(&case.gantry)))];
+    let mut pictures = vec![("machine".to_string(), Picture::Drawing(gantry_drawing(&case.machine)))];
     let ways = names().zip(ways).filter_map(|(name, way)| Some((format!("{name}-path"), way?.into())));
     pictures.extend(ways);
     pictures.extend(named(names(), figures));

@@ -8,7 +8,7 @@ use crate::interrupt::Interrupt;
 use crate::progress::Progress;
 use std::time::Instant;
 use taut::Error;
-use taut::case::{GantryCase, GantryExperiment};
+use taut::case::{Case, Experiment};
 use taut::mechanism::Mechanism;
 use taut::metrics::GantryMeter;
 use taut::solve::{self, Course, Detail, ErrorEstimate, Flow, Solver, stream_mechanism};
@@ -18,7 +18,7 @@ use taut_report::simulate::gantry::{Run, curves};
 /// Settings that all runs of a command share.
 pub struct Setting<'a> {
     pub args: &'a Simulate,
-    pub case: &'a GantryCase,
+    pub case: &'a Case,
     pub mechanism: &'a Mechanism,
     pub solver: Solver,
     pub folder: Option<&'a Folder>,
@@ -27,14 +27,14 @@ pub struct Setting<'a> {
 
 impl<'a> Setting<'a> {
     /// Runs `experiment`.
-    pub fn run(&self, experiment: &'a GantryExperiment) -> Result<Run<'a>, Failure> {
+    pub fn run(&self, experiment: &'a Experiment) -> Result<Run<'a>, Failure> {
         let begin = Instant::now();
-        let course = Course::of(experiment);
+        let course = Course::of(&self.mechanism, experiment);
         let name = experiment.file_name();
         let mut writers = writers(self.folder, &name, &self.args.format).map_err(Failure::work)?;
-        let mut meter = GantryMeter::new(&self.case.gantry);
+        let mut meter = GantryMeter::new(&self.case.machine);
         let plotted = self.folder.is_some() && !self.args.common.no_report;
-        let mut curves = plotted.then(|| curves(&self.case.gantry));
+        let mut curves = plotted.then(|| curves(&self.case.machine));
         let progress = Progress::new(&experiment.name, Some(experiment.samples()), self.args.common.quiet);
         let mut trouble: Option<Error> = None;
         let mut estimate = match self.solver {

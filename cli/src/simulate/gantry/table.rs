@@ -3,14 +3,14 @@
 use crate::simulate::table::took;
 use crate::terminal::bold;
 use std::fmt::Write;
-use taut::case::GantryCase;
+use taut::case::Case;
 use taut::solve::Solver;
 use taut_report::simulate::gantry::{Run, early_end, lines, machine};
 use taut_report::simulate::solver_words;
 
 /// The text on the terminal.
-pub fn text(case: &GantryCase, solver: Solver, runs: &[Run]) -> String {
-    let gantry = &case.gantry;
+pub fn text(case: &Case, solver: Solver, runs: &[Run]) -> String {
+    let gantry = &case.machine;
     let how = solver_words(solver, runs.iter().map(|run| &run.outcome));
     let mut text = format!("{}\n{}\n{how}\n", bold(&case.title), machine(gantry));
     for run in runs {

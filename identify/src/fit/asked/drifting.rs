@@ -2,14 +2,16 @@
 //! ended.
 
 use super::run::Run;
-use crate::case::{Experiment, Initial};
+use crate::case::Experiment;
 use crate::log::Quantity;
 use crate::machine::Machine;
+use crate::machine::axis::{CART, DRIVE, IDLER};
+use crate::mechanism::State;
 use crate::signal::{Hold, Signal};
 use crate::solve::{Bench, Detail, Ending, Flow};
 use crate::trajectory::Trajectory;
 
-/// Columns of the state, in the order of [`Initial`].
+/// Columns of the state, way and speed of each body.
 const STATE: [&str; 6] = ["drive_angle", "drive_speed", "cart_position", "cart_speed", "idler_angle", "idler_speed"];
 
 /// Weighted residuals, model minus log, of machines that follow each other in equal parts of the log; false where the
@@ -32,10 +34,10 @@ pub(crate) fn residuals(run: &Run, stages: &[Machine], extras: &[f64], out: &mut
         let mut machine = machine.clone();
         let whole = run.experiment(&mut machine, extras);
         machine.encoder = None;
-        let Some(input) = later(&whole.input, run.time[begin]) else { return false };
+        let Some(input) = later(&whole.inputs[0], run.time[begin]) else { return false };
         let initial_here = initial.unwrap_or(whole.initial);
         let until = whole.every * (end - begin) as f64;
-        let experiment = Experiment { input, initial: initial_here, until, ..whole };
+        let experiment = Experiment { inputs: vec![input], initial: initial_here, until, ..whole };
         let Some((rows, last)) = rows(&machine, &experiment, &quantities) else { return false };
         if rows[0].len() != end - begin + 1 {
             return false;
@@ -43,13 +45,13 @@ pub(crate) fn residuals(run: &Run, stages: &[Machine], extras: &[f64], out: &mut
         for (column, rows) in columns.iter_mut().zip(&rows) {
             column.extend_from_slice(&rows[usize::from(part > 0)..]);
         }
-        initial = Some(Initial { motor_current: initial_here.motor_current, ..last });
+        initial = Some(State { current: initial_here.current, ..last });
     }
     run.compare(&columns, extras, out)
 }
 
 /// The outputs of an experiment, and the state at its end.
-fn rows(machine: &Machine, experiment: &Experiment, quantities: &[Quantity]) -> Option<(Vec<Vec<f64>>, Initial)> {
+fn rows(machine: &Machine, experiment: &Experiment, quantities: &[Quantity]) -> Option<(Vec<Vec<f64>>, State)> {
     let mut columns = vec![Vec::new(); quantities.len()];
     let mut state = [0.0; 6];
     let mut bench = Bench::default();
@@ -64,9 +66,10 @@ fn rows(machine: &Machine, experiment: &Experiment, quantities: &[Quantity]) -> 
         Flow::Continue
     };
     let outcome = bench.run(experiment, Detail::Full, &mut take).ok()?;
-    let [drive_angle, drive_speed, cart_position, cart_speed, idler_angle, idler_speed] = state;
-    let last =
-        Initial { drive_angle, drive_speed, cart_position, cart_speed, idler_angle, idler_speed, motor_current: 0.0 };
+    let mut last = State::default();
+    for body in [DRIVE, CART, IDLER] {
+        (last.position[body], last.speed[body]) = (state[2 * body], state[2 * body + 1]);
+    }
     (outcome.ending == Ending::Complete && state.iter().all(|v| v.is_finite())).then_some((columns, last))
 }
 

@@ -1,12 +1,14 @@
 //! A log made ready to be compared: when the model is asked, what it is told, and what its answer is weighed with.
 
 use super::acceleration::cart_acceleration;
-use crate::case::{Case, Experiment, Initial};
+use crate::case::{Case, Experiment};
 use crate::control::{Added, follow};
 use crate::design::Design;
 use crate::fit::limits::{DITHER_STEPS, EVEN_RASTER, INPUT_BEFORE_WINDOW, RASTER_POINTS};
 use crate::log::{Log, Quantity};
+use crate::machine::axis::{CART, DRIVE, IDLER};
 use crate::machine::{AmplifierMode, Machine};
+use crate::mechanism::State;
 use crate::signal::Signal;
 use crate::signal::profile::Profile;
 use crate::solve::{Bench, Detail, Ending, Flow, Solver};
@@ -115,7 +117,7 @@ pub struct Run {
     /// The closed loop, where the input is not as logged.
     closed: Option<Arc<Closed>>,
     input: Signal,
-    initial: Initial,
+    initial: State,
     every: f64,
     until: f64,
     even: bool,
@@ -185,9 +187,9 @@ impl Run {
         // On the raster, where the solver need not stop twice for a sample.
         let grid = Grid::new(every, until);
         let times = if even { (0..n as u64).map(|k| grid.time(k)).collect() } else { time.clone() };
-        let is_logged = matches!(&experiment.input, Signal::Sampled { times: own, .. } if *own == log.time);
+        let is_logged = matches!(&experiment.inputs[0], Signal::Sampled { times: own, .. } if *own == log.time);
         let input = if whole && !is_logged {
-            experiment.input.clone()
+            experiment.inputs[0].clone()
         } else {
             // A window that is late still has the input of what came before it.
             let earlier = rows.start.saturating_sub(INPUT_BEFORE_WINDOW)..rows.start;
@@ -326,15 +328,16 @@ impl Run {
     }
 
     /// Where the model begins with these values of the extras, which set the gain of its amplifier, too.
-    pub(crate) fn initial(&self, machine: &mut Machine, extras: &[f64]) -> Initial {
+    pub(crate) fn initial(&self, machine: &mut Machine, extras: &[f64]) -> State {
         machine.drives[0].amplifier.gain *= self.extra(Nuisance::InputGain, extras).unwrap_or(1.0);
         let r = machine.pulley_radius;
         let mut initial = self.initial;
         if let Some(position) = self.extra(Nuisance::StartPosition, extras) {
-            (initial.cart_position, initial.drive_angle, initial.idler_angle) = (position, position / r, position / r);
+            (initial.position[CART], initial.position[DRIVE], initial.position[IDLER]) =
+                (position, position / r, position / r);
         }
         if let Some(speed) = self.extra(Nuisance::StartSpeed, extras) {
-            (initial.cart_speed, initial.drive_speed, initial.idler_speed) = (speed, speed / r, speed / r);
+            (initial.speed[CART], initial.speed[DRIVE], initial.speed[IDLER]) = (speed, speed / r, speed / r);
         }
         initial
     }
@@ -361,7 +364,7 @@ impl Run {
                 input = Signal::Sum(vec![input, Signal::Step { value: offset, at: 0.0 }]);
             }
         }
-        Experiment { input, initial, until: self.until, every: self.every, ..empty() }
+        Experiment { inputs: vec![input], initial, until: self.until, every: self.every, ..empty() }
     }
 
     /// The model's outputs at the log's times, one column for each, biases not yet added; false where it does not
@@ -461,10 +464,10 @@ impl Run {
 fn empty() -> Experiment {
     Experiment {
         name: String::new(),
-        input: Signal::Step { value: 0.0, at: 0.0 },
+        inputs: vec![Signal::Step { value: 0.0, at: 0.0 }],
         until: 1.0,
         every: 1.0,
-        initial: Initial::default(),
+        initial: State::default(),
         log: None,
     }
 }
@@ -634,7 +637,7 @@ mod tests {
                 .to_vec(),
             ended: None,
         };
-        experiment.input = Signal::Sampled { times: log.time.clone(), values: log.input.clone(), hold: log.hold };
+        experiment.inputs[0] = Signal::Sampled { times: log.time.clone(), values: log.input.clone(), hold: log.hold };
         let predicted = |run: &mut Run, known: &[(Nuisance, f64)]| {
             let extra = |what| Extra { what, start: 0.0, unit: 1.0, low: -1.0, high: 1.0, known: None };
             run.extras = known.iter().map(|(what, _)| extra(*what)).collect();

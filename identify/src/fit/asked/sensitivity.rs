@@ -152,7 +152,7 @@ impl Run {
         let mut machine = Machine { encoder: None, ..machine.clone() };
         let initial = self.initial(&mut machine, extras);
         let mechanism = Arc::new(machine.mechanism());
-        Begun { start: initial.state(&mechanism), mechanism }
+        Begun { start: mechanism.begun(&initial), mechanism }
     }
 
     /// Each output with its derivatives by the variables at the log's times; none where they cannot be told exactly.

@@ -97,7 +97,7 @@ fn cut(experiment: &Experiment, rows: Range<usize>) -> Option<Experiment> {
     let initial = if rows.start == 0 { experiment.initial } else { Default::default() };
     Some(Experiment {
         name: format!("{} from row {}", experiment.name, rows.start + 1),
-        input: own.signal(),
+        inputs: vec![own.signal()],
         until: own.time.last().copied().unwrap_or_default(),
         every: experiment.every,
         initial,

@@ -1,9 +1,10 @@
 //! How far an experiment may go, and how far one goes.
 
 use super::Request;
-use crate::case::{Case, Experiment, Initial};
+use crate::case::{Case, Experiment};
 use crate::error::{Error, Result};
 use crate::machine::{AmplifierMode, Machine, Travel};
+use crate::mechanism::State;
 use crate::signal::Signal;
 use crate::solve::{Bench, Detail, Ending, Flow};
 
@@ -126,15 +127,15 @@ pub(super) fn unbounded(stage: &Machine) -> Machine {
 fn seen(case: &Case) -> Vec<Reached> {
     let stage = unbounded(&case.machine);
     let one = |experiment: &Experiment| {
-        reach(&stage, &experiment.input, experiment.initial, experiment.every, experiment.until)
+        reach(&stage, &experiment.inputs[0], experiment.initial, experiment.every, experiment.until)
     };
     case.experiments.iter().filter_map(one).collect()
 }
 
 /// How far an input goes on a machine; none where the run does not get to its end.
-pub(super) fn reach(stage: &Machine, input: &Signal, initial: Initial, every: f64, until: f64) -> Option<Reached> {
+pub(super) fn reach(stage: &Machine, input: &Signal, initial: State, every: f64, until: f64) -> Option<Reached> {
     let mut reached = Reached { positions: [f64::INFINITY, f64::NEG_INFINITY], ..Reached::default() };
-    let experiment = Experiment { name: String::new(), input: input.clone(), until, every, initial, log: None };
+    let experiment = Experiment { name: String::new(), inputs: vec![input.clone()], until, every, initial, log: None };
     let mut bench = Bench::default();
     bench.mount(stage).ok()?;
     let outcome = bench.run(&experiment, Detail::Full, &mut |block| {

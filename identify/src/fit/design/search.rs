@@ -5,7 +5,7 @@ use super::criterion::Information;
 use super::limits::{Limits, Reached};
 use super::{Criterion, Task, Undetermined};
 use crate::case::parameters;
-use crate::case::{Case, Experiment, Initial};
+use crate::case::{Case, Experiment};
 use crate::chance::uniform;
 use crate::error::{Error, Result};
 use crate::fit::asked::residuals::Differences;
@@ -15,6 +15,7 @@ use crate::fit::limits::{
 };
 use crate::fit::search::cmaes;
 use crate::machine::{Channel, Machine};
+use crate::mechanism::State;
 use crate::signal::Signal;
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
@@ -81,7 +82,7 @@ pub struct Designed {
     /// Between samples, s.
     pub every: f64,
     /// Where it begins.
-    pub initial: Initial,
+    pub initial: State,
     /// How far it goes on the machine of the case.
     pub reached: Reached,
     /// How far it may go.
@@ -111,7 +112,7 @@ pub struct Designed {
 /// An input of which is known what it tells.
 struct Judged {
     shape: Shape,
-    initial: Initial,
+    initial: State,
     reached: Reached,
     information: Information,
     score: f64,
@@ -321,7 +322,7 @@ impl Task<'_> {
             measured: self.measured.clone(),
             ..*self
         };
-        let input: &Signal = &experiment.input;
+        let input: &Signal = &experiment.inputs[0];
         let information = task.information(input, experiment.initial, &Differences::Central)?;
         let determined = self.wanted.iter().filter(|&&j| information.known.error[j].is_finite()).count();
         Some(Own {

@@ -3,6 +3,7 @@
 use super::Designed;
 use crate::case::{Case, Experiment};
 use crate::error::{Error, Result};
+use crate::machine::axis::{CART, DRIVE, IDLER};
 use std::path::Path;
 
 impl Designed {
@@ -10,7 +11,7 @@ impl Designed {
     pub fn experiment(&self) -> Experiment {
         Experiment {
             name: self.name.clone(),
-            input: self.shape.signal(),
+            inputs: vec![self.shape.signal()],
             until: self.duration,
             every: self.every,
             initial: self.initial,
@@ -26,13 +27,13 @@ impl Designed {
         put("input", self.shape.toml(self.unit));
         put("until", format!("\"{} s\"", self.duration));
         put("every", format!("\"{} s\"", self.every));
-        if self.initial.cart_position != 0.0 {
-            let at = self.initial;
+        if self.initial.position[CART] != 0.0 {
+            let at = self.initial.position;
             put(
                 "initial",
                 format!(
                     "{{ cart_position = \"{} m\", drive_angle = \"{} rad\", idler_angle = \"{} rad\" }}",
-                    at.cart_position, at.drive_angle, at.idler_angle
+                    at[CART], at[DRIVE], at[IDLER]
                 ),
             );
         }
@@ -53,7 +54,7 @@ impl Designed {
         })?;
         // What is written is what was judged.
         match read.experiments.last() {
-            Some(last) if last.name == self.name && last.input == self.shape.signal() => Ok(whole),
+            Some(last) if last.name == self.name && last.inputs[0] == self.shape.signal() => Ok(whole),
             _ => Err(Error::new("the experiment that was found does not read back as what it is").in_file(name)),
         }
     }

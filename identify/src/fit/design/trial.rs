@@ -4,13 +4,15 @@ use super::Task;
 use super::candidates::Shape;
 use super::criterion::Information;
 use super::limits::{Reached, reach, unbounded};
-use crate::case::{Experiment, Initial};
+use crate::case::Experiment;
 use crate::chance::{hash, normal};
 use crate::fit::asked::problem::Problem;
 use crate::fit::asked::residuals::{Differences, Residuals};
 use crate::fit::limits::SMALLER;
 use crate::log::{Log, Output, Quantity};
+use crate::machine::axis::CART;
 use crate::machine::{Channel, Machine};
+use crate::mechanism::State;
 use crate::signal::{Hold, Signal};
 use crate::solve::{Bench, Detail, Ending, Flow};
 use crate::trajectory::{Grid, Trajectory};
@@ -22,24 +24,21 @@ use std::sync::Arc;
 impl Task<'_> {
     /// Where an input begins so that its way is in the middle of the travel, and how far it goes; none where the run
     /// does not get to its end.
-    pub(super) fn placed(&self, machine: &Machine, input: &Signal) -> Option<(Initial, Reached)> {
+    pub(super) fn placed(&self, machine: &Machine, input: &Signal) -> Option<(State, Reached)> {
         let machine = unbounded(machine);
-        let at = |x: f64| {
-            let angle = x / machine.pulley_radius;
-            Initial { cart_position: x, drive_angle: angle, idler_angle: angle, ..Initial::default() }
-        };
+        let at = |x: f64| machine.at_rest(x);
         let mut initial = at(self.limits.middle.unwrap_or(0.0));
         let mut reached = reach(&machine, input, initial, self.every, self.duration)?;
         if let Some(middle) = self.limits.middle {
             let off = 0.5 * (reached.positions[0] + reached.positions[1]) - middle;
-            initial = at(round(initial.cart_position - off));
+            initial = at(round(initial.position[CART] - off));
             reached = reach(&machine, input, initial, self.every, self.duration)?;
         }
         Some((initial, reached))
     }
 
     /// The input with an amplitude that keeps the limits, as it is or smaller; none where that is not found.
-    pub(super) fn fitted(&self, shape: Shape, stages: &[Machine]) -> Option<(Shape, Initial, Reached)> {
+    pub(super) fn fitted(&self, shape: Shape, stages: &[Machine]) -> Option<(Shape, State, Reached)> {
         let mut shape = shape;
         for _ in 0..SMALLER {
             let signal = shape.signal();
@@ -59,14 +58,20 @@ impl Task<'_> {
     }
 
     /// The experiment with the log that the model makes of it; `noise` is which one.
-    pub(super) fn experiment(&self, name: &str, input: &Signal, initial: Initial, noise: u64) -> Option<Experiment> {
+    pub(super) fn experiment(&self, name: &str, input: &Signal, initial: State, noise: u64) -> Option<Experiment> {
         let time: Vec<f64> = {
             let grid = Grid::new(self.every, self.duration);
             (0..=grid.intervals()).map(|k| grid.time(k)).collect()
         };
         let until = *time.last()?;
-        let mut experiment =
-            Experiment { name: name.to_string(), input: input.clone(), until, every: self.every, initial, log: None };
+        let mut experiment = Experiment {
+            name: name.to_string(),
+            inputs: vec![input.clone()],
+            until,
+            every: self.every,
+            initial,
+            log: None,
+        };
         let mut columns: Vec<Vec<f64>> = vec![Vec::new(); self.measured.len()];
         let mut bench = Bench::default();
         bench.mount(&self.case.machine).ok()?;
@@ -118,7 +123,7 @@ impl Task<'_> {
     }
 
     /// Knowledge of a fit of a log of this input, by such derivatives.
-    pub(super) fn information(&self, input: &Signal, initial: Initial, how: &Differences) -> Option<Information> {
+    pub(super) fn information(&self, input: &Signal, initial: State, how: &Differences) -> Option<Information> {
         let mut problem = self.problem(self.experiment("designed", input, initial, self.seed)?)?;
         let x = problem.start();
         let mut residuals = vec![0.0; problem.rows()];

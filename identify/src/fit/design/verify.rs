@@ -10,6 +10,7 @@ use crate::fit::fit;
 use crate::fit::limits::START_OFF;
 use crate::fit::search::point::Ending;
 use crate::log::Quantity;
+use crate::machine::axis::{CART, DRIVE, IDLER};
 use crate::solve::Flow;
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
@@ -43,9 +44,9 @@ pub fn verify(case: &Case, request: &Request, found: &Designed, logs: usize, sto
         // Somewhere within a step of a converter, so that rounding is another each time.
         let mut initial = found.initial;
         let off = uniform(&mut random) * step(&task);
-        initial.cart_position += off;
-        initial.drive_angle += off / case.machine.pulley_radius;
-        initial.idler_angle += off / case.machine.pulley_radius;
+        initial.position[CART] += off;
+        initial.position[DRIVE] += off / case.machine.pulley_radius;
+        initial.position[IDLER] += off / case.machine.pulley_radius;
         let noise = task.seed.wrapping_add(1 + k as u64);
         let experiment = task
             .experiment(&found.name, &found.shape.signal(), initial, noise)

@@ -11,7 +11,7 @@ use taut::linear::GantryAnalysis;
 
 /// The page.
 pub fn page(analysis: &GantryAnalysis, planes: &[Named]) -> Page {
-    let gantry = &analysis.case.gantry;
+    let gantry = &analysis.case.machine;
     let mechanism = gantry.mechanism();
     let mut page = Page::new(analysis.case.title.clone()).subtitle("How it swings");
     page.section("What was linearised");

@@ -10,7 +10,7 @@ pub use rows::{early_end, lines, machine};
 
 use super::{Curves, Way};
 use std::time::Duration;
-use taut::case::GantryExperiment;
+use taut::case::Experiment;
 use taut::json::GantrySimulated;
 use taut::metrics::GantryMetrics;
 use taut::solve;
@@ -18,7 +18,7 @@ use taut::solve;
 /// An experiment after it ran.
 pub struct Run<'a> {
     /// The experiment as the case has it.
-    pub experiment: &'a GantryExperiment,
+    pub experiment: &'a Experiment,
     /// Its events, how it ended, what it cost.
     pub outcome: solve::Outcome,
     /// Its key figures.

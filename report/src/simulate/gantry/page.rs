@@ -7,25 +7,25 @@ use crate::page::{Callout, Page};
 use crate::plane::Plane;
 use crate::simulate::page::{events, figures_table, how};
 use crate::simulate::plots::Named;
-use taut::case::GantryCase;
+use taut::case::Case;
 use taut::mechanism::Mechanism;
 use taut::solve::Solver;
 
 /// The page for these runs; `text` is the case that repeats them.
 pub fn page(
-    case: &GantryCase,
+    case: &Case,
     text: &str,
     solver: Solver,
     runs: &[Run],
     figures: &[Vec<Named>],
     ways: &[Option<Plane>],
 ) -> Page {
-    let mechanism = case.gantry.mechanism();
+    let mechanism = case.machine.mechanism();
     let mut page = Page::new(case.title.clone()).subtitle(how(solver));
     page.section("The machine");
-    page.prose(format!("{}.", machine(&case.gantry)));
+    page.prose(format!("{}.", machine(&case.machine)));
     page.drawing(
-        &gantry_drawing(&case.gantry),
+        &gantry_drawing(&case.machine),
         "In plan view with positive directions; lengths are not to scale. In the model the bridge does not yaw, and idlers have \
          neither inertia nor friction.",
     );
@@ -39,13 +39,13 @@ pub fn page(
 
 /// Settings that all runs of a page share.
 struct Setting<'a> {
-    case: &'a GantryCase,
+    case: &'a Case,
     mechanism: &'a Mechanism,
     solver: Solver,
 }
 
 fn experiment(page: &mut Page, setting: &Setting, run: &Run, figures: &[Named], way: Option<&Plane>) {
-    let gantry = &setting.case.gantry;
+    let gantry = &setting.case.machine;
     page.section(&run.experiment.name);
     if let Some(told) = early_end(run, gantry) {
         page.callout(Callout::Fails, "The whole run", format!("This run {told}."));

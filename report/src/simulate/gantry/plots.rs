@@ -5,7 +5,7 @@ use crate::simulate::curves::{Curves, Source, Way};
 use crate::simulate::marks;
 use crate::simulate::plots::Named;
 use crate::{Axis, Colour, Figure, Panel, Plane, Series, Style};
-use taut::case::GantryCase;
+use taut::case::Case;
 use taut::machine::{AmplifierMode, DriveAt, Machine};
 
 /// The curves that a report shows, and the way of the cart, before the first row.
@@ -29,7 +29,7 @@ pub fn curves(gantry: &Machine) -> (Curves, Way) {
 }
 
 /// Every plot of a run over time, in the order of a report; none if its curves were not kept.
-pub fn figures(case: &GantryCase, run: &Run) -> Vec<Named> {
+pub fn figures(case: &Case, run: &Run) -> Vec<Named> {
     let Some((curves, _)) = &run.curves else { return Vec::new() };
     let figure = |name: &str| Figure::new(format!("{}: {name}", run.experiment.name), Axis::new("Time", "s"));
     let panel = |axis: Axis, names: &[(&str, &str)]| {
@@ -45,7 +45,7 @@ pub fn figures(case: &GantryCase, run: &Run) -> Vec<Named> {
         }
         panel
     };
-    let gantry = &case.gantry;
+    let gantry = &case.machine;
     let sides = |quantity: &str| [format!("left_{quantity}"), format!("right_{quantity}")];
     let two = |axis: Axis, quantity: &str| {
         let [left, right] = sides(quantity);
@@ -120,7 +120,7 @@ pub fn figures(case: &GantryCase, run: &Run) -> Vec<Named> {
 }
 
 /// The way of the cart in the plane; none if it was not kept.
-pub fn way(case: &GantryCase, run: &Run) -> Option<Plane> {
+pub fn way(case: &Case, run: &Run) -> Option<Plane> {
     let (_, way) = run.curves.as_ref()?;
     let (y, x) = way.points();
     let millimetres = |name: &str| Axis::new(name, "m").shown_as("mm", 1e3);
@@ -130,7 +130,7 @@ pub fn way(case: &GantryCase, run: &Run) -> Option<Plane> {
             "The way of the cart in the plane, at one scale for both directions and seen as the drawing is: x upward, y to the right. \
              It begins at the open circle.",
         );
-    if let (Some(bridge), Some(cart)) = (case.gantry.first_slide().travel, case.gantry.cart.travel) {
+    if let (Some(bridge), Some(cart)) = (case.machine.first_slide().travel, case.machine.cart.travel) {
         plane = plane.bounds((cart.min, cart.max), (bridge.min, bridge.max));
         plane.caption += " The dotted frame is the travel of both.";
     }

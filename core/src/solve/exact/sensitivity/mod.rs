@@ -88,7 +88,7 @@ impl<'t, const N: usize> Follower<'t, N> {
     fn new(task: Task<'t>, known: super::Modes<N>, slopes: Vec<Sloped<N>>) -> Option<Self> {
         let Task { mechanism, experiment, variables, outputs } = task;
         let grid = Grid::new(experiment.every, experiment.until);
-        let start = experiment.initial.state(mechanism);
+        let start = mechanism.begun(&experiment.initial);
         let seen = Seen::new(mechanism, &start, task.space(mechanism));
         let ends = (grid.interval(), grid.end());
         let mut core = Core::new(Arc::clone(&seen.mechanism), Arc::new(task.space(mechanism)), &start, ends, known);
@@ -144,7 +144,7 @@ impl<'t, const N: usize> Follower<'t, N> {
 
     /// Runs to the end along the input of the experiment.
     fn along(&mut self) -> Option<()> {
-        let signals = std::slice::from_ref(&self.task.experiment.input);
+        let signals = &self.task.experiment.inputs[..];
         let mut time = 0.0;
         loop {
             let pieces = Pieces::of(signals, time);
