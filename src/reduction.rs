@@ -3,7 +3,7 @@
 use crate::case::Experiment;
 use crate::error::Result;
 use crate::machine::{Belt, BeltModel, Machine};
-use crate::metrics::{Meter, Peak, largest};
+use crate::metrics::{Meter, Peak};
 use crate::solve::{Ending, Flow, Solver, stream_observed};
 use crate::trajectory::Trajectory;
 
@@ -75,7 +75,7 @@ fn travel(machine: &Machine, experiment: &Experiment, solver: Solver) -> Result<
         Flow::Continue
     })?;
     let metrics = meter.finish(&outcome.events);
-    let (_, stretch) = largest(&metrics.peak_stretch);
+    let (_, stretch) = metrics.largest_stretch();
     let complete = outcome.ending == Ending::Complete;
-    Ok(complete.then_some(Travel { time, cart, drive, encoder_error: metrics.peak_encoder_error, stretch }))
+    Ok(complete.then_some(Travel { time, cart, drive, encoder_error: metrics.cart().peak_error, stretch }))
 }

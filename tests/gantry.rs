@@ -4,7 +4,7 @@ use serde_json::Value;
 use taut::case::Case;
 use taut::linear::{GantryAnalysis, Natural, Root};
 use taut::machine::Kind;
-use taut::metrics::{GantryMeter, GantryMetrics, Peak};
+use taut::metrics::{Meter, Metrics, Peak};
 use taut::solve::{Course, Detail, Ending, ErrorEstimate, Event, Flow, Solver, stream_mechanism};
 use taut::trajectory::Trajectory;
 
@@ -100,9 +100,9 @@ fn the_general_solver_agrees_with_the_authority() {
 }
 
 /// The figures of a run with a row every so many seconds, and the rows.
-fn metered(case: &Case, solver: Solver, every: f64) -> (GantryMetrics, Trajectory) {
+fn metered(case: &Case, solver: Solver, every: f64) -> (Metrics, Trajectory) {
     let course = Course { every, ..Course::of(&case.machine.mechanism(), &case.experiments[0]) };
-    let mut meter = GantryMeter::new(&case.machine);
+    let mut meter = Meter::new(&case.machine, &case.experiments[0]);
     let mut rows = Trajectory::default();
     let sink = &mut |block: &Trajectory| {
         rows.append(block);
@@ -114,9 +114,15 @@ fn metered(case: &Case, solver: Solver, every: f64) -> (GantryMetrics, Trajector
 }
 
 /// All peaks of a run.
-fn peaks(metrics: &GantryMetrics) -> Vec<Peak> {
-    let pairs = [metrics.peak_speed, metrics.peak_error, metrics.peak_current, metrics.peak_drive_speed];
-    [&pairs.concat()[..], &metrics.peak_stretch, &metrics.peak_force].concat()
+fn peaks(metrics: &Metrics) -> Vec<Peak> {
+    let Metrics { loads, drives, spans, .. } = metrics;
+    let mut peaks: Vec<Peak> = loads.iter().map(|load| load.peak_speed).collect();
+    peaks.extend(loads.iter().map(|load| load.peak_error));
+    peaks.extend(drives.iter().map(|drive| drive.peak_current));
+    peaks.extend(drives.iter().map(|drive| drive.peak_speed));
+    peaks.extend(spans.iter().map(|span| span.peak_stretch));
+    peaks.extend(spans.iter().map(|span| span.peak_force));
+    peaks
 }
 
 /// The stretch of each span by its lever arms, s = A q, from columns of q.
@@ -173,9 +179,9 @@ fn peaks_are_of_the_motion_and_not_of_its_rows() {
             assert!(near(fine, coarse, 1e-9), "{name}: peak {k}: {fine} and {coarse}");
             assert!(near(fine, general, 1e-6), "{name}: peak {k}: {fine} and {general}");
         }
-        assert_eq!((fine.stop_time.is_some(), fine.events), (coarse.stop_time.is_some(), coarse.events), "{name}");
+        assert_eq!((fine.stop_time.is_some(), &fine.bodies), (coarse.stop_time.is_some(), &coarse.bodies), "{name}");
         let [x, y] = ["bridge_position", "cart_position"].map(|name| *rows.get(name).unwrap().last().unwrap());
-        assert_eq!(fine.final_position, [x, y], "{name}");
+        assert_eq!([fine.loads[0].position, fine.loads[1].position], [x, y], "{name}");
     }
 }
 

@@ -4,7 +4,7 @@
 use std::fmt::Write;
 use taut::case::Case;
 use taut::chance::hash;
-use taut::solve::{Choice, Course, Detail, Flow, Solver, stream, stream_mechanism};
+use taut::solve::{Flow, Solver, stream};
 use taut::trajectory::Trajectory;
 
 const CASES: [&str; 5] = [
@@ -26,32 +26,14 @@ fn lines(path: &str) -> String {
     let mut told = |name: &str, rows: &Trajectory| {
         let _ = writeln!(text, "{path} {name:?}: {} rows, {:016x}", rows.len(), bits(rows));
     };
-    match &case {
-        case if case.is_axis() => {
-            for experiment in &case.experiments {
-                let mut rows = Trajectory::default();
-                let mut take = |block: &Trajectory| {
-                    rows.append(block);
-                    Flow::Continue
-                };
-                stream(&case.machine, experiment, Solver::of(&case.machine), &mut take).unwrap();
-                told(&experiment.name, &rows);
-            }
-        }
-        case => {
-            let mechanism = case.machine.mechanism();
-            let solver = Choice::default().solver_of(&mechanism).unwrap();
-            for experiment in &case.experiments {
-                let mut rows = Trajectory::default();
-                let mut take = |block: &Trajectory| {
-                    rows.append(block);
-                    Flow::Continue
-                };
-                let course = Course::of(&mechanism, experiment);
-                stream_mechanism(&mechanism, &course, solver, (Detail::Full, None), &mut take).unwrap();
-                told(&experiment.name, &rows);
-            }
-        }
+    for experiment in &case.experiments {
+        let mut rows = Trajectory::default();
+        let mut take = |block: &Trajectory| {
+            rows.append(block);
+            Flow::Continue
+        };
+        stream(&case.machine, experiment, Solver::of(&case.machine), &mut take).unwrap();
+        told(&experiment.name, &rows);
     }
     text
 }

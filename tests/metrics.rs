@@ -7,7 +7,7 @@ use proptest::prelude::*;
 use taut::case::Experiment;
 use taut::friction::{Friction, Law, Shape};
 use taut::machine::{AmplifierMode, BeltModel, GearPlay, Machine};
-use taut::metrics::{Balance, Meter, Metrics, Peak, balanced_speed, largest};
+use taut::metrics::{Balance, Meter, Metrics, OfSpan, Peak, balanced_speed};
 use taut::polyline::Polyline;
 use taut::signal::{Signal, Slot};
 use taut::solve::{Ending, Flow, Method, Solution, Solver, stream_observed};
@@ -38,13 +38,13 @@ fn every(machine: &Machine, input: &Signal, until: f64, every: f64, solver: Solv
 /// Peaks with their names.
 fn peaks(metrics: &Metrics) -> Vec<(String, Peak)> {
     let mut peaks = vec![
-        ("cart speed".to_string(), metrics.peak_cart_speed),
-        ("drive speed".into(), metrics.peak_drive_speed),
-        ("current".into(), metrics.peak_current),
+        ("cart speed".to_string(), metrics.cart().peak_speed),
+        ("drive speed".into(), metrics.drive().peak_belt_speed.unwrap()),
+        ("current".into(), metrics.drive().peak_current),
     ];
     for span in 0..3 {
-        peaks.push((format!("stretch {}", span + 1), metrics.peak_stretch[span]));
-        peaks.push((format!("force {}", span + 1), metrics.peak_force[span]));
+        peaks.push((format!("stretch {}", span + 1), metrics.spans[span].peak_stretch));
+        peaks.push((format!("force {}", span + 1), metrics.spans[span].peak_force));
     }
     peaks
 }
@@ -108,9 +108,9 @@ proptest! {
         let last = |name: &str| *get(name).last().unwrap();
         let r = machine.pulley_radius;
         prop_assert_eq!(metrics.end, 0.4);
-        prop_assert_eq!(metrics.final_cart_position, last("cart_position"));
-        prop_assert_eq!(metrics.final_drive_travel, r * last("drive_angle"));
-        prop_assert_eq!(metrics.peak_encoder_error, metrics.peak_stretch[0]);
+        prop_assert_eq!(metrics.cart().position, last("cart_position"));
+        prop_assert_eq!(metrics.cart().by_drives, r * last("drive_angle"));
+        prop_assert_eq!(metrics.cart().peak_error, metrics.spans[0].peak_stretch);
         let rest = |row: usize| ["drive_state", "cart_state", "idler_state"].iter().all(|state| get(state)[row] == 0.0);
         let rows = solution.trajectory.len();
         prop_assert_eq!(metrics.settled, rest(rows - 1));
@@ -122,7 +122,7 @@ proptest! {
             Some(stop) => prop_assert!(rest(rows - 1) && stop >= moving && events.iter().all(|e| e.time <= stop)),
             None => prop_assert!(!rest(rows - 1)),
         }
-        let counted: u64 = metrics.events.iter().map(|count| count.total()).sum();
+        let counted: u64 = metrics.bodies.iter().map(|count| count.total()).sum();
         prop_assert_eq!(counted, events.len() as u64);
 
         // The last tenth of the last stretch of constant input, by the rows of a finer run.
@@ -163,16 +163,16 @@ proptest! {
 fn the_five_volt_pulse_of_the_paper() {
     let machine = table4();
     let (_, metrics) = run(&machine, Signal::Pulse { value: 5.0, duration: 0.25, at: 0.0 }, 1.0);
-    assert!((metrics.final_drive_travel - 0.053744890394).abs() < 1e-9);
-    assert!((metrics.final_cart_position - 0.053746653033).abs() < 1e-9);
-    let (stops, starts) = metrics.events.iter().fold((0, 0), |(a, b), e| (a + e.stops, b + e.starts));
+    assert!((metrics.cart().by_drives - 0.053744890394).abs() < 1e-9);
+    assert!((metrics.cart().position - 0.053746653033).abs() < 1e-9);
+    let (stops, starts) = metrics.bodies.iter().fold((0, 0), |(a, b), e| (a + e.stops, b + e.starts));
     assert_eq!((stops, starts, metrics.settled), (6, 6, true));
     assert!(metrics.stop_time.is_some_and(|stop| stop > 0.25 && stop < 0.5));
     let steady = metrics.steady_speed.unwrap();
     // The rise takes 26 ms: after ten times that nothing changes any more.
     assert!(steady.reached && steady.stretch == (0.0, 0.25), "{steady:?}");
     assert!((steady.value / steady.analytic.speed().unwrap() - 1.0).abs() < 1e-3, "{steady:?}");
-    assert_eq!(metrics.peak_encoder_error, metrics.peak_stretch[0]);
+    assert_eq!(metrics.cart().peak_error, metrics.spans[0].peak_stretch);
 }
 
 #[test]
@@ -301,8 +301,8 @@ fn a_spinning_rotor_behind_play_is_not_settled() {
     let (spinning, metrics) = run(&machine, input.clone(), 0.03);
     let speed = *spinning.trajectory.get("rotor_speed").unwrap().last().unwrap();
     assert!(speed > 0.1, "{speed}");
-    assert!(metrics.bodies_rest && !metrics.rotor_rests && !metrics.settled, "{metrics:?}");
-    assert_eq!((metrics.stop_time, metrics.final_rotor_speed), (None, speed));
+    assert!(metrics.bodies_rest && !metrics.rotors_rest && !metrics.settled, "{metrics:?}");
+    assert_eq!((metrics.stop_time, metrics.drive().shaft_speed), (None, speed));
 
     // In time it comes to rest, at one time whatever the rows.
     let stops = [1e-3, 1e-4, 0.37e-3].map(|h| every(&machine, &input, 5.0, h, Solver::Exact).1);
@@ -348,8 +348,12 @@ fn a_constant_input_counts_by_its_time() {
 #[test]
 fn the_largest_of_three_spans() {
     let peak = |value| Peak { value, time: 1.0 };
-    assert_eq!(largest(&[peak(1.0), peak(-3.0), peak(2.0)]), (2, peak(-3.0)));
-    assert_eq!(largest(&[peak(1.0), peak(-1.0), peak(1.0)]), (1, peak(1.0)));
+    let largest = |values: [f64; 3]| {
+        let span = |value| OfSpan { peak_force: peak(value), ..OfSpan::default() };
+        Metrics { spans: values.map(span).to_vec(), ..Metrics::default() }.largest_force()
+    };
+    assert_eq!(largest([1.0, -3.0, 2.0]), (1, peak(-3.0)));
+    assert_eq!(largest([1.0, -1.0, 1.0]), (0, peak(1.0)));
 }
 
 /// A machine whose peak cart speed was 9e-8 too low with rows of 0.2 to 2 ms: the best of nine places on a curve stood
@@ -393,17 +397,17 @@ fn the_time_of_a_plateaus_peak_depended_on_the_output_interval() {
     for duration in [1.0, 1.2345678] {
         for rows in [1e-2, 1e-3, 0.37e-3, 2e-5] {
             let (_, metrics) = every(&machine, &pulse(duration), 1.5, rows, Solver::Exact);
-            let peak = metrics.peak_cart_speed;
+            let peak = metrics.cart().peak_speed;
             assert!((peak.time - duration).abs() < 1e-12, "{duration} s, rows of {rows} s: {peak:?}");
         }
     }
     // The current that the voltage asks for is beyond its limit while the machine speeds up.
     machine.drives[0].amplifier.current_limit = Some(2.0);
     let (_, known) = every(&machine, &pulse(1.0), 1.5, 1e-3, Solver::Exact);
-    assert!(known.peak_current.value == 2.0, "{:?}", known.peak_current);
+    assert!(known.drive().peak_current.value == 2.0, "{:?}", known.drive().peak_current);
     for rows in [1e-2, 0.37e-3, 2e-5] {
         let (_, metrics) = every(&machine, &pulse(1.0), 1.5, rows, Solver::Exact);
-        let (a, b) = (metrics.peak_current, known.peak_current);
+        let (a, b) = (metrics.drive().peak_current, known.drive().peak_current);
         assert!(a.value == b.value && (a.time - b.time).abs() < 1e-9, "rows of {rows} s: {a:?}, {b:?}");
     }
 }

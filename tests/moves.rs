@@ -130,7 +130,7 @@ fn figures_do_not_depend_on_the_rows() {
                     ("settling", a.settling.unwrap_or(0.0), b.settling.unwrap_or(0.0)),
                     ("restlessness", a.restlessness, b.restlessness),
                     ("amplifier", a.amplifier_limited, b.amplifier_limited),
-                    ("force", one.metrics.peak_force[0].value, other.metrics.peak_force[0].value),
+                    ("force", one.metrics.spans[0].peak_force.value, other.metrics.spans[0].peak_force.value),
                 ] {
                     assert!((a.abs() - b.abs()).abs() <= 1e-6 * a.abs() + 1e-12, "{name} {what}: {a} {b}");
                 }

@@ -13,7 +13,7 @@ use taut::fit;
 use taut::linear::{GantryAnalysis, Operation, Root, StateSpace};
 use taut::log::{Accelerometer, ColumnId, Dialect, Filter, Log, Mapping, Quantity, Source, Survey, read_accelerometer};
 use taut::machine::Machine;
-use taut::metrics::GantryMeter;
+use taut::metrics::Meter;
 use taut::signal::gcode::legs;
 use taut::signal::profile::{Limits, Profile};
 use taut::solve::{self, Course, Detail, Ending, Flow, Outcome, Solver};
@@ -113,7 +113,7 @@ fn gantry(name: &Path, case: &Case) -> Reached {
     let mut course = Course::of(&mechanism, experiment);
     course.until = course.until.min(LONGEST.min(PHASE / fastest.max(1e-300)));
     course.every = course.every.min(course.until).max(course.until / ROWS);
-    let mut meter = GantryMeter::new(&case.machine);
+    let mut meter = Meter::new(&case.machine, experiment);
     let mut finite = true;
     let shown = (Detail::Full, Some(&mut meter as &mut dyn solve::Observe));
     let outcome = solve::stream_mechanism(&mechanism, &course, Solver::of_mechanism(&mechanism), shown, &mut |rows| {

@@ -32,24 +32,9 @@ const TUNE: usize = 400;
 #[pyclass(frozen, module = "taut._native")]
 pub struct Case {
     /// As the library has it.
-    pub inner: Inner,
+    pub inner: Arc<taut::case::Case>,
     /// Where it lies, or would: paths in it are relative to its folder.
     pub path: PathBuf,
-}
-
-/// A case of either kind.
-pub enum Inner {
-    Axis(Arc<taut::case::Case>),
-    Gantry(Arc<taut::case::Case>),
-}
-
-impl From<taut::case::Case> for Inner {
-    fn from(opened: taut::case::Case) -> Self {
-        match opened {
-            case if case.is_axis() => Inner::Axis(Arc::from(case)),
-            case => Inner::Gantry(Arc::from(case)),
-        }
-    }
 }
 
 /// The part of a case that a word names.
@@ -84,15 +69,15 @@ impl Case {
     #[staticmethod]
     fn read(py: Python<'_>, path: PathBuf, changes: Vec<String>) -> PyResult<Self> {
         let changes: Vec<&str> = changes.iter().map(String::as_str).collect();
-        let inner = unlocked(py, || taut::case::Case::read_with(&path, &changes))?.told(py)?.into();
-        Ok(Self { inner, path })
+        let inner = unlocked(py, || taut::case::Case::read_with(&path, &changes))?.told(py)?;
+        Ok(Self { inner: Arc::new(inner), path })
     }
 
     #[staticmethod]
     fn from_text(py: Python<'_>, path: PathBuf, text: &str, changes: Vec<String>) -> PyResult<Self> {
         let changes: Vec<&str> = changes.iter().map(String::as_str).collect();
-        let inner = unlocked(py, || taut::case::Case::from_text_with(&path, text, &changes))?.told(py)?.into();
-        Ok(Self { inner, path })
+        let inner = unlocked(py, || taut::case::Case::from_text_with(&path, text, &changes))?.told(py)?;
+        Ok(Self { inner: Arc::new(inner), path })
     }
 
     /// The same with changes, each as KEY=VALUE.
@@ -103,26 +88,17 @@ impl Case {
     /// As the case file has it.
     #[getter]
     fn kind(&self) -> &str {
-        match &self.inner {
-            Inner::Axis(_) => "axis",
-            Inner::Gantry(case) => case.machine.kind.word(),
-        }
+        self.inner.machine.kind.word()
     }
 
     #[getter]
     fn title(&self) -> &str {
-        match &self.inner {
-            Inner::Axis(case) => &case.title,
-            Inner::Gantry(case) => &case.title,
-        }
+        &self.inner.title
     }
 
     #[getter]
     fn text(&self) -> &str {
-        match &self.inner {
-            Inner::Axis(case) => &case.text,
-            Inner::Gantry(case) => &case.text,
-        }
+        &self.inner.text
     }
 
     #[getter]
@@ -132,26 +108,17 @@ impl Case {
 
     #[getter]
     fn experiments(&self) -> Vec<&str> {
-        match &self.inner {
-            Inner::Axis(case) => case.experiments.iter().map(|experiment| experiment.name.as_str()).collect(),
-            Inner::Gantry(case) => case.experiments.iter().map(|experiment| experiment.name.as_str()).collect(),
-        }
+        self.inner.experiments.iter().map(|experiment| experiment.name.as_str()).collect()
     }
 
     #[getter]
     fn moves(&self) -> Vec<&str> {
-        match &self.inner {
-            Inner::Axis(case) => case.moves.iter().map(|motion| motion.name.as_str()).collect(),
-            Inner::Gantry(_) => Vec::new(),
-        }
+        self.inner.moves.iter().map(|motion| motion.name.as_str()).collect()
     }
 
     /// The value under a key, in SI units.
     fn value<'py>(&self, py: Python<'py>, key: &str) -> PyResult<Bound<'py, PyAny>> {
-        let found = guarded(|| match &self.inner {
-            Inner::Axis(case) => case.value(key),
-            Inner::Gantry(case) => case.value(key),
-        });
+        let found = guarded(|| self.inner.value(key));
         value::given(py, &found?.told(py)?)
     }
 
@@ -175,16 +142,8 @@ impl Case {
         let solver = solver.map(|name| one_of("solver", name, &kinds)).transpose()?;
         let method = method.map(|name| one_of("method", name, &methods)).transpose()?;
         let choice = Choice { solver, tolerance, step, method };
-        match &self.inner {
-            Inner::Axis(case) => {
-                let solver = guarded(|| choice.solver(&case.machine))?.told(py)?;
-                runs::simulate(py, case, &self.path, &names, solver)
-            }
-            Inner::Gantry(case) => {
-                let solver = guarded(|| choice.solver_of(&case.machine.mechanism()))?.told(py)?;
-                runs::simulate_gantry(py, case, &self.path, &names, solver)
-            }
-        }
+        let solver = guarded(|| choice.solver(&self.inner.machine))?.told(py)?;
+        runs::simulate(py, &self.inner, &self.path, &names, solver)
     }
 
     /// Runs moves; timing is every, delay, limit of a controller in Python.
@@ -402,11 +361,7 @@ impl Case {
 
     /// The overview, as `taut show --json` has it.
     fn show<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let opened = match &self.inner {
-            Inner::Axis(case) => case.as_ref().clone(),
-            Inner::Gantry(case) => case.as_ref().clone(),
-        };
-        let overview = unlocked(py, || Overview::of(&opened))?.told(py)?;
+        let overview = unlocked(py, || Overview::of(&self.inner))?.told(py)?;
         value::json(py, &guarded(|| json::show(&overview))?)
     }
 
@@ -420,10 +375,7 @@ impl Case {
         how: (Option<String>, String, Option<f64>, u32),
     ) -> PyResult<(Vec<PathBuf>, Vec<String>)> {
         let (part, real, step, fmi) = how;
-        let opened = match &self.inner {
-            Inner::Axis(case) => case.as_ref().clone(),
-            Inner::Gantry(case) => case.as_ref().clone(),
-        };
+        let opened = &*self.inner;
         let options = Options { part: exported_part(part.as_deref())?, real: exported_real(&real)?, step };
         let own = self.path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
         let made = unlocked(py, || {
@@ -431,7 +383,7 @@ impl Case {
             let text = |target: Target| {
                 let place = Place::of(&out, target.ending(), &own);
                 let mut claim = place.claim(target.ending())?;
-                let exported = export(&opened, target, &place.stem, &options)?;
+                let exported = export(opened, target, &place.stem, &options)?;
                 Ok((place.write(&exported, &inputs, &mut claim)?, exported.notes))
             };
             match target {
@@ -442,13 +394,13 @@ impl Case {
                 "fmu" => {
                     let place = Place::of(&out, "fmu", &own);
                     let mut claim = place.claim("fmu")?;
-                    let exported = fmu::export(&opened, options.part, fmi, &place.stem)?;
+                    let exported = fmu::export(opened, options.part, fmi, &place.stem)?;
                     Ok((place.write(&exported, &inputs, &mut claim)?, exported.notes))
                 }
                 "json" => {
                     let place = Place::of(&out, "json", &own);
                     let mut claim = place.claim("json")?;
-                    let content = json::text(&json::export(&opened)?).into_bytes();
+                    let content = json::text(&json::export(opened)?).into_bytes();
                     let files = vec![(format!("{}.json", place.stem), content)];
                     let exported = Exported { files, ..Exported::default() };
                     Ok((place.write(&exported, &inputs, &mut claim)?, Vec::new()))
@@ -462,10 +414,10 @@ impl Case {
 
     /// Modes of a gantry, as `taut modes --json` has them.
     fn gantry_modes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let Inner::Gantry(case) = &self.inner else {
+        if self.inner.is_axis() {
             return Err(taut::Error::new("this case describes an axis, not a gantry")).told(py);
-        };
-        let analysis = unlocked(py, || GantryAnalysis::of(case))?.told(py)?;
+        }
+        let analysis = unlocked(py, || GantryAnalysis::of(&self.inner))?.told(py)?;
         value::json(py, &guarded(|| json::gantry_modes(&analysis))?)
     }
 }
@@ -473,22 +425,16 @@ impl Case {
 impl Case {
     /// The case of an axis; told where it has to be one.
     pub fn axis(&self, py: Python<'_>) -> PyResult<&Arc<taut::case::Case>> {
-        match &self.inner {
-            Inner::Axis(case) => Ok(case),
-            Inner::Gantry(case) => {
-                // Read as that of an axis, it is told where it says that it is none.
-                let told = guarded(|| taut::case::Case::axis_from_text_for(&self.path, &case.text, &[], Files::All))?;
-                let told = told.err().unwrap_or_else(|| taut::Error::new("this needs a single axis"));
-                Err(crate::error::told(py, told))
-            }
+        if self.inner.is_axis() {
+            return Ok(&self.inner);
         }
+        // Read as that of an axis, it is told where it says that it is none.
+        let told = guarded(|| taut::case::Case::axis_from_text_for(&self.path, self.text(), &[], Files::All))?;
+        Err(crate::error::told(py, told.err().unwrap_or_else(|| taut::Error::new("this needs a single axis"))))
     }
 
     fn files(&self) -> &[InputFile] {
-        match &self.inner {
-            Inner::Axis(case) => &case.files,
-            Inner::Gantry(case) => &case.files,
-        }
+        &self.inner.files
     }
 }
 

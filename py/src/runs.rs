@@ -17,10 +17,10 @@ use taut::case::{Case, Experiment};
 use taut::control::feasible::{Shortfall, shortfalls};
 use taut::control::{Loop, MoveRun, Rows, Standard, Worst, stream, worst};
 use taut::files::Inputs;
-use taut::json::{self, GantrySimulated, GantrySimulation, Moved, Simulated, Simulation};
-use taut::metrics::{GantryMeter, GantryMetrics, Meter, Metrics};
+use taut::json::{self, Moved, Simulated, Simulation};
+use taut::metrics::{Meter, Metrics};
 use taut::reduction::Reduction;
-use taut::solve::{self, Course, Detail, Flow, Outcome, Solver};
+use taut::solve::{self, Flow, Outcome, Solver};
 use taut::trajectory::{CsvWriter, ParquetWriter, Trajectory};
 use taut::tune::trouble::{Trouble, trouble};
 
@@ -43,13 +43,6 @@ enum What {
         outcome: Outcome,
         metrics: Box<Metrics>,
         reduction: Option<Reduction>,
-    },
-    Gantry {
-        case: Arc<Case>,
-        index: usize,
-        solver: Solver,
-        outcome: Outcome,
-        metrics: Box<GantryMetrics>,
     },
     Move {
         case: Arc<Case>,
@@ -85,7 +78,6 @@ impl Run {
     fn name(&self) -> &str {
         match &self.what {
             What::Experiment { case, index, .. } => &case.experiments[*index].name,
-            What::Gantry { case, index, .. } => &case.experiments[*index].name,
             What::Move { case, index, .. } => &case.moves[*index].name,
         }
     }
@@ -95,7 +87,6 @@ impl Run {
     fn ending(&self) -> (&'static str, f64) {
         let end = match &self.what {
             What::Experiment { metrics, .. } => metrics.end,
-            What::Gantry { metrics, .. } => metrics.end,
             What::Move { run, .. } => run.metrics.end,
         };
         json::ending(self.outcome().ending, end)
@@ -116,12 +107,8 @@ impl Run {
 
     /// The key figures.
     fn figures<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let of_axis = |metrics: &Metrics, case: &Case| {
-            serde_json::to_value(json::Metrics::of(metrics, case.machine.drives[0].amplifier.mode)).unwrap_or_default()
-        };
         let told = guarded(|| match &self.what {
-            What::Experiment { case, metrics, .. } => of_axis(metrics, case),
-            What::Gantry { case, metrics, .. } => json::gantry_metrics(metrics, case.machine.kind),
+            What::Experiment { case, metrics, .. } => json::figures(metrics, &case.machine),
             What::Move { case, index, run, worst, .. } => {
                 let moved = Moved {
                     motion: &case.moves[*index],
@@ -131,7 +118,7 @@ impl Run {
                     shortfalls: &[],
                     files: &[],
                 };
-                in_closed_loop(of_axis(&run.metrics, case), json::motion(&moved))
+                in_closed_loop(json::figures(&run.metrics, &case.machine), json::motion(&moved))
             }
         });
         value::json(py, &told?)
@@ -140,26 +127,15 @@ impl Run {
     /// Every event.
     fn events<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let list = &self.outcome().events;
-        let events = || -> Vec<json::Event> {
-            match &self.what {
-                What::Gantry { case, .. } => {
-                    let mechanism = case.machine.mechanism();
-                    list.iter().map(|event| json::Event::on(&mechanism, event)).collect()
-                }
-                What::Experiment { .. } | What::Move { .. } => list.iter().map(json::Event::of).collect(),
-            }
-        };
+        let mechanism = self.case().machine.mechanism();
+        let events = || -> Vec<json::Event> { list.iter().map(|event| json::Event::on(&mechanism, event)).collect() };
         value::json(py, &guarded(|| serde_json::to_value(events()).unwrap_or_default())?)
     }
 
     /// Files that the case names, which nothing is written over.
     #[getter]
     fn inputs(&self) -> Vec<&Path> {
-        let files = match &self.what {
-            What::Experiment { case, .. } | What::Move { case, .. } => &case.files,
-            What::Gantry { case, .. } => &case.files,
-        };
-        files.iter().map(|file| file.path.as_path()).collect()
+        self.case().files.iter().map(|file| file.path.as_path()).collect()
     }
 }
 
@@ -186,9 +162,15 @@ fn in_closed_loop(mut figures: Value, told: Value) -> Value {
 }
 
 impl Run {
+    fn case(&self) -> &Case {
+        match &self.what {
+            What::Experiment { case, .. } | What::Move { case, .. } => case,
+        }
+    }
+
     fn outcome(&self) -> &Outcome {
         match &self.what {
-            What::Experiment { outcome, .. } | What::Gantry { outcome, .. } => outcome,
+            What::Experiment { outcome, .. } => outcome,
             What::Move { run, .. } => &run.outcome,
         }
     }
@@ -250,51 +232,6 @@ fn one(py: Python<'_>, case: &Arc<Case>, experiment: &Experiment, solver: Solver
     let index = case.experiments.iter().position(|other| std::ptr::eq(other, experiment)).unwrap_or_default();
     let metrics = Box::new(metrics);
     let what = What::Experiment { case: Arc::clone(case), index, solver, outcome, metrics, reduction };
-    Ok(Run { columns: Columns::of(py, trajectory)?, what, took })
-}
-
-/// Runs experiments of a gantry.
-pub fn simulate_gantry(
-    py: Python<'_>,
-    case: &Arc<Case>,
-    path: &Path,
-    names: &[String],
-    solver: Solver,
-) -> PyResult<Vec<Run>> {
-    let experiments = case.experiments_named(path, names).told(py)?;
-    experiments.into_iter().map(|experiment| one_of_gantry(py, case, experiment, solver)).collect()
-}
-
-fn one_of_gantry(py: Python<'_>, case: &Arc<Case>, experiment: &Experiment, solver: Solver) -> PyResult<Run> {
-    let mechanism = case.machine.mechanism();
-    columns::fit(py, experiment.samples() as f64, mechanism.columns.len(), FEWER)?;
-    let interrupt = Interrupt::listen();
-    let found = unlocked(py, || {
-        let begin = Instant::now();
-        let mut meter = GantryMeter::new(&case.machine);
-        let mut trajectory = Trajectory::default();
-        let rows = experiment.samples().min(1 << 20) as usize + 1;
-        let mut take = |block: &Trajectory| {
-            if trajectory.columns.is_empty() {
-                trajectory = Trajectory::with_capacity(&block.columns, rows);
-            }
-            trajectory.append(block);
-            if interrupt.stop() { Flow::Stop } else { Flow::Continue }
-        };
-        let shown = (Detail::Full, Some(&mut meter as &mut dyn solve::Observe));
-        let outcome =
-            solve::stream_mechanism(&mechanism, &Course::of(&mechanism, experiment), solver, shown, &mut take);
-        let found = outcome.map(|outcome| {
-            let metrics = meter.finish(&outcome.events);
-            (trajectory, outcome, metrics)
-        });
-        (found, begin.elapsed().as_secs_f64())
-    });
-    interrupt.finish()?;
-    let (found, took) = found?;
-    let (trajectory, outcome, metrics) = found.told(py)?;
-    let index = case.experiments.iter().position(|other| std::ptr::eq(other, experiment)).unwrap_or_default();
-    let what = What::Gantry { case: Arc::clone(case), index, solver, outcome, metrics: Box::new(metrics) };
     Ok(Run { columns: Columns::of(py, trajectory)?, what, took })
 }
 
@@ -409,7 +346,7 @@ pub fn simulation<'py>(py: Python<'py>, runs: Vec<PyRef<'py, Run>>) -> PyResult<
         .iter()
         .map(|run| match &run.what {
             What::Experiment { case, index, .. } => taut::fit::beside_log(&case.machine, &case.experiments[*index]),
-            What::Gantry { .. } | What::Move { .. } => None,
+            What::Move { .. } => None,
         })
         .collect();
     let axis: Vec<Simulated> = runs
@@ -425,24 +362,12 @@ pub fn simulation<'py>(py: Python<'py>, runs: Vec<PyRef<'py, Run>>) -> PyResult<
                 log: log.as_ref(),
                 files: &[],
             }),
-            What::Gantry { .. } | What::Move { .. } => None,
-        })
-        .collect();
-    let gantry: Vec<GantrySimulated> = runs
-        .iter()
-        .filter_map(|run| match &run.what {
-            What::Gantry { case, index, outcome, metrics, .. } => {
-                Some(GantrySimulated { experiment: &case.experiments[*index], outcome, metrics, files: &[] })
-            }
-            What::Experiment { .. } | What::Move { .. } => None,
+            What::Move { .. } => None,
         })
         .collect();
     let told = runs.iter().find_map(|run| match &run.what {
         What::Experiment { case, solver, .. } => {
             Some(guarded(|| serde_json::to_value(Simulation::new(case, *solver, &axis)).unwrap_or_default()))
-        }
-        What::Gantry { case, solver, .. } => {
-            Some(guarded(|| serde_json::to_value(GantrySimulation::new(case, *solver, &gantry)).unwrap_or_default()))
         }
         What::Move { .. } => None,
     });
@@ -464,7 +389,7 @@ pub fn moves<'py>(py: Python<'py>, runs: Vec<PyRef<'py, Run>>) -> PyResult<Bound
                 let profile = profile.clone().shaped(design.map_or(&[], |design| &design.shaper));
                 (trouble, shortfalls(&case.machine, timing.limit, &profile))
             }
-            What::Experiment { .. } | What::Gantry { .. } => (None, Vec::new()),
+            What::Experiment { .. } => (None, Vec::new()),
         })
         .collect();
     let told: Vec<Moved> = runs
@@ -479,12 +404,12 @@ pub fn moves<'py>(py: Python<'py>, runs: Vec<PyRef<'py, Run>>) -> PyResult<Bound
                 shortfalls,
                 files: &[],
             }),
-            What::Experiment { .. } | What::Gantry { .. } => None,
+            What::Experiment { .. } => None,
         })
         .collect();
     let first = runs.iter().find_map(|run| match &run.what {
         What::Move { case, structure, timing, .. } => Some((case, structure, timing)),
-        What::Experiment { .. } | What::Gantry { .. } => None,
+        What::Experiment { .. } => None,
     });
     let Some((case, structure, timing)) = first else { return Ok(py.None().into_bound(py)) };
     value::json(py, &guarded(|| json::moves(&case.title, structure, timing, &case.machine, &told))?)

@@ -1,6 +1,6 @@
 //! Many runs: rows by number, on threads of this machine.
 
-use crate::case::{Case, Inner};
+use crate::case::Case;
 use crate::columns::{self, Columns};
 use crate::error::{Told, unlocked};
 use crate::interrupt::Interrupt;
@@ -23,10 +23,7 @@ pub struct Sweep {
 impl Sweep {
     #[new]
     fn new(py: Python<'_>, case: &Case) -> PyResult<Self> {
-        let planned = || match &case.inner {
-            Inner::Axis(case) => taut::sweep::Sweep::new(case),
-            Inner::Gantry(case) => taut::sweep::Sweep::new(case),
-        };
+        let planned = || taut::sweep::Sweep::new(&case.inner);
         let inner = unlocked(py, || planned().map_err(|error| error.in_file(&case.path)))?;
         Ok(Self { inner: inner.told(py)? })
     }

@@ -49,12 +49,18 @@ mod together;
 pub mod tune;
 
 pub use decimate::{Decimator, decimate};
-pub use drawing::stage_drawing;
 pub use equations::{BodyEquation, FrictionTerm, Inertia, MotorEquation, Term, axis_diagram, body_diagram};
 pub use figure::{Axis, Figure, Marker, Panel, Series, Style};
-pub use gantry::gantry_drawing;
 pub use page::{Callout, Cell, Page, Table};
 pub use picture::Picture;
 pub use plane::{Map, Plane};
 pub use raster::png;
 pub use svg::Colour;
+
+/// The drawing of a machine, with its values and positive directions. Works in light and dark.
+pub fn machine_drawing(machine: &taut::machine::Machine) -> String {
+    match machine.kind {
+        taut::machine::Kind::Axis => drawing::stage_drawing(machine),
+        _ => gantry::gantry_drawing(machine),
+    }
+}

@@ -99,7 +99,7 @@ fn page() -> Page {
     page.equation(maud::html! { math { mi { "φ" } mo { "=" } mn { "0" } } }, Some("(1)"));
     page.embed(NASTY, NASTY);
     figures().iter().for_each(|f| page.figure(f));
-    page.drawing(&stage_drawing(&machine(None)), NASTY);
+    page.drawing(&machine_drawing(&machine(None)), NASTY);
     page.footer(NASTY);
     page
 }
@@ -116,7 +116,7 @@ fn well_formed(svg: &str) {
 fn every_picture_is_well_formed_and_can_be_rasterised() {
     let mut pictures: Vec<String> = figures().iter().map(Figure::svg).collect();
     for at in [EncoderPlace::Motor, EncoderPlace::DrivePulley, EncoderPlace::Cart] {
-        pictures.push(stage_drawing(&machine(Some(Encoder { at, lines: 512.0 }))));
+        pictures.push(machine_drawing(&machine(Some(Encoder { at, lines: 512.0 }))));
     }
     let bodies = [0, 1, 4].map(|n| body("Cart", n));
     pictures.extend(bodies.iter().map(body_diagram));
@@ -137,7 +137,7 @@ fn a_scale_beside_an_encoder_is_drawn() {
     let encoder = Encoder { at: EncoderPlace::Motor, lines: 512.0 };
     let alone = machine(Some(encoder));
     let scale = Some(Encoder { at: EncoderPlace::Cart, lines: 50e3 });
-    let [without, with] = [alone.clone(), Machine { scale, ..alone }].map(|machine| stage_drawing(&machine));
+    let [without, with] = [alone.clone(), Machine { scale, ..alone }].map(|machine| machine_drawing(&machine));
     well_formed(&with);
     assert!(with.contains("encoder, 512 lines") && with.contains("scale, 50000 lines/m"), "{with}");
     assert!(without.contains("encoder, 512 lines") && !without.contains("lines/m"));

@@ -10,7 +10,6 @@ mod drift;
 mod export;
 mod fit;
 mod frf;
-mod gantry;
 mod gantry_modes;
 mod modes;
 mod moves;
@@ -30,7 +29,6 @@ pub use drift::drift;
 pub use export::{export, exported};
 pub use fit::fit;
 pub use frf::frf;
-pub use gantry::{GantrySimulated, GantrySimulation, gantry_metrics};
 pub use gantry_modes::gantry_modes;
 pub use modes::modes;
 pub use moves::{Moved, motion, moves};
@@ -38,7 +36,7 @@ pub use posterior::posterior;
 pub use result_schema::{identity, schema, schemas};
 pub use shape::shape;
 pub use show::show;
-pub use simulation::{Band, Event, Metrics, Simulated, Simulation, load_unit};
+pub use simulation::{Band, Event, Simulated, Simulation, figures, load_unit};
 pub use sweep::sweep;
 pub use tune::tuned;
 
@@ -77,5 +75,5 @@ fn peak(peak: Peak) -> Value {
 
 /// The URI of a schema.
 fn address(name: &str) -> String {
-    format!("urn:taut:{name}:1")
+    format!("urn:taut:{name}:{}", result_schema::version(name))
 }

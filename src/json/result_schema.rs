@@ -3,8 +3,9 @@
 //!
 //! In a path `[]` is each element of a list, `*` each key of a map, and a key that ends in `?` may be missing. Types
 //! are `text`, `number`, `whole`, `flag`, `any`, a list `[number]` and a map `{number}` of them; with `?` behind it,
-//! null is there where it has no value.
+//! null is there where it has no value. `FIGURES` stands for the lines of the key figures.
 
+use super::simulation::figure_lines;
 use serde_json::{Map, Value, json};
 
 /// The results, by the word that each begins with: `"schema": "taut/WORD/1"`.
@@ -20,7 +21,6 @@ const RESULTS: &[(&str, &str, &str)] = &[
     ("fit", "`taut fit`", include_str!("results/fit.txt")),
     ("frf", "`taut frf`", include_str!("results/frf.txt")),
     ("gantry-modes", "`taut modes` of a gantry", include_str!("results/gantry-modes.txt")),
-    ("gantry-simulate", "`taut simulate` of a gantry", include_str!("results/gantry-simulate.txt")),
     ("modes", "`taut modes`", include_str!("results/modes.txt")),
     ("move", "`taut move`", include_str!("results/move.txt")),
     ("paper", "`taut paper`: claims.json", include_str!("results/paper.txt")),
@@ -45,6 +45,12 @@ pub fn schema(name: &str) -> Option<Value> {
     let mut root = Node::default();
     for line in table.lines().filter(|line| !line.trim().is_empty()) {
         let (path, rest) = line.split_once(' ').unwrap_or((line, "any"));
+        if let Some(path) = path.strip_suffix("FIGURES") {
+            for [end, kind, meaning] in figure_lines() {
+                root.add(&format!("{path}{end}"), &kind, &meaning);
+            }
+            continue;
+        }
         let (kind, meaning) = rest.trim_start().split_once(' ').unwrap_or((rest.trim_start(), ""));
         root.add(path, kind, meaning.trim());
     }
@@ -61,7 +67,12 @@ pub fn schema(name: &str) -> Option<Value> {
 
 /// The word that a result of this name begins with.
 pub fn identity(name: &str) -> String {
-    format!("taut/{name}/1")
+    format!("taut/{name}/{}", version(name))
+}
+
+/// The version of a result's schema.
+pub(super) fn version(name: &str) -> u8 {
+    if name == "simulate" { 2 } else { 1 }
 }
 
 /// A key and what is below it.

@@ -3,13 +3,15 @@
 use super::fit::score;
 use crate::case::{Case, Experiment};
 use crate::fit::LogFit;
-use crate::machine::{AmplifierMode, Machine, axis};
+use crate::machine::{AmplifierMode, Kind, Machine, Motor, axis};
 use crate::mechanism::Mechanism;
-use crate::metrics::{self, Peak, SteadySpeed};
+use crate::metrics::{
+    self, EventCount, Figure, Metrics, OfDrive, OfLoad, OfSpan, Peak, Role, Seek, SteadySpeed, Worth,
+};
 use crate::reduction::Reduction;
 use crate::solve::{self, Method, Outcome, Solver};
 use serde::Serialize;
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 /// Events listed; the rest is in the events' own file.
 pub(super) const MOST_EVENTS: usize = 10_000;
@@ -22,7 +24,7 @@ pub struct Simulated<'a> {
     /// Events, ending and cost.
     pub outcome: &'a Outcome,
     /// Its key figures.
-    pub metrics: &'a metrics::Metrics,
+    pub metrics: &'a Metrics,
     /// How far its model is from the elastic one, where it is a reduced one.
     pub reduction: Option<Reduction>,
     /// The band of the machines of a posterior.
@@ -39,8 +41,12 @@ pub struct Simulation {
     schema: String,
     title: String,
     version: &'static str,
+    kind: &'static str,
     solver: SolverUsed,
-    stage: StageFigures,
+    machine: MachineFigures,
+    /// Of an axis alone.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    stage: Option<StageFigures>,
     experiments: Vec<ExperimentFigures>,
 }
 
@@ -53,6 +59,22 @@ pub(super) struct SolverUsed {
     step_s: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     method: Option<&'static str>,
+}
+
+/// The machine, by the role of its parts.
+#[derive(Debug, Serialize)]
+struct MachineFigures {
+    pulley_radius_m: f64,
+    drive_pulley_inertia_kg_m2: f64,
+    /// Of each drive, with the gear's ratio squared.
+    rotor_inertia_at_pulley_kg_m2: Vec<f64>,
+    gear_ratio: Vec<f64>,
+    /// Mass of each body that slides.
+    #[serde(flatten)]
+    masses: Map<String, Value>,
+    /// By span, with what slides at zero.
+    span_stiffness_newton_per_m: Map<String, Value>,
+    spans_follow: bool,
 }
 
 #[derive(Debug, Serialize)]
@@ -73,7 +95,7 @@ struct ExperimentFigures {
     name: String,
     files: Vec<String>,
     ending: EndingTold,
-    metrics: Metrics,
+    metrics: Value,
     /// None for the elastic model.
     #[serde(skip_serializing_if = "Option::is_none")]
     reduction: Option<ReductionTold>,
@@ -83,7 +105,7 @@ struct ExperimentFigures {
     /// Where the experiment has a log.
     #[serde(skip_serializing_if = "Option::is_none")]
     log: Option<Value>,
-    /// By how much r φ₁, x and r φ₃ may be off.
+    /// By how much positions at the belt may be off.
     position_error_m: Option<f64>,
     position_error_basis: Option<&'static str>,
     /// Whether numbers of 64 bits determine the motion to a thousandth of itself.
@@ -113,33 +135,6 @@ pub struct Band {
 pub(super) struct EndingTold {
     word: &'static str,
     time_s: f64,
-}
-
-/// The key figures of a run.
-#[derive(Debug, Serialize)]
-pub struct Metrics {
-    end_time_s: f64,
-    final_drive_angle_rad: f64,
-    final_drive_travel_m: f64,
-    final_cart_position_m: f64,
-    final_cart_speed_m_s: f64,
-    #[serde(rename = "peak_cart_speed_m_s")]
-    cart_speed: PeakTold,
-    #[serde(rename = "peak_drive_speed_m_s")]
-    drive_speed: PeakTold,
-    steady_speed: Option<SteadyTold>,
-    #[serde(rename = "peak_span_stretch_m")]
-    stretch: [PeakTold; 3],
-    #[serde(rename = "peak_span_force_N")]
-    force: [PeakTold; 3],
-    #[serde(rename = "peak_motor_current_A")]
-    current: PeakTold,
-    #[serde(rename = "peak_drive_travel_minus_cart_m")]
-    encoder_error: PeakTold,
-    final_drive_travel_minus_cart_m: f64,
-    stop_time_s: Option<f64>,
-    settled: bool,
-    event_counts: [CountTold; 3],
 }
 
 /// A reduced model beside the elastic one.
@@ -209,15 +204,18 @@ pub(super) struct CostTold {
 impl Simulation {
     /// The summary of these runs.
     pub fn new(case: &Case, solver: Solver, runs: &[Simulated]) -> Self {
+        let mechanism = case.machine.mechanism();
         Self {
             schema: super::identity("simulate"),
             title: case.title.clone(),
             version: env!("CARGO_PKG_VERSION"),
+            kind: case.machine.kind.word(),
             solver: SolverUsed::of(solver),
-            stage: StageFigures::of(&case.machine),
+            machine: MachineFigures::of(&case.machine),
+            stage: case.is_axis().then(|| StageFigures::of(&case.machine)),
             experiments: runs
                 .iter()
-                .map(|run| ExperimentFigures::of(run, case.machine.drives[0].amplifier.mode, solver))
+                .map(|run| ExperimentFigures::of(run, (&case.machine, &mechanism), solver))
                 .collect(),
         }
     }
@@ -241,6 +239,30 @@ impl SolverUsed {
     }
 }
 
+impl MachineFigures {
+    fn of(machine: &Machine) -> Self {
+        let of_motors = |number: fn(&Motor) -> f64| machine.drives.iter().map(|unit| number(&unit.motor)).collect();
+        let geometry = machine.geometry();
+        let mass = |(at, slide): (&crate::machine::SlideAt, &crate::machine::Slide)| {
+            (format!("{}_mass_kg", geometry.label(at.body).key), json!(slide.mass))
+        };
+        let stiffness = machine.belt.stiffness.iter().map(|k| super::number(*k));
+        Self {
+            pulley_radius_m: machine.pulley_radius,
+            drive_pulley_inertia_kg_m2: machine.drive_pulley.inertia,
+            rotor_inertia_at_pulley_kg_m2: of_motors(|motor| motor.gear_ratio.powi(2) * motor.rotor_inertia),
+            gear_ratio: of_motors(|motor| motor.gear_ratio),
+            masses: geometry.slides.iter().zip(machine.slides()).map(mass).collect(),
+            span_stiffness_newton_per_m: geometry
+                .span_labels()
+                .map(|span| span.key.to_string())
+                .zip(stiffness)
+                .collect(),
+            spans_follow: machine.belt.follows_cart,
+        }
+    }
+}
+
 impl StageFigures {
     fn of(machine: &Machine) -> Self {
         let (n, r) = (machine.drives[0].motor.gear_ratio, machine.pulley_radius);
@@ -260,13 +282,13 @@ impl StageFigures {
 }
 
 impl ExperimentFigures {
-    fn of(run: &Simulated, mode: AmplifierMode, solver: Solver) -> Self {
+    fn of(run: &Simulated, (machine, mechanism): (&Machine, &Mechanism), solver: Solver) -> Self {
         let (metrics, outcome) = (run.metrics, run.outcome);
         Self {
             name: run.experiment.name.clone(),
             files: run.files.to_vec(),
             ending: EndingTold::of(outcome, metrics.end),
-            metrics: Metrics::of(metrics, mode),
+            metrics: figures(metrics, machine),
             reduction: run.reduction.map(|reduction| ReductionTold {
                 cart: reduction.cart.into(),
                 drive: reduction.drive.into(),
@@ -280,7 +302,7 @@ impl ExperimentFigures {
             position_error_basis: error_basis(outcome, solver),
             is_determined: is_determined(outcome),
             decided_within_rounding: TieTold::of(outcome),
-            events: outcome.events.iter().take(MOST_EVENTS).map(Event::of).collect(),
+            events: outcome.events.iter().take(MOST_EVENTS).map(|event| Event::on(mechanism, event)).collect(),
             events_not_listed: outcome.events.len().saturating_sub(MOST_EVENTS),
             cost: CostTold::of(outcome),
         }
@@ -344,29 +366,114 @@ impl CountTold {
     }
 }
 
-impl Metrics {
-    /// As seen by a meter on a stage whose amplifier works in this way.
-    pub fn of(metrics: &metrics::Metrics, mode: AmplifierMode) -> Self {
-        let count = |body: usize| CountTold::of(axis::LABELS[body].key, metrics.events[body]);
-        Self {
-            end_time_s: metrics.end,
-            final_drive_angle_rad: metrics.final_drive_angle,
-            final_drive_travel_m: metrics.final_drive_travel,
-            final_cart_position_m: metrics.final_cart_position,
-            final_cart_speed_m_s: metrics.final_cart_speed,
-            cart_speed: metrics.peak_cart_speed.into(),
-            drive_speed: metrics.peak_drive_speed.into(),
-            steady_speed: metrics.steady_speed.map(|steady| SteadyTold::of(steady, mode)),
-            stretch: metrics.peak_stretch.map(PeakTold::from),
-            force: metrics.peak_force.map(PeakTold::from),
-            current: metrics.peak_current.into(),
-            encoder_error: metrics.peak_encoder_error.into(),
-            final_drive_travel_minus_cart_m: metrics.final_drive_travel - metrics.final_cart_position,
-            stop_time_s: metrics.stop_time,
-            settled: metrics.settled,
-            event_counts: std::array::from_fn(count),
+/// The key figures of a run of this machine: the rows of [`FIGURES`](metrics::FIGURES), each under its key by role and,
+/// where an axis has another name for it, under that one, too.
+pub fn figures(metrics: &Metrics, machine: &Machine) -> Value {
+    let geometry = machine.geometry();
+    let mut told = Map::new();
+    told.insert("end_time_s".into(), json!(metrics.end));
+    for figure in metrics::figures(machine.kind) {
+        let value = match figure.of(metrics) {
+            Worth::Number(_) if figure.row.seek == Some(Seek::SteadySpeed) => {
+                let steady =
+                    metrics.steady_speed.map(|steady| SteadyTold::of(steady, machine.drives[0].amplifier.mode));
+                json!(steady)
+            }
+            Worth::Number(value) => super::number(value),
+            Worth::Peak(peak) => super::peak(peak),
+            Worth::Flag(flag) => json!(flag),
+            Worth::TimeOfPeak(_) => continue,
+        };
+        match key(&figure) {
+            Key::Whole(keys) => keys.into_iter().for_each(|key| {
+                told.insert(key, value.clone());
+            }),
+            Key::OfSpan(key) => {
+                let spans = told.entry(key).or_insert_with(|| json!({}));
+                spans[geometry.spans[figure.place].label.key] = value;
+            }
+            Key::OfBody => {}
         }
     }
+    let counts = geometry.bodies.iter().zip(&metrics.bodies).map(|(body, count)| CountTold::of(body.label.key, *count));
+    told.insert("event_counts".into(), json!(counts.collect::<Vec<_>>()));
+    Value::Object(told)
+}
+
+/// Where a result holds a figure.
+enum Key {
+    /// Under these keys.
+    Whole(Vec<String>),
+    /// Under this key, in a map by spans.
+    OfSpan(String),
+    /// Among the counts of events.
+    OfBody,
+}
+
+fn key(figure: &Figure) -> Key {
+    let of = |name: &str| match figure.row.seek {
+        Some(Seek::SteadySpeed) => name.to_string(),
+        _ => format!("{name}{}", unit_key(figure.unit)),
+    };
+    match figure.row.role {
+        Role::Body => Key::OfBody,
+        Role::Span => Key::OfSpan(of(&figure.row.name.replace('*', "span"))),
+        _ if figure.name == figure.by_role => Key::Whole(vec![of(&figure.name)]),
+        _ => Key::Whole(vec![of(&figure.by_role), of(&figure.name)]),
+    }
+}
+
+/// A unit as the end of a key.
+fn unit_key(unit: &str) -> String {
+    if unit.is_empty() { String::new() } else { format!("_{}", unit.replace('/', "_")) }
+}
+
+/// The lines of the table of a schema that stand for the key figures: path below the metrics, type and meaning.
+pub(super) fn figure_lines() -> Vec<[String; 3]> {
+    let mut lines: Vec<[String; 3]> = Vec::new();
+    let mut add = |path: String, kind: &str, words: &str| {
+        if lines.iter().all(|line| line[0] != path) {
+            lines.push([path, kind.into(), words.into()]);
+        }
+    };
+    let kinds = Kind::ALL;
+    // Of more parts than any machine has.
+    let nothing = Metrics {
+        loads: vec![OfLoad::default(); 8],
+        drives: vec![OfDrive::default(); 8],
+        spans: vec![OfSpan::default(); 8],
+        bodies: vec![EventCount::default(); 8],
+        ..Metrics::default()
+    };
+    for figure in kinds.iter().flat_map(|kind| metrics::figures(*kind)) {
+        let of_all = |name: &str| {
+            kinds.iter().all(|kind| metrics::figures(*kind).iter().any(|one| one.by_role == name || one.name == name))
+        };
+        let ends: &[(&str, &str)] = match figure.of(&nothing) {
+            Worth::Number(_) if figure.row.seek == Some(Seek::SteadySpeed) => continue,
+            Worth::TimeOfPeak(_) => continue,
+            Worth::Number(_) if figure.row.seek == Some(Seek::StopTime) => &[("", "number?")],
+            Worth::Number(_) => &[("", "number")],
+            Worth::Peak(_) => &[(".value", "number"), (".time_s", "number")],
+            Worth::Flag(_) => &[("", "flag")],
+        };
+        let words = figure.words.replace(figure.part, "*");
+        let words = if figure.row.role == Role::Span { figure.row.words.replace("the *", "each") } else { words };
+        let keys = match key(&figure) {
+            Key::Whole(keys) => {
+                let bare = |key: &str| key.trim_end_matches(&unit_key(figure.unit)).to_string();
+                keys.into_iter().map(|key| if of_all(&bare(&key)) { key } else { format!("{key}?") }).collect()
+            }
+            Key::OfSpan(key) => vec![format!("{key}.*")],
+            Key::OfBody => continue,
+        };
+        for key in keys {
+            for (end, kind) in ends {
+                add(format!("{key}{end}"), kind, &words);
+            }
+        }
+    }
+    lines
 }
 
 impl From<Peak> for PeakTold {

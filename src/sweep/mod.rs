@@ -19,23 +19,23 @@
 //! # Ok::<(), taut::Error>(())
 //! ```
 
-mod axis;
 mod chance;
 mod distribution;
-mod gantry;
 mod indices;
 mod measures;
 mod plan;
 mod points;
 mod sobol;
 mod statistics;
+mod subject;
 mod summary;
 
 pub use distribution::Distribution;
 pub use indices::{Estimate, Index, indices};
-pub use measures::{Figure, Measure, OF_EXPERIMENT, OF_MOVE, OfPart, of_gantry};
+pub use measures::{Figure, Measure, OF_MOVE};
 pub use sobol::{DIMENSIONS, Sobol};
 pub use statistics::{Ranked, SHARES, Spread};
+use subject::{Subject, Worker};
 pub use summary::{Drawn, Measured, Shown, Summary};
 
 use crate::case::Sampling;
@@ -128,71 +128,6 @@ pub struct Group {
     pub figures: Vec<Figure>,
 }
 
-/// The subject of a sweep: a machine as the case has it, with its experiments and moves.
-#[derive(Debug, Clone)]
-enum Subject {
-    Axis(Box<axis::Axis>),
-    Gantry(Box<gantry::Gantry>),
-}
-
-impl Subject {
-    fn machine(&self) -> &Machine {
-        match self {
-            Subject::Axis(axis) => &axis.machine,
-            Subject::Gantry(swept) => &swept.machine,
-        }
-    }
-
-    fn groups(&self) -> Vec<Group> {
-        match self {
-            Subject::Axis(axis) => axis.groups(),
-            Subject::Gantry(swept) => swept.groups(),
-        }
-    }
-
-    /// Refuses a case whose own machine cannot be run.
-    fn check(&self) -> Result<()> {
-        match self {
-            Subject::Axis(axis) => axis.check(),
-            Subject::Gantry(swept) => swept.check(),
-        }
-    }
-}
-
-/// Runs machines of a subject, one after another.
-enum Worker<'a> {
-    Axis(Box<axis::Worker<'a>>),
-    Gantry(&'a gantry::Gantry, Box<Machine>),
-}
-
-impl<'a> Worker<'a> {
-    fn of(subject: &'a Subject) -> Self {
-        match subject {
-            Subject::Axis(axis) => Worker::Axis(Box::new(axis::Worker::new(axis))),
-            Subject::Gantry(swept) => Worker::Gantry(swept, Box::new(swept.machine.clone())),
-        }
-    }
-
-    /// The machine as the case has it, for numbers to be set.
-    fn reset(&mut self) -> &mut Machine {
-        match self {
-            Worker::Axis(worker) => worker.reset(),
-            Worker::Gantry(swept, gantry) => {
-                gantry.as_mut().clone_from(&swept.machine);
-                gantry.as_mut()
-            }
-        }
-    }
-
-    /// Adds status and figures of all that the machine does.
-    fn run(&mut self, values: &mut Vec<f64>) {
-        match self {
-            Worker::Axis(worker) => worker.run(values),
-            Worker::Gantry(swept, gantry) => swept.run(gantry, values),
-        }
-    }
-}
-
 /// Many runs of a case.
 #[derive(Debug, Clone)]
 pub struct Sweep {
@@ -259,7 +194,7 @@ impl Sweep {
 
     /// The machine of a run.
     pub fn machine(&self, run: u64) -> Machine {
-        let mut machine = self.subject.machine().clone();
+        let mut machine = self.subject.machine.clone();
         let mut values = Vec::with_capacity(self.inputs());
         self.put_values(run, &mut values);
         self.set(&mut machine, run, &values);
@@ -272,7 +207,7 @@ impl Sweep {
     pub fn rows(&self, first: u64, count: usize, stop: &dyn Fn() -> bool) -> Option<Trajectory> {
         let mut table = Trajectory::with_capacity(&self.headings, count);
         let mut values = Vec::with_capacity(self.headings.len());
-        let mut worker = Worker::of(&self.subject);
+        let mut worker = Worker::new(&self.subject);
         for run in self.range(first, count) {
             if stop() {
                 return None;
@@ -289,10 +224,7 @@ impl Sweep {
     /// blocks. Errors: a machine that cannot be run.
     pub fn stream(&self, run: u64, experiment: usize, sink: &mut dyn FnMut(&Trajectory) -> Flow) -> Result<Outcome> {
         let machine = self.machine(run);
-        match &self.subject {
-            Subject::Axis(axis) => axis.stream(&machine, experiment, sink),
-            Subject::Gantry(gantry) => gantry.stream(&machine, experiment, sink),
-        }
+        self.subject.stream(&machine, experiment, sink)
     }
 
     fn range(&self, first: u64, count: usize) -> std::ops::Range<u64> {

@@ -2,7 +2,7 @@
 
 use super::distribution::ends;
 use super::points::Points;
-use super::{DIMENSIONS, Distribution, Draws, Group, Parameter, Subject, Sweep, axis, gantry, headings};
+use super::{DIMENSIONS, Distribution, Draws, Group, Parameter, Subject, Sweep, headings};
 use crate::case::{Case, Kinds, Known, Origin, Prior, Sampling, Sweeping, Variation};
 use crate::error::{Error, Result};
 use crate::fit;
@@ -24,15 +24,12 @@ impl Sweep {
             Some(Origin::Posterior(file)) => Some(Arc::new(draws(case, plan, file)?)),
             _ => None,
         };
-        let subject = match case.is_axis() {
-            true => Subject::Axis(Box::new(axis::Axis::of(case, plan))),
-            false => Subject::Gantry(Box::new(gantry::Gantry::of(case, plan))),
-        };
+        let subject = Subject::of(case, plan);
         Self::planned(subject, plan, draws, &case.known)
     }
 
     fn planned(subject: Subject, plan: &Sweeping, draws: Option<Arc<Draws>>, known: &[Known]) -> Result<Self> {
-        let machine = subject.machine();
+        let machine = &subject.machine;
         let chosen = chosen(machine, known, plan, draws.as_deref())?;
         let mut parameters = Vec::new();
         let mut changes = Vec::new();

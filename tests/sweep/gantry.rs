@@ -3,10 +3,10 @@
 use super::{bits, rows};
 use taut::case::{Case, Given, Sampling};
 use taut::machine::Kind;
-use taut::metrics::{GantryMeter, GantryMetrics};
+use taut::metrics::{Meter, Metrics, figures};
 use taut::parameter::{Free, every, values};
 use taut::solve::{Course, Detail, Flow, Solver, stream_mechanism};
-use taut::sweep::{Status, Sweep, of_gantry};
+use taut::sweep::{Status, Sweep};
 use taut::trajectory::Trajectory;
 
 const H_FRAME: &str = include_str!("../../stages/h-frame/h-frame.toml");
@@ -21,9 +21,9 @@ fn sweep(text: &str, changes: &[&str]) -> Sweep {
 }
 
 /// The key figures that `taut simulate` gives of an experiment.
-fn simulated(case: &Case, experiment: usize) -> GantryMetrics {
+fn simulated(case: &Case, experiment: usize) -> Metrics {
     let mechanism = case.machine.mechanism();
-    let mut meter = GantryMeter::new(&case.machine);
+    let mut meter = Meter::new(&case.machine, &case.experiments[experiment]);
     let (course, solver) = (Course::of(&mechanism, &case.experiments[experiment]), Solver::of_mechanism(&mechanism));
     let observed = (Detail::Full, Some(&mut meter as _));
     let outcome = stream_mechanism(&mechanism, &course, solver, observed, &mut |_| Flow::Continue).unwrap();
@@ -72,14 +72,10 @@ fn a_row_is_the_run_of_its_machine() {
                 for (number, group) in sweep.groups().iter().enumerate() {
                     assert_eq!(table.get(&format!("{}.status", group.file)).unwrap()[row], Status::Complete.code());
                     let metrics = simulated(&case, number);
-                    for measure in of_gantry(&case.machine.mechanism()) {
-                        let value = table.get(&format!("{}.{}", group.file, measure.figure.name)).unwrap()[row];
-                        assert_eq!(
-                            value.to_bits(),
-                            measure.value(&metrics).to_bits(),
-                            "{design} {}",
-                            measure.figure.name
-                        );
+                    for figure in figures(case.machine.kind) {
+                        let value = table.get(&format!("{}.{}", group.file, figure.name)).unwrap()[row];
+                        let told = figure.of(&metrics).number();
+                        assert_eq!(value.to_bits(), told.to_bits(), "{design} {}", figure.name);
                         compared += 1;
                     }
                 }

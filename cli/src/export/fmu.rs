@@ -7,7 +7,7 @@ use taut::Result;
 use taut::case::Case;
 use taut::export::fmu::{Carried, Version, object_in, pack};
 use taut::export::{Exported, Part};
-use taut_report::{gantry_drawing, png, stage_drawing};
+use taut_report::{machine_drawing, png};
 
 /// `CARRIED`, the shared object, if the build made one; `NOTICES`, the licences of what is in it.
 mod carried {
@@ -38,8 +38,5 @@ fn object() -> Result<Cow<'static, [u8]>> {
 }
 
 fn drawing(case: &Case) -> String {
-    match case {
-        case if case.is_axis() => stage_drawing(&case.machine),
-        case => gantry_drawing(&case.machine),
-    }
+    machine_drawing(&case.machine)
 }

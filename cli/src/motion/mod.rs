@@ -20,7 +20,7 @@ use taut::trajectory::{CsvWriter, Trajectory};
 use taut::tune::trouble;
 use taut::{Error, Result};
 use taut_report::motion::{Curves, Done, Tried, figures, page};
-use taut_report::simulate::{early_end, named, time};
+use taut_report::simulate::{ended_early, named, time};
 
 /// Reads the cases, runs their moves, reports.
 pub fn run(args: &Args) -> Outcome {
@@ -154,7 +154,7 @@ fn write_samples(folder: &Folder, name: &str, case: &Case, run: &MoveRun) -> Res
 /// How it ended, and a word about every move that did not reach its end or whose loop is not to be relied on.
 fn status(tried: &[Tried], interrupt: &Interrupt) -> (Status, Vec<Remark>) {
     let early = |done: &Done| {
-        let told = early_end(&done.run.outcome.ending)?;
+        let told = ended_early(&done.run.outcome.ending, "cart")?;
         Some(Remark::Error(format!("the move \"{}\" {told}", done.motion.name)))
     };
     let unwell = |done: &Done| {

@@ -5,14 +5,14 @@ use std::fmt::Write;
 use taut::control::drives::drive_gains;
 use taut::machine::{AmplifierMode, Machine};
 use taut_report::motion::{Tried, controller, length, lines};
-use taut_report::simulate::{early_end, value};
+use taut_report::simulate::{ended_early, value};
 
 /// Text on the terminal for one case.
 pub fn text(tried: &Tried) -> String {
     let mut text = format!("{}\n{}\n", bold(&tried.case.title), controller(tried.design, &tried.case.machine));
     for done in &tried.done {
         let _ = write!(text, "\n{}\n", bold(&done.motion.name));
-        if let Some(told) = early_end(&done.run.outcome.ending) {
+        if let Some(told) = ended_early(&done.run.outcome.ending, "cart") {
             let _ = writeln!(text, "  {:<16}{}", "ended early", told.trim_start_matches("ended "));
         }
         for (name, words) in lines(tried, done) {

@@ -82,7 +82,7 @@ fn write(folder: &Folder, common: &Common, findings: &Findings, plots: &[Plot]) 
     folder.make("figures")?;
     let machine = &findings.sets.table4.machine;
     let drawings = [
-        ("figure-01-02", taut_report::stage_drawing(&findings.sets.table1.machine)),
+        ("figure-01-02", taut_report::machine_drawing(&findings.sets.table1.machine)),
         ("figure-18", diagrams::drive_pulley(machine)),
         ("figure-19", diagrams::whole(machine)),
     ];

@@ -9,7 +9,7 @@ use super::words::{found, mm, percent, rule, share, si, symbols, um, value};
 use super::{diagrams, tables};
 use maud::{Markup, html};
 use taut::number::significant;
-use taut_report::{Callout, Cell, Page, Table, stage_drawing};
+use taut_report::{Callout, Cell, Page, Table, machine_drawing};
 
 /// Puts it together. `plots` are looked up by their files' names.
 pub fn page(f: &Findings, claims: &[Claim], plots: &[Plot]) -> Page {
@@ -125,7 +125,7 @@ impl Report<'_> {
         let page = &mut *self.page;
         page.section("The stage and its parameters");
         page.drawing(
-            &stage_drawing(&f.sets.table1.machine),
+            &machine_drawing(&f.sets.table1.machine),
             html! { b { "Figures 1 and 2. " } "The stage as it is modelled, with the values of Table 1. \
             Rotation and position count positive in the sense of the arrows." },
         );

@@ -1,7 +1,6 @@
 //! `taut simulate`: runs the experiments of a case, and says what they show.
 
 mod band;
-mod gantry;
 mod rows;
 mod run;
 mod table;
@@ -21,7 +20,7 @@ use taut::json::{self, Simulation};
 use taut::machine::Machine;
 use taut::solve::{self, Ending, Solver};
 use taut::{Error, Result};
-use taut_report::simulate::{Run, early_end, figures, hidden, named, page};
+use taut_report::simulate::{Run, early_end, hidden, report};
 
 /// How to keep the result.
 const ADVICE: &str = "add --out DIR for files and a report; `taut studio CASE` shows it in motion";
@@ -34,10 +33,7 @@ pub fn run(args: &Simulate) -> Outcome {
 
 fn one(args: &Simulate, path: &Path) -> Outcome {
     let files = if args.experiments.is_empty() { Files::All } else { Files::Of(&args.experiments) };
-    match args.common.open_for(path, files)? {
-        case if case.is_axis() => axis(args, path, &case),
-        case => gantry::run(args, path, &case),
-    }
+    simulate(args, path, &args.common.open_for(path, files)?)
 }
 
 /// One case after the other, each into a folder of its own; the gravest end is that of all.
@@ -79,7 +75,8 @@ fn several(args: &Simulate) -> Outcome {
     Ok(all)
 }
 
-fn axis(args: &Simulate, path: &Path, case: &Case) -> Outcome {
+fn simulate(args: &Simulate, path: &Path, case: &Case) -> Outcome {
+    refuse(args, case)?;
     let common = &args.common;
     let solver = args.solver(&case.machine)?;
     let experiments = case.experiments_named(path, &args.experiments)?;
@@ -110,19 +107,32 @@ fn axis(args: &Simulate, path: &Path, case: &Case) -> Outcome {
     if let Some(folder) = &folder {
         let text = folder.bring(&case.text, &case.files).map_err(Failure::work)?;
         if common.draws() {
-            let figures: Vec<_> = runs.iter().map(|run| figures(case, run)).collect();
-            let page = page(case, &text, solver, &runs, &figures);
-            let names = runs.iter().map(|run| run.experiment.file_name());
-            finished.report = Some(Report { page, pictures: named(names, figures) });
+            let (page, pictures) = report(case, &text, solver, &runs);
+            finished.report = Some(Report { page, pictures });
         }
         finished.files.push(("case.toml".into(), text));
     }
     let ended: Vec<Ended> = runs
         .iter()
-        .map(|run| Ended { name: &run.experiment.name, outcome: &run.outcome, early: early_end(&run.outcome.ending) })
+        .map(|run| Ended { name: &run.experiment.name, outcome: &run.outcome, early: early_end(run, &case.machine) })
         .collect();
     (finished.status, finished.remarks) = status(&ended, solver, &interrupt);
     finished.finish(common, folder)
+}
+
+/// Refuses what is there for an axis alone.
+fn refuse(args: &Simulate, case: &Case) -> Result<()> {
+    let (option, next) = match case.is_axis() {
+        true => return Ok(()),
+        false if args.as_measured => {
+            ("--as-measured", "leave it out: the columns hold the encoder's counts, where the case has an [encoder]")
+        }
+        false if args.draws.is_some() => {
+            ("--draws", "leave it out: gantries are not fitted yet, so there are no draws of one")
+        }
+        false => return Ok(()),
+    };
+    Err(Error::new("this is there for a single axis, and not yet for a gantry").in_file(option).next(next))
 }
 
 /// The files that will be written, but for plots: `brought` are those of the case's inputs, `experiments` the names of

@@ -93,8 +93,7 @@ impl<'a> Setting<'a> {
             reduction = Reduction::of(machine, experiment, self.solver)?;
             log = beside_log(machine, experiment);
         }
-        let model = machine.belt.model;
-        Ok(Run { experiment, outcome, metrics, curves, samples, band, log, model, reduction, files, took })
+        Ok(Run { experiment, outcome, metrics, curves, samples, band, log, reduction, files, took })
     }
 
     /// Runs it once more, as its recorder sees it, and writes the log.

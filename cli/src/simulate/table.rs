@@ -6,17 +6,22 @@ use std::time::Duration;
 use taut::case::Case;
 use taut::number;
 use taut::solve::Solver;
-use taut_report::simulate::{Run, early_end, lines, solver_words};
+use taut_report::simulate::{Run, early_end, lines, machine, solver_words};
 
 /// The text on the terminal.
 pub fn text(case: &Case, solver: Solver, runs: &[Run]) -> String {
-    let mut text = format!("{}\n{}\n", bold(&case.title), solver_words(solver, runs.iter().map(|run| &run.outcome)));
+    let how = solver_words(solver, runs.iter().map(|run| &run.outcome));
+    let mut text = format!("{}\n", bold(&case.title));
+    if !case.is_axis() {
+        let _ = writeln!(text, "{}", machine(&case.machine));
+    }
+    let _ = writeln!(text, "{how}");
     for run in runs {
         let _ = write!(text, "\n{}\n", bold(&run.experiment.name));
-        if let Some(told) = early_end(&run.outcome.ending) {
+        if let Some(told) = early_end(run, &case.machine) {
             let _ = writeln!(text, "  {:<16}{}", "ended early", told.trim_start_matches("ended "));
         }
-        for (name, words) in lines(run, solver) {
+        for (name, words) in lines(run, &case.machine, solver) {
             let _ = writeln!(text, "  {name:<16}{words}");
         }
         let _ = writeln!(text, "  {:<16}{}", "took", took(run.took));
@@ -26,6 +31,6 @@ pub fn text(case: &Case, solver: Solver, runs: &[Run]) -> String {
 }
 
 /// How long it took.
-pub fn took(duration: Duration) -> String {
+fn took(duration: Duration) -> String {
     number::engineering(duration.as_secs_f64(), "s", 3).replace('\u{a0}', " ")
 }

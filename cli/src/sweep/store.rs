@@ -225,7 +225,7 @@ fn chunk(work: &Work, threads: usize) -> u64 {
 /// A hash of everything that rows follow from: the text of the case with what the command line changed, and the files
 /// it names.
 fn fingerprint(work: &Work) -> Result<String> {
-    let mut bytes = work.case.text.as_str().as_bytes().to_vec();
+    let mut bytes = work.case.text.as_bytes().to_vec();
     for path in work.case.files.iter().map(|file| &file.path) {
         bytes.extend(taut::files::read(path, usize::MAX).map_err(|e| Error::new(e.to_string()).in_file(path))?);
     }

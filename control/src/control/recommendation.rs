@@ -7,7 +7,7 @@ use super::resonance::{Drive, Reach, Resonance, reaches, resonances};
 use super::shaper::{Firmware, Form, residual_vibration};
 use super::shaping::{Choice, Criterion, Target, choose};
 use super::spectrum::{Axis, Spectrum};
-use crate::case::Case;
+use crate::case::{Case, Files};
 use crate::error::{Error, Result};
 use crate::log::read_accelerometer;
 use std::path::{Path, PathBuf};
@@ -221,7 +221,7 @@ fn model(args: &Question, file: &Path) -> Result<(Source, Vec<PathBuf>)> {
         return Err(error.next("leave --axis out, or give a spectrum"));
     }
     let changes: Vec<&str> = args.changes.iter().map(String::as_str).collect();
-    let case = Case::read_with(file, &changes)?;
+    let case = Case::read_axis_for(file, &changes, Files::All)?;
     let drive = args.drive.unwrap_or(Drive::Held);
     let modes = resonances(&case.machine, drive).map_err(|e| e.in_file(file))?;
     let also = case.files.into_iter().map(|file| file.path).collect();

@@ -3,7 +3,6 @@
 use super::{Method, Solver};
 use crate::error::{Error, Result};
 use crate::machine::Machine;
-use crate::mechanism::Mechanism;
 
 /// The name of a solver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,19 +29,15 @@ pub struct Choice {
 }
 
 impl Choice {
-    /// The solver that is asked for, or else the one for this stage. Options that do not go with it are told by the
-    /// names of the command line.
+    /// The solver that is asked for, or else the one for this machine. Options that do not go with it are told by the
+    /// names of the command line; Table 3 is of an axis alone.
     pub fn solver(&self, machine: &Machine) -> Result<Solver> {
-        self.instead_of(Solver::of(machine))
-    }
-
-    /// The same for a machine that is no axis, which Table 3 does not know.
-    pub fn solver_of(&self, mechanism: &Mechanism) -> Result<Solver> {
         let option = match (self.solver, self.step, self.method) {
+            _ if machine.kind == crate::machine::Kind::Axis => return self.instead_of(Solver::of(machine)),
             (Some(Kind::Table3), _, _) => "--solver table3",
             (_, Some(_), _) => "--step",
             (_, _, Some(_)) => "--method",
-            _ => return self.instead_of(Solver::of_mechanism(mechanism)),
+            _ => return self.instead_of(Solver::of(machine)),
         };
         Err(Error::new("the paper's Table 3, with its fixed step, is of a single axis")
             .in_file(option)

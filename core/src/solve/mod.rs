@@ -452,7 +452,7 @@ pub fn stream(
 /// let experiment = &case.experiments[0];
 /// let mut meter = Meter::new(&case.machine, experiment);
 /// let outcome = stream_observed(&case.machine, experiment, Solver::Exact, &mut meter, &mut |_| Flow::Continue)?;
-/// assert!(meter.finish(&outcome.events).peak_current.value > 1.0);
+/// assert!(meter.finish(&outcome.events).drive().peak_current.value > 1.0);
 /// # Ok::<(), taut::Error>(())
 /// ```
 pub fn stream_observed(

@@ -61,7 +61,7 @@ pub fn pack(case: &Case, part: Option<Part>, version: Version, stem: &str, carri
     archive.add("modelDescription.xml", description(&model, version, sources.is_ok())?.as_bytes())?;
     archive.add(&format!("binaries/{folder}/{BINARY}.{ending}"), carried.object)?;
     archive.add(MACHINE, model.resource.as_bytes())?;
-    archive.add("resources/case.toml", case.text.as_str().as_bytes())?;
+    archive.add("resources/case.toml", case.text.as_bytes())?;
     if let Some(icon) = carried.icon {
         archive.add(if version == Version::Two { "model.png" } else { "terminalsAndIcons/icon.png" }, icon)?;
     }

@@ -4,7 +4,7 @@ use super::Tried;
 use super::rows::{controller, lines};
 use crate::drawing::stage_drawing;
 use crate::page::{Callout, Cell, Page, Table};
-use crate::simulate::{Named, early_end, figures_table};
+use crate::simulate::{Named, ended_early, figures_table};
 use taut::control::drives::drive_gains;
 
 /// The page; `text` is the case that repeats the moves.
@@ -15,7 +15,7 @@ pub fn page(tried: &Tried, text: &str, figures: &[Vec<Named>]) -> Page {
     page.drawing(&stage_drawing(&tried.case.machine), "Symbols, values and positive directions.");
     for (done, figures) in tried.done.iter().zip(figures) {
         page.section(&done.motion.name);
-        if let Some(told) = early_end(&done.run.outcome.ending) {
+        if let Some(told) = ended_early(&done.run.outcome.ending, "cart") {
             page.callout(Callout::Fails, "The whole move", format!("This move {told}."));
         }
         page.table(&figures_table(lines(tried, done)));

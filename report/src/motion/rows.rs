@@ -8,7 +8,6 @@ use taut::control::sliding;
 use taut::design::{Design, FeedForwardModel, Structure};
 use taut::machine::rigid::Rigid;
 use taut::machine::{EncoderPlace, Machine};
-use taut::metrics::largest;
 
 /// A length in µm, in mm from 10 mm on.
 pub fn length(metres: f64) -> String {
@@ -68,8 +67,8 @@ pub fn lines(tried: &Tried, done: &Done) -> Vec<(&'static str, String)> {
     let deviation = |d: &taut::control::Deviation| {
         format!("at most {} at {}, {} rms", length(d.peak.value), time(d.peak.time), length(d.rms))
     };
-    let (span, stretch) = largest(&run.metrics.peak_stretch);
-    let (force_span, force) = largest(&run.metrics.peak_force);
+    let (span, stretch) = run.metrics.largest_stretch();
+    let (force_span, force) = run.metrics.largest_force();
     let settling = match figures.settling {
         Some(settling) => format!("{} after the profile, within {}", time(settling), length(done.motion.window)),
         None => format!("not within {} until the end", length(done.motion.window)),
@@ -83,8 +82,8 @@ pub fn lines(tried: &Tried, done: &Done) -> Vec<(&'static str, String)> {
         ("following error", deviation(&figures.following)),
         ("settling", settling),
         ("overshoot", length(figures.overshoot)),
-        ("peak stretch", format!("{} in span {span} at {}", value(stretch.value, "m"), time(stretch.time))),
-        ("peak force", format!("{} in span {force_span} at {}", value(force.value, "N"), time(force.time))),
+        ("peak stretch", format!("{} in span {} at {}", value(stretch.value, "m"), span + 1, time(stretch.time))),
+        ("peak force", format!("{} in span {} at {}", value(force.value, "N"), force_span + 1, time(force.time))),
         ("current", format!("at most {}, {} rms", value(figures.current.0.value, "A"), value(figures.current.1, "A"))),
         ("voltage", format!("at most {}, {} rms", value(figures.voltage.0.value, "V"), value(figures.voltage.1, "V"))),
         ("saturated", held),

@@ -1,7 +1,8 @@
 //! The curves of a run, thinned out as its rows come, so that a plot of any run needs the same memory.
 
 use crate::Decimator;
-use taut::machine::Machine;
+use taut::machine::{DriveAt, Kind, Machine};
+use taut::mechanism::Heading;
 use taut::trajectory::Trajectory;
 
 /// Points that a curve keeps: more than a plot has pixels.
@@ -16,9 +17,32 @@ pub fn decimator() -> Decimator {
 }
 
 /// A curve: its name, and the columns that it is a sum of, each with its weight.
-pub type Source = (String, Vec<(String, f64)>);
+type Source = (String, Vec<(String, f64)>);
 
-/// Every curve that the report of an axis can show.
+/// Every curve that a report can show.
+fn sources(machine: &Machine) -> Vec<Source> {
+    match machine.kind {
+        Kind::Axis => of_axis(machine.pulley_radius),
+        _ => in_plane(machine),
+    }
+}
+
+/// All columns, and x and y as the drives say minus what they are, as `Machine::by_drives` has it, term by term.
+fn in_plane(machine: &Machine) -> Vec<Source> {
+    let alone = |heading: &Heading| (heading.name.to_string(), vec![(heading.name.to_string(), 1.0)]);
+    let mut sources: Vec<Source> = machine.mechanism().columns.iter().map(alone).collect();
+    let geometry = machine.geometry();
+    for (name, slide) in ["x error", "y error"].into_iter().zip(geometry.slides) {
+        let angle = |drive: &DriveAt| format!("{}_angle", geometry.label(drive.pulley).key);
+        let drives = geometry.drives.iter().zip(slide.by_drives);
+        let mut terms: Vec<_> = drives.map(|(drive, weight)| (angle(drive), weight * machine.pulley_radius)).collect();
+        terms.push((format!("{}_position", geometry.label(slide.body).key), -1.0));
+        sources.push((name.into(), terms));
+    }
+    sources
+}
+
+/// Of an axis.
 fn of_axis(r: f64) -> Vec<Source> {
     let column = |name: &'static str, column: &'static str| (name, vec![(column, 1.0)]);
     let arc = |name, angle: &'static str| (name, vec![(angle, r)]);
@@ -95,18 +119,22 @@ pub struct Curves {
     sources: Vec<Source>,
     thinned: Vec<Decimator>,
     scratch: Vec<f64>,
+    /// The way of the cart in its plane, where it has one.
+    way: Option<Way>,
 }
 
 impl Curves {
-    /// No points yet, of an axis.
+    /// No points yet.
     pub fn new(machine: &Machine) -> Self {
-        Self::of(of_axis(machine.pulley_radius))
+        let sources = sources(machine);
+        let thinned = sources.iter().map(|_| decimator()).collect();
+        let way = (machine.kind != Kind::Axis).then(|| Way::new(["cart_position", "bridge_position"]));
+        Self { sources, thinned, scratch: Vec::new(), way }
     }
 
-    /// The same of these curves.
-    pub fn of(sources: Vec<Source>) -> Self {
-        let thinned = sources.iter().map(|_| decimator()).collect();
-        Self { sources, thinned, scratch: Vec::new() }
+    /// The cart's positions in its plane, y and x, where it has one.
+    pub fn way(&self) -> Option<(Vec<f64>, Vec<f64>)> {
+        self.way.as_ref().map(Way::points)
     }
 
     /// Takes the next rows.
@@ -128,6 +156,9 @@ impl Curves {
             };
             thinned.push(time, sum);
         }
+        if let Some(way) = &mut self.way {
+            way.take(block);
+        }
     }
 
     /// Rows that the curves stand for.
@@ -143,7 +174,7 @@ impl Curves {
 }
 
 /// Where two columns go together, one over the other, thinned out by leaving out every second row as often as needed.
-pub struct Way {
+struct Way {
     columns: [String; 2],
     stride: usize,
     rows: usize,

@@ -2,24 +2,26 @@
 
 mod band;
 mod curves;
-pub mod gantry;
+mod in_plane;
 mod marks;
 mod page;
 mod plots;
 pub(crate) mod rows;
 
 pub use band::Band;
-pub use curves::{Curves, Samples, Way, decimator};
+pub use curves::{Curves, Samples, decimator};
 pub(crate) use page::figures_table;
-pub use page::page;
-pub use plots::{Named, figures, named};
-pub use rows::{accuracy, cost, early_end, events, hidden, lines, plain, solver_words, speed, time, travel, value};
+pub use page::report;
+pub use plots::{Named, named};
+pub use rows::{
+    accuracy, cost, early_end, ended_early, events, hidden, lines, machine, plain, solver_words, speed, time, travel,
+    value,
+};
 
 use std::time::Duration;
 use taut::case::Experiment;
 use taut::fit::LogFit;
 use taut::json::{self, Simulated};
-use taut::machine::BeltModel;
 use taut::metrics::Metrics;
 use taut::reduction::Reduction;
 use taut::solve;
@@ -40,8 +42,6 @@ pub struct Run<'a> {
     pub band: Option<Band>,
     /// The run beside the log of its experiment, where it has one.
     pub log: Option<LogFit>,
-    /// Its model of the belt.
-    pub model: BeltModel,
     /// How far its model is from the elastic one, where it is a reduced one.
     pub reduction: Option<Reduction>,
     /// Its files, as paths within the folder.

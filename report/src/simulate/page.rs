@@ -1,28 +1,49 @@
 //! The report: one HTML file.
 
 use super::Run;
-use super::plots::Named;
-use super::rows::{early_end, lines};
-use crate::drawing::stage_drawing;
+use super::plots::{Named, figures, way};
+use super::rows::{early_end, lines, machine};
+use crate::machine_drawing;
 use crate::page::{Callout, Cell, Page, Table};
+use crate::{Picture, Plane};
 use taut::case::Case;
-use taut::json::load_unit;
+use taut::machine::Machine;
+use taut::mechanism::Mechanism;
+use taut::metrics::{self, Worth};
 use taut::number;
 use taut::solve::{Event, Solver};
 
 /// Events shown; the rest is in the events' own file.
 const MOST_EVENTS: usize = 200;
 
-/// The page for these runs; `text` is the case that repeats them.
-pub fn page(case: &Case, text: &str, solver: Solver, runs: &[Run], figures: &[Vec<Named>]) -> Page {
+/// The page for these runs, and its pictures by the names of their files; `text` is the case that repeats them.
+pub fn report(case: &Case, text: &str, solver: Solver, runs: &[Run]) -> (Page, Vec<(String, Picture)>) {
+    let mechanism = case.machine.mechanism();
     let mut page = Page::new(case.title.clone()).subtitle(how(solver));
-    page.section("The stage");
-    page.drawing(&stage_drawing(&case.machine), "Symbols, values and positive directions.");
-    for (run, figures) in runs.iter().zip(figures) {
-        experiment(&mut page, run, figures, solver);
+    let mut pictures = Vec::new();
+    let drawing = machine_drawing(&case.machine);
+    if case.is_axis() {
+        page.section("The stage");
+        page.drawing(&drawing, "Symbols, values and positive directions.");
+    } else {
+        page.section("The machine");
+        page.prose(format!("{}.", machine(&case.machine)));
+        page.drawing(
+            &drawing,
+            "In plan view with positive directions; lengths are not to scale. In the model the bridge does not yaw, and \
+             idlers have neither inertia nor friction.",
+        );
+        pictures.push(("machine".to_string(), Picture::Drawing(drawing)));
+    }
+    for run in runs {
+        let name = run.experiment.file_name();
+        let (figures, way) = (figures(case, run), way(case, run));
+        experiment(&mut page, (case, &mechanism, solver), run, &figures, way.as_ref());
+        pictures.extend(way.map(|way| (format!("{name}-path"), way.into())));
+        pictures.extend(figures.into_iter().map(|(figure, drawn)| (format!("{name}-{figure}"), drawn.into())));
     }
     page.case("This text repeats the run.", "case.toml", text);
-    page
+    (page, pictures)
 }
 
 /// How it was solved.
@@ -45,16 +66,45 @@ pub fn figures_table(lines: Vec<(&'static str, String)>) -> Table {
     table
 }
 
-fn experiment(page: &mut Page, run: &Run, figures: &[Named], solver: Solver) {
+fn experiment(
+    page: &mut Page,
+    (case, mechanism, solver): (&Case, &Mechanism, Solver),
+    run: &Run,
+    figures: &[Named],
+    way: Option<&Plane>,
+) {
     page.section(&run.experiment.name);
-    if let Some(told) = early_end(&run.outcome.ending) {
+    if let Some(told) = early_end(run, &case.machine) {
         page.callout(Callout::Fails, "The whole run", format!("This run {told}."));
     }
-    page.table(&figures_table(lines(run, solver)));
-    for (_, figure) in figures {
+    page.table(&figures_table(lines(run, &case.machine, solver)));
+    for (name, figure) in figures {
         page.figure(figure);
+        // The path stands behind the positions that it is made of.
+        if let Some(way) = way.filter(|_| *name == "positions") {
+            page.plane(way);
+        }
     }
-    events(page, &run.outcome.events, &run.experiment.file_name(), load_unit);
+    all_figures(page, run, &case.machine);
+    events(page, &run.outcome.events, &run.experiment.file_name(), |body| mechanism.bodies[body].kind.units()[2]);
+}
+
+/// Every key figure, from the list of them.
+fn all_figures(page: &mut Page, run: &Run, machine: &Machine) {
+    page.subsection("Key figures");
+    let mut table = Table::new("").column("Figure", "").column("Value", "").column("At", "s");
+    for figure in metrics::figures(machine.kind) {
+        let unit = figure.unit;
+        let (value, at) = match figure.of(&run.metrics) {
+            Worth::TimeOfPeak(_) => continue,
+            Worth::Number(value) if value.is_nan() => (Cell::from("none"), Cell::from("")),
+            Worth::Number(value) => (Cell::Number(number::engineering(value, unit, 6)), Cell::from("")),
+            Worth::Peak(peak) => (Cell::Number(number::engineering(peak.value, unit, 6)), Cell::fixed(peak.time, 9)),
+            Worth::Flag(flag) => (Cell::from(if flag { "yes" } else { "no" }), Cell::from("")),
+        };
+        table.row([Cell::from(figure.words), value, at]);
+    }
+    page.table(&table);
 }
 
 /// The events of an experiment of this file name; `unit` is that of the load on a body.

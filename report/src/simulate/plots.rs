@@ -2,8 +2,8 @@
 
 use super::Run;
 use super::curves::{Curves, Samples};
-use super::marks;
-use crate::{Axis, Colour, Figure, Panel, Picture, Series, Style};
+use super::{in_plane, marks};
+use crate::{Axis, Colour, Figure, Panel, Picture, Plane, Series, Style};
 use taut::case::Case;
 use taut::machine::AmplifierMode;
 
@@ -12,6 +12,9 @@ pub type Named = (&'static str, Figure);
 
 /// Every plot of a run, in the order of a report; none if its curves were not kept.
 pub fn figures(case: &Case, run: &Run) -> Vec<Named> {
+    if !case.is_axis() {
+        return in_plane::figures(case, run);
+    }
     let Some(curves) = &run.curves else { return Vec::new() };
     let figure = |name: &str| Figure::new(format!("{}: {name}", run.experiment.name), Axis::new("Time", "s"));
     let millimetres = || Axis::new("Position", "m").shown_as("mm", 1e3);
@@ -118,6 +121,11 @@ impl Plot<'_> {
         }
         panel
     }
+}
+
+/// The way of the cart in its plane; none if it has none, or its curves were not kept.
+pub fn way(case: &Case, run: &Run) -> Option<Plane> {
+    if case.is_axis() { None } else { in_plane::way(case, run) }
 }
 
 /// The figures of runs of these file names, each called after its run.

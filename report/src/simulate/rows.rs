@@ -3,9 +3,9 @@
 use super::Run;
 use super::band::Band;
 use crate::fit::outputs;
-use taut::machine::BeltModel;
+use taut::machine::{BeltModel, Geometry, Kind, Machine, Slide};
 use taut::mechanism::Part;
-use taut::metrics::{Balance, Metrics, largest};
+use taut::metrics::{Balance, Metrics, OfLoad, Peak};
 use taut::number;
 use taut::reduction::Reduction;
 use taut::solve::{Cost, Ending, Event, Method, Outcome, PositionError, Solver, Tie};
@@ -47,8 +47,20 @@ pub fn time(seconds: f64) -> String {
     }
 }
 
-/// How a run ended that did not reach its end.
-pub fn early_end(ending: &Ending) -> Option<String> {
+/// How a run of this machine ended that did not reach its end.
+pub fn early_end(run: &Run, machine: &Machine) -> Option<String> {
+    // Whichever is nearest to an end of its travel, or beyond.
+    let left = |(slide, load): &(&Slide, &OfLoad)| {
+        slide.travel.map_or(f64::INFINITY, |travel| (load.position - travel.min).min(travel.max - load.position))
+    };
+    let loads = machine.slides().zip(&run.metrics.loads).map(|pair| left(&pair));
+    let nearest = loads.enumerate().min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(place, _)| place);
+    let geometry = machine.geometry();
+    ended_early(&run.outcome.ending, geometry.label(geometry.slides[nearest].body).name)
+}
+
+/// The same where `load` would be what leaves its travel.
+pub fn ended_early(ending: &Ending, load: &str) -> Option<String> {
     match *ending {
         Ending::Complete => None,
         Ending::TooManyEvents { time: at } => Some(format!(
@@ -62,58 +74,135 @@ pub fn early_end(ending: &Ending) -> Option<String> {
             time(at)
         )),
         Ending::LeftTravel { time: at } => {
-            Some(format!("ended at {}: the cart leaves its travel there, and nothing stops it", time(at)))
+            Some(format!("ended at {}: the {load} leaves its travel there, and nothing stops it", time(at)))
         }
         Ending::Interrupted { time: at } => Some(format!("was interrupted at {}", time(at))),
     }
 }
 
-/// The key figures of a run with their names.
-pub fn lines(run: &Run, solver: Solver) -> Vec<(&'static str, String)> {
-    let metrics = &run.metrics;
-    let (span, stretch) = largest(&metrics.peak_stretch);
-    let (force_span, force) = largest(&metrics.peak_force);
-    let error = metrics.peak_encoder_error;
-    let left = metrics.final_drive_travel - metrics.final_cart_position;
-    let mut lines = vec![
-        (
-            "final position",
-            format!("cart {}, r φ₁ {}", travel(metrics.final_cart_position), travel(metrics.final_drive_travel)),
-        ),
-        ("steady speed", steady(metrics)),
-        (
-            "peak speed",
-            format!("cart {} at {}", speed(metrics.peak_cart_speed.value), time(metrics.peak_cart_speed.time)),
-        ),
-        ("peak stretch", format!("{} in span {span} at {}", value(stretch.value, "m"), time(stretch.time))),
-        ("peak force", format!("{} in span {force_span} at {}", value(force.value, "N"), time(force.time))),
-        ("peak current", format!("{} at {}", value(metrics.peak_current.value, "A"), time(metrics.peak_current.time))),
-        ("stop time", stop(metrics, solver)),
-        ("events", events(&run.outcome.events, solver)),
-        (
-            "r φ₁ - x",
-            format!("at most {} at {}, {} at the end", value(error.value, "m"), time(error.time), value(left, "m")),
-        ),
-        ("accuracy", accuracy(&run.outcome, solver)),
-        ("cost", cost(run.outcome.cost)),
-    ];
-    if matches!(solver, Solver::Table3 { .. }) {
-        lines.retain(|(name, _)| *name != "accuracy");
+/// Lengths (m), speeds (m/s), forces (N) and currents (A) up to these are shown as nothing: less than rounding makes of
+/// a symmetric motion.
+const LEAST: f64 = 1e-13;
+const LEAST_FORCE: f64 = 1e-9;
+
+/// A machine with a bridge in a line.
+pub fn machine(machine: &Machine) -> String {
+    let belts = if machine.kind == Kind::HFrame { "one belt round both drives" } else { "a belt for each drive" };
+    let short = |value: f64, unit: &str| number::engineering_typed(value, unit, 4);
+    let stiffness: Vec<String> = machine.belt.stiffness.iter().map(|k| short(*k, "N/m")).collect();
+    let follow = if machine.belt.follows_cart { " at x = y = 0, following bridge and cart" } else { "" };
+    format!(
+        "{}, {belts}: bridge {}, cart {}, r = {}, spans {}{follow}",
+        machine.kind.name(),
+        short(machine.first_slide().mass, "kg"),
+        short(machine.cart.mass, "kg"),
+        short(machine.pulley_radius, "m"),
+        stiffness.join(", "),
+    )
+}
+
+/// Words for a peak: its value, and when that was.
+fn at(peak: Peak, unit: &str, text: String) -> String {
+    let least = if unit == "N" { LEAST_FORCE } else { LEAST };
+    match peak.value.abs() <= least {
+        true => format!("0 {unit}"),
+        false => format!("{text} at {}", time(peak.time)),
     }
-    if run.model == BeltModel::Rigid {
-        // Nothing stretches in it.
-        lines.retain(|(name, _)| !["peak stretch", "peak force", "r φ₁ - x"].contains(name));
+}
+
+/// The key figures of a run of this machine with their names.
+pub fn lines(run: &Run, machine: &Machine, solver: Solver) -> Vec<(&'static str, String)> {
+    let (metrics, geometry) = (&run.metrics, machine.geometry());
+    let one_drive = metrics.drives.len() == 1;
+    let labels: Vec<&str> = geometry.slides.iter().map(|slide| geometry.label(slide.body).name).collect();
+    let of_loads = |words: &dyn Fn(&OfLoad) -> String| {
+        let each = labels.iter().zip(&metrics.loads).map(|(name, load)| format!("{name} {}", words(load)));
+        each.collect::<Vec<_>>().join(", ")
+    };
+    let place = |metres: f64| travel(if metres.abs() <= LEAST { 0.0 } else { metres });
+    let stiff = machine.belt.model == BeltModel::Rigid;
+    let mut lines = Vec::new();
+    let positions = of_loads(&|load| place(load.position));
+    if one_drive {
+        lines.push(("final position", format!("{positions}, r φ₁ {}", place(metrics.cart().by_drives))));
+        lines.push(("steady speed", steady(metrics)));
+    } else {
+        lines.push(("final position", positions));
+        lines.push(("by the drives", of_loads(&|load| place(load.by_drives))));
+    }
+    lines.push(("peak speed", of_loads(&|load| at(load.peak_speed, "m/s", speed(load.peak_speed.value)))));
+    if !stiff {
+        // Nothing stretches in a rigid belt.
+        let (span, stretch) = metrics.largest_stretch();
+        let name = geometry.spans[span].label.name;
+        lines.push(("peak stretch", at(stretch, "m", format!("{} in {name}", value(stretch.value, "m")))));
+        lines.push(("peak force", forces(metrics, geometry)));
+    }
+    lines.push(("peak current", currents(metrics, geometry)));
+    lines.push(("stop time", stop(metrics, &labels, solver)));
+    lines.push(("events", events(&run.outcome.events, solver)));
+    if !stiff {
+        lines.push((if one_drive { "r φ₁ - x" } else { "drives' error" }, errors(metrics, &labels)));
+    }
+    if !matches!(solver, Solver::Table3 { .. }) {
+        lines.push(("accuracy", accuracy(&run.outcome, solver)));
     }
     if let Some(log) = &run.log {
-        lines.insert(lines.len() - 1, ("against its log", outputs(log)));
+        lines.push(("against its log", outputs(log)));
     }
     if let Some(band) = &run.band {
-        lines.insert(lines.len() - 1, ("band", band_words(band)));
+        lines.push(("band", band_words(band)));
     }
     if let Some(reduction) = run.reduction {
-        lines.insert(lines.len() - 1, ("reduced model", reduced(&reduction)));
+        lines.push(("reduced model", reduced(&reduction)));
     }
+    lines.push(("cost", cost(run.outcome.cost)));
     lines
+}
+
+/// The largest force of a machine with one drive; that of each span of one with several.
+fn forces(metrics: &Metrics, geometry: &Geometry) -> String {
+    if metrics.drives.len() == 1 {
+        let (span, force) = metrics.largest_force();
+        return at(force, "N", format!("{} in {}", value(force.value, "N"), geometry.spans[span].label.name));
+    }
+    let each = geometry.span_labels().zip(&metrics.spans).map(|(span, of)| {
+        let words = at(of.peak_force, "N", value(of.peak_force.value, "N"));
+        format!("{} {words}", span.name.trim_end_matches(" span"))
+    });
+    each.collect::<Vec<_>>().join(", ")
+}
+
+fn currents(metrics: &Metrics, geometry: &Geometry) -> String {
+    let words = |peak: Peak| at(peak, "A", value(peak.value, "A"));
+    if let [only] = &metrics.drives[..] {
+        return words(only.peak_current);
+    }
+    let each = geometry
+        .drives
+        .iter()
+        .zip(&metrics.drives)
+        .map(|(at, drive)| format!("{} {}", at.label.name.trim_end_matches(" drive"), words(drive.peak_current)));
+    each.collect::<Vec<_>>().join(", ")
+}
+
+/// How far the drives are off what slides.
+fn errors(metrics: &Metrics, labels: &[&str]) -> String {
+    let words = |load: &OfLoad| {
+        let left = load.by_drives - load.position;
+        let left = if left.abs() <= LEAST { 0.0 } else { left };
+        let most = at(load.peak_error, "m", value(load.peak_error.value, "m"));
+        format!("at most {most}, {} at the end", value(left, "m"))
+    };
+    if let [only] = &metrics.loads[..] {
+        return words(only);
+    }
+    labels
+        .iter()
+        .zip(&metrics.loads)
+        .map(|(name, load)| format!("{name} {}", words(load)))
+        .collect::<Vec<_>>()
+        .join("; ")
 }
 
 /// By how much positions may be off.
@@ -208,17 +297,23 @@ fn steady(metrics: &Metrics) -> String {
     }
 }
 
-fn stop(metrics: &Metrics, solver: Solver) -> String {
+fn stop(metrics: &Metrics, labels: &[&str], solver: Solver) -> String {
+    let speeds = || {
+        let each = labels.iter().zip(&metrics.loads).map(|(name, load)| format!("{name} at {}", speed(load.speed)));
+        each.collect::<Vec<_>>().join(", ")
+    };
     match metrics.stop_time {
-        Some(0.0) if metrics.events.iter().all(|count| count.total() == 0) => "nothing moved".into(),
+        Some(0.0) if metrics.bodies.iter().all(|count| count.total() == 0) => "nothing moved".into(),
         Some(at) => time(at),
         None if matches!(solver, Solver::Table3 { .. }) => {
-            format!("none: Table 3 freezes speeds and creeps on, cart at {}", speed(metrics.final_cart_speed))
+            format!("none: Table 3 freezes speeds and creeps on, {}", speeds())
         }
         None if metrics.bodies_rest => {
-            format!("the rotor still turns at the end, at {}", value(metrics.final_rotor_speed, "rad/s"))
+            let fastest =
+                metrics.drives.iter().map(|drive| drive.shaft_speed).max_by(|a, b| a.abs().total_cmp(&b.abs()));
+            format!("the rotor still turns at the end, at {}", value(fastest.unwrap_or_default(), "rad/s"))
         }
-        None => format!("still moving at the end, cart at {}", speed(metrics.final_cart_speed)),
+        None => format!("still moving at the end, {}", speeds()),
     }
 }
 

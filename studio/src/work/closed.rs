@@ -103,7 +103,7 @@ pub fn closed(request: &Request, context: &Context) -> Result<Reply> {
         "profile_end": motion.profile.end(),
         "controller": taut_report::motion::controller(design, &case.machine),
         "rows": lines.iter().map(|(name, value)| json!([name, value.replace('-', "−")])).collect::<Vec<_>>(),
-        "ending": taut_report::simulate::early_end(&done.run.outcome.ending),
+        "ending": taut_report::simulate::ended_early(&done.run.outcome.ending, "cart"),
         "trouble": warnings(done),
         "result": told,
         "parameters": parameters(&opened, &opened.numbers()?),

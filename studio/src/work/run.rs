@@ -11,11 +11,11 @@ use std::time::Instant;
 use taut::case::{Case, Experiment};
 use taut::control::Loop;
 use taut::error::Result;
-use taut::json::{GantrySimulation, Simulation};
-use taut::metrics::{GantryMeter, Meter};
+use taut::json::Simulation;
+use taut::metrics::Meter;
 use taut::overview::Overview;
 use taut::reduction::Reduction;
-use taut::solve::{self, Course, Detail, Outcome, Solver, stream_mechanism, stream_observed};
+use taut::solve::{self, Outcome, Solver, stream_observed};
 use taut_report::motion::Tried;
 use taut_report::simulate::{self, Curves};
 
@@ -30,8 +30,7 @@ pub fn run(request: &Request, context: &Context) -> Result<Reply> {
         case if case.is_axis() && case.experiments.is_empty() && !case.moves.is_empty() => {
             axis(&case.moves, request, |place| move_run(case, place, context))?
         }
-        case if case.is_axis() => axis(&case.experiments, request, |place| axis_run(case, place, context))?,
-        case => axis(&case.experiments, request, |place| gantry_run(case, place, context))?,
+        case => axis(&case.experiments, request, |place| experiment_run(case, place, context))?,
     };
     let took = begun.elapsed();
     let numbers = case.numbers()?;
@@ -81,21 +80,21 @@ fn axis<E>(
     run(chosen(request, experiments.len())?)
 }
 
-fn axis_run(case: &Case, place: usize, context: &Context) -> Result<(Simulated, Kept)> {
+fn experiment_run(case: &Case, place: usize, context: &Context) -> Result<(Simulated, Kept)> {
     let (machine, experiment) = (&case.machine, &case.experiments[place]);
     let opened = case.clone();
     let panels = panels(&opened, &machine.mechanism().columns);
     let shown = Experiment { every: interval(experiment.every, experiment.samples()), ..experiment.clone() };
     let solver = Solver::of(machine);
     let mut kept = Kept::new(&panels);
-    let run = simulate_axis(case, &shown, solver, context, &mut Keep::Columns(&mut kept))?;
-    let lines = simulate::lines(&run, solver);
+    let run = simulated(case, &shown, solver, context, &mut Keep::Columns(&mut kept))?;
+    let lines = simulate::lines(&run, machine, solver);
     let json = serde_json::to_value(Simulation::new(case, solver, &[run.told()])).unwrap_or_default();
     let simulated = Simulated {
         place,
         until: experiment.until,
         rows: lines_told(lines.into_iter().filter(|(name, _)| *name != "cost")),
-        early: simulate::early_end(&run.outcome.ending),
+        early: simulate::early_end(&run, machine),
         outcome: run.outcome,
         panels: told(&panels),
         json,
@@ -116,7 +115,7 @@ fn move_run(case: &Case, place: usize, context: &Context) -> Result<(Simulated, 
     let rows = lines_told(taut_report::motion::lines(&tried, &tried.done[0]).into_iter());
     let outcome = tried.done.into_iter().next().map(|done| done.run.outcome);
     let Some(outcome) = outcome else { return Err(taut::Error::new("there is no such move")) };
-    let early = simulate::early_end(&outcome.ending);
+    let early = simulate::ended_early(&outcome.ending, "cart");
     let simulated = Simulated { place, until: moves[place].until, rows, early, outcome, panels: told(&panels), json };
     Ok((simulated, kept))
 }
@@ -129,8 +128,8 @@ pub enum Keep<'a> {
     Curves,
 }
 
-/// Runs an experiment of an axis, stopped when nobody waits for it.
-pub fn simulate_axis<'a>(
+/// Runs an experiment, stopped when nobody waits for it.
+pub fn simulated<'a>(
     case: &Case,
     experiment: &'a Experiment,
     solver: Solver,
@@ -152,7 +151,7 @@ pub fn simulate_axis<'a>(
     })?;
     let metrics = meter.finish(&outcome.events);
     let reduction = Reduction::of(machine, experiment, solver)?;
-    let (model, took) = (machine.belt.model, begun.elapsed());
+    let took = begun.elapsed();
     Ok(simulate::Run {
         experiment,
         outcome,
@@ -161,61 +160,10 @@ pub fn simulate_axis<'a>(
         samples: None,
         band: None,
         log: None,
-        model,
         reduction,
         files: Vec::new(),
         took,
     })
-}
-
-fn gantry_run(case: &Case, place: usize, context: &Context) -> Result<(Simulated, Kept)> {
-    let experiment = &case.experiments[place];
-    let opened = case.clone();
-    let panels = panels(&opened, &case.machine.mechanism().columns);
-    let shown = Experiment { every: interval(experiment.every, experiment.samples()), ..experiment.clone() };
-    let mut kept = Kept::new(&panels);
-    let (run, solver) = simulate_gantry(case, &shown, context, &mut Keep::Columns(&mut kept))?;
-    let json = GantrySimulation::new(case, solver, &[run.told()]);
-    let simulated = Simulated {
-        place,
-        until: experiment.until,
-        rows: lines_told(
-            simulate::gantry::lines(&run, &case.machine, solver).into_iter().filter(|(name, _)| *name != "cost"),
-        ),
-        early: simulate::gantry::early_end(&run, &case.machine),
-        panels: told(&panels),
-        json: serde_json::to_value(json).unwrap_or_default(),
-        outcome: run.outcome,
-    };
-    Ok((simulated, kept))
-}
-
-/// Runs an experiment of a gantry, stopped when nobody waits for it.
-pub fn simulate_gantry<'a>(
-    case: &Case,
-    experiment: &'a Experiment,
-    context: &Context,
-    keep: &mut Keep,
-) -> Result<(simulate::gantry::Run<'a>, Solver)> {
-    let begun = Instant::now();
-    let mechanism = case.machine.mechanism();
-    let solver = Solver::of_mechanism(&mechanism);
-    let mut meter = GantryMeter::new(&case.machine);
-    let mut curves = matches!(keep, Keep::Curves).then(|| simulate::gantry::curves(&case.machine));
-    let shown = (Detail::Full, Some(&mut meter as &mut dyn solve::Observe));
-    let outcome = stream_mechanism(&mechanism, &Course::of(&mechanism, experiment), solver, shown, &mut |block| {
-        if let Keep::Columns(kept) = keep {
-            kept.take(block);
-        }
-        if let Some((curves, way)) = &mut curves {
-            curves.take(block);
-            way.take(block);
-        }
-        context.flow()
-    })?;
-    let metrics = meter.finish(&outcome.events);
-    let took = begun.elapsed();
-    Ok((simulate::gantry::Run { experiment, outcome, metrics, curves, files: Vec::new(), took }, solver))
 }
 
 /// Names and lengths of the experiments.
@@ -225,7 +173,6 @@ fn names(case: &Case) -> Value {
         case if case.is_axis() && case.experiments.is_empty() => {
             case.moves.iter().map(|m| one(&m.name, m.until)).collect()
         }
-        case if case.is_axis() => case.experiments.iter().map(|e| one(&e.name, e.until)).collect(),
         case => case.experiments.iter().map(|e| one(&e.name, e.until)).collect(),
     }
 }

@@ -6,7 +6,7 @@ use taut::linear::{GantryAnalysis, ResonanceMap};
 use taut::number::{engineering_typed, fixed, typed};
 use taut_report::modes::gantry::{elastic, over_the_area, rigid, slow};
 use taut_report::modes::pole;
-use taut_report::simulate::gantry::machine;
+use taut_report::simulate::machine;
 
 /// Places along either way of the table of the working area.
 const PLACES: usize = 5;

@@ -6,7 +6,7 @@ use crate::gantry::gantry_drawing;
 use crate::modes::page::printed;
 use crate::modes::rows::pole;
 use crate::page::{Callout, Cell, Page, Table};
-use crate::simulate::gantry::machine;
+use crate::simulate::machine;
 use taut::linear::GantryAnalysis;
 
 /// The page.

@@ -1,36 +1,14 @@
-//! The plots of a gantry's run.
+//! The plots of a run whose cart moves in a plane.
 
 use super::Run;
-use crate::simulate::curves::{Curves, Source, Way};
-use crate::simulate::marks;
-use crate::simulate::plots::Named;
+use super::marks;
 use crate::{Axis, Colour, Figure, Panel, Plane, Series, Style};
 use taut::case::Case;
-use taut::machine::{AmplifierMode, DriveAt, Machine};
-
-/// The curves that a report shows, and the way of the cart, before the first row.
-pub fn curves(gantry: &Machine) -> (Curves, Way) {
-    let mut sources: Vec<Source> = gantry
-        .mechanism()
-        .columns
-        .iter()
-        .map(|heading| (heading.name.to_string(), vec![(heading.name.to_string(), 1.0)]))
-        .collect();
-    // x and y as the drives say, minus what they are: as `Machine::by_drives` has it, term by term.
-    let geometry = gantry.geometry();
-    for (name, slide) in ["x error", "y error"].into_iter().zip(geometry.slides) {
-        let angle = |drive: &DriveAt| format!("{}_angle", geometry.label(drive.pulley).key);
-        let drives = geometry.drives.iter().zip(slide.by_drives);
-        let mut terms: Vec<_> = drives.map(|(drive, weight)| (angle(drive), weight * gantry.pulley_radius)).collect();
-        terms.push((format!("{}_position", geometry.label(slide.body).key), -1.0));
-        sources.push((name.into(), terms));
-    }
-    (Curves::of(sources), Way::new(["cart_position", "bridge_position"]))
-}
+use taut::machine::AmplifierMode;
 
 /// Every plot of a run over time, in the order of a report; none if its curves were not kept.
-pub fn figures(case: &Case, run: &Run) -> Vec<Named> {
-    let Some((curves, _)) = &run.curves else { return Vec::new() };
+pub fn figures(case: &Case, run: &Run) -> Vec<(&'static str, Figure)> {
+    let Some(curves) = &run.curves else { return Vec::new() };
     let figure = |name: &str| Figure::new(format!("{}: {name}", run.experiment.name), Axis::new("Time", "s"));
     let panel = |axis: Axis, names: &[(&str, &str)]| {
         let colours = [Colour::Blue, Colour::Vermillion, Colour::Green, Colour::Purple];
@@ -121,8 +99,7 @@ pub fn figures(case: &Case, run: &Run) -> Vec<Named> {
 
 /// The way of the cart in the plane; none if it was not kept.
 pub fn way(case: &Case, run: &Run) -> Option<Plane> {
-    let (_, way) = run.curves.as_ref()?;
-    let (y, x) = way.points();
+    let (y, x) = run.curves.as_ref()?.way()?;
     let millimetres = |name: &str| Axis::new(name, "m").shown_as("mm", 1e3);
     let mut plane = Plane::new(format!("{}: path", run.experiment.name), millimetres("Cart y"), millimetres("Bridge x"))
         .path(Series::new("", y, x).colour(Colour::Blue))

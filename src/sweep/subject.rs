@@ -1,30 +1,30 @@
-//! Sweeps of an axis: its experiments and its moves in closed loop.
+//! The subject of a sweep: a machine, its experiments, and its moves in closed loop.
 
-use super::measures::{Figure, Measure, OF_EXPERIMENT, OF_MOVE};
+use super::measures::{Figure, Measure, OF_MOVE};
 use super::{Group, put_figures, status};
 use crate::case::{Case, Experiment, Move, Sweeping};
 use crate::control::{self, MoveRun, Setup};
 use crate::design::Design;
 use crate::error::{Error, Result};
 use crate::machine::Machine;
-use crate::metrics::{Held, Meter, Metrics, Sought};
+use crate::metrics::{self, Held, Meter, Sought};
 use crate::solve::{self, Bench, Flow, Outcome, Solver};
 use crate::trajectory::Trajectory;
 
-/// An axis, and what each of its machines does.
+/// A machine as the case has it, and what each of those that are made of it does.
 #[derive(Debug, Clone)]
-pub(super) struct Axis {
+pub(super) struct Subject {
     pub machine: Machine,
     experiments: Vec<Experiment>,
     moves: Vec<Move>,
     controller: Option<Design>,
     /// The figures that are told of experiments and of moves, and what experiments are followed for.
-    of_experiment: Vec<&'static Measure<Metrics>>,
-    of_move: Vec<&'static Measure<MoveRun>>,
-    sought: Vec<Sought>,
+    of_experiment: Vec<metrics::Figure>,
+    of_move: Vec<&'static Measure>,
+    sought: Sought,
 }
 
-impl Axis {
+impl Subject {
     /// That of a case, as planned.
     pub fn of(case: &Case, plan: &Sweeping) -> Self {
         let mut experiments = case.experiments.clone();
@@ -34,9 +34,11 @@ impl Axis {
             experiment.every = plan.interval.unwrap_or(experiment.every);
         }
         let (machine, moves, controller) = (case.machine.clone(), case.moves.clone(), case.controller.clone());
-        let of_experiment: Vec<_> = OF_EXPERIMENT.iter().filter(|measure| plan.tells(measure.name)).collect();
+        let mut of_experiment = metrics::figures(machine.kind);
+        of_experiment.retain(|figure| plan.tells(&figure.name));
         let of_move = OF_MOVE.iter().filter(|measure| plan.tells(measure.name)).collect();
-        let sought = of_experiment.iter().flat_map(|measure| measure.seeks).copied().collect();
+        let seeks: Vec<_> = of_experiment.iter().filter_map(metrics::Figure::seek).collect();
+        let sought = Sought::of(&machine, &machine.mechanism(), &seeks);
         Self { machine, experiments, moves, controller, of_experiment, of_move, sought }
     }
 
@@ -46,13 +48,13 @@ impl Axis {
             name: experiment.name.clone(),
             file: experiment.file_name(),
             is_move: false,
-            figures: self.of_experiment.iter().copied().map(Figure::of).collect(),
+            figures: self.of_experiment.iter().map(Figure::of_experiment).collect(),
         });
         let moves = self.moves.iter().map(|motion| Group {
             name: motion.name.clone(),
             file: motion.file_name(),
             is_move: true,
-            figures: self.of_move.iter().copied().map(Figure::of).collect(),
+            figures: self.of_move.iter().copied().map(Figure::of_move).collect(),
         });
         experiments.chain(moves).collect()
     }
@@ -97,38 +99,38 @@ impl Axis {
 
 /// Runs one machine after another, and keeps what can be used again.
 pub(super) struct Worker<'a> {
-    axis: &'a Axis,
+    subject: &'a Subject,
     pub machine: Machine,
     bench: Bench,
     held: Vec<Option<Held>>,
 }
 
 impl<'a> Worker<'a> {
-    pub fn new(axis: &'a Axis) -> Self {
-        let held = axis.experiments.iter().map(Held::last).collect();
-        Self { axis, machine: axis.machine.clone(), bench: Bench::default(), held }
+    pub fn new(subject: &'a Subject) -> Self {
+        let held = subject.experiments.iter().map(Held::last).collect();
+        Self { subject, machine: subject.machine.clone(), bench: Bench::default(), held }
     }
 
     /// The machine as the case has it.
     pub fn reset(&mut self) -> &mut Machine {
-        self.machine.clone_from(&self.axis.machine);
+        self.machine.clone_from(&self.subject.machine);
         &mut self.machine
     }
 
     /// Adds status and figures of all that the machine does.
     pub fn run(&mut self, values: &mut Vec<f64>) {
-        let Self { axis, machine, bench, held } = self;
+        let Self { subject, machine, bench, held } = self;
         let mounted = bench.mount(machine);
-        for (experiment, held) in axis.experiments.iter().zip(held) {
-            let mut meter = Meter::with(machine, *held).seeking(&axis.sought);
+        for (experiment, held) in subject.experiments.iter().zip(held) {
+            let mut meter = Meter::with(machine, &subject.sought, *held);
             let outcome = mounted.clone().and_then(|()| bench.observe(experiment, &mut meter));
             let told = outcome.map(|outcome| (status(&outcome), meter.finish(&outcome.events)));
-            put_figures(told, &axis.of_experiment, |measure, metrics| (measure.of)(metrics), values);
+            put_figures(told, &subject.of_experiment, |figure, metrics| figure.of(metrics).number(), values);
         }
-        for motion in &axis.moves {
+        for motion in &subject.moves {
             let told =
-                mounted.clone().and_then(|()| axis.close(machine, motion)).map(|run| (status(&run.outcome), run));
-            put_figures(told, &axis.of_move, |measure, run| (measure.of)(run), values);
+                mounted.clone().and_then(|()| subject.close(machine, motion)).map(|run| (status(&run.outcome), run));
+            put_figures(told, &subject.of_move, |measure, run| (measure.of)(run), values);
         }
     }
 }

@@ -1,0 +1,214 @@
+//! The list of key figures, by the role of the part that each belongs to. Columns of sweeps, keys of results, tables of
+//! reports and views of the studio are made from it: a new figure is one row here.
+
+use super::{Metrics, Peak};
+use crate::machine::{DriveAt, Geometry, Kind};
+use crate::mechanism::Label;
+
+/// The role of a part of a machine.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Role {
+    /// What slides.
+    Load,
+    /// A pulley that a drive turns.
+    Pulley,
+    /// A motor.
+    Motor,
+    /// A span of the belt.
+    Span,
+    /// A body other than rotors.
+    Body,
+    /// The whole machine.
+    Whole,
+}
+
+/// The value of a figure.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Worth {
+    /// A number; NaN where a run has none.
+    Number(f64),
+    /// The value of largest magnitude, with its sign, and when that was.
+    Peak(Peak),
+    /// When a peak is, which that peak tells, too.
+    TimeOfPeak(f64),
+    /// A yes or no.
+    Flag(bool),
+}
+
+impl Worth {
+    /// As a number. Peaks are magnitudes: of a motion there and back the sign of the larger peak is chance, and shares of
+    /// signed ones would mean nothing.
+    pub fn number(self) -> f64 {
+        match self {
+            Worth::Number(value) | Worth::TimeOfPeak(value) => value,
+            Worth::Peak(peak) => peak.value.abs(),
+            Worth::Flag(flag) => f64::from(u8::from(flag)),
+        }
+    }
+}
+
+/// What a [`Meter`](super::Meter) has to follow the motion for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Seek {
+    /// The peak speed of what slides.
+    LoadSpeed,
+    /// How far the drives are off it at most.
+    LoadError,
+    /// The peak of r φ̇ of the only drive's pulley.
+    BeltSpeed,
+    /// The peak speed of a motor.
+    ShaftSpeed,
+    /// The peak current of a motor.
+    Current,
+    /// The peak stretch of a span.
+    Stretch,
+    /// The peak force of a span.
+    Force,
+    /// The steady speed.
+    SteadySpeed,
+    /// When everything came to rest.
+    StopTime,
+}
+
+/// A row of the list: a figure of each part of a role.
+#[derive(Debug)]
+pub struct FigureRow {
+    /// The role of the parts that have it.
+    pub role: Role,
+    /// Its name as a column, `*` standing for the part.
+    pub name: &'static str,
+    /// Its SI unit; empty for a pure number.
+    pub unit: &'static str,
+    /// Its name for people, `*` standing for the part.
+    pub words: &'static str,
+    /// Its name as a column and for people on an axis, where that has names of its own for it.
+    pub of_axis: Option<[&'static str; 2]>,
+    /// Whether only a machine with one drive has it.
+    pub one_drive: bool,
+    /// Its value for the part of this place.
+    pub of: fn(&Metrics, usize) -> Worth,
+    /// What has to be followed for it; of a row of the whole machine, for all parts.
+    pub seek: Option<Seek>,
+}
+
+type Of = fn(&Metrics, usize) -> Worth;
+
+const fn row(role: Role, name: &'static str, unit: &'static str, words: &'static str, of: Of) -> FigureRow {
+    FigureRow { role, name, unit, words, of_axis: None, one_drive: false, of, seek: None }
+}
+
+impl FigureRow {
+    const fn seeking(self, seek: Seek) -> Self {
+        Self { seek: Some(seek), ..self }
+    }
+
+    const fn on_an_axis(self, name: &'static str, words: &'static str) -> Self {
+        Self { of_axis: Some([name, words]), ..self }
+    }
+
+    const fn of_one_drive(self) -> Self {
+        Self { one_drive: true, ..self }
+    }
+}
+
+use Role::{Body, Load, Motor, Pulley, Span, Whole};
+use Worth::{Flag, Number, TimeOfPeak};
+
+/// The key figures.
+#[rustfmt::skip]
+pub static FIGURES: &[FigureRow] = &[
+    row(Pulley, "final_*_angle", "rad", "angle of the * at the end", |m, k| Number(m.drives[k].angle)),
+    row(Load, "final_*_by_drives", "m", "* position at the end, by the drives", |m, k| Number(m.loads[k].by_drives))
+        .on_an_axis("final_drive_travel", "drive travel r φ₁ at the end"),
+    row(Load, "final_*_position", "m", "* position at the end", |m, k| Number(m.loads[k].position)),
+    row(Load, "final_*_speed", "m/s", "* speed at the end", |m, k| Number(m.loads[k].speed)),
+    row(Load, "final_drives_minus_*", "m", "drives minus * at the end", |m, k| Number(m.loads[k].by_drives - m.loads[k].position))
+        .on_an_axis("final_drive_travel_minus_cart", "drive travel minus cart at the end"),
+    row(Load, "peak_*_speed", "m/s", "peak * speed", |m, k| Worth::Peak(m.loads[k].peak_speed)).seeking(Seek::LoadSpeed),
+    row(Load, "peak_*_speed_time", "s", "time of the peak * speed", |m, k| TimeOfPeak(m.loads[k].peak_speed.time)).seeking(Seek::LoadSpeed),
+    row(Load, "peak_drives_minus_*", "m", "largest drives minus *", |m, k| Worth::Peak(m.loads[k].peak_error)).seeking(Seek::LoadError)
+        .on_an_axis("peak_drive_travel_minus_cart", "largest drive travel minus cart"),
+    row(Pulley, "peak_*_speed", "m/s", "peak speed r φ′ of the *", |m, k| Worth::Peak(m.drives[k].peak_belt_speed.unwrap_or_default()))
+        .seeking(Seek::BeltSpeed).of_one_drive().on_an_axis("peak_drive_speed", "peak drive speed r φ₁′"),
+    row(Motor, "peak_*_speed", "rad/s", "peak speed of the *", |m, k| Worth::Peak(m.drives[k].peak_speed)).seeking(Seek::ShaftSpeed),
+    row(Whole, "steady_speed", "m/s", "steady cart speed", |m, _| Number(m.steady_speed.map_or(f64::NAN, |steady| steady.value)))
+        .seeking(Seek::SteadySpeed).of_one_drive(),
+    row(Span, "peak_*_stretch", "m", "peak stretch of the *", |m, k| Worth::Peak(m.spans[k].peak_stretch)).seeking(Seek::Stretch),
+    row(Span, "peak_*_force", "N", "peak force in the *", |m, k| Worth::Peak(m.spans[k].peak_force)).seeking(Seek::Force),
+    row(Whole, "peak_belt_force", "N", "largest force in the belt", |m, _| Worth::Peak(m.largest_force().1)).seeking(Seek::Force),
+    row(Motor, "peak_*_current", "A", "peak current of the *", |m, k| Worth::Peak(m.drives[k].peak_current)).seeking(Seek::Current),
+    row(Whole, "stop_time", "s", "time of the last stop", |m, _| Number(m.stop_time.unwrap_or(f64::NAN))).seeking(Seek::StopTime),
+    row(Whole, "settled", "", "at rest at the end", |m, _| Flag(m.settled)),
+    row(Body, "*_stops", "", "stops of the *", |m, k| Number(m.bodies[k].stops as f64)),
+    row(Body, "*_reversals", "", "reversals of the *", |m, k| Number(m.bodies[k].reversals as f64)),
+];
+
+/// A key figure of a machine: a row of [`FIGURES`], for one part.
+#[derive(Debug, Clone)]
+pub struct Figure {
+    /// Its name as a column.
+    pub name: String,
+    /// Its name by role where that is another one.
+    pub by_role: String,
+    /// Its SI unit; empty for a pure number.
+    pub unit: &'static str,
+    /// Its name for people.
+    pub words: String,
+    /// The place of its part among those of the role.
+    pub place: usize,
+    /// The key of its part.
+    pub part: &'static str,
+    /// The row that it is of.
+    pub row: &'static FigureRow,
+}
+
+impl Figure {
+    /// Its value.
+    pub fn of(&self, metrics: &Metrics) -> Worth {
+        (self.row.of)(metrics, self.place)
+    }
+
+    /// What has to be followed for it.
+    pub fn seek(&self) -> Option<(super::Seek, Option<usize>)> {
+        self.row.seek.map(|seek| (seek, (self.row.role != Role::Whole).then_some(self.place)))
+    }
+}
+
+/// The parts of a role: their keys as columns have them, and their names.
+fn parts(geometry: &Geometry, role: Role) -> Vec<Label> {
+    match role {
+        Role::Load => geometry.slides.iter().map(|slide| geometry.label(slide.body)).collect(),
+        Role::Pulley => geometry.drives.iter().map(|drive| geometry.label(drive.pulley)).collect(),
+        Role::Motor => {
+            // As its current's column begins.
+            let key = |column: &'static str| column.trim_end_matches("_current");
+            let label = |drive: &DriveAt| Label { key: key(drive.current_column), name: drive.label.name };
+            geometry.drives.iter().map(label).collect()
+        }
+        Role::Span => geometry.spans.iter().map(|span| Label { key: span.column, name: span.label.name }).collect(),
+        Role::Body => geometry.bodies.iter().map(|body| body.label).collect(),
+        Role::Whole => vec![Label { key: "", name: "" }],
+    }
+}
+
+/// The key figures of a kind of machine, in the order of the list, then of the parts.
+pub fn figures(kind: Kind) -> Vec<Figure> {
+    let geometry = kind.geometry();
+    let rows = FIGURES.iter().filter(|row| !row.one_drive || geometry.drives.len() == 1);
+    let of_parts = |row: &'static FigureRow| {
+        parts(geometry, row.role).into_iter().enumerate().map(move |(place, part)| {
+            let by_role = row.name.replace('*', part.key);
+            let own = row.of_axis.filter(|_| kind == Kind::Axis);
+            Figure {
+                name: own.map_or_else(|| by_role.clone(), |[name, _]| name.to_string()),
+                by_role,
+                unit: row.unit,
+                words: own.map_or_else(|| row.words.replace('*', part.name), |[_, words]| words.to_string()),
+                place,
+                part: part.key,
+                row,
+            }
+        })
+    };
+    rows.flat_map(of_parts).collect()
+}

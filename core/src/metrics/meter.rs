@@ -1,0 +1,418 @@
+//! The observer that gathers the key figures of a run.
+
+use super::rotor::Rotor;
+use super::steady::{Held, Plateau};
+use super::{EventCount, Metrics, NEWS, OfDrive, OfLoad, OfSpan, Peak, Seek};
+use crate::friction::Motion;
+use crate::machine::Machine;
+use crate::mechanism::{Mechanism, Mode, Shown, State};
+use crate::plan::Experiment;
+use crate::solve::{Closer, Curve, Event, Gap, Gaps, Observe, Polynomial, QUANTITIES, Reading, Stretch};
+use std::sync::Arc;
+
+/// Where the peak of a quantity is sought: in a reading, or in a sum of readings.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Place {
+    /// The number of a reading, and the factor that makes the quantity of it.
+    Reading(usize, f64),
+    /// The number of a sum.
+    Sum(usize),
+}
+
+/// A sum of readings by their numbers, each with its weight.
+type Sum = Vec<(usize, f64)>;
+
+/// Where a machine's readings hold what the figures are made from: the same for all machines of a structure.
+#[derive(Debug, Clone, PartialEq, Default)]
+struct Places {
+    /// Bodies other than rotors.
+    bodies: usize,
+    load_speeds: Vec<Place>,
+    load_errors: Vec<Place>,
+    /// Of the drive pulleys at the pitch circle; of a machine with one drive.
+    belt_speeds: Vec<Place>,
+    shaft_speeds: Vec<Place>,
+    currents: Vec<Place>,
+    stretches: Vec<Place>,
+    forces: Vec<Place>,
+    sums: Vec<Sum>,
+    /// Rotors that turn by themselves, and the readings of their speeds.
+    rotors: Vec<(usize, usize)>,
+    /// The bodies that the motors' shafts turn with.
+    shafts: Vec<usize>,
+}
+
+impl Places {
+    fn of(machine: &Machine, mechanism: &Mechanism) -> Self {
+        let geometry = machine.geometry();
+        let find = |wanted: Shown| mechanism.readings.iter().position(|shown| *shown == wanted);
+        let place = |wanted: Shown| find(wanted).map_or(Place::Sum(usize::MAX), |q| Place::Reading(q, 1.0));
+        let mut sums: Vec<Sum> = Vec::new();
+        // A stretch that is no reading is a sum of those that are.
+        let mut summed = |terms: &[(usize, f64)]| match terms {
+            &[(span, 1.0)] if find(Shown::Stretch(span)).is_some() => place(Shown::Stretch(span)),
+            _ => {
+                let term = |&(span, weight): &(usize, f64)| Some((find(Shown::Stretch(span))?, weight));
+                sums.push(terms.iter().filter_map(term).collect());
+                Place::Sum(sums.len() - 1)
+            }
+        };
+        let load_errors = geometry.slides.iter().map(|slide| summed(slide.error)).collect();
+        let stretches = (0..geometry.spans.len()).map(|span| match place(Shown::Stretch(span)) {
+            read @ Place::Reading(..) => read,
+            Place::Sum(_) => summed(geometry.spans[span].by_others),
+        });
+        let stretches = stretches.collect();
+        let belt_speeds: Vec<Place> = match &mechanism.drives[..] {
+            [drive] => vec![place(Shown::Speed(drive.pulley, machine.pulley_radius))],
+            _ => Vec::new(),
+        };
+        let shafts = mechanism.drives.iter().enumerate().map(|(number, drive)| match belt_speeds.get(number) {
+            // Without play the shaft turns with the pulley, whose speed is followed already.
+            Some(&Place::Reading(q, _)) if drive.shaft == drive.pulley => {
+                Place::Reading(q, 1.0 / machine.pulley_radius)
+            }
+            _ => place(Shown::Speed(drive.shaft, 1.0)),
+        });
+        let shaft_speeds = shafts.collect();
+        let bodies = geometry.bodies.len();
+        let rotor = |body: usize| Some((body, find(Shown::Speed(body, 1.0))?));
+        Self {
+            bodies,
+            load_speeds: geometry.slides.iter().map(|slide| place(Shown::Speed(slide.body, 1.0))).collect(),
+            load_errors,
+            belt_speeds,
+            shaft_speeds,
+            currents: (0..mechanism.drives.len()).map(|drive| place(Shown::Current(drive))).collect(),
+            stretches,
+            forces: (0..geometry.spans.len())
+                .map(|span| place(Shown::Force(machine.span_alike(span).unwrap_or(span), 1.0)))
+                .collect(),
+            sums,
+            rotors: (bodies..mechanism.bodies.len()).filter_map(rotor).collect(),
+            shafts: mechanism.drives.iter().map(|drive| drive.shaft).collect(),
+        }
+    }
+
+    /// The places of what a figure is made from, of all parts of its role.
+    fn sought(&self, seek: Seek) -> &[Place] {
+        match seek {
+            Seek::LoadSpeed => &self.load_speeds,
+            Seek::LoadError => &self.load_errors,
+            Seek::BeltSpeed => &self.belt_speeds,
+            Seek::ShaftSpeed => &self.shaft_speeds,
+            Seek::Current => &self.currents,
+            Seek::Stretch => &self.stretches,
+            Seek::Force => &self.forces,
+            Seek::SteadySpeed | Seek::StopTime => &[],
+        }
+    }
+}
+
+/// What a meter looks for, made once for many machines of a structure.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sought {
+    places: Arc<Places>,
+    readings: [bool; QUANTITIES],
+    sums: bool,
+    steady_speed: bool,
+    /// Whether the motion has to be followed at all.
+    follows: bool,
+}
+
+impl Sought {
+    /// All that a machine has figures of.
+    pub fn all(machine: &Machine, mechanism: &Mechanism) -> Self {
+        let every = [
+            Seek::LoadSpeed,
+            Seek::LoadError,
+            Seek::BeltSpeed,
+            Seek::ShaftSpeed,
+            Seek::Current,
+            Seek::Stretch,
+            Seek::Force,
+            Seek::SteadySpeed,
+            Seek::StopTime,
+        ];
+        Self::of(machine, mechanism, &every.map(|seek| (seek, None)))
+    }
+
+    /// These alone, each of one part of its role or of all of them, and what is known at the end: other peaks and
+    /// speeds stay as they are where nothing has moved, and cost nothing.
+    pub fn of(machine: &Machine, mechanism: &Mechanism, seeks: &[(Seek, Option<usize>)]) -> Self {
+        let places = Places::of(machine, mechanism);
+        let (mut readings, mut sums) = ([false; QUANTITIES], false);
+        for &(seek, part) in seeks {
+            for (number, place) in places.sought(seek).iter().enumerate() {
+                match *place {
+                    _ if part.is_some_and(|part| part != number) => {}
+                    Place::Reading(q, _) => readings[q] = true,
+                    Place::Sum(_) => sums = true,
+                }
+            }
+        }
+        let steady_speed = seeks.iter().any(|(seek, _)| *seek == Seek::SteadySpeed) && mechanism.drives.len() == 1;
+        let follows = !seeks.is_empty() || !places.rotors.is_empty();
+        Self { places: Arc::new(places), readings, sums, steady_speed, follows }
+    }
+}
+
+/// Gathers [`Metrics`] from a run that it observes: peaks between rows, too, and not of rows.
+///
+/// ```
+/// use taut::case::Case;
+/// use taut::metrics::Meter;
+/// use taut::solve::{Course, Detail, Flow, Solver, stream_mechanism};
+/// # let text = r#"
+/// # kind = "h-frame"
+/// # motor = { torque_constant = "23 mN m/A", back_emf_constant = "23 mV s/rad", resistance = "0.71 ohm" }
+/// # drive_pulley = { radius = "19.4 mm", inertia = "6.3e-5 kg m^2" }
+/// # bridge = { mass = "0.838 kg" }
+/// # cart = { mass = "0.362 kg" }
+/// # belt = { stiffness = ["132.76 kN/m", "132.76 kN/m", "58.885 kN/m"] }
+/// # experiment = [{ name = "pulse", input = { left = { pulse = "5 V", for = "0.25 s" } }, until = 1, every = 1e-3 }]
+/// # "#;
+/// let case = Case::from_text("frame.toml", text)?;
+/// let mechanism = case.machine.mechanism();
+/// let course = Course::of(&mechanism, &case.experiments[0]);
+/// let mut meter = Meter::new(&case.machine, &case.experiments[0]);
+/// let rows = &mut |_: &taut::trajectory::Trajectory| Flow::Continue;
+/// let outcome = stream_mechanism(&mechanism, &course, Solver::Exact, (Detail::None, Some(&mut meter)), rows)?;
+/// // The left motor alone pulls bridge and cart alike.
+/// let loads = meter.finish(&outcome.events).loads;
+/// assert!(loads[0].position < -0.1 && loads[1].position < -0.1);
+/// # Ok::<(), taut::Error>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct Meter {
+    machine: Machine,
+    sought: Sought,
+    /// By readings.
+    peaks: [Peak; QUANTITIES],
+    /// By sums of readings.
+    sums: Vec<Peak>,
+    plateau: Option<Plateau>,
+    rotors: Vec<(usize, Rotor)>,
+    /// Whether any body slid or was free.
+    moved: bool,
+    end: f64,
+    state: State,
+    bodies_rest: bool,
+}
+
+impl Meter {
+    /// A meter for all figures of a run of `experiment` on `machine`.
+    pub fn new(machine: &Machine, experiment: &Experiment) -> Self {
+        Self::with(machine, &Sought::all(machine, &machine.mechanism()), Held::last(experiment))
+    }
+
+    /// A meter for these figures, where the last stretch of constant input is known.
+    pub fn with(machine: &Machine, sought: &Sought, held: Option<Held>) -> Self {
+        let sums = if sought.sums { sought.places.sums.len() } else { 0 };
+        Self {
+            machine: machine.clone(),
+            sought: sought.clone(),
+            peaks: [Peak::default(); QUANTITIES],
+            sums: vec![Peak::default(); sums],
+            plateau: held.filter(|_| sought.steady_speed).map(Plateau::new),
+            rotors: sought.places.rotors.iter().map(|&(body, reading)| (body, Rotor::new(reading))).collect(),
+            moved: false,
+            end: 0.0,
+            state: State::default(),
+            bodies_rest: false,
+        }
+    }
+
+    /// The magnitudes above which there is a peak of each reading.
+    #[inline]
+    fn heights(&self) -> Reading {
+        let mut heights = [f64::INFINITY; QUANTITIES];
+        for ((height, peak), sought) in heights.iter_mut().zip(&self.peaks).zip(self.sought.readings) {
+            *height = if sought { peak.value.abs() } else { f64::INFINITY };
+        }
+        heights
+    }
+
+    /// The peaks of the readings that are sought, with their numbers.
+    fn sought(&mut self) -> impl Iterator<Item = (usize, &mut Peak)> {
+        let readings = self.sought.readings;
+        self.peaks.iter_mut().enumerate().filter(move |(q, _)| readings[*q])
+    }
+
+    /// Whether any body other than rotors slides or is free.
+    fn slides(&self, mode: &Mode) -> bool {
+        mode.motion[..self.sought.places.bodies].iter().any(|motion| *motion != Motion::Stuck)
+    }
+
+    /// The metrics of the run that was observed and whose events these are.
+    pub fn finish(self, events: &[Event]) -> Metrics {
+        let (places, machine, state) = (&*self.sought.places, &self.machine, &self.state);
+        let geometry = machine.geometry();
+        let peak = |place: Option<&Place>| match place.copied() {
+            Some(Place::Reading(q, 1.0)) => self.peaks[q],
+            Some(Place::Reading(q, factor)) => Peak { value: factor * self.peaks[q].value, ..self.peaks[q] },
+            Some(Place::Sum(sum)) => self.sums.get(sum).copied().unwrap_or_default(),
+            None => Peak::default(),
+        };
+        let mut counts = vec![EventCount::default(); places.bodies];
+        for event in events {
+            if let Some(count) = event.body().and_then(|body| counts.get_mut(body)) {
+                count.add(event);
+            }
+        }
+        let rotors_rest = self.rotors.iter().all(|(_, rotor)| rotor.rests);
+        let turned = self.rotors.iter().map(|(_, rotor)| rotor.turned).fold(0.0, f64::max);
+        let last = match events.iter().rfind(|event| event.body().is_some()) {
+            Some(last) => Some(last.time),
+            None => Some(0.0).filter(|_| !self.moved),
+        };
+        let settled = self.bodies_rest && rotors_rest;
+        let load = |(number, (slide, by_drives)): (usize, (&crate::machine::SlideAt, f64))| OfLoad {
+            position: state.position[slide.body],
+            speed: state.speed[slide.body],
+            by_drives,
+            peak_speed: peak(places.load_speeds.get(number)),
+            peak_error: peak(places.load_errors.get(number)),
+        };
+        let drive = |(number, at): (usize, &crate::machine::DriveAt)| OfDrive {
+            angle: state.position[at.pulley],
+            shaft_speed: state.speed[places.shafts[number]],
+            peak_belt_speed: places.belt_speeds.get(number).map(|place| peak(Some(place))),
+            peak_speed: peak(places.shaft_speeds.get(number)),
+            peak_current: peak(places.currents.get(number)),
+        };
+        let span = |span: usize| OfSpan {
+            peak_stretch: peak(places.stretches.get(span)),
+            peak_force: peak(places.forces.get(span)),
+        };
+        Metrics {
+            end: self.end,
+            loads: geometry.slides.iter().zip(machine.by_drives(&state.position)).enumerate().map(load).collect(),
+            drives: geometry.drives.iter().enumerate().map(drive).collect(),
+            spans: (0..geometry.spans.len()).map(span).collect(),
+            bodies: counts,
+            steady_speed: self.plateau.as_ref().and_then(|plateau| plateau.steady_speed(machine)),
+            stop_time: last.map(|time| time.max(turned)).filter(|_| settled),
+            settled,
+            bodies_rest: self.bodies_rest,
+            rotors_rest,
+        }
+    }
+}
+
+/// A sum of what is read.
+#[inline]
+fn weighed(sum: &[(usize, f64)], reading: &Reading) -> f64 {
+    sum.iter().map(|&(q, weight)| weight * reading[q]).sum()
+}
+
+/// By how much a sum can be off a straight line, where each reading can be off by its own bow.
+#[inline]
+fn bowed(sum: &[(usize, f64)], bow: &Reading) -> f64 {
+    sum.iter().map(|&(q, weight)| weight.abs() * bow[q]).sum()
+}
+
+impl Observe for Meter {
+    fn stretch(&mut self, stretch: &Stretch) -> Closer {
+        // When a rotor was last fast depends on how fast it had been by then.
+        if !self.rotors.is_empty() {
+            return Closer::Now;
+        }
+        self.moved |= stretch.interval > 0.0 && self.slides(stretch.mode);
+        for (q, peak) in self.sought() {
+            if stretch.most[q] > peak.value.abs() * (1.0 - NEWS) {
+                let (value, time) = stretch.largest(q, NEWS);
+                // What it begins with is what the last one ended with.
+                if time > stretch.begin { peak.come_to(value, time) } else { peak.take(value, time) }
+            }
+        }
+        let mut closer = match &self.plateau {
+            Some(plateau) if plateau.meets(stretch) => Gaps::first(stretch.readings.len() - 1),
+            _ => stretch.rising_above(&self.heights(), 1.0 + NEWS),
+        };
+        for (sum, peak) in self.sought.places.sums.iter().zip(&mut self.sums) {
+            let bow = bowed(sum, stretch.bow);
+            if let [only] = stretch.readings {
+                peak.take(weighed(sum, only), stretch.begin);
+            }
+            for (row, [from, to]) in stretch.readings.array_windows().enumerate() {
+                let ends = [weighed(sum, from), weighed(sum, to)];
+                peak.pass(ends, (stretch.time(row), stretch.time(row + 1)), bow == 0.0 && ends[0] == ends[1]);
+            }
+            for (gap, [from, to]) in stretch.readings.array_windows().enumerate() {
+                let bound = Gap::bound_of(weighed(sum, from), weighed(sum, to), bow);
+                closer.set(gap, bound > peak.value.abs() * (1.0 + NEWS));
+            }
+        }
+        Closer::Later(closer)
+    }
+
+    fn pass(&mut self, gap: &Gap) -> bool {
+        let end = gap.begin + gap.length;
+        let (news, mut closer) = gap.rises_above(&self.heights(), [1.0 - NEWS, 1.0 + NEWS]);
+        if news {
+            for (q, peak) in self.sought() {
+                peak.pass([gap.from[q], gap.to[q]], (gap.begin, end), gap.holds(q));
+            }
+            // What its ends have told is no reason to look between them, where a bound says what is there.
+            closer = gap.rises_above(&self.heights(), [1.0, 1.0 + NEWS]).1;
+        }
+        for (sum, peak) in self.sought.places.sums.iter().zip(&mut self.sums) {
+            let (from, to) = (weighed(sum, gap.from), weighed(sum, gap.to));
+            let bow = bowed(sum, gap.bow);
+            peak.pass([from, to], (gap.begin, end), bow == 0.0 && from == to);
+            closer |= Gap::bound_of(from, to, bow) > peak.value.abs() * (1.0 + NEWS);
+        }
+        if let Some(plateau) = &mut self.plateau {
+            closer |= plateau.pass(gap);
+        }
+        for (_, rotor) in &mut self.rotors {
+            closer |= rotor.pass(gap);
+        }
+        self.moved |= gap.length > 0.0 && self.slides(gap.mode);
+        closer && gap.length > 0.0
+    }
+
+    fn see(&mut self, curve: &Curve) {
+        let (lows, highs) = curve.ranges();
+        for (q, peak) in self.sought() {
+            if highs[q] > peak.value.abs() {
+                let (s, value) = curve.of(q).greatest(0.0, 1.0);
+                peak.take(value, curve.begin + s * curve.length);
+            }
+            if -lows[q] > peak.value.abs() {
+                let (s, value) = curve.of(q).negative().greatest(0.0, 1.0);
+                peak.take(-value, curve.begin + s * curve.length);
+            }
+        }
+        for (sum, peak) in self.sought.places.sums.iter().zip(&mut self.sums) {
+            let mut course = Polynomial::default();
+            for &(q, weight) in sum {
+                course.add(&curve.of(q), weight);
+            }
+            if course.bound() > peak.value.abs() {
+                let (s, value) = course.largest(0.0, 1.0);
+                peak.take(value, curve.begin + s * curve.length);
+            }
+        }
+        if let Some(plateau) = &mut self.plateau {
+            plateau.see(curve);
+        }
+        for (_, rotor) in &mut self.rotors {
+            rotor.see(curve);
+        }
+    }
+
+    fn follows(&self) -> bool {
+        self.sought.follows
+    }
+
+    fn end(&mut self, time: f64, state: &State, mode: &Mode) {
+        (self.end, self.state) = (time, *state);
+        let stuck = |body: usize| mode.motion[body] == Motion::Stuck && state.speed[body] == 0.0;
+        self.bodies_rest = (0..self.sought.places.bodies).all(stuck);
+        for (body, rotor) in &mut self.rotors {
+            rotor.end(state.speed[*body]);
+        }
+    }
+}

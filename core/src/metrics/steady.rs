@@ -1,0 +1,243 @@
+//! The steady speed of a machine with one drive: at the end of a constant input, and by the balance of forces.
+
+use crate::machine::Machine;
+use crate::mechanism::AmplifierMode;
+use crate::plan::Experiment;
+use crate::solve::{Curve, Gap, Stretch, reading};
+
+/// Share of the run that a stretch of constant input has to last before a steady speed is sought in it.
+const SHORTEST: f64 = 0.02;
+
+/// The last part of such a stretch, in which the speed must have become steady.
+const LATE: f64 = 0.1;
+
+/// The change of a steady speed that is allowed, relative to itself.
+const STEADY: f64 = 0.01;
+
+/// The share of that by which it may be off.
+const NEGLIGIBLE: f64 = 1e-7;
+
+/// The cart's speed at the end of the last stretch of time on which the input was constant and not zero, and that
+/// lasted at least a fiftieth of the run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SteadySpeed {
+    /// Its speed at the end of that stretch, m/s.
+    pub value: f64,
+    /// The difference of largest and least speed within the last tenth of that stretch, m/s.
+    pub change: f64,
+    /// Whether that change is at most 1 % of the speed; if not, there was no time to become steady.
+    pub reached: bool,
+    /// The speed at which all forces balance under that input, with everything sliding its way: [`balanced_speed`].
+    pub analytic: Balance,
+    /// The input, V or A.
+    pub input: f64,
+    /// Where that stretch begins and ends, s.
+    pub stretch: (f64, f64),
+}
+
+/// A stretch of time on which the input is constant.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Held {
+    input: f64,
+    begin: f64,
+    end: f64,
+}
+
+impl Held {
+    /// The last one of an experiment that is not zero and no shorter than a fiftieth of the run.
+    pub fn last(experiment: &Experiment) -> Option<Self> {
+        let until = experiment.until;
+        let long = |held: &Held| held.input != 0.0 && held.end - held.begin >= SHORTEST * until * (1.0 - 1e-9);
+        let (mut last, mut held, mut time) = (None, Held { input: 0.0, begin: 0.0, end: 0.0 }, 0.0);
+        while time < until {
+            let piece = experiment.inputs[0].piece(time);
+            let input = if piece.degree() == 0 { piece.coefficients[0] } else { 0.0 };
+            if input.to_bits() != held.input.to_bits() {
+                last = Some(held).filter(long).or(last);
+                held = Held { input, begin: time, end: time };
+            }
+            time = piece.end.min(until);
+            held.end = time;
+        }
+        Some(held).filter(long).or(last)
+    }
+}
+
+/// The cart's speed at the end of a stretch of constant input.
+#[derive(Debug, Clone)]
+pub(super) struct Plateau {
+    held: Held,
+    /// Where its last part begins.
+    late: f64,
+    /// Times as near as this are one.
+    near: f64,
+    /// The least and greatest speed there.
+    range: (f64, f64),
+    /// The speed at its end, where that was reached.
+    last: Option<f64>,
+}
+
+impl Plateau {
+    pub fn new(held: Held) -> Self {
+        Self {
+            held,
+            late: held.end - LATE * (held.end - held.begin),
+            near: 16.0 * f64::EPSILON * held.end,
+            range: (f64::INFINITY, f64::NEG_INFINITY),
+            last: None,
+        }
+    }
+
+    fn take(&mut self, speed: f64) {
+        self.range = (self.range.0.min(speed), self.range.1.max(speed));
+    }
+
+    /// Whether a stretch may tell of it.
+    pub fn meets(&self, stretch: &Stretch) -> bool {
+        stretch.end() >= self.late - self.near && stretch.begin <= self.held.end + self.near
+    }
+
+    pub fn pass(&mut self, gap: &Gap) -> bool {
+        let (begin, end) = (gap.begin, gap.begin + gap.length);
+        if end < self.late - self.near || end > self.held.end + self.near {
+            return false;
+        }
+        let (from, to) = (gap.from[reading::CART_SPEED], gap.to[reading::CART_SPEED]);
+        self.take(to);
+        if begin >= self.late - self.near {
+            self.take(from);
+        }
+        if end >= self.held.end - self.near {
+            self.last = Some(to);
+        }
+        let (low, high) = gap.range(reading::CART_SPEED);
+        let news = STEADY * NEGLIGIBLE * low.abs().max(high.abs());
+        begin < self.late - self.near || low < self.range.0 - news || high > self.range.1 + news
+    }
+
+    pub fn see(&mut self, curve: &Curve) {
+        let end = curve.begin + curve.length;
+        if end < self.late || end > self.held.end + self.near {
+            return;
+        }
+        let speed = curve.of(reading::CART_SPEED);
+        let from = ((self.late - curve.begin) / curve.length).clamp(0.0, 1.0);
+        self.take(speed.greatest(from, 1.0).1);
+        self.take(-speed.negative().greatest(from, 1.0).1);
+    }
+
+    pub fn steady_speed(&self, machine: &Machine) -> Option<SteadySpeed> {
+        let (value, change) = (self.last?, self.range.1 - self.range.0);
+        Some(SteadySpeed {
+            value,
+            change,
+            reached: change <= STEADY * value.abs(),
+            analytic: balanced_speed(machine, self.held.input, value),
+            input: self.held.input,
+            stretch: (self.held.begin, self.held.end),
+        })
+    }
+}
+
+/// At which speed of the cart all forces balance under a constant input.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Balance {
+    /// At this one, m/s; zero where that input cannot keep the axis sliding.
+    At(f64),
+    /// At none: nothing limits the speed (a commanded current, and no viscous friction).
+    Never,
+    /// At no single one: friction, the belt or a force changes along the travel, or a force with the speed.
+    Changing,
+}
+
+impl Balance {
+    /// The speed, if there is one.
+    pub fn speed(self) -> Option<f64> {
+        match self {
+            Balance::At(speed) => Some(speed),
+            Balance::Never | Balance::Changing => None,
+        }
+    }
+}
+
+/// The cart's speed at which a constant `input` (V or A) just makes up for all losses; the belt's stretch is constant
+/// then.
+///
+/// Everything slides in the direction of the input, by its friction law, and limits of voltage and current hold. Where
+/// a law's curve lets the forces balance at several speeds, it is the one that the axis comes to from `near`, m/s.
+pub fn balanced_speed(machine: &Machine, input: f64, near: f64) -> Balance {
+    if machine.changes_along_travel() || machine.cart.forces.by_speed.is_some() {
+        return Balance::Changing;
+    }
+    let (motor, amplifier) = (&machine.drives[0].motor, &machine.drives[0].amplifier);
+    let (r, n, eta) = (machine.pulley_radius, motor.gear_ratio, motor.gear_efficiency);
+    let output = amplifier.gain * input;
+    let forward = output >= 0.0;
+    let direction = if forward { 1.0 } else { -1.0 };
+
+    // What drives, as lines τ = a − s φ̇ of which the least counts: the command, and the limit on the other quantity.
+    let least = |a: f64, b: Option<f64>| b.map_or(a, |b| a.min(b));
+    // τ_M = η n K_t i
+    let at_current = |current: f64| (eta * n * motor.torque_constant * current, 0.0);
+    // τ_M = η n K_t (V_in − K_e n φ̇) / R                                          (4) with a gear
+    let at_voltage = |voltage: f64| {
+        let per_volt = eta * n * motor.torque_constant / motor.resistance;
+        (per_volt * voltage, per_volt * motor.back_emf_constant * n)
+    };
+    let (command, bound) = match amplifier.mode {
+        AmplifierMode::Current => {
+            (at_current(least(output.abs(), amplifier.current_limit)), amplifier.voltage_limit.map(at_voltage))
+        }
+        AmplifierMode::Voltage => {
+            (at_voltage(least(output.abs(), amplifier.voltage_limit)), amplifier.current_limit.map(at_current))
+        }
+    };
+
+    // Sum of (16), r (17) and (18) without accelerations, with v = ẋ = r φ̇₁ = r φ̇₃ and the constant force F on the
+    // cart:
+    //   excess(v) = τ_M + r F − τ_f1 − τ_f2 − r F_f
+    let bodies = [(machine.drive_pulley.friction, r), (machine.cart.friction, 1.0), (machine.idler_pulley.friction, r)];
+    let load = direction * r * machine.cart.constant_force();
+    let viscous: f64 = bodies.iter().map(|(law, radius)| r / radius * (r / radius) * law.side(forward).viscous).sum();
+    let dry = |v: f64| bodies.iter().map(|(law, radius)| r / radius * law.dry(forward, v / radius)).sum::<f64>();
+    let excess = |v: f64| {
+        let drive = [Some(command), bound].into_iter().flatten().map(|(a, s)| a - s * v / r);
+        drive.fold(f64::INFINITY, f64::min) + load - viscous * v / r - dry(v)
+    };
+
+    // Without dry friction it would go this fast, and with it no faster.
+    let fastest = |(a, s): (f64, f64)| if s + viscous > 0.0 { r * (a + load) / (s + viscous) } else { f64::INFINITY };
+    let fastest = bound.map_or(f64::INFINITY, fastest).min(fastest(command));
+    let scales: Vec<f64> = bodies.iter().filter_map(|(law, radius)| law.law.velocity().map(|v| radius * v)).collect();
+    let slowest = scales.iter().copied().fold(f64::INFINITY, f64::min) / SLOWER;
+    let past = scales.iter().copied().fold(0.0, f64::max) * FASTER;
+    let top = if fastest.is_finite() { 2.0 * fastest.max(0.0) } else { past.max(direction * near) };
+
+    // Between neighbours of these speeds the excess changes its sign no more than once.
+    let curve = std::iter::successors(Some(slowest), |v| Some(v * FINER)).take_while(|v| *v < past.min(top));
+    let near = (direction * near).clamp(0.0, top);
+    let mut speeds: Vec<f64> = curve.chain([0.0, near, top]).collect();
+    speeds.sort_by(f64::total_cmp);
+    let from = speeds.partition_point(|v| *v < near);
+    let drives = |v: &f64| excess(*v) > 0.0;
+    let (mut low, mut high) = if drives(&near) {
+        let Some(beyond) = speeds[from..].iter().position(|v| !drives(v)) else { return Balance::Never };
+        (speeds[from + beyond - 1], speeds[from + beyond])
+    } else {
+        let Some(below) = speeds[..from].iter().rposition(drives) else { return Balance::At(0.0) };
+        (speeds[below], speeds[below + 1])
+    };
+    loop {
+        let middle = 0.5 * (low + high);
+        if middle <= low || middle >= high {
+            return Balance::At(direction * middle);
+        }
+        if drives(&middle) { low = middle } else { high = middle }
+    }
+}
+
+/// Speeds at which a friction curve is looked at: from this share of its own speed, to this many times it, each so many
+/// times the last.
+const SLOWER: f64 = 1e4;
+const FASTER: f64 = 50.0;
+const FINER: f64 = 1.05;
