@@ -4,6 +4,7 @@ use crate::common;
 use proptest::prelude::*;
 use taut::case::{Case, Experiment};
 use taut::friction::Friction;
+use taut::linear::{Natural, Operation, Root, System};
 use taut::machine::{Belt, DriveUnit, Kind, Machine, Pulley, Slide, Spans};
 use taut::mechanism::{Amplifier, AmplifierMode, Motor, State};
 use taut::signal::Signal;
@@ -175,6 +176,55 @@ proptest! {
         let power = mechanism.power(mechanism.first_mode(&state), &state, &[volts[0], volts[1]]);
         prop_assert!(power.imbalance().abs() <= 1e-12 * power.scale(), "{power:?}");
         prop_assert!(power.friction.iter().chain(&power.spring).all(|&loss| loss >= 0.0), "{power:?}");
+    }
+
+    /// Where nothing sticks, a run is that of the linear equations, whose exponential is another library's: every output
+    /// at the end, and poles are those of the modes.
+    #[test]
+    fn the_linear_system_is_the_machine(gantry in gantry(), volts in prop::collection::vec(-12.0..12.0_f64, 2)) {
+        let mut gantry = gantry;
+        let smooth = |friction: Friction| Friction::with_breakaway(friction.forward.viscous, 0.0, 0.0);
+        gantry.drive_pulley.friction = smooth(gantry.drive_pulley.friction);
+        gantry.cart.friction = smooth(gantry.cart.friction);
+        if let Some(bridge) = &mut gantry.bridge {
+            bridge.friction = smooth(bridge.friction);
+        }
+        let system = System::of(&gantry, Operation::default()).unwrap();
+        prop_assert_eq!(system.inputs.iter().map(|input| input.name.as_str()).collect::<Vec<_>>(),
+            ["left_voltage_command", "right_voltage_command"]);
+        let (until, n) = (0.02, system.a.nrows());
+        let u = nalgebra::DVector::from_row_slice(&volts);
+        // d/dt (x, 1) = [A, B u; 0, 0] (x, 1)
+        let mut whole = nalgebra::DMatrix::zeros(n + 1, n + 1);
+        whole.view_mut((0, 0), (n, n)).copy_from(&system.a);
+        whole.view_mut((0, n), (n, 1)).copy_from(&(&system.b * &u));
+        let x = (whole * until).exp().view((0, n), (n, 1)).into_owned();
+        let y = &system.c * x.column(0) + &system.d * &u;
+        let mechanism = gantry.mechanism();
+        let inputs = volts.iter().map(|value| Signal::Step { value: *value, at: 0.0 }).collect();
+        let course = Course { inputs, start: State::default(), until, every: until / 200.0 };
+        let mut rows = Trajectory::default();
+        let outcome = stream_mechanism(&mechanism, &course, Solver::Exact, (Detail::Full, None), &mut |block| {
+            rows.append(block);
+            Flow::Continue
+        }).unwrap();
+        prop_assert_eq!(outcome.ending, Ending::Complete);
+        for (output, y) in system.outputs.iter().zip(y.iter()) {
+            let column = rows.get(&output.name).unwrap_or_else(|| panic!("no column {}", output.name));
+            let largest = column.iter().fold(0.0, |most: f64, v| most.max(v.abs()));
+            let last = column[column.len() - 1];
+            prop_assert!((last - y).abs() <= 1e-9 * largest.max(1e-9), "{}: {last} and {y}", output.name);
+        }
+        // Poles: without an inductance those of M, C and K.
+        if gantry.drives[0].motor.inductance == 0.0 {
+            let natural = Natural::of(&mechanism, &[0.0; 6]).unwrap();
+            let fast = |roots: Vec<Root>| roots.into_iter().filter_map(Root::hertz).collect::<Vec<_>>();
+            let (a, b) = (fast(Root::of(&system.input(0).poles().unwrap())), fast(natural.poles));
+            prop_assert_eq!(a.len(), b.len());
+            for (a, b) in a.iter().zip(&b) {
+                prop_assert!((a - b).abs() <= 1e-9 * b, "{a} Hz and {b} Hz");
+            }
+        }
     }
 
     /// u → −u turns the motion around, bit for bit.

@@ -137,7 +137,7 @@ proptest! {
     #[test]
     fn antiresonance_is_resonance_with_the_drive_pulley_clamped(machine in machine(Dry::Any)) {
         let free = StateSpace::of(&machine, Operation::default()).unwrap();
-        let held = Operation { held: [true, false, false], ..Operation::default() };
+        let held = Operation { held: [true, false, false, false, false, false], ..Operation::default() };
         let held = StateSpace::of(&machine, held).unwrap().poles().unwrap();
         let zeros = free.zeros(free.output("drive_angle").unwrap()).unwrap().unwrap().values;
         // With an inductance the current goes on by itself while the pulley is held: −R/L, no zero.
@@ -232,7 +232,7 @@ fn bristles_slide_like_the_curve_and_hold_like_a_spring() {
         let ((zero, a), (none, b)) = (gain(&bristles, speed), gain(&curve, speed));
         assert!(zero == 0 && none == 0 && (a / b - 1.0).abs() < 1e-9, "{speed}: {a} {b}");
     }
-    let rest = Operation { speed: 0.0, held: [true, false, true], ..Operation::default() };
+    let rest = Operation { speed: 0.0, held: [true, false, true, false, false, false], ..Operation::default() };
     let [k1, k2, _] = bristles.belt.stiffness.three();
     let swing = StateSpace::of(&bristles, rest).unwrap().poles().unwrap().pop().unwrap().norm_sqr();
     assert!((swing / ((k1 + k2 + 1e5) / bristles.cart.mass) - 1.0).abs() < 1e-12, "{swing}");
@@ -267,7 +267,7 @@ fn spans_that_follow_the_cart() {
     // Near the drive pulley the cart hangs on a short span.
     assert!(along[4].undamped_antiresonances[1] > 2.0 * along[2].undamped_antiresonances[1], "{along:?}");
     // Where the axis is built symmetric it is so for the anti-resonance with both pulleys held.
-    let both = Operation { held: [true, false, true], ..Operation::default() };
+    let both = Operation { held: [true, false, true, false, false, false], ..Operation::default() };
     let at = |position| hertz(&StateSpace::of(&machine, Operation { position, ..both }).unwrap());
     assert!((at(0.2)[0] / at(-0.2)[0] - 1.0).abs() < 1e-12);
     let [k1, k2] = make.stiffness_at(0.2);
@@ -309,7 +309,7 @@ fn stages_without_losses() {
 /// With every body held the current alone is left, and without an inductance it is no state: a system without states.
 #[test]
 fn nothing_is_left_to_move() {
-    let held = Operation { held: [true; 3], ..Operation::default() };
+    let held = Operation { held: [true, true, true, false, false, false], ..Operation::default() };
     let system = StateSpace::of(&table4(), held).unwrap();
     assert_eq!((system.states.len(), system.poles().unwrap().len()), (0, 0));
     let transfers = system.transfers().unwrap();

@@ -36,7 +36,10 @@ pub fn question(
         Some("tustin") => Hold::Tustin,
         Some(other) => return Err(PyValueError::new_err(format!("hold: \"{other}\" is none of zero, first, tustin"))),
     };
-    let held = bodies.map(|body| stuck.iter().any(|name| name == body));
+    let mut held = [false; 6];
+    for (held, body) in held.iter_mut().zip(bodies) {
+        *held = stuck.iter().any(|name| name == body);
+    }
     Ok(Question { speed, at, held, sample_time, hold, delay: delay.unwrap_or(0.0), from, to })
 }
 
@@ -54,7 +57,7 @@ pub fn answers<'py>(py: Python<'py>, analysis: &Analysis) -> PyResult<Bound<'py,
     let responses = PyDict::new(py);
     for (output, response) in system.outputs.iter().zip(&analysis.responses) {
         responses
-            .set_item(output.name, (response.magnitude().into_pyarray(py), response.degrees().into_pyarray(py)))?;
+            .set_item(&output.name, (response.magnitude().into_pyarray(py), response.degrees().into_pyarray(py)))?;
     }
     dict.set_item("frequency", hertz.into_pyarray(py))?;
     dict.set_item("responses", responses)?;

@@ -4,7 +4,7 @@ use super::number;
 use crate::case::Case;
 use crate::error::Result;
 use crate::export::{self, ElementKind, Exported, Row, Tables, Then};
-use crate::linear::{Operation, StateSpace, Variable};
+use crate::linear::{Operation, System, Variable};
 use crate::machine::Machine;
 use crate::mechanism::{Kind, Mechanism, Over, SpringLaw};
 use crate::parameter;
@@ -18,10 +18,7 @@ pub fn export(case: &Case) -> Result<Value> {
         true => Some(equations(&Tables::new(&mechanism)?)),
         false => None,
     };
-    let linear = match case.is_axis() {
-        true => Some(linear(&StateSpace::of(&case.machine, Operation::default())?)),
-        false => None,
-    };
+    let linear = linear(&System::of(&case.machine, Operation::default())?);
     Ok(json!({
         "schema": super::identity("export"),
         "title": case.title.as_str(),
@@ -167,19 +164,20 @@ fn row(row: &Row) -> Value {
     json!({ "depends_on": row.depends, "weights": row.weights })
 }
 
-fn linear(system: &StateSpace) -> Value {
+fn linear(system: &System) -> Value {
     let variable = |variable: &Variable| json!({ "name": variable.name, "unit": variable.unit });
     let matrix = |matrix: &nalgebra::DMatrix<f64>| -> Vec<Vec<f64>> {
         matrix.row_iter().map(|row| row.iter().copied().collect()).collect()
     };
-    let column = |vector: &nalgebra::DVector<f64>| -> Vec<Vec<f64>> { vector.iter().map(|v| vec![*v]).collect() };
     json!({
-        "input": variable(&system.input),
+        // Of an axis the only one.
+        "input": variable(&system.inputs[0]),
+        "inputs": system.inputs.iter().map(variable).collect::<Vec<_>>(),
         "states": system.states.iter().map(variable).collect::<Vec<_>>(),
         "outputs": system.outputs.iter().map(variable).collect::<Vec<_>>(),
         "A": matrix(&system.a),
-        "B": column(&system.b),
+        "B": matrix(&system.b),
         "C": matrix(&system.c),
-        "D": column(&system.d),
+        "D": matrix(&system.d),
     })
 }

@@ -1,6 +1,9 @@
 //! How a gantry swings: `taut modes --json`, `modes.json`. Frequencies are in Hz where they say so.
 
-use super::{modes::root_told, number};
+use super::{
+    modes::{matrix, root_told, transfer, variable},
+    number,
+};
 use crate::linear::{GantryAnalysis, Natural};
 use crate::mechanism::Mechanism;
 use serde_json::{Map, Value, json};
@@ -40,6 +43,17 @@ pub fn gantry_modes(analysis: &GantryAnalysis) -> Value {
         },
         "rigid": rigid.collect::<Vec<_>>(),
         "elastic": elastic.collect::<Vec<_>>(),
+        "inputs": analysis.by_input.iter().map(|one| json!({
+            "name": one.system.input.name,
+            "unit": one.system.input.unit,
+            "outputs": one.system.outputs.iter().zip(&one.transfers).map(transfer).collect::<Vec<_>>(),
+        })).collect::<Vec<_>>(),
+        "states": analysis.system.states.iter().map(variable).collect::<Vec<_>>(),
+        "outputs": analysis.system.outputs.iter().map(variable).collect::<Vec<_>>(),
+        "A": matrix(&analysis.system.a),
+        "B": matrix(&analysis.system.b),
+        "C": matrix(&analysis.system.c),
+        "D": matrix(&analysis.system.d),
         "poles": modes.poles.iter().map(|root| root_told(*root)).collect::<Vec<_>>(),
         "stiffness_depends_on_position": analysis.map.is_some(),
         "map": analysis.map.as_ref().map(|map| json!({

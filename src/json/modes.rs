@@ -11,22 +11,7 @@ use std::f64::consts::PI;
 pub fn modes(analysis: &Analysis) -> Value {
     let system = &analysis.system;
     let operation = analysis.operation;
-    let outputs: Vec<Value> = system
-        .outputs
-        .iter()
-        .zip(&analysis.transfers)
-        .map(|(output, transfer)| {
-            let (integrators, gain) = transfer.low_frequency();
-            json!({
-                "name": output.name,
-                "unit": output.unit,
-                "zeros": transfer.zeros.values.iter().map(root).collect::<Vec<_>>(),
-                "gain": number(transfer.zeros.gain),
-                "integrators": integrators,
-                "low_frequency_gain": number(gain),
-            })
-        })
-        .collect();
+    let outputs: Vec<Value> = system.outputs.iter().zip(&analysis.transfers).map(transfer).collect();
     let stuck: Vec<&str> =
         operation.held.iter().zip(LABELS).filter(|(held, _)| **held).map(|(_, label)| label.key).collect();
     json!({
@@ -55,11 +40,24 @@ pub fn modes(analysis: &Analysis) -> Value {
     })
 }
 
-fn variable(variable: &Variable) -> Value {
+/// What the input does to an output.
+pub(super) fn transfer((output, transfer): (&Variable, &Transfer)) -> Value {
+    let (integrators, gain) = transfer.low_frequency();
+    json!({
+        "name": output.name,
+        "unit": output.unit,
+        "zeros": transfer.zeros.values.iter().map(root).collect::<Vec<_>>(),
+        "gain": number(transfer.zeros.gain),
+        "integrators": integrators,
+        "low_frequency_gain": number(gain),
+    })
+}
+
+pub(super) fn variable(variable: &Variable) -> Value {
     json!({ "name": variable.name, "unit": variable.unit })
 }
 
-fn matrix(matrix: &DMatrix<f64>) -> Vec<Vec<f64>> {
+pub(super) fn matrix(matrix: &DMatrix<f64>) -> Vec<Vec<f64>> {
     matrix.row_iter().map(|row| row.iter().copied().collect()).collect()
 }
 

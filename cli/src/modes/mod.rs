@@ -47,7 +47,7 @@ fn question(args: &Args) -> Question {
     Question {
         speed: args.speed,
         at: args.at,
-        held: [BodyName::Drive, BodyName::Cart, BodyName::Idler].map(|body| args.stuck.contains(&body)),
+        held: held(args),
         sample_time: args.sample_time,
         hold: match args.hold.unwrap_or_default() {
             HoldName::Zero => Hold::Zero,
@@ -78,4 +78,13 @@ fn csv(analysis: &Analysis) -> String {
         text.push('\n');
     }
     text
+}
+
+/// The bodies that are held, by their numbers.
+fn held(args: &Args) -> [bool; 6] {
+    let mut held = [false; 6];
+    for (held, body) in held.iter_mut().zip([BodyName::Drive, BodyName::Cart, BodyName::Idler]) {
+        *held = args.stuck.contains(&body);
+    }
+    held
 }

@@ -14,8 +14,8 @@ const ROWS: usize = 7;
 pub fn text(analysis: &Analysis) -> String {
     let system = &analysis.system;
     let mut text = format!("{}\n", bold(&analysis.case.title));
-    let names: Vec<String> = system.states.iter().map(|state| words(state.name)).collect();
-    let _ = writeln!(text, "{}, {} states: {}", words(system.input.name), names.len(), names.join(", "));
+    let names: Vec<String> = system.states.iter().map(|state| words(&state.name)).collect();
+    let _ = writeln!(text, "{}, {} states: {}", words(&system.input.name), names.len(), names.join(", "));
     for note in &analysis.words {
         let _ = writeln!(text, "  {note}");
     }
@@ -26,7 +26,7 @@ pub fn text(analysis: &Analysis) -> String {
     }
     let _ = write!(text, "\n{}\n", bold("Outputs"));
     for (output, transfer) in system.outputs.iter().zip(&analysis.transfers) {
-        let _ = writeln!(text, "  {:<16}{}", words(output.name), gain(transfer, output.unit, system.input.unit));
+        let _ = writeln!(text, "  {:<16}{}", words(&output.name), gain(transfer, output.unit, system.input.unit));
         let zeros = zeros(transfer);
         if !zeros.is_empty() {
             let _ = writeln!(text, "  {:<16}zeros: {zeros}", "");

@@ -17,8 +17,8 @@ pub struct Question {
     pub speed: Option<f64>,
     /// Where the cart is, m; at x = 0 if not said.
     pub at: Option<f64>,
-    /// Which of drive pulley, cart and idler pulley are held where they are.
-    pub held: [bool; 3],
+    /// Which bodies are held where they are.
+    pub held: [bool; 6],
     /// Of the discrete-time model, s; none is made if not said.
     pub sample_time: Option<f64>,
     /// The input between samples.
@@ -74,6 +74,7 @@ impl<'a> Analysis<'a> {
             speed: question.speed.unwrap_or(usual.speed),
             position: question.at.unwrap_or(usual.position),
             held: question.held,
+            ..usual
         };
         let machine = &case.machine;
         numbers(question)?;

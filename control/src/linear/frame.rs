@@ -1,54 +1,60 @@
 //! Coordinates: which quantities are the states, and what every stretch, speed and angle is in terms of them.
 
 use crate::friction::Law;
-use crate::machine::axis::{BODIES, CART, DRIVE, ROTOR};
-use crate::machine::{BeltModel, Machine};
-use crate::mechanism::{Form, Mechanism};
+use crate::machine::{Geometry, Machine};
+use crate::mechanism::{self, Form, Mechanism};
 use nalgebra::{DMatrix, DVector};
 
 /// A quantity with its unit.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Variable {
     /// As the columns of a run are called.
-    pub name: &'static str,
+    pub name: String,
     /// Its unit.
     pub unit: &'static str,
 }
 
-/// Speeds: of the three bodies, and of the rotor.
-pub(super) const SPEEDS: usize = 4;
-/// Lengths: of the three spans, the gear's twist, and where the cart is.
-const STRETCHES: usize = 5;
-/// The gear's twist among the lengths.
-const TWIST: usize = 3;
+impl Variable {
+    pub(super) fn new(name: impl Into<String>, unit: &'static str) -> Self {
+        Self { name: name.into(), unit }
+    }
 
-/// Each length as coefficients of φ₁, x, φ₃ and φ_r.
-fn arms(r: f64) -> [[f64; SPEEDS]; STRETCHES] {
-    [[r, -1.0, 0.0, 0.0], [0.0, 1.0, -r, 0.0], [-r, 0.0, r, 0.0], [-1.0, 0.0, 0.0, 1.0], [0.0, 1.0, 0.0, 0.0]]
-}
+    /// The angle or position of a body.
+    pub(super) fn angle(plant: &Mechanism, body: usize) -> Self {
+        let part = &plant.bodies[body];
+        let way = if part.kind == mechanism::Kind::Linear { "position" } else { "angle" };
+        Self::new(format!("{}_{way}", part.label.key), part.kind.units()[0])
+    }
 
-/// Whether the rotor is an inertia of its own.
-pub(super) fn has_rotor(mechanism: &Mechanism) -> bool {
-    mechanism.drives[0].has_rotor()
+    /// The speed of a body.
+    pub(super) fn speed(plant: &Mechanism, body: usize) -> Self {
+        let part = &plant.bodies[body];
+        Self::new(format!("{}_speed", part.label.key), part.kind.units()[1])
+    }
+
+    /// The current of a drive.
+    pub(super) fn current(geometry: &Geometry, drive: usize) -> Self {
+        Self::new(geometry.drives[drive].current_column, "A")
+    }
 }
 
 /// States, and what is made of them.
 pub(super) struct Frame {
     pub(super) variables: Vec<Variable>,
-    /// Coefficients of the states in the lengths.
-    stretch: [DVector<f64>; STRETCHES],
-    /// Which of the lengths each spring of the mechanism has.
-    of_spring: Vec<usize>,
-    /// In φ̇₁, ẋ, φ̇₃, φ̇_r.
-    speed: [DVector<f64>; SPEEDS],
-    /// In φ₁, x, φ₃, φ_r.
-    pub(super) angle: [DVector<f64>; SPEEDS],
+    /// Coefficients of the states in the length of each spring.
+    stretch: Vec<DVector<f64>>,
+    /// In the speed of each body.
+    speed: Vec<DVector<f64>>,
+    /// In the angle or position of each body.
+    pub(super) angle: Vec<DVector<f64>>,
     /// Places of the states that are ways, and their rates.
     pub(super) ways: Vec<(usize, DVector<f64>)>,
-    /// Where the speeds stand that are states.
-    pub(super) speed_place: [Option<usize>; SPEEDS],
-    pub(super) current_place: Option<usize>,
-    pub(super) bristle_place: [Option<usize>; 3],
+    /// Where the speeds stand that are states, by body.
+    pub(super) speed_place: Vec<Option<usize>>,
+    /// By drive.
+    pub(super) current_place: Vec<Option<usize>>,
+    /// By body.
+    pub(super) bristle_place: Vec<Option<usize>>,
     /// The kind of each state: the quantity whose coefficients in another frame are its own.
     kinds: Vec<Kind>,
 }
@@ -58,67 +64,67 @@ enum Kind {
     Angle(usize),
     Stretch(usize),
     Speed(usize),
-    Current,
+    Current(usize),
     Bristle(usize),
 }
 
-const ANGLES: [Variable; SPEEDS] = [
-    Variable { name: "drive_angle", unit: "rad" },
-    Variable { name: "cart_position", unit: "m" },
-    Variable { name: "idler_angle", unit: "rad" },
-    Variable { name: "rotor_angle", unit: "rad" },
-];
+/// The spring between a pulley and its rotor, where that turns by itself.
+pub(super) fn gears(plant: &Mechanism) -> impl Iterator<Item = usize> + '_ {
+    let is_gear = |spring: &usize| {
+        let part = &plant.springs[*spring];
+        part.arms.iter().any(|(body, _)| plant.bodies[*body].is_rotor)
+    };
+    (0..plant.springs.len()).filter(is_gear)
+}
 
-const RATES: [Variable; SPEEDS] = [
-    Variable { name: "drive_speed", unit: "rad/s" },
-    Variable { name: "cart_speed", unit: "m/s" },
-    Variable { name: "idler_speed", unit: "rad/s" },
-    Variable { name: "rotor_speed", unit: "rad/s" },
-];
-
-const BRISTLES: [Variable; 3] = [
-    Variable { name: "drive_bristle", unit: "rad" },
-    Variable { name: "cart_bristle", unit: "m" },
-    Variable { name: "idler_bristle", unit: "rad" },
-];
+/// The pulleys, each with the first span that hangs on it and on what slides alone.
+fn pulleys(machine: &Machine, plant: &Mechanism) -> Vec<(usize, usize)> {
+    let slides = |body: usize| plant.bodies[body].kind == mechanism::Kind::Linear;
+    let turning = plant.held_bodies().filter(|body| !slides(*body));
+    let own = |body: usize| {
+        let hangs = |span: &usize| {
+            let arms = &plant.springs[*span].arms;
+            arms.iter().any(|arm| arm.0 == body) && arms.iter().all(|arm| arm.0 == body || slides(arm.0))
+        };
+        (0..machine.geometry().spans.len()).find(hangs).map(|span| (body, span))
+    };
+    turning.filter_map(own).collect()
+}
 
 impl Frame {
     /// Angles and speeds, body by body, of what moves by itself.
-    pub(super) fn outer(machine: &Machine, plant: &Mechanism, held: [bool; 3], speed: f64) -> Self {
+    pub(super) fn outer(machine: &Machine, plant: &Mechanism, held: &[bool], speed: f64) -> Self {
         let moving: Vec<usize> = moving(plant, held);
+        let is_rotor = |body: &&usize| plant.bodies[**body].is_rotor;
         let mut kinds: Vec<Kind> = Vec::new();
-        for &j in moving.iter().filter(|&&j| j != ROTOR) {
+        for &j in moving.iter().filter(|body| !is_rotor(body)) {
             kinds.extend([Kind::Angle(j), Kind::Speed(j)]);
         }
-        kinds.extend(plant.drives[0].has_current_state().then_some(Kind::Current));
-        if moving.contains(&ROTOR) {
-            kinds.extend([Kind::Angle(ROTOR), Kind::Speed(ROTOR)]);
+        kinds.extend(currents(plant));
+        for &j in moving.iter().filter(is_rotor) {
+            kinds.extend([Kind::Angle(j), Kind::Speed(j)]);
         }
         kinds.extend(bristles(plant, held, speed));
         Self::new(machine, plant, kinds, false)
     }
 
-    /// The cart's position and stretches, so that what does not depend on where the axis is has coefficients that are
-    /// exactly zero. The outer frame where a body is held: then positions are stretches.
-    pub(super) fn inner(machine: &Machine, plant: &Mechanism, held: [bool; 3], speed: f64) -> Self {
+    /// Positions of what slides and stretches, so that what does not depend on where the machine is has coefficients
+    /// that are exactly zero. The outer frame where a body is held: then positions are stretches.
+    pub(super) fn inner(machine: &Machine, plant: &Mechanism, held: &[bool], speed: f64) -> Self {
         if held.contains(&true) {
             return Self::outer(machine, plant, held, speed);
         }
-        let mut kinds = vec![Kind::Angle(1)];
-        kinds.extend(match machine.belt.model {
-            BeltModel::Elastic => vec![Kind::Stretch(0), Kind::Stretch(1)],
-            BeltModel::TwoMass => vec![Kind::Stretch(0)],
-            BeltModel::Rigid => Vec::new(),
-        });
-        kinds.extend(has_rotor(plant).then_some(Kind::Stretch(TWIST)));
+        let mut kinds: Vec<Kind> = machine.geometry().slides.iter().map(|slide| Kind::Angle(slide.body)).collect();
+        let of_pulleys = pulleys(machine, plant).into_iter().filter(|(body, _)| plant.leader(*body) == *body);
+        kinds.extend(of_pulleys.map(|(_, span)| Kind::Stretch(span)));
+        kinds.extend(gears(plant).map(Kind::Stretch));
         kinds.extend(moving(plant, held).into_iter().map(Kind::Speed));
-        kinds.extend(plant.drives[0].has_current_state().then_some(Kind::Current));
+        kinds.extend(currents(plant));
         kinds.extend(bristles(plant, held, speed));
         Self::new(machine, plant, kinds, true)
     }
 
     fn new(machine: &Machine, plant: &Mechanism, kinds: Vec<Kind>, relative: bool) -> Self {
-        let r = machine.pulley_radius;
         let n = kinds.len();
         let place = |kind: Kind| kinds.iter().position(|k| *k == kind);
         let unit = |kind: Kind, factor: f64| {
@@ -128,62 +134,82 @@ impl Frame {
             }
             row
         };
-        // What moves with another body goes its way times a ratio; the rotor of a stiff gear goes with the drive
-        // pulley.
-        let led = |kind: fn(usize) -> Kind, j: usize| match j {
-            ROTOR if !has_rotor(plant) => unit(kind(plant.leader(DRIVE)), plant.ratio(DRIVE)),
-            body => unit(kind(plant.leader(body)), plant.ratio(body)),
+        // What moves with another body goes its way times a ratio.
+        let led = |kind: fn(usize) -> Kind, j: usize| unit(kind(plant.leader(j)), plant.ratio(j));
+        let bodies = 0..plant.bodies.len();
+        let speed: Vec<DVector<f64>> = bodies.clone().map(|j| led(Kind::Speed, j)).collect();
+        let along = |ways: &[DVector<f64>], spring: usize| {
+            let arms = &plant.springs[spring].arms;
+            arms.iter().fold(DVector::zeros(n), |sum, &(body, arm)| sum + &ways[body] * arm)
         };
-        let speed: [DVector<f64>; SPEEDS] = std::array::from_fn(|j| led(Kind::Speed, j));
-        let arms = arms(r);
-        let along = |ways: &[DVector<f64>; SPEEDS], arm: &[f64; SPEEDS]| {
-            ways.iter().zip(arm).fold(DVector::zeros(n), |sum, (way, arm)| sum + way * *arm)
-        };
-        let (angle, stretch): ([DVector<f64>; SPEEDS], [DVector<f64>; STRETCHES]);
+        let angle: Vec<DVector<f64>>;
+        let mut stretch: Vec<DVector<f64>>;
         if relative {
-            let x = unit(Kind::Angle(CART), 1.0);
-            let (d1, twist) = (unit(Kind::Stretch(0), 1.0), unit(Kind::Stretch(TWIST), 1.0));
-            // x − r φ₃; with both pulleys as one it is x − r φ₁
-            let d2 = match machine.belt.model {
-                BeltModel::Elastic => unit(Kind::Stretch(1), 1.0),
-                _ => -d1.clone(),
+            let mut ways: Vec<DVector<f64>> = bodies.clone().map(|j| unit(Kind::Angle(j), 1.0)).collect();
+            stretch = (0..plant.springs.len()).map(|spring| unit(Kind::Stretch(spring), 1.0)).collect();
+            // A pulley or a rotor is where its spring's length and the other bodies of that spring say.
+            let solved = |ways: &[DVector<f64>], stretch: &DVector<f64>, spring: usize, body: usize| {
+                let arms = &plant.springs[spring].arms;
+                let own = arms.iter().find(|arm| arm.0 == body).map_or(1.0, |arm| arm.1);
+                let others = arms.iter().filter(|arm| arm.0 != body);
+                others.fold(stretch.clone(), |sum, &(other, arm)| sum - &ways[other] * arm) / own
             };
-            // r φ₁ = x + d₁,  r φ₃ = x − d₂,  φ_r = φ₁ + θ
-            let drive = (&x + &d1) / r;
-            let rotor = &drive + &twist;
-            angle = [drive, x.clone(), (&x - &d2) / r, rotor];
-            stretch = [d1.clone(), d2.clone(), -d1 - d2, twist, x];
+            let pulleys = pulleys(machine, plant);
+            for &(body, span) in &pulleys {
+                if plant.leader(body) != body {
+                    // Both pulleys are one: what one span gains the other loses.
+                    stretch[span] = -stretch[pulleys[0].1].clone();
+                }
+                ways[body] = solved(&ways, &stretch[span], span, body);
+            }
+            let spans = machine.geometry().spans;
+            for (span, at) in spans.iter().enumerate().filter(|(span, _)| !pulleys.iter().any(|own| own.1 == *span)) {
+                let others = at.by_others.iter();
+                stretch[span] = others.fold(DVector::zeros(n), |sum, &(other, weight)| sum + &stretch[other] * weight);
+            }
+            for gear in gears(plant) {
+                let rotor = plant.springs[gear].arms.iter().find(|(body, _)| plant.bodies[*body].is_rotor);
+                if let Some(&(body, _)) = rotor {
+                    ways[body] = solved(&ways, &stretch[gear], gear, body);
+                }
+            }
+            // What stands at the ends of the travel, and forces along it.
+            for spring in spans.len()..plant.springs.len() {
+                if !gears(plant).any(|gear| gear == spring) {
+                    stretch[spring] = along(&ways, spring);
+                }
+            }
+            angle = ways;
         } else {
-            angle = std::array::from_fn(|j| led(Kind::Angle, j));
-            stretch = std::array::from_fn(|j| along(&angle, &arms[j]));
+            angle = bodies.map(|j| led(Kind::Angle, j)).collect();
+            stretch = (0..plant.springs.len()).map(|spring| along(&angle, spring)).collect();
         }
         let ways = kinds
             .iter()
             .enumerate()
             .filter_map(|(place, kind)| match *kind {
                 Kind::Angle(j) => Some((place, speed[j].clone())),
-                Kind::Stretch(j) => Some((place, along(&speed, &arms[j]))),
+                Kind::Stretch(j) => Some((place, along(&speed, j))),
                 _ => None,
             })
             .collect();
         let variables = kinds.iter().map(|kind| match *kind {
-            Kind::Angle(j) => ANGLES[j],
-            Kind::Speed(j) => RATES[j],
-            Kind::Current => Variable { name: "motor_current", unit: "A" },
-            Kind::Bristle(j) => BRISTLES[j],
-            Kind::Stretch(3) => Variable { name: "twist", unit: "rad" },
-            Kind::Stretch(_) => Variable { name: "stretch", unit: "m" },
+            Kind::Angle(j) => Variable::angle(plant, j),
+            Kind::Speed(j) => Variable::speed(plant, j),
+            Kind::Current(drive) => Variable::current(machine.geometry(), drive),
+            Kind::Bristle(j) => {
+                let part = &plant.bodies[j];
+                Variable::new(format!("{}_bristle", part.label.key), part.kind.units()[0])
+            }
+            Kind::Stretch(j) if gears(plant).any(|gear| gear == j) => Variable::new("twist", "rad"),
+            Kind::Stretch(_) => Variable::new("stretch", "m"),
         });
         Self {
             variables: variables.collect(),
-            speed_place: std::array::from_fn(|j| place(Kind::Speed(j))),
-            current_place: place(Kind::Current),
-            bristle_place: std::array::from_fn(|j| place(Kind::Bristle(j))),
+            speed_place: (0..plant.bodies.len()).map(|j| place(Kind::Speed(j))).collect(),
+            current_place: (0..plant.drives.len()).map(|drive| place(Kind::Current(drive))).collect(),
+            bristle_place: (0..plant.bodies.len()).map(|j| place(Kind::Bristle(j))).collect(),
             stretch,
-            of_spring: match has_rotor(plant) {
-                true => vec![0, 1, 2, TWIST, STRETCHES - 1],
-                false => vec![0, 1, 2, STRETCHES - 1],
-            },
             speed,
             angle,
             ways,
@@ -191,19 +217,21 @@ impl Frame {
         }
     }
 
-    /// Coefficients of the states in a form, and that of the input.
-    pub(super) fn row(&self, form: &Form) -> (DVector<f64>, f64) {
+    /// Coefficients of the states in a form, and those of the inputs.
+    pub(super) fn row(&self, form: &Form) -> (DVector<f64>, DVector<f64>) {
         let mut row = DVector::zeros(self.variables.len());
-        let stretches = self.of_spring.iter().map(|&own| &self.stretch[own]).zip(form.stretch);
+        let stretches = self.stretch.iter().zip(form.stretch);
         for (part, factor) in stretches.chain(self.speed.iter().zip(form.speed)) {
             if factor != 0.0 {
                 row += part * factor;
             }
         }
-        if let Some(place) = self.current_place {
-            row[place] += form.current[0];
+        for (place, factor) in self.current_place.iter().zip(form.current) {
+            if let Some(place) = place {
+                row[*place] += factor;
+            }
         }
-        (row, form.input[0])
+        (row, DVector::from_iterator(self.current_place.len(), form.input.into_iter().take(self.current_place.len())))
     }
 
     /// This frame's states from those of another.
@@ -215,7 +243,7 @@ impl Frame {
                 Kind::Angle(j) => other.angle[j].clone(),
                 Kind::Stretch(j) => other.stretch[j].clone(),
                 Kind::Speed(j) => other.speed[j].clone(),
-                Kind::Current | Kind::Bristle(_) => {
+                Kind::Current(_) | Kind::Bristle(_) => {
                     DVector::from_fn(n, |j, _| f64::from(u8::from(other.kinds[j] == *kind)))
                 }
             };
@@ -225,18 +253,24 @@ impl Frame {
     }
 }
 
-/// Bodies that move by themselves, and the rotor, if it does.
-fn moving(plant: &Mechanism, held: [bool; 3]) -> Vec<usize> {
-    plant.leaders().filter(|&j| j == ROTOR || !held[j]).collect()
+/// Bodies that move by themselves, rotors among them.
+fn moving(plant: &Mechanism, held: &[bool]) -> Vec<usize> {
+    plant.leaders().filter(|&j| plant.bodies[j].is_rotor || !held[j]).collect()
+}
+
+/// Currents that are states.
+fn currents(plant: &Mechanism) -> impl Iterator<Item = Kind> + '_ {
+    let drives = plant.drives.iter().enumerate();
+    drives.filter(|(_, drive)| drive.has_current_state()).map(|(number, _)| Kind::Current(number))
 }
 
 /// Bristles that are states.
-fn bristles(plant: &Mechanism, held: [bool; 3], speed: f64) -> Vec<Kind> {
+fn bristles(plant: &Mechanism, held: &[bool], speed: f64) -> Vec<Kind> {
     let forward = speed >= 0.0;
     let has = |body: &usize| {
         let friction = &plant.bodies[*body].friction;
         let v = speed.abs() / plant.bodies[*body].kind.lever();
         matches!(friction.law, Law::LuGre { .. }) && friction.dry(forward, v) > 0.0 && !held[*body]
     };
-    (0..BODIES).filter(has).map(Kind::Bristle).collect()
+    plant.held_bodies().filter(has).map(Kind::Bristle).collect()
 }

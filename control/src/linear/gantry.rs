@@ -1,6 +1,6 @@
 //! All that is told of how a gantry swings: its modes, and a map of its resonances over the working area.
 
-use super::Natural;
+use super::{Natural, Operation, Range, Response, StateSpace, System, Transfer};
 use crate::case::Case;
 use crate::error::Result;
 use crate::friction::Law;
@@ -20,8 +20,23 @@ pub struct GantryAnalysis<'a> {
     pub modes: Natural,
     /// Over the working area, where the place makes a difference.
     pub map: Option<ResonanceMap>,
+    /// The linear equations with bridge and cart at zero.
+    pub system: System,
+    /// What each drive's input does to every output, in the order of the drives.
+    pub by_input: Vec<ByInput>,
     /// The assumptions.
     pub words: Vec<String>,
+}
+
+/// What an input does.
+#[derive(Debug, Clone)]
+pub struct ByInput {
+    /// The system of this input.
+    pub system: StateSpace,
+    /// By output.
+    pub transfers: Vec<Transfer>,
+    /// By output.
+    pub responses: Vec<Response>,
 }
 
 /// Undamped frequencies of the elastic modes over the working area.
@@ -52,11 +67,25 @@ impl<'a> GantryAnalysis<'a> {
     pub fn of(case: &'a Case) -> Result<Self> {
         let mechanism = case.machine.mechanism();
         let modes = Natural::of(&mechanism, &[0.0; BODIES])?;
+        let system = System::of(&case.machine, Operation::default())?;
+        let by_input = (0..system.inputs.len()).map(|input| ByInput::of(system.input(input))).collect::<Result<_>>()?;
         let map = match (case.machine.belt.following(), case.machine.first_slide().travel, case.machine.cart.travel) {
             (Some(_), Some(bridge), Some(cart)) => Some(ResonanceMap::of(&mechanism, bridge, cart)?),
             _ => None,
         };
-        Ok(Self { case, modes, map, words: words(case, &mechanism) })
+        Ok(Self { case, modes, map, system, by_input, words: words(case, &mechanism) })
+    }
+}
+
+impl ByInput {
+    fn of(system: StateSpace) -> Result<Self> {
+        let transfers = system.transfers()?;
+        let poles = transfers.first().map_or(&[][..], |transfer| &transfer.poles);
+        let zeros: Vec<_> = transfers.iter().map(|transfer| transfer.zeros.clone()).collect();
+        let roots: Vec<_> = poles.iter().chain(zeros.iter().flat_map(|zeros| &zeros.values)).copied().collect();
+        let frequencies = Range::of(poles, &zeros).frequencies(&roots);
+        let responses = system.responses(&transfers, &frequencies);
+        Ok(Self { system, transfers, responses })
     }
 }
 

@@ -1,34 +1,59 @@
-//! The equations of a stage, linearised about steady sliding, as matrices.
+//! The equations of a machine, linearised about steady sliding, as matrices.
 
-use super::frame::{Frame, Variable, has_rotor};
+use super::frame::{Frame, Variable, gears};
 use crate::error::{Error, Result};
 use crate::friction::{Law, Motion};
-use crate::machine::axis::{BODIES, ROTOR, SPANS};
-use crate::machine::{BeltModel, Machine};
-use crate::mechanism::{AmplifierMode, Contact, Form, Mechanism, Mode, Over, SpringLaw};
+use crate::machine::{BeltModel, Kind, Machine};
+use crate::mechanism::{AmplifierMode, BODIES, Contact, Form, Mechanism, Mode, Over, SpringLaw};
 use nalgebra::{DMatrix, DVector};
 
-/// About what a stage is linearised.
+/// About what a machine is linearised.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Operation {
-    /// Speed of the cart, m/s, with which everything slides; negative is backward. Friction curves have their slope
+    /// Speed at the belt, m/s, with which everything slides; negative is backward. Friction curves have their slope
     /// there, and bristles are bent as they are in steady sliding.
     pub speed: f64,
     /// Where the cart is, m: spans that follow it are as stiff as there, friction that changes along the travel is as
     /// there.
     pub position: f64,
-    /// Which of drive pulley, cart and idler pulley are held where they are.
-    pub held: [bool; 3],
+    /// Where the bridge is, m, of a machine that has one.
+    pub bridge: f64,
+    /// Which bodies are held where they are, by their numbers.
+    pub held: [bool; 6],
 }
 
 impl Default for Operation {
-    /// Everything slides forward at 0.1 m/s, the cart at x = 0.
+    /// Everything slides forward at 0.1 m/s, what slides at zero.
     fn default() -> Self {
-        Self { speed: 0.1, position: 0.0, held: [false; 3] }
+        Self { speed: 0.1, position: 0.0, bridge: 0.0, held: [false; 6] }
     }
 }
 
-/// ẋ = A x + b u, y = C x + d u: small motions on top of steady sliding.
+// A place for each body.
+const _: () = assert!(BODIES == 6);
+
+/// ẋ = A x + B u, y = C x + D u: small motions on top of steady sliding, with an input for each drive.
+#[derive(Debug, Clone)]
+pub struct System {
+    /// The states x, in order.
+    pub states: Vec<Variable>,
+    /// The inputs u, before the amplifiers' gains, in the order of the drives.
+    pub inputs: Vec<Variable>,
+    /// The outputs y, in order.
+    pub outputs: Vec<Variable>,
+    /// A, 1/s and other units.
+    pub a: DMatrix<f64>,
+    /// B.
+    pub b: DMatrix<f64>,
+    /// C.
+    pub c: DMatrix<f64>,
+    /// D.
+    pub d: DMatrix<f64>,
+    /// The same system in stretches instead of positions, which loses nothing to cancellation.
+    inner: Inner<DMatrix<f64>>,
+}
+
+/// ẋ = A x + b u, y = C x + d u: the system of one input.
 #[derive(Debug, Clone)]
 pub struct StateSpace {
     /// The states x, in order.
@@ -46,22 +71,94 @@ pub struct StateSpace {
     /// d.
     pub d: DVector<f64>,
     /// The same system in stretches instead of positions, which loses nothing to cancellation.
-    pub(super) inner: Inner,
+    pub(super) inner: Inner<DVector<f64>>,
 }
 
 /// The system in coordinates that suit the arithmetic.
 #[derive(Debug, Clone)]
-pub(super) struct Inner {
+pub(super) struct Inner<B> {
     pub(super) a: DMatrix<f64>,
-    pub(super) b: DVector<f64>,
+    pub(super) b: B,
     pub(super) c: DMatrix<f64>,
     /// The states of the outer system from these, and these from those.
     pub(super) outward: DMatrix<f64>,
     pub(super) inward: DMatrix<f64>,
 }
 
+impl System {
+    /// The linear equations of `machine` about `operation`, as [`StateSpace::of`] has them for the first input alone.
+    ///
+    /// ```
+    /// use taut::case::Case;
+    /// use taut::linear::{Operation, System};
+    /// let case = Case::read("../stages/core-xy/core-xy.toml")?;
+    /// let gantry = System::of(&case.machine, Operation::default())?;
+    /// assert_eq!(gantry.inputs.len(), 2);
+    /// // Motors A and B pull the cart along y in opposite ways, and the bridge along x alike.
+    /// let rate = |output: &str, input: usize| gantry.input(input).output(output).unwrap();
+    /// assert_eq!(rate("bridge_position", 0), rate("bridge_position", 1));
+    /// # Ok::<(), taut::Error>(())
+    /// ```
+    pub fn of(machine: &Machine, operation: Operation) -> Result<Self> {
+        let machine = placed(machine, operation)?;
+        let plant = machine.mechanism();
+        let bodies = plant.held_bodies();
+        let is_held =
+            |body: usize| plant.followers(plant.leader(body)).any(|b| bodies.contains(&b) && operation.held[b]);
+        let held: Vec<bool> = bodies.clone().map(is_held).collect();
+        let frame = Frame::outer(&machine, &plant, &held, operation.speed);
+        let inner = Frame::inner(&machine, &plant, &held, operation.speed);
+        let mode = mode(&plant, &held, operation.speed);
+        let equations = Linear { machine: &machine, plant: &plant, operation, held, mode };
+        let (a, b) = equations.rates(&frame);
+        let (inner_a, inner_b) = equations.rates(&inner);
+        let (outputs, c, d) = equations.outputs(&frame);
+        let (_, inner_c, _) = equations.outputs(&inner);
+        let input = |(at, unit): (&crate::machine::DriveAt, &crate::machine::DriveUnit)| match unit.amplifier.mode {
+            AmplifierMode::Voltage => Variable::new(format!("{}voltage_command", at.prefix), "V"),
+            AmplifierMode::Current => Variable::new(format!("{}current_command", at.prefix), "A"),
+        };
+        Ok(Self {
+            states: frame.variables.clone(),
+            inputs: machine.geometry().drives.iter().zip(&machine.drives).map(input).collect(),
+            outputs,
+            a,
+            b,
+            c,
+            d,
+            inner: Inner {
+                a: inner_a,
+                b: inner_b,
+                c: inner_c,
+                outward: frame.from(&inner),
+                inward: inner.from(&frame),
+            },
+        })
+    }
+
+    /// The system of one input, the others being zero.
+    ///
+    /// # Panics
+    ///
+    /// Where there is no input of this number.
+    pub fn input(&self, input: usize) -> StateSpace {
+        let System { states, inputs, outputs, a, b, c, d, inner } = self.clone();
+        let column = |matrix: &DMatrix<f64>| matrix.column(input).into_owned();
+        StateSpace {
+            states,
+            input: inputs[input].clone(),
+            outputs,
+            a,
+            b: column(&b),
+            c,
+            d: column(&d),
+            inner: Inner { a: inner.a, b: column(&inner.b), c: inner.c, outward: inner.outward, inward: inner.inward },
+        }
+    }
+}
+
 impl StateSpace {
-    /// The linear equations of `stage` about `operation`.
+    /// The linear equations of `machine` about `operation`, with its first drive's input.
     ///
     /// Parts that work piece by piece are taken as they are in undisturbed motion: amplifier within its limits, spans
     /// taut, end stops apart, the driving flank of a gear with play in contact. A gear with losses is driven by the
@@ -82,38 +179,7 @@ impl StateSpace {
     /// # Ok::<(), taut::Error>(())
     /// ```
     pub fn of(machine: &Machine, operation: Operation) -> Result<Self> {
-        let machine = placed(machine, operation.position)?;
-        let plant = machine.mechanism();
-        let held =
-            std::array::from_fn(|body| plant.followers(plant.leader(body)).any(|b| b < BODIES && operation.held[b]));
-        let frame = Frame::outer(&machine, &plant, held, operation.speed);
-        let inner = Frame::inner(&machine, &plant, held, operation.speed);
-        let mode = mode(&plant, held, operation.speed);
-        let equations = Linear { machine: &machine, plant: &plant, operation, held, mode };
-        let (a, b) = equations.rates(&frame);
-        let (inner_a, inner_b) = equations.rates(&inner);
-        let (outputs, c, d) = equations.outputs(&frame);
-        let (_, inner_c, _) = equations.outputs(&inner);
-        let input = match machine.drives[0].amplifier.mode {
-            AmplifierMode::Voltage => Variable { name: "voltage_command", unit: "V" },
-            AmplifierMode::Current => Variable { name: "current_command", unit: "A" },
-        };
-        Ok(Self {
-            states: frame.variables.clone(),
-            input,
-            outputs,
-            a,
-            b,
-            c,
-            d,
-            inner: Inner {
-                a: inner_a,
-                b: inner_b,
-                c: inner_c,
-                outward: frame.from(&inner),
-                inward: inner.from(&frame),
-            },
-        })
+        Ok(System::of(machine, operation)?.input(0))
     }
 
     /// Where an output of this name stands.
@@ -122,10 +188,12 @@ impl StateSpace {
     }
 }
 
-/// The stage with its spans as stiff as they are with the cart at `x`.
-fn placed(machine: &Machine, x: f64) -> Result<Machine> {
+/// The machine with its spans as stiff as they are with what slides at its place.
+fn placed(machine: &Machine, operation: Operation) -> Result<Machine> {
     let mut machine = machine.clone();
-    if let (true, Some(make)) = (machine.belt.follows_cart, machine.belt.make) {
+    let Some(make) = machine.belt.make.filter(|_| machine.belt.follows_cart) else { return Ok(machine) };
+    if machine.kind == Kind::Axis {
+        let x = operation.position;
         let [l1, l2, _] = make.spans.three();
         if !(-l2 < x && x < l1) {
             return Err(Error::new(format!("the cart cannot be at {x} m: a span would have no length"))
@@ -134,14 +202,26 @@ fn placed(machine: &Machine, x: f64) -> Result<Machine> {
         }
         let [k1, k2] = make.stiffness_at(x);
         (machine.belt.stiffness[0], machine.belt.stiffness[1]) = (k1, k2);
+        return Ok(machine);
+    }
+    let (x, y) = (operation.bridge, operation.position);
+    let lengths = machine.span_lengths(&[x, y]);
+    for (span, length) in lengths.iter().flat_map(|lengths| lengths.iter().copied().enumerate()) {
+        if length.is_nan() || length <= 0.0 {
+            return Err(Error::new(format!(
+                "bridge and cart cannot be at {x} m and {y} m: a span would have no length"
+            ))
+            .next("name a place on the travel of both"));
+        }
+        machine.belt.stiffness[span] = make.rigidity() / length;
     }
     Ok(machine)
 }
 
 /// The mode of steady sliding.
-fn mode(plant: &Mechanism, held: [bool; 3], speed: f64) -> Mode {
+fn mode(plant: &Mechanism, held: &[bool], speed: f64) -> Mode {
     let forward = speed >= 0.0;
-    let motion = (0..BODIES).map(|body| match (held[body], plant.has_modes(body), forward) {
+    let motion = plant.held_bodies().map(|body| match (held[body], plant.has_modes(body), forward) {
         (true, ..) => Motion::Stuck,
         (_, false, _) => Motion::Free,
         (_, _, true) => Motion::Forward,
@@ -154,11 +234,13 @@ fn mode(plant: &Mechanism, held: [bool; 3], speed: f64) -> Mode {
             mode.piece[index] = line.piece_at(speed) as u8;
         }
     }
-    if has_rotor(plant) {
+    for gear in gears(plant) {
         // Between its end stops, on the driving flank of its gear.
-        mode.contact[SPANS] = if forward { Contact::High } else { Contact::Low };
-        if plant.has_modes(ROTOR) {
-            mode.motion[ROTOR] = if forward { Motion::Forward } else { Motion::Backward };
+        mode.contact[gear] = if forward { Contact::High } else { Contact::Low };
+    }
+    for rotor in plant.held_bodies().end..plant.bodies.len() {
+        if plant.has_modes(rotor) {
+            mode.motion[rotor] = if forward { Motion::Forward } else { Motion::Backward };
         }
     }
     mode
@@ -169,28 +251,36 @@ struct Linear<'a> {
     machine: &'a Machine,
     plant: &'a Mechanism,
     operation: Operation,
-    held: [bool; 3],
+    held: Vec<bool>,
     mode: Mode,
 }
 
 impl Linear<'_> {
-    /// A and b.
-    fn rates(&self, frame: &Frame) -> (DMatrix<f64>, DVector<f64>) {
+    /// A and B.
+    fn rates(&self, frame: &Frame) -> (DMatrix<f64>, DMatrix<f64>) {
         let plant = self.plant;
         let n = frame.variables.len();
-        let (mut a, mut b) = (DMatrix::zeros(n, n), DVector::zeros(n));
+        let (mut a, mut b) = (DMatrix::zeros(n, n), DMatrix::zeros(n, plant.drives.len()));
         let equations = plant.equations(self.mode);
         for (place, rate) in &frame.ways {
             a.row_mut(*place).copy_from(&rate.transpose());
         }
-        if let Some(place) = frame.current_place {
-            let (row, input) = frame.row(&equations.current_rate[0]);
+        let mut put = |a: &mut DMatrix<f64>, place: usize, (row, input): (DVector<f64>, DVector<f64>)| {
             a.row_mut(place).copy_from(&row.transpose());
-            b[place] = input;
+            b.row_mut(place).copy_from(&input.transpose());
+        };
+        for (drive, place) in frame.current_place.iter().enumerate() {
+            if let Some(place) = place {
+                put(&mut a, *place, frame.row(&equations.current_rate[drive]));
+            }
         }
-        for body in plant.leaders().filter(|&body| body < BODIES && !self.held[body]) {
+        for body in plant.leaders().filter(|body| plant.bodies[*body].is_rotor || !self.held[*body]) {
             let Some(place) = frame.speed_place[body] else { continue };
             let (mut row, input) = frame.row(&equations.acceleration[body]);
+            if plant.bodies[body].is_rotor {
+                put(&mut a, place, (row, input));
+                continue;
+            }
             let mass = plant.mass(body, &equations.inertia);
             // M v̇ = what is linear − Σ ρ (what friction adds to it), of all that moves with it at ρ v
             for member in plant.followers(body) {
@@ -203,13 +293,7 @@ impl Linear<'_> {
                     (a[(bristle, place)], a[(bristle, bristle)]) = (ratio * on_speed, on_bristle);
                 }
             }
-            a.row_mut(place).copy_from(&row.transpose());
-            b[place] = input;
-        }
-        if let Some(place) = frame.speed_place[ROTOR] {
-            let (row, input) = frame.row(&equations.acceleration[ROTOR]);
-            a.row_mut(place).copy_from(&row.transpose());
-            b[place] = input;
+            put(&mut a, place, (row, input));
         }
         (a, b)
     }
@@ -261,43 +345,36 @@ impl Linear<'_> {
         [v.abs() * slope / g, -stiffness * v.abs() / g]
     }
 
-    /// The outputs, C and d.
-    fn outputs(&self, frame: &Frame) -> (Vec<Variable>, DMatrix<f64>, DVector<f64>) {
-        let plant = self.plant;
-        let mut all: Vec<(Variable, DVector<f64>, f64)> = Vec::new();
-        let mut add = |name, unit, (row, input)| all.push((Variable { name, unit }, row, input));
-        const NAMES: [[(&str, &str); 2]; 3] = [
-            [("drive_angle", "rad"), ("drive_speed", "rad/s")],
-            [("cart_position", "m"), ("cart_speed", "m/s")],
-            [("idler_angle", "rad"), ("idler_speed", "rad/s")],
-        ];
-        let moving = |body: &usize| !self.held[*body];
-        for body in (0..BODIES).filter(moving) {
-            let [(angle, unit), _] = NAMES[body];
-            add(angle, unit, (frame.angle[body].clone(), 0.0));
+    /// The outputs, C and D.
+    fn outputs(&self, frame: &Frame) -> (Vec<Variable>, DMatrix<f64>, DMatrix<f64>) {
+        let (plant, geometry) = (self.plant, self.machine.geometry());
+        let drives = plant.drives.len();
+        let mut all: Vec<(Variable, DVector<f64>, DVector<f64>)> = Vec::new();
+        let mut add = |variable, (row, input)| all.push((variable, row, input));
+        let moving = || plant.held_bodies().filter(|body| !self.held[*body]);
+        let rotors = || plant.held_bodies().end..plant.bodies.len();
+        for body in moving().chain(rotors()) {
+            add(Variable::angle(plant, body), (frame.angle[body].clone(), DVector::zeros(drives)));
         }
-        if has_rotor(plant) {
-            add("rotor_angle", "rad", (frame.angle[ROTOR].clone(), 0.0));
-        }
-        for body in (0..BODIES).filter(moving) {
-            let [_, (speed, unit)] = NAMES[body];
-            add(speed, unit, frame.row(&Form::speed(body)));
-        }
-        if has_rotor(plant) {
-            add("rotor_speed", "rad/s", frame.row(&Form::speed(ROTOR)));
+        for body in moving().chain(rotors()) {
+            add(Variable::speed(plant, body), frame.row(&Form::speed(body)));
         }
         if self.machine.belt.model != BeltModel::Rigid {
-            for (span, name) in ["span1_force", "span2_force", "span3_force"].into_iter().enumerate() {
+            for (span, at) in geometry.spans.iter().enumerate() {
                 let alike = self.machine.span_alike(span).unwrap_or(span);
-                add(name, "N", frame.row(&plant.spring_force(alike, &self.mode)));
+                let force = Variable::new(format!("{}_force", at.column), "N");
+                add(force, frame.row(&plant.spring_force(alike, &self.mode)));
             }
         }
-        if has_rotor(plant) {
-            add("gear_torque", "N m", frame.row(&plant.spring_force(SPANS, &self.mode)));
+        for gear in gears(plant) {
+            let torque = Variable::new(format!("{}_torque", plant.springs[gear].label.key), "N m");
+            add(torque, frame.row(&plant.spring_force(gear, &self.mode)));
         }
-        add("motor_current", "A", frame.row(&plant.current(0, &self.mode)));
+        for drive in 0..drives {
+            add(Variable::current(geometry, drive), frame.row(&plant.current(drive, &self.mode)));
+        }
         let c = DMatrix::from_fn(all.len(), frame.variables.len(), |i, j| all[i].1[j]);
-        let d = DVector::from_fn(all.len(), |i, _| all[i].2);
+        let d = DMatrix::from_fn(all.len(), drives, |i, j| all[i].2[j]);
         (all.into_iter().map(|(variable, ..)| variable).collect(), c, d)
     }
 }

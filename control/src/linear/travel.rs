@@ -3,6 +3,7 @@
 use super::{Operation, Root, StateSpace};
 use crate::error::Result;
 use crate::friction::{Friction, Law, Side};
+use crate::machine::axis::DRIVE;
 use crate::machine::{Amplifier, AmplifierMode, Machine, SlideForces};
 
 /// The resonances with the cart at one place. All frequencies in Hz, the lowest first.
@@ -38,7 +39,8 @@ pub fn places(machine: &Machine, count: usize) -> Option<Vec<f64>> {
 /// The stage with the cart at each of `positions`, m; all else as `operation` says.
 pub fn travel(machine: &Machine, operation: Operation, positions: &[f64]) -> Result<Vec<Place>> {
     let bare = undamped(machine);
-    let drive_held = Operation { held: [true, operation.held[1], operation.held[2]], ..operation };
+    let mut drive_held = operation;
+    drive_held.held[DRIVE] = true;
     let place = |&position: &f64| {
         let pairs = |machine: &Machine, about: Operation| -> Result<Vec<Root>> {
             let poles = StateSpace::of(machine, Operation { position, ..about })?.poles()?;

@@ -7,7 +7,7 @@ use super::packed::{LEAVE, Packed};
 use super::{Exported, Options, Part, Real, STEP, Tables, c, identifier, mechanism};
 use crate::case::Case;
 use crate::error::Result;
-use crate::linear::{Operation, StateSpace};
+use crate::linear::{Operation, System};
 use mat::Variable;
 
 const FUNCTION: &str = include_str!("model.m");
@@ -82,24 +82,20 @@ fn variables(case: &Case, tables: &Tables, step: f64) -> Result<Vec<(&'static st
         ("lengths", Variable::Numbers(packed.lengths.iter().map(|row| row.to_vec()).collect())),
         ("outputs_first", whole(&packed.outputs)),
     ];
-    if case.is_axis() {
-        let system = StateSpace::of(&case.machine, Operation::default())?;
-        let matrix = |m: &nalgebra::DMatrix<f64>| {
-            Variable::Numbers(m.row_iter().map(|row| row.iter().copied().collect()).collect())
-        };
-        let column = |v: &nalgebra::DVector<f64>| Variable::Numbers(v.iter().map(|v| vec![*v]).collect());
-        all.extend([
-            ("A", matrix(&system.a)),
-            ("B", column(&system.b)),
-            ("C", matrix(&system.c)),
-            ("D", column(&system.d)),
-            ("states", words(system.states.iter().map(|v| v.name).collect())),
-            ("state_units", words(system.states.iter().map(|v| v.unit).collect())),
-            ("outputs", words(system.outputs.iter().map(|v| v.name).collect())),
-            ("output_units", words(system.outputs.iter().map(|v| v.unit).collect())),
-            ("inputs", words(vec![system.input.name])),
-            ("input_units", words(vec![system.input.unit])),
-        ]);
-    }
+    let system = System::of(&case.machine, Operation::default())?;
+    let matrix =
+        |m: &nalgebra::DMatrix<f64>| Variable::Numbers(m.row_iter().map(|row| row.iter().copied().collect()).collect());
+    all.extend([
+        ("A", matrix(&system.a)),
+        ("B", matrix(&system.b)),
+        ("C", matrix(&system.c)),
+        ("D", matrix(&system.d)),
+        ("states", words(system.states.iter().map(|v| v.name.as_str()).collect())),
+        ("state_units", words(system.states.iter().map(|v| v.unit).collect())),
+        ("outputs", words(system.outputs.iter().map(|v| v.name.as_str()).collect())),
+        ("output_units", words(system.outputs.iter().map(|v| v.unit).collect())),
+        ("inputs", words(system.inputs.iter().map(|v| v.name.as_str()).collect())),
+        ("input_units", words(system.inputs.iter().map(|v| v.unit).collect())),
+    ]);
     Ok(all)
 }

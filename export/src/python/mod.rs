@@ -4,7 +4,7 @@ use super::packed::{LEAVE, Packed};
 use super::{Exported, Options, STEP, Tables, mechanism};
 use crate::case::Case;
 use crate::error::Result;
-use crate::linear::{Operation, StateSpace};
+use crate::linear::{Operation, System, Variable};
 use crate::machine::Machine;
 use std::fmt::{Debug, Write};
 
@@ -14,10 +14,7 @@ const SCRIPT: &str = include_str!("model.py");
 pub(super) fn export(case: &Case, stem: &str, options: &Options) -> Result<Exported> {
     let tables = Tables::new(&mechanism(case))?;
     let packed = Packed::new(&tables);
-    let linear = match case.is_axis() {
-        true => linear(&case.machine)?,
-        false => "None".into(),
-    };
+    let linear = linear(&case.machine)?;
     let mut text = SCRIPT.replace("@tables@", lists(&tables, &packed).trim_end()).replace("@linear@", &linear);
     for (place, part) in [
         ("@title@", plain(case.title.as_str())),
@@ -79,23 +76,22 @@ fn lists(tables: &Tables, packed: &Packed) -> String {
 }
 
 fn linear(machine: &Machine) -> Result<String> {
-    let system = StateSpace::of(machine, Operation::default())?;
+    let system = System::of(machine, Operation::default())?;
     let rows = |m: &nalgebra::DMatrix<f64>| -> Vec<Vec<f64>> {
         m.row_iter().map(|row| row.iter().copied().collect()).collect()
     };
-    let names = |all: &[crate::linear::Variable]| -> Vec<&'static str> { all.iter().map(|v| v.name).collect() };
-    let units = |all: &[crate::linear::Variable]| -> Vec<&'static str> { all.iter().map(|v| v.unit).collect() };
-    let column = |v: &nalgebra::DVector<f64>| -> Vec<[f64; 1]> { v.iter().map(|v| [*v]).collect() };
+    let names = |all: &[Variable]| -> Vec<String> { all.iter().map(|v| v.name.clone()).collect() };
+    let units = |all: &[Variable]| -> Vec<&'static str> { all.iter().map(|v| v.unit).collect() };
     let mut text = String::from("{\n");
     for (key, values) in [
         ("A", format!("{:?}", rows(&system.a))),
-        ("B", format!("{:?}", column(&system.b))),
+        ("B", format!("{:?}", rows(&system.b))),
         ("C", format!("{:?}", rows(&system.c))),
-        ("D", format!("{:?}", column(&system.d))),
+        ("D", format!("{:?}", rows(&system.d))),
         ("states", format!("{:?}", names(&system.states))),
         ("outputs", format!("{:?}", names(&system.outputs))),
         ("output_units", format!("{:?}", units(&system.outputs))),
-        ("inputs", format!("{:?}", [system.input.name])),
+        ("inputs", format!("{:?}", names(&system.inputs))),
     ] {
         let _ = writeln!(text, "    \"{key}\": {values},");
     }

@@ -26,7 +26,7 @@ pub fn page(analysis: &Analysis, figures: &[Named]) -> Page {
     let mut rows = Table::new("").column("Output", "").column("In the long run", "").column("Zeros", "");
     for (output, transfer) in analysis.system.outputs.iter().zip(&analysis.transfers) {
         let told = gain(transfer, output.unit, analysis.system.input.unit);
-        rows.row([words(output.name), printed(&told), printed(&zeros(transfer))].map(Cell::from));
+        rows.row([words(&output.name), printed(&told), printed(&zeros(transfer))].map(Cell::from));
     }
     page.table(&rows);
     page.section("Frequency response");

@@ -5,8 +5,7 @@ use crate::simulate::Named;
 use crate::{Axis, Colour, Figure, Panel, Series, Style};
 use nalgebra::Complex;
 use std::f64::consts::PI;
-use taut::linear::Analysis;
-use taut::linear::{Place, Root};
+use taut::linear::{Analysis, Place, Response, Root, StateSpace};
 
 /// Outputs drawn together, with the name of the figure.
 const GROUPS: [(&str, &str, &[&str]); 3] = [
@@ -28,32 +27,44 @@ pub fn figures(analysis: &Analysis) -> Vec<Named> {
 
 /// Magnitude and phase over frequency; angles and their rates as they are at the belt, so that the two can be compared.
 fn bode(analysis: &Analysis, title: &str, outputs: &[&str]) -> Option<Figure> {
+    let label = |name: &str| match name {
+        "drive_angle" => "drive pulley r φ₁".into(),
+        "drive_speed" => "drive pulley r φ̇₁".into(),
+        "cart_position" => "cart x".into(),
+        "cart_speed" => "cart ẋ".into(),
+        name => words(name),
+    };
     let radius = analysis.case.machine.pulley_radius;
+    response(&analysis.system, &analysis.responses, radius, title, outputs, &label)
+}
+
+/// The responses of these outputs; those of pulleys are taken at the pitch circle.
+pub(super) fn response(
+    system: &StateSpace,
+    responses: &[Response],
+    radius: f64,
+    title: &str,
+    outputs: &[&str],
+    label: &dyn Fn(&str) -> String,
+) -> Option<Figure> {
     let unit = match outputs.first()? {
         name if name.contains("force") => "N",
         name if name.contains("speed") => "m/s",
         _ => "m",
     };
-    let input = analysis.system.input.unit;
+    let input = system.input.unit;
     let mut magnitude = Panel::new(Axis::new(format!("Magnitude, dB of 1 {unit} per {input}"), "")).weight(1.3);
     let mut phase = Panel::new(Axis::new("Phase", "°"));
     let mut drawn = 0;
-    for (name, style) in outputs.iter().zip([Style::Solid, Style::Solid, Style::Dashed]) {
-        let Some(index) = analysis.system.output(name) else { continue };
-        let response = &analysis.responses[index];
-        let turns = name.starts_with("drive");
+    for (name, style) in outputs.iter().zip([Style::Solid, Style::Solid, Style::Dashed, Style::Dashed]) {
+        let Some(index) = system.output(name) else { continue };
+        let response = &responses[index];
+        let turns = system.outputs[index].unit.starts_with("rad");
         let shift = if turns { 20.0 * radius.log10() } else { 0.0 };
         let hertz: Vec<f64> = response.frequency.iter().map(|omega| omega / (2.0 * PI)).collect();
         let decibels: Vec<f64> = response.decibels().iter().map(|value| value + shift).collect();
-        let label = match *name {
-            "drive_angle" => "drive pulley r φ₁".into(),
-            "drive_speed" => "drive pulley r φ̇₁".into(),
-            "cart_position" => "cart x".into(),
-            "cart_speed" => "cart ẋ".into(),
-            name => words(name),
-        };
         let colour = Colour::CYCLE[drawn % Colour::CYCLE.len()];
-        magnitude = magnitude.series(Series::new(label, hertz.clone(), decibels).colour(colour).style(style));
+        magnitude = magnitude.series(Series::new(label(name), hertz.clone(), decibels).colour(colour).style(style));
         phase = phase.series(Series::new("", hertz, response.degrees()).colour(colour).style(style));
         drawn += 1;
     }

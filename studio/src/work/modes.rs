@@ -23,7 +23,10 @@ pub fn modes(request: &Request, context: &Context) -> Result<Reply> {
         case => {
             let analysis = GantryAnalysis::of(case)?;
             let figures = modes::gantry::planes(&analysis);
-            (modes::gantry::page(&analysis, &figures), taut::json::gantry_modes(&analysis))
+            (
+                modes::gantry::page(&analysis, &figures, &modes::gantry::responses(&analysis)),
+                taut::json::gantry_modes(&analysis),
+            )
         }
     };
     Ok(Reply::of(json!({ "html": format!("{}{}", page.body(), friction.body()), "result": result })))

@@ -11,7 +11,7 @@ use taut::case::Case;
 use taut::json;
 use taut::linear::{GantryAnalysis, ResonanceMap};
 use taut::{Error, Result};
-use taut_report::modes::gantry::{page, planes};
+use taut_report::modes::gantry::{page, planes, responses};
 
 /// Finds the modes, writes, tells.
 pub fn run(args: &Args, case: &Case) -> Outcome {
@@ -29,8 +29,10 @@ pub fn run(args: &Args, case: &Case) -> Outcome {
     }
     if common.reports() {
         let planes = planes(&analysis);
-        let page = page(&analysis, &planes);
-        let pictures = planes.into_iter().map(|(name, plane)| (name, plane.into())).collect();
+        let responses = responses(&analysis);
+        let page = page(&analysis, &planes, &responses);
+        let figures = responses.into_iter().map(|(name, figure)| (name, figure.into()));
+        let pictures = planes.into_iter().map(|(name, plane)| (name, plane.into())).chain(figures).collect();
         finished.report = Some(Report { page, pictures });
     }
     finished.finish(common, folder)
@@ -40,7 +42,8 @@ pub fn run(args: &Args, case: &Case) -> Outcome {
 fn refuse(args: &Args) -> Result<()> {
     let map = "the modes are those with bridge and cart at zero, and the map has every other place: leave it out";
     let slides = "the modes of a gantry are those of everything sliding: leave it out";
-    let none = "there is no state space of a gantry yet: leave it out";
+    let none =
+        "the result has the matrices of the gantry in continuous time, and the responses of each drive: leave it out";
     let asked = [
         ("--at", args.at.is_some(), map),
         ("--speed", args.speed.is_some(), slides),

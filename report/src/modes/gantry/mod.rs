@@ -6,12 +6,33 @@ mod rows;
 pub use page::page;
 pub use rows::{elastic, over_the_area, rigid, slow};
 
-use crate::{Axis, Map, Plane};
-use taut::linear::GantryAnalysis;
+use super::plots::response;
+use super::rows::words;
+use crate::{Axis, Figure, Map, Plane};
+use taut::linear::{ByInput, GantryAnalysis};
 use taut::number::engineering;
 
 /// A plane and its name in file names.
 pub type Named = (String, Plane);
+
+/// What each drive does to bridge, cart and pulleys.
+pub fn responses(analysis: &GantryAnalysis) -> Vec<(String, Figure)> {
+    let radius = analysis.case.machine.pulley_radius;
+    let outputs = ["bridge_position", "cart_position", "left_angle", "right_angle"];
+    let label = |name: &str| match name {
+        "bridge_position" => "bridge x".into(),
+        "cart_position" => "cart y".into(),
+        "left_angle" => "left pulley r φ".into(),
+        "right_angle" => "right pulley r φ".into(),
+        name => words(name),
+    };
+    let of_input = |one: &ByInput| {
+        let name = words(&one.system.input.name);
+        let figure = response(&one.system, &one.responses, radius, &format!("{name} to positions"), &outputs, &label);
+        figure.map(|figure| (format!("bode-{}", name.replace(' ', "-")), figure))
+    };
+    analysis.by_input.iter().filter_map(of_input).collect()
+}
 
 /// A map of each elastic mode, seen as the drawing is.
 pub fn planes(analysis: &GantryAnalysis) -> Vec<Named> {

@@ -2,7 +2,8 @@
 
 use super::Named;
 use super::rows::{elastic, over_the_area, rigid, slow};
-use crate::gantry::gantry_drawing;
+use crate::Figure;
+use crate::machine_drawing;
 use crate::modes::page::printed;
 use crate::modes::rows::pole;
 use crate::page::{Callout, Cell, Page, Table};
@@ -10,7 +11,7 @@ use crate::simulate::machine;
 use taut::linear::GantryAnalysis;
 
 /// The page.
-pub fn page(analysis: &GantryAnalysis, planes: &[Named]) -> Page {
+pub fn page(analysis: &GantryAnalysis, planes: &[Named], responses: &[(String, Figure)]) -> Page {
     let gantry = &analysis.case.machine;
     let mechanism = gantry.mechanism();
     let mut page = Page::new(analysis.case.title.clone()).subtitle("How it swings");
@@ -18,7 +19,7 @@ pub fn page(analysis: &GantryAnalysis, planes: &[Named]) -> Page {
     page.prose(format!("{}.", machine(gantry)));
     page.callout(Callout::Note, "While it slides", analysis.words.join("; "));
     page.drawing(
-        &gantry_drawing(gantry),
+        &machine_drawing(gantry),
         "In plan view with positive directions; lengths are not to scale. In the model the bridge does not yaw, and idlers have \
          neither inertia nor friction.",
     );
@@ -54,6 +55,13 @@ pub fn page(analysis: &GantryAnalysis, planes: &[Named]) -> Page {
     page.prose(told + ".");
     for (_, plane) in planes {
         page.plane(plane);
+    }
+    page.section("What the drives do");
+    page.prose(
+        "The frequency responses of each drive's input, the other one being zero, with bridge and cart at zero.",
+    );
+    for (_, figure) in responses {
+        page.figure(figure);
     }
     page.case("", "case.toml", &analysis.case.text);
     page
