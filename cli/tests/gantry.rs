@@ -268,7 +268,7 @@ fn a_sweep_writes_a_whole_folder_that_repeats_it() {
         "24 runs of 3 simulations each: 21 parameters, sobol",
         "bridge position at the end",
         "peak current of the left drive",
-        "largest force in the belts",
+        "largest force in the belt",
         "figures that count events",
     ] {
         assert!(told.contains(word), "{word} is not in\n{told}");

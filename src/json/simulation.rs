@@ -458,7 +458,7 @@ pub(super) fn figure_lines() -> Vec<[String; 3]> {
             Worth::Flag(_) => &[("", "flag")],
         };
         let words = figure.words.replace(figure.part, "*");
-        let words = if figure.row.role == Role::Span { figure.row.words.replace("the *", "each") } else { words };
+        let words = if figure.row.role == Role::Span { figure.row.words.replace('*', "each span") } else { words };
         let keys = match key(&figure) {
             Key::Whole(keys) => {
                 let bare = |key: &str| key.trim_end_matches(&unit_key(figure.unit)).to_string();

@@ -35,7 +35,7 @@ impl Subject {
         }
         let (machine, moves, controller) = (case.machine.clone(), case.moves.clone(), case.controller.clone());
         let mut of_experiment = metrics::figures(machine.kind);
-        of_experiment.retain(|figure| plan.tells(&figure.name));
+        of_experiment.retain(|figure| !(case.is_axis() && figure.row.again_on_an_axis) && plan.tells(&figure.name));
         let of_move = OF_MOVE.iter().filter(|measure| plan.tells(measure.name)).collect();
         let seeks: Vec<_> = of_experiment.iter().filter_map(metrics::Figure::seek).collect();
         let sought = Sought::of(&machine, &machine.mechanism(), &seeks);

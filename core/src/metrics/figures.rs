@@ -83,6 +83,8 @@ pub struct FigureRow {
     pub words: &'static str,
     /// Its name as a column and for people on an axis, where that has names of its own for it.
     pub of_axis: Option<[&'static str; 2]>,
+    /// Whether it is another figure in other words on an axis, so that its sweeps leave it out.
+    pub again_on_an_axis: bool,
     /// Whether only a machine with one drive has it.
     pub one_drive: bool,
     /// Its value for the part of this place.
@@ -94,7 +96,7 @@ pub struct FigureRow {
 type Of = fn(&Metrics, usize) -> Worth;
 
 const fn row(role: Role, name: &'static str, unit: &'static str, words: &'static str, of: Of) -> FigureRow {
-    FigureRow { role, name, unit, words, of_axis: None, one_drive: false, of, seek: None }
+    FigureRow { role, name, unit, words, of_axis: None, again_on_an_axis: false, one_drive: false, of, seek: None }
 }
 
 impl FigureRow {
@@ -104,6 +106,10 @@ impl FigureRow {
 
     const fn on_an_axis(self, name: &'static str, words: &'static str) -> Self {
         Self { of_axis: Some([name, words]), ..self }
+    }
+
+    const fn again(self) -> Self {
+        Self { again_on_an_axis: true, ..self }
     }
 
     const fn of_one_drive(self) -> Self {
@@ -117,7 +123,7 @@ use Worth::{Flag, Number, TimeOfPeak};
 /// The key figures.
 #[rustfmt::skip]
 pub static FIGURES: &[FigureRow] = &[
-    row(Pulley, "final_*_angle", "rad", "angle of the * at the end", |m, k| Number(m.drives[k].angle)),
+    row(Pulley, "final_*_angle", "rad", "angle of the * at the end", |m, k| Number(m.drives[k].angle)).again(),
     row(Load, "final_*_by_drives", "m", "* position at the end, by the drives", |m, k| Number(m.loads[k].by_drives))
         .on_an_axis("final_drive_travel", "drive travel r φ₁ at the end"),
     row(Load, "final_*_position", "m", "* position at the end", |m, k| Number(m.loads[k].position)),
@@ -127,16 +133,17 @@ pub static FIGURES: &[FigureRow] = &[
     row(Load, "peak_*_speed", "m/s", "peak * speed", |m, k| Worth::Peak(m.loads[k].peak_speed)).seeking(Seek::LoadSpeed),
     row(Load, "peak_*_speed_time", "s", "time of the peak * speed", |m, k| TimeOfPeak(m.loads[k].peak_speed.time)).seeking(Seek::LoadSpeed),
     row(Load, "peak_drives_minus_*", "m", "largest drives minus *", |m, k| Worth::Peak(m.loads[k].peak_error)).seeking(Seek::LoadError)
-        .on_an_axis("peak_drive_travel_minus_cart", "largest drive travel minus cart"),
+        .on_an_axis("peak_drive_travel_minus_cart", "largest drive travel minus cart").again(),
     row(Pulley, "peak_*_speed", "m/s", "peak speed r φ′ of the *", |m, k| Worth::Peak(m.drives[k].peak_belt_speed.unwrap_or_default()))
         .seeking(Seek::BeltSpeed).of_one_drive().on_an_axis("peak_drive_speed", "peak drive speed r φ₁′"),
-    row(Motor, "peak_*_speed", "rad/s", "peak speed of the *", |m, k| Worth::Peak(m.drives[k].peak_speed)).seeking(Seek::ShaftSpeed),
+    row(Motor, "peak_*_speed", "rad/s", "peak speed of the *", |m, k| Worth::Peak(m.drives[k].peak_speed)).seeking(Seek::ShaftSpeed).again(),
     row(Whole, "steady_speed", "m/s", "steady cart speed", |m, _| Number(m.steady_speed.map_or(f64::NAN, |steady| steady.value)))
         .seeking(Seek::SteadySpeed).of_one_drive(),
-    row(Span, "peak_*_stretch", "m", "peak stretch of the *", |m, k| Worth::Peak(m.spans[k].peak_stretch)).seeking(Seek::Stretch),
-    row(Span, "peak_*_force", "N", "peak force in the *", |m, k| Worth::Peak(m.spans[k].peak_force)).seeking(Seek::Force),
+    row(Span, "peak_*_stretch", "m", "peak stretch of *", |m, k| Worth::Peak(m.spans[k].peak_stretch)).seeking(Seek::Stretch),
+    row(Span, "peak_*_force", "N", "peak force in *", |m, k| Worth::Peak(m.spans[k].peak_force)).seeking(Seek::Force),
     row(Whole, "peak_belt_force", "N", "largest force in the belt", |m, _| Worth::Peak(m.largest_force().1)).seeking(Seek::Force),
-    row(Motor, "peak_*_current", "A", "peak current of the *", |m, k| Worth::Peak(m.drives[k].peak_current)).seeking(Seek::Current),
+    row(Motor, "peak_*_current", "A", "peak current of the *", |m, k| Worth::Peak(m.drives[k].peak_current)).seeking(Seek::Current)
+        .on_an_axis("peak_motor_current", "peak motor current"),
     row(Whole, "stop_time", "s", "time of the last stop", |m, _| Number(m.stop_time.unwrap_or(f64::NAN))).seeking(Seek::StopTime),
     row(Whole, "settled", "", "at rest at the end", |m, _| Flag(m.settled)),
     row(Body, "*_stops", "", "stops of the *", |m, k| Number(m.bodies[k].stops as f64)),
@@ -175,8 +182,8 @@ impl Figure {
 }
 
 /// The parts of a role: their keys as columns have them, and their names.
-fn parts(geometry: &Geometry, role: Role) -> Vec<Label> {
-    match role {
+fn parts(geometry: &Geometry, role: Role) -> Vec<(&'static str, String)> {
+    let labels: Vec<Label> = match role {
         Role::Load => geometry.slides.iter().map(|slide| geometry.label(slide.body)).collect(),
         Role::Pulley => geometry.drives.iter().map(|drive| geometry.label(drive.pulley)).collect(),
         Role::Motor => {
@@ -188,7 +195,11 @@ fn parts(geometry: &Geometry, role: Role) -> Vec<Label> {
         Role::Span => geometry.spans.iter().map(|span| Label { key: span.column, name: span.label.name }).collect(),
         Role::Body => geometry.bodies.iter().map(|body| body.label).collect(),
         Role::Whole => vec![Label { key: "", name: "" }],
-    }
+    };
+    // The span 1, but the left span.
+    let article = |name: &str| role == Role::Span && !name.starts_with("span");
+    let named = |name: &str| if article(name) { format!("the {name}") } else { name.to_string() };
+    labels.into_iter().map(|label| (label.key, named(label.name))).collect()
 }
 
 /// The key figures of a kind of machine, in the order of the list, then of the parts.
@@ -196,16 +207,16 @@ pub fn figures(kind: Kind) -> Vec<Figure> {
     let geometry = kind.geometry();
     let rows = FIGURES.iter().filter(|row| !row.one_drive || geometry.drives.len() == 1);
     let of_parts = |row: &'static FigureRow| {
-        parts(geometry, row.role).into_iter().enumerate().map(move |(place, part)| {
-            let by_role = row.name.replace('*', part.key);
+        parts(geometry, row.role).into_iter().enumerate().map(move |(place, (part, name))| {
+            let by_role = row.name.replace('*', part);
             let own = row.of_axis.filter(|_| kind == Kind::Axis);
             Figure {
                 name: own.map_or_else(|| by_role.clone(), |[name, _]| name.to_string()),
                 by_role,
                 unit: row.unit,
-                words: own.map_or_else(|| row.words.replace('*', part.name), |[_, words]| words.to_string()),
+                words: own.map_or_else(|| row.words.replace('*', &name), |[_, words]| words.to_string()),
                 place,
-                part: part.key,
+                part,
                 row,
             }
         })
