@@ -65,6 +65,10 @@ def test_modes(gantry, root):
     modes = gantry.modes()
     assert modes.resonances == pytest.approx([196.643946994, 220.198687165], abs=1e-8)
     assert all(0 < damping < 0.1 for damping in modes.damping) and modes.map is None
+    system = modes.to_control()
+    assert (system.nstates, system.ninputs) == (8, 2) and system.input_labels == ["left_voltage_command", "right_voltage_command"]
+    swings = sorted({round(abs(pole.imag) / (2 * np.pi), 6) for pole in system.poles() if pole.imag > 1})
+    assert swings == [round(mode["damped"]["damped_frequency_Hz"], 6) for mode in modes.data["elastic"]]
     assert "196.6 Hz" in repr(modes) and "elastic modes" in modes._repr_html_()
     bridge, cart, hertz = taut.read(root / "stages/core-xy/follows.toml").modes().map
     assert hertz.shape == (2, len(bridge), len(cart)) and (hertz > 100).all()

@@ -636,6 +636,19 @@ class GantryModes:
         bridge, cart, hertz = (np.array(found[key]) for key in ("bridge_position_m", "cart_position_m", "elastic_Hz"))
         return bridge, cart, hertz
 
+    @property
+    def model(self) -> LinearModel:
+        """The linear equations with bridge and cart at zero, with an input for each drive."""
+        data = self.data
+        a, b, c, d = (np.array(data[key], dtype=float) for key in "ABCD")
+        states, inputs, outputs = (tuple(row["name"] for row in data[key]) for key in ("states", "inputs", "outputs"))
+        units = {row["name"]: row["unit"] for row in [*data["inputs"], *data["outputs"]]}
+        return LinearModel(a, b, c, d, 0.0, states, inputs, outputs, units)
+
+    def to_control(self) -> control.StateSpace:
+        """The model as python-control has it, with two inputs."""
+        return self.model.to_control()
+
     def to_pandas(self) -> pandas.DataFrame:
         """A pandas.DataFrame of the elastic modes: frequency (Hz), damping ratio, and how far each body moves at the
         belt."""
