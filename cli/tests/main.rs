@@ -14,6 +14,7 @@ mod frf;
 mod gantry;
 #[path = "../../tests/common/ignored.rs"]
 mod ignored;
+mod kinds;
 mod missing_logs;
 mod moves;
 mod outputs;

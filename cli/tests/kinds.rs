@@ -1,0 +1,104 @@
+//! Every kind of machine through every command: each pair runs, or is refused by one sentence that is known here.
+
+use assert_cmd::Command;
+use std::path::Path;
+use tempfile::TempDir;
+
+/// What becomes of a command with a kind of machine.
+enum Ends {
+    /// It runs.
+    Runs,
+    /// It is refused with status 2, and these words are in what it says.
+    Refused(&'static str),
+}
+use Ends::{Refused, Runs};
+
+const AXIS: &str = "stages/sollmann-jouaneh/table4.toml";
+const PID: &str = "stages/sollmann-jouaneh/controllers/pid.toml";
+const LOGS: &str = "stages/sollmann-jouaneh/identification/separate.toml";
+const GANTRIES: [&str; 2] = ["stages/h-frame/h-frame.toml", "stages/core-xy/core-xy.toml"];
+
+/// Commands without a machine.
+const OTHERS: [&str; 6] = ["paper", "init", "schema", "completions", "man", "help"];
+
+/// Of a gantry that is not there yet.
+const YET_TO_COME: Ends = Refused("this needs a single axis, and the case describes a gantry");
+
+/// A command, the options behind the case, the case of an axis that it runs with, and what becomes of a gantry.
+const TABLE: &[(&str, &[&str], &str, Ends)] = &[
+    ("show", &[], AXIS, Runs),
+    ("simulate", &[], AXIS, Runs),
+    ("modes", &[], AXIS, Runs),
+    ("sweep", &["--runs", "3", "--vary", "cart.mass=5 %"], AXIS, Runs),
+    ("move", &[], PID, YET_TO_COME),
+    ("tune", &["--evaluate"], PID, YET_TO_COME),
+    ("check", &[], LOGS, YET_TO_COME),
+    ("fit", &[], LOGS, YET_TO_COME),
+    ("shape", &[], PID, YET_TO_COME),
+    ("frf", &[], LOGS, YET_TO_COME),
+    ("design", &["--for", "cart.mass", "--measure", "motor_current=10mA"], AXIS, YET_TO_COME),
+    ("export c", &[], AXIS, Runs),
+    ("export matlab", &["--out", "there/"], AXIS, Runs),
+    ("export python", &[], AXIS, Runs),
+    ("export json", &[], AXIS, Runs),
+    ("export fmu", &["--out", "there/"], AXIS, Runs),
+    ("export st", &[], PID, Refused("a gantry has no controller")),
+    // It serves until it is ended.
+    ("studio", &["--port", "none"], AXIS, Refused("--port")),
+];
+
+fn taut() -> Command {
+    let mut command = Command::cargo_bin("taut").unwrap();
+    command.current_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join(".."));
+    command
+}
+
+#[test]
+fn every_command_is_in_the_table() {
+    let output = taut().arg("--help").output().unwrap();
+    let help = String::from_utf8(output.stdout).unwrap();
+    let listed = help.lines().skip_while(|line| *line != "Commands:").skip(1).take_while(|line| !line.is_empty());
+    let names = listed.filter(|line| line.starts_with("  ") && !line.starts_with("   "));
+    for name in names.filter_map(|line| line.split_whitespace().next()) {
+        let has = TABLE.iter().any(|(command, ..)| command.split(' ').next() == Some(name));
+        assert!(has != OTHERS.contains(&name), "{name}");
+    }
+    let targets = String::from_utf8(taut().args(["export", "--help"]).output().unwrap().stdout).unwrap();
+    for target in ["fmu", "c", "st", "matlab", "python", "json"] {
+        assert!(targets.contains(target) && TABLE.iter().any(|row| row.0 == format!("export {target}")), "{target}");
+    }
+}
+
+#[test]
+fn every_kind_goes_through_every_command() {
+    for (command, options, axis, of_gantry) in TABLE {
+        let words: Vec<&str> = command.split(' ').collect();
+        let run = |case: &str, ends: &Ends| {
+            let folder = TempDir::new().unwrap();
+            let there = format!("{}/", folder.path().display());
+            let options = options.iter().map(|option| if *option == "there/" { there.as_str() } else { option });
+            let output = taut().args(&words).arg(case).args(options).output().unwrap();
+            let [told, said] =
+                [&output.stdout, &output.stderr].map(|bytes| String::from_utf8_lossy(bytes).into_owned());
+            match ends {
+                // What was found may be nothing to rely on: status 1.
+                Runs => {
+                    assert!(matches!(output.status.code(), Some(0 | 1)) && !told.is_empty(), "{command} {case}: {said}")
+                }
+                Refused(words) => {
+                    assert_eq!(output.status.code(), Some(2), "{command} {case}: {said}");
+                    assert!(said.starts_with("error: ") && said.contains(words), "{command} {case}: {said}");
+                    assert!(
+                        said.contains("next: ") || said.contains("--help"),
+                        "{command} {case} does not say what to do: {said}"
+                    );
+                }
+            }
+        };
+        match *command {
+            "studio" => run(axis, of_gantry),
+            _ => run(axis, &Runs),
+        }
+        GANTRIES.iter().for_each(|case| run(case, of_gantry));
+    }
+}
