@@ -174,9 +174,9 @@ impl Frame {
                 }
             }
             // What stands at the ends of the travel, and forces along it.
-            for spring in spans.len()..plant.springs.len() {
+            for (spring, own) in stretch.iter_mut().enumerate().skip(spans.len()) {
                 if !gears(plant).any(|gear| gear == spring) {
-                    stretch[spring] = along(&ways, spring);
+                    *own = along(&ways, spring);
                 }
             }
             angle = ways;

@@ -306,9 +306,10 @@ pub fn at_pulley(stage: &Machine, key: &str) -> f64 {
 /// Refuses a machine with a number out of its range.
 pub fn check(machine: &Machine) -> Result<()> {
     for row in all() {
-        let Sits::Machine(list, count) = machine.sits(row) else { continue };
+        let Field::Machine(accessor) = &row.field else { continue };
+        let Some((list, count)) = accessor.listed(machine) else { continue };
         for index in 0..count {
-            if let Some(value) = machine.get(row, index).filter(|value| !row.range.contains(*value)) {
+            if let Some(value) = (accessor.get)(machine, index).filter(|value| !row.range.contains(*value)) {
                 let name = list.key(row.key, index);
                 let unit = if row.unit.is_empty() { String::new() } else { format!(" {}", row.unit) };
                 return Err(Error::new(format!("{name} cannot be {}{unit}", rounded(value)))

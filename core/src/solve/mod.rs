@@ -24,6 +24,7 @@ mod saved;
 mod sensitivity;
 mod simulator;
 mod table3;
+mod widest;
 
 pub use crate::trajectory::Grid;
 pub use choice::{Choice, Kind};

@@ -2,6 +2,7 @@
 
 use super::{Detail, Flow};
 use crate::mechanism::{BODIES, DRIVES, Form, Layout, Mechanism, Mode, Shown, State};
+use crate::solve::widest::widest;
 use crate::trajectory::Trajectory;
 
 /// Number of quantities in a [`Reading`].
@@ -62,21 +63,11 @@ impl Gap<'_> {
         middle + rise(half, bow)
     }
 
-    /// Whether the magnitude of any quantity is above the first of `factors` times its height at either end, and whether
-    /// it can be above the second times that within.
-    pub fn rises_above(&self, heights: &Reading, factors: [f64; 2]) -> (bool, bool) {
-        #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
-            // SAFETY: the processor has AVX2.
-            return unsafe { self.rises_above_by_avx2(heights, factors) };
-        }
-        self.rises_above_by_any(heights, factors)
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn rises_above_by_avx2(&self, heights: &Reading, factors: [f64; 2]) -> (bool, bool) {
-        self.rises_above_by_any(heights, factors)
+    widest! {
+        /// Whether the magnitude of any quantity is above the first of `factors` times its height at either end, and whether
+        /// it can be above the second times that within.
+        pub fn rises_above(&self, heights: &Reading, factors: [f64; 2]) -> (bool, bool)
+            = rises_above_by_any, rises_above_by_avx2;
     }
 
     #[inline(always)]
@@ -243,20 +234,10 @@ impl Curve {
         Polynomial(self.terms.map(|term| term[q]))
     }
 
-    /// The curve from values and the first three derivatives by s, each over its order's factorial, at both ends.
-    pub(super) fn through(begin: f64, length: f64, from: &[Reading; 4], to: &[Reading; 4]) -> Self {
-        #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
-            // SAFETY: the processor has AVX2.
-            return unsafe { Self::through_by_avx2(begin, length, from, to) };
-        }
-        Self::through_by_any(begin, length, from, to)
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn through_by_avx2(begin: f64, length: f64, from: &[Reading; 4], to: &[Reading; 4]) -> Self {
-        Self::through_by_any(begin, length, from, to)
+    widest! {
+        /// The curve from values and the first three derivatives by s, each over its order's factorial, at both ends.
+        pub(super) fn through(begin: f64, length: f64, from: &[Reading; 4], to: &[Reading; 4]) -> Self
+            = Self::through_by_any, through_by_avx2;
     }
 
     #[inline(always)]
@@ -279,20 +260,9 @@ impl Curve {
         Self { begin, length, terms }
     }
 
-    /// Bounds of the values of every quantity, from below and above: those of [`Polynomial::range`].
-    pub fn ranges(&self) -> (Reading, Reading) {
-        #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
-            // SAFETY: the processor has AVX2.
-            return unsafe { self.ranges_by_avx2() };
-        }
-        self.ranges_by_any()
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn ranges_by_avx2(&self) -> (Reading, Reading) {
-        self.ranges_by_any()
+    widest! {
+        /// Bounds of the values of every quantity, from below and above: those of [`Polynomial::range`].
+        pub fn ranges(&self) -> (Reading, Reading) = ranges_by_any, ranges_by_avx2;
     }
 
     #[inline(always)]

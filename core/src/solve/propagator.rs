@@ -11,6 +11,8 @@ mod slopes;
 
 pub(crate) use slopes::{Columns, SlopedStep};
 
+use crate::solve::widest::widest;
+
 /// An `R` × `C` matrix: the rate of change ż = A z, or a change over some time, z(t + h) − z(t) = P z(t).
 #[derive(Debug, Clone)]
 pub(crate) struct Matrix<const R: usize, const C: usize> {
@@ -55,20 +57,9 @@ impl<const C: usize> Series<C> {
         z.iter_mut().zip(self.change(s)).for_each(|(z, change)| *z += change);
     }
 
-    /// z(s · distance) − z(0).
-    pub(crate) fn change(&self, s: f64) -> [f64; C] {
-        #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
-            // SAFETY: the processor has AVX2.
-            return unsafe { self.change_by_avx2(s) };
-        }
-        self.change_by_any(s)
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn change_by_avx2(&self, s: f64) -> [f64; C] {
-        self.change_by_any(s)
+    widest! {
+        /// z(s · distance) − z(0).
+        pub(crate) fn change(&self, s: f64) -> [f64; C] = change_by_any, change_by_avx2;
     }
 
     #[inline(always)]
@@ -149,21 +140,10 @@ impl<const R: usize, const C: usize> Matrix<R, C> {
         sum
     }
 
-    /// The product with a vector.
-    #[inline]
-    pub(crate) fn rate(&self, z: &[f64; C]) -> [f64; R] {
-        #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
-            // SAFETY: the processor has AVX2.
-            return unsafe { self.times_by_avx2(z) };
-        }
-        self.times(z)
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn times_by_avx2(&self, z: &[f64; C]) -> [f64; R] {
-        self.times(z)
+    widest! {
+        /// The product with a vector.
+        #[inline]
+        pub(crate) fn rate(&self, z: &[f64; C]) -> [f64; R] = times, times_by_avx2;
     }
 
     /// The same, compiled into who calls it.
@@ -178,21 +158,10 @@ impl<const R: usize, const C: usize> Matrix<R, C> {
         sum
     }
 
-    /// z ← z + P z.
-    #[inline(always)]
-    pub(crate) fn advance(&self, z: &mut [f64; C]) {
-        #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
-            // SAFETY: the processor has AVX2.
-            return unsafe { self.advance_by_avx2(z) };
-        }
-        self.advance_by_any(z);
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn advance_by_avx2(&self, z: &mut [f64; C]) {
-        self.advance_by_any(z);
+    widest! {
+        /// z ← z + P z.
+        #[inline(always)]
+        pub(crate) fn advance(&self, z: &mut [f64; C]) = advance_by_any, advance_by_avx2;
     }
 
     #[inline(always)]
@@ -203,20 +172,10 @@ impl<const R: usize, const C: usize> Matrix<R, C> {
         }
     }
 
-    /// z ← z + P z for each of `rows`, which take what z is then; `largest` takes the largest magnitudes.
-    pub(crate) fn advance_rows(&self, z: &mut [f64; C], largest: &mut [f64; C], rows: &mut [[f64; C]]) {
-        #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
-            // SAFETY: the processor has AVX2.
-            return unsafe { self.advance_rows_by_avx2(z, largest, rows) };
-        }
-        self.advance_rows_by_any(z, largest, rows);
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn advance_rows_by_avx2(&self, z: &mut [f64; C], largest: &mut [f64; C], rows: &mut [[f64; C]]) {
-        self.advance_rows_by_any(z, largest, rows);
+    widest! {
+        /// z ← z + P z for each of `rows`, which take what z is then; `largest` takes the largest magnitudes.
+        pub(crate) fn advance_rows(&self, z: &mut [f64; C], largest: &mut [f64; C], rows: &mut [[f64; C]])
+            = advance_rows_by_any, advance_rows_by_avx2;
     }
 
     #[inline(always)]
@@ -263,20 +222,9 @@ impl<const R: usize, const C: usize> Matrix<R, C> {
         out
     }
 
-    /// e^{A h} − I for ‖A‖ h ≤ [`EXPONENTIAL_REACH`], A being `self`.
-    pub(crate) fn exponential(&self, h: f64) -> Self {
-        #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
-            // SAFETY: the processor has AVX2.
-            return unsafe { self.exponential_by_avx2(h) };
-        }
-        self.exponential_by_any(h)
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn exponential_by_avx2(&self, h: f64) -> Self {
-        self.exponential_by_any(h)
+    widest! {
+        /// e^{A h} − I for ‖A‖ h ≤ [`EXPONENTIAL_REACH`], A being `self`.
+        pub(crate) fn exponential(&self, h: f64) -> Self = exponential_by_any, exponential_by_avx2;
     }
 
     #[inline(always)]
@@ -309,20 +257,9 @@ impl<const R: usize, const C: usize> Matrix<R, C> {
         out
     }
 
-    /// e^{2 A h} − I from e^{A h} − I, keeping the relative accuracy of small changes.
-    pub(crate) fn doubled(&self) -> Self {
-        #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
-            // SAFETY: the processor has AVX2.
-            return unsafe { self.doubled_by_avx2() };
-        }
-        self.doubled_by_any()
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn doubled_by_avx2(&self) -> Self {
-        self.doubled_by_any()
+    widest! {
+        /// e^{2 A h} − I from e^{A h} − I, keeping the relative accuracy of small changes.
+        pub(crate) fn doubled(&self) -> Self = doubled_by_any, doubled_by_avx2;
     }
 
     #[inline(always)]

@@ -6,6 +6,7 @@
 //! but touches zero is told by Bernstein coefficients.
 
 use super::propagator::SERIES_TERMS;
+use crate::solve::widest::widest;
 
 /// Value and derivative of Σ c_k sᵏ = E(s²) + s O(s²): the chains of even and odd powers do not wait for each other.
 #[inline(always)]
@@ -189,20 +190,9 @@ fn search<const N: usize>(c: &[f64], b: &[f64; N], low: f64, high: f64) -> Optio
     search(c, &left, low, middle).or_else(|| search(c, &right, middle, high))
 }
 
-/// The coefficients on both halves, by de Casteljau's scheme.
-fn halves<const N: usize>(b: &[f64; N]) -> ([f64; N], [f64; N]) {
-    #[cfg(target_arch = "x86_64")]
-    if std::arch::is_x86_feature_detected!("avx2") {
-        // SAFETY: the processor has AVX2.
-        return unsafe { halves_by_avx2(b) };
-    }
-    halves_by_any(b)
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn halves_by_avx2<const N: usize>(b: &[f64; N]) -> ([f64; N], [f64; N]) {
-    halves_by_any(b)
+widest! {
+    /// The coefficients on both halves, by de Casteljau's scheme.
+    fn halves [const N: usize](b: &[f64; N]) -> ([f64; N], [f64; N]) = halves_by_any, halves_by_avx2;
 }
 
 #[inline(always)]

@@ -7,6 +7,7 @@ use crate::friction::Motion;
 use crate::mechanism::{BODIES, DRIVES, Equations, Form, Layout, Mechanism, Mode, ROUNDING, SPRINGS, SpringLaw, State};
 use crate::signal::DEGREE;
 use crate::solve::propagator::{EXPONENTIAL_REACH, Matrix, SERIES_REACH, Series, series_order};
+use crate::solve::widest::widest;
 use guards::{Beside, LANES, Lanes, Row, Values, side_by_side};
 pub(super) use guards::{Room, Watch};
 pub(super) use shown::Shown;
@@ -432,20 +433,9 @@ impl<const N: usize> ModeMatrices<N> {
         self.speed
     }
 
-    /// A look at z: ż and its size, and the guards into `value`; or, with ż for z, at what is one derivative higher.
-    pub(super) fn look(&self, z: &[f64; N], value: &mut Values) -> ([f64; N], Size) {
-        #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
-            // SAFETY: the processor has AVX2.
-            return unsafe { self.look_by_avx2(z, value) };
-        }
-        self.look_by_any(z, value)
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn look_by_avx2(&self, z: &[f64; N], value: &mut Values) -> ([f64; N], Size) {
-        self.look_by_any(z, value)
+    widest! {
+        /// A look at z: ż and its size, and the guards into `value`; or, with ż for z, at what is one derivative higher.
+        pub(super) fn look(&self, z: &[f64; N], value: &mut Values) -> ([f64; N], Size) = look_by_any, look_by_avx2;
     }
 
     #[inline(always)]
@@ -455,20 +445,9 @@ impl<const N: usize> ModeMatrices<N> {
         (rate, self.size_by_any(&rate))
     }
 
-    /// The values of the guards.
-    pub(super) fn values(&self, z: &[f64; N], value: &mut Values) {
-        #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
-            // SAFETY: the processor has AVX2.
-            return unsafe { self.values_by_avx2(z, value) };
-        }
-        self.values_by_any(z, value);
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn values_by_avx2(&self, z: &[f64; N], value: &mut Values) {
-        self.values_by_any(z, value);
+    widest! {
+        /// The values of the guards.
+        pub(super) fn values(&self, z: &[f64; N], value: &mut Values) = values_by_any, values_by_avx2;
     }
 
     #[inline(always)]
@@ -478,20 +457,9 @@ impl<const N: usize> ModeMatrices<N> {
         }
     }
 
-    /// √(2V) of ż.
-    pub(super) fn size(&self, y: &[f64; N]) -> Size {
-        #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
-            // SAFETY: the processor has AVX2.
-            return unsafe { self.size_by_avx2(y) };
-        }
-        self.size_by_any(y)
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn size_by_avx2(&self, y: &[f64; N]) -> Size {
-        self.size_by_any(y)
+    widest! {
+        /// √(2V) of ż.
+        pub(super) fn size(&self, y: &[f64; N]) -> Size = size_by_any, size_by_avx2;
     }
 
     #[inline(always)]

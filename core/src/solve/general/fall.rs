@@ -3,6 +3,7 @@
 use super::radau::{POINTS, TERMS};
 use crate::solve::propagator::SERIES_TERMS;
 use crate::solve::roots;
+use crate::solve::widest::widest;
 
 /// Whether what has these values at the points of a step can turn negative within. A quartic leaves the range of its
 /// values at the points by at most their spread; what swings by up to four radians within the step adds to that.
@@ -37,20 +38,9 @@ static SECOND: [[f64; SERIES_TERMS]; TERMS] = {
     table
 };
 
-/// The coefficients on the second half of a step, from those on the whole.
-fn second_half(c: &[f64]) -> [f64; SERIES_TERMS] {
-    #[cfg(target_arch = "x86_64")]
-    if std::arch::is_x86_feature_detected!("avx2") {
-        // SAFETY: the processor has AVX2.
-        return unsafe { second_half_by_avx2(c) };
-    }
-    second_half_by_any(c)
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn second_half_by_avx2(c: &[f64]) -> [f64; SERIES_TERMS] {
-    second_half_by_any(c)
+widest! {
+    /// The coefficients on the second half of a step, from those on the whole.
+    fn second_half(c: &[f64]) -> [f64; SERIES_TERMS] = second_half_by_any, second_half_by_avx2;
 }
 
 #[inline(always)]

@@ -17,6 +17,7 @@
 
 use super::radau::{self, DRIVEN, FORCED, FREE, Lane, NODES, POINTS, POWER, POWERS, TERMS};
 use crate::mechanism::{BODIES, DRIVES};
+use crate::solve::widest::widest;
 use std::sync::OnceLock;
 
 /// Room for coordinates, speeds and currents, a multiple of four.
@@ -205,20 +206,9 @@ impl Series {
         Self { terms: [[0.0; STATES]; TERMS], order: 0 }
     }
 
-    /// The states at the share `s` of the step.
-    pub(super) fn at(&self, size: usize, s: f64) -> States {
-        #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
-            // SAFETY: the processor has AVX2.
-            return unsafe { self.at_by_avx2(size, s) };
-        }
-        self.at_by_any(size, s)
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn at_by_avx2(&self, size: usize, s: f64) -> States {
-        self.at_by_any(size, s)
+    widest! {
+        /// The states at the share `s` of the step.
+        pub(super) fn at(&self, size: usize, s: f64) -> States = at_by_any, at_by_avx2;
     }
 
     #[inline(always)]
@@ -262,20 +252,10 @@ impl Series {
     }
 }
 
-/// x, M x/ν, (M/ν)² x, …, M given by columns.
-fn powers(size: usize, columns: &[States], x: &States, norm: f64, chain: &mut [States; TERMS]) {
-    #[cfg(target_arch = "x86_64")]
-    if std::arch::is_x86_feature_detected!("avx2") {
-        // SAFETY: the processor has AVX2.
-        return unsafe { powers_by_avx2(size, columns, x, norm, chain) };
-    }
-    powers_by_any(size, columns, x, norm, chain);
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn powers_by_avx2(size: usize, columns: &[States], x: &States, norm: f64, chain: &mut [States; TERMS]) {
-    powers_by_any(size, columns, x, norm, chain);
+widest! {
+    /// x, M x/ν, (M/ν)² x, …, M given by columns.
+    fn powers(size: usize, columns: &[States], x: &States, norm: f64, chain: &mut [States; TERMS])
+        = powers_by_any, powers_by_avx2;
 }
 
 #[inline(always)]
@@ -418,32 +398,10 @@ fn sum_of(columns: &[Lane], x: &[f64]) -> Lane {
     sum
 }
 
-/// The lanes of c y that states, one, and inputs add, by the rows r_m and their moments.
-fn lead(
-    linear: &Linear,
-    rows: &[States; TERMS],
-    moments: &[[f64; TERMS]],
-    (h, degree): (f64, usize),
-    base: &mut [Lane],
-) {
-    #[cfg(target_arch = "x86_64")]
-    if std::arch::is_x86_feature_detected!("avx2") {
-        // SAFETY: the processor has AVX2.
-        return unsafe { lead_by_avx2(linear, rows, moments, (h, degree), base) };
-    }
-    lead_by_any(linear, rows, moments, (h, degree), base);
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn lead_by_avx2(
-    linear: &Linear,
-    rows: &[States; TERMS],
-    moments: &[[f64; TERMS]],
-    step: (f64, usize),
-    base: &mut [Lane],
-) {
-    lead_by_any(linear, rows, moments, step, base);
+widest! {
+    /// The lanes of c y that states, one, and inputs add, by the rows r_m and their moments.
+    fn lead(linear: &Linear, rows: &[States; TERMS], moments: &[[f64; TERMS]], step: (f64, usize), base: &mut [Lane])
+        = lead_by_any, lead_by_avx2;
 }
 
 #[inline(always)]
@@ -479,20 +437,10 @@ fn lead_by_any(
     }
 }
 
-/// The lanes of c y that the five values of a force add, and ω, by the moments r_m b/νᵐ.
-fn driven(moments: &[f64; TERMS], h: f64, reach: f64, order: usize) -> [Lane; POINTS + 1] {
-    #[cfg(target_arch = "x86_64")]
-    if std::arch::is_x86_feature_detected!("avx2") {
-        // SAFETY: the processor has AVX2.
-        return unsafe { driven_by_avx2(moments, h, reach, order) };
-    }
-    driven_by_any(moments, h, reach, order)
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn driven_by_avx2(moments: &[f64; TERMS], h: f64, reach: f64, order: usize) -> [Lane; POINTS + 1] {
-    driven_by_any(moments, h, reach, order)
+widest! {
+    /// The lanes of c y that the five values of a force add, and ω, by the moments r_m b/νᵐ.
+    fn driven(moments: &[f64; TERMS], h: f64, reach: f64, order: usize) -> [Lane; POINTS + 1]
+        = driven_by_any, driven_by_avx2;
 }
 
 #[inline(always)]

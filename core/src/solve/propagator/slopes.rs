@@ -11,6 +11,7 @@
 //! L has those columns alone: l(2h) = 2 l + P l.
 
 use super::{EXPONENTIAL_ORDER, EXPONENTIAL_REACH, Matrix, RECIPROCAL_FACTORIAL, Series};
+use crate::solve::widest::widest;
 
 /// A matrix of which most columns are zero: those that are not.
 #[derive(Debug, Clone, Default)]
@@ -103,26 +104,11 @@ impl<const N: usize> Matrix<N, N> {
         self.column.iter_mut().flatten().zip(other.column.iter().flatten()).for_each(|(own, other)| *own += other);
     }
 
-    /// Adds to each of `s` how it changes along `series`, which goes so far as `distance`, up to its share `part` of
-    /// it, where A changes by `slopes`, and not at all for those behind the last of these: T_k = d/k (A T_{k−1} + A_p z_{k−1}).
-    pub(crate) fn add_slopes(
-        &self,
-        slopes: &[Columns<N>],
-        (series, distance, part): (&Series<N>, f64, f64),
-        s: &mut [[f64; N]],
-    ) {
-        #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
-            // SAFETY: the processor has AVX2.
-            return unsafe { self.add_slopes_by_avx2(slopes, (series, distance, part), s) };
-        }
-        self.add_slopes_by_any(slopes, (series, distance, part), s);
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn add_slopes_by_avx2(&self, slopes: &[Columns<N>], along: (&Series<N>, f64, f64), s: &mut [[f64; N]]) {
-        self.add_slopes_by_any(slopes, along, s);
+    widest! {
+        /// Adds to each of `s` how it changes along `series`, which goes so far as `distance`, up to its share `part` of
+        /// it, where A changes by `slopes`, and not at all for those behind the last of these: T_k = d/k (A T_{k−1} + A_p z_{k−1}).
+        pub(crate) fn add_slopes(&self, slopes: &[Columns<N>], along: (&Series<N>, f64, f64), s: &mut [[f64; N]])
+            = add_slopes_by_any, add_slopes_by_avx2;
     }
 
     #[inline(always)]
@@ -154,20 +140,9 @@ impl<const N: usize> Matrix<N, N> {
 }
 
 impl<const N: usize> SlopedStep<N> {
-    /// S ← S + P S + L z for each of `s`, z being where the step begins; those behind the last L have none.
-    pub(crate) fn advance(&self, z: &[f64; N], s: &mut [[f64; N]]) {
-        #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
-            // SAFETY: the processor has AVX2.
-            return unsafe { self.advance_by_avx2(z, s) };
-        }
-        self.advance_by_any(z, s);
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn advance_by_avx2(&self, z: &[f64; N], s: &mut [[f64; N]]) {
-        self.advance_by_any(z, s);
+    widest! {
+        /// S ← S + P S + L z for each of `s`, z being where the step begins; those behind the last L have none.
+        pub(crate) fn advance(&self, z: &[f64; N], s: &mut [[f64; N]]) = advance_by_any, advance_by_avx2;
     }
 
     #[inline(always)]

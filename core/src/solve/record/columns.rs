@@ -9,6 +9,7 @@ use super::sum::{Places, Sum, Values};
 use super::{BLOCK, Detail, Extra, Segment};
 use crate::mechanism::{DRIVES, Heading, Layout, Mechanism, Shown};
 use crate::solve::coordinates::Coordinates;
+use crate::solve::widest::widest;
 use crate::trajectory::{Grid, Trajectory};
 use std::ops::Range;
 
@@ -101,20 +102,9 @@ impl Columns {
         }
     }
 
-    /// Computes all columns, and puts into `out` those that are shown.
-    pub(super) fn fill(&mut self, block: &Block, out: &mut Trajectory) {
-        #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
-            // SAFETY: the processor has AVX2.
-            return unsafe { self.fill_by_avx2(block, out) };
-        }
-        self.fill_by_any(block, out);
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn fill_by_avx2(&mut self, block: &Block, out: &mut Trajectory) {
-        self.fill_by_any(block, out);
+    widest! {
+        /// Computes all columns, and puts into `out` those that are shown.
+        pub(super) fn fill(&mut self, block: &Block, out: &mut Trajectory) = fill_by_any, fill_by_avx2;
     }
 
     #[inline(always)]

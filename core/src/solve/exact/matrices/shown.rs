@@ -5,6 +5,7 @@ use crate::friction::Motion;
 use crate::mechanism::{BODIES, DRIVES, Mechanism};
 use crate::solve::observe::{QUANTITIES, Reading, Readout};
 use crate::solve::propagator::Matrix;
+use crate::solve::widest::widest;
 
 /// The least size of a rate: nothing next to any other.
 const STILL: f64 = 1e-250;
@@ -73,20 +74,10 @@ impl<const N: usize> Shown<N> {
         self.readout.placed(self.matrix.rate(z), origin)
     }
 
-    /// The same in each of `rows`, added to `readings`.
-    pub(in crate::solve) fn read_rows(&self, rows: &[[f64; N]], origin: &[f64; BODIES], readings: &mut Vec<Reading>) {
-        #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
-            // SAFETY: the processor has AVX2.
-            return unsafe { self.read_rows_by_avx2(rows, origin, readings) };
-        }
-        self.read_rows_by_any(rows, origin, readings);
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn read_rows_by_avx2(&self, rows: &[[f64; N]], origin: &[f64; BODIES], readings: &mut Vec<Reading>) {
-        self.read_rows_by_any(rows, origin, readings);
+    widest! {
+        /// The same in each of `rows`, added to `readings`.
+        pub(in crate::solve) fn read_rows(&self, rows: &[[f64; N]], origin: &[f64; BODIES], readings: &mut Vec<Reading>)
+            = read_rows_by_any, read_rows_by_avx2;
     }
 
     #[inline(always)]

@@ -1,0 +1,87 @@
+//! Functions in two versions, for any processor and for one with AVX2: the same source, compiled twice.
+
+/// Makes a function that calls the second one named, or the third where the processor has AVX2, and that third, which is
+/// the second compiled for AVX2. The second has to be `#[inline(always)]`; both versions compute the same bits, since
+/// wider vectors change the order of no sum.
+///
+/// ```text
+/// widest! { fn sum(values: &[f64]) -> f64 = sum_by_any, sum_by_avx2; }
+/// #[inline(always)]
+/// fn sum_by_any(values: &[f64]) -> f64 { … }
+/// ```
+macro_rules! widest {
+    // A method that reads.
+    ($(#[$meta:meta])* $vis:vis fn $name:ident(&self $(, $arg:ident: $type:ty)*) $(-> $out:ty)? = $any:ident, $wide:ident;) => {
+        $(#[$meta])*
+        $vis fn $name(&self $(, $arg: $type)*) $(-> $out)? {
+            #[cfg(target_arch = "x86_64")]
+            if std::arch::is_x86_feature_detected!("avx2") {
+                // SAFETY: the processor has AVX2.
+                return unsafe { self.$wide($($arg),*) };
+            }
+            self.$any($($arg),*)
+        }
+
+        #[cfg(target_arch = "x86_64")]
+        #[target_feature(enable = "avx2")]
+        fn $wide(&self $(, $arg: $type)*) $(-> $out)? {
+            self.$any($($arg),*)
+        }
+    };
+    // One that writes.
+    ($(#[$meta:meta])* $vis:vis fn $name:ident(&mut self $(, $arg:ident: $type:ty)*) $(-> $out:ty)? = $any:ident, $wide:ident;) => {
+        $(#[$meta])*
+        $vis fn $name(&mut self $(, $arg: $type)*) $(-> $out)? {
+            #[cfg(target_arch = "x86_64")]
+            if std::arch::is_x86_feature_detected!("avx2") {
+                // SAFETY: the processor has AVX2.
+                return unsafe { self.$wide($($arg),*) };
+            }
+            self.$any($($arg),*)
+        }
+
+        #[cfg(target_arch = "x86_64")]
+        #[target_feature(enable = "avx2")]
+        fn $wide(&mut self $(, $arg: $type)*) $(-> $out)? {
+            self.$any($($arg),*)
+        }
+    };
+    // A function of a type.
+    ($(#[$meta:meta])* $vis:vis fn $name:ident($($arg:ident: $type:ty),*) $(-> $out:ty)? = Self::$any:ident, $wide:ident;) => {
+        $(#[$meta])*
+        $vis fn $name($($arg: $type),*) $(-> $out)? {
+            #[cfg(target_arch = "x86_64")]
+            if std::arch::is_x86_feature_detected!("avx2") {
+                // SAFETY: the processor has AVX2.
+                return unsafe { Self::$wide($($arg),*) };
+            }
+            Self::$any($($arg),*)
+        }
+
+        #[cfg(target_arch = "x86_64")]
+        #[target_feature(enable = "avx2")]
+        fn $wide($($arg: $type),*) $(-> $out)? {
+            Self::$any($($arg),*)
+        }
+    };
+    // One by itself.
+    ($(#[$meta:meta])* $vis:vis fn $name:ident $([$($generic:tt)*])? ($($arg:ident: $type:ty),*) $(-> $out:ty)? = $any:ident, $wide:ident;) => {
+        $(#[$meta])*
+        $vis fn $name $(<$($generic)*>)? ($($arg: $type),*) $(-> $out)? {
+            #[cfg(target_arch = "x86_64")]
+            if std::arch::is_x86_feature_detected!("avx2") {
+                // SAFETY: the processor has AVX2.
+                return unsafe { $wide($($arg),*) };
+            }
+            $any($($arg),*)
+        }
+
+        #[cfg(target_arch = "x86_64")]
+        #[target_feature(enable = "avx2")]
+        fn $wide $(<$($generic)*>)? ($($arg: $type),*) $(-> $out)? {
+            $any($($arg),*)
+        }
+    };
+}
+
+pub(in crate::solve) use widest;
