@@ -230,6 +230,7 @@ pub struct Curve {
 
 impl Curve {
     /// The polynomial of one quantity.
+    #[inline]
     pub fn of(&self, q: usize) -> Polynomial {
         Polynomial(self.terms.map(|term| term[q]))
     }
