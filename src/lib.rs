@@ -61,6 +61,7 @@
 //! `parquet` adds Parquet files; `json` adds results as data. Without them the library is the physics alone. Figures
 //! and reports are a crate of their own, `taut-report`.
 
+pub mod calculator;
 pub mod case;
 pub mod chance;
 pub mod control;
