@@ -5,6 +5,9 @@
 //! it in time.
 
 pub mod placement;
+mod tunable;
+
+pub use tunable::{Tunable, TunedBy};
 
 /// A sampled controller.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,39 +30,53 @@ pub struct Design {
     pub shaper: Vec<[f64; 2]>,
 }
 
-/// The structure and its gains.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Structure {
+/// The structures, one list for all that goes through them.
+macro_rules! structures {
+    ($($(#[$about:meta])* $name:ident),* $(,)?) => {
+        /// The structure and its gains.
+        #[derive(Debug, Clone, PartialEq)]
+        pub enum Structure {
+            $($(#[$about])* $name($name)),*
+        }
+
+        impl Structure {
+            /// One of each, without gains.
+            pub fn each() -> Vec<Self> {
+                vec![$(Self::$name($name::default())),*]
+            }
+
+            /// What tuning and others ask of it.
+            pub fn tunable(&self) -> &dyn Tunable {
+                match self {
+                    $(Self::$name(structure) => structure),*
+                }
+            }
+        }
+    };
+}
+
+structures! {
     /// u = K_p e + K_i ∫e dt + K_d ė, the derivative filtered.
-    Pid(Pid),
+    Pid,
     /// Position loop around speed loop, around a current loop if there is one.
-    Cascade(Cascade),
+    Cascade,
     /// Feedback of the states that a Kalman filter estimates.
-    StateFeedback(StateFeedback),
+    StateFeedback,
     /// Sliding mode with a boundary layer.
-    SlidingMode(SlidingMode),
+    SlidingMode,
     /// A table of rules.
-    Fuzzy(Fuzzy),
+    Fuzzy,
 }
 
 impl Structure {
     /// Its name for people.
     pub fn name(&self) -> &'static str {
-        match self {
-            Structure::Pid(_) => "PID",
-            Structure::Cascade(Cascade { current: None, .. }) => "cascade P-PI",
-            Structure::Cascade(_) => "cascade P-PI-PI",
-            Structure::StateFeedback(StateFeedback { integral: None, .. }) => "state feedback (LQG)",
-            Structure::StateFeedback(_) => "state feedback (LQI)",
-            Structure::SlidingMode(_) => "sliding mode",
-            Structure::Fuzzy(Fuzzy { incremental: false, .. }) => "fuzzy PD",
-            Structure::Fuzzy(_) => "fuzzy PI",
-        }
+        self.tunable().name()
     }
 }
 
 /// Gains of a PID controller.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Pid {
     /// K_p, V/m or A/m.
     pub proportional: f64,
@@ -76,7 +93,7 @@ pub struct Pid {
 }
 
 /// Gains of a cascade.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Cascade {
     /// K_v, 1/s: speed asked for per error of position.
     pub position: f64,
@@ -95,7 +112,7 @@ pub struct Cascade {
 }
 
 /// A sampled current loop inside a cascade.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct CurrentLoop {
     /// V/A.
     pub proportional: f64,
@@ -107,7 +124,7 @@ pub struct CurrentLoop {
 
 /// Weights of a linear-quadratic regulator and spreads for its Kalman filter: each an amount that counts as much as the
 /// others.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct StateFeedback {
     /// Error of the cart's position, m.
     pub position: f64,
@@ -124,7 +141,7 @@ pub struct StateFeedback {
 }
 
 /// Parameters of a sliding-mode controller, σ = ė + λ e.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SlidingMode {
     /// λ, 1/s: how fast the error goes on the sliding surface.
     pub bandwidth: f64,
@@ -139,7 +156,7 @@ pub struct SlidingMode {
 }
 
 /// A fuzzy controller: triangular sets, the same on both axes, and a singleton for each pair of them.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Fuzzy {
     /// Error at the outermost sets, m.
     pub error: f64,

@@ -13,6 +13,7 @@
 //!   and their logs.
 //! - [`solve`]: the motion. [`measure`]: what a recorder makes of it. [`metrics`]: what it shows.
 
+pub mod calculator;
 pub mod chance;
 pub mod design;
 pub mod error;

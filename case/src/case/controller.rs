@@ -2,12 +2,10 @@
 
 use super::reader::{Field, Table};
 use super::suggestion;
-use crate::design::*;
+use crate::design::{CurrentLoop, Design, DisturbanceObserver, FeedForward, FeedForwardModel, Filter, Structure};
 use crate::error::Result;
 use crate::machine::{AmplifierMode, EncoderPlace, Machine};
-
-/// The structures by their keys; exactly one of them.
-const STRUCTURES: [&str; 5] = ["pid", "cascade", "state_feedback", "sliding_mode", "fuzzy"];
+use crate::parameter::{self, Fallback};
 
 /// Most samples that a delay may take.
 const MOST_DELAY: f64 = 1000.0;
@@ -48,14 +46,17 @@ pub(super) fn controller(root: &Table, machine: &Machine) -> Result<Option<Desig
 }
 
 fn structure(table: &Table, machine: &Machine, (every, delay): (f64, f64)) -> Result<Structure> {
-    let given: Vec<Field> = STRUCTURES.iter().filter_map(|key| table.optional(key)).collect();
+    let known = Structure::each();
+    let words: Vec<&str> = known.iter().map(|one| one.tunable().word()).collect();
+    // Exactly one of them.
+    let given: Vec<Field> = words.iter().filter_map(|key| table.optional(key)).collect();
     let field = match &given[..] {
         [field] => field.clone(),
         [] => {
             return Err(table
                 .field
                 .fail("the structure is not said")
-                .allowed(STRUCTURES.join(", "))
+                .allowed(words.join(", "))
                 .next(format!("add for example {}", suggestion::pid(machine, every, delay))));
         }
         [first, second, ..] => {
@@ -67,75 +68,62 @@ fn structure(table: &Table, machine: &Machine, (every, delay): (f64, f64)) -> Re
     let own = field.table()?;
     let others: &[&'static str] = if field.key() == "fuzzy" { &["rules"] } else { &[] };
     own.check_keys(others, &[])?;
-    Ok(match field.key() {
-        "pid" => Structure::Pid(Pid {
-            proportional: match own.number_if_given("proportional")? {
-                Some(value) => value,
-                None => {
-                    let such_as = || format!("add for example {}", suggestion::proportional(machine, every, delay));
-                    own.number("proportional").map_err(|error| error.next(such_as()))?
-                }
-            },
-            integral: own.number("integral")?,
-            derivative: own.number("derivative")?,
-            filter: own.number("filter")?,
-            reference_speed: own.number("reference_speed")?,
-            tracking: own.number("tracking")?,
-        }),
-        "cascade" => Structure::Cascade(cascade(&field, machine)?),
-        "state_feedback" => Structure::StateFeedback(StateFeedback {
-            position: own.number("position")?,
-            speed: own.number_if_given("speed")?,
-            integral: own.number_if_given("integral")?,
-            command: own.number("command")?,
-            disturbance: own.number("disturbance")?,
-            noise: own.number("noise")?,
-        }),
-        "sliding_mode" => Structure::SlidingMode(SlidingMode {
-            bandwidth: own.number("bandwidth")?,
-            reaching: own.number("reaching")?,
-            boundary: own.number("boundary")?,
-            integral: own.number("integral")?,
-            filter: own.number("filter")?,
-        }),
-        "fuzzy" => Structure::Fuzzy(fuzzy(&own)?),
-        _ => return Err(field.unread()),
-    })
-}
-
-fn cascade(field: &Field, machine: &Machine) -> Result<Cascade> {
-    let current = match field.table()?.optional("current") {
-        None => None,
-        Some(current) if machine.drives[0].amplifier.mode == AmplifierMode::Current => {
-            return Err(current
-                .fail("the amplifier commands the current itself: there is no loop to close")
-                .next("leave it out, or set amplifier.mode = \"voltage\""));
-        }
-        Some(current) => {
-            let table = current.table()?;
-            table.check_keys(&[], &[])?;
-            Some(CurrentLoop {
-                proportional: table.number("proportional")?,
-                integral: table.number("integral")?,
-                limit: table.number_if_given("limit")?,
-            })
-        }
+    let Some(mut structure) = known.into_iter().find(|one| one.tunable().word() == field.key()) else {
+        return Err(field.unread());
     };
-    // With a current loop the speed loop asks for a current.
-    let input_unit = if current.is_some() { "A" } else { field.input_unit };
-    let table = Field { input_unit, ..field.clone() }.table()?;
-    Ok(Cascade {
-        position: table.number("position")?,
-        speed: table.number("speed")?,
-        speed_integral: table.number("speed_integral")?,
-        filter: table.number("filter")?,
-        reference_speed: table.number("reference_speed")?,
-        tracking: table.number("tracking")?,
-        current,
-    })
+    match &mut structure {
+        Structure::Pid(_) => {
+            if own.optional("proportional").is_none() {
+                let such_as = || format!("add for example {}", suggestion::proportional(machine, every, delay));
+                own.number("proportional").map_err(|error| error.next(such_as()))?;
+            }
+            gains(&own, &mut structure)?;
+        }
+        Structure::Cascade(cascade) => {
+            let Some(current) = own.optional("current") else {
+                gains(&own, &mut structure)?;
+                return Ok(structure);
+            };
+            if machine.drives[0].amplifier.mode == AmplifierMode::Current {
+                return Err(current
+                    .fail("the amplifier commands the current itself: there is no loop to close")
+                    .next("leave it out, or set amplifier.mode = \"voltage\""));
+            }
+            cascade.current = Some(CurrentLoop::default());
+            let inner = current.table()?;
+            inner.check_keys(&[], &[])?;
+            gains(&inner, &mut structure)?;
+            // With a current loop the speed loop asks for a current.
+            gains(&Field { input_unit: "A", ..field.clone() }.table()?, &mut structure)?;
+        }
+        Structure::Fuzzy(rules) => {
+            (rules.command, rules.incremental, rules.rules) = fuzzy(&own)?;
+            gains(&own, &mut structure)?;
+        }
+        Structure::StateFeedback(_) | Structure::SlidingMode(_) => gains(&own, &mut structure)?,
+    }
+    Ok(structure)
 }
 
-fn fuzzy(table: &Table) -> Result<Fuzzy> {
+/// The numbers of a table that are its rows.
+fn gains(table: &Table, structure: &mut Structure) -> Result<()> {
+    let section = &table.field.section;
+    for row in parameter::all() {
+        let name = row.key.strip_prefix(section.as_str()).and_then(|rest| rest.strip_prefix('.'));
+        let (Some(name), Some(gain)) = (name.filter(|name| !name.contains('.')), row.gain) else { continue };
+        let value = match row.default {
+            Fallback::Words(_) => table.number_if_given(name)?,
+            Fallback::Required | Fallback::Value(_) => Some(table.number(name)?),
+        };
+        if let Some(value) = value {
+            (gain.set)(structure, value);
+        }
+    }
+    Ok(())
+}
+
+/// The command of a rule, whether rules change it, and the rules.
+fn fuzzy(table: &Table) -> Result<(f64, bool, Vec<Vec<f64>>)> {
     let (command, slope) = (table.optional("command"), table.optional("slope"));
     let (value, incremental) = match (&command, &slope) {
         (Some(command), None) => (command.number()?, false),
@@ -163,25 +151,12 @@ fn fuzzy(table: &Table) -> Result<Fuzzy> {
         let value = |field: &Field| field.clone().named("controller.fuzzy.rule").number();
         rules.push(values.iter().map(value).collect::<Result<Vec<_>>>()?);
     }
-    Ok(Fuzzy {
-        error: table.number("error")?,
-        rate: table.number("rate")?,
-        command: value,
-        incremental,
-        rules,
-        filter: table.number("filter")?,
-    })
+    Ok((value, incremental, rules))
 }
 
 fn feed_forward(table: &Table, structure: &Structure, machine: &Machine) -> Result<FeedForward> {
     let Some(field) = table.optional("feed_forward") else {
-        // A sliding mode's equivalent control is that of the model; state feedback has its states from it.
-        let model = match structure {
-            Structure::SlidingMode(_) => FeedForwardModel::Rigid,
-            Structure::StateFeedback(_) => FeedForwardModel::Elastic,
-            Structure::Pid(_) | Structure::Cascade(_) | Structure::Fuzzy(_) => FeedForwardModel::None,
-        };
-        return Ok(FeedForward { model, ..FeedForward::NONE });
+        return Ok(FeedForward { model: structure.tunable().feed_forward(), ..FeedForward::NONE });
     };
     let table = field.table()?;
     table.check_keys(&["model", "compensate_stretch"], &[])?;
@@ -196,8 +171,8 @@ fn feed_forward(table: &Table, structure: &Structure, machine: &Machine) -> Resu
             .fail("an encoder at the cart sees no stretch of the belt")
             .next("leave it out: it is for an encoder at motor or drive pulley"));
     }
-    if let (true, Some(field), Structure::Cascade(_), Some(_)) =
-        (compensate_stretch, table.optional("compensate_stretch"), structure, machine.scale)
+    if let (true, Some(field), true, Some(_)) =
+        (compensate_stretch, table.optional("compensate_stretch"), structure.tunable().follows_scale(), machine.scale)
     {
         return Err(field
             .fail("with a scale the cascade closes its position loop at the cart, where no stretch is seen")

@@ -5,7 +5,7 @@ use super::Move;
 use super::reader::{Field, Table};
 use super::suggestion;
 use super::tree::Kind;
-use crate::design::{Design, Structure};
+use crate::design::{Design, Structure, Tunable, TunedBy};
 use crate::error::Result;
 use crate::machine::Machine;
 use std::path::PathBuf;
@@ -109,11 +109,12 @@ pub(super) fn tuning(
             .fail("there is no controller to tune")
             .next(format!("add [controller] with for example {}", suggestion::controller(machine))));
     };
-    let placed = matches!(design.structure, Structure::Pid(_) | Structure::Cascade(_));
-    if !placed && !matches!(design.structure, Structure::StateFeedback(_)) {
+    let tuned_by = design.structure.tunable().tuned_by();
+    let placed = tuned_by == TunedBy::Bandwidth;
+    if tuned_by == TunedBy::Nothing {
         return Err(field
             .fail(format!("the gains of {} cannot be tuned", design.structure.name()))
-            .allowed("a controller with pid, cascade or state_feedback"));
+            .allowed(format!("a controller with {}", tunable())));
     }
     let default = Tuning::default();
     let words = [
@@ -164,6 +165,20 @@ pub(super) fn tuning(
         draws: None,
         effort: default.effort,
     }))
+}
+
+/// The structures whose gains can be tuned, in words.
+fn tunable() -> String {
+    let all: Vec<&str> = Structure::each()
+        .iter()
+        .map(Structure::tunable)
+        .filter(|one| one.tuned_by() != TunedBy::Nothing)
+        .map(Tunable::word)
+        .collect();
+    match &all[..] {
+        [first @ .., last] if !first.is_empty() => format!("{} or {last}", first.join(", ")),
+        _ => all.concat(),
+    }
 }
 
 /// The table that a fit leaves behind.

@@ -2,9 +2,14 @@
 
 use super::machines::{Commands, commands, noisy, observed, pulse, ways};
 use super::tools::{are_there, doubles, file, run, taut, write_doubles};
+use nalgebra::Complex;
+use std::f64::consts::PI;
 use std::fs;
 use std::path::Path;
 use taut::case::Case;
+use taut::control::feedback::Feedback;
+use taut::control::{Controller, Observation, Standard};
+use taut::signal::profile::Reference;
 use tempfile::TempDir;
 
 /// Warnings that every compiler is asked for.
@@ -177,6 +182,67 @@ fn the_controller_replays_moves_bit_for_bit() {
             let first = seen.iter().zip(&given).position(|((_, own), other)| own.to_bits() != other.to_bits());
             if let Some(k) = first {
                 panic!("{name}, move {which}: sample {k} is {:e} and not {:e}", given[k], seen[k].1);
+            }
+        }
+    }
+}
+
+/// Samples that an impulse is followed for.
+const SAMPLES: usize = 6000;
+
+/// Every controller in three ways, which come from one text: as it runs, as C, bit for bit the same, and as margins see
+/// it. What an impulse of a measurement makes of the command has the response of the linear view at a grid of frequencies;
+/// of a controller that is not linear an impulse small enough does, from rest.
+#[test]
+fn a_controller_that_runs_is_its_program_and_its_margins() {
+    if !are_there(&["gcc"]) {
+        return;
+    }
+    for name in CONTROLLERS {
+        let case = Case::read(controller(name)).unwrap();
+        let design = case.controller.as_ref().unwrap();
+        let feedback = Feedback::new(design, &case.machine).unwrap();
+        let (size, bound) = if feedback.is_linear() { (1e-5, 1e-6) } else { (1e-8, 1e-4) };
+        let folder = exported(&controller(name), &[], &["--part", "controller"]);
+        let commands = |impulse: Option<usize>| {
+            let mut seen = vec![[0.0; 12]; SAMPLES];
+            impulse.into_iter().for_each(|input| seen[1][input] = size);
+            let mut own = Standard::new(design, &case.machine).unwrap();
+            let still = Reference::default();
+            let step = |all: &[f64; 12]| {
+                let (position, current) = (all[10], all[11]);
+                let seen = Observation { time: 0.0, reference: still, ahead: still, position, scale: None, current };
+                let asked = own.step(&seen);
+                let given = design.limit.map_or(asked, |limit| asked.clamp(-limit, limit));
+                own.limited(given);
+                given
+            };
+            let given: Vec<f64> = seen.iter().map(step).collect();
+            write_doubles(&folder.path().join("in.bin"), seen.iter().flatten().copied());
+            run_here(folder.path(), "control.c", &[]);
+            let written = doubles(&folder.path().join("out.bin"));
+            let first = given.iter().zip(&written).position(|(own, other)| own.to_bits() != other.to_bits());
+            assert_eq!((first, written.len()), (None, SAMPLES), "{name}");
+            given
+        };
+        let still = commands(None);
+        let inputs = [(10, true), (11, feedback.uses_current())];
+        for (input, _) in inputs.into_iter().filter(|(_, is_used)| *is_used) {
+            let pushed = commands(Some(input));
+            let mut answer: Vec<f64> = pushed.iter().zip(&still).map(|(a, b)| (a - b) / size).collect();
+            // Differences of differences end, whatever two integrals keep.
+            for _ in 0..2 {
+                answer = (0..SAMPLES).map(|k| answer[k] - if k > 0 { answer[k - 1] } else { 0.0 }).collect();
+            }
+            for hertz in [0.7, 2.0, 5.0, 11.0, 23.0, 47.0, 90.0, 180.0, 310.0, 460.0] {
+                let theta = 2.0 * PI * hertz * design.every;
+                let back = |k: f64| Complex::new(0.0, -theta * k).exp();
+                let sum: Complex<f64> = answer.iter().enumerate().map(|(k, h)| back(k as f64 - 1.0) * *h).sum();
+                let found = sum / (Complex::new(1.0, 0.0) - back(1.0)).powi(2);
+                let terms = feedback.at(2.0 * PI * hertz);
+                let told = -if input == 10 { terms.position } else { terms.current } / terms.own;
+                let apart = (found - told).norm() / told.norm();
+                assert!(apart < bound, "{name}, input {input} at {hertz} Hz: {found} and {told}, {apart:.1e} apart");
             }
         }
     }

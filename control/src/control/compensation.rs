@@ -1,17 +1,26 @@
 //! Feed-forward from the reference alone: the command for an axis of one mass, and for one whose belt stretches.
 
+use crate::calculator::{Calculator, Run, less, more};
 use crate::design::{FeedForward, FeedForwardModel};
-use crate::machine::rigid::{REST_ACCELERATION, REST_SPEED, Rigid};
+use crate::machine::rigid::{REST_ACCELERATION, REST_SPEED, Rigid, side};
 use crate::machine::{BeltModel, EncoderPlace, Machine};
 use crate::signal::profile::Reference;
 
 /// Direction in which the axis moves, or is about to move: 1, −1 or 0.
 pub fn direction(reference: &Reference) -> f64 {
-    let sign = |value: f64, rest: f64| if value.abs() > rest { value.signum() } else { 0.0 };
-    match sign(reference.speed, REST_SPEED) {
-        0.0 => sign(reference.acceleration, REST_ACCELERATION),
-        sign => sign,
-    }
+    direction_by(&mut Run::plain(), reference)
+}
+
+/// The same by any calculator.
+pub fn direction_by<C: Calculator>(c: &mut C, reference: &Reference<C::N>) -> C::N {
+    let [forward, backward, none] = [1.0, -1.0, 0.0].map(|sign| c.number(sign));
+    let mut sign = |of: C::N, rest: f64, or: C::N| {
+        let or = c.choose(less(of, -rest), backward, or);
+        c.choose(more(of, rest), forward, or)
+    };
+    let leaving = sign(reference.acceleration, REST_ACCELERATION, none);
+    let way = sign(reference.speed, REST_SPEED, leaving);
+    c.name("way", way)
 }
 
 /// Feed-forward, and the reference for what the encoder sees.
@@ -30,15 +39,15 @@ pub struct Compensation {
 /// Pulleys that make the cart follow its reference: y₁ = r φ₁ and y₃ = r φ₃, and the force that the motor needs at the
 /// belt.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Needed {
+pub struct Needed<N = f64> {
     /// Drive pulley.
-    pub drive: Reference,
+    pub drive: Reference<N>,
     /// Idler pulley, position and speed.
-    pub idler: [f64; 2],
+    pub idler: [N; 2],
     /// N; and its rate, N/s.
-    pub force: [f64; 2],
+    pub force: [N; 2],
     /// Forces in the three spans of an elastic belt, counted from the pretension, N; zero for other belts.
-    pub spans: [f64; 3],
+    pub spans: [N; 3],
 }
 
 impl Compensation {
@@ -57,111 +66,143 @@ impl Compensation {
     /// The motion of the pulleys with which the cart follows `y`: quasi-static in the idler's own swing, exact
     /// otherwise.
     pub fn needed(&self, y: &Reference) -> Needed {
+        self.needed_by(&mut Run::plain(), y)
+    }
+
+    /// The same by any calculator.
+    pub fn needed_by<C: Calculator>(&self, c: &mut C, y: &Reference<C::N>) -> Needed<C::N> {
         let machine = &self.machine;
-        let (r, sign) = (machine.pulley_radius, direction(y));
-        let forward = sign >= 0.0;
+        let (r, sign) = (machine.pulley_radius, direction_by(c, y));
         let &Reference { position, speed, acceleration, jerk, snap } = y;
         let [k1, k2] = match (machine.belt.make, machine.belt.follows_cart) {
-            (Some(make), true) => make.stiffness_at(position),
-            _ => [machine.belt.stiffness[0], machine.belt.stiffness[1]],
+            (Some(make), true) => {
+                // k₁ = A E/(l₁ − x), k₂ = A E/(l₂ + x)
+                let (rigidity, [l1, l2, _]) = (make.rigidity(), make.spans.three());
+                let [rigidity, l1, l2] = [rigidity, l1, l2].map(|value| c.number(value));
+                [c.name("k1", rigidity / (l1 - position)), c.name("k2", rigidity / (l2 + position))]
+            }
+            _ => [machine.belt.stiffness[0], machine.belt.stiffness[1]].map(|k| c.number(k)),
         };
-        let k3 = machine.belt.stiffness[2];
+        let k3 = c.number(machine.belt.stiffness[2]);
+        let mut both = |of: [f64; 2]| side(c, sign, of);
+        let cart = [machine.cart.friction.forward, machine.cart.friction.backward];
+        let (cart_b, cart_c) = (both(cart.map(|side| side.viscous)), both(cart.map(|side| side.coulomb)));
+        let idler = [machine.idler_pulley.friction.forward, machine.idler_pulley.friction.backward];
+        let (idler_b, idler_c) = (both(idler.map(|side| side.viscous)), both(idler.map(|side| side.coulomb)));
+        let drive = [machine.drive_pulley.friction.forward, machine.drive_pulley.friction.backward];
+        let (drive_b, drive_c) = (both(drive.map(|side| side.viscous / (r * r))), both(drive.map(|side| side.coulomb)));
         // L = f₁ − f₂ = M y″ + b y′ + F_c sgn y′ − F                             (17)
-        let (mass, cart) = (machine.cart.mass, machine.cart.friction.side(forward));
+        let mass = machine.cart.mass;
         let load = [
-            mass * acceleration + cart.viscous * speed + cart.coulomb * sign - machine.cart.constant_force(),
-            mass * jerk + cart.viscous * acceleration,
-            mass * snap + cart.viscous * jerk,
-        ];
+            acceleration * mass + cart_b * speed + cart_c * sign - machine.cart.constant_force(),
+            jerk * mass + cart_b * acceleration,
+            snap * mass + cart_b * jerk,
+        ]
+        .map(|load| c.name("load", load));
         // P = f₂ − f₃ = (J₂ y″/r + B₂ y′/r + τ_c2 sgn y′)/r                      (18)
-        let (inertia, idler) = (machine.idler_pulley.inertia, machine.idler_pulley.friction.side(forward));
+        let inertia = machine.idler_pulley.inertia;
         let pull = [
-            (inertia * acceleration / r + idler.viscous * speed / r + idler.coulomb * sign) / r,
-            (inertia * jerk / r + idler.viscous * acceleration / r) / r,
-            (inertia * snap / r + idler.viscous * jerk / r) / r,
-        ];
+            (acceleration * inertia / r + idler_b * speed / r + idler_c * sign) / r,
+            (jerk * inertia / r + idler_b * acceleration / r) / r,
+            (snap * inertia / r + idler_b * jerk / r) / r,
+        ]
+        .map(|pull| c.name("pull", pull));
         // With y₃ − y = (k₃ (y₁ − y) − P)/(k₂ + k₃):  y₁ − y = (L + k₂ P/(k₂ + k₃))/k,  k = k₁ + k₂ k₃/(k₂ + k₃)
-        let (share, k) = (k2 / (k2 + k3), k1 + k2 * k3 / (k2 + k3));
-        let stretch: [f64; 3] = std::array::from_fn(|j| match machine.belt.model {
-            BeltModel::Elastic => (load[j] + share * pull[j]) / k,
-            BeltModel::TwoMass => load[j] / k,
-            BeltModel::Rigid => 0.0,
+        let share = c.name("share_of_k2", k2 / (k2 + k3));
+        let k = c.name("k", k1 + k2 * k3 / (k2 + k3));
+        let stretch: [C::N; 3] = std::array::from_fn(|j| {
+            let stretch = match machine.belt.model {
+                BeltModel::Elastic => (load[j] + share * pull[j]) / k,
+                BeltModel::TwoMass => load[j] / k,
+                BeltModel::Rigid => c.number(0.0),
+            };
+            c.name("stretch", stretch)
         });
-        let behind: [f64; 2] = std::array::from_fn(|j| match machine.belt.model {
-            BeltModel::Elastic => (k3 * stretch[j] - pull[j]) / (k2 + k3),
-            _ => stretch[j],
+        let behind: [C::N; 2] = std::array::from_fn(|j| match machine.belt.model {
+            BeltModel::Elastic => {
+                let behind = (k3 * stretch[j] - pull[j]) / (k2 + k3);
+                c.name("behind", behind)
+            }
+            BeltModel::TwoMass | BeltModel::Rigid => stretch[j],
         });
         let drive = Reference {
-            position: position + stretch[0],
-            speed: speed + stretch[1],
-            acceleration: acceleration + stretch[2],
+            position: c.name("drive_position", position + stretch[0]),
+            speed: c.name("drive_speed", speed + stretch[1]),
+            acceleration: c.name("drive_acceleration", acceleration + stretch[2]),
             ..*y
         };
         // τ/r = ((J₁ + n² J_r) y₁″ + B₁ y₁′)/r² + τ_c1 sgn y′/r + L + P           (16)
         let n = machine.drives[0].motor.gear_ratio;
         let own = (machine.drive_pulley.inertia + n * n * machine.drives[0].motor.rotor_inertia) / (r * r);
-        let side = machine.drive_pulley.friction.side(forward);
-        let viscous = side.viscous / (r * r);
-        let force = own * drive.acceleration + viscous * drive.speed + side.coulomb * sign / r + load[0] + pull[0];
-        let rate = own * jerk + viscous * drive.acceleration + load[1] + pull[1];
+        let force = drive.acceleration * own + drive_b * drive.speed + drive_c * sign / r + load[0] + pull[0];
+        let rate = jerk * own + drive_b * drive.acceleration + load[1] + pull[1];
         // f₁ = k₁ (y₁ − y),  f₂ = k₂ (y − y₃),  f₃ = k₃ (y₃ − y₁)
         let spans = match machine.belt.model {
             BeltModel::Elastic => [k1 * stretch[0], -k2 * behind[0], k3 * (behind[0] - stretch[0])],
-            BeltModel::TwoMass | BeltModel::Rigid => [0.0; 3],
+            BeltModel::TwoMass | BeltModel::Rigid => [c.number(0.0); 3],
         };
-        Needed { drive, idler: [position + behind[0], speed + behind[1]], force: [force, rate], spans }
+        let force = [c.name("push", force), c.name("push_rate", rate)];
+        Needed { drive, idler: [position + behind[0], speed + behind[1]], force, spans }
     }
 
     /// Where the encoder's side should be, so that the cart is where it should.
-    pub fn target(&self, y: &Reference) -> Reference {
+    pub fn target<C: Calculator>(&self, c: &mut C, y: &Reference<C::N>) -> Reference<C::N> {
         if !(self.settings.compensate_stretch && self.before_belt) {
             return *y;
         }
-        let needed = self.needed(y);
+        let needed = self.needed_by(c, y);
         let mut target = needed.drive;
         if let Some(play) = self.machine.drives[0].motor.gear_play.filter(|_| self.before_gear) {
             // The twist of the gear: T/k_g, and half the play.
-            let (r, sign) = (self.machine.pulley_radius, direction(y));
-            let torque = r * needed.force[0] - self.rotor(needed.drive.acceleration);
-            target.position += r * (torque / play.stiffness + 0.5 * play.backlash * sign);
+            let (r, sign) = (self.machine.pulley_radius, direction_by(c, y));
+            let torque = needed.force[0] * r - self.rotor(needed.drive.acceleration);
+            let twist = (torque / play.stiffness + sign * (0.5 * play.backlash)) * r;
+            target.position = c.name("target", target.position + twist);
         }
         target
     }
 
     /// Torque that the rotor itself takes at the pulley, N m.
-    fn rotor(&self, acceleration: f64) -> f64 {
+    fn rotor<N: crate::calculator::Number>(&self, acceleration: N) -> N {
         let n = self.machine.drives[0].motor.gear_ratio;
-        n * n * self.machine.drives[0].motor.rotor_inertia * acceleration / self.machine.pulley_radius
+        acceleration * (n * n * self.machine.drives[0].motor.rotor_inertia) / self.machine.pulley_radius
     }
 
-    /// The command that the reference asks for, V or A.
-    pub fn command(&self, y: &Reference) -> f64 {
+    /// The command that the reference asks for, V or A; none without feed-forward.
+    pub fn command<C: Calculator>(&self, c: &mut C, y: &Reference<C::N>) -> Option<C::N> {
         let (rigid, settings) = (&self.rigid, &self.settings);
-        let sign = direction(y);
-        let (viscous, dry) = rigid.friction(y.speed, sign);
         match settings.model {
-            FeedForwardModel::None => 0.0,
+            FeedForwardModel::None => None,
             // F = M y″ + b y′ + F_c sgn y′
             FeedForwardModel::Rigid => {
-                let force = settings.inertia * rigid.mass * y.acceleration + settings.friction * (viscous + dry)
-                    - rigid.constant;
-                let rate = settings.inertia * rigid.mass * y.jerk;
-                rigid.command(force, rate, y.speed)
+                let (viscous, dry) = self.friction(c, y);
+                let mass = settings.inertia * rigid.mass;
+                let force = y.acceleration * mass + (viscous + dry) * settings.friction - rigid.constant;
+                let command = rigid.command_by(c, force, y.jerk * mass, y.speed);
+                Some(c.name("forward", command))
             }
             FeedForwardModel::Elastic => {
-                let needed = self.needed(y);
+                let needed = self.needed_by(c, y);
                 let [force, rate] = needed.force;
-                let less = (1.0 - settings.friction) * (viscous + dry)
-                    + (1.0 - settings.inertia) * rigid.mass * needed.drive.acceleration;
-                rigid.command(force - less, rate, needed.drive.speed)
+                let (viscous, dry) = self.friction(c, y);
+                let less = (viscous + dry) * (1.0 - settings.friction)
+                    + needed.drive.acceleration * ((1.0 - settings.inertia) * rigid.mass);
+                let command = rigid.command_by(c, force - less, rate, needed.drive.speed);
+                Some(c.name("forward", command))
             }
         }
     }
 
+    /// Friction of the axis on its way, its viscous and its dry part, N.
+    fn friction<C: Calculator>(&self, c: &mut C, y: &Reference<C::N>) -> (C::N, C::N) {
+        let sign = direction_by(c, y);
+        self.rigid.friction_by(c, y.speed, sign)
+    }
+
     /// The part of friction that does not grow with speed, as a command, V or A: what a linear model does not know.
-    pub fn dry(&self, y: &Reference) -> f64 {
-        let (_, dry) = self.rigid.friction(0.0, direction(y));
-        (dry - self.rigid.constant) / self.rigid.force_per_command()
+    pub fn dry<C: Calculator>(&self, c: &mut C, y: &Reference<C::N>) -> C::N {
+        let (_, dry) = self.friction(c, y);
+        c.name("dry", (dry - self.rigid.constant) / self.rigid.force_per_command())
     }
 }
 
@@ -178,6 +219,7 @@ mod tests {
         let case = Case::read(folder.join("pid-elastic.toml")).unwrap();
         let mut machine = case.machine.clone();
         (machine.drives[0].motor.gear_efficiency, machine.cart.load) = (0.8, 3.0);
+        let run = &mut Run::plain();
         let mut number = 1_u64;
         let mut noise = |size: f64| {
             number = number.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
@@ -188,8 +230,8 @@ mod tests {
                 FeedForward { model, compensate_stretch: true, ..case.controller.as_ref().unwrap().feed_forward };
             let compensation = Compensation::new(&machine, &settings);
             let still = Reference { position: 0.1, ..Reference::default() };
-            let [command, dry] = [compensation.command(&still), compensation.dry(&still)];
-            let target = compensation.target(&still).position;
+            let [command, dry] = [compensation.command(run, &still).unwrap(), compensation.dry(run, &still)];
+            let target = compensation.target(run, &still).position;
             // The pulley is quicker than the cart by the rate of the stretch, some 1e-8 m/s here.
             for size in [1.9e-16, 1e-12, 1e-9, 0.9] {
                 for _ in 0..100 {
@@ -197,11 +239,11 @@ mod tests {
                     let acceleration = noise(size * REST_ACCELERATION);
                     let y = Reference { speed, acceleration, ..still };
                     assert_eq!(direction(&y), 0.0);
-                    assert_eq!(compensation.dry(&y), dry);
+                    assert_eq!(compensation.dry(run, &y), dry);
                     // The noise itself goes through inertia and viscous friction, a few grams and N s/m.
                     let most = size * 1e-2 * compensation.rigid.command(1.0, 0.0, 0.0);
-                    assert!((compensation.command(&y) - command).abs() <= most + 1e-12, "{y:?}");
-                    assert!((compensation.target(&y).position - target).abs() <= size * 1e-6 + 1e-15, "{y:?}");
+                    assert!((compensation.command(run, &y).unwrap() - command).abs() <= most + 1e-12, "{y:?}");
+                    assert!((compensation.target(run, &y).position - target).abs() <= size * 1e-6 + 1e-15, "{y:?}");
                 }
             }
             // Ten times as much is a direction.
@@ -210,7 +252,7 @@ mod tests {
                 assert_eq!(direction(&moving), sign);
                 let leaving = Reference { acceleration: 10.0 * sign * REST_ACCELERATION, ..still };
                 assert_eq!(direction(&leaving), sign);
-                assert!((compensation.dry(&leaving) - dry).abs() > 0.01);
+                assert!((compensation.dry(run, &leaving) - dry).abs() > 0.01);
             }
         }
     }

@@ -1,41 +1,61 @@
 //! A controller as a linear filter of what it measures, for margins and stability: within its limit, without reference
 //! and counts.
+//!
+//! The slopes of its text at rest, by dual numbers, are s⁺ = A s + B (y, x, i, u), and C s + D (y, x, i, u) for the
+//! command that it asks for, u being the command that the axis gets. States stand in the order in which they depend on
+//! each other; those that depend on each other in circles are turned so that A is lower triangular but for a pair of rows
+//! for each two complex poles (Schur's real form). An integral stays as it is: its A − 1 is exactly zero, and z − 1 is
+//! known without the loss of a difference.
 
 use super::filter::Biquad;
-use super::observer::DisturbanceState;
-use super::standard::observed;
-use super::state_feedback::{Law, StateFeedbackState};
-use crate::design::{Cascade, Design, Pid, Structure};
-use crate::error::{Error, Result};
+use super::law::Law;
+use super::sampled::Observation;
+use super::standard::Text;
+use crate::calculator::{Dual, Run, Slope};
+use crate::design::Design;
+use crate::error::Result;
 use crate::machine::Machine;
-use crate::machine::rigid::Rigid;
-use nalgebra::{Complex, DMatrix, DVector, Schur};
-use std::f64::consts::PI;
+use crate::signal::profile::Reference;
+use nalgebra::{Complex, DMatrix, Schur};
 
-/// Steps of the QR algorithm that Schur's form of an estimate may take: a few for each state do.
+/// Steps of the QR algorithm that Schur's form of states in a circle may take: a few for each state do.
 const TURNS: usize = 1000;
+
+/// By how much a pole has to be outside of the unit circle to count.
+const OUTSIDE: f64 = 1e-9;
+
+/// What a controller is told: encoder, scale, current, and the command that the axis gets.
+const INPUTS: usize = 4;
+const SCALE: usize = 1;
+const CURRENT: usize = 2;
+const COMMAND: usize = 3;
 
 /// The controller of a design as D u = −(N_y y + N_x x + N_i i), with y the measured position, x the cart on a scale
 /// beside that and i the measured current at a sample.
 #[derive(Debug, Clone)]
 pub struct Feedback {
     every: f64,
-    core: Core,
-    filters: Vec<Biquad>,
-    observer: Option<DisturbanceState>,
-    /// Whether there is a scale, and what the observer sees of encoder and scale.
-    has_scale: bool,
-    weights: [f64; 2],
+    /// The states, the last of which depend on those before.
+    parts: Vec<Part>,
+    /// C.
+    row: Vec<f64>,
+    /// B, state by state, and D.
+    inputs: Vec<[f64; INPUTS]>,
+    direct: [f64; INPUTS],
+    corners: Vec<f64>,
+    is_linear: bool,
 }
 
+/// The rows of A − I of one pole, or of two complex ones: the block on the diagonal, and the states before that it depends
+/// on, with how.
 #[derive(Debug, Clone)]
-enum Core {
-    Pid(Pid),
-    Cascade(Cascade),
-    StateFeedback(Box<Observed>),
+enum Part {
+    One { pole: f64, of: Vec<(usize, f64)> },
+    Two { block: [[f64; 2]; 2], of: Vec<(usize, [f64; 2])> },
 }
 
-/// N_y, N_x, N_i and D at one frequency. D has no poles but stable ones: unstable controllers show as zeros of it.
+/// N_y, N_x, N_i and D at one frequency, over poles of the controller of which [`Feedback::unstable`] are outside of the
+/// unit circle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Terms {
     /// N_y, V/m or A/m.
@@ -73,27 +93,26 @@ impl Turn {
 }
 
 impl Feedback {
-    /// That of a design for a model of the axis; fails for structures that are not linear.
+    /// That of a design for a model of the axis.
     pub fn new(design: &Design, model: &Machine) -> Result<Self> {
-        let core = match &design.structure {
-            Structure::Pid(gains) => Core::Pid(*gains),
-            Structure::Cascade(gains) => Core::Cascade(*gains),
-            Structure::StateFeedback(weights) => {
-                let state = StateFeedbackState::new(weights, model, design)?;
-                Core::StateFeedback(Box::new(Observed::of(state.law())))
-            }
-            other => {
-                return Err(Error::new(format!("{} is no linear controller: it has no margins", other.name()))
-                    .allowed("pid, cascade and state_feedback"));
-            }
-        };
-        let observer = match design.disturbance_observer {
-            None => None,
-            Some(observer) => DisturbanceState::new(observer.bandwidth, &Rigid::of(model), design.every),
-        };
-        let filters = design.filters.iter().map(|filter| Biquad::new(filter, design.every)).collect();
-        let weights = observed(model, &Rigid::of(model));
-        Ok(Self { every: design.every, core, filters, observer, has_scale: model.scale.is_some(), weights })
+        let text = Text::new(design, model)?;
+        let mut system = System::of(&text, model.scale.is_some());
+        system.reduce();
+        let parts = system.order();
+        Ok(Self {
+            every: design.every,
+            parts,
+            row: system.c.iter().copied().collect(),
+            inputs: (0..system.b.nrows()).map(|i| std::array::from_fn(|k| system.b[(i, k)])).collect(),
+            direct: system.d,
+            corners: text.filters.iter().map(|filter: &Biquad| filter.frequency(design.every)).collect(),
+            is_linear: text.law.is_linear(),
+        })
+    }
+
+    /// Whether it is linear but for its limit; what is told of another holds for small motions about rest.
+    pub fn is_linear(&self) -> bool {
+        self.is_linear
     }
 
     /// At z = e^{jωT}; ω in rad/s, above zero.
@@ -102,194 +121,281 @@ impl Feedback {
     }
 
     /// The same where what belongs to the frequency is known already.
-    pub fn at_turn(&self, &Turn { z, change }: &Turn) -> Terms {
-        let t = self.every;
-        let one = Complex::new(1.0, 0.0);
-        let filter = self.filters.iter().fold(one, |product, filter| product * filter.at(z));
-        let zero = Complex::ZERO;
-        let (position, scale, current, own) = match &self.core {
-            Core::Pid(gains) => (pid(gains, t, z, change), zero, zero, (one, zero)),
-            Core::Cascade(gains) => {
-                let ([speed, position], current) = cascade(gains, t, z, change);
-                match self.has_scale {
-                    true => (speed, position, current, (one, zero)),
-                    false => (speed + position, zero, current, (one, zero)),
-                }
+    pub fn at_turn(&self, turn: &Turn) -> Terms {
+        let mut sums = self.direct.map(|direct| Complex::new(direct, 0.0));
+        self.resolve(turn.change, &mut |state, value| {
+            for (sum, input) in sums.iter_mut().zip(&self.inputs[state]) {
+                *sum += value * *input;
             }
-            Core::StateFeedback(observed) => {
-                let ([position, scale], delayed, input) = observed.at(z, change);
-                (position, scale, zero, (delayed, input))
+        });
+        // u = H_y y + H_x x + H_i i + H_u u
+        let [position, scale, current, command] = sums;
+        Terms { position: -position, scale: -scale, current: -current, own: -command + 1.0 }
+    }
+
+    /// The row C (z I − A)⁻¹, state by state from the last one on; no numbers on a pole.
+    fn resolve(&self, change: Complex<f64>, each: &mut impl FnMut(usize, Complex<f64>)) {
+        const FEW: usize = 24;
+        let mut few = [Complex::ZERO; FEW];
+        let mut many = Vec::new();
+        let n = self.row.len();
+        let row = match few.get_mut(..n) {
+            Some(few) => few,
+            None => {
+                many.resize(n, Complex::ZERO);
+                &mut many[..]
             }
         };
-        // w = W_u u + W_y (a y + b x), and u = H v − w with v D₀ = −(N_y y + N_x x + N_i i + N_u u)
-        let [on_command, on_position] = self.observer.as_ref().map_or([zero; 2], |observer| observer.at(z));
-        let (delayed, input) = own;
-        let [encoder, cart] = self.weights.map(|weight| delayed * on_position * weight);
-        Terms {
-            position: filter * position + encoder,
-            scale: filter * scale + cart,
-            current: filter * current,
-            own: delayed * (one + on_command) + filter * input,
-        }
-    }
-
-    /// True if it uses the scale beside the encoder: N_x is not zero.
-    pub fn uses_scale(&self) -> bool {
-        self.has_scale && (!matches!(self.core, Core::Pid(_)) || self.observer.is_some())
-    }
-
-    /// True if it closes a current loop: N_i is not zero.
-    pub fn uses_current(&self) -> bool {
-        matches!(&self.core, Core::Cascade(Cascade { current: Some(_), .. }))
-    }
-
-    /// Frequencies at which it changes quickly, rad/s.
-    pub fn corners(&self) -> Vec<f64> {
-        self.filters.iter().map(|filter| filter.frequency(self.every)).collect()
-    }
-}
-
-/// K_p + K_i T z/(z − 1) + K_d (z − 1)/(T_f (z − 1) + T z), backward differences
-fn pid(gains: &Pid, t: f64, z: Complex<f64>, change: Complex<f64>) -> Complex<f64> {
-    let time = 1.0 / (2.0 * PI * gains.filter);
-    let slope = change / (change * time + z * t);
-    let integral = if gains.integral == 0.0 { Complex::ZERO } else { z * (gains.integral * t) / change };
-    slope * gains.derivative + integral + gains.proportional
-}
-
-/// (K_s + K_si T z/(z − 1)) times V(z), the filtered difference, and times K_v; with a current loop that times its own
-/// controller.
-fn cascade(gains: &Cascade, t: f64, z: Complex<f64>, change: Complex<f64>) -> ([Complex<f64>; 2], Complex<f64>) {
-    let summed = |proportional: f64, integral: f64| match integral {
-        0.0 => Complex::new(proportional, 0.0),
-        _ => z * (integral * t) / change + proportional,
-    };
-    let keep = (-2.0 * PI * gains.filter * t).exp();
-    // v = (1 − a) z/(z − a) · (1 − 1/z)/T y
-    let speed = change * ((1.0 - keep) / t) / (z - keep);
-    let outer = summed(gains.speed, gains.speed_integral);
-    let outer = [outer * speed, outer * gains.position];
-    match gains.current {
-        None => (outer, Complex::ZERO),
-        Some(inner) => {
-            let inner = summed(inner.proportional, inner.integral);
-            (outer.map(|outer| outer * inner), inner)
-        }
-    }
-}
-
-/// The Kalman filter and the regulator as a filter of what is measured, from [`Law`], in coordinates in which the
-/// resolvent of the estimate costs least: (Φ C)ᵀ = Q T Qᵀ, T upper triangular but for a pair of rows for each two complex
-/// poles (Schur's real form).
-#[derive(Debug, Clone)]
-struct Observed {
-    law: Law,
-    /// T, by its poles or pairs of them; of the estimate from one sample to the next, C = Π (I − L_i m_i).
-    estimate: Vec<Part>,
-    /// Qᵀ Cᵀ k, of the estimate before a sample to the command.
-    row: DVector<f64>,
-    /// Of encoder and scale: Qᵀ Φ G, of the measured position to the estimate, and k G, straight to the command; G_i =
-    /// Π_{j>i} (I − L_j m_j) L_i.
-    sensors: Vec<(DVector<f64>, f64)>,
-    /// Qᵀ Γ₀ and Qᵀ Γ₁, of commands.
-    now: DVector<f64>,
-    before: DVector<f64>,
-}
-
-/// The column of T of a pole, or both columns of two complex ones, as far as above the block on the diagonal.
-#[derive(Debug, Clone)]
-enum Part {
-    One { pole: f64, above: Vec<f64> },
-    Two { block: [[f64; 2]; 2], above: Vec<[f64; 2]> },
-}
-
-impl Observed {
-    fn of(law: &Law) -> Self {
-        let n = law.phi.nrows();
-        let own = law.gain.rows(0, n);
-        let mut corrected = DMatrix::identity(n, n);
-        let mut gains: Vec<DVector<f64>> = Vec::new();
-        for sensor in &law.sensors {
-            let correct = DMatrix::identity(n, n) - &sensor.kalman * sensor.measured.transpose();
-            gains.iter_mut().for_each(|gain| *gain = &correct * &*gain);
-            gains.push(sensor.kalman.clone());
-            corrected = correct * corrected;
-        }
-        let turned = Schur::try_new((&law.phi * &corrected).transpose(), f64::EPSILON, TURNS);
-        // What has no numbers answers with none.
-        let none = || (DMatrix::identity(n, n), DMatrix::from_element(n, n, f64::NAN));
-        let (q, t) = turned.map_or_else(none, Schur::unpack);
-        let mut estimate = Vec::new();
-        let mut i = 0;
-        while i < n {
-            if i + 1 < n && t[(i + 1, i)] != 0.0 {
-                let block = [[t[(i, i)], t[(i, i + 1)]], [t[(i + 1, i)], t[(i + 1, i + 1)]]];
-                estimate.push(Part::Two { block, above: (0..i).map(|k| [t[(k, i)], t[(k, i + 1)]]).collect() });
-                i += 2;
-            } else {
-                estimate.push(Part::One { pole: t[(i, i)], above: (0..i).map(|k| t[(k, i)]).collect() });
-                i += 1;
-            }
-        }
-        Self {
-            estimate,
-            row: q.tr_mul(&corrected.tr_mul(&own)),
-            sensors: gains.iter().map(|gain| (q.tr_mul(&(&law.phi * gain)), own.dot(gain))).collect(),
-            now: q.tr_mul(&law.now),
-            before: q.tr_mul(&law.before),
-            law: law.clone(),
-        }
-    }
-
-    /// N_y and N_x, D₀ and N_u of the command before filters: v D₀ = −(N_y y + N_x x + N_u u).
-    fn at(&self, z: Complex<f64>, change: Complex<f64>) -> ([Complex<f64>; 2], Complex<f64>, Complex<f64>) {
-        let law = &self.law;
-        let n = self.row.len();
-        let inverse = z.inv();
-        // x̂⁺ = C x̂ + G y,  z x̂ = Φ x̂⁺ + Γ₀ z^{−d} u + Γ₁ z^{−d−1} u
-        let lag = inverse.powi(law.lag() as i32);
-        // kᵀ C (z I − Φ C)⁻¹, a row for all that it is asked of
-        let row = self.resolved(z);
-        let seen = |from: &DVector<f64>| row.iter().zip(from).map(|(row, from)| row * *from).sum::<Complex<f64>>();
-        let mut positions = [Complex::ZERO; 2];
-        for (position, (corrected, direct)) in positions.iter_mut().zip(&self.sensors) {
-            *position = seen(corrected) + *direct;
-        }
-        if let Some(integral) = law.integral() {
-            positions[self.sensors.len().min(2) - 1] += Complex::new(integral * law.every, 0.0) / change;
-        }
-        let mut delayed = Complex::new(1.0, 0.0);
-        for i in 0..law.pending {
-            delayed += inverse.powi(i as i32 + 1) * law.gain[n + i];
-        }
-        (positions, delayed, lag * (seen(&self.now) + inverse * seen(&self.before)))
-    }
-
-    /// The row kᵀ C times the resolvent of the estimate; no numbers on a pole.
-    fn resolved(&self, z: Complex<f64>) -> Vec<Complex<f64>> {
-        let mut row: Vec<Complex<f64>> = self.row.iter().map(|v| Complex::new(*v, 0.0)).collect();
-        let mut end = row.len();
-        for part in self.estimate.iter().rev() {
+        row.iter_mut().zip(&self.row).for_each(|(row, c)| row.re = *c);
+        let mut end = n;
+        for part in self.parts.iter().rev() {
             match part {
-                Part::One { pole, above } => {
-                    let (before, own) = row[..end].split_at_mut(end - 1);
-                    let x = own[0] / (z - pole);
-                    own[0] = x;
-                    before.iter_mut().zip(above).for_each(|(row, t)| *row += x * *t);
+                Part::One { pole, of } => {
+                    let x = row[end - 1] / (change - pole);
+                    of.iter().for_each(|&(j, a)| row[j] += x * a);
+                    each(end - 1, x);
                     end -= 1;
                 }
-                Part::Two { block: [[a, b], [c, d]], above } => {
-                    let (before, own) = row[..end].split_at_mut(end - 2);
+                Part::Two { block: [[a, b], [c, d]], of } => {
+                    let (first, second) = (row[end - 2], row[end - 1]);
                     // (z I − block)⁻¹ by its adjugate
-                    let scale = ((z - a) * (z - d) - b * c).inv();
-                    let x = ((z - d) * own[0] + own[1] * *b) * scale;
-                    let y = (own[0] * *c + (z - a) * own[1]) * scale;
-                    own.copy_from_slice(&[x, y]);
-                    before.iter_mut().zip(above).for_each(|(row, [s, t])| *row += x * *s + y * *t);
+                    let scale = ((change - a) * (change - d) - b * c).inv();
+                    let x = ((change - d) * first + second * *c) * scale;
+                    let y = (first * *b + (change - a) * second) * scale;
+                    of.iter().for_each(|&(j, [s, t])| row[j] += x * s + y * t);
+                    each(end - 2, x);
+                    each(end - 1, y);
                     end -= 2;
                 }
             }
         }
-        row
     }
+
+    /// Poles outside of the unit circle.
+    pub fn unstable(&self) -> usize {
+        let is_outside = |size: f64| size > 1.0 + OUTSIDE;
+        let of = |part: &Part| match part {
+            Part::One { pole, .. } => usize::from(is_outside((1.0 + pole).abs())),
+            Part::Two { block: [[a, b], [c, d]], .. } => {
+                let (half, product) = (0.5 * (a + d), a * d - b * c);
+                let root = Complex::new(half * half - product, 0.0).sqrt();
+                [root, -root].into_iter().filter(|root| is_outside((root + half + 1.0).norm())).count()
+            }
+        };
+        self.parts.iter().map(of).sum()
+    }
+
+    /// True if it uses the scale beside the encoder: N_x is not zero.
+    pub fn uses_scale(&self) -> bool {
+        self.uses(SCALE)
+    }
+
+    /// True if it closes a current loop: N_i is not zero.
+    pub fn uses_current(&self) -> bool {
+        self.uses(CURRENT)
+    }
+
+    fn uses(&self, input: usize) -> bool {
+        self.direct[input] != 0.0 || self.inputs.iter().any(|inputs| inputs[input] != 0.0)
+    }
+
+    /// Frequencies at which it changes quickly, rad/s.
+    pub fn corners(&self) -> Vec<f64> {
+        self.corners.clone()
+    }
+}
+
+/// The slopes of a controller's text, with A − I.
+struct System {
+    a: DMatrix<f64>,
+    b: DMatrix<f64>,
+    c: DMatrix<f64>,
+    d: [f64; INPUTS],
+}
+
+impl System {
+    /// At rest, behind the first sample.
+    fn of(text: &Text, has_scale: bool) -> Self {
+        let n = text.slots.count();
+        let rest = text.at_rest(has_scale);
+        let mut memory = vec![0.0; n];
+        let run = &mut Run::on(&mut memory);
+        let given = text.step(run, &rest);
+        text.moved(run, 0.0, given);
+        let zero = Dual::constant(0.0);
+        let still = Reference { position: zero, speed: zero, acceleration: zero, jerk: zero, snap: zero };
+        // Along one of the states, or behind them along one of the inputs.
+        let along = |direction: usize| {
+            let dual = |value: f64, place: usize| Dual { value, slope: f64::from(u8::from(place == direction)) };
+            let mut slope = Slope { memory: memory.iter().enumerate().map(|(j, value)| dual(*value, j)).collect() };
+            let seen = Observation {
+                time: 0.0,
+                reference: still,
+                ahead: still,
+                position: dual(rest.position, n),
+                scale: rest.scale.map(|scale| dual(scale, n + SCALE)),
+                current: dual(rest.current, n + CURRENT),
+            };
+            let asked = text.step(&mut slope, &seen);
+            // Within the limit nothing is taken of the command; what the axis gets is an input.
+            text.moved(&mut slope, Dual::constant(0.0), dual(asked.value, n + COMMAND));
+            (asked.slope, slope.memory)
+        };
+        let mut system =
+            Self { a: DMatrix::zeros(n, n), b: DMatrix::zeros(n, INPUTS), c: DMatrix::zeros(1, n), d: [0.0; INPUTS] };
+        for direction in 0..n + INPUTS {
+            let (asked, memory) = along(direction);
+            let column = memory.iter().map(|next| next.slope);
+            match direction.checked_sub(n) {
+                None => {
+                    system.c[direction] = asked;
+                    column.enumerate().for_each(|(i, slope)| {
+                        system.a[(i, direction)] = if i == direction { slope - 1.0 } else { slope };
+                    });
+                }
+                Some(input) => {
+                    system.d[input] = asked;
+                    column.enumerate().for_each(|(i, slope)| system.b[(i, input)] = slope);
+                }
+            }
+        }
+        system
+    }
+
+    /// Leaves out states that no input moves, and those that the command does not follow from.
+    fn reduce(&mut self) {
+        let n = self.a.nrows();
+        let mut moved: Vec<bool> = (0..n).map(|i| self.b.row(i).iter().any(|b| *b != 0.0)).collect();
+        let mut shown: Vec<bool> = self.c.iter().map(|c| *c != 0.0).collect();
+        let is_tied = |i: usize, j: usize| i != j && self.a[(i, j)] != 0.0;
+        spread(&mut moved, &|from, to| is_tied(to, from));
+        spread(&mut shown, &|from, to| is_tied(from, to));
+        let kept: Vec<usize> = (0..n).filter(|&i| moved[i] && shown[i]).collect();
+        self.take(&kept);
+    }
+
+    /// These states alone, in this order.
+    fn take(&mut self, kept: &[usize]) {
+        self.a = self.a.select_rows(kept).select_columns(kept);
+        self.b = self.b.select_rows(kept);
+        self.c = self.c.select_columns(kept);
+    }
+
+    /// Puts states behind those that they depend on, and turns circles of them; the parts that are left.
+    fn order(&mut self) -> Vec<Part> {
+        let circles = circles(&self.a);
+        self.take(&circles.concat());
+        let mut begin = 0;
+        for circle in &circles {
+            if circle.len() > 2 {
+                self.turn(begin, circle.len());
+            }
+            begin += circle.len();
+        }
+        let a = &self.a;
+        let n = a.nrows();
+        let mut parts = Vec::new();
+        let mut i = 0;
+        while i < n {
+            if i + 1 < n && a[(i, i + 1)] != 0.0 {
+                let before = (0..i).map(|j| (j, [a[(i, j)], a[(i + 1, j)]])).filter(|(_, pair)| *pair != [0.0; 2]);
+                let block = [[a[(i, i)], a[(i, i + 1)]], [a[(i + 1, i)], a[(i + 1, i + 1)]]];
+                parts.push(Part::Two { block, of: before.collect() });
+                i += 2;
+            } else {
+                let before = (0..i).map(|j| (j, a[(i, j)])).filter(|(_, a)| *a != 0.0);
+                parts.push(Part::One { pole: a[(i, i)], of: before.collect() });
+                i += 1;
+            }
+        }
+        parts
+    }
+
+    /// Turns a circle of `size` states so that its block is lower triangular but for pairs: with S = D Q of powers of two
+    /// that balance it and of Schur's form (D⁻¹ A D)ᵀ = Q T Qᵀ, S⁻¹ A S = Tᵀ.
+    fn turn(&mut self, begin: usize, size: usize) {
+        let mut block = self.a.view((begin, begin), (size, size)).into_owned();
+        let scales = balanced(&mut block);
+        let is_finite = block.iter().all(|v| v.is_finite());
+        let schur = is_finite.then(|| Schur::try_new(block.transpose(), f64::EPSILON, TURNS)).flatten();
+        // What has no numbers answers with none.
+        let none = || (DMatrix::identity(size, size), DMatrix::from_element(size, size, f64::NAN));
+        let (q, t) = schur.map_or_else(none, Schur::unpack);
+        let scale = DMatrix::from_fn(size, size, |i, j| if i == j { scales[i] } else { 0.0 });
+        let back = DMatrix::from_fn(size, size, |i, j| if i == j { 1.0 / scales[i] } else { 0.0 });
+        let (there, back) = (scale * &q, q.transpose() * back);
+        let columns = self.a.columns(begin, size) * &there;
+        self.a.columns_mut(begin, size).copy_from(&columns);
+        let rows = &back * self.a.rows(begin, size);
+        self.a.rows_mut(begin, size).copy_from(&rows);
+        for (i, j) in (0..size).flat_map(|i| (0..size).map(move |j| (i, j))) {
+            // Above the diagonal there are pairs alone.
+            let is_part = j <= i || j == i + 1 && t[(j, i)] != 0.0;
+            self.a[(begin + i, begin + j)] = if is_part { t[(j, i)] } else { 0.0 };
+        }
+        let rows = &back * self.b.rows(begin, size);
+        self.b.rows_mut(begin, size).copy_from(&rows);
+        let columns = self.c.columns(begin, size) * &there;
+        self.c.columns_mut(begin, size).copy_from(&columns);
+    }
+}
+
+/// Marks what can be reached from what is marked.
+fn spread(marked: &mut [bool], leads: &dyn Fn(usize, usize) -> bool) {
+    let mut waiting: Vec<usize> = (0..marked.len()).filter(|&i| marked[i]).collect();
+    while let Some(from) = waiting.pop() {
+        for (to, mark) in marked.iter_mut().enumerate() {
+            if !*mark && leads(from, to) {
+                *mark = true;
+                waiting.push(to);
+            }
+        }
+    }
+}
+
+/// States that depend on each other, circle by circle, behind those that they depend on.
+fn circles(a: &DMatrix<f64>) -> Vec<Vec<usize>> {
+    let n = a.nrows();
+    let reached = |from: usize| {
+        let mut all: Vec<bool> = (0..n).map(|i| i == from).collect();
+        spread(&mut all, &|j, i| a[(i, j)] != 0.0);
+        all
+    };
+    let reach: Vec<Vec<bool>> = (0..n).map(reached).collect();
+    let mut done = vec![false; n];
+    let mut all = Vec::new();
+    while let Some(first) = (0..n).find(|&i| !done[i] && (0..n).all(|j| done[j] || !reach[j][i] || reach[i][j])) {
+        let circle: Vec<usize> = (0..n).filter(|&j| reach[first][j] && reach[j][first]).collect();
+        circle.iter().for_each(|&j| done[j] = true);
+        all.push(circle);
+    }
+    all
+}
+
+/// D⁻¹ A D with powers of two that make rows and columns alike (B. N. Parlett, C. Reinsch, "Balancing a matrix for
+/// calculation of eigenvalues and eigenvectors", Numerische Mathematik 13, 1969); D.
+fn balanced(a: &mut DMatrix<f64>) -> Vec<f64> {
+    let n = a.nrows();
+    let mut scales = vec![1.0; n];
+    for _ in 0..64 {
+        let mut is_done = true;
+        for i in 0..n {
+            let others = |of: &dyn Fn(usize) -> f64| (0..n).filter(|&j| j != i).map(|j| of(j).abs()).sum::<f64>();
+            let (column, row) = (others(&|j| a[(j, i)]), others(&|j| a[(i, j)]));
+            if !(column > 0.0 && row > 0.0 && column.is_finite() && row.is_finite()) {
+                continue;
+            }
+            let factor = (0.5 * (row / column).log2()).round().exp2();
+            if factor != 1.0 {
+                is_done = false;
+                scales[i] *= factor;
+                a.column_mut(i).scale_mut(factor);
+                a.row_mut(i).scale_mut(1.0 / factor);
+            }
+        }
+        if is_done {
+            break;
+        }
+    }
+    scales
 }

@@ -1,8 +1,7 @@
 //! Filters on the command.
 
-use super::memory::{Memory, all};
+use crate::calculator::{Calculator, Slot, Slots};
 use crate::design::Filter;
-use nalgebra::Complex;
 use std::f64::consts::PI;
 
 /// A filter of second order, stepped once a sample.
@@ -10,12 +9,12 @@ use std::f64::consts::PI;
 pub struct Biquad {
     b: [f64; 3],
     a: [f64; 2],
-    state: [f64; 2],
+    state: [Slot; 2],
 }
 
 impl Biquad {
     /// Sampled every `every` s by Tustin's rule, exact at the filter's own frequency.
-    pub fn new(filter: &Filter, every: f64) -> Self {
+    pub fn new(slots: &mut Slots, filter: &Filter, every: f64) -> Self {
         let (frequency, zeros, poles) = match *filter {
             Filter::Notch { frequency, depth, damping } => (frequency, [1.0, 2.0 * depth, 1.0], damping),
             Filter::LowPass { frequency, damping } => (frequency, [0.0, 0.0, 1.0], damping),
@@ -28,29 +27,25 @@ impl Biquad {
         let over =
             |n2: f64, n1: f64, n0: f64| [n2 * c * c + n1 * c + n0, 2.0 * (n0 - n2 * c * c), n2 * c * c - n1 * c + n0];
         let [a0, a1, a2] = over(1.0, 2.0 * poles, 1.0);
-        Self { b: over(n2, n1, n0).map(|b| b / a0), a: [a1 / a0, a2 / a0], state: [0.0; 2] }
-    }
-
-    /// b and a of (b₀ + b₁ q + b₂ q²)/(1 + a₁ q + a₂ q²), q = 1/z.
-    pub fn coefficients(&self) -> ([f64; 3], [f64; 2]) {
-        (self.b, self.a)
+        let about = match filter {
+            Filter::Notch { .. } => "of a notch",
+            Filter::LowPass { .. } => "of a low-pass",
+        };
+        let state = [slots.add("filter", about), slots.add("filter", about)];
+        Self { b: over(n2, n1, n0).map(|b| b / a0), a: [a1 / a0, a2 / a0], state }
     }
 
     /// The next value.
-    pub fn step(&mut self, input: f64) -> f64 {
-        // Transposed direct form II.
-        let output = self.b[0] * input + self.state[0];
-        self.state[0] = self.b[1] * input - self.a[0] * output + self.state[1];
-        self.state[1] = self.b[2] * input - self.a[1] * output;
+    pub fn step<C: Calculator>(&self, c: &mut C, input: C::N) -> C::N {
+        // Transposed direct form II: (b₀ + b₁ q + b₂ q²)/(1 + a₁ q + a₂ q²), q = 1/z.
+        let [first, second] = self.state;
+        let input = c.name("unfiltered", input);
+        let output = input * self.b[0] + c.memory(first);
+        let output = c.name("filtered", output);
+        let next = input * self.b[1] - output * self.a[0] + c.memory(second);
+        c.keep(first, next);
+        c.keep(second, input * self.b[2] - output * self.a[1]);
         output
-    }
-
-    /// Its gain at z.
-    pub fn at(&self, z: Complex<f64>) -> Complex<f64> {
-        let q = z.inv();
-        let [b0, b1, b2] = self.b;
-        let [a1, a2] = self.a;
-        (q * (q * b2 + b1) + b0) / (q * (q * a2 + a1) + 1.0)
     }
 
     /// Where its poles turn, rad/s, sampled every `every` s.
@@ -58,29 +53,22 @@ impl Biquad {
         // z² + a₁ z + a₂ with |z|² = a₂ and Re z = −a₁/2
         (-0.5 * self.a[0] / self.a[1].abs().sqrt().max(f64::MIN_POSITIVE)).clamp(-1.0, 1.0).acos() / every
     }
-
-    /// Forgets.
-    pub fn reset(&mut self) {
-        self.state = [0.0; 2];
-    }
-
-    /// Shows its memory to a function that takes all of it.
-    pub(super) fn memory(&mut self, memory: &mut Memory) -> Option<()> {
-        all(&mut self.state, memory)
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::calculator::Run;
 
     fn gain(filter: &Filter, frequency: f64) -> f64 {
         let every = 1e-3;
-        let mut biquad = Biquad::new(filter, every);
+        let mut slots = Slots::default();
+        let biquad = Biquad::new(&mut slots, filter, every);
+        let mut memory = vec![0.0; slots.count()];
         let (mut re, mut im) = (0.0, 0.0);
         for k in 0..20_000 {
             let phase = 2.0 * PI * frequency * every * k as f64;
-            let y = biquad.step(phase.sin());
+            let y = biquad.step(&mut Run::on(&mut memory), phase.sin());
             if k >= 10_000 {
                 re += y * phase.sin() / 5_000.0;
                 im += y * phase.cos() / 5_000.0;

@@ -1,82 +1,97 @@
 //! A fuzzy controller with its table of rules (A. Kulkarni, M. A. El-Sharkawi, "Intelligent precision position control
 //! of elastic drive systems", IEEE Transactions on Energy Conversion 16, 2001).
 
-use super::memory::Memory;
-use super::sampled::Speed;
+use super::law::{Law, Seen, Speed};
+use crate::calculator::{Calculator, Slot, Slots};
 use crate::design::Fuzzy;
-use crate::signal::profile::Reference;
 
 /// Triangular sets at equal distances that add up to 1, products of memberships, and the mean of the rules' values they
 /// weigh.
 #[derive(Debug, Clone)]
-pub struct FuzzyState {
+pub struct FuzzyLaw {
     rules: Fuzzy,
     every: f64,
     speed: Speed,
-    command: f64,
+    command: Slot,
 }
 
-impl FuzzyState {
+impl FuzzyLaw {
     /// Stepped every `every` s.
-    pub fn new(rules: &Fuzzy, every: f64) -> Self {
-        Self { rules: rules.clone(), every, speed: Speed::new(every, rules.filter), command: 0.0 }
+    pub fn new(slots: &mut Slots, rules: &Fuzzy, every: f64) -> Self {
+        let speed = Speed::new(slots, every, rules.filter);
+        Self { rules: rules.clone(), every, speed, command: slots.add("so_far", "the command so far") }
+    }
+}
+
+impl Law for FuzzyLaw {
+    fn about(&self) -> &'static str {
+        "table of rules"
     }
 
-    /// The next command.
-    pub fn step(&mut self, target: &Reference, position: f64) -> f64 {
-        let error = target.position - position;
-        let rate = target.speed - self.speed.step(position);
-        let value = self.rules.command * infer(&self.rules.rules, error / self.rules.error, rate / self.rules.rate);
-        self.command = if self.rules.incremental { self.command + self.every * value } else { value };
-        self.command
+    fn commands_current(&self) -> bool {
+        false
+    }
+
+    fn is_linear(&self) -> bool {
+        false
+    }
+
+    fn step<C: Calculator>(&self, c: &mut C, seen: &Seen<C::N>) -> C::N {
+        let rules = &self.rules;
+        let error = seen.target.position - seen.position;
+        let rate = seen.target.speed - self.speed.step(c, seen.position);
+        let value = infer(c, &rules.rules, error / rules.error, rate / rules.rate) * rules.command;
+        if !rules.incremental {
+            return value;
+        }
+        let command = c.memory(self.command) + value * self.every;
+        let command = c.name("command", command);
+        c.keep(self.command, command);
+        command
     }
 
     /// An incremental command goes on from where the limit left it.
-    pub fn limited(&mut self, excess: f64) {
+    fn limited<C: Calculator>(&self, c: &mut C, excess: C::N, _: C::N) {
         if self.rules.incremental {
-            self.command += excess;
+            let command = c.memory(self.command) + excess;
+            c.keep(self.command, command);
         }
-    }
-
-    /// Forgets.
-    pub fn reset(&mut self) {
-        self.speed.reset();
-        self.command = 0.0;
-    }
-
-    /// Shows its memory to a function that takes all of it.
-    pub(super) fn memory(&mut self, memory: &mut Memory) -> Option<()> {
-        self.speed.memory(memory)?;
-        memory(&mut self.command)
     }
 }
 
 /// The output of the rules for an error and its rate, both from −1 to 1; beyond that the outermost sets hold.
-pub fn infer(rules: &[Vec<f64>], error: f64, rate: f64) -> f64 {
+pub fn infer<C: Calculator>(c: &mut C, rules: &[Vec<f64>], error: C::N, rate: C::N) -> C::N {
     // Two sets overlap at any place: which is the lower, and how far the upper holds.
-    let place = |value: f64, size: usize| {
-        let position = (0.5 * (value.clamp(-1.0, 1.0) + 1.0)) * (size.max(2) - 1) as f64;
-        let lower = (position as usize).min(size.saturating_sub(2));
-        (lower, position - lower as f64)
+    let size = rules.len();
+    let mut place = |[value, set, share]: [&'static str; 3], of: C::N| {
+        let of = c.name(value, of);
+        let within = c.within(of, -1.0, 1.0);
+        let place = c.name(value, (within + 1.0) * 0.5 * (size.max(2) - 1) as f64);
+        let whole = c.whole(place);
+        let lower = c.within(whole, 0.0, size.saturating_sub(2) as f64);
+        let lower = c.name(set, lower);
+        (lower, c.name(share, place - lower))
     };
-    let (i, a) = place(error, rules.len());
-    let (j, b) = place(rate, rules.first().map_or(0, Vec::len));
-    let rule = |i: usize, j: usize| rules.get(i).and_then(|row| row.get(j)).copied().unwrap_or(0.0);
-    (1.0 - a) * ((1.0 - b) * rule(i, j) + b * rule(i, j + 1))
-        + a * ((1.0 - b) * rule(i + 1, j) + b * rule(i + 1, j + 1))
+    let (i, a) = place(["error", "error_set", "error_share"], error);
+    let (j, b) = place(["rate", "rate_set", "rate_share"], rate);
+    let [ll, lh, hl, hh] = c.neighbours(rules, i, j);
+    let low = (-a + 1.0) * ((-b + 1.0) * ll + b * lh);
+    let high = a * ((-b + 1.0) * hl + b * hh);
+    low + high
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::calculator::Run;
 
     #[test]
     fn rules_hold_at_their_sets_and_blend_between_them() {
         let rules = vec![vec![-1.0, -0.5, 0.0], vec![-0.5, 0.0, 0.5], vec![0.0, 0.5, 1.0]];
-        assert_eq!(infer(&rules, 0.0, 0.0), 0.0);
-        assert_eq!(infer(&rules, 1.0, 1.0), 1.0);
-        assert_eq!(infer(&rules, -3.0, -1.0), -1.0);
-        assert_eq!(infer(&rules, 0.5, 0.0), 0.25);
-        assert_eq!(infer(&rules, 1.0, -1.0), 0.0);
+        assert_eq!(infer(&mut Run::plain(), &rules, 0.0, 0.0), 0.0);
+        assert_eq!(infer(&mut Run::plain(), &rules, 1.0, 1.0), 1.0);
+        assert_eq!(infer(&mut Run::plain(), &rules, -3.0, -1.0), -1.0);
+        assert_eq!(infer(&mut Run::plain(), &rules, 0.5, 0.0), 0.25);
+        assert_eq!(infer(&mut Run::plain(), &rules, 1.0, -1.0), 0.0);
     }
 }

@@ -1,21 +1,23 @@
 //! An observer of the disturbance at the command.
 
-use super::memory::{Memory, optional};
+use crate::calculator::{Calculator, Slot, Slots, less};
 use crate::machine::rigid::Rigid;
-use nalgebra::{Complex, Matrix3, RowVector3, Vector3};
+use nalgebra::{Matrix3, RowVector3, Vector3};
 
 /// Estimates position, speed and a constant disturbance of an axis of one mass from its measured position.
 #[derive(Debug, Clone)]
-pub struct DisturbanceState {
+pub struct DisturbanceObserver {
+    /// Of s⁺ = A s + b u + L (y − s₁).
     a: Matrix3<f64>,
     b: Vector3<f64>,
     gain: Vector3<f64>,
-    state: Option<Vector3<f64>>,
+    state: [Slot; 3],
+    began: Slot,
 }
 
-impl DisturbanceState {
+impl DisturbanceObserver {
     /// With all poles at `bandwidth`, Hz; none where the axis cannot be observed so.
-    pub fn new(bandwidth: f64, rigid: &Rigid, every: f64) -> Option<Self> {
+    pub fn new(slots: &mut Slots, bandwidth: f64, rigid: &Rigid, every: f64) -> Option<Self> {
         // v̇ = −(d/M) v + (g/M)(u + w), ẇ = 0, held inputs
         let (rate, push) = (rigid.drag() / rigid.mass, rigid.force_per_command() / rigid.mass);
         let x = rate * every;
@@ -34,50 +36,32 @@ impl DisturbanceState {
         let pole = (-2.0 * std::f64::consts::PI * bandwidth * every).exp();
         let shifted = a - Matrix3::identity() * pole;
         let gain = shifted * shifted * shifted * observability.try_inverse()? * Vector3::new(0.0, 0.0, 1.0);
-        gain.iter().all(|g| g.is_finite()).then_some(Self { a, b, gain, state: None })
-    }
-
-    /// A, b and the gain L of s⁺ = A s + b u + L (y − s₁).
-    pub fn matrices(&self) -> ([[f64; 3]; 3], [f64; 3], [f64; 3]) {
-        let row = |i: usize| std::array::from_fn(|j| self.a[(i, j)]);
-        (std::array::from_fn(row), self.b.into(), self.gain.into())
+        if !gain.iter().all(|g| g.is_finite()) {
+            return None;
+        }
+        let began = slots.add("observing", "1 once the observer has begun");
+        let state = [("position", "m"), ("speed", "m/s"), ("disturbance", "as a command")]
+            .map(|(of, about)| slots.add(format!("observed_{of}"), about));
+        Some(Self { a, b, gain, state, began })
     }
 
     /// The disturbance, V or A, that acts along with the command.
-    pub fn disturbance(&self) -> f64 {
-        self.state.map_or(0.0, |state| state[2])
+    pub fn disturbance<C: Calculator>(&self, c: &mut C) -> C::N {
+        c.memory(self.state[2])
     }
 
     /// Takes a measured position and the command that acts from there on.
-    pub fn step(&mut self, position: f64, command: f64) {
-        let state = self.state.unwrap_or(Vector3::new(position, 0.0, 0.0));
-        self.state = Some(self.a * state + self.b * command + self.gain * (position - state[0]));
-    }
-
-    /// Its transfer at z from a command and from a position: w = W_u u + W_y y.
-    pub(super) fn at(&self, z: Complex<f64>) -> [Complex<f64>; 2] {
-        // s⁺ = (A − L c) s + b u + L y,  w = s₃: the third row of (z I − A + L c)⁻¹ by its minors
-        let own = self.a - self.gain * RowVector3::new(1.0, 0.0, 0.0);
-        let n = |i: usize, j: usize| if i == j { z - own[(i, j)] } else { Complex::new(-own[(i, j)], 0.0) };
-        let row = [
-            n(1, 0) * n(2, 1) - n(1, 1) * n(2, 0),
-            n(0, 1) * n(2, 0) - n(0, 0) * n(2, 1),
-            n(0, 0) * n(1, 1) - n(0, 1) * n(1, 0),
-        ];
-        let inverse = (n(0, 2) * row[0] + n(1, 2) * row[1] + n(2, 2) * row[2]).inv();
-        [self.b, self.gain].map(|from| (row[0] * from[0] + row[1] * from[1] + row[2] * from[2]) * inverse)
-    }
-
-    /// Forgets.
-    pub fn reset(&mut self) {
-        self.state = None;
-    }
-
-    /// Shows its memory to a function that takes all of it.
-    pub(super) fn memory(&mut self, memory: &mut Memory) -> Option<()> {
-        let mut state = self.state.map(|state| [state[0], state[1], state[2]]);
-        optional(&mut state, memory)?;
-        self.state = state.map(Vector3::from);
-        Some(())
+    pub fn step<C: Calculator>(&self, c: &mut C, position: C::N, command: C::N) {
+        let one = c.number(1.0);
+        let [first, speed, disturbance] = self.state.map(|slot| c.memory(slot));
+        let began = c.memory(self.began);
+        let first = c.choose(less(began, 0.5), position, first);
+        c.keep(self.began, one);
+        let surprise = c.name("surprise", position - first);
+        for (i, slot) in self.state.into_iter().enumerate() {
+            let [a, b, d] = [0, 1, 2].map(|j| self.a[(i, j)]);
+            let next = first * a + speed * b + disturbance * d + command * self.b[i] + surprise * self.gain[i];
+            c.keep(slot, next);
+        }
     }
 }

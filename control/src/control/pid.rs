@@ -2,134 +2,159 @@
 //!
 //! With the weight c of the reference's speed: c = 1 differentiates the error, c = 0 the measurement alone.
 
-use super::memory::{Memory, all, last};
-use super::sampled::Speed;
+use super::law::{Last, Law, Seen, Speed};
+use crate::calculator::{Calculator, Slot, Slots};
 use crate::design::{Cascade, Pid};
-use crate::signal::profile::Reference;
 
 /// A PID controller: u = K_p e + K_i ∫e dt + K_d (c ẏ* − ẏ).
 #[derive(Debug, Clone)]
-pub struct PidState {
+pub struct PidLaw {
     gains: Pid,
     every: f64,
-    integral: f64,
-    slope: f64,
-    last: Option<f64>,
+    integral: Slot,
+    slope: Slot,
+    last: Last,
 }
 
-impl PidState {
+impl PidLaw {
     /// Stepped every `every` s.
-    pub fn new(gains: &Pid, every: f64) -> Self {
-        Self { gains: *gains, every, integral: 0.0, slope: 0.0, last: None }
+    pub fn new(slots: &mut Slots, gains: &Pid, every: f64) -> Self {
+        let integral = slots.add("integral", "integral of the error, as a command");
+        let slope = slots.add("slope", "filtered derivative, m/s");
+        let last = Last::new(slots, "last", "what was differentiated at the last sample, m");
+        Self { gains: *gains, every, integral, slope, last }
+    }
+}
+
+impl Law for PidLaw {
+    fn about(&self) -> &'static str {
+        "PID"
     }
 
-    /// The next command.
-    pub fn step(&mut self, target: &Reference, position: f64) -> f64 {
-        let Pid { proportional, integral, derivative, filter, reference_speed: c, .. } = self.gains;
-        let error = target.position - position;
+    fn commands_current(&self) -> bool {
+        false
+    }
+
+    fn is_linear(&self) -> bool {
+        true
+    }
+
+    fn step<C: Calculator>(&self, c: &mut C, seen: &Seen<C::N>) -> C::N {
+        let Pid { proportional, integral, derivative, filter, reference_speed, .. } = self.gains;
+        let (target, position, every) = (&seen.target, seen.position, self.every);
+        let error = c.name("error", target.position - position);
         // T_f ḋ + d = c ẏ* − ẏ by backward differences
         let time = 1.0 / (2.0 * std::f64::consts::PI * filter);
-        let weighed = c * target.position - position;
-        let change = weighed - self.last.unwrap_or(weighed);
-        self.slope = (time * self.slope + change) / (time + self.every);
-        self.last = Some(weighed);
-        self.integral += integral * self.every * error;
-        proportional * error + self.integral + derivative * self.slope
+        let weighed = c.name("weighed", target.position * reference_speed - position);
+        let change = weighed - self.last.step(c, weighed);
+        let slope = (c.memory(self.slope) * time + change) / (time + every);
+        let slope = c.name("new_slope", slope);
+        c.keep(self.slope, slope);
+        let sum = c.memory(self.integral) + error * (integral * every);
+        let sum = c.name("sum", sum);
+        c.keep(self.integral, sum);
+        error * proportional + sum + slope * derivative
     }
 
     /// Back-calculation: the integral follows what the limit leaves. Without a gain there is none: nothing would ever
     /// empty it again.
-    pub fn limited(&mut self, excess: f64) {
+    fn limited<C: Calculator>(&self, c: &mut C, excess: C::N, _: C::N) {
         if self.gains.integral != 0.0 {
-            self.integral += (self.every / self.gains.tracking).min(1.0) * excess;
+            let sum = c.memory(self.integral) + excess * (self.every / self.gains.tracking).min(1.0);
+            c.keep(self.integral, sum);
         }
-    }
-
-    /// Forgets.
-    pub fn reset(&mut self) {
-        *self = Self::new(&self.gains, self.every);
-    }
-
-    /// Shows its memory to a function that takes all of it.
-    pub(super) fn memory(&mut self, memory: &mut Memory) -> Option<()> {
-        all([&mut self.integral, &mut self.slope], memory)?;
-        last(&mut self.last, memory)
     }
 }
 
 /// A position loop around a speed loop, around a current loop if there is one.
 #[derive(Debug, Clone)]
-pub struct CascadeState {
+pub struct CascadeLaw {
     gains: Cascade,
     every: f64,
     speed: Speed,
-    speed_integral: f64,
-    current_integral: f64,
+    speed_integral: Slot,
+    current_integral: Slot,
 }
 
-impl CascadeState {
+impl CascadeLaw {
     /// Stepped every `every` s.
-    pub fn new(gains: &Cascade, every: f64) -> Self {
-        let speed = Speed::new(every, gains.filter);
-        Self { gains: *gains, every, speed, speed_integral: 0.0, current_integral: 0.0 }
+    pub fn new(slots: &mut Slots, gains: &Cascade, every: f64) -> Self {
+        Self {
+            gains: *gains,
+            every,
+            speed: Speed::new(slots, every, gains.filter),
+            speed_integral: slots.add("speed_integral", "integral of the speed loop"),
+            current_integral: slots.add("current_integral", "integral of the current loop, V"),
+        }
     }
 
-    /// The next command, told the position that its speed is of and the one that is to follow the target: with two
-    /// sensors that of the motor and that of the cart. `forward` is what feed-forward adds to the speed loop's output
-    /// where that is a current.
-    pub fn step(&mut self, target: &Reference, [motor, load]: [f64; 2], current: f64, forward: f64) -> f64 {
-        let gains = &self.gains;
-        let speed = self.speed.step(motor);
-        // v* = K_v (y* − y) + c ẏ*
-        let wanted = gains.position * (target.position - load) + gains.reference_speed * target.speed;
-        let error = wanted - speed;
-        self.speed_integral += gains.speed_integral * self.every * error;
-        let output = gains.speed * error + self.speed_integral;
-        let Some(inner) = gains.current else { return output };
-        let asked = output + forward;
-        let held = inner.limit.map_or(asked, |limit| asked.clamp(-limit, limit));
-        self.push_speed(self.share() * (held - asked));
-        let error = held - current;
-        self.current_integral += inner.integral * self.every * error;
-        inner.proportional * error + self.current_integral
-    }
-
-    /// Whether its speed loop asks for a current.
-    pub fn commands_current(&self) -> bool {
-        self.gains.current.is_some()
+    /// Adds to the speed loop's integral, if it has one: of a gain of zero nothing would ever empty it again.
+    fn push_speed<C: Calculator>(&self, c: &mut C, change: C::N) {
+        if self.gains.speed_integral != 0.0 {
+            let sum = c.memory(self.speed_integral) + change;
+            c.keep(self.speed_integral, sum);
+        }
     }
 
     fn share(&self) -> f64 {
         (self.every / self.gains.tracking).min(1.0)
     }
+}
 
-    /// Adds to the speed loop's integral, if it has one: of a gain of zero nothing would ever empty it again.
-    fn push_speed(&mut self, change: f64) {
-        if self.gains.speed_integral != 0.0 {
-            self.speed_integral += change;
+impl Law for CascadeLaw {
+    fn about(&self) -> &'static str {
+        "position loop around speed loop"
+    }
+
+    fn commands_current(&self) -> bool {
+        self.gains.current.is_some()
+    }
+
+    fn is_linear(&self) -> bool {
+        true
+    }
+
+    fn step<C: Calculator>(&self, c: &mut C, seen: &Seen<C::N>) -> C::N {
+        let gains = &self.gains;
+        // With a scale the position loop is closed at the cart, which is to be where the reference is.
+        let (aim, load) = match seen.scale {
+            None => (&seen.target, seen.position),
+            Some(scale) => (&seen.reference, scale),
+        };
+        let speed = self.speed.step(c, seen.position);
+        // v* = K_v (y* − y) + c ẏ*
+        let wanted = (aim.position - load) * gains.position + aim.speed * gains.reference_speed;
+        let error = c.name("error", wanted - speed);
+        let sum = c.memory(self.speed_integral) + error * (gains.speed_integral * self.every);
+        let sum = c.name("sum", sum);
+        c.keep(self.speed_integral, sum);
+        let output = error * gains.speed + sum;
+        let Some(inner) = gains.current else { return output };
+        let asked = seen.forward.map_or(output, |forward| output + forward);
+        let asked = c.name("current_asked", asked);
+        let mut held = asked;
+        if let Some(limit) = inner.limit {
+            held = c.within(asked, -limit, limit);
+            held = c.name("current_held", held);
+            self.push_speed(c, (held - asked) * self.share());
         }
+        let error = c.name("current_error", held - seen.current);
+        let sum = c.memory(self.current_integral) + error * (inner.integral * self.every);
+        let sum = c.name("current_sum", sum);
+        c.keep(self.current_integral, sum);
+        error * inner.proportional + sum
     }
 
     /// Back-calculation in the innermost loop.
-    pub fn limited(&mut self, excess: f64) {
-        let share = self.share() * excess;
-        let Some(inner) = self.gains.current else { return self.push_speed(share) };
+    fn limited<C: Calculator>(&self, c: &mut C, excess: C::N, _: C::N) {
+        let share = c.name("share", excess * self.share());
+        let Some(inner) = self.gains.current else { return self.push_speed(c, share) };
         if inner.integral != 0.0 {
-            self.current_integral += share;
+            let sum = c.memory(self.current_integral) + share;
+            c.keep(self.current_integral, sum);
         }
         if inner.proportional != 0.0 {
-            self.push_speed(share / inner.proportional);
+            self.push_speed(c, share / inner.proportional);
         }
-    }
-
-    /// Forgets.
-    pub fn reset(&mut self) {
-        *self = Self::new(&self.gains, self.every);
-    }
-
-    /// Shows its memory to a function that takes all of it.
-    pub(super) fn memory(&mut self, memory: &mut Memory) -> Option<()> {
-        self.speed.memory(memory)?;
-        all([&mut self.speed_integral, &mut self.current_integral], memory)
     }
 }

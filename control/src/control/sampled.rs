@@ -1,7 +1,6 @@
 //! The loop closed: samples, counts, delay and limit between a controller and the axis.
 
-use super::memory::{Memory, last};
-use crate::design::{Design, Structure};
+use crate::design::Design;
 use crate::error::{Error, Result};
 use crate::machine::axis::{CART, DRIVE};
 use crate::machine::{Encoder, EncoderPlace, Machine};
@@ -11,19 +10,19 @@ use crate::signal::profile::Reference;
 
 /// Measurements and references that a controller has at a sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Observation {
+pub struct Observation<N = f64> {
     /// Time of the sample, s.
     pub time: f64,
     /// Where the cart should be now.
-    pub reference: Reference,
+    pub reference: Reference<N>,
     /// Where it should be when the command acts, or as far ahead as the controller asked to look.
-    pub ahead: Reference,
+    pub ahead: Reference<N>,
     /// Measured position, m along the belt: whole counts.
-    pub position: f64,
+    pub position: N,
     /// The cart's position on a scale beside that encoder, m: whole counts; none without a scale.
-    pub scale: Option<f64>,
+    pub scale: Option<N>,
     /// Measured motor current, A.
-    pub current: f64,
+    pub current: N,
 }
 
 /// A controller, stepped once a sample. A user's own implements this.
@@ -183,10 +182,7 @@ pub fn measures_cart(machine: &Machine) -> bool {
 /// Whether a controller on this stage reads the scale beside the encoder: a cascade, state feedback and a disturbance
 /// observer do.
 pub fn reads_scale(design: &Design, machine: &Machine) -> bool {
-    let structure = match &design.structure {
-        Structure::Cascade(_) | Structure::StateFeedback(_) => true,
-        Structure::Pid(_) | Structure::SlidingMode(_) | Structure::Fuzzy(_) => false,
-    };
+    let structure = design.structure.tunable().reads_scale();
     machine.scale.is_some() && (structure || design.disturbance_observer.is_some())
 }
 
@@ -241,38 +237,5 @@ impl Loop {
     pub fn of(design: &crate::design::Design) -> Self {
         let lead = design.feed_forward.lead.unwrap_or(design.delay + 0.5 * design.every);
         Self { every: design.every, delay: design.delay, limit: design.limit, lead }
-    }
-}
-
-/// Speed from a measured position: differences through a filter of first order.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Speed {
-    every: f64,
-    keep: f64,
-    last: Option<f64>,
-    value: f64,
-}
-
-impl Speed {
-    /// With a corner at `filter`, Hz.
-    pub(super) fn new(every: f64, filter: f64) -> Self {
-        Self { every, keep: (-2.0 * std::f64::consts::PI * filter * every).exp(), last: None, value: 0.0 }
-    }
-
-    pub(super) fn step(&mut self, position: f64) -> f64 {
-        let difference = (position - self.last.unwrap_or(position)) / self.every;
-        self.last = Some(position);
-        self.value = self.keep * self.value + (1.0 - self.keep) * difference;
-        self.value
-    }
-
-    pub(super) fn reset(&mut self) {
-        (self.last, self.value) = (None, 0.0);
-    }
-
-    /// Shows its memory to a function that takes all of it.
-    pub(super) fn memory(&mut self, memory: &mut Memory) -> Option<()> {
-        last(&mut self.last, memory)?;
-        memory(&mut self.value)
     }
 }

@@ -1,61 +1,78 @@
 //! Sliding mode with a boundary layer, and the condition under which it reaches its surface.
 
-use super::memory::Memory;
-use super::sampled::Speed;
+use super::law::{Law, Seen, Speed};
+use crate::calculator::{Calculator, Slot, Slots};
 use crate::design::SlidingMode;
 use crate::machine::rigid::Rigid;
-use crate::signal::profile::Reference;
 
 /// A sliding-mode controller on the side of the encoder: σ = ė + λ e + κ ∫e dt (A. Hace et al., "Robust motion control
 /// and trajectory planning for planar laser cutting system", 2005, for belts).
 ///
 /// With V = σ²/2 and M σ̇ = −M K sat(σ/Φ) + Δ the surface is reached, σ σ̇ < 0 for |σ| ≥ Φ, if K > |Δ|/M: [`required`].
 #[derive(Debug, Clone)]
-pub struct SlidingState {
+pub struct SlidingLaw {
     gains: SlidingMode,
-    rigid: Rigid,
+    mass: f64,
+    force_per_command: f64,
     every: f64,
     speed: Speed,
-    integral: f64,
+    integral: Slot,
 }
 
-impl SlidingState {
+impl SlidingLaw {
     /// Stepped every `every` s, on an axis of one mass.
-    pub fn new(gains: &SlidingMode, rigid: &Rigid, every: f64) -> Self {
-        let speed = Speed::new(every, gains.filter);
-        Self { gains: *gains, rigid: *rigid, every, speed, integral: 0.0 }
+    pub fn new(slots: &mut Slots, gains: &SlidingMode, rigid: &Rigid, every: f64) -> Self {
+        let speed = Speed::new(slots, every, gains.filter);
+        let integral = slots.add("integral", "integral of the error, m s");
+        let (mass, force_per_command) = (rigid.mass, rigid.force_per_command());
+        Self { gains: *gains, mass, force_per_command, every, speed, integral }
+    }
+}
+
+impl Law for SlidingLaw {
+    fn about(&self) -> &'static str {
+        "sliding mode with a boundary layer"
     }
 
-    /// The next command beside feed-forward, which is the rest of the equivalent control.
-    pub fn step(&mut self, target: &Reference, position: f64) -> f64 {
+    fn commands_current(&self) -> bool {
+        false
+    }
+
+    fn is_linear(&self) -> bool {
+        false
+    }
+
+    /// Feed-forward is the rest of the equivalent control.
+    fn step<C: Calculator>(&self, c: &mut C, seen: &Seen<C::N>) -> C::N {
         let SlidingMode { bandwidth, reaching, boundary, integral, .. } = self.gains;
-        let error = target.position - position;
-        let rate = target.speed - self.speed.step(position);
-        self.integral += self.every * error;
-        let sigma = rate + bandwidth * error + integral * self.integral;
+        let error = c.name("error", seen.target.position - seen.position);
+        let rate = seen.target.speed - self.speed.step(c, seen.position);
+        let rate = c.name("rate", rate);
+        let mut sigma = rate + error * bandwidth;
+        let mut acceleration = rate * bandwidth;
+        if integral != 0.0 {
+            let sum = c.memory(self.integral) + error * self.every;
+            let sum = c.name("sum", sum);
+            c.keep(self.integral, sum);
+            sigma = sigma + sum * integral;
+            acceleration = acceleration + error * integral;
+        }
         // M (λ ė + κ e + K sat(σ/Φ))
-        let acceleration = bandwidth * rate + integral * error + reaching * (sigma / boundary).clamp(-1.0, 1.0);
-        self.rigid.mass * acceleration / self.rigid.force_per_command()
+        let share = c.name("share", sigma / boundary);
+        let layer = c.within(share, -1.0, 1.0);
+        let layer = c.name("layer", layer);
+        (acceleration + layer * reaching) * self.mass / self.force_per_command
     }
 
     /// Without effect of its own the integral does not grow.
-    pub fn limited(&mut self, excess: f64) {
-        if excess != 0.0 && self.gains.integral > 0.0 {
-            let force = excess * self.rigid.force_per_command() / self.rigid.mass;
-            let gain = self.gains.integral * self.gains.reaching / self.gains.boundary;
-            self.integral += (self.gains.bandwidth * self.every).min(1.0) * force / gain;
+    fn limited<C: Calculator>(&self, c: &mut C, excess: C::N, _: C::N) {
+        let SlidingMode { bandwidth, reaching, boundary, integral, .. } = self.gains;
+        if integral > 0.0 {
+            let force = excess * self.force_per_command / self.mass;
+            let change = force * (bandwidth * self.every).min(1.0) / (integral * reaching / boundary);
+            let sum = c.memory(self.integral) + change;
+            c.keep(self.integral, sum);
         }
-    }
-
-    /// Forgets.
-    pub fn reset(&mut self) {
-        *self = Self::new(&self.gains, &self.rigid, self.every);
-    }
-
-    /// Shows its memory to a function that takes all of it.
-    pub(super) fn memory(&mut self, memory: &mut Memory) -> Option<()> {
-        self.speed.memory(memory)?;
-        memory(&mut self.integral)
     }
 }
 

@@ -2,13 +2,10 @@
 
 use super::compensation::Compensation;
 use super::filter::Biquad;
-use super::fuzzy::FuzzyState;
-use super::memory::{Memory, all};
-use super::observer::DisturbanceState;
-use super::pid::{CascadeState, PidState};
+use super::law::{AnyLaw, Law, Seen};
+use super::observer::DisturbanceObserver;
 use super::sampled::{Controller, Observation};
-use super::sliding::SlidingState;
-use super::state_feedback::StateFeedbackState;
+use crate::calculator::{Calculator, Run, Slot, Slots, less, more};
 use crate::design::{Design, Structure};
 use crate::error::{Error, Result};
 use crate::machine::rigid::Rigid;
@@ -18,66 +15,168 @@ use crate::signal::profile::Reference;
 /// A controller that a [`Design`] describes, made with a model of the axis: the stage itself, or what one takes it for.
 #[derive(Debug, Clone)]
 pub struct Standard {
-    core: Core,
+    text: Text,
+    memory: Vec<f64>,
+}
+
+/// What such a controller does at a sample, for any calculator.
+#[derive(Debug, Clone)]
+pub struct Text {
+    pub(crate) law: AnyLaw,
     compensation: Compensation,
-    observer: Option<DisturbanceState>,
-    filters: Vec<Biquad>,
+    observer: Option<DisturbanceObserver>,
+    pub(crate) filters: Vec<Biquad>,
     /// Weights of encoder and scale in the position that the observer is given.
     weights: [f64; 2],
-    /// The last command asked for, and the position for the observer and dry friction there.
-    asked: f64,
-    position: f64,
-    dry: f64,
+    /// What it remembers; of that what the command asked for at last, and the position for the observer and dry friction
+    /// there.
+    pub slots: Slots,
+    asked: Slot,
+    position: Slot,
+    dry: Slot,
 }
 
-#[derive(Debug, Clone)]
-enum Core {
-    Pid(PidState),
-    Cascade(CascadeState),
-    StateFeedback(Box<StateFeedbackState>),
-    SlidingMode(SlidingState),
-    Fuzzy(FuzzyState),
-}
-
-impl Standard {
-    /// The controller of `design` for a `model` of the axis.
+impl Text {
+    /// That of `design` for a `model` of the axis.
     pub fn new(design: &Design, model: &Machine) -> Result<Self> {
         check(design, model)?;
         let every = design.every;
         let compensation = Compensation::new(model, &design.feed_forward);
         let rigid = compensation.rigid;
-        let core = match &design.structure {
-            Structure::Pid(gains) => Core::Pid(PidState::new(gains, every)),
-            Structure::Cascade(gains) => Core::Cascade(CascadeState::new(gains, every)),
-            Structure::StateFeedback(weights) => {
-                Core::StateFeedback(Box::new(StateFeedbackState::new(weights, model, design)?))
-            }
-            Structure::SlidingMode(gains) => Core::SlidingMode(SlidingState::new(gains, &rigid, every)),
-            Structure::Fuzzy(rules) => Core::Fuzzy(FuzzyState::new(rules, every)),
-        };
+        let slots = &mut Slots::default();
+        let law = AnyLaw::new(slots, design, model)?;
+        let filters = design.filters.iter().map(|filter| Biquad::new(slots, filter, every)).collect();
         let observer = match design.disturbance_observer {
             None => None,
-            Some(observer) => Some(DisturbanceState::new(observer.bandwidth, &rigid, every).ok_or_else(|| {
-                Error::new("a disturbance observer cannot be made for this axis and sample time")
-                    .next("take a shorter sample time, or another bandwidth")
-            })?),
+            Some(observer) => {
+                Some(DisturbanceObserver::new(slots, observer.bandwidth, &rigid, every).ok_or_else(|| {
+                    Error::new("a disturbance observer cannot be made for this axis and sample time")
+                        .next("take a shorter sample time, or another bandwidth")
+                })?)
+            }
         };
-        Ok(Self {
-            core,
-            compensation,
-            observer,
-            filters: design.filters.iter().map(|filter| Biquad::new(filter, every)).collect(),
-            weights: observed(model, &rigid),
-            asked: 0.0,
-            position: 0.0,
-            dry: 0.0,
-        })
+        let [asked, position, dry] = [
+            ("last_asked", "the last command asked for"),
+            ("last_position", "the position there"),
+            ("last_dry", "dry friction there"),
+        ]
+        .map(|(name, about)| slots.add(name, about));
+        let weights = observed(model, &rigid);
+        Ok(Self { law, compensation, observer, filters, weights, slots: std::mem::take(slots), asked, position, dry })
+    }
+
+    /// The command that is asked for.
+    pub fn step<C: Calculator>(&self, c: &mut C, seen: &Observation<C::N>) -> C::N {
+        let compensation = &self.compensation;
+        c.remark("where the encoder should be, and what the reference asks for by itself");
+        let target = compensation.target(c, &seen.reference);
+        let mut added = compensation.command(c, &seen.ahead);
+        let mut forward = None;
+        if let (Some(whole), true) = (added, self.law.commands_current()) {
+            // As a current into the inner loop; what the voltage needs beyond it is left outside.
+            (forward, added) = split(c, compensation, &seen.ahead, whole);
+        }
+        c.remark(self.law.about());
+        let &Observation { reference, position, scale, current, .. } = seen;
+        let own = self.law.step(c, &Seen { reference, target, position, scale, current, forward, compensation });
+        let own = self.filters.iter().fold(own, |value, filter| filter.step(c, value));
+        let mut asked = added.map_or(own, |added| own + added);
+        let mut common = position;
+        if let Some(observer) = &self.observer {
+            asked = asked - observer.disturbance(c);
+            let [encoder, cart] = self.weights;
+            if let (Some(scale), true) = (scale, cart != 0.0) {
+                common = position * encoder + scale * cart;
+            }
+        }
+        let asked = c.name("asked", asked);
+        let dry = compensation.dry(c, &seen.ahead);
+        c.keep(self.asked, asked);
+        c.keep(self.position, common);
+        c.keep(self.dry, dry);
+        asked
+    }
+
+    /// Takes the command that the limit left.
+    pub fn limited<C: Calculator>(&self, c: &mut C, given: C::N) {
+        c.remark("what the limit has left");
+        let excess = given - c.memory(self.asked);
+        let excess = c.name("excess", excess);
+        self.moved(c, excess, given);
+    }
+
+    /// Takes what the limit added to the command, and the command that the axis gets.
+    pub fn moved<C: Calculator>(&self, c: &mut C, excess: C::N, given: C::N) {
+        // What a linear model of the axis is moved by.
+        let effective = given - c.memory(self.dry);
+        let effective = c.name("effective", effective);
+        self.law.limited(c, excess, effective);
+        if let Some(observer) = &self.observer {
+            let position = c.memory(self.position);
+            observer.step(c, position, effective);
+        }
+    }
+
+    /// What a controller is shown at rest: the axis where it should be, at zero.
+    pub fn at_rest(&self, has_scale: bool) -> Observation {
+        let zero = Reference::default();
+        let position = self.compensation.target(&mut Run::plain(), &zero).position;
+        let scale = has_scale.then_some(0.0);
+        Observation { time: 0.0, reference: zero, ahead: zero, position, scale, current: 0.0 }
+    }
+}
+
+/// The part of a voltage fed forward that goes into the current loop, A; and the rest of it, for the back-EMF, V.
+fn split<C: Calculator>(
+    c: &mut C,
+    compensation: &Compensation,
+    ahead: &Reference<C::N>,
+    forward: C::N,
+) -> (Option<C::N>, Option<C::N>) {
+    let (rigid, zero) = (&compensation.rigid, c.number(0.0));
+    let back = rigid.command_by(c, zero, zero, ahead.speed);
+    // Feed-forward of nothing has no part for the speed.
+    let nothing = c.choose(less(forward, 0.0), back, zero);
+    let back = c.choose(more(forward, 0.0), back, nothing);
+    let back = c.name("back_emf", back);
+    let inner = (forward - back) * rigid.force_per_command() / rigid.force_per_ampere;
+    (Some(c.name("inner", inner)), Some(back))
+}
+
+impl Standard {
+    /// The controller of `design` for a `model` of the axis.
+    pub fn new(design: &Design, model: &Machine) -> Result<Self> {
+        let text = Text::new(design, model)?;
+        Ok(Self { memory: vec![0.0; text.slots.count()], text })
+    }
+
+    /// What it remembers from sample to sample.
+    pub(super) fn memory(&self) -> &[f64] {
+        &self.memory
+    }
+
+    pub(super) fn memory_mut(&mut self) -> &mut [f64] {
+        &mut self.memory
+    }
+}
+
+impl Controller for Standard {
+    fn step(&mut self, seen: &Observation) -> f64 {
+        self.text.step(&mut Run::on(&mut self.memory), seen)
+    }
+
+    fn limited(&mut self, given: f64) {
+        self.text.limited(&mut Run::on(&mut self.memory), given);
+    }
+
+    fn reset(&mut self) {
+        self.memory.fill(0.0);
     }
 }
 
 /// Weights of encoder and scale in the position that a disturbance observer is given: the share of the mass that moves
 /// with each, so that it sees the common motion, in which the belt does not swing. All of the encoder without a scale.
-pub(super) fn observed(model: &Machine, rigid: &Rigid) -> [f64; 2] {
+fn observed(model: &Machine, rigid: &Rigid) -> [f64; 2] {
     match model.scale {
         None => [1.0, 0.0],
         Some(_) => [rigid.driving / rigid.mass, 1.0 - rigid.driving / rigid.mass],
@@ -116,99 +215,4 @@ fn check(design: &Design, model: &Machine) -> Result<()> {
         return Err(Error::new("the command moves nothing: torque constant or gain is zero").allowed("above zero"));
     }
     Ok(())
-}
-
-impl Standard {
-    /// Shows its memory from sample to sample to a function that takes all of it.
-    pub(super) fn memory(&mut self, memory: &mut Memory) -> Option<()> {
-        match &mut self.core {
-            Core::Pid(core) => core.memory(memory)?,
-            Core::Cascade(core) => core.memory(memory)?,
-            Core::StateFeedback(core) => core.memory(memory)?,
-            Core::SlidingMode(core) => core.memory(memory)?,
-            Core::Fuzzy(core) => core.memory(memory)?,
-        }
-        self.filters.iter_mut().try_for_each(|filter| filter.memory(memory))?;
-        if let Some(observer) = &mut self.observer {
-            observer.memory(memory)?;
-        }
-        all([&mut self.asked, &mut self.position, &mut self.dry], memory)
-    }
-}
-
-impl Controller for Standard {
-    fn step(&mut self, seen: &Observation) -> f64 {
-        let compensation = &self.compensation;
-        let target = || compensation.target(&seen.reference);
-        // A scale that the model has and the axis has not is none.
-        let scale = seen.scale.unwrap_or(seen.position);
-        let mut forward = compensation.command(&seen.ahead);
-        let own = match &mut self.core {
-            Core::Pid(core) => core.step(&target(), seen.position),
-            Core::Cascade(core) => {
-                let mut inner = 0.0;
-                if core.commands_current() {
-                    // As a current into the inner loop; what the voltage needs beyond it is left outside.
-                    inner = forward_current(compensation, &seen.ahead, forward);
-                    forward = back_emf(compensation, &seen.ahead, forward);
-                }
-                // With a scale the position loop is closed at the cart, which is to be where the reference is.
-                match seen.scale {
-                    None => core.step(&target(), [seen.position; 2], seen.current, inner),
-                    Some(scale) => core.step(&seen.reference, [seen.position, scale], seen.current, inner),
-                }
-            }
-            Core::StateFeedback(core) => core.step(&seen.reference, compensation, [seen.position, scale]),
-            Core::SlidingMode(core) => core.step(&target(), seen.position),
-            Core::Fuzzy(core) => core.step(&target(), seen.position),
-        };
-        let own = self.filters.iter_mut().fold(own, |value, filter| filter.step(value));
-        let disturbance = self.observer.as_ref().map_or(0.0, DisturbanceState::disturbance);
-        let [encoder, cart] = self.weights;
-        self.position = if cart == 0.0 { seen.position } else { encoder * seen.position + cart * scale };
-        self.dry = self.compensation.dry(&seen.ahead);
-        self.asked = own + forward - disturbance;
-        self.asked
-    }
-
-    fn limited(&mut self, given: f64) {
-        let excess = given - self.asked;
-        // What a linear model of the axis is moved by.
-        let effective = given - self.dry;
-        match &mut self.core {
-            Core::Pid(core) => core.limited(excess),
-            Core::Cascade(core) => core.limited(excess),
-            Core::StateFeedback(core) => core.limited(excess, effective),
-            Core::SlidingMode(core) => core.limited(excess),
-            Core::Fuzzy(core) => core.limited(excess),
-        }
-        if let Some(observer) = &mut self.observer {
-            observer.step(self.position, effective);
-        }
-    }
-
-    fn reset(&mut self) {
-        match &mut self.core {
-            Core::Pid(core) => core.reset(),
-            Core::Cascade(core) => core.reset(),
-            Core::StateFeedback(core) => core.reset(),
-            Core::SlidingMode(core) => core.reset(),
-            Core::Fuzzy(core) => core.reset(),
-        }
-        self.filters.iter_mut().for_each(Biquad::reset);
-        if let Some(observer) = &mut self.observer {
-            observer.reset();
-        }
-    }
-}
-
-/// The share of the voltage fed forward that is for speed, V.
-fn back_emf(compensation: &Compensation, y: &Reference, forward: f64) -> f64 {
-    if forward == 0.0 { 0.0 } else { compensation.rigid.command(0.0, 0.0, y.speed) }
-}
-
-/// The rest of it, as a current, A.
-fn forward_current(compensation: &Compensation, y: &Reference, forward: f64) -> f64 {
-    let rest = forward - back_emf(compensation, y, forward);
-    rest * compensation.rigid.force_per_command() / compensation.rigid.force_per_ampere
 }

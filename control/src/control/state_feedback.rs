@@ -1,89 +1,71 @@
 //! State feedback with a Kalman filter: LQG, and with an integral LQI.
 
-use super::compensation::Compensation;
-use super::memory::{Memory, all, flag};
+use super::law::{Law, Seen};
 use super::model::Linear;
 use super::model::Quantity;
 use super::riccati;
 use super::sampled::Sensor;
+use crate::calculator::{Calculator, Slot, Slots, less, more};
 use crate::design::{Design, StateFeedback};
 use crate::error::Result;
 use crate::machine::Machine;
 use crate::machine::axis::{CART, IDLER};
 use crate::machine::rigid::Rigid;
-use crate::signal::profile::Reference;
 use nalgebra::{DMatrix, DVector};
+
+/// Most states that an axis has.
+const STATES: usize = 2 * crate::mechanism::BODIES + crate::mechanism::DRIVES;
 
 /// A linear-quadratic regulator on the states that a Kalman filter estimates, both for the sampled axis with its delay.
 #[derive(Debug, Clone)]
-pub struct StateFeedbackState {
-    law: Law,
+pub struct StateFeedbackLaw {
+    every: f64,
+    /// Φ, row by row, without zeros.
+    phi: Vec<Vec<(usize, f64)>>,
+    /// Effect over a sample of the command that takes over within it, and of the one before.
+    now: Vec<f64>,
+    before: Vec<f64>,
+    /// The encoder; behind it the scale, if there is one. Each corrects the estimate that the one before has left.
+    sensors: Vec<Corrected>,
+    /// u = −K (x − x*), then of commands under way, then of the integral.
+    gain: Vec<f64>,
+    pending: usize,
     radius: f64,
     states: Vec<Quantity>,
-    estimate: DVector<f64>,
-    scratch: DVector<f64>,
-    wanted: DVector<f64>,
-    started: bool,
+    /// Where all of it is remembered.
+    started: Slot,
+    estimate: Vec<Slot>,
     /// The last commands beside feed-forward, latest first, and as the axis got them.
-    own: Vec<f64>,
-    given: Vec<f64>,
-    integral: f64,
-    integrated: f64,
-    last_own: f64,
-    /// Residuals of the two Riccati equations.
-    pub residuals: [f64; 2],
-}
-
-/// The part of it that does not change in time.
-#[derive(Debug, Clone)]
-pub struct Law {
-    /// Sample interval, s.
-    pub every: f64,
-    /// Φ.
-    pub phi: DMatrix<f64>,
-    /// Effect over a sample of the command that takes over within it, and of the one before.
-    pub now: DVector<f64>,
-    /// Effect of the command before it.
-    pub before: DVector<f64>,
-    /// The encoder; behind it the scale, if there is one. Each corrects the estimate that the one before has left.
-    pub sensors: Vec<Corrected>,
-    /// u = −K (x − x*), then of commands under way, then of the integral.
-    pub gain: DVector<f64>,
-    /// Number of commands under way.
-    pub pending: usize,
-    /// True if the last state is the integral of the error.
-    pub has_integral: bool,
+    own: Vec<Slot>,
+    given: Vec<Slot>,
+    /// Integral of the measured error, and its last part.
+    integral: Option<[Slot; 2]>,
+    last_own: Slot,
 }
 
 /// A sensor of the Kalman filter: x̂ ← x̂ + L (y − m x̂).
 #[derive(Debug, Clone)]
-pub struct Corrected {
-    /// m.
-    pub measured: DVector<f64>,
+struct Corrected {
+    /// m, without zeros.
+    measured: Vec<(usize, f64)>,
     /// L.
-    pub kalman: DVector<f64>,
+    kalman: Vec<f64>,
 }
 
-impl Law {
-    /// Samples from a command to the one that takes over within a sample.
-    pub fn lag(&self) -> usize {
-        if self.before.iter().any(|v| *v != 0.0) { self.pending - 1 } else { self.pending }
-    }
-
-    /// Gain of the integral, if there is one.
-    pub fn integral(&self) -> Option<f64> {
-        self.has_integral.then(|| self.gain[self.phi.nrows() + self.pending])
-    }
+/// What is not zero of a row.
+fn sparse<'a>(row: impl IntoIterator<Item = &'a f64>) -> Vec<(usize, f64)> {
+    row.into_iter().copied().enumerate().filter(|(_, value)| *value != 0.0).collect()
 }
 
-impl StateFeedbackState {
-    /// The part of it that does not change in time.
-    pub fn law(&self) -> &Law {
-        &self.law
-    }
+/// Σ of products.
+fn dot<C: Calculator>(c: &mut C, weights: &[(usize, f64)], of: &[C::N]) -> C::N {
+    let products = weights.iter().map(|&(i, weight)| of[i] * weight);
+    products.reduce(|sum, product| sum + product).unwrap_or_else(|| c.number(0.0))
+}
 
+impl StateFeedbackLaw {
     /// For a model of the axis.
-    pub fn new(weights: &StateFeedback, machine: &Machine, design: &Design) -> Result<Self> {
+    pub fn new(slots: &mut Slots, weights: &StateFeedback, machine: &Machine, design: &Design) -> Result<Self> {
         let linear = Linear::of(machine);
         let n = linear.a.nrows();
         let every = design.every;
@@ -151,36 +133,43 @@ impl StateFeedbackState {
             let effect = both.column(column) * scale;
             noise += &effect * effect.transpose();
         }
-        let (sensors, residual) = filter(&linear, &phi, &noise, weights, machine)?;
-        let gain = regulator.gain.row(0).transpose();
-        let law = Law { every, phi, now, before, sensors, gain, pending, has_integral: integral };
+        let sensors = filter(&linear, &phi, &noise, weights, machine)?;
+        let integral = integral.then(|| {
+            let integral = slots.add("integral", "integral of the measured error, m s");
+            [integral, slots.add("integrated", "its last part")]
+        });
         Ok(Self {
-            law,
+            every,
+            phi: phi.row_iter().map(|row| sparse(row.iter())).collect(),
+            now: now.iter().copied().collect(),
+            before: before.iter().copied().collect(),
+            sensors,
+            gain: regulator.gain.row(0).iter().copied().collect(),
+            pending,
             radius: machine.pulley_radius,
             states: linear.states,
-            estimate: DVector::zeros(n),
-            scratch: DVector::zeros(n),
-            wanted: DVector::zeros(n),
-            started: false,
-            own: vec![0.0; pending],
-            given: vec![0.0; pending + 1],
-            integral: 0.0,
-            integrated: 0.0,
-            last_own: 0.0,
-            residuals: [regulator.residual, residual],
+            started: slots.add("started", "1 once the filter has begun"),
+            estimate: slots.list(n, "estimate", "estimated state"),
+            own: slots.list(pending, "own", "a command under way"),
+            given: slots.list(pending + 1, "given", "a command as the axis got it"),
+            integral,
+            last_own: slots.add("last_own", "the last command"),
         })
     }
 
-    /// The next command beside feed-forward, told the position at the encoder and that at the scale, of which there may
-    /// be none.
-    pub fn step(&mut self, reference: &Reference, compensation: &Compensation, positions: [f64; 2]) -> f64 {
-        let [position, _] = positions;
-        // What the states should be, were the cart where it should be.
-        let needed = compensation.needed(reference);
-        let r = self.radius;
-        let current = needed.force[0] / compensation.rigid.force_per_ampere;
-        for (wanted, &state) in self.wanted.iter_mut().zip(&self.states) {
-            *wanted = match state {
+    /// Samples from a command to the one that takes over within a sample.
+    fn lag(&self) -> usize {
+        if self.before.iter().any(|v| *v != 0.0) { self.pending - 1 } else { self.pending }
+    }
+
+    /// What the states should be, were the cart where it should be.
+    fn wanted<C: Calculator>(&self, c: &mut C, seen: &Seen<C::N>) -> [C::N; STATES] {
+        let (r, reference) = (self.radius, &seen.reference);
+        let needed = seen.compensation.needed_by(c, reference);
+        let current = needed.force[0] / seen.compensation.rigid.force_per_ampere;
+        let mut wanted = [c.number(0.0); STATES];
+        for (i, (wanted, &state)) in wanted.iter_mut().zip(&self.states).enumerate() {
+            let value = match state {
                 Quantity::Position(CART) => reference.position,
                 Quantity::Speed(CART) => reference.speed,
                 Quantity::Position(IDLER) => needed.idler[0] / r,
@@ -190,78 +179,115 @@ impl StateFeedbackState {
                 Quantity::Speed(_) => needed.drive.speed / r,
                 Quantity::Current => current,
             };
+            *wanted = c.numbered("wanted", i, value);
         }
-        if !self.started {
-            self.started = true;
-            // At rest where it is measured.
-            for (x, &state) in self.estimate.iter_mut().zip(&self.states) {
-                *x = match state {
-                    Quantity::Position(CART) => position,
-                    Quantity::Position(_) => position / r,
-                    Quantity::Speed(_) | Quantity::Current => 0.0,
-                };
-            }
-        }
-        for (sensor, position) in self.law.sensors.iter().zip(positions) {
-            let surprise = position - sensor.measured.dot(&self.estimate);
-            self.estimate.axpy(surprise, &sensor.kalman, 1.0);
-        }
-        let law = &self.law;
-        let mut command = 0.0;
-        let n = self.estimate.len();
-        for i in 0..n {
-            command -= law.gain[i] * (self.estimate[i] - self.wanted[i]);
-        }
-        for (i, own) in self.own.iter().enumerate() {
-            command -= law.gain[n + i] * own;
-        }
-        if let (Some(gain), Some((sensor, position))) = (law.integral(), law.sensors.iter().zip(positions).next_back())
-        {
-            command -= gain * self.integral;
-            self.integrated = law.every * (position - sensor.measured.dot(&self.wanted));
-            self.integral += self.integrated;
-        }
-        self.last_own = command;
-        command
+        wanted
     }
 
-    /// Is told what the limit took (`excess`), and what the axis gets beside what dry friction takes of it.
-    pub fn limited(&mut self, excess: f64, effective: f64) {
-        if excess != 0.0 && self.law.has_integral {
-            // What has no effect is not gathered.
-            self.integral -= self.integrated;
+    /// The estimate before a sample: at the first one at rest where it is measured.
+    fn estimated<C: Calculator>(&self, c: &mut C, position: C::N) -> [C::N; STATES] {
+        let (zero, one, started) = (c.number(0.0), c.number(1.0), c.memory(self.started));
+        c.keep(self.started, one);
+        let mut estimate = [zero; STATES];
+        for (i, (estimate, &state)) in estimate.iter_mut().zip(&self.states).enumerate() {
+            let at_rest = match state {
+                Quantity::Position(CART) => position,
+                Quantity::Position(_) => position / self.radius,
+                Quantity::Speed(_) | Quantity::Current => zero,
+            };
+            let known = c.memory(self.estimate[i]);
+            *estimate = c.choose(less(started, 0.5), at_rest, known);
         }
-        let law = &self.law;
-        self.own.insert(0, self.last_own + excess);
-        self.own.truncate(law.pending);
-        self.given.insert(0, effective);
-        self.given.truncate(law.pending + 1);
-        let lag = law.lag();
-        self.scratch.gemv(1.0, &law.phi, &self.estimate, 0.0);
-        self.scratch.axpy(self.given[lag], &law.now, 1.0);
-        if let Some(&previous) = self.given.get(lag + 1) {
-            self.scratch.axpy(previous, &law.before, 1.0);
-        }
-        std::mem::swap(&mut self.scratch, &mut self.estimate);
-    }
-
-    /// Forgets.
-    pub fn reset(&mut self) {
-        self.started = false;
-        self.own.fill(0.0);
-        self.given.fill(0.0);
-        (self.integral, self.integrated, self.last_own) = (0.0, 0.0, 0.0);
-    }
-
-    /// Shows its memory to a function that takes all of it.
-    pub(super) fn memory(&mut self, memory: &mut Memory) -> Option<()> {
-        flag(&mut self.started, memory)?;
-        all(self.estimate.iter_mut().chain(&mut self.own).chain(&mut self.given), memory)?;
-        all([&mut self.integral, &mut self.integrated, &mut self.last_own], memory)
+        estimate
     }
 }
 
-/// The sensors of the Kalman filter with their gains, and what is left of its Riccati equation. Their noise is
+impl Law for StateFeedbackLaw {
+    fn about(&self) -> &'static str {
+        "feedback of the states that a Kalman filter estimates"
+    }
+
+    fn commands_current(&self) -> bool {
+        false
+    }
+
+    fn is_linear(&self) -> bool {
+        true
+    }
+
+    fn step<C: Calculator>(&self, c: &mut C, seen: &Seen<C::N>) -> C::N {
+        let n = self.states.len();
+        let wanted = self.wanted(c, seen);
+        let mut estimate = self.estimated(c, seen.position);
+        let positions = [seen.position, seen.scale.unwrap_or(seen.position)];
+        for (sensor, position) in self.sensors.iter().zip(positions) {
+            let surprise = position - dot(c, &sensor.measured, &estimate);
+            let surprise = c.name("innovation", surprise);
+            for (i, kalman) in sensor.kalman.iter().enumerate() {
+                estimate[i] = c.numbered("corrected", i, surprise * *kalman + estimate[i]);
+            }
+        }
+        let mut command = c.number(0.0);
+        for i in 0..n {
+            c.keep(self.estimate[i], estimate[i]);
+            command = command - (estimate[i] - wanted[i]) * self.gain[i];
+        }
+        for (own, gain) in self.own.iter().zip(&self.gain[n..]) {
+            command = command - c.memory(*own) * *gain;
+        }
+        if let (Some([sum, part]), Some((sensor, position))) =
+            (self.integral, self.sensors.iter().zip(positions).next_back())
+        {
+            let integral = c.memory(sum);
+            command = command - integral * self.gain[n + self.pending];
+            let error = position - dot(c, &sensor.measured, &wanted);
+            let integrated = c.name("part", error * self.every);
+            c.keep(part, integrated);
+            c.keep(sum, integral + integrated);
+        }
+        let command = c.name("fed_back", command);
+        c.keep(self.last_own, command);
+        command
+    }
+
+    fn limited<C: Calculator>(&self, c: &mut C, excess: C::N, effective: C::N) {
+        if let Some([sum, part]) = self.integral {
+            // What has no effect is not gathered.
+            let (integral, integrated) = (c.memory(sum), c.memory(part));
+            let back = integral - integrated;
+            let kept = c.choose(less(excess, 0.0), back, integral);
+            let kept = c.choose(more(excess, 0.0), back, kept);
+            c.keep(sum, kept);
+        }
+        let latest = c.memory(self.last_own) + excess;
+        for (slots, latest) in [(&self.own, latest), (&self.given, effective)] {
+            for pair in slots.windows(2).rev() {
+                let earlier = c.memory(pair[0]);
+                c.keep(pair[1], earlier);
+            }
+            if let Some(first) = slots.first() {
+                c.keep(*first, latest);
+            }
+        }
+        // x⁺ = Φ x + Γ₀ u_{k−d} + e^{A(T−ρ)} Γ(ρ) u_{k−d−1}
+        let lag = self.lag();
+        let given = c.memory(self.given[lag]);
+        let previous = self.given.get(lag + 1).map(|slot| c.memory(*slot));
+        let mut estimate = [c.number(0.0); STATES];
+        for (estimate, slot) in estimate.iter_mut().zip(&self.estimate) {
+            *estimate = c.memory(*slot);
+        }
+        for (i, row) in self.phi.iter().enumerate() {
+            let mut next = dot(c, row, &estimate) + given * self.now[i];
+            if let Some(previous) = previous {
+                next = next + previous * self.before[i];
+            }
+            c.keep(self.estimate[i], next);
+        }
+    }
+}
+
+/// The sensors of the Kalman filter with their gains. Their noise is
 /// independent, so that they may correct one after another: L = P mᵀ/(m P mᵀ + V), P ← P − L m P, before the
 /// prediction.
 fn filter(
@@ -270,7 +296,7 @@ fn filter(
     noise: &DMatrix<f64>,
     weights: &StateFeedback,
     machine: &Machine,
-) -> Result<(Vec<Corrected>, f64)> {
+) -> Result<Vec<Corrected>> {
     let n = phi.nrows();
     let spread = |sensor: Sensor| weights.noise.max(0.3 * sensor.step());
     let mut all = vec![(linear.measured.transpose(), spread(Sensor::new(machine)))];
@@ -287,7 +313,7 @@ fn filter(
         let p = &x * &measured;
         let kalman = &p / (measured.dot(&p) + spread * spread);
         x -= &kalman * p.transpose();
-        sensors.push(Corrected { measured, kalman });
+        sensors.push(Corrected { measured: sparse(measured.iter()), kalman: kalman.iter().copied().collect() });
     }
-    Ok((sensors, filter.residual))
+    Ok(sensors)
 }

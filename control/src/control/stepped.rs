@@ -1,6 +1,5 @@
 //! A controller stepped from outside: whoever asks gives it the reference, and the machine at its samples.
 
-use super::memory::{Memory, all, flag};
 use super::sampled::{Controller, Loop, Observation, Sensors};
 use super::standard::Standard;
 use crate::design::Design;
@@ -114,17 +113,6 @@ impl Clocked {
     }
 }
 
-impl Clocked {
-    /// The numbers that it remembers, but for its place in time.
-    fn memory(&mut self, memory: &mut Memory) -> Option<()> {
-        flag(&mut self.halfway, memory)?;
-        // Between a sample and where its command takes over, that command waits with the others.
-        let (whole, _) = self.timing.samples_late();
-        self.waiting.resize(whole + usize::from(self.halfway), 0.0);
-        all(self.waiting.iter_mut().chain([&mut self.acting]), memory)
-    }
-}
-
 /// A controller with its clock, its delay and its limit, between two of its decisions. A clone of it goes on in the
 /// same way.
 #[derive(Debug, Clone)]
@@ -164,40 +152,37 @@ impl Stepped {
 }
 
 impl Stepped {
-    /// All that it needs to go on, as plain numbers.
+    /// All that it needs to go on, as plain numbers: whether it is between a sample and where its command takes over,
+    /// commands that wait and that act, what its text remembers, and the number of the sample.
     pub fn save(&self) -> Vec<u64> {
-        let mut list = Vec::new();
-        let mut out = |number: &mut f64| {
-            list.push(number.to_bits());
-            Some(())
-        };
-        // Every number is shown to a function that takes all of them.
-        let _ = self.clone().memory(&mut out);
-        list.push(self.clocked.k);
-        list
+        let Clocked { k, halfway, waiting, acting, .. } = &self.clocked;
+        let halfway = f64::from(u8::from(*halfway));
+        let numbers = [halfway].into_iter().chain(waiting.iter().copied()).chain([*acting]);
+        numbers.chain(self.controller.memory().iter().copied()).map(f64::to_bits).chain([*k]).collect()
     }
 
     /// Goes on from what [`Stepped::save`] gave, bit for bit, of a controller of the same design. None, and nothing has
     /// changed, where `saved` is not of such a one.
     pub fn restore(&mut self, saved: &[u64]) -> Option<()> {
         let (k, numbers) = saved.split_last()?;
-        let mut numbers = numbers.iter();
-        let mut copy = self.clone();
-        copy.memory(&mut |number| {
-            *number = f64::from_bits(*numbers.next()?);
-            Some(())
-        })?;
-        if numbers.next().is_some() {
+        let (halfway, numbers) = numbers.split_first()?;
+        let halfway = match f64::from_bits(*halfway) {
+            0.0 => false,
+            1.0 => true,
+            _ => return None,
+        };
+        // Between a sample and where its command takes over, that command waits with the others.
+        let waiting = self.clocked.timing.samples_late().0 + usize::from(halfway);
+        let memory = self.controller.memory_mut();
+        if numbers.len() != waiting + 1 + memory.len() {
             return None;
         }
-        copy.clocked.k = *k;
-        *self = copy;
+        let mut numbers = numbers.iter().map(|bits| f64::from_bits(*bits));
+        self.clocked.waiting = numbers.by_ref().take(waiting).collect();
+        self.clocked.acting = numbers.next()?;
+        memory.iter_mut().zip(numbers).for_each(|(number, saved)| *number = saved);
+        (self.clocked.k, self.clocked.halfway) = (*k, halfway);
         Some(())
-    }
-
-    fn memory(&mut self, memory: &mut Memory) -> Option<()> {
-        self.clocked.memory(memory)?;
-        self.controller.memory(memory)
     }
 }
 

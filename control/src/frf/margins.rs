@@ -19,6 +19,8 @@ pub struct Measured {
     pub phase: Option<(f64, f64)>,
     /// Gain margin, and where L passes the negative real axis, rad/s.
     pub gain: Option<(f64, f64)>,
+    /// Whether it holds for small motions about rest alone: the controller is not linear.
+    pub is_at_rest: bool,
     /// Lowest and highest frequency that was looked at, rad/s.
     pub range: [f64; 2],
 }
@@ -42,6 +44,7 @@ pub fn measured(frf: &Frf, design: &Design, machine: &Machine, length: f64) -> R
         sensitivity_at_most: 0.0,
         phase: None,
         gain: None,
+        is_at_rest: !feedback.is_linear(),
         range: [first.omega, last.omega],
     };
     let mut before: Option<(f64, Complex<f64>)> = None;
@@ -99,6 +102,7 @@ impl Measured {
         });
         let [low, high] = self.range.map(hertz);
         let (peak, at) = self.sensitivity;
-        format!("Ms {peak:.2} at {} ({most}); {phase}; {gain}; from {low} to {high}", hertz(at))
+        let at_rest = if self.is_at_rest { "at rest: " } else { "" };
+        format!("{at_rest}Ms {peak:.2} at {} ({most}); {phase}; {gain}; from {low} to {high}", hertz(at))
     }
 }

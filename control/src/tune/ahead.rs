@@ -2,7 +2,7 @@
 
 use super::judged::Verdict;
 use super::work::Work;
-use crate::design::{Design, FeedForward, FeedForwardModel, Structure};
+use crate::design::{Design, FeedForward, FeedForwardModel};
 use crate::error::Result;
 use crate::machine::{BeltModel, EncoderPlace, Machine};
 
@@ -29,7 +29,7 @@ impl Ahead {
 fn forms(machine: &Machine, design: &Design) -> Vec<FeedForward> {
     let own = &design.feed_forward;
     // State feedback and sliding mode have their model already.
-    if !matches!(design.structure, Structure::Pid(_) | Structure::Cascade(_) | Structure::Fuzzy(_)) {
+    if design.structure.tunable().feed_forward() != FeedForwardModel::None {
         return Vec::new();
     }
     let models: &[FeedForwardModel] = match own.model {
@@ -39,7 +39,7 @@ fn forms(machine: &Machine, design: &Design) -> Vec<FeedForward> {
     };
     let is_elastic = machine.belt.model != BeltModel::Rigid;
     let sees_stretch = machine.encoder.is_some_and(|encoder| encoder.at == EncoderPlace::Cart)
-        || matches!(design.structure, Structure::Cascade(_)) && machine.scale.is_some();
+        || design.structure.tunable().follows_scale() && machine.scale.is_some();
     let mut forms = Vec::new();
     for &model in models.iter().filter(|model| is_elastic || **model != FeedForwardModel::Elastic) {
         for compensate_stretch in [own.compensate_stretch, true] {

@@ -11,7 +11,7 @@ use super::watch::Watch;
 use super::work::{FINALISTS, Finalist, Work};
 use crate::case::{Cost, Move};
 use crate::chance::uniform;
-use crate::design::{Design, Structure};
+use crate::design::Design;
 use crate::error::Result;
 use crate::machine::Machine;
 use crate::signal::profile::Profile;
@@ -223,13 +223,9 @@ impl Work<'_> {
         self.spent.get() + self.tried as u64 * self.design_costs()
     }
 
-    /// Samples that take as long as the limits of one design on the set: with state feedback two Riccati equations are
-    /// solved, too.
+    /// Samples that take as long as the limits of one design on the set.
     fn design_costs(&self) -> u64 {
-        match self.case.controller.as_ref().map(|design| &design.structure) {
-            Some(Structure::StateFeedback(_)) => 2000,
-            _ => 500,
-        }
+        self.case.controller.as_ref().map_or(0, |design| design.structure.tunable().costs())
     }
 
     /// One search with the simplex; its value.

@@ -1,9 +1,9 @@
 //! The gains of a design as numbers with names, for a search and for the case file.
 
 use crate::design::placement::commands_current;
-use crate::design::{Design, Filter, Structure};
-use crate::machine::{AmplifierMode, Machine};
-use crate::parameter::{find, unit_for};
+use crate::design::{Design, Filter};
+use crate::machine::Machine;
+use crate::parameter::{self, Parameter, Tuned, find, unit_for};
 
 /// Digits that a gain is given with behind its first one.
 const DIGITS: usize = 3;
@@ -28,19 +28,32 @@ pub struct Gain {
     pub searched: bool,
 }
 
+/// Where the gains of structures sit, in the order of the case file.
+fn places() -> impl Iterator<Item = (&'static str, parameter::InStructure)> {
+    let place = |row: &'static Parameter| row.gain.map(|gain| (row.key, gain));
+    parameter::all().filter_map(place).filter(|(_, gain)| gain.tuned != Tuned::No)
+}
+
+/// Whether a search changes a gain of this design: not what is zero, nor the corner of what is.
+fn is_searched(design: &Design, gain: &parameter::InStructure) -> bool {
+    let is_there = |gain: &parameter::InStructure| (gain.get)(&design.structure).is_some_and(|value| value != 0.0);
+    is_there(gain)
+        && match gain.tuned {
+            Tuned::No => false,
+            Tuned::Gain => true,
+            Tuned::Corner(of) => find(of).and_then(|row| row.gain).is_some_and(|gain| is_there(&gain)),
+        }
+}
+
 /// The gains of a design that are not zero, in the order of the case file.
 pub fn gains(design: &Design, machine: &Machine) -> Vec<Gain> {
-    let mut copy = design.clone();
-    let amperes = commands_current(design, machine);
-    let amplifier = if machine.drives[0].amplifier.mode == AmplifierMode::Current { "A" } else { "V" };
-    let input = if amperes && matches!(design.structure, Structure::Cascade(_)) { "A" } else { amplifier };
-    let gain = |(key, value, searched): (&'static str, &mut f64, bool)| Gain {
-        key,
-        unit: find(key).map_or("", |row| unit_for(row.unit, input)),
-        value: *value,
-        searched,
+    let input = if commands_current(design, machine) { "A" } else { "V" };
+    let gain = |(key, gain): (&'static str, parameter::InStructure)| {
+        let value = (gain.get)(&design.structure).filter(|value| *value != 0.0)?;
+        let unit = find(key).map_or("", |row| unit_for(row.unit, input));
+        Some(Gain { key, unit, value, searched: is_searched(design, &gain) })
     };
-    fields(&mut copy).into_iter().map(gain).filter(|gain| gain.value != 0.0).collect()
+    places().filter_map(gain).collect()
 }
 
 /// The design with its searched gains multiplied, in the order of [`gains`], by e to these powers. A corner that is
@@ -48,10 +61,12 @@ pub fn gains(design: &Design, machine: &Machine) -> Vec<Gain> {
 pub fn scaled(design: &Design, powers: &[f64]) -> Design {
     let mut other = design.clone();
     let highest = HIGHEST / design.every;
-    let searched = fields(&mut other).into_iter().filter(|(_, value, searched)| **value != 0.0 && *searched);
-    for ((key, value, _), power) in searched.zip(powers) {
-        let most = if key.ends_with(".filter") && *power != 0.0 { highest } else { f64::INFINITY };
-        *value = (*value * power.exp()).min(most);
+    let searched = places().filter(|(_, gain)| is_searched(design, gain));
+    for ((_, gain), power) in searched.zip(powers) {
+        let most = if matches!(gain.tuned, Tuned::Corner(_)) && *power != 0.0 { highest } else { f64::INFINITY };
+        if let Some(value) = (gain.get)(&design.structure) {
+            (gain.set)(&mut other.structure, (value * power.exp()).min(most));
+        }
     }
     other
 }
@@ -82,9 +97,7 @@ pub fn shaped(design: &Design, own: usize, powers: &[f64]) -> Design {
 
 /// How many powers [`shaped`] takes.
 pub fn searched(design: &Design, own: usize) -> usize {
-    let mut copy = design.clone();
-    fields(&mut copy).iter().filter(|(_, value, searched)| **value != 0.0 && *searched).count()
-        + filter_knobs(design, own)
+    places().filter(|(_, gain)| is_searched(design, gain)).count() + filter_knobs(design, own)
 }
 
 fn filter_knobs(design: &Design, own: usize) -> usize {
@@ -98,8 +111,10 @@ fn filter_knobs(design: &Design, own: usize) -> usize {
 /// The design with gains and filters of four digits, as they are written.
 pub fn rounded(design: &Design) -> Design {
     let mut other = design.clone();
-    for (_, value, _) in fields(&mut other) {
-        *value = four(*value);
+    for (_, gain) in places() {
+        if let Some(value) = (gain.get)(&design.structure) {
+            (gain.set)(&mut other.structure, four(value));
+        }
     }
     for filter in &mut other.filters {
         match filter {
@@ -128,45 +143,11 @@ pub fn filters_text(filters: &[Filter]) -> String {
     format!("[{}]", filters.iter().map(one).collect::<Vec<_>>().join(", "))
 }
 
-fn fields(design: &mut Design) -> Vec<(&'static str, &mut f64, bool)> {
-    match &mut design.structure {
-        Structure::Pid(pid) => {
-            let has_derivative = pid.derivative != 0.0;
-            vec![
-                ("controller.pid.proportional", &mut pid.proportional, true),
-                ("controller.pid.integral", &mut pid.integral, true),
-                ("controller.pid.derivative", &mut pid.derivative, true),
-                ("controller.pid.filter", &mut pid.filter, has_derivative),
-            ]
-        }
-        Structure::Cascade(cascade) => {
-            let mut all = vec![
-                ("controller.cascade.position", &mut cascade.position, true),
-                ("controller.cascade.speed", &mut cascade.speed, true),
-                ("controller.cascade.speed_integral", &mut cascade.speed_integral, true),
-                ("controller.cascade.filter", &mut cascade.filter, true),
-            ];
-            if let Some(inner) = &mut cascade.current {
-                all.push(("controller.cascade.current.proportional", &mut inner.proportional, true));
-                all.push(("controller.cascade.current.integral", &mut inner.integral, true));
-            }
-            all
-        }
-        Structure::StateFeedback(weights) => {
-            let mut all = vec![("controller.state_feedback.position", &mut weights.position, true)];
-            all.extend(weights.speed.as_mut().map(|v| ("controller.state_feedback.speed", v, true)));
-            all.extend(weights.integral.as_mut().map(|v| ("controller.state_feedback.integral", v, true)));
-            all.push(("controller.state_feedback.disturbance", &mut weights.disturbance, true));
-            all
-        }
-        _ => Vec::new(),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::case::Case;
+    use crate::design::Structure;
     use std::path::Path;
 
     /// A search ended with a notch of damping 0.05 and depth 0.1, which amplifies by 6 dB, and with a corner of 15 kHz at

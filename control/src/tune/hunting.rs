@@ -6,7 +6,7 @@
 //! next one comes where no watch is long enough.
 
 use crate::control::{Loop, Rows, Standard, stream};
-use crate::design::{Design, Structure};
+use crate::design::Design;
 use crate::error::Result;
 use crate::friction::Side;
 use crate::machine::rigid::Rigid;
@@ -160,17 +160,8 @@ fn friction(machine: &Machine, change: fn(&mut Side)) -> Machine {
 
 /// The design with its integral action times `factor`, none with 0; none without integral action.
 pub(super) fn integral_times(design: &Design, factor: f64) -> Option<Design> {
-    let mut other = design.clone();
-    match &mut other.structure {
-        Structure::Pid(pid) if pid.integral != 0.0 => pid.integral *= factor,
-        Structure::Cascade(cascade) if cascade.speed_integral != 0.0 => cascade.speed_integral *= factor,
-        // The gain is about the inverse of the weight.
-        Structure::StateFeedback(weights) if weights.integral.is_some() => {
-            weights.integral = weights.integral.map(|weight| weight / factor).filter(|weight| weight.is_finite());
-        }
-        _ => return None,
-    }
-    Some(other)
+    let structure = design.structure.tunable().integral_times(factor)?;
+    Some(Design { structure, ..design.clone() })
 }
 
 /// How long to watch, s: some of the times in which the integral takes the command from one breakaway to the other.
@@ -181,15 +172,10 @@ fn watch(machine: &Machine, design: &Design) -> f64 {
         let length = if crate::control::measures_cart(machine) { 1.0 } else { machine.pulley_radius };
         length / encoder.counts_per_unit(machine.drives[0].motor.gear_ratio)
     });
-    // Command per second and metre of error that stays.
-    let rate = match &design.structure {
-        Structure::Pid(pid) => pid.integral * rigid.force_per_command(),
-        Structure::Cascade(cascade) => match cascade.current {
-            Some(_) => cascade.speed_integral * cascade.position * rigid.force_per_ampere,
-            None => cascade.speed_integral * cascade.position * rigid.force_per_command(),
-        },
-        _ => 0.0,
-    };
+    // Force per second and metre of error that stays.
+    let structure = design.structure.tunable();
+    let force = if structure.commands_current() { rigid.force_per_ampere } else { rigid.force_per_command() };
+    let rate = structure.ramp() * force;
     let ramp = dry / (rate.abs() * count);
     if ramp.is_finite() { (20.0 * ramp).clamp(4.0, LONGEST) } else { 10.0 }
 }

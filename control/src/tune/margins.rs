@@ -162,7 +162,7 @@ impl Rough {
     pub fn of(plant: &Plant, feedback: &Feedback) -> Self {
         let mut most = [0.0_f64; 2];
         let mut sums = [0.0; 2];
-        let mut winding = Winding::new(plant);
+        let mut winding = Winding::new(plant, feedback);
         let mut before: Option<(f64, [f64; 2])> = None;
         let breaks = breaks(feedback);
         for (omega, answer, turn) in plant.seen() {
@@ -244,7 +244,7 @@ impl<'a> Curve<'a> {
 
     /// Whether the closed loop is stable.
     fn is_stable(&self) -> bool {
-        let mut winding = Winding::new(self.plant);
+        let mut winding = Winding::new(self.plant, self.feedback);
         for (omega, open) in &self.points {
             winding.go_on(*omega, open.difference, &Turn::of(*omega, self.plant.every));
         }

@@ -47,7 +47,7 @@ pub use unknown::Unknown;
 
 use crate::case::{Case, Cost, EFFORTS, Files, Move, Tuning};
 use crate::control::feedback::Feedback;
-use crate::design::{Design, Pid, Structure};
+use crate::design::Design;
 use crate::error::{Error, Result};
 use crate::machine::BeltModel;
 use by_moves::WIDE;
@@ -327,7 +327,9 @@ impl Work<'_> {
 
 /// What to add to a PID controller without a derivative, where gains of it do not do.
 fn without_derivative(case: &Case, design: &Design) -> Option<String> {
-    let Structure::Pid(Pid { derivative: 0.0, .. }) = design.structure else { return None };
+    if !design.structure.tunable().lacks_damping() {
+        return None;
+    }
     let such_as = case.suggested_derivative(design);
     Some(format!("add a derivative to controller.pid, for example {such_as}: nothing else damps this loop"))
 }

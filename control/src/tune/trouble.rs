@@ -92,7 +92,7 @@ pub fn trouble(machine: &Machine, design: &Design, run: &MoveRun, target: f64) -
 
 /// Where the sampled loop swings, Hz, if it is not stable; none too for structures that are not linear.
 fn unstable(machine: &Machine, design: &Design, place: f64) -> Option<f64> {
-    let feedback = Feedback::new(design, machine).ok()?;
+    let feedback = Feedback::new(design, machine).ok().filter(Feedback::is_linear)?;
     let plant = Plant::of(machine, place, design, &feedback.corners()).ok()?;
     let margins = Margins::of(&plant, &feedback);
     (!margins.stable).then_some(margins.at / (2.0 * PI))

@@ -1,12 +1,12 @@
 //! Stability of a sampled loop by Nyquist's criterion.
 
 use super::plant::Plant;
-use crate::control::feedback::Turn;
+use crate::control::feedback::{Feedback, Turn};
 use nalgebra::Complex;
 use std::f64::consts::PI;
 
 /// Nyquist's criterion: F(z) = (1 + L)(1 − 1/z)^m, with m poles at z = 1, turns by π (P − Z) from θ = 0 to π, P poles
-/// of the axis and Z of the closed loop being outside.
+/// of axis and controller and Z of the closed loop being outside.
 pub(super) struct Winding {
     unstable: f64,
     /// The first two of ω and 1 + L, of which m is known.
@@ -20,9 +20,9 @@ pub(super) struct Winding {
 }
 
 impl Winding {
-    pub fn new(plant: &Plant) -> Self {
+    pub fn new(plant: &Plant, feedback: &Feedback) -> Self {
         let zero = Complex::ZERO;
-        let unstable = plant.unstable as f64;
+        let unstable = (plant.unstable + feedback.unstable()) as f64;
         Self { unstable, first: None, poles: 0, start: zero, now: zero, turns: 0.0, is_number: true }
     }
 

@@ -1,6 +1,7 @@
 //! An axis as one mass along its belt.
 
 use super::{AmplifierMode, Machine};
+use crate::calculator::{Calculator, Run, at_least, less, more};
 
 /// Largest speed of a reference that counts as rest, m/s, and largest acceleration that counts as none, m/s²: what
 /// rounding leaves of a generated trajectory, in single precision too, has no direction.
@@ -62,18 +63,42 @@ impl Rigid {
 
     /// Motor current, A, and voltage at its terminals, V, that push with `force` (N, changing at `rate`, N/s) at `speed`.
     pub fn electrical(&self, force: f64, rate: f64, speed: f64) -> (f64, f64) {
-        // What drives through the gear loses, what is driven holds more; at rest it is taken to drive.
-        let drives = speed.abs() <= REST_SPEED || force * speed >= 0.0;
-        let efficiency = if drives { self.efficiency } else { 1.0 / self.efficiency };
-        let per_ampere = self.force_per_ampere * efficiency;
-        let current = force / per_ampere;
+        self.electrical_by(&mut Run::plain(), force, rate, speed)
+    }
+
+    /// The same by any calculator.
+    pub fn electrical_by<C: Calculator>(&self, c: &mut C, force: C::N, rate: C::N, speed: C::N) -> (C::N, C::N) {
+        let force = c.name("force", force);
+        let per_ampere = self.per_ampere(c, force, speed);
+        let current = c.name("amperes", force / per_ampere);
         // v = R i + L di/dt + K_e n φ̇                                        (4) with an inductance
-        (current, self.resistance * current + self.inductance * rate / per_ampere + self.brake * speed)
+        let mut voltage = current * self.resistance;
+        if self.inductance != 0.0 {
+            voltage = voltage + rate * self.inductance / per_ampere;
+        }
+        (current, voltage + speed * self.brake)
+    }
+
+    /// Force per ampere. What drives through the gear loses, what is driven holds more; at rest it is taken to drive.
+    fn per_ampere<C: Calculator>(&self, c: &mut C, force: C::N, speed: C::N) -> C::N {
+        let [drives, driven] = [self.efficiency, 1.0 / self.efficiency].map(|e| c.number(self.force_per_ampere * e));
+        if self.efficiency == 1.0 {
+            return drives;
+        }
+        let moving = c.choose(at_least(force * speed, 0.0), drives, driven);
+        let backward = c.choose(less(speed, -REST_SPEED), moving, drives);
+        let per_ampere = c.choose(more(speed, REST_SPEED), moving, backward);
+        c.name("per_ampere", per_ampere)
     }
 
     /// The command that makes the motor push with `force` (N, changing at `rate`, N/s) at `speed`, V or A.
     pub fn command(&self, force: f64, rate: f64, speed: f64) -> f64 {
-        let (current, voltage) = self.electrical(force, rate, speed);
+        self.command_by(&mut Run::plain(), force, rate, speed)
+    }
+
+    /// The same by any calculator.
+    pub fn command_by<C: Calculator>(&self, c: &mut C, force: C::N, rate: C::N, speed: C::N) -> C::N {
+        let (current, voltage) = self.electrical_by(c, force, rate, speed);
         match self.mode {
             AmplifierMode::Current => current / self.gain,
             AmplifierMode::Voltage => voltage / self.gain,
@@ -96,7 +121,18 @@ impl Rigid {
 
     /// Friction of the axis at this speed, N; its viscous part and its dry part, which goes the way of `sign`.
     pub fn friction(&self, speed: f64, sign: f64) -> (f64, f64) {
-        let side = usize::from(sign < 0.0);
-        (self.viscous[side] * speed, self.coulomb[side] * sign)
+        self.friction_by(&mut Run::plain(), speed, sign)
     }
+
+    /// The same by any calculator.
+    pub fn friction_by<C: Calculator>(&self, c: &mut C, speed: C::N, sign: C::N) -> (C::N, C::N) {
+        let [viscous, coulomb] = [self.viscous, self.coulomb].map(|both| side(c, sign, both));
+        (speed * viscous, sign * coulomb)
+    }
+}
+
+/// A number for each direction, forward and backward; none counts as forward.
+pub fn side<C: Calculator>(c: &mut C, sign: C::N, [forward, backward]: [f64; 2]) -> C::N {
+    let [forward, backward] = [forward, backward].map(|value| c.number(value));
+    c.choose(less(sign, 0.0), backward, forward)
 }

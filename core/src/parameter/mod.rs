@@ -15,6 +15,7 @@ pub use free::{Free, GivenBounds, every, kinds, kinds_without, own, set, value, 
 pub use machine::Sits;
 pub use markdown::{free_markdown, markdown};
 
+use crate::design::Structure;
 use crate::error::{Error, Result};
 use crate::machine::Machine;
 use crate::quantity::{rounded, shortest};
@@ -46,6 +47,30 @@ pub struct Parameter {
     pub follows: &'static [&'static str],
     /// The sum over the bodies that it is a part of.
     pub part: Option<(Sum, Arm)>,
+    /// Where it sits in a controller's structure.
+    pub gain: Option<InStructure>,
+}
+
+/// Where a number sits in a structure, and whether a search changes it.
+#[derive(Debug, Clone, Copy)]
+pub struct InStructure {
+    /// Its value; none in a structure that has none.
+    pub get: fn(&Structure) -> Option<f64>,
+    /// Sets it, in a structure that has a place for it.
+    pub set: fn(&mut Structure, f64),
+    /// Whether a search changes it.
+    pub tuned: Tuned,
+}
+
+/// Whether a search of gains changes a number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Tuned {
+    /// No.
+    No,
+    /// As a gain.
+    Gain,
+    /// As a corner, below half the sampling rate; where the number with this key, whose corner it is, is not zero.
+    Corner(&'static str),
 }
 
 /// Whether a number of a machine may be off where nobody names it.

@@ -5,7 +5,8 @@ use super::field::{
     set_coulomb, set_radius, set_simple, set_stribeck_decay, set_stribeck_force, set_stribeck_velocity, simple,
     stiffness, stribeck_decay, stribeck_force, stribeck_velocity,
 };
-use super::{Arm, Fallback, Field, INPUT, Off, Parameter, Range, Sum};
+use super::{Arm, Fallback, Field, INPUT, InStructure, Off, Parameter, Range, Sum, Tuned};
+use crate::design::Structure;
 use crate::friction::Law;
 
 const fn row(
@@ -18,7 +19,7 @@ const fn row(
     sentence: &'static str,
 ) -> Parameter {
     let (field, off) = (Field::Elsewhere, Off::No);
-    Parameter { key, symbol, unit, default, range, sentence, example, field, off, follows: &[], part: None }
+    Parameter { key, symbol, unit, default, range, sentence, example, field, off, follows: &[], part: None, gain: None }
 }
 
 impl Parameter {
@@ -30,6 +31,11 @@ impl Parameter {
     /// It sits there in machines.
     const fn at(self, field: Field) -> Self {
         Self { field, ..self }
+    }
+
+    /// It sits there in a structure.
+    const fn held(self, gain: InStructure) -> Self {
+        Self { gain: Some(gain), ..self }
     }
 
     /// It may be off, with all others of that name.
@@ -76,6 +82,61 @@ const FREQUENCY: Range = Range::new(1e-9, 1e9);
 /// Whole numbers that TOML has, 0 to 2⁶³ − 1: read by their digits, as a double does not hold all of them.
 const SEED: Range = Range { below: true, ..Range::whole(0.0, i64::MAX as f64) };
 const UP_TO_ONE: Range = Range { above: true, ..Range::new(0.0, 1.0) };
+
+/// A number of a structure, which may be absent.
+trait Held {
+    fn held(&self) -> Option<f64>;
+    fn hold(&mut self, value: f64);
+}
+
+impl Held for f64 {
+    fn held(&self) -> Option<f64> {
+        Some(*self)
+    }
+
+    fn hold(&mut self, value: f64) {
+        *self = value;
+    }
+}
+
+impl Held for Option<f64> {
+    fn held(&self) -> Option<f64> {
+        *self
+    }
+
+    fn hold(&mut self, value: f64) {
+        *self = Some(value);
+    }
+}
+
+/// The place of a number in a structure, or in a part of it that may be absent; of another structure there is none.
+macro_rules! gain {
+    ($structure:ident.$field:ident, $tuned:expr) => {
+        InStructure {
+            get: |structure| if let Structure::$structure(own) = structure { own.$field.held() } else { None },
+            set: |structure, value| {
+                if let Structure::$structure(own) = structure {
+                    own.$field.hold(value);
+                }
+            },
+            tuned: $tuned,
+        }
+    };
+    ($structure:ident.$part:ident?.$field:ident, $tuned:expr) => {
+        InStructure {
+            get: |structure| {
+                let Structure::$structure(own) = structure else { return None };
+                own.$part.as_ref().and_then(|part| part.$field.held())
+            },
+            set: |structure, value| {
+                if let Structure::$structure(own) = structure {
+                    own.$part.iter_mut().for_each(|part| part.$field.hold(value));
+                }
+            },
+            tuned: $tuned,
+        }
+    };
+}
 
 /// Friction of one body: the rows with that body's key, symbols, units and examples.
 macro_rules! friction {
@@ -597,38 +658,38 @@ const CONTROLLER: &[Parameter] = &[
     row("controller.every", "T", "s", Required, DURATION, "1 ms", "Sample time."),
     row("controller.delay", "", "s", Value(0.0), TIME, "0.5 ms", "Time from a sample to the command that follows from it; up to 1000 sample times."),
     row("controller.limit", "", INPUT, Words("none"), POSITIVE, "24 V", "Largest command, either way."),
-    row("controller.pid.proportional", "K_p", "V/m or A/m", Required, ANY, "2 V/mm", "Command per error of position."),
-    row("controller.pid.integral", "K_i", "V/(m s) or A/(m s)", Value(0.0), ANY, "30 V/(mm s)", "Command per integral of the error."),
-    row("controller.pid.derivative", "K_d", "V s/m or A s/m", Value(0.0), ANY, "25 V s/m", "Command per rate of the error."),
-    row("controller.pid.filter", "", "Hz", Value(200.0), FREQUENCY, "200 Hz", "Corner of the derivative's filter, of first order."),
-    row("controller.pid.reference_speed", "c", "", Value(1.0), Range::new(0.0, 10.0), "0", "Weight of the reference's speed in the derivative: 1 differentiates the error, 0 the measurement alone."),
-    row("controller.pid.tracking", "", "s", Value(0.05), DURATION, "50 ms", "Time in which the integral follows a command that is limited (anti-windup)."),
-    row("controller.cascade.position", "K_v", "rad/s", Required, NOT_NEGATIVE, "60 rad/s", "Speed asked for per error of position."),
-    row("controller.cascade.speed", "", "V s/m or A s/m", Required, ANY, "30 V s/m", "Command per error of speed; with a current loop the current."),
-    row("controller.cascade.speed_integral", "", "V/m or A/m", Value(0.0), ANY, "1 V/mm", "Command per integral of that; with a current loop the current."),
-    row("controller.cascade.filter", "", "Hz", Value(200.0), FREQUENCY, "200 Hz", "Corner of the filter of the measured speed, of first order."),
-    row("controller.cascade.reference_speed", "c", "", Value(1.0), Range::new(0.0, 10.0), "0", "Weight of the reference's speed in the speed that is asked for; 0 where the drive feeds none forward."),
-    row("controller.cascade.tracking", "", "s", Value(0.02), DURATION, "20 ms", "Time in which the integrals follow what is limited."),
-    row("controller.cascade.current.proportional", "", "V/A", Required, ANY, "0.3 V/A", "Voltage per error of current."),
-    row("controller.cascade.current.integral", "", "V/(A s)", Value(0.0), ANY, "200 V/(A s)", "Voltage per integral of that."),
-    row("controller.cascade.current.limit", "", "A", Words("none"), POSITIVE, "10 A", "Largest current asked for."),
-    row("controller.state_feedback.position", "", "m", Required, POSITIVE, "0.1 mm", "Error of the cart's position that weighs as much as `command`."),
-    row("controller.state_feedback.speed", "", "m/s", Words("no weight"), POSITIVE, "0.1 m/s", "The same of its speed."),
-    row("controller.state_feedback.integral", "", "m s", Words("no integral"), POSITIVE, "5e-6 m s", "The same of the integral of the measured error: makes it LQI."),
-    row("controller.state_feedback.command", "", INPUT, Required, POSITIVE, "5 V", "Command that weighs as much as each of these."),
-    row("controller.state_feedback.disturbance", "", INPUT, Required, POSITIVE, "1 V", "Standard deviation of an unknown command, and of a force on the cart as large, that the Kalman filter expects at each sample."),
-    row("controller.state_feedback.noise", "", "m", Value(0.0), NOT_NEGATIVE, "5 um", "Standard deviation of a measured position; at least 0.3 counts are taken."),
-    row("controller.sliding_mode.bandwidth", "λ", "rad/s", Required, POSITIVE, "60 rad/s", "How fast the error dies out on the sliding surface ė + λ e = 0."),
-    row("controller.sliding_mode.reaching", "K", "m/s^2", Required, POSITIVE, "4 m/s^2", "Acceleration that drives to the surface."),
-    row("controller.sliding_mode.boundary", "Φ", "m/s", Required, POSITIVE, "0.05 m/s", "Boundary layer: distance from the surface below which only a share of it does."),
-    row("controller.sliding_mode.integral", "", "s^-2", Value(0.0), NOT_NEGATIVE, "900 s^-2", "Weight of the error's integral in the surface."),
-    row("controller.sliding_mode.filter", "", "Hz", Value(200.0), FREQUENCY, "200 Hz", "Corner of the filter of the measured speed, of first order."),
-    row("controller.fuzzy.error", "", "m", Required, POSITIVE, "2 mm", "Error at the outermost sets."),
-    row("controller.fuzzy.rate", "", "m/s", Required, POSITIVE, "0.1 m/s", "Its rate at the outermost sets."),
+    row("controller.pid.proportional", "K_p", "V/m or A/m", Required, ANY, "2 V/mm", "Command per error of position.").held(gain!(Pid.proportional, Tuned::Gain)),
+    row("controller.pid.integral", "K_i", "V/(m s) or A/(m s)", Value(0.0), ANY, "30 V/(mm s)", "Command per integral of the error.").held(gain!(Pid.integral, Tuned::Gain)),
+    row("controller.pid.derivative", "K_d", "V s/m or A s/m", Value(0.0), ANY, "25 V s/m", "Command per rate of the error.").held(gain!(Pid.derivative, Tuned::Gain)),
+    row("controller.pid.filter", "", "Hz", Value(200.0), FREQUENCY, "200 Hz", "Corner of the derivative's filter, of first order.").held(gain!(Pid.filter, Tuned::Corner("controller.pid.derivative"))),
+    row("controller.pid.reference_speed", "c", "", Value(1.0), Range::new(0.0, 10.0), "0", "Weight of the reference's speed in the derivative: 1 differentiates the error, 0 the measurement alone.").held(gain!(Pid.reference_speed, Tuned::No)),
+    row("controller.pid.tracking", "", "s", Value(0.05), DURATION, "50 ms", "Time in which the integral follows a command that is limited (anti-windup).").held(gain!(Pid.tracking, Tuned::No)),
+    row("controller.cascade.position", "K_v", "rad/s", Required, NOT_NEGATIVE, "60 rad/s", "Speed asked for per error of position.").held(gain!(Cascade.position, Tuned::Gain)),
+    row("controller.cascade.speed", "", "V s/m or A s/m", Required, ANY, "30 V s/m", "Command per error of speed; with a current loop the current.").held(gain!(Cascade.speed, Tuned::Gain)),
+    row("controller.cascade.speed_integral", "", "V/m or A/m", Value(0.0), ANY, "1 V/mm", "Command per integral of that; with a current loop the current.").held(gain!(Cascade.speed_integral, Tuned::Gain)),
+    row("controller.cascade.filter", "", "Hz", Value(200.0), FREQUENCY, "200 Hz", "Corner of the filter of the measured speed, of first order.").held(gain!(Cascade.filter, Tuned::Corner("controller.cascade.speed"))),
+    row("controller.cascade.reference_speed", "c", "", Value(1.0), Range::new(0.0, 10.0), "0", "Weight of the reference's speed in the speed that is asked for; 0 where the drive feeds none forward.").held(gain!(Cascade.reference_speed, Tuned::No)),
+    row("controller.cascade.tracking", "", "s", Value(0.02), DURATION, "20 ms", "Time in which the integrals follow what is limited.").held(gain!(Cascade.tracking, Tuned::No)),
+    row("controller.cascade.current.proportional", "", "V/A", Required, ANY, "0.3 V/A", "Voltage per error of current.").held(gain!(Cascade.current?.proportional, Tuned::Gain)),
+    row("controller.cascade.current.integral", "", "V/(A s)", Value(0.0), ANY, "200 V/(A s)", "Voltage per integral of that.").held(gain!(Cascade.current?.integral, Tuned::Gain)),
+    row("controller.cascade.current.limit", "", "A", Words("none"), POSITIVE, "10 A", "Largest current asked for.").held(gain!(Cascade.current?.limit, Tuned::No)),
+    row("controller.state_feedback.position", "", "m", Required, POSITIVE, "0.1 mm", "Error of the cart's position that weighs as much as `command`.").held(gain!(StateFeedback.position, Tuned::Gain)),
+    row("controller.state_feedback.speed", "", "m/s", Words("no weight"), POSITIVE, "0.1 m/s", "The same of its speed.").held(gain!(StateFeedback.speed, Tuned::Gain)),
+    row("controller.state_feedback.integral", "", "m s", Words("no integral"), POSITIVE, "5e-6 m s", "The same of the integral of the measured error: makes it LQI.").held(gain!(StateFeedback.integral, Tuned::Gain)),
+    row("controller.state_feedback.command", "", INPUT, Required, POSITIVE, "5 V", "Command that weighs as much as each of these.").held(gain!(StateFeedback.command, Tuned::No)),
+    row("controller.state_feedback.disturbance", "", INPUT, Required, POSITIVE, "1 V", "Standard deviation of an unknown command, and of a force on the cart as large, that the Kalman filter expects at each sample.").held(gain!(StateFeedback.disturbance, Tuned::Gain)),
+    row("controller.state_feedback.noise", "", "m", Value(0.0), NOT_NEGATIVE, "5 um", "Standard deviation of a measured position; at least 0.3 counts are taken.").held(gain!(StateFeedback.noise, Tuned::No)),
+    row("controller.sliding_mode.bandwidth", "λ", "rad/s", Required, POSITIVE, "60 rad/s", "How fast the error dies out on the sliding surface ė + λ e = 0.").held(gain!(SlidingMode.bandwidth, Tuned::No)),
+    row("controller.sliding_mode.reaching", "K", "m/s^2", Required, POSITIVE, "4 m/s^2", "Acceleration that drives to the surface.").held(gain!(SlidingMode.reaching, Tuned::No)),
+    row("controller.sliding_mode.boundary", "Φ", "m/s", Required, POSITIVE, "0.05 m/s", "Boundary layer: distance from the surface below which only a share of it does.").held(gain!(SlidingMode.boundary, Tuned::No)),
+    row("controller.sliding_mode.integral", "", "s^-2", Value(0.0), NOT_NEGATIVE, "900 s^-2", "Weight of the error's integral in the surface.").held(gain!(SlidingMode.integral, Tuned::No)),
+    row("controller.sliding_mode.filter", "", "Hz", Value(200.0), FREQUENCY, "200 Hz", "Corner of the filter of the measured speed, of first order.").held(gain!(SlidingMode.filter, Tuned::No)),
+    row("controller.fuzzy.error", "", "m", Required, POSITIVE, "2 mm", "Error at the outermost sets.").held(gain!(Fuzzy.error, Tuned::No)),
+    row("controller.fuzzy.rate", "", "m/s", Required, POSITIVE, "0.1 m/s", "Its rate at the outermost sets.").held(gain!(Fuzzy.rate, Tuned::No)),
     row("controller.fuzzy.command", "", INPUT, Words("none with `slope`"), POSITIVE, "5 V", "Command of a rule of 1: makes it PD."),
     row("controller.fuzzy.slope", "", "V/s or A/s", Words("none with `command`"), POSITIVE, "100 V/s", "Change of the command of a rule of 1: makes it PI."),
     row("controller.fuzzy.rule", "", "", Required, Range::new(-1.0, 1.0), "0.5", "Each value in `rules`."),
-    row("controller.fuzzy.filter", "", "Hz", Value(200.0), FREQUENCY, "200 Hz", "Corner of the filter of the rate, of first order."),
+    row("controller.fuzzy.filter", "", "Hz", Value(200.0), FREQUENCY, "200 Hz", "Corner of the filter of the rate, of first order.").held(gain!(Fuzzy.filter, Tuned::No)),
     row("controller.feed_forward.inertia", "", "", Value(1.0), Range::new(0.0, 2.0), "1", "Share of the inertia's part that is fed forward."),
     row("controller.feed_forward.friction", "", "", Value(1.0), Range::new(0.0, 2.0), "0.8", "Share of the friction's."),
     row("controller.feed_forward.lead", "", "s", Words("the delay and half a sample"), TIME, "1 ms", "How far ahead of a sample it looks."),

@@ -25,17 +25,17 @@ pub struct Limits {
 
 /// Where the cart should be, and the first four derivatives of that.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Reference {
+pub struct Reference<N = f64> {
     /// y, m.
-    pub position: f64,
+    pub position: N,
     /// y′, m/s.
-    pub speed: f64,
+    pub speed: N,
     /// y″, m/s².
-    pub acceleration: f64,
+    pub acceleration: N,
     /// y‴, m/s³; zero for a trapezoid, whose acceleration jumps.
-    pub jerk: f64,
+    pub jerk: N,
     /// y⁗, m/s⁴; zero where the jerk jumps.
-    pub snap: f64,
+    pub snap: N,
 }
 
 impl Reference {

@@ -5,7 +5,7 @@ use crate::controller::{DERIVATIVES, program};
 use crate::design::Design;
 use crate::error::Result;
 use crate::machine::Machine;
-use crate::program::{Expr, Node, Operator, Program, Statement, Test};
+use crate::program::{Expr, Node, Operator, Program, Statement, Test, sign};
 use crate::shaper_remark;
 use std::fmt::Write;
 
@@ -53,7 +53,7 @@ impl Controller {
 
     pub(super) fn source(&self, writer: &Writer) -> String {
         let program = &self.program;
-        let read = program.read_inputs();
+        let read = &program.read;
         let mut fields = String::new();
         for state in &program.states {
             let _ = writeln!(fields, "    @name@_real {}; /* {} */", state.name, plain(&state.about));
@@ -61,7 +61,7 @@ impl Controller {
         let resets: Vec<String> = program
             .states
             .iter()
-            .map(|state| format!("    control.{} = {};", state.name, writer.number(state.start)))
+            .map(|state| format!("    control.{} = {};", state.name, writer.number(0.0)))
             .collect();
         let mut body = String::new();
         for input in program.inputs.iter().filter(|input| read.contains(&input.name)) {
@@ -116,7 +116,7 @@ impl Printer<'_> {
                     writeln!(text, "{indent}{} = {};", self.place(name), self.whole(value))
                 }
                 Statement::If(Test(relation, a, b), yes, no) => {
-                    let test = format!("{} {} {}", self.term(a), relation.sign(), self.term(b));
+                    let test = format!("{} {} {}", self.term(a), sign(*relation), self.term(b));
                     match yes.is_empty() {
                         true => {
                             let _ = writeln!(text, "{indent}if (!({test})) {{");

@@ -1,7 +1,7 @@
 //! IEC 61131-3 Structured Text: the controller as a function block.
 
 use super::controller::program;
-use super::program::{Expr, Node, Statement, Test};
+use super::program::{Expr, Node, Statement, Test, sign};
 use super::{Exported, Part, controller, identifier, shaper_note, shaper_remark, without_controller};
 use crate::case::Case;
 use crate::error::{Error, Result};
@@ -21,18 +21,18 @@ pub(super) fn export(case: &Case, part: Option<Part>, stem: &str) -> Result<Expo
     let program = program(design, &case.machine)?;
     let unit = case.machine.drives[0].amplifier.mode.unit();
     let lead = design.feed_forward.lead.unwrap_or(design.delay + 0.5 * design.every);
-    let read = program.read_inputs();
+    let read = &program.read;
     let inputs = program.inputs.iter().filter(|input| read.contains(&input.name));
     let inputs: Vec<String> =
         inputs.map(|input| format!("    {} : LREAL; (* {} *)", input.name, plain(&input.about))).collect();
     let states = program
         .states
         .iter()
-        .map(|state| format!("    {} : LREAL := {}; (* {} *)", state.name, literal(state.start), plain(&state.about)));
+        .map(|state| format!("    {} : LREAL := {}; (* {} *)", state.name, literal(0.0), plain(&state.about)));
     let locals = program.locals.iter().map(|local| format!("    {local} : LREAL;"));
     let kept: Vec<String> = states.chain(locals).collect();
     let resets: Vec<String> =
-        program.states.iter().map(|state| format!("    {} := {};", state.name, literal(state.start))).collect();
+        program.states.iter().map(|state| format!("    {} := {};", state.name, literal(0.0))).collect();
     let mut body = String::new();
     block(&program.body, 0, &mut body);
     let name = format!("{}_controller", identifier(stem));
@@ -93,7 +93,7 @@ fn block(body: &[Statement], depth: usize, text: &mut String) {
             Statement::Remark(remark) => writeln!(text, "{indent}(* {} *)", plain(remark)),
             Statement::Set(name, value) => writeln!(text, "{indent}{name} := {};", whole(value)),
             Statement::If(Test(relation, a, b), yes, no) => {
-                let test = format!("{} {} {}", term(a), relation.sign(), term(b));
+                let test = format!("{} {} {}", term(a), sign(*relation), term(b));
                 match yes.is_empty() {
                     true => {
                         let _ = writeln!(text, "{indent}IF NOT ({test}) THEN");

@@ -109,15 +109,18 @@ pub fn closed(request: &Request, context: &Context) -> Result<Reply> {
         "parameters": parameters(&opened, &opened.numbers()?),
     }));
     match nyquist(&case, design) {
-        Ok((margins, limit, curves)) => {
+        Ok((margins, limit, curves, is_linear)) => {
             let rows = taut_report::tune::margins(&margins, &margins);
-            let rows: Vec<Value> = rows.iter().map(|(name, value, _)| json!([name, value])).collect();
+            let mut rows: Vec<Value> = rows.iter().map(|(name, value, _)| json!([name, value])).collect();
+            if !is_linear {
+                rows.insert(0, json!(["at rest", "for small motions alone"]));
+            }
             reply.head.insert("margins".into(), json!({ "rows": rows, "limit": limit, "stable": margins.stable }));
             for (name, values) in ["hertz", "re", "im", "sensitivity", "complementary"].into_iter().zip(curves) {
                 kept.put(name, values);
             }
         }
-        // Some controllers are not linear: there is no L to show.
+        // What has no loop has no L to show.
         Err(error) => {
             reply.head.insert("margins".into(), json!({ "without": error.what }));
         }
@@ -161,8 +164,8 @@ fn warnings(done: &Done) -> Option<String> {
 }
 
 /// The margins on the axis as the file has it, the limit of Ms, and frequency, Re L, Im L where Ms stands, |S| and |T|
-/// at the worst break.
-fn nyquist(case: &Case, design: &Design) -> Result<(Margins, f64, [Vec<f64>; 5])> {
+/// at the worst break; and whether the controller is linear.
+fn nyquist(case: &Case, design: &Design) -> Result<(Margins, f64, [Vec<f64>; 5], bool)> {
     let tuning = case.tune.clone().unwrap_or_default();
     let feedback = Feedback::new(design, &case.machine)?;
     let family = Family::of(case, &tuning)?;
@@ -180,7 +183,7 @@ fn nyquist(case: &Case, design: &Design) -> Result<(Margins, f64, [Vec<f64>; 5])
         highest(Open::sensitivity),
         highest(Open::complementary),
     ];
-    Ok((margins, tuning.sensitivity, curves))
+    Ok((margins, tuning.sensitivity, curves, feedback.is_linear()))
 }
 
 /// Columns by name.

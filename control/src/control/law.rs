@@ -1,0 +1,163 @@
+//! Laws of control: what all of them have in common.
+//!
+//! A law is written once, for any [`Calculator`]. From its text follow the running controller ([`super::Standard`]), its
+//! linear view ([`super::feedback`]) and the exported program.
+
+use super::compensation::Compensation;
+use super::fuzzy::FuzzyLaw;
+use super::pid::{CascadeLaw, PidLaw};
+use super::sliding::SlidingLaw;
+use super::state_feedback::StateFeedbackLaw;
+use crate::calculator::{Calculator, Slot, Slots, less};
+use crate::design::{Design, Structure};
+use crate::error::Result;
+use crate::machine::Machine;
+use crate::machine::rigid::Rigid;
+use crate::signal::profile::Reference;
+
+/// What a law is shown at a sample.
+#[derive(Debug, Clone, Copy)]
+pub struct Seen<'a, N> {
+    /// Where the cart should be.
+    pub reference: Reference<N>,
+    /// Where the encoder's side should be, so that the cart is there.
+    pub target: Reference<N>,
+    /// Measured position, m along the belt.
+    pub position: N,
+    /// The cart on a scale beside that, m; none without a scale.
+    pub scale: Option<N>,
+    /// Measured motor current, A.
+    pub current: N,
+    /// What feed-forward adds to a current that the law commands, A, if it does.
+    pub forward: Option<N>,
+    /// What the reference asks of pulleys and motor.
+    pub compensation: &'a Compensation,
+}
+
+/// A structure with its gains, made for an axis.
+pub trait Law {
+    /// What it does, as a remark in a program.
+    fn about(&self) -> &'static str;
+
+    /// Whether it commands a current inside itself, into which feed-forward goes.
+    fn commands_current(&self) -> bool;
+
+    /// Whether it is linear, limits apart; slopes of another are those at rest.
+    fn is_linear(&self) -> bool;
+
+    /// The next command beside feed-forward.
+    fn step<C: Calculator>(&self, c: &mut C, seen: &Seen<C::N>) -> C::N;
+
+    /// Is told what the limit added to the command (`excess`), and what the axis gets beside what dry friction takes of
+    /// it.
+    fn limited<C: Calculator>(&self, c: &mut C, excess: C::N, effective: C::N);
+}
+
+/// One of the laws.
+#[derive(Debug, Clone)]
+pub(crate) enum AnyLaw {
+    Pid(PidLaw),
+    Cascade(CascadeLaw),
+    StateFeedback(Box<StateFeedbackLaw>),
+    SlidingMode(SlidingLaw),
+    Fuzzy(FuzzyLaw),
+}
+
+/// The same of each law.
+macro_rules! each_law {
+    ($self:expr, $law:ident => $done:expr) => {
+        match $self {
+            AnyLaw::Pid($law) => $done,
+            AnyLaw::Cascade($law) => $done,
+            AnyLaw::StateFeedback($law) => $done,
+            AnyLaw::SlidingMode($law) => $done,
+            AnyLaw::Fuzzy($law) => $done,
+        }
+    };
+}
+
+impl AnyLaw {
+    /// That of a design for a model of the axis.
+    pub fn new(slots: &mut Slots, design: &Design, model: &Machine) -> Result<Self> {
+        let every = design.every;
+        Ok(match &design.structure {
+            Structure::Pid(gains) => Self::Pid(PidLaw::new(slots, gains, every)),
+            Structure::Cascade(gains) => Self::Cascade(CascadeLaw::new(slots, gains, every)),
+            Structure::StateFeedback(weights) => {
+                Self::StateFeedback(Box::new(StateFeedbackLaw::new(slots, weights, model, design)?))
+            }
+            Structure::SlidingMode(gains) => Self::SlidingMode(SlidingLaw::new(slots, gains, &Rigid::of(model), every)),
+            Structure::Fuzzy(rules) => Self::Fuzzy(FuzzyLaw::new(slots, rules, every)),
+        })
+    }
+}
+
+impl Law for AnyLaw {
+    fn about(&self) -> &'static str {
+        each_law!(self, law => law.about())
+    }
+
+    fn commands_current(&self) -> bool {
+        each_law!(self, law => law.commands_current())
+    }
+
+    fn is_linear(&self) -> bool {
+        each_law!(self, law => law.is_linear())
+    }
+
+    fn step<C: Calculator>(&self, c: &mut C, seen: &Seen<C::N>) -> C::N {
+        each_law!(self, law => law.step(c, seen))
+    }
+
+    fn limited<C: Calculator>(&self, c: &mut C, excess: C::N, effective: C::N) {
+        each_law!(self, law => law.limited(c, excess, effective))
+    }
+}
+
+/// A number at the last sample; at the first one that of now.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Last {
+    has: Slot,
+    value: Slot,
+}
+
+impl Last {
+    pub fn new(slots: &mut Slots, name: &'static str, about: &'static str) -> Self {
+        Self { has: slots.add(format!("has_{name}"), "1 once there is one"), value: slots.add(name, about) }
+    }
+
+    /// What it was, taking what it is now.
+    pub fn step<C: Calculator>(&self, c: &mut C, now: C::N) -> C::N {
+        let (has, was, one) = (c.memory(self.has), c.memory(self.value), c.number(1.0));
+        c.keep(self.has, one);
+        c.keep(self.value, now);
+        let last = c.choose(less(has, 0.5), now, was);
+        c.name("before", last)
+    }
+}
+
+/// Speed from a measured position: differences through a filter of first order.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Speed {
+    every: f64,
+    keep: f64,
+    last: Last,
+    value: Slot,
+}
+
+impl Speed {
+    /// With a corner at `filter`, Hz.
+    pub fn new(slots: &mut Slots, every: f64, filter: f64) -> Self {
+        let last = Last::new(slots, "last", "position at the last sample, m");
+        let keep = (-2.0 * std::f64::consts::PI * filter * every).exp();
+        Self { every, keep, last, value: slots.add("speed", "filtered speed, m/s") }
+    }
+
+    pub fn step<C: Calculator>(&self, c: &mut C, position: C::N) -> C::N {
+        let difference = (position - self.last.step(c, position)) / self.every;
+        let speed = c.memory(self.value) * self.keep + difference * (1.0 - self.keep);
+        let speed = c.name("new_speed", speed);
+        c.keep(self.value, speed);
+        speed
+    }
+}

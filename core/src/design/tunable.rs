@@ -1,0 +1,412 @@
+//! What tuning, hunting, the reader of case files and reports ask of a structure. No answer has a default, so that the
+//! compiler lists them all for a new structure.
+
+use super::placement::{CASCADE, least};
+use super::{Cascade, CurrentLoop, Design, FeedForwardModel, Fuzzy, Pid, SlidingMode, StateFeedback, Structure};
+use crate::machine::Machine;
+use crate::machine::rigid::Rigid;
+use std::f64::consts::PI;
+
+/// How gains of a structure are found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TunedBy {
+    /// They follow from bandwidth and damping, and a search begins there.
+    Bandwidth,
+    /// They follow from weights, at which a search begins.
+    Weights,
+    /// They are not searched for.
+    Nothing,
+}
+
+/// What is asked of a structure.
+pub trait Tunable {
+    /// Its key in the case file.
+    fn word(&self) -> &'static str;
+
+    /// Its name for people.
+    fn name(&self) -> &'static str;
+
+    /// Whether it uses a scale beside the encoder.
+    fn reads_scale(&self) -> bool;
+
+    /// Whether its position loop is closed at that scale, where no stretch is seen.
+    fn follows_scale(&self) -> bool;
+
+    /// Whether it commands a current inside itself.
+    fn commands_current(&self) -> bool;
+
+    /// Feed-forward where the case file says nothing.
+    fn feed_forward(&self) -> FeedForwardModel;
+
+    /// How its gains are found.
+    fn tuned_by(&self) -> TunedBy;
+
+    /// With gains for this bandwidth (Hz) and damping, as [`super::placement::place`] says; none where it has no such
+    /// gains.
+    fn placed(&self, design: &Design, machine: &Machine, bandwidth: f64, damping: f64) -> Option<Structure>;
+
+    /// Other gains to begin a search with.
+    fn starts(&self, design: &Design, machine: &Machine) -> Vec<Structure>;
+
+    /// With its integral action times `factor`, none with 0; none without integral action.
+    fn integral_times(&self, factor: f64) -> Option<Structure>;
+
+    /// By how much the command that it gives grows per second and metre of an error that stays, V or A; zero where that is
+    /// not known from its gains alone.
+    fn ramp(&self) -> f64;
+
+    /// Whether nothing in it damps, so that it wants a derivative.
+    fn lacks_damping(&self) -> bool;
+
+    /// Samples of a run that take as long as its margins on a set of axes.
+    fn costs(&self) -> u64;
+}
+
+/// Margins of gains that need nothing solved before, and those behind two Riccati equations.
+const QUICK: u64 = 500;
+const SOLVED: u64 = 2000;
+
+impl Tunable for Pid {
+    fn word(&self) -> &'static str {
+        "pid"
+    }
+
+    fn name(&self) -> &'static str {
+        "PID"
+    }
+
+    fn reads_scale(&self) -> bool {
+        false
+    }
+
+    fn follows_scale(&self) -> bool {
+        false
+    }
+
+    fn commands_current(&self) -> bool {
+        false
+    }
+
+    fn feed_forward(&self) -> FeedForwardModel {
+        FeedForwardModel::None
+    }
+
+    fn tuned_by(&self) -> TunedBy {
+        TunedBy::Bandwidth
+    }
+
+    fn placed(&self, _: &Design, machine: &Machine, bandwidth: f64, damping: f64) -> Option<Structure> {
+        let rigid = Rigid::of(machine);
+        let (mass, w) = (rigid.mass, 2.0 * PI * bandwidth);
+        let (drag, push) = (rigid.drag(), rigid.force_per_command().abs());
+        let sign = rigid.force_per_command().signum();
+        // s³ + (d + g K_d)/M s² + g K_p/M s + g K_i/M
+        let real = if self.integral == 0.0 { 0.0 } else { damping * w };
+        let gain = |coefficient: f64| sign * mass * coefficient / push;
+        Some(Structure::Pid(Pid {
+            proportional: gain(w * w + 2.0 * damping * w * real),
+            integral: gain(real * w * w),
+            derivative: match self.derivative {
+                0.0 => 0.0,
+                _ => sign * least(mass * (2.0 * damping * w + real), drag) / push,
+            },
+            ..*self
+        }))
+    }
+
+    /// Skogestad's rule for k e^{−θs}/(s (τ s + 1)) with τ_c = θ: K_c = 1/(2 k θ), τ_I = 8 θ, τ_D = τ, in series.
+    ///
+    /// S. Skogestad, "Simple analytic rules for model reduction and PID controller tuning", Journal of Process Control 13
+    /// (2003).
+    fn starts(&self, design: &Design, machine: &Machine) -> Vec<Structure> {
+        let rigid = Rigid::of(machine);
+        let late = design.delay + 0.5 * design.every + 1.0 / (2.0 * PI * self.filter);
+        let (drag, push) = (rigid.drag(), rigid.force_per_command());
+        // M ẍ + d ẋ = g u:  k = g/d, τ = M/d; without drag k/τ is what counts.
+        if drag <= 0.0 {
+            return Vec::new();
+        }
+        let (lag, gain) = (rigid.mass / drag, push / drag);
+        let (c, integral, derivative) = (0.5 / (gain * late), 8.0 * late, lag.min(8.0 * late));
+        // From series to parallel form.
+        let factor = 1.0 + derivative / integral;
+        let kept = |old: f64, new: f64| if old == 0.0 { 0.0 } else { new };
+        vec![Structure::Pid(Pid {
+            proportional: c * factor,
+            integral: kept(self.integral, c / integral),
+            derivative: kept(self.derivative, c * derivative),
+            ..*self
+        })]
+    }
+
+    fn integral_times(&self, factor: f64) -> Option<Structure> {
+        let integral = factor * self.integral;
+        (self.integral != 0.0).then_some(Structure::Pid(Self { integral, ..*self }))
+    }
+
+    fn ramp(&self) -> f64 {
+        self.integral
+    }
+
+    fn lacks_damping(&self) -> bool {
+        self.derivative == 0.0
+    }
+
+    fn costs(&self) -> u64 {
+        QUICK
+    }
+}
+
+impl Tunable for Cascade {
+    fn word(&self) -> &'static str {
+        "cascade"
+    }
+
+    fn name(&self) -> &'static str {
+        if self.current.is_some() { "cascade P-PI-PI" } else { "cascade P-PI" }
+    }
+
+    fn reads_scale(&self) -> bool {
+        true
+    }
+
+    fn follows_scale(&self) -> bool {
+        true
+    }
+
+    fn commands_current(&self) -> bool {
+        self.current.is_some()
+    }
+
+    fn feed_forward(&self) -> FeedForwardModel {
+        FeedForwardModel::None
+    }
+
+    fn tuned_by(&self) -> TunedBy {
+        TunedBy::Bandwidth
+    }
+
+    fn placed(&self, design: &Design, machine: &Machine, bandwidth: f64, damping: f64) -> Option<Structure> {
+        let rigid = Rigid::of(machine);
+        let (mass, w) = (rigid.mass, 2.0 * PI * bandwidth);
+        let speed = CASCADE * w;
+        let current = self.current.map(|inner| {
+            let late = 0.5 * design.every + design.delay;
+            let pole = (CASCADE * speed).min(0.5 / late.max(f64::MIN_POSITIVE));
+            let gain = machine.drives[0].amplifier.gain;
+            CurrentLoop {
+                proportional: pole * machine.drives[0].motor.inductance / gain,
+                integral: pole * machine.drives[0].motor.resistance / gain,
+                ..inner
+            }
+        });
+        // Around a current the axis has no back-EMF.
+        let (drag, push) = match current {
+            Some(_) => (rigid.viscous[0], rigid.force_per_ampere),
+            None => (rigid.drag(), rigid.force_per_command()),
+        };
+        let (sign, push) = (push.signum(), push.abs());
+        let middle = if self.speed_integral == 0.0 { speed } else { 2.0 * damping * speed };
+        Some(Structure::Cascade(Cascade {
+            position: w,
+            speed: sign * least(mass * middle, drag) / push,
+            speed_integral: if self.speed_integral == 0.0 { 0.0 } else { sign * mass * speed * speed / push },
+            current,
+            ..*self
+        }))
+    }
+
+    fn starts(&self, _: &Design, _: &Machine) -> Vec<Structure> {
+        Vec::new()
+    }
+
+    fn integral_times(&self, factor: f64) -> Option<Structure> {
+        let speed_integral = factor * self.speed_integral;
+        (self.speed_integral != 0.0).then_some(Structure::Cascade(Self { speed_integral, ..*self }))
+    }
+
+    fn ramp(&self) -> f64 {
+        self.speed_integral * self.position
+    }
+
+    fn lacks_damping(&self) -> bool {
+        false
+    }
+
+    fn costs(&self) -> u64 {
+        QUICK
+    }
+}
+
+impl Tunable for StateFeedback {
+    fn word(&self) -> &'static str {
+        "state_feedback"
+    }
+
+    fn name(&self) -> &'static str {
+        if self.integral.is_some() { "state feedback (LQI)" } else { "state feedback (LQG)" }
+    }
+
+    fn reads_scale(&self) -> bool {
+        true
+    }
+
+    fn follows_scale(&self) -> bool {
+        false
+    }
+
+    fn commands_current(&self) -> bool {
+        false
+    }
+
+    /// It has its states from the model.
+    fn feed_forward(&self) -> FeedForwardModel {
+        FeedForwardModel::Elastic
+    }
+
+    fn tuned_by(&self) -> TunedBy {
+        TunedBy::Weights
+    }
+
+    fn placed(&self, _: &Design, _: &Machine, _: f64, _: f64) -> Option<Structure> {
+        None
+    }
+
+    /// The same regulator behind slower filters.
+    fn starts(&self, _: &Design, _: &Machine) -> Vec<Structure> {
+        let slower = |share: f64| Self { disturbance: share * self.disturbance, ..*self };
+        [0.3, 0.1].map(|share| Structure::StateFeedback(slower(share))).into()
+    }
+
+    fn integral_times(&self, factor: f64) -> Option<Structure> {
+        // The gain is about the inverse of the weight.
+        let integral = Some(self.integral? / factor).filter(|weight| weight.is_finite());
+        Some(Structure::StateFeedback(Self { integral, ..*self }))
+    }
+
+    /// It follows from the weights by an equation.
+    fn ramp(&self) -> f64 {
+        0.0
+    }
+
+    fn lacks_damping(&self) -> bool {
+        false
+    }
+
+    fn costs(&self) -> u64 {
+        SOLVED
+    }
+}
+
+impl Tunable for SlidingMode {
+    fn word(&self) -> &'static str {
+        "sliding_mode"
+    }
+
+    fn name(&self) -> &'static str {
+        "sliding mode"
+    }
+
+    fn reads_scale(&self) -> bool {
+        false
+    }
+
+    fn follows_scale(&self) -> bool {
+        false
+    }
+
+    fn commands_current(&self) -> bool {
+        false
+    }
+
+    /// Its equivalent control is that of the model.
+    fn feed_forward(&self) -> FeedForwardModel {
+        FeedForwardModel::Rigid
+    }
+
+    fn tuned_by(&self) -> TunedBy {
+        TunedBy::Nothing
+    }
+
+    fn placed(&self, _: &Design, _: &Machine, _: f64, _: f64) -> Option<Structure> {
+        None
+    }
+
+    fn starts(&self, _: &Design, _: &Machine) -> Vec<Structure> {
+        Vec::new()
+    }
+
+    fn integral_times(&self, factor: f64) -> Option<Structure> {
+        let integral = factor * self.integral;
+        (self.integral != 0.0).then_some(Structure::SlidingMode(Self { integral, ..*self }))
+    }
+
+    /// It ends at the boundary of its layer, and depends on the mass of the axis.
+    fn ramp(&self) -> f64 {
+        0.0
+    }
+
+    fn lacks_damping(&self) -> bool {
+        false
+    }
+
+    fn costs(&self) -> u64 {
+        QUICK
+    }
+}
+
+impl Tunable for Fuzzy {
+    fn word(&self) -> &'static str {
+        "fuzzy"
+    }
+
+    fn name(&self) -> &'static str {
+        if self.incremental { "fuzzy PI" } else { "fuzzy PD" }
+    }
+
+    fn reads_scale(&self) -> bool {
+        false
+    }
+
+    fn follows_scale(&self) -> bool {
+        false
+    }
+
+    fn commands_current(&self) -> bool {
+        false
+    }
+
+    fn feed_forward(&self) -> FeedForwardModel {
+        FeedForwardModel::None
+    }
+
+    fn tuned_by(&self) -> TunedBy {
+        TunedBy::Nothing
+    }
+
+    fn placed(&self, _: &Design, _: &Machine, _: f64, _: f64) -> Option<Structure> {
+        None
+    }
+
+    fn starts(&self, _: &Design, _: &Machine) -> Vec<Structure> {
+        Vec::new()
+    }
+
+    /// Its rules are integral action and damping in one.
+    fn integral_times(&self, _: f64) -> Option<Structure> {
+        None
+    }
+
+    /// It is not the same for all errors.
+    fn ramp(&self) -> f64 {
+        0.0
+    }
+
+    fn lacks_damping(&self) -> bool {
+        false
+    }
+
+    fn costs(&self) -> u64 {
+        QUICK
+    }
+}
