@@ -554,8 +554,8 @@ impl Pages<'_> {
             };
             Statement::If(is(column, j), corners.map(one).collect(), Vec::new())
         };
-        for i in 0..rules.len().saturating_sub(1) {
-            let columns = (0..rules[i].len().saturating_sub(1)).map(|j| set(i, j)).collect();
+        for (i, across) in rules.iter().take(rules.len().saturating_sub(1)).enumerate() {
+            let columns = (0..across.len().saturating_sub(1)).map(|j| set(i, j)).collect();
             statements.push(Statement::If(is(row, i), columns, Vec::new()));
         }
     }
