@@ -198,7 +198,7 @@ fn the_worst_break_of_every_structure_is_that_of_a_dense_grid() {
                 let off = if ours == theirs || is_level { 0.0 } else { (ours / theirs - 1.0).abs() };
                 let off = if off.is_nan() { f64::INFINITY } else { off };
                 beside[k] = beside[k].max(off);
-                if off >= 1e-5 || !is_level && ours.is_finite() && !has_it {
+                if off >= 1e-6 || !is_level && ours.is_finite() && !has_it {
                     wrong.push(told(&format!("figure {k} at {} is {ours}, not {theirs}\n{}", named.word(), shown())));
                 }
             }

@@ -4,15 +4,7 @@
 //! linear view ([`super::feedback`]) and the exported program.
 
 use super::compensation::Compensation;
-use super::fuzzy::FuzzyLaw;
-use super::pid::{CascadeLaw, PidLaw};
-use super::sliding::SlidingLaw;
-use super::state_feedback::StateFeedbackLaw;
 use crate::calculator::{Calculator, Slot, Slots, less};
-use crate::design::{Design, Structure};
-use crate::error::Result;
-use crate::machine::Machine;
-use crate::machine::rigid::Rigid;
 use crate::signal::profile::Reference;
 
 /// What a law is shown at a sample.
@@ -51,67 +43,6 @@ pub trait Law {
     /// Is told what the limit added to the command (`excess`), and what the axis gets beside what dry friction takes of
     /// it.
     fn limited<C: Calculator>(&self, c: &mut C, excess: C::N, effective: C::N);
-}
-
-/// One of the laws.
-#[derive(Debug, Clone)]
-pub(crate) enum AnyLaw {
-    Pid(PidLaw),
-    Cascade(CascadeLaw),
-    StateFeedback(Box<StateFeedbackLaw>),
-    SlidingMode(SlidingLaw),
-    Fuzzy(FuzzyLaw),
-}
-
-/// The same of each law.
-macro_rules! each_law {
-    ($self:expr, $law:ident => $done:expr) => {
-        match $self {
-            AnyLaw::Pid($law) => $done,
-            AnyLaw::Cascade($law) => $done,
-            AnyLaw::StateFeedback($law) => $done,
-            AnyLaw::SlidingMode($law) => $done,
-            AnyLaw::Fuzzy($law) => $done,
-        }
-    };
-}
-
-impl AnyLaw {
-    /// That of a design for a model of the axis.
-    pub fn new(slots: &mut Slots, design: &Design, model: &Machine) -> Result<Self> {
-        let every = design.every;
-        Ok(match &design.structure {
-            Structure::Pid(gains) => Self::Pid(PidLaw::new(slots, gains, every)),
-            Structure::Cascade(gains) => Self::Cascade(CascadeLaw::new(slots, gains, every)),
-            Structure::StateFeedback(weights) => {
-                Self::StateFeedback(Box::new(StateFeedbackLaw::new(slots, weights, model, design)?))
-            }
-            Structure::SlidingMode(gains) => Self::SlidingMode(SlidingLaw::new(slots, gains, &Rigid::of(model), every)),
-            Structure::Fuzzy(rules) => Self::Fuzzy(FuzzyLaw::new(slots, rules, every)),
-        })
-    }
-}
-
-impl Law for AnyLaw {
-    fn about(&self) -> &'static str {
-        each_law!(self, law => law.about())
-    }
-
-    fn commands_current(&self) -> bool {
-        each_law!(self, law => law.commands_current())
-    }
-
-    fn is_linear(&self) -> bool {
-        each_law!(self, law => law.is_linear())
-    }
-
-    fn step<C: Calculator>(&self, c: &mut C, seen: &Seen<C::N>) -> C::N {
-        each_law!(self, law => law.step(c, seen))
-    }
-
-    fn limited<C: Calculator>(&self, c: &mut C, excess: C::N, effective: C::N) {
-        each_law!(self, law => law.limited(c, excess, effective))
-    }
 }
 
 /// A number at the last sample; at the first one that of now.

@@ -20,6 +20,7 @@ pub mod fuzzy;
 mod insensitive;
 mod kind;
 pub(crate) mod law;
+mod laws;
 pub mod model;
 pub mod observer;
 mod outcome;

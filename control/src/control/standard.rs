@@ -2,7 +2,8 @@
 
 use super::compensation::Compensation;
 use super::filter::Biquad;
-use super::law::{AnyLaw, Law, Seen};
+use super::law::{Law, Seen};
+use super::laws::AnyLaw;
 use super::observer::DisturbanceObserver;
 use super::sampled::{Controller, Observation};
 use crate::calculator::{Calculator, Run, Slot, Slots, less, more};

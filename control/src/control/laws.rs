@@ -1,0 +1,73 @@
+//! The laws of control, one for each structure of a design.
+
+use super::fuzzy::FuzzyLaw;
+use super::law::{Law, Seen};
+use super::pid::{CascadeLaw, PidLaw};
+use super::sliding::SlidingLaw;
+use super::state_feedback::StateFeedbackLaw;
+use crate::calculator::{Calculator, Slots};
+use crate::design::{Design, Structure};
+use crate::error::Result;
+use crate::machine::Machine;
+use crate::machine::rigid::Rigid;
+
+/// One of the laws.
+#[derive(Debug, Clone)]
+pub enum AnyLaw {
+    Pid(PidLaw),
+    Cascade(CascadeLaw),
+    StateFeedback(Box<StateFeedbackLaw>),
+    SlidingMode(SlidingLaw),
+    Fuzzy(FuzzyLaw),
+}
+
+/// The same of each law.
+macro_rules! each_law {
+    ($self:expr, $law:ident => $done:expr) => {
+        match $self {
+            AnyLaw::Pid($law) => $done,
+            AnyLaw::Cascade($law) => $done,
+            AnyLaw::StateFeedback($law) => $done,
+            AnyLaw::SlidingMode($law) => $done,
+            AnyLaw::Fuzzy($law) => $done,
+        }
+    };
+}
+
+impl AnyLaw {
+    /// That of a design for a model of the axis.
+    pub fn new(slots: &mut Slots, design: &Design, model: &Machine) -> Result<Self> {
+        let every = design.every;
+        Ok(match &design.structure {
+            Structure::Pid(gains) => Self::Pid(PidLaw::new(slots, gains, every)),
+            Structure::Cascade(gains) => Self::Cascade(CascadeLaw::new(slots, gains, every)),
+            Structure::StateFeedback(weights) => {
+                Self::StateFeedback(Box::new(StateFeedbackLaw::new(slots, weights, model, design)?))
+            }
+            Structure::SlidingMode(gains) => Self::SlidingMode(SlidingLaw::new(slots, gains, &Rigid::of(model), every)),
+            Structure::Fuzzy(rules) => Self::Fuzzy(FuzzyLaw::new(slots, rules, every)),
+        })
+    }
+}
+
+impl Law for AnyLaw {
+    fn about(&self) -> &'static str {
+        each_law!(self, law => law.about())
+    }
+
+    fn commands_current(&self) -> bool {
+        each_law!(self, law => law.commands_current())
+    }
+
+    fn is_linear(&self) -> bool {
+        each_law!(self, law => law.is_linear())
+    }
+
+    fn step<C: Calculator>(&self, c: &mut C, seen: &Seen<C::N>) -> C::N {
+        each_law!(self, law => law.step(c, seen))
+    }
+
+    fn limited<C: Calculator>(&self, c: &mut C, excess: C::N, effective: C::N) {
+        each_law!(self, law => law.limited(c, excess, effective))
+    }
+}
