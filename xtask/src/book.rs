@@ -1,7 +1,9 @@
-//! `cargo xtask book`: builds the documents as a book under `target/book/html` and checks every link in it.
+//! `cargo xtask book [--program TAUT]`: builds the documents as a book under `target/book/html` and checks every link in
+//! it.
 //!
 //! The pages of `docs` are copied to `target/book/docs`. Lines `<!-- generated: ... -->` are replaced there by tables of
-//! the JSON schemas, the Python API and a C header, which the program and the package themselves provide.
+//! the JSON schemas, the Python API and a C header, which the program and the package themselves provide. The program is
+//! built first, unless a built one is named.
 
 mod generated;
 mod links;
@@ -10,14 +12,19 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-pub const USAGE: &str = "cargo xtask book";
+pub const USAGE: &str = "cargo xtask book [--program TAUT]";
 
 /// The version of mdBook that is installed under `target/mdbook`.
 const VERSION: &str = "0.5.4";
 
 /// Builds the book and checks its links.
-pub fn run() -> Result<(), String> {
+pub fn run(words: &[&str]) -> Result<(), String> {
     let target = crate::python::target();
+    let program = match words {
+        [] => built(&target)?,
+        ["--program", program] => PathBuf::from(program),
+        _ => return Err(format!("usage: {USAGE}")),
+    };
     let mdbook = mdbook(&target)?;
     let folder = target.join("book");
     let _ = fs::remove_dir_all(&folder);
@@ -25,7 +32,7 @@ pub fn run() -> Result<(), String> {
     copy(Path::new("docs"), &pages)?;
     write(&folder.join("book.toml"), &read(Path::new("book.toml"))?)?;
     for page in files(&pages)?.iter().filter(|path| path.extension().is_some_and(|e| e == "md")) {
-        let text = generated::filled(&read(page)?)?;
+        let text = generated::filled(&read(page)?, &program)?;
         write(page, &links::within(&text, &pages)?)?;
     }
     let html = folder.join("html");
@@ -41,6 +48,17 @@ pub fn run() -> Result<(), String> {
     }
     println!("{checked} links lead somewhere; the book begins at {}", html.join("index.html").display());
     Ok(())
+}
+
+/// Path of the program `taut`, which is built first.
+fn built(target: &Path) -> Result<PathBuf, String> {
+    match crate::cargo(&["build", "--quiet", "--package", "taut-cli", "--bin", "taut"]).status() {
+        Ok(status) if status.success() => {
+            Ok(target.join("debug").join(format!("taut{}", std::env::consts::EXE_SUFFIX)))
+        }
+        Ok(_) => Err("the program taut could not be built".into()),
+        Err(error) => Err(format!("cargo cannot be started: {error}")),
+    }
 }
 
 /// Path of mdBook in the wanted version, which is installed first where it is missing.

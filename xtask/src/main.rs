@@ -96,7 +96,7 @@ fn main() -> ExitCode {
         ["browser"] => test(&[BROWSER]),
         ["export"] => test(&[TOOLS, EXPORTS]),
         ["bad"] => bad::run(),
-        ["book"] => book::run(),
+        ["book", ref words @ ..] => book::run(words),
         ["data", ref words @ ..] => data::run(words),
         ["dist", ref words @ ..] => dist::run(words),
         ["counts", ref words @ ..] => counts::run(words),

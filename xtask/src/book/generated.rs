@@ -2,21 +2,22 @@
 
 use serde_json::Value;
 use std::fmt::Write;
+use std::path::Path;
 use std::process::{Command, Stdio};
 
 /// The case whose exported header stands for all.
 const EXPORTED: &str = "stages/sollmann-jouaneh/controllers/pid.toml";
 
 /// A page with its lines `<!-- generated: NAME -->` replaced.
-pub fn filled(text: &str) -> Result<String, String> {
+pub fn filled(text: &str, program: &Path) -> Result<String, String> {
     let mut filled = String::new();
     for line in text.lines() {
         let name = line.strip_prefix("<!-- generated: ").and_then(|rest| rest.strip_suffix(" -->"));
         filled += &match name {
             None => line.to_string(),
-            Some("schemas") => schemas()?,
+            Some("schemas") => schemas(program)?,
             Some("python") => output(Command::new("python3").arg("py/reference.py"))?,
-            Some("header") => header()?,
+            Some("header") => header(program)?,
             Some(other) => return Err(format!("{other} cannot be generated; schemas, python and header can")),
         };
         filled.push('\n');
@@ -35,25 +36,24 @@ fn output(command: &mut Command) -> Result<String, String> {
     String::from_utf8(output.stdout).map_err(|_| format!("the output of {name} is not text"))
 }
 
-/// What taut prints.
-fn taut(words: &[&str]) -> Result<String, String> {
-    let mut command = crate::cargo(&["run", "--quiet", "--package", "taut-cli", "--bin", "taut", "--"]);
-    output(command.args(words))
+/// What the program prints.
+fn taut(program: &Path, words: &[&str]) -> Result<String, String> {
+    output(Command::new(program).args(words))
 }
 
 /// A header as `taut export c` writes it.
-fn header() -> Result<String, String> {
+fn header(program: &Path) -> Result<String, String> {
     let file = crate::python::target().join("book/axis.c");
-    taut(&["export", "c", EXPORTED, "--out", &file.display().to_string()])?;
+    taut(program, &["export", "c", EXPORTED, "--out", &file.display().to_string()])?;
     Ok(format!("```c\n{}```\n", super::read(&file.with_extension("h"))?))
 }
 
 /// A table for every schema.
-fn schemas() -> Result<String, String> {
+fn schemas(program: &Path) -> Result<String, String> {
     let mut text = String::new();
-    for line in taut(&["schema"])?.lines().filter_map(|line| line.strip_prefix("  ")) {
+    for line in taut(program, &["schema"])?.lines().filter_map(|line| line.strip_prefix("  ")) {
         let (name, what) = line.split_once("  ").unwrap_or((line, ""));
-        let schema = taut(&["schema", name])?;
+        let schema = taut(program, &["schema", name])?;
         let schema: Value = serde_json::from_str(&schema).map_err(|error| format!("taut schema {name}: {error}"))?;
         let _ = writeln!(text, "## {name}\n\n{}\n", what.trim());
         text += "| key | type | meaning |\n|---|---|---|\n";
