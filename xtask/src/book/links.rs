@@ -9,7 +9,7 @@ const COPIES: &str = "repository";
 
 /// Changes the links of a page to files outside `docs` so that they lead to copies in the book, and makes these copies.
 ///
-/// A copy of a Markdown file ends in `.md.txt`, since mdBook takes `.md` for a page. A link to a folder leads to its
+/// A copy of a Markdown file ends in `.txt`, since mdBook takes `.md` for a page. A link to a folder leads to its
 /// `README.md`.
 pub fn within(text: &str, pages: &Path) -> Result<String, String> {
     let mut parts = text.split("](../");
@@ -21,10 +21,8 @@ pub fn within(text: &str, pages: &Path) -> Result<String, String> {
         if file.is_dir() {
             file.push("README.md");
         }
-        let mut name = file.display().to_string();
-        if name.ends_with(".md") {
-            name.push_str(".txt");
-        }
+        let name = file.display().to_string();
+        let name = name.strip_suffix(".md").map_or(name.clone(), |stem| format!("{stem}.txt"));
         copy_file(&file, &pages.join(COPIES).join(&name))?;
         changed += &format!("]({COPIES}/{name}){rest}");
     }
