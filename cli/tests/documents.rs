@@ -282,6 +282,84 @@ fn what_the_documents_name_is_there() {
     assert!(missing.is_empty(), "{missing:#?}");
 }
 
+/// A text without its fenced blocks.
+fn without_blocks(text: &str) -> String {
+    let mut is_block = false;
+    let mut kept = String::new();
+    for line in text.lines() {
+        let is_fence = line.trim_start().starts_with("```");
+        if !is_block && !is_fence {
+            kept.extend([line, "\n"]);
+        }
+        is_block ^= is_fence;
+    }
+    kept
+}
+
+/// The anchors of a page's headings, as GitHub and mdBook make them.
+fn anchors(text: &str) -> Vec<String> {
+    let mut anchors: Vec<String> = Vec::new();
+    for line in without_blocks(text).lines().filter(|line| line.starts_with('#')) {
+        let heading = line.trim_start_matches('#').trim().to_lowercase();
+        let kept = heading.chars().filter(|c| c.is_alphanumeric() || [' ', '-', '_'].contains(c));
+        let plain: String = kept.map(|c| if c == ' ' { '-' } else { c }).collect();
+        let same = anchors.iter().filter(|anchor| **anchor == plain).count();
+        anchors.push(if same > 0 { format!("{plain}-{same}") } else { plain });
+    }
+    anchors
+}
+
+/// Every link to a heading, in the book and outside, leads to one.
+#[test]
+fn links_to_headings_lead_to_headings() {
+    let mut documents = Vec::new();
+    for (folder, is_deep) in [("", false), ("docs", true), ("authorities", true), ("stages", true), ("py", false)] {
+        markdown(&root().join(folder), is_deep, &mut documents);
+    }
+    let (mut missing, mut links) = (Vec::new(), 0);
+    for path in &documents {
+        let text = fs::read_to_string(path).unwrap();
+        for link in without_blocks(&text).split("](").skip(1).filter_map(|rest| rest.split(')').next()) {
+            let Some((file, anchor)) = link.split_once('#').filter(|_| !link.contains("://")) else { continue };
+            let to = if file.is_empty() { path.clone() } else { path.parent().unwrap().join(file) };
+            let there = fs::read_to_string(&to).unwrap_or_default();
+            if !anchors(&there).iter().any(|there| there == anchor) {
+                missing.push(format!("{}: {link}", path.strip_prefix(root()).unwrap_or(path).display()));
+            }
+            links += 1;
+        }
+    }
+    assert!(links > 40, "{links}");
+    assert!(missing.is_empty(), "{missing:#?}");
+}
+
+/// The table of contents of the book names every page once, and no other.
+#[test]
+fn the_book_has_every_page() {
+    let summary = read("docs/SUMMARY.md");
+    let mut named: Vec<&str> = summary.split("](").skip(1).filter_map(|rest| rest.split(')').next()).collect();
+    named.sort_unstable();
+    let mut pages = Vec::new();
+    markdown(&root().join("docs"), false, &mut pages);
+    let names = pages.iter().map(|path| path.file_name().unwrap().to_string_lossy().into_owned());
+    let mut pages: Vec<String> = names.filter(|name| name != "SUMMARY.md").collect();
+    pages.sort_unstable();
+    assert_eq!(named, pages);
+}
+
+/// A page begins with an explanation, not with a block of code.
+#[test]
+fn every_page_begins_with_an_explanation() {
+    let mut pages = Vec::new();
+    markdown(&root().join("docs"), false, &mut pages);
+    for path in pages.iter().filter(|path| !path.ends_with("SUMMARY.md")) {
+        let text = fs::read_to_string(path).unwrap();
+        let first = text.lines().skip(1).find(|line| !line.trim().is_empty()).unwrap_or_default();
+        let is_prose = first.starts_with(|c: char| c.is_alphabetic() || c == '`' || c == '"' || c == '[');
+        assert!(text.starts_with("# ") && is_prose && !first.starts_with("```"), "{}: {first}", path.display());
+    }
+}
+
 /// The first column of NOTATION.md's tables holds names that the code has.
 #[test]
 fn the_names_of_the_notation_are_those_of_the_code() {

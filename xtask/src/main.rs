@@ -5,9 +5,10 @@
 //! `cargo xtask hunt` looks for what is wrong with larger means, `cargo xtask coverage` and `cargo xtask faults` make
 //! the tables of docs/fit.md, `cargo xtask counts` counts the instructions of standard works, `cargo xtask fmu` calls the
 //! functions of FMI at random under address sanitizer, `cargo xtask drag`, `cargo xtask load` and `cargo xtask first-fit`
-//! measure the studio.
+//! measure the studio, `cargo xtask book` builds the documents as a book and checks its links.
 
 mod bad;
+mod book;
 mod browser;
 mod counts;
 mod data;
@@ -95,6 +96,7 @@ fn main() -> ExitCode {
         ["browser"] => test(&[BROWSER]),
         ["export"] => test(&[TOOLS, EXPORTS]),
         ["bad"] => bad::run(),
+        ["book", ref words @ ..] => book::run(words),
         ["data", ref words @ ..] => data::run(words),
         ["dist", ref words @ ..] => dist::run(words),
         ["counts", ref words @ ..] => counts::run(words),
@@ -115,7 +117,8 @@ fn main() -> ExitCode {
             eprintln!(
                 "usage: cargo xtask test | cargo xtask bad | cargo xtask browser | cargo xtask export | \
                  cargo xtask python | cargo xtask coverage [...] | cargo xtask faults [...] | \
-                 {} | {} | {} | {} | {} | {} | {} | {}",
+                 {} | {} | {} | {} | {} | {} | {} | {} | {}",
+                book::USAGE,
                 dist::USAGE,
                 counts::USAGE,
                 studio::FIRST_FIT,

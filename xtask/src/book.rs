@@ -1,0 +1,123 @@
+//! `cargo xtask book [--program TAUT]`: builds the documents as a book under `target/book/html` and checks every link in
+//! it.
+//!
+//! The pages of `docs` are copied to `target/book/docs`. Lines `<!-- generated: ... -->` are replaced there by tables of
+//! the JSON schemas, the Python API and a C header, which the program and the package themselves provide. The program is
+//! built first, unless a built one is named.
+
+mod generated;
+mod links;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+pub const USAGE: &str = "cargo xtask book [--program TAUT]";
+
+/// The version of mdBook that is installed under `target/mdbook`.
+const VERSION: &str = "0.5.4";
+
+/// Builds the book and checks its links.
+pub fn run(words: &[&str]) -> Result<(), String> {
+    let target = crate::python::target();
+    let program = match words {
+        [] => built(&target)?,
+        ["--program", program] => PathBuf::from(program),
+        _ => return Err(format!("usage: {USAGE}")),
+    };
+    let mdbook = mdbook(&target)?;
+    let folder = target.join("book");
+    let _ = fs::remove_dir_all(&folder);
+    let pages = folder.join("docs");
+    copy(Path::new("docs"), &pages)?;
+    write(&folder.join("book.toml"), &read(Path::new("book.toml"))?)?;
+    for page in files(&pages)?.iter().filter(|path| path.extension().is_some_and(|e| e == "md")) {
+        let text = generated::filled(&read(page)?, &program)?;
+        write(page, &links::within(&text, &pages)?)?;
+    }
+    let html = folder.join("html");
+    let built = Command::new(&mdbook).arg("build").arg(&folder).arg("--dest-dir").arg(&html).status();
+    match built {
+        Ok(status) if status.success() => {}
+        Ok(_) => return Err("mdbook could not build the book".into()),
+        Err(error) => return Err(format!("{} cannot be started: {error}", mdbook.display())),
+    }
+    let (checked, broken) = links::check(&html)?;
+    if !broken.is_empty() {
+        return Err(format!("broken links:\n{}", broken.join("\n")));
+    }
+    println!("{checked} links lead somewhere; the book begins at {}", html.join("index.html").display());
+    Ok(())
+}
+
+/// Path of the program `taut`, which is built first.
+fn built(target: &Path) -> Result<PathBuf, String> {
+    match crate::cargo(&["build", "--quiet", "--package", "taut-cli", "--bin", "taut"]).status() {
+        Ok(status) if status.success() => {
+            Ok(target.join("debug").join(format!("taut{}", std::env::consts::EXE_SUFFIX)))
+        }
+        Ok(_) => Err("the program taut could not be built".into()),
+        Err(error) => Err(format!("cargo cannot be started: {error}")),
+    }
+}
+
+/// Path of mdBook in the wanted version, which is installed first where it is missing.
+fn mdbook(target: &Path) -> Result<PathBuf, String> {
+    let root = target.join("mdbook");
+    let program = root.join("bin").join(format!("mdbook{}", std::env::consts::EXE_SUFFIX));
+    let version = || {
+        let output = Command::new(&program).arg("--version").stderr(Stdio::null()).output().ok()?;
+        Some(String::from_utf8_lossy(&output.stdout).trim().trim_start_matches("mdbook v").to_string())
+    };
+    if version().as_deref() == Some(VERSION) {
+        return Ok(program);
+    }
+    println!("installing mdbook {VERSION} under {}", root.display());
+    let mut install = crate::cargo(&["install", "--locked", "--force", "--version", VERSION, "mdbook"]);
+    install.args(["--no-default-features", "--features", "search"]).arg("--root").arg(&root);
+    install.arg("--target-dir").arg(root.join("build"));
+    match install.status() {
+        Ok(status) if status.success() && version().as_deref() == Some(VERSION) => Ok(program),
+        Ok(_) => Err(format!("mdbook {VERSION} could not be installed under {}", root.display())),
+        Err(error) => Err(format!("cargo cannot be started: {error}")),
+    }
+}
+
+fn read(path: &Path) -> Result<String, String> {
+    fs::read_to_string(path).map_err(|error| format!("{} cannot be read: {error}", path.display()))
+}
+
+fn write(path: &Path, text: &str) -> Result<(), String> {
+    let written = path.parent().map_or(Ok(()), fs::create_dir_all).and_then(|()| fs::write(path, text));
+    written.map_err(|error| format!("{} cannot be written: {error}", path.display()))
+}
+
+/// All files below a folder, in the order of their paths.
+fn files(folder: &Path) -> Result<Vec<PathBuf>, String> {
+    let cannot = |error: std::io::Error| format!("{} cannot be read: {error}", folder.display());
+    let mut found = Vec::new();
+    for entry in fs::read_dir(folder).map_err(cannot)? {
+        let path = entry.map_err(cannot)?.path();
+        if path.is_dir() {
+            found.extend(files(&path)?);
+        } else {
+            found.push(path);
+        }
+    }
+    found.sort();
+    Ok(found)
+}
+
+/// Copies a folder with everything in it.
+fn copy(from: &Path, to: &Path) -> Result<(), String> {
+    for path in files(from)? {
+        let name = path.strip_prefix(from).map_err(|error| error.to_string())?;
+        copy_file(&path, &to.join(name))?;
+    }
+    Ok(())
+}
+
+fn copy_file(from: &Path, to: &Path) -> Result<(), String> {
+    let copied = to.parent().map_or(Ok(()), fs::create_dir_all).and_then(|()| fs::copy(from, to).map(drop));
+    copied.map_err(|error| format!("{} cannot be copied to {}: {error}", from.display(), to.display()))
+}
