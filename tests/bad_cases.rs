@@ -26,7 +26,7 @@ fn every_wrong_gantry_gives_its_message() {
     messages("tests/bad/gantry", 25, opened);
 }
 
-/// What a text is changed from is right itself: a mistake in it would hide those that are tested.
+/// The text that is changed is right itself: a mistake in it would hide those that are tested.
 #[test]
 fn every_base_is_read() {
     let mut count = 0;

@@ -152,8 +152,8 @@ fn a_minimum_on_a_kink_is_one() {
     }
 }
 
-/// A search may ask for a breakaway below Coulomb friction; the machine then breaks away at Coulomb friction, and that is
-/// told: 0.26 N beside 21 N could not be read back.
+/// A search may ask for a breakaway below Coulomb friction; the machine then breaks away at Coulomb friction, and that
+/// is told: 0.26 N beside 21 N could not be read back.
 #[test]
 fn a_breakaway_is_never_told_below_coulomb_friction() {
     let truth = ["cart.friction.viscous=24", "cart.friction.coulomb=0.6"];
@@ -372,7 +372,7 @@ every = "1 ms"
     }
 }
 
-/// What a fit lacks as a force that turns its sign with the direction and goes in straight lines along the travel is
+/// A missing force that turns its sign with the direction and goes in straight lines along the travel is
 /// `along`, whose factors are found like any other number.
 #[test]
 fn friction_that_changes_along_the_travel_is_found_again() {
@@ -396,7 +396,8 @@ fn friction_that_changes_along_the_travel_is_found_again() {
     }
 }
 
-/// What keeps its sign with the direction is a force of its own, over the travel or over the speed, found from nothing.
+/// A residual that keeps its sign with the direction is a force of its own, over the travel or over the speed, found
+/// from nothing.
 #[test]
 fn forces_that_are_lines_are_found_again() {
     let line = |key: &str, over: [f64; 3], forces: [f64; 3]| {

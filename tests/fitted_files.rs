@@ -78,8 +78,8 @@ fn drawn(chance: &mut Chance, free: &[&str], off: f64) -> Case {
     case
 }
 
-/// What was not determined was written as the case had it, and the rest as it was beside other values: a fit to 3.2 mrad
-/// left a file that was off by 419 mrad.
+/// Parameters that were not determined were written as the case had it, and the rest as it was beside other values: a
+/// fit to 3.2 mrad left a file that was off by 419 mrad.
 #[test]
 fn a_file_has_the_errors_of_its_fit_where_parameters_are_not_determined() {
     let count = std::env::var("TAUT_FITTED_FILES").ok().and_then(|n| n.parse().ok()).unwrap_or(24);

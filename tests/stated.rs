@@ -1,5 +1,6 @@
-//! The accuracy that a run states of itself: neither the output interval nor a tolerance at which nothing but rounding is
-//! left changes positions by more. Events lie where their own conditions say, also where the input changes with time.
+//! The accuracy that a run states of itself: neither the output interval nor a tolerance at which nothing but rounding
+//! is left changes positions by more. Events lie where their own conditions say, also where the input changes with
+//! time.
 
 use crate::common;
 use common::random::{self, Dry, decades};
@@ -122,7 +123,7 @@ const EVERY: f64 = 2e-3;
 /// A difference that counts for nothing, m: a hundredth of an atom's width.
 const LEAST: f64 = 1e-12;
 
-/// What is wrong with the accuracies stated at two output intervals, the second `times` as short; and how much of the
+/// Faults of the accuracies stated at two output intervals, the second `times` as short; and how much of the
 /// first one's statement its error is.
 fn fault(stage: &Machine, input: &Signal, times: usize, solver: Solver) -> (Option<String>, PositionError, f64) {
     let best = match solver {

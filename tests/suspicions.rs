@@ -1,4 +1,4 @@
-//! What is said to be wrong with a log is borne out by simulation: false suspicions of good logs, and true ones of bad.
+//! Findings about a log are borne out by simulation: false suspicions of good logs, and true ones of bad.
 
 use crate::common::chance::Chance;
 use std::f64::consts::TAU;
@@ -225,8 +225,8 @@ fn shown(time: f64) -> String {
     taut::number::engineering_typed(time, "s", 4)
 }
 
-/// A stiff, light axis whose input is held for 20 ms slips from one sample to the next and stands again: in its log that
-/// is a jump, which the model makes too. A jump beside these slips is found, and nothing else is reported.
+/// A stiff, light axis whose input is held for 20 ms slips from one sample to the next and stands again: in its log
+/// that is a jump, which the model makes too. A jump beside these slips is found, and nothing else is reported.
 #[test]
 fn a_slip_between_two_samples_is_no_jump() {
     let every = 20e-3;

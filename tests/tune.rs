@@ -363,7 +363,7 @@ fn no_move_gets_worse_unless_a_limit_forces_it() {
     assert_eq!(judged.before.objective, tuned.after.objective);
 }
 
-/// What limits cost that no gains keep without a worse figure: of all that were judged, the least worse.
+/// The cost of limits that no gains keep without a worse figure: of all that were judged, the least worse.
 #[test]
 fn what_the_limits_cost_at_least_is_told() {
     let case = case("pid-elastic.toml", &[]);

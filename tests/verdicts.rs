@@ -1,4 +1,4 @@
-//! What a tuning says of its gains: hunting, what varies, why it is worse, what to do next.
+//! Statements of a tuning about its gains: hunting, what varies, why it is worse, what to do next.
 
 use std::path::Path;
 use taut::case::{Case, Cost, TEMPLATE, Tuning};
@@ -9,7 +9,8 @@ fn case(name: &str) -> Case {
     Case::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/loops").join(name)).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// An axis whose integral needs a minute and more from one breakaway to the other was said to rest: it slips by ±450 µm.
+/// An axis whose integral needs a minute and more from one breakaway to the other was said to rest: it slips by ±450
+/// µm.
 #[test]
 fn an_axis_that_slips_after_a_minute_hunts() {
     let case = case("hunts-slowly.toml");

@@ -20,7 +20,7 @@ pub struct Progress {
 struct Line {
     bar: OnceLock<ProgressBar>,
     what: Mutex<String>,
-    /// What Ctrl-C does.
+    /// The effect of Ctrl-C.
     at_end: &'static str,
     all: Option<u64>,
     done: AtomicU64,

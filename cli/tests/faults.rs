@@ -370,7 +370,7 @@ fn tune_into_a_file_is_killed() {
         .withstands_kills(19);
 }
 
-/// What the page saves is the whole new text or the whole old one, and a studio that is started again can save.
+/// A file saved by the page is the whole new text or the whole old one, and a studio that is started again can save.
 #[test]
 fn saving_in_the_studio_is_killed() {
     use crate::studio::{Studio, text};

@@ -4,7 +4,7 @@ use assert_cmd::Command;
 use std::path::Path;
 use tempfile::TempDir;
 
-/// What becomes of a command with a kind of machine.
+/// The outcome of a command with a kind of machine.
 enum Ends {
     /// It runs.
     Runs,

@@ -1,4 +1,4 @@
-//! What a law of control is computed with. Its text is written once: it runs on numbers ([`Run`]), gives its slopes
+//! Arithmetic for control laws. The text of a law is written once: it runs on numbers ([`Run`]), gives its slopes
 //! ([`Slope`]), and is written down as a program (`export::program`).
 
 use std::fmt::Debug;
@@ -122,7 +122,8 @@ impl Slots {
     }
 }
 
-/// What computes a law: it has no loops that depend on numbers, and both sides of a choice are computed.
+/// Arithmetic that a law is computed with: it has no loops that depend on numbers, and both sides of a choice are
+/// computed.
 pub trait Calculator {
     /// Its numbers.
     type N: Number;
@@ -130,7 +131,7 @@ pub trait Calculator {
     /// A constant.
     fn number(&mut self, value: f64) -> Self::N;
 
-    /// What is remembered there; what was kept last.
+    /// The value stored last.
     fn memory(&mut self, slot: Slot) -> Self::N;
 
     /// Remembers.
@@ -142,8 +143,8 @@ pub trait Calculator {
     /// The whole number below a number that is not negative.
     fn whole(&mut self, value: Self::N) -> Self::N;
 
-    /// Of a square table four neighbours, `row` and `column` being whole numbers: itself, the next in its row, the next in
-    /// its column, and the one across.
+    /// Of a square table four neighbours, `row` and `column` being whole numbers: itself, the next in its row, the next
+    /// in its column, and the one across.
     fn neighbours(&mut self, table: &[Vec<f64>], row: Self::N, column: Self::N) -> [Self::N; 4];
 
     /// Gives a number a name in a program.
@@ -320,7 +321,7 @@ impl Div<f64> for Dual {
 /// of the side that the text chooses there.
 #[derive(Debug)]
 pub struct Slope {
-    /// What is remembered.
+    /// The memory.
     pub memory: Vec<Dual>,
 }
 

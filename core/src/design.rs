@@ -45,7 +45,7 @@ macro_rules! structures {
                 vec![$(Self::$name($name::default())),*]
             }
 
-            /// What tuning and others ask of it.
+            /// Its answers for tuning, hunting, reader and reports.
             pub fn tunable(&self) -> &dyn Tunable {
                 match self {
                     $(Self::$name(structure) => structure),*

@@ -70,12 +70,12 @@ impl Machine {
         own + (drive + idler) / self.pulley_radius - side * (cart.constant_force() + of_lines)
     }
 
-    /// What slides, in the order of the geometry: the cart, behind the bridge where there is one.
+    /// The sliding parts, in the order of the geometry: the cart, behind the bridge where there is one.
     pub fn slides(&self) -> impl Iterator<Item = &Slide> {
         self.bridge.iter().chain(std::iter::once(&self.cart))
     }
 
-    /// What carries the rest: the bridge, or a cart that there is alone.
+    /// The part that carries the rest: the bridge, or the cart if there is no bridge.
     pub fn first_slide(&self) -> &Slide {
         self.bridge.as_ref().unwrap_or(&self.cart)
     }
@@ -132,7 +132,7 @@ pub struct Pulley {
     pub friction: Friction,
 }
 
-/// What slides: the cart, or the bridge that carries it.
+/// A sliding part: the cart, or the bridge that carries it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Slide {
     /// Mass M with its load, kg; of a bridge without its cart.
@@ -166,7 +166,7 @@ pub struct SlideForces {
 pub const GRAVITY: f64 = 9.80665;
 
 impl Slide {
-    /// What slides on the level, without ends and with nothing pulling at it.
+    /// A sliding part on the level, without end stops and external forces.
     pub fn new(mass: f64, friction: Friction) -> Self {
         let forces = SlideForces::default();
         Self { mass, friction, along: None, forces, load: 0.0, inclination: 0.0, travel: None }
@@ -178,8 +178,8 @@ impl Slide {
     }
 }
 
-/// The spans of the belt, or of both belts, in the order of the geometry. Of an axis these are 1 drive pulley to cart, 2
-/// cart to idler pulley, 3 idler pulley back to drive pulley.
+/// The spans of the belt, or of both belts, in the order of the geometry. Of an axis these are 1 drive pulley to cart,
+/// 2 cart to idler pulley, 3 idler pulley back to drive pulley.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Belt {
     /// Span stiffness k₁, k₂, k₃, N/m, at the origin; infinite in a rigid model that is given none.

@@ -17,13 +17,13 @@ pub use steady::{Balance, Held, SteadySpeed, balanced_speed};
 use crate::friction::Motion;
 use crate::solve::Event;
 
-/// The key figures of one run, by the role of the parts. SI units; r is the pulleys' pitch radius, φ the angle of a drive
-/// pulley.
+/// The key figures of one run, by the role of the parts. SI units; r is the pulleys' pitch radius, φ the angle of a
+/// drive pulley.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Metrics {
     /// When the run ended, s.
     pub end: f64,
-    /// What slides: the cart of an axis, bridge and cart of a gantry.
+    /// The sliding parts: the cart of an axis, bridge and cart of a gantry.
     pub loads: Vec<OfLoad>,
     /// The drives, in the order of the inputs.
     pub drives: Vec<OfDrive>,
@@ -60,8 +60,8 @@ pub struct OfLoad {
     pub by_drives: f64,
     /// Its speed of largest magnitude, m/s.
     pub peak_speed: Peak,
-    /// Where the drives say it is minus where it is, of largest magnitude, m: by how much an encoder at the drive pulley
-    /// misses the cart.
+    /// Where the drives say it is minus where it is, of largest magnitude, m: by how much an encoder at the drive
+    /// pulley misses the cart.
     pub peak_error: Peak,
 }
 
@@ -179,9 +179,10 @@ impl Peak {
     }
 }
 
-/// A bound that passes a peak by no more than this share of it is no reason to look closer, and values that differ by no
-/// more are one. The peak itself is the top of a polynomial that is good to 1e-9 of the largest value, the share that
-/// peaks are stated to; its time is off by the square root of that, as a share of the time in which the quantity bends.
+/// A bound that passes a peak by no more than this share of it is no reason to look closer, and values that differ by
+/// no more are one. The peak itself is the top of a polynomial that is good to 1e-9 of the largest value, the share
+/// that peaks are stated to; its time is off by the square root of that, as a share of the time in which the quantity
+/// bends.
 const NEWS: f64 = 1e-12;
 
 /// The largest of these peaks, with its place; the first of equal ones.

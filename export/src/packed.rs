@@ -19,7 +19,7 @@ pub(super) struct Packed {
     /// For each condition: its table; the element (−1 for none) and the state in which it is one; what follows; its
     /// rank; and, where the load decides what follows, the conditions on the breakaway forward and backward (else −1).
     pub guards: Vec<[i64; 7]>,
-    /// What the changes set: (condition, place), and the values.
+    /// Resets by the changes: (condition, place), and the values.
     pub resets: Vec<[i64; 2]>,
     pub reset_values: Vec<f64>,
     /// Gears that lose power: (element, table of the torque at rest). Loads on bodies at rest are those where such an

@@ -1,4 +1,4 @@
-//! What is computed once a sample, as a program: assignments and conditions, no loops. It is written out as C and as
+//! The computation of one sample as a program: assignments and conditions, no loops. It is written out as C and as
 //! Structured Text, in the same order of operations, so that both give the same bits.
 //!
 //! [`Writer`] is a [`Calculator`] that writes down what a law computes: every operation is a node that others refer to.
@@ -109,13 +109,13 @@ pub(super) struct Program {
     pub read: HashSet<String>,
 }
 
-/// What a node computes; others by their places.
+/// The operation of a node; operands by their places.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 enum Step {
     /// By its bits.
     Number(u64),
     Input(usize),
-    /// What is remembered from the last sample.
+    /// A value remembered from the last sample.
     State(usize),
     Minus(usize),
     Two(Operator, usize, usize),
@@ -248,7 +248,7 @@ impl<'t> Neg for Term<'t> {
 pub(super) struct Writer<'t> {
     tape: &'t Tape,
     slots: &'t Slots,
-    /// What is kept in each slot at last.
+    /// The value stored in each slot at the end.
     kept: Vec<Option<usize>>,
 }
 

@@ -64,7 +64,7 @@ pub enum Does {
 }
 
 impl Does {
-    /// What a part does next.
+    /// The next state of a part.
     fn next(next: Next) -> Self {
         match next {
             Next::Moves(_, motion) => Does::Moves(motion),

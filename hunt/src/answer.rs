@@ -1,4 +1,4 @@
-//! What taut says about a case, by each way of asking it.
+//! Answers of taut about a case, by each of its interfaces.
 
 use crate::c;
 use crate::double::Double;
@@ -74,7 +74,7 @@ pub enum End {
 /// An answer.
 #[derive(Debug, Clone)]
 pub struct Answer {
-    /// What was run, where it is not the case itself.
+    /// The subject that was run, if it is not the case itself.
     pub subject: Option<Subject>,
     /// How its inputs came.
     pub fed: Fed,
@@ -82,7 +82,7 @@ pub struct Answer {
     pub times: Vec<f64>,
     /// Positions along the belt from the start at these times, as far as it went; where there are none, NaN.
     pub rows: Vec<[Double; BODIES]>,
-    /// What bodies did, where that is told.
+    /// Events of the bodies, where they are reported.
     pub events: Option<Vec<Event>>,
     /// How it ended.
     pub end: End,
@@ -199,7 +199,7 @@ pub(crate) fn solved(subject: &Subject, solver: Solver) -> Result<Answer, String
     })
 }
 
-/// What a run states of itself: the exact solver its bound, the general one its estimate.
+/// The error that a run states: the exact solver's bound, the general one's estimate.
 fn estimated(
     solver: Solver,
     outcome: &Outcome,

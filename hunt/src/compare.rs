@@ -28,7 +28,7 @@ const AGREEMENT: [f64; 3] = [1e-3, 1e-6, 1e-6];
 /// The moments of the general solver are as good as its positions: it may have a body creep that is stuck, as long as
 /// that shows in no position.
 const AGREEMENT_OF_GENERAL: [f64; 3] = [1.0, 1e-3, f64::INFINITY];
-/// What its positions may be off by at least where events are judged, m.
+/// The least error of its positions where events are judged, m.
 const GENERAL_EVENTS: f64 = 1e-9;
 
 /// How far apart the ends of two runs may be, as a part of the run.
@@ -66,8 +66,8 @@ pub struct Compared {
     pub verdict: Verdict,
 }
 
-/// Compares a case by each of these ways; `every` are other intervals between rows, as multiples of the case's, at which
-/// solvers are asked again.
+/// Compares a case by each of these ways; `every` are other intervals between rows, as multiples of the case's, at
+/// which solvers are asked again.
 pub fn compare(name: &str, text: &str, ways: &[By], every: &[f64]) -> Vec<Compared> {
     let fault = |by: By, why: String| Compared {
         by,

@@ -24,7 +24,7 @@ pub struct Ramp {
     pub way: usize,
 }
 
-/// What a curve is.
+/// Kinds of curves.
 #[derive(Debug, Clone)]
 pub enum Kind {
     /// (F_b − F_c) e^{−q²}, or e^{−q}: what a Stribeck curve has beyond F_c.
@@ -80,7 +80,7 @@ pub struct Curved {
     pub speed: (usize, f64),
     /// Factor that changes along the travel.
     pub along: Option<Ramp>,
-    /// What it is.
+    /// Its kind.
     pub kind: Kind,
 }
 

@@ -95,7 +95,7 @@ pub struct Drawn {
     pub kinds: Vec<Kind>,
 }
 
-/// What makes the seed of lines, which are drawn by themselves, and of the cases with features.
+/// Added to the seed for lines, which are drawn by themselves, and for cases with features.
 const LINES: u64 = 0x6c69_6e65;
 const PAIRS: u64 = 0x7477_6f73;
 

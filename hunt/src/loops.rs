@@ -17,7 +17,7 @@ use taut::signal::profile::Reference;
 pub enum Looks {
     /// That of the profile.
     Ahead,
-    /// What follows from position and derivatives at the sample, as inputs of an FMU have them.
+    /// The reference from position and derivatives at the sample, as inputs of an FMU have them.
     OnFromSample,
 }
 
@@ -130,7 +130,7 @@ fn in_counts(value: f64, counts: f64) -> f64 {
     (counts * value).round() / counts
 }
 
-/// What a controller is shown at a sample.
+/// Inputs of a controller at a sample.
 struct Seen {
     time: f64,
     reference: Reference,

@@ -128,7 +128,7 @@ pub struct Span {
     pub stiffness: Double,
     /// Damping.
     pub damping: Double,
-    /// What its stiffness follows.
+    /// The bodies that its stiffness follows.
     pub follows: Option<Follows>,
 }
 
@@ -194,7 +194,7 @@ pub struct Model {
     pub beyond: [Double; BODIES],
     /// Position of each body where ways are counted from.
     pub origin: [Double; BODIES],
-    /// What makes a position of taut (rad or m) one along the belt.
+    /// Factor from a position of taut (rad or m) to one along the belt.
     pub lever: [Double; BODIES],
     /// The bodies that say where the machine is, each with the change of all positions with its own.
     pub place: Vec<(usize, [f64; BODIES])>,

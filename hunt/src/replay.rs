@@ -109,7 +109,7 @@ struct Told {
     end: f64,
 }
 
-/// What came of replaying.
+/// The outcome of a replay.
 #[derive(Debug, Default)]
 pub struct Replayed {
     /// Machines that were compared.
@@ -155,7 +155,7 @@ impl Drawn {
         self.step * STEPS as f64
     }
 
-    /// What the parts do by the exact solver, all commands multiplied by a factor.
+    /// Changes of the parts by the exact solver, all commands multiplied by a factor.
     fn by_taut(&self, factor: f64) -> Option<Told> {
         let mut machine = Simulator::of_mechanism(&self.mechanism, &State::default(), Solver::Exact, self.step).ok()?;
         let mut events = Vec::new();
@@ -441,7 +441,7 @@ fn rows(machine: &Drawn) -> Vec<Vec<f64>> {
     (0..STEPS).map(|k| machine.commands.iter().map(|values| values[k]).collect()).collect()
 }
 
-/// What was printed, machine by machine.
+/// The printed changes, machine by machine.
 fn parted(told: &str) -> Vec<Raw> {
     let parts = told.split("machine ").skip(1);
     parts.map(|part| (!part.contains("refused")).then(|| part.lines().filter_map(line).collect())).collect()

@@ -30,11 +30,11 @@ pub struct Hunt {
     pub progress: bool,
     /// Ends it early.
     pub stop: Arc<AtomicBool>,
-    /// What is drawn.
+    /// The features that are drawn.
     pub drawing: Drawing,
 }
 
-/// What is drawn.
+/// The features that are drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Drawing {
     /// Stages linear piece by piece, over wide ranges.

@@ -9,7 +9,7 @@ use taut::case::{Case, Experiment, Move};
 use taut::machine::Machine;
 use taut::signal::Signal;
 
-/// What is run.
+/// The subject of a run.
 #[derive(Debug, Clone)]
 pub enum Subject {
     /// An axis, its first experiment.

@@ -1,4 +1,4 @@
-//! What a run states of its own error, against the independent solver, on machines whose errors grow: force lines that
+//! The error that a run states, against the independent solver, on machines whose errors grow: force lines that
 //! feed the motion, flanks and stops that touch.
 
 use taut::case::Case;
@@ -10,8 +10,8 @@ use taut_hunt::draw::Random;
 /// Positions are not compared closer than this, m.
 const LEAST: f64 = 1e-12;
 
-/// A drawn machine on which a force line feeds the motion: near an unstable equilibrium, or pushed along by a force that
-/// grows with the speed.
+/// A drawn machine on which a force line feeds the motion: near an unstable equilibrium, or pushed along by a force
+/// that grows with the speed.
 fn fed(random: &mut Random) -> String {
     let belt = match random.below(3) {
         0 => "model = \"rigid\"".to_string(),

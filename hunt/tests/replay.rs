@@ -6,7 +6,7 @@ mod ignored;
 
 use taut_hunt::replay::{Tool, machines, replay};
 
-/// What each part does, change by change, is the same by taut and by this tool.
+/// Every change of every part is the same by taut and by this tool.
 fn replays(tool: Tool, count: usize) {
     let Some(program) = tool.program() else {
         return ignored::ignored(&format!("the program for {}, which `cargo xtask export` installs", tool.name()));

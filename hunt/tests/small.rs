@@ -63,7 +63,7 @@ fn threads_change_nothing() {
     assert_eq!(told(1), told(3));
 }
 
-/// What each pair of features needs: at least 30 of 10,000 cases.
+/// The number of cases that each pair of features needs: at least 30 of 10,000.
 #[test]
 fn every_pair_that_can_occur_occurs_often() {
     for seed in [1, 2, 3] {

@@ -40,7 +40,7 @@ pub fn modes(analysis: &Analysis) -> Value {
     })
 }
 
-/// What the input does to an output.
+/// The transfer from the input to an output.
 pub(super) fn transfer((output, transfer): (&Variable, &Transfer)) -> Value {
     let (integrators, gain) = transfer.low_frequency();
     json!({

@@ -21,9 +21,9 @@ const MOST_BYTES: u64 = 1 << 20;
 /// Names of results that only this process may write, until it is dropped.
 ///
 /// The lock of a file is `.NAME.taut.lock` beside it, that of a folder `.taut.lock` in it. Each holds the number of the
-/// process and its command line, and is locked by the operating system, so that a process that was killed claims nothing.
-/// Links and relative paths lead to the same lock. A folder and a file in it that the folder's owner will write exclude
-/// each other.
+/// process and its command line, and is locked by the operating system, so that a process that was killed claims
+/// nothing. Links and relative paths lead to the same lock. A folder and a file in it that the folder's owner will
+/// write exclude each other.
 #[derive(Debug, Default)]
 pub struct Claim {
     locks: Vec<Lock>,
@@ -55,7 +55,7 @@ impl From<Refusal> for Error {
     }
 }
 
-/// What a lock says of its owner.
+/// The owner that a lock names.
 #[derive(Default)]
 struct Owner {
     process: Option<u32>,
@@ -205,7 +205,7 @@ impl Drop for Claim {
 }
 
 impl Owner {
-    /// What the lock of this process says.
+    /// The text of this process' lock.
     fn own(names: &[String]) -> String {
         let command: Vec<String> = std::env::args_os().map(|word| word.to_string_lossy().replace('\n', " ")).collect();
         let mut text = format!("{}\n{}\n{}\n", std::process::id(), host(), command.join(" "));

@@ -1,4 +1,4 @@
-//! What is kept of a file that is replaced: the links that lead to it, its permissions and its owner.
+//! Properties kept of a file that is replaced: the links that lead to it, its permissions and its owner.
 
 use super::cannot_write;
 use crate::error::{Error, Result};
@@ -9,8 +9,8 @@ use std::path::{Path, PathBuf};
 /// Most links that are followed after each other, as on Linux.
 const MOST_LINKS: usize = 40;
 
-/// The file that `path` leads to by symbolic links, whether that exists or not; refuses pipes, sockets and devices, which
-/// a file would take the place of.
+/// The file that `path` leads to by symbolic links, whether that exists or not; refuses pipes, sockets and devices,
+/// which a file would take the place of.
 pub(super) fn target(path: &Path) -> Result<PathBuf> {
     let mut at = path.to_path_buf();
     for _ in 0..MOST_LINKS {

@@ -1,4 +1,4 @@
-//! What a step of an exported plant computes at most: counted, against the bounds that its header states.
+//! The most operations of a step of an exported plant: counted, against the bounds that its header states.
 
 use super::c::{MACHINES, exported};
 use super::machines::commands;

@@ -1,4 +1,4 @@
-//! What shapers are chosen for, and by what: the vibration that is left, smoothing, and the score of both.
+//! Criteria for choosing shapers: residual vibration, smoothing, and the score of both.
 
 use super::kind::{Kind, TOLERANCE};
 use super::resonance::Resonance;

@@ -3,9 +3,9 @@
 //!
 //! The slopes of its text at rest, by dual numbers, are s⁺ = A s + B (y, x, i, u), and C s + D (y, x, i, u) for the
 //! command that it asks for, u being the command that the axis gets. States stand in the order in which they depend on
-//! each other; those that depend on each other in circles are turned so that A is lower triangular but for a pair of rows
-//! for each two complex poles (Schur's real form). An integral stays as it is: its A − 1 is exactly zero, and z − 1 is
-//! known without the loss of a difference.
+//! each other; those that depend on each other in circles are turned so that A is lower triangular but for a pair of
+//! rows for each two complex poles (Schur's real form). An integral stays as it is: its A − 1 is exactly zero, and z −
+//! 1 is known without the loss of a difference.
 
 use super::filter::Biquad;
 use super::law::Law;
@@ -24,7 +24,7 @@ const TURNS: usize = 1000;
 /// By how much a pole has to be outside of the unit circle to count.
 const OUTSIDE: f64 = 1e-9;
 
-/// What a controller is told: encoder, scale, current, and the command that the axis gets.
+/// Inputs of a controller: encoder, scale, current, and the command that the axis gets.
 const INPUTS: usize = 4;
 const SCALE: usize = 1;
 const CURRENT: usize = 2;
@@ -46,16 +46,16 @@ pub struct Feedback {
     is_linear: bool,
 }
 
-/// The rows of A − I of one pole, or of two complex ones: the block on the diagonal, and the states before that it depends
-/// on, with how.
+/// The rows of A − I of one pole, or of two complex ones: the block on the diagonal, and the states before that it
+/// depends on, with how.
 #[derive(Debug, Clone)]
 enum Part {
     One { pole: f64, of: Vec<(usize, f64)> },
     Two { block: [[f64; 2]; 2], of: Vec<(usize, [f64; 2])> },
 }
 
-/// N_y, N_x, N_i and D at one frequency, over poles of the controller of which [`Feedback::unstable`] are outside of the
-/// unit circle.
+/// N_y, N_x, N_i and D at one frequency, over poles of the controller of which [`Feedback::unstable`] are outside of
+/// the unit circle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Terms {
     /// N_y, V/m or A/m.
@@ -311,8 +311,8 @@ impl System {
         parts
     }
 
-    /// Turns a circle of `size` states so that its block is lower triangular but for pairs: with S = D Q of powers of two
-    /// that balance it and of Schur's form (D⁻¹ A D)ᵀ = Q T Qᵀ, S⁻¹ A S = Tᵀ.
+    /// Turns a circle of `size` states so that its block is lower triangular but for pairs: with S = D Q of powers of
+    /// two that balance it and of Schur's form (D⁻¹ A D)ᵀ = Q T Qᵀ, S⁻¹ A S = Tᵀ.
     fn turn(&mut self, begin: usize, size: usize) {
         let mut block = self.a.view((begin, begin), (size, size)).into_owned();
         let scales = balanced(&mut block);

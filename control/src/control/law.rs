@@ -1,13 +1,13 @@
 //! Laws of control: what all of them have in common.
 //!
-//! A law is written once, for any [`Calculator`]. From its text follow the running controller ([`super::Standard`]), its
-//! linear view ([`super::feedback`]) and the exported program.
+//! A law is written once, for any [`Calculator`]. From its text follow the running controller ([`super::Standard`]),
+//! its linear view ([`super::feedback`]) and the exported program.
 
 use super::compensation::Compensation;
 use crate::calculator::{Calculator, Slot, Slots, less};
 use crate::signal::profile::Reference;
 
-/// What a law is shown at a sample.
+/// Inputs of a law at a sample.
 #[derive(Debug, Clone, Copy)]
 pub struct Seen<'a, N> {
     /// Where the cart should be.
@@ -20,15 +20,15 @@ pub struct Seen<'a, N> {
     pub scale: Option<N>,
     /// Measured motor current, A.
     pub current: N,
-    /// What feed-forward adds to a current that the law commands, A, if it does.
+    /// Feed-forward added to a current that the law commands, A, if any.
     pub forward: Option<N>,
-    /// What the reference asks of pulleys and motor.
+    /// The demands of the reference on pulleys and motor.
     pub compensation: &'a Compensation,
 }
 
 /// A structure with its gains, made for an axis.
 pub trait Law {
-    /// What it does, as a remark in a program.
+    /// A description for a remark in a program.
     fn about(&self) -> &'static str;
 
     /// Whether it commands a current inside itself, into which feed-forward goes.
@@ -57,7 +57,7 @@ impl Last {
         Self { has: slots.add(format!("has_{name}"), "1 once there is one"), value: slots.add(name, about) }
     }
 
-    /// What it was, taking what it is now.
+    /// The previous value; stores the present one.
     pub fn step<C: Calculator>(&self, c: &mut C, now: C::N) -> C::N {
         let (has, was, one) = (c.memory(self.has), c.memory(self.value), c.number(1.0));
         c.keep(self.has, one);

@@ -20,7 +20,7 @@ pub struct Standard {
     memory: Vec<f64>,
 }
 
-/// What such a controller does at a sample, for any calculator.
+/// One sample of such a controller, for any calculator.
 #[derive(Debug, Clone)]
 pub struct Text {
     pub(crate) law: AnyLaw,
@@ -29,7 +29,7 @@ pub struct Text {
     pub(crate) filters: Vec<Biquad>,
     /// Weights of encoder and scale in the position that the observer is given.
     weights: [f64; 2],
-    /// What it remembers; of that what the command asked for at last, and the position for the observer and dry friction
+    /// Its memory; of that the last command before limits, and the position for the observer and dry friction
     /// there.
     pub slots: Slots,
     asked: Slot,
@@ -118,7 +118,7 @@ impl Text {
         }
     }
 
-    /// What a controller is shown at rest: the axis where it should be, at zero.
+    /// Inputs of a controller at rest: the axis at its reference, zero.
     pub fn at_rest(&self, has_scale: bool) -> Observation {
         let zero = Reference::default();
         let position = self.compensation.target(&mut Run::plain(), &zero).position;
@@ -151,7 +151,7 @@ impl Standard {
         Ok(Self { memory: vec![0.0; text.slots.count()], text })
     }
 
-    /// What it remembers from sample to sample.
+    /// Memory from sample to sample.
     pub(super) fn memory(&self) -> &[f64] {
         &self.memory
     }

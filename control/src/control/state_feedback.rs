@@ -52,7 +52,7 @@ struct Corrected {
     kalman: Vec<f64>,
 }
 
-/// What is not zero of a row.
+/// Nonzero entries of a row.
 fn sparse<'a>(row: impl IntoIterator<Item = &'a f64>) -> Vec<(usize, f64)> {
     row.into_iter().copied().enumerate().filter(|(_, value)| *value != 0.0).collect()
 }
@@ -162,7 +162,7 @@ impl StateFeedbackLaw {
         if self.before.iter().any(|v| *v != 0.0) { self.pending - 1 } else { self.pending }
     }
 
-    /// What the states should be, were the cart where it should be.
+    /// The states if the cart were at its reference.
     fn wanted<C: Calculator>(&self, c: &mut C, seen: &Seen<C::N>) -> [C::N; STATES] {
         let (r, reference) = (self.radius, &seen.reference);
         let needed = seen.compensation.needed_by(c, reference);

@@ -22,13 +22,13 @@ pub struct GantryAnalysis<'a> {
     pub map: Option<ResonanceMap>,
     /// The linear equations with bridge and cart at zero.
     pub system: System,
-    /// What each drive's input does to every output, in the order of the drives.
+    /// Transfer from each drive's input to every output, in the order of the drives.
     pub by_input: Vec<ByInput>,
     /// The assumptions.
     pub words: Vec<String>,
 }
 
-/// What an input does.
+/// The effect of one input.
 #[derive(Debug, Clone)]
 pub struct ByInput {
     /// The system of this input.

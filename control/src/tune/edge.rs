@@ -1,4 +1,4 @@
-//! What a search by moves asks of one design at the edge of the limits.
+//! Questions of a search by moves to one design at the edge of the limits.
 
 use super::gains::{rounded, shaped};
 use super::objective::{AtWorst, BALANCES};
@@ -21,8 +21,8 @@ const HALVINGS: usize = 5;
 const EASED: usize = 3;
 
 impl Work<'_> {
-    /// ln J of a finalist with these powers, by moves on the axes that are watched; what keeps the limits on the set and
-    /// is below the bar joins the archive. Infinite once the search is to end.
+    /// ln J of a finalist with these powers, by moves on the axes that are watched; what keeps the limits on the set
+    /// and is below the bar joins the archive. Infinite once the search is to end.
     pub fn of_moves(
         &mut self,
         (finalist, layout, powers): (&Finalist, usize, &[f64]),
@@ -98,8 +98,8 @@ impl Work<'_> {
         })
     }
 
-    /// These powers with the loop as much slower as the limits make it on the set; where half as fast is not enough, how
-    /// far it is beyond them.
+    /// These powers with the loop as much slower as the limits make it on the set; where half as fast is not enough,
+    /// how far it is beyond them.
     fn eased(&mut self, finalist: &Finalist, powers: &[f64]) -> std::result::Result<Vec<f64>, f64> {
         let slowing = slowing(&finalist.start, finalist.own, &self.case.machine);
         let at = |log: f64| -> Vec<f64> { powers.iter().zip(&slowing).map(|(x, slow)| x + log * slow).collect() };

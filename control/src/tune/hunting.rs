@@ -1,9 +1,9 @@
 //! Limit cycles at rest: an integral against sticking friction and counts.
 //!
 //! They are found by simulation. Between two slips of a stuck axis the command is a ramp, the integral of an error that
-//! stays, and the next slip is known in closed form: with the slope u̇ of the command and its force g per command it comes
-//! where g u reaches the breakaway of cart and pulleys. That says how long to watch where slips are rare, and when the
-//! next one comes where no watch is long enough.
+//! stays, and the next slip is known in closed form: with the slope u̇ of the command and its force g per command it
+//! comes where g u reaches the breakaway of cart and pulleys. That says how long to watch where slips are rare, and
+//! when the next one comes where no watch is long enough.
 
 use crate::control::{Loop, Rows, Standard, stream};
 use crate::design::Design;
@@ -180,8 +180,8 @@ fn watch(machine: &Machine, design: &Design) -> f64 {
     if ramp.is_finite() { (20.0 * ramp).clamp(4.0, LONGEST) } else { 10.0 }
 }
 
-/// A swing at rest: half of what the cart goes to and fro, m, how long that takes, s, and whether not always as long; and
-/// the time between slips of a cart that stands between them, s.
+/// A swing at rest: half of what the cart goes to and fro, m, how long that takes, s, and whether not always as long;
+/// and the time between slips of a cart that stands between them, s.
 #[derive(Clone, Copy)]
 struct Swing {
     amplitude: f64,
@@ -190,7 +190,8 @@ struct Swing {
     slips_every: f64,
 }
 
-/// What a watch has seen: a swing of the cart, its place (m) over time (s), and the command where it ended, with its slope where it is a ramp.
+/// A watched swing of the cart, its place (m) over time (s), and the command where it ended, with its slope where it is
+/// a ramp.
 struct Seen {
     swing: Option<Swing>,
     cart: Vec<(f64, f64)>,
@@ -199,8 +200,8 @@ struct Seen {
 }
 
 impl Seen {
-    /// How long it is until the command of a stuck axis has reached its breakaway, and how long it is from one breakaway
-    /// to the other, s; none where the command does not go there.
+    /// How long it is until the command of a stuck axis has reached its breakaway, and how long it is from one
+    /// breakaway to the other, s; none where the command does not go there.
     fn next(&self, machine: &Machine) -> Option<(f64, f64)> {
         let (rigid, r) = (Rigid::of(machine), machine.pulley_radius);
         let most = |side: &Side| side.coulomb.max(side.breakaway);
@@ -224,7 +225,7 @@ fn slope(command: &[(f64, f64)]) -> Option<f64> {
     ((1.0 / STEADY..=STEADY).contains(&ratio) && late.is_finite()).then_some(late)
 }
 
-/// What the cart does at rest, watched so long and from so long after the reversal on, s.
+/// Motion of the cart at rest, watched for this time, beginning this long after the reversal, s.
 fn seen(machine: &Machine, design: &Design, model: &Machine, (watched, skipped): (f64, f64)) -> Result<Seen> {
     let limits = Limits { speed: SPEED, acceleration: 0.2, jerk: None, snap: None };
     // From 0, to the side that has more room.

@@ -1,4 +1,4 @@
-//! What a verdict on a controller is.
+//! Verdicts on a controller.
 
 use super::family::Corner;
 use super::hunting::Hunt;

@@ -85,7 +85,7 @@ pub struct Tuned {
     pub after: Verdict,
     /// The judgement.
     pub judgement: Judgement,
-    /// What to do where it is worse, if something is known.
+    /// Advice if it is worse, where there is any.
     pub advice: Option<String>,
     /// The feed-forward that makes the moves better than the gains alone, if one does.
     pub ahead: Option<Ahead>,
@@ -325,7 +325,7 @@ impl Work<'_> {
     }
 }
 
-/// What to add to a PID controller without a derivative, where gains of it do not do.
+/// Addition for a PID controller without a derivative whose gains are not sufficient.
 fn without_derivative(case: &Case, design: &Design) -> Option<String> {
     if !design.structure.tunable().lacks_damping() {
         return None;

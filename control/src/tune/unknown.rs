@@ -89,8 +89,8 @@ pub(super) fn tie(unknowns: &mut [Unknown]) {
     }
 }
 
-/// What no fit knows anything of keeps its default spread. Of the two constants of a motor, which are one number, the one
-/// that was not fitted is off by as large a share as the other.
+/// Parameters that no fit has estimated keep their default spread. Of the two constants of a motor, which are one
+/// number, the one that was not fitted is off by as large a share as the other.
 pub(super) fn with_the_rest(mut fitted: Vec<Unknown>, machine: &Machine) -> Vec<Unknown> {
     let frees: Vec<&Free> = fitted.iter().map(|unknown| &unknown.free).collect();
     let rest = kinds_without(machine, &frees).into_iter().map(|free| {

@@ -1,9 +1,9 @@
 //! The straight way from gains that were found back to those of the file, which break the limits.
 //!
-//! With the powers p_j = ln(k_j/K_j) that lead from the gains K that were found to the gains k of the file, filters that
-//! were added left as they are, the way is K_j e^(t p_j) for t from 0 to 1. Its last design that keeps the limits is the
-//! nearest there is on it to the controller of the file; where that is worse than the file, too, the limits stand
-//! between the two: no design of this way that is nearer to the file keeps them.
+//! With the powers p_j = ln(k_j/K_j) that lead from the gains K that were found to the gains k of the file, filters
+//! that were added left as they are, the way is K_j e^(t p_j) for t from 0 to 1. Its last design that keeps the limits
+//! is the nearest there is on it to the controller of the file; where that is worse than the file, too, the limits
+//! stand between the two: no design of this way that is nearer to the file keeps them.
 
 use super::Judgement;
 use super::gains::{gains, rounded, shaped};
@@ -67,7 +67,7 @@ impl Work<'_> {
     }
 }
 
-/// What leads from the gains of a design to those of another; none where one of them is zero in one of the two.
+/// The factors from the gains of a design to those of another; none where one of them is zero in one of the two.
 fn powers(from: &Design, to: &Design, machine: &Machine) -> Option<Vec<f64>> {
     let [from, to] = [from, to].map(|design| gains(design, machine));
     let pairs = from.iter().zip(&to).filter(|(from, _)| from.searched);
@@ -110,7 +110,7 @@ mod tests {
         assert_eq!(super::powers(&file, &without, &case.machine), None);
     }
 
-    /// What is taken from the way keeps the limits, and a little nearer to the file they are broken.
+    /// The design taken from the path keeps the limits, and a little nearer to the file they are broken.
     #[test]
     fn its_edge_is_where_the_limits_begin_to_hold() {
         let case = pid();

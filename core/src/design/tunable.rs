@@ -1,5 +1,5 @@
-//! What tuning, hunting, the reader of case files and reports ask of a structure. No answer has a default, so that the
-//! compiler lists them all for a new structure.
+//! Questions of tuning, hunting, the reader of case files and reports to a structure. No answer has a default, so that
+//! the compiler lists them all for a new structure.
 
 use super::placement::{CASCADE, least};
 use super::{Cascade, CurrentLoop, Design, FeedForwardModel, Fuzzy, Pid, SlidingMode, StateFeedback, Structure};
@@ -18,7 +18,7 @@ pub enum TunedBy {
     Nothing,
 }
 
-/// What is asked of a structure.
+/// Answers that every structure gives.
 pub trait Tunable {
     /// Its key in the case file.
     fn word(&self) -> &'static str;
@@ -51,8 +51,8 @@ pub trait Tunable {
     /// With its integral action times `factor`, none with 0; none without integral action.
     fn integral_times(&self, factor: f64) -> Option<Structure>;
 
-    /// By how much the command that it gives grows per second and metre of an error that stays, V or A; zero where that is
-    /// not known from its gains alone.
+    /// By how much the command that it gives grows per second and metre of an error that stays, V or A; zero where that
+    /// is not known from its gains alone.
     fn ramp(&self) -> f64;
 
     /// Whether nothing in it damps, so that it wants a derivative.
@@ -116,8 +116,8 @@ impl Tunable for Pid {
 
     /// Skogestad's rule for k e^{−θs}/(s (τ s + 1)) with τ_c = θ: K_c = 1/(2 k θ), τ_I = 8 θ, τ_D = τ, in series.
     ///
-    /// S. Skogestad, "Simple analytic rules for model reduction and PID controller tuning", Journal of Process Control 13
-    /// (2003).
+    /// S. Skogestad, "Simple analytic rules for model reduction and PID controller tuning", Journal of Process Control
+    /// 13 (2003).
     fn starts(&self, design: &Design, machine: &Machine) -> Vec<Structure> {
         let rigid = Rigid::of(machine);
         let late = design.delay + 0.5 * design.every + 1.0 / (2.0 * PI * self.filter);

@@ -72,7 +72,7 @@ const fn bodies(left: &'static [f64; 2]) -> [BodyAt; BODIES] {
     ]
 }
 
-/// What slides, with where it is by the drives, and how far these are off.
+/// The sliding parts, with their positions by the drives and the errors of those.
 const fn slides(by_drives: [&'static [f64]; 2], errors: [&'static [(usize, f64)]; 2]) -> [SlideAt; 2] {
     [
         SlideAt {

@@ -15,7 +15,7 @@ pub struct Geometry {
     pub bodies: &'static [BodyAt],
     /// The spans of the belt, by their numbers.
     pub spans: &'static [SpanAt],
-    /// What slides, by its number: a row of coordinates.
+    /// The sliding parts, by their numbers: a row of coordinates.
     pub slides: &'static [SlideAt],
 }
 
@@ -36,9 +36,9 @@ pub struct DriveAt {
     pub gear: Label,
     /// Its rotor there.
     pub rotor: Label,
-    /// What stands before the key of an axis' part: `left_drive.`.
+    /// Prefix of an axis' key: `left_drive.`.
     pub key: &'static str,
-    /// What stands before the column of an axis: `left_`. Without the line it is its input's name.
+    /// Prefix of an axis' column: `left_`. Without the line it is its input's name.
     pub prefix: &'static str,
 }
 
@@ -71,7 +71,7 @@ pub enum Part {
 pub struct SpanAt {
     /// Its name.
     pub label: Label,
-    /// What the columns of its force and slack begin with.
+    /// Prefix of the columns of its force and slack.
     pub column: &'static str,
     /// By how much it gets longer per way of each body.
     pub arms: &'static [(usize, Lever)],
@@ -105,7 +105,7 @@ impl Lever {
 pub struct SlideAt {
     /// Its body.
     pub body: usize,
-    /// What stands at its ends.
+    /// Its end stops.
     pub stop: Label,
     /// The column of a force on it along its travel, and what that is.
     pub force_along: Label,
@@ -113,7 +113,7 @@ pub struct SlideAt {
     pub force_by_speed: Label,
     /// Where the drives have it, as a sum over the angles of their pulleys, times the radius.
     pub by_drives: &'static [f64],
-    /// What that is more than where it is, as a sum over stretches of spans, (span, weight).
+    /// That minus its true position, as a sum over stretches of spans, (span, weight).
     pub error: &'static [(usize, f64)],
 }
 

@@ -9,7 +9,7 @@ const ROOM: usize = 4;
 /// A number of each span, in the order of the geometry: a slice of them, but one that is copied.
 #[derive(Clone, Copy, PartialEq)]
 pub struct Spans {
-    /// What is behind `count` is zero.
+    /// Values behind `count` are zero.
     values: [f64; ROOM],
     count: usize,
 }

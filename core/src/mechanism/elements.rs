@@ -1,5 +1,6 @@
-//! Parts that work piece by piece beside the bodies: amplifiers with limits, springs that only pull or only push, forces
-//! that are lines. Each is linear in each of its states; the conditions that lead from one to the other are linear forms.
+//! Parts that work piece by piece beside the bodies: amplifiers with limits, springs that only pull or only push,
+//! forces that are lines. Each is linear in each of its states; the conditions that lead from one to the other are
+//! linear forms.
 
 use super::{
     AmplifierMode, Cause, Contact, DRIVES, Drive, Form, Guard, Limit, Mechanism, Mode, Over, SPRINGS, Spring,
@@ -137,7 +138,7 @@ impl Mechanism {
         }
     }
 
-    /// What a spring's line is over.
+    /// The argument of a spring's line.
     fn way_of_line(&self, spring: usize, over: Over) -> Form {
         match over {
             Over::Length => Form::stretch(spring),

@@ -163,7 +163,7 @@ impl SpringLaw {
     }
 }
 
-/// What a force is a line over.
+/// The argument of a force line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Over {
     /// The length of a spring.

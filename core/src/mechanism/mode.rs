@@ -234,7 +234,7 @@ impl PartialEq<Motion> for Status {
 pub struct Guard {
     /// The form that must not become negative.
     pub form: Form,
-    /// What follows where it does.
+    /// The consequence of its fall.
     pub transition: Transition,
 }
 

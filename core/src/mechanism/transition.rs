@@ -1,11 +1,11 @@
-//! What follows where a condition of a mode falls: the rule of events, as data that is made with the conditions.
+//! The consequence of a condition that falls: the rule of events, as data that is made with the conditions.
 //!
 //! Solvers and exports read it, and none of them decides by itself what follows.
 
 use super::{AmplifierMode, Cause, Drive, Form, Limit, Mechanism, Mode, Switch, What};
 use crate::friction::Motion;
 
-/// What follows where a condition of a mode falls.
+/// The consequence of a condition of a mode that falls.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Transition {
     /// The condition.
@@ -16,7 +16,7 @@ pub struct Transition {
     pub then: Then,
     /// Quantities of the state that the change sets.
     pub resets: Resets,
-    /// What rounding is forgiven after it.
+    /// Tolerance for rounding after it.
     pub after: After,
     /// The part that events name; none for the torque of a gear and for a rotor, which only its gear holds.
     pub told: Option<What>,
@@ -33,7 +33,7 @@ pub enum Then {
     Leave,
 }
 
-/// What a part does next.
+/// The next state of a part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Next {
     /// A body, and those that move with it.
@@ -64,7 +64,7 @@ pub enum Place {
     Current(usize),
 }
 
-/// What rounding is forgiven after a change.
+/// Tolerance for rounding after a change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum After {
     /// Nothing.
@@ -93,7 +93,7 @@ impl Resets {
 }
 
 impl Mechanism {
-    /// What follows where this condition of `mode` falls.
+    /// The consequence of the fall of this condition of `mode`.
     pub(super) fn transition(&self, cause: Cause, mode: &Mode) -> Transition {
         let widen = |body, then, resets| (then, resets, After::BreakawaysWiden, self.told(body));
         let breaks = |body, motion| widen(body, Then::Become(Next::Moves(body, motion)), Resets::None);
@@ -119,7 +119,7 @@ impl Mechanism {
         (!self.bodies[body].is_rotor).then_some(What::Body(body))
     }
 
-    /// What a switch does to a current that is a state and that its limit holds.
+    /// The effect of a switch on a current that is a state and is held at its limit.
     fn current_at_limit(&self, switch: Switch, mode: &Mode) -> (Resets, Option<Cause>) {
         let Switch::Current(drive, side) = switch else { return (Resets::None, None) };
         let part = &self.drives[drive];

@@ -8,7 +8,7 @@ use crate::mechanism::Label;
 /// The role of a part of a machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
-    /// What slides.
+    /// A sliding part.
     Load,
     /// A pulley that a drive turns.
     Pulley,
@@ -36,8 +36,8 @@ pub enum Worth {
 }
 
 impl Worth {
-    /// As a number. Peaks are magnitudes: of a motion there and back the sign of the larger peak is chance, and shares of
-    /// signed ones would mean nothing.
+    /// As a number. Peaks are magnitudes: of a motion there and back the sign of the larger peak is chance, and shares
+    /// of signed ones would mean nothing.
     pub fn number(self) -> f64 {
         match self {
             Worth::Number(value) | Worth::TimeOfPeak(value) => value,
@@ -47,7 +47,7 @@ impl Worth {
     }
 }
 
-/// What a [`Meter`](super::Meter) has to follow the motion for.
+/// A reason for a [`Meter`](super::Meter) to follow the motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Seek {
     /// The peak speed of what slides.
@@ -89,7 +89,7 @@ pub struct FigureRow {
     pub one_drive: bool,
     /// Its value for the part of this place.
     pub of: fn(&Metrics, usize) -> Worth,
-    /// What has to be followed for it; of a row of the whole machine, for all parts.
+    /// The quantity to follow for it; for a row of the whole machine, of all parts.
     pub seek: Option<Seek>,
 }
 
@@ -175,7 +175,7 @@ impl Figure {
         (self.row.of)(metrics, self.place)
     }
 
-    /// What has to be followed for it.
+    /// The quantity to follow for it, and the part's place.
     pub fn seek(&self) -> Option<(super::Seek, Option<usize>)> {
         self.row.seek.map(|seek| (seek, (self.row.role != Role::Whole).then_some(self.place)))
     }

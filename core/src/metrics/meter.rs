@@ -109,7 +109,7 @@ impl Places {
     }
 }
 
-/// What a meter looks for, made once for many machines of a structure.
+/// The quantities that a meter follows, made once for many machines of a structure.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sought {
     places: Arc<Places>,

@@ -1,4 +1,4 @@
-//! What a simulator asks of the solver below it, and the value of each column from that.
+//! The interface of a simulator to its solver, and the value of each column from it.
 
 use super::inputs::Pieces;
 use super::record::Extra;

@@ -1,4 +1,4 @@
-//! What is followed with a run: quantities, and the variables that they are differentiated by.
+//! Quantities followed with a run, and the variables by which they are differentiated.
 
 use crate::mechanism::{Mechanism, Shown, State};
 use crate::plan::Experiment;

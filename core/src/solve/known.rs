@@ -1,4 +1,4 @@
-//! What runs of one machine can share.
+//! Results that runs of one machine share.
 
 use std::any::Any;
 

@@ -236,7 +236,7 @@ impl fmt::Display for Ending {
     }
 }
 
-/// What [`Simulator::advance`] and [`Dynamics::settle`] end with where they cannot go on.
+/// The ending of [`Simulator::advance`] and [`Dynamics::settle`] that cannot go on.
 impl std::error::Error for Ending {}
 
 /// The cost of a run, in pieces of work rather than seconds.
@@ -275,8 +275,8 @@ pub struct Outcome {
     /// given, whoever gave them; the general solver's is estimated by [`ErrorEstimate`]. Table 3 with
     /// a fixed step has none, nor has a run without rows of a machine in which errors can grow.
     pub error: Option<PositionError>,
-    /// Events of the general solver whose own condition (a speed of zero, a load at its breakaway, a limit at its level)
-    /// does not hold at their time: found too late to be located. A run that has any is not to be relied on.
+    /// Events of the general solver whose own condition (a speed of zero, a load at its breakaway, a limit at its
+    /// level) does not hold at their time: found too late to be located. A run that has any is not to be relied on.
     pub unmet: u64,
 }
 

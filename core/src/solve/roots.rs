@@ -2,8 +2,8 @@
 //!
 //! Most are told by their coefficients: where c₀ and the negative ones add up to zero or more, Σ c_k sᵏ does not fall;
 //! where the coefficients change their sign once, there is one root above zero (Descartes), and the sign at the end
-//! says whether it lies in the interval. Of others the first fall is approached in steps that cannot pass it, and what all
-//! but touches zero is told by Bernstein coefficients.
+//! says whether it lies in the interval. Of others the first fall is approached in steps that cannot pass it, and what
+//! all but touches zero is told by Bernstein coefficients.
 
 use super::propagator::SERIES_TERMS;
 use crate::solve::widest::widest;
@@ -271,7 +271,8 @@ mod tests {
         assert!(falls > 5000 && stays > 1000 && left < 200, "{falls} {stays} {left}");
     }
 
-    /// What begins close above zero, rises and comes back falls there: s³ − 1.5 s² + 0.5 s + ε at 0.5 + 4 ε.
+    /// A condition that begins close above zero, rises and comes back falls there: s³ − 1.5 s² + 0.5 s + ε at 0.5 + 4
+    /// ε.
     #[test]
     fn what_rises_from_all_but_zero_comes_back() {
         for above in [1e-9, 1e-14, 1e-17, 1e-20, 1e-30, 1e-300] {

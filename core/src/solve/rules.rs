@@ -1,6 +1,6 @@
 //! The rules of events: how modes follow each other at one instant, whatever solver goes on between them.
 //!
-//! What follows a condition that falls is the mechanism's to say ([`Transition`]). Here stands in which order conditions
+//! The consequence of a condition that falls is the mechanism's ([`Transition`]). Here stands in which order conditions
 //! are settled, what rounding is forgiven after a change, and how many changes there may be. A solver tells what it
 //! knows of its conditions ([`Between`]).
 
@@ -66,14 +66,14 @@ pub(super) struct Known {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Load {
     pub(super) value: f64,
-    /// What friction takes of it once the body slides: Coulomb friction, in the direction of the motion.
+    /// Coulomb friction once the body slides, in the direction of the motion.
     pub(super) sliding: f64,
-    /// What it must pass before the body slides.
+    /// The breakaway that it must exceed before the body slides.
     pub(super) breakaway: f64,
     pub(super) noise: f64,
 }
 
-/// What the rules ask of a solver, of the present mode and the present state.
+/// The interface of the rules to a solver: answers for the present mode and state.
 pub(super) trait Between {
     fn rules(&self) -> &Rules;
     fn rules_mut(&mut self) -> &mut Rules;
@@ -83,13 +83,13 @@ pub(super) trait Between {
     fn instant(&self) -> f64;
     /// How many conditions the mode has.
     fn conditions(&self) -> usize;
-    /// What follows where the condition of this number falls.
+    /// The consequence of the fall of the condition of this number.
     fn transition(&self, index: usize) -> &Transition;
     /// Its value.
     fn known(&self, index: usize) -> Known;
     /// The same where the mode has just begun: the moment at which it did is known to a rounding, too.
     fn known_at_begin(&self, index: usize) -> Known;
-    /// What a condition that has just begun to hold is forgiven beyond that: a solver that knows by their series which
+    /// Further tolerance for a condition that has just begun to hold: a solver that knows by their series which
     /// conditions rise from zero needs nothing.
     fn margin(&self, index: usize) -> f64;
     /// Looks at all conditions; false if each of them holds for certain.

@@ -1,4 +1,4 @@
-//! What a run asks of the solver below it.
+//! The interface of a run to its solver.
 
 use super::Outcome;
 use super::inputs::Pieces;

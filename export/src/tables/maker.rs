@@ -177,7 +177,7 @@ impl Maker<'_> {
         Ok((guards.into_iter().map(|(guard, _)| guard).collect(), kinds.len()))
     }
 
-    /// What follows where these conditions of a mode fall.
+    /// The consequences of these conditions of a mode.
     fn transitions(&self, does: &[usize], is_one: impl Fn(&Transition) -> bool) -> Vec<Transition> {
         let all = self.mechanism.equations(self.mode(does)).guards.into_iter().map(|guard| guard.transition);
         all.filter(|transition| is_one(transition)).collect()

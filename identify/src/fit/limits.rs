@@ -651,7 +651,7 @@ pub(crate) const WALK_LENGTH: f64 = 2.38;
 /// Unit: 1. Source: G. O. Roberts, A. Gelman, W. R. Gilks 1997. Test: `a_density_of_kinks_has_its_moments`.
 pub(crate) const WALK_TAKEN: f64 = 0.234;
 
-/// What is added to it in one variable: 0.44 together.
+/// Added to it in one variable: 0.44 together.
 ///
 /// Unit: 1. Source: A. Gelman, G. O. Roberts, W. R. Gilks 1996.
 pub(crate) const WALK_TAKEN_OF_ONE: f64 = 0.206;

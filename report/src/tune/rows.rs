@@ -208,7 +208,7 @@ fn reason(forced: &Forced) -> String {
     }
 }
 
-/// What comes nearest to being no worse, in words, a sentence of its own.
+/// The design that comes nearest to being no worse, as a sentence of its own.
 fn least(work: &Work) -> String {
     let Some(least) = &work.tuned.least else { return String::new() };
     let Worse { motion, figure, before, after, .. } = least.worse;
@@ -325,7 +325,7 @@ pub fn hunt(hunt: &Option<Hunt>) -> String {
     format!("{how}; {needs}")
 }
 
-/// What varies by its name, after a fit: what was fitted, and what was not.
+/// Varied parameters by name after a fit: those fitted, and those not.
 fn varied(family: &Family, fitted: &str) -> String {
     let names = |is_fitted: bool| -> String {
         let own = family.unknowns.iter().filter(|unknown| unknown.is_fitted == is_fitted);

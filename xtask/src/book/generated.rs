@@ -1,4 +1,4 @@
-//! What the reference of the book takes from the program and from the Python package.
+//! Parts of the book's reference generated from the program and the Python package.
 
 use serde_json::Value;
 use std::fmt::Write;
@@ -25,7 +25,7 @@ pub fn filled(text: &str, program: &Path) -> Result<String, String> {
     Ok(filled)
 }
 
-/// What a command prints.
+/// The output of a command.
 fn output(command: &mut Command) -> Result<String, String> {
     let name = command.get_program().to_string_lossy().into_owned();
     let output = command.stderr(Stdio::inherit()).output();
@@ -36,7 +36,7 @@ fn output(command: &mut Command) -> Result<String, String> {
     String::from_utf8(output.stdout).map_err(|_| format!("the output of {name} is not text"))
 }
 
-/// What the program prints.
+/// The output of the program.
 fn taut(program: &Path, words: &[&str]) -> Result<String, String> {
     output(Command::new(program).args(words))
 }

@@ -1,5 +1,5 @@
-//! Where the instructions of a work go: what each function of a profile of callgrind's takes by itself, added up by kinds
-//! of work.
+//! Where the instructions of a work go: what each function of a profile of callgrind's takes by itself, added up by
+//! kinds of work.
 
 use std::collections::HashMap;
 
@@ -72,8 +72,9 @@ pub fn of(profile: &str) -> Vec<(&'static str, f64)> {
     names.zip(costs).map(|(name, cost)| (name, cost as f64 / whole)).collect()
 }
 
-/// What each function takes by itself. Names are told once and then by number: `fn=(12) name`, `fn=(12)`. Lines of cost
-/// begin with a place, a number by itself or against the one before; the one behind `calls=` is that of who is called.
+/// The cost of each function by itself. Names are told once and then by number: `fn=(12) name`, `fn=(12)`. Lines of
+/// cost begin with a place, a number by itself or against the one before; the one behind `calls=` is that of who is
+/// called.
 fn by_function(profile: &str) -> HashMap<String, u64> {
     let mut names = HashMap::new();
     let mut costs = HashMap::new();

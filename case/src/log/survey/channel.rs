@@ -368,7 +368,7 @@ impl Channel {
         notes
     }
 
-    /// What would mend a note on an output, as far as samples show it.
+    /// The remedy for a note on an output, as far as samples show it.
     fn remedy(&self, code: &str, output: &Output) -> Option<Remedy> {
         match code {
             "wraps" => self.turn().map(|turn| Remedy::Unwrap(output.quantity, turn)),

@@ -46,7 +46,7 @@ pub struct Note {
     pub column: Option<&'static str>,
     /// The finding, in a sentence with numbers, and what to do.
     pub text: String,
-    /// What would mend the log, where a model can tell whether that is so.
+    /// The remedy, if a model can decide whether it applies.
     pub remedy: Option<Remedy>,
 }
 

@@ -1,4 +1,4 @@
-//! What would mend a log, if a suspicion were right: a model can be put through both.
+//! Remedies for a log, each to be tested by running a model with and without it.
 
 use super::Jump;
 use crate::log::{Log, Quantity};

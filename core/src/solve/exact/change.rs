@@ -1,4 +1,5 @@
-//! What the rules of events ask of the exact solver: values and noises of its conditions, loads, the equations of a mode.
+//! The exact solver's answers to the rules of events: values and noises of its conditions, loads, the equations of a
+//! mode.
 
 use super::matrices::Room;
 use super::{Core, ModeMatrices};

@@ -16,8 +16,8 @@
 //!
 //! N counts steps, Φ the radians of the fastest swing, K the constant forces of a mode before they are added up: near
 //! an unstable equilibrium they cancel, and their rounding is the error from which all others grow. A guard that only
-//! grazes falls by its bend: |w·f⁻| is taken for no less than √(½ |w·f̈| δg), the slope at which it leaves its rounding.
-//! A belt position w·z is off by at most √(wᵀ C w).
+//! grazes falls by its bend: |w·f⁻| is taken for no less than √(½ |w·f̈| δg), the slope at which it leaves its
+//! rounding. A belt position w·z is off by at most √(wᵀ C w).
 
 use super::Core;
 use super::matrices::Watch;
@@ -110,7 +110,7 @@ impl<const N: usize> Ellipsoid<N> {
         add(&mut self.c, other, &weights, self.states);
     }
 
-    /// What makes errors of all states comparable: one over the squares of their sizes.
+    /// Weights that make errors of all states comparable: one over the squares of their sizes.
     fn weights(&self) -> [f64; N] {
         self.size.map(|size| if size > 0.0 { 1.0 / (size * size) } else { 0.0 })
     }
@@ -134,7 +134,7 @@ impl<const N: usize> Ellipsoid<N> {
         sum.max(0.0)
     }
 
-    /// What stands still, or is held, is not off.
+    /// Parts at rest, or held, have no error.
     fn settle(&mut self, place: usize) {
         self.c[place] = [0.0; N];
         self.c.iter_mut().for_each(|row| row[place] = 0.0);
@@ -248,7 +248,7 @@ impl<const N: usize> Core<N> {
         mechanism.held_bodies().map(row).collect()
     }
 
-    /// What an event does to the errors depends on the state before it.
+    /// The effect of an event on the errors depends on the state before it.
     pub(super) fn crossing(&self, fallen: Transition) -> Option<Crossing<N>> {
         let errors = self.errors.as_ref()?;
         let law = &self.matrices;

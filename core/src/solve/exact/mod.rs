@@ -57,7 +57,7 @@ pub(super) struct Core<const N: usize> {
     /// Matrices that were there before.
     shared: u64,
     room: Box<Room<N>>,
-    /// What rounding has done to the state, of a machine in which that can grow.
+    /// Rounding errors of the state, for a machine in which they can grow.
     errors: Option<Box<Ellipsoid<N>>>,
     pub(super) common: Common,
 }

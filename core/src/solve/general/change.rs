@@ -1,4 +1,5 @@
-//! What the rules of events ask of the general solver: values and errors of its conditions, loads, the equations of a mode.
+//! The general solver's answers to the rules of events: values and errors of its conditions, loads, the equations of a
+//! mode.
 
 use super::Core;
 use crate::mechanism::{Cause, Mechanism, Place, Transition};
@@ -121,7 +122,7 @@ impl Between for Core {
 }
 
 impl Core {
-    /// What a condition is forgiven: to a speed what the laws' error may do, which is no stop, least of all where a body
+    /// Tolerance of a condition: for a speed what the laws' error may do, which is no stop, least of all where a body
     /// has just begun to slide.
     pub(super) fn forgiven(&self, cause: Cause) -> f64 {
         match cause {
@@ -130,7 +131,7 @@ impl Core {
         }
     }
 
-    /// What the formula may be off by in a condition.
+    /// Error of the formula in a condition.
     fn error_at(&self, index: usize) -> f64 {
         let field = &self.known[self.present].field;
         let rounding = field.rounding(index, &self.absolute.map(|absolute| absolute / self.relative));

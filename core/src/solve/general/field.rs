@@ -259,7 +259,7 @@ impl Field {
         form.noise(&self.model.layout, &self.model.inner(y), input) / ROUNDING
     }
 
-    /// What rounding may do to a guard where states are as large as `usual`: of a guard of one speed, its size at the
+    /// Rounding error of a guard where states are as large as `usual`: of a guard of one speed, its size at the
     /// event says nothing.
     pub(super) fn rounding(&self, index: usize, usual: &Vector) -> f64 {
         let on_state = self.guards[index].row.iter().zip(usual).map(|(weight, usual)| (weight * usual).abs());

@@ -1,4 +1,4 @@
-//! What is compared with what: logs as runs of the model, and their residuals as a function of the variables.
+//! The comparison: logs as runs of the model, and their residuals as a function of the variables.
 
 mod acceleration;
 pub(crate) mod controller;

@@ -153,7 +153,7 @@ impl<'a> Problem<'a> {
         self
     }
 
-    /// What is asked.
+    /// The question.
     pub(crate) fn stop(&self) -> Option<Stop<'a>> {
         self.stop
     }
@@ -444,8 +444,8 @@ impl<'a> Problem<'a> {
         matches!(self.units[j], Scale::Log(_))
     }
 
-    /// The same machine, with each variable as the machine has it: a breakaway that was asked for below Coulomb friction
-    /// is at it.
+    /// The same machine, with each variable as the machine has it: a breakaway that was asked for below Coulomb
+    /// friction is at it.
     pub fn as_set(&self, x: &[f64]) -> Vec<f64> {
         let mut own = x.to_vec();
         for (j, (parameter, unit)) in self.parameters.iter().zip(&self.units).enumerate() {

@@ -1,4 +1,5 @@
-//! What a search is asked: residuals as a function of variables within bounds, and how they are differentiated.
+//! The function that a search minimises: residuals as a function of variables within bounds, and how they are
+//! differentiated.
 
 use nalgebra::DMatrix;
 

@@ -94,8 +94,8 @@ impl Problem<'_> {
         extras
     }
 
-    /// What variable `j` of the search is to run `index`; none for what is no number of a machine, nor known how it
-    /// moves the input.
+    /// The meaning of variable `j` of the search for run `index`; none for what is no number of a machine, nor known
+    /// how it moves the input.
     fn variable_of(&self, (index, j): (usize, usize), x: &[f64], bounds: &Bounds, is_moved: bool) -> Option<Variable> {
         let extra = match j.checked_sub(self.parameters.len()) {
             None => None,

@@ -82,7 +82,7 @@ pub(super) struct Spread {
     /// Weights and covariances of the globals; and those of noise that is larger in some places, where it is.
     parts: Vec<(f64, DMatrix<f64>, Option<DMatrix<f64>>)>,
     freedom: f64,
-    /// What errors that come again at the same place have moved the globals by.
+    /// Shift of the globals by errors that recur at the same place.
     shift: DVector<f64>,
     /// Mean covariance, with the square of the shift.
     pub covariance: DMatrix<f64>,
@@ -363,8 +363,8 @@ impl Estimate {
         })
     }
 
-    /// The normal equations of the globals, the waves and the residuals under these slow noises, without what columns of
-    /// one run can do.
+    /// The normal equations of the globals, the waves and the residuals under these slow noises, without what columns
+    /// of one run can do.
     fn normal(&self, slow: &[Slow]) -> Normal {
         let g = self.globals;
         let n = g + self.series.first().map_or(0, |series| series.more);

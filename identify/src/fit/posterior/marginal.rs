@@ -8,8 +8,8 @@
 //! y given x is normal with mean ŷ = −R⁻¹ Qᵀ r(x, 0) and covariance T R⁻¹ R⁻ᵀ
 //! ```
 //!
-//! so draws of x are those of a problem with the residuals P r, and y is drawn beside each of them. A run with one shift
-//! between near bounds l and h, where s = √T/R, has one residual more:
+//! so draws of x are those of a problem with the residuals P r, and y is drawn beside each of them. A run with one
+//! shift between near bounds l and h, where s = √T/R, has one residual more:
 //!
 //! ```text
 //! ∫ₗʰ e^{−|r|²/2T} dy ∝ e^{−|P r|²/2T} ΔΦ,   ΔΦ = Φ((h − ŷ)/s) − Φ((l − ŷ)/s)        ρ = √(−2 T ln ΔΦ)
@@ -43,7 +43,8 @@ pub(crate) struct Marginal<'a> {
     fixed: Option<Vec<Columns>>,
 }
 
-/// What is integrated over of a run: where its residuals begin, the variables, and whether a bound is near.
+/// The nuisances of a run that are integrated out: where its residuals begin, the variables, and whether a bound is
+/// near.
 #[derive(Clone)]
 struct Shifts {
     run: usize,

@@ -128,7 +128,8 @@ mod tests {
 
     const START: [f64; 2] = [0.6, 0.9];
 
-    /// What a rung alone makes of the valley, from a point where it knows the derivatives: its end, and where it led.
+    /// The result of one rung alone in the valley, from a point where it knows the derivatives: its end, and where it
+    /// led.
     fn alone(rung: &mut dyn Rung, start: &[f64], is_exact: bool) -> (Climb, Minimum) {
         let (bounds, options) = (Bounds::none(2), Options::default());
         let mut toy = Kinked { is_exact };

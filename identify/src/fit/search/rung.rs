@@ -16,7 +16,7 @@ pub(crate) enum Climb {
     Lowered,
     /// The rung does not lower the cost: the next one is tried.
     Passed,
-    /// What ends a search wherever it is: it was stopped, its iterations are used up, or there is no Jacobian.
+    /// Reasons that end a search anywhere: it was stopped, its iterations are used up, or there is no Jacobian.
     Ended(Ending),
 }
 

@@ -1,4 +1,4 @@
-//! What widens intervals beyond what noise makes of them: parts of the logs that disagree, and another friction law.
+//! Reasons to widen intervals beyond noise: parts of the logs that disagree, and another friction law.
 
 use nalgebra::DMatrix;
 

@@ -1,4 +1,4 @@
-//! What is to be known of a fit, in a sentence each.
+//! Findings of a fit, a sentence each.
 
 /// How much something matters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

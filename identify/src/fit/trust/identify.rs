@@ -2,8 +2,9 @@
 //!
 //! With J the derivatives of the weighted outputs with respect to relative changes of the parameters, and what else is
 //! fitted along projected out, J = U S Vᵀ: along vᵢ the outputs change by sᵢ standard deviations of white noise. How
-//! far off that combination may be, the noise that the residuals show says ([`crate::fit::noise`]); where that is more than
-//! [`UNDETERMINED`], or where the outputs move by less than a machine shows ([`LEAST_SHOWN`], [`MODEL_ERROR`]), it is not determined.
+//! far off that combination may be, the noise that the residuals show says ([`crate::fit::noise`]); where that is more
+//! than [`UNDETERMINED`], or where the outputs move by less than a machine shows ([`LEAST_SHOWN`], [`MODEL_ERROR`]), it
+//! is not determined.
 
 use super::combinations::{self, Combination};
 use super::directions::Directions;
@@ -253,8 +254,8 @@ impl Identifiability {
     }
 }
 
-/// The tie of these parameters; none where they cannot be tied: values of different units, sums, and what campaigns have
-/// for themselves.
+/// The tie of these parameters; none where they cannot be tied: values of different units, sums, and what campaigns
+/// have for themselves.
 fn tie(problem: &Problem, members: &[usize]) -> Option<String> {
     let mut keys = Vec::new();
     let unit = problem.parameters.get(*members.first()?)?.unit;
@@ -268,7 +269,7 @@ fn tie(problem: &Problem, members: &[usize]) -> Option<String> {
     Some(format!("tie them: tied = [[{}]]", keys.join(", ")))
 }
 
-/// What a change of a value has to come to, so that a machine shows it, and how far the values range: in their weights.
+/// The least change of a value that a machine shows, and how far the values range: in their weights.
 struct Least {
     least: f64,
     range: f64,

@@ -1,4 +1,4 @@
-//! What may be believed of a minimum: which parameters are determined, how well, and what speaks against it.
+//! The trust in a minimum: which parameters are determined, how well, and what speaks against it.
 
 pub(crate) mod combinations;
 pub(crate) mod directions;

@@ -15,7 +15,7 @@ use taut::number::engineering;
 /// A plane and its name in file names.
 pub type Named = (String, Plane);
 
-/// What each drive does to bridge, cart and pulleys.
+/// Responses of bridge, cart and pulleys to each drive.
 pub fn responses(analysis: &GantryAnalysis) -> Vec<(String, Figure)> {
     let radius = analysis.case.machine.pulley_radius;
     let outputs = ["bridge_position", "cart_position", "left_angle", "right_angle"];
