@@ -411,3 +411,73 @@ fn the_time_of_a_plateaus_peak_depended_on_the_output_interval() {
         assert!(a.value == b.value && (a.time - b.time).abs() < 1e-9, "rows of {rows} s: {a:?}, {b:?}");
     }
 }
+
+/// Friction laws of a cart; the exact solver takes the first one alone.
+const LAWS: [Law; 5] = [
+    Law::Coulomb,
+    Law::Stribeck { velocity: 0.01, shape: Shape::Gaussian },
+    Law::Stribeck { velocity: 0.01, shape: Shape::Exponential },
+    Law::Smooth { breakaway_velocity: 0.01 },
+    Law::LuGre { velocity: 0.01, stiffness: 1e4, damping: 60.0 },
+];
+
+/// The same by the general solver, with every friction law: the polynomials that an observer is shown bent what was
+/// constant by the rounding of their table, 1e-11 of it, and that decided when the peak was.
+#[test]
+fn the_time_of_a_plateaus_peak_depended_on_the_output_interval_of_the_general_solver() {
+    for law in LAWS {
+        let mut machine = table4();
+        machine.belt.model = BeltModel::Rigid;
+        machine.cart.friction = Friction::with_breakaway(19.0, 0.2, 0.3).following(law);
+        ends_at_its_peak(&machine, &[1.0, 1.2345678], Solver::GENERAL);
+        // The current that the voltage asks for is beyond its limit while the machine speeds up.
+        machine.drives[0].amplifier.current_limit = Some(2.0);
+        let pulse = Signal::Pulse { value: 5.0, duration: 1.0, at: 0.0 };
+        let (_, known) = every(&machine, &pulse, 1.5, 1e-3, Solver::GENERAL);
+        assert!(known.drive().peak_current.value == 2.0, "{:?}", known.drive().peak_current);
+        for rows in [1e-2, 0.37e-3] {
+            let (_, metrics) = every(&machine, &pulse, 1.5, rows, Solver::GENERAL);
+            let (a, b) = (metrics.drive().peak_current, known.drive().peak_current);
+            assert!(a.value == b.value && (a.time - b.time).abs() < 1e-9, "{law:?}, rows of {rows} s: {a:?}, {b:?}");
+        }
+    }
+}
+
+/// Drawn machines with a rigid belt, by both solvers. A body whose rate depends on its speed alone approaches its steady
+/// speed from one side and never reaches it: it is fastest where the pulse ends.
+#[test]
+fn the_time_of_a_plateaus_peak_is_the_same_on_drawn_machines() {
+    let mut chance = common::chance::Chance::new(28);
+    for _ in 0..6 {
+        let mut factor = || 2f64.powf(2.0 * chance.uniform() - 1.0);
+        let mut machine = table4();
+        machine.belt.model = BeltModel::Rigid;
+        machine.pulley_radius *= factor().sqrt();
+        machine.drives[0].motor.resistance *= factor();
+        machine.drive_pulley.inertia *= factor();
+        machine.cart.mass *= factor();
+        let [viscous, coulomb, over] = [19.0 * factor(), 0.2 * factor(), 1.0 + 0.3 * factor()];
+        let durations = [1.2 * factor().sqrt(), 1.2 * factor().sqrt()];
+        for law in &LAWS[..4] {
+            machine.cart.friction = Friction::with_breakaway(viscous, coulomb, over * coulomb).following(*law);
+            ends_at_its_peak(&machine, &durations, Solver::GENERAL);
+            if *law == Law::Coulomb {
+                ends_at_its_peak(&machine, &durations, Solver::Exact);
+            }
+        }
+    }
+}
+
+/// Cart and drive are fastest at the end of a pulse of each duration, s, whatever the output interval.
+fn ends_at_its_peak(machine: &Machine, durations: &[f64], solver: Solver) {
+    for &duration in durations {
+        let pulse = Signal::Pulse { value: 5.0, duration, at: 0.0 };
+        for rows in [1e-2, 1e-3, 0.37e-3] {
+            let (_, metrics) = every(machine, &pulse, duration + 0.3, rows, solver);
+            for peak in [metrics.cart().peak_speed, metrics.drive().peak_belt_speed.unwrap()] {
+                let off = (peak.time - duration).abs();
+                assert!(off < 1e-12, "{:?}, {duration} s, rows of {rows} s: {peak:?}", machine.cart.friction.law);
+            }
+        }
+    }
+}

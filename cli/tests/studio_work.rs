@@ -178,3 +178,40 @@ fn a_case_of_moves_alone_is_run_as_its_first_move() {
     let keys = head["parameters"].as_array().unwrap();
     assert!(keys.iter().any(|one| one["key"] == "controller.pid.proportional"));
 }
+
+/// One log that was not there blocked the whole page: other experiments, modes, loops.
+#[test]
+fn a_missing_log_blocks_only_what_needs_it() {
+    let studio = Studio::start(&[]);
+    let mut page = studio.page();
+    let gone = "\n[[experiment]]\nname = \"gone\"\nlog = { file = \"gone.csv\", time = \"t\", input = \"u\", cart_position = \"x\" }\n";
+    let mine = format!("{}{gone}\n[fit]\nfree = [\"cart.friction.viscous\"]\n", text(TABLE4));
+    let line = 1 + mine.lines().position(|line| line.contains("gone.csv")).unwrap();
+    let whole = page.result("run", json!({ "text": text(TABLE4), "set": [["cart.mass", 0.5]] }));
+    let run = page.result("run", json!({ "text": mine, "set": [["cart.mass", 0.5]] }));
+    assert_eq!(run["experiments"], whole["experiments"]);
+    assert_eq!(run["result"]["experiments"], whole["result"]["experiments"]);
+    let notes = run["overview"]["notes"].to_string();
+    assert!(notes.contains("gone") && notes.contains(&format!("line {line}")), "{notes}");
+    assert_eq!(
+        page.result("modes", json!({ "text": mine }))["result"],
+        page.result("modes", json!({ "text": text(TABLE4) }))["result"]
+    );
+    let moved = format!("{}{gone}", text(PID));
+    assert_eq!(
+        page.result("loop", json!({ "text": moved }))["result"],
+        page.result("loop", json!({ "text": text(PID) }))["result"]
+    );
+    for act in ["check", "fit"] {
+        let (_, answer, _) = long(&mut page, act, json!({ "text": mine }));
+        let error = &answer["error"];
+        assert_eq!(error["line"], json!(line), "{act}: {answer}");
+        assert!(error["what"].as_str().unwrap().contains("experiment \"gone\""), "{act}: {answer}");
+    }
+    // Where nothing else is to be run, the line is told, too.
+    let alone = mine.split("[[experiment]]").next().unwrap().to_string() + gone;
+    let line = 1 + alone.lines().position(|line| line.contains("gone.csv")).unwrap();
+    let id = page.ask("run", json!({ "text": alone }));
+    let (answer, _) = page.answer().unwrap();
+    assert_eq!((answer["id"].clone(), answer["error"]["line"].clone()), (json!(id), json!(line)), "{answer}");
+}

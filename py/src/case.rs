@@ -69,14 +69,14 @@ impl Case {
     #[staticmethod]
     fn read(py: Python<'_>, path: PathBuf, changes: Vec<String>) -> PyResult<Self> {
         let changes: Vec<&str> = changes.iter().map(String::as_str).collect();
-        let inner = unlocked(py, || taut::case::Case::read_with(&path, &changes))?.told(py)?;
+        let inner = unlocked(py, || taut::case::Case::read_for(&path, &changes, Files::All))?.told(py)?;
         Ok(Self { inner: Arc::new(inner), path })
     }
 
     #[staticmethod]
     fn from_text(py: Python<'_>, path: PathBuf, text: &str, changes: Vec<String>) -> PyResult<Self> {
         let changes: Vec<&str> = changes.iter().map(String::as_str).collect();
-        let inner = unlocked(py, || taut::case::Case::from_text_with(&path, text, &changes))?.told(py)?;
+        let inner = unlocked(py, || taut::case::Case::from_text_for(&path, text, &changes, Files::All))?.told(py)?;
         Ok(Self { inner: Arc::new(inner), path })
     }
 
@@ -109,6 +109,18 @@ impl Case {
     #[getter]
     fn experiments(&self) -> Vec<&str> {
         self.inner.experiments.iter().map(|experiment| experiment.name.as_str()).collect()
+    }
+
+    /// Experiments that were left out, each with the reason: name, error.
+    #[getter]
+    fn left_out(&self) -> Vec<(&str, String)> {
+        self.inner.left_out().into_iter().map(|(name, error)| (name, error.to_string())).collect()
+    }
+
+    /// Raises the error of an experiment of this name that was left out.
+    fn require(&self, py: Python<'_>, name: &str) -> PyResult<()> {
+        let left_out = self.inner.unread.iter().find(|one| one.holds(name));
+        left_out.map_or(Ok(()), |one| Err(one.error.clone())).told(py)
     }
 
     #[getter]

@@ -132,3 +132,25 @@ def test_a_case_is_exported_as_the_program_does(case, tmp_path):
         taut.export(case, "st", tmp_path)
     with pytest.raises(ValueError, match="real: float or double"):
         taut.export(case, "c", tmp_path, real="half")
+
+
+def test_a_missing_log_is_told_to_those_who_need_it(case, tmp_path):
+    """One log that was not there blocked the whole case: its modes, its export, the simulation of other experiments."""
+    text = case.text + """
+[[experiment]]
+name = "gone"
+log  = { file = "gone.csv", time = "time_s", input = "voltage_V", drive_angle = "drive_angle_rad" }
+[fit]
+free = ["cart.friction.viscous"]
+"""
+    (tmp_path / "mine.toml").write_text(text)
+    line = 1 + next(k for k, line in enumerate(text.splitlines()) if "gone.csv" in line)
+    for mine in (taut.read(tmp_path / "mine.toml"), taut.Case(text, tmp_path / "mine.toml")):
+        assert mine.experiments == case.experiments and list(mine.left_out) == ["gone"] and "gone.csv" in mine.left_out["gone"]
+        assert mine.modes().data == case.modes().data and mine.show().data["title"] == case.title
+        assert mine.simulate(case.experiments[0]).data["experiments"] == case.simulate(case.experiments[0]).data["experiments"]
+        assert mine.changed({"cart.mass": 0.5})["cart.mass"] == 0.5
+        for needs in (mine.check, mine.fit, mine.frf, mine.compare, mine.simulate, lambda: mine.simulate("gone")):
+            with pytest.raises(taut.Error, match=f"mine.toml:{line}(.|\\n)*experiment \"gone\"|experiment \"gone\"(.|\\n)*mine.toml:{line}"):
+                needs()
+    assert case.left_out == {}

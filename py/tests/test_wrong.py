@@ -578,10 +578,10 @@ def test_files_that_are_gone_or_something_else(case, tmp_path):
         allowed(lambda: taut.Case(fitted.text, fitted.path), f"log {number}: {start}, {end}")
     log.unlink()
     with pytest.raises(taut.Error, match="there is no such file"):
-        taut.Case(fitted.text, fitted.path)
+        taut.Case(fitted.text, fitted.path).check()
     log.mkdir()
     with pytest.raises(taut.Error, match="pulse.csv"):
-        taut.Case(fitted.text, fitted.path)
+        taut.Case(fitted.text, fitted.path).check()
     # A case that was read has its logs, whatever becomes of the files.
     assert fitted.check().complete
     with pytest.raises(taut.Error):

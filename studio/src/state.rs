@@ -5,7 +5,7 @@ use crate::pool::{Pool, lock};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
-use taut::case::Case;
+use taut::case::{Case, Files};
 use taut::error::{Error, Result};
 use tokio::sync::{Semaphore, watch};
 
@@ -142,7 +142,7 @@ impl Drop for Place {
 impl CaseFile {
     fn read(path: PathBuf) -> Result<Self> {
         // Mistakes in it are shown at their line on the page; a file that is no text at all is told now.
-        match Case::read_with(&path, &[]) {
+        match Case::read_for(&path, &[], Files::Nothing) {
             Err(error) if error.place.as_ref().is_none_or(|place| place.span.is_none()) => return Err(error),
             _ => {}
         }

@@ -78,8 +78,13 @@ class Case:
 
     @property
     def experiments(self) -> list[str]:
-        """Names of the experiments."""
+        """Names of the experiments whose files could be read."""
         return self._native.experiments
+
+    @property
+    def left_out(self) -> dict[str, str]:
+        """Experiments of which a file cannot be read, each with the reason; what needs one raises an error."""
+        return dict(self._native.left_out)
 
     @property
     def moves(self) -> list[str]:
@@ -291,7 +296,9 @@ class Case:
             raise TypeError(f"columns: a dictionary is wanted, and no {type(columns).__name__}")
         table = {"file": written, **columns, **settings}
         experiment = f"\n[[experiment]]\nname = {toml(_checks.text('name', name))}\nlog = {toml(table)}\n"
-        return Case(self.text.rstrip("\n") + "\n" + experiment, self.path)
+        logged = Case(self.text.rstrip("\n") + "\n" + experiment, self.path)
+        logged._native.require(name)
+        return logged
 
     def compare(
         self, laws: str | Sequence[str] | None = None, windows: Sequence[float | None] | None = None

@@ -152,10 +152,10 @@ pub fn verdict(work: &Work) -> String {
     let tuned = work.tuned;
     let (before, after) = (&tuned.before, &tuned.after);
     let mut told: Vec<String> = before.moves.iter().zip(&after.moves).filter_map(|(was, is)| change(was, is)).collect();
-    let hunts = |hunt: &Option<Hunt>| hunt.as_ref().map_or(0.0, |hunt| hunt.amplitude);
-    let (was, is) = (hunts(&before.hunt), hunts(&after.hunt));
+    let amplitude = |hunt: &Option<Hunt>| hunt.as_ref().map_or(0.0, |hunt| hunt.amplitude);
+    let (was, is) = (amplitude(&before.hunt), amplitude(&after.hunt));
     if before.hunt.is_some() != after.hunt.is_some() || is > 1.1 * was {
-        told.push(format!("at rest the cart hunts by {}, {} before", swing(is), swing(was)));
+        told.push(format!("at rest the cart {}", hunts(is, was)));
     }
     let told = if told.is_empty() { String::new() } else { format!(": {}", told.join("; ")) };
     match (tuned.judgement, &tuned.forced) {
@@ -214,7 +214,7 @@ fn least(work: &Work) -> String {
     let Worse { motion, figure, before, after, .. } = least.worse;
     let name = motion.map_or("at rest the cart", |motion| &work.tuned.moves[motion].name);
     let what = match figure {
-        Figure::Hunting => format!("hunts by {}, {} before", swing(after), swing(before)),
+        Figure::Hunting => hunts(after, before),
         Figure::Error => format!("errs {}, {} before", length(after), length(before)),
         Figure::Settling => format!("settles after {:.0} ms, {:.0} ms before", 1e3 * after, 1e3 * before),
         Figure::Settled => format!("settles on {after} axes, {before} before"),
@@ -289,6 +289,15 @@ pub fn choices(work: &Work) -> Vec<Vec<String>> {
 
 /// Headings of [`choices`].
 pub const CHOICES: [&str; 6] = ["choice", "J", "move", "cart error", "settles", "current, rms"];
+
+/// How far a cart hunts with the new gains and with those of the file; amplitudes in m, 0 at rest.
+fn hunts(after: f64, before: f64) -> String {
+    match [after, before].map(|amplitude| amplitude == 0.0) {
+        [true, _] => format!("no longer hunts, {} before", swing(before)),
+        [_, true] => format!("hunts by {}, and did not before", swing(after)),
+        [false, false] => format!("hunts by {}, {} before", swing(after), swing(before)),
+    }
+}
 
 /// The swing of a hunting axis.
 fn swing(amplitude: f64) -> String {

@@ -4,24 +4,30 @@ use super::Context;
 use super::curves::spans;
 use crate::message::Request;
 use serde_json::{Value, json};
-use taut::case::{Case, Number};
+use taut::case::{Case, Files, Number};
 use taut::error::{Error, Result};
 use taut::machine::Machine;
 use taut::parameter::{Fallback, Free};
 
-/// The case: `text`, changed by `set`, a list of keys and values, and by `changes`, a list of `KEY=VALUE`.
+/// The case: `text`, changed by `set`, a list of keys and values, and by `changes`, a list of `KEY=VALUE`. Experiments
+/// whose files cannot be read are left out; a job that needs them refuses the case ([`Case::complete`]).
 pub fn opened(request: &Request, context: &Context) -> Result<Case> {
+    opened_for(request, context, Files::All)
+}
+
+/// The same with the files of these experiments only.
+pub fn opened_for(request: &Request, context: &Context, files: Files) -> Result<Case> {
     let (name, text) = (context.state.name(), request.text("text")?);
     let mut changes: Vec<String> =
         request.list("changes").iter().filter_map(Value::as_str).map(str::to_string).collect();
     if !request.list("set").is_empty() {
-        let numbers = Case::from_text_with(name, text, &[])?.numbers()?;
+        let numbers = Case::from_text_for(name, text, &[], Files::Nothing)?.numbers()?;
         for pair in request.list("set") {
             changes.push(change(&numbers, pair)?);
         }
     }
     let changes: Vec<&str> = changes.iter().map(String::as_str).collect();
-    Case::from_text_with(name, text, &changes)
+    Case::from_text_for(name, text, &changes, files)
 }
 
 /// The change that `[key, value]` means: the value is a number in SI, or a text with a unit.
@@ -80,6 +86,11 @@ pub fn parameters(case: &Case, numbers: &[Number]) -> Value {
         })
     };
     Value::Array(numbers.iter().map(one).collect())
+}
+
+/// Refuses a case that has nothing to run because its files cannot be read, with the line that names the first of them.
+pub fn runnable(case: &Case) -> Result<()> {
+    if case.experiments.is_empty() && case.moves.is_empty() { case.complete() } else { Ok(()) }
 }
 
 /// The place in a list that a request names as `experiment`: its first where it names none.

@@ -1,14 +1,14 @@
 //! Loops that are closed: a move and the loop's margins for what sliders ask, and the tuning.
 
 use super::Context;
-use super::case::{opened, parameters};
+use super::case::{opened_for, parameters};
 use super::rows::interval;
 use crate::message::{Reply, Request};
 use serde_json::{Value, json};
 use std::cell::Cell;
 use std::f64::consts::PI;
 use std::time::{Duration, Instant};
-use taut::case::{Case, Given, Move, Tuning};
+use taut::case::{Case, Files, Given, Move, Tuning};
 use taut::control::feasible::shortfalls;
 use taut::control::feedback::Feedback;
 use taut::control::{Loop, Rows, Standard, stream};
@@ -70,7 +70,7 @@ fn written(given: &Given) -> String {
 
 /// The case of a request, which has to be an axis, with `changes`; and its text with them.
 fn axis(request: &Request, context: &Context) -> Result<Case> {
-    match opened(request, context)? {
+    match opened_for(request, context, Files::Nothing)? {
         case if case.is_axis() => Ok(case),
         _ => {
             let error = Error::new("a controller moves an axis, and this case is a gantry");

@@ -1,9 +1,10 @@
 //! How the machine swings: the page of `taut modes`.
 
-use super::case::opened;
+use super::case::opened_for;
 use super::{Context, friction};
 use crate::message::{Reply, Request};
 use serde_json::json;
+use taut::case::Files;
 use taut::error::Result;
 use taut::linear::{Analysis, GantryAnalysis, Question};
 use taut_report::modes;
@@ -11,7 +12,7 @@ use taut_report::modes;
 /// Poles, zeros, frequency responses, and how they change along the travel, as a part of a page and as data; and
 /// friction over speed, up to `speed`, m/s.
 pub fn modes(request: &Request, context: &Context) -> Result<Reply> {
-    let case = opened(request, context)?;
+    let case = opened_for(request, context, Files::Nothing)?;
     let speed = request.number("speed").filter(|speed| *speed > 0.0).unwrap_or(1.0);
     let friction = friction::page(&case, speed);
     let (page, result) = match &case {

@@ -9,9 +9,10 @@ use taut::error::Result;
 use taut::solve::Solver;
 use taut_report::simulate;
 
-/// The page as text.
+/// The page as text; a report of all experiments needs all of their files.
 pub fn report(request: &Request, context: &Context) -> Result<Reply> {
     let case = &opened(request, context)?;
+    case.complete()?;
     let solver = Solver::of(&case.machine);
     let experiments = case.experiments.iter();
     let runs = experiments.map(|one| simulated(case, one, solver, context, &mut Keep::Curves));

@@ -1,7 +1,7 @@
 //! One experiment simulated: what every move of a slider asks for.
 
 use super::Context;
-use super::case::{chosen, opened, parameters};
+use super::case::{chosen, opened, parameters, runnable};
 use super::curves::{Kept, bodies, panels, told};
 use super::rows::interval;
 use super::scene::scene;
@@ -25,6 +25,7 @@ const EVENTS: usize = 2000;
 /// Simulates `experiment` of the case; with `describe`, the answer says what there is, too.
 pub fn run(request: &Request, context: &Context) -> Result<Reply> {
     let case = opened(request, context)?;
+    runnable(&case)?;
     let begun = Instant::now();
     let (simulated, kept) = match &case {
         case if case.is_axis() && case.experiments.is_empty() && !case.moves.is_empty() => {
@@ -200,6 +201,11 @@ fn overview(case: &Case) -> Value {
         .iter()
         .map(|group| json!({ "name": group.name, "rows": group.rows.iter().map(row).collect::<Vec<_>>() }))
         .collect();
-    let notes: Vec<&str> = overview.notes.iter().map(|note| note.text.as_str()).collect();
+    let left_out = case.left_out().into_iter().map(|(name, error)| {
+        let line =
+            error.place.as_ref().and_then(|place| place.span.as_ref()).map(|span| format!("line {}: ", span.line));
+        format!("\"{name}\" is left out: {}{}", line.unwrap_or_default(), error.what)
+    });
+    let notes: Vec<String> = left_out.chain(overview.notes.iter().map(|note| note.text.clone())).collect();
     json!({ "groups": groups, "places": taut_report::show::rows(&overview), "notes": notes })
 }

@@ -1,7 +1,7 @@
 //! A part of a run, computed again at a finer interval.
 
 use super::Context;
-use super::case::{chosen, opened};
+use super::case::{chosen, opened, runnable};
 use super::curves::{Kept, panels};
 use crate::message::{Reply, Request};
 use serde_json::json;
@@ -19,6 +19,7 @@ const SHORTEST: f64 = 1e-12;
 /// Rows from `from` to `to`, s, so many as `points` says.
 pub fn section(request: &Request, context: &Context) -> Result<Reply> {
     let case = opened(request, context)?;
+    runnable(&case)?;
     let number = |key: &str| request.number(key).ok_or_else(|| Error::new(format!("a section needs a number `{key}`")));
     let (from, to) = (number("from")?.max(0.0), number("to")?);
     let points = request.number("points").unwrap_or(1001.0).clamp(2.0, POINTS) as usize;
