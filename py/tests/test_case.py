@@ -81,6 +81,14 @@ def test_mistakes_are_told_as_on_the_command_line(case):
     assert (str(again), again.line, again.next) == (str(error), error.line, error.next)
 
 
+def mistake(path):
+    """The message about a wrong case, or about the first log of it that is left out."""
+    try:
+        return next(iter(taut.read(path).left_out.values()))
+    except taut.Error as error:
+        return str(error)
+
+
 @pytest.mark.skipif("TAUT_BAD" not in os.environ, reason="TAUT_BAD names no folder that `cargo xtask bad` wrote")
 @pytest.mark.parametrize("folder", ["case", "mapping"])
 def test_wrong_files_give_their_messages(folder):
@@ -89,10 +97,8 @@ def test_wrong_files_give_their_messages(folder):
     wrong = sorted(folder.glob("*.toml"))
     assert len(wrong) >= 60
     for path in wrong:
-        with pytest.raises(taut.Error) as caught:
-            taut.read(path)
         expected = path.with_suffix(".txt").read_text(encoding="utf-8")
-        assert str(caught.value).replace(f"{folder}/", "") + "\n" == expected, path.name
+        assert mistake(path).replace(f"{folder}/", "") + "\n" == expected, path.name
 
 
 def test_cases_are_read_and_saved(case, tmp_path):
@@ -148,7 +154,7 @@ free = ["cart.friction.viscous"]
     for mine in (taut.read(tmp_path / "mine.toml"), taut.Case(text, tmp_path / "mine.toml")):
         assert mine.experiments == case.experiments and list(mine.left_out) == ["gone"] and "gone.csv" in mine.left_out["gone"]
         assert mine.modes().data == case.modes().data and mine.show().data["title"] == case.title
-        assert mine.simulate(case.experiments[0]).data["experiments"] == case.simulate(case.experiments[0]).data["experiments"]
+        assert mine.simulate(case.experiments[0]).metrics == case.simulate(case.experiments[0]).metrics
         assert mine.changed({"cart.mass": 0.5})["cart.mass"] == 0.5
         for needs in (mine.check, mine.fit, mine.frf, mine.compare, mine.simulate, lambda: mine.simulate("gone")):
             with pytest.raises(taut.Error, match=f"mine.toml:{line}(.|\\n)*experiment \"gone\"|experiment \"gone\"(.|\\n)*mine.toml:{line}"):

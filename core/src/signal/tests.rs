@@ -16,10 +16,12 @@ fn walk(signal: &Signal, until: f64) -> Vec<Piece> {
     pieces
 }
 
-/// The largest |u| and |u′| there can be, by the pieces given.
+/// The largest |u| and |u′| there can be, by both ends of the pieces given.
 fn size(pieces: &[Piece]) -> (f64, f64) {
     let largest = |k: usize| pieces.iter().map(|p| p.coefficients[k].abs()).fold(0.0, f64::max);
-    (largest(0), largest(1))
+    // A chirp may begin at zero and have one piece alone.
+    let ends = pieces.iter().filter(|p| p.end.is_finite()).map(|p| p.value(p.end).abs()).fold(0.0, f64::max);
+    (largest(0).max(ends), largest(1))
 }
 
 /// Pieces and direct formula agree at `share` of every piece, and just after and just before its seams.

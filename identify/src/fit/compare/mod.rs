@@ -134,6 +134,7 @@ pub fn compare(
     stop: Option<Stop>,
     watch: &mut dyn FnMut(&str) -> Flow,
 ) -> Result<Comparison> {
+    case.complete()?;
     if setting.laws.is_empty() || setting.windows.is_empty() {
         return Err(
             Error::new("there is nothing to compare").next("name a law and a length of windows, or leave both out")
