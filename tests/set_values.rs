@@ -5,7 +5,7 @@ use crate::common::chance::Chance;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use taut::case::{Case, TEMPLATE};
 use taut::parameter::{Field, all, values};
-use taut::solve::{Course, Detail, Ending, ErrorEstimate, Flow, Outcome, Solver, stream, stream_mechanism};
+use taut::solve::{Ending, ErrorEstimate, Flow, Outcome, Solver, stream};
 
 const TOLERANCE: f64 = 1e-7;
 const GENERAL: Solver = Solver::General { tolerance: TOLERANCE };
@@ -40,35 +40,16 @@ fn run(opened: &Case) -> Option<(Outcome, f64)> {
         calls += 1;
         if calls > CALLS { Flow::Stop } else { Flow::Continue }
     };
-    let (outcome, error) = match opened {
-        case if case.is_axis() => {
-            let mut experiment = case.experiments[0].clone();
-            experiment.until = experiment.until.min(0.02);
-            experiment.every = experiment.until / 40.0;
-            let mut estimate = ErrorEstimate::new(&case.machine, &experiment);
-            let outcome = stream(&case.machine, &experiment, GENERAL, &mut |rows| {
-                estimate.take(rows);
-                enough()
-            });
-            let outcome = outcome.ok()?;
-            let error = estimate.finish(&case.machine, &experiment, TOLERANCE, &outcome, &mut flow);
-            (outcome, error.unwrap())
-        }
-        case => {
-            let mechanism = case.machine.mechanism();
-            let mut course = Course::of(&mechanism, &case.experiments[0]);
-            course.until = course.until.min(0.02);
-            course.every = course.until / 40.0;
-            let mut estimate = ErrorEstimate::of_mechanism(&mechanism, &course);
-            let outcome = stream_mechanism(&mechanism, &course, GENERAL, (Detail::Full, None), &mut |rows| {
-                estimate.take(rows);
-                enough()
-            });
-            let outcome = outcome.ok()?;
-            let error = estimate.finish_mechanism(&mechanism, &course, TOLERANCE, &outcome, &mut flow);
-            (outcome, error.unwrap())
-        }
-    };
+    let mut experiment = opened.experiments[0].clone();
+    experiment.until = experiment.until.min(0.02);
+    experiment.every = experiment.until / 40.0;
+    let mut estimate = ErrorEstimate::new(&opened.machine, &experiment);
+    let outcome = stream(&opened.machine, &experiment, GENERAL, &mut |rows| {
+        estimate.take(rows);
+        enough()
+    });
+    let outcome = outcome.ok()?;
+    let error = estimate.finish(&opened.machine, &experiment, TOLERANCE, &outcome, &mut flow).unwrap();
     Some((outcome, error.map_or(f64::INFINITY, |error| error.value)))
 }
 
@@ -116,10 +97,7 @@ fn any_number_of_any_machine_may_be_set() {
             let factor = 10.0_f64.powi(below(5) as i32 - 2) * (1.0 + below(8) as f64);
             if below(3) > 0 {
                 // A number that the machine has.
-                let own = opened(path, text, &[]).map(|opened| match opened {
-                    case if case.is_axis() => values(&case.machine),
-                    case => values(&case.machine),
-                });
+                let own = opened(path, text, &[]).map(|case| values(&case.machine));
                 let own = own.unwrap();
                 let (key, value) = &own[below(own.len())];
                 changes.push(format!("{key}={}", factor * value));

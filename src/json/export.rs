@@ -1,10 +1,11 @@
 //! A model as data: `taut export json`; and what the other targets wrote: `taut export --json`.
 
+use super::modes::{matrix, variable};
 use super::number;
 use crate::case::Case;
 use crate::error::Result;
 use crate::export::{self, ElementKind, Exported, Row, Tables, Then};
-use crate::linear::{Operation, System, Variable};
+use crate::linear::{Operation, System};
 use crate::machine::Machine;
 use crate::mechanism::{Kind, Mechanism, Over, SpringLaw};
 use crate::parameter;
@@ -165,10 +166,6 @@ fn row(row: &Row) -> Value {
 }
 
 fn linear(system: &System) -> Value {
-    let variable = |variable: &Variable| json!({ "name": variable.name, "unit": variable.unit });
-    let matrix = |matrix: &nalgebra::DMatrix<f64>| -> Vec<Vec<f64>> {
-        matrix.row_iter().map(|row| row.iter().copied().collect()).collect()
-    };
     json!({
         // Of an axis the only one.
         "input": variable(&system.inputs[0]),

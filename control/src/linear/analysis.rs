@@ -124,9 +124,7 @@ fn within(case: &Case, question: &Question) -> Result<()> {
 
 /// The frequencies of the response, rad/s.
 fn frequencies(transfers: &[Transfer], question: &Question) -> Result<Vec<f64>> {
-    let poles = transfers.first().map_or(&[][..], |transfer| &transfer.poles);
-    let zeros: Vec<_> = transfers.iter().map(|transfer| transfer.zeros.clone()).collect();
-    let usual = Range::of(poles, &zeros);
+    let (usual, roots) = Range::of_transfers(transfers);
     let range = Range {
         from: question.from.map_or(usual.from, |hertz| 2.0 * PI * hertz),
         to: question.to.map_or(usual.to, |hertz| 2.0 * PI * hertz),
@@ -138,6 +136,5 @@ fn frequencies(transfers: &[Transfer], question: &Question) -> Result<Vec<f64>> 
             .in_file("--from, --to")
             .next("give --from and --to, the lower one first"));
     }
-    let roots: Vec<_> = poles.iter().chain(zeros.iter().flat_map(|zeros| &zeros.values)).copied().collect();
     Ok(range.frequencies(&roots))
 }

@@ -80,11 +80,8 @@ impl<'a> GantryAnalysis<'a> {
 impl ByInput {
     fn of(system: StateSpace) -> Result<Self> {
         let transfers = system.transfers()?;
-        let poles = transfers.first().map_or(&[][..], |transfer| &transfer.poles);
-        let zeros: Vec<_> = transfers.iter().map(|transfer| transfer.zeros.clone()).collect();
-        let roots: Vec<_> = poles.iter().chain(zeros.iter().flat_map(|zeros| &zeros.values)).copied().collect();
-        let frequencies = Range::of(poles, &zeros).frequencies(&roots);
-        let responses = system.responses(&transfers, &frequencies);
+        let (range, roots) = Range::of_transfers(&transfers);
+        let responses = system.responses(&transfers, &range.frequencies(&roots));
         Ok(Self { system, transfers, responses })
     }
 }

@@ -142,7 +142,12 @@ impl System {
     ///
     /// Where there is no input of this number.
     pub fn input(&self, input: usize) -> StateSpace {
-        let System { states, inputs, outputs, a, b, c, d, inner } = self.clone();
+        self.clone().into_input(input)
+    }
+
+    /// The same of a system that is not wanted any more.
+    fn into_input(self, input: usize) -> StateSpace {
+        let System { states, inputs, outputs, a, b, c, d, inner } = self;
         let column = |matrix: &DMatrix<f64>| matrix.column(input).into_owned();
         StateSpace {
             states,
@@ -179,7 +184,7 @@ impl StateSpace {
     /// # Ok::<(), taut::Error>(())
     /// ```
     pub fn of(machine: &Machine, operation: Operation) -> Result<Self> {
-        Ok(System::of(machine, operation)?.input(0))
+        Ok(System::of(machine, operation)?.into_input(0))
     }
 
     /// Where an output of this name stands.

@@ -124,6 +124,14 @@ impl Range {
         }
     }
 
+    /// That of all these transfers, which have the same poles, and their poles and zeros.
+    pub(super) fn of_transfers(transfers: &[Transfer]) -> (Self, Vec<Complex<f64>>) {
+        let poles = transfers.first().map_or(&[][..], |transfer| &transfer.poles);
+        let zeros: Vec<_> = transfers.iter().map(|transfer| transfer.zeros.clone()).collect();
+        let roots = poles.iter().chain(zeros.iter().flat_map(|zeros| &zeros.values)).copied().collect();
+        (Self::of(poles, &zeros), roots)
+    }
+
     /// The frequencies, rad/s, rising; each pair among `roots` has points of its own, so that its peak or dip is drawn
     /// to its end.
     pub fn frequencies(&self, roots: &[Complex<f64>]) -> Vec<f64> {

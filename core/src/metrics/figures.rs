@@ -70,6 +70,21 @@ pub enum Seek {
     StopTime,
 }
 
+impl Seek {
+    /// All of them.
+    pub const ALL: [Self; 9] = [
+        Self::LoadSpeed,
+        Self::LoadError,
+        Self::BeltSpeed,
+        Self::ShaftSpeed,
+        Self::Current,
+        Self::Stretch,
+        Self::Force,
+        Self::SteadySpeed,
+        Self::StopTime,
+    ];
+}
+
 /// A row of the list: a figure of each part of a role.
 #[derive(Debug)]
 pub struct FigureRow {

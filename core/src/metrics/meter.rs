@@ -123,18 +123,7 @@ pub struct Sought {
 impl Sought {
     /// All that a machine has figures of.
     pub fn all(machine: &Machine, mechanism: &Mechanism) -> Self {
-        let every = [
-            Seek::LoadSpeed,
-            Seek::LoadError,
-            Seek::BeltSpeed,
-            Seek::ShaftSpeed,
-            Seek::Current,
-            Seek::Stretch,
-            Seek::Force,
-            Seek::SteadySpeed,
-            Seek::StopTime,
-        ];
-        Self::of(machine, mechanism, &every.map(|seek| (seek, None)))
+        Self::of(machine, mechanism, &Seek::ALL.map(|seek| (seek, None)))
     }
 
     /// These alone, each of one part of its role or of all of them, and what is known at the end: other peaks and

@@ -1,8 +1,8 @@
 //! Functions in two versions, for any processor and for one with AVX2: the same source, compiled twice.
 
-/// Makes a function that calls the second one named, or the third where the processor has AVX2, and that third, which is
-/// the second compiled for AVX2. The second has to be `#[inline(always)]`; both versions compute the same bits, since
-/// wider vectors change the order of no sum.
+/// Makes a function that calls the second one named, or the third where the processor has AVX2; and that third, which
+/// is the second compiled for AVX2. The second has to be `#[inline(always)]`. Both versions compute the same bits,
+/// since wider vectors change the order of no sum.
 ///
 /// ```text
 /// widest! { fn sum(values: &[f64]) -> f64 = sum_by_any, sum_by_avx2; }
@@ -11,75 +11,43 @@
 /// ```
 macro_rules! widest {
     // A method that reads.
-    ($(#[$meta:meta])* $vis:vis fn $name:ident(&self $(, $arg:ident: $type:ty)*) $(-> $out:ty)? = $any:ident, $wide:ident;) => {
-        $(#[$meta])*
-        $vis fn $name(&self $(, $arg: $type)*) $(-> $out)? {
-            #[cfg(target_arch = "x86_64")]
-            if std::arch::is_x86_feature_detected!("avx2") {
-                // SAFETY: the processor has AVX2.
-                return unsafe { self.$wide($($arg),*) };
-            }
-            self.$any($($arg),*)
-        }
-
-        #[cfg(target_arch = "x86_64")]
-        #[target_feature(enable = "avx2")]
-        fn $wide(&self $(, $arg: $type)*) $(-> $out)? {
-            self.$any($($arg),*)
-        }
+    ($(#[$meta:meta])* $vis:vis fn $name:ident(&self $(, $arg:ident: $type:ty)*) $(-> $out:ty)?
+        = $any:ident, $wide:ident;) => {
+        widest!(@both [$(#[$meta])* $vis fn $name] [fn $wide] [&self $(, $arg: $type)*] [$(-> $out)?]
+            [self.$any($($arg),*)] [self.$wide($($arg),*)]);
     };
     // One that writes.
-    ($(#[$meta:meta])* $vis:vis fn $name:ident(&mut self $(, $arg:ident: $type:ty)*) $(-> $out:ty)? = $any:ident, $wide:ident;) => {
-        $(#[$meta])*
-        $vis fn $name(&mut self $(, $arg: $type)*) $(-> $out)? {
-            #[cfg(target_arch = "x86_64")]
-            if std::arch::is_x86_feature_detected!("avx2") {
-                // SAFETY: the processor has AVX2.
-                return unsafe { self.$wide($($arg),*) };
-            }
-            self.$any($($arg),*)
-        }
-
-        #[cfg(target_arch = "x86_64")]
-        #[target_feature(enable = "avx2")]
-        fn $wide(&mut self $(, $arg: $type)*) $(-> $out)? {
-            self.$any($($arg),*)
-        }
+    ($(#[$meta:meta])* $vis:vis fn $name:ident(&mut self $(, $arg:ident: $type:ty)*) $(-> $out:ty)?
+        = $any:ident, $wide:ident;) => {
+        widest!(@both [$(#[$meta])* $vis fn $name] [fn $wide] [&mut self $(, $arg: $type)*] [$(-> $out)?]
+            [self.$any($($arg),*)] [self.$wide($($arg),*)]);
     };
     // A function of a type.
-    ($(#[$meta:meta])* $vis:vis fn $name:ident($($arg:ident: $type:ty),*) $(-> $out:ty)? = Self::$any:ident, $wide:ident;) => {
-        $(#[$meta])*
-        $vis fn $name($($arg: $type),*) $(-> $out)? {
-            #[cfg(target_arch = "x86_64")]
-            if std::arch::is_x86_feature_detected!("avx2") {
-                // SAFETY: the processor has AVX2.
-                return unsafe { Self::$wide($($arg),*) };
-            }
-            Self::$any($($arg),*)
-        }
-
-        #[cfg(target_arch = "x86_64")]
-        #[target_feature(enable = "avx2")]
-        fn $wide($($arg: $type),*) $(-> $out)? {
-            Self::$any($($arg),*)
-        }
+    ($(#[$meta:meta])* $vis:vis fn $name:ident($($arg:ident: $type:ty),*) $(-> $out:ty)?
+        = Self::$any:ident, $wide:ident;) => {
+        widest!(@both [$(#[$meta])* $vis fn $name] [fn $wide] [$($arg: $type),*] [$(-> $out)?]
+            [Self::$any($($arg),*)] [Self::$wide($($arg),*)]);
     };
     // One by itself.
-    ($(#[$meta:meta])* $vis:vis fn $name:ident $([$($generic:tt)*])? ($($arg:ident: $type:ty),*) $(-> $out:ty)? = $any:ident, $wide:ident;) => {
-        $(#[$meta])*
-        $vis fn $name $(<$($generic)*>)? ($($arg: $type),*) $(-> $out)? {
+    ($(#[$meta:meta])* $vis:vis fn $name:ident $([$($generic:tt)*])? ($($arg:ident: $type:ty),*) $(-> $out:ty)?
+        = $any:ident, $wide:ident;) => {
+        widest!(@both [$(#[$meta])* $vis fn $name $(<$($generic)*>)?] [fn $wide $(<$($generic)*>)?]
+            [$($arg: $type),*] [$(-> $out)?] [$any($($arg),*)] [$wide($($arg),*)]);
+    };
+    (@both [$($head:tt)*] [$($twin:tt)*] [$($args:tt)*] [$($out:tt)*] [$($any:tt)*] [$($wide:tt)*]) => {
+        $($head)*($($args)*) $($out)* {
             #[cfg(target_arch = "x86_64")]
             if std::arch::is_x86_feature_detected!("avx2") {
                 // SAFETY: the processor has AVX2.
-                return unsafe { $wide($($arg),*) };
+                return unsafe { $($wide)* };
             }
-            $any($($arg),*)
+            $($any)*
         }
 
         #[cfg(target_arch = "x86_64")]
         #[target_feature(enable = "avx2")]
-        fn $wide $(<$($generic)*>)? ($($arg: $type),*) $(-> $out)? {
-            $any($($arg),*)
+        $($twin)*($($args)*) $($out)* {
+            $($any)*
         }
     };
 }

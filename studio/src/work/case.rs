@@ -6,7 +6,6 @@ use crate::message::Request;
 use serde_json::{Value, json};
 use taut::case::{Case, Files, Number};
 use taut::error::{Error, Result};
-use taut::machine::Machine;
 use taut::parameter::{Fallback, Free};
 
 /// The case: `text`, changed by `set`, a list of keys and values, and by `changes`, a list of `KEY=VALUE`. Experiments
@@ -55,10 +54,7 @@ fn span(case: &Case, key: &str) -> Option<&'static str> {
 
 /// The numbers of a case with what the table of parameters says of them.
 pub fn parameters(case: &Case, numbers: &[Number]) -> Value {
-    let machine: &Machine = match case {
-        case if case.is_axis() => &case.machine,
-        case => &case.machine,
-    };
+    let machine = &case.machine;
     let one = |number: &Number| {
         let Number { key, row, unit, value, written } = number;
         let default = match row.default {

@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 use taut::case::Case;
-use taut::machine::{BeltModel, Machine, axis};
+use taut::machine::{BeltModel, Machine};
 use taut::mechanism::Heading;
 use taut::trajectory::Trajectory;
 
@@ -237,8 +237,5 @@ pub fn spans(case: &Case) -> Vec<&'static str> {
 
 /// The names of the bodies of a machine.
 pub fn bodies(case: &Case) -> Vec<&'static str> {
-    match case {
-        case if case.is_axis() => axis::LABELS.iter().map(|label| label.key).collect(),
-        case => case.machine.geometry().bodies.iter().map(|body| body.label.key).collect(),
-    }
+    case.machine.geometry().bodies.iter().map(|body| body.label.key).collect()
 }
