@@ -69,7 +69,7 @@ pub mod reduction;
 pub mod sweep;
 
 pub use taut_case::{case, files, log};
-pub use taut_control::{control, frf, linear, tune};
+pub use taut_control::{control, frf, linear, planning, tune};
 pub use taut_core::{
     Error, Result, chance, design, error, friction, machine, measure, mechanism, metrics, number, parameter, plan,
     polyline, quantity, signal, solve,

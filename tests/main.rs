@@ -45,6 +45,7 @@ mod quantity;
 mod recorders;
 mod reference;
 
+mod planning;
 mod rooms;
 mod rounding;
 mod rows;

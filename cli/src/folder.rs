@@ -23,6 +23,47 @@ pub enum Target {
     Folder(Folder),
 }
 
+impl Target {
+    /// The place that `--out` names for a case that was made of another: a file that is not there yet where it ends in
+    /// `.toml`, else a folder for files of these names, a report and what the case refers to.
+    pub fn of_case(
+        path: &Path,
+        case: &Case,
+        common: &Common,
+        names: [&str; 2],
+        besides: &str,
+    ) -> std::result::Result<Self, Failure> {
+        let Some(out) = &common.out else { return Ok(Self::Nowhere) };
+        let inputs = inputs(path, &case.files);
+        if !out.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
+            let report = (!common.no_report).then(|| "report.html".to_string());
+            let names = names.map(str::to_string).into_iter().chain(report);
+            return Folder::create(out, inputs, names.chain(brought(&case.files).into_values())).map(Self::Folder);
+        }
+        Inputs::new([path]).check(out).map_err(|error| error.next(format!("name another --out{besides}")))?;
+        inputs.check(out)?;
+        let claim = claim(out)?;
+        if out.exists() {
+            return Err(Error::new(format!("{} is there already", out.display()))
+                .in_file("--out")
+                .next(format!("name another file, or a folder{besides}"))
+                .into());
+        }
+        leading(&case.text, &case.files, parent(out))?;
+        Ok(Self::File(out.clone(), claim))
+    }
+}
+
+/// The folder that a file is in.
+fn parent(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// The text of the case at `from` for another place: paths in it lead from there to the same files.
+pub fn moved(text: &str, from: &Path, to: &Path) -> Result<String> {
+    leading(text, &files_of(from, text)?, parent(to))
+}
+
 /// A folder of results.
 pub struct Folder {
     root: PathBuf,

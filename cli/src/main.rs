@@ -19,6 +19,7 @@ mod manual;
 mod modes;
 mod motion;
 mod paper;
+mod plan;
 mod progress;
 mod shape;
 mod show;
@@ -54,6 +55,7 @@ fn main() -> ExitCode {
         Command::Fit(args) => fit::run(&args),
         Command::Shape(args) => shape::run(&args),
         Command::Tune(args) => tune::run(&args),
+        Command::Plan(args) => plan::run(&args),
         Command::Sweep(args) => sweep::run(&args),
         Command::Modes(args) => modes::run(&args),
         Command::Frf(args) => frf::run(&args),

@@ -168,6 +168,11 @@ fn the_page_on_tuning_shows_what_the_program_prints() {
 }
 
 #[test]
+fn the_page_on_plans_shows_what_the_program_prints() {
+    check("docs/plan.md");
+}
+
+#[test]
 fn the_page_on_sweeps_shows_what_the_program_prints() {
     check("docs/sweep.md");
 }

@@ -304,6 +304,16 @@ fn tune_is_killed() {
     Writer::new(command, "", "--set tune.damping=0.7").reading("pid.toml", "controllers/pid.toml").withstands_kills(8);
 }
 
+/// The plan of a short move, with little to look for.
+const PLAN: &str = "plan pid.toml --move fast --no-report --out out";
+
+#[test]
+fn plan_is_killed() {
+    let set = "--set move.0.name=fast --set tune.spread=0";
+    let command = format!("{PLAN} {set}").leak();
+    Writer::new(command, "", "--reserve 20%").reading("pid.toml", "controllers/pid.toml").withstands_kills(15);
+}
+
 #[test]
 fn tune_in_place_is_killed() {
     let command = format!("tune pid.toml {TUNING} --in-place --anyway").leak();
@@ -418,6 +428,7 @@ fn writers() -> Vec<(Writer, &'static str)> {
         (table4("sweep table4.toml --runs 200 --vary all=20% --out out"), "out"),
         (pid(&format!("tune pid.toml {TUNING} --out out")), "out"),
         (pid(&format!("tune pid.toml {TUNING} --in-place --anyway")), "."),
+        (pid(&format!("{PLAN} --set move.0.name=fast --set tune.spread=0")), "out"),
         (logs("check nonlinear.toml --out out"), "out"),
         (table4("show table4.toml --out out"), "out"),
         (logs("frf nonlinear.toml --out out"), "out"),

@@ -32,6 +32,7 @@ const TABLE: &[(&str, &[&str], &str, Ends)] = &[
     ("sweep", &["--runs", "3", "--vary", "cart.mass=5 %"], AXIS, Runs),
     ("move", &[], PID, YET_TO_COME),
     ("tune", &["--evaluate"], PID, YET_TO_COME),
+    ("plan", &["--move", "short fast"], PID, YET_TO_COME),
     ("check", &[], LOGS, YET_TO_COME),
     ("fit", &[], LOGS, YET_TO_COME),
     ("shape", &[], PID, YET_TO_COME),

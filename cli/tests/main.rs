@@ -19,6 +19,7 @@ mod missing_logs;
 mod moves;
 mod outputs;
 mod paper;
+mod plan;
 mod schemas;
 mod shape;
 mod show;

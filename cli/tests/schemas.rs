@@ -202,13 +202,14 @@ const COMMANDS: [&str; 13] = [
 ];
 
 /// Those that search.
-const SEARCHES: [&str; 8] = [
+const SEARCHES: [&str; 9] = [
     "check CASE",
     "fit CASE",
     "fit CASE --drift",
     "fit CASE --compare --laws viscous,coulomb --windows whole",
     "design CASE",
     "tune CASE",
+    "plan CASE",
     "shape CASE",
     "export fmu CASE",
 ];

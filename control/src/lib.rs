@@ -7,4 +7,5 @@ use taut_core::*;
 pub mod control;
 pub mod frf;
 pub mod linear;
+pub mod planning;
 pub mod tune;

@@ -22,6 +22,7 @@ use taut::json;
 use taut::linear::{Analysis, GantryAnalysis};
 use taut::machine::{Channel, Quantity};
 use taut::overview::Overview;
+use taut::planning::{Wanted, plan};
 use taut::solve::{Choice, Flow, Kind as SolverKind, Method};
 use taut::tune::{evaluate, tune};
 
@@ -308,6 +309,31 @@ impl Case {
         let text = guarded(|| tuned.case_text(case, &self.path))?.told(py)?;
         let changed = Self::from_text(py, self.path.clone(), &text, Vec::new())?;
         let told = guarded(|| json::tuned(case, &tuning, &tuned))?;
+        Ok((value::json(py, &told)?.unbind(), Py::new(py, changed)?))
+    }
+
+    /// Plans moves: what `--json` prints, and the case with the planned limits.
+    fn plan(
+        &self,
+        py: Python<'_>,
+        names: Vec<String>,
+        limits: (Option<f64>, Option<f64>, Option<f64>),
+        reserve: f64,
+    ) -> PyResult<(Py<PyAny>, Py<Self>)> {
+        let case = self.axis(py)?;
+        let (_, moves) = case.moves_named(&self.path, &names).told(py)?;
+        let places: Vec<usize> =
+            (0..case.moves.len()).filter(|&k| moves.iter().any(|one| one.name == case.moves[k].name)).collect();
+        let (speed, acceleration, jerk) = limits;
+        let wanted = Wanted { speed, acceleration, jerk, reserve };
+        wanted.check().told(py)?;
+        let interrupt = Interrupt::listen();
+        let found = unlocked(py, || plan(case, &places, &wanted, &|| interrupt.stop()));
+        interrupt.finish()?;
+        let plans = found?.map_err(|error| error.in_file(&self.path)).told(py)?;
+        let text = guarded(|| plans.case_text(case, &self.path))?.told(py)?;
+        let changed = Self::from_text(py, self.path.clone(), &text, Vec::new())?;
+        let told = guarded(|| json::plan(case, &wanted, &plans))?;
         Ok((value::json(py, &told)?.unbind(), Py::new(py, changed)?))
     }
 

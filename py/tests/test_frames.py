@@ -191,6 +191,22 @@ def test_tuning_is_the_command_lines(root, moving):
         taut.Case(taut.template()).tune()
 
 
+def test_plans_are_the_command_lines(root, moving):
+    from test_results import program
+
+    told = program(root, "plan", f"{STAGE}/controllers/pid.toml", "--move", "short fast", "--reserve", "20%")
+    found = moving.plan("short fast", reserve=0.2)
+    assert found.data == told
+    planned, given = found.arrivals()["short fast"]
+    assert planned is None or given is None or planned <= given
+    assert found.case["move.0.speed"] == pytest.approx(told["moves"][0]["limits"]["speed_m_s"]) or told["moves"][0]["kept"]
+    assert "short fast" in found._repr_html_() and "short fast" in repr(found)
+    assert len(found.to_pandas()) == len(told["moves"][0]["tried"])
+    for wrong in ({"speed": 0.0}, {"jerk": -1.0}, {"reserve": 0.95}, {"moves": "gone"}):
+        with pytest.raises(taut.Error):
+            moving.plan(**wrong)
+
+
 def test_pairs_of_shapers_are_the_command_lines(root):
     from test_results import program
 

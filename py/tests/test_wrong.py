@@ -559,6 +559,8 @@ def test_tunings_and_logs_with_nonsense(short, moving):
     for value in WRONG:
         if not isinstance(value, (int, float)):
             allowed(lambda: moving.tune(spread=value, evaluate=True), told("tune", spread=value))
+            allowed(lambda: moving.plan("gone", speed=value), told("plan", speed=value))
+            allowed(lambda: moving.plan("gone", reserve=value), told("plan", reserve=value))
         allowed(lambda: short.tune(spread=value), told("tune without a controller", spread=value))
         allowed(lambda: short.with_log(value, {"t": [0.0, 1.0]}, {"time": "t"}), told("with_log", value))
         allowed(lambda: short.with_log("log", value, {"time": "t"}), told("with_log", "log", value))
@@ -625,7 +627,7 @@ def test_everything_public_is_called_here():
     source = pathlib.Path(__file__).read_text(encoding="utf-8")
     called = {
         "Case": [
-            "changed", "check", "compare", "copy", "design", "drift", "fit", "frf", "get", "modes", "move", "save", "show", "simulate", "sweep",
+            "changed", "check", "compare", "copy", "design", "drift", "fit", "frf", "get", "modes", "move", "plan", "save", "show", "simulate", "sweep",
             "tune", "update", "with_log",
         ],  # fmt: skip
         "Run": ["plot", "write"],

@@ -37,6 +37,7 @@ pub mod modes;
 pub mod motion;
 pub mod page;
 mod picture;
+pub mod plan;
 mod plane;
 mod plot;
 mod raster;

@@ -24,6 +24,7 @@ const RESULTS: &[(&str, &str, &str)] = &[
     ("modes", "`taut modes`", include_str!("results/modes.txt")),
     ("move", "`taut move`", include_str!("results/move.txt")),
     ("paper", "`taut paper`: claims.json", include_str!("results/paper.txt")),
+    ("plan", "`taut plan`", include_str!("results/plan.txt")),
     ("shape", "`taut shape`", include_str!("results/shape.txt")),
     ("show", "`taut show`", include_str!("results/show.txt")),
     ("simulate", "`taut simulate`", include_str!("results/simulate.txt")),

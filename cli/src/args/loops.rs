@@ -1,8 +1,8 @@
 //! Vibrations and controllers: `modes`, `tune`, `shape`.
 
 use super::values::{
-    Shapers, corner_speed, damping, delay, effort, hertz, metres, metres_per_second, seconds, shapers, share,
-    smoothing, uncertainty, vibrations,
+    Shapers, acceleration, corner_speed, damping, delay, effort, hertz, jerk, metres, metres_per_second, reserve,
+    seconds, shapers, share, smoothing, speed, uncertainty, vibrations,
 };
 use crate::command::Common;
 use clap::ValueEnum;
@@ -56,6 +56,46 @@ Examples:
 
 Exit status 1: a move became worse than with the gains of the file (the limits may force that), or the limits
 do not hold. Ctrl-C ends a search early with the best gains so far, with exit status 130.";
+
+/// Plan the fastest moves that the machine can make.
+///
+/// Finds for each move of a case the speed, acceleration, jerk and snap with which its cart stays in its window soonest,
+/// at worst over the family of machines of `taut tune`, while voltage, current, span tension and teeth keep their
+/// limits. Jerk times are tried on the zeros of the belt's modes. Prints the planned limits beside the file's, and the
+/// least time of the axis as one mass. With --out FILE.toml it writes the case with them.
+#[derive(Debug, clap::Args)]
+#[command(after_help = PLAN, mut_arg("out", |out| out.value_name("FILE or DIR").help(
+    "The case file to write (ends in .toml), or the folder for it, a summary, a report and plots"
+)))]
+pub struct Plan {
+    /// The case file; - is standard input
+    pub case: PathBuf,
+    /// Plan only the move of this name, as often as needed
+    #[arg(long = "move", value_name = "NAME")]
+    pub moves: Vec<String>,
+    /// Most speed, besides what the machine allows: "0.5 m/s"
+    #[arg(long, value_name = "SPEED", value_parser = speed)]
+    pub speed: Option<f64>,
+    /// Most acceleration: "20 m/s^2"
+    #[arg(long, value_name = "ACCELERATION", value_parser = acceleration)]
+    pub acceleration: Option<f64>,
+    /// Most jerk: "500 m/s^3"
+    #[arg(long, value_name = "JERK", value_parser = jerk)]
+    pub jerk: Option<f64>,
+    /// Share of voltage and current that is left to the loop
+    #[arg(long, value_name = "SHARE", default_value = "10%", value_parser = reserve)]
+    pub reserve: f64,
+    #[command(flatten)]
+    pub common: Common,
+}
+
+const PLAN: &str = "\
+Examples:
+  taut plan stages/sollmann-jouaneh/controllers/pid-elastic.toml --out planned.toml
+  taut plan axis.toml --move fine --jerk '500 m/s^3' --reserve 20%
+  taut plan axis.toml --json | jq .moves[0].arrival.in_window_worst_s
+
+Exit status 1: a move has no plan, or its cart does not stay in its window.";
 
 /// Recommend an input shaper, from a measured spectrum or from a model.
 ///

@@ -22,6 +22,26 @@ pub fn share(text: &str) -> Result<f64, String> {
     if (0.0..1.0).contains(&share) { Ok(share) } else { Err("a share from 0 to below 1 is needed, such as 20%".into()) }
 }
 
+/// A share of what is limited.
+pub fn reserve(text: &str) -> Result<f64, String> {
+    match share(text)? {
+        reserve if reserve <= 0.9 => Ok(reserve),
+        _ => Err("a share from 0 to 90% is needed, such as 10%".into()),
+    }
+}
+
+pub fn speed(text: &str) -> Result<f64, String> {
+    positive(text, "m/s", "speed above zero, such as \"0.5 m/s\",")
+}
+
+pub fn acceleration(text: &str) -> Result<f64, String> {
+    positive(text, "m/s^2", "acceleration above zero, such as \"20 m/s^2\",")
+}
+
+pub fn jerk(text: &str) -> Result<f64, String> {
+    positive(text, "m/s^3", "jerk above zero, such as \"500 m/s^3\",")
+}
+
 pub fn effort(text: &str) -> Result<f64, String> {
     let (least, most) = (EFFORTS.start(), EFFORTS.end());
     match text.parse() {

@@ -5,16 +5,15 @@ mod table;
 use crate::args::Tune as Args;
 use crate::command::{self, Finished, Remark, Report};
 use crate::failure::{Failure, Outcome, Status};
-use crate::folder::{self, Folder, Target, files_of};
+use crate::folder::{self, Target, files_of};
 use crate::interrupt::{Interrupt, interrupted};
 use crate::progress::Progress;
-use std::path::Path;
+use taut::Error;
 use taut::case::{Case, Files, Tuning};
 use taut::control::feasible::{of_moves, sentence};
-use taut::files::{Inputs, write_atomically};
+use taut::files::write_atomically;
 use taut::json;
 use taut::tune::{Judgement, evaluate, tune};
-use taut::{Error, Result};
 use taut_report::tune::{Work, figures, hertz, page};
 
 /// Reads the case, tunes, writes, tells.
@@ -66,7 +65,8 @@ pub fn run(args: &Args) -> Outcome {
     let folder = match target {
         Target::Nowhere => None,
         Target::File(path, _claim) => {
-            write_atomically(&path, moved(&text, args, &path)?).map_err(Failure::work)?;
+            let text = if args.in_place { text } else { folder::moved(&text, &args.case, &path)? };
+            write_atomically(&path, text).map_err(Failure::work)?;
             finished.written.push(path.display().to_string());
             None
         }
@@ -117,37 +117,11 @@ fn target(args: &Args, case: &Case) -> std::result::Result<Target, Failure> {
         }
         return Ok(Target::File(args.case.clone(), folder::claim(&args.case)?));
     }
-    let Some(out) = &args.common.out else { return Ok(Target::Nowhere) };
-    let inputs = folder::inputs(&args.case, &case.files);
-    if !out.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
-        let report = (!args.common.no_report).then(|| "report.html".to_string());
-        let names = ["tuned.toml", "tune.json"].map(str::to_string).into_iter().chain(report);
-        let names = names.chain(folder::brought(&case.files).into_values());
-        return Folder::create(out, inputs, names).map(Target::Folder);
-    }
-    let own = Inputs::new([&args.case]);
-    own.check(out).map_err(|error| error.next("name another --out, or say --in-place"))?;
-    inputs.check(out)?;
-    let claim = folder::claim(out)?;
-    if out.exists() {
-        return Err(Error::new(format!("{} is there already", out.display()))
-            .in_file("--out")
-            .next("name another file, or a folder; --in-place changes the case file itself")
-            .into());
-    }
-    folder::leading(&case.text, &case.files, parent(out))?;
-    Ok(Target::File(out.clone(), claim))
-}
-
-/// The folder that a file is in.
-fn parent(path: &Path) -> &Path {
-    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
-}
-
-/// The text for a place of its own: paths in it lead from there to the same files.
-fn moved(text: &str, args: &Args, path: &Path) -> Result<String> {
-    if args.in_place {
-        return Ok(text.to_string());
-    }
-    folder::leading(text, &files_of(&args.case, text)?, parent(path))
+    Target::of_case(
+        &args.case,
+        case,
+        &args.common,
+        ["tuned.toml", "tune.json"],
+        "; --in-place changes the case file itself",
+    )
 }

@@ -42,47 +42,96 @@ struct Need {
     spans: [f64; 3],
 }
 
+/// A limit of the machine and the need that it bounds, with the words before, behind and after what is needed.
+struct Demand {
+    limit: &'static str,
+    unit: &'static str,
+    allowed: f64,
+    needed: Box<dyn Fn(&Need) -> f64>,
+    words: [&'static str; 3],
+}
+
+/// Most that a reference needs of something limited, and the limit, both in `unit`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Load {
+    /// `voltage`, `current`, `slack`, `tension` or `teeth`.
+    pub limit: &'static str,
+    /// V, A or N.
+    pub unit: &'static str,
+    /// How much is needed at most.
+    pub needed: f64,
+    /// How much there is.
+    pub allowed: f64,
+}
+
+impl Load {
+    /// Whether the motor's supply bounds it, of which a loop needs some for itself.
+    pub fn is_electrical(&self) -> bool {
+        ["V", "A"].contains(&self.unit)
+    }
+}
+
+/// The limits of this machine under a controller with this limit of its command (V or A).
+fn demands(machine: &Machine, limit: Option<f64>) -> Vec<Demand> {
+    let (volts, amperes) = limits(machine, limit);
+    let belt = &machine.belt;
+    let pretension = belt.pretension.unwrap_or(0.0);
+    let off = |need: &Need| -need.spans.iter().copied().fold(0.0, f64::min);
+    let tension = move |need: &Need| pretension + need.spans.iter().copied().fold(0.0, f64::max);
+    let carried = belt.sheet.mesh(machine.pulley_radius).and_then(|(_, carried)| carried);
+    type Needed = Box<dyn Fn(&Need) -> f64>;
+    let demand = |(limit, unit), allowed: Option<f64>, needed: Needed, words| {
+        allowed.map(|allowed| Demand { limit, unit, allowed, needed, words })
+    };
+    let all = [
+        demand(("voltage", "V"), volts, Box::new(|need| need.voltage.abs()), ["needs", "", "; the limit is"]),
+        demand(("current", "A"), amperes, Box::new(|need| need.current.abs()), ["needs", "", "; the limit is"]),
+        demand(
+            ("slack", "N"),
+            belt.pretension,
+            Box::new(off),
+            ["takes", " off a span", ", which goes slack; the pretension is"],
+        ),
+        demand(
+            ("tension", "N"),
+            belt.sheet.allowed_tension,
+            Box::new(tension),
+            ["brings a span to", "", "; the belt may have"],
+        ),
+        demand(
+            ("teeth", "N"),
+            carried,
+            Box::new(|need| need.force.abs()),
+            ["takes", " at the drive pulley", "; the teeth in mesh carry"],
+        ),
+    ];
+    all.into_iter().flatten().collect()
+}
+
+/// How much of each limit `profile` needs at most, looked at `instants` times along its way.
+pub fn loads(machine: &Machine, limit: Option<f64>, profile: &Profile, instants: usize) -> Vec<Load> {
+    let needs = needs(machine, profile, instants);
+    let load = |demand: Demand| {
+        let needed = needs.iter().map(&demand.needed).fold(0.0, f64::max);
+        Load { limit: demand.limit, unit: demand.unit, needed, allowed: demand.allowed }
+    };
+    demands(machine, limit).into_iter().map(load).collect()
+}
+
 /// The limits that `profile`, shaper included, exceeds on this machine under a controller with this limit of its command
 /// (V or A); none if the reference can be followed. Friction counts as viscous and Coulomb friction, the idler's own
 /// swing as quasi-static.
 pub fn shortfalls(machine: &Machine, limit: Option<f64>, profile: &Profile) -> Vec<Shortfall> {
-    let needs = needs(machine, profile);
+    let needs = needs(machine, profile, INSTANTS);
     let (volts, amperes) = limits(machine, limit);
-    let belt = &machine.belt;
-    let off = |need: &Need| -need.spans.iter().copied().fold(0.0, f64::min);
-    let tension = |need: &Need| belt.pretension.unwrap_or(0.0) + need.spans.iter().copied().fold(0.0, f64::max);
-    let carried = belt.sheet.mesh(machine.pulley_radius).and_then(|(_, carried)| carried);
-    // Of each limit: how the motion comes by what it needs, and what there is.
-    let found = [
-        of_speed(machine, volts, &needs).or_else(|| {
-            exceeded(&needs, ("voltage", "V"), volts, |need| need.voltage.abs(), ["needs", "", "; the limit is"])
-        }),
-        exceeded(&needs, ("current", "A"), amperes, |need| need.current.abs(), ["needs", "", "; the limit is"]),
-        of_breakaway(machine, (volts, amperes), &needs),
-        of_travel(machine, &needs),
-        exceeded(
-            &needs,
-            ("slack", "N"),
-            belt.pretension,
-            off,
-            ["takes", " off a span", ", which goes slack; the pretension is"],
-        ),
-        exceeded(
-            &needs,
-            ("tension", "N"),
-            belt.sheet.allowed_tension,
-            tension,
-            ["brings a span to", "", "; the belt may have"],
-        ),
-        exceeded(
-            &needs,
-            ("teeth", "N"),
-            carried,
-            |need| need.force.abs(),
-            ["takes", " at the drive pulley", "; the teeth in mesh carry"],
-        ),
-    ];
-    found.into_iter().flatten().collect()
+    let mut found: Vec<Shortfall> = Vec::new();
+    for demand in demands(machine, limit) {
+        let by_speed = if demand.limit == "voltage" { of_speed(machine, volts, &needs) } else { None };
+        found.extend(by_speed.or_else(|| exceeded(&needs, &demand)));
+    }
+    found.extend(of_breakaway(machine, (volts, amperes), &needs));
+    found.extend(of_travel(machine, &needs));
+    found
 }
 
 /// A value in a sentence.
@@ -108,24 +157,18 @@ fn most(needs: &[Need], allowed: f64, needed: impl Fn(&Need) -> f64) -> Option<&
     (needed(most) - allowed > 1e-9 * allowed.abs().max(1.0)).then_some(most)
 }
 
-/// A limit that the motion exceeds, where there is one, in the words before, behind and after what is needed.
-fn exceeded(
-    needs: &[Need],
-    (limit, unit): (&'static str, &'static str),
-    allowed: Option<f64>,
-    needed: impl Fn(&Need) -> f64,
-    [comes_by, behind, there]: [&str; 3],
-) -> Option<Shortfall> {
-    let allowed = allowed?;
-    let need = most(needs, allowed, &needed)?;
+/// The limit where the motion exceeds it.
+fn exceeded(needs: &[Need], demand: &Demand) -> Option<Shortfall> {
+    let Demand { limit, unit, allowed, needed, words: [comes_by, behind, there] } = demand;
+    let need = most(needs, *allowed, needed)?;
     let (speed, acceleration) = (told(need.y.speed.abs(), "m/s"), told(need.y.acceleration.abs(), "m/s^2"));
     let words = format!(
         "{acceleration} at {speed} {comes_by} {}{behind} ({}){there} {}",
         told(needed(need), unit),
         need.when(),
-        told(allowed, unit)
+        told(*allowed, unit)
     );
-    Some(need.beyond(limit, [needed(need), allowed], unit, words))
+    Some(need.beyond(limit, [needed(need), *allowed], unit, words))
 }
 
 /// The voltage, where the largest speed needs too much of it without any acceleration.
@@ -198,7 +241,7 @@ pub fn sentence(name: &str, short: &[Shortfall]) -> String {
 }
 
 /// The tightest limits of voltage and current, V and A.
-fn limits(machine: &Machine, limit: Option<f64>) -> (Option<f64>, Option<f64>) {
+pub(crate) fn limits(machine: &Machine, limit: Option<f64>) -> (Option<f64>, Option<f64>) {
     let amplifier = &machine.drives[0].amplifier;
     let commanded = limit.map(|limit| limit * amplifier.gain.abs());
     let least = |a: Option<f64>, b: Option<f64>| a.into_iter().chain(b).reduce(f64::min);
@@ -208,7 +251,7 @@ fn limits(machine: &Machine, limit: Option<f64>) -> (Option<f64>, Option<f64>) {
     }
 }
 
-fn needs(machine: &Machine, profile: &Profile) -> Vec<Need> {
+fn needs(machine: &Machine, profile: &Profile, instants: usize) -> Vec<Need> {
     let compensation = Compensation::new(machine, &FeedForward::NONE);
     let lines = &machine.cart.forces;
     let need = |time: f64| {
@@ -221,7 +264,7 @@ fn needs(machine: &Machine, profile: &Profile) -> Vec<Need> {
         Need { time, y, force, current, voltage, spans: needed.spans }
     };
     let end = profile.rest();
-    (0..=INSTANTS).map(|k| need(end * k as f64 / INSTANTS as f64)).collect()
+    (0..=instants).map(|k| need(end * k as f64 / instants as f64)).collect()
 }
 
 #[cfg(test)]
@@ -256,7 +299,7 @@ mod tests {
                 solver: Solver::Exact,
             };
             let figures = closed_loop(&setup).unwrap().figures;
-            let needs = needs(&case.machine, &motion.profile);
+            let needs = needs(&case.machine, &motion.profile, INSTANTS);
             let most = |value: fn(&Need) -> f64| needs.iter().map(value).fold(0.0, |most, x| x.abs().max(most));
             let (volts, amperes) = (most(|need| need.voltage), most(|need| need.current));
             let (given, taken) = (figures.voltage.0.value.abs(), figures.current.0.value.abs());
@@ -270,7 +313,7 @@ mod tests {
     fn each_limit_is_named_where_it_is_exceeded() {
         let case = case();
         let motion = &case.moves[0];
-        let needs = needs(&case.machine, &motion.profile);
+        let needs = needs(&case.machine, &motion.profile, INSTANTS);
         let most = |value: &dyn Fn(&Need) -> f64| needs.iter().map(value).fold(0.0, f64::max);
         let volts = most(&|need| need.voltage.abs());
         let amperes = most(&|need| need.current.abs());
@@ -328,7 +371,8 @@ mod tests {
     fn the_speed_that_is_reached_is_the_steady_one() {
         let case = case();
         let motion = &case.moves[0];
-        let volts = needs(&case.machine, &motion.profile).iter().fold(0.0, |most, need| need.voltage.max(most)) * 0.5;
+        let volts =
+            needs(&case.machine, &motion.profile, INSTANTS).iter().fold(0.0, |most, need| need.voltage.max(most)) * 0.5;
         let found = shortfalls(&case.machine, Some(volts), &motion.profile);
         let short = found.iter().find(|short| short.limit == "voltage").unwrap();
         let Balance::At(speed) = balanced_speed(&case.machine, volts, 0.1) else { panic!("no steady speed") };

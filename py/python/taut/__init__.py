@@ -12,7 +12,7 @@ Mistakes are :class:`taut.Error`, a ``ValueError`` with the text that the comman
 
 from ._native import Bug, Error, Observation, __version__
 from .case import Case, GantryCase, export, read, show, template
-from .results import Check, Comparison, Designed, Drift, Estimate, Fit, FitLog, FrequencyResponses, GantryModes, LinearModel, Modes, Shown, Tuned
+from .results import Check, Comparison, Designed, Drift, Estimate, Fit, FitLog, FrequencyResponses, GantryModes, LinearModel, Modes, Plans, Shown, Tuned
 from .runs import Run, Runs
 from .shapers import Shape, shape
 from .sweeps import sweep, sweep_tables
@@ -35,6 +35,7 @@ __all__ = [
     "LinearModel",
     "Modes",
     "Observation",
+    "Plans",
     "Run",
     "Runs",
     "Shape",

@@ -11,7 +11,7 @@ from . import _checks, _html, _native
 from ._logs import write_log
 from ._toml import change
 from ._toml import written as toml
-from .results import Check, Comparison, Designed, Drift, Fit, FitLog, FrequencyResponses, GantryModes, LinearModel, Modes, Shown, Tuned
+from .results import Check, Comparison, Designed, Drift, Fit, FitLog, FrequencyResponses, GantryModes, LinearModel, Modes, Plans, Shown, Tuned
 from .runs import Run, Runs
 from .sweeps import sweep
 from .table import Table
@@ -273,6 +273,26 @@ class Case:
             _checks.given("effort", effort),
         )
         return Tuned(data, self._of(case))
+
+    def plan(
+        self,
+        moves: str | Sequence[str] | None = None,
+        *,
+        speed: float | None = None,
+        acceleration: float | None = None,
+        jerk: float | None = None,
+        reserve: float = 0.1,
+    ) -> Plans:
+        """Plans the fastest moves that the machine can make: all of the case's, or those of these names.
+
+        ``speed`` (m/s), ``acceleration`` (m/s²) and ``jerk`` (m/s³) are limits besides those of the machine;
+        ``reserve`` is the share of voltage and current that is left to the loop. Ctrl-C ends it.
+        """
+        names = _checks.names("moves", [moves] if isinstance(moves, str) else moves)
+        n = _checks.number
+        limits = (n("speed", speed), n("acceleration", acceleration), n("jerk", jerk))
+        data, case = self._native.plan(names, limits, _checks.given("reserve", reserve))
+        return Plans(data, self._of(case))
 
     def with_log(
         self,

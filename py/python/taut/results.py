@@ -557,6 +557,40 @@ class Shown:
 
 
 @dataclass(frozen=True)
+class Plans:
+    """Planned moves."""
+
+    data: dict[str, Any]
+    """The output of ``taut plan --json``."""
+    case: Case
+    """The case with the planned limits."""
+
+    def arrivals(self) -> dict[str, tuple[float | None, float | None]]:
+        """Of each move: when the cart of the slowest axis stays in its window, planned and with the limits of the file,
+        s; None where one does not."""
+        return {
+            move["name"]: (move["arrival"]["in_window_worst_s"], move["given"]["arrival"]["in_window_worst_s"])
+            for move in self.data["moves"]
+        }
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """A pandas.DataFrame with a row for each plan that was tried."""
+        rows = [
+            {"move": move["name"], **one["limits"], "share": one["share"], **one["arrival"]}
+            for move in self.data["moves"]
+            for one in move["tried"]
+        ]
+        return frame({key: [row[key] for row in rows] for key in rows[0]} if rows else {})
+
+    def __repr__(self) -> str:
+        return f"<taut.Plans {self.data['title']!r}: {', '.join(move['name'] for move in self.data['moves'])}>"
+
+    def _repr_html_(self) -> str:
+        rows = [(name, *times) for name, times in self.arrivals().items()]
+        return _html.table(self.data["title"], ("move", "planned, s", "file, s"), rows)
+
+
+@dataclass(frozen=True)
 class FrequencyResponses:
     """Frequency responses from logs."""
 

@@ -1,0 +1,64 @@
+//! `taut plan` as a user runs it.
+
+use serde_json::Value;
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+use tempfile::TempDir;
+
+const PID: &str = "stages/sollmann-jouaneh/controllers/pid.toml";
+
+fn taut(args: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_taut"));
+    command.args(args).current_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("..")).output().unwrap()
+}
+
+#[test]
+fn a_plan_is_written_and_moves() {
+    let folder = TempDir::new().unwrap();
+    let planned = folder.path().join("planned.toml");
+    let planned = planned.to_str().unwrap();
+    let output = taut(&["plan", PID, "--move", "long", "--out", planned, "--json"]);
+    let told: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((output.status.code(), &told["schema"]), (Some(0), &"taut/plan/1".into()));
+    let one = &told["moves"][0];
+    assert!(one["arrival"]["in_window_s"].as_f64() > one["fastest_rigid_s"].as_f64(), "{one}");
+    // The case that was written moves as was told.
+    let moved = taut(&["move", planned, "--move", "long", "--json"]);
+    let moved: Value = serde_json::from_slice(&moved.stdout).unwrap();
+    let motion = &moved["moves"][0];
+    let arrives = motion["profile_end_s"].as_f64().unwrap() + motion["settling_s"].as_f64().unwrap();
+    assert!((arrives - one["arrival"]["in_window_s"].as_f64().unwrap()).abs() < 1e-9, "{motion}");
+    assert_eq!(motion["shortfalls"], serde_json::json!([]));
+    // Nothing is written over.
+    let before = fs::read(planned).unwrap();
+    let again = taut(&["plan", PID, "--move", "long", "--out", planned]);
+    assert_eq!((again.status.code(), fs::read(planned).unwrap()), (Some(2), before));
+    // The folder has a report.
+    let out = folder.path().join("out");
+    let done = taut(&["plan", PID, "--move", "long", "--set", "tune.spread=0", "--out", out.to_str().unwrap()]);
+    assert_eq!(done.status.code(), Some(0));
+    for name in ["planned.toml", "plan.json", "report.html", "files.json"] {
+        assert!(out.join(name).is_file(), "{name}");
+    }
+}
+
+#[test]
+fn what_cannot_be_planned_is_told() {
+    let cases: [(&[&str], i32, &str); 8] = [
+        (&["stages/sollmann-jouaneh/table4.toml"], 2, "move"),
+        (&[PID, "--move", "gone"], 2, "gone"),
+        (&[PID, "--reserve", "95%"], 2, "a share from 0 to 90% is needed"),
+        (&[PID, "--speed", "0"], 2, "speed above zero"),
+        (&[PID, "--jerk", "5 m/s"], 2, "m/s^3"),
+        (&[PID, "--move", "long", "--set", "cart.friction.static=1 kN"], 1, "to break away takes"),
+        (&[PID, "--move", "long", "--set", "controller.limit=0.5 V"], 1, "has no plan"),
+        (&["stages/core-xy/core-xy.toml"], 2, "gantry"),
+    ];
+    for (words, status, part) in cases {
+        let output = taut(&[&["plan"], words].concat());
+        let told = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(status), "{words:?}: {told}");
+        assert!(told.starts_with("error: ") && told.contains(part), "{words:?}: {told}");
+    }
+}

@@ -1,0 +1,170 @@
+//! Planned moves: within the limits on every axis, sooner than what the file has, and never sooner than can be.
+
+use crate::common::experiment;
+use rand_pcg::Pcg64;
+use std::path::Path;
+use taut::case::Case;
+use taut::control::feasible::{loads, shortfalls};
+use taut::control::{Setup, closed_loop};
+use taut::friction::Motion;
+use taut::machine::BeltModel;
+use taut::machine::Machine;
+use taut::machine::axis::CART;
+use taut::machine::rigid::Rigid;
+use taut::plan::Experiment;
+use taut::planning::{Wanted, plan};
+use taut::signal::profile::Leg;
+use taut::signal::profile::Profile;
+use taut::signal::{Hold, Signal};
+use taut::solve::{Solver, simulate};
+
+const FREE: Wanted = Wanted { speed: None, acceleration: None, jerk: None, reserve: 0.1 };
+
+fn case(changes: &[&str]) -> Case {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("stages/sollmann-jouaneh/controllers/pid-elastic.toml");
+    let text = std::fs::read_to_string(&file).unwrap();
+    Case::from_text_with(&file, &text, changes).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// An axis and its case, drawn: mass, stiffness, friction and voltage off by factors up to two.
+fn drawn(seed: u64) -> Case {
+    let mut random = Pcg64::new(32, u128::from(seed));
+    let mut factor = || 2f64.powf(2.0 * taut::chance::uniform(&mut random) - 1.0);
+    case(&[
+        &format!("cart.mass={}", 0.362 * factor()),
+        &format!("belt.section={} mm^2", 5.5626 * factor()),
+        &format!("cart.friction.coulomb={}", 2.0 * factor()),
+        &format!("controller.limit={} V", 24.0 * factor()),
+        "tune.spread=0",
+    ])
+}
+
+#[test]
+fn plans_keep_the_limits_and_arrive_sooner() {
+    for seed in 0..4 {
+        let case = drawn(seed);
+        let design = case.controller.as_ref().unwrap();
+        let plans = plan(&case, &[0, 1], &FREE, &|| false).unwrap();
+        for planned in &plans.moves {
+            let (best, given) = (&planned.best, &planned.given);
+            println!("{seed} {}: {:?}, {given:?}, at least {:?}", planned.name, best.arrival, planned.bound);
+            let short = shortfalls(&case.machine, design.limit, &planned.profile);
+            assert_eq!(short, [], "{seed}");
+            // The reserve is left.
+            for load in loads(&case.machine, design.limit, &planned.profile, 4000) {
+                assert!(load.needed <= 0.905 * load.allowed, "{seed}: {load:?}");
+            }
+            let [sooner, later] = [&best.arrival, given].map(|arrival| arrival.worst.unwrap_or(f64::INFINITY));
+            assert!(planned.is_kept || sooner < later, "{seed}: {sooner} {later}");
+            assert!(sooner > planned.bound.unwrap(), "{seed}");
+            // What is told of the arrival is a run of its own.
+            let setup = Setup {
+                machine: &case.machine,
+                model: &case.machine,
+                design,
+                profile: &planned.profile,
+                until: planned.profile.end() + 0.5,
+                window: planned.window,
+                solver: Solver::Exact,
+            };
+            let settling = closed_loop(&setup).unwrap().figures.settling;
+            assert_eq!(settling.map(|late| late + planned.profile.end()), best.arrival.nominal, "{seed}");
+        }
+    }
+}
+
+/// ∫ a e^{−iωt} dt of the planned reference at the belt's mode, as a share of ∫ |a| dt.
+fn excited(profile: &Profile, hertz: f64) -> f64 {
+    let count = 200_000;
+    let h = profile.end() / f64::from(count);
+    let (mut sum, mut whole) = ((0.0, 0.0), 0.0);
+    for k in 0..count {
+        let t = h * (f64::from(k) + 0.5);
+        let (a, angle) = (profile.at(t).acceleration, 2.0 * std::f64::consts::PI * hertz * t);
+        sum = (sum.0 + h * a * angle.cos(), sum.1 - h * a * angle.sin());
+        whole += h * a.abs();
+    }
+    f64::hypot(sum.0, sum.1) / whole
+}
+
+#[test]
+fn jerk_times_are_on_the_zeros_of_the_belts_modes() {
+    let mut seen = 0;
+    for seed in 10..12 {
+        let case = drawn(seed);
+        let plans = plan(&case, &[0], &FREE, &|| false).unwrap();
+        let planned = &plans.moves[0];
+        for one in planned.tried.iter().filter(|one| one.periods[0] > 0) {
+            let time = one.limits.acceleration / one.limits.jerk.unwrap();
+            let periods = time * plans.modes[0];
+            assert!((periods - f64::from(one.periods[0])).abs() < 1e-9, "{seed}: {periods}");
+            let target = planned.profile.target();
+            let profile = Profile::new(0.0, &[Leg::To(target, one.limits)]).unwrap();
+            let left = excited(&profile, plans.modes[0]);
+            assert!(left < 1e-4, "{seed} {:?}: {left}", one.periods);
+            seen += 1;
+        }
+    }
+    assert!(seen > 20, "{seen}");
+}
+
+#[test]
+fn limits_of_the_user_are_kept() {
+    let case = drawn(5);
+    let wanted = Wanted { speed: Some(0.21), acceleration: Some(3.0), jerk: Some(150.0), reserve: 0.2 };
+    let plans = plan(&case, &[0, 1, 2], &wanted, &|| false).unwrap();
+    for one in plans.moves.iter().flat_map(|planned| &planned.tried) {
+        let limits = &one.limits;
+        assert!(limits.speed <= 0.21 * (1.0 + 1e-12) && limits.acceleration <= 3.0 * (1.0 + 1e-12), "{limits:?}");
+        assert!(limits.jerk.unwrap() <= 150.0 * (1.0 + 1e-12), "{limits:?}");
+    }
+    // The case that is written holds the plan.
+    let text = plans.case_text(&case, Path::new("planned.toml")).unwrap();
+    let written = Case::from_text("planned.toml", &text).unwrap();
+    for planned in plans.moves.iter().filter(|planned| !planned.is_kept) {
+        let [read, meant] = [&written.moves[planned.place].profile, &planned.profile];
+        assert!((read.end() - meant.end()).abs() < 1e-12 * meant.end(), "{}", planned.name);
+        let off = (0..100).map(|k| f64::from(k) / 100.0 * meant.end());
+        let off = off.map(|t| (read.at(t).position - meant.at(t).position).abs()).fold(0.0, f64::max);
+        assert!(off < 1e-12, "{}: {off}", planned.name);
+    }
+}
+
+/// Time from rest to rest of the axis under full voltage, then full braking, by the exact solver: the switch is sought
+/// so that the cart stops after the distance.
+fn bang_bang(machine: &Machine, volts: f64, distance: f64, longest: f64) -> f64 {
+    let stop = |switch: f64| -> (f64, f64) {
+        let input = Signal::Sampled { times: vec![0.0, switch], values: vec![volts, -volts], hold: Hold::Zero };
+        let experiment = Experiment { every: longest, ..experiment(input, longest) };
+        let solution = simulate(machine, &experiment, Solver::Exact).unwrap();
+        let cart = solution.outcome.events.iter().find(|event| {
+            event.body() == Some(CART) && event.time > switch && event.from.code() != Motion::Stuck.code()
+        });
+        let time = cart.map_or(longest, |event| event.time);
+        let until = Experiment { until: time, every: time, ..experiment };
+        let way =
+            *simulate(machine, &until, Solver::Exact).unwrap().trajectory.get("cart_position").unwrap().last().unwrap();
+        (way, time)
+    };
+    let mut ends = [0.0, longest];
+    for _ in 0..50 {
+        let middle = 0.5 * (ends[0] + ends[1]);
+        ends[usize::from(stop(middle).0 > distance)] = middle;
+    }
+    stop(ends[0]).1
+}
+
+#[test]
+fn the_least_time_of_a_rigid_axis_is_that_of_full_voltage_and_full_braking() {
+    for seed in 20..26 {
+        let case = drawn(seed);
+        let mut machine = case.machine.clone();
+        machine.belt.model = BeltModel::Rigid;
+        let volts = case.controller.as_ref().unwrap().limit.unwrap();
+        for distance in [0.002, 0.02, 0.3] {
+            let least = Rigid::of(&machine).quickest(distance, (Some(volts), None)).unwrap();
+            let time = bang_bang(&machine, volts, distance, 4.0 * least);
+            assert!((least / time - 1.0).abs() < 1e-6, "{seed}, {distance} m: {least} s, {time} s simulated");
+        }
+    }
+}
