@@ -72,7 +72,7 @@ pub use taut_case::{case, files, log};
 pub use taut_control::{control, frf, linear, planning, tune};
 pub use taut_core::{
     Error, Result, chance, design, error, friction, machine, measure, mechanism, metrics, number, parameter, plan,
-    polyline, quantity, signal, solve,
+    polyline, quantity, reach, signal, solve,
 };
 pub use taut_export as export;
 pub use taut_identify::fit;

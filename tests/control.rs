@@ -6,11 +6,11 @@ use nalgebra::DMatrix;
 use proptest::prelude::*;
 use serde_json::Value;
 use taut::case::Case;
-use taut::control::compensation::Compensation;
 use taut::control::{Loop, Rows, Setup, Standard, closed_loop, riccati, sliding, spread, stream};
 use taut::design::*;
 use taut::machine::rigid::Rigid;
 use taut::machine::{Encoder, EncoderPlace, Machine};
+use taut::reach::compensation::Compensation;
 use taut::signal::profile::{Leg, Limits, Profile, Reference, Stroke};
 use taut::solve::{Ending, Flow, Solver};
 

@@ -46,6 +46,7 @@ mod recorders;
 mod reference;
 
 mod planning;
+mod reach;
 mod rooms;
 mod rounding;
 mod rows;

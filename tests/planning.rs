@@ -4,7 +4,6 @@ use crate::common::experiment;
 use rand_pcg::Pcg64;
 use std::path::Path;
 use taut::case::Case;
-use taut::control::feasible::{loads, shortfalls};
 use taut::control::{Setup, closed_loop};
 use taut::friction::Motion;
 use taut::machine::BeltModel;
@@ -12,7 +11,9 @@ use taut::machine::Machine;
 use taut::machine::axis::CART;
 use taut::machine::rigid::Rigid;
 use taut::plan::Experiment;
-use taut::planning::{Wanted, plan};
+use taut::planning::plan;
+use taut::reach::feasible::{loads, shortfalls};
+use taut::reach::quickest::Wanted;
 use taut::signal::profile::Leg;
 use taut::signal::profile::Profile;
 use taut::signal::{Hold, Signal};
@@ -128,6 +129,25 @@ fn limits_of_the_user_are_kept() {
         let off = off.map(|t| (read.at(t).position - meant.at(t).position).abs()).fold(0.0, f64::max);
         assert!(off < 1e-12, "{}: {off}", planned.name);
     }
+}
+
+/// The file may leave the limits to the machine: they change with it, and exceed nothing.
+#[test]
+fn a_move_of_the_file_may_be_a_plan() {
+    let planned = "move=[{ name = \"planned\", to = \"40 mm\", plan = { jerk = \"900 m/s^3\" }, until = \"1 s\" }]";
+    let [slow, fast] = ["12 V", "24 V"].map(|limit| case(&[&format!("controller.limit={limit}"), planned]));
+    for case in [&slow, &fast] {
+        let (design, motion) = (case.controller.as_ref().unwrap(), &case.moves[0]);
+        assert!(motion.is_planned && motion.profile.target() == 0.04);
+        let loads = loads(&case.machine, design.limit, &motion.profile, 4000);
+        let most = loads.iter().map(|load| load.share()).fold(0.0, f64::max);
+        assert!(most <= 0.9 + 1e-9, "{most}");
+        // Peak of jerk, from the pieces of the reference.
+        let jerk = (0..2000).map(|k| motion.profile.at(motion.profile.end() * f64::from(k) / 2000.0).jerk.abs());
+        let jerk = jerk.fold(0.0, f64::max);
+        assert!(jerk <= 900.0 * (1.0 + 1e-9) && (most > 0.85 || jerk > 890.0), "{most}, {jerk} m/s^3");
+    }
+    assert!(fast.moves[0].profile.end() < slow.moves[0].profile.end());
 }
 
 /// Time from rest to rest of the axis under full voltage, then full braking, by the exact solver: the switch is sought

@@ -10,11 +10,11 @@ use taut::case::Case;
 use taut::control::compare::compare;
 use taut::control::damping::fitted;
 use taut::control::power_spectral_density;
-use taut::control::resonance::{Drive, Resonance, reaches, resonances};
 use taut::control::shaper::{Corner, Firmware, Form, Kind, Pattern, Shaper, TOLERANCE, residual_vibration};
 use taut::control::shaping::{ALLOWED_SMOOTHING, Criterion, Target, choose};
 use taut::control::spectrum::{Axis, Spectrum};
 use taut::log::{Accelerometer, read_accelerometer};
+use taut::reach::resonance::{Drive, Resonance, reaches, resonances};
 
 const EXACT: [Kind; 3] = [Kind::Zv, Kind::Mzv, Kind::Zvd];
 

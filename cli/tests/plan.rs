@@ -52,9 +52,24 @@ fn what_cannot_be_planned_is_told() {
         (&[PID, "--speed", "0"], 2, "speed above zero"),
         (&[PID, "--jerk", "5 m/s"], 2, "m/s^3"),
         (&[PID, "--move", "long", "--set", "cart.friction.static=1 kN"], 1, "to break away takes"),
-        (&[PID, "--move", "long", "--set", "controller.limit=0.5 V"], 1, "has no plan"),
+        (&[PID, "--move", "long", "--set", "controller.limit=0.5 V"], 1, "there is no plan"),
         (&["stages/core-xy/core-xy.toml"], 2, "gantry"),
     ];
+    for (plan, besides, part) in [
+        ("{ speed = 0 }", "motor.resistance=1", "has to be above zero"),
+        ("{ sped = 1 }", "motor.resistance=1", "did you mean `speed`?"),
+        ("{ reserve = 0.95 }", "motor.resistance=1", "from 0 to 0.9"),
+        ("{}, speed = 1", "motor.resistance=1", "the move has a plan already"),
+        ("3", "motor.resistance=1", "a table is wanted"),
+        ("{}", "cart.friction.static=1 kN", "there is no plan: to break away takes"),
+        ("{}", "motor.resistance=1", ""),
+    ] {
+        let planned = format!("move=[{{ name = \"long\", to = \"40 mm\", plan = {plan}, until = \"1 s\" }}]");
+        let output = taut(&["move", PID, "--set", &planned, "--set", besides]);
+        let told = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(if part.is_empty() { 0 } else { 2 }), "{plan}: {told}");
+        assert!(told.contains(part), "{plan}: {told}");
+    }
     for (words, status, part) in cases {
         let output = taut(&[&["plan"], words].concat());
         let told = String::from_utf8(output.stderr).unwrap();

@@ -1,33 +1,22 @@
 //! The fastest move of an axis: speed, acceleration and jerk that its limits allow, with jerk times on the zeros of the
-//! belt's modes, chosen by how soon the cart stays in its window over a family of machines.
+//! belt's modes, chosen by how soon the cart stays in its window over a family of machines. The limits themselves are those of
+//! [`Quickest`].
 
 use crate::case::{Case, Files, Move};
-use crate::control::feasible::{Load, Shortfall, limits, loads as loads_of, shortfalls};
-use crate::control::resonance::{Drive, reaches, resonances};
 use crate::control::{MoveRun, Setup, closed_loop};
 use crate::design::Design;
 use crate::error::{Error, Result};
+use crate::machine::Machine;
 use crate::machine::rigid::Rigid;
-use crate::machine::{BeltModel, Machine};
-use crate::signal::profile::{Leg, Limits, Profile};
+use crate::reach::feasible::{Load, Shortfall, limits, loads, shortfalls};
+use crate::reach::quickest::{CLOSELY, INSTANTS, Quickest, Wanted, Way, modes};
+use crate::signal::profile::{Limits, Profile};
 use crate::solve::{Ending, Solver};
 use crate::tune::Family;
 use std::path::Path;
 
-/// Instants of a reference that are looked at during the search, and at its end.
-const INSTANTS: usize = 160;
-const CLOSELY: usize = 4000;
-
-/// Cruising speeds that are tried, by a grid and then by golden section, and bisections of the acceleration.
-const SPEEDS: usize = 10;
-const NARROWED: usize = 8;
-const BISECTIONS: usize = 14;
-
-/// Jerk times in periods of the belt's lowest mode, and snap times in periods of its next; 0 is [`SHORTEST`].
+/// Jerk times in periods of the belt's lowest mode, and snap times in periods of its next; 0 is a few samples.
 const PERIODS: [[u8; 2]; 5] = [[0, 0], [1, 0], [2, 0], [3, 0], [1, 1]];
-
-/// Jerk and snap time that are on no mode, in samples of the controller.
-const SHORTEST: [f64; 2] = [4.0, 1.0];
 
 /// Shares of the limits that plans take, the quickest first.
 const SHARES: [f64; 8] = [1.0, 0.85, 0.72, 0.6, 0.5, 0.4, 0.3, 0.2];
@@ -35,41 +24,6 @@ const SHARES: [f64; 8] = [1.0, 0.85, 0.72, 0.6, 0.5, 0.4, 0.3, 0.2];
 /// Shortest time at rest that is watched, s, and a time that is longer than any move, s.
 const WATCHED: f64 = 0.3;
 const NEVER: f64 = 1e12;
-
-/// Times that a plan is made slower because an axis of the family needs more than there is.
-const CORRECTIONS: usize = 6;
-
-/// Smallest cruising speed that is tried, as a share of the largest that the way allows.
-const SLOWEST: f64 = 0.02;
-
-/// Limits of a plan besides those of the machine, and the share of voltage and current that it leaves to the loop.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Wanted {
-    /// m/s
-    pub speed: Option<f64>,
-    /// m/s²
-    pub acceleration: Option<f64>,
-    /// m/s³
-    pub jerk: Option<f64>,
-    /// 0 to 0.9.
-    pub reserve: f64,
-}
-
-impl Wanted {
-    /// Each limit is above zero and finite, and the reserve a share up to 90 %.
-    pub fn check(&self) -> Result<()> {
-        let limits = [("speed", self.speed), ("acceleration", self.acceleration), ("jerk", self.jerk)];
-        for (name, value) in limits {
-            if let Some(value) = value.filter(|value| !(*value > 0.0 && value.is_finite())) {
-                return Err(Error::new(format!("{value} is no limit of {name}")).allowed("above 0"));
-            }
-        }
-        match (0.0..=0.9).contains(&self.reserve) {
-            true => Ok(()),
-            false => Err(Error::new(format!("a reserve of {}", self.reserve)).allowed("from 0 to 0.9")),
-        }
-    }
-}
 
 /// How soon the cart stays in its window, from the beginning of the move, in closed loop.
 #[derive(Debug, Clone, PartialEq)]
@@ -155,10 +109,11 @@ pub fn plan(case: &Case, places: &[usize], wanted: &Wanted, stop: &dyn Fn() -> b
 }
 
 impl Plans {
-    /// The text of the case with the planned limits, its remarks left alone; `name` stands in messages.
+    /// The text of the case with the planned limits, its remarks left alone but for moves that have a plan in the file; `name` stands in messages.
     pub fn case_text(&self, case: &Case, name: &Path) -> Result<String> {
         let mut changes = Vec::new();
-        for planned in self.moves.iter().filter(|planned| !planned.is_kept) {
+        let is_written = |planned: &&Planned| !planned.is_kept && !case.moves[planned.place].is_planned;
+        for planned in self.moves.iter().filter(is_written) {
             let limits = &planned.best.limits;
             let mut set = |key: &str, value: f64, unit: &str| {
                 changes.push(format!("move.{}.{key}={value:?} {unit}", planned.place));
@@ -178,18 +133,6 @@ impl Plans {
     }
 }
 
-/// Lowest frequencies along the travel of the modes with the drive pulley held, Hz, the lowest first; none of a rigid
-/// belt, or of one that does not swing.
-fn modes(machine: &Machine) -> Vec<f64> {
-    if machine.belt.model == BeltModel::Rigid {
-        return Vec::new();
-    }
-    let Ok(found) = resonances(machine, Drive::Held) else { return Vec::new() };
-    let mut lowest: Vec<f64> = reaches(&found).iter().map(|mode| mode.frequency[0]).collect();
-    lowest.sort_by(f64::total_cmp);
-    lowest
-}
-
 /// What the plans of a case have in common.
 struct Planner<'a> {
     design: &'a Design,
@@ -199,59 +142,20 @@ struct Planner<'a> {
     stop: &'a dyn Fn() -> bool,
 }
 
-/// A move from stroke to stroke, without its limits.
-struct Way {
-    start: f64,
-    /// Rest before each stroke (s), and its target (m).
-    strokes: Vec<(f64, f64)>,
-    /// The shortest and the longest stroke, m.
-    shortest: f64,
-    longest: f64,
-}
-
-impl Way {
-    /// The strokes of a reference; none of one that has none.
-    fn of(profile: &Profile) -> Option<Self> {
-        let mut rested = 0.0;
-        let mut strokes = Vec::new();
-        for (begin, from, distance, duration) in profile.strokes().filter(|(_, _, distance, _)| *distance != 0.0) {
-            strokes.push((begin - rested, from + distance));
-            rested = begin + duration;
-        }
-        let lengths = || profile.strokes().map(|(_, _, distance, _)| distance.abs()).filter(|length| *length > 0.0);
-        let (shortest, longest) = (lengths().reduce(f64::min)?, lengths().reduce(f64::max)?);
-        Some(Self { start: profile.start(), strokes, shortest, longest })
-    }
-
-    /// The same way within these limits.
-    fn within(&self, limits: &Limits) -> Result<Profile> {
-        let legs = self.strokes.iter().flat_map(|&(rest, to)| {
-            let wait = (rest > 1e-12).then_some(Leg::Wait(rest));
-            wait.into_iter().chain([Leg::To(to, *limits)])
-        });
-        Profile::new(self.start, &legs.collect::<Vec<_>>())
-    }
-}
-
 impl Planner<'_> {
     fn planned(&self, motion: &Move, place: usize) -> Result<Planned> {
-        let impossible = |what: String| Error::new(format!("the move \"{}\" has no plan: {what}", motion.name));
+        let impossible = |what: String| Error::new(format!("the move \"{}\": there is no plan: {what}", motion.name));
         let way = Way::of(&motion.profile).ok_or_else(|| impossible("it has no stroke".into()))?;
         let machine = &self.family.machine;
         let reference = motion.reference(self.design);
         let short = shortfalls(machine, self.design.limit, &reference);
-        // What no speed and no acceleration can mend.
-        if let Some(short) = short.iter().find(|short| ["breakaway", "travel"].contains(&short.limit)) {
-            return Err(impossible(short.words.clone()));
-        }
-        let (volts, amperes) = limits(machine, self.design.limit);
-        if volts.is_none() && amperes.is_none() && (self.wanted.speed.is_none() || self.wanted.acceleration.is_none()) {
-            let error = impossible("neither voltage nor current is limited".into());
-            return Err(error.next("give limit in [controller], amplifier.voltage_limit or --speed and --acceleration"));
-        }
-        let mut tried = self.tried(&way, motion)?;
+        let quickest = Quickest { machine, design: self.design, modes: self.modes, wanted: self.wanted };
+        quickest
+            .check(&way)
+            .map_err(|error| Error { what: format!("the move \"{}\": {}", motion.name, error.what), ..error })?;
+        let mut tried = self.tried(&quickest, &way, motion)?;
         if tried.is_empty() {
-            return Err(impossible(self.unmoved(&way, motion)));
+            return Err(impossible("what is left of voltage and current accelerates no axis of the family".into()));
         }
         tried.sort_by(|a, b| a.rank().total_cmp(&b.rank()));
         let mut best = tried[0].clone();
@@ -286,14 +190,15 @@ impl Planner<'_> {
     }
 
     /// Plans for each jerk time and share of the limits, with their arrival on the axis as the file has it.
-    fn tried(&self, way: &Way, motion: &Move) -> Result<Vec<Tried>> {
+    fn tried(&self, quickest: &Quickest, way: &Way, motion: &Move) -> Result<Vec<Tried>> {
         let mut tried = Vec::new();
         for periods in PERIODS {
             for share in SHARES {
                 if (self.stop)() {
                     return Ok(tried);
                 }
-                let Some(limits) = self.quickest_of_all(way, periods, share)? else { continue };
+                let all = |profile: &Profile| self.loads(profile, INSTANTS).iter().map(Load::share).fold(0.0, f64::max);
+                let Some(limits) = quickest.limits_for(way, periods, share, &all)? else { continue };
                 let arrival = self.arrival(motion, &way.within(&limits)?, false)?;
                 tried.push(Tried { limits, periods, share, arrival });
             }
@@ -301,147 +206,19 @@ impl Planner<'_> {
         Ok(tried)
     }
 
-    /// Jerk and snap time, s; none where the belt has no such mode.
-    fn times(&self, periods: [u8; 2]) -> Option<[f64; 2]> {
-        let mut times = SHORTEST.map(|samples| samples * self.design.every);
-        for (k, (time, periods)) in times.iter_mut().zip(periods).enumerate() {
-            if periods > 0 {
-                *time = f64::from(periods) / self.modes.get(k)?;
-            }
-        }
-        (times[1] <= times[0]).then_some(times)
-    }
-
-    /// Limits with these averaging times, the shortest jerk time grown where a limit of jerk asks for it.
-    fn limits(&self, speed: f64, acceleration: f64, periods: [u8; 2], times: [f64; 2]) -> Limits {
-        let mut jerk_time = times[0];
-        if let (0, Some(jerk)) = (periods[0], self.wanted.jerk) {
-            jerk_time = jerk_time.max(acceleration / jerk);
-        }
-        let jerk = acceleration / jerk_time;
-        Limits { speed, acceleration, jerk: Some(jerk), snap: Some(jerk / times[1]) }
-    }
-
-    /// The limits of the quickest move that takes no more than this share of what is left of voltage and current, and no
-    /// axis of the family more than there is; none where there is none.
-    fn quickest_of_all(&self, way: &Way, periods: [u8; 2], share: f64) -> Result<Option<Limits>> {
-        let wanted = share * (1.0 - self.wanted.reserve);
-        let mut share = wanted;
-        for _ in 0..CORRECTIONS {
-            let Some(limits) = self.quickest(way, periods, share) else { return Ok(None) };
-            let profile = way.within(&limits)?.shaped(&self.design.shaper);
-            let mut loads = self.loads(&profile, INSTANTS);
-            // Looked at more closely, the axis of the file needs a little more than during the search.
-            loads.extend(loads_of(&self.family.machine, self.design.limit, &profile, CLOSELY).into_iter().map(
-                |load| {
-                    let allowed = if load.is_electrical() { wanted * load.allowed } else { load.allowed };
-                    Load { allowed, ..load }
-                },
-            ));
-            let most = loads.iter().map(|load| load.needed / load.allowed).fold(0.0, f64::max);
-            if most <= 1.0 {
-                return Ok(Some(limits));
-            }
-            share *= 0.995 / most;
-        }
-        Ok(None)
-    }
-
-    /// The limits of the quickest move with these averaging times that takes no more than a share of the machine's; none
-    /// where there is none.
-    fn quickest(&self, way: &Way, periods: [u8; 2], share: f64) -> Option<Limits> {
-        let times = self.times(periods)?;
-        let both: f64 = times.iter().sum();
-        // T₂ = v/a ≥ T_j + T_s and D ≥ 2 a (T_j + T_s)²: a shorter stroke would shorten the jerk time.
-        let shortest = way.shortest / (2.0 * both * both);
-        let mut most = shortest.min(self.wanted.acceleration.unwrap_or(f64::INFINITY));
-        if let (true, Some(jerk)) = (periods[0] > 0, self.wanted.jerk) {
-            most = most.min(jerk * times[0]);
-        }
-        let acceleration = |speed: f64| {
-            let within = |a: f64| self.is_within(way, &self.limits(speed, a, periods, times), share);
-            let most = most.min(speed / both);
-            if within(most) {
-                return Some(most);
-            }
-            let mut ends = [1e-4 * most, most];
-            if !within(ends[0]) {
-                return None;
-            }
-            for _ in 0..BISECTIONS {
-                let middle = (ends[0] * ends[1]).sqrt();
-                ends[usize::from(!within(middle))] = middle;
-            }
-            Some(ends[0])
-        };
-        let duration = |speed: f64| -> (f64, Option<Limits>) {
-            let Some(a) = acceleration(speed) else { return (f64::INFINITY, None) };
-            let limits = self.limits(speed, a, periods, times);
-            (way.within(&limits).map_or(f64::INFINITY, |profile| profile.end()), Some(limits))
-        };
-        // No faster than a way without any cruise reaches.
-        let fastest = (way.longest * most).sqrt().min(self.wanted.speed.unwrap_or(f64::INFINITY));
-        let grid = |k: usize| fastest * SLOWEST.powf(k as f64 / (SPEEDS - 1) as f64);
-        let found: Vec<(f64, f64, Option<Limits>)> = (0..SPEEDS)
-            .map(|k| {
-                let (time, limits) = duration(grid(k));
-                (time, grid(k), limits)
-            })
-            .collect();
-        let best = (0..SPEEDS).min_by(|&a, &b| found[a].0.total_cmp(&found[b].0))?;
-        let mut best_yet = (found[best].0, found[best].2);
-        best_yet.1?;
-        let (mut low, mut high) = (grid((best + 1).min(SPEEDS - 1)), grid(best.saturating_sub(1)));
-        const GOLDEN: f64 = 0.618_033_988_749_895;
-        for _ in 0..NARROWED {
-            let inner = [high - GOLDEN * (high - low), low + GOLDEN * (high - low)];
-            let [a, b] = inner.map(duration);
-            for (time, limits) in [a, b] {
-                if time < best_yet.0 {
-                    best_yet = (time, limits);
-                }
-            }
-            if a.0 <= b.0 { high = inner[1] } else { low = inner[0] }
-        }
-        let limits = best_yet.1?;
-        // Where no stroke cruises, the largest speed of the longest.
-        let profile = way.within(&limits).ok()?;
-        let peaks = profile.strokes().map(|(begin, _, _, duration)| profile.at(begin + 0.5 * duration).speed.abs());
-        let speed = peaks.fold(0.0, f64::max).min(limits.speed);
-        Some(Limits { speed, ..limits })
-    }
-
-    /// Whether a move within these limits takes no more than this share of each limit of the machine.
-    fn is_within(&self, way: &Way, limits: &Limits, share: f64) -> bool {
-        let Ok(profile) = way.within(limits) else { return false };
-        let profile = profile.shaped(&self.design.shaper);
-        let loads = loads_of(&self.family.machine, self.design.limit, &profile, INSTANTS);
-        loads.iter().all(|load| load.needed <= load.allowed * if load.is_electrical() { share } else { 1.0 })
-    }
-
     /// What a reference, shaper included, needs of each limit at most, over the family.
     fn loads(&self, profile: &Profile, instants: usize) -> Vec<Load> {
         let mut all: Vec<Load> = Vec::new();
         for corner in &self.family.machines {
-            for load in loads_of(&self.family.stage_at(corner), self.design.limit, profile, instants) {
+            for load in loads(&self.family.stage_at(corner), self.design.limit, profile, instants) {
                 match all.iter_mut().find(|known| known.limit == load.limit) {
-                    Some(known) if load.needed / load.allowed > known.needed / known.allowed => *known = load,
+                    Some(known) if load.share() > known.share() => *known = load,
                     Some(_) => (),
                     None => all.push(load),
                 }
             }
         }
         all
-    }
-
-    /// Why nothing moves, in words: what the slowest move that is tried needs.
-    fn unmoved(&self, way: &Way, motion: &Move) -> String {
-        let slow = Limits { speed: 1e-3, acceleration: 1e-2, jerk: None, snap: None };
-        let found = way.within(&slow).map(|profile| shortfalls(&self.family.machine, self.design.limit, &profile));
-        match found.as_deref() {
-            Ok([first, ..]) => first.words.clone(),
-            _ => format!("{} leaves too little to accelerate with", motion.name),
-        }
     }
 
     /// When the cart arrives, in closed loop.

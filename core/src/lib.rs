@@ -9,8 +9,8 @@
 //! - [`trajectory`]: named columns with units.
 //! - [`friction`], [`mechanism`]: bodies, springs and drives as data, and their equations of motion, mode by mode.
 //! - [`machine`]: what a person has. [`parameter`]: the one table of everything a case file can say.
-//! - [`signal`]: inputs, and the references of moves. [`design`]: what a controller is, in data. [`plan`]: experiments
-//!   and their logs.
+//! - [`signal`]: inputs, and the references of moves. [`design`]: what a controller is, in data. [`reach`]: what
+//!   references need of a machine, and its limits. [`plan`]: experiments and their logs.
 //! - [`solve`]: the motion. [`measure`]: what a recorder makes of it. [`metrics`]: what it shows.
 
 pub mod calculator;
@@ -27,6 +27,7 @@ pub mod parameter;
 pub mod plan;
 pub mod polyline;
 pub mod quantity;
+pub mod reach;
 pub mod signal;
 pub mod solve;
 pub mod trajectory;

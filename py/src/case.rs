@@ -22,7 +22,8 @@ use taut::json;
 use taut::linear::{Analysis, GantryAnalysis};
 use taut::machine::{Channel, Quantity};
 use taut::overview::Overview;
-use taut::planning::{Wanted, plan};
+use taut::planning::plan;
+use taut::reach::quickest::Wanted;
 use taut::solve::{Choice, Flow, Kind as SolverKind, Method};
 use taut::tune::{evaluate, tune};
 

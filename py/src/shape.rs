@@ -6,10 +6,10 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use std::path::PathBuf;
 use taut::control::recommendation::{Damping, Question, recommend};
-use taut::control::resonance::Drive;
 use taut::control::shaper::{Firmware, Form};
 use taut::control::spectrum::Axis;
 use taut::json;
+use taut::reach::resonance::Drive;
 
 /// The options, as Python hands them over.
 #[derive(FromPyObject)]

@@ -3,9 +3,9 @@
 use super::{ending, peak};
 use crate::case::Move;
 use crate::control::drives::{DriveGain, drive_gains};
-use crate::control::feasible::Shortfall;
 use crate::control::{Deviation, Loop, MoveRun, Worst};
 use crate::machine::Machine;
+use crate::reach::feasible::Shortfall;
 use crate::tune::trouble::Trouble;
 use serde_json::{Value, json};
 

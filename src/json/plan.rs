@@ -3,8 +3,9 @@
 use super::moves::shortfall;
 use super::number;
 use crate::case::Case;
-use crate::control::feasible::Load;
-use crate::planning::{Arrival, Planned, Plans, Tried, Wanted};
+use crate::planning::{Arrival, Planned, Plans, Tried};
+use crate::reach::feasible::Load;
+use crate::reach::quickest::Wanted;
 use crate::signal::profile::Limits;
 use serde_json::{Value, json};
 

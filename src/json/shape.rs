@@ -3,10 +3,10 @@
 use crate::control::compare::{Comparison, Pair};
 use crate::control::pairs;
 use crate::control::recommendation::{Findings, Found, Left, Source};
-use crate::control::resonance::{Drive, Resonance};
 use crate::control::shaper::Shaper;
 use crate::control::shaping::Fitted;
 use crate::control::spectrum::Spectrum;
+use crate::reach::resonance::{Drive, Resonance};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 

@@ -3,7 +3,6 @@
 use super::moves::shortfall;
 use super::number;
 use crate::case::{Case, Move, Tuning};
-use crate::control::feasible::of_moves;
 use crate::design::Design;
 use crate::tune::{Ahead, AtWorst, Choice, Least, Margins, MoveVerdict, Tuned, Unknown, Verdict, gains};
 use serde_json::{Value, json};
@@ -37,7 +36,7 @@ pub fn tuned(case: &Case, tuning: &Tuning, tuned: &Tuned) -> Value {
             "left_out": tuned.family.left_out(tuned.family.machines.len()),
             "varies": tuned.family.unknowns.iter().map(varies).collect::<Vec<_>>(),
         },
-        "shortfalls": of_moves(case).iter().map(|(name, limits)| {
+        "shortfalls": case.shortfalls().iter().map(|(name, limits)| {
             json!({ "move": name, "limits": limits.iter().map(shortfall).collect::<Vec<_>>() })
         }).collect::<Vec<_>>(),
         "standard_moves": case.moves.is_empty(),

@@ -3,10 +3,10 @@
 use super::limits::{Most, Power, most, safety};
 use super::{Group, Note, Overview, Place, belt_mass, drive_at_belt, motor_rows, of_belt, of_constants, told};
 use crate::case::Case;
-use crate::control::feasible::{of_moves, sentence};
 use crate::error::Result;
 use crate::linear::{Operation, Root, places, travel};
 use crate::machine::{AmplifierMode, BeltModel, Machine};
+use crate::reach::feasible::sentence;
 use std::f64::consts::PI;
 
 /// Places along the travel.
@@ -30,7 +30,7 @@ pub(super) fn overview(case: &Case) -> Result<Overview> {
         of_belt(&machine.belt.sheet, &machine.belt.damping, machine.pulley_radius, &mut notes);
     }
     notes.extend(
-        of_moves(case).iter().map(|(name, short)| Note { code: "move-out-of-reach", text: sentence(name, short) }),
+        case.shortfalls().iter().map(|(name, short)| Note { code: "move-out-of-reach", text: sentence(name, short) }),
     );
     groups.retain(|group| !group.rows.is_empty());
     let (title, kind, depends_on_place) = (case.title.clone(), "axis", along.is_some());

@@ -41,6 +41,7 @@ use crate::log::Log;
 use crate::machine::axis::{CART, LABELS};
 use crate::machine::{Kind, Machine, Measurement};
 use crate::mechanism::State;
+use crate::reach::feasible::{Shortfall, shortfalls};
 use files::Folder;
 use reader::{Field, Table};
 use std::collections::HashMap;
@@ -92,6 +93,15 @@ enum Accepted {
 }
 
 impl Case {
+    /// The limits that the reference of each move exceeds under the case's controller, with the name of the move; moves
+    /// that can be followed are left out.
+    pub fn shortfalls(&self) -> Vec<(&str, Vec<Shortfall>)> {
+        let Some(design) = &self.controller else { return Vec::new() };
+        let short = |motion: &Move| shortfalls(&self.machine, design.limit, &motion.reference(design));
+        let moves = self.moves.iter().map(|motion| (&*motion.name, short(motion)));
+        moves.filter(|(_, short)| !short.is_empty()).collect()
+    }
+
     /// Reads a case file.
     pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         Self::read_with(path, &[])

@@ -4,9 +4,10 @@ use super::reader::{Field, Table};
 use super::suggestion;
 use super::{MOST_SAMPLES, check_name, file_name};
 use crate::design::Design;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::machine::Machine;
 use crate::quantity::{rounded, show};
+use crate::reach::quickest::{Quickest, Wanted, Way, modes};
 use crate::signal::gcode;
 use crate::signal::profile::{Leg, Limits, Profile};
 
@@ -17,6 +18,8 @@ pub struct Move {
     pub name: String,
     /// The cart's reference.
     pub profile: Profile,
+    /// Whether its limits are those of a plan of the machine, and not numbers of the file.
+    pub is_planned: bool,
     /// End of the run, s.
     pub until: f64,
     /// Interval between rows, s.
@@ -73,8 +76,11 @@ fn one(table: &Table, machine: &Machine, design: &Design) -> Result<Move> {
     table.check_keys(&["name", "gcode"], &[])?;
     let name = table.required("name", "for example name = \"short fast\"")?;
     check_name(&name)?;
-    let limits = limits(table)?;
     let from = table.number("from")?;
+    let limits = match table.optional("plan") {
+        Some(field) => planned(table, &field, from, machine, design)?,
+        None => limits(table)?,
+    };
     let legs = legs(table, from, &limits)?;
     let until = table.number("until")?;
     let every = table.number_if_given("every")?.unwrap_or(design.every.min(until));
@@ -106,13 +112,52 @@ fn one(table: &Table, machine: &Machine, design: &Design) -> Result<Move> {
             )));
         }
     }
-    Ok(Move { name: name.text()?.to_string(), profile, until, every, window: table.number("window")? })
+    let (name, window) = (name.text()?.to_string(), table.number("window")?);
+    Ok(Move { name, profile, is_planned: table.optional("plan").is_some(), until, every, window })
+}
+
+/// The limits of the quickest move that the machine of the file can make, with jerk and snap time on the belt's modes
+/// where the way is long enough for it.
+fn planned(table: &Table, field: &Field, from: f64, machine: &Machine, design: &Design) -> Result<Limits> {
+    if let Some(other) = ["speed", "acceleration", "jerk", "snap", "gcode"].iter().find_map(|key| table.optional(key)) {
+        let next = format!(
+            "leave out plan, or {}; limits of the plan stand in it: plan = {{ speed = \"0.5 m/s\" }}",
+            other.key()
+        );
+        return Err(other.fail("the move has a plan already").next(next));
+    }
+    let given = field.clone().named("move.plan").table()?;
+    given.check_keys(&[], &[])?;
+    let wanted = Wanted {
+        speed: given.number_if_given("speed")?,
+        acceleration: given.number_if_given("acceleration")?,
+        jerk: given.number_if_given("jerk")?,
+        reserve: given.number("reserve")?,
+    };
+    // Where it goes does not depend on how fast.
+    let any = Limits { speed: 1.0, acceleration: 1.0, jerk: None, snap: None };
+    let told = |error: Error| Error { place: field.fail("").place, ..error };
+    let profile = Profile::new(from, &legs(table, from, &any)?).map_err(told)?;
+    let way = Way::of(&profile).ok_or_else(|| field.fail("a move that goes nowhere has no plan"))?;
+    let modes = modes(machine);
+    let quickest = Quickest { machine, design, modes: &modes, wanted: &wanted };
+    quickest.check(&way).map_err(told)?;
+    for periods in [[1, 1], [1, 0], [0, 0]] {
+        if let Some(limits) = quickest.limits_for(&way, periods, 1.0, &|_| 0.0).map_err(told)? {
+            return Ok(limits);
+        }
+    }
+    Err(field.fail("there is no plan: what is left of voltage and current does not accelerate the axis"))
 }
 
 fn limits(table: &Table) -> Result<Limits> {
+    let needed = |key: &str, example: &str| {
+        table.required(key, example)?;
+        table.number(key)
+    };
     let limits = Limits {
-        speed: table.number("speed")?,
-        acceleration: table.number("acceleration")?,
+        speed: needed("speed", "speed = \"0.4 m/s\", or plan = {} for the quickest move that the machine can make")?,
+        acceleration: needed("acceleration", "acceleration = \"5 m/s^2\"")?,
         jerk: table.number_if_given("jerk")?,
         snap: table.number_if_given("snap")?,
     };

@@ -11,7 +11,8 @@ use crate::progress::Progress;
 use taut::case::Files;
 use taut::files::write_atomically;
 use taut::json;
-use taut::planning::{Planned, Wanted, plan};
+use taut::planning::{Planned, plan};
+use taut::reach::quickest::Wanted;
 use taut_report::plan::{figures, page};
 
 /// Reads the case, plans, writes, tells.
@@ -39,6 +40,11 @@ pub fn run(args: &Args) -> Outcome {
     let advice = "add --out FILE.toml for the case with these limits, or --out DIR for a report, too";
     let mut finished = Finished::new("plan", ("plan.json", data), table::text(&case, &plans), advice);
     finished.remarks = plans.moves.iter().filter_map(remark).collect();
+    let own = plans.moves.iter().filter(|planned| !planned.is_kept && case.moves[planned.place].is_planned);
+    finished.remarks.extend(own.map(|planned| {
+        let name = &planned.name;
+        Remark::Note(format!("the move \"{name}\" keeps the `plan` of the file; without it these limits are written"))
+    }));
     finished.status = match finished.remarks.iter().any(|remark| matches!(remark, Remark::Warning(_))) {
         true => Status::Incomplete,
         false => Status::Done,

@@ -8,10 +8,10 @@ use crate::failure::Outcome;
 use crate::folder::Folder;
 use std::path::PathBuf;
 use taut::control::recommendation::{Question, recommend};
-use taut::control::resonance::Drive;
 use taut::control::spectrum::Axis;
 use taut::files::Inputs;
 use taut::json;
+use taut::reach::resonance::Drive;
 use taut_report::shape::{figures, page};
 
 /// Reads the files, chooses, compares, writes, tells.

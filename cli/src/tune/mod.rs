@@ -10,9 +10,9 @@ use crate::interrupt::{Interrupt, interrupted};
 use crate::progress::Progress;
 use taut::Error;
 use taut::case::{Case, Files, Tuning};
-use taut::control::feasible::{of_moves, sentence};
 use taut::files::write_atomically;
 use taut::json;
+use taut::reach::feasible::sentence;
 use taut::tune::{Judgement, evaluate, tune};
 use taut_report::tune::{Work, figures, hertz, page};
 
@@ -93,7 +93,7 @@ fn remarks(work: &Work) -> Vec<Remark> {
         let told = "the loop is not stable on the axis as the file has it";
         remarks.push(Remark::Warning(format!("{told}: it swings at {}", hertz(tuned.after.nominal.at))));
     }
-    let short = of_moves(work.case);
+    let short = work.case.shortfalls();
     remarks.extend(short.iter().map(|(name, short)| Remark::Warning(sentence(name, short))));
     remarks
 }

@@ -1,10 +1,10 @@
 //! Criteria for choosing shapers: residual vibration, smoothing, and the score of both.
 
 use super::kind::{Kind, TOLERANCE};
-use super::resonance::Resonance;
 use super::shaper::{Corner, Firmware, Form, Shaper, USUAL_DAMPING, check_damping};
 use super::spectrum::Spectrum;
 use crate::error::Result;
+use crate::reach::resonance::Resonance;
 
 /// The highest frequency of a shaper for a spectrum, Hz; it is not reached.
 const HIGHEST: f64 = 150.0;

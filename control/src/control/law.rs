@@ -3,8 +3,8 @@
 //! A law is written once, for any [`Calculator`]. From its text follow the running controller ([`super::Standard`]),
 //! its linear view ([`super::feedback`]) and the exported program.
 
-use super::compensation::Compensation;
 use crate::calculator::{Calculator, Slot, Slots, less};
+use crate::reach::compensation::Compensation;
 use crate::signal::profile::Reference;
 
 /// Inputs of a law at a sample.

@@ -9,11 +9,9 @@
 
 mod at_samples;
 pub mod compare;
-pub mod compensation;
 mod criterion;
 pub mod damping;
 pub mod drives;
-pub mod feasible;
 pub mod feedback;
 pub mod filter;
 pub mod fuzzy;
@@ -27,7 +25,6 @@ mod outcome;
 pub mod pairs;
 pub mod pid;
 pub mod recommendation;
-pub mod resonance;
 mod rest;
 pub mod riccati;
 mod sampled;

@@ -3,13 +3,13 @@
 
 use super::compare::{Comparison, compare};
 use super::damping::{FittedMode, fitted};
-use super::resonance::{Drive, Reach, Resonance, reaches, resonances};
 use super::shaper::{Firmware, Form, residual_vibration};
 use super::shaping::{Choice, Criterion, Target, choose};
 use super::spectrum::{Axis, Spectrum};
 use crate::case::{Case, Files};
 use crate::error::{Error, Result};
 use crate::log::read_accelerometer;
+use crate::reach::resonance::{Drive, Reach, Resonance, reaches, resonances};
 use std::path::{Path, PathBuf};
 
 /// By how much a model's frequencies may be wrong where the user does not say: masses are known to some 20 %.

@@ -1,6 +1,5 @@
 //! A controller from its design: structure, feed-forward, observer and filters put together.
 
-use super::compensation::Compensation;
 use super::filter::Biquad;
 use super::law::{Law, Seen};
 use super::laws::AnyLaw;
@@ -11,6 +10,7 @@ use crate::design::{Design, Structure};
 use crate::error::{Error, Result};
 use crate::machine::rigid::Rigid;
 use crate::machine::{AmplifierMode, Machine};
+use crate::reach::compensation::Compensation;
 use crate::signal::profile::Reference;
 
 /// A controller that a [`Design`] describes, made with a model of the axis: the stage itself, or what one takes it for.

@@ -1,12 +1,12 @@
 //! The moves that a controller is judged by, and the current that they ask for.
 
 use crate::case::{Case, Move};
-use crate::control::compensation::Compensation;
 use crate::control::measures_cart;
 use crate::design::{Design, FeedForward};
 use crate::error::Result;
 use crate::machine::rigid::Rigid;
 use crate::machine::{AmplifierMode, Machine};
+use crate::reach::compensation::Compensation;
 use crate::signal::profile::{Leg, Limits, Profile};
 
 /// Share of what the command's limit allows of speed and of force that a standard move takes.
@@ -53,7 +53,14 @@ fn standard(machine: &Machine, design: &Design) -> Result<Vec<Move>> {
     let one = |(name, legs): (&str, Vec<Leg>)| {
         let profile = Profile::new(from, &legs)?;
         let until = (profile.end() + 0.3).max(1.3 * profile.end());
-        Ok(Move { name: name.into(), until, every: design.every, window: WINDOW.max(COUNTS * count), profile })
+        Ok(Move {
+            name: name.into(),
+            until,
+            every: design.every,
+            window: WINDOW.max(COUNTS * count),
+            profile,
+            is_planned: false,
+        })
     };
     legs.into_iter().map(one).collect()
 }

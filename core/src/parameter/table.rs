@@ -81,6 +81,7 @@ const DURATION: Range = Range::new(1e-12, 1e9);
 const FREQUENCY: Range = Range::new(1e-9, 1e9);
 /// Whole numbers that TOML has, 0 to 2⁶³ − 1: read by their digits, as a double does not hold all of them.
 const SEED: Range = Range { below: true, ..Range::whole(0.0, i64::MAX as f64) };
+const RESERVE: Range = Range::new(0.0, 0.9);
 const UP_TO_ONE: Range = Range { above: true, ..Range::new(0.0, 1.0) };
 
 /// A number of a structure, which may be absent.
@@ -724,10 +725,14 @@ const SWEEP: &[Parameter] = &[
 const MOVE: &[Parameter] = &[
     row("move.from", "", "m", Value(0.0), ANY, "0 mm", "Where the cart stands at time zero."),
     row("move.to", "", "m", Words("`points` or `gcode` instead"), ANY, "50 mm", "Where it goes."),
-    row("move.speed", "", "m/s", Required, POSITIVE, "0.4 m/s", "Largest speed."),
-    row("move.acceleration", "", "m/s^2", Required, POSITIVE, "5 m/s^2", "Largest acceleration."),
+    row("move.speed", "", "m/s", Words("`plan` instead"), POSITIVE, "0.4 m/s", "Largest speed."),
+    row("move.acceleration", "", "m/s^2", Words("`plan` instead"), POSITIVE, "5 m/s^2", "Largest acceleration."),
     row("move.jerk", "", "m/s^3", Words("none: a trapezoid"), POSITIVE, "200 m/s^3", "Largest jerk."),
     row("move.snap", "", "m/s^4", Words("none: third order"), POSITIVE, "20000 m/s^4", "Largest snap; only with `jerk`."),
+    row("move.plan.speed", "", "m/s", Words("what the machine allows"), POSITIVE, "0.5 m/s", "Largest speed of a move that is planned."),
+    row("move.plan.acceleration", "", "m/s^2", Words("what the machine allows"), POSITIVE, "20 m/s^2", "Largest acceleration."),
+    row("move.plan.jerk", "", "m/s^3", Words("what the jerk time asks for"), POSITIVE, "500 m/s^3", "Largest jerk."),
+    row("move.plan.reserve", "", "", Value(0.1), RESERVE, "20 %", "Share of voltage and current that is left to the loop."),
     row("move.until", "", "s", Required, DURATION, "1 s", "End of the run."),
     row("move.every", "", "s", Words("the controller's `every`"), DURATION, "1 ms", "Interval between the rows of the result, the last of which is at the end; it affects neither accuracy nor figures."),
     row("move.window", "", "m", Value(1e-4), POSITIVE, "50 um", "How near its target the cart counts as settled."),

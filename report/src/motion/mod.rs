@@ -9,10 +9,10 @@ pub use plots::{Curves, figures};
 pub use rows::{controller, length, lines};
 
 use taut::case::{Case, Move};
-use taut::control::feasible::Shortfall;
 use taut::control::{MoveRun, Worst};
 use taut::design::Design;
 use taut::json::Moved;
+use taut::reach::feasible::Shortfall;
 use taut::tune::trouble::Trouble;
 
 /// A move after it ran.

@@ -2,9 +2,9 @@
 
 use crate::{Axis, Colour, Figure, Panel, Series, Style};
 use taut::control::recommendation::{Findings, Found, Source, damping};
-use taut::control::resonance::Resonance;
 use taut::control::shaping::Target;
 use taut::control::spectrum::Spectrum;
+use taut::reach::resonance::Resonance;
 
 /// All figures, with the names of their files.
 pub fn figures(found: &Findings) -> Vec<(String, Figure)> {

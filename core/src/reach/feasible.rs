@@ -1,7 +1,6 @@
 //! Whether the machine can follow a reference: what that needs of motor, amplifier, belt and travel, and their limits.
 
 use super::compensation::{Compensation, direction};
-use crate::case::{Case, Move};
 use crate::design::FeedForward;
 use crate::machine::rigid::Rigid;
 use crate::machine::{AmplifierMode, Machine};
@@ -65,6 +64,11 @@ pub struct Load {
 }
 
 impl Load {
+    /// What is needed as a share of what there is.
+    pub fn share(&self) -> f64 {
+        self.needed / self.allowed
+    }
+
     /// Whether the motor's supply bounds it, of which a loop needs some for itself.
     pub fn is_electrical(&self) -> bool {
         ["V", "A"].contains(&self.unit)
@@ -226,14 +230,6 @@ fn of_travel(machine: &Machine, needs: &[Need]) -> Option<Shortfall> {
     Some(need.beyond("travel", [position, end], "m", words))
 }
 
-/// The shortfalls of each move of a case under its controller, with the name of the move; moves without one are left out.
-pub fn of_moves(case: &Case) -> Vec<(&str, Vec<Shortfall>)> {
-    let Some(design) = &case.controller else { return Vec::new() };
-    let short = |motion: &Move| shortfalls(&case.machine, design.limit, &motion.reference(design));
-    let moves = case.moves.iter().map(|motion| (&*motion.name, short(motion)));
-    moves.filter(|(_, short)| !short.is_empty()).collect()
-}
-
 /// In a sentence, all of a move's.
 pub fn sentence(name: &str, short: &[Shortfall]) -> String {
     let words: Vec<&str> = short.iter().map(|short| &*short.words).collect();
@@ -241,7 +237,7 @@ pub fn sentence(name: &str, short: &[Shortfall]) -> String {
 }
 
 /// The tightest limits of voltage and current, V and A.
-pub(crate) fn limits(machine: &Machine, limit: Option<f64>) -> (Option<f64>, Option<f64>) {
+pub fn limits(machine: &Machine, limit: Option<f64>) -> (Option<f64>, Option<f64>) {
     let amplifier = &machine.drives[0].amplifier;
     let commanded = limit.map(|limit| limit * amplifier.gain.abs());
     let least = |a: Option<f64>, b: Option<f64>| a.into_iter().chain(b).reduce(f64::min);
@@ -265,118 +261,4 @@ fn needs(machine: &Machine, profile: &Profile, instants: usize) -> Vec<Need> {
     };
     let end = profile.rest();
     (0..=instants).map(|k| need(end * k as f64 / instants as f64)).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::control::{Setup, closed_loop};
-    use crate::machine::Travel;
-    use crate::metrics::{Balance, balanced_speed};
-    use crate::solve::Solver;
-    use std::path::Path;
-
-    fn case() -> Case {
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../stages/sollmann-jouaneh/controllers");
-        let mut case = Case::read(folder.join("pid-elastic.toml")).unwrap();
-        (case.machine.drives[0].amplifier.voltage_limit, case.machine.drives[0].amplifier.current_limit) = (None, None);
-        case
-    }
-
-    /// The motor gets what a reference needs where a loop follows it closely.
-    #[test]
-    fn needs_are_those_of_a_loop_that_follows_closely() {
-        let case = case();
-        let design = case.controller.as_ref().unwrap();
-        for motion in &case.moves {
-            let setup = Setup {
-                machine: &case.machine,
-                model: &case.machine,
-                design,
-                profile: &motion.profile,
-                until: motion.until,
-                window: motion.window,
-                solver: Solver::Exact,
-            };
-            let figures = closed_loop(&setup).unwrap().figures;
-            let needs = needs(&case.machine, &motion.profile, INSTANTS);
-            let most = |value: fn(&Need) -> f64| needs.iter().map(value).fold(0.0, |most, x| x.abs().max(most));
-            let (volts, amperes) = (most(|need| need.voltage), most(|need| need.current));
-            let (given, taken) = (figures.voltage.0.value.abs(), figures.current.0.value.abs());
-            assert!((volts / given - 1.0).abs() < 0.1, "{}: {volts} V, {given} V in the loop", motion.name);
-            assert!((amperes / taken - 1.0).abs() < 0.25, "{}: {amperes} A, {taken} A in the loop", motion.name);
-        }
-    }
-
-    /// Each limit is named a tenth below what is needed, and not a tenth above it.
-    #[test]
-    fn each_limit_is_named_where_it_is_exceeded() {
-        let case = case();
-        let motion = &case.moves[0];
-        let needs = needs(&case.machine, &motion.profile, INSTANTS);
-        let most = |value: &dyn Fn(&Need) -> f64| needs.iter().map(value).fold(0.0, f64::max);
-        let volts = most(&|need| need.voltage.abs());
-        let amperes = most(&|need| need.current.abs());
-        let far = most(&|need| need.y.position);
-        let off = most(&|need| -need.spans.iter().copied().fold(0.0, f64::min));
-        let on = most(&|need| need.spans.iter().copied().fold(0.0, f64::max));
-        let away = case.machine.breakaway(1.0, 0.0) / Rigid::of(&case.machine).force_per_command();
-        type Set = fn(&mut Machine, f64) -> Option<f64>;
-        let limits: [(&str, f64, Set); 6] = [
-            ("voltage", volts, |machine, most| {
-                machine.drives[0].amplifier.voltage_limit = Some(most);
-                None
-            }),
-            ("voltage", volts, |_, most| Some(most)),
-            ("current", amperes, |machine, most| {
-                machine.drives[0].amplifier.current_limit = Some(most);
-                None
-            }),
-            ("travel", far, |machine, most| {
-                machine.cart.travel = Some(Travel { min: -1.0, max: most, stop: None });
-                None
-            }),
-            ("slack", off, |machine, most| {
-                machine.belt.pretension = Some(most);
-                None
-            }),
-            ("tension", on, |machine, most| {
-                machine.belt.sheet.allowed_tension = Some(most);
-                None
-            }),
-        ];
-        for (limit, needed, set) in limits {
-            for share in [0.9, 1.1] {
-                let mut machine = case.machine.clone();
-                let own = set(&mut machine, share * needed);
-                let found = shortfalls(&machine, own, &motion.profile);
-                if share > 1.0 {
-                    assert_eq!(found, [], "{limit} at {share}");
-                    continue;
-                }
-                let [short] = &found[..] else { panic!("{limit} at {share}: {found:?}") };
-                assert_eq!(short.limit, limit);
-                assert!((short.allowed - share * needed).abs() <= 1e-12 * needed, "{short:?}");
-                assert!(short.needed > short.allowed && short.time >= 0.0 && !short.words.is_empty(), "{short:?}");
-            }
-        }
-        let names = |limit: f64| -> Vec<&str> {
-            shortfalls(&case.machine, Some(limit), &motion.profile).iter().map(|short| short.limit).collect()
-        };
-        assert!(names(0.9 * away).contains(&"breakaway") && !names(1.1 * away).contains(&"breakaway"));
-    }
-
-    /// The speed that a voltage reaches is the steady speed of a run under it.
-    #[test]
-    fn the_speed_that_is_reached_is_the_steady_one() {
-        let case = case();
-        let motion = &case.moves[0];
-        let volts =
-            needs(&case.machine, &motion.profile, INSTANTS).iter().fold(0.0, |most, need| need.voltage.max(most)) * 0.5;
-        let found = shortfalls(&case.machine, Some(volts), &motion.profile);
-        let short = found.iter().find(|short| short.limit == "voltage").unwrap();
-        let Balance::At(speed) = balanced_speed(&case.machine, volts, 0.1) else { panic!("no steady speed") };
-        let told = engineering(speed, "m/s", 3);
-        assert!(short.words.ends_with(&format!("reach {told}")), "{} and {told}", short.words);
-    }
 }

@@ -1,0 +1,255 @@
+//! The quickest moves that an axis can make: speed, acceleration, jerk and snap within its limits, with jerk and snap
+//! times on the zeros of the belt's modes.
+
+use super::feasible::{limits, loads, shortfalls};
+use super::resonance::{Drive, reaches, resonances};
+use crate::design::Design;
+use crate::error::{Error, Result};
+use crate::machine::{BeltModel, Machine};
+use crate::signal::profile::{Leg, Limits, Profile};
+
+/// Instants of a reference that are looked at during a search.
+pub const INSTANTS: usize = 160;
+/// The same where a plan is checked.
+pub const CLOSELY: usize = 4000;
+
+/// Cruising speeds that are tried, by a grid and then by golden section, and bisections of the acceleration.
+const SPEEDS: usize = 10;
+const NARROWED: usize = 8;
+const BISECTIONS: usize = 14;
+
+/// Jerk and snap time that are on no mode, in samples of the controller.
+const SHORTEST: [f64; 2] = [4.0, 1.0];
+
+/// Times that a plan is made slower because an axis of the family needs more than there is.
+const CORRECTIONS: usize = 6;
+
+/// Smallest cruising speed that is tried, as a share of the largest that the way allows.
+const SLOWEST: f64 = 0.02;
+
+/// Limits of a plan besides those of the machine, and the share of voltage and current that it leaves to the loop.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Wanted {
+    /// m/s
+    pub speed: Option<f64>,
+    /// m/s²
+    pub acceleration: Option<f64>,
+    /// m/s³
+    pub jerk: Option<f64>,
+    /// 0 to 0.9.
+    pub reserve: f64,
+}
+
+impl Wanted {
+    /// Each limit is above zero and finite, and the reserve a share up to 90 %.
+    pub fn check(&self) -> Result<()> {
+        let limits = [("speed", self.speed), ("acceleration", self.acceleration), ("jerk", self.jerk)];
+        for (name, value) in limits {
+            if let Some(value) = value.filter(|value| !(*value > 0.0 && value.is_finite())) {
+                return Err(Error::new(format!("{value} is no limit of {name}")).allowed("above 0"));
+            }
+        }
+        match (0.0..=0.9).contains(&self.reserve) {
+            true => Ok(()),
+            false => Err(Error::new(format!("a reserve of {}", self.reserve)).allowed("from 0 to 0.9")),
+        }
+    }
+}
+
+/// Lowest frequencies along the travel of the modes with the drive pulley held, Hz, the lowest first; none of a rigid
+/// belt, or of one that does not swing.
+pub fn modes(machine: &Machine) -> Vec<f64> {
+    if machine.belt.model == BeltModel::Rigid {
+        return Vec::new();
+    }
+    let Ok(found) = resonances(machine, Drive::Held) else { return Vec::new() };
+    let mut lowest: Vec<f64> = reaches(&found).iter().map(|mode| mode.frequency[0]).collect();
+    lowest.sort_by(f64::total_cmp);
+    lowest
+}
+
+/// A move from stroke to stroke, without its limits.
+#[derive(Debug, Clone)]
+pub struct Way {
+    /// Where it begins, m.
+    pub start: f64,
+    /// Rest before each stroke (s), and its target (m).
+    pub strokes: Vec<(f64, f64)>,
+    /// The shortest and the longest stroke, m.
+    shortest: f64,
+    longest: f64,
+}
+
+impl Way {
+    /// The strokes of a reference; none of one that has none.
+    pub fn of(profile: &Profile) -> Option<Self> {
+        let mut rested = 0.0;
+        let mut strokes = Vec::new();
+        for (begin, from, distance, duration) in profile.strokes().filter(|(_, _, distance, _)| *distance != 0.0) {
+            strokes.push((begin - rested, from + distance));
+            rested = begin + duration;
+        }
+        let lengths = || profile.strokes().map(|(_, _, distance, _)| distance.abs()).filter(|length| *length > 0.0);
+        let (shortest, longest) = (lengths().reduce(f64::min)?, lengths().reduce(f64::max)?);
+        Some(Self { start: profile.start(), strokes, shortest, longest })
+    }
+
+    /// The same way within these limits.
+    pub fn within(&self, limits: &Limits) -> Result<Profile> {
+        let legs = self.strokes.iter().flat_map(|&(rest, to)| {
+            let wait = (rest > 1e-12).then_some(Leg::Wait(rest));
+            wait.into_iter().chain([Leg::To(to, *limits)])
+        });
+        Profile::new(self.start, &legs.collect::<Vec<_>>())
+    }
+}
+
+/// The search for the quickest move of an axis under a controller.
+#[derive(Debug, Clone, Copy)]
+pub struct Quickest<'a> {
+    /// The axis.
+    pub machine: &'a Machine,
+    /// The controller: its limit, its sample time and its shaper count.
+    pub design: &'a Design,
+    /// Frequencies of the modes, as [`modes`] has them, Hz.
+    pub modes: &'a [f64],
+    /// Further limits.
+    pub wanted: &'a Wanted,
+}
+
+impl Quickest<'_> {
+    /// Refuses a way that no speed and no acceleration make possible, and one that nothing limits.
+    pub fn check(&self, way: &Way) -> Result<()> {
+        let slow = Limits { speed: 1e-3, acceleration: 1e-2, jerk: None, snap: None };
+        let reference = way.within(&slow)?.shaped(&self.design.shaper);
+        if let Some(short) = shortfalls(self.machine, self.design.limit, &reference).first() {
+            return Err(Error::new(format!("there is no plan: {}", short.words)));
+        }
+        let (volts, amperes) = limits(self.machine, self.design.limit);
+        if volts.is_none() && amperes.is_none() && (self.wanted.speed.is_none() || self.wanted.acceleration.is_none()) {
+            return Err(Error::new("there is no plan: neither voltage nor current is limited")
+                .next("give limit in [controller], amplifier.voltage_limit, or a speed and an acceleration"));
+        }
+        Ok(())
+    }
+
+    /// Jerk and snap time, s; none where the belt has no such mode.
+    fn times(&self, periods: [u8; 2]) -> Option<[f64; 2]> {
+        let mut times = SHORTEST.map(|samples| samples * self.design.every);
+        for (k, (time, periods)) in times.iter_mut().zip(periods).enumerate() {
+            if periods > 0 {
+                *time = f64::from(periods) / self.modes.get(k)?;
+            }
+        }
+        (times[1] <= times[0]).then_some(times)
+    }
+
+    /// Limits with these averaging times, the shortest jerk time grown where a limit of jerk asks for it.
+    fn limits(&self, speed: f64, acceleration: f64, periods: [u8; 2], times: [f64; 2]) -> Limits {
+        let mut jerk_time = times[0];
+        if let (0, Some(jerk)) = (periods[0], self.wanted.jerk) {
+            jerk_time = jerk_time.max(acceleration / jerk);
+        }
+        let jerk = acceleration / jerk_time;
+        Limits { speed, acceleration, jerk: Some(jerk), snap: Some(jerk / times[1]) }
+    }
+
+    /// The limits of the quickest move that takes no more than this share of what is left of voltage and current; none
+    /// where there is none. `others` is the largest share of a limit that a reference, shaper included, takes of other
+    /// machines, of which 1 is allowed.
+    pub fn limits_for(
+        &self,
+        way: &Way,
+        periods: [u8; 2],
+        share: f64,
+        others: &dyn Fn(&Profile) -> f64,
+    ) -> Result<Option<Limits>> {
+        let wanted = share * (1.0 - self.wanted.reserve);
+        let mut share = wanted;
+        for _ in 0..CORRECTIONS {
+            let Some(limits) = self.searched(way, periods, share) else { return Ok(None) };
+            let profile = way.within(&limits)?.shaped(&self.design.shaper);
+            // Looked at more closely, the axis needs a little more than during the search.
+            let closely = loads(self.machine, self.design.limit, &profile, CLOSELY);
+            let most = closely.iter().map(|load| load.share() / if load.is_electrical() { wanted } else { 1.0 });
+            let most = most.fold(others(&profile), f64::max);
+            if most <= 1.0 {
+                return Ok(Some(limits));
+            }
+            share *= 0.995 / most;
+        }
+        Ok(None)
+    }
+
+    /// The limits of the quickest move with these averaging times that takes no more than a share of the machine's; none
+    /// where there is none.
+    fn searched(&self, way: &Way, periods: [u8; 2], share: f64) -> Option<Limits> {
+        let times = self.times(periods)?;
+        let both: f64 = times.iter().sum();
+        // T₂ = v/a ≥ T_j + T_s and D ≥ 2 a (T_j + T_s)²: a shorter stroke would shorten the jerk time.
+        let shortest = way.shortest / (2.0 * both * both);
+        let mut most = shortest.min(self.wanted.acceleration.unwrap_or(f64::INFINITY));
+        if let (true, Some(jerk)) = (periods[0] > 0, self.wanted.jerk) {
+            most = most.min(jerk * times[0]);
+        }
+        let acceleration = |speed: f64| {
+            let within = |a: f64| self.is_within(way, &self.limits(speed, a, periods, times), share);
+            let most = most.min(speed / both);
+            if within(most) {
+                return Some(most);
+            }
+            let mut ends = [1e-4 * most, most];
+            if !within(ends[0]) {
+                return None;
+            }
+            for _ in 0..BISECTIONS {
+                let middle = (ends[0] * ends[1]).sqrt();
+                ends[usize::from(!within(middle))] = middle;
+            }
+            Some(ends[0])
+        };
+        let duration = |speed: f64| -> (f64, Option<Limits>) {
+            let Some(a) = acceleration(speed) else { return (f64::INFINITY, None) };
+            let limits = self.limits(speed, a, periods, times);
+            (way.within(&limits).map_or(f64::INFINITY, |profile| profile.end()), Some(limits))
+        };
+        // No faster than a way without any cruise reaches.
+        let fastest = (way.longest * most).sqrt().min(self.wanted.speed.unwrap_or(f64::INFINITY));
+        let grid = |k: usize| fastest * SLOWEST.powf(k as f64 / (SPEEDS - 1) as f64);
+        let found: Vec<(f64, f64, Option<Limits>)> = (0..SPEEDS)
+            .map(|k| {
+                let (time, limits) = duration(grid(k));
+                (time, grid(k), limits)
+            })
+            .collect();
+        let best = (0..SPEEDS).min_by(|&a, &b| found[a].0.total_cmp(&found[b].0))?;
+        let mut best_yet = (found[best].0, found[best].2);
+        best_yet.1?;
+        let (mut low, mut high) = (grid((best + 1).min(SPEEDS - 1)), grid(best.saturating_sub(1)));
+        const GOLDEN: f64 = 0.618_033_988_749_895;
+        for _ in 0..NARROWED {
+            let inner = [high - GOLDEN * (high - low), low + GOLDEN * (high - low)];
+            let [a, b] = inner.map(duration);
+            for (time, limits) in [a, b] {
+                if time < best_yet.0 {
+                    best_yet = (time, limits);
+                }
+            }
+            if a.0 <= b.0 { high = inner[1] } else { low = inner[0] }
+        }
+        let limits = best_yet.1?;
+        // Where no stroke cruises, the largest speed of the longest.
+        let profile = way.within(&limits).ok()?;
+        let peaks = profile.strokes().map(|(begin, _, _, duration)| profile.at(begin + 0.5 * duration).speed.abs());
+        let speed = peaks.fold(0.0, f64::max).min(limits.speed);
+        Some(Limits { speed, ..limits })
+    }
+
+    /// Whether a move within these limits takes no more than this share of each limit of the machine.
+    fn is_within(&self, way: &Way, limits: &Limits, share: f64) -> bool {
+        let Ok(profile) = way.within(limits) else { return false };
+        let profile = profile.shaped(&self.design.shaper);
+        let loads = loads(self.machine, self.design.limit, &profile, INSTANTS);
+        loads.iter().all(|load| load.share() <= if load.is_electrical() { share } else { 1.0 })
+    }
+}

@@ -1,0 +1,167 @@
+//! What a reference needs of a machine, and which of its limits that exceeds; feed-forward at rest.
+
+use std::path::Path;
+use taut::case::Case;
+use taut::control::{Setup, closed_loop};
+use taut::design::{FeedForward, FeedForwardModel};
+use taut::machine::rigid::{REST_ACCELERATION, REST_SPEED, Rigid};
+use taut::machine::{Machine, Travel};
+use taut::metrics::{Balance, balanced_speed};
+use taut::number::engineering;
+use taut::reach::compensation::{Compensation, direction};
+use taut::reach::feasible::{loads, shortfalls};
+use taut::signal::profile::{Profile, Reference};
+use taut::solve::Solver;
+use taut_core::calculator::Run;
+
+/// Most that a reference needs of one of a machine's limits, counted from a pretension of zero.
+fn needed(machine: &Machine, profile: &Profile, limit: &str) -> f64 {
+    let mut machine = machine.clone();
+    let amplifier = &mut machine.drives[0].amplifier;
+    (amplifier.voltage_limit, amplifier.current_limit) = (Some(1e9), Some(1e9));
+    machine.belt.sheet.allowed_tension = Some(1e9);
+    machine.belt.pretension = Some(0.0);
+    loads(&machine, None, profile, 4000).iter().find(|load| load.limit == limit).unwrap().needed
+}
+
+fn case() -> Case {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("stages/sollmann-jouaneh/controllers");
+    let mut case = Case::read(folder.join("pid-elastic.toml")).unwrap();
+    (case.machine.drives[0].amplifier.voltage_limit, case.machine.drives[0].amplifier.current_limit) = (None, None);
+    case
+}
+
+/// The motor gets what a reference needs where a loop follows it closely.
+#[test]
+fn needs_are_those_of_a_loop_that_follows_closely() {
+    let case = case();
+    let design = case.controller.as_ref().unwrap();
+    for motion in &case.moves {
+        let setup = Setup {
+            machine: &case.machine,
+            model: &case.machine,
+            design,
+            profile: &motion.profile,
+            until: motion.until,
+            window: motion.window,
+            solver: Solver::Exact,
+        };
+        let figures = closed_loop(&setup).unwrap().figures;
+        let [volts, amperes] = ["voltage", "current"].map(|limit| needed(&case.machine, &motion.profile, limit));
+        let (given, taken) = (figures.voltage.0.value.abs(), figures.current.0.value.abs());
+        assert!((volts / given - 1.0).abs() < 0.1, "{}: {volts} V, {given} V in the loop", motion.name);
+        assert!((amperes / taken - 1.0).abs() < 0.25, "{}: {amperes} A, {taken} A in the loop", motion.name);
+    }
+}
+
+/// Each limit is named a tenth below what is needed, and not a tenth above it.
+#[test]
+fn each_limit_is_named_where_it_is_exceeded() {
+    let case = case();
+    let motion = &case.moves[0];
+    let most = |limit: &str| needed(&case.machine, &motion.profile, limit);
+    let [volts, amperes, off, on] = ["voltage", "current", "slack", "tension"].map(most);
+    let far = motion.profile.target();
+    let away = case.machine.breakaway(1.0, 0.0) / Rigid::of(&case.machine).force_per_command();
+    type Set = fn(&mut Machine, f64) -> Option<f64>;
+    let limits: [(&str, f64, Set); 6] = [
+        ("voltage", volts, |machine, most| {
+            machine.drives[0].amplifier.voltage_limit = Some(most);
+            None
+        }),
+        ("voltage", volts, |_, most| Some(most)),
+        ("current", amperes, |machine, most| {
+            machine.drives[0].amplifier.current_limit = Some(most);
+            None
+        }),
+        ("travel", far, |machine, most| {
+            machine.cart.travel = Some(Travel { min: -1.0, max: most, stop: None });
+            None
+        }),
+        ("slack", off, |machine, most| {
+            machine.belt.pretension = Some(most);
+            None
+        }),
+        ("tension", on, |machine, most| {
+            machine.belt.sheet.allowed_tension = Some(most);
+            None
+        }),
+    ];
+    for (limit, needed, set) in limits {
+        for share in [0.9, 1.1] {
+            let mut machine = case.machine.clone();
+            let own = set(&mut machine, share * needed);
+            let found = shortfalls(&machine, own, &motion.profile);
+            if share > 1.0 {
+                assert_eq!(found, [], "{limit} at {share}");
+                continue;
+            }
+            let [short] = &found[..] else { panic!("{limit} at {share}: {found:?}") };
+            assert_eq!(short.limit, limit);
+            assert!((short.allowed - share * needed).abs() <= 1e-12 * needed, "{short:?}");
+            assert!(short.needed > short.allowed && short.time >= 0.0 && !short.words.is_empty(), "{short:?}");
+        }
+    }
+    let names = |limit: f64| -> Vec<&str> {
+        shortfalls(&case.machine, Some(limit), &motion.profile).iter().map(|short| short.limit).collect()
+    };
+    assert!(names(0.9 * away).contains(&"breakaway") && !names(1.1 * away).contains(&"breakaway"));
+}
+
+/// The speed that a voltage reaches is the steady speed of a run under it.
+#[test]
+fn the_speed_that_is_reached_is_the_steady_one() {
+    let case = case();
+    let motion = &case.moves[0];
+    let volts = 0.5 * needed(&case.machine, &motion.profile, "voltage");
+    let found = shortfalls(&case.machine, Some(volts), &motion.profile);
+    let short = found.iter().find(|short| short.limit == "voltage").unwrap();
+    let Balance::At(speed) = balanced_speed(&case.machine, volts, 0.1) else { panic!("no steady speed") };
+    let told = engineering(speed, "m/s", 3);
+    assert!(short.words.ends_with(&format!("reach {told}")), "{} and {told}", short.words);
+}
+
+/// A generator that left a speed of 1.9e-16 m/s at the end of its move commanded the whole dry friction for ever.
+#[test]
+fn what_rounding_leaves_of_a_reference_at_rest_commands_no_friction() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("stages/sollmann-jouaneh/controllers");
+    let case = Case::read(folder.join("pid-elastic.toml")).unwrap();
+    let mut machine = case.machine.clone();
+    (machine.drives[0].motor.gear_efficiency, machine.cart.load) = (0.8, 3.0);
+    let run = &mut Run::plain();
+    let mut number = 1_u64;
+    let mut noise = |size: f64| {
+        number = number.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        size * ((number >> 11) as f64 / (1_u64 << 52) as f64 - 1.0)
+    };
+    for model in [FeedForwardModel::Rigid, FeedForwardModel::Elastic] {
+        let settings =
+            FeedForward { model, compensate_stretch: true, ..case.controller.as_ref().unwrap().feed_forward };
+        let compensation = Compensation::new(&machine, &settings);
+        let still = Reference { position: 0.1, ..Reference::default() };
+        let [command, dry] = [compensation.command(run, &still).unwrap(), compensation.dry(run, &still)];
+        let target = compensation.target(run, &still).position;
+        // The pulley is quicker than the cart by the rate of the stretch, some 1e-8 m/s here.
+        for size in [1.9e-16, 1e-12, 1e-9, 0.9] {
+            for _ in 0..100 {
+                let speed = noise(size * REST_SPEED);
+                let acceleration = noise(size * REST_ACCELERATION);
+                let y = Reference { speed, acceleration, ..still };
+                assert_eq!(direction(&y), 0.0);
+                assert_eq!(compensation.dry(run, &y), dry);
+                // The noise itself goes through inertia and viscous friction, a few grams and N s/m.
+                let most = size * 1e-2 * compensation.rigid.command(1.0, 0.0, 0.0);
+                assert!((compensation.command(run, &y).unwrap() - command).abs() <= most + 1e-12, "{y:?}");
+                assert!((compensation.target(run, &y).position - target).abs() <= size * 1e-6 + 1e-15, "{y:?}");
+            }
+        }
+        // Ten times as much is a direction.
+        for sign in [1.0, -1.0] {
+            let moving = Reference { speed: 10.0 * sign * REST_SPEED, acceleration: -sign, ..still };
+            assert_eq!(direction(&moving), sign);
+            let leaving = Reference { acceleration: 10.0 * sign * REST_ACCELERATION, ..still };
+            assert_eq!(direction(&leaving), sign);
+            assert!((compensation.dry(run, &leaving) - dry).abs() > 0.01);
+        }
+    }
+}
