@@ -6,6 +6,8 @@ use std::path::Path;
 use std::process::{Command, Output};
 use tempfile::TempDir;
 
+/// The same with feed-forward, which follows a plan without saturation.
+const ELASTIC: &str = "stages/sollmann-jouaneh/controllers/pid-elastic.toml";
 const PID: &str = "stages/sollmann-jouaneh/controllers/pid.toml";
 
 fn taut(args: &[&str]) -> Output {
@@ -65,7 +67,7 @@ fn what_cannot_be_planned_is_told() {
         ("{}", "motor.resistance=1", ""),
     ] {
         let planned = format!("move=[{{ name = \"long\", to = \"40 mm\", plan = {plan}, until = \"1 s\" }}]");
-        let output = taut(&["move", PID, "--set", &planned, "--set", besides]);
+        let output = taut(&["move", ELASTIC, "--set", &planned, "--set", besides]);
         let told = String::from_utf8(output.stderr).unwrap();
         assert_eq!(output.status.code(), Some(if part.is_empty() { 0 } else { 2 }), "{plan}: {told}");
         assert!(told.contains(part), "{plan}: {told}");
