@@ -526,6 +526,35 @@ fn a_spread_that_is_no_share_is_refused() {
     assert_eq!(stopped, None);
 }
 
+/// Gains in units of drives: a cascade by hand, and a notch by its response.
+#[test]
+fn gains_of_drives_are_those_of_the_loop() {
+    use taut::design::{Cascade, CurrentLoop, Design, Filter, InDrives, Pid, Structure};
+    let current = CurrentLoop { proportional: 2.0, integral: 1000.0, ..CurrentLoop::default() };
+    let cascade =
+        Cascade { position: 50.0, speed: 4.0, speed_integral: 200.0, current: Some(current), ..Cascade::default() };
+    let base = Case::read("stages/sollmann-jouaneh/controllers/pid.toml").unwrap().controller.unwrap();
+    let of = |structure: Structure, filters: Vec<Filter>| Design { structure, filters, ..base.clone() }.in_drives();
+    let rows = |gains: &[InDrives]| gains.iter().map(|gain| (gain.name, gain.value, gain.unit)).collect::<Vec<_>>();
+    let cascade = of(Structure::Cascade(cascade), Vec::new());
+    let expected = [
+        ("K_v", 50.0, "1/s"),
+        ("K_v", 3.0, "(m/min)/mm"),
+        ("T_n (speed loop)", 20.0, "ms"),
+        ("T_n (current loop)", 2.0, "ms"),
+    ];
+    assert_eq!(rows(&cascade), expected);
+    // Without an integral or a derivative there is no such time.
+    assert_eq!(of(Structure::Pid(Pid { proportional: 3e3, ..Pid::default() }), Vec::new()), []);
+    let notch = of(
+        Structure::Pid(Pid { proportional: 3e3, integral: 3e4, derivative: 30.0, ..Pid::default() }),
+        vec![Filter::Notch { frequency: 80.0, depth: 0.05, damping: 0.5 }],
+    );
+    let values: Vec<f64> = notch.iter().map(|gain| gain.value).collect();
+    let expected = [100.0, 10.0, 80.0, 80.0, -20.0];
+    assert!(values.iter().zip(expected).all(|(value, expected)| (value - expected).abs() < 1e-12), "{notch:?}");
+}
+
 /// The feed-forward of WPILib and LinuxCNC is the rigid feed-forward, and the torque of ODrive is that of the motor.
 #[test]
 fn gains_for_drives_make_the_same_command() {

@@ -7,7 +7,7 @@
 pub mod placement;
 mod tunable;
 
-pub use tunable::{Tunable, TunedBy};
+pub use tunable::{InDrives, Tunable, TunedBy};
 
 /// A sampled controller.
 #[derive(Debug, Clone, PartialEq)]

@@ -3,7 +3,7 @@
 use super::moves::shortfall;
 use super::number;
 use crate::case::{Case, Move, Tuning};
-use crate::design::Design;
+use crate::design::{Design, InDrives};
 use crate::tune::{Ahead, AtWorst, Choice, Least, Margins, MoveVerdict, Tuned, Unknown, Verdict, gains};
 use serde_json::{Value, json};
 use std::f64::consts::PI;
@@ -48,10 +48,19 @@ pub fn tuned(case: &Case, tuning: &Tuning, tuned: &Tuned) -> Value {
         "designs": tuned.work.1,
         "gains": tuned.changes().into_iter().map(change).collect::<Vec<_>>(),
         "filters": filters,
+        "in_drives": {
+            "before": tuned.before.design.in_drives().into_iter().map(in_drives).collect::<Vec<_>>(),
+            "after": tuned.after.design.in_drives().into_iter().map(in_drives).collect::<Vec<_>>(),
+        },
         "before": verdict(tuned, &tuned.before),
         "after": verdict(tuned, &tuned.after),
         "pareto": tuned.choices.iter().map(|one| choice(tuned, one)).collect::<Vec<_>>(),
     })
+}
+
+/// A gain as drives have it.
+fn in_drives(gain: InDrives) -> Value {
+    json!({ "name": gain.name, "value": number(gain.value), "unit": gain.unit })
 }
 
 /// Feed-forward that pays; its moves without it are those of `after`.

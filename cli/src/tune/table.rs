@@ -4,7 +4,8 @@ use crate::terminal::bold;
 use std::fmt::Write;
 use taut::tune::Verdict;
 use taut_report::tune::{
-    CHOICES, Row, Work, ahead, axes, choices, family, gains, given, goal, hunt, limiting, margins, moves, verdict,
+    CHOICES, Row, Work, ahead, axes, choices, family, gains, given, goal, hunt, in_drives, limiting, margins, moves,
+    verdict,
 };
 
 fn rows(text: &mut String, title: &str, rows: &[Row]) {
@@ -47,6 +48,10 @@ pub fn text(work: &Work) -> String {
         let _ = writeln!(text, "The case has no moves: a standard set for its travel and limits.");
     }
     rows(&mut text, "Gains", &gains(work));
+    let in_drives = in_drives(work);
+    if !in_drives.is_empty() {
+        rows(&mut text, "Gains as drives have them", &in_drives);
+    }
     rows(&mut text, "The axis as the file has it", &margins(&before.nominal, &after.nominal));
     rows(&mut text, "At worst", &margins(&before.worst, &after.worst));
     let [first, second] = limiting(work);

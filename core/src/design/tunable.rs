@@ -2,7 +2,9 @@
 //! the compiler lists them all for a new structure.
 
 use super::placement::{CASCADE, least};
-use super::{Cascade, CurrentLoop, Design, FeedForwardModel, Fuzzy, Pid, SlidingMode, StateFeedback, Structure};
+use super::{
+    Cascade, CurrentLoop, Design, FeedForwardModel, Filter, Fuzzy, Pid, SlidingMode, StateFeedback, Structure,
+};
 use crate::machine::Machine;
 use crate::machine::rigid::Rigid;
 use std::f64::consts::PI;
@@ -60,6 +62,46 @@ pub trait Tunable {
 
     /// Samples of a run that take as long as its margins on a set of axes.
     fn costs(&self) -> u64;
+
+    /// Its gains as drives have them; those that are not in use are left out.
+    fn in_drives(&self) -> Vec<InDrives>;
+}
+
+/// A gain as drives have it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct InDrives {
+    /// As it is called there.
+    pub name: &'static str,
+    /// In the unit that is used there.
+    pub value: f64,
+    /// That unit.
+    pub unit: &'static str,
+}
+
+impl Filter {
+    /// Its numbers as drives have them: frequency, width between the points at −3 dB of a notch that goes to zero, and
+    /// depth.
+    pub fn in_drives(&self) -> Vec<InDrives> {
+        match *self {
+            Self::Notch { frequency, depth, damping } => vec![
+                InDrives { name: "notch frequency", value: frequency, unit: "Hz" },
+                InDrives { name: "notch width", value: 2.0 * damping * frequency, unit: "Hz" },
+                InDrives { name: "notch depth", value: 20.0 * (depth / damping).log10(), unit: "dB" },
+            ],
+            Self::LowPass { frequency, damping } => vec![
+                InDrives { name: "low-pass frequency", value: frequency, unit: "Hz" },
+                InDrives { name: "low-pass damping", value: damping, unit: "" },
+            ],
+        }
+    }
+}
+
+impl Design {
+    /// Gains and filters as drives have them.
+    pub fn in_drives(&self) -> Vec<InDrives> {
+        let filters = self.filters.iter().flat_map(Filter::in_drives);
+        self.structure.tunable().in_drives().into_iter().chain(filters).collect()
+    }
 }
 
 /// Margins of gains that need nothing solved before, and those behind two Riccati equations.
@@ -155,6 +197,17 @@ impl Tunable for Pid {
     fn costs(&self) -> u64 {
         QUICK
     }
+
+    /// In series form K_p (1 + 1/(T_n s) + T_v s).
+    fn in_drives(&self) -> Vec<InDrives> {
+        let used =
+            |name, value: f64| (value > 0.0 && value.is_finite()).then_some(InDrives { name, value, unit: "ms" });
+        let times = [
+            used("T_n (reset time)", 1e3 * self.proportional / self.integral),
+            used("T_v (derivative time)", 1e3 * self.derivative / self.proportional),
+        ];
+        times.into_iter().flatten().collect()
+    }
 }
 
 impl Tunable for Cascade {
@@ -236,6 +289,21 @@ impl Tunable for Cascade {
     fn costs(&self) -> u64 {
         QUICK
     }
+
+    fn in_drives(&self) -> Vec<InDrives> {
+        let time = |name, proportional: f64, integral: f64| {
+            (integral > 0.0).then(|| InDrives { name, value: 1e3 * proportional / integral, unit: "ms" })
+        };
+        let current = self.current.as_ref();
+        let all = [
+            Some(InDrives { name: "K_v", value: self.position, unit: "1/s" }),
+            // 1/s = 60/1000 (m/min)/mm
+            Some(InDrives { name: "K_v", value: 0.06 * self.position, unit: "(m/min)/mm" }),
+            time("T_n (speed loop)", self.speed, self.speed_integral),
+            current.and_then(|current| time("T_n (current loop)", current.proportional, current.integral)),
+        ];
+        all.into_iter().flatten().collect()
+    }
 }
 
 impl Tunable for StateFeedback {
@@ -296,6 +364,11 @@ impl Tunable for StateFeedback {
     fn costs(&self) -> u64 {
         SOLVED
     }
+
+    /// Drives have no such gains.
+    fn in_drives(&self) -> Vec<InDrives> {
+        Vec::new()
+    }
 }
 
 impl Tunable for SlidingMode {
@@ -353,6 +426,11 @@ impl Tunable for SlidingMode {
     fn costs(&self) -> u64 {
         QUICK
     }
+
+    /// Drives have no such gains.
+    fn in_drives(&self) -> Vec<InDrives> {
+        Vec::new()
+    }
 }
 
 impl Tunable for Fuzzy {
@@ -408,5 +486,10 @@ impl Tunable for Fuzzy {
 
     fn costs(&self) -> u64 {
         QUICK
+    }
+
+    /// Drives have no such gains.
+    fn in_drives(&self) -> Vec<InDrives> {
+        Vec::new()
     }
 }

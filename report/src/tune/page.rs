@@ -25,6 +25,11 @@ pub fn page(work: &Work, text: &str, figures: &[(String, Figure)]) -> Page {
     }
     page.section("Gains");
     page.table(&rows(&told::gains(work)));
+    let in_drives = told::in_drives(work);
+    if !in_drives.is_empty() {
+        page.subsection("As drives have them");
+        page.table(&rows(&in_drives));
+    }
     page.section("Margins");
     page.subsection("The axis as the file has it");
     page.table(&rows(&told::margins(&tuned.before.nominal, &tuned.after.nominal)));

@@ -4,7 +4,8 @@ use super::Work;
 use std::f64::consts::PI;
 use std::fmt::Write;
 use taut::control::Deviation;
-use taut::number::engineering;
+use taut::design::InDrives;
+use taut::number::{engineering, significant};
 use taut::tune::{
     AtWorst, Break, Corner, Family, Figure, Forced, Hunt, Judgement, Limit, Margins, MoveVerdict, SPREAD, Source,
     Standing, Worse,
@@ -34,6 +35,22 @@ pub fn gains(work: &Work) -> Vec<Row> {
         rows.push(("filters".into(), before, after));
     }
     rows
+}
+
+/// Gains and filters as drives have them; filters that only one side has stand beside a dash.
+pub fn in_drives(work: &Work) -> Vec<Row> {
+    let [before, after] = [&work.tuned.before, &work.tuned.after].map(|verdict| verdict.design.in_drives());
+    let told = |gain: Option<&InDrives>| match gain {
+        Some(gain) if gain.unit == "dB" => format!("{:.1} dB", gain.value),
+        Some(gain) => format!("{} {}", significant(gain.value, 4), gain.unit).trim_end().to_string(),
+        None => "-".into(),
+    };
+    let row = |k: usize| {
+        let [before, after] = [before.get(k), after.get(k)];
+        let name = after.or(before).map_or("", |gain| gain.name);
+        (name.to_string(), told(before), told(after))
+    };
+    (0..before.len().max(after.len())).map(row).collect()
 }
 
 /// A frequency.
