@@ -40,6 +40,7 @@ pub use search::point::{Ending, Strategy};
 pub use search::regression::{Balance, regression};
 pub use search::starts::Work;
 pub use search::triangle::inverse_of_square;
+pub use trust::causes::{Cause, Size};
 pub use trust::combinations::Combination;
 pub use trust::doubts::{Disagreement, OtherLaw};
 pub use trust::finding::{Finding, Grade};

@@ -8,6 +8,7 @@ use crate::fit::limits::{FILE_ROUNDING, KNOWN_DELAY, SLOW_BY_DIFFERENCE, STARTS_
 use crate::log::Quantity;
 use crate::machine::{AmplifierMode, Machine};
 use crate::parameter::{self, Free};
+use crate::signal::Signal;
 use crate::solve::Bench;
 use nalgebra::DMatrix;
 
@@ -168,8 +169,10 @@ impl<'a> Problem<'a> {
         let interval = self.runs[0].interval();
         let most = self.runs.iter().flat_map(|run| run.logged.iter()).fold(0.0, |most: f64, u| most.max(u.abs()));
         let most = if most > 0.0 { most } else { 1.0 };
-        let late =
-            Extra { what: Nuisance::Delay, start: 0.0, unit: interval, low: 0.0, high: 50.0 * interval, known: None };
+        // Samples that are taken after their stamps are an input that acts early: as far as the input is logged.
+        let is_sampled = self.runs.iter().all(|run| matches!(run.input(), Signal::Sampled { .. }));
+        let (early, high) = (if is_sampled { -50.0 * interval } else { 0.0 }, 50.0 * interval);
+        let late = Extra { what: Nuisance::Delay, start: 0.0, unit: interval, low: early, high, known: None };
         let gain = Extra { what: Nuisance::InputGain, start: 1.0, unit: 1.0, low: 0.2, high: 5.0, known: None };
         let offset = Extra { what: Nuisance::InputOffset, start: 0.0, unit: most, low: -most, high: most, known: None };
         let scopes = [(delay, late), (input_gain, gain), (input_offset, offset)];

@@ -40,10 +40,57 @@ pub(super) fn innovations(
     slow: &[Slow],
     each: impl FnMut(&mut [f64], f64),
 ) {
+    if let [swing] = slow
+        && swing.frequency > 0.0
+    {
+        return innovations_of_swing(series, rows, wide, swing, each);
+    }
     match slow.len() {
         0 => innovations_of::<0>(series, rows, wide, slow, each),
         1 => innovations_of::<1>(series, rows, wide, slow, each),
         _ => innovations_of::<SLOW_NOISES>(series, rows, wide, slow, each),
+    }
+}
+
+/// [`innovations`] of a noise that swings: x turns by ω Δ as it decays, and its first component shows.
+fn innovations_of_swing(
+    series: &Series,
+    rows: &[f64],
+    wide: usize,
+    slow: &Slow,
+    mut each: impl FnMut(&mut [f64], f64),
+) {
+    // P as p₀₀, p₀₁, p₁₁
+    let mut p = [slow.variance, 0.0, slow.variance];
+    let mut x = vec![[0.0; 2]; wide];
+    let mut v = vec![0.0; wide];
+    let mut last = None;
+    for ((row, &g), &time) in rows.chunks(wide).zip(&series.gain).zip(&series.time) {
+        if let Some(last) = last {
+            let past: f64 = time - last;
+            let decay = (-past / slow.time).exp();
+            let (sin, cos) = (slow.frequency * past).sin_cos();
+            let (s, c) = (decay * sin, decay * cos);
+            let fresh = slow.variance * (1.0 - decay * decay);
+            let [a, b, d] = p;
+            // P ← R P Rᵀ + σ² (1 − e^{−2Δ/τ}) I
+            p = [
+                c * c * a - 2.0 * c * s * b + s * s * d + fresh,
+                c * s * (a - d) + (c * c - s * s) * b,
+                s * s * a + 2.0 * c * s * b + c * c * d + fresh,
+            ];
+            x.iter_mut().for_each(|x| *x = [c * x[0] - s * x[1], s * x[0] + c * x[1]]);
+        }
+        last = Some(time);
+        let ph = [g * p[0], g * p[1]];
+        let f = 1.0 + g * ph[0];
+        let k = ph.map(|ph| ph / f);
+        for ((v, x), y) in v.iter_mut().zip(&mut x).zip(row) {
+            *v = y - g * x[0];
+            *x = [x[0] + k[0] * *v, x[1] + k[1] * *v];
+        }
+        p = [p[0] - k[0] * ph[0], p[1] - k[0] * ph[1], p[2] - k[1] * ph[1]];
+        each(&mut v, f);
     }
 }
 

@@ -24,6 +24,8 @@ pub struct OtherLaw {
     pub words: String,
     /// Its amplitude in standard errors.
     pub standard_errors: f64,
+    /// Amount that it takes off the sum of the squared residuals.
+    pub(crate) gain: f64,
     /// By how many of its standard errors each parameter would move.
     pub off: Vec<f64>,
     /// The addition to the covariance of the variables that concern all runs.

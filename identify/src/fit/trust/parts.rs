@@ -8,14 +8,14 @@ use std::ops::Range;
 use std::sync::Arc;
 
 /// The parts that are fitted, and those that are held out.
-pub(super) struct Fold {
+pub(crate) struct Fold {
     pub fitted: Vec<Experiment>,
     pub held_out: Vec<Experiment>,
 }
 
 /// The records in parts: each is held out once. The flag says that logs were cut, so that their parts have starts of
 /// their own.
-pub(super) struct Parts {
+pub(crate) struct Parts {
     pub folds: Vec<Fold>,
     pub is_cut: bool,
 }
