@@ -1,8 +1,8 @@
 //! Machines that a rigid axis with viscous and Coulomb friction is not, integrated here: nothing is shared with taut's
 //! solvers.
 //!
-//! Two masses with a spring or play between them, by a semi-implicit step of [`STEP`]; dry friction takes off as much
-//! of a speed as it can in a step, and holds what is left of less.
+//! Two masses with a spring or play between them, in steps of [`STEP`]; a position moves by the mean of the speeds before
+//! and behind a step. Dry friction takes off as much of a speed as it can in a step, and holds what is left of less.
 
 use super::chance::Chance;
 use std::f64::consts::TAU;
@@ -137,13 +137,15 @@ fn positions(truth: Truth, [mass, viscous, coulomb]: Values, input: &[f64], shar
             let stretch = xm - x;
             let beyond = stretch.signum() * (stretch.abs() - half).max(0.0);
             let own = stiffness * beyond + if beyond != 0.0 { damping * (vm - v) } else { 0.0 };
+            let last = vm;
             vm += STEP * (force - own) / before;
-            xm += STEP * vm;
+            xm += 0.5 * STEP * (last + vm);
             own
         } else {
             force
         };
         let drag = if truth == Truth::Drag { 0.3 * viscous * v * v.abs() } else { 0.0 };
+        let last = v;
         if truth == Truth::LuGre {
             // ż = v − σ₀ |v|/g z,  F = σ₀ z + σ₁ ż + b v
             let (stiff, calm) = (coulomb / 0.1e-3, (coulomb / 0.1e-3 * mass).sqrt());
@@ -152,10 +154,12 @@ fn positions(truth: Truth, [mass, viscous, coulomb]: Values, input: &[f64], shar
             z += STEP * rate;
             v += STEP * (pull - stiff * z - calm * rate - viscous * v) / behind;
         } else {
-            v += STEP * (pull - drift * viscous * v - drag) / behind;
-            v = v.signum() * (v.abs() - STEP * drift * coulomb / behind).max(0.0);
+            // M (v′ − v)/h = F − b (v + v′)/2, and dry friction takes off no more than there is.
+            let (half, per_mass) = (0.5 * STEP * drift * viscous / behind, STEP / behind);
+            v = ((1.0 - half) * v + per_mass * (pull - drag)) / (1.0 + half);
+            v = v.signum() * (v.abs() - per_mass * drift * coulomb / (1.0 + half)).max(0.0);
         }
-        x += STEP * v;
+        x += 0.5 * STEP * (last + v);
     }
     all
 }

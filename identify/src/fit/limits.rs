@@ -945,3 +945,28 @@ pub(crate) const KNOWN_SHARE: f64 = 0.05;
 ///
 /// Unit: relative to the estimate. Source: chosen.
 pub(crate) const CAUSE_MOVES: f64 = 0.01;
+
+/// Longest time for which residuals that swing keep their sign.
+///
+/// Unit: share of a log. Source: chosen. Test: `noise_that_swings_is_known_as_such`.
+pub(crate) const SWINGS_KEEP: f64 = 0.1;
+
+/// Cost with an element after its first steps, relative to that without, up to which it is fitted whole.
+///
+/// Unit: 1. Source: chosen: what is further off does not get there.
+pub(crate) const CAUSE_NEAR: f64 = 3.0;
+
+/// Where the size of an element may go, relative to where it begins.
+///
+/// Unit: 1. Source: chosen: starts are 2 to 4 times apart.
+pub(crate) const CAUSE_AROUND: [f64; 2] = [0.1, 10.0];
+
+/// Where the share of the inertia before a spring or play may go.
+///
+/// Unit: 1. Source: chosen: less is not seen, and takes long to simulate.
+pub(crate) const KNOWN_SHARES: [f64; 2] = [0.05, 0.95];
+
+/// How far the length of a wave may be from a whole part of a pulley's turn.
+///
+/// Unit: relative. Source: chosen: as far as its length is known.
+pub(crate) const WHOLE_TURNS: f64 = 0.02;

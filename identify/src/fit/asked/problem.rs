@@ -33,6 +33,8 @@ pub struct Problem<'a> {
     pub simulations: u64,
     /// Runs that the last Jacobian took differences of.
     pub differences: usize,
+    /// Whether residuals swing to and fro, so that a first value is as far off as any other, however smooth they are.
+    pub swings: bool,
     units: Vec<Scale>,
     /// Whether to end the work.
     stop: Option<Stop<'a>>,
@@ -122,6 +124,7 @@ impl<'a> Problem<'a> {
             held_out,
             simulations: 0,
             differences: 0,
+            swings: false,
             stop: None,
         };
         problem.add_extras(case, plan);
@@ -143,6 +146,7 @@ impl<'a> Problem<'a> {
             held_out: Vec::new(),
             simulations: 0,
             differences: 0,
+            swings: false,
             units: Vec::new(),
             stop: None,
         }
@@ -327,7 +331,8 @@ impl<'a> Problem<'a> {
             for extra in run.extras.iter_mut().filter(|extra| extra.what == Nuisance::StartPosition) {
                 if let Some(known) = &mut extra.known {
                     // Its unit is what neighbouring values differ by.
-                    *known = known.max(deviation.min(SLOW_BY_DIFFERENCE * extra.unit));
+                    let most = if self.swings { f64::INFINITY } else { SLOW_BY_DIFFERENCE * extra.unit };
+                    *known = known.max(deviation.min(most));
                     let room = 6.0 * *known;
                     (extra.low, extra.high) = (extra.low.min(extra.start - room), extra.high.max(extra.start + room));
                 }

@@ -52,7 +52,13 @@ pub(super) fn innovations(
     }
 }
 
-/// [`innovations`] of a noise that swings: x turns by ω Δ as it decays, and its first component shows.
+/// [`innovations`] of a noise that swings: an oscillator with x and w = ẋ/ω₀ that white noise drives, of which x shows.
+///
+/// ```text
+/// γ = 1/τ      ω₀² = ω² + γ²
+/// A = e^{−γΔ} [cos ωΔ + γ/ω sin ωΔ, ω₀/ω sin ωΔ; −ω₀/ω sin ωΔ, cos ωΔ − γ/ω sin ωΔ]
+/// P ← A P Aᵀ + σ² (I − A Aᵀ)
+/// ```
 fn innovations_of_swing(
     series: &Series,
     rows: &[f64],
@@ -60,26 +66,32 @@ fn innovations_of_swing(
     slow: &Slow,
     mut each: impl FnMut(&mut [f64], f64),
 ) {
+    let (omega, gamma) = (slow.frequency, 1.0 / slow.time);
+    let natural = omega.hypot(gamma);
     // P as p₀₀, p₀₁, p₁₁
     let mut p = [slow.variance, 0.0, slow.variance];
     let mut x = vec![[0.0; 2]; wide];
     let mut v = vec![0.0; wide];
-    let mut last = None;
+    let (mut last, mut step, mut turn) = (None, f64::NAN, [0.0; 4]);
     for ((row, &g), &time) in rows.chunks(wide).zip(&series.gain).zip(&series.time) {
         if let Some(last) = last {
             let past: f64 = time - last;
-            let decay = (-past / slow.time).exp();
-            let (sin, cos) = (slow.frequency * past).sin_cos();
-            let (s, c) = (decay * sin, decay * cos);
-            let fresh = slow.variance * (1.0 - decay * decay);
-            let [a, b, d] = p;
-            // P ← R P Rᵀ + σ² (1 − e^{−2Δ/τ}) I
+            if (past - step).abs() > 1e-9 * step || step.is_nan() {
+                step = past;
+                let decay = (-gamma * past).exp();
+                let (sin, cos) = (omega * past).sin_cos();
+                let (damped, stiff) = (gamma / omega * sin, natural / omega * sin);
+                turn = [cos + damped, stiff, -stiff, cos - damped].map(|one| decay * one);
+            }
+            let [a, b, c, d] = turn;
+            // P − σ² I, which A turns, and σ² I, which stays.
+            let q = [p[0] - slow.variance, p[1], p[2] - slow.variance];
             p = [
-                c * c * a - 2.0 * c * s * b + s * s * d + fresh,
-                c * s * (a - d) + (c * c - s * s) * b,
-                s * s * a + 2.0 * c * s * b + c * c * d + fresh,
+                a * a * q[0] + 2.0 * a * b * q[1] + b * b * q[2] + slow.variance,
+                a * c * q[0] + (a * d + b * c) * q[1] + b * d * q[2],
+                c * c * q[0] + 2.0 * c * d * q[1] + d * d * q[2] + slow.variance,
             ];
-            x.iter_mut().for_each(|x| *x = [c * x[0] - s * x[1], s * x[0] + c * x[1]]);
+            x.iter_mut().for_each(|x| *x = [a * x[0] + b * x[1], c * x[0] + d * x[1]]);
         }
         last = Some(time);
         let ph = [g * p[0], g * p[1]];

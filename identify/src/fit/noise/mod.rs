@@ -5,7 +5,8 @@
 //!
 //! ```text
 //! r(t) = J(t) δ + d(t) (w(t) (x₁(t) + x₂(t)) + s ε(t)) + Σ a cos κ ŷ(t) + b sin κ ŷ(t)
-//! cov x(t), x(u) = σ² e^{−|t−u|/τ}        or, of one that swings, σ² e^{−|t−u|/τ} cos ω(t − u)
+//! cov x(t), x(u) = σ² e^{−|t−u|/τ}
+//! cov x(t), x(u) = σ² e^{−|t−u|/τ} (cos ω|t−u| + sin ω|t−u|/(ωτ))         of one that swings
 //! ```
 //!
 //! with the derivatives J of the model, as a fit has moved its residuals along them: what is slow in noise looks like a
@@ -541,10 +542,12 @@ impl Estimate {
         sum
     }
 
-    /// Σ_tu W(t) d(t) g(t) e^{−|t−u|/τ} cos ω(t − u) g(u) d(u) W(u)ᵀ for a slow noise of one.
+    /// Σ_tu W(t) d(t) g(t) ρ(t − u) g(u) d(u) W(u)ᵀ for a slow noise of one with the covariance ρ.
     fn slow_part(&self, slow: &Slow, scales: Option<&[Vec<f64>]>) -> DMatrix<f64> {
         let g = self.globals;
         let mut sum = DMatrix::zeros(g, g);
+        // 1/(ωτ)
+        let phase = if slow.frequency > 0.0 { 1.0 / (slow.frequency * slow.time) } else { 0.0 };
         for (index, (series, rows)) in self.series.iter().zip(&self.influence).enumerate() {
             // Σ e^{(iω − 1/τ)(t − u)} g(u) d(u) W(u), its real part and its imaginary one.
             let (mut state, mut other) = (vec![0.0; g], vec![0.0; g]);
@@ -559,9 +562,10 @@ impl Estimate {
                 for (x, y) in state.iter_mut().zip(&mut other) {
                     (*x, *y) = (decay * (cos * *x - sin * *y), decay * (sin * *x + cos * *y));
                 }
+                let shown = |j: usize| state[j] + phase * other[j];
                 for i in 0..g {
                     for j in 0..g {
-                        sum[(i, j)] += gain * (row[i] * state[j] + row[j] * state[i]) + gain * gain * row[i] * row[j];
+                        sum[(i, j)] += gain * (row[i] * shown(j) + row[j] * shown(i)) + gain * gain * row[i] * row[j];
                     }
                 }
                 for (x, w) in state.iter_mut().zip(row) {

@@ -2,7 +2,8 @@
 
 use crate::case::{Case, Plan, Scope};
 use crate::fit::limits::{
-    CAUSE_DELAYS, CAUSE_GAPS, CAUSE_SHARE, CAUSE_SPRINGS, FLANK_DAMPING, FLANK_FREQUENCY, KNOWN_SHARE, SPRING_DAMPING,
+    CAUSE_AROUND, CAUSE_DELAYS, CAUSE_GAPS, CAUSE_SHARE, CAUSE_SPRINGS, FLANK_DAMPING, FLANK_FREQUENCY, KNOWN_SHARE,
+    KNOWN_SHARES, SPRING_DAMPING,
 };
 use crate::fit::search::regression::suspected_delay;
 use crate::fit::search::starts::Searched;
@@ -126,6 +127,15 @@ impl<'s, 'a> Site<'s, 'a> {
         machine.drives[0].motor.gear_play = Some(play);
         let mut plan = Plan { starts: 1, ..self.plan.clone() };
         plan.free.extend(keys.iter().map(|key| key.to_string()));
+        // What is far off takes long to simulate, and is not what was tried.
+        let n = machine.drives[0].motor.gear_ratio;
+        let around = |key: &str| match key {
+            "motor.rotor_inertia" => KNOWN_SHARES.map(|share| share * self.inertia() / (n * n)),
+            "motor.gear_stiffness" => CAUSE_AROUND.map(|factor| factor * play.stiffness),
+            "motor.gear_damping" => [0.0, CAUSE_AROUND[1] * play.damping],
+            _ => [0.0, CAUSE_AROUND[1] * play.backlash],
+        };
+        plan.bounds.extend(keys.iter().map(|key| (key.to_string(), around(key))));
         let case = Case { machine, ..self.case.clone() };
         let extended = |case: Case, at_motor: bool| Extended {
             key: "",

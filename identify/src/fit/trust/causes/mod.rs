@@ -23,8 +23,8 @@ use crate::case::{Case, Plan};
 use crate::fit::asked::problem::Stop;
 use crate::fit::asked::run::Run;
 use crate::fit::limits::{
-    CAUSE_ERRORS, CAUSE_EXPLAINS, CAUSE_MOST_VALUES, CAUSE_STEPS, CAUSES_FITTED, COLOURED, NORMAL, ROUGH_TOLERANCE,
-    STEPS_IN_PART,
+    CAUSE_ERRORS, CAUSE_EXPLAINS, CAUSE_MOST_VALUES, CAUSE_NEAR, CAUSE_STEPS, CAUSES_FITTED, COLOURED, NORMAL,
+    ROUGH_TOLERANCE, STEPS_IN_PART,
 };
 use crate::fit::search::point::Options;
 use crate::fit::search::starts::Searched;
@@ -82,17 +82,24 @@ pub(crate) fn cause(
         return None;
     }
     let site = Site::new(case, plan, found);
+    let before = found.best.cost;
     let mut ranked: Vec<Tried> = EXTENSIONS
         .iter()
         .flat_map(|extension| extension.tries(&site))
         .filter_map(|extended| Tried::begun(&site, extended, CAUSE_STEPS))
+        .filter(|tried| tried.cost() < CAUSE_NEAR * before)
         .collect();
     ranked.sort_by(|a, b| a.cost().total_cmp(&b.cost()));
-    ranked.dedup_by_key(|tried| tried.kind());
+    // The best start of each.
+    let mut kinds = Vec::new();
+    ranked.retain(|tried| {
+        let is_first = !kinds.contains(&tried.kind());
+        kinds.push(tried.kind());
+        is_first
+    });
     ranked.truncate(CAUSES_FITTED);
     let mut whole: Vec<Tried> = ranked.into_iter().filter_map(Tried::fitted).collect();
     whole.sort_by(|a, b| a.cost().total_cmp(&b.cost()));
-    let before = found.best.cost;
     for tried in whole {
         let gain = 2.0 * (before - tried.cost());
         let explained = 1.0 - tried.cost() / before;

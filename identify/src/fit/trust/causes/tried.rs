@@ -24,6 +24,7 @@ impl<'a> Tried<'a> {
     pub fn begun(site: &Site<'_, 'a>, extended: Extended, steps: usize) -> Option<Self> {
         let mut problem = Problem::new(&extended.case, &extended.plan).ok()?.stopped_by(site.found.problem.stop());
         let noise: Vec<_> = problem.quantities().iter().map(|&own| (own, site.deviation(own))).collect();
+        problem.swings = site.found.problem.swings;
         problem.weigh_by(&noise);
         let mut start = problem.start();
         let (g, old) = (problem.globals(), site.found.problem.globals());
