@@ -4,6 +4,8 @@
 //! `cargo xtask coverage [--machines N] [--seed N] [--threads N] [--cell WORDS]...` prints a table; with `--causes` that
 //! of machines which a rigid axis with viscous and Coulomb friction is not, integrated without taut's solvers.
 
+// Each of them is used in part.
+#[allow(dead_code)]
 #[path = "../tests/common"]
 mod common {
     pub mod chance;

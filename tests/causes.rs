@@ -57,7 +57,7 @@ fn late_stamps_are_a_delay_of_the_other_sign() {
 #[test]
 fn the_right_model_lacks_nothing() {
     let (mut named, mut inside) = (Vec::new(), 0);
-    for (truth, machines) in [(Truth::Right, 10), (Truth::NarrowBand, 10)] {
+    for (truth, machines) in [(Truth::Right, 6), (Truth::NarrowBand, 6)] {
         for seed in 1..=machines {
             let (found, values) = fitted(seed, truth);
             inside += held(&found, values);
@@ -65,7 +65,7 @@ fn the_right_model_lacks_nothing() {
         }
     }
     assert!(named.len() <= 1, "{named:#?}");
-    assert!(inside >= 52, "{inside} of 60");
+    assert!(inside >= 28, "{inside} of 36");
 }
 
 /// `check` and `fit` say the same of a model.
@@ -84,7 +84,7 @@ fn check_and_fit_say_the_same() {
 #[test]
 fn noise_that_swings_is_known_as_such() {
     let (mut squares, mut widths, mut inside) = ([0.0; 3], [0.0; 3], 0);
-    let machines = 12;
+    let machines = 8;
     for seed in 1..=machines {
         let (found, values) = fitted(seed, Truth::NarrowBand);
         inside += held(&found, values);
@@ -95,5 +95,5 @@ fn noise_that_swings_is_known_as_such() {
     }
     let ratios: Vec<f64> = (0..3).map(|j| widths[j] / f64::sqrt(squares[j])).collect();
     assert!(ratios.iter().all(|ratio| *ratio < 2.5), "{ratios:?}");
-    assert!(inside >= 30, "{inside} of 36: {ratios:?}");
+    assert!(inside >= 18, "{inside} of 24: {ratios:?}");
 }

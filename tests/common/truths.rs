@@ -15,7 +15,7 @@ pub const EVERY: f64 = 1e-3;
 pub const COUNT: usize = 4001;
 
 /// Steps of the integration between two samples.
-const STEPS: usize = 100;
+const STEPS: usize = 300;
 const STEP: f64 = EVERY / STEPS as f64;
 
 /// A machine in current mode: mass, viscous and Coulomb friction, all at the cart.

@@ -8,13 +8,13 @@ use crate::fit::asked::controller::reproduced;
 use crate::fit::asked::problem::Problem;
 use crate::fit::asked::run::is_position;
 use crate::fit::limits::{
-    CAUSE_MOVES, CAUSE_WARNS, KINK_PROMISE, MOTOR_CONSTANTS, NORMAL, OPPOSITE, POOR_FIT, REPRODUCED, WHOLE_TURNS,
+    CAUSE_MOVES, CAUSE_WARNS, KINK_PROMISE, MOTOR_CONSTANTS, NORMAL, OPPOSITE, POOR_FIT, REPRODUCED,
 };
 use crate::fit::noise::Wave;
 use crate::fit::search::point::Ending;
 use crate::fit::search::regression::Balance;
 use crate::fit::search::starts::Searched;
-use crate::log::{Note, Quantity, Remedy, Severity};
+use crate::log::{Note, Remedy, Severity};
 use crate::machine::AmplifierMode;
 use crate::number::engineering;
 use crate::solve::Bench;
@@ -178,25 +178,14 @@ fn of_search(fit: &Fit) -> Vec<Finding> {
     }
     for Wave { quantity, length, amplitude } in &fit.waves {
         let text = format!(
-            "{}: its error repeats with position, by ±{} every {}{}; the intervals are widened by what that moves",
+            "{}: its error repeats with position, by ±{} every {}; the intervals are widened by what that moves",
             quantity.name(),
             engineering(*amplitude, quantity.unit(), 2).replace('\u{a0}', " "),
-            plain(*length, quantity.unit()),
-            in_a_turn(*quantity, *length, fit.machine.pulley_radius)
+            plain(*length, quantity.unit())
         );
         all.push(finding(Grade::Note, "place", text));
     }
     all
-}
-
-/// How often a wave of this length comes in a turn of the pulley, in words; empty where that is no whole number.
-fn in_a_turn(quantity: Quantity, length: f64, pulley_radius: f64) -> String {
-    let turn = std::f64::consts::TAU * if quantity == Quantity::CartPosition { pulley_radius } else { 1.0 };
-    let times = turn / length;
-    match (times - times.round()).abs() < WHOLE_TURNS * times && times.round() >= 1.0 {
-        true => format!(", {} to a turn of the pulley", times.round()),
-        false => String::new(),
-    }
 }
 
 /// The element that the model lacks, as a fit with it found it.

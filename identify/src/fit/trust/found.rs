@@ -1,8 +1,7 @@
 //! The result of a fit, and how well it is known.
 
-use super::causes::Cause;
 use super::combinations::Combination;
-use super::doubts::{Disagreement, OtherLaw};
+use super::doubts::{Cause, Disagreement, OtherLaw};
 use super::finding::{Finding, Grade};
 use super::identify::Identifiability;
 use super::scores::LogFit;

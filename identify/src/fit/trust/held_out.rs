@@ -1,16 +1,12 @@
 //! Logs that are only compared: where they start is fitted to them, and nothing else.
 
-use super::parts::Fold;
-use super::result::known;
-use super::scores::{LogFit, compared, together};
-use crate::case::{Case, Plan};
-use crate::error::Result;
-use crate::fit::asked::problem::{Problem, Stop};
+use super::scores::{LogFit, compared};
+use crate::case::Plan;
+use crate::fit::asked::problem::Problem;
 use crate::fit::asked::run::{Extra, Nuisance, Run};
-use crate::fit::limits::{HELD_OUT_ROWS, REFIT_TOLERANCE, START_SHARE};
+use crate::fit::limits::{HELD_OUT_ROWS, REFIT_TOLERANCE};
 use crate::fit::search::least_squares::minimise;
 use crate::fit::search::point::{Ending, Options};
-use crate::fit::search::starts::{Work, search_as_far};
 use crate::log::Quantity;
 use crate::machine::Machine;
 use crate::solve::Flow;
@@ -76,29 +72,4 @@ pub(crate) fn nothing(plan: &Plan) -> Plan {
         bounds: Vec::new(),
         ..plan.clone()
     }
-}
-
-/// Sums of squares of a part that is not fitted, by quantity, with the number of values; from a fit to the other parts
-/// that begins at the machine of `case`. `is_cut`: the parts are blocks of logs, with starts of their own.
-pub(crate) fn errors(
-    case: &Case,
-    plan: &Plan,
-    fold: &Fold,
-    (is_cut, options): (bool, &Options),
-    stop: Option<Stop>,
-) -> Result<(Vec<(Quantity, f64, usize)>, Work)> {
-    let Fold { fitted, held_out } = fold;
-    let mut plan = Plan { held_out: Vec::new(), separate: Vec::new(), ..plan.clone() };
-    plan.nuisance.initial_state |= is_cut;
-    let own = Case { experiments: fitted.clone(), ..case.clone() };
-    let found = search_as_far(&own, &plan, stop, options, &mut |_, _| Flow::Continue)?;
-    let machine = found.problem.stage_at(&found.best.x);
-    let known = known(&found);
-    let held = Case { experiments: held_out.clone(), ..case.clone() };
-    let scored = Plan { windows: None, nuisance: plan.nuisance, ..nothing(&plan) };
-    let logs: Vec<_> =
-        Problem::new(&held, &scored)?.runs.iter().map(|run| met(run, &machine, &known, START_SHARE)).collect();
-    let errors = together(&logs, |_| String::new());
-    let errors = errors.iter().map(|one| (one.quantity, one.rmse.powi(2) * one.count as f64, one.count));
-    Ok((errors.collect(), found.work))
 }

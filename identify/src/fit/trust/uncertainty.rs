@@ -4,9 +4,8 @@
 //! says: with the covariance Σ of the noise it is (JᵀJ)⁻¹ Jᵀ Σ J (JᵀJ)⁻¹, for every Σ that the residuals allow
 //! ([`crate::fit::noise`]).
 
-use super::causes::Cause;
 use super::directions::Directions;
-use super::doubts::{Disagreement, OtherLaw};
+use super::doubts::{Cause, Disagreement, OtherLaw};
 use super::identify::Identifiability;
 use crate::fit::asked::problem::Problem;
 use crate::fit::limits::NORMAL;

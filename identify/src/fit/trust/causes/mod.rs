@@ -15,59 +15,22 @@
 mod extension;
 mod tried;
 
-use super::doubts::OtherLaw;
-use super::held_out::errors;
-use super::parts::Parts;
+use super::doubts::{Cause, OtherLaw};
+use super::parts::{Parts, errors};
 use super::uncertainty::Judged;
 use crate::case::{Case, Plan};
 use crate::fit::asked::problem::Stop;
 use crate::fit::asked::run::Run;
 use crate::fit::limits::{
     CAUSE_ERRORS, CAUSE_EXPLAINS, CAUSE_MOST_VALUES, CAUSE_NEAR, CAUSE_STEPS, CAUSES_FITTED, COLOURED, NORMAL,
-    ROUGH_TOLERANCE, STEPS_IN_PART,
+    ROUGH_TOLERANCE, STARTS_FITTED, STEPS_IN_PART,
 };
 use crate::fit::search::point::Options;
 use crate::fit::search::starts::Searched;
 use crate::machine::Kind;
 use extension::{EXTENSIONS, Site};
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use tried::Tried;
-
-/// An element that the model lacks and the logs show.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Cause {
-    /// Its key: `spring`, `play`, `delay`.
-    pub key: &'static str,
-    /// In words, with its size.
-    pub words: String,
-    /// The share of the sum of squared residuals that it explains.
-    pub explained: f64,
-    /// Its size in standard errors.
-    pub standard_errors: f64,
-    /// Its parameters.
-    pub parameters: Vec<Size>,
-    /// The estimates of the fit as they are with it, in their order; none where the fit with it has no such value.
-    pub estimates: Vec<Option<Size>>,
-    /// The change of the case file that adds it.
-    pub add: String,
-    /// Parts of the logs that were held out, and in how many of them it predicts better.
-    pub better: [usize; 2],
-    /// The addition to the covariance of the variables that concern all runs.
-    pub(crate) added: DMatrix<f64>,
-}
-
-/// A value with its standard error.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Size {
-    /// The parameter.
-    pub name: String,
-    /// SI unit.
-    pub unit: &'static str,
-    /// Its value.
-    pub value: f64,
-    /// Its standard error.
-    pub error: f64,
-}
 
 /// The element that explains most of what the fit leaves; none where none is accepted, or `law`, a friction law,
 /// explains more.
@@ -90,12 +53,10 @@ pub(crate) fn cause(
         .filter(|tried| tried.cost() < CAUSE_NEAR * before)
         .collect();
     ranked.sort_by(|a, b| a.cost().total_cmp(&b.cost()));
-    // The best start of each.
     let mut kinds = Vec::new();
     ranked.retain(|tried| {
-        let is_first = !kinds.contains(&tried.kind());
         kinds.push(tried.kind());
-        is_first
+        kinds.iter().filter(|kind| **kind == tried.kind()).count() <= STARTS_FITTED
     });
     ranked.truncate(CAUSES_FITTED);
     let mut whole: Vec<Tried> = ranked.into_iter().filter_map(Tried::fitted).collect();
@@ -156,7 +117,8 @@ fn predicts(site: &Site, tried: &Tried, stop: Option<Stop>) -> Option<[usize; 2]
             Some(squares / count.max(1) as f64)
         };
         let (without, with) = (mean(&without, &plan, one)?, mean(&with, &own, other)?);
-        gains.push(without - with);
+        // ln of the ratio: a part in which a start is missed has errors of another size.
+        gains.push((without / with).ln());
     }
     let n = gains.len() as f64;
     let mean = gains.iter().sum::<f64>() / n;
@@ -166,12 +128,10 @@ fn predicts(site: &Site, tried: &Tried, stop: Option<Stop>) -> Option<[usize; 2]
     is_clear.then_some([better, gains.len()])
 }
 
-impl Cause {
-    /// By how many of its standard errors each estimate would move, those of the fit without the cause.
-    pub(crate) fn widened(shift: &[f64], errors: &[f64]) -> DMatrix<f64> {
-        let d = nalgebra::DVector::from_column_slice(shift);
-        let own = DMatrix::from_diagonal(&nalgebra::DVector::from_iterator(errors.len(), errors.iter().map(|e| e * e)));
-        // (|d| + h′)² ≤ 2 (d² + h′²)
-        &d * d.transpose() * (2.0 / (NORMAL * NORMAL)) + own * 2.0
-    }
+/// What is added to a covariance so that intervals contain values that are off by `shift` and have these errors.
+fn widened(shift: &[f64], errors: &[f64]) -> DMatrix<f64> {
+    let d = DVector::from_column_slice(shift);
+    let own = DMatrix::from_diagonal(&DVector::from_iterator(errors.len(), errors.iter().map(|e| e * e)));
+    // (|d| + h′)² ≤ 2 (d² + h′²)
+    &d * d.transpose() * (2.0 / (NORMAL * NORMAL)) + own * 2.0
 }

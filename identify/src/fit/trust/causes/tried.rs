@@ -1,13 +1,14 @@
 //! A fit with one element more.
 
 use super::extension::{Extended, Site};
-use super::{Cause, Size};
+use super::widened;
 use crate::case::{Case, Plan};
 use crate::fit::asked::problem::Problem;
 use crate::fit::asked::residuals::Residuals;
 use crate::fit::limits::{CAUSE_DIFFERENCE, ROUGH_TOLERANCE, TRIAL_FIT_ITERATIONS};
 use crate::fit::search::least_squares::minimise;
 use crate::fit::search::point::{Ending, Minimum, Options};
+use crate::fit::trust::doubts::{Cause, Size};
 use crate::fit::trust::uncertainty::Judged;
 use crate::machine::Machine;
 use crate::solve::Flow;
@@ -62,7 +63,7 @@ impl<'a> Tried<'a> {
         Judged::new(&self.problem, residuals, jacobian, x, at_bound)
     }
 
-    /// The machine with the element, and the delay that was searched for with it.
+    /// The machine with the element.
     fn machine(&self, x: &[f64]) -> Machine {
         self.problem.stage_at(x)
     }
@@ -139,7 +140,7 @@ impl<'a> Tried<'a> {
             (shift[j], errors[j]) = (moved, error / slope);
             estimates[j] = Some(Size { name: own.name.clone(), unit: own.unit, value, error });
         }
-        let added = Cause::widened(&shift, &errors);
+        let added = widened(&shift, &errors);
         let (words, add) = self.extended.words(site, &machine, delay);
         let key = self.extended.key;
         Some(Cause { key, words, explained, standard_errors, parameters, estimates, add, better, added })
