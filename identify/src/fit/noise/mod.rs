@@ -217,10 +217,7 @@ impl Estimate {
         let all = || scales.iter().flatten().flatten().copied();
         let unevenness =
             if scales.is_some() { all().fold(0.0, f64::max) / all().fold(f64::INFINITY, f64::min) } else { 1.0 };
-        let lengths = if is_position(self.quantity) { self.find_waves(best(&told)?) } else { Vec::new() };
-        if !lengths.is_empty() {
-            told = self.told();
-        }
+        let lengths = if is_position(self.quantity) { self.waves_beside(&mut told)? } else { Vec::new() };
         let first = best(&told)?;
         let (top, freedom, slow) = (first.weight, first.freedom, first.slow.clone());
         let (waves, shift, unsure) = self.waves(first, &lengths);
@@ -473,6 +470,30 @@ impl Estimate {
         let (waves, more) = (self.globals, n - self.globals);
         let amplitudes = (&inverse * sum.view((0, n), (n, 1))).rows(waves, more).column(0).into_owned();
         Some((amplitudes, inverse.view((waves, waves), (more, more)) * noise.white))
+    }
+
+    /// Finds errors that come again at the same place, and the noise beside them. At a steady speed such an error swings
+    /// as noise may: the likelier of both counts.
+    fn waves_beside(&mut self, told: &mut Vec<Told>) -> Option<Vec<f64>> {
+        let top = best(told)?;
+        let swings = |one: &Told| one.slow.iter().any(|slow| slow.frequency > 0.0);
+        let (is_swinging, before) = (swings(top), top.weight);
+        let plain = told.iter().filter(|one| !swings(one)).max_by(|a, b| a.weight.total_cmp(&b.weight))?;
+        let mut lengths = self.find_waves(plain);
+        if lengths.is_empty() && !is_swinging {
+            return Some(lengths);
+        }
+        let with = self.told();
+        if !is_swinging || !lengths.is_empty() && best(&with).is_some_and(|with| with.weight > before) {
+            *told = with;
+            return Some(lengths);
+        }
+        self.series.iter_mut().for_each(Series::take_back);
+        lengths = self.find_waves(best(told)?);
+        if !lengths.is_empty() {
+            *told = self.told();
+        }
+        Some(lengths)
     }
 
     /// Finds errors that come again at the same place beside this noise, and puts them into the rows: the lengths of
