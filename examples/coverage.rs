@@ -1,8 +1,18 @@
 //! How often 95 % intervals hold the truth: machines with random friction and mass, logs with a disturbance that is
 //! known, a fit each.
 //!
-//! `cargo xtask coverage [--machines N] [--seed N] [--threads N] [--cell WORDS]...` prints a table.
+//! `cargo xtask coverage [--machines N] [--seed N] [--threads N] [--cell WORDS]...` prints a table; with `--causes` that
+//! of machines which a rigid axis with viscous and Coulomb friction is not, integrated without taut's solvers.
 
+// Each of them is used in part.
+#[allow(dead_code)]
+#[path = "../tests/common"]
+mod common {
+    pub mod chance;
+    pub mod truths;
+}
+
+use common::truths::{Truth, drawn};
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 use std::f64::consts::TAU;
@@ -12,7 +22,7 @@ use std::sync::{Arc, Mutex};
 use taut::case::{Case, Plan, TEMPLATE};
 use taut::chance::normal;
 use taut::fit::least_squares::{Differences, Residuals};
-use taut::fit::{Problem, fit, inverse_of_square};
+use taut::fit::{Grade, Problem, fit, inverse_of_square};
 use taut::friction::{Law, Shape};
 use taut::log::{Log, Output, Quantity};
 use taut::machine::axis::{CART, DRIVE, IDLER};
@@ -421,10 +431,107 @@ fn one(cell: &Cell, seed: u64, found: &Mutex<Found>) {
     }
 }
 
+/// What the fits of a kind of truth said.
+#[derive(Default)]
+struct Named {
+    machines: usize,
+    held: [usize; 3],
+    /// Half-widths of the mass's interval, relative to it.
+    wide: Vec<f64>,
+    /// The cause is the right one; another one.
+    right: usize,
+    wrong: usize,
+    /// The interval of the mass holds, or a warning names the right cause.
+    safe: usize,
+    warned: usize,
+}
+
+impl Truth {
+    /// The keys of causes that are right of it.
+    fn causes(self) -> &'static [&'static str] {
+        match self {
+            Truth::Right | Truth::NarrowBand => &[],
+            Truth::Spring | Truth::SpringAtMotor => &["spring"],
+            Truth::Play => &["play"],
+            Truth::Late => &["delay"],
+            Truth::LuGre | Truth::Drag | Truth::Drift => &["other_law"],
+        }
+    }
+}
+
+fn named(truth: Truth, seed: u64, sum: &Mutex<Named>) {
+    let (case, values) = drawn(seed, truth);
+    let Some(plan) = &case.fit else { return };
+    let fitted = fit(&case, plan, None, &mut |_| Flow::Continue);
+    let mut sum = sum.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+    sum.machines += 1;
+    let Ok(fitted) = fitted else { return };
+    let inside = |j: usize| {
+        let interval = fitted.estimates[j].interval;
+        interval.is_some_and(|[low, high]| low <= values[j] && values[j] <= high)
+    };
+    (0..3).filter(|&j| inside(j)).for_each(|j| sum.held[j] += 1);
+    sum.wide.extend(fitted.estimates[0].interval.map(|[low, high]| 0.5 * (high - low) / values[0]));
+    let codes = ["spring", "play", "delay", "other_law", "place"];
+    let is_right = |code: &str| truth.causes().contains(&code);
+    let told = || fitted.findings.iter().filter(|one| codes.contains(&one.code));
+    sum.right += usize::from(told().any(|one| is_right(one.code)));
+    sum.wrong += usize::from(told().any(|one| !is_right(one.code)));
+    let warned = |one: &&taut::fit::Finding| one.grade == Grade::Warning;
+    sum.warned += usize::from(fitted.findings.iter().any(|one| warned(&one)));
+    sum.safe += usize::from((0..3).all(inside) || told().any(|one| warned(&one) && is_right(one.code)));
+}
+
+/// The table of causes.
+fn causes(machines: u64, seed: u64, threads: u64, only: &[String]) {
+    println!(
+        "| what the model lacks | mass | viscous | Coulomb | half-width of the mass | named | another cause | a warning | all hold, or a warning names it |"
+    );
+    println!("|---|---|---|---|---|---|---|---|---|");
+    for truth in Truth::ALL {
+        if !only.is_empty() && !only.iter().any(|words| truth.name().contains(words.as_str())) {
+            continue;
+        }
+        let (sum, next) = (Mutex::new(Named::default()), AtomicU64::new(0));
+        std::thread::scope(|scope| {
+            for _ in 0..threads {
+                scope.spawn(|| {
+                    loop {
+                        let k = next.fetch_add(1, Ordering::Relaxed);
+                        if k >= machines {
+                            return;
+                        }
+                        named(truth, seed.wrapping_mul(1_000_003) + k, &sum);
+                    }
+                });
+            }
+        });
+        let mut sum = sum.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner());
+        sum.wide.sort_by(f64::total_cmp);
+        let share = |count: usize| format!("{:.0} %", 100.0 * count as f64 / sum.machines.max(1) as f64);
+        let wide = sum.wide.get(sum.wide.len() / 2).copied().unwrap_or(f64::NAN);
+        let [mass, viscous, coulomb] = sum.held.map(share);
+        println!(
+            "| {} | {mass} | {viscous} | {coulomb} | {:.2} % | {} | {} | {} | {} |",
+            truth.name(),
+            100.0 * wide,
+            share(sum.right),
+            share(sum.wrong),
+            share(sum.warned),
+            share(sum.safe)
+        );
+    }
+}
+
 fn main() -> ExitCode {
     let (mut machines, mut seed, mut threads, mut only) = (2000, 1, 2, Vec::new());
+    let mut of_causes = false;
     let mut words = std::env::args().skip(1);
     while let Some(word) = words.next() {
+        if word == "--causes" {
+            of_causes = true;
+            continue;
+        }
         let value = words.next();
         let number = value.as_deref().and_then(|value| value.parse::<u64>().ok());
         match (word.as_str(), number, value) {
@@ -433,10 +540,16 @@ fn main() -> ExitCode {
             ("--threads", Some(n), _) => threads = n,
             ("--cell", _, Some(value)) => only.push(value),
             _ => {
-                eprintln!("usage: cargo xtask coverage [--machines N] [--seed N] [--threads N] [--cell WORDS]...");
+                eprintln!(
+                    "usage: cargo xtask coverage [--machines N] [--seed N] [--threads N] [--cell WORDS]... [--causes]"
+                );
                 return ExitCode::from(2);
             }
         }
+    }
+    if of_causes {
+        causes(machines, seed, threads, &only);
+        return ExitCode::SUCCESS;
     }
     println!("| disturbance; log | viscous | Coulomb | mass | force | half-width | without an interval |");
     println!("|---|---|---|---|---|---|---|");

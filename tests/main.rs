@@ -9,6 +9,7 @@ mod breaks;
 mod case;
 mod case_documentation;
 mod case_mutations;
+mod causes;
 mod collocation;
 mod combinations;
 mod common;

@@ -1,43 +1,13 @@
 //! Findings about a log are borne out by simulation: false suspicions of good logs, and true ones of bad.
 
 use crate::common::chance::Chance;
-use std::f64::consts::TAU;
+use crate::common::truths::{AXIS, COUNT, EVERY, narrow};
 use std::sync::Arc;
 use taut::case::{Case, Plan, TEMPLATE};
 use taut::fit::{Fit, fit};
 use taut::log::{Log, Output, Quantity};
 use taut::signal::{Hold, Signal};
 use taut::solve::{Flow, Solver, simulate};
-
-const EVERY: f64 = 1e-3;
-const COUNT: usize = 4001;
-
-/// A machine in current mode: mass, viscous and Coulomb friction, all at the cart.
-const AXIS: &str = r#"
-[motor]
-torque_constant = 1
-back_emf_constant = 0
-resistance = 1
-[amplifier]
-mode = "current"
-[drive_pulley]
-radius = 1
-inertia = 1e-6
-[idler_pulley]
-inertia = 1e-6
-[belt]
-model = "rigid"
-[cart]
-mass = "1 kg"
-friction = { viscous = "10 N s/m", coulomb = "1.5 N" }
-[[experiment]]
-name = "log"
-input = { step = "1 A" }
-until = "1 s"
-every = "1 ms"
-[fit]
-free = ["cart.mass", "cart.friction.viscous", "cart.friction.coulomb"]
-"#;
 
 /// The case with a log of another machine of its kind: random levels of current, a position with noise of second order
 /// about 15 Hz, damped by 0.05, and an input that acts so many rows late.
@@ -63,22 +33,10 @@ fn drawn(seed: u64, noise: f64, late: usize) -> Case {
     (experiment.until, experiment.every) = ((COUNT - 1) as f64 * EVERY, EVERY);
     experiment.inputs[0] = Signal::Sampled { times: time.clone(), values: input.clone(), hold: Hold::Zero };
     let run = simulate(&truth, &experiment, Solver::of(&truth)).unwrap().trajectory;
-    // x_k = 2 ρ cos(ω h) x_{k−1} − ρ² x_{k−2} + e_k
-    let (zeta, omega) = (0.05, TAU * 15.0);
-    let rho = (-zeta * omega * EVERY).exp();
-    let (a, b) = (2.0 * rho * (omega * (1.0f64 - zeta * zeta).sqrt() * EVERY).cos(), -rho * rho);
-    let (mut last, mut before) = (0.0, 0.0);
-    let mut ar: Vec<f64> = Vec::new();
-    for _ in 0..COUNT + 2000 {
-        let next = a * last + b * before + chance.normal();
-        (last, before) = (next, last);
-        ar.push(next);
-    }
-    ar.drain(..2000);
-    let size = (ar.iter().map(|v| v * v).sum::<f64>() / COUNT as f64).sqrt();
+    let narrow = narrow(&mut chance);
     let position = run.get("cart_position").unwrap();
     let mut values: Vec<f64> =
-        (0..COUNT).map(|k| position[k.saturating_sub(late)] + noise * ar[k] / size + 1e-5 * chance.normal()).collect();
+        (0..COUNT).map(|k| position[k.saturating_sub(late)] + noise * narrow[k] + 1e-5 * chance.normal()).collect();
     values.iter_mut().for_each(|v| *v = (*v / 1e-6).round() * 1e-6);
     experiment.name = "log".into();
     experiment.log = Some(Arc::new(Log {

@@ -2,7 +2,7 @@
 
 use super::number;
 use crate::case::Case;
-use crate::fit::{Combination, Estimate, Finding, Fit, Group, Profile, Score};
+use crate::fit::{Cause, Combination, Estimate, Finding, Fit, Group, Profile, Score, Size};
 use serde_json::{Value, json};
 
 pub(super) fn score(score: Option<Score>) -> Value {
@@ -25,6 +25,26 @@ fn profile(profile: &Profile) -> Value {
         "values": profile.values,
         "growth": profile.growth,
         "linear": profile.linear,
+    })
+}
+
+/// An element that the model lacks.
+fn cause(found: &Cause) -> Value {
+    let size = |size: &Size| {
+        json!({
+            "name": size.name, "unit": size.unit, "value": number(size.value), "standard_error": number(size.error),
+        })
+    };
+    json!({
+        "key": found.key,
+        "words": found.words,
+        "explained": number(found.explained),
+        "standard_errors": number(found.standard_errors),
+        "parameters": found.parameters.iter().map(size).collect::<Vec<_>>(),
+        "estimates": found.estimates.iter().flatten().map(size).collect::<Vec<_>>(),
+        "add": found.add,
+        "parts_better": found.better[0],
+        "parts": found.better[1],
     })
 }
 
@@ -137,6 +157,7 @@ pub fn fit(case: &Case, fit: &Fit, profiles: &[Profile], posterior: Option<Value
             "standard_errors": number(found.standard_errors),
             "moves_standard_errors": found.off.iter().map(|off| number(*off)).collect::<Vec<_>>(),
         })),
+        "cause": fit.cause.as_ref().map(cause),
         "correlation": correlation,
         "residual_deviation": fit.noise.iter().map(|(quantity, deviation)| json!({
             "quantity": quantity.name(), "unit": quantity.unit(), "value": number(*deviation),

@@ -9,6 +9,7 @@ pub mod logged;
 pub mod loops;
 pub mod random;
 pub mod stability;
+pub mod truths;
 pub mod wrong;
 
 use taut::case::Experiment;

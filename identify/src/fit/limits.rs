@@ -233,6 +233,56 @@ pub(crate) const TIMES_APART: f64 = 1.0;
 /// Unit: rounds. Source: chosen.
 pub(crate) const NOISE_TURNS: usize = 3;
 
+/// Prior probability of noise that swings.
+///
+/// Unit: 1. Source: chosen. Test: `noise_that_swings_is_known_as_such`.
+pub(crate) const SWING_BEFOREHAND: f64 = 0.1;
+
+/// Least number of swings in the longest log.
+///
+/// Unit: periods. Source: chosen: fewer are a drift.
+pub(crate) const SWINGS_IN_LOG: f64 = 5.0;
+
+/// Greatest frequency of noise that swings.
+///
+/// Unit: rad between two blocks. Source: chosen: four blocks in a period.
+pub(crate) const SWING_FASTEST: f64 = 1.6;
+
+/// Ratio of neighbouring frequencies that are tried.
+///
+/// Unit: 1. Source: chosen: about the width of a peak with `SWING_DAMPING`.
+pub(crate) const SWING_RATIO: f64 = 1.2;
+
+/// Damping ratio with which frequencies are tried.
+///
+/// Unit: 1. Source: chosen.
+pub(crate) const SWING_DAMPING: f64 = 0.1;
+
+/// Variances with which frequencies are tried, relative to white noise of a block.
+///
+/// Unit: 1. Source: chosen.
+pub(crate) const SWING_POWERS: [f64; 3] = [1.0, 30.0, 1000.0];
+
+/// First steps from the best frequency, time and variance.
+///
+/// Unit: of their logarithms. Source: chosen: as far as those that were tried are apart.
+pub(crate) const SWING_STEPS: [f64; 3] = [0.08, 1.0, 1.5];
+
+/// Rounds of steps, and the factor on the steps after each.
+///
+/// Unit: rounds. Source: chosen.
+pub(crate) const SWING_ROUNDS: usize = 10;
+
+/// Factor on the steps after each round.
+///
+/// Unit: 1. Source: chosen.
+pub(crate) const SWING_SHRINKS: f64 = 0.7;
+
+/// Grid around the most likely noise that swings.
+///
+/// Unit: logarithms of frequency, time and variance. Source: chosen: about a standard error of each.
+pub(crate) const SWING_AROUND: [f64; 3] = [0.02, 0.4, 0.4];
+
 /// Maximum number of waves along the travel.
 ///
 /// Unit: waves. Source: chosen. Test: `an_error_that_comes_again_at_the_same_place_is_named`.
@@ -506,16 +556,6 @@ pub(crate) const STAND_OUT: f64 = 9.0;
 ///
 /// Unit: 1. Source: chosen.
 pub(crate) const JUMP: f64 = 0.5;
-
-/// Root mean square residual with a delay, relative to that without, below which the delay is borne out.
-///
-/// Unit: 1. Source: chosen. Test: `narrow_band_noise_is_no_delay`.
-pub(crate) const DELAY_MENDS: f64 = 0.8;
-
-/// Least delay that is borne out.
-///
-/// Unit: standard errors. Source: chosen. Test: `narrow_band_noise_is_no_delay`.
-pub(crate) const DELAY_ERRORS: f64 = 4.0;
 
 /// Maximum Jacobians of the fit to a corrected log.
 ///
@@ -825,3 +865,108 @@ pub(crate) const SMALLER: usize = 8;
 ///
 /// Unit: 1. Source: chosen. Test: `promises_hold_on_simulated_logs`.
 pub(crate) const START_OFF: f64 = 0.1;
+
+/// Damped Gauss-Newton steps that rank the elements a model may lack.
+///
+/// Unit: steps. Source: chosen: the price of a few runs. Test: `a_missing_spring_is_named`.
+pub(crate) const CAUSE_STEPS: usize = 4;
+
+/// Starts that are fitted whole, the best of those that were ranked.
+///
+/// Unit: starts. Source: chosen.
+pub(crate) const CAUSES_FITTED: usize = 4;
+
+/// Starts of one element that are fitted whole.
+///
+/// Unit: starts. Source: chosen: the nearest does not always lead to the least.
+pub(crate) const STARTS_FITTED: usize = 2;
+
+/// Share of the squared residuals that an element must explain.
+///
+/// Unit: 1. Source: chosen. Test: `the_right_model_lacks_nothing`.
+pub(crate) const CAUSE_EXPLAINS: f64 = 0.02;
+
+/// Size that an element must have.
+///
+/// Unit: standard errors of its size. Source: chosen. Test: `the_right_model_lacks_nothing`.
+pub(crate) const CAUSE_ERRORS: f64 = 4.0;
+
+/// Share of the squared residuals from which on an element is a warning.
+///
+/// Unit: 1. Source: chosen: 0.8 of the residuals are left. Test: `a_missing_spring_is_named`.
+pub(crate) const CAUSE_WARNS: f64 = 0.36;
+
+/// Most values of logs for which elements are tried.
+///
+/// Unit: values. Source: chosen: bounds the time.
+pub(crate) const CAUSE_MOST_VALUES: usize = 100_000;
+
+/// Step of the variables over which estimates with an element are differentiated.
+///
+/// Unit: 1. Source: the third root of rounding.
+pub(crate) const CAUSE_DIFFERENCE: f64 = 1e-5;
+
+/// Frequencies of a spring between motor and cart that are tried.
+///
+/// Unit: Hz. Source: steps of 2. Test: `a_missing_spring_is_named`.
+pub(crate) const CAUSE_SPRINGS: [f64; 5] = [5.0, 10.0, 20.0, 40.0, 80.0];
+
+/// Damping ratio with which a spring begins.
+///
+/// Unit: 1. Source: chosen.
+pub(crate) const SPRING_DAMPING: f64 = 0.05;
+
+/// Sizes of play that are tried.
+///
+/// Unit: standard deviations of the residuals. Source: steps of 4.
+pub(crate) const CAUSE_GAPS: [f64; 3] = [1.0, 4.0, 16.0];
+
+/// Frequency and damping ratio of the flanks of play.
+///
+/// Unit: Hz. Source: chosen: far above what a log shows.
+pub(crate) const FLANK_FREQUENCY: f64 = 150.0;
+
+/// Damping ratio of the flanks of play.
+///
+/// Unit: 1. Source: chosen.
+pub(crate) const FLANK_DAMPING: f64 = 0.5;
+
+/// Delays that are tried.
+///
+/// Unit: intervals between samples. Source: chosen: one of either sign.
+pub(crate) const CAUSE_DELAYS: [f64; 2] = [0.5, -0.5];
+
+/// Share of the inertia with which a part before a spring or play begins.
+///
+/// Unit: 1. Source: chosen.
+pub(crate) const CAUSE_SHARE: f64 = 0.35;
+
+/// Share of the inertia from which on a rotor is one that the case knows.
+///
+/// Unit: 1. Source: chosen.
+pub(crate) const KNOWN_SHARE: f64 = 0.05;
+
+/// Change of an estimate with an element from which on it is reported.
+///
+/// Unit: relative to the estimate. Source: chosen.
+pub(crate) const CAUSE_MOVES: f64 = 0.01;
+
+/// Longest time for which residuals that swing keep their sign.
+///
+/// Unit: share of a log. Source: chosen. Test: `noise_that_swings_is_known_as_such`.
+pub(crate) const SWINGS_KEEP: f64 = 0.1;
+
+/// Cost with an element after its first steps, relative to that without, up to which it is fitted whole.
+///
+/// Unit: 1. Source: chosen: what is further off does not get there.
+pub(crate) const CAUSE_NEAR: f64 = 3.0;
+
+/// Where the size of an element may go, relative to where it begins.
+///
+/// Unit: 1. Source: chosen: starts are 2 to 4 times apart.
+pub(crate) const CAUSE_AROUND: [f64; 2] = [0.1, 10.0];
+
+/// Where the share of the inertia before a spring or play may go.
+///
+/// Unit: 1. Source: chosen: less is not seen, and takes long to simulate.
+pub(crate) const KNOWN_SHARES: [f64; 2] = [0.05, 0.95];

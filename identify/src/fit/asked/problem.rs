@@ -8,6 +8,7 @@ use crate::fit::limits::{FILE_ROUNDING, KNOWN_DELAY, SLOW_BY_DIFFERENCE, STARTS_
 use crate::log::Quantity;
 use crate::machine::{AmplifierMode, Machine};
 use crate::parameter::{self, Free};
+use crate::signal::Signal;
 use crate::solve::Bench;
 use nalgebra::DMatrix;
 
@@ -32,6 +33,8 @@ pub struct Problem<'a> {
     pub simulations: u64,
     /// Runs that the last Jacobian took differences of.
     pub differences: usize,
+    /// Whether residuals swing to and fro, so that a first value is as far off as any other, however smooth they are.
+    pub swings: bool,
     units: Vec<Scale>,
     /// Whether to end the work.
     stop: Option<Stop<'a>>,
@@ -121,6 +124,7 @@ impl<'a> Problem<'a> {
             held_out,
             simulations: 0,
             differences: 0,
+            swings: false,
             stop: None,
         };
         problem.add_extras(case, plan);
@@ -142,6 +146,7 @@ impl<'a> Problem<'a> {
             held_out: Vec::new(),
             simulations: 0,
             differences: 0,
+            swings: false,
             units: Vec::new(),
             stop: None,
         }
@@ -168,8 +173,10 @@ impl<'a> Problem<'a> {
         let interval = self.runs[0].interval();
         let most = self.runs.iter().flat_map(|run| run.logged.iter()).fold(0.0, |most: f64, u| most.max(u.abs()));
         let most = if most > 0.0 { most } else { 1.0 };
-        let late =
-            Extra { what: Nuisance::Delay, start: 0.0, unit: interval, low: 0.0, high: 50.0 * interval, known: None };
+        // Samples that are taken after their stamps are an input that acts early: as far as the input is logged.
+        let is_sampled = self.runs.iter().all(|run| matches!(run.input(), Signal::Sampled { .. }));
+        let (early, high) = (if is_sampled { -50.0 * interval } else { 0.0 }, 50.0 * interval);
+        let late = Extra { what: Nuisance::Delay, start: 0.0, unit: interval, low: early, high, known: None };
         let gain = Extra { what: Nuisance::InputGain, start: 1.0, unit: 1.0, low: 0.2, high: 5.0, known: None };
         let offset = Extra { what: Nuisance::InputOffset, start: 0.0, unit: most, low: -most, high: most, known: None };
         let scopes = [(delay, late), (input_gain, gain), (input_offset, offset)];
@@ -324,7 +331,8 @@ impl<'a> Problem<'a> {
             for extra in run.extras.iter_mut().filter(|extra| extra.what == Nuisance::StartPosition) {
                 if let Some(known) = &mut extra.known {
                     // Its unit is what neighbouring values differ by.
-                    *known = known.max(deviation.min(SLOW_BY_DIFFERENCE * extra.unit));
+                    let most = if self.swings { f64::INFINITY } else { SLOW_BY_DIFFERENCE * extra.unit };
+                    *known = known.max(deviation.min(most));
                     let room = 6.0 * *known;
                     (extra.low, extra.high) = (extra.low.min(extra.start - room), extra.high.max(extra.start + room));
                 }

@@ -7,6 +7,7 @@ use crate::fit::asked::problem::Stop;
 use crate::fit::limits::CHANGE_ALIKE;
 use crate::fit::search::starts::{Searched, Work};
 use crate::fit::trust::found::Estimate;
+use crate::fit::trust::held_out::nothing;
 use crate::fit::trust::nearest::{Settled, search};
 use crate::fit::trust::result::result;
 use crate::fit::trust::scores::{Together, together};
@@ -85,19 +86,6 @@ pub fn drift(case: &Case, plan: &Plan, stop: Option<Stop>, watch: &mut dyn FnMut
     }
     changes.sort_by(|a, b| a.left.total_cmp(&b.left));
     Ok(Drift { unchanged, changes, work })
-}
-
-/// The same logs, and nothing searched for in them.
-pub(crate) fn nothing(plan: &Plan) -> Plan {
-    Plan {
-        free: Vec::new(),
-        tied: Vec::new(),
-        lumped: Vec::new(),
-        separate: Vec::new(),
-        priors: Vec::new(),
-        bounds: Vec::new(),
-        ..plan.clone()
-    }
 }
 
 fn errors(found: &Searched) -> Vec<Together> {

@@ -8,26 +8,24 @@
 
 pub(crate) mod drift;
 mod laws;
-mod parts;
 
 pub use laws::FrictionLaw;
 
 use crate::case::{Case, Files, Plan};
 use crate::error::{Error, Result};
 use crate::fit::asked::problem::{Problem, Stop};
-use crate::fit::limits::{ROUGH_TOLERANCE, START_SHARE, STEPS, STEPS_IN_PART};
+use crate::fit::limits::{ROUGH_TOLERANCE, STEPS, STEPS_IN_PART};
 use crate::fit::search::point::Options;
 use crate::fit::search::starts::{Work, search_as_far};
 use crate::fit::trust::found::Fit;
-use crate::fit::trust::held_out::met;
+use crate::fit::trust::held_out::{met, nothing};
 use crate::fit::trust::nearest::search_near;
+use crate::fit::trust::parts::{Parts, errors};
 use crate::fit::trust::result::{known, told};
 use crate::fit::trust::scores::together;
 use crate::log::Quantity;
 use crate::machine::Machine;
 use crate::solve::Flow;
-use drift::nothing;
-use parts::{Fold, Parts};
 use std::path::Path;
 
 /// How far the fits go that are compared: what another step would move them by is far less than what laws differ by in
@@ -257,20 +255,11 @@ impl Course<'_> {
 
     /// The errors in a part that is not fitted.
     fn fold(&mut self, case: &Case, plan: &Plan, part: usize) -> Result<Vec<(Quantity, f64, usize)>> {
-        let Fold { fitted, held_out } = &self.parts.folds[part];
-        let mut plan = Plan { held_out: Vec::new(), separate: Vec::new(), ..plan.clone() };
-        plan.nuisance.initial_state |= self.parts.is_cut;
-        let own = Case { experiments: fitted.clone(), ..case.clone() };
-        let found = search_as_far(&own, &plan, self.stop, &compared(STEPS_IN_PART), &mut |_, _| Flow::Continue)?;
-        self.work.add(&found.work);
-        let machine = found.problem.stage_at(&found.best.x);
-        let known = known(&found);
-        let held = Case { experiments: held_out.clone(), ..case.clone() };
-        let scored = Plan { windows: None, nuisance: plan.nuisance, ..nothing(&plan) };
-        let logs: Vec<_> =
-            Problem::new(&held, &scored)?.runs.iter().map(|run| met(run, &machine, &known, START_SHARE)).collect();
-        let errors = together(&logs, |_| String::new());
-        Ok(errors.iter().map(|one| (one.quantity, one.rmse.powi(2) * one.count as f64, one.count)).collect())
+        let parts = &self.parts;
+        let options = compared(STEPS_IN_PART);
+        let (found, work) = errors(case, plan, &parts.folds[part], (parts.is_cut, &options), self.stop)?;
+        self.work.add(&work);
+        Ok(found)
     }
 
     /// The windows with which the laws of straight lines predict best; none where none was tried yet.

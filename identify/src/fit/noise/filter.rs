@@ -40,10 +40,69 @@ pub(super) fn innovations(
     slow: &[Slow],
     each: impl FnMut(&mut [f64], f64),
 ) {
+    if let [swing] = slow
+        && swing.frequency > 0.0
+    {
+        return innovations_of_swing(series, rows, wide, swing, each);
+    }
     match slow.len() {
         0 => innovations_of::<0>(series, rows, wide, slow, each),
         1 => innovations_of::<1>(series, rows, wide, slow, each),
         _ => innovations_of::<SLOW_NOISES>(series, rows, wide, slow, each),
+    }
+}
+
+/// [`innovations`] of a noise that swings: an oscillator with x and w = ẋ/ω₀ that white noise drives, of which x shows.
+///
+/// ```text
+/// γ = 1/τ      ω₀² = ω² + γ²
+/// A = e^{−γΔ} [cos ωΔ + γ/ω sin ωΔ, ω₀/ω sin ωΔ; −ω₀/ω sin ωΔ, cos ωΔ − γ/ω sin ωΔ]
+/// P ← A P Aᵀ + σ² (I − A Aᵀ)
+/// ```
+fn innovations_of_swing(
+    series: &Series,
+    rows: &[f64],
+    wide: usize,
+    slow: &Slow,
+    mut each: impl FnMut(&mut [f64], f64),
+) {
+    let (omega, gamma) = (slow.frequency, 1.0 / slow.time);
+    let natural = omega.hypot(gamma);
+    // P as p₀₀, p₀₁, p₁₁
+    let mut p = [slow.variance, 0.0, slow.variance];
+    let mut x = vec![[0.0; 2]; wide];
+    let mut v = vec![0.0; wide];
+    let (mut last, mut step, mut turn) = (None, f64::NAN, [0.0; 4]);
+    for ((row, &g), &time) in rows.chunks(wide).zip(&series.gain).zip(&series.time) {
+        if let Some(last) = last {
+            let past: f64 = time - last;
+            if (past - step).abs() > 1e-9 * step || step.is_nan() {
+                step = past;
+                let decay = (-gamma * past).exp();
+                let (sin, cos) = (omega * past).sin_cos();
+                let (damped, stiff) = (gamma / omega * sin, natural / omega * sin);
+                turn = [cos + damped, stiff, -stiff, cos - damped].map(|one| decay * one);
+            }
+            let [a, b, c, d] = turn;
+            // P − σ² I, which A turns, and σ² I, which stays.
+            let q = [p[0] - slow.variance, p[1], p[2] - slow.variance];
+            p = [
+                a * a * q[0] + 2.0 * a * b * q[1] + b * b * q[2] + slow.variance,
+                a * c * q[0] + (a * d + b * c) * q[1] + b * d * q[2],
+                c * c * q[0] + 2.0 * c * d * q[1] + d * d * q[2] + slow.variance,
+            ];
+            x.iter_mut().for_each(|x| *x = [a * x[0] + b * x[1], c * x[0] + d * x[1]]);
+        }
+        last = Some(time);
+        let ph = [g * p[0], g * p[1]];
+        let f = 1.0 + g * ph[0];
+        let k = ph.map(|ph| ph / f);
+        for ((v, x), y) in v.iter_mut().zip(&mut x).zip(row) {
+            *v = y - g * x[0];
+            *x = [x[0] + k[0] * *v, x[1] + k[1] * *v];
+        }
+        p = [p[0] - k[0] * ph[0], p[1] - k[0] * ph[1], p[2] - k[1] * ph[1]];
+        each(&mut v, f);
     }
 }
 

@@ -6,6 +6,7 @@
 //! ```text
 //! r(t) = J(t) δ + d(t) (w(t) (x₁(t) + x₂(t)) + s ε(t)) + Σ a cos κ ŷ(t) + b sin κ ŷ(t)
 //! cov x(t), x(u) = σ² e^{−|t−u|/τ}
+//! cov x(t), x(u) = σ² e^{−|t−u|/τ} (cos ω|t−u| + sin ω|t−u|/(ωτ))         of one that swings
 //! ```
 //!
 //! with the derivatives J of the model, as a fit has moved its residuals along them: what is slow in noise looks like a
@@ -25,8 +26,9 @@ pub(crate) mod student;
 use crate::fit::asked::problem::Problem;
 use crate::fit::asked::run::is_position;
 use crate::fit::limits::{
-    LEAST_POWER, MOST_POWERS, NOISE_TURNS, NOTHING, POWER_RATIO, ROUNDED, TIME_RATIO, TIMES_APART, TWO_BEFOREHAND,
-    WAVE_CLEAR, WAVES, WHITE_BEFOREHAND,
+    LEAST_POWER, MOST_POWERS, NOISE_TURNS, NOTHING, POWER_RATIO, ROUNDED, SWING_AROUND, SWING_BEFOREHAND,
+    SWING_DAMPING, SWING_FASTEST, SWING_POWERS, SWING_RATIO, SWING_ROUNDS, SWING_SHRINKS, SWING_STEPS, SWINGS_IN_LOG,
+    TIME_RATIO, TIMES_APART, TWO_BEFOREHAND, WAVE_CLEAR, WAVES, WHITE_BEFOREHAND,
 };
 use crate::log::Quantity;
 use nalgebra::{DMatrix, DVector};
@@ -41,6 +43,8 @@ pub(super) struct Slow {
     pub variance: f64,
     /// Time constant, s.
     pub time: f64,
+    /// Angular frequency ω, rad/s: zero for noise of first order.
+    pub frequency: f64,
 }
 
 /// An error that comes again at the same place.
@@ -213,10 +217,7 @@ impl Estimate {
         let all = || scales.iter().flatten().flatten().copied();
         let unevenness =
             if scales.is_some() { all().fold(0.0, f64::max) / all().fold(f64::INFINITY, f64::min) } else { 1.0 };
-        let lengths = if is_position(self.quantity) { self.find_waves(best(&told)?) } else { Vec::new() };
-        if !lengths.is_empty() {
-            told = self.told();
-        }
+        let lengths = if is_position(self.quantity) { self.waves_beside(&mut told)? } else { Vec::new() };
         let first = best(&told)?;
         let (top, freedom, slow) = (first.weight, first.freedom, first.slow.clone());
         let (waves, shift, unsure) = self.waves(first, &lengths);
@@ -246,12 +247,13 @@ impl Estimate {
         unsure: &DMatrix<f64>,
     ) -> Vec<DMatrix<f64>> {
         let white = self.white_part(scales) + rest;
-        let mut known: Vec<(f64, DMatrix<f64>)> = Vec::new();
+        let mut known: Vec<([f64; 2], DMatrix<f64>)> = Vec::new();
         let of = |one: &Told| {
             let mut own = white.clone();
             for slow in &one.slow {
-                let place = known.iter().position(|(time, _)| *time == slow.time).unwrap_or_else(|| {
-                    known.push((slow.time, self.slow_part(slow.time, scales)));
+                let kind = [slow.time, slow.frequency];
+                let place = known.iter().position(|(own, _)| *own == kind).unwrap_or_else(|| {
+                    known.push((kind, self.slow_part(slow, scales)));
                     known.len() - 1
                 });
                 own += &known[place].1 * slow.variance;
@@ -287,7 +289,7 @@ impl Estimate {
                 let mut falling = 0;
                 let mut before = f64::NEG_INFINITY;
                 for &power in &powers {
-                    let slow = Slow { variance: variance(power, time), time };
+                    let slow = Slow { variance: variance(power, time), time, frequency: 0.0 };
                     let both: Vec<Slow> = std::iter::once(slow).chain(beside).collect();
                     let Some(one) = self.likelihood(&both) else { continue };
                     falling = if one.weight < before { falling + 1 } else { 0 };
@@ -319,6 +321,7 @@ impl Estimate {
             turns.push(two);
         }
         // The best of one stands for all of its kind that are about as good: Σ e^{L − L*} of them.
+        all.extend(self.swinging([interval, longest], gain));
         let (Some(a), Some(b)) = (turns.pop(), turns.pop()) else { return all };
         let top = best(&a).map_or(0.0, |one| one.weight);
         let as_good = |told: &[Told]| told.iter().map(|one| (one.weight - top).exp()).sum::<f64>();
@@ -328,6 +331,63 @@ impl Estimate {
         let (for_a, for_b) = (each * as_good(&b), each * as_good(&a));
         all.extend(counted(a, for_a));
         all.extend(counted(b, for_b));
+        all
+    }
+
+    /// Noises that swing: the most likely one, and those next to it, with what they counted for before.
+    ///
+    /// Frequencies are tried one after the other with a usual damping; from the best, frequency, time and variance are
+    /// improved in turns by steps that are halved.
+    fn swinging(&self, [interval, longest]: [f64; 2], gain: f64) -> Vec<Told> {
+        let of = |[frequency, time, variance]: [f64; 3]| {
+            let [frequency, time, variance] = [frequency.exp(), time.exp(), variance.exp()];
+            self.likelihood(&[Slow { variance, time, frequency }])
+        };
+        let weight = |told: &Option<Told>| told.as_ref().map_or(f64::NEG_INFINITY, |told| told.weight);
+        let mut best: Option<([f64; 3], f64)> = None;
+        let (mut frequency, mut tried) = (SWINGS_IN_LOG * TAU / longest, 0);
+        while frequency * interval < SWING_FASTEST {
+            for power in SWING_POWERS {
+                let time = 1.0 / (SWING_DAMPING * frequency);
+                let at = [frequency, time, power / gain].map(f64::ln);
+                let own = weight(&of(at));
+                tried += 1;
+                if best.is_none_or(|(_, most)| own > most) {
+                    best = Some((at, own));
+                }
+            }
+            frequency *= SWING_RATIO;
+        }
+        let Some((mut at, mut most)) = best else { return Vec::new() };
+        let mut steps = SWING_STEPS;
+        for _ in 0..SWING_ROUNDS {
+            for j in 0..3 {
+                for sign in [1.0, -1.0] {
+                    let mut next = at;
+                    next[j] += sign * steps[j];
+                    let own = weight(&of(next));
+                    if own > most {
+                        (at, most) = (next, own);
+                        break;
+                    }
+                }
+            }
+            steps = steps.map(|step| SWING_SHRINKS * step);
+        }
+        // On a grid around it, each as likely before as one that was tried at first.
+        let shares = [-1.0, 0.0, 1.0];
+        let mut all = Vec::new();
+        for i in shares {
+            for j in shares {
+                for k in shares {
+                    let around =
+                        [at[0] + i * SWING_AROUND[0], at[1] + j * SWING_AROUND[1], at[2] + k * SWING_AROUND[2]];
+                    all.extend(of(around));
+                }
+            }
+        }
+        let before = (SWING_BEFOREHAND / tried.max(1) as f64 / all.len().max(1) as f64).ln();
+        all.iter_mut().for_each(|one| one.weight += before);
         all
     }
 
@@ -412,6 +472,30 @@ impl Estimate {
         Some((amplitudes, inverse.view((waves, waves), (more, more)) * noise.white))
     }
 
+    /// Finds errors that come again at the same place, and the noise beside them. At a steady speed such an error swings
+    /// as noise may: the likelier of both counts.
+    fn waves_beside(&mut self, told: &mut Vec<Told>) -> Option<Vec<f64>> {
+        let top = best(told)?;
+        let swings = |one: &Told| one.slow.iter().any(|slow| slow.frequency > 0.0);
+        let (is_swinging, before) = (swings(top), top.weight);
+        let plain = told.iter().filter(|one| !swings(one)).max_by(|a, b| a.weight.total_cmp(&b.weight))?;
+        let mut lengths = self.find_waves(plain);
+        if lengths.is_empty() && !is_swinging {
+            return Some(lengths);
+        }
+        let with = self.told();
+        if !is_swinging || !lengths.is_empty() && best(&with).is_some_and(|with| with.weight > before) {
+            *told = with;
+            return Some(lengths);
+        }
+        self.series.iter_mut().for_each(Series::take_back);
+        lengths = self.find_waves(best(told)?);
+        if !lengths.is_empty() {
+            *told = self.told();
+        }
+        Some(lengths)
+    }
+
     /// Finds errors that come again at the same place beside this noise, and puts them into the rows: the lengths of
     /// their waves.
     fn find_waves(&mut self, noise: &Told) -> Vec<f64> {
@@ -479,22 +563,30 @@ impl Estimate {
         sum
     }
 
-    /// Σ_tu W(t) d(t) g(t) e^{−|t−u|/τ} g(u) d(u) W(u)ᵀ for a slow noise of one.
-    fn slow_part(&self, tau: f64, scales: Option<&[Vec<f64>]>) -> DMatrix<f64> {
+    /// Σ_tu W(t) d(t) g(t) ρ(t − u) g(u) d(u) W(u)ᵀ for a slow noise of one with the covariance ρ.
+    fn slow_part(&self, slow: &Slow, scales: Option<&[Vec<f64>]>) -> DMatrix<f64> {
         let g = self.globals;
         let mut sum = DMatrix::zeros(g, g);
+        // 1/(ωτ)
+        let phase = if slow.frequency > 0.0 { 1.0 / (slow.frequency * slow.time) } else { 0.0 };
         for (index, (series, rows)) in self.series.iter().zip(&self.influence).enumerate() {
-            let mut state = vec![0.0; g];
+            // Σ e^{(iω − 1/τ)(t − u)} g(u) d(u) W(u), its real part and its imaginary one.
+            let (mut state, mut other) = (vec![0.0; g], vec![0.0; g]);
             let mut last = None;
             for (k, row) in rows.chunks(g.max(1)).enumerate() {
                 let d = scales.map_or(1.0, |scales| scales[index][k]);
                 let (gain, time) = (series.gain[k] * d, series.time[k]);
-                let decay = (-(time - last.unwrap_or(time)) / tau).exp();
+                let past = time - last.unwrap_or(time);
+                let decay = (-past / slow.time).exp();
                 last = Some(time);
-                state.iter_mut().for_each(|x| *x *= decay);
+                let (sin, cos) = (slow.frequency * past).sin_cos();
+                for (x, y) in state.iter_mut().zip(&mut other) {
+                    (*x, *y) = (decay * (cos * *x - sin * *y), decay * (sin * *x + cos * *y));
+                }
+                let shown = |j: usize| state[j] + phase * other[j];
                 for i in 0..g {
                     for j in 0..g {
-                        sum[(i, j)] += gain * (row[i] * state[j] + row[j] * state[i]) + gain * gain * row[i] * row[j];
+                        sum[(i, j)] += gain * (row[i] * shown(j) + row[j] * shown(i)) + gain * gain * row[i] * row[j];
                     }
                 }
                 for (x, w) in state.iter_mut().zip(row) {

@@ -33,6 +33,18 @@ impl Series {
         self.moved.len() + self.more + 1
     }
 
+    /// Takes the columns out that are not of the Jacobian.
+    pub fn take_back(&mut self) {
+        let (wide, more) = (self.wide(), self.more);
+        let mut place = 0;
+        self.rows.retain(|_| {
+            let column = place % wide;
+            place += 1;
+            column + 1 + more < wide || column + 1 == wide
+        });
+        self.more = 0;
+    }
+
     /// Puts further columns before the residual.
     pub fn append(&mut self, columns: &[Vec<f64>]) {
         let wide = self.wide();

@@ -11,7 +11,10 @@
 use super::triangle::inverse_of_square;
 use crate::fit::asked::problem::Problem;
 use crate::fit::asked::run::{Run, is_position};
-use crate::fit::limits::{REGRESSION_BLOCK, REGRESSION_NOISE, REST_ROWS, WIDEST_IN_REGRESSION, WIDTHS};
+use crate::fit::limits::{
+    LONGEST_DELAY, REGRESSION_BLOCK, REGRESSION_NOISE, REST_ROWS, SHORTEST_DELAY, SUSPECT_DELAY, WIDEST_IN_REGRESSION,
+    WIDTHS,
+};
 use crate::log::Quantity;
 use crate::machine::{AmplifierMode, Machine};
 use crate::parameter::{Free, Sum, at_pulley, value};
@@ -50,6 +53,15 @@ pub(crate) struct Smoothed<'a> {
     margin: usize,
     /// φ̇ and φ̈
     derivatives: Vec<[f64; 2]>,
+}
+
+/// A delay of the input with which less of the torque is left, s; none where none leaves markedly less.
+pub(crate) fn suspected_delay(problem: &Problem) -> Option<f64> {
+    let logs = smoothed(problem);
+    let left: Vec<f64> = (0..=LONGEST_DELAY).map_while(|late| Some(balance(&logs, late)?.unexplained)).collect();
+    let late = (0..left.len()).min_by(|&a, &b| left[a].total_cmp(&left[b]))?;
+    let is_suspect = late >= SHORTEST_DELAY && left[late] <= SUSPECT_DELAY * left[0];
+    is_suspect.then(|| late as f64 * problem.runs[0].interval())
 }
 
 /// The logs of a problem that hold positions on an even raster, as [`balance`] wants them.

@@ -8,7 +8,8 @@ use crate::chance;
 use crate::error::{Error, Result};
 use crate::fit::asked::problem::{Problem, Stop, extent};
 use crate::fit::asked::residuals::Residuals;
-use crate::fit::limits::{FILE_ROUNDING, HUBER, ROUGH_TOLERANCE, TRIAL_ITERATIONS, WEIGHT_ROUNDS};
+use crate::fit::asked::run::is_position;
+use crate::fit::limits::{FILE_ROUNDING, HUBER, ROUGH_TOLERANCE, SWINGS_KEEP, TRIAL_ITERATIONS, WEIGHT_ROUNDS};
 use crate::log::Quantity;
 use crate::solve::Flow;
 use nalgebra::DMatrix;
@@ -107,6 +108,7 @@ pub(crate) fn search_as_far<'a>(
             break;
         }
         let before = first_weight(&problem);
+        problem.swings |= swings(&problem, &best);
         problem.weigh_by(&fresh);
         let alike = fresh.len() == 1 && !plan.huber && !told_beforehand(&problem, &fresh) && uniform(&problem);
         noise = fresh;
@@ -168,6 +170,32 @@ fn uniform(problem: &Problem) -> bool {
         problem.runs.iter().flat_map(|run| &run.seen).flat_map(|seen| &seen.weights).filter(|w| **w > 0.0);
     let Some(first) = weights.next() else { return true };
     weights.all(|w| (w / first - 1.0).abs() < 1e-3)
+}
+
+/// Whether the residuals of positions go to and fro all along: they change their sign often, and never keep it for long,
+/// as those of a model that is wrong do.
+fn swings(problem: &Problem, at: &Minimum) -> bool {
+    let all = problem.runs.iter().enumerate().flat_map(|(index, run)| {
+        let (first, n) = (problem.first_row(index), run.time.len());
+        let own = run.seen.iter().enumerate().filter(|(_, seen)| is_position(seen.quantity));
+        own.map(move |(output, _)| &at.residuals[first + output * n..first + (output + 1) * n])
+    });
+    let is_swinging = |values: &[f64]| {
+        let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
+        let (mut longest, mut since) = (0, 0);
+        for k in 1..values.len() {
+            if (values[k] > mean) != (values[k - 1] > mean) {
+                since = k;
+            }
+            longest = longest.max(k - since);
+        }
+        !values.is_empty() && (longest as f64) < SWINGS_KEEP * values.len() as f64
+    };
+    let mut any = false;
+    all.into_iter().all(|values| {
+        any = true;
+        is_swinging(values)
+    }) && any
 }
 
 /// Whether what is known beforehand of the start could be as wrong as the residuals are: then it depends on their

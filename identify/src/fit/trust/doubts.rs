@@ -1,4 +1,5 @@
-//! Reasons to widen intervals beyond noise: parts of the logs that disagree, and another friction law.
+//! Reasons to widen intervals beyond noise: parts of the logs that disagree, another friction law, and an element that
+//! the model lacks.
 
 use nalgebra::DMatrix;
 
@@ -24,8 +25,46 @@ pub struct OtherLaw {
     pub words: String,
     /// Its amplitude in standard errors.
     pub standard_errors: f64,
+    /// Amount that it takes off the sum of the squared residuals.
+    pub(crate) gain: f64,
     /// By how many of its standard errors each parameter would move.
     pub off: Vec<f64>,
     /// The addition to the covariance of the variables that concern all runs.
     pub(crate) added: DMatrix<f64>,
+}
+
+/// An element that the model lacks and the logs show.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cause {
+    /// Its key: `spring`, `play`, `delay`.
+    pub key: &'static str,
+    /// In words, with its size.
+    pub words: String,
+    /// The share of the sum of squared residuals that it explains.
+    pub explained: f64,
+    /// Its size in standard errors.
+    pub standard_errors: f64,
+    /// Its parameters.
+    pub parameters: Vec<Size>,
+    /// The estimates of the fit as they are with it, in their order; none where the fit with it has no such value.
+    pub estimates: Vec<Option<Size>>,
+    /// The change of the case file that adds it.
+    pub add: String,
+    /// Parts of the logs that were held out, and in how many of them it predicts better.
+    pub better: [usize; 2],
+    /// The addition to the covariance of the variables that concern all runs.
+    pub(crate) added: DMatrix<f64>,
+}
+
+/// A value with its standard error.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Size {
+    /// The parameter.
+    pub name: String,
+    /// SI unit.
+    pub unit: &'static str,
+    /// Its value.
+    pub value: f64,
+    /// Its standard error.
+    pub error: f64,
 }

@@ -3,16 +3,16 @@
 use super::finding::{Finding, Grade};
 use super::found::Fit;
 use super::trials::{self, is_borne_out};
-use crate::case::{Case, Plan, Scope};
+use crate::case::{Case, Plan};
 use crate::fit::asked::controller::reproduced;
 use crate::fit::asked::problem::Problem;
 use crate::fit::asked::run::is_position;
 use crate::fit::limits::{
-    KINK_PROMISE, LONGEST_DELAY, MOTOR_CONSTANTS, OPPOSITE, POOR_FIT, REPRODUCED, SHORTEST_DELAY, SUSPECT_DELAY,
+    CAUSE_MOVES, CAUSE_WARNS, KINK_PROMISE, MOTOR_CONSTANTS, NORMAL, OPPOSITE, POOR_FIT, REPRODUCED,
 };
 use crate::fit::noise::Wave;
 use crate::fit::search::point::Ending;
-use crate::fit::search::regression::{Balance, balance, smoothed};
+use crate::fit::search::regression::Balance;
 use crate::fit::search::starts::Searched;
 use crate::log::{Note, Remedy, Severity};
 use crate::machine::AmplifierMode;
@@ -23,7 +23,7 @@ use crate::solve::Bench;
 pub(crate) fn findings(case: &Case, plan: &Plan, found: &Searched, fit: &Fit) -> Vec<Finding> {
     let mut all = of_logs(case, plan, found);
     all.extend(of_controller(case, plan));
-    all.extend(of_delay(case, plan, found));
+    all.extend(of_cause(fit));
     all.extend(of_search(fit));
     all.extend(of_motor(case, fit));
     all.extend(of_residuals(fit));
@@ -110,32 +110,6 @@ fn of_controller(case: &Case, plan: &Plan) -> Vec<Finding> {
     told.collect()
 }
 
-/// Whether the logs answer their inputs late: a regression that suspects it, and a fit that finds it.
-fn of_delay(case: &Case, plan: &Plan, found: &Searched) -> Option<Finding> {
-    if plan.nuisance.delay != Scope::Off || plan.closed_loop {
-        return None;
-    }
-    let logs = smoothed(&found.problem);
-    let left: Vec<f64> = (0..=LONGEST_DELAY).map_while(|late| Some(balance(&logs, late)?.unexplained)).collect();
-    let late = (0..left.len()).min_by(|&a, &b| left[a].total_cmp(&left[b]))?;
-    if late < SHORTEST_DELAY || left[late] > SUSPECT_DELAY * left[0] {
-        return None;
-    }
-    let late = trials::late(case, plan, found, late as f64 * found.problem.runs[0].interval())?;
-    let text = format!(
-        "the logs answer their input about {} late: a fit with that delay leaves errors of {:.0} % of those without; \
-         say nuisance = {{ delay = \"shared\" }} in [fit]",
-        rounded_time(late.delay),
-        100.0 * late.left
-    );
-    Some(finding(Grade::Warning, "delay", text))
-}
-
-/// A time in two digits.
-fn rounded_time(value: f64) -> String {
-    engineering(value, "s", 2).replace('\u{a0}', " ")
-}
-
 /// How the search ended.
 fn of_search(fit: &Fit) -> Vec<Finding> {
     let mut all = Vec::new();
@@ -170,7 +144,7 @@ fn of_search(fit: &Fit) -> Vec<Finding> {
         };
         all.push(finding(if zero { Grade::Note } else { Grade::Warning }, "bound", text));
     }
-    if let Some(found) = &fit.disagreement {
+    if let (Some(found), None) = (&fit.disagreement, &fit.cause) {
         let names: Vec<String> = fit
             .estimates
             .iter()
@@ -179,8 +153,8 @@ fn of_search(fit: &Fit) -> Vec<Finding> {
             .map(|(estimate, off)| format!("{} by {off:.1}", estimate.name))
             .collect();
         let text = format!(
-            "{} windows of {} disagree with the whole logs by more than noise, in standard errors of it: {}; something drifts, or \
-             the laws are others; the intervals are widened by that",
+            "{} windows of {} disagree with the whole logs by more than noise, in standard errors of it: {}; no element \
+             that was tried explains that; the intervals are widened by it",
             found.windows,
             plain(found.length, "s"),
             names.join(", ")
@@ -197,15 +171,14 @@ fn of_search(fit: &Fit) -> Vec<Finding> {
             }
         };
         let text = format!(
-            "the residuals speak for {} ({:.1} standard errors): {moved}; `taut fit --compare` tries other laws",
+            "the residuals suggest {} ({:.1} standard errors): {moved}; `taut fit --compare` tries other laws",
             found.words, found.standard_errors
         );
         all.push(finding(Grade::Note, "other_law", text));
     }
     for Wave { quantity, length, amplitude } in &fit.waves {
         let text = format!(
-            "{}: its error comes again at the same place, by ±{} every {}: a pulley or an encoder out of centre, teeth, a \
-             motor that cogs; the intervals are widened by what that moves",
+            "{}: its error repeats with position, by ±{} every {}; the intervals are widened by what that moves",
             quantity.name(),
             engineering(*amplitude, quantity.unit(), 2).replace('\u{a0}', " "),
             plain(*length, quantity.unit())
@@ -213,6 +186,37 @@ fn of_search(fit: &Fit) -> Vec<Finding> {
         all.push(finding(Grade::Note, "place", text));
     }
     all
+}
+
+/// The element that the model lacks, as a fit with it found it.
+fn of_cause(fit: &Fit) -> Option<Finding> {
+    let found = fit.cause.as_ref()?;
+    let moved = fit.estimates.iter().zip(&found.estimates).filter_map(|(estimate, with)| {
+        let with = with.as_ref()?;
+        let is_moved = (with.value - estimate.value).abs() > CAUSE_MOVES * estimate.value.abs();
+        is_moved.then(|| {
+            let [value, error, own] = [with.value, NORMAL * with.error, estimate.value].map(|v| shown(v, with.unit));
+            format!("{} is then {value} ± {error} ({own} without)", estimate.name)
+        })
+    });
+    let moved: Vec<String> = moved.collect();
+    let moved = if moved.is_empty() { "no estimate moves by a hundredth".to_string() } else { moved.join(", ") };
+    let text = format!(
+        "{} explains {:.0} % of what is left, and predicts {} of {} parts of the logs better that were held out: {moved}; \
+         the intervals are widened to contain that; add {}",
+        found.words,
+        100.0 * found.explained,
+        found.better[0],
+        found.better[1],
+        found.add
+    );
+    let grade = if found.explained >= CAUSE_WARNS { Grade::Warning } else { Grade::Note };
+    Some(finding(grade, found.key, text))
+}
+
+/// A value in three digits.
+fn shown(value: f64, unit: &str) -> String {
+    engineering(value, unit, 3).replace(['\u{a0}', '\u{202f}'], " ").replace('−', "-")
 }
 
 /// Whether K_t and K_e can be those of one motor.
@@ -262,10 +266,8 @@ impl Balance {
     pub fn words(&self) -> &'static str {
         match self.unexplained {
             left if left < 0.1 => "a rigid axis with viscous and Coulomb friction explains these logs",
-            left if left < 0.3 => {
-                "a rigid axis explains most: the rest is noise in derivatives, elasticity, or another friction"
-            }
-            left if left < 0.7 => "much is left: look for a delay, for elasticity, or for another friction",
+            left if left < 0.3 => "a rigid axis with viscous and Coulomb friction explains most of these logs",
+            left if left < 0.7 => "a rigid axis with viscous and Coulomb friction leaves much of these logs",
             _ => "it explains next to nothing: look at units, signs and columns first",
         }
     }

@@ -1,7 +1,7 @@
 //! The result of a fit, and how well it is known.
 
 use super::combinations::Combination;
-use super::doubts::{Disagreement, OtherLaw};
+use super::doubts::{Cause, Disagreement, OtherLaw};
 use super::finding::{Finding, Grade};
 use super::identify::Identifiability;
 use super::scores::LogFit;
@@ -35,6 +35,8 @@ pub struct Fit {
     pub disagreement: Option<Disagreement>,
     /// A friction law that the case does not have and the residuals speak for.
     pub other_law: Option<OtherLaw>,
+    /// An element that the model lacks and the logs show, as a fit with it found it.
+    pub cause: Option<Cause>,
     /// Errors of an output that come again at the same place.
     pub waves: Vec<Wave>,
     /// Findings on logs and search, warnings first.

@@ -1,6 +1,7 @@
 //! Logs that are only compared: where they start is fitted to them, and nothing else.
 
 use super::scores::{LogFit, compared};
+use crate::case::Plan;
 use crate::fit::asked::problem::Problem;
 use crate::fit::asked::run::{Extra, Nuisance, Run};
 use crate::fit::limits::{HELD_OUT_ROWS, REFIT_TOLERANCE};
@@ -58,4 +59,17 @@ pub(crate) fn met(run: &Run, machine: &Machine, known: &Known, share: f64) -> Lo
 /// An extra that has this value.
 fn held(extra: &Extra, value: f64) -> Extra {
     Extra { start: value, low: value, high: value, known: None, ..*extra }
+}
+
+/// The same logs, and nothing searched for in them.
+pub(crate) fn nothing(plan: &Plan) -> Plan {
+    Plan {
+        free: Vec::new(),
+        tied: Vec::new(),
+        lumped: Vec::new(),
+        separate: Vec::new(),
+        priors: Vec::new(),
+        bounds: Vec::new(),
+        ..plan.clone()
+    }
 }

@@ -1,5 +1,6 @@
 //! The trust in a minimum: which parameters are determined, how well, and what speaks against it.
 
+pub(crate) mod causes;
 pub(crate) mod combinations;
 pub(crate) mod directions;
 pub(crate) mod doubts;
@@ -10,6 +11,7 @@ pub(crate) mod held_out;
 pub(crate) mod identify;
 pub(crate) mod nearest;
 pub(crate) mod other_laws;
+pub(crate) mod parts;
 pub(crate) mod profile;
 pub(crate) mod proposals;
 pub(crate) mod residual_force;

@@ -13,7 +13,7 @@
 //! that it begins at.
 
 use super::uncertainty::Judged;
-use super::{other_laws, sub_records};
+use super::{causes, other_laws, sub_records};
 use crate::case::{Case, Plan};
 use crate::error::Result;
 use crate::fit::asked::problem::{Problem, Stop};
@@ -44,7 +44,9 @@ impl Settled<'_> {
         };
         let disagreement = sub_records::disagreement(case, plan, &self.searched, &judged);
         let other_law = other_laws::other_law(&self.searched, &judged);
-        judged.widen(disagreement, other_law);
+        let cause = causes::cause(case, plan, &self.searched, &judged, other_law.as_ref());
+        let other_law = other_law.filter(|_| cause.is_none());
+        judged.widen(disagreement, other_law, cause);
         Some(judged)
     }
 }

@@ -321,6 +321,6 @@ impl Place<'_> {
         let added = &square * (3.0 / (NORMAL * NORMAL)) + square * (error / tried.amplitude).powi(2);
         let Candidate { body, .. } = tried.candidate;
         let words = tried.candidate.words(tried.amplitude);
-        Some(OtherLaw { body: body.key(), words, standard_errors, off, added })
+        Some(OtherLaw { body: body.key(), words, standard_errors, gain: tried.gain, off, added })
     }
 }

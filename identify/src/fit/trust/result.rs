@@ -132,6 +132,7 @@ pub(crate) fn result(found: &Searched, judged: Option<&Judged>) -> Fit {
         identifiability,
         disagreement: judged.and_then(|judged| judged.disagreement.clone()),
         other_law: judged.and_then(|judged| judged.other_law.clone()),
+        cause: judged.and_then(|judged| judged.cause.clone()),
         waves: judged.iter().flat_map(|judged| &judged.spreads).flat_map(|spread| spread.waves.clone()).collect(),
         findings: Vec::new(),
         point: best.x.clone(),

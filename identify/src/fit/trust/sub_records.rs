@@ -40,6 +40,7 @@ pub(crate) fn disagreement(case: &Case, plan: &Plan, found: &Searched, judged: &
     let length = (total / FEWEST_WINDOWS).min(0.5 * shortest).max(WINDOW_SAMPLES * total / samples);
     let windowed = Plan { windows: Some(length), ..plan.clone() };
     let mut problem = Problem::new(case, &windowed).ok()?;
+    problem.swings = whole.swings;
     for &(quantity, deviation) in &found.noise {
         problem.weigh(quantity, deviation, true);
         problem.doubt_starts(quantity, deviation);

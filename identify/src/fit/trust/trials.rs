@@ -2,31 +2,18 @@
 //! logs do not bear out is not said.
 //!
 //! Correlations and regressions are quick, and are wrong where noise is narrow-band, where a belt is elastic or where
-//! parameters are far off. A log that is mended, or an input that comes later, has to leave markedly less.
+//! parameters are far off. A log that is mended has to leave markedly less.
 
 use super::scores::beside_log;
-use super::uncertainty::Judged;
-use crate::case::{Case, Plan, Scope};
+use crate::case::{Case, Plan};
 use crate::fit::asked::problem::Problem;
-use crate::fit::asked::run::Nuisance;
-use crate::fit::limits::{
-    DELAY_ERRORS, DELAY_MENDS, HUBER, JUMP, MENDED, NO_WORSE, ROUGH_TOLERANCE, STAND_OUT, TRIAL_FIT_ITERATIONS,
-    UNIT_WORSE,
-};
+use crate::fit::limits::{HUBER, JUMP, MENDED, NO_WORSE, ROUGH_TOLERANCE, STAND_OUT, TRIAL_FIT_ITERATIONS, UNIT_WORSE};
 use crate::fit::search::least_squares::minimise;
 use crate::fit::search::point::{Ending, Minimum, Options};
 use crate::fit::search::starts::Searched;
 use crate::log::{Log, Note, Quantity, Remedy, Severity, Survey, jumps_text};
 use crate::solve::Flow;
 use std::sync::Arc;
-
-/// A delay that logs bear out.
-pub(crate) struct Late {
-    /// s.
-    pub delay: f64,
-    /// Root mean square of the residuals with it, as a part of that without.
-    pub left: f64,
-}
 
 /// The surveys of all logs, without what a fit to the log as it is said to be refutes.
 pub(crate) fn surveys(case: &Case, plan: &Plan, found: &Searched) -> Vec<Survey> {
@@ -165,27 +152,4 @@ fn descend(problem: &mut Problem, plan: &Plan, start: &[f64]) -> Option<(Minimum
     let found = minimise(problem, start, &bounds, &options, &mut |_, _| Flow::Continue);
     let cost = found.cost;
     (!matches!(found.ending, Ending::Failed | Ending::Interrupted) && cost.is_finite()).then_some((found, cost))
-}
-
-/// The delay of all inputs with which the logs are met markedly better; `about` is where its search begins, s.
-pub(crate) fn late(case: &Case, plan: &Plan, found: &Searched, about: f64) -> Option<Late> {
-    let mut own = plan.clone();
-    own.nuisance.delay = Scope::Shared;
-    let mut problem = Problem::new(case, &own).ok()?.stopped_by(found.problem.stop());
-    problem.weigh_by(&found.noise);
-    let place = problem.parameters.len() + problem.shared.iter().position(|extra| extra.what == Nuisance::Delay)?;
-    let unit = problem.shared[place - problem.parameters.len()].unit;
-    let with = |x: &[f64]| {
-        let mut start = x.to_vec();
-        start.insert(place, about / unit);
-        start
-    };
-    let (minimum, cost) = [found.best.x.clone(), found.problem.start()]
-        .iter()
-        .filter_map(|x| descend(&mut problem, &own, &with(x)))
-        .min_by(|a, b| a.1.total_cmp(&b.1))?;
-    let left = (cost / found.best.cost.max(f64::MIN_POSITIVE)).sqrt();
-    let judged = Judged::new(&problem, &minimum.residuals, &minimum.jacobian, &minimum.x, &minimum.at_bound)?;
-    let (delay, error) = (unit * minimum.x[place], unit * judged.covariance.error(place)?);
-    (left < DELAY_MENDS && delay > DELAY_ERRORS * error).then_some(Late { delay, left })
 }

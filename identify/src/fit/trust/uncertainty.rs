@@ -5,11 +5,11 @@
 //! ([`crate::fit::noise`]).
 
 use super::directions::Directions;
-use super::doubts::{Disagreement, OtherLaw};
+use super::doubts::{Cause, Disagreement, OtherLaw};
 use super::identify::Identifiability;
 use crate::fit::asked::problem::Problem;
 use crate::fit::limits::NORMAL;
-use crate::fit::noise::{self, Spread, Wave, half_width};
+use crate::fit::noise::{self, Slow, Spread, Wave, half_width};
 use crate::fit::search::triangle::inverse_of_square;
 use nalgebra::{DMatrix, DVector};
 
@@ -42,6 +42,8 @@ pub(crate) struct Judged {
     pub disagreement: Option<Disagreement>,
     /// The law that the residuals speak for.
     pub other_law: Option<OtherLaw>,
+    /// The element that the model lacks.
+    pub cause: Option<Cause>,
 }
 
 impl Judged {
@@ -114,14 +116,15 @@ impl Judged {
             _ => 0.0,
         });
         let covariance = Covariance { free, matrix, deviation, freedom: freedom.round() as usize, reach: NORMAL };
-        Some(Self { identifiability, covariance, inflation, spreads, disagreement: None, other_law: None })
+        Some(Self { identifiability, covariance, inflation, spreads, disagreement: None, other_law: None, cause: None })
     }
 }
 
 impl Judged {
-    /// Adds what parts of the logs say otherwise, and what another law would change.
-    pub fn widen(&mut self, disagreement: Option<Disagreement>, other_law: Option<OtherLaw>) {
+    /// Adds what parts of the logs say otherwise, what another law would change, and what an element that is not there.
+    pub fn widen(&mut self, disagreement: Option<Disagreement>, other_law: Option<OtherLaw>, cause: Option<Cause>) {
         let added = disagreement.iter().map(|found| &found.added).chain(other_law.iter().map(|found| &found.added));
+        let added = added.chain(cause.iter().map(|found| &found.added));
         for added in added {
             let globals = added.nrows();
             for (a, &i) in self.covariance.free.iter().enumerate().filter(|(_, i)| **i < globals) {
@@ -130,16 +133,20 @@ impl Judged {
                 }
             }
         }
-        (self.disagreement, self.other_law) = (disagreement, other_law);
+        (self.disagreement, self.other_law, self.cause) = (disagreement, other_law, cause);
     }
 
     /// The autocorrelation of the residuals, in words.
     pub fn slow_words(&self, problem: &Problem) -> String {
         let quantities = problem.quantities();
         let shown = |value: f64, unit| crate::number::engineering(value, unit, 2).replace('\u{a0}', " ");
+        let told_time = |slow: &Slow| match slow.frequency > 0.0 {
+            true => format!("swings of {}", shown(slow.frequency / std::f64::consts::TAU, "Hz")),
+            false => shown(slow.time, "s"),
+        };
         let mut told = Vec::new();
         for (spread, quantity) in self.spreads.iter().zip(&quantities) {
-            let own: Vec<String> = spread.slow.iter().map(|slow| shown(slow.time, "s")).collect();
+            let own: Vec<String> = spread.slow.iter().map(told_time).collect();
             if !own.is_empty() {
                 told.push(format!("{} over {}", quantity.name(), own.join(" and ")));
             }

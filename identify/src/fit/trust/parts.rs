@@ -1,21 +1,29 @@
 //! Records cut into parts, one of which is held out at a time.
 
+use super::held_out::{met, nothing};
+use super::result::known;
+use super::scores::together;
 use crate::case::Plan;
 use crate::case::{Case, Experiment, matches};
-use crate::fit::limits::{BLOCK_SAMPLES, FEWEST_LOGS, FOLDS, LOG_BLOCKS};
-use crate::log::{Log, Output};
+use crate::error::Result;
+use crate::fit::asked::problem::{Problem, Stop};
+use crate::fit::limits::{BLOCK_SAMPLES, FEWEST_LOGS, FOLDS, LOG_BLOCKS, START_SHARE};
+use crate::fit::search::point::Options;
+use crate::fit::search::starts::{Work, search_as_far};
+use crate::log::{Log, Output, Quantity};
+use crate::solve::Flow;
 use std::ops::Range;
 use std::sync::Arc;
 
 /// The parts that are fitted, and those that are held out.
-pub(super) struct Fold {
+pub(crate) struct Fold {
     pub fitted: Vec<Experiment>,
     pub held_out: Vec<Experiment>,
 }
 
 /// The records in parts: each is held out once. The flag says that logs were cut, so that their parts have starts of
 /// their own.
-pub(super) struct Parts {
+pub(crate) struct Parts {
     pub folds: Vec<Fold>,
     pub is_cut: bool,
 }
@@ -41,6 +49,31 @@ impl Parts {
             false => format!("the logs, in {} parts, one after the other", self.folds.len()),
         }
     }
+}
+
+/// Sums of squares of a part that is not fitted, by quantity, with the number of values; from a fit to the other parts
+/// that begins at the machine of `case`. `is_cut`: the parts are blocks of logs, with starts of their own.
+pub(crate) fn errors(
+    case: &Case,
+    plan: &Plan,
+    fold: &Fold,
+    (is_cut, options): (bool, &Options),
+    stop: Option<Stop>,
+) -> Result<(Vec<(Quantity, f64, usize)>, Work)> {
+    let Fold { fitted, held_out } = fold;
+    let mut plan = Plan { held_out: Vec::new(), separate: Vec::new(), ..plan.clone() };
+    plan.nuisance.initial_state |= is_cut;
+    let own = Case { experiments: fitted.clone(), ..case.clone() };
+    let found = search_as_far(&own, &plan, stop, options, &mut |_, _| Flow::Continue)?;
+    let machine = found.problem.stage_at(&found.best.x);
+    let known = known(&found);
+    let held = Case { experiments: held_out.clone(), ..case.clone() };
+    let scored = Plan { windows: None, nuisance: plan.nuisance, ..nothing(&plan) };
+    let logs: Vec<_> =
+        Problem::new(&held, &scored)?.runs.iter().map(|run| met(run, &machine, &known, START_SHARE)).collect();
+    let errors = together(&logs, |_| String::new());
+    let errors = errors.iter().map(|one| (one.quantity, one.rmse.powi(2) * one.count as f64, one.count));
+    Ok((errors.collect(), found.work))
 }
 
 /// Every so many logs, so that each part is like the others.

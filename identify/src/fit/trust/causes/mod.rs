@@ -1,0 +1,137 @@
+//! Causes of what the model leaves: the model is fitted once more with one element that it lacks.
+//!
+//! Each [`Extension`] is a row of a table. All of them take a few damped Gauss-Newton steps from where the fit ended,
+//! which ranks them; the best are fitted whole. With the costs C of the fit and C′ of the fit with the element, it
+//! explains
+//!
+//! ```text
+//! 1 − C′/C
+//! ```
+//!
+//! of what is left. An element is accepted if its size differs from zero by more than noise makes of it, and if the fit
+//! with it to parts of the logs predicts the other parts better. The estimates are then d away from those with it, and
+//! intervals of half-width h become √(h² + 2 (d² + h′²)) ≥ d + h′, h′ that of the fit with the element.
+
+mod extension;
+mod tried;
+
+use super::doubts::{Cause, OtherLaw};
+use super::parts::{Parts, errors};
+use super::uncertainty::Judged;
+use crate::case::{Case, Plan};
+use crate::fit::asked::problem::Stop;
+use crate::fit::asked::run::Run;
+use crate::fit::limits::{
+    CAUSE_ERRORS, CAUSE_EXPLAINS, CAUSE_MOST_VALUES, CAUSE_NEAR, CAUSE_STEPS, CAUSES_FITTED, COLOURED, NORMAL,
+    ROUGH_TOLERANCE, STARTS_FITTED, STEPS_IN_PART,
+};
+use crate::fit::search::point::Options;
+use crate::fit::search::starts::Searched;
+use crate::machine::Kind;
+use extension::{EXTENSIONS, Site};
+use nalgebra::{DMatrix, DVector};
+use tried::Tried;
+
+/// The element that explains most of what the fit leaves; none where none is accepted, or `law`, a friction law,
+/// explains more.
+pub(crate) fn cause(
+    case: &Case,
+    plan: &Plan,
+    found: &Searched,
+    judged: &Judged,
+    law: Option<&OtherLaw>,
+) -> Option<Cause> {
+    if !is_asked(case, plan, found, judged) {
+        return None;
+    }
+    let site = Site::new(case, plan, found);
+    let before = found.best.cost;
+    let mut ranked: Vec<Tried> = EXTENSIONS
+        .iter()
+        .flat_map(|extension| extension.tries(&site))
+        .filter_map(|extended| Tried::begun(&site, extended, CAUSE_STEPS))
+        .filter(|tried| tried.cost() < CAUSE_NEAR * before)
+        .collect();
+    ranked.sort_by(|a, b| a.cost().total_cmp(&b.cost()));
+    let mut kinds = Vec::new();
+    ranked.retain(|tried| {
+        kinds.push(tried.kind());
+        kinds.iter().filter(|kind| **kind == tried.kind()).count() <= STARTS_FITTED
+    });
+    ranked.truncate(CAUSES_FITTED);
+    let mut whole: Vec<Tried> = ranked.into_iter().filter_map(Tried::fitted).collect();
+    whole.sort_by(|a, b| a.cost().total_cmp(&b.cost()));
+    for tried in whole {
+        let gain = 2.0 * (before - tried.cost());
+        let explained = 1.0 - tried.cost() / before;
+        if explained < CAUSE_EXPLAINS || law.is_some_and(|law| law.gain > gain) {
+            return None;
+        }
+        let Some(known) = tried.judged() else { continue };
+        let standard_errors = tried.standard_errors(&known);
+        if standard_errors < CAUSE_ERRORS {
+            continue;
+        }
+        let Some(better) = predicts(&site, &tried, found.problem.stop()) else { continue };
+        return tried.told(&site, &known, [explained, standard_errors], better);
+    }
+    None
+}
+
+/// Whether causes are looked for: the residuals are no white noise, and the fit is one of its kind.
+fn is_asked(case: &Case, plan: &Plan, found: &Searched, judged: &Judged) -> bool {
+    let problem = &found.problem;
+    judged.inflation >= COLOURED
+        && case.machine.kind == Kind::Axis
+        && plan.windows.is_none()
+        && plan.until.is_none()
+        && plan.separate.is_empty()
+        && !plan.huber
+        && !problem.is_stopped()
+        && !problem.runs.iter().any(Run::is_closed)
+        && problem.counted() <= CAUSE_MOST_VALUES
+        && problem.machine.is_piecewise_linear()
+        && !problem.parameters.is_empty()
+}
+
+/// In how many of the parts of the logs the fit with an element to the other parts predicts better, and of how many;
+/// none where it does not clearly do so.
+fn predicts(site: &Site, tried: &Tried, stop: Option<Stop>) -> Option<[usize; 2]> {
+    let without = Case { machine: site.machine.clone(), ..site.case.clone() };
+    let plan = Plan { starts: 1, ..site.plan.clone() };
+    let (with, own) = tried.case_and_plan();
+    let parts = [Parts::new(&without, &plan), Parts::new(&with, &own)];
+    let options =
+        Options { tolerance: ROUGH_TOLERANCE, iterations: STEPS_IN_PART, evolutions: 0, ..Options::default() };
+    let [before, after] = &parts;
+    let mut gains = Vec::new();
+    for (one, other) in before.folds.iter().zip(&after.folds) {
+        let mean = |case: &Case, plan: &Plan, fold| {
+            let (found, _) = errors(case, plan, fold, (before.is_cut, &options), stop).ok()?;
+            // Quantities in units of their residuals.
+            let own = found.iter().map(|(quantity, squares, count)| {
+                let deviation = site.deviation(*quantity);
+                (squares / (deviation * deviation), *count)
+            });
+            let (squares, count) = own.fold((0.0, 0), |(s, n), (squares, count)| (s + squares, n + count));
+            Some(squares / count.max(1) as f64)
+        };
+        let (without, with) = (mean(&without, &plan, one)?, mean(&with, &own, other)?);
+        // ln of the ratio: a part in which a start is missed has errors of another size.
+        gains.push((without / with).ln());
+    }
+    let n = gains.len() as f64;
+    let mean = gains.iter().sum::<f64>() / n;
+    let variance = gains.iter().map(|gain| (gain - mean).powi(2)).sum::<f64>() / (n - 1.0) / n;
+    let better = gains.iter().filter(|gain| **gain > 0.0).count();
+    let is_clear = gains.len() >= 2 && better + 1 >= gains.len() && mean > variance.sqrt();
+    is_clear.then_some([better, gains.len()])
+}
+
+/// What is added to a covariance so that intervals contain values that are off by `shift` and have these errors.
+fn widened(shift: &[f64], errors: &[f64]) -> DMatrix<f64> {
+    let d = DVector::from_column_slice(shift);
+    let own = DMatrix::from_diagonal(&DVector::from_iterator(errors.len(), errors.iter().map(|e| e * e)));
+    // (|d| + h′)² ≤ 2 (d² + h′²)
+    &d * d.transpose() * (2.0 / (NORMAL * NORMAL)) + own * 2.0
+}

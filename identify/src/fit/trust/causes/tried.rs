@@ -1,0 +1,192 @@
+//! A fit with one element more.
+
+use super::extension::{Extended, Site};
+use super::widened;
+use crate::case::{Case, Plan};
+use crate::fit::asked::problem::Problem;
+use crate::fit::asked::residuals::Residuals;
+use crate::fit::limits::{CAUSE_DIFFERENCE, ROUGH_TOLERANCE, TRIAL_FIT_ITERATIONS};
+use crate::fit::search::least_squares::minimise;
+use crate::fit::search::point::{Ending, Minimum, Options};
+use crate::fit::trust::doubts::{Cause, Size};
+use crate::fit::trust::uncertainty::Judged;
+use crate::machine::Machine;
+use crate::solve::Flow;
+
+/// A model with one element more, and where its search is.
+pub(super) struct Tried<'a> {
+    extended: Extended,
+    problem: Problem<'a>,
+    best: Minimum,
+}
+
+impl<'a> Tried<'a> {
+    /// So many steps from where the fit without the element ended; none where the model does not get through the logs.
+    pub fn begun(site: &Site<'_, 'a>, extended: Extended, steps: usize) -> Option<Self> {
+        let mut problem = Problem::new(&extended.case, &extended.plan).ok()?.stopped_by(site.found.problem.stop());
+        let noise: Vec<_> = problem.quantities().iter().map(|&own| (own, site.deviation(own))).collect();
+        problem.swings = site.found.problem.swings;
+        problem.weigh_by(&noise);
+        let mut start = problem.start();
+        let (g, old) = (problem.globals(), site.found.problem.globals());
+        let own = &site.found.best.x[old..];
+        if own.len() == start.len() - g {
+            start[g..].copy_from_slice(own);
+        }
+        if let (Some(delay), Some(last)) = (extended.delay, problem.shared.last()) {
+            start[g - 1] = (delay - last.start) / last.unit;
+        }
+        let best = descend(&mut problem, &start, steps)?;
+        Some(Self { extended, problem, best })
+    }
+
+    /// The same to its end.
+    pub fn fitted(mut self) -> Option<Self> {
+        let from = self.best.x.clone();
+        self.best = descend(&mut self.problem, &from, TRIAL_FIT_ITERATIONS)?;
+        Some(self)
+    }
+
+    /// ½ Σ r²
+    pub fn cost(&self) -> f64 {
+        self.best.cost
+    }
+
+    /// The row of the table, and the side on which the sensor is.
+    pub fn kind(&self) -> (&'static str, bool) {
+        (self.extended.key, self.extended.at_motor)
+    }
+
+    /// The information of the logs on it.
+    pub fn judged(&self) -> Option<Judged> {
+        let Minimum { residuals, jacobian, x, at_bound, .. } = &self.best;
+        Judged::new(&self.problem, residuals, jacobian, x, at_bound)
+    }
+
+    /// The machine with the element.
+    fn machine(&self, x: &[f64]) -> Machine {
+        self.problem.stage_at(x)
+    }
+
+    /// The place of the variable whose size says whether the element is there.
+    fn telling(&self) -> Option<usize> {
+        match self.extended.telling {
+            Some(key) => self.problem.parameters.iter().position(|own| own.name == key),
+            None => self.problem.globals().checked_sub(1),
+        }
+    }
+
+    /// The size of the element in standard errors: of what is searched for by its logarithm, 1 over the error of that.
+    pub fn standard_errors(&self, judged: &Judged) -> f64 {
+        let Some(j) = self.telling() else { return 0.0 };
+        let Some(error) = judged.covariance.error(j).filter(|error| *error > 0.0) else { return 0.0 };
+        match j < self.problem.parameters.len() {
+            true if self.problem.is_log(j) => 1.0 / error,
+            true => self.best.x[j].abs() / error,
+            false => {
+                let extra = self.problem.shared[j - self.problem.parameters.len()];
+                (extra.start / extra.unit + self.best.x[j]).abs() / error
+            }
+        }
+    }
+
+    /// The case with the element, its machine as fitted, and what is searched for in it.
+    pub fn case_and_plan(&self) -> (Case, Plan) {
+        let case = Case { machine: self.machine(&self.best.x), ..self.extended.case.clone() };
+        (case, self.extended.plan.clone())
+    }
+
+    /// The cause with its sizes; none where its sizes cannot be told.
+    pub fn told(
+        &self,
+        site: &Site,
+        judged: &Judged,
+        [explained, standard_errors]: [f64; 2],
+        better: [usize; 2],
+    ) -> Option<Cause> {
+        let (x, base) = (&self.best.x, &site.found.problem);
+        let machine = self.machine(x);
+        let error = |j: usize| judged.covariance.error(j);
+        let mut parameters = Vec::new();
+        for (j, own) in self.problem.parameters.iter().enumerate() {
+            if base.parameters.iter().any(|other| other.name == own.name) {
+                continue;
+            }
+            let value = self.problem.value(j, x[j]);
+            let error = error(j).map_or(f64::INFINITY, |error| error * self.problem.slope(j, value));
+            parameters.push(Size { name: own.name.clone(), unit: own.unit, value, error });
+        }
+        let mut delay = 0.0;
+        if self.problem.shared.len() > base.shared.len()
+            && let Some(last) = self.problem.shared.last()
+        {
+            let j = self.problem.globals() - 1;
+            delay = last.start + last.unit * x[j];
+            let error = error(j).map_or(f64::INFINITY, |error| error * last.unit);
+            parameters.push(Size { name: last.what.name().into(), unit: "s", value: delay, error });
+        }
+        let g = base.globals();
+        let (mut shift, mut errors) = (vec![0.0; g], vec![0.0; g]);
+        let mut estimates = vec![None; g];
+        for (j, own) in base.parameters.iter().enumerate() {
+            let as_base = |x: &[f64]| own.value_in(&site.without(self.machine(x)));
+            let Some(value) = as_base(x).filter(|value| value.is_finite()) else { continue };
+            let error = self.propagated(judged, &as_base);
+            let slope = base.slope(j, value).abs().max(f64::MIN_POSITIVE);
+            let moved = base.variable(j, value) - site.found.best.x[j];
+            if !moved.is_finite() || !error.is_finite() {
+                continue;
+            }
+            (shift[j], errors[j]) = (moved, error / slope);
+            estimates[j] = Some(Size { name: own.name.clone(), unit: own.unit, value, error });
+        }
+        let added = widened(&shift, &errors);
+        let (words, add) = self.extended.words(site, &machine, delay);
+        let key = self.extended.key;
+        Some(Cause { key, words, explained, standard_errors, parameters, estimates, add, better, added })
+    }
+
+    /// The standard error of a function of the variables: √(gᵀ C g), g its gradient.
+    fn propagated(&self, judged: &Judged, value: &dyn Fn(&[f64]) -> Option<f64>) -> f64 {
+        let covariance = &judged.covariance;
+        let globals = self.problem.globals();
+        let places: Vec<(usize, usize)> =
+            covariance.free.iter().copied().enumerate().filter(|(_, j)| *j < globals).collect();
+        let slope = |j: usize| {
+            let h = CAUSE_DIFFERENCE * self.best.x[j].abs().max(1.0);
+            let at = |by: f64| {
+                let mut moved = self.best.x.clone();
+                moved[j] += by;
+                value(&moved)
+            };
+            Some((at(h)? - at(-h)?) / (2.0 * h))
+        };
+        let gradient: Vec<(usize, f64)> =
+            places.iter().map(|&(place, j)| (place, slope(j).unwrap_or(f64::INFINITY))).collect();
+        let mut sum = 0.0;
+        for (a, ga) in gradient.iter().filter(|(_, g)| *g != 0.0) {
+            for (b, gb) in gradient.iter().filter(|(_, g)| *g != 0.0) {
+                sum += ga * gb * covariance.matrix[(*a, *b)];
+            }
+        }
+        sum.max(0.0).sqrt()
+    }
+}
+
+/// Where a short search from `start` leads.
+fn descend(problem: &mut Problem, start: &[f64], iterations: usize) -> Option<Minimum> {
+    if start.len() != problem.variables() || problem.is_stopped() {
+        return None;
+    }
+    let options = Options {
+        iterations,
+        tolerance: ROUGH_TOLERANCE,
+        evolutions: 0,
+        rounding: problem.rounding(),
+        ..Options::default()
+    };
+    let bounds = problem.bounds();
+    let found = minimise(problem, start, &bounds, &options, &mut |_, _| Flow::Continue);
+    let is_there = found.jacobian.nrows() == problem.rows() && found.cost.is_finite();
+    (is_there && !matches!(found.ending, Ending::Failed | Ending::Interrupted)).then_some(found)
+}

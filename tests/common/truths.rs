@@ -1,0 +1,219 @@
+//! Machines that a rigid axis with viscous and Coulomb friction is not, integrated here: nothing is shared with taut's
+//! solvers.
+//!
+//! Two masses with a spring or play between them, in steps of [`STEP`]; a position moves by the mean of the speeds before
+//! and behind a step. Dry friction takes off as much of a speed as it can in a step, and holds what is left of less.
+
+use super::chance::Chance;
+use std::f64::consts::TAU;
+use std::sync::Arc;
+use taut::case::Case;
+use taut::log::{Log, Output, Quantity};
+use taut::signal::{Hold, Signal};
+
+pub const EVERY: f64 = 1e-3;
+pub const COUNT: usize = 4001;
+
+/// Steps of the integration between two samples.
+const STEPS: usize = 300;
+const STEP: f64 = EVERY / STEPS as f64;
+
+/// A machine in current mode: mass, viscous and Coulomb friction, all at the cart.
+pub const AXIS: &str = r#"
+[motor]
+torque_constant = 1
+back_emf_constant = 0
+resistance = 1
+[amplifier]
+mode = "current"
+[drive_pulley]
+radius = 1
+inertia = 1e-6
+[idler_pulley]
+inertia = 1e-6
+[belt]
+model = "rigid"
+[cart]
+mass = "1 kg"
+friction = { viscous = "10 N s/m", coulomb = "1.5 N" }
+[[experiment]]
+name = "log"
+input = { step = "1 A" }
+until = "1 s"
+every = "1 ms"
+[fit]
+free = ["cart.mass", "cart.friction.viscous", "cart.friction.coulomb"]
+"#;
+
+/// What the model lacks.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Truth {
+    /// Nothing.
+    Right,
+    /// A spring of 17 Hz between motor and cart, the position read at the cart.
+    Spring,
+    /// The same, the position read at the motor.
+    SpringAtMotor,
+    /// Play of 0.3 mm, positions in counts of 50 µm.
+    Play,
+    /// Samples taken 0 to 0.8 ms after their stamps.
+    Late,
+    /// Bristles.
+    LuGre,
+    /// A drag of 0.3 b v² beside the friction.
+    Drag,
+    /// All friction goes by one sine of ±10 % along the log.
+    Drift,
+    /// Nothing; noise of second order at 15 Hz, ζ = 0.05, of 1 mm.
+    NarrowBand,
+}
+
+impl Truth {
+    pub const ALL: [Self; 9] = [
+        Self::Right,
+        Self::Spring,
+        Self::SpringAtMotor,
+        Self::Play,
+        Self::Late,
+        Self::LuGre,
+        Self::Drag,
+        Self::Drift,
+        Self::NarrowBand,
+    ];
+
+    /// Its name in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Right => "nothing",
+            Self::Spring => "a spring of 17 Hz between motor and cart",
+            Self::SpringAtMotor => "the same, the position read at the motor",
+            Self::Play => "play of 0.3 mm, counts of 50 µm",
+            Self::Late => "samples taken 0 to 0.8 ms after their stamps",
+            Self::LuGre => "LuGre",
+            Self::Drag => "a drag of 0.3 b v²",
+            Self::Drift => "friction drifts by one sine of ±10 %",
+            Self::NarrowBand => "nothing; noise at 15 Hz, ζ = 0.05",
+        }
+    }
+}
+
+/// Mass, viscous and Coulomb friction.
+type Values = [f64; 3];
+
+/// Random levels of force, N, for each sample.
+fn forces(chance: &mut Chance) -> Vec<f64> {
+    let mut input = vec![0.0; COUNT];
+    let (mut k, mut sign) = (50, 1.0);
+    while k + 400 < COUNT {
+        let next = k + 100 + (200.0 * chance.uniform()) as usize;
+        input[k..next].fill(sign * (5.0 + 10.0 * chance.uniform()));
+        (k, sign) = (next + (60.0 * chance.uniform()) as usize, -sign);
+    }
+    input
+}
+
+/// The position that is read, m, in steps of [`STEP`].
+fn positions(truth: Truth, [mass, viscous, coulomb]: Values, input: &[f64], share: f64) -> Vec<f64> {
+    let (before, behind) = match truth {
+        Truth::Spring | Truth::SpringAtMotor | Truth::Play => (share * mass, (1.0 - share) * mass),
+        _ => (0.0, mass),
+    };
+    let reduced = before * behind / mass;
+    let frequency = if truth == Truth::Play { 120.0 } else { 17.0 };
+    let stiffness = reduced * (TAU * frequency).powi(2);
+    let damping = 2.0 * if truth == Truth::Play { 0.3 } else { 0.03 } * (stiffness * reduced).sqrt();
+    let half = if truth == Truth::Play { 0.15e-3 } else { 0.0 };
+    let (mut x, mut v, mut xm, mut vm, mut z) = (0.0f64, 0.0f64, 0.0f64, 0.0f64, 0.0f64);
+    let mut all = Vec::with_capacity(input.len() * STEPS);
+    for k in 0..(input.len() - 1) * STEPS + 1 {
+        all.push(if truth == Truth::SpringAtMotor { xm } else { x });
+        let time = k as f64 * STEP;
+        let drift = match truth {
+            Truth::Drift => 1.0 + 0.1 * (TAU * time / (COUNT as f64 * EVERY)).sin(),
+            _ => 1.0,
+        };
+        let force = input[(k / STEPS).min(input.len() - 1)];
+        let pull = if before > 0.0 {
+            let stretch = xm - x;
+            let beyond = stretch.signum() * (stretch.abs() - half).max(0.0);
+            let own = stiffness * beyond + if beyond != 0.0 { damping * (vm - v) } else { 0.0 };
+            let last = vm;
+            vm += STEP * (force - own) / before;
+            xm += 0.5 * STEP * (last + vm);
+            own
+        } else {
+            force
+        };
+        let drag = if truth == Truth::Drag { 0.3 * viscous * v * v.abs() } else { 0.0 };
+        let last = v;
+        if truth == Truth::LuGre {
+            // ż = v − σ₀ |v|/g z,  F = σ₀ z + σ₁ ż + b v
+            let (stiff, calm) = (coulomb / 0.1e-3, (coulomb / 0.1e-3 * mass).sqrt());
+            let g = coulomb * (1.0 + 0.5 * (-(v / 0.05).powi(2)).exp());
+            let rate = v - stiff * v.abs() / g * z;
+            z += STEP * rate;
+            v += STEP * (pull - stiff * z - calm * rate - viscous * v) / behind;
+        } else {
+            // M (v′ − v)/h = F − b (v + v′)/2, and dry friction takes off no more than there is.
+            let (half, per_mass) = (0.5 * STEP * drift * viscous / behind, STEP / behind);
+            v = ((1.0 - half) * v + per_mass * (pull - drag)) / (1.0 + half);
+            v = v.signum() * (v.abs() - per_mass * drift * coulomb / (1.0 + half)).max(0.0);
+        }
+        x += 0.5 * STEP * (last + v);
+    }
+    all
+}
+
+/// A case with a log of such a machine, and its values.
+pub fn drawn(seed: u64, truth: Truth) -> (Case, Values) {
+    let mut chance = Chance::new(seed);
+    let mut case = Case::from_text("axis.toml", AXIS).unwrap();
+    let mut off = || 2f64.powf(chance.uniform() - 0.5);
+    let values = [off(), 10.0 * off(), 1.5 * off()];
+    let share = 0.3 + 0.3 * chance.uniform();
+    let input = forces(&mut chance);
+    let position = positions(truth, values, &input, share);
+    let narrow = narrow(&mut chance);
+    let count = if truth == Truth::Play { 50e-6 } else { 1e-6 };
+    let read = |k: usize, chance: &mut Chance| {
+        let late = if truth == Truth::Late { (0.8 * chance.uniform() * STEPS as f64) as usize } else { 0 };
+        let noise = if truth == Truth::NarrowBand { 1e-3 * narrow[k] } else { 0.0 };
+        let value = position[(k * STEPS + late).min(position.len() - 1)] + noise + 1e-5 * chance.normal();
+        (value / count).round() * count
+    };
+    let seen: Vec<f64> = (0..COUNT).map(|k| read(k, &mut chance)).collect();
+    let time: Vec<f64> = (0..COUNT).map(|k| k as f64 * EVERY).collect();
+    let experiment = &mut case.experiments[0];
+    (experiment.until, experiment.every) = ((COUNT - 1) as f64 * EVERY, EVERY);
+    experiment.inputs[0] = Signal::Sampled { times: time.clone(), values: input.clone(), hold: Hold::Zero };
+    experiment.log = Some(Arc::new(Log {
+        name: "log".into(),
+        file: Default::default(),
+        time,
+        input,
+        hold: Hold::Zero,
+        added: None,
+        reference: None,
+        outputs: vec![Output { quantity: Quantity::CartPosition, absolute: false, values: seen }],
+        ended: None,
+    }));
+    (case, values)
+}
+
+/// Noise of second order at 15 Hz, damped by 0.05, of deviation 1.
+pub fn narrow(chance: &mut Chance) -> Vec<f64> {
+    // x_k = 2 ρ cos(ω h) x_{k−1} − ρ² x_{k−2} + e_k
+    let (zeta, omega) = (0.05f64, TAU * 15.0);
+    let rho = (-zeta * omega * EVERY).exp();
+    let (a, b) = (2.0 * rho * (omega * (1.0 - zeta * zeta).sqrt() * EVERY).cos(), -rho * rho);
+    let (mut last, mut before) = (0.0, 0.0);
+    let mut all: Vec<f64> = Vec::new();
+    for _ in 0..COUNT + 2000 {
+        let next = a * last + b * before + chance.normal();
+        (last, before) = (next, last);
+        all.push(next);
+    }
+    all.drain(..2000);
+    let size = (all.iter().map(|v| v * v).sum::<f64>() / COUNT as f64).sqrt();
+    all.iter().map(|v| v / size).collect()
+}
