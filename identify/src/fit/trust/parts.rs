@@ -51,6 +51,9 @@ impl Parts {
     }
 }
 
+/// Sum of squares and number of values of each quantity.
+pub(crate) type Errors = Vec<(Quantity, f64, usize)>;
+
 /// Sums of squares of a part that is not fitted, by quantity, with the number of values; from a fit to the other parts
 /// that begins at the machine of `case`. `is_cut`: the parts are blocks of logs, with starts of their own.
 pub(crate) fn errors(
@@ -59,7 +62,7 @@ pub(crate) fn errors(
     fold: &Fold,
     (is_cut, options): (bool, &Options),
     stop: Option<Stop>,
-) -> Result<(Vec<(Quantity, f64, usize)>, Work)> {
+) -> Result<(Errors, Work)> {
     let Fold { fitted, held_out } = fold;
     let mut plan = Plan { held_out: Vec::new(), separate: Vec::new(), ..plan.clone() };
     plan.nuisance.initial_state |= is_cut;
