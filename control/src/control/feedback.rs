@@ -14,6 +14,7 @@ use super::standard::Text;
 use crate::calculator::{Dual, Run, Slope};
 use crate::design::Design;
 use crate::error::Result;
+use crate::linear::eigen::{balance, scaled};
 use crate::machine::Machine;
 use crate::signal::profile::Reference;
 use nalgebra::{Complex, DMatrix, Schur};
@@ -314,8 +315,9 @@ impl System {
     /// Turns a circle of `size` states so that its block is lower triangular but for pairs: with S = D Q of powers of
     /// two that balance it and of Schur's form (D⁻¹ A D)ᵀ = Q T Qᵀ, S⁻¹ A S = Tᵀ.
     fn turn(&mut self, begin: usize, size: usize) {
-        let mut block = self.a.view((begin, begin), (size, size)).into_owned();
-        let scales = balanced(&mut block);
+        let block = self.a.view((begin, begin), (size, size)).into_owned();
+        let scales = balance(&block);
+        let block = scaled(&block, &scales);
         let is_finite = block.iter().all(|v| v.is_finite());
         let schur = is_finite.then(|| Schur::try_new(block.transpose(), f64::EPSILON, TURNS)).flatten();
         // What has no numbers answers with none.
@@ -370,32 +372,4 @@ fn circles(a: &DMatrix<f64>) -> Vec<Vec<usize>> {
         all.push(circle);
     }
     all
-}
-
-/// D⁻¹ A D with powers of two that make rows and columns alike (B. N. Parlett, C. Reinsch, "Balancing a matrix for
-/// calculation of eigenvalues and eigenvectors", Numerische Mathematik 13, 1969); D.
-fn balanced(a: &mut DMatrix<f64>) -> Vec<f64> {
-    let n = a.nrows();
-    let mut scales = vec![1.0; n];
-    for _ in 0..64 {
-        let mut is_done = true;
-        for i in 0..n {
-            let others = |of: &dyn Fn(usize) -> f64| (0..n).filter(|&j| j != i).map(|j| of(j).abs()).sum::<f64>();
-            let (column, row) = (others(&|j| a[(j, i)]), others(&|j| a[(i, j)]));
-            if !(column > 0.0 && row > 0.0 && column.is_finite() && row.is_finite()) {
-                continue;
-            }
-            let factor = (0.5 * (row / column).log2()).round().exp2();
-            if factor != 1.0 {
-                is_done = false;
-                scales[i] *= factor;
-                a.column_mut(i).scale_mut(factor);
-                a.row_mut(i).scale_mut(1.0 / factor);
-            }
-        }
-        if is_done {
-            break;
-        }
-    }
-    scales
 }

@@ -7,6 +7,7 @@
 //! diagonal of ones, and the result is refined by Newton's method.
 
 use crate::error::{Error, Result};
+use crate::linear::eigen::{balance, scaled as balanced};
 use nalgebra::{DMatrix, DVector};
 
 /// Residual, relative to the largest of the equation's terms, up to which a solution counts.
@@ -134,20 +135,9 @@ fn accepted(best: Option<Solution>) -> Result<Solution> {
     }
 }
 
-/// Powers of two that even out rows and columns of A, as for eigenvalues.
+/// The scale that balances A, with the largest weight of a state at 1.
 fn first_scale(a: &DMatrix<f64>, q: &DMatrix<f64>) -> DVector<f64> {
-    let n = a.nrows();
-    let mut scale = DVector::from_element(n, 1.0);
-    for _ in 0..20 {
-        for i in 0..n {
-            let others = |j: &usize| *j != i;
-            let column: f64 = (0..n).filter(others).map(|j| (a[(j, i)] / scale[j] * scale[i]).abs()).sum();
-            let row: f64 = (0..n).filter(others).map(|j| (a[(i, j)] * scale[j] / scale[i]).abs()).sum();
-            if column > 0.0 && row > 0.0 {
-                scale[i] *= (0.5 * (row / column).log2()).round().exp2();
-            }
-        }
-    }
+    let (n, scale) = (a.nrows(), balance(a));
     let size = (0..n).map(|i| (q[(i, i)] * scale[i] * scale[i]).abs()).fold(0.0, f64::max);
     if size > 0.0 { scale / size.sqrt() } else { scale }
 }
@@ -158,10 +148,8 @@ fn scaled(
     q: &DMatrix<f64>,
     scale: &DVector<f64>,
 ) -> (DMatrix<f64>, DMatrix<f64>, DMatrix<f64>) {
-    let n = a.nrows();
-    let sa = DMatrix::from_fn(n, n, |i, j| a[(i, j)] * scale[j] / scale[i]);
-    let sb = DMatrix::from_fn(n, b.ncols(), |i, j| b[(i, j)] / scale[i]);
-    (sa, sb, both_sides(q, scale))
+    let sb = DMatrix::from_fn(a.nrows(), b.ncols(), |i, j| b[(i, j)] / scale[i]);
+    (balanced(a, scale), sb, both_sides(q, scale))
 }
 
 fn both_sides(x: &DMatrix<f64>, scale: &DVector<f64>) -> DMatrix<f64> {

@@ -12,7 +12,7 @@
 
 mod analysis;
 mod discrete;
-mod eigen;
+pub(crate) mod eigen;
 mod frame;
 mod gantry;
 mod model;
