@@ -382,7 +382,10 @@ mod tests {
             }
         });
         assert_eq!(had.into_inner(), 40);
-        assert_eq!(names(&folder), ["far"]);
+        // A folder that one let go while another took it up stays, with nothing in it.
+        let left = names(&folder);
+        let is_empty = || names(&folder.join("new")).is_empty();
+        assert!(left == ["far"] || left == ["far", "new"] && is_empty(), "{left:?}");
         fs::remove_dir_all(&folder).unwrap();
     }
 
