@@ -8,7 +8,6 @@ use taut::control::feedback::Feedback;
 use taut::control::{Loop, Standard, close};
 use taut::friction::Motion;
 use taut::machine::axis::CART;
-
 use taut::signal::profile::{Leg, Limits, Profile};
 use taut::solve::{Event, Solver};
 use taut::tune::{Family, Judgement, Margins, Plant, SPREAD, evaluate, hunting, tune};
