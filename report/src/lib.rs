@@ -65,3 +65,15 @@ pub fn machine_drawing(machine: &taut::machine::Machine) -> String {
         _ => gantry::gantry_drawing(machine),
     }
 }
+
+/// Puts the drawing of a machine on a page, and says what it leaves out.
+pub fn drawn(page: &mut Page, machine: &taut::machine::Machine) {
+    let caption = match machine.bridge.is_some() {
+        false => "Symbols, values and positive directions.",
+        true => {
+            "In plan view with positive directions; lengths are not to scale. In the model the bridge does not yaw, and \
+             idlers have neither inertia nor friction."
+        }
+    };
+    page.drawing(&machine_drawing(machine), caption);
+}
