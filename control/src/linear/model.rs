@@ -3,7 +3,7 @@
 use super::frame::{Frame, Variable, gears};
 use crate::error::{Error, Result};
 use crate::friction::{Law, Motion};
-use crate::machine::{BeltMake, BeltModel, Machine};
+use crate::machine::{BeltMake, BeltModel, Geometry, Machine};
 use crate::mechanism::{AmplifierMode, BODIES, Contact, Form, Mechanism, Mode, Over, SpringLaw};
 use nalgebra::{DMatrix, DVector};
 
@@ -205,11 +205,30 @@ pub(super) fn placed(machine: &Machine, operation: Operation) -> Result<Machine>
         let name = |body: usize| machine.geometry().label(body).name;
         let places = slides.iter().zip(at).map(|(slide, at)| format!("the {} at {at} m", name(slide.body)));
         let places = places.collect::<Vec<_>>().join(" and ");
-        return Err(Error::new(format!("with {places} a span would have no length"))
-            .next("name a place on the travel, between the pulleys"));
+        let error = Error::new(format!("with {places} a span would have no length"));
+        let error = match slides {
+            [_] => error.allowed(within(machine.geometry(), &make)),
+            _ => error,
+        };
+        return Err(error.next("name a place on the travel, between the pulleys"));
     }
     machine.belt.stiffness = BeltMake { spans: lengths, ..make }.stiffness();
     Ok(machine)
+}
+
+/// Where the one sliding part can be, in words: no span shorter than nothing.
+fn within(geometry: &Geometry, make: &BeltMake) -> String {
+    let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
+    for (length, span) in make.spans.into_iter().zip(geometry.spans) {
+        for (_, arm) in span.follows {
+            // l + arm x > 0
+            match *arm > 0.0 {
+                true => low = low.max(-length / arm),
+                false => high = high.min(-length / arm),
+            }
+        }
+    }
+    format!("between {low} m and {high} m")
 }
 
 /// The mode of steady sliding.

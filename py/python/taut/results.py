@@ -455,7 +455,7 @@ def _together(
     models: Sequence[tuple[NDArray[np.float64], ...]],
     names: Sequence[Sequence[str]],
     inputs: Sequence[str],
-) -> tuple[tuple[NDArray[np.float64], ...], tuple[str, ...]]:
+) -> tuple[tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]], tuple[str, ...]]:
     """A, B, C, D of one machine from those of each of its inputs, which have the machine's states first and then
     inputs of their own that are on their way; and the names of all states."""
     late = [a.shape[0] - states for a, *_ in models]
@@ -498,12 +498,13 @@ class Modes:
         data = found["data"]
         inputs, outputs, states = (tuple(row["name"] for row in data[key]) for key in ("inputs", "outputs", "states"))
         units = {row["name"]: row["unit"] for row in [*data["inputs"], *data["outputs"]]}
-        model = LinearModel(*found["continuous"], 0.0, states, inputs, outputs, units)
+        a, b, c, d = found["continuous"]
+        model = LinearModel(a, b, c, d, 0.0, states, inputs, outputs, units)
         discrete = None
         if sample_time is not None:
             names = [one["discrete"]["states"] for one in data["inputs"]]
-            matrices, names = _together(len(states), found["discrete"], names, inputs)
-            discrete = LinearModel(*matrices, float(sample_time), names, inputs, outputs, units)
+            (a, b, c, d), every = _together(len(states), found["discrete"], names, inputs)
+            discrete = LinearModel(a, b, c, d, float(sample_time), every, inputs, outputs, units)
         return cls(data, model, discrete, found["frequency"], found["responses"])
 
     @property
