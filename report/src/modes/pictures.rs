@@ -45,7 +45,7 @@ pub fn pictures(analysis: &Analysis) -> Pictures {
             true => format!("{} to {to}", words(&one.system.input.name)),
             false => to.to_string(),
         };
-        let group = |(name, to, outputs): (&str, &str, Vec<(String, String)>)| {
+        let group = |(name, to, outputs): Group| {
             let figure = response(&one.system, &one.responses, machine.pulley_radius, &title(to), &outputs);
             figure.map(|figure| (named(one, name), figure))
         };
@@ -59,9 +59,12 @@ pub fn pictures(analysis: &Analysis) -> Pictures {
     }
 }
 
+/// The name of a figure, its title, and the outputs in it with what they are called there.
+type Group = (&'static str, &'static str, Vec<(String, String)>);
+
 /// Outputs drawn together, each with what it is called there: the name of the figure, its title, the outputs. Angles
 /// and their rates are taken at the belt, so that they compare with what slides.
-fn groups(machine: &Machine) -> [(&'static str, &'static str, Vec<(String, String)>); 3] {
+fn groups(machine: &Machine) -> [Group; 3] {
     let geometry = machine.geometry();
     let slides = geometry.slides.iter().zip(["x", "y"]).map(|(slide, symbol)| (slide.body, symbol));
     let pulleys = geometry.bodies.iter().enumerate().filter(|(_, body)| body.part == Part::DrivePulley);
