@@ -66,8 +66,9 @@ pub fn machine_drawing(machine: &taut::machine::Machine) -> String {
     }
 }
 
-/// Puts the drawing of a machine on a page, and says what it leaves out.
-pub fn drawn(page: &mut Page, machine: &taut::machine::Machine) {
+/// Puts the drawing of a machine on a page, says what it leaves out, and returns it.
+pub fn drawn(page: &mut Page, machine: &taut::machine::Machine) -> String {
+    let drawing = machine_drawing(machine);
     let caption = match machine.bridge.is_some() {
         false => "Symbols, values and positive directions.",
         true => {
@@ -75,5 +76,6 @@ pub fn drawn(page: &mut Page, machine: &taut::machine::Machine) {
              idlers have neither inertia nor friction."
         }
     };
-    page.drawing(&machine_drawing(machine), caption);
+    page.drawing(&drawing, caption);
+    drawing
 }

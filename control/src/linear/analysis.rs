@@ -117,10 +117,12 @@ impl<'a> Analysis<'a> {
             let responses = system.responses(&transfers, &frequencies);
             Ok(ByInput { system, transfers, responses, discrete })
         };
-        let poles = each.first().map_or(Ok(Vec::new()), StateSpace::poles)?;
+        // All transfers have the same poles.
+        let poles = transfers.iter().flatten().next().map(|transfer| transfer.poles.clone()).unwrap_or_default();
         let inputs = each.into_iter().zip(transfers).map(by_input).collect::<Result<Vec<_>>>()?;
         let everything_slides = question.held.is_empty();
-        let modes = everything_slides.then(|| Natural::of(&machine.mechanism(), &positions(machine, operation)));
+        let at = machine.without_strain(&operation.coordinates(machine), &[]).position;
+        let modes = everything_slides.then(|| Natural::of(&machine.mechanism(), &at));
         Ok(Self {
             case,
             operation,
@@ -135,15 +137,6 @@ impl<'a> Analysis<'a> {
             map: ResonanceMap::of(machine)?,
         })
     }
-}
-
-/// Where the bodies are that slide; the others do not matter to what follows them.
-pub(super) fn positions(machine: &Machine, operation: Operation) -> [f64; BODIES] {
-    let mut positions = [0.0; BODIES];
-    for (slide, at) in machine.geometry().slides.iter().rev().zip([operation.position, operation.bridge]) {
-        positions[slide.body] = at;
-    }
-    positions
 }
 
 /// Refuses a question whose numbers are none.

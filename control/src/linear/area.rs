@@ -1,6 +1,6 @@
 //! Resonances over the working area of a machine that moves in a plane.
 
-use super::{Natural, Operation, analysis::positions};
+use super::Natural;
 use crate::error::Result;
 use crate::machine::{Machine, Travel};
 
@@ -34,8 +34,7 @@ impl ResonanceMap {
         let mut hertz: Vec<Vec<Vec<f64>>> = Vec::new();
         for (i, x) in bridge.iter().enumerate() {
             for y in &cart {
-                let at = Operation { bridge: *x, position: *y, ..Operation::default() };
-                let found = Natural::frequencies(&mechanism, &positions(machine, at))?;
+                let found = Natural::frequencies(&mechanism, &machine.without_strain(&[*x, *y], &[]).position)?;
                 hertz.resize_with(found.len(), || vec![Vec::with_capacity(cart.len()); bridge.len()]);
                 for (mode, frequency) in hertz.iter_mut().zip(found) {
                     mode[i].push(frequency);

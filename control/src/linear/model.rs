@@ -22,6 +22,13 @@ pub struct Operation {
     pub held: [bool; 6],
 }
 
+impl Operation {
+    /// Where each sliding part of `machine` is, m, in the order of its geometry.
+    pub(super) fn coordinates(&self, machine: &Machine) -> Vec<f64> {
+        machine.bridge.iter().map(|_| self.bridge).chain([self.position]).collect()
+    }
+}
+
 impl Default for Operation {
     /// Everything slides forward at 0.1 m/s, what slides at zero.
     fn default() -> Self {
@@ -29,7 +36,8 @@ impl Default for Operation {
     }
 }
 
-// A place for each body. (With `[bool; BODIES]` in the struct the compiler fails where another crate's closure copies it.)
+// A place for each body. With `[bool; BODIES]` in the struct the compiler fails where a closure of another crate copies
+// it.
 const _: () = assert!(BODIES == 6);
 
 /// ẋ = A x + B u, y = C x + D u: small motions on top of steady sliding, with an input for each drive.
@@ -197,13 +205,11 @@ impl StateSpace {
 pub(super) fn placed(machine: &Machine, operation: Operation) -> Result<Machine> {
     let mut machine = machine.clone();
     let slides = machine.geometry().slides;
-    // The cart is the last of them.
-    let at = &[operation.bridge, operation.position][2 - slides.len()..];
-    let Some((make, lengths)) = machine.belt.following().zip(machine.span_lengths(at)) else { return Ok(machine) };
-    let is_none = |length: &&f64| length.is_nan() || **length <= 0.0;
-    if lengths.iter().any(|length| is_none(&length)) {
+    let at = operation.coordinates(&machine);
+    let Some((make, lengths)) = machine.belt.following().zip(machine.span_lengths(&at)) else { return Ok(machine) };
+    if lengths.iter().any(|length| length.is_nan() || *length <= 0.0) {
         let name = |body: usize| machine.geometry().label(body).name;
-        let places = slides.iter().zip(at).map(|(slide, at)| format!("the {} at {at} m", name(slide.body)));
+        let places = slides.iter().zip(&at).map(|(slide, at)| format!("the {} at {at} m", name(slide.body)));
         let places = places.collect::<Vec<_>>().join(" and ");
         let error = Error::new(format!("with {places} a span would have no length"));
         let error = match slides {

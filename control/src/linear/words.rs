@@ -58,15 +58,13 @@ fn forces(machine: &Machine, plant: &Mechanism, operation: Operation, moving: &[
     let mut words = Vec::new();
     let slides = machine.geometry().slides.iter().zip(machine.slides());
     let moves = |body: usize| moving.contains(&plant.leader(body));
-    let places = [operation.bridge, operation.position];
-    let places = &places[places.len() - machine.geometry().slides.len()..];
-    for ((at, slide), place) in slides.zip(places) {
+    for ((at, slide), place) in slides.zip(operation.coordinates(machine)) {
         let whose = match machine.bridge.is_some() {
             true => format!(" of the {}", machine.geometry().label(at.body).name),
             false => String::new(),
         };
         if slide.along.is_some() && moves(at.body) {
-            let place = engineering_typed(*place, "m", 4);
+            let place = engineering_typed(place, "m", 4);
             words.push(format!(
                 "friction{whose} that changes along the travel is taken as it is at x = {place}, and not followed"
             ));
@@ -93,16 +91,18 @@ fn forces(machine: &Machine, plant: &Mechanism, operation: Operation, moving: &[
 fn drives(machine: &Machine, plant: &Mechanism) -> Vec<String> {
     let mut words = Vec::new();
     let limited = |unit: &DriveUnit| unit.amplifier.voltage_limit.is_some() || unit.amplifier.current_limit.is_some();
-    let (one, several) = (machine.drives.len() == 1, machine.drives.len() > 1);
+    let (amplifier, gear) = match machine.drives.len() {
+        1 => (
+            "the amplifier is taken within its limits",
+            "the gear is taken as driven by the motor: it passes on the efficiency's share of the torque",
+        ),
+        _ => (
+            "the amplifiers are taken within their limits",
+            "gears are taken as driven by their motors: they pass on the efficiency's share of the torque",
+        ),
+    };
     if machine.drives.iter().any(limited) {
-        words.push(
-            if one {
-                "the amplifier is taken within its limits"
-            } else {
-                "the amplifiers are taken within their limits"
-            }
-            .into(),
-        );
+        words.push(amplifier.into());
     }
     let backlash = |unit: &DriveUnit| unit.motor.gear_play.map(|play| play.backlash).filter(|width| *width > 0.0);
     let mut widths: Vec<String> =
@@ -115,12 +115,7 @@ fn drives(machine: &Machine, plant: &Mechanism) -> Vec<String> {
         ));
     }
     if plant.drives.iter().any(|drive| drive.loses()) {
-        let what = if several {
-            "gears are taken as driven by their motors: they pass"
-        } else {
-            "the gear is taken as driven by the motor: it passes"
-        };
-        words.push(format!("{what} on the efficiency's share of the torque"));
+        words.push(gear.into());
     }
     words
 }

@@ -4,8 +4,7 @@ use super::Run;
 use super::plots::{Named, figures, way};
 use super::rows::{early_end, lines, machine};
 use crate::page::{Callout, Cell, Page, Table};
-use crate::{Picture, Plane};
-use crate::{drawn, machine_drawing};
+use crate::{Picture, Plane, drawn};
 use taut::case::Case;
 use taut::machine::Machine;
 use taut::mechanism::Mechanism;
@@ -23,8 +22,7 @@ pub fn report(case: &Case, text: &str, solver: Solver, runs: &[Run]) -> (Page, V
     let mut pictures = Vec::new();
     page.section("The machine");
     page.prose(format!("{}.", machine(&case.machine)));
-    drawn(&mut page, &case.machine);
-    pictures.push(("machine".to_string(), Picture::Drawing(machine_drawing(&case.machine))));
+    pictures.push(("machine".to_string(), Picture::Drawing(drawn(&mut page, &case.machine))));
     for run in runs {
         let name = run.experiment.file_name();
         let (figures, way) = (figures(case, run), way(case, run));
