@@ -22,7 +22,10 @@ pub fn report(case: &Case, text: &str, solver: Solver, runs: &[Run]) -> (Page, V
     let mut pictures = Vec::new();
     page.section("The machine");
     page.prose(format!("{}.", machine(&case.machine)));
-    pictures.push(("machine".to_string(), Picture::Drawing(drawn(&mut page, &case.machine))));
+    let drawing = drawn(&mut page, &case.machine);
+    if case.machine.bridge.is_some() {
+        pictures.push(("machine".to_string(), Picture::Drawing(drawing)));
+    }
     for run in runs {
         let name = run.experiment.file_name();
         let (figures, way) = (figures(case, run), way(case, run));
