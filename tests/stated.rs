@@ -13,19 +13,26 @@ use taut::machine::axis::CART;
 use taut::machine::{BeltMake, BeltModel, Machine, Travel};
 use taut::mechanism::{Limit, Status, What};
 use taut::polyline::Polyline;
-use taut::signal::Signal;
+use taut::signal::{Sequence, Signal, Slot};
 use taut::solve::{Ending, ErrorEstimate, Flow, Outcome, PositionError, Simulator, Solution, Solver, simulate};
 
-/// Inputs that change with time.
+/// Inputs that change with time, one in four of them after a delay.
 fn moving() -> impl Strategy<Value = Signal> {
     let value = || (0.5..8.0_f64, any::<bool>()).prop_map(|(size, up)| if up { size } else { -size });
     let sine = (value(), 1.0..40.0, -3.0..3.0, prop_oneof![Just(0.0), -2.0..2.0]);
     let sine =
         sine.prop_map(|(amplitude, frequency, phase, offset)| Signal::Sine { amplitude, frequency, phase, offset });
     let one = prop_oneof![2 => sine, 3 => random::input()];
-    (one.clone(), prop::option::weighted(0.2, one)).prop_map(|(one, other)| match other {
+    let sum = (one.clone(), prop::option::weighted(0.2, one)).prop_map(|(one, other)| match other {
         Some(other) => Signal::Sum(vec![one, other]),
         None => one,
+    });
+    (sum, prop::option::weighted(0.25, 0.001..0.5 * UNTIL)).prop_map(|(signal, delay)| match delay {
+        Some(lasts) => Signal::Sequence(Sequence::new(vec![
+            Slot { signal: Signal::Step { value: 0.0, at: 0.0 }, lasts },
+            Slot { signal, lasts: UNTIL },
+        ])),
+        None => signal,
     })
 }
 

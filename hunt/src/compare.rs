@@ -245,7 +245,7 @@ impl Pair<'_> {
     }
 
     /// Runs of the independent solver with numbers that are off by their last bit, or by the tolerance of an integrator;
-    /// half of them keep their state in 64 bits, too. Against model exchange the conditions of half of them fall later.
+    /// half of them keep their state in 64 bits, too. A controller's clock is off by its last bit. Against model exchange the conditions of half of them fall later.
     fn perturbed(&self) -> Vec<Run> {
         let mut runs = Vec::new();
         let (own, of_input) = match (self.by.tolerance(self.subject), self.subject.has_sines()) {
@@ -269,10 +269,12 @@ impl Pair<'_> {
             let mut machine = perturb(1, own);
             let mut input = perturb(2, of_input);
             let mut kept = perturb(3, PERTURBATION);
+            let mut clock = perturb(4, PERTURBATION);
             let kept: Option<Taken> = if number % 2 == 1 { Some(&mut kept) } else { None };
             let is_delayed = self.by == By::ModelExchange && number % 4 < 2;
             let delayed = if is_delayed { DELAY_OF_EXCHANGE } else { 0.0 };
-            let numbers = Numbers { machine: &mut machine, input: &mut input, kept, delayed };
+            let clock = &mut clock;
+            let numbers = Numbers { machine: &mut machine, input: &mut input, clock, kept, delayed };
             runs.extend(self.subject.known(&self.answer.fed, &self.answer.times, numbers));
         }
         runs
