@@ -12,7 +12,7 @@
 
 use super::model::{Curved, Model, Sliding, Vector};
 use super::radau::{FOUND, Lane, NODES, PLACES, POINTS, QUARTIC, RADAU, monomials};
-use crate::friction::{Law, Motion};
+use crate::friction::{Law, Motion, Side};
 
 /// A force, with the arguments that it depends on by their numbers.
 pub(super) enum Source {
@@ -128,6 +128,16 @@ impl Source {
             }
         }
         first
+    }
+
+    /// Whether it is zero in one direction of a body that reverses without sticking. What such a body does is then
+    /// solved without an error, so that nothing but the length of a step keeps it near to a quartic.
+    pub(super) fn is_one_sided(&self, model: &Model) -> bool {
+        let &Source::Friction { curved, motion: Motion::Free, .. } = self else { return false };
+        let friction = &model.curved[curved].friction;
+        let more = friction.backward.viscous - friction.forward.viscous;
+        let is_zero = |side: Side| side.coulomb == 0.0 && side.breakaway == 0.0;
+        is_zero(friction.forward) || (is_zero(friction.backward) && more == 0.0)
     }
 
     /// The body of a friction force whose speed is zero where the step ends.
