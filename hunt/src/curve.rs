@@ -84,6 +84,9 @@ pub struct Curved {
     pub kind: Kind,
 }
 
+/// y of a tail at a speed and its change over a step, both as multiples of the curve's velocity.
+type Tail = fn(f64, f64) -> [f64; 2];
+
 /// A series by its terms.
 type Sequence = [Double; ORDER + 1];
 
@@ -205,7 +208,7 @@ impl Curved {
     /// too small to be noticed although the tail rises to 1 within it. The terms (Δy)ᵏ/k! fall from k = Δy on, so
     /// Δy ≤ 24 leaves nothing unnoticed, nor does Δy ≤ y/4 with y > 96: e^{−3y/4} is below rounding.
     pub fn part(&self, z: &[Double; PLACES], change: &[f64; PLACES]) -> f64 {
-        let (velocity, of_tail): (&Double, fn(f64, f64) -> [f64; 2]) = match &self.kind {
+        let (velocity, of_tail): (&Double, Tail) = match &self.kind {
             Kind::Stribeck { velocity, is_gaussian: false, .. } => (velocity, |q, d| [q, d]),
             Kind::Stribeck { velocity, .. } | Kind::Bristles { velocity, .. } => {
                 (velocity, |q, d| [q * q, d * (2.0 * q + d)])
