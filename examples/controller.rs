@@ -26,8 +26,9 @@ fn main() -> taut::Result<()> {
     let limits = Limits { speed: 0.3, acceleration: 4.0, jerk: Some(200.0), snap: None };
     let profile = Profile::new(0.0, &[Leg::To(0.1, limits)])?;
     let timing = Loop { every: 1e-3, delay: 0.0, limit: Some(24.0), lead: 0.0 };
-    let run = close(machine, &mut Relay { volts: 10.0 }, &timing, &profile, 1.0, 50e-6, Solver::Exact)?;
-    println!("relay: cart error at most {:.1} µm", 1e6 * run.figures.cart.peak.value.abs());
+    let run =
+        close(machine, &mut [&mut Relay { volts: 10.0 }], &timing, &[profile.clone()], 1.0, 50e-6, Solver::Exact)?;
+    println!("relay: cart error at most {:.1} µm", 1e6 * run.figures.cart().error.peak.value.abs());
 
     let pid = Pid {
         proportional: 3000.0,
@@ -49,7 +50,7 @@ fn main() -> taut::Result<()> {
     };
     let solver = Solver::Exact;
     let setup =
-        Setup { machine, model: machine, design: &design, profile: &profile, until: 1.0, window: 50e-6, solver };
+        Setup { machine, model: machine, design: &design, profiles: &[profile], until: 1.0, window: 50e-6, solver };
     let mut best = f64::INFINITY;
     for _ in 0..200 {
         let begin = Instant::now();
@@ -59,7 +60,7 @@ fn main() -> taut::Result<()> {
     let run = closed_loop(&setup)?;
     println!(
         "PID: cart error at most {:.1} µm; one second at 1 kHz in {:.0} µs",
-        1e6 * run.figures.cart.peak.value.abs(),
+        1e6 * run.figures.cart().error.peak.value.abs(),
         1e6 * best
     );
     println!("{:?} {:?} events {}", run.figures, run.outcome.cost, run.outcome.events.len());

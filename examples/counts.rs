@@ -99,8 +99,9 @@ fn closed() -> taut::Result<Box<dyn Fn() -> f64>> {
     let profile = profile()?;
     let timing = Loop { every: 1e-3, delay: 0.0, limit: Some(LIMIT), lead: 0.0 };
     Ok(Box::new(move || {
-        let run = close(&stage, &mut Proportional, &timing, &profile, 1.0, 50e-6, Solver::Exact);
-        run.expect("the loop is sound").figures.final_cart_error
+        let run =
+            close(&stage, &mut [&mut Proportional], &timing, std::slice::from_ref(&profile), 1.0, 50e-6, Solver::Exact);
+        run.expect("the loop is sound").figures.cart().error.last
     }))
 }
 

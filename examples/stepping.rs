@@ -42,8 +42,16 @@ fn main() -> Result<()> {
     let profile = Profile::new(0.0, &[Leg::To(0.05, limits)])?;
     let timing = Loop { every: 1e-3, delay: 0.0, limit: Some(LIMIT), lead: 0.0 };
     let (closed, at) = best(calls, || {
-        let run = close(&case.machine, &mut Proportional, &timing, &profile, 1.0, 50e-6, Solver::Exact)?;
-        Ok(run.figures.final_cart_error + profile.target())
+        let run = close(
+            &case.machine,
+            &mut [&mut Proportional],
+            &timing,
+            std::slice::from_ref(&profile),
+            1.0,
+            50e-6,
+            Solver::Exact,
+        )?;
+        Ok(run.figures.cart().error.last + profile.target())
     })?;
     let start = Simulator::new(&case.machine, Solver::Exact)?;
     let (radius, shaft) = (case.machine.pulley_radius, start.mechanism().drives[0].shaft);

@@ -192,9 +192,9 @@ fn closed_loops_agree_with_the_authority() {
             let every = get("every") * get("row");
             let run = stream(
                 &machine,
-                &mut controller,
+                &mut [&mut controller],
                 &Loop::of(&design),
-                &profile,
+                std::slice::from_ref(&profile),
                 &Rows { until: get("until"), every, window: 1e-4 },
                 solver,
                 false,
@@ -327,13 +327,13 @@ proptest! {
         let mut controller = Standard::new(&design, &machine).unwrap();
         let timing = Loop::of(&design);
         let rows = Rows { until: 3.0, every: 1e-3, window: 1e-3 };
-        let run = stream(&machine, &mut controller, &timing, &profile, &rows, Solver::Exact, true, &mut |_| Flow::Continue).unwrap();
+        let run = stream(&machine, &mut [&mut controller], &timing, std::slice::from_ref(&profile), &rows, Solver::Exact, true, &mut |_| Flow::Continue).unwrap();
         prop_assert_eq!(run.outcome.ending, Ending::Complete);
         prop_assert!(run.kept.iter().all(|s| s.given.abs() <= limit && s.asked.is_finite()));
-        let end = run.figures.final_cart_error;
+        let end = run.figures.cart().error.last;
         prop_assert!(end.abs() < 5e-3, "{:?} ends {end} off", design.structure.name());
         // The same again gives the same: the controller forgets.
-        let again = stream(&machine, &mut controller, &timing, &profile, &rows, Solver::Exact, true, &mut |_| Flow::Continue).unwrap();
+        let again = stream(&machine, &mut [&mut controller], &timing, std::slice::from_ref(&profile), &rows, Solver::Exact, true, &mut |_| Flow::Continue).unwrap();
         prop_assert_eq!(run.kept, again.kept);
     }
 }
@@ -356,13 +356,17 @@ fn sliding_mode_keeps_its_bounds() {
             machine: &axis,
             model: &machine,
             design: &design,
-            profile: &profile,
+            profiles: std::slice::from_ref(&profile),
             until: 1.0,
             window: 1e-4,
             solver: Solver::Exact,
         };
         let figures = closed_loop(&setup).unwrap().figures;
-        assert!(figures.cart.peak.value.abs() < 2e-3 && figures.cart.rms < 1e-3, "{name}: {:?}", figures.cart);
+        assert!(
+            figures.cart().error.peak.value.abs() < 2e-3 && figures.cart().error.rms < 1e-3,
+            "{name}: {:?}",
+            figures.cart().error
+        );
     }
 }
 
@@ -378,12 +382,12 @@ fn elastic_feed_forward_beats_pid_fivefold() {
                 machine,
                 model: machine,
                 design,
-                profile: &motion.profile,
+                profiles: &motion.profiles,
                 until: motion.until,
                 window: motion.window,
                 solver: Solver::Exact,
             };
-            closed_loop(&setup).unwrap().figures.cart.peak.value.abs()
+            closed_loop(&setup).unwrap().figures.cart().error.peak.value.abs()
         };
         case.moves.iter().map(error).collect()
     };
@@ -430,7 +434,16 @@ fn a_timing_that_is_none_is_refused() {
     let profile = Profile::new(0.0, &[Leg::To(0.01, limits)]).unwrap();
     let told = |timing: Loop, window: f64| {
         let rows = Rows { until: 0.1, every: 1e-3, window };
-        let run = stream(&machine, &mut Idle, &timing, &profile, &rows, Solver::Exact, false, &mut |_| Flow::Continue);
+        let run = stream(
+            &machine,
+            &mut [&mut Idle],
+            &timing,
+            std::slice::from_ref(&profile),
+            &rows,
+            Solver::Exact,
+            false,
+            &mut |_| Flow::Continue,
+        );
         run.err().map(|error| error.to_string())
     };
     let good = Loop { every: 1e-3, delay: 0.0, limit: None, lead: 0.0 };

@@ -491,7 +491,7 @@ fn a_loop_is_closed_again() {
     let mut controller = Standard::new(&design, &case.machine).unwrap();
     let mut run = Trajectory::default();
     let timing = Loop::of(&design);
-    stream(&real.machine, &mut controller, &timing, &profile, &rows, Solver::Exact, false, &mut |block| {
+    stream(&real.machine, &mut [&mut controller], &timing, &[profile], &rows, Solver::Exact, false, &mut |block| {
         run.append(block);
         Flow::Continue
     })

@@ -1,19 +1,20 @@
 //! The figures of moves in closed loop, against dense quadratures, and whatever their rows.
 
 use taut::case::{Case, Move};
-use taut::control::{Loop, MoveRun, Rows, Standard, stream};
+use taut::control::{Loop, MoveRun, Rows, Standard, each, stream};
 use taut::solve::{Ending, Flow, Solver};
 use taut::trajectory::Trajectory;
 
 /// A move of a controller's case with a row every `every`, and these rows.
 fn moved(case: &Case, motion: &Move, every: f64) -> (MoveRun, Trajectory) {
     let design = case.controller.as_ref().unwrap();
-    let mut controller = Standard::new(design, &case.machine).unwrap();
-    let profile = motion.reference(design);
+    let mut controllers = Standard::of_drives(design, &case.machine).unwrap();
+    let profiles = motion.references(design);
     let rows = Rows { until: motion.until, every, window: motion.window };
     let mut trajectory = Trajectory::default();
     let solver = Solver::of(&case.machine);
-    let run = stream(&case.machine, &mut controller, &Loop::of(design), &profile, &rows, solver, false, &mut |block| {
+    let (controllers, timing) = (&mut each(&mut controllers), Loop::of(design));
+    let run = stream(&case.machine, controllers, &timing, &profiles, &rows, solver, false, &mut |block| {
         trajectory.append(block);
         Flow::Continue
     })
@@ -60,44 +61,47 @@ fn integrals_are_those_of_a_dense_quadrature() {
         let power = both(&|k, at| voltage[k] * current(k, at));
         let net = simpson(h, &power);
         let figures = &run.figures;
-        near("net energy", figures.energy.0 - figures.energy.1, net, 1e-8);
+        near("net energy", figures.drive().energy.0 - figures.drive().energy.1, net, 1e-8);
         let back: f64 = power.iter().map(|[a, b]| h * 0.5 * ((-a).max(0.0) + (-b).max(0.0))).sum();
-        near("energy back", figures.energy.1, back, 1e-3);
+        near("energy back", figures.drive().energy.1, back, 1e-3);
         let rms =
             |of: &dyn Fn(usize, usize) -> f64| (simpson(h, &both(&|k, at| of(k, at).powi(2))) / motion.until).sqrt();
-        near("rms voltage", figures.voltage.1, rms(&|k, _| voltage[k]), 1e-8);
-        near("rms current", figures.current.1, rms(&current), 1e-8);
-        near("rms error", figures.cart.rms, rms(&|_, at| error[at]), 1e-7);
+        near("rms voltage", figures.drive().voltage.1, rms(&|k, _| voltage[k]), 1e-8);
+        near("rms current", figures.drive().current.1, rms(&current), 1e-8);
+        near("rms error", figures.cart().error.rms, rms(&|_, at| error[at]), 1e-7);
         let r = case.machine.pulley_radius;
-        near("rms following", figures.following.rms, rms(&|_, at| r * drive[at] - reference[at]), 1e-7);
+        near("rms following", figures.drive().following.rms, rms(&|_, at| r * drive[at] - reference[at]), 1e-7);
 
         // Peaks: no row passes them, and the nearest comes close.
         let most = |values: &[f64]| values.iter().fold(0.0, |most: f64, v| most.max(v.abs()));
         let currents: Vec<f64> = (0..n).flat_map(|k| [current(k, k), current(k, k + 1)]).collect();
         for (name, peak, rows) in [
-            ("error", figures.cart.peak.value, most(error)),
-            ("voltage", figures.voltage.0.value, most(voltage)),
-            ("current", figures.current.0.value, most(&currents)),
+            ("error", figures.cart().error.peak.value, most(error)),
+            ("voltage", figures.drive().voltage.0.value, most(voltage)),
+            ("current", figures.drive().current.0.value, most(&currents)),
         ] {
             assert!(rows <= peak.abs() * (1.0 + 1e-9) && peak.abs() <= rows * (1.0 + 1e-3), "{name}: {peak} {rows}");
         }
-        let beyond = cart.iter().map(|x| x - motion.profile.target()).fold(0.0, f64::max);
-        assert!(beyond <= figures.overshoot + 1e-12 && figures.overshoot <= beyond + 1e-9, "{beyond} {figures:?}");
+        let beyond = cart.iter().map(|x| x - motion.profile().target()).fold(0.0, f64::max);
+        assert!(
+            beyond <= figures.cart().overshoot + 1e-12 && figures.cart().overshoot <= beyond + 1e-9,
+            "{beyond} {figures:?}"
+        );
         let last = cart
             .iter()
             .zip(get("time"))
-            .filter(|(x, t)| **t >= motion.profile.end() && (**x - motion.profile.target()).abs() > motion.window);
+            .filter(|(x, t)| **t >= motion.profile().end() && (**x - motion.profile().target()).abs() > motion.window);
         let last = last.map(|(_, t)| *t).next_back();
         match figures.settling {
             Some(settling) => {
-                let settled = last.map_or(0.0, |t| t - motion.profile.end());
+                let settled = last.map_or(0.0, |t| t - motion.profile().end());
                 assert!(settling >= settled - 1e-12 && settling <= settled + 1.001 * h, "{settling} {settled}");
             }
             None => assert_eq!(last, Some(motion.until)),
         }
         // Samples at the limit, each held for its time.
         assert_eq!(run.samples.1 > 0, limit.is_some());
-        near("limited", figures.limited, run.samples.1 as f64 * 1e-3, 1e-12);
+        near("limited", figures.drive().limited, run.samples.1 as f64 * 1e-3, 1e-12);
     }
 }
 
@@ -117,19 +121,19 @@ fn figures_do_not_depend_on_the_rows() {
             for other in [&fine, &odd] {
                 let (a, b) = (&one.figures, &other.figures);
                 for (what, a, b) in [
-                    ("error", a.cart.peak.value, b.cart.peak.value),
-                    ("rms error", a.cart.rms, b.cart.rms),
-                    ("following", a.following.peak.value, b.following.peak.value),
-                    ("voltage", a.voltage.0.value, b.voltage.0.value),
-                    ("rms voltage", a.voltage.1, b.voltage.1),
-                    ("current", a.current.0.value, b.current.0.value),
-                    ("rms current", a.current.1, b.current.1),
-                    ("energy in", a.energy.0, b.energy.0),
-                    ("energy back", a.energy.1, b.energy.1),
-                    ("overshoot", a.overshoot, b.overshoot),
+                    ("error", a.cart().error.peak.value, b.cart().error.peak.value),
+                    ("rms error", a.cart().error.rms, b.cart().error.rms),
+                    ("following", a.drive().following.peak.value, b.drive().following.peak.value),
+                    ("voltage", a.drive().voltage.0.value, b.drive().voltage.0.value),
+                    ("rms voltage", a.drive().voltage.1, b.drive().voltage.1),
+                    ("current", a.drive().current.0.value, b.drive().current.0.value),
+                    ("rms current", a.drive().current.1, b.drive().current.1),
+                    ("energy in", a.drive().energy.0, b.drive().energy.0),
+                    ("energy back", a.drive().energy.1, b.drive().energy.1),
+                    ("overshoot", a.cart().overshoot, b.cart().overshoot),
                     ("settling", a.settling.unwrap_or(0.0), b.settling.unwrap_or(0.0)),
-                    ("restlessness", a.restlessness, b.restlessness),
-                    ("amplifier", a.amplifier_limited, b.amplifier_limited),
+                    ("restlessness", a.drive().restlessness, b.drive().restlessness),
+                    ("amplifier", a.drive().amplifier_limited, b.drive().amplifier_limited),
                     ("force", one.metrics.spans[0].peak_force.value, other.metrics.spans[0].peak_force.value),
                 ] {
                     assert!((a.abs() - b.abs()).abs() <= 1e-6 * a.abs() + 1e-12, "{name} {what}: {a} {b}");
@@ -150,7 +154,7 @@ fn the_amplifier_is_saturated_for_as_long_as_it_is() {
     let switches = run.outcome.events.iter().filter(|event| event.part.key() == "voltage").count();
     assert!(at_limit > 1000, "{at_limit}");
     assert!(
-        (run.figures.amplifier_limited - at_limit as f64 * h).abs() <= (switches + 1) as f64 * h,
+        (run.figures.drive().amplifier_limited - at_limit as f64 * h).abs() <= (switches + 1) as f64 * h,
         "{:?}",
         run.figures
     );

@@ -63,7 +63,7 @@ fn plans_keep_the_limits_and_arrive_sooner() {
                 machine: &case.machine,
                 model: &case.machine,
                 design,
-                profile: &planned.profile,
+                profiles: std::slice::from_ref(&planned.profile),
                 until: planned.profile.end() + 0.5,
                 window: planned.window,
                 solver: Solver::Exact,
@@ -123,7 +123,7 @@ fn limits_of_the_user_are_kept() {
     let text = plans.case_text(&case, Path::new("planned.toml")).unwrap();
     let written = Case::from_text("planned.toml", &text).unwrap();
     for planned in plans.moves.iter().filter(|planned| !planned.is_kept) {
-        let [read, meant] = [&written.moves[planned.place].profile, &planned.profile];
+        let [read, meant] = [&written.moves[planned.place].profile(), &planned.profile];
         assert!((read.end() - meant.end()).abs() < 1e-12 * meant.end(), "{}", planned.name);
         let off = (0..100).map(|k| f64::from(k) / 100.0 * meant.end());
         let off = off.map(|t| (read.at(t).position - meant.at(t).position).abs()).fold(0.0, f64::max);
@@ -138,16 +138,16 @@ fn a_move_of_the_file_may_be_a_plan() {
     let [slow, fast] = ["12 V", "24 V"].map(|limit| case(&[&format!("controller.limit={limit}"), planned]));
     for case in [&slow, &fast] {
         let (design, motion) = (case.controller.as_ref().unwrap(), &case.moves[0]);
-        assert!(motion.is_planned && motion.profile.target() == 0.04);
-        let loads = loads(&case.machine, design.limit, &motion.profile, 4000);
+        assert!(motion.is_planned && motion.profile().target() == 0.04);
+        let loads = loads(&case.machine, design.limit, motion.profile(), 4000);
         let most = loads.iter().map(|load| load.share()).fold(0.0, f64::max);
         assert!(most <= 0.9 + 1e-9, "{most}");
         // Peak of jerk, from the pieces of the reference.
-        let jerk = (0..2000).map(|k| motion.profile.at(motion.profile.end() * f64::from(k) / 2000.0).jerk.abs());
+        let jerk = (0..2000).map(|k| motion.profile().at(motion.profile().end() * f64::from(k) / 2000.0).jerk.abs());
         let jerk = jerk.fold(0.0, f64::max);
         assert!(jerk <= 900.0 * (1.0 + 1e-9) && (most > 0.85 || jerk > 890.0), "{most}, {jerk} m/s^3");
     }
-    assert!(fast.moves[0].profile.end() < slow.moves[0].profile.end());
+    assert!(fast.moves[0].profile().end() < slow.moves[0].profile().end());
 }
 
 /// Time from rest to rest of the axis under full voltage, then full braking, by the exact solver: the switch is sought

@@ -41,14 +41,14 @@ fn needs_are_those_of_a_loop_that_follows_closely() {
             machine: &case.machine,
             model: &case.machine,
             design,
-            profile: &motion.profile,
+            profiles: &motion.profiles,
             until: motion.until,
             window: motion.window,
             solver: Solver::Exact,
         };
         let figures = closed_loop(&setup).unwrap().figures;
-        let [volts, amperes] = ["voltage", "current"].map(|limit| needed(&case.machine, &motion.profile, limit));
-        let (given, taken) = (figures.voltage.0.value.abs(), figures.current.0.value.abs());
+        let [volts, amperes] = ["voltage", "current"].map(|limit| needed(&case.machine, motion.profile(), limit));
+        let (given, taken) = (figures.drive().voltage.0.value.abs(), figures.drive().current.0.value.abs());
         assert!((volts / given - 1.0).abs() < 0.1, "{}: {volts} V, {given} V in the loop", motion.name);
         assert!((amperes / taken - 1.0).abs() < 0.25, "{}: {amperes} A, {taken} A in the loop", motion.name);
     }
@@ -59,9 +59,9 @@ fn needs_are_those_of_a_loop_that_follows_closely() {
 fn each_limit_is_named_where_it_is_exceeded() {
     let case = case();
     let motion = &case.moves[0];
-    let most = |limit: &str| needed(&case.machine, &motion.profile, limit);
+    let most = |limit: &str| needed(&case.machine, motion.profile(), limit);
     let [volts, amperes, off, on] = ["voltage", "current", "slack", "tension"].map(most);
-    let far = motion.profile.target();
+    let far = motion.profile().target();
     let away = case.machine.breakaway(1.0, 0.0) / Rigid::of(&case.machine).force_per_command();
     type Set = fn(&mut Machine, f64) -> Option<f64>;
     let limits: [(&str, f64, Set); 6] = [
@@ -91,7 +91,7 @@ fn each_limit_is_named_where_it_is_exceeded() {
         for share in [0.9, 1.1] {
             let mut machine = case.machine.clone();
             let own = set(&mut machine, share * needed);
-            let found = shortfalls(&machine, own, &motion.profile);
+            let found = shortfalls(&machine, own, motion.profile());
             if share > 1.0 {
                 assert_eq!(found, [], "{limit} at {share}");
                 continue;
@@ -103,7 +103,7 @@ fn each_limit_is_named_where_it_is_exceeded() {
         }
     }
     let names = |limit: f64| -> Vec<&str> {
-        shortfalls(&case.machine, Some(limit), &motion.profile).iter().map(|short| short.limit).collect()
+        shortfalls(&case.machine, Some(limit), motion.profile()).iter().map(|short| short.limit).collect()
     };
     assert!(names(0.9 * away).contains(&"breakaway") && !names(1.1 * away).contains(&"breakaway"));
 }
@@ -113,8 +113,8 @@ fn each_limit_is_named_where_it_is_exceeded() {
 fn the_speed_that_is_reached_is_the_steady_one() {
     let case = case();
     let motion = &case.moves[0];
-    let volts = 0.5 * needed(&case.machine, &motion.profile, "voltage");
-    let found = shortfalls(&case.machine, Some(volts), &motion.profile);
+    let volts = 0.5 * needed(&case.machine, motion.profile(), "voltage");
+    let found = shortfalls(&case.machine, Some(volts), motion.profile());
     let short = found.iter().find(|short| short.limit == "voltage").unwrap();
     let Balance::At(speed) = balanced_speed(&case.machine, volts, 0.1) else { panic!("no steady speed") };
     let told = engineering(speed, "m/s", 3);

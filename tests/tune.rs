@@ -270,14 +270,14 @@ fn the_worst_axis_is_worse_than_random_ones() {
                     machine: &stage,
                     model: &case.machine,
                     design,
-                    profile: &motion.profile,
+                    profiles: &motion.profiles,
                     until: 8.0,
                     window: 1e-3,
                     solver: Solver::Exact,
                 };
                 let run = closed_loop(&setup).unwrap();
                 assert_eq!(run.outcome.ending, Ending::Complete);
-                assert!(run.figures.final_cart_error.abs() < 2e-3, "{name}: {}", run.figures.final_cart_error);
+                assert!(run.figures.cart().error.last.abs() < 2e-3, "{name}: {}", run.figures.cart().error.last);
             }
         }
         let worst = tuned.after.worst.excess(tuning.sensitivity, tuning.complementary);
@@ -463,15 +463,15 @@ fn a_brief_run_shows_what_a_whole_one_does() {
         let case = case(name, &[]);
         let design = case.controller.as_ref().unwrap();
         for motion in &case.moves {
-            let (stage, profile) = (&case.machine, &motion.profile);
+            let (stage, profiles) = (&case.machine, &motion.profiles);
             let (until, window, solver) = (motion.until, motion.window, taut::solve::Solver::of(stage));
-            let setup = taut::control::Setup { machine: stage, model: stage, design, profile, until, window, solver };
+            let setup = taut::control::Setup { machine: stage, model: stage, design, profiles, until, window, solver };
             let whole = taut::control::closed_loop(&setup).unwrap().figures;
             let brief = taut::tune::look(stage, stage, design, motion).unwrap();
-            assert_eq!(brief.error, whole.cart.peak.value.abs(), "{name}: {}", motion.name);
+            assert_eq!(brief.error, whole.cart().error.peak.value.abs(), "{name}: {}", motion.name);
             assert_eq!(brief.settling, whole.settling, "{name}: {}", motion.name);
             // Their integrals are summed over other pieces.
-            for (brief, whole) in [(brief.rms, whole.cart.rms), (brief.current, whole.current.1)] {
+            for (brief, whole) in [(brief.rms, whole.cart().error.rms), (brief.current, whole.drive().current.1)] {
                 let off = brief / whole - 1.0;
                 assert!(off.abs() < 1e-14, "{name}: {}: {off:e}", motion.name);
             }

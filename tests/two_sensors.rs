@@ -29,7 +29,7 @@ fn run(case: &Case, until: f64) -> MoveRun {
         machine: &case.machine,
         model: &model,
         design: case.controller.as_ref().unwrap(),
-        profile: &motion.profile,
+        profiles: &motion.profiles,
         until,
         window: motion.window,
         solver: Solver::of(&case.machine),
@@ -47,7 +47,7 @@ fn a_scale_takes_away_the_stretch_that_the_motor_does_not_see() {
     // f = k₁ (y₁ − x) + k₂ k₃/(k₂ + k₃) (y₁ − x) = 8 N
     let [k1, k2, k3] = one.machine.belt.stiffness.three();
     let stretch = 8.0 / (k1 + k2 * k3 / (k2 + k3));
-    let [with, without] = [&both, &one].map(|case| run(case, 3.0).figures.final_cart_error);
+    let [with, without] = [&both, &one].map(|case| run(case, 3.0).figures.cart().error.last);
     assert!((without.abs() / stretch - 1.0).abs() < 0.15, "{without} {stretch}");
     // One count of the scale is 5 µm.
     assert!(with.abs() < 10e-6 && with.abs() < 0.25 * without.abs(), "{with} {without}");
@@ -128,7 +128,7 @@ fn the_kalman_filter_weighs_both_sensors() {
     let changes = ["cart.load=-8", "cart.friction={ viscous = 19, coulomb = 0 }"];
     let one = case("controllers/lqi", &changes);
     let both = case("controllers/lqi", &[changes[0], changes[1], "scale={ lines = 50000 }"]);
-    let [with, without] = [&both, &one].map(|case| run(case, 3.0).figures.final_cart_error.abs());
+    let [with, without] = [&both, &one].map(|case| run(case, 3.0).figures.cart().error.last.abs());
     assert!(with < 10e-6 && without > 3.0 * with, "{with} {without}");
 }
 

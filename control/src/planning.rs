@@ -8,7 +8,7 @@ use crate::design::Design;
 use crate::error::{Error, Result};
 use crate::machine::Machine;
 use crate::machine::rigid::Rigid;
-use crate::reach::feasible::{Load, Shortfall, limits, loads, shortfalls};
+use crate::reach::feasible::{Load, Shortfall, limits, loads};
 use crate::reach::quickest::{CLOSELY, INSTANTS, Quickest, Wanted, Way, modes};
 use crate::signal::profile::{Limits, Profile};
 use crate::solve::{Ending, Solver};
@@ -145,10 +145,9 @@ struct Planner<'a> {
 impl Planner<'_> {
     fn planned(&self, motion: &Move, place: usize) -> Result<Planned> {
         let impossible = |what: String| Error::new(format!("the move \"{}\": there is no plan: {what}", motion.name));
-        let way = Way::of(&motion.profile).ok_or_else(|| impossible("it has no stroke".into()))?;
+        let way = Way::of(motion.profile()).ok_or_else(|| impossible("it has no stroke".into()))?;
         let machine = &self.family.machine;
-        let reference = motion.reference(self.design);
-        let short = shortfalls(machine, self.design.limit, &reference);
+        let short = motion.shortfalls(machine, self.design);
         let quickest = Quickest { machine, design: self.design, modes: self.modes, wanted: self.wanted };
         quickest
             .check(&way)
@@ -171,7 +170,7 @@ impl Planner<'_> {
             }
         }
         let profile = way.within(&best.limits)?;
-        let given = self.arrival(motion, &motion.profile, true)?;
+        let given = self.arrival(motion, motion.profile(), true)?;
         let is_sooner = short.is_empty() && Tried::rank_of(&given) <= best.rank();
         Ok(Planned {
             is_kept: is_sooner,
@@ -181,7 +180,7 @@ impl Planner<'_> {
             loads: self.loads(&profile.clone().shaped(&self.design.shaper), CLOSELY),
             bound: self.bound(&way),
             given,
-            reference: motion.profile.clone(),
+            reference: motion.profile().clone(),
             shortfalls: short,
             best,
             profile,
@@ -223,13 +222,13 @@ impl Planner<'_> {
 
     /// When the cart arrives, in closed loop.
     fn arrival(&self, motion: &Move, profile: &Profile, whole: bool) -> Result<Arrival> {
-        let watched = (motion.until - motion.profile.end()).max(WATCHED);
+        let watched = (motion.until - motion.profile().end()).max(WATCHED);
         let run = |machine: &Machine| -> Result<MoveRun> {
             closed_loop(&Setup {
                 machine,
                 model: &self.family.machine,
                 design: self.design,
-                profile,
+                profiles: std::slice::from_ref(profile),
                 until: profile.clone().shaped(&self.design.shaper).rest() + watched,
                 window: motion.window,
                 solver: Solver::of(machine),
@@ -245,7 +244,7 @@ impl Planner<'_> {
             worst: None,
             settled: usize::from(nominal.is_some()),
             axes: 1,
-            cart_error: own.figures.cart.peak.value.abs(),
+            cart_error: own.figures.cart().error.peak.value.abs(),
         };
         if whole {
             let mut worst = Some(0.0_f64);

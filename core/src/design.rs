@@ -30,6 +30,19 @@ pub struct Design {
     pub shaper: Vec<[f64; 2]>,
 }
 
+impl Design {
+    /// The key of a part of it that needs the model of a single axis, which a machine with several drives does not
+    /// have; none if it has no such part.
+    pub fn needs_axis(&self) -> Option<&'static str> {
+        let FeedForward { model, compensate_stretch, .. } = self.feed_forward;
+        match self.structure {
+            Structure::StateFeedback(_) | Structure::SlidingMode(_) => Some(self.structure.tunable().word()),
+            _ if model != FeedForwardModel::None || compensate_stretch => Some("feed_forward"),
+            _ => self.disturbance_observer.map(|_| "disturbance_observer"),
+        }
+    }
+}
+
 /// The structures, one list for all that goes through them.
 macro_rules! structures {
     ($($(#[$about:meta])* $name:ident),* $(,)?) => {

@@ -130,9 +130,9 @@ pub fn identifier(name: &str) -> String {
 /// The controller of a case. Errors: a case without one; what to do about it is the caller's to say.
 pub fn controller(case: &Case) -> Result<(&Case, &crate::design::Design)> {
     match &case.controller {
-        Some(design) => Ok((case, design)),
-        None if case.is_axis() => Err(Error::new("this case has no controller")),
-        None => Err(Error::new("a gantry has no controller")),
+        Some(design) if case.is_axis() => Ok((case, design)),
+        Some(_) => Err(Error::new("the controller of a gantry is not exported yet")),
+        None => Err(Error::new("this case has no controller")),
     }
 }
 

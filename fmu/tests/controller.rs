@@ -39,12 +39,12 @@ fn is_that_of_a_move(name: &str, ahead: bool, most: f64) {
             machine: &case.machine,
             model: &case.machine,
             design,
-            profile: &shown.profile,
+            profiles: &shown.profiles,
             until,
             window: shown.window,
             solver: Solver::Exact,
         };
-        let wanted = closed_loop(&setup).unwrap().figures.final_cart_error;
+        let wanted = closed_loop(&setup).unwrap().figures.cart().error.last;
         let one = unit.three(false, false);
         one.start();
         let put = |name: &str, reference: Reference| {
@@ -55,9 +55,9 @@ fn is_that_of_a_move(name: &str, ahead: bool, most: f64) {
             }
         };
         let refer = |time: f64| {
-            put("reference", shown.profile.at(time));
+            put("reference", shown.profile().at(time));
             if ahead {
-                put("reference_ahead", shown.profile.at(time + unit.model.lead().unwrap()));
+                put("reference_ahead", shown.profile().at(time + unit.model.lead().unwrap()));
             }
         };
         for k in 0..milliseconds {

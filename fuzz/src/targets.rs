@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use taut::case::{Case, Experiment, Move, TEMPLATE};
 use taut::control::spectrum::{Axis, Spectrum};
-use taut::control::{Loop, Rows, Standard};
+use taut::control::{Loop, Rows, Standard, each};
 use taut::fit;
 use taut::linear::{Analysis, Operation, Question, StateSpace};
 use taut::log::{Accelerometer, ColumnId, Dialect, Filter, Log, Mapping, Quantity, Source, Survey, read_accelerometer};
@@ -161,10 +161,11 @@ fn judge(outcome: Result<Outcome, Error>, finite: bool) {
 fn drive(stage: &Machine, design: &taut::design::Design, motion: &Move, longest: f64) {
     let until = motion.until.min(longest).min(ROWS * design.every);
     let rows = Rows { until, every: motion.every.min(until).max(until / ROWS), window: motion.window };
-    let done = Standard::new(design, stage).and_then(|mut controller| {
-        let profile = motion.reference(design);
+    let done = Standard::of_drives(design, stage).and_then(|mut controllers| {
+        let profiles = motion.references(design);
         let (timing, solver) = (Loop::of(design), Solver::of(stage));
-        taut::control::stream(stage, &mut controller, &timing, &profile, &rows, solver, false, &mut |_| Flow::Continue)
+        let controllers = &mut each(&mut controllers);
+        taut::control::stream(stage, controllers, &timing, &profiles, &rows, solver, false, &mut |_| Flow::Continue)
     });
     if let Err(error) = done {
         refused(&error);
@@ -274,10 +275,21 @@ pub(crate) fn accelerometer(bytes: &[u8]) -> Reached {
 pub(crate) fn gcode(bytes: &[u8]) -> Reached {
     let Ok(text) = std::str::from_utf8(bytes) else { return Reached::Refused };
     let limits = Limits { speed: 0.5, acceleration: 5.0, jerk: Some(200.0), snap: None };
-    let profile = match legs(text, 0.01, &limits).and_then(|legs| Profile::new(0.01, &legs)) {
-        Ok(profile) => profile,
-        Err(error) => return refused(&error),
-    };
+    let of = |start: &[f64]| legs(text, start, &limits).and_then(|legs| Profile::along(start, &legs));
+    let in_plane = of(&[0.01, 0.01]);
+    if let Ok(profiles) = &in_plane {
+        profiles.iter().for_each(|profile| runs_from_rest_to_rest(profile, &limits));
+    }
+    match of(&[0.01]) {
+        Ok(profiles) => runs_from_rest_to_rest(&profiles[0], &limits),
+        // What an axis refuses may be for a plane.
+        Err(error) if in_plane.is_err() => return refused(&error),
+        Err(_) => {}
+    }
+    Reached::Read
+}
+
+fn runs_from_rest_to_rest(profile: &Profile, limits: &Limits) {
     assert_eq!(profile.at(-1.0).position, 0.01);
     let places = profile.strokes().flat_map(|(_, from, distance, _)| [from, distance]);
     // A moment is known to its rounding only, and so is where the cart is then.
@@ -290,7 +302,6 @@ pub(crate) fn gcode(bytes: &[u8]) -> Reached {
         let parts = [now.position, now.speed, now.acceleration, now.jerk];
         assert!(parts.iter().all(|part| part.is_finite()), "{now:?}");
     }
-    Reached::Read
 }
 
 /// Draws from a posterior: each is a machine.

@@ -172,10 +172,18 @@ pub(crate) fn solved(subject: &Subject, solver: Solver) -> Result<Answer, String
             let lead = design.feed_forward.lead.unwrap_or(design.delay + 0.5 * design.every);
             let timing = Loop { every: design.every, delay: design.delay, limit: design.limit, lead };
             let rows = Rows { until: motion.until, every: motion.every, window: motion.window };
-            let profile = motion.reference(design);
-            let run =
-                control::stream(&case.machine, &mut controller, &timing, &profile, &rows, solver, false, &mut keep)
-                    .map_err(told)?;
+            let profiles = motion.references(design);
+            let run = control::stream(
+                &case.machine,
+                &mut [&mut controller],
+                &timing,
+                &profiles,
+                &rows,
+                solver,
+                false,
+                &mut keep,
+            )
+            .map_err(told)?;
             let stated = run.outcome.error.map(|error| error.value);
             (run.outcome, stated)
         }

@@ -208,7 +208,7 @@ fn loop_main(subject: &Subject, ticks: usize, parts: usize) -> Result<String, St
     let late = (design.delay / design.every * 4.0).round() as usize;
     let mut text = head(subject);
     for (name, ahead) in [("now", 0.0), ("ahead", lead)] {
-        let reference = |k: usize| case.moves[0].profile.at(k as f64 * design.every + ahead);
+        let reference = |k: usize| case.moves[0].profile().at(k as f64 * design.every + ahead);
         type Field = fn(&Reference) -> f64;
         let fields: [(&str, Field); 5] = [
             ("position", |y| y.position),

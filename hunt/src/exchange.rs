@@ -47,7 +47,7 @@ impl Importer<'_> {
     /// The inputs at a time, those before an edge where `before` says so.
     fn inputs(&self, time: f64) -> Vec<f64> {
         match self.subject {
-            Subject::Loop(case) => references(&case.moves[0].profile, time).to_vec(),
+            Subject::Loop(case) => references(case.moves[0].profile(), time).to_vec(),
             Subject::Axis(_) | Subject::Gantry(_) => {
                 self.chains.iter().map(|chain| input::value(chain, time).high).collect()
             }

@@ -44,7 +44,7 @@ pub fn run(
     (clock, kept): (Taken, Option<Taken>),
 ) -> Result<Run, String> {
     let design = case.controller.as_ref().ok_or("the case has no controller")?;
-    let (machine, profile) = (&case.machine, &case.moves[0].profile);
+    let (machine, profile) = (&case.machine, case.moves[0].profile());
     let end = times.last().copied().unwrap_or(0.0);
     let mut law = Law::new(design, model)?;
     let (every, delay) = (design.every, design.delay);

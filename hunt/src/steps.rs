@@ -60,7 +60,7 @@ pub fn run(subject: &Subject) -> Result<Answer, String> {
         Subject::Loop(case) => {
             let design = case.controller.as_ref().ok_or("the case has no controller")?;
             every = design.every;
-            (Fed::Sampled, Some(&case.moves[0].profile))
+            (Fed::Sampled, Some(case.moves[0].profile()))
         }
         Subject::Axis(_) | Subject::Gantry(_) => (subject.held(every)?, None),
     };

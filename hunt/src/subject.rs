@@ -186,7 +186,7 @@ fn at_rest(motion: &Move, machine: &Machine) -> Experiment {
         inputs: vec![Signal::Step { value: 0.0, at: 0.0 }],
         until: motion.until,
         every: motion.every,
-        initial: machine.at_rest(motion.profile.start()),
+        initial: machine.at_rest(motion.profile().start()),
         log: None,
     }
 }

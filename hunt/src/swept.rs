@@ -46,7 +46,7 @@ pub fn run(subject: &Subject) -> Result<Answer, String> {
         }
         // x = y + error
         Subject::Loop(case) => {
-            let y = case.moves[0].profile.at(case.moves[0].until).position;
+            let y = case.moves[0].profile().at(case.moves[0].until).position;
             row[1] = Double::from(column("final_cart_error")?) + Double::from(y) - machine.origin[1];
         }
         Subject::Axis(_) => {

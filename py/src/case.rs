@@ -169,7 +169,7 @@ impl Case {
         timing: runs::Timing,
         spread: Option<f64>,
     ) -> PyResult<Vec<runs::Run>> {
-        runs::motion(py, self.axis(py)?, &self.path, &names, controller, timing, spread)
+        runs::motion(py, &self.inner, &self.path, &names, controller, timing, spread)
     }
 
     fn check<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {

@@ -14,11 +14,11 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 use taut::case::{Case, Experiment};
-use taut::control::{Loop, MoveRun, Rows, Standard, Worst, stream, worst};
+use taut::control::{Loop, MoveRun, Rows, Standard, Worst, each, stream, worst};
 use taut::files::Inputs;
 use taut::json::{self, Moved, Simulated, Simulation};
 use taut::metrics::{Meter, Metrics};
-use taut::reach::feasible::{Shortfall, shortfalls};
+use taut::reach::feasible::Shortfall;
 use taut::reduction::Reduction;
 use taut::solve::{self, Flow, Outcome, Solver};
 use taut::trajectory::{CsvWriter, ParquetWriter, Trajectory};
@@ -111,6 +111,7 @@ impl Run {
             What::Experiment { case, metrics, .. } => json::figures(metrics, &case.machine),
             What::Move { case, index, run, worst, .. } => {
                 let moved = Moved {
+                    machine: &case.machine,
                     motion: &case.moves[*index],
                     run,
                     worst: worst.as_ref(),
@@ -270,7 +271,7 @@ pub fn motion(
     };
     let mut runs = Vec::new();
     for motion in moves {
-        let profile = motion.reference(design);
+        let profiles = motion.references(design);
         let rows = Rows { until: motion.until, every: motion.every, window: motion.window };
         columns::fit(py, rows.until / rows.every, COLUMNS, FEWER)?;
         let interrupt = Interrupt::listen();
@@ -283,11 +284,11 @@ pub fn motion(
         let run = match controller {
             Some(object) => {
                 let mut own = Own::new(object, &interrupt)?;
-                guarded(|| stream(machine, &mut own, &timing, &profile, &rows, solver, false, &mut take))
+                guarded(|| stream(machine, &mut [&mut own], &timing, &profiles, &rows, solver, false, &mut take))
             }
             None => unlocked(py, || {
-                let mut controller = Standard::new(design, machine)?;
-                stream(machine, &mut controller, &timing, &profile, &rows, solver, false, &mut take)
+                let mut controllers = Standard::of_drives(design, machine)?;
+                stream(machine, &mut each(&mut controllers), &timing, &profiles, &rows, solver, false, &mut take)
             }),
         };
         interrupt.finish()?;
@@ -383,11 +384,11 @@ pub fn moves<'py>(py: Python<'py>, runs: Vec<PyRef<'py, Run>>) -> PyResult<Bound
     let judged: Vec<(Option<Trouble>, Vec<Shortfall>)> = runs
         .iter()
         .map(|run| match &run.what {
-            What::Move { case, index, run: moved, timing, .. } => {
-                let (design, profile) = (case.controller.as_ref(), &case.moves[*index].profile);
-                let trouble = design.and_then(|design| trouble(&case.machine, design, moved, profile.target()));
-                let profile = profile.clone().shaped(design.map_or(&[], |design| &design.shaper));
-                (trouble, shortfalls(&case.machine, timing.limit, &profile))
+            What::Move { case, index, run: moved, .. } => {
+                let (design, motion) = (case.controller.as_ref(), &case.moves[*index]);
+                let target = motion.profile().target();
+                let trouble = design.and_then(|design| trouble(&case.machine, design, moved, target));
+                (trouble, design.map_or(Vec::new(), |design| motion.shortfalls(&case.machine, design)))
             }
             What::Experiment { .. } => (None, Vec::new()),
         })
@@ -397,6 +398,7 @@ pub fn moves<'py>(py: Python<'py>, runs: Vec<PyRef<'py, Run>>) -> PyResult<Bound
         .zip(&judged)
         .filter_map(|(run, (trouble, shortfalls))| match &run.what {
             What::Move { case, index, run: moved, worst, .. } => Some(Moved {
+                machine: &case.machine,
                 motion: &case.moves[*index],
                 run: moved,
                 worst: worst.as_ref(),

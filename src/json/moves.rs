@@ -3,15 +3,17 @@
 use super::{ending, peak};
 use crate::case::Move;
 use crate::control::drives::{DriveGain, drive_gains};
-use crate::control::{Deviation, Loop, MoveRun, Worst};
+use crate::control::{Deviation, DriveFigures, Loop, MoveRun, Worst};
 use crate::machine::Machine;
 use crate::reach::feasible::Shortfall;
 use crate::tune::trouble::Trouble;
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 /// One move after it ran.
 #[derive(Debug, Clone, Copy)]
 pub struct Moved<'a> {
+    /// The machine that the case describes.
+    pub machine: &'a Machine,
     /// The move as the case has it.
     pub motion: &'a Move,
     /// Its run.
@@ -54,32 +56,46 @@ pub(super) fn shortfall(short: &Shortfall) -> Value {
     })
 }
 
+fn of_drive(drive: &DriveFigures) -> Value {
+    json!({
+        "following_error": deviation(drive.following),
+        "peak_current_A": peak(drive.current.0),
+        "rms_current_A": drive.current.1,
+        "peak_voltage_V": peak(drive.voltage.0),
+        "rms_voltage_V": drive.voltage.1,
+        "limited_s": drive.limited,
+        "amplifier_limited_s": drive.amplifier_limited,
+        "energy_in_J": drive.energy.0,
+        "energy_back_J": drive.energy.1,
+        "command_turns_per_s": drive.restlessness,
+    })
+}
+
 /// One of them.
 pub fn motion(done: &Moved) -> Value {
     let (run, figures) = (done.run, &done.run.figures);
     let (word, time) = ending(run.outcome.ending, run.metrics.end);
+    let geometry = done.machine.geometry();
+    let names = geometry.slides.iter().map(|slide| geometry.label(slide.body).key);
+    let loads = names.zip(&figures.loads).zip(&done.motion.profiles).map(|((name, load), profile)| {
+        let told = json!({
+            "error": deviation(load.error), "overshoot_m": load.overshoot, "target_m": profile.target(),
+        });
+        (name.to_string(), told)
+    });
+    let drives =
+        geometry.drives.iter().zip(&figures.drives).map(|(at, drive)| (at.label.key.to_string(), of_drive(drive)));
     let mut value = json!({
         "name": done.motion.name,
         "files": done.files,
         "ending": { "word": word, "time_s": time },
-        "profile_end_s": done.motion.profile.end(),
-        "target_m": done.motion.profile.target(),
-        "cart_error": deviation(figures.cart),
-        "following_error": deviation(figures.following),
+        "profile_end_s": done.motion.profile().end(),
+        "loads": loads.collect::<Map<_, _>>(),
+        "drives": drives.collect::<Map<_, _>>(),
         "window_m": done.motion.window,
         "settling_s": figures.settling,
-        "overshoot_m": figures.overshoot,
         "peak_stretch": run.metrics.spans.iter().map(|span| peak(span.peak_stretch)).collect::<Vec<_>>(),
         "peak_force_N": run.metrics.spans.iter().map(|span| peak(span.peak_force)).collect::<Vec<_>>(),
-        "peak_current_A": peak(figures.current.0),
-        "rms_current_A": figures.current.1,
-        "peak_voltage_V": peak(figures.voltage.0),
-        "rms_voltage_V": figures.voltage.1,
-        "limited_s": figures.limited,
-        "amplifier_limited_s": figures.amplifier_limited,
-        "energy_in_J": figures.energy.0,
-        "energy_back_J": figures.energy.1,
-        "command_turns_per_s": figures.restlessness,
         "samples": run.samples.0,
         "limited_samples": run.samples.1,
         "events": run.outcome.events.len(),
@@ -88,7 +104,20 @@ pub fn motion(done: &Moved) -> Value {
         })),
         "shortfalls": done.shortfalls.iter().map(shortfall).collect::<Vec<_>>(),
     });
-    if let (Some(worst), Value::Object(object)) = (done.worst, &mut value) {
+    let Value::Object(object) = &mut value else { return value };
+    if let Some(contour) = figures.contour {
+        object.insert("contour_error".into(), deviation(contour));
+    }
+    // Of an axis the figures of its cart and its drive stand beside the others.
+    if let ([cart], [drive]) = (&figures.loads[..], &figures.drives[..]) {
+        object.insert("target_m".into(), json!(done.motion.profile().target()));
+        object.insert("cart_error".into(), deviation(cart.error));
+        object.insert("overshoot_m".into(), json!(cart.overshoot));
+        if let Value::Object(drive) = of_drive(drive) {
+            object.extend(drive);
+        }
+    }
+    if let Some(worst) = done.worst {
         object.insert(
             "spread".into(),
             json!({

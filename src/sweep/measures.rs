@@ -2,6 +2,8 @@
 //! [`FIGURES`](crate::metrics::FIGURES).
 
 use crate::control::MoveRun;
+use crate::machine::Kind;
+use crate::mechanism::Label;
 use crate::metrics;
 
 /// A key figure, as a column has it.
@@ -17,8 +19,7 @@ pub struct Figure {
 
 impl Figure {
     pub(super) fn of_move(measure: &Measure) -> Self {
-        let &Measure { name, unit, words, .. } = measure;
-        Self { name: name.to_string(), unit, words: words.to_string() }
+        Self { name: measure.name.clone(), unit: measure.unit, words: measure.words.clone() }
     }
 
     pub(super) fn of_experiment(figure: &metrics::Figure) -> Self {
@@ -27,37 +28,99 @@ impl Figure {
 }
 
 /// A key figure of a move, and how it is had from a run.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Measure {
     /// Its name, as a column.
-    pub name: &'static str,
+    pub name: String,
     /// Its SI unit; empty for a pure number.
     pub unit: &'static str,
     /// Its name for people.
-    pub words: &'static str,
-    /// Its value; NaN where a run has none.
-    pub of: fn(&MoveRun) -> f64,
+    pub words: String,
+    part: usize,
+    of: fn(&MoveRun, usize) -> f64,
 }
 
-const fn row(name: &'static str, unit: &'static str, words: &'static str, of: fn(&MoveRun) -> f64) -> Measure {
-    Measure { name, unit, words, of }
+impl Measure {
+    /// Its value; NaN where a run has none.
+    pub fn of(&self, run: &MoveRun) -> f64 {
+        (self.of)(run, self.part)
+    }
+}
+
+/// The parts that a figure of moves belongs to.
+#[derive(Clone, Copy, PartialEq)]
+enum Per {
+    Load,
+    Drive,
+    /// The whole machine.
+    Whole,
+    /// The whole of a machine whose cart moves in a plane.
+    Plane,
+}
+
+/// A figure of moves: its name and words on an axis, and those of each part of a machine with several, `*` being the
+/// part.
+struct Row {
+    names: [&'static str; 2],
+    unit: &'static str,
+    words: [&'static str; 2],
+    per: Per,
+    of: fn(&MoveRun, usize) -> f64,
+}
+
+const fn row(
+    names: [&'static str; 2],
+    unit: &'static str,
+    words: [&'static str; 2],
+    per: Per,
+    of: fn(&MoveRun, usize) -> f64,
+) -> Row {
+    Row { names, unit, words, per, of }
 }
 
 /// Those of a move in closed loop, in the order of the columns.
 #[rustfmt::skip]
-pub const OF_MOVE: &[Measure] = &[
-    row("peak_cart_error", "m", "largest cart error x − y", |m| m.figures.cart.peak.value.abs()),
-    row("rms_cart_error", "m", "rms of the cart error", |m| m.figures.cart.rms),
-    row("final_cart_error", "m", "cart error at the end", |m| m.figures.final_cart_error),
-    row("peak_following_error", "m", "largest following error r φ₁ − y", |m| m.figures.following.peak.value.abs()),
-    row("rms_following_error", "m", "rms of the following error", |m| m.figures.following.rms),
-    row("settling_time", "s", "settling time after the profile", |m| m.figures.settling.unwrap_or(f64::NAN)),
-    row("overshoot", "m", "overshoot of the cart", |m| m.figures.overshoot),
-    row("peak_motor_current", "A", "peak motor current", |m| m.figures.current.0.value.abs()),
-    row("rms_motor_current", "A", "rms motor current", |m| m.figures.current.1),
-    row("peak_motor_voltage", "V", "peak motor voltage", |m| m.figures.voltage.0.value.abs()),
-    row("limited_time", "s", "time at the controller's limit", |m| m.figures.limited),
-    row("energy_taken", "J", "electrical energy taken in", |m| m.figures.energy.0),
-    row("restlessness", "Hz", "changes of direction of the command per second", |m| m.figures.restlessness),
-    row("peak_belt_force", "N", "largest force in the belt", |m| m.metrics.largest_force().1.value.abs()),
+const OF_MOVE: &[Row] = &[
+    row(["peak_cart_error", "peak_*_error"], "m", ["largest cart error x − y", "largest error of the *"], Per::Load, |m, k| m.figures.loads[k].error.peak.value.abs()),
+    row(["rms_cart_error", "rms_*_error"], "m", ["rms of the cart error", "rms of the error of the *"], Per::Load, |m, k| m.figures.loads[k].error.rms),
+    row(["final_cart_error", "final_*_error"], "m", ["cart error at the end", "error of the * at the end"], Per::Load, |m, k| m.figures.loads[k].error.last),
+    row(["peak_contour_error"; 2], "m", ["largest distance from the path"; 2], Per::Plane, |m, _| m.figures.contour.map_or(f64::NAN, |contour| contour.peak.value.abs())),
+    row(["rms_contour_error"; 2], "m", ["rms of the distance from the path"; 2], Per::Plane, |m, _| m.figures.contour.map_or(f64::NAN, |contour| contour.rms)),
+    row(["peak_following_error", "peak_*_following_error"], "m", ["largest following error r φ₁ − y", "largest following error of the *"], Per::Drive, |m, k| m.figures.drives[k].following.peak.value.abs()),
+    row(["rms_following_error", "rms_*_following_error"], "m", ["rms of the following error", "rms of the following error of the *"], Per::Drive, |m, k| m.figures.drives[k].following.rms),
+    row(["settling_time"; 2], "s", ["settling time after the profile"; 2], Per::Whole, |m, _| m.figures.settling.unwrap_or(f64::NAN)),
+    row(["overshoot", "*_overshoot"], "m", ["overshoot of the cart", "overshoot of the *"], Per::Load, |m, k| m.figures.loads[k].overshoot),
+    row(["peak_motor_current", "peak_*_current"], "A", ["peak motor current", "peak current of the *"], Per::Drive, |m, k| m.figures.drives[k].current.0.value.abs()),
+    row(["rms_motor_current", "rms_*_current"], "A", ["rms motor current", "rms current of the *"], Per::Drive, |m, k| m.figures.drives[k].current.1),
+    row(["peak_motor_voltage", "peak_*_voltage"], "V", ["peak motor voltage", "peak voltage of the *"], Per::Drive, |m, k| m.figures.drives[k].voltage.0.value.abs()),
+    row(["limited_time", "*_limited_time"], "s", ["time at the controller's limit", "time of the * at the controller's limit"], Per::Drive, |m, k| m.figures.drives[k].limited),
+    row(["energy_taken", "*_energy_taken"], "J", ["electrical energy taken in", "electrical energy that the * takes in"], Per::Drive, |m, k| m.figures.drives[k].energy.0),
+    row(["restlessness", "*_restlessness"], "Hz", ["changes of direction of the command per second", "changes of direction of the command of the * per second"], Per::Drive, |m, k| m.figures.drives[k].restlessness),
+    row(["peak_belt_force"; 2], "N", ["largest force in the belt"; 2], Per::Whole, |m, _| m.metrics.largest_force().1.value.abs()),
 ];
+
+/// The figures of moves of a kind of machine.
+pub fn of_move(kind: Kind) -> Vec<Measure> {
+    let geometry = kind.geometry();
+    let loads: Vec<Label> = geometry.slides.iter().map(|slide| geometry.label(slide.body)).collect();
+    let drives: Vec<Label> = geometry.drives.iter().map(|drive| drive.label).collect();
+    let of_row = |row: &'static Row| -> Vec<Measure> {
+        let &Row { names, unit, words, per, of } = row;
+        let one = |part: usize, label: Label, place: usize| Measure {
+            name: names[place].replace('*', label.key),
+            unit,
+            words: words[place].replace('*', label.name),
+            part,
+            of,
+        };
+        let parts = match per {
+            Per::Load => &loads,
+            Per::Drive => &drives,
+            Per::Plane if loads.len() < 2 => return Vec::new(),
+            Per::Whole | Per::Plane => return vec![one(0, Label { key: "", name: "" }, 0)],
+        };
+        let place = usize::from(parts.len() > 1);
+        parts.iter().enumerate().map(|(part, label)| one(part, *label, place)).collect()
+    };
+    OF_MOVE.iter().flat_map(of_row).collect()
+}

@@ -32,7 +32,7 @@ mod summary;
 
 pub use distribution::Distribution;
 pub use indices::{Estimate, Index, indices};
-pub use measures::{Figure, Measure, OF_MOVE};
+pub use measures::{Figure, Measure, of_move};
 pub use sobol::{DIMENSIONS, Sobol};
 pub use statistics::{Ranked, SHARES, Spread};
 use subject::{Subject, Worker};

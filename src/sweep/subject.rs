@@ -1,6 +1,6 @@
 //! The subject of a sweep: a machine, its experiments, and its moves in closed loop.
 
-use super::measures::{Figure, Measure, OF_MOVE};
+use super::measures::{self, Figure, Measure};
 use super::{Group, put_figures, status};
 use crate::case::{Case, Experiment, Move, Sweeping};
 use crate::control::{self, MoveRun, Setup};
@@ -20,7 +20,7 @@ pub(super) struct Subject {
     controller: Option<Design>,
     /// The figures that are told of experiments and of moves, and what experiments are followed for.
     of_experiment: Vec<metrics::Figure>,
-    of_move: Vec<&'static Measure>,
+    of_move: Vec<Measure>,
     sought: Sought,
 }
 
@@ -36,7 +36,8 @@ impl Subject {
         let (machine, moves, controller) = (case.machine.clone(), case.moves.clone(), case.controller.clone());
         let mut of_experiment = metrics::figures(machine.kind);
         of_experiment.retain(|figure| !(case.is_axis() && figure.row.again_on_an_axis) && plan.tells(&figure.name));
-        let of_move = OF_MOVE.iter().filter(|measure| plan.tells(measure.name)).collect();
+        let mut of_move = measures::of_move(machine.kind);
+        of_move.retain(|measure| plan.tells(&measure.name));
         let seeks: Vec<_> = of_experiment.iter().filter_map(metrics::Figure::seek).collect();
         let sought = Sought::of(&machine, &machine.mechanism(), &seeks);
         Self { machine, experiments, moves, controller, of_experiment, of_move, sought }
@@ -54,7 +55,7 @@ impl Subject {
             name: motion.name.clone(),
             file: motion.file_name(),
             is_move: true,
-            figures: self.of_move.iter().copied().map(Figure::of_move).collect(),
+            figures: self.of_move.iter().map(Figure::of_move).collect(),
         });
         experiments.chain(moves).collect()
     }
@@ -88,7 +89,7 @@ impl Subject {
             machine,
             model: &self.machine,
             design,
-            profile: &motion.profile,
+            profiles: &motion.profiles,
             until: motion.until,
             window: motion.window,
             solver: Solver::of(machine),
@@ -130,7 +131,7 @@ impl<'a> Worker<'a> {
         for motion in &subject.moves {
             let told =
                 mounted.clone().and_then(|()| subject.close(machine, motion)).map(|run| (status(&run.outcome), run));
-            put_figures(told, &subject.of_move, |measure, run| (measure.of)(run), values);
+            put_figures(told, &subject.of_move, |measure, run| measure.of(run), values);
         }
     }
 }

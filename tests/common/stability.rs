@@ -37,14 +37,14 @@ pub fn is_that_of_runs(name: &str, case: &Case, every: usize) {
             machine: &louder(step),
             model: &case.machine,
             design,
-            profile: &case.moves[0].profile,
+            profiles: &case.moves[0].profiles,
             until: 12.0,
             window: 1e-3,
             solver: Solver::Exact,
         })
         .unwrap();
         let calm = run.outcome.ending == Ending::Complete && run.figures.settling.is_some_and(|s| s < 9.0);
-        assert_eq!(told[step], calm, "{name} at step {step}: {:?} {told:?}", run.figures.cart);
+        assert_eq!(told[step], calm, "{name} at step {step}: {:?} {told:?}", run.figures.cart().error);
         both[usize::from(calm)] += 1;
     }
     println!("{name}: {} unstable, {} stable", both[0], both[1]);

@@ -26,7 +26,7 @@ pub(super) fn controller(root: &Table, machine: &Machine) -> Result<Option<Desig
             .allowed(format!("up to {MOST_DELAY} samples")));
     }
     let structure = structure(&table, machine, (every, delay))?;
-    Ok(Some(Design {
+    let design = Design {
         every,
         delay,
         limit: table.number_if_given("limit")?,
@@ -42,7 +42,14 @@ pub(super) fn controller(root: &Table, machine: &Machine) -> Result<Option<Desig
         },
         filters: filters(&table)?,
         shaper: shaper(&table)?,
-    }))
+    };
+    if let Some(part) = design.needs_axis().filter(|_| machine.drives.len() > 1) {
+        let field = table.optional(part).unwrap_or_else(|| table.field.clone());
+        return Err(field
+            .fail(format!("`{part}` needs a single axis, and the case describes a gantry ({})", machine.kind.name()))
+            .next("leave it out: pid, cascade and fuzzy run on each drive of a gantry"));
+    }
+    Ok(Some(design))
 }
 
 fn structure(table: &Table, machine: &Machine, (every, delay): (f64, f64)) -> Result<Structure> {

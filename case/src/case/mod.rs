@@ -41,7 +41,7 @@ use crate::log::Log;
 use crate::machine::axis::{CART, LABELS};
 use crate::machine::{Kind, Machine, Measurement};
 use crate::mechanism::State;
-use crate::reach::feasible::{Shortfall, shortfalls};
+use crate::reach::feasible::Shortfall;
 use files::Folder;
 use reader::{Field, Table};
 use std::collections::HashMap;
@@ -97,8 +97,7 @@ impl Case {
     /// that can be followed are left out.
     pub fn shortfalls(&self) -> Vec<(&str, Vec<Shortfall>)> {
         let Some(design) = &self.controller else { return Vec::new() };
-        let short = |motion: &Move| shortfalls(&self.machine, design.limit, &motion.reference(design));
-        let moves = self.moves.iter().map(|motion| (&*motion.name, short(motion)));
+        let moves = self.moves.iter().map(|motion| (&*motion.name, motion.shortfalls(&self.machine, design)));
         moves.filter(|(_, short)| !short.is_empty()).collect()
     }
 

@@ -1,4 +1,4 @@
-//! The moves: to a place, through points, or as a list in the manner of G-code.
+//! The moves: to a place, through points, or as a list in the manner of G-code; of a gantry in its plane.
 
 use super::reader::{Field, Table};
 use super::suggestion;
@@ -7,17 +7,18 @@ use crate::design::Design;
 use crate::error::{Error, Result};
 use crate::machine::Machine;
 use crate::quantity::{rounded, show};
+use crate::reach::feasible::{Shortfall, shortfalls};
 use crate::reach::quickest::{Quickest, Wanted, Way, modes};
 use crate::signal::gcode;
 use crate::signal::profile::{Leg, Limits, Profile};
 
-/// A move in closed loop: where the cart should be, and what is looked at.
+/// A move in closed loop: where all that slides should be, and what is looked at.
 #[derive(Debug, Clone)]
 pub struct Move {
     /// Its name, unique among the moves.
     pub name: String,
-    /// The cart's reference.
-    pub profile: Profile,
+    /// The reference of each coordinate: that of the cart of an axis, those of bridge and cart of a gantry.
+    pub profiles: Vec<Profile>,
     /// Whether its limits are those of a plan of the machine, and not numbers of the file.
     pub is_planned: bool,
     /// End of the run, s.
@@ -34,9 +35,22 @@ impl Move {
         file_name(&self.name)
     }
 
-    /// The cart's reference, through the shaper of this controller.
-    pub fn reference(&self, design: &Design) -> Profile {
-        self.profile.clone().shaped(&design.shaper)
+    /// The reference of the first coordinate: the cart's of an axis.
+    pub fn profile(&self) -> &Profile {
+        &self.profiles[0]
+    }
+
+    /// The references, through the shaper of this controller.
+    pub fn references(&self, design: &Design) -> Vec<Profile> {
+        self.profiles.iter().map(|profile| profile.clone().shaped(&design.shaper)).collect()
+    }
+
+    /// The limits that its reference exceeds on an axis under this controller; of a gantry none is known before it runs.
+    pub fn shortfalls(&self, machine: &Machine, design: &Design) -> Vec<Shortfall> {
+        match &self.references(design)[..] {
+            [reference] => shortfalls(machine, design.limit, reference),
+            _ => Vec::new(),
+        }
     }
 }
 
@@ -76,12 +90,14 @@ fn one(table: &Table, machine: &Machine, design: &Design) -> Result<Move> {
     table.check_keys(&["name", "gcode"], &[])?;
     let name = table.required("name", "for example name = \"short fast\"")?;
     check_name(&name)?;
-    let from = table.number("from")?;
+    let from = match table.optional("from") {
+        Some(field) => place(&field, machine)?,
+        None => vec![0.0; machine.geometry().slides.len()],
+    };
     let limits = match table.optional("plan") {
-        Some(field) => planned(table, &field, from, machine, design)?,
+        Some(field) => planned(table, &field, &from, machine, design)?,
         None => limits(table)?,
     };
-    let legs = legs(table, from, &limits)?;
     let until = table.number("until")?;
     let every = table.number_if_given("every")?.unwrap_or(design.every.min(until));
     let at = |key: &str| table.optional(key).unwrap_or_else(|| table.field.clone());
@@ -96,29 +112,70 @@ fn one(table: &Table, machine: &Machine, design: &Design) -> Result<Move> {
             .allowed(format!("up to {}", rounded(MOST_SAMPLES)))
             .next("take a shorter run, or a longer interval"));
     }
-    let profile = Profile::new(from, &legs).map_err(|error| table.field.fail(error.what))?;
-    if profile.end() > until {
+    let profiles = profiles(table, machine, &from, &limits)?;
+    let end = profiles.first().map_or(0.0, Profile::end);
+    if end > until {
         return Err(at("until")
-            .fail(format!("the run ends before the move, which takes {}", show(profile.end(), "s")))
-            .allowed(format!("from {} on", show(profile.end(), "s"))));
+            .fail(format!("the run ends before the move, which takes {}", show(end, "s")))
+            .allowed(format!("from {} on", show(end, "s"))));
     }
-    if let Some(travel) = machine.cart.travel {
-        let places = std::iter::once(from).chain(profile.strokes().map(|(_, from, distance, _)| from + distance));
+    for ((slide, travel), profile) in machine.travels().zip(&profiles) {
+        let Some(travel) = travel else { continue };
+        let strokes = profile.strokes().map(|(_, from, distance, _)| from + distance);
+        let places = std::iter::once(profile.start()).chain(strokes);
         if let Some(out) = places.into_iter().find(|x| !(travel.min..=travel.max).contains(x)) {
-            return Err(table.field.fail(format!("it leads to {}, off the travel", show(out, "mm"))).allowed(format!(
-                "from {} to {}",
-                show(travel.min, "mm"),
-                show(travel.max, "mm")
-            )));
+            let whose = if profiles.len() == 1 { String::new() } else { format!(" of the {}", slide.name) };
+            return Err(table
+                .field
+                .fail(format!("it leads to {}, off the travel{whose}", show(out, "mm")))
+                .allowed(format!("from {} to {}", show(travel.min, "mm"), show(travel.max, "mm"))));
         }
     }
     let (name, window) = (name.text()?.to_string(), table.number("window")?);
-    Ok(Move { name, profile, is_planned: table.optional("plan").is_some(), until, every, window })
+    Ok(Move { name, profiles, is_planned: table.optional("plan").is_some(), until, every, window })
+}
+
+/// A position of each coordinate: a number for an axis, a list for a gantry.
+fn place(field: &Field, machine: &Machine) -> Result<Vec<f64>> {
+    let slides = machine.geometry().slides;
+    match slides.len() {
+        1 => Ok(vec![field.number()?]),
+        count => {
+            let names: Vec<&str> = machine.travels().map(|(slide, _)| slide.name).collect();
+            let wanted = format!("{count} positions: {}", names.join(", "));
+            let key = field.key();
+            let example = format!("write for example {key} = [\"50 mm\", \"20 mm\"]");
+            field
+                .numbers(count, &wanted)
+                .map_err(|error| if error.next.is_none() { error.next(example) } else { error })
+        }
+    }
+}
+
+/// The reference of each coordinate along the legs of the table.
+fn profiles(table: &Table, machine: &Machine, from: &[f64], limits: &Limits) -> Result<Vec<Profile>> {
+    let legs = legs(table, machine, from, limits)?;
+    let profiles = match from {
+        [from] => {
+            let alone = |leg: &Leg<Vec<f64>>| match leg {
+                Leg::To(to, limits) => Leg::To(to[0], *limits),
+                Leg::Wait(length) => Leg::Wait(*length),
+            };
+            Profile::new(*from, &legs.iter().map(alone).collect::<Vec<_>>()).map(|profile| vec![profile])
+        }
+        _ => Profile::along(from, &legs),
+    };
+    profiles.map_err(|error| table.field.fail(error.what))
 }
 
 /// The limits of the quickest move that the machine of the file can make, with jerk and snap time on the belt's modes
 /// where the way is long enough for it.
-fn planned(table: &Table, field: &Field, from: f64, machine: &Machine, design: &Design) -> Result<Limits> {
+fn planned(table: &Table, field: &Field, from: &[f64], machine: &Machine, design: &Design) -> Result<Limits> {
+    if from.len() > 1 {
+        return Err(field
+            .fail("a plan needs a single axis, and the case describes a gantry")
+            .next("give speed and acceleration along the path instead"));
+    }
     if let Some(other) = ["speed", "acceleration", "jerk", "snap", "gcode"].iter().find_map(|key| table.optional(key)) {
         let next = format!(
             "leave out plan, or {}; limits of the plan stand in it: plan = {{ speed = \"0.5 m/s\" }}",
@@ -137,8 +194,8 @@ fn planned(table: &Table, field: &Field, from: f64, machine: &Machine, design: &
     // Where it goes does not depend on how fast.
     let any = Limits { speed: 1.0, acceleration: 1.0, jerk: None, snap: None };
     let told = |error: Error| Error { place: field.fail("").place, ..error };
-    let profile = Profile::new(from, &legs(table, from, &any)?).map_err(told)?;
-    let way = Way::of(&profile).ok_or_else(|| field.fail("a move that goes nowhere has no plan"))?;
+    let profiles = profiles(table, machine, from, &any).map_err(told)?;
+    let way = profiles.first().and_then(Way::of).ok_or_else(|| field.fail("a move that goes nowhere has no plan"))?;
     let modes = modes(machine);
     let quickest = Quickest { machine, design, modes: &modes, wanted: &wanted };
     quickest.check(&way).map_err(told)?;
@@ -170,11 +227,12 @@ fn limits(table: &Table) -> Result<Limits> {
 }
 
 /// The legs: `to`, `points` or `gcode`.
-fn legs(table: &Table, from: f64, limits: &Limits) -> Result<Vec<Leg>> {
+fn legs(table: &Table, machine: &Machine, from: &[f64], limits: &Limits) -> Result<Vec<Leg<Vec<f64>>>> {
     let kinds = ["to", "points", "gcode"];
     let given: Vec<Field> = kinds.iter().filter_map(|key| table.optional(key)).collect();
     let field = match &given[..] {
         [field] => field,
+        [] if from.len() > 1 => return Err(table.missing("to", "to = [\"50 mm\", \"20 mm\"], or points, or gcode")),
         [] => return Err(table.missing("to", "to = \"50 mm\", or points, or gcode")),
         [first, second, ..] => {
             return Err(second
@@ -183,18 +241,22 @@ fn legs(table: &Table, from: f64, limits: &Limits) -> Result<Vec<Leg>> {
         }
     };
     match field.key() {
-        "to" => Ok(vec![Leg::To(field.number()?, *limits)]),
+        "to" => Ok(vec![Leg::To(place(field, machine)?, *limits)]),
         "points" => {
             let mut legs = Vec::new();
             for point in field.filled_list()? {
                 if !point.is_table() {
-                    legs.push(Leg::To(point.named("move.points.to").number()?, *limits));
+                    legs.push(Leg::To(place(&point.named("move.points.to"), machine)?, *limits));
                     continue;
                 }
                 let table = point.named("move.points").table()?;
                 table.check_keys(&[], &[])?;
                 let speed = table.number_if_given("speed")?.unwrap_or(limits.speed);
-                legs.push(Leg::To(table.number("to")?, Limits { speed, ..*limits }));
+                let to = match from.len() {
+                    1 => vec![table.number("to")?],
+                    _ => place(&table.required("to", "to = [\"50 mm\", \"20 mm\"]")?, machine)?,
+                };
+                legs.push(Leg::To(to, Limits { speed, ..*limits }));
                 let wait = table.number("wait")?;
                 if wait > 0.0 {
                     legs.push(Leg::Wait(wait));

@@ -10,22 +10,22 @@ use crate::interrupt::Interrupt;
 use std::fmt::Write;
 use std::path::Path;
 use taut::case::{Case, Files, Move};
-use taut::control::{Loop, MoveRun, Rows, Standard, stream, worst};
+use taut::control::{Loop, MoveRun, Rows, Standard, each, stream, worst};
 use taut::design::Design;
 use taut::files::write_atomically;
 use taut::json::{self, Moved};
-use taut::reach::feasible::{sentence, shortfalls};
+use taut::reach::feasible::sentence;
 use taut::solve::{Flow, Solver};
 use taut::trajectory::{CsvWriter, Trajectory};
 use taut::tune::trouble;
 use taut::{Error, Result};
-use taut_report::motion::{Curves, Done, Tried, figures, page};
-use taut_report::simulate::{ended_early, named, time};
+use taut_report::motion::{Curves, Done, Tried, page};
+use taut_report::simulate::{ended_early, time};
 
 /// Reads the cases, runs their moves, reports.
 pub fn run(args: &Args) -> Outcome {
     let common = &args.common;
-    let cases: Vec<Case> = args.case.iter().map(|path| common.case_for(path, Files::Nothing)).collect::<Result<_>>()?;
+    let cases: Vec<Case> = args.case.iter().map(|path| common.open_for(path, Files::Nothing)).collect::<Result<_>>()?;
     if cases.len() > 1 && common.out.is_some() {
         return Err(Error::new("--out takes the results of one case")
             .in_file("--out")
@@ -63,10 +63,8 @@ pub fn run(args: &Args) -> Outcome {
     if let (Some(folder), [tried]) = (&folder, &tried[..]) {
         let text = folder.bring(&tried.case.text, &tried.case.files).map_err(Failure::work)?;
         if common.draws() {
-            let figures: Vec<_> = tried.done.iter().map(figures).collect();
-            let page = page(tried, &text, &figures);
-            let names = tried.done.iter().map(|done| done.motion.file_name());
-            finished.report = Some(Report { page, pictures: named(names, figures) });
+            let (page, pictures) = page(tried, &text);
+            finished.report = Some(Report { page, pictures });
         }
         finished.files.push(("case.toml".into(), text));
     }
@@ -86,7 +84,7 @@ fn names(args: &Args, case: &Case, path: &Path) -> Result<Vec<String>> {
 
 /// A case with its moves as data.
 fn told(tried: &Tried) -> impl serde::Serialize + use<> {
-    let moved: Vec<Moved> = tried.done.iter().map(Done::told).collect();
+    let moved: Vec<Moved> = tried.done.iter().map(|done| done.told(&tried.case.machine)).collect();
     let (design, case) = (tried.design, tried.case);
     json::moves(&case.title, design.structure.name(), &Loop::of(design), &case.machine, &moved)
 }
@@ -101,8 +99,8 @@ fn one<'a>(
     interrupt: &Interrupt,
 ) -> std::result::Result<Done<'a>, Failure> {
     let machine = &case.machine;
-    let mut controller = Standard::new(design, machine)?;
-    let profile = motion.reference(design);
+    let mut controllers = Standard::of_drives(design, machine)?;
+    let profiles = motion.references(design);
     let rows = Rows { until: motion.until, every: motion.every, window: motion.window };
     let name = motion.file_name();
     let writer = folder.map(|folder| CsvWriter::create(folder.path(format!("{name}.csv")))).transpose();
@@ -118,7 +116,8 @@ fn one<'a>(
         if trouble.is_some() || interrupt.signal().is_some() { Flow::Stop } else { Flow::Continue }
     };
     let keep = folder.is_some();
-    let run = stream(machine, &mut controller, &Loop::of(design), &profile, &rows, solver, keep, &mut take)?;
+    let (controllers, timing) = (&mut each(&mut controllers), Loop::of(design));
+    let run = stream(machine, controllers, &timing, &profiles, &rows, solver, keep, &mut take)?;
     if let Some(trouble) = trouble {
         return Err(Failure::work(trouble));
     }
@@ -133,18 +132,24 @@ fn one<'a>(
         Some(share) => worst(&case.machine, design, motion, share, solver, &|| interrupt.signal().is_some())?,
         None => None,
     };
-    let trouble = trouble::trouble(machine, design, &run, motion.profile.target());
-    let shortfalls = shortfalls(machine, design.limit, &profile);
+    let trouble = trouble::trouble(machine, design, &run, motion.profile().target());
+    let shortfalls = motion.shortfalls(machine, design);
     Ok(Done { motion, run, curves, worst, trouble, shortfalls, files })
 }
 
 /// The controller's samples as CSV.
 fn write_samples(folder: &Folder, name: &str, case: &Case, run: &MoveRun) -> Result<String> {
-    let unit = if case.machine.drives[0].amplifier.mode == taut::machine::AmplifierMode::Current { "A" } else { "V" };
-    let mut text = format!("time_s,reference_m,measured_m,asked_{unit},given_{unit}\n");
+    let unit = case.machine.drives[0].amplifier.mode.unit();
+    // One drive is not named.
+    let drives: Vec<String> = match case.machine.geometry().drives {
+        [_] => vec![String::new()],
+        several => several.iter().map(|drive| format!("{},", drive.label.key)).collect(),
+    };
+    let name_of_drive = if drives.len() > 1 { "drive," } else { "" };
+    let mut text = format!("time_s,{name_of_drive}reference_m,measured_m,asked_{unit},given_{unit}\n");
     for s in &run.kept {
-        let _ =
-            writeln!(text, "{},{},{},{},{}", s.time, s.reference + 0.0, s.measured + 0.0, s.asked + 0.0, s.given + 0.0);
+        let [reference, measured, asked, given] = [s.reference, s.measured, s.asked, s.given].map(|value| value + 0.0);
+        let _ = writeln!(text, "{},{}{reference},{measured},{asked},{given}", s.time, drives[s.drive]);
     }
     let name = format!("{name}.samples.csv");
     write_atomically(folder.path(&name), text)?;
@@ -182,7 +187,7 @@ fn status(tried: &[Tried], interrupt: &Interrupt) -> (Status, Vec<Remark>) {
 
 /// How long the command or the amplifier stood at its limit, in words; none if neither did.
 fn saturated(done: &Done) -> Option<String> {
-    let ((samples, limited), amplifier) = (done.run.samples, done.run.figures.amplifier_limited);
+    let ((samples, limited), amplifier) = (done.run.samples, done.run.figures.drive().amplifier_limited);
     if limited > 0 {
         return Some(format!("{limited} of {samples} samples are at the controller's limit"));
     }

@@ -49,15 +49,15 @@ pub fn comparison(tried: &[Tried]) -> String {
             let figures = &done.run.figures;
             let mut row = vec![
                 case.case.title.clone(),
-                length(figures.cart.peak.value.abs()),
-                length(figures.cart.rms),
-                length(figures.following.peak.value.abs()),
+                length(figures.cart().error.peak.value.abs()),
+                length(figures.cart().error.rms),
+                length(figures.drive().following.peak.value.abs()),
                 figures.settling.map_or("no".into(), |s| format!("{:.0} ms", 1e3 * s)),
-                length(figures.overshoot),
-                format!("{:.2} A", figures.current.1),
+                length(figures.cart().overshoot),
+                format!("{:.2} A", figures.drive().current.1),
             ];
             if !amperes {
-                row.push(format!("{:.2} V", figures.voltage.1));
+                row.push(format!("{:.2} V", figures.drive().voltage.1));
             }
             if let Some(worst) = &done.worst {
                 row.extend([length(worst.error), format!("{}/{}", worst.settled, worst.axes)]);

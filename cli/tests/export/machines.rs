@@ -138,9 +138,10 @@ pub fn observed(case: &Case, which: usize) -> Vec<([f64; 12], f64)> {
     let design = case.controller.as_ref().unwrap();
     let one = &case.moves[which];
     let mut watched = Watched { own: Standard::new(design, &case.machine).unwrap(), seen: Vec::new() };
-    let profile = one.reference(design);
+    let profiles = one.references(design);
     let timing = Loop::of(design);
-    close(&case.machine, &mut watched, &timing, &profile, one.until, one.window, Solver::of(&case.machine)).unwrap();
+    close(&case.machine, &mut [&mut watched], &timing, &profiles, one.until, one.window, Solver::of(&case.machine))
+        .unwrap();
     let flat = |seen: &Observation| {
         let five = |r: Reference| [r.position, r.speed, r.acceleration, r.jerk, r.snap];
         let mut all = [0.0; 12];

@@ -3,8 +3,8 @@
 //! Nobody observes the motion, which takes a third of the time. What is between samples is missing: a peak by about
 //! (ω T)²/8 of itself at a frequency ω and a sample time T, 1e-3 at 14 Hz and 1 kHz.
 
-use super::outcome::{Deviation, Figures, at_rest, unrecorded};
-use super::sampled::Loop;
+use super::outcome::{Deviation, DriveFigures, Figures, LoadFigures, at_rest, unrecorded};
+use super::sampled::{Controller, Loop};
 use super::standard::Standard;
 use crate::error::Result;
 use crate::machine::Machine;
@@ -14,22 +14,23 @@ use crate::metrics::{Meter, Peak};
 use crate::signal::profile::Profile;
 use crate::solve::{self, Solver};
 
-/// Runs a move and gathers the cart's error, settling and the root mean square of the current at samples alone, with
+/// Runs a move of an axis and gathers the cart's error, settling and the root mean square of the current at samples alone, with
 /// straight lines between; the figures, and how the run ended. Motion and commands are those of
 /// [`closed_loop`](super::closed_loop).
 pub(crate) fn closed_loop_at_samples(
     machine: &Machine,
     controller: &mut Standard,
     timing: &Loop,
-    profile: &Profile,
+    profiles: &[Profile],
     (until, window): (f64, f64),
     solver: Solver,
 ) -> Result<(Figures, solve::Ending)> {
     timing.check(until)?;
-    let experiment = at_rest(machine, profile, until, timing.every.min(until));
-    let mut gathered = Gathered::new(profile, window);
+    let experiment = at_rest(machine, profiles, until, timing.every.min(until));
+    let mut gathered = Gathered::new(&profiles[0], window);
     let see = |time: f64, state: &State, current: f64| gathered.see(time, state, current);
-    let outcome = unrecorded((machine, &experiment), controller, (timing, profile), solver, None::<&mut Meter>, see)?;
+    let controllers = &mut [controller as &mut dyn Controller];
+    let outcome = unrecorded((machine, &experiment), controllers, (timing, profiles), solver, None::<&mut Meter>, see)?;
     Ok((gathered.finish(), outcome.ending))
 }
 
@@ -81,11 +82,10 @@ impl<'a> Gathered<'a> {
         let [error, current] = self.squares.map(|sum| (sum / end.max(f64::MIN_POSITIVE)).sqrt());
         let is_inside = end >= self.done && away <= self.window;
         Figures {
-            cart: Deviation { peak: self.peak, rms: error, last },
-            final_cart_error: last,
+            loads: vec![LoadFigures { error: Deviation { peak: self.peak, rms: error, last }, overshoot: 0.0 }],
             settling: is_inside.then(|| self.entered.map_or(0.0, |time| (time - self.done).max(0.0))),
-            current: (Peak::default(), current),
-            ..Figures::default()
+            drives: vec![DriveFigures { current: (Peak::default(), current), ..DriveFigures::default() }],
+            contour: None,
         }
     }
 }

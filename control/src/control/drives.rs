@@ -35,6 +35,9 @@ pub struct DriveGain {
 
 /// The gains for an axis going forward; those in volts where a voltage is commanded.
 pub fn drive_gains(machine: &Machine) -> Vec<DriveGain> {
+    if machine.drives.len() > 1 {
+        return Vec::new();
+    }
     let rigid = Rigid::of(machine);
     let motor = &machine.drives[0].motor;
     // Before the amplifier's gain, which is the drive's own affair: the voltage or current at the motor.

@@ -1,14 +1,15 @@
-//! Control of an axis: controllers stepped in time around the exact plant, input shapers, and the spectra that these
+//! Control of a machine: controllers stepped in time around the exact plant, input shapers, and the spectra that these
 //! are chosen from.
 //!
-//! [`closed_loop`] runs a [`Design`] on a stage along a [`Profile`]; [`close`] does so with any [`Controller`], a
-//! user's own too.
+//! [`closed_loop`] runs a [`Design`] on each drive of a machine along a [`Profile`] for each coordinate; [`close`] does so
+//! with any [`Controller`]s, a user's own too.
 //!
 //! [`Design`]: crate::design::Design
 //! [`Profile`]: crate::signal::profile::Profile
 
 mod at_samples;
 pub mod compare;
+mod contour;
 mod criterion;
 pub mod damping;
 pub mod drives;
@@ -40,7 +41,9 @@ mod stepped;
 mod welch;
 
 pub(crate) use at_samples::closed_loop_at_samples;
-pub use outcome::{Deviation, Figures, MoveRun, Rows, Setup, close, closed_loop, stream};
+pub use outcome::{
+    Deviation, DriveFigures, Figures, LoadFigures, MoveRun, Rows, Setup, close, closed_loop, each, stream,
+};
 pub use outcome::{closed_loop_briefly, follow};
 pub use rest::Swing;
 pub use sampled::Added;

@@ -1,5 +1,6 @@
 //! A move run in closed loop, and what it shows.
 
+use super::contour::{Contour, ContourGauge};
 use super::rest::Swing;
 use super::sampled::{Added, Controller, Loop, Sample};
 use super::sampling::Sampled;
@@ -7,13 +8,12 @@ use super::standard::Standard;
 use crate::case::Experiment;
 use crate::design::Design;
 use crate::error::{Error, Result};
-use crate::machine::Machine;
-use crate::machine::axis::{CART, DRIVE};
-use crate::mechanism::{Limit, Mode, State};
-use crate::metrics::{Meter, Metrics, Peak};
+use crate::machine::{Machine, SlideAt};
+use crate::mechanism::{Limit, Mechanism, Mode, Shown, State};
+use crate::metrics::{Held, Meter, Metrics, Peak, Sought};
 use crate::signal::Signal;
 use crate::signal::profile::Profile;
-use crate::solve::{self, Curve, Detail, Flow, Gap, Observe, Polynomial, Solver, TERMS, reading};
+use crate::solve::{self, Curve, Detail, Flow, Gap, Observe, Polynomial, Solver, TERMS};
 use crate::trajectory::{Column, Trajectory};
 
 /// A difference over time.
@@ -27,21 +27,49 @@ pub struct Deviation {
     pub last: f64,
 }
 
-/// The key figures of a move: peaks over all instants and not only over rows, integrals over time.
+/// The key figures of a move, by the role of the parts: peaks over all instants and not only over rows, integrals over
+/// time.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Figures {
-    /// r φ₁ − y: the drive pulley from the cart's reference. A controller that makes up for the belt's stretch means
-    /// part of it.
-    pub following: Deviation,
-    /// x − y: the cart from its reference.
-    pub cart: Deviation,
-    /// x − y at the end, m.
-    pub final_cart_error: f64,
-    /// From the end of the profile, a shaper apart, until the cart stays within the window around its target, s; none
-    /// if it does not.
+    /// Of what slides: the cart of an axis, bridge and cart of a gantry.
+    pub loads: Vec<LoadFigures>,
+    /// Of the drives.
+    pub drives: Vec<DriveFigures>,
+    /// Distance from the path, to its left above zero, of a machine with two coordinates. Exact where the nearest leg is
+    /// the same for a while; about corners at eight places of each piece of the motion.
+    pub contour: Option<Deviation>,
+    /// From the end of the profile, a shaper apart, until all that slides stays within the window around its target, s;
+    /// none if it does not.
     pub settling: Option<f64>,
-    /// By how much the cart passes its target after the beginning of the last stroke, m.
+}
+
+impl Figures {
+    /// The figures of the cart.
+    pub fn cart(&self) -> LoadFigures {
+        self.loads.last().copied().unwrap_or_default()
+    }
+
+    /// The figures of the first drive.
+    pub fn drive(&self) -> DriveFigures {
+        self.drives.first().copied().unwrap_or_default()
+    }
+}
+
+/// Key figures of what slides.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct LoadFigures {
+    /// x − y: its difference from its reference.
+    pub error: Deviation,
+    /// By how much it passes its target after the beginning of the last stroke, m.
     pub overshoot: f64,
+}
+
+/// Key figures of a drive.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct DriveFigures {
+    /// r φ − y: its pulley from the reference of its part of the belt. A controller that makes up for the belt's stretch
+    /// means part of it.
+    pub following: Deviation,
     /// Motor current: largest and root mean square, A.
     pub current: (Peak, f64),
     /// Motor voltage: largest and root mean square, V.
@@ -70,21 +98,21 @@ pub struct MoveRun {
     pub samples: (u64, u64),
     /// The samples, if asked for.
     pub kept: Vec<Sample>,
-    /// The swing of the command after the profile.
-    pub swing: Swing,
+    /// The swing of each drive's command after the profile.
+    pub swings: Vec<Swing>,
 }
 
 /// Everything that a closed loop needs.
 #[derive(Debug, Clone, Copy)]
 pub struct Setup<'a> {
-    /// The axis.
+    /// The machine.
     pub machine: &'a Machine,
     /// The machine that the controller assumes; mostly the same.
     pub model: &'a Machine,
-    /// The controller.
+    /// The controller of each drive.
     pub design: &'a Design,
-    /// The reference of the cart.
-    pub profile: &'a Profile,
+    /// The reference of each coordinate.
+    pub profiles: &'a [Profile],
     /// End of the run, s.
     pub until: f64,
     /// Half the width of the window in which the cart counts as settled, m.
@@ -95,75 +123,87 @@ pub struct Setup<'a> {
 
 /// Runs a design along a profile: pure, and as cheap as a run of the axis, so that a search can call it often.
 pub fn closed_loop(setup: &Setup) -> Result<MoveRun> {
-    let mut controller = Standard::new(setup.design, setup.model)?;
-    let profile = setup.profile.clone().shaped(&setup.design.shaper);
-    let timing = Loop::of(setup.design);
-    close(setup.machine, &mut controller, &timing, &profile, setup.until, setup.window, setup.solver)
+    let &Setup { machine, model, design, profiles, until, window, solver } = setup;
+    let shaped: Vec<Profile> = profiles.iter().map(|profile| profile.clone().shaped(&design.shaper)).collect();
+    let mut controllers = Standard::of_drives(design, model)?;
+    close(machine, &mut each(&mut controllers), &Loop::of(design), &shaped, until, window, solver)
 }
 
-/// The same of a search that runs it a thousand times, with a controller and a shaped profile that are made once: of the
-/// figures the cart's error, settling and the root mean square of the current, equal to those of [`closed_loop`] (root
-/// mean squares to rounding, the others to the last bit), and how it ended.
+/// Controllers of a design as [`close`] and [`stream`] take them.
+pub fn each(controllers: &mut [Standard]) -> Vec<&mut dyn Controller> {
+    controllers.iter_mut().map(|controller| controller as &mut dyn Controller).collect()
+}
+
+/// The same as [`closed_loop`] of a search that runs it a thousand times, with controllers and shaped profiles that are made once: of the
+/// figures the error of what slides, settling and the root mean square of the current, equal to those of [`closed_loop`]
+/// (root mean squares to rounding, the others to the last bit), and how it ended.
 pub fn closed_loop_briefly(
     machine: &Machine,
-    controller: &mut Standard,
+    controllers: &mut [&mut dyn Controller],
     timing: &Loop,
-    profile: &Profile,
+    profiles: &[Profile],
     (until, window): (f64, f64),
     solver: Solver,
 ) -> Result<(Figures, solve::Ending)> {
     timing.check(until)?;
-    let experiment = at_rest(machine, profile, until, timing.every.min(until));
-    let mut gauge = Gauge { is_brief: true, ..Gauge::new(machine, &experiment, profile, window) };
+    let experiment = at_rest(machine, profiles, until, timing.every.min(until));
+    let mut gauge = Gauge { is_brief: true, ..Gauge::new(machine, &experiment, profiles, window) };
     let outcome =
-        unrecorded((machine, &experiment), controller, (timing, profile), solver, Some(&mut gauge), |_, _, _| {})?;
+        unrecorded((machine, &experiment), controllers, (timing, profiles), solver, Some(&mut gauge), |_, _, _| {})?;
     Ok((gauge.finish(&outcome.events).0, outcome.ending))
 }
 
-/// Runs a controller along a profile without rows; `see` is shown its samples, as [`Sampled::drive`] says.
+/// Runs controllers along their profiles without rows; `see` is shown its samples, as [`Sampled::drive`] says.
 pub(super) fn unrecorded(
     (machine, experiment): (&Machine, &Experiment),
-    controller: &mut Standard,
-    (timing, profile): (&Loop, &Profile),
+    controllers: &mut [&mut dyn Controller],
+    (timing, profiles): (&Loop, &[Profile]),
     solver: Solver,
     observer: Option<&mut impl Observe>,
     see: impl FnMut(f64, &State, f64),
 ) -> Result<solve::Outcome> {
-    controller.reset();
-    let mut sampled = Sampled::new(machine, controller, *timing, profile, false).until(experiment.until);
+    controllers.iter_mut().for_each(|controller| controller.reset());
+    let mut sampled = Sampled::new(machine, controllers, *timing, profiles, false).until(experiment.until);
     let sink = &mut |_: &Trajectory| Flow::Continue;
     let observer = observer.map(|observer| observer as &mut dyn Observe);
-    let mut run = solve::Run::new(machine, experiment, solver, Detail::None, observer, sink)?;
+    let mut run = solve::Run::reading(read(machine), experiment, solver, Detail::None, observer, sink)?;
     sampled.drive(&mut run, experiment.until, see);
     Ok(run.finish())
 }
 
-/// A run from rest at the start of a profile, without an input of its own.
-pub(super) fn at_rest(machine: &Machine, profile: &Profile, until: f64, every: f64) -> Experiment {
-    let start = profile.start();
+/// A machine, and its mechanism with the readings of a move.
+fn read(machine: &Machine) -> (&Machine, Mechanism) {
+    let mut mechanism = machine.mechanism();
+    mechanism.readings = machine.readings_of_move(&mechanism);
+    (machine, mechanism)
+}
+
+/// A run from rest at the start of the profiles, without inputs of its own.
+pub(super) fn at_rest(machine: &Machine, profiles: &[Profile], until: f64, every: f64) -> Experiment {
+    let starts: Vec<f64> = profiles.iter().map(Profile::start).collect();
     Experiment {
         name: String::new(),
-        inputs: vec![Signal::Step { value: 0.0, at: 0.0 }],
+        inputs: vec![Signal::Step { value: 0.0, at: 0.0 }; machine.drives.len()],
         until,
         every,
-        initial: machine.at_rest(start),
+        initial: machine.without_strain(&starts, &[]),
         log: None,
     }
 }
 
-/// Runs any controller along a profile, from rest at its start, for `until` s; the cart has settled within `window` (m)
-/// of its target.
+/// Runs controllers, one for each drive, along profiles, one for each coordinate, from rest at their start, for `until`
+/// s; what slides has settled within `window` (m) of its target.
 pub fn close(
     machine: &Machine,
-    controller: &mut dyn Controller,
+    controllers: &mut [&mut dyn Controller],
     timing: &Loop,
-    profile: &Profile,
+    profiles: &[Profile],
     until: f64,
     window: f64,
     solver: Solver,
 ) -> Result<MoveRun> {
     let rows = Rows { until, every: timing.every.min(until), window };
-    run(machine, controller, timing, profile, &rows, solver, (Detail::None, false), &mut |_| Flow::Continue)
+    run(machine, controllers, timing, profiles, &rows, solver, (Detail::None, false), &mut |_| Flow::Continue)
 }
 
 /// Which rows are put out, and the window.
@@ -177,29 +217,31 @@ pub struct Rows {
     pub window: f64,
 }
 
-/// The same, handing each block of rows on to `sink`, with columns `reference` and `cart_error` behind the others.
+/// The same, handing each block of rows on to `sink`, with columns of references and errors behind the others:
+/// `reference` and `cart_error` of an axis, `bridge_reference`, `cart_reference`, `bridge_error` and `cart_error` of a
+/// gantry.
 #[allow(clippy::too_many_arguments)] // each is one thing, and the functions above leave most out
 pub fn stream(
     machine: &Machine,
-    controller: &mut dyn Controller,
+    controllers: &mut [&mut dyn Controller],
     timing: &Loop,
-    profile: &Profile,
+    profiles: &[Profile],
     rows: &Rows,
     solver: Solver,
     keep: bool,
     sink: &mut dyn FnMut(&Trajectory) -> Flow,
 ) -> Result<MoveRun> {
-    let mut wide = Wide::default();
-    let sink = &mut |block: &Trajectory| sink(wide.of(profile, block));
-    run(machine, controller, timing, profile, rows, solver, (Detail::Full, keep), sink)
+    let mut wide = Wide::of(machine);
+    let sink = &mut |block: &Trajectory| sink(wide.widened(profiles, block));
+    run(machine, controllers, timing, profiles, rows, solver, (Detail::Full, keep), sink)
 }
 
 #[allow(clippy::too_many_arguments)]
 fn run(
     machine: &Machine,
-    controller: &mut dyn Controller,
+    controllers: &mut [&mut dyn Controller],
     timing: &Loop,
-    profile: &Profile,
+    profiles: &[Profile],
     rows: &Rows,
     solver: Solver,
     (detail, keep): (Detail, bool),
@@ -209,19 +251,26 @@ fn run(
     if !(rows.window > 0.0 && rows.window.is_finite()) {
         return Err(Error::new(format!("the cart cannot settle within {:?} m", rows.window)).allowed("above zero"));
     }
-    let experiment = at_rest(machine, profile, rows.until, rows.every);
-    controller.reset();
-    let mut sampled = Sampled::new(machine, controller, *timing, profile, keep).until(rows.until);
-    let mut gauge = Gauge::new(machine, &experiment, profile, rows.window);
-    let mut run = solve::Run::new(machine, &experiment, solver, detail, Some(&mut gauge), sink)?;
+    let (loads, drives) = (machine.geometry().slides.len(), machine.drives.len());
+    if profiles.len() != loads || controllers.len() != drives {
+        let what = format!("{} controllers and {} profiles", controllers.len(), profiles.len());
+        return Err(Error::new(what).allowed(format!("{drives} controllers, one for each drive, and {loads} profiles")));
+    }
+    let experiment = at_rest(machine, profiles, rows.until, rows.every);
+    controllers.iter_mut().for_each(|controller| controller.reset());
+    let mut sampled = Sampled::new(machine, controllers, *timing, profiles, keep).until(rows.until);
+    let mut gauge = Gauge::new(machine, &experiment, profiles, rows.window);
+    let mut run = solve::Run::reading(read(machine), &experiment, solver, detail, Some(&mut gauge), sink)?;
     sampled.drive(&mut run, experiment.until, |_, _, _| {});
     let outcome = run.finish();
     let (mut figures, metrics) = gauge.finish(&outcome.events);
-    figures.limited = sampled.held_back;
-    figures.restlessness = sampled.turns as f64 / metrics.end.max(f64::MIN_POSITIVE);
+    for (drive, told) in figures.drives.iter_mut().zip(&sampled.told) {
+        drive.limited = told.held_back;
+        drive.restlessness = told.turns as f64 / metrics.end.max(f64::MIN_POSITIVE);
+    }
     let samples = (sampled.samples, sampled.limited);
-    let swing = sampled.at_rest.swing();
-    Ok(MoveRun { figures, metrics, outcome, samples, kept: sampled.kept.unwrap_or_default(), swing })
+    let swings = sampled.told.iter().take(drives).map(|told| told.at_rest.swing()).collect();
+    Ok(MoveRun { figures, metrics, outcome, samples, kept: sampled.kept.unwrap_or_default(), swings })
 }
 
 /// Puts the controller of a design, made for `model`, through an experiment along a reference that is shaped already;
@@ -237,7 +286,9 @@ pub fn follow(
     sink: &mut dyn FnMut(&Trajectory) -> Flow,
 ) -> Result<solve::Outcome> {
     let mut controller = Standard::new(design, model)?;
-    let mut sampled = Sampled::new(machine, &mut controller, Loop::of(design), profile, false).exactly().with(added);
+    let (mut controllers, profiles) = ([&mut controller as &mut dyn Controller], std::slice::from_ref(profile));
+    let sampled = Sampled::new(machine, &mut controllers, Loop::of(design), profiles, false);
+    let mut sampled = sampled.exactly().with(added);
     let machine = Machine { encoder: None, ..machine.clone() };
     let mut run = solve::Run::new(&machine, experiment, solver, Detail::Full, None, sink)?;
     sampled.drive(&mut run, experiment.until, |_, _, _| {});
@@ -247,58 +298,168 @@ pub fn follow(
 /// Gathers the figures of a move that it observes.
 struct Gauge<'a> {
     meter: Meter,
-    profile: &'a Profile,
+    profiles: &'a [Profile],
     window: f64,
-    radius: f64,
-    /// Begin and direction of the last stroke.
-    last_stroke: (f64, f64),
-    target: f64,
-    seen: Figures,
-    /// ∫ of the squares of following error, cart error, voltage and current.
-    squares: [f64; 4],
-    /// When the cart was outside its window for the last time after the profile, and whether it is now.
-    outside: Option<f64>,
-    is_outside: bool,
-    /// Whether the amplifier stands at a limit where it is now.
-    saturated: bool,
+    loads: Vec<LoadGauge>,
+    drives: Vec<DriveGauge>,
+    contour: Option<ContourGauge>,
     end: f64,
-    /// Whether the cart's error, settling and current are all that is asked for.
+    /// Whether the errors of what slides, settling and current are all that is asked for.
     is_brief: bool,
 }
 
-impl<'a> Gauge<'a> {
-    fn new(machine: &Machine, experiment: &Experiment, profile: &'a Profile, window: f64) -> Self {
-        let last = profile.strokes().last().map_or((0.0, 0.0), |(begin, _, distance, _)| (begin, distance));
+/// What is gathered of something that slides.
+struct LoadGauge {
+    body: usize,
+    /// The reading of its position.
+    position: usize,
+    /// Its largest speed, of a machine whose readings have none.
+    peak_speed: Option<Peak>,
+    /// Where the drives have it minus where it is, as a sum of stretches: reading and weight.
+    stretches: Vec<(usize, f64)>,
+    /// Begin and direction of the last stroke that goes anywhere.
+    last_stroke: (f64, f64),
+    target: f64,
+    /// ∫ of the square of its error.
+    square: f64,
+    /// When it was outside its window for the last time after the profile, and whether it is now.
+    outside: Option<f64>,
+    is_outside: bool,
+    seen: LoadFigures,
+}
+
+/// What is gathered of a drive.
+struct DriveGauge {
+    pulley: usize,
+    /// The reading of its current.
+    current: usize,
+    voltage: Voltage,
+    /// Weights of the coordinates in the position of its part of the belt.
+    shares: &'static [f64],
+    /// ∫ of the squares of following error, voltage and current.
+    squares: [f64; 3],
+    /// Whether its amplifier stands at a limit where it is now.
+    saturated: bool,
+    seen: DriveFigures,
+}
+
+/// The voltage at a motor's terminals.
+enum Voltage {
+    /// A reading.
+    Read(usize),
+    /// R i + L di/dt + K_e n φ̇ of the reading of the shaft's speed behind the gear.
+    Computed { speed: usize, resistance: f64, inductance: f64, back_emf: f64 },
+}
+
+impl Voltage {
+    fn on(&self, curve: &Curve, current: &Polynomial) -> Polynomial {
+        match *self {
+            Self::Read(q) => curve.of(q),
+            Self::Computed { speed, resistance, inductance, back_emf } => {
+                let (rate, speed) = (slope(current, curve.length), curve.of(speed));
+                let sum = |k: usize| resistance * current.0[k] + inductance * rate.0[k] + back_emf * speed.0[k];
+                Polynomial(std::array::from_fn(sum))
+            }
+        }
+    }
+}
+
+/// The derivative by time of a quantity on a curve of this length, s.
+fn slope(quantity: &Polynomial, length: f64) -> Polynomial {
+    let term = |k: usize| if k + 1 < TERMS { (k + 1) as f64 * quantity.0[k + 1] / length } else { 0.0 };
+    Polynomial(std::array::from_fn(term))
+}
+
+impl LoadGauge {
+    fn new((slide, profile): (&SlideAt, &Profile), mechanism: &Mechanism) -> Self {
+        let find = |shown: Shown| mechanism.readings.iter().position(|reading| *reading == shown);
+        let strokes = profile.strokes().filter(|(_, _, distance, _)| *distance != 0.0);
+        let stretch = |&(span, weight): &(usize, f64)| Some((find(Shown::Stretch(span))?, weight));
         Self {
-            meter: Meter::new(machine, experiment),
-            profile,
-            window,
-            radius: machine.pulley_radius,
-            last_stroke: last,
+            body: slide.body,
+            position: find(Shown::Position(slide.body, 1.0)).unwrap_or_default(),
+            peak_speed: match find(Shown::Speed(slide.body, 1.0)) {
+                Some(_) => None,
+                None => Some(Peak::default()),
+            },
+            stretches: slide.error.iter().filter_map(stretch).collect(),
+            last_stroke: strokes.last().map_or((0.0, 0.0), |(begin, _, distance, _)| (begin, distance)),
             target: profile.target(),
-            seen: Figures::default(),
-            squares: [0.0; 4],
+            square: 0.0,
             outside: None,
             is_outside: false,
+            seen: LoadFigures::default(),
+        }
+    }
+
+    /// Where it is from its target, once the last stroke and the profile, which ends at `end`, have passed.
+    fn settle(&mut self, curve: &Curve, end: f64, window: f64) {
+        let mut away = curve.of(self.position);
+        away.0[0] -= self.target;
+        let share = |time: f64| ((time - curve.begin) / curve.length).max(0.0);
+        let (last, done) = (share(self.last_stroke.0), share(end));
+        if last < 1.0 && self.last_stroke.1 != 0.0 {
+            let beyond = if self.last_stroke.1 > 0.0 { away } else { away.negative() };
+            if beyond.bound() > self.seen.overshoot {
+                self.seen.overshoot = self.seen.overshoot.max(beyond.greatest(last, 1.0).1);
+            }
+        }
+        self.is_outside = done < 1.0 && away.at(1.0).abs() > window;
+        if done < 1.0 && away.bound() > window {
+            if self.is_outside {
+                self.outside = Some(curve.begin + curve.length);
+                return;
+            }
+            let edges = [-window, window].map(|edge| {
+                let mut beyond = away;
+                beyond.0[0] -= edge;
+                beyond.zeros(done, 1.0).last().copied()
+            });
+            if let Some(s) = edges.into_iter().flatten().reduce(f64::max) {
+                self.outside = Some(curve.begin + s * curve.length);
+            }
+        }
+    }
+}
+
+impl DriveGauge {
+    fn new(machine: &Machine, mechanism: &Mechanism, drive: usize) -> Self {
+        let find = |shown: Shown| mechanism.readings.iter().position(|reading| *reading == shown);
+        let mechanisms_drive = &mechanism.drives[drive];
+        let motor = &mechanisms_drive.motor;
+        Self {
+            pulley: mechanisms_drive.pulley,
+            current: find(Shown::Current(drive)).unwrap_or_default(),
+            voltage: match find(Shown::Voltage(drive)) {
+                Some(q) => Voltage::Read(q),
+                None => Voltage::Computed {
+                    speed: find(Shown::Speed(mechanisms_drive.shaft, 1.0)).unwrap_or_default(),
+                    resistance: motor.resistance,
+                    inductance: motor.inductance,
+                    back_emf: motor.gear_ratio * motor.back_emf_constant,
+                },
+            },
+            shares: machine.belt_shares()[drive],
+            squares: [0.0; 3],
             saturated: false,
-            end: 0.0,
-            is_brief: false,
+            seen: DriveFigures::default(),
         }
     }
 
     /// Adds voltage and current over a curve.
-    fn power(&mut self, curve: &Curve) {
-        let (v, i) = (curve.of(reading::VOLTAGE), curve.of(reading::CURRENT));
-        if self.is_brief {
-            self.squares[3] += curve.length * integral((0.0, 1.0), |s| i.at(s).powi(2));
+    fn power(&mut self, curve: &Curve, is_brief: bool) {
+        let i = curve.of(self.current);
+        if is_brief {
+            self.squares[2] += curve.length * integral((0.0, 1.0), |s| i.at(s).powi(2));
             return;
         }
+        let v = self.voltage.on(curve, &i);
         larger(&mut self.seen.voltage.0, &v, (0.0, 1.0), curve);
         larger(&mut self.seen.current.0, &i, (0.0, 1.0), curve);
         let h = curve.length;
         let (volts, amperes) = (at_places(&v), at_places(&i));
-        self.squares[2] += h * product(&volts, &volts);
-        self.squares[3] += h * product(&amperes, &amperes);
+        self.squares[1] += h * product(&volts, &volts);
+        self.squares[2] += h * product(&amperes, &amperes);
         // Energy that goes in and energy that comes back, parted where either changes its sign.
         let mut count = |energy: f64| {
             if energy > 0.0 { self.seen.energy.0 += energy } else { self.seen.energy.1 -= energy }
@@ -319,74 +480,109 @@ impl<'a> Gauge<'a> {
             self.seen.amplifier_limited += h;
         }
     }
+}
 
-    /// Adds the cart's motion over the part of a curve on which the reference is one polynomial.
-    fn track(&mut self, curve: &Curve, part: (f64, f64), reference: &Polynomial) {
-        let (x, stretch) = (curve.of(reading::CART_POSITION), curve.of(reading::STRETCH));
-        // x − y and r φ₁ − y = x − y + d₁
-        let error = Polynomial(std::array::from_fn(|k| x.0[k] - reference.0[k]));
+impl<'a> Gauge<'a> {
+    fn new(machine: &Machine, experiment: &Experiment, profiles: &'a [Profile], window: f64) -> Self {
+        let (_, mechanism) = read(machine);
+        let loads = machine.geometry().slides.iter().zip(profiles);
+        Self {
+            meter: Meter::with(machine, &Sought::all(machine, &mechanism), Held::last(experiment)),
+            profiles,
+            window,
+            loads: loads.map(|load| LoadGauge::new(load, &mechanism)).collect(),
+            drives: (0..machine.drives.len()).map(|drive| DriveGauge::new(machine, &mechanism, drive)).collect(),
+            contour: Contour::along(profiles).map(ContourGauge::new),
+            end: 0.0,
+            is_brief: false,
+        }
+    }
+
+    /// Adds the motion over the part of a curve on which the references are one polynomial each.
+    fn track(&mut self, curve: &Curve, part: (f64, f64), references: &[Polynomial]) {
+        let mut errors = [Polynomial([0.0; TERMS]); SLIDES];
+        let mut places = [Polynomial([0.0; TERMS]); SLIDES];
+        for ((load, reference), (error, place)) in
+            self.loads.iter_mut().zip(references).zip(errors.iter_mut().zip(&mut places))
+        {
+            let x = curve.of(load.position);
+            *place = x;
+            // x − y
+            *error = Polynomial(std::array::from_fn(|k| x.0[k] - reference.0[k]));
+            larger(&mut load.seen.error.peak, error, part, curve);
+            load.square += curve.length * square(error, part);
+            if let (Some(peak), false) = (&mut load.peak_speed, self.is_brief) {
+                larger(peak, &slope(&x, curve.length), part, curve);
+            }
+        }
         if self.is_brief {
-            larger(&mut self.seen.cart.peak, &error, part, curve);
-            self.squares[1] += curve.length * integral(part, |s| error.at(s).powi(2));
             return;
         }
-        let following = Polynomial(std::array::from_fn(|k| error.0[k] + stretch.0[k]));
-        larger(&mut self.seen.cart.peak, &error, part, curve);
-        larger(&mut self.seen.following.peak, &following, part, curve);
-        for (sum, quantity) in self.squares.iter_mut().zip([following, error]) {
-            let square = match part {
-                (0.0, 1.0) => {
-                    let values = at_places(&quantity);
-                    product(&values, &values)
+        for drive in &mut self.drives {
+            // r φ − y as a sum over x − y and the stretches between; r φ₁ − y = x − y + d₁ of an axis
+            let mut following = Polynomial([0.0; TERMS]);
+            for ((load, error), share) in self.loads.iter().zip(&errors).zip(drive.shares) {
+                following.0.iter_mut().zip(error.0).for_each(|(sum, term)| *sum += share * term);
+                for &(stretch, weight) in &load.stretches {
+                    let stretch = curve.of(stretch);
+                    following.0.iter_mut().zip(stretch.0).for_each(|(sum, term)| *sum += share * weight * term);
                 }
-                _ => integral(part, |s| quantity.at(s).powi(2)),
-            };
-            *sum += curve.length * square;
+            }
+            larger(&mut drive.seen.following.peak, &following, part, curve);
+            drive.squares[0] += curve.length * square(&following, part);
+        }
+        if let Some(contour) = &mut self.contour {
+            contour.track(curve, part, &places);
         }
     }
 
-    /// Where the cart is from its target, once the last stroke and the profile have passed.
-    fn settle(&mut self, curve: &Curve) {
-        let mut away = curve.of(reading::CART_POSITION);
-        away.0[0] -= self.target;
-        let share = |time: f64| ((time - curve.begin) / curve.length).max(0.0);
-        let (last, done) = (share(self.last_stroke.0), share(self.profile.end()));
-        if last < 1.0 && self.last_stroke.1 != 0.0 {
-            let beyond = if self.last_stroke.1 > 0.0 { away } else { away.negative() };
-            if beyond.bound() > self.seen.overshoot {
-                self.seen.overshoot = self.seen.overshoot.max(beyond.greatest(last, 1.0).1);
-            }
+    fn finish(self, events: &[solve::Event]) -> (Figures, Metrics) {
+        let end = self.profiles.first().map_or(0.0, Profile::end);
+        let mean = |sum: f64| (sum / self.end.max(f64::MIN_POSITIVE)).sqrt();
+        let mut metrics = self.meter.finish(events);
+        for (load, peak) in metrics.loads.iter_mut().zip(self.loads.iter().map(|load| load.peak_speed)) {
+            load.peak_speed = peak.unwrap_or(load.peak_speed);
         }
-        self.is_outside = done < 1.0 && away.at(1.0).abs() > self.window;
-        if done < 1.0 && away.bound() > self.window {
-            if self.is_outside {
-                self.outside = Some(curve.begin + curve.length);
-                return;
-            }
-            let edges = [-self.window, self.window].map(|edge| {
-                let mut beyond = away;
-                beyond.0[0] -= edge;
-                beyond.zeros(done, 1.0).last().copied()
-            });
-            if let Some(s) = edges.into_iter().flatten().reduce(f64::max) {
-                self.outside = Some(curve.begin + s * curve.length);
-            }
-        }
-    }
-
-    fn finish(mut self, events: &[solve::Event]) -> (Figures, Metrics) {
-        let seen = &mut self.seen;
-        let [following, cart, voltage, current] =
-            self.squares.map(|sum| (sum / self.end.max(f64::MIN_POSITIVE)).sqrt());
-        (seen.following.rms, seen.cart.rms, seen.voltage.1, seen.current.1) = (following, cart, voltage, current);
-        seen.final_cart_error = seen.cart.last;
-        let done = self.profile.end();
-        seen.settling = match self.outside {
-            _ if self.end < done || self.is_outside => None,
-            None => Some(0.0),
-            Some(last) => Some(last - done),
+        let left = self.loads.iter().filter_map(|load| load.outside).reduce(f64::max);
+        let is_outside = self.loads.iter().any(|load| load.is_outside);
+        let figures = Figures {
+            settling: match left {
+                _ if self.end < end || is_outside => None,
+                None => Some(0.0),
+                Some(last) => Some(last - end),
+            },
+            contour: self.contour.map(|contour| contour.finish(self.end)),
+            loads: self
+                .loads
+                .into_iter()
+                .map(|mut load| {
+                    load.seen.error.rms = mean(load.square);
+                    load.seen
+                })
+                .collect(),
+            drives: self
+                .drives
+                .into_iter()
+                .map(|mut drive| {
+                    let [following, voltage, current] = drive.squares.map(mean);
+                    let seen = &mut drive.seen;
+                    (seen.following.rms, seen.voltage.1, seen.current.1) = (following, voltage, current);
+                    drive.seen
+                })
+                .collect(),
         };
-        (self.seen, self.meter.finish(events))
+        (figures, metrics)
+    }
+}
+
+/// The integral of the square of a polynomial over a part of 0..1.
+fn square(quantity: &Polynomial, part: (f64, f64)) -> f64 {
+    match part {
+        (0.0, 1.0) => {
+            let values = at_places(quantity);
+            product(&values, &values)
+        }
+        _ => integral(part, |s| quantity.at(s).powi(2)),
     }
 }
 
@@ -396,12 +592,19 @@ impl Observe for Gauge<'_> {
             return true;
         }
         self.meter.pass(gap);
-        let drive = &gap.mode.drive[0];
-        self.saturated = drive.voltage != Limit::Inside || drive.current != Limit::Inside;
-        for (peak, q) in [(&mut self.seen.voltage.0, reading::VOLTAGE), (&mut self.seen.current.0, reading::CURRENT)] {
-            for (value, time) in [(gap.from[q], gap.begin), (gap.to[q], gap.begin + gap.length)] {
-                if value.abs() > peak.value.abs() {
-                    *peak = Peak { value, time };
+        for (number, drive) in self.drives.iter_mut().enumerate() {
+            let mode = &gap.mode.drive[number];
+            drive.saturated = mode.voltage != Limit::Inside || mode.current != Limit::Inside;
+            let current = Some((&mut drive.seen.current.0, drive.current));
+            let voltage = match drive.voltage {
+                Voltage::Read(q) => Some((&mut drive.seen.voltage.0, q)),
+                Voltage::Computed { .. } => None,
+            };
+            for (peak, q) in [voltage, current].into_iter().flatten() {
+                for (value, time) in [(gap.from[q], gap.begin), (gap.to[q], gap.begin + gap.length)] {
+                    if value.abs() > peak.value.abs() {
+                        *peak = Peak { value, time };
+                    }
                 }
             }
         }
@@ -412,18 +615,28 @@ impl Observe for Gauge<'_> {
         if !self.is_brief {
             self.meter.see(curve);
         }
-        self.power(curve);
+        for drive in &mut self.drives {
+            drive.power(curve, self.is_brief);
+        }
         // A seam that is as near as rounding is behind.
         let shortest = SHORTEST + 16.0 * f64::EPSILON * (curve.begin + curve.length) / curve.length;
         let mut from = 0.0;
         while from < 1.0 {
             let begin = curve.begin + from * curve.length;
-            let (coefficients, until) = self.profile.piece(begin);
-            let to = ((until - curve.begin) / curve.length).max(from + shortest).min(1.0);
-            self.track(curve, (from, to), &shifted(&coefficients, from, curve.length));
+            let (mut references, mut seam) = ([Polynomial([0.0; TERMS]); SLIDES], f64::INFINITY);
+            for (reference, profile) in references.iter_mut().zip(self.profiles) {
+                let (coefficients, until) = profile.piece(begin);
+                *reference = shifted(&coefficients, from, curve.length);
+                seam = seam.min(until);
+            }
+            let to = ((seam - curve.begin) / curve.length).max(from + shortest).min(1.0);
+            self.track(curve, (from, to), &references);
             from = to;
         }
-        self.settle(curve);
+        let end = self.profiles.first().map_or(0.0, Profile::end);
+        for load in &mut self.loads {
+            load.settle(curve, end, self.window);
+        }
     }
 
     fn sees_all(&self) -> bool {
@@ -432,12 +645,25 @@ impl Observe for Gauge<'_> {
 
     fn end(&mut self, time: f64, state: &State, mode: &Mode) {
         self.meter.end(time, state, mode);
-        let y = self.profile.at(time).position;
         self.end = time;
-        self.seen.cart.last = state.position[CART] - y;
-        self.seen.following.last = self.radius * state.position[DRIVE] - y;
+        let mut references = [0.0; SLIDES];
+        for ((load, profile), reference) in self.loads.iter_mut().zip(self.profiles).zip(&mut references) {
+            *reference = profile.at(time).position;
+            load.seen.error.last = state.position[load.body] - *reference;
+        }
+        let radius = self.meter.machine().pulley_radius;
+        for drive in &mut self.drives {
+            let y: f64 = drive.shares.iter().zip(references).map(|(share, reference)| share * reference).sum();
+            drive.seen.following.last = radius * state.position[drive.pulley] - y;
+        }
+        if let (Some(contour), [x, y]) = (&mut self.contour, &self.loads[..]) {
+            contour.end(time, [x.body, y.body].map(|body| state.position[body]));
+        }
     }
 }
+
+/// Most coordinates of a machine.
+const SLIDES: usize = 2;
 
 /// Least share of a curve that a piece of the reference is looked at.
 const SHORTEST: f64 = 1e-9;
@@ -463,7 +689,7 @@ fn shifted(coefficients: &[f64; 5], from: f64, length: f64) -> Polynomial {
 }
 
 /// Takes the largest magnitude on a part of a curve, if it is news.
-fn larger(peak: &mut Peak, quantity: &Polynomial, part: (f64, f64), curve: &Curve) {
+pub(super) fn larger(peak: &mut Peak, quantity: &Polynomial, part: (f64, f64), curve: &Curve) {
     if quantity.bound() > peak.value.abs() {
         let (s, value) = quantity.largest(part.0, part.1);
         if value.abs() > peak.value.abs() {
@@ -500,7 +726,7 @@ const POWERS: [[f64; PLACES]; TERMS] = {
 const PLACES: usize = 2 * GAUSS.len();
 
 /// The values of a polynomial at the places on 0..1.
-fn at_places(polynomial: &Polynomial) -> [f64; PLACES] {
+pub(super) fn at_places(polynomial: &Polynomial) -> [f64; PLACES] {
     let mut values = [0.0; PLACES];
     for (c, powers) in polynomial.0.iter().zip(&POWERS) {
         values.iter_mut().zip(powers).for_each(|(value, power)| *value += c * power);
@@ -509,35 +735,64 @@ fn at_places(polynomial: &Polynomial) -> [f64; PLACES] {
 }
 
 /// The integral over 0..1 of the product of two polynomials, of which these are the values.
-fn product(a: &[f64; PLACES], b: &[f64; PLACES]) -> f64 {
+pub(super) fn product(a: &[f64; PLACES], b: &[f64; PLACES]) -> f64 {
     let weighted = |(j, (_, w)): (usize, &(f64, f64))| w * (a[2 * j] * b[2 * j] + a[2 * j + 1] * b[2 * j + 1]);
     0.5 * GAUSS.iter().enumerate().map(weighted).sum::<f64>()
 }
 
 /// The integral over s on a part of 0..1.
-fn integral((from, to): (f64, f64), value: impl Fn(f64) -> f64) -> f64 {
+pub(super) fn integral((from, to): (f64, f64), value: impl Fn(f64) -> f64) -> f64 {
     let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
     GAUSS.iter().map(|(x, w)| w * (value(middle - half * x) + value(middle + half * x))).sum::<f64>() * half
 }
 
-/// Blocks of rows with reference and error behind their own columns.
-#[derive(Default)]
+/// Blocks of rows with references and errors behind their own columns.
 struct Wide {
     block: Trajectory,
+    /// Columns of the positions, and names of the references and errors that go with them.
+    loads: Vec<[String; 3]>,
 }
 
 impl Wide {
-    fn of(&mut self, profile: &Profile, block: &Trajectory) -> &Trajectory {
-        let own = block.columns.len();
-        if self.block.columns.len() != own + 2 {
+    fn of(machine: &Machine) -> Self {
+        let slides = machine.geometry().slides;
+        let names = |slide: &SlideAt| {
+            let key = machine.geometry().label(slide.body).key;
+            let reference = if slides.len() == 1 { "reference".to_string() } else { format!("{key}_reference") };
+            [format!("{key}_position"), reference, format!("{key}_error")]
+        };
+        Self { block: Trajectory::default(), loads: slides.iter().map(names).collect() }
+    }
+
+    fn widened(&mut self, profiles: &[Profile], block: &Trajectory) -> &Trajectory {
+        let (own, loads) = (block.columns.len(), self.loads.len());
+        let contour = Contour::along(profiles);
+        let added = 2 * loads + usize::from(contour.is_some());
+        if self.block.columns.len() != own + added {
             self.block.columns.clone_from(&block.columns);
-            self.block.columns.push(Column::new("reference", "m"));
-            self.block.columns.push(Column::new("cart_error", "m"));
+            let names = self.loads.iter().map(|names| &names[1]).chain(self.loads.iter().map(|names| &names[2]));
+            self.block.columns.extend(names.map(|name| Column::new(name.as_str(), "m")));
+            if contour.is_some() {
+                self.block.columns.push(Column::new("contour_error", "m"));
+            }
         }
-        let column = |name: &str| block.get(name).unwrap_or(&[]);
-        let reference: Vec<f64> = column("time").iter().map(|&t| profile.at(t).position).collect();
-        let error: Vec<f64> = column("cart_position").iter().zip(&reference).map(|(x, y)| x - y).collect();
-        let sources = block.columns.iter().map(|column| &column.values).chain([&reference, &error]);
+        let time = block.get("time").unwrap_or(&[]);
+        let place = |names: &[String; 3]| block.get(&names[0]).unwrap_or(&[]);
+        let references: Vec<Vec<f64>> =
+            profiles.iter().map(|profile| time.iter().map(|&t| profile.at(t).position).collect()).collect();
+        let error = |(names, reference): (&[String; 3], &Vec<f64>)| -> Vec<f64> {
+            place(names).iter().zip(reference).map(|(x, y)| x - y).collect()
+        };
+        let errors: Vec<Vec<f64>> = self.loads.iter().zip(&references).map(error).collect();
+        let away: Option<Vec<f64>> = match (contour, &self.loads[..]) {
+            (Some(contour), [x, y]) => {
+                let points = place(x).iter().zip(place(y)).zip(time);
+                Some(points.map(|((x, y), time)| contour.nearest(*time, [*x, *y]).0).collect())
+            }
+            _ => None,
+        };
+        let own = block.columns.iter().map(|column| &column.values);
+        let sources = own.chain(&references).chain(&errors).chain(&away);
         for (to, from) in self.block.columns.iter_mut().zip(sources) {
             to.values.clone_from(from);
         }

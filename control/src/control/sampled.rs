@@ -2,20 +2,20 @@
 
 use crate::design::Design;
 use crate::error::{Error, Result};
-use crate::machine::axis::{CART, DRIVE};
+use crate::machine::axis::CART;
 use crate::machine::{Encoder, EncoderPlace, Machine};
 use crate::mechanism::State;
 use crate::quantity::rounded;
 use crate::signal::profile::Reference;
 
 /// Measurements and references that a controller has at a sample.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Observation<N = f64> {
     /// Time of the sample, s.
     pub time: f64,
-    /// Where the cart should be now.
+    /// Where the cart should be now; of a drive of a gantry where its part of the belt should be.
     pub reference: Reference<N>,
-    /// Where it should be when the command acts, or as far ahead as the controller asked to look.
+    /// Where that should be when the command acts, or as far ahead as the controller asked to look.
     pub ahead: Reference<N>,
     /// Measured position, m along the belt: whole counts.
     pub position: N,
@@ -25,7 +25,7 @@ pub struct Observation<N = f64> {
     pub current: N,
 }
 
-/// A controller, stepped once a sample. A user's own implements this.
+/// The controller of one drive, stepped once a sample. A user's own implements this.
 ///
 /// ```
 /// use taut::case::{Case, TEMPLATE};
@@ -45,8 +45,8 @@ pub struct Observation<N = f64> {
 /// let limits = Limits { speed: 0.2, acceleration: 2.0, jerk: None, snap: None };
 /// let profile = Profile::new(0.0, &[Leg::To(0.05, limits)])?;
 /// let timing = Loop { every: 1e-3, delay: 0.0, limit: Some(12.0), lead: 0.0 };
-/// let run = close(&case.machine, &mut Proportional(3000.0), &timing, &profile, 1.0, 50e-6, Solver::Exact)?;
-/// assert!(run.figures.final_cart_error.abs() < 1e-3);
+/// let run = close(&case.machine, &mut [&mut Proportional(3000.0)], &timing, &[profile], 1.0, 50e-6, Solver::Exact)?;
+/// assert!(run.figures.cart().error.last.abs() < 1e-3);
 /// # Ok::<(), taut::Error>(())
 /// ```
 pub trait Controller {
@@ -78,7 +78,9 @@ pub struct Loop {
 pub struct Sample {
     /// s.
     pub time: f64,
-    /// Reference of the cart, m.
+    /// The number of its drive.
+    pub drive: usize,
+    /// Reference of the cart, or of a gantry's drive, m along the belt.
     pub reference: f64,
     /// Measured position, m.
     pub measured: f64,
@@ -106,7 +108,7 @@ impl Added {
     }
 }
 
-/// All that a controller reads of an axis.
+/// All that the controller of a drive reads of a machine.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sensors {
     encoder: Sensor,
@@ -114,8 +116,10 @@ pub(super) struct Sensors {
 }
 
 impl Sensors {
-    pub(super) fn new(machine: &Machine) -> Self {
-        Self { encoder: Sensor::new(machine), scale: Sensor::of_scale(machine) }
+    /// Those of each drive.
+    pub(super) fn of(machine: &Machine) -> Vec<Self> {
+        let of_drive = |drive| Self { encoder: Sensor::new(machine, drive), scale: Sensor::of_scale(machine) };
+        (0..machine.drives.len()).map(of_drive).collect()
     }
 
     pub(super) fn exactly(self) -> Self {
@@ -145,14 +149,15 @@ pub(super) struct Sensor {
 }
 
 impl Sensor {
-    pub(super) fn new(machine: &Machine) -> Self {
-        let counts =
-            machine.encoder.map(|encoder: Encoder| encoder.counts_per_unit(machine.drives[0].motor.gear_ratio));
-        let r = machine.pulley_radius;
+    /// That of a drive.
+    pub(super) fn new(machine: &Machine, drive: usize) -> Self {
+        let ratio = machine.drives[drive].motor.gear_ratio;
+        let counts = machine.encoder.map(|encoder: Encoder| encoder.counts_per_unit(ratio));
+        let (geometry, r) = (machine.geometry(), machine.pulley_radius);
         let (body, length) = match machine.encoder.map(|encoder| encoder.at) {
-            Some(EncoderPlace::Cart) => (CART, 1.0),
-            Some(EncoderPlace::DrivePulley) => (DRIVE, r),
-            Some(EncoderPlace::Motor) | None => (machine.mechanism().drives[0].shaft, r),
+            Some(EncoderPlace::Cart) => (geometry.cart(), 1.0),
+            Some(EncoderPlace::DrivePulley) => (geometry.drives[drive].pulley, r),
+            Some(EncoderPlace::Motor) | None => (machine.mechanism().drives[drive].shaft, r),
         };
         Self { body, length, counts }
     }

@@ -1,68 +1,82 @@
-//! A controller around a run: samples, commands and delays, decision by decision.
+//! Controllers around a run: samples, commands and delays, decision by decision.
 
 use super::rest::Rest;
 use super::sampled::{Added, Controller, Loop, Sample};
-use super::stepped::{Clocked, Decision};
+use super::stepped::{Clocked, Commands, Decision, References};
 use crate::machine::Machine;
-use crate::mechanism::State;
+use crate::mechanism::{DRIVES, State};
 use crate::signal::profile::{Profile, Reference};
 use crate::solve::Run;
 
-/// Decides the input: samples, asks the controller, limits, and hands on when the delay is over.
-pub(super) struct Sampled<'a> {
-    controller: &'a mut dyn Controller,
-    profile: &'a Profile,
+/// Decides the inputs: samples, asks the controllers, limits, and hands on when the delay is over.
+pub(super) struct Sampled<'a, 'c> {
+    controllers: &'a mut [&'c mut dyn Controller],
+    /// Of each coordinate.
+    profiles: &'a [Profile],
+    /// Weights of the coordinates in the position of each drive along the belt.
+    shares: Vec<&'static [f64]>,
     clocked: Clocked,
-    /// Samples at the limit, and for how long their commands were held, s.
-    pub(super) limited: u64,
-    pub(super) held_back: f64,
-    /// Changes of direction of what acts, and the last change of it that was none of zero.
-    pub(super) turns: u64,
-    way: f64,
+    /// What each drive was told.
+    pub(super) told: [Told; DRIVES],
     /// End of the run, s.
     until: f64,
+    /// Samples, and those at which a command was limited.
     pub(super) samples: u64,
-    /// The command after the profile.
-    pub(super) at_rest: Rest,
+    pub(super) limited: u64,
     pub(super) kept: Option<Vec<Sample>>,
-    /// An input added to the command.
+    /// An input added to the command of the first drive.
     added: Option<&'a Added>,
 }
 
-impl<'a> Sampled<'a> {
+/// The commands of a drive.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Told {
+    /// For how long limited commands were held, s.
+    pub held_back: f64,
+    /// Changes of direction of what acts, and the last change of it that was none of zero.
+    pub turns: u64,
+    way: f64,
+    /// The command after the profile.
+    pub at_rest: Rest,
+}
+
+impl Told {
+    /// Nothing yet, of a profile that ends at `end`, s, and a run that does at `until`.
+    fn new(end: f64, until: f64) -> Self {
+        Self { held_back: 0.0, turns: 0, way: 0.0, at_rest: Rest::new(end, until) }
+    }
+}
+
+impl<'a, 'c> Sampled<'a, 'c> {
     pub(super) fn new(
         machine: &Machine,
-        controller: &'a mut dyn Controller,
+        controllers: &'a mut [&'c mut dyn Controller],
         timing: Loop,
-        profile: &'a Profile,
+        profiles: &'a [Profile],
         keep: bool,
     ) -> Self {
         Self {
-            controller,
-            profile,
+            controllers,
+            profiles,
+            shares: machine.belt_shares(),
             clocked: Clocked::new(machine, timing),
-            limited: 0,
-            held_back: 0.0,
-            turns: 0,
-            way: 0.0,
+            told: [Told::new(f64::INFINITY, f64::INFINITY); DRIVES],
             until: f64::INFINITY,
             samples: 0,
-            at_rest: Rest::new(f64::INFINITY, f64::INFINITY),
+            limited: 0,
             kept: keep.then(Vec::new),
             added: None,
         }
     }
-}
 
-impl<'a> Sampled<'a> {
     /// For a run that ends there: what is held then is held no longer.
     pub(super) fn until(mut self, until: f64) -> Self {
         self.until = until;
-        self.at_rest = Rest::new(self.profile.end(), until);
+        self.told = [Told::new(self.profiles.first().map_or(0.0, Profile::end), until); DRIVES];
         self
     }
 
-    /// With a known input added to its commands.
+    /// With a known input added to the commands of the first drive.
     pub(super) fn with(mut self, added: Option<&'a Added>) -> Self {
         self.added = added;
         self
@@ -75,30 +89,33 @@ impl<'a> Sampled<'a> {
     }
 }
 
-impl Sampled<'_> {
-    /// Drives a run to its end, `until`, s: the input is held from one decision to the next. `see` is shown time, state
-    /// and the motor's current, A, at each of them and at the end.
+impl Sampled<'_, '_> {
+    /// Drives a run to its end, `until`, s: inputs are held from one decision to the next. `see` is shown time, state
+    /// and the current of the first motor, A, at each of them and at the end.
     pub(super) fn drive(&mut self, run: &mut Run, until: f64, mut see: impl FnMut(f64, &State, f64)) {
+        let drives = self.controllers.len();
         loop {
-            let (state, current) = (run.state(), run.current(0));
-            see(run.time(), &state, current);
-            let (input, end) = self.decide(&state, current);
+            let state = run.state();
+            let mut currents = Commands::default();
+            currents.iter_mut().take(drives).enumerate().for_each(|(drive, current)| *current = run.current(drive));
+            see(run.time(), &state, currents[0]);
+            let (inputs, end) = self.decide(&state, &currents);
             let is_at_end = run.time() >= until;
-            if !self.hold(run, input, end) || is_at_end {
+            if !self.hold(run, &inputs[..drives], end) || is_at_end {
                 return;
             }
         }
     }
 
-    /// Holds a command, with what is added to it, until `end`, s; false where the run ends.
-    fn hold(&self, run: &mut Run, command: f64, end: f64) -> bool {
-        let Some(added) = self.added else { return run.hold(&[command], end) };
+    /// Holds commands, with what is added to them, until `end`, s; false where the run ends.
+    fn hold(&self, run: &mut Run, commands: &[f64], end: f64) -> bool {
+        let Some(added) = self.added else { return run.hold(commands, end) };
         loop {
             // A hundredth of a sample is what clocks of logs are off by.
             let near = 1e-2 * self.clocked.timing.every;
             let (value, next) = added.at(run.time() + near);
             let next = if next < end - near { next } else { end };
-            if !run.hold(&[command + value], next) {
+            if !run.hold(&[commands[0] + value], next) {
                 return false;
             }
             if next >= end {
@@ -107,36 +124,55 @@ impl Sampled<'_> {
         }
     }
 
-    /// The input from now on and until when it is held, s, told the state and the motor's current, A, just before.
-    fn decide(&mut self, state: &State, current: f64) -> (f64, f64) {
-        let Loop { every, lead, .. } = self.clocked.timing;
+    /// References of each drive at `time`, s, along the belt: now and one lead later.
+    fn references(&self, time: f64) -> References {
+        let lead = self.clocked.timing.lead;
+        let mut references = References::default();
+        for (weights, of_drive) in self.shares.iter().zip(&mut references) {
+            let at = |time: f64| {
+                let coordinates = weights.iter().zip(self.profiles);
+                coordinates.fold(Reference::default(), |sum, (weight, profile)| sum.plus(*weight, profile.at(time)))
+            };
+            let now = at(time);
+            *of_drive = [now, if lead == 0.0 { now } else { at(time + lead) }];
+        }
+        references
+    }
+
+    /// The inputs from now on and until when they are held, s, told the state and the motors' currents, A, just before.
+    fn decide(&mut self, state: &State, currents: &Commands) -> (Commands, f64) {
+        let every = self.clocked.timing.every;
         let (time, before) = (self.clocked.next(), self.clocked.acting());
         // A command that was delayed needs no reference.
-        let [reference, ahead] = match self.clocked.is_at_sample() {
-            false => [Reference::default(); 2],
-            true => {
-                let reference = self.profile.at(time);
-                [reference, if lead == 0.0 { reference } else { self.profile.at(time + lead) }]
-            }
+        let references = match self.clocked.is_at_sample() {
+            false => References::default(),
+            true => self.references(time),
         };
-        if let Some(Decision { seen, asked, given }) =
-            self.clocked.decide(self.controller, (state, current), &reference, &ahead)
-        {
+        let drives = self.controllers.len();
+        if let Some(decisions) = self.clocked.decide(self.controllers, (state, currents), &references) {
             self.samples += 1;
-            self.at_rest.see(time, given);
-            if given != asked {
-                self.limited += 1;
-                self.held_back += every.min(self.until - time).max(0.0);
+            let mut is_limited = false;
+            for (drive, Decision { seen, asked, given }) in decisions.into_iter().take(drives).enumerate() {
+                let told = &mut self.told[drive];
+                told.at_rest.see(time, given);
+                if given != asked {
+                    is_limited = true;
+                    told.held_back += every.min(self.until - time).max(0.0);
+                }
+                if let Some(kept) = &mut self.kept {
+                    let (reference, measured) = (seen.reference.position, seen.position);
+                    kept.push(Sample { time, drive, reference, measured, asked, given });
+                }
             }
-            if let Some(kept) = &mut self.kept {
-                kept.push(Sample { time, reference: seen.reference.position, measured: seen.position, asked, given });
-            }
+            self.limited += u64::from(is_limited);
         }
         let acting = self.clocked.acting();
-        let change = acting - before;
         if time < self.until {
-            self.turns += u64::from(change * self.way < 0.0);
-            self.way = if change == 0.0 { self.way } else { change };
+            for (told, (now, before)) in self.told.iter_mut().zip(acting.iter().zip(before)) {
+                let change = now - before;
+                told.turns += u64::from(change * told.way < 0.0);
+                told.way = if change == 0.0 { told.way } else { change };
+            }
         }
         (acting, self.clocked.next())
     }

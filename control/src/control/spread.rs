@@ -1,6 +1,6 @@
 //! The axis with each of its parameters wrong by some share.
 
-use super::{Loop, Rows, Standard, stream};
+use super::{Deviation, Figures, Loop, Rows, Standard, each, stream};
 use crate::case::Move;
 use crate::design::Design;
 use crate::error::{Error, Result};
@@ -52,26 +52,31 @@ pub fn worst(
             .next("write 0.2 for 20 %"));
     }
     let mut worst = Worst::default();
-    let profile = motion.reference(design);
+    let profiles = motion.references(design);
     let timing = Loop::of(design);
     let rows = Rows { until: motion.until, every: timing.every.min(motion.until), window: motion.window };
     for (axis, other) in spread(machine, share) {
-        let mut controller = Standard::new(design, machine)?;
+        let mut controllers = Standard::of_drives(design, machine)?;
         let mut sink = |_: &Trajectory| if stop() { Flow::Stop } else { Flow::Continue };
-        let run = stream(&other, &mut controller, &timing, &profile, &rows, solver, false, &mut sink)?;
+        let run = stream(&other, &mut each(&mut controllers), &timing, &profiles, &rows, solver, false, &mut sink)?;
         if stop() {
             return Ok(None);
         }
         worst.axes += 1;
         worst.settled += usize::from(run.figures.settling.is_some() && run.outcome.ending == Ending::Complete);
         let error = match run.outcome.ending {
-            Ending::Complete => run.figures.cart.peak.value.abs(),
+            Ending::Complete => largest(&run.figures, |error| error.peak.value),
             _ => f64::INFINITY,
         };
         if error > worst.error {
             (worst.error, worst.axis) = (error, axis);
         }
-        worst.last = worst.last.max(run.figures.final_cart_error.abs());
+        worst.last = worst.last.max(largest(&run.figures, |error| error.last));
     }
     Ok(Some(worst))
+}
+
+/// The largest magnitude of an error of what slides.
+fn largest(figures: &Figures, of: fn(&Deviation) -> f64) -> f64 {
+    figures.loads.iter().map(|load| of(&load.error).abs()).fold(0.0, f64::max)
 }

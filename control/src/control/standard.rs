@@ -151,6 +151,11 @@ impl Standard {
         Ok(Self { memory: vec![0.0; text.slots.count()], text })
     }
 
+    /// The same for each drive of a machine.
+    pub fn of_drives(design: &Design, model: &Machine) -> Result<Vec<Self>> {
+        model.drives.iter().map(|_| Self::new(design, model)).collect()
+    }
+
     /// Memory from sample to sample.
     pub(super) fn memory(&self) -> &[f64] {
         &self.memory
@@ -187,6 +192,10 @@ fn observed(model: &Machine, rigid: &Rigid) -> [f64; 2] {
 /// Refuses what no controller can be.
 fn check(design: &Design, model: &Machine) -> Result<()> {
     let Design { every, delay, limit, .. } = *design;
+    if let Some(part) = design.needs_axis().filter(|_| model.drives.len() > 1) {
+        return Err(Error::new(format!("`{part}` needs a single axis, and this machine has several drives"))
+            .next("leave it out: pid, cascade and fuzzy run on each drive of such a machine"));
+    }
     if !((1e-9..=1e9).contains(&every) && (0.0..=1000.0 * every).contains(&delay)) {
         return Err(Error::new(format!("a controller cannot be sampled every {every} s with a delay of {delay} s"))
             .allowed("a sample time above zero, and a delay of up to 1000 of them"));

@@ -299,7 +299,7 @@ fn filter(
 ) -> Result<Vec<Corrected>> {
     let n = phi.nrows();
     let spread = |sensor: Sensor| weights.noise.max(0.3 * sensor.step());
-    let mut all = vec![(linear.measured.transpose(), spread(Sensor::new(machine)))];
+    let mut all = vec![(linear.measured.transpose(), spread(Sensor::new(machine, 0)))];
     if let (Some(row), Some(sensor)) = (&linear.scale, Sensor::of_scale(machine)) {
         all.push((row.transpose(), spread(sensor)));
     }

@@ -5,28 +5,35 @@ use super::standard::Standard;
 use crate::design::Design;
 use crate::error::Result;
 use crate::machine::Machine;
-use crate::mechanism::State;
+use crate::mechanism::{DRIVES, State};
 use crate::signal::profile::Reference;
 use crate::trajectory::Interval;
 use std::collections::VecDeque;
 
-/// A controller's clock, delay and limit, between two of its decisions.
+/// The clock, delay and limit of the controllers of all drives, between two of their decisions.
 #[derive(Debug, Clone)]
 pub(super) struct Clocked {
     pub timing: Loop,
     clock: Interval,
-    sensors: Sensors,
+    /// Of each drive.
+    sensors: Vec<Sensors>,
     /// Next sample, and the place in it: at the sample, or where a delayed command takes over.
     k: u64,
     halfway: bool,
     /// Rest of the delay beyond whole samples, s.
     rest: f64,
-    waiting: VecDeque<f64>,
-    acting: f64,
+    waiting: VecDeque<Commands>,
+    acting: Commands,
 }
 
+/// A command of each drive, V or A.
+pub(super) type Commands = [f64; DRIVES];
+
+/// References of each drive: at a sample, and one lead later.
+pub(super) type References = [[Reference; 2]; DRIVES];
+
 /// A command at a sample.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Decision {
     /// Measurements and references at the sample.
     pub seen: Observation,
@@ -42,18 +49,18 @@ impl Clocked {
         Self {
             timing,
             clock: Interval::of(timing.every),
-            sensors: Sensors::new(machine),
+            sensors: Sensors::of(machine),
             k: 0,
             halfway: false,
             rest,
-            waiting: std::iter::repeat_n(0.0, whole).collect(),
-            acting: 0.0,
+            waiting: std::iter::repeat_n([0.0; DRIVES], whole).collect(),
+            acting: [0.0; DRIVES],
         }
     }
 
     /// With positions read exactly and not in counts.
     pub fn exactly(mut self) -> Self {
-        self.sensors = self.sensors.exactly();
+        self.sensors = self.sensors.into_iter().map(Sensors::exactly).collect();
         self
     }
 
@@ -67,54 +74,60 @@ impl Clocked {
         !self.halfway
     }
 
-    /// The command that acts now, V or A.
-    pub fn acting(&self) -> f64 {
+    /// The commands that act now.
+    pub fn acting(&self) -> Commands {
         self.acting
     }
 
-    /// The next command takes over.
+    /// The next commands take over.
     fn take_over(&mut self) {
         self.k += 1;
-        self.acting = self.waiting.pop_front().unwrap_or(0.0);
+        self.acting = self.waiting.pop_front().unwrap_or_default();
     }
 
-    /// Decides at [`Clocked::next`]; what was decided if that is a sample. A delayed command needs nothing else.
+    /// Decides at [`Clocked::next`] for each drive; what was decided if that is a sample. A delayed command needs
+    /// nothing else.
     pub fn decide(
         &mut self,
-        controller: &mut dyn Controller,
-        (state, current): (&State, f64),
-        reference: &Reference,
-        ahead: &Reference,
-    ) -> Option<Decision> {
+        controllers: &mut [&mut dyn Controller],
+        (state, currents): (&State, &Commands),
+        references: &References,
+    ) -> Option<[Decision; DRIVES]> {
         if self.halfway {
             self.halfway = false;
             self.take_over();
             return None;
         }
-        let seen = Observation {
-            time: self.clock.times(self.k),
-            reference: *reference,
-            ahead: *ahead,
-            position: self.sensors.position(state),
-            scale: self.sensors.scale(state),
-            current,
-        };
-        let asked = controller.step(&seen);
-        // What is no number asks for nothing.
-        let asked = if asked.is_finite() { asked } else { 0.0 };
-        let given = self.timing.limit.map_or(asked, |limit| asked.clamp(-limit, limit));
-        controller.limited(given);
-        self.waiting.push_back(given);
+        let time = self.clock.times(self.k);
+        let mut decisions = [Decision::default(); DRIVES];
+        for (drive, controller) in controllers.iter_mut().enumerate() {
+            let (sensors, [reference, ahead]) = (&self.sensors[drive], references[drive]);
+            let seen = Observation {
+                time,
+                reference,
+                ahead,
+                position: sensors.position(state),
+                scale: sensors.scale(state),
+                current: currents[drive],
+            };
+            let asked = controller.step(&seen);
+            // What is no number asks for nothing.
+            let asked = if asked.is_finite() { asked } else { 0.0 };
+            let given = self.timing.limit.map_or(asked, |limit| asked.clamp(-limit, limit));
+            controller.limited(given);
+            decisions[drive] = Decision { seen, asked, given };
+        }
+        self.waiting.push_back(decisions.map(|decision| decision.given));
         match self.rest > 0.0 {
             true => self.halfway = true,
             false => self.take_over(),
         }
-        Some(Decision { seen, asked, given })
+        Some(decisions)
     }
 }
 
-/// A controller with its clock, its delay and its limit, between two of its decisions. A clone of it goes on in the
-/// same way.
+/// The controller of an axis with its clock, its delay and its limit, between two of its decisions. A clone of it goes
+/// on in the same way.
 #[derive(Debug, Clone)]
 pub struct Stepped {
     controller: Standard,
@@ -136,7 +149,7 @@ impl Stepped {
 
     /// The command that acts now, V or A.
     pub fn command(&self) -> f64 {
-        self.clocked.acting()
+        self.clocked.acting()[0]
     }
 
     /// Decides at [`Stepped::next`] from the state, the motor's current, A, and the reference at that time.
@@ -146,8 +159,10 @@ impl Stepped {
     /// until the next decision.
     pub fn decide(&mut self, state: &State, current: f64, reference: &Reference, ahead: Option<&Reference>) -> f64 {
         let ahead = ahead.copied().unwrap_or_else(|| after(reference, self.clocked.timing.lead));
-        self.clocked.decide(&mut self.controller, (state, current), reference, &ahead);
-        self.clocked.acting()
+        let (mut currents, mut references) = (Commands::default(), References::default());
+        (currents[0], references[0]) = (current, [*reference, ahead]);
+        self.clocked.decide(&mut [&mut self.controller], (state, &currents), &references);
+        self.command()
     }
 }
 
@@ -157,7 +172,7 @@ impl Stepped {
     pub fn save(&self) -> Vec<u64> {
         let Clocked { k, halfway, waiting, acting, .. } = &self.clocked;
         let halfway = f64::from(u8::from(*halfway));
-        let numbers = [halfway].into_iter().chain(waiting.iter().copied()).chain([*acting]);
+        let numbers = [halfway].into_iter().chain(waiting.iter().chain([acting]).map(|commands| commands[0]));
         numbers.chain(self.controller.memory().iter().copied()).map(f64::to_bits).chain([*k]).collect()
     }
 
@@ -178,8 +193,9 @@ impl Stepped {
             return None;
         }
         let mut numbers = numbers.iter().map(|bits| f64::from_bits(*bits));
-        self.clocked.waiting = numbers.by_ref().take(waiting).collect();
-        self.clocked.acting = numbers.next()?;
+        let commands = |command: f64| std::array::from_fn(|drive| if drive == 0 { command } else { 0.0 });
+        self.clocked.waiting = numbers.by_ref().take(waiting).map(commands).collect();
+        self.clocked.acting = commands(numbers.next()?);
         memory.iter_mut().zip(numbers).for_each(|(number, saved)| *number = saved);
         (self.clocked.k, self.clocked.halfway) = (*k, halfway);
         Some(())

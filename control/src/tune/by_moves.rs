@@ -71,7 +71,7 @@ const LOST: f64 = 0.2;
 impl Work<'_> {
     /// The figures of all moves on one axis.
     pub fn looked(&self, runner: &mut Runner, design: &Design, machine: &Machine) -> Result<Vec<MoveFigures>> {
-        let one = |(motion, shaped): (&Move, &Profile)| {
+        let one = |(motion, shaped): (&Move, &Vec<Profile>)| {
             self.spend(design, motion);
             runner.look(machine, motion, shaped)
         };
@@ -81,7 +81,7 @@ impl Work<'_> {
     /// The figures of each move on all axes, at samples.
     pub fn glanced(&self, design: &Design) -> Result<Vec<Vec<MoveFigures>>> {
         let mut runner = Runner::new(&self.case.machine, design)?;
-        let mut of_move = |(motion, shaped): (&Move, &Profile)| {
+        let mut of_move = |(motion, shaped): (&Move, &Vec<Profile>)| {
             let one = |machine: &Machine| {
                 self.spend(design, motion);
                 runner.glance(machine, motion, shaped)
@@ -350,7 +350,7 @@ impl Work<'_> {
         for ((is, was), motion) in worst.iter().zip(figures).zip(self.moves) {
             value += steep * (is.error.0 / (was.error.0 * (1.0 - BETWEEN))).ln().max(0.0);
             // As a share of the profile's duration, as J counts it.
-            let duration = motion.profile.end().max(f64::MIN_POSITIVE);
+            let duration = motion.profile().end().max(f64::MIN_POSITIVE);
             value += steep * (is.settles.0 - was.settles.0).max(0.0) / duration;
             value += steep * LOST * is.unsettled.saturating_sub(was.unsettled) as f64;
         }

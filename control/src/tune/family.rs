@@ -394,7 +394,7 @@ fn along(case: &Case, count: usize) -> Vec<f64> {
     let (low, high) = case
         .moves
         .iter()
-        .flat_map(|motion| motion.profile.strokes().flat_map(|(_, from, distance, _)| [from, from + distance]))
+        .flat_map(|motion| motion.profile().strokes().flat_map(|(_, from, distance, _)| [from, from + distance]))
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
     if machine.cart.travel.is_some() || low > high {
         return whole;

@@ -267,12 +267,13 @@ fn seen(
     let rows = Rows { until, every: design.every.min(until), window: 1e-4 };
     let mut cart: Vec<(f64, f64)> = Vec::new();
     let solver = Solver::of(machine);
-    let run = stream(machine, &mut controller, &Loop::of(design), &profile, &rows, solver, true, &mut |block| {
-        let (time, x) = (block.get("time").unwrap_or(&[]), block.get("cart_position").unwrap_or(&[]));
-        let late = time.iter().zip(x).filter(|(t, _)| **t > from + skipped);
-        cart.extend(late.map(|(t, x)| (*t, *x)));
-        Flow::Continue
-    })?;
+    let run =
+        stream(machine, &mut [&mut controller], &Loop::of(design), &[profile], &rows, solver, true, &mut |block| {
+            let (time, x) = (block.get("time").unwrap_or(&[]), block.get("cart_position").unwrap_or(&[]));
+            let late = time.iter().zip(x).filter(|(t, _)| **t > from + skipped);
+            cart.extend(late.map(|(t, x)| (*t, *x)));
+            Flow::Continue
+        })?;
     // The last eighth of the watch.
     let late = run.kept.iter().filter(|sample| sample.time >= until - 0.125 * watched);
     let command: Vec<(f64, f64)> = late.map(|sample| (sample.time, sample.given)).collect();

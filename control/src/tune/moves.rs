@@ -58,7 +58,7 @@ fn standard(machine: &Machine, design: &Design) -> Result<Vec<Move>> {
             until,
             every: design.every,
             window: WINDOW.max(COUNTS * count),
-            profile,
+            profiles: vec![profile],
             is_planned: false,
         })
     };
@@ -92,9 +92,9 @@ fn limits(machine: &Machine, design: &Design) -> (f64, f64) {
 pub fn asked(machine: &Machine, motion: &Move) -> f64 {
     let compensation = Compensation::new(machine, &FeedForward::NONE);
     let count = 1000;
-    let end = motion.profile.end();
+    let end = motion.profile().end();
     let square = |k: i32| {
-        let y = motion.profile.at(end * (f64::from(k) + 0.5) / f64::from(count));
+        let y = motion.profile().at(end * (f64::from(k) + 0.5) / f64::from(count));
         (compensation.needed(&y).force[0] / compensation.rigid.force_per_ampere).powi(2)
     };
     let mean = (0..count).map(square).sum::<f64>() / f64::from(count) * end / motion.until;

@@ -13,7 +13,7 @@
 //! D)(1 + ln(1 + e/w)).
 
 use crate::case::{Cost, Move};
-use crate::control::{Figures, Loop, Standard, closed_loop_at_samples, closed_loop_briefly};
+use crate::control::{Controller, Figures, Loop, Standard, closed_loop_at_samples, closed_loop_briefly};
 use crate::design::Design;
 use crate::error::Result;
 use crate::machine::Machine;
@@ -57,7 +57,7 @@ pub struct MoveFigures {
 
 /// A move on one axis.
 pub fn look(machine: &Machine, model: &Machine, design: &Design, motion: &Move) -> Result<MoveFigures> {
-    Runner::new(model, design)?.look(machine, motion, &motion.reference(design))
+    Runner::new(model, design)?.look(machine, motion, &motion.references(design))
 }
 
 /// A controller that is made once and run through many moves.
@@ -73,15 +73,16 @@ impl Runner {
     }
 
     /// A move on one axis, its profile being shaped already.
-    pub fn look(&mut self, machine: &Machine, motion: &Move, shaped: &Profile) -> Result<MoveFigures> {
+    pub fn look(&mut self, machine: &Machine, motion: &Move, shaped: &[Profile]) -> Result<MoveFigures> {
         let seen = (motion.until, motion.window);
+        let controllers = &mut [&mut self.controller as &mut dyn Controller];
         let (figures, ending) =
-            closed_loop_briefly(machine, &mut self.controller, &self.timing, shaped, seen, Solver::of(machine))?;
+            closed_loop_briefly(machine, controllers, &self.timing, shaped, seen, Solver::of(machine))?;
         Ok(figures_of(&figures, ending, motion))
     }
 
     /// The same at samples alone, in a third of the time.
-    pub fn glance(&mut self, machine: &Machine, motion: &Move, shaped: &Profile) -> Result<MoveFigures> {
+    pub fn glance(&mut self, machine: &Machine, motion: &Move, shaped: &[Profile]) -> Result<MoveFigures> {
         let seen = (motion.until, motion.window);
         let (figures, ending) =
             closed_loop_at_samples(machine, &mut self.controller, &self.timing, shaped, seen, Solver::of(machine))?;
@@ -99,14 +100,14 @@ fn figures_of(figures: &Figures, ending: Ending, motion: &Move) -> MoveFigures {
             current: f64::INFINITY,
         };
     }
-    let left = (motion.until - motion.profile.end()).max(motion.profile.end() * 1e-3);
-    let away = left * (1.0 + (figures.final_cart_error.abs() / motion.window).ln_1p());
+    let left = (motion.until - motion.profile().end()).max(motion.profile().end() * 1e-3);
+    let away = left * (1.0 + (figures.cart().error.last.abs() / motion.window).ln_1p());
     MoveFigures {
-        error: figures.cart.peak.value.abs(),
-        rms: figures.cart.rms,
+        error: figures.cart().error.peak.value.abs(),
+        rms: figures.cart().error.rms,
         settling: figures.settling,
         settles: figures.settling.unwrap_or(away),
-        current: figures.current.1,
+        current: figures.drive().current.1,
     }
 }
 
@@ -165,7 +166,7 @@ pub fn objective(cost: Cost, balance: &Balance, moves: &[Move], asked: &[f64], w
             Cost::Squares => (worst.rms / motion.window).ln_1p(),
             Cost::Peak => error,
             Cost::Moves | Cost::Disturbance => {
-                let duration = motion.profile.end().max(f64::MIN_POSITIVE);
+                let duration = motion.profile().end().max(f64::MIN_POSITIVE);
                 balance.error * error
                     + balance.settling * (worst.settles.0 / duration).ln_1p()
                     + balance.current * (worst.current / asked).ln()
@@ -191,7 +192,7 @@ mod tests {
             let design = case.controller.as_ref().unwrap();
             let mut runner = Runner::new(&case.machine, design).unwrap();
             for motion in &case.moves {
-                let shaped = motion.reference(design);
+                let shaped = motion.references(design);
                 let whole = runner.look(&case.machine, motion, &shaped).unwrap();
                 let glance = runner.glance(&case.machine, motion, &shaped).unwrap();
                 let told = format!("{name}: {}: {whole:?} {glance:?}", motion.name);

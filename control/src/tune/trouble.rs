@@ -59,10 +59,12 @@ pub struct Trouble {
     pub words: String,
 }
 
-/// The trouble of a move that was run to `target`, m; none if it has none.
+/// The trouble of a move that was run to `target` (of the first coordinate, m); none if it has none.
 pub fn trouble(machine: &Machine, design: &Design, run: &MoveRun, target: f64) -> Option<Trouble> {
-    let model = unstable(machine, design, target);
-    let (swing, (samples, limited)) = (run.swing, run.samples);
+    // Loops round several drives have no margins here: what their run shows tells.
+    let model = if machine.drives.len() == 1 { unstable(machine, design, target) } else { None };
+    let (samples, limited) = run.samples;
+    let swing = run.swings.iter().copied().reduce(|a, b| if b.late > a.late { b } else { a }).unwrap_or_default();
     let limit = limit(machine, design).unwrap_or(f64::INFINITY);
     let cycles = swing.cycles >= CYCLES;
     let loud = swing.late > LOUD * limit && cycles;

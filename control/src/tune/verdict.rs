@@ -131,14 +131,14 @@ impl Work<'_> {
         let mut moves = Vec::new();
         for (motion, seen) in self.moves.iter().zip(all) {
             let (machine, until, window) = (&self.case.machine, motion.until, motion.window);
-            let (profile, solver) = (&motion.profile, Solver::of(machine));
-            let own = closed_loop(&Setup { machine, model: machine, design, profile, until, window, solver })?;
+            let (profiles, solver) = (&motion.profiles, Solver::of(machine));
+            let own = closed_loop(&Setup { machine, model: machine, design, profiles, until, window, solver })?;
             let at_worst = AtWorst::of(&seen, left_out);
             moves.push(MoveVerdict {
                 name: motion.name.clone(),
-                cart: own.figures.cart,
+                cart: own.figures.cart().error,
                 settling: own.figures.settling.filter(|_| own.outcome.ending == Ending::Complete),
-                current: own.figures.current.1,
+                current: own.figures.drive().current.1,
                 worst: (at_worst.error.0, self.family.words(&machines[at_worst.error.1])),
                 settled: (at_worst.settled, machines.len()),
                 at_worst,

@@ -49,7 +49,7 @@ pub(super) struct Work<'a> {
     /// I₀ of each move, A.
     pub asked: Vec<f64>,
     /// The moves as the shaper of the controller makes them, which no search changes.
-    pub shaped: Vec<Profile>,
+    pub shaped: Vec<Vec<Profile>>,
     /// The axes of all machines of the family, and what a controller sees of them over frequency.
     pub stages: Vec<Machine>,
     pub plants: Vec<Plant>,
@@ -108,7 +108,7 @@ impl<'a> Work<'a> {
             tuning,
             moves,
             asked,
-            shaped: moves.iter().map(|motion| motion.reference(design)).collect(),
+            shaped: moves.iter().map(|motion| motion.references(design)).collect(),
             stages: family.machines.iter().map(|machine| family.stage_at(machine)).collect(),
             plants,
             set: vec![0],

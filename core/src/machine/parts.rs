@@ -2,7 +2,7 @@
 //! without strain.
 
 use super::{
-    BeltMake, BeltModel, BodyAt, DriveAt, EncoderPlace, Geometry, Machine, Part, Slide, SlideAt, SpanAt, Spans,
+    BeltMake, BeltModel, BodyAt, DriveAt, EncoderPlace, Geometry, Machine, Part, Slide, SlideAt, SpanAt, Spans, Travel,
 };
 use crate::error::{Error, Result};
 use crate::friction::{Friction, Law};
@@ -169,6 +169,18 @@ impl Machine {
         }
     }
 
+    /// Readings for the observer of a move: of several drives with the positions of what slides in place of its speeds,
+    /// as there is no room for both.
+    pub fn readings_of_move(&self, mechanism: &Mechanism) -> Vec<Shown> {
+        let mut readings = mechanism.readings.clone();
+        if self.drives.len() > 1 {
+            for (reading, slide) in readings.iter_mut().zip(self.geometry().slides) {
+                *reading = Shown::Position(slide.body, 1.0);
+            }
+        }
+        readings
+    }
+
     fn columns(&self, mechanism: &Mechanism) -> Vec<Heading> {
         let geometry = self.geometry();
         let (bodies, spans) = (geometry.bodies, geometry.spans);
@@ -273,6 +285,19 @@ impl Machine {
             ways[geometry.bodies.len() + rotor] = ways[drive.pulley];
         }
         ways
+    }
+
+    /// The names of what slides, and its travel where it has one.
+    pub fn travels(&self) -> impl Iterator<Item = (Label, Option<Travel>)> {
+        let geometry = self.geometry();
+        geometry.slides.iter().zip(self.slides()).map(|(at, slide)| (geometry.label(at.body), slide.travel))
+    }
+
+    /// Weights of the positions of what slides in that of each drive's part of the belt, r φ of its pulley without
+    /// strain.
+    pub fn belt_shares(&self) -> Vec<&'static [f64]> {
+        let geometry = self.geometry();
+        geometry.drives.iter().map(|drive| geometry.bodies[drive.pulley].by_slides).collect()
     }
 
     /// Where the drives have what slides, m, by the angles of all bodies.

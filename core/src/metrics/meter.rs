@@ -212,6 +212,11 @@ impl Meter {
         }
     }
 
+    /// The machine that is observed.
+    pub fn machine(&self) -> &Machine {
+        &self.machine
+    }
+
     /// The magnitudes above which there is a peak of each reading.
     #[inline]
     fn heights(&self) -> Reading {

@@ -113,6 +113,12 @@ impl Stroke {
         Ok(Self { distance, duration: times.iter().sum(), pieces: pieces(distance, &times) })
     }
 
+    /// This share of it, over `distance` (m).
+    fn scaled(&self, share: f64, distance: f64) -> Self {
+        let scale = |(begin, state): &(f64, [f64; 5])| (*begin, state.map(|value| share * value));
+        Self { distance, duration: self.duration, pieces: self.pieces.iter().map(scale).collect() }
+    }
+
     /// How long it takes, s.
     pub fn duration(&self) -> f64 {
         self.duration
@@ -250,9 +256,9 @@ fn moved(state: &[f64; 5], h: f64) -> [f64; 5] {
 
 /// One move of a chain, or a wait.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Leg {
-    /// To a position, m.
-    To(f64, Limits),
+pub enum Leg<P = f64> {
+    /// To a position, m: a number for an axis, the position of each coordinate for a machine with several.
+    To(P, Limits),
     /// Rest for so long, s.
     Wait(f64),
 }
@@ -292,6 +298,47 @@ impl Profile {
             }
         }
         Ok(Self { strokes, start, end: time, shaper: Vec::new(), samples: Vec::new() })
+    }
+
+    /// The chain of straight `legs` from `start` (m): a profile for each coordinate, all on one clock. Limits hold along
+    /// the path; legs meet at rest.
+    ///
+    /// ```
+    /// use taut::signal::profile::{Leg, Limits, Profile};
+    /// let limits = Limits { speed: 0.5, acceleration: 5.0, jerk: None, snap: None };
+    /// // 50 mm along the path, of which 30 mm along one coordinate and 40 mm along the other.
+    /// let path = Profile::along(&[0.0, 0.0], &[Leg::To(vec![0.03, 0.04], limits)])?;
+    /// let alone = Profile::new(0.0, &[Leg::To(0.05, limits)])?;
+    /// assert_eq!((path[0].target(), path[1].target()), (0.03, 0.04));
+    /// assert_eq!(path[0].end(), alone.end());
+    /// assert!((path[0].at(0.1).speed - 0.6 * alone.at(0.1).speed).abs() < 1e-15);
+    /// # Ok::<(), taut::Error>(())
+    /// ```
+    pub fn along(start: &[f64], legs: &[Leg<Vec<f64>>]) -> Result<Vec<Self>> {
+        let (mut position, mut way) = (start.to_vec(), 0.0);
+        // Ways along the path, and the ends of each leg.
+        let (mut lengths, mut ends) = (Vec::new(), Vec::new());
+        for leg in legs {
+            lengths.push(match leg {
+                Leg::Wait(length) => Leg::Wait(*length),
+                Leg::To(target, limits) => {
+                    let square: f64 = target.iter().zip(&position).map(|(to, from)| (to - from).powi(2)).sum();
+                    way += square.sqrt();
+                    ends.push((std::mem::replace(&mut position, target.clone()), target.clone()));
+                    Leg::To(way, *limits)
+                }
+            });
+        }
+        let whole = Self::new(0.0, &lengths)?;
+        let of_coordinate = |k: usize| {
+            let stroke = |((begin, _, stroke), (from, to)): (&(f64, [f64; 2], Stroke), &(Vec<f64>, Vec<f64>))| {
+                let share = if stroke.distance > 0.0 { (to[k] - from[k]) / stroke.distance } else { 0.0 };
+                (*begin, [from[k], to[k]], stroke.scaled(share, to[k] - from[k]))
+            };
+            let strokes = whole.strokes.iter().zip(&ends).map(stroke).collect();
+            Self { strokes, start: start[k], end: whole.end, shaper: Vec::new(), samples: Vec::new() }
+        };
+        Ok((0..start.len()).map(of_coordinate).collect())
     }
 
     /// A reference of which `positions` (m) at increasing `times` (s) are known: straight lines between them. Speed and

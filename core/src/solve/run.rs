@@ -97,8 +97,20 @@ impl<'a> Run<'a> {
         observer: Option<&'a mut dyn Observe>,
         sink: &'a mut dyn FnMut(&Trajectory) -> Flow,
     ) -> Result<Self> {
+        Self::reading((machine, machine.mechanism()), experiment, solver, detail, observer, sink)
+    }
+
+    /// The same of a machine whose mechanism has readings of its own for the observer.
+    pub fn reading(
+        (machine, mechanism): (&Machine, Mechanism),
+        experiment: &Experiment,
+        solver: Solver,
+        detail: Detail,
+        observer: Option<&'a mut dyn Observe>,
+        sink: &'a mut dyn FnMut(&Trajectory) -> Flow,
+    ) -> Result<Self> {
         check::machine(machine)?;
-        let mechanism = Arc::new(machine.mechanism());
+        let mechanism = Arc::new(mechanism);
         check::experiment(&mechanism, experiment)?;
         let start = experiment.start(&mechanism);
         Self::of(&mechanism, &start, (solver, 0), Known::default(), Output { detail, sink, observer })

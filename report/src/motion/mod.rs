@@ -5,13 +5,14 @@ mod plots;
 mod rows;
 
 pub use page::page;
-pub use plots::{Curves, figures};
+pub use plots::Curves;
 pub use rows::{controller, length, lines};
 
 use taut::case::{Case, Move};
 use taut::control::{MoveRun, Worst};
 use taut::design::Design;
 use taut::json::Moved;
+use taut::machine::Machine;
 use taut::reach::feasible::Shortfall;
 use taut::tune::trouble::Trouble;
 
@@ -35,8 +36,9 @@ pub struct Done<'a> {
 
 impl Done<'_> {
     /// The entry of the summary.
-    pub fn told(&self) -> Moved<'_> {
+    pub fn told<'a>(&'a self, machine: &'a Machine) -> Moved<'a> {
         Moved {
+            machine,
             motion: self.motion,
             run: &self.run,
             worst: self.worst.as_ref(),

@@ -4,10 +4,11 @@ use super::{Done, Tried};
 use crate::simulate::rows::ties;
 use crate::simulate::{plain, time, value};
 use std::fmt::Write;
-use taut::control::sliding;
+use taut::control::{Deviation, DriveFigures, LoadFigures, sliding};
 use taut::design::{Design, FeedForwardModel, Structure};
 use taut::machine::rigid::Rigid;
-use taut::machine::{EncoderPlace, Machine};
+use taut::machine::{DriveUnit, EncoderPlace, Machine};
+use taut::metrics::Peak;
 
 /// A length in µm, in mm from 10 mm on.
 pub fn length(metres: f64) -> String {
@@ -63,34 +64,51 @@ pub fn controller(design: &Design, machine: &Machine) -> String {
 /// The key figures of a move with their names.
 pub fn lines(tried: &Tried, done: &Done) -> Vec<(&'static str, String)> {
     let (machine, run) = (&tried.case.machine, &done.run);
-    let figures = &run.figures;
-    let deviation = |d: &taut::control::Deviation| {
-        format!("at most {} at {}, {} rms", length(d.peak.value), time(d.peak.time), length(d.rms))
-    };
-    let (span, stretch) = run.metrics.largest_stretch();
-    let (force_span, force) = run.metrics.largest_force();
+    let (figures, geometry) = (&run.figures, machine.geometry());
+    let deviation =
+        |d: &Deviation| format!("at most {} at {}, {} rms", length(d.peak.value), time(d.peak.time), length(d.rms));
+    let (place, stretch) = run.metrics.largest_stretch();
+    let (force_place, force) = run.metrics.largest_force();
+    let span = |number: usize| geometry.spans[number].label.name;
+    let loads = geometry.slides.iter().map(|slide| geometry.label(slide.body).name);
+    let of_loads = |words: &dyn Fn(&LoadFigures) -> String| each(loads.clone(), &figures.loads, words);
+    let drives = geometry.drives.iter().map(|drive| drive.label.name.trim_end_matches(" drive"));
+    let of_drives = |words: &dyn Fn(&DriveFigures) -> String| each(drives.clone(), &figures.drives, words);
+    let largest =
+        |(peak, rms): (Peak, f64), unit: &str| format!("at most {}, {} rms", value(peak.value, unit), value(rms, unit));
     let settling = match figures.settling {
         Some(settling) => format!("{} after the profile, within {}", time(settling), length(done.motion.window)),
         None => format!("not within {} until the end", length(done.motion.window)),
     };
     let mut held = format!("{} of {} samples", run.samples.1, run.samples.0);
-    if machine.drives[0].amplifier.voltage_limit.is_some() || machine.drives[0].amplifier.current_limit.is_some() {
-        let _ = write!(held, "; the amplifier for {}", time(figures.amplifier_limited));
+    let is_limited =
+        |unit: &DriveUnit| unit.amplifier.voltage_limit.is_some() || unit.amplifier.current_limit.is_some();
+    if machine.drives.iter().any(is_limited) {
+        let _ = write!(held, "; the amplifier for {}", of_drives(&|drive| time(drive.amplifier_limited)));
     }
     let mut lines = vec![
-        ("cart error", format!("{}, {} at the end", deviation(&figures.cart), length(figures.final_cart_error))),
-        ("following error", deviation(&figures.following)),
+        (
+            if figures.loads.len() == 1 { "cart error" } else { "error" },
+            of_loads(&|load| format!("{}, {} at the end", deviation(&load.error), length(load.error.last))),
+        ),
+        ("following error", of_drives(&|drive| deviation(&drive.following))),
         ("settling", settling),
-        ("overshoot", length(figures.overshoot)),
-        ("peak stretch", format!("{} in span {} at {}", value(stretch.value, "m"), span + 1, time(stretch.time))),
-        ("peak force", format!("{} in span {} at {}", value(force.value, "N"), force_span + 1, time(force.time))),
-        ("current", format!("at most {}, {} rms", value(figures.current.0.value, "A"), value(figures.current.1, "A"))),
-        ("voltage", format!("at most {}, {} rms", value(figures.voltage.0.value, "V"), value(figures.voltage.1, "V"))),
+        ("overshoot", of_loads(&|load| length(load.overshoot))),
+        ("peak stretch", format!("{} in {} at {}", value(stretch.value, "m"), span(place), time(stretch.time))),
+        ("peak force", format!("{} in {} at {}", value(force.value, "N"), span(force_place), time(force.time))),
+        ("current", of_drives(&|drive| largest(drive.current, "A"))),
+        ("voltage", of_drives(&|drive| largest(drive.voltage, "V"))),
         ("saturated", held),
-        ("energy", format!("{} in, {} back", value(figures.energy.0, "J"), value(figures.energy.1, "J"))),
+        (
+            "energy",
+            of_drives(&|drive| format!("{} in, {} back", value(drive.energy.0, "J"), value(drive.energy.1, "J"))),
+        ),
         // The bound of a run holds without a controller, which answers to what rounding does.
         ("accuracy", format!("not stated in closed loop{}", ties(&run.outcome.ties))),
     ];
+    if let Some(contour) = &figures.contour {
+        lines.insert(1, ("contour error", format!("{}, {} at the end", deviation(contour), length(contour.last))));
+    }
     if let Structure::SlidingMode(gains) = &tried.design.structure {
         let (speed, acceleration) = peaks(done);
         let needed = sliding::required(gains, &Rigid::of(machine), 0.2, speed, acceleration);
@@ -121,9 +139,17 @@ pub fn lines(tried: &Tried, done: &Done) -> Vec<(&'static str, String)> {
     lines
 }
 
+/// Words about each part: alone where there is one, with its name where there are several.
+fn each<'a, T>(names: impl Iterator<Item = &'a str>, parts: &[T], words: &dyn Fn(&T) -> String) -> String {
+    match parts {
+        [only] => words(only),
+        _ => names.zip(parts).map(|(name, part)| format!("{name} {}", words(part))).collect::<Vec<_>>().join("; "),
+    }
+}
+
 /// Largest speed and acceleration of the reference, m/s and m/s².
 fn peaks(done: &Done) -> (f64, f64) {
-    let (profile, n) = (&done.motion.profile, 10_000);
+    let (profile, n) = (&done.motion.profile(), 10_000);
     let at = |k: i32| profile.at(profile.end() * f64::from(k) / f64::from(n));
     (0..=n).map(at).fold((0.0, 0.0), |(v, a), y| (f64::max(v, y.speed.abs()), f64::max(a, y.acceleration.abs())))
 }

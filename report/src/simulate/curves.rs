@@ -128,7 +128,8 @@ impl Curves {
     pub fn new(machine: &Machine) -> Self {
         let sources = sources(machine);
         let thinned = sources.iter().map(|_| decimator()).collect();
-        let way = (machine.kind != Kind::Axis).then(|| Way::new(["cart_position", "bridge_position"]));
+        let way =
+            (machine.kind != Kind::Axis).then(|| Way::new(["cart_position", "bridge_position"].map(String::from)));
         Self { sources, thinned, scratch: Vec::new(), way }
     }
 
@@ -174,7 +175,7 @@ impl Curves {
 }
 
 /// Where two columns go together, one over the other, thinned out by leaving out every second row as often as needed.
-struct Way {
+pub struct Way {
     columns: [String; 2],
     stride: usize,
     rows: usize,
@@ -184,8 +185,8 @@ struct Way {
 
 impl Way {
     /// No points yet.
-    pub fn new(columns: [&str; 2]) -> Self {
-        Self { columns: columns.map(str::to_string), stride: 1, rows: 0, points: Vec::new(), last: [0.0; 2] }
+    pub fn new(columns: [String; 2]) -> Self {
+        Self { columns, stride: 1, rows: 0, points: Vec::new(), last: [0.0; 2] }
     }
 
     /// Takes the next rows.

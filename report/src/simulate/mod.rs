@@ -9,6 +9,7 @@ mod plots;
 pub(crate) mod rows;
 
 pub use band::Band;
+pub(crate) use curves::Way;
 pub use curves::{Curves, Samples, decimator};
 pub(crate) use page::figures_table;
 pub use page::report;

@@ -9,7 +9,7 @@ use std::f64::consts::PI;
 use taut::Result;
 use taut::case::Move;
 use taut::control::feedback::Feedback;
-use taut::control::{Loop, Rows, Standard, stream};
+use taut::control::{Controller, Loop, Rows, Standard, stream};
 use taut::solve::{Flow, Solver};
 use taut::tune::{Break, Corner, Open, Verdict, breaks, loops};
 
@@ -240,10 +240,11 @@ fn moved(work: &Work, motion: &Move) -> Result<Figure> {
     {
         let design = &verdict.design;
         let mut controller = Standard::new(design, stage)?;
-        let profile = motion.reference(design);
+        let profiles = motion.references(design);
         let rows = Rows { until: motion.until, every: motion.every, window: motion.window };
         let (mut x, mut u) = (decimator(), decimator());
-        stream(stage, &mut controller, &Loop::of(design), &profile, &rows, Solver::of(stage), false, &mut |block| {
+        let (controllers, timing) = (&mut [&mut controller as &mut dyn Controller], Loop::of(design));
+        stream(stage, controllers, &timing, &profiles, &rows, Solver::of(stage), false, &mut |block| {
             let column = |name: &str| block.get(name).unwrap_or(&[]);
             x.push(column("time"), column("cart_error"));
             u.push(column("time"), column("voltage"));
@@ -256,7 +257,7 @@ fn moved(work: &Work, motion: &Move) -> Result<Figure> {
     Ok(Figure::new(format!("{}: before and after", motion.name), Axis::new("Time", "s"))
         .panel(error)
         .panel(command)
-        .vertical(motion.profile.end(), "end of the profile")
+        .vertical(motion.profile().end(), "end of the profile")
         .caption("By how much the cart is off, and what it takes, on the axis as the file has it."))
 }
 

@@ -10,10 +10,9 @@ use std::f64::consts::PI;
 use std::time::{Duration, Instant};
 use taut::case::{Case, Files, Given, Move, Tuning};
 use taut::control::feedback::Feedback;
-use taut::control::{Loop, Rows, Standard, stream};
+use taut::control::{Loop, Rows, Standard, each, stream};
 use taut::design::Design;
 use taut::error::{Error, Result};
-use taut::reach::feasible::shortfalls;
 use taut::solve::Solver;
 use taut::trajectory::Trajectory;
 use taut::tune::{Break, Family, Margins, Open, Verdict, breaks, loops, trouble, tune};
@@ -91,8 +90,13 @@ pub fn closed(request: &Request, context: &Context) -> Result<Reply> {
     let tried = Tried { case: &case, design, done: vec![done] };
     let done = &tried.done[0];
     let lines = taut_report::motion::lines(&tried, done);
-    let told =
-        taut::json::moves(&case.title, design.structure.name(), &Loop::of(design), &case.machine, &[done.told()]);
+    let told = taut::json::moves(
+        &case.title,
+        design.structure.name(),
+        &Loop::of(design),
+        &case.machine,
+        &[done.told(&case.machine)],
+    );
     let opened = case.clone();
     let mut reply = Reply::of(json!({
         "title": case.title,
@@ -100,7 +104,7 @@ pub fn closed(request: &Request, context: &Context) -> Result<Reply> {
         "moves": moves.iter().map(|one| json!({ "name": one.name, "until": one.until })).collect::<Vec<_>>(),
         "move": place,
         "until": motion.until,
-        "profile_end": motion.profile.end(),
+        "profile_end": motion.profile().end(),
         "controller": taut_report::motion::controller(design, &case.machine),
         "rows": lines.iter().map(|(name, value)| json!([name, value.replace('-', "−")])).collect::<Vec<_>>(),
         "ending": taut_report::simulate::ended_early(&done.run.outcome.ending, "cart"),
@@ -140,8 +144,8 @@ pub fn moved<'a>(
     sink: &mut dyn FnMut(&Trajectory),
 ) -> Result<Done<'a>> {
     let machine = &case.machine;
-    let mut controller = Standard::new(design, machine)?;
-    let profile = motion.reference(design);
+    let mut controllers = Standard::of_drives(design, machine)?;
+    let profiles = motion.references(design);
     let count = (motion.until / motion.every).ceil().max(1.0) as u64;
     let rows =
         Rows { until: motion.until, every: interval(motion.every, count).min(motion.until), window: motion.window };
@@ -149,10 +153,10 @@ pub fn moved<'a>(
         sink(block);
         context.flow()
     };
-    let run =
-        stream(machine, &mut controller, &Loop::of(design), &profile, &rows, Solver::of(machine), false, &mut take)?;
-    let trouble = trouble::trouble(machine, design, &run, motion.profile.target());
-    let shortfalls = shortfalls(machine, design.limit, &profile);
+    let (timing, solver) = (Loop::of(design), Solver::of(machine));
+    let run = stream(machine, &mut each(&mut controllers), &timing, &profiles, &rows, solver, false, &mut take)?;
+    let trouble = trouble::trouble(machine, design, &run, motion.profile().target());
+    let shortfalls = motion.shortfalls(machine, design);
     Ok(Done { motion, run, curves: None, worst: None, trouble, shortfalls, files: Vec::new() })
 }
 

@@ -28,7 +28,7 @@ pub fn run(request: &Request, context: &Context) -> Result<Reply> {
     runnable(&case)?;
     let begun = Instant::now();
     let (simulated, kept) = match &case {
-        case if case.is_axis() && case.experiments.is_empty() && !case.moves.is_empty() => {
+        case if case.experiments.is_empty() && !case.moves.is_empty() => {
             axis(&case.moves, request, |place| move_run(case, place, context))?
         }
         case => axis(&case.experiments, request, |place| experiment_run(case, place, context))?,
@@ -111,7 +111,8 @@ fn move_run(case: &Case, place: usize, context: &Context) -> Result<(Simulated, 
     let mut kept = Kept::new(&panels);
     let done = super::closed::moved(case, design, moves[place], context, &mut |block| kept.take(block))?;
     let timing = Loop::of(design);
-    let json = taut::json::moves(&case.title, design.structure.name(), &timing, &case.machine, &[done.told()]);
+    let json =
+        taut::json::moves(&case.title, design.structure.name(), &timing, &case.machine, &[done.told(&case.machine)]);
     let tried = Tried { case, design, done: vec![done] };
     let rows = lines_told(taut_report::motion::lines(&tried, &tried.done[0]).into_iter());
     let outcome = tried.done.into_iter().next().map(|done| done.run.outcome);
@@ -171,9 +172,7 @@ pub fn simulated<'a>(
 fn names(case: &Case) -> Value {
     let one = |name: &str, until: f64| json!({ "name": name, "until": until });
     match case {
-        case if case.is_axis() && case.experiments.is_empty() => {
-            case.moves.iter().map(|m| one(&m.name, m.until)).collect()
-        }
+        case if case.experiments.is_empty() => case.moves.iter().map(|m| one(&m.name, m.until)).collect(),
         case => case.experiments.iter().map(|e| one(&e.name, e.until)).collect(),
     }
 }
