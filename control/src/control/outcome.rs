@@ -36,7 +36,7 @@ pub struct Figures {
     /// Of the drives.
     pub drives: Vec<DriveFigures>,
     /// Distance from the path, to its left above zero, of a machine with two coordinates. Exact where the nearest leg is
-    /// the same for a while; about corners at eight places of each piece of the motion.
+    /// the same for a while; about corners its peak is sought between nine places of each piece of the motion.
     pub contour: Option<Deviation>,
     /// From the end of the profile, a shaper apart, until all that slides stays within the window around its target, s;
     /// none if it does not.

@@ -1,0 +1,328 @@
+//! Moves of gantries in closed loop: against an integration that shares no code with the program, and laws.
+
+use rand_pcg::Pcg64;
+use taut::case::{Case, Move};
+use taut::chance::uniform;
+use taut::control::{Loop, MoveRun, Rows, Standard, each, stream};
+use taut::solve::{Ending, Flow, Solver};
+use taut::trajectory::Trajectory;
+
+/// Numbers from a seed.
+struct Draw(Pcg64);
+
+impl Draw {
+    fn new(seed: u64) -> Self {
+        Self(Pcg64::new(32, u128::from(seed)))
+    }
+
+    fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * uniform(&mut self.0)
+    }
+}
+
+/// A gantry without dry friction under proportional control of each motor, along straight legs with trapezoids of speed.
+struct Plain {
+    kind: &'static str,
+    radius: f64,
+    inertia: f64,
+    pulley_drag: f64,
+    /// K_t and K_e, R.
+    motor: [f64; 2],
+    /// Bridge without the cart, cart.
+    masses: [f64; 2],
+    drags: [f64; 2],
+    stiffness: Vec<f64>,
+    damping: f64,
+    gain: f64,
+    every: f64,
+    limit: f64,
+    points: Vec<[f64; 2]>,
+    speed: f64,
+    acceleration: f64,
+    until: f64,
+}
+
+impl Plain {
+    fn drawn(draw: &mut Draw, kind: &'static str) -> Self {
+        let spans = if kind == "h-frame" { 3 } else { 4 };
+        let mut place = || [draw.between(-0.04, 0.04), draw.between(-0.04, 0.04)];
+        let points = vec![place(), place(), place()];
+        Self {
+            kind,
+            radius: draw.between(0.008, 0.02),
+            inertia: draw.between(2e-5, 9e-5),
+            pulley_drag: draw.between(0.0, 2e-3),
+            motor: [draw.between(0.02, 0.06), draw.between(0.5, 2.0)],
+            masses: [draw.between(0.3, 1.2), draw.between(0.2, 0.8)],
+            drags: [draw.between(4.0, 20.0), draw.between(4.0, 20.0)],
+            stiffness: (0..spans).map(|_| draw.between(3e4, 2e5)).collect(),
+            damping: draw.between(5.0, 40.0),
+            gain: draw.between(100.0, 400.0),
+            every: 1e-3 * draw.between(0.5, 2.0).round().max(0.5),
+            limit: draw.between(0.5, 20.0),
+            points,
+            speed: draw.between(0.2, 0.5),
+            acceleration: draw.between(2.0, 8.0),
+            until: 2.0,
+        }
+    }
+
+    fn text(&self) -> String {
+        let list = |values: &[f64]| format!("[{}]", values.iter().map(f64::to_string).collect::<Vec<_>>().join(", "));
+        let points: Vec<String> = self.points.iter().map(|point| list(point)).collect();
+        let ([k, r], [bridge, cart], [b, c]) = (self.motor, self.masses, self.drags);
+        format!(
+            "kind = \"{}\"\n[motor]\ntorque_constant = {k}\nback_emf_constant = {k}\nresistance = {r}\n\
+             [drive_pulley]\nradius = {}\ninertia = {}\nfriction = {{ viscous = {} }}\n\
+             [bridge]\nmass = {bridge}\nfriction = {{ viscous = {b} }}\n\
+             [cart]\nmass = {cart}\nfriction = {{ viscous = {c} }}\n\
+             [belt]\nstiffness = {}\ndamping = {}\n\
+             [controller]\nevery = {}\nlimit = {}\npid = {{ proportional = {} }}\n\
+             [[move]]\nname = \"path\"\npoints = [{}]\nspeed = {}\nacceleration = {}\nuntil = {}\n",
+            self.kind,
+            self.radius,
+            self.inertia,
+            self.pulley_drag,
+            list(&self.stiffness),
+            list(&vec![self.damping; self.stiffness.len()]),
+            self.every,
+            self.limit,
+            self.gain,
+            points.join(", "),
+            self.speed,
+            self.acceleration,
+            self.until,
+        )
+    }
+
+    /// Arms of the spans: left, right, bridge, cart.
+    fn arms(&self) -> Vec<[f64; 4]> {
+        let r = self.radius;
+        match self.kind {
+            "h-frame" => vec![[r, 0.0, 1.0, 1.0], [0.0, -r, 1.0, -1.0], [-r, r, -2.0, 0.0]],
+            _ => vec![[r, 0.0, -1.0, -1.0], [-r, 0.0, 1.0, 1.0], [0.0, r, -1.0, 1.0], [0.0, -r, 1.0, -1.0]],
+        }
+    }
+
+    /// r φ of both pulleys with the belt without strain.
+    fn drives(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        if self.kind == "h-frame" { [-x - y, x - y] } else { [x + y, x - y] }
+    }
+
+    /// Where the reference is: trapezoids of speed from point to point.
+    fn reference(&self, time: f64) -> [f64; 2] {
+        let (mut from, mut left) = ([0.0, 0.0], time);
+        for to in &self.points {
+            let length = (to[0] - from[0]).hypot(to[1] - from[1]);
+            let (v, a) = (self.speed.min((length * self.acceleration).sqrt()), self.acceleration);
+            let (ramp, whole) = (v / a, length / v + v / a);
+            if left < whole {
+                let way = match left {
+                    t if t < ramp => 0.5 * a * t * t,
+                    t if t > whole - ramp => length - 0.5 * a * (whole - t).powi(2),
+                    t => v * (t - 0.5 * ramp),
+                };
+                return [0, 1].map(|k| from[k] + (to[k] - from[k]) * way / length);
+            }
+            (from, left) = (*to, left - whole);
+        }
+        from
+    }
+
+    fn rates(&self, z: &[f64; 8], volts: [f64; 2]) -> [f64; 8] {
+        let ([k, resistance], [bridge, cart]) = (self.motor, self.masses);
+        let mut forces = [0.0; 4];
+        for (arms, stiffness) in self.arms().iter().zip(&self.stiffness) {
+            let sum = |of: &[f64]| arms.iter().zip(of).map(|(arm, way)| arm * way).sum::<f64>();
+            let pull = stiffness * sum(&z[..4]) + self.damping * sum(&z[4..]);
+            forces.iter_mut().zip(arms).for_each(|(force, arm)| *force -= arm * pull);
+        }
+        for motor in 0..2 {
+            forces[motor] += k * (volts[motor] - k * z[4 + motor]) / resistance - self.pulley_drag * z[4 + motor];
+            forces[2 + motor] -= self.drags[motor] * z[6 + motor];
+        }
+        let inertias = [self.inertia, self.inertia, bridge + cart, cart];
+        std::array::from_fn(|n| if n < 4 { z[4 + n] } else { forces[n - 4] / inertias[n - 4] })
+    }
+
+    /// When each leg begins.
+    fn begins(&self) -> Vec<f64> {
+        let mut from = [0.0, 0.0];
+        let ends = self.points.iter().scan(0.0, |time, to| {
+            let length = (to[0] - from[0]).hypot(to[1] - from[1]);
+            let v = self.speed.min((length * self.acceleration).sqrt());
+            (from, *time) = (*to, *time + length / v + v / self.acceleration);
+            Some(*time)
+        });
+        std::iter::once(0.0).chain(ends).collect()
+    }
+
+    /// Distance from the path, whichever leg is nearest of those that have begun and the next.
+    fn off(&self, begun: usize, point: [f64; 2]) -> f64 {
+        let starts = std::iter::once([0.0, 0.0]).chain(self.points.iter().copied());
+        let legs = starts.zip(&self.points).take(begun + 1);
+        let of_leg = |(from, to): ([f64; 2], &[f64; 2])| {
+            let along = [to[0] - from[0], to[1] - from[1]];
+            let square = along[0].powi(2) + along[1].powi(2);
+            let share = (((point[0] - from[0]) * along[0] + (point[1] - from[1]) * along[1]) / square).clamp(0.0, 1.0);
+            (point[0] - from[0] - share * along[0]).hypot(point[1] - from[1] - share * along[1])
+        };
+        legs.map(of_leg).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Runge and Kutta's method with this many steps a sample: the end of bridge and cart, and peak and root mean square
+    /// of the distance from the path.
+    fn integrated(&self, steps: usize) -> ([f64; 2], [f64; 2]) {
+        let (mut z, h) = ([0.0; 8], self.every / steps as f64);
+        let samples = (self.until / self.every).round() as usize;
+        let (mut peak, mut square) = (0.0_f64, 0.0);
+        let begins = self.begins();
+        for sample in 0..samples {
+            let wanted = self.drives(self.reference(sample as f64 * self.every));
+            let volts = [0, 1]
+                .map(|motor| (self.gain * (wanted[motor] - self.radius * z[motor])).clamp(-self.limit, self.limit));
+            for part in 0..steps {
+                let time = self.every * (sample as f64 + (part + 1) as f64 / steps as f64);
+                let step = |by: f64, rate: &[f64; 8]| std::array::from_fn(|n| z[n] + by * rate[n]);
+                let a = self.rates(&z, volts);
+                let b = self.rates(&step(0.5 * h, &a), volts);
+                let c = self.rates(&step(0.5 * h, &b), volts);
+                let d = self.rates(&step(h, &c), volts);
+                z = std::array::from_fn(|n| z[n] + h / 6.0 * (a[n] + 2.0 * b[n] + 2.0 * c[n] + d[n]));
+                let begun = begins.iter().take_while(|begin| **begin <= time).count();
+                let off = self.off(begun, [z[2], z[3]]);
+                (peak, square) = (peak.max(off), square + h * off * off);
+            }
+        }
+        ([z[2], z[3]], [peak, (square / self.until).sqrt()])
+    }
+}
+
+/// A move of a case with a row every `every`, and these rows.
+fn moved(case: &Case, motion: &Move, every: f64) -> (MoveRun, Trajectory) {
+    let design = case.controller.as_ref().unwrap();
+    let mut controllers = Standard::of_drives(design, &case.machine).unwrap();
+    let rows = Rows { until: motion.until, every, window: motion.window };
+    let (references, solver) = (motion.references(design), Solver::of(&case.machine));
+    let mut trajectory = Trajectory::default();
+    let sink = &mut |block: &Trajectory| {
+        trajectory.append(block);
+        Flow::Continue
+    };
+    let controllers = &mut each(&mut controllers);
+    let run = stream(&case.machine, controllers, &Loop::of(design), &references, &rows, solver, false, sink).unwrap();
+    (run, trajectory)
+}
+
+#[test]
+fn closed_loops_agree_with_an_integration_that_shares_no_code() {
+    let mut draw = Draw::new(7);
+    let mut limited = 0;
+    for number in 0..12 {
+        let plain = Plain::drawn(&mut draw, ["h-frame", "core-xy"][number % 2]);
+        let case = Case::from_text("plain.toml", &plain.text()).unwrap();
+        let (run, _) = moved(&case, &case.moves[0], 1e-2);
+        assert_eq!(run.outcome.ending, Ending::Complete);
+        let (ends, [peak, rms]) = plain.integrated(400);
+        for (load, end) in run.metrics.loads.iter().zip(ends) {
+            let off = load.position - end;
+            assert!(off.abs() < 1e-9, "{number} {}: {off:e} m", plain.kind);
+        }
+        let contour = run.figures.contour.unwrap();
+        // About corners the root mean square is summed over places.
+        let off = [contour.peak.value.abs() - peak, contour.rms - rms];
+        let fits = off[0].abs() < 1e-8 && off[1].abs() < 1e-8 + 1e-4 * rms;
+        assert!(fits, "{number} {}: {off:?} m of {peak} m and {rms} m", plain.kind);
+        limited += usize::from(run.samples.1 > 0);
+    }
+    assert!((2..=10).contains(&limited), "{limited} of 12 meet their limit");
+}
+
+/// A CoreXY with dry friction, encoders and limits, with these lines more.
+fn rig(changes: &[&str]) -> Case {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("stages/core-xy/square.toml");
+    Case::read_with(path, changes).unwrap()
+}
+
+#[test]
+fn figures_are_those_of_the_rows() {
+    for changes in [&[][..], &["amplifier.voltage_limit=4 V"], &["controller.limit=3 V", "motor.inductance=0.5 mH"]] {
+        let case = rig(changes);
+        for motion in &case.moves {
+            let h = 5e-5;
+            let (run, rows) = moved(&case, motion, h);
+            let column = |name: &str| rows.get(name).unwrap_or_else(|| panic!("no {name}"));
+            let most = |name: &str| column(name).iter().fold(0.0_f64, |most, value| most.max(value.abs()));
+            let rms = |name: &str| {
+                let square: f64 =
+                    column(name).windows(2).map(|pair| 0.5 * h * (pair[0].powi(2) + pair[1].powi(2))).sum();
+                (square / motion.until).sqrt()
+            };
+            let figures = &run.figures;
+            let contour = figures.contour.unwrap();
+            let mut compared = vec![("contour_error", contour.peak.value, contour.rms, 2e-7)];
+            for (name, load) in ["bridge_error", "cart_error"].into_iter().zip(&figures.loads) {
+                compared.push((name, load.error.peak.value, load.error.rms, 1e-8));
+                assert!((column(name).last().unwrap() - load.error.last).abs() < 1e-12);
+            }
+            for (side, drive) in ["left", "right"].into_iter().zip(&figures.drives) {
+                let [voltage, current] = ["voltage", "current"].map(|what| format!("{side}_{what}"));
+                for (name, (peak, mean)) in [(voltage, drive.voltage), (current, drive.current)] {
+                    // A voltage jumps at samples, between two rows at the most.
+                    assert!((peak.value.abs() - most(&name)).abs() < 2e-3 * most(&name), "{name} {changes:?}");
+                    assert!((mean - rms(&name)).abs() < 2e-2 * mean, "{name} {changes:?}: {mean} {}", rms(&name));
+                }
+            }
+            for (name, peak, mean, slack) in compared {
+                assert!((peak.abs() - most(name)).abs() < slack, "{name} {changes:?}: {peak} {}", most(name));
+                assert!((mean - rms(name)).abs() < 1e-4 * mean + 1e-9, "{name} {changes:?}: {mean} {}", rms(name));
+            }
+            // They do not depend on the rows.
+            let (other, _) = moved(&case, motion, 0.37e-3);
+            let pairs = other.figures.loads.iter().zip(&figures.loads).map(|(a, b)| (a.error, b.error, 1e-9));
+            for (a, b, slack) in pairs.chain([(other.figures.contour.unwrap(), contour, 1e-4)]) {
+                assert!((a.peak.value - b.peak.value).abs() < 1e-9, "{changes:?}: {a:?} {b:?}");
+                assert!((a.rms - b.rms).abs() < 1e-9 + slack * b.rms, "{changes:?}: {a:?} {b:?}");
+                assert!((a.last - b.last).abs() < 1e-9, "{changes:?}: {a:?} {b:?}");
+            }
+        }
+    }
+}
+
+/// With motors and belts alike, a move along the bridge leaves the cart where it is, and both drives do the same.
+#[test]
+fn alike_sides_do_alike() {
+    let alike = [
+        "belt.stiffness=[1e5, 1e5, 1e5, 1e5]",
+        "move=[{ name = \"out\", to = [\"60 mm\", 0], speed = 0.3, \
+                 acceleration = 5, until = 0.6 }, { name = \"across\", to = [0, \"60 mm\"], speed = 0.3, acceleration = 5, \
+                 until = 0.6 }]",
+    ];
+    let case = rig(&alike);
+    let [out, across] = [0, 1].map(|place| moved(&case, &case.moves[place], 1e-3).0);
+    for (run, still, sign) in [(&out, 1, 1.0), (&across, 0, -1.0)] {
+        assert!(run.figures.loads[still].error.peak.value.abs() < 1e-12);
+        let [left, right] = [0, 1].map(|drive| run.figures.drives[drive]);
+        assert!((left.following.peak.value - sign * right.following.peak.value).abs() < 1e-12);
+        assert!((left.voltage.1 - right.voltage.1).abs() < 1e-9);
+        // Along one coordinate the distance from the path is what the other is off, and what it is off its ends.
+        assert!(run.figures.contour.unwrap().peak.value.abs() <= run.figures.loads[1 - still].overshoot + 1e-12);
+    }
+}
+
+#[test]
+fn a_path_shaped_is_the_path_of_its_coordinates() {
+    let case = rig(&["controller.shaper=[[0, 0.5], [10e-3, 0.5]]"]);
+    let design = case.controller.as_ref().unwrap();
+    let motion = &case.moves[0];
+    let references = motion.references(design);
+    for t in (0..2000).map(|k| 1e-3 * f64::from(k)) {
+        for (shaped, plain) in references.iter().zip(&motion.profiles) {
+            let mean = 0.5 * (plain.at(t).position + plain.at(t - 10e-3).position);
+            assert!((shaped.at(t).position - mean).abs() < 1e-15);
+        }
+    }
+    // Corners are cut by what a shaper does to them.
+    let plain = moved(&rig(&[]), motion, 1e-3).0.figures.contour.unwrap();
+    assert!(moved(&case, motion, 1e-3).0.figures.contour.unwrap().rms != plain.rms);
+}
