@@ -61,6 +61,11 @@ fn plain() -> Value {
     json!({ "type": ["number", "string"] })
 }
 
+/// The number of this name, or a list: of the spans of a belt, or the coordinates of a gantry.
+fn each(key: &str) -> Value {
+    any(vec![parameter::named(key).map_or_else(plain, number), list(plain())])
+}
+
 fn words<'a>(words: impl IntoIterator<Item = &'a str>) -> Value {
     json!({ "enum": words.into_iter().collect::<Vec<_>>() })
 }
@@ -173,7 +178,6 @@ fn friction(section: &str) -> Value {
 
 fn belt() -> Value {
     let row = |key: &str| parameter::named(key).map_or_else(plain, number);
-    let each = |key: &str| any(vec![row(key), list(plain())]);
     table(
         "belt",
         &[
@@ -297,10 +301,17 @@ fn controller() -> Value {
 }
 
 fn motion() -> Value {
-    let point = any(vec![plain(), table("move.points", &[])]);
+    let at = table("move.points", &[("to", each("move.points.to"))]);
+    let point = any(vec![plain(), list(plain()), at]);
     table(
         "move",
-        &[("name", json!({ "type": "string" })), ("gcode", json!({ "type": "string" })), ("points", list(point))],
+        &[
+            ("name", json!({ "type": "string" })),
+            ("from", each("move.from")),
+            ("to", each("move.to")),
+            ("gcode", json!({ "type": "string" })),
+            ("points", list(point)),
+        ],
     )
 }
 

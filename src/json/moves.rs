@@ -83,8 +83,11 @@ pub fn motion(done: &Moved) -> Value {
         });
         (name.to_string(), told)
     });
-    let drives =
-        geometry.drives.iter().zip(&figures.drives).map(|(at, drive)| (at.label.key.to_string(), of_drive(drive)));
+    let drives = geometry
+        .drives
+        .iter()
+        .zip(&figures.drives)
+        .map(|(at, drive)| (geometry.label(at.pulley).key.to_string(), of_drive(drive)));
     let mut value = json!({
         "name": done.motion.name,
         "files": done.files,

@@ -2,7 +2,7 @@
 //! [`FIGURES`](crate::metrics::FIGURES).
 
 use crate::control::MoveRun;
-use crate::machine::Kind;
+use crate::machine::{DriveAt, Kind};
 use crate::mechanism::Label;
 use crate::metrics;
 
@@ -103,7 +103,8 @@ const OF_MOVE: &[Row] = &[
 pub fn of_move(kind: Kind) -> Vec<Measure> {
     let geometry = kind.geometry();
     let loads: Vec<Label> = geometry.slides.iter().map(|slide| geometry.label(slide.body)).collect();
-    let drives: Vec<Label> = geometry.drives.iter().map(|drive| drive.label).collect();
+    let side = |drive: &DriveAt| Label { key: geometry.label(drive.pulley).key, name: drive.label.name };
+    let drives: Vec<Label> = geometry.drives.iter().map(side).collect();
     let of_row = |row: &'static Row| -> Vec<Measure> {
         let &Row { names, unit, words, per, of } = row;
         let one = |part: usize, label: Label, place: usize| Measure {

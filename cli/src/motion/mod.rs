@@ -141,9 +141,10 @@ fn one<'a>(
 fn write_samples(folder: &Folder, name: &str, case: &Case, run: &MoveRun) -> Result<String> {
     let unit = case.machine.drives[0].amplifier.mode.unit();
     // One drive is not named.
-    let drives: Vec<String> = match case.machine.geometry().drives {
+    let geometry = case.machine.geometry();
+    let drives: Vec<String> = match geometry.drives {
         [_] => vec![String::new()],
-        several => several.iter().map(|drive| format!("{},", drive.label.key)).collect(),
+        several => several.iter().map(|drive| format!("{},", geometry.label(drive.pulley).key)).collect(),
     };
     let name_of_drive = if drives.len() > 1 { "drive," } else { "" };
     let mut text = format!("time_s,{name_of_drive}reference_m,measured_m,asked_{unit},given_{unit}\n");

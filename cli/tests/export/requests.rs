@@ -23,7 +23,7 @@ fn without_a_name_it_lists_what_there_is() {
 fn wrong_requests_are_refused_with_what_can_be_done_instead() {
     let (table4, pid) =
         (file("stages/sollmann-jouaneh/table4.toml"), file("stages/sollmann-jouaneh/controllers/pid.toml"));
-    let core = file("stages/core-xy/core-xy.toml");
+    let (core, square) = (file("stages/core-xy/core-xy.toml"), file("stages/core-xy/square.toml"));
     let curved =
         ["--set", "cart.friction={ coulomb = \"0.2 N\", stribeck = { force = \"0.1 N\", velocity = \"0.02 m/s\" } }"];
     let mut words = vec!["export", "c", &table4];
@@ -35,10 +35,14 @@ fn wrong_requests_are_refused_with_what_can_be_done_instead() {
     words[2] = &pid;
     let (_, _, error) = told(&words);
     assert!(error.contains("taut export fmu") && error.contains("--part controller"), "{error}");
-    let cases: [(&[&str], &[&str]); 8] = [
+    let cases: [(&[&str], &[&str]); 9] = [
         (&["export", "c", &table4, "--part", "controller"], &["no controller", "[controller]", "leave --part out"]),
         (&["export", "st", &table4], &["no controller", "[controller]", "export fmu"]),
-        (&["export", "c", &core, "--part", "both"], &["a gantry has no controller", "leave --part out"]),
+        (&["export", "c", &core, "--part", "both"], &["this case has no controller", "leave --part out"]),
+        (
+            &["export", "c", &square, "--part", "both"],
+            &["the controller of a gantry is not exported", "leave --part out"],
+        ),
         (&["export", "st", &pid, "--part", "plant"], &["only a controller", "export fmu"]),
         (&["export", "st", &pid, "--real", "float"], &["--real means nothing to st", "with c"]),
         (&["export", "c", &table4, "--fmi", "2"], &["--fmi means nothing to c", "with fmu"]),

@@ -723,9 +723,9 @@ const SWEEP: &[Parameter] = &[
 
 #[rustfmt::skip]
 const MOVE: &[Parameter] = &[
-    row("move.from", "", "m", Value(0.0), ANY, "0 mm", "Where the cart stands at time zero."),
-    row("move.to", "", "m", Words("`points` or `gcode` instead"), ANY, "50 mm", "Where it goes."),
-    row("move.speed", "", "m/s", Words("`plan` instead"), POSITIVE, "0.4 m/s", "Largest speed."),
+    row("move.from", "", "m", Value(0.0), ANY, "0 mm", "Where the cart stands at time zero; of a gantry a list: bridge, cart."),
+    row("move.to", "", "m", Words("`points` or `gcode` instead"), ANY, "50 mm", "Where it goes; of a gantry a list: bridge, cart."),
+    row("move.speed", "", "m/s", Words("`plan` instead"), POSITIVE, "0.4 m/s", "Largest speed, along the path of a gantry."),
     row("move.acceleration", "", "m/s^2", Words("`plan` instead"), POSITIVE, "5 m/s^2", "Largest acceleration."),
     row("move.jerk", "", "m/s^3", Words("none: a trapezoid"), POSITIVE, "200 m/s^3", "Largest jerk."),
     row("move.snap", "", "m/s^4", Words("none: third order"), POSITIVE, "20000 m/s^4", "Largest snap; only with `jerk`."),

@@ -201,10 +201,11 @@ pub fn path(done: &Done) -> Option<Plane> {
     let millimetres = |name: &str| Axis::new(name, "m").shown_as("mm", 1e3);
     Some(
         Plane::new(format!("{}: path", done.motion.name), millimetres("Cart y"), millimetres("Bridge x"))
-            .path(Series::new("asked for", asked.1, asked.0).colour(Colour::Green).style(Style::Dashed))
+            .path(Series::new("asked for", asked.1, asked.0).colour(Colour::Vermillion))
             .path(Series::new("gone", y, x).colour(Colour::Blue))
             .caption(format!(
-                "The path that is asked for, and that of the cart: its difference from where it should be at that moment is                  drawn {times} times as large."
+                "The path that is asked for, in red, and that of the cart, in blue: its difference from where it should be \
+                 at that moment is drawn {times} times as large. Seen as the drawing is: x upward, y to the right."
             )),
     )
 }

@@ -127,7 +127,8 @@ pub fn lines(tried: &Tried, done: &Done) -> Vec<(&'static str, String)> {
     }
     if let Some(worst) = &done.worst {
         let words = format!(
-            "cart error at most {} ({}), {} at the end; {} of {} settle",
+            "{} at most {} ({}), {} at the end; {} of {} settle",
+            if figures.loads.len() == 1 { "cart error" } else { "error" },
             length(worst.error),
             worst.axis,
             length(worst.last),

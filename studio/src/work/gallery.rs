@@ -23,8 +23,10 @@ const STAGES: &[(&str, &str)] = stages![
     "sollmann-jouaneh/controllers/pid.toml",
     "h-frame/h-frame.toml",
     "h-frame/follows.toml",
+    "h-frame/square.toml",
     "core-xy/core-xy.toml",
     "core-xy/follows.toml",
+    "core-xy/square.toml",
 ];
 
 /// All of them: path, title, text, and what their pictures need.
