@@ -326,3 +326,44 @@ fn a_path_shaped_is_the_path_of_its_coordinates() {
     let plain = moved(&rig(&[]), motion, 1e-3).0.figures.contour.unwrap();
     assert!(moved(&case, motion, 1e-3).0.figures.contour.unwrap().rms != plain.rms);
 }
+
+/// Feed-forward alone, on belts that hardly stretch: what moves follows by the model's own inertia and friction.
+#[test]
+fn feed_forward_alone_keeps_bridge_and_cart_on_their_path() {
+    for kind in ["h-frame", "core-xy"] {
+        let spans = if kind == "h-frame" { "[1e8, 1e8, 1e8]" } else { "[1e8, 1e8, 1e8, 1e8]" };
+        let damping = spans.replace("1e8", "2000");
+        let changes = [
+            format!("belt.stiffness={spans}"),
+            format!("belt.damping={damping}"),
+            "controller.every=20 us".into(),
+            "controller.pid={ proportional = \"1e-6 V/mm\" }".into(),
+            "controller.feed_forward={ model = \"rigid\" }".into(),
+            "move=[{ name = \"there\", points = [[\"60 mm\", \"20 mm\"], [\"60 mm\", \"-30 mm\"]], speed = 0.3, \
+             acceleration = 5, jerk = 200, until = 0.8 }]"
+                .into(),
+        ];
+        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("stages").join(kind).join("square.toml");
+        let changes: Vec<&str> = changes.iter().map(String::as_str).collect();
+        let mut case = Case::read_with(path, &changes).unwrap();
+        case.machine.encoder = None;
+        let (run, _) = moved(&case, &case.moves[0], 1e-3);
+        for load in &run.figures.loads {
+            // A model that lacked a part of what moves or rubs would be off by centimetres.
+            assert!(load.error.peak.value.abs() < 5e-4, "{kind}: {:?}", run.figures.loads);
+        }
+    }
+}
+
+#[test]
+fn feed_forward_makes_contour_errors_less() {
+    for kind in ["h-frame", "core-xy"] {
+        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("stages").join(kind).join("square.toml");
+        let contour = |changes: &[&str]| {
+            let case = Case::read_with(&path, changes).unwrap();
+            moved(&case, &case.moves[0], 1e-3).0.figures.contour.unwrap().rms
+        };
+        let (without, with) = (contour(&[]), contour(&["controller.feed_forward={ model = \"rigid\" }"]));
+        assert!(with < 0.5 * without, "{kind}: {with} m with it, {without} m without");
+    }
+}

@@ -7,14 +7,14 @@ use crate::interrupt::Interrupt;
 use crate::value;
 use pyo3::exceptions::PyRecursionError;
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyList};
+use pyo3::types::{PyDict, PyList, PyTuple};
 use serde_json::Value;
 use std::cell::Cell;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 use taut::case::{Case, Experiment};
-use taut::control::{Loop, MoveRun, Rows, Standard, Worst, each, stream, worst};
+use taut::control::{Controller, Loop, MoveRun, Rows, Standard, Worst, each, stream, worst};
 use taut::files::Inputs;
 use taut::json::{self, Moved, Simulated, Simulation};
 use taut::metrics::{Meter, Metrics};
@@ -239,6 +239,11 @@ fn one(py: Python<'_>, case: &Arc<Case>, experiment: &Experiment, solver: Solver
 /// The timing of a loop with a controller in Python, where it is not the case's.
 pub type Timing = (Option<f64>, Option<f64>, Option<f64>);
 
+/// Whether it is a list of controllers, one for each drive.
+fn is_several(object: &Bound<'_, PyAny>) -> bool {
+    object.is_instance_of::<PyList>() || object.is_instance_of::<PyTuple>()
+}
+
 /// Runs moves of a case that lies there in closed loop, with its own controller or one in Python.
 pub fn motion(
     py: Python<'_>,
@@ -261,7 +266,8 @@ pub fn motion(
     let structure = match controller {
         None => design.structure.name().to_string(),
         Some(object) => {
-            let name = object.getattr("__name__").or_else(|_| object.get_type().getattr("__name__"))?;
+            let first = if is_several(object) { object.get_item(0)? } else { object.clone() };
+            let name = first.getattr("__name__").or_else(|_| first.get_type().getattr("__name__"))?;
             name.str()?.to_string_lossy().into_owned()
         }
     };
@@ -283,8 +289,10 @@ pub fn motion(
         let begin = Instant::now();
         let run = match controller {
             Some(object) => {
-                let mut own = Own::new(object, &interrupt)?;
-                guarded(|| stream(machine, &mut [&mut own], &timing, &profiles, &rows, solver, false, &mut take))
+                let objects = if is_several(object) { object.extract()? } else { vec![object.clone()] };
+                let mut own = objects.iter().map(|one| Own::new(one, &interrupt)).collect::<PyResult<Vec<_>>>()?;
+                let controllers = &mut own.iter_mut().map(|one| one as &mut dyn Controller).collect::<Vec<_>>();
+                guarded(|| stream(machine, controllers, &timing, &profiles, &rows, solver, false, &mut take))
             }
             None => unlocked(py, || {
                 let mut controllers = Standard::of_drives(design, machine)?;

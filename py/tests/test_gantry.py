@@ -105,9 +105,50 @@ def test_a_row_of_a_sweep_is_the_run_of_its_machine(gantry):
         gantry.sweep(4, vary={"idler_pulley.inertia": "20 %"})
 
 
+def test_moves_in_the_plane(root):
+    case = taut.read(root / "stages/core-xy/square.toml")
+    assert case.moves == ["square", "part"]
+    run = case.move("square")
+    figures = run.metrics
+    errors = [figures["loads"][part]["error"]["peak_m"] for part in ("bridge", "cart")]
+    for part, peak in zip(("bridge", "cart"), errors):
+        assert run[f"{part}_error"] == pytest.approx(run[f"{part}_position"] - run[f"{part}_reference"])
+        assert 0 <= abs(peak) - np.abs(run[f"{part}_error"]).max() < 2e-6
+    assert abs(figures["contour_error"]["peak_m"]) == pytest.approx(np.abs(run["contour_error"]).max(), abs=2e-6)
+    assert set(figures["drives"]) == {"left", "right"} and "cart_error" not in figures
+    # Along a leg without a stop the distance from the path is the other coordinate's error.
+    first = run["time"] < 0.15
+    assert run["contour_error"][first] == pytest.approx(run["cart_error"][first], abs=1e-15)
+    assert case.move("square", spread=0.1).metrics["spread"]["axes"] == 20
+
+
+def test_each_drive_of_a_gantry_has_a_controller_of_its_own(root):
+    case = taut.read(root / "stages/core-xy/square.toml")
+    seen = {"left": [], "right": []}
+
+    def of(side):
+        def proportional(position, reference):
+            seen[side].append(reference)
+            return 2000.0 * (reference - position)
+
+        return proportional
+
+    run = case.move("square", controller=[of("left"), of("right")], every=1e-3)
+    assert len(seen["left"]) == len(seen["right"]) == 1501
+    x, y = run["bridge_reference"], run["cart_reference"]
+    assert seen["left"] == pytest.approx(x + y) and seen["right"] == pytest.approx(x - y)
+    with pytest.raises(taut.Error, match="1 controllers and 2 profiles(.|\n)*2 controllers, one for each drive"):
+        case.move("square", controller=of("left"))
+    for key, part in (("feed_forward", {"model": "rigid"}), ("disturbance_observer", {"bandwidth": 20})):
+        with pytest.raises(taut.Error, match=f"`{key}` needs a single axis"):
+            case[f"controller.{key}"] = part
+    with pytest.raises(taut.Error, match="2 positions: bridge, cart"):
+        case["move.0.points"] = [["40 mm"]]
+
+
 def test_what_is_not_there_says_so(gantry):
     assert repr(gantry) == "<taut.Case 'H-frame': one motor, along x, along y>"
-    for refused in (gantry.check, gantry.fit, gantry.move):
+    for refused in (gantry.check, gantry.fit, gantry.shape):
         with pytest.raises(taut.Error, match="this needs a single axis") as told:
             refused()
         assert told.value.line == 4

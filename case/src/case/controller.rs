@@ -47,7 +47,9 @@ pub(super) fn controller(root: &Table, machine: &Machine) -> Result<Option<Desig
         let field = table.optional(part).unwrap_or_else(|| table.field.clone());
         return Err(field
             .fail(format!("`{part}` needs a single axis, and the case describes a gantry ({})", machine.kind.name()))
-            .next("leave it out: pid, cascade and fuzzy run on each drive of a gantry"));
+            .next(
+                "leave it out: a gantry takes pid, cascade or fuzzy, with feed_forward = { model = \"rigid\" } at most",
+            ));
     }
     Ok(Some(design))
 }

@@ -15,6 +15,7 @@ pub mod damping;
 pub mod drives;
 pub mod feedback;
 pub mod filter;
+mod forward;
 pub mod fuzzy;
 mod insensitive;
 mod kind;

@@ -663,7 +663,7 @@ impl Observe for Gauge<'_> {
 }
 
 /// Most coordinates of a machine.
-const SLIDES: usize = 2;
+pub(super) const SLIDES: usize = 2;
 
 /// Least share of a curve that a piece of the reference is looked at.
 const SHORTEST: f64 = 1e-9;

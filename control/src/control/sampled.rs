@@ -53,7 +53,13 @@ pub trait Controller {
     /// The command that follows from what is seen, V or A.
     fn step(&mut self, seen: &Observation) -> f64;
 
-    /// Is told what the limit left of the command just asked for.
+    /// The command that is fed forward beside that, V or A, from the references of all that slides when it acts: of a
+    /// machine with several drives, whose references belong together.
+    fn forward(&self, _slides: &[Reference]) -> f64 {
+        0.0
+    }
+
+    /// Is told what the limit left of the command just asked for, beside what was fed forward.
     fn limited(&mut self, _given: f64) {}
 
     /// Forgets all it has seen.

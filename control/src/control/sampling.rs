@@ -1,5 +1,6 @@
 //! Controllers around a run: samples, commands and delays, decision by decision.
 
+use super::outcome::SLIDES;
 use super::rest::Rest;
 use super::sampled::{Added, Controller, Loop, Sample};
 use super::stepped::{Clocked, Commands, Decision, References};
@@ -139,17 +140,26 @@ impl Sampled<'_, '_> {
         references
     }
 
+    /// References of all that slides at `time`, s; of an axis that of its controller is all there is.
+    fn slides(&self, time: f64) -> [Reference; SLIDES] {
+        let mut slides = [Reference::default(); SLIDES];
+        if self.profiles.len() > 1 {
+            slides.iter_mut().zip(self.profiles).for_each(|(slide, profile)| *slide = profile.at(time));
+        }
+        slides
+    }
+
     /// The inputs from now on and until when they are held, s, told the state and the motors' currents, A, just before.
     fn decide(&mut self, state: &State, currents: &Commands) -> (Commands, f64) {
         let every = self.clocked.timing.every;
         let (time, before) = (self.clocked.next(), self.clocked.acting());
         // A command that was delayed needs no reference.
-        let references = match self.clocked.is_at_sample() {
-            false => References::default(),
-            true => self.references(time),
+        let (references, slides) = match self.clocked.is_at_sample() {
+            false => Default::default(),
+            true => (self.references(time), self.slides(time + self.clocked.timing.lead)),
         };
         let drives = self.controllers.len();
-        if let Some(decisions) = self.clocked.decide(self.controllers, (state, currents), &references) {
+        if let Some(decisions) = self.clocked.decide(self.controllers, (state, currents), (&references, &slides)) {
             self.samples += 1;
             let mut is_limited = false;
             for (drive, Decision { seen, asked, given }) in decisions.into_iter().take(drives).enumerate() {

@@ -1,12 +1,13 @@
 //! A controller from its design: structure, feed-forward, observer and filters put together.
 
 use super::filter::Biquad;
+use super::forward::Forward;
 use super::law::{Law, Seen};
 use super::laws::AnyLaw;
 use super::observer::DisturbanceObserver;
 use super::sampled::{Controller, Observation};
 use crate::calculator::{Calculator, Run, Slot, Slots, less, more};
-use crate::design::{Design, Structure};
+use crate::design::{Design, FeedForward, Structure};
 use crate::error::{Error, Result};
 use crate::machine::rigid::Rigid;
 use crate::machine::{AmplifierMode, Machine};
@@ -18,6 +19,7 @@ use crate::signal::profile::Reference;
 pub struct Standard {
     text: Text,
     memory: Vec<f64>,
+    forward: Option<Forward>,
 }
 
 /// One sample of such a controller, for any calculator.
@@ -42,7 +44,9 @@ impl Text {
     pub fn new(design: &Design, model: &Machine) -> Result<Self> {
         check(design, model)?;
         let every = design.every;
-        let compensation = Compensation::new(model, &design.feed_forward);
+        // Several drives are fed forward together: `Forward`.
+        let own = if model.drives.len() == 1 { design.feed_forward } else { FeedForward::NONE };
+        let compensation = Compensation::new(model, &own);
         let rigid = compensation.rigid;
         let slots = &mut Slots::default();
         let law = AnyLaw::new(slots, design, model)?;
@@ -148,12 +152,13 @@ impl Standard {
     /// The controller of `design` for a `model` of the axis.
     pub fn new(design: &Design, model: &Machine) -> Result<Self> {
         let text = Text::new(design, model)?;
-        Ok(Self { memory: vec![0.0; text.slots.count()], text })
+        Ok(Self { memory: vec![0.0; text.slots.count()], text, forward: None })
     }
 
     /// The same for each drive of a machine.
     pub fn of_drives(design: &Design, model: &Machine) -> Result<Vec<Self>> {
-        model.drives.iter().map(|_| Self::new(design, model)).collect()
+        let of_drive = |drive| Ok(Self { forward: Forward::of(design, model, drive), ..Self::new(design, model)? });
+        (0..model.drives.len()).map(of_drive).collect()
     }
 
     /// Memory from sample to sample.
@@ -169,6 +174,10 @@ impl Standard {
 impl Controller for Standard {
     fn step(&mut self, seen: &Observation) -> f64 {
         self.text.step(&mut Run::on(&mut self.memory), seen)
+    }
+
+    fn forward(&self, slides: &[Reference]) -> f64 {
+        self.forward.as_ref().map_or(0.0, |forward| forward.command(slides))
     }
 
     fn limited(&mut self, given: f64) {
@@ -194,7 +203,7 @@ fn check(design: &Design, model: &Machine) -> Result<()> {
     let Design { every, delay, limit, .. } = *design;
     if let Some(part) = design.needs_axis().filter(|_| model.drives.len() > 1) {
         return Err(Error::new(format!("`{part}` needs a single axis, and this machine has several drives"))
-            .next("leave it out: pid, cascade and fuzzy run on each drive of such a machine"));
+            .next("leave it out: such a machine takes pid, cascade or fuzzy, with rigid feed-forward at most"));
     }
     if !((1e-9..=1e9).contains(&every) && (0.0..=1000.0 * every).contains(&delay)) {
         return Err(Error::new(format!("a controller cannot be sampled every {every} s with a delay of {delay} s"))

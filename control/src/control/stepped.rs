@@ -85,13 +85,13 @@ impl Clocked {
         self.acting = self.waiting.pop_front().unwrap_or_default();
     }
 
-    /// Decides at [`Clocked::next`] for each drive; what was decided if that is a sample. A delayed command needs
+    /// Decides at [`Clocked::next`] for each drive, `slides` being the references of all that slides one lead later; what was decided if that is a sample. A delayed command needs
     /// nothing else.
     pub fn decide(
         &mut self,
         controllers: &mut [&mut dyn Controller],
         (state, currents): (&State, &Commands),
-        references: &References,
+        (references, slides): (&References, &[Reference]),
     ) -> Option<[Decision; DRIVES]> {
         if self.halfway {
             self.halfway = false;
@@ -110,11 +110,12 @@ impl Clocked {
                 scale: sensors.scale(state),
                 current: currents[drive],
             };
-            let asked = controller.step(&seen);
+            let forward = controller.forward(slides);
+            let asked = controller.step(&seen) + forward;
             // What is no number asks for nothing.
             let asked = if asked.is_finite() { asked } else { 0.0 };
             let given = self.timing.limit.map_or(asked, |limit| asked.clamp(-limit, limit));
-            controller.limited(given);
+            controller.limited(given - forward);
             decisions[drive] = Decision { seen, asked, given };
         }
         self.waiting.push_back(decisions.map(|decision| decision.given));
@@ -161,7 +162,7 @@ impl Stepped {
         let ahead = ahead.copied().unwrap_or_else(|| after(reference, self.clocked.timing.lead));
         let (mut currents, mut references) = (Commands::default(), References::default());
         (currents[0], references[0]) = (current, [*reference, ahead]);
-        self.clocked.decide(&mut [&mut self.controller], (state, &currents), &references);
+        self.clocked.decide(&mut [&mut self.controller], (state, &currents), (&references, &[ahead]));
         self.command()
     }
 }

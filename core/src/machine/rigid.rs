@@ -1,6 +1,6 @@
 //! An axis as one mass along its belt.
 
-use super::{AmplifierMode, Machine};
+use super::{AmplifierMode, DriveUnit, Machine};
 use crate::calculator::{Calculator, Run, at_least, less, more};
 
 /// Largest speed of a reference that counts as rest, m/s, and largest acceleration that counts as none, m/s²: what
@@ -34,10 +34,15 @@ pub struct Rigid {
 }
 
 impl Rigid {
-    /// That of `stage`.
+    /// That of an axis.
     pub fn of(machine: &Machine) -> Self {
-        let (r, motor) = (machine.pulley_radius, &machine.drives[0].motor);
-        let n = motor.gear_ratio;
+        Self::of_drive(machine, 0)
+    }
+
+    /// The same with the motor of this drive.
+    fn of_drive(machine: &Machine, drive: usize) -> Self {
+        let DriveUnit { motor, amplifier } = &machine.drives[drive];
+        let (r, n) = (machine.pulley_radius, motor.gear_ratio);
         let pulleys = machine.drive_pulley.inertia + n * n * motor.rotor_inertia + machine.idler_pulley.inertia;
         let [drive, cart, idler] =
             [machine.drive_pulley.friction, machine.cart.friction, machine.idler_pulley.friction];
@@ -56,9 +61,38 @@ impl Rigid {
             brake: n * motor.back_emf_constant / r,
             resistance: motor.resistance,
             inductance: motor.inductance,
-            gain: machine.drives[0].amplifier.gain,
-            mode: machine.drives[0].amplifier.mode,
+            gain: amplifier.gain,
+            mode: amplifier.mode,
         }
+    }
+
+    /// A drive of a machine with several, alone with its pulley and what turns with it: its motor, and as mass and friction
+    /// those of its pulley.
+    pub fn of_pulley(machine: &Machine, drive: usize) -> Self {
+        let (whole, r) = (Self::of_drive(machine, drive), machine.pulley_radius);
+        let sides = [true, false].map(|forward| machine.drive_pulley.friction.side(forward));
+        Self {
+            mass: whole.driving,
+            viscous: sides.map(|side| side.viscous / (r * r)),
+            coulomb: sides.map(|side| side.coulomb / r),
+            constant: 0.0,
+            ..whole
+        }
+    }
+
+    /// What slides as a mass of its own, with its friction and its constant force; a motor moves it by nothing.
+    pub fn of_slide(machine: &Machine, number: usize) -> Option<Self> {
+        let (slide, at) = machine.slides().zip(machine.geometry().slides).nth(number)?;
+        let sides = [true, false].map(|forward| slide.friction.side(forward));
+        let body = &machine.mechanism().bodies[at.body];
+        Some(Self {
+            mass: body.inertia,
+            driving: 0.0,
+            viscous: sides.map(|side| side.viscous),
+            coulomb: sides.map(|side| side.coulomb),
+            constant: body.force,
+            ..Self::of_drive(machine, 0)
+        })
     }
 
     /// Motor current, A, and voltage at its terminals, V, that push with `force` (N, changing at `rate`, N/s) at `speed`.

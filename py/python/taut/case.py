@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, overload
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, overload
 
 from . import _checks, _html, _native
 from ._logs import write_log
@@ -30,6 +30,10 @@ class Controller(Protocol):
     def step(self, seen: _native.Observation, /) -> float:
         """The command, V or A, that follows from what is seen; called once a sample."""
         ...
+
+
+OneController: TypeAlias = "Controller | Callable[[float, float], float]"
+"""A controller of one's own, or a function of the measured position and the reference, m."""
 
 
 class Case:
@@ -376,7 +380,7 @@ class Case:
         self,
         move: str,
         *,
-        controller: Controller | Callable[[float, float], float] | None = None,
+        controller: OneController | list[OneController] | tuple[OneController, ...] | None = None,
         every: float | None = None,
         delay: float | None = None,
         limit: float | None = None,
@@ -387,7 +391,7 @@ class Case:
         self,
         move: list[str] | tuple[str, ...] | None = None,
         *,
-        controller: Controller | Callable[[float, float], float] | None = None,
+        controller: OneController | list[OneController] | tuple[OneController, ...] | None = None,
         every: float | None = None,
         delay: float | None = None,
         limit: float | None = None,
@@ -397,7 +401,7 @@ class Case:
         self,
         move: str | list[str] | tuple[str, ...] | None = None,
         *,
-        controller: Controller | Callable[[float, float], float] | None = None,
+        controller: OneController | list[OneController] | tuple[OneController, ...] | None = None,
         every: float | None = None,
         delay: float | None = None,
         limit: float | None = None,
@@ -406,7 +410,8 @@ class Case:
         """Runs one move in closed loop by its name, several, or all; with the case's controller, or one of your own.
 
         ``controller`` is a function of the measured position and the reference (m), or an object with ``step(seen)``;
-        it returns the command (V or A) and is called once a sample. ``every`` (sample time, s), ``delay`` (from sample
+        it returns the command (V or A) and is called once a sample; of a gantry a list of them, one for each drive, each
+        of which is given its part of the belt. ``every`` (sample time, s), ``delay`` (from sample
         to command, s) and ``limit`` (of the command) are the case's unless said. What it raises comes out here.
         ``spread`` also tries the case's controller with each parameter off by this share.
         """
