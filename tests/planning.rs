@@ -123,7 +123,7 @@ fn limits_of_the_user_are_kept() {
     let text = plans.case_text(&case, Path::new("planned.toml")).unwrap();
     let written = Case::from_text("planned.toml", &text).unwrap();
     for planned in plans.moves.iter().filter(|planned| !planned.is_kept) {
-        let [read, meant] = [&written.moves[planned.place].profile(), &planned.profile];
+        let [read, meant] = [written.moves[planned.place].profile(), &planned.profile];
         assert!((read.end() - meant.end()).abs() < 1e-12 * meant.end(), "{}", planned.name);
         let off = (0..100).map(|k| f64::from(k) / 100.0 * meant.end());
         let off = off.map(|t| (read.at(t).position - meant.at(t).position).abs()).fold(0.0, f64::max);

@@ -65,7 +65,7 @@ fn structure(table: &Table, machine: &Machine, (every, delay): (f64, f64)) -> Re
             return Err(table
                 .field
                 .fail("the structure is not said")
-                .allowed(words.join(", "))
+                .allowed(if machine.drives.len() == 1 { words.join(", ") } else { "pid, cascade, fuzzy".into() })
                 .next(format!("add for example {}", suggestion::pid(machine, every, delay))));
         }
         [first, second, ..] => {

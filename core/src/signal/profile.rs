@@ -331,12 +331,18 @@ impl Profile {
         }
         let whole = Self::new(0.0, &lengths)?;
         let of_coordinate = |k: usize| {
-            let stroke = |((begin, _, stroke), (from, to)): (&(f64, [f64; 2], Stroke), &(Vec<f64>, Vec<f64>))| {
+            let legs = whole.strokes.iter().zip(&ends);
+            let strokes = legs.map(|((begin, _, stroke), (from, to))| {
                 let share = if stroke.distance > 0.0 { (to[k] - from[k]) / stroke.distance } else { 0.0 };
                 (*begin, [from[k], to[k]], stroke.scaled(share, to[k] - from[k]))
-            };
-            let strokes = whole.strokes.iter().zip(&ends).map(stroke).collect();
-            Self { strokes, start: start[k], end: whole.end, shaper: Vec::new(), samples: Vec::new() }
+            });
+            Self {
+                strokes: strokes.collect(),
+                start: start[k],
+                end: whole.end,
+                shaper: Vec::new(),
+                samples: Vec::new(),
+            }
         };
         Ok((0..start.len()).map(of_coordinate).collect())
     }
