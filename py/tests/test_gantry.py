@@ -139,7 +139,7 @@ def test_each_drive_of_a_gantry_has_a_controller_of_its_own(root):
     assert seen["left"] == pytest.approx(x + y) and seen["right"] == pytest.approx(x - y)
     with pytest.raises(taut.Error, match="1 controllers and 2 profiles(.|\n)*2 controllers, one for each drive"):
         case.move("square", controller=of("left"))
-    for key, part in (("feed_forward", {"model": "rigid"}), ("disturbance_observer", {"bandwidth": 20})):
+    for key, part in (("feed_forward", {"model": "elastic"}), ("disturbance_observer", {"bandwidth": 20})):
         with pytest.raises(taut.Error, match=f"`{key}` needs a single axis"):
             case[f"controller.{key}"] = part
     with pytest.raises(taut.Error, match="2 positions: bridge, cart"):
@@ -148,7 +148,7 @@ def test_each_drive_of_a_gantry_has_a_controller_of_its_own(root):
 
 def test_what_is_not_there_says_so(gantry):
     assert repr(gantry) == "<taut.Case 'H-frame': one motor, along x, along y>"
-    for refused in (gantry.check, gantry.fit, gantry.shape):
+    for refused in (gantry.check, gantry.fit, gantry.tune):
         with pytest.raises(taut.Error, match="this needs a single axis") as told:
             refused()
         assert told.value.line == 4
