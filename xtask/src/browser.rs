@@ -17,7 +17,7 @@ const SPECTRA: [&str; 2] =
     ["target/browser/resonances_x_20210701_223821.csv", "target/browser/resonances_x_20210821_152037.csv"];
 
 /// The reports that are looked at: a name, and the command that makes it.
-const REPORTS: [(&str, &[&str]); 15] = [
+const REPORTS: [(&str, &[&str]); 16] = [
     ("simulate", &["simulate", "stages/sollmann-jouaneh/table4.toml"]),
     // More rows than a page holds.
     ("long", &["simulate", "stages/sollmann-jouaneh/table4.toml", "--set", "experiment.0.every=0.05ms"]),
@@ -25,6 +25,7 @@ const REPORTS: [(&str, &[&str]); 15] = [
     ("modes", &["modes", "stages/printer-axis/printer-axis.toml"]),
     ("modes-of-a-gantry", &["modes", "stages/h-frame/h-frame.toml"]),
     ("move", &["move", "stages/sollmann-jouaneh/controllers/pid.toml"]),
+    ("move-of-a-gantry", &["move", "stages/core-xy/square.toml"]),
     ("tune", &["tune", "stages/sollmann-jouaneh/controllers/pid.toml"]),
     ("sweep", &["sweep", "stages/sollmann-jouaneh/table4.toml", "--runs", "200", "--vary", "all=20%"]),
     ("shape", &["shape", "stages/printer-axis/printer-axis.toml"]),
