@@ -1,6 +1,6 @@
 //! Acts that a page can ask for: each is a row of [`ACTS`] and a function from a request to a reply.
 //!
-//! They need no server: what only the surroundings of a page can do, such as saving a file, they ask a [`Host`] for.
+//! They need no server: a [`Host`] provides what depends on the surroundings of the page, such as saving a file.
 
 mod case;
 mod closed;
@@ -33,12 +33,12 @@ use taut::solve::Flow;
 /// The name of a case that is no file.
 pub const NAME: &str = "studio.toml";
 
-/// The surroundings of a page: a server, or a browser alone.
+/// The surroundings of a page: a server, or a browser without one.
 pub trait Host: Sync {
-    /// A clock that never goes back, s.
+    /// A monotonic clock, s.
     fn seconds(&self) -> f64;
 
-    /// Threads that one work may take.
+    /// Threads available to one act.
     fn threads(&self) -> usize;
 
     /// The name that a case of the page has: it decides where relative paths in its text lead.
@@ -50,7 +50,7 @@ pub trait Host: Sync {
     /// Saves that case; errors: what is in the way. Returns where it is.
     fn save(&self, text: &str) -> Result<PathBuf>;
 
-    /// A file that pages sent; no other file is looked at by its path alone.
+    /// The file that a page sent under this path; any other path is an error.
     fn sent(&self, path: &str) -> Result<PathBuf>;
 }
 
@@ -135,7 +135,7 @@ pub fn names(pace: Pace) -> impl Iterator<Item = &'static str> {
     ACTS.iter().filter(move |(_, own, _)| *own == pace).map(|(name, _, _)| *name)
 }
 
-/// The answer to an act that there is not.
+/// The answer to an unknown act.
 pub fn unknown(act: &str) -> Reply {
     let names: Vec<&str> = ACTS.iter().map(|(name, _, _)| *name).collect();
     let error = Error::new(format!("there is nothing called \"{act}\" to do"));
@@ -153,7 +153,7 @@ pub fn answer(request: &Request, context: &Context) -> Reply {
     }
 }
 
-/// The answer to what broke off.
+/// The answer to a computation that panicked.
 pub fn defect() -> Reply {
     let error = Error::new("this is a defect of taut: the computation broke off");
     Reply::error(&error.next("keep the case, and report it"))

@@ -2,23 +2,23 @@
 
 use taut::error::Error;
 
-/// Bytes of a file at most.
+/// Largest file, bytes.
 pub const FILE: usize = 64 << 20;
 
-/// Bytes of all files together at most.
+/// Largest total of all files, bytes.
 pub const ALL: usize = 512 << 20;
 
-/// What is said of more.
+/// The message for files beyond these bounds.
 pub fn too_large() -> String {
     format!("a file may have {} MB, and all together {} MB", FILE >> 20, ALL >> 20)
 }
 
-/// What is said of a path under which no page sent a file.
+/// The error for a path that belongs to no file of a page.
 pub fn unknown() -> Error {
     Error::new("this file was not sent by this page").next("drop it on the page again")
 }
 
-/// The name that a file is kept under: what could lead elsewhere is left out.
+/// The name under which a file is kept, without characters that could lead to another folder.
 pub fn name(given: &str) -> String {
     let plain: String = given.chars().filter(|c| c.is_ascii_alphanumeric() || "._-".contains(*c)).take(100).collect();
     let plain = plain.trim_start_matches('.');

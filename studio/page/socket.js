@@ -3,7 +3,9 @@
 
 const ENDED = "the server has ended";
 
-/** @implements {import("./wire.js").Carrier} */
+/** @typedef {import("./wire.js").Carrier} Carrier */
+
+/** @implements {Carrier} */
 export class Socket {
   /** @param {import("./wire.js").Wire} wire */
   constructor(wire) {

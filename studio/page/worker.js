@@ -1,13 +1,16 @@
-// The worker of a page without a server: it does with the module `taut.wasm` what it is asked for, one after another.
+// The worker of a page without a server: it executes requests with the module `taut.wasm`, one after another.
 "use strict";
 
-/** Time between two looks whether a work is to go on, ms. */
+/** @type {any} */
+const scope = self;
+
+/** Time between two checks for cancellation, ms. */
 const LOOKS = 50;
 
 let module, made, files = [];
 let go = "", isStopped = false, looked = 0;
 
-/** Whether the address that lets a work go on is there. */
+/** True if the address, which is revoked to cancel an act, still exists. */
 function isThere(address) {
   try {
     const request = new XMLHttpRequest();
@@ -31,11 +34,11 @@ const imports = {worker: {
   },
   tell: (at, length) => {
     const frame = bytes(at >>> 0, length >>> 0);
-    postMessage({frame}, [frame]);
+    scope.postMessage({frame}, [frame]);
   },
 }};
 
-/** Hands parts to the module, one after another. */
+/** Writes the input of the next call. */
 function hand(...parts) {
   let at = made.exports.room(parts.reduce((sum, part) => sum + part.length, 0)) >>> 0;
   for (const part of parts) { new Uint8Array(made.exports.memory.buffer).set(part, at); at += part.length; }
@@ -44,16 +47,16 @@ function hand(...parts) {
 const text = words => new TextEncoder().encode(words);
 const json = length => JSON.parse(new TextDecoder().decode(output(length)));
 
-/** Has the module keep a file: its path, or what is wrong. */
+/** Stores a file in the module; returns its path or an error. */
 function keep({place, file}) {
   try {
     const name = text(file.name);
-    hand(name, new Uint8Array(new FileReaderSync().readAsArrayBuffer(file)));
+    hand(name, new Uint8Array(new scope.FileReaderSync().readAsArrayBuffer(file)));
     return json(made.exports.keep(place, name.length));
-  } catch (error) { return {error: `${file.name} cannot be read: ${error.message}`}; }
+  } catch (error) { return {error: `${file.name} cannot be read: ${error}`}; }
 }
 
-/** Makes an instance of the module, with the files that were dropped. */
+/** Creates an instance of the module with the dropped files. */
 function make() {
   made = new WebAssembly.Instance(module, imports);
   files.forEach(keep);
@@ -65,7 +68,7 @@ function answer(request) {
     hand(text(request));
     return output(made.exports.ask());
   } catch (error) {
-    // A defect, or no more memory: this instance is not to be used any more.
+    // After a trap, such as a panic or exhausted memory, the instance is unusable.
     console.error(error);
     make();
     hand(text(request));
@@ -73,22 +76,22 @@ function answer(request) {
   }
 }
 
-onmessage = ({data}) => {
+scope.onmessage = ({data}) => {
   if (data.module) {
     ({module, files} = data);
     make();
-    postMessage({long: json(made.exports.long_acts())});
+    scope.postMessage({long: json(made.exports.long_acts())});
   }
   if (data.file) {
     const kept = keep(data.file);
     if (kept.path !== undefined) files.push(data.file); else make();
-    postMessage({kept, place: data.file.place});
+    scope.postMessage({kept, place: data.file.place});
   }
   if (data.ask) {
-    // Where it cannot be looked at, the page ends the worker instead.
+    // If the address cannot be read at all, the page terminates the worker instead.
     go = data.go && isThere(data.go) ? data.go : "";
     isStopped = false;
     const frame = answer(data.ask);
-    postMessage({frame}, [frame]);
+    scope.postMessage({frame}, [frame]);
   }
 };

@@ -1,13 +1,15 @@
 // @ts-check
-// Carries requests to workers of the browser, which run the commands as a WebAssembly module: one for all quick works, and
-// one for each long work. Files that are dropped go to them, and nowhere else.
+// Carries requests to workers of the browser, which run the commands as a WebAssembly module: one worker for all quick
+// acts, and one for each long act. Dropped files are sent to these workers only.
 
-/** How long a long work may take to stop by itself, with what it has, ms. */
+/** Time after which a cancelled act that has not answered is terminated, ms. */
 const PATIENCE = 3000;
 
 /** A file that was dropped, and its number. @typedef {{place: number, file: File}} Dropped */
 
-/** @implements {import("./wire.js").Carrier} */
+/** @typedef {import("./wire.js").Carrier} Carrier */
+
+/** @implements {Carrier} */
 export class Workers {
   /** @param {import("./wire.js").Wire} wire */
   constructor(wire) {
@@ -32,7 +34,7 @@ export class Workers {
   async begin() {
     const answer = await fetch(new URL("taut.wasm", import.meta.url));
     if (!answer.ok) throw new Error(`taut.wasm cannot be loaded: ${answer.status} ${answer.statusText}`);
-    // Not by streaming, for which a server has to know the type of the file.
+    // Streaming would require the server to send the type application/wasm.
     this.module = await WebAssembly.compile(await answer.arrayBuffer());
     await new Promise((done, failed) => { this.quick = this.worker(done, failed); });
     this.wire.changed(true);
@@ -72,7 +74,7 @@ export class Workers {
     const {id} = request, ask = JSON.stringify(request);
     if (request.do === "cancel") this.cancel(id, request.of || 0);
     else if (this.isLong.has(request.do || "")) {
-      // A worker at work takes no messages; but it sees when this address is gone.
+      // A busy worker receives no messages, but it notices that this address was revoked.
       const go = URL.createObjectURL(new Blob(["go"]));
       const worker = this.worker(() => {}, error => { this.end(id); this.fail(id, error.message); });
       this.long.set(id, {worker, go});

@@ -1,18 +1,17 @@
-//! The page as a folder of files, which any server of static files serves: its commands are done by workers of the
-//! browser.
+//! The page as a folder of files for any server of static files; workers of the browser execute its commands.
 
 use crate::{assets, guard};
 
-/// Where the lines for the head of the page go.
+/// Lines for the head of the page are inserted after this one.
 const PLACE: &str = "<meta charset=\"utf-8\">\n";
 
-/// The files of the folder, each with its name, but for the module `taut.wasm`.
+/// Names and contents of the files, except the module `taut.wasm`.
 pub fn page_without_server() -> Vec<(&'static str, String)> {
     let files = assets::paths().filter_map(|path| Some((path.trim_start_matches('/'), assets::file(path)?.1)));
     files.map(|(name, content)| (name, if name == "index.html" { without_server(&content) } else { content })).collect()
 }
 
-/// The page itself says what the server would have said with it: what it may do, and who answers it.
+/// Adds the Content-Security-Policy, which the server would send as a header, and the carrier.
 fn without_server(page: &str) -> String {
     let scripts = guard::POLICY.replace("script-src 'self'", "script-src 'self' 'wasm-unsafe-eval'");
     let policy = format!("{scripts}; connect-src 'self' blob:");

@@ -14,7 +14,7 @@ use axum::middleware::Next;
 use axum::response::Response;
 use std::sync::Arc;
 
-/// What every page of ours may do, however it is served.
+/// The Content-Security-Policy of the page with and without the server.
 pub const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; \
                           base-uri 'none'; form-action 'none'";
 

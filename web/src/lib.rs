@@ -1,9 +1,9 @@
-//! The commands of the studio for a page without a server: a WebAssembly module in a worker of the browser, with the
-//! protocol of the server's socket.
+//! The commands of the studio as a WebAssembly module, which a worker of the browser runs instead of a server. The
+//! protocol is that of the server's socket.
 //!
-//! The worker (`studio/page/worker.js`) writes the bytes of a call to where [`room`] says, calls, and reads so many bytes
-//! of an answer as the call returns, from where [`output`] says. A call that breaks off leaves the module unusable: the
-//! worker makes a new one of it.
+//! For each call, the worker (`studio/page/worker.js`) writes the input at the address returned by [`room`]. The call
+//! returns the length of its answer, which starts at the address returned by [`output`]. A call that traps leaves the
+//! instance unusable, and the worker creates a new one.
 
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -12,11 +12,11 @@ use taut::error::{Error, Result};
 use taut::files::memory;
 use taut_acts::{Context, Host, Pace, Reply, Request, sent};
 
-/// The bytes of the next call, and those of the last answer.
+/// Input of the next call, and the last answer.
 static INPUT: Mutex<Vec<u8>> = Mutex::new(Vec::new());
 static OUTPUT: Mutex<Vec<u8>> = Mutex::new(Vec::new());
 
-/// Makes room for so many bytes of a call.
+/// Allocates the input of the next call, `length` bytes, and returns its address.
 #[unsafe(no_mangle)]
 pub extern "C" fn room(length: usize) -> *mut u8 {
     let mut input = lock(&INPUT);
@@ -25,33 +25,33 @@ pub extern "C" fn room(length: usize) -> *mut u8 {
     input.as_mut_ptr()
 }
 
-/// Where the last answer is.
+/// Address of the last answer.
 #[unsafe(no_mangle)]
 pub extern "C" fn output() -> *const u8 {
     lock(&OUTPUT).as_ptr()
 }
 
-/// The names of works that take seconds and more, as a JSON list.
+/// Lists the acts of pace [`Pace::Long`] as JSON.
 #[unsafe(no_mangle)]
 pub extern "C" fn long_acts() -> usize {
     answer(json!(taut_acts::names(Pace::Long).collect::<Vec<_>>()).to_string().into_bytes())
 }
 
-/// Does what the text of a request asks for; the answer is a frame.
+/// Executes the request in the input; the answer is a frame.
 #[unsafe(no_mangle)]
 pub extern "C" fn ask() -> usize {
     answer(asked(&String::from_utf8_lossy(&taken())))
 }
 
-/// The frame for a request of which the work broke off.
+/// Answers the request in the input, which trapped, with an error frame.
 #[unsafe(no_mangle)]
 pub extern "C" fn defect() -> usize {
     let request = Request::read(&String::from_utf8_lossy(&taken()));
     answer(taut_acts::defect().frame(request.ok().map(|request| request.id)))
 }
 
-/// Keeps a file that was dropped on the page, its `place`-th: so many bytes of its name, and then its own. The answer is
-/// JSON, its `path` or an `error`.
+/// Keeps a file that was dropped on the page, number `place`. The input is its name, of `name` bytes, followed by its
+/// content. The answer is JSON with its `path` or an `error`.
 #[unsafe(no_mangle)]
 pub extern "C" fn keep(place: u32, name: usize) -> usize {
     let mut bytes = taken();
@@ -81,7 +81,7 @@ fn kept(place: u32, name: &str, file: Vec<u8>) -> std::result::Result<String, St
     Ok(path)
 }
 
-/// A browser alone.
+/// A browser without a server.
 struct Browser;
 
 impl Host for Browser {
@@ -102,7 +102,7 @@ impl Host for Browser {
     }
 
     fn save(&self, _: &str) -> Result<PathBuf> {
-        let error = Error::new("this page has no server, and writes no files");
+        let error = Error::new("a page without a server cannot write files");
         Err(error.next("download the text instead, or open it with `taut studio CASE`"))
     }
 
@@ -125,7 +125,7 @@ fn lock(bytes: &Mutex<Vec<u8>>) -> MutexGuard<'_, Vec<u8>> {
     bytes.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// What the worker does for the module.
+/// Functions that the worker provides.
 #[cfg(target_family = "wasm")]
 mod worker {
     mod imports {
@@ -133,7 +133,7 @@ mod worker {
         unsafe extern "C" {
             pub safe fn seconds() -> f64;
             pub safe fn is_stopped() -> i32;
-            /// Takes so many bytes from there.
+            /// Sends a frame of `length` bytes to the page.
             pub fn tell(bytes: *const u8, length: usize);
         }
     }
@@ -153,7 +153,7 @@ mod worker {
     }
 }
 
-/// The same outside a browser, for tests.
+/// Stand-ins for tests, which run outside a browser.
 #[cfg(not(target_family = "wasm"))]
 mod worker {
     use std::sync::LazyLock;
@@ -195,7 +195,7 @@ mod tests {
         let run = told(&json!({ "id": 2, "do": "run", "text": opened["text"] }));
         assert!(run["result"].is_object() && run["columns"][0]["rows"].as_u64() > Some(10), "{}", run["error"]);
         let saved = told(&json!({ "id": 3, "do": "save", "text": opened["text"] }));
-        assert_eq!(saved["error"]["what"], "this page has no server, and writes no files");
+        assert_eq!(saved["error"]["what"], "a page without a server cannot write files");
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! Files that lie in memory under a path: what a browser, which has no file system, reads in the place of files.
+//! Files in memory, which take the place of the file system in a browser.
 
 use std::collections::BTreeMap;
 use std::io::{self, Cursor, ErrorKind};
@@ -10,29 +10,29 @@ pub type Source = Cursor<Arc<[u8]>>;
 
 static HELD: Mutex<BTreeMap<PathBuf, Arc<[u8]>>> = Mutex::new(BTreeMap::new());
 
-/// Holds a file under a path, in the place of one that was held there before.
+/// Stores a file under a path, and replaces an earlier one.
 pub fn hold(path: impl Into<PathBuf>, bytes: Vec<u8>) {
     all().insert(path.into(), bytes.into());
 }
 
-/// Whether a file is held under a path.
+/// True if a file is stored under this path.
 pub fn is_held(path: impl AsRef<Path>) -> bool {
     all().contains_key(path.as_ref())
 }
 
-/// Bytes of all files that are held.
+/// Total size of the stored files, bytes.
 pub fn held() -> usize {
     all().values().map(|bytes| bytes.len()).sum()
 }
 
-/// Opens a file that is held.
+/// Opens a stored file.
 pub fn open(path: impl AsRef<Path>) -> io::Result<Source> {
-    let missing = "this page has no file system, and reads only files that were dropped on it";
+    let missing = "this page has no file system and reads only files that were dropped on it";
     let found = all().get(path.as_ref()).cloned();
     found.map(Cursor::new).ok_or_else(|| io::Error::new(ErrorKind::Unsupported, missing))
 }
 
-/// The first `most` bytes of a file that is held.
+/// The first `most` bytes of a stored file.
 pub fn read(path: impl AsRef<Path>, most: usize) -> io::Result<Vec<u8>> {
     let bytes = open(path)?.into_inner();
     Ok(bytes[..bytes.len().min(most)].to_vec())
