@@ -14,7 +14,7 @@ pub fn page_without_server() -> Vec<(&'static str, String)> {
 /// Adds the Content-Security-Policy, which the server would send as a header, and the carrier.
 fn without_server(page: &str) -> String {
     let scripts = guard::POLICY.replace("script-src 'self'", "script-src 'self' 'wasm-unsafe-eval'");
-    let policy = format!("{scripts}; connect-src 'self' blob:");
+    let policy = format!("{scripts}; connect-src 'self'");
     let head = format!(
         "<meta http-equiv=\"Content-Security-Policy\" content=\"{policy}\">\n\
          <meta name=\"carrier\" content=\"workers\">\n"

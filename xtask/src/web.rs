@@ -7,7 +7,7 @@
 use crate::{browser, dist, python};
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 pub const USAGE: &str = "cargo xtask web [--out FOLDER]";
@@ -86,7 +86,7 @@ pub fn compiler() -> Result<Compiler, String> {
         return Ok(Compiler::Debian(root));
     }
     let rustup = Command::new("rustup").args(["target", "add", TARGET]).stderr(Stdio::null()).spawn();
-    if rustup.is_ok_and(ends_in_time) && has_target() {
+    if rustup.is_ok_and(|rustup| succeeds_within(PATIENCE, rustup)) && has_target() {
         return Ok(Compiler::Own);
     }
     if browser::path_of("apt-get").is_some() && unpack(&root).is_ok() && answers(&root) {
@@ -106,12 +106,12 @@ fn has_target() -> bool {
         .is_ok_and(|files| files.flatten().any(|file| file.file_name().as_encoded_bytes().starts_with(b"libstd-")))
 }
 
-/// True if a program succeeds within [`PATIENCE`]; after that it is killed.
-fn ends_in_time(mut program: std::process::Child) -> bool {
+/// True if a program succeeds within this time; after that it is killed.
+fn succeeds_within(limit: Duration, mut program: Child) -> bool {
     let begun = Instant::now();
-    while begun.elapsed() < PATIENCE {
+    while begun.elapsed() < limit {
         match program.try_wait() {
-            Ok(None) => std::thread::sleep(Duration::from_millis(100)),
+            Ok(None) => std::thread::sleep(Duration::from_millis(50)),
             Ok(Some(status)) => return status.success(),
             Err(_) => return false,
         }
@@ -183,4 +183,35 @@ fn linker() -> Result<PathBuf, String> {
     let own = Path::new(&folder).with_file_name("bin").join("rust-lld");
     let found = Some(own).filter(|own| own.is_file()).or_else(|| browser::path_of("wasm-ld"));
     found.ok_or_else(|| "rust-lld, which comes with Rust of rustup, or wasm-ld (Debian: apt-get install lld)".into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn unknown_words_are_an_error() {
+        for words in [&["--fast"] as &[&str], &["--out"], &["--out", "a", "b"]] {
+            assert!(run(words).unwrap_err().contains(USAGE), "{words:?}");
+        }
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn a_program_that_hangs_is_killed() {
+        let spawn = |words: &[&str]| Command::new(words[0]).args(&words[1..]).spawn().unwrap();
+        let begun = Instant::now();
+        assert!(!succeeds_within(Duration::from_millis(200), spawn(&["sleep", "60"])));
+        assert!(begun.elapsed() < Duration::from_secs(30));
+        assert!(succeeds_within(Duration::from_secs(30), spawn(&["true"])));
+        assert!(!succeeds_within(Duration::from_secs(30), spawn(&["false"])));
+    }
+
+    #[test]
+    fn a_folder_without_a_compiler_is_none() {
+        let folder = std::env::temp_dir().join(format!("taut-xtask-web-{}", std::process::id()));
+        fs::create_dir_all(folder.join("usr/lib/rustlib")).unwrap();
+        assert!(!answers(&folder) && !answers(&folder.join("nothing")));
+        fs::remove_dir_all(folder).unwrap();
+    }
 }
