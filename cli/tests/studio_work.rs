@@ -96,7 +96,7 @@ fn files_that_were_not_sent_are_not_looked_at() {
     for path in ["/etc/passwd", "../../etc/passwd", TABLE4, "", "/nothing/there"] {
         for body in [("columns", json!({ "path": path })), ("shape", json!({ "paths": [path] }))] {
             let head = page.result(body.0, body.1);
-            assert_eq!(head["error"]["what"], "this file was not sent to this server", "{path}");
+            assert_eq!(head["error"]["what"], "this file was not sent by this page", "{path}");
         }
     }
 }

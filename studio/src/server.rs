@@ -110,7 +110,7 @@ async fn connection(stream: TcpStream, service: TowerToHyperService<Router>) {
 fn router(state: &Arc<State>) -> Router {
     Router::new()
         .route("/socket", get(socket::upgrade))
-        .route("/upload", post(crate::work::upload::take))
+        .route("/upload", post(crate::upload::take))
         .fallback(get(crate::assets::serve))
         .layer(from_fn_with_state(Arc::clone(state), guard::check))
         .with_state(Arc::clone(state))

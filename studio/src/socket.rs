@@ -4,9 +4,7 @@
 //! kind alone is done: what the page shows last is what it asked for last. Long works have a thread each, tell how far
 //! they are, and are stopped by `cancel`. When the page goes, all of its works are told to stop.
 
-use crate::message::{Reply, Request};
 use crate::state::State;
-use crate::work::{self, Context, Pace};
 use axum::extract::State as Shared;
 use axum::extract::ws::{CloseFrame, Message, WebSocket, WebSocketUpgrade, close_code};
 use axum::http::StatusCode;
@@ -17,6 +15,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use taut::error::Error;
+use taut_acts::{Context, Pace, Reply, Request};
 use tokio::sync::mpsc;
 
 /// Bytes of a message: twice what a case file may have.
@@ -113,11 +112,8 @@ impl Page {
             stop.inspect(|stop| stop.store(true, Ordering::Relaxed));
             return Some(Reply::of(json!({ "cancelled": stop.is_some() })).frame(Some(request.id)));
         }
-        match work::pace(&request.act) {
-            None => {
-                let error = Error::new(format!("there is nothing called \"{}\" to do", request.act));
-                Some(Reply::error(&error.allowed(work::names())).frame(Some(request.id)))
-            }
+        match taut_acts::pace(&request.act) {
+            None => Some(taut_acts::unknown(&request.act).frame(Some(request.id))),
             Some(Pace::Long) => self.begin_long(request),
             Some(Pace::Quick) => {
                 let same = self.waiting.iter().position(|waiting| waiting.act == request.act);
@@ -165,8 +161,9 @@ impl Page {
                 // A page that is behind misses a step, and gets the next.
                 progress.try_send(Reply::of(json!({ "progress": step })).frame(Some(id))).is_ok()
             };
-            let context = Context::new(&state, &stop, &tell);
-            let frame = work::answer(&request, &context).frame(Some(id));
+            let is_stopped = || stop.load(Ordering::Relaxed);
+            let context = Context::new(&*state, &is_stopped, &tell);
+            let frame = taut_acts::answer(&request, &context).frame(Some(id));
             let _ = done.blocking_send(Done { id, frame, was_quick });
         })
     }

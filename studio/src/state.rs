@@ -5,8 +5,10 @@ use crate::pool::{Pool, lock};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
+use std::time::Instant;
 use taut::case::{Case, Files};
 use taut::error::{Error, Result};
+use taut_acts::Host;
 use tokio::sync::{Semaphore, watch};
 
 /// Pages at a time; one more is refused.
@@ -29,6 +31,7 @@ pub struct State {
     /// Bytes of them, and of those that are on their way.
     uploaded: AtomicUsize,
     ending: watch::Sender<bool>,
+    begun: Instant,
 }
 
 /// The case file of the command line.
@@ -51,6 +54,7 @@ impl State {
             uploads: Mutex::default(),
             uploaded: AtomicUsize::new(0),
             ending: watch::channel(false).0,
+            begun: Instant::now(),
         })
     }
 
@@ -67,11 +71,6 @@ impl State {
     /// Pages that are open.
     pub fn sockets_open(&self) -> usize {
         SOCKETS - self.sockets.available_permits()
-    }
-
-    /// The name that a case of the page has: it decides where relative paths in its text lead.
-    pub fn name(&self) -> &Path {
-        self.case.as_ref().map_or(Path::new("studio.toml"), |case| &case.path)
     }
 
     /// The folder of files that pages send, which others cannot read; it is made when the first one comes.
@@ -108,6 +107,42 @@ impl State {
         let most = std::thread::available_parallelism().map_or(2, usize::from).max(2);
         let taken = self.long.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |n| (n < most).then_some(n + 1));
         taken.ok().map(|_| Place(Arc::clone(&self.long)))
+    }
+}
+
+impl Host for State {
+    fn seconds(&self) -> f64 {
+        self.begun.elapsed().as_secs_f64()
+    }
+
+    fn threads(&self) -> usize {
+        std::thread::available_parallelism().map_or(2, usize::from).clamp(1, 16)
+    }
+
+    fn name(&self) -> &Path {
+        self.case.as_ref().map_or(Path::new(taut_acts::NAME), |case| &case.path)
+    }
+
+    fn opened(&self) -> Option<(&Path, String)> {
+        self.case.as_ref().map(|case| (&*case.path, case.text()))
+    }
+
+    fn save(&self, text: &str) -> Result<PathBuf> {
+        let Some(case) = &self.case else {
+            let error = Error::new("no case was named on the command line, and the page writes no other file");
+            return Err(error.next("download the text instead, or start with `taut studio CASE`"));
+        };
+        case.save(text)?;
+        Ok(case.path.clone())
+    }
+
+    fn sent(&self, path: &str) -> Result<PathBuf> {
+        let folder = self.uploads().ok().and_then(|folder| folder.canonicalize().ok());
+        let file = Path::new(path).canonicalize().ok();
+        match (folder, file) {
+            (Some(folder), Some(file)) if file.starts_with(&folder) => Ok(file),
+            _ => Err(taut_acts::sent::unknown()),
+        }
     }
 }
 

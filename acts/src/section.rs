@@ -1,8 +1,8 @@
 //! A part of a run, computed again at a finer interval.
 
-use super::Context;
-use super::case::{chosen, opened, runnable};
-use super::curves::{Kept, panels};
+use crate::Context;
+use crate::case::{chosen, opened, runnable};
+use crate::curves::{Kept, panels};
 use crate::message::{Reply, Request};
 use serde_json::json;
 use taut::error::{Error, Result};

@@ -1,13 +1,12 @@
 //! Loops that are closed: a move and the loop's margins for what sliders ask, and the tuning.
 
-use super::Context;
-use super::case::{opened_for, parameters};
-use super::rows::interval;
+use crate::Context;
+use crate::case::{opened_for, parameters};
 use crate::message::{Reply, Request};
+use crate::rows::interval;
 use serde_json::{Value, json};
 use std::cell::Cell;
 use std::f64::consts::PI;
-use std::time::{Duration, Instant};
 use taut::case::{Case, Files, Given, Move, Tuning};
 use taut::control::feedback::Feedback;
 use taut::control::{Loop, Rows, Standard, each, stream};
@@ -19,11 +18,11 @@ use taut::tune::{Break, Family, Margins, Open, Verdict, breaks, loops, trouble, 
 use taut_report::motion::{Done, Tried};
 use taut_report::tune::{Work, figures, page};
 
-/// Time between two steps of progress.
-const STEPS: Duration = Duration::from_millis(100);
+/// Time between two steps of progress, s.
+const STEPS: f64 = 0.1;
 
 macro_rules! controllers {
-    ($($path:literal),* $(,)?) => { &[$(($path, include_str!(concat!("../../../stages/sollmann-jouaneh/controllers/", $path)))),*] };
+    ($($path:literal),* $(,)?) => { &[$(($path, include_str!(concat!("../../stages/sollmann-jouaneh/controllers/", $path)))),*] };
 }
 
 /// Controllers to begin with, from the bundled cases.
@@ -57,7 +56,7 @@ fn written(given: &Given) -> String {
     match given {
         Given::Number(value) => format!("{value:?}"),
         Given::Whole(value) => value.to_string(),
-        Given::Text(text) => super::toml::toml(&json!(text)),
+        Given::Text(text) => crate::toml::toml(&json!(text)),
         Given::Truth(truth) => truth.to_string(),
         Given::List(all) => format!("[{}]", all.iter().map(written).collect::<Vec<_>>().join(", ")),
         Given::Table(all) => {
@@ -81,8 +80,8 @@ fn axis(request: &Request, context: &Context) -> Result<Case> {
 /// One move and the margins of its loop: what every move of a gain's slider asks for.
 pub fn closed(request: &Request, context: &Context) -> Result<Reply> {
     let case = axis(request, context)?;
-    let begun = Instant::now();
-    let (design, moves) = case.moves_named(context.state.name(), &[])?;
+    let begun = context.elapsed();
+    let (design, moves) = case.moves_named(context.host.name(), &[])?;
     let place = (request.number("move").unwrap_or(0.0).max(0.0) as usize).min(moves.len() - 1);
     let motion = moves[place];
     let mut kept = Columns::default();
@@ -130,7 +129,7 @@ pub fn closed(request: &Request, context: &Context) -> Result<Reply> {
         }
     }
     reply.head.insert("columns".into(), kept.told());
-    reply.head.insert("took_s".into(), json!(begun.elapsed().as_secs_f64()));
+    reply.head.insert("took_s".into(), json!(context.elapsed() - begun));
     reply.columns = kept.values;
     Ok(reply)
 }
@@ -226,12 +225,14 @@ pub fn tuned(request: &Request, context: &Context) -> Result<Reply> {
     let case = axis(request, context)?;
     let mut tuning: Tuning = case.tune.clone().unwrap_or_default();
     tuning.spread = request.number("spread").or(tuning.spread);
-    let (begun, looks, last) = (Instant::now(), Cell::new(0u64), Cell::new(Instant::now()));
+    let begun = context.elapsed();
+    let (looks, last) = (Cell::new(0u64), Cell::new(begun));
     let stop = || {
         looks.set(looks.get() + 1);
-        if last.get().elapsed() > STEPS {
-            last.set(Instant::now());
-            (context.progress)(json!({ "designs": looks.get(), "took_s": begun.elapsed().as_secs_f64() }));
+        let now = context.elapsed();
+        if now - last.get() > STEPS {
+            last.set(now);
+            (context.progress)(json!({ "designs": looks.get(), "took_s": now - begun }));
         }
         context.is_stopped()
     };
@@ -240,7 +241,7 @@ pub fn tuned(request: &Request, context: &Context) -> Result<Reply> {
         tuned => tuned?,
     };
     let work = Work { case: &case, tuning: &tuning, tuned: &tuned };
-    let text = tuned.case_text(&case, context.state.name())?;
+    let text = tuned.case_text(&case, context.host.name())?;
     let page = page(&work, &text, &figures(&work)?);
     let worst = |verdict: &Verdict| verdict.moves.iter().map(|one| point(&one.at_worst)).collect::<Vec<_>>();
     let choices = tuned.choices.iter().map(|choice| {
@@ -256,7 +257,7 @@ pub fn tuned(request: &Request, context: &Context) -> Result<Reply> {
         "after": worst(&tuned.after),
         "choices": choices.collect::<Vec<_>>(),
         "stopped": context.is_stopped(),
-        "took_s": begun.elapsed().as_secs_f64(),
+        "took_s": context.elapsed() - begun,
     })))
 }
 

@@ -1,7 +1,6 @@
 //! Input shapers from spectra that were sent: the page of `taut shape`.
 
-use super::Context;
-use super::logs::sent;
+use crate::Context;
 use crate::message::{Reply, Request};
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -13,7 +12,7 @@ use taut_report::shape::{figures, page};
 /// Chooses shapers for one file, or compares two: `paths`; `axis`, of the accelerometer; `together`.
 pub fn shape(request: &Request, context: &Context) -> Result<Reply> {
     let paths = request.list("paths").iter().filter_map(Value::as_str);
-    let files = paths.map(|path| sent(path, context)).collect::<Result<Vec<PathBuf>>>()?;
+    let files = paths.map(|path| context.host.sent(path)).collect::<Result<Vec<PathBuf>>>()?;
     let axis = match request.body.get("axis").and_then(Value::as_str) {
         Some("x") => Some(Axis::X),
         Some("y") => Some(Axis::Y),

@@ -1,8 +1,8 @@
 //! How the machine swings: the page of `taut modes`.
 
-use super::case::opened_for;
-use super::{Context, friction};
+use crate::case::opened_for;
 use crate::message::{Reply, Request};
+use crate::{Context, friction};
 use serde_json::json;
 use taut::case::Files;
 use taut::error::Result;

@@ -1,9 +1,9 @@
 //! The one-file report of all experiments: the page of `taut simulate`.
 
-use super::Context;
-use super::case::opened;
-use super::run::{Keep, simulated};
+use crate::Context;
+use crate::case::opened;
 use crate::message::{Reply, Request};
+use crate::run::{Keep, simulated};
 use serde_json::json;
 use taut::error::Result;
 use taut::solve::Solver;

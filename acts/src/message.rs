@@ -1,4 +1,4 @@
-//! Messages of a socket: requests as JSON, answers as frames of a JSON head and columns of numbers.
+//! Messages of a page: requests as JSON, answers as frames of a JSON head and columns of numbers.
 
 use serde_json::{Map, Value, json};
 use std::path::Path;
@@ -9,7 +9,7 @@ use taut::error::{Error, Result};
 pub struct Request {
     /// The page's number for it, given back with the answer.
     pub id: u64,
-    /// The act: a row of `work::ACTS`.
+    /// The act: a row of `ACTS`.
     pub act: String,
     /// All of it.
     pub body: Map<String, Value>,

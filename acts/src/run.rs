@@ -1,13 +1,13 @@
 //! One experiment simulated: what every move of a slider asks for.
 
-use super::Context;
-use super::case::{chosen, opened, parameters, runnable};
-use super::curves::{Kept, bodies, panels, told};
-use super::rows::interval;
-use super::scene::scene;
+use crate::Context;
+use crate::case::{chosen, opened, parameters, runnable};
+use crate::curves::{Kept, bodies, panels, told};
 use crate::message::{Reply, Request};
+use crate::rows::interval;
+use crate::scene::scene;
 use serde_json::{Value, json};
-use std::time::Instant;
+use std::time::Duration;
 use taut::case::{Case, Experiment};
 use taut::control::Loop;
 use taut::error::Result;
@@ -26,14 +26,14 @@ const EVENTS: usize = 2000;
 pub fn run(request: &Request, context: &Context) -> Result<Reply> {
     let case = opened(request, context)?;
     runnable(&case)?;
-    let begun = Instant::now();
+    let begun = context.elapsed();
     let (simulated, kept) = match &case {
         case if case.experiments.is_empty() && !case.moves.is_empty() => {
             axis(&case.moves, request, |place| move_run(case, place, context))?
         }
         case => axis(&case.experiments, request, |place| experiment_run(case, place, context))?,
     };
-    let took = begun.elapsed();
+    let took = context.elapsed() - begun;
     let numbers = case.numbers()?;
     let mut reply = Reply::of(json!({
         "title": case.title.as_str(),
@@ -51,7 +51,7 @@ pub fn run(request: &Request, context: &Context) -> Result<Reply> {
         "panels": simulated.panels,
         "bodies": bodies(&case),
         "result": simulated.json,
-        "took_s": took.as_secs_f64(),
+        "took_s": took,
     }));
     if request.flag("describe") {
         reply.head.insert("parameters".into(), parameters(&case, &numbers));
@@ -105,11 +105,11 @@ fn experiment_run(case: &Case, place: usize, context: &Context) -> Result<(Simul
 
 /// A move in closed loop, of a case that has no experiments.
 fn move_run(case: &Case, place: usize, context: &Context) -> Result<(Simulated, Kept)> {
-    let (design, moves) = case.moves_named(context.state.name(), &[])?;
+    let (design, moves) = case.moves_named(context.host.name(), &[])?;
     let opened = case.clone();
     let panels = panels(&opened, &case.machine.mechanism().columns);
     let mut kept = Kept::new(&panels);
-    let done = super::closed::moved(case, design, moves[place], context, &mut |block| kept.take(block))?;
+    let done = crate::closed::moved(case, design, moves[place], context, &mut |block| kept.take(block))?;
     let timing = Loop::of(design);
     let json =
         taut::json::moves(&case.title, design.structure.name(), &timing, &case.machine, &[done.told(&case.machine)]);
@@ -138,7 +138,7 @@ pub fn simulated<'a>(
     context: &Context,
     keep: &mut Keep,
 ) -> Result<simulate::Run<'a>> {
-    let begun = Instant::now();
+    let begun = context.elapsed();
     let machine = &case.machine;
     let mut meter = Meter::new(machine, experiment);
     let mut curves = matches!(keep, Keep::Curves).then(|| Curves::new(machine));
@@ -153,7 +153,7 @@ pub fn simulated<'a>(
     })?;
     let metrics = meter.finish(&outcome.events);
     let reduction = Reduction::of(machine, experiment, solver)?;
-    let took = begun.elapsed();
+    let took = Duration::try_from_secs_f64(context.elapsed() - begun).unwrap_or_default();
     Ok(simulate::Run {
         experiment,
         outcome,

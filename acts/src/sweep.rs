@@ -1,14 +1,13 @@
 //! A sweep with its rows as they come, and the trajectories of chosen runs.
 
-use super::Context;
-use super::case::opened;
-use super::curves::{Kept, panels};
-use super::toml::toml;
+use crate::Context;
+use crate::case::opened;
+use crate::curves::{Kept, panels};
 use crate::message::{Reply, Request};
+use crate::toml::toml;
 use serde_json::{Value, json};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::channel;
-use std::time::{Duration, Instant};
 use taut::case::Case;
 use taut::error::{Error, Result};
 use taut::solve::Flow;
@@ -25,8 +24,8 @@ const PIECE: usize = 16;
 const TRACES: usize = 60;
 const ROWS: usize = 400;
 
-/// Time between two steps of progress.
-const STEPS: Duration = Duration::from_millis(100);
+/// Time between two steps of progress, s.
+const STEPS: f64 = 0.1;
 
 /// The case of a request with its sweep: `plan`, the table `[sweep]`, the text's own where it is left out.
 fn planned(request: &Request, context: &Context) -> Result<(Case, Sweep)> {
@@ -47,7 +46,7 @@ fn planned(request: &Request, context: &Context) -> Result<(Case, Sweep)> {
 /// Runs all machines on all processors; the page gets rows as they come, and all of them in the end.
 pub fn sweep(request: &Request, context: &Context) -> Result<Reply> {
     let (case, sweep) = planned(request, context)?;
-    let begun = Instant::now();
+    let begun = context.elapsed();
     (context.progress)(json!({ "runs": sweep.runs(), "headings": headings(&sweep), "rows": [] }));
     let table = rows(&sweep, context);
     let mut reply = Reply::of(json!({
@@ -58,7 +57,7 @@ pub fn sweep(request: &Request, context: &Context) -> Result<Reply> {
         "headings": headings(&sweep),
         "statuses": Status::ALL.map(Status::words),
         "experiments": sweep.groups().iter().filter(|group| !group.is_move).map(|group| &group.name).collect::<Vec<_>>(),
-        "took_s": begun.elapsed().as_secs_f64(),
+        "took_s": context.elapsed() - begun,
         "columns": sweep.columns().iter().map(|column| json!({ "name": column.name, "rows": table.len() })).collect::<Vec<_>>(),
     }));
     reply.columns = table.columns.into_iter().map(|column| column.values).collect();
@@ -83,40 +82,37 @@ fn headings(sweep: &Sweep) -> Vec<Value> {
 
 /// Rows in the order of the runs, those that were done where it was stopped.
 fn rows(sweep: &Sweep, context: &Context) -> Trajectory {
-    let (next, (done, pieces)) = (AtomicU64::new(0), channel::<(u64, Trajectory)>());
-    let threads = std::thread::available_parallelism().map_or(2, usize::from).clamp(1, 16);
-    let stop = || context.is_stopped();
+    let (next, stop) = (AtomicU64::new(0), || context.is_stopped());
+    let piece = || {
+        let first = next.fetch_add(PIECE as u64, Ordering::Relaxed);
+        let piece = if first < sweep.runs() { sweep.rows(first, PIECE, &stop) } else { None };
+        piece.map(|piece| (first, piece))
+    };
     let mut all: Vec<(u64, Trajectory)> = Vec::new();
-    std::thread::scope(|scope| {
-        for _ in 0..threads {
-            let (done, next, stop) = (done.clone(), &next, &stop);
-            scope.spawn(move || {
-                loop {
-                    let first = next.fetch_add(PIECE as u64, Ordering::Relaxed);
-                    if first >= sweep.runs() {
-                        return;
-                    }
-                    let Some(piece) = sweep.rows(first, PIECE, &|| stop()) else { return };
-                    if done.send((first, piece)).is_err() {
-                        return;
-                    }
-                }
-            });
-        }
-        drop(done);
-        let (mut last, mut told) = (Instant::now(), 0);
-        for piece in pieces {
-            all.push(piece);
-            if last.elapsed() > STEPS {
-                // Rows that the page was too busy for come with the next step.
-                let fresh: Vec<Vec<f64>> = all[told..].iter().flat_map(|(_, piece)| lines(piece)).collect();
-                if (context.progress)(json!({ "runs": sweep.runs(), "rows": fresh })) {
-                    told = all.len();
-                }
-                last = Instant::now();
+    let (mut last, mut told) = (context.elapsed(), 0);
+    let mut take = |piece| {
+        all.push(piece);
+        if context.elapsed() - last > STEPS {
+            // Rows that the page was too busy for come with the next step.
+            let fresh: Vec<Vec<f64>> = all[told..].iter().flat_map(|(_, piece)| lines(piece)).collect();
+            if (context.progress)(json!({ "runs": sweep.runs(), "rows": fresh })) {
+                told = all.len();
             }
+            last = context.elapsed();
         }
-    });
+    };
+    match context.host.threads() {
+        0 | 1 => std::iter::from_fn(piece).for_each(take),
+        threads => std::thread::scope(|scope| {
+            let (done, pieces) = channel();
+            for _ in 0..threads {
+                let (done, piece) = (done.clone(), &piece);
+                scope.spawn(move || std::iter::from_fn(piece).try_for_each(|piece| done.send(piece)));
+            }
+            drop(done);
+            pieces.into_iter().for_each(&mut take);
+        }),
+    }
     all.sort_by_key(|(first, _)| *first);
     let mut table = Trajectory::with_capacity(sweep.columns(), all.len() * PIECE);
     all.iter().for_each(|(_, piece)| table.append(piece));
@@ -162,7 +158,7 @@ pub fn traces(request: &Request, context: &Context) -> Result<Reply> {
             columns.push(values);
         }
     }
-    let mut reply = Reply::of(json!({ "panels": super::curves::told(&shown), "columns": told }));
+    let mut reply = Reply::of(json!({ "panels": crate::curves::told(&shown), "columns": told }));
     reply.columns = columns;
     Ok(reply)
 }

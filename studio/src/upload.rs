@@ -7,12 +7,7 @@ use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use std::sync::Arc;
 use std::time::Duration;
-
-/// Bytes of a file.
-const FILE: usize = 64 << 20;
-
-/// Bytes of all files together.
-const ALL: usize = 512 << 20;
+use taut_acts::sent::{self, ALL, FILE};
 
 /// How long a file may take.
 const PATIENCE: Duration = Duration::from_secs(30);
@@ -25,7 +20,8 @@ pub async fn take(Shared(state): Shared<Arc<State>>, request: Request) -> Respon
     }
     // What is on its way counts as well: it is in memory until it is written.
     let Some(room) = state.room(length.unwrap_or(FILE), ALL) else { return too_large() };
-    let name = name(request.uri().query().unwrap_or_default());
+    let query = request.uri().query().unwrap_or_default();
+    let name = sent::name(query.split('&').find_map(|pair| pair.strip_prefix("name=")).unwrap_or_default());
     let body = match tokio::time::timeout(PATIENCE, to_bytes(request.into_body(), FILE)).await {
         Err(_) => return (StatusCode::REQUEST_TIMEOUT, "the file came too slowly\n").into_response(),
         Ok(Err(_)) => return too_large(),
@@ -52,14 +48,5 @@ fn axum_json(value: &serde_json::Value) -> Response {
 }
 
 fn too_large() -> Response {
-    let told = format!("a file may have {} MB, and all together {} MB\n", FILE >> 20, ALL >> 20);
-    (StatusCode::PAYLOAD_TOO_LARGE, told).into_response()
-}
-
-/// The name of the file after `name=`: what could lead elsewhere is left out.
-fn name(query: &str) -> String {
-    let given = query.split('&').find_map(|pair| pair.strip_prefix("name=")).unwrap_or_default();
-    let plain: String = given.chars().filter(|c| c.is_ascii_alphanumeric() || "._-".contains(*c)).take(100).collect();
-    let plain = plain.trim_start_matches('.');
-    if plain.is_empty() { "file".to_string() } else { plain.to_string() }
+    (StatusCode::PAYLOAD_TOO_LARGE, sent::too_large() + "\n").into_response()
 }

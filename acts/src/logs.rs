@@ -1,13 +1,11 @@
 //! From logs to a model: what a file has, what logs determine, and the fit.
 
-use super::Context;
-use super::case::opened;
-use super::toml::toml;
+use crate::Context;
+use crate::case::opened;
 use crate::message::{Reply, Request};
+use crate::toml::toml;
 use serde_json::{Map, Value, json};
 use std::cell::RefCell;
-use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
 use taut::case::{Case, Plan};
 use taut::error::{Error, Result};
 use taut::fit::{Problem, Run, check_watched, fit_watched, profiles};
@@ -23,12 +21,12 @@ const POINTS: usize = 600;
 const SHOWN: usize = 4;
 const THINNED: usize = 240;
 
-/// Time between two pictures of a fit.
-const PICTURES: Duration = Duration::from_millis(40);
+/// Time between two pictures of a fit, s.
+const PICTURES: f64 = 0.04;
 
 /// The columns of a file that was sent, their first rows, and what they seem to be.
 pub fn columns(request: &Request, context: &Context) -> Result<Reply> {
-    let file = sent(request.text("path")?, context)?;
+    let file = context.host.sent(request.text("path")?)?;
     let Looked { columns, guess } = look(&file)?;
     let rows = columns.iter().map(|column| column.values.len()).max().unwrap_or(0);
     let thin = rows.div_ceil(POINTS).max(1);
@@ -57,16 +55,6 @@ pub fn columns(request: &Request, context: &Context) -> Result<Reply> {
     })))
 }
 
-/// A file that pages sent; no other file is looked at by its path alone.
-pub fn sent(path: &str, context: &Context) -> Result<PathBuf> {
-    let folder = context.state.uploads().ok().and_then(|folder| folder.canonicalize().ok());
-    let file = Path::new(path).canonicalize().ok();
-    match (folder, file) {
-        (Some(folder), Some(file)) if file.starts_with(&folder) => Ok(file),
-        _ => Err(Error::new("this file was not sent to this server").next("drop it on the page again")),
-    }
-}
-
 /// The case of a request with its logs in the place of its experiments, and its plan: `logs`, a list of `name` and `log`,
 /// the table of a log; `plan`, the table `[fit]`. Both are the text's own where they are left out.
 fn planned(request: &Request, context: &Context) -> Result<(Case, Plan)> {
@@ -79,7 +67,7 @@ fn planned(request: &Request, context: &Context) -> Result<(Case, Plan)> {
         changes.push(json!(format!("fit={}", toml(plan))));
     }
     request.body.insert("changes".into(), Value::Array(changes));
-    let name = context.state.name();
+    let name = context.host.name();
     let case = opened(&request, context)?;
     if !case.is_axis() {
         return Err(Error::new("a fit takes an axis, and this case is a gantry").next("open the case of an axis"));
@@ -112,7 +100,7 @@ pub fn fit(request: &Request, context: &Context) -> Result<Reply> {
     let (case, plan) = planned(request, context)?;
     let stop = || context.is_stopped();
     let live = Live::new(&case, &plan, context)?;
-    let begun = Instant::now();
+    let begun = context.elapsed();
     let fit = match fit_watched(&case, &plan, Some(&stop), &mut |x, cost| live.see(x, cost)) {
         Err(_) if context.is_stopped() => return Err(stopped()),
         fit => fit?,
@@ -128,7 +116,7 @@ pub fn fit(request: &Request, context: &Context) -> Result<Reply> {
     };
     let found = Found { fit, profiles, drawn: None };
     let fit = &found.fit;
-    let text = fit.case_text(&case, context.state.name())?;
+    let text = fit.case_text(&case, context.host.name())?;
     let page = taut_report::fit::page(&case, &found, &text);
     let result = taut::json::fit(&case, fit, &found.profiles, None);
     Ok(Reply::of(json!({
@@ -142,7 +130,7 @@ pub fn fit(request: &Request, context: &Context) -> Result<Reply> {
             json!({ "name": estimate.name, "value": value, "error": error, "interval": interval,
                     "start": taut_report::fit::value(estimate.start, estimate.unit, 5) })
         }).collect::<Vec<_>>(),
-        "took_s": begun.elapsed().as_secs_f64(),
+        "took_s": context.elapsed() - begun,
     })))
 }
 
@@ -152,7 +140,7 @@ fn kept(request: &Request, context: &Context, found: &Found) -> Result<String> {
     if !own.is_axis() {
         return Err(Error::new("this case is a gantry"));
     }
-    found.fit.case_text(&own, context.state.name())
+    found.fit.case_text(&own, context.host.name())
 }
 
 /// A fit under way, as the page sees it.
@@ -166,7 +154,7 @@ struct Live<'a> {
 
 struct Seen {
     steps: u64,
-    last: Option<Instant>,
+    last: Option<f64>,
     bench: Bench,
 }
 
@@ -184,12 +172,13 @@ impl<'a> Live<'a> {
     fn see(&self, x: &[f64], cost: f64) -> Flow {
         let mut state = self.state.borrow_mut();
         state.steps += 1;
-        if state.last.is_none_or(|last| last.elapsed() > PICTURES) && !self.context.is_stopped() {
+        let now = self.context.elapsed();
+        if state.last.is_none_or(|last| now - last > PICTURES) && !self.context.is_stopped() {
             let steps = state.steps;
             let logs: Vec<Value> = self.shown.iter().filter_map(|&k| self.log(k, x, &mut state.bench)).collect();
             let told = json!({ "step": steps, "cost": cost, "parameters": self.parameters(x), "logs": logs });
             (self.context.progress)(told);
-            state.last = Some(Instant::now());
+            state.last = Some(self.context.elapsed());
         }
         if self.context.is_stopped() { Flow::Stop } else { Flow::Continue }
     }

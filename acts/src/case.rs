@@ -1,7 +1,7 @@
 //! The case of a request, with its changes.
 
-use super::Context;
-use super::curves::spans;
+use crate::Context;
+use crate::curves::spans;
 use crate::message::Request;
 use serde_json::{Value, json};
 use taut::case::{Case, Files, Number};
@@ -16,7 +16,7 @@ pub fn opened(request: &Request, context: &Context) -> Result<Case> {
 
 /// The same with the files of these experiments only.
 pub fn opened_for(request: &Request, context: &Context, files: Files) -> Result<Case> {
-    let (name, text) = (context.state.name(), request.text("text")?);
+    let (name, text) = (context.host.name(), request.text("text")?);
     let mut changes: Vec<String> =
         request.list("changes").iter().filter_map(Value::as_str).map(str::to_string).collect();
     if !request.list("set").is_empty() {

@@ -1,14 +1,14 @@
 //! The machines that come with the program.
 
-use super::Context;
-use super::scene::scene;
+use crate::Context;
 use crate::message::{Reply, Request};
+use crate::scene::scene;
 use serde_json::{Value, json};
 use taut::case::Case;
 use taut::error::Result;
 
 macro_rules! stages {
-    ($($path:literal),* $(,)?) => { &[$(($path, include_str!(concat!("../../../stages/", $path)))),*] };
+    ($($path:literal),* $(,)?) => { &[$(($path, include_str!(concat!("../../stages/", $path)))),*] };
 }
 
 /// Their case files, none of which names another file.
