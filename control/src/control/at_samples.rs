@@ -3,7 +3,8 @@
 //! Nobody observes the motion, which takes a third of the time. What is between samples is missing: a peak by about
 //! (ω T)²/8 of itself at a frequency ω and a sample time T, 1e-3 at 14 Hz and 1 kHz.
 
-use super::outcome::{Deviation, DriveFigures, Figures, LoadFigures, at_rest, unrecorded};
+use super::figures::{Deviation, DriveFigures, Figures, LoadFigures};
+use super::outcome::{at_rest, unrecorded};
 use super::sampled::{Controller, Loop};
 use super::standard::Standard;
 use crate::error::Result;

@@ -1,6 +1,7 @@
 //! Distances from a path in a plane.
 
-use super::outcome::{Deviation, integral, larger};
+use super::figures::Deviation;
+use super::quadrature::{integral, larger};
 use crate::metrics::Peak;
 use crate::signal::profile::Profile;
 use crate::solve::{Curve, Polynomial, TERMS};

@@ -14,9 +14,11 @@ mod criterion;
 pub mod damping;
 pub mod drives;
 pub mod feedback;
+mod figures;
 pub mod filter;
 mod forward;
 pub mod fuzzy;
+mod gauge;
 mod insensitive;
 mod kind;
 pub(crate) mod law;
@@ -26,6 +28,7 @@ pub mod observer;
 mod outcome;
 pub mod pairs;
 pub mod pid;
+mod quadrature;
 pub mod recommendation;
 mod rest;
 pub mod riccati;
@@ -40,11 +43,11 @@ mod standard;
 pub mod state_feedback;
 mod stepped;
 mod welch;
+mod wide;
 
 pub(crate) use at_samples::closed_loop_at_samples;
-pub use outcome::{
-    Deviation, DriveFigures, Figures, LoadFigures, MoveRun, Rows, Setup, close, closed_loop, each, stream,
-};
+pub use figures::{Deviation, DriveFigures, Figures, LoadFigures};
+pub use outcome::{MoveRun, Rows, Setup, close, closed_loop, each, stream};
 pub use outcome::{closed_loop_briefly, follow};
 pub use rest::Swing;
 pub use sampled::Added;

@@ -8,6 +8,9 @@ use crate::mechanism::State;
 use crate::quantity::rounded;
 use crate::signal::profile::Reference;
 
+/// Most coordinates of a machine.
+pub(super) const SLIDES: usize = 2;
+
 /// Measurements and references that a controller has at a sample.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Observation<N = f64> {

@@ -1,8 +1,7 @@
 //! Controllers around a run: samples, commands and delays, decision by decision.
 
-use super::outcome::SLIDES;
 use super::rest::Rest;
-use super::sampled::{Added, Controller, Loop, Sample};
+use super::sampled::{Added, Controller, Loop, SLIDES, Sample};
 use super::stepped::{Clocked, Commands, Decision, References};
 use crate::machine::Machine;
 use crate::mechanism::{DRIVES, State};

@@ -1,0 +1,71 @@
+//! The key figures of a move.
+
+use crate::metrics::Peak;
+
+/// A difference over time.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Deviation {
+    /// Its largest magnitude, with its sign, m.
+    pub peak: Peak,
+    /// Its root mean square over the time of the run, m.
+    pub rms: f64,
+    /// At the end, m.
+    pub last: f64,
+}
+
+/// The key figures of a move, by the role of the parts: peaks over all instants and not only over rows, integrals over
+/// time.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Figures {
+    /// Of what slides: the cart of an axis, bridge and cart of a gantry.
+    pub loads: Vec<LoadFigures>,
+    /// Of the drives.
+    pub drives: Vec<DriveFigures>,
+    /// Distance from the path, to its left above zero, of a machine with two coordinates. Exact where the nearest leg is
+    /// the same for a while; about corners its peak is sought between nine places of each piece of the motion.
+    pub contour: Option<Deviation>,
+    /// From the end of the profile, a shaper apart, until all that slides stays within the window around its target, s;
+    /// none if it does not.
+    pub settling: Option<f64>,
+}
+
+impl Figures {
+    /// The figures of the cart.
+    pub fn cart(&self) -> LoadFigures {
+        self.loads.last().copied().unwrap_or_default()
+    }
+
+    /// The figures of the first drive.
+    pub fn drive(&self) -> DriveFigures {
+        self.drives.first().copied().unwrap_or_default()
+    }
+}
+
+/// Key figures of what slides.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct LoadFigures {
+    /// x − y: its difference from its reference.
+    pub error: Deviation,
+    /// By how much it passes its target after the beginning of the last stroke, m.
+    pub overshoot: f64,
+}
+
+/// Key figures of a drive.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct DriveFigures {
+    /// r φ − y: its pulley from the reference of its part of the belt. A controller that makes up for the belt's stretch
+    /// means part of it.
+    pub following: Deviation,
+    /// Motor current: largest and root mean square, A.
+    pub current: (Peak, f64),
+    /// Motor voltage: largest and root mean square, V.
+    pub voltage: (Peak, f64),
+    /// Time during which the controller's own limit held its command back, s.
+    pub limited: f64,
+    /// Time during which the amplifier stood at its limit of voltage or current, s.
+    pub amplifier_limited: f64,
+    /// Electrical energy taken in and given back, J.
+    pub energy: (f64, f64),
+    /// Changes of direction of the command per second: what hunting sounds like.
+    pub restlessness: f64,
+}

@@ -1,0 +1,377 @@
+//! The observer that gathers the figures of a move.
+
+use super::contour::{Contour, ContourGauge};
+use super::figures::{DriveFigures, Figures, LoadFigures};
+use super::quadrature::{at_places, integral, larger, product, shifted, slope, square};
+use super::sampled::SLIDES;
+use crate::case::Experiment;
+use crate::machine::{Machine, SlideAt};
+use crate::mechanism::{Limit, Mechanism, Mode, Shown, State};
+use crate::metrics::{Held, Meter, Metrics, Peak, Sought};
+use crate::signal::profile::Profile;
+use crate::solve::{self, Curve, Gap, Observe, Polynomial, TERMS};
+
+/// A machine, and its mechanism with the readings of a move.
+pub(super) fn read(machine: &Machine) -> (&Machine, Mechanism) {
+    let mut mechanism = machine.mechanism();
+    mechanism.readings = machine.readings_of_move(&mechanism);
+    (machine, mechanism)
+}
+
+/// Gathers the figures of a move that it observes.
+pub(super) struct Gauge<'a> {
+    meter: Meter,
+    profiles: &'a [Profile],
+    window: f64,
+    loads: Vec<LoadGauge>,
+    drives: Vec<DriveGauge>,
+    contour: Option<ContourGauge>,
+    end: f64,
+    /// Whether the errors of what slides, settling and current are all that is asked for.
+    is_brief: bool,
+}
+
+/// What is gathered of something that slides.
+struct LoadGauge {
+    body: usize,
+    /// The reading of its position.
+    position: usize,
+    /// Its largest speed, of a machine whose readings have none.
+    peak_speed: Option<Peak>,
+    /// Where the drives have it minus where it is, as a sum of stretches: reading and weight.
+    stretches: Vec<(usize, f64)>,
+    /// Begin and direction of the last stroke that goes anywhere.
+    last_stroke: (f64, f64),
+    target: f64,
+    /// ∫ of the square of its error.
+    square: f64,
+    /// When it was outside its window for the last time after the profile, and whether it is now.
+    outside: Option<f64>,
+    is_outside: bool,
+    seen: LoadFigures,
+}
+
+/// What is gathered of a drive.
+struct DriveGauge {
+    pulley: usize,
+    /// The reading of its current.
+    current: usize,
+    voltage: Voltage,
+    /// Weights of the coordinates in the position of its part of the belt.
+    shares: &'static [f64],
+    /// ∫ of the squares of following error, voltage and current.
+    squares: [f64; 3],
+    /// Whether its amplifier stands at a limit where it is now.
+    saturated: bool,
+    seen: DriveFigures,
+}
+
+/// The voltage at a motor's terminals.
+enum Voltage {
+    /// A reading.
+    Read(usize),
+    /// R i + L di/dt + K_e n φ̇ of the reading of the shaft's speed behind the gear.
+    Computed { speed: usize, resistance: f64, inductance: f64, back_emf: f64 },
+}
+
+impl Voltage {
+    fn on(&self, curve: &Curve, current: &Polynomial) -> Polynomial {
+        match *self {
+            Self::Read(q) => curve.of(q),
+            Self::Computed { speed, resistance, inductance, back_emf } => {
+                let (rate, speed) = (slope(current, curve.length), curve.of(speed));
+                let sum = |k: usize| resistance * current.0[k] + inductance * rate.0[k] + back_emf * speed.0[k];
+                Polynomial(std::array::from_fn(sum))
+            }
+        }
+    }
+}
+
+impl LoadGauge {
+    fn new((slide, profile): (&SlideAt, &Profile), mechanism: &Mechanism) -> Self {
+        let find = |shown: Shown| mechanism.readings.iter().position(|reading| *reading == shown);
+        let strokes = profile.strokes().filter(|(_, _, distance, _)| *distance != 0.0);
+        let stretch = |&(span, weight): &(usize, f64)| Some((find(Shown::Stretch(span))?, weight));
+        Self {
+            body: slide.body,
+            position: find(Shown::Position(slide.body, 1.0)).unwrap_or_default(),
+            peak_speed: match find(Shown::Speed(slide.body, 1.0)) {
+                Some(_) => None,
+                None => Some(Peak::default()),
+            },
+            stretches: slide.error.iter().filter_map(stretch).collect(),
+            last_stroke: strokes.last().map_or((0.0, 0.0), |(begin, _, distance, _)| (begin, distance)),
+            target: profile.target(),
+            square: 0.0,
+            outside: None,
+            is_outside: false,
+            seen: LoadFigures::default(),
+        }
+    }
+
+    /// Where it is from its target, once the last stroke and the profile, which ends at `end`, have passed.
+    fn settle(&mut self, curve: &Curve, end: f64, window: f64) {
+        let mut away = curve.of(self.position);
+        away.0[0] -= self.target;
+        let share = |time: f64| ((time - curve.begin) / curve.length).max(0.0);
+        let (last, done) = (share(self.last_stroke.0), share(end));
+        if last < 1.0 && self.last_stroke.1 != 0.0 {
+            let beyond = if self.last_stroke.1 > 0.0 { away } else { away.negative() };
+            if beyond.bound() > self.seen.overshoot {
+                self.seen.overshoot = self.seen.overshoot.max(beyond.greatest(last, 1.0).1);
+            }
+        }
+        self.is_outside = done < 1.0 && away.at(1.0).abs() > window;
+        if done < 1.0 && away.bound() > window {
+            if self.is_outside {
+                self.outside = Some(curve.begin + curve.length);
+                return;
+            }
+            let edges = [-window, window].map(|edge| {
+                let mut beyond = away;
+                beyond.0[0] -= edge;
+                beyond.zeros(done, 1.0).last().copied()
+            });
+            if let Some(s) = edges.into_iter().flatten().reduce(f64::max) {
+                self.outside = Some(curve.begin + s * curve.length);
+            }
+        }
+    }
+}
+
+impl DriveGauge {
+    fn new(machine: &Machine, mechanism: &Mechanism, drive: usize) -> Self {
+        let find = |shown: Shown| mechanism.readings.iter().position(|reading| *reading == shown);
+        let mechanisms_drive = &mechanism.drives[drive];
+        let motor = &mechanisms_drive.motor;
+        Self {
+            pulley: mechanisms_drive.pulley,
+            current: find(Shown::Current(drive)).unwrap_or_default(),
+            voltage: match find(Shown::Voltage(drive)) {
+                Some(q) => Voltage::Read(q),
+                None => Voltage::Computed {
+                    speed: find(Shown::Speed(mechanisms_drive.shaft, 1.0)).unwrap_or_default(),
+                    resistance: motor.resistance,
+                    inductance: motor.inductance,
+                    back_emf: motor.gear_ratio * motor.back_emf_constant,
+                },
+            },
+            shares: machine.belt_shares()[drive],
+            squares: [0.0; 3],
+            saturated: false,
+            seen: DriveFigures::default(),
+        }
+    }
+
+    /// Adds voltage and current over a curve.
+    fn power(&mut self, curve: &Curve, is_brief: bool) {
+        let i = curve.of(self.current);
+        if is_brief {
+            self.squares[2] += curve.length * integral((0.0, 1.0), |s| i.at(s).powi(2));
+            return;
+        }
+        let v = self.voltage.on(curve, &i);
+        larger(&mut self.seen.voltage.0, &v, (0.0, 1.0), curve);
+        larger(&mut self.seen.current.0, &i, (0.0, 1.0), curve);
+        let h = curve.length;
+        let (volts, amperes) = (at_places(&v), at_places(&i));
+        self.squares[1] += h * product(&volts, &volts);
+        self.squares[2] += h * product(&amperes, &amperes);
+        // Energy that goes in and energy that comes back, parted where either changes its sign.
+        let mut count = |energy: f64| {
+            if energy > 0.0 { self.seen.energy.0 += energy } else { self.seen.energy.1 -= energy }
+        };
+        if v.keeps_its_sign() && i.keeps_its_sign() {
+            count(h * product(&volts, &amperes));
+        } else {
+            let mut seams = vec![0.0, 1.0];
+            for turning in [v, i].iter().filter(|quantity| !quantity.keeps_its_sign()) {
+                seams.extend(turning.zeros(0.0, 1.0));
+            }
+            seams.sort_by(f64::total_cmp);
+            for pair in seams.windows(2) {
+                count(h * integral((pair[0], pair[1]), |s| v.at(s) * i.at(s)));
+            }
+        }
+        if self.saturated {
+            self.seen.amplifier_limited += h;
+        }
+    }
+}
+
+impl<'a> Gauge<'a> {
+    pub(super) fn new(machine: &Machine, experiment: &Experiment, profiles: &'a [Profile], window: f64) -> Self {
+        let (_, mechanism) = read(machine);
+        let loads = machine.geometry().slides.iter().zip(profiles);
+        Self {
+            meter: Meter::with(machine, &Sought::all(machine, &mechanism), Held::last(experiment)),
+            profiles,
+            window,
+            loads: loads.map(|load| LoadGauge::new(load, &mechanism)).collect(),
+            drives: (0..machine.drives.len()).map(|drive| DriveGauge::new(machine, &mechanism, drive)).collect(),
+            contour: Contour::along(profiles).map(ContourGauge::new),
+            end: 0.0,
+            is_brief: false,
+        }
+    }
+
+    /// For the errors of what slides, settling and current alone.
+    pub(super) fn briefly(self) -> Self {
+        Self { is_brief: true, ..self }
+    }
+
+    /// Adds the motion over the part of a curve on which the references are one polynomial each.
+    fn track(&mut self, curve: &Curve, part: (f64, f64), references: &[Polynomial]) {
+        let mut errors = [Polynomial([0.0; TERMS]); SLIDES];
+        let mut places = [Polynomial([0.0; TERMS]); SLIDES];
+        for ((load, reference), (error, place)) in
+            self.loads.iter_mut().zip(references).zip(errors.iter_mut().zip(&mut places))
+        {
+            let x = curve.of(load.position);
+            *place = x;
+            // x − y
+            *error = Polynomial(std::array::from_fn(|k| x.0[k] - reference.0[k]));
+            larger(&mut load.seen.error.peak, error, part, curve);
+            load.square += curve.length * square(error, part);
+            if let (Some(peak), false) = (&mut load.peak_speed, self.is_brief) {
+                larger(peak, &slope(&x, curve.length), part, curve);
+            }
+        }
+        if self.is_brief {
+            return;
+        }
+        for drive in &mut self.drives {
+            // r φ − y as a sum over x − y and the stretches between; r φ₁ − y = x − y + d₁ of an axis
+            let mut following = Polynomial([0.0; TERMS]);
+            for ((load, error), share) in self.loads.iter().zip(&errors).zip(drive.shares) {
+                following.0.iter_mut().zip(error.0).for_each(|(sum, term)| *sum += share * term);
+                for &(stretch, weight) in &load.stretches {
+                    let stretch = curve.of(stretch);
+                    following.0.iter_mut().zip(stretch.0).for_each(|(sum, term)| *sum += share * weight * term);
+                }
+            }
+            larger(&mut drive.seen.following.peak, &following, part, curve);
+            drive.squares[0] += curve.length * square(&following, part);
+        }
+        if let Some(contour) = &mut self.contour {
+            contour.track(curve, part, &places);
+        }
+    }
+
+    pub(super) fn finish(self, events: &[solve::Event]) -> (Figures, Metrics) {
+        let end = self.profiles.first().map_or(0.0, Profile::end);
+        let mean = |sum: f64| (sum / self.end.max(f64::MIN_POSITIVE)).sqrt();
+        let mut metrics = self.meter.finish(events);
+        for (load, peak) in metrics.loads.iter_mut().zip(self.loads.iter().map(|load| load.peak_speed)) {
+            load.peak_speed = peak.unwrap_or(load.peak_speed);
+        }
+        let left = self.loads.iter().filter_map(|load| load.outside).reduce(f64::max);
+        let is_outside = self.loads.iter().any(|load| load.is_outside);
+        let figures = Figures {
+            settling: match left {
+                _ if self.end < end || is_outside => None,
+                None => Some(0.0),
+                Some(last) => Some(last - end),
+            },
+            contour: self.contour.map(|contour| contour.finish(self.end)),
+            loads: self
+                .loads
+                .into_iter()
+                .map(|mut load| {
+                    load.seen.error.rms = mean(load.square);
+                    load.seen
+                })
+                .collect(),
+            drives: self
+                .drives
+                .into_iter()
+                .map(|mut drive| {
+                    let [following, voltage, current] = drive.squares.map(mean);
+                    let seen = &mut drive.seen;
+                    (seen.following.rms, seen.voltage.1, seen.current.1) = (following, voltage, current);
+                    drive.seen
+                })
+                .collect(),
+        };
+        (figures, metrics)
+    }
+}
+
+impl Observe for Gauge<'_> {
+    fn pass(&mut self, gap: &Gap) -> bool {
+        if self.is_brief {
+            return true;
+        }
+        self.meter.pass(gap);
+        for (number, drive) in self.drives.iter_mut().enumerate() {
+            let mode = &gap.mode.drive[number];
+            drive.saturated = mode.voltage != Limit::Inside || mode.current != Limit::Inside;
+            let current = Some((&mut drive.seen.current.0, drive.current));
+            let voltage = match drive.voltage {
+                Voltage::Read(q) => Some((&mut drive.seen.voltage.0, q)),
+                Voltage::Computed { .. } => None,
+            };
+            for (peak, q) in [voltage, current].into_iter().flatten() {
+                for (value, time) in [(gap.from[q], gap.begin), (gap.to[q], gap.begin + gap.length)] {
+                    if value.abs() > peak.value.abs() {
+                        *peak = Peak { value, time };
+                    }
+                }
+            }
+        }
+        true
+    }
+
+    fn see(&mut self, curve: &Curve) {
+        if !self.is_brief {
+            self.meter.see(curve);
+        }
+        for drive in &mut self.drives {
+            drive.power(curve, self.is_brief);
+        }
+        // A seam that is as near as rounding is behind.
+        let shortest = SHORTEST + 16.0 * f64::EPSILON * (curve.begin + curve.length) / curve.length;
+        let mut from = 0.0;
+        while from < 1.0 {
+            let begin = curve.begin + from * curve.length;
+            let (mut references, mut seam) = ([Polynomial([0.0; TERMS]); SLIDES], f64::INFINITY);
+            for (reference, profile) in references.iter_mut().zip(self.profiles) {
+                let (coefficients, until) = profile.piece(begin);
+                *reference = shifted(&coefficients, from, curve.length);
+                seam = seam.min(until);
+            }
+            let to = ((seam - curve.begin) / curve.length).max(from + shortest).min(1.0);
+            self.track(curve, (from, to), &references);
+            from = to;
+        }
+        let end = self.profiles.first().map_or(0.0, Profile::end);
+        for load in &mut self.loads {
+            load.settle(curve, end, self.window);
+        }
+    }
+
+    fn sees_all(&self) -> bool {
+        true
+    }
+
+    fn end(&mut self, time: f64, state: &State, mode: &Mode) {
+        self.meter.end(time, state, mode);
+        self.end = time;
+        let mut references = [0.0; SLIDES];
+        for ((load, profile), reference) in self.loads.iter_mut().zip(self.profiles).zip(&mut references) {
+            *reference = profile.at(time).position;
+            load.seen.error.last = state.position[load.body] - *reference;
+        }
+        let radius = self.meter.machine().pulley_radius;
+        for drive in &mut self.drives {
+            let y: f64 = drive.shares.iter().zip(references).map(|(share, reference)| share * reference).sum();
+            drive.seen.following.last = radius * state.position[drive.pulley] - y;
+        }
+        if let (Some(contour), [x, y]) = (&mut self.contour, &self.loads[..]) {
+            contour.end(time, [x.body, y.body].map(|body| state.position[body]));
+        }
+    }
+}
+
+/// Least share of a curve that a piece of the reference is looked at.
+const SHORTEST: f64 = 1e-9;

@@ -1,0 +1,60 @@
+//! Rows of a move, with where everything should be.
+
+use super::contour::Contour;
+use crate::machine::{Machine, SlideAt};
+use crate::signal::profile::Profile;
+use crate::trajectory::{Column, Trajectory};
+
+/// Blocks of rows with references and errors behind their own columns.
+pub(super) struct Wide {
+    block: Trajectory,
+    /// Columns of the positions, and names of the references and errors that go with them.
+    loads: Vec<[String; 3]>,
+}
+
+impl Wide {
+    pub(super) fn of(machine: &Machine) -> Self {
+        let slides = machine.geometry().slides;
+        let names = |slide: &SlideAt| {
+            let key = machine.geometry().label(slide.body).key;
+            let reference = if slides.len() == 1 { "reference".to_string() } else { format!("{key}_reference") };
+            [format!("{key}_position"), reference, format!("{key}_error")]
+        };
+        Self { block: Trajectory::default(), loads: slides.iter().map(names).collect() }
+    }
+
+    pub(super) fn widened(&mut self, profiles: &[Profile], block: &Trajectory) -> &Trajectory {
+        let (own, loads) = (block.columns.len(), self.loads.len());
+        let contour = Contour::along(profiles);
+        let added = 2 * loads + usize::from(contour.is_some());
+        if self.block.columns.len() != own + added {
+            self.block.columns.clone_from(&block.columns);
+            let names = self.loads.iter().map(|names| &names[1]).chain(self.loads.iter().map(|names| &names[2]));
+            self.block.columns.extend(names.map(|name| Column::new(name.as_str(), "m")));
+            if contour.is_some() {
+                self.block.columns.push(Column::new("contour_error", "m"));
+            }
+        }
+        let time = block.get("time").unwrap_or(&[]);
+        let place = |names: &[String; 3]| block.get(&names[0]).unwrap_or(&[]);
+        let references: Vec<Vec<f64>> =
+            profiles.iter().map(|profile| time.iter().map(|&t| profile.at(t).position).collect()).collect();
+        let error = |(names, reference): (&[String; 3], &Vec<f64>)| -> Vec<f64> {
+            place(names).iter().zip(reference).map(|(x, y)| x - y).collect()
+        };
+        let errors: Vec<Vec<f64>> = self.loads.iter().zip(&references).map(error).collect();
+        let away: Option<Vec<f64>> = match (contour, &self.loads[..]) {
+            (Some(contour), [x, y]) => {
+                let points = place(x).iter().zip(place(y)).zip(time);
+                Some(points.map(|((x, y), time)| contour.nearest(*time, [*x, *y]).0).collect())
+            }
+            _ => None,
+        };
+        let own = block.columns.iter().map(|column| &column.values);
+        let sources = own.chain(&references).chain(&errors).chain(&away);
+        for (to, from) in self.block.columns.iter_mut().zip(sources) {
+            to.values.clone_from(from);
+        }
+        &self.block
+    }
+}
