@@ -874,7 +874,7 @@ pub(crate) const CAUSE_STEPS: usize = 4;
 /// Starts that are fitted whole, the best of those that were ranked.
 ///
 /// Unit: starts. Source: chosen.
-pub(crate) const CAUSES_FITTED: usize = 4;
+pub(crate) const CAUSES_FITTED: usize = 6;
 
 /// Starts of one element that are fitted whole.
 ///
@@ -970,3 +970,33 @@ pub(crate) const CAUSE_AROUND: [f64; 2] = [0.1, 10.0];
 ///
 /// Unit: 1. Source: chosen: less is not seen, and takes long to simulate.
 pub(crate) const KNOWN_SHARES: [f64; 2] = [0.05, 0.95];
+
+/// Factors of gears that are tried, and their reciprocals.
+///
+/// Unit: 1. Source: whole numbers up to 5, and a digit.
+pub(crate) const GEAR_FACTORS: [f64; 5] = [2.0, 3.0, 4.0, 5.0, 10.0];
+
+/// First size of a force on the cart that is tried.
+///
+/// Unit: the motor's force at the greatest input. Source: chosen.
+pub(crate) const FORCE_FIRST: f64 = 0.01;
+
+/// Points of a drag over the speed.
+///
+/// Unit: points. Source: straight lines are then within 0.3 % of the greatest drag.
+pub(crate) const DRAG_POINTS: usize = 21;
+
+/// Points of friction that falls with speed, on either side of zero.
+///
+/// Unit: Stribeck velocities. Source: 0.2 % of the fall is left at the last.
+pub(crate) const STRIBECK_POINTS: [f64; 9] = [0.2, 0.4, 0.6, 0.8, 1.0, 1.25, 1.5, 2.0, 2.5];
+
+/// Points in a turn of a force that comes again with it.
+///
+/// Unit: points. Source: chosen.
+pub(crate) const RIPPLE_POINTS: usize = 10;
+
+/// Phases of it that are tried, over half a turn.
+///
+/// Unit: 1. Source: what lies between two of them is met to cos² 22.5° = 85 %.
+pub(crate) const RIPPLE_PHASES: usize = 4;

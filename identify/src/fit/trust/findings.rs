@@ -176,7 +176,9 @@ fn of_search(fit: &Fit) -> Vec<Finding> {
         );
         all.push(finding(Grade::Note, "other_law", text));
     }
-    for Wave { quantity, length, amplitude } in &fit.waves {
+    // An element explains more than what comes again along the travel by chance of the motion.
+    let waves = fit.waves.iter().filter(|_| fit.cause.is_none());
+    for Wave { quantity, length, amplitude } in waves {
         let text = format!(
             "{}: its error repeats with position, by ±{} every {}; the intervals are widened by what that moves",
             quantity.name(),
@@ -203,7 +205,7 @@ fn of_cause(fit: &Fit) -> Option<Finding> {
     let moved = if moved.is_empty() { "no estimate moves by a hundredth".to_string() } else { moved.join(", ") };
     let text = format!(
         "{} explains {:.0} % of what is left, and predicts {} of {} parts of the logs better that were held out: {moved}; \
-         the intervals are widened to contain that; add {}",
+         the intervals are widened to contain that; {}",
         found.words,
         100.0 * found.explained,
         found.better[0],

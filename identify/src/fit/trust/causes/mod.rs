@@ -13,6 +13,9 @@
 //! intervals of half-width h become √(h² + 2 (d² + h′²)) ≥ d + h′, h′ that of the fit with the element.
 
 mod extension;
+mod force;
+mod gear;
+mod stamp;
 mod tried;
 
 use super::doubts::{Cause, OtherLaw};
@@ -48,8 +51,8 @@ pub(crate) fn cause(
     let before = found.best.cost;
     let mut ranked: Vec<Tried> = EXTENSIONS
         .iter()
-        .flat_map(|extension| extension.tries(&site))
-        .filter_map(|extended| Tried::begun(&site, extended, CAUSE_STEPS))
+        .flat_map(|row| (row.tries)(&site).into_iter().map(move |extended| (row, extended)))
+        .filter_map(|(row, extended)| Tried::begun(&site, row, extended, CAUSE_STEPS))
         .filter(|tried| tried.cost() < CAUSE_NEAR * before)
         .collect();
     ranked.sort_by(|a, b| a.cost().total_cmp(&b.cost()));
@@ -68,7 +71,7 @@ pub(crate) fn cause(
             return None;
         }
         let Some(known) = tried.judged() else { continue };
-        let standard_errors = tried.standard_errors(&known);
+        let standard_errors = tried.standard_errors(before, &known);
         if standard_errors < CAUSE_ERRORS {
             continue;
         }
