@@ -10,6 +10,7 @@
 #[path = "../tests/common"]
 mod common {
     pub mod chance;
+    pub mod logged;
     pub mod truths;
 }
 
@@ -23,7 +24,7 @@ use std::sync::{Arc, Mutex};
 use taut::case::{Case, Plan, TEMPLATE};
 use taut::chance::normal;
 use taut::fit::least_squares::{Differences, Residuals};
-use taut::fit::{Grade, Problem, fit, inverse_of_square};
+use taut::fit::{Finding, Grade, Problem, fit, inverse_of_square};
 use taut::friction::{Law, Shape};
 use taut::log::{Log, Output, Quantity};
 use taut::machine::axis::{CART, DRIVE, IDLER};
@@ -457,9 +458,9 @@ impl Truth {
             Truth::Spring | Truth::SpringAtMotor => &["spring"],
             Truth::Play => &["play"],
             Truth::Late => &["delay"],
-            Truth::LuGre => &["stribeck"],
+            Truth::LuGre => &["stribeck", "lugre"],
             Truth::Drag => &["drag"],
-            Truth::Drift => &["other_law"],
+            Truth::Drift => &["drift", "sway"],
         }
     }
 }
@@ -477,19 +478,25 @@ fn named(truth: Truth, seed: u64, is_told: bool, sum: &Mutex<Named>) {
     };
     (0..3).filter(|&j| inside(j)).for_each(|j| sum.held[j] += 1);
     sum.wide.extend(fitted.estimates[0].interval.map(|[low, high]| 0.5 * (high - low) / values[0]));
-    let codes = ["spring", "play", "ratio", "delay", "drag", "stribeck", "load", "ripple", "other_law", "place"];
+    let codes =
+        ["spring", "play", "ratio", "delay", "drag", "stribeck", "lugre", "load", "ripple", "other_law", "place"];
     let is_right = |code: &str| truth.causes().contains(&code);
     if is_told {
         let off = |j: usize| if inside(j) { "holds" } else { "does not hold" };
         let lines: Vec<String> = fitted.findings.iter().map(|one| format!("\n  {}: {one}", one.code)).collect();
         eprintln!("{seed}: {}, {}, {}{}", off(0), off(1), off(2), lines.concat());
     }
-    let told = || fitted.findings.iter().filter(|one| codes.contains(&one.code));
-    sum.right += usize::from(told().any(|one| is_right(one.code)));
-    sum.wrong += usize::from(told().any(|one| !is_right(one.code)));
-    let warned = |one: &&taut::fit::Finding| one.grade == Grade::Warning;
-    sum.warned += usize::from(fitted.findings.iter().any(|one| warned(&one)));
-    let is_named = told().any(|one| warned(&one) && is_right(one.code));
+    // A friction law by its own name.
+    let key = |one: &Finding| match (one.code, &fitted.other_law) {
+        ("other_law", Some(law)) => law.key,
+        (code, _) => code,
+    };
+    let told: Vec<(&str, Grade)> =
+        fitted.findings.iter().filter(|one| codes.contains(&one.code)).map(|one| (key(one), one.grade)).collect();
+    sum.right += usize::from(told.iter().any(|(code, _)| is_right(code)));
+    sum.wrong += usize::from(told.iter().any(|(code, _)| !is_right(code)));
+    sum.warned += usize::from(fitted.findings.iter().any(|one| one.grade == Grade::Warning));
+    let is_named = told.iter().any(|(code, grade)| *grade == Grade::Warning && is_right(code));
     sum.safe += (0..3).filter(|&j| is_named || inside(j)).count();
     sum.safe_machines += usize::from(is_named || (0..3).all(inside));
 }

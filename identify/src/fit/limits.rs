@@ -1000,3 +1000,18 @@ pub(crate) const RIPPLE_POINTS: usize = 10;
 ///
 /// Unit: 1. Source: what lies between two of them is met to cos² 22.5° = 85 %.
 pub(crate) const RIPPLE_PHASES: usize = 4;
+
+/// Cost with an element, relative to that without, below which no element that takes long is tried.
+///
+/// Unit: 1. Source: chosen.
+pub(crate) const CAUSE_ENOUGH: f64 = 0.1;
+
+/// Most values of logs for which elements are tried that take long.
+///
+/// Unit: values. Source: chosen: bounds the time.
+pub(crate) const CAUSE_SLOW_VALUES: usize = 10_000;
+
+/// Damped Gauss-Newton steps of a fit with such an element.
+///
+/// Unit: steps. Source: chosen: bounds the time.
+pub(crate) const CAUSE_SLOW_STEPS: usize = 12;

@@ -30,6 +30,7 @@ use crate::machine::Machine;
 use crate::number::engineering;
 use crate::solve::Bench;
 use nalgebra::{DMatrix, DVector};
+use std::f64::consts::TAU;
 
 /// A body of an axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -76,6 +77,25 @@ enum Kind {
     Sided,
     /// All friction less at the begin of each log, and as much more at its end, as a share of it.
     Drift,
+    /// All friction by one sine along each log, as a share of it.
+    Sway,
+}
+
+impl Kind {
+    /// Its name in results.
+    fn key(self) -> &'static str {
+        match self {
+            Kind::Stribeck(_) => "stribeck",
+            Kind::Sided => "sided",
+            Kind::Drift => "drift",
+            Kind::Sway => "sway",
+        }
+    }
+
+    /// Whether the machine changes along a log, and its amplitude is a share of friction.
+    fn is_along(self) -> bool {
+        matches!(self, Kind::Drift | Kind::Sway)
+    }
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -89,7 +109,7 @@ struct Candidate {
 impl Candidate {
     /// The amplitude that is tried first.
     fn first(self) -> f64 {
-        LAW_FIRST * if self.kind == Kind::Drift { 1.0 } else { self.coulomb }
+        LAW_FIRST * if self.kind.is_along() { 1.0 } else { self.coulomb }
     }
 
     /// Puts so much of the law into a machine, at this share of a log.
@@ -108,8 +128,9 @@ impl Candidate {
                     side.breakaway = side.breakaway.max(side.coulomb);
                 }
             }
-            Kind::Drift => {
-                let factor = 1.0 + amplitude * (2.0 * share - 1.0);
+            Kind::Drift | Kind::Sway => {
+                let along = if self.kind == Kind::Drift { 2.0 * share - 1.0 } else { (TAU * share).sin() };
+                let factor = 1.0 + amplitude * along;
                 for side in [&mut friction.forward, &mut friction.backward] {
                     side.viscous *= factor;
                     side.coulomb *= factor;
@@ -124,7 +145,7 @@ impl Candidate {
         match self.kind {
             Kind::Stribeck(_) => (LAW_LEAST * self.coulomb, LAW_MOST * self.coulomb),
             Kind::Sided => (-0.9 * self.coulomb, 0.9 * self.coulomb),
-            Kind::Drift => (-0.9, 0.9),
+            Kind::Drift | Kind::Sway => (-0.9, 0.9),
         }
     }
 
@@ -147,6 +168,11 @@ impl Candidate {
                 "friction of the {whose} that {} by {} % from the begin of each log to its end",
                 if amplitude > 0.0 { "rises" } else { "falls" },
                 percent(200.0 * amplitude.abs())
+            ),
+            Kind::Sway => format!(
+                "friction of the {whose} that {} along each log by a sine of ±{} %",
+                if amplitude > 0.0 { "rises and falls" } else { "falls and rises" },
+                percent(100.0 * amplitude.abs())
             ),
         }
     }
@@ -230,7 +256,7 @@ fn candidates(problem: &Problem, x: &[f64]) -> Vec<Candidate> {
         }
         let fastest = fastest(problem, x, body);
         all.extend(STRIBECK_SHARES.map(|share| Candidate { body, kind: Kind::Stribeck(share * fastest), coulomb }));
-        all.extend([Kind::Sided, Kind::Drift].map(|kind| Candidate { body, kind, coulomb }));
+        all.extend([Kind::Sided, Kind::Drift, Kind::Sway].map(|kind| Candidate { body, kind, coulomb }));
     }
     all
 }
@@ -267,7 +293,7 @@ impl Place<'_> {
             };
             let rows = &mut moved[first..first + run.rows()];
             let good = match candidate.kind {
-                Kind::Drift => {
+                Kind::Drift | Kind::Sway => {
                     let stages: Vec<Machine> =
                         (0..DRIFT_PARTS).map(|k| with((k as f64 + 0.5) / DRIFT_PARTS as f64)).collect();
                     drifting::residuals(run, &stages, &extras, rows)
@@ -319,8 +345,18 @@ impl Place<'_> {
         // one of its kind, and the true one may do half as much again.
         let square = &shift * shift.transpose();
         let added = &square * (3.0 / (NORMAL * NORMAL)) + square * (error / tried.amplitude).powi(2);
-        let Candidate { body, .. } = tried.candidate;
+        let Candidate { body, kind, .. } = tried.candidate;
+        let explained = tried.gain / self.residuals.norm_squared();
         let words = tried.candidate.words(tried.amplitude);
-        Some(OtherLaw { body: body.key(), words, standard_errors, gain: tried.gain, off, added })
+        Some(OtherLaw {
+            key: kind.key(),
+            body: body.key(),
+            words,
+            explained,
+            standard_errors,
+            gain: tried.gain,
+            off,
+            added,
+        })
     }
 }

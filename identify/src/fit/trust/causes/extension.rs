@@ -25,19 +25,31 @@ pub(super) struct Extension {
     pub words: fn(&Site, &Extended, &Fitted) -> Said,
     /// A machine of the case with it as one of the case without it.
     pub without: fn(&Site, Machine) -> Machine,
+    /// Whether it takes a curved law, whose runs take a hundred times as long.
+    pub is_slow: bool,
 }
 
 /// All of them.
 pub(super) const EXTENSIONS: &[Extension] = &[
-    Extension { key: "spring", tries: gear::springs, words: gear::spring_words, without: gear::without },
-    Extension { key: "play", tries: gear::plays, words: gear::play_words, without: gear::without },
-    Extension { key: "ratio", tries: gear::ratios, words: gear::ratio_words, without: as_it_is },
-    Extension { key: "delay", tries: stamp::delays, words: stamp::words, without: as_it_is },
-    Extension { key: "drag", tries: force::drags, words: force::drag_words, without: force::without },
-    Extension { key: "stribeck", tries: force::falls, words: force::fall_words, without: force::without_fall },
-    Extension { key: "load", tries: force::loads, words: force::load_words, without: as_it_is },
-    Extension { key: "ripple", tries: force::ripples, words: force::ripple_words, without: force::without },
+    row("spring", gear::springs, gear::spring_words, gear::without),
+    row("play", gear::plays, gear::play_words, gear::without),
+    row("ratio", gear::ratios, gear::ratio_words, as_it_is),
+    row("delay", stamp::delays, stamp::words, as_it_is),
+    row("drag", force::drags, force::drag_words, force::without),
+    row("stribeck", force::falls, force::fall_words, force::without_fall),
+    row("load", force::loads, force::load_words, as_it_is),
+    row("ripple", force::ripples, force::ripple_words, force::without),
+    Extension { is_slow: true, ..row("lugre", force::bristles, force::bristle_words, force::without_bristles) },
 ];
+
+const fn row(
+    key: &'static str,
+    tries: fn(&Site) -> Vec<Extended>,
+    words: fn(&Site, &Extended, &Fitted) -> Said,
+    without: fn(&Site, Machine) -> Machine,
+) -> Extension {
+    Extension { key, tries, words, without, is_slow: false }
+}
 
 fn as_it_is(_: &Site, machine: Machine) -> Machine {
     machine

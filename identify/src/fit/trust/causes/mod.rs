@@ -25,36 +25,37 @@ use crate::case::{Case, Plan};
 use crate::fit::asked::problem::Stop;
 use crate::fit::asked::run::Run;
 use crate::fit::limits::{
-    CAUSE_ERRORS, CAUSE_EXPLAINS, CAUSE_MOST_VALUES, CAUSE_NEAR, CAUSE_STEPS, CAUSES_FITTED, COLOURED, NORMAL,
-    ROUGH_TOLERANCE, STARTS_FITTED, STEPS_IN_PART,
+    CAUSE_ENOUGH, CAUSE_ERRORS, CAUSE_EXPLAINS, CAUSE_MOST_VALUES, CAUSE_NEAR, CAUSE_SLOW_STEPS, CAUSE_SLOW_VALUES,
+    CAUSE_STEPS, CAUSES_FITTED, COLOURED, NORMAL, ROUGH_TOLERANCE, STARTS_FITTED, STEPS_IN_PART,
 };
 use crate::fit::search::point::Options;
 use crate::fit::search::starts::Searched;
 use crate::machine::Kind;
-use extension::{EXTENSIONS, Site};
+use extension::{EXTENSIONS, Extension, Site};
 use nalgebra::{DMatrix, DVector};
 use tried::Tried;
 
 /// The element that explains most of what the fit leaves; none where none is accepted, or `law`, a friction law,
-/// explains more.
+/// explains more. `is_off`: parts of the logs disagree, or the residuals suggest a law.
 pub(crate) fn cause(
     case: &Case,
     plan: &Plan,
     found: &Searched,
     judged: &Judged,
-    law: Option<&OtherLaw>,
+    (law, is_off): (Option<&OtherLaw>, bool),
 ) -> Option<Cause> {
     if !is_asked(case, plan, found, judged) {
         return None;
     }
     let site = Site::new(case, plan, found);
     let before = found.best.cost;
-    let mut ranked: Vec<Tried> = EXTENSIONS
-        .iter()
-        .flat_map(|row| (row.tries)(&site).into_iter().map(move |extended| (row, extended)))
-        .filter_map(|(row, extended)| Tried::begun(&site, row, extended, CAUSE_STEPS))
-        .filter(|tried| tried.cost() < CAUSE_NEAR * before)
-        .collect();
+    let begun = |row: &'static Extension, steps: usize| {
+        let tries = (row.tries)(&site).into_iter();
+        let begun = tries.filter_map(|extended| Tried::begun(&site, row, extended, steps));
+        begun.filter(|tried| tried.cost() < CAUSE_NEAR * before).collect::<Vec<_>>()
+    };
+    let (slow, quick): (Vec<_>, Vec<_>) = EXTENSIONS.iter().partition(|row| row.is_slow);
+    let mut ranked: Vec<Tried> = quick.into_iter().flat_map(|row| begun(row, CAUSE_STEPS)).collect();
     ranked.sort_by(|a, b| a.cost().total_cmp(&b.cost()));
     let mut kinds = Vec::new();
     ranked.retain(|tried| {
@@ -63,6 +64,11 @@ pub(crate) fn cause(
     });
     ranked.truncate(CAUSES_FITTED);
     let mut whole: Vec<Tried> = ranked.into_iter().filter_map(Tried::fitted).collect();
+    let least = whole.iter().map(Tried::cost).fold(before, f64::min);
+    // What takes long is tried where something is off that the others leave.
+    if is_off && least > CAUSE_ENOUGH * before && found.problem.counted() <= CAUSE_SLOW_VALUES {
+        whole.extend(slow.into_iter().flat_map(|row| begun(row, CAUSE_SLOW_STEPS)));
+    }
     whole.sort_by(|a, b| a.cost().total_cmp(&b.cost()));
     for tried in whole {
         let gain = 2.0 * (before - tried.cost());
