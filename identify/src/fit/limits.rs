@@ -475,6 +475,11 @@ pub(crate) const LAW_MOST: f64 = 3.0;
 /// `the_right_law_is_not_suspected`.
 pub(crate) const LAW_SHOWN: f64 = 3.0;
 
+/// Share of what the column of another law promises that a run with it must bear out.
+///
+/// Unit: 1. Source: chosen. Test: `the_right_model_lacks_nothing`.
+pub(crate) const LAW_KEEPS: f64 = 0.25;
+
 /// Change of the outputs that another law must make, as a share of their range.
 ///
 /// Unit: 1. Source: below are the last digits of logs and solvers. Test: `last_digits_of_a_log_speak_for_no_law`.
@@ -991,16 +996,6 @@ pub(crate) const DRAG_POINTS: usize = 21;
 /// Unit: Stribeck velocities. Source: 0.2 % of the fall is left at the last.
 pub(crate) const STRIBECK_POINTS: [f64; 9] = [0.2, 0.4, 0.6, 0.8, 1.0, 1.25, 1.5, 2.0, 2.5];
 
-/// Points in a turn of a force that comes again with it.
-///
-/// Unit: points. Source: chosen.
-pub(crate) const RIPPLE_POINTS: usize = 10;
-
-/// Phases of it that are tried, over half a turn.
-///
-/// Unit: 1. Source: what lies between two of them is met to cos² 22.5° = 85 %.
-pub(crate) const RIPPLE_PHASES: usize = 4;
-
 /// Cost with an element, relative to that without, below which no element that takes long is tried.
 ///
 /// Unit: 1. Source: chosen.
@@ -1015,3 +1010,8 @@ pub(crate) const CAUSE_SLOW_VALUES: usize = 10_000;
 ///
 /// Unit: steps. Source: chosen: bounds the time.
 pub(crate) const CAUSE_SLOW_STEPS: usize = 12;
+
+/// Greatest size of a force on the cart that has one sign, relative to its first.
+///
+/// Unit: 1. Source: chosen: a hundred times the motor's greatest force.
+pub(crate) const FORCE_MOST: f64 = 1e4;

@@ -329,7 +329,7 @@ fn over_travel(case: &Case) -> impl Iterator<Item = f64> {
 }
 
 /// Where the cart is in the logs, m.
-pub(crate) fn travel(case: &Case) -> (f64, f64) {
+fn travel(case: &Case) -> (f64, f64) {
     let r = case.machine.pulley_radius;
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
     for log in case.experiments.iter().filter_map(|experiment| experiment.log.as_ref()) {

@@ -7,7 +7,7 @@
 //! error, L. Breiman and others 1984).
 
 pub(crate) mod drift;
-pub(crate) mod laws;
+mod laws;
 
 pub use laws::FrictionLaw;
 

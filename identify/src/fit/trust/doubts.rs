@@ -25,7 +25,7 @@ pub struct OtherLaw {
     pub body: &'static str,
     /// In words, with its size.
     pub words: String,
-    /// The share of the sum of squared residuals that it explains, to first order.
+    /// The share of the sum of squared residuals that it explains.
     pub explained: f64,
     /// Its amplitude in standard errors.
     pub standard_errors: f64,
@@ -40,7 +40,7 @@ pub struct OtherLaw {
 /// An element that the model lacks and the logs show.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cause {
-    /// Its key: `spring`, `play`, `ratio`, `delay`, `drag`, `stribeck`, `lugre`, `load`, `ripple`.
+    /// Its key: `spring`, `play`, `ratio`, `delay`, `drag`, `stribeck`, `lugre`, `load`.
     pub key: &'static str,
     /// In words, with its size.
     pub words: String,

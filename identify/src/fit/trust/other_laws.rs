@@ -10,7 +10,8 @@
 //! ```
 //!
 //! d is what the law would change of the parameters: the bias of a variable that was left out. Where a is more than
-//! noise makes of it, intervals are widened by d, and it is said which law it is.
+//! noise makes of it, and a run with the law and the parameters moved by d bears out what the column promises, intervals
+//! are widened by d, and it is said which law it is.
 
 use super::doubts::OtherLaw;
 use super::uncertainty::Judged;
@@ -18,7 +19,7 @@ use crate::fit::asked::drifting;
 use crate::fit::asked::problem::Problem;
 use crate::fit::asked::run::Run;
 use crate::fit::limits::{
-    DRIFT_PARTS, FILE_ROUNDING, LAW_DUST, LAW_FIRST, LAW_LEAST, LAW_MOST, LAW_ROUNDS, LAW_SHOWN, NORMAL,
+    DRIFT_PARTS, FILE_ROUNDING, LAW_DUST, LAW_FIRST, LAW_KEEPS, LAW_LEAST, LAW_MOST, LAW_ROUNDS, LAW_SHOWN, NORMAL,
     STRIBECK_SHARES,
 };
 use crate::fit::noise::{half_width, spreads};
@@ -203,6 +204,8 @@ struct Tried {
 struct Place<'a> {
     problem: &'a Problem<'a>,
     x: &'a [f64],
+    /// The variables that are not at a bound, a column of the Jacobian each.
+    free: Vec<usize>,
     residuals: DVector<f64>,
     jacobian: DMatrix<f64>,
     inverse: DMatrix<f64>,
@@ -227,7 +230,7 @@ pub(crate) fn other_law(found: &Searched, judged: &Judged) -> Option<OtherLaw> {
     let jacobian = best.jacobian.select_columns(&free);
     let inverse = inverse_of_square(&jacobian)?;
     let residuals = DVector::from_column_slice(&best.residuals);
-    let place = Place { problem, x: &best.x, residuals, jacobian, inverse };
+    let place = Place { problem, x: &best.x, free, residuals, jacobian, inverse };
     let tried = candidates.into_iter().filter_map(|candidate| place.attempt(candidate, candidate.first()));
     let mut tried = tried.max_by(|a, b| a.gain.total_cmp(&b.gain))?;
     // Independent residuals would have to show it, too.
@@ -277,21 +280,20 @@ fn fastest(problem: &Problem, x: &[f64], body: Body) -> f64 {
 }
 
 impl Place<'_> {
-    /// The amplitude that a law would have, from what so much of it makes of the residuals; none where the model does
-    /// not get through with it, or where it is what the parameters do already.
-    fn attempt(&self, candidate: Candidate, step: f64) -> Option<Tried> {
-        let mut moved = vec![0.0; self.residuals.len()];
+    /// The residuals at `x` with so much of a law; none where the model does not get through with it.
+    fn with(&self, candidate: Candidate, amplitude: f64, x: &[f64]) -> Option<DVector<f64>> {
+        let mut residuals = vec![0.0; self.residuals.len()];
         let mut bench = Bench::default();
         for (index, run) in self.problem.runs.iter().enumerate() {
             let first = self.problem.first_row(index);
-            let extras = self.problem.extras_of(index, self.x);
-            let machine = self.problem.stage_of(run.part, self.x);
+            let extras = self.problem.extras_of(index, x);
+            let machine = self.problem.stage_of(run.part, x);
             let with = |share: f64| {
                 let mut machine = machine.clone();
-                candidate.put(&mut machine, step, share);
+                candidate.put(&mut machine, amplitude, share);
                 machine
             };
-            let rows = &mut moved[first..first + run.rows()];
+            let rows = &mut residuals[first..first + run.rows()];
             let good = match candidate.kind {
                 Kind::Drift | Kind::Sway => {
                     let stages: Vec<Machine> =
@@ -304,7 +306,27 @@ impl Place<'_> {
                 return None;
             }
         }
-        let column = (DVector::from_vec(moved) - &self.residuals) / step;
+        Some(DVector::from_vec(residuals))
+    }
+
+    /// What a law takes off Σ r² where the variables have moved along with it, x + d; none where that is less than
+    /// [`LAW_KEEPS`] of what its column promises.
+    fn gained(&self, tried: &Tried) -> Option<f64> {
+        let bounds = self.problem.bounds();
+        let mut x = self.x.to_vec();
+        for (&j, along) in self.free.iter().zip(tried.along.iter()) {
+            x[j] = (x[j] - tried.amplitude * along).clamp(bounds.low[j], bounds.high[j]);
+        }
+        let left = self.with(tried.candidate, tried.amplitude, &x)?;
+        let gain = self.residuals.norm_squared() - left.norm_squared();
+        (gain >= LAW_KEEPS * tried.gain).then_some(gain)
+    }
+
+    /// The amplitude that a law would have, from what so much of it makes of the residuals; none where the model does
+    /// not get through with it, or where it is what the parameters do already.
+    fn attempt(&self, candidate: Candidate, step: f64) -> Option<Tried> {
+        let moved = self.with(candidate, step, self.x)?;
+        let column = (moved - &self.residuals) / step;
         let along = &self.inverse * self.jacobian.tr_mul(&column);
         let beside = &column - &self.jacobian * &along;
         let square = beside.norm_squared();
@@ -346,17 +368,9 @@ impl Place<'_> {
         let square = &shift * shift.transpose();
         let added = &square * (3.0 / (NORMAL * NORMAL)) + square * (error / tried.amplitude).powi(2);
         let Candidate { body, kind, .. } = tried.candidate;
-        let explained = tried.gain / self.residuals.norm_squared();
+        let gain = self.gained(tried)?;
+        let explained = gain / self.residuals.norm_squared();
         let words = tried.candidate.words(tried.amplitude);
-        Some(OtherLaw {
-            key: kind.key(),
-            body: body.key(),
-            words,
-            explained,
-            standard_errors,
-            gain: tried.gain,
-            off,
-            added,
-        })
+        Some(OtherLaw { key: kind.key(), body: body.key(), words, explained, standard_errors, gain, off, added })
     }
 }

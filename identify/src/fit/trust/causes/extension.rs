@@ -38,7 +38,6 @@ pub(super) const EXTENSIONS: &[Extension] = &[
     row("drag", force::drags, force::drag_words, force::without),
     row("stribeck", force::falls, force::fall_words, force::without_fall),
     row("load", force::loads, force::load_words, as_it_is),
-    row("ripple", force::ripples, force::ripple_words, force::without),
     Extension { is_slow: true, ..row("lugre", force::bristles, force::bristle_words, force::without_bristles) },
 ];
 

@@ -1,47 +1,36 @@
 //! Forces on the cart, beside viscous and Coulomb friction.
 //!
-//! They are lines through points, `force_by_speed` and `force_along`, whose forces keep their ratios: one amplitude
+//! Drag and falling friction are lines through points, `force_by_speed`, whose forces keep their ratios: one amplitude
 //! each, with exact derivatives.
 
 use super::extension::{Extended, Fitted, Measure, Said, Site, Telling, shown};
 use crate::fit::asked::problem::Problem;
-use crate::fit::compare::laws::travel;
 use crate::fit::limits::{
-    BRISTLE_BEND, DRAG_POINTS, FORCE_FIRST, MOST_BREAKAWAY, RIPPLE_PHASES, RIPPLE_POINTS, STRIBECK_ABOVE,
-    STRIBECK_FALL, STRIBECK_POINTS, STRIBECK_SHARES,
+    BRISTLE_BEND, DRAG_POINTS, FORCE_FIRST, FORCE_MOST, MOST_BREAKAWAY, STRIBECK_ABOVE, STRIBECK_FALL, STRIBECK_POINTS,
+    STRIBECK_SHARES,
 };
 use crate::friction::Law;
 use crate::log::Quantity;
 use crate::machine::Machine;
-use crate::polyline::{MOST_POINTS, Polyline};
+use crate::polyline::Polyline;
 use crate::solve::Bench;
-use std::f64::consts::{PI, TAU};
 
-/// A line under `[cart]`.
-#[derive(Clone, Copy)]
-enum Over {
-    Speed,
-    Travel,
-}
-
-/// The case with a force of this shape, in N, on the cart; none if it has such a line.
-fn shaped(site: &Site, over: Over, points: Vec<[f64; 2]>, size: Measure) -> Option<Extended> {
+/// The case with a force of this shape over the speed, in N, on the cart, which keeps its sign; none if it has such a
+/// line.
+fn shaped(site: &Site, points: Vec<[f64; 2]>, size: Measure) -> Option<Extended> {
     let mut machine = site.machine.clone();
-    let (line, key) = match over {
-        Over::Speed => (&mut machine.cart.forces.by_speed, "force_by_speed"),
-        Over::Travel => (&mut machine.cart.forces.along, "force_along"),
-    };
-    if line.is_some() || points.len() > MOST_POINTS {
+    let line = &mut machine.cart.forces.by_speed;
+    if line.is_some() {
         return None;
     }
-    let tied: Vec<String> =
-        (0..points.len()).filter(|&k| points[k][1] != 0.0).map(|k| format!("cart.{key}.{k}.force")).collect();
-    *line = Polyline::new(points);
-    line.as_ref()?;
-    let telling = Telling::Parameter(tied.join(" = "));
+    let moved = (0..points.len()).filter(|&k| points[k][1] != 0.0);
+    let tied: Vec<String> = moved.map(|k| format!("cart.force_by_speed.{k}.force")).collect();
+    let (name, far) = (tied.join(" = "), FORCE_MOST * parameter(&points));
+    *line = Some(Polyline::new(points)?);
     let mut plan = site.plan.clone();
+    plan.bounds.push((name.clone(), [far.min(0.0), far.max(0.0)]));
     plan.tied.push(tied);
-    Some(Extended { size: Some(size), ..Extended::new(site.with(machine), plan, telling) })
+    Some(Extended { size: Some(size), ..Extended::new(site.with(machine), plan, Telling::Parameter(name)) })
 }
 
 /// The first force of a line that is not zero, which is its parameter.
@@ -80,7 +69,7 @@ pub(super) fn drags(site: &Site) -> Vec<Extended> {
     let speed = |k: i32| 1.2 * fastest * f64::from(k) / f64::from(half);
     let points: Vec<[f64; 2]> = (-half..=half).map(|k| [speed(k), -c * speed(k) * speed(k).abs()]).collect();
     let size = Measure { name: "drag", unit: "N s^2/m^2", per: c / parameter(&points) };
-    shaped(site, Over::Speed, points, size).into_iter().collect()
+    shaped(site, points, size).into_iter().collect()
 }
 
 pub(super) fn drag_words(_: &Site, extended: &Extended, found: &Fitted) -> Said {
@@ -117,7 +106,7 @@ pub(super) fn falls(site: &Site) -> Vec<Extended> {
         points.push([0.0, 0.0]);
         points.extend(side);
         let per = points.last().map_or(1.0, |point| point[1]) / parameter(&points);
-        shaped(site, Over::Speed, points, Measure { name: "cart.friction.stribeck.force", unit: "N", per })
+        shaped(site, points, Measure { name: "cart.friction.stribeck.force", unit: "N", per })
     };
     STRIBECK_SHARES.iter().filter_map(of).collect()
 }
@@ -142,21 +131,17 @@ pub(super) fn fall_words(site: &Site, extended: &Extended, found: &Fitted) -> Sa
     let last = line.and_then(|line| line.points().last()).map_or(0.0, |point| point[0]);
     let velocity = last / STRIBECK_POINTS[STRIBECK_POINTS.len() - 1];
     let whose = body(site).map_or("cart", |(key, _)| key);
-    let (verb, size) = if fall < 0.0 { ("rises", -fall) } else { ("falls", fall) };
     let words = format!(
-        "friction of the {} that {verb} by {} within some {}",
+        "friction of the {} that falls by {} within some {}",
         whose.replace('_', " "),
-        shown(size, "N"),
+        shown(fall, "N"),
         shown(velocity, "m/s")
     );
-    let add = match fall < 0.0 {
-        true => "try `taut fit --compare`".to_string(),
-        false => format!(
-            "add stribeck = {{ force = \"{}\", velocity = \"{}\" }} to cart.friction",
-            shown(fall, "N"),
-            shown(velocity, "m/s")
-        ),
-    };
+    let add = format!(
+        "add stribeck = {{ force = \"{}\", velocity = \"{}\" }} to cart.friction",
+        shown(fall, "N"),
+        shown(velocity, "m/s")
+    );
     Said { words, add }
 }
 
@@ -247,37 +232,4 @@ pub(super) fn load_words(_: &Site, _: &Extended, found: &Fitted) -> Said {
         "a constant force of {load} on the cart (or Coulomb friction that is {both} {way} forward than backward)"
     );
     Said { words, add: format!("add load = \"{load}\" to [cart], and cart.load to `free`") }
-}
-
-/// A force that comes again with each turn of the drive pulley.
-pub(super) fn ripples(site: &Site) -> Vec<Extended> {
-    let turn = TAU * site.machine.pulley_radius;
-    let (low, high) = travel(site.case);
-    let step = turn / RIPPLE_POINTS as f64;
-    let count = ((high - low) / step).ceil() as usize + 3;
-    if high - low < 2.0 * turn || count > MOST_POINTS {
-        return Vec::new();
-    }
-    let amplitude = FORCE_FIRST * site.force();
-    let of = |phase: usize| {
-        let phase = PI * phase as f64 / RIPPLE_PHASES as f64;
-        let place = |k: usize| low + (k as f64 - 1.0) * step;
-        let force = |x: f64| amplitude * (TAU * x / turn + phase).cos();
-        // The parameter is the first of them that is not zero.
-        let points: Vec<[f64; 2]> = (0..count)
-            .map(|k| [place(k), force(place(k))])
-            .map(|[x, force]| [x, if force.abs() < 1e-6 * amplitude { 0.0 } else { force }])
-            .collect();
-        let size = Measure { name: "ripple", unit: "N", per: amplitude / parameter(&points) };
-        shaped(site, Over::Travel, points, size)
-    };
-    (0..RIPPLE_PHASES).filter_map(of).collect()
-}
-
-pub(super) fn ripple_words(site: &Site, extended: &Extended, found: &Fitted) -> Said {
-    let force = (extended.size.map_or(0.0, |size| size.per) * found.value).abs();
-    let turn = shown(TAU * site.machine.pulley_radius, "m");
-    let words =
-        format!("a force of ±{} on the cart that comes again every {turn}, a turn of the pulley", shown(force, "N"));
-    Said { words, add: "add force_along to [cart], with ten points in a turn".into() }
 }
