@@ -412,7 +412,8 @@ fn modes_of_the_papers_machine() {
     for (wrong, told) in [
         (["--from", "10", "--to", "5"], "before it begins"),
         (["--sample-time", "1ms", "--delay", "1s"], "late by 1 s"),
-        (["--stuck", "rotor", "--speed", "0"], "invalid value"),
+        (["--stuck", "rotor", "--speed", "0"], "this machine has no body \"rotor\"\n  allowed: drive, cart, idler"),
+        (["--bridge", "1mm", "--speed", "0"], "this machine has no bridge"),
     ] {
         let run = taut(folder.path()).args(["modes", file]).args(wrong).assert().code(2);
         assert!(text(&run.get_output().stderr).contains(told), "{wrong:?}");

@@ -229,15 +229,49 @@ fn modes_tells_rigid_and_elastic_ones_and_maps_the_area() {
     assert!((told["elastic"][0]["frequency_Hz"].as_f64().unwrap() - 196.643946994).abs() < 1e-9);
 }
 
+/// A gantry is asked what an axis is: a place, a speed, bodies held, a sample time, a range of frequencies.
 #[test]
-fn modes_refuses_what_is_asked_of_an_axis() {
-    let case = machine("h-frame/h-frame.toml");
-    for option in
-        [["--at", "1mm"], ["--speed", "0.1"], ["--stuck", "cart"], ["--sample-time", "1ms"], ["--from", "1Hz"]]
-    {
-        let told = refused(&["modes", option[0], option[1]], &case);
-        let begin = format!("error: {}: this is there for a single axis, and not for a gantry\n  next: ", option[0]);
-        assert!(told.starts_with(&begin) && told.ends_with("leave it out\n"), "{told}");
+fn modes_of_a_gantry_answer_every_question() {
+    let case = machine("core-xy/follows.toml");
+    let asked = |options: &[&str]| {
+        let folder = TempDir::new().unwrap();
+        let run = taut(folder.path()).arg("modes").arg(&case).args(options).args(["--out", "out", "--json"]).assert();
+        let told = json(&run.success().get_output().stdout);
+        (told, fs::read_to_string(folder.path().join("out/frequency-response.csv")).unwrap())
+    };
+    // At a corner of the map the modes are what the map says.
+    let (usual, _) = asked(&[]);
+    let map = &usual["map"];
+    let (x, y) = (map["bridge_position_m"][3].as_f64().unwrap(), map["cart_position_m"][30].as_f64().unwrap());
+    let (there, _) = asked(&["--bridge", &x.to_string(), "--at", &y.to_string()]);
+    for mode in 0..2 {
+        let (told, want) = (&there["elastic"][mode]["frequency_Hz"], &map["elastic_Hz"][mode][3][30]);
+        assert!((told.as_f64().unwrap() / want.as_f64().unwrap() - 1.0).abs() < 1e-12, "{told} {want}");
+    }
+    assert_eq!(there["here"]["bridge_position_m"].as_f64(), Some(x));
+    // With both pulleys held nothing is driven, and what is left swings as "drives held" says.
+    let (held, _) = asked(&["--stuck", "left,right"]);
+    assert_eq!((&held["rigid"], &held["operation"]["stuck"]), (&Value::Null, &serde_json::json!(["left", "right"])));
+    assert_eq!(held["here"]["resonances"], usual["here"]["antiresonances"]);
+    // Sampled, each drive by itself has the poles e^(s T).
+    let (sampled, response) = asked(&["--sample-time", "1ms", "--delay", "1.5ms", "--from", "1Hz", "--to", "100Hz"]);
+    for input in sampled["inputs"].as_array().unwrap() {
+        let poles = input["discrete"]["poles"].as_array().unwrap();
+        let integrators = poles.iter().filter(|pole| (pole["re"].as_f64().unwrap() - 1.0).abs() < 1e-9);
+        assert_eq!((integrators.count(), poles.len()), (2, 8 + 2));
+    }
+    let mut rows = response.lines();
+    let head = rows.next().unwrap();
+    assert!(head.contains(",right_voltage_command_to_bridge_position_magnitude,"), "{head}");
+    let hertz: Vec<f64> = rows.map(|row| row.split(',').next().unwrap().parse().unwrap()).collect();
+    assert!((hertz[0] - 1.0).abs() < 1e-9 && (hertz.last().unwrap() - 100.0).abs() < 1e-9);
+
+    for (options, told) in [
+        (["--stuck", "idler"], "--stuck: this machine has no body \"idler\"\n  allowed: left, right, bridge, cart\n"),
+        (["--bridge", "9m"], "--bridge: 9 m is outside the travel\n"),
+    ] {
+        let said = refused(&["modes", options[0], options[1]], &case);
+        assert!(said.starts_with(&format!("error: {told}")), "{said}");
     }
 }
 

@@ -101,7 +101,7 @@ fn faults(value: &Value, schema: &Value, root: &Value, path: &str, found: &mut V
 
 /// The version of a schema.
 fn version(name: &str) -> u8 {
-    if name == "simulate" { 2 } else { 1 }
+    if ["simulate", "modes"].contains(&name) { 2 } else { 1 }
 }
 
 fn follows(name: &str, value: &Value) {
@@ -129,8 +129,8 @@ fn results_follow_their_schemas() {
         ("simulate", &["simulate", "stages/h-frame/follows.toml"]),
         ("modes", &["modes", TABLE4, "--sample-time", "1ms", "--delay", "0s"]),
         ("modes", &["modes", "stages/laser-gantry/laser-gantry.toml", "--stuck", "cart"]),
-        ("gantry-modes", &["modes", "stages/core-xy/follows.toml"]),
-        ("gantry-modes", &["modes", "stages/h-frame/h-frame.toml", "--set", "belt.damping=[0,0,0]"]),
+        ("modes", &["modes", "stages/core-xy/follows.toml"]),
+        ("modes", &["modes", "stages/h-frame/h-frame.toml", "--set", "belt.damping=[0,0,0]"]),
         ("move", &["move", PID, "--spread", "20%"]),
         ("sweep", &["sweep", TABLE4, "--runs", "9", "--vary", "all=10%"]),
         ("sweep", &["sweep", TABLE4, "--runs", "4", "--vary", "cart.mass=9%", "--design", "sobol", "--indices"]),

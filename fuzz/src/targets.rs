@@ -10,7 +10,7 @@ use taut::case::{Case, Experiment, Move, TEMPLATE};
 use taut::control::spectrum::{Axis, Spectrum};
 use taut::control::{Loop, Rows, Standard};
 use taut::fit;
-use taut::linear::{GantryAnalysis, Operation, Root, StateSpace};
+use taut::linear::{Analysis, Operation, Question, StateSpace};
 use taut::log::{Accelerometer, ColumnId, Dialect, Filter, Log, Mapping, Quantity, Source, Survey, read_accelerometer};
 use taut::machine::Machine;
 use taut::metrics::Meter;
@@ -101,13 +101,8 @@ fn gantry(name: &Path, case: &Case) -> Reached {
     let again = Case::from_text_with(name, &case.text, &[]);
     let again = again.unwrap_or_else(|error| panic!("its own text is refused: {error}"));
     assert!(again.text == case.text && again.machine == case.machine, "its own text reads otherwise");
-    let Ok(analysis) = GantryAnalysis::of(case) else { return Reached::Read };
-    let pace = |root: &Root| match *root {
-        Root::Zero => 0.0,
-        Root::Real(s) => s.abs(),
-        Root::Pair { frequency, .. } => frequency,
-    };
-    let fastest = analysis.modes.poles.iter().map(pace).fold(0.0, f64::max);
+    let Ok(analysis) = Analysis::of(case, &Question::default()) else { return Reached::Read };
+    let fastest = analysis.poles.iter().map(|pole| pole.norm()).fold(0.0, f64::max);
     let (Some(experiment), true) = (case.experiments.first(), fastest.is_finite()) else { return Reached::Read };
     let mechanism = case.machine.mechanism();
     let mut course = Course::of(&mechanism, experiment);

@@ -58,6 +58,17 @@ impl By {
     pub fn is_general(self, subject: &Subject) -> bool {
         self == By::General || (self != By::Exact && self != By::C && !is_piecewise_linear(subject))
     }
+
+    /// The tolerance of positions with which an integrator answers, m; `None` where an answer has only rounding.
+    pub fn tolerance(self, subject: &Subject) -> Option<f64> {
+        let Solver::General { tolerance } = Solver::GENERAL else { return None };
+        match self {
+            By::General => Some(TOLERANCE),
+            By::ModelExchange => Some(exchange::POSITIONS),
+            By::CoSimulation | By::Sweep if !is_piecewise_linear(subject) => Some(tolerance),
+            By::Exact | By::C | By::CoSimulation | By::Sweep => None,
+        }
+    }
 }
 
 /// How a run ended.

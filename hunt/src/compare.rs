@@ -13,8 +13,11 @@ use std::panic::catch_unwind;
 /// good to 1e-14 of its peak, as much as that.
 const PERTURBATION: f64 = 4e-16;
 const PERTURBATION_OF_SINES: f64 = 1e-14;
-/// The same where a general solver is asked, whose errors are those of its tolerance: 1e-11 m, as much as this of 10 m.
-const PERTURBATION_OF_GENERAL: f64 = 1e-12;
+/// The same where an integrator is asked, whose errors are those of its tolerance: that tolerance as a share of the
+/// largest position, within these limits. 1e-11 m is as much as 1e-12 of 10 m.
+const PERTURBATION_OF_GENERAL: [f64; 2] = [1e-12, 1e-6];
+/// By this much, in its SI unit, each condition of an FMU for model exchange falls later (docs/fmu.md).
+const DELAY_OF_EXCHANGE: f64 = 1.0 / (1_u64 << 40) as f64;
 
 /// Perturbed runs.
 const PERTURBED: u64 = 8;
@@ -241,14 +244,19 @@ impl Pair<'_> {
         }
     }
 
-    /// Runs of the independent solver with numbers that are off by their last bit; half of them keep their state in so
-    /// few bits, too.
+    /// Runs of the independent solver with numbers that are off by their last bit, or by the tolerance of an integrator;
+    /// half of them keep their state in 64 bits, too. A controller's clock is off by its last bit. Against model exchange the conditions of half of them fall later.
     fn perturbed(&self) -> Vec<Run> {
         let mut runs = Vec::new();
-        let (own, of_input) = match (self.by.is_general(self.subject), self.subject.has_sines()) {
-            (true, _) => (PERTURBATION_OF_GENERAL, PERTURBATION_OF_GENERAL),
-            (false, true) => (PERTURBATION, PERTURBATION_OF_SINES),
-            (false, false) => (PERTURBATION, PERTURBATION),
+        let (own, of_input) = match (self.by.tolerance(self.subject), self.subject.has_sines()) {
+            (Some(tolerance), _) => {
+                let farthest = self.known.rows.iter().flatten().map(|x| x.high.abs()).fold(f64::MIN_POSITIVE, f64::max);
+                let [least, most] = PERTURBATION_OF_GENERAL;
+                let share = (tolerance / farthest).clamp(least, most);
+                (share, share)
+            }
+            (None, true) => (PERTURBATION, PERTURBATION_OF_SINES),
+            (None, false) => (PERTURBATION, PERTURBATION),
         };
         for number in 0..PERTURBED {
             let perturb = |seed: u64, size: f64| {
@@ -261,8 +269,12 @@ impl Pair<'_> {
             let mut machine = perturb(1, own);
             let mut input = perturb(2, of_input);
             let mut kept = perturb(3, PERTURBATION);
+            let mut clock = perturb(4, PERTURBATION);
             let kept: Option<Taken> = if number % 2 == 1 { Some(&mut kept) } else { None };
-            let numbers = Numbers { machine: &mut machine, input: &mut input, kept };
+            let is_delayed = self.by == By::ModelExchange && number % 4 < 2;
+            let delayed = if is_delayed { DELAY_OF_EXCHANGE } else { 0.0 };
+            let clock = &mut clock;
+            let numbers = Numbers { machine: &mut machine, input: &mut input, clock, kept, delayed };
             runs.extend(self.subject.known(&self.answer.fed, &self.answer.times, numbers));
         }
         runs

@@ -2,7 +2,7 @@
 //! follow the cart.
 //!
 //! Each is a place behind the states. Its series comes term by term from those of the states, by the recurrences of
-//! products, quotients, e^y (k E_k = Σ j y_j E_{k−j}) and tanh (T′ = (1 − T²) y′).
+//! products, quotients, e^y (k E_k = Σ j y_j E_{k−j}) and tanh (T′ = N y′, N′ = −2 T N y′, N = 1 − T²).
 
 use crate::double::{Double, ROUNDING};
 use crate::machine::{BODIES, STATES};
@@ -84,6 +84,9 @@ pub struct Curved {
     pub kind: Kind,
 }
 
+/// y of a tail at a speed and its change over a step, both as multiples of the curve's velocity.
+type Tail = fn(f64, f64) -> [f64; 2];
+
 /// A series by its terms.
 type Sequence = [Double; ORDER + 1];
 
@@ -94,6 +97,7 @@ pub struct Work {
     e: Sequence,
     t: Sequence,
     n: Sequence,
+    p: Sequence,
     g: Sequence,
     own: Sequence,
 }
@@ -102,7 +106,7 @@ impl Default for Work {
     /// Without a term yet.
     fn default() -> Self {
         let zero = [Double::ZERO; ORDER + 1];
-        Self { q: zero, y: zero, e: zero, t: zero, n: zero, g: zero, own: zero }
+        Self { q: zero, y: zero, e: zero, t: zero, n: zero, p: zero, g: zero, own: zero }
     }
 }
 
@@ -159,15 +163,18 @@ impl Curved {
                 w.q[k] = terms[k][speed] * sign / *velocity;
                 w.y[k] = product(&w.q, &w.q, k) * -0.5;
                 w.e[k] = exponential(&w.e, &w.y, k);
-                // T′ = 10 (1 − T²) w′
-                w.t[k] = match k {
-                    0 => (w.q[0] * 10.0).tanh(),
-                    k => {
-                        let sum = (1..=k).fold(Double::ZERO, |sum, j| sum + w.q[j] * w.n[k - j] * (10.0 * j as f64));
+                // T′ = 10 N w′, N′ = −20 T N w′: N keeps its digits where T rounds to ±1.
+                if k == 0 {
+                    let y = w.q[0] * 10.0;
+                    (w.t[0], w.n[0]) = (y.tanh(), y.square_of_sech());
+                } else {
+                    let by_speed = |of: &Sequence, factor: f64| {
+                        let sum = (1..=k).fold(Double::ZERO, |sum, j| sum + w.q[j] * of[k - j] * (factor * j as f64));
                         sum / Double::from(k as f64)
-                    }
-                };
-                w.n[k] = (if k == 0 { Double::ONE } else { Double::ZERO }) - product(&w.t, &w.t, k);
+                    };
+                    (w.t[k], w.n[k]) = (by_speed(&w.n, 10.0), by_speed(&w.p, -20.0));
+                }
+                w.p[k] = product(&w.t, &w.n, k);
                 let root = Double::from(0.5).exp();
                 w.own[k] = *above * root * product(&w.q, &w.e, k) + *coulomb * w.t[k];
                 w.g[k] = ramp(k);
@@ -192,6 +199,28 @@ impl Curved {
                 w.own[k]
             }
         }
+    }
+
+    /// The part of a step, from `z` with these largest changes of the states, on which the terms of the series show
+    /// what the curve does.
+    ///
+    /// The tail of a curve is e^{−y} with y = q², q or 2 abs(10 w). Far out, terms up to order 32 of a long step are
+    /// too small to be noticed although the tail rises to 1 within it. The terms (Δy)ᵏ/k! fall from k = Δy on, so
+    /// Δy ≤ 24 leaves nothing unnoticed, nor does Δy ≤ y/4 with y > 96: e^{−3y/4} is below rounding.
+    pub fn part(&self, z: &[Double; PLACES], change: &[f64; PLACES]) -> f64 {
+        let (velocity, of_tail): (&Double, Tail) = match &self.kind {
+            Kind::Stribeck { velocity, is_gaussian: false, .. } => (velocity, |q, d| [q, d]),
+            Kind::Stribeck { velocity, .. } | Kind::Bristles { velocity, .. } => {
+                (velocity, |q, d| [q * q, d * (2.0 * q + d)])
+            }
+            // The tail of e^{−w²/2} is flatter for w < 40, and e^{−800} is zero.
+            Kind::Smooth { velocity, .. } => (velocity, |w, d| [20.0 * w, 20.0 * d]),
+            Kind::Span { .. } => return 1.0,
+        };
+        let (speed, _) = self.speed;
+        let [y, swing] = of_tail(z[speed].high.abs() / velocity.high, change[speed] / velocity.high);
+        let most = f64::max(24.0, 0.25 * y);
+        if swing > most { most / swing } else { 1.0 }
     }
 
     /// About how much it changes with each state it depends on, and the rounding of its own value.
@@ -300,5 +329,49 @@ mod tests {
         sums(&Curved { place: SPAN[0], speed: (0, 1.0), along: None, kind }, |at| {
             double(900.0) * (at(WAY[0]) - at(WAY[1])) / (double(1.7) - at(WAY[1]))
         });
+    }
+
+    /// Where tanh rounds to 1 its series was constant, and a step of the solver missed the steep part.
+    #[test]
+    fn a_series_of_tanh_is_not_constant_where_tanh_rounds_to_one() {
+        let [above, coulomb, velocity] = [0.4, 1.3, 0.8].map(double);
+        let kind = Kind::Smooth { above, coulomb, velocity };
+        let curved = Curved { place: FRICTION[1], speed: (SPEED[1], 1.0), along: None, kind };
+        let mut terms: Terms = [[Double::ZERO; PLACES]; ORDER + 1];
+        // 10 w = 45 − 50 s
+        (terms[0][SPEED[1]], terms[1][SPEED[1]]) = (velocity * 4.5, velocity * -5.0);
+        let mut work = Work::default();
+        let own: Vec<Double> = (0..=ORDER).map(|k| curved.term(k, &terms, &mut work)).collect();
+        // 1 − tanh y = 2 e^{−2y} but for e^{−4y}: term k of tanh is −2 e^{−90} 100ᵏ/k!
+        let mut expected = double(-90.0).exp() * -2.0 * coulomb;
+        let hump = |k: usize| {
+            let root = double(0.5).exp();
+            above * root * product(&work.q, &work.e, k)
+        };
+        for (k, term) in own.iter().enumerate().skip(1) {
+            expected = expected * 100.0 / double(k as f64);
+            let rest = *term - hump(k) - expected;
+            let size = expected.high.abs().max(hump(k).high.abs());
+            assert!(rest.high.abs() < 1e-14 * size, "term {k}: {:?} instead of {expected:?}", *term - hump(k));
+        }
+    }
+
+    /// A step from far out in the tail of a curve ends before the curve rises.
+    #[test]
+    fn steps_do_not_cross_a_curve_from_far_out() {
+        let [above, coulomb, velocity] = [0.4, 1.3, 1.0].map(double);
+        for (kind, far) in [
+            (Kind::Stribeck { above, velocity, is_gaussian: false }, 300.0),
+            (Kind::Stribeck { above, velocity, is_gaussian: true }, 20.0),
+            (Kind::Smooth { above, coulomb, velocity }, 15.0),
+        ] {
+            let curved = Curved { place: FRICTION[1], speed: (SPEED[1], 1.0), along: None, kind };
+            let (mut z, mut change) = ([Double::ZERO; PLACES], [0.0; PLACES]);
+            (z[SPEED[1]], change[SPEED[1]]) = (double(-far), far);
+            let part = curved.part(&z, &change);
+            assert!(part > 0.05 && part < 0.5, "{:?}: {part}", curved.kind);
+            change[SPEED[1]] = 0.01 * far;
+            assert_eq!(curved.part(&z, &change), 1.0);
+        }
     }
 }

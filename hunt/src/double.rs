@@ -101,6 +101,14 @@ impl Double {
         (e - Self::ONE) / (e + Self::ONE)
     }
 
+    /// 1 − tanh² of it, which keeps its digits where tanh rounds to 1.
+    pub fn square_of_sech(self) -> Self {
+        // 4 e^{−2x}/(1 + e^{−2x})²
+        let e = (self.abs() * -2.0).exp();
+        let sum = Self::ONE + e;
+        e * 4.0 / (sum * sum)
+    }
+
     /// Sine and cosine.
     pub fn sin_cos(self) -> (Self, Self) {
         // θ = n π/2 + x with |x| ≤ π/4, and the series of x

@@ -15,6 +15,12 @@ const ALLOWED: f64 = 1e-6;
 /// Relative to nominal values or values, whichever is larger.
 const TOLERANCE: f64 = 1e-11;
 
+/// The same for positions: their nominal value is 1 cm, m.
+pub(crate) const POSITIONS: f64 = 0.01 * TOLERANCE;
+
+/// Rounding of a step as a multiple of that of a rate times its length.
+const ROUNDING: f64 = 16.0;
+
 /// Columns of the extrapolation.
 const COLUMNS: usize = 8;
 
@@ -82,10 +88,24 @@ impl Importer<'_> {
         Ok(values.into_iter().map(|value| value > 0.0).collect())
     }
 
+    /// The error that each quantity may have after a step of `h`: the tolerance, but no less than rounding. Far from the
+    /// origin stiff springs turn the last bit of a position into a force that no step is short enough for.
+    fn errors(&mut self, y: &[f64], first: &[f64], h: f64) -> Result<Vec<f64>, String> {
+        let sign = |j: usize| if j.is_multiple_of(2) { f64::EPSILON } else { -f64::EPSILON };
+        let rounded: Vec<f64> = y.iter().enumerate().map(|(j, y)| y * (1.0 + sign(j / 2))).collect();
+        let other = self.rates(self.time, self.time, &rounded)?;
+        let quantities = y.iter().zip(&self.nominals).zip(first.iter().zip(&other));
+        let error = quantities.map(|((y, nominal), (f, other))| {
+            (TOLERANCE * nominal.max(y.abs())).max(ROUNDING * h.abs() * (f - other).abs())
+        });
+        Ok(error.collect())
+    }
+
     /// The state a step of `h` on, and its error by the tolerance.
     fn extrapolated(&mut self, h: f64) -> Result<(Vec<f64>, f64), String> {
         let (t, y) = (self.time, self.states.clone());
         let first = self.rates(t, t, &y)?;
+        let most = self.errors(&y, &first, h)?;
         let mut last: Vec<Vec<f64>> = Vec::new();
         for column in 0..COLUMNS {
             let count = steps_of(column);
@@ -112,8 +132,8 @@ impl Importer<'_> {
             let best = &row[column];
             let mut error = f64::INFINITY;
             if column > 1 {
-                let terms = best.iter().zip(&row[column - 1]).zip(&self.nominals).zip(&y);
-                let terms = terms.map(|(((a, b), nominal), y)| (a - b).abs() / (TOLERANCE * nominal.max(y.abs())));
+                let terms = best.iter().zip(&row[column - 1]).zip(&most);
+                let terms = terms.map(|((a, b), most)| (a - b).abs() / most);
                 error = terms.fold(0.0, |most, e| if e.is_nan() { f64::INFINITY } else { e.max(most) });
             }
             if error <= 1.0 || column + 1 == COLUMNS {

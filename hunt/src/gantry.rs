@@ -100,5 +100,6 @@ pub fn machine(gantry: &Machine, experiment: &Experiment, taken: Taken) -> Model
         origin,
         lever: [r, r, Double::ONE, Double::ONE],
         place: vec![(2, [of_x[0], of_x[1], 1.0, 0.0]), (3, [of_y[0], of_y[1], 0.0, 1.0])],
+        delayed: 0.0,
     }
 }

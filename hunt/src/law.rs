@@ -113,6 +113,26 @@ pub struct Law {
     currents: Vec<Row>,
 }
 
+impl Change {
+    /// The size along the belt of one SI unit of its condition: of 1 rad or rad/s it is the lever, of 1 N m its inverse.
+    fn unit(self, machine: &Model, mode: &Mode) -> Double {
+        let flank = |lever: Double, now: Touch, then: Touch| match (now, then) {
+            (Touch::Carries(_), Touch::Loose(_)) | (Touch::Loose(_), Touch::Carries(_)) => Double::ONE / lever,
+            _ => lever,
+        };
+        match self {
+            Change::Voltage(..) | Change::Current(..) | Change::Span(..) | Change::Passed(..) | Change::Leave => {
+                Double::ONE
+            }
+            Change::GearSign(drive) => Double::ONE / machine.lever[machine.drives[drive].body],
+            Change::Gear(drive, then) => flank(machine.lever[machine.drives[drive].body], mode.gear[drive], then),
+            Change::Stop(body, then) => flank(machine.lever[body], mode.stop[body], then),
+            Change::Turn(body) | Change::Rest(body) => machine.lever[body],
+            Change::Break(body, _) => Double::ONE / machine.lever[body],
+        }
+    }
+}
+
 impl Limit {
     fn sign(self) -> f64 {
         match self {
@@ -152,7 +172,10 @@ impl Law {
             Builder { machine, mode, parts: Vec::new(), bodies: Vec::new(), curved: Vec::new(), currents: Vec::new() };
         let rates = builder.rates();
         let Builder { parts, bodies, curved, currents, .. } = builder;
-        let guards = parts.into_iter().chain(bodies).map(|(form, change)| Guard { row: Row::from(form), change });
+        let guards = parts.into_iter().chain(bodies).map(|(form, change)| {
+            let later = Form::constant(change.unit(machine, &mode) * machine.delayed);
+            Guard { row: Row::from(form + later), change }
+        });
         Self { guards: guards.collect(), rates: Rates::new(&rates, curved), currents }
     }
 

@@ -35,12 +35,13 @@ fn later(y: &Reference, t: f64) -> Reference {
     Reference { position: from(0), speed: from(1), acceleration: from(2), jerk: from(3), snap: from(4) }
 }
 
-/// Runs the first move of a case on this machine, which its controller takes for `model`.
+/// Runs the first move of a case on this machine, which its controller takes for `model`. `clock` are the times at which
+/// it takes its reference: at an edge of the profile a last bit decides between two accelerations.
 pub fn run(
     (case, model, looks): (&Case, &Machine, Looks),
     own: &Model,
     times: &[f64],
-    kept: Option<Taken>,
+    (clock, kept): (Taken, Option<Taken>),
 ) -> Result<Run, String> {
     let design = case.controller.as_ref().ok_or("the case has no controller")?;
     let (machine, profile) = (&case.machine, &case.moves[0].profile);
@@ -80,9 +81,9 @@ pub fn run(
         let (motor, pulley, cart) = (at_belt(shaft), at_belt(WAY[0]), at_belt(WAY[1]));
         let position = measured(machine, [motor, pulley, cart]);
         let scale = machine.scale.as_ref().map(|scale| in_counts(cart, 4.0 * scale.lines));
-        let reference = profile.at(sample);
+        let reference = profile.at(clock(sample).high);
         let ahead = match looks {
-            Looks::Ahead => profile.at(sample + lead),
+            Looks::Ahead => profile.at(clock(sample + lead).high),
             Looks::OnFromSample => later(&reference, lead),
         };
         let given = law.step(&Seen { time: sample, reference, ahead, position, scale, current });

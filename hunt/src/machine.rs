@@ -198,6 +198,8 @@ pub struct Model {
     pub lever: [Double; BODIES],
     /// The bodies that say where the machine is, each with the change of all positions with its own.
     pub place: Vec<(usize, [f64; BODIES])>,
+    /// How much later than at zero every condition falls, in the SI unit that taut has for it.
+    pub delayed: f64,
 }
 
 /// How a number of the case becomes one of ours: as it is, or perturbed.
@@ -246,6 +248,7 @@ impl Model {
             origin: [cart_start; BODIES],
             lever: [r, Double::ONE, r, Double::ONE],
             place: vec![(1, [1.0; BODIES])],
+            delayed: 0.0,
         }
     }
 

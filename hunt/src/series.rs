@@ -187,6 +187,8 @@ pub struct Series {
     pub terms: Box<Terms>,
     /// Those of the inputs.
     pub input: [Polynomial; DRIVES],
+    /// The part of h on which the terms of the curved forces show what they do.
+    part: f64,
     /// Σ |terms[k]| for k ≥ 1.
     change: [f64; PLACES],
     input_change: [f64; DRIVES],
@@ -217,7 +219,9 @@ impl Series {
             }
         }
         let input_change = input.map(|input| input[1..].iter().map(|u| u.high.abs()).sum());
-        Self { terms, input, change, input_change }
+        let parts = rates.curved.iter().map(|curved| curved.part(&terms[0], &change));
+        let part = parts.fold(f64::INFINITY, |least, part| if part < 1.0 { least.min(part) } else { least });
+        Self { terms, input, part, change, input_change }
     }
 
     /// The most that each input may be up to s = 1.
@@ -227,7 +231,7 @@ impl Series {
 
     /// How far, in parts of h, the terms left out are below rounding.
     pub fn reach(&self, size: &Size) -> f64 {
-        let mut reach = f64::INFINITY;
+        let mut reach = self.part;
         let mut look = |size: f64, k: usize, term: Double| {
             let term = term.high.abs();
             if term > 0.0 {

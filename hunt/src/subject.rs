@@ -39,8 +39,12 @@ pub struct Numbers<'a> {
     pub machine: Taken<'a>,
     /// Those of the input.
     pub input: Taken<'a>,
+    /// The times at which a controller takes its reference.
+    pub clock: Taken<'a>,
     /// The rounding of a state after each step, as if it were kept in fewer bits.
     pub kept: Option<Taken<'a>>,
+    /// How much later than at zero every condition falls, in the SI unit that taut has for it.
+    pub delayed: f64,
 }
 
 impl Subject {
@@ -133,12 +137,12 @@ impl Subject {
 
     /// The independent solver's run with rows at `times`.
     pub fn known(&self, fed: &Fed, times: &[f64], numbers: Numbers) -> Result<Run, String> {
-        let machine = self.machine(numbers.machine);
+        let machine = Model { delayed: numbers.delayed, ..self.machine(numbers.machine) };
         let end = times.last().copied().unwrap_or(0.0);
         if let Subject::Loop(case) = self {
             let model = if let Fed::ByModel(model) = fed { model } else { &case.machine };
             let looks = if *fed == Fed::Sampled { Looks::OnFromSample } else { Looks::Ahead };
-            return loops::run((case, model, looks), &machine, times, numbers.kept);
+            return loops::run((case, model, looks), &machine, times, (numbers.clock, numbers.kept));
         }
         let chains = match fed {
             Fed::AsGiven | Fed::ByModel(_) | Fed::Sampled => self.chains(end, numbers.input)?,
@@ -149,7 +153,13 @@ impl Subject {
 
     /// The same with all numbers as they are.
     pub fn known_as_is(&self, fed: &Fed, times: &[f64]) -> Result<Run, String> {
-        let numbers = Numbers { machine: &mut Double::from, input: &mut Double::from, kept: None };
+        let numbers = Numbers {
+            machine: &mut Double::from,
+            input: &mut Double::from,
+            clock: &mut Double::from,
+            kept: None,
+            delayed: 0.0,
+        };
         self.known(fed, times, numbers)
     }
 

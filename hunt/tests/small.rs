@@ -46,6 +46,28 @@ fn what_was_wrong_once_is_right() {
     }
 }
 
+/// Cases of pairs on which the hunt itself was wrong: a series of tanh that was constant where tanh rounds to 1, an
+/// integrator that could not go below rounding far from the origin.
+#[test]
+fn what_the_hunt_had_wrong_once_agrees() {
+    for number in [2975, 4198, 5113, 5778] {
+        let outcome = stages::pair(1, number);
+        let agrees = outcome.compared.iter().all(|one| one.verdict == Verdict::Agrees);
+        assert!(agrees && !outcome.compared.is_empty(), "{}", stages::told(1, &[outcome], true));
+    }
+}
+
+/// Cases of pairs that amplify what an answer may be off by: the tolerance of an integrator (2638, 3083, 3544, 7130), the
+/// delay of each condition in model exchange (3560, 4830), a controller's clock at an edge of the profile (5736, 8548).
+#[test]
+fn what_amplifies_a_tolerance_is_ill_conditioned() {
+    for number in [2638, 3083, 3544, 7130, 3560, 4830, 5736, 8548] {
+        let outcome = stages::pair(1, number);
+        let known = outcome.compared.iter().all(|one| matches!(one.verdict, Verdict::IllConditioned(_)));
+        assert!(known && !outcome.compared.is_empty(), "{}", stages::told(1, &[outcome], true));
+    }
+}
+
 #[test]
 fn every_kind_of_stage_is_drawn() {
     for kind in Kind::ALL {

@@ -19,7 +19,7 @@ use taut::fit::experiment_design::{Criterion, Kind, Request, design, verify};
 use taut::fit::{Posterior, Profile, check_watched, drift, fit, posterior, profiles};
 use taut::frf::{Cut, Known, measure};
 use taut::json;
-use taut::linear::{Analysis, GantryAnalysis};
+use taut::linear::Analysis;
 use taut::machine::{Channel, Quantity};
 use taut::overview::Overview;
 use taut::planning::plan;
@@ -384,6 +384,7 @@ impl Case {
         &self,
         py: Python<'py>,
         at: Option<f64>,
+        bridge: Option<f64>,
         speed: Option<f64>,
         stuck: Vec<String>,
         sample_time: Option<f64>,
@@ -392,9 +393,8 @@ impl Case {
         from: Option<f64>,
         to: Option<f64>,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let question = modes::question(at, speed, &stuck, sample_time, hold, delay, from, to)?;
-        let case = self.axis(py)?;
-        let analysis = unlocked(py, || Analysis::of(case, &question))?.told(py)?;
+        let question = modes::question(at, bridge, speed, &stuck, sample_time, hold, delay, from, to)?;
+        let analysis = unlocked(py, || Analysis::of(&self.inner, &question))?.told(py)?;
         modes::answers(py, &analysis)
     }
 
@@ -449,15 +449,6 @@ impl Case {
             }
         });
         made?.told(py)
-    }
-
-    /// Modes of a gantry, as `taut modes --json` has them.
-    fn gantry_modes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        if self.inner.is_axis() {
-            return Err(taut::Error::new("this case describes an axis, not a gantry")).told(py);
-        }
-        let analysis = unlocked(py, || GantryAnalysis::of(&self.inner))?.told(py)?;
-        value::json(py, &guarded(|| json::gantry_modes(&analysis))?)
     }
 }
 

@@ -37,7 +37,8 @@ def test_every_result_plots_into_axes_of_ones_own(case, root, moving):
         (2, lambda ax: found.plot(ax=ax)),
         (2, lambda ax: found.logs[0].plot(ax=ax)),
         (2, lambda ax: case.modes().plot("cart_position", ax=ax)),
-        (1, lambda ax: gantry.plot(ax=ax)),
+        (1, lambda ax: gantry.plot_map(ax=ax)),
+        (2, lambda ax: gantry.plot("bridge_position", input="right_voltage_command", ax=ax)),
         (1, lambda ax: moving.tune(evaluate=True).plot(ax=ax)),
         (1, lambda ax: case.show().plot(ax=ax)),
         (1, lambda ax: case.design(["cart.mass"], inputs=["trapezoid"], duration=0.5).plot(ax=ax)),
@@ -71,7 +72,8 @@ def test_every_result_goes_to_pandas(case, root, moving):
     frame = found.to_pandas().set_index("parameter")
     assert all(frame.loc[name, "value"] == estimate.value for name, estimate in found.estimates.items())
     assert case.modes().to_pandas().shape[0] == len(case.modes().frequency)
-    assert list(gantry.to_pandas()["frequency_Hz"]) == gantry.resonances
+    assert list(gantry.shapes["frequency_Hz"]) == [mode["frequency_Hz"] for mode in gantry.data["elastic"]]
+    assert "right_voltage_command_to_cart_speed_phase_deg" in gantry.to_pandas()
     assert list(tuned.to_pandas()["gains"].unique()) == ["before", "after"]
     assert dict(zip(*case.show().to_pandas()[["key", "value"]].to_dict("list").values())) == {
         key: value for key, (value, _) in case.show().rows.items()

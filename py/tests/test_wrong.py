@@ -463,7 +463,7 @@ def test_controllers_that_come_back_in(moving):
 
 def test_modes_with_nonsense(short):
     for value in WRONG:
-        for option in "at", "speed", "stuck", "sample_time", "hold", "delay", "lowest", "highest":
+        for option in "at", "bridge", "speed", "stuck", "sample_time", "hold", "delay", "lowest", "highest":
             allowed(lambda: short.modes(**{option: value}), told("modes", **{option: value}))
         for option in "hold", "delay":
             call = {"sample_time": 1e-3, option: value}

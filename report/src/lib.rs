@@ -65,3 +65,17 @@ pub fn machine_drawing(machine: &taut::machine::Machine) -> String {
         _ => gantry::gantry_drawing(machine),
     }
 }
+
+/// Puts the drawing of a machine on a page, says what it leaves out, and returns it.
+pub fn drawn(page: &mut Page, machine: &taut::machine::Machine) -> String {
+    let drawing = machine_drawing(machine);
+    let caption = match machine.bridge.is_some() {
+        false => "Symbols, values and positive directions.",
+        true => {
+            "In plan view with positive directions; lengths are not to scale. In the model the bridge does not yaw, and \
+             idlers have neither inertia nor friction."
+        }
+    };
+    page.drawing(&drawing, caption);
+    drawing
+}

@@ -20,7 +20,6 @@ const RESULTS: &[(&str, &str, &str)] = &[
     ("files", "What a folder of results holds: files.json", include_str!("results/files.txt")),
     ("fit", "`taut fit`", include_str!("results/fit.txt")),
     ("frf", "`taut frf`", include_str!("results/frf.txt")),
-    ("gantry-modes", "`taut modes` of a gantry", include_str!("results/gantry-modes.txt")),
     ("modes", "`taut modes`", include_str!("results/modes.txt")),
     ("move", "`taut move`", include_str!("results/move.txt")),
     ("paper", "`taut paper`: claims.json", include_str!("results/paper.txt")),
@@ -73,7 +72,7 @@ pub fn identity(name: &str) -> String {
 
 /// The version of a result's schema.
 pub(super) fn version(name: &str) -> u8 {
-    if name == "simulate" { 2 } else { 1 }
+    if ["simulate", "modes"].contains(&name) { 2 } else { 1 }
 }
 
 /// A key and what is below it.

@@ -163,7 +163,6 @@ fn compliance(machine: &Machine, x: f64) -> f64 {
 }
 
 fn place(machine: &Machine, found: &crate::linear::Place) -> Place {
-    let [k1, k2] = found.stiffness;
     let damped = |k: usize| match found.resonances.get(k) {
         // Where damping makes fewer pairs, which is which cannot be told.
         Some(Root::Pair { damping, .. }) if found.resonances.len() == found.undamped_resonances.len() => Some(*damping),
@@ -172,7 +171,7 @@ fn place(machine: &Machine, found: &crate::linear::Place) -> Place {
     let modes = found.undamped_resonances.iter().enumerate().map(|(k, hertz)| (*hertz, damped(k))).collect();
     Place {
         position: vec![found.position],
-        stiffness: vec![k1, k2, machine.belt.stiffness[2]],
+        stiffness: found.stiffness.to_vec(),
         stretch: vec![compliance(machine, found.position)],
         modes,
         held: found.undamped_antiresonances.first().copied(),

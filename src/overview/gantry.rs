@@ -7,7 +7,6 @@ use crate::error::Result;
 use crate::linear::Natural;
 use crate::machine::gantry::{BRIDGE, CART};
 use crate::machine::{AmplifierMode, BeltMake, DriveUnit, Machine, Travel};
-use crate::mechanism::BODIES;
 use std::f64::consts::PI;
 
 /// The drives, as rows call them.
@@ -147,9 +146,7 @@ fn belt(gantry: &Machine, place: &Place) -> Group {
 /// The machine with the bridge at x and the cart at y.
 fn place(gantry: &Machine, [x, y]: [f64; 2]) -> Result<Place> {
     let mechanism = gantry.mechanism();
-    let mut position = [0.0; BODIES];
-    (position[BRIDGE], position[CART]) = (x, y);
-    let modes = Natural::of(&mechanism, &position)?;
+    let modes = Natural::of(&mechanism, &gantry.without_strain(&[x, y], &[]).position)?;
     let modes = modes.elastic.iter().map(|mode| (mode.hertz(), mode.damping())).collect();
     let lengths = gantry.span_lengths(&[x, y]).zip(gantry.belt.make);
     let stiffness =

@@ -23,7 +23,7 @@ const REPORTS: [(&str, &[&str]); 15] = [
     ("long", &["simulate", "stages/sollmann-jouaneh/table4.toml", "--set", "experiment.0.every=0.05ms"]),
     ("gantry", &["simulate", "stages/h-frame/h-frame.toml"]),
     ("modes", &["modes", "stages/printer-axis/printer-axis.toml"]),
-    ("gantry-modes", &["modes", "stages/h-frame/h-frame.toml"]),
+    ("modes-of-a-gantry", &["modes", "stages/h-frame/h-frame.toml"]),
     ("move", &["move", "stages/sollmann-jouaneh/controllers/pid.toml"]),
     ("tune", &["tune", "stages/sollmann-jouaneh/controllers/pid.toml"]),
     ("sweep", &["sweep", "stages/sollmann-jouaneh/table4.toml", "--runs", "200", "--vary", "all=20%"]),

@@ -150,15 +150,13 @@ pub struct Shape {
     pub common: Common,
 }
 
-/// Say how a machine swings: poles, zeros, frequency response, resonance along the travel.
+/// Say how a machine swings: poles, zeros, frequency response, resonances.
 ///
-/// Linearises the stage of a case while everything slides, and prints its poles with frequency and damping, the gain
-/// and the zeros of each output, and resonance and anti-resonance along the travel; with --sample-time also its
-/// discrete-time model. With --out it also writes modes.json with the matrices, frequency-response.csv, and a report
-/// with a Bode diagram, a map of the travel and a map of poles and zeros.
-///
-/// Of a gantry it prints rigid and elastic modes with frequency, damping and shape, and their frequencies over the
-/// working area; with --out it writes modes.json, map.csv and a report with the maps.
+/// Linearises the machine of a case while everything slides, and prints its poles with frequency and damping, the
+/// shapes of its rigid and elastic modes, the gain and the zeros of each output from each drive, and the resonances
+/// along the travel of an axis or over the working area of a gantry; with --sample-time also its discrete-time model.
+/// With --out it also writes modes.json with the matrices, frequency-response.csv, map.csv (a gantry whose spans
+/// follow bridge and cart), and a report with Bode diagrams, maps, and poles and zeros.
 #[derive(Debug, clap::Args)]
 #[command(after_help = MODES)]
 pub struct Modes {
@@ -170,9 +168,13 @@ pub struct Modes {
     /// Speed of the cart at which everything slides; 0 is at rest, below 0 backward [default: 0.1 m/s]
     #[arg(long, value_name = "SPEED", value_parser = metres_per_second, allow_hyphen_values = true)]
     pub speed: Option<f64>,
-    /// Bodies that stick and are held where they are, separated by commas
-    #[arg(long, value_enum, value_delimiter = ',', value_name = "BODY")]
-    pub stuck: Vec<BodyName>,
+    /// Where the bridge of a gantry is [default: 0 m]
+    #[arg(long, value_name = "POSITION", value_parser = metres, allow_hyphen_values = true)]
+    pub bridge: Option<f64>,
+    /// Bodies that stick and are held where they are, separated by commas: drive, cart or idler; left, right, bridge
+    /// or cart of a gantry
+    #[arg(long, value_delimiter = ',', value_name = "BODY")]
+    pub stuck: Vec<String>,
     /// Also give the discrete-time model for this sample time
     #[arg(long, value_name = "TIME", value_parser = seconds)]
     pub sample_time: Option<f64>,
@@ -246,18 +248,8 @@ Examples:
   taut modes axis.toml
   taut modes axis.toml --out modes --sample-time 1ms --delay 0.5ms
   taut modes axis.toml --at \"120 mm\" --speed \"20 mm/s\"
-  taut modes axis.toml --stuck cart,idler --json | jq .poles";
-
-/// A body that can be held.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum BodyName {
-    /// The drive pulley
-    Drive,
-    /// The cart
-    Cart,
-    /// The idler pulley
-    Idler,
-}
+  taut modes axis.toml --stuck cart,idler --json | jq .poles
+  taut modes gantry.toml --at \"50 mm\" --bridge \"-100 mm\"";
 
 /// Input between samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]

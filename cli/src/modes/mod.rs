@@ -1,43 +1,36 @@
-//! `taut modes`: linearises the stage of a case, and says how it swings.
+//! `taut modes`: linearises the machine of a case, and says how it swings.
 
-mod gantry;
 mod table;
 
-use crate::args::{BodyName, HoldName, Modes as Args};
+use crate::args::{HoldName, Modes as Args};
 use crate::command::{Finished, Report};
 use crate::failure::Outcome;
 use crate::folder::{self, Folder};
 use std::f64::consts::PI;
 use std::fmt::Write;
-use taut::case::{Case, Files};
+use taut::case::Files;
 use taut::json;
-use taut::linear::{Analysis, Hold, Question};
-use taut_report::modes::{figures, page};
+use taut::linear::{Analysis, Hold, Question, ResonanceMap};
+use taut_report::modes::{page, pictures};
 
 /// Reads the case, linearises, writes, tells.
 pub fn run(args: &Args) -> Outcome {
-    match args.common.open_for(&args.case, Files::Nothing)? {
-        case if case.is_axis() => axis(args, &case),
-        case => gantry::run(args, &case),
-    }
-}
-
-fn axis(args: &Args, case: &Case) -> Outcome {
     let common = &args.common;
-    let names = ["modes.json", "frequency-response.csv", "report.html"];
+    let case = common.open_for(&args.case, Files::Nothing)?;
+    let analysis = Analysis::of(&case, &question(args))?;
+    let map = analysis.map.is_some().then_some("map.csv");
+    let names = ["modes.json", "frequency-response.csv", "report.html"].into_iter().chain(map);
     let folder = Folder::wanted(common, || folder::inputs(&args.case, &case.files), names)?;
-    let analysis = Analysis::of(case, &question(args))?;
     let advice = "add --out DIR for matrices, frequency response and a report";
     let json = ("modes.json", json::text(&json::modes(&analysis)));
     let mut finished = Finished::new("modes", json, table::text(&analysis), advice);
     if common.out.is_some() {
-        finished.files.push(("frequency-response.csv".into(), csv(&analysis)));
+        finished.files.push(("frequency-response.csv".into(), responses(&analysis)));
+        finished.files.extend(analysis.map.as_ref().map(|map| ("map.csv".to_string(), places(map))));
     }
     if common.reports() {
-        let figures = figures(&analysis);
-        let page = page(&analysis, &figures);
-        let pictures = figures.into_iter().map(|(name, figure)| (name.to_string(), figure.into()));
-        finished.report = Some(Report { page, pictures: pictures.collect() });
+        let pictures = pictures(&analysis);
+        finished.report = Some(Report { page: page(&analysis, &pictures), pictures: pictures.into_files() });
     }
     finished.finish(common, folder)
 }
@@ -47,7 +40,8 @@ fn question(args: &Args) -> Question {
     Question {
         speed: args.speed,
         at: args.at,
-        held: held(args),
+        bridge: args.bridge,
+        held: args.stuck.clone(),
         sample_time: args.sample_time,
         hold: match args.hold.unwrap_or_default() {
             HoldName::Zero => Hold::Zero,
@@ -60,17 +54,24 @@ fn question(args: &Args) -> Question {
     }
 }
 
-/// The response of every output: magnitude as it is and in dB, phase in degrees.
-fn csv(analysis: &Analysis) -> String {
+/// The response of every output: magnitude as it is and in dB, phase in degrees. Where there are several inputs, each
+/// column begins with the name of its own.
+fn responses(analysis: &Analysis) -> String {
     let mut text = String::from("frequency_Hz,frequency_rad_s");
-    for output in &analysis.system.outputs {
-        let _ = write!(text, ",{0}_magnitude,{0}_magnitude_dB,{0}_phase_deg", output.name);
+    let mut columns: Vec<[Vec<f64>; 3]> = Vec::new();
+    for one in &analysis.inputs {
+        let of = match analysis.inputs.len() {
+            1 => String::new(),
+            _ => format!("{}_to_", one.system.input.name),
+        };
+        for (output, response) in one.system.outputs.iter().zip(&one.responses) {
+            let _ = write!(text, ",{of}{0}_magnitude,{of}{0}_magnitude_dB,{of}{0}_phase_deg", output.name);
+            columns.push([response.magnitude(), response.decibels(), response.degrees()]);
+        }
     }
     text.push('\n');
-    let columns: Vec<[Vec<f64>; 3]> =
-        analysis.responses.iter().map(|r| [r.magnitude(), r.decibels(), r.degrees()]).collect();
-    let frequencies = analysis.responses.first().map_or(&[][..], |response| &response.frequency);
-    for (k, omega) in frequencies.iter().enumerate() {
+    let responses = analysis.inputs.first().and_then(|one| one.responses.first());
+    for (k, omega) in responses.map_or(&[][..], |response| &response.frequency).iter().enumerate() {
         let _ = write!(text, "{},{omega}", omega / (2.0 * PI));
         for column in columns.iter().flatten() {
             let _ = write!(text, ",{}", column[k]);
@@ -80,11 +81,21 @@ fn csv(analysis: &Analysis) -> String {
     text
 }
 
-/// The bodies that are held, by their numbers.
-fn held(args: &Args) -> [bool; 6] {
-    let mut held = [false; 6];
-    for (held, body) in held.iter_mut().zip([BodyName::Drive, BodyName::Cart, BodyName::Idler]) {
-        *held = args.stuck.contains(&body);
+/// The map, a row for each place.
+fn places(map: &ResonanceMap) -> String {
+    let mut text = String::from("bridge_position_m,cart_position_m");
+    (1..=map.hertz.len()).for_each(|k| {
+        let _ = write!(text, ",elastic_{k}_Hz");
+    });
+    text.push('\n');
+    for (i, x) in map.bridge.iter().enumerate() {
+        for (j, y) in map.cart.iter().enumerate() {
+            let _ = write!(text, "{x},{y}");
+            map.hertz.iter().for_each(|mode| {
+                let _ = write!(text, ",{}", mode[i][j]);
+            });
+            text.push('\n');
+        }
     }
-    held
+    text
 }

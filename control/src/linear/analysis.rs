@@ -1,100 +1,147 @@
-//! All that is told of a stage's linear equations at once: matrices, poles, zeros, responses, resonance along the
-//! travel.
+//! All that is told of a machine's linear equations at once: matrices, poles, zeros, responses, modes, resonances
+//! along the travel or over the working area.
 
-use super::{Discrete, Hold, Operation, Place, Range, Response, StateSpace, Transfer};
-use super::{assumptions, places, sticks, travel};
+use super::{Discrete, Hold, Natural, Operation, Place, Range, ResonanceMap, Response, StateSpace, System, Transfer};
+use super::{assumptions, place, places, sticks, travel};
 use crate::case::Case;
 use crate::error::{Error, Result};
+use crate::machine::Machine;
+use crate::mechanism::BODIES;
+use nalgebra::Complex;
 use std::f64::consts::PI;
 
-/// Places along the travel.
+/// Places along the travel of an axis.
 const PLACES: usize = 61;
 
 /// The question of an analysis.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Question {
-    /// Speed of the cart at which everything slides, m/s; [`Operation::default`]'s if not said.
+    /// Speed at the belt at which everything slides, m/s; [`Operation::default`]'s if not said.
     pub speed: Option<f64>,
-    /// Where the cart is, m; at x = 0 if not said.
+    /// Where the cart is, m; at zero if not said.
     pub at: Option<f64>,
-    /// Which bodies are held where they are.
-    pub held: [bool; 6],
-    /// Of the discrete-time model, s; none is made if not said.
+    /// Where the bridge is, m, of a machine that has one; at zero if not said.
+    pub bridge: Option<f64>,
+    /// Keys of the bodies that are held where they are.
+    pub held: Vec<String>,
+    /// Of the discrete-time models, s; none is made if not said.
     pub sample_time: Option<f64>,
-    /// The input between samples.
+    /// The inputs between samples.
     pub hold: Hold,
-    /// By how much the input is late, s.
+    /// By how much the inputs are late, s.
     pub delay: f64,
-    /// Lowest frequency of the response, Hz; below the slowest pole or zero if not said.
+    /// Lowest frequency of the responses, Hz; below the slowest pole or zero if not said.
     pub from: Option<f64>,
-    /// Highest frequency of the response, Hz; above the fastest resonance if not said.
+    /// Highest frequency of the responses, Hz; above the fastest resonance if not said.
     pub to: Option<f64>,
 }
 
 /// The answers.
 #[derive(Debug, Clone)]
 pub struct Analysis<'a> {
-    /// The case whose stage it is.
+    /// The case whose machine it is.
     pub case: &'a Case,
     /// About what it was linearised.
     pub operation: Operation,
     /// Its equations.
-    pub system: StateSpace,
-    /// By output.
-    pub transfers: Vec<Transfer>,
+    pub system: System,
+    /// The effect of each input alone, in the order of the drives.
+    pub inputs: Vec<ByInput>,
+    /// Poles, 1/s, conjugates side by side, the slowest first.
+    pub poles: Vec<Complex<f64>>,
+    /// Shapes and energies of the modes; none where a body is held.
+    pub modes: Option<Natural>,
     /// The assumptions.
     pub words: Vec<String>,
-    /// Whether the stage sticks at rest.
+    /// Whether the machine sticks at rest.
     pub sticks: bool,
     /// At the place that was asked for.
     pub here: Place,
-    /// Along the travel, where the place makes a difference.
+    /// Along the travel of an axis, where the place makes a difference.
     pub travel: Option<Vec<Place>>,
+    /// Over the working area of a gantry, where the place makes a difference.
+    pub map: Option<ResonanceMap>,
+}
+
+/// The effect of one input.
+#[derive(Debug, Clone)]
+pub struct ByInput {
+    /// The system of this input, the others being zero.
+    pub system: StateSpace,
     /// By output.
+    pub transfers: Vec<Transfer>,
+    /// By output, all inputs at the same frequencies.
     pub responses: Vec<Response>,
     /// The discrete-time model, if asked for.
     pub discrete: Option<Discrete>,
 }
 
 impl<'a> Analysis<'a> {
-    /// Linearises the stage of `case`. Mistakes in the question are told by the names of the command line's options.
+    /// Linearises the machine of `case`. Mistakes in the question are told by the names of the command line's options.
     ///
     /// ```
     /// use taut::case::{Case, TEMPLATE};
     /// use taut::linear::{Analysis, Question};
     /// let case = Case::from_text("axis.toml", TEMPLATE)?;
     /// let analysis = Analysis::of(&case, &Question { sample_time: Some(1e-3), ..Question::default() })?;
-    /// assert_eq!(analysis.discrete.unwrap().sample_time, 1e-3);
+    /// assert_eq!(analysis.inputs[0].discrete.as_ref().unwrap().sample_time, 1e-3);
     /// assert!(Analysis::of(&case, &Question { from: Some(10.0), to: Some(1.0), ..Question::default() }).is_err());
+    ///
+    /// let case = Case::read_with("../stages/h-frame/h-frame.toml", &[])?;
+    /// let analysis = Analysis::of(&case, &Question::default())?;
+    /// let modes = analysis.modes.unwrap();
+    /// assert_eq!((analysis.inputs.len(), modes.rigid.len(), modes.elastic.len()), (2, 2, 2));
+    /// assert!((modes.elastic[0].hertz() - 196.643946994).abs() < 1e-9);
+    /// // Given stiffnesses are the same everywhere.
+    /// assert!(analysis.map.is_none());
     /// # Ok::<(), taut::Error>(())
     /// ```
     pub fn of(case: &'a Case, question: &Question) -> Result<Self> {
+        let machine = &case.machine;
+        numbers(question)?;
+        within(machine, question)?;
         let usual = Operation::default();
         let operation = Operation {
             speed: question.speed.unwrap_or(usual.speed),
             position: question.at.unwrap_or(usual.position),
-            held: question.held,
-            ..usual
+            bridge: question.bridge.unwrap_or(usual.bridge),
+            held: held(machine, &question.held)?,
         };
-        let machine = &case.machine;
-        numbers(question)?;
-        within(case, question)?;
-        let system = StateSpace::of(machine, operation).map_err(|error| error.in_file("--at"))?;
-        let transfers = system.transfers()?;
-        let frequencies = frequencies(&transfers, question)?;
-        let responses = system.responses(&transfers, &frequencies);
-        let along = places(machine, PLACES).map(|places| travel(machine, operation, &places)).transpose()?;
-        let here = travel(machine, operation, &[operation.position])?.swap_remove(0);
-        let discrete = question.sample_time.map(|time| system.discrete(time, question.hold, question.delay));
-        let discrete = discrete.transpose().map_err(|error| error.in_file("--sample-time"))?;
-        let (words, sticks) = (assumptions(machine, operation), sticks(machine, operation));
-        Ok(Self { case, operation, system, transfers, words, sticks, here, travel: along, responses, discrete })
+        let system = System::of(machine, operation).map_err(|error| error.in_file("--at"))?;
+        let each: Vec<StateSpace> = (0..system.inputs.len()).map(|input| system.input(input)).collect();
+        let transfers = each.iter().map(StateSpace::transfers).collect::<Result<Vec<_>>>()?;
+        let frequencies = frequencies(&transfers.concat(), question)?;
+        let by_input = |(system, transfers): (StateSpace, Vec<Transfer>)| {
+            let discrete = question.sample_time.map(|time| system.discrete(time, question.hold, question.delay));
+            let discrete = discrete.transpose().map_err(|error| error.in_file("--sample-time"))?;
+            let responses = system.responses(&transfers, &frequencies);
+            Ok(ByInput { system, transfers, responses, discrete })
+        };
+        // All transfers have the same poles.
+        let poles = transfers.iter().flatten().next().map(|transfer| transfer.poles.clone()).unwrap_or_default();
+        let inputs = each.into_iter().zip(transfers).map(by_input).collect::<Result<Vec<_>>>()?;
+        let everything_slides = question.held.is_empty();
+        let at = machine.without_strain(&operation.coordinates(machine), &[]).position;
+        let modes = everything_slides.then(|| Natural::of(&machine.mechanism(), &at));
+        Ok(Self {
+            case,
+            operation,
+            system,
+            inputs,
+            poles,
+            modes: modes.transpose()?,
+            words: assumptions(machine, operation),
+            sticks: sticks(machine, operation),
+            here: place(machine, operation)?,
+            travel: places(machine, PLACES).map(|places| travel(machine, operation, &places)).transpose()?,
+            map: ResonanceMap::of(machine)?,
+        })
     }
 }
 
 /// Refuses a question whose numbers are none.
 fn numbers(question: &Question) -> Result<()> {
-    let &Question { speed, at, delay, from, to, .. } = question;
+    let &Question { speed, at, bridge, delay, from, to, .. } = question;
     let finite = |value: f64| value.is_finite();
     let frequency = |value: f64| value > 0.0 && value.is_finite();
     let wrong = |option: &str, value: Option<f64>, good: fn(f64) -> bool, allowed: &str| {
@@ -103,26 +150,48 @@ fn numbers(question: &Question) -> Result<()> {
     };
     let found = wrong("--speed", speed, finite, "a finite number, in m/s")
         .or_else(|| wrong("--at", at, finite, "a finite number, in m"))
+        .or_else(|| wrong("--bridge", bridge, finite, "a finite number, in m"))
         .or_else(|| wrong("--delay", Some(delay), finite, "a finite number, in s"))
         .or_else(|| wrong("--from", from, frequency, "above zero, in Hz"))
         .or_else(|| wrong("--to", to, frequency, "above zero, in Hz"));
     found.map_or(Ok(()), Err)
 }
 
-/// Refuses a place outside the travel.
-fn within(case: &Case, question: &Question) -> Result<()> {
-    match (question.at, case.machine.cart.travel) {
-        (Some(at), Some(travel)) if !(travel.min..=travel.max).contains(&at) => {
-            Err(Error::new(format!("{at} m is outside the travel"))
-                .in_file("--at")
-                .allowed(format!("{} m to {} m", travel.min, travel.max))
-                .next("name a place on the travel, or change [travel]"))
-        }
-        _ => Ok(()),
+/// Refuses a place outside the travel, and that of a bridge where there is none.
+fn within(machine: &Machine, question: &Question) -> Result<()> {
+    if question.bridge.is_some() && machine.bridge.is_none() {
+        return Err(Error::new("this machine has no bridge").in_file("--bridge").next("leave it out, or give --at"));
     }
+    let bridge = machine.bridge.as_ref().and_then(|bridge| bridge.travel);
+    for (option, at, travel) in [("--at", question.at, machine.cart.travel), ("--bridge", question.bridge, bridge)] {
+        let (Some(at), Some(travel)) = (at, travel) else { continue };
+        if !(travel.min..=travel.max).contains(&at) {
+            return Err(Error::new(format!("{at} m is outside the travel"))
+                .in_file(option)
+                .allowed(format!("{} m to {} m", travel.min, travel.max))
+                .next("name a place on the travel, or change [travel]"));
+        }
+    }
+    Ok(())
 }
 
-/// The frequencies of the response, rad/s.
+/// The bodies of these keys, by their numbers.
+fn held(machine: &Machine, keys: &[String]) -> Result<[bool; BODIES]> {
+    let mut held = [false; BODIES];
+    let bodies = machine.geometry().bodies;
+    for key in keys {
+        let Some(body) = bodies.iter().position(|body| body.label.key == key) else {
+            let known: Vec<&str> = bodies.iter().map(|body| body.label.key).collect();
+            return Err(Error::new(format!("this machine has no body \"{key}\""))
+                .in_file("--stuck")
+                .allowed(known.join(", ")));
+        };
+        held[body] = true;
+    }
+    Ok(held)
+}
+
+/// The frequencies of the responses, rad/s.
 fn frequencies(transfers: &[Transfer], question: &Question) -> Result<Vec<f64>> {
     let (usual, roots) = Range::of_transfers(transfers);
     let range = Range {

@@ -4,17 +4,17 @@
 //! that the solvers use. From there: [poles](StateSpace::poles), [zeros](StateSpace::zeros), [`Response`] over
 //! frequency, resonance and anti-resonance [along the travel](travel), and [`Discrete`] models for a sample time.
 //!
-//! [`Natural`] has rigid and elastic modes of any mechanism, and [`GantryAnalysis`] those of a gantry over its working
-//! area.
+//! [`Natural`] has rigid and elastic modes of any mechanism, [`ResonanceMap`] those of a gantry over its working area.
+//! [`Analysis`] is all of it at once.
 //!
 //! Dry friction that does not change with speed drops out while everything slides; while a body sticks it does not move
 //! at all, and [`Operation::held`] says so.
 
 mod analysis;
+mod area;
 mod discrete;
 pub(crate) mod eigen;
 mod frame;
-mod gantry;
 mod model;
 mod natural;
 mod response;
@@ -22,14 +22,14 @@ mod travel;
 mod words;
 mod zeros;
 
-pub use analysis::{Analysis, Question};
+pub use analysis::{Analysis, ByInput, Question};
+pub use area::ResonanceMap;
 pub use discrete::{Discrete, Hold};
 pub use frame::Variable;
-pub use gantry::{ByInput, GantryAnalysis, ResonanceMap};
 pub use model::{Operation, StateSpace, System};
 pub use natural::{ElasticMode, Natural, RigidMode};
 pub use response::{Range, Response, Transfer};
-pub use travel::{Place, places, travel, undamped};
+pub use travel::{Place, place, places, travel, undamped};
 pub use words::{assumptions, sticks};
 pub use zeros::Zeros;
 

@@ -3,7 +3,7 @@
 use super::frame::{Frame, Variable, gears};
 use crate::error::{Error, Result};
 use crate::friction::{Law, Motion};
-use crate::machine::{BeltModel, Kind, Machine};
+use crate::machine::{BeltMake, BeltModel, Geometry, Machine};
 use crate::mechanism::{AmplifierMode, BODIES, Contact, Form, Mechanism, Mode, Over, SpringLaw};
 use nalgebra::{DMatrix, DVector};
 
@@ -22,6 +22,13 @@ pub struct Operation {
     pub held: [bool; 6],
 }
 
+impl Operation {
+    /// Where each sliding part of `machine` is, m, in the order of its geometry.
+    pub(super) fn coordinates(&self, machine: &Machine) -> Vec<f64> {
+        machine.bridge.iter().map(|_| self.bridge).chain([self.position]).collect()
+    }
+}
+
 impl Default for Operation {
     /// Everything slides forward at 0.1 m/s, what slides at zero.
     fn default() -> Self {
@@ -29,7 +36,8 @@ impl Default for Operation {
     }
 }
 
-// A place for each body.
+// A place for each body. With `[bool; BODIES]` in the struct the compiler fails where a closure of another crate copies
+// it.
 const _: () = assert!(BODIES == 6);
 
 /// ẋ = A x + B u, y = C x + D u: small motions on top of steady sliding, with an input for each drive.
@@ -194,33 +202,39 @@ impl StateSpace {
 }
 
 /// The machine with its spans as stiff as they are with what slides at its place.
-fn placed(machine: &Machine, operation: Operation) -> Result<Machine> {
+pub(super) fn placed(machine: &Machine, operation: Operation) -> Result<Machine> {
     let mut machine = machine.clone();
-    let Some(make) = machine.belt.make.filter(|_| machine.belt.follows_cart) else { return Ok(machine) };
-    if machine.kind == Kind::Axis {
-        let x = operation.position;
-        let [l1, l2, _] = make.spans.three();
-        if !(-l2 < x && x < l1) {
-            return Err(Error::new(format!("the cart cannot be at {x} m: a span would have no length"))
-                .allowed(format!("between {} m and {l1} m", -l2))
-                .next("name a place between the pulleys"));
-        }
-        let [k1, k2] = make.stiffness_at(x);
-        (machine.belt.stiffness[0], machine.belt.stiffness[1]) = (k1, k2);
-        return Ok(machine);
+    let slides = machine.geometry().slides;
+    let at = operation.coordinates(&machine);
+    let Some((make, lengths)) = machine.belt.following().zip(machine.span_lengths(&at)) else { return Ok(machine) };
+    if lengths.iter().any(|length| length.is_nan() || *length <= 0.0) {
+        let name = |body: usize| machine.geometry().label(body).name;
+        let places = slides.iter().zip(&at).map(|(slide, at)| format!("the {} at {at} m", name(slide.body)));
+        let places = places.collect::<Vec<_>>().join(" and ");
+        let error = Error::new(format!("with {places} a span would have no length"));
+        let error = match slides {
+            [_] => error.allowed(within(machine.geometry(), &make)),
+            _ => error,
+        };
+        return Err(error.next("name a place on the travel, between the pulleys"));
     }
-    let (x, y) = (operation.bridge, operation.position);
-    let lengths = machine.span_lengths(&[x, y]);
-    for (span, length) in lengths.iter().flat_map(|lengths| lengths.iter().copied().enumerate()) {
-        if length.is_nan() || length <= 0.0 {
-            return Err(Error::new(format!(
-                "bridge and cart cannot be at {x} m and {y} m: a span would have no length"
-            ))
-            .next("name a place on the travel of both"));
-        }
-        machine.belt.stiffness[span] = make.rigidity() / length;
-    }
+    machine.belt.stiffness = BeltMake { spans: lengths, ..make }.stiffness();
     Ok(machine)
+}
+
+/// Where the one sliding part can be, in words: no span shorter than nothing.
+fn within(geometry: &Geometry, make: &BeltMake) -> String {
+    let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
+    for (length, span) in make.spans.into_iter().zip(geometry.spans) {
+        for (_, arm) in span.follows {
+            // l + arm x > 0
+            match *arm > 0.0 {
+                true => low = low.max(-length / arm),
+                false => high = high.min(-length / arm),
+            }
+        }
+    }
+    format!("between {low} m and {high} m")
 }
 
 /// The mode of steady sliding.

@@ -139,6 +139,8 @@ impl Range {
         let count = self.points.max(2);
         let mut all: Vec<f64> =
             (0..count).map(|i| (low + (high - low) * i as f64 / (count - 1) as f64).exp()).collect();
+        // The ends as they were asked for, and not as rounding has them.
+        (all[0], all[count - 1]) = (self.from, self.to);
         for root in roots.iter().filter(|root| root.im > 0.0) {
             let width = (root.re.abs() / root.im).clamp(1e-9, 1.0);
             for k in -12..=12 {

@@ -2,49 +2,24 @@
 
 use super::Operation;
 use crate::friction::Law;
-use crate::machine::axis::{BODIES, CART};
-use crate::machine::{BeltModel, Machine};
-use crate::mechanism::Mechanism;
+use crate::machine::{BeltModel, DriveUnit, Machine};
+use crate::mechanism::{AmplifierMode, Kind, Mechanism};
 use crate::number::engineering_typed;
 
-/// The operating point and the assumptions: a sentence for each part that makes the stage more than a linear system.
+/// The operating point and the assumptions: a sentence for each part that makes the machine more than a linear system.
 pub fn assumptions(machine: &Machine, operation: Operation) -> Vec<String> {
     let plant = machine.mechanism();
     let held = |body: usize| operation.held[body] || operation.held[plant.leader(body)];
     let moving: Vec<usize> = leaders(&plant).filter(|body| !held(*body)).collect();
     let mut words = Vec::new();
-    let stopped: Vec<&str> = (0..BODIES).filter(|b| held(*b)).map(|b| plant.bodies[b].label.name).collect();
+    let stopped: Vec<&str> = plant.held_bodies().filter(|b| held(*b)).map(|b| plant.bodies[b].label.name).collect();
     if !stopped.is_empty() {
         words.push(format!("held where it is: {}", stopped.join(", ")));
     }
     words.extend(sliding(&plant, operation, &moving));
     words.extend(curves(&plant, operation, &moving));
-    if machine.cart.along.is_some() && moving.contains(&plant.leader(CART)) {
-        let at = engineering_typed(operation.position, "m", 4);
-        words.push(format!("friction that changes along the travel is taken as it is at x = {at}, and not followed"));
-    }
-    let forces = &machine.cart.forces;
-    if forces.along.is_some() {
-        words.push("the force that changes along the travel is taken as it is at the place, and not followed".into());
-    }
-    if forces.by_speed.is_some() && moving.contains(&plant.leader(CART)) {
-        let at = engineering_typed(operation.speed, "m/s", 4);
-        words.push(format!("the force that changes with the speed is a damper as steep as it is at {at}"));
-    }
-    let amplifier = &machine.drives[0].amplifier;
-    if amplifier.voltage_limit.is_some() || amplifier.current_limit.is_some() {
-        words.push("the amplifier is taken within its limits".into());
-    }
-    if let Some(play) = machine.drives[0].motor.gear_play.filter(|play| play.backlash > 0.0) {
-        let width = engineering_typed(play.backlash, "rad", 3);
-        words.push(format!(
-            "the gear is taken with its driving flank in contact; within its play of {width} the motor moves nothing but its rotor"
-        ));
-    }
-    if plant.drives[0].loses() {
-        words
-            .push("the gear is taken as driven by the motor: it passes on its efficiency's share of the torque".into());
-    }
+    words.extend(forces(machine, &plant, operation, &moving));
+    words.extend(drives(machine, &plant));
     if machine.belt.pretension.is_some() {
         words.push("the spans are taken taut; forces are those beyond pretension".into());
     }
@@ -53,11 +28,94 @@ pub fn assumptions(machine: &Machine, operation: Operation) -> Vec<String> {
         BeltModel::TwoMass => words.push("the belt's model is two-mass: both pulleys are one inertia".into()),
         BeltModel::Rigid => words.push("the belt's model is rigid: it does not stretch, so it has no resonance".into()),
     }
-    if machine.cart.travel.is_some_and(|travel| travel.stop.is_some()) {
-        words.push("the cart is taken between its end stops".into());
+    if machine.slides().any(|slide| slide.travel.is_some_and(|travel| travel.stop.is_some())) {
+        let who = if machine.bridge.is_some() { "bridge and cart are" } else { "the cart is" };
+        words.push(format!("{who} taken between the end stops"));
     }
-    if machine.cart.constant_force() != 0.0 {
-        words.push("the constant force on the cart changes where the stage is, not how it swings".into());
+    words.extend(damping_of_modes(machine, &plant));
+    words
+}
+
+/// What the damping of [`Natural`](super::Natural) modes leaves out and the poles have.
+fn damping_of_modes(machine: &Machine, plant: &Mechanism) -> Vec<String> {
+    let mut words = Vec::new();
+    let is_curved = |body: usize| {
+        let friction = &plant.bodies[body].friction;
+        friction.law != Law::Coulomb || friction.forward.viscous != friction.backward.viscous
+    };
+    if plant.held_bodies().any(is_curved) {
+        words.push("the modes' damping has of friction the viscous part of forward motion; the poles have all".into());
+    }
+    let is_sluggish = |unit: &DriveUnit| unit.amplifier.mode == AmplifierMode::Voltage && unit.motor.inductance != 0.0;
+    if machine.drives.iter().any(is_sluggish) {
+        words.push("the modes' damping leaves out motors with an inductance; the poles have them".into());
+    }
+    words
+}
+
+/// What is assumed of friction along the travel and of forces on what slides.
+fn forces(machine: &Machine, plant: &Mechanism, operation: Operation, moving: &[usize]) -> Vec<String> {
+    let mut words = Vec::new();
+    let slides = machine.geometry().slides.iter().zip(machine.slides());
+    let moves = |body: usize| moving.contains(&plant.leader(body));
+    for ((at, slide), place) in slides.zip(operation.coordinates(machine)) {
+        let whose = match machine.bridge.is_some() {
+            true => format!(" of the {}", machine.geometry().label(at.body).name),
+            false => String::new(),
+        };
+        if slide.along.is_some() && moves(at.body) {
+            let place = engineering_typed(place, "m", 4);
+            words.push(format!(
+                "friction{whose} that changes along the travel is taken as it is at x = {place}, and not followed"
+            ));
+        }
+        if slide.forces.along.is_some() {
+            words.push(format!(
+                "the force{whose} that changes along the travel is taken as it is at the place, and not followed"
+            ));
+        }
+        if slide.forces.by_speed.is_some() && moves(at.body) {
+            let speed = engineering_typed(operation.speed, "m/s", 4);
+            words
+                .push(format!("the force{whose} that changes with the speed is a damper as steep as it is at {speed}"));
+        }
+    }
+    if machine.slides().any(|slide| slide.constant_force() != 0.0) {
+        let who = if machine.bridge.is_some() { "bridge or cart" } else { "the cart" };
+        words.push(format!("the constant force on {who} changes where the machine is, not how it swings"));
+    }
+    words
+}
+
+/// What is assumed of amplifiers and gears: a sentence for all drives.
+fn drives(machine: &Machine, plant: &Mechanism) -> Vec<String> {
+    let mut words = Vec::new();
+    let limited = |unit: &DriveUnit| unit.amplifier.voltage_limit.is_some() || unit.amplifier.current_limit.is_some();
+    let (amplifier, gear) = match machine.drives.len() {
+        1 => (
+            "the amplifier is taken within its limits",
+            "the gear is taken as driven by the motor: it passes on the efficiency's share of the torque",
+        ),
+        _ => (
+            "the amplifiers are taken within their limits",
+            "gears are taken as driven by their motors: they pass on the efficiency's share of the torque",
+        ),
+    };
+    if machine.drives.iter().any(limited) {
+        words.push(amplifier.into());
+    }
+    let backlash = |unit: &DriveUnit| unit.motor.gear_play.map(|play| play.backlash).filter(|width| *width > 0.0);
+    let mut widths: Vec<String> =
+        machine.drives.iter().filter_map(backlash).map(|w| engineering_typed(w, "rad", 3)).collect();
+    widths.dedup();
+    if !widths.is_empty() {
+        words.push(format!(
+            "the gear is taken with its driving flank in contact; within its play of {} the motor moves nothing but its rotor",
+            widths.join(" and ")
+        ));
+    }
+    if plant.drives.iter().any(|drive| drive.loses()) {
+        words.push(gear.into());
     }
     words
 }
@@ -118,7 +176,7 @@ fn curves(plant: &Mechanism, operation: Operation, moving: &[usize]) -> Vec<Stri
         let part = &plant.bodies[body];
         let friction = part.friction;
         let speed = operation.speed / part.kind.lever();
-        let (name, unit) = (part.label.name, if body == CART { "N s/m" } else { "N m s/rad" });
+        let (name, unit) = (part.label.name, if part.kind == Kind::Linear { "N s/m" } else { "N m s/rad" });
         match friction.law {
             Law::Coulomb => None,
             Law::LuGre { .. } if operation.speed == 0.0 => {

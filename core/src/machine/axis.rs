@@ -39,6 +39,7 @@ pub const LABELS: [Label; BODIES] = [
 pub(super) static AXIS: Geometry = Geometry {
     word: "axis",
     name: "axis",
+    belts: "one belt",
     drives: &[DriveAt {
         label: Label { key: "motor", name: "motor" },
         voltage: Label { key: "voltage", name: "voltage limit" },

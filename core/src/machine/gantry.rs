@@ -97,6 +97,7 @@ const fn slides(by_drives: [&'static [f64]; 2], errors: [&'static [(usize, f64)]
 pub(super) static H_FRAME: Geometry = Geometry {
     word: "h-frame",
     name: "H-frame",
+    belts: "one belt round both drives",
     drives: &DRIVES,
     bodies: &const { bodies(&[-1.0, -1.0]) },
     spans: &[
@@ -128,6 +129,7 @@ pub(super) static H_FRAME: Geometry = Geometry {
 pub(super) static CORE_XY: Geometry = Geometry {
     word: "core-xy",
     name: "CoreXY",
+    belts: "a belt for each drive",
     drives: &DRIVES,
     bodies: &const { bodies(&[1.0, 1.0]) },
     spans: &[

@@ -9,6 +9,8 @@ pub struct Geometry {
     pub word: &'static str,
     /// For people.
     pub name: &'static str,
+    /// Its belts, in words.
+    pub belts: &'static str,
     /// The drives.
     pub drives: &'static [DriveAt],
     /// The bodies other than rotors, by their numbers.

@@ -11,8 +11,8 @@ Mistakes are :class:`taut.Error`, a ``ValueError`` with the text that the comman
 """
 
 from ._native import Bug, Error, Observation, __version__
-from .case import Case, GantryCase, export, read, show, template
-from .results import Check, Comparison, Designed, Drift, Estimate, Fit, FitLog, FrequencyResponses, GantryModes, LinearModel, Modes, Plans, Shown, Tuned
+from .case import Case, export, read, show, template
+from .results import Check, Comparison, Designed, Drift, Estimate, Fit, FitLog, FrequencyResponses, LinearModel, Modes, Plans, Shown, Tuned
 from .runs import Run, Runs
 from .shapers import Shape, shape
 from .sweeps import sweep, sweep_tables
@@ -30,8 +30,6 @@ __all__ = [
     "Fit",
     "FitLog",
     "FrequencyResponses",
-    "GantryCase",
-    "GantryModes",
     "LinearModel",
     "Modes",
     "Observation",

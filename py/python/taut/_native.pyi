@@ -158,6 +158,7 @@ class Case:
     def modes(
         self,
         at: float | None,
+        bridge: float | None,
         speed: float | None,
         stuck: list[str],
         sample_time: float | None,
@@ -170,7 +171,6 @@ class Case:
     def export(
         self, target: str, out: str, how: tuple[str | None, str, float | None, int], /
     ) -> tuple[list[Path], list[str]]: ...
-    def gantry_modes(self) -> dict[str, Any]: ...
     def show(self) -> dict[str, Any]: ...
 
 class Sweep:

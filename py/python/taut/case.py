@@ -11,7 +11,7 @@ from . import _checks, _html, _native
 from ._logs import write_log
 from ._toml import change
 from ._toml import written as toml
-from .results import Check, Comparison, Designed, Drift, Fit, FitLog, FrequencyResponses, GantryModes, LinearModel, Modes, Plans, Shown, Tuned
+from .results import Check, Comparison, Designed, Drift, Fit, FitLog, FrequencyResponses, LinearModel, Modes, Plans, Shown, Tuned
 from .runs import Run, Runs
 from .sweeps import sweep
 from .table import Table
@@ -33,7 +33,7 @@ class Controller(Protocol):
 
 
 class Case:
-    """A case file: a machine, and what is done with it. That of a gantry is a :class:`GantryCase` by itself.
+    """A case file: a machine, and what is done with it.
 
     ``case["cart.mass"]`` reads a value in SI units, ``case["cart.mass"] = "0.6 kg"`` or ``= 0.6`` writes one: by the
     keys of the case file, with comments and layout kept, and checked as the file is. ``case.text`` is the file.
@@ -54,7 +54,6 @@ class Case:
 
     def _take(self, native: _native.Case) -> None:
         self._native = native
-        self.__class__ = Case if native.kind == "axis" else GantryCase
 
     @property
     def kind(self) -> str:
@@ -341,6 +340,7 @@ class Case:
         self,
         *,
         at: float | None = None,
+        bridge: float | None = None,
         speed: float | None = None,
         stuck: Sequence[str] = (),
         sample_time: float | None = None,
@@ -349,16 +349,18 @@ class Case:
         lowest: float | None = None,
         highest: float | None = None,
     ) -> Modes:
-        """Linearises the stage while everything slides: matrices, poles, zeros, frequency response, resonances.
+        """Linearises the machine while everything slides: matrices, poles, zeros, frequency responses, resonances.
 
-        ``at`` is where the cart is (m), ``speed`` how fast it slides (m/s, 0.1 if not said), ``stuck`` which of
-        ``drive``, ``cart``, ``idler`` are held. With ``sample_time`` (s) also a discrete-time model, whose input is
-        held (``zero``, ``first`` or ``tustin``) and late by ``delay`` (s). ``lowest`` and ``highest`` bound the
-        response, Hz.
+        ``at`` is where the cart is (m), ``bridge`` where the bridge of a gantry is (m), ``speed`` how fast it slides
+        (m/s, 0.1 if not said), ``stuck`` which of ``drive``, ``cart``, ``idler`` (``left``, ``right``, ``bridge``,
+        ``cart`` of a gantry) are held. With ``sample_time`` (s) also a discrete-time model, whose inputs are held
+        (``zero``, ``first`` or ``tustin``) and late by ``delay`` (s). ``lowest`` and ``highest`` bound the responses,
+        Hz.
         """
         n = _checks.number
         found = self._native.modes(
             n("at", at),
+            n("bridge", bridge),
             n("speed", speed),
             _checks.names("stuck", stuck),
             n("sample_time", sample_time),
@@ -367,18 +369,7 @@ class Case:
             n("lowest", lowest),
             n("highest", highest),
         )
-        data = found["data"]
-        inputs, outputs = (data["input"]["name"],), tuple(row["name"] for row in data["outputs"])
-        units = {row["name"]: row["unit"] for row in [data["input"], *data["outputs"]]}
-        states = tuple(row["name"] for row in data["states"])
-        a, b, c, d = found["continuous"]
-        model = LinearModel(a, b, c, d, 0.0, states, inputs, outputs, units)
-        discrete = None
-        if sample_time is not None:
-            a, b, c, d = found["discrete"]
-            late = tuple(data["discrete"]["states"])
-            discrete = LinearModel(a, b, c, d, float(sample_time), late, inputs, outputs, units)
-        return Modes(data, model, discrete, found["frequency"], found["responses"])
+        return Modes._of(found, sample_time)
 
     @overload
     def move(
@@ -483,27 +474,8 @@ class Case:
         return _html.table(self.title, ("key", "SI"), rows + done)
 
 
-class GantryCase(Case):
-    """A case file of a gantry: two drives, ``left`` and ``right``, a ``bridge``, and a ``cart`` on it.
-
-    It simulates, is swept and is edited as any case. There are no moves, fits and tuning of gantries yet.
-    """
-
-    __slots__ = ()
-
-    def __init__(self, text: str, path: str | PathLike[str] = "case.toml") -> None:
-        """Reads a gantry from text."""
-        super().__init__(text, path)
-        if self.kind == "axis":
-            raise _native.Error("this case describes an axis, not a gantry")
-
-    def modes(self) -> GantryModes:  # type: ignore[override]  # what an axis is asked for, a gantry has not
-        """Rigid and elastic modes while everything slides, and the resonances over the working area."""
-        return GantryModes(self._native.gantry_modes())
-
-
 def read(path: str | PathLike[str]) -> Case:
-    """Reads a case file; that of a gantry becomes a :class:`GantryCase`."""
+    """Reads a case file."""
     return Case._of(_native.Case.read(_checks.path(path), []))
 
 

@@ -450,20 +450,67 @@ class LinearModel:
         return package.ss(self.A, self.B, self.C, self.D, self.dt, **names)
 
 
+def _together(
+    states: int,
+    models: Sequence[tuple[NDArray[np.float64], ...]],
+    names: Sequence[Sequence[str]],
+    inputs: Sequence[str],
+) -> tuple[tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]], tuple[str, ...]]:
+    """A, B, C, D of one machine from those of each of its inputs, which have the machine's states first and then
+    inputs of their own that are on their way; and the names of all states."""
+    late = [a.shape[0] - states for a, *_ in models]
+    size = states + sum(late)
+    first = models[0]
+    A, B = np.zeros((size, size)), np.zeros((size, len(models)))
+    C = np.zeros((first[2].shape[0], size))
+    A[:states, :states], C[:, :states] = first[0][:states, :states], first[2][:, :states]
+    place, every = states, list(names[0][:states])
+    for k, (a, b, c, _) in enumerate(models):
+        own = slice(place, place + late[k])
+        A[:states, own], A[own, own], C[:, own] = a[:states, states:], a[states:, states:], c[:, states:]
+        B[:states, k], B[own, k] = b[:states, 0], b[states:, 0]
+        every += [f"{inputs[k]}_{name}" if len(models) > 1 else name for name in names[k][states:]]
+        place += late[k]
+    return (A, B, C, np.hstack([d for *_, d in models])), tuple(every)
+
+
+Response = tuple[NDArray[np.float64], NDArray[np.float64]]
+"""Magnitude (output's unit per input's unit) and phase (degrees)."""
+
+
 @dataclass(frozen=True)
 class Modes:
-    """How a stage swings: its equations linearised while everything slides."""
+    """How a machine swings: its equations linearised while everything slides."""
 
     data: dict[str, Any]
     """The output of ``taut modes --json``."""
     model: LinearModel
-    """In continuous time."""
+    """In continuous time, with an input for each drive."""
     discrete: LinearModel | None
     """For the sample time, if one was given."""
     frequency: NDArray[np.float64]
     """Frequencies of the responses, Hz."""
-    responses: dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]]
-    """By output: magnitude (output's unit per input's unit) and phase (degrees)."""
+    by_input: dict[str, dict[str, Response]]
+    """By input, then by output."""
+
+    @classmethod
+    def _of(cls, found: dict[str, Any], sample_time: float | None) -> Modes:
+        data = found["data"]
+        inputs, outputs, states = (tuple(row["name"] for row in data[key]) for key in ("inputs", "outputs", "states"))
+        units = {row["name"]: row["unit"] for row in [*data["inputs"], *data["outputs"]]}
+        a, b, c, d = found["continuous"]
+        model = LinearModel(a, b, c, d, 0.0, states, inputs, outputs, units)
+        discrete = None
+        if sample_time is not None:
+            names = [one["discrete"]["states"] for one in data["inputs"]]
+            (a, b, c, d), every = _together(len(states), found["discrete"], names, inputs)
+            discrete = LinearModel(a, b, c, d, float(sample_time), every, inputs, outputs, units)
+        return cls(data, model, discrete, found["frequency"], found["responses"])
+
+    @property
+    def responses(self) -> dict[str, Response]:
+        """Of the first input, by output."""
+        return next(iter(self.by_input.values()))
 
     @property
     def poles(self) -> NDArray[np.complex128]:
@@ -472,31 +519,81 @@ class Modes:
 
     @property
     def resonances(self) -> list[float]:
-        """Hz, at the place that was asked for."""
+        """Natural frequencies of the pole pairs, Hz, at the place that was asked for."""
         return [float(root["frequency_Hz"]) for root in self.data["here"]["resonances"]]
+
+    @property
+    def damping(self) -> list[float]:
+        """The damping ratios of the resonances."""
+        return [float(root["damping_ratio"]) for root in self.data["here"]["resonances"]]
+
+    @property
+    def shapes(self) -> pandas.DataFrame:
+        """A pandas.DataFrame of the elastic modes: frequency without damping (Hz), damping ratio, and how far each body
+        moves at the belt. Empty where a body is held."""
+        rows = self.data["elastic"] or []
+        bodies = list(dict.fromkeys(body for row in rows for body in row["shape_at_belt"]))
+        columns = {key: [row[key] for row in rows] for key in ("frequency_Hz", "damping_ratio")}
+        return frame(columns | {body: [row["shape_at_belt"].get(body) for row in rows] for body in bodies})
+
+    @property
+    def map(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]] | None:
+        """Positions of the bridge and of the cart (m), and the frequencies (Hz) by mode, bridge and cart.
+
+        None for an axis, and where the stiffness does not depend on the place.
+        """
+        found = self.data["map"]
+        if found is None:
+            return None
+        bridge, cart, hertz = (np.array(found[key]) for key in ("bridge_position_m", "cart_position_m", "elastic_Hz"))
+        return bridge, cart, hertz
 
     def to_control(self) -> control.StateSpace:
         """The model as python-control has it: in discrete time if a sample time was given."""
         return (self.discrete or self.model).to_control()
 
     def to_pandas(self) -> pandas.DataFrame:
-        """A pandas.DataFrame of the responses: ``frequency_Hz``, and magnitude and phase (degrees) of each output."""
+        """A pandas.DataFrame of the responses: ``frequency_Hz``, and magnitude and phase (degrees) of each output. With
+        several inputs each column begins with the name of its own."""
         columns: dict[str, Any] = {"frequency_Hz": self.frequency}
-        for name, (magnitude, phase) in self.responses.items():
-            columns |= {f"{name}_magnitude": magnitude, f"{name}_phase_deg": phase}
+        for given, responses in self.by_input.items():
+            of = f"{given}_to_" if len(self.by_input) > 1 else ""
+            for name, (magnitude, phase) in responses.items():
+                columns |= {f"{of}{name}_magnitude": magnitude, f"{of}{name}_phase_deg": phase}
         return frame(columns)
 
-    def plot(self, output: str | None = None, *, ax: Axes | Sequence[Axes] | None = None) -> Figure:
-        """Bode diagram of one output (the first unless said): magnitude above, phase below, or both into two ``ax``."""
-        name = next(iter(self.responses)) if output is None else output
-        if name not in self.responses:
-            raise KeyError(f"there is no output {name!r}; there are {', '.join(self.responses)}")
-        magnitude, phase = self.responses[name]
+    def plot(
+        self, output: str | None = None, *, input: str | None = None, ax: Axes | Sequence[Axes] | None = None
+    ) -> Figure:
+        """Bode diagram of one output (the first unless said) and input (the first unless said): magnitude above, phase
+        below, or both into two ``ax``."""
+        given = self.model.inputs[0] if input is None else input
+        if given not in self.by_input:
+            raise KeyError(f"there is no input {given!r}; there are {', '.join(self.by_input)}")
+        responses = self.by_input[given]
+        name = next(iter(responses)) if output is None else output
+        if name not in responses:
+            raise KeyError(f"there is no output {name!r}; there are {', '.join(responses)}")
+        magnitude, phase = responses[name]
         figure, (above, below) = _plots.panels(ax, 2)
         above.loglog(self.frequency, magnitude, linewidth=1)
         below.semilogx(self.frequency, phase, linewidth=1)
-        _plots.finished(above, "", f"{name.replace('_', ' ')}, {self.model.units[name]}/{self.model.units[self.model.inputs[0]]}")
+        _plots.finished(above, "", f"{name.replace('_', ' ')}, {self.model.units[name]}/{self.model.units[given]}")
         _plots.finished(below, "frequency, Hz", "phase, °")
+        return figure
+
+    def plot_map(self, mode: int = 0, *, ax: Axes | None = None) -> Figure:
+        """Frequency without damping of an elastic mode over the working area; where it is the same everywhere, all modes as
+        bars."""
+        figure, (axis,) = _plots.panels(ax, 1, height=3.0)
+        area, shown = self.map, [float(row["frequency_Hz"]) for row in self.data["elastic"] or []]
+        if area is None:
+            _plots.bars(axis, [f"mode {k}" for k in range(len(shown))], shown, "frequency, Hz")
+            return figure
+        bridge, cart, hertz = area
+        filled = axis.contourf(1e3 * bridge, 1e3 * cart, hertz[mode].T, levels=20)
+        figure.colorbar(filled, ax=axis, label="frequency, Hz")
+        _plots.finished(axis, "bridge, mm", "cart, mm")
         return figure
 
     def __repr__(self) -> str:
@@ -639,81 +736,3 @@ class FrequencyResponses:
     def _repr_html_(self) -> str:
         rows = [(one["log"], one["quantity"], len(one["frequency_Hz"])) for one in self.data["responses"]]
         return _html.table(str(self.data["title"]), ("log", "quantity", "frequencies"), rows)
-
-
-@dataclass(frozen=True)
-class GantryModes:
-    """How a gantry swings while everything slides."""
-
-    data: dict[str, Any]
-    """The output of ``taut modes --json``."""
-
-    @property
-    def resonances(self) -> list[float]:
-        """Undamped frequencies of the elastic modes, Hz, with bridge and cart at zero."""
-        return [float(mode["frequency_Hz"]) for mode in self.data["elastic"]]
-
-    @property
-    def damping(self) -> list[float | None]:
-        """Their damping ratios; None where damping is so strong that not every mode swings."""
-        return [mode["damping_ratio"] for mode in self.data["elastic"]]
-
-    @property
-    def map(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]] | None:
-        """Positions of the bridge and of the cart (m), and the frequencies (Hz) by mode, bridge and cart.
-
-        None where the stiffness does not depend on the place.
-        """
-        found = self.data["map"]
-        if found is None:
-            return None
-        bridge, cart, hertz = (np.array(found[key]) for key in ("bridge_position_m", "cart_position_m", "elastic_Hz"))
-        return bridge, cart, hertz
-
-    @property
-    def model(self) -> LinearModel:
-        """The linear equations with bridge and cart at zero, with an input for each drive."""
-        data = self.data
-        a, b, c, d = (np.array(data[key], dtype=float) for key in "ABCD")
-        states, inputs, outputs = (tuple(row["name"] for row in data[key]) for key in ("states", "inputs", "outputs"))
-        units = {row["name"]: row["unit"] for row in [*data["inputs"], *data["outputs"]]}
-        return LinearModel(a, b, c, d, 0.0, states, inputs, outputs, units)
-
-    def to_control(self) -> control.StateSpace:
-        """The model as python-control has it, with two inputs."""
-        return self.model.to_control()
-
-    def to_pandas(self) -> pandas.DataFrame:
-        """A pandas.DataFrame of the elastic modes: frequency (Hz), damping ratio, and how far each body moves at the
-        belt."""
-        rows = self.data["elastic"]
-        bodies = list(dict.fromkeys(body for row in rows for body in row["shape_at_belt"]))
-        columns = {key: [row[key] for row in rows] for key in ("frequency_Hz", "damping_ratio")}
-        return frame(columns | {body: [row["shape_at_belt"].get(body) for row in rows] for body in bodies})
-
-    def plot(self, mode: int = 0, *, ax: Axes | None = None) -> Figure:
-        """The frequency of an elastic mode over the working area; where it is the same everywhere, all modes as
-        bars."""
-        figure, (axis,) = _plots.panels(ax, 1, height=3.0)
-        area = self.map
-        if area is None:
-            _plots.bars(axis, [f"mode {k}" for k in range(len(self.resonances))], self.resonances, "frequency, Hz")
-            return figure
-        bridge, cart, hertz = area
-        shown = axis.contourf(1e3 * bridge, 1e3 * cart, hertz[mode].T, levels=20)
-        figure.colorbar(shown, ax=axis, label="frequency, Hz")
-        _plots.finished(axis, "bridge, mm", "cart, mm")
-        return figure
-
-    def __repr__(self) -> str:
-        found = ", ".join(f"{frequency:.4g} Hz" for frequency in self.resonances)
-        return f"<taut.GantryModes {self.data['title']!r}: resonances at {found}>"
-
-    def _repr_html_(self) -> str:
-        bodies = ("left", "right", "bridge", "cart")
-        rows = [
-            (mode["frequency_Hz"], mode["damping_ratio"], *(mode["shape_at_belt"].get(body) for body in bodies))
-            for mode in self.data["elastic"]
-        ]
-        head = ("frequency, Hz", "damping ratio", *bodies)
-        return _html.table(f"{self.data['title']}: elastic modes", head, rows)

@@ -1,10 +1,9 @@
 //! Linear analyses as a person sees them.
 
-pub mod gantry;
 mod page;
-mod plots;
+mod pictures;
 mod rows;
 
 pub use page::{page, printed};
-pub use plots::figures;
-pub use rows::{along, gain, pole, poles, words, z, zeros};
+pub use pictures::{Pictures, pictures};
+pub use rows::{elastic, gain, pole, rigid, where_it_matters, words, z, zeros};

@@ -2,15 +2,10 @@
 
 use nalgebra::Complex;
 use std::f64::consts::PI;
-use taut::linear::Analysis;
-use taut::linear::{Root, Transfer};
+use taut::linear::{Analysis, ElasticMode, Natural, RigidMode, Root, Transfer};
 use taut::machine::BeltModel;
-use taut::number::engineering_typed;
-
-/// Of each pole or pair, the slowest first.
-pub fn poles(analysis: &Analysis) -> Vec<Root> {
-    Root::of(analysis.transfers.first().map_or(&[], |transfer| &transfer.poles))
-}
+use taut::mechanism::Mechanism;
+use taut::number::{engineering_typed, fixed};
 
 /// A name without underscores.
 pub fn words(name: &str) -> String {
@@ -101,19 +96,73 @@ pub fn z(value: &Complex<f64>) -> String {
     }
 }
 
-/// Whether the stiffness or the friction of the stage depends on where the cart is, in words.
-pub fn along(analysis: &Analysis) -> &'static str {
-    let machine = &analysis.case.machine;
-    match (&analysis.travel, machine.belt.make) {
-        _ if machine.belt.model == BeltModel::Rigid => "a rigid belt has no spans that could change with the position",
-        (Some(_), _) => "spans 1 and 2 follow the cart: k = A E / l with the length that is left",
-        (None, Some(_)) => {
-            "the same along the travel: this file's stiffness does not depend on the position \
-                 (belt.follows_cart = true makes spans 1 and 2 follow the cart)"
+/// The body of a rigid mode, and how the others go with it.
+pub fn rigid(mechanism: &Mechanism, modes: &Natural, mode: &RigidMode) -> (&'static str, String) {
+    let others = modes.bodies.iter().zip(&mode.shape).filter(|(body, _)| **body != mode.body);
+    let way = |(body, way): (&usize, &f64)| {
+        let body = &mechanism.bodies[*body];
+        match way {
+            0.0 => format!("{} 0", body.label.name),
+            way => format!("{} {} {}", body.label.name, fixed(*way, 2), body.kind.units()[0]),
         }
-        (None, None) => {
+    };
+    let body = &mechanism.bodies[mode.body];
+    let ways: Vec<String> = others.map(way).collect();
+    let ways = if ways.is_empty() { "all that moves".into() } else { ways.join(", ") };
+    (body.label.name, format!("per {}: {ways}", body.kind.units()[0]))
+}
+
+/// Frequency without damping, damping, shape and energy of an elastic mode.
+pub fn elastic(mechanism: &Mechanism, modes: &Natural, mode: &ElasticMode) -> [String; 4] {
+    let damping = match mode.damped {
+        Some(root @ Root::Pair { damping, .. }) => format!(
+            "damping {}, time constant {}, damped frequency {} Hz",
+            engineering_typed(shown_damping(damping), "", 4),
+            time(root),
+            plain(root.damped_hertz().unwrap_or(0.0))
+        ),
+        _ => "damped so much that not every mode swings".into(),
+    };
+    let name = |body: usize| mechanism.bodies[body].label.name;
+    let bodies = || modes.bodies.iter().copied();
+    let shape: Vec<String> =
+        bodies().zip(&mode.shape).map(|(body, way)| format!("{} {}", name(body), fixed(*way, 3))).collect();
+    let mut shares: Vec<(usize, f64)> = bodies().zip(mode.energy.iter().copied()).collect();
+    // Alike ones stay in the order of the bodies.
+    shares.sort_by(|a, b| (b.1 * 1e6).round().total_cmp(&(a.1 * 1e6).round()));
+    let shares = shares.iter().filter(|(_, share)| *share >= 0.005);
+    let energy: Vec<String> =
+        shares.map(|(body, share)| format!("{} {} %", name(*body), fixed(100.0 * share, 0))).collect();
+    [
+        format!("{} Hz", plain(mode.hertz())),
+        damping,
+        format!("ways at the belt: {}", shape.join(", ")),
+        format!("energy: {}", energy.join(", ")),
+    ]
+}
+
+/// Whether stiffness, and with it the resonances, depend on the place, in words.
+pub fn where_it_matters(analysis: &Analysis) -> &'static str {
+    let belt = &analysis.case.machine.belt;
+    match analysis.case.machine.bridge.is_some() {
+        _ if belt.model == BeltModel::Rigid => "a rigid belt has no spans that could change with the position",
+        false if belt.following().is_some() => {
+            "spans 1 and 2 follow the cart: k = A E / l with the length that is left"
+        }
+        true if belt.following().is_some() => {
+            "the spans follow bridge and cart: k = A E / l with the length that is left"
+        }
+        false if belt.make.is_some() => {
+            "the same along the travel: this file's stiffness does not depend on the position \
+             (belt.follows_cart = true makes spans 1 and 2 follow the cart)"
+        }
+        false => {
             "the same along the travel: this file gives the spans' stiffness as such \
-                 (belt.modulus, section, spans and follows_cart = true make them follow the cart)"
+             (belt.modulus, section, spans and follows_cart = true make them follow the cart)"
+        }
+        true => {
+            "the same everywhere: in this file the spans' stiffness does not depend on the place \
+             (belt.modulus, section, spans and follows_cart = true make the spans follow bridge and cart)"
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::Tried;
 use super::rows::{controller, lines};
-use crate::drawing::stage_drawing;
+use crate::drawn;
 use crate::page::{Callout, Cell, Page, Table};
 use crate::simulate::{Named, ended_early, figures_table};
 use taut::control::drives::drive_gains;
@@ -12,7 +12,7 @@ pub fn page(tried: &Tried, text: &str, figures: &[Vec<Named>]) -> Page {
     let words = controller(tried.design, &tried.case.machine);
     let mut page = Page::new(tried.case.title.clone()).subtitle(format!("Moves in closed loop: {words}."));
     page.section("The stage");
-    page.drawing(&stage_drawing(&tried.case.machine), "Symbols, values and positive directions.");
+    drawn(&mut page, &tried.case.machine);
     for (done, figures) in tried.done.iter().zip(figures) {
         page.section(&done.motion.name);
         if let Some(told) = ended_early(&done.run.outcome.ending, "cart") {

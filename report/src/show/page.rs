@@ -3,7 +3,7 @@
 use super::rows::{rows, value};
 use crate::modes::printed;
 use crate::simulate::Named;
-use crate::{Axis, Callout, Cell, Colour, Figure, Page, Panel, Series, Table, machine_drawing};
+use crate::{Axis, Callout, Cell, Colour, Figure, Page, Panel, Series, Table, drawn};
 use taut::case::Case;
 use taut::overview::Overview;
 
@@ -35,11 +35,7 @@ pub fn figures(overview: &Overview) -> Vec<Named> {
 pub fn page(case: &Case, overview: &Overview, figures: &[Named]) -> Page {
     let mut page = Page::new(overview.title.clone()).subtitle("What follows from its numbers");
     page.section("The machine");
-    let caption = match case.is_axis() {
-        true => "Symbols, values and positive directions.",
-        false => "In plan view with positive directions; lengths are not to scale.",
-    };
-    page.drawing(&machine_drawing(&case.machine), caption);
+    drawn(&mut page, &case.machine);
     for note in &overview.notes {
         page.callout(Callout::Note, "Note", format!("{}.", note.text));
     }

@@ -3,9 +3,8 @@
 use super::Run;
 use super::plots::{Named, figures, way};
 use super::rows::{early_end, lines, machine};
-use crate::machine_drawing;
 use crate::page::{Callout, Cell, Page, Table};
-use crate::{Picture, Plane};
+use crate::{Picture, Plane, drawn};
 use taut::case::Case;
 use taut::machine::Machine;
 use taut::mechanism::Mechanism;
@@ -21,18 +20,10 @@ pub fn report(case: &Case, text: &str, solver: Solver, runs: &[Run]) -> (Page, V
     let mechanism = case.machine.mechanism();
     let mut page = Page::new(case.title.clone()).subtitle(how(solver));
     let mut pictures = Vec::new();
-    let drawing = machine_drawing(&case.machine);
-    if case.is_axis() {
-        page.section("The stage");
-        page.drawing(&drawing, "Symbols, values and positive directions.");
-    } else {
-        page.section("The machine");
-        page.prose(format!("{}.", machine(&case.machine)));
-        page.drawing(
-            &drawing,
-            "In plan view with positive directions; lengths are not to scale. In the model the bridge does not yaw, and \
-             idlers have neither inertia nor friction.",
-        );
+    page.section("The machine");
+    page.prose(format!("{}.", machine(&case.machine)));
+    let drawing = drawn(&mut page, &case.machine);
+    if case.machine.bridge.is_some() {
         pictures.push(("machine".to_string(), Picture::Drawing(drawing)));
     }
     for run in runs {

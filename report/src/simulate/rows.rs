@@ -3,7 +3,7 @@
 use super::Run;
 use super::band::Band;
 use crate::fit::outputs;
-use taut::machine::{BeltModel, Geometry, Kind, Machine, Slide};
+use taut::machine::{BeltModel, Geometry, Machine, Slide};
 use taut::mechanism::Part;
 use taut::metrics::{Balance, Metrics, OfLoad, Peak};
 use taut::number;
@@ -85,17 +85,23 @@ pub fn ended_early(ending: &Ending, load: &str) -> Option<String> {
 const LEAST: f64 = 1e-13;
 const LEAST_FORCE: f64 = 1e-9;
 
-/// A machine with a bridge in a line.
+/// A machine in a line.
 pub fn machine(machine: &Machine) -> String {
-    let belts = if machine.kind == Kind::HFrame { "one belt round both drives" } else { "a belt for each drive" };
     let short = |value: f64, unit: &str| number::engineering_typed(value, unit, 4);
     let stiffness: Vec<String> = machine.belt.stiffness.iter().map(|k| short(*k, "N/m")).collect();
-    let follow = if machine.belt.follows_cart { " at x = y = 0, following bridge and cart" } else { "" };
+    let parts = machine.geometry().slides.iter().zip(machine.slides());
+    let parts =
+        parts.map(|(at, slide)| format!("{} {}", machine.geometry().label(at.body).name, short(slide.mass, "kg")));
+    let follow = match (machine.belt.follows_cart, machine.bridge.is_some()) {
+        (false, _) => "",
+        (true, false) => " at x = 0, following the cart",
+        (true, true) => " at x = y = 0, following bridge and cart",
+    };
     format!(
-        "{}, {belts}: bridge {}, cart {}, r = {}, spans {}{follow}",
+        "{}, {}: {}, r = {}, spans {}{follow}",
         machine.kind.name(),
-        short(machine.first_slide().mass, "kg"),
-        short(machine.cart.mass, "kg"),
+        machine.geometry().belts,
+        parts.collect::<Vec<_>>().join(", "),
         short(machine.pulley_radius, "m"),
         stiffness.join(", "),
     )

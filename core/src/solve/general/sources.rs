@@ -12,7 +12,7 @@
 
 use super::model::{Curved, Model, Sliding, Vector};
 use super::radau::{FOUND, Lane, NODES, PLACES, POINTS, QUARTIC, RADAU, monomials};
-use crate::friction::{Law, Motion};
+use crate::friction::{Law, Motion, Side};
 
 /// A force, with the arguments that it depends on by their numbers.
 pub(super) enum Source {
@@ -38,6 +38,9 @@ pub(super) enum Source {
 
 /// A step that begins this near a kink, as a share of how far it goes from there, begins at it.
 const AT_KINK: f64 = 1e-8;
+
+/// Parts of the interval between two nodes in which a quartic is looked at for a change of its sign.
+const PARTS: usize = 4;
 
 /// Bristles that slip by more than this share of their deflection within a step are stiff.
 const STIFF: f64 = 2.0;
@@ -125,6 +128,16 @@ impl Source {
             }
         }
         first
+    }
+
+    /// Whether it is zero in one direction of a body that reverses without sticking. What such a body does is then
+    /// solved without an error, so that nothing but the length of a step keeps it near to a quartic.
+    pub(super) fn is_one_sided(&self, model: &Model) -> bool {
+        let &Source::Friction { curved, motion: Motion::Free, .. } = self else { return false };
+        let friction = &model.curved[curved].friction;
+        let more = friction.backward.viscous - friction.forward.viscous;
+        let is_zero = |side: Side| side.coulomb == 0.0 && side.breakaway == 0.0;
+        is_zero(friction.forward) || (is_zero(friction.backward) && more == 0.0)
     }
 
     /// The body of a friction force whose speed is zero where the step ends.
@@ -265,24 +278,43 @@ fn course(begin: f64, [a, b, c, d]: &Lane) -> [f64; POINTS] {
     [begin, *a, *b, *c, *d]
 }
 
-/// The share of a step at which a quartic through these values first changes its sign, if it goes farther than
-/// `negligible` from zero, and not where it begins.
+/// The share of a step at which a quartic through these values first changes its sign, also between two nodes and back,
+/// if it goes farther than `negligible` from zero, and not where it begins.
 #[inline(always)]
 fn crossing(values: &[f64; POINTS], negligible: f64) -> Option<f64> {
     let farthest = values.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
-    let is_at = |value: f64| value.abs() <= AT_KINK * farthest;
-    let pair = (0..NODES).find(|&i| values[i] * values[i + 1] < 0.0 && !(i == 0 && is_at(values[0])))?;
-    if farthest <= negligible {
+    if farthest <= negligible || stays_on_its_side(values) {
         return None;
     }
     let powers = monomials(values);
     let at = |s: f64| powers.iter().rev().fold(0.0, |sum, power| sum * s + power);
-    let (mut low, mut high) = (PLACES[pair], PLACES[pair + 1]);
-    for _ in 0..52 {
-        let middle = 0.5 * (low + high);
-        if at(middle) * values[pair] > 0.0 { low = middle } else { high = middle }
+    let between = (0..NODES).flat_map(|pair| {
+        let (begin, length) = (PLACES[pair], PLACES[pair + 1] - PLACES[pair]);
+        (0..PARTS).map(move |part| (pair, part, begin + length * part as f64 / PARTS as f64))
+    });
+    let places = between.map(|(pair, part, s)| (s, if part == 0 { values[pair] } else { at(s) }));
+    // Where it begins at zero, it has no side yet.
+    let mut places = places.chain([(1.0, values[NODES])]).skip_while(|(_, value)| value.abs() <= AT_KINK * farthest);
+    let (mut low, side) = places.next()?;
+    for (mut high, value) in places {
+        if value * side >= 0.0 {
+            low = high;
+            continue;
+        }
+        for _ in 0..52 {
+            let middle = 0.5 * (low + high);
+            if at(middle) * side > 0.0 { low = middle } else { high = middle }
+        }
+        return Some(0.5 * (low + high));
     }
-    Some(0.5 * (low + high))
+    None
+}
+
+/// Whether a quartic through these values surely keeps their sign: it goes beyond them by less than they differ.
+#[inline(always)]
+fn stays_on_its_side(values: &[f64; POINTS]) -> bool {
+    let (least, most) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, m), v| (l.min(*v), m.max(*v)));
+    most - least < least.max(-most)
 }
 
 /// The matrix of the deflections at the nodes, I + h R diag(a), parted in two triangles.

@@ -36,6 +36,9 @@ const HALVINGS: usize = 60;
 const SOLUTIONS: usize = 6;
 const NEAR_KINK: f64 = 1e-11;
 
+/// Largest ‖A‖ h of a step in which the crossing of zero by a free motion is told by a quartic.
+const NEAR_QUARTIC: f64 = 1.0;
+
 /// Lengths of steps of one mode that are kept.
 const KEPT: usize = 48;
 
@@ -185,7 +188,9 @@ impl Core {
     /// what is left to such a multiple or to the end of the stretch.
     fn length(&self, field: &Field, stretch: &Stretch) -> Length {
         let left = stretch.length() - self.tau;
-        let most = self.step.min(REACH / field.linear.norm);
+        let is_one_sided = field.sources.iter().any(|source| source.is_one_sided(&field.model));
+        let reach = if is_one_sided { NEAR_QUARTIC } else { REACH };
+        let most = self.step.min(reach / field.linear.norm);
         let regular = self.interval * power_of_two_below(most / self.interval);
         let time = stretch.begin + self.tau;
         let near = 8.0 * f64::EPSILON * time + 1e-9 * regular;
