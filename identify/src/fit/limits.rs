@@ -480,6 +480,12 @@ pub(crate) const LAW_SHOWN: f64 = 3.0;
 /// Unit: 1. Source: chosen. Test: `the_right_model_lacks_nothing`.
 pub(crate) const LAW_KEEPS: f64 = 0.25;
 
+/// Steps to another law that are run: friction that falls by half makes a cart slip where it stuck, and the whole step
+/// misses.
+///
+/// Unit: 1, of the amplitude. Source: chosen. Test: `a_law_that_was_not_asked_for_widens_intervals_and_is_named`.
+pub(crate) const LAW_SHARES: [f64; 3] = [1.0, 0.75, 0.5];
+
 /// Change of the outputs that another law must make, as a share of their range.
 ///
 /// Unit: 1. Source: below are the last digits of logs and solvers. Test: `last_digits_of_a_log_speak_for_no_law`.
@@ -1000,6 +1006,12 @@ pub(crate) const STRIBECK_POINTS: [f64; 9] = [0.2, 0.4, 0.6, 0.8, 1.0, 1.25, 1.5
 ///
 /// Unit: 1. Source: chosen.
 pub(crate) const CAUSE_ENOUGH: f64 = 0.1;
+
+/// Length by which bristles bend before they slip, from which on they are named.
+///
+/// Unit: standard deviations of the residuals of a position. Source: chosen: shorter ones are fitted to friction that
+/// falls with speed. Test: `a_law_that_was_not_asked_for_widens_intervals_and_is_named`.
+pub(crate) const BRISTLE_SHOWN: f64 = 3.0;
 
 /// Most values of logs for which elements are tried that take long.
 ///

@@ -72,3 +72,8 @@ pub struct Size {
     /// Its standard error.
     pub error: f64,
 }
+
+/// Friction of a body that falls by a force or torque as it picks up this speed, in words.
+pub(super) fn falling(body: &str, force: &str, speed: &str) -> String {
+    format!("friction of the {} that falls by {force} within some {speed}", body.replace('_', " "))
+}

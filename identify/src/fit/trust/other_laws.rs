@@ -13,14 +13,14 @@
 //! noise makes of it, and a run with the law and the parameters moved by d bears out what the column promises, intervals
 //! are widened by d, and it is said which law it is.
 
-use super::doubts::OtherLaw;
+use super::doubts::{OtherLaw, falling};
 use super::uncertainty::Judged;
 use crate::fit::asked::drifting;
 use crate::fit::asked::problem::Problem;
 use crate::fit::asked::run::Run;
 use crate::fit::limits::{
-    DRIFT_PARTS, FILE_ROUNDING, LAW_DUST, LAW_FIRST, LAW_KEEPS, LAW_LEAST, LAW_MOST, LAW_ROUNDS, LAW_SHOWN, NORMAL,
-    STRIBECK_SHARES,
+    DRIFT_PARTS, FILE_ROUNDING, LAW_DUST, LAW_FIRST, LAW_KEEPS, LAW_LEAST, LAW_MOST, LAW_ROUNDS, LAW_SHARES, LAW_SHOWN,
+    NORMAL, STRIBECK_SHARES,
 };
 use crate::fit::noise::{half_width, spreads};
 use crate::fit::search::starts::Searched;
@@ -155,11 +155,7 @@ impl Candidate {
         let (force, speed) = self.body.units();
         let whose = self.body.key().replace('_', " ");
         match self.kind {
-            Kind::Stribeck(velocity) => format!(
-                "friction of the {whose} that falls by {} within some {}",
-                shown(amplitude, force),
-                shown(velocity, speed)
-            ),
+            Kind::Stribeck(velocity) => falling(self.body.key(), &shown(amplitude, force), &shown(velocity, speed)),
             Kind::Sided => format!(
                 "Coulomb friction of the {whose} that is {} {} forward than backward",
                 shown(2.0 * amplitude.abs(), force),
@@ -309,16 +305,20 @@ impl Place<'_> {
         Some(DVector::from_vec(residuals))
     }
 
-    /// What a law takes off Σ r² where the variables have moved along with it, x + d; none where that is less than
-    /// [`LAW_KEEPS`] of what its column promises.
+    /// What a law takes off Σ r² where the variables have moved along with it, x + s d with the best of the shares s;
+    /// none where that is less than [`LAW_KEEPS`] of what its column promises.
     fn gained(&self, tried: &Tried) -> Option<f64> {
         let bounds = self.problem.bounds();
-        let mut x = self.x.to_vec();
-        for (&j, along) in self.free.iter().zip(tried.along.iter()) {
-            x[j] = (x[j] - tried.amplitude * along).clamp(bounds.low[j], bounds.high[j]);
-        }
-        let left = self.with(tried.candidate, tried.amplitude, &x)?;
-        let gain = self.residuals.norm_squared() - left.norm_squared();
+        let own = |share: &f64| {
+            let amplitude = share * tried.amplitude;
+            let mut x = self.x.to_vec();
+            for (&j, along) in self.free.iter().zip(tried.along.iter()) {
+                x[j] = (x[j] - amplitude * along).clamp(bounds.low[j], bounds.high[j]);
+            }
+            let left = self.with(tried.candidate, amplitude, &x)?;
+            Some(self.residuals.norm_squared() - left.norm_squared())
+        };
+        let gain = LAW_SHARES.iter().filter_map(own).fold(0.0, f64::max);
         (gain >= LAW_KEEPS * tried.gain).then_some(gain)
     }
 

@@ -25,6 +25,8 @@ pub(super) struct Extension {
     pub words: fn(&Site, &Extended, &Fitted) -> Said,
     /// A machine of the case with it as one of the case without it.
     pub without: fn(&Site, Machine) -> Machine,
+    /// Whether a fit with it, whose residuals have this share of the deviation without, shows it beside noise.
+    pub shows: fn(&Site, &Machine, f64) -> bool,
     /// Whether it takes a curved law, whose runs take a hundred times as long.
     pub is_slow: bool,
 }
@@ -38,7 +40,11 @@ pub(super) const EXTENSIONS: &[Extension] = &[
     row("drag", force::drags, force::drag_words, force::without),
     row("stribeck", force::falls, force::fall_words, force::without_fall),
     row("load", force::loads, force::load_words, as_it_is),
-    Extension { is_slow: true, ..row("lugre", force::bristles, force::bristle_words, force::without_bristles) },
+    Extension {
+        shows: force::bristles_show,
+        is_slow: true,
+        ..row("lugre", force::bristles, force::bristle_words, force::without_bristles)
+    },
 ];
 
 const fn row(
@@ -47,7 +53,11 @@ const fn row(
     words: fn(&Site, &Extended, &Fitted) -> Said,
     without: fn(&Site, Machine) -> Machine,
 ) -> Extension {
-    Extension { key, tries, words, without, is_slow: false }
+    Extension { key, tries, words, without, shows: always, is_slow: false }
+}
+
+fn always(_: &Site, _: &Machine, _: f64) -> bool {
+    true
 }
 
 fn as_it_is(_: &Site, machine: Machine) -> Machine {
@@ -125,6 +135,16 @@ impl<'s, 'a> Site<'s, 'a> {
             _ => None,
         };
         of(quantity).or(stands_for).unwrap_or(1e-12)
+    }
+
+    /// The standard deviation of the residuals of positions, as lengths at the cart, m; none where no log has one.
+    pub fn position_deviation(&self) -> Option<f64> {
+        let r = self.machine.pulley_radius;
+        self.found.noise.iter().find_map(|(quantity, sigma)| match quantity {
+            Quantity::CartPosition => Some(*sigma),
+            Quantity::DriveAngle => Some(r * sigma),
+            _ => None,
+        })
     }
 
     /// Whether a key of the case file is searched for, by itself or with others.

@@ -6,9 +6,10 @@
 use super::extension::{Extended, Fitted, Measure, Said, Site, Telling, shown};
 use crate::fit::asked::problem::Problem;
 use crate::fit::limits::{
-    BRISTLE_BEND, DRAG_POINTS, FORCE_FIRST, FORCE_MOST, MOST_BREAKAWAY, STRIBECK_ABOVE, STRIBECK_FALL, STRIBECK_POINTS,
-    STRIBECK_SHARES,
+    BRISTLE_BEND, BRISTLE_SHOWN, DRAG_POINTS, FORCE_FIRST, FORCE_MOST, MOST_BREAKAWAY, STRIBECK_ABOVE, STRIBECK_FALL,
+    STRIBECK_POINTS, STRIBECK_SHARES,
 };
+use crate::fit::trust::doubts::falling;
 use crate::friction::Law;
 use crate::log::Quantity;
 use crate::machine::Machine;
@@ -131,12 +132,7 @@ pub(super) fn fall_words(site: &Site, extended: &Extended, found: &Fitted) -> Sa
     let last = line.and_then(|line| line.points().last()).map_or(0.0, |point| point[0]);
     let velocity = last / STRIBECK_POINTS[STRIBECK_POINTS.len() - 1];
     let whose = body(site).map_or("cart", |(key, _)| key);
-    let words = format!(
-        "friction of the {} that falls by {} within some {}",
-        whose.replace('_', " "),
-        shown(fall, "N"),
-        shown(velocity, "m/s")
-    );
+    let words = falling(whose, &shown(fall, "N"), &shown(velocity, "m/s"));
     let add = format!(
         "add stribeck = {{ force = \"{}\", velocity = \"{}\" }} to cart.friction",
         shown(fall, "N"),
@@ -181,6 +177,15 @@ pub(super) fn bristles(site: &Site) -> Vec<Extended> {
     plan.free.extend(["static", "lugre.stiffness", "lugre.velocity"].map(|key| format!("cart.friction.{key}")));
     plan.bounds.push(("cart.friction.static".into(), [coulomb, MOST_BREAKAWAY * coulomb]));
     vec![Extended::new(site.with(machine), plan, Telling::Parameter("cart.friction.lugre.stiffness".into()))]
+}
+
+/// Whether bristles bend by more than noise before they slip: a sensor does not tell less from friction that falls with
+/// speed.
+pub(super) fn bristles_show(site: &Site, machine: &Machine, share: f64) -> bool {
+    let friction = machine.cart.friction;
+    let Law::LuGre { stiffness, .. } = friction.law else { return false };
+    let bend = friction.forward.coulomb / stiffness;
+    site.position_deviation().is_some_and(|deviation| bend > BRISTLE_SHOWN * share * deviation)
 }
 
 pub(super) fn bristle_words(_: &Site, _: &Extended, found: &Fitted) -> Said {

@@ -121,13 +121,8 @@ pub(super) fn plays(site: &Site) -> Vec<Extended> {
     let Some((machine, is_split)) = site.split().filter(|_| site.is_stiff()) else { return Vec::new() };
     let mut keys = vec!["motor.backlash"];
     keys.extend(is_split.then_some("motor.rotor_inertia"));
-    let r = machine.pulley_radius;
-    let angle = site.found.noise.iter().find_map(|(quantity, sigma)| match quantity {
-        Quantity::CartPosition => Some(sigma / r),
-        Quantity::DriveAngle => Some(*sigma),
-        _ => None,
-    });
-    let Some(angle) = angle else { return Vec::new() };
+    let Some(length) = site.position_deviation() else { return Vec::new() };
+    let angle = length / machine.pulley_radius;
     let of = |gap: &f64| {
         let [stiffness, damping] = flank(site, &machine, FLANK_FREQUENCY, FLANK_DAMPING);
         let play = GearPlay { backlash: gap * angle, stiffness, damping };

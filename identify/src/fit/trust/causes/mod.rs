@@ -78,7 +78,7 @@ pub(crate) fn cause(
         }
         let Some(known) = tried.judged() else { continue };
         let standard_errors = tried.standard_errors(before, &known);
-        if standard_errors < CAUSE_ERRORS {
+        if standard_errors < CAUSE_ERRORS || !tried.shows(&site, before) {
             continue;
         }
         let Some(better) = predicts(&site, &tried, found.problem.stop()) else { continue };
