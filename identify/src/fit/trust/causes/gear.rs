@@ -7,7 +7,7 @@ use crate::fit::limits::{
     KNOWN_SHARES, SPRING_DAMPING,
 };
 use crate::log::{Log, Quantity};
-use crate::machine::{BeltModel, GearPlay, Machine};
+use crate::machine::{AmplifierMode, BeltModel, GearPlay, Machine};
 use crate::number::significant;
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -173,10 +173,12 @@ pub(super) fn ratios(site: &Site) -> Vec<Extended> {
 pub(super) fn ratio_words(site: &Site, _: &Extended, found: &Fitted) -> Said {
     let [own, other] = [&site.machine, &found.machine].map(|machine| machine.drives[0].motor.gear_ratio);
     let ratio = significant(other, 4);
-    Said {
-        words: format!("a gear ratio of {ratio} instead of {}", significant(own, 4)),
-        add: format!("say motor.gear_ratio = {ratio}"),
+    let mut words = format!("a gear ratio of {ratio} instead of {}", significant(own, 4));
+    // Without back-EMF and a rotor, a gear is a factor of the force.
+    if site.machine.drives[0].amplifier.mode == AmplifierMode::Current {
+        words.push_str(&format!(" (or a gain that is {} times as great)", significant(other / own, 4)));
     }
+    Said { words, add: format!("set motor.gear_ratio = {ratio}") }
 }
 
 /// A spring in words.
