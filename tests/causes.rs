@@ -75,14 +75,6 @@ fn a_drag_is_named_with_its_size() {
     assert!(named == 5, "{named} of 5");
 }
 
-/// Bristles made the mass's interval hold in none of 8.
-#[test]
-fn bristles_are_named() {
-    let all: Vec<_> = [31, 33].map(|seed| fitted(seed, Truth::LuGre)).into_iter().collect();
-    let named = all.iter().filter(|(found, values)| warns(found, "lugre") && held(found, *values) == 3).count();
-    assert!(named >= 1, "{:#?}", all.iter().map(|one| &one.0.findings).collect::<Vec<_>>());
-}
-
 /// The case with the log of another machine of its kind, which taut simulates.
 fn simulated(seed: u64, changes: &[&str], truth: &[&str]) -> Fit {
     let mut case = Case::from_text_with("axis.toml", AXIS, changes).unwrap();

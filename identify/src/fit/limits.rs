@@ -1002,27 +1002,6 @@ pub(crate) const DRAG_POINTS: usize = 21;
 /// Unit: Stribeck velocities. Source: 0.2 % of the fall is left at the last.
 pub(crate) const STRIBECK_POINTS: [f64; 9] = [0.2, 0.4, 0.6, 0.8, 1.0, 1.25, 1.5, 2.0, 2.5];
 
-/// Cost with an element, relative to that without, below which no element that takes long is tried.
-///
-/// Unit: 1. Source: chosen.
-pub(crate) const CAUSE_ENOUGH: f64 = 0.1;
-
-/// Length by which bristles bend before they slip, from which on they are named.
-///
-/// Unit: standard deviations of the residuals of a position. Source: chosen: shorter ones are fitted to friction that
-/// falls with speed. Test: `a_law_that_was_not_asked_for_widens_intervals_and_is_named`.
-pub(crate) const BRISTLE_SHOWN: f64 = 3.0;
-
-/// Most values of logs for which elements are tried that take long.
-///
-/// Unit: values. Source: chosen: bounds the time.
-pub(crate) const CAUSE_SLOW_VALUES: usize = 10_000;
-
-/// Damped Gauss-Newton steps of a fit with such an element.
-///
-/// Unit: steps. Source: chosen: bounds the time.
-pub(crate) const CAUSE_SLOW_STEPS: usize = 12;
-
 /// Greatest size of a force on the cart that has one sign, relative to its first.
 ///
 /// Unit: 1. Source: chosen: a hundred times the motor's greatest force.

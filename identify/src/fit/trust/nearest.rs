@@ -44,8 +44,7 @@ impl Settled<'_> {
         };
         let disagreement = sub_records::disagreement(case, plan, &self.searched, &judged);
         let other_law = other_laws::other_law(&self.searched, &judged);
-        let is_off = disagreement.is_some() || other_law.is_some();
-        let cause = causes::cause(case, plan, &self.searched, &judged, (other_law.as_ref(), is_off));
+        let cause = causes::cause(case, plan, &self.searched, &judged, other_law.as_ref());
         let other_law = other_law.filter(|_| cause.is_none());
         judged.widen(disagreement, other_law, cause);
         Some(judged)

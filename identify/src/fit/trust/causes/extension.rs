@@ -25,10 +25,6 @@ pub(super) struct Extension {
     pub words: fn(&Site, &Extended, &Fitted) -> Said,
     /// A machine of the case with it as one of the case without it.
     pub without: fn(&Site, Machine) -> Machine,
-    /// Whether a fit with it, whose residuals have this share of the deviation without, shows it beside noise.
-    pub shows: fn(&Site, &Machine, f64) -> bool,
-    /// Whether it takes a curved law, whose runs take a hundred times as long.
-    pub is_slow: bool,
 }
 
 /// All of them.
@@ -40,11 +36,6 @@ pub(super) const EXTENSIONS: &[Extension] = &[
     row("drag", force::drags, force::drag_words, force::without),
     row("stribeck", force::falls, force::fall_words, force::without_fall),
     row("load", force::loads, force::load_words, as_it_is),
-    Extension {
-        shows: force::bristles_show,
-        is_slow: true,
-        ..row("lugre", force::bristles, force::bristle_words, force::without_bristles)
-    },
 ];
 
 const fn row(
@@ -53,11 +44,7 @@ const fn row(
     words: fn(&Site, &Extended, &Fitted) -> Said,
     without: fn(&Site, Machine) -> Machine,
 ) -> Extension {
-    Extension { key, tries, words, without, shows: always, is_slow: false }
-}
-
-fn always(_: &Site, _: &Machine, _: f64) -> bool {
-    true
+    Extension { key, tries, words, without }
 }
 
 fn as_it_is(_: &Site, machine: Machine) -> Machine {

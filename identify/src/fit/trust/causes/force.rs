@@ -5,12 +5,8 @@
 
 use super::extension::{Extended, Fitted, Measure, Said, Site, Telling, shown};
 use crate::fit::asked::problem::Problem;
-use crate::fit::limits::{
-    BRISTLE_BEND, BRISTLE_SHOWN, DRAG_POINTS, FORCE_FIRST, FORCE_MOST, MOST_BREAKAWAY, STRIBECK_ABOVE, STRIBECK_FALL,
-    STRIBECK_POINTS, STRIBECK_SHARES,
-};
+use crate::fit::limits::{DRAG_POINTS, FORCE_FIRST, FORCE_MOST, STRIBECK_POINTS, STRIBECK_SHARES};
 use crate::fit::trust::doubts::falling;
-use crate::friction::Law;
 use crate::log::Quantity;
 use crate::machine::Machine;
 use crate::polyline::Polyline;
@@ -155,66 +151,6 @@ pub(super) fn without_fall(site: &Site, machine: Machine) -> Machine {
     for side in [&mut friction.forward, &mut friction.backward] {
         side.coulomb -= arm * fall;
         side.breakaway = side.breakaway.max(side.coulomb);
-    }
-    machine
-}
-
-/// Friction of the cart by bristles, which bend before they slip.
-pub(super) fn bristles(site: &Site) -> Vec<Extended> {
-    let mut machine = site.machine.clone();
-    let friction = &mut machine.cart.friction;
-    let coulomb = f64::min(friction.forward.coulomb, friction.backward.coulomb);
-    if friction.law != Law::Coulomb || coulomb <= 0.0 || !site.is_free("cart.friction.coulomb") {
-        return Vec::new();
-    }
-    let stiffness = coulomb / BRISTLE_BEND;
-    let velocity = STRIBECK_FALL * fastest(site);
-    friction.law = Law::LuGre { stiffness, damping: (stiffness * machine.cart.mass).sqrt(), velocity };
-    for side in [&mut friction.forward, &mut friction.backward] {
-        side.breakaway = (1.0 + STRIBECK_ABOVE) * side.coulomb;
-    }
-    let mut plan = site.plan.clone();
-    plan.free.extend(["static", "lugre.stiffness", "lugre.velocity"].map(|key| format!("cart.friction.{key}")));
-    plan.bounds.push(("cart.friction.static".into(), [coulomb, MOST_BREAKAWAY * coulomb]));
-    vec![Extended::new(site.with(machine), plan, Telling::Parameter("cart.friction.lugre.stiffness".into()))]
-}
-
-/// Whether bristles bend by more than noise before they slip: a sensor does not tell less from friction that falls with
-/// speed.
-pub(super) fn bristles_show(site: &Site, machine: &Machine, share: f64) -> bool {
-    let friction = machine.cart.friction;
-    let Law::LuGre { stiffness, .. } = friction.law else { return false };
-    let bend = friction.forward.coulomb / stiffness;
-    site.position_deviation().is_some_and(|deviation| bend > BRISTLE_SHOWN * share * deviation)
-}
-
-pub(super) fn bristle_words(_: &Site, _: &Extended, found: &Fitted) -> Said {
-    let friction = found.machine.cart.friction;
-    let Law::LuGre { stiffness, damping, velocity } = friction.law else {
-        return Said { words: "friction by bristles".into(), add: String::new() };
-    };
-    let words = format!(
-        "friction of the cart by bristles (LuGre) of {}, {} at rest",
-        shown(stiffness, "N/m"),
-        shown(friction.forward.breakaway, "N")
-    );
-    let add = format!(
-        "add static = \"{}\", lugre = {{ stiffness = \"{}\", damping = \"{}\", velocity = \"{}\" }} to cart.friction",
-        shown(friction.forward.breakaway, "N"),
-        shown(stiffness, "N/m"),
-        shown(damping, "N s/m"),
-        shown(velocity, "m/s")
-    );
-    Said { words, add }
-}
-
-/// The machine with the Coulomb friction that bristles have in sliding.
-pub(super) fn without_bristles(site: &Site, mut machine: Machine) -> Machine {
-    let own = site.machine.cart.friction;
-    let friction = &mut machine.cart.friction;
-    friction.law = own.law;
-    for side in [&mut friction.forward, &mut friction.backward] {
-        side.breakaway = side.coulomb;
     }
     machine
 }

@@ -25,8 +25,8 @@ use crate::case::{Case, Plan};
 use crate::fit::asked::problem::Stop;
 use crate::fit::asked::run::Run;
 use crate::fit::limits::{
-    CAUSE_ENOUGH, CAUSE_ERRORS, CAUSE_EXPLAINS, CAUSE_MOST_VALUES, CAUSE_NEAR, CAUSE_SLOW_STEPS, CAUSE_SLOW_VALUES,
-    CAUSE_STEPS, CAUSES_FITTED, COLOURED, NORMAL, ROUGH_TOLERANCE, STARTS_FITTED, STEPS_IN_PART,
+    CAUSE_ERRORS, CAUSE_EXPLAINS, CAUSE_MOST_VALUES, CAUSE_NEAR, CAUSE_STEPS, CAUSES_FITTED, COLOURED, NORMAL,
+    ROUGH_TOLERANCE, STARTS_FITTED, STEPS_IN_PART,
 };
 use crate::fit::search::point::Options;
 use crate::fit::search::starts::Searched;
@@ -36,26 +36,25 @@ use nalgebra::{DMatrix, DVector};
 use tried::Tried;
 
 /// The element that explains most of what the fit leaves; none where none is accepted, or `law`, a friction law,
-/// explains more. `is_off`: parts of the logs disagree, or the residuals suggest a law.
+/// explains more.
 pub(crate) fn cause(
     case: &Case,
     plan: &Plan,
     found: &Searched,
     judged: &Judged,
-    (law, is_off): (Option<&OtherLaw>, bool),
+    law: Option<&OtherLaw>,
 ) -> Option<Cause> {
     if !is_asked(case, plan, found, judged) {
         return None;
     }
     let site = Site::new(case, plan, found);
     let before = found.best.cost;
-    let begun = |row: &'static Extension, steps: usize| {
+    let begun = |row: &'static Extension| {
         let tries = (row.tries)(&site).into_iter();
-        let begun = tries.filter_map(|extended| Tried::begun(&site, row, extended, steps));
+        let begun = tries.filter_map(|extended| Tried::begun(&site, row, extended, CAUSE_STEPS));
         begun.filter(|tried| tried.cost() < CAUSE_NEAR * before).collect::<Vec<_>>()
     };
-    let (slow, quick): (Vec<_>, Vec<_>) = EXTENSIONS.iter().partition(|row| row.is_slow);
-    let mut ranked: Vec<Tried> = quick.into_iter().flat_map(|row| begun(row, CAUSE_STEPS)).collect();
+    let mut ranked: Vec<Tried> = EXTENSIONS.iter().flat_map(begun).collect();
     ranked.sort_by(|a, b| a.cost().total_cmp(&b.cost()));
     let mut kinds = Vec::new();
     ranked.retain(|tried| {
@@ -64,11 +63,6 @@ pub(crate) fn cause(
     });
     ranked.truncate(CAUSES_FITTED);
     let mut whole: Vec<Tried> = ranked.into_iter().filter_map(Tried::fitted).collect();
-    let least = whole.iter().map(Tried::cost).fold(before, f64::min);
-    // What takes long is tried where something is off that the others leave.
-    if is_off && least > CAUSE_ENOUGH * before && found.problem.counted() <= CAUSE_SLOW_VALUES {
-        whole.extend(slow.into_iter().flat_map(|row| begun(row, CAUSE_SLOW_STEPS)));
-    }
     whole.sort_by(|a, b| a.cost().total_cmp(&b.cost()));
     for tried in whole {
         let gain = 2.0 * (before - tried.cost());
@@ -78,7 +72,7 @@ pub(crate) fn cause(
         }
         let Some(known) = tried.judged() else { continue };
         let standard_errors = tried.standard_errors(before, &known);
-        if standard_errors < CAUSE_ERRORS || !tried.shows(&site, before) {
+        if standard_errors < CAUSE_ERRORS {
             continue;
         }
         let Some(better) = predicts(&site, &tried, found.problem.stop()) else { continue };

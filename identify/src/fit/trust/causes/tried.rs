@@ -58,11 +58,6 @@ impl<'a> Tried<'a> {
         (self.row.key, self.extended.at_motor)
     }
 
-    /// Whether the fit shows it beside noise; `before`: the cost without it.
-    pub fn shows(&self, site: &Site, before: f64) -> bool {
-        (self.row.shows)(site, &self.machine(&self.best.x), (self.cost() / before).sqrt())
-    }
-
     /// The information of the logs on it.
     pub fn judged(&self) -> Option<Judged> {
         let Minimum { residuals, jacobian, x, at_bound, .. } = &self.best;
