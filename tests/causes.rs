@@ -103,18 +103,6 @@ fn a_constant_force_is_named_with_its_size() {
     }
 }
 
-/// Another gear is named where the mass is known, with its ratio.
-#[test]
-fn another_gear_is_named_with_its_ratio() {
-    let known = "fit.free=[\"cart.friction.viscous\", \"cart.friction.coulomb\"]";
-    for (seed, ratio) in [(1, 2.0), (2, 3.0), (3, 0.5)] {
-        let found = simulated(seed, &[known], &[&format!("motor.gear_ratio={ratio}")]);
-        let cause = found.cause.as_ref().unwrap_or_else(|| panic!("{ratio}: {:#?}", found.findings));
-        assert!(cause.key == "ratio" && warns(&found, "ratio"), "{ratio}: {}", cause.words);
-        assert!(cause.add == format!("set motor.gear_ratio = {ratio}"), "{ratio}: {}", cause.add);
-    }
-}
-
 /// A right model lacks nothing, whatever its noise is like.
 #[test]
 fn the_right_model_lacks_nothing() {

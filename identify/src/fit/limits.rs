@@ -982,11 +982,6 @@ pub(crate) const CAUSE_AROUND: [f64; 2] = [0.1, 10.0];
 /// Unit: 1. Source: chosen: less is not seen, and takes long to simulate.
 pub(crate) const KNOWN_SHARES: [f64; 2] = [0.05, 0.95];
 
-/// Factors of gears that are tried, and their reciprocals.
-///
-/// Unit: 1. Source: whole numbers up to 5, and a digit.
-pub(crate) const GEAR_FACTORS: [f64; 5] = [2.0, 3.0, 4.0, 5.0, 10.0];
-
 /// First size of a force on the cart that is tried.
 ///
 /// Unit: the motor's force at the greatest input. Source: chosen.

@@ -31,7 +31,6 @@ pub(super) struct Extension {
 pub(super) const EXTENSIONS: &[Extension] = &[
     row("spring", gear::springs, gear::spring_words, gear::without),
     row("play", gear::plays, gear::play_words, gear::without),
-    row("ratio", gear::ratios, gear::ratio_words, as_it_is),
     row("delay", stamp::delays, stamp::words, as_it_is),
     row("drag", force::drags, force::drag_words, force::without),
     row("stribeck", force::falls, force::fall_words, force::without_fall),
@@ -68,8 +67,6 @@ pub(super) enum Telling {
     Parameter(String),
     /// The last of the nuisances that all logs share, and where its search starts, SI.
     Nuisance(f64),
-    /// The cost alone: the element has no parameter of its own.
-    Cost,
 }
 
 /// A quantity that is a multiple of a parameter.
@@ -84,7 +81,7 @@ pub(super) struct Measure {
 /// A fit with the element.
 pub(super) struct Fitted {
     pub machine: Machine,
-    /// The parameter that tells the element, SI; zero where it has none.
+    /// The parameter that tells the element, SI.
     pub value: f64,
     /// Standard deviation of the times at which samples are taken, s, as far as the residuals show it.
     pub scatter: Option<f64>,

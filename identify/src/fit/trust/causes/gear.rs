@@ -3,12 +3,11 @@
 use super::extension::{Extended, Fitted, Said, Site, Telling, shown};
 use crate::case::{Case, Plan};
 use crate::fit::limits::{
-    CAUSE_AROUND, CAUSE_GAPS, CAUSE_SHARE, CAUSE_SPRINGS, FLANK_DAMPING, FLANK_FREQUENCY, GEAR_FACTORS, KNOWN_SHARE,
-    KNOWN_SHARES, SPRING_DAMPING,
+    CAUSE_AROUND, CAUSE_GAPS, CAUSE_SHARE, CAUSE_SPRINGS, FLANK_DAMPING, FLANK_FREQUENCY, KNOWN_SHARE, KNOWN_SHARES,
+    SPRING_DAMPING,
 };
 use crate::log::{Log, Quantity};
-use crate::machine::{AmplifierMode, BeltModel, GearPlay, Machine};
-use crate::number::significant;
+use crate::machine::{BeltModel, GearPlay, Machine};
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
@@ -155,30 +154,6 @@ pub(super) fn without(site: &Site, mut machine: Machine) -> Machine {
 fn rotor(machine: &Machine) -> f64 {
     let motor = &machine.drives[0].motor;
     motor.gear_ratio * motor.gear_ratio * motor.rotor_inertia
-}
-
-/// Another gear, by a factor that gears often have.
-pub(super) fn ratios(site: &Site) -> Vec<Extended> {
-    if site.is_free("motor.gear_ratio") {
-        return Vec::new();
-    }
-    let of = |factor: f64| {
-        let mut machine = site.machine.clone();
-        machine.drives[0].motor.gear_ratio *= factor;
-        Extended::new(site.with(machine), site.plan.clone(), Telling::Cost)
-    };
-    GEAR_FACTORS.iter().flat_map(|factor| [of(*factor), of(1.0 / factor)]).collect()
-}
-
-pub(super) fn ratio_words(site: &Site, _: &Extended, found: &Fitted) -> Said {
-    let [own, other] = [&site.machine, &found.machine].map(|machine| machine.drives[0].motor.gear_ratio);
-    let ratio = significant(other, 4);
-    let mut words = format!("a gear ratio of {ratio} instead of {}", significant(own, 4));
-    // Without back-EMF and a rotor, a gear is a factor of the force.
-    if site.machine.drives[0].amplifier.mode == AmplifierMode::Current {
-        words.push_str(&format!(" (or a gain that is {} times as great)", significant(other / own, 4)));
-    }
-    Said { words, add: format!("set motor.gear_ratio = {ratio}") }
 }
 
 /// A spring in words.

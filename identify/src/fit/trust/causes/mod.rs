@@ -71,7 +71,7 @@ pub(crate) fn cause(
             return None;
         }
         let Some(known) = tried.judged() else { continue };
-        let standard_errors = tried.standard_errors(before, &known);
+        let standard_errors = tried.standard_errors(&known);
         if standard_errors < CAUSE_ERRORS {
             continue;
         }

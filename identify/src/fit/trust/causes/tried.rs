@@ -69,12 +69,11 @@ impl<'a> Tried<'a> {
         self.problem.stage_at(x)
     }
 
-    /// The place of the variable whose size says whether the element is there; none where only the cost says so.
+    /// The place of the variable whose size says whether the element is there.
     fn telling(&self) -> Option<usize> {
         match &self.extended.telling {
             Telling::Parameter(key) => self.problem.parameters.iter().position(|own| own.name == *key),
             Telling::Nuisance(_) => self.problem.globals().checked_sub(1),
-            Telling::Cost => None,
         }
     }
 
@@ -86,13 +85,9 @@ impl<'a> Tried<'a> {
         }
     }
 
-    /// The size of the element in standard errors: of what is searched for by its logarithm, 1 over the error of that;
-    /// of what has no parameter, √(2 (C − C′)) over what errors are of those of white noise of deviation 1.
-    pub fn standard_errors(&self, before: f64, judged: &Judged) -> f64 {
-        let Some(j) = self.telling() else {
-            let gain = 2.0 * (before - self.cost());
-            return gain.max(0.0).sqrt() / (judged.covariance.deviation * judged.inflation.max(1.0));
-        };
+    /// The size of the element in standard errors: of what is searched for by its logarithm, 1 over the error of that.
+    pub fn standard_errors(&self, judged: &Judged) -> f64 {
+        let Some(j) = self.telling() else { return 0.0 };
         let Some(error) = judged.covariance.error(j).filter(|error| *error > 0.0) else { return 0.0 };
         match self.problem.shared.get(j.wrapping_sub(self.problem.parameters.len())) {
             None if self.problem.is_log(j) => 1.0 / error,
