@@ -2,13 +2,15 @@
 //! known, a fit each.
 //!
 //! `cargo xtask coverage [--machines N] [--seed N] [--threads N] [--cell WORDS]...` prints a table; with `--causes` that
-//! of machines which a rigid axis with viscous and Coulomb friction is not, integrated without taut's solvers.
+//! of machines which a rigid axis with viscous and Coulomb friction is not, integrated without taut's solvers, and with
+//! `--told` what is said of each of them.
 
 // Each of them is used in part.
 #[allow(dead_code)]
 #[path = "../tests/common"]
 mod common {
     pub mod chance;
+    pub mod logged;
     pub mod truths;
 }
 
@@ -22,7 +24,7 @@ use std::sync::{Arc, Mutex};
 use taut::case::{Case, Plan, TEMPLATE};
 use taut::chance::normal;
 use taut::fit::least_squares::{Differences, Residuals};
-use taut::fit::{Grade, Problem, fit, inverse_of_square};
+use taut::fit::{Finding, Grade, Problem, fit, inverse_of_square};
 use taut::friction::{Law, Shape};
 use taut::log::{Log, Output, Quantity};
 use taut::machine::axis::{CART, DRIVE, IDLER};
@@ -441,8 +443,10 @@ struct Named {
     /// The cause is the right one; another one.
     right: usize,
     wrong: usize,
-    /// The interval of the mass holds, or a warning names the right cause.
+    /// Intervals that hold, or of which a warning names the right cause.
     safe: usize,
+    /// Machines all of whose intervals do.
+    safe_machines: usize,
     warned: usize,
 }
 
@@ -454,12 +458,14 @@ impl Truth {
             Truth::Spring | Truth::SpringAtMotor => &["spring"],
             Truth::Play => &["play"],
             Truth::Late => &["delay"],
-            Truth::LuGre | Truth::Drag | Truth::Drift => &["other_law"],
+            Truth::LuGre => &["stribeck"],
+            Truth::Drag => &["drag"],
+            Truth::Drift => &["drift", "sway"],
         }
     }
 }
 
-fn named(truth: Truth, seed: u64, sum: &Mutex<Named>) {
+fn named(truth: Truth, seed: u64, is_told: bool, sum: &Mutex<Named>) {
     let (case, values) = drawn(seed, truth);
     let Some(plan) = &case.fit else { return };
     let fitted = fit(&case, plan, None, &mut |_| Flow::Continue);
@@ -472,64 +478,87 @@ fn named(truth: Truth, seed: u64, sum: &Mutex<Named>) {
     };
     (0..3).filter(|&j| inside(j)).for_each(|j| sum.held[j] += 1);
     sum.wide.extend(fitted.estimates[0].interval.map(|[low, high]| 0.5 * (high - low) / values[0]));
-    let codes = ["spring", "play", "delay", "other_law", "place"];
+    let codes = ["spring", "play", "delay", "drag", "stribeck", "load", "other_law", "place"];
     let is_right = |code: &str| truth.causes().contains(&code);
-    let told = || fitted.findings.iter().filter(|one| codes.contains(&one.code));
-    sum.right += usize::from(told().any(|one| is_right(one.code)));
-    sum.wrong += usize::from(told().any(|one| !is_right(one.code)));
-    let warned = |one: &&taut::fit::Finding| one.grade == Grade::Warning;
-    sum.warned += usize::from(fitted.findings.iter().any(|one| warned(&one)));
-    sum.safe += usize::from((0..3).all(inside) || told().any(|one| warned(&one) && is_right(one.code)));
+    if is_told {
+        let off = |j: usize| if inside(j) { "holds" } else { "does not hold" };
+        let lines: Vec<String> = fitted.findings.iter().map(|one| format!("\n  {}: {one}", one.code)).collect();
+        eprintln!("{seed}: {}, {}, {}{}", off(0), off(1), off(2), lines.concat());
+    }
+    // A friction law by its own name.
+    let key = |one: &Finding| match (one.code, &fitted.other_law) {
+        ("other_law", Some(law)) => law.key,
+        (code, _) => code,
+    };
+    let told: Vec<(&str, Grade)> =
+        fitted.findings.iter().filter(|one| codes.contains(&one.code)).map(|one| (key(one), one.grade)).collect();
+    sum.right += usize::from(told.iter().any(|(code, _)| is_right(code)));
+    sum.wrong += usize::from(told.iter().any(|(code, _)| !is_right(code)));
+    sum.warned += usize::from(fitted.findings.iter().any(|one| one.grade == Grade::Warning));
+    let is_named = told.iter().any(|(code, grade)| *grade == Grade::Warning && is_right(code));
+    sum.safe += (0..3).filter(|&j| is_named || inside(j)).count();
+    sum.safe_machines += usize::from(is_named || (0..3).all(inside));
+}
+
+/// Calls `work` with the numbers below `count`, in threads.
+fn for_each(count: u64, threads: u64, work: impl Fn(u64) + Sync) {
+    let next = AtomicU64::new(0);
+    std::thread::scope(|scope| {
+        for _ in 0..threads {
+            scope.spawn(|| {
+                loop {
+                    let k = next.fetch_add(1, Ordering::Relaxed);
+                    if k >= count {
+                        return;
+                    }
+                    work(k);
+                }
+            });
+        }
+    });
 }
 
 /// The table of causes.
-fn causes(machines: u64, seed: u64, threads: u64, only: &[String]) {
+fn causes(machines: u64, seed: u64, threads: u64, (only, is_told): (&[String], bool)) {
     println!(
-        "| what the model lacks | mass | viscous | Coulomb | half-width of the mass | named | another cause | a warning | all hold, or a warning names it |"
+        "| what the model lacks | mass | viscous | Coulomb | half-width of the mass | named | another cause | a warning | an interval holds, or a warning names it | all three do |"
     );
-    println!("|---|---|---|---|---|---|---|---|---|");
+    println!("|---|---|---|---|---|---|---|---|---|---|");
     for truth in Truth::ALL {
         if !only.is_empty() && !only.iter().any(|words| truth.name().contains(words.as_str())) {
             continue;
         }
-        let (sum, next) = (Mutex::new(Named::default()), AtomicU64::new(0));
-        std::thread::scope(|scope| {
-            for _ in 0..threads {
-                scope.spawn(|| {
-                    loop {
-                        let k = next.fetch_add(1, Ordering::Relaxed);
-                        if k >= machines {
-                            return;
-                        }
-                        named(truth, seed.wrapping_mul(1_000_003) + k, &sum);
-                    }
-                });
-            }
-        });
+        let sum = Mutex::new(Named::default());
+        for_each(machines, threads, |k| named(truth, seed.wrapping_mul(1_000_003) + k, is_told, &sum));
         let mut sum = sum.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner());
         sum.wide.sort_by(f64::total_cmp);
         let share = |count: usize| format!("{:.0} %", 100.0 * count as f64 / sum.machines.max(1) as f64);
         let wide = sum.wide.get(sum.wide.len() / 2).copied().unwrap_or(f64::NAN);
         let [mass, viscous, coulomb] = sum.held.map(share);
         println!(
-            "| {} | {mass} | {viscous} | {coulomb} | {:.2} % | {} | {} | {} | {} |",
+            "| {} | {mass} | {viscous} | {coulomb} | {:.2} % | {} | {} | {} | {:.0} % | {} |",
             truth.name(),
             100.0 * wide,
             share(sum.right),
             share(sum.wrong),
             share(sum.warned),
-            share(sum.safe)
+            100.0 * sum.safe as f64 / (3 * sum.machines.max(1)) as f64,
+            share(sum.safe_machines)
         );
     }
 }
 
 fn main() -> ExitCode {
     let (mut machines, mut seed, mut threads, mut only) = (2000, 1, 2, Vec::new());
-    let mut of_causes = false;
+    let (mut of_causes, mut is_told) = (false, false);
     let mut words = std::env::args().skip(1);
     while let Some(word) = words.next() {
         if word == "--causes" {
             of_causes = true;
+            continue;
+        }
+        if word == "--told" {
+            is_told = true;
             continue;
         }
         let value = words.next();
@@ -541,14 +570,14 @@ fn main() -> ExitCode {
             ("--cell", _, Some(value)) => only.push(value),
             _ => {
                 eprintln!(
-                    "usage: cargo xtask coverage [--machines N] [--seed N] [--threads N] [--cell WORDS]... [--causes]"
+                    "usage: cargo xtask coverage [--machines N] [--seed N] [--threads N] [--cell WORDS]... [--causes [--told]]"
                 );
                 return ExitCode::from(2);
             }
         }
     }
     if of_causes {
-        causes(machines, seed, threads, &only);
+        causes(machines, seed, threads, (&only, is_told));
         return ExitCode::SUCCESS;
     }
     println!("| disturbance; log | viscous | Coulomb | mass | force | half-width | without an interval |");
@@ -558,20 +587,8 @@ fn main() -> ExitCode {
             continue;
         }
         let found = Mutex::new(Found::default());
-        let next = AtomicU64::new(0);
-        std::thread::scope(|scope| {
-            for _ in 0..threads {
-                scope.spawn(|| {
-                    loop {
-                        let k = next.fetch_add(1, Ordering::Relaxed);
-                        if k >= machines {
-                            return;
-                        }
-                        one(cell, seed.wrapping_mul(1_000_003) + 100_000 * place as u64 + k, &found);
-                    }
-                });
-            }
-        });
+        let first = seed.wrapping_mul(1_000_003) + 100_000 * place as u64;
+        for_each(machines, threads, |k| one(cell, first + k, &found));
         let mut found = found.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner());
         let n = found.machines as f64;
         let share = |count: usize| format!("{:.1} %", 100.0 * count as f64 / n);

@@ -1,8 +1,13 @@
 //! Elements that a model lacks are found by fitting them: machines of known truth, integrated without taut's solvers.
 
-use crate::common::truths::{Truth, drawn};
+use crate::common::chance::Chance;
+use crate::common::logged::{columns, output};
+use crate::common::truths::{AXIS, COUNT, EVERY, Truth, drawn, forces};
+use taut::case::Case;
 use taut::fit::{Fit, Grade, check, fit};
-use taut::solve::Flow;
+use taut::log::Quantity;
+use taut::signal::{Hold, Signal};
+use taut::solve::{Flow, Solver, simulate};
 
 fn fitted(seed: u64, truth: Truth) -> (Fit, [f64; 3]) {
     let (case, values) = drawn(seed, truth);
@@ -41,16 +46,61 @@ fn a_missing_spring_is_named() {
     }
 }
 
-/// Samples that are taken after their stamps are an input that acts early: the mass's interval held in 2 of 100.
+/// Samples that are taken after their stamps are an input that acts early: the mass's interval held in 2 of 100. They
+/// scatter over 0.8 ms.
 #[test]
-fn late_stamps_are_a_delay_of_the_other_sign() {
-    let mut named = 0;
-    for seed in 1..=5 {
+fn late_stamps_are_a_delay_of_the_other_sign_and_scatter() {
+    let (mut named, mut scattered) = (0, 0);
+    for seed in 1..=10 {
         let (found, _) = fitted(seed, Truth::Late);
-        let cause = found.cause.as_ref().filter(|cause| cause.key == "delay");
-        named += usize::from(cause.is_some_and(|cause| (cause.parameters[0].value + 0.4e-3).abs() < 0.15e-3));
+        let Some(cause) = found.cause.as_ref().filter(|cause| cause.key == "delay") else { continue };
+        named += usize::from((cause.parameters[0].value + 0.4e-3).abs() < 0.15e-3);
+        let scatter = cause.parameters.iter().find(|own| own.name == "scatter");
+        scattered += usize::from(scatter.is_some_and(|own| (12f64.sqrt() * own.value - 0.8e-3).abs() < 0.1e-3));
     }
-    assert!(named >= 4, "{named} of 5");
+    assert!(named >= 9 && scattered >= 9, "{named} and {scattered} of 10");
+}
+
+/// A drag of 0.3 b v² made the viscous friction's interval hold in 31 of 100.
+#[test]
+fn a_drag_is_named_with_its_size() {
+    let mut named = 0;
+    for seed in 11..=15 {
+        let (found, [_, viscous, _]) = fitted(seed, Truth::Drag);
+        let size = found.cause.as_ref().filter(|cause| cause.key == "drag").map(|cause| &cause.parameters[0]);
+        let is_right = size.is_some_and(|size| (size.value / (0.3 * viscous) - 1.0).abs() < 0.05);
+        let [low, high] = found.estimates[1].interval.unwrap();
+        named += usize::from(is_right && warns(&found, "drag") && (low..=high).contains(&viscous));
+    }
+    assert!(named == 5, "{named} of 5");
+}
+
+/// The case with the log of another machine of its kind, which taut simulates.
+fn simulated(seed: u64, changes: &[&str], truth: &[&str]) -> Fit {
+    let mut case = Case::from_text_with("axis.toml", AXIS, changes).unwrap();
+    let other = Case::from_text_with("axis.toml", AXIS, &[changes, truth].concat()).unwrap().machine;
+    let mut chance = Chance::new(seed);
+    let input = forces(&mut chance);
+    let time: Vec<f64> = (0..COUNT).map(|k| k as f64 * EVERY).collect();
+    let experiment = &mut case.experiments[0];
+    (experiment.until, experiment.every) = ((COUNT - 1) as f64 * EVERY, EVERY);
+    experiment.inputs[0] = Signal::Sampled { times: time.clone(), values: input.clone(), hold: Hold::Zero };
+    let run = simulate(&other, experiment, Solver::of(&other)).unwrap().trajectory;
+    let position = run.get("cart_position").unwrap().iter().map(|x| x + 1e-5 * chance.normal()).collect();
+    experiment.log = Some(columns("log", time, input, vec![output(Quantity::CartPosition, position)]));
+    fit(&case, case.fit.as_ref().unwrap(), None, &mut |_| Flow::Continue).unwrap()
+}
+
+/// A constant force is named with its size.
+#[test]
+fn a_constant_force_is_named_with_its_size() {
+    for seed in 1..=3 {
+        let found = simulated(seed, &[], &["cart.load=0.5"]);
+        let cause = found.cause.as_ref().unwrap_or_else(|| panic!("{seed}: {:#?}", found.findings));
+        assert!(cause.key == "load" && warns(&found, "load"), "{seed}: {}", cause.words);
+        let own = cause.parameters[0].value;
+        assert!((own / 0.5 - 1.0).abs() < 0.2, "{seed}: {own}");
+    }
 }
 
 /// A right model lacks nothing, whatever its noise is like.
@@ -61,11 +111,15 @@ fn the_right_model_lacks_nothing() {
         for seed in 1..=machines {
             let (found, values) = fitted(seed, truth);
             inside += held(&found, values);
+            let told = ["other_law", "place"];
+            let told = found.findings.iter().filter(|one| told.contains(&one.code));
+            named.extend(told.map(|one| format!("{truth:?} {seed}: {one}")));
             named.extend(found.cause.map(|cause| format!("{truth:?} {seed}: {}", cause.words)));
         }
     }
     assert!(named.len() <= 1, "{named:#?}");
-    assert!(inside >= 28, "{inside} of 36");
+    // 95 % of 36 are 34.
+    assert!(inside >= 32, "{inside} of 36");
 }
 
 /// `check` and `fit` say the same of a model.

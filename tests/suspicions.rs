@@ -1,11 +1,12 @@
 //! Findings about a log are borne out by simulation: false suspicions of good logs, and true ones of bad.
 
 use crate::common::chance::Chance;
-use crate::common::truths::{AXIS, COUNT, EVERY, narrow};
+use crate::common::logged::{columns, output};
+use crate::common::truths::{AXIS, COUNT, EVERY, forces, narrow};
 use std::sync::Arc;
 use taut::case::{Case, Plan, TEMPLATE};
 use taut::fit::{Fit, fit};
-use taut::log::{Log, Output, Quantity};
+use taut::log::{Log, Quantity};
 use taut::signal::{Hold, Signal};
 use taut::solve::{Flow, Solver, simulate};
 
@@ -21,13 +22,7 @@ fn drawn(seed: u64, noise: f64, late: usize) -> Case {
     for side in [&mut truth.cart.friction.forward, &mut truth.cart.friction.backward] {
         (side.viscous, side.coulomb, side.breakaway) = (b * side.viscous, c * side.coulomb, c * side.breakaway);
     }
-    let mut input = vec![0.0; COUNT];
-    let (mut k, mut sign) = (50, 1.0);
-    while k + 400 < COUNT {
-        let next = k + 100 + (200.0 * chance.uniform()) as usize;
-        input[k..next].fill(sign * (5.0 + 10.0 * chance.uniform()));
-        (k, sign) = (next + (60.0 * chance.uniform()) as usize, -sign);
-    }
+    let input = forces(&mut chance);
     let time: Vec<f64> = (0..COUNT).map(|k| k as f64 * EVERY).collect();
     let mut experiment = case.experiments[0].clone();
     (experiment.until, experiment.every) = ((COUNT - 1) as f64 * EVERY, EVERY);
@@ -39,17 +34,7 @@ fn drawn(seed: u64, noise: f64, late: usize) -> Case {
         (0..COUNT).map(|k| position[k.saturating_sub(late)] + noise * narrow[k] + 1e-5 * chance.normal()).collect();
     values.iter_mut().for_each(|v| *v = (*v / 1e-6).round() * 1e-6);
     experiment.name = "log".into();
-    experiment.log = Some(Arc::new(Log {
-        name: "log".into(),
-        file: Default::default(),
-        time,
-        input,
-        hold: Hold::Zero,
-        added: None,
-        reference: None,
-        outputs: vec![Output { quantity: Quantity::CartPosition, absolute: false, values }],
-        ended: None,
-    }));
+    experiment.log = Some(columns("log", time, input, vec![output(Quantity::CartPosition, values)]));
     case.experiments = vec![experiment];
     case
 }
@@ -97,7 +82,7 @@ fn signs_and_ratios_are_found_beside_narrow_band_noise() {
         // An angle behind a gear that the case does not know.
         change(&mut case, &|log| {
             let values = log.outputs[0].values.iter().map(|v| 3.0 * v).collect();
-            log.outputs.push(Output { quantity: Quantity::DriveAngle, absolute: false, values });
+            log.outputs.push(output(Quantity::DriveAngle, values));
         });
         assert!(warned(&fitted(&case), "unit"), "seed {seed}");
     }
@@ -121,28 +106,16 @@ fn a_cart_on_a_soft_belt_is_not_taken_for_a_wrong_sign_or_unit() {
         let run = simulate(&case.machine, experiment, Solver::of(&case.machine)).unwrap().trajectory;
         let column = |name: &str| run.get(name).unwrap().to_vec();
         let mut chance = Chance::new(tenths);
-        let mut output = |quantity, name, noise: f64| {
-            let values = column(name).iter().map(|v| v + noise * chance.normal()).collect();
-            Output { quantity, absolute: false, values }
+        let mut noisy = |quantity, name, noise: f64| {
+            output(quantity, column(name).iter().map(|v| v + noise * chance.normal()).collect())
         };
         let outputs = vec![
-            output(Quantity::CartPosition, "cart_position", 1e-6),
-            output(Quantity::DriveAngle, "drive_angle", 1e-4),
+            noisy(Quantity::CartPosition, "cart_position", 1e-6),
+            noisy(Quantity::DriveAngle, "drive_angle", 1e-4),
         ];
         let (time, input) = (column("time"), column("voltage"));
         experiment.inputs[0] = Signal::Sampled { times: time.clone(), values: input.clone(), hold: Hold::Zero };
-        let name = experiment.name.clone();
-        experiment.log = Some(Arc::new(Log {
-            name,
-            file: Default::default(),
-            time,
-            input,
-            hold: Hold::Zero,
-            added: None,
-            reference: None,
-            outputs,
-            ended: None,
-        }));
+        experiment.log = Some(columns(&experiment.name, time, input, outputs));
         let survey = taut::log::Survey::new(experiment.log.as_ref().unwrap(), &case.machine);
         reported += usize::from(survey.has("sign") || survey.has("unit"));
         let plan = Plan { free: vec!["cart.mass".into(), "cart.friction.viscous".into()], ..Plan::default() };
@@ -210,17 +183,7 @@ fn a_slip_between_two_samples_is_no_jump() {
         let run = simulate(&truth, experiment, Solver::of(&truth)).unwrap().trajectory;
         let position = run.get("cart_position").unwrap();
         let values = position.iter().map(|x| x + 1e-5 * chance.normal()).collect();
-        experiment.log = Some(Arc::new(Log {
-            name: "log".into(),
-            file: Default::default(),
-            time,
-            input,
-            hold: Hold::Zero,
-            added: None,
-            reference: None,
-            outputs: vec![Output { quantity: Quantity::CartPosition, absolute: false, values }],
-            ended: None,
-        }));
+        experiment.log = Some(columns("log", time, input, vec![output(Quantity::CartPosition, values)]));
         // The survey by itself would report the slips.
         reported += usize::from(taut::log::Survey::new(case.experiments[0].log.as_ref().unwrap(), &truth).has("jumps"));
         let found = fitted(&case);

@@ -152,8 +152,10 @@ pub fn fit(case: &Case, fit: &Fit, profiles: &[Profile], posterior: Option<Value
             "standard_errors": found.off.iter().map(|off| number(*off)).collect::<Vec<_>>(),
         })),
         "other_law": fit.other_law.as_ref().map(|found| json!({
+            "key": found.key,
             "body": found.body,
             "words": found.words,
+            "explained": number(found.explained),
             "standard_errors": number(found.standard_errors),
             "moves_standard_errors": found.off.iter().map(|off| number(*off)).collect::<Vec<_>>(),
         })),

@@ -5,17 +5,30 @@ use taut::log::{Log, Output, Quantity};
 use taut::signal::Hold;
 use taut::trajectory::Trajectory;
 
-/// The log of a run that shows these angles of the drive pulley.
-pub fn logged(name: &str, run: &Trajectory, drive_angle: Vec<f64>) -> Arc<Log> {
+/// A log of these columns.
+pub fn columns(name: &str, time: Vec<f64>, input: Vec<f64>, outputs: Vec<Output>) -> Arc<Log> {
     Arc::new(Log {
         name: name.into(),
         file: Default::default(),
-        time: run.get("time").unwrap().to_vec(),
-        input: run.get("voltage").unwrap().to_vec(),
+        time,
+        input,
         added: None,
         hold: Hold::Zero,
-        reference: run.get("reference").map(<[f64]>::to_vec),
-        outputs: vec![Output { quantity: Quantity::DriveAngle, absolute: false, values: drive_angle }],
+        reference: None,
+        outputs,
         ended: None,
     })
+}
+
+/// The values of a sensor.
+pub fn output(quantity: Quantity, values: Vec<f64>) -> Output {
+    Output { quantity, absolute: false, values }
+}
+
+/// The log of a run that shows these angles of the drive pulley.
+pub fn logged(name: &str, run: &Trajectory, drive_angle: Vec<f64>) -> Arc<Log> {
+    let column = |name: &str| run.get(name).unwrap().to_vec();
+    let mut log = columns(name, column("time"), column("voltage"), vec![output(Quantity::DriveAngle, drive_angle)]);
+    Arc::make_mut(&mut log).reference = run.get("reference").map(<[f64]>::to_vec);
+    log
 }

@@ -5,10 +5,10 @@
 //! and behind a step. Dry friction takes off as much of a speed as it can in a step, and holds what is left of less.
 
 use super::chance::Chance;
+use super::logged::{columns, output};
 use std::f64::consts::TAU;
-use std::sync::Arc;
 use taut::case::Case;
-use taut::log::{Log, Output, Quantity};
+use taut::log::Quantity;
 use taut::signal::{Hold, Signal};
 
 pub const EVERY: f64 = 1e-3;
@@ -101,7 +101,7 @@ impl Truth {
 type Values = [f64; 3];
 
 /// Random levels of force, N, for each sample.
-fn forces(chance: &mut Chance) -> Vec<f64> {
+pub fn forces(chance: &mut Chance) -> Vec<f64> {
     let mut input = vec![0.0; COUNT];
     let (mut k, mut sign) = (50, 1.0);
     while k + 400 < COUNT {
@@ -186,17 +186,7 @@ pub fn drawn(seed: u64, truth: Truth) -> (Case, Values) {
     let experiment = &mut case.experiments[0];
     (experiment.until, experiment.every) = ((COUNT - 1) as f64 * EVERY, EVERY);
     experiment.inputs[0] = Signal::Sampled { times: time.clone(), values: input.clone(), hold: Hold::Zero };
-    experiment.log = Some(Arc::new(Log {
-        name: "log".into(),
-        file: Default::default(),
-        time,
-        input,
-        hold: Hold::Zero,
-        added: None,
-        reference: None,
-        outputs: vec![Output { quantity: Quantity::CartPosition, absolute: false, values: seen }],
-        ended: None,
-    }));
+    experiment.log = Some(columns("log", time, input, vec![output(Quantity::CartPosition, seen)]));
     (case, values)
 }
 

@@ -475,6 +475,17 @@ pub(crate) const LAW_MOST: f64 = 3.0;
 /// `the_right_law_is_not_suspected`.
 pub(crate) const LAW_SHOWN: f64 = 3.0;
 
+/// Share of what the column of another law promises that a run with it must bear out.
+///
+/// Unit: 1. Source: chosen. Test: `the_right_model_lacks_nothing`.
+pub(crate) const LAW_KEEPS: f64 = 0.25;
+
+/// Steps to another law that are run: friction that falls by half makes a cart slip where it stuck, and the whole step
+/// misses.
+///
+/// Unit: 1, of the amplitude. Source: chosen. Test: `a_law_that_was_not_asked_for_widens_intervals_and_is_named`.
+pub(crate) const LAW_SHARES: [f64; 3] = [1.0, 0.75, 0.5];
+
 /// Change of the outputs that another law must make, as a share of their range.
 ///
 /// Unit: 1. Source: below are the last digits of logs and solvers. Test: `last_digits_of_a_log_speak_for_no_law`.
@@ -874,7 +885,7 @@ pub(crate) const CAUSE_STEPS: usize = 4;
 /// Starts that are fitted whole, the best of those that were ranked.
 ///
 /// Unit: starts. Source: chosen.
-pub(crate) const CAUSES_FITTED: usize = 4;
+pub(crate) const CAUSES_FITTED: usize = 6;
 
 /// Starts of one element that are fitted whole.
 ///
@@ -970,3 +981,23 @@ pub(crate) const CAUSE_AROUND: [f64; 2] = [0.1, 10.0];
 ///
 /// Unit: 1. Source: chosen: less is not seen, and takes long to simulate.
 pub(crate) const KNOWN_SHARES: [f64; 2] = [0.05, 0.95];
+
+/// First size of a force on the cart that is tried.
+///
+/// Unit: the motor's force at the greatest input. Source: chosen.
+pub(crate) const FORCE_FIRST: f64 = 0.01;
+
+/// Points of a drag over the speed.
+///
+/// Unit: points. Source: straight lines are then within 0.3 % of the greatest drag.
+pub(crate) const DRAG_POINTS: usize = 21;
+
+/// Points of friction that falls with speed, on either side of zero.
+///
+/// Unit: Stribeck velocities. Source: 0.2 % of the fall is left at the last.
+pub(crate) const STRIBECK_POINTS: [f64; 9] = [0.2, 0.4, 0.6, 0.8, 1.0, 1.25, 1.5, 2.0, 2.5];
+
+/// Greatest size of a force on the cart that has one sign, relative to its first.
+///
+/// Unit: 1. Source: chosen: a hundred times the motor's greatest force.
+pub(crate) const FORCE_MOST: f64 = 1e4;

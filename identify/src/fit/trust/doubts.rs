@@ -19,10 +19,14 @@ pub struct Disagreement {
 /// A friction law that the residuals speak for.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OtherLaw {
+    /// Its key: `stribeck`, `sided`, `drift`, `sway`.
+    pub key: &'static str,
     /// The body, as the case file has it.
     pub body: &'static str,
     /// In words, with its size.
     pub words: String,
+    /// The share of the sum of squared residuals that it explains.
+    pub explained: f64,
     /// Its amplitude in standard errors.
     pub standard_errors: f64,
     /// Amount that it takes off the sum of the squared residuals.
@@ -36,7 +40,7 @@ pub struct OtherLaw {
 /// An element that the model lacks and the logs show.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cause {
-    /// Its key: `spring`, `play`, `delay`.
+    /// Its key: `spring`, `play`, `delay`, `drag`, `stribeck`, `load`.
     pub key: &'static str,
     /// In words, with its size.
     pub words: String,
@@ -67,4 +71,9 @@ pub struct Size {
     pub value: f64,
     /// Its standard error.
     pub error: f64,
+}
+
+/// Friction of a body that falls by a force or torque as it picks up this speed, in words.
+pub(super) fn falling(body: &str, force: &str, speed: &str) -> String {
+    format!("friction of the {} that falls by {force} within some {speed}", body.replace('_', " "))
 }

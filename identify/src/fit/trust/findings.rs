@@ -8,7 +8,7 @@ use crate::fit::asked::controller::reproduced;
 use crate::fit::asked::problem::Problem;
 use crate::fit::asked::run::is_position;
 use crate::fit::limits::{
-    CAUSE_MOVES, CAUSE_WARNS, KINK_PROMISE, MOTOR_CONSTANTS, NORMAL, OPPOSITE, POOR_FIT, REPRODUCED,
+    CAUSE_EXPLAINS, CAUSE_MOVES, CAUSE_WARNS, KINK_PROMISE, MOTOR_CONSTANTS, NORMAL, OPPOSITE, POOR_FIT, REPRODUCED,
 };
 use crate::fit::noise::Wave;
 use crate::fit::search::point::Ending;
@@ -171,12 +171,22 @@ fn of_search(fit: &Fit) -> Vec<Finding> {
             }
         };
         let text = format!(
-            "the residuals suggest {} ({:.1} standard errors): {moved}; `taut fit --compare` tries other laws",
-            found.words, found.standard_errors
+            "the residuals suggest {}, which explains {:.0} % of them ({:.1} standard errors): {moved}; \
+             `taut fit --compare` tries other laws",
+            found.words,
+            100.0 * found.explained,
+            found.standard_errors
         );
-        all.push(finding(Grade::Note, "other_law", text));
+        let grade = if found.explained >= CAUSE_WARNS { Grade::Warning } else { Grade::Note };
+        all.push(finding(grade, "other_law", text));
     }
-    for Wave { quantity, length, amplitude } in &fit.waves {
+    // a²/2 of a wave against σ² of the residuals. Where an element explains them, its waves are a part of that.
+    let share = |wave: &Wave| {
+        let noise = fit.noise.iter().find(|(quantity, _)| *quantity == wave.quantity);
+        noise.map_or(1.0, |(_, deviation)| 0.5 * (wave.amplitude / deviation).powi(2))
+    };
+    let waves = fit.waves.iter().filter(|wave| fit.cause.is_none() && share(wave) >= CAUSE_EXPLAINS);
+    for Wave { quantity, length, amplitude } in waves {
         let text = format!(
             "{}: its error repeats with position, by ±{} every {}; the intervals are widened by what that moves",
             quantity.name(),
@@ -203,7 +213,7 @@ fn of_cause(fit: &Fit) -> Option<Finding> {
     let moved = if moved.is_empty() { "no estimate moves by a hundredth".to_string() } else { moved.join(", ") };
     let text = format!(
         "{} explains {:.0} % of what is left, and predicts {} of {} parts of the logs better that were held out: {moved}; \
-         the intervals are widened to contain that; add {}",
+         the intervals are widened to contain that; {}",
         found.words,
         100.0 * found.explained,
         found.better[0],

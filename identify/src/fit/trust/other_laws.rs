@@ -10,16 +10,17 @@
 //! ```
 //!
 //! d is what the law would change of the parameters: the bias of a variable that was left out. Where a is more than
-//! noise makes of it, intervals are widened by d, and it is said which law it is.
+//! noise makes of it, and a run with the law and the parameters moved by d bears out what the column promises, intervals
+//! are widened by d, and it is said which law it is.
 
-use super::doubts::OtherLaw;
+use super::doubts::{OtherLaw, falling};
 use super::uncertainty::Judged;
 use crate::fit::asked::drifting;
 use crate::fit::asked::problem::Problem;
 use crate::fit::asked::run::Run;
 use crate::fit::limits::{
-    DRIFT_PARTS, FILE_ROUNDING, LAW_DUST, LAW_FIRST, LAW_LEAST, LAW_MOST, LAW_ROUNDS, LAW_SHOWN, NORMAL,
-    STRIBECK_SHARES,
+    DRIFT_PARTS, FILE_ROUNDING, LAW_DUST, LAW_FIRST, LAW_KEEPS, LAW_LEAST, LAW_MOST, LAW_ROUNDS, LAW_SHARES, LAW_SHOWN,
+    NORMAL, STRIBECK_SHARES,
 };
 use crate::fit::noise::{half_width, spreads};
 use crate::fit::search::starts::Searched;
@@ -30,6 +31,7 @@ use crate::machine::Machine;
 use crate::number::engineering;
 use crate::solve::Bench;
 use nalgebra::{DMatrix, DVector};
+use std::f64::consts::TAU;
 
 /// A body of an axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -76,6 +78,25 @@ enum Kind {
     Sided,
     /// All friction less at the begin of each log, and as much more at its end, as a share of it.
     Drift,
+    /// All friction by one sine along each log, as a share of it.
+    Sway,
+}
+
+impl Kind {
+    /// Its name in results.
+    fn key(self) -> &'static str {
+        match self {
+            Kind::Stribeck(_) => "stribeck",
+            Kind::Sided => "sided",
+            Kind::Drift => "drift",
+            Kind::Sway => "sway",
+        }
+    }
+
+    /// Whether the machine changes along a log, and its amplitude is a share of friction.
+    fn is_along(self) -> bool {
+        matches!(self, Kind::Drift | Kind::Sway)
+    }
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -89,7 +110,7 @@ struct Candidate {
 impl Candidate {
     /// The amplitude that is tried first.
     fn first(self) -> f64 {
-        LAW_FIRST * if self.kind == Kind::Drift { 1.0 } else { self.coulomb }
+        LAW_FIRST * if self.kind.is_along() { 1.0 } else { self.coulomb }
     }
 
     /// Puts so much of the law into a machine, at this share of a log.
@@ -108,8 +129,9 @@ impl Candidate {
                     side.breakaway = side.breakaway.max(side.coulomb);
                 }
             }
-            Kind::Drift => {
-                let factor = 1.0 + amplitude * (2.0 * share - 1.0);
+            Kind::Drift | Kind::Sway => {
+                let along = if self.kind == Kind::Drift { 2.0 * share - 1.0 } else { (TAU * share).sin() };
+                let factor = 1.0 + amplitude * along;
                 for side in [&mut friction.forward, &mut friction.backward] {
                     side.viscous *= factor;
                     side.coulomb *= factor;
@@ -124,7 +146,7 @@ impl Candidate {
         match self.kind {
             Kind::Stribeck(_) => (LAW_LEAST * self.coulomb, LAW_MOST * self.coulomb),
             Kind::Sided => (-0.9 * self.coulomb, 0.9 * self.coulomb),
-            Kind::Drift => (-0.9, 0.9),
+            Kind::Drift | Kind::Sway => (-0.9, 0.9),
         }
     }
 
@@ -133,11 +155,7 @@ impl Candidate {
         let (force, speed) = self.body.units();
         let whose = self.body.key().replace('_', " ");
         match self.kind {
-            Kind::Stribeck(velocity) => format!(
-                "friction of the {whose} that falls by {} within some {}",
-                shown(amplitude, force),
-                shown(velocity, speed)
-            ),
+            Kind::Stribeck(velocity) => falling(self.body.key(), &shown(amplitude, force), &shown(velocity, speed)),
             Kind::Sided => format!(
                 "Coulomb friction of the {whose} that is {} {} forward than backward",
                 shown(2.0 * amplitude.abs(), force),
@@ -147,6 +165,11 @@ impl Candidate {
                 "friction of the {whose} that {} by {} % from the begin of each log to its end",
                 if amplitude > 0.0 { "rises" } else { "falls" },
                 percent(200.0 * amplitude.abs())
+            ),
+            Kind::Sway => format!(
+                "friction of the {whose} that {} along each log by a sine of ±{} %",
+                if amplitude > 0.0 { "rises and falls" } else { "falls and rises" },
+                percent(100.0 * amplitude.abs())
             ),
         }
     }
@@ -177,6 +200,8 @@ struct Tried {
 struct Place<'a> {
     problem: &'a Problem<'a>,
     x: &'a [f64],
+    /// The variables that are not at a bound, a column of the Jacobian each.
+    free: Vec<usize>,
     residuals: DVector<f64>,
     jacobian: DMatrix<f64>,
     inverse: DMatrix<f64>,
@@ -201,7 +226,7 @@ pub(crate) fn other_law(found: &Searched, judged: &Judged) -> Option<OtherLaw> {
     let jacobian = best.jacobian.select_columns(&free);
     let inverse = inverse_of_square(&jacobian)?;
     let residuals = DVector::from_column_slice(&best.residuals);
-    let place = Place { problem, x: &best.x, residuals, jacobian, inverse };
+    let place = Place { problem, x: &best.x, free, residuals, jacobian, inverse };
     let tried = candidates.into_iter().filter_map(|candidate| place.attempt(candidate, candidate.first()));
     let mut tried = tried.max_by(|a, b| a.gain.total_cmp(&b.gain))?;
     // Independent residuals would have to show it, too.
@@ -230,7 +255,7 @@ fn candidates(problem: &Problem, x: &[f64]) -> Vec<Candidate> {
         }
         let fastest = fastest(problem, x, body);
         all.extend(STRIBECK_SHARES.map(|share| Candidate { body, kind: Kind::Stribeck(share * fastest), coulomb }));
-        all.extend([Kind::Sided, Kind::Drift].map(|kind| Candidate { body, kind, coulomb }));
+        all.extend([Kind::Sided, Kind::Drift, Kind::Sway].map(|kind| Candidate { body, kind, coulomb }));
     }
     all
 }
@@ -251,23 +276,22 @@ fn fastest(problem: &Problem, x: &[f64], body: Body) -> f64 {
 }
 
 impl Place<'_> {
-    /// The amplitude that a law would have, from what so much of it makes of the residuals; none where the model does
-    /// not get through with it, or where it is what the parameters do already.
-    fn attempt(&self, candidate: Candidate, step: f64) -> Option<Tried> {
-        let mut moved = vec![0.0; self.residuals.len()];
+    /// The residuals at `x` with so much of a law; none where the model does not get through with it.
+    fn with(&self, candidate: Candidate, amplitude: f64, x: &[f64]) -> Option<DVector<f64>> {
+        let mut residuals = vec![0.0; self.residuals.len()];
         let mut bench = Bench::default();
         for (index, run) in self.problem.runs.iter().enumerate() {
             let first = self.problem.first_row(index);
-            let extras = self.problem.extras_of(index, self.x);
-            let machine = self.problem.stage_of(run.part, self.x);
+            let extras = self.problem.extras_of(index, x);
+            let machine = self.problem.stage_of(run.part, x);
             let with = |share: f64| {
                 let mut machine = machine.clone();
-                candidate.put(&mut machine, step, share);
+                candidate.put(&mut machine, amplitude, share);
                 machine
             };
-            let rows = &mut moved[first..first + run.rows()];
+            let rows = &mut residuals[first..first + run.rows()];
             let good = match candidate.kind {
-                Kind::Drift => {
+                Kind::Drift | Kind::Sway => {
                     let stages: Vec<Machine> =
                         (0..DRIFT_PARTS).map(|k| with((k as f64 + 0.5) / DRIFT_PARTS as f64)).collect();
                     drifting::residuals(run, &stages, &extras, rows)
@@ -278,7 +302,31 @@ impl Place<'_> {
                 return None;
             }
         }
-        let column = (DVector::from_vec(moved) - &self.residuals) / step;
+        Some(DVector::from_vec(residuals))
+    }
+
+    /// What a law takes off Σ r² where the variables have moved along with it, x + s d with the best of the shares s;
+    /// none where that is less than [`LAW_KEEPS`] of what its column promises.
+    fn gained(&self, tried: &Tried) -> Option<f64> {
+        let bounds = self.problem.bounds();
+        let own = |share: &f64| {
+            let amplitude = share * tried.amplitude;
+            let mut x = self.x.to_vec();
+            for (&j, along) in self.free.iter().zip(tried.along.iter()) {
+                x[j] = (x[j] - amplitude * along).clamp(bounds.low[j], bounds.high[j]);
+            }
+            let left = self.with(tried.candidate, amplitude, &x)?;
+            Some(self.residuals.norm_squared() - left.norm_squared())
+        };
+        let gain = LAW_SHARES.iter().filter_map(own).fold(0.0, f64::max);
+        (gain >= LAW_KEEPS * tried.gain).then_some(gain)
+    }
+
+    /// The amplitude that a law would have, from what so much of it makes of the residuals; none where the model does
+    /// not get through with it, or where it is what the parameters do already.
+    fn attempt(&self, candidate: Candidate, step: f64) -> Option<Tried> {
+        let moved = self.with(candidate, step, self.x)?;
+        let column = (moved - &self.residuals) / step;
         let along = &self.inverse * self.jacobian.tr_mul(&column);
         let beside = &column - &self.jacobian * &along;
         let square = beside.norm_squared();
@@ -319,8 +367,10 @@ impl Place<'_> {
         // one of its kind, and the true one may do half as much again.
         let square = &shift * shift.transpose();
         let added = &square * (3.0 / (NORMAL * NORMAL)) + square * (error / tried.amplitude).powi(2);
-        let Candidate { body, .. } = tried.candidate;
+        let Candidate { body, kind, .. } = tried.candidate;
+        let gain = self.gained(tried)?;
+        let explained = gain / self.residuals.norm_squared();
         let words = tried.candidate.words(tried.amplitude);
-        Some(OtherLaw { body: body.key(), words, standard_errors, gain: tried.gain, off, added })
+        Some(OtherLaw { key: kind.key(), body: body.key(), words, explained, standard_errors, gain, off, added })
     }
 }

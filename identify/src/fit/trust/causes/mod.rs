@@ -13,6 +13,9 @@
 //! intervals of half-width h become √(h² + 2 (d² + h′²)) ≥ d + h′, h′ that of the fit with the element.
 
 mod extension;
+mod force;
+mod gear;
+mod stamp;
 mod tried;
 
 use super::doubts::{Cause, OtherLaw};
@@ -28,7 +31,7 @@ use crate::fit::limits::{
 use crate::fit::search::point::Options;
 use crate::fit::search::starts::Searched;
 use crate::machine::Kind;
-use extension::{EXTENSIONS, Site};
+use extension::{EXTENSIONS, Extension, Site};
 use nalgebra::{DMatrix, DVector};
 use tried::Tried;
 
@@ -46,12 +49,12 @@ pub(crate) fn cause(
     }
     let site = Site::new(case, plan, found);
     let before = found.best.cost;
-    let mut ranked: Vec<Tried> = EXTENSIONS
-        .iter()
-        .flat_map(|extension| extension.tries(&site))
-        .filter_map(|extended| Tried::begun(&site, extended, CAUSE_STEPS))
-        .filter(|tried| tried.cost() < CAUSE_NEAR * before)
-        .collect();
+    let begun = |row: &'static Extension| {
+        let tries = (row.tries)(&site).into_iter();
+        let begun = tries.filter_map(|extended| Tried::begun(&site, row, extended, CAUSE_STEPS));
+        begun.filter(|tried| tried.cost() < CAUSE_NEAR * before).collect::<Vec<_>>()
+    };
+    let mut ranked: Vec<Tried> = EXTENSIONS.iter().flat_map(begun).collect();
     ranked.sort_by(|a, b| a.cost().total_cmp(&b.cost()));
     let mut kinds = Vec::new();
     ranked.retain(|tried| {

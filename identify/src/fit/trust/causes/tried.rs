@@ -1,7 +1,7 @@
 //! A fit with one element more.
 
-use super::extension::{Extended, Site};
-use super::widened;
+use super::extension::{Extended, Extension, Fitted, Measure, Said, Site, Telling};
+use super::{stamp, widened};
 use crate::case::{Case, Plan};
 use crate::fit::asked::problem::Problem;
 use crate::fit::asked::residuals::Residuals;
@@ -15,6 +15,7 @@ use crate::solve::Flow;
 
 /// A model with one element more, and where its search is.
 pub(super) struct Tried<'a> {
+    row: &'static Extension,
     extended: Extended,
     problem: Problem<'a>,
     best: Minimum,
@@ -22,7 +23,7 @@ pub(super) struct Tried<'a> {
 
 impl<'a> Tried<'a> {
     /// So many steps from where the fit without the element ended; none where the model does not get through the logs.
-    pub fn begun(site: &Site<'_, 'a>, extended: Extended, steps: usize) -> Option<Self> {
+    pub fn begun(site: &Site<'_, 'a>, row: &'static Extension, extended: Extended, steps: usize) -> Option<Self> {
         let mut problem = Problem::new(&extended.case, &extended.plan).ok()?.stopped_by(site.found.problem.stop());
         let noise: Vec<_> = problem.quantities().iter().map(|&own| (own, site.deviation(own))).collect();
         problem.swings = site.found.problem.swings;
@@ -33,11 +34,11 @@ impl<'a> Tried<'a> {
         if own.len() == start.len() - g {
             start[g..].copy_from_slice(own);
         }
-        if let (Some(delay), Some(last)) = (extended.delay, problem.shared.last()) {
-            start[g - 1] = (delay - last.start) / last.unit;
+        if let (Telling::Nuisance(value), Some(last)) = (&extended.telling, problem.shared.last()) {
+            start[g - 1] = (value - last.start) / last.unit;
         }
         let best = descend(&mut problem, &start, steps)?;
-        Some(Self { extended, problem, best })
+        Some(Self { row, extended, problem, best })
     }
 
     /// The same to its end.
@@ -54,7 +55,7 @@ impl<'a> Tried<'a> {
 
     /// The row of the table, and the side on which the sensor is.
     pub fn kind(&self) -> (&'static str, bool) {
-        (self.extended.key, self.extended.at_motor)
+        (self.row.key, self.extended.at_motor)
     }
 
     /// The information of the logs on it.
@@ -70,9 +71,17 @@ impl<'a> Tried<'a> {
 
     /// The place of the variable whose size says whether the element is there.
     fn telling(&self) -> Option<usize> {
-        match self.extended.telling {
-            Some(key) => self.problem.parameters.iter().position(|own| own.name == key),
-            None => self.problem.globals().checked_sub(1),
+        match &self.extended.telling {
+            Telling::Parameter(key) => self.problem.parameters.iter().position(|own| own.name == *key),
+            Telling::Nuisance(_) => self.problem.globals().checked_sub(1),
+        }
+    }
+
+    /// The value of that variable, SI.
+    fn value(&self, j: usize) -> f64 {
+        match self.problem.shared.get(j.wrapping_sub(self.problem.parameters.len())) {
+            Some(extra) => extra.start + extra.unit * self.best.x[j],
+            None => self.problem.value(j, self.best.x[j]),
         }
     }
 
@@ -80,13 +89,10 @@ impl<'a> Tried<'a> {
     pub fn standard_errors(&self, judged: &Judged) -> f64 {
         let Some(j) = self.telling() else { return 0.0 };
         let Some(error) = judged.covariance.error(j).filter(|error| *error > 0.0) else { return 0.0 };
-        match j < self.problem.parameters.len() {
-            true if self.problem.is_log(j) => 1.0 / error,
-            true => self.best.x[j].abs() / error,
-            false => {
-                let extra = self.problem.shared[j - self.problem.parameters.len()];
-                (extra.start / extra.unit + self.best.x[j]).abs() / error
-            }
+        match self.problem.shared.get(j.wrapping_sub(self.problem.parameters.len())) {
+            None if self.problem.is_log(j) => 1.0 / error,
+            None => self.best.x[j].abs() / error,
+            Some(extra) => self.value(j).abs() / (error * extra.unit),
         }
     }
 
@@ -105,31 +111,35 @@ impl<'a> Tried<'a> {
         better: [usize; 2],
     ) -> Option<Cause> {
         let (x, base) = (&self.best.x, &site.found.problem);
-        let machine = self.machine(x);
         let error = |j: usize| judged.covariance.error(j);
+        let is_new = |name: &str| !base.parameters.iter().any(|other| other.name == name);
         let mut parameters = Vec::new();
-        for (j, own) in self.problem.parameters.iter().enumerate() {
-            if base.parameters.iter().any(|other| other.name == own.name) {
-                continue;
-            }
+        for (j, own) in self.problem.parameters.iter().enumerate().filter(|(_, own)| is_new(&own.name)) {
             let value = self.problem.value(j, x[j]);
-            let error = error(j).map_or(f64::INFINITY, |error| error * self.problem.slope(j, value));
-            parameters.push(Size { name: own.name.clone(), unit: own.unit, value, error });
+            let error = error(j).map_or(f64::INFINITY, |error| error * self.problem.slope(j, value).abs());
+            parameters.push(match self.extended.size.filter(|_| self.telling() == Some(j)) {
+                None => Size { name: own.name.clone(), unit: own.unit, value, error },
+                Some(Measure { name, unit, per }) => {
+                    Size { name: name.into(), unit, value: per * value, error: per.abs() * error }
+                }
+            });
         }
-        let mut delay = 0.0;
-        if self.problem.shared.len() > base.shared.len()
-            && let Some(last) = self.problem.shared.last()
+        let mut scatter = None;
+        if let (Telling::Nuisance(_), Some(last), Some(j)) =
+            (&self.extended.telling, self.problem.shared.last(), self.telling())
         {
-            let j = self.problem.globals() - 1;
-            delay = last.start + last.unit * x[j];
             let error = error(j).map_or(f64::INFINITY, |error| error * last.unit);
-            parameters.push(Size { name: last.what.name().into(), unit: "s", value: delay, error });
+            parameters.push(Size { name: last.what.name().into(), unit: "s", value: self.value(j), error });
+            scatter = stamp::scatter(&self.problem, &self.best.residuals);
+        }
+        if let Some([value, error]) = scatter {
+            parameters.push(Size { name: "scatter".into(), unit: "s", value, error });
         }
         let g = base.globals();
         let (mut shift, mut errors) = (vec![0.0; g], vec![0.0; g]);
         let mut estimates = vec![None; g];
         for (j, own) in base.parameters.iter().enumerate() {
-            let as_base = |x: &[f64]| own.value_in(&site.without(self.machine(x)));
+            let as_base = |x: &[f64]| own.value_in(&(self.row.without)(site, self.machine(x)));
             let Some(value) = as_base(x).filter(|value| value.is_finite()) else { continue };
             let error = self.propagated(judged, &as_base);
             let slope = base.slope(j, value).abs().max(f64::MIN_POSITIVE);
@@ -141,8 +151,10 @@ impl<'a> Tried<'a> {
             estimates[j] = Some(Size { name: own.name.clone(), unit: own.unit, value, error });
         }
         let added = widened(&shift, &errors);
-        let (words, add) = self.extended.words(site, &machine, delay);
-        let key = self.extended.key;
+        let value = self.telling().map_or(0.0, |j| self.value(j));
+        let fitted = Fitted { machine: self.machine(x), value, scatter: scatter.map(|[deviation, _]| deviation) };
+        let Said { words, add } = (self.row.words)(site, &self.extended, &fitted);
+        let key = self.row.key;
         Some(Cause { key, words, explained, standard_errors, parameters, estimates, add, better, added })
     }
 
