@@ -1,4 +1,4 @@
-//! Acts that a page can ask for: each is a row of [`ACTS`] and a function from a request to a reply.
+//! Acts that a page can ask for: each is a row of `ACTS` and a function from a request to a reply.
 //!
 //! They need no server: a [`Host`] provides what depends on the surroundings of the page, such as saving a file.
 
