@@ -40,6 +40,11 @@ impl Move {
         &self.profiles[0]
     }
 
+    /// End of the references, s.
+    pub fn end(&self) -> f64 {
+        self.profiles.iter().map(Profile::end).fold(0.0, f64::max)
+    }
+
     /// The references, through the shaper of this controller.
     pub fn references(&self, design: &Design) -> Vec<Profile> {
         self.profiles.iter().map(|profile| profile.clone().shaped(&design.shaper)).collect()
