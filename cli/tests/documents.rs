@@ -57,7 +57,7 @@ fn lasting(text: &str) -> Vec<String> {
     words
 }
 
-/// Whether an output is as the document shows it; a line `…` of the document stands for any lines.
+/// True if an output is as the document shows it; a line `…` of the document stands for any lines.
 fn agrees(got: &str, want: &str) -> bool {
     let (got, parts) = (lasting(got), want.split("\n…").map(lasting).collect::<Vec<_>>());
     match &parts[..] {

@@ -76,7 +76,7 @@ pub struct Planned {
     pub shortfalls: Vec<Shortfall>,
     /// The reference of the file.
     pub reference: Profile,
-    /// What the plan needs of each limit of the machine, at worst over the family.
+    /// Use of each limit of the machine, worst case over the family.
     pub loads: Vec<Load>,
     /// The least time in which the rigid axis could do it within voltage and current, s; none where nothing limits it.
     pub bound: Option<f64>,
@@ -133,7 +133,7 @@ impl Plans {
     }
 }
 
-/// What the plans of a case have in common.
+/// Data shared by the plans of a case.
 struct Planner<'a> {
     design: &'a Design,
     family: &'a Family,
@@ -205,7 +205,7 @@ impl Planner<'_> {
         Ok(tried)
     }
 
-    /// What a reference, shaper included, needs of each limit at most, over the family.
+    /// Largest use of each limit by a reference with its shaper, over the family.
     fn loads(&self, profile: &Profile, instants: usize) -> Vec<Load> {
         let mut all: Vec<Load> = Vec::new();
         for corner in &self.family.machines {

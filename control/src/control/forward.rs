@@ -12,12 +12,12 @@ pub(super) struct Forward {
     settings: FeedForward,
     /// The drive with its pulley.
     pulley: Rigid,
-    /// What slides: its share of the drive's way, how far it goes per way of the drive, and itself.
+    /// Slides: weight of the drive's travel, travel per travel of the drive, and the slide as a rigid axis.
     slides: Vec<(f64, f64, Rigid)>,
 }
 
 impl Forward {
-    /// That of drive `drive` in the design; none of an axis, whose controller has its own, and of a design without.
+    /// Feed-forward of drive `drive`; none for an axis, whose controller has its own, or a design without it.
     pub fn of(design: &Design, machine: &Machine, drive: usize) -> Option<Self> {
         let settings = design.feed_forward;
         if machine.drives.len() == 1 || settings.model == FeedForwardModel::None {

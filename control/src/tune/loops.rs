@@ -60,7 +60,7 @@ pub struct Open {
     parts: [Complex<f64>; 3],
     /// Δ: 1 + L, times what has stable poles.
     pub(super) difference: Complex<f64>,
-    /// Whether the position loop is closed at a scale.
+    /// True if the position loop is closed at a scale.
     has_scale: bool,
     /// The cart's position per position that follows the reference, and per step beside the command.
     cart: Complex<f64>,

@@ -33,7 +33,7 @@ pub struct Plant {
     pub frequency: Vec<f64>,
     /// The answers to a command there.
     pub answers: Vec<Answer>,
-    /// The same frequencies as a sampled loop sees them.
+    /// The frequencies in terms of the sampled loop.
     turns: Vec<Turn>,
     model: Discrete,
     /// Outputs of the model: what is measured, the cart, the current; and metres per unit of the first.
@@ -45,7 +45,7 @@ pub struct Plant {
 }
 
 impl Plant {
-    /// That of `stage` with the cart at `place`, as the controller of `design` samples it.
+    /// Sampled plant with the cart at `place`, m, for the controller of `design`.
     pub fn of(machine: &Machine, place: f64, design: &Design, corners: &[f64]) -> Result<Self> {
         let t = design.every;
         let system = StateSpace::of(machine, Operation { position: place, ..Operation::default() })?;
