@@ -49,7 +49,7 @@ fn plans_keep_the_limits_and_arrive_sooner() {
         for planned in &plans.moves {
             let (best, given) = (&planned.best, &planned.given);
             println!("{seed} {}: {:?}, {given:?}, at least {:?}", planned.name, best.arrival, planned.bound);
-            let short = shortfalls(&case.machine, design.limit, &planned.profile);
+            let short = shortfalls(&case.machine, design.limit, std::slice::from_ref(&planned.profile));
             assert_eq!(short, [], "{seed}");
             // The reserve is left.
             for load in loads(&case.machine, design.limit, &planned.profile, 4000) {

@@ -14,7 +14,7 @@ use taut::design::Design;
 use taut::error::{Error, Result};
 use taut::solve::Solver;
 use taut::trajectory::Trajectory;
-use taut::tune::{Break, Family, Margins, Open, Verdict, breaks, loops, trouble, tune};
+use taut::tune::{Family, Loops, Margins, Verdict, loops, trouble, tune};
 use taut_report::motion::{Done, Tried};
 use taut_report::tune::{Work, figures, page};
 
@@ -150,7 +150,7 @@ pub fn moved<'a>(
     };
     let (timing, solver) = (Loop::of(design), Solver::of(machine));
     let run = stream(machine, &mut each(&mut controllers), &timing, &profiles, &rows, solver, false, &mut take)?;
-    let trouble = trouble::trouble(machine, design, &run, motion.profile().target());
+    let trouble = trouble::trouble(machine, design, &run, motion);
     let shortfalls = motion.shortfalls(machine, design);
     Ok(Done { motion, run, curves: None, worst: None, trouble, shortfalls, files: Vec::new() })
 }
@@ -171,16 +171,14 @@ fn nyquist(case: &Case, design: &Design) -> Result<(Margins, f64, [Vec<f64>; 5],
     let plant = family.plant(&family.nominal(), design, &feedback.corners())?;
     let margins = Margins::of(&plant, &feedback);
     let open = loops(&plant, &feedback);
-    let of = |value: &dyn Fn(&Open) -> f64| open.iter().map(value).collect::<Vec<f64>>();
-    let (at, breaks) = (margins.breaks.sensitivity, breaks(&feedback));
-    let highest =
-        |value: fn(&Open, Break) -> f64| of(&|open| breaks.iter().map(|&at| value(open, at)).fold(0.0, f64::max));
+    let of = |value: &dyn Fn(&Loops) -> f64| open.iter().map(value).collect::<Vec<f64>>();
+    let (at, drive) = (margins.breaks.sensitivity, margins.breaks.gain_drive);
     let curves = [
         plant.frequency.iter().map(|omega| omega / (2.0 * PI)).collect(),
-        of(&|open| open.broken_at(at).re),
-        of(&|open| open.broken_at(at).im),
-        highest(Open::sensitivity),
-        highest(Open::complementary),
+        of(&|open| open.broken_at(at, drive).re),
+        of(&|open| open.broken_at(at, drive).im),
+        of(&Loops::sensitivity),
+        of(&Loops::complementary),
     ];
     Ok((margins, tuning.sensitivity, curves, feedback.is_linear()))
 }

@@ -33,7 +33,7 @@ const TABLE: &[(&str, &[&str], &str, Ends)] = &[
     ("modes", &[], AXIS, Runs),
     ("sweep", &["--runs", "3", "--vary", "cart.mass=5 %"], AXIS, Runs),
     ("move", &[], PID, Runs),
-    ("tune", &["--evaluate"], PID, YET_TO_COME),
+    ("tune", &["--evaluate"], PID, Runs),
     ("plan", &["--move", "short fast"], PID, YET_TO_COME),
     ("check", &[], LOGS, YET_TO_COME),
     ("fit", &[], LOGS, YET_TO_COME),
@@ -102,7 +102,7 @@ fn every_kind_goes_through_every_command() {
             "studio" => run(axis, of_gantry),
             _ => run(axis, &Runs),
         }
-        let gantries = if *command == "move" { IN_LOOP } else { GANTRIES };
+        let gantries = if ["move", "tune"].contains(command) { IN_LOOP } else { GANTRIES };
         gantries.iter().for_each(|case| run(case, of_gantry));
     }
 }

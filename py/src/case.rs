@@ -292,7 +292,7 @@ impl Case {
         draws: Option<PathBuf>,
         effort: f64,
     ) -> PyResult<(Py<PyAny>, Py<Case>)> {
-        let case = self.axis(py)?;
+        let case = &self.inner;
         let mut tuning = case.tune.clone().unwrap_or_default();
         tuning.spread = spread.or(tuning.spread);
         tuning.corners = corners;

@@ -394,8 +394,7 @@ pub fn moves<'py>(py: Python<'py>, runs: Vec<PyRef<'py, Run>>) -> PyResult<Bound
         .map(|run| match &run.what {
             What::Move { case, index, run: moved, .. } => {
                 let (design, motion) = (case.controller.as_ref(), &case.moves[*index]);
-                let target = motion.profile().target();
-                let trouble = design.and_then(|design| trouble(&case.machine, design, moved, target));
+                let trouble = design.and_then(|design| trouble(&case.machine, design, moved, motion));
                 (trouble, design.map_or(Vec::new(), |design| motion.shortfalls(&case.machine, design)))
             }
             What::Experiment { .. } => (None, Vec::new()),

@@ -40,17 +40,19 @@ impl Move {
         &self.profiles[0]
     }
 
+    /// End of the references, s.
+    pub fn end(&self) -> f64 {
+        self.profiles.iter().map(Profile::end).fold(0.0, f64::max)
+    }
+
     /// The references, through the shaper of this controller.
     pub fn references(&self, design: &Design) -> Vec<Profile> {
         self.profiles.iter().map(|profile| profile.clone().shaped(&design.shaper)).collect()
     }
 
-    /// The limits that its reference exceeds on an axis under this controller; of a gantry none is known before it runs.
+    /// The limits that its references exceed on a machine under this controller.
     pub fn shortfalls(&self, machine: &Machine, design: &Design) -> Vec<Shortfall> {
-        match &self.references(design)[..] {
-            [reference] => shortfalls(machine, design.limit, reference),
-            _ => Vec::new(),
-        }
+        shortfalls(machine, design.limit, &self.references(design))
     }
 }
 

@@ -1,7 +1,6 @@
 //! A controller from its design: structure, feed-forward, observer and filters put together.
 
 use super::filter::Biquad;
-use super::forward::Forward;
 use super::law::{Law, Seen};
 use super::laws::AnyLaw;
 use super::observer::DisturbanceObserver;
@@ -12,6 +11,7 @@ use crate::error::{Error, Result};
 use crate::machine::rigid::Rigid;
 use crate::machine::{AmplifierMode, Machine};
 use crate::reach::compensation::Compensation;
+use crate::reach::forward::Forward;
 use crate::signal::profile::Reference;
 
 /// A controller that a [`Design`] describes, made with a model of the axis: the stage itself, or what one takes it for.
@@ -157,7 +157,8 @@ impl Standard {
 
     /// A controller for each drive of a machine.
     pub fn of_drives(design: &Design, model: &Machine) -> Result<Vec<Self>> {
-        let of_drive = |drive| Ok(Self { forward: Forward::of(design, model, drive), ..Self::new(design, model)? });
+        let of_drive =
+            |drive| Ok(Self { forward: Forward::of(design.feed_forward, model, drive), ..Self::new(design, model)? });
         (0..model.drives.len()).map(of_drive).collect()
     }
 

@@ -23,6 +23,16 @@ pub struct Operation {
 }
 
 impl Operation {
+    /// Where what slides is at `slides`, m, in the order of the geometry, and all slides forward.
+    pub fn at(slides: &[f64]) -> Self {
+        let own = Self::default();
+        match slides {
+            [bridge, cart] => Self { position: *cart, bridge: *bridge, ..own },
+            [cart] => Self { position: *cart, ..own },
+            _ => own,
+        }
+    }
+
     /// Where each sliding part of `machine` is, m, in the order of its geometry.
     pub(super) fn coordinates(&self, machine: &Machine) -> Vec<f64> {
         machine.bridge.iter().map(|_| self.bridge).chain([self.position]).collect()

@@ -1,6 +1,6 @@
 //! An axis as one mass along its belt.
 
-use super::{AmplifierMode, DriveUnit, Machine};
+use super::{AmplifierMode, DriveUnit, Machine, SlideAt};
 use crate::calculator::{Calculator, Run, at_least, less, more};
 
 /// Largest speed of a reference that counts as rest, m/s, and largest acceleration that counts as none, m/s²: what
@@ -34,9 +34,30 @@ pub struct Rigid {
 }
 
 impl Rigid {
-    /// Rigid model of an axis.
+    /// That of an axis; of a machine with several drives what each of them moves where all move what is heaviest to
+    /// move.
     pub fn of(machine: &Machine) -> Self {
-        Self::of_drive(machine, 0)
+        if machine.drives.len() == 1 {
+            return Self::of_drive(machine, 0);
+        }
+        let pulley = Self::of_pulley(machine, 0);
+        // With y = s q and q = Σ l y the work Σ f dy = M q̈ dq gives f = l M q̈ = (l/s) M ÿ.
+        let share = |(number, at): (usize, &SlideAt)| {
+            let weight = at.by_drives[0] / machine.belt_shares()[0][number];
+            Self::of_slide(machine, number).map(|slide| (weight, slide))
+        };
+        let shares = machine.geometry().slides.iter().enumerate().filter_map(share);
+        let Some((weight, slide)) = shares.max_by(|(v, a), (w, b)| (v * a.mass).total_cmp(&(w * b.mass))) else {
+            return pulley;
+        };
+        let sum = |own: [f64; 2], more: [f64; 2]| [own[0] + weight * more[0], own[1] + weight * more[1]];
+        Self {
+            mass: pulley.mass + weight * slide.mass,
+            viscous: sum(pulley.viscous, slide.viscous),
+            coulomb: sum(pulley.coulomb, slide.coulomb),
+            constant: weight * slide.constant,
+            ..pulley
+        }
     }
 
     /// Rigid model of an axis with the motor of this drive.

@@ -122,7 +122,7 @@ impl Quickest<'_> {
     pub fn check(&self, way: &Way) -> Result<()> {
         let slow = Limits { speed: 1e-3, acceleration: 1e-2, jerk: None, snap: None };
         let reference = way.within(&slow)?.shaped(&self.design.shaper);
-        if let Some(short) = shortfalls(self.machine, self.design.limit, &reference).first() {
+        if let Some(short) = shortfalls(self.machine, self.design.limit, &[reference]).first() {
             return Err(Error::new(format!("there is no plan: {}", short.words)));
         }
         let (volts, amperes) = limits(self.machine, self.design.limit);

@@ -63,6 +63,11 @@ impl Model {
         let case = Case::from_text_with("machine.toml", text, &[])?;
         let [until, every] = resource::times(&case);
         let (machine, design) = (case.machine.clone(), case.controller.clone());
+        if with_controller && design.is_some() && !case.is_axis() {
+            let error = Error::new("an FMU of a gantry has no controller inside yet").in_file("--part");
+            return Err(error
+                .next("leave --part out for the machine; `taut export c` and `taut export st` have the controllers"));
+        }
         if with_controller && design.is_none() {
             let missing = controller(&case).map(|_| ());
             missing.map_err(|error| without_controller(&case, error, "leave --part out for the machine alone"))?;
