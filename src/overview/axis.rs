@@ -81,7 +81,7 @@ fn drive(machine: &Machine, notes: &mut Vec<Note>) -> Group {
     if force > 0.0 {
         let [forward, backward] = [1.0, -1.0].map(|side| machine.breakaway(side, 0.0) / force);
         let row = group.add("breakaway_input", breakaway_name(input), forward, input);
-        row.how("of all bodies together; below it, friction holds");
+        row.how("of all bodies together");
         if (backward - forward).abs() > 1e-3 * forward.abs() {
             group.add("breakaway_input_backward", "the same backward", backward, input);
         }
