@@ -378,7 +378,7 @@ fn a_sweep_that_a_gantry_cannot_have_is_told() {
         ("total.viscous=20%", "`total.viscous` is a sum over the bodies of a single axis, and this is a gantry\n"),
         ("cart.friction.stribeck.force=20%", "`cart.friction.stribeck.force` has no value in this case\n"),
         ("bridge.mass=values(-1 kg)", "-1 kg has to be above zero\n"),
-        ("cart.mass=values(1 s)", "\"1 s\" is a time (s); a mass (kg) is wanted\n"),
+        ("cart.mass=values(1 s)", "\"1 s\" is a time (s); expected a mass (kg)\n"),
     ] {
         let told = told(vary, &[]);
         assert!(told.contains(message), "{vary}: {told}");
@@ -408,7 +408,7 @@ fn a_sweep_that_a_gantry_cannot_have_is_told() {
     assert!(apart.contains("`motor.resistance` is not the same in both drives\n"), "{apart}");
     assert_eq!(
         refused(&["sweep"], &case),
-        "error: stages/h-frame.toml: this case does not say what is varied\n  \
+        "error: stages/h-frame.toml: this case has no parameters to vary\n  \
          next: give for example --runs 1000 --vary cart.mass=20%, or add a table [sweep]\n"
     );
 }

@@ -76,7 +76,7 @@ pub struct Planned {
     pub shortfalls: Vec<Shortfall>,
     /// The references of the file.
     pub references: Vec<Profile>,
-    /// What the plan needs of each limit of the machine, at worst over the family.
+    /// Use of each limit of the machine, worst case over the family.
     pub loads: Vec<Load>,
     /// The least time in which the rigid axis could do it within voltage and current, s; none where nothing limits it, and
     /// of a machine with several drives.
@@ -134,7 +134,7 @@ impl Plans {
     }
 }
 
-/// What the plans of a case have in common.
+/// Data shared by the plans of a case.
 struct Planner<'a> {
     design: &'a Design,
     family: &'a Family,
@@ -207,7 +207,7 @@ impl Planner<'_> {
         Ok(tried)
     }
 
-    /// What a reference, shaper included, needs of each limit at most, over the family.
+    /// Largest use of each limit by references with their shaper, over the family.
     fn loads(&self, profiles: &[Profile], instants: usize) -> Vec<Load> {
         let mut all: Vec<Load> = Vec::new();
         for corner in &self.family.machines {

@@ -64,12 +64,12 @@ pub enum Part {
 }
 
 impl Part {
-    /// Whether the plant is in it.
+    /// True if the plant is in it.
     pub fn has_plant(self) -> bool {
         self != Part::Controller
     }
 
-    /// Whether the controller is in it.
+    /// True if the controller is in it.
     pub fn has_controller(self) -> bool {
         self != Part::Plant
     }
@@ -85,7 +85,7 @@ pub enum Real {
     Double,
 }
 
-/// Wishes beside the target.
+/// Options of an export.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Options {
     /// Which part; none for what the target has by itself.
@@ -192,7 +192,7 @@ fn shaper_note(design: &crate::design::Design) -> Option<String> {
         .then(|| format!("the input shaper of {} impulses is not in it: shape the reference before it", impulses.len()))
 }
 
-/// The same as lines of a comment, with the impulses.
+/// The shaper as lines of a comment, with the impulses.
 fn shaper_remark(design: &crate::design::Design) -> Vec<String> {
     let Some(note) = shaper_note(design) else { return Vec::new() };
     let of = |[time, amplitude]: &[f64; 2]| format!("  {amplitude:?} of the reference {time:?} s ago");

@@ -46,9 +46,7 @@ fn exported_part(word: Option<&str>) -> PyResult<Option<Part>> {
         Some("plant") => Ok(Some(Part::Plant)),
         Some("controller") => Ok(Some(Part::Controller)),
         Some("both") => Ok(Some(Part::Both)),
-        Some(other) => {
-            Err(PyValueError::new_err(format!("part: plant, controller or both is wanted, and no {other:?}")))
-        }
+        Some(other) => Err(PyValueError::new_err(format!("part: expected plant, controller or both, found {other:?}"))),
     }
 }
 
@@ -57,7 +55,7 @@ fn exported_real(word: &str) -> PyResult<Real> {
     match word {
         "float" => Ok(Real::Float),
         "double" => Ok(Real::Double),
-        other => Err(PyValueError::new_err(format!("real: float or double is wanted, and no {other:?}"))),
+        other => Err(PyValueError::new_err(format!("real: expected float or double, found {other:?}"))),
     }
 }
 
@@ -82,7 +80,7 @@ impl Case {
         Ok(Self { inner: Arc::new(inner), path })
     }
 
-    /// The same with changes, each as KEY=VALUE.
+    /// A copy with changes, each as KEY=VALUE.
     fn changed(&self, py: Python<'_>, changes: Vec<String>) -> PyResult<Self> {
         Self::from_text(py, self.path.clone(), self.text(), changes)
     }

@@ -239,7 +239,7 @@ fn one(py: Python<'_>, case: &Arc<Case>, experiment: &Experiment, solver: Solver
 /// The timing of a loop with a controller in Python, where it is not the case's.
 pub type Timing = (Option<f64>, Option<f64>, Option<f64>);
 
-/// Whether it is a list of controllers, one for each drive.
+/// True if it is a list of controllers, one for each drive.
 fn is_several(object: &Bound<'_, PyAny>) -> bool {
     object.is_instance_of::<PyList>() || object.is_instance_of::<PyTuple>()
 }

@@ -27,7 +27,7 @@ impl Picture {
         }
     }
 
-    /// The same as a PNG, at twice the size on white.
+    /// The picture as a PNG, at twice the size on white.
     ///
     /// # Errors
     ///

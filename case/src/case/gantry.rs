@@ -207,10 +207,7 @@ pub(super) fn inputs(experiment: &Table, gantry: &Machine, context: &input::Cont
     let sides = ["left", "right"];
     if let Some(key) = inputs.keys().find(|key| !sides.contains(key)) {
         let field = inputs.optional(key).unwrap_or_else(|| inputs.field.clone());
-        return Err(field
-            .fail(format!("a gantry has two inputs, and `{key}` is none of them"))
-            .allowed("left, right")
-            .next(such_as));
+        return Err(field.fail(format!("`{key}` is not an input of a gantry")).allowed("left, right").next(such_as));
     }
     let signal = |(side, unit): (&str, &DriveUnit)| match inputs.optional(side) {
         None => Ok(Signal::Step { value: 0.0, at: 0.0 }),

@@ -19,7 +19,7 @@ pub struct Move {
     pub name: String,
     /// The reference of each coordinate: that of the cart of an axis, those of bridge and cart of a gantry.
     pub profiles: Vec<Profile>,
-    /// Whether its limits are those of a plan of the machine, and not numbers of the file.
+    /// True if its limits are those of a plan of the machine, and not numbers of the file.
     pub is_planned: bool,
     /// End of the run, s.
     pub until: f64,
@@ -60,7 +60,7 @@ pub(super) fn moves(root: &Table, machine: &Machine, design: Option<&Design>) ->
     let Some(field) = root.optional("move") else { return Ok(Vec::new()) };
     if field.is_table() {
         return Err(field
-            .fail("a list of tables is wanted")
+            .fail("expected a list of tables")
             .next("write [[move]] with double brackets: there can be several"));
     }
     let Some(design) = design else {
@@ -182,7 +182,7 @@ fn planned(table: &Table, field: &Field, from: &[f64], machine: &Machine, design
     let any = Limits { speed: 1.0, acceleration: 1.0, jerk: None, snap: None };
     let told = |error: Error| Error { place: field.fail("").place, ..error };
     let profiles = profiles(table, machine, from, &any).map_err(told)?;
-    let way = Way::of(&profiles).ok_or_else(|| field.fail("a move that goes nowhere has no plan"))?;
+    let way = Way::of(&profiles).ok_or_else(|| field.fail("a move without a stroke has no plan"))?;
     let modes = modes(machine);
     let quickest = Quickest { machine, design, modes: &modes, wanted: &wanted };
     quickest.check(&way).map_err(told)?;
@@ -191,7 +191,7 @@ fn planned(table: &Table, field: &Field, from: &[f64], machine: &Machine, design
             return Ok(limits);
         }
     }
-    Err(field.fail("there is no plan: what is left of voltage and current does not accelerate the machine"))
+    Err(field.fail("there is no plan: the remaining voltage and current do not accelerate the machine"))
 }
 
 fn limits(table: &Table) -> Result<Limits> {

@@ -16,7 +16,7 @@ pub(super) struct Sampled<'a, 'c> {
     /// Weights of the coordinates in the position of each drive along the belt.
     shares: Vec<&'static [f64]>,
     clocked: Clocked,
-    /// What each drive was told.
+    /// Last command of each drive.
     pub(super) told: [Told; DRIVES],
     /// End of the run, s.
     until: f64,

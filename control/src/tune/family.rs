@@ -70,7 +70,7 @@ pub struct Family {
     pub loads: Vec<f64>,
     /// The axis of the file with each load, and a Latin hypercube of axes that can be.
     pub machines: Vec<Corner>,
-    /// Whether all parameters may be at their ends at once.
+    /// True if all parameters may be at their ends at once.
     pub corners: bool,
 }
 
@@ -86,7 +86,7 @@ pub enum Source {
 }
 
 impl Family {
-    /// That of a case. Its machines are a Latin hypercube: within a spread all values are as likely, within the
+    /// Family of a case. Its machines are a Latin hypercube: within a spread all values are as likely, within the
     /// interval of a fit they are normal; what was never fitted is off by the default spread. With `tuning.corners` the worst corner of all intervals joins them.
     pub fn of(case: &Case, tuning: &Tuning) -> Result<Self> {
         if let Some(file) = &tuning.draws {
@@ -121,11 +121,11 @@ impl Family {
         Ok(family)
     }
 
-    /// That of the draws of a posterior: machines that the logs allow, with what they say of parameters together, at
-    /// places and with loads that are drawn.
+    /// Family from the draws of a posterior: machines that the logs allow, with what they say of parameters together,
+    /// at places and with loads that are drawn.
     fn of_draws(case: &Case, tuning: &Tuning, file: &Path) -> Result<Self> {
         let plan = case.fit.as_ref().ok_or_else(|| {
-            Error::new("draws are of what a fit searched for, and this case has no [fit]")
+            Error::new("draws belong to the parameters of a fit, and this case has no [fit]")
                 .in_file(file)
                 .next("use --draws with the fitted.toml of the same folder, or with the case that was fitted")
         })?;

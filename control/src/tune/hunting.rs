@@ -58,7 +58,7 @@ pub struct Hunt {
     /// Time from one slip, or burst of slips, to the next of an axis that is stuck between them, s: half of the time it
     /// stands in spells of at least that length. Infinite where it swings all the time.
     pub slips_every: f64,
-    /// Whether intervals from one swing to the next differ by more than a quarter of their mean.
+    /// True if intervals from one swing to the next differ by more than a quarter of their mean.
     pub irregular: bool,
     /// Without each of these it comes to rest.
     pub needs: Vec<&'static str>,

@@ -65,7 +65,7 @@ pub(super) struct Open<const N: usize> {
     /// The adjugate of Δ, and det Δ: det (1 + L), times what has stable poles.
     adjugate: Square<N>,
     pub difference: Complex<f64>,
-    /// Whether the position loop is closed at a scale.
+    /// True if the position loop is closed at a scale.
     has_scale: bool,
     /// The positions of what slides per position that follows the reference, and per step beside the command.
     slides: Square<N>,
@@ -151,7 +151,7 @@ impl<const N: usize> Open<N> {
         self.slides * (self.closed(self.outer())[1] / self.difference) * self.shares
     }
 
-    /// Whether `other` is turned by more than `most` from this in any of the loops.
+    /// True if `other` is turned by more than `most` from this in any of the loops.
     pub fn turns(&self, other: &Self, breaks: &[Break], most: f64) -> bool {
         let turns = |a: Complex<f64>, b: Complex<f64>| (b / a).arg().abs() > most;
         turns(self.difference, other.difference)

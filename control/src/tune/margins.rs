@@ -62,7 +62,7 @@ pub struct Breaks {
 /// The margins of a sampled loop, each at the break at which it is worst.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Margins {
-    /// Whether every pole of the closed loop lies within the unit circle, by Nyquist's criterion.
+    /// True if every pole of the closed loop lies within the unit circle, by Nyquist's criterion.
     pub stable: bool,
     /// M_s = max |S|, S = 1/(1 + L); infinite if it is not stable.
     pub sensitivity: f64,
@@ -78,7 +78,7 @@ pub struct Margins {
     pub phase: f64,
     /// Where these are worst.
     pub breaks: Breaks,
-    /// Whether the loop is the same wherever it is broken: the controller of a drive uses a single measurement.
+    /// True if the loop is the same wherever it is broken: the controller of a drive uses a single measurement.
     pub has_one_loop: bool,
     /// The kind of machine, whose drives these are.
     pub kind: Kind,
@@ -117,7 +117,7 @@ impl Margins {
         margins
     }
 
-    /// Those of a loop that is not stable.
+    /// Sets the margins of an unstable loop.
     fn spoil(&mut self) {
         (self.sensitivity, self.complementary) = (f64::INFINITY, f64::INFINITY);
         (self.gain, self.phase) = (1.0, 0.0);
@@ -156,7 +156,7 @@ impl Peaks {
         Self { peaks: if is_stable { peaks } else { [f64::INFINITY; 2] } }
     }
 
-    /// Whether the loop is stable.
+    /// True if the loop is stable.
     pub fn is_stable(&self) -> bool {
         self.peaks[0].is_finite()
     }
@@ -270,7 +270,7 @@ impl<'a, const N: usize> Curve<'a, N> {
         self.points = done;
     }
 
-    /// Whether the closed loop is stable.
+    /// True if the closed loop is stable.
     fn is_stable(&self) -> bool {
         let mut winding = Winding::new(self.plant, self.feedback, N);
         for (omega, open) in &self.points {

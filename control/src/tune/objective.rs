@@ -68,7 +68,7 @@ pub(super) struct Runner {
 }
 
 impl Runner {
-    /// That of a design for a model of the axis.
+    /// Objective of a design for a model of the axis.
     pub fn new(model: &Machine, design: &Design) -> Result<Self> {
         Ok(Self { controllers: Standard::of_drives(design, model)?, timing: Loop::of(design) })
     }
@@ -82,7 +82,7 @@ impl Runner {
         Ok(figures_of(&figures, ending, motion))
     }
 
-    /// The same at samples alone, in a third of the time.
+    /// Figures of a move at samples only, in a third of the time.
     pub fn glance(&mut self, machine: &Machine, motion: &Move, shaped: &[Profile]) -> Result<MoveFigures> {
         let seen = (motion.until, motion.window);
         let (figures, ending) =

@@ -34,7 +34,7 @@ pub(super) struct Answer<const N: usize> {
 pub struct Plant {
     /// ω, rad/s, up to half the sampling rate.
     pub frequency: Vec<f64>,
-    /// The same frequencies as a sampled loop sees them.
+    /// The frequencies in terms of the sampled loop.
     turns: Vec<Turn>,
     pub(super) every: f64,
     /// Poles outside the unit circle.

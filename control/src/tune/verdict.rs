@@ -191,7 +191,7 @@ impl Work<'_> {
     }
 }
 
-/// Whether a controller is better than the one before: not if any figure of a move is worse.
+/// Judges a controller against the one before: worse if any figure of a move is worse.
 pub(super) fn compare(before: &Verdict, after: &Verdict) -> Judgement {
     if before.design == after.design {
         return Judgement::Unchanged;

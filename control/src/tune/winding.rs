@@ -51,7 +51,7 @@ impl Winding {
         self.now = is;
     }
 
-    /// Whether no pole of the closed loop is outside.
+    /// True if no pole of the closed loop is outside.
     pub fn is_stable(&self) -> bool {
         let arg = |v: Complex<f64>| (v.im + 0.0).atan2(v.re);
         // It begins on the real axis.

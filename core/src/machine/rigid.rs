@@ -34,7 +34,8 @@ pub struct Rigid {
 }
 
 impl Rigid {
-    /// That of an axis; of a machine with several drives what each of them moves where all move what is heaviest to move.
+    /// That of an axis; of a machine with several drives what each of them moves where all move what is heaviest to
+    /// move.
     pub fn of(machine: &Machine) -> Self {
         if machine.drives.len() == 1 {
             return Self::of_drive(machine, 0);
@@ -59,7 +60,7 @@ impl Rigid {
         }
     }
 
-    /// The same with the motor of this drive.
+    /// Rigid model of an axis with the motor of this drive.
     fn of_drive(machine: &Machine, drive: usize) -> Self {
         let DriveUnit { motor, amplifier } = &machine.drives[drive];
         let (r, n) = (machine.pulley_radius, motor.gear_ratio);
@@ -100,7 +101,7 @@ impl Rigid {
         }
     }
 
-    /// What slides as a mass of its own, with its friction and its constant force; a motor moves it by nothing.
+    /// A slide as a mass with its friction and constant force, without a motor.
     pub fn of_slide(machine: &Machine, number: usize) -> Option<Self> {
         let (slide, at) = machine.slides().zip(machine.geometry().slides).nth(number)?;
         let sides = [true, false].map(|forward| slide.friction.side(forward));
@@ -120,7 +121,7 @@ impl Rigid {
         self.electrical_by(&mut Run::plain(), force, rate, speed)
     }
 
-    /// The same by any calculator.
+    /// As the function without `_by`, for any calculator.
     pub fn electrical_by<C: Calculator>(&self, c: &mut C, force: C::N, rate: C::N, speed: C::N) -> (C::N, C::N) {
         let force = c.name("force", force);
         let per_ampere = self.per_ampere(c, force, speed);
@@ -150,7 +151,7 @@ impl Rigid {
         self.command_by(&mut Run::plain(), force, rate, speed)
     }
 
-    /// The same by any calculator.
+    /// As the function without `_by`, for any calculator.
     pub fn command_by<C: Calculator>(&self, c: &mut C, force: C::N, rate: C::N, speed: C::N) -> C::N {
         let (current, voltage) = self.electrical_by(c, force, rate, speed);
         match self.mode {
@@ -178,7 +179,7 @@ impl Rigid {
         self.friction_by(&mut Run::plain(), speed, sign)
     }
 
-    /// The same by any calculator.
+    /// As the function without `_by`, for any calculator.
     pub fn friction_by<C: Calculator>(&self, c: &mut C, speed: C::N, sign: C::N) -> (C::N, C::N) {
         let [viscous, coulomb] = [self.viscous, self.coulomb].map(|both| side(c, sign, both));
         (speed * viscous, sign * coulomb)

@@ -1,4 +1,4 @@
-//! Whether the machine can follow a reference: what that needs of motor, amplifier, belt and travel, and their limits.
+//! Feasibility of a reference: the requirements on motor, amplifier, belt and travel, and their limits.
 
 use super::compensation::{Compensation, direction};
 use super::forward::Forward;
@@ -20,9 +20,9 @@ pub struct Shortfall {
     pub time: f64,
     /// Where the reference is then, m; of a machine with several drives that of the drive's part of the belt.
     pub position: f64,
-    /// How much is needed, in `unit`.
+    /// Requirement, in `unit`.
     pub needed: f64,
-    /// How much there is.
+    /// Limit.
     pub allowed: f64,
     /// V, A, N or m.
     pub unit: &'static str,
@@ -58,14 +58,14 @@ pub struct Load {
     pub limit: &'static str,
     /// V, A or N.
     pub unit: &'static str,
-    /// How much is needed at most.
+    /// Largest requirement.
     pub needed: f64,
-    /// How much there is.
+    /// Limit.
     pub allowed: f64,
 }
 
 impl Load {
-    /// What is needed as a share of what there is.
+    /// Requirement divided by the limit.
     pub fn share(&self) -> f64 {
         self.needed / self.allowed
     }
@@ -79,7 +79,7 @@ impl Load {
         }
     }
 
-    /// Whether the motor's supply bounds it, of which a loop needs some for itself.
+    /// True if the motor's supply bounds it, of which a loop needs some for itself.
     pub fn is_electrical(&self) -> bool {
         ["V", "A"].contains(&self.unit)
     }

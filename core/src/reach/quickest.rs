@@ -8,9 +8,9 @@ use crate::error::{Error, Result};
 use crate::machine::{BeltModel, Machine};
 use crate::signal::profile::{Leg, Limits, Profile};
 
-/// Instants of a reference that are looked at during a search.
+/// Number of instants of a reference that a search evaluates.
 pub const INSTANTS: usize = 160;
-/// The same where a plan is checked.
+/// Number of instants at which a plan is checked.
 pub const CLOSELY: usize = 4000;
 
 /// Cruising speeds that are tried, by a grid and then by golden section, and bisections of the acceleration.
@@ -76,7 +76,7 @@ pub fn modes(machine: &Machine) -> Vec<f64> {
 /// A move from stroke to stroke, without its limits.
 #[derive(Debug, Clone)]
 pub struct Way {
-    /// Where it begins, m, a position of each coordinate.
+    /// Start position of each coordinate, m.
     pub start: Vec<f64>,
     /// Rest before each stroke (s), and its target (m).
     pub strokes: Vec<(f64, Vec<f64>)>,
@@ -108,7 +108,7 @@ impl Way {
         Some(Self { start, strokes, shortest, longest })
     }
 
-    /// The same way within these limits along it.
+    /// Profiles over this path within these limits along it.
     pub fn within(&self, limits: &Limits) -> Result<Vec<Profile>> {
         let legs = self.strokes.iter().flat_map(|(rest, to)| {
             let wait = (*rest > 1e-12).then_some(Leg::Wait(*rest));
@@ -269,7 +269,7 @@ impl Quickest<'_> {
         Some(Limits { speed, ..limits })
     }
 
-    /// Whether a move within these limits takes no more than this share of each limit of the machine.
+    /// True if a move within these limits takes no more than this share of each limit of the machine.
     fn is_within(&self, way: &Way, limits: &Limits, share: f64) -> bool {
         let Ok(profiles) = way.within(limits) else { return false };
         let loads = loads(self.machine, self.design.limit, &self.shaped(profiles), INSTANTS);

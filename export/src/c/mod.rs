@@ -12,7 +12,7 @@ pub(super) fn export(case: &Case, part: Part, stem: &str, options: &Options) -> 
     named(case, part, (stem, &identifier(stem)), options)
 }
 
-/// The same with names that begin so.
+/// C source whose names begin with `stem`.
 pub(super) fn named(case: &Case, part: Part, (stem, name): (&str, &str), options: &Options) -> Result<Exported> {
     let writer = Writer { name: name.to_string(), real: options.real, local: "" };
     let (mut header, mut source) = (String::new(), String::new());
