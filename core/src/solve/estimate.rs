@@ -19,9 +19,9 @@ const MOST_ROWS: u64 = 1000;
 /// The tolerance of the second run, as a multiple of the first one's.
 const FACTOR: f64 = 100.0;
 
-/// Rows of the second run for each that is compared: not a power of two, so that none of its steps, which are halves and
-/// doubles of its output interval, is as long as one of the first run.
-const ROWS: u64 = 3;
+/// Rows of the second run for each that is compared, to choose from. Steps are halves and doubles of a run's output
+/// interval: where the two intervals differ by a power of two, both runs take the same steps.
+const ROWS: [u64; 3] = [3, 2, 5];
 
 /// The estimate as a multiple of what the two runs differ by, and its least value as a share of the tolerance: where
 /// neither run's steps are limited by the tolerance (corners of a friction curve, of a line along the travel), both are
@@ -137,7 +137,7 @@ impl ErrorEstimate {
         outcome: &Outcome,
         flow: &mut dyn FnMut() -> Flow,
     ) -> Result<Option<PositionError>> {
-        let every = course.every * self.stride as f64 / ROWS as f64;
+        let every = course.every * self.stride as f64 / rows_between(self.stride) as f64;
         let mut start = Start { state: course.start, until: course.until, every, noise: NOISE };
         let state = &mut start.state;
         let values = state.position.iter_mut().chain(&mut state.speed).chain(&mut state.current);
@@ -195,6 +195,13 @@ impl ErrorEstimate {
     }
 }
 
+/// Rows of the second run for each that is compared, where one of so many rows of the first run is: the intervals of the
+/// two, n and m, are as far as possible from each other's halves and doubles, log₂(n/m) from every whole number.
+fn rows_between(stride: u64) -> u64 {
+    let off = |rows: &u64| ((stride as f64 / *rows as f64).log2().rem_euclid(1.0) - 0.5).abs();
+    ROWS.into_iter().min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(ROWS[0])
+}
+
 /// Whether two runs end in the same way; one that was asked to stop says nothing of another.
 fn ends_alike(first: Ending, second: Ending) -> bool {
     let is_stopped = |ending| matches!(ending, Ending::Interrupted { .. });
@@ -222,4 +229,20 @@ fn columns<'a>(ways: &[(String, f64)], block: &'a Trajectory) -> Vec<Way<'a>> {
 fn coarser(tolerance: f64) -> Solver {
     let coarse = if FACTOR * tolerance <= 1e-2 { FACTOR * tolerance } else { tolerance / FACTOR };
     Solver::General { tolerance: coarse }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::rows_between;
+
+    /// Where every third row was compared, both runs had the same interval, the same steps, and the same errors.
+    #[test]
+    fn the_second_run_never_had_the_steps_of_the_first() {
+        assert_eq!(rows_between(1), 3);
+        for stride in 1..10_000 {
+            let ratio = stride as f64 / rows_between(stride) as f64;
+            let nearest = ratio.log2().round().exp2();
+            assert!((ratio / nearest).log2().abs() > 0.25, "{ratio} at every {stride}th row");
+        }
+    }
 }
