@@ -117,14 +117,15 @@ impl Hunt {
                 "--longest" => hunt.longest = number()?,
                 _ => return Err(format!("{word} is not known")),
             }
-            match word {
-                "--stages" => sized.push(Part::Stages),
-                "--pairs" => sized.push(Part::Pairs),
-                "--seconds" => sized.push(Part::Readers),
-                "--kills" => sized.push(Part::Faults),
-                "--mutants" | "--only" => sized.push(Part::Mutants),
-                _ => {}
-            }
+            let part = match word {
+                "--stages" => Some(Part::Stages),
+                "--pairs" => Some(Part::Pairs),
+                "--seconds" => Some(Part::Readers),
+                "--kills" => Some(Part::Faults),
+                "--mutants" | "--only" => Some(Part::Mutants),
+                _ => None,
+            };
+            sized.extend(part.filter(|part| !sized.contains(part)));
         }
         if hunt.parts.is_empty() {
             hunt.parts = sized;
@@ -181,6 +182,8 @@ mod tests {
         assert!(Hunt::new(&["--stages", "5", "--seed", "3"]).unwrap().parts == [Part::Stages]);
         assert_eq!(Hunt::new(&[]).unwrap().parts.len(), 4);
         assert!(Hunt::new(&["--pairs", "5"]).unwrap().parts == [Part::Pairs]);
+        let hunt = Hunt::new(&["--mutants", "5", "--threads", "0", "--longest", "6", "--only", "2"]).unwrap();
+        assert!(hunt.parts == [Part::Mutants] && hunt.threads == Some(1) && hunt.longest == 6);
         assert_eq!(Hunt::new(&["--part", "others"]).err().unwrap(), "there is no part others");
         assert_eq!(Hunt::new(&["--stages", "many"]).err().unwrap(), "--stages wants a whole number, not many");
         assert_eq!(Hunt::new(&["--seed"]).err().unwrap(), "--seed wants a value");
