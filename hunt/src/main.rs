@@ -131,7 +131,7 @@ impl Stages {
             return ExitCode::SUCCESS;
         }
         let stop = Arc::new(AtomicBool::new(false));
-        // Ctrl-C and SIGTERM end it after the stages under way; what is done is shown.
+        // Ctrl-C and SIGTERM end it; what is done is shown.
         for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
             let _ = signal_hook::flag::register(signal, Arc::clone(&stop));
         }

@@ -39,20 +39,17 @@ pub fn on(k: usize) -> bool {
 const LIBRARY: &str = "core/src/lib.rs";
 const SWITCHES: &str = "core/src/mutant.rs";
 
-/// The features that the library is built with.
-const FEATURES: &str = "json,parquet";
-
-/// The programs of tests: name, arguments of cargo. `lib`, `core`, `case`, `control`, `identify` and
-/// `export` are the tests within the crates of the library, `all` those beside it, `hunt`
-/// those of the small hunt, `fmu` those of the shared object.
+/// The programs of tests: name, arguments of cargo. `lib`, `core`, `case`, `control`, `identify` and `export` are the
+/// tests within the crates of the library, `all` those beside it, `hunt` those of the small hunt, `fmu` those of the
+/// shared object. All take the library without features, so that it is built once; JSON and Parquet are in no area.
 const PROGRAMS: [(&str, &[&str]); 9] = [
-    ("lib", &["--package", "taut", "--features", FEATURES, "--lib"]),
+    ("lib", &["--package", "taut", "--lib"]),
     ("core", &["--package", "taut-core", "--lib"]),
     ("case", &["--package", "taut-case", "--lib"]),
     ("control", &["--package", "taut-control", "--lib"]),
     ("identify", &["--package", "taut-identify", "--lib"]),
     ("export", &["--package", "taut-export", "--lib"]),
-    ("all", &["--package", "taut", "--features", FEATURES, "--test", "all"]),
+    ("all", &["--package", "taut", "--test", "all"]),
     ("hunt", &["--package", "taut-hunt", "--test", "small"]),
     ("fmu", &["--package", "taut-fmu", "--test", "all"]),
 ];
@@ -191,7 +188,7 @@ impl Tree {
     /// Where the compiler finds errors.
     fn errors(&self) -> Result<Vec<(String, Range<usize>)>, String> {
         let output = self
-            .cargo(&["check", "--package", "taut", "--features", FEATURES, "--lib"])
+            .cargo(&["check", "--package", "taut", "--lib"])
             .output()
             .map_err(|error| format!("cargo cannot be started: {error}"))?;
         let mut errors = Vec::new();
