@@ -349,7 +349,7 @@ mod tests {
     #[test]
     fn a_stop_is_as_uncertain_as_the_speeds_before_it() {
         let mut core = sliding();
-        core.go_on_to(0.29, &mut Vec::new()).unwrap();
+        (1..=29).for_each(|row| core.go_on_to(1e-2 * f64::from(row), &mut Vec::new()).unwrap());
         core.carry_errors();
         let place = core.common.space.layout.speed[0];
         assert!((core.z[place] - 0.01).abs() < 1e-12, "{}", core.z[place]);
