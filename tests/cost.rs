@@ -2,7 +2,6 @@
 
 use crate::common;
 use common::experiment;
-use taut::friction::Law;
 use taut::machine::{GearPlay, Machine};
 use taut::signal::Signal;
 use taut::solve::{Cost, Solver, simulate};
@@ -53,17 +52,4 @@ fn limits_and_a_gear_with_play_cost_more() {
     let zero = Cost { samples: 1001, pieces: 3, modes: 21, ..Cost::default() };
     costs(&machine, Solver::Exact, Cost { propagators: 46, steps: 1287, looks: 995, series: 118, ..zero });
     costs(&machine, Solver::GENERAL, Cost { propagators: 34, steps: 1272, looks: 193, evaluations: 1272, ..zero });
-}
-
-/// Where a force is steep, Newton's method solves a step: each evaluation squares what is left of its error. With a
-/// slope that is not the derivative it needs several times as many, or shorter steps.
-#[test]
-fn steep_forces_cost_few_evaluations_for_each_step() {
-    let bristles = Law::LuGre { velocity: 1e-2, stiffness: 1e6, damping: 300.0 };
-    for (law, most) in [(bristles, 4), (Law::Smooth { breakaway_velocity: 1e-4 }, 4)] {
-        let mut machine = common::table4();
-        machine.cart.friction.law = law;
-        let cost = cost(&machine, Solver::GENERAL);
-        assert!(cost.evaluations <= most * cost.steps, "{law:?}: {cost:?}");
-    }
 }

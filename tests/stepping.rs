@@ -266,16 +266,3 @@ fn a_run_that_is_finished_early_was_called_complete() {
         assert!(rows <= 101, "{rows} rows");
     }
 }
-
-/// A machine that is stepped from outside has no end: it may be so fast that a run of a second would need too many steps.
-#[test]
-fn a_machine_too_fast_for_a_long_run_is_stepped_for_a_short_time() {
-    let mut case = Case::from_text("axis.toml", taut::case::TEMPLATE).unwrap();
-    case.machine.drives[0].motor.inductance = 1e-12 * case.machine.drives[0].motor.resistance;
-    let error = simulate(&case.machine, &case.experiments[0], Solver::GENERAL).err().unwrap().to_string();
-    assert!(error.contains("would need some"), "{error}");
-    let mut machine = Simulator::new(&case.machine, Solver::GENERAL).unwrap();
-    machine.set_input(0, &Signal::Step { value: 1.0, at: 0.0 }.piece(0.0)).unwrap();
-    machine.advance(1e-10, &mut Vec::new()).unwrap();
-    assert_eq!(machine.time(), 1e-10);
-}
