@@ -195,8 +195,8 @@ impl ErrorEstimate {
     }
 }
 
-/// Rows of the second run for each that is compared, where one of so many rows of the first run is: the intervals of the
-/// two, n and m, are as far as possible from each other's halves and doubles, log₂(n/m) from every whole number.
+/// Rows of the second run for each that is compared, where the first run has `stride` rows for each: log₂ of the ratio
+/// of the two numbers is as far as possible from a whole number.
 fn rows_between(stride: u64) -> u64 {
     let off = |rows: &u64| ((stride as f64 / *rows as f64).log2().rem_euclid(1.0) - 0.5).abs();
     ROWS.into_iter().min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(ROWS[0])
