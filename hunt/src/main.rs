@@ -131,8 +131,10 @@ impl Stages {
             return ExitCode::SUCCESS;
         }
         let stop = Arc::new(AtomicBool::new(false));
-        // Ctrl-C ends it after the stages under way; what is done is shown.
-        let _ = signal_hook::flag::register(signal_hook::consts::SIGINT, Arc::clone(&stop));
+        // Ctrl-C and SIGTERM end it; what is done is shown.
+        for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
+            let _ = signal_hook::flag::register(signal, Arc::clone(&stop));
+        }
         let processors = std::thread::available_parallelism().map_or(1, usize::from);
         let threads = self.threads.unwrap_or(processors).clamp(1, 256);
         let hunt = Hunt {

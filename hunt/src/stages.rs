@@ -28,7 +28,7 @@ pub struct Hunt {
     pub threads: usize,
     /// True if to tell on the way how far it is.
     pub progress: bool,
-    /// Ends it early.
+    /// Ends it early; cases under way do not count.
     pub stop: Arc<AtomicBool>,
     /// The features that are drawn.
     pub drawing: Drawing,
@@ -104,6 +104,10 @@ impl Hunt {
                                 Drawing::Pairs => pair(self.seed, number),
                             };
                             *lock(busy) = None;
+                            // The signal that ends the hunt ends its compilers and programs, too.
+                            if self.stop.load(Ordering::Relaxed) {
+                                break;
+                            }
                             done.fetch_add(1, Ordering::Relaxed);
                             let faults = outcome.compared.iter().filter(|c| c.verdict.is_unexplained()).count();
                             unexplained.fetch_add(faults, Ordering::Relaxed);

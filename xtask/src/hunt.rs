@@ -6,6 +6,8 @@ mod mutants;
 mod readers;
 mod stages;
 
+use std::time::Duration;
+
 /// The hunt that is asked for.
 pub struct Hunt {
     parts: Vec<Part>,
@@ -28,9 +30,11 @@ pub struct Hunt {
     only: Vec<usize>,
     /// True if they are shown, and not run.
     list: bool,
-    /// Threads of the stages, all processors unless said.
+    /// Threads of the stages, all processors unless given; changes and tests tried side by side, two unless given.
     threads: Option<u64>,
-    /// True if the stages are told as JSON.
+    /// Tests of changes that take longer are left out, s.
+    longest: u64,
+    /// Whether the stages are told as JSON.
     json: bool,
 }
 
@@ -53,8 +57,8 @@ const PARTS: [(&str, Part); 5] = [
 ];
 
 pub const USAGE: &str = "cargo xtask hunt [--part stages|pairs|readers|faults|mutants]... [--seed S]
-                       [--stages N [--threads N] [--json]] [--pairs N] [--seconds B] [--kills N]
-                       [--mutants N [--area FOLDER]... [--tests NAME]... [--list | --only K...]]";
+                       [--threads N] [--stages N [--json]] [--pairs N] [--seconds B] [--kills N]
+                       [--mutants N [--area FOLDER]... [--tests NAME]... [--longest S] [--list | --only K...]]";
 
 impl Hunt {
     /// From the words behind `hunt`. The size of a part names it, too; without any all parts but the mutants, which
@@ -73,6 +77,7 @@ impl Hunt {
             only: Vec::new(),
             list: false,
             threads: None,
+            longest: 120,
             json: false,
         };
         let mut sized = Vec::new();
@@ -108,17 +113,19 @@ impl Hunt {
                 "--kills" => hunt.kills = number()?,
                 "--mutants" => hunt.mutants = number()? as usize,
                 "--only" => hunt.only.push(number()? as usize),
-                "--threads" => hunt.threads = Some(number()?),
+                "--threads" => hunt.threads = Some(number()?.clamp(1, 256)),
+                "--longest" => hunt.longest = number()?,
                 _ => return Err(format!("{word} is not known")),
             }
-            match word {
-                "--stages" => sized.push(Part::Stages),
-                "--pairs" => sized.push(Part::Pairs),
-                "--seconds" => sized.push(Part::Readers),
-                "--kills" => sized.push(Part::Faults),
-                "--mutants" | "--only" => sized.push(Part::Mutants),
-                _ => {}
-            }
+            let part = match word {
+                "--stages" => Some(Part::Stages),
+                "--pairs" => Some(Part::Pairs),
+                "--seconds" => Some(Part::Readers),
+                "--kills" => Some(Part::Faults),
+                "--mutants" | "--only" => Some(Part::Mutants),
+                _ => None,
+            };
+            sized.extend(part.filter(|part| !sized.contains(part)));
         }
         if hunt.parts.is_empty() {
             hunt.parts = sized;
@@ -139,7 +146,17 @@ impl Hunt {
                 Part::Readers => readers::run(self.seconds, self.seed),
                 Part::Faults => faults::run(self.kills, self.seed),
                 Part::Mutants => {
-                    mutants::run(self.mutants, self.seed, (&self.areas, &self.tests), &self.only, self.list)
+                    let wanted = mutants::Wanted {
+                        count: self.mutants,
+                        seed: self.seed,
+                        areas: &self.areas,
+                        programs: &self.tests,
+                        only: &self.only,
+                        longest: Duration::from_secs(self.longest),
+                        threads: self.threads.unwrap_or(2) as usize,
+                        list: self.list,
+                    };
+                    mutants::run(&wanted)
                 }
             };
             found.extend(done.err());
@@ -165,6 +182,8 @@ mod tests {
         assert!(Hunt::new(&["--stages", "5", "--seed", "3"]).unwrap().parts == [Part::Stages]);
         assert_eq!(Hunt::new(&[]).unwrap().parts.len(), 4);
         assert!(Hunt::new(&["--pairs", "5"]).unwrap().parts == [Part::Pairs]);
+        let hunt = Hunt::new(&["--mutants", "5", "--threads", "0", "--longest", "6", "--only", "2"]).unwrap();
+        assert!(hunt.parts == [Part::Mutants] && hunt.threads == Some(1) && hunt.longest == 6);
         assert_eq!(Hunt::new(&["--part", "others"]).err().unwrap(), "there is no part others");
         assert_eq!(Hunt::new(&["--stages", "many"]).err().unwrap(), "--stages wants a whole number, not many");
         assert_eq!(Hunt::new(&["--seed"]).err().unwrap(), "--seed wants a value");

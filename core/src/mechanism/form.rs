@@ -162,3 +162,64 @@ impl Sub for Form {
         self + -other
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::chance::uniform;
+    use crate::mechanism::{Body, Kind, Label, Spring, SpringLaw};
+    use rand_pcg::Pcg64;
+
+    /// Two bodies on a spring.
+    fn mechanism() -> Mechanism {
+        let label = Label { key: "part", name: "part" };
+        let body = |index: usize| Body {
+            label,
+            kind: Kind::Linear,
+            inertia: 1.0,
+            friction: Default::default(),
+            force: 0.0,
+            along: None,
+            leader: (index, 1.0),
+            is_rotor: false,
+        };
+        let arms = vec![(0, 1.0), (1, -1.0)];
+        let spring = Spring { label, arms, stiffness: 1e4, damping: 0.0, law: SpringLaw::TwoSided, follows: None };
+        Mechanism::new(vec![body(0), body(1)], vec![spring], Vec::new())
+    }
+
+    /// The remainder of parts that cancel is rounding, at most the noise, whichever of them takes off the others.
+    #[test]
+    fn noise_is_at_least_the_remainder_of_parts_that_cancel() {
+        let layout = Layout::new(&mechanism());
+        let mut random = Pcg64::new(11, 1);
+        let mut number = || (uniform(&mut random) - 0.5) * 10.0_f64.powf(8.0 * uniform(&mut random) - 4.0);
+        let mut rounded = 0;
+        for part in (0..5).cycle().take(2000) {
+            let mut inner = State::default();
+            inner.position[..2].copy_from_slice(&[number(), number()]);
+            inner.speed[..2].copy_from_slice(&[number(), number()]);
+            inner.current[0] = number();
+            let mut input = [0.0; DRIVES];
+            input[0] = number();
+            let mut form = Form::ZERO;
+            form.stretch[0] = number();
+            form.speed[..2].copy_from_slice(&[number(), number()]);
+            (form.current[0], form.input[0], form.constant) = (number(), number(), number());
+            // One part takes off what the others add up to.
+            let (place, value): (fn(&mut Form) -> &mut f64, f64) = match part {
+                0 => (|form| &mut form.stretch[0], layout.stretches(&inner)[0]),
+                1 => (|form| &mut form.speed[0], inner.speed[0]),
+                2 => (|form| &mut form.current[0], inner.current[0]),
+                3 => (|form| &mut form.input[0], input[0]),
+                _ => (|form| &mut form.constant, 1.0),
+            };
+            *place(&mut form) = 0.0;
+            *place(&mut form) = -layout.value(&form, &inner, &input) / value;
+            let (left, noise) = (layout.value(&form, &inner, &input).abs(), form.noise(&layout, &inner, &input));
+            assert!(left <= noise, "{part}: {left:e} remains, the noise is {noise:e}");
+            rounded += usize::from(left > 0.0);
+        }
+        assert!(rounded > 500);
+    }
+}

@@ -9,9 +9,9 @@ mod copy;
 
 use change::Change;
 use copy::{Ended, Test, Tree};
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::time::Instant;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
 
 /// The places that are changed.
 const AREAS: [&str; 8] = [
@@ -25,70 +25,117 @@ const AREAS: [&str; 8] = [
     "export/src",
 ];
 
-/// Changes and tests tried side by side.
-const WORKERS: usize = 2;
+/// Which changes are tried, and how.
+pub struct Wanted<'a> {
+    pub count: usize,
+    pub seed: u64,
+    /// Folders that are changed; all areas where none is named.
+    pub areas: &'a [String],
+    /// Programs of tests; all where none is named.
+    pub programs: &'a [String],
+    /// Numbers of the changes; all where none is named.
+    pub only: &'a [usize],
+    /// Tests that take longer without a change are left out.
+    pub longest: Duration,
+    /// Changes and tests tried side by side.
+    pub threads: usize,
+    /// Shows the changes and tries none.
+    pub list: bool,
+}
 
-pub fn run(
-    count: usize,
-    seed: u64,
-    (areas, programs): (&[String], &[String]),
-    only: &[usize],
-    list: bool,
-) -> Result<(), String> {
+pub fn run(wanted: &Wanted) -> Result<(), String> {
     let mut drawn = Vec::new();
-    if let Some(unknown) = areas.iter().find(|area| AREAS.iter().all(|folder| folder != *area)) {
+    if let Some(unknown) = wanted.areas.iter().find(|area| AREAS.iter().all(|folder| folder != *area)) {
         return Err(format!("{unknown} is not an area of changes; allowed: {}", AREAS.join(", ")));
     }
-    for folder in AREAS.iter().filter(|folder| areas.is_empty() || areas.iter().any(|area| area == *folder)) {
+    let is_wanted = |folder: &&&str| wanted.areas.is_empty() || wanted.areas.iter().any(|area| area == *folder);
+    for folder in AREAS.iter().filter(is_wanted) {
         change::all(folder, &mut drawn)?;
     }
-    println!("{} changes are possible; {count} are drawn with seed {seed}", drawn.len());
-    change::shuffle(&mut drawn, seed);
-    let copy = Tree::make()?;
-    let chosen = copy.build(drawn, count)?;
-    if list {
+    println!("{} changes are possible; {} are drawn with seed {}", drawn.len(), wanted.count, wanted.seed);
+    change::shuffle(&mut drawn, wanted.seed);
+    let copy = Tree::make(&drawn)?;
+    let chosen = copy.build(drawn, wanted.count)?;
+    if wanted.list {
         chosen.iter().enumerate().for_each(|(k, change)| println!("{:3}  {change}", k + 1));
         return Ok(());
     }
-    let tests = copy.tests(programs)?;
+    let crew = Crew::new(wanted.threads)?;
+    let tests = copy.tests(wanted.programs, wanted.longest, &crew)?;
     let begin = Instant::now();
     let changes: Vec<(usize, &Change)> =
-        (1..).zip(&chosen).filter(|(k, _)| only.is_empty() || only.contains(k)).collect();
+        (1..).zip(&chosen).filter(|(k, _)| wanted.only.is_empty() || wanted.only.contains(k)).collect();
     let fates = Mutex::new(Vec::new());
-    side_by_side(&changes, |(k, change)| {
+    crew.each(&changes, |(k, change)| {
         let fate = fate(*k, &tests);
-        println!("{k:3}  {change}\n     {}", fate.text());
-        fates.lock().unwrap().push((*k, *change, fate));
+        // What ends the hunt ends its tests, too.
+        if !crew.is_stopped() {
+            println!("{k:3}  {change}\n     {}", fate.text());
+            fates.lock().unwrap().push((*k, *change, fate));
+        }
     });
     let mut fates = fates.into_inner().unwrap();
     fates.sort_by_key(|(k, ..)| *k);
-    let count = |of: fn(&Fate) -> bool| fates.iter().filter(|(.., fate)| of(fate)).count();
-    let noticed = count(|fate| !matches!(fate, Fate::Survived(_)));
-    println!(
-        "\n{noticed} of {} changes are noticed ({:.0} %), {} of them by a run that does not end, in {:.0} min",
-        fates.len(),
-        100.0 * noticed as f64 / fates.len().max(1) as f64,
-        count(|fate| matches!(fate, Fate::Endless(_))),
-        begin.elapsed().as_secs_f64() / 60.0
-    );
+    tell(&fates, changes.len(), begin.elapsed());
+    if crew.is_stopped() { Err("ended before all changes were tried".into()) } else { Ok(()) }
+}
+
+/// Prints how many changes of each area are noticed, and those that are not.
+fn tell(fates: &[(usize, &Change, Fate)], asked: usize, took: Duration) {
+    let minutes = took.as_secs_f64() / 60.0;
+    println!("\n{} of {asked} changes tried in {minutes:.0} min\n", fates.len());
+    println!("| changes in | tried | noticed | of them endless | survive |\n|---|---|---|---|---|");
+    for area in AREAS.iter().copied().chain([""]) {
+        let of_area: Vec<&Fate> =
+            fates.iter().filter(|(_, change, _)| change.file.starts_with(area)).map(|(.., fate)| fate).collect();
+        let count = |of: fn(&Fate) -> bool| of_area.iter().filter(|fate| of(fate)).count();
+        let (survive, endless) =
+            (count(|fate| matches!(fate, Fate::Survived(_))), count(|fate| matches!(fate, Fate::Endless(_))));
+        if !of_area.is_empty() {
+            let (name, noticed) = (if area.is_empty() { "all" } else { area }, of_area.len() - survive);
+            let share = 100.0 * noticed as f64 / of_area.len() as f64;
+            println!("| {name} | {} | {noticed} ({share:.0} %) | {endless} | {survive} |", of_area.len());
+        }
+    }
+    println!();
     for (k, change, fate) in fates.iter().filter(|(.., fate)| matches!(fate, Fate::Survived(_))) {
         println!("{k:3}  {change}: {}", fate.text());
     }
-    Ok(())
 }
 
-/// Does `work` for each of them, two at a time.
-fn side_by_side<T: Sync>(all: &[T], work: impl Fn(&T) + Sync) {
-    let next = AtomicUsize::new(0);
-    std::thread::scope(|scope| {
-        for _ in 0..WORKERS {
-            scope.spawn(|| {
-                while let Some(one) = all.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    work(one);
-                }
-            });
+/// Threads that share a job, until it is done or Ctrl-C or SIGTERM ends it.
+struct Crew {
+    threads: usize,
+    stop: Arc<AtomicBool>,
+}
+
+impl Crew {
+    fn new(threads: usize) -> Result<Self, String> {
+        let stop = Arc::new(AtomicBool::new(false));
+        for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
+            let registered = signal_hook::flag::register(signal, Arc::clone(&stop));
+            registered.map_err(|error| format!("signal {signal} cannot be handled: {error}"))?;
         }
-    });
+        Ok(Self { threads, stop })
+    }
+
+    fn is_stopped(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+    }
+
+    /// Does `work` for each of them, several at a time.
+    fn each<T: Sync>(&self, all: &[T], work: impl Fn(&T) + Sync) {
+        let next = AtomicUsize::new(0);
+        std::thread::scope(|scope| {
+            for _ in 0..self.threads {
+                scope.spawn(|| {
+                    while let Some(one) = all.get(next.fetch_add(1, Ordering::Relaxed)).filter(|_| !self.is_stopped()) {
+                        work(one);
+                    }
+                });
+            }
+        });
+    }
 }
 
 /// The fate of a change.

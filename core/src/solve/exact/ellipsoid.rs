@@ -314,3 +314,50 @@ impl<const N: usize> Core<N> {
         self.cross(crossing);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::friction::Friction;
+    use crate::mechanism::{Body, Cause, Kind, Label, Mechanism, Spring, SpringLaw, State};
+    use crate::solve::exact::Space;
+    use std::sync::Arc;
+
+    /// A cart of 1 kg that slides at 0.3 m/s against 1 N, before a stop that it does not reach.
+    fn sliding() -> Core<16> {
+        let label = Label { key: "cart", name: "cart" };
+        let cart = Body {
+            label,
+            kind: Kind::Linear,
+            inertia: 1.0,
+            friction: Friction::symmetric(0.0, 1.0),
+            force: 0.0,
+            along: None,
+            leader: (0, 1.0),
+            is_rotor: false,
+        };
+        let law = SpringLaw::Gap { low: -1.0, high: 1.0 };
+        let stop = Spring { label, arms: vec![(0, 1.0)], stiffness: 1e4, damping: 0.0, law, follows: None };
+        let mechanism = Mechanism::new(vec![cart], vec![stop], Vec::new());
+        let mut start = State::default();
+        start.speed[0] = 0.3;
+        let space = Arc::new(Space::new(&mechanism, 0));
+        Core::new(Arc::new(mechanism), space, &start, (1e-3, f64::INFINITY), Vec::new())
+    }
+
+    /// The speed that falls to zero was taken to be known to a rounding of zero.
+    #[test]
+    fn a_stop_is_as_uncertain_as_the_speeds_before_it() {
+        let mut core = sliding();
+        (1..=29).for_each(|row| core.go_on_to(1e-2 * f64::from(row), &mut Vec::new()).unwrap());
+        core.carry_errors();
+        let place = core.common.space.layout.speed[0];
+        assert!((core.z[place] - 0.01).abs() < 1e-12, "{}", core.z[place]);
+        core.z[place] = 0.0;
+        let stops = |cause| matches!(cause, Cause::Stop(0));
+        let guard = core.matrices.guards.iter().find(|guard| stops(guard.transition.cause)).unwrap();
+        let crossing = core.crossing(guard.transition).unwrap();
+        let rounding = f64::EPSILON * 0.3;
+        assert!((0.9..10.0).contains(&(crossing.rounding / rounding)), "{:e}", crossing.rounding);
+    }
+}

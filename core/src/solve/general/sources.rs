@@ -406,3 +406,109 @@ fn decompose(matrix: &mut Slopes) -> [usize; NODES] {
     }
     order
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::friction::{Friction, Shape};
+    use crate::mechanism::{BODIES, Body, Follows, Kind, Label, Layout, Mechanism, Spring, SpringLaw};
+    use crate::polyline::Polyline;
+    use std::sync::Arc;
+
+    /// Two carts on a span that follows the first; the first one's friction has this law.
+    fn model(law: Law, along: bool) -> Model {
+        let label = Label { key: "part", name: "part" };
+        let friction = Friction::sided(
+            Side { viscous: 3.0, coulomb: 1.0, breakaway: 1.6 },
+            Side { viscous: 4.0, coulomb: 1.2, breakaway: 1.9 },
+        );
+        let body = |index: usize, friction: Friction, along: Option<Polyline>| Body {
+            label,
+            kind: Kind::Linear,
+            inertia: 1.0,
+            friction,
+            force: 0.0,
+            along,
+            leader: (index, 1.0),
+            is_rotor: false,
+        };
+        let line = Polyline::new(vec![[-1.0, 0.8], [1.0, 1.4]]).filter(|_| along);
+        let follows = Follows { rigidity: 2e4, length: 0.6, arms: vec![(0, 1.0)] };
+        let arms = vec![(0, 1.0), (1, -1.0)];
+        let spring =
+            Spring { label, arms, stiffness: 3e4, damping: 0.0, law: SpringLaw::TwoSided, follows: Some(follows) };
+        let bodies = vec![body(0, friction.following(law), line), body(1, Friction::default(), None)];
+        let mechanism = Mechanism::new(bodies, vec![spring], Vec::new());
+        let layout = Layout::new(&mechanism);
+        Model::new(Arc::new(mechanism), layout)
+    }
+
+    /// Central differences of the forces by each argument at each node.
+    fn differences(source: &Source, model: &Model, (h, y): (f64, &Vector), arguments: &[Lane]) -> Vec<Slopes> {
+        let forces = |arguments: &[Lane]| {
+            let mut bristles = [Bristle::default(); BODIES];
+            source.set_out(model, h, y, &mut bristles);
+            source.at_nodes(model, h, y, arguments, &mut bristles)
+        };
+        let of_node = |argument: usize, node: usize| {
+            let at = |by: f64| {
+                let mut moved = arguments.to_vec();
+                moved[argument][node] += by;
+                forces(&moved)
+            };
+            let (up, down) = (at(1e-6), at(-1e-6));
+            std::array::from_fn::<f64, NODES, _>(|i| (up[i] - down[i]) / 2e-6)
+        };
+        let of_argument = |argument: usize| -> Slopes {
+            let columns: [Lane; NODES] = std::array::from_fn(|node| of_node(argument, node));
+            std::array::from_fn(|i| std::array::from_fn(|j| columns[j][i]))
+        };
+        (0..arguments.len()).map(of_argument).collect()
+    }
+
+    /// Newton's method takes the slopes for the derivatives of the forces. Where they are not, it needs more steps, and
+    /// no position tells.
+    #[test]
+    fn slopes_are_the_derivatives_of_the_forces() {
+        let laws = [
+            Law::Stribeck { velocity: 0.1, shape: Shape::Gaussian },
+            Law::Smooth { breakaway_velocity: 0.1 },
+            Law::LuGre { velocity: 0.1, stiffness: 1e4, damping: 20.0 },
+        ];
+        let places: Lane = [0.11, 0.13, 0.16, 0.18];
+        for (law, along, sign) in laws.into_iter().flat_map(|law| {
+            [(false, 1.0), (true, 1.0), (false, -1.0), (true, -1.0)].map(|(along, sign)| (law, along, sign))
+        }) {
+            let model = model(law, along);
+            let motion = match (law.never_sticks(), sign > 0.0) {
+                (true, _) => Motion::Free,
+                (false, true) => Motion::Forward,
+                (false, false) => Motion::Backward,
+            };
+            let friction = Source::Friction { curved: 0, motion, speed: 0, way: along.then_some(1) };
+            let spring = Source::spring(&model, 0, 2, vec![(0, 1)]);
+            let arguments = [[0.05, 0.07, 0.09, 0.12].map(|v| sign * v), places, [1e-3, 2e-3, -1e-3, 3e-3]];
+            let mut y = [0.0; super::super::model::MOST];
+            (y[model.speed(0)], y[model.coordinate(0)]) = (sign * 0.04, 0.1);
+            if let Some(place) = model.bristle[0] {
+                y[place] = sign * 5e-5;
+            }
+            // Bristles bend in the shorter step and slip in the longer one.
+            for (h, source) in [1e-4, 0.1].into_iter().flat_map(|h| [(h, &friction), (h, &spring)]) {
+                let known = differences(source, &model, (h, &y), &arguments);
+                let mut bristles = [Bristle::default(); BODIES];
+                source.set_out(&model, h, &y, &mut bristles);
+                source.at_nodes(&model, h, &y, &arguments, &mut bristles);
+                let mut own = vec![[[0.0; NODES]; NODES]; arguments.len()];
+                source.slopes(&model, h, &arguments, &bristles, &mut |argument, slopes| own[argument] = *slopes);
+                for (argument, (own, known)) in own.iter().zip(&known).enumerate() {
+                    let largest = known.iter().flatten().fold(0.0, |most: f64, slope| most.max(slope.abs()));
+                    for (own, known) in own.iter().flatten().zip(known.iter().flatten()) {
+                        let off = (own - known).abs();
+                        assert!(off <= 1e-5 * largest + 1e-6, "{law:?} {along} {h} {argument}: {own} and {known}");
+                    }
+                }
+            }
+        }
+    }
+}

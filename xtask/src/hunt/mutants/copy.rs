@@ -1,5 +1,6 @@
 //! A copy of the repository with changes built into it, and its tests.
 
+use super::Crew;
 use super::change::Change;
 use crate::cargo;
 use std::collections::{BTreeMap, BTreeSet};
@@ -34,26 +35,24 @@ pub fn on(k: usize) -> bool {
 }
 "#;
 
-/// The features that the library is built with.
-const FEATURES: &str = "json,parquet";
+/// Where the switch is declared, and where it stands.
+const LIBRARY: &str = "core/src/lib.rs";
+const SWITCHES: &str = "core/src/mutant.rs";
 
-/// The programs of tests: name, arguments of cargo. `lib`, `core`, `case`, `control`, `identify` and
-/// `export` are the tests within the crates of the library, `all` those beside it, `hunt`
-/// those of the small hunt, `fmu` those of the shared object.
+/// The programs of tests: name, arguments of cargo. `lib`, `core`, `case`, `control`, `identify` and `export` are the
+/// tests within the crates of the library, `all` those beside it, `hunt` those of the small hunt, `fmu` those of the
+/// shared object. All take the library without features, so that it is built once; JSON and Parquet are in no area.
 const PROGRAMS: [(&str, &[&str]); 9] = [
-    ("lib", &["--package", "taut", "--features", FEATURES, "--lib"]),
+    ("lib", &["--package", "taut", "--lib"]),
     ("core", &["--package", "taut-core", "--lib"]),
     ("case", &["--package", "taut-case", "--lib"]),
     ("control", &["--package", "taut-control", "--lib"]),
     ("identify", &["--package", "taut-identify", "--lib"]),
     ("export", &["--package", "taut-export", "--lib"]),
-    ("all", &["--package", "taut", "--features", FEATURES, "--test", "all"]),
+    ("all", &["--package", "taut", "--test", "all"]),
     ("hunt", &["--package", "taut-hunt", "--test", "small"]),
     ("fmu", &["--package", "taut-fmu", "--test", "all"]),
 ];
-
-/// A test takes at most so long without a change; a longer one is left out.
-const LONGEST: Duration = Duration::from_secs(120);
 
 /// Memory that a program of tests may take, KiB: a change may make a loop that collects for ever.
 const MEMORY: u64 = 12 << 20;
@@ -86,28 +85,33 @@ pub enum Ended {
 }
 
 impl Tree {
-    /// All files of the repository, anew.
-    pub fn make() -> Result<Self, String> {
+    /// All files of the repository but those that `build` writes. Files that are there already and do not differ stay
+    /// as they are, so that the same changes are not built again.
+    pub fn make(drawn: &[Change]) -> Result<Self, String> {
         let here = std::env::current_dir().map_err(|error| error.to_string())?;
         let root = here.join("target/mutants/taut");
-        let _ = fs::remove_dir_all(&root);
+        fs::create_dir_all(&root).map_err(|error| format!("target/mutants: {error}"))?;
         // Data that some tests read are not in the list of files.
         #[cfg(unix)]
         if let Ok(data) = here.join("data").canonicalize() {
-            let made = fs::create_dir_all(&root).and_then(|()| std::os::unix::fs::symlink(data, root.join("data")));
+            let _ = fs::remove_file(root.join("data"));
+            let made = std::os::unix::fs::symlink(data, root.join("data"));
             made.map_err(|error| format!("target/mutants: {error}"))?;
         }
         let listed = Command::new("git").args(["ls-files", "-z", "--cached"]).output();
         let listed = listed.map_err(|error| format!("git cannot be started: {error}"))?;
-        for name in String::from_utf8_lossy(&listed.stdout).split('\0').filter(|name| Path::new(name).is_file()) {
-            let to = root.join(name);
-            let made = to.parent().map_or(Ok(()), fs::create_dir_all).and_then(|()| fs::copy(name, &to));
-            made.map_err(|error| format!("{}: {error}", to.display()))?;
+        let listed = String::from_utf8_lossy(&listed.stdout).into_owned();
+        let listed: BTreeSet<&str> = listed.split('\0').filter(|name| Path::new(name).is_file()).collect();
+        remove_others(&root, &root, &listed)?;
+        let changed: BTreeSet<&str> = drawn.iter().map(|change| &*change.file).collect();
+        for name in listed.difference(&changed) {
+            let mut bytes = fs::read(name).map_err(|error| format!("{name}: {error}"))?;
+            if *name == LIBRARY {
+                bytes.extend_from_slice(b"\npub mod mutant;\n");
+            }
+            write(&root.join(name), &bytes)?;
         }
-        let library = root.join("core/src/lib.rs");
-        let text = fs::read_to_string(&library).map_err(|error| error.to_string())?;
-        write(&library, &(text + "\npub mod mutant;\n"))?;
-        write(&root.join("core/src/mutant.rs"), SWITCH)?;
+        write(&root.join(SWITCHES), SWITCH.as_bytes())?;
         Ok(Self { root })
     }
 
@@ -166,7 +170,7 @@ impl Tree {
                 end = place.end;
             }
             text.push_str(&was[end..]);
-            write(&self.root.join(file), &text)?;
+            write(&self.root.join(file), text.as_bytes())?;
         }
         Ok(places)
     }
@@ -176,13 +180,15 @@ impl Tree {
         // A folder of its own: cargo would take what it builds here for the repository's.
         command.arg("--message-format=json").current_dir(&self.root);
         command.env("CARGO_TARGET_DIR", "../target").stderr(Stdio::null());
+        // Nobody debugs it, and few files stay between two builds.
+        command.envs([("CARGO_PROFILE_DEV_DEBUG", "false"), ("CARGO_INCREMENTAL", "0")]);
         command
     }
 
     /// Where the compiler finds errors.
     fn errors(&self) -> Result<Vec<(String, Range<usize>)>, String> {
         let output = self
-            .cargo(&["check", "--package", "taut", "--features", FEATURES, "--lib"])
+            .cargo(&["check", "--package", "taut", "--lib"])
             .output()
             .map_err(|error| format!("cargo cannot be started: {error}"))?;
         let mut errors = Vec::new();
@@ -213,9 +219,10 @@ impl Tree {
         built.next_back().ok_or_else(|| format!("the tests of the copy in {} cannot be built", self.root.display()))
     }
 
-    /// Builds the programs of these names (none: all), and runs each of their tests without a change. The quickest
-    /// tests come first.
-    pub fn tests(&self, names: &[String]) -> Result<Vec<Test>, String> {
+    /// Builds the programs of these names (none: all), and runs each of their tests without a change, unless that was
+    /// done before with the same program. The quickest tests come first; those that take longer than `longest` are
+    /// left out.
+    pub fn tests(&self, names: &[String], longest: Duration, crew: &Crew) -> Result<Vec<Test>, String> {
         if let Some(unknown) = names.iter().find(|name| PROGRAMS.iter().all(|(known, _)| known != *name)) {
             return Err(format!(
                 "{unknown} is not a program of tests; allowed: {}",
@@ -234,20 +241,22 @@ impl Tree {
                     path: path.clone(),
                     name: name.into(),
                     root: self.root.clone(),
-                    took: LONGEST,
+                    took: longest,
                     reached: BTreeSet::new(),
                 }));
             }
         }
         let begin = Instant::now();
         let well = Mutex::new(Vec::new());
-        let numbered: Vec<(usize, Test)> = tests.into_iter().enumerate().collect();
-        super::side_by_side(&numbered, |(i, test)| {
-            let (ended, tried) = test.reach(&self.root.join(format!("reached-{i}")));
+        let lists = self.root.with_file_name("reached");
+        fs::create_dir_all(&lists).map_err(|error| format!("{}: {error}", lists.display()))?;
+        crew.each(&tests, |test| {
+            let (ended, tried) = test.reach(&lists, longest);
             match ended {
                 Ended::Well => well.lock().unwrap().push(tried),
+                Ended::Badly if crew.is_stopped() => {}
                 Ended::Badly => println!("{test} fails without any change, and is left out"),
-                Ended::Not => println!("{test} takes longer than {} s, and is left out", LONGEST.as_secs()),
+                Ended::Not => println!("{test} takes longer than {} s, and is left out", longest.as_secs()),
             }
         });
         let mut tests = well.into_inner().unwrap();
@@ -265,13 +274,29 @@ impl Test {
         wait(&mut command, 10 * self.took + Duration::from_secs(20))
     }
 
-    /// Runs it without a change; itself with its time and with what it reaches.
-    fn reach(&self, list: &Path) -> (Ended, Self) {
+    /// Runs it without a change; itself with its time and with what it reaches. A file in the folder of lists keeps
+    /// both until the program is built anew.
+    fn reach(&self, lists: &Path, longest: Duration) -> (Ended, Self) {
+        let list = lists.join(self.to_string().replace("::", ".").replace(' ', "-"));
+        let time = list.with_added_extension("time");
+        let modified = |path: &Path| fs::metadata(path).and_then(|file| file.modified()).ok();
+        let of_list = |took| {
+            let text = fs::read_to_string(&list).unwrap_or_default();
+            Self { took, reached: text.lines().filter_map(|line| line.parse().ok()).collect(), ..self.clone() }
+        };
+        let is_new = modified(&time) > modified(&self.path);
+        let before = fs::read_to_string(&time).ok().and_then(|text| text.parse().ok()).map(Duration::from_secs_f64);
+        if let Some(took) = before.filter(|_| is_new) {
+            return (if took <= longest { Ended::Well } else { Ended::Not }, of_list(took));
+        }
+        let _ = fs::remove_file(&list);
         let begin = Instant::now();
-        let ended = wait(self.command().env("TAUT_REACHED", list), LONGEST);
-        let text = fs::read_to_string(list).unwrap_or_default();
-        let reached = text.lines().filter_map(|line| line.parse().ok()).collect();
-        (ended, Self { took: begin.elapsed(), reached, ..self.clone() })
+        let ended = wait(self.command().env("TAUT_REACHED", &list), longest);
+        let took = begin.elapsed();
+        if ended == Ended::Well {
+            let _ = fs::write(&time, took.as_secs_f64().to_string());
+        }
+        (ended, of_list(took))
     }
 
     fn command(&self) -> Command {
@@ -293,6 +318,7 @@ impl fmt::Display for Test {
 fn wait(command: &mut Command, longest: Duration) -> Ended {
     let Ok(mut child) = command.spawn() else { return Ended::Badly };
     let begin = Instant::now();
+    let mut pause = Duration::from_millis(1);
     loop {
         match child.try_wait() {
             Ok(Some(status)) if status.success() => return Ended::Well,
@@ -302,11 +328,35 @@ fn wait(command: &mut Command, longest: Duration) -> Ended {
                 let _ = child.wait();
                 return Ended::Not;
             }
-            Ok(None) => std::thread::sleep(Duration::from_millis(20)),
+            Ok(None) => {
+                std::thread::sleep(pause);
+                pause = (2 * pause).min(Duration::from_millis(20));
+            }
         }
     }
 }
 
-fn write(path: &Path, text: &str) -> Result<(), String> {
-    fs::write(path, text).map_err(|error| format!("{}: {error}", path.display()))
+/// Writes a file that is not there with these bytes.
+fn write(path: &Path, bytes: &[u8]) -> Result<(), String> {
+    if fs::read(path).is_ok_and(|there| there == bytes) {
+        return Ok(());
+    }
+    let made = path.parent().map_or(Ok(()), fs::create_dir_all).and_then(|()| fs::write(path, bytes));
+    made.map_err(|error| format!("{}: {error}", path.display()))
+}
+
+/// Removes files of an earlier copy that are not in the list.
+fn remove_others(folder: &Path, root: &Path, listed: &BTreeSet<&str>) -> Result<(), String> {
+    for entry in fs::read_dir(folder).map_err(|error| format!("{}: {error}", folder.display()))?.flatten() {
+        let path = entry.path();
+        let name = path.strip_prefix(root).unwrap_or(&path).to_string_lossy().replace('\\', "/");
+        match entry.file_type() {
+            Ok(kind) if kind.is_dir() => remove_others(&path, root, listed)?,
+            Ok(kind) if kind.is_file() && !listed.contains(&*name) && name != SWITCHES => {
+                fs::remove_file(&path).map_err(|error| format!("{}: {error}", path.display()))?;
+            }
+            _ => {}
+        }
+    }
+    Ok(())
 }
