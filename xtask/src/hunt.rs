@@ -34,7 +34,7 @@ pub struct Hunt {
     threads: Option<u64>,
     /// Tests of changes that take longer are left out, s.
     longest: u64,
-    /// Whether the stages are told as JSON.
+    /// True if the stages are told as JSON.
     json: bool,
 }
 
