@@ -21,7 +21,7 @@ fn needed(machine: &Machine, profile: &Profile, limit: &str) -> f64 {
     (amplifier.voltage_limit, amplifier.current_limit) = (Some(1e9), Some(1e9));
     machine.belt.sheet.allowed_tension = Some(1e9);
     machine.belt.pretension = Some(0.0);
-    loads(&machine, None, profile, 4000).iter().find(|load| load.limit == limit).unwrap().needed
+    loads(&machine, None, std::slice::from_ref(profile), 4000).iter().find(|load| load.limit == limit).unwrap().needed
 }
 
 fn case() -> Case {

@@ -319,7 +319,7 @@ impl Case {
         limits: (Option<f64>, Option<f64>, Option<f64>),
         reserve: f64,
     ) -> PyResult<(Py<PyAny>, Py<Self>)> {
-        let case = self.axis(py)?;
+        let case = &self.inner;
         let (_, moves) = case.moves_named(&self.path, &names).told(py)?;
         let places: Vec<usize> =
             (0..case.moves.len()).filter(|&k| moves.iter().any(|one| one.name == case.moves[k].name)).collect();

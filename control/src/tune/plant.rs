@@ -47,7 +47,7 @@ pub struct Plant {
 #[derive(Debug, Clone)]
 pub(super) enum ByDrives {
     One(Sampled<1>),
-    Two(Sampled<2>),
+    Two(Box<Sampled<2>>),
 }
 
 /// The same code for either number of drives.
@@ -55,7 +55,10 @@ macro_rules! by_drives {
     ($plant:expr, |$sampled:ident| $value:expr) => {
         match &$plant.of {
             $crate::tune::plant::ByDrives::One($sampled) => $value,
-            $crate::tune::plant::ByDrives::Two($sampled) => $value,
+            $crate::tune::plant::ByDrives::Two(both) => {
+                let $sampled = &**both;
+                $value
+            }
         }
     };
 }
@@ -83,7 +86,9 @@ impl Plant {
         let model = |drive: usize| system.input(drive).discrete(design.every, Hold::Zero, design.delay);
         match machine.drives.len() {
             1 => Self::sampled([model(0)?], &system.input(0), machine, corners, ByDrives::One),
-            2 => Self::sampled([model(0)?, model(1)?], &system.input(0), machine, corners, ByDrives::Two),
+            2 => Self::sampled([model(0)?, model(1)?], &system.input(0), machine, corners, |sampled| {
+                ByDrives::Two(Box::new(sampled))
+            }),
             count => {
                 Err(Error::new(format!("a machine with {count} drives has no margins")).allowed("one or two drives"))
             }

@@ -70,6 +70,15 @@ impl Load {
         self.needed / self.allowed
     }
 
+    /// Adds it to loads of which each limit has one: the one that takes the larger share.
+    pub fn join(self, all: &mut Vec<Self>) {
+        match all.iter_mut().find(|known| known.limit == self.limit) {
+            Some(known) if self.share() > known.share() => *known = self,
+            Some(_) => (),
+            None => all.push(self),
+        }
+    }
+
     /// True if the motor's supply bounds it, of which a loop needs some for itself.
     pub fn is_electrical(&self) -> bool {
         ["V", "A"].contains(&self.unit)
@@ -125,14 +134,24 @@ fn electrical(volts: Option<f64>, amperes: Option<f64>) -> Vec<Demand> {
     voltage.into_iter().chain(current).collect()
 }
 
-/// How much of each limit `profile` needs at most, looked at `instants` times along its way.
-pub fn loads(machine: &Machine, limit: Option<f64>, profile: &Profile, instants: usize) -> Vec<Load> {
-    let needs = needs(machine, profile, instants);
-    let load = |demand: Demand| {
+/// How much of each limit references need at most, looked at `instants` times along their way; of several drives that of
+/// the one that needs most of it.
+pub fn loads(machine: &Machine, limit: Option<f64>, profiles: &[Profile], instants: usize) -> Vec<Load> {
+    let load = |needs: &[Need], demand: Demand| {
         let needed = needs.iter().map(&demand.needed).fold(0.0, f64::max);
         Load { limit: demand.limit, unit: demand.unit, needed, allowed: demand.allowed }
     };
-    demands(machine, limit).into_iter().map(load).collect()
+    if let [profile] = profiles {
+        let needs = needs(machine, profile, instants);
+        return demands(machine, limit).into_iter().map(|demand| load(&needs, demand)).collect();
+    }
+    let mut all: Vec<Load> = Vec::new();
+    for drive in 0..machine.drives.len() {
+        let needs = needs_of_drive(machine, drive, profiles, instants);
+        let (volts, amperes) = limits_of(machine, drive, limit);
+        electrical(volts, amperes).into_iter().for_each(|demand| load(&needs, demand).join(&mut all));
+    }
+    all
 }
 
 /// The limits that `profile`, shaper included, exceeds on this machine under a controller with this limit of its command
@@ -149,21 +168,26 @@ pub fn shortfalls(machine: &Machine, limit: Option<f64>, profiles: &[Profile]) -
 
 /// The limits that the references of a machine with several drives exceed at one of these.
 fn of_drive(machine: &Machine, limit: Option<f64>, drive: usize, profiles: &[Profile]) -> Vec<Shortfall> {
+    let needs = needs_of_drive(machine, drive, profiles, INSTANTS);
+    let name = machine.geometry().drives[drive].label.name;
+    let (volts, amperes) = limits_of(machine, drive, limit);
+    let electrical = electrical(volts, amperes).into_iter().filter_map(|demand| exceeded(&needs, &demand));
+    electrical.map(|short| Shortfall { words: format!("{name}: {}", short.words), ..short }).collect()
+}
+
+/// What one of several drives needs, the belts taken for rigid.
+fn needs_of_drive(machine: &Machine, drive: usize, profiles: &[Profile], instants: usize) -> Vec<Need> {
     let all = FeedForward { model: FeedForwardModel::Rigid, ..FeedForward::NONE };
     let Some(forward) = Forward::of(all, machine, drive) else { return Vec::new() };
     let end = profiles.iter().map(Profile::rest).fold(0.0, f64::max);
     let need = |k: usize| {
-        let time = end * k as f64 / INSTANTS as f64;
+        let time = end * k as f64 / instants as f64;
         let slides: Vec<Reference> = profiles.iter().map(|profile| profile.at(time)).collect();
         let (current, voltage) = forward.electrical(&slides);
         let (force, spans) = (forward.force(&slides)[0], [0.0; 3]);
         Need { time, y: forward.along(&slides), force, current, voltage, spans }
     };
-    let needs: Vec<Need> = (0..=INSTANTS).map(need).collect();
-    let name = machine.geometry().drives[drive].label.name;
-    let (volts, amperes) = limits_of(machine, drive, limit);
-    let electrical = electrical(volts, amperes).into_iter().filter_map(|demand| exceeded(&needs, &demand));
-    electrical.map(|short| Shortfall { words: format!("{name}: {}", short.words), ..short }).collect()
+    (0..=instants).map(need).collect()
 }
 
 fn of_axis(machine: &Machine, limit: Option<f64>, profile: &Profile) -> Vec<Shortfall> {

@@ -347,6 +347,16 @@ impl Profile {
         Ok((0..start.len()).map(of_coordinate).collect())
     }
 
+    /// The reference of each coordinate along legs: [`Profile::new`] of one, [`Profile::along`] of several.
+    pub fn of_legs(start: &[f64], legs: &[Leg<Vec<f64>>]) -> Result<Vec<Self>> {
+        let [start] = start else { return Self::along(start, legs) };
+        let alone = |leg: &Leg<Vec<f64>>| match leg {
+            Leg::To(to, limits) => Leg::To(to[0], *limits),
+            Leg::Wait(length) => Leg::Wait(*length),
+        };
+        Ok(vec![Self::new(*start, &legs.iter().map(alone).collect::<Vec<_>>())?])
+    }
+
     /// A reference of which `positions` (m) at increasing `times` (s) are known: straight lines between them. Speed and
     /// acceleration are those of the parabola through a sample and its neighbours; jerk and snap are not known, and
     /// zero.
