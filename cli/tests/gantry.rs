@@ -371,7 +371,7 @@ fn a_sweep_that_a_gantry_cannot_have_is_told() {
         ("bridge.mas=20%", "next: did you mean `bridge.mass`?\n"),
         (
             "belt.stiffness.3=20%",
-            "`belt.stiffness.3` is none of the 3 that there are\n  1 | sweep.vary.\"belt.stiffness.3\"=20%\n    \
+            "`belt.stiffness.3` does not exist: there are 3\n  1 | sweep.vary.\"belt.stiffness.3\"=20%\n    \
              |                               ^^^\n  allowed: belt.stiffness.0 to belt.stiffness.2\n",
         ),
         ("belt.modulus=20%", "`belt.modulus` has no value in this case\n"),

@@ -493,7 +493,7 @@ pub(super) fn prior_of(kind: &str, field: &Field, key: &str) -> Result<Prior> {
         }
         "log_normal" => {
             let [median, deviation] = pair(field, "two: the median and the standard deviation of the logarithm")?;
-            let wide = plain(&deviation, "a number without a unit, 0.05 for about 5 %,")?;
+            let wide = plain(&deviation, "a number without a unit, 0.05 for about 5 %")?;
             let middle = value(&median, key)?;
             if middle <= 0.0 {
                 return Err(median.fail(format!("{middle} has no logarithm")).allowed("above zero"));
