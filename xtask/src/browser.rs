@@ -1,7 +1,7 @@
 //! Reports in a browser: made with the program, opened and used in headless Chromium by `report/browser/check.mjs`; and
-//! the studio, by the scripts `studio*.mjs` beside it.
+//! the studio, by the scripts `studio*.mjs` beside it, and `web.mjs` without a server.
 
-use crate::Counts;
+use crate::{Counts, web};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -9,8 +9,9 @@ use std::process::{Command, Stdio};
 /// The script that opens them, and what npm installs for it.
 pub const FOLDER: &str = "report/browser";
 
-/// The name of these tests where they cannot be done.
+/// The names of these tests where they cannot be done.
 const NAME: &str = "reports in a browser";
+const WEB: &str = "the studio without a server, in a browser";
 
 /// Spectra as printers name them: with such names a page scrolled sideways.
 const SPECTRA: [&str; 2] =
@@ -54,7 +55,7 @@ const REPORTS: [(&str, &[&str]); 16] = [
 pub fn test(counts: &mut Counts) -> Result<bool, String> {
     let browser = match browser() {
         Ok(browser) => browser,
-        Err(needs) => return ignored(&needs, counts),
+        Err(needs) => return ignored(NAME, &needs, counts),
     };
     let target = crate::python::target();
     let (reports, shots) = (target.join("browser/reports"), target.join("browser/shots"));
@@ -76,7 +77,7 @@ pub fn test(counts: &mut Counts) -> Result<bool, String> {
     let mut check = Command::new("node");
     check.arg(Path::new(FOLDER).join("check.mjs")).arg(&browser).arg(&reports).arg(&shots);
     let looked = crate::run(check, counts)?;
-    let studio = studio(&taut, &browser, &shots, counts)?;
+    let studio = studio(&taut, &browser, &shots, counts)? & without_server(&taut, &browser, &shots, counts)?;
     println!("pictures of all pages: {}", shots.display());
     Ok(looked && studio)
 }
@@ -92,6 +93,18 @@ fn studio(taut: &Path, browser: &Path, shots: &Path, counts: &mut Counts) -> Res
         passed &= crate::run(node, counts)?;
     }
     Ok(passed)
+}
+
+/// The studio as a folder of files; ignored if no compiler for its module can be had.
+fn without_server(taut: &Path, browser: &Path, shots: &Path, counts: &mut Counts) -> Result<bool, String> {
+    let folder = web::default_folder();
+    match web::compiler() {
+        Ok(compiler) => web::make(&folder, &compiler)?,
+        Err(needs) => return ignored(WEB, &needs, counts),
+    };
+    let mut node = Command::new("node");
+    node.arg(Path::new(FOLDER).join("web.mjs")).arg(browser).arg(taut).arg(folder).arg(shots);
+    crate::run(node, counts)
 }
 
 /// A spectrum with a peak there, and a smaller one above it, as Klipper writes them.
@@ -180,10 +193,10 @@ pub fn path_of(program: &str) -> Option<PathBuf> {
 }
 
 /// Counts the tests as ignored, by name; or fails where all are required.
-fn ignored(needs: &str, counts: &mut Counts) -> Result<bool, String> {
+fn ignored(name: &str, needs: &str, counts: &mut Counts) -> Result<bool, String> {
     if std::env::var_os("TAUT_REQUIRE").is_some_and(|all| all == "all") {
-        return Err(format!("{NAME}: needs {needs}"));
+        return Err(format!("{name}: needs {needs}"));
     }
-    counts.left_out.push(format!("{NAME}: needs {needs}"));
+    counts.left_out.push(format!("{name}: needs {needs}"));
     Ok(true)
 }

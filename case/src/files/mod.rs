@@ -4,8 +4,10 @@ mod batch;
 mod claim;
 mod csv;
 mod inputs;
+pub mod memory;
 #[cfg(feature = "parquet")]
 mod parquet;
+#[cfg(not(target_family = "wasm"))]
 mod reading;
 mod replacing;
 mod temporary;
@@ -15,9 +17,12 @@ pub use batch::{Batch, MARKER, shown};
 pub use claim::{Claim, Refusal};
 pub use csv::CsvWriter;
 pub use inputs::Inputs;
+#[cfg(target_family = "wasm")]
+pub use memory::{Source, open, read};
 #[cfg(feature = "parquet")]
 pub use parquet::ParquetWriter;
-pub use reading::{open, read};
+#[cfg(not(target_family = "wasm"))]
+pub use reading::{Source, open, read};
 pub use temporary::remove_abandoned;
 pub use unfinished::abandon;
 
