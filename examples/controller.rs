@@ -24,17 +24,9 @@ fn main() -> taut::Result<()> {
     let case = Case::from_text_with("axis.toml", TEMPLATE, &["encoder.lines=3000"])?;
     let machine = &case.machine;
     let limits = Limits { speed: 0.3, acceleration: 4.0, jerk: Some(200.0), snap: None };
-    let profile = Profile::new(0.0, &[Leg::To(0.1, limits)])?;
+    let path = [Profile::new(0.0, &[Leg::To(0.1, limits)])?];
     let timing = Loop { every: 1e-3, delay: 0.0, limit: Some(24.0), lead: 0.0 };
-    let run = close(
-        machine,
-        &mut [&mut Relay { volts: 10.0 }],
-        &timing,
-        std::slice::from_ref(&profile),
-        1.0,
-        50e-6,
-        Solver::Exact,
-    )?;
+    let run = close(machine, &mut [&mut Relay { volts: 10.0 }], &timing, &path, 1.0, 50e-6, Solver::Exact)?;
     println!("relay: cart error at most {:.1} µm", 1e6 * run.figures.cart().error.peak.value.abs());
 
     let pid = Pid {
@@ -56,8 +48,7 @@ fn main() -> taut::Result<()> {
         shaper: Vec::new(),
     };
     let solver = Solver::Exact;
-    let setup =
-        Setup { machine, model: machine, design: &design, profiles: &[profile], until: 1.0, window: 50e-6, solver };
+    let setup = Setup { machine, model: machine, design: &design, profiles: &path, until: 1.0, window: 50e-6, solver };
     let mut best = f64::INFINITY;
     for _ in 0..200 {
         let begin = Instant::now();

@@ -39,19 +39,11 @@ fn main() -> Result<()> {
     let calls = std::env::args().nth(1).and_then(|number| number.parse().ok()).unwrap_or(200);
     let case = Case::from_text("axis.toml", TEMPLATE)?;
     let limits = Limits { speed: 0.2, acceleration: 2.0, jerk: None, snap: None };
-    let profile = Profile::new(0.0, &[Leg::To(0.05, limits)])?;
+    let path = [Profile::new(0.0, &[Leg::To(0.05, limits)])?];
     let timing = Loop { every: 1e-3, delay: 0.0, limit: Some(LIMIT), lead: 0.0 };
     let (closed, at) = best(calls, || {
-        let run = close(
-            &case.machine,
-            &mut [&mut Proportional],
-            &timing,
-            std::slice::from_ref(&profile),
-            1.0,
-            50e-6,
-            Solver::Exact,
-        )?;
-        Ok(run.figures.cart().error.last + profile.target())
+        let run = close(&case.machine, &mut [&mut Proportional], &timing, &path, 1.0, 50e-6, Solver::Exact)?;
+        Ok(run.figures.cart().error.last + path[0].target())
     })?;
     let start = Simulator::new(&case.machine, Solver::Exact)?;
     let (radius, shaft) = (case.machine.pulley_radius, start.mechanism().drives[0].shaft);
@@ -59,7 +51,7 @@ fn main() -> Result<()> {
         let (mut machine, mut events) = (start.clone(), Vec::new());
         for k in 0..1000 {
             let time = f64::from(k) * 1e-3;
-            let error = profile.at(time).position - radius * machine.state().position[shaft];
+            let error = path[0].at(time).position - radius * machine.state().position[shaft];
             let held = Signal::Step { value: (GAIN * error).clamp(-LIMIT, LIMIT), at: 0.0 };
             machine.set_input(0, &held.piece(machine.time()))?;
             if machine.advance(f64::from(k + 1) * 1e-3, &mut events).is_err() {

@@ -626,7 +626,7 @@ fn an_authority_agrees() {
     for one in value["resonances"].as_array().unwrap() {
         let case = Case::from_text("authority.toml", one["toml"].as_str().unwrap()).unwrap();
         let drive = if one["drive"] == "held" { Drive::Held } else { Drive::Free };
-        let found = resonances(&case.machine, drive).unwrap();
+        let found = resonances(&case.machine, drive, 0).unwrap();
         let expected = one["modes"].as_array().unwrap();
         assert!(!expected.is_empty());
         for mode in expected {
@@ -648,7 +648,7 @@ fn a_stage_without_a_measurement() {
     ] {
         for drive in [Drive::Held, Drive::Free] {
             let machine = Case::read(case).unwrap().machine;
-            let modes = resonances(&machine, drive).unwrap();
+            let modes = resonances(&machine, drive, 0).unwrap();
             assert!(modes.iter().all(|mode| mode.frequency > 1.0 && mode.damping >= 0.0 && mode.share <= 1.0));
             let main = modes.iter().find(|mode| mode.share == 1.0).unwrap();
             let criterion = Criterion::default().with_damping(main.damping).unwrap();
@@ -665,7 +665,45 @@ fn a_stage_without_a_measurement() {
         }
     }
     let rigid = Case::read("stages/emps/emps.toml").unwrap().machine;
-    assert!(resonances(&rigid, Drive::Held).unwrap_err().what.contains("rigid"));
+    assert!(resonances(&rigid, Drive::Held, 0).unwrap_err().what.contains("rigid"));
+}
+
+/// The modes of a gantry are those of its equations of motion: with free motors those of `paper/h-frame.md`, with motors
+/// held of bridge and cart on all spans, K = Σ k dᵀd over both.
+#[test]
+fn a_gantry_has_modes_of_each_coordinate() {
+    let k = [132_760.0, 132_760.0, 58_885.0];
+    // d of the three spans over bridge and cart
+    let (xx, yy) = (k[0] + k[1] + 4.0 * k[2], k[0] + k[1]);
+    let held = [xx / 1.2, yy / 0.362].map(|squared: f64| squared.sqrt() / std::f64::consts::TAU);
+    let machine = Case::read("stages/h-frame/h-frame.toml").unwrap().machine;
+    for (coordinate, frequency) in held.into_iter().enumerate() {
+        // Alike on both sides, bridge and cart do not know of each other.
+        let modes = resonances(&machine, Drive::Held, coordinate).unwrap();
+        assert_eq!(modes.len(), 1, "{modes:?}");
+        assert!((modes[0].frequency / frequency - 1.0).abs() < 1e-9, "{modes:?} {frequency}");
+    }
+    for (kind, wanted) in
+        [("h-frame", [196.643_946_994, 220.198_687_165]), ("core-xy", [214.360_612_188, 263.042_776_685])]
+    {
+        let machine = Case::read(format!("stages/{kind}/{kind}.toml")).unwrap().machine;
+        let mut found: Vec<f64> = (0..2)
+            .flat_map(|coordinate| resonances(&machine, Drive::Free, coordinate).unwrap())
+            .map(|mode| mode.frequency)
+            .collect();
+        found.sort_by(f64::total_cmp);
+        found.dedup_by(|a, b| (*a / *b - 1.0).abs() < 1e-9);
+        assert_eq!(found.len(), 2, "{kind}: {found:?}");
+        for (found, wanted) in found.iter().zip(wanted) {
+            assert!((found / wanted - 1.0).abs() < 1e-9, "{kind}: {found} {wanted}");
+        }
+    }
+    // Spans that follow: along the whole area, each mode between its least and its greatest of `taut modes`.
+    let machine = Case::read("stages/core-xy/follows.toml").unwrap().machine;
+    let modes = resonances(&machine, Drive::Free, 0).unwrap();
+    let [low, high] = [f64::min, f64::max]
+        .map(|pick| modes.iter().filter(|mode| mode.share == 1.0).map(|mode| mode.frequency).reduce(pick).unwrap());
+    assert!((low - 179.4).abs() < 0.1 && (high - 222.7).abs() < 0.1, "{low} {high}");
 }
 
 /// Two modes far apart: one shaper that covers both would be long.

@@ -21,12 +21,8 @@ use taut_report::tune::{Work, figures, page};
 /// Time between two steps of progress, s.
 const STEPS: f64 = 0.1;
 
-macro_rules! controllers {
-    ($($path:literal),* $(,)?) => { &[$(($path, include_str!(concat!("../../stages/sollmann-jouaneh/controllers/", $path)))),*] };
-}
-
 /// Controllers to begin with, from the bundled cases.
-const CONTROLLERS: &[(&str, &str)] = controllers![
+const CONTROLLERS: &[(&str, &str)] = bundled!["sollmann-jouaneh/controllers/";
     "pid.toml",
     "pid-rigid.toml",
     "pid-elastic.toml",

@@ -7,12 +7,8 @@ use serde_json::{Value, json};
 use taut::case::Case;
 use taut::error::Result;
 
-macro_rules! stages {
-    ($($path:literal),* $(,)?) => { &[$(($path, include_str!(concat!("../../stages/", $path)))),*] };
-}
-
 /// Their case files, none of which names another file.
-const STAGES: &[(&str, &str)] = stages![
+const STAGES: &[(&str, &str)] = bundled!["";
     "sollmann-jouaneh/table4.toml",
     "sollmann-jouaneh/table1.toml",
     "sollmann-jouaneh/table2.toml",

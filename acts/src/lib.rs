@@ -1,6 +1,13 @@
-//! Acts that a page can ask for: each is a row of [`ACTS`] and a function from a request to a reply.
+//! Acts that a page can ask for: each is a row of `ACTS` and a function from a request to a reply.
 //!
 //! They need no server: a [`Host`] provides what depends on the surroundings of the page, such as saving a file.
+
+/// Names and texts of bundled case files in a folder of `stages`.
+macro_rules! bundled {
+    ($folder:literal; $($path:literal),* $(,)?) => {
+        &[$(($path, include_str!(concat!("../../stages/", $folder, $path)))),*]
+    };
+}
 
 mod case;
 mod closed;

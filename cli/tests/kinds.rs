@@ -37,7 +37,7 @@ const TABLE: &[(&str, &[&str], &str, Ends)] = &[
     ("plan", &["--move", "short fast"], PID, YET_TO_COME),
     ("check", &[], LOGS, YET_TO_COME),
     ("fit", &[], LOGS, YET_TO_COME),
-    ("shape", &[], PID, YET_TO_COME),
+    ("shape", &[], PID, Runs),
     ("frf", &[], LOGS, YET_TO_COME),
     ("design", &["--for", "cart.mass", "--measure", "motor_current=10mA"], AXIS, YET_TO_COME),
     ("export c", &[], AXIS, Runs),

@@ -354,7 +354,7 @@ await test("gallery, tour and frequencies lead where they say", async open => {
   await page.click("#go-gallery");
   await page.waitForSelector(".gallery li");
   const count = await page.locator(".gallery li").count();
-  expect(count === 12, `${count} machines`);
+  expect(count === 14, `${count} machines`);
   await page.screenshot({path: join(shots, "studio-gallery.png")});
   await page.locator(".gallery button", {hasText: "core-xy/core-xy.toml"}).click();
   await quiet(page);

@@ -69,11 +69,12 @@ fn one(found: &Found) -> Value {
             };
             value["spectra"] = spectra.iter().map(one).collect();
         }
-        Source::Model { title, drive, modes } => {
+        Source::Model { title, coordinate, drive, modes } => {
             let mode = |mode: &Resonance| json!({ "position": mode.position, "frequency": mode.frequency, "damping": mode.damping, "share": mode.share });
             let drive = if *drive == Drive::Held { "held" } else { "free" };
             value["model"] = json!({
                 "title": title,
+                "coordinate": coordinate.map(|coordinate| coordinate.label.key),
                 "motor": drive,
                 "modes": modes.iter().map(mode).collect::<Vec<_>>(),
                 "uncertainty": found.uncertainty,

@@ -23,7 +23,7 @@ pub(super) fn no_axis(root: &Table, kind: Kind) -> Error {
     let field = root.optional("kind").unwrap_or_else(|| root.field.clone());
     let what = format!("this needs a single axis, and the case describes a gantry ({})", kind.name());
     field.fail(what).allowed("kind = \"axis\", or no kind at all").next(
-        "`taut simulate`, `taut modes`, `taut move` and `taut sweep` take gantries; fit and tuning of them are yet to come",
+        "`taut simulate`, `taut modes`, `taut move`, `taut shape` and `taut sweep` take gantries; fit and tuning of them are yet to come",
     )
 }
 

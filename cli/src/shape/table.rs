@@ -55,7 +55,8 @@ fn modes(text: &mut String, one: &Found) {
         return;
     }
     let pair = if one.choice.pairs.is_empty() { "" } else { "  best pair leaves" };
-    let _ = writeln!(text, "\n  mode along the travel  damping         moves the cart  recommended leaves{pair}");
+    let moves = format!("moves the {}", one.load());
+    let _ = writeln!(text, "\n  mode along the travel  damping         {moves:>14}  recommended leaves{pair}");
     for left in &all {
         let [frequency, damping, share, best, paired] = mode_words(left, one.choice.recommended);
         let mut row = format!("  {:<21}  {damping:<14}  {share:>14}  {best:>16} %", format!("{frequency} Hz"));

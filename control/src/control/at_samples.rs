@@ -15,8 +15,8 @@ use crate::metrics::{Meter, Peak};
 use crate::signal::profile::Profile;
 use crate::solve::{self, Solver};
 
-/// Runs a move of an axis and gathers the cart's error, settling and the root mean square of the current at samples alone, with
-/// straight lines between; the figures, and how the run ended. Motion and commands are those of
+/// Runs a move of an axis and gathers the cart's error, settling and the root mean square of the current at samples
+/// alone, with straight lines between; the figures, and how the run ended. Motion and commands are those of
 /// [`closed_loop`](super::closed_loop).
 pub(crate) fn closed_loop_at_samples(
     machine: &Machine,

@@ -158,7 +158,7 @@ pub fn stream(
     keep: bool,
     sink: &mut dyn FnMut(&Trajectory) -> Flow,
 ) -> Result<MoveRun> {
-    let mut wide = Wide::of(machine);
+    let mut wide = Wide::of(machine, profiles);
     let sink = &mut |block: &Trajectory| sink(wide.widened(profiles, block));
     run(machine, controllers, timing, profiles, rows, solver, (Detail::Full, keep), sink)
 }

@@ -9,6 +9,7 @@ use super::spectrum::{Axis, Spectrum};
 use crate::case::{Case, Files};
 use crate::error::{Error, Result};
 use crate::log::read_accelerometer;
+use crate::mechanism::Label;
 use crate::reach::resonance::{Drive, Reach, Resonance, reaches, resonances};
 use std::path::{Path, PathBuf};
 
@@ -26,11 +27,22 @@ pub enum Source {
     Model {
         /// The case's.
         title: String,
+        /// The coordinate that is to rest, of a machine with several.
+        coordinate: Option<Coordinate>,
         /// The motor meanwhile.
         drive: Drive,
         /// At all places.
         modes: Vec<Resonance>,
     },
+}
+
+/// A coordinate of a machine with several.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Coordinate {
+    /// Its name.
+    pub label: Label,
+    /// Its letter: x of the bridge, y of the cart.
+    pub letter: &'static str,
 }
 
 /// A file with its shapers.
@@ -121,7 +133,7 @@ pub fn recommend(args: &Question, files: &[PathBuf]) -> Result<Findings> {
     }
     let each = match args.together {
         true => vec![together(args, files)?],
-        false => files.iter().map(|file| find(args, files, file)).collect::<Result<Vec<Found>>>()?,
+        false => files.iter().map(|file| find(args, files, file)).collect::<Result<Vec<_>>>()?.concat(),
     };
     let comparison = match each.as_slice() {
         [Found { source: Source::Spectrum(first), .. }, Found { source: Source::Spectrum(second), .. }] => {
@@ -151,9 +163,17 @@ fn is_case(file: &Path) -> bool {
     file.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"))
 }
 
-fn find(args: &Question, files: &[PathBuf], file: &Path) -> Result<Found> {
-    let (source, also) = if is_case(file) { model(args, file)? } else { (measured(args, files, file)?, Vec::new()) };
-    chosen(args, file, source, also)
+/// What is found in a file: one choice, or one for each coordinate of a machine.
+fn find(args: &Question, files: &[PathBuf], file: &Path) -> Result<Vec<Found>> {
+    if !is_case(file) {
+        return Ok(vec![chosen(args, file, measured(args, files, file)?, Vec::new())?]);
+    }
+    let (sources, also) = model(args, file)?;
+    if sources.len() > 1 && files.len() > 1 {
+        let error = Error::new("a gantry has a shaper for each coordinate, and is compared with nothing").in_file(file);
+        return Err(error.next("name this case alone"));
+    }
+    sources.into_iter().map(|source| chosen(args, file, source, also.clone())).collect()
 }
 
 fn chosen(args: &Question, file: &Path, source: Source, also: Vec<PathBuf>) -> Result<Found> {
@@ -215,17 +235,23 @@ pub fn damping(modes: &[Resonance]) -> f64 {
     main.iter().sum::<f64>() / main.len().max(1) as f64
 }
 
-fn model(args: &Question, file: &Path) -> Result<(Source, Vec<PathBuf>)> {
+/// The model of each coordinate, and further files of the case.
+fn model(args: &Question, file: &Path) -> Result<(Vec<Source>, Vec<PathBuf>)> {
     if args.axis.is_some() {
         let error = Error::new("a case file has no accelerometer").in_file("--axis");
         return Err(error.next("leave --axis out, or give a spectrum"));
     }
     let changes: Vec<&str> = args.changes.iter().map(String::as_str).collect();
-    let case = Case::read_axis_for(file, &changes, Files::All)?;
+    let case = Case::read_for(file, &changes, Files::All)?;
     let drive = args.drive.unwrap_or(Drive::Held);
-    let modes = resonances(&case.machine, drive).map_err(|e| e.in_file(file))?;
-    let also = case.files.into_iter().map(|file| file.path).collect();
-    Ok((Source::Model { title: case.title, drive, modes }, also))
+    let labels: Vec<Label> = case.machine.travels().map(|(label, _)| label).collect();
+    let of_coordinate = |(number, (label, letter)): (usize, (&Label, &'static str))| {
+        let modes = resonances(&case.machine, drive, number).map_err(|e| e.in_file(file))?;
+        let coordinate = (labels.len() > 1).then_some(Coordinate { label: *label, letter });
+        Ok(Source::Model { title: case.title.clone(), coordinate, drive, modes })
+    };
+    let sources = labels.iter().zip(["x", "y"]).enumerate().map(of_coordinate).collect::<Result<_>>()?;
+    Ok((sources, case.files.iter().map(|file| file.path.clone()).collect()))
 }
 
 fn measured(args: &Question, files: &[PathBuf], file: &Path) -> Result<Source> {
@@ -316,6 +342,7 @@ impl Found {
         let named = ["x", "y", "z"].into_iter().find(|axis| name.contains(&format!("_{axis}_")));
         let axis = match &self.source {
             Source::Spectrum(Spectrum { axis, .. }) if *axis != Axis::All => axis.word(),
+            Source::Model { coordinate: Some(coordinate), .. } => coordinate.letter,
             Source::Spectrum(_) | Source::Spectra(_) | Source::Model { .. } => named.unwrap_or("x"),
         };
         let shaper = &self.choice.best().shaper;
@@ -327,9 +354,21 @@ impl Found {
         ]
     }
 
-    /// The file's name without its folder.
+    /// What is to rest: the cart, unless the model has several coordinates.
+    pub fn load(&self) -> &'static str {
+        match self.source {
+            Source::Model { coordinate: Some(coordinate), .. } => coordinate.label.name,
+            _ => "cart",
+        }
+    }
+
+    /// The file's name without its folder, and the coordinate of a model with several.
     pub fn name(&self) -> String {
-        self.file.file_name().unwrap_or_default().to_string_lossy().into_owned()
+        let file = self.file.file_name().unwrap_or_default().to_string_lossy();
+        match &self.source {
+            Source::Model { coordinate: Some(coordinate), .. } => format!("{file}, {}", coordinate.label.name),
+            _ => file.into_owned(),
+        }
     }
 
     /// The source, in a sentence.
@@ -355,10 +394,15 @@ impl Found {
                 let peaks: Vec<String> = spectrum.peaks().iter().map(peak).collect();
                 format!("{}; axis {}; peaks at {}", spectrum.origin, spectrum.axis.word(), peaks.join(", "))
             }
-            Source::Model { title, drive, modes } => {
-                let word = match drive {
-                    Drive::Held => "held on its command",
-                    Drive::Free => "free to give way",
+            Source::Model { title, coordinate, drive, modes } => {
+                let (motor, load) = match coordinate {
+                    None => ("motor", "cart".to_string()),
+                    Some(Coordinate { label, letter }) => ("motors", format!("{} ({letter})", label.name)),
+                };
+                let word = match (drive, coordinate) {
+                    (Drive::Held, None) => "held on its command",
+                    (Drive::Held, Some(_)) => "held on their commands",
+                    (Drive::Free, _) => "free to give way",
                 };
                 let main = modes.iter().filter(|mode| mode.share == 1.0);
                 let (mut low, mut high) = (f64::INFINITY, 0.0f64);
@@ -371,7 +415,7 @@ impl Found {
                 };
                 let damping = damping(modes);
                 format!(
-                    "the model of \"{title}\", motor {word}; the cart vibrates at {range}, damping ratio {damping:.3}"
+                    "the model of \"{title}\", {motor} {word}; the {load} vibrates at {range}, damping ratio {damping:.3}"
                 )
             }
         }

@@ -124,28 +124,24 @@ impl Sampled<'_, '_> {
         }
     }
 
-    /// References of each drive at `time`, s, along the belt: now and one lead later.
-    fn references(&self, time: f64) -> References {
+    /// References at `time`, s: of each drive along the belt, now and one lead later; and of all that slides, later.
+    fn references(&self, time: f64) -> (References, [Reference; SLIDES]) {
         let lead = self.clocked.timing.lead;
+        let at = |time: f64| {
+            let mut slides = [Reference::default(); SLIDES];
+            slides.iter_mut().zip(self.profiles).for_each(|(slide, profile)| *slide = profile.at(time));
+            slides
+        };
+        let now = at(time);
+        let ahead = if lead == 0.0 { now } else { at(time + lead) };
         let mut references = References::default();
         for (weights, of_drive) in self.shares.iter().zip(&mut references) {
-            let at = |time: f64| {
-                let coordinates = weights.iter().zip(self.profiles);
-                coordinates.fold(Reference::default(), |sum, (weight, profile)| sum.plus(*weight, profile.at(time)))
-            };
-            let now = at(time);
-            *of_drive = [now, if lead == 0.0 { now } else { at(time + lead) }];
+            *of_drive = [&now, &ahead].map(|slides| {
+                let weighed = weights.iter().zip(slides);
+                weighed.fold(Reference::default(), |sum, (weight, slide)| sum.plus(*weight, *slide))
+            });
         }
-        references
-    }
-
-    /// References of all that slides at `time`, s; of an axis that of its controller is all there is.
-    fn slides(&self, time: f64) -> [Reference; SLIDES] {
-        let mut slides = [Reference::default(); SLIDES];
-        if self.profiles.len() > 1 {
-            slides.iter_mut().zip(self.profiles).for_each(|(slide, profile)| *slide = profile.at(time));
-        }
-        slides
+        (references, ahead)
     }
 
     /// The inputs from now on and until when they are held, s, told the state and the motors' currents, A, just before.
@@ -155,7 +151,7 @@ impl Sampled<'_, '_> {
         // A command that was delayed needs no reference.
         let (references, slides) = match self.clocked.is_at_sample() {
             false => Default::default(),
-            true => (self.references(time), self.slides(time + self.clocked.timing.lead)),
+            true => self.references(time),
         };
         let drives = self.controllers.len();
         if let Some(decisions) = self.clocked.decide(self.controllers, (state, currents), (&references, &slides)) {

@@ -85,8 +85,8 @@ impl Clocked {
         self.acting = self.waiting.pop_front().unwrap_or_default();
     }
 
-    /// Decides at [`Clocked::next`] for each drive, `slides` being the references of all that slides one lead later; what was decided if that is a sample. A delayed command needs
-    /// nothing else.
+    /// Decides at [`Clocked::next`] for each drive, `slides` being the references of all that slides one lead later;
+    /// returns the decisions if that is a sample. A delayed command needs nothing else.
     pub fn decide(
         &mut self,
         controllers: &mut [&mut dyn Controller],

@@ -8,30 +8,35 @@ use crate::trajectory::{Column, Trajectory};
 /// Blocks of rows with references and errors behind their own columns.
 pub(super) struct Wide {
     block: Trajectory,
+    /// The path of a machine with two coordinates.
+    contour: Option<Contour>,
     /// Columns of the positions, and names of the references and errors that go with them.
     loads: Vec<[String; 3]>,
 }
 
 impl Wide {
-    pub(super) fn of(machine: &Machine) -> Self {
+    pub(super) fn of(machine: &Machine, profiles: &[Profile]) -> Self {
         let slides = machine.geometry().slides;
         let names = |slide: &SlideAt| {
             let key = machine.geometry().label(slide.body).key;
             let reference = if slides.len() == 1 { "reference".to_string() } else { format!("{key}_reference") };
             [format!("{key}_position"), reference, format!("{key}_error")]
         };
-        Self { block: Trajectory::default(), loads: slides.iter().map(names).collect() }
+        Self {
+            block: Trajectory::default(),
+            contour: Contour::along(profiles),
+            loads: slides.iter().map(names).collect(),
+        }
     }
 
     pub(super) fn widened(&mut self, profiles: &[Profile], block: &Trajectory) -> &Trajectory {
         let (own, loads) = (block.columns.len(), self.loads.len());
-        let contour = Contour::along(profiles);
-        let added = 2 * loads + usize::from(contour.is_some());
+        let added = 2 * loads + usize::from(self.contour.is_some());
         if self.block.columns.len() != own + added {
             self.block.columns.clone_from(&block.columns);
             let names = self.loads.iter().map(|names| &names[1]).chain(self.loads.iter().map(|names| &names[2]));
             self.block.columns.extend(names.map(|name| Column::new(name.as_str(), "m")));
-            if contour.is_some() {
+            if self.contour.is_some() {
                 self.block.columns.push(Column::new("contour_error", "m"));
             }
         }
@@ -43,7 +48,7 @@ impl Wide {
             place(names).iter().zip(reference).map(|(x, y)| x - y).collect()
         };
         let errors: Vec<Vec<f64>> = self.loads.iter().zip(&references).map(error).collect();
-        let away: Option<Vec<f64>> = match (contour, &self.loads[..]) {
+        let away: Option<Vec<f64>> = match (&self.contour, &self.loads[..]) {
             (Some(contour), [x, y]) => {
                 let points = place(x).iter().zip(place(y)).zip(time);
                 Some(points.map(|((x, y), time)| contour.nearest(*time, [*x, *y]).0).collect())

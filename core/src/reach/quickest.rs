@@ -62,7 +62,7 @@ pub fn modes(machine: &Machine) -> Vec<f64> {
     if machine.belt.model == BeltModel::Rigid {
         return Vec::new();
     }
-    let Ok(found) = resonances(machine, Drive::Held) else { return Vec::new() };
+    let Ok(found) = resonances(machine, Drive::Held, 0) else { return Vec::new() };
     let mut lowest: Vec<f64> = reaches(&found).iter().map(|mode| mode.frequency[0]).collect();
     lowest.sort_by(f64::total_cmp);
     lowest

@@ -1,12 +1,15 @@
-//! The frequencies at which a stage vibrates, along its travel, from its masses and springs.
+//! The frequencies at which a machine vibrates, along its travel, from its masses and springs.
 
 use crate::error::{Error, Result};
-use crate::machine::{AmplifierMode, BeltModel, Machine, Spans};
+use crate::machine::{AmplifierMode, BeltModel, DriveAt, DriveUnit, Machine, Travel};
+use crate::mechanism::Body;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use std::f64::consts::PI;
 
 /// Places along the travel at which modes are looked for.
 const PLACES: usize = 21;
+/// Places along the travel of another coordinate.
+const OTHERS: usize = 5;
 /// Modes that move the cart less than this part of the strongest are left out.
 const LEAST: f64 = 1e-3;
 
@@ -23,13 +26,13 @@ pub enum Drive {
 /// A mode of vibration at one place.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Resonance {
-    /// Cart position, m.
+    /// Position of the coordinate, m: of the cart of an axis.
     pub position: f64,
     /// Undamped natural frequency, Hz.
     pub frequency: f64,
     /// Damping ratio.
     pub damping: f64,
-    /// How far it moves the cart after a step of the command, of what the strongest mode at that place does: 0 to 1.
+    /// How far it moves the coordinate after a step of the command, of what the strongest mode at that place does: 0 to 1.
     pub share: f64,
 }
 
@@ -82,27 +85,21 @@ impl Reach {
     }
 }
 
-/// The modes of a stage that move its cart: at every place along the travel if the spans follow the cart, else at one.
+/// The modes of a machine that move one of its coordinates: the cart of an axis, bridge or cart of a gantry. They are
+/// those at every place along the travel if the spans follow what slides, else at one.
 ///
-/// The masses, springs and dampers are those of the sliding stage: M q̈ + C q̇ + K q = 0 with the viscous friction, the
+/// The masses, springs and dampers are those of the sliding machine: M q̈ + C q̇ + K q = 0 with the viscous friction, the
 /// belt's damping and, where a free motor is fed by a voltage, its back-EMF. Frequencies are of K and M alone; damping
 /// ratios ζ = φᵀ C φ / (2 ω φᵀ M φ) hold for light damping. Modes that are damped so much that they do not vibrate are
 /// left out.
-pub fn resonances(machine: &Machine, drive: Drive) -> Result<Vec<Resonance>> {
+pub fn resonances(machine: &Machine, drive: Drive, coordinate: usize) -> Result<Vec<Resonance>> {
     if machine.belt.model == BeltModel::Rigid {
         let error = Error::new("a rigid belt has no resonance").allowed("belt.model = \"elastic\" or \"two-mass\"");
         return Err(error.next("describe the belt's stiffness, or give a measured spectrum"));
     }
-    let places = match (&machine.cart.travel, machine.belt.follows_cart) {
-        (Some(travel), true) => {
-            let part = |k: usize| k as f64 / (PLACES - 1) as f64;
-            (0..PLACES).map(|k| travel.min + part(k) * (travel.max - travel.min)).collect()
-        }
-        _ => vec![0.0],
-    };
     let mut all = Vec::new();
-    for position in places {
-        let mut here = at(machine, drive, position);
+    for slides in places(machine, coordinate) {
+        let mut here = at(machine, (drive, coordinate), &slides);
         let most = here.iter().map(|mode| mode.share).fold(0.0, f64::max);
         here.retain(|mode| mode.share > LEAST * most);
         for mode in &mut here {
@@ -117,23 +114,67 @@ pub fn resonances(machine: &Machine, drive: Drive) -> Result<Vec<Resonance>> {
     Ok(all)
 }
 
-/// The modes with the cart at one place; `share` is not yet relative.
-fn at(machine: &Machine, drive: Drive, position: f64) -> Vec<Resonance> {
-    let (m, c, k) = matrices(machine, drive, position);
-    // With the drive pulley held it is no coordinate, but what it does is felt through its column of K.
-    let first = if drive == Drive::Held { 1 } else { 0 };
+/// Positions of what slides, m: along the travel of the coordinate, to and fro over a few places of another.
+fn places(machine: &Machine, coordinate: usize) -> Vec<Vec<f64>> {
+    let travels: Vec<Option<Travel>> = machine.travels().map(|(_, travel)| travel).collect();
+    let along = |travel: &Option<Travel>, count: usize| -> Vec<f64> {
+        let Some(travel) = travel.filter(|_| machine.belt.follows_cart) else { return vec![0.0] };
+        let part = |k: usize| k as f64 / (count - 1) as f64;
+        (0..count).map(|k| travel.min + part(k) * (travel.max - travel.min)).collect()
+    };
+    let mut all = vec![vec![0.0; travels.len()]];
+    for (number, travel) in travels.iter().enumerate() {
+        let is_own = number == coordinate;
+        if !is_own {
+            let others = along(travel, OTHERS);
+            all = others.iter().flat_map(|place| all.iter().map(move |at| with(at, number, *place))).collect();
+        }
+    }
+    let own = along(&travels[coordinate], PLACES);
+    let line = |(turn, at): (usize, &Vec<f64>)| -> Vec<Vec<f64>> {
+        let one = |place: &f64| with(at, coordinate, *place);
+        // From where the last line ended, so that a mode changes little from place to place.
+        if turn.is_multiple_of(2) { own.iter().map(one).collect() } else { own.iter().rev().map(one).collect() }
+    };
+    all.iter().enumerate().flat_map(line).collect()
+}
+
+/// Positions with another one of a coordinate.
+fn with(at: &[f64], number: usize, place: f64) -> Vec<f64> {
+    let mut all = at.to_vec();
+    all[number] = place;
+    all
+}
+
+/// The modes with everything at one place; `share` is not yet relative.
+fn at(machine: &Machine, (drive, coordinate): (Drive, usize), slides: &[f64]) -> Vec<Resonance> {
+    let geometry = machine.geometry();
+    let (m, c, k) = matrices(machine, drive, slides);
+    // Drive pulleys that are held, the first bodies, are no coordinates, but what they do is felt through their columns
+    // of K.
+    let drives = geometry.drives.len();
+    let first = if drive == Drive::Held { drives } else { 0 };
     let size = m.nrows() - first;
     let part = |a: &DMatrix<f64>| a.view((first, first), (size, size)).into_owned();
     let root = m.diagonal().rows(first, size).map(|mass| mass.sqrt().recip());
     // M^(−½) K M^(−½) u = ω² u, φ = M^(−½) u
     let scaled = DMatrix::from_fn(size, size, |i, j| part(&k)[(i, j)] * root[i] * root[j]);
     let eigen = SymmetricEigen::new(scaled);
+    let slide = &geometry.slides[coordinate];
     let force = match drive {
-        // A step of φ₁ pulls with −K's first column; the cart ends at r φ₁.
-        Drive::Held => -k.view((1, 0), (size, 1)).column(0).into_owned(),
-        Drive::Free => DVector::from_fn(size, |i, _| if i == 0 { 1.0 } else { 0.0 }),
+        // A step of the drives, as much as the coordinate's own asks for, pulls with their columns of −K.
+        Drive::Held => {
+            let share = |at: &DriveAt| geometry.bodies[at.pulley].by_slides[coordinate];
+            let column = |at: &DriveAt| -k.view((first, at.pulley), (size, 1)).column(0) * share(at);
+            geometry.drives.iter().map(column).fold(DVector::zeros(size), |sum, column| sum + column)
+        }
+        // The torques that push the coordinate: Σ τ_k dφ_k = F dq
+        Drive::Free => DVector::from_fn(size, |i, _| {
+            let of = geometry.drives.iter().zip(slide.by_drives).find(|(at, _)| at.pulley == i);
+            of.map_or(0.0, |(_, weight)| *weight)
+        }),
     };
-    let cart = 1 - first;
+    let load = slide.body - first;
     let stiffest = eigen.eigenvalues.max();
     let mode = |i: usize| {
         let squared = eigen.eigenvalues[i];
@@ -144,50 +185,55 @@ fn at(machine: &Machine, drive: Drive, position: f64) -> Vec<Resonance> {
         let omega = squared.sqrt();
         let shape = eigen.eigenvectors.column(i).component_mul(&root);
         let damping = (shape.transpose() * part(&c) * &shape)[(0, 0)] / (2.0 * omega);
-        let share = (shape[cart] * shape.dot(&force) / squared).abs();
-        (damping < 1.0).then_some(Resonance { position, frequency: omega / (2.0 * PI), damping, share })
+        let share = (shape[load] * shape.dot(&force) / squared).abs();
+        let (position, frequency) = (slides[coordinate], omega / (2.0 * PI));
+        (damping < 1.0).then_some(Resonance { position, frequency, damping, share })
     };
     let mut modes: Vec<Resonance> = (0..size).filter_map(mode).collect();
     modes.sort_by(|a, b| a.frequency.total_cmp(&b.frequency));
     modes
 }
 
-/// M, C and K over φ₁, x and φ₃; over φ₁ and x where both pulleys are one.
-fn matrices(machine: &Machine, drive: Drive, position: f64) -> (DMatrix<f64>, DMatrix<f64>, DMatrix<f64>) {
-    let motor = &machine.drives[0].motor;
-    let n = motor.gear_ratio;
-    let [mut stiffness, damping] = [machine.belt.stiffness, machine.belt.damping].map(Spans::three);
-    if let (true, Some(make)) = (machine.belt.follows_cart, &machine.belt.make) {
-        let [k1, k2] = make.stiffness_at(position);
-        stiffness = [k1, k2, stiffness[2]];
+/// M, C and K over the bodies other than rotors; over φ₁ and x of an axis where both pulleys are one.
+fn matrices(machine: &Machine, drive: Drive, slides: &[f64]) -> (DMatrix<f64>, DMatrix<f64>, DMatrix<f64>) {
+    let (geometry, mechanism) = (machine.geometry(), machine.mechanism());
+    let count = geometry.bodies.len();
+    let mut stiffness: Vec<f64> = machine.belt.stiffness.into_iter().collect();
+    let damping: Vec<f64> = machine.belt.damping.into_iter().collect();
+    if let (Some(lengths), Some(make)) = (machine.span_lengths(slides), &machine.belt.make) {
+        for ((k, length), span) in stiffness.iter_mut().zip(lengths).zip(geometry.spans) {
+            *k = if span.follows.is_empty() { *k } else { make.rigidity() / length };
+        }
     }
-    let mechanism = machine.mechanism();
     let arm = |span: usize, body: usize| mechanism.stretch_rate(span).speed[body];
     // Σ k dᵀ d over the spans' stretches d
-    let sum = |values: [f64; 3]| {
-        DMatrix::from_fn(3, 3, |i, j| (0..3).map(|s| values[s] * arm(s, i) * arm(s, j)).sum::<f64>())
+    let sum = |values: &[f64]| {
+        let term = |i: usize, j: usize| values.iter().enumerate().map(|(s, k)| k * arm(s, i) * arm(s, j)).sum::<f64>();
+        DMatrix::from_fn(count, count, term)
     };
-    let rotor = n * n * motor.rotor_inertia;
-    let masses = [machine.drive_pulley.inertia + rotor, machine.cart.mass, machine.idler_pulley.inertia];
-    let frictions = [machine.drive_pulley.friction, machine.cart.friction, machine.idler_pulley.friction];
-    let mut resisting = frictions.map(|friction| 0.5 * (friction.forward.viscous + friction.backward.viscous));
-    if drive == Drive::Free && machine.drives[0].amplifier.mode == AmplifierMode::Voltage {
-        // n² K_t K_e / R, of an armature without inductance
-        resisting[0] += n * n * motor.torque_constant * motor.back_emf_constant / motor.resistance;
+    let bodies = &mechanism.bodies[..count];
+    let mut masses: Vec<f64> = bodies.iter().map(|body| body.inertia).collect();
+    let viscous = |body: &Body| 0.5 * (body.friction.forward.viscous + body.friction.backward.viscous);
+    let mut resisting: Vec<f64> = bodies.iter().map(viscous).collect();
+    for (at, DriveUnit { motor, amplifier }) in geometry.drives.iter().zip(&machine.drives) {
+        let n = motor.gear_ratio;
+        masses[at.pulley] += n * n * motor.rotor_inertia;
+        if drive == Drive::Free && amplifier.mode == AmplifierMode::Voltage {
+            // n² K_t K_e / R, of an armature without inductance
+            resisting[at.pulley] += n * n * motor.torque_constant * motor.back_emf_constant / motor.resistance;
+        }
     }
     let diagonal = |values: &[f64]| DMatrix::from_diagonal(&DVector::from_column_slice(values));
-    if machine.belt.model == BeltModel::TwoMass {
+    if let (BeltModel::TwoMass, [k1, k2, k3], [c1, c2, c3]) = (machine.belt.model, &stiffness[..], &damping[..]) {
         // Spans 2 and 3 in series between the cart and both pulleys, which turn as one.
-        let r = machine.pulley_radius;
-        let [[k1, k2, k3], [c1, c2, c3]] = [stiffness, damping];
-        let all = k2 + k3;
+        let (r, all) = (machine.pulley_radius, k2 + k3);
         let (k, c) = (k1 + k2 * k3 / all, c1 + (c2 * k3 * k3 + c3 * k2 * k2) / (all * all));
         let both = |value: f64| DMatrix::from_row_slice(2, 2, &[r * r * value, -r * value, -r * value, value]);
-        let two = |values: [f64; 3]| diagonal(&[values[0] + values[2], values[1]]);
-        return (two(masses), both(c) + two(resisting), both(k));
+        let two = |values: &[f64]| diagonal(&[values[0] + values[2], values[1]]);
+        return (two(&masses), both(c) + two(&resisting), both(k));
     }
     // A pulley without inertia follows at once; the smallest weight keeps the matrix of masses regular.
     let tiny = 1e-9 * machine.cart.mass * machine.pulley_radius * machine.pulley_radius;
-    let masses = masses.map(|mass| mass.max(tiny));
-    (diagonal(&masses), sum(damping) + diagonal(&resisting), sum(stiffness))
+    masses.iter_mut().for_each(|mass| *mass = mass.max(tiny));
+    (diagonal(&masses), sum(&damping) + diagonal(&resisting), sum(&stiffness))
 }

@@ -1,6 +1,5 @@
 //! The elements that a model may lack, one row each.
 
-use super::{force, gear, stamp};
 use crate::case::{Case, Plan};
 use crate::fit::search::starts::Searched;
 use crate::log::Quantity;
@@ -25,29 +24,6 @@ pub(super) struct Extension {
     pub words: fn(&Site, &Extended, &Fitted) -> Said,
     /// A machine of the case with it as one of the case without it.
     pub without: fn(&Site, Machine) -> Machine,
-}
-
-/// All of them.
-pub(super) const EXTENSIONS: &[Extension] = &[
-    row("spring", gear::springs, gear::spring_words, gear::without),
-    row("play", gear::plays, gear::play_words, gear::without),
-    row("delay", stamp::delays, stamp::words, as_it_is),
-    row("drag", force::drags, force::drag_words, force::without),
-    row("stribeck", force::falls, force::fall_words, force::without_fall),
-    row("load", force::loads, force::load_words, as_it_is),
-];
-
-const fn row(
-    key: &'static str,
-    tries: fn(&Site) -> Vec<Extended>,
-    words: fn(&Site, &Extended, &Fitted) -> Said,
-    without: fn(&Site, Machine) -> Machine,
-) -> Extension {
-    Extension { key, tries, words, without }
-}
-
-fn as_it_is(_: &Site, machine: Machine) -> Machine {
-    machine
 }
 
 /// A case with one element more, where the search for it starts.

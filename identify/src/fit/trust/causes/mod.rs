@@ -30,10 +30,33 @@ use crate::fit::limits::{
 };
 use crate::fit::search::point::Options;
 use crate::fit::search::starts::Searched;
-use crate::machine::Kind;
-use extension::{EXTENSIONS, Extension, Site};
+use crate::machine::{Kind, Machine};
+use extension::{Extended, Extension, Fitted, Said, Site};
 use nalgebra::{DMatrix, DVector};
 use tried::Tried;
+
+/// All of them.
+const EXTENSIONS: &[Extension] = &[
+    row("spring", gear::springs, gear::spring_words, gear::without),
+    row("play", gear::plays, gear::play_words, gear::without),
+    row("delay", stamp::delays, stamp::words, as_it_is),
+    row("drag", force::drags, force::drag_words, force::without),
+    row("stribeck", force::falls, force::fall_words, force::without_fall),
+    row("load", force::loads, force::load_words, as_it_is),
+];
+
+const fn row(
+    key: &'static str,
+    tries: fn(&Site) -> Vec<Extended>,
+    words: fn(&Site, &Extended, &Fitted) -> Said,
+    without: fn(&Site, Machine) -> Machine,
+) -> Extension {
+    Extension { key, tries, words, without }
+}
+
+fn as_it_is(_: &Site, machine: Machine) -> Machine {
+    machine
+}
 
 /// The element that explains most of what the fit leaves; none where none is accepted, or `law`, a friction law,
 /// explains more.
