@@ -4,40 +4,37 @@
 //
 // TAUT is the program, whose digits are compared; FOLDER is what `cargo xtask web` made. Pictures go to SHOTS. Of tests
 // with NAME in their names only these are done.
-import {execFileSync} from "node:child_process";
+import {spawnSync} from "node:child_process";
 import {mkdirSync, mkdtempSync, readFileSync, writeFileSync} from "node:fs";
-import {createServer} from "node:http";
 import {tmpdir} from "node:os";
-import {extname, join} from "node:path";
-import {Harness, expect, quiet, row, settled, value} from "./harness.mjs";
+import {join} from "node:path";
+import {Harness, UNDER, expect, quiet, row, settled, value} from "./harness.mjs";
 
 const [program, taut, folder, shots, only] = process.argv.slice(2);
 mkdirSync(shots, {recursive: true});
 const TABLE4 = "stages/sollmann-jouaneh/table4.toml", LINEAR = "stages/sollmann-jouaneh/identification/linear-5v.toml";
-/** Where the folder is served: not at the top. */
-const UNDER = "/lessons/belt/";
-
-// ---- A server of files that knows nothing else, not even what WebAssembly is.
-
-const TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml"};
-const asked = [];
-const files = createServer((request, response) => {
-  asked.push(`${request.method} ${request.url}`);
-  const path = request.url.startsWith(UNDER) ? request.url.slice(UNDER.length) || "index.html" : "";
-  let content = null;
-  try { if (request.method === "GET" && /^[a-z-]+\.[a-z]+$/.test(path)) content = readFileSync(join(folder, path)); } catch { /* told below */ }
-  response.writeHead(content ? 200 : 404, {"Content-Type": (content && TYPES[extname(path)]) || "application/octet-stream"});
-  response.end(content || "");
-});
-await new Promise(done => files.listen(0, "127.0.0.1", done));
-const address = `http://127.0.0.1:${files.address().port}${UNDER}`;
-
+const LOGS = ["5-v-pulse", "10-v-pulse"].map(name => join(LINEAR, `../logs/${name}.measured.csv`));
 const harness = new Harness(program, taut);
 await harness.start();
+const {address, asked} = await harness.serveFolder(folder);
 const test = (name, work) => (!only || name.includes(only) ? harness.test(name, open => work((options = {}, hash = "") => open(address + hash, options))) : null);
 const ask = (page, act, body) => page.evaluate(async ([act, body]) => {
   try { return (await window.studio.wire.ask(act, body)).head; } catch (error) { return {error: error.mistake || String(error)}; }
 }, [act, body]);
+
+/** Removes what the browser reports of the revoked addresses by which workers are stopped. */
+const forgive = trouble => { for (let k = trouble.length; k--;) if (/ERR_FILE_NOT_FOUND/.test(trouble[k])) trouble.splice(k, 1); };
+
+/** JSON with the keys of objects in alphabetical order. */
+const sorted = one => JSON.stringify(one, (_, part) => (part && typeof part === "object" && !Array.isArray(part)
+  ? Object.fromEntries(Object.entries(part).sort(([a], [b]) => (a < b ? -1 : 1))) : part));
+
+/** What the program prints as JSON; of a run that ended early, too. */
+const printed = words => {
+  const {stdout, stderr} = spawnSync(taut, [...words, "--json"], {maxBuffer: 1 << 26, encoding: "utf8"});
+  expect(stdout.startsWith("{"), `taut ${words.join(" ")}: ${stderr}`);
+  return JSON.parse(stdout);
+};
 
 // ---- What a person does
 
@@ -50,43 +47,54 @@ await test("opens a machine of the gallery, and a drag of a slider simulates", a
   const slider = row(page, "cart.friction.viscous").locator("input[type=range]");
   await slider.scrollIntoViewIfNeeded();
   const box = await slider.boundingBox();
+  const plotted = () => page.locator("[data-panel=position] canvas").first().evaluate(canvas => canvas.toDataURL()), before = await plotted();
   await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
   await page.mouse.down();
   for (let k = 1; k <= 20; k++) await page.mouse.move(box.x + box.width * (0.5 + 0.02 * k), box.y + box.height / 2);
   await page.mouse.up();
   await quiet(page);
+  expect((await plotted()) !== before, "the plots do not move");
   const shown = Number(await row(page, "cart.friction.viscous").locator("input[type=text]").inputValue());
   expect(shown > 30 && (await value(page, "cart.friction.viscous")) === shown, `the field says ${shown}`);
   expect((await page.evaluate(() => window.studio.text)).includes(`viscous = "${shown} N s/m"`), "the text does not have it");
 });
 
-await test("shows the digits of the program for 30 random settings", async open => {
+await test("shows the digits of the program for 100 random machines", async open => {
   const {page} = await open();
   // A sequence that is the same each time (Lehmer, 48271 modulo 2³¹ − 1).
   let state = 20261;
   const random = () => (state = (state * 48271) % 2147483647) / 2147483647;
-  const keys = ["cart.mass", "drive_pulley.inertia", "idler_pulley.inertia", "belt.stiffness.0", "belt.stiffness.2",
-    "cart.friction.viscous", "cart.friction.coulomb", "drive_pulley.friction.viscous", "drive_pulley.friction.coulomb"];
-  const text = readFileSync(TABLE4, "utf8"), {parameters} = await ask(page, "run", {text, describe: true});
   const file = join(mkdtempSync(join(tmpdir(), "taut-web-test-")), "studio.toml");
-  const number = key => parameters.find(one => one.key === key);
-  for (let k = 0; k < 30; k++) {
-    const set = keys.filter(key => number(key) && random() < 0.5).map(key => [key, number(key).value * 10 ** (random() - 0.5)]);
-    const experiment = Math.floor(2 * random());
-    const here = await ask(page, "run", {text, set, experiment});
+  const stages = (await ask(page, "gallery", {})).stages, described = [];
+  for (const {text} of stages) described.push(await ask(page, "run", {text, describe: true}));
+  const seen = new Map();
+  for (let drawn = 0, compared = 0; compared < 100; drawn++) {
+    expect(drawn < 200, `of ${drawn} machines ${drawn - compared} were refused`);
+    const place = Math.floor(stages.length * random()), {parameters, experiments} = described[place];
+    const set = parameters.filter(() => random() < 0.3).map(one => [one.key, one.value * 10 ** (0.5 * (random() - 0.5))]);
+    const experiment = Math.floor(experiments.length * random());
+    const here = await ask(page, "run", {text: stages[place].text, set, experiment});
+    const name = `${stages[place].path} ${experiments[experiment].name} ${JSON.stringify(set)}`;
+    // A breakaway below Coulomb friction, for example, is refused.
+    if (here.error) { expect(here.error.what && !/defect/.test(here.error.what), `${name}: ${JSON.stringify(here.error)}`); continue; }
     // The text that the page shows for it, as whoever downloads it would run it.
     writeFileSync(file, here.text);
-    const there = JSON.parse(execFileSync(taut, ["simulate", file, "--json"], {maxBuffer: 1 << 26}));
-    const [one, other] = [here.result.experiments, [there.experiments[experiment]]].map(all => JSON.stringify(all));
-    expect(one === other, `${JSON.stringify(set)}: the page has\n${one}\nthe program\n${other}`);
-    expect(JSON.stringify(here.result.machine) === JSON.stringify(there.machine), `${JSON.stringify(set)}: another machine`);
+    const kind = here.result.experiments ? "experiments" : "moves";
+    const there = printed([kind === "moves" ? "move" : "simulate", file]);
+    expect(there[kind], `${name}: ${sorted(there)}`);
+    const [one, other] = [here.result[kind][0], there[kind][experiment]].map(sorted);
+    expect(one === other, `${name}: the page has\n${one}\nthe program\n${other}`);
+    expect(sorted(here.result.machine) === sorted(there.machine), `${name}: another machine`);
+    seen.set(place, (seen.get(place) || 0) + 1);
+    compared++;
   }
+  expect(seen.size === stages.length, `only ${seen.size} of ${stages.length} machines of the gallery were drawn`);
 });
 
 await test("logs that are dropped are fitted by a worker, with the digits of the program", async open => {
   const {page} = await open();
   await page.click("#go-fit");
-  await page.setInputFiles("#log-file", ["5-v-pulse", "10-v-pulse"].map(name => join(LINEAR, `../logs/${name}.measured.csv`)));
+  await page.setInputFiles("#log-file", LOGS);
   await page.waitForFunction(() => document.querySelectorAll(".log-file").length === 2);
   const told = await ask(page, "columns", {path: "/dropped/1/10-v-pulse.measured.csv"});
   expect(told.found && told.rows > 100, JSON.stringify(told.error));
@@ -96,9 +104,50 @@ await test("logs that are dropped are fitted by a worker, with the digits of the
     try { return {head: (await window.studio.wire.ask("fit", {text}, () => { steps += 1; })).head, steps}; } catch (error) { return {error: error.mistake || String(error)}; }
   }, text);
   expect(here.head && here.steps > 0, JSON.stringify(here.error || here.steps));
-  const there = JSON.parse(execFileSync(taut, ["fit", LINEAR, "--json"], {maxBuffer: 1 << 26}));
-  const [one, other] = [here.head.result, there].map(result => JSON.stringify(result.parameters));
-  expect(one && one === other, `the page has\n${one}\nthe program\n${other}`);
+  const there = printed(["fit", LINEAR]), [own, others] = [here.head.result, there].map(result => result.parameters);
+  // Products of large matrices are summed with fused multiplications where the processor has them, and WebAssembly has
+  // none: standard errors may differ in their last digits.
+  for (const [k, one] of own.entries()) {
+    const {standard_error: error, interval_95: interval, ...rest} = one, {standard_error, interval_95, ...wanted} = others[k];
+    const name = `${one.name}: the page has ${JSON.stringify(one)}, the program ${JSON.stringify(others[k])}`;
+    expect(sorted(rest) === sorted(wanted), name);
+    for (const [a, b] of [[error, standard_error], ...interval.map((end, k) => [end, interval_95[k]])]) expect(Math.abs(a - b) <= 1e-12 * Math.abs(b), name);
+  }
+  expect(own.length === others.length, `${own.length} parameters`);
+});
+
+await test("a log that is dropped by hand is checked and fitted from the page", async open => {
+  const {page} = await open();
+  await page.evaluate(text => window.studio.open(text, {name: "table4.toml"}), readFileSync(TABLE4, "utf8"));
+  await quiet(page);
+  await page.click("#go-fit");
+  const dropped = await page.evaluateHandle(content => {
+    const data = new DataTransfer();
+    data.items.add(new File([content], "5 V pulse.csv"));
+    return data;
+  }, readFileSync(LOGS[0], "utf8"));
+  await page.locator("#view-fit .drop").first().dispatchEvent("drop", {dataTransfer: dropped});
+  await page.waitForSelector(".log-file");
+  await page.locator("#view-fit input[value='cart.friction.viscous']").check();
+  await page.click("#check");
+  await page.waitForSelector("#view-fit .report[data-of=check] h2", {timeout: 120_000});
+  await page.click("#fit");
+  await page.waitForSelector("#fit-keep", {timeout: 120_000});
+  expect(/cart.friction.viscous/.test(await page.locator("#view-fit .report table").first().innerText()), "no parameter is told");
+  await page.screenshot({path: join(shots, "web-fit.png"), fullPage: true});
+});
+
+await test("a log that is no log, and one that is too large, are told", async open => {
+  const {page} = await open();
+  await page.click("#go-fit");
+  const kept = await page.evaluate(async () => {
+    const {wire} = window.studio, path = await wire.upload(new File(["words\n"], "notes.csv"));
+    try { await wire.upload(new File([new Uint8Array((64 << 20) + 1)], "large.csv")); } catch (error) { return [path, String(error)]; }
+    return [path, ""];
+  });
+  expect(kept[0] === "/dropped/0/notes.csv" && /64 MB/.test(kept[1]), kept.join());
+  const told = await ask(page, "columns", {path: kept[0]});
+  expect(told.error && /no line of this file has numbers/.test(told.error.what), JSON.stringify(told));
 });
 
 await test("a long work tells how far it is, and Stop keeps what there is", async open => {
@@ -110,8 +159,59 @@ await test("a long work tells how far it is, and Stop keeps what there is", asyn
     try { return {head: (await asked).head, steps}; } catch (error) { return {error: error.mistake || String(error), steps}; }
   }, readFileSync(TABLE4, "utf8"));
   expect(sweep.head && sweep.head.stopped && sweep.head.done > 0 && sweep.steps >= 4, JSON.stringify(sweep.error || sweep.head));
-  // The browser tells of the address by which the worker was stopped.
-  for (let k = trouble.length; k--;) if (/ERR_FILE_NOT_FOUND/.test(trouble[k])) trouble.splice(k, 1);
+  forgive(trouble);
+});
+
+await test("a sweep of the page shows its progress and is stopped by its button", async open => {
+  const {page, trouble} = await open();
+  await page.evaluate(text => window.studio.open(text, {name: "table4.toml"}), readFileSync(TABLE4, "utf8"));
+  await quiet(page);
+  await page.click("#go-sweep");
+  await page.locator("#runs").fill("20000");
+  await page.click("#sweep");
+  await page.waitForFunction(() => / of 20000 runs/.test(document.querySelector("#sweep-status").textContent), null, {timeout: 60_000});
+  await page.click("#sweep-stop");
+  await page.waitForFunction(() => /stopped/.test(document.querySelector("#sweep-status").textContent), null, {timeout: 30_000});
+  forgive(trouble);
+  await page.screenshot({path: join(shots, "web-sweep.png"), fullPage: true});
+  await page.locator("#runs").fill("60");
+  await page.click("#sweep");
+  await page.waitForFunction(() => /^60 runs in/.test(document.querySelector("#sweep-status").textContent), null, {timeout: 60_000});
+});
+
+await test("all stops of the tour show their machine", async open => {
+  const {page} = await open();
+  let stops = 0, isLast = false;
+  for (; !isLast; stops++) {
+    await page.click("#go-tour");
+    await page.waitForSelector("#tour-show");
+    isLast = await page.locator("#tour-next").isDisabled();
+    await page.click("#tour-show");
+    await page.waitForFunction(() => window.studio.view !== "tour", null, {timeout: 15_000});
+    await quiet(page);
+    const told = await page.evaluate(() => window.studio.mistake && window.studio.mistake.text);
+    expect(!told, `stop ${stops + 1}: ${told}`);
+    await page.click("#go-tour");
+    if (!isLast) await page.click("#tour-next");
+  }
+  expect(stops >= 10, `${stops} stops`);
+});
+
+await test("a move is simulated in closed loop, and its controller is tuned until Stop", async open => {
+  const {page, trouble} = await open();
+  const {stages} = await ask(page, "gallery", {});
+  const {text} = stages.find(stage => stage.path.endsWith("controllers/pid.toml"));
+  await page.evaluate(text => window.studio.open(text, {name: "pid.toml"}), text);
+  await quiet(page);
+  await page.click("#go-tune");
+  await quiet(page);
+  const closed = await ask(page, "loop", {text});
+  expect(!closed.error, JSON.stringify(closed.error));
+  await page.click("#tune");
+  await page.waitForFunction(() => /looks at designs/.test(document.querySelector("#tune-status").textContent), null, {timeout: 60_000});
+  await page.click("#tune-stop");
+  await page.waitForFunction(() => /stopped|interrupted|best so far/i.test(document.querySelector("#view-tune").innerText), null, {timeout: 60_000});
+  forgive(trouble);
 });
 
 await test("what a page without a server cannot do is told", async open => {
@@ -158,5 +258,4 @@ for (const width of [390, 1280]) {
   });
 }
 
-files.close();
 await harness.end("the studio without a server");

@@ -36,6 +36,7 @@ export class Workers {
     if (!answer.ok) throw new Error(`taut.wasm cannot be loaded: ${answer.status} ${answer.statusText}`);
     // Streaming would require the server to send the type application/wasm.
     this.module = await WebAssembly.compile(await answer.arrayBuffer());
+    performance.mark("module");
     await new Promise((done, failed) => { this.quick = this.worker(done, failed); });
     this.wire.changed(true);
   }

@@ -60,7 +60,7 @@ pub fn make(folder: &Path, compiler: &Compiler) -> Result<u64, String> {
 
 /// The compiled module.
 fn module(compiler: &Compiler) -> Result<PathBuf, String> {
-    let target = python::target().join("web").join("build");
+    let target = build_folder();
     let mut build = crate::cargo(&["build", "--locked", "--profile", "web", "--package", "taut-web", "--lib"]);
     build.args(["--target", TARGET, "--target-dir"]).arg(&target);
     // Paths of the machine that builds it do not belong in a published file.
@@ -73,29 +73,53 @@ fn module(compiler: &Compiler) -> Result<PathBuf, String> {
     if !succeeds(&mut build)? {
         return Err("the module was not built".into());
     }
-    Ok(target.join(TARGET).join("web").join("taut_web.wasm"))
+    Ok(built(&target))
+}
+
+/// The folder in which cargo builds the module.
+fn build_folder() -> PathBuf {
+    python::target().join("web").join("build")
+}
+
+/// The module in that folder.
+fn built(target: &Path) -> PathBuf {
+    target.join(TARGET).join("web").join("taut_web.wasm")
 }
 
 /// Finds or fetches a compiler for the module. Errors: what is missing.
 pub fn compiler() -> Result<Compiler, String> {
-    let root = python::target().join("web/debian/root");
-    if has_target() {
-        return Ok(Compiler::Own);
-    }
-    if answers(&root) {
-        return Ok(Compiler::Debian(root));
+    if let Some(compiler) = installed() {
+        return Ok(compiler);
     }
     let rustup = Command::new("rustup").args(["target", "add", TARGET]).stderr(Stdio::null()).spawn();
     if rustup.is_ok_and(|rustup| succeeds_within(PATIENCE, rustup)) && has_target() {
         return Ok(Compiler::Own);
     }
-    if browser::path_of("apt-get").is_some() && unpack(&root).is_ok() && answers(&root) {
-        return Ok(Compiler::Debian(root));
+    if browser::path_of("apt-get").is_some() && unpack(&debian()).is_ok() && answers(&debian()) {
+        return Ok(Compiler::Debian(debian()));
     }
     Err(format!(
         "the standard library of Rust for {TARGET} (rustup target add {TARGET}; or on Debian 12 what apt-get download \
          fetches: rustc-web, rust-web-src)"
     ))
+}
+
+/// Returns a compiler for tests, which download none and do not compile the standard library for the first time.
+pub fn compiler_for_tests() -> Result<Compiler, String> {
+    let can_build = |compiler: &Compiler| matches!(compiler, Compiler::Own) || built(&build_folder()).exists();
+    installed().filter(can_build).ok_or_else(|| {
+        format!("the target {TARGET} of Rust, or a module that `cargo xtask web` has built once, which fetches it")
+    })
+}
+
+/// Returns the compiler that is on this computer, if any.
+fn installed() -> Option<Compiler> {
+    if has_target() { Some(Compiler::Own) } else { Some(debian()).filter(|root| answers(root)).map(Compiler::Debian) }
+}
+
+/// The folder of Debian's compiler.
+fn debian() -> PathBuf {
+    python::target().join("web/debian/root")
 }
 
 /// True if the compiler of the project has the target.
