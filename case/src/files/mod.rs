@@ -84,10 +84,11 @@ impl Draft {
 
     /// Gives the file its name.
     pub fn finish(mut self) -> Result<()> {
-        let file = self.file.take();
+        let mut file = self.file.take();
         // Closed later, so that it is locked until it has its name; but some systems do not rename an open file.
-        #[cfg(not(unix))]
-        let file = drop(file);
+        if cfg!(not(unix)) {
+            file = None;
+        }
         let renamed = unfinished::complete(&self.temporary, || {
             let renamed = fs::rename(&self.temporary, &self.target);
             if renamed.is_err() {
@@ -95,7 +96,6 @@ impl Draft {
             }
             renamed
         });
-        #[allow(clippy::drop_non_drop)]
         drop(file);
         renamed.map_err(|e| cannot_write(&self.path, &e))
     }
