@@ -33,10 +33,10 @@ export class Harness {
     return {child, address};
   }
 
-  /** A server of the files of a folder, and the requests that it received. */
-  async serveFolder(folder) {
+  /** A server of the files of a folder and of more, by their names; and the requests that it received. */
+  async serveFolder(folder, more = {}) {
     const asked = [];
-    const content = path => { try { return readFileSync(join(folder, path)); } catch { return null; } };
+    const content = path => { try { return more[path] || readFileSync(join(folder, path)); } catch { return null; } };
     const server = createServer(({method, url}, response) => {
       asked.push(`${method} ${url}`);
       const path = url.startsWith(UNDER) ? url.slice(UNDER.length) || "index.html" : "";

@@ -16,7 +16,11 @@ const TABLE4 = "stages/sollmann-jouaneh/table4.toml", LINEAR = "stages/sollmann-
 const LOGS = ["5-v-pulse", "10-v-pulse"].map(name => join(LINEAR, `../logs/${name}.measured.csv`));
 const harness = new Harness(program, taut);
 await harness.start();
-const {address, asked} = await harness.serveFolder(folder);
+const escaped = text => text.replaceAll("&", "&amp;").replaceAll("<", "&lt;");
+const LESSON = `<!DOCTYPE html><meta charset="utf-8"><title>A lesson</title><script type="module" src="taut-stage.js"></script>
+<taut-stage id="file" case="machine.toml"></taut-stage><taut-stage id="missing" case="missing.toml"></taut-stage>
+<taut-stage id="own" view="modes">${escaped(readFileSync("stages/printer-axis/printer-axis.toml", "utf8"))}</taut-stage>`;
+const {address, asked} = await harness.serveFolder(folder, {"lesson.html": LESSON, "machine.toml": readFileSync(TABLE4)});
 const test = (name, work) => (!only || name.includes(only) ? harness.test(name, open => work((options = {}, hash = "", at = address) => open(at + hash, options))) : null);
 const ask = (page, act, body) => page.evaluate(async ([act, body]) => {
   try { return (await window.studio.wire.ask(act, body)).head; } catch (error) { return {error: error.mistake || String(error)}; }
@@ -266,6 +270,39 @@ await test("a link opens for whoever has it", async open => {
   const hash = await page.evaluate(async address => (await import(address + "link.js")).fragment({...window.studio.snapshot(), text: window.studio.text.replace(/title = ".*"/, 'title = "A lesson"')}), address);
   const other = await open({}, hash);
   expect((await other.page.title()).includes("A lesson"), await other.page.title());
+});
+
+await test("a damaged link says so", async open => {
+  const {page} = await open();
+  const hash = await page.evaluate(async address => (await import(address + "link.js")).fragment(window.studio.snapshot()), address);
+  const other = await open({}, hash.slice(0, 40) + hash.slice(41));
+  expect(/This link is damaged/.test(await other.page.locator("#notice").innerText()), "a damaged link opens");
+});
+
+await test("a lesson contains machines, each with its own case", async open => {
+  const {context} = await open(), page = await context.newPage(), trouble = [];
+  page.on("pageerror", error => trouble.push(error.message));
+  await page.goto(address + "lesson.html");
+  const frames = [];
+  for (const id of ["file", "own"]) {
+    const frame = await (await page.waitForSelector(`#${id} iframe[src]`)).contentFrame();
+    await frame.waitForFunction(() => window.studio && window.studio.run, null, {timeout: 20_000});
+    frames.push(frame);
+  }
+  const [first, second] = frames, title = frame => frame.evaluate(() => document.title);
+  expect(/Table 4/.test(await title(first)) && /printer/i.test(await title(second)), `${await title(first)}; ${await title(second)}`);
+  expect((await second.evaluate(() => window.studio.view)) === "modes", "the view is another");
+  expect(/missing.toml cannot be opened: 404/.test(await page.locator("#missing [role=alert]").innerText()), "a missing case is not told");
+  // A changed machine is that of its frame alone, and anew after a reload, without a question.
+  await first.evaluate(() => { window.studio.drag("cart.mass", 0.5); window.studio.drop(); });
+  await first.waitForFunction(() => !window.studio.wire.isBusy && window.studio.isUnsaved);
+  await settled(page);
+  await page.screenshot({path: join(shots, "web-lesson.png"), fullPage: true});
+  await page.reload();
+  const again = await (await page.waitForSelector("#file iframe[src]")).contentFrame();
+  await again.waitForFunction(() => window.studio && window.studio.run, null, {timeout: 20_000});
+  expect((await again.evaluate(() => window.studio.parameters.find(one => one.key === "cart.mass").value)) !== 0.5, "the change is kept");
+  expect(!trouble.length, trouble.join("; "));
 });
 
 for (const width of [390, 1280]) {

@@ -5,10 +5,14 @@ use crate::{assets, guard};
 /// Lines for the head of the page are inserted after this one.
 const PLACE: &str = "<meta charset=\"utf-8\">\n";
 
+/// The element by which other pages contain this one. The server has none, as it forbids that.
+const ELEMENT: (&str, &str) = ("taut-stage.js", include_str!("../page/taut-stage.js"));
+
 /// Names and contents of the files, except the module `taut.wasm`.
 pub fn page_without_server() -> Vec<(&'static str, String)> {
     let files = assets::paths().filter_map(|path| Some((path.trim_start_matches('/'), assets::file(path)?.1)));
-    files.map(|(name, content)| (name, if name == "index.html" { without_server(&content) } else { content })).collect()
+    let page = files.map(|(name, file)| (name, if name == "index.html" { without_server(&file) } else { file }));
+    page.chain([(ELEMENT.0, ELEMENT.1.to_string())]).collect()
 }
 
 /// Adds the Content-Security-Policy, which the server would send as a header, and the carrier.
