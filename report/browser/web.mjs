@@ -279,6 +279,17 @@ await test("a damaged link says so", async open => {
   expect(/This link is damaged/.test(await other.page.locator("#notice").innerText()), "a damaged link opens");
 });
 
+await test("a folder without its module, or its worker, says what is missing", async open => {
+  const {context} = await open();
+  for (const missing of ["taut.wasm", "worker.js"]) {
+    const page = await context.newPage();
+    await page.route(`**/${missing}`, route => route.fulfill({status: 404, body: "none"}));
+    await page.goto(address);
+    await page.waitForFunction(() => /cannot be loaded/.test(document.querySelector("#notice").textContent), null, {timeout: 20_000});
+    await page.close();
+  }
+});
+
 await test("a lesson contains machines, each with its own case", async open => {
   const {context} = await open(), page = await context.newPage(), trouble = [];
   page.on("pageerror", error => trouble.push(error.message));

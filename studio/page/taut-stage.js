@@ -5,7 +5,11 @@
 // opens: motion, modes, fit, tune, shape, sweep, gallery or tour.
 import {fragment} from "./link.js";
 
-const STYLE = ":host{display:block;height:44rem}iframe{width:100%;height:100%;border:1px solid #8888;border-radius:8px;box-sizing:border-box}";
+const STYLE = `
+  :host { display: block; height: 44rem; }
+  :host([data-failed]) { height: auto; }
+  iframe { width: 100%; height: 100%; border: 1px solid #8888; border-radius: 8px; box-sizing: border-box; }
+`;
 
 class TautStage extends HTMLElement {
   static observedAttributes = ["case", "view"];
@@ -36,6 +40,7 @@ class TautStage extends HTMLElement {
     this.told.textContent = told;
     this.told.hidden = !told;
     this.frame.hidden = !!told;
+    this.toggleAttribute("data-failed", !!told);
   }
 }
 
