@@ -2,7 +2,8 @@
 //! WebAssembly module.
 //!
 //! Compiling the module requires the standard library for `wasm32-unknown-unknown`. If rustup cannot provide it,
-//! Debian's compiler for browsers and the source of the library are unpacked under `target/web`, without installing them.
+//! Debian's compiler for browsers and the source of the library are unpacked under `target/web`, without being
+//! installed.
 
 use crate::{browser, dist, python};
 use std::fs;
