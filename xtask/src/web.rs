@@ -52,8 +52,12 @@ pub fn make(folder: &Path, compiler: &Compiler) -> Result<u64, String> {
     let module = module(compiler)?;
     let failed = |error: std::io::Error| format!("{} cannot be written: {error}", folder.display());
     fs::create_dir_all(folder).map_err(failed)?;
-    let mut page = crate::cargo(&["run", "--quiet", "--package", "taut-studio", "--example", "folder", "--"]);
-    if !succeeds(page.arg(folder))? {
+    // Of the whole workspace, as the tests build it: of one package alone, the library is built with other features.
+    if !succeeds(&mut crate::cargo(&["build", "--quiet", "--workspace", "--example", "folder"]))? {
+        return Err("the program that writes the page was not built".into());
+    }
+    let example = python::target().join("debug/examples").join(format!("folder{}", std::env::consts::EXE_SUFFIX));
+    if !succeeds(Command::new(example).arg(folder))? {
         return Err("the files of the page were not written".into());
     }
     fs::copy(module, folder.join(MODULE)).map_err(failed)
