@@ -49,9 +49,9 @@ pub fn default_folder() -> PathBuf {
 
 /// Makes the folder, and returns the size of the module, bytes.
 pub fn make(folder: &Path, compiler: &Compiler) -> Result<u64, String> {
-    let module = module(compiler)?;
     let failed = |error: std::io::Error| format!("{} cannot be written: {error}", folder.display());
     fs::create_dir_all(folder).map_err(failed)?;
+    let module = module(compiler)?;
     // Of the whole workspace, as the tests build it: of one package alone, the library is built with other features.
     if !succeeds(&mut crate::cargo(&["build", "--quiet", "--workspace", "--example", "folder"]))? {
         return Err("the program that writes the page was not built".into());
