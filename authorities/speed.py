@@ -7,8 +7,8 @@ and 2 that follow the cart. Each solver has the loosest tolerance, on a ladder o
 against authority B (`elements_taylor.py`). The solvers take turns, round after round, so that what else the computer does falls on
 all of them alike; a time is that of the best run, of SciPy and CVODE in processor seconds.
 
-`python speed.py [--update] [PROBLEM ...]` prints the tables; with `--update` it writes them into docs/general-solver.md, too, and
-into output/speed.txt.
+`python speed.py [--update] [PROBLEM ...]` prints the tables; with `--update` it writes them into output/speed.txt, too, and a summary into
+docs/general-solver.md.
 """
 
 from __future__ import annotations
@@ -431,6 +431,24 @@ def table(problem, rows):
     return "\n".join(lines)
 
 
+def milliseconds(seconds):
+    """Seconds as milliseconds with three digits."""
+    return f"{1e3 * seconds:.3g}" if seconds < 1.0 else f"{1e3 * seconds:.0f}"
+
+
+def summary(tables, target=1e-9):
+    """Milliseconds a run of each solver on each problem where the error at every row is at most `target`, as Markdown."""
+    names = [name for name, *_ in tables[-1][1] if name != "taut exact"]
+    lines = ["| solver | " + " | ".join(problem.name for problem, _ in tables) + " |", "|---" * (len(tables) + 1) + "|"]
+    for name in ["taut exact", *dict.fromkeys(names)]:
+        cells = []
+        for _, rows in tables:
+            times = [seconds for who, wanted, _, _, seconds, _ in rows if who == name and wanted in (None, target)]
+            cells.append("–" if not times else milliseconds(times[0]) if times[0] else "not reached")
+        lines.append(f"| {name} | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
 def verdict(tables):
     """Where taut is not ahead."""
     behind = []
@@ -449,7 +467,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     names = ["coulomb", "stribeck", "lugre-1e4", "lugre-1e7", "follows"]
     parser.add_argument("problems", nargs="*", default=names, metavar="PROBLEM", help=", ".join(names))
-    parser.add_argument("--update", action="store_true", help="write the tables into docs/general-solver.md")
+    parser.add_argument("--update", action="store_true", help="write output/speed.txt, and the summary in docs/general-solver.md")
     asked = parser.parse_args()
     if unknown := set(asked.problems) - set(names):
         parser.error(f"{', '.join(sorted(unknown))}: there are {', '.join(names)}")
@@ -465,6 +483,7 @@ def main():
         (HERE / "output" / "speed.txt").write_text(text + "\n")
         document = DOCUMENT.read_text()
         before, rest = document.split(BEGIN)
+        text = f"{summary(tables)}\n\n{verdict(tables)}"
         DOCUMENT.write_text(f"{before}{BEGIN}\n\n{text}\n\n{END}{rest.split(END)[1]}")
 
 

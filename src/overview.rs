@@ -26,7 +26,21 @@ const NOT_WHOLE: f64 = 0.1;
 /// Share of the moved mass above which a belt's own mass shows.
 const HEAVY: f64 = 0.1;
 
-/// Everything that is told.
+/// Keys of the rows that answer the first questions about a machine; those of a direction continue with its name.
+const MAIN: [&str; 10] = [
+    "breakaway_input",
+    "total_mass",
+    "stretch_per_force",
+    "resonance1",
+    "held_resonance",
+    "largest_force",
+    "largest_acceleration",
+    "largest_speed",
+    "tooth_safety",
+    "tension_safety",
+];
+
+/// Masses, stiffnesses, frequencies and limits of a machine.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Overview {
     /// The title of the case.
@@ -37,7 +51,7 @@ pub struct Overview {
     pub groups: Vec<Group>,
     /// With the cart at several places, where the place makes a difference; else at one.
     pub places: Vec<Place>,
-    /// Whether the place makes a difference.
+    /// True if the place makes a difference.
     pub depends_on_place: bool,
     /// Notes.
     pub notes: Vec<Note>,
@@ -137,6 +151,11 @@ impl Group {
 }
 
 impl Row {
+    /// True for the rows that `taut show` prints without `--verbose`.
+    pub fn is_main(&self) -> bool {
+        MAIN.iter().any(|key| self.key.starts_with(key))
+    }
+
     fn how(&mut self, words: impl Into<String>) {
         self.how = words.into();
     }

@@ -5,6 +5,7 @@ use rand_pcg::Pcg64;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 use taut::case::Case;
 use taut::control::feedback::Feedback;
+use taut::linear::Operation;
 use taut::tune::{Break, Margins, Plant, place};
 
 /// Loops of each structure.
@@ -145,7 +146,7 @@ impl Draw {
 fn margins(case: &Case) -> Margins {
     let design = case.controller.as_ref().unwrap();
     let feedback = Feedback::new(design, &case.machine).unwrap();
-    Margins::of(&Plant::of(&case.machine, 0.0, design, &feedback.corners()).unwrap(), &feedback)
+    Margins::of(&Plant::of(&case.machine, Operation::default(), design, &feedback.corners()).unwrap(), &feedback)
 }
 
 /// The least of a figure over all breaks, and whether a break has it.

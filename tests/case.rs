@@ -151,11 +151,11 @@ fn mistakes_in_a_set_value_say_so() {
     );
     assert_eq!(
         shown("belt.stiffness=[1 N/m]"),
-        "--set:1:16: this list, table or text is not complete\n  1 | belt.stiffness=[1 N/m]\n    |                ^^^^^^^\n  next: inside it, texts stand in quotes: [\"1 kN/m\", \"2 kN/m\"]"
+        "--set:1:16: this list, table or text is not complete\n  1 | belt.stiffness=[1 N/m]\n    |                ^^^^^^^\n  next: put texts inside it in quotes: [\"1 kN/m\", \"2 kN/m\"]"
     );
     assert!(shown("cart.mass.x=1").contains("`x` cannot be set"));
     assert!(shown("=1").contains("is no key"));
-    assert!(shown("title=2").contains("a number stands where a text is wanted"));
+    assert!(shown("title=2").contains("expected a text, found a number"));
 }
 
 /// Lists of any length that fits the file are read in reasonable time; longer files are refused.

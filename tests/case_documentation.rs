@@ -7,31 +7,23 @@ use taut::machine::BELTS;
 use taut::number::engineering;
 use taut::parameter::{free_markdown, markdown, sections};
 
-/// Sections of the table of parameters that a gantry alone has.
-const OF_GANTRIES: [&str; 2] = ["bridge", "gantry.initial"];
-
 #[test]
 fn the_reference_holds_the_tables_of_the_program() {
-    for (document, of_gantries) in [("docs/case-file.md", false), ("docs/gantry.md", true)] {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(document);
-        let text = fs::read_to_string(&path).unwrap();
-        let mut updated = text.clone();
-        let own = sections().filter(|section| OF_GANTRIES.contains(section) == of_gantries);
-        let tables = own.map(|section| (section, markdown(section)));
-        let others = [("parameters: free", free_markdown()), ("belts", belts())];
-        let others = others.into_iter().filter(|_| !of_gantries).map(|(name, table)| (name.to_string(), table));
-        let tables = tables.map(|(section, table)| (format!("parameters: {section}"), table));
-        for (section, table) in tables.chain(others) {
-            let (begin, end) = (format!("<!-- {section} -->\n"), "<!-- end -->");
-            let from = updated.find(&begin).unwrap_or_else(|| panic!("no table of {section}")) + begin.len();
-            let to = from + updated[from..].find(end).expect("an end");
-            updated.replace_range(from..to, &table);
-        }
-        if std::env::var_os("UPDATE_EXPECT").is_some() {
-            fs::write(&path, &updated).unwrap();
-        } else {
-            assert_eq!(text, updated, "run with UPDATE_EXPECT=1 to write the tables anew");
-        }
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/case-file.md");
+    let text = fs::read_to_string(&path).unwrap();
+    let mut updated = text.clone();
+    let tables = sections().map(|section| (format!("parameters: {section}"), markdown(section)));
+    let others = [("parameters: free", free_markdown()), ("belts", belts())];
+    for (section, table) in tables.chain(others.map(|(name, table)| (name.to_string(), table))) {
+        let (begin, end) = (format!("<!-- {section} -->\n"), "<!-- end -->");
+        let from = updated.find(&begin).unwrap_or_else(|| panic!("no table of {section}")) + begin.len();
+        let to = from + updated[from..].find(end).expect("an end");
+        updated.replace_range(from..to, &table);
+    }
+    if std::env::var_os("UPDATE_EXPECT").is_some() {
+        fs::write(&path, &updated).unwrap();
+    } else {
+        assert_eq!(text, updated, "run with UPDATE_EXPECT=1 to write the tables anew");
     }
 }
 

@@ -146,7 +146,7 @@ fn what_cannot_be_designed_is_told() {
     endless.experiments.clear();
     assert!(told(&endless, &one).contains("nothing limits the input"));
     let amplitude = Request { input: Some(5.0), ..one.clone() };
-    assert!(told(&endless, &amplitude).contains("nothing limits the way of the cart"));
+    assert!(told(&endless, &amplitude).contains("the travel of the cart is unlimited"));
     let mut limited = case.clone();
     limited.machine.drives[0].amplifier.voltage_limit = Some(12.0);
     let beyond = Request { input: Some(20.0), ..one.clone() };

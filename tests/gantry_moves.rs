@@ -367,3 +367,29 @@ fn feed_forward_makes_contour_errors_less() {
         assert!(with < 0.5 * without, "{kind}: {with} m with it, {without} m without");
     }
 }
+
+/// Beyond the limits of either motor a move is told before it runs, with what it needs: what it really takes, on belts
+/// that hardly stretch, and what it then saturates.
+#[test]
+fn a_path_that_a_motor_cannot_drive_is_told() {
+    let stiff = ["belt.stiffness=[1e8, 1e8, 1e8, 1e8]", "belt.damping=[2000, 2000, 2000, 2000]"];
+    let ideal = [
+        "controller.feed_forward={ model = \"rigid\" }",
+        "controller.every=50 us",
+        // The loop itself, and the noise of its counts, hardly matter.
+        "controller.pid={ proportional = \"0.1 V/mm\" }",
+    ];
+    let case = rig(&[&stiff[..], &ideal].concat());
+    let motion = &case.moves[0];
+    assert!(motion.shortfalls(&case.machine, case.controller.as_ref().unwrap()).is_empty());
+    let figures = moved(&case, motion, 1e-2).0.figures;
+    let most = figures.drives.iter().map(|drive| drive.voltage.0.value.abs()).fold(0.0, f64::max);
+    // Less than the move takes is short of it, by about what it takes.
+    let low = rig(&[&stiff[..], &ideal, &[&format!("amplifier.voltage_limit={}", 0.7 * most)]].concat());
+    let found = low.moves[0].shortfalls(&low.machine, low.controller.as_ref().unwrap());
+    assert!(!found.is_empty() && found.iter().all(|short| short.limit == "voltage"), "{found:?}");
+    assert!(found.iter().any(|short| short.words.starts_with("left drive: ")), "{found:?}");
+    let needed = found.iter().map(|short| short.needed).fold(0.0, f64::max);
+    assert!((needed / most - 1.0).abs() < 0.15, "{needed} {most}");
+    assert!(moved(&low, &low.moves[0], 1e-2).0.figures.drives.iter().any(|drive| drive.amplifier_limited > 0.0));
+}

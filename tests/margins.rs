@@ -3,6 +3,7 @@
 use serde_json::Value;
 use taut::case::Case;
 use taut::control::feedback::Feedback;
+use taut::linear::Operation;
 use taut::tune::{Margins, Plant};
 
 /// Ms peaks stand at poles of the closed loop; looked for about those of the axis alone, 7 of 76 tunings passed their
@@ -17,7 +18,7 @@ fn no_peak_is_missed_on_two_hundred_loops() {
         let case = Case::from_text("loop.toml", one["case"].as_str().unwrap()).unwrap_or_else(|e| panic!("{e}"));
         let design = case.controller.as_ref().unwrap();
         let feedback = Feedback::new(design, &case.machine).unwrap();
-        let plant = Plant::of(&case.machine, 0.0, design, &feedback.corners()).unwrap();
+        let plant = Plant::of(&case.machine, Operation::default(), design, &feedback.corners()).unwrap();
         let margins = Margins::of(&plant, &feedback);
         assert_eq!(margins.stable, one["stable"].as_bool().unwrap(), "loop {number}, radius {}", one["radius"]);
         if !margins.stable {

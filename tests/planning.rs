@@ -49,10 +49,10 @@ fn plans_keep_the_limits_and_arrive_sooner() {
         for planned in &plans.moves {
             let (best, given) = (&planned.best, &planned.given);
             println!("{seed} {}: {:?}, {given:?}, at least {:?}", planned.name, best.arrival, planned.bound);
-            let short = shortfalls(&case.machine, design.limit, &planned.profile);
+            let short = shortfalls(&case.machine, design.limit, &planned.profiles);
             assert_eq!(short, [], "{seed}");
             // The reserve is left.
-            for load in loads(&case.machine, design.limit, &planned.profile, 4000) {
+            for load in loads(&case.machine, design.limit, &planned.profiles, 4000) {
                 assert!(load.needed <= 0.905 * load.allowed, "{seed}: {load:?}");
             }
             let [sooner, later] = [&best.arrival, given].map(|arrival| arrival.worst.unwrap_or(f64::INFINITY));
@@ -63,13 +63,13 @@ fn plans_keep_the_limits_and_arrive_sooner() {
                 machine: &case.machine,
                 model: &case.machine,
                 design,
-                profiles: std::slice::from_ref(&planned.profile),
-                until: planned.profile.end() + 0.5,
+                profiles: &planned.profiles,
+                until: planned.profiles[0].end() + 0.5,
                 window: planned.window,
                 solver: Solver::Exact,
             };
             let settling = closed_loop(&setup).unwrap().figures.settling;
-            assert_eq!(settling.map(|late| late + planned.profile.end()), best.arrival.nominal, "{seed}");
+            assert_eq!(settling.map(|late| late + planned.profiles[0].end()), best.arrival.nominal, "{seed}");
         }
     }
 }
@@ -99,7 +99,7 @@ fn jerk_times_are_on_the_zeros_of_the_belts_modes() {
             let time = one.limits.acceleration / one.limits.jerk.unwrap();
             let periods = time * plans.modes[0];
             assert!((periods - f64::from(one.periods[0])).abs() < 1e-9, "{seed}: {periods}");
-            let target = planned.profile.target();
+            let target = planned.profiles[0].target();
             let profile = Profile::new(0.0, &[Leg::To(target, one.limits)]).unwrap();
             let left = excited(&profile, plans.modes[0]);
             assert!(left < 1e-4, "{seed} {:?}: {left}", one.periods);
@@ -123,11 +123,65 @@ fn limits_of_the_user_are_kept() {
     let text = plans.case_text(&case, Path::new("planned.toml")).unwrap();
     let written = Case::from_text("planned.toml", &text).unwrap();
     for planned in plans.moves.iter().filter(|planned| !planned.is_kept) {
-        let [read, meant] = [written.moves[planned.place].profile(), &planned.profile];
+        let [read, meant] = [written.moves[planned.place].profile(), &planned.profiles[0]];
         assert!((read.end() - meant.end()).abs() < 1e-12 * meant.end(), "{}", planned.name);
         let off = (0..100).map(|k| f64::from(k) / 100.0 * meant.end());
         let off = off.map(|t| (read.at(t).position - meant.at(t).position).abs()).fold(0.0, f64::max);
         assert!(off < 1e-12, "{}: {off}", planned.name);
+    }
+}
+
+/// A gantry in closed loop with feed-forward, its square as `motion` says.
+fn gantry(kind: &str, motion: &str) -> Case {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("stages").join(kind).join("square.toml");
+    let calm = "controller.pid={ proportional = \"5 V/mm\", integral = \"30 V/(mm s)\", derivative = \"39 V s/m\" }";
+    let ahead = "controller.feed_forward={ model = \"rigid\" }";
+    Case::read_with(file, &[calm, ahead, motion]).unwrap_or_else(|error| panic!("{error}"))
+}
+
+#[test]
+fn a_path_is_planned_within_the_limits_of_both_motors() {
+    let path = "points = [[0.05, 0.0], { to = [0.05, 0.04], wait = 0.05 }, [-0.01, -0.02]]";
+    for kind in ["h-frame", "core-xy"] {
+        let slow = format!("move=[{{ name = \"path\", {path}, speed = 0.2, acceleration = 2, until = 2 }}]");
+        let case = gantry(kind, &slow);
+        let design = case.controller.as_ref().unwrap();
+        let plans = plan(&case, &[0], &FREE, &|| false).unwrap();
+        let planned = &plans.moves[0];
+        println!("{kind}: {:?} {:?} {:?}", planned.best, planned.given, plans.modes);
+        assert_eq!(shortfalls(&case.machine, design.limit, &planned.profiles), []);
+        let most = |case: &Case, profiles: &[Profile]| {
+            let loads = loads(&case.machine, design.limit, profiles, 4000);
+            loads.iter().map(|load| load.share()).fold(0.0, f64::max)
+        };
+        assert!(most(&case, &planned.profiles) <= 0.9 + 1e-9);
+        let [sooner, later] = [&planned.best.arrival, &planned.given].map(|arrival| arrival.nominal.unwrap());
+        assert!(!planned.is_kept && sooner < later, "{kind}: {sooner} {later}");
+        // The same corners, at all of which it stands, on straight legs.
+        let strokes = |profile: &Profile| -> Vec<[f64; 2]> {
+            profile.strokes().map(|(_, from, distance, _)| [from, from + distance]).collect()
+        };
+        for (own, file) in planned.profiles.iter().zip(&case.moves[0].profiles) {
+            for (own, file) in strokes(own).iter().flatten().zip(strokes(file).iter().flatten()) {
+                assert!((own - file).abs() < 1e-12, "{kind}: {own} {file}");
+            }
+        }
+        let [x, y] = [&planned.profiles[0], &planned.profiles[1]];
+        let last = x.strokes().last().unwrap();
+        for k in 0..=50 {
+            let t = last.0 + last.3 * f64::from(k) / 50.0;
+            let share = (x.at(t).position - 0.05) / -0.06;
+            assert!((y.at(t).position - (0.04 - 0.06 * share)).abs() < 1e-12, "{kind} at {t}");
+        }
+        // A case may leave it to the machine.
+        let left = gantry(kind, &format!("move=[{{ name = \"path\", {path}, plan = {{}}, until = 2 }}]"));
+        let taken = most(&left, &left.moves[0].profiles);
+        assert!(left.moves[0].is_planned && taken <= 0.9 + 1e-9, "{kind}: {taken}");
+        assert!(left.moves[0].end() < case.moves[0].end());
+        // The case that is written moves as planned.
+        let text = plans.case_text(&case, Path::new("planned.toml")).unwrap();
+        let written = Case::from_text("planned.toml", &text).unwrap();
+        assert!((written.moves[0].end() - planned.profiles[0].end()).abs() < 1e-12);
     }
 }
 
@@ -139,7 +193,7 @@ fn a_move_of_the_file_may_be_a_plan() {
     for case in [&slow, &fast] {
         let (design, motion) = (case.controller.as_ref().unwrap(), &case.moves[0]);
         assert!(motion.is_planned && motion.profile().target() == 0.04);
-        let loads = loads(&case.machine, design.limit, motion.profile(), 4000);
+        let loads = loads(&case.machine, design.limit, &motion.profiles, 4000);
         let most = loads.iter().map(|load| load.share()).fold(0.0, f64::max);
         assert!(most <= 0.9 + 1e-9, "{most}");
         // Peak of jerk, from the pieces of the reference.

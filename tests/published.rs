@@ -14,7 +14,7 @@ use taut::solve::Flow;
 struct Row {
     case: &'static str,
     what: &'static str,
-    /// Whether a log counts, and whether its part that was fitted does.
+    /// True if a log counts, and whether its part that was fitted does.
     logs: fn(&str) -> bool,
     held_out: bool,
     /// Its unit in the table, and how many of it the SI unit is.

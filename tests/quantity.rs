@@ -111,14 +111,14 @@ fn what_engineers_type() {
 
 /// (typed, wanted unit, message, next step)
 const BAD: &[(&str, &str, &str, &str)] = &[
-    ("0.362 kg", "m", "\"0.362 kg\" is a mass (kg); a length (m) is wanted", ""),
-    ("5 Hz", "rad/s", "\"5 Hz\" is given in hertz; an angular speed (rad/s) is wanted", "5 Hz is 31.4159 rad/s"),
-    ("31.4 rad/s", "Hz", "\"31.4 rad/s\" is an angular speed; a frequency (Hz) is wanted", "31.4 rad/s is 4.99747 Hz"),
-    ("300 rpm", "Hz", "\"300 rpm\" is an angular speed; a frequency (Hz) is wanted", "300 rpm is 5 Hz"),
+    ("0.362 kg", "m", "\"0.362 kg\" is a mass (kg); expected a length (m)", ""),
+    ("5 Hz", "rad/s", "\"5 Hz\" is given in hertz; expected an angular speed (rad/s)", "5 Hz is 31.4159 rad/s"),
+    ("31.4 rad/s", "Hz", "\"31.4 rad/s\" is an angular speed; expected a frequency (Hz)", "31.4 rad/s is 4.99747 Hz"),
+    ("300 rpm", "Hz", "\"300 rpm\" is an angular speed; expected a frequency (Hz)", "300 rpm is 5 Hz"),
     (
         "5 oz-in",
         "N m",
-        "\"5 oz-in\" is a mass times a length (kg m); a torque (N m) is wanted",
+        "\"5 oz-in\" is a mass times a length (kg m); expected a torque (N m)",
         "a weight as a force is lbf, ozf, kgf or gf; lb, oz, kg and g are masses",
     ),
     ("19,4 mm", "m", "\"19,4 mm\" has a comma in its number", "the decimal sign is a point: \"19.4 mm\""),
@@ -139,10 +139,10 @@ const BAD: &[(&str, &str, &str, &str)] = &[
     (
         "5",
         "V",
-        "\"5\" has no unit; a voltage (V) is wanted",
+        "\"5\" has no unit; expected a voltage (V)",
         "add the unit, or leave the quotes away if the number is in SI units",
     ),
-    ("90", "rad", "\"90\" has no unit; an angle (rad) is wanted", "add the unit, such as deg, rad or rev"),
+    ("90", "rad", "\"90\" has no unit; expected an angle (rad)", "add the unit, such as deg, rad or rev"),
     (
         "10 V/1000rpm",
         "V s/rad",
@@ -152,8 +152,8 @@ const BAD: &[(&str, &str, &str, &str)] = &[
     (
         "100 rpm/V",
         "V s/rad",
-        "\"100 rpm/V\" is a speed per voltage (rad/s/V); a back-EMF constant (V s/rad) is wanted",
-        "that is the inverse of what is wanted: write 0.095493 V s/rad",
+        "\"100 rpm/V\" is a speed per voltage (rad/s/V); expected a back-EMF constant (V s/rad)",
+        "this is the inverse of the expected quantity: write 0.095493 V s/rad",
     ),
     ("5 KN", "N", "\"5 KN\" has an unknown unit `KN`", "did you mean kN?"),
     ("5 volst", "V", "\"5 volst\" has an unknown unit `volst`", "did you mean volt?"),
@@ -180,7 +180,7 @@ const BAD: &[(&str, &str, &str, &str)] = &[
         "\"512 lines/rev\" has an unknown unit `lines`",
         "units are such as mm, kg, N s/m, kg m^2, ohm, GPa, rpm, in, lbf",
     ),
-    ("19.4 mm/rev", "m", "\"19.4 mm/rev\" is a travel per angle (m/rad); a length (m) is wanted", ""),
+    ("19.4 mm/rev", "m", "\"19.4 mm/rev\" is a travel per angle (m/rad); expected a length (m)", ""),
 ];
 
 #[test]

@@ -21,7 +21,7 @@ fn needed(machine: &Machine, profile: &Profile, limit: &str) -> f64 {
     (amplifier.voltage_limit, amplifier.current_limit) = (Some(1e9), Some(1e9));
     machine.belt.sheet.allowed_tension = Some(1e9);
     machine.belt.pretension = Some(0.0);
-    loads(&machine, None, profile, 4000).iter().find(|load| load.limit == limit).unwrap().needed
+    loads(&machine, None, std::slice::from_ref(profile), 4000).iter().find(|load| load.limit == limit).unwrap().needed
 }
 
 fn case() -> Case {
@@ -91,7 +91,7 @@ fn each_limit_is_named_where_it_is_exceeded() {
         for share in [0.9, 1.1] {
             let mut machine = case.machine.clone();
             let own = set(&mut machine, share * needed);
-            let found = shortfalls(&machine, own, motion.profile());
+            let found = shortfalls(&machine, own, &motion.profiles);
             if share > 1.0 {
                 assert_eq!(found, [], "{limit} at {share}");
                 continue;
@@ -103,7 +103,7 @@ fn each_limit_is_named_where_it_is_exceeded() {
         }
     }
     let names = |limit: f64| -> Vec<&str> {
-        shortfalls(&case.machine, Some(limit), motion.profile()).iter().map(|short| short.limit).collect()
+        shortfalls(&case.machine, Some(limit), &motion.profiles).iter().map(|short| short.limit).collect()
     };
     assert!(names(0.9 * away).contains(&"breakaway") && !names(1.1 * away).contains(&"breakaway"));
 }
@@ -114,7 +114,7 @@ fn the_speed_that_is_reached_is_the_steady_one() {
     let case = case();
     let motion = &case.moves[0];
     let volts = 0.5 * needed(&case.machine, motion.profile(), "voltage");
-    let found = shortfalls(&case.machine, Some(volts), motion.profile());
+    let found = shortfalls(&case.machine, Some(volts), &motion.profiles);
     let short = found.iter().find(|short| short.limit == "voltage").unwrap();
     let Balance::At(speed) = balanced_speed(&case.machine, volts, 0.1) else { panic!("no steady speed") };
     let told = engineering(speed, "m/s", 3);

@@ -217,7 +217,7 @@ fn odrive_and_moteus_go_by_the_names_of_their_properties() {
         fs::write(folder.join("log.csv"), text).unwrap();
         // Their commands are currents; this machine has an amplifier of voltages.
         let error = read(&folder, &format!(r#"file = "log.csv", preset = "{preset}""#)).unwrap_err();
-        assert!(error.contains("log.preset: its input is in A; V is wanted"), "{error}");
+        assert!(error.contains("log.preset: its input is in A; expected V"), "{error}");
         let log = log(&folder, &format!(r#"file = "log.csv", preset = "{preset}", units = {{ input = "V" }}"#));
         agrees(&log, Quantity::DriveAngle, column("drive_angle"), 1e-9);
         agrees(&log, Quantity::DriveSpeed, column("drive_speed"), 1e-9);

@@ -10,6 +10,7 @@ use taut::case::{Case, Cost, Tuning};
 use taut::control::feedback::Feedback;
 use taut::control::{Controller, Observation, Setup, Standard, closed_loop};
 use taut::design::{Design, Filter, Structure};
+use taut::linear::Operation;
 use taut::machine::rigid::Rigid;
 use taut::signal::profile::Reference;
 use taut::solve::{Ending, Solver};
@@ -146,7 +147,7 @@ fn a_placed_loop_swings_as_asked() {
     let case = case("pid.toml", &changes);
     let design = place(case.controller.as_ref().unwrap(), &case.machine, hertz, damping).unwrap();
     let feedback = Feedback::new(&design, &case.machine).unwrap();
-    let plant = Plant::of(&case.machine, 0.0, &design, &[]).unwrap();
+    let plant = Plant::of(&case.machine, Operation::default(), &design, &[]).unwrap();
     // |T| of a PD loop on M s² + d s: (2ζ′ω s + ω²)/(s² + 2ζω s + ω²), ζ′ what K_d gives of ζ
     let rigid = Rigid::of(&case.machine);
     let Structure::Pid(gains) = &design.structure else { panic!() };
@@ -197,7 +198,7 @@ fn the_constraint_is_met_by_a_dense_sweep() {
     for corner in [&tuned.after.corner, &tuned.family.nominal()] {
         let mut stage = tuned.family.stage_at(corner);
         stage.belt.follows_cart = true;
-        use taut::linear::{Hold, Operation, StateSpace};
+        use taut::linear::{Hold, StateSpace};
         let about = Operation { position: corner.place, ..Operation::default() };
         let system = StateSpace::of(&stage, about).unwrap();
         let model = system.discrete(design.every, Hold::Zero, design.delay).unwrap();
@@ -249,6 +250,7 @@ fn the_worst_axis_is_worse_than_random_ones() {
             let (low, high) = (family.places[0], *family.places.last().unwrap());
             let corner = Corner {
                 place: low + share(&mut random) * (high - low),
+                bridge: 0.0,
                 load: 0.3 * share(&mut random),
                 off: family.unknowns.iter().map(|_| 2.0 * share(&mut random) - 1.0).collect(),
             };

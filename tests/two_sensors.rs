@@ -7,6 +7,7 @@ use taut::case::Case;
 use taut::control::feedback::Feedback;
 use taut::control::{Controller, MoveRun, Observation, Setup, Standard, closed_loop, reads_scale};
 use taut::design::Design;
+use taut::linear::Operation;
 use taut::machine::Measurement;
 use taut::measure::measure;
 use taut::signal::profile::Reference;
@@ -141,7 +142,7 @@ fn a_disturbance_observer_of_both_sensors_keeps_more_margin() {
         let case = case("controllers/pid-observer", changes);
         let design = case.controller.clone().unwrap();
         let feedback = Feedback::new(&design, &case.machine).unwrap();
-        let plant = Plant::of(&case.machine, 0.0, &design, &feedback.corners()).unwrap();
+        let plant = Plant::of(&case.machine, Operation::default(), &design, &feedback.corners()).unwrap();
         Margins::of(&plant, &feedback)
     };
     let softer = "controller.pid={ proportional = 1500, integral = 0, derivative = 5, filter = 200 }";

@@ -404,6 +404,6 @@ fn check_tells_of_parameters_that_all_end_at_bounds() {
     let bound = checked.fit.findings.iter().find(|one| one.code == "bound").unwrap();
     assert_eq!(
         bound.to_string(),
-        "warning: cart.friction.viscous ended at its bound of 50 N s/m: the logs would have it beyond"
+        "warning: cart.friction.viscous ended at its bound of 50 N s/m: the optimum lies outside"
     );
 }

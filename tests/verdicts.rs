@@ -7,6 +7,7 @@ use taut::case::{Case, Cost, TEMPLATE, Tuning};
 use taut::control::feedback::Feedback;
 use taut::control::{Loop, Standard, close};
 use taut::friction::Motion;
+use taut::linear::Operation;
 use taut::machine::axis::CART;
 use taut::signal::profile::{Leg, Limits, Profile};
 use taut::solve::{Event, Solver};
@@ -174,7 +175,7 @@ fn suggested_gains_have_margins_on_drawn_axes() {
         let hint = told.split("add for example ").nth(1).unwrap_or_else(|| panic!("{told}")).trim();
         let case = Case::from_text_with("axis.toml", &format!("{head}{hint}\n"), &sets).unwrap();
         let design = case.controller.as_ref().unwrap();
-        let plant = Plant::of(&case.machine, 0.0, design, &[]).unwrap();
+        let plant = Plant::of(&case.machine, Operation::default(), design, &[]).unwrap();
         let margins = Margins::of(&plant, &Feedback::new(design, &case.machine).unwrap());
         assert!(margins.excess(1.7, 1.7) <= 1.0, "{hint}, every {every}: {margins:?}\n{sets:?}");
     }

@@ -14,7 +14,7 @@ pub fn opened(request: &Request, context: &Context) -> Result<Case> {
     opened_for(request, context, Files::All)
 }
 
-/// The same with the files of these experiments only.
+/// The case of a request, with the files of these experiments only.
 pub fn opened_for(request: &Request, context: &Context, files: Files) -> Result<Case> {
     let (name, text) = (context.host.name(), request.text("text")?);
     let mut changes: Vec<String> =

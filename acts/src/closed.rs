@@ -12,9 +12,10 @@ use taut::control::feedback::Feedback;
 use taut::control::{Loop, Rows, Standard, each, stream};
 use taut::design::Design;
 use taut::error::{Error, Result};
+use taut::machine::{DriveAt, Machine};
 use taut::solve::Solver;
 use taut::trajectory::Trajectory;
-use taut::tune::{Break, Family, Margins, Open, Verdict, breaks, loops, trouble, tune};
+use taut::tune::{Family, Loops, Margins, Verdict, loops, trouble, tune};
 use taut_report::motion::{Done, Tried};
 use taut_report::tune::{Work, figures, page};
 
@@ -62,25 +63,15 @@ fn written(given: &Given) -> String {
     }
 }
 
-/// The case of a request, which has to be an axis, with `changes`; and its text with them.
-fn axis(request: &Request, context: &Context) -> Result<Case> {
-    match opened_for(request, context, Files::Nothing)? {
-        case if case.is_axis() => Ok(case),
-        _ => {
-            let error = Error::new("a controller moves an axis, and this case is a gantry");
-            Err(error.next("open the case of an axis"))
-        }
-    }
-}
-
 /// One move and the margins of its loop: what every move of a gain's slider asks for.
 pub fn closed(request: &Request, context: &Context) -> Result<Reply> {
-    let case = axis(request, context)?;
+    let case = opened_for(request, context, Files::Nothing)?;
     let begun = context.elapsed();
     let (design, moves) = case.moves_named(context.host.name(), &[])?;
     let place = (request.number("move").unwrap_or(0.0).max(0.0) as usize).min(moves.len() - 1);
     let motion = moves[place];
-    let mut kept = Columns::default();
+    let shown = Curves::of(&case.machine);
+    let mut kept = shown.columns();
     let done = moved(&case, design, motion, context, &mut |block| kept.take(block))?;
     let tried = Tried { case: &case, design, done: vec![done] };
     let done = &tried.done[0];
@@ -93,16 +84,18 @@ pub fn closed(request: &Request, context: &Context) -> Result<Reply> {
         &[done.told(&case.machine)],
     );
     let opened = case.clone();
+    let sliding = if case.is_axis() { "cart" } else { "bridge or cart" };
     let mut reply = Reply::of(json!({
         "title": case.title,
         "text": case.text,
         "moves": moves.iter().map(|one| json!({ "name": one.name, "until": one.until })).collect::<Vec<_>>(),
         "move": place,
         "until": motion.until,
-        "profile_end": motion.profile().end(),
+        "profile_end": motion.end(),
+        "curves": shown.told(),
         "controller": taut_report::motion::controller(design, &case.machine),
         "rows": lines.iter().map(|(name, value)| json!([name, value.replace('-', "−")])).collect::<Vec<_>>(),
-        "ending": taut_report::simulate::ended_early(&done.run.outcome.ending, "cart"),
+        "ending": taut_report::simulate::ended_early(&done.run.outcome.ending, sliding),
         "trouble": warnings(done),
         "result": told,
         "parameters": parameters(&opened, &opened.numbers()?),
@@ -150,7 +143,7 @@ pub fn moved<'a>(
     };
     let (timing, solver) = (Loop::of(design), Solver::of(machine));
     let run = stream(machine, &mut each(&mut controllers), &timing, &profiles, &rows, solver, false, &mut take)?;
-    let trouble = trouble::trouble(machine, design, &run, motion.profile().target());
+    let trouble = trouble::trouble(machine, design, &run, motion);
     let shortfalls = motion.shortfalls(machine, design);
     Ok(Done { motion, run, curves: None, worst: None, trouble, shortfalls, files: Vec::new() })
 }
@@ -171,42 +164,83 @@ fn nyquist(case: &Case, design: &Design) -> Result<(Margins, f64, [Vec<f64>; 5],
     let plant = family.plant(&family.nominal(), design, &feedback.corners())?;
     let margins = Margins::of(&plant, &feedback);
     let open = loops(&plant, &feedback);
-    let of = |value: &dyn Fn(&Open) -> f64| open.iter().map(value).collect::<Vec<f64>>();
-    let (at, breaks) = (margins.breaks.sensitivity, breaks(&feedback));
-    let highest =
-        |value: fn(&Open, Break) -> f64| of(&|open| breaks.iter().map(|&at| value(open, at)).fold(0.0, f64::max));
+    let of = |value: &dyn Fn(&Loops) -> f64| open.iter().map(value).collect::<Vec<f64>>();
+    let (at, drive) = (margins.breaks.sensitivity, margins.breaks.gain_drive);
     let curves = [
         plant.frequency.iter().map(|omega| omega / (2.0 * PI)).collect(),
-        of(&|open| open.broken_at(at).re),
-        of(&|open| open.broken_at(at).im),
-        highest(Open::sensitivity),
-        highest(Open::complementary),
+        of(&|open| open.broken_at(at, drive).re),
+        of(&|open| open.broken_at(at, drive).im),
+        of(&Loops::sensitivity),
+        of(&Loops::complementary),
     ];
     Ok((margins, tuning.sensitivity, curves, feedback.is_linear()))
 }
 
-/// Columns by name.
-#[derive(Default)]
-struct Columns {
-    names: Vec<&'static str>,
-    values: Vec<Vec<f64>>,
+/// A curve of a move: its name and its column.
+struct Shown {
+    name: &'static str,
+    column: String,
 }
 
-/// The columns of a move that are shown.
-const SHOWN: [&str; 6] = ["time", "reference", "cart_position", "cart_error", "voltage", "motor_current"];
+/// The curves of a move that are shown, by picture.
+struct Curves {
+    error: Vec<Shown>,
+    position: Vec<Shown>,
+    command: Vec<Shown>,
+}
+
+impl Curves {
+    fn of(machine: &Machine) -> Self {
+        let geometry = machine.geometry();
+        let slides: Vec<&str> = geometry.slides.iter().map(|slide| geometry.label(slide.body).key).collect();
+        let is_alone = slides.len() == 1;
+        let curve = |name, column: String| Shown { name, column };
+        let error = |key| curve(if is_alone { "x − y" } else { key }, format!("{key}_error"));
+        let position = |key| {
+            let reference = if is_alone { "reference".into() } else { format!("{key}_reference") };
+            [curve("reference", reference), curve(key, format!("{key}_position"))]
+        };
+        let command = |at: &DriveAt| {
+            curve(if is_alone { "voltage" } else { at.prefix.trim_end_matches('_') }, format!("{}voltage", at.prefix))
+        };
+        Self {
+            error: slides.iter().copied().map(error).collect(),
+            position: slides.iter().copied().flat_map(position).collect(),
+            command: geometry.drives.iter().map(command).collect(),
+        }
+    }
+
+    fn told(&self) -> Value {
+        let all = |curves: &[Shown]| -> Vec<Value> {
+            curves.iter().map(|one| json!({ "name": one.name, "column": one.column })).collect()
+        };
+        json!({ "error": all(&self.error), "position": all(&self.position), "command": all(&self.command) })
+    }
+
+    /// Columns for all of them, and the time.
+    fn columns(&self) -> Columns {
+        let all = [&self.error, &self.position, &self.command].into_iter().flatten();
+        let names: Vec<String> = std::iter::once("time".into()).chain(all.map(|one| one.column.clone())).collect();
+        Columns { values: vec![Vec::new(); names.len()], of_move: names.len(), names }
+    }
+}
+
+/// Columns by name; the first are those of a move.
+struct Columns {
+    names: Vec<String>,
+    values: Vec<Vec<f64>>,
+    of_move: usize,
+}
 
 impl Columns {
     fn take(&mut self, block: &Trajectory) {
-        if self.names.is_empty() {
-            SHOWN.iter().for_each(|name| self.put(name, Vec::new()));
-        }
-        for (name, values) in SHOWN.iter().zip(&mut self.values) {
+        for (name, values) in self.names.iter().zip(&mut self.values).take(self.of_move) {
             values.extend_from_slice(block.get(name).unwrap_or(&[]));
         }
     }
 
-    fn put(&mut self, name: &'static str, values: Vec<f64>) {
-        self.names.push(name);
+    fn put(&mut self, name: &str, values: Vec<f64>) {
+        self.names.push(name.into());
         self.values.push(values);
     }
 
@@ -218,7 +252,7 @@ impl Columns {
 
 /// Tunes the controller: the page of `taut tune`, and the text with the gains.
 pub fn tuned(request: &Request, context: &Context) -> Result<Reply> {
-    let case = axis(request, context)?;
+    let case = opened_for(request, context, Files::Nothing)?;
     let mut tuning: Tuning = case.tune.clone().unwrap_or_default();
     tuning.spread = request.number("spread").or(tuning.spread);
     let begun = context.elapsed();

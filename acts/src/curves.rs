@@ -48,7 +48,7 @@ impl Panel {
         self
     }
 
-    /// Whether it is more than what the drawing needs.
+    /// True if it is more than what the drawing needs.
     pub fn is_plotted(&self) -> bool {
         !self.title.is_empty()
     }

@@ -95,11 +95,11 @@ const ACTS: &[Act] = &[
 /// A quick work is stopped after this time, s: a picture that takes longer is none to drag.
 const DEADLINE: f64 = 10.0;
 
-/// Surroundings of a work beside its request.
+/// Context of a job.
 pub struct Context<'a> {
     /// The surroundings of the page.
     pub(crate) host: &'a dyn Host,
-    /// Whether nobody wants the answer any more.
+    /// True if nobody wants the answer any more.
     stop: &'a (dyn Fn() -> bool + Sync),
     /// Tells the page how far a long work is; false where it is behind, and misses this step.
     pub(crate) progress: &'a (dyn Fn(Value) -> bool + Sync),
@@ -107,7 +107,7 @@ pub struct Context<'a> {
 }
 
 impl<'a> Context<'a> {
-    /// That of a work that begins now.
+    /// Context of a job that begins now.
     pub fn new(
         host: &'a dyn Host,
         stop: &'a (dyn Fn() -> bool + Sync),
@@ -121,12 +121,12 @@ impl<'a> Context<'a> {
         self.host.seconds() - self.begun
     }
 
-    /// Whether a quick work is to go on.
+    /// Tells a quick job to continue or to stop.
     fn flow(&self) -> Flow {
         if self.is_stopped() || self.elapsed() > DEADLINE { Flow::Stop } else { Flow::Continue }
     }
 
-    /// Whether nobody wants the answer any more.
+    /// True if nobody wants the answer any more.
     fn is_stopped(&self) -> bool {
         (self.stop)()
     }

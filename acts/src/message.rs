@@ -40,7 +40,7 @@ impl Request {
         self.body.get(key).and_then(Value::as_f64).filter(|number| number.is_finite())
     }
 
-    /// Whether something is asked for.
+    /// True if something is asked for.
     pub fn flag(&self, key: &str) -> bool {
         self.body.get(key).and_then(Value::as_bool).unwrap_or(false)
     }

@@ -19,7 +19,7 @@ pub struct Common {
     /// The folder to write results into; it is made if it is not there
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Change one value of the case for this run, as often as needed
+    /// Override one value of the case; may be repeated
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub changes: Vec<String>,
     /// Leave out the report and the plots
@@ -44,7 +44,7 @@ impl Common {
         Ok(case)
     }
 
-    /// The same with the files of these experiments. One that is missing is told to whoever asks for the experiment.
+    /// Opens a case with the files of these experiments; a missing file is an error only for its own experiment.
     pub fn open_for(&self, path: &Path, files: Files) -> Result<Case> {
         match is_standard_input(path) {
             true => Case::from_text_for(path, &standard_input()?, &self.changes(), files),
@@ -59,7 +59,8 @@ impl Common {
         Ok(case)
     }
 
-    /// The same with the files of these experiments. One that is missing is told to whoever asks for the experiment.
+    /// Opens the case of an axis with the files of these experiments; a missing file is an error only for its own
+    /// experiment.
     pub fn case_for(&self, path: &Path, files: Files) -> Result<Case> {
         match is_standard_input(path) {
             true => Case::axis_from_text_for(path, &standard_input()?, &self.changes(), files),
@@ -71,18 +72,18 @@ impl Common {
         self.changes.iter().map(String::as_str).collect()
     }
 
-    /// Whether a report is made: where there is a folder for it, and time to draw it.
+    /// True if a report is made: where there is a folder for it, and time to draw it.
     pub fn reports(&self) -> bool {
         self.out.is_some() && self.draws()
     }
 
-    /// Whether a report is wanted. After a signal the result itself comes first, and there may be no time for more.
+    /// True if a report is wanted. After a signal the result itself comes first, and there may be no time for more.
     pub fn draws(&self) -> bool {
         !self.no_report && interrupt::came().is_none()
     }
 }
 
-/// Whether this is the word for standard input.
+/// True if this is the word for standard input.
 pub fn is_standard_input(path: &Path) -> bool {
     path.as_os_str() == "-"
 }

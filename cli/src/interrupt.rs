@@ -53,7 +53,7 @@ pub fn came() -> Option<u8> {
 #[cfg(unix)]
 const SIGNALS: [i32; 3] = [libc::SIGINT, libc::SIGTERM, libc::SIGHUP];
 
-/// Those of them that were ignored when the program started.
+/// Signals that were ignored when the program started.
 #[cfg(unix)]
 pub fn ignored() -> Vec<i32> {
     SIGNALS.into_iter().filter(|&signal| is_ignored(signal)).collect()
@@ -169,7 +169,7 @@ pub fn explained(mut failure: Failure) -> Failure {
     }
 }
 
-/// Whether the program was started with this signal ignored.
+/// True if the program was started with this signal ignored.
 #[cfg(unix)]
 fn is_ignored(signal: i32) -> bool {
     let mut action = std::mem::MaybeUninit::<libc::sigaction>::zeroed();

@@ -81,7 +81,7 @@ impl Listing {
         taut::json::text(self)
     }
 
-    /// That of an earlier run in this folder; none where there is none that can be read.
+    /// List of an earlier run in this folder; none if it does not exist or cannot be read.
     pub fn read(folder: &Path) -> Option<Self> {
         let mut text = String::new();
         File::open(folder.join(NAME)).ok()?.take(MOST_BYTES).read_to_string(&mut text).ok()?;

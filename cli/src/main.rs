@@ -1,4 +1,4 @@
-//! The program `taut`: reads the command line, does what it says, and tells how it ended.
+//! The program `taut`: reads the command line, runs the command and sets the exit status.
 
 mod args;
 mod check;
@@ -87,7 +87,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// Whether a command line that cannot be read asks for JSON.
+/// True if a command line that cannot be read asks for JSON.
 fn is_json_wanted() -> bool {
     std::env::args_os().skip(1).take_while(|word| word != "--").any(|word| word == "--json")
 }

@@ -35,7 +35,7 @@ impl Progress {
         Self::ended_by(what, all, quiet, "Ctrl-C keeps what is done")
     }
 
-    /// The same of work that is of no use before its end.
+    /// Progress of a job whose intermediate results are useless.
     pub fn of_whole(what: impl Into<String>, quiet: bool) -> Self {
         Self::ended_by(what, None, quiet, "Ctrl-C ends it")
     }
@@ -60,7 +60,7 @@ impl Progress {
         Self { line }
     }
 
-    /// The same where so many steps were done before.
+    /// This progress with `already` steps done.
     pub fn with_done(self, already: u64) -> Self {
         self.line.done.store(already, Ordering::Relaxed);
         self

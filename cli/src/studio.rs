@@ -23,7 +23,7 @@ pub fn run(args: &Args) -> Outcome {
     serve(options).map_err(Failure::from).map(|()| Status::Done)
 }
 
-/// Whether it is a state of a page, and no file: an address with a fragment, or the fragment alone.
+/// True if it is a state of a page, and no file: an address with a fragment, or the fragment alone.
 fn is_link(given: &str) -> bool {
     given.starts_with('#') || given.starts_with("http://") || given.starts_with("https://")
 }

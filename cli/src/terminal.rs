@@ -44,7 +44,7 @@ pub fn show(text: &str) {
 /// True once anything was written to standard output.
 static SHOWN: AtomicBool = AtomicBool::new(false);
 
-/// Whether anything was written to standard output.
+/// True if anything was written to standard output.
 pub fn has_shown() -> bool {
     SHOWN.load(Ordering::SeqCst)
 }
@@ -133,7 +133,7 @@ fn word(text: &str) -> usize {
     text[spaces..].find(' ').map_or(text.len(), |end| spaces + end)
 }
 
-/// Whether a text goes on with one space and what may be a unit.
+/// True if a text goes on with one space and what may be a unit.
 fn is_unit(text: &str) -> bool {
     let mut letters = text.chars();
     letters.next() == Some(' ') && letters.next().is_some_and(|c| c.is_alphabetic() || "%°".contains(c))

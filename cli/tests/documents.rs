@@ -57,7 +57,7 @@ fn lasting(text: &str) -> Vec<String> {
     words
 }
 
-/// Whether an output is as the document shows it; a line `…` of the document stands for any lines.
+/// True if an output is as the document shows it; a line `…` of the document stands for any lines.
 fn agrees(got: &str, want: &str) -> bool {
     let (got, parts) = (lasting(got), want.split("\n…").map(lasting).collect::<Vec<_>>());
     match &parts[..] {
@@ -70,7 +70,7 @@ fn agrees(got: &str, want: &str) -> bool {
 /// An output as the document is to show it: as short as it was.
 fn shown(got: &str, want: &str) -> String {
     let Some((first, last)) = want.split_once("\n…") else { return got.to_string() };
-    let (first, last) = (first.lines().count(), last.lines().filter(|line| !line.is_empty()).count());
+    let (first, last) = (first.lines().count(), last.trim_matches('\n').lines().count());
     let lines: Vec<&str> = got.trim_end_matches('\n').lines().collect();
     let end = lines.len().saturating_sub(last);
     let mut text = lines[..first.min(end)].join("\n") + "\n…\n";
@@ -88,6 +88,8 @@ fn a_document_may_leave_out_the_effort_and_long_middles() {
     assert!(!agrees(got, &want.replace("1001", "1002").replace("41\nsimulations", "7 simulations")));
     assert!(agrees(got, "  fit   0.5 kg\n…\nend") && !agrees(got, "  fit   0.6 kg\n…\nend"));
     assert_eq!(shown(got, "  fit   0.6 kg\n…\nend"), "  fit   0.5 kg\n…\nend\n");
+    // An empty line in the end is one of its lines: the line behind the dots was lost.
+    assert_eq!(shown("a\nb\nc\n\nd\n", "a\n…\nc\n\nd"), "a\n…\nc\n\nd\n");
 }
 
 /// Runs the commands of a document's `console` blocks, one after another in one folder, and compares what they print.

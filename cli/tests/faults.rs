@@ -168,7 +168,7 @@ struct Whole {
 }
 
 impl Whole {
-    /// Whether what was left of a command shows that it had begun to write.
+    /// True if what was left of a command shows that it had begun to write.
     fn check(&self, left: &Files, what: &str) -> bool {
         let lost: Vec<&String> = self.before.keys().filter(|name| !left.contains_key(*name)).collect();
         assert!(lost.is_empty(), "{what}: {lost:?} stood before and is gone");

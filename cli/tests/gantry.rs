@@ -279,13 +279,13 @@ fn modes_of_a_gantry_answer_every_question() {
 #[test]
 fn commands_for_an_axis_say_what_takes_a_gantry() {
     let case = machine("core-xy/core-xy.toml");
-    for command in ["fit", "tune", "plan", "check", "frf"] {
+    for command in ["fit", "check", "frf"] {
         assert_eq!(
             refused(&[command], &case),
             "error: stages/core-xy.toml:4:9: kind: this needs a single axis, and the case describes a gantry (CoreXY)\n  \
              4 | kind  = \"core-xy\"\n    |         ^^^^^^^^^\n  \
              allowed: kind = \"axis\", or no kind at all\n  \
-             next: `taut simulate`, `taut modes`, `taut move`, `taut shape` and `taut sweep` take gantries; fit and tuning of them are yet to come\n",
+             next: `taut simulate`, `taut modes`, `taut move`, `taut tune`, `taut plan`, `taut shape` and `taut sweep` take gantries; fits of them are yet to come\n",
             "{command}"
         );
     }
@@ -378,7 +378,7 @@ fn a_sweep_that_a_gantry_cannot_have_is_told() {
         ("total.viscous=20%", "`total.viscous` is a sum over the bodies of a single axis, and this is a gantry\n"),
         ("cart.friction.stribeck.force=20%", "`cart.friction.stribeck.force` has no value in this case\n"),
         ("bridge.mass=values(-1 kg)", "-1 kg has to be above zero\n"),
-        ("cart.mass=values(1 s)", "\"1 s\" is a time (s); a mass (kg) is wanted\n"),
+        ("cart.mass=values(1 s)", "\"1 s\" is a time (s); expected a mass (kg)\n"),
     ] {
         let told = told(vary, &[]);
         assert!(told.contains(message), "{vary}: {told}");
@@ -408,7 +408,7 @@ fn a_sweep_that_a_gantry_cannot_have_is_told() {
     assert!(apart.contains("`motor.resistance` is not the same in both drives\n"), "{apart}");
     assert_eq!(
         refused(&["sweep"], &case),
-        "error: stages/h-frame.toml: this case does not say what is varied\n  \
+        "error: stages/h-frame.toml: this case has no parameters to vary\n  \
          next: give for example --runs 1000 --vary cart.mass=20%, or add a table [sweep]\n"
     );
 }

@@ -95,8 +95,8 @@ fn misprints_are_told_and_references_are_met() {
 fn the_ids_are_those_of_the_documentation() {
     let document = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/paper.md")).unwrap();
     let (_, list) = document.split_once("## The claims").unwrap();
-    let documented: Vec<&str> =
-        list.lines().filter_map(|l| l.strip_prefix("| `")?.split_once('`')).map(|(id, _)| id).collect();
+    let items = list.split("\n\n").find(|paragraph| paragraph.starts_with("- **")).unwrap();
+    let documented: Vec<&str> = items.split('`').skip(1).step_by(2).collect();
     let ids: Vec<String> = claims().iter().map(|c| c["id"].as_str().unwrap().to_string()).collect();
     assert_eq!(documented, ids);
 }

@@ -62,7 +62,7 @@ fn what_cannot_be_planned_is_told() {
         ("{ sped = 1 }", "motor.resistance=1", "did you mean `speed`?"),
         ("{ reserve = 0.95 }", "motor.resistance=1", "from 0 to 0.9"),
         ("{}, speed = 1", "motor.resistance=1", "the move has a plan already"),
-        ("3", "motor.resistance=1", "a table is wanted"),
+        ("3", "motor.resistance=1", "expected a table"),
         ("{}", "cart.friction.static=1 kN", "there is no plan: to break away takes"),
         ("{}", "motor.resistance=1", ""),
     ] {

@@ -151,3 +151,43 @@ fn wrong_input_is_told_with_its_place() {
     assert_eq!(status, Some(2));
     assert!(error.contains("required arguments were not provided"), "{error}");
 }
+
+/// The answer comes first: details were 60 lines of `show` and 90 of `tune` before anybody asked for them.
+#[test]
+fn details_are_printed_only_if_asked_for() {
+    let printed = |args: &[&str]| {
+        let output = taut(args).output().unwrap();
+        assert_eq!(output.stderr, b"", "{args:?}");
+        String::from_utf8(output.stdout).unwrap()
+    };
+    for machine in [TABLE4, "stages/printer-axis/printer-axis.toml", "stages/core-xy/follows.toml"] {
+        let (short, long) = (printed(&["show", machine]), printed(&["show", machine, "--verbose"]));
+        let found = shown(&[machine]);
+        let names = |text: &str| rows(&found).iter().filter(|row| named(text, row["name"].as_str().unwrap())).count();
+        assert_eq!(names(&long), rows(&found).len(), "{machine}: {long}");
+        assert!(names(&short) < names(&long) && short.lines().count() <= 32, "{machine}: {short}");
+        assert!(short.contains("more rows") && short.contains("--verbose") && !long.contains("more rows"), "{short}");
+        assert!(named(&short, "resonance 1") || named(&short, "elastic mode 1"), "{machine}: {short}");
+    }
+    let pid = "stages/sollmann-jouaneh/controllers/pid.toml";
+    let judged = ["tune", pid, "--evaluate"];
+    let run = |more: &[&str]| {
+        let output = taut(&[&judged[..], more].concat()).output().unwrap();
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let (short, long) = (run(&[]), run(&["--verbose"]));
+    for heading in ["The axis as the file has it", "Objective", "Axes", "Limit cycles at rest"] {
+        assert!(!short.contains(heading) && long.contains(heading), "{heading}: {short}\n{long}");
+    }
+    for heading in ["Gains", "At worst", "Moves"] {
+        assert!(short.contains(heading) && long.contains(heading), "{heading}: {short}\n{long}");
+    }
+    let output = taut(&["show", TABLE4, "--verbose", "--quiet"]).output().unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    assert!(String::from_utf8(output.stderr).unwrap().contains("cannot be used with"));
+}
+
+/// True if a line of a text begins with a name.
+fn named(text: &str, name: &str) -> bool {
+    text.lines().any(|line| line.trim_start().starts_with(name))
+}

@@ -446,7 +446,7 @@ fn a_refused_change_names_its_key_and_no_line() {
     let mut page = studio.page();
     for (value, what) in [
         (json!(-1), "cart.mass: -1 kg has to be above zero"),
-        (json!("3 mm"), "cart.mass: \"3 mm\" is a length (m); a mass (kg) is wanted"),
+        (json!("3 mm"), "cart.mass: \"3 mm\" is a length (m); expected a mass (kg)"),
         (json!("heavy"), "cart.mass: \"heavy\" does not begin with a number"),
     ] {
         let error = page.result("run", json!({ "text": text(TABLE4), "set": [["cart.mass", value]] }))["error"].clone();

@@ -138,7 +138,7 @@ fn a_killed_sweep_goes_on() {
     }
     // Another plan does not mix with it.
     let other = told(folder.path(), &[&case, "--runs", "6000", "--vary", "all=10%", "--out", "killed.parquet"]);
-    assert!(other.contains("an unfinished sweep of another case, plan or version stands here"), "{other}");
+    assert!(other.contains("this folder has an unfinished sweep of another case, plan or version"), "{other}");
     assert!(other.contains("remove killed.parquet.parts"), "{other}");
 
     let kept = parts(&parts_folder);
@@ -205,7 +205,7 @@ fn mistakes_on_the_command_line_are_told() {
     let folder = TempDir::new().unwrap();
     let case = machine("table4.toml");
     for (arguments, message) in [
-        (vec![], "this case does not say what is varied"),
+        (vec![], "this case has no parameters to vary"),
         (vec!["--runs", "10"], "nothing is varied"),
         (vec!["--vary", "all=20%"], "`sweep.runs` is missing"),
         (vec!["--runs", "0", "--vary", "all=20%"], "has to be above zero"),
@@ -213,7 +213,7 @@ fn mistakes_on_the_command_line_are_told() {
         (vec!["--runs", "10", "--vary", "cart.mass"], "does not say how something varies"),
         (vec!["--runs", "10", "--vary", "=20%"], "does not say how something varies"),
         (vec!["--runs", "10", "--vary", "cart.mas=20%"], "did you mean `cart.mass`?"),
-        (vec!["--runs", "10", "--vary", "cart.mass=20 kg"], "is no way to vary a parameter"),
+        (vec!["--runs", "10", "--vary", "cart.mass=20 kg"], "is not a distribution of a parameter"),
         (vec!["--runs", "10", "--vary", "cart.load=20%"], "is 0, of which a share"),
         (vec!["--runs", "10", "--vary", "all=20%", "--design", "sobl"], "did you mean \"sobol\"?"),
         (vec!["--runs", "10", "--vary", "all=20%", "--interval", "2 s"], "does not suit"),

@@ -102,9 +102,9 @@ pub struct Frf {
     pub segments: usize,
     /// Samples in each.
     pub length: usize,
-    /// Whether those are periods.
+    /// True if those are periods.
     pub periodic: bool,
-    /// Whether a reference was used.
+    /// True if a reference was used.
     pub closed: bool,
     /// By frequency.
     pub points: Vec<Point>,
@@ -339,7 +339,7 @@ pub fn measure(case: &Case, cut: &Cut, known: Known) -> Result<Measurement> {
     Ok(Measurement { known, responses, fit })
 }
 
-/// Whether a quantity is a position or a speed.
+/// True if a quantity is a position or a speed.
 fn is_kinematic(quantity: Quantity) -> bool {
     match quantity {
         Quantity::MotorCurrent | Quantity::MotorVoltage | Quantity::CartAcceleration => false,

@@ -1,4 +1,4 @@
-//! The fastest move of an axis: speed, acceleration and jerk that its limits allow, with jerk times on the zeros of the
+//! The fastest move of a machine: speed, acceleration and jerk that its limits allow, with jerk times on the zeros of the
 //! belt's modes, chosen by how soon the cart stays in its window over a family of machines. The limits themselves are those of
 //! [`Quickest`].
 
@@ -38,7 +38,7 @@ pub struct Arrival {
     pub settled: usize,
     /// How many were run.
     pub axes: usize,
-    /// Largest distance of the cart from its reference on the axis as the file has it, m.
+    /// Largest distance of what slides from its reference on the machine as the file has it, m.
     pub cart_error: f64,
 }
 
@@ -66,19 +66,20 @@ pub struct Planned {
     pub window: f64,
     /// The best that was tried.
     pub best: Tried,
-    /// Its reference.
-    pub profile: Profile,
+    /// Its references.
+    pub profiles: Vec<Profile>,
     /// True if the limits of the file stay because nothing that was tried arrives sooner.
     pub is_kept: bool,
     /// When the cart arrives with the limits of the file.
     pub given: Arrival,
     /// Limits that the move of the file exceeds.
     pub shortfalls: Vec<Shortfall>,
-    /// The reference of the file.
-    pub reference: Profile,
-    /// What the plan needs of each limit of the machine, at worst over the family.
+    /// The references of the file.
+    pub references: Vec<Profile>,
+    /// Use of each limit of the machine, worst case over the family.
     pub loads: Vec<Load>,
-    /// The least time in which the rigid axis could do it within voltage and current, s; none where nothing limits it.
+    /// The least time in which the rigid axis could do it within voltage and current, s; none where nothing limits it, and
+    /// of a machine with several drives.
     pub bound: Option<f64>,
     /// All plans that were tried, in order.
     pub tried: Vec<Tried>,
@@ -123,7 +124,7 @@ impl Plans {
             [("jerk", limits.jerk, "m/s^3"), ("snap", limits.snap, "m/s^4")]
                 .into_iter()
                 .for_each(|(key, value, unit)| value.into_iter().for_each(|value| set(key, value, unit)));
-            let end = planned.profile.rest();
+            let end = planned.profiles.iter().map(Profile::rest).fold(0.0, f64::max);
             if case.moves[planned.place].until < end {
                 set("until", end, "s");
             }
@@ -133,7 +134,7 @@ impl Plans {
     }
 }
 
-/// What the plans of a case have in common.
+/// Data shared by the plans of a case.
 struct Planner<'a> {
     design: &'a Design,
     family: &'a Family,
@@ -145,7 +146,7 @@ struct Planner<'a> {
 impl Planner<'_> {
     fn planned(&self, motion: &Move, place: usize) -> Result<Planned> {
         let impossible = |what: String| Error::new(format!("the move \"{}\": there is no plan: {what}", motion.name));
-        let way = Way::of(motion.profile()).ok_or_else(|| impossible("it has no stroke".into()))?;
+        let way = Way::of(&motion.profiles).ok_or_else(|| impossible("it has no stroke".into()))?;
         let machine = &self.family.machine;
         let short = motion.shortfalls(machine, self.design);
         let quickest = Quickest { machine, design: self.design, modes: self.modes, wanted: self.wanted };
@@ -169,21 +170,21 @@ impl Planner<'_> {
                 (best, is_run) = (one.clone(), true);
             }
         }
-        let profile = way.within(&best.limits)?;
-        let given = self.arrival(motion, motion.profile(), true)?;
+        let profiles = way.within(&best.limits)?;
+        let given = self.arrival(motion, &motion.profiles, true)?;
         let is_sooner = short.is_empty() && Tried::rank_of(&given) <= best.rank();
         Ok(Planned {
             is_kept: is_sooner,
             place,
             name: motion.name.clone(),
             window: motion.window,
-            loads: self.loads(&profile.clone().shaped(&self.design.shaper), CLOSELY),
+            loads: self.loads(&self.shaped(&profiles), CLOSELY),
             bound: self.bound(&way),
             given,
-            reference: motion.profile().clone(),
+            references: motion.profiles.clone(),
             shortfalls: short,
             best,
-            profile,
+            profiles,
             tried,
         })
     }
@@ -196,7 +197,8 @@ impl Planner<'_> {
                 if (self.stop)() {
                     return Ok(tried);
                 }
-                let all = |profile: &Profile| self.loads(profile, INSTANTS).iter().map(Load::share).fold(0.0, f64::max);
+                let all =
+                    |profiles: &[Profile]| self.loads(profiles, INSTANTS).iter().map(Load::share).fold(0.0, f64::max);
                 let Some(limits) = quickest.limits_for(way, periods, share, &all)? else { continue };
                 let arrival = self.arrival(motion, &way.within(&limits)?, false)?;
                 tried.push(Tried { limits, periods, share, arrival });
@@ -205,36 +207,37 @@ impl Planner<'_> {
         Ok(tried)
     }
 
-    /// What a reference, shaper included, needs of each limit at most, over the family.
-    fn loads(&self, profile: &Profile, instants: usize) -> Vec<Load> {
+    /// Largest use of each limit by references with their shaper, over the family.
+    fn loads(&self, profiles: &[Profile], instants: usize) -> Vec<Load> {
         let mut all: Vec<Load> = Vec::new();
         for corner in &self.family.machines {
-            for load in loads(&self.family.stage_at(corner), self.design.limit, profile, instants) {
-                match all.iter_mut().find(|known| known.limit == load.limit) {
-                    Some(known) if load.share() > known.share() => *known = load,
-                    Some(_) => (),
-                    None => all.push(load),
-                }
-            }
+            let own = loads(&self.family.stage_at(corner), self.design.limit, profiles, instants);
+            own.into_iter().for_each(|load| load.join(&mut all));
         }
         all
     }
 
+    /// References through the shaper of the controller.
+    fn shaped(&self, profiles: &[Profile]) -> Vec<Profile> {
+        profiles.iter().map(|profile| profile.clone().shaped(&self.design.shaper)).collect()
+    }
+
     /// When the cart arrives, in closed loop.
-    fn arrival(&self, motion: &Move, profile: &Profile, whole: bool) -> Result<Arrival> {
-        let watched = (motion.until - motion.profile().end()).max(WATCHED);
+    fn arrival(&self, motion: &Move, profiles: &[Profile], whole: bool) -> Result<Arrival> {
+        let watched = (motion.until - motion.end()).max(WATCHED);
+        let rest = self.shaped(profiles).iter().map(Profile::rest).fold(0.0, f64::max);
         let run = |machine: &Machine| -> Result<MoveRun> {
             closed_loop(&Setup {
                 machine,
                 model: &self.family.machine,
                 design: self.design,
-                profiles: std::slice::from_ref(profile),
-                until: profile.clone().shaped(&self.design.shaper).rest() + watched,
+                profiles,
+                until: rest + watched,
                 window: motion.window,
                 solver: Solver::of(machine),
             })
         };
-        let end = profile.end();
+        let end = profiles.iter().map(Profile::end).fold(0.0, f64::max);
         let time = |run: &MoveRun| run.figures.settling.filter(|_| run.outcome.ending == Ending::Complete);
         let own = run(&self.family.machine)?;
         let nominal = time(&own).map(|settling| end + settling);
@@ -244,7 +247,7 @@ impl Planner<'_> {
             worst: None,
             settled: usize::from(nominal.is_some()),
             axes: 1,
-            cart_error: own.figures.cart().error.peak.value.abs(),
+            cart_error: own.figures.worst_load().error.peak.value.abs(),
         };
         if whole {
             let mut worst = Some(0.0_f64);
@@ -265,12 +268,13 @@ impl Planner<'_> {
 
     /// The least time of all strokes of the rigid axis, with their rests.
     fn bound(&self, way: &Way) -> Option<f64> {
+        let [mut from] = way.start[..] else { return None };
         let limits = limits(&self.family.machine, self.design.limit);
         let rigid = Rigid::of(&self.family.machine);
-        let (mut from, mut time) = (way.start, 0.0);
-        for &(rest, to) in &way.strokes {
-            time += rest + rigid.quickest(to - from, limits)?;
-            from = to;
+        let mut time = 0.0;
+        for (rest, to) in &way.strokes {
+            time += rest + rigid.quickest(to[0] - from, limits)?;
+            from = to[0];
         }
         Some(time)
     }

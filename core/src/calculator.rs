@@ -73,7 +73,7 @@ pub fn at_least<N>(of: N, than: f64) -> Test<N> {
 }
 
 impl Test<f64> {
-    /// Whether it holds; not of what is no number.
+    /// True if it holds; not of what is no number.
     #[inline]
     pub fn holds(&self) -> bool {
         match self.relation {
@@ -150,7 +150,7 @@ pub trait Calculator {
     /// Gives a number a name in a program.
     fn name(&mut self, name: &'static str, value: Self::N) -> Self::N;
 
-    /// The same of one of many.
+    /// Names a value with a number.
     fn numbered(&mut self, name: &'static str, number: usize, value: Self::N) -> Self::N;
 
     /// A remark in a program on what follows.

@@ -183,7 +183,7 @@ pub struct Fuzzy {
     pub rate: f64,
     /// Command of a rule of 1, V or A; of an incremental one, V/s or A/s.
     pub command: f64,
-    /// Whether rules change the command (PI) instead of giving it (PD).
+    /// True if rules change the command (PI) instead of giving it (PD).
     pub incremental: bool,
     /// `rules[i][j]` from −1 to 1 for set i of the error and set j of its rate, both from negative to positive; a
     /// square of odd size.
@@ -195,25 +195,25 @@ pub struct Fuzzy {
 /// Feed-forward from the reference alone.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FeedForward {
-    /// Which model tells it.
+    /// Model of the feed-forward.
     pub model: FeedForwardModel,
     /// Share of the inertia's part.
     pub inertia: f64,
     /// Share of the friction's.
     pub friction: f64,
-    /// Whether an encoder at the motor is given the cart's reference with the belt's stretch added.
+    /// True if an encoder at the motor is given the cart's reference with the belt's stretch added.
     pub compensate_stretch: bool,
-    /// How far ahead of the sample the reference is looked at, s; delay + T/2 where it is not said.
+    /// Lead of the reference over the sample, s; delay + T/2 by default.
     pub lead: Option<f64>,
 }
 
 impl FeedForward {
-    /// None at all.
+    /// No feed-forward.
     pub const NONE: Self =
         Self { model: FeedForwardModel::None, inertia: 1.0, friction: 1.0, compensate_stretch: false, lead: None };
 }
 
-/// How much of the axis feed-forward knows.
+/// Model of the axis in the feed-forward.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FeedForwardModel {
     /// Nothing.
@@ -228,7 +228,7 @@ impl FeedForwardModel {
     /// All of them.
     pub const ALL: [Self; 3] = [Self::None, Self::Rigid, Self::Elastic];
 
-    /// As in the case file.
+    /// Its name in the case file.
     pub fn word(self) -> &'static str {
         match self {
             Self::None => "none",

@@ -30,13 +30,13 @@ pub struct Side {
 }
 
 impl Friction {
-    /// The same in both directions, breakaway equal to Coulomb: the paper's law, eq. (15).
+    /// Friction that is equal in both directions, with a breakaway equal to Coulomb friction: eq. (15).
     pub fn symmetric(viscous: f64, coulomb: f64) -> Self {
         let side = Side { viscous, coulomb, breakaway: coulomb };
         Self { forward: side, backward: side, law: Law::Coulomb }
     }
 
-    /// The same in both directions with a higher breakaway.
+    /// Friction that is equal in both directions, with a higher breakaway.
     pub fn with_breakaway(viscous: f64, coulomb: f64, breakaway: f64) -> Self {
         let side = Side { viscous, coulomb, breakaway };
         Self { forward: side, backward: side, law: Law::Coulomb }
@@ -47,7 +47,7 @@ impl Friction {
         Self { forward, backward, law: Law::Coulomb }
     }
 
-    /// The same values after another law.
+    /// These values under another law.
     pub fn following(self, law: Law) -> Self {
         Self { law, ..self }
     }
@@ -62,17 +62,17 @@ impl Friction {
         }
     }
 
-    /// Whether it is b v and no more, so that nothing ever sticks and the direction makes no difference.
+    /// True if it is b v and no more, so that nothing ever sticks and the direction makes no difference.
     pub fn is_linear(&self) -> bool {
         self.forward == self.backward && self.forward.breakaway == 0.0 && self.forward.coulomb == 0.0
     }
 
-    /// Whether it is made of straight lines and jumps: what the exact solver takes.
+    /// True if it is made of straight lines and jumps: what the exact solver takes.
     pub fn is_piecewise_linear(&self) -> bool {
         self.law == Law::Coulomb || self.is_linear()
     }
 
-    /// Whether a body can be held at rest by it, so that its motion has modes.
+    /// True if a body can be held at rest by it, so that its motion has modes.
     pub fn sticks(&self) -> bool {
         !self.law.never_sticks() && !self.is_linear()
     }

@@ -41,7 +41,7 @@ pub struct Machine {
     pub cart: Slide,
     /// The belt, or belts.
     pub belt: Belt,
-    /// How the motion of each drive is measured, if it is; of an axis it may be that of the cart.
+    /// Encoder of each drive, if there is one; on an axis it can be at the cart.
     pub encoder: Option<Encoder>,
     /// A second encoder at the cart, beside one at motor or drive pulley.
     pub scale: Option<Encoder>,
@@ -85,12 +85,12 @@ impl Machine {
         self.slides().nth(index)
     }
 
-    /// The same, to be changed.
+    /// Mutable access to a slide.
     pub fn slide_mut(&mut self, index: usize) -> Option<&mut Slide> {
         self.bridge.iter_mut().chain(std::iter::once(&mut self.cart)).nth(index)
     }
 
-    /// Whether its equations are linear but for stick, slip and other changes of mode: what the exact solver takes.
+    /// True if its equations are linear but for stick, slip and other changes of mode: what the exact solver takes.
     pub fn is_piecewise_linear(&self) -> bool {
         let pulleys = [self.drive_pulley.friction, self.idler_pulley.friction];
         let mut laws = pulleys.iter().chain(self.slides().map(|slide| &slide.friction));
@@ -99,7 +99,7 @@ impl Machine {
         laws.all(Friction::is_piecewise_linear) && self.slides().all(|slide| slide.along.is_none()) && !follows
     }
 
-    /// Whether it is another machine elsewhere along its travel, but for the ends.
+    /// True if it is another machine elsewhere along its travel, but for the ends.
     pub fn changes_along_travel(&self) -> bool {
         self.slides().any(|slide| slide.along.is_some() || slide.forces.along.is_some()) || self.belt.follows_cart
     }
@@ -139,7 +139,7 @@ pub struct Slide {
     pub mass: f64,
     /// Friction force, N over m/s.
     pub friction: Friction,
-    /// How its dry friction changes along the travel, if it does.
+    /// Factor on dry friction along the travel, if it varies.
     pub along: Option<Polyline>,
     /// Forces on it that change along the travel or with its speed, if any.
     pub forces: SlideForces,
@@ -148,7 +148,7 @@ pub struct Slide {
     pub load: f64,
     /// Inclination of its travel, rad: positive if it climbs towards larger x.
     pub inclination: f64,
-    /// How far it may go, if that is bounded.
+    /// Travel, if it is limited.
     pub travel: Option<Travel>,
 }
 
@@ -190,9 +190,9 @@ pub struct Belt {
     pub make: Option<BeltMake>,
     /// Tension T₀ of every span at rest, N. A span whose tension is used up goes slack; none for spans that can push.
     pub pretension: Option<f64>,
-    /// Whether spans get shorter and longer, and so stiffer and softer, as what slides moves; needs `make`.
+    /// True if spans get shorter and longer, and so stiffer and softer, as what slides moves; needs `make`.
     pub follows_cart: bool,
-    /// How many of the three inertias move by themselves.
+    /// Belt model: the number of inertias that move independently.
     pub model: BeltModel,
     /// Its data sheet.
     pub sheet: BeltSheet,
@@ -232,7 +232,7 @@ pub enum BeltModel {
 }
 
 impl BeltModel {
-    /// As in the case file.
+    /// Its name in the case file.
     pub fn word(self) -> &'static str {
         match self {
             BeltModel::Elastic => "elastic",
@@ -242,7 +242,7 @@ impl BeltModel {
     }
 }
 
-/// How far something may go.
+/// Limits of a position, with or without end stops.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Travel {
     /// Least position x, m.
@@ -324,7 +324,7 @@ pub fn pitch_radius(teeth: f64, pitch: f64) -> f64 {
 /// An incremental encoder.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Encoder {
-    /// Where it sits.
+    /// Place of the encoder.
     pub at: EncoderPlace,
     /// Lines per turn (per metre at the cart); in quadrature four counts each.
     pub lines: f64,
@@ -352,16 +352,16 @@ impl Encoder {
     }
 }
 
-/// How a run is recorded: when samples are taken, and what converters make of them.
+/// Recorder: sample times, converters and noise.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Measurement {
     /// Interval between samples, s; the experiment's where there is none.
     pub every: Option<f64>,
-    /// How old a sample is when it is recorded, s.
+    /// Age of a sample when it is recorded, s.
     pub delay: f64,
     /// Standard deviation of the instant of a sample, s.
     pub jitter: f64,
-    /// Which noise and jitter; the same seed gives the same ones.
+    /// Seed of noise and jitter.
     pub seed: u64,
     /// The quantities that are recorded beside the encoder's counts.
     pub channels: Vec<Channel>,

@@ -55,7 +55,7 @@ pub fn measure(
     Ok(Solution { trajectory, outcome })
 }
 
-/// The same, handing the samples to `sink` in blocks, so that memory stays bounded.
+/// Records a run and passes the samples to `sink` in blocks, so that memory stays bounded.
 pub fn stream(
     machine: &Machine,
     measurement: &Measurement,
@@ -210,7 +210,7 @@ impl Recorder<'_> {
     }
 }
 
-/// Whatever turns a quantity into numbers of a log.
+/// Sensor or recorder of a quantity.
 enum Device {
     /// Counts, and what they stand for.
     Encoder {

@@ -39,11 +39,11 @@ pub struct Metrics {
     /// while anything moves, where a body has no dry friction to stick by, and for a solver that locates no events
     /// (`table3` freezes speeds and creeps on).
     pub stop_time: Option<f64>,
-    /// Whether everything is at rest at the end: bodies and rotors.
+    /// True if everything is at rest at the end: bodies and rotors.
     pub settled: bool,
-    /// Whether all bodies other than rotors are stuck at the end, at a speed of exactly zero.
+    /// True if all bodies other than rotors are stuck at the end, at a speed of exactly zero.
     pub bodies_rest: bool,
-    /// Whether no rotor turns at the end: that of a gear with play turns no faster than a millionth of its largest
+    /// True if no rotor turns at the end: that of a gear with play turns no faster than a millionth of its largest
     /// speed. True for stiff gears, whose rotors are part of their pulleys.
     pub rotors_rest: bool,
 }
@@ -51,17 +51,17 @@ pub struct Metrics {
 /// Figures of what slides.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct OfLoad {
-    /// Where it is at the end, m.
+    /// Final position, m.
     pub position: f64,
     /// Its speed at the end, m/s.
     pub speed: f64,
-    /// Where the angles of the drive pulleys say that it is at the end, with a belt that does not stretch, m: r φ of an
+    /// Final position by the angles of the drive pulleys without stretch of the belt, m: r φ of an
     /// axis.
     pub by_drives: f64,
     /// Its speed of largest magnitude, m/s.
     pub peak_speed: Peak,
-    /// Where the drives say it is minus where it is, of largest magnitude, m: by how much an encoder at the drive
-    /// pulley misses the cart.
+    /// Peak of the position by the drives minus the true position, m: the error of an encoder at the drive
+    /// pulley as a measurement of the cart.
     pub peak_error: Peak,
 }
 
@@ -121,7 +121,7 @@ pub struct Peak {
     pub time: f64,
 }
 
-/// How often a body changed what it does.
+/// Numbers of stops, starts and reversals of a body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct EventCount {
     /// It came to rest.

@@ -67,7 +67,7 @@ pub struct Log {
     pub added: Option<Vec<f64>>,
     /// The input between them.
     pub hold: Hold,
-    /// Where the cart should have been at those times, m, if the log was made in closed loop and says so.
+    /// Logged reference of the cart at those times, m, if there is one.
     pub reference: Option<Vec<f64>>,
     /// The outputs; at least one.
     pub outputs: Vec<Output>,
@@ -80,7 +80,7 @@ pub struct Log {
 pub struct Output {
     /// The quantity.
     pub quantity: Quantity,
-    /// Whether its sign was lost, as by a counter of pulses: then it is to be compared with an absolute value.
+    /// True if its sign was lost, as by a counter of pulses: then it is to be compared with an absolute value.
     pub absolute: bool,
     /// A value for each time, SI; NaN where one is missing.
     pub values: Vec<f64>,
@@ -92,7 +92,7 @@ impl Log {
         self.time.len()
     }
 
-    /// Whether there are none.
+    /// True if there are none.
     pub fn is_empty(&self) -> bool {
         self.time.is_empty()
     }

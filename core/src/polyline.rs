@@ -18,7 +18,7 @@ impl Polyline {
         (!line.points.is_empty() && line.grows() && is_finite).then_some(line)
     }
 
-    /// Whether x grows from point to point, as it must.
+    /// True if x grows from point to point, as it must.
     pub(crate) fn grows(&self) -> bool {
         self.points.windows(2).all(|pair| pair[0][0] < pair[1][0])
     }

@@ -23,7 +23,9 @@ pub use place::Place;
 pub use tables::{Does, Element, ElementKind, Row, StateName, TableGuard, Tables, Then};
 
 use crate::case::Case;
+use crate::design::FeedForward;
 use crate::error::{Error, Result};
+use crate::machine::{DriveAt, SlideAt};
 
 /// A target whose files are made here.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -62,12 +64,12 @@ pub enum Part {
 }
 
 impl Part {
-    /// Whether the plant is in it.
+    /// True if the plant is in it.
     pub fn has_plant(self) -> bool {
         self != Part::Controller
     }
 
-    /// Whether the controller is in it.
+    /// True if the controller is in it.
     pub fn has_controller(self) -> bool {
         self != Part::Plant
     }
@@ -83,7 +85,7 @@ pub enum Real {
     Double,
 }
 
-/// Wishes beside the target.
+/// Options of an export.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Options {
     /// Which part; none for what the target has by itself.
@@ -127,11 +129,14 @@ pub fn identifier(name: &str) -> String {
     }
 }
 
-/// The controller of a case. Errors: a case without one; what to do about it is the caller's to say.
+/// The controller of a case, of a gantry that of each motor. Errors: a case without one, and feed-forward of a gantry;
+/// what to do about it is the caller's to say.
 pub fn controller(case: &Case) -> Result<(&Case, &crate::design::Design)> {
     match &case.controller {
-        Some(design) if case.is_axis() => Ok((case, design)),
-        Some(_) => Err(Error::new("the controller of a gantry is not exported yet")),
+        Some(design) if case.is_axis() || design.feed_forward == FeedForward::NONE => Ok((case, design)),
+        Some(_) => Err(Error::new(
+            "the feed-forward of a gantry needs the references of bridge and cart together, which an exported controller does not have",
+        )),
         None => Err(Error::new("this case has no controller")),
     }
 }
@@ -139,6 +144,7 @@ pub fn controller(case: &Case) -> Result<(&Case, &crate::design::Design)> {
 /// The next step where a controller is missing: to add one, where the case can have one, or `instead`.
 fn without_controller(case: &Case, error: Error, instead: &str) -> Error {
     error.next(match case.is_axis() {
+        _ if case.controller.is_some() => format!("leave controller.feed_forward out, or {instead}"),
         true => format!("add a [controller], as in docs/control.md, or {instead}"),
         false => instead.to_string(),
     })
@@ -161,6 +167,24 @@ pub fn part(case: &Case, asked: Option<Part>) -> Result<Part> {
     Ok(part)
 }
 
+/// Note on the references of controllers of several motors.
+fn drives_note(case: &Case) -> Option<String> {
+    let geometry = case.machine.geometry();
+    let of_drive = |(at, shares): (&DriveAt, &[f64])| {
+        let parts = geometry.slides.iter().zip(shares).filter(|(_, share)| **share != 0.0);
+        let part = |(slide, share): (&SlideAt, &f64)| {
+            format!("{} {}", if *share < 0.0 { "-" } else { "+" }, geometry.label(slide.body).key)
+        };
+        let sum = parts.map(part).collect::<Vec<_>>().join(" ");
+        format!("of the {} {}", at.label.name, sum.trim_start_matches("+ "))
+    };
+    let shares = case.machine.belt_shares();
+    let each: Vec<String> = geometry.drives.iter().zip(shares).map(of_drive).collect();
+    (each.len() > 1).then(|| {
+        format!("one controller for each motor, whose reference is that of its part of the belt: {}", each.join(", "))
+    })
+}
+
 /// Note that a controller is exported without its input shaper: how many impulses, and what to do.
 fn shaper_note(design: &crate::design::Design) -> Option<String> {
     let impulses = &design.shaper;
@@ -168,7 +192,7 @@ fn shaper_note(design: &crate::design::Design) -> Option<String> {
         .then(|| format!("the input shaper of {} impulses is not in it: shape the reference before it", impulses.len()))
 }
 
-/// The same as lines of a comment, with the impulses.
+/// The shaper as lines of a comment, with the impulses.
 fn shaper_remark(design: &crate::design::Design) -> Vec<String> {
     let Some(note) = shaper_note(design) else { return Vec::new() };
     let of = |[time, amplitude]: &[f64; 2]| format!("  {amplitude:?} of the reference {time:?} s ago");

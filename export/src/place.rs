@@ -10,14 +10,14 @@ use std::path::{Path, PathBuf};
 pub struct Place {
     /// The folder.
     pub folder: PathBuf,
-    /// Whether a file was named and no folder.
+    /// True if a file was named and no folder.
     pub is_file: bool,
     /// The name that all files share.
     pub stem: String,
 }
 
 impl Place {
-    /// That of a path: a file where it ends in `ending`, else a folder, with files called `own`.
+    /// Place of a path: a file if it ends in `ending`, else a folder with files named `own`.
     pub fn of(path: &Path, ending: &str, own: &str) -> Self {
         let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
         match path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending)) {

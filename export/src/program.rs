@@ -160,7 +160,7 @@ pub(super) struct Tape(RefCell<Written>);
 #[derive(Debug, Default)]
 struct Written {
     steps: Vec<Step>,
-    /// The same computed twice is computed once.
+    /// Index of each step, so that equal steps are computed once.
     places: HashMap<Step, usize>,
     names: HashMap<usize, String>,
     /// Remarks before the node of that place.
@@ -510,7 +510,7 @@ impl Pages<'_> {
         }
     }
 
-    /// Whether the one use of a choice is as one of two of another.
+    /// True if the one use of a choice is as one of two of another.
     fn is_in_choice(&self, place: usize) -> bool {
         self.written.steps.iter().zip(self.live).any(|(step, live)| match *step {
             Step::Choose(of, _, _, yes, no) => *live && of != place && (yes == place || no == place),

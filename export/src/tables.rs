@@ -99,7 +99,7 @@ pub struct Row {
     pub depends: Vec<usize>,
     /// The rows.
     pub weights: Vec<Vec<f64>>,
-    /// The same as forms.
+    /// The rows as linear forms.
     pub(super) forms: Vec<Form>,
 }
 
@@ -182,7 +182,7 @@ pub struct StateName {
 const MOST_ROWS: usize = 20_000;
 
 impl Tables {
-    /// Those of a mechanism. Errors: one that is not piecewise linear.
+    /// Tables of a mechanism. Errors: a mechanism that is not piecewise linear.
     pub fn new(mechanism: &Mechanism) -> Result<Self> {
         if !mechanism.is_piecewise_linear() {
             return Err(curved(mechanism));
@@ -216,7 +216,7 @@ impl Tables {
         if rows > MOST_ROWS {
             return Err(Error::new(format!("this machine has {rows} rows of equations"))
                 .allowed(format!("up to {MOST_ROWS}"))
-                .next("leave out what it can do without: limits, slack spans, end stops, or a gear that gives way"));
+                .next("leave out optional parts: limits, slack spans, end stops, or a compliant gear"));
         }
         Ok(Self {
             mechanism,
@@ -248,7 +248,7 @@ impl Tables {
         Ok(self.others.len() - 1)
     }
 
-    /// The same machine with each input as a state that rises at a rate, and that rate as one: ramps are no stairs
+    /// The machine with each input, and its rate, as states, so that ramps are exact
     /// then. Behind the states stand as many inputs as before, which nothing depends on.
     ///
     /// ```text
@@ -344,7 +344,7 @@ impl ElementKind {
         }
     }
 
-    /// Whether a condition with this cause is one on it.
+    /// True if a condition with this cause is one on it.
     fn owns(self, cause: Cause) -> bool {
         match (self, cause) {
             (ElementKind::Body(own), Cause::Stop(body) | Cause::BreakForward(body) | Cause::BreakBackward(body)) => {

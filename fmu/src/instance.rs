@@ -53,9 +53,9 @@ pub enum Use {
     ModelExchange,
     /// The machine does.
     CoSimulation {
-        /// Whether the importer handles events.
+        /// True if the importer handles events.
         events: bool,
-        /// Whether a step may end before its end.
+        /// True if a step may end before its end.
         early: bool,
     },
 }
@@ -149,10 +149,10 @@ pub struct Instance {
     pub(crate) control: Option<Stepped>,
     /// True once a reference ahead of time was other than zero: whoever sets none has it extrapolated.
     pub(crate) sees_ahead: bool,
-    /// Whether inputs were set that the plant does not know yet; and whether the columns are those of now.
+    /// True if inputs were set that the plant does not know yet; and whether the columns are those of now.
     pub(crate) is_set: bool,
     pub(crate) columns: Option<Vec<f64>>,
-    /// Whether the machine has ended the run.
+    /// True if the machine has ended the run.
     pub(crate) is_over: bool,
 }
 
@@ -197,7 +197,7 @@ impl Instance {
         self.time
     }
 
-    /// Whether the machine has ended the run: its cart left its travel.
+    /// True if the machine has ended the run: its cart left its travel.
     pub fn is_over(&self) -> bool {
         self.is_over
     }
@@ -256,7 +256,7 @@ impl Instance {
         self.allow(function, phases)
     }
 
-    /// Whether it is for model exchange.
+    /// True if it is for model exchange.
     pub fn exchanges(&self) -> bool {
         self.purpose == Use::ModelExchange
     }

@@ -26,9 +26,9 @@ pub enum Halt {
 /// Changes that an event has brought about.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Settled {
-    /// Whether integrated quantities were put elsewhere.
+    /// True if integrated quantities were put elsewhere.
     pub moved: bool,
-    /// Whether the machine has ended the run.
+    /// True if the machine has ended the run.
     pub over: bool,
     /// When the controller decides next, s.
     pub next: Option<f64>,
@@ -268,7 +268,7 @@ impl Instance {
         Ok(())
     }
 
-    /// Whether a condition has fallen by the end of an integrator's step.
+    /// True if a condition has fallen by the end of an integrator's step.
     pub fn has_fallen(&mut self) -> Told<bool> {
         self.prepare()?;
         self.refresh()?;

@@ -88,7 +88,7 @@ impl<'i, 'u> Importer<'i, 'u> {
         (0..k1.len()).map(|i| self.x[i] + h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])).collect()
     }
 
-    /// Whether a condition falls until then.
+    /// True if a condition falls until then.
     fn falls(&self, h: f64, x: &[f64]) -> bool {
         self.place(self.time + h, x);
         self.look().iter().zip(&self.conditions).any(|(now, before)| (*now <= 0.0) != (*before <= 0.0))

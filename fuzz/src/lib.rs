@@ -37,7 +37,7 @@ pub struct Seed {
     pub name: String,
     /// Its content.
     pub bytes: Vec<u8>,
-    /// Whether the reader has to take it.
+    /// True if the reader has to take it.
     pub good: bool,
 }
 

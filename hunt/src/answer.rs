@@ -54,7 +54,7 @@ impl By {
         }
     }
 
-    /// Whether it is the general solver or answers by it where a machine has curves.
+    /// True if it is the general solver or answers by it where a machine has curves.
     pub fn is_general(self, subject: &Subject) -> bool {
         self == By::General || (self != By::Exact && self != By::C && !is_piecewise_linear(subject))
     }
@@ -99,7 +99,7 @@ pub struct Answer {
     pub end: End,
     /// How far positions may be off, m.
     pub allowed: f64,
-    /// Whether that is what the run states of itself.
+    /// True if that is what the run states of itself.
     pub is_stated: bool,
     /// Decisions within rounding that it names.
     pub ties: usize,
@@ -118,7 +118,7 @@ pub fn ask(subject: &Subject, by: By) -> Result<Answer, String> {
     asked.unwrap_or_else(|_| Err("it panics".into()))
 }
 
-/// Whether the machine of a subject is linear piece by piece.
+/// True if the machine of a subject is linear piece by piece.
 pub fn is_piecewise_linear(subject: &Subject) -> bool {
     match subject {
         Subject::Axis(case) | Subject::Loop(case) => case.machine.is_piecewise_linear(),

@@ -33,7 +33,7 @@ impl Drop for Folder {
     }
 }
 
-/// Whether there is a compiler.
+/// True if there is a compiler.
 pub fn has_compiler() -> bool {
     Command::new("gcc").arg("--version").output().is_ok_and(|output| output.status.success())
 }

@@ -63,7 +63,7 @@ pub struct Compared {
     pub spread: Option<f64>,
     /// Changes of bodies that the independent solver saw.
     pub events: usize,
-    /// Whether positions are off by more than a run states that names no decision within rounding.
+    /// True if positions are off by more than a run states that names no decision within rounding.
     pub exceeds: bool,
     /// The verdict.
     pub verdict: Verdict,

@@ -33,7 +33,7 @@ pub enum Kind {
         above: Double,
         /// v_s.
         velocity: Double,
-        /// Whether the exponent is a square.
+        /// True if the exponent is a square.
         is_gaussian: bool,
     },
     /// √e (F_b − F_c) w e^{−w²/2} + F_c tanh 10 w, w = v/v_b: the law that never sticks.

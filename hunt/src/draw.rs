@@ -138,7 +138,7 @@ struct Sizes {
 
 struct Draw {
     random: Random,
-    /// Whether numbers have four digits instead of all.
+    /// True if numbers have four digits instead of all.
     short: bool,
     kinds: Vec<Kind>,
     text: String,
@@ -157,23 +157,23 @@ impl Draw {
         Self { random, short, kinds: Vec::new(), text: String::new(), fastest: 0.0, features: None, curves: [None; 3] }
     }
 
-    /// Whether it has a feature: by this chance, or by its recipe.
+    /// True if it has a feature: by this chance, or by its recipe.
     fn has(&mut self, feature: Feature, share: f64) -> bool {
         let drawn = self.random.chance(share);
         self.features.as_ref().map_or(drawn, |features| features.contains(&feature))
     }
 
-    /// Whether its recipe has a feature.
+    /// True if its recipe has a feature.
     fn wants(&self, feature: Feature) -> bool {
         self.features.as_ref().is_some_and(|features| features.contains(&feature))
     }
 
-    /// Whether it has a recipe.
+    /// True if it has a recipe.
     fn is_by_recipe(&self) -> bool {
         self.features.is_some()
     }
 
-    /// Whether it is a move in a closed loop.
+    /// True if it is a move in a closed loop.
     fn is_loop(&self) -> bool {
         self.features.as_ref().is_some_and(|features| features.iter().any(|one| one.is_controller()))
     }

@@ -30,7 +30,7 @@ impl Disagreement {
         format!("the {} is {ours:?} instead of {known:?} from {from:e} s to {to:e} s", names[*body])
     }
 
-    /// Whether it matters: a stuck body may be told to slide for `moment`, and `way` gives how far the independent
+    /// True if it matters: a stuck body may be told to slide for `moment`, and `way` gives how far the independent
     /// solver has a body go
     /// between two moments, m, which may be `near`.
     pub fn matters(&self, moment: f64, near: f64, way: impl Fn(usize, f64, f64) -> f64) -> bool {

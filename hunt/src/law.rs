@@ -21,7 +21,7 @@ pub enum Motion {
     Free,
 }
 
-/// Whether a limit binds.
+/// State of a limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Limit {
     /// At the negative limit.
@@ -48,7 +48,7 @@ pub enum Touch {
 pub struct Mode {
     /// Each body. One whose friction never lets it rest has a direction, too.
     pub motion: [Motion; BODIES],
-    /// Whether the torque that each motor hands to its gear is positive.
+    /// True if the torque that each motor hands to its gear is positive.
     pub gear_positive: [bool; DRIVES],
     /// Spans.
     pub slack: [bool; BODIES],

@@ -43,7 +43,7 @@ pub enum Curve {
     Stribeck {
         /// v_s.
         velocity: Double,
-        /// Whether the exponent is a square.
+        /// True if the exponent is a square.
         is_gaussian: bool,
     },
     /// √(2e) (F_b − F_c) e^{−(v/v_St)²} v/v_St + F_c tanh(v/v_Coul), v_St = √2 v_b, v_Coul = v_b/10.
@@ -53,7 +53,7 @@ pub enum Curve {
 }
 
 impl Curve {
-    /// Whether a body under it can be at rest.
+    /// True if a body under it can be at rest.
     pub fn sticks(self) -> bool {
         matches!(self, Curve::None | Curve::Stribeck { .. })
     }
@@ -151,7 +151,7 @@ pub struct Drive {
     pub efficiency: Double,
     /// A compliant gear.
     pub play: Option<Play>,
-    /// Whether the input commands the current.
+    /// True if the input commands the current.
     pub current_mode: bool,
     /// Output per input.
     pub gain: Double,
@@ -274,7 +274,7 @@ impl Model {
         self.drives.iter().position(|drive| self.leader(drive.body) == leader)
     }
 
-    /// Whether a body can be at rest, or feels its direction by a law that lets it rest.
+    /// True if a body can be at rest, or feels its direction by a law that lets it rest.
     pub fn is_dry(&self, leader: usize) -> bool {
         let loses = self.drive_of(leader).is_some_and(|drive| self.drives[drive].loses());
         let mut sum = [[Double::ZERO; 2]; 2];
@@ -288,19 +288,19 @@ impl Model {
         sum.iter().any(|side| side[0] != Double::ZERO) || sum[0][1] != sum[1][1] || loses
     }
 
-    /// Whether it feels its direction by a law that never lets it rest.
+    /// True if it feels its direction by a law that never lets it rest.
     pub fn is_curved(&self, leader: usize) -> bool {
         self.followers(leader).any(|body| !self.friction[body].curve.sticks())
     }
 }
 
 impl Drive {
-    /// Whether the gear loses power.
+    /// True if the gear loses power.
     pub fn loses(&self) -> bool {
         self.efficiency < Double::ONE
     }
 
-    /// Whether the current is a state.
+    /// True if the current is a state.
     pub fn current_moves(&self) -> bool {
         if self.current_mode { self.bandwidth.is_some() } else { self.inductance > Double::ZERO }
     }
@@ -425,7 +425,7 @@ fn spans(machine: &Machine, taken: Taken, cart_start: Double) -> Vec<Span> {
     }
 }
 
-/// Whether a difference of two positions is more than their rounding.
+/// True if a difference of two positions is more than their rounding.
 pub fn is_strain(strain: Double, origin: Double) -> bool {
     let way = (strain + origin).high.abs();
     strain.high.abs() > LAST_PLACES * f64::EPSILON * way.max(origin.high.abs())

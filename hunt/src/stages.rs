@@ -26,7 +26,7 @@ pub struct Hunt {
     pub count: u64,
     /// Threads.
     pub threads: usize,
-    /// Whether to tell on the way how far it is.
+    /// True if to tell on the way how far it is.
     pub progress: bool,
     /// Ends it early.
     pub stop: Arc<AtomicBool>,
@@ -160,7 +160,7 @@ fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
 }
 
 impl Verdict {
-    /// Whether it is a find.
+    /// True if it is a find.
     pub fn is_unexplained(&self) -> bool {
         matches!(self, Verdict::Unexplained(_))
     }

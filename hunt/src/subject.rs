@@ -99,7 +99,7 @@ impl Subject {
         }
     }
 
-    /// Whether the input moves otherwise than on straight lines.
+    /// True if the input moves otherwise than on straight lines.
     pub fn has_sines(&self) -> bool {
         self.signals().iter().any(|signal| signal.degree() > 1)
     }

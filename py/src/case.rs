@@ -46,9 +46,7 @@ fn exported_part(word: Option<&str>) -> PyResult<Option<Part>> {
         Some("plant") => Ok(Some(Part::Plant)),
         Some("controller") => Ok(Some(Part::Controller)),
         Some("both") => Ok(Some(Part::Both)),
-        Some(other) => {
-            Err(PyValueError::new_err(format!("part: plant, controller or both is wanted, and no {other:?}")))
-        }
+        Some(other) => Err(PyValueError::new_err(format!("part: expected plant, controller or both, found {other:?}"))),
     }
 }
 
@@ -57,7 +55,7 @@ fn exported_real(word: &str) -> PyResult<Real> {
     match word {
         "float" => Ok(Real::Float),
         "double" => Ok(Real::Double),
-        other => Err(PyValueError::new_err(format!("real: float or double is wanted, and no {other:?}"))),
+        other => Err(PyValueError::new_err(format!("real: expected float or double, found {other:?}"))),
     }
 }
 
@@ -82,7 +80,7 @@ impl Case {
         Ok(Self { inner: Arc::new(inner), path })
     }
 
-    /// The same with changes, each as KEY=VALUE.
+    /// A copy with changes, each as KEY=VALUE.
     fn changed(&self, py: Python<'_>, changes: Vec<String>) -> PyResult<Self> {
         Self::from_text(py, self.path.clone(), self.text(), changes)
     }
@@ -294,7 +292,7 @@ impl Case {
         draws: Option<PathBuf>,
         effort: f64,
     ) -> PyResult<(Py<PyAny>, Py<Case>)> {
-        let case = self.axis(py)?;
+        let case = &self.inner;
         let mut tuning = case.tune.clone().unwrap_or_default();
         tuning.spread = spread.or(tuning.spread);
         tuning.corners = corners;
@@ -321,7 +319,7 @@ impl Case {
         limits: (Option<f64>, Option<f64>, Option<f64>),
         reserve: f64,
     ) -> PyResult<(Py<PyAny>, Py<Self>)> {
-        let case = self.axis(py)?;
+        let case = &self.inner;
         let (_, moves) = case.moves_named(&self.path, &names).told(py)?;
         let places: Vec<usize> =
             (0..case.moves.len()).filter(|&k| moves.iter().any(|one| one.name == case.moves[k].name)).collect();

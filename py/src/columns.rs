@@ -34,7 +34,7 @@ impl Columns {
     }
 }
 
-/// The same columns as the library has them: a copy.
+/// Copies the columns into a trajectory of the library.
 pub fn read(arrays: &Bound<'_, PyDict>, names: &Bound<'_, PyList>) -> PyResult<Trajectory> {
     let mut columns = Vec::with_capacity(names.len());
     for entry in names.iter() {

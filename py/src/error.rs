@@ -31,7 +31,7 @@ pub fn guarded<T>(work: impl FnOnce() -> T) -> PyResult<T> {
     })
 }
 
-/// The same without the interpreter's lock.
+/// Runs a job without the interpreter's lock, as [`guarded`] does.
 pub fn unlocked<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult<T> {
     py.detach(|| guarded(work))
 }
@@ -63,7 +63,7 @@ fn describe(exception: &Bound<'_, PyAny>, error: taut::Error) -> PyResult<()> {
 
 /// Results of the library as results of Python.
 pub trait Told<T> {
-    /// The same with an exception for the error.
+    /// This result with a Python exception for its error.
     fn told(self, py: Python<'_>) -> PyResult<T>;
 }
 

@@ -15,7 +15,7 @@ pub struct Interrupt {
     begin: Instant,
     asked: AtomicU64,
     stopped: AtomicBool,
-    /// Whether a thread asks by itself, and nobody else need.
+    /// True if a thread asks by itself, and nobody else need.
     watched: AtomicBool,
     raised: Mutex<Option<PyErr>>,
 }
@@ -32,7 +32,7 @@ impl Interrupt {
         }
     }
 
-    /// Whether to stop.
+    /// True if to stop.
     pub fn stop(&self) -> bool {
         if self.stopped.load(Ordering::Relaxed) || self.watched.load(Ordering::Relaxed) {
             return self.stopped.load(Ordering::Relaxed);

@@ -239,7 +239,7 @@ fn one(py: Python<'_>, case: &Arc<Case>, experiment: &Experiment, solver: Solver
 /// The timing of a loop with a controller in Python, where it is not the case's.
 pub type Timing = (Option<f64>, Option<f64>, Option<f64>);
 
-/// Whether it is a list of controllers, one for each drive.
+/// True if it is a list of controllers, one for each drive.
 fn is_several(object: &Bound<'_, PyAny>) -> bool {
     object.is_instance_of::<PyList>() || object.is_instance_of::<PyTuple>()
 }
@@ -394,8 +394,7 @@ pub fn moves<'py>(py: Python<'py>, runs: Vec<PyRef<'py, Run>>) -> PyResult<Bound
         .map(|run| match &run.what {
             What::Move { case, index, run: moved, .. } => {
                 let (design, motion) = (case.controller.as_ref(), &case.moves[*index]);
-                let target = motion.profile().target();
-                let trouble = design.and_then(|design| trouble(&case.machine, design, moved, target));
+                let trouble = design.and_then(|design| trouble(&case.machine, design, moved, motion));
                 (trouble, design.map_or(Vec::new(), |design| motion.shortfalls(&case.machine, design)))
             }
             What::Experiment { .. } => (None, Vec::new()),

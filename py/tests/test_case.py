@@ -64,7 +64,7 @@ def test_mistakes_are_told_as_on_the_command_line(case):
     with pytest.raises(taut.Error) as caught:
         case["cart.mass"] = "0.5 m"
     assert str(caught.value) == (
-        '--set:1:11: cart.mass: "0.5 m" is a length (m); a mass (kg) is wanted\n'
+        '--set:1:11: cart.mass: "0.5 m" is a length (m); expected a mass (kg)\n'
         '  1 | cart.mass="0.5 m"\n'
         "    |           ^^^^^^^\n"
         '  next: write for example mass = "0.362 kg"'

@@ -146,9 +146,21 @@ def test_each_drive_of_a_gantry_has_a_controller_of_its_own(root):
         case["move.0.points"] = [["40 mm"]]
 
 
+def test_loops_of_both_motors_have_margins(root):
+    case = taut.read(root / "stages/core-xy/square.toml")
+    tuned = case.tune(evaluate=True)
+    told = tuned.data["after"]["nominal"]
+    assert told["stable"] and told["gain_margin_drive"] in ("left drive", "right drive")
+    worst = tuned.data["after"]["worst"]
+    assert worst["bridge_m"] == 0 and len(tuned.data["after"]["moves"]) == len(case.moves)
+    # Too much for the belts.
+    case["controller.pid.proportional"] = 1e6
+    assert not case.tune(evaluate=True).data["after"]["nominal"]["stable"]
+
+
 def test_what_is_not_there_says_so(gantry):
     assert repr(gantry) == "<taut.Case 'H-frame': one motor, along x, along y>"
-    for refused in (gantry.check, gantry.fit, gantry.tune):
+    for refused in (gantry.check, gantry.fit):
         with pytest.raises(taut.Error, match="this needs a single axis") as told:
             refused()
         assert told.value.line == 4

@@ -64,7 +64,7 @@ def test_figures_are_chosen(case):
         assert np.array_equal(table[name].view(np.uint64), whole[name].view(np.uint64)), name
     with pytest.raises(taut.Error, match='nothing that is swept has a figure "final_cart_positon"'):
         case.sweep(4, vary=VARY, figures=["final_cart_positon"])
-    with pytest.raises(TypeError, match="figures: a list of names is wanted, and no str"):
+    with pytest.raises(TypeError, match="figures: expected a list of names, found str"):
         case.sweep(4, vary=VARY, figures="final_cart_position")
 
 

@@ -39,6 +39,8 @@ async function open(name, options) {
   page.on("pageerror", error => trouble.push("error: " + error.message));
   page.on("request", request => { if (!/^(file|data|blob):/.test(request.url())) trouble.push("asked for " + request.url()); });
   await page.goto(address(name));
+  // Folded sections are checked like the others.
+  await page.evaluate(() => document.querySelectorAll("details.section").forEach(section => { section.open = true; }));
   return {page, trouble, done: () => context.close()};
 }
 

@@ -1,6 +1,6 @@
 //! Scales: the range that is shown, the ticks on it, and what is written at them.
 
-/// Whether a value can be shown at all.
+/// True if a value can be shown at all.
 pub(crate) fn in_range(value: f64) -> bool {
     value.abs() < 1e300
 }

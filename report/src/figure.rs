@@ -24,7 +24,7 @@ pub struct Figure {
     pub panels: Vec<Panel>,
     /// Vertical lines through all panels: "voltage off".
     pub verticals: Vec<Marker>,
-    /// Whether a unit is as long upward as to the right, as a circle needs it; of figures with one panel.
+    /// True if a unit is as long upward as to the right, as a circle needs it; of figures with one panel.
     pub equal: bool,
     /// The part of the x axis that is shown first, in the units of the data; the rest is reached by zooming out.
     pub view: Option<(f64, f64)>,
@@ -92,7 +92,7 @@ pub enum Style {
 }
 
 impl Style {
-    /// Whether it shows points by themselves, not a line through them.
+    /// True if it shows points by themselves, not a line through them.
     pub(crate) fn is_symbol(self) -> bool {
         match self {
             Style::Points | Style::Crosses | Style::Rings => true,

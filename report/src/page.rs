@@ -21,6 +21,7 @@ pub struct Page {
     contents: Vec<(String, String)>,
     figures: usize,
     axes: Vec<SharedAxis>,
+    folds: usize,
 }
 
 /// An x axis that figures of a page have in common: they are zoomed together.
@@ -39,7 +40,7 @@ impl SharedAxis {
         (!figure.equal && !heading.is_empty()).then_some(Self { heading, log, range })
     }
 
-    /// Whether it measures the same over about the same range: runs of quite different lengths are zoomed apart.
+    /// True if it measures the same over about the same range: runs of quite different lengths are zoomed apart.
     fn is_as(&self, other: &Self) -> bool {
         let bend = |v: f64| if self.log { v.ln() } else { v };
         let [a, b, c, d] = [self.range.0, self.range.1, other.range.0, other.range.1].map(bend);
@@ -232,6 +233,19 @@ impl Page {
         self.contents.push((id, heading.to_string()));
     }
 
+    /// Begins a section that only shows its heading until it is opened; [`Page::end_fold`] ends it.
+    pub fn begin_fold(&mut self, heading: &str) {
+        self.folds += 1;
+        self.push(PreEscaped("<details class=\"section\"><summary>".into()));
+        self.section(heading);
+        self.push(PreEscaped("</summary>".into()));
+    }
+
+    /// Ends a folded section.
+    pub fn end_fold(&mut self) {
+        self.push(PreEscaped("</details>".into()));
+    }
+
     /// Begins a part of a section.
     pub fn subsection(&mut self, heading: &str) {
         self.push(html! { h3 { (heading) } });
@@ -332,7 +346,7 @@ impl Page {
         self.body.push('\n');
     }
 
-    /// The same of what people read: numbers stay beside their units.
+    /// Adds text in which numbers stay beside their units.
     fn push_words(&mut self, markup: Markup) {
         self.push(words(markup));
     }
@@ -370,6 +384,7 @@ impl Page {
                         @if let Some(footer) = &self.footer { footer { (footer) } }
                     }
                     @if self.figures > 0 { script { (PreEscaped(script())) } }
+                    @if self.folds > 0 { script { (PreEscaped(UNFOLD)) } }
                 }
             }
         };
@@ -381,6 +396,16 @@ impl Page {
         write_atomically(path, self.html())
     }
 }
+
+/// Opens the folded section of the element that the address names, and all of them for printing.
+const UNFOLD: &str = "\
+const unfold = () => {
+for (let e = document.getElementById(location.hash.slice(1)); e; e = e.parentElement) if (e.tagName === \"DETAILS\") e.open = true;
+};
+addEventListener(\"hashchange\", unfold);
+addEventListener(\"beforeprint\", () => document.querySelectorAll(\"details.section\").forEach(e => { e.open = true; }));
+unfold();
+";
 
 /// Numbers stay beside their units.
 fn words(text: impl Render) -> Markup {

@@ -89,7 +89,7 @@ impl Plane {
         self.draw(true)
     }
 
-    /// The same without its title, for a page that has one.
+    /// The plane without its title, for a page that has one.
     pub(super) fn bare(&self) -> String {
         self.draw(false)
     }

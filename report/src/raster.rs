@@ -26,7 +26,7 @@ static FONTS: LazyLock<Arc<fontdb::Database>> = LazyLock::new(|| {
 });
 
 impl Picture {
-    /// The same as a PNG, at twice the size on white.
+    /// The picture as a PNG, at twice the size on white.
     ///
     /// # Errors
     ///

@@ -8,7 +8,7 @@ const PREFIXES: [&str; 10] = ["", "k", "M", "G", "m", "µ", "u", "n", "p", "c"];
 /// Units that stand for themselves.
 const OTHERS: [&str; 8] = ["%", "°", "°C", "dB", "rpm", "krpm", "min", "1"];
 
-/// The same HTML with each number and its unit in a span that does not break; tags stay as they are.
+/// The HTML with each number and its unit in a span that does not break; tags are unchanged.
 pub(crate) fn numbers_and_units(html: &str) -> String {
     let mut out = String::with_capacity(html.len());
     for piece in html.split_inclusive('>') {

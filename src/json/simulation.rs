@@ -108,7 +108,7 @@ struct ExperimentFigures {
     /// By how much positions at the belt may be off.
     position_error_m: Option<f64>,
     position_error_basis: Option<&'static str>,
-    /// Whether numbers of 64 bits determine the motion to a thousandth of itself.
+    /// True if numbers of 64 bits determine the motion to a thousandth of itself.
     is_determined: Option<bool>,
     decided_within_rounding: Vec<TieTold>,
     events: Vec<Event>,
@@ -330,7 +330,7 @@ impl TieTold {
     }
 }
 
-/// Whether errors leave the motion determined, where they are known.
+/// True if errors leave the motion determined, where they are known.
 pub(super) fn is_determined(outcome: &Outcome) -> Option<bool> {
     outcome.error.map(|error| !error.hides_motion())
 }

@@ -100,8 +100,10 @@ fn margins(m: &Margins) -> Value {
         "complementary_break": m.breaks.complementary.word(),
         "gain_margin": number(m.gain),
         "gain_margin_break": m.breaks.gain.word(),
+        "gain_margin_drive": m.drive_name(m.breaks.gain_drive),
         "phase_margin_rad": number(m.phase),
         "phase_margin_break": m.breaks.phase.word(),
+        "phase_margin_drive": m.drive_name(m.breaks.phase_drive),
         "crossover_Hz": number(m.crossover / (2.0 * PI)),
         "bandwidth_Hz": number(m.bandwidth / (2.0 * PI)),
         "tracking_bandwidth_Hz": number(m.tracking / (2.0 * PI)),
@@ -152,6 +154,7 @@ fn verdict(tuned: &Tuned, verdict: &Verdict) -> Value {
         "worst": {
             "margins": margins(&verdict.worst),
             "place_m": corner.place,
+            "bridge_m": family.machine.bridge.as_ref().map(|_| corner.bridge),
             "load_kg": corner.load,
             "off": off,
             "words": family.words(corner).replace('\u{a0}', " "),

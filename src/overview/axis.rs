@@ -81,7 +81,7 @@ fn drive(machine: &Machine, notes: &mut Vec<Note>) -> Group {
     if force > 0.0 {
         let [forward, backward] = [1.0, -1.0].map(|side| machine.breakaway(side, 0.0) / force);
         let row = group.add("breakaway_input", breakaway_name(input), forward, input);
-        row.how("that friction holds against, the belt pulling all bodies along");
+        row.how("of all bodies together");
         if (backward - forward).abs() > 1e-3 * forward.abs() {
             group.add("breakaway_input_backward", "the same backward", backward, input);
         }
@@ -105,9 +105,9 @@ fn inertia(machine: &Machine, masses: &Masses, notes: &mut Vec<Note>) -> Group {
     if masses.rotor > 0.0 {
         group.add("rotor_mass", "rotor", masses.rotor, "kg").how("n² J/r²");
     }
-    group.add("total_mass", "all of it", masses.total, "kg");
+    group.add("total_mass", "total", masses.total, "kg");
     let reflected = masses.total - machine.cart.mass;
-    group.add("reflected_share", "share of what turns", reflected / masses.total, "");
+    group.add("reflected_share", "share of rotating parts", reflected / masses.total, "");
     let length = machine.belt.make.map(|make| make.spans.iter().sum::<f64>() + 2.0 * PI * machine.pulley_radius);
     belt_mass(&mut group, notes, &machine.belt.sheet, length, masses.total);
     group
@@ -205,16 +205,16 @@ fn limits(machine: &Machine, masses: &Masses, most: Option<&Most>, notes: &mut V
         let left = (power.force - coulomb - against) / masses.total;
         group
             .add(format!("largest_acceleration{end}"), format!("largest acceleration{words}"), left.max(0.0), "m/s^2")
-            .how("from a creep, against friction");
+            .how("at low speed, against friction");
         match power.speed(coulomb, viscous, against) {
             Some(speed) => {
                 group
                     .add(format!("largest_speed{end}"), format!("largest speed{words}"), speed, "m/s")
-                    .how("in the long run");
+                    .how("at steady state");
             }
             None => notes.push(Note {
                 code: "no-largest-speed",
-                text: "nothing bounds the speed: in current mode give amplifier.voltage_limit".to_string(),
+                text: "the speed is unlimited: in current mode give amplifier.voltage_limit".to_string(),
             }),
         }
         if left <= 0.0 {
@@ -225,7 +225,7 @@ fn limits(machine: &Machine, masses: &Masses, most: Option<&Most>, notes: &mut V
     }
     if machine.belt.model != BeltModel::Rigid {
         group
-            .add("largest_stretch", "stretch of the belt under it", power.force * compliance(machine, 0.0), "m")
+            .add("largest_stretch", "stretch of the belt under this force", power.force * compliance(machine, 0.0), "m")
             .how("at the cart, the drive held");
         safety(&mut group, notes, &machine.belt.sheet, machine.belt.pretension, r, power.force);
         notes.extend(little_pretension(machine, power.force));

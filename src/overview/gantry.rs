@@ -112,7 +112,7 @@ fn inertia(gantry: &Machine, notes: &mut Vec<Note>) -> Group {
     group.add("turning_mass", "both pulleys and rotors, at the belt", turning, "kg").how("(2 J + n² J_r of both)/r²");
     for ((way, words), mass) in WAYS.into_iter().zip(masses(gantry)) {
         group.add(format!("total_mass_{way}"), words, mass, "kg");
-        group.add(format!("reflected_share_{way}"), "share of what turns", turning / mass, "");
+        group.add(format!("reflected_share_{way}"), "share of rotating parts", turning / mass, "");
     }
     let length = gantry.belt.make.as_ref().map(|make| make.spans.iter().sum::<f64>());
     belt_mass(&mut group, notes, &gantry.belt.sheet, length, masses(gantry)[0]);
@@ -176,7 +176,7 @@ fn limits(case: &Case, notes: &mut Vec<Note>) -> Option<Group> {
     let most = most(None, inputs);
     let power = |k: usize| Power::of(&gantry.drives[k].motor, &gantry.drives[k].amplifier, r, most.as_ref());
     let (Some((left, from)), Some((right, _))) = (power(0), power(1)) else {
-        let text = "nothing bounds the inputs: give amplifier.voltage_limit or current_limit to see the largest speeds and accelerations";
+        let text = "the inputs are unlimited: give amplifier.voltage_limit or current_limit for the largest speeds and accelerations";
         notes.push(Note { code: "no-limit", text: text.to_string() });
         return None;
     };
@@ -201,11 +201,11 @@ fn limits(case: &Case, notes: &mut Vec<Note>) -> Option<Group> {
             acceleration,
             "m/s^2",
         );
-        row.how("from a creep, against friction");
+        row.how("at low speed, against friction");
         if let Some(speed) = both.speed(coulomb, viscous, 0.0) {
             group
                 .add(format!("largest_speed_{way}"), format!("largest speed along {way}"), speed, "m/s")
-                .how("in the long run");
+                .how("at steady state");
         }
     }
     safety(&mut group, notes, &gantry.belt.sheet, gantry.belt.pretension, r, force);

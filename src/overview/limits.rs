@@ -123,7 +123,7 @@ pub(super) fn safety(
     if let Some((in_mesh, carried)) = sheet.mesh(r) {
         group.add("teeth_in_mesh", "teeth in mesh at the drive pulley", in_mesh, "");
         if let Some(carried) = carried {
-            group.add("tooth_force", "force that they carry at rest", carried, "N");
+            group.add("tooth_force", "force that the teeth carry at rest", carried, "N");
             group
                 .add("tooth_safety", "safety of the teeth", carried / force, "")
                 .how("against the largest force of the motor");

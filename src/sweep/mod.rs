@@ -121,7 +121,7 @@ pub struct Group {
     pub name: String,
     /// Its name as that of a file, with which those of its columns begin.
     pub file: String,
-    /// Whether it is a move in closed loop, and no experiment. The controller takes every machine for the one of the
+    /// True if it is a move in closed loop, and no experiment. The controller takes every machine for the one of the
     /// case.
     pub is_move: bool,
     /// Its figures, whose columns stand behind that of its status.
@@ -158,7 +158,7 @@ impl Sweep {
         self.sampling
     }
 
-    /// Whether the runs are blocks of k + 2 for Sobol' indices: the machine of a sample A, that of a sample B, and
+    /// True if the runs are blocks of k + 2 for Sobol' indices: the machine of a sample A, that of a sample B, and
     /// those of A with one parameter after the other from B.
     pub fn indices(&self) -> bool {
         self.indices

@@ -76,7 +76,7 @@ impl Sweep {
 /// The sweep of a case.
 fn planned(plan: Option<&Sweeping>) -> Result<&Sweeping> {
     plan.ok_or_else(|| {
-        Error::new("this case does not say what is varied")
+        Error::new("this case has no parameters to vary")
             .next("give for example --runs 1000 --vary cart.mass=20%, or add a table [sweep]")
     })
 }
@@ -181,7 +181,7 @@ fn distribution(machine: &Machine, free: &Free, variation: &Variation, design: S
         Kinds::Drawn(prior) => *prior,
     };
     Distribution::drawn(prior, within).ok_or_else(|| {
-        Error::new(format!("next to nothing of what `{}` is drawn from is allowed", free.name))
+        Error::new(format!("almost the whole distribution of `{}` is outside the allowed range", free.name))
             .allowed(format!("from {} to {} {}", within[0], within[1], free.unit))
     })
 }

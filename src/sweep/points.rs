@@ -11,7 +11,7 @@ pub(super) struct Points {
     /// Number of samples: of runs, or of the blocks that indices are made of.
     samples: u64,
     kind: Kind,
-    /// Whether runs come in blocks of k + 2.
+    /// True if runs come in blocks of k + 2.
     blocks: bool,
 }
 
@@ -105,7 +105,7 @@ impl Points {
         }
     }
 
-    /// Whether a run sets parameter `place`; one at a time leaves the others exactly as they are.
+    /// True if a run sets parameter `place`; one at a time leaves the others exactly as they are.
     pub fn varies(&self, run: u64, place: usize) -> bool {
         match &self.kind {
             Kind::OneAtATime(changes) => {

@@ -61,7 +61,7 @@ pub struct Measured {
 }
 
 impl Measured {
-    /// Whether runs differ in it.
+    /// True if runs differ in it.
     pub fn varies(&self) -> bool {
         self.spread.as_ref().is_some_and(|spread| spread.quantiles[0] < spread.quantiles[4])
     }

@@ -119,9 +119,11 @@ class Tune {
     list(this.figures, head.trouble ? [["trouble", head.trouble], ...head.rows] : head.rows);
     const time = columns.get("time"), scaled = (name, factor) => Float64Array.from(columns.get(name) || [], value => value * factor);
     const marks = [{x: head.profile_end, name: "end of the profile"}];
-    this.error.show([{name: "x − y", x: time, y: scaled("cart_error", 1e6), colour: "blue"}], {marks});
-    this.position.show([{name: "reference", x: time, y: scaled("reference", 1e3), colour: "grey", dash: [5, 3]}, {name: "cart", x: time, y: scaled("cart_position", 1e3), colour: "blue"}], {marks});
-    this.command.show([{name: "voltage", x: time, y: scaled("voltage", 1), colour: "verm"}], {marks});
+    const curve = (one, factor, colour) => ({name: one.name, x: time, y: scaled(one.column, factor), colour, ...(one.name === "reference" ? {colour: "grey", dash: [5, 3]} : {})});
+    const {error, position, command} = head.curves;
+    this.error.show(error.map((one, k) => curve(one, 1e6, ["blue", "green"][k])), {marks});
+    this.position.show(position.map((one, k) => curve(one, 1e3, k < 2 ? "blue" : "green")), {marks});
+    this.command.show(command.map((one, k) => curve(one, 1, ["verm", "amber"][k])), {marks});
     const {margins} = head;
     const isLinear = !margins.without;
     this.nyquist.figure.hidden = this.sensitivity.figure.hidden = !isLinear;

@@ -51,7 +51,7 @@ async fn judge(state: &State, request: Request, next: Next) -> Response {
     next.run(request).await
 }
 
-/// Whether it is more than a look: a socket, a file that is sent.
+/// True if it is more than a look: a socket, a file that is sent.
 fn is_act(request: &Request) -> bool {
     request.method() != Method::GET || request.headers().contains_key(header::UPGRADE)
 }

@@ -24,7 +24,7 @@ impl Keys {
         format!("taut-studio-{}", self.port)
     }
 
-    /// Whether it is one of our names, with our port.
+    /// True if it is one of our names, with our port.
     pub fn is_host(&self, host: &str) -> bool {
         ["127.0.0.1", "localhost"].iter().any(|name| host == format!("{name}:{}", self.port))
     }

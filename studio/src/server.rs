@@ -35,7 +35,7 @@ pub struct Options {
     pub fragment: Option<String>,
     /// The port; a free one where none is said.
     pub port: Option<u16>,
-    /// Whether a browser is opened.
+    /// True if a browser is opened.
     pub open: bool,
     /// Numbers of signals that do not end the server: those that were ignored when the program started.
     pub ignored: Vec<i32>,

@@ -40,7 +40,7 @@ pub async fn upgrade(Shared(state): Shared<Arc<State>>, socket: WebSocketUpgrade
 struct Done {
     id: u64,
     frame: Vec<u8>,
-    /// Whether it was the quick one.
+    /// True if it was the quick one.
     was_quick: bool,
 }
 

@@ -17,7 +17,7 @@ pub fn data<const N: usize>(files: [impl AsRef<str>; N]) -> Option<[PathBuf; N]>
     }
 }
 
-/// Whether the measurements that a case file of `stages` names are there.
+/// True if the measurements that a case file of `stages` names are there.
 pub fn of_case(path: &Path) -> bool {
     let text = std::fs::read_to_string(path).unwrap();
     let named = text.split("file = \"../../data/").skip(1).filter_map(|rest| rest.split('"').next());

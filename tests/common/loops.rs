@@ -179,7 +179,7 @@ impl Loop {
         eigenvalues(whole)
     }
 
-    /// Whether a measurement is used at all.
+    /// True if a measurement is used at all.
     fn uses(&self, k: usize) -> bool {
         self.b.column(k).iter().chain([&self.d[k]]).any(|v| *v != 0.0)
     }

@@ -191,7 +191,7 @@ pub fn lined(dry: Dry) -> impl Strategy<Value = Machine> {
     )
 }
 
-/// Whether flanks, spans or end stops may strike again and again, so that an error grows tenfold every few strikes.
+/// True if flanks, spans or end stops may strike again and again, so that an error grows tenfold every few strikes.
 pub fn rattles(machine: &Machine) -> bool {
     machine.drives[0].motor.gear_play.is_some() || machine.cart.travel.is_some() || machine.belt.pretension.is_some()
 }

@@ -3,6 +3,7 @@
 use taut::case::Case;
 use taut::control::feedback::Feedback;
 use taut::control::{Setup, closed_loop};
+use taut::linear::Operation;
 use taut::solve::{Ending, Solver};
 use taut::tune::{Margins, Plant};
 
@@ -26,7 +27,7 @@ pub fn is_that_of_runs(name: &str, case: &Case, every: usize) {
     };
     let feedback = Feedback::new(design, &case.machine).unwrap();
     let told = |step: usize| {
-        let plant = Plant::of(&louder(step), 0.0, design, &feedback.corners()).unwrap();
+        let plant = Plant::of(&louder(step), Operation::default(), design, &feedback.corners()).unwrap();
         Margins::of(&plant, &feedback).stable
     };
     let told: Vec<bool> = (0..30).map(told).collect();

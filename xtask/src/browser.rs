@@ -148,7 +148,7 @@ pub fn browser() -> Result<PathBuf, String> {
     found().ok_or_else(|| "Chromium (Debian: apt-get install chromium)".into())
 }
 
-/// Whether what the lock file asks for is there: npm keeps a list of it with the same hashes.
+/// True if what the lock file asks for is there: npm keeps a list of it with the same hashes.
 fn is_installed() -> bool {
     let read = |file: &str| fs::read_to_string(Path::new(FOLDER).join(file)).unwrap_or_default();
     let (wanted, there) = (read("package-lock.json"), read("node_modules/.package-lock.json"));

@@ -133,7 +133,7 @@ fn compare(before: &BTreeMap<String, u64>, now: &[(String, u64)]) -> Vec<String>
     rises
 }
 
-/// The document with these counts in its rows of work, count before, count now and ratio.
+/// The document with these counts in its rows of workload, description and count.
 fn with_counts(document: &str, counts: &[(String, u64)]) -> String {
     document.lines().map(|line| row(line, counts).unwrap_or_else(|| line.to_string()) + "\n").collect()
 }
@@ -150,10 +150,10 @@ fn with_shares(document: &str, [run, sweep]: [Vec<Share>; 2]) -> String {
 
 fn row(line: &str, counts: &[(String, u64)]) -> Option<String> {
     let cells: Vec<&str> = line.split('|').map(str::trim).collect();
-    let ["", name, before, _, _, ""] = cells[..] else { return None };
-    let before: u64 = before.replace(' ', "").parse().ok()?;
-    let (_, now) = counts.iter().find(|(work, _)| name.trim_matches('`') == work)?;
-    Some(format!("| {name} | {} | {} | {:.2} |", grouped(before), grouped(*now), *now as f64 / before as f64))
+    let ["", name, what, kept, ""] = cells[..] else { return None };
+    kept.replace(' ', "").parse::<u64>().ok()?;
+    let (_, count) = counts.iter().find(|(work, _)| name.trim_matches('`') == work)?;
+    Some(format!("| {name} | {what} | {} |", grouped(*count)))
 }
 
 /// A whole number with a space before every three digits.
@@ -206,8 +206,9 @@ mod tests {
 
     #[test]
     fn the_table_of_the_document_takes_the_counts() {
-        let document = "| work | what it is |\n| `run` | Table 4 |\n| `run` | 931 991 | 654 326 | 0.70 |\ntext\n";
-        let expected = "| work | what it is |\n| `run` | Table 4 |\n| `run` | 931 991 | 465 995 | 0.50 |\ntext\n";
+        let document =
+            "| work | what it is | instructions |\n| `run` | Table 4 | 654 326 |\n| `run` | 1 % | 2 % |\ntext\n";
+        let expected = document.replace("654 326", "465 995");
         assert_eq!(with_counts(document, &[("run".to_string(), 465_995)]), expected);
         assert_eq!([7, 999, 1000, 12_345_678].map(grouped), ["7", "999", "1 000", "12 345 678"]);
     }

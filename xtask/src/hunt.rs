@@ -26,11 +26,11 @@ pub struct Hunt {
     tests: Vec<String>,
     /// Only these of the changes.
     only: Vec<usize>,
-    /// Whether they are shown, and not run.
+    /// True if they are shown, and not run.
     list: bool,
     /// Threads of the stages, all processors unless said.
     threads: Option<u64>,
-    /// Whether the stages are told as JSON.
+    /// True if the stages are told as JSON.
     json: bool,
 }
 

@@ -193,7 +193,7 @@ impl Step {
         }
     }
 
-    /// Whether it succeeds; the tests in it are counted.
+    /// True if it succeeds; the tests in it are counted.
     fn run(&self, counts: &mut Counts, ignored: &Ignored) -> Result<bool, String> {
         match self.work {
             Work::Cargo(words, variables) => {
@@ -208,7 +208,7 @@ impl Step {
     }
 }
 
-/// Whether a command succeeds; its output is shown as it comes, and the tests in it are counted.
+/// True if a command succeeds; its output is shown as it comes, and the tests in it are counted.
 fn run(mut command: Command, counts: &mut Counts) -> Result<bool, String> {
     let name = command.get_program().to_string_lossy().into_owned();
     let child = command.stdout(Stdio::piped()).spawn();

@@ -54,9 +54,9 @@ struct Signs<'a> {
     place: usize,
     /// Lists and tables in one line that are open.
     depth: usize,
-    /// Whether this is a header, or what stands before `=` on a line.
+    /// True if this is a header, or what stands before `=` on a line.
     is_key: bool,
-    /// Whether nothing stood on this line yet.
+    /// True if nothing stood on this line yet.
     begins: bool,
     /// Where the last word began, and the points in it.
     word: usize,

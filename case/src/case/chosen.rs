@@ -15,7 +15,7 @@ impl Case {
         }
     }
 
-    /// Whether its machine is a single axis.
+    /// True if its machine is a single axis.
     pub fn is_axis(&self) -> bool {
         self.machine.kind == Kind::Axis
     }
@@ -73,7 +73,7 @@ impl Case {
     /// The plan of its fit. `path` is the case's own.
     pub fn fit_plan(&self, path: &Path) -> Result<Plan> {
         self.fit.clone().ok_or_else(|| {
-            Error::new("this case does not say what is searched for").in_file(path).next(
+            Error::new("this case has no free parameters").in_file(path).next(
                 "add a table [fit] with for example free = [\"cart.friction.viscous\", \"cart.friction.coulomb\"]",
             )
         })

@@ -177,14 +177,14 @@ fn feed_forward(table: &Table, structure: &Structure, machine: &Machine) -> Resu
         (compensate_stretch, compensate, machine.encoder.map(|encoder| encoder.at))
     {
         return Err(field
-            .fail("an encoder at the cart sees no stretch of the belt")
+            .fail("an encoder at the cart does not measure the stretch of the belt")
             .next("leave it out: it is for an encoder at motor or drive pulley"));
     }
     if let (true, Some(field), true, Some(_)) =
         (compensate_stretch, table.optional("compensate_stretch"), structure.tunable().follows_scale(), machine.scale)
     {
         return Err(field
-            .fail("with a scale the cascade closes its position loop at the cart, where no stretch is seen")
+            .fail("with a scale the cascade closes its position loop at the cart, where there is no stretch to compensate")
             .next("leave it out, or leave [scale] out"));
     }
     Ok(FeedForward {
@@ -243,7 +243,7 @@ fn shaper(table: &Table) -> Result<Vec<[f64; 2]>> {
     if (sum - 1.0).abs() > 1e-6 {
         let told = crate::quantity::rounded(sum);
         return Err(field
-            .fail(format!("the amplitudes add up to {told}: the cart would not get where it should"))
+            .fail(format!("the amplitudes add up to {told}: the cart would not reach its target"))
             .allowed("1")
             .next(format!("divide each of them by {told}")));
     }

@@ -11,9 +11,9 @@ use std::path::{Path, PathBuf};
 /// The experiments whose files are read: logs, and inputs that are columns of files.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Files<'a> {
-    /// Those of all experiments.
+    /// The files of all experiments.
     All,
-    /// Those of the experiments of these names.
+    /// The files of the experiments with these names.
     Of(&'a [String]),
     /// None: the machine, its controller and its moves are all that is wanted.
     Nothing,
@@ -50,7 +50,7 @@ impl Unread {
         Some([until?, every?])
     }
 
-    /// Whether an experiment of this name is meant: itself, or a run of its log.
+    /// True if an experiment of this name is meant: itself, or a run of its log.
     pub fn holds(&self, name: &str) -> bool {
         name == self.name || name.strip_prefix(self.name.as_str()).is_some_and(|rest| rest.starts_with('/'))
     }
@@ -63,12 +63,12 @@ pub(super) struct Folder<'a> {
     wanted: Files<'a>,
     /// The name of the experiment that is being read.
     experiment: RefCell<String>,
-    /// Whether a file of it was not read.
+    /// True if a file of it was not read.
     failed: Cell<bool>,
 }
 
 impl<'a> Folder<'a> {
-    /// That of the case file `name`.
+    /// Reader of the files that the case file `name` refers to.
     pub fn of(name: &'a Path, wanted: Files<'a>) -> Self {
         let path = name.parent().unwrap_or(Path::new(""));
         Self { path, wanted, named: RefCell::default(), experiment: RefCell::default(), failed: Cell::new(false) }

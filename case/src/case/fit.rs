@@ -28,7 +28,7 @@ pub struct Plan {
     pub priors: Vec<(String, Prior)>,
     /// The nuisances that are fitted along with each log.
     pub nuisance: Nuisances,
-    /// Whether residuals beyond 1.345 standard deviations count linearly.
+    /// True if residuals beyond 1.345 standard deviations count linearly.
     pub huber: bool,
     /// From how many points the search starts.
     pub starts: usize,
@@ -40,7 +40,7 @@ pub struct Plan {
     pub until: Option<f64>,
     /// Length of the windows into which logs are cut, s.
     pub windows: Option<f64>,
-    /// Whether the case's controller follows the logged reference again; otherwise the input is what was logged.
+    /// True if the case's controller follows the logged reference again; otherwise the input is what was logged.
     pub closed_loop: bool,
 }
 
@@ -198,7 +198,7 @@ pub(super) fn plan(root: &Table, stage: &Machine, experiments: &[Experiment], wh
     let mut seen: Vec<&str> = Vec::new();
     for key in free.iter().chain(tied.iter().flatten()).chain(&lumped) {
         if seen.contains(&key.as_str()) {
-            return Err(field.fail(format!("`{key}` stands in it twice")).next("name each parameter once"));
+            return Err(field.fail(format!("`{key}` is listed twice")).next("name each parameter once"));
         }
         seen.push(key);
     }
@@ -318,7 +318,7 @@ fn closed(field: &Field, table: &Table, root: &Table, experiments: &[Experiment]
     let without = experiments.iter().find(|e| e.log.as_ref().is_some_and(|log| log.reference.is_none()));
     if let Some(experiment) = without {
         return Err(field
-            .fail(format!("the log of \"{}\" does not say where the cart should have been", experiment.name))
+            .fail(format!("the log of \"{}\" has no reference", experiment.name))
             .next("add reference = \"...\" with the name of that column to the log, or leave out `loop`"));
     }
     if table.optional("windows").is_some() {
@@ -346,7 +346,7 @@ pub(super) fn free(field: &Field, name: &str, machine: &Machine) -> Result<()> {
 /// Names that an error lists at most.
 const MOST_NAMES: usize = 10;
 
-/// Whether a name is meant by a pattern: the name itself, where each `*` stands for anything, nothing too.
+/// True if a name is meant by a pattern: the name itself, where each `*` stands for anything, nothing too.
 pub fn matches(name: &str, pattern: &str) -> bool {
     let Some((start, rest)) = pattern.split_once('*') else { return name == pattern };
     let Some(mut left) = name.strip_prefix(start) else { return false };
@@ -421,8 +421,8 @@ pub(super) fn plain(field: &Field, wanted: &str) -> Result<f64> {
     match &field.node.kind {
         Kind::Float(value) if value.is_finite() => Ok(*value),
         Kind::Integer(value) => Ok(*value as f64),
-        Kind::Float(value) => Err(field.fail(format!("{value} stands where {wanted} is wanted"))),
-        other => Err(field.fail(format!("{} stands where {wanted} is wanted", other.word()))),
+        Kind::Float(value) => Err(field.fail(format!("expected {wanted}, found {value}"))),
+        other => Err(field.fail(format!("expected {wanted}, found {}", other.word()))),
     }
 }
 
@@ -466,7 +466,7 @@ fn prior(field: &Field, key: &str) -> Result<Prior> {
     let mut kinds = table.keys();
     let (Some(kind), None) = (kinds.next(), kinds.next()) else {
         let count = table.keys().count();
-        return Err(field.fail(format!("{count} priors stand here")).allowed(format!("one of {PRIORS}")));
+        return Err(field.fail(format!("expected one prior, found {count}")).allowed(format!("one of {PRIORS}")));
     };
     let Some(field) = table.optional(kind) else { return Err(field.fail("this prior is empty")) };
     prior_of(kind, &field, key)
@@ -512,7 +512,7 @@ fn nuisances(table: &Table) -> Result<Nuisances> {
         None => Ok(false),
         Some(field) => match &field.node.kind {
             Kind::Bool(value) => Ok(*value),
-            other => Err(field.fail(format!("{} stands where true or false is wanted", other.word()))),
+            other => Err(field.fail(format!("expected true or false, found {}", other.word()))),
         },
     };
     let scope = |key: &str| match table.optional(key) {
@@ -522,7 +522,7 @@ fn nuisances(table: &Table) -> Result<Nuisances> {
             Kind::Bool(false) => Ok(Scope::Off),
             Kind::Text(text) if text == "shared" => Ok(Scope::Shared),
             other => Err(field
-                .fail(format!("{} stands where true, false or \"shared\" is wanted", other.word()))
+                .fail(format!("expected true, false or \"shared\", found {}", other.word()))
                 .next("true gives each log its own, \"shared\" all of them the same")),
         },
     };

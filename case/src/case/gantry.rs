@@ -23,7 +23,7 @@ pub(super) fn no_axis(root: &Table, kind: Kind) -> Error {
     let field = root.optional("kind").unwrap_or_else(|| root.field.clone());
     let what = format!("this needs a single axis, and the case describes a gantry ({})", kind.name());
     field.fail(what).allowed("kind = \"axis\", or no kind at all").next(
-        "`taut simulate`, `taut modes`, `taut move`, `taut shape` and `taut sweep` take gantries; fit and tuning of them are yet to come",
+        "`taut simulate`, `taut modes`, `taut move`, `taut tune`, `taut plan`, `taut shape` and `taut sweep` take gantries; fits of them are yet to come",
     )
 }
 
@@ -37,7 +37,7 @@ pub(super) fn tables(root: &Table) -> Result<&'static [&'static str]> {
             }));
         }
     }
-    for key in ["measurement", "fit", "tune", "uncertainty"] {
+    for key in ["measurement", "fit", "uncertainty"] {
         if let Some(field) = root.optional(key) {
             return Err(field.fail("this is not there yet for a gantry").next("leave it out for now"));
         }
@@ -58,6 +58,7 @@ pub(super) fn tables(root: &Table) -> Result<&'static [&'static str]> {
         "experiment",
         "controller",
         "move",
+        "tune",
         "sweep",
     ])
 }
@@ -206,10 +207,7 @@ pub(super) fn inputs(experiment: &Table, gantry: &Machine, context: &input::Cont
     let sides = ["left", "right"];
     if let Some(key) = inputs.keys().find(|key| !sides.contains(key)) {
         let field = inputs.optional(key).unwrap_or_else(|| inputs.field.clone());
-        return Err(field
-            .fail(format!("a gantry has two inputs, and `{key}` is none of them"))
-            .allowed("left, right")
-            .next(such_as));
+        return Err(field.fail(format!("`{key}` is not an input of a gantry")).allowed("left, right").next(such_as));
     }
     let signal = |(side, unit): (&str, &DriveUnit)| match inputs.optional(side) {
         None => Ok(Signal::Step { value: 0.0, at: 0.0 }),

@@ -116,7 +116,7 @@ fn input(field: &Field, table: &Table, sources: &Sources, driven: bool) -> Resul
             let field = table.optional("input").unwrap_or_else(|| field.clone());
             return Err(field
                 .fail("the experiment has an input already")
-                .next("leave out the one or the other: what was logged, or what was meant"));
+                .next("leave out one of them: the logged input or the experiment's own"));
         }
         _ => {}
     }
@@ -186,7 +186,7 @@ impl<'a> Sources<'a> {
         Ok(sources)
     }
 
-    /// Whether there is a column of this, by the table or a preset.
+    /// True if there is a column of this, by the table or a preset.
     fn is_named(&self, key: &str) -> bool {
         self.table.optional(key).is_some() || self.columns.iter().any(|(own, ..)| *own == key)
     }
@@ -205,7 +205,7 @@ impl<'a> Sources<'a> {
         if let (None, Some(Unit::Name(known)), Some(preset)) = (&given, &known, self.table.optional("preset"))
             && quantity::read(&format!("1 {known}"), unit).is_err()
         {
-            let error = preset.fail(format!("its {key} is in {known}; {unit} is wanted")).allowed(unit);
+            let error = preset.fail(format!("its {key} is in {known}; expected {unit}")).allowed(unit);
             return Err(error.next(match key {
                 "input" => format!(
                     "correct `mode` of [amplifier], name the column of another input, or say units = {{ input = \"{unit}\" }}"
@@ -243,7 +243,7 @@ impl<'a> Sources<'a> {
         match quantity::read(&format!("1 {text}"), unit) {
             Ok(_) => Ok(Unit::Name(text.to_string())),
             Err(e) => {
-                let what = format!("\"{text}\" is no unit of this column, which is wanted in {unit}");
+                let what = format!("\"{text}\" is not a unit of this column: expected one convertible to {unit}");
                 let such_as =
                     format!("write for example {} = \"{}\"", field.key(), example(unit).trim_start_matches("1 "));
                 Err(field.fail(what).next(e.next.filter(|next| next.starts_with("1 ")).unwrap_or(such_as)))
@@ -300,7 +300,7 @@ fn column(field: &Field) -> Result<ColumnId> {
             .next("a column without a name goes by its number, from 1")),
         Kind::Text(name) => Ok(ColumnId::from(name.as_str())),
         other => Err(field
-            .fail(format!("{} stands where a column is wanted", other.word()))
+            .fail(format!("expected a column, found {}", other.word()))
             .next("write the column's name in quotes, or its number, from 1")),
     }
 }
@@ -333,7 +333,7 @@ fn filter(field: &Field) -> Result<Filter> {
         Kind::Integer(number) => Ok(number.to_string()),
         Kind::Float(number) if number.is_finite() => Ok(shortest(*number)),
         Kind::Text(text) => Ok(text.trim().to_string()),
-        other => Err(field.fail(format!("{} stands where a number or a text is wanted", other.word()))),
+        other => Err(field.fail(format!("expected a number or a text, found {}", other.word()))),
     };
     Ok(Filter { column, values: list.iter().map(text).collect::<Result<_>>()?, keep })
 }

@@ -139,7 +139,7 @@ pub(super) fn amplifier(table: Option<&Table>, motor: Option<&Table>) -> Result<
                 .next("leave it out, or set mode = \"current\""));
         }
         (AmplifierMode::Current, None, Some(limit)) if inductance > 0.0 => {
-            return Err(limit.fail("a current that jumps would need any voltage at an inductance").next(
+            return Err(limit.fail("a step of current needs an infinite voltage at an inductance").next(
                 "add the current loop's bandwidth, for example bandwidth = \"1 kHz\", or leave motor.inductance out",
             ));
         }
@@ -187,7 +187,7 @@ pub(super) fn radius(table: &Table, belt_pitch: Option<f64>) -> Result<f64> {
     }
 }
 
-/// Whether two pitches are the same but for rounding in print.
+/// True if two pitches are the same but for rounding in print.
 fn same_pitch(a: f64, b: f64) -> bool {
     (a - b).abs() <= 0.01 * a
 }

@@ -68,7 +68,7 @@ fn channel(field: &Field, quantity: Quantity, machine: &Machine) -> Result<Chann
     Ok(Channel { quantity, step, noise: table.number("noise")?, range })
 }
 
-/// Whether an experiment can be recorded like this.
+/// Checks that an experiment can be recorded like this.
 fn fits(table: &Table, measurement: &Measurement, experiment: &Experiment) -> Result<()> {
     let Experiment { name, until, .. } = experiment;
     let at = |key: &str| table.optional(key).unwrap_or_else(|| table.field.clone());

@@ -112,20 +112,20 @@ impl Case {
         Self::from_text_with(path, &read_text(path)?, changes)
     }
 
-    /// The same with the files of these experiments only. An experiment whose files are not read, or cannot be, is none
-    /// of the case's experiments; [`Case::unread`] says why, and whoever asks for it is told.
+    /// Reads a case with the files of these experiments only. An experiment whose files are not read, or cannot be, is
+    /// none of the case's experiments; [`Case::unread`] says why, and whoever asks for it is told.
     pub fn read_for(path: impl AsRef<Path>, changes: &[&str], files: Files) -> Result<Self> {
         let path = path.as_ref();
         Self::from_text_for(path, &read_text(path)?, changes, files)
     }
 
-    /// The same for what takes an axis alone: refuses every other kind of machine.
+    /// Reads the case of an axis; rejects every other kind of machine.
     pub fn read_axis_for(path: impl AsRef<Path>, changes: &[&str], files: Files) -> Result<Self> {
         let path = path.as_ref();
         Self::axis_from_text_for(path, &read_text(path)?, changes, files)
     }
 
-    /// The same from text, as [`Case::from_text_for`] has it.
+    /// Reads the case of an axis from text, as [`Case::from_text_for`] does.
     pub fn axis_from_text_for(name: impl AsRef<Path>, text: &str, changes: &[&str], files: Files) -> Result<Self> {
         Self::of_kinds(name.as_ref(), text, changes, files, Accepted::Axis)
     }
@@ -161,7 +161,7 @@ impl Case {
         Ok(case)
     }
 
-    /// The same with the files of these experiments only, as [`Case::read_for`] has it.
+    /// Reads a case from text with the files of these experiments only, as [`Case::read_for`] does.
     pub fn from_text_for(name: impl AsRef<Path>, text: &str, changes: &[&str], files: Files) -> Result<Self> {
         Self::of_kinds(name.as_ref(), text, changes, files, Accepted::All)
     }
@@ -307,7 +307,7 @@ fn listed<'a>(root: &Table<'a>) -> Result<Vec<Field<'a>>> {
     let field = root.required("experiment", such_as)?;
     if field.is_table() {
         return Err(field
-            .fail("a list of tables is wanted")
+            .fail("expected a list of tables")
             .next("write [[experiment]] with double brackets: there can be several"));
     }
     let list = field.list()?;
@@ -433,7 +433,7 @@ fn check_name(field: &Field) -> Result<()> {
     }
     if let Some(c) = name.chars().find(|c| matches!(c, '/' | '\\') || c.is_control()) {
         return Err(field
-            .fail(format!("a name with `{}` would lead out of the output folder", c.escape_debug()))
+            .fail(format!("a name with `{}` would leave the output folder", c.escape_debug()))
             .allowed(usable));
     }
     match name.chars().count() {

@@ -19,7 +19,7 @@ pub struct Move {
     pub name: String,
     /// The reference of each coordinate: that of the cart of an axis, those of bridge and cart of a gantry.
     pub profiles: Vec<Profile>,
-    /// Whether its limits are those of a plan of the machine, and not numbers of the file.
+    /// True if its limits are those of a plan of the machine, and not numbers of the file.
     pub is_planned: bool,
     /// End of the run, s.
     pub until: f64,
@@ -40,17 +40,19 @@ impl Move {
         &self.profiles[0]
     }
 
+    /// End of the references, s.
+    pub fn end(&self) -> f64 {
+        self.profiles.iter().map(Profile::end).fold(0.0, f64::max)
+    }
+
     /// The references, through the shaper of this controller.
     pub fn references(&self, design: &Design) -> Vec<Profile> {
         self.profiles.iter().map(|profile| profile.clone().shaped(&design.shaper)).collect()
     }
 
-    /// The limits that its reference exceeds on an axis under this controller; of a gantry none is known before it runs.
+    /// The limits that its references exceed on a machine under this controller.
     pub fn shortfalls(&self, machine: &Machine, design: &Design) -> Vec<Shortfall> {
-        match &self.references(design)[..] {
-            [reference] => shortfalls(machine, design.limit, reference),
-            _ => Vec::new(),
-        }
+        shortfalls(machine, design.limit, &self.references(design))
     }
 }
 
@@ -58,7 +60,7 @@ pub(super) fn moves(root: &Table, machine: &Machine, design: Option<&Design>) ->
     let Some(field) = root.optional("move") else { return Ok(Vec::new()) };
     if field.is_table() {
         return Err(field
-            .fail("a list of tables is wanted")
+            .fail("expected a list of tables")
             .next("write [[move]] with double brackets: there can be several"));
     }
     let Some(design) = design else {
@@ -155,27 +157,12 @@ fn place(field: &Field, machine: &Machine) -> Result<Vec<f64>> {
 /// The reference of each coordinate along the legs of the table.
 fn profiles(table: &Table, machine: &Machine, from: &[f64], limits: &Limits) -> Result<Vec<Profile>> {
     let legs = legs(table, machine, from, limits)?;
-    let profiles = match from {
-        [from] => {
-            let alone = |leg: &Leg<Vec<f64>>| match leg {
-                Leg::To(to, limits) => Leg::To(to[0], *limits),
-                Leg::Wait(length) => Leg::Wait(*length),
-            };
-            Profile::new(*from, &legs.iter().map(alone).collect::<Vec<_>>()).map(|profile| vec![profile])
-        }
-        _ => Profile::along(from, &legs),
-    };
-    profiles.map_err(|error| table.field.fail(error.what))
+    Profile::of_legs(from, &legs).map_err(|error| table.field.fail(error.what))
 }
 
 /// The limits of the quickest move that the machine of the file can make, with jerk and snap time on the belt's modes
 /// where the way is long enough for it.
 fn planned(table: &Table, field: &Field, from: &[f64], machine: &Machine, design: &Design) -> Result<Limits> {
-    if from.len() > 1 {
-        return Err(field
-            .fail("a plan needs a single axis, and the case describes a gantry")
-            .next("give speed and acceleration along the path instead"));
-    }
     if let Some(other) = ["speed", "acceleration", "jerk", "snap", "gcode"].iter().find_map(|key| table.optional(key)) {
         let next = format!(
             "leave out plan, or {}; limits of the plan stand in it: plan = {{ speed = \"0.5 m/s\" }}",
@@ -195,7 +182,7 @@ fn planned(table: &Table, field: &Field, from: &[f64], machine: &Machine, design
     let any = Limits { speed: 1.0, acceleration: 1.0, jerk: None, snap: None };
     let told = |error: Error| Error { place: field.fail("").place, ..error };
     let profiles = profiles(table, machine, from, &any).map_err(told)?;
-    let way = profiles.first().and_then(Way::of).ok_or_else(|| field.fail("a move that goes nowhere has no plan"))?;
+    let way = Way::of(&profiles).ok_or_else(|| field.fail("a move without a stroke has no plan"))?;
     let modes = modes(machine);
     let quickest = Quickest { machine, design, modes: &modes, wanted: &wanted };
     quickest.check(&way).map_err(told)?;
@@ -204,7 +191,7 @@ fn planned(table: &Table, field: &Field, from: &[f64], machine: &Machine, design
             return Ok(limits);
         }
     }
-    Err(field.fail("there is no plan: what is left of voltage and current does not accelerate the axis"))
+    Err(field.fail("there is no plan: the remaining voltage and current do not accelerate the machine"))
 }
 
 fn limits(table: &Table) -> Result<Limits> {

@@ -25,7 +25,7 @@ impl<'a> Field<'a> {
         Self { source, node, path: String::new(), section: String::new(), input_unit: "V" }
     }
 
-    /// The same value as a member of another section of the table of parameters.
+    /// This value as a member of another section of the table of parameters.
     pub fn named(mut self, section: impl Into<String>) -> Self {
         self.section = section.into();
         self
@@ -78,7 +78,7 @@ impl<'a> Field<'a> {
             }
             other => {
                 let wanted = if unit.is_empty() { "a number" } else { "a number or a text with a unit" };
-                return Err(self.fail(format!("{} stands where {wanted} is wanted", other.word())).next(such_as));
+                return Err(self.fail(format!("expected {wanted}, found {}", other.word())).next(such_as));
             }
         };
         if !value.is_finite() {
@@ -120,9 +120,7 @@ impl<'a> Field<'a> {
     pub fn text(&self) -> Result<&'a str> {
         match &self.node.kind {
             Kind::Text(text) => Ok(text),
-            other => {
-                Err(self.fail(format!("{} stands where a text is wanted", other.word())).next("put the text in quotes"))
-            }
+            other => Err(self.fail(format!("expected a text, found {}", other.word())).next("put the text in quotes")),
         }
     }
 
@@ -131,7 +129,7 @@ impl<'a> Field<'a> {
         match &self.node.kind {
             Kind::Bool(value) => Ok(*value),
             other => Err(self
-                .fail(format!("{} stands where true or false is wanted", other.word()))
+                .fail(format!("expected true or false, found {}", other.word()))
                 .next("write true or false, without quotes")),
         }
     }
@@ -141,9 +139,7 @@ impl<'a> Field<'a> {
         let words: Vec<&str> = options.iter().map(|(word, _)| *word).collect();
         let allowed = || words.iter().map(|w| format!("\"{w}\"")).collect::<Vec<_>>().join(" or ");
         let Kind::Text(text) = &self.node.kind else {
-            return Err(self
-                .fail(format!("{} stands where a word is wanted", self.node.kind.word()))
-                .allowed(allowed()));
+            return Err(self.fail(format!("expected a word, found {}", self.node.kind.word())).allowed(allowed()));
         };
         options.iter().find(|(word, _)| word == text).map(|(_, value)| *value).ok_or_else(|| {
             let error = self.fail(format!("\"{text}\" is not known")).allowed(allowed());
@@ -162,7 +158,7 @@ impl<'a> Field<'a> {
                 .map(|(i, node)| Field { node, path: format!("{}.{i}", self.path), ..self.clone() })
                 .collect()),
             other => Err(self
-                .fail(format!("{} stands where a list is wanted", other.word()))
+                .fail(format!("expected a list, found {}", other.word()))
                 .next("write the values in brackets, separated by commas: [1, 2, 3]")),
         }
     }
@@ -187,9 +183,7 @@ impl<'a> Field<'a> {
     /// So many numbers, one for each span.
     pub fn numbers(&self, count: usize, per_span: &str) -> Result<Vec<f64>> {
         let Kind::List(nodes) = &self.node.kind else {
-            return Err(self
-                .fail(format!("{} stands where a list is wanted", self.node.kind.word()))
-                .allowed(per_span));
+            return Err(self.fail(format!("expected a list, found {}", self.node.kind.word())).allowed(per_span));
         };
         if nodes.len() != count {
             return Err(self.fail(format!("the list has {} values", nodes.len())).allowed(per_span));
@@ -216,7 +210,7 @@ impl<'a> Field<'a> {
                     true => "write its entries in braces: { key = value, key = value }".to_string(),
                     false => format!("write [{}] on a line of its own, and its keys below", self.path),
                 };
-                Err(self.fail(format!("{} stands where a table is wanted", other.word())).next(next))
+                Err(self.fail(format!("expected a table, found {}", other.word())).next(next))
             }
         }
     }
@@ -231,7 +225,7 @@ pub(super) struct Table<'a> {
 }
 
 impl<'a> Table<'a> {
-    /// The same, with what `base` says where it says nothing itself.
+    /// This table over a base table, whose values apply where this one has none.
     pub fn over(mut self, base: Option<Table<'a>>) -> Self {
         self.base = base.map(Box::new);
         self

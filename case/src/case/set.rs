@@ -56,7 +56,7 @@ impl<'a> Change<'a> {
                 let at = Place::in_text("--set", argument, key.len() + 1..argument.len());
                 return Err(Error::new("this list, table or text is not complete")
                     .at(at)
-                    .next("inside it, texts stand in quotes: [\"1 kN/m\", \"2 kN/m\"]"));
+                    .next("put texts inside it in quotes: [\"1 kN/m\", \"2 kN/m\"]"));
             }
             Err(_) => Value::from(value),
         };
@@ -84,7 +84,7 @@ impl<'a> Change<'a> {
             }
             other => {
                 let Some(table) = other.as_table_like_mut() else {
-                    return Err(self.fail(format!("`{last}` cannot be set: what stands before it is no table")));
+                    return Err(self.fail(format!("`{last}` cannot be set: its parent is not a table")));
                 };
                 match table.get_mut(last) {
                     Some(Item::Value(old)) => replace(old, self.value.clone()),
@@ -109,7 +109,7 @@ impl<'a> Change<'a> {
             return item.get_mut(index).ok_or_else(|| self.no_element(step, length));
         }
         let Some(table) = item.as_table_like_mut() else {
-            return Err(self.fail(format!("`{step}` cannot be reached: what stands before it is no table")));
+            return Err(self.fail(format!("`{step}` cannot be reached: its parent is not a table")));
         };
         if !table.contains_key(step) {
             let new = match depth {
@@ -132,9 +132,9 @@ impl<'a> Change<'a> {
                     element.ok_or_else(|| self.no_element(step, length))?
                 }
                 Value::InlineTable(table) => table.get_mut(step).ok_or_else(|| {
-                    self.fail(format!("`{step}` does not stand there yet; set what stands before it"))
+                    self.fail(format!("`{step}` does not exist yet; set the entries before it first"))
                 })?,
-                _ => return Err(self.fail(format!("`{step}` cannot be reached: what stands before it is no table"))),
+                _ => return Err(self.fail(format!("`{step}` cannot be reached: its parent is not a table"))),
             };
         }
         Ok(value)

@@ -108,7 +108,7 @@ pub(super) fn simple_drive(root: &Table) -> Result<Option<SimpleDrive>> {
     {
         return Err(mode
             .fail("a [drive] has no current that could be commanded")
-            .next("leave mode out, and give force_per_input per unit of input, whatever that is"));
+            .next("leave mode out, and give force_per_input per unit of the input"));
     }
     Ok(Some(SimpleDrive { force: table.number("force_per_input")?, drag: table.number("drag")? }))
 }
@@ -212,7 +212,7 @@ pub(super) fn proportion(table: &Table, mechanism: &Mechanism) -> Result<Option<
         // c = 2 ζ k / ω₀
         Some(frequency) => Ok(Some(2.0 * zeta / frequency)),
         None => Err(field
-            .fail("there is no swing that this could be the damping of: the belt does not stretch")
+            .fail("a rigid belt has no vibration to damp")
             .next("leave it out, or set model = \"elastic\" or \"two-mass\"")),
     }
 }

@@ -27,14 +27,14 @@ pub struct Sweeping {
     pub vary: Vec<(String, Variation)>,
     /// The fit that parameters are drawn from.
     pub from: Option<Origin>,
-    /// Whether the runs are those that Sobol' indices need.
+    /// True if the runs are those that Sobol' indices need.
     pub indices: bool,
     /// The figures that are told, by name; all where nothing is said.
     pub figures: Option<Vec<String>>,
 }
 
 impl Sweeping {
-    /// Whether this figure is told.
+    /// True if this figure is told.
     pub fn tells(&self, name: &str) -> bool {
         self.figures.as_ref().is_none_or(|figures| figures.iter().any(|figure| figure == name))
     }
@@ -81,12 +81,12 @@ impl Sampling {
         ("one-at-a-time", Sampling::OneAtATime),
     ];
 
-    /// As in the case file.
+    /// Its name in the case file.
     pub fn word(self) -> &'static str {
         Self::ALL.iter().find(|(_, sampling)| *sampling == self).map_or("", |(word, _)| word)
     }
 
-    /// Whether the runs are drawn, as many as one wants.
+    /// True if the runs are drawn, as many as one wants.
     pub fn is_drawn(self) -> bool {
         !matches!(self, Sampling::Grid | Sampling::OneAtATime)
     }
@@ -236,7 +236,7 @@ fn variation(field: &Field, key: &str, design: Sampling, machine: &Machine) -> R
     let mut kinds = table.keys().filter(|kind| *kind != "within");
     let (Some(kind), None) = (kinds.next(), kinds.next()) else {
         let count = table.keys().filter(|kind| *kind != "within").count();
-        return Err(field.fail(format!("{count} ways to vary it stand here")).allowed(format!("one of {KINDS}")));
+        return Err(field.fail(format!("expected one distribution, found {count}")).allowed(format!("one of {KINDS}")));
     };
     let Some(at) = table.optional(kind) else { return Err(field.fail("this is empty")) };
     if key == "all" && !matches!(kind, "share" | "factors") {
@@ -309,7 +309,7 @@ fn short(field: &Field, text: &str) -> Result<Node> {
         return Ok(table_of(field.node, "share", Kind::Text(plain.to_string())));
     }
     let wrong = || {
-        field.fail(format!("\"{}\" is no way to vary a parameter", text.trim())).allowed(
+        field.fail(format!("\"{}\" is not a distribution of a parameter", text.trim())).allowed(
             "a share such as 20 %, uniform(least, most), normal(mean, deviation), log-normal(median, deviation), values(a, b, …), \
              grid(from, to, count) or factors(a, b, …)",
         )

@@ -75,7 +75,7 @@ const A_LINE: &str = "a line is key = value; a number with a unit stands in quot
 /// Mistakes of the notation: what the reader of TOML says, and what we say instead.
 const TOML_MISTAKES: &[(&str, &str, &str)] = &[
     ("recursion", "this is nested too deeply", "nest lists and tables less deeply"),
-    ("duplicate key", "this stands here for the second time", "keep one of the two"),
+    ("duplicate key", "this key or table occurs twice", "keep one of the two"),
     ("values must be quoted", "this is neither a number nor a text in quotes", A_LINE),
     ("number overflowed", "this number is too large for a computer's number", "check its digits and its power of ten"),
     ("key with no value", "there is no `=` after this key", A_LINE),

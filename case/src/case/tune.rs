@@ -29,7 +29,7 @@ pub struct Tuning {
     pub loads: Vec<f64>,
     /// Places along the travel that are looked at.
     pub places: usize,
-    /// Whether all parameters may be at their ends at once, and no axis is left out.
+    /// True if all parameters may be at their ends at once, and no axis is left out.
     pub corners: bool,
     /// Draws of `taut fit --posterior`, of which the family is made instead.
     pub draws: Option<PathBuf>,
@@ -73,7 +73,7 @@ pub enum Cost {
 }
 
 impl Cost {
-    /// As in the case file.
+    /// Its name in the case file.
     pub fn word(self) -> &'static str {
         match self {
             Cost::Moves => "moves",

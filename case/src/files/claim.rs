@@ -269,7 +269,7 @@ fn refused(shown: &Path, e: &io::Error) -> Refusal {
     Refusal { error: cannot_write(shown, e), is_name_wrong: is_name_wrong(e) }
 }
 
-/// Whether another name would help; a full disk may have space later.
+/// True if another name would help; a full disk may have space later.
 fn is_name_wrong(e: &io::Error) -> bool {
     !matches!(e.kind(), ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::FileTooLarge)
 }

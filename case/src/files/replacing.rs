@@ -67,7 +67,7 @@ struct Kept {
 
 #[cfg(unix)]
 impl Kept {
-    /// Those of a file; none if there is no such file.
+    /// Attributes of a file; none if it does not exist.
     fn of(path: &Path) -> io::Result<Option<Self>> {
         use std::os::unix::fs::MetadataExt;
         match fs::metadata(path) {

@@ -88,7 +88,7 @@ pub fn remove_abandoned(path: &Path) -> bool {
     }
 }
 
-/// Whether `path` is the name of this open file.
+/// True if `path` is the name of this open file.
 #[cfg(unix)]
 pub(super) fn stands_at(path: &Path, file: &File) -> bool {
     use std::os::unix::fs::MetadataExt;

@@ -36,7 +36,7 @@ pub enum Accelerometer {
         frequency: Vec<f64>,
         /// Of x, y and z, and their sum; in the file's unit, (mm/s²)²/Hz.
         density: [Vec<f64>; 4],
-        /// Whether they are already divided by the frequency, as in files that name shapers.
+        /// True if they are already divided by the frequency, as in files that name shapers.
         per_frequency: bool,
     },
     /// Accelerations over time.
@@ -103,7 +103,7 @@ impl Heading {
 }
 
 impl Heading {
-    /// Whether all of these columns are there.
+    /// Checks that all of these columns exist.
     fn check(&self, names: &[&str]) -> Result<()> {
         let fields: Vec<&str> = self.text.split([',', ';', '\t', ' ']).map(|f| f.trim().trim_matches('"')).collect();
         let Some(missing) = names.iter().find(|name| !fields.contains(*name)) else { return Ok(()) };

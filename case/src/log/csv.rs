@@ -297,12 +297,12 @@ fn parse(text: &str, dialect: Dialect) -> Option<f64> {
     }
 }
 
-/// Whether a text is meant as a number, commas or not.
+/// True if a text is meant as a number, commas or not.
 fn numeric(text: &str) -> bool {
     text.replacen(',', ".", 1).parse::<f64>().is_ok_and(|number| !number.is_nan())
 }
 
-/// Whether a text is one that programs write where they have no value.
+/// True if a text is one that programs write where they have no value.
 fn is_missing(text: &str) -> bool {
     const WORDS: [&str; 10] = ["", "nan", "-nan", "nan(ind)", "-nan(ind)", "na", "n/a", "null", "none", "-"];
     WORDS.iter().any(|word| text.eq_ignore_ascii_case(word)) || text.contains("#QNAN") || text.contains("#IND")
@@ -314,7 +314,7 @@ struct Layout {
     names: Vec<String>,
     /// For each column asked for, its place among `names`.
     wanted: Vec<usize>,
-    /// Whether the current line names the columns; otherwise it is the first row.
+    /// True if the current line names the columns; otherwise it is the first row.
     is_heading: bool,
     /// The line that names the columns, if one does.
     heading_line: Option<usize>,
@@ -322,7 +322,7 @@ struct Layout {
     below: Vec<String>,
     /// The separator, if the case file says it.
     said: Option<char>,
-    /// Whether columns may be asked for by number.
+    /// True if columns may be asked for by number.
     by_number: bool,
 }
 
@@ -452,7 +452,7 @@ impl Layout {
             }
         }
         best.map(|(_, _, candidate)| candidate).ok_or_else(|| {
-            lines.error("a comma cannot part the columns and the decimals at once").next("name another separator")
+            lines.error("a comma cannot separate both columns and decimals").next("name another separator")
         })
     }
 

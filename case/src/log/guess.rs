@@ -152,7 +152,7 @@ fn by_name(columns: &[Seen]) -> Guess {
     guess
 }
 
-/// Whether a column can be of a quantity with this unit: the unit that its file states, if one, has the same dimension.
+/// True if a column can be of a quantity with this unit: the unit that its file states, if one, has the same dimension.
 fn is_of(column: &Seen, wanted: &str) -> bool {
     let dimension = |unit: &str| conversion(unit).map(|(dimension, _)| dimension.without_angle()).ok();
     column.unit.as_deref().and_then(dimension).is_none_or(|own| Some(own) == dimension(wanted))
@@ -194,7 +194,7 @@ fn rank(words: &[String], known: &[&str]) -> Option<usize> {
     known.iter().position(has)
 }
 
-/// Whether nearly all rows are above the one before: a clock may begin anew with each run.
+/// True if nearly all rows are above the one before: a clock may begin anew with each run.
 fn rises(values: &[f64]) -> bool {
     let up = values.windows(2).filter(|pair| pair[1] > pair[0]).count();
     values.len() > 2 && up as f64 >= 0.97 * (values.len() - 1) as f64

@@ -137,7 +137,7 @@ pub(super) struct Lines<'a, R> {
     /// Of the current line, from 1.
     pub number: usize,
     pub text: String,
-    /// Whether the current line ended as lines do.
+    /// True if the current line ended as lines do.
     pub complete: bool,
     /// The last remark before the current line, without its mark.
     pub remark: String,

@@ -34,7 +34,7 @@ pub struct Mapping {
     pub input: Option<Source>,
     /// Unit of the input, V or A.
     pub input_unit: &'static str,
-    /// Whether an input that is missing is the one before it; otherwise it is an error.
+    /// True if an input that is missing is the one before it; otherwise it is an error.
     pub hold_missing: bool,
     /// The column of what was added to the input behind the controller.
     pub added: Option<Source>,
@@ -97,7 +97,7 @@ impl Source {
         Self { column: ColumnId::from(name), unit: None, scale: 1.0, offset: 0.0 }
     }
 
-    /// The same, in `unit`.
+    /// This source with its numbers in `unit`.
     pub fn unit(self, unit: &str) -> Self {
         Self { unit: Some(Unit::Name(unit.to_string())), ..self }
     }
@@ -165,7 +165,7 @@ impl Mapping {
         }
     }
 
-    /// Whether the numbers in the first column have to increase from the first row to the last.
+    /// True if the numbers in the first column have to increase from the first row to the last.
     fn is_ordered(&self) -> bool {
         let increases = matches!(&self.time, Clock::Column(time) if time.scale > 0.0);
         increases && self.filter.is_none() && self.split.is_none()
@@ -219,7 +219,10 @@ fn factor(sheet: &Sheet, i: usize, role: Role, source: &Source) -> Result<f64> {
     let name = &sheet.names[i];
     if let Some(unit) = &sheet.units[i] {
         return of(unit).map_err(|_| {
-            let what = format!("column {name} is in {}, by its file; {key} is wanted in {wanted}", shown(unit));
+            let what = format!(
+                "column {name} is in {} in the file; {key} requires a unit convertible to {wanted}",
+                shown(unit)
+            );
             let error = sheet.heading_error(i, what).allowed(format!("{wanted}, or a unit convertible to it"));
             error.next(match quantity::parse(&format!("1 {unit}")) {
                 Ok(_) => format!("name another column, or say that this one is not in {unit}: {}", say(wanted)),

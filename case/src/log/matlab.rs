@@ -37,7 +37,7 @@ const SAVE: &str = "save it again, in MATLAB with save('log.mat', '-v7'), in Pyt
 const MATRIX: u32 = 14;
 const COMPRESSED: u32 = 15;
 
-/// Whether a file is one of MATLAB's, by how it begins or, where that says nothing, by its name.
+/// True if a file is one of MATLAB's, by how it begins or, where that says nothing, by its name.
 pub(super) fn is_matlab(file: &Path, beginning: &[u8]) -> bool {
     let binary = beginning.contains(&0);
     let named = file.extension().is_some_and(|e| e.eq_ignore_ascii_case("mat"));

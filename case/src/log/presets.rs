@@ -5,7 +5,7 @@
 /// A recorder whose files are known.
 #[derive(Debug, PartialEq)]
 pub struct Preset {
-    /// As in the case file.
+    /// Its name in the case file.
     pub name: &'static str,
     /// For people.
     pub title: &'static str,
@@ -16,9 +16,9 @@ pub struct Preset {
     pub columns: &'static [(&'static str, &'static [&'static str], In)],
     /// Lines that end the numbers.
     pub ends: &'static [End],
-    /// Whether rows of what is known of the columns stand between their names and the numbers.
+    /// True if rows of what is known of the columns stand between their names and the numbers.
     pub has_metadata: bool,
-    /// Whether a packed file holds messages, as Klipper's does.
+    /// True if a packed file holds messages, as Klipper's does.
     pub is_messages: bool,
     /// Where all of it is defined.
     pub source: &'static str,
@@ -29,7 +29,7 @@ pub struct Preset {
 pub struct End {
     /// The line.
     pub line: &'static str,
-    /// Whether something was lost.
+    /// True if something was lost.
     pub is_loss: bool,
 }
 
@@ -55,7 +55,7 @@ pub enum In {
     MotorSteps,
 }
 
-/// Those that there are.
+/// All presets.
 pub const PRESETS: &[Preset] = &[
     Preset {
         name: "reprapfirmware",
@@ -157,7 +157,7 @@ pub(super) fn found(names: &[&str], there: &[String]) -> Option<String> {
     names.iter().find_map(|name| there.iter().find(|there| matches(name, there))).cloned()
 }
 
-/// Whether a name is as a pattern says, with at most one `*` in it.
+/// True if a name is as a pattern says, with at most one `*` in it.
 fn matches(pattern: &str, name: &str) -> bool {
     match pattern.split_once('*') {
         None => pattern == name,

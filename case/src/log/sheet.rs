@@ -48,7 +48,7 @@ impl From<&str> for ColumnId {
 pub struct Dialect {
     /// The separator of the columns; found out where it is not said. A space stands for any number of blanks.
     pub separator: Option<char>,
-    /// Whether numbers have decimal commas.
+    /// True if numbers have decimal commas.
     pub decimal_comma: bool,
 }
 
@@ -59,7 +59,7 @@ pub struct Filter {
     pub column: ColumnId,
     /// The values; as text, numbers as they are written.
     pub values: Vec<String>,
-    /// Whether rows with one of the values are kept, or all others.
+    /// True if rows with one of the values are kept, or all others.
     pub keep: bool,
 }
 
@@ -69,7 +69,7 @@ impl Filter {
     }
 }
 
-/// Whether two texts are the same, as numbers if they are such.
+/// True if two texts are the same, as numbers if they are such.
 fn same(a: &str, b: &str) -> bool {
     match (a.parse::<f64>(), b.parse::<f64>()) {
         (Ok(a), Ok(b)) => a == b,
@@ -83,9 +83,9 @@ pub(super) struct Request<'a> {
     pub columns: &'a [ColumnId],
     /// How many of them, from the first on, must have a value in every row.
     pub complete: usize,
-    /// Whether the first column has to increase: rows behind the first one that breaks this may then be missing.
+    /// True if the first column has to increase: rows behind the first one that breaks this may then be missing.
     pub ordered: bool,
-    /// Whether a row under the header may name the units.
+    /// True if a row under the header may name the units.
     pub units_row: bool,
     pub dialect: Dialect,
     pub filter: Option<&'a Filter>,
@@ -121,7 +121,7 @@ impl<'a> Request<'a> {
 #[derive(Debug, Default)]
 pub(super) struct Sheet {
     pub file: PathBuf,
-    /// Whether a row is a line in messages: a line of a text file has a text to show.
+    /// True if a row is a line in messages: a line of a text file has a text to show.
     pub is_text: bool,
     /// The names of the wanted columns.
     pub names: Vec<String>,

@@ -15,19 +15,19 @@ pub struct Paper {
     pub common: Common,
 }
 
-/// Open a page in the browser where the axis is alive: seen, dragged, compared.
+/// Open an interactive view of the axis in the browser.
 ///
-/// Serves this computer alone, until Ctrl-C ends it. The first line printed is the address of the page, with the token
-/// that lets a browser in.
+/// Serves this computer only, until Ctrl-C ends it. The first line printed is the address of the page, with the token
+/// that a browser needs.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Examples:\n  taut studio\n  taut studio axis.toml\n  taut studio axis.toml --port 8080 --no-open"
 )]
 pub struct Studio {
-    /// The case file, which the page can save; or a link that a studio gave
+    /// The case file, which the page can save, or a link copied from the studio
     #[arg(value_name = "CASE|LINK")]
     pub case: Option<String>,
-    /// Port of the server; a free one if not said
+    /// Port of the server [default: a free one]
     #[arg(long, value_name = "N")]
     pub port: Option<u16>,
     /// Do not open a browser
@@ -39,7 +39,7 @@ pub struct Studio {
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  taut schema\n  taut schema case > taut-case.schema.json")]
 pub struct Schema {
-    /// Which one; without a name they are listed
+    /// Name of the schema; without one, all are listed
     pub name: Option<String>,
 }
 
@@ -56,15 +56,14 @@ pub struct Completions {
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  taut man | man -l -\n  taut man --out ~/.local/share/man/man1")]
 pub struct Man {
-    /// The folder for one page for each command; it is made if it is not there
+    /// Folder for one page per command; created if missing
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
 }
 
 /// Write a commented case file to start from.
 ///
-/// The file describes a complete machine and two experiments, and simulates as it stands; its remarks name what can be
-/// added.
+/// The file describes a complete machine and two experiments, and runs as it is; its comments name further keys.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Examples:\n  taut init axis.toml\n  taut init --template stage stage.toml\n  taut init --kind core-xy gantry.toml"
@@ -75,7 +74,7 @@ pub struct Init {
     /// Kind of machine
     #[arg(long, value_enum, default_value = "axis")]
     pub kind: KindName,
-    /// Start from data sheets: a machine of this sort, by the keys that data sheets have
+    /// Write a template with the values that data sheets have
     #[arg(long, value_enum, conflicts_with = "kind")]
     pub template: Option<TemplateName>,
     /// Replace the file if it exists
@@ -105,17 +104,20 @@ pub enum KindName {
     CoreXy,
 }
 
-/// Say what follows from the numbers of a case: masses, stiffness, frequencies, limits.
+/// Compute masses, stiffness, frequencies and limits from the numbers of a case, without a simulation.
 ///
-/// Prints the moved mass with all that turns as seen at the cart, the stiffness of the spans and how much the cart
-/// gives way per newton, natural frequencies with their damping along the travel, the voltage at which the axis breaks
-/// away, the largest force, acceleration and speed, and what is left of teeth and tension where the belt's type says
-/// what they bear. Nothing is simulated. With --out it writes show.json and a report.
+/// Prints the moved mass, the compliance of the belt at the cart, the lowest natural frequency, the breakaway voltage,
+/// the largest force, acceleration and speed, and the safety of teeth and tension for a known belt type. --verbose adds
+/// the contribution of each part, and stiffness, frequencies and damping along the travel. With --out it writes
+/// show.json and a report with everything.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = SHOW)]
 pub struct Show {
     /// The case file; - is standard input
     pub case: PathBuf,
+    /// Print every row, and how stiffness and resonances change along the travel
+    #[arg(long, conflicts_with = "quiet")]
+    pub verbose: bool,
     #[command(flatten)]
     pub common: Common,
 }

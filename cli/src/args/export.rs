@@ -5,11 +5,11 @@ use crate::command::Common;
 use clap::ValueEnum;
 use std::path::PathBuf;
 
-/// Take a machine, or its controller, to other tools: FMU, C, Structured Text, MATLAB, Python, JSON.
+/// Export a machine or controller: FMU, C, Structured Text, MATLAB, Python, JSON.
 ///
-/// Without a name it lists what there is. A path in --out that ends as the target's files do names the file, and the
-/// others of the target stand beside it under the same name; any other path is a folder, and the files in it are called
-/// after the case. Without --out it says what would be written.
+/// Without a target it lists all targets. A path in --out with the ending of the target's files names the file, and
+/// further files are written beside it under the same name; any other path is a folder, whose files have the name of
+/// the case. Without --out it lists the files that it would write.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = EXPORT, mut_arg("out", |out| out.value_name("PATH").help(
     "The file to write, or the folder for it and for those that belong to it"
@@ -24,16 +24,16 @@ pub struct Export {
         ("target", "json"),
     ]))]
     pub case: Option<PathBuf>,
-    /// Which part of the case [default: st: controller; fmu: plant; else both where the case has a controller]
+    /// Part of the case to export [default: st: controller; fmu: plant; else both where the case has a controller]
     #[arg(long, value_enum)]
     pub part: Option<PartName>,
-    /// Of c: the numbers that it computes in [default: double]
+    /// C only: floating-point type [default: double]
     #[arg(long, value_enum)]
     pub real: Option<RealName>,
-    /// Of c, matlab and python: the step of the plant [default: 1 ms]
+    /// C, MATLAB and Python only: time step of the plant [default: 1 ms]
     #[arg(long, value_name = "TIME", value_parser = seconds)]
     pub step: Option<f64>,
-    /// Of fmu: the version of the standard [default: 3]
+    /// FMU only: version of FMI [default: 3]
     #[arg(long, value_name = "VERSION", value_parser = clap::value_parser!(u8).range(2..=3))]
     pub fmi: Option<u8>,
     #[command(flatten)]
@@ -53,15 +53,15 @@ Examples:
 pub enum TargetName {
     /// A functional mock-up unit: one file for any tool that imports FMI
     Fmu,
-    /// Two files of C99 with nothing below them: plant and controller
+    /// Two files of C99 without dependencies: plant and controller
     C,
     /// The controller as function blocks of IEC 61131-3
     St,
     /// Functions and a MAT-file for MATLAB and Octave
     Matlab,
-    /// A script on NumPy, SciPy and python-control
+    /// A script with NumPy, SciPy and python-control
     Python,
-    /// All about the model as data
+    /// The whole model as data
     Json,
 }
 

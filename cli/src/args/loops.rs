@@ -10,11 +10,12 @@ use std::path::PathBuf;
 use taut::control::recommendation::Damping;
 use taut::control::shaper::Firmware;
 
-/// Find gains and filters for the controller in a case, good for the machines that it may meet
+/// Find gains and filters for the controller of a case that hold over a family of machines
 ///
-/// Makes settling, cart error and current of the moves small, at worst over a family of machines (parameters off,
-/// loads, places), while the sampled loop keeps its limits of sensitivity there. Says in its first line whether the
-/// moves became better or worse. Prints gains, margins, moves and limit cycles before and after.
+/// Minimises settling time, cart error and current of the moves in the worst case over a family of machines (other
+/// parameters, loads, positions), within limits on the sensitivity of the sampled loop. The first line is the verdict:
+/// better, unchanged or worse. Prints gains and worst margins before and after; --verbose adds all margins, moves,
+/// machines and limit cycles.
 #[derive(Debug, clap::Args)]
 #[command(after_help = TUNE, mut_arg("out", |out| out.value_name("FILE or DIR").help(
     "The case file to write (ends in .toml), or the folder for it, a summary, a report and plots"
@@ -31,18 +32,21 @@ pub struct Tune {
     /// Judge the gains of the file without a search
     #[arg(long, conflicts_with_all = ["in_place", "out"])]
     pub evaluate: bool,
-    /// Let all parameters be at their worst ends at once, and leave no axis out
+    /// Add all combinations of extreme parameters, and exclude no machine from the worst case
     #[arg(long)]
     pub corners: bool,
-    /// Let each parameter of the axis be off by this share, whatever the file says: 20%
+    /// Relative uncertainty of each parameter, in place of the file's, such as 20%
     #[arg(long, value_name = "SHARE", value_parser = share)]
     pub spread: Option<f64>,
-    /// Take the machines from the draws of `taut fit --posterior`, whatever the file says of how far they are off
+    /// Take the machines from the draws of `taut fit --posterior`
     #[arg(long, value_name = "FILE", conflicts_with = "spread")]
     pub draws: Option<PathBuf>,
-    /// Let the search take so many times as long: the gains it finds get better by some per cent
+    /// Multiply the search budget by this factor; improves the gains by some per cent
     #[arg(long, value_name = "FACTOR", default_value = "1", value_parser = effort, conflicts_with = "evaluate")]
     pub effort: f64,
+    /// Print all margins, each move, the choices, the axes and the limit cycles, too
+    #[arg(long, conflicts_with = "quiet")]
+    pub verbose: bool,
     #[command(flatten)]
     pub common: Common,
 }
@@ -54,15 +58,15 @@ Examples:
   taut tune axis.toml --set tune.cost=none --set tune.bandwidth=8Hz
   taut tune axis.toml --evaluate --json | jq .before.objective
 
-Exit status 1: a move became worse than with the gains of the file (the limits may force that), or the limits
-do not hold. Ctrl-C ends a search early with the best gains so far, with exit status 130.";
+Exit status 1: a move is worse than with the gains of the file (the limits may force that), or the limits do
+not hold. Ctrl-C ends a search early with the best gains so far, with exit status 130.";
 
 /// Plan the fastest moves that the machine can make.
 ///
-/// Finds for each move of a case the speed, acceleration, jerk and snap with which its cart stays in its window soonest,
-/// at worst over the family of machines of `taut tune`, while voltage, current, span tension and teeth keep their
-/// limits. Jerk times are tried on the zeros of the belt's modes. Prints the planned limits beside the file's, and the
-/// least time of the axis as one mass. With --out FILE.toml it writes the case with them.
+/// Finds for each move of a case the speed, acceleration, jerk and snap with which the cart stays in its window
+/// soonest, on the slowest of the family of machines of `taut tune`, within the limits of voltage, current, span
+/// tension and teeth. Jerk times are multiples of the periods of the belt's modes. Prints the planned limits beside the
+/// file's, and the least time of the axis as one mass. With --out FILE.toml it writes the case with the planned limits.
 #[derive(Debug, clap::Args)]
 #[command(after_help = PLAN, mut_arg("out", |out| out.value_name("FILE or DIR").help(
     "The case file to write (ends in .toml), or the folder for it, a summary, a report and plots"
@@ -70,19 +74,19 @@ do not hold. Ctrl-C ends a search early with the best gains so far, with exit st
 pub struct Plan {
     /// The case file; - is standard input
     pub case: PathBuf,
-    /// Plan only the move of this name, as often as needed
+    /// Plan only the move of this name; may be repeated
     #[arg(long = "move", value_name = "NAME")]
     pub moves: Vec<String>,
-    /// Most speed, besides what the machine allows: "0.5 m/s"
+    /// Largest speed, in addition to the limits of the machine: "0.5 m/s"
     #[arg(long, value_name = "SPEED", value_parser = speed)]
     pub speed: Option<f64>,
-    /// Most acceleration: "20 m/s^2"
+    /// Largest acceleration: "20 m/s^2"
     #[arg(long, value_name = "ACCELERATION", value_parser = acceleration)]
     pub acceleration: Option<f64>,
-    /// Most jerk: "500 m/s^3"
+    /// Largest jerk: "500 m/s^3"
     #[arg(long, value_name = "JERK", value_parser = jerk)]
     pub jerk: Option<f64>,
-    /// Share of voltage and current that is left to the loop
+    /// Share of voltage and current reserved for the control loop
     #[arg(long, value_name = "SHARE", default_value = "10%", value_parser = reserve)]
     pub reserve: f64,
     #[command(flatten)]
@@ -101,19 +105,19 @@ Exit status 1: a move has no plan, or its cart does not stay in its window.";
 ///
 /// Takes a spectrum (Klipper's resonances_*.csv, calibration_data_*.csv), raw accelerometer samples (raw_data_*.csv),
 /// or a case file, whose resonances along the travel are computed. Prints for each shaper the best frequency, the
-/// vibration that remains, smoothing and the greatest acceleration, which one to take, and the lines for Klipper's
+/// remaining vibration, the smoothing and the largest acceleration, then the recommended shaper as lines for Klipper's
 /// configuration. A second spectrum is compared with the first; with --together one shaper is chosen for all.
 #[derive(Debug, clap::Args)]
 #[command(after_help = SHAPE)]
 pub struct Shape {
     /// A spectrum, accelerometer samples, or a case file (.toml)
     pub spectrum: PathBuf,
-    /// Another one to compare: the other belt, or after a change; with --together any number
+    /// A second spectrum to compare with; with --together any number
     pub others: Vec<PathBuf>,
-    /// One shaper for all of the spectra: of each the one counts of which most remains
+    /// Choose one shaper for all spectra, by the largest remaining vibration
     #[arg(long)]
     pub together: bool,
-    /// Whose definitions of shapers, and whose rule to choose one [default: klipper, as it is since 2026-03]
+    /// Firmware whose shapers and selection rule are used [default: klipper, as of 2026-03]
     #[arg(long, value_enum, default_value_t, hide_default_value = true)]
     pub firmware: FirmwareName,
     /// Axis of the accelerometer [default: the sum of x, y and z]
@@ -123,55 +127,54 @@ pub struct Shape {
     /// the model's]
     #[arg(long, value_name = "RATIO", value_parser = damping)]
     pub damping: Option<Damping>,
-    /// Most smoothing that is allowed, such as "0.1 mm" [default: any]
+    /// Largest smoothing, such as "0.1 mm" [default: any]
     #[arg(long, value_name = "LENGTH", value_parser = smoothing)]
     pub max_smoothing: Option<f64>,
-    /// Most vibration that is wanted, in per cent of that without a shaper; a quieter shaper is then taken although it
-    /// smooths more
+    /// Largest vibration, in per cent of that without a shaper; a longer shaper is chosen if necessary
     #[arg(long, value_name = "PERCENT", value_parser = vibrations)]
     pub max_vibrations: Option<f64>,
-    /// Speed at right-angled corners, of which smoothing is computed [default: "5 mm/s"]
+    /// Speed at right-angled corners, for the smoothing [default: "5 mm/s"]
     #[arg(long, value_name = "SPEED", value_parser = corner_speed)]
     pub corner_speed: Option<f64>,
     /// Shapers to choose from, separated by commas: zv, mzv, zvd, ei, 2hump_ei, 3hump_ei, mzv(n=4,t=0.9), ei(v_tol=0.1)
     /// [default: all but zvd]
     #[arg(long, value_name = "NAMES", value_parser = shapers)]
     pub shapers: Option<Shapers>,
-    /// Look at pairs of shapers, too, one behind the other: for two modes, or for a mode that moves far along the travel
+    /// Also try pairs of shapers in series: for two modes, or for a mode that varies along the travel
     #[arg(long)]
     pub pairs: bool,
-    /// Of a case file: by which part its frequencies may be wrong [default: 0.1]
+    /// Case files only: relative uncertainty of the frequencies [default: 0.1]
     #[arg(long, value_name = "PART", value_parser = uncertainty)]
     pub uncertainty: Option<f64>,
-    /// Of a case file: what the motor does [default: held]
+    /// Case files only: state of the motor [default: held]
     #[arg(long, value_enum)]
     pub motor: Option<MotorName>,
     #[command(flatten)]
     pub common: Common,
 }
 
-/// Say how a machine swings: poles, zeros, frequency response, resonances.
+/// Vibration analysis: poles, zeros, frequency response, resonances.
 ///
-/// Linearises the machine of a case while everything slides, and prints its poles with frequency and damping, the
-/// shapes of its rigid and elastic modes, the gain and the zeros of each output from each drive, and the resonances
-/// along the travel of an axis or over the working area of a gantry; with --sample-time also its discrete-time model.
-/// With --out it also writes modes.json with the matrices, frequency-response.csv, map.csv (a gantry whose spans
-/// follow bridge and cart), and a report with Bode diagrams, maps, and poles and zeros.
+/// Linearises the machine of a case while everything slides, and prints poles with frequency and damping, rigid and
+/// elastic modes, gain and zeros from each drive to each output, and the resonances along the travel of an axis or over
+/// the working area of a gantry; with --sample-time also the discrete-time model. With --out it also writes modes.json
+/// with the matrices, frequency-response.csv, map.csv (a gantry whose spans follow bridge and cart), and a report with
+/// Bode diagrams, maps, and poles and zeros.
 #[derive(Debug, clap::Args)]
 #[command(after_help = MODES)]
 pub struct Modes {
     /// The case file; - is standard input
     pub case: PathBuf,
-    /// Where the cart is; matters to spans that follow it and to friction along the travel [default: 0 m]
+    /// Position of the cart, for spans that follow it and friction along the travel [default: 0 m]
     #[arg(long, value_name = "POSITION", value_parser = metres, allow_hyphen_values = true)]
     pub at: Option<f64>,
     /// Speed of the cart at which everything slides; 0 is at rest, below 0 backward [default: 0.1 m/s]
     #[arg(long, value_name = "SPEED", value_parser = metres_per_second, allow_hyphen_values = true)]
     pub speed: Option<f64>,
-    /// Where the bridge of a gantry is [default: 0 m]
+    /// Position of the bridge of a gantry [default: 0 m]
     #[arg(long, value_name = "POSITION", value_parser = metres, allow_hyphen_values = true)]
     pub bridge: Option<f64>,
-    /// Bodies that stick and are held where they are, separated by commas: drive, cart or idler; left, right, bridge
+    /// Bodies that stick, separated by commas: drive, cart or idler; left, right, bridge
     /// or cart of a gantry
     #[arg(long, value_delimiter = ',', value_name = "BODY")]
     pub stuck: Vec<String>,
@@ -181,7 +184,7 @@ pub struct Modes {
     /// Input between samples [default: zero]
     #[arg(long, value_enum, requires = "sample_time")]
     pub hold: Option<HoldName>,
-    /// By how much the input is late, computing time for one [default: 0 s]
+    /// Input delay, such as computing time [default: 0 s]
     #[arg(long, value_name = "TIME", value_parser = delay, requires = "sample_time")]
     pub delay: Option<f64>,
     /// Lowest frequency of the response, in Hz [default: below the slowest pole or zero]
@@ -206,7 +209,7 @@ Examples:
 /// Whose shapers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
 pub enum FirmwareName {
-    /// Klipper as it is since 2026-03: shapers of 2025-09, choice of 2025-10, parameters of mzv and ei
+    /// Klipper as of 2026-03: shapers of 2025-09, choice of 2025-10, parameters of mzv and ei
     #[default]
     Klipper,
     /// Klipper until 2025-08
@@ -237,9 +240,9 @@ pub enum AxisName {
 /// State of the motor while the cart vibrates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum MotorName {
-    /// It follows its command, as a stepper motor or a stiff position loop makes it
+    /// Follows its command, as with a stepper motor or a stiff position loop
     Held,
-    /// It is free, as with a commanded voltage or current
+    /// Free, as with a commanded voltage or current
     Free,
 }
 
@@ -254,11 +257,11 @@ Examples:
 /// Input between samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
 pub enum HoldName {
-    /// It stands: what a converter puts out
+    /// Zero-order hold, as of a converter
     #[default]
     Zero,
-    /// It goes straight from sample to sample
+    /// First-order hold: straight from sample to sample
     First,
-    /// The bilinear rule, an approximation
+    /// Tustin's bilinear rule, an approximation
     Tustin,
 }

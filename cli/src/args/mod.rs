@@ -27,8 +27,7 @@ Start with:
   taut simulate axis.toml --out results
   taut studio axis.toml
 
-Exit status: 0 done, 1 the work could not be done or its result is not to be relied on,
-2 the input was wrong, 130 ended by Ctrl-C.";
+Exit status: 0 success, 1 failure or unreliable result, 2 invalid input, 130 ended by Ctrl-C.";
 
 #[derive(Debug, Subcommand)]
 pub enum Command {
@@ -54,7 +53,7 @@ pub enum Command {
 }
 
 impl Command {
-    /// Whether the result, and an error, is wanted as JSON.
+    /// True if the result, and an error, is wanted as JSON.
     pub fn json(&self) -> bool {
         match self {
             Self::Paper(args) => args.common.json,

@@ -20,19 +20,19 @@ pub struct Simulate {
     /// The case file; - is standard input. Several are run one after the other, each into a folder of its own name in --out
     #[arg(required = true)]
     pub cases: Vec<PathBuf>,
-    /// Run only the experiment of this name, as often as needed
+    /// Run only the experiment of this name; may be repeated
     #[arg(long = "experiment", value_name = "NAME")]
     pub experiments: Vec<String>,
-    /// How the equations are solved [default: exact, or general where the stage needs it]
+    /// Solver [default: exact, or general if the machine needs it]
     #[arg(long, value_enum)]
     pub solver: Option<SolverName>,
-    /// About what positions are off by with --solver general, m [default: 1e-9]
+    /// Position tolerance of --solver general, m [default: 1e-9]
     #[arg(long, value_name = "NUMBER")]
     pub tolerance: Option<f64>,
     /// Step of --solver table3 [default: 0.1 ms]
     #[arg(long, value_name = "TIME", value_parser = step)]
     pub step: Option<f64>,
-    /// Formula of --solver table3 [default: rk4]
+    /// Integration formula of --solver table3 [default: rk4]
     #[arg(long, value_enum)]
     pub method: Option<MethodName>,
     /// Formats of the quantities over time, separated by commas
@@ -41,10 +41,10 @@ pub struct Simulate {
     /// Also write each run as a recorder logs it: [encoder] and [measurement] of the case
     #[arg(long, requires = "out")]
     pub as_measured: bool,
-    /// Also run machines drawn by `taut fit --posterior`, and write the band that 95 % of them stay in
+    /// Also run machines drawn by `taut fit --posterior`, and write the 95 % band of their motion
     #[arg(long, value_name = "FILE")]
     pub draws: Option<PathBuf>,
-    /// How many of them to run
+    /// Number of drawn machines to run
     #[arg(long, value_name = "N", default_value_t = 200, requires = "draws", value_parser = count)]
     pub machines: usize,
     #[command(flatten)]
@@ -60,24 +60,24 @@ Examples:
   taut simulate axis.toml --as-measured --out results
   taut simulate axis.toml --solver table3 --step 1ms --out as-printed
 
-Ctrl-C ends a run early: what was computed until then is written and reported, with exit status 130.";
+Ctrl-C ends a run early: the results so far are written and reported, with exit status 130.";
 
 /// Run the moves of a case in closed loop: the controller sampled, the axis exact.
 ///
-/// Prints for each move how far the drive pulley and the cart are from where the cart should be, when the cart settles,
-/// by how much it overshoots, and what belt and motor take. With --out it also writes, for each move, every quantity
-/// over time and the controller's samples as CSV, the events and the plots, and for all of them a report and a summary
-/// as JSON. With several cases it prints one table for each move, to compare controllers.
+/// Prints for each move the errors of cart and drive pulley, settling time, overshoot, and the load on belt and motor.
+/// With --out it also writes, for each move, every quantity over time and the controller's samples as CSV, the events
+/// and the plots, and for all of them a report and a summary as JSON. With several cases it prints one table for each
+/// move, to compare controllers.
 #[derive(Debug, clap::Args)]
 #[command(after_help = MOVE)]
 pub struct Move {
     /// The case file; several to compare them
     #[arg(required = true)]
     pub case: Vec<PathBuf>,
-    /// Run only the move of this name, as often as needed
+    /// Run only the move of this name; may be repeated
     #[arg(long = "move", value_name = "NAME")]
     pub moves: Vec<String>,
-    /// Also run with each parameter of the axis wrong by this share, the controller knowing nothing of it: 20%
+    /// Also run with each parameter of the axis off by this share, unknown to the controller: 20%
     #[arg(long, value_name = "SHARE", value_parser = share)]
     pub spread: Option<f64>,
     /// Also print feed-forward gains for WPILib, LinuxCNC, ODrive and Beckhoff, from the model
@@ -95,9 +95,9 @@ Examples:
 
 /// Run a case many times with its parameters varied.
 ///
-/// Prints how each key figure is spread and which parameters it depends on. With --out FILE it writes a row for each
-/// run, as Parquet (units in its metadata) or CSV; with --out DIR also a summary, a report and plots. The same command
-/// resumes an interrupted or killed one. Rows are the same, bit for bit, on any number of threads.
+/// Prints the distribution of each key figure and the parameters that it depends on. With --out FILE it writes a row
+/// for each run, as Parquet (units in its metadata) or CSV; with --out DIR also a summary, a report and plots. The same
+/// command resumes an interrupted or killed one. Rows are the same, bit for bit, on any number of threads.
 #[derive(Debug, clap::Args)]
 #[command(after_help = SWEEP, mut_arg("out", |out| out.value_name("FILE or DIR").help(
     "The file of the rows (ends in .parquet or .csv), or the folder for it, a summary, a report and plots"
@@ -105,22 +105,22 @@ Examples:
 pub struct Sweep {
     /// The case file; - is standard input
     pub case: PathBuf,
-    /// How many machines to run
+    /// Number of machines to run
     #[arg(long, value_name = "N")]
     pub runs: Option<String>,
-    /// How a parameter varies, as often as needed; `all` is every number of the machine that is not zero
+    /// Distribution of a parameter; may be repeated; `all` is every number of the machine that is not zero
     #[arg(long, value_name = "KEY=HOW")]
     pub vary: Vec<String>,
-    /// How machines are chosen: random, latin-hypercube, sobol, grid or one-at-a-time [default: random]
+    /// Design of the runs: random, latin-hypercube, sobol, grid or one-at-a-time [default: random]
     #[arg(long, value_name = "DESIGN")]
     pub design: Option<String>,
-    /// Which draws: a whole number from 0 to 9223372036854775807 [default: 1]
+    /// Seed of the random numbers, from 0 to 9223372036854775807 [default: 1]
     #[arg(long, value_name = "NUMBER")]
     pub seed: Option<u64>,
     /// Also compute Sobol' indices: N (k + 2) runs for k parameters
     #[arg(long)]
     pub indices: bool,
-    /// Figures to tell, by the names of their columns, separated by commas: others are not sought [default: all]
+    /// Figures to compute, by the names of their columns, separated by commas [default: all]
     #[arg(long, value_name = "A,B,...", value_delimiter = ',')]
     pub figures: Vec<String>,
     /// Interval between the rows of --trajectories; figures do not depend on it [default: the experiment's]
@@ -129,7 +129,7 @@ pub struct Sweep {
     /// Also write every quantity over time of every run
     #[arg(long, requires = "out")]
     pub trajectories: bool,
-    /// How many threads [default: as many as there are processors]
+    /// Number of threads [default: number of processors]
     #[arg(long, value_name = "T", value_parser = count)]
     pub threads: Option<usize>,
     #[command(flatten)]
@@ -146,16 +146,16 @@ Examples:
   taut sweep fit/fitted.toml --runs 1000 --set sweep.from=uncertainty
 
 HOW is a share such as 20%, uniform(LEAST, MOST), normal(MEAN, DEVIATION), log-normal(MEDIAN, DEVIATION), values(A, B, ...),
-grid(FROM, TO, COUNT) or factors(A, B, ...). What is varied can stand in the case instead, as [sweep].
+grid(FROM, TO, COUNT) or factors(A, B, ...). The case can contain distributions instead, in [sweep].
 
-Ctrl-C keeps what is done, with exit status 130; the same command then goes on.";
+Ctrl-C keeps the finished runs, with exit status 130; the same command then continues.";
 
 /// How the equations are solved.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum SolverName {
     /// Exact to rounding: stick, slip and matrix exponentials
     Exact,
-    /// Collocation with steps by the error: any friction law, spans that follow the cart
+    /// Adaptive collocation: any friction law, spans that follow the cart
     General,
     /// The friction function of the paper's Table 3 with a fixed step, to reproduce the paper
     Table3,
@@ -174,7 +174,7 @@ pub enum MethodName {
 /// A format of the quantities over time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Format {
-    /// Text, with every digit that matters
+    /// Text with full precision
     Csv,
     /// Columns of doubles with their units
     #[cfg(feature = "parquet")]
@@ -182,12 +182,12 @@ pub enum Format {
 }
 
 impl Simulate {
-    /// The solver that is asked for, or else the one for this stage.
+    /// The requested solver, or else the one that the machine needs.
     pub fn solver(&self, machine: &Machine) -> taut::Result<Solver> {
         self.choice().solver(machine)
     }
 
-    /// The solver that is asked for, with its settings.
+    /// The requested solver, with its settings.
     pub fn choice(&self) -> Choice {
         let kind = |name: SolverName| match name {
             SolverName::Exact => SolverKind::Exact,

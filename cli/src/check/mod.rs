@@ -53,7 +53,7 @@ fn watched(case: &Case, plan: &Plan, quiet: bool) -> Result<Check, Failure> {
 
 fn text(case: &Case, found: &Check) -> String {
     let mut text = format!("{}\n", bold(&case.title));
-    let _ = write!(text, "\n{}\n", bold("What the logs show"));
+    let _ = write!(text, "\n{}\n", bold("Logs"));
     for log in &found.logs {
         text.push_str(&shown(log, found.logs.len() <= MOST_WHOLE));
     }
@@ -65,7 +65,7 @@ fn text(case: &Case, found: &Check) -> String {
         let left = 100.0 * found.unexplained;
         let _ = writeln!(
             text,
-            "  {} equations, of whose torque {left:.1} % is left: {}; a first guess, not a fit",
+            "  {} equations with a residual torque of {left:.1} %: {}; a first estimate, not a fit",
             found.equations,
             found.words()
         );
@@ -74,7 +74,7 @@ fn text(case: &Case, found: &Check) -> String {
     for finding in found.fit.findings.iter().filter(own) {
         let _ = write!(text, "\n{finding}\n");
     }
-    let _ = write!(text, "\n{}\n", bold("How well each parameter would be known, all others free"));
+    let _ = write!(text, "\n{}\n", bold("Accuracy of each parameter, all others free"));
     let wide = found.fit.estimates.iter().map(|estimate| estimate.name.chars().count()).max().unwrap_or(0);
     for (name, error) in shares(found) {
         let _ = writeln!(text, "  {name:<wide$}  {error}");
@@ -85,9 +85,9 @@ fn text(case: &Case, found: &Check) -> String {
     }
     let _ = writeln!(text, "  {}", found.noise_words);
     text.push_str(match &found.identifiability {
-        Some(known) if known.complete() => "\neverything that is searched for is determined\n",
+        Some(known) if known.complete() => "\nall free parameters are determined\n",
         Some(_) => "",
-        None => "\neverything that is searched for ended at a bound: there is no sensitivity to tell\n",
+        None => "\nall free parameters ended at a bound: their sensitivity is unknown\n",
     });
     for (group, choices) in found.groups() {
         let _ = write!(text, "\n{}\n  {}\n", bold("Not determined"), group.words);
@@ -101,7 +101,7 @@ fn text(case: &Case, found: &Check) -> String {
         }
     }
     if !found.experiments.is_empty() {
-        let _ = write!(text, "\n{}\n", bold("What one more experiment would tell, by simulation, the best first"));
+        let _ = write!(text, "\n{}\n", bold("Most useful next experiments, by simulation"));
         for experiment in &found.experiments {
             let _ = writeln!(text, "  {}: {}", experiment.name, experiment.told);
         }

@@ -74,7 +74,7 @@ pub fn run(args: &Args) -> Outcome {
     finished.finish(common, folder)
 }
 
-/// Whether a warning keeps the result from being written.
+/// True if a warning keeps the result from being written.
 fn is_held_back(fit: &Fit, args: &Args) -> bool {
     fit.warnings().next().is_some() && !args.anyway
 }

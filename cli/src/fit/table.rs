@@ -38,8 +38,10 @@ pub fn text(case: &Case, found: &Found, took: Duration) -> String {
                 let _ = writeln!(text, "  - {choice}");
             }
         }
-        let _ =
-            writeln!(text, "  of the machines that meet the logs alike, fitted.toml is the nearest to the case file");
+        let _ = writeln!(
+            text,
+            "  among the machines that fit equally well, fitted.toml is the one nearest to the case file"
+        );
     }
     let names = crooked(&found.profiles);
     if !names.is_empty() {

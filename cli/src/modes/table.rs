@@ -49,7 +49,7 @@ pub fn text(analysis: &Analysis) -> String {
     text
 }
 
-/// What moves in each mode.
+/// Mode shapes and energies.
 fn shapes(text: &mut String, analysis: &Analysis, modes: &Natural) {
     let mechanism = analysis.case.machine.mechanism();
     let _ = write!(text, "\n{}\n", bold("Rigid modes"));

@@ -132,7 +132,7 @@ fn one<'a>(
         Some(share) => worst(&case.machine, design, motion, share, solver, &|| interrupt.signal().is_some())?,
         None => None,
     };
-    let trouble = trouble::trouble(machine, design, &run, motion.profile().target());
+    let trouble = trouble::trouble(machine, design, &run, motion);
     let shortfalls = motion.shortfalls(machine, design);
     Ok(Done { motion, run, curves, worst, trouble, shortfalls, files })
 }

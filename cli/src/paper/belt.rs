@@ -14,7 +14,7 @@ pub const MODULUS_2: f64 = 8.335e9;
 pub const PARTS: [(f64, f64); 2] = [(2.0 / 3.0, 6e6), (1.0 / 3.0, 50e9)];
 /// l₁ = l₂ and l₃ as printed, m (2.3.1).
 pub const PRINTED: (f64, f64) = (0.349, 0.787);
-/// The same as 13.75 in and 31 in, m.
+/// The span lengths as 13.75 in and 31 in, m.
 pub const INCHES: (f64, f64) = (0.34925, 0.7874);
 /// Belt width, m (2.2).
 pub const WIDTH: f64 = 9.53e-3;

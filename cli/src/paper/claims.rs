@@ -51,7 +51,7 @@ pub struct Check {
     pub unit: &'static str,
     /// When it holds.
     pub rule: Rule,
-    /// Whether the claim falls with it; otherwise it only earns a remark.
+    /// True if the claim falls with it; otherwise it only earns a remark.
     pub decides: bool,
 }
 
@@ -76,7 +76,7 @@ pub enum Rule {
 pub enum Verdict {
     /// Every number holds.
     Confirmed,
-    /// Those that decide hold, another does not.
+    /// The deciding checks hold, another one does not.
     WithRemark,
     /// One that decides does not hold.
     NotConfirmed,
@@ -85,7 +85,7 @@ pub enum Verdict {
 }
 
 impl Rule {
-    /// Whether `value` satisfies it; what is not a number satisfies nothing.
+    /// True if `value` satisfies it; what is not a number satisfies nothing.
     pub fn holds(self, value: f64) -> bool {
         match self {
             Rule::Near { expected, tolerance } => (value - expected).abs() <= tolerance,

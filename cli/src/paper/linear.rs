@@ -117,7 +117,7 @@ pub struct Linear {
     pub slow: [(f64, f64); 3],
     /// Largest real part among the poles of (7) as printed: Table 1 and Table 2, 1/s.
     pub printed_pole: [f64; 2],
-    /// The same with −b/M.
+    /// The pole with −b/M.
     pub corrected_pole: [f64; 2],
     /// r φ₁ at the end of the 5 V run with (7) as printed, Table 1, m.
     pub printed_end: f64,

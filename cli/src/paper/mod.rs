@@ -105,9 +105,9 @@ fn table(claims: &[Claim]) -> String {
         String::from("Sollmann & Jouaneh, Dynamic modelling of a single-axis belt-drive system (2011), recomputed\n\n");
     let width = claims.iter().map(|c| c.id.len()).max().unwrap_or(0);
     let groups = [
-        (Kind::Statement, "What the paper says"),
-        (Kind::Print, "What it prints"),
-        (Kind::Reading, "What a close reading adds"),
+        (Kind::Statement, "Statements of the paper"),
+        (Kind::Print, "Printed equations and values"),
+        (Kind::Reading, "Results of a close reading"),
         (Kind::Reference, "Independent solutions"),
     ];
     for (kind, heading) in groups {

@@ -20,18 +20,29 @@ pub fn page(f: &Findings, claims: &[Claim], plots: &[Plot]) -> Page {
     });
     let report = &mut Report { page: &mut page, f, claims, plots };
     report.summary();
-    report.parameters();
-    report.belt();
-    report.first_response();
-    report.one_at_a_time();
-    report.matching();
-    report.friction_models();
-    report.table3();
-    report.misprints();
-    report.all_claims();
-    report.method();
+    for (heading, content) in sections() {
+        report.page.begin_fold(heading);
+        content(report);
+        report.page.end_fold();
+    }
     page.footer(html! { "Computed by taut " (env!("CARGO_PKG_VERSION")) ", command " code { "taut paper" } ". This file needs no network." });
     page
+}
+
+/// The sections behind the summary, which are folded: the summary alone is read in ten minutes.
+fn sections<'a>() -> [(&'static str, fn(&mut Report<'a>)); 10] {
+    [
+        ("The stage and its parameters", Report::parameters),
+        ("Belt, pulleys and modes", Report::belt),
+        ("First response: Table 1", Report::first_response),
+        ("One parameter at a time", Report::one_at_a_time),
+        ("A linear set against two voltages", Report::matching),
+        ("Friction with a threshold", Report::friction_models),
+        ("Table 3 against the exact solution", Report::table3),
+        ("Misprints and inconsistencies", Report::misprints),
+        ("Every number and its rule", Report::all_claims),
+        ("How it was computed", Report::method),
+    ]
 }
 
 struct Report<'a> {
@@ -82,7 +93,8 @@ impl Report<'_> {
              Coulomb friction. Its equations are solved here exactly, and its statements are held against the result. Of "
             (all) " statements and printed items, " b { (confirmed) " are confirmed" } ", " (remark) " with a remark, " (not)
             " not, and " (open) " cannot be checked: mostly those that rest on the measured curves, which \
-             are not available as data."
+             are not available as data. With the results of a close reading and the independent numbers there are "
+            (self.claims.len()) " claims, which " a href="#every-number" { "a section below" } " lists with every number."
         });
         page.markup(html! { dl {
             dt { "Friction first" }
@@ -109,12 +121,11 @@ impl Report<'_> {
                   and cart moves the motor by at most "
                  (um(f.identifiability.sharing.iter().flat_map(|s| s.difference).fold(0.0, f64::max), 2)) "." }
         } });
-        let mut table = Table::new("").column("The paper", "").column("Here", "").column("", "");
+        let mut table = Table::new("").column("The paper", "").column("Here", "");
         for claim in self.claims.iter().filter(|c| own.contains(&c.kind)) {
             table.row([
                 Cell::Markup(html! { (symbols(claim.statement)) br; small { (claim.source) } }),
-                Cell::Markup(symbols(&found(claim))),
-                badge(claim.verdict()).into(),
+                Cell::Markup(html! { (badge(claim.verdict())) br; (symbols(&found(claim))) }),
             ]);
         }
         page.table(&table);
@@ -123,7 +134,6 @@ impl Report<'_> {
     fn parameters(&mut self) {
         let f = self.f;
         let page = &mut *self.page;
-        page.section("The stage and its parameters");
         page.drawing(
             &machine_drawing(&f.sets.table1.machine),
             html! { b { "Figures 1 and 2. " } "The stage as it is modelled, with the values of Table 1. \
@@ -163,7 +173,6 @@ impl Report<'_> {
 
     fn belt(&mut self) {
         let f = self.f;
-        self.page.section("Belt, pulleys and modes");
         self.page.prose(format!(
             "Two thirds of neoprene and one third of fibreglass in parallel give a modulus of {}; the paper \
              prints 16.67 GPa. \
@@ -201,7 +210,6 @@ impl Report<'_> {
     }
 
     fn first_response(&mut self) {
-        self.page.section("First response: Table 1");
         self.page.prose(
             "The input is a pulse of 0.25 s, of 5 V or 10 V. Position and velocity are the motor's, \
              expressed in metres by the \
@@ -212,7 +220,6 @@ impl Report<'_> {
     }
 
     fn one_at_a_time(&mut self) {
-        self.page.section("One parameter at a time");
         self.page.prose(
             "Stiffness, inertia and friction are doubled and halved, one after the other. The paper does it \
              from Table 1; the second \
@@ -240,7 +247,6 @@ impl Report<'_> {
 
     fn matching(&mut self) {
         let m = &self.f.matched;
-        self.page.section("A linear set against two voltages");
         self.page.prose(format!(
             "A linear stage goes exactly twice as far for twice the voltage; here {} times. With the \
              friction of Table 4 it goes {} times as far. \
@@ -264,7 +270,6 @@ impl Report<'_> {
 
     fn friction_models(&mut self) {
         let f = self.f;
-        self.page.section("Friction with a threshold");
         self.figures(16..=17);
         self.figure("friction-laws");
         self.claim("stribeck-minor");
@@ -287,7 +292,6 @@ impl Report<'_> {
 
     fn table3(&mut self) {
         let f = self.f;
-        self.page.section("Table 3 against the exact solution");
         self.page.prose(format!(
             "Table 3 sets friction equal to the computed torque while the speed is within ±0.01 and the \
              torque within the Coulomb value. \
@@ -303,7 +307,6 @@ impl Report<'_> {
     }
 
     fn misprints(&mut self) {
-        self.page.section("Misprints and inconsistencies");
         for m in &MISPRINTS {
             self.page.subsection(&format!("{}. {}", m.number, m.title));
             self.page.prose(m.text);
@@ -328,14 +331,13 @@ impl Report<'_> {
     }
 
     fn all_claims(&mut self) {
-        self.page.section("Every number and its rule");
         self.page.prose(html! {
             "The verdict follows from the numbers by the rules beside them: a claim is confirmed if all \
              hold, confirmed with a remark if only \
              those marked “further” fail, and not confirmed otherwise. The same is in " code { "claims.json" } "."
         });
-        let mut table =
-            Table::new("").column("Claim and number", "").column("Value", "").column("Rule", "").column("", "");
+        self.page.markup(html! { span id="every-number" {} });
+        let mut table = Table::new("").column("Claim and number", "").column("Value", "").column("Rule", "");
         for claim in self.claims {
             for (i, check) in claim.checks.iter().enumerate() {
                 let holds = check.rule.holds(check.value);
@@ -348,8 +350,7 @@ impl Report<'_> {
                 table.row([
                     Cell::Markup(html! { @if i == 0 { b { code { (claim.id) } } br; } (symbols(&what)) }),
                     Cell::Number(value(check)),
-                    rule(check).into(),
-                    kind.badge(if holds { "holds" } else { "fails" }).into(),
+                    Cell::Markup(html! { (kind.badge(if holds { "holds" } else { "fails" })) " " (rule(check)) }),
                 ]);
             }
         }
@@ -361,7 +362,6 @@ impl Report<'_> {
         let golden = self.claims.iter().filter(|c| c.kind == Kind::Reference);
         let (right, all) =
             golden.fold((0, 0), |(right, all), c| (right + usize::from(c.verdict() == Verdict::Confirmed), all + 1));
-        self.page.section("How it was computed");
         self.page.prose(format!(
             "Friction makes the equations linear piece by piece: each body slides forward, slides backward \
              or is stuck. Within a piece the motion is \

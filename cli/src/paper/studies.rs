@@ -238,7 +238,7 @@ pub struct Sharing {
     pub name: &'static str,
     /// Largest difference in r φ₁ to Table 4 at 5 and 10 V, m.
     pub difference: [f64; 2],
-    /// The same after the two totals were adjusted so that both final positions agree, m.
+    /// Differences after both totals were adjusted so that the final positions agree, m.
     pub adjusted: [f64; 2],
     /// By how much the totals had to change, relative: viscous, Coulomb.
     pub adjustment: [f64; 2],
@@ -360,7 +360,7 @@ fn sharing(
 pub struct Matched {
     /// Table 2 over Table 4, final position, minus one: 5 V and 10 V.
     pub final_position: [f64; 2],
-    /// The same for the speed at 0.24 s.
+    /// Differences of the speed at 0.24 s.
     pub speed: [f64; 2],
     /// Final position at 10 V over that at 5 V: Table 2, Table 4.
     pub ratio: (f64, f64),

@@ -68,7 +68,7 @@ fn number(value: f64) -> Cell {
     Cell::Number(digits(value))
 }
 
-/// The same in grey, on the right.
+/// A number in grey, aligned to the right.
 fn taken_over(value: f64) -> Cell {
     Cell::Markup(maud::html! { div.num { small { (digits(value)) } } })
 }

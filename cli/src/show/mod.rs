@@ -19,7 +19,7 @@ pub fn run(args: &Args) -> Outcome {
     let folder = Folder::wanted(common, || folder::inputs(&args.case, &case.files), ["show.json", "report.html"])?;
     let advice = "add --out DIR for the same as data and a report";
     let json = ("show.json", json::text(&json::show(&overview)));
-    let mut finished = Finished::new("show", json, table::text(&overview), advice);
+    let mut finished = Finished::new("show", json, table::text(&overview, args.verbose), advice);
     let told = |(name, error): (&str, &taut::Error)| Remark::Note(format!("\"{name}\" is left out: {}", error.what));
     finished.remarks = case.left_out().into_iter().map(told).collect();
     if common.reports() {

@@ -11,21 +11,31 @@ const NAMES: usize = 42;
 /// Width of the column of values.
 const VALUES: usize = 16;
 
-/// The text on the terminal.
-pub fn text(overview: &Overview) -> String {
+/// The text on the terminal: the most important rows, or all of them.
+pub fn text(overview: &Overview, is_verbose: bool) -> String {
     let mut text = format!("{}\n", bold(&overview.title));
     for group in &overview.groups {
-        let _ = write!(text, "\n{}\n", bold(group.name));
-        for row in &group.rows {
+        let mut rows = group.rows.iter().filter(|row| is_verbose || row.is_main()).peekable();
+        if rows.peek().is_some() {
+            let _ = write!(text, "\n{}\n", bold(group.name));
+        }
+        for row in rows {
             let value = value(row);
             let line = format!("  {:<NAMES$}{value:<VALUES$}{}", row.name, typed(&row.how));
             let _ = writeln!(text, "{}", line.trim_end());
         }
     }
-    places(&mut text, overview);
+    if is_verbose {
+        places(&mut text, overview);
+    }
     text.push('\n');
     for note in &overview.notes {
         let _ = writeln!(text, "note: {}", typed(&note.text));
+    }
+    let hidden = overview.rows().filter(|row| !row.is_main()).count();
+    if !is_verbose && hidden > 0 {
+        let places = if overview.depends_on_place { ", and figures along the travel" } else { "" };
+        let _ = writeln!(text, "{hidden} more rows{places}: --verbose");
     }
     text
 }

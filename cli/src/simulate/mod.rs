@@ -169,7 +169,7 @@ fn machines(case: &Case, args: &Simulate, path: &Path) -> Result<Vec<Machine>> {
     Ok(band::chosen(taut::fit::machines(case, plan, file)?, args.machines))
 }
 
-/// Refuses to log what nobody measures, and what would not be the run.
+/// Rejects --as-measured without a recorder or with table3.
 fn measurable(case: &Case, solver: Solver, path: &Path) -> Result<()> {
     if case.machine.encoder.is_none() && case.measurement.is_none() {
         return Err(Error::new("--as-measured: this case does not say how it is measured").in_file(path).next(

@@ -43,7 +43,7 @@ struct Room {
     runs: u64,
     /// The file of the rows, bytes.
     file: f64,
-    /// The same with the parts, which stand until it is whole, bytes.
+    /// Size with the parts, which are kept until the file is complete, bytes.
     all: f64,
 }
 

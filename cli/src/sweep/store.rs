@@ -71,7 +71,7 @@ impl Store {
                 known.ok_or_else(|| Error::new("this manifest cannot be read").in_file(&path).next(remove(&folder)))?;
             manifest.chunk = known.chunk;
             if known != manifest || known.chunk == 0 {
-                return Err(Error::new("an unfinished sweep of another case, plan or version stands here")
+                return Err(Error::new("this folder has an unfinished sweep of another case, plan or version")
                     .in_file(&folder)
                     .next(format!("finish that one by its own command, name another --out, or {}", remove(&folder))));
             }

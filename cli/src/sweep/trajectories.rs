@@ -19,7 +19,7 @@ pub fn check(sweep: &Sweep) -> Result<()> {
         ))
         .in_file("--trajectories")
         .allowed(format!("up to {MOST} runs"))
-        .next("sweep for the metrics, then run again those machines that are worth a look"));
+        .next("sweep without --trajectories first, then repeat the interesting runs"));
     }
     match sweep.groups().iter().all(|group| group.is_move) {
         true => Err(Error::new("moves in closed loop have no trajectories here")

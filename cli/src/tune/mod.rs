@@ -19,7 +19,7 @@ use taut_report::tune::{Work, figures, hertz, page};
 /// Reads the case, tunes, writes, tells.
 pub fn run(args: &Args) -> Outcome {
     let common = &args.common;
-    let case = common.case_for(&args.case, Files::Nothing)?;
+    let case = common.open_for(&args.case, Files::Nothing)?;
     let tuning = tuning(args, &case);
     let target = target(args, &case)?;
     let (found, signal) = match args.evaluate {
@@ -50,7 +50,7 @@ pub fn run(args: &Args) -> Outcome {
     let text = tuned.case_text(&case, &args.case)?;
     let advice = if args.evaluate { "" } else { "add --out FILE.toml, --out DIR or --in-place" };
     let data = json::text(&json::tuned(&case, &tuning, &tuned));
-    let mut finished = Finished::new("tune", ("tune.json", data), table::text(&work), advice);
+    let mut finished = Finished::new("tune", ("tune.json", data), table::text(&work, args.verbose), advice);
     finished.remarks = remarks(&work);
     finished.status = match signal {
         Some(signal) => Status::Interrupted(signal),

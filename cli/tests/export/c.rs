@@ -1,6 +1,6 @@
 //! C: compilers, analysers, and the same numbers as taut's, on this machine and on a Cortex-M4F.
 
-use super::machines::{Commands, commands, noisy, observed, pulse, ways};
+use super::machines::{Commands, commands, noisy, observed, observed_drives, pulse, ways};
 use super::tools::{are_there, doubles, file, run, taut, write_doubles};
 use nalgebra::Complex;
 use std::f64::consts::PI;
@@ -183,6 +183,45 @@ fn the_controller_replays_moves_bit_for_bit() {
             if let Some(k) = first {
                 panic!("{name}, move {which}: sample {k} is {:e} and not {:e}", given[k], seen[k].1);
             }
+        }
+    }
+}
+
+/// Gantries in closed loop, with changes.
+pub const GANTRIES: [(&str, &[&str]); 4] = [
+    ("stages/h-frame/square.toml", &[]),
+    ("stages/core-xy/square.toml", &["controller.limit=3 V"]),
+    (
+        "stages/core-xy/square.toml",
+        &[
+            "controller={ every = \"1 ms\", limit = \"24 V\", cascade = { position = 20, speed = 40, speed_integral = 0.05 } }",
+        ],
+    ),
+    ("stages/h-frame/square.toml", &["controller.filters=[{ low_pass = \"150 Hz\" }]"]),
+];
+
+/// Each motor of a gantry has a controller in files of its own.
+#[test]
+fn the_controllers_of_a_gantry_replay_moves_bit_for_bit() {
+    if !are_there(&["gcc"]) {
+        return;
+    }
+    for (path, changes) in GANTRIES {
+        let case = opened(path, changes);
+        let folder = exported(&file(path), changes, &["--part", "controller"]);
+        let harness = fs::read_to_string(folder.path().join("control.c")).unwrap();
+        for (side, seen) in ["left", "right"].into_iter().zip(observed_drives(&case, 0)) {
+            let own = format!("model_{side}");
+            let text = harness.replace("\"model.h\"", &format!("\"{own}.h\"")).replace("model_", &format!("{own}_"));
+            fs::write(folder.path().join("control.c"), text).unwrap();
+            fs::copy(folder.path().join(format!("{own}.c")), folder.path().join("model.c")).unwrap();
+            write_doubles(&folder.path().join("in.bin"), seen.iter().flat_map(|(seen, _)| *seen));
+            run_here(folder.path(), "control.c", &[]);
+            let given = doubles(&folder.path().join("out.bin"));
+            assert_eq!(given.len(), seen.len());
+            let first = seen.iter().zip(&given).position(|((_, own), other)| own.to_bits() != other.to_bits());
+            assert_eq!(first, None, "{path} {changes:?} {side}");
+            assert!(seen.iter().any(|(_, given)| *given != 0.0));
         }
     }
 }

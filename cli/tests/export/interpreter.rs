@@ -88,7 +88,7 @@ impl Block {
         Self { name, values, body: all[k..end].to_vec() }
     }
 
-    /// Whether there is a variable of this name.
+    /// True if there is a variable of this name.
     pub fn has(&self, name: &str) -> bool {
         self.values.contains_key(&name.to_ascii_uppercase())
     }

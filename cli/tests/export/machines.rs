@@ -133,15 +133,21 @@ impl Controller for Watched {
     }
 }
 
-/// Inputs of the controller of a case in one of its moves, and the commands that follow: twelve numbers and one.
+/// Inputs of the controller of an axis in one of its moves, and the commands that follow: twelve numbers and one.
 pub fn observed(case: &Case, which: usize) -> Vec<([f64; 12], f64)> {
+    observed_drives(case, which).swap_remove(0)
+}
+
+/// The same of the controller of each drive.
+pub fn observed_drives(case: &Case, which: usize) -> Vec<Vec<([f64; 12], f64)>> {
     let design = case.controller.as_ref().unwrap();
     let one = &case.moves[which];
-    let mut watched = Watched { own: Standard::new(design, &case.machine).unwrap(), seen: Vec::new() };
+    let own = Standard::of_drives(design, &case.machine).unwrap();
+    let mut watched: Vec<Watched> = own.into_iter().map(|own| Watched { own, seen: Vec::new() }).collect();
     let profiles = one.references(design);
     let timing = Loop::of(design);
-    close(&case.machine, &mut [&mut watched], &timing, &profiles, one.until, one.window, Solver::of(&case.machine))
-        .unwrap();
+    let mut each: Vec<&mut dyn Controller> = watched.iter_mut().map(|one| one as &mut dyn Controller).collect();
+    close(&case.machine, &mut each, &timing, &profiles, one.until, one.window, Solver::of(&case.machine)).unwrap();
     let flat = |seen: &Observation| {
         let five = |r: Reference| [r.position, r.speed, r.acceleration, r.jerk, r.snap];
         let mut all = [0.0; 12];
@@ -150,5 +156,5 @@ pub fn observed(case: &Case, which: usize) -> Vec<([f64; 12], f64)> {
         (all[10], all[11]) = (seen.position, seen.current);
         all
     };
-    watched.seen.iter().map(|(seen, given)| (flat(seen), *given)).collect()
+    watched.iter().map(|one| one.seen.iter().map(|(seen, given)| (flat(seen), *given)).collect()).collect()
 }

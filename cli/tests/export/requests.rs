@@ -40,8 +40,8 @@ fn wrong_requests_are_refused_with_what_can_be_done_instead() {
         (&["export", "st", &table4], &["no controller", "[controller]", "export fmu"]),
         (&["export", "c", &core, "--part", "both"], &["this case has no controller", "leave --part out"]),
         (
-            &["export", "c", &square, "--part", "both"],
-            &["the controller of a gantry is not exported", "leave --part out"],
+            &["export", "c", &square, "--part", "both", "--set", "controller.feed_forward={ model = \"rigid\" }"],
+            &["feed-forward of a gantry", "leave controller.feed_forward out, or leave --part out"],
         ),
         (&["export", "st", &pid, "--part", "plant"], &["only a controller", "export fmu"]),
         (&["export", "st", &pid, "--real", "float"], &["--real means nothing to st", "with c"]),

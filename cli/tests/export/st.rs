@@ -1,7 +1,7 @@
 //! Structured Text: its grammar by a public one, and its function blocks run by an interpreter.
 
 use super::interpreter::Block;
-use super::machines::{noisy, observed};
+use super::machines::{noisy, observed, observed_drives};
 use super::tools::{file, python, run, taut};
 use std::fs;
 use taut::case::Case;
@@ -23,8 +23,14 @@ pub const SEEN: [&str; 12] = [
 ];
 
 fn exported(name: &str) -> String {
+    changed(name, &[])
+}
+
+fn changed(name: &str, changes: &[&str]) -> String {
     let folder = tempfile::tempdir().unwrap();
-    let output = taut(folder.path(), &["export", "st", name, "--out", "x.st"]);
+    let mut words = vec!["export", "st", name, "--out", "x.st"];
+    changes.iter().for_each(|change| words.extend(["--set", change]));
+    let output = taut(folder.path(), &words);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     fs::read_to_string(folder.path().join("x.st")).unwrap()
 }
@@ -56,6 +62,20 @@ fn function_blocks_replay_moves_bit_for_bit() {
             if let Some(k) = first {
                 panic!("{name}, move {which}: sample {k} is {:e} and not {:e}", given[k], seen[k].1);
             }
+        }
+    }
+}
+
+/// One function block, an instance of it for each motor.
+#[test]
+fn a_function_block_is_the_controller_of_each_motor_of_a_gantry() {
+    for (path, changes) in super::c::GANTRIES {
+        let case = Case::read_with(file(path), changes).unwrap();
+        let text = changed(&file(path), changes);
+        for seen in observed_drives(&case, 0) {
+            let given = replayed(&text, &seen);
+            let first = seen.iter().zip(&given).position(|((_, own), other)| own.to_bits() != other.to_bits());
+            assert_eq!(first, None, "{path} {changes:?}");
         }
     }
 }

@@ -5,7 +5,7 @@ use crate::ignored::ignored;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-/// Whether all of these programs are there.
+/// True if all of these programs are there.
 pub fn are_there(programs: &[&str]) -> bool {
     let paths = std::env::var_os("PATH").unwrap_or_default();
     let is_there = |name: &&&str| std::env::split_paths(&paths).any(|folder| folder.join(name).is_file());

@@ -4,23 +4,22 @@
 //! (ω T)²/8 of itself at a frequency ω and a sample time T, 1e-3 at 14 Hz and 1 kHz.
 
 use super::figures::{Deviation, DriveFigures, Figures, LoadFigures};
-use super::outcome::{at_rest, unrecorded};
-use super::sampled::{Controller, Loop};
+use super::outcome::{at_rest, each, unrecorded};
+use super::sampled::Loop;
 use super::standard::Standard;
 use crate::error::Result;
-use crate::machine::Machine;
-use crate::machine::axis::CART;
+use crate::machine::{Machine, SlideAt};
 use crate::mechanism::State;
 use crate::metrics::{Meter, Peak};
 use crate::signal::profile::Profile;
 use crate::solve::{self, Solver};
 
-/// Runs a move of an axis and gathers the cart's error, settling and the root mean square of the current at samples
+/// Runs a move and gathers the errors of what slides, settling and the root mean squares of the currents at samples
 /// alone, with straight lines between; the figures, and how the run ended. Motion and commands are those of
 /// [`closed_loop`](super::closed_loop).
 pub(crate) fn closed_loop_at_samples(
     machine: &Machine,
-    controller: &mut Standard,
+    controllers: &mut [Standard],
     timing: &Loop,
     profiles: &[Profile],
     (until, window): (f64, f64),
@@ -28,64 +27,121 @@ pub(crate) fn closed_loop_at_samples(
 ) -> Result<(Figures, solve::Ending)> {
     timing.check(until)?;
     let experiment = at_rest(machine, profiles, until, timing.every.min(until));
-    let mut gathered = Gathered::new(&profiles[0], window);
-    let see = |time: f64, state: &State, current: f64| gathered.see(time, state, current);
-    let controllers = &mut [controller as &mut dyn Controller];
-    let outcome = unrecorded((machine, &experiment), controllers, (timing, profiles), solver, None::<&mut Meter>, see)?;
+    let mut gathered = Gathered::new(machine, profiles, window);
+    let see = |time: f64, state: &State, currents: &[f64]| gathered.see(time, state, currents);
+    let run = (machine, &experiment);
+    let outcome = unrecorded(run, &mut each(controllers), (timing, profiles), solver, None::<&mut Meter>, see)?;
     Ok((gathered.finish(), outcome.ending))
 }
 
 /// Figures at samples.
 struct Gathered<'a> {
-    profile: &'a Profile,
     window: f64,
-    /// End of the profile, s, and target, m.
+    /// End of the profiles, and the last sample, s.
     done: f64,
+    last: Option<f64>,
+    slides: Vec<OfSlide<'a>>,
+    currents: Vec<Squared>,
+}
+
+/// Those of what slides.
+struct OfSlide<'a> {
+    body: usize,
+    profile: &'a Profile,
     target: f64,
-    /// The last sample: time, cart's error, squares of error and current, distance from the target.
-    last: Option<(f64, f64, [f64; 2], f64)>,
     peak: Peak,
-    /// ∫ of the squares.
-    squares: [f64; 2],
-    /// When the cart entered its window for the last time after the profile.
+    squared: Squared,
+    /// The error at the last sample, and the distance from the target, m.
+    error: f64,
+    away: f64,
+    /// When it entered its window for the last time after the profile, s.
     entered: Option<f64>,
 }
 
-impl<'a> Gathered<'a> {
-    fn new(profile: &'a Profile, window: f64) -> Self {
-        let (done, target) = (profile.end(), profile.target());
-        let (peak, squares) = (Peak::default(), [0.0; 2]);
-        Self { profile, window, done, target, last: None, peak, squares, entered: None }
+/// The integral of a square over time, and the square at the last sample.
+#[derive(Clone, Copy, Default)]
+struct Squared {
+    sum: f64,
+    last: f64,
+}
+
+impl Squared {
+    /// On to the next sample; `length` is the time since the last one, s, if there was one.
+    fn see(&mut self, value: f64, length: Option<f64>) {
+        let square = value * value;
+        if let Some(length) = length {
+            self.sum += 0.5 * length * (self.last + square);
+        }
+        self.last = square;
     }
 
-    fn see(&mut self, time: f64, state: &State, current: f64) {
-        let x = state.position[CART];
-        let error = x - self.profile.at(time).position;
-        if error.abs() > self.peak.value.abs() {
-            self.peak = Peak { value: error, time };
+    /// The root mean square until `end`, s.
+    fn root(self, end: f64) -> f64 {
+        (self.sum / end.max(f64::MIN_POSITIVE)).sqrt()
+    }
+}
+
+impl<'a> Gathered<'a> {
+    fn new(machine: &Machine, profiles: &'a [Profile], window: f64) -> Self {
+        let slide = |(profile, at): (&'a Profile, &SlideAt)| OfSlide {
+            body: at.body,
+            profile,
+            target: profile.target(),
+            peak: Peak::default(),
+            squared: Squared::default(),
+            error: 0.0,
+            away: 0.0,
+            entered: None,
+        };
+        Self {
+            window,
+            done: profiles.iter().map(Profile::end).fold(0.0, f64::max),
+            last: None,
+            slides: profiles.iter().zip(machine.geometry().slides).map(slide).collect(),
+            currents: vec![Squared::default(); machine.drives.len()],
         }
-        let (values, away) = ([error * error, current * current], (x - self.target).abs());
-        if let Some((before, _, was, from)) = self.last {
-            let length = time - before;
-            for (sum, (was, is)) in self.squares.iter_mut().zip(was.iter().zip(values)) {
-                *sum += 0.5 * length * (was + is);
+    }
+
+    fn see(&mut self, time: f64, state: &State, currents: &[f64]) {
+        let length = self.last.map(|before| time - before);
+        self.currents.iter_mut().zip(currents).for_each(|(squared, current)| squared.see(*current, length));
+        for slide in &mut self.slides {
+            let x = state.position[slide.body];
+            let error = x - slide.profile.at(time).position;
+            if error.abs() > slide.peak.value.abs() {
+                slide.peak = Peak { value: error, time };
             }
-            if time > self.done && from > self.window && away <= self.window {
+            slide.squared.see(error, length);
+            let (from, away) = (slide.away, (x - slide.target).abs());
+            if let Some((before, length)) = self.last.zip(length)
+                && time > self.done
+                && from > self.window
+                && away <= self.window
+            {
                 let share = (from - self.window) / (from - away);
-                self.entered = Some(before + share * length);
+                slide.entered = Some(before + share * length);
             }
+            (slide.error, slide.away) = (error, away);
         }
-        self.last = Some((time, error, values, away));
+        self.last = Some(time);
     }
 
     fn finish(self) -> Figures {
-        let (end, last, _, away) = self.last.unwrap_or_default();
-        let [error, current] = self.squares.map(|sum| (sum / end.max(f64::MIN_POSITIVE)).sqrt());
-        let is_inside = end >= self.done && away <= self.window;
+        let end = self.last.unwrap_or_default();
+        let is_inside = end >= self.done && self.slides.iter().all(|slide| slide.away <= self.window);
+        let entered = self.slides.iter().filter_map(|slide| slide.entered).reduce(f64::max);
+        let load = |slide: &OfSlide| LoadFigures {
+            error: Deviation { peak: slide.peak, rms: slide.squared.root(end), last: slide.error },
+            overshoot: 0.0,
+        };
+        let drive = |current: &Squared| DriveFigures {
+            current: (Peak::default(), current.root(end)),
+            ..DriveFigures::default()
+        };
         Figures {
-            loads: vec![LoadFigures { error: Deviation { peak: self.peak, rms: error, last }, overshoot: 0.0 }],
-            settling: is_inside.then(|| self.entered.map_or(0.0, |time| (time - self.done).max(0.0))),
-            drives: vec![DriveFigures { current: (Peak::default(), current), ..DriveFigures::default() }],
+            loads: self.slides.iter().map(load).collect(),
+            settling: is_inside.then(|| entered.map_or(0.0, |time| (time - self.done).max(0.0))),
+            drives: self.currents.iter().map(drive).collect(),
             contour: None,
         }
     }

@@ -19,7 +19,7 @@ pub(super) struct Contour {
 }
 
 impl Contour {
-    /// That of two profiles, shapers apart; none of another number.
+    /// Path of two profiles, without their shapers; none for another number of profiles.
     pub fn along(profiles: &[Profile]) -> Option<Self> {
         let [x, y] = profiles else { return None };
         let leg = |((begin, x, along_x, _), (_, y, along_y, _)): (Stroke, Stroke)| {
@@ -142,7 +142,7 @@ impl ContourGauge {
         self.seen.last = self.path.nearest(time, point).0;
     }
 
-    /// What was gathered of a run that ended at `end`, s.
+    /// Contour error of a run that ended at `end`, s.
     pub fn finish(mut self, end: f64) -> Deviation {
         self.seen.rms = (self.square / end.max(f64::MIN_POSITIVE)).sqrt();
         self.seen

@@ -49,9 +49,9 @@ pub struct Criterion {
     pub firmware: Firmware,
     /// Forms that are fitted.
     pub forms: Vec<Form>,
-    /// Those of them that may be recommended.
+    /// The forms that may be recommended.
     pub candidates: Vec<Form>,
-    /// Whether pairs of them, convolved, are looked at, too.
+    /// True if pairs of them, convolved, are looked at, too.
     pub pairs: bool,
 }
 
@@ -106,7 +106,7 @@ impl Target<'_> {
         self.weighed(dampings, &mut |f, zeta| shaper.residual_vibration(f, zeta))
     }
 
-    /// The same of anything that leaves V(f, ζ), which is asked for always in the same order.
+    /// Weighed vibration of any residual V(f, ζ), which is evaluated in a fixed order.
     pub(super) fn weighed(&self, dampings: &[f64], left: &mut dyn FnMut(f64, f64) -> f64) -> f64 {
         match self {
             Target::Spectrum(spectrum) => of_spectrum(spectrum, left, dampings),

@@ -29,7 +29,7 @@ pub struct DriveGain {
     pub name: &'static str,
     /// In the unit that is used there.
     pub value: f64,
-    /// That unit.
+    /// Unit of the value.
     pub unit: &'static str,
 }
 

@@ -79,7 +79,7 @@ pub struct Turn {
 }
 
 impl Turn {
-    /// That of ω (rad/s) at a sample time T (s).
+    /// Terms of the frequency ω, rad/s, at a sample time T, s.
     pub fn of(omega: f64, t: f64) -> Self {
         let half = Complex::new(0.0, 0.5 * omega * t).exp();
         let change = Complex::new(0.0, 2.0 * half.im) * half;
@@ -94,7 +94,7 @@ impl Turn {
 }
 
 impl Feedback {
-    /// That of a design for a model of the axis.
+    /// Linear feedback of a design for a model of the axis.
     pub fn new(design: &Design, model: &Machine) -> Result<Self> {
         let text = Text::new(design, model)?;
         let mut system = System::of(&text, model.scale.is_some());
@@ -111,7 +111,7 @@ impl Feedback {
         })
     }
 
-    /// Whether it is linear but for its limit; what is told of another holds for small motions about rest.
+    /// True if it is linear but for its limit; what is told of another holds for small motions about rest.
     pub fn is_linear(&self) -> bool {
         self.is_linear
     }
@@ -121,7 +121,7 @@ impl Feedback {
         self.at_turn(&Turn::of(omega, self.every))
     }
 
-    /// The same where what belongs to the frequency is known already.
+    /// Terms of the feedback for the precomputed terms of a frequency.
     pub fn at_turn(&self, turn: &Turn) -> Terms {
         let mut sums = self.direct.map(|direct| Complex::new(direct, 0.0));
         self.resolve(turn.change, &mut |state, value| {

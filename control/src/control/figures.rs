@@ -35,6 +35,18 @@ impl Figures {
         self.loads.last().copied().unwrap_or_default()
     }
 
+    /// The figures of what slides with the largest error.
+    pub fn worst_load(&self) -> LoadFigures {
+        let size = |load: &LoadFigures| load.error.peak.value.abs();
+        let larger = |a: LoadFigures, b: LoadFigures| if size(&b) > size(&a) { b } else { a };
+        self.loads.iter().copied().reduce(larger).unwrap_or_default()
+    }
+
+    /// The largest root mean square of all motors' currents, A.
+    pub fn worst_current(&self) -> f64 {
+        self.drives.iter().map(|drive| drive.current.1).fold(0.0, f64::max)
+    }
+
     /// The figures of the first drive.
     pub fn drive(&self) -> DriveFigures {
         self.drives.first().copied().unwrap_or_default()

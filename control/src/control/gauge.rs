@@ -27,11 +27,11 @@ pub(super) struct Gauge<'a> {
     drives: Vec<DriveGauge>,
     contour: Option<ContourGauge>,
     end: f64,
-    /// Whether the errors of what slides, settling and current are all that is asked for.
+    /// True if the errors of what slides, settling and current are all that is asked for.
     is_brief: bool,
 }
 
-/// What is gathered of something that slides.
+/// Figures of a slide, gathered during a run.
 struct LoadGauge {
     body: usize,
     /// The reading of its position.
@@ -51,7 +51,7 @@ struct LoadGauge {
     seen: LoadFigures,
 }
 
-/// What is gathered of a drive.
+/// Figures of a drive, gathered during a run.
 struct DriveGauge {
     pulley: usize,
     /// The reading of its current.
@@ -61,7 +61,7 @@ struct DriveGauge {
     shares: &'static [f64],
     /// ∫ of the squares of following error, voltage and current.
     squares: [f64; 3],
-    /// Whether its amplifier stands at a limit where it is now.
+    /// True if its amplifier stands at a limit where it is now.
     saturated: bool,
     seen: DriveFigures,
 }

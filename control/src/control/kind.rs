@@ -48,7 +48,7 @@ impl Kind {
         self.amplitudes_for(TOLERANCE)
     }
 
-    /// The same for a tolerance V of the EI shapers.
+    /// Amplitudes for a tolerance V of the EI shapers.
     pub(super) fn amplitudes_for(self, v: f64) -> Vec<f64> {
         match self {
             Kind::Zv => vec![0.5, 0.5],

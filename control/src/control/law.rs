@@ -31,10 +31,10 @@ pub trait Law {
     /// A description for a remark in a program.
     fn about(&self) -> &'static str;
 
-    /// Whether it commands a current inside itself, into which feed-forward goes.
+    /// True if it commands a current inside itself, into which feed-forward goes.
     fn commands_current(&self) -> bool;
 
-    /// Whether it is linear, limits apart; slopes of another are those at rest.
+    /// True if it is linear, limits apart; slopes of another are those at rest.
     fn is_linear(&self) -> bool;
 
     /// The next command beside feed-forward.

@@ -21,7 +21,7 @@ pub enum AnyLaw {
     Fuzzy(FuzzyLaw),
 }
 
-/// The same of each law.
+/// Expands an expression for each law.
 macro_rules! each_law {
     ($self:expr, $law:ident => $done:expr) => {
         match $self {
@@ -35,7 +35,7 @@ macro_rules! each_law {
 }
 
 impl AnyLaw {
-    /// That of a design for a model of the axis.
+    /// Control law of a design for a model of the axis.
     pub fn new(slots: &mut Slots, design: &Design, model: &Machine) -> Result<Self> {
         let every = design.every;
         Ok(match &design.structure {

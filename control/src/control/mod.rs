@@ -16,7 +16,6 @@ pub mod drives;
 pub mod feedback;
 mod figures;
 pub mod filter;
-mod forward;
 pub mod fuzzy;
 mod gauge;
 mod insensitive;

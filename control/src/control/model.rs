@@ -50,7 +50,7 @@ impl Quantity {
 }
 
 impl Linear {
-    /// That of `stage`.
+    /// Model of a machine.
     pub fn of(machine: &Machine) -> Self {
         let mechanism = machine.mechanism();
         let r = machine.pulley_radius;

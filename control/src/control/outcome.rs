@@ -94,7 +94,7 @@ pub(super) fn unrecorded(
     (timing, profiles): (&Loop, &[Profile]),
     solver: Solver,
     observer: Option<&mut impl Observe>,
-    see: impl FnMut(f64, &State, f64),
+    see: impl FnMut(f64, &State, &[f64]),
 ) -> Result<solve::Outcome> {
     controllers.iter_mut().for_each(|controller| controller.reset());
     let mut sampled = Sampled::new(machine, controllers, *timing, profiles, false).until(experiment.until);

@@ -98,7 +98,7 @@ pub struct Question {
     pub uncertainty: Option<f64>,
     /// The motor while the cart vibrates.
     pub drive: Option<Drive>,
-    /// Whether pairs of shapers, convolved, are looked at, too.
+    /// True if pairs of shapers, convolved, are looked at, too.
     pub pairs: bool,
 }
 
@@ -123,9 +123,7 @@ pub enum Damping {
 /// ```
 pub fn recommend(args: &Question, files: &[PathBuf]) -> Result<Findings> {
     let Some(_) = files.first() else {
-        return Err(
-            Error::new("there is no file to look at").next("name a spectrum, samples of an accelerometer, or a case")
-        );
+        return Err(Error::new("no file was given").next("name a spectrum, samples of an accelerometer, or a case"));
     };
     if files.len() > 2 && !args.together {
         let error = Error::new(format!("{} files, of which two can be compared", files.len())).in_file("taut shape");
@@ -163,7 +161,7 @@ fn is_case(file: &Path) -> bool {
     file.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"))
 }
 
-/// What is found in a file: one choice, or one for each coordinate of a machine.
+/// Recommendations for a file: one, or one for each coordinate of a machine.
 fn find(args: &Question, files: &[PathBuf], file: &Path) -> Result<Vec<Found>> {
     if !is_case(file) {
         return Ok(vec![chosen(args, file, measured(args, files, file)?, Vec::new())?]);
@@ -354,7 +352,7 @@ impl Found {
         ]
     }
 
-    /// What is to rest: the cart, unless the model has several coordinates.
+    /// The body whose vibration is reduced: the cart, unless the model has several coordinates.
     pub fn load(&self) -> &'static str {
         match self.source {
             Source::Model { coordinate: Some(coordinate), .. } => coordinate.label.name,

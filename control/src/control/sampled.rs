@@ -125,7 +125,7 @@ pub(super) struct Sensors {
 }
 
 impl Sensors {
-    /// Those of each drive.
+    /// The sensor of each drive.
     pub(super) fn of(machine: &Machine) -> Vec<Self> {
         let of_drive = |drive| Self { encoder: Sensor::new(machine, drive), scale: Sensor::of_scale(machine) };
         (0..machine.drives.len()).map(of_drive).collect()
@@ -158,7 +158,7 @@ pub(super) struct Sensor {
 }
 
 impl Sensor {
-    /// That of a drive.
+    /// The sensor of a drive.
     pub(super) fn new(machine: &Machine, drive: usize) -> Self {
         let ratio = machine.drives[drive].motor.gear_ratio;
         let counts = machine.encoder.map(|encoder: Encoder| encoder.counts_per_unit(ratio));
@@ -171,7 +171,7 @@ impl Sensor {
         Self { body, length, counts }
     }
 
-    /// That of the scale beside the encoder, if there is one.
+    /// The scale beside the encoder, if there is one.
     pub(super) fn of_scale(machine: &Machine) -> Option<Self> {
         let counts = machine.scale?.counts_per_unit(machine.drives[0].motor.gear_ratio);
         Some(Self { body: CART, length: 1.0, counts: Some(counts) })
@@ -188,12 +188,12 @@ impl Sensor {
     }
 }
 
-/// Whether the encoder of this stage sits at the cart.
+/// True if the encoder of this stage sits at the cart.
 pub fn measures_cart(machine: &Machine) -> bool {
     machine.encoder.is_some_and(|encoder| encoder.at == EncoderPlace::Cart)
 }
 
-/// Whether a controller on this stage reads the scale beside the encoder: a cascade, state feedback and a disturbance
+/// True if a controller on this stage reads the scale beside the encoder: a cascade, state feedback and a disturbance
 /// observer do.
 pub fn reads_scale(design: &Design, machine: &Machine) -> bool {
     let structure = design.structure.tunable().reads_scale();
@@ -247,7 +247,7 @@ impl Loop {
         }
     }
 
-    /// That of a design.
+    /// Sample time, delay, limit and lead of a design.
     pub fn of(design: &crate::design::Design) -> Self {
         let lead = design.feed_forward.lead.unwrap_or(design.delay + 0.5 * design.every);
         Self { every: design.every, delay: design.delay, limit: design.limit, lead }

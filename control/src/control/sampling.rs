@@ -16,7 +16,7 @@ pub(super) struct Sampled<'a, 'c> {
     /// Weights of the coordinates in the position of each drive along the belt.
     shares: Vec<&'static [f64]>,
     clocked: Clocked,
-    /// What each drive was told.
+    /// Last command of each drive.
     pub(super) told: [Told; DRIVES],
     /// End of the run, s.
     until: f64,
@@ -91,14 +91,14 @@ impl<'a, 'c> Sampled<'a, 'c> {
 
 impl Sampled<'_, '_> {
     /// Drives a run to its end, `until`, s: inputs are held from one decision to the next. `see` is shown time, state
-    /// and the current of the first motor, A, at each of them and at the end.
-    pub(super) fn drive(&mut self, run: &mut Run, until: f64, mut see: impl FnMut(f64, &State, f64)) {
+    /// and the currents of the motors, A, at each of them and at the end.
+    pub(super) fn drive(&mut self, run: &mut Run, until: f64, mut see: impl FnMut(f64, &State, &[f64])) {
         let drives = self.controllers.len();
         loop {
             let state = run.state();
             let mut currents = Commands::default();
             currents.iter_mut().take(drives).enumerate().for_each(|(drive, current)| *current = run.current(drive));
-            see(run.time(), &state, currents[0]);
+            see(run.time(), &state, &currents[..drives]);
             let (inputs, end) = self.decide(&state, &currents);
             let is_at_end = run.time() >= until;
             if !self.hold(run, &inputs[..drives], end) || is_at_end {

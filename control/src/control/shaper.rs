@@ -153,7 +153,7 @@ pub struct Pattern {
 }
 
 impl Pattern {
-    /// That of a form by the definitions of a firmware, for a damping ratio from 0 to below 1.
+    /// Shaper of a form as a firmware defines it, for a damping ratio from 0 to below 1.
     pub fn new(form: Form, firmware: Firmware, damping: f64) -> Result<Self> {
         check_damping(damping)?;
         let kind = form.kind();
@@ -405,7 +405,7 @@ pub fn residual_vibration(impulses: &[(f64, f64)], frequency: f64, damping: f64)
     c.hypot(s) / sum
 }
 
-/// Whether a damping ratio is one of a mode that vibrates.
+/// Checks that a damping ratio is at least 0 and below 1.
 pub fn check_damping(damping: f64) -> Result<()> {
     if (0.0..1.0).contains(&damping) {
         return Ok(());

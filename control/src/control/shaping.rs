@@ -25,9 +25,9 @@ pub struct Fitted {
     pub max_acceleration: f64,
     /// The score that is compared, smaller is better: smoothing in mm times a measure of the vibration.
     pub score: f64,
-    /// Whether it may be recommended.
+    /// True if it may be recommended.
     pub is_candidate: bool,
-    /// Whether its frequency is the lowest that is tried: a lower one might leave less, and would smooth more.
+    /// True if its frequency is the lowest that is tried: a lower one might leave less, and would smooth more.
     pub is_lowest: bool,
 }
 
@@ -43,7 +43,7 @@ pub struct Choice {
     pub reason: String,
     /// Pairs of shapers, convolved, the best first; empty unless they were asked for.
     pub pairs: Vec<Pair>,
-    /// Whether the first of them is clearly better than the recommended shaper.
+    /// True if the first of them is clearly better than the recommended shaper.
     pub is_pair_better: bool,
 }
 

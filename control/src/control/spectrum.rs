@@ -58,7 +58,7 @@ impl Spectrum {
         Self::by(data, axis, Firmware::Klipper202508)
     }
 
-    /// The same as a firmware divides it by frequency.
+    /// Spectrum divided by frequency as a firmware does.
     pub fn by(data: &Accelerometer, axis: Axis, firmware: Firmware) -> Self {
         match data {
             Accelerometer::Spectrum { frequency, density: [x, y, z, all], per_frequency } => {

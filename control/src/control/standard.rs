@@ -1,7 +1,6 @@
 //! A controller from its design: structure, feed-forward, observer and filters put together.
 
 use super::filter::Biquad;
-use super::forward::Forward;
 use super::law::{Law, Seen};
 use super::laws::AnyLaw;
 use super::observer::DisturbanceObserver;
@@ -12,6 +11,7 @@ use crate::error::{Error, Result};
 use crate::machine::rigid::Rigid;
 use crate::machine::{AmplifierMode, Machine};
 use crate::reach::compensation::Compensation;
+use crate::reach::forward::Forward;
 use crate::signal::profile::Reference;
 
 /// A controller that a [`Design`] describes, made with a model of the axis: the stage itself, or what one takes it for.
@@ -40,7 +40,7 @@ pub struct Text {
 }
 
 impl Text {
-    /// That of `design` for a `model` of the axis.
+    /// Controller of `design` for a `model` of the axis.
     pub fn new(design: &Design, model: &Machine) -> Result<Self> {
         check(design, model)?;
         let every = design.every;
@@ -155,9 +155,10 @@ impl Standard {
         Ok(Self { memory: vec![0.0; text.slots.count()], text, forward: None })
     }
 
-    /// The same for each drive of a machine.
+    /// A controller for each drive of a machine.
     pub fn of_drives(design: &Design, model: &Machine) -> Result<Vec<Self>> {
-        let of_drive = |drive| Ok(Self { forward: Forward::of(design, model, drive), ..Self::new(design, model)? });
+        let of_drive =
+            |drive| Ok(Self { forward: Forward::of(design.feed_forward, model, drive), ..Self::new(design, model)? });
         (0..model.drives.len()).map(of_drive).collect()
     }
 
@@ -210,7 +211,7 @@ fn check(design: &Design, model: &Machine) -> Result<()> {
             .allowed("a sample time above zero, and a delay of up to 1000 of them"));
     }
     if limit.is_some_and(|limit| !(limit > 0.0 && limit.is_finite())) {
-        return Err(Error::new("the limit of the command is none").allowed("above zero"));
+        return Err(Error::new("the command limit must be a positive number").allowed("above zero"));
     }
     if let Structure::Cascade(cascade) = &design.structure
         && cascade.current.is_some()
@@ -223,7 +224,7 @@ fn check(design: &Design, model: &Machine) -> Result<()> {
         let size = fuzzy.rules.len();
         let square = size >= 3 && size % 2 == 1 && fuzzy.rules.iter().all(|row| row.len() == size);
         if !square {
-            return Err(Error::new("the rules are no square table").allowed("3, 5, 7, … rows of as many values"));
+            return Err(Error::new("the rule table must be square").allowed("3, 5, 7, … rows of as many values"));
         }
     }
     let sum: f64 = design.shaper.iter().map(|[_, amplitude]| amplitude).sum();

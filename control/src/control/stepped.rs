@@ -69,7 +69,7 @@ impl Clocked {
         self.clock.times(self.k) + if self.halfway { self.rest } else { 0.0 }
     }
 
-    /// Whether it is at a sample, and not where a delayed command takes over.
+    /// True if it is at a sample, and not where a delayed command takes over.
     pub fn is_at_sample(&self) -> bool {
         !self.halfway
     }

@@ -105,7 +105,7 @@ fn changed(machine: &Machine, known: &Known, x: &[f64]) -> Machine {
     machine
 }
 
-/// The same as the averages see it: Σ W Ĝ/Σ W about each line, where the input is white. Of whole periods
+/// Response smeared by the window as in the averages: Σ W Ĝ/Σ W about each line, for a white input. Of whole periods
 /// nothing is smeared.
 fn smeared(machine: &Machine, place: f64, delay: f64, frf: &Frf) -> Result<Vec<Complex<f64>>> {
     if frf.periodic {
@@ -180,7 +180,7 @@ impl Problem<'_> {
         Ok(jacobian)
     }
 
-    /// That of the unknowns, with the rows of the residuals two for each point that is used.
+    /// Covariance of the unknowns; the Jacobian has two rows for each point that is used.
     fn covariance(&self, jacobian: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         let mut middle = jacobian.transpose() * jacobian;
         let inverse = middle.clone().try_inverse()?;

@@ -19,13 +19,13 @@ pub struct Measured {
     pub phase: Option<(f64, f64)>,
     /// Gain margin, and where L passes the negative real axis, rad/s.
     pub gain: Option<(f64, f64)>,
-    /// Whether it holds for small motions about rest alone: the controller is not linear.
+    /// True if it holds for small motions about rest alone: the controller is not linear.
     pub is_at_rest: bool,
     /// Lowest and highest frequency that was looked at, rad/s.
     pub range: [f64; 2],
 }
 
-/// Those of a design around a response of the position that it measures; `length` is metres per unit of it.
+/// Margins of a design around the response of the position that it measures; `length` is metres per unit of it.
 pub fn measured(frf: &Frf, design: &Design, machine: &Machine, length: f64) -> Result<Measured> {
     let feedback = Feedback::new(design, machine)?;
     if (frf.every / design.every - 1.0).abs() > 1e-6 {

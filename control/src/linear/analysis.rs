@@ -53,7 +53,7 @@ pub struct Analysis<'a> {
     pub modes: Option<Natural>,
     /// The assumptions.
     pub words: Vec<String>,
-    /// Whether the machine sticks at rest.
+    /// True if the machine sticks at rest.
     pub sticks: bool,
     /// At the place that was asked for.
     pub here: Place,

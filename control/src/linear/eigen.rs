@@ -86,7 +86,7 @@ pub(crate) fn eigenvalues(matrix: &DMatrix<f64>) -> Result<Vec<Complex<f64>>> {
     Ok(values)
 }
 
-/// The same as the Schur form gives them: each within a few roundings of the largest.
+/// Eigenvalues from the Schur form alone: each within a few roundings of the largest.
 pub(crate) fn rough(matrix: &DMatrix<f64>) -> Result<Vec<Complex<f64>>> {
     let (mut values, rest) = taken_apart(matrix);
     if rest.nrows() > 0 {
@@ -128,7 +128,7 @@ fn schur(matrix: &DMatrix<f64>) -> Result<Vec<Complex<f64>>> {
     let size = norm(matrix);
     if !size.is_finite() {
         return Err(Error::new("the linearised equations hold a number that is too large to compute with")
-            .next("look for a stiffness, an inertia or an inductance with a wrong unit"));
+            .next("check the units of stiffness, inertia and inductance"));
     }
     for turn in 0..MOST_TURNS {
         let mut copy = matrix.clone();

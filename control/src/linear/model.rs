@@ -23,6 +23,16 @@ pub struct Operation {
 }
 
 impl Operation {
+    /// Where what slides is at `slides`, m, in the order of the geometry, and all slides forward.
+    pub fn at(slides: &[f64]) -> Self {
+        let own = Self::default();
+        match slides {
+            [bridge, cart] => Self { position: *cart, bridge: *bridge, ..own },
+            [cart] => Self { position: *cart, ..own },
+            _ => own,
+        }
+    }
+
     /// Where each sliding part of `machine` is, m, in the order of its geometry.
     pub(super) fn coordinates(&self, machine: &Machine) -> Vec<f64> {
         machine.bridge.iter().map(|_| self.bridge).chain([self.position]).collect()
@@ -57,7 +67,7 @@ pub struct System {
     pub c: DMatrix<f64>,
     /// D.
     pub d: DMatrix<f64>,
-    /// The same system in stretches instead of positions, which loses nothing to cancellation.
+    /// The system in elongations instead of positions, which avoids cancellation.
     inner: Inner<DMatrix<f64>>,
 }
 
@@ -78,7 +88,7 @@ pub struct StateSpace {
     pub c: DMatrix<f64>,
     /// d.
     pub d: DVector<f64>,
-    /// The same system in stretches instead of positions, which loses nothing to cancellation.
+    /// The system in elongations instead of positions, which avoids cancellation.
     pub(super) inner: Inner<DVector<f64>>,
 }
 
@@ -153,7 +163,7 @@ impl System {
         self.clone().into_input(input)
     }
 
-    /// The same of a system that is not wanted any more.
+    /// The system with one input only; consumes the system.
     fn into_input(self, input: usize) -> StateSpace {
         let System { states, inputs, outputs, a, b, c, d, inner } = self;
         let column = |matrix: &DMatrix<f64>| matrix.column(input).into_owned();

@@ -196,7 +196,7 @@ impl Matrices {
         let scaled = DMatrix::from_fn(n, n, |i, j| self.stiffness[(i, j)] / (root[i] * root[j]));
         let eigen = SymmetricEigen::try_new(scaled, f64::EPSILON, 10_000).ok_or_else(|| {
             Error::new("the natural modes cannot be found: the iteration does not settle")
-                .next("look for a stiffness or an inertia with a wrong unit")
+                .next("check the units of stiffness and inertia")
         })?;
         let mut order: Vec<usize> = (0..n).collect();
         order.sort_by(|a, b| eigen.eigenvalues[*a].total_cmp(&eigen.eigenvalues[*b]));
@@ -229,7 +229,7 @@ fn poles(values: &[f64], damping: &DMatrix<f64>, free: usize) -> Result<Vec<Root
     Ok(poles)
 }
 
-/// The same motions as sums of `shapes`, each of which moves one chosen body by one and the other chosen ones not at
+/// Rigid motions as sums of `shapes`, each of which moves one chosen body by one and the other chosen ones not at
 /// all; bodies that slide are chosen first.
 fn rigid(shapes: &DMatrix<f64>, slides: &dyn Fn(usize) -> bool) -> Vec<(usize, Vec<f64>)> {
     let mut left = shapes.clone();

@@ -124,7 +124,7 @@ impl Range {
         }
     }
 
-    /// That of all these transfers, which have the same poles, and their poles and zeros.
+    /// Frequency range for transfers with common poles, and their poles and zeros.
     pub(super) fn of_transfers(transfers: &[Transfer]) -> (Self, Vec<Complex<f64>>) {
         let poles = transfers.first().map_or(&[][..], |transfer| &transfer.poles);
         let zeros: Vec<_> = transfers.iter().map(|transfer| transfer.zeros.clone()).collect();

@@ -67,7 +67,7 @@ pub fn place(machine: &Machine, operation: Operation) -> Result<Place> {
     Ok(travel(machine, operation, &[operation.position])?.swap_remove(0))
 }
 
-/// The same masses and springs and nothing that takes energy: no friction, no damping, no back-EMF, motors that are
+/// The machine with its masses and springs but without losses: no friction, no damping, no back-EMF, motors that are
 /// given their current.
 pub fn undamped(machine: &Machine) -> Machine {
     let mut bare = machine.clone();

@@ -36,7 +36,7 @@ pub fn assumptions(machine: &Machine, operation: Operation) -> Vec<String> {
     words
 }
 
-/// What the damping of [`Natural`](super::Natural) modes leaves out and the poles have.
+/// Damping that the poles include and [`Natural`](super::Natural) modes do not.
 fn damping_of_modes(machine: &Machine, plant: &Mechanism) -> Vec<String> {
     let mut words = Vec::new();
     let is_curved = |body: usize| {
@@ -53,7 +53,7 @@ fn damping_of_modes(machine: &Machine, plant: &Mechanism) -> Vec<String> {
     words
 }
 
-/// What is assumed of friction along the travel and of forces on what slides.
+/// Assumptions about friction along the travel and forces on slides.
 fn forces(machine: &Machine, plant: &Mechanism, operation: Operation, moving: &[usize]) -> Vec<String> {
     let mut words = Vec::new();
     let slides = machine.geometry().slides.iter().zip(machine.slides());
@@ -87,7 +87,7 @@ fn forces(machine: &Machine, plant: &Mechanism, operation: Operation, moving: &[
     words
 }
 
-/// What is assumed of amplifiers and gears: a sentence for all drives.
+/// Assumptions about amplifiers and gears: one sentence for all drives.
 fn drives(machine: &Machine, plant: &Mechanism) -> Vec<String> {
     let mut words = Vec::new();
     let limited = |unit: &DriveUnit| unit.amplifier.voltage_limit.is_some() || unit.amplifier.current_limit.is_some();
@@ -120,7 +120,7 @@ fn drives(machine: &Machine, plant: &Mechanism) -> Vec<String> {
     words
 }
 
-/// Whether dry friction can hold a body that moves in this model at rest.
+/// True if dry friction can hold a body that moves in this model at rest.
 pub fn sticks(machine: &Machine, operation: Operation) -> bool {
     let plant = machine.mechanism();
     leaders(&plant).any(|body| !operation.held[body] && plant.friction(body).breakaway(true) > 0.0)

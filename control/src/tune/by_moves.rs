@@ -49,7 +49,7 @@ const NARROW: Spread = Spread { generations: 8, scatter: 0.3, edge: Edge::Eased,
 /// How far beyond the limits the first simplex may go: it goes along their edge.
 const SLACK: f64 = 0.05;
 
-/// How much worse than the best (ln J) a finalist may be and still be searched from.
+/// Largest ln J excess over the best at which a finalist is refined.
 const NEAR: f64 = 0.3;
 
 /// Samples of moves that a search of usual effort may simulate, each design that it looks at counted as some more: a few
@@ -213,7 +213,7 @@ impl Work<'_> {
         self.most = self.charged() + (self.tuning.effort * SAMPLES as f64) as u64;
     }
 
-    /// Whether the samples of moves that a search may ask for are used up.
+    /// True if the samples of moves that a search may ask for are used up.
     pub fn is_spent(&self) -> bool {
         self.charged() >= self.most
     }

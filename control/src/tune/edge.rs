@@ -50,7 +50,7 @@ impl Work<'_> {
         value + STEEP * beyond
     }
 
-    /// The same with the loop as much slower as the limits make it; what is below the bar keeps them on all axes.
+    /// Cost of the design slowed down until the limits hold; below the bar, they hold on all axes.
     fn of_eased(
         &mut self,
         (finalist, layout, powers): (&Finalist, usize, &[f64]),
@@ -89,7 +89,7 @@ impl Work<'_> {
         f64::INFINITY
     }
 
-    /// Whether no design that was run is better by what a search weighs, or by a balance that designs are chosen by.
+    /// True if no design that was run is better by what a search weighs, or by a balance that designs are chosen by.
     fn is_best_by_any(&self, worst: &[AtWorst], archive: &[Tried], weighed: &Weighed) -> bool {
         let [strict, soft] = [HARD, SOFT].map(|steep| weighed.bars.map(|bars| Bars { steep, ..bars }));
         [(1, strict), (1, soft), (1, None), (0, None), (2, None)].into_iter().any(|(place, bars)| {

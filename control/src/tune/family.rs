@@ -38,10 +38,19 @@ type Step<'a> = Box<dyn Fn(&Corner) -> Corner + 'a>;
 pub struct Corner {
     /// Where the cart is, m.
     pub place: f64,
+    /// Where the bridge is, m, of a machine that has one.
+    pub bridge: f64,
     /// Mass added to it, kg.
     pub load: f64,
     /// How far each unknown is off, from −1 to 1.
     pub off: Vec<f64>,
+}
+
+impl Corner {
+    /// The machine sliding there.
+    pub fn operation(&self) -> Operation {
+        Operation { position: self.place, bridge: self.bridge, ..Operation::default() }
+    }
 }
 
 /// All of them.
@@ -55,11 +64,13 @@ pub struct Family {
     pub source: Source,
     /// Places along the travel, m; a single one where nothing changes along it.
     pub places: Vec<f64>,
+    /// Places of the bridge, m.
+    pub bridges: Vec<f64>,
     /// Loads, kg.
     pub loads: Vec<f64>,
     /// The axis of the file with each load, and a Latin hypercube of axes that can be.
     pub machines: Vec<Corner>,
-    /// Whether all parameters may be at their ends at once.
+    /// True if all parameters may be at their ends at once.
     pub corners: bool,
 }
 
@@ -75,7 +86,7 @@ pub enum Source {
 }
 
 impl Family {
-    /// That of a case. Its machines are a Latin hypercube: within a spread all values are as likely, within the
+    /// Family of a case. Its machines are a Latin hypercube: within a spread all values are as likely, within the
     /// interval of a fit they are normal; what was never fitted is off by the default spread. With `tuning.corners` the worst corner of all intervals joins them.
     pub fn of(case: &Case, tuning: &Tuning) -> Result<Self> {
         if let Some(file) = &tuning.draws {
@@ -105,18 +116,16 @@ impl Family {
             }
         };
         tie(&mut unknowns);
-        let (places, loads) = (along(case, tuning.places), tuning.loads.clone());
-        let mut family =
-            Self { places, loads, machine, unknowns, source, machines: Vec::new(), corners: tuning.corners };
+        let mut family = Self::without_machines(case, tuning, unknowns, source);
         family.machines = family.drawn(MACHINES);
         Ok(family)
     }
 
-    /// That of the draws of a posterior: machines that the logs allow, with what they say of parameters together, at
-    /// places and with loads that are drawn.
+    /// Family from the draws of a posterior: machines that the logs allow, with what they say of parameters together,
+    /// at places and with loads that are drawn.
     fn of_draws(case: &Case, tuning: &Tuning, file: &Path) -> Result<Self> {
         let plan = case.fit.as_ref().ok_or_else(|| {
-            Error::new("draws are of what a fit searched for, and this case has no [fit]")
+            Error::new("draws belong to the parameters of a fit, and this case has no [fit]")
                 .in_file(file)
                 .next("use --draws with the fitted.toml of the same folder, or with the case that was fitted")
         })?;
@@ -137,10 +146,7 @@ impl Family {
         tie(&mut unknowns);
         // What the draws have they have together.
         unknowns.iter_mut().take(count).enumerate().for_each(|(place, unknown)| unknown.with = place);
-        let (places, loads) = (along(case, tuning.places), tuning.loads.clone());
-        let (machine, source) = (case.machine.clone(), Source::Posterior(rows));
-        let mut family =
-            Self { places, loads, machine, unknowns, source, machines: Vec::new(), corners: tuning.corners };
+        let mut family = Self::without_machines(case, tuning, unknowns, Source::Posterior(rows));
         let count = MACHINES.min(rows);
         family.machines = family.drawn(count);
         let first = family.machines.len() - count;
@@ -153,6 +159,12 @@ impl Family {
             }
         }
         Ok(family)
+    }
+
+    fn without_machines(case: &Case, tuning: &Tuning, unknowns: Vec<Unknown>, source: Source) -> Self {
+        let [bridges, places] = along(case, tuning.places);
+        let (machine, loads) = (case.machine.clone(), tuning.loads.clone());
+        Self { places, bridges, loads, machine, unknowns, source, machines: Vec::new(), corners: tuning.corners }
     }
 
     /// The axis of the file with each load, and `count` axes of a Latin hypercube over what is off, loads and places.
@@ -170,10 +182,14 @@ impl Family {
         };
         let (at, load) = (column(), column());
         let off: Vec<Vec<f64>> = self.unknowns.iter().map(|_| column()).collect();
-        let (first, last) = (self.places.first().copied(), self.places.last().copied());
-        let (from, to) = (first.unwrap_or_default(), last.unwrap_or_default());
+        let bridge = column();
+        let between = |places: &[f64], share: f64| {
+            let [from, to] = [places.first(), places.last()].map(|place| place.copied().unwrap_or_default());
+            from + share * (to - from)
+        };
         all.extend((0..count).map(|draw| Corner {
-            place: from + at[draw] * (to - from),
+            place: between(&self.places, at[draw]),
+            bridge: between(&self.bridges, bridge[draw]),
             load: self.loads.get((load[draw] * self.loads.len() as f64) as usize).copied().unwrap_or_default(),
             off: self.unknowns.iter().map(|unknown| unknown.quantile(off[unknown.with][draw])).collect(),
         }));
@@ -201,9 +217,14 @@ impl Family {
 
     /// The axis as it is taken for, in the middle of its places, with the least load.
     pub fn nominal(&self) -> Corner {
-        let middle = self.places.get(self.places.len() / 2).copied().unwrap_or_default();
+        let middle = |places: &[f64]| places.get(places.len() / 2).copied().unwrap_or_default();
         let least = self.loads.iter().copied().fold(f64::INFINITY, f64::min);
-        Corner { place: middle, load: if least.is_finite() { least } else { 0.0 }, off: vec![0.0; self.unknowns.len()] }
+        Corner {
+            place: middle(&self.places),
+            bridge: middle(&self.bridges),
+            load: if least.is_finite() { least } else { 0.0 },
+            off: vec![0.0; self.unknowns.len()],
+        }
     }
 
     /// The machine at a corner.
@@ -217,13 +238,14 @@ impl Family {
 
     /// Its response, as the controller of `design` sees it.
     pub fn plant(&self, corner: &Corner, design: &Design, corners: &[f64]) -> Result<Plant> {
-        Plant::of(&following(self.stage_at(corner)), corner.place, design, corners)
+        Plant::of(&following(self.stage_at(corner)), corner.operation(), design, corners)
     }
 
-    /// Steps to these ends of each unknown, to these places and loads.
-    fn steps<'a>(&'a self, ends: &[f64], places: &[f64], loads: &[f64]) -> Vec<Step<'a>> {
+    /// Steps to these ends of each unknown, to these places of cart and bridge, and loads.
+    fn steps<'a>(&'a self, ends: &[f64], [places, bridges]: [&[f64]; 2], loads: &[f64]) -> Vec<Step<'a>> {
         let mut steps: Vec<Step<'a>> = Vec::new();
         steps.extend(places.iter().map(|&place| moved(move |corner| corner.place = place)));
+        steps.extend(bridges.iter().map(|&bridge| moved(move |corner| corner.bridge = bridge)));
         steps.extend(loads.iter().map(|&load| moved(move |corner| corner.load = load)));
         for unknown in self.leading() {
             steps.extend(ends.iter().map(|&end| moved(move |corner| self.put(corner, unknown, end))));
@@ -240,6 +262,9 @@ impl Family {
         }
         if self.places.len() > 1 {
             words.push(format!("cart at {:.0} mm", 1e3 * corner.place));
+        }
+        if self.bridges.len() > 1 {
+            words.push(format!("bridge at {:.0} mm", 1e3 * corner.bridge));
         }
         if words.is_empty() { "as the file has it".into() } else { words.join(", ") }
     }
@@ -259,6 +284,7 @@ impl Family {
             Ok((if value.is_nan() { f64::INFINITY } else { value }, margins))
         };
         let nominal = self.nominal();
+        let start_bridge = nominal.bridge;
         let mut best = (nominal.clone(), look(&nominal)?);
         let start = best.1.0;
         // What each unknown does by itself.
@@ -288,6 +314,10 @@ impl Family {
             let pick = |values: &[f64], share: f64| values.get((share * values.len() as f64) as usize).copied();
             let corner = Corner {
                 place: pick(&self.places, share()).unwrap_or_default(),
+                bridge: match self.bridges.len() {
+                    0 | 1 => start_bridge,
+                    _ => pick(&self.bridges, share()).unwrap_or_default(),
+                },
                 load: pick(&self.loads, share()).unwrap_or_default(),
                 off: vec![0.0; self.unknowns.len()],
             };
@@ -308,7 +338,7 @@ impl Family {
                 inner = Some((corner.clone(), found));
             }
         }
-        let ends = self.steps(&[-1.0, 0.0, 1.0], &self.places, &self.loads);
+        let ends = self.steps(&[-1.0, 0.0, 1.0], [&self.places, &self.bridges], &self.loads);
         best = climb(best, &ends, ROUNDS, &look)?;
         if let Some(other) = other {
             let other = climb(other, &ends, ROUNDS, &look)?;
@@ -317,7 +347,11 @@ impl Family {
             }
         }
         // Seldom the worst lies between the ends.
-        let between = self.steps(&[-0.75, -0.5, -0.25, 0.25, 0.5, 0.75], &halves(&self.places), &halves(&self.loads));
+        let between = self.steps(
+            &[-0.75, -0.5, -0.25, 0.25, 0.5, 0.75],
+            [&halves(&self.places), &halves(&self.bridges)],
+            &halves(&self.loads),
+        );
         let all: Vec<Step> = ends.into_iter().chain(between).collect();
         if let Some(inner) = inner {
             let inner = climb(inner, &all, 3, &look)?;
@@ -382,23 +416,29 @@ fn following(mut machine: Machine) -> Machine {
     machine
 }
 
-/// Resonance and anti-resonance of a stage at these places along its travel.
-pub(super) fn modes_along(machine: &Machine, places: &[f64]) -> Result<Vec<Place>> {
-    travel(&following(machine.clone()), Operation::default(), places)
+/// Resonance and anti-resonance of a machine at these places of its cart, the bridge being at `bridge`, m.
+pub(super) fn modes_along(machine: &Machine, bridge: f64, places: &[f64]) -> Result<Vec<Place>> {
+    travel(&following(machine.clone()), Operation { bridge, ..Operation::default() }, places)
 }
 
-/// Places along the travel: of `[travel]`, or where the moves lead.
-fn along(case: &Case, count: usize) -> Vec<f64> {
+/// Places of the bridge, where there is one, and of the cart along their travel: of `[travel]`, or where the moves lead.
+fn along(case: &Case, count: usize) -> [Vec<f64>; 2] {
     let machine = following(case.machine.clone());
-    let Some(whole) = places(&machine, count) else { return vec![0.0] };
-    let (low, high) = case
-        .moves
-        .iter()
-        .flat_map(|motion| motion.profile().strokes().flat_map(|(_, from, distance, _)| [from, from + distance]))
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
-    if machine.cart.travel.is_some() || low > high {
-        return whole;
-    }
     let steps = count.max(2) - 1;
-    (0..=steps).map(|i| low + (high - low) * i as f64 / steps as f64).collect()
+    let evenly = |low: f64, high: f64| (0..=steps).map(|i| low + (high - low) * i as f64 / steps as f64).collect();
+    let of_moves = |slide: usize| {
+        let profiles = case.moves.iter().map(|motion| &motion.profiles[slide]);
+        let ends = profiles.flat_map(|profile| profile.strokes().flat_map(|(_, from, way, _)| [from, from + way]));
+        let (low, high) = ends.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
+        (low <= high).then(|| evenly(low, high))
+    };
+    if machine.bridge.is_some() {
+        let of_slide = |slide| of_moves(slide).filter(|_| machine.belt.follows_cart).unwrap_or(vec![0.0]);
+        return [of_slide(0), of_slide(1)];
+    }
+    let Some(whole) = places(&machine, count) else { return [Vec::new(), vec![0.0]] };
+    match of_moves(0).filter(|_| machine.cart.travel.is_none()) {
+        Some(places) => [Vec::new(), places],
+        None => [Vec::new(), whole],
+    }
 }

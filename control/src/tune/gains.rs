@@ -24,7 +24,7 @@ pub struct Gain {
     pub unit: &'static str,
     /// Its value.
     pub value: f64,
-    /// Whether a search changes it.
+    /// True if a search changes it.
     pub searched: bool,
 }
 
@@ -34,7 +34,7 @@ fn places() -> impl Iterator<Item = (&'static str, parameter::InStructure)> {
     parameter::all().filter_map(place).filter(|(_, gain)| gain.tuned != Tuned::No)
 }
 
-/// Whether a search changes a gain of this design: not what is zero, nor the corner of what is.
+/// True if a search changes a gain of this design: not what is zero, nor the corner of what is.
 fn is_searched(design: &Design, gain: &parameter::InStructure) -> bool {
     let is_there = |gain: &parameter::InStructure| (gain.get)(&design.structure).is_some_and(|value| value != 0.0);
     is_there(gain)

@@ -3,16 +3,17 @@
 //! They are found by simulation. Between two slips of a stuck axis the command is a ramp, the integral of an error that
 //! stays, and the next slip is known in closed form: with the slope u̇ of the command and its force g per command it
 //! comes where g u reaches the breakaway of cart and pulleys. That says how long to watch where slips are rare, and
-//! when the next one comes where no watch is long enough.
+//! when the next one comes where no watch is long enough. Machines with several drives are watched without that.
 
-use crate::control::{Loop, Rows, Standard, stream};
+use crate::control::{Loop, Rows, Standard, each, stream};
 use crate::design::Design;
 use crate::error::Result;
 use crate::friction::Side;
 use crate::machine::rigid::Rigid;
-use crate::machine::{Encoder, Machine};
+use crate::machine::{Encoder, Machine, Slide, SlideAt};
 use crate::signal::profile::{Leg, Limits, Profile};
 use crate::solve::{Flow, Solver};
+use crate::trajectory::Trajectory;
 
 /// Way out before the slow reversal, m, half of which it goes back; enough to break away. Less on a short travel.
 const WAY: f64 = 10e-3;
@@ -57,7 +58,7 @@ pub struct Hunt {
     /// Time from one slip, or burst of slips, to the next of an axis that is stuck between them, s: half of the time it
     /// stands in spells of at least that length. Infinite where it swings all the time.
     pub slips_every: f64,
-    /// Whether intervals from one swing to the next differ by more than a quarter of their mean.
+    /// True if intervals from one swing to the next differ by more than a quarter of their mean.
     pub irregular: bool,
     /// Without each of these it comes to rest.
     pub needs: Vec<&'static str>,
@@ -89,9 +90,9 @@ pub fn hunting(machine: &Machine, design: &Design) -> Result<Option<Hunt>> {
     if other != *machine {
         without("breakaway above Coulomb friction", &other, design)?;
     }
-    if machine.drives[0].motor.gear_play.is_some() {
+    if machine.drives.iter().any(|drive| drive.motor.gear_play.is_some()) {
         let mut other = machine.clone();
-        other.drives[0].motor.gear_play = None;
+        other.drives.iter_mut().for_each(|drive| drive.motor.gear_play = None);
         without("play in the gear", &other, design)?;
     }
     if machine.encoder.is_some() {
@@ -143,7 +144,7 @@ fn hunts_at(machine: &Machine, design: &Design, start: f64) -> Result<Option<Hun
     }
     let watched = (short + SLIPS * most).min(bound);
     let second = seen(machine, design, machine, start, (watched, 0.25 * short))?;
-    Ok(match (second.swing.or_else(|| rare(&second.cart)), second.next(machine)) {
+    Ok(match (second.swing.or_else(|| widest(&second.slides, rare)), second.next(machine)) {
         (Some(swing), _) => Some(hunt(swing, watched)),
         // It slips, though not often enough for a swing to be seen.
         (None, Some((next, _))) => Some(unseen(next, watched)),
@@ -170,7 +171,9 @@ impl Hunt {
 
 fn friction(machine: &Machine, change: fn(&mut Side)) -> Machine {
     let mut other = machine.clone();
-    for law in [&mut other.drive_pulley.friction, &mut other.cart.friction, &mut other.idler_pulley.friction] {
+    let bridge = other.bridge.iter_mut().map(|bridge| &mut bridge.friction);
+    let others = [&mut other.drive_pulley.friction, &mut other.cart.friction, &mut other.idler_pulley.friction];
+    for law in bridge.chain(others) {
         change(&mut law.forward);
         change(&mut law.backward);
     }
@@ -209,19 +212,22 @@ struct Swing {
     slips_every: f64,
 }
 
-/// A watched swing of the cart, its place (m) over time (s), and the command where it ended, with its slope where it is
-/// a ramp.
+/// A watched swing of what slides, its places (m) over time (s), and the command where it ended, with its slope where it
+/// is a ramp.
 struct Seen {
     swing: Option<Swing>,
-    cart: Vec<(f64, f64)>,
+    slides: Vec<Vec<(f64, f64)>>,
     command: f64,
     slope: Option<f64>,
 }
 
 impl Seen {
     /// How long it is until the command of a stuck axis has reached its breakaway, and how long it is from one
-    /// breakaway to the other, s; none where the command does not go there.
+    /// breakaway to the other, s; none where the command does not go there, and with several drives.
     fn next(&self, machine: &Machine) -> Option<(f64, f64)> {
+        if machine.drives.len() > 1 {
+            return None;
+        }
         let (rigid, r) = (Rigid::of(machine), machine.pulley_radius);
         let most = |side: &Side| side.coulomb.max(side.breakaway);
         let of = |friction: &crate::friction::Friction| most(&friction.forward).max(most(&friction.backward));
@@ -255,30 +261,43 @@ fn seen(
 ) -> Result<Seen> {
     let limits = Limits { speed: SPEED, acceleration: 0.2, jerk: None, snap: None };
     // From 0, to the side that has more room.
-    let way = start
-        * machine.cart.travel.map_or(WAY, |travel| match travel.max >= -travel.min {
-            true => travel.max.clamp(0.0, 2.0 * WAY) * 0.5,
-            false => travel.min.clamp(-2.0 * WAY, 0.0) * 0.5,
-        });
-    let profile = Profile::new(0.0, &[Leg::To(way, limits), Leg::To(0.5 * way, limits)])?;
-    let from = profile.end();
+    let reversal = |slide: &Slide| {
+        let way = start
+            * slide.travel.map_or(WAY, |travel| match travel.max >= -travel.min {
+                true => travel.max.clamp(0.0, 2.0 * WAY) * 0.5,
+                false => travel.min.clamp(-2.0 * WAY, 0.0) * 0.5,
+            });
+        Profile::new(0.0, &[Leg::To(way, limits), Leg::To(0.5 * way, limits)])
+    };
+    let profiles = machine.slides().map(reversal).collect::<Result<Vec<_>>>()?;
+    let from = profiles.iter().map(Profile::end).fold(0.0, f64::max);
     let until = from + watched;
-    let mut controller = Standard::new(design, model)?;
+    let mut controllers = Standard::of_drives(design, model)?;
     let rows = Rows { until, every: design.every.min(until), window: 1e-4 };
-    let mut cart: Vec<(f64, f64)> = Vec::new();
-    let solver = Solver::of(machine);
-    let run =
-        stream(machine, &mut [&mut controller], &Loop::of(design), &[profile], &rows, solver, true, &mut |block| {
-            let (time, x) = (block.get("time").unwrap_or(&[]), block.get("cart_position").unwrap_or(&[]));
-            let late = time.iter().zip(x).filter(|(t, _)| **t > from + skipped);
-            cart.extend(late.map(|(t, x)| (*t, *x)));
-            Flow::Continue
-        })?;
+    let geometry = machine.geometry();
+    let column = |slide: &SlideAt| format!("{}_position", geometry.label(slide.body).key);
+    let columns: Vec<String> = geometry.slides.iter().map(column).collect();
+    let mut slides: Vec<Vec<(f64, f64)>> = vec![Vec::new(); columns.len()];
+    let mut take = |block: &Trajectory| {
+        let time = block.get("time").unwrap_or(&[]);
+        for (places, column) in slides.iter_mut().zip(&columns) {
+            let late = time.iter().zip(block.get(column).unwrap_or(&[])).filter(|(t, _)| **t > from + skipped);
+            places.extend(late.map(|(t, x)| (*t, *x)));
+        }
+        Flow::Continue
+    };
+    let (timing, solver) = (Loop::of(design), Solver::of(machine));
+    let run = stream(machine, &mut each(&mut controllers), &timing, &profiles, &rows, solver, true, &mut take)?;
     // The last eighth of the watch.
-    let late = run.kept.iter().filter(|sample| sample.time >= until - 0.125 * watched);
+    let late = run.kept.iter().filter(|sample| sample.drive == 0 && sample.time >= until - 0.125 * watched);
     let command: Vec<(f64, f64)> = late.map(|sample| (sample.time, sample.given)).collect();
     let command_now = command.last().map_or(0.0, |(_, given)| *given);
-    Ok(Seen { swing: swung(&cart), cart, command: command_now, slope: slope(&command) })
+    Ok(Seen { swing: widest(&slides, swung), slides, command: command_now, slope: slope(&command) })
+}
+
+/// The widest swing of what slides.
+fn widest(slides: &[Vec<(f64, f64)>], swing: fn(&[(f64, f64)]) -> Option<Swing>) -> Option<Swing> {
+    slides.iter().filter_map(|places| swing(places)).max_by(|a, b| a.amplitude.total_cmp(&b.amplitude))
 }
 
 /// The swing of a cart of which place (m) over time (s) is known from a time on at which it should rest.

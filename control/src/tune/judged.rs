@@ -84,7 +84,7 @@ pub enum Limit {
 }
 
 impl Limit {
-    /// As in the case file.
+    /// Its name in the case file.
     pub fn word(self) -> &'static str {
         match self {
             Self::Sensitivity => "sensitivity",
@@ -108,7 +108,7 @@ pub enum Figure {
 }
 
 impl Figure {
-    /// As in `tune.json`.
+    /// Its name in `tune.json`.
     pub fn word(self) -> &'static str {
         match self {
             Self::Error => "cart_error_m",
@@ -157,7 +157,7 @@ pub enum Standing {
 }
 
 impl Standing {
-    /// As in `tune.json`.
+    /// Its name in `tune.json`.
     pub fn word(self) -> &'static str {
         match self {
             Self::WayBack => "way_back",

@@ -1,18 +1,22 @@
 //! The loops of a controller at one frequency, each broken at another place.
 //!
-//! With the command u and what is measured, the position y, a scale x beside it and the current i, a controller is
-//! D u = −(N_y y + N_x x + N_i i) and the axis y = G_y u, x = G_x u, i = G_i u. With P_k = N_k G_k,
+//! With the commands u and what is measured, the positions y, a scale x beside them and the currents i, the controllers
+//! of all drives, which are alike, are D u = −(N_y y + N_x x + N_i i) and the machine y = G_y u, x = G_x u, i = G_i u:
+//! numbers for one drive, matrices for several. With P_k = N_k G_k,
 //!
 //! ```text
 //! Δ = D + Σ P_k
-//! broken at the command:       L = Σ P_k/D,              S = D/Δ
-//! broken at a measurement k:   L = P_k/(Δ − P_k),        S = (Δ − P_k)/Δ
+//! broken at the commands:       L = D⁻¹ Σ P_k,            S = D Δ⁻¹
+//! broken at measurements k:     L = P_k (Δ − P_k)⁻¹,      S = (Δ − P_k) Δ⁻¹
 //! ```
 //!
-//! All have the same closed loop, Δ = 0, and margins of their own. With a single measurement both are the same loop.
+//! All have the same closed loop, det Δ = 0, and margins of their own. With a single measurement of a single drive both
+//! are the same loop. Of several drives |S| and |T| are the largest singular values, and the loop of one drive with
+//! those of the others closed is L_j = T_jj/S_jj.
 
-use super::plant::{Answer, Plant};
+use super::plant::{Answer, Plant, Sampled, Square, by_drives};
 use crate::control::feedback::{Feedback, Turn};
+use crate::mechanism::DRIVES;
 use nalgebra::Complex;
 
 /// Where a loop is broken.
@@ -53,95 +57,222 @@ pub fn breaks(feedback: &Feedback) -> &'static [Break] {
 
 /// The loops at one frequency.
 #[derive(Debug, Clone, Copy)]
-pub struct Open {
+pub(super) struct Open<const N: usize> {
     /// D.
     own: Complex<f64>,
     /// P_y, P_x, P_i.
-    parts: [Complex<f64>; 3],
-    /// Δ: 1 + L, times what has stable poles.
-    pub(super) difference: Complex<f64>,
-    /// Whether the position loop is closed at a scale.
+    parts: [Square<N>; 3],
+    /// The adjugate of Δ, and det Δ: det (1 + L), times what has stable poles.
+    adjugate: Square<N>,
+    pub difference: Complex<f64>,
+    /// True if the position loop is closed at a scale.
     has_scale: bool,
-    /// The cart's position per position that follows the reference, and per step beside the command.
-    cart: Complex<f64>,
-    pub(super) pushed: Complex<f64>,
+    /// The positions of what slides per position that follows the reference, and per step beside the command.
+    slides: Square<N>,
+    pub pushed: Square<N>,
+    /// What each drive's part of the belt does per way of what slides.
+    shares: Square<N>,
 }
 
-impl Open {
-    pub(super) fn of(answer: &Answer, feedback: &Feedback, turn: &Turn) -> Self {
+impl<const N: usize> Open<N> {
+    pub fn of(sampled: &Sampled<N>, answer: &Answer<N>, feedback: &Feedback, turn: &Turn) -> Self {
         let terms = feedback.at_turn(turn);
         let own = terms.own;
-        let parts = [
-            terms.position * answer.position, //
-            terms.scale * answer.cart,
-            terms.current * answer.current,
-        ];
+        let parts = [answer.position * terms.position, answer.slides * terms.scale, answer.current * terms.current];
         // Δ = D + P_y + P_x + P_i
-        let difference = own + parts[0] + parts[1] + parts[2];
-        // x = G_x D/Δ v for a step v beside the command
-        let pushed = answer.cart * own / difference;
+        let whole = diagonal(own) + parts[0] + parts[1] + parts[2];
+        let (adjugate, difference) = inverse(&whole);
+        // x = G_x D Δ⁻¹ v for a step v beside the command
+        let pushed = over(&(answer.slides * own), &adjugate, difference);
         let has_scale = feedback.uses_scale();
         // What follows the reference is the cart itself where it is measured.
-        let follows = if has_scale { answer.cart } else { answer.position };
-        Self { own, parts, difference, has_scale, cart: answer.cart / follows, pushed }
+        let follows = if has_scale { answer.slides } else { answer.position };
+        let (turned, size) = inverse(&follows);
+        let slides = over(&answer.slides, &turned, size);
+        Self { own, parts, adjugate, difference, has_scale, slides, pushed, shares: sampled.shares }
     }
 
-    /// The two parts of Δ: what is closed inside the loop broken there, and the loop itself; L is the second over the
-    /// first.
-    fn parted(&self, at: Break) -> (Complex<f64>, Complex<f64>) {
-        let [y, x, i] = self.parts;
+    /// The two parts of Δ: what is closed inside the loop broken there, and the loop itself.
+    fn parted(&self, at: Break) -> [Square<N>; 2] {
+        let (own, [y, x, i]) = (diagonal(self.own), self.parts);
         match at {
-            Break::Command => (self.own, y + x + i),
-            Break::Position => (self.own + x + i, y),
-            Break::Scale => (self.own + y + i, x),
-            Break::Current => (self.own + y + x, i),
+            Break::Command => [own, y + x + i],
+            Break::Position => [own + x + i, y],
+            Break::Scale => [own + y + i, x],
+            Break::Current => [own + y + x, i],
         }
     }
 
+    /// S and T of the loop broken there, times det Δ.
+    fn closed(&self, at: Break) -> [Square<N>; 2] {
+        self.parted(at).map(|part| times(&part, &self.adjugate))
+    }
+
     /// The break of the loop that follows the reference: the scale, or the measured position without one.
-    pub(super) fn outer(&self) -> Break {
+    pub fn outer(&self) -> Break {
         if self.has_scale { Break::Scale } else { Break::Position }
     }
 
-    /// L broken there.
-    pub fn broken_at(&self, at: Break) -> Complex<f64> {
-        let (inner, outer) = self.parted(at);
-        outer / inner
+    /// L of a drive broken there, the loops of the others being closed.
+    pub fn broken_at(&self, at: Break, drive: usize) -> Complex<f64> {
+        let [inner, outer] = self.closed(at);
+        outer[(drive, drive)] / inner[(drive, drive)]
     }
 
     /// |S| of the loop broken there.
     pub fn sensitivity(&self, at: Break) -> f64 {
-        (self.parted(at).0 / self.difference).norm()
+        largest(&(self.closed(at)[0] / self.difference))
     }
 
     /// |T| of the loop broken there.
     pub fn complementary(&self, at: Break) -> f64 {
-        (self.parted(at).1 / self.difference).norm()
+        largest(&(self.closed(at)[1] / self.difference))
     }
 
     /// |S|² and |T|², of the worst of these breaks each.
-    pub(super) fn squares(&self, breaks: &[Break]) -> [f64; 2] {
+    pub fn squares(&self, breaks: &[Break]) -> [f64; 2] {
         let least = self.difference.norm_sqr().recip();
         let mut most = [0.0_f64; 2];
         for &at in breaks {
-            let (inner, outer) = self.parted(at);
-            most = [most[0].max(inner.norm_sqr() * least), most[1].max(outer.norm_sqr() * least)];
+            for (most, part) in most.iter_mut().zip(self.closed(at)) {
+                *most = most.max(largest_square(&part) * least);
+            }
         }
         most
     }
 
     /// |S| of the loop that follows the reference.
-    pub(super) fn following(&self) -> f64 {
+    pub fn following(&self) -> f64 {
         self.sensitivity(self.outer())
     }
 
-    /// T x/y: from the reference to the cart, without feed-forward.
-    pub fn reference_to_cart(&self) -> Complex<f64> {
-        self.parted(self.outer()).1 / self.difference * self.cart
+    /// T x/y: from the references of what slides to what slides, without feed-forward.
+    pub fn reference_to_slides(&self) -> Square<N> {
+        self.slides * (self.closed(self.outer())[1] / self.difference) * self.shares
+    }
+
+    /// True if `other` is turned by more than `most` from this in any of the loops.
+    pub fn turns(&self, other: &Self, breaks: &[Break], most: f64) -> bool {
+        let turns = |a: Complex<f64>, b: Complex<f64>| (b / a).arg().abs() > most;
+        turns(self.difference, other.difference)
+            || breaks.iter().any(|&at| (0..N).any(|drive| turns(self.broken_at(at, drive), other.broken_at(at, drive))))
     }
 }
 
-/// The loops at all frequencies of the axis.
-pub fn loops(plant: &Plant, feedback: &Feedback) -> Vec<Open> {
-    plant.seen().map(|(_, answer, turn)| Open::of(answer, feedback, turn)).collect()
+/// A number on the diagonal.
+fn diagonal<const N: usize>(value: Complex<f64>) -> Square<N> {
+    Square::from_diagonal_element(value)
+}
+
+/// A product with an adjugate, which is 1 for a single drive.
+fn times<const N: usize>(a: &Square<N>, adjugate: &Square<N>) -> Square<N> {
+    if N == 1 { *a } else { a * adjugate }
+}
+
+/// A product with an inverse: the adjugate over the determinant.
+fn over<const N: usize>(a: &Square<N>, adjugate: &Square<N>, determinant: Complex<f64>) -> Square<N> {
+    times(a, adjugate) / determinant
+}
+
+/// Adjugate and determinant.
+fn inverse<const N: usize>(a: &Square<N>) -> (Square<N>, Complex<f64>) {
+    let mut adjugate = diagonal(Complex::ONE);
+    if N == 1 {
+        return (adjugate, a[(0, 0)]);
+    }
+    for (row, column) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+        let own = if row == column { a[(1 - row, 1 - column)] } else { -a[(row, column)] };
+        adjugate[(row, column)] = own;
+    }
+    (adjugate, a[(0, 0)] * a[(1, 1)] - a[(0, 1)] * a[(1, 0)])
+}
+
+/// The largest singular value.
+fn largest<const N: usize>(a: &Square<N>) -> f64 {
+    if N == 1 { a[(0, 0)].norm() } else { largest_square(a).sqrt() }
+}
+
+/// Its square: of two rows (‖A‖² + √(‖A‖⁴ − 4 |det A|²))/2 with the sum ‖A‖² of all squares.
+fn largest_square<const N: usize>(a: &Square<N>) -> f64 {
+    if N == 1 {
+        return a[(0, 0)].norm_sqr();
+    }
+    let sum: f64 = a.iter().map(Complex::norm_sqr).sum();
+    let [first, second] = [0, 1].map(|row| a[(row, 0)].norm_sqr() + a[(row, 1)].norm_sqr());
+    let inner = a[(0, 0)] * a[(1, 0)].conj() + a[(0, 1)] * a[(1, 1)].conj();
+    // The same root without the loss of a difference.
+    0.5 * (sum + ((first - second).powi(2) + 4.0 * inner.norm_sqr()).sqrt())
+}
+
+/// The smallest singular value: |det A| over the largest.
+pub(super) fn smallest<const N: usize>(a: &Square<N>) -> f64 {
+    if N == 1 { a[(0, 0)].norm() } else { inverse(a).1.norm() / largest(a) }
+}
+
+/// The loops broken at one place, at one frequency.
+#[derive(Debug, Clone, Copy)]
+pub struct Broken {
+    /// Where.
+    pub at: Break,
+    /// |S|.
+    pub sensitivity: f64,
+    /// |T|.
+    pub complementary: f64,
+    /// L of each drive, the loops of the others being closed.
+    pub drives: [Complex<f64>; DRIVES],
+}
+
+/// The loops at one frequency: at each of [`breaks`], and from the reference of each part that slides to that part,
+/// without feed-forward.
+#[derive(Debug, Clone)]
+pub struct Loops {
+    /// In the order of [`breaks`].
+    pub broken: Vec<Broken>,
+    /// In the order of the slides.
+    pub reference_to_slides: [Complex<f64>; DRIVES],
+}
+
+impl Loops {
+    /// L of a drive broken there, the loops of the others being closed.
+    ///
+    /// # Panics
+    ///
+    /// Where the controller's loop is not broken.
+    pub fn broken_at(&self, at: Break, drive: usize) -> Complex<f64> {
+        self.broken.iter().find(|broken| broken.at == at).expect("a break of this controller").drives[drive]
+    }
+
+    /// |S| at the worst break.
+    pub fn sensitivity(&self) -> f64 {
+        self.broken.iter().map(|broken| broken.sensitivity).fold(0.0, f64::max)
+    }
+
+    /// |T| at the worst break.
+    pub fn complementary(&self) -> f64 {
+        self.broken.iter().map(|broken| broken.complementary).fold(0.0, f64::max)
+    }
+}
+
+/// The loops at all frequencies of the machine.
+pub fn loops(plant: &Plant, feedback: &Feedback) -> Vec<Loops> {
+    by_drives!(plant, |sampled| all(plant, sampled, feedback))
+}
+
+fn all<const N: usize>(plant: &Plant, sampled: &Sampled<N>, feedback: &Feedback) -> Vec<Loops> {
+    let filled =
+        |of: &dyn Fn(usize) -> Complex<f64>| std::array::from_fn(|k| if k < N { of(k) } else { Complex::ZERO });
+    let one = |open: Open<N>| {
+        let broken = |&at: &Break| Broken {
+            at,
+            sensitivity: open.sensitivity(at),
+            complementary: open.complementary(at),
+            drives: filled(&|drive| open.broken_at(at, drive)),
+        };
+        let slides = open.reference_to_slides();
+        Loops {
+            broken: breaks(feedback).iter().map(broken).collect(),
+            reference_to_slides: filled(&|slide| slides[(slide, slide)]),
+        }
+    };
+    plant.seen(sampled).map(|(_, answer, turn)| one(Open::of(sampled, answer, feedback, turn))).collect()
 }

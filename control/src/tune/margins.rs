@@ -4,15 +4,20 @@
 //! each of them, the others being closed (`loops.rs`); of every figure the worst break counts. Held commands, delay and
 //! filters are in it exactly.
 //!
+//! The loops of several drives are one: they are stable if det (1 + L) says so, and |S| and |T| are largest singular
+//! values. Gain and phase margin are those of one drive's loop with the others closed, as one measures them, the worst
+//! of all.
+//!
 //! The peaks of |S| and |T| stand at poles of the closed loop, which no grid knows beforehand. So a grid that is dense
 //! about the poles of the axis is first divided wherever one L or 1 + L turns by much from one point to the next, which
 //! it does about every lightly damped pole of the closed loop; then every local maximum is followed to its top, and every
 //! crossing to where it is.
 
-use super::loops::{Break, Open, breaks, loops};
-use super::plant::Plant;
+use super::loops::{Break, Open, breaks, smallest};
+use super::plant::{Plant, Sampled, Square, by_drives};
 use super::winding::Winding;
 use crate::control::feedback::{Feedback, Turn};
+use crate::machine::Kind;
 use nalgebra::Complex;
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
@@ -48,12 +53,16 @@ pub struct Breaks {
     pub gain: Break,
     /// Of the phase margin.
     pub phase: Break,
+    /// The drive whose gain margin is the least, by number.
+    pub gain_drive: usize,
+    /// The drive whose phase margin is the least.
+    pub phase_drive: usize,
 }
 
 /// The margins of a sampled loop, each at the break at which it is worst.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Margins {
-    /// Whether every pole of the closed loop lies within the unit circle, by Nyquist's criterion.
+    /// True if every pole of the closed loop lies within the unit circle, by Nyquist's criterion.
     pub stable: bool,
     /// M_s = max |S|, S = 1/(1 + L); infinite if it is not stable.
     pub sensitivity: f64,
@@ -69,8 +78,10 @@ pub struct Margins {
     pub phase: f64,
     /// Where these are worst.
     pub breaks: Breaks,
-    /// Whether the loop is the same wherever it is broken: the controller uses a single measurement.
+    /// True if the loop is the same wherever it is broken: the controller of a drive uses a single measurement.
     pub has_one_loop: bool,
+    /// The kind of machine, whose drives these are.
+    pub kind: Kind,
     /// Where |L| of the loop that follows the reference falls below 1, the first time, rad/s.
     pub crossover: f64,
     /// Where |S| of that loop rises above 1/√2, the first time, rad/s.
@@ -87,18 +98,26 @@ pub struct Margins {
 }
 
 impl Margins {
+    /// The name of a drive, where there are several.
+    pub fn drive_name(&self, drive: usize) -> Option<&'static str> {
+        let drives = self.kind.geometry().drives;
+        if drives.len() > 1 { Some(drives[drive].label.name) } else { None }
+    }
+
     /// Of a controller on an axis; peaks and crossings where they are, not where a grid has a point.
     pub fn of(plant: &Plant, feedback: &Feedback) -> Self {
-        let mut curve = Curve::on_grid(plant, feedback);
-        curve.divide();
-        let mut margins = curve.margins();
+        let mut margins = by_drives!(plant, |sampled| {
+            let mut curve = Curve::on_grid(plant, sampled, feedback);
+            curve.divide();
+            curve.margins()
+        });
         if !margins.stable {
             margins.spoil();
         }
         margins
     }
 
-    /// Those of a loop that is not stable.
+    /// Sets the margins of an unstable loop.
     fn spoil(&mut self) {
         (self.sensitivity, self.complementary) = (f64::INFINITY, f64::INFINITY);
         (self.gain, self.phase) = (1.0, 0.0);
@@ -128,14 +147,16 @@ pub struct Peaks {
 impl Peaks {
     /// Of a controller on an axis, the same as those of [`Margins::of`].
     pub fn of(plant: &Plant, feedback: &Feedback) -> Self {
-        let mut curve = Curve::on_grid(plant, feedback);
-        curve.divide();
-        let peaks = [curve.highest(Open::sensitivity).value, curve.highest(Open::complementary).value];
-        let is_stable = curve.is_stable() && peaks[0].is_finite();
+        let (peaks, is_stable) = by_drives!(plant, |sampled| {
+            let mut curve = Curve::on_grid(plant, sampled, feedback);
+            curve.divide();
+            let peaks = [curve.highest(Open::sensitivity).value, curve.highest(Open::complementary).value];
+            (peaks, curve.is_stable() && peaks[0].is_finite())
+        });
         Self { peaks: if is_stable { peaks } else { [f64::INFINITY; 2] } }
     }
 
-    /// Whether the loop is stable.
+    /// True if the loop is stable.
     pub fn is_stable(&self) -> bool {
         self.peaks[0].is_finite()
     }
@@ -160,18 +181,22 @@ pub struct Rough {
 impl Rough {
     /// Of a controller on an axis.
     pub fn of(plant: &Plant, feedback: &Feedback) -> Self {
+        by_drives!(plant, |sampled| Self::of_sampled(plant, sampled, feedback))
+    }
+
+    fn of_sampled<const N: usize>(plant: &Plant, sampled: &Sampled<N>, feedback: &Feedback) -> Self {
         let mut most = [0.0_f64; 2];
         let mut sums = [0.0; 2];
-        let mut winding = Winding::new(plant, feedback);
+        let mut winding = Winding::new(plant, feedback, N);
         let mut before: Option<(f64, [f64; 2])> = None;
         let breaks = breaks(feedback);
-        for (omega, answer, turn) in plant.seen() {
-            let open = Open::of(answer, feedback, turn);
+        for (omega, answer, turn) in plant.seen(sampled) {
+            let open = Open::of(sampled, answer, feedback, turn);
             winding.go_on(omega, open.difference, turn);
             // |S|² and |T|², |x/v|² and |S|² of what follows the reference
             let squares = open.squares(breaks);
             most = [most[0].max(squares[0]), most[1].max(squares[1])];
-            let parts = [open.pushed.norm_sqr() / omega, open.following().powi(2) / omega];
+            let parts = [all_squares(&open.pushed) / omega, open.following().powi(2) / omega];
             if let Some((last, was)) = before.filter(|(last, _)| *last >= 2.0 * PI * SLOWEST) {
                 let way = 0.5 * (omega / last).ln();
                 for (sum, (a, b)) in sums.iter_mut().zip(was.iter().zip(parts)) {
@@ -190,11 +215,12 @@ impl Rough {
 }
 
 /// The loops along the frequencies.
-struct Curve<'a> {
+struct Curve<'a, const N: usize> {
     plant: &'a Plant,
+    sampled: &'a Sampled<N>,
     feedback: &'a Feedback,
     breaks: &'static [Break],
-    points: Vec<(f64, Open)>,
+    points: Vec<(f64, Open<N>)>,
 }
 
 /// A top of |S| or |T|.
@@ -207,27 +233,29 @@ struct Top {
 }
 
 /// Value of a loop broken at one place.
-type Of = fn(&Open, Break) -> f64;
+type Of<const N: usize> = fn(&Open<N>, Break) -> f64;
 
-impl<'a> Curve<'a> {
-    fn on_grid(plant: &'a Plant, feedback: &'a Feedback) -> Self {
-        let points = plant.frequency.iter().copied().zip(loops(plant, feedback)).collect();
-        Self { plant, feedback, breaks: breaks(feedback), points }
+/// Σ |a|² over a matrix.
+fn all_squares<const N: usize>(a: &Square<N>) -> f64 {
+    a.iter().map(Complex::norm_sqr).sum()
+}
+
+impl<'a, const N: usize> Curve<'a, N> {
+    fn on_grid(plant: &'a Plant, sampled: &'a Sampled<N>, feedback: &'a Feedback) -> Self {
+        let open = |(omega, answer, turn)| (omega, Open::of(sampled, answer, feedback, turn));
+        let points = plant.seen(sampled).map(open).collect();
+        Self { plant, sampled, feedback, breaks: breaks(feedback), points }
     }
 
-    fn at(&self, omega: f64) -> Open {
-        Open::of(&self.plant.at(omega), self.feedback, &Turn::of(omega, self.plant.every))
+    fn at(&self, omega: f64) -> Open<N> {
+        Open::of(self.sampled, &self.sampled.at(omega), self.feedback, &Turn::of(omega, self.plant.every))
     }
 
     /// Puts points between those from one of which to the next one L or 1 + L turns by more than [`TURN`].
     fn divide(&mut self) {
-        let breaks = self.breaks;
-        let turns = |a: &Open, b: &Open| {
-            let turn = |a: Complex<f64>, b: Complex<f64>| (b / a).arg().abs() > TURN;
-            turn(a.difference, b.difference) || breaks.iter().any(|&at| turn(a.broken_at(at), b.broken_at(at)))
-        };
-        let mut done: Vec<(f64, Open)> = Vec::with_capacity(2 * self.points.len());
-        let mut waiting: Vec<(f64, Open)> = self.points.iter().rev().copied().collect();
+        let turns = |a: &Open<N>, b: &Open<N>| a.turns(b, self.breaks, TURN);
+        let mut done: Vec<(f64, Open<N>)> = Vec::with_capacity(2 * self.points.len());
+        let mut waiting: Vec<(f64, Open<N>)> = self.points.iter().rev().copied().collect();
         let mut added = 0;
         done.extend(waiting.pop());
         while let (Some(last), Some(next)) = (done.last(), waiting.last()) {
@@ -242,9 +270,9 @@ impl<'a> Curve<'a> {
         self.points = done;
     }
 
-    /// Whether the closed loop is stable.
+    /// True if the closed loop is stable.
     fn is_stable(&self) -> bool {
-        let mut winding = Winding::new(self.plant, self.feedback);
+        let mut winding = Winding::new(self.plant, self.feedback, N);
         for (omega, open) in &self.points {
             winding.go_on(*omega, open.difference, &Turn::of(*omega, self.plant.every));
         }
@@ -264,30 +292,40 @@ impl<'a> Curve<'a> {
             complementary_at: complementary.omega,
             gain: f64::INFINITY,
             phase: f64::INFINITY,
-            breaks: Breaks { sensitivity: top.at, complementary: complementary.at, gain: first, phase: first },
+            breaks: Breaks {
+                sensitivity: top.at,
+                complementary: complementary.at,
+                gain: first,
+                phase: first,
+                gain_drive: 0,
+                phase_drive: 0,
+            },
             has_one_loop: self.breaks.len() == 1,
+            kind: self.plant.kind,
             crossover: f64::NAN,
             bandwidth: f64::NAN,
             tracking: f64::NAN,
-            disturbance: self.squared(&|open| open.pushed.norm_sqr()),
+            disturbance: self.squared(&|open| all_squares(&open.pushed)),
             following: self.squared(&|open| open.following().powi(2)),
         };
         for &at in self.breaks {
-            self.cross(at, &mut margins);
+            (0..N).for_each(|drive| self.cross(at, drive, &mut margins));
         }
         for pair in self.points.windows(2) {
             let [(_, was), (_, is)] = [pair[0], pair[1]];
-            let falls = |of: &dyn Fn(&Open) -> f64| of(&was) >= 0.0 && of(&is) < 0.0;
+            let falls = |of: &dyn Fn(&Open<N>) -> f64| of(&was) >= 0.0 && of(&is) < 0.0;
             let level = |value: f64| value.ln() - FRAC_1_SQRT_2.ln();
-            let of_l = |open: &Open| open.broken_at(open.outer()).norm().ln();
+            let of_l = |open: &Open<N>| {
+                (0..N).map(|drive| open.broken_at(open.outer(), drive).norm()).fold(0.0, f64::max).ln()
+            };
             if margins.crossover.is_nan() && falls(&of_l) {
                 margins.crossover = self.crossing(pair, &of_l).0;
             }
-            let of_s = |open: &Open| -level(open.following());
+            let of_s = |open: &Open<N>| -level(open.following());
             if margins.bandwidth.is_nan() && falls(&of_s) {
                 margins.bandwidth = self.crossing(pair, &of_s).0;
             }
-            let of_t = |open: &Open| level(open.reference_to_cart().norm());
+            let of_t = |open: &Open<N>| level(smallest(&open.reference_to_slides()));
             if margins.tracking.is_nan() && falls(&of_t) {
                 margins.tracking = self.crossing(pair, &of_t).0;
             }
@@ -295,13 +333,13 @@ impl<'a> Curve<'a> {
         margins
     }
 
-    /// Gain and phase margin of the loop broken there, where they are less than those of other breaks.
-    fn cross(&self, at: Break, margins: &mut Margins) {
-        let of = |open: &Open| open.broken_at(at);
+    /// Gain and phase margin of a drive's loop broken there, where they are less than those of other breaks and drives.
+    fn cross(&self, at: Break, drive: usize, margins: &mut Margins) {
+        let of = |open: &Open<N>| open.broken_at(at, drive);
         // −L on the positive real axis
         let mut grow = |size: f64| {
             if size > 0.0 && size < 1.0 && 1.0 / size < margins.gain {
-                (margins.gain, margins.breaks.gain) = (1.0 / size, at);
+                (margins.gain, margins.breaks.gain, margins.breaks.gain_drive) = (1.0 / size, at, drive);
             }
         };
         for pair in self.points.windows(2) {
@@ -314,7 +352,7 @@ impl<'a> Curve<'a> {
                 // The angle from the negative axis; the nearest of all crossings counts.
                 let angle = (-of(&open)).arg().abs();
                 if angle < margins.phase {
-                    (margins.phase, margins.breaks.phase) = (angle, at);
+                    (margins.phase, margins.breaks.phase, margins.breaks.phase_drive) = (angle, at, drive);
                 }
             }
         }
@@ -332,7 +370,7 @@ impl<'a> Curve<'a> {
     }
 
     /// The highest value over all frequencies and breaks.
-    fn highest(&self, value: Of) -> Top {
+    fn highest(&self, value: Of<N>) -> Top {
         let of = |at: Break| -> Vec<f64> { self.points.iter().map(|(_, open)| value(open, at)).collect() };
         let values: Vec<(Break, Vec<f64>)> = self.breaks.iter().map(|&at| (at, of(at))).collect();
         let mut best = Top { value: 0.0, omega: 0.0, at: self.breaks[0] };
@@ -347,7 +385,7 @@ impl<'a> Curve<'a> {
         for (at, values) in values.iter().filter(|_| level.is_finite()) {
             for k in 1..values.len().saturating_sub(1) {
                 if values[k] >= level && values[k] >= values[k - 1] && values[k] >= values[k + 1] {
-                    let of = |open: &Open| value(open, *at);
+                    let of = |open: &Open<N>| value(open, *at);
                     let (top, omega) = self.top(self.points[k - 1].0, self.points[k + 1].0, &of);
                     if top > best.value {
                         best = Top { value: top, omega, at: *at };
@@ -359,7 +397,7 @@ impl<'a> Curve<'a> {
     }
 
     /// The top between two frequencies, by the golden section.
-    fn top(&self, mut low: f64, mut high: f64, value: &dyn Fn(&Open) -> f64) -> (f64, f64) {
+    fn top(&self, mut low: f64, mut high: f64, value: &dyn Fn(&Open<N>) -> f64) -> (f64, f64) {
         let share = 0.5 * (5f64.sqrt() - 1.0);
         let look = |omega: f64| (value(&self.at(omega)), omega);
         let (mut left, mut right) = (look(high - share * (high - low)), look(low + share * (high - low)));
@@ -379,7 +417,7 @@ impl<'a> Curve<'a> {
     }
 
     /// Where a quantity passes zero between two points.
-    fn crossing(&self, pair: &[(f64, Open)], of: &dyn Fn(&Open) -> f64) -> (f64, Open) {
+    fn crossing(&self, pair: &[(f64, Open<N>)], of: &dyn Fn(&Open<N>) -> f64) -> (f64, Open<N>) {
         let (mut low, mut high) = ((pair[0], of(&pair[0].1)), (pair[1], of(&pair[1].1)));
         for step in 0..STEPS {
             // The straight line, and every other time the middle.
@@ -397,9 +435,9 @@ impl<'a> Curve<'a> {
     }
 
     /// √(1/π ∫ v/ω² dω) of a squared magnitude v, by trapezia on the logarithm of ω.
-    fn squared(&self, value: &dyn Fn(&Open) -> f64) -> f64 {
+    fn squared(&self, value: &dyn Fn(&Open<N>) -> f64) -> f64 {
         let slowest = 2.0 * PI * SLOWEST;
-        let part = |(omega, open): &(f64, Open)| value(open) / omega;
+        let part = |(omega, open): &(f64, Open<N>)| value(open) / omega;
         let sum: f64 = self
             .points
             .windows(2)

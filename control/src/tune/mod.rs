@@ -36,10 +36,10 @@ pub use family::{Corner, Family, MACHINES, Source};
 pub use gains::{Gain, gains};
 pub use hunting::{Hunt, hunting};
 pub use judged::{Figure, Forced, Judgement, Least, Limit, MoveVerdict, Standing, Verdict, Worse};
-pub use loops::{Break, Open, breaks, loops};
+pub use loops::{Break, Broken, Loops, breaks, loops};
 pub use margins::{Breaks, Margins, Peaks, Rough};
 pub use objective::{AtWorst, BALANCES, Balance, MoveFigures, look, objective};
-pub use plant::{Answer, Plant};
+pub use plant::Plant;
 pub use reference::evolved;
 pub use search::{Found, minimise, minimise_below};
 pub use unknown::SPREAD;
@@ -57,15 +57,15 @@ use verdict::{compare, forced_by_file, worse};
 use watch::Watch;
 use work::{Finalist, Work};
 
-/// Searches for what makes no figure worse, each with the machines on which one was.
+/// Maximum rounds of the constrained search, in which no figure may be worse.
 const KEPT: usize = 6;
 
 /// Of these, how many look nearby with the simplex before differential evolution does.
 const NEARBY: usize = 2;
 
-/// How steeply ln J grows with the logarithm of what an error is worse than before, and with what settling is later, as
-/// a share of the move: some times as steeply as J falls with either, so that a search does not end where one is worse,
-/// and where nothing may be.
+/// Penalty slopes d ln J / d ln(error/error_before), and with respect to a later settling relative to the duration of
+/// the move: soft in the search, so that it does not end at a worse figure,
+/// and hard if nothing may be worse.
 const SOFT: f64 = 3.0;
 const HARD: f64 = 30.0;
 
@@ -101,7 +101,7 @@ pub struct Tuned {
     pub family: Family,
     /// The moves, those of the file or a standard set.
     pub moves: Vec<Move>,
-    /// Whether the limits of sensitivity hold at worst.
+    /// True if the limits of sensitivity hold at worst.
     pub holds: bool,
     /// Rounds, and designs that were tried; none of an evaluation.
     pub work: (usize, usize),
@@ -111,7 +111,7 @@ pub struct Tuned {
     pub undamped: Option<f64>,
     /// Modes of the axis that a command swings, each in the middle of where it goes along the travel, Hz.
     pub modes: Vec<f64>,
-    /// Whether gains were looked for, and not judged alone.
+    /// True if gains were looked for, and not judged alone.
     pub searched: bool,
 }
 
@@ -126,7 +126,7 @@ pub struct Choice {
     pub objective: f64,
     /// Its moves at worst.
     pub worst: Vec<AtWorst>,
-    /// Whether this is what was chosen.
+    /// True if this is what was chosen.
     pub chosen: bool,
 }
 
@@ -431,7 +431,7 @@ impl Tuned {
         let read = Case::from_text_for(name, &case.text, &changes, Files::Nothing)?;
         match read.controller.as_ref() == Some(&self.after.design) {
             true => Ok(read.text),
-            false => Err(Error::new("the gains that were found do not read back as what they are").in_file(name)),
+            false => Err(Error::new("the tuned gains do not read back as they were written").in_file(name)),
         }
     }
 }

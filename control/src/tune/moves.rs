@@ -2,12 +2,13 @@
 
 use crate::case::{Case, Move};
 use crate::control::measures_cart;
-use crate::design::{Design, FeedForward};
-use crate::error::Result;
+use crate::design::{Design, FeedForward, FeedForwardModel};
+use crate::error::{Error, Result};
 use crate::machine::rigid::Rigid;
 use crate::machine::{AmplifierMode, Machine};
 use crate::reach::compensation::Compensation;
-use crate::signal::profile::{Leg, Limits, Profile};
+use crate::reach::forward::Forward;
+use crate::signal::profile::{Leg, Limits, Profile, Reference};
 
 /// Share of what the command's limit allows of speed and of force that a standard move takes.
 const SPEED: f64 = 0.5;
@@ -28,7 +29,12 @@ const WINDOW: f64 = 50e-6;
 /// The moves of a case; where it has none a standard set: a short and a long move as quick as travel and limits allow,
 /// and a slow reversal.
 pub fn of(case: &Case, design: &Design) -> Result<Vec<Move>> {
-    if case.moves.is_empty() { standard(&case.machine, design) } else { Ok(case.moves.clone()) }
+    match (case.moves.is_empty(), case.machine.drives.len()) {
+        (false, _) => Ok(case.moves.clone()),
+        (true, 1) => standard(&case.machine, design),
+        (true, _) => Err(Error::new("a machine with several drives is tuned for moves, and this case has none")
+            .next("add [[move]] with points = [[...], ...] or a G-code file")),
+    }
 }
 
 /// Short, long, and a slow reversal.
@@ -88,15 +94,30 @@ fn limits(machine: &Machine, design: &Design) -> (f64, f64) {
     (speed, if acceleration > 0.0 { acceleration } else { 0.1 * MODEST.1 })
 }
 
-/// Root mean square over the run of the current that a move asks of the axis as the file has it, A.
+/// Root mean square over the run of the current that a move asks of the machine as the file has it, A; the largest of
+/// all motors.
 pub fn asked(machine: &Machine, motion: &Move) -> f64 {
-    let compensation = Compensation::new(machine, &FeedForward::NONE);
-    let count = 1000;
-    let end = motion.profile().end();
-    let square = |k: i32| {
-        let y = motion.profile().at(end * (f64::from(k) + 0.5) / f64::from(count));
-        (compensation.needed(&y).force[0] / compensation.rigid.force_per_ampere).powi(2)
+    let whole = FeedForward { model: FeedForwardModel::Rigid, ..FeedForward::NONE };
+    let of_drive = |drive: usize| {
+        let mean = match Forward::of(whole, machine, drive) {
+            Some(forward) => mean_square(motion, |time| {
+                let slides: Vec<Reference> = motion.profiles.iter().map(|profile| profile.at(time)).collect();
+                forward.electrical(&slides).0
+            }),
+            None => {
+                let compensation = Compensation::new(machine, &FeedForward::NONE);
+                let force = |time: f64| compensation.needed(&motion.profile().at(time)).force[0];
+                mean_square(motion, |time| force(time) / compensation.rigid.force_per_ampere)
+            }
+        };
+        if mean > 0.0 && mean.is_finite() { mean.sqrt() } else { 1.0 }
     };
-    let mean = (0..count).map(square).sum::<f64>() / f64::from(count) * end / motion.until;
-    if mean > 0.0 && mean.is_finite() { mean.sqrt() } else { 1.0 }
+    (0..machine.drives.len()).map(of_drive).fold(0.0, f64::max)
+}
+
+/// The mean square over the run of what a move asks for until its end.
+fn mean_square(motion: &Move, value: impl Fn(f64) -> f64) -> f64 {
+    let (count, end) = (1000, motion.end());
+    let square = |k: i32| value(end * (f64::from(k) + 0.5) / f64::from(count)).powi(2);
+    (0..count).map(square).sum::<f64>() / f64::from(count) * end / motion.until
 }

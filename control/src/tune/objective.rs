@@ -2,7 +2,8 @@
 //!
 //! Of each move three figures count, each on the axis that is the worst one for it once the bad end of the central 95 %
 //! is left out: the largest error E of the cart, the time S from the end of the profile until the cart stays within its
-//! window w, and the root mean square I of the current. With the duration D of the profile, the current I₀ that it asks
+//! window w, and the root mean square I of the current. Of several parts that slide, and of several motors, the worst
+//! counts. With the duration D of the profile, the current I₀ that it asks
 //! of the axis as the file has it, and M moves
 //!
 //! ```text
@@ -13,7 +14,7 @@
 //! D)(1 + ln(1 + e/w)).
 
 use crate::case::{Cost, Move};
-use crate::control::{Controller, Figures, Loop, Standard, closed_loop_at_samples, closed_loop_briefly};
+use crate::control::{Figures, LoadFigures, Loop, Standard, closed_loop_at_samples, closed_loop_briefly, each};
 use crate::design::Design;
 use crate::error::Result;
 use crate::machine::Machine;
@@ -43,15 +44,15 @@ pub const BALANCES: [Balance; 3] = [
 /// The figures of a move on one axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MoveFigures {
-    /// Largest |x − y|, m; infinite where the run does not reach its end.
+    /// Largest |x − y|, m, of all that slides; infinite where the run does not reach its end.
     pub error: f64,
-    /// Root mean square of x − y, m.
+    /// Root mean square of x − y, m, the largest of all that slides.
     pub rms: f64,
     /// From the end of the profile until the cart settles, s.
     pub settling: Option<f64>,
     /// S, s.
     pub settles: f64,
-    /// Root mean square of the current, A.
+    /// Root mean square of the current, A, the largest of all motors.
     pub current: f64,
 }
 
@@ -62,30 +63,30 @@ pub fn look(machine: &Machine, model: &Machine, design: &Design, motion: &Move) 
 
 /// A controller that is made once and run through many moves.
 pub(super) struct Runner {
-    controller: Standard,
+    controllers: Vec<Standard>,
     timing: Loop,
 }
 
 impl Runner {
-    /// That of a design for a model of the axis.
+    /// Objective of a design for a model of the axis.
     pub fn new(model: &Machine, design: &Design) -> Result<Self> {
-        Ok(Self { controller: Standard::new(design, model)?, timing: Loop::of(design) })
+        Ok(Self { controllers: Standard::of_drives(design, model)?, timing: Loop::of(design) })
     }
 
     /// A move on one axis, its profile being shaped already.
     pub fn look(&mut self, machine: &Machine, motion: &Move, shaped: &[Profile]) -> Result<MoveFigures> {
         let seen = (motion.until, motion.window);
-        let controllers = &mut [&mut self.controller as &mut dyn Controller];
+        let controllers = &mut each(&mut self.controllers);
         let (figures, ending) =
             closed_loop_briefly(machine, controllers, &self.timing, shaped, seen, Solver::of(machine))?;
         Ok(figures_of(&figures, ending, motion))
     }
 
-    /// The same at samples alone, in a third of the time.
+    /// Figures of a move at samples only, in a third of the time.
     pub fn glance(&mut self, machine: &Machine, motion: &Move, shaped: &[Profile]) -> Result<MoveFigures> {
         let seen = (motion.until, motion.window);
         let (figures, ending) =
-            closed_loop_at_samples(machine, &mut self.controller, &self.timing, shaped, seen, Solver::of(machine))?;
+            closed_loop_at_samples(machine, &mut self.controllers, &self.timing, shaped, seen, Solver::of(machine))?;
         Ok(figures_of(&figures, ending, motion))
     }
 }
@@ -100,14 +101,15 @@ fn figures_of(figures: &Figures, ending: Ending, motion: &Move) -> MoveFigures {
             current: f64::INFINITY,
         };
     }
-    let left = (motion.until - motion.profile().end()).max(motion.profile().end() * 1e-3);
-    let away = left * (1.0 + (figures.cart().error.last.abs() / motion.window).ln_1p());
+    let left = (motion.until - motion.end()).max(motion.end() * 1e-3);
+    let worst = |of: fn(&LoadFigures) -> f64| figures.loads.iter().map(of).fold(0.0, f64::max);
+    let away = left * (1.0 + (worst(|load| load.error.last.abs()) / motion.window).ln_1p());
     MoveFigures {
-        error: figures.cart().error.peak.value.abs(),
-        rms: figures.cart().error.rms,
+        error: worst(|load| load.error.peak.value.abs()),
+        rms: worst(|load| load.error.rms),
         settling: figures.settling,
         settles: figures.settling.unwrap_or(away),
-        current: figures.drive().current.1,
+        current: figures.worst_current(),
     }
 }
 
@@ -166,7 +168,7 @@ pub fn objective(cost: Cost, balance: &Balance, moves: &[Move], asked: &[f64], w
             Cost::Squares => (worst.rms / motion.window).ln_1p(),
             Cost::Peak => error,
             Cost::Moves | Cost::Disturbance => {
-                let duration = motion.profile().end().max(f64::MIN_POSITIVE);
+                let duration = motion.end().max(f64::MIN_POSITIVE);
                 balance.error * error
                     + balance.settling * (worst.settles.0 / duration).ln_1p()
                     + balance.current * (worst.current / asked).ln()

@@ -1,12 +1,12 @@
-//! The sampled axis over frequency: what a controller measures per command.
+//! The sampled machine over frequency: what its controllers measure per command.
 
 use crate::control::feedback::Turn;
 use crate::control::measures_cart;
 use crate::design::Design;
-use crate::error::Result;
-use crate::linear::{Discrete, Hold, Operation, Range, StateSpace};
-use crate::machine::{EncoderPlace, Machine};
-use nalgebra::Complex;
+use crate::error::{Error, Result};
+use crate::linear::{Discrete, Hold, Operation, Range, StateSpace, System};
+use crate::machine::{EncoderPlace, Kind, Machine};
+use nalgebra::{Complex, SMatrix};
 use std::f64::consts::PI;
 
 /// Points of the grid on each of its decades, those about resonances apart.
@@ -15,78 +15,153 @@ const POINTS: f64 = 90.0;
 const LOWEST: f64 = 1e-8;
 const SPARSE: f64 = 12.0;
 
-/// The answer to a command at one frequency.
+/// A matrix over frequency with a row for each measurement, or part that slides, and a column for each drive.
+pub(super) type Square<const N: usize> = SMatrix<Complex<f64>, N, N>;
+
+/// The answers to commands at one frequency.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Answer {
-    /// Measured position, m per V or A.
-    pub position: Complex<f64>,
-    /// Motor current, A per V or A, as it is when it is sampled.
-    pub current: Complex<f64>,
-    /// The cart's position, m per V or A.
-    pub cart: Complex<f64>,
+pub(super) struct Answer<const N: usize> {
+    /// Measured positions, m per V or A.
+    pub position: Square<N>,
+    /// Motor currents, A per V or A, as they are when they are sampled.
+    pub current: Square<N>,
+    /// The positions of what slides, m per V or A.
+    pub slides: Square<N>,
 }
 
-/// A sampled axis over frequency: what the controller measures per command.
+/// A sampled machine over frequency: what the controllers of its drives measure per command.
 #[derive(Debug, Clone)]
 pub struct Plant {
     /// ω, rad/s, up to half the sampling rate.
     pub frequency: Vec<f64>,
-    /// The answers to a command there.
-    pub answers: Vec<Answer>,
-    /// The same frequencies as a sampled loop sees them.
+    /// The frequencies in terms of the sampled loop.
     turns: Vec<Turn>,
-    model: Discrete,
-    /// Outputs of the model: what is measured, the cart, the current; and metres per unit of the first.
-    outputs: [usize; 3],
-    length: f64,
     pub(super) every: f64,
     /// Poles outside the unit circle.
     pub(super) unstable: usize,
+    pub(super) kind: Kind,
+    pub(super) of: ByDrives,
+}
+
+/// The answers of a machine with one drive or with two.
+#[derive(Debug, Clone)]
+pub(super) enum ByDrives {
+    One(Sampled<1>),
+    Two(Box<Sampled<2>>),
+}
+
+/// The same code for either number of drives.
+macro_rules! by_drives {
+    ($plant:expr, |$sampled:ident| $value:expr) => {
+        match &$plant.of {
+            $crate::tune::plant::ByDrives::One($sampled) => $value,
+            $crate::tune::plant::ByDrives::Two(both) => {
+                let $sampled = &**both;
+                $value
+            }
+        }
+    };
+}
+pub(super) use by_drives;
+
+/// The sampled model of each command, and the answers on the grid.
+#[derive(Debug, Clone)]
+pub(super) struct Sampled<const N: usize> {
+    answers: Vec<Answer<N>>,
+    models: [Discrete; N],
+    /// Outputs of the models: what is measured, what slides, the currents; and metres per unit of the first.
+    measured: [usize; N],
+    slides: [usize; N],
+    currents: [usize; N],
+    length: f64,
+    every: f64,
+    /// What each drive's part of the belt does per way of what slides.
+    pub shares: Square<N>,
 }
 
 impl Plant {
-    /// That of `stage` with the cart at `place`, as the controller of `design` samples it.
-    pub fn of(machine: &Machine, place: f64, design: &Design, corners: &[f64]) -> Result<Self> {
-        let t = design.every;
-        let system = StateSpace::of(machine, Operation { position: place, ..Operation::default() })?;
-        let model = system.discrete(t, Hold::Zero, design.delay)?;
-        let frequency = grid(&model, t, corners);
-        let output = match machine.encoder.map(|encoder| encoder.at) {
-            _ if measures_cart(machine) => "cart_position",
-            Some(EncoderPlace::DrivePulley) => "drive_angle",
-            _ => "rotor_angle",
-        };
-        let length = if measures_cart(machine) { 1.0 } else { machine.pulley_radius };
-        let measured = system.output(output).or(system.output("drive_angle")).unwrap_or_default();
-        let of = |name: &str| system.output(name).unwrap_or_default();
-        let outputs = [measured, of("cart_position"), of("motor_current")];
-        let unstable = model.poles().iter().filter(|z| z.norm() > 1.0 + 1e-9).count();
-        let turns = frequency.iter().map(|&omega| Turn::of(omega, t)).collect();
-        let mut plant = Self { frequency, answers: Vec::new(), turns, model, outputs, length, every: t, unstable };
-        plant.answers = plant.frequency.iter().map(|&omega| plant.at(omega)).collect();
-        Ok(plant)
-    }
-
-    /// Frequencies, the answers to a command there, and the frequencies as a sampled loop sees them.
-    pub(super) fn seen(&self) -> impl Iterator<Item = (f64, &Answer, &Turn)> {
-        let all = self.frequency.iter().zip(&self.answers).zip(&self.turns);
-        all.map(|((&omega, answer), turn)| (omega, answer, turn))
-    }
-
-    /// The answer to a command at ω, rad/s.
-    pub fn at(&self, omega: f64) -> Answer {
-        let all = self.model.at(omega);
-        let [measured, cart, motor] = self.outputs;
-        // What is sampled is the current of the command before.
-        let lag = Complex::new(0.0, -omega * self.every).exp() - 1.0;
-        Answer {
-            position: all[measured] * self.length,
-            current: all[motor] + lag * self.model.d[motor],
-            cart: all[cart],
+    /// That of `machine` about `operation`, as the controllers of `design` sample it.
+    pub fn of(machine: &Machine, operation: Operation, design: &Design, corners: &[f64]) -> Result<Self> {
+        let system = System::of(machine, operation)?;
+        let model = |drive: usize| system.input(drive).discrete(design.every, Hold::Zero, design.delay);
+        match machine.drives.len() {
+            1 => Self::sampled([model(0)?], &system.input(0), machine, corners, ByDrives::One),
+            2 => Self::sampled([model(0)?, model(1)?], &system.input(0), machine, corners, |sampled| {
+                ByDrives::Two(Box::new(sampled))
+            }),
+            count => {
+                Err(Error::new(format!("a machine with {count} drives has no margins")).allowed("one or two drives"))
+            }
         }
+    }
+
+    fn sampled<const N: usize>(
+        models: [Discrete; N],
+        system: &StateSpace,
+        machine: &Machine,
+        corners: &[f64],
+        of: fn(Sampled<N>) -> ByDrives,
+    ) -> Result<Self> {
+        let t = models[0].sample_time;
+        let frequency = grid(&models[0], t, corners);
+        let geometry = machine.geometry();
+        let find = |name: &str| system.output(name);
+        let measured = |drive: usize| {
+            let at = &geometry.drives[drive];
+            let pulley = format!("{}_angle", geometry.label(at.pulley).key);
+            let name = match machine.encoder.map(|encoder| encoder.at) {
+                _ if measures_cart(machine) => "cart_position",
+                Some(EncoderPlace::DrivePulley) => &pulley,
+                _ => &format!("{}_angle", at.rotor.key),
+            };
+            find(name).or(find(&pulley)).unwrap_or_default()
+        };
+        let slide = |slide: usize| {
+            find(&format!("{}_position", geometry.label(geometry.slides[slide].body).key)).unwrap_or_default()
+        };
+        let shares = machine.belt_shares();
+        let mut sampled = Sampled {
+            answers: Vec::new(),
+            measured: std::array::from_fn(measured),
+            slides: std::array::from_fn(slide),
+            currents: std::array::from_fn(|drive| find(geometry.drives[drive].current_column).unwrap_or_default()),
+            length: if measures_cart(machine) { 1.0 } else { machine.pulley_radius },
+            every: t,
+            shares: Square::from_fn(|drive, slide| Complex::new(shares[drive][slide], 0.0)),
+            models,
+        };
+        let unstable = sampled.models[0].poles().iter().filter(|z| z.norm() > 1.0 + 1e-9).count();
+        let turns = frequency.iter().map(|&omega| Turn::of(omega, t)).collect();
+        sampled.answers = frequency.iter().map(|&omega| sampled.at(omega)).collect();
+        Ok(Self { frequency, turns, every: t, unstable, kind: machine.kind, of: of(sampled) })
+    }
+
+    /// Frequencies, the answers to commands there, and the frequencies as a sampled loop sees them.
+    pub(super) fn seen<'a, const N: usize>(
+        &'a self,
+        sampled: &'a Sampled<N>,
+    ) -> impl Iterator<Item = (f64, &'a Answer<N>, &'a Turn)> {
+        let all = self.frequency.iter().zip(&sampled.answers).zip(&self.turns);
+        all.map(|((&omega, answer), turn)| (omega, answer, turn))
     }
 }
 
+impl<const N: usize> Sampled<N> {
+    /// The answers to commands at ω, rad/s.
+    pub fn at(&self, omega: f64) -> Answer<N> {
+        let all: [Vec<Complex<f64>>; N] = std::array::from_fn(|input| self.models[input].at(omega));
+        // What is sampled is the current of the command before.
+        let lag = Complex::new(0.0, -omega * self.every).exp() - 1.0;
+        Answer {
+            position: Square::from_fn(|row, input| all[input][self.measured[row]] * self.length),
+            current: Square::from_fn(|row, input| {
+                let output = self.currents[row];
+                all[input][output] + lag * self.models[input].d[output]
+            }),
+            slides: Square::from_fn(|row, input| all[input][self.slides[row]]),
+        }
+    }
+}
 /// Frequencies up to half the sampling rate, dense about the poles of the axis and the controller's corners.
 fn grid(model: &Discrete, t: f64, corners: &[f64]) -> Vec<f64> {
     let most = PI / t;

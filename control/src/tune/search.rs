@@ -22,7 +22,7 @@ pub fn minimise(
     minimise_below(start, step, accuracy, most, &mut |x, _| function(x))
 }
 
-/// The same of a function that is told the value to beat: what is no better may be given as any value that is not below
+/// Minimises a function that receives the value to beat: what is no better may be given as any value that is not below
 /// it, and the search takes the same way.
 pub fn minimise_below(
     start: &[f64],

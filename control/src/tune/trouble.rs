@@ -2,11 +2,13 @@
 
 use super::margins::Margins;
 use super::plant::Plant;
+use crate::case::Move;
 use crate::control::MoveRun;
 use crate::control::feedback::Feedback;
 use crate::design::Design;
 use crate::linear::{Operation, travel};
 use crate::machine::{AmplifierMode, Machine};
+use crate::signal::profile::Profile;
 use std::f64::consts::PI;
 
 /// Share of the samples at the limit from which on a command counts as saturated.
@@ -59,10 +61,11 @@ pub struct Trouble {
     pub words: String,
 }
 
-/// The trouble of a move that was run to `target` (of the first coordinate, m); none if it has none.
-pub fn trouble(machine: &Machine, design: &Design, run: &MoveRun, target: f64) -> Option<Trouble> {
-    // Loops round several drives have no margins here: what their run shows tells.
-    let model = if machine.drives.len() == 1 { unstable(machine, design, target) } else { None };
+/// The trouble of a move as it was run; none if it has none.
+pub fn trouble(machine: &Machine, design: &Design, run: &MoveRun, motion: &Move) -> Option<Trouble> {
+    let targets: Vec<f64> = motion.profiles.iter().map(Profile::target).collect();
+    let at = Operation::at(&targets);
+    let model = unstable(machine, design, at);
     let (samples, limited) = run.samples;
     let swing = run.swings.iter().copied().reduce(|a, b| if b.late > a.late { b } else { a }).unwrap_or_default();
     let limit = limit(machine, design).unwrap_or(f64::INFINITY);
@@ -80,22 +83,22 @@ pub fn trouble(machine: &Machine, design: &Design, run: &MoveRun, target: f64) -
         _ if loud => (Kind::Howling, seen),
         _ => return None,
     };
-    let cause = cause(machine, design, kind, frequency, target);
-    let at = frequency.map_or(String::new(), |hertz| format!(" at {hertz:.1} Hz"));
+    let cause = cause(machine, design, kind, frequency, at);
+    let place = frequency.map_or(String::new(), |hertz| format!(" at {hertz:.1} Hz"));
     let what = match kind {
-        Kind::Unstable => format!("the loop is unstable and swings{at}"),
-        Kind::Saturated if frequency.is_some() => format!("the command is saturated and swings{at}"),
+        Kind::Unstable => format!("the loop is unstable and swings{place}"),
+        Kind::Saturated if frequency.is_some() => format!("the command is saturated and swings{place}"),
         Kind::Saturated => "the command is saturated".into(),
-        Kind::Howling => format!("the loop howls{at}"),
+        Kind::Howling => format!("the loop howls{place}"),
     };
     let held = if limited > 0 { format!("; {limited} of {samples} samples at the limit") } else { String::new() };
     Some(Trouble { kind, frequency, words: format!("{what}: {cause}{held}"), cause })
 }
 
 /// Where the sampled loop swings, Hz, if it is not stable; none too for structures that are not linear.
-fn unstable(machine: &Machine, design: &Design, place: f64) -> Option<f64> {
+fn unstable(machine: &Machine, design: &Design, at: Operation) -> Option<f64> {
     let feedback = Feedback::new(design, machine).ok().filter(Feedback::is_linear)?;
-    let plant = Plant::of(machine, place, design, &feedback.corners()).ok()?;
+    let plant = Plant::of(machine, at, design, &feedback.corners()).ok()?;
     let margins = Margins::of(&plant, &feedback);
     (!margins.stable).then_some(margins.at / (2.0 * PI))
 }
@@ -109,14 +112,14 @@ fn limit(machine: &Machine, design: &Design) -> Option<f64> {
     [design.limit, amplifier].into_iter().flatten().reduce(f64::min)
 }
 
-fn cause(machine: &Machine, design: &Design, kind: Kind, frequency: Option<f64>, place: f64) -> String {
+fn cause(machine: &Machine, design: &Design, kind: Kind, frequency: Option<f64>, at: Operation) -> String {
     let Some(hertz) = frequency else {
         return match kind {
             Kind::Saturated => "the move asks for more than the limit of the command allows".into(),
             Kind::Unstable | Kind::Howling => "its gains are too high".into(),
         };
     };
-    let places = travel(machine, Operation::default(), &[place]).unwrap_or_default();
+    let places = travel(machine, at, &[at.position]).unwrap_or_default();
     let mut modes = places.iter().flat_map(|place| place.undamped_resonances.iter().copied());
     if let Some(mode) = modes.find(|mode| (mode / hertz).ln().abs() < NEAR) {
         return format!(

@@ -136,9 +136,9 @@ impl Work<'_> {
             let at_worst = AtWorst::of(&seen, left_out);
             moves.push(MoveVerdict {
                 name: motion.name.clone(),
-                cart: own.figures.cart().error,
+                cart: own.figures.worst_load().error,
                 settling: own.figures.settling.filter(|_| own.outcome.ending == Ending::Complete),
-                current: own.figures.drive().current.1,
+                current: own.figures.worst_current(),
                 worst: (at_worst.error.0, self.family.words(&machines[at_worst.error.1])),
                 settled: (at_worst.settled, machines.len()),
                 at_worst,
@@ -191,7 +191,7 @@ impl Work<'_> {
     }
 }
 
-/// Whether a controller is better than the one before: not if any figure of a move is worse.
+/// Judges a controller against the one before: worse if any figure of a move is worse.
 pub(super) fn compare(before: &Verdict, after: &Verdict) -> Judgement {
     if before.design == after.design {
         return Judgement::Unchanged;
@@ -280,7 +280,8 @@ fn limiting(family: &Family, after: &Verdict, tuning: &Tuning, standing: Standin
         true => (Limit::Sensitivity, worst.at, worst.breaks.sensitivity),
         false => (Limit::Complementary, worst.complementary_at, worst.breaks.complementary),
     };
-    let there = modes_along(&family.stage_at(&after.corner), &[after.corner.place]).unwrap_or_default();
+    let there =
+        modes_along(&family.stage_at(&after.corner), after.corner.bridge, &[after.corner.place]).unwrap_or_default();
     let modes: Vec<f64> = there.iter().flat_map(|place| place.undamped_resonances.iter().copied()).collect();
     Forced { limit, standing, at, mode: mode_at(omega, &modes), place: after.corner.place }
 }

@@ -24,7 +24,7 @@ fn order(seen: &[MoveFigures], figure: fn(&MoveFigures) -> f64) -> Vec<usize> {
 const FIGURES: [fn(&MoveFigures) -> f64; 2] = [|seen| seen.error, |seen| seen.settles];
 
 impl Watch {
-    /// Those that are worst in a figure, of each so many more than it leaves out.
+    /// Machines that are worst in a figure: `left_out` plus a fixed number for each.
     pub fn of(seen: &[Vec<MoveFigures>], left_out: usize) -> Self {
         let of_move = |seen: &Vec<MoveFigures>| {
             let mut axes: Vec<usize> = Vec::new();
@@ -52,7 +52,7 @@ impl Watch {
         Self { axes: seen.iter().map(of_move).collect(), left_out: 0 }
     }
 
-    /// Those of another first, too; whether any is new.
+    /// Adds the machines of another list; true if any is new.
     pub fn join(&mut self, other: &Self) -> bool {
         self.axes.resize(self.axes.len().max(other.axes.len()), Vec::new());
         let mut is_new = false;

@@ -5,11 +5,11 @@ use crate::control::feedback::{Feedback, Turn};
 use nalgebra::Complex;
 use std::f64::consts::PI;
 
-/// Nyquist's criterion: F(z) = (1 + L)(1 − 1/z)^m, with m poles at z = 1, turns by π (P − Z) from θ = 0 to π, P poles
-/// of axis and controller and Z of the closed loop being outside.
+/// Nyquist's criterion: F(z) = det (1 + L)(1 − 1/z)^m, with m poles at z = 1, turns by π (P − Z) from θ = 0 to π, P poles
+/// of the machine and its controllers and Z of the closed loop being outside.
 pub(super) struct Winding {
     unstable: f64,
-    /// The first two of ω and 1 + L, of which m is known.
+    /// The first two of ω and det (1 + L), of which m is known.
     first: Option<(f64, Complex<f64>, Turn)>,
     poles: i32,
     /// F where it begins and where it is, whole turns between, and whether all were numbers.
@@ -20,9 +20,9 @@ pub(super) struct Winding {
 }
 
 impl Winding {
-    pub fn new(plant: &Plant, feedback: &Feedback) -> Self {
+    pub fn new(plant: &Plant, feedback: &Feedback, drives: usize) -> Self {
         let zero = Complex::ZERO;
-        let unstable = (plant.unstable + feedback.unstable()) as f64;
+        let unstable = (plant.unstable + drives * feedback.unstable()) as f64;
         Self { unstable, first: None, poles: 0, start: zero, now: zero, turns: 0.0, is_number: true }
     }
 
@@ -51,7 +51,7 @@ impl Winding {
         self.now = is;
     }
 
-    /// Whether no pole of the closed loop is outside.
+    /// True if no pole of the closed loop is outside.
     pub fn is_stable(&self) -> bool {
         let arg = |v: Complex<f64>| (v.im + 0.0).atan2(v.re);
         // It begins on the real axis.

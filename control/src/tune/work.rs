@@ -189,7 +189,7 @@ impl<'a> Work<'a> {
     /// Modes of the axis that a command swings, each in the middle of where it goes along the travel, Hz; and the first
     /// anti-resonance.
     pub fn modes(&self) -> Result<(Vec<f64>, Option<f64>)> {
-        let places = modes_along(&self.case.machine, &self.family.places)?;
+        let places = modes_along(&self.case.machine, self.family.nominal().bridge, &self.family.places)?;
         let swing = places.iter().filter_map(|place| place.undamped_antiresonances.first().copied()).reduce(f64::min);
         let most = 0.4 / self.design().every;
         let mut modes = Vec::new();

@@ -31,7 +31,7 @@ pub fn first(design: &Design, swing: Option<f64>) -> f64 {
     swing.map_or(of_delay, |swing| of_delay.min(swing / 6.0))
 }
 
-/// Whether a current is commanded, by amplifier or inner loop.
+/// True if a current is commanded, by amplifier or inner loop.
 pub fn commands_current(design: &Design, machine: &Machine) -> bool {
     machine.drives[0].amplifier.mode == AmplifierMode::Current || design.structure.tunable().commands_current()
 }

@@ -9,7 +9,7 @@ use crate::machine::Machine;
 use crate::machine::rigid::Rigid;
 use std::f64::consts::PI;
 
-/// How gains of a structure are found.
+/// Method by which gains of a structure are found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TunedBy {
     /// They follow from bandwidth and damping, and a search begins there.
@@ -28,19 +28,19 @@ pub trait Tunable {
     /// Its name for people.
     fn name(&self) -> &'static str;
 
-    /// Whether it uses a scale beside the encoder.
+    /// True if it uses a scale beside the encoder.
     fn reads_scale(&self) -> bool;
 
-    /// Whether its position loop is closed at that scale, where no stretch is seen.
+    /// True if its position loop is closed at that scale, where no stretch is seen.
     fn follows_scale(&self) -> bool;
 
-    /// Whether it commands a current inside itself.
+    /// True if it commands a current inside itself.
     fn commands_current(&self) -> bool;
 
     /// Feed-forward where the case file says nothing.
     fn feed_forward(&self) -> FeedForwardModel;
 
-    /// How its gains are found.
+    /// Method by which its gains are found.
     fn tuned_by(&self) -> TunedBy;
 
     /// With gains for this bandwidth (Hz) and damping, as [`super::placement::place`] says; none where it has no such
@@ -57,7 +57,7 @@ pub trait Tunable {
     /// is not known from its gains alone.
     fn ramp(&self) -> f64;
 
-    /// Whether nothing in it damps, so that it wants a derivative.
+    /// True if nothing in it damps, so that it wants a derivative.
     fn lacks_damping(&self) -> bool;
 
     /// Samples of a run that take as long as its margins on a set of axes.
@@ -74,7 +74,7 @@ pub struct InDrives {
     pub name: &'static str,
     /// In the unit that is used there.
     pub value: f64,
-    /// That unit.
+    /// Unit of the value.
     pub unit: &'static str,
 }
 
@@ -340,7 +340,7 @@ impl Tunable for StateFeedback {
         None
     }
 
-    /// The same regulator behind slower filters.
+    /// The regulator with slower Kalman filters.
     fn starts(&self, _: &Design, _: &Machine) -> Vec<Structure> {
         let slower = |share: f64| Self { disturbance: share * self.disturbance, ..*self };
         [0.3, 0.1].map(|share| Structure::StateFeedback(slower(share))).into()

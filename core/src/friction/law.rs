@@ -3,7 +3,7 @@
 use super::Friction;
 use std::f64::consts::{E, SQRT_2};
 
-/// How friction goes from the breakaway F_b down to Coulomb friction F_c as a body picks up speed; b v comes on top.
+/// Transition of friction from the breakaway F_b to Coulomb friction F_c with increasing speed; b v is added.
 ///
 /// Speeds are in m/s for a cart and rad/s for a pulley. The sources disagree on what they call "static force":
 /// Armstrong-Hélouvry, Canudas de Wit and Simscape mean F_b, the level at rest; the paper's F_s in eq. (14) is the
@@ -43,7 +43,7 @@ pub enum Law {
 }
 
 impl Law {
-    /// Whether a body under it is never at rest for good: it creeps, or hangs on its bristles.
+    /// True if a body under it is never at rest for good: it creeps, or hangs on its bristles.
     pub fn never_sticks(self) -> bool {
         match self {
             Law::Coulomb | Law::Stribeck { .. } => false,
@@ -164,7 +164,7 @@ impl Friction {
         self.dry_at(forward, [v])[0]
     }
 
-    /// The same at several speeds side by side.
+    /// Dry friction at several speeds.
     #[inline(always)]
     pub(crate) fn dry_at<const N: usize>(&self, forward: bool, v: [f64; N]) -> [f64; N] {
         let side = self.side(forward);
@@ -191,7 +191,7 @@ impl Friction {
         dry
     }
 
-    /// How [`Friction::sliding`] changes with the velocity: negative where stick-slip begins by itself.
+    /// Derivative of [`Friction::sliding`] with respect to velocity; negative values cause stick-slip.
     pub fn slope(&self, velocity: f64) -> f64 {
         let side = self.side(velocity >= 0.0);
         let above = side.breakaway - side.coulomb;

@@ -5,7 +5,7 @@ use crate::mechanism::Label;
 /// The geometry of a kind of machine.
 #[derive(Debug)]
 pub struct Geometry {
-    /// As in the case file.
+    /// Its name in the case file.
     pub word: &'static str,
     /// For people.
     pub name: &'static str,
@@ -111,11 +111,11 @@ pub struct SlideAt {
     pub stop: Label,
     /// The column of a force on it along its travel, and what that is.
     pub force_along: Label,
-    /// The same of a force by its speed.
+    /// Column of a force that depends on its speed.
     pub force_by_speed: Label,
     /// Where the drives have it, as a sum over the angles of their pulleys, times the radius.
     pub by_drives: &'static [f64],
-    /// That minus its true position, as a sum over stretches of spans, (span, weight).
+    /// Position by the drives minus true position, as a sum over span elongations: (span, weight).
     pub error: &'static [(usize, f64)],
 }
 

@@ -27,7 +27,7 @@ impl Kind {
         }
     }
 
-    /// As in the case file.
+    /// Its name in the case file.
     pub fn word(self) -> &'static str {
         self.geometry().word
     }

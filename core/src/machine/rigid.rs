@@ -1,6 +1,6 @@
 //! An axis as one mass along its belt.
 
-use super::{AmplifierMode, DriveUnit, Machine};
+use super::{AmplifierMode, DriveUnit, Machine, SlideAt};
 use crate::calculator::{Calculator, Run, at_least, less, more};
 
 /// Largest speed of a reference that counts as rest, m/s, and largest acceleration that counts as none, m/s²: what
@@ -34,12 +34,33 @@ pub struct Rigid {
 }
 
 impl Rigid {
-    /// That of an axis.
+    /// That of an axis; of a machine with several drives what each of them moves where all move what is heaviest to
+    /// move.
     pub fn of(machine: &Machine) -> Self {
-        Self::of_drive(machine, 0)
+        if machine.drives.len() == 1 {
+            return Self::of_drive(machine, 0);
+        }
+        let pulley = Self::of_pulley(machine, 0);
+        // With y = s q and q = Σ l y the work Σ f dy = M q̈ dq gives f = l M q̈ = (l/s) M ÿ.
+        let share = |(number, at): (usize, &SlideAt)| {
+            let weight = at.by_drives[0] / machine.belt_shares()[0][number];
+            Self::of_slide(machine, number).map(|slide| (weight, slide))
+        };
+        let shares = machine.geometry().slides.iter().enumerate().filter_map(share);
+        let Some((weight, slide)) = shares.max_by(|(v, a), (w, b)| (v * a.mass).total_cmp(&(w * b.mass))) else {
+            return pulley;
+        };
+        let sum = |own: [f64; 2], more: [f64; 2]| [own[0] + weight * more[0], own[1] + weight * more[1]];
+        Self {
+            mass: pulley.mass + weight * slide.mass,
+            viscous: sum(pulley.viscous, slide.viscous),
+            coulomb: sum(pulley.coulomb, slide.coulomb),
+            constant: weight * slide.constant,
+            ..pulley
+        }
     }
 
-    /// The same with the motor of this drive.
+    /// Rigid model of an axis with the motor of this drive.
     fn of_drive(machine: &Machine, drive: usize) -> Self {
         let DriveUnit { motor, amplifier } = &machine.drives[drive];
         let (r, n) = (machine.pulley_radius, motor.gear_ratio);
@@ -80,7 +101,7 @@ impl Rigid {
         }
     }
 
-    /// What slides as a mass of its own, with its friction and its constant force; a motor moves it by nothing.
+    /// A slide as a mass with its friction and constant force, without a motor.
     pub fn of_slide(machine: &Machine, number: usize) -> Option<Self> {
         let (slide, at) = machine.slides().zip(machine.geometry().slides).nth(number)?;
         let sides = [true, false].map(|forward| slide.friction.side(forward));
@@ -100,7 +121,7 @@ impl Rigid {
         self.electrical_by(&mut Run::plain(), force, rate, speed)
     }
 
-    /// The same by any calculator.
+    /// As the function without `_by`, for any calculator.
     pub fn electrical_by<C: Calculator>(&self, c: &mut C, force: C::N, rate: C::N, speed: C::N) -> (C::N, C::N) {
         let force = c.name("force", force);
         let per_ampere = self.per_ampere(c, force, speed);
@@ -130,7 +151,7 @@ impl Rigid {
         self.command_by(&mut Run::plain(), force, rate, speed)
     }
 
-    /// The same by any calculator.
+    /// As the function without `_by`, for any calculator.
     pub fn command_by<C: Calculator>(&self, c: &mut C, force: C::N, rate: C::N, speed: C::N) -> C::N {
         let (current, voltage) = self.electrical_by(c, force, rate, speed);
         match self.mode {
@@ -158,7 +179,7 @@ impl Rigid {
         self.friction_by(&mut Run::plain(), speed, sign)
     }
 
-    /// The same by any calculator.
+    /// As the function without `_by`, for any calculator.
     pub fn friction_by<C: Calculator>(&self, c: &mut C, speed: C::N, sign: C::N) -> (C::N, C::N) {
         let [viscous, coulomb] = [self.viscous, self.coulomb].map(|both| side(c, sign, both));
         (speed * viscous, sign * coulomb)

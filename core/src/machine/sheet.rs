@@ -12,7 +12,7 @@ const MOST_TEETH: f64 = 12.0;
 /// A timing belt as its maker sells it.
 #[derive(Debug, PartialEq)]
 pub struct BeltType {
-    /// As in the case file.
+    /// Its name in the case file.
     pub name: &'static str,
     /// Distance from tooth to tooth, m.
     pub pitch: f64,
@@ -239,7 +239,7 @@ pub struct BeltSheet {
     pub mass_per_length: Option<f64>,
     /// Allowed tension, N.
     pub allowed_tension: Option<f64>,
-    /// Whether its make is E A itself: a modulus over a section of 1 m².
+    /// True if its make is E A itself: a modulus over a section of 1 m².
     pub is_specific: bool,
 }
 

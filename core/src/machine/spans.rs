@@ -15,7 +15,7 @@ pub struct Spans {
 }
 
 impl Spans {
-    /// The same number for each of `count` spans.
+    /// One value for each of `count` spans.
     pub fn all(count: usize, value: f64) -> Self {
         std::iter::repeat_n(value, count).collect()
     }
@@ -25,7 +25,7 @@ impl Spans {
         self.into_iter().map(change).collect()
     }
 
-    /// Those of the three spans of an axis.
+    /// Values of the three spans of an axis.
     pub fn three(self) -> [f64; 3] {
         let [first, second, third, _] = self.values;
         [first, second, third]

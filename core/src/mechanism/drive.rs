@@ -19,7 +19,7 @@ pub struct Motor {
     pub gear_efficiency: f64,
     /// A compliant gear, so that the rotor is an inertia of its own; none for one that is stiff and without play.
     pub gear_play: Option<GearPlay>,
-    /// Whether it only stands for a drive that is given by force and drag, so that its own numbers mean nothing.
+    /// True if it only stands for a drive that is given by force and drag, so that its own numbers mean nothing.
     pub is_simple: bool,
 }
 
@@ -56,7 +56,7 @@ impl Amplifier {
     }
 }
 
-/// Whether the amplifier imposes a voltage or a current.
+/// Quantity that the amplifier commands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum AmplifierMode {
     /// The output is the motor's terminal voltage.

@@ -60,7 +60,7 @@ impl Mechanism {
         drive.has_rotor().then(|| self.springs.iter().position(|spring| is_gear(&spring.arms))).flatten()
     }
 
-    /// Whether the torque through a compliant gear is positive.
+    /// True if the torque through a compliant gear is positive.
     pub(super) fn is_gear_torque_positive(&self, drive: usize, spring: usize, mode: &Mode) -> bool {
         match (&self.springs[spring].law, mode.contact[spring]) {
             (SpringLaw::Gap { .. }, Contact::Low | Contact::LowLoose) => false,
@@ -84,7 +84,7 @@ impl Mechanism {
         forces
     }
 
-    /// The same as [`Mechanism::load`], by the forces of the springs.
+    /// [`Mechanism::load`] from given forces of the springs.
     fn load_by(&self, forces: &[Form; SPRINGS], body: usize, forward: bool, mode: &Mode) -> Form {
         let mut load = Form::ZERO;
         for follower in self.followers(body) {

@@ -23,7 +23,7 @@ pub struct Replaced {
     pub own: f64,
     /// The arms of the others.
     pub others: Vec<(usize, f64)>,
-    /// Whether one of them is replaced itself.
+    /// True if one of them is replaced itself.
     pub on_replaced: bool,
 }
 
@@ -48,7 +48,7 @@ pub struct Layout {
 }
 
 impl Layout {
-    /// That of a mechanism: bodies in their order, each with its coordinate and its speed, then the currents, then
+    /// Layout of a mechanism: bodies in their order, each with its coordinate and its speed, then the currents, then
     /// rotors.
     pub fn new(mechanism: &Mechanism) -> Self {
         let bodies = mechanism.bodies.len();
@@ -144,7 +144,7 @@ impl Layout {
         row
     }
 
-    /// The same into the places of a vector: lengths as coordinates, speeds and currents.
+    /// Writes a form into a row: lengths, speeds and currents at their indices.
     #[inline]
     pub fn put(&self, form: &Form, row: &mut [f64]) {
         for body in 0..self.bodies {
@@ -165,7 +165,7 @@ impl Layout {
         self.terms.iter().filter(move |term| term.0 == spring).map(|&(_, body, weight)| (body, weight))
     }
 
-    /// Whether a length stands in the place of this body's way.
+    /// True if a length stands in the place of this body's way.
     pub fn is_replaced(&self, body: usize) -> bool {
         self.replaced.iter().any(|replaced| replaced.body == body)
     }

@@ -40,7 +40,7 @@ pub const SPRINGS: usize = 8;
 /// Room for drives.
 pub const DRIVES: usize = 2;
 
-/// How something is called.
+/// Names of a part: for programs and for people.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Label {
     /// In column headings and keys.
@@ -54,7 +54,7 @@ pub struct Label {
 pub struct Body {
     /// Its name.
     pub label: Label,
-    /// Whether it turns (rad) or slides (m).
+    /// Rotary (rad) or linear (m).
     pub kind: Kind,
     /// Moment of inertia, kg m², or mass, kg; without what is geared to it.
     pub inertia: f64,
@@ -62,15 +62,15 @@ pub struct Body {
     pub friction: Friction,
     /// A constant torque or force on it, N m or N.
     pub force: f64,
-    /// How its dry friction changes along its way, if it does.
+    /// Factor on its dry friction over its coordinate, if it varies.
     pub along: Option<Polyline>,
     /// The body that it moves with, and its way per way of that one; itself and 1, unless something makes both one.
     pub leader: (usize, f64),
-    /// Whether it is the rotor of a drive, which nothing but the gear holds.
+    /// True if it is the rotor of a drive, which nothing but the gear holds.
     pub is_rotor: bool,
 }
 
-/// How a body moves.
+/// Kind of motion of a body.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Kind {
     /// It turns; the belt runs over it at this pitch radius, m.
@@ -113,7 +113,7 @@ pub struct Spring {
     pub damping: f64,
     /// When it pushes and pulls.
     pub law: SpringLaw,
-    /// How its stiffness changes with the bodies' ways, if it does.
+    /// Dependence of its stiffness on coordinates, if there is one.
     pub follows: Option<Follows>,
 }
 
@@ -129,12 +129,12 @@ pub enum SpringLaw {
     },
     /// It only pushes, beyond either end of a play: the flanks of a gear, end stops.
     Gap {
-        /// Where the negative side begins.
+        /// Length at which the negative side begins to push.
         low: f64,
-        /// Where the positive side begins.
+        /// Length at which the positive side begins to push.
         high: f64,
     },
-    /// As a line says, whose x is its length or the rate of it: what pulls in either direction alike, and keeps no
+    /// Force over its length or rate, piecewise linear: the same in both directions, without stored
     /// energy.
     Line {
         /// Its x.
@@ -211,17 +211,17 @@ pub struct Drive {
 }
 
 impl Drive {
-    /// Whether the rotor is an inertia of its own.
+    /// True if the rotor is an inertia of its own.
     pub fn has_rotor(&self) -> bool {
         self.shaft != self.pulley
     }
 
-    /// Whether its gear loses power.
+    /// True if its gear loses power.
     pub fn loses(&self) -> bool {
         self.motor.gear_efficiency < 1.0
     }
 
-    /// Whether the armature current is a state of its own.
+    /// True if the armature current is a state of its own.
     pub fn has_current_state(&self) -> bool {
         match self.amplifier.mode {
             AmplifierMode::Voltage => self.motor.inductance > 0.0,
@@ -229,7 +229,7 @@ impl Drive {
         }
     }
 
-    /// Whether its input differs from the voltage at its terminals, and is worth a column of its own.
+    /// True if its input differs from the voltage at its terminals, and is worth a column of its own.
     pub fn shows_input(&self) -> bool {
         let amplifier = &self.amplifier;
         amplifier.gain != 1.0
@@ -264,7 +264,7 @@ pub enum Shown {
     Motion(usize),
     /// Deflection of the bristles of a body.
     Bristle(usize),
-    /// Whether a spring is slack, or which side of it pushes.
+    /// State of a one-sided spring: slack, or the side that pushes.
     Contact(usize),
     /// Whole counts of an encoder on a body, so many per unit of its way.
     Counts(usize, f64),
@@ -279,7 +279,7 @@ pub struct Heading {
     pub unit: &'static str,
     /// The quantity in it.
     pub shown: Shown,
-    /// Whether it is there also where only what a controller or a comparison needs is asked for.
+    /// True if it is there also where only what a controller or a comparison needs is asked for.
     pub lean: bool,
 }
 
@@ -294,7 +294,7 @@ pub struct State {
     pub current: [f64; DRIVES],
 }
 
-/// The roles of the parts of a machine, by their numbers. Who asks for figures asks here, and takes keys and names from
+/// Roles of parts, by index: loads, drives and spans. Metrics use them, with keys and names from
 /// the labels.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Roles {
@@ -319,7 +319,7 @@ pub struct Mechanism {
     pub readings: Vec<Shown>,
     /// The roles of its parts.
     pub roles: Roles,
-    /// Where ways are counted from: what follows them or changes along them begins there.
+    /// Coordinates of the origin, for parts that depend on them.
     pub origin: [f64; BODIES],
     /// Friction of each body and of those that move with it, as far as it is straight, and whether it sticks.
     friction: Vec<(Friction, bool)>,
@@ -394,14 +394,14 @@ impl Mechanism {
         &self.friction[body].0
     }
 
-    /// Whether a body can stick or has a direction-dependent law, so that its motion has modes at all.
+    /// True if a body can stick or has a direction-dependent law, so that its motion has modes at all.
     pub fn has_modes(&self, body: usize) -> bool {
         let leader = self.leader(body);
         let by_gear = |drive: &Drive| drive.loses() && self.leader(drive.shaft) == leader;
         self.friction[leader].1 || self.drives.iter().any(by_gear)
     }
 
-    /// Whether its equations are linear but for changes of mode: what the exact solver takes.
+    /// True if its equations are linear but for changes of mode: what the exact solver takes.
     pub fn is_piecewise_linear(&self) -> bool {
         let straight = |body: &Body| body.friction.is_piecewise_linear() && body.along.is_none();
         self.bodies.iter().all(straight) && self.springs.iter().all(|spring| spring.follows.is_none())
@@ -434,7 +434,7 @@ impl Mechanism {
         rate
     }
 
-    /// The same as [`Mechanism::seen_from`], itself where that is where it counts from already.
+    /// [`Mechanism::seen_from`], or this mechanism if its coordinates begin at zero already.
     pub(crate) fn seen_by(self: &Arc<Self>, layout: &Layout, start: &State) -> Arc<Self> {
         if layout.origin(start) == self.origin { Arc::clone(self) } else { Arc::new(self.seen_from(layout, start)) }
     }

@@ -3,16 +3,16 @@
 use super::{BODIES, DRIVES, Form, Label, Mechanism, SPRINGS, Transition};
 use crate::friction::Motion;
 
-/// Which linear equations hold: what each body, each spring and each drive does.
+/// Mode: the state of each body, spring and drive, within which the equations are linear.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Mode {
     /// Motion of each body.
     pub motion: [Motion; BODIES],
-    /// Whether a spring that only pulls is slack.
+    /// True if a spring that only pulls is slack.
     pub slack: [bool; SPRINGS],
-    /// Which side of a spring that only pushes touches.
+    /// Side of each one-sided spring that is in contact.
     pub contact: [Contact; SPRINGS],
-    /// Which piece of its line a spring is on.
+    /// Index of the piece of each piecewise linear spring.
     pub piece: [u8; SPRINGS],
     /// The state of each drive.
     pub drive: [DriveMode; DRIVES],
@@ -21,16 +21,16 @@ pub struct Mode {
 /// The states of the parts of a drive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct DriveMode {
-    /// Whether the torque through the gear is positive; matters only where the gear loses power.
+    /// True if the torque through the gear is positive; matters only where the gear loses power.
     pub torque_positive: bool,
-    /// Whether the voltage limit binds.
+    /// State of the voltage limit.
     pub voltage: Limit,
-    /// Whether the current limit binds.
+    /// State of the current limit.
     pub current: Limit,
 }
 
 impl DriveMode {
-    /// Nothing out of the ordinary.
+    /// Drive within its limits, with positive gear torque.
     pub const ORDINARY: Self = Self { torque_positive: true, voltage: Limit::Inside, current: Limit::Inside };
 }
 
@@ -80,7 +80,7 @@ impl Mode {
     }
 }
 
-/// Whether a limit binds, and on which side.
+/// State of a limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Limit {
     /// At the negative limit.
@@ -103,7 +103,7 @@ impl Limit {
     }
 }
 
-/// Whether two elastic flanks touch, and on which side. A flank only pushes: one that its damper holds back from
+/// State of two elastic flanks. A flank only pushes: one that its damper holds back from
 /// following carries nothing, though it has not left.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Contact {
@@ -131,7 +131,7 @@ impl Contact {
     }
 }
 
-/// Which part of a mechanism, by its number.
+/// Part of a mechanism, by index.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum What {
     /// A body.
@@ -158,7 +158,7 @@ pub struct Part {
 }
 
 impl Part {
-    /// That of a mechanism.
+    /// A part of a mechanism, with its name.
     pub fn of(mechanism: &Mechanism, what: What) -> Self {
         let label = match what {
             What::Body(body) => mechanism.bodies[body].label,
@@ -301,7 +301,7 @@ impl Cause {
         }
     }
 
-    /// Whether both are of the same part, and it is no body.
+    /// True if both are of the same part, and it is no body.
     pub(crate) fn is_of_same_part(self, other: Cause) -> bool {
         match (self, other) {
             (Cause::GearTorque(a), Cause::GearTorque(b)) => a == b,

@@ -1,4 +1,4 @@
-//! Where the power goes.
+//! Power balance.
 
 use super::{AmplifierMode, BODIES, DRIVES, Limit, Mechanism, Mode, SPRINGS, SpringLaw, State};
 

@@ -52,7 +52,7 @@ impl Worth {
 pub enum Seek {
     /// The peak speed of what slides.
     LoadSpeed,
-    /// How far the drives are off it at most.
+    /// Peak of the position by the drives minus the true position.
     LoadError,
     /// The peak of r φ̇ of the only drive's pulley.
     BeltSpeed,
@@ -98,9 +98,9 @@ pub struct FigureRow {
     pub words: &'static str,
     /// Its name as a column and for people on an axis, where that has names of its own for it.
     pub of_axis: Option<[&'static str; 2]>,
-    /// Whether it is another figure in other words on an axis, so that its sweeps leave it out.
+    /// True if it is another figure in other words on an axis, so that its sweeps leave it out.
     pub again_on_an_axis: bool,
-    /// Whether only a machine with one drive has it.
+    /// True if only a machine with one drive has it.
     pub one_drive: bool,
     /// Its value for the part of this place.
     pub of: fn(&Metrics, usize) -> Worth,

@@ -116,7 +116,7 @@ pub struct Sought {
     readings: [bool; QUANTITIES],
     sums: bool,
     steady_speed: bool,
-    /// Whether the motion has to be followed at all.
+    /// True if the motion has to be followed at all.
     follows: bool,
 }
 
@@ -182,7 +182,7 @@ pub struct Meter {
     sums: Vec<Peak>,
     plateau: Option<Plateau>,
     rotors: Vec<(usize, Rotor)>,
-    /// Whether any body slid or was free.
+    /// True if any body slid or was free.
     moved: bool,
     end: f64,
     state: State,
@@ -233,7 +233,7 @@ impl Meter {
         self.peaks.iter_mut().enumerate().filter(move |(q, _)| readings[*q])
     }
 
-    /// Whether any body other than rotors slides or is free.
+    /// True if any body other than rotors slides or is free.
     fn slides(&self, mode: &Mode) -> bool {
         mode.motion[..self.sought.places.bodies].iter().any(|motion| *motion != Motion::Stuck)
     }

@@ -25,13 +25,13 @@ pub struct SteadySpeed {
     pub value: f64,
     /// The difference of largest and least speed within the last tenth of that stretch, m/s.
     pub change: f64,
-    /// Whether that change is at most 1 % of the speed; if not, there was no time to become steady.
+    /// True if that change is at most 1 % of the speed; if not, there was no time to become steady.
     pub reached: bool,
     /// The speed at which all forces balance under that input, with everything sliding its way: [`balanced_speed`].
     pub analytic: Balance,
     /// The input, V or A.
     pub input: f64,
-    /// Where that stretch begins and ends, s.
+    /// Begin and end of the interval of steady speed, s.
     pub stretch: (f64, f64),
 }
 
@@ -92,7 +92,7 @@ impl Plateau {
         self.range = (self.range.0.min(speed), self.range.1.max(speed));
     }
 
-    /// Whether a stretch may tell of it.
+    /// True if an interval is long enough for a steady speed.
     pub fn meets(&self, stretch: &Stretch) -> bool {
         stretch.end() >= self.late - self.near && stretch.begin <= self.held.end + self.near
     }

@@ -1,9 +1,9 @@
-//! Where a parameter sits in a machine, how it is read there and how it is set.
+//! Location of a parameter in a machine, with access to it.
 
 use crate::friction::{Friction, Law, Shape, decay_of_velocity, velocity_of_decay};
 use crate::machine::{Belt, BeltModel, Machine, SimpleDrive};
 
-/// Where a parameter sits in a machine.
+/// Location of a parameter in a machine.
 #[derive(Debug, Clone, Copy)]
 pub enum Field {
     /// In no machine: it is a number of a run, a recorder, a controller or a method.
@@ -60,7 +60,7 @@ impl Accessor {
     }
 }
 
-/// How the elements of a parameter are named.
+/// Naming of the elements of a parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum List {
     /// It is a single number.
@@ -99,7 +99,7 @@ impl List {
         }
     }
 
-    /// Whether the parameter's own key names all elements together.
+    /// True if the parameter's own key names all elements together.
     pub(super) fn has_whole(self) -> bool {
         self != List::Slides
     }

@@ -43,9 +43,9 @@ pub struct Free {
     pub name: String,
     /// SI unit.
     pub unit: &'static str,
-    /// Where it starts.
+    /// Start value.
     pub start: f64,
-    /// Where it may go.
+    /// Bounds.
     pub low: f64,
     /// The other end of it.
     pub high: f64,
@@ -58,7 +58,7 @@ pub struct Free {
 /// Bounds of a parameter that are given, by name.
 pub type GivenBounds = [(String, [f64; 2])];
 
-/// How far a parameter may go from where it starts, unless its bounds are given.
+/// Default bounds: factor from the start value.
 const FAR: f64 = 100.0;
 
 impl Free {
@@ -166,12 +166,12 @@ impl Free {
         Some(number.value(machine)? / factor)
     }
 
-    /// Whether both set a number of the machine.
+    /// True if both set a number of the machine.
     pub fn overlaps(&self, other: &Self) -> bool {
         self.members.iter().any(|(number, _)| other.members.iter().any(|(its, _)| its == number))
     }
 
-    /// Whether it is searched for on a logarithmic scale: what is above zero by nature, over more than a factor of two.
+    /// True if it is searched for on a logarithmic scale: what is above zero by nature, over more than a factor of two.
     pub fn logarithmic(&self) -> bool {
         self.low > 0.0 && self.high > 2.0 * self.low
     }
@@ -295,14 +295,14 @@ fn present<'a>(machine: &'a Machine, row: &'static Parameter) -> impl Iterator<I
     })
 }
 
-/// Whether both drives of a gantry have this number, and the same one: it is then that of the motor that both are.
+/// True if both drives of a gantry have this number, and the same one: it is then that of the motor that both are.
 fn are_alike_drives(machine: &Machine, row: &'static Parameter) -> bool {
     let Some((List::Drives, count)) = machine.sits(row).listed() else { return false };
     let first = machine.get(row, 0);
     first.is_some() && (1..count).all(|index| machine.get(row, index) == first)
 }
 
-/// Whether it has the value of something that it follows.
+/// True if it has the value of something that it follows.
 fn follows_any(machine: &Machine, number: Number) -> bool {
     leads(machine, number).next().is_some()
 }
@@ -378,7 +378,7 @@ fn numbers(machine: &Machine, key: &str, free: &[&str]) -> Result<(Vec<Number>, 
         // Of a number there are no elements, of a list not that many.
         return Err(match list {
             List::None | List::Drives | List::Slides => unknown(machine, key),
-            List::Numbers | List::Points => Error::new(format!("`{key}` is none of the {count} that there are"))
+            List::Numbers | List::Points => Error::new(format!("`{key}` does not exist: there are {count}"))
                 .allowed(format!("{} to {}", list.key(row.key, 0), list.key(row.key, count - 1))),
         });
     }

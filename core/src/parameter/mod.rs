@@ -36,18 +36,18 @@ pub struct Parameter {
     pub range: Range,
     /// Its meaning.
     pub sentence: &'static str,
-    /// How it is typically written.
+    /// Typical value in a case file.
     pub example: &'static str,
-    /// Where it sits in a machine.
+    /// Location in a machine.
     pub field: Field,
-    /// Whether it may be off where nobody names it, and with which others.
+    /// Its variation with `--spread`.
     pub off: Off,
     /// The keys that it goes with as long as it has the same value and is not named itself, the one that is asked first
     /// first.
     pub follows: &'static [&'static str],
     /// The sum over the bodies that it is a part of.
     pub part: Option<(Sum, Arm)>,
-    /// Where it sits in a controller's structure.
+    /// Location in a controller's structure.
     pub gain: Option<InStructure>,
 }
 
@@ -58,11 +58,11 @@ pub struct InStructure {
     pub get: fn(&Structure) -> Option<f64>,
     /// Sets it, in a structure that has a place for it.
     pub set: fn(&mut Structure, f64),
-    /// Whether a search changes it.
+    /// How a search for gains changes it.
     pub tuned: Tuned,
 }
 
-/// Whether a search of gains changes a number.
+/// Role of a number in a search for gains.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Tuned {
     /// No.
@@ -73,7 +73,7 @@ pub enum Tuned {
     Corner(&'static str),
 }
 
-/// Whether a number of a machine may be off where nobody names it.
+/// How a parameter varies with `--spread` without being named.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Off {
     /// No: it is counted, chosen or set.
@@ -102,7 +102,7 @@ impl Sum {
     /// All of them.
     pub const ALL: [Sum; 4] = [Sum::Viscous, Sum::Coulomb, Sum::Inertia, Sum::Stiffness];
 
-    /// As in the case file.
+    /// Its name in the case file.
     pub fn name(self) -> &'static str {
         match self {
             Sum::Viscous => "total.viscous",
@@ -206,11 +206,11 @@ pub struct Range {
     pub low: f64,
     /// The greatest value.
     pub high: f64,
-    /// Whether `low` itself is excluded.
+    /// True if `low` itself is excluded.
     pub above: bool,
-    /// Whether `high` itself is excluded.
+    /// True if `high` itself is excluded.
     pub below: bool,
-    /// Whether only whole numbers will do.
+    /// True if only whole numbers will do.
     pub whole: bool,
 }
 
@@ -232,14 +232,14 @@ impl Range {
         Self { whole: true, ..Self::new(low, high) }
     }
 
-    /// Whether `value` lies in it.
+    /// True if `value` lies in it.
     pub fn contains(&self, value: f64) -> bool {
         let low = if self.above { value > self.low } else { value >= self.low };
         let high = if self.below { value < self.high } else { value <= self.high };
         low && high && (!self.whole || value.fract() == 0.0)
     }
 
-    /// Whether it goes as far as a seed may.
+    /// True if it goes as far as a seed may.
     fn is_seed(&self) -> bool {
         self.whole && self.high == i64::MAX as f64
     }

@@ -72,7 +72,7 @@ pub fn parse(text: &str) -> Result<Quantity> {
 /// use taut::quantity::read;
 /// assert_eq!(read("19.4 mm", "m")?, 0.0194);
 /// let error = read("0.362 kg", "m").unwrap_err();
-/// assert_eq!(error.what, "\"0.362 kg\" is a mass (kg); a length (m) is wanted");
+/// assert_eq!(error.what, "\"0.362 kg\" is a mass (kg); expected a length (m)");
 /// # Ok::<(), taut::Error>(())
 /// ```
 pub fn read(text: &str, unit: &str) -> Result<f64> {
@@ -82,18 +82,18 @@ pub fn read(text: &str, unit: &str) -> Result<f64> {
     let (is, want) = (given.dimension, wanted.dimension);
     if is.without_angle() == want.without_angle() {
         if wanted.hertz == 1 && is.angle == 1 {
-            return Err(Error::new(format!("\"{text}\" is an angular speed; a frequency (Hz) is wanted"))
+            return Err(Error::new(format!("\"{text}\" is an angular speed; expected a frequency (Hz)"))
                 .next(format!("{text} is {} Hz", rounded(given.value / (2.0 * PI)))));
         }
         if given.hertz != 0 && want.angle != 0 {
-            let error = Error::new(format!("\"{text}\" is given in hertz; {} is wanted", want.describe()));
+            let error = Error::new(format!("\"{text}\" is given in hertz; expected {}", expected(want)));
             return Err(match (given.hertz, want.angle) {
                 (1, 1) => error.next(format!("{text} is {} rad/s", rounded(given.value * 2.0 * PI))),
-                _ => error.next("give it per rad/s or per rpm, so that turns and radians cannot be mixed up"),
+                _ => error.next("give it per rad/s or per rpm, so that turns and radians are distinct"),
             });
         }
         if given.unit.is_empty() && want != Dimension::NONE {
-            return Err(Error::new(format!("\"{text}\" has no unit; {} is wanted", want.describe()))
+            return Err(Error::new(format!("\"{text}\" has no unit; expected {}", expected(want)))
                 .next("add the unit, such as deg, rad or rev"));
         }
         if is.angle == want.angle || is.angle == 0 {
@@ -101,10 +101,10 @@ pub fn read(text: &str, unit: &str) -> Result<f64> {
         }
     }
     if given.unit.is_empty() {
-        return Err(Error::new(format!("\"{text}\" has no unit; {} is wanted", want.describe()))
+        return Err(Error::new(format!("\"{text}\" has no unit; expected {}", expected(want)))
             .next("add the unit, or leave the quotes away if the number is in SI units"));
     }
-    let error = Error::new(format!("\"{text}\" is {}; {} is wanted", is.describe(), want.describe()));
+    let error = Error::new(format!("\"{text}\" is {}; expected {}", is.describe(), expected(want)));
     // Pounds and kilograms of force: what is missing is exactly one acceleration of gravity.
     let as_force = is.times(Dimension::new(0, 1, -2, 0, 0), 1).map(Dimension::without_angle);
     if as_force == Some(want.without_angle()) {
@@ -113,9 +113,17 @@ pub fn read(text: &str, unit: &str) -> Result<f64> {
     // Motors are sold by K_v in rpm/V, and modelled by K_e in V s/rad.
     let inverse = Dimension::NONE.times(is, -1).map(Dimension::without_angle);
     Err(match inverse == Some(want.without_angle()) && given.value != 0.0 {
-        true => error.next(format!("that is the inverse of what is wanted: write {}", show(1.0 / given.value, unit))),
+        true => {
+            error.next(format!("this is the inverse of the expected quantity: write {}", show(1.0 / given.value, unit)))
+        }
         false => error,
     })
+}
+
+/// A dimension as the object of "expected".
+fn expected(want: Dimension) -> String {
+    let words = want.describe();
+    if words.starts_with("in ") { format!("a quantity {words}") } else { words }
 }
 
 /// An SI value in `unit`, as in `show(0.0194, "mm")`, which is `19.4 mm`; to six digits, for messages.

@@ -81,7 +81,7 @@ pub(super) struct Unit {
     pub names: &'static [&'static str],
     pub dimension: Dimension,
     pub factor: Factor,
-    /// Whether `k`, `m`, `µ` and their kind may stand before it.
+    /// True if `k`, `m`, `µ` and their kind may stand before it.
     pub prefixes: bool,
 }
 

@@ -11,7 +11,7 @@ pub fn direction(reference: &Reference) -> f64 {
     direction_by(&mut Run::plain(), reference)
 }
 
-/// The same by any calculator.
+/// As the function without `_by`, for any calculator.
 pub fn direction_by<C: Calculator>(c: &mut C, reference: &Reference<C::N>) -> C::N {
     let [forward, backward, none] = [1.0, -1.0, 0.0].map(|sign| c.number(sign));
     let mut sign = |of: C::N, rest: f64, or: C::N| {
@@ -30,9 +30,9 @@ pub struct Compensation {
     machine: Machine,
     /// The axis as one mass.
     pub rigid: Rigid,
-    /// Whether the encoder sits before the belt.
+    /// True if the encoder sits before the belt.
     before_belt: bool,
-    /// Whether it sits before the gear.
+    /// True if it sits before the gear.
     before_gear: bool,
 }
 
@@ -69,7 +69,7 @@ impl Compensation {
         self.needed_by(&mut Run::plain(), y)
     }
 
-    /// The same by any calculator.
+    /// As the function without `_by`, for any calculator.
     pub fn needed_by<C: Calculator>(&self, c: &mut C, y: &Reference<C::N>) -> Needed<C::N> {
         let machine = &self.machine;
         let (r, sign) = (machine.pulley_radius, direction_by(c, y));
@@ -145,7 +145,7 @@ impl Compensation {
         Needed { drive, idler: [position + behind[0], speed + behind[1]], force, spans }
     }
 
-    /// Where the encoder's side should be, so that the cart is where it should.
+    /// Reference of the encoder for which the cart follows its own.
     pub fn target<C: Calculator>(&self, c: &mut C, y: &Reference<C::N>) -> Reference<C::N> {
         if !(self.settings.compensate_stretch && self.before_belt) {
             return *y;

@@ -1,7 +1,8 @@
-//! Whether the machine can follow a reference: what that needs of motor, amplifier, belt and travel, and their limits.
+//! Feasibility of a reference: the requirements on motor, amplifier, belt and travel, and their limits.
 
 use super::compensation::{Compensation, direction};
-use crate::design::FeedForward;
+use super::forward::Forward;
+use crate::design::{FeedForward, FeedForwardModel};
 use crate::machine::rigid::Rigid;
 use crate::machine::{AmplifierMode, Machine};
 use crate::number::engineering;
@@ -17,11 +18,11 @@ pub struct Shortfall {
     pub limit: &'static str,
     /// When most is needed, s.
     pub time: f64,
-    /// Where the reference is then, m.
+    /// Where the reference is then, m; of a machine with several drives that of the drive's part of the belt.
     pub position: f64,
-    /// How much is needed, in `unit`.
+    /// Requirement, in `unit`.
     pub needed: f64,
-    /// How much there is.
+    /// Limit.
     pub allowed: f64,
     /// V, A, N or m.
     pub unit: &'static str,
@@ -57,19 +58,28 @@ pub struct Load {
     pub limit: &'static str,
     /// V, A or N.
     pub unit: &'static str,
-    /// How much is needed at most.
+    /// Largest requirement.
     pub needed: f64,
-    /// How much there is.
+    /// Limit.
     pub allowed: f64,
 }
 
 impl Load {
-    /// What is needed as a share of what there is.
+    /// Requirement divided by the limit.
     pub fn share(&self) -> f64 {
         self.needed / self.allowed
     }
 
-    /// Whether the motor's supply bounds it, of which a loop needs some for itself.
+    /// Adds it to loads of which each limit has one: the one that takes the larger share.
+    pub fn join(self, all: &mut Vec<Self>) {
+        match all.iter_mut().find(|known| known.limit == self.limit) {
+            Some(known) if self.share() > known.share() => *known = self,
+            Some(_) => (),
+            None => all.push(self),
+        }
+    }
+
+    /// True if the motor's supply bounds it, of which a loop needs some for itself.
     pub fn is_electrical(&self) -> bool {
         ["V", "A"].contains(&self.unit)
     }
@@ -88,8 +98,6 @@ fn demands(machine: &Machine, limit: Option<f64>) -> Vec<Demand> {
         allowed.map(|allowed| Demand { limit, unit, allowed, needed, words })
     };
     let all = [
-        demand(("voltage", "V"), volts, Box::new(|need| need.voltage.abs()), ["needs", "", "; the limit is"]),
-        demand(("current", "A"), amperes, Box::new(|need| need.current.abs()), ["needs", "", "; the limit is"]),
         demand(
             ("slack", "N"),
             belt.pretension,
@@ -109,23 +117,80 @@ fn demands(machine: &Machine, limit: Option<f64>) -> Vec<Demand> {
             ["takes", " at the drive pulley", "; the teeth in mesh carry"],
         ),
     ];
-    all.into_iter().flatten().collect()
+    electrical(volts, amperes).into_iter().chain(all.into_iter().flatten()).collect()
 }
 
-/// How much of each limit `profile` needs at most, looked at `instants` times along its way.
-pub fn loads(machine: &Machine, limit: Option<f64>, profile: &Profile, instants: usize) -> Vec<Load> {
-    let needs = needs(machine, profile, instants);
-    let load = |demand: Demand| {
+/// The demands on a motor with these limits of voltage and current.
+fn electrical(volts: Option<f64>, amperes: Option<f64>) -> Vec<Demand> {
+    let words = ["needs", "", "; the limit is"];
+    let voltage = volts.map(|allowed| {
+        let needed = Box::new(|need: &Need| need.voltage.abs());
+        Demand { limit: "voltage", unit: "V", allowed, needed, words }
+    });
+    let current = amperes.map(|allowed| {
+        let needed = Box::new(|need: &Need| need.current.abs());
+        Demand { limit: "current", unit: "A", allowed, needed, words }
+    });
+    voltage.into_iter().chain(current).collect()
+}
+
+/// How much of each limit references need at most, looked at `instants` times along their way; of several drives that of
+/// the one that needs most of it.
+pub fn loads(machine: &Machine, limit: Option<f64>, profiles: &[Profile], instants: usize) -> Vec<Load> {
+    let load = |needs: &[Need], demand: Demand| {
         let needed = needs.iter().map(&demand.needed).fold(0.0, f64::max);
         Load { limit: demand.limit, unit: demand.unit, needed, allowed: demand.allowed }
     };
-    demands(machine, limit).into_iter().map(load).collect()
+    if let [profile] = profiles {
+        let needs = needs(machine, profile, instants);
+        return demands(machine, limit).into_iter().map(|demand| load(&needs, demand)).collect();
+    }
+    let mut all: Vec<Load> = Vec::new();
+    for drive in 0..machine.drives.len() {
+        let needs = needs_of_drive(machine, drive, profiles, instants);
+        let (volts, amperes) = limits_of(machine, drive, limit);
+        electrical(volts, amperes).into_iter().for_each(|demand| load(&needs, demand).join(&mut all));
+    }
+    all
 }
 
 /// The limits that `profile`, shaper included, exceeds on this machine under a controller with this limit of its command
 /// (V or A); none if the reference can be followed. Friction counts as viscous and Coulomb friction, the idler's own
 /// swing as quasi-static.
-pub fn shortfalls(machine: &Machine, limit: Option<f64>, profile: &Profile) -> Vec<Shortfall> {
+///
+/// Of a machine with several drives voltage and current of each are looked at, the belts taken for rigid.
+pub fn shortfalls(machine: &Machine, limit: Option<f64>, profiles: &[Profile]) -> Vec<Shortfall> {
+    match profiles {
+        [profile] => of_axis(machine, limit, profile),
+        _ => (0..machine.drives.len()).flat_map(|drive| of_drive(machine, limit, drive, profiles)).collect(),
+    }
+}
+
+/// The limits that the references of a machine with several drives exceed at one of these.
+fn of_drive(machine: &Machine, limit: Option<f64>, drive: usize, profiles: &[Profile]) -> Vec<Shortfall> {
+    let needs = needs_of_drive(machine, drive, profiles, INSTANTS);
+    let name = machine.geometry().drives[drive].label.name;
+    let (volts, amperes) = limits_of(machine, drive, limit);
+    let electrical = electrical(volts, amperes).into_iter().filter_map(|demand| exceeded(&needs, &demand));
+    electrical.map(|short| Shortfall { words: format!("{name}: {}", short.words), ..short }).collect()
+}
+
+/// What one of several drives needs, the belts taken for rigid.
+fn needs_of_drive(machine: &Machine, drive: usize, profiles: &[Profile], instants: usize) -> Vec<Need> {
+    let all = FeedForward { model: FeedForwardModel::Rigid, ..FeedForward::NONE };
+    let Some(forward) = Forward::of(all, machine, drive) else { return Vec::new() };
+    let end = profiles.iter().map(Profile::rest).fold(0.0, f64::max);
+    let need = |k: usize| {
+        let time = end * k as f64 / instants as f64;
+        let slides: Vec<Reference> = profiles.iter().map(|profile| profile.at(time)).collect();
+        let (current, voltage) = forward.electrical(&slides);
+        let (force, spans) = (forward.force(&slides)[0], [0.0; 3]);
+        Need { time, y: forward.along(&slides), force, current, voltage, spans }
+    };
+    (0..=instants).map(need).collect()
+}
+
+fn of_axis(machine: &Machine, limit: Option<f64>, profile: &Profile) -> Vec<Shortfall> {
     let needs = needs(machine, profile, INSTANTS);
     let (volts, amperes) = limits(machine, limit);
     let mut found: Vec<Shortfall> = Vec::new();
@@ -236,9 +301,14 @@ pub fn sentence(name: &str, short: &[Shortfall]) -> String {
     format!("the move \"{name}\" cannot be followed: {}", words.join("; "))
 }
 
-/// The tightest limits of voltage and current, V and A.
+/// The tightest limits of voltage and current, V and A, of the first drive.
 pub fn limits(machine: &Machine, limit: Option<f64>) -> (Option<f64>, Option<f64>) {
-    let amplifier = &machine.drives[0].amplifier;
+    limits_of(machine, 0, limit)
+}
+
+/// The same of any drive.
+fn limits_of(machine: &Machine, drive: usize, limit: Option<f64>) -> (Option<f64>, Option<f64>) {
+    let amplifier = &machine.drives[drive].amplifier;
     let commanded = limit.map(|limit| limit * amplifier.gain.abs());
     let least = |a: Option<f64>, b: Option<f64>| a.into_iter().chain(b).reduce(f64::min);
     match amplifier.mode {

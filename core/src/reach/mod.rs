@@ -1,7 +1,8 @@
-//! What a machine can do: the forces, currents and voltages that a reference needs, the limits of these, the modes that
+//! Capability of a machine: forces, currents and voltages that a reference requires, their limits, the modes that
 //! it excites, and the quickest moves.
 
 pub mod compensation;
 pub mod feasible;
+pub mod forward;
 pub mod quickest;
 pub mod resonance;

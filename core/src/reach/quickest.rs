@@ -1,5 +1,5 @@
-//! The quickest moves that an axis can make: speed, acceleration, jerk and snap within its limits, with jerk and snap
-//! times on the zeros of the belt's modes.
+//! The quickest moves that a machine can make: speed, acceleration, jerk and snap within its limits, of a gantry along
+//! its path, with jerk and snap times on the zeros of the belt's modes.
 
 use super::feasible::{limits, loads, shortfalls};
 use super::resonance::{Drive, reaches, resonances};
@@ -8,9 +8,9 @@ use crate::error::{Error, Result};
 use crate::machine::{BeltModel, Machine};
 use crate::signal::profile::{Leg, Limits, Profile};
 
-/// Instants of a reference that are looked at during a search.
+/// Number of instants of a reference that a search evaluates.
 pub const INSTANTS: usize = 160;
-/// The same where a plan is checked.
+/// Number of instants at which a plan is checked.
 pub const CLOSELY: usize = 4000;
 
 /// Cruising speeds that are tried, by a grid and then by golden section, and bisections of the acceleration.
@@ -23,6 +23,9 @@ const SHORTEST: [f64; 2] = [4.0, 1.0];
 
 /// Times that a plan is made slower because an axis of the family needs more than there is.
 const CORRECTIONS: usize = 6;
+
+/// Share by which two frequencies differ that are one mode.
+const SAME: f64 = 1e-6;
 
 /// Smallest cruising speed that is tried, as a share of the largest that the way allows.
 const SLOWEST: f64 = 0.02;
@@ -56,51 +59,62 @@ impl Wanted {
     }
 }
 
-/// Lowest frequencies along the travel of the modes with the drive pulley held, Hz, the lowest first; none of a rigid
-/// belt, or of one that does not swing.
+/// Lowest frequencies along the travel of the modes with the drive pulleys held, Hz, the lowest first; of a gantry those
+/// that move the bridge and those that move the cart. None of a rigid belt, or of one that does not swing.
 pub fn modes(machine: &Machine) -> Vec<f64> {
     if machine.belt.model == BeltModel::Rigid {
         return Vec::new();
     }
-    let Ok(found) = resonances(machine, Drive::Held, 0) else { return Vec::new() };
-    let mut lowest: Vec<f64> = reaches(&found).iter().map(|mode| mode.frequency[0]).collect();
+    let of_slide = |slide| resonances(machine, Drive::Held, slide).map(|found| reaches(&found)).unwrap_or_default();
+    let found = (0..machine.geometry().slides.len()).flat_map(of_slide);
+    let mut lowest: Vec<f64> = found.map(|mode| mode.frequency[0]).collect();
     lowest.sort_by(f64::total_cmp);
+    lowest.dedup_by(|next, last| (*next / *last - 1.0).abs() < SAME);
     lowest
 }
 
 /// A move from stroke to stroke, without its limits.
 #[derive(Debug, Clone)]
 pub struct Way {
-    /// Where it begins, m.
-    pub start: f64,
+    /// Start position of each coordinate, m.
+    pub start: Vec<f64>,
     /// Rest before each stroke (s), and its target (m).
-    pub strokes: Vec<(f64, f64)>,
+    pub strokes: Vec<(f64, Vec<f64>)>,
     /// The shortest and the longest stroke, m.
     shortest: f64,
     longest: f64,
 }
 
 impl Way {
-    /// The strokes of a reference; none of one that has none.
-    pub fn of(profile: &Profile) -> Option<Self> {
+    /// The strokes of references on one clock; none of those that have none.
+    pub fn of(profiles: &[Profile]) -> Option<Self> {
+        let all: Vec<Vec<_>> = profiles.iter().map(|profile| profile.strokes().collect()).collect();
         let mut rested = 0.0;
-        let mut strokes = Vec::new();
-        for (begin, from, distance, duration) in profile.strokes().filter(|(_, _, distance, _)| *distance != 0.0) {
-            strokes.push((begin - rested, from + distance));
-            rested = begin + duration;
+        let (mut strokes, mut lengths) = (Vec::new(), Vec::new());
+        for number in 0..all.first()?.len() {
+            let legs = || all.iter().filter_map(|strokes| strokes.get(number));
+            let length = legs().map(|(_, _, distance, _)| distance * distance).sum::<f64>().sqrt();
+            if length == 0.0 {
+                continue;
+            }
+            let begin = legs().map(|(begin, ..)| *begin).fold(0.0, f64::max);
+            strokes.push((begin - rested, legs().map(|(_, from, distance, _)| from + distance).collect()));
+            lengths.push(length);
+            rested = begin + legs().map(|(.., duration)| *duration).fold(0.0, f64::max);
         }
-        let lengths = || profile.strokes().map(|(_, _, distance, _)| distance.abs()).filter(|length| *length > 0.0);
-        let (shortest, longest) = (lengths().reduce(f64::min)?, lengths().reduce(f64::max)?);
-        Some(Self { start: profile.start(), strokes, shortest, longest })
+        let start = profiles.iter().map(Profile::start).collect();
+        let (shortest, longest) =
+            (lengths.iter().copied().reduce(f64::min)?, lengths.iter().copied().reduce(f64::max)?);
+        Some(Self { start, strokes, shortest, longest })
     }
 
-    /// The same way within these limits.
-    pub fn within(&self, limits: &Limits) -> Result<Profile> {
-        let legs = self.strokes.iter().flat_map(|&(rest, to)| {
-            let wait = (rest > 1e-12).then_some(Leg::Wait(rest));
-            wait.into_iter().chain([Leg::To(to, *limits)])
+    /// Profiles over this path within these limits along it.
+    pub fn within(&self, limits: &Limits) -> Result<Vec<Profile>> {
+        let legs = self.strokes.iter().flat_map(|(rest, to)| {
+            let wait = (*rest > 1e-12).then_some(Leg::Wait(*rest));
+            wait.into_iter().chain([Leg::To(to.clone(), *limits)])
         });
-        Profile::new(self.start, &legs.collect::<Vec<_>>())
+        Profile::of_legs(&self.start, &legs.collect::<Vec<_>>())
     }
 }
 
@@ -121,8 +135,8 @@ impl Quickest<'_> {
     /// Refuses a way that no speed and no acceleration make possible, and one that nothing limits.
     pub fn check(&self, way: &Way) -> Result<()> {
         let slow = Limits { speed: 1e-3, acceleration: 1e-2, jerk: None, snap: None };
-        let reference = way.within(&slow)?.shaped(&self.design.shaper);
-        if let Some(short) = shortfalls(self.machine, self.design.limit, &reference).first() {
+        let references = self.shaped(way.within(&slow)?);
+        if let Some(short) = shortfalls(self.machine, self.design.limit, &references).first() {
             return Err(Error::new(format!("there is no plan: {}", short.words)));
         }
         let (volts, amperes) = limits(self.machine, self.design.limit);
@@ -131,6 +145,11 @@ impl Quickest<'_> {
                 .next("give limit in [controller], amplifier.voltage_limit, or a speed and an acceleration"));
         }
         Ok(())
+    }
+
+    /// References through the shaper of the controller.
+    fn shaped(&self, profiles: Vec<Profile>) -> Vec<Profile> {
+        profiles.into_iter().map(|profile| profile.shaped(&self.design.shaper)).collect()
     }
 
     /// Jerk and snap time, s; none where the belt has no such mode.
@@ -162,17 +181,17 @@ impl Quickest<'_> {
         way: &Way,
         periods: [u8; 2],
         share: f64,
-        others: &dyn Fn(&Profile) -> f64,
+        others: &dyn Fn(&[Profile]) -> f64,
     ) -> Result<Option<Limits>> {
         let wanted = share * (1.0 - self.wanted.reserve);
         let mut share = wanted;
         for _ in 0..CORRECTIONS {
             let Some(limits) = self.searched(way, periods, share) else { return Ok(None) };
-            let profile = way.within(&limits)?.shaped(&self.design.shaper);
+            let profiles = self.shaped(way.within(&limits)?);
             // Looked at more closely, the axis needs a little more than during the search.
-            let closely = loads(self.machine, self.design.limit, &profile, CLOSELY);
+            let closely = loads(self.machine, self.design.limit, &profiles, CLOSELY);
             let most = closely.iter().map(|load| load.share() / if load.is_electrical() { wanted } else { 1.0 });
-            let most = most.fold(others(&profile), f64::max);
+            let most = most.fold(others(&profiles), f64::max);
             if most <= 1.0 {
                 return Ok(Some(limits));
             }
@@ -211,7 +230,7 @@ impl Quickest<'_> {
         let duration = |speed: f64| -> (f64, Option<Limits>) {
             let Some(a) = acceleration(speed) else { return (f64::INFINITY, None) };
             let limits = self.limits(speed, a, periods, times);
-            (way.within(&limits).map_or(f64::INFINITY, |profile| profile.end()), Some(limits))
+            (way.within(&limits).map_or(f64::INFINITY, |profiles| profiles[0].end()), Some(limits))
         };
         // No faster than a way without any cruise reaches.
         let fastest = (way.longest * most).sqrt().min(self.wanted.speed.unwrap_or(f64::INFINITY));
@@ -239,17 +258,21 @@ impl Quickest<'_> {
         }
         let limits = best_yet.1?;
         // Where no stroke cruises, the largest speed of the longest.
-        let profile = way.within(&limits).ok()?;
-        let peaks = profile.strokes().map(|(begin, _, _, duration)| profile.at(begin + 0.5 * duration).speed.abs());
+        let profiles = way.within(&limits).ok()?;
+        let strokes = profiles[0].strokes().map(|(begin, _, _, duration)| begin + 0.5 * duration);
+        let speed_at = |time: f64| match &profiles[..] {
+            [profile] => profile.at(time).speed.abs(),
+            _ => profiles.iter().map(|profile| profile.at(time).speed.powi(2)).sum::<f64>().sqrt(),
+        };
+        let peaks = strokes.map(speed_at);
         let speed = peaks.fold(0.0, f64::max).min(limits.speed);
         Some(Limits { speed, ..limits })
     }
 
-    /// Whether a move within these limits takes no more than this share of each limit of the machine.
+    /// True if a move within these limits takes no more than this share of each limit of the machine.
     fn is_within(&self, way: &Way, limits: &Limits, share: f64) -> bool {
-        let Ok(profile) = way.within(limits) else { return false };
-        let profile = profile.shaped(&self.design.shaper);
-        let loads = loads(self.machine, self.design.limit, &profile, INSTANTS);
+        let Ok(profiles) = way.within(limits) else { return false };
+        let loads = loads(self.machine, self.design.limit, &self.shaped(profiles), INSTANTS);
         loads.iter().all(|load| load.share() <= if load.is_electrical() { share } else { 1.0 })
     }
 }

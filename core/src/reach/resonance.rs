@@ -79,7 +79,7 @@ pub fn reaches(modes: &[Resonance]) -> Vec<Reach> {
 }
 
 impl Reach {
-    /// Whether a mode at some place is this one.
+    /// True if a mode at some place is this one.
     pub fn has(&self, mode: &Resonance) -> bool {
         (self.frequency[0]..=self.frequency[1]).contains(&mode.frequency)
     }

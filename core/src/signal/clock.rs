@@ -17,17 +17,17 @@ impl Now {
         Self { t, slack: 8.0 * f64::EPSILON * t }
     }
 
-    /// The same moment where the clock shows `t`.
+    /// This moment with the clock at `t`.
     fn showing(self, t: f64) -> Self {
         Self { t: t.max(0.0), ..self }
     }
 
-    /// Whether it is `seam` or later.
+    /// True if it is `seam` or later.
     pub fn reached(self, seam: f64) -> bool {
         seam <= self.t + self.slack
     }
 
-    /// Whether seams `spacing` apart can be told apart; false also for a spacing that is not a positive number.
+    /// True if seams `spacing` apart can be told apart; false also for a spacing that is not a positive number.
     pub fn resolves(self, spacing: f64) -> bool {
         spacing > 1e-30 && spacing > 16.0 * self.slack
     }

@@ -61,7 +61,7 @@ impl State {
         if self.position.len() > 1 { KNOWN_IN_PLANE } else { KNOWN }
     }
 
-    /// Whether a block of a printer's list moves nothing that slides: a code of its heaters, fans or extruder.
+    /// True if a block of a printer's list moves nothing that slides: a code of its heaters, fans or extruder.
     fn passes_over(&self, words: &[(char, f64)]) -> bool {
         let other = |&(letter, value): &(char, f64)| match letter {
             'M' | 'T' => true,

@@ -27,9 +27,9 @@ pub const DEGREE: usize = 7;
 /// A stretch of time on which the input is a polynomial.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Piece {
-    /// Where it begins, s; powers count from here.
+    /// Start time, s, from which powers count.
     pub start: f64,
-    /// Where it ends, s; the next piece holds from there on. `f64::INFINITY` for the last.
+    /// End time, s, from which the next piece holds; `f64::INFINITY` for the last.
     pub end: f64,
     /// u(t) = Σ c_k (t − start)ᵏ.
     pub coefficients: [f64; DEGREE + 1],
@@ -127,7 +127,7 @@ pub enum Signal {
         amplitude: f64,
         /// Length of one bit.
         bit: f64,
-        /// Which sequence; the same seed gives the same one.
+        /// Seed of the sequence.
         seed: u64,
     },
     /// Straight lines between points (time, value) of increasing time; zero before the first, held after the last.
@@ -175,7 +175,7 @@ pub enum Hold {
 pub struct Slot {
     /// The signal; its time zero is the start of its turn.
     pub signal: Signal,
-    /// How long its turn lasts, s.
+    /// Duration of this part, s.
     pub lasts: f64,
 }
 

@@ -23,7 +23,7 @@ pub struct Limits {
     pub snap: Option<f64>,
 }
 
-/// Where the cart should be, and the first four derivatives of that.
+/// Reference position of the cart and its first four derivatives.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Reference<N = f64> {
     /// y, m.
@@ -98,7 +98,7 @@ impl Stroke {
         if values.iter().flatten().any(|v| !(1e-15..=1e15).contains(v))
             || limits.jerk.is_none() && limits.snap.is_some()
         {
-            return Err(Error::new("these limits of a move are none")
+            return Err(Error::new("the limits of a move are invalid")
                 .allowed("speed, acceleration, jerk and snap above zero; snap only with jerk"));
         }
         if distance.is_nan() || distance.abs() > 1e9 {
@@ -119,12 +119,12 @@ impl Stroke {
         Self { distance, duration: self.duration, pieces: self.pieces.iter().map(scale).collect() }
     }
 
-    /// How long it takes, s.
+    /// Duration, s.
     pub fn duration(&self) -> f64 {
         self.duration
     }
 
-    /// Where it is `t` after its beginning.
+    /// Reference at time `t` after the start, s.
     pub fn at(&self, t: f64) -> Reference {
         if t >= self.duration {
             return Reference::at(self.distance);
@@ -347,6 +347,16 @@ impl Profile {
         Ok((0..start.len()).map(of_coordinate).collect())
     }
 
+    /// The reference of each coordinate along legs: [`Profile::new`] of one, [`Profile::along`] of several.
+    pub fn of_legs(start: &[f64], legs: &[Leg<Vec<f64>>]) -> Result<Vec<Self>> {
+        let [start] = start else { return Self::along(start, legs) };
+        let alone = |leg: &Leg<Vec<f64>>| match leg {
+            Leg::To(to, limits) => Leg::To(to[0], *limits),
+            Leg::Wait(length) => Leg::Wait(*length),
+        };
+        Ok(vec![Self::new(*start, &legs.iter().map(alone).collect::<Vec<_>>())?])
+    }
+
     /// A reference of which `positions` (m) at increasing `times` (s) are known: straight lines between them. Speed and
     /// acceleration are those of the parabola through a sample and its neighbours; jerk and snap are not known, and
     /// zero.
@@ -370,13 +380,13 @@ impl Profile {
         Self { strokes: Vec::new(), start, end, shaper: Vec::new(), samples }
     }
 
-    /// The same through a shaper: impulses (time, s; amplitude) whose amplitudes add up to 1.
+    /// This profile through a shaper: impulses (time, s; amplitude) whose amplitudes add up to 1.
     pub fn shaped(mut self, shaper: &[[f64; 2]]) -> Self {
         self.shaper = shaper.to_vec();
         self
     }
 
-    /// Where the reference is at time `t`, s.
+    /// Reference at time `t`, s.
     pub fn at(&self, t: f64) -> Reference {
         if self.shaper.is_empty() {
             return self.plain(t);
@@ -454,12 +464,12 @@ impl Profile {
         self.end + self.shaper.iter().fold(0.0, |late, impulse| f64::max(late, impulse[0]))
     }
 
-    /// Where it begins, m.
+    /// Start position, m.
     pub fn start(&self) -> f64 {
         self.start
     }
 
-    /// Where it ends, m.
+    /// End position, m.
     pub fn target(&self) -> f64 {
         let sampled = self.samples.last().map(|(_, reference)| reference.position);
         sampled.unwrap_or_else(|| self.strokes.last().map_or(self.start, |(_, [_, to], _)| *to))

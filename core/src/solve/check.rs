@@ -194,7 +194,7 @@ pub(super) fn fastest_rate(mechanism: &Mechanism) -> f64 {
 }
 
 fn too_fast(what: &str, rate: f64) -> Error {
-    Error::new(format!("{what} would change within {:.0e} s, too fast to be told from rounding", 1.0 / rate))
+    Error::new(format!("{what} would change within {:.0e} s, too fast for 64-bit numbers", 1.0 / rate))
         .allowed(format!("{:e} s and longer", 1.0 / FASTEST))
 }
 

@@ -16,7 +16,7 @@ const LAST_PLACES: f64 = 4.0;
 #[derive(Debug, Clone)]
 pub(crate) struct Coordinates {
     start: State,
-    /// Where ways are counted from.
+    /// Coordinates of the origin.
     origin: [f64; BODIES],
     /// Lengths at the start, by the bodies in whose places they stand.
     strain: [f64; BODIES],
@@ -25,7 +25,7 @@ pub(crate) struct Coordinates {
 }
 
 impl Coordinates {
-    /// Those of a run that begins in `start`, and `start` in them.
+    /// Coordinates of a run that begins in `start`, and `start` in these coordinates.
     pub(crate) fn new(layout: &Layout, start: &State) -> (Self, State) {
         let origin = layout.origin(start);
         let mut inner = *start;
@@ -48,7 +48,7 @@ impl Coordinates {
         (Self { start: *start, origin, strain, held: [None; BODIES] }, inner)
     }
 
-    /// The same where angles are as in `state`, whatever lengths say.
+    /// These coordinates with the angles of `state`, whatever the lengths.
     pub(crate) fn at(&self, state: &State) -> Self {
         Self { held: state.position.map(Some), ..self.clone() }
     }
@@ -66,7 +66,7 @@ impl Coordinates {
         &self.start
     }
 
-    /// Where ways are counted from.
+    /// Coordinates of the origin.
     pub(crate) fn origin(&self) -> &[f64; BODIES] {
         &self.origin
     }

@@ -128,7 +128,7 @@ impl ErrorEstimate {
         self.finish_mechanism(&mechanism, &course, tolerance, outcome, flow)
     }
 
-    /// The same of a run of a mechanism.
+    /// Finishes the estimate for a run of a mechanism.
     pub fn finish_mechanism(
         self,
         mechanism: &Mechanism,
@@ -195,7 +195,7 @@ impl ErrorEstimate {
     }
 }
 
-/// Whether two runs end in the same way; one that was asked to stop says nothing of another.
+/// True if two runs end in the same way; one that was asked to stop says nothing of another.
 fn ends_alike(first: Ending, second: Ending) -> bool {
     let is_stopped = |ending| matches!(ending, Ending::Interrupted { .. });
     is_stopped(first) || is_stopped(second) || std::mem::discriminant(&first) == std::mem::discriminant(&second)

@@ -15,7 +15,7 @@ pub(super) struct Pieces {
 }
 
 impl Pieces {
-    /// Those of these signals at `time`.
+    /// Values and derivatives of these signals at `time`, s.
     pub fn of(signals: &[Signal], time: f64) -> Self {
         let mut pieces = Self { start: time, end: f64::INFINITY, coefficients: [[0.0; DEGREE + 1]; DRIVES] };
         for (signal, coefficients) in signals.iter().zip(&mut pieces.coefficients) {
@@ -36,7 +36,7 @@ impl Pieces {
         pieces
     }
 
-    /// The same from `time` on: powers count from there.
+    /// These inputs as polynomials that begin at `time`.
     pub fn since(&self, time: f64) -> Self {
         let by = time - self.start;
         let mut pieces = Self { start: time, ..*self };

@@ -47,7 +47,7 @@ use crate::trajectory::Trajectory;
 use std::fmt;
 use std::sync::Arc;
 
-/// How the equations are solved.
+/// Solver of the equations.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Solver {
     /// Modes and matrix exponentials: exact to rounding.
@@ -76,7 +76,7 @@ impl Solver {
         if machine.is_piecewise_linear() { Self::Exact } else { Self::GENERAL }
     }
 
-    /// The same for a mechanism.
+    /// Solver of a mechanism.
     pub fn of_mechanism(mechanism: &Mechanism) -> Self {
         if mechanism.is_piecewise_linear() { Self::Exact } else { Self::GENERAL }
     }
@@ -97,7 +97,7 @@ pub enum Method {
 pub struct Event {
     /// When, s.
     pub time: f64,
-    /// Which part.
+    /// The part.
     pub part: Part,
     /// The state before.
     pub from: Status,
@@ -105,7 +105,7 @@ pub struct Event {
     pub to: Status,
     /// The force (N) or torque (N m) on a body at that moment, friction apart; 0 for other parts.
     pub load: f64,
-    /// Whether rounding decided when it happened: a stop of a body whose speed tends to zero and in exact numbers never
+    /// True if rounding decided when it happened: a stop of a body whose speed tends to zero and in exact numbers never
     /// gets there.
     pub by_rounding: bool,
 }
@@ -151,7 +151,7 @@ impl Event {
 pub struct Tie {
     /// When, s.
     pub time: f64,
-    /// Which body.
+    /// The body.
     pub part: Part,
 }
 
@@ -171,7 +171,7 @@ impl Tie {
     }
 }
 
-/// How a run ended.
+/// Ending of a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Ending {
     /// At the end of the experiment.
@@ -267,7 +267,7 @@ pub struct Outcome {
     pub events: Vec<Event>,
     /// Decisions within rounding, as far as the exact solver knows of them; of many the first ones.
     pub ties: Vec<Tie>,
-    /// How it ended.
+    /// Its ending.
     pub ending: Ending,
     /// Its cost.
     pub cost: Cost,
@@ -283,9 +283,9 @@ pub struct Outcome {
 /// By how much positions at the belt (r φ₁, x, r φ₃) may be off.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PositionError {
-    /// That much, m.
+    /// Bound of the error, m.
     pub value: f64,
-    /// How far the axis went at most from where it began, m.
+    /// Largest distance from the start, m.
     pub way: f64,
 }
 
@@ -293,17 +293,17 @@ impl PositionError {
     /// Up to here a result is called exact, m.
     pub const EXACT: f64 = 1e-9;
 
-    /// Whether it is small enough for the result to be called exact.
+    /// True if it is small enough for the result to be called exact.
     pub fn is_exact(self) -> bool {
         self.value <= Self::EXACT
     }
 
-    /// Whether it is more than a thousandth of the motion, so that the result is not to be relied on.
+    /// True if it is more than a thousandth of the motion, so that the result is not to be relied on.
     pub fn hides_motion(self) -> bool {
         !self.is_exact() && self.value > 1e-3 * self.way
     }
 
-    /// Whether it is as large as the motion: nothing of it is determined by numbers of 64 bits.
+    /// True if it is as large as the motion: nothing of it is determined by numbers of 64 bits.
     pub fn is_undetermined(self) -> bool {
         self.hides_motion() && self.value >= self.way
     }
@@ -327,7 +327,7 @@ pub enum Flow {
     Stop,
 }
 
-/// Which columns a run puts out.
+/// Columns of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Detail {
     /// All of them.
@@ -370,7 +370,7 @@ impl Bench {
         self.go(experiment, Output { detail, sink, observer: None })
     }
 
-    /// The same for an observer alone: no rows are made.
+    /// Simulates for an observer only, without rows.
     pub fn observe(&mut self, experiment: &Experiment, observer: &mut dyn Observe) -> Result<Outcome> {
         let sink = &mut |_: &Trajectory| Flow::Continue;
         self.go(experiment, Output { detail: Detail::None, sink, observer: Some(observer) })
@@ -443,7 +443,8 @@ pub fn stream(
     run(machine, experiment, solver, Output { detail: Detail::Full, sink, observer: None })
 }
 
-/// The same, with an observer that sees what is between the rows, too: a [`crate::metrics::Meter`], or one's own.
+/// Streams a run to a sink and to an observer of the motion between the rows: a [`crate::metrics::Meter`], or one's
+/// own.
 ///
 /// ```
 /// use taut::case::{Case, TEMPLATE};

@@ -56,7 +56,7 @@ impl Gap<'_> {
         Self::bound_of(self.from[q], self.to[q], self.bow[q])
     }
 
-    /// The same of what goes from `from` to `to` and can be off the straight line by `bow`.
+    /// Bound of a quantity that goes from `from` to `to` and deviates from the straight line by at most `bow`.
     #[inline(always)]
     pub fn bound_of(from: f64, to: f64, bow: f64) -> f64 {
         let (middle, half) = (0.5 * (from + to).abs(), 0.5 * (to - from).abs());
@@ -81,7 +81,7 @@ impl Gap<'_> {
         (ends != 0, within != 0)
     }
 
-    /// Whether quantity `q` is held at one value: by a limit, or because nothing moves.
+    /// True if quantity `q` is held at one value: by a limit, or because nothing moves.
     #[inline(always)]
     pub fn holds(&self, q: usize) -> bool {
         self.bow[q] == 0.0 && self.from[q] == self.to[q]
@@ -114,7 +114,7 @@ impl Gaps {
         self.0 |= u64::from(is_in) << gap;
     }
 
-    /// Whether the one with this number is among them.
+    /// True if the one with this number is among them.
     pub fn has(self, gap: usize) -> bool {
         self.0 >> gap & 1 == 1
     }
@@ -344,7 +344,7 @@ impl Polynomial {
         b.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &b| (low.min(b), high.max(b)))
     }
 
-    /// Whether it certainly has no zero.
+    /// True if it certainly has no zero.
     pub fn keeps_its_sign(&self) -> bool {
         self.0[0].abs() > self.0[1..].iter().map(|c| c.abs()).sum()
     }
@@ -404,7 +404,7 @@ impl Polynomial {
         self.0.iter_mut().zip(other.0).for_each(|(own, other)| *own += weight * other);
     }
 
-    /// The same with the other sign.
+    /// This reading with the opposite sign.
     pub fn negative(&self) -> Self {
         Self(self.0.map(|c| -c))
     }
@@ -465,12 +465,12 @@ pub trait Observe {
     /// Takes what is in a gap that it wanted to see closer.
     fn see(&mut self, curve: &Curve);
 
-    /// Whether it wants to be shown the motion at all; if not, only the end is told.
+    /// True if it wants to be shown the motion at all; if not, only the end is told.
     fn follows(&self) -> bool {
         true
     }
 
-    /// Whether it wants to see all of the motion closely, whatever a bound says.
+    /// True if it wants to see all of the motion closely, whatever a bound says.
     fn sees_all(&self) -> bool {
         false
     }
@@ -566,7 +566,7 @@ pub(crate) struct Output<'a> {
 }
 
 impl<'a> Output<'a> {
-    /// The same for a part of its life.
+    /// This output for a shorter lifetime.
     pub(crate) fn within<'b>(self) -> Output<'b>
     where
         'a: 'b,

@@ -146,7 +146,7 @@ impl<const R: usize, const C: usize> Matrix<R, C> {
         pub(crate) fn rate(&self, z: &[f64; C]) -> [f64; R] = times, times_by_avx2;
     }
 
-    /// The same, compiled into who calls it.
+    /// Product with z, always inlined.
     #[inline(always)]
     pub(crate) fn times(&self, z: &[f64; C]) -> [f64; R] {
         let mut sum = [0.0; R];

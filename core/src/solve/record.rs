@@ -60,7 +60,7 @@ pub(crate) struct Recorder<'a> {
     taken: Option<u64>,
     /// One for each row, or none at all where the linear equations say everything.
     extra: Vec<Extra>,
-    /// That of the last row of the block before.
+    /// Extra values of the last row of the previous block.
     last_extra: Option<Extra>,
     sheets: Sheets,
     block: Trajectory,
@@ -74,7 +74,7 @@ pub(crate) struct Recorder<'a> {
 }
 
 impl<'a> Recorder<'a> {
-    /// That of rows of `stride` numbers, states in the places of the layout and inputs where `input` says.
+    /// Recorder of rows of `stride` numbers: states as in the layout, inputs from index `input`.
     pub(crate) fn new(
         mechanism: &Arc<Mechanism>,
         layout: &Layout,

@@ -43,7 +43,7 @@ pub(super) struct Rules {
     /// is watched where it is zero but for rounding, and would count as wrong in either state. The place behind the
     /// others stays zero.
     pub(super) tolerance: [f64; Cause::KINDS + 1],
-    /// Whether the input has changed, and what rounding does to the loads on stuck bodies is to be looked at anew.
+    /// True after a change of the input, when the rounding of loads on stuck bodies has to be evaluated anew.
     pub(super) at_edge: bool,
     /// Time since the last mode change, s, and how many there have been there.
     pub(super) since_change: f64,
@@ -87,18 +87,18 @@ pub(super) trait Between {
     fn transition(&self, index: usize) -> &Transition;
     /// Its value.
     fn known(&self, index: usize) -> Known;
-    /// The same where the mode has just begun: the moment at which it did is known to a rounding, too.
+    /// Known terms of a condition at the beginning of a mode, whose time is known to rounding, too.
     fn known_at_begin(&self, index: usize) -> Known;
     /// Further tolerance for a condition that has just begun to hold: a solver that knows by their series which
     /// conditions rise from zero needs nothing.
     fn margin(&self, index: usize) -> f64;
     /// Looks at all conditions; false if each of them holds for certain.
     fn look(&mut self) -> bool;
-    /// Whether a condition falls here, by the last look.
+    /// True if a condition falls here, by the last look.
     fn falls(&mut self, index: usize) -> bool;
     /// The load on a body at rest that would go forward, or backward; gears carry as they do at rest.
     fn load(&self, body: usize, forward: bool) -> Load;
-    /// Whether the speed of a body tends to zero for ever, and rounding decides when it gets there.
+    /// True if the speed of a body tends to zero for ever, and rounding decides when it gets there.
     fn dies_out(&mut self, body: usize) -> bool;
     /// Sets a quantity of the state.
     fn put(&mut self, place: Place, value: f64);
@@ -107,7 +107,7 @@ pub(super) trait Between {
 }
 
 impl Rules {
-    /// Those of a run that begins in this mode.
+    /// Rules of a run that begins in this mode.
     pub(super) fn new(mode: Mode) -> Self {
         Self {
             mode,
@@ -173,7 +173,7 @@ impl Rules {
         }
     }
 
-    /// Whether changes go back and forth at this instant.
+    /// True if changes go back and forth at this instant.
     fn is_back_and_forth(&self) -> bool {
         self.changes > TURNS_AT_ONCE
     }
@@ -248,7 +248,7 @@ fn move_on<B: Between>(solver: &mut B, fallen: &Transition, body: usize, to: Opt
     let again = solver.rules().is_back_and_forth();
     let to = match to {
         Some(to) => to,
-        // Where rounding turns a body back again and again without a moment passing, it rests.
+        // A body whose reversals are caused by rounding alone is taken to be at rest.
         None if again => {
             note_tie(solver, body);
             Motion::Stuck

@@ -100,7 +100,7 @@ impl<'a> Run<'a> {
         Self::reading((machine, machine.mechanism()), experiment, solver, detail, observer, sink)
     }
 
-    /// The same of a machine whose mechanism has readings of its own for the observer.
+    /// Run of a machine whose mechanism has its own readings for the observer.
     pub fn reading(
         (machine, mechanism): (&Machine, Mechanism),
         experiment: &Experiment,
@@ -116,7 +116,7 @@ impl<'a> Run<'a> {
         Self::of(&mechanism, &start, (solver, 0), Known::default(), Output { detail, sink, observer })
     }
 
-    /// The same of a mechanism that was checked, with inputs of at most this degree.
+    /// Run of a checked mechanism, with inputs of at most this degree.
     pub(super) fn of(
         mechanism: &Arc<Mechanism>,
         start: &Start,

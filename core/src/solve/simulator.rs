@@ -39,7 +39,7 @@ const INTERVAL: f64 = 1e-3;
 pub struct Simulator {
     engine: Box<dyn Engine>,
     inputs: Pieces,
-    /// Whether inputs were set since it was advanced last.
+    /// True if inputs were set since it was advanced last.
     is_set: bool,
 }
 

@@ -58,7 +58,7 @@ impl Trajectory {
         self.columns.first().map_or(0, |c| c.values.len())
     }
 
-    /// Whether there are no rows.
+    /// True if there are no rows.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }

@@ -20,8 +20,9 @@ pub(super) struct Controller {
 }
 
 impl Controller {
-    pub(super) fn new(design: &Design, machine: &Machine) -> Result<Self> {
-        let unit = machine.drives[0].amplifier.mode.unit();
+    /// That of a drive.
+    pub(super) fn new(design: &Design, machine: &Machine, drive: usize) -> Result<Self> {
+        let unit = machine.drives[drive].amplifier.mode.unit();
         Ok(Self { design: design.clone(), program: program(design, machine)?, unit })
     }
 

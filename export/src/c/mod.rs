@@ -12,7 +12,7 @@ pub(super) fn export(case: &Case, part: Part, stem: &str, options: &Options) -> 
     named(case, part, (stem, &identifier(stem)), options)
 }
 
-/// The same with names that begin so.
+/// C source whose names begin with `stem`.
 pub(super) fn named(case: &Case, part: Part, (stem, name): (&str, &str), options: &Options) -> Result<Exported> {
     let writer = Writer { name: name.to_string(), real: options.real, local: "" };
     let (mut header, mut source) = (String::new(), String::new());
@@ -27,16 +27,38 @@ pub(super) fn named(case: &Case, part: Part, (stem, name): (&str, &str), options
         source += &plant.source(&writer);
         facts.extend(plant.facts());
     }
+    let whole = |writer: &Writer, stem: &str, header: &str, source: &str| {
+        let (header, source) = (writer.header(case.title.as_str(), header), writer.source(stem, source));
+        [(format!("{stem}.c"), source.into_bytes()), (format!("{stem}.h"), header.into_bytes())]
+    };
+    let mut of_drives = Vec::new();
     if part.has_controller() {
         let (case, design) = super::controller(case)?;
-        let controller = controller::Controller::new(design, &case.machine)?;
-        header += &controller.header(&writer);
-        source += &controller.source(&writer);
-        facts.extend(controller.facts());
+        let drives = case.machine.geometry().drives;
+        for (number, at) in drives.iter().enumerate() {
+            let controller = controller::Controller::new(design, &case.machine, number)?;
+            match drives {
+                [_] => {
+                    header += &controller.header(&writer);
+                    source += &controller.source(&writer);
+                }
+                // All state is static: a file for each motor.
+                _ => {
+                    let side = at.prefix.trim_end_matches('_');
+                    let own = Writer { name: format!("{name}_{side}"), ..writer };
+                    let stem = format!("{stem}_{side}");
+                    of_drives.extend(whole(&own, &stem, &controller.header(&own), &controller.source(&own)));
+                }
+            }
+            if number == 0 {
+                facts.extend(controller.facts());
+            }
+        }
+        notes.extend(super::drives_note(case));
         notes.extend(super::shaper_note(design));
     }
-    let (header, source) = (writer.header(case.title.as_str(), &header), writer.source(stem, &source));
-    let files = vec![(format!("{stem}.c"), source.into_bytes()), (format!("{stem}.h"), header.into_bytes())];
+    let own = (!source.is_empty()).then(|| whole(&writer, stem, &header, &source));
+    let files = own.into_iter().flatten().chain(of_drives).collect();
     Ok(Exported { files, facts, notes })
 }
 

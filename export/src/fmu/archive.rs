@@ -31,7 +31,7 @@ impl Archive {
     /// Adds a file; folders are in its name, with `/`. Errors: a second one of that name, or one that is too large.
     pub fn add(&mut self, name: &str, content: &[u8]) -> Result<()> {
         if self.names.iter().any(|other| other == name) {
-            return Err(Error::new(format!("{name} would stand in the archive twice")));
+            return Err(Error::new(format!("{name} would be in the archive twice")));
         }
         let too_large = || Error::new(format!("{name} is too large for an archive")).allowed("up to 4 GB in all");
         let mut deflate = DeflateEncoder::new(Vec::new(), flate2::Compression::default());

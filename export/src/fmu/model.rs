@@ -58,11 +58,16 @@ impl Model {
         Self::of_resource(&resource, with_controller)
     }
 
-    /// The same of what [`super::resource`] gave.
+    /// Model from the text of [`super::resource`].
     pub fn of_resource(text: &str, with_controller: bool) -> Result<Self> {
         let case = Case::from_text_with("machine.toml", text, &[])?;
         let [until, every] = resource::times(&case);
         let (machine, design) = (case.machine.clone(), case.controller.clone());
+        if with_controller && design.is_some() && !case.is_axis() {
+            let error = Error::new("an FMU of a gantry has no controller inside yet").in_file("--part");
+            return Err(error
+                .next("leave --part out for the machine; `taut export c` and `taut export st` have the controllers"));
+        }
         if with_controller && design.is_none() {
             let missing = controller(&case).map(|_| ());
             missing.map_err(|error| without_controller(&case, error, "leave --part out for the machine alone"))?;
@@ -130,13 +135,13 @@ impl Model {
             None => Ok(mechanism),
             Some(drive) => {
                 Err(Error::new(format!("the inductance of the {} decides which states there are", drive.label.name))
-                    .allowed("zero where it is zero in the case, above zero where it is")
+                    .allowed("zero if it is zero in the case, positive if it is")
                     .next("change it in the case, and export that"))
             }
         }
     }
 
-    /// Whether it is linear between its events.
+    /// True if it is linear between its events.
     pub fn is_piecewise_linear(&self) -> bool {
         self.mechanism(&self.defaults()).is_ok_and(|mechanism| mechanism.is_piecewise_linear())
     }
@@ -363,7 +368,7 @@ fn parameters(machine: &Machine) -> Result<Vec<(Free, &'static Parameter)>> {
     own.iter().map(of).collect()
 }
 
-/// Whether a number can change while the machine runs: what it carries, what it rubs, what warmth and supply do. What
+/// True if a number can change while the machine runs: what it carries, what it rubs, what warmth and supply do. What
 /// tells its geometry, or which quantities its states are, cannot.
 fn is_tunable(key: &str) -> bool {
     let drive = ["left_drive.", "right_drive."].into_iter().find_map(|side| key.strip_prefix(side));
@@ -400,7 +405,7 @@ fn push(body: usize) -> Drive {
     Drive { label, voltage: label, current: label, pulley: body, shaft: body, motor, amplifier }
 }
 
-/// Whether a column is an integrated quantity as it stands.
+/// True if a column is an integrated quantity as it stands.
 fn shows(heading: &Heading, quantity: Quantity) -> bool {
     heading.shown
         == match quantity {

@@ -48,7 +48,7 @@ pub enum Role {
     Force(usize),
     /// Where the controller's cart should be: position, speed, acceleration, jerk, snap.
     Reference(usize),
-    /// The same one lead of the feed-forward later.
+    /// Reference one lead of the feed-forward later.
     Ahead(usize),
     /// A number of the machine, by its place among these, and whether it may change under way.
     Parameter(usize, bool),
@@ -117,7 +117,7 @@ impl Variable {
         }
     }
 
-    /// Whether it counts: it jumps, though it may be too large for a whole number of 32 bits.
+    /// True if it counts: it jumps, though it may be too large for a whole number of 32 bits.
     fn is_count(&self) -> bool {
         matches!(self.role, Role::Output(_)) && self.name.ends_with("_count")
     }

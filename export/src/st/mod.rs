@@ -2,7 +2,7 @@
 
 use super::controller::program;
 use super::program::{Expr, Node, Statement, Test, sign};
-use super::{Exported, Part, controller, identifier, shaper_note, shaper_remark, without_controller};
+use super::{Exported, Part, controller, drives_note, identifier, shaper_note, shaper_remark, without_controller};
 use crate::case::Case;
 use crate::error::{Error, Result};
 use std::fmt::Write;
@@ -63,6 +63,7 @@ pub(super) fn export(case: &Case, part: Option<Part>, stem: &str) -> Result<Expo
     ];
     let mut notes =
         vec!["untried on a real controller: its grammar is checked, and it is run by an interpreter".into()];
+    notes.extend(drives_note(case));
     notes.extend(shaper_note(design));
     Ok(Exported { files: vec![(format!("{stem}.st"), text.into_bytes())], facts, notes })
 }

@@ -80,7 +80,7 @@ impl Maker<'_> {
         self.row_with(None, form)
     }
 
-    /// The same where an element does something given.
+    /// A row with an element in a given case.
     fn row_with(&self, fixed: Option<(usize, usize)>, form: &dyn Fn(&Mode) -> Form) -> Result<Row> {
         let at = |does: &[usize]| form(&self.mode(does));
         let mut depends: Vec<usize> = Vec::new();
@@ -111,7 +111,7 @@ impl Maker<'_> {
         if count > MOST_ROWS {
             return Err(Error::new(format!("one of the equations of this machine has {count} forms"))
                 .allowed(format!("up to {MOST_ROWS}"))
-                .next("leave out what it can do without: limits, slack spans, end stops"));
+                .next("leave out optional parts: limits, slack spans, end stops"));
         }
         let mut forms = Vec::with_capacity(count);
         for index in 0..count {

@@ -159,27 +159,27 @@ impl Feature {
         matches!(self, HFrame | CoreXy)
     }
 
-    /// Whether the general solver alone has it.
+    /// True if the general solver alone has it.
     pub fn is_curved(self) -> bool {
         matches!(self, Stribeck | Exponential | Smooth | LuGre | Along | Follows)
     }
 
-    /// Whether it is a law of friction.
+    /// True if it is a law of friction.
     pub fn is_law(self) -> bool {
         matches!(self, Stribeck | Exponential | Smooth | LuGre)
     }
 
-    /// Whether it is a shape of an input.
+    /// True if it is a shape of an input.
     pub fn is_input(self) -> bool {
         matches!(self, Step | Ramp | Sine | Table | Triangle)
     }
 
-    /// Whether it is a controller.
+    /// True if it is a controller.
     pub fn is_controller(self) -> bool {
         matches!(self, Pid | Cascade | CurrentLoop | StateFeedback | SlidingMode | Fuzzy)
     }
 
-    /// Whether both can be features of one case.
+    /// True if both can be features of one case.
     pub fn goes_with(self, other: Feature) -> bool {
         let either = |a: fn(Feature) -> bool, b: fn(Feature) -> bool| (a(self) && b(other)) || (a(other) && b(self));
         let excluded =

@@ -17,7 +17,7 @@ impl Fit {
         self.text(case, name, 0)
     }
 
-    /// The same with the values of a campaign, by its place among [`Fit::parts`].
+    /// Text of the case with the values of a campaign, by its index in [`Fit::parts`].
     pub fn case_text_of(&self, case: &Case, name: &Path, part: usize) -> Result<String> {
         self.text(case, name, part)
     }
@@ -60,7 +60,7 @@ impl Fit {
             text.parse().map_err(|_| Error::new("this is not TOML").in_file(name))?;
         let mut table = toml_edit::Table::new();
         let how = format!(
-            "\n# How well the fit knows its estimates: SI units, standard errors, 95 % intervals. How it ended: {}.\n",
+            "\n# Uncertainty of the estimates: SI units, standard errors, 95 % intervals. Ending of the fit: {}.\n",
             self.ending_word()
         );
         table.decor_mut().set_prefix(how);

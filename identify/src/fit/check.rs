@@ -44,7 +44,7 @@ pub fn check(case: &Case, plan: &Plan) -> Result<Check> {
     check_watched(case, plan, None, &mut |_, _| Flow::Continue)
 }
 
-/// The same; `watch` sees the variables and the cost after each step, and `stop` ends the search with the best so far.
+/// Checks a case; `watch` receives variables and cost after each step, and `stop` ends the search with the best so far.
 pub fn check_watched(
     case: &Case,
     plan: &Plan,
@@ -64,7 +64,7 @@ pub fn check_watched(
         })
         .collect();
     let alike = judged.as_ref().map_or(String::new(), |judged| format!(", {}", judged.slow_words(&found.problem)));
-    let noise_words = format!("for what the best model leaves ({}){alike}", noise.join(", "));
+    let noise_words = format!("residual noise: {}{alike}", noise.join(", "));
     let balance = regression(&found.problem);
     let fit = told(case, plan, &found, judged.as_ref());
     Ok(Check {

@@ -151,7 +151,7 @@ pub(crate) const TRIAL_ITERATIONS: usize = 12;
 /// Unit: standard errors. Source: a tenth of what noise makes of an estimate.
 pub(crate) const ROUGH_TOLERANCE: f64 = 0.1;
 
-/// The same in a fit whose values count: of windows, profiles, and starts of held-out logs.
+/// Tolerance of refits: windows, profiles, and starts of held-out logs.
 ///
 /// Unit: standard errors. Source: chosen.
 pub(crate) const REFIT_TOLERANCE: f64 = 0.05;
@@ -378,7 +378,7 @@ pub const UNDETERMINED: f64 = 1.0;
 /// Unit: steps of the converter, as standard deviations of rounding. Source: chosen.
 pub const LEAST_SHOWN: f64 = 0.2;
 
-/// The same, as a share of the range of the values.
+/// Model error relative to the range of the values.
 ///
 /// Unit: 1. Source: chosen: no model of an axis is better.
 pub const MODEL_ERROR: f64 = 2e-4;

@@ -64,7 +64,7 @@ pub fn fit(case: &Case, plan: &Plan, stop: Option<Stop>, watch: &mut dyn FnMut(f
     fit_watched(case, plan, stop, &mut |_, cost| watch(cost))
 }
 
-/// The same; `watch` sees the variables after each step, too, as a [`Problem`] of this case and plan has them.
+/// Fits a case; `watch` receives the variables of the [`Problem`] after each step.
 pub fn fit_watched(
     case: &Case,
     plan: &Plan,

@@ -14,7 +14,7 @@ def number(name: str, value: Any) -> float | None:
     if value is None:
         return None
     if isinstance(value, (str, bytes, bytearray)) or not (hasattr(value, "__float__") or hasattr(value, "__index__")):
-        raise TypeError(f"{name}: a number in SI units is wanted, and no {type(value).__name__}")
+        raise TypeError(f"{name}: expected a number in SI units, found {type(value).__name__}")
     try:
         return float(value)
     except OverflowError:
@@ -25,7 +25,7 @@ def given(name: str, value: Any) -> float:
     """A number that cannot be left out."""
     found = number(name, value)
     if found is None:
-        raise TypeError(f"{name}: a number in SI units is wanted, and no NoneType")
+        raise TypeError(f"{name}: expected a number in SI units, found NoneType")
     return found
 
 
@@ -34,7 +34,7 @@ def whole(name: str, value: Any, least: int, most: int = 2**63 - 1) -> int:
     try:
         found = operator.index(value)
     except TypeError:
-        raise TypeError(f"{name}: a whole number is wanted, and no {type(value).__name__}") from None
+        raise TypeError(f"{name}: expected a whole number, found {type(value).__name__}") from None
     if not least <= found <= most:
         shown = str(found) if abs(found) < 10**30 else "this number"
         raise ValueError(f"{name}: {shown} cannot be; allowed: {least} to {most}")
@@ -44,7 +44,7 @@ def whole(name: str, value: Any, least: int, most: int = 2**63 - 1) -> int:
 def text(name: str, value: Any) -> str:
     """A text that can be written as UTF-8."""
     if not isinstance(value, str):
-        raise TypeError(f"{name}: a text is wanted, and no {type(value).__name__}")
+        raise TypeError(f"{name}: expected a text, found {type(value).__name__}")
     try:
         value.encode()
     except UnicodeEncodeError as error:
@@ -62,11 +62,11 @@ def names(name: str, value: Iterable[str] | None) -> list[str]:
     if value is None:
         return []
     if isinstance(value, (str, bytes, bytearray)):
-        raise TypeError(f"{name}: a list of names is wanted, and no {type(value).__name__}")
+        raise TypeError(f"{name}: expected a list of names, found {type(value).__name__}")
     try:
         each = iter(value)
     except TypeError:
-        raise TypeError(f"{name}: a name or a list of names is wanted, and no {type(value).__name__}") from None
+        raise TypeError(f"{name}: expected a name or a list of names, found {type(value).__name__}") from None
     return [text(name, item) for item in each]
 
 
@@ -74,5 +74,5 @@ def path(value: Any) -> str:
     """A path as a text: os.PathLike, or a text."""
     found = os.fspath(value)
     if not isinstance(found, str):
-        raise TypeError(f"a path is wanted as a text or an os.PathLike of one, and no {type(found).__name__}")
+        raise TypeError(f"expected a path as text or os.PathLike, found {type(found).__name__}")
     return found

@@ -36,7 +36,7 @@ def _columns(log: Any) -> dict[str, NDArray[np.float64]]:
         return {str(name): _numbers_of(str(name), log[name].to_numpy()) for name in log.columns}
     if isinstance(log, Mapping):
         return {str(name): _numbers_of(str(name), np.asarray(values)) for name, values in log.items()}
-    raise TypeError(f"log: a DataFrame, a Table or a dictionary of arrays is wanted, and no {type(log).__name__}")
+    raise TypeError(f"log: expected a DataFrame, a Table or a dictionary of arrays, found {type(log).__name__}")
 
 
 def _numbers_of(name: str, values: Any) -> NDArray[np.float64]:

@@ -316,7 +316,7 @@ class Case:
         """
         written = write_log(log, None if path is None else _checks.path(path), _checks.text("name", name))
         if not isinstance(columns, Mapping):
-            raise TypeError(f"columns: a dictionary is wanted, and no {type(columns).__name__}")
+            raise TypeError(f"columns: expected a dictionary, found {type(columns).__name__}")
         table = {"file": written, **columns, **settings}
         experiment = f"\n[[experiment]]\nname = {toml(_checks.text('name', name))}\nlog = {toml(table)}\n"
         logged = Case(self.text.rstrip("\n") + "\n" + experiment, self.path)

@@ -31,12 +31,12 @@ class Check:
 
     @property
     def complete(self) -> bool:
-        """Whether everything that is searched for is determined."""
+        """Whether all free parameters are determined."""
         return bool(self.data["complete"])
 
     @property
     def errors(self) -> dict[str, float]:
-        """How well each parameter would be known: its standard error as a share of it; infinite if not at all."""
+        """Relative standard error of each parameter; infinite if it is not determined."""
         infinite = float("inf")
         return {
             row["name"]: infinite if row["relative_error"] is None else row["relative_error"]
@@ -53,7 +53,7 @@ class Check:
         return frame({"parameter": list(self.errors), "relative_error": list(self.errors.values())})
 
     def plot(self, *, ax: Axes | None = None) -> Figure:
-        """How well each parameter would be known, as bars; what is not determined reaches the end of the scale."""
+        """Relative standard error of each parameter, as bars; undetermined ones reach the end of the scale."""
         figure, (axis,) = _plots.panels(ax, 1, height=1 + 0.3 * len(self.errors))
         known = [100 * error for error in self.errors.values() if np.isfinite(error)]
         most = 10 * max(known, default=10.0)

@@ -108,9 +108,9 @@ def shape(
     paths = [files] if isinstance(files, (str, PathLike)) else list(files)
     fitted = isinstance(damping, str)
     if fitted and damping != "fitted":
-        raise ValueError(f'damping: a ratio such as 0.08 is wanted, or "fitted", and not {damping!r}')
+        raise ValueError(f'damping: expected a ratio such as 0.08, or "fitted", found {damping!r}')
     if not isinstance(changes, (Mapping, type(None))):
-        raise TypeError(f"changes: a dictionary is wanted, and no {type(changes).__name__}")
+        raise TypeError(f"changes: expected a dictionary, found {type(changes).__name__}")
     options = {
         "together": bool(together),
         "firmware": _checks.text("firmware", firmware),

@@ -127,14 +127,14 @@ def _planned(
 ) -> Case:
     """The case with all of it in its text, as the command line does."""
     if not isinstance(getattr(case, "_native", None), _native.Case):
-        raise TypeError(f"case: a taut.Case is wanted, and no {type(case).__name__}")
+        raise TypeError(f"case: expected a taut.Case, found {type(case).__name__}")
     if not isinstance(vary, (Mapping, type(None))):
-        raise TypeError(f"vary: a dictionary is wanted, and no {type(vary).__name__}")
+        raise TypeError(f"vary: expected a dictionary, found {type(vary).__name__}")
     given = {"runs": n, "design": design, "seed": seed, "interval": interval, "indices": True if indices else None}
     changes: dict[str, Any] = {f"sweep.{key}": value for key, value in given.items() if value is not None}
     if figures is not None:
         if isinstance(figures, str) or not isinstance(figures, Sequence):
-            raise TypeError(f"figures: a list of names is wanted, and no {type(figures).__name__}")
+            raise TypeError(f"figures: expected a list of names, found {type(figures).__name__}")
         changes["sweep.figures"] = [_checks.text("figures", figure) for figure in figures]
     for key, how in (vary or {}).items():
         changes[f"sweep.vary.{json.dumps(_checks.text('vary', key), ensure_ascii=False)}"] = how
@@ -144,7 +144,7 @@ def _planned(
 def _tables(case: Case, client: Client, chunk: int | None) -> Iterator[pyarrow.Table]:
     arrow = needed("pyarrow", "pyarrow", "sweep() on Dask")
     if not (hasattr(client, "submit") and hasattr(client, "nthreads")):
-        raise TypeError(f"client: a Client of Dask is wanted, and no {type(client).__name__}")
+        raise TypeError(f"client: expected a Client of Dask, found {type(client).__name__}")
     native = _native.Sweep(case._native)
     size = _chunk(native) if chunk is None else _checks.whole("chunk", chunk, 1)
     text, path = case.text, os.path.abspath(case.path)

@@ -17,7 +17,7 @@ pub fn shares(found: &Check) -> impl Iterator<Item = (String, String)> {
             }
             Some(e) if e.is_finite() => format!("to {}", value(e, estimate.unit, 2)),
             None => "at its bound".into(),
-            Some(_) => "not at all".into(),
+            Some(_) => "not determined".into(),
         };
         (estimate.name.clone(), error)
     };

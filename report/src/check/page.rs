@@ -8,10 +8,10 @@ use taut::fit::{Balance, Check};
 
 /// The page.
 pub fn page(case: &Case, found: &Check) -> Page {
-    let mut page = Page::new(case.title.clone()).subtitle("What the logs can tell of the parameters.");
+    let mut page = Page::new(case.title.clone()).subtitle("Parameters that the logs determine.");
     page.section("What is determined");
     verdict(&mut page, found);
-    let mut rows = Table::new("How well each parameter would be known, all others free.");
+    let mut rows = Table::new("Accuracy of each parameter, all others free.");
     rows = rows.column("Parameter", "").column("Standard error", "");
     for (name, error) in shares(found) {
         rows.row([name, error].map(Cell::from));
@@ -19,9 +19,8 @@ pub fn page(case: &Case, found: &Check) -> Page {
     page.table(&rows);
     page.prose(format!("{}.", found.noise_words));
     if !found.experiments.is_empty() {
-        page.section("What one more experiment would tell");
-        let mut rows =
-            Table::new("By simulation, the best first.").column("Experiment", "").column("What it tells", "");
+        page.section("Most useful next experiments");
+        let mut rows = Table::new("By simulation, the best first.").column("Experiment", "").column("Effect", "");
         for experiment in &found.experiments {
             rows.row([experiment.name.to_string(), experiment.told.clone()].map(Cell::from));
         }
@@ -30,7 +29,7 @@ pub fn page(case: &Case, found: &Check) -> Page {
     if let Some(found) = &found.balance {
         regression(&mut page, found);
     }
-    page.section("What the logs show");
+    page.section("Logs");
     for log in &found.logs {
         shown(log, true).lines().for_each(|line| page.prose(line.trim()));
     }
@@ -41,13 +40,13 @@ pub fn page(case: &Case, found: &Check) -> Page {
 fn verdict(page: &mut Page, found: &Check) {
     match &found.identifiability {
         Some(known) if known.complete() => {
-            page.callout(Callout::Holds, "All of it", "everything that is searched for is determined.");
+            page.callout(Callout::Holds, "All of it", "all free parameters are determined.");
         }
         Some(_) => {}
         None => page.callout(
             Callout::Fails,
             "At bounds",
-            "everything that is searched for ended at a bound: there is no sensitivity to tell.",
+            "all free parameters ended at a bound: their sensitivity is unknown.",
         ),
     }
     for (group, choices) in found.groups() {
@@ -58,7 +57,7 @@ fn verdict(page: &mut Page, found: &Check) {
 
 fn regression(page: &mut Page, found: &Balance) {
     page.section("A rigid axis by regression");
-    let mut rows = Table::new("All at the drive pulley; a first guess, not a fit.");
+    let mut rows = Table::new("All at the drive pulley; a first estimate, not a fit.");
     rows = rows.column("Quantity", "").column("Value", "").column("Standard error", "");
     for (name, unit, value, error) in super::regression(found) {
         rows.row([name.to_string(), told(value, unit, 5), told(error, unit, 2)].map(Cell::from));

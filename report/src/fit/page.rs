@@ -11,7 +11,7 @@ pub fn page(case: &Case, found: &Found, text: &str) -> Page {
     page_with(case, found, text, |_| {})
 }
 
-/// The same with something before it.
+/// The page of a fit with a part before it.
 pub fn page_with(case: &Case, found: &Found, text: &str, first: impl FnOnce(&mut Page)) -> Page {
     let fit = &found.fit;
     let mut page = Page::new(case.title.clone()).subtitle("Parameters from logs.");

@@ -182,7 +182,7 @@ pub fn residual_forces(all: &ResidualForce) -> Vec<Figure> {
     ]
 }
 
-/// The same over time, for one log.
+/// Residual force over time, for one log.
 pub fn residual_over_time(log: &LogFit, own: &ResidualForce) -> Figure {
     Figure::new(format!("{}: residual force", log.name), Axis::new("Time", "s"))
         .panel(Panel::new(Axis::new("Residual force", "N")).line("", &own.time, &own.force).horizontal(0.0, ""))

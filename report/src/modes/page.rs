@@ -48,7 +48,7 @@ pub fn page(analysis: &Analysis, pictures: &Pictures) -> Page {
     page
 }
 
-/// What moves in each mode.
+/// Mode shapes and energies.
 fn shapes(page: &mut Page, analysis: &Analysis, modes: &Natural) {
     let mechanism = analysis.case.machine.mechanism();
     page.section("Modes");

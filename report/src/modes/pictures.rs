@@ -8,7 +8,7 @@ use taut::linear::{Analysis, ByInput, Place, ResonanceMap, Response, Root, State
 use taut::machine::{Machine, Part};
 use taut::number::engineering;
 
-/// What there is to see of an analysis, each with its name in file names.
+/// Figures of an analysis, each with its name in file names.
 #[derive(Default)]
 pub struct Pictures {
     /// Responses of each input, in the order of the drives.

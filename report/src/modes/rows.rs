@@ -141,7 +141,7 @@ pub fn elastic(mechanism: &Mechanism, modes: &Natural, mode: &ElasticMode) -> [S
     ]
 }
 
-/// Whether stiffness, and with it the resonances, depend on the place, in words.
+/// Sentence on the dependence of stiffness and resonances on the position.
 pub fn where_it_matters(analysis: &Analysis) -> &'static str {
     let belt = &analysis.case.machine.belt;
     match analysis.case.machine.bridge.is_some() {

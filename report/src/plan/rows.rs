@@ -52,8 +52,8 @@ pub fn lines(planned: &Planned) -> Vec<(&'static str, String)> {
         ("acceleration", value(limits.acceleration, "m/s^2")),
         ("jerk", format!("{}{}", value(limits.jerk.unwrap_or(f64::INFINITY), "m/s^3"), on(jerk, "lowest"))),
         ("snap", format!("{}{}", value(limits.snap.unwrap_or(f64::INFINITY), "m/s^4"), on(snap, "next"))),
-        ("arrives", arrival(&planned.best.arrival)),
-        ("file", arrival(&planned.given)),
+        ("arrives", arrival(planned, &planned.best.arrival)),
+        ("file", arrival(planned, &planned.given)),
     ];
     if let Some(bound) = planned.bound {
         lines.push(("at least", format!("{}, the axis as one mass at full voltage and current", time(bound))));
@@ -68,10 +68,11 @@ pub fn lines(planned: &Planned) -> Vec<(&'static str, String)> {
     lines
 }
 
-fn arrival(arrival: &Arrival) -> String {
+fn arrival(planned: &Planned, arrival: &Arrival) -> String {
+    let sliding = if planned.profiles.len() > 1 { "bridge or cart" } else { "cart" };
     let told = |at: Option<f64>| at.map_or("not".into(), time);
     format!(
-        "{}, {} at worst ({} of {} axes); reference {}, cart error {}",
+        "{}, {} at worst ({} of {} axes); reference {}, {sliding} error {}",
         told(arrival.nominal),
         told(arrival.worst),
         arrival.settled,

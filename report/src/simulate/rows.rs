@@ -59,7 +59,7 @@ pub fn early_end(run: &Run, machine: &Machine) -> Option<String> {
     ended_early(&run.outcome.ending, geometry.label(geometry.slides[nearest].body).name)
 }
 
-/// The same where `load` would be what leaves its travel.
+/// Sentence on an early end; `load` is the body that leaves its travel.
 pub fn ended_early(ending: &Ending, load: &str) -> Option<String> {
     match *ending {
         Ending::Complete => None,

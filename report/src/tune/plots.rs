@@ -2,6 +2,7 @@
 
 use super::Work;
 use super::rows::told;
+use crate::decimate::Decimator;
 use crate::simulate::{Named, decimator};
 use crate::{Axis, Colour, Figure, Panel, Series, Style};
 use nalgebra::Complex;
@@ -9,9 +10,10 @@ use std::f64::consts::PI;
 use taut::Result;
 use taut::case::Move;
 use taut::control::feedback::Feedback;
-use taut::control::{Controller, Loop, Rows, Standard, stream};
+use taut::control::{Loop, Rows, Standard, each, stream};
+use taut::machine::Machine;
 use taut::solve::{Flow, Solver};
-use taut::tune::{Break, Corner, Open, Verdict, breaks, loops};
+use taut::tune::{Corner, Loops, Verdict, loops};
 
 /// The largest |L| that is drawn: more of it would hide the point −1.
 const FAR: f64 = 3.0;
@@ -49,22 +51,20 @@ fn frequency(work: &Work) -> Result<Vec<Named>> {
         let feedback = Feedback::new(&verdict.design, &work.case.machine)?;
         let plant = tuned.family.plant(corner, &verdict.design, &feedback.corners())?;
         let open = loops(&plant, &feedback);
-        let breaks = breaks(&feedback);
         let hertz: Vec<f64> = plant.frequency.iter().map(|omega| omega / (2.0 * PI)).collect();
         // The loop whose sensitivity is the highest.
         let margins = if corner == &nominal { &verdict.nominal } else { &verdict.worst };
         let at = margins.breaks.sensitivity;
         let name = if margins.has_one_loop { name.to_string() } else { format!("{name}, {}", told(at)) };
-        let curve = open.iter().map(|open| open.broken_at(at));
+        let drive = margins.breaks.gain_drive;
+        let curve = open.iter().map(|open| open.broken_at(at, drive));
         // Beyond, there is no line.
         let near: Vec<Complex<f64>> =
             curve.map(|l| if l.norm() < FAR { l } else { Complex::new(f64::NAN, f64::NAN) }).collect();
         let (re, im): (Vec<f64>, Vec<f64>) = near.iter().map(|l| (l.re, l.im)).unzip();
         nyquist = nyquist.series(Series::new(name.clone(), re, im).colour(colour).style(style));
-        let highest = |of: fn(&Open, Break) -> f64| -> Vec<f64> {
-            open.iter().map(|open| breaks.iter().map(|&at| of(open, at)).fold(1e-4, f64::max)).collect()
-        };
-        let (s, t) = (highest(Open::sensitivity), highest(Open::complementary));
+        let highest = |of: fn(&Loops) -> f64| -> Vec<f64> { open.iter().map(|open| of(open).max(1e-4)).collect() };
+        let (s, t) = (highest(Loops::sensitivity), highest(Loops::complementary));
         peak = hertz.iter().zip(&s).max_by(|a, b| a.1.total_cmp(b.1)).map_or(peak, |(hertz, _)| peak.min(*hertz));
         last = hertz.last().map_or(last, |hertz| hertz.max(last));
         sensitivity = sensitivity.series(Series::new(name, hertz.clone(), s).colour(colour).style(style));
@@ -113,7 +113,8 @@ fn bode(work: &Work) -> Result<Figure> {
         let open = loops(&plant, &feedback);
         let hertz: Vec<f64> = plant.frequency.iter().map(|omega| omega / (2.0 * PI)).collect();
         last = hertz.last().copied().unwrap_or(last).max(last);
-        let curve: Vec<Complex<f64>> = open.iter().map(|open| open.broken_at(verdict.nominal.breaks.phase)).collect();
+        let (at, drive) = (verdict.nominal.breaks.phase, verdict.nominal.breaks.phase_drive);
+        let curve: Vec<Complex<f64>> = open.iter().map(|open| open.broken_at(at, drive)).collect();
         let decibels: Vec<f64> = curve.iter().map(|l| 20.0 * l.norm().max(1e-12).log10()).collect();
         // From 0 down to −360°: −180° is what margins are counted from.
         let turned = |angle: f64| if angle > 0.0 { angle - 360.0 } else { angle };
@@ -144,9 +145,21 @@ fn bode(work: &Work) -> Result<Figure> {
     Ok(figure)
 }
 
-/// A closed loop with its name and colour: frequencies, rad/s, and the way from the reference to the cart without
-/// feed-forward.
-type Way = (&'static str, Colour, Vec<f64>, Vec<Complex<f64>>);
+/// A closed loop with its name, colour and style: frequencies, rad/s, and the way from the reference of what slides to
+/// what slides without feed-forward.
+type Way = (String, Colour, Style, Vec<f64>, Vec<Complex<f64>>);
+
+/// The keys of the parts that slide, with styles.
+fn slides(machine: &Machine) -> impl Iterator<Item = (&'static str, Style)> {
+    let geometry = machine.geometry();
+    let keys = geometry.slides.iter().map(|slide| geometry.label(slide.body).key);
+    keys.zip([Style::Solid, Style::Dashed])
+}
+
+/// The name of a curve of a part that slides: with that part, where there are several.
+fn of_slide(machine: &Machine, name: &str, key: &str) -> String {
+    if machine.geometry().slides.len() > 1 { format!("{name}, {key}") } else { name.to_string() }
+}
 
 /// The loops before and after on the axis as it is taken for, those alone that are stable.
 fn ways(work: &Work) -> Result<Vec<Way>> {
@@ -156,8 +169,12 @@ fn ways(work: &Work) -> Result<Vec<Way>> {
     for (name, verdict, colour) in both.into_iter().filter(|(_, verdict, _)| verdict.nominal.stable) {
         let feedback = Feedback::new(&verdict.design, &work.case.machine)?;
         let plant = work.tuned.family.plant(&nominal, &verdict.design, &feedback.corners())?;
-        let way = loops(&plant, &feedback).iter().map(Open::reference_to_cart).collect();
-        all.push((name, colour, plant.frequency, way));
+        let loops = loops(&plant, &feedback);
+        for (number, (key, style)) in slides(&work.case.machine).enumerate() {
+            let way = loops.iter().map(|open| open.reference_to_slides[number]).collect();
+            let name = of_slide(&work.case.machine, name, key);
+            all.push((name, colour, style, plant.frequency.clone(), way));
+        }
     }
     Ok(all)
 }
@@ -166,11 +183,11 @@ fn ways(work: &Work) -> Result<Vec<Way>> {
 fn closed(work: &Work) -> Result<Figure> {
     let mut magnitude = Panel::new(Axis::new("|x/y|, dB", ""));
     let mut last = 1.0_f64;
-    for (name, colour, frequency, way) in ways(work)? {
+    for (name, colour, style, frequency, way) in ways(work)? {
         let hertz: Vec<f64> = frequency.iter().map(|omega| omega / (2.0 * PI)).collect();
         last = hertz.last().copied().unwrap_or(last).max(last);
         let decibels: Vec<f64> = way.iter().map(|way| 20.0 * way.norm().max(1e-6).log10()).collect();
-        magnitude = magnitude.series(Series::new(name, hertz, decibels).colour(colour));
+        magnitude = magnitude.series(Series::new(name, hertz, decibels).colour(colour).style(style));
     }
     let mut figure = Figure::new("From the reference to the cart", Axis::new("Frequency", "Hz").logarithmic())
         .panel(magnitude.horizontal(-3.0, "−3 dB"))
@@ -196,9 +213,9 @@ fn step(work: &Work) -> Result<Figure> {
     let until = LONG / slowest.fold(f64::INFINITY, f64::min);
     let until = if until.is_finite() && until > 0.0 { until.min(20.0) } else { 1.0 };
     let mut panel = Panel::new(Axis::new("Cart, per step", ""));
-    for (name, colour, frequency, way) in ways(work)? {
+    for (name, colour, style, frequency, way) in ways(work)? {
         let (time, values) = step_response(&frequency, &way, every, until);
-        panel = panel.series(Series::new(name, time, values).colour(colour));
+        panel = panel.series(Series::new(name, time, values).colour(colour).style(style));
     }
     Ok(Figure::new("Step of the reference", Axis::new("Time", "s")).panel(panel.horizontal(1.0, "")).caption(
         "The cart after a step of the reference, without feed-forward and limits: the sampled loop while everything slides, on the axis as \
@@ -233,32 +250,40 @@ fn step_response(frequency: &[f64], way: &[Complex<f64>], every: f64, until: f64
 /// The cart's error in a move, before and after, and the command.
 fn moved(work: &Work, motion: &Move) -> Result<Figure> {
     let stage = &work.case.machine;
-    let mut error = Panel::new(Axis::new("Cart x − y", "m").shown_as("µm", 1e6)).weight(1.6);
+    let mut error = Panel::new(Axis::new("x − y", "m").shown_as("µm", 1e6)).weight(1.6);
     let mut command = Panel::new(Axis::new("Voltage", "V"));
     for (name, verdict, colour) in
         [("before", &work.tuned.before, Colour::Amber), ("after", &work.tuned.after, Colour::Blue)]
     {
         let design = &verdict.design;
-        let mut controller = Standard::new(design, stage)?;
+        let mut controllers = Standard::of_drives(design, stage)?;
         let profiles = motion.references(design);
         let rows = Rows { until: motion.until, every: motion.every, window: motion.window };
-        let (mut x, mut u) = (decimator(), decimator());
-        let (controllers, timing) = (&mut [&mut controller as &mut dyn Controller], Loop::of(design));
-        stream(stage, controllers, &timing, &profiles, &rows, Solver::of(stage), false, &mut |block| {
+        let errors = slides(stage).map(|(key, style)| (of_slide(stage, name, key), format!("{key}_error"), style));
+        let styles = [Style::Solid, Style::Dashed];
+        let drives = stage.geometry().drives.iter().zip(styles);
+        let voltages = drives.map(|(at, style)| (String::new(), format!("{}voltage", at.prefix), style));
+        let kept = |(name, column, style)| (name, column, style, decimator());
+        let (mut x, mut u): (Vec<_>, Vec<_>) = (errors.map(kept).collect(), voltages.map(kept).collect());
+        let timing = Loop::of(design);
+        let (controllers, solver) = (&mut each(&mut controllers), Solver::of(stage));
+        stream(stage, controllers, &timing, &profiles, &rows, solver, false, &mut |block| {
             let column = |name: &str| block.get(name).unwrap_or(&[]);
-            x.push(column("time"), column("cart_error"));
-            u.push(column("time"), column("voltage"));
+            x.iter_mut().chain(&mut u).for_each(|(_, name, _, kept)| kept.push(column("time"), column(name)));
             Flow::Continue
         })?;
-        let ((t, x), (time, u)) = (x.points(), u.points());
-        error = error.series(Series::new(name, t, x).colour(colour));
-        command = command.series(Series::new("", time, u).colour(colour));
+        let series = |(name, _, style, kept): (String, String, Style, Decimator)| {
+            let (time, values) = kept.points();
+            Series::new(name, time, values).colour(colour).style(style)
+        };
+        error = x.into_iter().map(series).fold(error, Panel::series);
+        command = u.into_iter().map(series).fold(command, Panel::series);
     }
     Ok(Figure::new(format!("{}: before and after", motion.name), Axis::new("Time", "s"))
         .panel(error)
         .panel(command)
-        .vertical(motion.profile().end(), "end of the profile")
-        .caption("By how much the cart is off, and what it takes, on the axis as the file has it."))
+        .vertical(motion.end(), "end of the profile")
+        .caption("By how much what slides is off, and what it takes, on the machine as the file has it."))
 }
 
 #[cfg(test)]

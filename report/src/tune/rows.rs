@@ -58,12 +58,18 @@ pub fn hertz(omega: f64) -> String {
     if omega.is_finite() { format!("{:.2} Hz", omega / (2.0 * PI)) } else { "none".into() }
 }
 
-/// Where the loop is broken for a margin; nothing where it is the same loop everywhere, and where it is not stable.
-fn broken(margins: &Margins, at: Break) -> String {
-    match margins.has_one_loop || !margins.stable {
-        true => String::new(),
-        false => format!(", {}", told(at)),
-    }
+/// Where the loop is broken for a margin, and of which drive; nothing where it is the same loop everywhere, and where it
+/// is not stable.
+fn broken(margins: &Margins, at: Break, drive: Option<usize>) -> String {
+    let at = (!margins.has_one_loop).then(|| told(at));
+    let parts = [at, drive.and_then(|drive| margins.drive_name(drive))];
+    let parts = parts.into_iter().flatten().filter(|_| margins.stable);
+    parts.map(|part| format!(", {part}")).collect()
+}
+
+/// The parts that slide, in a word.
+fn sliding(work: &Work) -> &'static str {
+    if work.case.is_axis() { "cart" } else { "bridge or cart" }
 }
 
 /// A break in words.
@@ -81,10 +87,12 @@ pub fn margins(before: &Margins, after: &Margins) -> Vec<Row> {
     let factor = |m: &Margins| match m.gain {
         _ if !m.stable => "none".into(),
         gain if gain.is_infinite() => "any".into(),
-        gain => format!("{gain:.2} ({:.1} dB){}", 20.0 * gain.log10(), broken(m, m.breaks.gain)),
+        gain => {
+            format!("{gain:.2} ({:.1} dB){}", 20.0 * gain.log10(), broken(m, m.breaks.gain, Some(m.breaks.gain_drive)))
+        }
     };
     let angle = |m: &Margins| match m.phase.is_finite() {
-        true => format!("{:.1}°{}", m.phase.to_degrees(), broken(m, m.breaks.phase)),
+        true => format!("{:.1}°{}", m.phase.to_degrees(), broken(m, m.breaks.phase, Some(m.breaks.phase_drive))),
         false => "any".into(),
     };
     type Shown<'a> = Box<dyn Fn(&Margins) -> String + 'a>;
@@ -92,8 +100,11 @@ pub fn margins(before: &Margins, after: &Margins) -> Vec<Row> {
     let top =
         |m: &Margins| if m.stable { format!(" at {}", hertz(m.at)) } else { format!(", swings at {}", hertz(m.at)) };
     let rows: [(&str, Shown); 7] = [
-        ("Ms", Box::new(move |m| format!("{}{}{}", peak(m.sensitivity), top(m), broken(m, m.breaks.sensitivity)))),
-        ("Mt", Box::new(move |m| format!("{}{}", peak(m.complementary), broken(m, m.breaks.complementary)))),
+        (
+            "Ms",
+            Box::new(move |m| format!("{}{}{}", peak(m.sensitivity), top(m), broken(m, m.breaks.sensitivity, None))),
+        ),
+        ("Mt", Box::new(move |m| format!("{}{}", peak(m.complementary), broken(m, m.breaks.complementary, None)))),
         ("gain margin", Box::new(factor)),
         ("phase margin", Box::new(angle)),
         ("crossover", Box::new(|m| hertz(m.crossover))),
@@ -146,10 +157,10 @@ pub fn moves(work: &Work) -> Vec<Row> {
     let mut rows = Vec::new();
     for (was, is) in before.iter().zip(after) {
         let mut row = |name: &str, of: &dyn Fn(&MoveVerdict) -> String| rows.push((name.to_string(), of(was), of(is)));
-        row(&format!("{}: cart error", was.name), &|one| cart(&one.cart));
+        row(&format!("{}: {} error", was.name, sliding(work)), &|one| cart(&one.cart));
         row("  settles", &|one| settles(one.settling));
         row("  current", &|one| format!("{} rms", amperes(one.current)));
-        row("  at worst: cart error", &|one| {
+        row(&format!("  at worst: {} error", sliding(work)), &|one| {
             format!("{} on {}", length(one.worst.0), numbered(work, one.at_worst.error.1))
         });
         row("  at worst: settles", &|one| settles(slowest(&one.at_worst)));
@@ -172,7 +183,7 @@ pub fn verdict(work: &Work) -> String {
     let amplitude = |hunt: &Option<Hunt>| hunt.as_ref().map_or(0.0, |hunt| hunt.amplitude);
     let (was, is) = (amplitude(&before.hunt), amplitude(&after.hunt));
     if before.hunt.is_some() != after.hunt.is_some() || is > 1.1 * was {
-        told.push(format!("at rest the cart {}", hunts(is, was)));
+        told.push(format!("at rest the {} {}", sliding(work), hunts(is, was)));
     }
     let told = if told.is_empty() { String::new() } else { format!(": {}", told.join("; ")) };
     match (tuned.judgement, &tuned.forced) {
@@ -229,7 +240,8 @@ fn reason(forced: &Forced) -> String {
 fn least(work: &Work) -> String {
     let Some(least) = &work.tuned.least else { return String::new() };
     let Worse { motion, figure, before, after, .. } = least.worse;
-    let name = motion.map_or("at rest the cart", |motion| &work.tuned.moves[motion].name);
+    let at_rest = format!("at rest the {}", sliding(work));
+    let name = motion.map_or(&at_rest, |motion| &work.tuned.moves[motion].name);
     let what = match figure {
         Figure::Hunting => hunts(after, before),
         Figure::Error => format!("errs {}, {} before", length(after), length(before)),

@@ -7,7 +7,7 @@ use std::collections::HashMap;
 /// the rest.
 const KINDS: [(&str, &[&str]); 8] = [
     (
-        "memory asked for, given back, cleared and copied",
+        "memory: allocation, clearing, copying",
         &[
             "malloc",
             "calloc",
@@ -23,15 +23,15 @@ const KINDS: [(&str, &[&str]); 8] = [
         ],
     ),
     (
-        "figures: what is read of the motion, peaks between rows",
+        "figures: evaluation of the motion, peaks between rows",
         &["solve::observe", "exact::shown", "matrices::shown", "metrics", "call_once_force"],
     ),
     (
-        "rows: propagated, their columns, handing them on",
+        "rows: propagation, columns, delivery",
         &["solve::record", "advance_rows", "trajectory", "Run<_>::p", "Coordinates"],
     ),
     (
-        "looks for events: bounds over intervals, steps that hold for certain",
+        "event search: bounds over intervals, certain steps",
         &[
             "look",
             "safe_intervals",
@@ -46,16 +46,16 @@ const KINDS: [(&str, &[&str]); 8] = [
         ],
     ),
     (
-        "series near events, and what follows an event",
+        "series near events, event handling",
         &["series", "Series", "change", "resolve", "Core<_>", "first_term", "Event"],
     ),
     (
-        "modes made ready: equations, guards, matrix exponentials",
+        "new modes: equations, guards, matrix exponentials",
         &["matrices", "equations", "Layout", "exponential", "doubled", "Mechanism>::"],
     ),
     ("steps by matrices", &["propagator"]),
     (
-        "machines from numbers: points drawn, checks, mechanism",
+        "machines: random points, checks, mechanism",
         &["sweep", "parameter", "stage", "mechanism", "Mechanism", "check", "friction"],
     ),
 ];
@@ -111,7 +111,7 @@ mod tests {
                        fn=(2)\n0 30\nfn=(3) main\n9 10\n";
         let shares = of(profile);
         let share = |part: &str| shares.iter().find(|(name, _)| name.starts_with(part)).map(|(_, share)| *share);
-        assert_eq!(share("looks for events"), Some(0.6));
+        assert_eq!(share("event search"), Some(0.6));
         assert_eq!(share("memory"), Some(0.3));
         assert_eq!(share("the rest"), Some(0.1));
         assert!((shares.iter().map(|(_, share)| share).sum::<f64>() - 1.0).abs() < 1e-12);

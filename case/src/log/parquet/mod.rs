@@ -157,7 +157,7 @@ struct Values {
     values: Vec<f64>,
     /// So many are wanted.
     length: usize,
-    /// Whether they have to increase.
+    /// True if they have to increase.
     ordered: bool,
 }
 

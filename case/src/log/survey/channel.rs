@@ -137,7 +137,7 @@ impl Channel {
         self.noise.max(self.step.map_or(0.0, |q| q / 12f64.sqrt()))
     }
 
-    /// Whether there is one value only.
+    /// True if there is one value only.
     pub fn is_constant(&self) -> bool {
         self.levels <= 1
     }
@@ -305,7 +305,7 @@ impl Channel {
                 "saturation",
                 Severity::Warning,
                 format!(
-                    "it stands at its extreme of {} for {samples} samples from {} on{reached}: {what}",
+                    "it stays at its extreme of {} for {samples} samples from {} on{reached}: {what}",
                     value(limit),
                     seconds(at)
                 ),
@@ -356,10 +356,7 @@ impl Channel {
             note(
                 "negative",
                 Severity::Warning,
-                format!(
-                    "it is said to be absolute, and {negative} samples are negative, down to {}",
-                    value(self.least)
-                ),
+                format!("it is declared absolute, but {negative} samples are negative, down to {}", value(self.least)),
             );
         }
         if let Some(output) = output {

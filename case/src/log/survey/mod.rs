@@ -121,7 +121,7 @@ impl Survey {
         Self { log: log.name.clone(), timing, channels, motion, notes }
     }
 
-    /// Whether there is a note of that code.
+    /// True if there is a note of that code.
     pub fn has(&self, code: &str) -> bool {
         self.notes.iter().any(|note| note.code == code)
     }

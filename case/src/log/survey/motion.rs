@@ -28,15 +28,15 @@ const SHORTEST: usize = 20;
 pub struct Motion {
     /// The column: a position if there is one, or else a speed.
     pub quantity: Quantity,
-    /// Whether that column has lost its sign.
+    /// True if that column has lost its sign.
     pub absolute: bool,
-    /// Whether it moves at all, beyond noise and steps.
+    /// True if it moves at all, beyond noise and steps.
     pub moves: bool,
     /// Largest speed, in the unit of a speed: m/s or rad/s.
     pub peak_speed: f64,
-    /// Whether it is at rest in the first samples.
+    /// True if it is at rest in the first samples.
     pub begins_at_rest: bool,
-    /// Whether it is at rest in the last samples.
+    /// True if it is at rest in the last samples.
     pub ends_at_rest: bool,
     /// Times, s, at which it turns round.
     pub reversals: Vec<f64>,
@@ -185,7 +185,7 @@ impl Motion {
             note(
                 "still",
                 Severity::Warning,
-                "it does not move beyond its noise and steps: nothing about the mechanics can be learnt".into(),
+                "it does not move beyond its noise and resolution: the log says nothing about the mechanics".into(),
             );
             return notes;
         }
@@ -195,33 +195,33 @@ impl Motion {
             _ if self.absolute => note(
                 "absolute",
                 Severity::Fact,
-                format!("it moves at up to {peak}; its sign was lost, so reversals are not seen"),
+                format!("it moves at up to {peak}; its sign was lost, so reversals are unknown"),
             ),
             0 => note(
                 "one-way",
                 Severity::Warning,
                 format!(
-                    "it moves at up to {peak} and never turns round: a constant force and Coulomb friction look the same"
+                    "it moves at up to {peak} and never reverses: a constant force and Coulomb friction cannot be separated"
                 ),
             ),
             1 => note(
                 "reverses",
                 Severity::Fact,
-                format!("it moves at up to {peak} and turns round once, at {}", shown(self.reversals[0], "s")),
+                format!("it moves at up to {peak} and reverses once, at {}", shown(self.reversals[0], "s")),
             ),
-            n => note("reverses", Severity::Fact, format!("it moves at up to {peak} and turns round {n} times")),
+            n => note("reverses", Severity::Fact, format!("it moves at up to {peak} and reverses {n} times")),
         }
         let longest = self.steady.iter().max_by(|a, b| (a.to - a.from).total_cmp(&(b.to - b.from)));
         match (longest, self.steady_speeds()) {
             (None, _) => note(
                 "unsteady",
                 Severity::Fact,
-                "no stretch of steady speed: friction and inertia are told apart by the transients alone".into(),
+                "no interval of steady speed: only transients separate friction from inertia".into(),
             ),
             (Some(steady), n) => {
                 let (speed, from, to) = (shown(steady.speed, unit), shown(steady.from, "s"), shown(steady.to, "s"));
                 let others = match n {
-                    1 => "it is the only steady speed, which cannot tell viscous from Coulomb friction".to_string(),
+                    1 => "a single steady speed does not separate viscous from Coulomb friction".to_string(),
                     n => format!("there are {n} different steady speeds"),
                 };
                 note("steady", Severity::Fact, format!("it moves steadily at {speed} from {from} to {to}; {others}"));

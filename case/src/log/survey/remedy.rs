@@ -12,7 +12,7 @@ pub enum Remedy {
     Flip(Quantity),
     /// A factor on an output.
     Scale(Quantity, f64),
-    /// The same, of an output that is odd for the machine of the case.
+    /// Another unit of an output that is implausible for the machine of the case.
     Unit(Quantity, f64),
     /// Of two outputs the first is this many times the second.
     Ratio(Quantity, Quantity, f64),

@@ -71,15 +71,15 @@ impl Timing {
         }
         if self.interval > 0.5 {
             let text = format!(
-                "a sample every {interval} is slow for a drive: are the times in ms? then say units = {{ time = \"ms\" }}"
+                "a sample every {interval} is slow for a drive: are the times in ms? then set units = {{ time = \"ms\" }}"
             );
             notes.push(Note::new("time-unit", Severity::Suspicion, text));
         } else if self.interval > 0.05 {
-            let text = format!("a sample every {interval} is too slow to see how the axis starts and stops");
+            let text = format!("a sample every {interval} is too slow to resolve starts and stops");
             notes.push(Note::new("slow-sampling", Severity::Warning, text));
         } else if self.interval < 5e-6 {
             let text = format!(
-                "a sample every {interval} is fast for a drive: are the times in a larger unit? then say so in units"
+                "a sample every {interval} is fast for a drive: are the times in a larger unit? then set units"
             );
             notes.push(Note::new("time-unit", Severity::Suspicion, text));
         }

@@ -107,7 +107,7 @@ fn input_note(stage: &Machine, input: &Channel) -> Option<Note> {
         return None;
     }
     let text = format!(
-        "it reaches {}, beyond any drive of this kind: is the column in {milli}? then say units = {{ input = \"{milli}\" }}",
+        "it reaches {}, beyond any drive of this kind: is the column in {milli}? then set units = {{ input = \"{milli}\" }}",
         shown(peak, unit)
     );
     Some(Note::new("unit", Severity::Suspicion, text).on("input"))
@@ -180,7 +180,7 @@ fn consistency(log: &Log, stage: &Machine, channels: &[Channel]) -> Vec<Note> {
             let code = if matches!(kind, Kind::Sign) { "sign" } else { "unit" };
             let text = match &kind {
                 Kind::Sign => format!(
-                    "it goes the other way than {s} says: one of the two has the wrong sign; say scale = {{ {s} = -1 }}, or so for {p}"
+                    "it moves against {s}: one of the two has the wrong sign; set scale = {{ {s} = -1 }}, or so for {p}"
                 ),
                 Kind::Factor(factor) => {
                     format!("it goes {factor} what {s} adds up to: is the unit of {p}, of {s} or of the time wrong?")
@@ -243,14 +243,14 @@ fn ratio_note(ratio: f64, base: &Output, other: &Output, stage: &Machine, what: 
         Kind::Sign => note(
             "sign",
             format!(
-                "it goes the other way than {other}: one of the two has the wrong sign; say scale = {{ {other} = -1 }}, or so for {name}"
+                "it moves against {other}: one of the two has the wrong sign; set scale = {{ {other} = -1 }}, or so for {name}"
             ),
             Remedy::Ratio(b, o, -1.0),
         ),
         Kind::Factor(_) if levers != 1.0 && (0.8..1.25).contains(&(1.0 / swapped)) => note(
             "swapped",
             format!(
-                "it and {other} look swapped: exchanged they agree with the pulley's radius of {}",
+                "it and {other} seem to be swapped: exchanged, they agree with the pulley's radius of {}",
                 shown(stage.pulley_radius, "m")
             ),
             Remedy::Exchange(b, o),
@@ -297,8 +297,8 @@ fn magnitude(log: &Log, stage: &Machine, motion: &Motion) -> Option<Note> {
         Remedy::Unit(motion.quantity, factor)
     });
     let next = match unit_meant {
-        Some(unit) => format!("is the column in {unit}? then say units = {{ {name} = \"{unit}\" }}"),
-        None if ratio < 1.0 => "are the times in ms or us, or the input in a larger unit? then say so in units".into(),
+        Some(unit) => format!("is the column in {unit}? then set units = {{ {name} = \"{unit}\" }}"),
+        None if ratio < 1.0 => "are the times in ms or us, or the input in a larger unit? then set units".into(),
         None => "check the units of the time, the input and this column".into(),
     };
     let text = format!(
@@ -348,7 +348,7 @@ fn hasty(log: &Log, motion: &Motion, expected: f64) -> Option<Note> {
     let times = (most / expected).sqrt();
     let text = format!(
         "it accelerates by up to {}, {:.0} times what the machine of the case would do with this input: do the times pass some {times:.0} times too \
-         quickly? then say what they are in, or time = {{ every = \"...\" }}",
+         quickly? then set units, or time = {{ every = \"...\" }}",
         shown(most, &unit),
         most / expected
     );
@@ -426,7 +426,7 @@ fn expected(log: &Log, stage: &Machine) -> Option<Expected> {
     (speed > 1e-3 * free && speed > 0.0).then_some(Expected { speed, acceleration })
 }
 
-/// Whether it moves against its input.
+/// Finding if the axis moves against its input.
 fn direction(log: &Log, stage: &Machine, motion: &Motion) -> Option<Note> {
     if motion.absolute {
         return None;
@@ -462,7 +462,7 @@ fn current_note(log: &Log, stage: &Machine) -> Option<Note> {
         return None;
     }
     let text = format!(
-        "it reaches {}, where this motor draws {} at most: is the column in mA? then say units = {{ motor_current = \"mA\" }}",
+        "it reaches {}, where this motor draws {} at most: is the column in mA? then set units = {{ motor_current = \"mA\" }}",
         shown(peak, "A"),
         shown(most, "A")
     );

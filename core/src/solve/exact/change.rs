@@ -129,7 +129,7 @@ impl<const N: usize> Core<N> {
         rules::settle(self);
     }
 
-    /// Whether a guard that is zero falls.
+    /// True if a guard that is zero falls.
     fn falls_from_zero(&mut self, index: usize) -> bool {
         let law = &*self.matrices;
         let Room { series, coefficients, .. } = &mut *self.room;

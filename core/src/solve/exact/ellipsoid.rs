@@ -78,7 +78,7 @@ impl<const N: usize> Ellipsoid<N> {
         Self { c: [[0.0; N]; N], states, size: [0.0; N], since: 0.0, steps: 0, largest: 0.0 }
     }
 
-    /// The same in another kernel.
+    /// This ellipsoid for a kernel of another size.
     pub(super) fn resized<const M: usize>(&self) -> Ellipsoid<M> {
         let mut new = Ellipsoid::<M>::new(self.states);
         for (new, own) in new.c.iter_mut().zip(&self.c).take(self.states) {

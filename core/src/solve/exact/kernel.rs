@@ -31,7 +31,7 @@ use std::sync::Arc;
 
 /// Something that is made for one kernel: vectors of `N` places.
 pub(in crate::solve) trait Make {
-    /// The same for every kernel.
+    /// Result type, common to all kernels.
     type Made;
 
     /// Makes it.

@@ -24,7 +24,7 @@ pub(in crate::solve) struct Space {
 }
 
 impl Space {
-    /// That of inputs whose pieces have at most this degree.
+    /// Matrices for inputs whose pieces have at most this degree.
     pub(in crate::solve) fn new(mechanism: &Mechanism, degree: usize) -> Self {
         Self { layout: Layout::new(mechanism), highest: if degree > 1 { DEGREE } else { degree } }
     }
@@ -101,7 +101,7 @@ fn square(x: f64) -> f64 {
 const GROWTH: f64 = 20.0;
 const GROWTH_PER_INTERVAL: f64 = 0.05;
 
-/// The same for a current that the motion does not act back on.
+/// Growth rate for a current without back-EMF.
 const GROWTH_OF_CURRENT: f64 = 1e-2;
 
 /// The size of a rate of change: √(2V), or per unit of it, of the mechanical and of the magnetic energy.
@@ -120,7 +120,7 @@ impl Size {
     }
 }
 
-/// Whether both ends of a spring are stuck.
+/// True for springs whose two ends are stuck.
 fn at_rest(mechanism: &Mechanism, stuck: &[bool; BODIES]) -> [bool; SPRINGS] {
     let mut at_rest = [true; SPRINGS];
     for (at_rest, spring) in at_rest.iter_mut().zip(&mechanism.springs) {
@@ -171,7 +171,7 @@ pub(super) fn straight<const N: usize>(mechanism: &Mechanism, space: &Space, mod
     (equations, rate)
 }
 
-/// Whether errors can grow in a machine of these parts.
+/// True if errors can grow in a machine of these parts.
 pub(super) fn can_grow(mechanism: &Mechanism) -> bool {
     mechanism.springs.iter().any(|spring| match spring.law {
         SpringLaw::Gap { .. } | SpringLaw::Tension { .. } | SpringLaw::Line { .. } => true,
@@ -197,7 +197,7 @@ fn crude<const N: usize>(mechanism: &Mechanism, layout: &Layout, mode: &Mode, in
 pub(in crate::solve) struct ModeMatrices<const N: usize> {
     pub(super) mode: Mode,
     pub(super) guards: Vec<Watch<N>>,
-    /// The same side by side.
+    /// Guards in groups, for vector instructions.
     beside: Vec<Beside<N>>,
     /// The load on each body without its friction; none where a gear loses power, and it is another at rest.
     load: Option<[Row<N>; BODIES]>,
@@ -213,7 +213,7 @@ pub(in crate::solve) struct ModeMatrices<const N: usize> {
     pub(super) swing: f64,
     /// The size of what the constant part of ż is added up from; nothing where errors do not grow.
     pub(super) crude: [f64; N],
-    /// Where ways are counted from.
+    /// Coordinates of the origin.
     origin: [f64; BODIES],
     rate: Matrix<N, N>,
     steps: Vec<OnceLock<Matrix<N, N>>>,
@@ -226,9 +226,9 @@ pub(in crate::solve) struct ModeMatrices<const N: usize> {
     /// Weight of each (di/dt)² in 2V, by the places of the currents; and whether there is any.
     magnetic: [(usize, f64); DRIVES],
     is_magnetic: bool,
-    /// The same by the drives.
+    /// Weight of the current of each drive.
     weight_of_current: [f64; DRIVES],
-    /// Whether a current moves anything, and the motion that current.
+    /// True if a current moves anything, and the motion that current.
     coupled: bool,
     /// Currents of the drives.
     current: [OnceLock<Row<N>>; DRIVES],
@@ -533,7 +533,7 @@ impl<const N: usize> ModeMatrices<N> {
         self.length(self.finest)
     }
 
-    /// How far the longest Taylor series reaches.
+    /// Largest step of the longest Taylor series, s.
     pub(super) fn far(&self) -> f64 {
         self.length(self.coarsest)
     }
@@ -593,12 +593,12 @@ impl<const N: usize> ModeMatrices<N> {
         coefficients.len()
     }
 
-    /// How much √V may grow by itself within `length`.
+    /// Factor by which √V can grow within `length`, s.
     pub(super) fn growth_over(&self, length: f64) -> f64 {
         if self.growth == 0.0 { 1.0 } else { (self.growth * length).exp() }
     }
 
-    /// The same within [`ModeMatrices::growth_time`].
+    /// Factor by which the energy norm can grow within [`ModeMatrices::growth_time`].
     pub(super) fn growth_factor(&self) -> f64 {
         if self.growth == 0.0 { 1.0 } else { 2.0 }
     }

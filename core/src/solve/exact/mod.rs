@@ -42,7 +42,7 @@ use std::sync::Arc;
 /// Halvings of an interval that are met exactly: eighths, where a delay ends in the midst of a sample.
 const HALVES: usize = 3;
 
-/// For so small a part of the series' reach a speed that has left zero is still told by its series alone.
+/// Fraction of the series radius below which the sign of a speed leaving zero is taken from the series.
 const SOON: f64 = 1e-6;
 
 /// A machine under way: its state, its mode, and what is needed to go on. A clone of it goes on in the same way.
@@ -77,7 +77,7 @@ pub(super) struct Common {
     /// Where it stands: so far behind `base`, s.
     base: f64,
     offset: f64,
-    /// How many modes have been taken up.
+    /// Number of modes so far.
     taken: u64,
     pub(super) cost: Cost,
     rounding: Rounding,
@@ -85,7 +85,7 @@ pub(super) struct Common {
     questions: u64,
     pace: Pace,
     end: f64,
-    /// Whether somebody is to be asked whether to go on.
+    /// True if somebody is to be asked whether to go on.
     pub(super) asks: bool,
 }
 
@@ -116,7 +116,7 @@ impl Lanes {
 }
 
 impl<const N: usize> Core<N> {
-    /// That of a machine at rest in its mode in `start`. `known` are modes made ready for intervals of any length;
+    /// Solver of a machine in `start`. `known` are the matrices of modes for intervals of any length;
     /// `end` is how far it is to go, to tell whether it gets there.
     pub(super) fn new(
         mechanism: Arc<Mechanism>,
@@ -246,7 +246,7 @@ impl<const N: usize> Core<N> {
         (self.common.input_rate[drive], self.common.input_curvature[drive]) = change_rates(coefficients, length);
     }
 
-    /// Whether the state is made of numbers.
+    /// True if the state is made of numbers.
     #[inline]
     fn is_finite(&self) -> bool {
         self.z.iter().sum::<f64>().is_finite()
@@ -313,7 +313,7 @@ impl<const N: usize> Core<N> {
         (most.min((time / self.common.h * 0.999) as u64), resting)
     }
 
-    /// Looks at the state: ż, its size, and the guards, forgiven what rounding alone may have made negative.
+    /// Evaluates rate, norm and guards at the state; guards are zero where rounding alone made them negative.
     #[inline]
     fn look(&mut self, law: &ModeMatrices<N>) {
         (self.room.rate, self.room.size) = law.look(&self.z, &mut self.room.value);
@@ -390,7 +390,7 @@ impl<const N: usize> Core<N> {
         }
     }
 
-    /// Whether nothing stands against going on.
+    /// True if nothing stands against going on.
     fn goes(&self) -> bool {
         self.common.rules.trouble.is_none() && !self.common.asks
     }
@@ -474,7 +474,7 @@ impl<const N: usize> Core<N> {
         self.advance_by_series_of(law, distance, Lanes(unsure | falling))
     }
 
-    /// The same, where no guards but these can fall.
+    /// Advances by a series; only these guards can fall.
     fn advance_by_series_of(&mut self, law: &ModeMatrices<N>, distance: f64, open: Lanes) -> Option<Transition> {
         self.common.cost.series += 1;
         law.series(&self.z, distance, &mut self.room.series);

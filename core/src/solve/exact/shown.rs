@@ -64,14 +64,14 @@ struct Later<const N: usize> {
 
 /// Where an observer is.
 pub(super) struct Watching<const N: usize> {
-    /// Whether there is an observer who follows the motion, and whether one who wants to see all of it closely.
+    /// True if there is an observer who follows the motion, and whether one who wants to see all of it closely.
     follows: bool,
     sees_all: bool,
     /// Readings at the beginning of a stretch and at its rows; the last one is the present.
     readings: Vec<Reading>,
-    /// Whether nothing has jumped since the present was read.
+    /// True if nothing has jumped since the present was read.
     is_read: bool,
-    /// Where ways are counted from.
+    /// Coordinates of the origin.
     origin: [f64; BODIES],
     later: Vec<Later<N>>,
     /// The largest magnitudes seen.
@@ -116,7 +116,7 @@ impl<const N: usize> Watching<N> {
 }
 
 impl<const N: usize> Run<'_, N> {
-    /// Whether somebody follows the motion.
+    /// True if somebody follows the motion.
     pub(super) fn is_observed(&self) -> bool {
         self.watching.follows
     }
@@ -228,7 +228,7 @@ impl<const N: usize> Run<'_, N> {
         law.bow(law.shown(&common.mechanism, &common.space), &law.rate(z), rates, (interval, whole))
     }
 
-    /// Whether the observer wants to see closer into a gap.
+    /// Asks the observer if it needs more points within an interval.
     fn ask(
         &mut self,
         law: &ModeMatrices<N>,
@@ -417,7 +417,7 @@ impl<const N: usize> Run<'_, N> {
         }
     }
 
-    /// The same as [`Core::advance`], and shows the way to whoever observes.
+    /// [`Core::advance`] that shows the motion to an observer.
     pub(super) fn advance_shown(&mut self, distance: f64, looked: bool) -> Option<Transition> {
         if !self.is_observed() {
             return self.core.advance(distance, looked);

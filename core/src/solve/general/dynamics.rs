@@ -164,7 +164,7 @@ impl Dynamics {
         watches.into_iter().zip(values).map(move |(cause, value)| (cause, value + core.forgiven(cause) + SHIFT))
     }
 
-    /// Whether a condition has fallen.
+    /// True if a condition has fallen.
     pub fn is_over(&self) -> bool {
         self.watched().any(|(_, value)| value <= 0.0)
     }

@@ -5,7 +5,7 @@ use crate::solve::propagator::SERIES_TERMS;
 use crate::solve::roots;
 use crate::solve::widest::widest;
 
-/// Whether what has these values at the points of a step can turn negative within. A quartic leaves the range of its
+/// True if what has these values at the points of a step can turn negative within. A quartic leaves the range of its
 /// values at the points by at most their spread; what swings by up to four radians within the step adds to that.
 pub(super) fn may_fall(values: &[f64; POINTS]) -> bool {
     let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &v| (l.min(v), h.max(v)));

@@ -27,7 +27,7 @@ pub(super) struct Field {
     pub(super) output: Vec<usize>,
     /// Arguments that errors are measured by: their places in the state.
     pub(super) measured: Vec<usize>,
-    /// Whether guards depend on what stands still: friction along the travel of a body at rest, and bent bristles.
+    /// True if guards depend on what stands still: friction along the travel of a body at rest, and bent bristles.
     pub(super) shifted: bool,
     /// Inertia that moves with each body, per unit of its leader's way.
     mass: [f64; BODIES],

@@ -71,7 +71,7 @@ enum Which {
 pub(super) type Forcing = [States; POWERS];
 
 impl Linear {
-    /// That of these columns of A, with nothing wanted yet.
+    /// Linear part with these columns of A, without outputs.
     pub(super) fn new(size: usize, columns: Vec<States>, constant: States, input: [States; DRIVES]) -> Self {
         let mut rows = vec![[0.0; STATES]; size];
         for (column, values) in columns.iter().enumerate() {
@@ -91,7 +91,7 @@ impl Linear {
         chains
     }
 
-    /// Those of the arguments, or of the guards.
+    /// Rows of the arguments, or of the guards.
     fn rows(&self, which: Which) -> &[[States; TERMS]] {
         let outputs = match which {
             Which::Arguments => &self.outputs[..self.arguments],
@@ -344,7 +344,7 @@ pub(super) struct Full {
     guards: Vec<Lane>,
     /// Changes of the states over the whole step.
     pub(super) end: Vec<States>,
-    /// The same up to each eighth of it.
+    /// Matrices up to each eighth of the step.
     inner: [OnceLock<Vec<States>>; EIGHTHS - 1],
     columns: usize,
     /// How many of them there are without the forces.
@@ -355,7 +355,7 @@ pub(super) struct Full {
 pub(super) const EIGHTHS: usize = 8;
 
 impl Set {
-    /// That of a step of length `h` under inputs of this degree.
+    /// Matrices of a step of length `h` for inputs of this degree.
     pub(super) fn new(linear: &Linear, h: f64, degree: usize) -> Self {
         let (known, drives) = (linear.known(degree), linear.drives());
         let mut base = vec![[0.0; NODES]; linear.arguments * known];

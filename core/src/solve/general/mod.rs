@@ -48,7 +48,7 @@ use stretch::Stretch;
 /// Most steps of a run, by what is known beforehand of its fastest rate.
 const MOST_STEPS: f64 = 1e10;
 
-/// Refuses a tolerance that is none, and a run of more steps than anybody waits for.
+/// Rejects an invalid tolerance, and a run of too many steps.
 pub(super) fn check(fastest: f64, until: f64, tolerance: f64) -> Result<()> {
     if !(1e-14..=1e-2).contains(&tolerance) {
         return Err(Error::new(format!("a tolerance of {tolerance:e} is of no use"))
@@ -105,7 +105,7 @@ pub(super) struct Core {
     outside: Option<f64>,
     pace: Pace,
     end: f64,
-    /// How many modes have been taken up.
+    /// Number of modes so far.
     taken: u64,
     /// Number of events whose own condition does not hold at their time.
     unmet: u64,
@@ -137,7 +137,7 @@ struct Way<'a> {
     until: f64,
     to: f64,
     begin: &'a Vector,
-    /// Whether nothing moves.
+    /// True if nothing moves.
     rests: bool,
     dense: &'a dyn Fn(f64) -> Vector,
 }
@@ -147,7 +147,7 @@ trait Witness {
     /// Sees a step.
     fn see(&mut self, core: &mut Core, way: &Way);
 
-    /// Whether to go on.
+    /// True if to go on.
     fn ask(&mut self) -> bool;
 }
 
@@ -170,8 +170,9 @@ struct Hit {
 }
 
 impl Core {
-    /// That of a machine in `start`; `tolerance` is the error allowed in each step, relative and, of small quantities,
-    /// absolute; `fastest` is its fastest rate, 1/s, `interval` what its steps fit into, and `end` how far it is to go.
+    /// Solver of a machine in `start`; `tolerance` is the error allowed in each step, relative and, of small
+    /// quantities, absolute; `fastest` is its fastest rate, 1/s, `interval` what its steps fit into, and `end` how far
+    /// it is to go.
     pub(super) fn new(
         mechanism: &Mechanism,
         layout: Layout,

@@ -143,14 +143,14 @@ pub(super) struct Model {
     pub(super) current: [Option<usize>; DRIVES],
     /// Where a body's bristle deflection stands, if it has one.
     pub(super) bristle: [Option<usize>; BODIES],
-    /// Whether anything is added to the linear equations at all.
+    /// True if anything is added to the linear equations at all.
     pub(super) adds: bool,
     pub(super) curved: Vec<Curved>,
     pub(super) following: Vec<Following>,
 }
 
 impl Model {
-    /// That of a mechanism whose ways are counted from where the run begins.
+    /// Model of a mechanism whose coordinates begin at zero.
     pub(super) fn new(mechanism: Arc<Mechanism>, layout: Layout) -> Self {
         let mut size = 0;
         let mut room = |count: usize| {
@@ -255,7 +255,7 @@ impl Model {
         self.factor_at(body, || y[self.coordinate(body)])
     }
 
-    /// The same at a place that is told if it matters.
+    /// Friction factor at a coordinate that is evaluated only if needed.
     #[inline(always)]
     pub(super) fn factor_at(&self, body: usize, coordinate: impl FnOnce() -> f64) -> f64 {
         match &self.mechanism.bodies[body].along {
@@ -357,7 +357,7 @@ impl Model {
         curved.bristle_rate(&sliding, place, y)
     }
 
-    /// The same as a row shows it.
+    /// Extra values as a row shows them.
     pub(super) fn extra(&self, mode: &Mode, y: &[f64]) -> Extra {
         let mut extra = Extra::default();
         if self.adds {

@@ -12,7 +12,7 @@ pub(super) struct Newton {
     order: Vec<usize>,
     /// Of which mode and length it is.
     pub(super) of: Option<(u64, f64)>,
-    /// Whether steps of that length need it.
+    /// True if steps of that length need it.
     pub(super) wanted: bool,
 }
 

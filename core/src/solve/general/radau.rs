@@ -8,7 +8,7 @@
 /// Nodes at which forces are unknown before the step is solved.
 pub(super) const NODES: usize = 4;
 
-/// The same with the beginning.
+/// Nodes and the beginning of the step.
 pub(super) const POINTS: usize = NODES + 1;
 
 /// One number for each node.
@@ -62,7 +62,7 @@ pub(super) fn rest(s: f64) -> f64 {
     PLACES.iter().fold(1.0, |product, place| product * (s - place))
 }
 
-/// The same of the cubics through the nodes alone.
+/// Coefficients of the cubics through the nodes alone.
 const CUBICS: [[f64; NODES]; NODES] = inverse(C);
 
 /// Values at the beginning of the cubics that are 1 at one node and 0 at the others.
@@ -88,7 +88,7 @@ pub(super) const RADAU: [Lane; NODES] = {
     matrix
 };
 
-/// The same of the quartic through the beginning and the nodes: ∫ from 0 to c_i of ℓ_p.
+/// Weights of the quartic through the beginning and the nodes: ∫ from 0 to c_i of ℓ_p.
 pub(super) const QUARTIC: [[f64; POINTS]; NODES] = {
     let mut matrix = [[0.0; POINTS]; NODES];
     let mut i = 0;
@@ -159,7 +159,7 @@ pub(super) static FORCED: [[Lane; TERMS]; POWERS] = {
     table
 };
 
-/// The same of a force ℓ_p, and of ω behind them: `[m][p]`.
+/// Integrals of a force ℓ_p, followed by that of ω: `[m][p]`.
 pub(super) static DRIVEN: [[Lane; POINTS + 1]; TERMS] = {
     let mut table = [[[0.0; NODES]; POINTS + 1]; TERMS];
     let mut m = 0;

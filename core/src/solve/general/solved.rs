@@ -157,7 +157,7 @@ impl Room {
         c[0] += output.constant;
     }
 
-    /// The same at the points.
+    /// Values at all points of the step.
     pub(super) fn at_points(c: &[f64; TERMS], order: usize) -> [f64; POINTS] {
         let lane = at_nodes(c, order);
         [c[0], lane[0], lane[1], lane[2], lane[3]]

@@ -55,14 +55,14 @@ pub(super) struct Bristle {
     is_stiff: bool,
 }
 
-/// Those of all bodies.
+/// Bristles of all bodies.
 pub(super) type Bristles = [Bristle; crate::mechanism::BODIES];
 
 /// How a force at each node changes with an argument at each node.
 pub(super) type Slopes = [Lane; NODES];
 
 impl Source {
-    /// That of a spring, with the arguments that are its stretch and the ways of the bodies that it follows.
+    /// Force of a spring; its arguments are its elongation and the coordinates of the bodies that it follows.
     pub(super) fn spring(model: &Model, following: usize, length: usize, ways: Vec<(usize, usize)>) -> Self {
         let spring = &model.mechanism.springs[model.following[following].spring];
         let (mut rest, mut arms) = (0.0, Vec::new());
@@ -130,7 +130,7 @@ impl Source {
         first
     }
 
-    /// Whether it is zero in one direction of a body that reverses without sticking. What such a body does is then
+    /// True if it is zero in one direction of a body that reverses without sticking. What such a body does is then
     /// solved without an error, so that nothing but the length of a step keeps it near to a quartic.
     pub(super) fn is_one_sided(&self, model: &Model) -> bool {
         let &Source::Friction { curved, motion: Motion::Free, .. } = self else { return false };
@@ -310,7 +310,7 @@ fn crossing(values: &[f64; POINTS], negligible: f64) -> Option<f64> {
     None
 }
 
-/// Whether a quartic through these values surely keeps their sign: it goes beyond them by less than they differ.
+/// True if a quartic through these values surely keeps their sign: it goes beyond them by less than they differ.
 #[inline(always)]
 fn stays_on_its_side(values: &[f64; POINTS]) -> bool {
     let (least, most) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, m), v| (l.min(*v), m.max(*v)));

@@ -75,7 +75,7 @@ pub(super) struct Step<'a> {
     pub(super) number: u64,
     pub(super) set: &'a Set,
     pub(super) begin: &'a Begin<'a>,
-    /// Whether it is taken by the columns of the whole step, or by its series.
+    /// True if it is taken by the columns of the whole step, or by its series.
     pub(super) whole: bool,
 }
 
@@ -105,7 +105,7 @@ pub(super) struct Room {
 /// next one is.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Guess {
-    /// Those at the beginning.
+    /// The forces at the beginning of the step, held constant.
     Constant,
     /// The quartics of the step before: this one begins where that one ended.
     After(f64),
@@ -114,7 +114,7 @@ pub(super) enum Guess {
 }
 
 impl Guess {
-    /// The same for a step of length `h`: by the ratio of the lengths.
+    /// This guess for a step of length `h`, scaled by the ratio of the lengths.
     pub(super) fn of(self, h: f64) -> Self {
         match self {
             Guess::Constant => Guess::Constant,

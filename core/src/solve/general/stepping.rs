@@ -440,9 +440,9 @@ struct Dense<'a> {
     start: Begin<'a>,
     set: &'a Set,
     h: f64,
-    /// Whether it was taken by the columns of the whole step.
+    /// True if it was taken by the columns of the whole step.
     whole: bool,
-    /// Whether the room has its series.
+    /// True if the room has its series.
     is_expanded: bool,
 }
 

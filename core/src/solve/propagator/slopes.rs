@@ -18,7 +18,7 @@ use crate::solve::widest::widest;
 pub(crate) struct Columns<const N: usize>(pub(crate) Vec<(usize, [f64; N])>);
 
 impl<const N: usize> Columns<N> {
-    /// Those of a matrix.
+    /// Slopes of a matrix.
     fn of(matrix: &Matrix<N, N>) -> Self {
         let columns = matrix.column.iter().enumerate();
         Self(columns.filter(|(_, column)| column.iter().any(|c| *c != 0.0)).map(|(at, c)| (at, *c)).collect())

@@ -44,7 +44,7 @@ pub(super) struct Block<'b> {
 }
 
 impl Columns {
-    /// Those of rows of `stride` numbers, a multiple of four.
+    /// Columns of rows of `stride` numbers, a multiple of four.
     pub(super) fn new(
         mechanism: &Mechanism,
         layout: &Layout,
@@ -301,7 +301,7 @@ pub(super) fn stretches(segments: &[Segment], sheets: &Sheets, written: usize) -
     stretches
 }
 
-/// Whether a column is put out.
+/// True if a column is put out.
 pub(super) fn is_shown(heading: &Heading, detail: Detail) -> bool {
     detail == Detail::Full || heading.lean
 }

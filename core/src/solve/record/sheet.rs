@@ -12,7 +12,7 @@ pub(super) struct Elements {
     pub(super) force: Vec<Sum>,
     pub(super) current: Vec<Sum>,
     pub(super) voltage: Vec<Sum>,
-    /// Whether a spring is slack, or which side of it pushes.
+    /// State of one-sided springs: slack, or the side that pushes.
     pub(super) contact: Vec<f64>,
 }
 

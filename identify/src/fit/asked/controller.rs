@@ -1,4 +1,4 @@
-//! Whether the controller of a case is the one that made a log: what it makes of the logged positions, beside the
+//! Tests whether the controller of a case made a log: its output for the logged positions, beside the
 //! logged input.
 
 use crate::case::Case;

@@ -27,16 +27,16 @@ pub struct Problem<'a> {
     pub shared: Vec<Extra>,
     /// The logs that are fitted.
     pub runs: Vec<Run>,
-    /// Those that are only compared.
+    /// Logs that are compared, not fitted.
     pub held_out: Vec<Run>,
     /// Simulated runs so far.
     pub simulations: u64,
     /// Runs that the last Jacobian took differences of.
     pub differences: usize,
-    /// Whether residuals swing to and fro, so that a first value is as far off as any other, however smooth they are.
+    /// True if residuals swing to and fro, so that a first value is as far off as any other, however smooth they are.
     pub swings: bool,
     units: Vec<Scale>,
-    /// Whether to end the work.
+    /// Called between evaluations; true ends the search.
     stop: Option<Stop<'a>>,
 }
 
@@ -45,7 +45,7 @@ pub struct Problem<'a> {
 pub struct Noise(pub Vec<(Quantity, f64)>);
 
 impl Noise {
-    /// That of a quantity; a picometre or its like where there is none.
+    /// Standard deviation of a quantity; 1e-12 in its unit if there is none.
     pub fn of(&self, quantity: Quantity) -> f64 {
         self.0.iter().find(|(own, _)| *own == quantity).map_or(1e-12, |(_, deviation)| *deviation)
     }
@@ -163,7 +163,7 @@ impl<'a> Problem<'a> {
         self.stop
     }
 
-    /// Whether it is asked to end.
+    /// True if it is asked to end.
     pub fn is_stopped(&self) -> bool {
         self.stop.is_some_and(|stop| stop())
     }
@@ -246,7 +246,7 @@ impl<'a> Problem<'a> {
                     });
                 }
             }
-            // What has no room is no variable, but a number: see `extras_of`.
+            // Extras with low == high are constants, not variables; see `extras_of`.
         }
     }
 
@@ -388,7 +388,7 @@ impl<'a> Problem<'a> {
         x
     }
 
-    /// The same with the parameters of a machine, as far as it has them within their bounds.
+    /// Point with the parameters of a machine, if they are within their bounds.
     pub(crate) fn point_of(&self, machine: &Machine) -> Vec<f64> {
         let mut x = self.start();
         let bounds = self.bounds();
@@ -447,7 +447,7 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// Whether parameter `j` is searched for on a logarithmic scale.
+    /// True if parameter `j` is searched for on a logarithmic scale.
     pub fn is_log(&self, j: usize) -> bool {
         matches!(self.units[j], Scale::Log(_))
     }
@@ -518,7 +518,7 @@ impl<'a> Problem<'a> {
         variable_extras(&self.runs[index]).enumerate().map(|(i, extra)| (first + i, *extra)).collect()
     }
 
-    /// Those of them that do no more than shift outputs.
+    /// Extras of a run that only shift its outputs.
     pub(crate) fn own_shifts(&self, index: usize, machine: &Machine) -> Vec<(usize, Extra)> {
         let mut own = self.own_variables(index);
         own.retain(|(_, extra)| self.runs[index].only_shifts(machine, extra));

@@ -11,7 +11,7 @@ pub trait Residuals {
     /// r(x); false where it cannot be computed.
     fn evaluate(&mut self, x: &[f64], r: &mut [f64]) -> bool;
 
-    /// Whether the last Jacobian is exact, whatever differences were asked for.
+    /// True if the last Jacobian is exact, whatever differences were asked for.
     fn is_exact(&self) -> bool {
         false
     }
@@ -124,7 +124,7 @@ impl Bounds {
         Self { low: vec![f64::NEG_INFINITY; n], high: vec![f64::INFINITY; n] }
     }
 
-    /// Whether variable `j` can only have one value.
+    /// True if variable `j` can only have one value.
     pub fn hold(&self, j: usize) -> bool {
         self.low[j] >= self.high[j]
     }

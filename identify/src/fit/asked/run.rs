@@ -68,7 +68,7 @@ pub struct Extra {
 pub struct MeasuredOutput {
     /// The quantity.
     pub quantity: Quantity,
-    /// Whether its sign was lost.
+    /// True if its sign was lost.
     pub absolute: bool,
     /// The values, NaN where missing.
     pub values: Vec<f64>,
@@ -106,7 +106,7 @@ pub struct Run {
     pub seen: Vec<MeasuredOutput>,
     /// The part of the logs that it is of, as far as these have parameters for themselves.
     pub part: usize,
-    /// Whether none of it is fitted.
+    /// True if none of it is fitted.
     pub held_out: bool,
     /// From which row on nothing is fitted.
     pub fitted_rows: usize,
@@ -140,7 +140,7 @@ pub struct Setting {
     pub window: Option<f64>,
     /// After this time nothing is fitted.
     pub fitted_until: Option<f64>,
-    /// Whether none of it is fitted.
+    /// True if none of it is fitted.
     pub held_out: bool,
 }
 
@@ -271,7 +271,7 @@ impl Run {
         pairs.filter_map(|(extra, value)| extra.known.map(|deviation| (value - extra.start) / deviation))
     }
 
-    /// Whether an extra does no more than shift outputs.
+    /// True if an extra does no more than shift outputs.
     pub(crate) fn only_shifts(&self, machine: &Machine, extra: &Extra) -> bool {
         // Whether it matters where the cart is, and not only how far it goes.
         let is_placed = machine.changes_along_travel() || machine.cart.travel.is_some();
@@ -306,12 +306,12 @@ impl Run {
         self.time.last().unwrap_or(&0.0) / (self.time.len().max(2) - 1) as f64
     }
 
-    /// Whether a controller makes its input.
+    /// True if a controller makes its input.
     pub fn is_closed(&self) -> bool {
         self.closed.is_some()
     }
 
-    /// Whether it is solved at its own times.
+    /// True if it is solved at its own times.
     pub fn is_even(&self) -> bool {
         self.even
     }
@@ -503,7 +503,7 @@ pub(crate) fn speed_of(quantity: Quantity) -> Option<Quantity> {
     }
 }
 
-/// Whether it is a way, so that a constant added to it changes nothing else.
+/// True if it is a way, so that a constant added to it changes nothing else.
 pub fn is_position(quantity: Quantity) -> bool {
     quantity.name().ends_with("_angle") || quantity.name().ends_with("_position")
 }

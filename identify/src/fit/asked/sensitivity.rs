@@ -141,7 +141,7 @@ impl Problem<'_> {
 type Sloped = (Vec<f64>, Vec<Vec<f64>>);
 
 impl Run {
-    /// Whether its start only shifts its outputs.
+    /// True if its start only shifts its outputs.
     fn is_shifted(&self, machine: &Machine) -> bool {
         let mut starts = self.extras.iter().filter(|extra| extra.what == Nuisance::StartPosition);
         starts.any(|extra| self.only_shifts(machine, extra))
@@ -223,7 +223,7 @@ fn differentiated(mechanism: &Mechanism, quantity: Quantity) -> Option<Different
     shown(name).or_else(|| shown(other)).map(|heading| Differentiated::Shown(heading.shown))
 }
 
-/// Whether a variable changes the radius of the pulleys.
+/// True if a variable changes the radius of the pulleys.
 fn changes_radius(machine: &Machine, variable: &Variable) -> bool {
     let is_other = |begun: &Begun| begun.mechanism.bodies[DRIVE].kind.lever() != machine.pulley_radius;
     matches!(variable, Variable::Machine { points, .. } if points.iter().any(is_other))

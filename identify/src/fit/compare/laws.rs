@@ -15,7 +15,7 @@ use toml_edit::{Array, DocumentMut, InlineTable, Item, Value};
 pub enum FrictionLaw {
     /// b v alone.
     Viscous,
-    /// The same and Coulomb friction.
+    /// Viscous and Coulomb friction.
     Coulomb,
     /// Each direction with its own values.
     Asymmetric,
@@ -28,7 +28,7 @@ pub enum FrictionLaw {
     /// The better one of the straight laws, with a force that changes along the travel and is the same in both
     /// directions.
     ForceAlong,
-    /// The same with a force that changes with the speed.
+    /// A force that depends on speed, above another law.
     ForceBySpeed,
 }
 
@@ -45,7 +45,7 @@ impl FrictionLaw {
         Self::LuGre,
     ];
 
-    /// Those that are compared unless others are named: bristles take long, and a force is no friction.
+    /// Laws compared by default: LuGre takes long, and a force is not friction.
     pub const USUAL: [Self; 5] = [Self::Viscous, Self::Coulomb, Self::Asymmetric, Self::Stribeck, Self::Along];
 
     /// Its name on the command line.
@@ -70,7 +70,7 @@ impl FrictionLaw {
         })
     }
 
-    /// Whether it stands above one of the laws of straight lines.
+    /// True if it stands above one of the laws of straight lines.
     pub(super) fn is_above(self) -> bool {
         match self {
             Self::Viscous | Self::Coulomb | Self::Asymmetric => false,
@@ -78,7 +78,7 @@ impl FrictionLaw {
         }
     }
 
-    /// Whether it curves with speed: a run takes a hundred times as long then.
+    /// True if it curves with speed: a run takes a hundred times as long then.
     pub(super) fn is_curved(self) -> bool {
         match self {
             Self::Viscous | Self::Coulomb | Self::Asymmetric | Self::Along | Self::ForceAlong | Self::ForceBySpeed => {

@@ -91,7 +91,7 @@ pub struct Comparison {
 pub struct Candidate {
     /// The law.
     pub law: FrictionLaw,
-    /// Whether each direction has its own values.
+    /// True if each direction has its own values.
     pub sided: bool,
     /// Length of windows, s; none for whole logs.
     pub window: Option<f64>,
@@ -99,7 +99,7 @@ pub struct Candidate {
     pub parameters: usize,
     /// Root mean square over whole logs that it was fitted to; NaN where it has none.
     pub training: f64,
-    /// The same of what was held out; infinite where a model did not get through, or no fit ended.
+    /// Error on held-out data; infinite if a simulation or the fit failed.
     pub held_out: f64,
     /// Standard error of the difference of its squared error to that of the best, as one of `held_out`.
     pub error: f64,
@@ -269,7 +269,7 @@ impl Course<'_> {
         tried.min_by(|a, b| a.squares().total_cmp(&b.squares())).map(|tried| tried.candidate.window)
     }
 
-    /// Whether friction with a value for each direction predicts better than without, as far as both were tried.
+    /// True if friction with a value for each direction predicts better than without, as far as both were tried.
     fn is_sided_better(&self) -> bool {
         let of = |law: FrictionLaw| {
             let own = self.tried.iter().filter(|tried| tried.candidate.law == law && tried.candidate.failed.is_none());

@@ -136,7 +136,7 @@ fn between(share: f64, low: f64, high: f64) -> f64 {
 }
 
 impl Shape {
-    /// That of a kind at a point of the unit cube.
+    /// Candidate of a kind at a point of the unit cube.
     pub(super) fn at(kind: Kind, share: &[f64], room: &Room) -> Self {
         let &Room { input, duration, frequencies: [low, high] } = room;
         let busy = duration * (1.0 - REST_AT_END);
@@ -187,7 +187,7 @@ impl Shape {
         }
     }
 
-    /// The same with another amplitude.
+    /// This candidate with another amplitude.
     pub(super) fn scaled(mut self, factor: f64) -> Self {
         match &mut self {
             Self::Trapezoid { amplitude, .. }

@@ -87,7 +87,7 @@ impl Limits {
         {
             return Err(Error::new(format!("an input of {asked} is beyond what the amplifier gives"))
                 .allowed(format!("up to {limit}"))
-                .next("ask for less with --amplitude: beyond its limit the amplifier gives a constant"));
+                .next("reduce --amplitude: beyond its limit the amplifier saturates"));
         }
         let current = asked(request.current).or(amplifier.current_limit.map(|limit| (limit, Origin::Machine)));
         let own = case.machine.cart.travel.map(|Travel { min, max, .. }| (max - min, Origin::Machine));
@@ -98,7 +98,7 @@ impl Limits {
                 .allowed(format!("up to {length} m")));
         }
         let travel = asked(request.travel).or(own).or_else(|| most(Reached::way)).ok_or_else(|| {
-            Error::new("nothing limits the way of the cart: the case has no [travel] and no experiment")
+            Error::new("the travel of the cart is unlimited: the case has no [travel] and no experiment")
                 .next("say how far it may go with --travel \"0.4 m\", or add [travel] with min and max")
         })?;
         let middle = case.machine.cart.travel.map(|travel| 0.5 * (travel.min + travel.max));

@@ -102,7 +102,7 @@ impl Default for Request {
 }
 
 impl Request {
-    /// That its numbers can be.
+    /// Checks the ranges of its numbers.
     fn checked(&self) -> Result<()> {
         let sizes = [
             ("duration", Some(self.duration)),

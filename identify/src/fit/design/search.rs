@@ -31,14 +31,14 @@ pub struct Promise {
     pub value: f64,
     /// Standard error; infinite where it is not determined.
     pub error: f64,
-    /// The same relative to the value, or to a typical one where the value may be zero.
+    /// Standard error relative to the value, or to a typical one if the value may be zero.
     pub relative: f64,
-    /// Whether it is one of those that count.
+    /// True if it is one of those that count.
     pub wanted: bool,
 }
 
 impl Promise {
-    /// Whether the experiment determines it.
+    /// True if the experiment determines it.
     pub fn is_determined(&self) -> bool {
         self.error.is_finite()
     }
@@ -51,7 +51,7 @@ pub struct Alternative {
     pub shape: Shape,
     /// The mean relative error.
     pub score: f64,
-    /// Whether it was searched beyond the first points.
+    /// True if it was searched beyond the first points.
     pub refined: bool,
 }
 
@@ -105,7 +105,7 @@ pub struct Designed {
     pub own: Vec<Own>,
     /// Inputs that were looked at.
     pub tried: usize,
-    /// Whether the search was ended early.
+    /// True if the search was ended early.
     pub interrupted: bool,
 }
 

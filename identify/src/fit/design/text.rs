@@ -45,7 +45,7 @@ impl Designed {
         let whole = format!("{}\n\n{}", case.text.trim_end(), self.toml());
         let read = Case::from_text(name, &whole).map_err(|error| {
             if case.text.lines().any(|line| line.trim_start().starts_with("experiment") && line.contains('=')) {
-                Error::new("the experiments of this case stand in one list, which a table cannot be added to")
+                Error::new("the experiments of this case are an inline list, to which a table cannot be added")
                     .in_file(name)
                     .next("write each as [[experiment]]")
             } else {
@@ -55,7 +55,7 @@ impl Designed {
         // What is written is what was judged.
         match read.experiments.last() {
             Some(last) if last.name == self.name && last.inputs[0] == self.shape.signal() => Ok(whole),
-            _ => Err(Error::new("the experiment that was found does not read back as what it is").in_file(name)),
+            _ => Err(Error::new("the designed experiment does not read back as it was written").in_file(name)),
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Whether a promise holds: logs of the experiment with noise, each fitted from a start that is off.
+//! Verifies predicted errors: noisy logs of the experiment, each fitted from a wrong start.
 
 use super::{Designed, Request, Task};
 use crate::case::{Case, parameters};

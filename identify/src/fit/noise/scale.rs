@@ -1,4 +1,4 @@
-//! Whether noise is larger in some places than in others: with speed, or along the logs.
+//! Tests whether the noise varies with speed or along the logs.
 //!
 //! The innovations v of white noise beside slow ones are independent, of one variance. Their blocks are put into K
 //! classes, of speed or of time; with the mean squares s_k² of n_k each and s² of all n, the classes raise the

@@ -52,7 +52,7 @@ pub struct Ingredients<'a, R> {
 pub struct Sampled {
     /// Values of the variables.
     pub draws: Draws,
-    /// Whether slopes, those of the fit, were followed; a random walk otherwise.
+    /// True if slopes, those of the fit, were followed; a random walk otherwise.
     pub fixed: bool,
 }
 
@@ -309,7 +309,7 @@ impl<'a, R: Residuals + Clone + Send> Density<'a, R> {
         Some(log).filter(|log| log.is_finite() && gradient.iter().all(|slope| slope.is_finite()))
     }
 
-    /// Whether slopes with the Jacobian at the fit are near those that are measured, where draws will be.
+    /// True if slopes with the Jacobian at the fit are near those that are measured, where draws will be.
     fn is_straight(&self, random: &mut Pcg64) -> bool {
         let n = self.errors.len();
         let (mut squares, mut count) = (0.0, 0);

@@ -37,7 +37,7 @@ pub(crate) struct Marginal<'a> {
     variance: f64,
     /// The variables that stay.
     kept: Vec<usize>,
-    /// Those that do not, by run.
+    /// Variables that only shift an output, by run.
     shifts: Vec<Shifts>,
     /// Their columns, where no pulley radius is searched for that they go with.
     fixed: Option<Vec<Columns>>,

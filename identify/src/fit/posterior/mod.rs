@@ -39,7 +39,7 @@ pub struct Posterior {
     pub draws: Draws,
     /// The divisor of the logarithm of the likelihood, for autocorrelated residuals.
     pub inflation: f64,
-    /// Whether paths followed the slopes at the fit; it was a random walk otherwise.
+    /// True if paths followed the slopes at the fit; it was a random walk otherwise.
     pub fixed_slopes: bool,
 }
 

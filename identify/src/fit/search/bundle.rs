@@ -113,7 +113,7 @@ impl Promise {
         Self { weights, mean, fall }
     }
 
-    /// Whether a piece says otherwise of that step.
+    /// True if a piece says otherwise of that step.
     fn is_contradicted(&self, (g, alpha): &(DVector<f64>, f64)) -> bool {
         -alpha - g.dot(&self.mean) + 0.5 * self.mean.norm_squared() >= -CONTRADICTS * self.fall
     }
@@ -198,8 +198,8 @@ fn forget(pieces: &mut Vec<Piece>, u: &DVector<f64>, cost: f64, weights: &[f64])
 }
 
 impl<'a> Coordinates<'a> {
-    /// Those around `best`, of whose Jacobian's QR decomposition `r` is R, over the variables that are free; σ is the
-    /// unit of residuals, beyond `huber` of which they count linearly.
+    /// Bundle around `best`; `r` is R of the QR decomposition of its Jacobian, over the variables that are free; σ is
+    /// the unit of residuals, beyond `huber` of which they count linearly.
     fn new(
         best: &Minimum,
         r: &DMatrix<f64>,

@@ -23,7 +23,7 @@ pub(crate) struct Damped {
     growth: f64,
     /// The Jacobian at the trial point that was taken, where it came with the residuals.
     ahead: Option<DMatrix<f64>>,
-    /// Whether the last trial point was taken.
+    /// True if the last trial point was taken.
     is_likely: bool,
     /// Steps in a row that gained less than shows.
     slow: usize,

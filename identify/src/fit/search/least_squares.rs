@@ -113,7 +113,7 @@ mod tests {
         }
     }
 
-    /// The same valley, with derivatives by differences.
+    /// The problem above with derivatives by differences.
     struct Differenced;
 
     impl Residuals for Differenced {

@@ -85,7 +85,7 @@ impl Linear {
         step
     }
 
-    /// The same with variables that are held at a bound.
+    /// Step with variables that are held at a bound.
     pub fn step(&self, held: &[bool], scale: &DVector<f64>, damping: f64) -> DVector<f64> {
         let fixed: Vec<Option<f64>> = held.iter().map(|&held| held.then_some(0.0)).collect();
         self.step_with(&fixed, scale, damping)

@@ -118,9 +118,9 @@ pub(crate) struct Point<'a> {
     pub scale: DVector<f64>,
     /// Standard deviation of the residuals, as if they were independent.
     pub deviation: f64,
-    /// Whether the Jacobian is exact.
+    /// True if the Jacobian is exact.
     pub is_exact: bool,
-    /// Whether the Gauss-Newton step changes no digit that counts.
+    /// True if the Gauss-Newton step changes no digit that counts.
     is_still: bool,
 }
 
@@ -189,7 +189,7 @@ impl<'a> Point<'a> {
         true
     }
 
-    /// Whether the projected gradient is zero to within the tolerance: the one test of convergence on a smooth piece.
+    /// True if the projected gradient is zero to within the tolerance: the one test of convergence on a smooth piece.
     pub fn is_at_minimum(&self) -> bool {
         self.best.decrement <= self.options.tolerance || self.is_still
     }

@@ -105,7 +105,7 @@ pub(crate) fn balance(logs: &[Smoothed], late: usize) -> Option<Balance> {
 }
 
 impl<'a> Smoothed<'a> {
-    /// That of one output of a run; none where it is too short.
+    /// Regression of one output of a run; none if it is too short.
     fn new(run: &'a Run, machine: &'a Machine, output: usize, noise: f64) -> Option<Self> {
         let seen = &run.seen[output];
         let (n, h) = (run.fitted_rows.min(run.time.len()), run.interval());

@@ -25,7 +25,7 @@ pub(crate) trait Rung {
     /// Its name in results.
     fn strategy(&self) -> Strategy;
 
-    /// Whether it can do anything at this point.
+    /// True if it can do anything at this point.
     fn applies(&self, at: &Point) -> bool;
 
     /// Goes on from `at` as long as that helps.

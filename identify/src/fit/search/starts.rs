@@ -164,7 +164,7 @@ fn rescale(minimum: &mut Minimum, factor: f64) {
     minimum.cost *= factor * factor;
 }
 
-/// Whether all that counts has the same weight.
+/// True if all that counts has the same weight.
 fn uniform(problem: &Problem) -> bool {
     let mut weights =
         problem.runs.iter().flat_map(|run| &run.seen).flat_map(|seen| &seen.weights).filter(|w| **w > 0.0);
@@ -172,8 +172,8 @@ fn uniform(problem: &Problem) -> bool {
     weights.all(|w| (w / first - 1.0).abs() < 1e-3)
 }
 
-/// Whether the residuals of positions go to and fro all along: they change their sign often, and never keep it for long,
-/// as those of a model that is wrong do.
+/// True if the residuals of positions go to and fro all along: they change their sign often, and never keep it for
+/// long, as those of a model that is wrong do.
 fn swings(problem: &Problem, at: &Minimum) -> bool {
     let all = problem.runs.iter().enumerate().flat_map(|(index, run)| {
         let (first, n) = (problem.first_row(index), run.time.len());
@@ -198,7 +198,7 @@ fn swings(problem: &Problem, at: &Minimum) -> bool {
     }) && any
 }
 
-/// Whether what is known beforehand of the start could be as wrong as the residuals are: then it depends on their
+/// True if what is known beforehand of the start could be as wrong as the residuals are: then it depends on their
 /// weight.
 fn told_beforehand(problem: &Problem, noise: &[(Quantity, f64)]) -> bool {
     let most = noise.iter().map(|(_, deviation)| *deviation).fold(0.0, f64::max);

@@ -16,7 +16,7 @@ pub struct Disagreement {
     pub(crate) added: DMatrix<f64>,
 }
 
-/// A friction law that the residuals speak for.
+/// A friction law that the residuals suggest.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OtherLaw {
     /// Its key: `stribeck`, `sided`, `drift`, `sway`.

@@ -65,7 +65,7 @@ fn grade(note: &Note, case: &Case, plan: &Plan) -> Grade {
     }
 }
 
-/// Whether a log moves against what the model does at the start.
+/// True if a log moves against what the model does at the start.
 fn is_opposite(problem: &Problem, name: &str) -> bool {
     let (x, mut worst) = (problem.start(), None);
     for (index, run) in problem.runs.iter().enumerate().filter(|(_, run)| run.name == name) {
@@ -91,7 +91,7 @@ fn is_opposite(problem: &Problem, name: &str) -> bool {
     worst.is_some_and(|correlation| correlation < OPPOSITE)
 }
 
-/// Whether the controller of the case is the one that made the logs.
+/// Findings about the controller: its output for the logged positions, compared with the logged input.
 fn of_controller(case: &Case, plan: &Plan) -> Vec<Finding> {
     let logs = case.experiments.iter().filter_map(|experiment| experiment.log.as_ref());
     let told = logs.filter_map(|log| {
@@ -100,9 +100,7 @@ fn of_controller(case: &Case, plan: &Plan) -> Vec<Finding> {
         let grade = if good || !plan.closed_loop { Grade::Note } else { Grade::Warning };
         let next = match good {
             true => "",
-            false => {
-                ": look at its gains, delay, filters and reference_speed, and at the columns of reference and position"
-            }
+            false => ": check its gains, delay, filters and reference_speed, and the columns of reference and position",
         };
         let text = format!("the controller of the case reproduces the logged input to {:.1} %{next}", percent.max(0.0));
         Some(Finding { grade, code: "controller", log: Some(log.name.clone()), text })
@@ -118,7 +116,7 @@ fn of_search(fit: &Fit) -> Vec<Finding> {
             Grade::Warning,
             "slope",
             format!(
-                "the search ended on a slope that promises {:.1} standard errors and that no step fulfils: not the minimum, or no minimum",
+                "the search stopped although the cost can still decrease by {:.1} standard errors (predicted): this is not a minimum",
                 fit.decrement
             ),
         )),
@@ -126,12 +124,12 @@ fn of_search(fit: &Fit) -> Vec<Finding> {
             Grade::Note,
             "kink",
             format!(
-                "ended at a kink, where sticks and slips change their order: its slope promises {:.1} standard errors",
+                "ended at a kink, where sticks and slips change their order: predicted gain of {:.1} standard errors",
                 fit.decrement
             ),
         )),
         Ending::OutOfIterations => {
-            all.push(finding(Grade::Warning, "steps", "the search was not at its end when its steps were used up".into()));
+            all.push(finding(Grade::Warning, "steps", "iteration limit reached before convergence".into()));
         }
         Ending::Converged | Ending::Interrupted | Ending::Failed => {}
     }
@@ -139,8 +137,8 @@ fn of_search(fit: &Fit) -> Vec<Finding> {
         let zero = estimate.value == 0.0 && estimate.bounds[0] == 0.0;
         let value = plain(estimate.value, estimate.unit);
         let text = match zero {
-            true => format!("{} is zero: the logs would have it below, which it cannot be", estimate.name),
-            false => format!("{} ended at its bound of {value}: the logs would have it beyond", estimate.name),
+            true => format!("{} is zero: the optimum would be negative", estimate.name),
+            false => format!("{} ended at its bound of {value}: the optimum lies outside", estimate.name),
         };
         all.push(finding(if zero { Grade::Note } else { Grade::Warning }, "bound", text));
     }
@@ -153,8 +151,8 @@ fn of_search(fit: &Fit) -> Vec<Finding> {
             .map(|(estimate, off)| format!("{} by {off:.1}", estimate.name))
             .collect();
         let text = format!(
-            "{} windows of {} disagree with the whole logs by more than noise, in standard errors of it: {}; no element \
-             that was tried explains that; the intervals are widened by it",
+            "{} windows of {} disagree with the whole logs by more than noise (in standard errors: {}); no element \
+             explains that; the intervals are widened by it",
             found.windows,
             plain(found.length, "s"),
             names.join(", ")
@@ -212,7 +210,7 @@ fn of_cause(fit: &Fit) -> Option<Finding> {
     let moved: Vec<String> = moved.collect();
     let moved = if moved.is_empty() { "no estimate moves by a hundredth".to_string() } else { moved.join(", ") };
     let text = format!(
-        "{} explains {:.0} % of what is left, and predicts {} of {} parts of the logs better that were held out: {moved}; \
+        "{} explains {:.0} % of the residuals, and improves the prediction of {} of {} held-out parts: {moved}; \
          the intervals are widened to contain that; {}",
         found.words,
         100.0 * found.explained,
@@ -229,7 +227,7 @@ fn shown(value: f64, unit: &str) -> String {
     engineering(value, unit, 3).replace(['\u{a0}', '\u{202f}'], " ").replace('−', "-")
 }
 
-/// Whether K_t and K_e can be those of one motor.
+/// Finding if K_t and K_e cannot belong to one motor.
 fn of_motor(case: &Case, fit: &Fit) -> Option<Finding> {
     let motor = &fit.machine.drives[0].motor;
     let (k_t, k_e) = (motor.torque_constant, motor.back_emf_constant);
@@ -241,7 +239,7 @@ fn of_motor(case: &Case, fit: &Fit) -> Option<Finding> {
         return None;
     }
     let text = format!(
-        "K_t = {} and K_e = {} are one number of one motor in SI units, and here {} times apart: tie them, or look for what else \
+        "K_t = {} and K_e = {} are one number of one motor in SI units, and here {} times apart: tie them, or check what else \
          brakes or drives (the gain, the resistance, friction)",
         plain(k_t, "N m/A"),
         plain(k_e, "V s/rad"),
@@ -257,7 +255,7 @@ fn of_residuals(fit: &Fit) -> Vec<Finding> {
         for output in &log.outputs {
             let Some(score) = output.fitted.filter(|score| score.percent < POOR_FIT) else { continue };
             let text = format!(
-                "{}: the model explains {:.0} % of it only: look at the units, signs and columns of this log, and at what the model lacks",
+                "{}: the model explains only {:.0} % of it: check units, signs and columns of this log, and missing parts of the model",
                 output.quantity.name(),
                 score.percent.max(0.0)
             );
@@ -277,7 +275,7 @@ impl Balance {
         match self.unexplained {
             left if left < 0.1 => "a rigid axis with viscous and Coulomb friction explains these logs",
             left if left < 0.3 => "a rigid axis with viscous and Coulomb friction explains most of these logs",
-            left if left < 0.7 => "a rigid axis with viscous and Coulomb friction leaves much of these logs",
+            left if left < 0.7 => "a rigid axis with viscous and Coulomb friction explains little of these logs",
             _ => "it explains next to nothing: look at units, signs and columns first",
         }
     }

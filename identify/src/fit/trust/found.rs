@@ -33,7 +33,7 @@ pub struct Fit {
     pub choices: Vec<Vec<String>>,
     /// Parts of the logs that say otherwise than the whole, by more than noise would make of it.
     pub disagreement: Option<Disagreement>,
-    /// A friction law that the case does not have and the residuals speak for.
+    /// A friction law that the case does not have and the residuals suggest.
     pub other_law: Option<OtherLaw>,
     /// An element that the model lacks and the logs show, as a fit with it found it.
     pub cause: Option<Cause>,
@@ -86,7 +86,7 @@ pub struct Estimate {
     pub interval: Option<[f64; 2]>,
     /// Its bounds.
     pub bounds: [f64; 2],
-    /// Whether it ended at one of them.
+    /// True if it ended at one of them.
     pub at_bound: bool,
     /// The part of the logs that it is for, by its place among the fit's; none where it is for all of them.
     pub part: Option<usize>,
@@ -95,19 +95,19 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    /// Whether the logs tell it, or it is at a bound.
+    /// True if the logs tell it, or it is at a bound.
     pub fn is_determined(&self) -> bool {
         self.at_bound || self.error.is_some_and(f64::is_finite)
     }
 }
 
 impl Fit {
-    /// Whether all that is searched for is determined and nothing warns.
+    /// True if all that is searched for is determined and nothing warns.
     pub fn is_reliable(&self) -> bool {
         self.is_complete() && self.warnings().next().is_none()
     }
 
-    /// Whether all that is searched for is determined.
+    /// True if all that is searched for is determined.
     pub fn is_complete(&self) -> bool {
         self.estimates.iter().all(Estimate::is_determined)
     }
@@ -117,7 +117,7 @@ impl Fit {
         self.findings.iter().filter(|finding| finding.grade == Grade::Warning)
     }
 
-    /// Whether the search ended at a minimum within the bounds, and nothing warns.
+    /// True if the search ended at a minimum within the bounds, and nothing warns.
     pub fn is_converged(&self) -> bool {
         self.ending == Ending::Converged
             && !self.estimates.iter().any(|estimate| estimate.at_bound)

@@ -61,7 +61,7 @@ fn held(extra: &Extra, value: f64) -> Extra {
     Extra { start: value, low: value, high: value, known: None, ..*extra }
 }
 
-/// The same logs, and nothing searched for in them.
+/// The plan with its logs but without free parameters.
 pub(crate) fn nothing(plan: &Plan) -> Plan {
     Plan {
         free: Vec::new(),

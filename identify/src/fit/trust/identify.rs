@@ -46,7 +46,7 @@ pub struct Group {
 }
 
 impl Identifiability {
-    /// Whether all is determined.
+    /// True if all is determined.
     pub fn complete(&self) -> bool {
         self.groups.is_empty()
     }
@@ -146,21 +146,24 @@ impl Identifiability {
         groups
     }
 
-    /// That no machine is the model to so little as these move the outputs: by `strongest`, of what all values weigh.
+    /// Message for members that move the outputs too little: by `strongest`, relative to the weight of all values.
     fn too_little(&self, problem: &Problem, members: &[usize], strongest: f64) -> String {
         let names: Vec<&str> = members.iter().map(|&j| self.names[j].as_str()).collect();
         let Least { least, range } = shows(problem);
         let percent = |share: f64| crate::number::significant(100.0 * share, 2);
         let by = match least > MODEL_ERROR * range {
-            true => "less than a fifth of what their converter rounds".to_string(),
+            true => "less than a fifth of their resolution".to_string(),
             false => format!(
-                "{} % of how far they range, and no model is good to less than {} %",
+                "{} % of their range, and a model is not accurate to less than {} %",
                 percent(strongest / range),
                 percent(MODEL_ERROR)
             ),
         };
-        let verb = if names.len() == 1 { "shows" } else { "show" };
-        format!("{} {verb} too little in these logs: a change by 100 % moves the outputs by {by}", listed(&names))
+        let verb = if names.len() == 1 { "has" } else { "have" };
+        format!(
+            "{} {verb} too little effect in these logs: a change by 100 % moves the outputs by {by}",
+            listed(&names)
+        )
     }
 
     fn words(
@@ -207,7 +210,7 @@ impl Identifiability {
             }
         }
         let combinations = if determined == 1 { "1 combination".into() } else { format!("{determined} combinations") };
-        let mut text = format!("of {} only {combinations} can be told", listed(&names));
+        let mut text = format!("of {} only {combinations} can be determined", listed(&names));
         if members.len() - determined == 1 {
             // The one direction that changes nothing.
             let lead = members.iter().copied().max_by(|&a, &b| hidden(a, a).total_cmp(&hidden(b, b))).unwrap_or(0);
@@ -219,11 +222,7 @@ impl Identifiability {
                     format!("{} by {}{:.2} %", self.names[j], if percent < 0.0 { "−" } else { "+" }, percent.abs())
                 })
                 .collect();
-            text.push_str(&format!(
-                ": {} by +1 % with {} changes nothing that they show",
-                self.names[lead],
-                along.join(", ")
-            ));
+            text.push_str(&format!(": {} by +1 % with {} changes nothing in them", self.names[lead], along.join(", ")));
         }
         text
     }

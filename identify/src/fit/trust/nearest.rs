@@ -61,7 +61,7 @@ pub(crate) fn search<'a>(
     search_near(case, &case.machine, plan, stop, watch)
 }
 
-/// The same; what is not determined comes as near to the values of `given` as the logs allow.
+/// Searches with undetermined parameters as near to the values of `given` as the logs allow.
 pub(crate) fn search_near<'a>(
     case: &Case,
     given: &Machine,

@@ -1,4 +1,4 @@
-//! Whether a friction law that was not asked for would explain what the fitted one leaves.
+//! Tests whether another friction law explains the residuals.
 //!
 //! Where friction in truth falls with speed, or is not the same in both directions, and the fit has neither, its
 //! parameters take what they can of the difference: residuals stay small, and estimates are off by far more than noise
@@ -93,7 +93,7 @@ impl Kind {
         }
     }
 
-    /// Whether the machine changes along a log, and its amplitude is a share of friction.
+    /// True for a drift along the log, whose amplitude is relative to friction.
     fn is_along(self) -> bool {
         matches!(self, Kind::Drift | Kind::Sway)
     }
@@ -207,7 +207,7 @@ struct Place<'a> {
     inverse: DMatrix<f64>,
 }
 
-/// The law that the residuals speak for most; none where none shows, or where too little is determined.
+/// The law that the residuals suggest most; none if none is significant or too little is determined.
 pub(crate) fn other_law(found: &Searched, judged: &Judged) -> Option<OtherLaw> {
     let (problem, best) = (&found.problem, &found.best);
     let g = problem.globals();
@@ -305,8 +305,8 @@ impl Place<'_> {
         Some(DVector::from_vec(residuals))
     }
 
-    /// What a law takes off Σ r² where the variables have moved along with it, x + s d with the best of the shares s;
-    /// none where that is less than [`LAW_KEEPS`] of what its column promises.
+    /// Decrease of Σ r² by a law at x + s d, with the best of the shares s;
+    /// none if it is below [`LAW_KEEPS`] of the predicted decrease.
     fn gained(&self, tried: &Tried) -> Option<f64> {
         let bounds = self.problem.bounds();
         let own = |share: &f64| {
@@ -340,7 +340,7 @@ impl Place<'_> {
         Some(Tried { candidate, amplitude: amplitude.clamp(least, most), column, along, gain })
     }
 
-    /// Whether noise explains it; with the columns of the fit and of the law together.
+    /// Judges a law against noise, with the columns of fit and law together.
     fn judged(&self, tried: &Tried, judged: &Judged) -> Option<OtherLaw> {
         let (g, n) = (self.problem.globals(), self.jacobian.ncols());
         let mut columns = DMatrix::zeros(self.jacobian.nrows(), n + 1);

@@ -27,7 +27,7 @@ pub struct Profile {
     pub values: Vec<f64>,
     /// √ of the growth of the sum of squares, in standard errors.
     pub growth: Vec<f64>,
-    /// The same for a model that is linear in its parameters: how many standard errors off it was held.
+    /// Values for a linear model: distance from the estimate at which it was held, in standard errors.
     pub linear: Vec<f64>,
 }
 
@@ -42,7 +42,7 @@ impl Profile {
         [at(0..middle), at(middle..self.linear.len())]
     }
 
-    /// Whether an interval that takes the model as linear is far too long or too short on a side.
+    /// True if an interval that takes the model as linear is far too long or too short on a side.
     pub fn is_crooked(&self) -> bool {
         self.bends().into_iter().flatten().any(|ratio| (ratio - 1.0).abs() > CROOKED)
     }

@@ -35,9 +35,9 @@ struct Idea {
     measured: Measured,
     /// The change of the machine.
     change: fn(&mut Machine),
-    /// Whether the input is turned round.
+    /// True if the input is turned round.
     reversed: bool,
-    /// Whether the logs have that already, or the model says nothing of it.
+    /// True if the logs have that already, or the model says nothing of it.
     is_there: fn(&Problem) -> bool,
 }
 
@@ -60,21 +60,21 @@ fn cart_noise(problem: &Problem, noise: &[(Quantity, f64)]) -> f64 {
 
 const IDEAS: &[Idea] = &[
     Idea {
-        name: "the same inputs again, the other way round",
+        name: "the same inputs with the opposite sign",
         measured: same,
         change: |_| {},
         reversed: true,
         is_there: turns_round,
     },
     Idea {
-        name: "an encoder at the cart, as fine as the one there is (to 10 µm where there is none)",
+        name: "an encoder at the cart with the resolution of the present one (10 µm if there is none)",
         measured: |problem, noise| with(noise, Quantity::CartPosition, cart_noise(problem, noise)),
         change: |_| {},
         reversed: false,
         is_there: |problem| has(problem, Quantity::CartPosition),
     },
     Idea {
-        name: "the motor's current measured, to 1 % of its peak",
+        name: "the motor's current, measured to 1 % of its peak",
         measured: |problem, noise| with(noise, Quantity::MotorCurrent, 0.01 * peak_current(problem)),
         change: |_| {},
         reversed: false,
@@ -253,7 +253,7 @@ fn answer(problem: &Problem, idea: &Idea, measured: &[(Quantity, f64)], index: u
     Some(values)
 }
 
-/// Whether some log moves both ways.
+/// True if some log moves both ways.
 fn turns_round(problem: &Problem) -> bool {
     let (mut most, mut least) = (0.0_f64, 0.0_f64);
     for u in problem.runs.iter().flat_map(|run| run.logged.iter()) {
@@ -266,7 +266,7 @@ fn has(problem: &Problem, quantity: Quantity) -> bool {
     problem.quantities().contains(&quantity)
 }
 
-/// Whether the current is measured, or is what is fed in.
+/// True if the current is measured, or is what is fed in.
 fn knows_current(problem: &Problem) -> bool {
     has(problem, Quantity::MotorCurrent) || problem.machine.drives[0].amplifier.mode == AmplifierMode::Current
 }

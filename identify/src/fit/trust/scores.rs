@@ -14,7 +14,7 @@ pub struct LogFit {
     pub name: String,
     /// Which window of it.
     pub window: usize,
-    /// Whether none of it was fitted.
+    /// True if none of it was fitted.
     pub held_out: bool,
     /// Times, s.
     pub time: Vec<f64>,
@@ -26,7 +26,7 @@ pub struct LogFit {
     pub outputs: Vec<OutputFit>,
     /// The nuisances: name, value, standard error.
     pub extras: Vec<(Nuisance, f64, Option<f64>)>,
-    /// Whether the model reached the end of it.
+    /// True if the model reached the end of it.
     pub complete: bool,
 }
 
@@ -140,7 +140,7 @@ pub struct Together {
     pub logs: usize,
     /// The measured values.
     pub quantity: Quantity,
-    /// Whether this is what was not fitted.
+    /// True if this is what was not fitted.
     pub held_out: bool,
     /// Values compared.
     pub count: usize,

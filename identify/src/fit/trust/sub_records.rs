@@ -1,4 +1,4 @@
-//! Whether parts of the logs agree with the whole: errors of the model that no noise explains.
+//! Tests whether parts of the logs agree with the whole, beyond noise.
 //!
 //! A friction that drifts, or one of another law, leaves residuals that the parameters follow as far as they can: the
 //! estimates go where the integrated error is least, and noise says nothing of how far that is from the truth. So the

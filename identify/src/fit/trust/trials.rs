@@ -48,7 +48,7 @@ fn leave_motion(case: &Case, found: &Searched, log: &Log, note: &mut Note) {
     note.text = jumps_text(jumps, quantity.unit());
 }
 
-/// Whether the logs are met better with the log of this name as `remedy` has it; true where that cannot be said.
+/// True if the logs are met better with the log of this name as `remedy` has it; true where that cannot be said.
 pub(crate) fn is_borne_out(case: &Case, plan: &Plan, found: &Searched, name: &str, remedy: &Remedy) -> bool {
     // What was not fitted, or not to its end, says nothing.
     if found.problem.is_stopped() || !found.problem.runs.iter().any(|run| run.name == name) {

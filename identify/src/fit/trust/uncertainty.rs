@@ -40,7 +40,7 @@ pub(crate) struct Judged {
     pub spreads: Vec<Spread>,
     /// Parts of the logs that say otherwise.
     pub disagreement: Option<Disagreement>,
-    /// The law that the residuals speak for.
+    /// The law that the residuals suggest.
     pub other_law: Option<OtherLaw>,
     /// The element that the model lacks.
     pub cause: Option<Cause>,
@@ -152,21 +152,21 @@ impl Judged {
             }
         }
         let mut words = match told.is_empty() {
-            true => "which is as good as independent from sample to sample".to_string(),
-            false => format!("which is alike over time ({})", told.join(", ")),
+            true => "white".to_string(),
+            false => format!("correlated in time: {}", told.join(", ")),
         };
         for (spread, quantity) in self.spreads.iter().zip(&quantities).filter(|(spread, _)| spread.unevenness > 1.0) {
             words.push_str(&format!(
-                "; {} is {:.1} times larger in some places than in others",
+                "; {} is up to {:.1} times larger in some parts than in others",
                 quantity.name(),
                 spread.unevenness
             ));
         }
         for Wave { quantity, length, amplitude } in self.spreads.iter().flat_map(|spread| &spread.waves) {
             let (length, amplitude) = (shown(*length, quantity.unit()), shown(*amplitude, quantity.unit()));
-            words.push_str(&format!("; {} comes again by ±{amplitude} every {length}", quantity.name()));
+            words.push_str(&format!("; {} repeats by ±{amplitude} every {length}", quantity.name()));
         }
-        if words.contains("alike") || words.contains(';') {
+        if words.contains("correlated") || words.contains(';') {
             words.push_str(&format!(": errors are {:.1} times those of independent residuals", self.inflation));
         }
         words

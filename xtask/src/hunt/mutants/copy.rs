@@ -21,7 +21,7 @@ static ON: LazyLock<usize> =
 static REACHED: LazyLock<Option<(std::ffi::OsString, Vec<AtomicBool>)>> =
     LazyLock::new(|| Some((std::env::var_os("TAUT_REACHED")?, (0..100_000).map(|_| AtomicBool::new(false)).collect())));
 
-/// Whether it is this one.
+/// True if it is this one.
 pub fn on(k: usize) -> bool {
     if let Some((path, reached)) = &*REACHED
         && !reached[k].load(Ordering::Relaxed)

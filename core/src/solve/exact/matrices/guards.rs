@@ -87,7 +87,7 @@ impl<const N: usize> Watch<N> {
         self.row.value(z)
     }
 
-    /// Whether its value is zero but for rounding.
+    /// True if its value is zero but for rounding.
     pub(in crate::solve::exact) fn is_zero(&self, z: &[f64; N]) -> bool {
         self.value(z).abs() <= 2.0 * self.noise(z)
     }

@@ -18,7 +18,7 @@ pub(in crate::solve) struct Shown<const N: usize> {
     /// The norm dual to the energy, of what springs hold and speeds, and of currents.
     mechanical: Reading,
     magnetic: Reading,
-    /// The same for the stretches that no spring holds, per unit of √(2V) of ż: these move as the masses do.
+    /// Dual norms of elongations that no spring holds, per unit of √(2V) of ż: these move as the masses do.
     unsprung: Reading,
     /// Magnitudes of the coefficients of the inputs.
     input: [Reading; DRIVES],
@@ -75,7 +75,7 @@ impl<const N: usize> Shown<N> {
     }
 
     widest! {
-        /// The same in each of `rows`, added to `readings`.
+        /// Adds the reading of each of `rows` to `readings`.
         pub(in crate::solve) fn read_rows(&self, rows: &[[f64; N]], origin: &[f64; BODIES], readings: &mut Vec<Reading>)
             = read_rows_by_any, read_rows_by_avx2;
     }
@@ -88,7 +88,7 @@ impl<const N: usize> Shown<N> {
         }
     }
 
-    /// The same of a change of z.
+    /// Reading of a change of z.
     #[inline]
     pub(in crate::solve) fn change(&self, change: &[f64; N]) -> Reading {
         self.matrix.rate(change)

@@ -79,7 +79,7 @@ struct Follower<'t, const N: usize> {
     /// The number of the present mode among them.
     now: usize,
     series: Box<Series<N>>,
-    /// Whether it stands on a row or at a change of the input.
+    /// True if it stands on a row or at a change of the input.
     is_regular: bool,
     out: Sensitivities,
 }

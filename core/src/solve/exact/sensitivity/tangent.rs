@@ -40,7 +40,7 @@ pub(super) struct Varied {
     pub(super) machines: [Arc<Mechanism>; 2],
     pub(super) points: [Seen; 2],
     pub(super) weights: [f64; 3],
-    /// Whether the start alone differs, and so neither equations nor guards do.
+    /// True if the start alone differs, and so neither equations nor guards do.
     pub(super) is_start: bool,
 }
 
@@ -169,7 +169,7 @@ pub(super) struct Tangent {
 }
 
 impl Tangent {
-    /// That of a mode; none where an output is no straight function of z.
+    /// Tangent of a mode; none if an output is not linear in z.
     pub(super) fn new<const N: usize>(
         sloped: usize,
         mode: &Mode,
@@ -247,7 +247,7 @@ fn row<const N: usize>(seen: &Seen, mode: &Mode, output: Differentiated) -> Opti
     })
 }
 
-/// Whether two machines have the same parts, so that one has a derivative by what makes it the other.
+/// True if two machines have the same parts, so that one has a derivative by what makes it the other.
 pub(super) fn are_alike(a: &Seen, b: &Seen) -> bool {
     use std::mem::discriminant;
     let (own, other) = (&a.mechanism, &b.mechanism);

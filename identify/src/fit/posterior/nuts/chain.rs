@@ -62,7 +62,7 @@ struct Ended;
 /// A chain at its present draw.
 pub struct Chain<'a> {
     density: &'a LogDensity<'a>,
-    /// Whether to go on.
+    /// True if to go on.
     watch: &'a (dyn Fn() -> bool + 'a),
     random: Pcg64,
     /// L
@@ -70,7 +70,7 @@ pub struct Chain<'a> {
     /// ε
     pub step: f64,
     at: Point,
-    /// Whether the last path diverged.
+    /// True if the last path diverged.
     pub diverged: bool,
     /// Evaluations of the density so far.
     pub evaluations: u64,

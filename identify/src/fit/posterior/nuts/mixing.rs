@@ -1,4 +1,4 @@
-//! Whether chains of draws look alike, and how many independent draws they are worth: R̂ and the effective sample size
+//! Convergence of chains: R̂ and the effective sample size
 //! of Vehtari, Gelman, Simpson, Carpenter, Bürkner, "Rank-normalization, folding, and localization: An improved R̂",
 //! Bayesian Analysis 16 (2021).
 

@@ -62,7 +62,7 @@ pub struct Draws {
     pub divergences: u64,
     /// Evaluations of the density and its gradient.
     pub evaluations: u64,
-    /// Whether it was stopped before all draws were made.
+    /// True if it was stopped before all draws were made.
     pub interrupted: bool,
 }
 
@@ -84,7 +84,7 @@ pub fn sample(log: &LogDensity, starts: &[Vec<f64>], effort: Effort, watch: &Wat
     chains(starts, effort, watch, &|job, start, random| job.chain(log, start, random))
 }
 
-/// The same by a random walk, which needs no slopes: for densities with kinks.
+/// Samples by a random walk, which needs no gradients: for densities with kinks.
 pub fn walk(log: &Plain, starts: &[Vec<f64>], effort: Effort, watch: &Watch) -> Result<Draws> {
     chains(starts, effort, watch, &|job, start, random| walk::chain(job, log, start, random))
 }
@@ -146,7 +146,7 @@ struct Drawn {
 }
 
 impl Job<'_> {
-    /// Whether to go on.
+    /// True if to go on.
     fn goes_on(&self) -> bool {
         let goes_on = !self.stopped.load(Ordering::Relaxed) && (self.watch)(self.made.load(Ordering::Relaxed));
         if !goes_on {

@@ -33,11 +33,11 @@ pub(super) struct Extended {
     pub telling: Telling,
     /// The size of the element, where its parameter is not that by itself.
     pub size: Option<Measure>,
-    /// Whether the sensor is taken to be at the motor.
+    /// True if the sensor is taken to be at the motor.
     pub at_motor: bool,
 }
 
-/// What says whether the element is there.
+/// Evidence for an element.
 pub(super) enum Telling {
     /// The parameter of this name, which is zero, or stiff, where the element is not there.
     Parameter(String),
@@ -107,7 +107,7 @@ impl<'s, 'a> Site<'s, 'a> {
         })
     }
 
-    /// Whether a key of the case file is searched for, by itself or with others.
+    /// True if a key of the case file is searched for, by itself or with others.
     pub fn is_free(&self, key: &str) -> bool {
         self.found.problem.parameters.iter().flat_map(|own| &own.keys).any(|(own, _)| own == key)
     }

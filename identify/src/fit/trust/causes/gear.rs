@@ -40,7 +40,7 @@ impl Site<'_, '_> {
             .then_some((machine, true))
     }
 
-    /// Whether a rotor of its own can stand behind a gear: the case has neither that nor a belt that stretches.
+    /// True if a rotor of its own can stand behind a gear: the case has neither that nor a belt that stretches.
     fn is_stiff(&self) -> bool {
         self.machine.drives[0].motor.gear_play.is_none() && self.machine.belt.model == BeltModel::Rigid
     }
@@ -175,7 +175,7 @@ pub(super) fn play_words(_: &Site, extended: &Extended, found: &Fitted) -> Said 
     parted(extended, &found.machine, words)
 }
 
-/// The same with the share of the mass, the place of the sensor, and the keys that add it.
+/// Description of the gear with the split of the mass, the place of the sensor, and the keys to add.
 fn parted(extended: &Extended, machine: &Machine, mut words: String) -> Said {
     let r = machine.pulley_radius;
     let motor = &machine.drives[0].motor;

@@ -104,7 +104,7 @@ pub(crate) fn cause(
     None
 }
 
-/// Whether causes are looked for: the residuals are no white noise, and the fit is one of its kind.
+/// True if causes are looked for: the residuals are no white noise, and the fit is one of its kind.
 fn is_asked(case: &Case, plan: &Plan, found: &Searched, judged: &Judged) -> bool {
     let problem = &found.problem;
     judged.inflation >= COLOURED
@@ -154,7 +154,7 @@ fn predicts(site: &Site, tried: &Tried, stop: Option<Stop>) -> Option<[usize; 2]
     is_clear.then_some([better, gains.len()])
 }
 
-/// What is added to a covariance so that intervals contain values that are off by `shift` and have these errors.
+/// Covariance to add so that intervals contain estimates shifted by `shift` with these errors.
 fn widened(shift: &[f64], errors: &[f64]) -> DMatrix<f64> {
     let d = DVector::from_column_slice(shift);
     let own = DMatrix::from_diagonal(&DVector::from_iterator(errors.len(), errors.iter().map(|e| e * e)));

@@ -41,7 +41,7 @@ impl<'a> Tried<'a> {
         Some(Self { row, extended, problem, best })
     }
 
-    /// The same to its end.
+    /// Continues the fit to convergence.
     pub fn fitted(mut self) -> Option<Self> {
         let from = self.best.x.clone();
         self.best = descend(&mut self.problem, &from, TRIAL_FIT_ITERATIONS)?;
