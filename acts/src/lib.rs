@@ -137,6 +137,11 @@ pub fn pace(act: &str) -> Option<Pace> {
     ACTS.iter().find(|(name, _, _)| *name == act).map(|(_, pace, _)| *pace)
 }
 
+/// The names of all acts of this pace.
+pub fn names(pace: Pace) -> impl Iterator<Item = &'static str> {
+    ACTS.iter().filter(move |(_, own, _)| *own == pace).map(|(name, _, _)| *name)
+}
+
 /// The answer to an unknown act.
 pub fn unknown(act: &str) -> Reply {
     let names: Vec<&str> = ACTS.iter().map(|(name, _, _)| *name).collect();
@@ -156,7 +161,7 @@ pub fn answer(request: &Request, context: &Context) -> Reply {
 }
 
 /// The answer to a computation that panicked.
-fn defect() -> Reply {
+pub fn defect() -> Reply {
     let error = Error::new("this is a defect of taut: the computation broke off");
     Reply::error(&error.next("keep the case, and report it"))
 }

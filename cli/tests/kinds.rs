@@ -81,7 +81,7 @@ fn every_kind_goes_through_every_command() {
             let there = format!("{}/", folder.path().display());
             let options = options.iter().map(|option| match *option {
                 "there/" => there.as_str(),
-                "short fast" if case != axis => "square",
+                "short fast" if case != *axis => "square",
                 option => option,
             });
             let output = taut().args(&words).arg(case).args(options).output().unwrap();

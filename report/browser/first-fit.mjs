@@ -2,15 +2,16 @@
 //
 //   node first-fit.mjs BROWSER TAUT [--shots DIR]
 //
+// TAUT is the program, or the folder that `cargo xtask web` makes, which needs no server.
 // The log is data/pendulepi/february.csv, or in the folder that TAUT_DATA names. Between two steps a person looks and
 // reads; the times are those of the machine alone.
-import {existsSync} from "node:fs";
+import {existsSync, statSync} from "node:fs";
 import {loadavg} from "node:os";
 import {join} from "node:path";
 import {Harness, quiet, settled} from "./harness.mjs";
 
 const [program, taut, ...words] = process.argv.slice(2);
-const shots = words[0] === "--shots" ? words[1] : "";
+const shots = words[0] === "--shots" ? words[1] : "", isFolder = statSync(taut).isDirectory();
 const log = [process.env.TAUT_DATA, "data"].filter(Boolean).map(folder => join(folder, "pendulepi/february.csv")).find(existsSync);
 if (!log) { console.log("needs data/pendulepi/february.csv: cargo xtask data fetches it"); process.exit(1); }
 const harness = new Harness(program, taut);
@@ -18,10 +19,10 @@ await harness.start();
 const load = loadavg()[0], rows = [];
 let begun = performance.now();
 const step = (what, told) => { const now = performance.now(); rows.push([what, (now - begun) / 1000, told]); begun = performance.now(); };
-const {address} = await harness.serve([]);
+const {address} = isFolder ? await harness.serveFolder(taut) : await harness.serve([]);
 const {page} = await harness.open(address);
 const shot = name => (shots ? page.screenshot({path: join(shots, `first-fit-${name}.png`), fullPage: true}) : null);
-step("`taut studio`: the page opens with a case to start from", await page.title());
+step(`${isFolder ? "The address of the folder" : "`taut studio`"}: the page opens with a case to start from`, await page.title());
 
 await page.click("#go-gallery");
 await page.locator(".gallery button", {hasText: "pendulepi/pendulepi.toml"}).click();

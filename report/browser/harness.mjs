@@ -1,6 +1,15 @@
 // Parts that scripts which use the studio in a browser have in common: servers, pages whose console is watched, tests.
 import {spawn} from "node:child_process";
+import {readFileSync} from "node:fs";
+import {createServer} from "node:http";
+import {extname, join} from "node:path";
 import {chromium} from "playwright-core";
+
+/** The folder that a server of files presents the studio in: not the top. */
+export const UNDER = "/lessons/belt/";
+
+/** Types that a server of files knows: it need not know what WebAssembly is. */
+const TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml"};
 
 /** Servers, a browser and tests of a program. */
 export class Harness {
@@ -22,6 +31,23 @@ export class Harness {
     this.servers.push(child);
     const address = await new Promise(done => child.stdout.once("data", data => done(String(data).split("\n")[0])));
     return {child, address};
+  }
+
+  /** A server of the files of a folder and of more, by their names; and the requests that it received. */
+  async serveFolder(folder, more = {}) {
+    const asked = [];
+    const content = path => { try { return more[path] || readFileSync(join(folder, path)); } catch { return null; } };
+    const server = createServer(({method, url}, response) => {
+      asked.push(`${method} ${url}`);
+      const path = url.startsWith(UNDER) ? url.slice(UNDER.length) || "index.html" : "";
+      const found = method === "GET" && /^[a-z-]+\.[a-z]+$/.test(path) ? content(path) : null;
+      response.writeHead(found ? 200 : 404, {"Content-Type": (found && TYPES[extname(path)]) || "application/octet-stream"});
+      response.end(found || "");
+    });
+    await new Promise(done => server.listen(0, "127.0.0.1", done));
+    // The server ends with the script.
+    server.unref();
+    return {address: `http://127.0.0.1:${server.address().port}${UNDER}`, asked};
   }
 
   /** A page of it; what its console says, and what it asks of others, is trouble. */

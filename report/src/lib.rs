@@ -40,6 +40,7 @@ mod picture;
 pub mod plan;
 mod plane;
 mod plot;
+#[cfg(feature = "png")]
 mod raster;
 pub mod shape;
 pub mod show;
@@ -55,6 +56,7 @@ pub use figure::{Axis, Figure, Marker, Panel, Series, Style};
 pub use page::{Callout, Cell, Page, Table};
 pub use picture::Picture;
 pub use plane::{Map, Plane};
+#[cfg(feature = "png")]
 pub use raster::png;
 pub use svg::Colour;
 

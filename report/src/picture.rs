@@ -1,10 +1,6 @@
 //! Whatever can be drawn: a figure over one axis, a plane, a drawing.
 
-use super::{Figure, Plane, png};
-use taut::error::Result;
-
-/// Pixels of a PNG for each of the SVG's: sharp on paper and on dense screens.
-const SCALE: f32 = 2.0;
+use super::{Figure, Plane};
 
 /// One picture of a report.
 #[derive(Debug, Clone)]
@@ -25,15 +21,6 @@ impl Picture {
             Self::Plane(plane) => plane.svg(),
             Self::Drawing(svg) => svg.clone(),
         }
-    }
-
-    /// The picture as a PNG, at twice the size on white.
-    ///
-    /// # Errors
-    ///
-    /// A picture of more than 16384 pixels to a side.
-    pub fn png(&self) -> Result<Vec<u8>> {
-        png(&self.svg(), SCALE)
     }
 }
 

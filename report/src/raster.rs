@@ -1,9 +1,13 @@
 //! SVG to PNG with a font of our own, so that the picture does not depend on the machine.
 
+use super::Picture;
 use resvg::tiny_skia::{Color, Pixmap, Transform};
 use resvg::usvg::{Options, Tree, fontdb};
 use std::sync::{Arc, LazyLock};
 use taut::error::{Error, Result};
+
+/// Pixels of a PNG for each of the SVG's: sharp on paper and on dense screens.
+const SCALE: f32 = 2.0;
 
 /// Noto Sans, regular and bold (SIL Open Font Licence 1.1), from the crate `notosans`.
 static FONTS: LazyLock<Arc<fontdb::Database>> = LazyLock::new(|| {
@@ -20,6 +24,17 @@ static FONTS: LazyLock<Arc<fontdb::Database>> = LazyLock::new(|| {
     }
     Arc::new(fonts)
 });
+
+impl Picture {
+    /// The picture as a PNG, at twice the size on white.
+    ///
+    /// # Errors
+    ///
+    /// A picture of more than 16384 pixels to a side.
+    pub fn png(&self) -> Result<Vec<u8>> {
+        png(&self.svg(), SCALE)
+    }
+}
 
 /// Rasterises `svg` on white, `scale` pixels per SVG pixel, at most 16384 pixels a side.
 pub fn png(svg: &str, scale: f32) -> Result<Vec<u8>> {

@@ -1,6 +1,6 @@
 // @ts-check
 // Cases that were left for another one, so that nobody's work is lost: they stand in the menu, and the browser keeps
-// them, and the one that is shown, until the tab is closed.
+// them, and the one that is shown, until the tab is closed. A page in a frame of another shows its case each time anew.
 import {element} from "./format.js";
 
 /** @typedef {import("./app.js").App} App */
@@ -9,6 +9,8 @@ import {element} from "./format.js";
 const KEY = "cases";
 /** Time between a change and its being kept, ms: a drag changes the text with every picture. */
 const LATER = 300;
+/** True in a frame: several frames of a tab would take each other's cases. */
+const isFramed = window !== window.top;
 
 export class Cases {
   /** @param {HTMLElement} list of the menu, after its heading @param {App} app */
@@ -20,6 +22,7 @@ export class Cases {
     this.timer = 0;
     app.on("leave", () => this.leave());
     app.on("opened", () => this.show());
+    if (isFramed) return;
     app.on("text", () => { if (!this.timer) this.timer = setTimeout(() => this.keep(), LATER); });
     addEventListener("pagehide", () => this.keep());
     addEventListener("beforeunload", event => { if (app.isUnsaved || this.left.some(one => one.isUnsaved)) event.preventDefault(); });
@@ -60,6 +63,7 @@ export class Cases {
   keep() {
     clearTimeout(this.timer);
     this.timer = 0;
+    if (isFramed) return;
     const {app} = this, bare = one => ({...one, past: [], future: []});
     try {
       if (!app.isUnsaved && !this.left.length) sessionStorage.removeItem(KEY);
@@ -70,6 +74,7 @@ export class Cases {
   /** Takes what was kept back. @param {string} path of the case that can be saved
    * @returns {Case | null} the case that was shown, unless the address is another now */
   restore(path) {
+    if (isFramed) return null;
     try {
       const {hash, shown, left} = JSON.parse(sessionStorage.getItem(KEY) || "null") || {shown: null, left: []};
       for (const one of [shown, ...left]) if (one && one.path !== path) one.path = "";

@@ -1,11 +1,11 @@
 // @ts-check
-// A place to drop files on, or to choose them; they go to this computer's own server.
+// A place to drop files on, or to choose them; they stay on this computer.
 import {element} from "./format.js";
 
 const MOST = 64 << 20;
 
-/** @param {{id: string, words: string, accept: string, many?: boolean, take: (files: {name: string, path: string}[]) => void, failed: (error: Error) => void}} options */
-export function dropPlace({id, words, accept, many, take, failed}) {
+/** @param {{id: string, words: string, accept: string, many?: boolean, take: (files: {name: string, path: string}[]) => void, failed: (error: Error) => void, wire: import("./wire.js").Wire}} options */
+export function dropPlace({id, words, accept, many, take, failed, wire}) {
   const input = element("input", {type: "file", id, accept, multiple: many || null, onchange: () => { send([...input.files]); }});
   const told = element("span", {class: "quiet", role: "status"});
   const place = element("label", {class: "drop", for: id}, element("strong", {}, words), element("span", {class: "quiet"}, "Drop here, or choose. Files stay on this computer."), input, told);
@@ -24,9 +24,7 @@ export function dropPlace({id, words, accept, many, take, failed}) {
       for (const file of many ? files : files.slice(0, 1)) {
         if (file.size > MOST) throw new Error(`${file.name} has ${Math.round(file.size / 1048576)} MB; a file may have 64 MB`);
         told.textContent = `Sending ${file.name}…`;
-        const answer = await fetch(`/upload?name=${encodeURIComponent(file.name)}`, {method: "POST", body: file});
-        if (!answer.ok) throw new Error((await answer.text()).trim());
-        sent.push({name: file.name, path: (await answer.json()).path});
+        sent.push({name: file.name, path: await wire.upload(file)});
       }
       told.textContent = sent.map(file => file.name).join(", ");
       input.value = "";

@@ -51,7 +51,7 @@ class Logs {
       element("h2", {}, "From a log to a model"),
       element("p", {class: "quiet"}, "The case says what the machine is; a log of it says how it moved. The fit changes the chosen parameters until the model moves as the log does."),
       element("h3", {}, "1. Logs"),
-      dropPlace({id: "log-file", words: "CSV, MATLAB or Parquet files of a recorder", accept: ".csv,.txt,.tsv,.mat,.parquet,.log,.gz", many: true, take: files => this.take(files), failed: error => this.tell(error)}),
+      dropPlace({id: "log-file", words: "CSV, MATLAB or Parquet files of a recorder", accept: ".csv,.txt,.tsv,.mat,.parquet,.log,.gz", many: true, take: files => this.take(files), failed: error => this.tell(error), wire: app.wire}),
       this.own, this.list,
       element("h3", {}, "2. What is searched for"), this.plan,
       element("h3", {}, "3. Check and fit"),

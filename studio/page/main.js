@@ -37,7 +37,7 @@ app.notify = (text, isGrave = false) => {
 app.wire.changed = isOpen => {
   if (isOpen) { if (find("notice").dataset.gone) { delete find("notice").dataset.gone; find("notice").hidden = true; } return; }
   find("notice").dataset.gone = "1";
-  app.notify("The server does not answer any more: start taut studio again. The text of this page is still here to be downloaded.", true);
+  app.notify(app.wire.carrier.words.gone, true);
 };
 
 // ---- Views
@@ -123,10 +123,10 @@ act("link", async () => {
   const hash = await fragment(app.snapshot());
   history.replaceState(null, "", hash);
   try { await navigator.clipboard.writeText(location.href); } catch { /* it stands in the address bar */ }
-  app.notify("The address of this page holds this state now. Open it elsewhere with: taut studio LINK");
+  app.notify(app.wire.carrier.words.link);
 });
 // A page that knows its opener would have the cases that were left here as its own.
-act("tab", async () => { window.open("/" + (await fragment(app.snapshot())), "_blank", "noopener"); });
+act("tab", async () => { window.open(location.pathname + (await fragment(app.snapshot())), "_blank", "noopener"); });
 find("file").addEventListener("change", async () => {
   const [file] = find("file").files;
   if (!file) return;

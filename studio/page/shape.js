@@ -17,7 +17,7 @@ export function mount(root, app) {
   let files = [];
   root.append(element("h2", {}, "Input shapers for what vibrates"),
     element("p", {class: "quiet"}, "A spectrum or the samples of an accelerometer, as printers' firmware writes them. Two files are compared: before and after."),
-    dropPlace({id: "spectrum-file", words: "One spectrum, or two", accept: ".csv,.txt", many: true, take: sent => { files = sent.slice(0, 2); again(); }, failed: error => tell(error)}),
+    dropPlace({id: "spectrum-file", words: "One spectrum, or two", accept: ".csv,.txt", many: true, take: sent => { files = sent.slice(0, 2); again(); }, failed: error => tell(error), wire: app.wire}),
     element("p", {class: "fields"}, element("label", {for: "shape-axis"}, "Axis of the accelerometer: ", axis)), told, trouble, body);
 
   function tell(error) { trouble.hidden = !error; trouble.textContent = error ? wordsOf(error) : ""; }

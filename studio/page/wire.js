@@ -1,5 +1,13 @@
 // @ts-check
-// The conversation with the server: requests go out as JSON, answers come back as frames of a JSON head and columns.
+// The conversation with what computes: requests go out as JSON, answers come back as frames of a JSON head and columns.
+// A carrier takes them there and back: a socket to the server that served the page, or workers of the browser.
+import {Socket} from "./socket.js";
+import {Workers} from "./workers.js";
+
+/** What a carrier does: `ready` when it can send.
+ * @typedef {{ready: Promise<void>, send: (request: {id: number}) => void, upload: (file: File) => Promise<string>, words: Words}} Carrier */
+/** What the page says of it.
+ * @typedef {{gone: string, link: string}} Words */
 
 /**
  * @typedef {Object} Answer
@@ -7,7 +15,7 @@
  * @property {Map<string, Float64Array>} columns
  */
 
-/** A mistake that the server found, with its place in the case.
+/** A mistake that was found, with its place in the case.
  * @property {any} mistake */
 export class Mistake extends Error {
   /** @param {any} mistake */
@@ -43,29 +51,25 @@ export class Wire {
     this.lanes = new Map();
     /** @type {(isOpen: boolean) => void} */
     this.changed = () => {};
-    /** @type {Promise<WebSocket>} */
-    this.socket = this.connect();
+    /** A page that needs no server says so. @type {Carrier} */
+    this.carrier = document.querySelector("meta[name=carrier][content=workers]") ? new Workers(this) : new Socket(this);
   }
 
   /** Whether an answer is to come. */
   get isBusy() { return this.open.size > 0 || [...this.lanes.values()].some(lane => lane.busy); }
 
-  /** @returns {Promise<WebSocket>} */
-  connect() {
-    return new Promise((done, failed) => {
-      const socket = new WebSocket(`ws://${location.host}/socket`);
-      socket.binaryType = "arraybuffer";
-      socket.onopen = () => { this.changed(true); done(socket); };
-      socket.onmessage = event => this.take(unpack(event.data));
-      socket.onclose = () => {
-        failed(new Error("the server has ended"));
-        for (const {failed: fail} of this.open.values()) fail(new Error("the server has ended"));
-        this.open.clear();
-        this.changed(false);
-        // It may have been this computer that slept.
-        setTimeout(() => { this.socket = this.connect(); this.socket.catch(() => {}); }, 3000);
-      };
-    });
+  /** What was asked for is answered no more. @param {string} why */
+  lose(why) {
+    for (const {failed} of this.open.values()) failed(new Error(why));
+    this.open.clear();
+    this.changed(false);
+  }
+
+  /** Takes a frame. @param {ArrayBuffer} buffer @returns {any} its head */
+  receive(buffer) {
+    const answer = unpack(buffer);
+    this.take(answer);
+    return answer.head;
   }
 
   /** @param {Answer} answer */
@@ -84,15 +88,18 @@ export class Wire {
    * @returns {Promise<Answer> & {id: number}} */
   ask(act, body = {}, progress = undefined) {
     const id = ++this.last;
-    const answer = this.socket.then(socket => new Promise((done, failed) => {
+    const answer = this.carrier.ready.then(() => new Promise((done, failed) => {
       this.open.set(id, {done, failed, progress});
-      socket.send(JSON.stringify({id, do: act, ...body}));
+      this.carrier.send({id, do: act, ...body});
     }));
     return Object.assign(answer, {id});
   }
 
   /** Stops long work. @param {number} id */
   cancel(id) { return this.ask("cancel", {of: id}); }
+
+  /** Sends a file. @param {File} file @returns {Promise<string>} the path that acts know it by */
+  upload(file) { return this.carrier.upload(file); }
 
   /** Asks for the newest of a kind alone: what is asked for while another of its kind is under way waits, and only the
    * last that waits is asked for. So the last picture is always of the last value.

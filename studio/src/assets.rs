@@ -39,22 +39,41 @@ const ASSETS: &[Asset] = page![
     "plots.js": SCRIPT,
     "shape.js": SCRIPT,
     "stage.js": SCRIPT,
+    "socket.js": SCRIPT,
     "sweep.js": SCRIPT,
     "tour.js": SCRIPT,
     "tune.js": SCRIPT,
     "wire.js": SCRIPT,
+    "worker.js": SCRIPT,
+    "workers.js": SCRIPT,
 ];
+
+/// The files that the report's style and script are served as.
+const REPORT: [&str; 2] = ["/report.css", "/report.js"];
+
+/// The paths of all files.
+pub fn paths() -> impl Iterator<Item = &'static str> {
+    ASSETS.iter().map(|(path, _, _)| *path).chain(REPORT)
+}
+
+/// Type and content of the file at a path.
+pub fn file(path: &str) -> Option<(&'static str, String)> {
+    let [style, script] = REPORT;
+    match path {
+        path if path == style => Some((CSS, taut_report::page::style())),
+        path if path == script => Some((SCRIPT, taut_report::page::script())),
+        path => {
+            let found = ASSETS.iter().find(|(known, _, _)| *known == path);
+            found.map(|(_, kind, content)| (*kind, (*content).to_string()))
+        }
+    }
+}
 
 /// The file at a path; `/` is the page itself.
 pub async fn serve(uri: Uri) -> Response {
     let path = if uri.path() == "/" { "/index.html" } else { uri.path() };
-    let found = ASSETS.iter().find(|(known, _, _)| *known == path);
-    let (status, kind, content) = match found {
-        Some((_, kind, content)) => {
-            (StatusCode::OK, *kind, from_folder(path).unwrap_or_else(|| (*content).to_string()))
-        }
-        None if path == "/report.css" => (StatusCode::OK, CSS, taut_report::page::style()),
-        None if path == "/report.js" => (StatusCode::OK, SCRIPT, taut_report::page::script()),
+    let (status, kind, content) = match file(path) {
+        Some((kind, content)) => (StatusCode::OK, kind, from_folder(path).unwrap_or(content)),
         None => {
             (StatusCode::NOT_FOUND, HTML, "<!DOCTYPE html><title>taut studio</title><p>There is no such page.\n".into())
         }

@@ -14,6 +14,10 @@ use axum::middleware::Next;
 use axum::response::Response;
 use std::sync::Arc;
 
+/// The Content-Security-Policy of the page with and without the server.
+pub const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; \
+                          base-uri 'none'; form-action 'none'";
+
 /// Lets a request through, exchanges a token, or refuses.
 pub async fn check(Shared(state): Shared<Arc<State>>, request: Request, next: Next) -> Response {
     let mut response = judge(&state, request, next).await;
@@ -81,11 +85,8 @@ fn refused(why: &str) -> Response {
 
 /// The headers of every answer.
 fn protect(headers: &mut HeaderMap, keys: &Keys) {
-    let policy = format!(
-        "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; connect-src 'self' \
-         ws://127.0.0.1:{0} ws://localhost:{0}; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
-        keys.port
-    );
+    let sockets = format!("connect-src 'self' ws://127.0.0.1:{0} ws://localhost:{0}", keys.port);
+    let policy = format!("{POLICY}; {sockets}; frame-ancestors 'none'");
     let mut set = |name: HeaderName, value: &str| {
         if let Ok(value) = HeaderValue::from_str(value) {
             headers.insert(name, value);

@@ -1,7 +1,7 @@
 //! Reports in a browser: made with the program, opened and used in headless Chromium by `report/browser/check.mjs`; and
-//! the studio, by the scripts `studio*.mjs` beside it.
+//! the studio, by the scripts `studio*.mjs` beside it, and `web.mjs` without a server.
 
-use crate::Counts;
+use crate::{Counts, web};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -11,6 +11,9 @@ pub const FOLDER: &str = "report/browser";
 
 /// The name of these tests where they cannot be done.
 const NAME: &str = "reports in a browser";
+
+/// The name of the tests of the studio without a server.
+const WITHOUT_SERVER: &str = "the studio without a server, in a browser";
 
 /// Spectra as printers name them: with such names a page scrolled sideways.
 const SPECTRA: [&str; 2] =
@@ -76,7 +79,7 @@ pub fn test(counts: &mut Counts) -> Result<bool, String> {
     let mut check = Command::new("node");
     check.arg(Path::new(FOLDER).join("check.mjs")).arg(&browser).arg(&reports).arg(&shots);
     let looked = crate::run(check, counts)?;
-    let studio = studio(&taut, &browser, &shots, counts)?;
+    let studio = studio(&taut, &browser, &shots, counts)? & without_server(&taut, &browser, &shots, counts)?;
     println!("pictures of all pages: {}", shots.display());
     Ok(looked && studio)
 }
@@ -92,6 +95,22 @@ fn studio(taut: &Path, browser: &Path, shots: &Path, counts: &mut Counts) -> Res
         passed &= crate::run(node, counts)?;
     }
     Ok(passed)
+}
+
+/// The studio as a folder of files. If its module cannot be built here, the tests are ignored even where all tests are
+/// required: fetching a compiler is the job of `cargo xtask web`.
+fn without_server(taut: &Path, browser: &Path, shots: &Path, counts: &mut Counts) -> Result<bool, String> {
+    let folder = web::default_folder();
+    match web::compiler_for_tests() {
+        Ok(compiler) => web::make(&folder, &compiler)?,
+        Err(needs) => {
+            counts.left_out.push(format!("{WITHOUT_SERVER}: needs {needs}"));
+            return Ok(true);
+        }
+    };
+    let mut node = Command::new("node");
+    node.arg(Path::new(FOLDER).join("web.mjs")).arg(browser).arg(taut).arg(folder).arg(shots);
+    crate::run(node, counts)
 }
 
 /// A spectrum with a peak there, and a smaller one above it, as Klipper writes them.

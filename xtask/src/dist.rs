@@ -13,9 +13,7 @@ pub fn run(words: &[&str]) -> Result<(), String> {
     if !words.is_empty() {
         return Err(format!("dist takes no words; usage: {USAGE}"));
     }
-    let folders = folders()?;
-    let flag = |(folder, name): &(PathBuf, &str)| format!("--remap-path-prefix={}={name}", folder.display());
-    let flags: Vec<String> = folders.iter().map(flag).collect();
+    let (folders, flags) = (folders()?, flags()?);
     // Other flags than those of daily work: a folder of its own keeps either from being built anew each time.
     let target = crate::python::target().join("dist-build");
     let mut build = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
@@ -37,6 +35,12 @@ pub fn run(words: &[&str]) -> Result<(), String> {
         [] => Ok(()),
         found => Err(format!("{} holds paths of this machine: {}", program.display(), found.join(", "))),
     }
+}
+
+/// Compiler flags that replace these folders.
+pub fn flags() -> Result<Vec<String>, String> {
+    let flag = |(folder, name): &(PathBuf, &str)| format!("--remap-path-prefix={}={name}", folder.display());
+    Ok(folders()?.iter().map(flag).collect())
 }
 
 /// Folders of this machine that may be in a program, and what stands for them; of several that fit, the last one counts.

@@ -5,7 +5,8 @@
 //! `cargo xtask hunt` looks for what is wrong with larger means, `cargo xtask coverage` and `cargo xtask faults` make
 //! the tables of docs/fit.md, `cargo xtask counts` counts the instructions of standard works, `cargo xtask fmu` calls the
 //! functions of FMI at random under address sanitizer, `cargo xtask drag`, `cargo xtask load` and `cargo xtask first-fit`
-//! measure the studio, `cargo xtask book` builds the documents as a book and checks its links.
+//! measure the studio, `cargo xtask web` makes a folder of it that needs no server, `cargo xtask book` builds the
+//! documents as a book and checks its links.
 
 mod bad;
 mod book;
@@ -19,6 +20,7 @@ mod hunt;
 mod ignored;
 mod python;
 mod studio;
+mod web;
 
 use ignored::Ignored;
 use std::io::{BufRead, BufReader};
@@ -99,6 +101,7 @@ fn main() -> ExitCode {
         ["book", ref words @ ..] => book::run(words),
         ["data", ref words @ ..] => data::run(words),
         ["dist", ref words @ ..] => dist::run(words),
+        ["web", ref words @ ..] => web::run(words),
         ["counts", ref words @ ..] => counts::run(words),
         ["fmu", ref words @ ..] => fmu::run(words),
         ["drag", ref words @ ..] => studio::drag(words),
@@ -117,9 +120,10 @@ fn main() -> ExitCode {
             eprintln!(
                 "usage: cargo xtask test | cargo xtask bad | cargo xtask browser | cargo xtask export | \
                  cargo xtask python | cargo xtask coverage [...] | cargo xtask faults [...] | \
-                 {} | {} | {} | {} | {} | {} | {} | {} | {}",
+                 {} | {} | {} | {} | {} | {} | {} | {} | {} | {}",
                 book::USAGE,
                 dist::USAGE,
+                web::USAGE,
                 counts::USAGE,
                 studio::FIRST_FIT,
                 studio::DRAG,

@@ -4,8 +4,10 @@ mod batch;
 mod claim;
 mod csv;
 mod inputs;
+pub mod memory;
 #[cfg(feature = "parquet")]
 mod parquet;
+#[cfg(not(target_family = "wasm"))]
 mod reading;
 mod replacing;
 mod temporary;
@@ -15,9 +17,12 @@ pub use batch::{Batch, MARKER, shown};
 pub use claim::{Claim, Refusal};
 pub use csv::CsvWriter;
 pub use inputs::Inputs;
+#[cfg(target_family = "wasm")]
+pub use memory::{Source, open, read};
 #[cfg(feature = "parquet")]
 pub use parquet::ParquetWriter;
-pub use reading::{open, read};
+#[cfg(not(target_family = "wasm"))]
+pub use reading::{Source, open, read};
 pub use temporary::remove_abandoned;
 pub use unfinished::abandon;
 
@@ -79,10 +84,11 @@ impl Draft {
 
     /// Gives the file its name.
     pub fn finish(mut self) -> Result<()> {
-        let file = self.file.take();
+        let mut file = self.file.take();
         // Closed later, so that it is locked until it has its name; but some systems do not rename an open file.
-        #[cfg(not(unix))]
-        let file = drop(file);
+        if cfg!(not(unix)) {
+            file = None;
+        }
         let renamed = unfinished::complete(&self.temporary, || {
             let renamed = fs::rename(&self.temporary, &self.target);
             if renamed.is_err() {
@@ -90,7 +96,6 @@ impl Draft {
             }
             renamed
         });
-        #[allow(clippy::drop_non_drop)]
         drop(file);
         renamed.map_err(|e| cannot_write(&self.path, &e))
     }

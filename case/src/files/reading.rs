@@ -9,6 +9,9 @@ use std::time::{Duration, Instant};
 /// Longest wait for the next byte of a pipe.
 const PATIENCE: Duration = Duration::from_secs(5);
 
+/// An open file.
+pub type Source = File;
+
 /// Opens a regular file, and nothing else: a named pipe, a socket or a device is an error of kind `InvalidInput`.
 pub fn open(path: impl AsRef<Path>) -> io::Result<File> {
     let file = open_anything(path.as_ref())?;

@@ -43,6 +43,7 @@ pub(super) fn like(old: &Path, path: &Path) -> io::Result<File> {
         let file = options.open(path)?;
         return kept.give(&file).map(|()| file);
     }
+    let _ = old;
     options.open(path)
 }
 

@@ -114,6 +114,6 @@ mod parquet {
     fn refused(file: &Path) -> Error {
         Error::new("this is a Parquet file, and this build of the program does not read them")
             .in_file(file)
-            .next("build it with the feature `parquet`, or export the data as CSV")
+            .next("export the data as CSV, or use `taut` itself, which reads them if built with the feature `parquet`")
     }
 }

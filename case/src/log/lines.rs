@@ -1,7 +1,7 @@
 //! The lines of a text file, one at a time and of bounded length, and their fields.
 
 use crate::error::{Error, Place, Result};
-use std::fs::File;
+use crate::files::Source;
 use std::io::{self, BufRead, BufReader, Read};
 use std::ops::Range;
 use std::path::Path;
@@ -246,7 +246,7 @@ fn too_many_columns<R: BufRead>(lines: &Lines<'_, R>) -> Error {
     lines.error(what).allowed("at most 10,000 columns").next("keep only the columns you need; samples go down, in rows")
 }
 
-pub(super) fn open(file: &Path) -> Result<BufReader<File>> {
+pub(super) fn open(file: &Path) -> Result<BufReader<Source>> {
     Ok(BufReader::with_capacity(1 << 16, crate::files::open(file).map_err(|error| unreadable(file, &error))?))
 }
 
@@ -263,6 +263,7 @@ pub(super) fn unreadable(file: &Path, error: &io::Error) -> Error {
         io::ErrorKind::PermissionDenied => ("you may not read this file".into(), "check its permissions"),
         io::ErrorKind::IsADirectory => ("this is a folder, not a file".into(), "name a file in it"),
         io::ErrorKind::InvalidInput => (error.to_string(), "write what it holds to a file, and name that"),
+        io::ErrorKind::Unsupported => (error.to_string(), "drop the file on the page"),
         _ => (format!("the file cannot be read: {error}"), "check the disk or the connection to it"),
     };
     Error::new(what).in_file(file).next(next)

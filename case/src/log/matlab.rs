@@ -10,8 +10,8 @@ use super::lines::unreadable;
 use super::sheet::{ColumnId, Request, Sheet};
 use super::words::{near, shown};
 use crate::error::{Error, Result};
+use crate::files::Source;
 use flate2::read::ZlibDecoder;
-use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
 
@@ -280,7 +280,7 @@ impl Variable {
 
 /// The file, of which only what is wanted is unpacked.
 struct Input {
-    file: BufReader<File>,
+    file: BufReader<Source>,
     length: u64,
     big: bool,
 }
@@ -289,7 +289,7 @@ impl Input {
     fn open(file: &Path) -> Result<Self> {
         let open = || {
             let mut input = BufReader::new(crate::files::open(file)?);
-            let length = input.get_ref().metadata()?.len();
+            let length = input.seek(SeekFrom::End(0))?;
             input.seek(SeekFrom::Start(126))?;
             let mut order = [0; 2];
             input.read_exact(&mut order)?;
