@@ -81,6 +81,7 @@ pub(super) fn motor(table: &Table) -> Result<Motor> {
         gear_efficiency: table.number("gear_efficiency")?,
         gear_play: gear_play(table)?,
         is_simple: false,
+        stepper: None,
     })
 }
 

@@ -140,6 +140,8 @@ pub(super) fn piecewise_linear(mechanism: &Mechanism) -> Result<()> {
         format!("the {}'s friction changes along the travel", body.label.name)
     } else if mechanism.springs.iter().any(|spring| spring.follows.is_some()) {
         "the belt's spans follow the cart".into()
+    } else if mechanism.drives.iter().any(|drive| drive.motor.stepper.is_some()) {
+        "the torque of a stepper goes with the sine of its angle".into()
     } else {
         return Ok(());
     };
@@ -165,6 +167,11 @@ pub(super) fn fastest_rate(mechanism: &Mechanism) -> f64 {
             emf.abs() / (motor.resistance * shaft)
         });
         fastest = fastest.max(2.0 * PI * drive.amplifier.bandwidth.unwrap_or(0.0));
+        if let Some(stepper) = &motor.stepper {
+            // The rotor on its field, and on its detents
+            let stiffness = motor.holding_torque().unwrap_or(0.0) + 4.0 * stepper.detent_torque;
+            fastest = fastest.max((stepper.teeth() * stiffness / shaft).sqrt());
+        }
     }
     for (index, body) in mechanism.bodies.iter().enumerate() {
         let (mut stiffness, mut damping) = (0.0, 0.0);

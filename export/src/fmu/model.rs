@@ -395,6 +395,7 @@ fn push(body: usize) -> Drive {
         gear_efficiency: 1.0,
         gear_play: None,
         is_simple: true,
+        stepper: None,
     };
     let amplifier = Amplifier::ideal(AmplifierMode::Current, 1.0);
     Drive { label, voltage: label, current: label, pulley: body, shaft: body, motor, amplifier }

@@ -82,7 +82,7 @@ impl Core {
         // The forces begin anew with each mode.
         let mut guess = Guess::Constant;
         let mut forces = [0.0; SOURCES];
-        field.forces(&self.y, &mut forces);
+        field.forces(&stretch.input(self.tau), &self.y, &mut forces);
         room.begin(&forces);
         let mut hit = None;
         while hit.is_none() && self.rules.trouble.is_none() {
@@ -152,7 +152,7 @@ impl Core {
                             model.mechanism.followers(leader).for_each(|body| self.y[model.speed(body)] = 0.0);
                         }
                         let mut forces = [0.0; SOURCES];
-                        field.forces(&self.y, &mut forces);
+                        field.forces(&stretch.input(self.tau), &self.y, &mut forces);
                         room.begin(&forces);
                         *guess = Guess::Constant;
                     }
