@@ -154,6 +154,12 @@ impl Mechanism {
         Some(stepper.microstep() / self.angle_per_input(drive))
     }
 
+    /// The farthest that the command of a stepper may jump, m: two full steps, half a tooth pitch.
+    pub fn farthest_jump(&self, drive: usize) -> Option<f64> {
+        let stepper = self.drives[drive].motor.stepper?;
+        Some(PI / stepper.teeth() / self.angle_per_input(drive).abs())
+    }
+
     /// By how much the rotor of a stepper is behind what it is told, rad.
     fn lag(&self, drive: usize) -> Option<Form> {
         let (spring, at) = self.angle_of(drive)?;

@@ -215,6 +215,20 @@ pub(super) fn course(mechanism: &Mechanism, course: &Course) -> Result<()> {
     state(&course.start)
 }
 
+/// Refuses commands of steppers that jump farther than a rotor follows, from where it begins on.
+fn commands(mechanism: &Mechanism, course: &Course) -> Result<()> {
+    for (number, (drive, input)) in mechanism.drives.iter().zip(&course.inputs).enumerate() {
+        let Some(most) = mechanism.farthest_jump(number) else { continue };
+        let begin = course.start.position[drive.shaft] / mechanism.angle_per_input(number);
+        if let Some((time, jump)) = input.first_jump(begin, most, course.until) {
+            return Err(Error::new(format!("the command of the stepper jumps by {jump} m at {time} s"))
+                .allowed(format!("up to {most} m at once, two full steps: a rotor does not follow more"))
+                .next("begin where the rotor is, and let the command grow"));
+        }
+    }
+    Ok(())
+}
+
 /// Refuses a state that is none.
 pub(super) fn state(start: &State) -> Result<()> {
     match start.position.iter().chain(&start.speed).chain(&start.current).find(|value| !value.is_finite()) {
@@ -243,6 +257,7 @@ pub(super) fn experiment(mechanism: &Mechanism, experiment: &Experiment) -> Resu
     state(&experiment.initial)?;
     let begun = Course::of(mechanism, experiment);
     course(mechanism, &begun)?;
+    commands(mechanism, &begun)?;
     // What moves as one begins as one.
     let state = begun.start;
     for body in 0..mechanism.bodies.len() {
