@@ -125,6 +125,7 @@ impl System {
         let input = |(at, unit): (&crate::machine::DriveAt, &crate::machine::DriveUnit)| match unit.amplifier.mode {
             AmplifierMode::Voltage => Variable::new(format!("{}voltage_command", at.prefix), "V"),
             AmplifierMode::Current => Variable::new(format!("{}current_command", at.prefix), "A"),
+            AmplifierMode::Position => Variable::new(format!("{}position_command", at.prefix), "m"),
         };
         Ok(Self {
             states: frame.variables.clone(),

@@ -3,5 +3,6 @@
 
 pub mod compensation;
 pub mod feasible;
+pub mod pull_out;
 pub mod quickest;
 pub mod resonance;

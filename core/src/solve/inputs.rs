@@ -65,15 +65,15 @@ impl Pieces {
         let powers = &self.coefficients[input];
         let at = |tau: f64| powers.iter().rev().fold(0.0, |sum, c| sum * tau + c);
         // On the very edge between two steps it is known by what comes next.
-        let begin = 16.0 * f64::EPSILON * self.start.max(1e-3);
+        let begin = AHEAD + 16.0 * f64::EPSILON * self.start;
         let whole = (at(begin) / step).round();
         let mut pieces = *self;
         pieces.coefficients[input] = [0.0; DEGREE + 1];
         pieces.coefficients[input][0] = whole * step + 0.0;
         let length = self.end.min(until) - self.start;
-        let edges = [whole - 0.5, whole + 0.5].map(|edge| first_at(powers, edge * step, begin, length));
+        let edges = [-1.0, 1.0].map(|side| first_beyond(powers, (whole + 0.5 * side) * step, side, begin..length));
         if let Some(first) = edges.into_iter().flatten().reduce(f64::min) {
-            pieces.end = pieces.end.min(self.start + first.max(2.0 * begin));
+            pieces.end = pieces.end.min(self.start + first);
         }
         pieces
     }
@@ -99,11 +99,19 @@ impl Pieces {
     }
 }
 
-/// The first time after `from` and before `to` at which a polynomial is at `level`.
-fn first_at(powers: &[f64; DEGREE + 1], level: f64, from: f64, to: f64) -> Option<f64> {
+/// How far ahead a command is looked at to know its microstep, s: much less than any driver takes for one.
+const AHEAD: f64 = 1e-9;
+
+/// The first time at which a polynomial is beyond `level`, above it or below it by `side`: where `within` begins, if it
+/// is so already there.
+fn first_beyond(powers: &[f64; DEGREE + 1], level: f64, side: f64, within: std::ops::Range<f64>) -> Option<f64> {
     let mut own = *powers;
     own[0] -= level;
-    crossings(&own, from, to).first().copied()
+    let begin = own.iter().rev().fold(0.0, |sum, c| sum * within.start + c);
+    match begin * side >= 0.0 {
+        true => Some(within.start),
+        false => crossings(&own, within.start, within.end).first().copied(),
+    }
 }
 
 /// Where a polynomial changes its sign, in order: between two places where its derivative does, it does so once at most.

@@ -21,13 +21,19 @@ pub fn figures(case: &Case, run: &Run) -> Vec<Named> {
     let plot = Plot { curves, samples: run.samples.as_ref() };
 
     let mut input = figure("input");
-    let commanded = case.machine.drives[0].amplifier.mode == AmplifierMode::Current;
     if curves.get("input").is_some() {
-        let axis = Axis::new("Input", if commanded { "A" } else { "V" });
+        let axis = Axis::new("Input", case.machine.drives[0].amplifier.mode.unit());
         input = input.panel(plot.panel(axis, &[("input", "u")]));
     }
+    // The phases of a stepper have voltages of their own.
+    if curves.get("voltage").is_some() {
+        input = input.panel(plot.measured(
+            Axis::new("Voltage", "V"),
+            &[("voltage", "motor voltage")],
+            &["motor_voltage"],
+        ));
+    }
     input = input
-        .panel(plot.measured(Axis::new("Voltage", "V"), &[("voltage", "motor voltage")], &["motor_voltage"]))
         .panel(plot.measured(Axis::new("Current", "A"), &[("current", "motor current")], &["motor_current"]))
         .caption("What the motor gets, and the current it draws.");
 

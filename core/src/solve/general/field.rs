@@ -26,8 +26,8 @@ pub(super) struct Field {
     pub(super) sources: Vec<Source>,
     /// Which of the outputs is a guard: the argument that it is, or one behind the arguments.
     pub(super) output: Vec<usize>,
-    /// Arguments that errors are measured by: their places in the state.
-    pub(super) measured: Vec<usize>,
+    /// Arguments that errors are measured by: their places in the state, and their weights there.
+    pub(super) measured: Vec<(usize, f64)>,
     /// Whether guards depend on what stands still: friction along the travel of a body at rest, and bent bristles.
     pub(super) shifted: bool,
     /// Inertia that moves with each body, per unit of its leader's way.
@@ -166,7 +166,9 @@ impl Field {
             }
         }
         let rows = self.linear.outputs.iter().map(|output| &output.row);
-        self.measured = rows.map(|row| row.iter().position(|weight| *weight != 0.0).unwrap_or(0)).collect();
+        // One of an input alone is known.
+        let first = |row: &States| row.iter().copied().enumerate().find(|(_, weight)| *weight != 0.0);
+        self.measured = rows.map(|row| first(row).unwrap_or((0, 1.0))).collect();
         self.linear.arguments = self.linear.outputs.len();
     }
 

@@ -178,8 +178,9 @@ impl Core {
     /// One over what each argument may be off by in a step.
     fn strict(&self, field: &Field) -> Lanes<f64> {
         let mut strict = [0.0; ARGUMENTS];
-        for (strict, &place) in strict.iter_mut().zip(&field.measured) {
-            *strict = 1.0 / (EASE * (self.absolute[place] + self.relative * self.y[place].abs()));
+        for (strict, &(place, weight)) in strict.iter_mut().zip(&field.measured) {
+            let allowed = self.absolute[place] + self.relative * self.y[place].abs();
+            *strict = 1.0 / (EASE * allowed * weight.abs());
         }
         strict
     }
