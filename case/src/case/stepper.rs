@@ -10,13 +10,23 @@ use crate::signal::Signal;
 /// What a case of a stepper cannot have yet, and what is wanted in its place.
 const YET_TO_COME: [&str; 6] = ["measurement", "controller", "move", "tune", "fit", "uncertainty"];
 
-/// The error of whatever needs a motor that is commanded by voltage or current.
+/// What is said where a motor that is commanded by voltage or current is wanted.
+const NO_MOTOR: [&str; 3] = [
+    "this needs a motor that is commanded by voltage or current, and the case describes a stepper",
+    "[motor] and [amplifier]",
+    "`taut show`, `taut simulate` and `taut sweep` take steppers; all else is yet to come",
+];
+
+/// Refuses a stepper where a motor that is commanded by voltage or current is needed.
+pub fn needs_motors(machine: &Machine) -> Result<()> {
+    let [what, allowed, next] = NO_MOTOR;
+    machine.stepper().map_or(Ok(()), |_| Err(Error::new(what).allowed(allowed).next(next)))
+}
+
+/// The same where a file has the table of a stepper.
 pub(super) fn no_motor(root: &Table) -> Error {
-    let field = root.optional("stepper").unwrap_or_else(|| root.field.clone());
-    field
-        .fail("this needs a motor that is commanded by voltage or current, and the case describes a stepper")
-        .allowed("[motor] and [amplifier]")
-        .next("`taut show`, `taut simulate` and `taut sweep` take steppers; all else is yet to come")
+    let ([what, allowed, next], field) = (NO_MOTOR, root.optional("stepper").unwrap_or_else(|| root.field.clone()));
+    field.fail(what).allowed(allowed).next(next)
 }
 
 /// The stepper of an axis and its driver; none where there is no table of that name.

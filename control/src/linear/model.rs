@@ -108,6 +108,7 @@ impl System {
     /// # Ok::<(), taut::Error>(())
     /// ```
     pub fn of(machine: &Machine, operation: Operation) -> Result<Self> {
+        crate::case::needs_motors(machine)?;
         let machine = placed(machine, operation)?;
         let plant = machine.mechanism();
         let bodies = plant.held_bodies();

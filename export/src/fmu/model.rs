@@ -54,6 +54,7 @@ impl Model {
     /// The machine of a case, with the controller inside if it is asked for. Errors: a controller that the case has
     /// not.
     pub fn new(case: &Case, with_controller: bool) -> Result<Self> {
+        crate::case::needs_motors(&case.machine)?;
         let resource = resource::resource(case)?;
         Self::of_resource(&resource, with_controller)
     }
