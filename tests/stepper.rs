@@ -1,8 +1,8 @@
 //! Steppers against an integration of their own: the two phases, rotor and belt by the classical formula with steps of a
 //! microsecond, which shares nothing with the solvers. Also limit laws that hold by hand.
 
-use std::f64::consts::{FRAC_1_SQRT_2, PI};
 use crate::common::chance::Chance;
+use std::f64::consts::{FRAC_1_SQRT_2, PI};
 use taut::case::Case;
 use taut::mechanism::{Status, What};
 use taut::reach::pull_out::PullOut;

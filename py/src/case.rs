@@ -459,7 +459,9 @@ impl Case {
             return Ok(&self.inner);
         }
         // Read as that of an axis, it is told where it says that it is none.
-        let told = guarded(|| taut::case::Case::from_text_accepting(&self.path, self.text(), &[], (Files::All, Accepted::Axis)))?;
+        let told = guarded(|| {
+            taut::case::Case::from_text_accepting(&self.path, self.text(), &[], (Files::All, Accepted::Axis))
+        })?;
         Err(crate::error::told(py, told.err().unwrap_or_else(|| taut::Error::new("this needs a single axis"))))
     }
 

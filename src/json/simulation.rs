@@ -436,7 +436,8 @@ pub(super) fn figure_lines() -> Vec<[String; 3]> {
             lines.push([path, kind.into(), words.into()]);
         }
     };
-    let machines: Vec<(Kind, bool)> = Kind::ALL.map(|kind| (kind, false)).into_iter().chain([(Kind::Axis, true)]).collect();
+    let machines: Vec<(Kind, bool)> =
+        Kind::ALL.map(|kind| (kind, false)).into_iter().chain([(Kind::Axis, true)]).collect();
     // Of more parts than any machine has.
     let nothing = Metrics {
         loads: vec![OfLoad::default(); 8],

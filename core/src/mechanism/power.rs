@@ -95,9 +95,7 @@ impl Mechanism {
                 let beyond = (length - high).max(0.0) + (length - low).min(0.0);
                 (beyond, beyond)
             }
-            SpringLaw::Line { .. } | SpringLaw::Bounds { .. } | SpringLaw::Angle { .. } | SpringLaw::None => {
-                (0.0, 0.0)
-            }
+            SpringLaw::Line { .. } | SpringLaw::Bounds { .. } | SpringLaw::Angle { .. } | SpringLaw::None => (0.0, 0.0),
         };
         Strain { way, strain, rate }
     }

@@ -2,8 +2,9 @@
 
 use super::field::{
     Of, always, amplifier, breakaway, is_amplifier, is_brushed, make, motor, of_drive, of_friction, of_law, of_simple,
-    of_slide, part, points, set_coulomb, set_radius, set_rated_current, set_simple, set_stribeck_decay, set_stribeck_force, set_stribeck_velocity, simple,
-    stepper, stiffness, stribeck_decay, stribeck_force, stribeck_velocity,
+    of_slide, part, points, set_coulomb, set_radius, set_rated_current, set_simple, set_stribeck_decay,
+    set_stribeck_force, set_stribeck_velocity, simple, stepper, stiffness, stribeck_decay, stribeck_force,
+    stribeck_velocity,
 };
 use super::{Arm, Fallback, Field, INPUT, InStructure, Off, Parameter, Range, Sum, Tuned};
 use crate::design::Structure;

@@ -4,7 +4,6 @@ use super::Run;
 use super::marks;
 use crate::{Axis, Colour, Figure, Panel, Plane, Series, Style};
 use taut::case::Case;
-use taut::machine::AmplifierMode;
 
 /// Every plot of a run over time, in the order of a report; none if its curves were not kept.
 pub fn figures(case: &Case, run: &Run) -> Vec<(&'static str, Figure)> {

@@ -5,7 +5,6 @@ use super::curves::{Curves, Samples};
 use super::{in_plane, marks};
 use crate::{Axis, Colour, Figure, Panel, Picture, Plane, Series, Style};
 use taut::case::Case;
-use taut::machine::AmplifierMode;
 
 /// A figure and its name in file names.
 pub type Named = (&'static str, Figure);
@@ -27,11 +26,8 @@ pub fn figures(case: &Case, run: &Run) -> Vec<Named> {
     }
     // The phases of a stepper have voltages of their own.
     if curves.get("voltage").is_some() {
-        input = input.panel(plot.measured(
-            Axis::new("Voltage", "V"),
-            &[("voltage", "motor voltage")],
-            &["motor_voltage"],
-        ));
+        input =
+            input.panel(plot.measured(Axis::new("Voltage", "V"), &[("voltage", "motor voltage")], &["motor_voltage"]));
     }
     input = input
         .panel(plot.measured(Axis::new("Current", "A"), &[("current", "motor current")], &["motor_current"]))

@@ -1,9 +1,7 @@
 //! A machine made ready for the general solver: what its laws and its belt add to the linear equations of a mode.
 
 use crate::friction::{Friction, Law, Motion};
-use crate::mechanism::{
-    BODIES, CURRENTS, DRIVES, Follows, Form, Layout, Mechanism, Mode, Phases, SPRINGS, State,
-};
+use crate::mechanism::{BODIES, CURRENTS, DRIVES, Follows, Form, Layout, Mechanism, Mode, Phases, SPRINGS, State};
 use crate::solve::record::Extra;
 use std::sync::Arc;
 

@@ -375,15 +375,10 @@ impl Phasing {
         let angle = at(phased.angle(y) - phased.at, self.angle).map(|angle| angle + phased.at);
         let (speed, current) = (at(y[phased.speed], self.speed), at(y[current], self.currents[phase]));
         let told = at(phased.per_input * input[phased.drive], self.told);
-        let mut excess = [[0.0; POINTS]; 2];
-        for point in 0..POINTS {
-            let [high, low] = phased
-                .phases
-                .excess(phase, angle[point], speed[point], current[point], told[point])
-                .unwrap_or_default();
-            (excess[0][point], excess[1][point]) = (high, low);
-        }
-        excess
+        let excess: [[f64; 2]; POINTS] = std::array::from_fn(|p| {
+            phased.phases.excess(phase, angle[p], speed[p], current[p], told[p]).unwrap_or_default()
+        });
+        [excess.map(|[high, _]| high), excess.map(|[_, low]| low)]
     }
 }
 
