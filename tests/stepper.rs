@@ -51,7 +51,7 @@ impl Axis {
         let total = mass + (rotor + drive + idler) / (radius * radius);
         let chopper = between(0.0, 1.0) < 0.8;
         let supply = if chopper { between(12.0, 48.0) } else { 2.0_f64.sqrt() * rated * resistance * 0.999 };
-        let amplitude = between(5e-3, 4e-2);
+        let amplitude = between(1e-3, 6e-3);
         // The largest acceleration takes this share of the holding torque.
         let share = between(0.1, if chopper { 1.5 } else { 0.5 });
         let frequency = (share * holding / radius / total / amplitude).sqrt() / (2.0 * PI);
@@ -65,7 +65,7 @@ impl Axis {
             inductance: resistance * between(1e-3, 3e-3),
             supply,
             chopper,
-            microsteps: [1.0, 2.0, 4.0, 16.0, 64.0][(5.0 * between(0.0, 0.999)) as usize],
+            microsteps: [1.0, 1.0, 2.0, 4.0, 8.0][(5.0 * between(0.0, 0.999)) as usize],
             detent: holding * between(0.0, 0.06),
             rotor,
             radius,
@@ -76,7 +76,7 @@ impl Axis {
             damping: [2e-4 * k, 2e-4 * k, 1e-4 * k],
             amplitude,
             frequency,
-            until: 1.0 / frequency + 0.02,
+            until: 1.0 / frequency + 0.01,
         }
     }
 
@@ -252,7 +252,7 @@ impl Axis {
 
 /// How many machines are drawn: more with `TAUT_CASES`.
 fn machines() -> u64 {
-    std::env::var("TAUT_CASES").ok().and_then(|text| text.parse().ok()).unwrap_or(12)
+    std::env::var("TAUT_CASES").ok().and_then(|text| text.parse().ok()).unwrap_or(6)
 }
 
 #[test]
@@ -305,10 +305,10 @@ fn plain(holding: f64, radius: f64, microsteps: u32, rest: &str) -> String {
 #[test]
 fn a_load_at_rest_deflects_the_rotor_by_the_sine_law() {
     let (holding, radius, n) = (0.45, 6.4e-3, 50.0);
-    for share in [0.1, 0.5, 0.9, -0.7_f64] {
+    for share in [0.5, -0.8_f64] {
         let force = -holding * share / radius;
         let text = plain(holding, radius, 16, &format!("[cart]\nmass = 0.2\nload = {force}\n"))
-            + "friction = { viscous = 2e-3 }\n[[experiment]]\nname = \"held\"\ninput = { step = 0 }\nuntil = 1\n\
+            + "friction = { viscous = 2e-3 }\n[[experiment]]\nname = \"held\"\ninput = { step = 0 }\nuntil = 0.3\n\
                every = 1e-2\n";
         let case = Case::from_text("held.toml", &text).unwrap();
         let run = simulate(&case.machine, &case.experiments[0], Solver::GENERAL).unwrap();
@@ -321,15 +321,15 @@ fn a_load_at_rest_deflects_the_rotor_by_the_sine_law() {
 
 #[test]
 fn the_pull_out_torque_that_is_shown_is_that_at_which_a_slow_ramp_loses_its_steps() {
-    let (holding, radius, damping, acceleration) = (0.45, 6.4e-3, 1.2e-3, 1.0);
-    let points: Vec<String> = (0..=1000)
-        .map(|k| f64::from(k) * 2e-3)
+    let (holding, radius, damping, acceleration) = (0.45, 6.4e-3, 1.2e-3, 10.0);
+    let points: Vec<String> = (0..=280)
+        .map(|k| f64::from(k) * 5e-4)
         .map(|time| format!("[{time}, {}]", 0.5 * acceleration * time * time))
         .collect();
-    let text = plain(holding, radius, 64, "[cart]\nmass = 0.05\n")
+    let text = plain(holding, radius, 2, "[cart]\nmass = 0.05\n")
         + &format!(
             "friction = {{ viscous = {damping} }}\n[[experiment]]\nname = \"ramp\"\n\
-             input = {{ table = [{}] }}\nuntil = 2\nevery = 1e-2\n",
+             input = {{ table = [{}] }}\nuntil = 0.13\nevery = 1e-2\n",
             points.join(", ")
         );
     let case = Case::from_text("ramp.toml", &text).unwrap();
