@@ -308,7 +308,7 @@ fn a_load_at_rest_deflects_the_rotor_by_the_sine_law() {
     for share in [0.5, -0.8_f64] {
         let force = -holding * share / radius;
         let text = plain(holding, radius, 16, &format!("[cart]\nmass = 0.2\nload = {force}\n"))
-            + "friction = { viscous = 2e-3 }\n[[experiment]]\nname = \"held\"\ninput = { step = 0 }\nuntil = 0.3\n\
+            + "friction = { viscous = 2e-3 }\n[[experiment]]\nname = \"held\"\ninput = { step = 0 }\nuntil = 0.6\n\
                every = 1e-2\n";
         let case = Case::from_text("held.toml", &text).unwrap();
         let run = simulate(&case.machine, &case.experiments[0], Solver::GENERAL).unwrap();
