@@ -308,14 +308,14 @@ fn a_load_at_rest_deflects_the_rotor_by_the_sine_law() {
     for share in [0.5, -0.8_f64] {
         let force = -holding * share / radius;
         let text = plain(holding, radius, 16, &format!("[cart]\nmass = 0.2\nload = {force}\n"))
-            + "friction = { viscous = 2e-3 }\n[[experiment]]\nname = \"held\"\ninput = { step = 0 }\nuntil = 0.6\n\
+            + "friction = { viscous = 2e-3 }\n[[experiment]]\nname = \"held\"\ninput = { step = 0 }\nuntil = 0.3\n\
                every = 1e-2\n";
         let case = Case::from_text("held.toml", &text).unwrap();
         let run = simulate(&case.machine, &case.experiments[0], Solver::GENERAL).unwrap();
         let angle = *run.trajectory.get("drive_angle").unwrap().last().unwrap();
         // T_h sin N δ = F r
         let deflection = -share.asin() / n;
-        assert!((angle - deflection).abs() < 1e-7, "{share}: {angle} rad instead of {deflection} rad");
+        assert!((angle - deflection).abs() < 1e-6, "{share}: {angle} rad instead of {deflection} rad");
     }
 }
 
