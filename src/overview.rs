@@ -7,6 +7,7 @@
 mod axis;
 mod gantry;
 mod limits;
+mod stepper;
 
 use crate::case::Case;
 use crate::error::Result;
@@ -184,6 +185,7 @@ fn drive_at_belt(motor: &Motor, amplifier: (AmplifierMode, f64), r: f64) -> (f64
     let per_ampere = motor.gear_efficiency * n * motor.torque_constant / r;
     match mode {
         AmplifierMode::Current => (gain.abs() * per_ampere, 0.0),
+        AmplifierMode::Position => (0.0, 0.0),
         AmplifierMode::Voltage => {
             // F = η n K_t / (R r) (u − K_e n v / r)
             let per_volt = per_ampere / motor.resistance;

@@ -42,6 +42,7 @@ fn machine(value: &Value) -> Machine {
                 gear_efficiency: get("gear_efficiency"),
                 gear_play: None,
                 is_simple: false,
+                stepper: None,
             },
             amplifier: Amplifier::ideal(
                 match value["amplifier_mode"].as_str() {

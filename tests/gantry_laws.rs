@@ -55,6 +55,7 @@ fn motor() -> impl Strategy<Value = Motor> {
             gear_efficiency: 1.0,
             gear_play: None,
             is_simple: false,
+            stepper: None,
         },
     )
 }

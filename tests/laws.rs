@@ -80,6 +80,7 @@ proptest! {
         let input_at = |row: usize| match machine.drives[0].amplifier.mode {
             AmplifierMode::Voltage => trajectory.get("voltage").unwrap()[row] / gain,
             AmplifierMode::Current => trajectory.get("motor_current").unwrap()[row] / gain,
+            AmplifierMode::Position => unreachable!("no stepper is drawn"),
         };
         let power = |row: usize| {
             let codes = LABELS.map(|b| trajectory.get(&format!("{}_state", b.key)).unwrap()[row]);
@@ -150,6 +151,7 @@ proptest! {
             let (voltage_mode, current_mode) = match amplifier.mode {
                 AmplifierMode::Voltage => (commanded(amplifier.voltage_limit), limit(current, amplifier.current_limit)),
                 AmplifierMode::Current => (limit(voltage, amplifier.voltage_limit), commanded(amplifier.current_limit)),
+                AmplifierMode::Position => unreachable!("no stepper is drawn"),
             };
             let mut mode = Mode::of(LABELS.map(|b| motion(at(&format!("{}_state", b.key)).unwrap())));
             for (span, slack) in mode.slack.iter_mut().enumerate().take(SPANS) {

@@ -59,6 +59,7 @@ mod shape;
 mod sheet;
 mod stages;
 mod stated;
+mod stepper;
 mod stepping;
 mod survey;
 mod suspicions;

@@ -61,14 +61,18 @@ fn heading(machine: &Path) -> &'static str {
     }
 }
 
+/// The solver of a machine; where that is the general one, its curves as good as it can be.
+fn solver(usual: Solver) -> Solver {
+    match usual {
+        Solver::Exact => Solver::Exact,
+        _ => Solver::General { tolerance: 1e-12 },
+    }
+}
+
 fn curve_of_gantry(path: &Path, case: &Case) -> String {
     let mut text = String::new();
     let mechanism = case.machine.mechanism();
-    // Spans that follow bridge and cart are the general solver's, and its curves as good as it can be.
-    let solver = match Solver::of_mechanism(&mechanism) {
-        Solver::Exact => Solver::Exact,
-        _ => Solver::General { tolerance: 1e-12 },
-    };
+    let solver = solver(Solver::of_mechanism(&mechanism));
     for experiment in &case.experiments {
         let mut rows = Trajectory::default();
         let sink = &mut |block: &Trajectory| {
@@ -98,7 +102,7 @@ fn curve_of_axis(path: &Path, case: &Case) -> String {
         return text;
     }
     for experiment in &case.experiments {
-        let run = simulate(&case.machine, experiment, Solver::Exact).unwrap();
+        let run = simulate(&case.machine, experiment, solver(Solver::of(&case.machine))).unwrap();
         assert_eq!(run.outcome.ending, Ending::Complete, "{}: {}", path.display(), experiment.name);
         let column = |name: &str| run.trajectory.get(name).unwrap();
         for kept in 0..=KEPT {

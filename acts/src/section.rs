@@ -19,6 +19,7 @@ const SHORTEST: f64 = 1e-12;
 /// Rows from `from` to `to`, s, so many as `points` says.
 pub fn section(request: &Request, context: &Context) -> Result<Reply> {
     let case = opened(request, context)?;
+    taut::case::needs_motors(&case.machine)?;
     runnable(&case)?;
     let number = |key: &str| request.number(key).ok_or_else(|| Error::new(format!("a section needs a number `{key}`")));
     let (from, to) = (number("from")?.max(0.0), number("to")?);

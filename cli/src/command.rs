@@ -8,7 +8,7 @@ use crate::{interrupt, terminal};
 use rayon::prelude::*;
 use std::io::Read;
 use std::path::{Path, PathBuf};
-use taut::case::{Case, Files, LARGEST_FILE};
+use taut::case::{Accepted, Case, Files, LARGEST_FILE};
 use taut::files::write_atomically;
 use taut::{Error, Result};
 use taut_report::{Page, Picture};
@@ -37,35 +37,37 @@ pub struct Common {
 }
 
 impl Common {
-    /// Reads the case of either kind at `path` with all its files; `-` is standard input.
+    /// Reads the case of any machine at `path` with all its files; `-` is standard input.
     pub fn open(&self, path: &Path) -> Result<Case> {
-        let case = self.open_for(path, Files::All)?;
+        self.whole(path, Accepted::All)
+    }
+
+    /// Opens the case of a machine whose motors are commanded by voltage or current, with the files of these experiments.
+    pub fn open_motors_for(&self, path: &Path, files: Files) -> Result<Case> {
+        self.accepting(path, (files, Accepted::Motors))
+    }
+
+    fn whole(&self, path: &Path, accepted: Accepted) -> Result<Case> {
+        let case = self.accepting(path, (Files::All, accepted))?;
         case.complete()?;
         Ok(case)
+    }
+
+    fn accepting(&self, path: &Path, (files, accepted): (Files, Accepted)) -> Result<Case> {
+        match is_standard_input(path) {
+            true => Case::from_text_accepting(path, &standard_input()?, &self.changes(), (files, accepted)),
+            false => Case::read_accepting(path, &self.changes(), (files, accepted)),
+        }
     }
 
     /// Opens a case with the files of these experiments; a missing file is an error only for its own experiment.
     pub fn open_for(&self, path: &Path, files: Files) -> Result<Case> {
-        match is_standard_input(path) {
-            true => Case::from_text_for(path, &standard_input()?, &self.changes(), files),
-            false => Case::read_for(path, &self.changes(), files),
-        }
+        self.accepting(path, (files, Accepted::All))
     }
 
     /// Reads the case of an axis at `path` with all its files; `-` is standard input.
     pub fn case(&self, path: &Path) -> Result<Case> {
-        let case = self.case_for(path, Files::All)?;
-        case.complete()?;
-        Ok(case)
-    }
-
-    /// Opens the case of an axis with the files of these experiments; a missing file is an error only for its own
-    /// experiment.
-    pub fn case_for(&self, path: &Path, files: Files) -> Result<Case> {
-        match is_standard_input(path) {
-            true => Case::axis_from_text_for(path, &standard_input()?, &self.changes(), files),
-            false => Case::read_axis_for(path, &self.changes(), files),
-        }
+        self.whole(path, Accepted::Axis)
     }
 
     fn changes(&self) -> Vec<&str> {

@@ -20,6 +20,15 @@ const GANTRIES: [&str; 2] = ["stages/h-frame/h-frame.toml", "stages/core-xy/core
 /// Gantries with a controller and moves.
 const IN_LOOP: [&str; 2] = ["stages/h-frame/square.toml", "stages/core-xy/square.toml"];
 
+/// An axis whose motor is told a position.
+const STEPPER: &str = "stages/stepper-axis/stepper-axis.toml";
+
+/// What takes a stepper; all else refuses it.
+const WITH_STEPPER: [&str; 3] = ["show", "simulate", "sweep"];
+
+/// Of whatever does not.
+const NO_MOTOR: Ends = Refused("this needs a motor that is commanded by voltage or current");
+
 /// Commands without a machine.
 const OTHERS: [&str; 6] = ["paper", "init", "schema", "completions", "man", "help"];
 
@@ -105,6 +114,11 @@ fn every_kind_goes_through_every_command() {
         match *command {
             "studio" => run(axis, of_gantry),
             _ => run(axis, &Runs),
+        }
+        match *command {
+            "studio" => {}
+            taken if WITH_STEPPER.contains(&taken) => run(STEPPER, &Runs),
+            _ => run(STEPPER, &NO_MOTOR),
         }
         let gantries = if ["move", "tune", "plan"].contains(command) { IN_LOOP } else { GANTRIES };
         gantries.iter().for_each(|case| run(case, of_gantry));

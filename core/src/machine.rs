@@ -11,7 +11,7 @@ mod spans;
 mod swing;
 
 use crate::friction::Friction;
-pub use crate::mechanism::{Amplifier, AmplifierMode, GearPlay, Motor};
+pub use crate::mechanism::{Amplifier, AmplifierMode, GearPlay, Motor, Stepper};
 use crate::polyline::Polyline;
 pub use geometry::{BodyAt, DriveAt, Geometry, Lever, Part, SlideAt, SpanAt};
 pub use kind::Kind;
@@ -57,6 +57,11 @@ pub struct DriveUnit {
 }
 
 impl Machine {
+    /// The stepper that drives it, if one does.
+    pub fn stepper(&self) -> Option<&Stepper> {
+        self.drives.iter().find_map(|unit| unit.motor.stepper.as_ref())
+    }
+
     /// Force at the belt that moves everything from rest with the cart at `position` (m), N; the sign of `side` is the
     /// direction.
     pub fn breakaway(&self, side: f64, position: f64) -> f64 {
@@ -96,7 +101,10 @@ impl Machine {
         let mut laws = pulleys.iter().chain(self.slides().map(|slide| &slide.friction));
         // A belt that does not stretch does so at any length.
         let follows = self.belt.follows_cart && self.belt.model != BeltModel::Rigid;
-        laws.all(Friction::is_piecewise_linear) && self.slides().all(|slide| slide.along.is_none()) && !follows
+        laws.all(Friction::is_piecewise_linear)
+            && self.slides().all(|slide| slide.along.is_none())
+            && !follows
+            && self.stepper().is_none()
     }
 
     /// True if it is another machine elsewhere along its travel, but for the ends.
@@ -109,6 +117,7 @@ impl Machine {
         let DriveUnit { motor, amplifier } = &self.drives[0];
         let parts = [
             (self.kind != Kind::Axis, "a second drive"),
+            (motor.stepper.is_some(), "a stepper"),
             (amplifier.voltage_limit.is_some(), "a voltage limit"),
             (amplifier.current_limit.is_some(), "a current limit"),
             (amplifier.bandwidth.is_some(), "a current loop of finite bandwidth"),

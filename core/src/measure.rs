@@ -203,6 +203,7 @@ impl Recorder<'_> {
         let (input, unit) = match machine.drives[0].amplifier.mode {
             AmplifierMode::Voltage => ("voltage", "V"),
             AmplifierMode::Current => ("current", "A"),
+            AmplifierMode::Position => ("position", "m"),
         };
         let mut columns = vec![Column::new("time", "s"), Column::new(input, unit)];
         columns.extend(self.devices.iter().flat_map(Device::headings));

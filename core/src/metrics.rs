@@ -43,9 +43,24 @@ pub struct Metrics {
     pub settled: bool,
     /// True if all bodies other than rotors are stuck at the end, at a speed of exactly zero.
     pub bodies_rest: bool,
+    /// Of a machine with a stepper.
+    pub stepper: Option<OfStepper>,
     /// True if no rotor turns at the end: that of a gear with play turns no faster than a millionth of its largest
     /// speed. True for stiff gears, whose rotors are part of their pulleys.
     pub rotors_rest: bool,
+}
+
+/// Figures of a stepper that was told where to go.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct OfStepper {
+    /// Full steps by which the rotor is behind its field at the end: four for each tooth pitch.
+    pub lost_steps: i64,
+    /// How often the rotor fell to another tooth.
+    pub slips: u64,
+    /// When it did so first, s.
+    pub first_slip: Option<f64>,
+    /// The position that it is told at the end minus that of the cart, m.
+    pub position_error: f64,
 }
 
 /// Figures of what slides.

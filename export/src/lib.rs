@@ -201,6 +201,7 @@ fn shaper_remark(design: &crate::design::Design) -> Vec<String> {
 
 /// The files of a target, called `stem`. Errors: what the target cannot do, and what can be done instead.
 pub fn export(case: &Case, target: Target, stem: &str, options: &Options) -> Result<Exported> {
+    crate::case::needs_motors(&case.machine)?;
     match target {
         Target::C => c::export(case, part(case, options.part)?, stem, options),
         Target::StructuredText => st::export(case, options.part, stem),

@@ -61,6 +61,8 @@ pub enum Does {
     Touches(Contact),
     /// Of a line: which piece of it holds.
     Follows(u8),
+    /// Of a stepper: by how many tooth pitches its rotor is behind.
+    Slips(i32),
 }
 
 impl Does {
@@ -72,6 +74,7 @@ impl Does {
             Next::Switch(Switch::Span(_, slack)) => Does::Slack(slack),
             Next::Switch(Switch::Gap(_, contact)) => Does::Touches(contact),
             Next::Switch(Switch::Line(_, piece)) => Does::Follows(piece),
+            Next::Switch(Switch::Field(_, pitches)) => Does::Slips(pitches),
             Next::Switch(Switch::Voltage(_, limit) | Switch::Current(_, limit)) => Does::Limits(limit),
         }
     }
@@ -88,6 +91,7 @@ impl Does {
             Does::Touches(Contact::HighLoose) => "positive side, loose",
             Does::Touches(contact) => Status::Contact(contact).word(),
             Does::Follows(piece) => Status::Piece(piece).word(),
+            Does::Slips(pitches) => Status::Slipped(pitches).word(),
         }
     }
 }
@@ -287,6 +291,7 @@ impl Tables {
             Does::Slack(slack) => Status::Slack(slack).code(),
             Does::Touches(contact) => Status::Contact(contact).code(),
             Does::Follows(piece) => Status::Piece(piece).code(),
+            Does::Slips(pitches) => Status::Slipped(pitches).code(),
         }
     }
 
@@ -424,7 +429,7 @@ fn elements(mechanism: &Mechanism) -> Vec<Element> {
                 let pieces: Vec<Does> = (0..=line.points().len()).map(|piece| Does::Follows(piece as u8)).collect();
                 add(ElementKind::Line(index), spring.label.key, &pieces);
             }
-            SpringLaw::TwoSided | SpringLaw::Bounds { .. } | SpringLaw::None => {}
+            SpringLaw::TwoSided | SpringLaw::Bounds { .. } | SpringLaw::Angle { .. } | SpringLaw::None => {}
         }
     }
     all

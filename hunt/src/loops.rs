@@ -375,7 +375,7 @@ impl Rigid {
             load: machine.cart.constant_force(),
             push: match machine.drives[0].amplifier.mode {
                 AmplifierMode::Voltage => per_volt / motor.resistance,
-                AmplifierMode::Current => per_volt,
+                AmplifierMode::Current | AmplifierMode::Position => per_volt,
             },
             inertia: 1.0,
             dry: 1.0,
@@ -408,7 +408,7 @@ impl Rigid {
                     + motor.inductance * per_force * rate
                     + n * motor.back_emf_constant * y.speed / r
             }
-            AmplifierMode::Current => per_force * force,
+            AmplifierMode::Current | AmplifierMode::Position => per_force * force,
         };
         command / amplifier.gain
     }

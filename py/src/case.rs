@@ -10,7 +10,7 @@ use pyo3::types::{PyDict, PyList};
 use std::path::PathBuf;
 use std::sync::Arc;
 use taut::Error;
-use taut::case::{Files, InputFile, Plan, TEMPLATE};
+use taut::case::{Accepted, Files, InputFile, Plan, TEMPLATE};
 use taut::export::{Exported, Options, Part, Place, Real, Target, export};
 use taut::files::{Inputs, write_atomically};
 use taut::fit::Effort;
@@ -457,7 +457,9 @@ impl Case {
             return Ok(&self.inner);
         }
         // Read as that of an axis, it is told where it says that it is none.
-        let told = guarded(|| taut::case::Case::axis_from_text_for(&self.path, self.text(), &[], Files::All))?;
+        let told = guarded(|| {
+            taut::case::Case::from_text_accepting(&self.path, self.text(), &[], (Files::All, Accepted::Axis))
+        })?;
         Err(crate::error::told(py, told.err().unwrap_or_else(|| taut::Error::new("this needs a single axis"))))
     }
 

@@ -209,6 +209,7 @@ fn motor(out: &mut Svg, machine: &Machine) {
     let symbol = match machine.drives[0].amplifier.mode {
         AmplifierMode::Voltage => "u",
         AmplifierMode::Current => "i",
+        AmplifierMode::Position => "x*",
     };
     let ink = svg::INK;
     if machine.drives[0].amplifier.gain == 1.0 {

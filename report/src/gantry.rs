@@ -261,6 +261,7 @@ fn drive(out: &mut Svg, gantry: &Machine, side: usize) {
     let fed = match amplifier.mode {
         AmplifierMode::Voltage => "u",
         AmplifierMode::Current => "i",
+        AmplifierMode::Position => "x*",
     };
     out.arrow((x, y + 66.0), (x, y + RADIUS + 3.0), svg::INK, 1.5);
     let name = ["left", "right"][side];

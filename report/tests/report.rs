@@ -24,6 +24,7 @@ fn machine(encoder: Option<Encoder>) -> Machine {
                 gear_efficiency: 0.8,
                 gear_play: None,
                 is_simple: false,
+                stepper: None,
             },
             amplifier: Amplifier::ideal(AmplifierMode::Voltage, 2.0),
         }],

@@ -117,6 +117,13 @@ fn root() -> Properties {
         ("motor", table("motor", &[])),
         ("drive", described(table("drive", &[]), "Instead of [motor]: a drive of which only the force is known")),
         ("amplifier", amplifier()),
+        (
+            "stepper",
+            described(
+                table("stepper", &[("drive", words(["chopper", "voltage"]))]),
+                "Instead of [motor] and [amplifier]: a stepper that is told a position",
+            ),
+        ),
         ("left_drive", described(drive(), "Of a gantry: what is different at the left drive")),
         ("right_drive", described(drive(), "Of a gantry: what is different at the right drive")),
         ("drive_pulley", pulley("drive_pulley")),

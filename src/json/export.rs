@@ -87,7 +87,7 @@ fn springs(mechanism: &Mechanism) -> Vec<Value> {
                 json!({ "kind": if *over == Over::Length { "line-over-length" } else { "line-over-rate" }, "points": line.points() })
             }
             SpringLaw::Bounds { low, high } => json!({ "kind": "bounds", "low": number(*low), "high": number(*high) }),
-            SpringLaw::None => json!({ "kind": "none" }),
+            SpringLaw::Angle { .. } | SpringLaw::None => json!({ "kind": "none" }),
         };
         let arm = |&(body, arm): &(usize, f64)| json!({ "body": mechanism.bodies[body].label.key, "arm": arm });
         json!({

@@ -372,7 +372,7 @@ pub fn figures(metrics: &Metrics, machine: &Machine) -> Value {
     let geometry = machine.geometry();
     let mut told = Map::new();
     told.insert("end_time_s".into(), json!(metrics.end));
-    for figure in metrics::figures(machine.kind) {
+    for figure in metrics::figures(machine.kind, machine.stepper().is_some()) {
         let value = match figure.of(metrics) {
             Worth::Number(_) if figure.row.seek == Some(Seek::SteadySpeed) => {
                 let steady =
@@ -436,7 +436,8 @@ pub(super) fn figure_lines() -> Vec<[String; 3]> {
             lines.push([path, kind.into(), words.into()]);
         }
     };
-    let kinds = Kind::ALL;
+    let machines: Vec<(Kind, bool)> =
+        Kind::ALL.map(|kind| (kind, false)).into_iter().chain([(Kind::Axis, true)]).collect();
     // Of more parts than any machine has.
     let nothing = Metrics {
         loads: vec![OfLoad::default(); 8],
@@ -445,10 +446,11 @@ pub(super) fn figure_lines() -> Vec<[String; 3]> {
         bodies: vec![EventCount::default(); 8],
         ..Metrics::default()
     };
-    for figure in kinds.iter().flat_map(|kind| metrics::figures(*kind)) {
-        let of_all = |name: &str| {
-            kinds.iter().all(|kind| metrics::figures(*kind).iter().any(|one| one.by_role == name || one.name == name))
+    for figure in machines.iter().flat_map(|&(kind, steps)| metrics::figures(kind, steps)) {
+        let has = |(kind, steps): &(Kind, bool), name: &str| {
+            metrics::figures(*kind, *steps).iter().any(|one| one.by_role == name || one.name == name)
         };
+        let of_all = |name: &str| machines.iter().all(|machine| has(machine, name));
         let ends: &[(&str, &str)] = match figure.of(&nothing) {
             Worth::Number(_) if figure.row.seek == Some(Seek::SteadySpeed) => continue,
             Worth::TimeOfPeak(_) => continue,
@@ -490,7 +492,7 @@ impl SteadyTold {
             reached: steady.reached,
             analytic_m_s: steady.analytic.speed(),
             input: steady.input,
-            input_unit: if mode == AmplifierMode::Current { "A" } else { "V" },
+            input_unit: mode.unit(),
             from_s: steady.stretch.0,
             to_s: steady.stretch.1,
         }

@@ -1,7 +1,7 @@
 //! Overview of an axis.
 
 use super::limits::{Most, Power, most, safety};
-use super::{Group, Note, Overview, Place, belt_mass, drive_at_belt, motor_rows, of_belt, of_constants, told};
+use super::{Group, Note, Overview, Place, belt_mass, drive_at_belt, motor_rows, of_belt, of_constants, stepper, told};
 use crate::case::Case;
 use crate::error::Result;
 use crate::linear::{Operation, Root, places, travel};
@@ -20,12 +20,20 @@ pub(super) fn overview(case: &Case) -> Result<Overview> {
     let most = most(case.controller.as_ref().and_then(|design| design.limit), inputs);
     let along = places(machine, PLACES);
     let positions = along.clone().unwrap_or_else(|| vec![0.0]);
-    let found = travel(machine, Operation::default(), &positions)?;
+    let found = match machine.stepper() {
+        // The motor as a free inertia: its field holds it by a sine, not by a stiffness.
+        Some(_) => travel(&stepper::without_field(machine), Operation::default(), &positions)?,
+        None => travel(machine, Operation::default(), &positions)?,
+    };
     let places: Vec<Place> = found.iter().map(|place| self::place(machine, place)).collect();
     let mut groups = vec![drive(machine, &mut notes), inertia(machine, &masses, &mut notes)];
     groups.extend(belt(machine, &places));
-    groups.extend(limits(machine, &masses, most.as_ref(), &mut notes));
-    of_constants(&machine.drives[0].motor, "", &mut notes);
+    if machine.stepper().is_some() {
+        groups.extend(stepper::limits(machine));
+    } else {
+        groups.extend(limits(machine, &masses, most.as_ref(), &mut notes));
+        of_constants(&machine.drives[0].motor, "", &mut notes);
+    }
     if machine.belt.model != BeltModel::Rigid {
         of_belt(&machine.belt.sheet, &machine.belt.damping, machine.pulley_radius, &mut notes);
     }
@@ -62,6 +70,7 @@ fn drive(machine: &Machine, notes: &mut Vec<Note>) -> Group {
     let (per_input, input) = match machine.drives[0].amplifier.mode {
         AmplifierMode::Voltage => ("N/V", "V"),
         AmplifierMode::Current => ("N/A", "A"),
+        AmplifierMode::Position => return stepper::drive(machine),
     };
     group.add("force_per_input", "force at the belt per input", force, per_input);
     if drag > 0.0 {

@@ -57,6 +57,8 @@ fn drive(gantry: &Machine, notes: &mut Vec<Note>) -> Group {
         let (per_input, input) = match amplifier.mode {
             AmplifierMode::Voltage => ("N/V", "V"),
             AmplifierMode::Current => ("N/A", "A"),
+            // A gantry has no steppers yet.
+            AmplifierMode::Position => continue,
         };
         group.add(format!("{prefix}force_per_input"), "force at the belt per input", force, per_input);
         if drag > 0.0 {

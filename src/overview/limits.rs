@@ -55,6 +55,7 @@ impl Power {
         let own = match amplifier.mode {
             AmplifierMode::Voltage => &mut volts,
             AmplifierMode::Current => &mut amperes,
+            AmplifierMode::Position => return None,
         };
         // What is never commanded is never reached.
         match (*own, commanded) {
@@ -69,6 +70,7 @@ impl Power {
         let is_limit = match amplifier.mode {
             AmplifierMode::Voltage => amplifier.voltage_limit == volts,
             AmplifierMode::Current => amplifier.current_limit == amperes,
+            AmplifierMode::Position => return None,
         };
         if !is_limit && let Some(most) = most {
             words.push(most.from);

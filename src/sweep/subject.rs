@@ -34,7 +34,7 @@ impl Subject {
             experiment.every = plan.interval.unwrap_or(experiment.every);
         }
         let (machine, moves, controller) = (case.machine.clone(), case.moves.clone(), case.controller.clone());
-        let mut of_experiment = metrics::figures(machine.kind);
+        let mut of_experiment = metrics::figures(machine.kind, machine.stepper().is_some());
         of_experiment.retain(|figure| !(case.is_axis() && figure.row.again_on_an_axis) && plan.tells(&figure.name));
         let mut of_move = measures::of_move(machine.kind);
         of_move.retain(|measure| plan.tells(&measure.name));

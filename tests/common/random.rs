@@ -79,6 +79,7 @@ pub fn machine(dry: Dry) -> impl Strategy<Value = Machine> {
             gear_efficiency,
             gear_play: None,
             is_simple: false,
+            stepper: None,
         });
     let amplifier = (prop_oneof![5 => Just(AmplifierMode::Voltage), 1 => Just(AmplifierMode::Current)], 0.5..2.0)
         .prop_map(|(mode, gain)| Amplifier::ideal(mode, gain));

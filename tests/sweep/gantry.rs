@@ -72,7 +72,7 @@ fn a_row_is_the_run_of_its_machine() {
                 for (number, group) in sweep.groups().iter().enumerate() {
                     assert_eq!(table.get(&format!("{}.status", group.file)).unwrap()[row], Status::Complete.code());
                     let metrics = simulated(&case, number);
-                    for figure in figures(case.machine.kind) {
+                    for figure in figures(case.machine.kind, false) {
                         let value = table.get(&format!("{}.{}", group.file, figure.name)).unwrap()[row];
                         let told = figure.of(&metrics).number();
                         assert_eq!(value.to_bits(), told.to_bits(), "{design} {}", figure.name);

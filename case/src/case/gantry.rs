@@ -37,7 +37,7 @@ pub(super) fn tables(root: &Table) -> Result<&'static [&'static str]> {
             }));
         }
     }
-    for key in ["measurement", "fit", "uncertainty"] {
+    for key in ["stepper", "measurement", "fit", "uncertainty"] {
         if let Some(field) = root.optional(key) {
             return Err(field.fail("this is not there yet for a gantry").next("leave it out for now"));
         }

@@ -2,7 +2,7 @@
 
 use super::friction::{along, friction, line};
 use super::reader::{Field, Table};
-use super::sheet;
+use super::{sheet, stepper};
 use crate::error::Result;
 use crate::machine::*;
 use crate::quantity::{rounded, show};
@@ -10,8 +10,10 @@ use crate::quantity::{rounded, show};
 pub(super) fn machine(root: &Table) -> Result<Machine> {
     let table = |name: &str, holds: &str| root.required(name, &format!("a table [{name}] with {holds}"))?.table();
     let simple = sheet::simple_drive(root)?;
+    let stepper = stepper::drive(root)?;
     let motor = match simple {
         Some(_) => None,
+        None if stepper.is_some() => None,
         None => {
             Some(table("motor", "torque_constant, back_emf_constant and resistance; or [drive] with force_per_input")?)
         }
@@ -29,14 +31,7 @@ pub(super) fn machine(root: &Table) -> Result<Machine> {
     idler.check_keys(&[], &[])?;
     cart.check_keys(&[], &[])?;
     let pulley_radius = radius(&drive, sheet::pitch(root)?)?;
-    let unit = DriveUnit {
-        motor: match (&motor, simple) {
-            (Some(motor), _) => self::motor(motor)?,
-            (None, Some(simple)) => simple.motor(pulley_radius),
-            (None, None) => return Err(root.missing("motor", "a table [motor], or [drive]")),
-        },
-        amplifier: self::amplifier(amplifier.as_ref(), motor.as_ref())?,
-    };
+    let unit = stepper.map_or_else(|| brushed(root, (motor, simple, amplifier), pulley_radius), Ok)?;
     let mut machine = Machine {
         kind: Kind::Axis,
         drives: vec![unit],
@@ -68,6 +63,22 @@ pub(super) fn machine(root: &Table) -> Result<Machine> {
     Ok(machine)
 }
 
+/// A brushed motor, or a drive that is given by force and drag, with its amplifier.
+fn brushed(
+    root: &Table,
+    (motor, simple, amplifier): (Option<Table>, Option<SimpleDrive>, Option<Table>),
+    pulley_radius: f64,
+) -> Result<DriveUnit> {
+    Ok(DriveUnit {
+        motor: match (&motor, simple) {
+            (Some(motor), _) => self::motor(motor)?,
+            (None, Some(simple)) => simple.motor(pulley_radius),
+            (None, None) => return Err(root.missing("motor", "a table [motor], or [drive], or [stepper]")),
+        },
+        amplifier: self::amplifier(amplifier.as_ref(), motor.as_ref())?,
+    })
+}
+
 pub(super) fn motor(table: &Table) -> Result<Motor> {
     table.check_keys(&[], &[])?;
     let [torque_constant, back_emf_constant, resistance] = sheet::constants(table)?;
@@ -81,6 +92,7 @@ pub(super) fn motor(table: &Table) -> Result<Motor> {
         gear_efficiency: table.number("gear_efficiency")?,
         gear_play: gear_play(table)?,
         is_simple: false,
+        stepper: None,
     })
 }
 

@@ -18,6 +18,7 @@ mod reader;
 mod set;
 mod sheet;
 mod source;
+mod stepper;
 mod suggestion;
 mod sweep;
 mod template;
@@ -31,6 +32,7 @@ pub use files::{Files, InputFile, Unread};
 pub use fit::{Nuisances, Per, Plan, Prior, Scope, matches};
 pub use get::{Given, Number};
 pub use motion::Move;
+pub use stepper::needs_motors;
 pub use sweep::{Kinds, Origin, Sampling, Sweeping, Variation};
 pub use template::{TEMPLATE, Template, gantry_template};
 pub use tune::{Cost, EFFORTS, Known, Tuning};
@@ -85,10 +87,14 @@ pub struct Case {
     pub files: Vec<InputFile>,
 }
 
-/// The machines that somebody takes.
+/// The machines that a command takes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Accepted {
+pub enum Accepted {
+    /// All of them.
     All,
+    /// Those with motors that are commanded by voltage or current.
+    Motors,
+    /// An axis with such a motor.
     Axis,
 }
 
@@ -119,15 +125,14 @@ impl Case {
         Self::from_text_for(path, &read_text(path)?, changes, files)
     }
 
-    /// Reads the case of an axis; rejects every other kind of machine.
-    pub fn read_axis_for(path: impl AsRef<Path>, changes: &[&str], files: Files) -> Result<Self> {
+    /// Reads a case for what takes some machines alone; rejects all others.
+    pub fn read_accepting(
+        path: impl AsRef<Path>,
+        changes: &[&str],
+        (files, accepted): (Files, Accepted),
+    ) -> Result<Self> {
         let path = path.as_ref();
-        Self::axis_from_text_for(path, &read_text(path)?, changes, files)
-    }
-
-    /// Reads the case of an axis from text, as [`Case::from_text_for`] does.
-    pub fn axis_from_text_for(name: impl AsRef<Path>, text: &str, changes: &[&str], files: Files) -> Result<Self> {
-        Self::of_kinds(name.as_ref(), text, changes, files, Accepted::Axis)
+        Self::from_text_accepting(path, &read_text(path)?, changes, (files, accepted))
     }
 
     /// Reads a case from text; `name` stands in messages, and paths in the text are relative to its folder.
@@ -163,10 +168,17 @@ impl Case {
 
     /// Reads a case from text with the files of these experiments only, as [`Case::read_for`] does.
     pub fn from_text_for(name: impl AsRef<Path>, text: &str, changes: &[&str], files: Files) -> Result<Self> {
-        Self::of_kinds(name.as_ref(), text, changes, files, Accepted::All)
+        Self::from_text_accepting(name, text, changes, (files, Accepted::All))
     }
 
-    fn of_kinds(name: &Path, text: &str, changes: &[&str], files: Files, accepted: Accepted) -> Result<Self> {
+    /// The same for what takes some machines alone: refuses all others.
+    pub fn from_text_accepting(
+        name: impl AsRef<Path>,
+        text: &str,
+        changes: &[&str],
+        (files, accepted): (Files, Accepted),
+    ) -> Result<Self> {
+        let name = name.as_ref();
         let text = text.strip_prefix('\u{feff}').unwrap_or(text);
         let source = set::apply(name, text, changes)?;
         let tree = source.tree()?;
@@ -179,6 +191,9 @@ impl Case {
         let kind = gantry::kind(&root)?;
         if accepted == Accepted::Axis && kind != Kind::Axis {
             return Err(gantry::no_axis(&root, kind));
+        }
+        if accepted != Accepted::All && root.optional("stepper").is_some() {
+            return Err(stepper::no_motor(&root));
         }
         root.check_keys(if kind == Kind::Axis { &AXIS_TABLES } else { gantry::tables(&root)? }, &[])?;
 
@@ -228,10 +243,11 @@ impl Case {
 }
 
 /// The tables of a case of an axis.
-const AXIS_TABLES: [&str; 20] = [
+const AXIS_TABLES: [&str; 21] = [
     "title",
     "kind",
     "motor",
+    "stepper",
     "drive",
     "amplifier",
     "drive_pulley",
@@ -371,6 +387,9 @@ fn experiment(field: &Field, machine: &Machine, folder: &Folder) -> Result<Vec<E
         false => table.check_keys(&["name", "input"], &["log"])?,
     }
     let name = named(&table)?;
+    if let Some(log) = table.optional("log").filter(|_| machine.stepper().is_some()) {
+        return Err(log.fail("logs of a stepper are not read yet").next("leave it out, and give the input"));
+    }
     let Some(log) = table.optional("log").filter(|_| one_drive) else {
         let (until, every) = times(&table, None)?;
         let context = input::Context { folder, until };
@@ -378,8 +397,14 @@ fn experiment(field: &Field, machine: &Machine, folder: &Folder) -> Result<Vec<E
             false => gantry::inputs(&table, machine, &context)?,
             true => {
                 let unit = field.input_unit;
-                let such_as = format!("for example input = {{ pulse = \"5 {unit}\", for = \"0.25 s\" }}");
-                vec![input::signal(&table.required("input", &such_as)?, &context)?]
+                let such_as = match unit {
+                    "m" => "for example input = { ramp = \"100 mm\", over = \"1 s\" }".into(),
+                    _ => format!("for example input = {{ pulse = \"5 {unit}\", for = \"0.25 s\" }}"),
+                };
+                let field = table.required("input", &such_as)?;
+                let signal = input::signal(&field, &context)?;
+                stepper::check_command(&field, machine, &signal, (&initial(&table, machine)?, until))?;
+                vec![signal]
             }
         };
         return Ok(vec![Experiment { name, inputs, until, every, initial: initial(&table, machine)?, log: None }]);
@@ -452,6 +477,11 @@ fn initial(experiment: &Table, machine: &Machine) -> Result<State> {
     }
     let table = field.table()?;
     table.check_keys(&[], &[])?;
+    if let Some(current) = table.optional("motor_current").filter(|_| machine.stepper().is_some()) {
+        return Err(current
+            .fail("the phases of a stepper begin with the currents that hold it where it is")
+            .next("leave it out"));
+    }
     if let Some(current) = table.optional("motor_current")
         && !machine.mechanism().drives.iter().any(|drive| drive.has_current_state())
     {

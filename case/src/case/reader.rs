@@ -355,8 +355,12 @@ impl<'a> Table<'a> {
 
 /// The example of a row, in amperes where the amplifier takes those.
 fn example_for(row: &Parameter, input_unit: &str) -> String {
-    let amperes = row.unit != parameter::unit_for(row.unit, "A") && input_unit == "A";
-    if amperes { row.example.replace(" V", " A") } else { row.example.to_string() }
+    let differs = row.unit != parameter::unit_for(row.unit, input_unit);
+    match input_unit {
+        "A" if differs => row.example.replace(" V", " A"),
+        "m" if differs => row.example.replace(" V", " mm"),
+        _ => row.example.to_string(),
+    }
 }
 
 /// The table that a misplaced key belongs to.

@@ -3,7 +3,7 @@
 use crate::design::placement::{first, place};
 use crate::design::{Design, FeedForward, Pid, Structure};
 use crate::machine::rigid::Rigid;
-use crate::machine::{AmplifierMode, Machine, slowest_swing};
+use crate::machine::{Machine, slowest_swing};
 use std::f64::consts::PI;
 
 /// Sample time where none is given, s, and how it is written.
@@ -50,7 +50,7 @@ pub(super) fn proportional(machine: &Machine, every: f64, delay: f64) -> String 
 }
 
 fn unit(machine: &Machine) -> &'static str {
-    if machine.drives[0].amplifier.mode == AmplifierMode::Current { "A" } else { "V" }
+    machine.drives[0].amplifier.mode.unit()
 }
 
 /// Gains placed well below the slowest swing and what sampling, delay and the derivative's filter allow; ordinary ones for

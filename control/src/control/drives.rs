@@ -59,7 +59,7 @@ pub fn drive_gains(machine: &Machine) -> Vec<DriveGain> {
                 one("LinuxCNC", "FF3", 1e-3 * jerk, "V/(mm/s^3)"),
             ]
         }
-        AmplifierMode::Current => {
+        AmplifierMode::Current | AmplifierMode::Position => {
             vec![one("LinuxCNC", "FF1", 1e-3 * v, "A/(mm/s)"), one("LinuxCNC", "FF2", 1e-3 * a, "A/(mm/s^2)")]
         }
     };

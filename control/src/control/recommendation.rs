@@ -6,7 +6,7 @@ use super::damping::{FittedMode, fitted};
 use super::shaper::{Firmware, Form, residual_vibration};
 use super::shaping::{Choice, Criterion, Target, choose};
 use super::spectrum::{Axis, Spectrum};
-use crate::case::{Case, Files};
+use crate::case::{Accepted, Case, Files};
 use crate::error::{Error, Result};
 use crate::log::read_accelerometer;
 use crate::mechanism::Label;
@@ -240,7 +240,7 @@ fn model(args: &Question, file: &Path) -> Result<(Vec<Source>, Vec<PathBuf>)> {
         return Err(error.next("leave --axis out, or give a spectrum"));
     }
     let changes: Vec<&str> = args.changes.iter().map(String::as_str).collect();
-    let case = Case::read_for(file, &changes, Files::All)?;
+    let case = Case::read_accepting(file, &changes, (Files::All, Accepted::Motors))?;
     let drive = args.drive.unwrap_or(Drive::Held);
     let labels: Vec<Label> = case.machine.travels().map(|(label, _)| label).collect();
     let of_coordinate = |(number, (label, letter)): (usize, (&Label, &'static str))| {

@@ -118,6 +118,7 @@ impl System {
     /// # Ok::<(), taut::Error>(())
     /// ```
     pub fn of(machine: &Machine, operation: Operation) -> Result<Self> {
+        crate::case::needs_motors(machine)?;
         let machine = placed(machine, operation)?;
         let plant = machine.mechanism();
         let bodies = plant.held_bodies();
@@ -135,6 +136,7 @@ impl System {
         let input = |(at, unit): (&crate::machine::DriveAt, &crate::machine::DriveUnit)| match unit.amplifier.mode {
             AmplifierMode::Voltage => Variable::new(format!("{}voltage_command", at.prefix), "V"),
             AmplifierMode::Current => Variable::new(format!("{}current_command", at.prefix), "A"),
+            AmplifierMode::Position => Variable::new(format!("{}position_command", at.prefix), "m"),
         };
         Ok(Self {
             states: frame.variables.clone(),

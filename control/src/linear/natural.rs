@@ -164,7 +164,7 @@ impl Matrices {
                 SpringLaw::TwoSided | SpringLaw::Tension { .. } => true,
                 // The flank of a gear that carries; an end stop is not touched.
                 SpringLaw::Gap { .. } => part.arms.len() > 1,
-                SpringLaw::Line { .. } | SpringLaw::Bounds { .. } | SpringLaw::None => false,
+                SpringLaw::Line { .. } | SpringLaw::Bounds { .. } | SpringLaw::Angle { .. } | SpringLaw::None => false,
             };
             let arms = mechanism.leading_arms(spring);
             let row = DVector::from_fn(n, |i, _| arms[bodies[i]]);

@@ -78,7 +78,7 @@ fn limits(machine: &Machine, design: &Design) -> (f64, f64) {
         AmplifierMode::Voltage => {
             machine.drives[0].amplifier.voltage_limit.map(|limit| limit / machine.drives[0].amplifier.gain.abs())
         }
-        AmplifierMode::Current => {
+        AmplifierMode::Current | AmplifierMode::Position => {
             machine.drives[0].amplifier.current_limit.map(|limit| limit / machine.drives[0].amplifier.gain.abs())
         }
     };

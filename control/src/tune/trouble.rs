@@ -106,7 +106,7 @@ fn unstable(machine: &Machine, design: &Design, at: Operation) -> Option<f64> {
 fn limit(machine: &Machine, design: &Design) -> Option<f64> {
     let amplifier = match machine.drives[0].amplifier.mode {
         AmplifierMode::Voltage => machine.drives[0].amplifier.voltage_limit,
-        AmplifierMode::Current => machine.drives[0].amplifier.current_limit,
+        AmplifierMode::Current | AmplifierMode::Position => machine.drives[0].amplifier.current_limit,
     };
     let amplifier = amplifier.map(|limit| limit / machine.drives[0].amplifier.gain.abs());
     [design.limit, amplifier].into_iter().flatten().reduce(f64::min)

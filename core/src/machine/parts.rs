@@ -46,6 +46,16 @@ impl Machine {
                     is_rotor: true,
                 });
             }
+            if unit.motor.stepper.is_some() {
+                springs.push(Spring {
+                    label: at.label,
+                    arms: vec![(shaft, 1.0)],
+                    stiffness: 0.0,
+                    damping: 0.0,
+                    law: SpringLaw::Angle { at: 0.0 },
+                    follows: None,
+                });
+            }
             let &DriveAt { label, voltage, current, pulley, .. } = at;
             let (motor, amplifier) = (unit.motor, unit.amplifier);
             drives.push(Drive { label, voltage, current, pulley, shaft, motor, amplifier });
@@ -153,6 +163,8 @@ impl Machine {
         let loads = geometry.slides.iter().map(|slide| Shown::Speed(slide.body, 1.0));
         let currents = (0..mechanism.drives.len()).map(Shown::Current);
         let shafts = mechanism.drives.iter().map(|drive| Shown::Speed(drive.shaft, 1.0));
+        // A stepper's phases have voltages of their own: there is its command.
+        let supply = |drive: &Drive| if drive.motor.stepper.is_some() { Shown::Input(0) } else { Shown::Voltage(0) };
         match &mechanism.drives[..] {
             [drive] => loads
                 .chain([Shown::Speed(drive.pulley, self.pulley_radius)])
@@ -160,7 +172,7 @@ impl Machine {
                 .chain(forces)
                 .chain(currents)
                 .chain(shafts)
-                .chain([Shown::Voltage(0), Shown::Position(geometry.cart(), 1.0)])
+                .chain([supply(drive), Shown::Position(geometry.cart(), 1.0)])
                 .collect(),
             _ => {
                 let stretches = geometry.telling_spans().map(Shown::Stretch);
@@ -189,7 +201,7 @@ impl Machine {
         let mut columns = Vec::new();
         let mut add = |name: String, unit, shown, lean| columns.push(Heading { name: name.into(), unit, shown, lean });
         add("time".into(), "s", Shown::Time, true);
-        for (drive, (at, _)) in drives() {
+        for (drive, (at, _)) in drives().filter(|(_, (_, part))| part.motor.stepper.is_none()) {
             add(at.voltage.key.into(), "V", Shown::Voltage(drive), true);
         }
         for (body, BodyAt { label, .. }) in bodies.iter().enumerate() {
@@ -200,6 +212,9 @@ impl Machine {
         }
         for (drive, (at, _)) in drives() {
             add(at.current_column.into(), "A", Shown::Current(drive), true);
+        }
+        for (drive, (at, _)) in drives().filter(|(_, (_, part))| part.motor.stepper.is_some()) {
+            add(format!("{}second_phase_current", at.prefix), "A", Shown::SecondPhase(drive), true);
         }
         let alike = |span: usize| self.span_alike(span).unwrap_or(span);
         for (span, at) in spans.iter().enumerate() {

@@ -155,7 +155,8 @@ impl Rigid {
     pub fn command_by<C: Calculator>(&self, c: &mut C, force: C::N, rate: C::N, speed: C::N) -> C::N {
         let (current, voltage) = self.electrical_by(c, force, rate, speed);
         match self.mode {
-            AmplifierMode::Current => current / self.gain,
+            // Whoever commands forces takes no stepper: this is never asked of one.
+            AmplifierMode::Current | AmplifierMode::Position => current / self.gain,
             AmplifierMode::Voltage => voltage / self.gain,
         }
     }
@@ -169,7 +170,7 @@ impl Rigid {
     pub fn drag(&self) -> f64 {
         self.viscous[0]
             + match self.mode {
-                AmplifierMode::Current => 0.0,
+                AmplifierMode::Current | AmplifierMode::Position => 0.0,
                 AmplifierMode::Voltage => self.force_per_ampere * self.brake / self.resistance,
             }
     }

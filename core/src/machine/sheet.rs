@@ -300,6 +300,7 @@ impl SimpleDrive {
             gear_efficiency: 1.0,
             gear_play: None,
             is_simple: true,
+            stepper: None,
         }
     }
 

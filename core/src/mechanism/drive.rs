@@ -1,6 +1,8 @@
 //! A motor with its gear, and the amplifier that feeds it.
 
-/// A brushed DC motor with a gear, eq. (4) and beyond.
+use std::f64::consts::{PI, SQRT_2};
+
+/// A brushed DC motor with a gear, eq. (4) and beyond; or a stepper, whose numbers are those of one of its phases.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Motor {
     /// Torque constant K_t, N m/A.
@@ -21,6 +23,62 @@ pub struct Motor {
     pub gear_play: Option<GearPlay>,
     /// True if it only stands for a drive that is given by force and drag, so that its own numbers mean nothing.
     pub is_simple: bool,
+    /// The two phases of a stepper that is told a position; none for a brushed motor.
+    pub stepper: Option<Stepper>,
+}
+
+impl Motor {
+    /// Holding torque of a stepper with both phases at rated current, N m: T_h = √2 K_m I.
+    pub fn holding_torque(&self) -> Option<f64> {
+        self.stepper.map(|stepper| self.torque_constant * stepper.amplitude())
+    }
+
+    /// Sets K_m = T_h/(√2 I), the torque and the back-EMF constant of each phase of a stepper.
+    pub fn set_holding_torque(&mut self, torque: f64) {
+        if let Some(stepper) = self.stepper {
+            self.torque_constant = torque / stepper.amplitude();
+            self.back_emf_constant = self.torque_constant;
+        }
+    }
+}
+
+/// The phases of a hybrid stepper with its driver, beyond what [`Motor`] and [`Amplifier`] have.
+///
+/// Two phases, a quarter of a tooth pitch apart; N = `steps_per_turn`/4 rotor teeth. The angle is zero where both phases
+/// carry the rated current, a full step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stepper {
+    /// Full steps per turn, 4 N.
+    pub steps_per_turn: f64,
+    /// Rated current I of each phase, A, with both phases on.
+    pub rated_current: f64,
+    /// Amplitude T_d of the detent torque, N m: four periods per tooth pitch.
+    pub detent_torque: f64,
+    /// Microsteps per full step.
+    pub microsteps: f64,
+}
+
+impl Stepper {
+    /// Full steps in a tooth pitch.
+    pub const STEPS_PER_TOOTH: i32 = 4;
+
+    /// Bandwidth of the chopper's current regulator, Hz: a third of a usual chopping frequency of 30 kHz.
+    pub const CHOPPER_BANDWIDTH: f64 = 1e4;
+
+    /// Number of rotor teeth N.
+    pub fn teeth(&self) -> f64 {
+        self.steps_per_turn / f64::from(Self::STEPS_PER_TOOTH)
+    }
+
+    /// The amplitude of the phase currents, A: √2 I, so that the copper loss is that of both phases at I at any angle.
+    pub fn amplitude(&self) -> f64 {
+        SQRT_2 * self.rated_current
+    }
+
+    /// Angle of a microstep, rad.
+    pub fn microstep(&self) -> f64 {
+        2.0 * PI / (self.steps_per_turn * self.microsteps)
+    }
 }
 
 /// A gear with play and stiffness, seen from the drive pulley.
@@ -63,6 +121,8 @@ pub enum AmplifierMode {
     Voltage,
     /// The output is the motor's current.
     Current,
+    /// A stepper's driver: the input is the position that the motor is told to go to, m at the belt.
+    Position,
 }
 
 impl AmplifierMode {
@@ -71,6 +131,7 @@ impl AmplifierMode {
         match self {
             AmplifierMode::Voltage => "V",
             AmplifierMode::Current => "A",
+            AmplifierMode::Position => "m",
         }
     }
 }

@@ -32,6 +32,7 @@ impl Mechanism {
         let (limit, bound) = match amplifier.mode {
             AmplifierMode::Voltage => (now.voltage, amplifier.voltage_limit),
             AmplifierMode::Current => (now.current, amplifier.current_limit),
+            AmplifierMode::Position => (Limit::Inside, None),
         };
         match (limit, bound) {
             (Limit::Inside, _) | (_, None) => self.command(drive),
@@ -39,11 +40,11 @@ impl Mechanism {
         }
     }
 
-    /// Armature current, A.
+    /// Armature current, A; of a stepper that of its first phase.
     pub fn current(&self, drive: usize, mode: &Mode) -> Form {
         let Drive { motor, amplifier, .. } = &self.drives[drive];
         if self.drives[drive].has_current_state() {
-            return Form::current(drive);
+            return Form::current(self.first_current(drive));
         }
         // i = (v − K_e n φ̇) / R                                                    in (4)
         let at = |voltage: Form| (voltage - self.back_emf(drive)) * (1.0 / motor.resistance);
@@ -54,26 +55,26 @@ impl Mechanism {
             (AmplifierMode::Current, side, _) => {
                 at(Form::constant(side.sign() * amplifier.voltage_limit.unwrap_or(0.0)))
             }
+            // Its currents are states.
+            (AmplifierMode::Position, ..) => Form::ZERO,
         }
     }
 
     /// The voltage over the inductance at the terminal voltage `voltage`: v − R i − K_e n φ̇.
     fn left_for_inductance(&self, drive: usize, voltage: Form) -> Form {
-        voltage - Form::current(drive) * self.drives[drive].motor.resistance - self.back_emf(drive)
+        voltage - Form::current(self.first_current(drive)) * self.drives[drive].motor.resistance - self.back_emf(drive)
     }
 
     /// di/dt of a current loop that is not limited by voltage: 2π f_b (i_ref − i).
     fn loop_rate(&self, drive: usize, mode: &Mode) -> Form {
         let bandwidth = self.drives[drive].amplifier.bandwidth.unwrap_or(0.0);
-        (self.commanded(drive, mode) - Form::current(drive)) * (2.0 * PI * bandwidth)
+        (self.commanded(drive, mode) - Form::current(self.first_current(drive))) * (2.0 * PI * bandwidth)
     }
 
-    /// di/dt, A/s; zero where the current is no state.
-    pub(super) fn current_rate(&self, drive: usize, mode: &Mode) -> Form {
+    /// di/dt of a current by its number, A/s; zero where it is no state. Of a stepper's phase what is linear of it.
+    pub(super) fn current_rate(&self, number: usize, mode: &Mode) -> Form {
+        let Some(drive) = self.drive_of_current(number) else { return Form::ZERO };
         let Drive { motor, amplifier, .. } = &self.drives[drive];
-        if !self.drives[drive].has_current_state() {
-            return Form::ZERO;
-        }
         match (amplifier.mode, mode.drive[drive].voltage, mode.drive[drive].current) {
             // L di/dt = v − R i − K_e n φ̇
             (AmplifierMode::Voltage, _, Limit::Inside) => {
@@ -86,19 +87,22 @@ impl Mechanism {
                 let most = Form::constant(side.sign() * amplifier.voltage_limit.unwrap_or(0.0));
                 self.left_for_inductance(drive, most) * (1.0 / motor.inductance)
             }
+            (AmplifierMode::Position, ..) => Form::current(number) * (-motor.resistance / motor.inductance),
         }
     }
 
-    /// Voltage at the motor's terminals, V: R i + L di/dt + K_e n φ̇, or what the amplifier puts there.
+    /// Voltage at the motor's terminals, V: R i + L di/dt + K_e n φ̇, or what the amplifier puts there. Zero of a stepper,
+    /// the voltages of whose phases are no linear forms.
     pub fn voltage(&self, drive: usize, mode: &Mode) -> Form {
         let Drive { motor, amplifier, .. } = &self.drives[drive];
         let now = &mode.drive[drive];
         let follows = || {
             self.current(drive, mode) * motor.resistance
-                + self.current_rate(drive, mode) * motor.inductance
+                + self.current_rate(self.first_current(drive), mode) * motor.inductance
                 + self.back_emf(drive)
         };
         match (amplifier.mode, now.voltage, now.current) {
+            (AmplifierMode::Position, ..) => Form::ZERO,
             (AmplifierMode::Voltage, _, Limit::Inside) => self.commanded(drive, mode),
             (AmplifierMode::Current, Limit::Low | Limit::High, _) => {
                 Form::constant(now.voltage.sign() * amplifier.voltage_limit.unwrap_or(0.0))
@@ -134,7 +138,7 @@ impl Mechanism {
                 force.constant += constant;
                 force
             }
-            SpringLaw::Bounds { .. } | SpringLaw::None => Form::ZERO,
+            SpringLaw::Bounds { .. } | SpringLaw::Angle { .. } | SpringLaw::None => Form::ZERO,
         }
     }
 
@@ -197,7 +201,7 @@ impl Mechanism {
                 SpringLaw::TwoSided => true,
                 SpringLaw::Tension { .. } => !mode.slack[index],
                 SpringLaw::Gap { .. } => mode.contact[index].code() != 0,
-                SpringLaw::Line { .. } | SpringLaw::Bounds { .. } | SpringLaw::None => false,
+                SpringLaw::Line { .. } | SpringLaw::Bounds { .. } | SpringLaw::Angle { .. } | SpringLaw::None => false,
             };
             stiffness[index] = if carries { spring.stiffness } else { 0.0 };
         }
@@ -211,6 +215,7 @@ impl Mechanism {
         let mut watch =
             |form: Form, cause: Cause| guards.push(Guard { form, transition: self.transition(cause, mode) });
         for drive in 0..self.drives.len() {
+            self.watch_steps(drive, mode, &mut watch);
             let mut switch = |form: Form, switch: Switch| watch(form, Cause::Switch(switch));
             self.watch_limits(drive, mode, &mut switch);
         }
@@ -240,7 +245,7 @@ impl Mechanism {
                         watch(-beyond, Cause::Leave(index));
                     }
                 }
-                SpringLaw::TwoSided | SpringLaw::None => {}
+                SpringLaw::TwoSided | SpringLaw::Angle { .. } | SpringLaw::None => {}
             }
         }
     }
@@ -255,7 +260,10 @@ impl Mechanism {
                 }
                 match amplifier.current_limit {
                     Some(bound) if self.drives[drive].has_current_state() => match now.current {
-                        Limit::Inside => watch_limit(Limit::Inside, Form::current(drive), bound, current, watch),
+                        Limit::Inside => {
+                            let own = Form::current(self.first_current(drive));
+                            watch_limit(Limit::Inside, own, bound, current, watch);
+                        }
                         // At the limit, the current stands as long as the voltage would drive it further.
                         side => watch(
                             self.left_for_inductance(drive, self.commanded(drive, mode)) * side.sign(),
@@ -281,6 +289,7 @@ impl Mechanism {
                     watch_limit(now.voltage, self.voltage(drive, &inside), bound, voltage, watch);
                 }
             }
+            AmplifierMode::Position => {}
         }
     }
 }

@@ -1,6 +1,6 @@
 //! The equations of motion of each mode, and what ends it.
 
-use super::{BODIES, Cause, Contact, DRIVES, Drive, Form, Guard, Mechanism, Mode, SPRINGS, SpringLaw, State};
+use super::{BODIES, CURRENTS, Cause, Contact, Drive, Form, Guard, Mechanism, Mode, SPRINGS, SpringLaw, State};
 use crate::friction::{Motion, Side};
 
 /// The equations in one mode: accelerations, rates of currents, and what must stay true.
@@ -8,8 +8,8 @@ use crate::friction::{Motion, Side};
 pub struct Equations {
     /// q̈ of each body.
     pub acceleration: [Form; BODIES],
-    /// di/dt of each drive; zero where the current is no state.
-    pub current_rate: [Form; DRIVES],
+    /// di/dt of each current; zero where it is no state.
+    pub current_rate: [Form; CURRENTS],
     /// Inertia of each body, with what is geared to it.
     pub inertia: [f64; BODIES],
     /// Stiffness of each spring that stores energy in this mode.
@@ -96,7 +96,8 @@ impl Mechanism {
 
     fn own_load(&self, forces: &[Form; SPRINGS], body: usize, forward: bool, mode: &Mode) -> Form {
         let mut load = Form::ZERO;
-        for (index, drive) in self.drives.iter().enumerate().filter(|(_, drive)| drive.shaft == body) {
+        let linear = |drive: &Drive| drive.motor.stepper.is_none();
+        for (index, drive) in self.drives.iter().enumerate().filter(|(_, drive)| drive.shaft == body && linear(drive)) {
             // τ_M = e n K_t i                                                   (4) with a gear
             let e = match drive.has_rotor() {
                 true => 1.0,
@@ -281,9 +282,9 @@ impl Mechanism {
             }
         }
         self.watch_elements(&mode, &mut guards);
-        let mut current_rate = [Form::ZERO; DRIVES];
-        for (drive, rate) in current_rate.iter_mut().enumerate().take(self.drives.len()) {
-            *rate = self.current_rate(drive, &mode);
+        let mut current_rate = [Form::ZERO; CURRENTS];
+        for (number, rate) in current_rate.iter_mut().enumerate() {
+            *rate = self.current_rate(number, &mode);
         }
         Equations { acceleration, current_rate, inertia, stiffness: self.stiffness_in(&mode), guards, load: loads }
     }

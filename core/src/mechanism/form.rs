@@ -1,7 +1,7 @@
 //! Linear forms of the state: forces written as the paper writes them, and evaluated, differentiated and bounded by
 //! machine.
 
-use super::{BODIES, DRIVES, Layout, Mechanism, SPRINGS, State};
+use super::{BODIES, CURRENTS, DRIVES, Layout, Mechanism, SPRINGS, State};
 use std::ops::{Add, Mul, Neg, Sub};
 
 /// A force, torque, current or rate as a linear form of the springs' lengths, speeds, currents, inputs, and one.
@@ -12,7 +12,7 @@ pub struct Form {
     /// Coefficients of the bodies' speeds.
     pub speed: [f64; BODIES],
     /// Coefficients of the armature currents, where they are states.
-    pub current: [f64; DRIVES],
+    pub current: [f64; CURRENTS],
     /// Coefficients of the inputs.
     pub input: [f64; DRIVES],
     /// The constant part.
@@ -24,7 +24,7 @@ impl Form {
     pub const ZERO: Form = Form {
         stretch: [0.0; SPRINGS],
         speed: [0.0; BODIES],
-        current: [0.0; DRIVES],
+        current: [0.0; CURRENTS],
         input: [0.0; DRIVES],
         constant: 0.0,
     };
@@ -43,10 +43,10 @@ impl Form {
         form
     }
 
-    /// The armature current of a drive as a state.
-    pub fn current(drive: usize) -> Form {
+    /// A current as a state, by its number.
+    pub fn current(number: usize) -> Form {
         let mut form = Form::ZERO;
-        form.current[drive] = 1.0;
+        form.current[number] = 1.0;
         form
     }
 

@@ -9,7 +9,7 @@
 //! c = (r φ₁ − x,  x − x₀,  x − r φ₃,  φ_r − φ₁)
 //! ```
 
-use super::{BODIES, DRIVES, Form, Kind, Mechanism, SPRINGS, State};
+use super::{BODIES, CURRENTS, DRIVES, Form, Kind, Mechanism, SPRINGS, State};
 
 /// Coefficients up to this share of those they come from are zero but for rounding.
 const NOTHING: f64 = 1e-12;
@@ -39,8 +39,8 @@ pub struct Layout {
     pub coordinate: [usize; BODIES],
     /// Place of each body's speed.
     pub speed: [usize; BODIES],
-    /// Place of each drive's current, where it is a state.
-    pub current: [Option<usize>; DRIVES],
+    /// Place of each current that is a state.
+    pub current: [Option<usize>; CURRENTS],
     /// Number of places.
     pub states: usize,
     /// Number of inputs.
@@ -53,10 +53,12 @@ impl Layout {
     pub fn new(mechanism: &Mechanism) -> Self {
         let bodies = mechanism.bodies.len();
         let held = mechanism.held_bodies().len();
-        let (mut current, mut currents) = ([None; DRIVES], 0);
-        for (index, _) in mechanism.drives.iter().enumerate().filter(|(_, drive)| drive.has_current_state()) {
-            current[index] = Some(2 * held + currents);
-            currents += 1;
+        let (mut current, mut currents) = ([None; CURRENTS], 0);
+        for (number, place) in current.iter_mut().enumerate() {
+            if mechanism.drive_of_current(number).is_some() {
+                *place = Some(2 * held + currents);
+                currents += 1;
+            }
         }
         let place = |body: usize| 2 * body + if body < held { 0 } else { currents };
         let mut layout = Self {

@@ -16,15 +16,17 @@ mod form;
 mod layout;
 mod mode;
 mod nudge;
+mod phases;
 mod power;
 mod transition;
 
-pub use drive::{Amplifier, AmplifierMode, GearPlay, Motor};
+pub use drive::{Amplifier, AmplifierMode, GearPlay, Motor, Stepper};
 pub use equations::Equations;
 pub use form::Form;
 pub use form::ROUNDING;
 pub use layout::{Layout, Replaced};
 pub use mode::{Cause, Contact, DriveMode, Guard, Limit, Mode, Part, Status, Switch, What};
+pub use phases::{PhaseRate, Phases};
 pub use power::Power;
 pub use transition::{After, Next, Place, Resets, Then, Transition};
 
@@ -39,6 +41,8 @@ pub const BODIES: usize = 6;
 pub const SPRINGS: usize = 8;
 /// Room for drives.
 pub const DRIVES: usize = 2;
+/// Room for currents that are states: one of each brushed motor, or both of a stepper.
+pub const CURRENTS: usize = DRIVES;
 
 /// Names of a part: for programs and for people.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -149,6 +153,11 @@ pub enum SpringLaw {
         /// Greatest length.
         high: f64,
     },
+    /// Never: its length is the angle of a stepper's rotor, rad.
+    Angle {
+        /// The angle where the length is zero.
+        at: f64,
+    },
     /// Never: its length is only looked at.
     None,
 }
@@ -226,14 +235,20 @@ impl Drive {
         match self.amplifier.mode {
             AmplifierMode::Voltage => self.motor.inductance > 0.0,
             AmplifierMode::Current => self.amplifier.bandwidth.is_some(),
+            AmplifierMode::Position => true,
         }
+    }
+
+    /// How many windings carry currents of their own.
+    pub fn windings(&self) -> usize {
+        if self.motor.stepper.is_some() { 2 } else { 1 }
     }
 
     /// True if its input differs from the voltage at its terminals, and is worth a column of its own.
     pub fn shows_input(&self) -> bool {
         let amplifier = &self.amplifier;
         amplifier.gain != 1.0
-            || amplifier.mode == AmplifierMode::Current
+            || amplifier.mode != AmplifierMode::Voltage
             || amplifier.voltage_limit.is_some()
             || amplifier.current_limit.is_some()
     }
@@ -248,8 +263,10 @@ pub enum Shown {
     Input(usize),
     /// Voltage at a motor's terminals, V.
     Voltage(usize),
-    /// Current of a motor, A.
+    /// Current of a motor, A; of a stepper that of its first phase.
     Current(usize),
+    /// Current of a stepper's second phase, A.
+    SecondPhase(usize),
     /// Way of a body, times a factor.
     Position(usize, f64),
     /// Speed of a body, times a factor.
@@ -290,8 +307,8 @@ pub struct State {
     pub position: [f64; BODIES],
     /// rad/s or m/s
     pub speed: [f64; BODIES],
-    /// A; only where the current is a state of its own.
-    pub current: [f64; DRIVES],
+    /// A; only where the current is a state of its own. In the order of the drives, both of a stepper one after the other.
+    pub current: [f64; CURRENTS],
 }
 
 /// Roles of parts, by index: loads, drives and spans. Metrics use them, with keys and names from
@@ -331,6 +348,7 @@ impl Mechanism {
     pub fn new(bodies: Vec<Body>, springs: Vec<Spring>, drives: Vec<Drive>) -> Self {
         assert!(bodies.len() <= BODIES && springs.len() <= SPRINGS && drives.len() <= DRIVES);
         assert!(bodies.iter().is_sorted_by_key(|body| body.is_rotor));
+        assert!(drives.iter().map(Drive::windings).sum::<usize>() <= CURRENTS);
         let mut friction = vec![(Friction::default(), Friction::default()); bodies.len()];
         for part in &bodies {
             let ((leader, ratio), mut own) = (part.leader, part.friction);
@@ -354,12 +372,30 @@ impl Mechanism {
     /// that is no state of its own.
     pub fn begun(&self, given: &State) -> State {
         let mut state = *given;
-        for (drive, current) in self.drives.iter().zip(&mut state.current) {
+        for drive in &self.drives {
             state.position[drive.shaft] = given.position[drive.pulley];
             state.speed[drive.shaft] = given.speed[drive.pulley];
-            *current = if drive.has_current_state() { *current } else { 0.0 };
         }
+        for (number, current) in state.current.iter_mut().enumerate() {
+            *current = if self.drive_of_current(number).is_some() { *current } else { 0.0 };
+        }
+        self.energise(&mut state);
         state
+    }
+
+    /// The first current of a drive, by its number.
+    pub fn first_current(&self, drive: usize) -> usize {
+        self.drives[..drive].iter().map(Drive::windings).sum()
+    }
+
+    /// The drive whose winding carries the current of this number, if that current is a state of its own.
+    pub fn drive_of_current(&self, number: usize) -> Option<usize> {
+        let ends = self.drives.iter().scan(0, |end, drive| {
+            *end += drive.windings();
+            Some(*end)
+        });
+        let drive = ends.take_while(|end| *end <= number).count();
+        (drive < self.drives.len() && self.drives[drive].has_current_state()).then_some(drive)
     }
 
     /// The body that this one moves with: itself, unless something makes several bodies one.
@@ -404,7 +440,9 @@ impl Mechanism {
     /// True if its equations are linear but for changes of mode: what the exact solver takes.
     pub fn is_piecewise_linear(&self) -> bool {
         let straight = |body: &Body| body.friction.is_piecewise_linear() && body.along.is_none();
-        self.bodies.iter().all(straight) && self.springs.iter().all(|spring| spring.follows.is_none())
+        self.bodies.iter().all(straight)
+            && self.springs.iter().all(|spring| spring.follows.is_none())
+            && self.drives.iter().all(|drive| drive.motor.stepper.is_none())
     }
 
     /// Length of a spring.
@@ -451,6 +489,7 @@ impl Mechanism {
                     (*low, *high) = (*low - shift, *high - shift);
                 }
                 SpringLaw::Line { over: Over::Length, line } => *line = line.shifted(shift),
+                SpringLaw::Angle { at } => *at += shift,
                 SpringLaw::Line { over: Over::Rate, .. }
                 | SpringLaw::TwoSided
                 | SpringLaw::Tension { .. }

@@ -27,11 +27,14 @@ pub struct DriveMode {
     pub voltage: Limit,
     /// State of the current limit.
     pub current: Limit,
+    /// Tooth pitches by which a stepper's rotor has fallen behind what it is told.
+    pub slipped: i32,
 }
 
 impl DriveMode {
     /// Drive within its limits, with positive gear torque.
-    pub const ORDINARY: Self = Self { torque_positive: true, voltage: Limit::Inside, current: Limit::Inside };
+    pub const ORDINARY: Self =
+        Self { torque_positive: true, voltage: Limit::Inside, current: Limit::Inside, slipped: 0 };
 }
 
 impl Mode {
@@ -65,6 +68,7 @@ impl Mode {
             What::Line(spring) => Status::Piece(self.piece[spring]),
             What::Voltage(drive) => Status::Limit(self.drive[drive].voltage),
             What::Current(drive) => Status::Limit(self.drive[drive].current),
+            What::Field(drive) => Status::Slipped(self.drive[drive].slipped),
         }
     }
 
@@ -76,6 +80,7 @@ impl Mode {
             Switch::Line(spring, piece) => self.piece[spring] = piece,
             Switch::Voltage(drive, limit) => self.drive[drive].voltage = limit,
             Switch::Current(drive, limit) => self.drive[drive].current = limit,
+            Switch::Field(drive, slipped) => self.drive[drive].slipped = slipped,
         }
     }
 }
@@ -146,6 +151,8 @@ pub enum What {
     Voltage(usize),
     /// A drive's current limit.
     Current(usize),
+    /// The field of a stepper, which its rotor follows.
+    Field(usize),
 }
 
 /// A part of a mechanism that can change what it does.
@@ -165,6 +172,7 @@ impl Part {
             What::Span(spring) | What::Gap(spring) | What::Line(spring) => mechanism.springs[spring].label,
             What::Voltage(drive) => mechanism.drives[drive].voltage,
             What::Current(drive) => mechanism.drives[drive].current,
+            What::Field(drive) => mechanism.drives[drive].label,
         };
         Self { what, label }
     }
@@ -193,6 +201,8 @@ pub enum Status {
     Contact(Contact),
     /// Of a line: which piece.
     Piece(u8),
+    /// Of a stepper: by how many tooth pitches, four full steps each, its rotor is behind.
+    Slipped(i32),
 }
 
 impl Status {
@@ -205,6 +215,15 @@ impl Status {
             Status::Limit(limit) => limit.sign() as i8,
             Status::Contact(contact) => contact.code(),
             Status::Piece(_) => 0,
+            Status::Slipped(pitches) => pitches.clamp(i32::from(i8::MIN), i32::from(i8::MAX)) as i8,
+        }
+    }
+
+    /// Whether nothing that shows differs.
+    pub fn shows_as(self, other: Status) -> bool {
+        match (self, other) {
+            (Status::Slipped(own), Status::Slipped(other)) => own == other,
+            _ => self.code() == other.code(),
         }
     }
 
@@ -219,6 +238,9 @@ impl Status {
             Status::Limit(Limit::Low) => "at the negative limit",
             Status::Contact(contact) => ["negative side", "apart", "positive side"][(contact.code() + 1) as usize],
             Status::Piece(_) => "on a piece of its line",
+            Status::Slipped(0) => "in step",
+            Status::Slipped(1..) => "behind by lost steps",
+            Status::Slipped(_) => "ahead by lost steps",
         }
     }
 }
@@ -257,8 +279,8 @@ pub enum Cause {
 
 impl Cause {
     /// Room for the kinds that [`Cause::kind`] tells apart: two for each body, one for each gear, three each for a
-    /// drive's limits and for a spring.
-    pub(crate) const KINDS: usize = 2 * BODIES + 7 * DRIVES + 3 * SPRINGS;
+    /// drive's limits and for a spring, two for a stepper's field.
+    pub(crate) const KINDS: usize = 2 * BODIES + 9 * DRIVES + 3 * SPRINGS;
 
     /// Which condition it belongs to; breakaway forward stands with the body, breakaway backward, which may be of quite
     /// another size, by itself.
@@ -266,6 +288,7 @@ impl Cause {
         const GEAR: usize = 2 * BODIES;
         const LIMITS: usize = GEAR + DRIVES;
         const SPRING: usize = LIMITS + 6 * DRIVES;
+        const FIELD: usize = SPRING + 3 * SPRINGS;
         let limit = |limit| match limit {
             Limit::Inside => 0,
             Limit::High => 1,
@@ -284,6 +307,8 @@ impl Cause {
             Cause::Switch(Switch::Current(drive, to)) => LIMITS + 6 * drive + 3 + limit(to),
             Cause::Switch(Switch::Span(spring, _)) | Cause::Leave(spring) => SPRING + 3 * spring,
             Cause::Switch(Switch::Gap(spring, to)) => SPRING + 3 * spring + contact(to),
+            // The neighbours of a number differ by two.
+            Cause::Switch(Switch::Field(drive, to)) => FIELD + 2 * drive + usize::from(to.rem_euclid(4) >= 2),
             // The piece before, this one, the one behind: no two of them alike.
             Cause::Switch(Switch::Line(spring, to)) => SPRING + 3 * spring + usize::from(to % 3),
         }
@@ -324,6 +349,8 @@ pub enum Switch {
     Voltage(usize, Limit),
     /// The current limit of a drive.
     Current(usize, Limit),
+    /// The rotor of a stepper falls to another tooth: so many pitches behind.
+    Field(usize, i32),
 }
 
 impl Switch {
@@ -335,6 +362,7 @@ impl Switch {
             Switch::Line(spring, _) => What::Line(spring),
             Switch::Voltage(drive, _) => What::Voltage(drive),
             Switch::Current(drive, _) => What::Current(drive),
+            Switch::Field(drive, _) => What::Field(drive),
         }
     }
 }

@@ -73,9 +73,9 @@ impl Mechanism {
             (0..self.bodies.len()).map(|body| self.whole_inertia(body) * state.speed[body].powi(2)).sum();
         let elastic: f64 =
             (0..self.springs.len()).map(|j| self.springs[j].stiffness * self.strain(j, state).strain.powi(2)).sum();
-        let magnetic: f64 = (self.drives.iter().zip(state.current))
-            .filter(|(drive, _)| drive.has_current_state())
-            .map(|(drive, current)| drive.motor.inductance * current.powi(2))
+        let magnetic: f64 = (state.current.iter().enumerate())
+            .filter_map(|(number, current)| Some((self.drive_of_current(number)?, current)))
+            .map(|(drive, current)| self.drives[drive].motor.inductance * current.powi(2))
             .sum();
         0.5 * (kinetic + elastic + magnetic)
     }
@@ -95,12 +95,12 @@ impl Mechanism {
                 let beyond = (length - high).max(0.0) + (length - low).min(0.0);
                 (beyond, beyond)
             }
-            SpringLaw::Line { .. } | SpringLaw::Bounds { .. } | SpringLaw::None => (0.0, 0.0),
+            SpringLaw::Line { .. } | SpringLaw::Bounds { .. } | SpringLaw::Angle { .. } | SpringLaw::None => (0.0, 0.0),
         };
         Strain { way, strain, rate }
     }
 
-    /// The power balance at `state` under `input` in `mode`.
+    /// The power balance at `state` under `input` in `mode`, of a machine with brushed motors.
     pub fn power(&self, mode: Mode, state: &State, input: &[f64; DRIVES]) -> Power {
         let equations = self.equations(mode);
         let acceleration = equations.acceleration.map(|form| form.value(self, state, input));
@@ -128,10 +128,10 @@ impl Mechanism {
             let motor = &drive.motor;
             let n = motor.gear_ratio;
             let i = self.current(index, &mode).value(self, state, input);
-            let di = equations.current_rate[index].value(self, state, input);
+            let di = equations.current_rate[self.first_current(index)].value(self, state, input);
             let shaft = state.speed[drive.shaft];
             let voltage = match (drive.amplifier.mode, mode.drive[index].current) {
-                (AmplifierMode::Current, _) | (_, Limit::Low | Limit::High) => {
+                (AmplifierMode::Current | AmplifierMode::Position, _) | (_, Limit::Low | Limit::High) => {
                     motor.resistance * i + motor.inductance * di + motor.back_emf_constant * n * shaft
                 }
                 (AmplifierMode::Voltage, Limit::Inside) => self.voltage(index, &mode).value(self, state, input),

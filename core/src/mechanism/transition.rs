@@ -60,7 +60,7 @@ pub enum Resets {
 pub enum Place {
     /// Speed of a body.
     Speed(usize),
-    /// Current of a drive.
+    /// Current of a drive, by the number of its winding.
     Current(usize),
 }
 
@@ -85,7 +85,7 @@ impl Resets {
         let (leader, current) = match self {
             Resets::None => (None, None),
             Resets::Speeds(body) => (Some(body), None),
-            Resets::Current(drive, value) => (None, Some((Place::Current(drive), value))),
+            Resets::Current(drive, value) => (None, Some((Place::Current(mechanism.first_current(drive)), value))),
         };
         let speeds = leader.into_iter().flat_map(|body| mechanism.followers(body));
         speeds.map(|body| (Place::Speed(body), 0.0)).chain(current)

@@ -102,6 +102,8 @@ pub struct FigureRow {
     pub again_on_an_axis: bool,
     /// True if only a machine with one drive has it.
     pub one_drive: bool,
+    /// Whether only a machine with a stepper has it.
+    pub stepper: bool,
     /// Its value for the part of this place.
     pub of: fn(&Metrics, usize) -> Worth,
     /// The quantity to follow for it; for a row of the whole machine, of all parts.
@@ -111,7 +113,8 @@ pub struct FigureRow {
 type Of = fn(&Metrics, usize) -> Worth;
 
 const fn row(role: Role, name: &'static str, unit: &'static str, words: &'static str, of: Of) -> FigureRow {
-    FigureRow { role, name, unit, words, of_axis: None, again_on_an_axis: false, one_drive: false, of, seek: None }
+    let (again_on_an_axis, one_drive, stepper) = (false, false, false);
+    FigureRow { role, name, unit, words, of_axis: None, again_on_an_axis, one_drive, stepper, of, seek: None }
 }
 
 impl FigureRow {
@@ -129,6 +132,10 @@ impl FigureRow {
 
     const fn of_one_drive(self) -> Self {
         Self { one_drive: true, ..self }
+    }
+
+    const fn of_steppers(self) -> Self {
+        Self { stepper: true, ..self }
     }
 }
 
@@ -159,6 +166,10 @@ pub static FIGURES: &[FigureRow] = &[
     row(Whole, "peak_belt_force", "N", "largest force in the belt", |m, _| Worth::Peak(m.largest_force().1)).seeking(Seek::Force),
     row(Motor, "peak_*_current", "A", "peak current of the *", |m, k| Worth::Peak(m.drives[k].peak_current)).seeking(Seek::Current)
         .on_an_axis("peak_motor_current", "peak motor current"),
+    row(Whole, "lost_steps", "", "full steps lost at the end", |m, _| Number(m.stepper.map_or(f64::NAN, |own| own.lost_steps as f64))).of_steppers(),
+    row(Whole, "in_step", "", "in step all the way", |m, _| Flag(m.stepper.is_some_and(|own| own.slips == 0))).of_steppers(),
+    row(Whole, "position_error", "m", "position told minus cart at the end", |m, _| Number(m.stepper.map_or(f64::NAN, |own| own.position_error)))
+        .of_steppers(),
     row(Whole, "stop_time", "s", "time of the last stop", |m, _| Number(m.stop_time.unwrap_or(f64::NAN))).seeking(Seek::StopTime),
     row(Whole, "settled", "", "at rest at the end", |m, _| Flag(m.settled)),
     row(Body, "*_stops", "", "stops of the *", |m, k| Number(m.bodies[k].stops as f64)),
@@ -217,10 +228,11 @@ fn parts(geometry: &Geometry, role: Role) -> Vec<(&'static str, String)> {
     labels.into_iter().map(|label| (label.key, named(label.name))).collect()
 }
 
-/// The key figures of a kind of machine, in the order of the list, then of the parts.
-pub fn figures(kind: Kind) -> Vec<Figure> {
+/// The key figures of a kind of machine, with steppers or without, in the order of the list, then of the parts.
+pub fn figures(kind: Kind, has_stepper: bool) -> Vec<Figure> {
     let geometry = kind.geometry();
-    let rows = FIGURES.iter().filter(|row| !row.one_drive || geometry.drives.len() == 1);
+    let has = move |row: &&FigureRow| (!row.one_drive || geometry.drives.len() == 1) && (!row.stepper || has_stepper);
+    let rows = FIGURES.iter().filter(has);
     let of_parts = |row: &'static FigureRow| {
         parts(geometry, row.role).into_iter().enumerate().map(move |(place, (part, name))| {
             let by_role = row.name.replace('*', part);

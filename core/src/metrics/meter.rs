@@ -2,12 +2,12 @@
 
 use super::rotor::Rotor;
 use super::steady::{Held, Plateau};
-use super::{EventCount, Metrics, NEWS, OfDrive, OfLoad, OfSpan, Peak, Seek};
+use super::{EventCount, Metrics, NEWS, OfDrive, OfLoad, OfSpan, OfStepper, Peak, Seek};
 use crate::friction::Motion;
-use crate::machine::Machine;
-use crate::mechanism::{Mechanism, Mode, Shown, State};
+use crate::machine::{Machine, Stepper};
+use crate::mechanism::{Mechanism, Mode, Shown, State, Status};
 use crate::plan::Experiment;
-use crate::solve::{Closer, Curve, Event, Gap, Gaps, Observe, Polynomial, QUANTITIES, Reading, Stretch};
+use crate::solve::{Closer, Curve, Event, Gap, Gaps, Observe, Polynomial, QUANTITIES, Reading, Stretch, reading};
 use std::sync::Arc;
 
 /// Where the peak of a quantity is sought: in a reading, or in a sum of readings.
@@ -182,6 +182,8 @@ pub struct Meter {
     sums: Vec<Peak>,
     plateau: Option<Plateau>,
     rotors: Vec<(usize, Rotor)>,
+    /// The last commanded position of a stepper, m.
+    told: Option<f64>,
     /// True if any body slid or was free.
     moved: bool,
     end: f64,
@@ -205,6 +207,7 @@ impl Meter {
             sums: vec![Peak::default(); sums],
             plateau: held.filter(|_| sought.steady_speed).map(Plateau::new),
             rotors: sought.places.rotors.iter().map(|&(body, reading)| (body, Rotor::new(reading))).collect(),
+            told: machine.stepper().map(|_| 0.0),
             moved: false,
             end: 0.0,
             state: State::default(),
@@ -288,10 +291,24 @@ impl Meter {
             steady_speed: self.plateau.as_ref().and_then(|plateau| plateau.steady_speed(machine)),
             stop_time: last.map(|time| time.max(turned)).filter(|_| settled),
             settled,
+            stepper: self.told.map(|told| of_stepper(events, told - state.position[geometry.cart()])),
             bodies_rest: self.bodies_rest,
             rotors_rest,
         }
     }
+}
+
+/// The figures of a stepper with these events and this error at the end.
+fn of_stepper(events: &[Event], position_error: f64) -> OfStepper {
+    let mut own = OfStepper { position_error, ..OfStepper::default() };
+    for event in events {
+        if let (Status::Slipped(from), Status::Slipped(to)) = (event.from, event.to) {
+            own.first_slip = own.first_slip.or(Some(event.time));
+            own.slips += u64::from(to.abs_diff(from));
+            own.lost_steps = i64::from(to) * i64::from(Stepper::STEPS_PER_TOOTH);
+        }
+    }
+    own
 }
 
 /// A sum of what is read.
@@ -343,6 +360,9 @@ impl Observe for Meter {
 
     fn pass(&mut self, gap: &Gap) -> bool {
         let end = gap.begin + gap.length;
+        if let Some(told) = &mut self.told {
+            *told = gap.to[reading::VOLTAGE];
+        }
         let (news, mut closer) = gap.rises_above(&self.heights(), [1.0 - NEWS, 1.0 + NEWS]);
         if news {
             for (q, peak) in self.sought() {

@@ -166,7 +166,8 @@ impl Balance {
 /// Everything slides in the direction of the input, by its friction law, and limits of voltage and current hold. Where
 /// a law's curve lets the forces balance at several speeds, it is the one that the axis comes to from `near`, m/s.
 pub fn balanced_speed(machine: &Machine, input: f64, near: f64) -> Balance {
-    if machine.changes_along_travel() || machine.cart.forces.by_speed.is_some() {
+    let is_stepper = machine.drives[0].motor.stepper.is_some();
+    if machine.changes_along_travel() || machine.cart.forces.by_speed.is_some() || is_stepper {
         return Balance::Changing;
     }
     let (motor, amplifier) = (&machine.drives[0].motor, &machine.drives[0].amplifier);
@@ -185,7 +186,7 @@ pub fn balanced_speed(machine: &Machine, input: f64, near: f64) -> Balance {
         (per_volt * voltage, per_volt * motor.back_emf_constant * n)
     };
     let (command, bound) = match amplifier.mode {
-        AmplifierMode::Current => {
+        AmplifierMode::Current | AmplifierMode::Position => {
             (at_current(least(output.abs(), amplifier.current_limit)), amplifier.voltage_limit.map(at_voltage))
         }
         AmplifierMode::Voltage => {

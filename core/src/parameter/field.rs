@@ -1,7 +1,7 @@
 //! Location of a parameter in a machine, with access to it.
 
 use crate::friction::{Friction, Law, Shape, decay_of_velocity, velocity_of_decay};
-use crate::machine::{Belt, BeltModel, Machine, SimpleDrive};
+use crate::machine::{Amplifier, AmplifierMode, Belt, BeltModel, Machine, Motor, SimpleDrive};
 
 /// Location of a parameter in a machine.
 #[derive(Debug, Clone, Copy)]
@@ -198,11 +198,11 @@ macro_rules! of_drive {
     };
 }
 
-/// A number of each motor.
+/// A number of each brushed motor.
 macro_rules! motor {
     ($name:ident) => {
-        of_drive!(motor, |motor| (!motor.is_simple).then_some(motor.$name), |motor, value| {
-            if !motor.is_simple {
+        of_drive!(motor, |motor| is_brushed(motor).then_some(motor.$name), |motor, value| {
+            if is_brushed(motor) {
                 motor.$name = value;
             }
         })
@@ -211,6 +211,24 @@ macro_rules! motor {
         of_drive!(motor, |motor| motor.gear_play.map(|play| play.$name), |motor, value| {
             if let Some(play) = &mut motor.gear_play {
                 play.$name = value;
+            }
+        })
+    };
+}
+
+/// A number of each stepper: one of its motor's, or one that only steppers have.
+macro_rules! stepper {
+    ($name:ident) => {
+        of_drive!(motor, |motor| motor.stepper.map(|stepper| stepper.$name), |motor, value| {
+            if let Some(stepper) = &mut motor.stepper {
+                stepper.$name = value;
+            }
+        })
+    };
+    (motor $name:ident) => {
+        of_drive!(motor, |motor| motor.stepper.map(|_| motor.$name), |motor, value| {
+            if motor.stepper.is_some() {
+                motor.$name = value;
             }
         })
     };
@@ -230,8 +248,10 @@ macro_rules! of_simple {
 /// A number of each amplifier that it need not have.
 macro_rules! amplifier {
     ($name:ident) => {
-        of_drive!(amplifier, |amplifier| amplifier.$name, |amplifier, value| {
-            amplifier.$name = amplifier.$name.map(|_| value)
+        of_drive!(amplifier, |amplifier| amplifier.$name.filter(|_| is_amplifier(amplifier)), |amplifier, value| {
+            if is_amplifier(amplifier) {
+                amplifier.$name = amplifier.$name.map(|_| value)
+            }
         })
     };
 }
@@ -321,7 +341,26 @@ macro_rules! of_law {
     };
 }
 
-pub(super) use {always, amplifier, make, motor, of_drive, of_friction, of_law, of_simple, of_slide, part};
+pub(super) use {always, amplifier, make, motor, of_drive, of_friction, of_law, of_simple, of_slide, part, stepper};
+
+/// Whether a motor has the numbers of `[motor]`.
+pub(super) fn is_brushed(motor: &Motor) -> bool {
+    !motor.is_simple && motor.stepper.is_none()
+}
+
+/// Whether an amplifier has the numbers of `[amplifier]`: the driver of a stepper has its own.
+pub(super) fn is_amplifier(amplifier: &Amplifier) -> bool {
+    amplifier.mode != AmplifierMode::Position
+}
+
+/// Sets the rated current of a stepper, which has its holding torque at that.
+pub(super) fn set_rated_current(motor: &mut Motor, value: f64) {
+    let torque = motor.holding_torque();
+    if let (Some(stepper), Some(torque)) = (&mut motor.stepper, torque) {
+        stepper.rated_current = value;
+        motor.set_holding_torque(torque);
+    }
+}
 
 /// The drive of an axis that is given by force and drag, if it is.
 pub(super) fn simple(machine: &Machine) -> Option<SimpleDrive> {

@@ -170,13 +170,14 @@ impl Arm {
     }
 }
 
-/// The unit of what is fed into the amplifier: V in voltage mode, A in current mode.
+/// The unit of what is fed into the amplifier: V in voltage mode, A in current mode. A stepper takes m.
 pub const INPUT: &str = "V or A";
 
 /// The unit that a parameter has where the amplifier takes `input` (V or A): its own, or the one of two that fits, the
 /// first in volts.
 pub fn unit_for(unit: &'static str, input: &str) -> &'static str {
     match unit.split_once(" or ") {
+        Some(_) if unit == INPUT && input == "m" => "m",
         Some((volts, amperes)) => {
             if input == "A" {
                 amperes

@@ -1,9 +1,10 @@
 //! The rows: every number that a case file can hold.
 
 use super::field::{
-    Of, always, amplifier, breakaway, make, motor, of_drive, of_friction, of_law, of_simple, of_slide, part, points,
-    set_coulomb, set_radius, set_simple, set_stribeck_decay, set_stribeck_force, set_stribeck_velocity, simple,
-    stiffness, stribeck_decay, stribeck_force, stribeck_velocity,
+    Of, always, amplifier, breakaway, is_amplifier, is_brushed, make, motor, of_drive, of_friction, of_law, of_simple,
+    of_slide, part, points, set_coulomb, set_radius, set_rated_current, set_simple, set_stribeck_decay,
+    set_stribeck_force, set_stribeck_velocity, simple, stepper, stiffness, stribeck_decay, stribeck_force,
+    stribeck_velocity,
 };
 use super::{Arm, Fallback, Field, INPUT, InStructure, Off, Parameter, Range, Sum, Tuned};
 use crate::design::Structure;
@@ -403,7 +404,7 @@ const MOTOR: &[Parameter] = &[
     row("motor.gear_ratio", "n", "", Value(1.0), Range::new(1e-6, 1e6), "5.9", "Motor turns per turn of the drive pulley.")
         .at(motor!(gear_ratio)),
     row("motor.gear_efficiency", "η", "", Value(1.0), UP_TO_ONE, "0.73", "The part of the power that passes the gear, whichever side drives.")
-        .at(of_drive!(motor, |m| (m.gear_play.is_none() && !m.is_simple).then_some(m.gear_efficiency), |m, value| m.gear_efficiency = value)),
+        .at(of_drive!(motor, |m| (m.gear_play.is_none() && is_brushed(m)).then_some(m.gear_efficiency), |m, value| m.gear_efficiency = value)),
     row("motor.backlash", "2α", "rad", Value(0.0), Range { below: true, ..Range::new(0.0, 6.3) }, "0.5 deg", "Play of the gear: by how much the drive pulley can turn while the rotor stands. Needs `gear_stiffness`.")
         .at(motor!(play backlash)).off("gear's backlash"),
     row("motor.gear_stiffness", "k_g", "N m/rad", Words("stiff"), POSITIVE, "300 N m/rad", "Stiffness of the gear between rotor and drive pulley, at the pulley; makes the rotor an inertia of its own.")
@@ -429,13 +430,35 @@ const DRIVE: &[Parameter] = &[
 #[rustfmt::skip]
 const AMPLIFIER: &[Parameter] = &[
     row("amplifier.gain", "", "", Value(1.0), ANY, "1", "Output, V or A, per unit of input; negative where the wires are swapped.")
-        .at(of_drive!(amplifier, |a| Some(a.gain), |a, value| a.gain = value)),
+        .at(of_drive!(amplifier, |a| is_amplifier(a).then_some(a.gain), |a, value| a.gain = if is_amplifier(a) { value } else { a.gain })),
     row("amplifier.voltage_limit", "V_max", "V", Words("none"), POSITIVE, "24 V", "Largest voltage at the motor's terminals, either way.")
         .at(amplifier!(voltage_limit)),
     row("amplifier.current_limit", "I_max", "A", Words("none"), POSITIVE, "12 A", "Largest current, either way.")
         .at(amplifier!(current_limit)),
     row("amplifier.bandwidth", "f_b", "Hz", Words("none: the current follows at once"), FREQUENCY, "1 kHz", "Bandwidth of the current loop, first order; only in current mode.")
         .at(amplifier!(bandwidth)).off("current loop's bandwidth"),
+];
+
+#[rustfmt::skip]
+const STEPPER: &[Parameter] = &[
+    row("stepper.steps_per_turn", "", "", Required, Range::whole(4.0, 1e4), "200", "Full steps per turn, a multiple of four: 4 N for N rotor teeth.")
+        .at(stepper!(steps_per_turn)),
+    row("stepper.holding_torque", "T_h", "N m", Required, POSITIVE, "0.45 N m", "Holding torque with both phases at rated current; K_m = T_h/(√2 I).")
+        .at(of_drive!(motor, |m| m.holding_torque(), |m, value| m.set_holding_torque(value))).off("holding torque"),
+    row("stepper.rated_current", "I", "A", Required, POSITIVE, "2 A", "Rated current of each phase, with both phases on.")
+        .at(of_drive!(motor, |m| m.stepper.map(|stepper| stepper.rated_current), |m, value| set_rated_current(m, value))),
+    row("stepper.resistance", "R", "ohm", Required, POSITIVE, "1.4 ohm", "Resistance of a phase, with its wires.")
+        .at(stepper!(motor resistance)).off("resistance"),
+    row("stepper.inductance", "L", "H", Required, POSITIVE, "3 mH", "Inductance of a phase.")
+        .at(stepper!(motor inductance)).off("inductance"),
+    row("stepper.supply", "V", "V", Required, POSITIVE, "24 V", "Voltage of the driver's supply: the most that a phase gets, either way.")
+        .at(of_drive!(amplifier, |a| a.voltage_limit.filter(|_| !is_amplifier(a)), |a, value| if !is_amplifier(a) { a.voltage_limit = Some(value) })),
+    row("stepper.microsteps", "", "", Value(1.0), Range::whole(1.0, 1024.0), "16", "Microsteps per full step: the field goes in these.")
+        .at(stepper!(microsteps)),
+    row("stepper.detent_torque", "T_d", "N m", Value(0.0), NOT_NEGATIVE, "15 mN m", "Amplitude of the torque without current, four periods per tooth pitch; below a quarter of the holding torque.")
+        .at(stepper!(detent_torque)).off("detent torque"),
+    row("stepper.rotor_inertia", "J_r", "kg m^2", Value(0.0), NOT_NEGATIVE, "5.4e-6 kg m^2", "Inertia of the rotor.")
+        .at(stepper!(motor rotor_inertia)).off("rotor inertia"),
 ];
 
 #[rustfmt::skip]
@@ -744,6 +767,7 @@ const MOVE: &[Parameter] = &[
 /// Titles of the sections, in the order of the case file, with the key prefix of their rows.
 pub(super) const SECTIONS: &[(&str, &[&[Parameter]])] = &[
     ("motor", &[MOTOR]),
+    ("stepper", &[STEPPER]),
     ("amplifier", &[AMPLIFIER]),
     (
         "drive_pulley",

@@ -313,6 +313,7 @@ fn limits_of(machine: &Machine, drive: usize, limit: Option<f64>) -> (Option<f64
     let least = |a: Option<f64>, b: Option<f64>| a.into_iter().chain(b).reduce(f64::min);
     match amplifier.mode {
         AmplifierMode::Voltage => (least(amplifier.voltage_limit, commanded), amplifier.current_limit),
+        AmplifierMode::Position => (amplifier.voltage_limit, amplifier.current_limit),
         AmplifierMode::Current => (amplifier.voltage_limit, least(amplifier.current_limit, commanded)),
     }
 }

@@ -4,5 +4,6 @@
 pub mod compensation;
 pub mod feasible;
 pub mod forward;
+pub mod pull_out;
 pub mod quickest;
 pub mod resonance;

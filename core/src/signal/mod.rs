@@ -48,6 +48,23 @@ impl Piece {
     }
 }
 
+impl Signal {
+    /// The first jump, s and by how much, that is farther than `most` from `begin` on and before `until`.
+    pub fn first_jump(&self, begin: f64, most: f64, until: f64) -> Option<(f64, f64)> {
+        let (mut time, mut before) = (0.0, begin);
+        while time < until {
+            let piece = self.piece(time);
+            let jump = piece.value(piece.start) - before;
+            if jump.abs() > most * (1.0 + 1e-9) {
+                return Some((time, jump));
+            }
+            before = piece.value(piece.end.min(until));
+            time = piece.end;
+        }
+        None
+    }
+}
+
 /// An input over time, in units of the amplifier's input. Times in s, frequencies in Hz, phases in rad.
 ///
 /// Before time zero and outside its own extent a signal is zero, but for ramps and tables, which hold their last value.

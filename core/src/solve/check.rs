@@ -140,6 +140,8 @@ pub(super) fn piecewise_linear(mechanism: &Mechanism) -> Result<()> {
         format!("the {}'s friction changes along the travel", body.label.name)
     } else if mechanism.springs.iter().any(|spring| spring.follows.is_some()) {
         "the belt's spans follow the cart".into()
+    } else if mechanism.drives.iter().any(|drive| drive.motor.stepper.is_some()) {
+        "the torque of a stepper goes with the sine of its angle".into()
     } else {
         return Ok(());
     };
@@ -165,6 +167,11 @@ pub(super) fn fastest_rate(mechanism: &Mechanism) -> f64 {
             emf.abs() / (motor.resistance * shaft)
         });
         fastest = fastest.max(2.0 * PI * drive.amplifier.bandwidth.unwrap_or(0.0));
+        if let Some(stepper) = &motor.stepper {
+            // The rotor on its field, and on its detents
+            let stiffness = motor.holding_torque().unwrap_or(0.0) + 4.0 * stepper.detent_torque;
+            fastest = fastest.max((stepper.teeth() * stiffness / shaft).sqrt());
+        }
     }
     for (index, body) in mechanism.bodies.iter().enumerate() {
         let (mut stiffness, mut damping) = (0.0, 0.0);
@@ -208,6 +215,20 @@ pub(super) fn course(mechanism: &Mechanism, course: &Course) -> Result<()> {
     state(&course.start)
 }
 
+/// Refuses commands of steppers that jump farther than a rotor follows, from where it begins on.
+fn commands(mechanism: &Mechanism, course: &Course) -> Result<()> {
+    for (number, (drive, input)) in mechanism.drives.iter().zip(&course.inputs).enumerate() {
+        let Some(most) = mechanism.farthest_jump(number) else { continue };
+        let begin = course.start.position[drive.shaft] / mechanism.angle_per_input(number);
+        if let Some((time, jump)) = input.first_jump(begin, most, course.until) {
+            return Err(Error::new(format!("the command of the stepper jumps by {jump} m at {time} s"))
+                .allowed(format!("up to {most} m at once, two full steps: a rotor does not follow more"))
+                .next("begin where the rotor is, and let the command grow"));
+        }
+    }
+    Ok(())
+}
+
 /// Refuses a state that is none.
 pub(super) fn state(start: &State) -> Result<()> {
     match start.position.iter().chain(&start.speed).chain(&start.current).find(|value| !value.is_finite()) {
@@ -236,6 +257,7 @@ pub(super) fn experiment(mechanism: &Mechanism, experiment: &Experiment) -> Resu
     state(&experiment.initial)?;
     let begun = Course::of(mechanism, experiment);
     course(mechanism, &begun)?;
+    commands(mechanism, &begun)?;
     // What moves as one begins as one.
     let state = begun.start;
     for body in 0..mechanism.bodies.len() {

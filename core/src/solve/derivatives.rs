@@ -55,6 +55,7 @@ impl Simulator {
                 Shown::Input(drive) => level.input[drive],
                 Shown::Voltage(drive) => level.of(&mechanism.voltage(drive, mode)),
                 Shown::Current(drive) => level.of(&mechanism.current(drive, mode)),
+                Shown::SecondPhase(drive) => level.state.current[mechanism.first_current(drive) + 1],
                 Shown::Position(body, factor) => before.state.speed[body] * factor,
                 Shown::Speed(body, factor) => level.state.speed[body] * factor,
                 Shown::Stretch(spring) => level.stretch[spring],

@@ -74,6 +74,7 @@ pub(super) fn shown(engine: &dyn Engine, into: &mut [f64]) {
             Shown::Current(drive) => {
                 within(value(&mechanism.current(drive, mode)), mechanism.drives[drive].amplifier.current_limit)
             }
+            Shown::SecondPhase(drive) => state.current[mechanism.first_current(drive) + 1],
             Shown::Position(body, factor) => state.position[body] * factor,
             Shown::Speed(body, factor) => state.speed[body] * factor,
             Shown::Stretch(spring) => value(&Form::stretch(spring)),

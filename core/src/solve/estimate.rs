@@ -256,6 +256,7 @@ mod tests {
             rotor_inertia: 0.0,
             gear_ratio: 1.0,
             gear_efficiency: 1.0,
+            stepper: None,
             gear_play: None,
             is_simple: false,
         };

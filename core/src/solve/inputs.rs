@@ -59,6 +59,25 @@ impl Pieces {
         shifted
     }
 
+    /// The same with one input at the nearest multiple of `step`, up to where another one becomes the nearest, or to
+    /// `until`: what a driver of microsteps makes of a position.
+    pub fn stepped(&self, input: usize, step: f64, until: f64) -> Self {
+        let powers = &self.coefficients[input];
+        let at = |tau: f64| powers.iter().rev().fold(0.0, |sum, c| sum * tau + c);
+        // On the very edge between two steps it is known by what comes next.
+        let begin = AHEAD + 16.0 * f64::EPSILON * self.start;
+        let whole = (at(begin) / step).round();
+        let mut pieces = *self;
+        pieces.coefficients[input] = [0.0; DEGREE + 1];
+        pieces.coefficients[input][0] = whole * step + 0.0;
+        let length = self.end.min(until) - self.start;
+        let edges = [-1.0, 1.0].map(|side| first_beyond(powers, (whole + 0.5 * side) * step, side, begin..length));
+        if let Some(first) = edges.into_iter().flatten().reduce(f64::min) {
+            pieces.end = pieces.end.min(self.start + first);
+        }
+        pieces
+    }
+
     /// The highest power of time in any of them.
     pub fn degree(&self) -> usize {
         self.pieces().map(|piece| piece.degree()).max().unwrap_or(0)
@@ -78,4 +97,45 @@ impl Pieces {
     pub fn pieces(&self) -> impl Iterator<Item = Piece> + '_ {
         self.coefficients.iter().map(|&coefficients| Piece { start: self.start, end: self.end, coefficients })
     }
+}
+
+/// How far ahead a command is looked at to know its microstep, s: much less than any driver takes for one.
+const AHEAD: f64 = 1e-9;
+
+/// The first time at which a polynomial is beyond `level`, above it or below it by `side`: where `within` begins, if it
+/// is so already there.
+fn first_beyond(powers: &[f64; DEGREE + 1], level: f64, side: f64, within: std::ops::Range<f64>) -> Option<f64> {
+    let mut own = *powers;
+    own[0] -= level;
+    let begin = own.iter().rev().fold(0.0, |sum, c| sum * within.start + c);
+    match begin * side >= 0.0 {
+        true => Some(within.start),
+        false => crossings(&own, within.start, within.end).first().copied(),
+    }
+}
+
+/// Where a polynomial changes its sign, in order: between two places where its derivative does, it does so once at most.
+fn crossings(powers: &[f64; DEGREE + 1], from: f64, to: f64) -> Vec<f64> {
+    let Some(degree) = powers.iter().rposition(|c| *c != 0.0).filter(|degree| *degree > 0) else { return Vec::new() };
+    let at = |tau: f64| powers[..=degree].iter().rev().fold(0.0, |sum, c| sum * tau + c);
+    if degree == 1 {
+        return Some(-powers[0] / powers[1]).filter(|tau| (from..to).contains(tau)).into_iter().collect();
+    }
+    let mut slope = [0.0; DEGREE + 1];
+    (1..=degree).for_each(|k| slope[k - 1] = k as f64 * powers[k]);
+    let mut places = vec![from];
+    places.extend(crossings(&slope, from, to));
+    places.push(to);
+    let between = |[mut low, mut high]: [f64; 2]| {
+        let side = at(low) < 0.0;
+        if (at(high) < 0.0) == side {
+            return None;
+        }
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            if (at(middle) < 0.0) == side { low = middle } else { high = middle }
+        }
+        Some(high)
+    };
+    places.array_windows().filter_map(|pair| between(*pair)).collect()
 }

@@ -139,7 +139,7 @@ impl Event {
         if let Some(back) = now.into_iter().position(passed) {
             self.from = events.remove(events.len() - 1 - back).from;
         }
-        if self.from.code() != self.to.code() {
+        if !self.from.shows_as(self.to) {
             events.push(self);
         }
     }

@@ -201,12 +201,12 @@ impl<'a> Recorder<'a> {
             row[self.layout.coordinate[body]] = inner.position[body];
             row[self.layout.speed[body]] = inner.speed[body];
         }
-        for drive in 0..self.layout.inputs {
-            if let Some(place) = self.layout.current[drive] {
-                row[place] = inner.current[drive];
+        for (place, current) in self.layout.current.iter().zip(inner.current) {
+            if let Some(place) = place {
+                row[*place] = current;
             }
-            row[self.inputs[drive]] = input[drive];
         }
+        (0..self.layout.inputs).for_each(|drive| row[self.inputs[drive]] = input[drive]);
         self.push(&row);
     }
 

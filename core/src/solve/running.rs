@@ -22,9 +22,14 @@ pub(super) trait Running {
     /// Takes up new inputs, now.
     fn set_input(&mut self, pieces: &Pieces);
 
+    /// What drives make of these inputs: a stepper's goes to the microstep that is nearest.
+    fn told(&self, pieces: Pieces) -> Pieces {
+        pieces
+    }
+
     /// Takes up what these signals do from `time`, which is now, on, and says until when that is.
     fn set_signals(&mut self, signals: &[Signal], time: f64) -> f64 {
-        let pieces = Pieces::of(signals, time);
+        let pieces = self.told(Pieces::of(signals, time));
         self.set_input(&pieces);
         pieces.end
     }

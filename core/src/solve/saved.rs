@@ -89,7 +89,11 @@ impl Pass<'_> {
         mode.drive.iter_mut().try_for_each(|drive| {
             self.flag(&mut drive.torque_positive)?;
             self.choice(limits, &mut drive.voltage)?;
-            self.choice(limits, &mut drive.current)
+            self.choice(limits, &mut drive.current)?;
+            let mut slipped = u64::from(drive.slipped.cast_unsigned());
+            self.bits(&mut slipped)?;
+            drive.slipped = u32::try_from(slipped).ok()?.cast_signed();
+            Some(())
         })
     }
 

@@ -54,6 +54,7 @@ impl Model {
     /// The machine of a case, with the controller inside if it is asked for. Errors: a controller that the case has
     /// not.
     pub fn new(case: &Case, with_controller: bool) -> Result<Self> {
+        crate::case::needs_motors(&case.machine)?;
         let resource = resource::resource(case)?;
         Self::of_resource(&resource, with_controller)
     }
@@ -400,6 +401,7 @@ fn push(body: usize) -> Drive {
         gear_efficiency: 1.0,
         gear_play: None,
         is_simple: true,
+        stepper: None,
     };
     let amplifier = Amplifier::ideal(AmplifierMode::Current, 1.0);
     Drive { label, voltage: label, current: label, pulley: body, shaft: body, motor, amplifier }

@@ -225,6 +225,7 @@ impl<'m> Writer<'m> {
             Shown::Motion(body) => Entry::of("IS_MOTION", body),
             Shown::Contact(spring) => Entry::of("IS_CONTACT", self.contact(spring, tables)),
             Shown::Counts(body, factor) => Entry { factor, ..Entry::of("IS_COUNTS", body) },
+            Shown::SecondPhase(_) => return Err(Error::new("a stepper is not linear between events")),
             Shown::Bristle(_) => return Err(Error::new("bristles are not linear between events")),
         })
     }

@@ -187,6 +187,7 @@ pub(super) fn words(heading: &Heading, mechanism: &Mechanism) -> String {
         Shown::Time => "Time.".into(),
         Shown::Input(d) => format!("Input of the amplifier of the {}, as it takes it.", drive(d)),
         Shown::Voltage(d) => format!("Voltage at the terminals of the {}.", drive(d)),
+        Shown::SecondPhase(d) => format!("Current of the second phase of the {}.", drive(d)),
         Shown::Current(d) => format!("Current of the {}.", drive(d)),
         Shown::Position(b, factor) => format!("Way of the {}{}.", body(b), seen(factor)),
         Shown::Speed(b, factor) => format!("Speed of the {}{}.", body(b), seen(factor)),

@@ -14,10 +14,7 @@ pub fn figures(found: &Measurement, machine: &Machine) -> Vec<(String, Figure)> 
 
 fn bode(one: &Response, machine: &Machine) -> Figure {
     let frf = &one.frf;
-    let unit = match machine.drives[0].amplifier.mode {
-        taut::machine::AmplifierMode::Voltage => "V",
-        taut::machine::AmplifierMode::Current => "A",
-    };
+    let unit = machine.drives[0].amplifier.mode.unit();
     let hertz: Vec<f64> = frf.points.iter().map(|point| point.omega / (2.0 * PI)).collect();
     let decibels = |value: f64| 20.0 * value.max(1e-300).log10();
     let measured: Vec<Complex<f64>> = frf.points.iter().map(|point| point.value).collect();

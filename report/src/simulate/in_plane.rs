@@ -4,7 +4,6 @@ use super::Run;
 use super::marks;
 use crate::{Axis, Colour, Figure, Panel, Plane, Series, Style};
 use taut::case::Case;
-use taut::machine::AmplifierMode;
 
 /// Every plot of a run over time, in the order of a report; none if its curves were not kept.
 pub fn figures(case: &Case, run: &Run) -> Vec<(&'static str, Figure)> {
@@ -32,8 +31,7 @@ pub fn figures(case: &Case, run: &Run) -> Vec<(&'static str, Figure)> {
 
     let mut drives = figure("drives");
     if curves.get("left_input").is_some() || curves.get("right_input").is_some() {
-        let commanded = gantry.drives[0].amplifier.mode == AmplifierMode::Current;
-        drives = drives.panel(two(Axis::new("Input", if commanded { "A" } else { "V" }), "input"));
+        drives = drives.panel(two(Axis::new("Input", gantry.drives[0].amplifier.mode.unit()), "input"));
     }
     let drives = drives
         .panel(two(Axis::new("Voltage", "V"), "voltage"))

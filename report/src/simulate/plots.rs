@@ -5,7 +5,6 @@ use super::curves::{Curves, Samples};
 use super::{in_plane, marks};
 use crate::{Axis, Colour, Figure, Panel, Picture, Plane, Series, Style};
 use taut::case::Case;
-use taut::machine::AmplifierMode;
 
 /// A figure and its name in file names.
 pub type Named = (&'static str, Figure);
@@ -21,13 +20,16 @@ pub fn figures(case: &Case, run: &Run) -> Vec<Named> {
     let plot = Plot { curves, samples: run.samples.as_ref() };
 
     let mut input = figure("input");
-    let commanded = case.machine.drives[0].amplifier.mode == AmplifierMode::Current;
     if curves.get("input").is_some() {
-        let axis = Axis::new("Input", if commanded { "A" } else { "V" });
+        let axis = Axis::new("Input", case.machine.drives[0].amplifier.mode.unit());
         input = input.panel(plot.panel(axis, &[("input", "u")]));
     }
+    // The phases of a stepper have voltages of their own.
+    if curves.get("voltage").is_some() {
+        input =
+            input.panel(plot.measured(Axis::new("Voltage", "V"), &[("voltage", "motor voltage")], &["motor_voltage"]));
+    }
     input = input
-        .panel(plot.measured(Axis::new("Voltage", "V"), &[("voltage", "motor voltage")], &["motor_voltage"]))
         .panel(plot.measured(Axis::new("Current", "A"), &[("current", "motor current")], &["motor_current"]))
         .caption("What the motor gets, and the current it draws.");
 

@@ -5,7 +5,7 @@ use super::band::Band;
 use crate::fit::outputs;
 use taut::machine::{BeltModel, Geometry, Machine, Slide};
 use taut::mechanism::Part;
-use taut::metrics::{Balance, Metrics, OfLoad, Peak};
+use taut::metrics::{Balance, Metrics, OfLoad, OfStepper, Peak};
 use taut::number;
 use taut::reduction::Reduction;
 use taut::solve::{Cost, Ending, Event, Method, Outcome, PositionError, Solver, Tie};
@@ -145,6 +145,9 @@ pub fn lines(run: &Run, machine: &Machine, solver: Solver) -> Vec<(&'static str,
         lines.push(("peak force", forces(metrics, geometry)));
     }
     lines.push(("peak current", currents(metrics, geometry)));
+    if let Some(own) = &metrics.stepper {
+        lines.push(("lost steps", lost_steps(own)));
+    }
     lines.push(("stop time", stop(metrics, &labels, solver)));
     lines.push(("events", events(&run.outcome.events, solver)));
     if !stiff {
@@ -164,6 +167,14 @@ pub fn lines(run: &Run, machine: &Machine, solver: Solver) -> Vec<(&'static str,
     }
     lines.push(("cost", cost(run.outcome.cost)));
     lines
+}
+
+/// What a stepper lost on its way, and what error of position is left.
+fn lost_steps(own: &OfStepper) -> String {
+    let error = format!("position error {}", value(own.position_error, "m"));
+    let Some(first) = own.first_slip else { return format!("none, {error}") };
+    let teeth = if own.slips == 1 { "tooth" } else { "teeth" };
+    format!("{} at the end, {error}; over {} {teeth}, first at {}", own.lost_steps, own.slips, value(first, "s"))
 }
 
 /// The largest force of a machine with one drive; that of each span of one with several.

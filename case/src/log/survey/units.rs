@@ -28,12 +28,11 @@ const FEWEST_LEVELS: usize = 10;
 /// Largest voltage and current that a drive of this kind takes.
 const MOST_VOLTS: f64 = 800.0;
 const MOST_AMPERES: f64 = 300.0;
+/// Longest travel of an axis that a position commands, m.
+const MOST_TRAVEL: f64 = 100.0;
 
 pub(super) fn input_unit(stage: &Machine) -> &'static str {
-    match stage.drives[0].amplifier.mode {
-        AmplifierMode::Voltage => "V",
-        AmplifierMode::Current => "A",
-    }
+    stage.drives[0].amplifier.mode.unit()
 }
 
 pub(super) fn notes(log: &Log, stage: &Machine, channels: &[Channel], motion: Option<&Motion>) -> Vec<Note> {
@@ -102,6 +101,7 @@ fn input_note(stage: &Machine, input: &Channel) -> Option<Note> {
     let (most, unit, milli) = match stage.drives[0].amplifier.mode {
         AmplifierMode::Voltage => (MOST_VOLTS, "V", "mV"),
         AmplifierMode::Current => (MOST_AMPERES, "A", "mA"),
+        AmplifierMode::Position => (MOST_TRAVEL, "m", "mm"),
     };
     if peak <= most {
         return None;
@@ -365,7 +365,7 @@ fn drive(stage: &Machine) -> Drive {
     let (motor, r) = (&stage.drives[0].motor, stage.pulley_radius);
     let per_ampere = motor.torque_constant * motor.gear_ratio * motor.gear_efficiency / r;
     match stage.drives[0].amplifier.mode {
-        AmplifierMode::Current => Drive { force: per_ampere, brake: 0.0 },
+        AmplifierMode::Current | AmplifierMode::Position => Drive { force: per_ampere, brake: 0.0 },
         AmplifierMode::Voltage => {
             let force = per_ampere / motor.resistance;
             Drive { force, brake: force * motor.back_emf_constant * motor.gear_ratio / r }
@@ -457,6 +457,7 @@ fn current_note(log: &Log, stage: &Machine) -> Option<Note> {
     let most = match stage.drives[0].amplifier.mode {
         AmplifierMode::Voltage => 2.0 * most / stage.drives[0].motor.resistance,
         AmplifierMode::Current => most,
+        AmplifierMode::Position => return None,
     };
     if most == 0.0 || peak < ROUGH * most {
         return None;

@@ -175,7 +175,7 @@ pub(super) fn straight<const N: usize>(mechanism: &Mechanism, space: &Space, mod
 pub(super) fn can_grow(mechanism: &Mechanism) -> bool {
     mechanism.springs.iter().any(|spring| match spring.law {
         SpringLaw::Gap { .. } | SpringLaw::Tension { .. } | SpringLaw::Line { .. } => true,
-        SpringLaw::TwoSided | SpringLaw::Bounds { .. } | SpringLaw::None => false,
+        SpringLaw::TwoSided | SpringLaw::Bounds { .. } | SpringLaw::Angle { .. } | SpringLaw::None => false,
     })
 }
 

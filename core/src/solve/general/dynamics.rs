@@ -3,7 +3,7 @@
 use super::{Core, Event};
 use crate::error::Result;
 use crate::friction::Motion;
-use crate::mechanism::{BODIES, Cause, DRIVES, Layout, Mechanism, Mode, SpringLaw, State};
+use crate::mechanism::{BODIES, CURRENTS, Cause, DRIVES, Layout, Mechanism, Mode, SpringLaw, State};
 use crate::solve::engine::{Engine, shown};
 use crate::solve::saved::{Pass, Passed, restored};
 use crate::solve::{Ending, check, rules};
@@ -23,7 +23,7 @@ pub enum Quantity {
     Position(usize),
     /// Its speed.
     Speed(usize),
-    /// The current of a drive, A.
+    /// A current by its number, A.
     Current(usize),
     /// The deflection of the bristles of a body, rad or m.
     Bristle(usize),
@@ -211,8 +211,8 @@ impl Dynamics {
 fn quantities(mechanism: &Mechanism) -> Vec<Quantity> {
     let mut list: Vec<Quantity> =
         mechanism.leaders().flat_map(|body| [Quantity::Position(body), Quantity::Speed(body)]).collect();
-    let currents = mechanism.drives.iter().enumerate().filter(|(_, drive)| drive.has_current_state());
-    list.extend(currents.map(|(drive, _)| Quantity::Current(drive)));
+    let currents = (0..CURRENTS).filter(|number| mechanism.drive_of_current(*number).is_some());
+    list.extend(currents.map(Quantity::Current));
     let has_bristles =
         |body: &usize| matches!(mechanism.bodies[*body].friction.law, crate::friction::Law::LuGre { .. });
     list.extend((0..mechanism.bodies.len()).filter(has_bristles).map(Quantity::Bristle));
@@ -228,7 +228,9 @@ fn kinds(mechanism: &Mechanism) -> Vec<usize> {
         causes.extend([Cause::BreakForward(body), Cause::BreakBackward(body)]);
     }
     for (index, drive) in mechanism.drives.iter().enumerate() {
-        if !drive.motor.is_simple {
+        if drive.motor.stepper.is_some() {
+            causes.extend([0, 2].map(|to| Cause::Switch(Switch::Field(index, to))));
+        } else if !drive.motor.is_simple {
             causes.push(Cause::GearTorque(index));
         }
         for to in [Limit::Inside, Limit::High, Limit::Low] {
@@ -249,7 +251,7 @@ fn kinds(mechanism: &Mechanism) -> Vec<usize> {
             }
             SpringLaw::Line { .. } => causes.extend([0, 1, 2].map(|to| Cause::Switch(Switch::Line(index, to)))),
             SpringLaw::Bounds { .. } => causes.push(Cause::Leave(index)),
-            SpringLaw::TwoSided | SpringLaw::None => {}
+            SpringLaw::TwoSided | SpringLaw::Angle { .. } | SpringLaw::None => {}
         }
     }
     causes.into_iter().map(Cause::kind).collect()

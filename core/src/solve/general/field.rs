@@ -2,7 +2,8 @@
 
 use super::linear::{Linear, Output, STATES, States};
 use super::model::{MOST_GUARDS, Model, Vector};
-use super::sources::Source;
+use super::sources::{Phasing, Source};
+use super::step::SOURCES;
 use crate::friction::{Law, Motion};
 use crate::mechanism::{BODIES, Cause, DRIVES, Equations, Form, Mode, ROUNDING, Switch, Transition};
 use std::sync::Arc;
@@ -25,8 +26,8 @@ pub(super) struct Field {
     pub(super) sources: Vec<Source>,
     /// Which of the outputs is a guard: the argument that it is, or one behind the arguments.
     pub(super) output: Vec<usize>,
-    /// Arguments that errors are measured by: their places in the state.
-    pub(super) measured: Vec<usize>,
+    /// Arguments that errors are measured by: their places in the state, and their weights there.
+    pub(super) measured: Vec<(usize, f64)>,
     /// True if guards depend on what stands still: friction along the travel of a body at rest, and bent bristles.
     pub(super) shifted: bool,
     /// Inertia that moves with each body, per unit of its leader's way.
@@ -92,7 +93,12 @@ impl Field {
 
     /// The number of the argument that is this row.
     fn argument(&mut self, row: States) -> usize {
-        let none = Output { row, input: [0.0; DRIVES], constant: 0.0, source: Vec::new() };
+        self.argument_of(row, [0.0; DRIVES])
+    }
+
+    /// The same with these weights of the inputs.
+    fn argument_of(&mut self, row: States, input: [f64; DRIVES]) -> usize {
+        let none = Output { row, input, constant: 0.0, source: Vec::new() };
         let outputs = &mut self.linear.outputs;
         outputs.iter().position(|output| *output == none).unwrap_or_else(|| {
             outputs.push(none);
@@ -151,6 +157,7 @@ impl Field {
             let column = self.column(|leader| if slack { 0.0 } else { arm(leader) });
             self.linear.source.push(column);
         }
+        self.add_phases();
         // Speeds that forces change are what errors are measured by.
         if !self.sources.is_empty() {
             let moved = |place: &usize| self.linear.source.iter().any(|column| column[*place] != 0.0);
@@ -159,8 +166,37 @@ impl Field {
             }
         }
         let rows = self.linear.outputs.iter().map(|output| &output.row);
-        self.measured = rows.map(|row| row.iter().position(|weight| *weight != 0.0).unwrap_or(0)).collect();
+        // One of an input alone is known.
+        let first = |row: &States| row.iter().copied().enumerate().find(|(_, weight)| *weight != 0.0);
+        self.measured = rows.map(|row| first(row).unwrap_or((0, 1.0))).collect();
         self.linear.arguments = self.linear.outputs.len();
+    }
+
+    /// The torque and the two voltages of each stepper.
+    fn add_phases(&mut self) {
+        let model = Arc::clone(&self.model);
+        for (index, phased) in model.phased.iter().enumerate() {
+            let mut row = [0.0; STATES];
+            phased.terms.iter().for_each(|&(place, weight)| row[place] += weight);
+            let mut input = [0.0; DRIVES];
+            input[phased.drive] = phased.per_input;
+            let arguments = Phasing {
+                phased: index,
+                angle: self.argument(row),
+                speed: self.argument_at(phased.speed),
+                currents: phased.currents.map(|place| self.argument_at(place)),
+                told: self.argument_of([0.0; STATES], input),
+            };
+            self.sources.push(Source::Torque(arguments));
+            let column = self.column(|leader| if leader == phased.leader { phased.ratio } else { 0.0 });
+            self.linear.source.push(column);
+            for (phase, place) in phased.currents.into_iter().enumerate() {
+                self.sources.push(Source::Phase(phase, arguments));
+                let mut column = [0.0; STATES];
+                column[place] = 1.0;
+                self.linear.source.push(column);
+            }
+        }
     }
 
     fn add_outputs(&mut self) {
@@ -203,6 +239,11 @@ impl Field {
                     let arm: f64 = following.arms.iter().filter(|(b, _)| *b == body).map(|(_, arm)| -arm).sum();
                     if slack { 0.0 } else { load * arm }
                 }
+                Source::Torque(phasing) => {
+                    let phased = &self.model.phased[phasing.phased];
+                    if phased.leader == body { load * phased.ratio } else { 0.0 }
+                }
+                Source::Phase(..) => 0.0,
             };
             self.sources.iter().map(of).collect()
         };
@@ -230,7 +271,7 @@ impl Field {
                             -1.0
                         }
                     }
-                    Source::Spring { .. } | Source::Friction { .. } => 0.0,
+                    Source::Spring { .. } | Source::Friction { .. } | Source::Torque(_) | Source::Phase(..) => 0.0,
                 };
                 self.sources.iter().map(own).collect()
             }
@@ -240,16 +281,16 @@ impl Field {
     }
 
     /// The forces at one instant.
-    pub(super) fn forces(&self, y: &Vector, forces: &mut [f64]) {
+    pub(super) fn forces(&self, input: &[f64; DRIVES], y: &Vector, forces: &mut [f64]) {
         for (force, source) in forces.iter_mut().zip(&self.sources) {
-            *force = source.at_begin(&self.model, &self.mode, y);
+            *force = source.at_begin(&self.model, &self.mode, input, y);
         }
     }
 
     /// ẏ of coordinates, speeds and currents.
     pub(super) fn rate(&self, input: &[f64; DRIVES], y: &Vector) -> States {
         let mut forces = vec![0.0; self.sources.len()];
-        self.forces(y, &mut forces);
+        self.forces(input, y, &mut forces);
         self.linear.rate(y, input, &forces)
     }
 
@@ -281,8 +322,8 @@ impl Field {
     /// The values that must not become negative, in the order of the watches.
     pub(super) fn guards(&self, input: &[f64; DRIVES], y: &Vector) -> [f64; MOST_GUARDS] {
         let mut values = [0.0; MOST_GUARDS];
-        let mut forces = [0.0; BODIES + crate::mechanism::SPRINGS];
-        self.forces(y, &mut forces);
+        let mut forces = [0.0; SOURCES];
+        self.forces(input, y, &mut forces);
         for (index, (value, guard)) in values.iter_mut().zip(&self.guards).enumerate() {
             let on_state = guard.row.iter().zip(y).fold(0.0, |sum, (weight, y)| sum + weight * y);
             *value = guard.input.iter().zip(input).fold(on_state + guard.constant, |sum, (w, u)| sum + w * u);

@@ -36,6 +36,18 @@ pub(super) struct Output {
     pub(super) source: Vec<f64>,
 }
 
+impl Output {
+    /// Adds what the constant and the inputs add to it at once to the columns of what is known.
+    fn put_at_once(&self, size: usize, degree: usize, base: &mut [Lane]) {
+        base[size].iter_mut().for_each(|lane| *lane += self.constant);
+        for (lanes, at_once) in base[size + 1..].chunks_mut(degree + 1).zip(&self.input) {
+            for (lane, power) in lanes.iter_mut().zip(&POWER) {
+                lane.iter_mut().zip(power).for_each(|(lane, at)| *lane += at_once * at);
+            }
+        }
+    }
+}
+
 /// The equations, by columns and by rows.
 pub(super) struct Linear {
     /// Places that are computed with: a multiple of four.
@@ -360,9 +372,10 @@ impl Set {
         let (known, drives) = (linear.known(degree), linear.drives());
         let mut base = vec![[0.0; NODES]; linear.arguments * known];
         let mut weights = Vec::with_capacity(linear.arguments * linear.source.len());
-        let outputs = linear.rows(Which::Arguments).iter().zip(linear.moments(Which::Arguments).chunks(drives));
-        for ((rows, moments), base) in outputs.zip(base.chunks_mut(known)) {
+        let rows = linear.rows(Which::Arguments).iter().zip(linear.moments(Which::Arguments).chunks(drives));
+        for (((rows, moments), base), output) in rows.zip(base.chunks_mut(known)).zip(&linear.outputs) {
             lead(linear, rows, moments, (h, degree), base);
+            output.put_at_once(linear.size, degree, base);
             let reach = linear.norm * h;
             weights.extend(moments[1 + linear.inputs..].iter().map(|m| driven(m, h, reach, radau::order(reach))));
         }
@@ -469,12 +482,7 @@ impl Full {
         for ((output, (rows, moments)), lanes) in outputs.iter().zip(rows).zip(guards.chunks_mut(columns)) {
             let (base, forces) = lanes.split_at_mut(known);
             lead(linear, rows, moments, (h, degree), base);
-            base[linear.size].iter_mut().for_each(|lane| *lane += output.constant);
-            for (lanes, at_once) in base[linear.size + 1..].chunks_mut(degree + 1).zip(&output.input) {
-                for (lane, power) in lanes.iter_mut().zip(&POWER) {
-                    lane.iter_mut().zip(power).for_each(|(lane, at)| *lane += at_once * at);
-                }
-            }
+            output.put_at_once(linear.size, degree, base);
             let forces = forces.as_chunks_mut::<POINTS>().0;
             for ((lanes, moments), at_once) in forces.iter_mut().zip(&moments[1 + linear.inputs..]).zip(&output.source)
             {

@@ -48,6 +48,9 @@ use stretch::Stretch;
 /// Most steps of a run, by what is known beforehand of its fastest rate.
 const MOST_STEPS: f64 = 1e10;
 
+/// Most modes that are kept ready.
+const MOST_KNOWN: usize = 256;
+
 /// Rejects an invalid tolerance, and a run of too many steps.
 pub(super) fn check(fastest: f64, until: f64, tolerance: f64) -> Result<()> {
     if !(1e-14..=1e-2).contains(&tolerance) {
@@ -186,12 +189,7 @@ impl Core {
         coordinates.hold(&layout, &mode, &inner);
         let model = Model::new(seen, layout);
         let mechanism = &*model.mechanism;
-        let mut y = model.vector(&inner);
-        for (current, drive) in model.current.iter().zip(&mechanism.drives) {
-            if let (Some(place), false) = (current, drive.has_current_state()) {
-                y[*place] = 0.0;
-            }
-        }
+        let y = model.vector(&inner);
         // An angle of 1 rad is as much as r at the belt.
         let turning = mechanism.bodies.iter().filter(|body| matches!(body.kind, Kind::Rotary { .. }));
         let r = turning.map(|body| body.kind.lever()).fold(f64::INFINITY, f64::min);
@@ -207,6 +205,10 @@ impl Core {
                 // Bristles bend by F_b/σ₀ at most.
                 absolute[place] = tolerance * friction.forward.breakaway.max(friction.backward.breakaway) / stiffness;
             }
+        }
+        for phased in &model.phased {
+            // Currents as shares of what the phases carry.
+            phased.currents.into_iter().for_each(|place| absolute[place] *= phased.phases.amplitude);
         }
         let model = Arc::new(model);
         let field = Arc::new(Field::new(&model, &mode));
@@ -257,6 +259,10 @@ impl Core {
     /// Has the equations of the mode at hand.
     fn make_ready(&mut self) {
         let known = self.known.iter().position(|known| known.field.mode == self.rules.mode);
+        if known.is_none() && self.known.len() == MOST_KNOWN {
+            // A stepper that has lost its field comes to a new mode with every tooth, and never to those again.
+            self.known.clear();
+        }
         self.present = known.unwrap_or_else(|| {
             let field = Arc::new(Field::new(&self.model, &self.rules.mode));
             self.known.push(Known { field, sets: Vec::new() });

@@ -1,12 +1,12 @@
 //! A machine made ready for the general solver: what its laws and its belt add to the linear equations of a mode.
 
 use crate::friction::{Friction, Law, Motion};
-use crate::mechanism::{BODIES, DRIVES, Follows, Form, Layout, Mechanism, Mode, SPRINGS, State};
+use crate::mechanism::{BODIES, CURRENTS, DRIVES, Follows, Form, Layout, Mechanism, Mode, Phases, SPRINGS, State};
 use crate::solve::record::Extra;
 use std::sync::Arc;
 
 /// Most quantities that are integrated: coordinates and speeds, currents, bristles.
-pub(super) const MOST: usize = 3 * BODIES + DRIVES;
+pub(super) const MOST: usize = 3 * BODIES + CURRENTS;
 
 /// The integrated quantities: coordinates and speeds in the order of [`Layout`], currents that are states, rotors, then
 /// bristles.
@@ -22,6 +22,56 @@ pub(super) struct Following {
     pub(super) terms: Vec<(usize, f64)>,
     /// By how much its force acts on each body that moves by itself.
     pub(super) arms: Vec<(usize, f64)>,
+}
+
+/// The phases of a stepper, with the places of all that they depend on.
+pub(super) struct Phased {
+    pub(super) drive: usize,
+    pub(super) phases: Phases,
+    /// The rotor's angle from the integrated quantities, places and weights, and where they are zero, rad.
+    pub(super) terms: Vec<(usize, f64)>,
+    pub(super) at: f64,
+    /// Where the rotor's speed and the two currents stand.
+    pub(super) speed: usize,
+    pub(super) currents: [usize; 2],
+    /// The body that the rotor moves with, and its way per way of that one.
+    pub(super) leader: usize,
+    pub(super) ratio: f64,
+    /// The angle that a unit of the input tells it to go to, rad/m.
+    pub(super) per_input: f64,
+}
+
+impl Phased {
+    /// The rotor's angle, rad.
+    #[inline(always)]
+    pub(super) fn angle(&self, y: &[f64]) -> f64 {
+        self.terms.iter().fold(self.at, |sum, &(place, weight)| sum + weight * y[place])
+    }
+
+    /// The torque on the rotor, N m.
+    pub(super) fn torque(&self, y: &[f64]) -> f64 {
+        self.phases.torque(self.angle(y), self.currents.map(|place| y[place])).0
+    }
+
+    fn of(mechanism: &Mechanism, layout: &Layout, (place, current): (&[usize; BODIES], &[Option<usize>])) -> Vec<Self> {
+        let phased = |(drive, part): (usize, &crate::mechanism::Drive)| {
+            let phases = Phases::of(part)?;
+            let (spring, at) = mechanism.angle_of(drive)?;
+            let first = mechanism.first_current(drive);
+            Some(Self {
+                drive,
+                phases,
+                terms: layout.weights(spring).map(|(body, weight)| (place[body], weight)).collect(),
+                at,
+                speed: place[part.shaft] + 1,
+                currents: [current[first]?, current[first + 1]?],
+                leader: mechanism.leader(part.shaft),
+                ratio: mechanism.ratio(part.shaft),
+                per_input: mechanism.angle_per_input(drive),
+            })
+        };
+        mechanism.drives.iter().enumerate().filter_map(phased).collect()
+    }
 }
 
 /// A body whose own friction is not that of the linear equations, be it moved by another or not.
@@ -140,13 +190,14 @@ pub(super) struct Model {
     /// Where each body's coordinate stands; its speed behind it.
     place: [usize; BODIES],
     /// Where the currents stand that are states.
-    pub(super) current: [Option<usize>; DRIVES],
+    pub(super) current: [Option<usize>; CURRENTS],
     /// Where a body's bristle deflection stands, if it has one.
     pub(super) bristle: [Option<usize>; BODIES],
     /// True if anything is added to the linear equations at all.
     pub(super) adds: bool,
     pub(super) curved: Vec<Curved>,
     pub(super) following: Vec<Following>,
+    pub(super) phased: Vec<Phased>,
 }
 
 impl Model {
@@ -157,11 +208,11 @@ impl Model {
             size += count;
             size - count
         };
-        let (mut place, mut current, mut bristle) = ([0; BODIES], [None; DRIVES], [None; BODIES]);
+        let (mut place, mut current, mut bristle) = ([0; BODIES], [None; CURRENTS], [None; BODIES]);
         let held = mechanism.held_bodies();
         held.clone().for_each(|body| place[body] = room(2));
-        for (index, drive) in mechanism.drives.iter().enumerate() {
-            current[index] = drive.has_current_state().then(|| room(1));
+        for (number, place) in current.iter_mut().enumerate() {
+            *place = mechanism.drive_of_current(number).map(|_| room(1));
         }
         (held.end..mechanism.bodies.len()).for_each(|body| place[body] = room(2));
         for (body, place) in bristle.iter_mut().enumerate().take(mechanism.bodies.len()) {
@@ -188,7 +239,8 @@ impl Model {
             }
         });
         let following = following.collect();
-        Self { mechanism, layout, place, current, bristle, adds, curved, following }
+        let phased = Phased::of(&mechanism, &layout, (&place, &current));
+        Self { mechanism, layout, place, current, bristle, adds, curved, following, phased }
     }
 
     /// Coefficients of the integrated quantities in a form.
@@ -279,7 +331,8 @@ impl Model {
         spring.follows.as_ref().map_or(0.0, |follows| stiffness(follows) - spring.stiffness)
     }
 
-    /// The loads of the springs that follow on each body that moves by itself, −Aᵀ f; a slack one has none.
+    /// The loads of the springs that follow on each body that moves by itself, −Aᵀ f, where a slack one has none; and of
+    /// the phases of steppers.
     #[inline(always)]
     fn loads(&self, mode: &Mode, y: &[f64]) -> [f64; BODIES] {
         let mut loads = [0.0; BODIES];
@@ -287,6 +340,7 @@ impl Model {
             let force = self.beyond(following, y);
             following.arms.iter().for_each(|&(body, arm)| loads[body] -= arm * force);
         }
+        self.phased.iter().for_each(|phased| loads[phased.leader] += phased.ratio * phased.torque(y));
         loads
     }
 
@@ -328,6 +382,10 @@ impl Model {
         for curved in &self.curved {
             // Power is conserved: F = ρ τ
             friction[curved.leader] += curved.ratio * self.beyond_straight(curved, mode.motion[curved.body], y);
+        }
+        // A body at rest holds what the phases of a stepper put on it.
+        for phased in self.phased.iter().filter(|phased| mode.motion[phased.leader] == Motion::Stuck) {
+            friction[phased.leader] += phased.ratio * phased.torque(y);
         }
         friction
     }

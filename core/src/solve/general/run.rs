@@ -48,6 +48,15 @@ impl Running for Run<'_> {
         self.core.take_up(Stretch::of(*pieces, self.rows.grid.end()));
     }
 
+    fn told(&self, pieces: Pieces) -> Pieces {
+        let mechanism = &self.core.model.mechanism;
+        let end = self.rows.grid.end();
+        (0..mechanism.drives.len()).fold(pieces, |pieces, drive| match mechanism.microstep(drive) {
+            Some(step) => pieces.stepped(drive, step, end),
+            None => pieces,
+        })
+    }
+
     fn advance(&mut self, until: f64) -> bool {
         if self.core.rules.trouble.is_none() {
             let whole = self.core.stretch.end;

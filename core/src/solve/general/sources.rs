@@ -10,9 +10,10 @@
 //! Where bristles slip within a step, R is Radau's: z follows g(v) without a sign of ringing. Where they bend, the rate
 //! at the beginning is a fifth value, which makes the quartic of it as good as that of the force.
 
-use super::model::{Curved, Model, Sliding, Vector};
+use super::model::{Curved, Model, Phased, Sliding, Vector};
 use super::radau::{FOUND, Lane, NODES, PLACES, POINTS, QUARTIC, RADAU, monomials};
 use crate::friction::{Law, Motion, Side};
+use crate::mechanism::{DRIVES, PhaseRate};
 
 /// A force, with the arguments that it depends on by their numbers.
 pub(super) enum Source {
@@ -34,6 +35,22 @@ pub(super) enum Source {
         rest: f64,
         arms: Vec<(usize, f64)>,
     },
+    /// The torque of a stepper, N m.
+    Torque(Phasing),
+    /// What is not linear of the rate of a phase current, by the number of the phase, A/s.
+    Phase(usize, Phasing),
+}
+
+/// The numbers of the arguments of a stepper's phases.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Phasing {
+    /// The stepper, by its number among those.
+    pub(super) phased: usize,
+    pub(super) angle: usize,
+    pub(super) speed: usize,
+    pub(super) currents: [usize; 2],
+    /// The angle that it is told to go to.
+    pub(super) told: usize,
 }
 
 /// A step that begins this near a kink, as a share of how far it goes from there, begins at it.
@@ -77,8 +94,21 @@ impl Source {
     }
 
     /// The force at the beginning of a step.
-    pub(super) fn at_begin(&self, model: &Model, mode: &crate::mechanism::Mode, y: &Vector) -> f64 {
+    pub(super) fn at_begin(
+        &self,
+        model: &Model,
+        mode: &crate::mechanism::Mode,
+        input: &[f64; DRIVES],
+        y: &Vector,
+    ) -> f64 {
         match self {
+            Source::Torque(phasing) => model.phased[phasing.phased].torque(y),
+            Source::Phase(phase, phasing) => {
+                let phased = &model.phased[phasing.phased];
+                let (speed, current) = (y[phased.speed], y[phased.currents[*phase]]);
+                let told = phased.per_input * input[phased.drive];
+                phased.phases.rate(*phase, phased.angle(y), speed, current, told).value
+            }
             Source::Friction { curved, .. } => {
                 let curved = &model.curved[*curved];
                 model.beyond_straight(curved, mode.motion[curved.body], y)
@@ -104,9 +134,13 @@ impl Source {
     /// sticking, or passes a corner of its friction along the travel. A corner that is passed by less than the share
     /// [`FOUND`] of what `strict` allows counts for nothing, and neither does one at the beginning.
     #[inline(always)]
-    pub(super) fn kink(&self, model: &Model, y: &Vector, arguments: &[Lane], strict: &[f64]) -> Option<f64> {
-        let &Source::Friction { curved, motion, speed, way } = self else { return None };
-        let curved = &model.curved[curved];
+    pub(super) fn kink(
+        &self,
+        model: &Model,
+        (y, input): (&Vector, &[f64; DRIVES]),
+        arguments: &[Lane],
+        strict: &[f64],
+    ) -> Option<f64> {
         let mut first: Option<f64> = None;
         let mut take = |share: Option<f64>| {
             first = match (first, share) {
@@ -114,6 +148,20 @@ impl Source {
                 (a, b) => a.or(b),
             }
         };
+        let (curved, motion, speed, way) = match *self {
+            Source::Friction { curved, motion, speed, way } => (curved, motion, speed, way),
+            Source::Phase(phase, phasing) => {
+                // The voltage limit of a phase begins or ceases to bind.
+                let (phased, places) = (&model.phased[phasing.phased], phasing.currents[phase]);
+                let Some(regulator) = phased.phases.regulator else { return None };
+                let negligible = FOUND / strict[places] * phased.phases.inductance * regulator;
+                let excess = phasing.excess(phased, phase, (y, input), arguments);
+                excess.iter().for_each(|excess| take(crossing(excess, negligible)));
+                return first;
+            }
+            Source::Spring { .. } | Source::Torque(_) => return None,
+        };
+        let curved = &model.curved[curved];
         if motion == Motion::Free {
             take(crossing(&course(y[curved.speed], &arguments[speed]), FOUND / strict[speed]));
         }
@@ -203,6 +251,14 @@ impl Source {
                 }
                 force
             }
+            Source::Torque(phasing) => {
+                let phases = &model.phased[phasing.phased].phases;
+                std::array::from_fn(|i| {
+                    let currents = phasing.currents.map(|current| arguments[current][i]);
+                    phases.torque(phasing.angle(model, arguments, i), currents).0
+                })
+            }
+            Source::Phase(phase, phasing) => std::array::from_fn(|i| phasing.rate(model, *phase, arguments, i).value),
         }
     }
 
@@ -268,7 +324,61 @@ impl Source {
                     each(argument, &diagonal(&steep));
                 }
             }
+            Source::Torque(phasing) => {
+                let phases = &model.phased[phasing.phased].phases;
+                let slopes: [[f64; 3]; NODES] = std::array::from_fn(|i| {
+                    let currents = phasing.currents.map(|current| arguments[current][i]);
+                    phases.torque(phasing.angle(model, arguments, i), currents).1
+                });
+                let [a, b] = phasing.currents;
+                for (number, argument) in [phasing.angle, a, b].into_iter().enumerate() {
+                    each(argument, &diagonal(&|i| slopes[i][number]));
+                }
+            }
+            Source::Phase(phase, phasing) => {
+                let slopes: [[f64; 3]; NODES] =
+                    std::array::from_fn(|i| phasing.rate(model, *phase, arguments, i).slopes);
+                let own = [phasing.angle, phasing.speed, phasing.currents[*phase]];
+                for (number, argument) in own.into_iter().enumerate() {
+                    each(argument, &diagonal(&|i| slopes[i][number]));
+                }
+            }
         }
+    }
+}
+
+impl Phasing {
+    /// The rotor's angle at a node, rad.
+    #[inline(always)]
+    fn angle(&self, model: &Model, arguments: &[Lane], i: usize) -> f64 {
+        model.phased[self.phased].at + arguments[self.angle][i]
+    }
+
+    /// What is not linear of the rate of a phase current at a node, A/s.
+    #[inline(always)]
+    fn rate(&self, model: &Model, phase: usize, arguments: &[Lane], i: usize) -> PhaseRate {
+        let [speed, current, told] = [self.speed, self.currents[phase], self.told].map(|number| arguments[number][i]);
+        let angle = self.angle(model, arguments, i);
+        model.phased[self.phased].phases.rate(phase, angle, speed, current, told)
+    }
+
+    /// The voltage that the regulator of a phase wants beyond either limit, V, at the points of a step.
+    fn excess(
+        &self,
+        phased: &Phased,
+        phase: usize,
+        (y, input): (&Vector, &[f64; DRIVES]),
+        arguments: &[Lane],
+    ) -> [[f64; POINTS]; 2] {
+        let at = |begin: f64, number: usize| course(begin, &arguments[number]);
+        let current = phased.currents[phase];
+        let angle = at(phased.angle(y) - phased.at, self.angle).map(|angle| angle + phased.at);
+        let (speed, current) = (at(y[phased.speed], self.speed), at(y[current], self.currents[phase]));
+        let told = at(phased.per_input * input[phased.drive], self.told);
+        let excess: [[f64; 2]; POINTS] = std::array::from_fn(|p| {
+            phased.phases.excess(phase, angle[p], speed[p], current[p], told[p]).unwrap_or_default()
+        });
+        [excess.map(|[high, _]| high), excess.map(|[_, low]| low)]
     }
 }
 

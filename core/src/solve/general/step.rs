@@ -27,11 +27,11 @@ use super::sources::{Bristle, Bristles};
 use crate::mechanism::{BODIES, DRIVES, SPRINGS};
 use crate::signal::DEGREE;
 
-/// Most forces.
-pub(super) const SOURCES: usize = BODIES + SPRINGS;
+/// Most forces: of friction, of springs, and the torque and the voltages of a stepper.
+pub(super) const SOURCES: usize = BODIES + SPRINGS + 2 * DRIVES;
 
-/// Most arguments of forces: speeds, ways, lengths.
-pub(super) const ARGUMENTS: usize = 2 * BODIES + SPRINGS;
+/// Most arguments of forces: speeds, ways, lengths, currents, inputs.
+pub(super) const ARGUMENTS: usize = 2 * BODIES + SPRINGS + 2 * DRIVES;
 
 /// Most columns of what a step depends on.
 const COLUMNS: usize = STATES + 1 + DRIVES * (DEGREE + 1) + SOURCES * POINTS;
@@ -360,8 +360,9 @@ impl Room {
 
     #[inline(always)]
     fn kink_of(&self, step: &Step, source: usize) -> Option<f64> {
-        let Begin { y, strict, .. } = step.begin;
-        step.field.sources[source].kink(&step.field.model, y, &self.arguments, &strict[..])
+        let Begin { y, input, strict, .. } = step.begin;
+        let begin = (*y, &input.map(|powers| powers[0]));
+        step.field.sources[source].kink(&step.field.model, begin, &self.arguments, &strict[..])
     }
 
     /// By how much the arguments are off where the step ends, as a multiple of what is allowed.

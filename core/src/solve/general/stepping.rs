@@ -82,7 +82,7 @@ impl Core {
         // The forces begin anew with each mode.
         let mut guess = Guess::Constant;
         let mut forces = [0.0; SOURCES];
-        field.forces(&self.y, &mut forces);
+        field.forces(&stretch.input(self.tau), &self.y, &mut forces);
         room.begin(&forces);
         let mut hit = None;
         while hit.is_none() && self.rules.trouble.is_none() {
@@ -152,7 +152,7 @@ impl Core {
                             model.mechanism.followers(leader).for_each(|body| self.y[model.speed(body)] = 0.0);
                         }
                         let mut forces = [0.0; SOURCES];
-                        field.forces(&self.y, &mut forces);
+                        field.forces(&stretch.input(self.tau), &self.y, &mut forces);
                         room.begin(&forces);
                         *guess = Guess::Constant;
                     }
@@ -178,8 +178,9 @@ impl Core {
     /// One over what each argument may be off by in a step.
     fn strict(&self, field: &Field) -> Lanes<f64> {
         let mut strict = [0.0; ARGUMENTS];
-        for (strict, &place) in strict.iter_mut().zip(&field.measured) {
-            *strict = 1.0 / (EASE * (self.absolute[place] + self.relative * self.y[place].abs()));
+        for (strict, &(place, weight)) in strict.iter_mut().zip(&field.measured) {
+            let allowed = self.absolute[place] + self.relative * self.y[place].abs();
+            *strict = 1.0 / (EASE * allowed * weight.abs());
         }
         strict
     }

@@ -195,6 +195,10 @@ impl Columns {
                 clamp(out, block.mechanism.drives[drive].amplifier.voltage_limit);
             }
             Shown::Current(drive) => out.copy_from_slice(column(places.current(drive))),
+            Shown::SecondPhase(drive) => {
+                let place = places.layout.current[block.mechanism.first_current(drive) + 1];
+                out.copy_from_slice(column(place.unwrap_or(places.current(drive))));
+            }
             Shown::Position(body, factor) => times(out, places.way(body), factor),
             Shown::Speed(body, factor) => times(out, places.speed(body), factor),
             Shown::Stretch(spring) => out.copy_from_slice(column(places.stretch(spring))),

@@ -3,7 +3,7 @@
 
 use super::sum::{Places, Sum};
 use crate::friction::Motion;
-use crate::mechanism::{DriveMode, Mechanism, Mode, SpringLaw, What};
+use crate::mechanism::{Drive, DriveMode, Mechanism, Mode, SpringLaw, What};
 
 /// Forces of springs, currents and voltages of drives: the same in all modes in which amplifiers, gears, belt and stops
 /// do the same.
@@ -117,7 +117,9 @@ fn load(mechanism: &Mechanism, places: &Places, leader: usize) -> Sum {
     let mut sum = Sum::constant(0.0);
     for body in mechanism.followers(leader) {
         let ratio = mechanism.ratio(body);
-        for (index, drive) in mechanism.drives.iter().enumerate().filter(|(_, drive)| drive.shaft == body) {
+        // What the phases of a stepper put on it is added to each row.
+        let own = |drive: &Drive| drive.shaft == body && drive.motor.stepper.is_none();
+        for (index, drive) in mechanism.drives.iter().enumerate().filter(|(_, drive)| own(drive)) {
             let factor = ratio * (drive.motor.gear_ratio * drive.motor.torque_constant);
             sum.add(places.current(index), factor);
         }

@@ -110,7 +110,8 @@ impl Places {
         let mut sum = Sum::constant(form.constant);
         (0..self.springs).for_each(|j| sum.add(self.stretch(j), form.stretch[j]));
         (0..self.bodies).for_each(|j| sum.add(self.speed(j), form.speed[j]));
-        let states = (0..self.drives).filter_map(|j| Some((self.layout.current[j]?, form.current[j])));
+        let states =
+            self.layout.current.iter().zip(form.current).filter_map(|(place, factor)| Some(((*place)?, factor)));
         states.for_each(|(place, factor)| sum.add(place, factor));
         (0..self.drives).for_each(|j| sum.add(self.input(j), form.input[j]));
         sum

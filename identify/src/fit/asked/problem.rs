@@ -743,7 +743,7 @@ fn typical(machine: &Machine, parameter: &Free, runs: &[Run]) -> Option<f64> {
     let motor = &machine.drives[0].motor;
     let per_unit = match machine.drives[0].amplifier.mode {
         AmplifierMode::Voltage => motor.torque_constant / motor.resistance,
-        AmplifierMode::Current => motor.torque_constant,
+        AmplifierMode::Current | AmplifierMode::Position => motor.torque_constant,
     };
     let torque = (0.1 * per_unit * motor.gear_ratio * machine.drives[0].amplifier.gain * most).abs();
     let r = machine.pulley_radius;

@@ -235,7 +235,9 @@ impl Run {
             let amplifier = &case.machine.drives[0].amplifier;
             let (quantity, limit, late) = match amplifier.mode {
                 AmplifierMode::Voltage => (Quantity::MotorVoltage, amplifier.voltage_limit, None),
-                AmplifierMode::Current => (Quantity::MotorCurrent, amplifier.current_limit, amplifier.bandwidth),
+                AmplifierMode::Current | AmplifierMode::Position => {
+                    (Quantity::MotorCurrent, amplifier.current_limit, amplifier.bandwidth)
+                }
             };
             if late.is_none() && !self.seen.iter().any(|seen| seen.quantity == quantity) {
                 let given = |input: &f64| {

@@ -74,7 +74,7 @@ impl Limits {
         };
         let machine = match amplifier.mode {
             AmplifierMode::Voltage => amplifier.voltage_limit,
-            AmplifierMode::Current => amplifier.current_limit,
+            AmplifierMode::Current | AmplifierMode::Position => amplifier.current_limit,
         };
         let machine = machine.map(|limit| (limit / amplifier.gain.abs(), Origin::Machine));
         let asked = |value: Option<f64>| value.map(|value| (value, Origin::Asked));

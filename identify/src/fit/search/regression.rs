@@ -142,7 +142,7 @@ impl<'a> Smoothed<'a> {
             let clipped = |value: f64, limit: Option<f64>| limit.map_or(value, |limit| value.clamp(-limit, limit));
             // τ_M = η n K_t i, i = (V − K_e n φ̇)/R
             let current = match amplifier.mode {
-                AmplifierMode::Current => given,
+                AmplifierMode::Current | AmplifierMode::Position => given,
                 AmplifierMode::Voltage => {
                     (clipped(given, amplifier.voltage_limit) - motor.back_emf_constant * n_gear * speed)
                         / motor.resistance

@@ -123,7 +123,7 @@ fn peak_current(problem: &Problem) -> f64 {
     let output = (most * amplifier.gain).abs().max(1e-9);
     match amplifier.mode {
         AmplifierMode::Voltage => output / problem.machine.drives[0].motor.resistance,
-        AmplifierMode::Current => output,
+        AmplifierMode::Current | AmplifierMode::Position => output,
     }
 }
 

@@ -73,7 +73,7 @@ pub fn residual_force(machine: &Machine, log: &LogFit) -> Option<ResidualForce> 
         AmplifierMode::Voltage => {
             gear * gear * motor.torque_constant * motor.back_emf_constant / motor.resistance / (r * r)
         }
-        AmplifierMode::Current => 0.0,
+        AmplifierMode::Current | AmplifierMode::Position => 0.0,
     };
     let (mass, viscous) = (total(Sum::Inertia), total(Sum::Viscous) + brake);
     // Third differences of noise have √20 times its deviation.

@@ -239,6 +239,7 @@ fn row<const N: usize>(seen: &Seen, mode: &Mode, output: Differentiated) -> Opti
         Shown::Voltage(drive) => space.row(&mechanism.voltage(drive, mode)),
         Shown::Input(drive) => space.row(&Form::input(drive)),
         Shown::Time
+        | Shown::SecondPhase(_)
         | Shown::Friction(_)
         | Shown::Motion(_)
         | Shown::Bristle(_)

@@ -1,0 +1,120 @@
+//! The table `[stepper]`: a motor that is told a position, with its driver. And what its case cannot have yet.
+
+use super::reader::{Field, Table};
+use crate::error::{Error, Result};
+use crate::machine::{Amplifier, AmplifierMode, DriveUnit, Machine, Motor, Stepper};
+use crate::mechanism::State;
+use crate::quantity::show;
+use crate::signal::Signal;
+
+/// What a case of a stepper cannot have yet, and what is wanted in its place.
+const YET_TO_COME: [&str; 6] = ["measurement", "controller", "move", "tune", "fit", "uncertainty"];
+
+/// What is said where a motor that is commanded by voltage or current is wanted.
+const NO_MOTOR: [&str; 3] = [
+    "this needs a motor that is commanded by voltage or current, and the case describes a stepper",
+    "[motor] and [amplifier]",
+    "`taut show`, `taut simulate` and `taut sweep` take steppers; all else is yet to come",
+];
+
+/// Refuses a stepper where a motor that is commanded by voltage or current is needed.
+pub fn needs_motors(machine: &Machine) -> Result<()> {
+    let [what, allowed, next] = NO_MOTOR;
+    machine.stepper().map_or(Ok(()), |_| Err(Error::new(what).allowed(allowed).next(next)))
+}
+
+/// The same where a file has the table of a stepper.
+pub(super) fn no_motor(root: &Table) -> Error {
+    let ([what, allowed, next], field) = (NO_MOTOR, root.optional("stepper").unwrap_or_else(|| root.field.clone()));
+    field.fail(what).allowed(allowed).next(next)
+}
+
+/// The stepper of an axis and its driver; none where there is no table of that name.
+pub(super) fn drive(root: &Table) -> Result<Option<DriveUnit>> {
+    let Some(field) = root.optional("stepper") else { return Ok(None) };
+    if let Some(other) = ["motor", "drive", "amplifier"].iter().find_map(|key| root.optional(key)) {
+        return Err(other
+            .fail("a stepper is a motor with its driver: this would be a second one")
+            .next("give either [stepper], or [motor] and [amplifier]"));
+    }
+    if let Some(other) = YET_TO_COME.iter().find_map(|key| root.optional(key)) {
+        return Err(other.fail("this is not there yet for a stepper").next("leave it out for now"));
+    }
+    let table = field.table()?;
+    table.check_keys(&["drive"], &[])?;
+    let stepper = Stepper {
+        steps_per_turn: steps_per_turn(&table)?,
+        rated_current: table.number("rated_current")?,
+        detent_torque: table.number("detent_torque")?,
+        microsteps: table.number("microsteps")?,
+    };
+    let drives = [("chopper", true), ("voltage", false)];
+    let is_chopper = table.optional("drive").map_or(Ok(true), |field| field.choice(&drives))?;
+    let mut motor = Motor {
+        torque_constant: 0.0,
+        back_emf_constant: 0.0,
+        resistance: table.number("resistance")?,
+        inductance: table.number("inductance")?,
+        rotor_inertia: table.number("rotor_inertia")?,
+        gear_ratio: 1.0,
+        gear_efficiency: 1.0,
+        gear_play: None,
+        is_simple: false,
+        stepper: Some(stepper),
+    };
+    let torque = table.number("holding_torque")?;
+    motor.set_holding_torque(torque);
+    if stepper.detent_torque >= 0.25 * torque
+        && let Some(field) = table.optional("detent_torque")
+    {
+        return Err(field
+            .fail("such a detent torque is stronger than the field between its steps")
+            .allowed(format!("below a quarter of the holding torque, {}", show(0.25 * torque, "N m"))));
+    }
+    let supply = table.number("supply")?;
+    let most = motor.resistance * stepper.amplitude();
+    if !is_chopper
+        && supply > most * (1.0 + 1e-6)
+        && let Some(field) = table.optional("supply")
+    {
+        return Err(field
+            .fail(format!("a phase would carry {} at rest", show(supply / motor.resistance, "A")))
+            .allowed(format!("up to {}: √2 times rated current and resistance", show(most, "V")))
+            .next("lower the supply, add a resistor to the phases, or set drive = \"chopper\""));
+    }
+    let amplifier = Amplifier {
+        voltage_limit: Some(supply),
+        bandwidth: is_chopper.then_some(Stepper::CHOPPER_BANDWIDTH),
+        ..Amplifier::ideal(AmplifierMode::Position, 1.0)
+    };
+    Ok(Some(DriveUnit { motor, amplifier }))
+}
+
+fn steps_per_turn(table: &Table) -> Result<f64> {
+    let steps = table.number("steps_per_turn")?;
+    match table.optional("steps_per_turn") {
+        Some(field) if steps % f64::from(Stepper::STEPS_PER_TOOTH) != 0.0 => {
+            Err(field.fail("a rotor tooth is four full steps").allowed("a multiple of four, such as 200 or 400"))
+        }
+        _ => Ok(steps),
+    }
+}
+
+/// Refuses a command that jumps farther than a rotor follows; `field` is the input.
+pub(super) fn check_command(
+    field: &Field,
+    machine: &Machine,
+    input: &Signal,
+    (initial, until): (&State, f64),
+) -> Result<()> {
+    let mechanism = machine.mechanism();
+    let Some(most) = mechanism.farthest_jump(0) else { return Ok(()) };
+    let begin = initial.position[mechanism.drives[0].pulley] / mechanism.angle_per_input(0);
+    match input.first_jump(begin, most, until) {
+        None => Ok(()),
+        Some((time, jump)) => Err(field
+            .fail(format!("the command jumps by {} at {}", show(jump, "m"), show(time, "s")))
+            .allowed(format!("up to {} at once, two full steps: a rotor does not follow more", show(most, "m")))
+            .next("let it grow, with ramp, table or sine")),
+    }
+}

@@ -1,0 +1,192 @@
+//! The phases of a stepper: two windings whose torque goes with the sine of the rotor's angle.
+//!
+//! With N rotor teeth, the rotor's angle φ counted from a full step, ε = N φ + π/4, and the field that the driver is told,
+//! ψ = N x*/r + π/4 (Kuo and Kelemen 1979; Kenjo and Sugawara 1994):
+//!
+//! ```text
+//! L di_a/dt = v_a − R i_a + K_m φ̇ sin ε
+//! L di_b/dt = v_b − R i_b − K_m φ̇ cos ε
+//! τ = K_m (−i_a sin ε + i_b cos ε) − T_d sin 4ε
+//! ```
+//!
+//! Phase b is phase a a quarter of a tooth pitch on: with σ_a = 0 and σ_b = π/2 both are one formula. The rate −R i/L is
+//! in the linear equations of a mode; the rest is not linear and stands here.
+
+use super::{Amplifier, Cause, Drive, Form, Mechanism, Mode, Motor, SpringLaw, State, Switch};
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
+
+/// A stepper's phases, made ready to be evaluated.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Phases {
+    /// N
+    pub teeth: f64,
+    /// K_m, N m/A and V s/rad.
+    pub torque_constant: f64,
+    /// T_d, N m.
+    pub detent_torque: f64,
+    /// R, Ω.
+    pub resistance: f64,
+    /// L, H.
+    pub inductance: f64,
+    /// The voltage of the supply V, V.
+    pub supply: f64,
+    /// √2 I, A.
+    pub amplitude: f64,
+    /// 2π f_b of the chopper's regulator, 1/s; none where the driver sets the voltage.
+    pub regulator: Option<f64>,
+}
+
+/// A rate of a phase current, A/s, and how it changes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PhaseRate {
+    /// di/dt + R i/L, A/s.
+    pub value: f64,
+    /// By the rotor's angle, its speed and the current.
+    pub slopes: [f64; 3],
+}
+
+impl Phases {
+    /// Those of a drive; none of a brushed motor.
+    pub fn of(drive: &Drive) -> Option<Self> {
+        Self::of_motor(&drive.motor, &drive.amplifier)
+    }
+
+    /// The same of a motor and its driver.
+    pub fn of_motor(motor: &Motor, amplifier: &Amplifier) -> Option<Self> {
+        let stepper = motor.stepper?;
+        Some(Self {
+            teeth: stepper.teeth(),
+            torque_constant: motor.torque_constant,
+            detent_torque: stepper.detent_torque,
+            resistance: motor.resistance,
+            inductance: motor.inductance,
+            supply: amplifier.voltage_limit.unwrap_or(f64::INFINITY),
+            amplitude: stepper.amplitude(),
+            regulator: amplifier.bandwidth.map(|bandwidth| 2.0 * PI * bandwidth),
+        })
+    }
+
+    /// ε = N φ + π/4, or ψ of the angle that is told.
+    fn electrical(&self, angle: f64) -> f64 {
+        self.teeth * angle + FRAC_PI_4
+    }
+
+    /// Torque on the rotor, N m, at an angle, rad, and currents, A; and how it changes with the angle and each current.
+    #[inline(always)]
+    pub fn torque(&self, angle: f64, [a, b]: [f64; 2]) -> (f64, [f64; 3]) {
+        let (sin, cos) = self.electrical(angle).sin_cos();
+        let (k, n) = (self.torque_constant, self.teeth);
+        // sin 4ε = 4 sin ε cos ε (1 − 2 sin² ε), cos 4ε = 1 − 8 sin² ε cos² ε
+        let product = sin * cos;
+        let detent = self.detent_torque * 4.0 * product * (1.0 - 2.0 * sin * sin);
+        let detent_slope = self.detent_torque * 4.0 * n * (1.0 - 8.0 * product * product);
+        // τ = K_m (−i_a sin ε + i_b cos ε) − T_d sin 4ε
+        let torque = k * (b * cos - a * sin) - detent;
+        (torque, [-k * n * (a * cos + b * sin) - detent_slope, -k * sin, k * cos])
+    }
+
+    /// The part of a phase current's rate beyond −R i/L, where the rotor is told to be at `told`, rad.
+    #[inline(always)]
+    pub fn rate(&self, phase: usize, angle: f64, speed: f64, current: f64, told: f64) -> PhaseRate {
+        let (sin, cos) = (self.electrical(angle) - FRAC_PI_2 * phase as f64).sin_cos();
+        let (k, n, l) = (self.torque_constant, self.teeth, self.inductance);
+        // e = −K_m φ̇ sin(ε − σ)
+        let (emf, by_angle, by_speed) = (-k * speed * sin, -k * speed * n * cos, -k * sin);
+        let along = (self.electrical(told) - FRAC_PI_2 * phase as f64).cos();
+        let voltage = match self.regulator {
+            // v = V cos(ψ − σ)
+            None => self.supply * along,
+            // v = R i + e + L ω_c (√2 I cos(ψ − σ) − i), no more than ±V
+            Some(rate) => {
+                let wanted = self.wanted(rate, emf, current, along);
+                if wanted.abs() < self.supply {
+                    let value = self.resistance / l * current + rate * (self.amplitude * along - current);
+                    return PhaseRate { value, slopes: [0.0, 0.0, self.resistance / l - rate] };
+                }
+                self.supply.copysign(wanted)
+            }
+        };
+        PhaseRate { value: (voltage - emf) / l, slopes: [-by_angle / l, -by_speed / l, 0.0] }
+    }
+
+    /// R i + e + L ω_c (i* − i), V.
+    #[inline(always)]
+    fn wanted(&self, regulator: f64, emf: f64, current: f64, along: f64) -> f64 {
+        self.resistance * current + emf + self.inductance * regulator * (self.amplitude * along - current)
+    }
+
+    /// The voltage that the regulator of a phase wants beyond V and beyond −V, V: where it is zero, a limit begins or
+    /// ceases to bind. None without a regulator.
+    #[inline(always)]
+    pub fn excess(&self, phase: usize, angle: f64, speed: f64, current: f64, told: f64) -> Option<[f64; 2]> {
+        let sin = (self.electrical(angle) - FRAC_PI_2 * phase as f64).sin();
+        let along = (self.electrical(told) - FRAC_PI_2 * phase as f64).cos();
+        let wanted = self.wanted(self.regulator?, -self.torque_constant * speed * sin, current, along);
+        Some([wanted - self.supply, wanted + self.supply])
+    }
+
+    /// Currents at rest where the field is told this angle, A.
+    pub fn at_rest(&self, told: f64) -> [f64; 2] {
+        let most = self.supply / self.resistance;
+        let amplitude = if self.regulator.is_some() { self.amplitude } else { most };
+        [0.0, FRAC_PI_2].map(|shift| (amplitude * (self.electrical(told) - shift).cos()).clamp(-most, most))
+    }
+}
+
+impl Mechanism {
+    /// The spring whose length is the angle of a stepper's rotor, and the angle where that is zero.
+    pub fn angle_of(&self, drive: usize) -> Option<(usize, f64)> {
+        let shaft = self.drives[drive].shaft;
+        self.springs.iter().enumerate().find_map(|(index, spring)| match spring.law {
+            SpringLaw::Angle { at } if spring.arms.iter().any(|(body, _)| *body == shaft) => Some((index, at)),
+            _ => None,
+        })
+    }
+
+    /// Angle of the shaft that a unit of the input tells a stepper to go to, rad/m: 1/r.
+    pub fn angle_per_input(&self, drive: usize) -> f64 {
+        self.drives[drive].amplifier.gain / self.bodies[self.drives[drive].pulley].kind.lever()
+    }
+
+    /// The input of a microstep, m; none of a brushed motor.
+    pub fn microstep(&self, drive: usize) -> Option<f64> {
+        let stepper = self.drives[drive].motor.stepper?;
+        Some(stepper.microstep() / self.angle_per_input(drive))
+    }
+
+    /// The farthest that the command of a stepper may jump, m: two full steps, half a tooth pitch.
+    pub fn farthest_jump(&self, drive: usize) -> Option<f64> {
+        let stepper = self.drives[drive].motor.stepper?;
+        Some(PI / stepper.teeth() / self.angle_per_input(drive).abs())
+    }
+
+    /// By how much the rotor of a stepper is behind what it is told, rad.
+    fn lag(&self, drive: usize) -> Option<Form> {
+        let (spring, at) = self.angle_of(drive)?;
+        let mut lag = -Form::stretch(spring);
+        lag.input[drive] = self.angle_per_input(drive);
+        lag.constant = -at;
+        Some(lag)
+    }
+
+    /// The conditions under which a rotor stays within half a tooth pitch of the field: beyond it, it falls to the next
+    /// tooth, four full steps on.
+    pub(super) fn watch_steps(&self, drive: usize, mode: &Mode, watch: &mut impl FnMut(Form, Cause)) {
+        let Some((lag, stepper)) = self.lag(drive).zip(self.drives[drive].motor.stepper) else { return };
+        let (slipped, pitch) = (mode.drive[drive].slipped, 2.0 * PI / stepper.teeth());
+        let middle = lag - Form::constant(f64::from(slipped) * pitch);
+        let half = Form::constant(0.5 * pitch);
+        watch(half - middle, Cause::Switch(Switch::Field(drive, slipped + 1)));
+        watch(half + middle, Cause::Switch(Switch::Field(drive, slipped - 1)));
+    }
+
+    /// Has the phases of steppers carry the currents that hold the rotor where it is.
+    pub(super) fn energise(&self, state: &mut State) {
+        for (number, drive) in self.drives.iter().enumerate() {
+            if let Some(phases) = Phases::of(drive) {
+                let first = self.first_current(number);
+                state.current[first..first + 2].copy_from_slice(&phases.at_rest(state.position[drive.shaft]));
+            }
+        }
+    }
+}

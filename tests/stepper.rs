@@ -1,0 +1,343 @@
+//! Steppers against an integration of their own: the two phases, rotor and belt by the classical formula with steps of a
+//! microsecond, which shares nothing with the solvers. Also limit laws that hold by hand.
+
+use crate::common::chance::Chance;
+use std::f64::consts::{FRAC_1_SQRT_2, PI};
+use taut::case::Case;
+use taut::mechanism::{Status, What};
+use taut::reach::pull_out::PullOut;
+use taut::solve::{Ending, Solver, simulate};
+
+/// Step of the integration, s.
+const STEP: f64 = 1e-6;
+
+/// A stepper axis on its way: u(t) = A (1 − cos 2πft), one period, and a rest.
+#[derive(Debug, Clone)]
+struct Axis {
+    steps: f64,
+    holding: f64,
+    rated: f64,
+    resistance: f64,
+    inductance: f64,
+    supply: f64,
+    chopper: bool,
+    microsteps: f64,
+    detent: f64,
+    rotor: f64,
+    radius: f64,
+    /// Inertias of pulleys and mass of the cart, with viscous and Coulomb friction of each.
+    inertia: [f64; 3],
+    viscous: [f64; 3],
+    coulomb: [f64; 3],
+    stiffness: [f64; 3],
+    damping: [f64; 3],
+    amplitude: f64,
+    frequency: f64,
+    until: f64,
+}
+
+/// Angles, speeds, currents.
+type State = [f64; 8];
+
+impl Axis {
+    fn drawn(chance: &mut Chance) -> Self {
+        let mut between = |low: f64, high: f64| low + (high - low) * chance.uniform();
+        let ratio = |x: f64, y: f64, share: f64| x * (y / x).powf(share);
+        let (holding, rated) = (ratio(0.1, 1.5, between(0.0, 1.0)), between(0.6, 4.0));
+        let resistance = between(0.8, 2.5) / rated;
+        let radius = between(5e-3, 1e-2);
+        let rotor = 1.2e-5 * holding * between(0.7, 1.5);
+        let (drive, idler, mass) = (between(5e-7, 2e-6), between(3e-7, 1e-6), between(0.1, 0.6));
+        let total = mass + (rotor + drive + idler) / (radius * radius);
+        let chopper = between(0.0, 1.0) < 0.8;
+        let supply = if chopper { between(12.0, 48.0) } else { 2.0_f64.sqrt() * rated * resistance * 0.999 };
+        let amplitude = between(1e-3, 6e-3);
+        // The largest acceleration takes this share of the holding torque.
+        let share = between(0.1, if chopper { 1.5 } else { 0.5 });
+        let frequency = (share * holding / radius / total / amplitude).sqrt() / (2.0 * PI);
+        let frequency = frequency.min(0.6 / amplitude / (2.0 * PI));
+        let k = between(4e4, 2e5);
+        Self {
+            steps: if between(0.0, 1.0) < 0.7 { 200.0 } else { 400.0 },
+            holding,
+            rated,
+            resistance,
+            inductance: resistance * between(1e-3, 3e-3),
+            supply,
+            chopper,
+            microsteps: [1.0, 1.0, 2.0, 4.0, 8.0][(5.0 * between(0.0, 0.999)) as usize],
+            detent: holding * between(0.0, 0.06),
+            rotor,
+            radius,
+            inertia: [drive, mass, idler],
+            viscous: [between(1e-5, 3e-4), between(0.5, 8.0), between(1e-6, 2e-5)],
+            coulomb: [holding * between(0.0, 0.05), holding / radius * between(0.0, 0.1), 0.0],
+            stiffness: [k, k, 0.5 * k],
+            damping: [2e-4 * k, 2e-4 * k, 1e-4 * k],
+            amplitude,
+            frequency,
+            until: 1.0 / frequency + 0.01,
+        }
+    }
+
+    fn case(&self) -> String {
+        let [drive, cart, idler] = [0, 1, 2].map(|k| {
+            let name = if k == 1 { "mass" } else { "inertia" };
+            let (inertia, b, c) = (self.inertia[k], self.viscous[k], self.coulomb[k]);
+            format!("{name} = {inertia:e}\nfriction = {{ viscous = {b:e}, coulomb = {c:e} }}\n")
+        });
+        let drive_word = if self.chopper { "chopper" } else { "voltage" };
+        format!(
+            "[stepper]\nsteps_per_turn = {}\nholding_torque = {:e}\nrated_current = {:e}\nresistance = {:e}\n\
+             inductance = {:e}\nsupply = {:e}\ndrive = \"{drive_word}\"\nmicrosteps = {}\ndetent_torque = {:e}\n\
+             rotor_inertia = {:e}\n[drive_pulley]\nradius = {:e}\n{drive}[cart]\n{cart}[idler_pulley]\n{idler}[belt]\n\
+             stiffness = {:?}\ndamping = {:?}\n[[experiment]]\nname = \"there and back\"\nuntil = {:e}\nevery = 1e-3\n\
+             input = {{ sequence = [{{ sine = {:e}, frequency = {:e}, phase = {:e}, offset = {:e}, lasts = {:e} }}, \
+             {{ step = 0.0 }}] }}\n",
+            self.steps,
+            self.holding,
+            self.rated,
+            self.resistance,
+            self.inductance,
+            self.supply,
+            self.microsteps,
+            self.detent,
+            self.rotor,
+            self.radius,
+            self.stiffness,
+            self.damping,
+            self.until,
+            self.amplitude,
+            self.frequency,
+            -0.5 * PI,
+            self.amplitude,
+            1.0 / self.frequency,
+        )
+    }
+
+    fn teeth(&self) -> f64 {
+        self.steps / 4.0
+    }
+
+    /// The position that it is told, as a whole number of microsteps, and the length of one.
+    fn microstep(&self, time: f64) -> f64 {
+        let told = match time * self.frequency < 1.0 {
+            true => self.amplitude * (1.0 - (2.0 * PI * self.frequency * time).cos()),
+            false => 0.0,
+        };
+        (told / self.length()).round()
+    }
+
+    fn length(&self) -> f64 {
+        2.0 * PI * self.radius / (self.steps * self.microsteps)
+    }
+
+    /// All that acts on the bodies but friction, and the rates of the currents.
+    fn forces(&self, y: &State, told: f64) -> ([f64; 3], [f64; 2]) {
+        let &[p1, x, p3, w1, v, w3, ia, ib] = y;
+        let (r, n) = (self.radius, self.teeth());
+        let k = self.holding * FRAC_1_SQRT_2 / self.rated;
+        let rotor = n * p1 + PI / 4.0;
+        let field = n * told / r + PI / 4.0;
+        let torque = k * (ib * rotor.cos() - ia * rotor.sin()) - self.detent * (4.0 * rotor).sin();
+        let emf = [-k * w1 * rotor.sin(), k * w1 * rotor.cos()];
+        let wanted = [field.cos(), field.sin()];
+        let rates = [0, 1].map(|phase| {
+            let i = [ia, ib][phase];
+            let volts = match self.chopper {
+                false => self.supply * wanted[phase],
+                true => {
+                    let regulated = 2.0 * PI * 1e4 * (2.0_f64.sqrt() * self.rated * wanted[phase] - i);
+                    let volts = self.resistance * i + emf[phase] + self.inductance * regulated;
+                    volts.max(-self.supply).min(self.supply)
+                }
+            };
+            (volts - self.resistance * i - emf[phase]) / self.inductance
+        });
+        let [k1, k2, k3] = self.stiffness;
+        let [c1, c2, c3] = self.damping;
+        let f1 = k1 * (r * p1 - x) + c1 * (r * w1 - v);
+        let f2 = k2 * (x - r * p3) + c2 * (v - r * w3);
+        let f3 = k3 * r * (p3 - p1) + c3 * r * (w3 - w1);
+        ([torque - r * f1 + r * f3, f1 - f2, r * f2 - r * f3], rates)
+    }
+
+    fn inertias(&self) -> [f64; 3] {
+        [self.inertia[0] + self.rotor, self.inertia[1], self.inertia[2]]
+    }
+
+    fn rate(&self, y: &State, told: f64, motion: &[i8; 3]) -> State {
+        let (load, currents) = self.forces(y, told);
+        let mut rate = [y[3], y[4], y[5], 0.0, 0.0, 0.0, currents[0], currents[1]];
+        for (k, &way) in motion.iter().enumerate() {
+            if way == 0 && self.coulomb[k] > 0.0 {
+                rate[k] = 0.0;
+                continue;
+            }
+            let dry = f64::from(way) * self.coulomb[k];
+            rate[3 + k] = (load[k] - dry - self.viscous[k] * y[3 + k]) / self.inertias()[k];
+        }
+        rate
+    }
+
+    /// A step of the classical formula.
+    fn step(&self, y: &State, h: f64, told: f64, motion: &[i8; 3]) -> State {
+        let add = |h: f64, k: &State| -> State { std::array::from_fn(|i| y[i] + h * k[i]) };
+        let k1 = self.rate(y, told, motion);
+        let k2 = self.rate(&add(0.5 * h, &k1), told, motion);
+        let k3 = self.rate(&add(0.5 * h, &k2), told, motion);
+        let k4 = self.rate(&add(h, &k3), told, motion);
+        std::array::from_fn(|i| y[i] + h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]))
+    }
+
+    /// Whether a step ends as it began: no body has reversed or broken away, and the command is the same.
+    fn holds(&self, y: &State, time: f64, told: f64, motion: &[i8; 3]) -> bool {
+        let (load, _) = self.forces(y, told);
+        let body = |k: usize| match motion[k] {
+            0 => load[k].abs() <= self.coulomb[k],
+            way => f64::from(way) * y[3 + k] >= 0.0,
+        };
+        (0..3).all(|k| self.coulomb[k] == 0.0 || body(k)) && self.microstep(time) * self.length() == told
+    }
+
+    /// Positions every millisecond, and when the rotor is half a tooth pitch off the field: times and pitches behind.
+    fn integrate(&self) -> (Vec<[f64; 3]>, Vec<(f64, i32)>) {
+        let mut y: State = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, self.rated, self.rated];
+        if !self.chopper {
+            let at_rest = self.supply / self.resistance * FRAC_1_SQRT_2;
+            (y[6], y[7]) = (at_rest, at_rest);
+        }
+        let (mut motion, mut time, mut behind) = ([0_i8; 3], 0.0, 0);
+        let (mut rows, mut slips) = (vec![[0.0; 3]], Vec::new());
+        while time < self.until - 1e-9 {
+            let end = (rows.len() as f64 * 1e-3).min(self.until);
+            let told = self.microstep(time + 1e-12) * self.length();
+            for (k, motion) in motion.iter_mut().enumerate() {
+                let load = self.forces(&y, told).0[k];
+                if self.coulomb[k] > 0.0 && y[3 + k] == 0.0 {
+                    *motion = if load.abs() <= self.coulomb[k] { 0 } else { load.signum() as i8 };
+                }
+            }
+            let mut h = STEP.min(end - time);
+            let mut next = self.step(&y, h, told, &motion);
+            if !self.holds(&next, time + h, told, &motion) {
+                // Up to where it ceases to hold.
+                let (mut low, mut high) = (0.0, h);
+                for _ in 0..40 {
+                    let middle = 0.5 * (low + high);
+                    let there = self.step(&y, middle, told, &motion);
+                    if self.holds(&there, time + middle, told, &motion) { low = middle } else { high = middle }
+                }
+                (h, next) = (high, self.step(&y, high, told, &motion));
+                for (speed, way) in next[3..6].iter_mut().zip(motion) {
+                    if f64::from(way) * *speed < 0.0 {
+                        *speed = 0.0;
+                    }
+                }
+            }
+            (y, time) = (next, time + h);
+            let told = self.microstep(time + 1e-12) * self.length();
+            let pitches = ((told / self.radius - y[0]) * self.teeth() / (2.0 * PI)).round() as i32;
+            if pitches != behind {
+                behind = pitches;
+                slips.push((time, behind));
+            }
+            if (time - end).abs() < 1e-10 {
+                rows.push([y[0], y[1], y[2]]);
+            }
+        }
+        (rows, slips)
+    }
+}
+
+/// How many machines are drawn: more with `TAUT_CASES`.
+fn machines() -> u64 {
+    std::env::var("TAUT_CASES").ok().and_then(|text| text.parse().ok()).unwrap_or(6)
+}
+
+#[test]
+fn drawn_steppers_go_where_the_two_phases_take_them_and_lose_the_same_steps() {
+    let (mut lost, mut kept) = (0, 0);
+    for seed in 0..machines() {
+        let axis = Axis::drawn(&mut Chance::new(3300 + seed));
+        let text = axis.case();
+        let case = Case::from_text("drawn.toml", &text).unwrap_or_else(|error| panic!("{error}\n{text}"));
+        let run = simulate(&case.machine, &case.experiments[0], Solver::GENERAL).unwrap();
+        assert_eq!(run.outcome.ending, Ending::Complete, "{seed}\n{text}");
+        assert_eq!(run.outcome.unmet, 0, "{seed}\n{text}");
+        let (rows, slips) = axis.integrate();
+        let own: Vec<(f64, i32)> = (run.outcome.events.iter())
+            .filter_map(|event| match (event.part.what, event.to) {
+                (What::Field(_), Status::Slipped(behind)) => Some((event.time, behind)),
+                _ => None,
+            })
+            .collect();
+        let first = slips.first().map_or(f64::INFINITY, |(time, _)| *time);
+        let columns = ["drive_angle", "cart_position", "idler_angle"].map(|name| run.trajectory.get(name).unwrap());
+        let mut most: f64 = 0.0;
+        for (row, others) in rows.iter().enumerate().filter(|(row, _)| 1e-3 * (*row as f64) < first) {
+            for (k, (own, other)) in columns.iter().map(|column| column[row]).zip(others).enumerate() {
+                most = most.max((own - other).abs() * if k == 1 { 1.0 } else { axis.radius });
+            }
+        }
+        // Where no tooth is lost, the general solver is as good as it promises.
+        assert!(most < 2e-9, "{seed}: {most:.1e} m apart\n{text}");
+        assert_eq!(own.first().is_some(), slips.first().is_some(), "{seed}: {own:?}, {slips:?}\n{text}");
+        if let (Some(own), Some(other)) = (own.first(), slips.first()) {
+            assert!((own.0 - other.0).abs() < 1e-3 && own.1 == other.1, "{seed}: {own:?}, {other:?}\n{text}");
+        }
+        assert_eq!(own.last().map(|slip| slip.1), slips.last().map(|slip| slip.1), "{seed}\n{text}");
+        if slips.is_empty() { kept += 1 } else { lost += 1 }
+    }
+    assert!(lost > 0 && kept > 0, "{lost} lose steps, {kept} do not");
+}
+
+/// A stepper axis for limit laws: no dry friction, and these keys of its own.
+fn plain(holding: f64, radius: f64, microsteps: u32, rest: &str) -> String {
+    format!(
+        "[stepper]\nsteps_per_turn = 200\nholding_torque = {holding}\nrated_current = 2\nresistance = 1.4\n\
+         inductance = 3e-3\nsupply = 24\nmicrosteps = {microsteps}\nrotor_inertia = 5.4e-6\n[idler_pulley]\n\
+         inertia = 1e-6\n[belt]\nstiffness = [6e4, 6e4, 3e4]\ndamping = [8, 8, 4]\n{rest}\n[drive_pulley]\n\
+         radius = {radius}\ninertia = 1e-6\n"
+    )
+}
+
+#[test]
+fn a_load_at_rest_deflects_the_rotor_by_the_sine_law() {
+    let (holding, radius, n) = (0.45, 6.4e-3, 50.0);
+    for share in [0.5, -0.8_f64] {
+        let force = -holding * share / radius;
+        let text = plain(holding, radius, 16, &format!("[cart]\nmass = 0.2\nload = {force}\n"))
+            + "friction = { viscous = 2e-3 }\n[[experiment]]\nname = \"held\"\ninput = { step = 0 }\nuntil = 0.3\n\
+               every = 1e-2\n";
+        let case = Case::from_text("held.toml", &text).unwrap();
+        let run = simulate(&case.machine, &case.experiments[0], Solver::GENERAL).unwrap();
+        let angle = *run.trajectory.get("drive_angle").unwrap().last().unwrap();
+        // T_h sin N δ = F r
+        let deflection = -share.asin() / n;
+        assert!((angle - deflection).abs() < 1e-6, "{share}: {angle} rad instead of {deflection} rad");
+    }
+}
+
+#[test]
+fn the_pull_out_torque_that_is_shown_is_that_at_which_a_slow_ramp_loses_its_steps() {
+    let (holding, radius, damping, acceleration) = (0.45, 6.4e-3, 1.2e-3, 10.0);
+    let points: Vec<String> = (0..=280)
+        .map(|k| f64::from(k) * 5e-4)
+        .map(|time| format!("[{time}, {}]", 0.5 * acceleration * time * time))
+        .collect();
+    let text = plain(holding, radius, 2, "[cart]\nmass = 0.05\n")
+        + &format!(
+            "friction = {{ viscous = {damping} }}\n[[experiment]]\nname = \"ramp\"\n\
+             input = {{ table = [{}] }}\nuntil = 0.13\nevery = 1e-2\n",
+            points.join(", ")
+        );
+    let case = Case::from_text("ramp.toml", &text).unwrap();
+    let run = simulate(&case.machine, &case.experiments[0], Solver::GENERAL).unwrap();
+    let first = run.outcome.events.iter().find(|event| matches!(event.part.what, What::Field(_)));
+    let speed = acceleration * first.expect("it loses steps").time / radius;
+    let inertia = 5.4e-6 + 2e-6 + 0.05 * radius * radius;
+    let needed = damping * speed + inertia * acceleration / radius;
+    let shown = PullOut::of(&case.machine).unwrap().torque(speed);
+    assert!((needed / shown - 1.0).abs() < 0.04, "{needed} N m at {speed} rad/s, shown {shown} N m");
+}
