@@ -131,9 +131,14 @@ impl<'a> Change<'a> {
                     let element = place_in_list(step, &self.key[..place]).and_then(|place| list.get_mut(place));
                     element.ok_or_else(|| self.no_element(step, length))?
                 }
-                Value::InlineTable(table) => table.get_mut(step).ok_or_else(|| {
-                    self.fail(format!("`{step}` does not exist yet; set the entries before it first"))
-                })?,
+                Value::InlineTable(table) => {
+                    if place + 1 == self.key.len() {
+                        table.get_or_insert(step, self.value.clone());
+                    }
+                    table.get_mut(step).ok_or_else(|| {
+                        self.fail(format!("`{step}` does not exist yet; set the entries before it first"))
+                    })?
+                }
                 _ => return Err(self.fail(format!("`{step}` cannot be reached: its parent is not a table"))),
             };
         }

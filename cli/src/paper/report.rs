@@ -29,8 +29,11 @@ pub fn page(f: &Findings, claims: &[Claim], plots: &[Plot]) -> Page {
     page
 }
 
+/// The heading of a section, and what writes it.
+type Section<'a> = (&'static str, fn(&mut Report<'a>));
+
 /// The sections behind the summary, which are folded: the summary alone is read in ten minutes.
-fn sections<'a>() -> [(&'static str, fn(&mut Report<'a>)); 10] {
+fn sections<'a>() -> [Section<'a>; 10] {
     [
         ("The stage and its parameters", Report::parameters),
         ("Belt, pulleys and modes", Report::belt),

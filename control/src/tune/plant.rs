@@ -46,7 +46,7 @@ pub struct Plant {
 /// The answers of a machine with one drive or with two.
 #[derive(Debug, Clone)]
 pub(super) enum ByDrives {
-    One(Sampled<1>),
+    One(Box<Sampled<1>>),
     Two(Box<Sampled<2>>),
 }
 
@@ -54,9 +54,12 @@ pub(super) enum ByDrives {
 macro_rules! by_drives {
     ($plant:expr, |$sampled:ident| $value:expr) => {
         match &$plant.of {
-            $crate::tune::plant::ByDrives::One($sampled) => $value,
-            $crate::tune::plant::ByDrives::Two(both) => {
-                let $sampled = &**both;
+            $crate::tune::plant::ByDrives::One(sampled) => {
+                let $sampled = &**sampled;
+                $value
+            }
+            $crate::tune::plant::ByDrives::Two(sampled) => {
+                let $sampled = &**sampled;
                 $value
             }
         }
@@ -85,7 +88,9 @@ impl Plant {
         let system = System::of(machine, operation)?;
         let model = |drive: usize| system.input(drive).discrete(design.every, Hold::Zero, design.delay);
         match machine.drives.len() {
-            1 => Self::sampled([model(0)?], &system.input(0), machine, corners, ByDrives::One),
+            1 => Self::sampled([model(0)?], &system.input(0), machine, corners, |sampled| {
+                ByDrives::One(Box::new(sampled))
+            }),
             2 => Self::sampled([model(0)?, model(1)?], &system.input(0), machine, corners, |sampled| {
                 ByDrives::Two(Box::new(sampled))
             }),

@@ -153,7 +153,7 @@ impl Source {
             Source::Phase(phase, phasing) => {
                 // The voltage limit of a phase begins or ceases to bind.
                 let (phased, places) = (&model.phased[phasing.phased], phasing.currents[phase]);
-                let Some(regulator) = phased.phases.regulator else { return None };
+                let regulator = phased.phases.regulator?;
                 let negligible = FOUND / strict[places] * phased.phases.inductance * regulator;
                 let excess = phasing.excess(phased, phase, (y, input), arguments);
                 excess.iter().for_each(|excess| take(crossing(excess, negligible)));
