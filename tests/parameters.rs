@@ -183,7 +183,35 @@ fn set_each(
     }
 }
 
-/// Of axes and of gantries.
+/// An axis with a stepper.
+const STEPPER: &str = "
+[stepper]
+steps_per_turn = 256
+holding_torque = 0.5
+rated_current = 2
+resistance = 1
+inductance = 0.00390625
+supply = 64
+microsteps = 16
+detent_torque = 0.015625
+rotor_inertia = 0.00001
+[drive_pulley]
+radius = 0.0078125
+inertia = 0.00001
+[idler_pulley]
+inertia = 0.00001
+[cart]
+mass = 0.5
+[belt]
+stiffness = [65536, 65536, 32768]
+damping = [8, 8, 4]
+[[experiment]]
+name = \"there\"
+input = { ramp = 0.03125, over = 1 }
+until = 1
+";
+
+/// Of axes, of gantries, and of a stepper.
 #[test]
 fn every_number_is_set_where_a_case_file_has_it() {
     let mut seen: Vec<&str> = Vec::new();
@@ -205,6 +233,9 @@ fn every_number_is_set_where_a_case_file_has_it() {
         let written = |change: &str| Ok(read(&[change])?.machine);
         set_each(&case.machine, &|key| case.value(key).is_ok(), &written, &mut seen);
     }
+    let case = read("stepper.toml", STEPPER, &[]);
+    let written = |change: &str| Ok(Case::from_text_with("stepper.toml", STEPPER, &[change])?.machine);
+    set_each(&case.machine, &|key| case.value(key).is_ok(), &written, &mut seen);
     for row in all() {
         match row.field {
             Field::Machine(_) | Field::Form(..) => assert!(seen.contains(&row.key), "no machine has {}", row.key),
@@ -395,6 +426,11 @@ fn the_table_is_of_one_piece() {
             ["motor.speed_constant", "motor.rated.", "belt.width", "belt.mass_per_length", "belt.allowed_tension"];
         if sheets.iter().any(|key| parameter.key.starts_with(key)) {
             assert!(is_elsewhere, "{}", parameter.key);
+            continue;
+        }
+        if parameter.key.starts_with("stepper.") {
+            // Of a motor that only steppers are.
+            assert_ne!(axis.sits(parameter), Sits::Elsewhere, "{}", parameter.key);
             continue;
         }
         let machine = [
