@@ -112,7 +112,7 @@ fn swapped_columns_and_signs_are_suspected() {
     swapped.outputs.remove(2);
     let angle = swapped.outputs[0].values.clone();
     swapped.outputs[0].values = std::mem::replace(&mut swapped.outputs[1].values, angle);
-    says(&swapped, "swapped", "exchanged they agree with the pulley's radius of 19.4 mm");
+    says(&swapped, "swapped", "exchanged, they agree with the pulley's radius of 19.4 mm");
     let mut exchanged = only(&log, Quantity::CartPosition);
     std::mem::swap(&mut exchanged.input, &mut exchanged.outputs[0].values);
     says(&exchanged, "swapped", "as an input does");
@@ -192,7 +192,7 @@ fn faults_of_single_columns() {
     says(&coarse, "quantisation", "steps of 10 mm");
     let mut absolute = only(&log, Quantity::CartSpeed);
     absolute.outputs[0].absolute = true;
-    says(&absolute, "negative", "said to be absolute");
+    says(&absolute, "negative", "declared absolute");
 }
 
 #[test]
