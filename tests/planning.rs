@@ -136,7 +136,7 @@ fn gantry(kind: &str, motion: &str) -> Case {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("stages").join(kind).join("square.toml");
     let calm = "controller.pid={ proportional = \"5 V/mm\", integral = \"30 V/(mm s)\", derivative = \"39 V s/m\" }";
     let ahead = "controller.feed_forward={ model = \"rigid\" }";
-    Case::read_with(file, &[calm, ahead, motion]).unwrap_or_else(|error| panic!("{error}"))
+    Case::read_with(file, &[calm, ahead, motion, "tune.spread=0"]).unwrap_or_else(|error| panic!("{error}"))
 }
 
 #[test]

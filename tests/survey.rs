@@ -121,7 +121,7 @@ fn swapped_columns_and_signs_are_suspected() {
     says(&sign, "sign", "against its input");
     let mut one = log.clone();
     values(&mut one, Quantity::CartSpeed).iter_mut().for_each(|x| *x = -*x);
-    says(&one, "sign", "the other way than cart_speed says");
+    says(&one, "sign", "it moves against cart_speed");
 }
 
 #[test]

@@ -300,7 +300,7 @@ fn a_verdict_does_not_depend_on_the_unit_of_the_input() {
     }
 }
 
-/// "The same inputs again, the other way round" promised 2.4 times better where it gave √2: its start and its delay
+/// "The same inputs again, opposite sign" promised 2.4 times better where it gave √2: its start and its delay
 /// were taken as known.
 #[test]
 fn the_other_way_round_gives_what_is_promised() {
@@ -309,7 +309,7 @@ fn the_other_way_round_gives_what_is_promised() {
     let noise = |seed| slow(seed, 0.0, 1.0, 3e-3);
     let one = made(&[], &truth, &[0], noise(1));
     let checked = check(&one, &free).unwrap();
-    let promise = checked.experiments.iter().find(|p| p.name.contains("the other way round"));
+    let promise = checked.experiments.iter().find(|p| p.name.contains("opposite sign"));
     // The other way round, with its log.
     let mut both = one.clone();
     let mut real = Case::from_text_with("axis.toml", TEMPLATE, &truth).unwrap();
@@ -344,7 +344,7 @@ fn the_other_way_round_gives_what_is_promised() {
     // A log that turns round already is not to be turned round.
     let there = made(&[], &truth, &[1], noise_of(4));
     let checked = check(&there, &free).unwrap();
-    assert!(checked.experiments.iter().all(|p| !p.name.contains("the other way round")));
+    assert!(checked.experiments.iter().all(|p| !p.name.contains("opposite sign")));
 }
 
 fn noise_of(seed: u64) -> impl FnMut(usize, f64) -> f64 {

@@ -103,7 +103,14 @@ pub fn plan(case: &Case, places: &[usize], wanted: &Wanted, stop: &dyn Fn() -> b
     };
     let family = Family::of(case, &case.tune.clone().unwrap_or_default())?;
     let modes = modes(&case.machine);
-    let planner = Planner { design, family: &family, modes: &modes, wanted, stop };
+    let mut machines: Vec<(Machine, usize)> = Vec::new();
+    for machine in family.machines.iter().map(|corner| family.stage_at(corner)) {
+        match machines.iter_mut().find(|(known, _)| *known == machine) {
+            Some((_, count)) => *count += 1,
+            None => machines.push((machine, 1)),
+        }
+    }
+    let planner = Planner { design, family: &family, machines, modes: &modes, wanted, stop };
     let moves: Result<Vec<_>> = places.iter().map(|&place| planner.planned(&case.moves[place], place)).collect();
     let moves = moves?;
     Ok(Plans { family, modes, moves })
@@ -138,6 +145,8 @@ impl Plans {
 struct Planner<'a> {
     design: &'a Design,
     family: &'a Family,
+    /// The machines of the family that differ, and how many there are of each.
+    machines: Vec<(Machine, usize)>,
     modes: &'a [f64],
     wanted: &'a Wanted,
     stop: &'a dyn Fn() -> bool,
@@ -210,8 +219,8 @@ impl Planner<'_> {
     /// Largest use of each limit by references with their shaper, over the family.
     fn loads(&self, profiles: &[Profile], instants: usize) -> Vec<Load> {
         let mut all: Vec<Load> = Vec::new();
-        for corner in &self.family.machines {
-            let own = loads(&self.family.stage_at(corner), self.design.limit, profiles, instants);
+        for (machine, _) in &self.machines {
+            let own = loads(machine, self.design.limit, profiles, instants);
             own.into_iter().for_each(|load| load.join(&mut all));
         }
         all
@@ -252,14 +261,15 @@ impl Planner<'_> {
         if whole {
             let mut worst = Some(0.0_f64);
             (arrival.settled, arrival.axes) = (0, 0);
-            for corner in &self.family.machines {
+            for (machine, count) in &self.machines {
                 if (self.stop)() {
                     worst = None;
                     break;
                 }
-                let one = time(&run(&self.family.stage_at(corner))?).map(|settling| end + settling);
+                let one = time(&run(machine)?).map(|settling| end + settling);
                 worst = worst.zip(one).map(|(worst, one)| worst.max(one));
-                (arrival.settled, arrival.axes) = (arrival.settled + usize::from(one.is_some()), arrival.axes + 1);
+                arrival.settled += if one.is_some() { *count } else { 0 };
+                arrival.axes += count;
             }
             arrival.worst = worst;
         }
