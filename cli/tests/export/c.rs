@@ -212,7 +212,7 @@ fn the_controllers_of_a_gantry_replay_moves_bit_for_bit() {
         let harness = fs::read_to_string(folder.path().join("control.c")).unwrap();
         for (side, seen) in ["left", "right"].into_iter().zip(observed_drives(&case, 0)) {
             let own = format!("model_{side}");
-            let text = harness.replace("\"model.h\"", &format!("\"{own}.h\"")).replace("model_", &format!("{own}_"));
+            let text = harness.replace("model_", &format!("{own}_")).replace("\"model.h\"", &format!("\"{own}.h\""));
             fs::write(folder.path().join("control.c"), text).unwrap();
             fs::copy(folder.path().join(format!("{own}.c")), folder.path().join("model.c")).unwrap();
             write_doubles(&folder.path().join("in.bin"), seen.iter().flat_map(|(seen, _)| *seen));
