@@ -296,7 +296,7 @@ fn a_sweep_of_rows_alone_is_killed_and_goes_on_to_the_same_bytes() {
     .withstands_kills(7);
 }
 
-const TUNING: &str = "--set tune.cost=none --set tune.bandwidth=8Hz --no-report";
+const TUNING: &str = "--set tune.cost=none --set tune.bandwidth=8Hz --set tune.spread=0 --no-report";
 
 #[test]
 fn tune_is_killed() {

@@ -177,7 +177,13 @@ impl Work<'_> {
                     &corner
                 }
             };
-            found.push((place, self.looked(&mut runner, design, machine)?));
+            // Without a spread machines are equal, and so are their runs.
+            let equal = |(other, _): &&(usize, Vec<MoveFigures>)| self.stages.get(*other) == Some(machine);
+            let figures = match found.iter().find(equal) {
+                Some((_, figures)) => figures.clone(),
+                None => self.looked(&mut runner, design, machine)?,
+            };
+            found.push((place, figures));
             if bar.is_finite() && found.len() > left_out {
                 let worst: Vec<AtWorst> =
                     (0..self.moves.len()).map(|k| AtWorst::of(&of(&found, k), left_out)).collect();
