@@ -47,7 +47,7 @@ fn a_plan_is_written_and_moves() {
 
 #[test]
 fn what_cannot_be_planned_is_told() {
-    let cases: [(&[&str], i32, &str); 8] = [
+    let cases: [(&[&str], i32, &str); 9] = [
         (&["stages/sollmann-jouaneh/table4.toml"], 2, "move"),
         (&[PID, "--move", "gone"], 2, "gone"),
         (&[PID, "--reserve", "95%"], 2, "a share from 0 to 90% is needed"),
@@ -55,7 +55,12 @@ fn what_cannot_be_planned_is_told() {
         (&[PID, "--jerk", "5 m/s"], 2, "m/s^3"),
         (&[PID, "--move", "long", "--set", "cart.friction.static=1 kN"], 1, "to break away takes"),
         (&[PID, "--move", "long", "--set", "controller.limit=0.5 V"], 1, "there is no plan"),
-        (&["stages/core-xy/core-xy.toml"], 2, "gantry"),
+        (&["stages/core-xy/core-xy.toml"], 2, "no move and no controller"),
+        (
+            &["stages/core-xy/square.toml", "--move", "square", "--set", "controller.limit=0.1 V"],
+            1,
+            "there is no plan: left drive: ",
+        ),
     ];
     for (plan, besides, part) in [
         ("{ speed = 0 }", "motor.resistance=1", "has to be above zero"),
