@@ -2,8 +2,7 @@
 
 use super::linear::{Linear, Output, STATES, States};
 use super::model::{MOST_GUARDS, Model, Vector};
-use super::sources::{Phasing, Source};
-use super::step::SOURCES;
+use super::sources::{Phasing, SOURCES, Source};
 use crate::friction::{Law, Motion};
 use crate::mechanism::{BODIES, Cause, DRIVES, Equations, Form, Mode, ROUNDING, Switch, Transition};
 use std::sync::Arc;

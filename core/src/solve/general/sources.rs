@@ -13,7 +13,10 @@
 use super::model::{Curved, Model, Phased, Sliding, Vector};
 use super::radau::{FOUND, Lane, NODES, PLACES, POINTS, QUARTIC, RADAU, monomials};
 use crate::friction::{Law, Motion, Side};
-use crate::mechanism::{DRIVES, PhaseRate};
+use crate::mechanism::{BODIES, DRIVES, PhaseRate, SPRINGS};
+
+/// Most forces: of friction, of springs, and the torque and the voltages of a stepper.
+pub(super) const SOURCES: usize = BODIES + SPRINGS + 2 * DRIVES;
 
 /// A force, with the arguments that it depends on by their numbers.
 pub(super) enum Source {

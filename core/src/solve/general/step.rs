@@ -23,12 +23,9 @@ use super::linear::{Forcing, STATES, Series, Set, States};
 use super::model::{MOST, MOST_GUARDS, Vector};
 use super::newton::Newton;
 use super::radau::{BACKWARD, C, FOUND, Lane, MONOMIALS, NODES, POINTS, POWER, POWERS, rest};
-use super::sources::{Bristle, Bristles};
+use super::sources::{Bristle, Bristles, SOURCES};
 use crate::mechanism::{BODIES, DRIVES, SPRINGS};
 use crate::signal::DEGREE;
-
-/// Most forces: of friction, of springs, and the torque and the voltages of a stepper.
-pub(super) const SOURCES: usize = BODIES + SPRINGS + 2 * DRIVES;
 
 /// Most arguments of forces: speeds, ways, lengths, currents, inputs.
 pub(super) const ARGUMENTS: usize = 2 * BODIES + SPRINGS + 2 * DRIVES;
