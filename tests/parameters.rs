@@ -209,6 +209,7 @@ damping = [8, 8, 4]
 name = \"there\"
 input = { ramp = 0.03125, over = 1 }
 until = 1
+every = 0.25
 ";
 
 /// Of axes, of gantries, and of a stepper.

@@ -467,7 +467,7 @@ fn plans_that_exclude_themselves_are_told() {
     let narrow = "sweep.vary.\"cart.mass\"={ normal = [\"1 kg\", \"1 g\"], within = [\"2 kg\", \"3 kg\"] }";
     assert!(told(&["sweep.runs=9", narrow]).contains("outside the allowed range"));
     let none = Sweep::new(&Case::from_text("table4.toml", TABLE4).unwrap()).unwrap_err();
-    assert!(none.to_string().contains("does not say what is varied"));
+    assert!(none.to_string().contains("no parameters to vary"));
 }
 
 #[test]
