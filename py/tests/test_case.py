@@ -136,7 +136,7 @@ def test_a_case_is_exported_as_the_program_does(case, tmp_path):
         taut.export(case, "fortran", tmp_path)
     with pytest.raises(taut.Error, match="no controller"):
         taut.export(case, "st", tmp_path)
-    with pytest.raises(ValueError, match="real: float or double"):
+    with pytest.raises(ValueError, match="real: expected float or double"):
         taut.export(case, "c", tmp_path, real="half")
 
 
