@@ -56,9 +56,15 @@ const all = (page, act, body) => page.evaluate(async ([act, body]) => {
   } catch (error) { return {error: error.mistake || String(error)}; }
 }, [act, body]);
 
-/** JSON with the keys of objects in alphabetical order. */
-const sorted = one => JSON.stringify(one, (_, part) => (part && typeof part === "object" && !Array.isArray(part)
-  ? Object.fromEntries(Object.entries(part).sort(([a], [b]) => (a < b ? -1 : 1))) : part));
+/**
+ * JSON with the keys of objects in alphabetical order; the frequency at which a loop swings, which a model's sines and
+ * logarithms give, to 12 digits.
+ */
+const sorted = one => JSON.stringify(one, (key, part) => {
+  if (key === "frequency_Hz" && typeof part === "number") return Number(part.toPrecision(12));
+  const isObject = part && typeof part === "object" && !Array.isArray(part);
+  return isObject ? Object.fromEntries(Object.entries(part).sort(([a], [b]) => (a < b ? -1 : 1))) : part;
+});
 
 /** True if two answers are the same but for the tolerance of the general solver. */
 const isNear = (one, other) => {
