@@ -119,7 +119,7 @@ impl Axis {
         self.steps / 4.0
     }
 
-    /// The position that it is told, as a whole number of microsteps, and the length of one.
+    /// Commanded position as a whole number of microsteps, and the length of one.
     fn microstep(&self, time: f64) -> f64 {
         let told = match time * self.frequency < 1.0 {
             true => self.amplitude * (1.0 - (2.0 * PI * self.frequency * time).cos()),
@@ -190,7 +190,7 @@ impl Axis {
         std::array::from_fn(|i| y[i] + h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]))
     }
 
-    /// Whether a step ends as it began: no body has reversed or broken away, and the command is the same.
+    /// True if a step ends as it began: no body has reversed or broken away, and the command is the same.
     fn holds(&self, y: &State, time: f64, told: f64, motion: &[i8; 3]) -> bool {
         let (load, _) = self.forces(y, told);
         let body = |k: usize| match motion[k] {

@@ -38,7 +38,7 @@ pub struct Arrival {
     pub settled: usize,
     /// How many were run.
     pub axes: usize,
-    /// Largest distance of what slides from its reference on the machine as the file has it, m.
+    /// Largest error of a sliding part on the machine of the file, m.
     pub cart_error: f64,
 }
 
@@ -131,7 +131,7 @@ impl Plans {
             [("jerk", limits.jerk, "m/s^3"), ("snap", limits.snap, "m/s^4")]
                 .into_iter()
                 .for_each(|(key, value, unit)| value.into_iter().for_each(|value| set(key, value, unit)));
-            let end = planned.profiles.iter().map(Profile::rest).fold(0.0, f64::max);
+            let end = Profile::last_rest(&planned.profiles);
             if case.moves[planned.place].until < end {
                 set("until", end, "s");
             }
@@ -187,7 +187,7 @@ impl Planner<'_> {
             place,
             name: motion.name.clone(),
             window: motion.window,
-            loads: self.loads(&self.shaped(&profiles), CLOSELY),
+            loads: self.loads(&self.design.shaped(&profiles), CLOSELY),
             bound: self.bound(&way),
             given,
             references: motion.profiles.clone(),
@@ -226,15 +226,10 @@ impl Planner<'_> {
         all
     }
 
-    /// References through the shaper of the controller.
-    fn shaped(&self, profiles: &[Profile]) -> Vec<Profile> {
-        profiles.iter().map(|profile| profile.clone().shaped(&self.design.shaper)).collect()
-    }
-
     /// When the cart arrives, in closed loop.
     fn arrival(&self, motion: &Move, profiles: &[Profile], whole: bool) -> Result<Arrival> {
         let watched = (motion.until - motion.end()).max(WATCHED);
-        let rest = self.shaped(profiles).iter().map(Profile::rest).fold(0.0, f64::max);
+        let rest = Profile::last_rest(&self.design.shaped(profiles));
         let run = |machine: &Machine| -> Result<MoveRun> {
             closed_loop(&Setup {
                 machine,
@@ -246,7 +241,7 @@ impl Planner<'_> {
                 solver: Solver::of(machine),
             })
         };
-        let end = profiles.iter().map(Profile::end).fold(0.0, f64::max);
+        let end = Profile::last_end(profiles);
         let time = |run: &MoveRun| run.figures.settling.filter(|_| run.outcome.ending == Ending::Complete);
         let own = run(&self.family.machine)?;
         let nominal = time(&own).map(|settling| end + settling);

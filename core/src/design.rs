@@ -9,6 +9,8 @@ mod tunable;
 
 pub use tunable::{InDrives, Tunable, TunedBy};
 
+use crate::signal::profile::Profile;
+
 /// A sampled controller.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Design {
@@ -31,6 +33,11 @@ pub struct Design {
 }
 
 impl Design {
+    /// References through its shaper.
+    pub fn shaped(&self, profiles: &[Profile]) -> Vec<Profile> {
+        profiles.iter().map(|profile| profile.clone().shaped(&self.shaper)).collect()
+    }
+
     /// The key of a part of it that needs the model of a single axis, which a machine with several drives does not
     /// have; none if it has no such part.
     pub fn needs_axis(&self) -> Option<&'static str> {

@@ -18,6 +18,7 @@ pub mod chance;
 pub mod design;
 pub mod error;
 pub mod friction;
+pub mod golden;
 pub mod machine;
 pub mod measure;
 pub mod mechanism;

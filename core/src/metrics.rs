@@ -59,7 +59,7 @@ pub struct OfStepper {
     pub slips: u64,
     /// When it did so first, s.
     pub first_slip: Option<f64>,
-    /// The position that it is told at the end minus that of the cart, m.
+    /// Commanded position at the end minus that of the cart, m.
     pub position_error: f64,
 }
 

@@ -3,11 +3,20 @@
 
 const ENDED = "the server has ended";
 
-/** @typedef {import("./wire.js").Carrier} Carrier */
+/** What the page says of a carrier.
+ * @typedef {{gone: string, link: string}} Words */
+/** What a carrier does: `ready` when it can send.
+ * @typedef {{ready: Promise<void>, send: (request: {id: number}) => void, upload: (file: File) => Promise<string>, words: Words}} Carrier */
+/** Who takes its answers, and is told whether it works.
+ * @typedef {Object} Receiver
+ * @property {(works: boolean) => void} changed
+ * @property {(why: string) => void} lose
+ * @property {(frame: ArrayBuffer) => any} receive
+ * @property {(answer: {head: any, columns: Map<string, Float64Array>}) => void} take */
 
 /** @implements {Carrier} */
 export class Socket {
-  /** @param {import("./wire.js").Wire} wire */
+  /** @param {Receiver} wire */
   constructor(wire) {
     this.wire = wire;
     this.words = {

@@ -4,10 +4,7 @@
 import {Socket} from "./socket.js";
 import {Workers} from "./workers.js";
 
-/** What a carrier does: `ready` when it can send.
- * @typedef {{ready: Promise<void>, send: (request: {id: number}) => void, upload: (file: File) => Promise<string>, words: Words}} Carrier */
-/** What the page says of it.
- * @typedef {{gone: string, link: string}} Words */
+/** @typedef {import("./socket.js").Carrier} Carrier */
 
 /**
  * @typedef {Object} Answer

@@ -7,11 +7,11 @@ const PATIENCE = 3000;
 
 /** A file that was dropped, and its number. @typedef {{place: number, file: File}} Dropped */
 
-/** @typedef {import("./wire.js").Carrier} Carrier */
+/** @typedef {import("./socket.js").Carrier} Carrier */
 
 /** @implements {Carrier} */
 export class Workers {
-  /** @param {import("./wire.js").Wire} wire */
+  /** @param {import("./socket.js").Receiver} wire */
   constructor(wire) {
     this.wire = wire;
     this.words = {

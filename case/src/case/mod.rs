@@ -171,7 +171,7 @@ impl Case {
         Self::from_text_accepting(name, text, changes, (files, Accepted::All))
     }
 
-    /// The same for what takes some machines alone: refuses all others.
+    /// Reads a case from text for what takes some machines alone; rejects all others.
     pub fn from_text_accepting(
         name: impl AsRef<Path>,
         text: &str,
@@ -393,8 +393,8 @@ fn experiment(field: &Field, machine: &Machine, folder: &Folder) -> Result<Vec<E
     let Some(log) = table.optional("log").filter(|_| one_drive) else {
         let (until, every) = times(&table, None)?;
         let context = input::Context { folder, until };
-        let inputs = match one_drive {
-            false => gantry::inputs(&table, machine, &context)?,
+        let (inputs, initial) = match one_drive {
+            false => (gantry::inputs(&table, machine, &context)?, initial(&table, machine)?),
             true => {
                 let unit = field.input_unit;
                 let such_as = match unit {
@@ -403,11 +403,14 @@ fn experiment(field: &Field, machine: &Machine, folder: &Folder) -> Result<Vec<E
                 };
                 let field = table.required("input", &such_as)?;
                 let signal = input::signal(&field, &context)?;
-                stepper::check_command(&field, machine, &signal, (&initial(&table, machine)?, until))?;
-                vec![signal]
+                let initial = initial(&table, machine)?;
+                if machine.stepper().is_some() {
+                    stepper::check_command(&field, machine, &signal, (&initial, until))?;
+                }
+                (vec![signal], initial)
             }
         };
-        return Ok(vec![Experiment { name, inputs, until, every, initial: initial(&table, machine)?, log: None }]);
+        return Ok(vec![Experiment { name, inputs, until, every, initial, log: None }]);
     };
     let (initial, input) = (initial(&table, machine)?, table.optional("input"));
     let runs = log::logs(&log, machine, folder, input.is_some())?;

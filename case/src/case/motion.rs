@@ -42,12 +42,12 @@ impl Move {
 
     /// End of the references, s.
     pub fn end(&self) -> f64 {
-        self.profiles.iter().map(Profile::end).fold(0.0, f64::max)
+        Profile::last_end(&self.profiles)
     }
 
     /// The references, through the shaper of this controller.
     pub fn references(&self, design: &Design) -> Vec<Profile> {
-        self.profiles.iter().map(|profile| profile.clone().shaped(&design.shaper)).collect()
+        design.shaped(&self.profiles)
     }
 
     /// The limits that its references exceed on a machine under this controller.

@@ -1,4 +1,4 @@
-//! The table `[stepper]`: a motor that is told a position, with its driver. And what its case cannot have yet.
+//! The table `[stepper]`, a motor that is commanded a position with its driver, and what its case cannot have yet.
 
 use super::reader::{Field, Table};
 use crate::error::{Error, Result};

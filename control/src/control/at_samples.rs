@@ -95,7 +95,7 @@ impl<'a> Gathered<'a> {
         };
         Self {
             window,
-            done: profiles.iter().map(Profile::end).fold(0.0, f64::max),
+            done: Profile::last_end(profiles),
             last: None,
             slides: profiles.iter().zip(machine.geometry().slides).map(slide).collect(),
             currents: vec![Squared::default(); machine.drives.len()],

@@ -2,6 +2,7 @@
 
 use super::figures::Deviation;
 use super::quadrature::{integral, larger};
+use crate::golden;
 use crate::metrics::Peak;
 use crate::signal::profile::Profile;
 use crate::solve::{Curve, Polynomial, TERMS};
@@ -92,17 +93,7 @@ const PLACES: usize = 9;
 /// A place as near the largest distance so far, as a share of it, may hide a larger one beside it.
 const NEAR: f64 = 0.05;
 
-/// Where a function with one top between two places has it, by the golden section.
-fn top([mut low, mut high]: [f64; 2], of: impl Fn(f64) -> f64) -> f64 {
-    const SHARE: f64 = 0.618_033_988_749_894_8;
-    for _ in 0..STEPS {
-        let [a, b] = [high - SHARE * (high - low), low + SHARE * (high - low)];
-        if of(a) < of(b) { low = a } else { high = b }
-    }
-    0.5 * (low + high)
-}
-
-/// Steps of the golden section, each of which leaves 0.62 of what was left.
+/// Steps of the golden section.
 const STEPS: usize = 40;
 
 impl ContourGauge {
@@ -129,7 +120,7 @@ impl ContourGauge {
         let Some(most) = (0..PLACES).max_by(|a, b| size(*a).total_cmp(&size(*b))) else { return };
         if size(most) > (1.0 - NEAR) * self.seen.peak.value.abs() {
             let between = [most.saturating_sub(1), (most + 1).min(PLACES - 1)].map(spread);
-            let s = top(between, |s| at(s).0.abs());
+            let s = golden::top(between, STEPS, |s| at(s).0.abs());
             let value = if at(s).0.abs() > size(most) { at(s).0 } else { seen[most].0 };
             if value.abs() > self.seen.peak.value.abs() {
                 self.seen.peak = Peak { value, time: time(s) };

@@ -35,7 +35,7 @@ impl Figures {
         self.loads.last().copied().unwrap_or_default()
     }
 
-    /// The figures of what slides with the largest error.
+    /// Figures of the sliding part with the largest error.
     pub fn worst_load(&self) -> LoadFigures {
         let size = |load: &LoadFigures| load.error.peak.value.abs();
         let larger = |a: LoadFigures, b: LoadFigures| if size(&b) > size(&a) { b } else { a };

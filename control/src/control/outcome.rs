@@ -58,7 +58,7 @@ pub struct Setup<'a> {
 /// Runs a design along a profile: pure, and as cheap as a run of the axis, so that a search can call it often.
 pub fn closed_loop(setup: &Setup) -> Result<MoveRun> {
     let &Setup { machine, model, design, profiles, until, window, solver } = setup;
-    let shaped: Vec<Profile> = profiles.iter().map(|profile| profile.clone().shaped(&design.shaper)).collect();
+    let shaped = design.shaped(profiles);
     let mut controllers = Standard::of_drives(design, model)?;
     close(machine, &mut each(&mut controllers), &Loop::of(design), &shaped, until, window, solver)
 }

@@ -270,7 +270,7 @@ fn seen(
         Profile::new(0.0, &[Leg::To(way, limits), Leg::To(0.5 * way, limits)])
     };
     let profiles = machine.slides().map(reversal).collect::<Result<Vec<_>>>()?;
-    let from = profiles.iter().map(Profile::end).fold(0.0, f64::max);
+    let from = Profile::last_end(&profiles);
     let until = from + watched;
     let mut controllers = Standard::of_drives(design, model)?;
     let rows = Rows { until, every: design.every.min(until), window: 1e-4 };

@@ -70,7 +70,7 @@ pub(super) struct Open<const N: usize> {
     /// The positions of what slides per position that follows the reference, and per step beside the command.
     slides: Square<N>,
     pub pushed: Square<N>,
-    /// What each drive's part of the belt does per way of what slides.
+    /// Travel of each drive's part of the belt per travel of each sliding part.
     shares: Square<N>,
 }
 
@@ -146,7 +146,7 @@ impl<const N: usize> Open<N> {
         self.sensitivity(self.outer())
     }
 
-    /// T x/y: from the references of what slides to what slides, without feed-forward.
+    /// T x/y: from the references of the sliding parts to their positions, without feed-forward.
     pub fn reference_to_slides(&self) -> Square<N> {
         self.slides * (self.closed(self.outer())[1] / self.difference) * self.shares
     }

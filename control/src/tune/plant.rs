@@ -25,7 +25,7 @@ pub(super) struct Answer<const N: usize> {
     pub position: Square<N>,
     /// Motor currents, A per V or A, as they are when they are sampled.
     pub current: Square<N>,
-    /// The positions of what slides, m per V or A.
+    /// Positions of the sliding parts, m per V or A.
     pub slides: Square<N>,
 }
 
@@ -77,13 +77,12 @@ pub(super) struct Sampled<const N: usize> {
     slides: [usize; N],
     currents: [usize; N],
     length: f64,
-    every: f64,
-    /// What each drive's part of the belt does per way of what slides.
+    /// Travel of each drive's part of the belt per travel of each sliding part.
     pub shares: Square<N>,
 }
 
 impl Plant {
-    /// That of `machine` about `operation`, as the controllers of `design` sample it.
+    /// Samples `machine` about `operation` as the controllers of `design` do.
     pub fn of(machine: &Machine, operation: Operation, design: &Design, corners: &[f64]) -> Result<Self> {
         let system = System::of(machine, operation)?;
         let model = |drive: usize| system.input(drive).discrete(design.every, Hold::Zero, design.delay);
@@ -131,7 +130,6 @@ impl Plant {
             slides: std::array::from_fn(slide),
             currents: std::array::from_fn(|drive| find(geometry.drives[drive].current_column).unwrap_or_default()),
             length: if measures_cart(machine) { 1.0 } else { machine.pulley_radius },
-            every: t,
             shares: Square::from_fn(|drive, slide| Complex::new(shares[drive][slide], 0.0)),
             models,
         };
@@ -156,7 +154,7 @@ impl<const N: usize> Sampled<N> {
     pub fn at(&self, omega: f64) -> Answer<N> {
         let all: [Vec<Complex<f64>>; N] = std::array::from_fn(|input| self.models[input].at(omega));
         // What is sampled is the current of the command before.
-        let lag = Complex::new(0.0, -omega * self.every).exp() - 1.0;
+        let lag = Complex::new(0.0, -omega * self.models[0].sample_time).exp() - 1.0;
         Answer {
             position: Square::from_fn(|row, input| all[input][self.measured[row]] * self.length),
             current: Square::from_fn(|row, input| {

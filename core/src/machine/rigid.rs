@@ -34,7 +34,7 @@ pub struct Rigid {
 }
 
 impl Rigid {
-    /// That of an axis; of a machine with several drives what each of them moves where all move what is heaviest to
+    /// Lumps an axis; of a machine with several drives what each of them moves where all move what is heaviest to
     /// move.
     pub fn of(machine: &Machine) -> Self {
         if machine.drives.len() == 1 {

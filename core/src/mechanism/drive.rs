@@ -23,7 +23,7 @@ pub struct Motor {
     pub gear_play: Option<GearPlay>,
     /// True if it only stands for a drive that is given by force and drag, so that its own numbers mean nothing.
     pub is_simple: bool,
-    /// The two phases of a stepper that is told a position; none for a brushed motor.
+    /// The two phases of a stepper, which is commanded a position; none for a brushed motor.
     pub stepper: Option<Stepper>,
 }
 
@@ -121,7 +121,7 @@ pub enum AmplifierMode {
     Voltage,
     /// The output is the motor's current.
     Current,
-    /// A stepper's driver: the input is the position that the motor is told to go to, m at the belt.
+    /// A stepper's driver: the input is the commanded position, m at the belt.
     Position,
 }
 

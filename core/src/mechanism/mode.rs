@@ -27,7 +27,7 @@ pub struct DriveMode {
     pub voltage: Limit,
     /// State of the current limit.
     pub current: Limit,
-    /// Tooth pitches by which a stepper's rotor has fallen behind what it is told.
+    /// Tooth pitches by which a stepper's rotor has fallen behind its command.
     pub slipped: i32,
 }
 

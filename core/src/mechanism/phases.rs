@@ -66,7 +66,7 @@ impl Phases {
         })
     }
 
-    /// ε = N φ + π/4, or ψ of the angle that is told.
+    /// ε = N φ + π/4, or ψ of the commanded angle.
     fn electrical(&self, angle: f64) -> f64 {
         self.teeth * angle + FRAC_PI_4
     }
@@ -85,7 +85,7 @@ impl Phases {
         (torque, [-k * n * (a * cos + b * sin) - detent_slope, -k * sin, k * cos])
     }
 
-    /// The part of a phase current's rate beyond −R i/L, where the rotor is told to be at `told`, rad.
+    /// The part of a phase current's rate beyond −R i/L, at the commanded angle `told`, rad.
     #[inline(always)]
     pub fn rate(&self, phase: usize, angle: f64, speed: f64, current: f64, told: f64) -> PhaseRate {
         let (sin, cos) = (self.electrical(angle) - FRAC_PI_2 * phase as f64).sin_cos();
@@ -125,7 +125,7 @@ impl Phases {
         Some([wanted - self.supply, wanted + self.supply])
     }
 
-    /// Currents at rest where the field is told this angle, A.
+    /// Currents at rest at this commanded angle of the field, A.
     pub fn at_rest(&self, told: f64) -> [f64; 2] {
         let most = self.supply / self.resistance;
         let amplitude = if self.regulator.is_some() { self.amplitude } else { most };
@@ -143,7 +143,7 @@ impl Mechanism {
         })
     }
 
-    /// Angle of the shaft that a unit of the input tells a stepper to go to, rad/m: 1/r.
+    /// Commanded angle of a stepper's shaft per unit of the input, rad/m: 1/r.
     pub fn angle_per_input(&self, drive: usize) -> f64 {
         self.drives[drive].amplifier.gain / self.bodies[self.drives[drive].pulley].kind.lever()
     }
@@ -160,7 +160,7 @@ impl Mechanism {
         Some(PI / stepper.teeth() / self.angle_per_input(drive).abs())
     }
 
-    /// By how much the rotor of a stepper is behind what it is told, rad.
+    /// Lag of a stepper's rotor behind its command, rad.
     fn lag(&self, drive: usize) -> Option<Form> {
         let (spring, at) = self.angle_of(drive)?;
         let mut lag = -Form::stretch(spring);

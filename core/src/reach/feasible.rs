@@ -179,7 +179,7 @@ fn of_drive(machine: &Machine, limit: Option<f64>, drive: usize, profiles: &[Pro
 fn needs_of_drive(machine: &Machine, drive: usize, profiles: &[Profile], instants: usize) -> Vec<Need> {
     let all = FeedForward { model: FeedForwardModel::Rigid, ..FeedForward::NONE };
     let Some(forward) = Forward::of(all, machine, drive) else { return Vec::new() };
-    let end = profiles.iter().map(Profile::rest).fold(0.0, f64::max);
+    let end = Profile::last_rest(profiles);
     let need = |k: usize| {
         let time = end * k as f64 / instants as f64;
         let slides: Vec<Reference> = profiles.iter().map(|profile| profile.at(time)).collect();

@@ -9,6 +9,7 @@
 //!
 //! That is the torque in steady motion: a rotor that swings in its field is lost earlier.
 
+use crate::golden;
 use crate::machine::Machine;
 use crate::machine::rigid::Rigid;
 use crate::mechanism::Phases;
@@ -61,13 +62,9 @@ impl PullOut {
         let at = |k: usize| PI * k as f64 / ANGLES as f64;
         let torques: Vec<f64> = (0..=ANGLES).map(|k| self.mean_torque(speed, at(k))).collect();
         let best = (0..=ANGLES).fold(0, |best, k| if torques[k] > torques[best] { k } else { best });
-        let (mut low, mut high) = (at(best.saturating_sub(1)), at((best + 1).min(ANGLES)));
-        let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
-        for _ in 0..SECTIONS {
-            let (a, b) = (high - golden * (high - low), low + golden * (high - low));
-            if self.mean_torque(speed, a) > self.mean_torque(speed, b) { high = b } else { low = a }
-        }
-        self.mean_torque(speed, 0.5 * (low + high)).max(torques[best]).max(0.0)
+        let about = [at(best.saturating_sub(1)), at((best + 1).min(ANGLES))];
+        let lead = golden::top(about, SECTIONS, |lead| self.mean_torque(speed, lead));
+        self.mean_torque(speed, lead).max(torques[best]).max(0.0)
     }
 
     /// T(δ) at this speed, N m.

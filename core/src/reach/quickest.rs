@@ -135,7 +135,7 @@ impl Quickest<'_> {
     /// Refuses a way that no speed and no acceleration make possible, and one that nothing limits.
     pub fn check(&self, way: &Way) -> Result<()> {
         let slow = Limits { speed: 1e-3, acceleration: 1e-2, jerk: None, snap: None };
-        let references = self.shaped(way.within(&slow)?);
+        let references = self.design.shaped(&way.within(&slow)?);
         if let Some(short) = shortfalls(self.machine, self.design.limit, &references).first() {
             return Err(Error::new(format!("there is no plan: {}", short.words)));
         }
@@ -145,11 +145,6 @@ impl Quickest<'_> {
                 .next("give limit in [controller], amplifier.voltage_limit, or a speed and an acceleration"));
         }
         Ok(())
-    }
-
-    /// References through the shaper of the controller.
-    fn shaped(&self, profiles: Vec<Profile>) -> Vec<Profile> {
-        profiles.into_iter().map(|profile| profile.shaped(&self.design.shaper)).collect()
     }
 
     /// Jerk and snap time, s; none where the belt has no such mode.
@@ -187,7 +182,7 @@ impl Quickest<'_> {
         let mut share = wanted;
         for _ in 0..CORRECTIONS {
             let Some(limits) = self.searched(way, periods, share) else { return Ok(None) };
-            let profiles = self.shaped(way.within(&limits)?);
+            let profiles = self.design.shaped(&way.within(&limits)?);
             // Looked at more closely, the axis needs a little more than during the search.
             let closely = loads(self.machine, self.design.limit, &profiles, CLOSELY);
             let most = closely.iter().map(|load| load.share() / if load.is_electrical() { wanted } else { 1.0 });
@@ -272,7 +267,7 @@ impl Quickest<'_> {
     /// True if a move within these limits takes no more than this share of each limit of the machine.
     fn is_within(&self, way: &Way, limits: &Limits, share: f64) -> bool {
         let Ok(profiles) = way.within(limits) else { return false };
-        let loads = loads(self.machine, self.design.limit, &self.shaped(profiles), INSTANTS);
+        let loads = loads(self.machine, self.design.limit, &self.design.shaped(&profiles), INSTANTS);
         loads.iter().all(|load| load.share() <= if load.is_electrical() { share } else { 1.0 })
     }
 }

@@ -347,6 +347,16 @@ impl Profile {
         Ok((0..start.len()).map(of_coordinate).collect())
     }
 
+    /// End of the last of these references, shapers apart, s; 0 of none.
+    pub fn last_end(profiles: &[Self]) -> f64 {
+        profiles.iter().map(Self::end).fold(0.0, f64::max)
+    }
+
+    /// Time from which on all of these references rest, s; 0 of none.
+    pub fn last_rest(profiles: &[Self]) -> f64 {
+        profiles.iter().map(Self::rest).fold(0.0, f64::max)
+    }
+
     /// The reference of each coordinate along legs: [`Profile::new`] of one, [`Profile::along`] of several.
     pub fn of_legs(start: &[f64], legs: &[Leg<Vec<f64>>]) -> Result<Vec<Self>> {
         let [start] = start else { return Self::along(start, legs) };

@@ -309,7 +309,7 @@ mod tests {
         }
     }
 
-    /// Where every third row was compared, both runs had the same interval, the same steps, and the same errors.
+    /// With every third row compared, both runs once had the same interval, steps and errors.
     #[test]
     fn the_second_run_never_had_the_steps_of_the_first() {
         assert_eq!(rows_between(1), 3);

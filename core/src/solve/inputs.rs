@@ -1,5 +1,6 @@
 //! The inputs of all drives at once: stretches of time on which each is one polynomial.
 
+use super::roots::first_fall;
 use crate::mechanism::DRIVES;
 use crate::signal::{DEGREE, Piece, Signal};
 
@@ -105,37 +106,17 @@ const AHEAD: f64 = 1e-9;
 /// The first time at which a polynomial is beyond `level`, above it or below it by `side`: where `within` begins, if it
 /// is so already there.
 fn first_beyond(powers: &[f64; DEGREE + 1], level: f64, side: f64, within: std::ops::Range<f64>) -> Option<f64> {
-    let mut own = *powers;
-    own[0] -= level;
-    let begin = own.iter().rev().fold(0.0, |sum, c| sum * within.start + c);
-    match begin * side >= 0.0 {
-        true => Some(within.start),
-        false => crossings(&own, within.start, within.end).first().copied(),
+    let length = within.end - within.start;
+    if length <= 0.0 {
+        return None;
     }
-}
-
-/// Where a polynomial changes its sign, in order: between two places where its derivative does, it does so once at most.
-fn crossings(powers: &[f64; DEGREE + 1], from: f64, to: f64) -> Vec<f64> {
-    let Some(degree) = powers.iter().rposition(|c| *c != 0.0).filter(|degree| *degree > 0) else { return Vec::new() };
-    let at = |tau: f64| powers[..=degree].iter().rev().fold(0.0, |sum, c| sum * tau + c);
-    if degree == 1 {
-        return Some(-powers[0] / powers[1]).filter(|tau| (from..to).contains(tau)).into_iter().collect();
+    // What is left up to the level, over the share of `within`.
+    let mut left = Pieces::shifted(powers, within.start);
+    left[0] -= level;
+    let mut scale = -side;
+    for power in &mut left {
+        *power *= scale;
+        scale *= length;
     }
-    let mut slope = [0.0; DEGREE + 1];
-    (1..=degree).for_each(|k| slope[k - 1] = k as f64 * powers[k]);
-    let mut places = vec![from];
-    places.extend(crossings(&slope, from, to));
-    places.push(to);
-    let between = |[mut low, mut high]: [f64; 2]| {
-        let side = at(low) < 0.0;
-        if (at(high) < 0.0) == side {
-            return None;
-        }
-        for _ in 0..60 {
-            let middle = 0.5 * (low + high);
-            if (at(middle) < 0.0) == side { low = middle } else { high = middle }
-        }
-        Some(high)
-    };
-    places.array_windows().filter_map(|pair| between(*pair)).collect()
+    first_fall(&left).map(|share| within.start + share * length)
 }

@@ -26,7 +26,7 @@ pub mod reading {
     pub const CURRENT: usize = 8;
     /// φ̇_r, rad/s: the rotor's speed seen from behind the gear.
     pub const ROTOR_SPEED: usize = 9;
-    /// Voltage at the motor's terminals, V; of a stepper the position that it is told, m.
+    /// Voltage at the motor's terminals, V; of a stepper the commanded position, m.
     pub const VOLTAGE: usize = 10;
     /// x, m.
     pub const CART_POSITION: usize = 11;

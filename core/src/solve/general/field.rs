@@ -95,7 +95,7 @@ impl Field {
         self.argument_of(row, [0.0; DRIVES])
     }
 
-    /// The same with these weights of the inputs.
+    /// Adds an argument with these weights of the inputs.
     fn argument_of(&mut self, row: States, input: [f64; DRIVES]) -> usize {
         let none = Output { row, input, constant: 0.0, source: Vec::new() };
         let outputs = &mut self.linear.outputs;

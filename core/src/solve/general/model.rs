@@ -37,7 +37,7 @@ pub(super) struct Phased {
     /// The body that the rotor moves with, and its way per way of that one.
     pub(super) leader: usize,
     pub(super) ratio: f64,
-    /// The angle that a unit of the input tells it to go to, rad/m.
+    /// Commanded angle per unit of the input, rad/m.
     pub(super) per_input: f64,
 }
 

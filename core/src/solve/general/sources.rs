@@ -52,7 +52,7 @@ pub(super) struct Phasing {
     pub(super) angle: usize,
     pub(super) speed: usize,
     pub(super) currents: [usize; 2],
-    /// The angle that it is told to go to.
+    /// Commanded angle.
     pub(super) told: usize,
 }
 
