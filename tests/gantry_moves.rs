@@ -1,6 +1,7 @@
 //! Moves of gantries in closed loop: against an integration that shares no code with the program, and laws.
 
 use rand_pcg::Pcg64;
+use std::f64::consts::TAU;
 use taut::case::{Case, Move};
 use taut::chance::uniform;
 use taut::control::{Loop, MoveRun, Rows, Standard, each, stream};
@@ -20,7 +21,21 @@ impl Draw {
     }
 }
 
-/// A gantry without dry friction under proportional control of each motor, along straight legs with trapezoids of speed.
+/// Which leg is an arc.
+const ARC: usize = 1;
+
+/// A leg of a path.
+struct Course {
+    from: [f64; 2],
+    to: [f64; 2],
+    /// Radius, angle of the beginning and turn, above zero counterclockwise.
+    arc: Option<(f64, f64, f64)>,
+    length: f64,
+    speed: f64,
+}
+
+/// A gantry without dry friction under proportional control of each motor, along two lines and an arc with trapezoids of
+/// speed.
 struct Plain {
     kind: &'static str,
     radius: f64,
@@ -37,6 +52,9 @@ struct Plain {
     every: f64,
     limit: f64,
     points: Vec<[f64; 2]>,
+    /// Of the arc.
+    center: [f64; 2],
+    clockwise: bool,
     speed: f64,
     acceleration: f64,
     until: f64,
@@ -46,7 +64,10 @@ impl Plain {
     fn drawn(draw: &mut Draw, kind: &'static str) -> Self {
         let spans = if kind == "h-frame" { 3 } else { 4 };
         let mut place = || [draw.between(-0.04, 0.04), draw.between(-0.04, 0.04)];
-        let points = vec![place(), place(), place()];
+        let (mut points, center) = (vec![place(), place(), place()], place());
+        let radius = (points[0][0] - center[0]).hypot(points[0][1] - center[1]);
+        let (sin, cos) = draw.between(0.0, TAU).sin_cos();
+        points[ARC] = [center[0] + radius * cos, center[1] + radius * sin];
         Self {
             kind,
             radius: draw.between(0.008, 0.02),
@@ -61,15 +82,19 @@ impl Plain {
             every: 1e-3 * draw.between(0.5, 2.0).round().max(0.5),
             limit: draw.between(0.5, 20.0),
             points,
+            center,
+            clockwise: draw.between(0.0, 1.0) < 0.5,
             speed: draw.between(0.2, 0.5),
             acceleration: draw.between(2.0, 8.0),
-            until: 2.0,
+            until: 4.0,
         }
     }
 
     fn text(&self) -> String {
         let list = |values: &[f64]| format!("[{}]", values.iter().map(f64::to_string).collect::<Vec<_>>().join(", "));
-        let points: Vec<String> = self.points.iter().map(|point| list(point)).collect();
+        let mut points: Vec<String> = self.points.iter().map(|point| list(point)).collect();
+        points[ARC] =
+            format!("{{ to = {}, center = {}, clockwise = {} }}", points[ARC], list(&self.center), self.clockwise);
         let ([k, r], [bridge, cart], [b, c]) = (self.motor, self.masses, self.drags);
         format!(
             "kind = \"{}\"\n[motor]\ntorque_constant = {k}\nback_emf_constant = {k}\nresistance = {r}\n\
@@ -109,12 +134,33 @@ impl Plain {
         if self.kind == "h-frame" { [-x - y, x - y] } else { [x + y, x - y] }
     }
 
+    /// The legs from point to point, one of them an arc.
+    fn legs(&self) -> Vec<Course> {
+        let starts = std::iter::once([0.0, 0.0]).chain(self.points.iter().copied());
+        let of = |(number, (from, to)): (usize, ([f64; 2], &[f64; 2]))| {
+            let away = [from, *to].map(|end| [end[0] - self.center[0], end[1] - self.center[1]]);
+            let arc = (number == ARC).then(|| {
+                let [begin, end] = away.map(|[x, y]| y.atan2(x));
+                let turn = if self.clockwise { begin - end } else { end - begin }.rem_euclid(TAU);
+                (away[0][0].hypot(away[0][1]), begin, if self.clockwise { -turn } else { turn })
+            });
+            let length = match arc {
+                Some((radius, _, turn)) => radius * turn.abs(),
+                None => (to[0] - from[0]).hypot(to[1] - from[1]),
+            };
+            // v²/R ≤ a
+            let across = arc.map_or(f64::INFINITY, |(radius, ..)| (radius * self.acceleration).sqrt());
+            let speed = self.speed.min((length * self.acceleration).sqrt()).min(across);
+            Course { from, to: *to, arc, length, speed }
+        };
+        starts.zip(&self.points).enumerate().map(of).collect()
+    }
+
     /// Where the reference is: trapezoids of speed from point to point.
     fn reference(&self, time: f64) -> [f64; 2] {
-        let (mut from, mut left) = ([0.0, 0.0], time);
-        for to in &self.points {
-            let length = (to[0] - from[0]).hypot(to[1] - from[1]);
-            let (v, a) = (self.speed.min((length * self.acceleration).sqrt()), self.acceleration);
+        let mut left = time;
+        for Course { from, to, arc, length, speed } in self.legs() {
+            let (v, a) = (speed, self.acceleration);
             let (ramp, whole) = (v / a, length / v + v / a);
             if left < whole {
                 let way = match left {
@@ -122,11 +168,18 @@ impl Plain {
                     t if t > whole - ramp => length - 0.5 * a * (whole - t).powi(2),
                     t => v * (t - 0.5 * ramp),
                 };
-                return [0, 1].map(|k| from[k] + (to[k] - from[k]) * way / length);
+                let share = way / length;
+                return match arc {
+                    None => [0, 1].map(|k| from[k] + (to[k] - from[k]) * share),
+                    Some((radius, begin, turn)) => {
+                        let (sin, cos) = (begin + turn * share).sin_cos();
+                        [self.center[0] + radius * cos, self.center[1] + radius * sin]
+                    }
+                };
             }
-            (from, left) = (*to, left - whole);
+            left -= whole;
         }
-        from
+        *self.points.last().unwrap()
     }
 
     fn rates(&self, z: &[f64; 8], volts: [f64; 2]) -> [f64; 8] {
@@ -147,27 +200,29 @@ impl Plain {
 
     /// When each leg begins.
     fn begins(&self) -> Vec<f64> {
-        let mut from = [0.0, 0.0];
-        let ends = self.points.iter().scan(0.0, |time, to| {
-            let length = (to[0] - from[0]).hypot(to[1] - from[1]);
-            let v = self.speed.min((length * self.acceleration).sqrt());
-            (from, *time) = (*to, *time + length / v + v / self.acceleration);
+        let ends = self.legs().into_iter().scan(0.0, |time, leg| {
+            *time += leg.length / leg.speed + leg.speed / self.acceleration;
             Some(*time)
         });
         std::iter::once(0.0).chain(ends).collect()
     }
 
     /// Distance from the path, whichever leg is nearest of those that have begun and the next.
-    fn off(&self, begun: usize, point: [f64; 2]) -> f64 {
-        let starts = std::iter::once([0.0, 0.0]).chain(self.points.iter().copied());
-        let legs = starts.zip(&self.points).take(begun + 1);
-        let of_leg = |(from, to): ([f64; 2], &[f64; 2])| {
-            let along = [to[0] - from[0], to[1] - from[1]];
-            let square = along[0].powi(2) + along[1].powi(2);
-            let share = (((point[0] - from[0]) * along[0] + (point[1] - from[1]) * along[1]) / square).clamp(0.0, 1.0);
-            (point[0] - from[0] - share * along[0]).hypot(point[1] - from[1] - share * along[1])
+    fn off(&self, legs: &[Course], point: [f64; 2]) -> f64 {
+        let of_leg = |Course { from, to, arc, .. }: &Course| {
+            let far = |end: [f64; 2]| (point[0] - end[0]).hypot(point[1] - end[1]);
+            let Some((radius, begin, turn)) = arc else {
+                let along = [to[0] - from[0], to[1] - from[1]];
+                let square = along[0].powi(2) + along[1].powi(2);
+                let share = ((point[0] - from[0]) * along[0] + (point[1] - from[1]) * along[1]) / square;
+                let share = share.clamp(0.0, 1.0);
+                return far([from[0] + share * along[0], from[1] + share * along[1]]);
+            };
+            let [x, y] = [point[0] - self.center[0], point[1] - self.center[1]];
+            let angle = (turn.signum() * (y.atan2(x) - begin)).rem_euclid(TAU);
+            if angle <= turn.abs() { (radius - x.hypot(y)).abs() } else { far(*from).min(far(*to)) }
         };
-        legs.map(of_leg).fold(f64::INFINITY, f64::min)
+        legs.iter().map(of_leg).fold(f64::INFINITY, f64::min)
     }
 
     /// Runge and Kutta's method with this many steps a sample: the end of bridge and cart, and peak and root mean square
@@ -176,7 +231,7 @@ impl Plain {
         let (mut z, h) = ([0.0; 8], self.every / steps as f64);
         let samples = (self.until / self.every).round() as usize;
         let (mut peak, mut square) = (0.0_f64, 0.0);
-        let begins = self.begins();
+        let (begins, legs) = (self.begins(), self.legs());
         for sample in 0..samples {
             let wanted = self.drives(self.reference(sample as f64 * self.every));
             let volts = [0, 1]
@@ -190,7 +245,7 @@ impl Plain {
                 let d = self.rates(&step(h, &c), volts);
                 z = std::array::from_fn(|n| z[n] + h / 6.0 * (a[n] + 2.0 * b[n] + 2.0 * c[n] + d[n]));
                 let begun = begins.iter().take_while(|begin| **begin <= time).count();
-                let off = self.off(begun, [z[2], z[3]]);
+                let off = self.off(&legs[..(begun + 1).min(legs.len())], [z[2], z[3]]);
                 (peak, square) = (peak.max(off), square + h * off * off);
             }
         }

@@ -141,7 +141,8 @@ fn gantry(kind: &str, motion: &str) -> Case {
 
 #[test]
 fn a_path_is_planned_within_the_limits_of_both_motors() {
-    let path = "points = [[0.05, 0.0], { to = [0.05, 0.04], wait = 0.05 }, [-0.01, -0.02]]";
+    let path = "points = [[0.05, 0.0], { to = [0.05, 0.04], wait = 0.05 }, \
+                { to = [0.03, 0.02], center = [0.03, 0.04] }, [-0.03, -0.02]]";
     for kind in ["h-frame", "core-xy"] {
         let slow = format!("move=[{{ name = \"path\", {path}, speed = 0.2, acceleration = 2, until = 2 }}]");
         let case = gantry(kind, &slow);
@@ -157,9 +158,9 @@ fn a_path_is_planned_within_the_limits_of_both_motors() {
         assert!(most(&case, &planned.profiles) <= 0.9 + 1e-9);
         let [sooner, later] = [&planned.best.arrival, &planned.given].map(|arrival| arrival.nominal.unwrap());
         assert!(!planned.is_kept && sooner < later, "{kind}: {sooner} {later}");
-        // The same corners, at all of which it stands, on straight legs.
+        // The same corners, at all of which it stands, on straight legs and an arc.
         let strokes = |profile: &Profile| -> Vec<[f64; 2]> {
-            profile.strokes().map(|(_, from, distance, _)| [from, from + distance]).collect()
+            profile.passages().iter().map(|passage| [passage.from, passage.to]).collect()
         };
         for (own, file) in planned.profiles.iter().zip(&case.moves[0].profiles) {
             for (own, file) in strokes(own).iter().flatten().zip(strokes(file).iter().flatten()) {
@@ -167,11 +168,16 @@ fn a_path_is_planned_within_the_limits_of_both_motors() {
             }
         }
         let [x, y] = [&planned.profiles[0], &planned.profiles[1]];
-        let last = x.strokes().last().unwrap();
+        let last = x.passages().last().unwrap();
         for k in 0..=50 {
-            let t = last.0 + last.3 * f64::from(k) / 50.0;
-            let share = (x.at(t).position - 0.05) / -0.06;
-            assert!((y.at(t).position - (0.04 - 0.06 * share)).abs() < 1e-12, "{kind} at {t}");
+            let t = last.begin + last.duration() * f64::from(k) / 50.0;
+            let share = (x.at(t).position - 0.03) / -0.06;
+            assert!((y.at(t).position - (0.02 - 0.04 * share)).abs() < 1e-12, "{kind} at {t}");
+            // Three quarters of a circle counterclockwise.
+            let arc = &x.passages()[2];
+            let t = arc.begin + arc.duration() * f64::from(k) / 50.0;
+            let radius = (x.at(t).position - 0.03).hypot(y.at(t).position - 0.04);
+            assert!((radius - 0.02).abs() < 1e-12 && arc.turn.is_some(), "{kind} at {t}: {radius}");
         }
         // A case may leave it to the machine.
         let left = gantry(kind, &format!("move=[{{ name = \"path\", {path}, plan = {{}}, until = 2 }}]"));

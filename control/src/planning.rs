@@ -10,7 +10,7 @@ use crate::machine::Machine;
 use crate::machine::rigid::Rigid;
 use crate::reach::feasible::{Load, Shortfall, limits, loads};
 use crate::reach::quickest::{CLOSELY, INSTANTS, Quickest, Wanted, Way, modes};
-use crate::signal::profile::{Limits, Profile};
+use crate::signal::profile::{Leg, Limits, Profile};
 use crate::solve::{Ending, Solver};
 use crate::tune::Family;
 use std::path::Path;
@@ -271,15 +271,21 @@ impl Planner<'_> {
         Ok(arrival)
     }
 
-    /// The least time of all strokes of the rigid axis, with their rests.
+    /// The least time of all legs of the rigid axis, with their rests.
     fn bound(&self, way: &Way) -> Option<f64> {
         let [mut from] = way.start[..] else { return None };
         let limits = limits(&self.family.machine, self.design.limit);
         let rigid = Rigid::of(&self.family.machine);
         let mut time = 0.0;
-        for (rest, to) in &way.strokes {
-            time += rest + rigid.quickest(to[0] - from, limits)?;
-            from = to[0];
+        for leg in &way.legs {
+            match leg {
+                Leg::Wait(rest) => time += rest,
+                Leg::To(to, _) => {
+                    time += rigid.quickest(to[0] - from, limits)?;
+                    from = to[0];
+                }
+                Leg::Around(..) => return None,
+            }
         }
         Some(time)
     }

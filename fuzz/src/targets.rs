@@ -15,7 +15,7 @@ use taut::log::{Accelerometer, ColumnId, Dialect, Filter, Log, Mapping, Quantity
 use taut::machine::Machine;
 use taut::metrics::Meter;
 use taut::signal::gcode::legs;
-use taut::signal::profile::{Limits, Profile};
+use taut::signal::profile::{Limits, Passage, Profile};
 use taut::solve::{self, Course, Detail, Ending, Flow, Outcome, Solver};
 use taut::sweep::Sweep;
 use taut::{Error, quantity};
@@ -291,7 +291,7 @@ pub(crate) fn gcode(bytes: &[u8]) -> Reached {
 
 fn runs_from_rest_to_rest(profile: &Profile, limits: &Limits) {
     assert_eq!(profile.at(-1.0).position, 0.01);
-    let places = profile.strokes().flat_map(|(_, from, distance, _)| [from, distance]);
+    let places = profile.passages().iter().flat_map(Passage::extremes);
     // A moment is known to its rounding only, and so is where the cart is then.
     let farthest = places.fold(1.0, |most: f64, place| most.max(place.abs()));
     let rounding = 1e-12 * farthest + 4.0 * f64::EPSILON * profile.end() * limits.speed;

@@ -308,7 +308,11 @@ fn controller() -> Value {
 }
 
 fn motion() -> Value {
-    let at = table("move.points", &[("to", each("move.points.to"))]);
+    let clockwise = described(json!({ "type": "boolean" }), "Sense of an arc");
+    let at = table(
+        "move.points",
+        &[("to", each("move.points.to")), ("center", each("move.points.center")), ("clockwise", clockwise)],
+    );
     let point = any(vec![plain(), list(plain()), at]);
     table(
         "move",

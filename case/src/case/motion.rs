@@ -9,8 +9,9 @@ use crate::machine::Machine;
 use crate::quantity::{rounded, show};
 use crate::reach::feasible::{Shortfall, shortfalls};
 use crate::reach::quickest::{Quickest, Wanted, Way, modes};
+use crate::signal::arc::Arc;
 use crate::signal::gcode;
-use crate::signal::profile::{Leg, Limits, Profile};
+use crate::signal::profile::{Leg, Limits, Passage, Profile};
 
 /// A move in closed loop: where all that slides should be, and what is looked at.
 #[derive(Debug, Clone)]
@@ -123,8 +124,8 @@ fn one(table: &Table, machine: &Machine, design: &Design) -> Result<Move> {
     }
     for ((slide, travel), profile) in machine.travels().zip(&profiles) {
         let Some(travel) = travel else { continue };
-        let strokes = profile.strokes().map(|(_, from, distance, _)| from + distance);
-        let places = std::iter::once(profile.start()).chain(strokes);
+        let legs = profile.passages().iter().flat_map(Passage::extremes);
+        let places = std::iter::once(profile.start()).chain(legs);
         if let Some(out) = places.into_iter().find(|x| !(travel.min..=travel.max).contains(x)) {
             let whose = if profiles.len() == 1 { String::new() } else { format!(" of the {}", slide.name) };
             return Err(table
@@ -213,6 +214,26 @@ fn limits(table: &Table) -> Result<Limits> {
     }
 }
 
+/// The arc that leads to a point, where its `center` is given.
+fn arc(table: &Table, to: &[f64], machine: &Machine) -> Result<Option<Arc>> {
+    let [center, clockwise] = ["center", "clockwise"].map(|key| table.optional(key));
+    let clockwise = match (clockwise, &center) {
+        (None, _) => false,
+        (Some(field), Some(_)) => field.truth()?,
+        (Some(field), None) => {
+            return Err(field
+                .fail("this leg is straight")
+                .next("add center = [\"20 mm\", \"0 mm\"] for an arc, or leave out clockwise"));
+        }
+    };
+    let Some(field) = center else { return Ok(None) };
+    let Ok(to) = to.try_into() else {
+        return Err(field.fail("an arc needs two coordinates").next("leave out center, or describe a gantry"));
+    };
+    let center = place(&field, machine)?[..].try_into().map_err(|_| field.fail("expected two positions"))?;
+    Ok(Some(Arc { to, center, clockwise }))
+}
+
 /// The legs: `to`, `points` or `gcode`.
 fn legs(table: &Table, machine: &Machine, from: &[f64], limits: &Limits) -> Result<Vec<Leg<Vec<f64>>>> {
     let kinds = ["to", "points", "gcode"];
@@ -237,13 +258,17 @@ fn legs(table: &Table, machine: &Machine, from: &[f64], limits: &Limits) -> Resu
                     continue;
                 }
                 let table = point.named("move.points").table()?;
-                table.check_keys(&[], &[])?;
+                table.check_keys(&["clockwise"], &[])?;
                 let speed = table.number_if_given("speed")?.unwrap_or(limits.speed);
                 let to = match from.len() {
                     1 => vec![table.number("to")?],
                     _ => place(&table.required("to", "to = [\"50 mm\", \"20 mm\"]")?, machine)?,
                 };
-                legs.push(Leg::To(to, Limits { speed, ..*limits }));
+                let limits = Limits { speed, ..*limits };
+                legs.push(match arc(&table, &to, machine)? {
+                    Some(arc) => Leg::Around(arc, limits),
+                    None => Leg::To(to, limits),
+                });
                 let wait = table.number("wait")?;
                 if wait > 0.0 {
                     legs.push(Leg::Wait(wait));

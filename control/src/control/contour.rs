@@ -4,8 +4,10 @@ use super::figures::Deviation;
 use super::quadrature::{integral, larger};
 use crate::golden;
 use crate::metrics::Peak;
-use crate::signal::profile::Profile;
+use crate::signal::arc::Turn;
+use crate::signal::profile::{Passage, Profile};
 use crate::solve::{Curve, Polynomial, TERMS};
+use std::f64::consts::TAU;
 
 /// Most legs before the present one that may be the nearest: what slides is behind its reference.
 const LEGS_BEHIND: usize = 16;
@@ -13,42 +15,73 @@ const LEGS_BEHIND: usize = 16;
 /// The path that two profiles on one clock describe, leg by leg.
 #[derive(Debug, Clone)]
 pub(super) struct Contour {
-    /// Begin (s), start and end (m) of each leg.
-    legs: Vec<(f64, [f64; 2], [f64; 2])>,
+    legs: Vec<Course>,
     /// Where it begins, m.
     start: [f64; 2],
+}
+
+/// A leg of a path.
+#[derive(Debug, Clone)]
+struct Course {
+    /// s
+    begin: f64,
+    /// m
+    from: [f64; 2],
+    to: [f64; 2],
+    /// Its first coordinate, of an arc, and the second one's centre.
+    arc: Option<(Turn, f64)>,
+}
+
+impl Course {
+    /// Share of it at which it is nearest to a point, within 0..1 where that is none of its ends, and the point's
+    /// distance from the whole line or circle, m, above zero to the left.
+    fn beside(&self, point: [f64; 2]) -> (f64, f64) {
+        let Some((turn, center)) = &self.arc else {
+            let away = |point: [f64; 2]| [point[0] - self.from[0], point[1] - self.from[1]];
+            let (along, off) = (away(self.to), away(point));
+            let length = along[0].hypot(along[1]);
+            let share = (along[0] * off[0] + along[1] * off[1]) / (length * length);
+            return (share, (along[0] * off[1] - along[1] * off[0]) / length);
+        };
+        let off = [point[0] - turn.center, point[1] - center];
+        let sense = turn.per_length.signum();
+        // Angle from the beginning, in the sense of the arc, from 0 to one turn.
+        let angle = (sense * (off[1].atan2(off[0]) - turn.phase)).rem_euclid(TAU);
+        // The centre is to the left of a counterclockwise arc.
+        (angle * turn.radius / turn.length, sense * (turn.radius - off[0].hypot(off[1])))
+    }
 }
 
 impl Contour {
     /// Path of two profiles, without their shapers; none for another number of profiles.
     pub fn along(profiles: &[Profile]) -> Option<Self> {
         let [x, y] = profiles else { return None };
-        let leg = |((begin, x, along_x, _), (_, y, along_y, _)): (Stroke, Stroke)| {
-            (begin, [x, y], [x + along_x, y + along_y])
+        let leg = |(x, y): (&Passage, &Passage)| Course {
+            begin: x.begin,
+            from: [x.from, y.from],
+            to: [x.to, y.to],
+            arc: x.turn.zip(y.turn.map(|turn| turn.center)),
         };
-        let legs = x.strokes().zip(y.strokes()).map(leg).filter(|(_, from, to)| from != to).collect();
+        let legs = x.passages().iter().zip(y.passages()).map(leg);
+        let legs = legs.filter(|leg| leg.arc.is_some() || leg.from != leg.to).collect();
         Some(Self { legs, start: [x.start(), y.start()] })
     }
 
     /// The distance of a point from the path at `time`, s, above zero to the left of it; the nearest leg's number, and
     /// whether the nearest point of it is none of its ends.
     pub fn nearest(&self, time: f64, point: [f64; 2]) -> (f64, Option<usize>, bool) {
-        let now = self.legs.partition_point(|(begin, ..)| *begin <= time);
+        let now = self.legs.partition_point(|leg| leg.begin <= time);
         let legs = now.saturating_sub(LEGS_BEHIND)..(now + 1).min(self.legs.len());
         let mut best = (f64::INFINITY, None, false);
         for number in legs {
-            let (_, from, to) = self.legs[number];
-            let (along, off) = ([to[0] - from[0], to[1] - from[1]], [point[0] - from[0], point[1] - from[1]]);
-            let length = along[0].hypot(along[1]);
-            let share = (along[0] * off[0] + along[1] * off[1]) / (length * length);
-            let left = (along[0] * off[1] - along[1] * off[0]) / length;
+            let leg = &self.legs[number];
+            let (share, left) = leg.beside(point);
             let is_beside = (0.0..=1.0).contains(&share);
-            let distance = match is_beside {
-                true => left,
-                false => {
-                    let end = if share > 1.0 { to } else { from };
-                    (point[0] - end[0]).hypot(point[1] - end[1]).copysign(left)
-                }
+            let far = |end: [f64; 2]| (point[0] - end[0]).hypot(point[1] - end[1]);
+            let distance = match (is_beside, &leg.arc) {
+                (true, _) => left,
+                (false, None) => far(if share > 1.0 { leg.to } else { leg.from }).copysign(left),
+                (false, Some(_)) => far(leg.to).min(far(leg.from)).copysign(left),
             };
             if distance.abs() < best.0.abs() {
                 best = (distance, Some(number), is_beside);
@@ -60,9 +93,9 @@ impl Contour {
         }
     }
 
-    /// The distance from a leg of a point that moves on these polynomials.
-    fn beside(&self, leg: usize, places: &[Polynomial]) -> Polynomial {
-        let (_, from, to) = self.legs[leg];
+    /// The distance from a straight leg of a point that moves on these polynomials; none from an arc.
+    fn beside(&self, leg: usize, places: &[Polynomial]) -> Option<Polynomial> {
+        let Course { from, to, arc: None, .. } = self.legs[leg] else { return None };
         let along = [to[0] - from[0], to[1] - from[1]];
         let length = along[0].hypot(along[1]);
         // n·(q − from), n to the left of the leg
@@ -72,12 +105,9 @@ impl Contour {
             *term = normal[0] * places[0].0[k] + normal[1] * places[1].0[k];
         }
         sum[0] -= normal[0] * from[0] + normal[1] * from[1];
-        Polynomial(sum)
+        Some(Polynomial(sum))
     }
 }
-
-/// A stroke of a profile: begin, start, distance and duration.
-type Stroke = (f64, f64, f64, f64);
 
 /// Gathers the distance from a path.
 pub(super) struct ContourGauge {
@@ -101,7 +131,7 @@ impl ContourGauge {
         Self { path, seen: Deviation::default(), square: 0.0 }
     }
 
-    /// Adds the motion on a part of a curve: exactly where one leg is the nearest on all of it.
+    /// Adds the motion on a part of a curve: exactly where one straight leg is the nearest on all of it.
     pub fn track(&mut self, curve: &Curve, part: (f64, f64), places: &[Polynomial]) {
         let time = |s: f64| curve.begin + s * curve.length;
         let at = |s: f64| self.path.nearest(time(s), [places[0].at(s), places[1].at(s)]);
@@ -109,8 +139,7 @@ impl ContourGauge {
         let seen: [_; PLACES] = std::array::from_fn(|k| at(spread(k)));
         let (_, leg, _) = seen[0];
         let same = seen.iter().all(|&(_, other, is_beside)| is_beside && other == leg);
-        if let Some(leg) = leg.filter(|_| same) {
-            let distance = self.path.beside(leg, places);
+        if let Some(distance) = leg.filter(|_| same).and_then(|leg| self.path.beside(leg, places)) {
             self.square += curve.length * integral(part, |s| distance.at(s).powi(2));
             larger(&mut self.seen.peak, &distance, part, curve);
             return;
@@ -143,6 +172,7 @@ impl ContourGauge {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::signal::arc::Arc;
     use crate::signal::profile::{Leg, Limits};
 
     /// 100 mm along, then 50 mm across.
@@ -172,5 +202,31 @@ mod tests {
         let path = Contour::along(&[still.clone(), still.clone()]).unwrap();
         assert_eq!(path.nearest(0.5, [0.25, 0.35]).0, 0.35 - 0.25);
         assert!(Contour::along(&[still]).is_none());
+    }
+
+    /// Against the nearest of many points of the path.
+    #[test]
+    fn distances_from_arcs_are_those_of_the_nearest_point() {
+        let limits = Limits { speed: 0.5, acceleration: 5.0, jerk: None, snap: None };
+        let arc = |to, clockwise| Leg::Around(Arc { to, center: [0.0, 0.0], clockwise }, limits);
+        // Three quarters to the left, a line, a whole circle to the right.
+        let legs = [arc([0.0, -0.01], false), Leg::To(vec![0.0, -0.02], limits), arc([0.0, -0.02], true)];
+        let profiles = Profile::along(&[0.01, 0.0], &legs).unwrap();
+        let path = Contour::along(&profiles).unwrap();
+        let points: Vec<[f64; 2]> = (0..=200_000)
+            .map(|k| profiles[0].end() * f64::from(k) / 2e5)
+            .map(|t| [profiles[0].at(t).position, profiles[1].at(t).position])
+            .collect();
+        for k in 0..60 {
+            let angle = 0.7 * f64::from(k);
+            let far = 0.004 + 0.0005 * f64::from(k);
+            let point = [far * angle.cos(), far * angle.sin()];
+            let least = points.iter().map(|p| (p[0] - point[0]).hypot(p[1] - point[1])).fold(f64::MAX, f64::min);
+            let (distance, ..) = path.nearest(10.0, point);
+            // The points are up to 1 µm apart.
+            assert!((-1e-12..1e-6).contains(&(least - distance.abs())), "{point:?}: {distance} {least}");
+        }
+        // Inside a counterclockwise circle is to the left of it, inside a clockwise one to the right.
+        assert!(path.nearest(0.0, [0.0, 0.009]).0 > 0.0 && path.nearest(10.0, [0.0, 0.019]).0 < 0.0);
     }
 }

@@ -8,7 +8,7 @@ use crate::case::Experiment;
 use crate::machine::{Machine, SlideAt};
 use crate::mechanism::{Limit, Mechanism, Mode, Shown, State};
 use crate::metrics::{Held, Meter, Metrics, Peak, Sought};
-use crate::signal::profile::Profile;
+use crate::signal::profile::{Passage, Profile};
 use crate::solve::{self, Curve, Gap, Observe, Polynomial, TERMS};
 
 /// A machine, and its mechanism with the readings of a move.
@@ -40,8 +40,9 @@ struct LoadGauge {
     peak_speed: Option<Peak>,
     /// Where the drives have it minus where it is, as a sum of stretches: reading and weight.
     stretches: Vec<(usize, f64)>,
-    /// Begin and direction of the last stroke that goes anywhere.
-    last_stroke: (f64, f64),
+    /// From when on (s) and in which direction a place is beyond the target; [`Passage::approach`] of the last leg that
+    /// moves it.
+    approach: (f64, f64),
     target: f64,
     /// ∫ of the square of its error.
     square: f64,
@@ -90,7 +91,7 @@ impl Voltage {
 impl LoadGauge {
     fn new((slide, profile): (&SlideAt, &Profile), mechanism: &Mechanism) -> Self {
         let find = |shown: Shown| mechanism.readings.iter().position(|reading| *reading == shown);
-        let strokes = profile.strokes().filter(|(_, _, distance, _)| *distance != 0.0);
+        let mut approaches = profile.passages().iter().rev().map(Passage::approach);
         let stretch = |&(span, weight): &(usize, f64)| Some((find(Shown::Stretch(span))?, weight));
         Self {
             body: slide.body,
@@ -100,7 +101,7 @@ impl LoadGauge {
                 None => Some(Peak::default()),
             },
             stretches: slide.error.iter().filter_map(stretch).collect(),
-            last_stroke: strokes.last().map_or((0.0, 0.0), |(begin, _, distance, _)| (begin, distance)),
+            approach: approaches.find(|(_, direction)| *direction != 0.0).unwrap_or_default(),
             target: profile.target(),
             square: 0.0,
             outside: None,
@@ -114,9 +115,9 @@ impl LoadGauge {
         let mut away = curve.of(self.position);
         away.0[0] -= self.target;
         let share = |time: f64| ((time - curve.begin) / curve.length).max(0.0);
-        let (last, done) = (share(self.last_stroke.0), share(end));
-        if last < 1.0 && self.last_stroke.1 != 0.0 {
-            let beyond = if self.last_stroke.1 > 0.0 { away } else { away.negative() };
+        let (last, done) = (share(self.approach.0), share(end));
+        if last < 1.0 && self.approach.1 != 0.0 {
+            let beyond = if self.approach.1 > 0.0 { away } else { away.negative() };
             if beyond.bound() > self.seen.overshoot {
                 self.seen.overshoot = self.seen.overshoot.max(beyond.greatest(last, 1.0).1);
             }

@@ -14,6 +14,7 @@ use crate::linear::{Operation, Place, places, travel};
 use crate::machine::Machine;
 use crate::number::engineering;
 use crate::parameter::{self, Free, kinds};
+use crate::signal::profile::Passage;
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
 use std::path::Path;
@@ -428,7 +429,7 @@ fn along(case: &Case, count: usize) -> [Vec<f64>; 2] {
     let evenly = |low: f64, high: f64| (0..=steps).map(|i| low + (high - low) * i as f64 / steps as f64).collect();
     let of_moves = |slide: usize| {
         let profiles = case.moves.iter().map(|motion| &motion.profiles[slide]);
-        let ends = profiles.flat_map(|profile| profile.strokes().flat_map(|(_, from, way, _)| [from, from + way]));
+        let ends = profiles.flat_map(|profile| profile.passages().iter().flat_map(Passage::extremes));
         let (low, high) = ends.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
         (low <= high).then(|| evenly(low, high))
     };

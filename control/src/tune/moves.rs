@@ -3,7 +3,7 @@
 use crate::case::{Case, Move};
 use crate::control::measures_cart;
 use crate::design::{Design, FeedForward, FeedForwardModel};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::machine::rigid::Rigid;
 use crate::machine::{AmplifierMode, Machine};
 use crate::reach::compensation::Compensation;
@@ -18,7 +18,7 @@ const FORCE: f64 = 0.5;
 const MODEST: (f64, f64) = (0.2, 2.0);
 const MOST: (f64, f64) = (5.0, 50.0);
 
-/// Way of the short move where there is no travel, m, and shares of a travel.
+/// Distance of the short move where there is no travel, m, and shares of a travel.
 const SHORT: f64 = 0.02;
 const SHARES: [f64; 2] = [0.1, 0.7];
 
@@ -27,44 +27,55 @@ const COUNTS: f64 = 5.0;
 const WINDOW: f64 = 50e-6;
 
 /// The moves of a case; where it has none a standard set: a short and a long move as quick as travel and limits allow,
-/// and a slow reversal.
+/// a slow reversal, and for a machine of several coordinates the long move of each of them alone.
 pub fn of(case: &Case, design: &Design) -> Result<Vec<Move>> {
-    match (case.moves.is_empty(), case.machine.drives.len()) {
-        (false, _) => Ok(case.moves.clone()),
-        (true, 1) => standard(&case.machine, design),
-        (true, _) => Err(Error::new("a machine with several drives is tuned for moves, and this case has none")
-            .next("add [[move]] with points = [[...], ...] or a G-code file")),
-    }
+    if case.moves.is_empty() { standard(&case.machine, design) } else { Ok(case.moves.clone()) }
 }
 
-/// Short, long, and a slow reversal.
 fn standard(machine: &Machine, design: &Design) -> Result<Vec<Move>> {
     let (speed, acceleration) = limits(machine, design);
-    let travel = machine.cart.travel.map(|travel| (travel.min, travel.max - travel.min));
-    let (from, way) = travel
-        .map_or((0.0, [SHORT, 10.0 * SHORT]), |(min, length)| (min + 0.1 * length, SHARES.map(|share| share * length)));
     let (jerk, quick) = (60.0 * acceleration, 8000.0 * acceleration);
     let limits = Limits { speed, acceleration, jerk: Some(jerk), snap: Some(quick) };
     let slow = Limits { speed: 0.04 * speed, acceleration: 0.04 * acceleration, jerk: Some(0.04 * jerk), snap: None };
-    let back = 0.25 * way[0];
-    let legs = [
-        ("short", vec![Leg::To(from + way[0], limits)]),
-        ("long", vec![Leg::To(from + way[1], limits)]),
-        ("slow reversal", vec![Leg::To(from + back, slow), Leg::To(from, slow)]),
+    // Where each coordinate starts, and its short and long distance.
+    let (from, distances): (Vec<f64>, Vec<[f64; 2]>) = machine
+        .travels()
+        .map(|(_, travel)| match travel {
+            None => (0.0, [SHORT, 10.0 * SHORT]),
+            Some(travel) => {
+                let length = travel.max - travel.min;
+                (travel.min + 0.1 * length, SHARES.map(|share| share * length))
+            }
+        })
+        .unzip();
+    let gone = |share: &dyn Fn(usize) -> f64| -> Vec<f64> {
+        from.iter().enumerate().map(|(coordinate, from)| from + share(coordinate)).collect()
+    };
+    let to = |share: &dyn Fn(usize) -> f64, limits: Limits| Leg::To(gone(share), limits);
+    let mut legs = vec![
+        ("short".to_string(), vec![to(&|k| distances[k][0], limits)]),
+        ("long".to_string(), vec![to(&|k| distances[k][1], limits)]),
+        ("slow reversal".to_string(), vec![to(&|k| 0.25 * distances[k][0], slow), to(&|_| 0.0, slow)]),
     ];
+    if from.len() > 1 {
+        legs.extend(machine.travels().enumerate().map(|(at, (label, _))| {
+            let leg = to(&|k| if k == at { distances[k][1] } else { 0.0 }, limits);
+            (format!("long, {} alone", label.name), vec![leg])
+        }));
+    }
     let count = machine.encoder.map_or(0.0, |encoder| {
         let length = if measures_cart(machine) { 1.0 } else { machine.pulley_radius };
         length / encoder.counts_per_unit(machine.drives[0].motor.gear_ratio)
     });
-    let one = |(name, legs): (&str, Vec<Leg>)| {
-        let profile = Profile::new(from, &legs)?;
-        let until = (profile.end() + 0.3).max(1.3 * profile.end());
+    let one = |(name, legs): (String, Vec<Leg<Vec<f64>>>)| {
+        let profiles = Profile::of_legs(&from, &legs)?;
+        let end = Profile::last_end(&profiles);
         Ok(Move {
-            name: name.into(),
-            until,
+            name,
+            until: (end + 0.3).max(1.3 * end),
             every: design.every,
             window: WINDOW.max(COUNTS * count),
-            profiles: vec![profile],
+            profiles,
             is_planned: false,
         })
     };

@@ -760,6 +760,7 @@ const MOVE: &[Parameter] = &[
     row("move.every", "", "s", Words("the controller's `every`"), DURATION, "1 ms", "Interval between the rows of the result, the last of which is at the end; it affects neither accuracy nor figures."),
     row("move.window", "", "m", Value(1e-4), POSITIVE, "50 um", "How near its target the cart counts as settled."),
     row("move.points.to", "", "m", Required, ANY, "50 mm", "Each point of a list, or its `to`."),
+    row("move.points.center", "", "m", Words("a straight leg"), ANY, "20 mm", "Centre of an arc to the point, of a gantry a list: bridge, cart; counterclockwise unless `clockwise = true`."),
     row("move.points.speed", "", "m/s", Words("the move's"), POSITIVE, "0.1 m/s", "Largest speed on the way there."),
     row("move.points.wait", "", "s", Value(0.0), TIME, "0.2 s", "How long it stands there."),
 ];

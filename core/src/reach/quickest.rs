@@ -6,7 +6,8 @@ use super::resonance::{Drive, reaches, resonances};
 use crate::design::Design;
 use crate::error::{Error, Result};
 use crate::machine::{BeltModel, Machine};
-use crate::signal::profile::{Leg, Limits, Profile};
+use crate::signal::arc::Arc;
+use crate::signal::profile::{Leg, Limits, Passage, Profile};
 
 /// Number of instants of a reference that a search evaluates.
 pub const INSTANTS: usize = 160;
@@ -73,48 +74,59 @@ pub fn modes(machine: &Machine) -> Vec<f64> {
     lowest
 }
 
-/// A move from stroke to stroke, without its limits.
+/// A move from leg to leg, without its limits.
 #[derive(Debug, Clone)]
 pub struct Way {
     /// Start position of each coordinate, m.
     pub start: Vec<f64>,
-    /// Rest before each stroke (s), and its target (m).
-    pub strokes: Vec<(f64, Vec<f64>)>,
-    /// The shortest and the longest stroke, m.
+    /// Its legs; those that move with any limits.
+    pub legs: Vec<Leg<Vec<f64>>>,
+    /// The shortest and the longest leg, m.
     shortest: f64,
     longest: f64,
 }
 
+/// Limits of a leg that has none yet.
+const ANY: Limits = Limits { speed: 1.0, acceleration: 1.0, jerk: None, snap: None };
+
 impl Way {
-    /// The strokes of references on one clock; none of those that have none.
+    /// The legs of references on one clock; none of references that do not move.
     pub fn of(profiles: &[Profile]) -> Option<Self> {
-        let all: Vec<Vec<_>> = profiles.iter().map(|profile| profile.strokes().collect()).collect();
         let mut rested = 0.0;
-        let (mut strokes, mut lengths) = (Vec::new(), Vec::new());
-        for number in 0..all.first()?.len() {
-            let legs = || all.iter().filter_map(|strokes| strokes.get(number));
-            let length = legs().map(|(_, _, distance, _)| distance * distance).sum::<f64>().sqrt();
+        let (mut legs, mut lengths) = (Vec::new(), Vec::new());
+        for number in 0..profiles.first()?.passages().len() {
+            let leg: Vec<&Passage> = profiles.iter().filter_map(|profile| profile.passages().get(number)).collect();
+            let straight = || leg.iter().map(|passage| (passage.to - passage.from).powi(2)).sum::<f64>().sqrt();
+            let turn = leg[0].turn;
+            let length = turn.map_or_else(straight, |turn| turn.length);
             if length == 0.0 {
                 continue;
             }
-            let begin = legs().map(|(begin, ..)| *begin).fold(0.0, f64::max);
-            strokes.push((begin - rested, legs().map(|(_, from, distance, _)| from + distance).collect()));
+            let begin = leg.iter().map(|passage| passage.begin).fold(0.0, f64::max);
+            // What rounding leaves of the clock is no rest.
+            if begin - rested > 1e-12 {
+                legs.push(Leg::Wait(begin - rested));
+            }
+            legs.push(match (turn, &leg[..]) {
+                (Some(turn), [x, y]) => {
+                    let center = [turn.center, y.turn.map_or(0.0, |turn| turn.center)];
+                    Leg::Around(Arc { to: [x.to, y.to], center, clockwise: turn.per_length < 0.0 }, ANY)
+                }
+                _ => Leg::To(leg.iter().map(|passage| passage.to).collect(), ANY),
+            });
             lengths.push(length);
-            rested = begin + legs().map(|(.., duration)| *duration).fold(0.0, f64::max);
+            rested = begin + leg.iter().map(|passage| passage.duration()).fold(0.0, f64::max);
         }
         let start = profiles.iter().map(Profile::start).collect();
         let (shortest, longest) =
             (lengths.iter().copied().reduce(f64::min)?, lengths.iter().copied().reduce(f64::max)?);
-        Some(Self { start, strokes, shortest, longest })
+        Some(Self { start, legs, shortest, longest })
     }
 
     /// Profiles over this path within these limits along it.
     pub fn within(&self, limits: &Limits) -> Result<Vec<Profile>> {
-        let legs = self.strokes.iter().flat_map(|(rest, to)| {
-            let wait = (*rest > 1e-12).then_some(Leg::Wait(*rest));
-            wait.into_iter().chain([Leg::To(to.clone(), *limits)])
-        });
-        Profile::of_legs(&self.start, &legs.collect::<Vec<_>>())
+        let legs: Vec<_> = self.legs.iter().map(|leg| leg.within(limits)).collect();
+        Profile::of_legs(&self.start, &legs)
     }
 }
 
@@ -254,12 +266,12 @@ impl Quickest<'_> {
         let limits = best_yet.1?;
         // Where no stroke cruises, the largest speed of the longest.
         let profiles = way.within(&limits).ok()?;
-        let strokes = profiles[0].strokes().map(|(begin, _, _, duration)| begin + 0.5 * duration);
+        let middles = profiles[0].passages().iter().map(|passage| passage.begin + 0.5 * passage.duration());
         let speed_at = |time: f64| match &profiles[..] {
             [profile] => profile.at(time).speed.abs(),
             _ => profiles.iter().map(|profile| profile.at(time).speed.powi(2)).sum::<f64>().sqrt(),
         };
-        let peaks = strokes.map(speed_at);
+        let peaks = middles.map(speed_at);
         let speed = peaks.fold(0.0, f64::max).min(limits.speed);
         Some(Limits { speed, ..limits })
     }

@@ -2,13 +2,16 @@
 //! `G1 X50 Y20 F3000`.
 //!
 //! Of G-code it takes what an axis of its own can do: G0 (as fast as allowed), G1 (with a feed), G4 (a wait, P in ms or
-//! S in s), G20 and G21 (inches, millimetres), G90 and G91 (absolute, relative). X and Y are in millimetres and F in
-//! mm/min unless G20 says inches; F is the speed along the path. Comments stand after `;` or in brackets. Every block
-//! stops exactly (G61): no corner is passed at speed.
+//! S in s), G20 and G21 (inches, millimetres), G90 and G91 (absolute, relative); of a machine in a plane also G2
+//! (clockwise arc) and G3 (counterclockwise), with the centre from the start by I and J, or with a radius R, below zero
+//! for the longer of both arcs. X, Y, I, J and R are in millimetres and F in mm/min unless G20 says inches; F is the
+//! speed along the path. Comments stand after `;` or in brackets. Every block stops exactly (G61): no corner is passed
+//! at speed.
 //!
 //! The list of a machine in a plane may be that of a printer: its words E and Z, its M and T codes, and G28, G92 of other
 //! letters move neither coordinate and are passed over.
 
+use super::arc::Arc;
 use super::profile::{Leg, Limits};
 use crate::error::{Error, Result};
 
@@ -27,7 +30,7 @@ use crate::error::{Error, Result};
 /// # Ok::<(), taut::Error>(())
 /// ```
 pub fn legs(text: &str, start: &[f64], limits: &Limits) -> Result<Vec<Leg<Vec<f64>>>> {
-    let mut state = State { unit: 1e-3, relative: false, rapid: true, feed: None, position: start.to_vec() };
+    let mut state = State { unit: 1e-3, relative: false, motion: Motion::Rapid, feed: None, position: start.to_vec() };
     let mut legs = Vec::new();
     for (number, line) in text.lines().enumerate() {
         block(line, &mut state, limits, &mut legs)
@@ -46,15 +49,26 @@ struct State {
     /// Metres per unit of length.
     unit: f64,
     relative: bool,
-    rapid: bool,
+    motion: Motion,
     /// m/s.
     feed: Option<f64>,
     /// Of each coordinate, m.
     position: Vec<f64>,
 }
 
+/// What a block without a code of motion does: the last one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Motion {
+    /// G0
+    Rapid,
+    /// G1
+    Straight,
+    /// G2 (clockwise) and G3
+    Arc { clockwise: bool },
+}
+
 const KNOWN: &str = "G0, G1, G4, G20, G21, G90 and G91, with X, F, P and S";
-const KNOWN_IN_PLANE: &str = "G0, G1, G4, G20, G21, G90 and G91, with X, Y, F, P and S";
+const KNOWN_IN_PLANE: &str = "G0, G1, G2, G3, G4, G20, G21, G90 and G91, with X, Y, I, J, R, F, P and S";
 
 impl State {
     fn known(&self) -> &'static str {
@@ -80,12 +94,17 @@ fn block(line: &str, state: &mut State, limits: &Limits, legs: &mut Vec<Leg<Vec<
         return Ok(());
     }
     let (mut to, mut wait) = (vec![None; state.position.len()], None);
+    let (mut off, mut radius) = ([None; 2], None);
     let mut dwell = false;
     for (letter, value) in words {
         let coordinate = COORDINATES.iter().take(to.len()).position(|known| *known == letter);
         match (letter, value) {
-            ('G', 0.0) => state.rapid = true,
-            ('G', 1.0) => state.rapid = false,
+            ('G', 0.0) => state.motion = Motion::Rapid,
+            ('G', 1.0) => state.motion = Motion::Straight,
+            ('G', 2.0 | 3.0) if in_plane => state.motion = Motion::Arc { clockwise: value == 2.0 },
+            ('I', value) if in_plane => off[0] = Some(value * state.unit),
+            ('J', value) if in_plane => off[1] = Some(value * state.unit),
+            ('R', value) if in_plane => radius = Some(value * state.unit),
             ('G', 4.0) => dwell = true,
             ('G', 20.0) => state.unit = 25.4e-3,
             ('G', 21.0) => state.unit = 1e-3,
@@ -113,24 +132,63 @@ fn block(line: &str, state: &mut State, limits: &Limits, legs: &mut Vec<Leg<Vec<
     } else if wait.is_some() {
         return Err(Error::new("P and S belong to G4").allowed(state.known()));
     }
-    if to.iter().any(Option::is_some) {
-        let place = |(to, now): (&Option<f64>, &f64)| match (to, state.relative) {
-            (None, _) => *now,
-            (Some(way), true) => now + way * state.unit,
-            (Some(place), false) => place * state.unit,
-        };
-        let target: Vec<f64> = to.iter().zip(&state.position).map(place).collect();
-        let speed = match (state.rapid, state.feed) {
-            (true, _) => limits.speed,
-            (false, Some(feed)) => feed.min(limits.speed),
-            (false, None) => {
-                return Err(Error::new("G1 before any feed").next("add F, in mm/min, such as G1 X50 F3000"));
-            }
-        };
-        state.position.clone_from(&target);
-        legs.push(Leg::To(target, Limits { speed, ..*limits }));
+    let has_center = off.iter().any(Option::is_some);
+    let is_arc = matches!(state.motion, Motion::Arc { .. });
+    if !is_arc && (has_center || radius.is_some()) {
+        return Err(Error::new("I, J and R belong to G2 and G3").allowed(state.known()));
     }
+    if to.iter().all(Option::is_none) && !has_center {
+        return Ok(());
+    }
+    let place = |(to, now): (&Option<f64>, &f64)| match (to, state.relative) {
+        (None, _) => *now,
+        (Some(way), true) => now + way * state.unit,
+        (Some(place), false) => place * state.unit,
+    };
+    let target: Vec<f64> = to.iter().zip(&state.position).map(place).collect();
+    let speed = match (state.motion, state.feed) {
+        (Motion::Rapid, _) => limits.speed,
+        (_, Some(feed)) => feed.min(limits.speed),
+        (_, None) => {
+            return Err(Error::new("G1, G2 or G3 before any feed").next("add F, in mm/min, such as G1 X50 F3000"));
+        }
+    };
+    let limits = Limits { speed, ..*limits };
+    legs.push(match (state.motion, &state.position[..], &target[..]) {
+        (Motion::Arc { clockwise }, &[x, y], &[to_x, to_y]) => {
+            let (from, to) = ([x, y], [to_x, to_y]);
+            let center = match (radius, has_center) {
+                (None, true) => [x + off[0].unwrap_or(0.0), y + off[1].unwrap_or(0.0)],
+                (Some(radius), false) => center(from, to, radius, clockwise)?,
+                _ => return Err(Error::new("an arc needs its centre by I and J, or its radius by R, and not both")),
+            };
+            Leg::Around(Arc { to, center, clockwise }, limits)
+        }
+        _ => Leg::To(target.clone(), limits),
+    });
+    state.position = target;
     Ok(())
+}
+
+/// The centre of an arc between two points, by its radius: of the shorter arc, and of the longer one for a radius below
+/// zero.
+fn center(from: [f64; 2], to: [f64; 2], radius: f64, clockwise: bool) -> Result<[f64; 2]> {
+    let chord = [to[0] - from[0], to[1] - from[1]];
+    let half = 0.5 * chord[0].hypot(chord[1]);
+    if half == 0.0 {
+        return Err(Error::new("an arc by R ends where it begins").next("give the centre of a whole circle by I and J"));
+    }
+    // A half circle, whose R has lost its last digits.
+    let square = radius * radius - half * half;
+    if square < -2e-3 * half * half {
+        return Err(Error::new(format!("a radius of {:.6} mm does not reach", 1e3 * radius.abs()))
+            .allowed(format!("from {:.6} mm on", 1e3 * half)));
+    }
+    let off = square.max(0.0).sqrt();
+    // The centre of the shorter counterclockwise arc is to the left of the chord.
+    let side = if clockwise == (radius > 0.0) { -off } else { off };
+    let middle = [0.5 * (from[0] + to[0]), 0.5 * (from[1] + to[1])];
+    Ok([middle[0] - side * chord[1] / (2.0 * half), middle[1] + side * chord[0] / (2.0 * half)])
 }
 
 /// The words of a line without its comments.
@@ -159,4 +217,57 @@ fn words(line: &str, known: &str) -> Result<Vec<(char, f64)>> {
         rest = &after[end..];
     }
     Ok(words)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LIMITS: Limits = Limits { speed: 0.5, acceleration: 5.0, jerk: None, snap: None };
+
+    fn arcs(text: &str) -> Vec<Arc> {
+        let of = |leg: &Leg<Vec<f64>>| match leg {
+            Leg::Around(arc, limits) => {
+                assert_eq!(limits.speed, 0.05);
+                Some(*arc)
+            }
+            _ => None,
+        };
+        legs(text, &[0.01, 0.0], &LIMITS).unwrap().iter().filter_map(of).collect()
+    }
+
+    fn near(a: Arc, b: Arc) -> bool {
+        let all = a.to.iter().zip(&b.to).chain(a.center.iter().zip(&b.center));
+        a.clockwise == b.clockwise && all.into_iter().all(|(a, b)| (a - b).abs() < 1e-12)
+    }
+
+    #[test]
+    fn arcs_by_centre_and_by_radius() {
+        let quarter = Arc { to: [0.0, 0.01], center: [0.0, 0.0], clockwise: false };
+        assert!(near(arcs("G3 X0 Y10 I-10 F3000")[0], quarter));
+        assert!(near(arcs("G3 X0 Y10 R10 F3000")[0], quarter));
+        assert!(near(arcs("G91\nG3 X-10 Y10 I-10 J0 F3000")[0], quarter));
+        // The short way clockwise has its centre on the other side; the long way counterclockwise too.
+        let other = [0.01, 0.01];
+        assert!(near(arcs("G2 X0 Y10 R10 F3000")[0], Arc { center: other, clockwise: true, ..quarter }));
+        assert!(near(arcs("G3 X0 Y10 R-10 F3000")[0], Arc { center: other, ..quarter }));
+        assert!(near(arcs("G2 X0 Y10 R-10 F3000")[0], Arc { clockwise: true, ..quarter }));
+        // A whole circle, then a second arc without a code.
+        let two = arcs("G2 I-10 F3000\nX-10 Y0 R10");
+        assert!(near(two[0], Arc { to: [0.01, 0.0], center: [0.0, 0.0], clockwise: true }));
+        assert!(near(two[1], Arc { to: [-0.01, 0.0], center: [0.0, 0.0], clockwise: true }));
+    }
+
+    #[test]
+    fn wrong_arcs_are_refused() {
+        let what = |text: &str| legs(text, &[0.01, 0.0], &LIMITS).unwrap_err().what;
+        assert!(what("G2 X0 Y10 F3000").contains("its centre by I and J, or its radius by R"));
+        assert!(what("G2 X0 Y10 I1 R10 F3000").contains("and not both"));
+        assert!(what("G2 X0 Y10 R2 F3000").contains("2.000000 mm does not reach"));
+        assert!(what("G2 R10 F3000\nG2 X10 Y0 R10").contains("ends where it begins"));
+        assert!(what("G1 X0 I10 F3000").contains("belong to G2 and G3"));
+        assert!(what("G2 X0 Y10 R10").contains("before any feed"));
+        let axis = legs("G2 X10 I5 F3000", &[0.0], &LIMITS).unwrap_err();
+        assert!(axis.what.contains("`G2` is not known"), "{}", axis.what);
+    }
 }

@@ -9,6 +9,7 @@
 //! - A periodic signal too fast for the clock to tell its seams apart reads as its mean, for ever: a bit of 1 ns after
 //!   ten hours, say.
 
+pub mod arc;
 mod clock;
 mod edges;
 pub mod gcode;

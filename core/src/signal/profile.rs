@@ -8,6 +8,7 @@
 //! segments of third order, and the fifteen of fourth (P. Lambrechts, M. Boerlage, M. Steinbuch, "Trajectory planning
 //! and feedforward design for electromechanical motion systems", Control Engineering Practice 13, 2005).
 
+use super::arc::{Arc, Circle, Turn};
 use crate::error::{Error, Result};
 
 /// Limits of a move. SI units; all above zero.
@@ -67,15 +68,22 @@ pub struct Stroke {
 }
 
 impl Stroke {
-    /// The end of the polynomial that holds `t` after the beginning.
-    fn seam(&self, t: f64) -> f64 {
+    /// True in the first half, the time from the nearer end, and the piece there; `later` is true if a seam belongs to the
+    /// piece that begins there, false if one of the second half, which mirrors the first, belongs to the piece before.
+    fn found(&self, t: f64, later: bool) -> (bool, f64, usize) {
         let middle = 0.5 * self.duration;
-        let first = t <= middle;
+        let first = if later { t < middle } else { t <= middle };
         let tau = if first { t } else { self.duration - t };
-        let index = self.pieces.partition_point(|(begin, _)| *begin <= tau).max(1) - 1;
+        let is_before = |begin: f64| if first || !later { begin <= tau } else { begin < tau };
+        (first, tau, self.pieces.partition_point(|(begin, _)| is_before(*begin)).max(1) - 1)
+    }
+
+    /// The end of the polynomial that holds from `t` after the beginning on.
+    fn seam(&self, t: f64) -> f64 {
+        let (first, _, index) = self.found(t, true);
         let begins = |index: usize| self.pieces.get(index).map(|(begin, _)| *begin);
-        // The second half mirrors the first.
         if first {
+            let middle = 0.5 * self.duration;
             begins(index + 1).map_or(middle, |next| next.min(middle))
         } else {
             self.duration - begins(index).unwrap_or(0.0)
@@ -129,13 +137,12 @@ impl Stroke {
         if t >= self.duration {
             return Reference::at(self.distance);
         }
-        if t <= 0.0 {
-            return Reference::default();
-        }
-        // The second half mirrors the first.
-        let first = t <= 0.5 * self.duration;
-        let tau = if first { t } else { self.duration - t };
-        let index = self.pieces.partition_point(|(begin, _)| *begin <= tau).max(1) - 1;
+        if t <= 0.0 { Reference::default() } else { self.reference(t, false) }
+    }
+
+    /// Reference at a time within the stroke, with the derivatives of the later or the earlier piece at a seam.
+    fn reference(&self, t: f64, later: bool) -> Reference {
+        let (first, tau, index) = self.found(t, later);
         let Some(&(begin, [p, v, a, j, s])) = self.pieces.get(index) else { return Reference::at(self.distance) };
         let h = tau - begin;
         let position = p + h * (v + h * (a / 2.0 + h * (j / 6.0 + h * s / 24.0)));
@@ -259,15 +266,83 @@ fn moved(state: &[f64; 5], h: f64) -> [f64; 5] {
 pub enum Leg<P = f64> {
     /// To a position, m: a number for an axis, the position of each coordinate for a machine with several.
     To(P, Limits),
+    /// Along a circle; of a machine with two coordinates.
+    Around(Arc, Limits),
     /// Rest for so long, s.
     Wait(f64),
+}
+
+impl<P: Clone> Leg<P> {
+    /// It with other limits.
+    pub fn within(&self, limits: &Limits) -> Self {
+        match self {
+            Self::To(to, _) => Self::To(to.clone(), *limits),
+            Self::Around(arc, _) => Self::Around(*arc, *limits),
+            Self::Wait(length) => Self::Wait(*length),
+        }
+    }
+}
+
+/// One coordinate of a leg.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Passage {
+    /// When it begins, s.
+    pub begin: f64,
+    /// Where, m.
+    pub from: f64,
+    /// Where it ends, m.
+    pub to: f64,
+    /// The circle that it is a coordinate of; none of a straight leg.
+    pub turn: Option<Turn>,
+    /// Of this coordinate; of an arc of the length along it.
+    stroke: Stroke,
+}
+
+impl Passage {
+    /// s
+    pub fn duration(&self) -> f64 {
+        self.stroke.duration
+    }
+
+    /// The smallest and the largest position on it, m.
+    pub fn extremes(&self) -> [f64; 2] {
+        let ends = [self.from.min(self.to), self.from.max(self.to)];
+        let Some(turn) = &self.turn else { return ends };
+        let [low, high] = turn.extremes();
+        [low.min(ends[0]), high.max(ends[1])]
+    }
+
+    /// The direction in which it comes to its end, ±1, and from when on (s) a place beyond the end has been passed over; 0
+    /// of one that does not move.
+    pub fn approach(&self) -> (f64, f64) {
+        let Some(turn) = &self.turn else {
+            let way = self.to - self.from;
+            return (self.begin, if way == 0.0 { 0.0 } else { way.signum() });
+        };
+        // The last thousandth of a circle, which passes over places beyond its end before.
+        let before = turn.at(&Reference::at(0.999 * turn.length)).position;
+        (self.begin + self.duration(), (self.to - before).signum())
+    }
+
+    /// The reference where its stroke is there.
+    fn placed(&self, gone: Reference) -> Reference {
+        match &self.turn {
+            Some(turn) => turn.at(&gone),
+            None => Reference { position: self.from + gone.position, ..gone },
+        }
+    }
+
+    /// The end of the polynomial that holds at `t`, s.
+    fn seam(&self, t: f64) -> f64 {
+        let seam = self.begin + self.stroke.seam(t - self.begin);
+        self.turn.as_ref().map_or(seam, |turn| seam.min(t + turn.step()))
+    }
 }
 
 /// Moves one after another, each from rest to rest.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Profile {
-    /// When each stroke begins, where from, where to, and the stroke.
-    strokes: Vec<(f64, [f64; 2], Stroke)>,
+    passages: Vec<Passage>,
     start: f64,
     end: f64,
     /// Impulses (time, s; amplitude) that it is convolved with; empty for none.
@@ -280,9 +355,10 @@ impl Profile {
     /// The chain of `legs` from `start` (m), the first beginning at time zero.
     pub fn new(start: f64, legs: &[Leg]) -> Result<Self> {
         let (mut time, mut position) = (0.0, start);
-        let mut strokes = Vec::new();
+        let mut passages = Vec::new();
         for leg in legs {
             match *leg {
+                Leg::Around(..) => return Err(Error::new("an arc needs two coordinates")),
                 Leg::Wait(length) => {
                     if !(0.0..=1e9).contains(&length) {
                         return Err(Error::new(format!("a wait of {length} s")).allowed("from 0 s to 1e9 s"));
@@ -291,17 +367,17 @@ impl Profile {
                 }
                 Leg::To(target, ref limits) => {
                     let stroke = Stroke::new(target - position, limits)?;
-                    let duration = stroke.duration();
-                    strokes.push((time, [position, target], stroke));
-                    (time, position) = (time + duration, target);
+                    let (begin, from) = (time, position);
+                    (time, position) = (begin + stroke.duration(), target);
+                    passages.push(Passage { begin, from, to: target, turn: None, stroke });
                 }
             }
         }
-        Ok(Self { strokes, start, end: time, shaper: Vec::new(), samples: Vec::new() })
+        Ok(Self { passages, start, end: time, shaper: Vec::new(), samples: Vec::new() })
     }
 
-    /// The chain of straight `legs` from `start` (m): a profile for each coordinate, all on one clock. Limits hold along
-    /// the path; legs meet at rest.
+    /// The chain of `legs` from `start` (m): a profile for each coordinate, all on one clock. Limits hold along the path,
+    /// and across an arc too, whose speed they lower; legs meet at rest.
     ///
     /// ```
     /// use taut::signal::profile::{Leg, Limits, Profile};
@@ -315,29 +391,41 @@ impl Profile {
     /// # Ok::<(), taut::Error>(())
     /// ```
     pub fn along(start: &[f64], legs: &[Leg<Vec<f64>>]) -> Result<Vec<Self>> {
-        let (mut position, mut way) = (start.to_vec(), 0.0);
-        // Ways along the path, and the ends of each leg.
-        let (mut lengths, mut ends) = (Vec::new(), Vec::new());
+        let (mut position, mut gone) = (start.to_vec(), 0.0);
+        // The legs by the length of the path, and the ends of each that moves, with its circle.
+        let (mut lengths, mut courses) = (Vec::new(), Vec::new());
         for leg in legs {
-            lengths.push(match leg {
-                Leg::Wait(length) => Leg::Wait(*length),
-                Leg::To(target, limits) => {
-                    let square: f64 = target.iter().zip(&position).map(|(to, from)| (to - from).powi(2)).sum();
-                    way += square.sqrt();
-                    ends.push((std::mem::replace(&mut position, target.clone()), target.clone()));
-                    Leg::To(way, *limits)
+            let (length, to, circle, limits) = match leg {
+                Leg::Wait(length) => {
+                    lengths.push(Leg::Wait(*length));
+                    continue;
                 }
-            });
+                Leg::To(to, limits) => {
+                    let square: f64 = to.iter().zip(&position).map(|(to, from)| (to - from).powi(2)).sum();
+                    (square.sqrt(), to.clone(), None, *limits)
+                }
+                Leg::Around(arc, limits) => {
+                    let from = position[..].try_into().map_err(|_| Error::new("an arc needs two coordinates"))?;
+                    let circle = arc.circle(from)?;
+                    let limits = circle.within(limits);
+                    (circle.length(), arc.to.to_vec(), Some((circle, limits)), limits)
+                }
+            };
+            gone += length;
+            lengths.push(Leg::To(gone, limits));
+            courses.push((std::mem::replace(&mut position, to.clone()), to, circle));
         }
         let whole = Self::new(0.0, &lengths)?;
         let of_coordinate = |k: usize| {
-            let legs = whole.strokes.iter().zip(&ends);
-            let strokes = legs.map(|((begin, _, stroke), (from, to))| {
-                let share = if stroke.distance > 0.0 { (to[k] - from[k]) / stroke.distance } else { 0.0 };
-                (*begin, [from[k], to[k]], stroke.scaled(share, to[k] - from[k]))
-            });
+            let passage = |(along, (from, to, circle)): (&Passage, &(Vec<f64>, Vec<f64>, Option<(Circle, Limits)>))| {
+                let (Passage { begin, stroke, .. }, from, to) = (along, from[k], to[k]);
+                let turn = circle.as_ref().map(|(circle, limits)| circle.coordinate(k, limits));
+                let share = if stroke.distance > 0.0 { (to - from) / stroke.distance } else { 0.0 };
+                let stroke = if turn.is_some() { stroke.clone() } else { stroke.scaled(share, to - from) };
+                Passage { begin: *begin, from, to, turn, stroke }
+            };
             Self {
-                strokes: strokes.collect(),
+                passages: whole.passages.iter().zip(&courses).map(passage).collect(),
                 start: start[k],
                 end: whole.end,
                 shaper: Vec::new(),
@@ -362,6 +450,7 @@ impl Profile {
         let [start] = start else { return Self::along(start, legs) };
         let alone = |leg: &Leg<Vec<f64>>| match leg {
             Leg::To(to, limits) => Leg::To(to[0], *limits),
+            Leg::Around(arc, limits) => Leg::Around(*arc, *limits),
             Leg::Wait(length) => Leg::Wait(*length),
         };
         Ok(vec![Self::new(*start, &legs.iter().map(alone).collect::<Vec<_>>())?])
@@ -387,7 +476,7 @@ impl Profile {
             .collect();
         let start = positions.first().copied().unwrap_or(0.0);
         let end = times.last().copied().unwrap_or(0.0);
-        Self { strokes: Vec::new(), start, end, shaper: Vec::new(), samples }
+        Self { passages: Vec::new(), start, end, shaper: Vec::new(), samples }
     }
 
     /// This profile through a shaper: impulses (time, s; amplitude) whose amplitudes add up to 1.
@@ -414,16 +503,12 @@ impl Profile {
             let share = (t - before) / (after - before);
             return Reference::default().plus(1.0 - share, *this).plus(share, *next);
         }
-        let index = self.strokes.partition_point(|(begin, ..)| *begin <= t);
-        let Some((begin, [from, to], stroke)) = index.checked_sub(1).and_then(|index| self.strokes.get(index)) else {
-            return Reference::at(self.start);
-        };
-        if t - begin >= stroke.duration {
-            return Reference::at(*to);
+        let index = self.passages.partition_point(|passage| passage.begin <= t);
+        match index.checked_sub(1).and_then(|index| self.passages.get(index)) {
+            None => Reference::at(self.start),
+            Some(passage) if t - passage.begin >= passage.duration() => Reference::at(passage.to),
+            Some(passage) => passage.placed(passage.stroke.at(t - passage.begin)),
         }
-        let mut reference = stroke.at(t - begin);
-        reference.position += from;
-        reference
     }
 
     /// The position from `t` on as a polynomial Σ c_k (time − t)ᵏ, m, and until when it holds, s.
@@ -451,17 +536,17 @@ impl Profile {
             let slope = (next.position - this.position) / (after - before);
             return ([this.position + slope * (t - before), slope, 0.0, 0.0, 0.0], *after);
         }
-        let index = self.strokes.partition_point(|(begin, ..)| *begin <= t);
-        let next = self.strokes.get(index).map(|(begin, ..)| *begin);
-        let Some((begin, [from, to], stroke)) = index.checked_sub(1).and_then(|index| self.strokes.get(index)) else {
+        let index = self.passages.partition_point(|passage| passage.begin <= t);
+        let next = self.passages.get(index).map(|passage| passage.begin);
+        let Some(passage) = index.checked_sub(1).and_then(|index| self.passages.get(index)) else {
             return rest(self.start, next);
         };
-        if t - begin >= stroke.duration {
-            return rest(*to, next);
+        if t - passage.begin >= passage.duration() {
+            return rest(passage.to, next);
         }
-        let Reference { position, speed, acceleration, jerk, snap } = stroke.at(t - begin);
-        let coefficients = [from + position, speed, acceleration / 2.0, jerk / 6.0, snap / 24.0];
-        (coefficients, begin + stroke.seam(t - begin))
+        let Reference { position, speed, acceleration, jerk, snap } =
+            passage.placed(passage.stroke.reference(t - passage.begin, true));
+        ([position, speed, acceleration / 2.0, jerk / 6.0, snap / 24.0], passage.seam(t))
     }
 
     /// When the last leg ends, s, a shaper apart.
@@ -482,11 +567,11 @@ impl Profile {
     /// End position, m.
     pub fn target(&self) -> f64 {
         let sampled = self.samples.last().map(|(_, reference)| reference.position);
-        sampled.unwrap_or_else(|| self.strokes.last().map_or(self.start, |(_, [_, to], _)| *to))
+        sampled.unwrap_or_else(|| self.passages.last().map_or(self.start, |passage| passage.to))
     }
 
-    /// Begin (s), start (m), distance (m) and duration (s) of each stroke.
-    pub fn strokes(&self) -> impl Iterator<Item = (f64, f64, f64, f64)> {
-        self.strokes.iter().map(|(begin, [from, _], stroke)| (*begin, *from, stroke.distance, stroke.duration))
+    /// This coordinate of each leg that moves; none of a reference that is a log's.
+    pub fn passages(&self) -> &[Passage] {
+        &self.passages
     }
 }
