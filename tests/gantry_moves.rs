@@ -225,12 +225,12 @@ impl Plain {
         legs.iter().map(of_leg).fold(f64::INFINITY, f64::min)
     }
 
-    /// Runge and Kutta's method with this many steps a sample: the end of bridge and cart, and peak and root mean square
-    /// of the distance from the path.
-    fn integrated(&self, steps: usize) -> ([f64; 2], [f64; 2]) {
+    /// Runge and Kutta's method with this many steps a sample: the end of bridge and cart, peak and root mean square of the
+    /// distance from the path, and by how much that changed in the step before the peak.
+    fn integrated(&self, steps: usize) -> ([f64; 2], [f64; 3]) {
         let (mut z, h) = ([0.0; 8], self.every / steps as f64);
         let samples = (self.until / self.every).round() as usize;
-        let (mut peak, mut square) = (0.0_f64, 0.0);
+        let (mut peak, mut square, mut change, mut last) = (0.0_f64, 0.0, 0.0, 0.0);
         let (begins, legs) = (self.begins(), self.legs());
         for sample in 0..samples {
             let wanted = self.drives(self.reference(sample as f64 * self.every));
@@ -246,10 +246,13 @@ impl Plain {
                 z = std::array::from_fn(|n| z[n] + h / 6.0 * (a[n] + 2.0 * b[n] + 2.0 * c[n] + d[n]));
                 let begun = begins.iter().take_while(|begin| **begin <= time).count();
                 let off = self.off(&legs[..(begun + 1).min(legs.len())], [z[2], z[3]]);
-                (peak, square) = (peak.max(off), square + h * off * off);
+                if off > peak {
+                    (peak, change) = (off, off - last);
+                }
+                (square, last) = (square + h * off * off, off);
             }
         }
-        ([z[2], z[3]], [peak, (square / self.until).sqrt()])
+        ([z[2], z[3]], [peak, (square / self.until).sqrt(), change])
     }
 }
 
@@ -278,7 +281,7 @@ fn closed_loops_agree_with_an_integration_that_shares_no_code() {
         let case = Case::from_text("plain.toml", &plain.text()).unwrap();
         let (run, _) = moved(&case, &case.moves[0], 1e-2);
         assert_eq!(run.outcome.ending, Ending::Complete);
-        let (ends, [peak, rms]) = plain.integrated(400);
+        let (ends, [peak, rms, change]) = plain.integrated(400);
         for (load, end) in run.metrics.loads.iter().zip(ends) {
             let off = load.position - end;
             assert!(off.abs() < 1e-9, "{number} {}: {off:e} m", plain.kind);
@@ -286,7 +289,8 @@ fn closed_loops_agree_with_an_integration_that_shares_no_code() {
         let contour = run.figures.contour.unwrap();
         // About corners the root mean square is summed over places.
         let off = [contour.peak.value.abs() - peak, contour.rms - rms];
-        let fits = off[0].abs() < 1e-8 && off[1].abs() < 1e-8 + 1e-4 * rms;
+        // Where the nearest leg changes, the peak is an edge between two steps.
+        let fits = off[0].abs() < 1e-8 + change && off[1].abs() < 1e-8 + 1e-4 * rms;
         assert!(fits, "{number} {}: {off:?} m of {peak} m and {rms} m", plain.kind);
         limited += usize::from(run.samples.1 > 0);
     }

@@ -158,7 +158,12 @@ fn place(field: &Field, machine: &Machine) -> Result<Vec<f64>> {
 /// The reference of each coordinate along the legs of the table.
 fn profiles(table: &Table, machine: &Machine, from: &[f64], limits: &Limits) -> Result<Vec<Profile>> {
     let legs = legs(table, machine, from, limits)?;
-    Profile::of_legs(from, &legs).map_err(|error| table.field.fail(error.what))
+    Profile::of_legs(from, &legs).map_err(|error| at(&table.field, error))
+}
+
+/// An error of a reference, at the field that describes it.
+fn at(field: &Field, error: Error) -> Error {
+    Error { allowed: error.allowed, next: error.next, ..field.fail(error.what) }
 }
 
 /// The limits of the quickest move that the machine of the file can make, with jerk and snap time on the belt's modes
@@ -276,13 +281,6 @@ fn legs(table: &Table, machine: &Machine, from: &[f64], limits: &Limits) -> Resu
             }
             Ok(legs)
         }
-        _ => gcode::legs(field.text()?, from, limits).map_err(|error| {
-            let mut told = field.fail(error.what);
-            told.allowed = error.allowed;
-            match error.next {
-                Some(next) => told.next(next),
-                None => told,
-            }
-        }),
+        _ => gcode::legs(field.text()?, from, limits).map_err(|error| at(field, error)),
     }
 }

@@ -56,7 +56,8 @@ impl Arc {
                 1e3 * radii[0],
                 1e3 * radii[1]
             ))
-            .allowed("radii that differ by at most 0.01 mm or 0.1 %"));
+            .allowed("radii that differ by at most 0.01 mm or 0.1 %")
+            .next("correct the centre or the end of the arc"));
         }
         let chord = away(self.to, from);
         let center = match length(chord) {
