@@ -11,12 +11,32 @@ export class Editor {
     this.app = app;
     this.lines = element("pre", {class: "lines", "aria-hidden": "true"});
     this.mark = element("div", {class: "line-mark", hidden: true});
-    this.field = element("textarea", {id: "text", spellcheck: "false", autocomplete: "off", autocapitalize: "off", wrap: "off", "aria-label": "Case text", "aria-describedby": "mistake",
-      oninput: () => { app.edit(this.field.value, true); this.count(); }, onscroll: () => this.scroll(), onkeydown: event => this.key(event)});
+    this.field = element("textarea", {
+      id: "text",
+      spellcheck: "false",
+      autocomplete: "off",
+      autocapitalize: "off",
+      wrap: "off",
+      "aria-label": "Case text",
+      "aria-describedby": "mistake",
+      oninput: () => {
+        app.edit(this.field.value, true);
+        this.count();
+      },
+      onscroll: () => this.scroll(),
+      onkeydown: event => this.key(event),
+    });
     this.told = element("div", {id: "mistake", class: "mistake", role: "status", "aria-live": "polite"});
-    root.append(element("div", {class: "editor"}, this.lines, element("div", {class: "field"}, this.mark, this.field)), this.told);
-    app.on("text", () => { if (!root.hidden) this.fill(); });
-    app.on("mistake", () => { if (!root.hidden) this.tellMistake(); });
+    root.append(
+      element("div", {class: "editor"}, this.lines, element("div", {class: "field"}, this.mark, this.field)),
+      this.told,
+    );
+    app.on("text", () => {
+      if (!root.hidden) this.fill();
+    });
+    app.on("mistake", () => {
+      if (!root.hidden) this.tellMistake();
+    });
   }
 
   /** Catches up with the text when it comes in sight. */
@@ -59,7 +79,10 @@ export class Editor {
     this.field.toggleAttribute("aria-invalid", Boolean(mistake));
     if (mistake) this.field.setAttribute("aria-invalid", "true");
     this.scroll();
-    if (!mistake) { this.told.replaceChildren(); return; }
+    if (!mistake) {
+      this.told.replaceChildren();
+      return;
+    }
     const where = mistake.line ? `Line ${mistake.line}, column ${mistake.column}: ` : "";
     const lines = [element("p", {}, element("b", {}, where), mistake.what)];
     if (mistake.allowed) lines.push(element("p", {}, `Allowed: ${mistake.allowed}`));
@@ -70,7 +93,11 @@ export class Editor {
 
   /** Puts the cursor at a mistake. */
   go(mistake) {
-    const before = this.field.value.split("\n").slice(0, mistake.line - 1).join("\n").length + (mistake.line > 1 ? 1 : 0);
+    const before =
+      this.field.value
+        .split("\n")
+        .slice(0, mistake.line - 1)
+        .join("\n").length + (mistake.line > 1 ? 1 : 0);
     this.field.focus();
     this.field.setSelectionRange(before + mistake.column - 1, before + mistake.column - 1 + (mistake.width || 1));
     this.field.scrollTop = Math.max(0, (mistake.line - 6) * parseFloat(getComputedStyle(this.field).lineHeight));

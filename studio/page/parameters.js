@@ -6,9 +6,25 @@ import {element, fold, number} from "./format.js";
 /** @typedef {import("./app.js").App} App */
 
 const GROUPS = {
-  motor: "Motor", amplifier: "Amplifier", drive: "Drive", drive_pulley: "Drive pulley", idler_pulley: "Idler pulley", cart: "Cart",
-  bridge: "Bridge", belt: "Belt", travel: "Travel", encoder: "Encoder", experiment: "Experiment", controller: "Controller",
-  left_drive: "Left drive", right_drive: "Right drive", measurement: "Recorder", move: "Move", fit: "Fit", tune: "Tuning", sweep: "Sweep",
+  motor: "Motor",
+  amplifier: "Amplifier",
+  drive: "Drive",
+  drive_pulley: "Drive pulley",
+  idler_pulley: "Idler pulley",
+  cart: "Cart",
+  bridge: "Bridge",
+  belt: "Belt",
+  travel: "Travel",
+  encoder: "Encoder",
+  experiment: "Experiment",
+  controller: "Controller",
+  left_drive: "Left drive",
+  right_drive: "Right drive",
+  measurement: "Recorder",
+  move: "Move",
+  fit: "Fit",
+  tune: "Tuning",
+  sweep: "Sweep",
 };
 const STEPS = 1000;
 /** Width of a slider's thumb in pixels, as browsers draw it. */
@@ -21,7 +37,13 @@ export class Parameters {
   constructor(root, app) {
     this.root = root;
     this.app = app;
-    this.search = element("input", {type: "search", id: "find", placeholder: "Find a parameter", "aria-label": "Find a parameter", oninput: () => this.filter()});
+    this.search = element("input", {
+      type: "search",
+      id: "find",
+      placeholder: "Find a parameter",
+      "aria-label": "Find a parameter",
+      oninput: () => this.filter(),
+    });
     this.groups = element("div", {class: "groups"});
     this.none = element("p", {class: "quiet", hidden: true}, "No parameter has that in its name.");
     /** What was moved last, once more; a narrow page shows it. */
@@ -32,12 +54,18 @@ export class Parameters {
     /** @type {Map<string, Row>} */
     this.again = new Map();
     this.shape = "";
-    app.on("run", () => { this.build(); this.remind(); });
+    app.on("run", () => {
+      this.build();
+      this.remind();
+    });
     app.on("mistake", () => {
       this.show();
       if (app.mistake && app.mistake.key) app.say(this.named(app.mistake));
     });
-    app.on("text", () => { this.show(); this.remind(); });
+    app.on("text", () => {
+      this.show();
+      this.remind();
+    });
   }
 
   show() {
@@ -46,11 +74,17 @@ export class Parameters {
 
   /** Puts what was moved last first. What is on the screen stays where it is: a finger may be on it. */
   remind() {
-    const {app, again, root} = this, keys = app.moved.filter(key => this.rows.has(key));
+    const {app, again, root} = this,
+      keys = app.moved.filter(key => this.rows.has(key));
     if (app.gesture || keys.join() === [...again.keys()].reverse().join()) return;
     const still = root.contains(document.activeElement) ? /** @type {Element} */ (document.activeElement) : this.groups;
-    const place = () => still.getBoundingClientRect().top, before = place();
-    for (const [key, row] of again) if (!keys.includes(key)) { row.element.remove(); again.delete(key); }
+    const place = () => still.getBoundingClientRect().top,
+      before = place();
+    for (const [key, row] of again)
+      if (!keys.includes(key)) {
+        row.element.remove();
+        again.delete(key);
+      }
     for (const key of keys.toReversed()) {
       if (again.has(key)) continue;
       const row = new Row(/** @type {Row} */ (this.rows.get(key)).parameter, app, AGAIN);
@@ -64,7 +98,9 @@ export class Parameters {
   }
 
   /** Whether there is a field for a key. @param {string | null} key */
-  has(key) { return this.rows.has(key || ""); }
+  has(key) {
+    return this.rows.has(key || "");
+  }
 
   /** Goes to the field of a key, wherever it is hidden. @param {string} key */
   go(key) {
@@ -78,12 +114,16 @@ export class Parameters {
   /** A mistake, with the parameter by the name that its field has. @param {any} mistake */
   named(mistake) {
     const row = this.rows.get(mistake.key || "");
-    return wordsOf({mistake: row ? {...mistake, what: mistake.what.replace(`${mistake.key}: `, `${row.title}: `)} : mistake});
+    return wordsOf({
+      mistake: row ? {...mistake, what: mistake.what.replace(`${mistake.key}: `, `${row.title}: `)} : mistake,
+    });
   }
 
   build() {
     const {parameters, experiment} = this.app;
-    const own = parameters.filter(({key}) => !key.startsWith("experiment.") || key.startsWith(`experiment.${experiment}.`));
+    const own = parameters.filter(
+      ({key}) => !key.startsWith("experiment.") || key.startsWith(`experiment.${experiment}.`),
+    );
     const shape = own.map(({key, written}) => key + (written === null)).join(" ") + this.app.original;
     if (shape !== this.shape) {
       this.shape = shape;
@@ -102,7 +142,10 @@ export class Parameters {
     for (const parameter of own) {
       for (const rows of [this.rows, this.again]) {
         const row = rows.get(parameter.key);
-        if (row) { row.parameter = parameter; row.show(); }
+        if (row) {
+          row.parameter = parameter;
+          row.show();
+        }
       }
     }
   }
@@ -113,9 +156,13 @@ export class Parameters {
       this.rows.set(parameter.key, row);
       return row;
     });
-    const unwritten = rows.filter(row => row.parameter.written === null), written = rows.filter(row => row.parameter.written !== null);
-    const name = GROUPS[group] || group, left = `${unwritten.length} more that stand at their default`;
-    const more = unwritten.length ? fold({class: "more"}, left, `${name}, ${left}`, ...unwritten.map(row => row.element)) : null;
+    const unwritten = rows.filter(row => row.parameter.written === null),
+      written = rows.filter(row => row.parameter.written !== null);
+    const name = GROUPS[group] || group,
+      left = `${unwritten.length} more that stand at their default`;
+    const more = unwritten.length
+      ? fold({class: "more"}, left, `${name}, ${left}`, ...unwritten.map(row => row.element))
+      : null;
     return fold({class: "group", open: written.length > 0}, name, name, ...written.map(row => row.element), more);
   }
 
@@ -142,7 +189,9 @@ export class Row {
     this.parameter = parameter;
     this.app = app;
     const {key, unit, sentence, allowed} = parameter;
-    const symbol = symbolOf(parameter), id = prefix + key.replace(/[^\w]/g, "-"), isAgain = prefix === AGAIN;
+    const symbol = symbolOf(parameter),
+      id = prefix + key.replace(/[^\w]/g, "-"),
+      isAgain = prefix === AGAIN;
     this.title = `${GROUPS[groupOf(key)] || groupOf(key)}, ${nameOf(parameter)}`;
     // Outside its group it is named with it.
     const name = isAgain ? this.title : nameOf(parameter);
@@ -151,38 +200,90 @@ export class Row {
     /** The value that field and slider show, none while they are used. */
     this.shown = NaN;
     /** Its attribute `data-typed` says that somebody is typing. */
-    this.field = element("input", {type: "text", id, inputmode: "decimal", autocomplete: "off", spellcheck: "false", "aria-describedby": `${id}-unit ${id}-told`,
-      oninput: () => { this.field.dataset.typed = ""; }, onchange: () => this.typed(), onblur: () => { delete this.field.dataset.typed; this.show(); },
-      onkeydown: event => { if (event.key === "Escape") this.back(); }});
+    this.field = element("input", {
+      type: "text",
+      id,
+      inputmode: "decimal",
+      autocomplete: "off",
+      spellcheck: "false",
+      "aria-describedby": `${id}-unit ${id}-told`,
+      oninput: () => {
+        this.field.dataset.typed = "";
+      },
+      onchange: () => this.typed(),
+      onblur: () => {
+        delete this.field.dataset.typed;
+        this.show();
+      },
+      onkeydown: event => {
+        if (event.key === "Escape") this.back();
+      },
+    });
     /** The position of the slider's thumb, in steps. */
     this.at = 0;
     /** How many steps the thumb is ahead of the pointer that holds it. */
     this.grip = 0;
     /** What holds the thumb: meanwhile neither it nor the range moves by itself. @type {"" | "pointer" | "key"} */
     this.held = "";
-    this.slider = element("input", {type: "range", min: 0, max: STEPS, step: 1, "aria-label": name,
-      oninput: () => this.moved(), onpointerdown: event => this.hold(event), onpointerup: () => this.release(),
-      onpointercancel: () => this.release(), onkeydown: () => { this.held = "key"; this.grip = 0; },
-      onkeyup: () => this.release(), onblur: () => this.leave(),
+    this.slider = element("input", {
+      type: "range",
+      min: 0,
+      max: STEPS,
+      step: 1,
+      "aria-label": name,
+      oninput: () => this.moved(),
+      onpointerdown: event => this.hold(event),
+      onpointerup: () => this.release(),
+      onpointercancel: () => this.release(),
+      onkeydown: () => {
+        this.held = "key";
+        this.grip = 0;
+      },
+      onkeyup: () => this.release(),
+      onblur: () => this.leave(),
       // A key that repeats ends no change before it is let go.
-      onchange: () => { if (this.held !== "key") this.release(); }});
-    this.told = element("p", {class: "told", id: id + "-told"}, `${sentence} `, element("span", {class: "quiet"}, `In the case text: ${key}; ${allowed}.`));
-    this.element = element("div", {class: "row", [isAgain ? "data-again" : "data-key"]: key},
-      element("label", {for: id}, symbol ? element("b", {}, symbol) : null, symbol ? " " : null, element("span", {}, name)),
-      element("span", {class: "entry-field"}, this.field, element("span", {class: "unit", id: id + "-unit"}, unit)), this.slider, this.told);
+      onchange: () => {
+        if (this.held !== "key") this.release();
+      },
+    });
+    this.told = element(
+      "p",
+      {class: "told", id: id + "-told"},
+      `${sentence} `,
+      element("span", {class: "quiet"}, `In the case text: ${key}; ${allowed}.`),
+    );
+    this.element = element(
+      "div",
+      {class: "row", [isAgain ? "data-again" : "data-key"]: key},
+      element(
+        "label",
+        {for: id},
+        symbol ? element("b", {}, symbol) : null,
+        symbol ? " " : null,
+        element("span", {}, name),
+      ),
+      element("span", {class: "entry-field"}, this.field, element("span", {class: "unit", id: id + "-unit"}, unit)),
+      this.slider,
+      this.told,
+    );
     this.span();
   }
 
   // What the slider reaches: a tenth to ten times the value it had, or the whole range where that is small.
   span() {
-    const {value, low, high, example, whole} = this.parameter, has = v => v !== null && v !== undefined && isFinite(v);
+    const {value, low, high, example, whole} = this.parameter,
+      has = v => v !== null && v !== undefined && isFinite(v);
     const size = Math.abs(value) || Math.abs(example) || 1;
-    this.log = value > 0 && !(has(high) && high <= 10 * value && has(low)) && !whole && !this.parameter.key.includes(".travel");
+    this.log =
+      value > 0 && !(has(high) && high <= 10 * value && has(low)) && !whole && !this.parameter.key.includes(".travel");
     if (this.log) {
       this.low = Math.max(value / 10, has(low) && low > 0 ? low : 0);
       this.high = Math.min(value * 10, has(high) ? high : Infinity);
     } else {
-      this.low = has(low) && high !== null && high - low <= 20 * size ? low : Math.max(has(low) ? low : -Infinity, value < 0 || low === null || low < 0 ? value - 3 * size : 0);
+      this.low =
+        has(low) && high !== null && high - low <= 20 * size
+          ? low
+          : Math.max(has(low) ? low : -Infinity, value < 0 || low === null || low < 0 ? value - 3 * size : 0);
       this.high = has(high) && high <= 20 * size ? high : value + 3 * size;
     }
     this.slider.step = String(whole ? STEPS / (this.high - this.low) : 1);
@@ -190,7 +291,9 @@ export class Row {
 
   /** Puts the thumb at a value. @param {number} value */
   place(value) {
-    const share = this.log ? Math.log(value / this.low) / Math.log(this.high / this.low) : (value - this.low) / (this.high - this.low);
+    const share = this.log
+      ? Math.log(value / this.low) / Math.log(this.high / this.low)
+      : (value - this.low) / (this.high - this.low);
     this.at = Math.round(STEPS * Math.max(0, Math.min(1, share)));
     this.slider.value = String(this.at);
   }
@@ -199,7 +302,8 @@ export class Row {
    * @param {PointerEvent} event */
   hold(event) {
     if (event.button) return;
-    const {left, width} = this.slider.getBoundingClientRect(), travel = width - THUMB;
+    const {left, width} = this.slider.getBoundingClientRect(),
+      travel = width - THUMB;
     const pressed = (STEPS * (event.clientX - left - THUMB / 2)) / travel;
     const reach = ((event.pointerType === "mouse" ? 0.5 : 1) * THUMB * STEPS) / travel;
     this.grip = Math.abs(this.at - pressed) <= reach ? this.at - pressed : 0;
@@ -221,13 +325,21 @@ export class Row {
   }
 
   moved() {
-    const at = Math.max(0, Math.min(STEPS, Math.round(Number(this.slider.value) + this.grip))), share = at / STEPS;
-    if (at === this.at) { this.slider.value = String(at); return; }
+    const at = Math.max(0, Math.min(STEPS, Math.round(Number(this.slider.value) + this.grip))),
+      share = at / STEPS;
+    if (at === this.at) {
+      this.slider.value = String(at);
+      return;
+    }
     let value = this.log ? this.low * (this.high / this.low) ** share : this.low + share * (this.high - this.low);
     if (this.parameter.whole) value = Math.round(value);
     // Four digits are finer than a slider is moved.
     value = Number(value.toPrecision(4));
-    if (this.parameter.whole) this.place(value); else { this.at = at; this.slider.value = String(at); }
+    if (this.parameter.whole) this.place(value);
+    else {
+      this.at = at;
+      this.slider.value = String(at);
+    }
     this.field.value = String(value);
     this.app.drag(this.parameter.key, value);
   }
@@ -235,8 +347,15 @@ export class Row {
   /** A number is in SI; anything else is read as in a case: "400 g". */
   typed() {
     delete this.field.dataset.typed;
-    const text = this.field.value.trim().replaceAll("\u2212", "-").replace(/^([-+]?\d*),(\d)/, "$1.$2"), bare = Number(text);
-    if (text === "" || (text === asTyped(this.parameter.value) && !this.app.pending.size)) { this.back(); return; }
+    const text = this.field.value
+        .trim()
+        .replaceAll("\u2212", "-")
+        .replace(/^([-+]?\d*),(\d)/, "$1.$2"),
+      bare = Number(text);
+    if (text === "" || (text === asTyped(this.parameter.value) && !this.app.pending.size)) {
+      this.back();
+      return;
+    }
     this.app.drag(this.parameter.key, isFinite(bare) ? bare : text);
     this.app.drop();
   }
@@ -249,12 +368,18 @@ export class Row {
   }
 
   show() {
-    const {value, key} = this.parameter, {mistake, pending} = this.app, isTyped = this.field.dataset.typed !== undefined;
+    const {value, key} = this.parameter,
+      {mistake, pending} = this.app,
+      isTyped = this.field.dataset.typed !== undefined;
     const isWrong = Boolean(mistake && pending.has(key) && (mistake.key ? mistake.key === key : !mistake.line));
     if (isWrong !== this.field.hasAttribute("aria-invalid")) {
-      if (isWrong) this.field.setAttribute("aria-invalid", "true"); else this.field.removeAttribute("aria-invalid");
+      if (isWrong) this.field.setAttribute("aria-invalid", "true");
+      else this.field.removeAttribute("aria-invalid");
     }
-    if (pending.has(key)) { this.shown = NaN; return; }
+    if (pending.has(key)) {
+      this.shown = NaN;
+      return;
+    }
     if (value === this.shown) return;
     this.shown = isTyped || this.held ? NaN : value;
     if (!isTyped) this.field.value = asTyped(value);
@@ -273,18 +398,31 @@ const asTyped = value => String(Number(value.toPrecision(6)));
 /** @param {string} key */
 const groupOf = key => key.split(".")[0];
 
-/** The name of a parameter in its group, of a span by the name that it has in plots: `cart.friction.viscous` is "friction
- * viscous" in the group Cart, `belt.stiffness.0` "stiffness of span 1, drive to cart".
+/** The name of a parameter in its group, of a span by the name that it has in plots: `cart.friction.viscous` is
+ * "friction viscous" in the group Cart, `belt.stiffness.0` "stiffness of span 1, drive to cart".
  * @param {{key: string, span?: string | null}} parameter */
 function nameOf({key, span}) {
-  const isOwn = key.startsWith("experiment."), parts = key.split(".").slice(1).map(part => part.replace(/_/g, " "));
+  const isOwn = key.startsWith("experiment."),
+    parts = key
+      .split(".")
+      .slice(1)
+      .map(part => part.replace(/_/g, " "));
   if (span) return `${parts[0] === "spans" ? "length" : parts[0]} of ${span}`;
-  return parts.filter(part => !(isOwn && /^\d+$/.test(part))).map(part => (/^\d+$/.test(part) ? String(Number(part) + 1) : part)).join(" ") || key;
+  return (
+    parts
+      .filter(part => !(isOwn && /^\d+$/.test(part)))
+      .map(part => (/^\d+$/.test(part) ? String(Number(part) + 1) : part))
+      .join(" ") || key
+  );
 }
 
-/** The symbol of a parameter: of a list like "k₁ k₂ k₃" that of the element. @param {{key: string, symbol: string}} parameter */
+/**
+ * The symbol of a parameter: of a list like "k₁ k₂ k₃" that of the element.
+ * @param {{key: string, symbol: string}} parameter
+ */
 function symbolOf({key, symbol}) {
-  const all = symbol.split(" "), place = Number(key.split(".").at(-1));
+  const all = symbol.split(" "),
+    place = Number(key.split(".").at(-1));
   if (all.length < 2 || !(place >= 0)) return symbol;
   return all[place] || all[0].replace(/[₀-₉]/, () => "₀₁₂₃₄₅₆₇₈₉"[place + 1] || "");
 }

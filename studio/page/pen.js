@@ -7,13 +7,15 @@ const NEAR = 0.05;
 
 /** A round step for about so many ticks. @param {number} span @param {number} wanted */
 export function step(span, wanted) {
-  const rough = span / Math.max(1, wanted), power = 10 ** Math.floor(Math.log10(rough));
-  return power * (/** @type {number} */ ([1, 2, 5, 10].find(m => rough / power <= m * 1.0001)));
+  const rough = span / Math.max(1, wanted),
+    power = 10 ** Math.floor(Math.log10(rough));
+  return power * /** @type {number} */ ([1, 2, 5, 10].find(m => rough / power <= m * 1.0001));
 }
 
 /** @param {number} low @param {number} high @param {number} wanted @returns {number[]} */
 export function ticks(low, high, wanted) {
-  const by = step(high - low, wanted), found = [];
+  const by = step(high - low, wanted),
+    found = [];
   if (!(by > 0)) return found;
   for (let i = Math.ceil(low / by - 1e-6); i * by <= high + 1e-6 * by && found.length < 50; i++) found.push(i * by);
   return found;
@@ -66,7 +68,8 @@ export class Path {
     const isFirst = isNaN(this.x);
     this.x0 = isFirst ? x : this.x;
     this.y0 = isFirst ? y : this.y;
-    if (isFirst) this.pen.moveTo(x, y); else this.pen.lineTo(this.x0, this.y0);
+    if (isFirst) this.pen.moveTo(x, y);
+    else this.pen.lineTo(this.x0, this.y0);
     // Of points above one another none is left out.
     this.low = x > this.x0 ? -Infinity : NaN;
     this.high = x > this.x0 ? Infinity : NaN;
