@@ -80,6 +80,8 @@ export class App {
     /** By how much stretch and error are magnified. */
     this.factor = 100;
     this.view = "motion";
+    /** The stop of the tour. */
+    this.stop = 0;
     this.gesture = false;
     this.sent = 0;
     /** Whether the run is that of the case as it is now. */
@@ -92,6 +94,8 @@ export class App {
     this.say = () => {};
     /** Tells everyone, what is grave until the next word. @type {(text: string, isGrave?: boolean) => void} */
     this.notify = () => {};
+    /** Drawing and plots of the view of motion, which sets it. @type {{stage: any, plots: any} | null} */
+    this.scene = null;
     /** Goes to a view. @type {(key: string) => void} */
     this.show = () => {};
   }
@@ -105,8 +109,8 @@ export class App {
 
   /** The contents of a link. */
   snapshot() {
-    const {text, name, experiment, view, cursor, window, factor, rate} = this;
-    return {text, name, experiment, view, cursor, window, factor, rate};
+    const {text, name, experiment, view, stop, cursor, window, factor, rate} = this;
+    return {text, name, experiment, view, stop, cursor, window, factor, rate};
   }
 
   /** @param {What} what @param {() => void} listener */

@@ -90,6 +90,9 @@ export function put(element, attributes) {
     if (element.getAttribute(name) !== String(value)) element.setAttribute(name, String(value));
 }
 
+/** True if the view of an element is not shown. @param {Element} element */
+export const isOutOfView = element => Boolean(element.closest(".view[hidden]"));
+
 /** Has the browser keep a file. @param {string} name @param {BlobPart} content @param {string} kind */
 export function download(name, content, kind) {
   const address = URL.createObjectURL(new Blob([content], {type: kind}));

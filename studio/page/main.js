@@ -2,6 +2,7 @@
 // Puts the page together: views, the case's menu, keys, themes, links.
 import {App} from "./app.js";
 import {Cases} from "./cases.js";
+import {film} from "./film.js";
 import {element, download, fileName, tell} from "./format.js";
 import {fragment, stateOf} from "./link.js";
 import {Mistake} from "./wire.js";
@@ -141,6 +142,13 @@ act("csv", () => {
   for (let i = 0; i < values[0].length; i++) text += values.map(column => column[i]).join(",") + "\n";
   download(`${fileName(app.run.head.title)}.csv`, text, "text/csv");
 });
+act("film", async () => {
+  app.isPlaying = false;
+  app.tell("play");
+  app.show("motion");
+  const gif = await film(app, share => app.notify(`Making the pictures: ${Math.round(100 * share)} %`));
+  download(`${fileName(app.run ? app.run.head.title : app.name)}.gif`, gif, "image/gif");
+});
 act("link", async () => {
   const hash = await fragment(app.snapshot());
   history.replaceState(null, "", hash);
@@ -178,7 +186,7 @@ document.addEventListener("keydown", event => {
   const target = /** @type {HTMLElement} */ (event.target),
     isText = target.matches("textarea, input:not([type=range], [type=file], [type=checkbox])");
   // What is being typed into a field is undone by the browser; what is part of the case, by the page.
-  const isItsOwn = isText && !target.matches("#text, .row input:not([data-typed])");
+  const isItsOwn = isText && !target.matches("#text, .entry-field input:not([data-typed])");
   if ((event.ctrlKey || event.metaKey) && !event.altKey) {
     const key = event.key.toLowerCase();
     if (isItsOwn && "zy".includes(key)) return;
@@ -246,6 +254,7 @@ async function follow() {
   app.open(state.text, {name: String(state.name || "linked.toml"), experiment: Number(state.experiment) || 0});
   if (Number.isFinite(state.factor)) app.factor = state.factor;
   if (Number.isFinite(state.rate)) app.rate = state.rate;
+  if (Number.isInteger(state.stop)) app.stop = Math.max(0, state.stop);
   app.show(state.view);
   let isFirst = true;
   app.on("opened", () => {

@@ -1,7 +1,8 @@
 // @ts-check
 // The view of the motion: the machine above its plots, the parameters and the text beside them.
 import {element, number, put, tell, time as timeText} from "./format.js";
-import {drawing, extent} from "./stage.js";
+import {splitter} from "./layout.js";
+import {RATES, Stage, playing, start} from "./player.js";
 import {Plots} from "./plots.js";
 import {Parameters} from "./parameters.js";
 import {Editor} from "./editor.js";
@@ -10,9 +11,6 @@ import {Editor} from "./editor.js";
 
 export const key = "motion",
   name = "Motion";
-
-/** Slow motion, in seconds of the machine for one of the watcher. */
-const RATES = [1, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 1e-3, 1e-4, 1e-5, 1e-6];
 
 /** @param {HTMLElement} root @param {App} app */
 export function mount(root, app) {
@@ -31,10 +29,32 @@ export function mount(root, app) {
     element("h2", {id: "plots-title", class: "unseen"}, "Plots"),
     plots,
   );
-  root.append(side, element("div", {class: "centre", id: "centre", tabindex: "-1"}, stage, bar(app), plotted, glance));
+  side.append(
+    splitter({
+      name: "side",
+      words: "Width of the parameters",
+      root,
+      panel: () => side.getBoundingClientRect(),
+      along: "x",
+      least: 240,
+      most: () => Math.max(240, innerWidth - 480),
+    }),
+  );
+  const size = splitter({
+    name: "stage",
+    words: "Height of the drawing",
+    root,
+    panel: () => (stage.querySelector("svg") || stage).getBoundingClientRect(),
+    along: "y",
+    least: 80,
+    most: () => Math.max(80, innerHeight - 240),
+  });
+  root.append(
+    side,
+    element("div", {class: "centre", id: "centre", tabindex: "-1"}, stage, size, bar(app), plotted, glance),
+  );
   sides(side, app);
-  new Stage(stage, app);
-  new Plots(plots, app);
+  app.scene = {stage: new Stage(stage, app), plots: new Plots(plots, app)};
   new Glance(glance, app);
 }
 
@@ -120,21 +140,7 @@ function sides(root, app) {
 
 /** Experiment, playing, and what is compared. @param {App} app */
 function bar(app) {
-  const play = element("button", {type: "button", id: "play", class: "play", onclick: () => app.play()});
-  const scrub = element("input", {
-    type: "range",
-    id: "scrub",
-    min: 0,
-    max: 10000,
-    step: 1,
-    "aria-label": "Time",
-    oninput: () => {
-      app.isPlaying = false;
-      app.tell("play");
-      app.seek(from() + (Number(scrub.value) / 10000) * span());
-    },
-  });
-  const clock = element("span", {class: "clock", id: "clock"});
+  const {play, scrub, clock} = playing(app);
   const rate = element(
     "select",
     {
@@ -182,12 +188,7 @@ function bar(app) {
   const pin = element("button", {type: "button", id: "pin", onclick: () => app.pin()}, "Pin");
   const unpin = element("button", {type: "button", id: "unpin", hidden: true, onclick: () => app.unpin()}, "Unpin");
   const all = element("button", {type: "button", id: "all", hidden: true, onclick: () => app.look(null)}, "Whole run");
-  const from = () => (app.window ? app.window[0] : 0),
-    span = () => (app.window ? app.window[1] - app.window[0] : app.until);
   const show = () => {
-    scrub.value = String(Math.round((10000 * (app.cursor - from())) / span()));
-    tell(clock, timeText(app.cursor, Math.min(span() / 1000, app.isPlaying ? app.rate / 60 : 1)));
-    put(scrub, {"aria-valuetext": clock.textContent});
     tell(factorTold, `× ${number(app.factor)}`);
     factor.value = String(Math.round(10 * Math.log10(app.factor)));
     put(factor, {"aria-valuetext": factorTold.textContent});
@@ -202,8 +203,6 @@ function bar(app) {
     unpin.textContent = `Unpin ${app.pins.length}`;
   });
   app.on("play", () => {
-    play.textContent = app.isPlaying ? "❚❚" : "▶";
-    play.setAttribute("aria-label", app.isPlaying ? "Pause" : "Play");
     rate.value = String(app.rate);
   });
   app.on("run", () => {
@@ -215,6 +214,7 @@ function bar(app) {
     if (experiment.value !== String(app.experiment)) experiment.value = String(app.experiment);
     show();
   });
+  start(app);
   app.tell("play");
   return element(
     "div",
@@ -237,84 +237,6 @@ function bar(app) {
     unpin,
     all,
   );
-}
-
-class Stage {
-  /** @param {HTMLElement} root @param {App} app */
-  constructor(root, app) {
-    this.root = root;
-    this.app = app;
-    this.shape = "";
-    this.frame = 0;
-    /** @type {import("./stage.js").Drawing | null} */
-    this.drawing = null;
-    /** @type {import("./stage.js").Extent | null} */
-    this.extent = null;
-    app.on("run", () => this.build());
-    app.on("cursor", () => this.later());
-    app.on("play", () => {
-      if (app.isPlaying) this.start();
-    });
-  }
-
-  build() {
-    const {run} = this.app;
-    if (!run) return;
-    const {scene} = run.head,
-      shape = JSON.stringify(scene);
-    if (shape !== this.shape) {
-      this.shape = shape;
-      this.drawing = drawing(scene);
-      this.root.replaceChildren(this.drawing.root);
-    }
-    this.extent = extent(run, scene);
-    this.later();
-  }
-
-  later() {
-    if (this.frame) return;
-    this.frame = requestAnimationFrame(() => {
-      this.frame = 0;
-      this.move();
-    });
-  }
-
-  move() {
-    const {app} = this;
-    if (!this.drawing || !this.extent || !app.run) return;
-    this.drawing.move(
-      name => app.value(name, app.cursor),
-      name => app.state(name, app.cursor),
-      app.factor,
-      this.extent,
-    );
-  }
-
-  /** Plays until the end, or until it is paused. */
-  start() {
-    const {app} = this;
-    let last = performance.now(),
-      asked = NaN;
-    const go = now => {
-      if (!app.isPlaying) return;
-      const step = Math.min(0.1, (now - last) / 1000) * app.rate,
-        end = app.window ? app.window[1] : app.until;
-      last = now;
-      let next = app.cursor + step;
-      if (next >= end) next = app.window ? app.window[0] : 0;
-      // In slow motion there are many pictures between two rows: those around the cursor are computed finer.
-      if (!app.window && app.run && app.rate * 50 < app.until / 50) {
-        const span = 6 * app.rate;
-        if (!(next >= asked && next < asked + 0.7 * span)) {
-          asked = next;
-          app.lens(Math.max(0, next - 0.05 * span), Math.min(app.until, next + span));
-        }
-      }
-      app.seek(next);
-      requestAnimationFrame(go);
-    };
-    requestAnimationFrame(go);
-  }
 }
 
 /** A part of the page whose cells take new texts where nothing else is new: the page lays out only what changed. */

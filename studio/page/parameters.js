@@ -1,7 +1,8 @@
 // @ts-check
 // Every number of the case as a field and a slider, by group, with search.
 import {wordsOf} from "./drop.js";
-import {element, fold, number} from "./format.js";
+import {element, fold, number, put, tell} from "./format.js";
+import {keep, recall} from "./layout.js";
 
 /** @typedef {import("./app.js").App} App */
 
@@ -29,8 +30,57 @@ const GROUPS = {
 const STEPS = 1000;
 /** Width of a slider's thumb in pixels, as browsers draw it. */
 const THUMB = 16;
-/** How ids begin of the fields that a parameter has among those changed last. */
-const AGAIN = "r-";
+/** How the ids of fields begin, with the attribute of their rows. A parameter may have a row among those of its group,
+ * among those changed last and the favourites, in the view of gains, and in the tour. */
+const PLACES = {"p-": "data-key", "r-": "data-again", "f-": "data-favourite", "g-": "data-key", "t-": "data-tour"};
+
+/** Ranges of sliders that somebody chose, by key. @type {Map<string, [number, number]>} */
+const ranges = new Map();
+
+/** Keys of favourites, the newest first, which the browser remembers. @type {string[]} */
+let favourites = [recall("favourites")].flat().filter(key => typeof key === "string");
+
+/** Makes a parameter a favourite, or takes it from them. @param {string} key */
+function favour(key) {
+  const left = favourites.filter(other => other !== key);
+  favourites = left.length < favourites.length ? left : [key, ...favourites];
+  keep("favourites", favourites.length ? favourites : undefined);
+}
+
+/** Rows of some parameters beside those in their groups. */
+class Shelf {
+  /** @param {string} name @param {string} prefix @param {Parameters} parameters */
+  constructor(name, prefix, parameters) {
+    this.parameters = parameters;
+    this.prefix = prefix;
+    this.root = fold({class: "group", open: true, hidden: true}, name, name);
+    /** @type {Map<string, Row>} */
+    this.rows = new Map();
+  }
+
+  /** Shows the rows of these keys. @param {string[]} keys */
+  fill(keys) {
+    for (const [key, row] of this.rows) {
+      if (keys.includes(key)) continue;
+      row.element.remove();
+      this.rows.delete(key);
+    }
+    for (const key of keys.toReversed()) {
+      if (this.rows.has(key)) continue;
+      const {parameter} = /** @type {Row} */ (this.parameters.rows.get(key));
+      const row = new Row(parameter, this.parameters.app, this.prefix);
+      this.rows.set(key, row);
+      this.root.firstElementChild.after(row.element);
+      row.show();
+    }
+    this.tell();
+  }
+
+  /** Shows it where it has rows and nobody searches. */
+  tell() {
+    this.root.hidden = !this.rows.size || Boolean(this.parameters.search.value.trim());
+  }
+}
 
 export class Parameters {
   /** @param {HTMLElement} root @param {App} app */
@@ -46,13 +96,14 @@ export class Parameters {
     });
     this.groups = element("div", {class: "groups"});
     this.none = element("p", {class: "quiet", hidden: true}, "No parameter has that in its name.");
-    /** What was moved last, once more; a narrow page shows it. */
-    this.recent = fold({class: "group recent", open: true, hidden: true}, "Changed last", "Changed last");
-    root.append(this.search, this.none, this.recent, this.groups);
     /** @type {Map<string, Row>} */
     this.rows = new Map();
-    /** @type {Map<string, Row>} */
-    this.again = new Map();
+    /** What was moved last; a narrow page shows it. */
+    this.recent = new Shelf("Changed last", "r-", this);
+    this.recent.root.classList.add("recent");
+    this.favourites = new Shelf("Favourites", "f-", this);
+    root.append(this.search, this.none, this.recent.root, this.favourites.root, this.groups);
+    root.addEventListener("favourite", () => this.remind());
     this.shape = "";
     app.on("run", () => {
       this.build();
@@ -69,30 +120,30 @@ export class Parameters {
   }
 
   show() {
-    for (const rows of [this.rows, this.again]) for (const row of rows.values()) row.show();
+    for (const row of this.all()) row.show();
   }
 
-  /** Puts what was moved last first. What is on the screen stays where it is: a finger may be on it. */
+  /** All rows. @returns {Row[]} */
+  all() {
+    return [this.rows, this.recent.rows, this.favourites.rows].flatMap(rows => [...rows.values()]);
+  }
+
+  /** Puts what was moved last, and favourites, first. What is on the screen stays where it is: a finger may be on
+   * it. */
   remind() {
-    const {app, again, root} = this,
-      keys = app.moved.filter(key => this.rows.has(key));
-    if (app.gesture || keys.join() === [...again.keys()].reverse().join()) return;
+    const {app, root} = this,
+      known = (/** @type {string[]} */ keys) => keys.filter(key => this.rows.has(key));
+    const shelves = /** @type {[Shelf, string[]][]} */ ([
+      [this.recent, known(app.moved)],
+      [this.favourites, known(favourites)],
+    ]);
+    const isSame = shelves.every(([shelf, keys]) => keys.join() === [...shelf.rows.keys()].reverse().join());
+    if (app.gesture || isSame) return;
     const still = root.contains(document.activeElement) ? /** @type {Element} */ (document.activeElement) : this.groups;
     const place = () => still.getBoundingClientRect().top,
       before = place();
-    for (const [key, row] of again)
-      if (!keys.includes(key)) {
-        row.element.remove();
-        again.delete(key);
-      }
-    for (const key of keys.toReversed()) {
-      if (again.has(key)) continue;
-      const row = new Row(/** @type {Row} */ (this.rows.get(key)).parameter, app, AGAIN);
-      again.set(key, row);
-      this.recent.firstElementChild.after(row.element);
-      row.show();
-    }
-    this.recent.hidden = !again.size;
+    for (const [shelf, keys] of shelves) shelf.fill(keys);
+    if (!still.isConnected) return;
     root.scrollTop += place() - before;
     scrollBy(0, place() - before);
   }
@@ -127,8 +178,8 @@ export class Parameters {
     const shape = own.map(({key, written}) => key + (written === null)).join(" ") + this.app.original;
     if (shape !== this.shape) {
       this.shape = shape;
-      for (const row of this.again.values()) row.element.remove();
-      this.again.clear();
+      this.recent.fill([]);
+      this.favourites.fill([]);
       this.rows.clear();
       /** @type {Map<string, any[]>} */
       const groups = new Map();
@@ -139,14 +190,10 @@ export class Parameters {
       this.groups.replaceChildren(...[...groups].map(([group, parameters]) => this.group(group, parameters)));
       this.filter();
     }
-    for (const parameter of own) {
-      for (const rows of [this.rows, this.again]) {
-        const row = rows.get(parameter.key);
-        if (row) {
-          row.parameter = parameter;
-          row.show();
-        }
-      }
+    const parameterOf = new Map(own.map(parameter => [parameter.key, parameter]));
+    for (const row of this.all()) {
+      row.parameter = parameterOf.get(row.parameter.key) || row.parameter;
+      row.show();
     }
   }
 
@@ -169,7 +216,7 @@ export class Parameters {
   filter() {
     const words = this.search.value.toLowerCase().split(/\s+/).filter(Boolean);
     let found = 0;
-    this.recent.hidden = words.length > 0 || !this.again.size;
+    for (const shelf of [this.recent, this.favourites]) shelf.tell();
     for (const row of this.rows.values()) {
       const isThere = words.every(word => row.text.includes(word));
       row.element.hidden = !isThere;
@@ -183,6 +230,27 @@ export class Parameters {
   }
 }
 
+/** Whether a pointer is pressed: until it is let go, nothing may move away from under it. */
+let isPressed = false;
+for (const [kind, now] of /** @type {const} */ ([
+  ["pointerdown", true],
+  ["pointerup", false],
+  ["pointercancel", false],
+]))
+  addEventListener(
+    kind,
+    () => {
+      isPressed = now;
+    },
+    true,
+  );
+
+/** Does something when no pointer is pressed, after the click of the one that is. @param {() => void} work */
+function unpressed(work) {
+  if (!isPressed) work();
+  else for (const kind of ["pointerup", "pointercancel"]) addEventListener(kind, () => setTimeout(work), {once: true});
+}
+
 export class Row {
   /** @param {any} parameter @param {App} app @param {string} [prefix] of its id */
   constructor(parameter, app, prefix = "p-") {
@@ -191,10 +259,10 @@ export class Row {
     const {key, unit, sentence, allowed} = parameter;
     const symbol = symbolOf(parameter),
       id = prefix + key.replace(/[^\w]/g, "-"),
-      isAgain = prefix === AGAIN;
+      isAway = "rft".includes(prefix[0]);
     this.title = `${GROUPS[groupOf(key)] || groupOf(key)}, ${nameOf(parameter)}`;
     // Outside its group it is named with it.
-    const name = isAgain ? this.title : nameOf(parameter);
+    const name = isAway ? this.title : nameOf(parameter);
     this.text = [key, name, symbol, sentence].join(" ").toLowerCase();
     this.home = parameter.value;
     /** The value that field and slider show, none while they are used. */
@@ -254,7 +322,17 @@ export class Row {
     );
     this.element = element(
       "div",
-      {class: "row", [isAgain ? "data-again" : "data-key"]: key},
+      {
+        class: "row",
+        [PLACES[prefix]]: key,
+        onfocusin: () => this.element.classList.add("used"),
+        onfocusout: event =>
+          unpressed(() => {
+            const {element} = this;
+            if (!element.contains(event.relatedTarget) && !element.contains(document.activeElement))
+              element.classList.remove("used");
+          }),
+      },
       element(
         "label",
         {for: id},
@@ -265,8 +343,67 @@ export class Row {
       element("span", {class: "entry-field"}, this.field, element("span", {class: "unit", id: id + "-unit"}, unit)),
       this.slider,
       this.told,
+      this.tools(name),
     );
     this.span();
+  }
+
+  /** What is done seldom: shown while the row is used. @param {string} name @returns {HTMLElement} */
+  tools(name) {
+    const {key} = this.parameter;
+    this.star = element(
+      "button",
+      {
+        type: "button",
+        class: "star",
+        "aria-label": `Favourite: ${name}`,
+        title: "Favourites stand first",
+        onclick: () => {
+          favour(key);
+          this.show();
+          this.star.dispatchEvent(new Event("favourite", {bubbles: true}));
+        },
+      },
+      "☆",
+    );
+    this.reset = element(
+      "button",
+      {
+        type: "button",
+        onclick: () => {
+          this.app.drag(key, this.home);
+          this.app.drop();
+        },
+      },
+      `Back to ${asTyped(this.home)}`,
+    );
+    const end = words =>
+      element("input", {
+        type: "number",
+        step: "any",
+        "aria-label": `${words} of the slider, ${name}`,
+        onchange: () => this.reach(),
+      });
+    this.from = end("Lower end");
+    this.to = end("Upper end");
+    return element(
+      "div",
+      {class: "row-tools"},
+      this.star,
+      this.reset,
+      element("span", {}, "Slider from ", this.from, " to ", this.to),
+    );
+  }
+
+  /** The range that somebody chose; none where an end is emptied. */
+  reach() {
+    const {key, low, high} = this.parameter,
+      ends = [this.from.value, this.to.value].map(Number);
+    const [from, to] = [Math.max(ends[0], low ?? -Infinity), Math.min(ends[1], high ?? Infinity)];
+    if (this.from.value !== "" && this.to.value !== "" && from < to) ranges.set(key, [from, to]);
+    else ranges.delete(key);
+    this.span();
+    this.place(this.parameter.value);
   }
 
   // What the slider reaches: a tenth to ten times the value it had, or the whole range where that is small.
@@ -286,7 +423,14 @@ export class Row {
           : Math.max(has(low) ? low : -Infinity, value < 0 || low === null || low < 0 ? value - 3 * size : 0);
       this.high = has(high) && high <= 20 * size ? high : value + 3 * size;
     }
+    this.range = ranges.get(this.parameter.key);
+    if (this.range) {
+      [this.low, this.high] = this.range;
+      this.log = this.low > 0 && this.high >= 10 * this.low && !whole;
+    }
     this.slider.step = String(whole ? STEPS / (this.high - this.low) : 1);
+    this.from.value = String(Number(this.low.toPrecision(6)));
+    this.to.value = String(Number(this.high.toPrecision(6)));
   }
 
   /** Puts the thumb at a value. @param {number} value */
@@ -376,15 +520,26 @@ export class Row {
       if (isWrong) this.field.setAttribute("aria-invalid", "true");
       else this.field.removeAttribute("aria-invalid");
     }
+    const isFavourite = favourites.includes(key);
+    put(this.star, {"aria-pressed": isFavourite});
+    tell(this.star, isFavourite ? "★" : "☆");
     if (pending.has(key)) {
       this.shown = NaN;
       return;
+    }
+    if (this.reset.disabled !== (value === this.home)) this.reset.disabled = value === this.home;
+    if (!this.held && this.range !== ranges.get(key)) {
+      this.span();
+      this.shown = NaN;
     }
     if (value === this.shown) return;
     this.shown = isTyped || this.held ? NaN : value;
     if (!isTyped) this.field.value = asTyped(value);
     if (!this.held) {
-      if (value < this.low || value > this.high) this.span();
+      if (value < this.low || value > this.high) {
+        ranges.delete(key);
+        this.span();
+      }
       this.place(value);
     }
     const words = `${number(value, 6)} ${this.parameter.unit}`;

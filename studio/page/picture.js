@@ -1,12 +1,13 @@
 // @ts-check
 // Figures of results: lines, points and bars on a canvas, with a cursor for keys, values as a table, and brushing.
 import {element, fold, number} from "./format.js";
-import {COLOURS, sized, step} from "./pen.js";
+import {Axes, COLOURS, sized, ticks} from "./pen.js";
 
 const LEFT = 70,
   RIGHT = 14,
   TOP = 10,
   BOTTOM = 40,
+  MARGINS = {left: LEFT, right: RIGHT, top: TOP, bottom: BOTTOM},
   ROWS = 60;
 
 /** @typedef {{name: string, x: ArrayLike<number>, y: ArrayLike<number>, kind?: "line"|"points"|"bars"|"cross",
@@ -15,7 +16,7 @@ const LEFT = 70,
 /**
  * @typedef {{x: string, y: string, xUnit?: string, yUnit?: string, words?: string, height?: number,
  * logX?: boolean, equal?: boolean, xRange?: [number, number], yRange?: [number, number],
- * marks?: {x?: number, y?: number, name: string}[]}} Axes
+ * marks?: {x?: number, y?: number, name: string}[]}} Options
  */
 
 /** @type {Set<Picture>} */
@@ -30,13 +31,15 @@ matchMedia("(prefers-color-scheme: dark)").addEventListener("change", again);
 new MutationObserver(again).observe(document.documentElement, {attributes: true, attributeFilter: ["data-theme"]});
 
 export class Picture {
-  /** @param {string} title @param {Axes} axes
+  /** @param {string} title @param {Options} axes
    * @param {(area: {x: [number, number], y: [number, number]} | null) => void} [brushed] called with what was
    * chosen by dragging */
   constructor(title, axes, brushed) {
     this.title = title;
     this.axes = axes;
     this.brushed = brushed;
+    /** Axes of what was drawn last. @type {Axes | null} */
+    this.drawn = null;
     /** @type {Series[]} */
     this.series = [];
     this.frame = 0;
@@ -84,7 +87,7 @@ export class Picture {
     all.add(this);
   }
 
-  /** @param {Series[]} series @param {Partial<Axes>} [axes] */
+  /** @param {Series[]} series @param {Partial<Options>} [axes] */
   show(series, axes = {}) {
     const names = JSON.stringify(series.filter(one => !one.quiet).map(one => [one.name, one.colour]));
     this.series = series;
@@ -170,63 +173,25 @@ export class Picture {
       pen = sized(this.canvas, this),
       style = getComputedStyle(document.documentElement);
     const colour = name => style.getPropertyValue("--" + name).trim() || "#888";
-    const range = this.ranges(),
-      wide = width - LEFT - RIGHT,
-      high = height - TOP - BOTTOM;
-    if (axes.equal) this.square(range, wide / high);
-    const place = axes.logX ? x => Math.log10(x) : x => x;
-    const [x0, x1] = range.x.map(place),
-      [y0, y1] = range.y;
-    const across = x => LEFT + (wide * (place(x) - x0)) / (x1 - x0),
-      up = y => TOP + (high * (y1 - y)) / (y1 - y0);
-    Object.assign(this, {
-      across,
-      up,
-      back: {
-        x: px => {
-          const v = x0 + ((px - LEFT) / wide) * (x1 - x0);
-          return axes.logX ? 10 ** v : v;
-        },
-        y: py => y1 - ((py - TOP) / high) * (y1 - y0),
-      },
-    });
-    // The grid, and numbers at it.
-    pen.font = "12px system-ui, sans-serif";
-    pen.lineWidth = 1;
-    const by = step(y1 - y0, Math.max(2, high / 34)),
-      bx = axes.logX ? 1 : step(x1 - x0, Math.max(2, wide / 62));
-    pen.textAlign = "right";
-    pen.textBaseline = "middle";
-    for (let i = Math.ceil(y0 / by - 1e-9); i * by <= y1 + 1e-9 * by; i++)
-      this.line(pen, colour, LEFT, up(i * by), width - RIGHT, up(i * by), number(i * by, 5), LEFT - 7, up(i * by));
+    const range = this.ranges();
+    if (axes.equal) this.square(range, (width - LEFT - RIGHT) / (height - TOP - BOTTOM));
+    const frame = new Axes(this, MARGINS, range.x, range.y, axes.logX);
+    this.drawn = frame;
+    const {x0, x1} = frame,
+      columns = frame.isLog ? ticks(x0, x1, x1 - x0).map(power => 10 ** power) : ticks(x0, x1, frame.wide / 62);
+    const told = (/** @type {number} */ value) => /** @type {[number, string]} */ ([value, number(value, 5)]);
+    const colours = {grid: colour("grid"), grey: colour("grey"), axis: colour("axis")};
+    frame.grid(pen, colours, columns.map(told), frame.rows(34).map(told));
+    pen.fillStyle = colours.grey;
     pen.textAlign = "center";
-    pen.textBaseline = "alphabetic";
-    for (let i = Math.ceil(x0 / bx - 1e-9); i * bx <= x1 + 1e-9 * bx; i++) {
-      const x = axes.logX ? 10 ** i : i * bx;
-      this.line(pen, colour, across(x), TOP, across(x), height - BOTTOM, number(x, 5), across(x), height - BOTTOM + 15);
-    }
-    pen.fillStyle = colour("grey");
-    pen.fillText(axes.x + (axes.xUnit ? `, ${axes.xUnit}` : ""), LEFT + wide / 2, height - 6);
-    pen.save();
-    pen.beginPath();
-    pen.rect(LEFT, TOP, wide, high);
-    pen.clip();
-    for (const mark of axes.marks || []) {
-      pen.strokeStyle = colour("axis");
-      pen.setLineDash([5, 4]);
-      pen.beginPath();
-      if (mark.y !== undefined) {
-        pen.moveTo(LEFT, up(mark.y));
-        pen.lineTo(width - RIGHT, up(mark.y));
-      }
-      if (mark.x !== undefined) {
-        pen.moveTo(across(mark.x), TOP);
-        pen.lineTo(across(mark.x), height - BOTTOM);
-      }
-      pen.stroke();
-      pen.setLineDash([]);
-    }
-    for (const one of this.series) this.one(pen, one, colour(this.colourOf(one)), across, up, height);
+    pen.fillText(axes.x + (axes.xUnit ? `, ${axes.xUnit}` : ""), LEFT + frame.wide / 2, height - 6);
+    frame.clip(pen);
+    pen.strokeStyle = colours.axis;
+    pen.setLineDash([5, 4]);
+    frame.marks(pen, axes.marks || []);
+    const across = (/** @type {number} */ x) => frame.across(x),
+      up = (/** @type {number} */ y) => frame.up(y);
+    for (const one of this.series) this.one(pen, one, colour(this.colourOf(one)), frame);
     if (this.brush) {
       const {x, y} = this.brush;
       pen.globalAlpha = 0.16;
@@ -248,16 +213,6 @@ export class Picture {
     if (this.table.open) this.fill();
   }
 
-  line(pen, colour, a, b, c, d, text, x, y) {
-    pen.strokeStyle = colour("grid");
-    pen.beginPath();
-    pen.moveTo(a, b);
-    pen.lineTo(c, d);
-    pen.stroke();
-    pen.fillStyle = colour("grey");
-    pen.fillText(text, x, y);
-  }
-
   /** The same scale on both axes. */
   square(range, ratio) {
     const [w, h] = [range.x[1] - range.x[0], range.y[1] - range.y[0]];
@@ -269,54 +224,32 @@ export class Picture {
     else range.y = grow(range.y, w / ratio);
   }
 
-  /** @param {CanvasRenderingContext2D} pen @param {Series} one */
-  one(pen, one, colour, across, up, height) {
+  /** @param {CanvasRenderingContext2D} pen @param {Series} one @param {string} colour @param {Axes} frame */
+  one(pen, one, colour, frame) {
     const {x, y, kind = "line"} = one,
-      n = x.length;
+      n = x.length,
+      places = Array.from({length: kind === "bars" || kind === "cross" ? n : 0}, (_, i) => [
+        frame.across(x[i]),
+        frame.up(y[i]),
+      ]);
     pen.strokeStyle = pen.fillStyle = colour;
     pen.globalAlpha = one.alpha === undefined ? 1 : one.alpha;
-    pen.lineWidth = kind === "line" ? 1.6 : 1;
+    pen.lineWidth = kind === "line" ? 1.6 : kind === "cross" ? 2 : 1;
     pen.setLineDash(one.dash || []);
-    if (kind === "bars") {
-      for (let i = 0; i < n; i++) {
-        const a = across(x[i]),
-          b = i + 1 < n ? across(x[i + 1]) : a + (n > 1 ? across(x[n - 1]) - across(x[n - 2]) : 20);
-        pen.fillRect(a + 0.5, up(y[i]), Math.max(1, b - a - 1), Math.max(0, height - BOTTOM - up(y[i])));
-      }
-    } else if (kind === "points") {
-      const r = n > 400 ? 1.7 : 2.6;
+    if (kind === "line") frame.curve(pen, x, y);
+    else if (kind === "points") frame.points(pen, x, y, n > 400 ? 1.7 : 2.6);
+    else if (kind === "bars") {
+      places.forEach(([a, top], i) => {
+        const end = i + 1 < n ? places[i + 1][0] : a + (n > 1 ? a - places[i - 1][0] : 20);
+        pen.fillRect(a + 0.5, top, Math.max(1, end - a - 1), Math.max(0, frame.bottom - top));
+      });
+    } else {
       pen.beginPath();
-      for (let i = 0; i < n; i++) {
-        if (!isFinite(y[i]) || !isFinite(x[i])) continue;
-        const a = across(x[i]),
-          b = up(y[i]);
-        pen.moveTo(a + r, b);
-        pen.arc(a, b, r, 0, 6.3);
-      }
-      pen.fill();
-    } else if (kind === "cross") {
-      pen.lineWidth = 2;
-      pen.beginPath();
-      for (let i = 0; i < n; i++) {
-        const a = across(x[i]),
-          b = up(y[i]);
+      for (const [a, b] of places) {
         pen.moveTo(a - 5, b - 5);
         pen.lineTo(a + 5, b + 5);
         pen.moveTo(a + 5, b - 5);
         pen.lineTo(a - 5, b + 5);
-      }
-      pen.stroke();
-    } else {
-      pen.beginPath();
-      let isOn = false;
-      for (let i = 0; i < n; i++) {
-        if (!isFinite(x[i]) || !isFinite(y[i]) || Math.abs(y[i]) > 1e200) {
-          isOn = false;
-          continue;
-        }
-        if (isOn) pen.lineTo(across(x[i]), up(y[i]));
-        else pen.moveTo(across(x[i]), up(y[i]));
-        isOn = true;
       }
       pen.stroke();
     }
@@ -370,26 +303,26 @@ export class Picture {
   }
 
   setBrush(a, b) {
-    const {back} = /** @type {any} */ (this);
-    if (!back) return;
+    const {drawn} = this;
+    if (!drawn) return;
     const isBars = this.series.some(({kind}) => kind === "bars");
-    const x = [back.x(Math.min(a[0], b[0])), back.x(Math.max(a[0], b[0]))];
+    const x = [drawn.xAt(Math.min(a[0], b[0])), drawn.xAt(Math.max(a[0], b[0]))];
     const y = isBars
-      ? [back.y(this.height - BOTTOM), back.y(TOP)]
-      : [back.y(Math.max(a[1], b[1])), back.y(Math.min(a[1], b[1]))];
+      ? [drawn.yAt(drawn.bottom), drawn.yAt(TOP)]
+      : [drawn.yAt(Math.max(a[1], b[1])), drawn.yAt(Math.min(a[1], b[1]))];
     this.brush = {x: /** @type {[number, number]} */ (x), y: /** @type {[number, number]} */ (y)};
     this.later();
   }
 
   nearest(px, py) {
-    const {across, up} = /** @type {any} */ (this);
-    if (!across) return;
+    const {drawn} = this;
+    if (!drawn) return;
     let best = 26 * 26,
       found = null;
     this.series.forEach((one, s) => {
       if (one.quiet) return;
       for (let i = 0; i < one.x.length; i++) {
-        const far = (across(one.x[i]) - px) ** 2 + (up(one.y[i]) - py) ** 2;
+        const far = (drawn.across(one.x[i]) - px) ** 2 + (drawn.up(one.y[i]) - py) ** 2;
         if (far < best) {
           best = far;
           found = [s, i];
@@ -438,10 +371,10 @@ export class Picture {
     this.cursor = [s, i];
     if (event.shiftKey && this.brushed) {
       // From where it began to the cursor, over the whole height.
-      const {back} = /** @type {any} */ (this),
+      const {drawn} = this,
         x = this.series[s].x[i];
       this.anchor = this.brush && this.anchor !== undefined ? this.anchor : x;
-      const y = back ? [back.y(this.height - BOTTOM), back.y(TOP)] : [-Infinity, Infinity];
+      const y = drawn ? [drawn.yAt(drawn.bottom), drawn.yAt(TOP)] : [-Infinity, Infinity];
       this.brush = {x: [Math.min(this.anchor, x), Math.max(this.anchor, x)], y: /** @type {[number, number]} */ (y)};
       this.brushed(this.brush);
     }

@@ -1,9 +1,9 @@
 // @ts-check
 // The plots of a run on canvases: all share the part of time that is seen, and the cursor. Each can be used by keys,
 // and has its values as a table.
-import {element, fold, number, time as timeText, download, fileName, tell} from "./format.js";
+import {element, fold, number, time as timeText, download, fileName, isOutOfView, tell} from "./format.js";
 import {lowerBound} from "./app.js";
-import {COLOURS, Path, density, line, sized, step, ticks} from "./pen.js";
+import {Axes, COLOURS, density, line, sized, step, ticks} from "./pen.js";
 
 /** @typedef {import("./app.js").App} App */
 /** @typedef {import("./wire.js").Answer} Answer */
@@ -12,7 +12,9 @@ const LEFT = 66,
   RIGHT = 12,
   TOP = 8,
   BOTTOM = 24,
+  MARGINS = {left: LEFT, right: RIGHT, top: TOP, bottom: BOTTOM},
   HEIGHT = 170,
+  SMALL_HEIGHT = 120,
   TABLE_ROWS = 50;
 /** Time without a change, ms, after which values in legends out of sight catch up. */
 const REST = 200;
@@ -26,19 +28,25 @@ const STATES = new Map([
 ]);
 
 export class Plots {
-  /** @param {HTMLElement} root @param {App} app */
-  constructor(root, app) {
+  /** @param {HTMLElement} root @param {App} app @param {(panel: any) => boolean} [isWanted] tells which panels have a
+   * plot here */
+  constructor(root, app, isWanted = panel => panel.title) {
     this.root = root;
     this.app = app;
+    this.isWanted = isWanted;
     /** @type {Plot[]} */
     this.plots = [];
     this.shape = "";
     this.colours = {};
+    /** Height of the curves, pixels. */
+    this.tall = 0;
     /** The states strip and its like are not to be hidden by what a panel is called. */
-    app.on("run", () => {
-      this.build();
-      this.later();
-    });
+    for (const what of /** @type {const} */ (["run", "view"])) {
+      app.on(what, () => {
+        this.build();
+        this.later();
+      });
+    }
     for (const what of /** @type {const} */ (["window", "compare", "cursor"]))
       app.on(what, () => this.later(what === "cursor"));
     app.on("theme", () => {
@@ -49,7 +57,9 @@ export class Plots {
       this.readColours();
       this.later();
     });
+    const isSmall = matchMedia("(max-width: 52rem), (max-height: 34rem)");
     new ResizeObserver(() => {
+      this.tall = isSmall.matches ? SMALL_HEIGHT : HEIGHT;
       for (const plot of this.plots) plot.measure();
       this.later();
     }).observe(root);
@@ -88,7 +98,7 @@ export class Plots {
   build() {
     const {run} = this.app;
     if (!run) return;
-    const panels = run.head.panels.filter(panel => panel.title);
+    const panels = run.head.panels.filter(panel => this.isWanted(panel));
     const shape = JSON.stringify(panels.map(panel => [panel.key, panel.curves]));
     if (shape === this.shape) {
       this.plots.forEach((plot, i) => {
@@ -105,6 +115,8 @@ export class Plots {
 
   /** Draws with the next picture. @param {boolean} [onlyCursor] */
   later(onlyCursor = false) {
+    // A view that is shown again is drawn anew.
+    if (isOutOfView(this.root)) return;
     if (!onlyCursor) this.onlyCursor = false;
     clearTimeout(this.rest);
     this.rest = setTimeout(() => {
@@ -250,19 +262,20 @@ class Plot {
     return (this.wide = this.area.clientWidth);
   }
   get height() {
-    return this.isStates ? 26 + 22 * this.panel.curves.length + BOTTOM : HEIGHT + BOTTOM;
+    return (this.isStates ? 26 + 22 * this.panel.curves.length : this.plots.tall) + BOTTOM;
+  }
+  get axes() {
+    const {low, high} = this.range || {low: 0, high: 1};
+    return new Axes(this, MARGINS, this.plots.seen, [low, high]);
   }
   across(time) {
-    const [a, b] = this.plots.seen;
-    return LEFT + ((this.width - LEFT - RIGHT) * (time - a)) / (b - a);
+    return this.axes.across(time);
   }
   timeAt(x) {
-    const [a, b] = this.plots.seen;
-    return a + ((b - a) * (x - LEFT)) / (this.width - LEFT - RIGHT);
+    return this.axes.xAt(x);
   }
   up(value) {
-    const {low, high} = this.range || {low: 0, high: 1};
-    return TOP + ((this.height - TOP - BOTTOM) * (high - value)) / (high - low);
+    return this.axes.up(value);
   }
 
   /** The runs that are drawn, from the lowest: pins, the run before, the run itself. */
@@ -346,7 +359,7 @@ class Plot {
   drawCurves(pen) {
     this.fit();
     pen.drawImage(this.ground(), 0, 0, this.width, this.height);
-    this.clip(pen);
+    this.axes.clip(pen);
     this.marks(pen);
     for (const layer of this.layers()) if (layer.style === "now") this.strokes(pen, layer);
     pen.restore();
@@ -375,20 +388,12 @@ class Plot {
     const pen = sized(this.back, this);
     this.grid(
       pen,
-      ticks(range.low, range.high, 4).map(value => [this.up(value), number(value, 6)]),
+      ticks(range.low, range.high, 4).map(value => [value, number(value, 6)]),
     );
-    this.clip(pen);
+    this.axes.clip(pen);
     for (const layer of below) this.strokes(pen, layer);
     pen.restore();
     return this.back;
-  }
-
-  /** Keeps what follows within the axes, until the pen is restored. @param {CanvasRenderingContext2D} pen */
-  clip(pen) {
-    pen.save();
-    pen.beginPath();
-    pen.rect(LEFT, TOP - 2, this.width - LEFT - RIGHT, this.height - TOP - BOTTOM + 4);
-    pen.clip();
   }
 
   /** All curves of a run. @param {CanvasRenderingContext2D} pen @param {{answer: Answer, style: string}} layer */
@@ -410,37 +415,16 @@ class Plot {
    * @param {CanvasRenderingContext2D} pen @param {Float64Array} x @param {Float64Array} y */
   curve(pen, x, y) {
     const [from, to] = this.plots.seen,
-      {scale} = this.panel,
-      {low, high} = /** @type {any} */ (this.range);
-    const kx = (this.width - LEFT - RIGHT) / (to - from),
-      ky = (this.height - TOP - BOTTOM) / (high - low);
+      {axes} = this;
     const first = Math.max(0, lowerBound(x, from) - 1),
       last = Math.min(x.length, lowerBound(x, to) + 1);
-    const together = Math.max(1, Math.floor((last - first) / (this.width - LEFT - RIGHT)));
+    const part = {first, last, together: Math.max(1, Math.floor((last - first) / axes.wide)), scale: this.panel.scale};
     // Dashes of what is dense show nothing, and cost most of a picture.
-    if (together > 2) pen.setLineDash([]);
-    const path = new Path(pen);
-    for (let i = first; i < last; i += together) {
-      let least = i,
-        greatest = i;
-      const end = Math.min(last, i + together);
-      for (let j = i + 1; j < end; j++) {
-        if (y[j] < y[least]) least = j;
-        if (y[j] > y[greatest]) greatest = j;
-      }
-      const a = Math.min(least, greatest),
-        b = Math.max(least, greatest);
-      path.to(LEFT + (x[a] - from) * kx, TOP + (high - y[a] * scale) * ky);
-      if (b !== a) path.to(LEFT + (x[b] - from) * kx, TOP + (high - y[b] * scale) * ky);
-    }
-    path.stroke();
-    if (last - first < (this.width - LEFT) / 9 && pen.globalAlpha === 1) {
+    if (part.together > 2) pen.setLineDash([]);
+    axes.curve(pen, x, y, part);
+    if (last - first < axes.wide / 9 && pen.globalAlpha === 1) {
       pen.fillStyle = pen.strokeStyle;
-      for (let i = first; i < last; i++) {
-        pen.beginPath();
-        pen.arc(LEFT + (x[i] - from) * kx, TOP + (high - y[i] * scale) * ky, 2.1, 0, 7);
-        pen.fill();
-      }
+      axes.points(pen, x, y, 2.1, part);
     }
   }
 
@@ -452,16 +436,11 @@ class Plot {
     const seen = app.run.head.events.filter(event => event.time >= from && event.time <= to);
     if (seen.length > 120) return;
     pen.strokeStyle = colours.grid;
-    pen.lineWidth = 1;
     pen.setLineDash([2, 2]);
-    pen.beginPath();
-    for (const event of seen) {
-      const x = this.across(event.time);
-      pen.moveTo(x, TOP);
-      pen.lineTo(x, this.height - BOTTOM);
-    }
-    pen.stroke();
-    pen.setLineDash([]);
+    this.axes.marks(
+      pen,
+      seen.map(event => ({x: event.time})),
+    );
   }
 
   /** A strip for each body, and the events on it. @param {CanvasRenderingContext2D} pen */
@@ -512,35 +491,19 @@ class Plot {
   /** @param {CanvasRenderingContext2D} pen @param {[number, string][]} rows */
   grid(pen, rows) {
     const {colours} = this.plots,
-      {width, height} = this,
       [from, to] = this.plots.seen,
-      bottom = height - BOTTOM;
-    pen.font = "12px system-ui, sans-serif";
-    pen.lineWidth = 1;
-    pen.setLineDash([]);
-    pen.globalAlpha = 1;
-    pen.strokeStyle = colours.grid;
-    pen.fillStyle = colours.grey;
-    pen.textAlign = "right";
-    for (const [y, text] of rows) {
-      line(pen, LEFT, y, width - RIGHT, y);
-      pen.fillText(text, LEFT - 8, y + 4);
-    }
-    pen.textAlign = "center";
-    const by = step(to - from, (width - LEFT) / 80);
-    for (const value of ticks(from, to, (width - LEFT) / 80)) {
-      const x = this.across(value);
-      line(pen, x, TOP, x, bottom);
+      {axes} = this;
+    const most = axes.wide / 80,
+      by = step(to - from, most),
       // Far in, what counts is the distance from the left.
-      const text = to - from < 1e-3 * Math.abs(from) ? "+" + timeText(value - from, by) : timeText(value, by);
-      if (x < width - 16) pen.fillText(text, Math.max(LEFT, x), bottom + 16);
-    }
-    if (to - from < 1e-3 * Math.abs(from)) {
-      pen.textAlign = "left";
-      pen.fillText(number(from, 9) + " s", 2, bottom + 16);
-    }
-    pen.strokeStyle = colours.axis;
-    line(pen, LEFT, bottom, width - RIGHT, bottom);
+      isFar = to - from < 1e-3 * Math.abs(from);
+    const columns = /** @type {[number, string][]} */ (
+      ticks(from, to, most).map(value => [value, isFar ? "+" + timeText(value - from, by) : timeText(value, by)])
+    );
+    axes.grid(pen, colours, columns, rows);
+    if (!isFar) return;
+    pen.textAlign = "left";
+    pen.fillText(number(from, 9) + " s", 2, axes.bottom + 16);
   }
 
   drawCursor() {
@@ -802,7 +765,8 @@ class Plot {
       + `fill="none" stroke="${colours.axis}"/>`;
     return (
       `<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 ${width} ${height}" width="${width}" height="${height}">`
-      + `<rect width="100%" height="100%" fill="${colours.paper}"/>${frame}${rows.join("")}${steps.join("")}${lines.join("")}</svg>\n`
+      + `<rect width="100%" height="100%" fill="${colours.paper}"/>${frame}${rows.join("")}`
+      + `${steps.join("")}${lines.join("")}</svg>\n`
     );
   }
 }

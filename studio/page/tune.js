@@ -182,7 +182,7 @@ class Tune {
     const one = this.controllers[this.choice.value];
     if (!one) return;
     const changes = [`controller=${one.controller}`];
-    if (!/^\s*\[\[move\]\]|^move\s*=/m.test(this.app.text)) changes.push(`move=${one.moves}`);
+    if (!this.app.run || !this.app.run.head.has_moves) changes.push(`move=${one.moves}`);
     try {
       const {head} = await this.app.wire.ask("loop", {...this.app.body(), changes});
       this.app.edit(head.text);
@@ -195,7 +195,7 @@ class Tune {
 
   tell(error) {
     this.trouble.hidden = !error;
-    const hasController = /^\s*\[?controller\b/m.test(this.app.text);
+    const hasController = this.app.run && this.app.run.head.has_controller;
     this.trouble.textContent = error
       ? (hasController ? "" : "Choose a controller above, or write one. As the case stands, ") + wordsOf(error)
       : "";
@@ -237,7 +237,7 @@ class Tune {
       this.moves.replaceChildren(...head.moves.map((one, k) => element("option", {value: k}, one.name)));
     }
     this.moves.value = String(head.move);
-    this.rows(head.parameters.filter(one => /^controller\./.test(one.key)));
+    this.rows(head.parameters.filter(one => one.key.startsWith("controller.")));
     const list = (place, rows) =>
       place.replaceChildren(...rows.flatMap(([name, value]) => [element("dt", {}, name), element("dd", {}, value)]));
     list(this.figures, head.trouble ? [["trouble", head.trouble], ...head.rows] : head.rows);
