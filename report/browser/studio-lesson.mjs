@@ -255,6 +255,34 @@ await test("a parameter goes back to its value, and its slider reaches what was 
   expect((await value(page, "cart.mass")) === 0.3, "going back cannot be undone");
 });
 
+await test("any key of the case is set, and one that is none is refused with what is allowed", async open => {
+  const {page} = await open();
+  await page.locator("#any").fill("travel = { min = -0.2, max = 0.3 }");
+  await page.locator("#any").press("Enter");
+  await page.waitForFunction(() => window.studio.text.includes("travel"));
+  await quiet(page);
+  expect((await value(page, "travel.max")) === 0.3, "the table is not in the case");
+  for (const [typed, pattern] of [
+    ["cart.masss = 1 kg", /did you mean `mass`/],
+    ["cart.mass", /KEY=VALUE/],
+    ["cart.mass = 3 mm", /is a length/],
+  ]) {
+    await page.locator("#any").fill(typed);
+    await page.locator("#any").press("Enter");
+    await page.waitForSelector("#notice.grave:not([hidden])");
+    await settled(page);
+    await quiet(page);
+    expect(pattern.test(await page.locator("#notice").innerText()), await page.locator("#notice").innerText());
+    expect((await page.locator("#any").inputValue()) === typed, "what was typed is gone");
+  }
+  await page.click("#undo");
+  await quiet(page);
+  expect(
+    (await page.evaluate(() => window.studio.text)) === readFileSync(TABLE4, "utf8"),
+    "it is not one step to undo",
+  );
+});
+
 // ---- The case text
 
 await test("the case text is completed and explained by the schema", async open => {

@@ -744,7 +744,7 @@ const faint = (page, nodes) =>
 await test("axe finds nothing serious, and what it leaves undecided has contrast", async open => {
   // The page's own policy lets no foreign script in, so it is evaluated.
   for (const colorScheme of ["light", "dark"]) {
-    const {page} = await open(common.address, {colorScheme});
+    const {page} = await open(common.address, {colorScheme, reducedMotion: "reduce"});
     await page.evaluate(readFileSync(axe, "utf8"));
     for (const view of ["motion", "modes", "fit", "tune", "shape", "sweep", "gallery", "tour"]) {
       await page.evaluate(view => window.studio.show(view), view);

@@ -51,7 +51,7 @@ export function mount(root, app) {
   });
   root.append(
     side,
-    element("div", {class: "centre", id: "centre", tabindex: "-1"}, stage, size, bar(app), plotted, glance),
+    element("div", {class: "centre", id: "centre", tabindex: "-1"}, stage, bar(app), size, plotted, glance),
   );
   sides(side, app);
   app.scene = {stage: new Stage(stage, app), plots: new Plots(plots, app)};

@@ -102,7 +102,28 @@ export class Parameters {
     this.recent = new Shelf("Changed last", "r-", this);
     this.recent.root.classList.add("recent");
     this.favourites = new Shelf("Favourites", "f-", this);
-    root.append(this.search, this.none, this.recent.root, this.favourites.root, this.groups);
+    /** Any key, also one that has no row. */
+    this.any = element("input", {
+      type: "text",
+      id: "any",
+      placeholder: "cart.load = 1 N",
+      autocomplete: "off",
+      spellcheck: "false",
+    });
+    const form = element(
+      "form",
+      {
+        class: "any",
+        onsubmit: event => {
+          event.preventDefault();
+          this.set();
+        },
+      },
+      element("label", {for: "any"}, "Set any KEY = VALUE"),
+      this.any,
+      element("button", {type: "submit"}, "Set"),
+    );
+    root.append(this.search, this.none, this.recent.root, this.favourites.root, this.groups, form);
     root.addEventListener("favourite", () => this.remind());
     this.shape = "";
     app.on("run", () => {
@@ -121,6 +142,21 @@ export class Parameters {
 
   show() {
     for (const row of this.all()) row.show();
+  }
+
+  /** Writes what was typed as `KEY = VALUE` into the case. */
+  async set() {
+    const {app, any} = this,
+      [key, ...rest] = any.value.split("=");
+    if (!any.value.trim()) return;
+    try {
+      const change = rest.length ? `${key.trim()}=${rest.join("=").trim()}` : any.value.trim();
+      const {head} = await app.wire.ask("run", {...app.body(), changes: [change]});
+      app.edit(head.text);
+      any.value = "";
+    } catch (error) {
+      app.notify(wordsOf(error), true);
+    }
   }
 
   /** All rows. @returns {Row[]} */
