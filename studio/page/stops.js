@@ -273,8 +273,8 @@ export const STOPS = [
     panel: "Friction over speed",
     words:
       "Friction against speed, equation (14): a part that grows with speed, a part that only knows the direction "
-      + "(Coulomb), and an excess at the start of a motion that is soon gone (Stribeck). The figures show the curve of "
-      + "each body; here the cart has such an excess, drawn large.",
+      + "(Coulomb), and an excess at the start of a motion that is soon gone (Stribeck). The figure shows the curve of "
+      + "the cart, which has such an excess here, drawn large.",
     tries: [],
     question: {
       words: "Which of the two sliders takes the peak beside zero speed away?",

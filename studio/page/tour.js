@@ -216,12 +216,11 @@ class Tour {
     if (stop.view) this.friction();
   }
 
-  /** The figures of the view of frequencies that a stop is about. */
+  /** The figure of the cart among those of the view of frequencies that a stop is about. */
   friction() {
     const {app, stop} = this,
       speeds = (this.first && this.first.columns.get("cart_speed")) || new Float64Array(1),
       speed = speeds.reduce((most, value) => Math.max(most, Math.abs(value)), 0);
-    if (app.gesture) return;
     const text = app.text;
     if (text === this.drawn && this.report.firstChild) return;
     this.drawn = text;
@@ -235,7 +234,7 @@ class Tour {
         const heading = [...whole.querySelectorAll("h2")].find(one => one.textContent === stop.panel);
         const parts = [];
         for (let at = heading && heading.nextElementSibling; at && at.tagName !== "H2"; at = at.nextElementSibling)
-          parts.push(at.outerHTML);
+          if (at.tagName === "FIGURE" && at.textContent.startsWith("Cart")) parts.push(at.outerHTML);
         showReport(this.report, parts.join(""));
       },
     );
