@@ -96,6 +96,12 @@ for (const [width, height] of [
         expect((await seen(page, part)) === 3, `${name}: ${part} is seen at ${await seen(page, part)} of 3 places`);
       expect((await seen(page, figure)) >= 1, `${name}: the figure is out of sight`);
       if (stop % 4 === 0) await page.screenshot({path: join(shots, `studio-tour-${stop + 1}-${width}.png`)});
+      for (const button of await page.locator(".tries button").all()) {
+        await button.click();
+        await quiet(page);
+        const read = await page.locator(".reading").innerText();
+        expect(read.length > 10 && !/–|NaN|undefined/.test(read), `${name}, ${await button.innerText()}: ${read}`);
+      }
       if (stop + 1 < ANSWERS.length) await page.click("#tour-next");
       await quiet(page);
     }

@@ -16,8 +16,10 @@ function kept() {
 /** What was kept under a name. @param {string} name @returns {any} */
 export const recall = name => kept()[name];
 
-/** Keeps a value under a name, or forgets it. @param {string} name @param {any} value */
+/** Keeps a value under a name, or forgets it; in a frame of another page nothing is kept.
+ * @param {string} name @param {any} value */
 export function keep(name, value) {
+  if (window !== window.top) return;
   const all = {...kept(), [name]: value};
   if (value === undefined) delete all[name];
   try {

@@ -15,6 +15,7 @@
  * @property {string} words
  * @property {string[]} keys
  * @property {(seen: Seen) => [string, number, string]} reading name, value and unit
+ * @property {string} [none] what is read where there is no such value
  * @property {(seen: Seen) => boolean} isAnswered
  * @property {string} answer */
 
@@ -322,6 +323,7 @@ export const STOPS = [
       words: "How much dry friction brings the cart to rest within 30 ms of the end of the pulse, by 0.28 s?",
       keys: [DRY],
       reading: ({run}) => ["The cart rests from", 1e3 * rest(run), "ms on"],
+      none: "The cart is not held anywhere.",
       isAnswered: ({run}) => rest(run) <= 0.28,
       answer:
         "Several times as much. Once at rest the cart stays there: the belt's force is below what friction can hold. "

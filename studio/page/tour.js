@@ -210,7 +210,8 @@ class Tour {
       ratio = key => value(key) / (this.values.get(key) || NaN);
     const seen = {run: app.run, first: this.first, ratio, value},
       [what, size, unit] = stop.question.reading(seen);
-    tell(this.reading, app.mistake ? String(app.mistake.what) : `${what} ${number(size, 3)} ${unit}.`);
+    const reading = isFinite(size) ? `${what} ${number(size, 3)} ${unit}.` : stop.question.none || "";
+    tell(this.reading, app.mistake ? String(app.mistake.what) : reading);
     const isAsked = app.experiment === this.first.head.experiment;
     if (isAsked && stop.question.isAnswered(seen)) tell(this.answer, stop.question.answer);
     if (stop.view) this.friction();
