@@ -23,6 +23,7 @@ mod rows;
 mod run;
 mod save;
 mod scene;
+mod schema;
 mod section;
 pub mod sent;
 mod shape;
@@ -80,6 +81,7 @@ const ACTS: &[Act] = &[
     ("modes", Pace::Quick, modes::modes),
     ("gallery", Pace::Quick, gallery::gallery),
     ("save", Pace::Quick, save::save),
+    ("schema", Pace::Quick, schema::schema),
     ("report", Pace::Quick, report::report),
     ("columns", Pace::Quick, logs::columns),
     ("check", Pace::Long, logs::check),

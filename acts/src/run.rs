@@ -37,6 +37,8 @@ pub fn run(request: &Request, context: &Context) -> Result<Reply> {
     let numbers = case.numbers()?;
     let mut reply = Reply::of(json!({
         "title": case.title.as_str(),
+        "has_controller": case.controller.is_some(),
+        "has_moves": !case.moves.is_empty(),
         "text": case.text.as_str(),
         "experiments": names(&case),
         "experiment": simulated.place,

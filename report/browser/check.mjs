@@ -10,17 +10,25 @@ import {chromium} from "playwright-core";
 
 const [program, reports, shots] = process.argv.slice(2);
 mkdirSync(shots, {recursive: true});
-const names = readdirSync(reports, {withFileTypes: true}).filter(entry => entry.isDirectory()).map(entry => entry.name).sort();
+const names = readdirSync(reports, {withFileTypes: true})
+  .filter(entry => entry.isDirectory())
+  .map(entry => entry.name)
+  .sort();
 const address = name => pathToFileURL(resolve(join(reports, name, "report.html"))).href;
 
-let passed = 0, failed = 0;
+let passed = 0,
+  failed = 0;
 async function test(name, work) {
   try {
     await work();
     passed++;
   } catch (error) {
     failed++;
-    console.log(`${name} ... FAILED\n  ${String(error.message || error).split("\n").join("\n  ")}`);
+    console.log(
+      `${name} ... FAILED\n  ${String(error.message || error)
+        .split("\n")
+        .join("\n  ")}`,
+    );
   }
 }
 function expect(holds, told) {
@@ -34,26 +42,42 @@ const browser = await chromium.launch({executablePath: program, args: asRoot ? [
 // A page with a report on it, and what went wrong on it.
 async function open(name, options) {
   const context = await browser.newContext({viewport: {width: 1200, height: 900}, colorScheme: "light", ...options});
-  const page = await context.newPage(), trouble = [];
-  page.on("console", message => { if (message.type() === "error") trouble.push("console: " + message.text()); });
+  const page = await context.newPage(),
+    trouble = [];
+  page.on("console", message => {
+    if (message.type() === "error") trouble.push("console: " + message.text());
+  });
   page.on("pageerror", error => trouble.push("error: " + error.message));
-  page.on("request", request => { if (!/^(file|data|blob):/.test(request.url())) trouble.push("asked for " + request.url()); });
+  page.on("request", request => {
+    if (!/^(file|data|blob):/.test(request.url())) trouble.push("asked for " + request.url());
+  });
   await page.goto(address(name));
   // Folded sections are checked like the others.
-  await page.evaluate(() => document.querySelectorAll("details.section").forEach(section => { section.open = true; }));
+  await page.evaluate(() =>
+    document.querySelectorAll("details.section").forEach(section => {
+      section.open = true;
+    }),
+  );
   return {page, trouble, done: () => context.close()};
 }
 
 // ---- Every report, narrow and wide, light and dark
 
 // Texts of plots that are not wholly inside them.
-const cutTexts = page => page.evaluate(() => [...document.querySelectorAll(".stage>svg")].flatMap(svg => {
-  const frame = svg.getBoundingClientRect();
-  return [...svg.querySelectorAll("text")].filter(text => {
-    const box = text.getBoundingClientRect();
-    return box.width && (box.left < frame.left - 1 || box.right > frame.right + 1 || box.bottom > frame.bottom + 1);
-  }).map(text => text.textContent);
-}));
+const cutTexts = page =>
+  page.evaluate(() =>
+    [...document.querySelectorAll(".stage>svg")].flatMap(svg => {
+      const frame = svg.getBoundingClientRect();
+      return [...svg.querySelectorAll("text")]
+        .filter(text => {
+          const box = text.getBoundingClientRect();
+          return (
+            box.width && (box.left < frame.left - 1 || box.right > frame.right + 1 || box.bottom > frame.bottom + 1)
+          );
+        })
+        .map(text => text.textContent);
+    }),
+  );
 
 async function looks(name, width, colorScheme) {
   const {page, trouble, done} = await open(name, {viewport: {width, height: 900}, colorScheme});
@@ -67,8 +91,13 @@ async function looks(name, width, colorScheme) {
     expect(scroll <= wide, `scrolls sideways: ${scroll} pixels on ${wide}`);
     const cut = await cutTexts(page);
     expect(!cut.length, `texts stand out of their plots: ${cut.join(" | ")}`);
-    const plots = await page.evaluate(() => [document.querySelectorAll("figure.plot").length, document.querySelectorAll("figure.live").length]);
-    const captions = await page.evaluate(() => [...document.querySelectorAll(".caption")].filter(p => p.scrollWidth > p.clientWidth + 1).length);
+    const plots = await page.evaluate(() => [
+      document.querySelectorAll("figure.plot").length,
+      document.querySelectorAll("figure.live").length,
+    ]);
+    const captions = await page.evaluate(
+      () => [...document.querySelectorAll(".caption")].filter(p => p.scrollWidth > p.clientWidth + 1).length,
+    );
     expect(!captions, `${captions} captions of tables are cut`);
     expect(plots[0] === plots[1], `${plots[1]} of ${plots[0]} plots came to life`);
   } finally {
@@ -79,22 +108,41 @@ async function looks(name, width, colorScheme) {
 // ---- What a reader does with a plot
 
 // Content of plot number i: texts of ticks, and the range of x.
-const state = (page, i) => page.evaluate(i => {
-  const {plot} = document.querySelectorAll("figure.plot")[i];
-  return {ticks: plot.shown.xTicks.map(tick => tick[1]).join(" "), range: plot.view.x.join(" "), picture: plot.svg.innerHTML};
-}, i);
+const state = (page, i) =>
+  page.evaluate(i => {
+    const {plot} = document.querySelectorAll("figure.plot")[i];
+    return {
+      ticks: plot.shown.xTicks.map(tick => tick[1]).join(" "),
+      range: plot.view.x.join(" "),
+      picture: plot.svg.innerHTML,
+    };
+  }, i);
 
 // The plot area of a panel, in pixels of the window, after it was scrolled there.
 async function area(page, i, panel = 0) {
-  await page.evaluate(i => document.querySelectorAll("figure.plot")[i].querySelector(".stage").scrollIntoView({block: "center", behavior: "instant"}), i);
+  await page.evaluate(
+    i =>
+      document
+        .querySelectorAll("figure.plot")
+        [i].querySelector(".stage")
+        .scrollIntoView({block: "center", behavior: "instant"}),
+    i,
+  );
   await settled(page);
-  return page.evaluate(([i, panel]) => {
-    const {plot} = document.querySelectorAll("figure.plot")[i], L = plot.shown, P = L.panels[panel];
-    const box = plot.svg.getBoundingClientRect(), k = box.width / L.width;
-    return {left: box.left + k * L.left, top: box.top + k * P.top, width: k * L.wide, height: k * P.height};
-  }, [i, panel]);
+  return page.evaluate(
+    ([i, panel]) => {
+      const {plot} = document.querySelectorAll("figure.plot")[i],
+        L = plot.shown,
+        P = L.panels[panel];
+      const box = plot.svg.getBoundingClientRect(),
+        k = box.width / L.width;
+      return {left: box.left + k * L.left, top: box.top + k * P.top, width: k * L.wide, height: k * P.height};
+    },
+    [i, panel],
+  );
 }
-const settled = page => page.evaluate(() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done))));
+const settled = page =>
+  page.evaluate(() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done))));
 
 async function drag(page, i, from, to) {
   const a = await area(page, i);
@@ -107,20 +155,28 @@ async function drag(page, i, from, to) {
 
 const interactions = {
   async "the script's ticks are those of the picture"(page) {
-    const wrong = await page.evaluate(() => [...document.querySelectorAll("figure.plot")].flatMap(({plot}) => {
-      const texts = layout => [layout.xTicks, ...layout.panels.map(P => P.yTicks)].map(ticks => ticks.map(tick => tick[1]).join(" "));
-      const placed = texts(plot.layout()), {x, y} = plot.view;
-      // Another range with the same ends is none that was placed before.
-      plot.view = {x: x.slice(), y: y.map(range => range.slice())};
-      const own = texts(plot.layout());
-      plot.view = {x, y};
-      return placed.flatMap((text, i) => (text === own[i] ? [] : [`${plot.figure.innerText.split("\n")[0]}: ${text} | ${own[i]}`]));
-    }));
+    const wrong = await page.evaluate(() =>
+      [...document.querySelectorAll("figure.plot")].flatMap(({plot}) => {
+        const texts = layout =>
+          [layout.xTicks, ...layout.panels.map(P => P.yTicks)].map(ticks => ticks.map(tick => tick[1]).join(" "));
+        const placed = texts(plot.layout()),
+          {x, y} = plot.view;
+        // Another range with the same ends is none that was placed before.
+        plot.view = {x: x.slice(), y: y.map(range => range.slice())};
+        const own = texts(plot.layout());
+        plot.view = {x, y};
+        return placed.flatMap((text, i) =>
+          text === own[i] ? [] : [`${plot.figure.innerText.split("\n")[0]}: ${text} | ${own[i]}`],
+        );
+      }),
+    );
     expect(!wrong.length, wrong.join("\n"));
   },
 
   async "a drag zooms, linked plots follow, reset brings back"(page, count) {
-    const axes = await page.evaluate(() => [...document.querySelectorAll("figure.plot")].map(figure => figure.dataset.axis || null));
+    const axes = await page.evaluate(() =>
+      [...document.querySelectorAll("figure.plot")].map(figure => figure.dataset.axis || null),
+    );
     for (const i of new Set([0, count - 1])) {
       const before = await Promise.all([...Array(count).keys()].map(k => state(page, k)));
       await drag(page, i, [0.3, 0.5], [0.6, 0.52]);
@@ -128,8 +184,12 @@ const interactions = {
       expect(after[i].ticks !== before[i].ticks, `ticks of plot ${i} stay ${after[i].ticks}`);
       axes.forEach((axis, k) => {
         const linked = k === i || (axis !== null && axis === axes[i]);
-        expect((after[k].range !== before[k].range) === linked, `plot ${k} ${linked ? "does not follow" : "follows"} plot ${i}`);
-        if (linked) expect(after[k].range === after[i].range, `plot ${k} shows ${after[k].range}, plot ${i} ${after[i].range}`);
+        expect(
+          (after[k].range !== before[k].range) === linked,
+          `plot ${k} ${linked ? "does not follow" : "follows"} plot ${i}`,
+        );
+        if (linked)
+          expect(after[k].range === after[i].range, `plot ${k} shows ${after[k].range}, plot ${i} ${after[i].range}`);
       });
       await page.locator("figure.plot").nth(i).locator(".figtitle button").click();
       await settled(page);
@@ -148,9 +208,14 @@ const interactions = {
     await page.mouse.move(a.left + 0.5 * a.width, a.top + 0.1 * a.height);
     await settled(page);
     const {on, text, over} = await page.evaluate(() => {
-      const {plot} = document.querySelector("figure.plot"), tip = plot.tip.getBoundingClientRect();
+      const {plot} = document.querySelector("figure.plot"),
+        tip = plot.tip.getBoundingClientRect();
       const legend = [...plot.svg.querySelectorAll('[data-curve^="0."]')].map(entry => entry.getBoundingClientRect());
-      return {on: plot.tip.classList.contains("on"), text: plot.tip.innerText, over: legend.some(entry => entry.bottom > tip.top + 1)};
+      return {
+        on: plot.tip.classList.contains("on"),
+        text: plot.tip.innerText,
+        over: legend.some(entry => entry.bottom > tip.top + 1),
+      };
     });
     expect(on && /\d/.test(text), `the tip says ${text}`);
     expect(!over, "the tip lies over the legend");
@@ -158,7 +223,8 @@ const interactions = {
   },
 
   async "keys show values, zoom and go back"(page) {
-    const tip = page.locator("figure.plot .tip").first(), before = await state(page, 0);
+    const tip = page.locator("figure.plot .tip").first(),
+      before = await state(page, 0);
     await page.locator("figure.plot .stage").first().focus();
     for (let k = 0; k < 3; k++) await page.keyboard.press("ArrowRight");
     await settled(page);
@@ -183,14 +249,18 @@ const interactions = {
   async "the legend hides and shows curves"(page) {
     const entry = page.locator("figure.plot [data-curve]").first();
     if (!(await entry.count())) return;
-    const curves = () => page.evaluate(() => {
-      const svg = document.querySelector("figure.plot [data-curve]").closest(".stage>svg");
-      return svg.querySelectorAll("svg>path").length;
-    });
+    const curves = () =>
+      page.evaluate(() => {
+        const svg = document.querySelector("figure.plot [data-curve]").closest(".stage>svg");
+        return svg.querySelectorAll("svg>path").length;
+      });
     const before = await curves();
     await entry.click();
     await settled(page);
-    expect((await entry.getAttribute("aria-checked")) === "false" && (await curves()) === before - 1, "a click hides nothing");
+    expect(
+      (await entry.getAttribute("aria-checked")) === "false" && (await curves()) === before - 1,
+      "a click hides nothing",
+    );
     await entry.focus();
     await page.keyboard.press("Enter");
     await settled(page);
@@ -202,17 +272,23 @@ const interactions = {
 async function taps(name) {
   const {page, trouble, done} = await open(name, {viewport: {width: 400, height: 800}, hasTouch: true, isMobile: true});
   try {
-    const a = await area(page, 0), tip = page.locator("figure.plot .tip").first();
+    const a = await area(page, 0),
+      tip = page.locator("figure.plot .tip").first();
     const isOn = () => tip.evaluate(element => element.classList.contains("on"));
     // Of curves in a plane one has to be hit.
     const {x, y} = await page.evaluate(() => {
-      const {plot} = document.querySelector("figure.plot"), box = plot.svg.getBoundingClientRect(), L = plot.shown, P = L.panels[0];
-      const series = P.panel.series[0], xs = plot.arrays[series.x], ys = plot.arrays[series.y];
+      const {plot} = document.querySelector("figure.plot"),
+        box = plot.svg.getBoundingClientRect(),
+        L = plot.shown,
+        P = L.panels[0];
+      const series = P.panel.series[0],
+        xs = plot.arrays[series.x],
+        ys = plot.arrays[series.y];
       let i = xs.length >> 1;
       while (i < xs.length - 1 && !isFinite(ys[i])) i++;
       // A tap near a name in the legend is one on the name.
       const y = plot.rising[series.x] ? P.top + P.height / 2 : plot.up(P, ys[i]);
-      return {x: box.left + plot.across(xs[i]) * box.width / L.width, y: box.top + y * box.width / L.width};
+      return {x: box.left + (plot.across(xs[i]) * box.width) / L.width, y: box.top + (y * box.width) / L.width};
     });
     const inside = (v, from, length) => Math.max(from + 3, Math.min(from + length - 3, v));
     await page.touchscreen.tap(inside(x, a.left, a.width), inside(y, a.top, a.height));
@@ -231,12 +307,13 @@ async function taps(name) {
 }
 
 // Curves of the second plot whose samples are drawn, and what it says of its limit.
-const farIn = page => page.evaluate(() => {
-  const {plot} = document.querySelectorAll("figure.plot")[1];
-  const series = plot.svg.querySelectorAll('svg>path[stroke-width="4.4"]');
-  const curves = [...series].filter(path => !path.closest("g") && !path.classList.contains("s-ink"));
-  return {dots: curves.length, limit: plot.limit.textContent};
-});
+const farIn = page =>
+  page.evaluate(() => {
+    const {plot} = document.querySelectorAll("figure.plot")[1];
+    const series = plot.svg.querySelectorAll('svg>path[stroke-width="4.4"]');
+    const curves = [...series].filter(path => !path.closest("g") && !path.classList.contains("s-ink"));
+    return {dots: curves.length, limit: plot.limit.textContent};
+  });
 
 // ---- What single reports have to show
 
@@ -244,39 +321,57 @@ const particular = {
   async tune(page) {
     const nyquist = await page.evaluate(() => {
       const {plot} = [...document.querySelectorAll("figure.plot")].find(figure => /Nyquist/.test(figure.innerText));
-      const L = plot.shown, P = L.panels[0], [low, high] = [L.xScale.low, L.xScale.high];
+      const L = plot.shown,
+        P = L.panels[0],
+        [low, high] = [L.xScale.low, L.xScale.high];
       return {
-        right: L.wide / (high - low), up: P.height / (P.yScale.high - P.yScale.low), sees: low < -1 && high > 0,
+        right: L.wide / (high - low),
+        up: P.height / (P.yScale.high - P.yScale.low),
+        sees: low < -1 && high > 0,
         named: P.panel.series.some(series => series.name === "\u22121"),
       };
     });
     expect(Math.abs(nyquist.right / nyquist.up - 1) < 0.01, `a unit is ${nyquist.right} wide and ${nyquist.up} high`);
     expect(nyquist.sees && nyquist.named, "the point -1 is not shown");
     const places = await page.evaluate(() => {
-      const {plot} = [...document.querySelectorAll("figure.plot")].find(figure => /^Sensitivity/.test(figure.innerText));
+      const {plot} = [...document.querySelectorAll("figure.plot")].find(figure =>
+        /^Sensitivity/.test(figure.innerText),
+      );
       const P = plot.shown.panels[0];
       return P.panel.series.map(series => {
-        const x = plot.arrays[series.x], y = plot.arrays[series.y];
+        const x = plot.arrays[series.x],
+          y = plot.arrays[series.y];
         return plot.shown.xScale.place(x[y.indexOf(Math.max(...y))]);
       });
     });
-    expect(places.every(place => place > 0.1 && place < 1), `peaks of |S| stand at ${places} of the width`);
+    expect(
+      places.every(place => place > 0.1 && place < 1),
+      `peaks of |S| stand at ${places} of the width`,
+    );
   },
 
   async modes(page) {
     const styles = await page.evaluate(() => {
-      const {plot} = [...document.querySelectorAll("figure.plot")].find(figure => /Poles and zeros/.test(figure.innerText));
+      const {plot} = [...document.querySelectorAll("figure.plot")].find(figure =>
+        /Poles and zeros/.test(figure.innerText),
+      );
       return plot.spec.panels[0].series.map(series => [series.name.split(" ")[0], series.style].join(" "));
     });
     expect(styles.includes("poles crosses") && styles.includes("zeros rings"), styles.join(", "));
-    const phases = await page.evaluate(() => [...document.querySelectorAll("figure.plot")].flatMap(({plot}) =>
-      plot.shown.panels.filter(P => P.panel.unit === "\u00b0").flatMap(P => P.yTicks.map(tick => tick[0]))));
+    const phases = await page.evaluate(() =>
+      [...document.querySelectorAll("figure.plot")].flatMap(({plot}) =>
+        plot.shown.panels.filter(P => P.panel.unit === "\u00b0").flatMap(P => P.yTicks.map(tick => tick[0])),
+      ),
+    );
     expect(phases.length && phases.every(phase => phase % 15 === 0), `phases at ${phases}`);
   },
 
   async simulate(page) {
-    const marks = await page.evaluate(() => [...document.querySelectorAll("figure.plot")].flatMap(({plot}) =>
-      plot.spec.panels.flatMap(panel => panel.series.map(series => series.name + " " + series.style))));
+    const marks = await page.evaluate(() =>
+      [...document.querySelectorAll("figure.plot")].flatMap(({plot}) =>
+        plot.spec.panels.flatMap(panel => panel.series.map(series => series.name + " " + series.style)),
+      ),
+    );
     expect(marks.includes("sticks points") && marks.includes("slips rings"), marks.join(", "));
     // Far in, samples are dots.
     for (let k = 0; k < 4; k++) await drag(page, 1, [0.3, 0.5], [0.35, 0.5]);
@@ -294,7 +389,8 @@ const particular = {
 
 for (const name of names) {
   for (const width of [1200, 400]) {
-    for (const theme of ["light", "dark"]) await test(`${name} at ${width} pixels, ${theme}`, () => looks(name, width, theme));
+    for (const theme of ["light", "dark"])
+      await test(`${name} at ${width} pixels, ${theme}`, () => looks(name, width, theme));
   }
   const {page, trouble, done} = await open(name, {});
   const count = await page.locator("figure.plot").count();

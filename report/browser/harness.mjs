@@ -22,7 +22,10 @@ export class Harness {
 
   async start() {
     const asRoot = process.getuid && process.getuid() === 0;
-    this.browser = await chromium.launch({executablePath: this.program, args: ["--disable-background-networking", ...(asRoot ? ["--no-sandbox"] : [])]});
+    this.browser = await chromium.launch({
+      executablePath: this.program,
+      args: ["--disable-background-networking", ...(asRoot ? ["--no-sandbox"] : [])],
+    });
   }
 
   /** A server with these words behind `studio`. */
@@ -36,12 +39,20 @@ export class Harness {
   /** A server of the files of a folder and of more, by their names; and the requests that it received. */
   async serveFolder(folder, more = {}) {
     const asked = [];
-    const content = path => { try { return more[path] || readFileSync(join(folder, path)); } catch { return null; } };
+    const content = path => {
+      try {
+        return more[path] || readFileSync(join(folder, path));
+      } catch {
+        return null;
+      }
+    };
     const server = createServer(({method, url}, response) => {
       asked.push(`${method} ${url}`);
       const path = url.startsWith(UNDER) ? url.slice(UNDER.length) || "index.html" : "";
       const found = method === "GET" && /^[a-z-]+\.[a-z]+$/.test(path) ? content(path) : null;
-      response.writeHead(found ? 200 : 404, {"Content-Type": (found && TYPES[extname(path)]) || "application/octet-stream"});
+      response.writeHead(found ? 200 : 404, {
+        "Content-Type": (found && TYPES[extname(path)]) || "application/octet-stream",
+      });
       response.end(found || "");
     });
     await new Promise(done => server.listen(0, "127.0.0.1", done));
@@ -52,15 +63,28 @@ export class Harness {
 
   /** A page of it; what its console says, and what it asks of others, is trouble. */
   async open(address, options = {}) {
-    const context = await this.browser.newContext({viewport: {width: 1400, height: 950}, colorScheme: "light", ...options});
-    const page = await context.newPage(), trouble = [];
-    page.on("console", message => { if (["error", "warning"].includes(message.type())) trouble.push("console: " + message.text()); });
+    const context = await this.browser.newContext({
+      viewport: {width: 1400, height: 950},
+      colorScheme: "light",
+      ...options,
+    });
+    const page = await context.newPage(),
+      trouble = [];
+    page.on("console", message => {
+      if (["error", "warning"].includes(message.type())) trouble.push("console: " + message.text());
+    });
     page.on("pageerror", error => trouble.push("error: " + error.message));
     const local = url => /^(http|ws):\/\/127\.0\.0\.1:/.test(url) || /^(data|blob):/.test(url);
-    page.on("request", request => { if (!local(request.url())) trouble.push("asked for " + request.url()); });
-    page.on("websocket", socket => { if (!local(socket.url())) trouble.push("asked for " + socket.url()); });
+    page.on("request", request => {
+      if (!local(request.url())) trouble.push("asked for " + request.url());
+    });
+    page.on("websocket", socket => {
+      if (!local(socket.url())) trouble.push("asked for " + socket.url());
+    });
     await page.goto(address);
-    await page.waitForFunction(() => window.studio && window.studio.run && document.querySelector(".live-plot"), null, {timeout: 20_000});
+    await page.waitForFunction(() => window.studio && window.studio.run && document.querySelector(".live-plot"), null, {
+      timeout: 20_000,
+    });
     await settled(page);
     return {page, trouble, context};
   }
@@ -68,12 +92,21 @@ export class Harness {
   async test(name, work) {
     const pages = [];
     try {
-      await work(async (...given) => { const page = await this.open(...given); pages.push(page); return page; });
+      await work(async (...given) => {
+        const page = await this.open(...given);
+        pages.push(page);
+        return page;
+      });
       for (const {trouble} of pages) expect(!trouble.length, trouble.join("; "));
       this.passed++;
     } catch (error) {
       this.failed++;
-      console.log(`studio: ${name} ... FAILED\n  ${String(error.stack || error).split("\n").slice(0, 6).join("\n  ")}`);
+      console.log(
+        `studio: ${name} ... FAILED\n  ${String(error.stack || error)
+          .split("\n")
+          .slice(0, 6)
+          .join("\n  ")}`,
+      );
     }
     for (const {context} of pages) await context.close();
   }
@@ -92,13 +125,16 @@ export function expect(holds, told) {
 }
 
 /** Two pictures later. */
-export const settled = page => page.evaluate(() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done))));
+export const settled = page =>
+  page.evaluate(() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done))));
 
 /** When the page shows what was asked for last. */
-export const quiet = page => page.waitForFunction(() => !window.studio.wire.isBusy, null, {timeout: 30_000}).then(() => settled(page));
+export const quiet = page =>
+  page.waitForFunction(() => !window.studio.wire.isBusy, null, {timeout: 30_000}).then(() => settled(page));
 
 /** A parameter's value in the run that is shown, in SI. */
-export const value = (page, key) => page.evaluate(key => window.studio.parameters.find(one => one.key === key).value, key);
+export const value = (page, key) =>
+  page.evaluate(key => window.studio.parameters.find(one => one.key === key).value, key);
 
 /** A parameter with its field and its slider. */
 export const row = (page, key) => page.locator(`.row[data-key="${key}"]`);

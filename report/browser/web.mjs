@@ -12,7 +12,8 @@ import {Harness, UNDER, expect, quiet, row, settled, value} from "./harness.mjs"
 
 const [program, taut, folder, shots, only] = process.argv.slice(2);
 mkdirSync(shots, {recursive: true});
-const TABLE4 = "stages/sollmann-jouaneh/table4.toml", LINEAR = "stages/sollmann-jouaneh/identification/linear-5v.toml";
+const TABLE4 = "stages/sollmann-jouaneh/table4.toml",
+  LINEAR = "stages/sollmann-jouaneh/identification/linear-5v.toml";
 const LOGS = ["5-v-pulse", "10-v-pulse"].map(name => join(LINEAR, `../logs/${name}.measured.csv`));
 const harness = new Harness(program, taut);
 await harness.start();
@@ -24,22 +25,38 @@ const LESSON = `<!DOCTYPE html><meta charset="utf-8"><title>A lesson</title>
 <taut-stage id="own" view="modes">${escaped(PRINTER)}</taut-stage>`;
 const lesson = {"lesson.html": LESSON, "machine.toml": readFileSync(TABLE4)};
 const {address, asked} = await harness.serveFolder(folder, lesson);
-const opener = open => (options = {}, hash = "", at = address) => open(at + hash, options);
+const opener =
+  open =>
+  (options = {}, hash = "", at = address) =>
+    open(at + hash, options);
 const test = (name, work) => (!only || name.includes(only) ? harness.test(name, open => work(opener(open))) : null);
 /** The head of the answer to a request, or its error; and the steps of its progress, of which one may stop it. */
-const watch = (page, act, body, stopAt = Infinity) => page.evaluate(async ([act, body, stopAt]) => {
-  const {wire} = window.studio;
-  let steps = 0;
-  const asked = wire.ask(act, body, () => { steps += 1; if (steps === stopAt) wire.cancel(asked.id); });
-  const [head, error] = await asked.then(({head}) => [head], error => [undefined, error.mistake || String(error)]);
-  return {head, error, steps};
-}, [act, body, stopAt]);
+const watch = (page, act, body, stopAt = Infinity) =>
+  page.evaluate(
+    async ([act, body, stopAt]) => {
+      const {wire} = window.studio;
+      let steps = 0;
+      const asked = wire.ask(act, body, () => {
+        steps += 1;
+        if (steps === stopAt) wire.cancel(asked.id);
+      });
+      const [head, error] = await asked.then(
+        ({head}) => [head],
+        error => [undefined, error.mistake || String(error)],
+      );
+      return {head, error, steps};
+    },
+    [act, body, stopAt],
+  );
 const ask = (page, act, body) => watch(page, act, body).then(({head, error}) => head || {error});
 
 /** Waits until the text of an element matches. */
-const says = (page, selector, pattern) => page.waitForFunction(
-  ([selector, source]) => new RegExp(source, "i").test(document.querySelector(selector).textContent),
-  [selector, pattern.source], {timeout: 60_000});
+const says = (page, selector, pattern) =>
+  page.waitForFunction(
+    ([selector, source]) => new RegExp(source, "i").test(document.querySelector(selector).textContent),
+    [selector, pattern.source],
+    {timeout: 60_000},
+  );
 
 /** Removes what the browser reports of the revoked addresses by which workers are stopped. */
 const forgive = trouble => {
@@ -47,24 +64,34 @@ const forgive = trouble => {
 };
 
 /** A whole answer: its head without the time that it took, and a digest of the bits of its columns. */
-const all = (page, act, body) => page.evaluate(async ([act, body]) => {
-  try {
-    const {head: {took_s, id, ...head}, columns} = await window.studio.wire.ask(act, body);
-    const bits = await new Blob([...columns.values()]).arrayBuffer();
-    const digest = await crypto.subtle.digest("SHA-256", bits);
-    return {head, bytes: bits.byteLength, digest: [...new Uint8Array(digest)].join(" ")};
-  } catch (error) { return {error: error.mistake || String(error)}; }
-}, [act, body]);
+const all = (page, act, body) =>
+  page.evaluate(
+    async ([act, body]) => {
+      try {
+        const {
+          head: {took_s, id, ...head},
+          columns,
+        } = await window.studio.wire.ask(act, body);
+        const bits = await new Blob([...columns.values()]).arrayBuffer();
+        const digest = await crypto.subtle.digest("SHA-256", bits);
+        return {head, bytes: bits.byteLength, digest: [...new Uint8Array(digest)].join(" ")};
+      } catch (error) {
+        return {error: error.mistake || String(error)};
+      }
+    },
+    [act, body],
+  );
 
 /**
  * JSON with the keys of objects in alphabetical order; the frequency at which a loop swings, which a model's sines and
  * logarithms give, to 12 digits.
  */
-const sorted = one => JSON.stringify(one, (key, part) => {
-  if (key === "frequency_Hz" && typeof part === "number") return Number(part.toPrecision(12));
-  const isObject = part && typeof part === "object" && !Array.isArray(part);
-  return isObject ? Object.fromEntries(Object.entries(part).sort(([a], [b]) => (a < b ? -1 : 1))) : part;
-});
+const sorted = one =>
+  JSON.stringify(one, (key, part) => {
+    if (key === "frequency_Hz" && typeof part === "number") return Number(part.toPrecision(12));
+    const isObject = part && typeof part === "object" && !Array.isArray(part);
+    return isObject ? Object.fromEntries(Object.entries(part).sort(([a], [b]) => (a < b ? -1 : 1))) : part;
+  });
 
 /** True if two answers are the same but for the tolerance of the general solver. */
 const isNear = (one, other) => {
@@ -81,24 +108,33 @@ const printed = words => {
 };
 
 /** The link to the state of a page, with a change of its text. */
-const linked = (page, from, to) => page.evaluate(async ([address, from, to]) => {
-  const state = window.studio.snapshot(), {fragment} = await import(address + "link.js");
-  return fragment({...state, text: state.text.replace(from, to)});
-}, [address, from, to]);
+const linked = (page, from, to) =>
+  page.evaluate(
+    async ([address, from, to]) => {
+      const state = window.studio.snapshot(),
+        {fragment} = await import(address + "link.js");
+      return fragment({...state, text: state.text.replace(from, to)});
+    },
+    [address, from, to],
+  );
 
 // ---- What a person does
 
 await test("opens a machine of the gallery, and a drag of a slider simulates", async open => {
   const {page} = await open();
   await page.click("#go-gallery");
-  await page.locator("#view-gallery button", {hasText: /Table 4|friction of Table 4/}).first().click();
+  await page
+    .locator("#view-gallery button", {hasText: /Table 4|friction of Table 4/})
+    .first()
+    .click();
   await quiet(page);
   expect((await page.title()).includes("Table 4"), await page.title());
   const slider = row(page, "cart.friction.viscous").locator("input[type=range]");
   await slider.scrollIntoViewIfNeeded();
   const box = await slider.boundingBox();
   const canvas = page.locator("[data-panel=position] canvas").first();
-  const plotted = () => canvas.evaluate(canvas => canvas.toDataURL()), before = await plotted();
+  const plotted = () => canvas.evaluate(canvas => canvas.toDataURL()),
+    before = await plotted();
   await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
   await page.mouse.down();
   for (let k = 1; k <= 20; k++) await page.mouse.move(box.x + box.width * (0.5 + 0.02 * k), box.y + box.height / 2);
@@ -112,20 +148,26 @@ await test("opens a machine of the gallery, and a drag of a slider simulates", a
 });
 
 await test("shows the bits of the program for 100 random machines", async open => {
-  const {page} = await open(), other = (await open({}, "", (await harness.serve([])).address)).page;
+  const {page} = await open(),
+    other = (await open({}, "", (await harness.serve([])).address)).page;
   // A sequence that is the same each time (Lehmer, 48271 modulo 2³¹ − 1).
   let state = 20261;
   const random = () => (state = (state * 48271) % 2147483647) / 2147483647;
   const file = join(mkdtempSync(join(tmpdir(), "taut-web-test-")), "studio.toml");
-  const stages = (await ask(page, "gallery", {})).stages, described = [], seen = new Set();
+  const stages = (await ask(page, "gallery", {})).stages,
+    described = [],
+    seen = new Set();
   for (const {text} of stages) described.push(await ask(page, "run", {text, describe: true}));
-  let exact = 0, printedToo = 0;
+  let exact = 0,
+    printedToo = 0;
   for (let drawn = 0; exact < 100; drawn++) {
     expect(drawn < 200, `of ${drawn} machines only ${exact} could be compared`);
-    const place = Math.floor(stages.length * random()), {parameters, experiments} = described[place];
+    const place = Math.floor(stages.length * random()),
+      {parameters, experiments} = described[place];
     const changed = ({key, value}) => [key, value * 10 ** (0.5 * (random() - 0.5))];
     const set = parameters.filter(() => random() < 0.3).map(changed);
-    const experiment = Math.floor(experiments.length * random()), {name: run} = experiments[experiment];
+    const experiment = Math.floor(experiments.length * random()),
+      {name: run} = experiments[experiment];
     const request = {text: stages[place].text, set, experiment};
     const [here, there] = [await all(page, "run", request), await all(other, "run", request)];
     const name = `${stages[place].path}, ${run}, ${JSON.stringify(set)}`;
@@ -144,7 +186,8 @@ await test("shows the bits of the program for 100 random machines", async open =
     writeFileSync(file, here.head.text);
     const kind = here.head.result.experiments ? "experiments" : "moves";
     const words = [kind === "moves" ? "move" : "simulate", file];
-    const own = here.head.result[kind][0], wanted = printed(words)[kind][experiment];
+    const own = here.head.result[kind][0],
+      wanted = printed(words)[kind][experiment];
     if (own.cost && own.cost.samples !== wanted.cost.samples) continue;
     expect(sorted(own) === sorted(wanted), both(own, wanted));
     printedToo++;
@@ -161,15 +204,18 @@ await test("logs that are dropped are fitted by a worker, with the digits of the
   const told = await ask(page, "columns", {path: "/dropped/1/10-v-pulse.measured.csv"});
   expect(told.found && told.rows > 100, JSON.stringify(told.error));
   const text = readFileSync(LINEAR, "utf8")
-    .replace("logs/5-v", "/dropped/0/5-v").replace("logs/10-v", "/dropped/1/10-v");
+    .replace("logs/5-v", "/dropped/0/5-v")
+    .replace("logs/10-v", "/dropped/1/10-v");
   const here = await watch(page, "fit", {text});
   expect(here.head && here.steps > 0, JSON.stringify(here.error || here.steps));
-  const there = printed(["fit", LINEAR]), [own, others] = [here.head.result, there].map(result => result.parameters);
+  const there = printed(["fit", LINEAR]),
+    [own, others] = [here.head.result, there].map(result => result.parameters);
   // Products of large matrices are summed with fused multiplications where the processor has them, and WebAssembly has
   // none: standard errors may differ in their last digits.
   const near = (a, b) => Math.abs(a - b) <= 1e-12 * Math.abs(b);
   for (const [k, one] of own.entries()) {
-    const other = others[k], bare = ({standard_error, interval_95, ...rest}) => sorted(rest);
+    const other = others[k],
+      bare = ({standard_error, interval_95, ...rest}) => sorted(rest);
     const ends = ({standard_error, interval_95}) => [standard_error, ...interval_95];
     const isSame = bare(one) === bare(other) && ends(one).every((end, i) => near(end, ends(other)[i]));
     expect(isSame, `${one.name}: the page has ${sorted(one)}, the program ${sorted(other)}`);
@@ -182,11 +228,14 @@ await test("a log that is dropped by hand is checked and fitted from the page", 
   await page.evaluate(text => window.studio.open(text, {name: "table4.toml"}), readFileSync(TABLE4, "utf8"));
   await quiet(page);
   await page.click("#go-fit");
-  const dropped = await page.evaluateHandle(content => {
-    const data = new DataTransfer();
-    data.items.add(new File([content], "5 V pulse.csv"));
-    return data;
-  }, readFileSync(LOGS[0], "utf8"));
+  const dropped = await page.evaluateHandle(
+    content => {
+      const data = new DataTransfer();
+      data.items.add(new File([content], "5 V pulse.csv"));
+      return data;
+    },
+    readFileSync(LOGS[0], "utf8"),
+  );
   await page.locator("#view-fit .drop").first().dispatchEvent("drop", {dataTransfer: dropped});
   await page.waitForSelector(".log-file");
   await page.locator("#view-fit input[value='cart.friction.viscous']").check();
@@ -203,7 +252,8 @@ await test("a log that is no log, and one that is too large, are told", async op
   const {page} = await open();
   await page.click("#go-fit");
   const kept = await page.evaluate(async () => {
-    const {wire} = window.studio, path = await wire.upload(new File(["words\n"], "notes.csv"));
+    const {wire} = window.studio,
+      path = await wire.upload(new File(["words\n"], "notes.csv"));
     const large = new File([new Uint8Array((64 << 20) + 1)], "large.csv");
     return [path, await wire.upload(large).catch(String)];
   });
@@ -239,7 +289,8 @@ await test("a sweep of the page shows its progress and is stopped by its button"
 
 await test("all stops of the tour show their machine", async open => {
   const {page} = await open();
-  let stops = 0, isLast = false;
+  let stops = 0,
+    isLast = false;
   for (; !isLast; stops++) {
     await page.click("#go-tour");
     await page.waitForSelector("#tour-show");
@@ -285,7 +336,8 @@ await test("what a page without a server cannot do is told", async open => {
 });
 
 await test("all views open, and nothing is asked of others", async open => {
-  const {page} = await open(), requests = [];
+  const {page} = await open(),
+    requests = [];
   page.on("request", request => requests.push(request.url()));
   for (const view of ["modes", "fit", "tune", "shape", "sweep", "gallery", "tour", "motion"]) {
     await page.click(`#go-${view}`);
@@ -324,7 +376,9 @@ await test("a folder without its module, or its worker, says what is missing", a
 });
 
 await test("a lesson contains machines, each with its own case", async open => {
-  const {context} = await open(), page = await context.newPage(), trouble = [];
+  const {context} = await open(),
+    page = await context.newPage(),
+    trouble = [];
   page.on("pageerror", error => trouble.push(error.message));
   await page.goto(address + "lesson.html");
   const frames = [];
@@ -333,14 +387,18 @@ await test("a lesson contains machines, each with its own case", async open => {
     await frame.waitForFunction(() => window.studio && window.studio.run, null, {timeout: 20_000});
     frames.push(frame);
   }
-  const [first, second] = frames, title = frame => frame.evaluate(() => document.title);
+  const [first, second] = frames,
+    title = frame => frame.evaluate(() => document.title);
   const titles = [await title(first), await title(second)];
   expect(/Table 4/.test(titles[0]) && /printer/i.test(titles[1]), titles.join("; "));
   expect((await second.evaluate(() => window.studio.view)) === "modes", "the view is another");
   const told = await page.locator("#missing [role=alert]").innerText();
   expect(/missing.toml cannot be opened: 404/.test(told), told);
   // A changed machine is that of its frame alone, and anew after a reload, without a question.
-  await first.evaluate(() => { window.studio.drag("cart.mass", 0.5); window.studio.drop(); });
+  await first.evaluate(() => {
+    window.studio.drag("cart.mass", 0.5);
+    window.studio.drop();
+  });
   await first.waitForFunction(() => !window.studio.wire.isBusy && window.studio.isUnsaved);
   await settled(page);
   await page.screenshot({path: join(shots, "web-lesson.png"), fullPage: true});

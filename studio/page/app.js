@@ -23,7 +23,9 @@ import {Wire, Mistake} from "./wire.js";
  * @property {string} at when it was left */
 /** @typedef {"run"|"text"|"mistake"|"cursor"|"window"|"compare"|"play"|"leave"|"opened"|"view"|"theme"} What */
 
-const MOST_UNDO = 200, MOST_PINS = 6, MOST_MOVED = 4;
+const MOST_UNDO = 200,
+  MOST_PINS = 6,
+  MOST_MOVED = 4;
 
 export class App {
   constructor() {
@@ -44,7 +46,10 @@ export class App {
     this.base = "";
     /** The text as it is shown. */
     this.text = "";
-    /** Changes that are not in the text yet: keys to values in SI, or with a unit. @type {Map<string, number | string>} */
+    /**
+     * Changes that are not in the text yet: keys to values in SI, or with a unit.
+     * @type {Map<string, number | string>}
+     */
     this.pending = new Map();
     /** @type {State[]} */
     this.past = [];
@@ -75,6 +80,8 @@ export class App {
     /** By how much stretch and error are magnified. */
     this.factor = 100;
     this.view = "motion";
+    /** The stop of the tour. */
+    this.stop = 0;
     this.gesture = false;
     this.sent = 0;
     /** Whether the run is that of the case as it is now. */
@@ -87,6 +94,8 @@ export class App {
     this.say = () => {};
     /** Tells everyone, what is grave until the next word. @type {(text: string, isGrave?: boolean) => void} */
     this.notify = () => {};
+    /** Drawing and plots of the view of motion, which sets it. @type {{stage: any, plots: any} | null} */
+    this.scene = null;
     /** Goes to a view. @type {(key: string) => void} */
     this.show = () => {};
   }
@@ -100,8 +109,8 @@ export class App {
 
   /** The contents of a link. */
   snapshot() {
-    const {text, name, experiment, view, cursor, window, factor, rate} = this;
-    return {text, name, experiment, view, cursor, window, factor, rate};
+    const {text, name, experiment, view, stop, cursor, window, factor, rate} = this;
+    return {text, name, experiment, view, stop, cursor, window, factor, rate};
   }
 
   /** @param {What} what @param {() => void} listener */
@@ -117,16 +126,53 @@ export class App {
   }
 
   /** The end of the run, s. */
-  get until() { return this.run ? this.run.head.until : 1; }
+  get until() {
+    return this.run ? this.run.head.until : 1;
+  }
 
   // ---- The text and its history
 
   /** Opens a case. @param {string} text @param {Partial<Case>} [of] */
-  open(text, {name = "studio.toml", path = "", experiment = 0, original = text, safe = text, set = [], past = [], future = [], isTouched = false, isBuiltIn = false} = {}) {
+  open(
+    text,
+    {
+      name = "studio.toml",
+      path = "",
+      experiment = 0,
+      original = text,
+      safe = text,
+      set = [],
+      past = [],
+      future = [],
+      isTouched = false,
+      isBuiltIn = false,
+    } = {},
+  ) {
     this.tell("leave");
     Object.assign(this, {
-      name, path, experiment, original, safe, base: text, text, past, future, isTouched, isBuiltIn, before: null, pins: [], window: null,
-      section: null, cursor: 0, isPlaying: false, needsDescription: true, run: null, mistake: null, gesture: false, lastEdit: -Infinity, moved: [],
+      name,
+      path,
+      experiment,
+      original,
+      safe,
+      base: text,
+      text,
+      past,
+      future,
+      isTouched,
+      isBuiltIn,
+      before: null,
+      pins: [],
+      window: null,
+      section: null,
+      cursor: 0,
+      isPlaying: false,
+      needsDescription: true,
+      run: null,
+      mistake: null,
+      gesture: false,
+      lastEdit: -Infinity,
+      moved: [],
     });
     this.pending = new Map(set);
     this.tell("text", "window", "compare", "play", "cursor");
@@ -137,14 +183,32 @@ export class App {
   get case() {
     const {name, path, experiment, original, safe, base, past, future, isTouched, isBuiltIn, isUnsaved} = this;
     const at = new Date().toTimeString().slice(0, 5);
-    return {name, path, experiment, original, safe, base, set: [...this.pending], past, future, isTouched, isBuiltIn, isUnsaved, at};
+    return {
+      name,
+      path,
+      experiment,
+      original,
+      safe,
+      base,
+      set: [...this.pending],
+      past,
+      future,
+      isTouched,
+      isBuiltIn,
+      isUnsaved,
+      at,
+    };
   }
 
   /** Whether there is work that stands nowhere else. */
-  get isUnsaved() { return this.isTouched && (this.text !== this.safe || this.pending.size > 0); }
+  get isUnsaved() {
+    return this.isTouched && (this.text !== this.safe || this.pending.size > 0);
+  }
 
   /** The case, as it is remembered. @returns {State} */
-  get present() { return {text: this.base, set: [...this.pending]}; }
+  get present() {
+    return {text: this.base, set: [...this.pending]};
+  }
 
   /** Remembers the case as it is, to be undone to. */
   remember() {
@@ -173,7 +237,10 @@ export class App {
   /** A parameter under a slider, or typed. @param {string} key @param {number | string} value in SI, or with a unit */
   drag(key, value) {
     const isFirst = !this.gesture;
-    if (isFirst) { this.gesture = true; this.remember(); }
+    if (isFirst) {
+      this.gesture = true;
+      this.remember();
+    }
     if (!this.moved.includes(key)) this.moved = [key, ...this.moved].slice(0, MOST_MOVED);
     this.pending.set(key, value);
     this.ask();
@@ -182,14 +249,19 @@ export class App {
   }
 
   /** Takes a change back that was refused. @param {string} key */
-  withdraw(key) { if (this.mistake && this.pending.delete(key)) this.ask(); }
+  withdraw(key) {
+    if (this.mistake && this.pending.delete(key)) this.ask();
+  }
 
   /** The end of a drag. */
   drop() {
     if (!this.gesture) return;
     this.gesture = false;
     // Otherwise the answer that is under way does it.
-    if (this.isCurrent) { this.settle(); this.tell("text"); }
+    if (this.isCurrent) {
+      this.settle();
+      this.tell("text");
+    }
   }
 
   /** What was dragged is part of the text now. */
@@ -198,9 +270,15 @@ export class App {
     this.pending.clear();
   }
 
-  undo() { this.turn(this.past, this.future); }
-  redo() { this.turn(this.future, this.past); }
-  reset() { this.edit(this.original); }
+  undo() {
+    this.turn(this.past, this.future);
+  }
+  redo() {
+    this.turn(this.future, this.past);
+  }
+  reset() {
+    this.edit(this.original);
+  }
 
   /** @param {State[]} from @param {State[]} to */
   turn(from, to) {
@@ -218,25 +296,32 @@ export class App {
   // ---- Runs
 
   /** The case as requests name it. */
-  body() { return {text: this.base, set: [...this.pending], experiment: this.experiment}; }
+  body() {
+    return {text: this.base, set: [...this.pending], experiment: this.experiment};
+  }
 
   /** Asks for the run of the case as it is now. @param {() => void} [then] */
   ask(then) {
     this.sent++;
     this.isCurrent = false;
-    let asked = this.sent, describes = false;
-    this.wire.newest("run", () => {
-      asked = this.sent;
-      // A text that comes while this one is under way asks for a description of its own.
-      describes = this.needsDescription;
-      this.needsDescription = false;
-      return {...this.body(), describe: describes};
-    }, (answer, error) => {
-      if (!answer && describes) this.needsDescription = true;
-      // Something newer is on its way.
-      if (asked === this.sent || answer) this.take(answer, error, asked === this.sent);
-      if (then) then();
-    });
+    let asked = this.sent,
+      describes = false;
+    this.wire.newest(
+      "run",
+      () => {
+        asked = this.sent;
+        // A text that comes while this one is under way asks for a description of its own.
+        describes = this.needsDescription;
+        this.needsDescription = false;
+        return {...this.body(), describe: describes};
+      },
+      (answer, error) => {
+        if (!answer && describes) this.needsDescription = true;
+        // Something newer is on its way.
+        if (asked === this.sent || answer) this.take(answer, error, asked === this.sent);
+        if (then) then();
+      },
+    );
   }
 
   /** @param {Answer | null} answer @param {Error | null} error @param {boolean} isLast */
@@ -266,7 +351,8 @@ export class App {
       this.tell("text");
     }
     if (this.cursor > this.until) this.cursor = this.until;
-    if (this.window) this.refine(); else if (this.section) this.section = null;
+    if (this.window) this.refine();
+    else if (this.section) this.section = null;
     this.tell("mistake", "run");
   }
 
@@ -286,7 +372,11 @@ export class App {
     this.tell("compare");
   }
 
-  unpin() { this.pins = []; this.before = null; this.tell("compare"); }
+  unpin() {
+    this.pins = [];
+    this.before = null;
+    this.tell("compare");
+  }
 
   // ---- What is looked at
 
@@ -301,39 +391,53 @@ export class App {
     if (window) {
       const least = Math.max(1e-9, 1e-11 * this.until);
       let [from, to] = window;
-      if (to - from < least) { const middle = (from + to) / 2; from = middle - least / 2; to = middle + least / 2; }
+      if (to - from < least) {
+        const middle = (from + to) / 2;
+        from = middle - least / 2;
+        to = middle + least / 2;
+      }
       from = Math.max(0, from);
       to = Math.min(this.until, to);
       window = from <= 0 && to >= this.until ? null : [from, to];
     }
     this.window = window;
-    if (window) this.refine(); else this.section = null;
+    if (window) this.refine();
+    else this.section = null;
     this.tell("window");
   }
 
   /** Asks for the rows of the window at a finer interval. */
   refine() {
-    this.wire.newest("section", () => {
-      const [from, to] = this.window || [0, this.until];
-      return {...this.body(), from, to, points: 2001};
-    }, answer => {
-      if (!answer || !this.window) return;
-      this.section = answer;
-      this.tell("window");
-    });
+    this.wire.newest(
+      "section",
+      () => {
+        const [from, to] = this.window || [0, this.until];
+        return {...this.body(), from, to, points: 2001};
+      },
+      answer => {
+        if (!answer || !this.window) return;
+        this.section = answer;
+        this.tell("window");
+      },
+    );
   }
 
   /** Rows around the cursor for slow motion. @param {number} from @param {number} to */
   lens(from, to) {
-    this.wire.newest("section", () => ({...this.body(), from, to, points: 2001}), answer => {
-      if (answer) this.section = answer;
-    });
+    this.wire.newest(
+      "section",
+      () => ({...this.body(), from, to, points: 2001}),
+      answer => {
+        if (answer) this.section = answer;
+      },
+    );
   }
 
   /** The value of a curve at a time, between rows along a line. @param {string} name @param {number} time */
   value(name, time) {
     for (const answer of [this.section, this.run]) {
-      const times = answer && answer.columns.get("time"), values = answer && answer.columns.get(name);
+      const times = answer && answer.columns.get("time"),
+        values = answer && answer.columns.get(name);
       if (!times || !values || !times.length || time < times[0] || time > times[times.length - 1]) continue;
       const i = Math.min(times.length - 1, lowerBound(times, time));
       if (i === 0 || times[i] === time) return values[i];
@@ -347,7 +451,8 @@ export class App {
   /** The state of a body at a time: no line leads from stuck to sliding. @param {string} name @param {number} time */
   state(name, time) {
     for (const answer of [this.section, this.run]) {
-      const times = answer && answer.columns.get("time"), values = answer && answer.columns.get(name);
+      const times = answer && answer.columns.get("time"),
+        values = answer && answer.columns.get(name);
       if (!times || !values || !times.length || time < times[0] || time > times[times.length - 1]) continue;
       const i = Math.min(times.length - 1, lowerBound(times, time));
       return times[i] === time || i === 0 ? values[i] : values[i - 1];
@@ -358,10 +463,12 @@ export class App {
 
 /** The first index whose value is not below. @param {Float64Array} x @param {number} value */
 export function lowerBound(x, value) {
-  let from = 0, to = x.length;
+  let from = 0,
+    to = x.length;
   while (from < to) {
     const middle = (from + to) >> 1;
-    if (x[middle] < value) from = middle + 1; else to = middle;
+    if (x[middle] < value) from = middle + 1;
+    else to = middle;
   }
   return from;
 }

@@ -23,9 +23,13 @@ export class Cases {
     app.on("leave", () => this.leave());
     app.on("opened", () => this.show());
     if (isFramed) return;
-    app.on("text", () => { if (!this.timer) this.timer = setTimeout(() => this.keep(), LATER); });
+    app.on("text", () => {
+      if (!this.timer) this.timer = setTimeout(() => this.keep(), LATER);
+    });
     addEventListener("pagehide", () => this.keep());
-    addEventListener("beforeunload", event => { if (app.isUnsaved || this.left.some(one => one.isUnsaved)) event.preventDefault(); });
+    addEventListener("beforeunload", event => {
+      if (app.isUnsaved || this.left.some(one => one.isUnsaved)) event.preventDefault();
+    });
   }
 
   /** Puts the case that is shown aside. One that came with the program is nobody's work before it is changed. */
@@ -46,8 +50,16 @@ export class Cases {
     const {app} = this;
     this.left = this.left.filter(one => !isSame(one, app.case));
     this.list.hidden = !this.left.length;
-    this.list.replaceChildren(/** @type {Element} */ (this.list.firstElementChild), ...this.left.map(one =>
-      element("button", {type: "button", onclick: () => this.back(one)}, `${one.name}, ${one.isUnsaved ? "changed, " : ""}left at ${one.at}`)));
+    this.list.replaceChildren(
+      /** @type {Element} */ (this.list.firstElementChild),
+      ...this.left.map(one =>
+        element(
+          "button",
+          {type: "button", onclick: () => this.back(one)},
+          `${one.name}, ${one.isUnsaved ? "changed, " : ""}left at ${one.at}`,
+        ),
+      ),
+    );
     this.keep();
   }
 
@@ -64,11 +76,22 @@ export class Cases {
     clearTimeout(this.timer);
     this.timer = 0;
     if (isFramed) return;
-    const {app} = this, bare = one => ({...one, past: [], future: []});
+    const {app} = this,
+      bare = one => ({...one, past: [], future: []});
     try {
       if (!app.isUnsaved && !this.left.length) sessionStorage.removeItem(KEY);
-      else sessionStorage.setItem(KEY, JSON.stringify({hash: location.hash, shown: app.isUnsaved ? bare(app.case) : null, left: this.left.map(bare)}));
-    } catch { /* private windows, or more than the browser keeps */ }
+      else
+        sessionStorage.setItem(
+          KEY,
+          JSON.stringify({
+            hash: location.hash,
+            shown: app.isUnsaved ? bare(app.case) : null,
+            left: this.left.map(bare),
+          }),
+        );
+    } catch {
+      /* private windows, or more than the browser keeps */
+    }
   }
 
   /** Takes what was kept back. @param {string} path of the case that can be saved
@@ -81,7 +104,9 @@ export class Cases {
       this.left = left;
       if (!shown || hash === location.hash) return shown;
       this.add(shown);
-    } catch { /* private windows */ }
+    } catch {
+      /* private windows */
+    }
     return null;
   }
 }

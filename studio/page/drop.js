@@ -4,12 +4,34 @@ import {element} from "./format.js";
 
 const MOST = 64 << 20;
 
-/** @param {{id: string, words: string, accept: string, many?: boolean, take: (files: {name: string, path: string}[]) => void, failed: (error: Error) => void, wire: import("./wire.js").Wire}} options */
+/**
+ * @param {{id: string, words: string, accept: string, many?: boolean,
+ * take: (files: {name: string, path: string}[]) => void, failed: (error: Error) => void,
+ * wire: import("./wire.js").Wire}} options
+ */
 export function dropPlace({id, words, accept, many, take, failed, wire}) {
-  const input = element("input", {type: "file", id, accept, multiple: many || null, onchange: () => { send([...input.files]); }});
+  const input = element("input", {
+    type: "file",
+    id,
+    accept,
+    multiple: many || null,
+    onchange: () => {
+      send([...input.files]);
+    },
+  });
   const told = element("span", {class: "quiet", role: "status"});
-  const place = element("label", {class: "drop", for: id}, element("strong", {}, words), element("span", {class: "quiet"}, "Drop here, or choose. Files stay on this computer."), input, told);
-  place.addEventListener("dragover", event => { event.preventDefault(); place.classList.add("over"); });
+  const place = element(
+    "label",
+    {class: "drop", for: id},
+    element("strong", {}, words),
+    element("span", {class: "quiet"}, "Drop here, or choose. Files stay on this computer."),
+    input,
+    told,
+  );
+  place.addEventListener("dragover", event => {
+    event.preventDefault();
+    place.classList.add("over");
+  });
   place.addEventListener("dragleave", () => place.classList.remove("over"));
   place.addEventListener("drop", event => {
     event.preventDefault();
@@ -22,7 +44,8 @@ export function dropPlace({id, words, accept, many, take, failed, wire}) {
     try {
       const sent = [];
       for (const file of many ? files : files.slice(0, 1)) {
-        if (file.size > MOST) throw new Error(`${file.name} has ${Math.round(file.size / 1048576)} MB; a file may have 64 MB`);
+        if (file.size > MOST)
+          throw new Error(`${file.name} has ${Math.round(file.size / 1048576)} MB; a file may have 64 MB`);
         told.textContent = `Sending ${file.name}…`;
         sent.push({name: file.name, path: await wire.upload(file)});
       }
@@ -41,5 +64,7 @@ export function dropPlace({id, words, accept, many, take, failed, wire}) {
 export function wordsOf(error) {
   const mistake = error && error.mistake;
   if (!mistake) return String((error && error.message) || error);
-  return [mistake.what, mistake.allowed && `Allowed: ${mistake.allowed}`, mistake.next && `Next: ${mistake.next}`].filter(Boolean).join(". ");
+  return [mistake.what, mistake.allowed && `Allowed: ${mistake.allowed}`, mistake.next && `Next: ${mistake.next}`]
+    .filter(Boolean)
+    .join(". ");
 }

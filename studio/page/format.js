@@ -10,13 +10,20 @@ export function number(value, digits = 5) {
   const size = Math.abs(value);
   if (size >= 1e7 || size < 1e-4) {
     const [mantissa, exponent] = value.toExponential(digits - 1).split("e");
-    const up = [...String(+exponent)].map(c => (c === "-" ? "\u207b" : "\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079"[+c])).join("");
+    const up = [...String(+exponent)]
+      .map(c => (c === "-" ? "\u207b" : "\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079"[+c]))
+      .join("");
     return `${String(+mantissa).replace("-", MINUS)}\u00d710${up}`;
   }
   return String(+value.toPrecision(digits)).replace("-", MINUS);
 }
 
-const PREFIXES = [[1, "s"], [1e-3, "ms"], [1e-6, "\u00b5s"], [1e-9, "ns"]];
+const PREFIXES = [
+  [1, "s"],
+  [1e-3, "ms"],
+  [1e-6, "\u00b5s"],
+  [1e-9, "ns"],
+];
 
 /** A time, as precise as the step asks. @param {number} seconds @param {number} [step] */
 export function time(seconds, step = 1e-3) {
@@ -34,7 +41,9 @@ export function time(seconds, step = 1e-3) {
 export function element(tag, attributes = {}, ...children) {
   const made = document.createElement(tag);
   set(made, attributes);
-  made.append(...children.filter(child => child !== null && child !== undefined).map(child => /** @type {Node|string} */ (child)));
+  made.append(
+    ...children.filter(child => child !== null && child !== undefined).map(child => /** @type {Node|string} */ (child)),
+  );
   return made;
 }
 
@@ -42,7 +51,12 @@ export function element(tag, attributes = {}, ...children) {
  * @param {Object<string, any>} attributes @param {string} words of the summary @param {string} name
  * @param {...(Node|string|null|undefined)} children @returns {any} */
 export function fold(attributes, words, name, ...children) {
-  return element("details", {...attributes, "aria-label": name}, element("summary", {"aria-label": name === words ? null : name}, words), ...children);
+  return element(
+    "details",
+    {...attributes, "aria-label": name},
+    element("summary", {"aria-label": name === words ? null : name}, words),
+    ...children,
+  );
 }
 
 /** An element of a drawing.
@@ -76,6 +90,9 @@ export function put(element, attributes) {
     if (element.getAttribute(name) !== String(value)) element.setAttribute(name, String(value));
 }
 
+/** True if the view of an element is not shown. @param {Element} element */
+export const isOutOfView = element => Boolean(element.closest(".view[hidden]"));
+
 /** Has the browser keep a file. @param {string} name @param {BlobPart} content @param {string} kind */
 export function download(name, content, kind) {
   const address = URL.createObjectURL(new Blob([content], {type: kind}));
@@ -87,4 +104,8 @@ export function download(name, content, kind) {
 }
 
 /** A name as that of a file. @param {string} name */
-export const fileName = name => name.toLowerCase().replace(/[^\p{L}\p{N}]+/gu, "-").replace(/^-+|-+$/g, "") || "case";
+export const fileName = name =>
+  name
+    .toLowerCase()
+    .replace(/[^\p{L}\p{N}]+/gu, "-")
+    .replace(/^-+|-+$/g, "") || "case";

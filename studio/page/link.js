@@ -1,6 +1,6 @@
 // @ts-check
-// A state as a link: everything stands behind the `#`, which browsers keep to themselves. It is compressed in the format
-// of zlib, whose checksum tells when a letter was changed or lost on the way.
+// A state as a link: everything stands behind the `#`, which browsers keep to themselves. It is compressed in the
+// format of zlib, whose checksum tells when a letter was changed or lost on the way.
 
 /** Bytes of a state at most: a link is from anywhere, and a few of its letters can mean gigabytes. */
 const MOST = 4 << 20;
@@ -20,7 +20,10 @@ async function through(bytes, way) {
   }
   const whole = new Uint8Array(length);
   let at = 0;
-  for (const part of parts) { whole.set(part, at); at += part.length; }
+  for (const part of parts) {
+    whole.set(part, at);
+    at += part.length;
+  }
   return whole;
 }
 
@@ -39,9 +42,16 @@ export async function stateOf(hash) {
   if (!found) return null;
   try {
     const text = atob(found[1].replace(/-/g, "+").replace(/_/g, "/"));
-    const bytes = await through(Uint8Array.from(text, c => c.charCodeAt(0)), "expand");
+    const bytes = await through(
+      Uint8Array.from(text, c => c.charCodeAt(0)),
+      "expand",
+    );
     const state = JSON.parse(new TextDecoder().decode(bytes));
     if (typeof state.text === "string") return state;
-  } catch { /* told below */ }
-  throw new Error("This link is damaged: a part of it was lost or changed, and its case cannot be opened. Copy the whole link again.");
+  } catch {
+    /* told below */
+  }
+  throw new Error(
+    "This link is damaged: a part of it was lost or changed, and its case cannot be opened. Copy the whole link again.",
+  );
 }

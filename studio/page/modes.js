@@ -4,11 +4,13 @@ import {element} from "./format.js";
 
 /** @typedef {import("./app.js").App} App */
 
-export const key = "modes", name = "Frequencies, friction";
+export const key = "modes",
+  name = "Frequencies, friction";
 
 /** @param {HTMLElement} root @param {App} app */
 export function mount(root, app) {
-  const told = element("p", {class: "quiet", role: "status"}, "Computing…"), body = element("div", {class: "report page"});
+  const told = element("p", {class: "quiet", role: "status"}, "Computing…"),
+    body = element("div", {class: "report page"});
   root.append(told, body);
   let shown = "";
   const show = () => {
@@ -16,18 +18,30 @@ export function mount(root, app) {
     const text = app.text;
     const speeds = app.run.columns.get("cart_speed") || new Float64Array(1);
     const speed = speeds.reduce((most, value) => Math.max(most, Math.abs(value)), 0);
-    app.wire.newest("modes", () => ({text: app.text, speed}), (answer, error) => {
-      told.hidden = Boolean(answer);
-      if (!answer) { told.textContent = String(error && error.message); body.replaceChildren(); return; }
-      shown = text;
-      showReport(body, answer.head.html);
-    });
+    app.wire.newest(
+      "modes",
+      () => ({text: app.text, speed}),
+      (answer, error) => {
+        told.hidden = Boolean(answer);
+        if (!answer) {
+          told.textContent = String(error && error.message);
+          body.replaceChildren();
+          return;
+        }
+        shown = text;
+        showReport(body, answer.head.html);
+      },
+    );
   };
   app.on("run", show);
   app.on("view", show);
 }
 
-/** Shows a part of a report: the library made it, and it holds no script. @param {HTMLElement} body @param {string} html */
+/**
+ * Shows a part of a report: the library made it, and it holds no script.
+ * @param {HTMLElement} body
+ * @param {string} html
+ */
 export function showReport(body, html) {
   body.innerHTML = html;
   /** @type {any} */ (window).tautFigures(body);

@@ -1,17 +1,16 @@
 // @ts-check
 // The view of the motion: the machine above its plots, the parameters and the text beside them.
 import {element, number, put, tell, time as timeText} from "./format.js";
-import {drawing, extent} from "./stage.js";
+import {splitter} from "./layout.js";
+import {RATES, Stage, playing, start} from "./player.js";
 import {Plots} from "./plots.js";
 import {Parameters} from "./parameters.js";
 import {Editor} from "./editor.js";
 
 /** @typedef {import("./app.js").App} App */
 
-export const key = "motion", name = "Motion";
-
-/** Slow motion, in seconds of the machine for one of the watcher. */
-const RATES = [1, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 1e-3, 1e-4, 1e-5, 1e-6];
+export const key = "motion",
+  name = "Motion";
 
 /** @param {HTMLElement} root @param {App} app */
 export function mount(root, app) {
@@ -19,95 +18,191 @@ export function mount(root, app) {
   const side = element("aside", {class: "side", "aria-label": "The case"});
   const stage = element("section", {class: "stage-box", "aria-label": "The machine"});
   const plots = element("div", {class: "plots", id: "plots"});
-  const glance = element("section", {class: "glance", "aria-labelledby": "glance-title"}, element("h2", {id: "glance-title"}, "At a glance"));
-  const plotted = element("section", {"aria-labelledby": "plots-title"}, element("h2", {id: "plots-title", class: "unseen"}, "Plots"), plots);
-  root.append(side, element("div", {class: "centre", id: "centre", tabindex: "-1"}, stage, bar(app), plotted, glance));
+  const glance = element(
+    "section",
+    {class: "glance", "aria-labelledby": "glance-title"},
+    element("h2", {id: "glance-title"}, "At a glance"),
+  );
+  const plotted = element(
+    "section",
+    {"aria-labelledby": "plots-title"},
+    element("h2", {id: "plots-title", class: "unseen"}, "Plots"),
+    plots,
+  );
+  side.append(
+    splitter({
+      name: "side",
+      words: "Width of the parameters",
+      root,
+      panel: () => side.getBoundingClientRect(),
+      along: "x",
+      least: 240,
+      most: () => Math.max(240, innerWidth - 480),
+    }),
+  );
+  const size = splitter({
+    name: "stage",
+    words: "Height of the drawing",
+    root,
+    panel: () => (stage.querySelector("svg") || stage).getBoundingClientRect(),
+    along: "y",
+    least: 80,
+    most: () => Math.max(80, innerHeight - 240),
+  });
+  root.append(
+    side,
+    element("div", {class: "centre", id: "centre", tabindex: "-1"}, stage, bar(app), size, plotted, glance),
+  );
   sides(side, app);
-  new Stage(stage, app);
-  new Plots(plots, app);
+  app.scene = {stage: new Stage(stage, app), plots: new Plots(plots, app)};
   new Glance(glance, app);
 }
 
 /** Parameters and text, of which a narrow page shows one. @param {HTMLElement} root @param {App} app */
 function sides(root, app) {
-  const panels = [["parameters", "Parameters"], ["case", "Case text"], ["results", "Results"]].map(([key, title]) => ({
-    key, title, panel: element("div", {role: "tabpanel", id: `side-${key}`, "aria-labelledby": `tab-${key}`, class: "side-panel"}),
+  const panels = [
+    ["parameters", "Parameters"],
+    ["case", "Case text"],
+    ["results", "Results"],
+  ].map(([key, title]) => ({
+    key,
+    title,
+    panel: element("div", {role: "tabpanel", id: `side-${key}`, "aria-labelledby": `tab-${key}`, class: "side-panel"}),
   }));
-  const tabs = panels.map(({key, title}, k) => element("button", {type: "button", role: "tab", id: `tab-${key}`, "aria-controls": `side-${key}`, onclick: () => choose(k)}, title));
+  const tabs = panels.map(({key, title}, k) =>
+    element(
+      "button",
+      {type: "button", role: "tab", id: `tab-${key}`, "aria-controls": `side-${key}`, onclick: () => choose(k)},
+      title,
+    ),
+  );
   /** Those that are kept up to date only in sight. @type {Map<string, {show: () => void}>} */
   const drawn = new Map();
-  const choose = chosen => panels.forEach(({key, panel}, k) => {
-    if (k === chosen && root.classList.contains("low")) sheet.click();
-    panel.hidden = k !== chosen;
-    if (k === chosen) drawn.get(key)?.show();
-    tabs[k].setAttribute("aria-selected", String(k === chosen));
-    tabs[k].tabIndex = k === chosen ? 0 : -1;
+  const choose = chosen =>
+    panels.forEach(({key, panel}, k) => {
+      if (k === chosen && root.classList.contains("low")) sheet.click();
+      panel.hidden = k !== chosen;
+      if (k === chosen) drawn.get(key)?.show();
+      tabs[k].setAttribute("aria-selected", String(k === chosen));
+      tabs[k].tabIndex = k === chosen ? 0 : -1;
+    });
+  const list = element(
+    "div",
+    {
+      role: "tablist",
+      "aria-label": "The case",
+      onkeydown: event => {
+        const now = tabs.indexOf(event.target),
+          next = {ArrowRight: now + 1, ArrowLeft: now - 1}[event.key];
+        if (next === undefined) return;
+        const k = (next + tabs.length) % tabs.length;
+        choose(k);
+        tabs[k].focus();
+      },
+    },
+    ...tabs,
+  );
+  const problem = element("button", {
+    type: "button",
+    class: "problem",
+    hidden: true,
+    onclick: () => {
+      const isField = app.mistake && parameters.has(app.mistake.key);
+      choose(isField ? 0 : 1);
+      if (isField) parameters.go(app.mistake.key);
+    },
   });
-  const list = element("div", {role: "tablist", "aria-label": "The case", onkeydown: event => {
-    const now = tabs.indexOf(event.target), next = {ArrowRight: now + 1, ArrowLeft: now - 1}[event.key];
-    if (next === undefined) return;
-    const k = (next + tabs.length) % tabs.length;
-    choose(k);
-    tabs[k].focus();
-  }}, ...tabs);
-  const problem = element("button", {type: "button", class: "problem", hidden: true, onclick: () => {
-    const isField = app.mistake && parameters.has(app.mistake.key);
-    choose(isField ? 0 : 1);
-    if (isField) parameters.go(app.mistake.key);
-  }});
   // On a narrow screen the panels are a sheet that can be put down.
-  const sheet = element("button", {type: "button", class: "sheet", onclick: () => {
-    const isLow = root.classList.toggle("low");
-    put(sheet, {"aria-expanded": !isLow});
-    tell(sheet, isLow ? "Show" : "Hide");
-  }, "aria-expanded": "true"}, "Hide");
+  const sheet = element(
+    "button",
+    {
+      type: "button",
+      class: "sheet",
+      onclick: () => {
+        const isLow = root.classList.toggle("low");
+        put(sheet, {"aria-expanded": !isLow});
+        tell(sheet, isLow ? "Show" : "Hide");
+      },
+      "aria-expanded": "true",
+    },
+    "Hide",
+  );
   root.append(element("div", {class: "side-head"}, list, sheet), problem, ...panels.map(({panel}) => panel));
   const parameters = new Parameters(panels[0].panel, app);
   drawn.set("case", new Editor(panels[1].panel, app)).set("results", new Results(panels[2].panel, app));
   choose(0);
   app.on("mistake", () => {
     if (problem.hidden === Boolean(app.mistake)) problem.hidden = !app.mistake;
-    if (app.mistake) problem.textContent = `${app.mistake.line ? `Line ${app.mistake.line}: ` : ""}${parameters.named(app.mistake)}`;
+    if (app.mistake)
+      problem.textContent = `${app.mistake.line ? `Line ${app.mistake.line}: ` : ""}${parameters.named(app.mistake)}`;
   });
 }
 
 /** Experiment, playing, and what is compared. @param {App} app */
 function bar(app) {
-  const play = element("button", {type: "button", id: "play", class: "play", onclick: () => app.play()});
-  const scrub = element("input", {type: "range", id: "scrub", min: 0, max: 10000, step: 1, "aria-label": "Time",
-    oninput: () => { app.isPlaying = false; app.tell("play"); app.seek(from() + (Number(scrub.value) / 10000) * span()); }});
-  const clock = element("span", {class: "clock", id: "clock"});
-  const rate = element("select", {id: "rate", "aria-label": "Slow motion", onchange: () => { app.rate = Number(rate.value); app.tell("play"); }},
-    ...RATES.map(value => element("option", {value}, value === 1 ? "as it is" : `${number(1 / value)} × slower`)));
-  const factor = element("input", {type: "range", id: "factor", min: 0, max: 40, step: 1, "aria-label": "Magnification of stretch and error", oninput: () => {
-    app.factor = Number((10 ** (Number(factor.value) / 10)).toPrecision(2));
-    app.tell("cursor");
-  }});
+  const {play, scrub, clock} = playing(app);
+  const rate = element(
+    "select",
+    {
+      id: "rate",
+      "aria-label": "Slow motion",
+      onchange: () => {
+        app.rate = Number(rate.value);
+        app.tell("play");
+      },
+    },
+    ...RATES.map(value => element("option", {value}, value === 1 ? "as it is" : `${number(1 / value)} × slower`)),
+  );
+  const factor = element("input", {
+    type: "range",
+    id: "factor",
+    min: 0,
+    max: 40,
+    step: 1,
+    "aria-label": "Magnification of stretch and error",
+    oninput: () => {
+      app.factor = Number((10 ** (Number(factor.value) / 10)).toPrecision(2));
+      app.tell("cursor");
+    },
+  });
   const factorTold = element("span", {class: "factor-value"});
-  const experiment = element("select", {id: "experiment", "aria-label": "Experiment", onchange: () => app.choose(Number(experiment.value))});
-  const before = element("button", {type: "button", "aria-pressed": "true", id: "before", onclick: () => {
-    app.showsBefore = !app.showsBefore;
-    before.setAttribute("aria-pressed", String(app.showsBefore));
-    app.tell("compare");
-  }}, "Before");
+  const experiment = element("select", {
+    id: "experiment",
+    "aria-label": "Experiment",
+    onchange: () => app.choose(Number(experiment.value)),
+  });
+  const before = element(
+    "button",
+    {
+      type: "button",
+      "aria-pressed": "true",
+      id: "before",
+      onclick: () => {
+        app.showsBefore = !app.showsBefore;
+        before.setAttribute("aria-pressed", String(app.showsBefore));
+        app.tell("compare");
+      },
+    },
+    "Before",
+  );
   const pin = element("button", {type: "button", id: "pin", onclick: () => app.pin()}, "Pin");
   const unpin = element("button", {type: "button", id: "unpin", hidden: true, onclick: () => app.unpin()}, "Unpin");
   const all = element("button", {type: "button", id: "all", hidden: true, onclick: () => app.look(null)}, "Whole run");
-  const from = () => (app.window ? app.window[0] : 0), span = () => (app.window ? app.window[1] - app.window[0] : app.until);
   const show = () => {
-    scrub.value = String(Math.round((10000 * (app.cursor - from())) / span()));
-    tell(clock, timeText(app.cursor, Math.min(span() / 1000, app.isPlaying ? app.rate / 60 : 1)));
-    put(scrub, {"aria-valuetext": clock.textContent});
     tell(factorTold, `× ${number(app.factor)}`);
     factor.value = String(Math.round(10 * Math.log10(app.factor)));
     put(factor, {"aria-valuetext": factorTold.textContent});
   };
   app.on("cursor", show);
-  app.on("window", () => { all.hidden = !app.window; show(); });
-  app.on("compare", () => { unpin.hidden = !app.pins.length; unpin.textContent = `Unpin ${app.pins.length}`; });
+  app.on("window", () => {
+    all.hidden = !app.window;
+    show();
+  });
+  app.on("compare", () => {
+    unpin.hidden = !app.pins.length;
+    unpin.textContent = `Unpin ${app.pins.length}`;
+  });
   app.on("play", () => {
-    play.textContent = app.isPlaying ? "❚❚" : "▶";
-    play.setAttribute("aria-label", app.isPlaying ? "Pause" : "Play");
     rate.value = String(app.rate);
   });
   app.on("run", () => {
@@ -119,75 +214,29 @@ function bar(app) {
     if (experiment.value !== String(app.experiment)) experiment.value = String(app.experiment);
     show();
   });
+  start(app);
   app.tell("play");
-  return element("div", {class: "transport", role: "toolbar", "aria-label": "Time"},
-    play, scrub, clock, rate, element("label", {class: "factor", title: "Stretch and error on the drawing are magnified"}, element("span", {class: "quiet"}, "stretch"), factor, factorTold),
-    element("span", {class: "gap"}), experiment, before, pin, unpin, all);
-}
-
-class Stage {
-  /** @param {HTMLElement} root @param {App} app */
-  constructor(root, app) {
-    this.root = root;
-    this.app = app;
-    this.shape = "";
-    this.frame = 0;
-    /** @type {import("./stage.js").Drawing | null} */
-    this.drawing = null;
-    /** @type {import("./stage.js").Extent | null} */
-    this.extent = null;
-    app.on("run", () => this.build());
-    app.on("cursor", () => this.later());
-    app.on("play", () => { if (app.isPlaying) this.start(); });
-  }
-
-  build() {
-    const {run} = this.app;
-    if (!run) return;
-    const {scene} = run.head, shape = JSON.stringify(scene);
-    if (shape !== this.shape) {
-      this.shape = shape;
-      this.drawing = drawing(scene);
-      this.root.replaceChildren(this.drawing.root);
-    }
-    this.extent = extent(run, scene);
-    this.later();
-  }
-
-  later() {
-    if (this.frame) return;
-    this.frame = requestAnimationFrame(() => { this.frame = 0; this.move(); });
-  }
-
-  move() {
-    const {app} = this;
-    if (!this.drawing || !this.extent || !app.run) return;
-    this.drawing.move(name => app.value(name, app.cursor), name => app.state(name, app.cursor), app.factor, this.extent);
-  }
-
-  /** Plays until the end, or until it is paused. */
-  start() {
-    const {app} = this;
-    let last = performance.now(), asked = NaN;
-    const go = now => {
-      if (!app.isPlaying) return;
-      const step = Math.min(0.1, (now - last) / 1000) * app.rate, end = app.window ? app.window[1] : app.until;
-      last = now;
-      let next = app.cursor + step;
-      if (next >= end) next = app.window ? app.window[0] : 0;
-      // In slow motion there are many pictures between two rows: those around the cursor are computed finer.
-      if (!app.window && app.run && app.rate * 50 < app.until / 50) {
-        const span = 6 * app.rate;
-        if (!(next >= asked && next < asked + 0.7 * span)) {
-          asked = next;
-          app.lens(Math.max(0, next - 0.05 * span), Math.min(app.until, next + span));
-        }
-      }
-      app.seek(next);
-      requestAnimationFrame(go);
-    };
-    requestAnimationFrame(go);
-  }
+  return element(
+    "div",
+    {class: "transport", role: "toolbar", "aria-label": "Time"},
+    play,
+    scrub,
+    clock,
+    rate,
+    element(
+      "label",
+      {class: "factor", title: "Stretch and error on the drawing are magnified"},
+      element("span", {class: "quiet"}, "stretch"),
+      factor,
+      factorTold,
+    ),
+    element("span", {class: "gap"}),
+    experiment,
+    before,
+    pin,
+    unpin,
+    all,
+  );
 }
 
 /** A part of the page whose cells take new texts where nothing else is new: the page lays out only what changed. */
@@ -202,7 +251,11 @@ class Cells {
   /** @param {any} shape all of it but the texts @param {string[]} texts @param {() => HTMLElement[]} make */
   fill(shape, texts, make) {
     const now = JSON.stringify(shape);
-    if (now !== this.shape) { this.shape = now; this.root.replaceChildren(...make()); return; }
+    if (now !== this.shape) {
+      this.shape = now;
+      this.root.replaceChildren(...make());
+      return;
+    }
     this.root.querySelectorAll(this.cells).forEach((cell, k) => tell(cell, texts[k]));
   }
 }
@@ -216,17 +269,63 @@ class Glance {
     const cells = new Cells(this.body, "dd, tbody td");
     app.on("run", () => {
       const overview = app.run && app.run.head.overview;
-      if (!overview) { cells.fill(null, [], () => []); return; }
-      const {groups, notes} = overview, [head, ...places] = overview.places;
-      const card = ({name, rows}) => element("div", {class: "card"}, element("h3", {}, name), element("dl", {},
-        ...rows.flatMap(row => [element("dt", {title: row.how || null}, row.name), element("dd", {}, row.value)])));
-      const table = () => places.length ? element("div", {class: "card wide"}, element("h3", {}, "Along the travel"), element("div", {class: "scroll", tabindex: "0", role: "group", "aria-label": "Along the travel"},
-        element("table", {}, element("thead", {}, element("tr", {}, ...head.map(text => element("th", {scope: "col"}, text)))),
-          element("tbody", {}, ...places.map(row => element("tr", {}, ...row.map(text => element("td", {}, text)))))))) : null;
-      const noted = () => notes.length ? element("div", {class: "card wide"}, element("h3", {}, "To be known"), element("ul", {}, ...notes.map(note => element("li", {}, note)))) : null;
-      const shape = [groups.map(({name, rows}) => [name, rows.map(row => [row.name, row.how])]), head, places.length, notes];
-      cells.fill(shape, [...groups.flatMap(({rows}) => rows.map(row => row.value)), ...places.flat()],
-        () => [...groups.map(card), table(), noted()].filter(Boolean));
+      if (!overview) {
+        cells.fill(null, [], () => []);
+        return;
+      }
+      const {groups, notes} = overview,
+        [head, ...places] = overview.places;
+      const card = ({name, rows}) =>
+        element(
+          "div",
+          {class: "card"},
+          element("h3", {}, name),
+          element(
+            "dl",
+            {},
+            ...rows.flatMap(row => [element("dt", {title: row.how || null}, row.name), element("dd", {}, row.value)]),
+          ),
+        );
+      const table = () =>
+        places.length
+          ? element(
+              "div",
+              {class: "card wide"},
+              element("h3", {}, "Along the travel"),
+              element(
+                "div",
+                {class: "scroll", tabindex: "0", role: "group", "aria-label": "Along the travel"},
+                element(
+                  "table",
+                  {},
+                  element("thead", {}, element("tr", {}, ...head.map(text => element("th", {scope: "col"}, text)))),
+                  element(
+                    "tbody",
+                    {},
+                    ...places.map(row => element("tr", {}, ...row.map(text => element("td", {}, text)))),
+                  ),
+                ),
+              ),
+            )
+          : null;
+      const noted = () =>
+        notes.length
+          ? element(
+              "div",
+              {class: "card wide"},
+              element("h3", {}, "To be known"),
+              element("ul", {}, ...notes.map(note => element("li", {}, note))),
+            )
+          : null;
+      const shape = [
+        groups.map(({name, rows}) => [name, rows.map(row => [row.name, row.how])]),
+        head,
+        places.length,
+        notes,
+      ];
+      cells.fill(shape, [...groups.flatMap(({rows}) => rows.map(row => row.value)), ...places.flat()], () =>
+        [...groups.map(card), table(), noted()].filter(Boolean),
+      );
     });
   }
 }
@@ -235,7 +334,8 @@ class Glance {
 class Results {
   /** @param {HTMLElement} root @param {App} app */
   constructor(root, app) {
-    const figures = element("dl", {class: "figures"}), events = element("div", {class: "events"});
+    const figures = element("dl", {class: "figures"}),
+      events = element("div", {class: "events"});
     const ending = element("p", {class: "mistake", hidden: true});
     root.append(ending, element("h2", {}, "Key figures"), figures, element("h2", {}, "Events"), events);
     const cells = new Cells(figures, "dd");
@@ -244,12 +344,36 @@ class Results {
       const {rows, ending: told, events: all, events_left_out: left} = app.run.head;
       ending.hidden = !told;
       tell(ending, told ? `This run ${told}.` : "");
-      cells.fill(rows.map(([name]) => name), rows.map(([, value]) => value),
-        () => rows.flatMap(([name, value]) => [element("dt", {}, name), element("dd", {}, value)]));
+      cells.fill(
+        rows.map(([name]) => name),
+        rows.map(([, value]) => value),
+        () => rows.flatMap(([name, value]) => [element("dt", {}, name), element("dd", {}, value)]),
+      );
       const shown = all.slice(0, 200);
-      events.replaceChildren(...shown.map(event => element("button", {type: "button", class: "event", onclick: () => { app.isPlaying = false; app.tell("play"); app.seek(event.time); }},
-        element("span", {}, timeText(event.time, 1e-9)), element("span", {}, event.part), element("span", {class: "quiet"}, `${event.from} → ${event.to}`))),
-      ...(all.length + left > shown.length ? [element("p", {class: "quiet"}, `${all.length + left - shown.length} more`)] : all.length ? [] : [element("p", {class: "quiet"}, "None.")]));
+      events.replaceChildren(
+        ...shown.map(event =>
+          element(
+            "button",
+            {
+              type: "button",
+              class: "event",
+              onclick: () => {
+                app.isPlaying = false;
+                app.tell("play");
+                app.seek(event.time);
+              },
+            },
+            element("span", {}, timeText(event.time, 1e-9)),
+            element("span", {}, event.part),
+            element("span", {class: "quiet"}, `${event.from} → ${event.to}`),
+          ),
+        ),
+        ...(all.length + left > shown.length
+          ? [element("p", {class: "quiet"}, `${all.length + left - shown.length} more`)]
+          : all.length
+            ? []
+            : [element("p", {class: "quiet"}, "None.")]),
+      );
     };
     app.on("run", this.show);
   }

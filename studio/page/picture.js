@@ -1,27 +1,45 @@
 // @ts-check
 // Figures of results: lines, points and bars on a canvas, with a cursor for keys, values as a table, and brushing.
 import {element, fold, number} from "./format.js";
-import {COLOURS, sized, step} from "./pen.js";
+import {Axes, COLOURS, sized, ticks} from "./pen.js";
 
-const LEFT = 70, RIGHT = 14, TOP = 10, BOTTOM = 40, ROWS = 60;
+const LEFT = 70,
+  RIGHT = 14,
+  TOP = 10,
+  BOTTOM = 40,
+  MARGINS = {left: LEFT, right: RIGHT, top: TOP, bottom: BOTTOM},
+  ROWS = 60;
 
-/** @typedef {{name: string, x: ArrayLike<number>, y: ArrayLike<number>, kind?: "line"|"points"|"bars"|"cross", colour?: string, dash?: number[], alpha?: number, quiet?: boolean}} Series
+/** @typedef {{name: string, x: ArrayLike<number>, y: ArrayLike<number>, kind?: "line"|"points"|"bars"|"cross",
+ * colour?: string, dash?: number[], alpha?: number, quiet?: boolean}} Series
  * quiet: neither in the legend nor in the table */
-/** @typedef {{x: string, y: string, xUnit?: string, yUnit?: string, words?: string, height?: number, logX?: boolean, equal?: boolean, xRange?: [number, number], yRange?: [number, number], marks?: {x?: number, y?: number, name: string}[]}} Axes */
+/**
+ * @typedef {{x: string, y: string, xUnit?: string, yUnit?: string, words?: string, height?: number,
+ * logX?: boolean, equal?: boolean, xRange?: [number, number], yRange?: [number, number],
+ * marks?: {x?: number, y?: number, name: string}[]}} Options
+ */
 
 /** @type {Set<Picture>} */
 const all = new Set();
-const again = () => { for (const one of all) { if (one.figure.isConnected) one.later(); else if (one.wasShown) all.delete(one); } };
+const again = () => {
+  for (const one of all) {
+    if (one.figure.isConnected) one.later();
+    else if (one.wasShown) all.delete(one);
+  }
+};
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", again);
 new MutationObserver(again).observe(document.documentElement, {attributes: true, attributeFilter: ["data-theme"]});
 
 export class Picture {
-  /** @param {string} title @param {Axes} axes
-   * @param {(area: {x: [number, number], y: [number, number]} | null) => void} [brushed] called with what was chosen by dragging */
+  /** @param {string} title @param {Options} axes
+   * @param {(area: {x: [number, number], y: [number, number]} | null) => void} [brushed] called with what was
+   * chosen by dragging */
   constructor(title, axes, brushed) {
     this.title = title;
     this.axes = axes;
     this.brushed = brushed;
+    /** Axes of what was drawn last. @type {Axes | null} */
+    this.drawn = null;
     /** @type {Series[]} */
     this.series = [];
     this.frame = 0;
@@ -33,19 +51,43 @@ export class Picture {
     this.canvas = element("canvas", {"aria-hidden": "true"});
     this.said = element("p", {class: "quiet picture-value", role: "status", "aria-live": "polite"});
     this.legend = element("span", {class: "legend"});
-    const help = brushed ? "Drag to choose. Shift and arrow keys choose by keys, Escape clears." : "Arrow keys tell the values.";
-    this.area = element("div", {class: "area picture-area", tabindex: "0", role: "application", "aria-roledescription": "figure",
-      "aria-label": `${title}. ${axes.words || ""} ${help}`, onkeydown: event => this.key(event)}, this.canvas);
-    this.table = fold({class: "data", ontoggle: () => this.fill()}, "Values", `Values of ${title}`, element("div", {class: "scroll", tabindex: "0", role: "group", "aria-label": `Values of ${title}`}));
+    const help = brushed
+      ? "Drag to choose. Shift and arrow keys choose by keys, Escape clears."
+      : "Arrow keys tell the values.";
+    this.area = element(
+      "div",
+      {
+        class: "area picture-area",
+        tabindex: "0",
+        role: "application",
+        "aria-roledescription": "figure",
+        "aria-label": `${title}. ${axes.words || ""} ${help}`,
+        onkeydown: event => this.key(event),
+      },
+      this.canvas,
+    );
+    this.table = fold(
+      {class: "data", ontoggle: () => this.fill()},
+      "Values",
+      `Values of ${title}`,
+      element("div", {class: "scroll", tabindex: "0", role: "group", "aria-label": `Values of ${title}`}),
+    );
     this.head = element("h3", {}, title);
     this.unit = element("span", {class: "quiet"});
-    this.figure = element("figure", {class: "picture", "data-picture": title}, element("figcaption", {}, element("span", {class: "picture-head"}, this.head, this.unit), this.legend), this.area, this.said, this.table);
+    this.figure = element(
+      "figure",
+      {class: "picture", "data-picture": title},
+      element("figcaption", {}, element("span", {class: "picture-head"}, this.head, this.unit), this.legend),
+      this.area,
+      this.said,
+      this.table,
+    );
     new ResizeObserver(() => this.later()).observe(this.area);
     this.listen();
     all.add(this);
   }
 
-  /** @param {Series[]} series @param {Partial<Axes>} [axes] */
+  /** @param {Series[]} series @param {Partial<Options>} [axes] */
   show(series, axes = {}) {
     const names = JSON.stringify(series.filter(one => !one.quiet).map(one => [one.name, one.colour]));
     this.series = series;
@@ -53,43 +95,70 @@ export class Picture {
     this.unit.textContent = this.axes.yUnit || "";
     if (names !== this.names) {
       this.names = names;
-      this.legend.replaceChildren(...series.filter(one => !one.quiet && one.name).map(one =>
-        element("span", {}, element("i", {class: `swatch t-${this.colourOf(one)}`}), one.name)));
+      this.legend.replaceChildren(
+        ...series
+          .filter(one => !one.quiet && one.name)
+          .map(one => element("span", {}, element("i", {class: `swatch t-${this.colourOf(one)}`}), one.name)),
+      );
     }
-    if (this.cursor && !(this.series[this.cursor[0]] && this.cursor[1] < this.series[this.cursor[0]].x.length)) this.cursor = null;
+    if (this.cursor && !(this.series[this.cursor[0]] && this.cursor[1] < this.series[this.cursor[0]].x.length))
+      this.cursor = null;
     this.later();
   }
 
   /** @param {Series} one */
-  colourOf(one) { return one.colour || COLOURS[this.series.filter(other => !other.quiet).indexOf(one) % COLOURS.length] || "blue"; }
+  colourOf(one) {
+    return one.colour || COLOURS[this.series.filter(other => !other.quiet).indexOf(one) % COLOURS.length] || "blue";
+  }
 
   later() {
     if (this.frame) return;
-    this.frame = requestAnimationFrame(() => { this.frame = 0; this.draw(); });
+    this.frame = requestAnimationFrame(() => {
+      this.frame = 0;
+      this.draw();
+    });
   }
 
-  get width() { return Math.max(180, this.area.clientWidth); }
-  get height() { return this.axes.equal ? Math.min(this.width * 0.8, 420) : this.axes.height || 230; }
+  get width() {
+    return Math.max(180, this.area.clientWidth);
+  }
+  get height() {
+    return this.axes.equal ? Math.min(this.width * 0.8, 420) : this.axes.height || 230;
+  }
 
   ranges() {
-    const {axes} = this, found = {x: [Infinity, -Infinity], y: [Infinity, -Infinity]};
+    const {axes} = this,
+      found = {x: [Infinity, -Infinity], y: [Infinity, -Infinity]};
     for (const {x, y, kind} of this.series) {
       for (let i = 0; i < x.length; i++) {
         if (!isFinite(x[i]) || !isFinite(y[i]) || Math.abs(y[i]) > 1e200 || (axes.logX && !(x[i] > 0))) continue;
-        found.x[0] = Math.min(found.x[0], x[i]); found.x[1] = Math.max(found.x[1], x[i]);
-        found.y[0] = Math.min(found.y[0], y[i]); found.y[1] = Math.max(found.y[1], y[i]);
+        found.x[0] = Math.min(found.x[0], x[i]);
+        found.x[1] = Math.max(found.x[1], x[i]);
+        found.y[0] = Math.min(found.y[0], y[i]);
+        found.y[1] = Math.max(found.y[1], y[i]);
       }
       if (kind === "bars") found.y[0] = 0;
     }
     for (const {x, y} of axes.marks || []) {
-      if (y !== undefined && isFinite(y)) { found.y[0] = Math.min(found.y[0], y); found.y[1] = Math.max(found.y[1], y); }
+      if (y !== undefined && isFinite(y)) {
+        found.y[0] = Math.min(found.y[0], y);
+        found.y[1] = Math.max(found.y[1], y);
+      }
       void x;
     }
     for (const key of /** @type {const} */ (["x", "y"])) {
       let [low, high] = found[key];
-      if (!(high >= low)) { low = 0; high = 1; }
-      if (high - low < 1e-12 * Math.max(Math.abs(low), Math.abs(high)) || high === low) { const room = Math.abs(low) * 0.05 || 0.5; low -= room; high += room; }
-      const isBars = this.series.some(({kind}) => kind === "bars"), room = key === "x" && (axes.logX || isBars) ? 0 : 0.05 * (high - low);
+      if (!(high >= low)) {
+        low = 0;
+        high = 1;
+      }
+      if (high - low < 1e-12 * Math.max(Math.abs(low), Math.abs(high)) || high === low) {
+        const room = Math.abs(low) * 0.05 || 0.5;
+        low -= room;
+        high += room;
+      }
+      const isBars = this.series.some(({kind}) => kind === "bars"),
+        room = key === "x" && (axes.logX || isBars) ? 0 : 0.05 * (high - low);
       found[key] = [isBars && key === "y" ? 0 : low - room, high + room];
     }
     if (axes.xRange) found.x = [...axes.xRange];
@@ -100,43 +169,29 @@ export class Picture {
   draw() {
     if (!this.area.clientWidth) return;
     this.wasShown = true;
-    const {width, height, axes} = this, pen = sized(this.canvas, this), style = getComputedStyle(document.documentElement);
+    const {width, height, axes} = this,
+      pen = sized(this.canvas, this),
+      style = getComputedStyle(document.documentElement);
     const colour = name => style.getPropertyValue("--" + name).trim() || "#888";
-    const range = this.ranges(), wide = width - LEFT - RIGHT, high = height - TOP - BOTTOM;
-    if (axes.equal) this.square(range, wide / high);
-    const place = axes.logX ? x => Math.log10(x) : x => x;
-    const [x0, x1] = range.x.map(place), [y0, y1] = range.y;
-    const across = x => LEFT + wide * (place(x) - x0) / (x1 - x0), up = y => TOP + high * (y1 - y) / (y1 - y0);
-    Object.assign(this, {across, up, back: {x: px => { const v = x0 + (px - LEFT) / wide * (x1 - x0); return axes.logX ? 10 ** v : v; }, y: py => y1 - (py - TOP) / high * (y1 - y0)}});
-    // The grid, and numbers at it.
-    pen.font = "12px system-ui, sans-serif";
-    pen.lineWidth = 1;
-    const by = step(y1 - y0, Math.max(2, high / 34)), bx = axes.logX ? 1 : step(x1 - x0, Math.max(2, wide / 62));
-    pen.textAlign = "right";
-    pen.textBaseline = "middle";
-    for (let i = Math.ceil(y0 / by - 1e-9); i * by <= y1 + 1e-9 * by; i++) this.line(pen, colour, LEFT, up(i * by), width - RIGHT, up(i * by), number(i * by, 5), LEFT - 7, up(i * by));
+    const range = this.ranges();
+    if (axes.equal) this.square(range, (width - LEFT - RIGHT) / (height - TOP - BOTTOM));
+    const frame = new Axes(this, MARGINS, range.x, range.y, axes.logX);
+    this.drawn = frame;
+    const {x0, x1} = frame,
+      columns = frame.isLog ? ticks(x0, x1, x1 - x0).map(power => 10 ** power) : ticks(x0, x1, frame.wide / 62);
+    const told = (/** @type {number} */ value) => /** @type {[number, string]} */ ([value, number(value, 5)]);
+    const colours = {grid: colour("grid"), grey: colour("grey"), axis: colour("axis")};
+    frame.grid(pen, colours, columns.map(told), frame.rows(34).map(told));
+    pen.fillStyle = colours.grey;
     pen.textAlign = "center";
-    pen.textBaseline = "alphabetic";
-    for (let i = Math.ceil(x0 / bx - 1e-9); i * bx <= x1 + 1e-9 * bx; i++) {
-      const x = axes.logX ? 10 ** i : i * bx;
-      this.line(pen, colour, across(x), TOP, across(x), height - BOTTOM, number(x, 5), across(x), height - BOTTOM + 15);
-    }
-    pen.fillStyle = colour("grey");
-    pen.fillText(axes.x + (axes.xUnit ? `, ${axes.xUnit}` : ""), LEFT + wide / 2, height - 6);
-    pen.save();
-    pen.beginPath();
-    pen.rect(LEFT, TOP, wide, high);
-    pen.clip();
-    for (const mark of axes.marks || []) {
-      pen.strokeStyle = colour("axis");
-      pen.setLineDash([5, 4]);
-      pen.beginPath();
-      if (mark.y !== undefined) { pen.moveTo(LEFT, up(mark.y)); pen.lineTo(width - RIGHT, up(mark.y)); }
-      if (mark.x !== undefined) { pen.moveTo(across(mark.x), TOP); pen.lineTo(across(mark.x), height - BOTTOM); }
-      pen.stroke();
-      pen.setLineDash([]);
-    }
-    for (const one of this.series) this.one(pen, one, colour(this.colourOf(one)), across, up, height);
+    pen.fillText(axes.x + (axes.xUnit ? `, ${axes.xUnit}` : ""), LEFT + frame.wide / 2, height - 6);
+    frame.clip(pen);
+    pen.strokeStyle = colours.axis;
+    pen.setLineDash([5, 4]);
+    frame.marks(pen, axes.marks || []);
+    const across = (/** @type {number} */ x) => frame.across(x),
+      up = (/** @type {number} */ y) => frame.up(y);
+    for (const one of this.series) this.one(pen, one, colour(this.colourOf(one)), frame);
     if (this.brush) {
       const {x, y} = this.brush;
       pen.globalAlpha = 0.16;
@@ -147,7 +202,8 @@ export class Picture {
       pen.strokeRect(across(x[0]), up(y[1]), across(x[1]) - across(x[0]), up(y[0]) - up(y[1]));
     }
     if (this.cursor) {
-      const one = this.series[this.cursor[0]], i = this.cursor[1];
+      const one = this.series[this.cursor[0]],
+        i = this.cursor[1];
       pen.strokeStyle = colour("ink");
       pen.beginPath();
       pen.arc(across(one.x[i]), up(one.y[i]), 5, 0, 7);
@@ -157,52 +213,43 @@ export class Picture {
     if (this.table.open) this.fill();
   }
 
-  line(pen, colour, a, b, c, d, text, x, y) {
-    pen.strokeStyle = colour("grid");
-    pen.beginPath();
-    pen.moveTo(a, b);
-    pen.lineTo(c, d);
-    pen.stroke();
-    pen.fillStyle = colour("grey");
-    pen.fillText(text, x, y);
-  }
-
   /** The same scale on both axes. */
   square(range, ratio) {
     const [w, h] = [range.x[1] - range.x[0], range.y[1] - range.y[0]];
-    const grow = (pair, to) => { const m = (pair[0] + pair[1]) / 2; return [m - to / 2, m + to / 2]; };
-    if (w / h < ratio) range.x = grow(range.x, h * ratio); else range.y = grow(range.y, w / ratio);
+    const grow = (pair, to) => {
+      const m = (pair[0] + pair[1]) / 2;
+      return [m - to / 2, m + to / 2];
+    };
+    if (w / h < ratio) range.x = grow(range.x, h * ratio);
+    else range.y = grow(range.y, w / ratio);
   }
 
-  /** @param {CanvasRenderingContext2D} pen @param {Series} one */
-  one(pen, one, colour, across, up, height) {
-    const {x, y, kind = "line"} = one, n = x.length;
+  /** @param {CanvasRenderingContext2D} pen @param {Series} one @param {string} colour @param {Axes} frame */
+  one(pen, one, colour, frame) {
+    const {x, y, kind = "line"} = one,
+      n = x.length,
+      places = Array.from({length: kind === "bars" || kind === "cross" ? n : 0}, (_, i) => [
+        frame.across(x[i]),
+        frame.up(y[i]),
+      ]);
     pen.strokeStyle = pen.fillStyle = colour;
     pen.globalAlpha = one.alpha === undefined ? 1 : one.alpha;
-    pen.lineWidth = kind === "line" ? 1.6 : 1;
+    pen.lineWidth = kind === "line" ? 1.6 : kind === "cross" ? 2 : 1;
     pen.setLineDash(one.dash || []);
-    if (kind === "bars") {
-      for (let i = 0; i < n; i++) {
-        const a = across(x[i]), b = i + 1 < n ? across(x[i + 1]) : a + (n > 1 ? across(x[n - 1]) - across(x[n - 2]) : 20);
-        pen.fillRect(a + 0.5, up(y[i]), Math.max(1, b - a - 1), Math.max(0, height - BOTTOM - up(y[i])));
-      }
-    } else if (kind === "points") {
-      const r = n > 400 ? 1.7 : 2.6;
-      pen.beginPath();
-      for (let i = 0; i < n; i++) { if (!isFinite(y[i]) || !isFinite(x[i])) continue; const a = across(x[i]), b = up(y[i]); pen.moveTo(a + r, b); pen.arc(a, b, r, 0, 6.3); }
-      pen.fill();
-    } else if (kind === "cross") {
-      pen.lineWidth = 2;
-      pen.beginPath();
-      for (let i = 0; i < n; i++) { const a = across(x[i]), b = up(y[i]); pen.moveTo(a - 5, b - 5); pen.lineTo(a + 5, b + 5); pen.moveTo(a + 5, b - 5); pen.lineTo(a - 5, b + 5); }
-      pen.stroke();
+    if (kind === "line") frame.curve(pen, x, y);
+    else if (kind === "points") frame.points(pen, x, y, n > 400 ? 1.7 : 2.6);
+    else if (kind === "bars") {
+      places.forEach(([a, top], i) => {
+        const end = i + 1 < n ? places[i + 1][0] : a + (n > 1 ? a - places[i - 1][0] : 20);
+        pen.fillRect(a + 0.5, top, Math.max(1, end - a - 1), Math.max(0, frame.bottom - top));
+      });
     } else {
       pen.beginPath();
-      let isOn = false;
-      for (let i = 0; i < n; i++) {
-        if (!isFinite(x[i]) || !isFinite(y[i]) || Math.abs(y[i]) > 1e200) { isOn = false; continue; }
-        if (isOn) pen.lineTo(across(x[i]), up(y[i])); else pen.moveTo(across(x[i]), up(y[i]));
-        isOn = true;
+      for (const [a, b] of places) {
+        pen.moveTo(a - 5, b - 5);
+        pen.lineTo(a + 5, b + 5);
+        pen.moveTo(a + 5, b - 5);
+        pen.lineTo(a - 5, b + 5);
       }
       pen.stroke();
     }
@@ -215,47 +262,71 @@ export class Picture {
   listen() {
     /** @type {[number, number] | null} */
     let from = null;
-    const at = event => { const box = this.canvas.getBoundingClientRect(); return /** @type {[number, number]} */ ([event.clientX - box.left, event.clientY - box.top]); };
+    const at = event => {
+      const box = this.canvas.getBoundingClientRect();
+      return /** @type {[number, number]} */ ([event.clientX - box.left, event.clientY - box.top]);
+    };
     this.area.addEventListener("pointerdown", event => {
       if (!this.brushed || event.button) return;
       from = at(event);
-      try { this.area.setPointerCapture(event.pointerId); } catch { /* of a script's event */ }
+      try {
+        this.area.setPointerCapture(event.pointerId);
+      } catch {
+        /* of a script's event */
+      }
     });
     this.area.addEventListener("pointermove", event => {
       const [x, y] = at(event);
-      if (from) { this.setBrush(from, [x, y]); return; }
+      if (from) {
+        this.setBrush(from, [x, y]);
+        return;
+      }
       this.nearest(x, y);
     });
     this.area.addEventListener("pointerup", event => {
       if (!from) return;
-      const to = at(event), isDrag = Math.hypot(to[0] - from[0], to[1] - from[1]) > 5;
-      if (!isDrag) this.brush = null; else this.setBrush(from, to);
+      const to = at(event),
+        isDrag = Math.hypot(to[0] - from[0], to[1] - from[1]) > 5;
+      if (!isDrag) this.brush = null;
+      else this.setBrush(from, to);
       from = null;
       this.later();
       if (this.brushed) this.brushed(this.brush);
     });
-    this.area.addEventListener("pointerleave", () => { if (this.cursor) { this.cursor = null; this.said.textContent = ""; this.later(); } });
+    this.area.addEventListener("pointerleave", () => {
+      if (this.cursor) {
+        this.cursor = null;
+        this.said.textContent = "";
+        this.later();
+      }
+    });
   }
 
   setBrush(a, b) {
-    const {back} = /** @type {any} */ (this);
-    if (!back) return;
+    const {drawn} = this;
+    if (!drawn) return;
     const isBars = this.series.some(({kind}) => kind === "bars");
-    const x = [back.x(Math.min(a[0], b[0])), back.x(Math.max(a[0], b[0]))];
-    const y = isBars ? [back.y(this.height - BOTTOM), back.y(TOP)] : [back.y(Math.max(a[1], b[1])), back.y(Math.min(a[1], b[1]))];
+    const x = [drawn.xAt(Math.min(a[0], b[0])), drawn.xAt(Math.max(a[0], b[0]))];
+    const y = isBars
+      ? [drawn.yAt(drawn.bottom), drawn.yAt(TOP)]
+      : [drawn.yAt(Math.max(a[1], b[1])), drawn.yAt(Math.min(a[1], b[1]))];
     this.brush = {x: /** @type {[number, number]} */ (x), y: /** @type {[number, number]} */ (y)};
     this.later();
   }
 
   nearest(px, py) {
-    const {across, up} = /** @type {any} */ (this);
-    if (!across) return;
-    let best = 26 * 26, found = null;
+    const {drawn} = this;
+    if (!drawn) return;
+    let best = 26 * 26,
+      found = null;
     this.series.forEach((one, s) => {
       if (one.quiet) return;
       for (let i = 0; i < one.x.length; i++) {
-        const far = (across(one.x[i]) - px) ** 2 + (up(one.y[i]) - py) ** 2;
-        if (far < best) { best = far; found = [s, i]; }
+        const far = (drawn.across(one.x[i]) - px) ** 2 + (drawn.up(one.y[i]) - py) ** 2;
+        if (far < best) {
+          best = far;
+          found = [s, i];
+        }
       }
     });
     this.cursor = found;
@@ -263,21 +334,35 @@ export class Picture {
   }
 
   tell() {
-    if (!this.cursor) { this.said.textContent = ""; this.later(); return; }
-    const one = this.series[this.cursor[0]], i = this.cursor[1], {axes} = this;
+    if (!this.cursor) {
+      this.said.textContent = "";
+      this.later();
+      return;
+    }
+    const one = this.series[this.cursor[0]],
+      i = this.cursor[1],
+      {axes} = this;
     const unit = text => (text ? `\u00a0${text}` : "");
-    this.said.textContent = `${one.name ? one.name + ": " : ""}${axes.x} ${number(one.x[i], 5)}${unit(axes.xUnit)}, ${axes.y} ${number(one.y[i], 5)}${unit(axes.yUnit)}`;
+    this.said.textContent =
+      `${one.name ? one.name + ": " : ""}${axes.x} ${number(one.x[i], 5)}${unit(axes.xUnit)}, `
+      + `${axes.y} ${number(one.y[i], 5)}${unit(axes.yUnit)}`;
     this.later();
   }
 
   key(event) {
     const rows = this.series.map((one, k) => (one.quiet ? -1 : k)).filter(k => k >= 0 && this.series[k].x.length);
     if (!rows.length) return;
-    if (event.key === "Escape" && this.brushed) { this.brush = null; this.later(); this.brushed(null); return; }
+    if (event.key === "Escape" && this.brushed) {
+      this.brush = null;
+      this.later();
+      this.brushed(null);
+      return;
+    }
     let [s, i] = this.cursor || [rows[0], -1];
     const by = {ArrowRight: 1, ArrowLeft: -1, PageDown: 10, PageUp: -10}[event.key];
     if (by) i = Math.max(0, Math.min(this.series[s].x.length - 1, i + by));
-    else if (event.key === "ArrowDown" || event.key === "ArrowUp") s = rows[(rows.indexOf(s) + (event.key === "ArrowDown" ? 1 : rows.length - 1)) % rows.length];
+    else if (event.key === "ArrowDown" || event.key === "ArrowUp")
+      s = rows[(rows.indexOf(s) + (event.key === "ArrowDown" ? 1 : rows.length - 1)) % rows.length];
     else if (event.key === "Home") i = 0;
     else if (event.key === "End") i = this.series[s].x.length - 1;
     else return;
@@ -286,9 +371,10 @@ export class Picture {
     this.cursor = [s, i];
     if (event.shiftKey && this.brushed) {
       // From where it began to the cursor, over the whole height.
-      const {back} = /** @type {any} */ (this), x = this.series[s].x[i];
+      const {drawn} = this,
+        x = this.series[s].x[i];
       this.anchor = this.brush && this.anchor !== undefined ? this.anchor : x;
-      const y = back ? [back.y(this.height - BOTTOM), back.y(TOP)] : [-Infinity, Infinity];
+      const y = drawn ? [drawn.yAt(drawn.bottom), drawn.yAt(TOP)] : [-Infinity, Infinity];
       this.brush = {x: [Math.min(this.anchor, x), Math.max(this.anchor, x)], y: /** @type {[number, number]} */ (y)};
       this.brushed(this.brush);
     }
@@ -298,14 +384,32 @@ export class Picture {
   /** The values of the table that is open. */
   fill() {
     if (!this.table.open) return;
-    const {axes} = this, unit = text => (text ? ` (${text})` : "");
-    const tables = this.series.filter(one => !one.quiet).map(one => {
-      const thin = Math.max(1, Math.ceil(one.x.length / ROWS)), rows = [];
-      for (let i = 0; i < one.x.length; i += thin) rows.push(element("tr", {}, element("td", {}, number(one.x[i], 6)), element("td", {}, number(one.y[i], 6))));
-      return element("table", {}, one.name ? element("caption", {}, one.name) : null,
-        element("thead", {}, element("tr", {}, element("th", {scope: "col"}, axes.x + unit(axes.xUnit)), element("th", {scope: "col"}, axes.y + unit(axes.yUnit)))),
-        element("tbody", {}, ...rows));
-    });
+    const {axes} = this,
+      unit = text => (text ? ` (${text})` : "");
+    const tables = this.series
+      .filter(one => !one.quiet)
+      .map(one => {
+        const thin = Math.max(1, Math.ceil(one.x.length / ROWS)),
+          rows = [];
+        for (let i = 0; i < one.x.length; i += thin)
+          rows.push(element("tr", {}, element("td", {}, number(one.x[i], 6)), element("td", {}, number(one.y[i], 6))));
+        return element(
+          "table",
+          {},
+          one.name ? element("caption", {}, one.name) : null,
+          element(
+            "thead",
+            {},
+            element(
+              "tr",
+              {},
+              element("th", {scope: "col"}, axes.x + unit(axes.xUnit)),
+              element("th", {scope: "col"}, axes.y + unit(axes.yUnit)),
+            ),
+          ),
+          element("tbody", {}, ...rows),
+        );
+      });
     this.table.lastElementChild.replaceChildren(...tables);
   }
 }
@@ -316,10 +420,21 @@ export function histogram(values, parts = 0, range) {
   const good = values.filter(isFinite);
   if (!good.length) return {x: [], y: []};
   let [low, high] = range || [Math.min(...good.slice(0, 1)), good[0]];
-  if (!range) for (const value of good) { low = Math.min(low, value); high = Math.max(high, value); }
-  if (high === low) { low -= Math.abs(low) * 0.05 || 0.5; high += Math.abs(high) * 0.05 || 0.5; }
+  if (!range)
+    for (const value of good) {
+      low = Math.min(low, value);
+      high = Math.max(high, value);
+    }
+  if (high === low) {
+    low -= Math.abs(low) * 0.05 || 0.5;
+    high += Math.abs(high) * 0.05 || 0.5;
+  }
   const n = parts || Math.max(8, Math.min(40, Math.round(2 * Math.cbrt(good.length) * 1.5)));
-  const y = new Array(n).fill(0), x = Array.from({length: n}, (_, k) => low + (high - low) * k / n);
-  for (const value of good) { const k = Math.floor((value - low) / (high - low) * n); if (k >= 0 && k <= n) y[Math.min(n - 1, k)]++; }
+  const y = new Array(n).fill(0),
+    x = Array.from({length: n}, (_, k) => low + ((high - low) * k) / n);
+  for (const value of good) {
+    const k = Math.floor(((value - low) / (high - low)) * n);
+    if (k >= 0 && k <= n) y[Math.min(n - 1, k)]++;
+  }
   return {x, y};
 }

@@ -1,43 +1,87 @@
 // @ts-check
-// The plots of a run on canvases: all share the part of time that is seen, and the cursor. Each can be used by keys, and
-// has its values as a table.
-import {element, fold, number, time as timeText, download, fileName, tell} from "./format.js";
+// The plots of a run on canvases: all share the part of time that is seen, and the cursor. Each can be used by keys,
+// and has its values as a table.
+import {element, fold, number, time as timeText, download, fileName, isOutOfView, tell} from "./format.js";
 import {lowerBound} from "./app.js";
-import {COLOURS, Path, density, line, sized, step, ticks} from "./pen.js";
+import {Axes, COLOURS, density, line, sized, step, ticks} from "./pen.js";
 
 /** @typedef {import("./app.js").App} App */
 /** @typedef {import("./wire.js").Answer} Answer */
 
-const LEFT = 66, RIGHT = 12, TOP = 8, BOTTOM = 24, HEIGHT = 170, TABLE_ROWS = 50;
+const LEFT = 66,
+  RIGHT = 12,
+  TOP = 8,
+  BOTTOM = 24,
+  MARGINS = {left: LEFT, right: RIGHT, top: TOP, bottom: BOTTOM},
+  HEIGHT = 170,
+  SMALL_HEIGHT = 120,
+  TABLE_ROWS = 50;
 /** Time without a change, ms, after which values in legends out of sight catch up. */
 const REST = 200;
 const DASHES = [[], [], [7, 4], [2, 3]];
 /** States of a body: stuck, forward, backward, and sliding without dry friction. */
-const STATES = new Map([[0, ["stuck", "grey"]], [1, ["forward", "blue"]], [-1, ["backward", "verm"]], [2, ["sliding", "green"]]]);
+const STATES = new Map([
+  [0, ["stuck", "grey"]],
+  [1, ["forward", "blue"]],
+  [-1, ["backward", "verm"]],
+  [2, ["sliding", "green"]],
+]);
 
 export class Plots {
-  /** @param {HTMLElement} root @param {App} app */
-  constructor(root, app) {
+  /** @param {HTMLElement} root @param {App} app @param {(panel: any) => boolean} [isWanted] tells which panels have a
+   * plot here */
+  constructor(root, app, isWanted = panel => panel.title) {
     this.root = root;
     this.app = app;
+    this.isWanted = isWanted;
     /** @type {Plot[]} */
     this.plots = [];
     this.shape = "";
     this.colours = {};
+    /** Height of the curves, pixels. */
+    this.tall = 0;
     /** The states strip and its like are not to be hidden by what a panel is called. */
-    app.on("run", () => { this.build(); this.later(); });
-    for (const what of /** @type {const} */ (["window", "compare", "cursor"])) app.on(what, () => this.later(what === "cursor"));
-    app.on("theme", () => { this.readColours(); this.later(); });
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { this.readColours(); this.later(); });
-    new ResizeObserver(() => { for (const plot of this.plots) plot.measure(); this.later(); }).observe(root);
+    for (const what of /** @type {const} */ (["run", "view"])) {
+      app.on(what, () => {
+        this.build();
+        this.later();
+      });
+    }
+    for (const what of /** @type {const} */ (["window", "compare", "cursor"]))
+      app.on(what, () => this.later(what === "cursor"));
+    app.on("theme", () => {
+      this.readColours();
+      this.later();
+    });
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
+      this.readColours();
+      this.later();
+    });
+    const isSmall = matchMedia("(max-width: 52rem), (max-height: 34rem)");
+    new ResizeObserver(() => {
+      this.tall = isSmall.matches ? SMALL_HEIGHT : HEIGHT;
+      for (const plot of this.plots) plot.measure();
+      this.later();
+    }).observe(root);
     // A plot that is scrolled out of sight is drawn when it comes in: pictures of a drag are of what is looked at.
-    this.sight = new IntersectionObserver(entries => {
-      for (const {target, isIntersecting} of entries) {
-        const plot = this.plots.find(({area}) => area === target);
-        if (plot) { plot.isSeen = isIntersecting; plot.catchUp(); }
-      }
-    }, {rootMargin: "150px"});
-    addEventListener("beforeprint", () => this.plots.forEach(plot => { plot.isSeen = true; plot.catchUp(); }));
+    this.sight = new IntersectionObserver(
+      entries => {
+        for (const {target, isIntersecting} of entries) {
+          const plot = this.plots.find(({area}) => area === target);
+          if (plot) {
+            plot.isSeen = isIntersecting;
+            plot.catchUp();
+          }
+        }
+      },
+      {rootMargin: "150px"},
+    );
+    addEventListener("beforeprint", () =>
+      this.plots.forEach(plot => {
+        plot.isSeen = true;
+        plot.catchUp();
+      }),
+    );
     this.readColours();
     this.frame = 0;
     this.rest = 0;
@@ -54,9 +98,14 @@ export class Plots {
   build() {
     const {run} = this.app;
     if (!run) return;
-    const panels = run.head.panels.filter(panel => panel.title);
+    const panels = run.head.panels.filter(panel => this.isWanted(panel));
     const shape = JSON.stringify(panels.map(panel => [panel.key, panel.curves]));
-    if (shape === this.shape) { this.plots.forEach((plot, i) => { plot.panel = panels[i]; }); return; }
+    if (shape === this.shape) {
+      this.plots.forEach((plot, i) => {
+        plot.panel = panels[i];
+      });
+      return;
+    }
     this.shape = shape;
     this.plots = panels.map(panel => new Plot(panel, this));
     this.root.replaceChildren(...this.plots.map(plot => plot.figure));
@@ -66,22 +115,31 @@ export class Plots {
 
   /** Draws with the next picture. @param {boolean} [onlyCursor] */
   later(onlyCursor = false) {
+    // A view that is shown again is drawn anew.
+    if (isOutOfView(this.root)) return;
     if (!onlyCursor) this.onlyCursor = false;
     clearTimeout(this.rest);
-    this.rest = setTimeout(() => { for (const plot of this.plots) plot.tellValues(); }, REST);
+    this.rest = setTimeout(() => {
+      for (const plot of this.plots) plot.tellValues();
+    }, REST);
     if (this.frame) return;
     this.frame = requestAnimationFrame(() => {
       this.frame = 0;
       const all = !this.onlyCursor;
       this.onlyCursor = true;
       if (!this.root.clientWidth) return;
-      for (const plot of this.plots) { if (all) plot.isStale = true; plot.catchUp(); }
+      for (const plot of this.plots) {
+        if (all) plot.isStale = true;
+        plot.catchUp();
+      }
       this.app.drawn = this.app.run;
     });
   }
 
   /** The part of time that is seen. @returns {[number, number]} */
-  get seen() { return this.app.window || [0, this.app.until]; }
+  get seen() {
+    return this.app.window || [0, this.app.until];
+  }
 }
 
 class Plot {
@@ -110,24 +168,60 @@ class Plot {
     /** @type {{shape: string, answers: Answer[]}} */
     this.grounded = {shape: "", answers: []};
     this.over = element("canvas", {class: "over", "aria-hidden": "true"});
-    const words = `${panel.words}${panel.unit ? ", in " + panel.unit : ""}. Arrow keys move the cursor, with Shift they slide what is seen; plus, minus and 0 zoom.`;
-    this.area = element("div", {
-      class: "area", tabindex: "0", role: "application", "aria-roledescription": "plot", "aria-label": `${panel.title} over time`,
-      "aria-description": words,
-    }, this.canvas, this.over);
+    const words =
+      `${panel.words}${panel.unit ? ", in " + panel.unit : ""}. `
+      + `Arrow keys move the cursor, with Shift they slide what is seen; plus, minus and 0 zoom.`;
+    this.area = element(
+      "div",
+      {
+        class: "area",
+        tabindex: "0",
+        role: "application",
+        "aria-roledescription": "plot",
+        "aria-label": `${panel.title} over time`,
+        "aria-description": words,
+      },
+      this.canvas,
+      this.over,
+    );
     this.legend = element("div", {class: "legend"});
     this.values = [];
     panel.curves.forEach((curve, k) => this.addEntry(curve, k));
     const table = fold({class: "data", ontoggle: () => this.fill(table)}, "Values", `Values of ${panel.title}`);
     this.table = table;
-    const keep = fold({class: "menu keep"}, "Keep", `Keep ${panel.title}`,
-      element("div", {},
+    const keep = fold(
+      {class: "menu keep"},
+      "Keep",
+      `Keep ${panel.title}`,
+      element(
+        "div",
+        {},
         element("button", {type: "button", onclick: () => this.png()}, "PNG"),
-        element("button", {type: "button", onclick: () => download(this.fileName("svg"), this.svg(), "image/svg+xml")}, "SVG"),
-        element("button", {type: "button", onclick: () => download(this.fileName("csv"), this.csv(), "text/csv")}, "CSV")));
-    this.figure = element("figure", {class: "live-plot", "data-panel": panel.key, "aria-label": panel.title},
-      element("figcaption", {}, element("h3", {}, panel.title, panel.unit ? element("span", {class: "quiet"}, " " + panel.unit) : ""), this.legend, keep),
-      this.area, table);
+        element(
+          "button",
+          {type: "button", onclick: () => download(this.fileName("svg"), this.svg(), "image/svg+xml")},
+          "SVG",
+        ),
+        element(
+          "button",
+          {type: "button", onclick: () => download(this.fileName("csv"), this.csv(), "text/csv")},
+          "CSV",
+        ),
+      ),
+    );
+    this.figure = element(
+      "figure",
+      {class: "live-plot", "data-panel": panel.key, "aria-label": panel.title},
+      element(
+        "figcaption",
+        {},
+        element("h3", {}, panel.title, panel.unit ? element("span", {class: "quiet"}, " " + panel.unit) : ""),
+        this.legend,
+        keep,
+      ),
+      this.area,
+      table,
+    );
     this.listen();
   }
 
@@ -136,26 +230,53 @@ class Plot {
     const value = element("span", {class: "value"});
     this.values.push(value);
     const colour = this.isStates ? "ink" : COLOURS[k % COLOURS.length];
-    const entry = element("button", {
-      type: "button", role: "switch", "aria-checked": "true", class: "entry", onclick: () => {
-        if (!this.hidden.delete(curve.key)) this.hidden.add(curve.key);
-        entry.setAttribute("aria-checked", String(!this.hidden.has(curve.key)));
-        this.plots.later();
+    const entry = element(
+      "button",
+      {
+        type: "button",
+        role: "switch",
+        "aria-checked": "true",
+        class: "entry",
+        onclick: () => {
+          if (!this.hidden.delete(curve.key)) this.hidden.add(curve.key);
+          entry.setAttribute("aria-checked", String(!this.hidden.has(curve.key)));
+          this.plots.later();
+        },
       },
-    }, element("i", {class: `t-${colour}${DASHES[k % 4].length ? " dashed" : ""}`}), curve.name);
+      element("i", {class: `t-${colour}${DASHES[k % 4].length ? " dashed" : ""}`}),
+      curve.name,
+    );
     this.legend.append(element("span", {}, entry, value));
   }
 
-  fileName(ending) { return `${fileName(this.plots.app.run ? this.plots.app.run.head.title : "run")}-${this.panel.key}.${ending}`; }
+  fileName(ending) {
+    return `${fileName(this.plots.app.run ? this.plots.app.run.head.title : "run")}-${this.panel.key}.${ending}`;
+  }
 
   // ---- Drawing
 
-  get width() { return Math.max(200, this.wide || this.measure()); }
-  measure() { return this.wide = this.area.clientWidth; }
-  get height() { return this.isStates ? 26 + 22 * this.panel.curves.length + BOTTOM : HEIGHT + BOTTOM; }
-  across(time) { const [a, b] = this.plots.seen; return LEFT + (this.width - LEFT - RIGHT) * (time - a) / (b - a); }
-  timeAt(x) { const [a, b] = this.plots.seen; return a + (b - a) * (x - LEFT) / (this.width - LEFT - RIGHT); }
-  up(value) { const {low, high} = this.range || {low: 0, high: 1}; return TOP + (this.height - TOP - BOTTOM) * (high - value) / (high - low); }
+  get width() {
+    return Math.max(200, this.wide || this.measure());
+  }
+  measure() {
+    return (this.wide = this.area.clientWidth);
+  }
+  get height() {
+    return (this.isStates ? 26 + 22 * this.panel.curves.length : this.plots.tall) + BOTTOM;
+  }
+  get axes() {
+    const {low, high} = this.range || {low: 0, high: 1};
+    return new Axes(this, MARGINS, this.plots.seen, [low, high]);
+  }
+  across(time) {
+    return this.axes.across(time);
+  }
+  timeAt(x) {
+    return this.axes.xAt(x);
+  }
+  up(value) {
+    return this.axes.up(value);
+  }
 
   /** The runs that are drawn, from the lowest: pins, the run before, the run itself. */
   layers() {
@@ -168,7 +289,8 @@ class Plot {
 
   /** The rows of a curve that are seen: those of the finer section where there is one for all of it. */
   rows(answer, key) {
-    const {app} = this.plots, [from, to] = this.plots.seen;
+    const {app} = this.plots,
+      [from, to] = this.plots.seen;
     if (answer === app.run && app.window && app.section) {
       const {head, columns} = app.section;
       if (head.from <= from + 1e-9 * (to - from) && head.to >= to - 1e-9 * (to - from) && columns.get(key))
@@ -187,20 +309,24 @@ class Plot {
   draw() {
     this.isStale = false;
     const pen = sized(this.canvas, this);
-    if (this.isStates) this.drawStates(pen); else this.drawCurves(pen);
+    if (this.isStates) this.drawStates(pen);
+    else this.drawCurves(pen);
     if (this.table.open) this.fill(this.table);
   }
 
   /** The range of what is seen; it changes only where it has to, so that a drag does not shake the axis. */
   fit() {
-    const {scale} = this.panel, [from, to] = this.plots.seen;
-    let low = Infinity, high = -Infinity;
+    const {scale} = this.panel,
+      [from, to] = this.plots.seen;
+    let low = Infinity,
+      high = -Infinity;
     for (const {answer} of this.layers()) {
       for (const {key} of this.panel.curves) {
         if (this.hidden.has(key)) continue;
         const {x, y} = this.rows(answer, key);
         if (!x || !y) continue;
-        const first = Math.max(0, lowerBound(x, from) - 1), last = Math.min(x.length, lowerBound(x, to) + 2);
+        const first = Math.max(0, lowerBound(x, from) - 1),
+          last = Math.min(x.length, lowerBound(x, to) + 2);
         for (let i = first; i < last; i++) {
           const value = y[i] * scale;
           if (value < low) low = value;
@@ -208,20 +334,32 @@ class Plot {
         }
       }
     }
-    if (!(high >= low)) { low = 0; high = 1; }
+    if (!(high >= low)) {
+      low = 0;
+      high = 1;
+    }
     const least = Math.max(1e-9 * Math.max(Math.abs(low), Math.abs(high)), 1e-12);
-    if (high - low < least) { const m = (high + low) / 2; low = m - Math.max(least, Math.abs(m) * 0.1, 1e-9); high = m + Math.max(least, Math.abs(m) * 0.1, 1e-9); }
-    const {range} = this, span = high - low;
+    if (high - low < least) {
+      const m = (high + low) / 2;
+      low = m - Math.max(least, Math.abs(m) * 0.1, 1e-9);
+      high = m + Math.max(least, Math.abs(m) * 0.1, 1e-9);
+    }
+    const {range} = this,
+      span = high - low;
     if (range && low >= range.low && high <= range.high && span > 0.55 * (range.high - range.low)) return;
-    const by = step(span, 4), grown = 0.04 * span;
-    this.range = {low: Math.floor((low - grown) / (by / 2)) * (by / 2), high: Math.ceil((high + grown) / (by / 2)) * (by / 2)};
+    const by = step(span, 4),
+      grown = 0.04 * span;
+    this.range = {
+      low: Math.floor((low - grown) / (by / 2)) * (by / 2),
+      high: Math.ceil((high + grown) / (by / 2)) * (by / 2),
+    };
   }
 
   /** @param {CanvasRenderingContext2D} pen */
   drawCurves(pen) {
     this.fit();
     pen.drawImage(this.ground(), 0, 0, this.width, this.height);
-    this.clip(pen);
+    this.axes.clip(pen);
     this.marks(pen);
     for (const layer of this.layers()) if (layer.style === "now") this.strokes(pen, layer);
     pen.restore();
@@ -230,26 +368,32 @@ class Plot {
   /** The grid, and the curves that stay during a drag: drawn anew only where one of them, the range or the colours
    * change. @returns {HTMLCanvasElement} */
   ground() {
-    const {colours, seen} = this.plots, {width, height} = this, range = /** @type {{low: number, high: number}} */ (this.range);
+    const {colours, seen} = this.plots,
+      {width, height} = this,
+      range = /** @type {{low: number, high: number}} */ (this.range);
     const below = this.layers().filter(({style}) => style !== "now");
-    const shape = JSON.stringify([width, height, density(), range, seen, [...this.hidden], colours, below.map(({style}) => style)]);
+    const shape = JSON.stringify([
+      width,
+      height,
+      density(),
+      range,
+      seen,
+      [...this.hidden],
+      colours,
+      below.map(({style}) => style),
+    ]);
     const isSame = shape === this.grounded.shape && below.every(({answer}, k) => answer === this.grounded.answers[k]);
     if (isSame) return this.back;
     this.grounded = {shape, answers: below.map(({answer}) => answer)};
     const pen = sized(this.back, this);
-    this.grid(pen, ticks(range.low, range.high, 4).map(value => [this.up(value), number(value, 6)]));
-    this.clip(pen);
+    this.grid(
+      pen,
+      ticks(range.low, range.high, 4).map(value => [value, number(value, 6)]),
+    );
+    this.axes.clip(pen);
     for (const layer of below) this.strokes(pen, layer);
     pen.restore();
     return this.back;
-  }
-
-  /** Keeps what follows within the axes, until the pen is restored. @param {CanvasRenderingContext2D} pen */
-  clip(pen) {
-    pen.save();
-    pen.beginPath();
-    pen.rect(LEFT, TOP - 2, this.width - LEFT - RIGHT, this.height - TOP - BOTTOM + 4);
-    pen.clip();
   }
 
   /** All curves of a run. @param {CanvasRenderingContext2D} pen @param {{answer: Answer, style: string}} layer */
@@ -270,73 +414,58 @@ class Plot {
   /** Draws what is seen of a curve: all points, or the least and greatest of those that share a pixel.
    * @param {CanvasRenderingContext2D} pen @param {Float64Array} x @param {Float64Array} y */
   curve(pen, x, y) {
-    const [from, to] = this.plots.seen, {scale} = this.panel, {low, high} = /** @type {any} */ (this.range);
-    const kx = (this.width - LEFT - RIGHT) / (to - from), ky = (this.height - TOP - BOTTOM) / (high - low);
-    const first = Math.max(0, lowerBound(x, from) - 1), last = Math.min(x.length, lowerBound(x, to) + 1);
-    const together = Math.max(1, Math.floor((last - first) / (this.width - LEFT - RIGHT)));
+    const [from, to] = this.plots.seen,
+      {axes} = this;
+    const first = Math.max(0, lowerBound(x, from) - 1),
+      last = Math.min(x.length, lowerBound(x, to) + 1);
+    const part = {first, last, together: Math.max(1, Math.floor((last - first) / axes.wide)), scale: this.panel.scale};
     // Dashes of what is dense show nothing, and cost most of a picture.
-    if (together > 2) pen.setLineDash([]);
-    const path = new Path(pen);
-    for (let i = first; i < last; i += together) {
-      let least = i, greatest = i;
-      const end = Math.min(last, i + together);
-      for (let j = i + 1; j < end; j++) {
-        if (y[j] < y[least]) least = j;
-        if (y[j] > y[greatest]) greatest = j;
-      }
-      const a = Math.min(least, greatest), b = Math.max(least, greatest);
-      path.to(LEFT + (x[a] - from) * kx, TOP + (high - y[a] * scale) * ky);
-      if (b !== a) path.to(LEFT + (x[b] - from) * kx, TOP + (high - y[b] * scale) * ky);
-    }
-    path.stroke();
-    if (last - first < (this.width - LEFT) / 9 && pen.globalAlpha === 1) {
+    if (part.together > 2) pen.setLineDash([]);
+    axes.curve(pen, x, y, part);
+    if (last - first < axes.wide / 9 && pen.globalAlpha === 1) {
       pen.fillStyle = pen.strokeStyle;
-      for (let i = first; i < last; i++) {
-        pen.beginPath();
-        pen.arc(LEFT + (x[i] - from) * kx, TOP + (high - y[i] * scale) * ky, 2.1, 0, 7);
-        pen.fill();
-      }
+      axes.points(pen, x, y, 2.1, part);
     }
   }
 
   /** Lines at the events. @param {CanvasRenderingContext2D} pen */
   marks(pen) {
-    const {app, colours} = this.plots, [from, to] = this.plots.seen;
+    const {app, colours} = this.plots,
+      [from, to] = this.plots.seen;
     if (!app.run) return;
     const seen = app.run.head.events.filter(event => event.time >= from && event.time <= to);
     if (seen.length > 120) return;
     pen.strokeStyle = colours.grid;
-    pen.lineWidth = 1;
     pen.setLineDash([2, 2]);
-    pen.beginPath();
-    for (const event of seen) {
-      const x = this.across(event.time);
-      pen.moveTo(x, TOP);
-      pen.lineTo(x, this.height - BOTTOM);
-    }
-    pen.stroke();
-    pen.setLineDash([]);
+    this.axes.marks(
+      pen,
+      seen.map(event => ({x: event.time})),
+    );
   }
 
   /** A strip for each body, and the events on it. @param {CanvasRenderingContext2D} pen */
   drawStates(pen) {
-    const {app, colours} = this.plots, {width, height} = this;
+    const {app, colours} = this.plots,
+      {width, height} = this;
     this.grid(pen, []);
     if (!app.run) return;
     pen.save();
     pen.font = "12px system-ui, sans-serif";
     this.panel.curves.forEach(({key, name}, k) => {
-      const {x, y} = this.rows(app.run, key), top = TOP + 6 + 22 * k;
+      const {x, y} = this.rows(app.run, key),
+        top = TOP + 6 + 22 * k;
       pen.fillStyle = colours.grey;
       pen.textAlign = "right";
       pen.fillText(name.split(" ")[0], LEFT - 8, top + 11);
       if (this.hidden.has(key) || !x || !y) return;
-      const from = Math.max(0, lowerBound(x, this.plots.seen[0]) - 1), to = Math.min(x.length - 1, lowerBound(x, this.plots.seen[1]) + 1);
+      const from = Math.max(0, lowerBound(x, this.plots.seen[0]) - 1),
+        to = Math.min(x.length - 1, lowerBound(x, this.plots.seen[1]) + 1);
       for (let i = from; i < to;) {
         let j = i;
         while (j < to && y[j] === y[i]) j++;
         const [, colour] = STATES.get(y[i]) || ["", "grey"];
-        const a = Math.max(LEFT, this.across(x[i])), b = Math.min(width - RIGHT, this.across(x[j]));
+        const a = Math.max(LEFT, this.across(x[i])),
+          b = Math.min(width - RIGHT, this.across(x[j]));
         pen.fillStyle = colours[colour];
         pen.globalAlpha = y[i] === 0 ? 0.28 : 0.75;
         if (b > a) pen.fillRect(a, y[i] === 0 ? top + 5 : top, b - a, y[i] === 0 ? 5 : 15);
@@ -347,7 +476,8 @@ class Plot {
     pen.strokeStyle = colours.ink;
     pen.lineWidth = 1;
     for (const {time, body} of app.run.head.events) {
-      const x = this.across(time), place = body === null ? -1 : body;
+      const x = this.across(time),
+        place = body === null ? -1 : body;
       if (x < LEFT || x > width - RIGHT || place < 0) continue;
       pen.beginPath();
       pen.moveTo(x, TOP + 4 + 22 * place);
@@ -360,37 +490,26 @@ class Plot {
 
   /** @param {CanvasRenderingContext2D} pen @param {[number, string][]} rows */
   grid(pen, rows) {
-    const {colours} = this.plots, {width, height} = this, [from, to] = this.plots.seen, bottom = height - BOTTOM;
-    pen.font = "12px system-ui, sans-serif";
-    pen.lineWidth = 1;
-    pen.setLineDash([]);
-    pen.globalAlpha = 1;
-    pen.strokeStyle = colours.grid;
-    pen.fillStyle = colours.grey;
-    pen.textAlign = "right";
-    for (const [y, text] of rows) {
-      line(pen, LEFT, y, width - RIGHT, y);
-      pen.fillText(text, LEFT - 8, y + 4);
-    }
-    pen.textAlign = "center";
-    const by = step(to - from, (width - LEFT) / 80);
-    for (const value of ticks(from, to, (width - LEFT) / 80)) {
-      const x = this.across(value);
-      line(pen, x, TOP, x, bottom);
+    const {colours} = this.plots,
+      [from, to] = this.plots.seen,
+      {axes} = this;
+    const most = axes.wide / 80,
+      by = step(to - from, most),
       // Far in, what counts is the distance from the left.
-      const text = to - from < 1e-3 * Math.abs(from) ? "+" + timeText(value - from, by) : timeText(value, by);
-      if (x < width - 16) pen.fillText(text, Math.max(LEFT, x), bottom + 16);
-    }
-    if (to - from < 1e-3 * Math.abs(from)) {
-      pen.textAlign = "left";
-      pen.fillText(number(from, 9) + " s", 2, bottom + 16);
-    }
-    pen.strokeStyle = colours.axis;
-    line(pen, LEFT, bottom, width - RIGHT, bottom);
+      isFar = to - from < 1e-3 * Math.abs(from);
+    const columns = /** @type {[number, string][]} */ (
+      ticks(from, to, most).map(value => [value, isFar ? "+" + timeText(value - from, by) : timeText(value, by)])
+    );
+    axes.grid(pen, colours, columns, rows);
+    if (!isFar) return;
+    pen.textAlign = "left";
+    pen.fillText(number(from, 9) + " s", 2, axes.bottom + 16);
   }
 
   drawCursor() {
-    const {app, colours} = this.plots, {width, height, press} = this, x = this.across(app.cursor);
+    const {app, colours} = this.plots,
+      {width, height, press} = this,
+      x = this.across(app.cursor);
     const isInside = x >= LEFT && x <= width - RIGHT;
     /** @type {[string, number][]} */
     const dots = [];
@@ -439,7 +558,8 @@ class Plot {
   // ---- Pointers and keys
 
   listen() {
-    const {area, plots} = this, {app} = plots;
+    const {area, plots} = this,
+      {app} = plots;
     const spot = event => event.clientX - area.getBoundingClientRect().left;
     area.addEventListener("pointerdown", event => {
       if (event.button) return;
@@ -447,10 +567,14 @@ class Plot {
       if (event.pointerType !== "touch") area.setPointerCapture(event.pointerId);
     });
     area.addEventListener("pointermove", event => {
-      const x = spot(event), {press} = this;
-      if (!press) { if (!app.isPlaying && event.pointerType === "mouse") app.seek(this.timeAt(x)); return; }
+      const x = spot(event),
+        {press} = this;
+      if (!press) {
+        if (!app.isPlaying && event.pointerType === "mouse") app.seek(this.timeAt(x));
+        return;
+      }
       if (press.pans && app.window && event.pointerType !== "touch") {
-        const by = (press.x - x) / (this.width - LEFT - RIGHT) * (press.window[1] - press.window[0]);
+        const by = ((press.x - x) / (this.width - LEFT - RIGHT)) * (press.window[1] - press.window[0]);
         this.slide(press.window, by);
       } else if (!press.pans) {
         press.to = Math.max(LEFT, Math.min(this.width - RIGHT, x));
@@ -458,26 +582,38 @@ class Plot {
       }
     });
     const release = event => {
-      const x = spot(event), {press} = this;
+      const x = spot(event),
+        {press} = this;
       this.press = null;
       if (!press || event.type === "pointercancel") return;
-      if (!press.pans && Math.abs(x - press.x) > 8) app.look(/** @type {[number, number]} */ ([this.timeAt(press.x), this.timeAt(press.to)].sort((a, b) => a - b)));
-      else if (Math.abs(x - press.x) <= 8) { app.isPlaying = false; app.tell("play"); app.seek(this.timeAt(x)); }
+      if (!press.pans && Math.abs(x - press.x) > 8)
+        app.look(/** @type {[number, number]} */ ([this.timeAt(press.x), this.timeAt(press.to)].sort((a, b) => a - b)));
+      else if (Math.abs(x - press.x) <= 8) {
+        app.isPlaying = false;
+        app.tell("play");
+        app.seek(this.timeAt(x));
+      }
       plots.later(true);
     };
     area.addEventListener("pointerup", release);
     area.addEventListener("pointercancel", release);
     area.addEventListener("dblclick", () => app.look(null));
-    area.addEventListener("wheel", event => {
-      if (!(event.ctrlKey || event.metaKey)) return;
-      event.preventDefault();
-      this.zoom(Math.exp(0.002 * event.deltaY), this.timeAt(spot(event)));
-    }, {passive: false});
+    area.addEventListener(
+      "wheel",
+      event => {
+        if (!(event.ctrlKey || event.metaKey)) return;
+        event.preventDefault();
+        this.zoom(Math.exp(0.002 * event.deltaY), this.timeAt(spot(event)));
+      },
+      {passive: false},
+    );
     area.addEventListener("keydown", event => this.key(event));
   }
 
   slide([from, to], by) {
-    const {app} = this.plots, span = to - from, start = Math.max(0, Math.min(app.until - span, from + by));
+    const {app} = this.plots,
+      span = to - from,
+      start = Math.max(0, Math.min(app.until - span, from + by));
     app.look([start, start + span]);
   }
 
@@ -488,18 +624,36 @@ class Plot {
 
   key(event) {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
-    const {app} = this.plots, [from, to] = this.plots.seen, span = to - from;
+    const {app} = this.plots,
+      [from, to] = this.plots.seen,
+      span = to - from;
     const go = by => () => {
-      if (event.shiftKey) { if (app.window) this.slide([from, to], 15 * by * span / 100); return; }
+      if (event.shiftKey) {
+        if (app.window) this.slide([from, to], (15 * by * span) / 100);
+        return;
+      }
       const start = app.cursor < from || app.cursor > to ? from : app.cursor;
-      app.seek(Math.max(from, Math.min(to, start + by * span / 100)));
+      app.seek(Math.max(from, Math.min(to, start + (by * span) / 100)));
       this.say();
     };
     const acts = {
-      ArrowLeft: go(-1), ArrowRight: go(1), PageUp: go(-10), PageDown: go(10),
-      Home: () => { app.seek(from); this.say(); }, End: () => { app.seek(to); this.say(); },
-      "+": () => this.zoom(0.6, app.cursor), "=": () => this.zoom(0.6, app.cursor), "-": () => this.zoom(1 / 0.6, app.cursor),
-      "0": () => app.look(null), Escape: () => app.look(null),
+      ArrowLeft: go(-1),
+      ArrowRight: go(1),
+      PageUp: go(-10),
+      PageDown: go(10),
+      Home: () => {
+        app.seek(from);
+        this.say();
+      },
+      End: () => {
+        app.seek(to);
+        this.say();
+      },
+      "+": () => this.zoom(0.6, app.cursor),
+      "=": () => this.zoom(0.6, app.cursor),
+      "-": () => this.zoom(1 / 0.6, app.cursor),
+      0: () => app.look(null),
+      Escape: () => app.look(null),
     };
     if (!acts[event.key]) return;
     acts[event.key]();
@@ -508,8 +662,11 @@ class Plot {
 
   /** Tells the values at the cursor to those who do not see them. */
   say() {
-    const {app} = this.plots, [from, to] = this.plots.seen;
-    const values = this.panel.curves.filter(({key}) => !this.hidden.has(key)).map(({key, name}) => `${name} ${this.words(key)}${this.panel.unit ? " " + this.panel.unit : ""}`);
+    const {app} = this.plots,
+      [from, to] = this.plots.seen;
+    const values = this.panel.curves
+      .filter(({key}) => !this.hidden.has(key))
+      .map(({key, name}) => `${name} ${this.words(key)}${this.panel.unit ? " " + this.panel.unit : ""}`);
     app.say(`${timeText(app.cursor, (to - from) / 100)}: ${values.join(", ")}`);
   }
 
@@ -517,15 +674,19 @@ class Plot {
 
   /** Rows that are seen, evenly chosen. @param {number} most */
   chosen(most) {
-    const {app} = this.plots, [from, to] = this.plots.seen;
+    const {app} = this.plots,
+      [from, to] = this.plots.seen;
     if (!app.run) return [];
     const columns = this.panel.curves.map(({key}) => this.rows(app.run, key));
     const x = columns.length ? columns[0].x : null;
     if (!x) return [];
-    const first = lowerBound(x, from), last = Math.min(x.length, lowerBound(x, to * (1 + 1e-15)) + 1), count = last - first, found = [];
+    const first = lowerBound(x, from),
+      last = Math.min(x.length, lowerBound(x, to * (1 + 1e-15)) + 1),
+      count = last - first,
+      found = [];
     const rows = Math.min(most, count);
     for (let k = 0; k < rows; k++) {
-      const i = first + (rows < 2 ? 0 : Math.round(k * (count - 1) / (rows - 1)));
+      const i = first + (rows < 2 ? 0 : Math.round((k * (count - 1)) / (rows - 1)));
       found.push([x[i], ...columns.map(({y}) => (y ? y[i] * (this.isStates ? 1 : this.panel.scale) : NaN))]);
     }
     return found;
@@ -534,43 +695,78 @@ class Plot {
   fill(details) {
     if (!details.open) return;
     const unit = this.panel.unit ? ` (${this.panel.unit})` : "";
-    const head = ["time (s)", ...this.panel.curves.map(curve => curve.name + unit)].map(text => element("th", {scope: "col"}, text));
-    const cell = (value, k) => element("td", {}, this.isStates && k ? (STATES.get(value) || [""])[0] : number(value, 7));
+    const head = ["time (s)", ...this.panel.curves.map(curve => curve.name + unit)].map(text =>
+      element("th", {scope: "col"}, text),
+    );
+    const cell = (value, k) =>
+      element("td", {}, this.isStates && k ? (STATES.get(value) || [""])[0] : number(value, 7));
     const rows = this.chosen(TABLE_ROWS).map(row => element("tr", {}, ...row.map(cell)));
-    const table = element("div", {class: "scroll", tabindex: "0", role: "group", "aria-label": `Values of ${this.panel.title}`},
-      element("table", {}, element("thead", {}, element("tr", {}, ...head)), element("tbody", {}, ...rows)));
+    const table = element(
+      "div",
+      {class: "scroll", tabindex: "0", role: "group", "aria-label": `Values of ${this.panel.title}`},
+      element("table", {}, element("thead", {}, element("tr", {}, ...head)), element("tbody", {}, ...rows)),
+    );
     details.replaceChildren(details.firstElementChild, table);
   }
 
   csv() {
-    const head = ["time_s", ...this.panel.curves.map(({key}) => key + (this.panel.unit ? "_" + this.panel.unit.replace(/[ /]/g, "_").replace("µ", "u") : ""))];
+    const head = [
+      "time_s",
+      ...this.panel.curves.map(
+        ({key}) => key + (this.panel.unit ? "_" + this.panel.unit.replace(/[ /]/g, "_").replace("µ", "u") : ""),
+      ),
+    ];
     return [head, ...this.chosen(Infinity)].map(row => row.join(",") + "\n").join("");
   }
 
   png() {
     if (this.isStale) this.draw();
-    const canvas = document.createElement("canvas"), {colours} = this.plots;
+    const canvas = document.createElement("canvas"),
+      {colours} = this.plots;
     canvas.width = this.canvas.width;
     canvas.height = this.canvas.height;
     const pen = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
     pen.fillStyle = colours.paper;
     pen.fillRect(0, 0, canvas.width, canvas.height);
     pen.drawImage(this.canvas, 0, 0);
-    canvas.toBlob(blob => { if (blob) download(this.fileName("png"), blob, "image/png"); });
+    canvas.toBlob(blob => {
+      if (blob) download(this.fileName("png"), blob, "image/png");
+    });
   }
 
   /** The curves as lines with axes. */
   svg() {
-    const {colours} = this.plots, {width, height} = this, [from, to] = this.plots.seen;
+    const {colours} = this.plots,
+      {width, height} = this,
+      [from, to] = this.plots.seen;
     const lines = this.panel.curves.map(({key, name}, k) => {
-      const rows = this.chosen(4000).map(row => `${this.across(row[0]).toFixed(2)},${(this.isStates ? TOP + 20 + 22 * k - 8 * row[k + 1] : this.up(row[k + 1])).toFixed(2)}`);
-      return this.hidden.has(key) ? "" : `<polyline fill="none" stroke="${colours[COLOURS[k % COLOURS.length]]}" stroke-width="1.6" points="${rows.join(" ")}"><title>${name}</title></polyline>`;
+      const rows = this.chosen(4000).map(
+        row =>
+          `${this.across(row[0]).toFixed(2)},`
+          + `${(this.isStates ? TOP + 20 + 22 * k - 8 * row[k + 1] : this.up(row[k + 1])).toFixed(2)}`,
+      );
+      return this.hidden.has(key)
+        ? ""
+        : `<polyline fill="none" stroke="${colours[COLOURS[k % COLOURS.length]]}" stroke-width="1.6" `
+            + `points="${rows.join(" ")}"><title>${name}</title></polyline>`;
     });
-    const text = (x, y, anchor, words) => `<text x="${x.toFixed(1)}" y="${y.toFixed(1)}" text-anchor="${anchor}" font-family="sans-serif" font-size="12" fill="${colours.grey}">${words}</text>`;
+    const text = (x, y, anchor, words) =>
+      `<text x="${x.toFixed(1)}" y="${y.toFixed(1)}" text-anchor="${anchor}" `
+      + `font-family="sans-serif" font-size="12" fill="${colours.grey}">${words}</text>`;
     const {low, high} = this.range || {low: 0, high: 1};
-    const rows = this.isStates ? [] : ticks(low, high, 4).map(value => text(LEFT - 8, this.up(value) + 4, "end", number(value, 6)));
-    const steps = ticks(from, to, 8).map(value => text(this.across(value), height - 6, "middle", timeText(value, step(to - from, 8))));
-    const frame = `<rect x="${LEFT}" y="${TOP}" width="${width - LEFT - RIGHT}" height="${height - TOP - BOTTOM}" fill="none" stroke="${colours.axis}"/>`;
-    return `<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 ${width} ${height}" width="${width}" height="${height}"><rect width="100%" height="100%" fill="${colours.paper}"/>${frame}${rows.join("")}${steps.join("")}${lines.join("")}</svg>\n`;
+    const rows = this.isStates
+      ? []
+      : ticks(low, high, 4).map(value => text(LEFT - 8, this.up(value) + 4, "end", number(value, 6)));
+    const steps = ticks(from, to, 8).map(value =>
+      text(this.across(value), height - 6, "middle", timeText(value, step(to - from, 8))),
+    );
+    const frame =
+      `<rect x="${LEFT}" y="${TOP}" width="${width - LEFT - RIGHT}" height="${height - TOP - BOTTOM}" `
+      + `fill="none" stroke="${colours.axis}"/>`;
+    return (
+      `<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 ${width} ${height}" width="${width}" height="${height}">`
+      + `<rect width="100%" height="100%" fill="${colours.paper}"/>${frame}${rows.join("")}`
+      + `${steps.join("")}${lines.join("")}</svg>\n`
+    );
   }
 }

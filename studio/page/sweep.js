@@ -7,17 +7,28 @@ import {wordsOf} from "./drop.js";
 
 /** @typedef {import("./app.js").App} App */
 
-export const key = "sweep", name = "Sweep";
+export const key = "sweep",
+  name = "Sweep";
 
-const TRACES = 30, LISTED = 100;
-const DESIGNS = [["sobol", "Sobol' points"], ["latin-hypercube", "Latin hypercube"], ["random", "random"]];
+const TRACES = 30,
+  LISTED = 100;
+const DESIGNS = [
+  ["sobol", "Sobol' points"],
+  ["latin-hypercube", "Latin hypercube"],
+  ["random", "random"],
+];
 const MACHINE = /^(motor|amplifier|drive|drive_pulley|idler_pulley|cart|bridge|belt|left_drive|right_drive)\./;
 
 /** @param {HTMLElement} root @param {App} app */
 export function mount(root, app) {
   const view = new Sweep(root, app);
-  app.on("view", () => { if (app.view === key) view.refresh(); });
-  app.on("opened", () => { view.shape = ""; if (app.view === key) view.refresh(); });
+  app.on("view", () => {
+    if (app.view === key) view.refresh();
+  });
+  app.on("opened", () => {
+    view.shape = "";
+    if (app.view === key) view.refresh();
+  });
 }
 
 class Sweep {
@@ -35,28 +46,105 @@ class Sweep {
     this.vary = element("div", {class: "choices", role: "group", "aria-label": "What varies"});
     this.share = element("input", {type: "number", id: "share", min: 0.1, max: 90, step: 1, value: 20});
     this.runs = element("input", {type: "number", id: "runs", min: 8, max: 20000, step: 1, value: 500});
-    this.design = element("select", {id: "design"}, ...DESIGNS.map(([value, words]) => element("option", {value}, words)));
+    this.design = element(
+      "select",
+      {id: "design"},
+      ...DESIGNS.map(([value, words]) => element("option", {value}, words)),
+    );
     this.go = element("button", {type: "button", id: "sweep", class: "strong", onclick: () => this.sweep()}, "Sweep");
-    this.stopButton = element("button", {type: "button", id: "sweep-stop", hidden: true, onclick: () => { if (this.work !== null) app.wire.cancel(this.work); }}, "Stop, keep what is done");
+    this.stopButton = element(
+      "button",
+      {
+        type: "button",
+        id: "sweep-stop",
+        hidden: true,
+        onclick: () => {
+          if (this.work !== null) app.wire.cancel(this.work);
+        },
+      },
+      "Stop, keep what is done",
+    );
     this.status = element("p", {class: "quiet", role: "status", id: "sweep-status"});
     this.trouble = element("p", {class: "mistake", role: "alert", hidden: true});
     this.group = element("select", {id: "sweep-group", onchange: () => this.figures()});
-    this.figure = element("select", {id: "sweep-figure", onchange: () => { this.brushes.clear(); this.draw(); }});
-    this.input = element("select", {id: "sweep-input", onchange: () => { this.brushes.clear(); this.draw(); }});
+    this.figure = element("select", {
+      id: "sweep-figure",
+      onchange: () => {
+        this.brushes.clear();
+        this.draw();
+      },
+    });
+    this.input = element("select", {
+      id: "sweep-input",
+      onchange: () => {
+        this.brushes.clear();
+        this.draw();
+      },
+    });
     this.curve = element("select", {id: "sweep-curve", onchange: () => this.traces()});
-    this.histogram = new Picture("Histogram", {x: "", y: "Runs", words: "How the figure is spread."}, area => this.brush("histogram", area));
-    this.scatter = new Picture("Scatter", {x: "", y: "", words: "The figure over a parameter; a dot is a run."}, area => this.brush("scatter", area));
-    this.inputs = new Picture("Parameter", {x: "", y: "Runs", words: "How the parameter is spread."}, area => this.brush("inputs", area));
-    this.paths = new Picture("Trajectories of the chosen runs", {x: "Time", xUnit: "s", y: "", words: "One line for each chosen run."});
+    this.histogram = new Picture("Histogram", {x: "", y: "Runs", words: "How the figure is spread."}, area =>
+      this.brush("histogram", area),
+    );
+    this.scatter = new Picture("Scatter", {x: "", y: "", words: "The figure over a parameter; a dot is a run."}, area =>
+      this.brush("scatter", area),
+    );
+    this.inputs = new Picture("Parameter", {x: "", y: "Runs", words: "How the parameter is spread."}, area =>
+      this.brush("inputs", area),
+    );
+    this.paths = new Picture("Trajectories of the chosen runs", {
+      x: "Time",
+      xUnit: "s",
+      y: "",
+      words: "One line for each chosen run.",
+    });
     this.chosen = element("p", {class: "quiet", role: "status", id: "chosen"});
     this.table = element("div", {class: "scroll card", tabindex: "0", role: "group", "aria-label": "Chosen runs"});
     const fields = (...all) => element("p", {class: "fields"}, ...all);
-    this.shown = element("div", {hidden: true}, fields(element("label", {for: "sweep-group"}, "Experiment: ", this.group), element("label", {for: "sweep-figure"}, "Figure: ", this.figure), element("label", {for: "sweep-input"}, "Parameter: ", this.input)),
-      element("p", {class: "quiet"}, "Drag over a figure to choose runs; a click clears. What is chosen in several figures is chosen in all of them."),
-      element("div", {class: "plots"}, this.histogram.figure, this.scatter.figure, this.inputs.figure, this.paths.figure), this.chosen, fields(element("label", {for: "sweep-curve"}, "Curve: ", this.curve)), this.table);
-    root.append(element("h2", {}, "Sweep"), element("p", {class: "quiet"}, "Many machines, each a little different: how far do the figures spread, and what do they depend on?"),
-      element("h3", {}, "What varies"), this.vary, fields(element("label", {for: "share"}, "by ± ", this.share, " %"), element("label", {for: "runs"}, "Runs: ", this.runs), element("label", {for: "design"}, "Points: ", this.design)),
-      element("p", {class: "buttons"}, this.go, this.stopButton), this.status, this.trouble, this.shown);
+    this.shown = element(
+      "div",
+      {hidden: true},
+      fields(
+        element("label", {for: "sweep-group"}, "Experiment: ", this.group),
+        element("label", {for: "sweep-figure"}, "Figure: ", this.figure),
+        element("label", {for: "sweep-input"}, "Parameter: ", this.input),
+      ),
+      element(
+        "p",
+        {class: "quiet"},
+        "Drag over a figure to choose runs; a click clears. What is chosen in several figures is "
+          + "chosen in all of them.",
+      ),
+      element(
+        "div",
+        {class: "plots"},
+        this.histogram.figure,
+        this.scatter.figure,
+        this.inputs.figure,
+        this.paths.figure,
+      ),
+      this.chosen,
+      fields(element("label", {for: "sweep-curve"}, "Curve: ", this.curve)),
+      this.table,
+    );
+    root.append(
+      element("h2", {}, "Sweep"),
+      element(
+        "p",
+        {class: "quiet"},
+        "Many machines, each a little different: how far do the figures spread, and what do they depend on?",
+      ),
+      element("h3", {}, "What varies"),
+      this.vary,
+      fields(
+        element("label", {for: "share"}, "by ± ", this.share, " %"),
+        element("label", {for: "runs"}, "Runs: ", this.runs),
+        element("label", {for: "design"}, "Points: ", this.design),
+      ),
+      element("p", {class: "buttons"}, this.go, this.stopButton),
+      this.status,
+      this.trouble,
+      this.shown,
+    );
   }
 
   refresh() {
@@ -65,19 +153,36 @@ class Sweep {
     if (shape === this.shape) return;
     this.shape = shape;
     const own = /^\[sweep/m.test(this.app.text);
-    const box = (value, words, checked) => element("label", {class: "choice"}, element("input", {type: "checkbox", value, checked}), " ", words);
+    const box = (value, words, checked) =>
+      element("label", {class: "choice"}, element("input", {type: "checkbox", value, checked}), " ", words);
     this.own = own ? element("input", {type: "checkbox", id: "own-sweep", checked: true}) : null;
     const written = machine.filter(one => one.written !== null);
-    this.vary.replaceChildren(...[this.own ? element("label", {class: "choice"}, this.own, " as [sweep] of the case says") : null, box("all", "all that can be off", true), ...written.map(one => box(one.key, one.key, false))].filter(Boolean));
+    this.vary.replaceChildren(
+      ...[
+        this.own ? element("label", {class: "choice"}, this.own, " as [sweep] of the case says") : null,
+        box("all", "all that can be off", true),
+        ...written.map(one => box(one.key, one.key, false)),
+      ].filter(Boolean),
+    );
   }
 
   body() {
     if (this.own && this.own.checked) return this.app.body();
-    const share = `${Number(this.share.value) || 20} %`, vary = {};
-    const chosen = [...this.vary.querySelectorAll("input:checked")].map(input => input.value).filter(value => value !== "on");
+    const share = `${Number(this.share.value) || 20} %`,
+      vary = {};
+    const chosen = [...this.vary.querySelectorAll("input:checked")]
+      .map(input => input.value)
+      .filter(value => value !== "on");
     const names = chosen.filter(value => value !== "all");
     for (const one of names.length ? names : chosen) vary[one] = share;
-    return {...this.app.body(), plan: {design: this.design.value, runs: Math.max(1, Math.min(20000, Math.round(Number(this.runs.value)) || 500)), vary}};
+    return {
+      ...this.app.body(),
+      plan: {
+        design: this.design.value,
+        runs: Math.max(1, Math.min(20000, Math.round(Number(this.runs.value)) || 500)),
+        vary,
+      },
+    };
   }
 
   tell(error) {
@@ -114,11 +219,16 @@ class Sweep {
       this.paths.figure.hidden = this.curve.parentElement.hidden = !this.experiments.length;
       const all = [...columns.values()];
       this.rows = Array.from({length: head.done}, (_, k) => all.map(column => column[k]));
-      this.status.textContent = `${head.done} runs${head.stopped ? ` of ${head.runs}, stopped,` : ""} in ${number((performance.now() - begun) / 1000, 3)} s.`;
+      this.status.textContent =
+        `${head.done} runs${head.stopped ? ` of ${head.runs}, stopped,` : ""} in `
+        + `${number((performance.now() - begun) / 1000, 3)} s.`;
       app.say(this.status.textContent);
       this.draw();
       this.traces();
-    } catch (error) { this.status.textContent = ""; this.tell(error); }
+    } catch (error) {
+      this.status.textContent = "";
+      this.tell(error);
+    }
     this.work = null;
     this.go.disabled = false;
     this.stopButton.hidden = true;
@@ -138,7 +248,9 @@ class Sweep {
 
   figures() {
     const before = this.figure.value;
-    const own = this.headings.map((one, k) => [one, k]).filter(([one]) => one.kind === "figure" && one.group === this.group.value);
+    const own = this.headings
+      .map((one, k) => [one, k])
+      .filter(([one]) => one.kind === "figure" && one.group === this.group.value);
     this.figure.replaceChildren(...own.map(([one, k]) => element("option", {value: k}, one.words || one.name)));
     if (own.some(([, k]) => String(k) === before)) this.figure.value = before;
     this.brushes.clear();
@@ -148,7 +260,8 @@ class Sweep {
 
   /** The runs that every brush holds. */
   selected() {
-    const f = Number(this.figure.value), p = Number(this.input.value);
+    const f = Number(this.figure.value),
+      p = Number(this.input.value);
     const within = (value, [a, b]) => value >= a && value <= b;
     const tests = [];
     const {histogram: h, scatter: s, inputs: i} = Object.fromEntries(this.brushes);
@@ -159,74 +272,165 @@ class Sweep {
   }
 
   brush(which, area) {
-    if (area) this.brushes.set(which, area); else this.brushes.delete(which);
+    if (area) this.brushes.set(which, area);
+    else this.brushes.delete(which);
     this.draw();
     this.traces();
   }
 
   draw() {
-    const f = Number(this.figure.value), p = Number(this.input.value), figure = this.headings[f], input = this.headings[p];
+    const f = Number(this.figure.value),
+      p = Number(this.input.value),
+      figure = this.headings[f],
+      input = this.headings[p];
     if (!figure || !input) return;
-    const words = figure.words || figure.name, chosen = this.selected(), isAll = chosen === this.rows;
+    const words = figure.words || figure.name,
+      chosen = this.selected(),
+      isAll = chosen === this.rows;
     const bars = (picture, place, heading, words) => {
-      const all = this.rows.map(row => row[place]), whole = histogram(all), n = whole.x.length;
-      const range = n > 1 ? /** @type {[number, number]} */ ([whole.x[0], whole.x[n - 1] + whole.x[1] - whole.x[0]]) : undefined;
-      const part = isAll || n < 2 ? null : histogram(chosen.map(row => row[place]), n, range);
-      picture.show([{name: "all runs", ...whole, kind: "bars", colour: part ? "axis" : "blue", alpha: part ? 0.45 : 0.8}, ...(part ? [{name: "chosen", ...part, kind: "bars", colour: "blue", alpha: 0.85}] : [])], {x: words, xUnit: heading.unit, xRange: range});
+      const all = this.rows.map(row => row[place]),
+        whole = histogram(all),
+        n = whole.x.length;
+      const range =
+        n > 1 ? /** @type {[number, number]} */ ([whole.x[0], whole.x[n - 1] + whole.x[1] - whole.x[0]]) : undefined;
+      const part =
+        isAll || n < 2
+          ? null
+          : histogram(
+              chosen.map(row => row[place]),
+              n,
+              range,
+            );
+      picture.show(
+        [
+          {name: "all runs", ...whole, kind: "bars", colour: part ? "axis" : "blue", alpha: part ? 0.45 : 0.8},
+          ...(part ? [{name: "chosen", ...part, kind: "bars", colour: "blue", alpha: 0.85}] : []),
+        ],
+        {x: words, xUnit: heading.unit, xRange: range},
+      );
       picture.head.textContent = words;
     };
     bars(this.histogram, f, figure, words);
     bars(this.inputs, p, input, input.name);
-    const dots = (rows, name, colour, alpha) => ({name, x: rows.map(row => row[p]), y: rows.map(row => row[f]), kind: /** @type {const} */ ("points"), colour, alpha});
+    const dots = (rows, name, colour, alpha) => ({
+      name,
+      x: rows.map(row => row[p]),
+      y: rows.map(row => row[f]),
+      kind: /** @type {const} */ ("points"),
+      colour,
+      alpha,
+    });
     const others = isAll ? null : new Set(chosen);
-    this.scatter.show(isAll ? [dots(this.rows, "all runs", "blue", 0.7)] : [dots(this.rows.filter(row => !(/** @type {Set<any>} */ (others)).has(row)), "others", "axis", 0.5), dots(chosen, "chosen", "blue", 0.9)],
-      {x: input.name, xUnit: input.unit, y: words, yUnit: figure.unit});
+    this.scatter.show(
+      isAll
+        ? [dots(this.rows, "all runs", "blue", 0.7)]
+        : [
+            dots(
+              this.rows.filter(row => !(/** @type {Set<any>} */ (others).has(row))),
+              "others",
+              "axis",
+              0.5,
+            ),
+            dots(chosen, "chosen", "blue", 0.9),
+          ],
+      {x: input.name, xUnit: input.unit, y: words, yUnit: figure.unit},
+    );
     this.scatter.head.textContent = `${words} over ${input.name}`;
-    this.chosen.textContent = isAll ? `${this.rows.length} runs, none chosen.` : `${chosen.length} of ${this.rows.length} runs chosen.`;
+    this.chosen.textContent = isAll
+      ? `${this.rows.length} runs, none chosen.`
+      : `${chosen.length} of ${this.rows.length} runs chosen.`;
     if (this.work === null) this.list(chosen, figure, f);
   }
 
   /** The chosen runs with their parameters. */
   list(chosen, figure, f) {
     const inputs = this.headings.map((one, k) => [one, k]).filter(([one]) => one.kind === "input");
-    const rows = chosen.slice(0, LISTED).map(row => element("tr", {}, element("th", {scope: "row"}, number(row[0], 7)), element("td", {}, number(row[f], 5)), ...inputs.map(([, k]) => element("td", {}, number(row[k], 5)))));
+    const rows = chosen
+      .slice(0, LISTED)
+      .map(row =>
+        element(
+          "tr",
+          {},
+          element("th", {scope: "row"}, number(row[0], 7)),
+          element("td", {}, number(row[f], 5)),
+          ...inputs.map(([, k]) => element("td", {}, number(row[k], 5))),
+        ),
+      );
     const unit = one => (one.unit ? ` (${one.unit})` : "");
     const left = chosen.length - rows.length;
-    this.table.replaceChildren(element("table", {}, element("caption", {}, `Runs and their parameters${left > 0 ? `; ${left} more are not listed` : ""}`), element("thead", {}, element("tr", {}, element("th", {scope: "col"}, "Run"), element("th", {scope: "col"}, (figure.words || figure.name) + unit(figure)), ...inputs.map(([one]) => element("th", {scope: "col"}, one.name + unit(one))))), element("tbody", {}, ...rows)));
+    this.table.replaceChildren(
+      element(
+        "table",
+        {},
+        element("caption", {}, `Runs and their parameters${left > 0 ? `; ${left} more are not listed` : ""}`),
+        element(
+          "thead",
+          {},
+          element(
+            "tr",
+            {},
+            element("th", {scope: "col"}, "Run"),
+            element("th", {scope: "col"}, (figure.words || figure.name) + unit(figure)),
+            ...inputs.map(([one]) => element("th", {scope: "col"}, one.name + unit(one))),
+          ),
+        ),
+        element("tbody", {}, ...rows),
+      ),
+    );
   }
 
   /** Trajectories of the chosen runs, spread over all of them. */
   traces() {
     if (!this.rows.length || !this.asked || !this.experiments || !this.experiments.length) return;
     const {app} = this;
-    app.wire.newest("traces", () => {
-      const chosen = this.selected(), thin = Math.max(1, chosen.length / TRACES);
-      const runs = [];
-      for (let k = 0; k < chosen.length && runs.length < TRACES; k += thin) runs.push(chosen[Math.floor(k)][0]);
-      return {...this.asked, runs, experiment: Math.max(0, this.experiments.indexOf(this.group.value))};
-    }, (answer, error) => {
-      if (!answer) { this.tell(error); return; }
-      if (answer.head.replaced) return;
-      const {panels} = answer.head, curves = panels.flatMap(panel => panel.curves.map(curve => ({panel, curve})));
-      const names = curves.map(({panel, curve}) => `${panel.title}: ${curve.name}`), before = this.curve.value;
-      if (names.join() !== this.names) {
-        this.names = names.join();
-        this.curve.replaceChildren(...curves.map((one, k) => element("option", {value: k}, names[k])));
-        const usual = curves.findIndex(({curve}) => curve.key === "cart_position");
-        this.curve.value = before && curves[before] ? before : String(Math.max(0, usual));
-      }
-      const picked = curves[Number(this.curve.value)];
-      if (!picked) { this.paths.show([]); return; }
-      const series = [];
-      for (const [column, y] of answer.columns) {
-        const [run, ...rest] = column.split(":");
-        if (rest.join(":") !== picked.curve.key) continue;
-        const scale = picked.panel.scale;
-        series.push({name: `run ${run}`, x: answer.columns.get(`${run}:time`), y: scale === 1 ? y : Float64Array.from(y, value => value * scale), colour: "blue", alpha: 0.45, quiet: series.length > 5});
-      }
-      this.paths.show(/** @type {any} */ (series), {y: picked.curve.name, yUnit: picked.panel.unit});
-      this.paths.head.textContent = `${picked.panel.title}: ${series.length} runs`;
-      this.paths.legend.hidden = true;
-    });
+    app.wire.newest(
+      "traces",
+      () => {
+        const chosen = this.selected(),
+          thin = Math.max(1, chosen.length / TRACES);
+        const runs = [];
+        for (let k = 0; k < chosen.length && runs.length < TRACES; k += thin) runs.push(chosen[Math.floor(k)][0]);
+        return {...this.asked, runs, experiment: Math.max(0, this.experiments.indexOf(this.group.value))};
+      },
+      (answer, error) => {
+        if (!answer) {
+          this.tell(error);
+          return;
+        }
+        if (answer.head.replaced) return;
+        const {panels} = answer.head,
+          curves = panels.flatMap(panel => panel.curves.map(curve => ({panel, curve})));
+        const names = curves.map(({panel, curve}) => `${panel.title}: ${curve.name}`),
+          before = this.curve.value;
+        if (names.join() !== this.names) {
+          this.names = names.join();
+          this.curve.replaceChildren(...curves.map((one, k) => element("option", {value: k}, names[k])));
+          const usual = curves.findIndex(({curve}) => curve.key === "cart_position");
+          this.curve.value = before && curves[before] ? before : String(Math.max(0, usual));
+        }
+        const picked = curves[Number(this.curve.value)];
+        if (!picked) {
+          this.paths.show([]);
+          return;
+        }
+        const series = [];
+        for (const [column, y] of answer.columns) {
+          const [run, ...rest] = column.split(":");
+          if (rest.join(":") !== picked.curve.key) continue;
+          const scale = picked.panel.scale;
+          series.push({
+            name: `run ${run}`,
+            x: answer.columns.get(`${run}:time`),
+            y: scale === 1 ? y : Float64Array.from(y, value => value * scale),
+            colour: "blue",
+            alpha: 0.45,
+            quiet: series.length > 5,
+          });
+        }
+        this.paths.show(/** @type {any} */ (series), {y: picked.curve.name, yUnit: picked.panel.unit});
+        this.paths.head.textContent = `${picked.panel.title}: ${series.length} runs`;
+        this.paths.legend.hidden = true;
+      },
+    );
   }
 }

@@ -24,19 +24,26 @@ class TautStage extends HTMLElement {
     this.attachShadow({mode: "open"}).append(style, this.told, this.frame);
   }
 
-  connectedCallback() { this.open(); }
+  connectedCallback() {
+    this.open();
+  }
 
-  attributeChangedCallback() { if (this.isConnected) this.open(); }
+  attributeChangedCallback() {
+    if (this.isConnected) this.open();
+  }
 
   async open() {
-    const file = this.getAttribute("case"), view = this.getAttribute("view") || "motion";
+    const file = this.getAttribute("case"),
+      view = this.getAttribute("view") || "motion";
     let told = "";
     try {
       const name = (file || "").split(/[?#]/)[0].split("/").pop() || "studio.toml";
       const text = file ? await textOf(new URL(file, document.baseURI)) : this.textContent || "";
       this.frame.title = `${name} in taut studio`;
-      this.frame.src = new URL("index.html", import.meta.url) + await fragment({text, name, view});
-    } catch (error) { told = `${file} cannot be opened: ${/** @type {Error} */ (error).message}`; }
+      this.frame.src = new URL("index.html", import.meta.url) + (await fragment({text, name, view}));
+    } catch (error) {
+      told = `${file} cannot be opened: ${/** @type {Error} */ (error).message}`;
+    }
     this.told.textContent = told;
     this.told.hidden = !told;
     this.frame.hidden = !!told;

@@ -1,145 +1,243 @@
 // @ts-check
-// The paper as a guided tour: what each figure shows, in a sentence, with the controls to try it.
-import {element} from "./format.js";
+// The paper as a guided tour: at each stop a sentence, the moving machine, a figure, and a question that is answered by
+// dragging.
+import {element, fold, number, tell} from "./format.js";
+import {showReport} from "./modes.js";
+import {Row} from "./parameters.js";
+import {RATES, Stage, playing} from "./player.js";
+import {Plots} from "./plots.js";
+import {STOPS} from "./stops.js";
 
 /** @typedef {import("./app.js").App} App */
+/** @typedef {import("./stops.js").Try} Try */
 
-export const key = "tour", name = "Tour";
+export const key = "tour",
+  name = "Tour";
 
 const RIG = "sollmann-jouaneh/";
-
-/** Something to try at a stop: other values, or another experiment.
- * @typedef {{words: string, set?: [string, number][], experiment?: number}} Try */
-
-/** A stop: figures of the paper, the sentence that they support, the case that shows it (with a change of its text, where
- * there is one), where to look, and what can be played with.
- * @typedef {Object} Stop
- * @property {string} figure
- * @property {string} title
- * @property {string} words
- * @property {string} stage
- * @property {[string, string]} [change]
- * @property {string} [view]
- * @property {string} panel to be seen; of another view the heading
- * @property {Try[]} tries
- * @property {number} [at]
- * @property {number} [factor]
- * @property {[number, number]} [window] */
-
-/** All three spans times a factor, of Table 1. @param {number} factor @returns {[string, number][]} */
-const stiffness = factor => [265520, 265520, 117770].map((k, span) => [`belt.stiffness.${span}`, factor * k]);
-
-/** Both pulleys. @param {number} factor @returns {[string, number][]} */
-const inertia = factor => [["drive_pulley.inertia", factor * 7e-5], ["idler_pulley.inertia", factor * 7e-5]];
-
-/** Friction everywhere. @param {number} factor @returns {[string, number][]} */
-const friction = factor => [["drive_pulley.friction.viscous", factor * 0.0042], ["idler_pulley.friction.viscous", factor * 0.0042], ["cart.friction.viscous", factor * 40.6518]];
-
-/** The cart's friction with an excess at the start. @type {[string, string]} */
-const STRIBECK = ['coulomb = "0.2000 N"', 'coulomb = "0.2000 N", stribeck = { force = "1 N", velocity = "20 mm/s" }'];
-
-/** @type {Stop[]} */
-const STOPS = [
-  {figure: "Figures 1 and 2", title: "The stage and its model", stage: "table4.toml", panel: "position", factor: 1000, at: 0.05,
-    words: "A geared DC motor turns one of two pulleys, and a toothed belt pulls the cart along its guide. The model has three inertias, the pulleys and the cart, and between them the three spans of the belt as springs: equations (1) to (3).",
-    tries: [{words: "a belt twenty times softer in span 1", set: [["belt.stiffness.0", 6638]]}]},
-  {figure: "Figure 3", title: "The belt as a spring", stage: "table1.toml", panel: "force", factor: 2000, at: 0.01, window: [0, 0.05],
-    words: "Where the belt has teeth it is much stiffer than between them. The two are springs in series, so the thin section decides: k = AE/l, equations (11) to (13). The longest span is the softest.",
-    tries: [{words: "half the modulus, as in Table 2", set: stiffness(0.5)}]},
-  {figure: "Figures 4 and 5", title: "A pulse, with the first guess", stage: "table1.toml", panel: "position", at: 0.25,
-    words: "5 V, and then 10 V, for a quarter of a second, with the values of Table 1. The simulated motor answers in the shape of the real one, and ends short of it. What was measured was not published as data: these are the simulated curves.",
-    tries: [{words: "10 V", experiment: 1}, {words: "friction of a half", set: friction(0.5)}]},
-  {figure: "Figures 6 and 7", title: "Stiffness and position", stage: "table1.toml", panel: "position", at: 0.25,
-    words: "One parameter at a time is doubled and halved. Twice and half the stiffness do not change the position by anything that could be seen: the dotted line, the run before, lies under the new one.",
-    tries: [{words: "twice the stiffness", set: stiffness(2)}, {words: "half the stiffness", set: stiffness(0.5)}]},
-  {figure: "Figures 8 and 9", title: "Stiffness and speed", stage: "table1.toml", panel: "speed", at: 0.005, window: [0, 0.03],
-    words: "In the speed, the swing of the belt on top of the motion changes, and hardly more than that: a stiffer belt swings faster and less.",
-    tries: [{words: "twice the stiffness", set: stiffness(2)}, {words: "half the stiffness", set: stiffness(0.5)}]},
-  {figure: "Figures 10 and 11", title: "Inertia", stage: "table1.toml", panel: "speed", at: 0.01,
-    words: "More inertia makes the answer slower, and the run-out after the pulse longer by as much, so that the end is the same. That holds while friction is viscous alone.",
-    tries: [{words: "pulleys twice as heavy", set: inertia(2)}, {words: "pulleys half as heavy", set: inertia(0.5)}, {words: "all twice as heavy", set: [...inertia(2), ["cart.mass", 0.724]]}]},
-  {figure: "Figures 12 and 13", title: "Friction", stage: "table1.toml", panel: "position", at: 0.25,
-    words: "Friction has by far the largest influence: twice as much of it nearly halves the way, half as much nearly doubles it.",
-    tries: [{words: "twice the friction", set: friction(2)}, {words: "half the friction", set: friction(0.5)}]},
-  {figure: "Figures 14 and 15", title: "Matched at 5 V", stage: "table2.toml", panel: "position", at: 0.25,
-    words: "Table 2 was matched to the pulse of 5 V. A linear model goes exactly twice as far at 10 V, whatever its numbers are, and the real stage does not: one set of linear parameters does not serve both.",
-    tries: [{words: "10 V", experiment: 1}]},
-  {figure: "Figure 16", title: "Three parts of friction", stage: "table4.toml", change: STRIBECK, view: "modes", panel: "Friction over speed",
-    words: "Friction against speed, equation (14): a part that grows with speed, a part that only knows the direction (Coulomb), and an excess at the start of a motion that is soon gone (Stribeck). The view shows the curve of each body; here the cart has such an excess, drawn large.",
-    tries: []},
-  {figure: "Figure 17", title: "Two of them are kept", stage: "table4.toml", view: "modes", panel: "Friction over speed",
-    words: "The Stribeck part is called minor and left out: what remains, equation (15), jumps at zero speed and rises from there.",
-    tries: [{words: "no dry friction at the cart", set: [["cart.friction.coulomb", 0]]}, {words: "ten times as much", set: [["cart.friction.coulomb", 2]]}]},
-  {figure: "Figures 18 and 19", title: "Friction must not push", stage: "table4.toml", panel: "state", at: 0.4,
-    words: "Block diagrams of equations (16) to (18). Friction may hold a body and never turn it round: Table 3 sees to that by a band of speeds about zero. Here a body that comes to rest sticks until its load breaks it loose; the strip shows when.",
-    tries: [{words: "no dry friction at the cart", set: [["cart.friction.coulomb", 0]]}]},
-  {figure: "Figures 20 and 21", title: "One set for both voltages", stage: "table4.toml", panel: "position", at: 0.4,
-    words: "With the Coulomb friction of Table 4 one set of numbers serves 5 V and 10 V. Dry friction takes its share of the first volts: twice the voltage moves the cart 2.3 times as far.",
-    tries: [{words: "10 V", experiment: 1}, {words: "no dry friction at the drive pulley", set: [["drive_pulley.friction.coulomb", 0]]}]},
-];
+/** A run, or the part of it that is shown, is played within at least so many seconds. */
+const LEAST = 3;
 
 /** @param {HTMLElement} root @param {App} app */
 export function mount(root, app) {
-  let at = 0;
-  const place = element("p", {class: "quiet"}), title = element("h2", {tabindex: "-1"}), words = element("p", {class: "lead"});
-  const tries = element("div", {class: "tries"});
-  const back = element("button", {type: "button", id: "tour-back", onclick: () => go(at - 1)}, "Back");
-  const next = element("button", {type: "button", id: "tour-next", class: "strong", onclick: () => go(at + 1)}, "Next");
-  const list = element("ol", {class: "stops"}, ...STOPS.map((stop, k) => element("li", {}, element("button", {type: "button", onclick: () => go(k)}, `${stop.figure}: ${stop.title}`))));
-  root.append(element("div", {class: "tour"}, element("p", {class: "quiet"}, "K. Sollmann and M. Jouaneh, Dynamic modelling of a single-axis belt-drive system, 2011: the paper that this program recomputes, figure by figure. ",
-    "taut paper checks every number."), place, title, words, tries, element("p", {class: "turns"}, back, next), element("h3", {}, "All stops"), list));
-  /** @type {Map<string, string>} */
-  let stages = new Map();
+  const tour = new Tour(root, app);
+  app.on("view", () => {
+    if (app.view === key) tour.enter().catch(error => app.notify(String(error.message || error), true));
+  });
+  for (const what of /** @type {const} */ (["run", "mistake", "text"])) app.on(what, () => tour.read());
+}
 
-  async function go(k) {
-    at = Math.max(0, Math.min(STOPS.length - 1, k));
-    if (!stages.size) {
-      const {head} = await app.wire.ask("gallery");
-      stages = new Map(head.stages.map(stage => [stage.path, stage.text]));
+class Tour {
+  /** @param {HTMLElement} root @param {App} app */
+  constructor(root, app) {
+    this.app = app;
+    /** Texts of the cases, by their paths. @type {Map<string, string>} */
+    this.stages = new Map();
+    /** The case of the stop, as it was opened. */
+    this.opened = "";
+    /** The run with which the stop begins. @type {import("./wire.js").Answer | null} */
+    this.first = null;
+    /** @type {Row[]} */
+    this.rows = [];
+    /** Values of their parameters at the beginning. @type {Map<string, number>} */
+    this.values = new Map();
+    /** Whether the first run of the case is to come, and what is tried with it. */
+    this.isNew = false;
+    /** @type {Try} */
+    this.one = {words: ""};
+    /** The text whose figures are shown. */
+    this.drawn = "";
+    this.place = element("p", {class: "quiet"});
+    this.title = element("h2", {tabindex: "-1"});
+    this.words = element("p", {class: "lead"});
+    this.asked = element("p", {class: "asked"});
+    this.sliders = element("div", {class: "groups"});
+    this.reading = element("p", {class: "reading"});
+    this.answer = element("p", {class: "answer", role: "status"});
+    this.tries = element("div", {class: "tries"});
+    this.back = element("button", {type: "button", id: "tour-back", onclick: () => this.go(app.stop - 1)}, "Back");
+    this.next = element(
+      "button",
+      {type: "button", id: "tour-next", class: "strong", onclick: () => this.go(app.stop + 1)},
+      "Next",
+    );
+    this.list = element(
+      "ol",
+      {class: "stops"},
+      ...STOPS.map((stop, k) =>
+        element(
+          "li",
+          {},
+          element("button", {type: "button", onclick: () => this.go(k)}, `${stop.figure}: ${stop.title}`),
+        ),
+      ),
+    );
+    const stage = element("section", {class: "stage-box", "aria-label": "The machine"});
+    this.plots = element("div", {class: "plots"});
+    this.report = element("div", {class: "report page"});
+    const {play, scrub, clock} = playing(app, "tour-");
+    root.append(
+      element(
+        "div",
+        {class: "tour"},
+        element(
+          "div",
+          {class: "tour-show"},
+          stage,
+          element("div", {class: "transport", role: "toolbar", "aria-label": "Time"}, play, scrub, clock),
+          this.plots,
+          this.report,
+        ),
+        element(
+          "div",
+          {class: "tour-words"},
+          this.place,
+          this.title,
+          this.words,
+          element(
+            "section",
+            {class: "question", "aria-label": "Question"},
+            this.asked,
+            this.sliders,
+            this.reading,
+            this.answer,
+          ),
+          this.tries,
+          element("p", {class: "turns"}, this.back, this.next),
+          fold({}, "All stops", "All stops", this.list),
+          element(
+            "p",
+            {class: "quiet"},
+            "K. Sollmann and M. Jouaneh, Dynamic modelling of a single-axis belt-drive system, 2011: the paper that ",
+            "this program recomputes, figure by figure. taut paper checks every number.",
+          ),
+        ),
+      ),
+    );
+    new Stage(stage, app);
+    new Plots(this.plots, app, panel => app.view === key && !this.stop.view && panel.key === this.stop.panel);
+  }
+
+  get stop() {
+    return STOPS[this.app.stop];
+  }
+
+  /** Opens the stop, unless its case is open already. */
+  async enter() {
+    if (!this.stages.size) {
+      const {head} = await this.app.wire.ask("gallery");
+      this.stages = new Map(head.stages.map(stage => [stage.path, stage.text]));
     }
-    const stop = STOPS[at];
-    place.textContent = `${at + 1} of ${STOPS.length} · ${stop.figure}`;
-    title.textContent = stop.title;
-    words.textContent = stop.words;
-    back.disabled = at === 0;
-    next.disabled = at === STOPS.length - 1;
-    [...list.children].forEach((item, i) => { if (i === at) item.setAttribute("aria-current", "step"); else item.removeAttribute("aria-current"); });
-    const show = () => element("button", {type: "button", class: "strong", id: "tour-show", onclick: () => { open(stop); }}, "Show it");
-    tries.replaceChildren(show(), ...stop.tries.map(one => element("button", {type: "button", onclick: () => { open(stop, one); }}, `Try ${one.words}`)));
-    title.focus({preventScroll: true});
+    if (this.app.original !== this.opened || !this.first) await this.go(this.app.stop);
   }
 
-  /** @param {Stop} stop @param {Try} [one] */
-  function open(stop, one = {words: ""}) {
-    const text = stages.get(RIG + stop.stage) || "";
-    app.open(stop.change ? text.replace(...stop.change) : text, {name: stop.stage, experiment: one.experiment || 0, isBuiltIn: true});
-    app.factor = stop.factor || 100;
-    app.show(stop.view || "motion");
-    waitFor(app, () => {
-      for (const [key, value] of one.set || []) app.drag(key, value);
-      app.drop();
-      // What the tour changes is nobody's work.
-      app.isTouched = false;
-      if (stop.window) app.look(stop.window);
-      if (stop.at !== undefined && app.cursor === 0) app.seek(stop.at);
-      if (stop.view) { heading(stop.panel, 100); return; }
-      const panel = document.querySelector(`[data-panel="${stop.panel}"]`);
-      if (panel) panel.scrollIntoView({block: "center", behavior: "smooth"});
+  /** Goes to a stop. @param {number} k */
+  async go(k) {
+    const {app} = this;
+    app.stop = Math.max(0, Math.min(STOPS.length - 1, k));
+    const {stop} = this;
+    tell(this.place, `${app.stop + 1} of ${STOPS.length} · ${stop.figure}`);
+    tell(this.title, stop.title);
+    tell(this.words, stop.words);
+    tell(this.asked, stop.question.words);
+    tell(this.answer, "");
+    tell(this.reading, "");
+    this.sliders.replaceChildren();
+    this.report.replaceChildren();
+    this.back.disabled = app.stop === 0;
+    this.next.disabled = app.stop === STOPS.length - 1;
+    [...this.list.children].forEach((item, i) => {
+      if (i === app.stop) item.setAttribute("aria-current", "step");
+      else item.removeAttribute("aria-current");
     });
+    this.tries.replaceChildren(
+      element("button", {type: "button", id: "tour-show", onclick: () => this.open()}, "Begin again"),
+      ...stop.tries.map(one => element("button", {type: "button", onclick: () => this.open(one)}, `Try ${one.words}`)),
+    );
+    this.open();
+    this.title.focus({preventScroll: true});
+    scrollTo(0, 0);
   }
 
-  app.on("view", () => { if (app.view === key && !stages.size) go(at); });
-}
+  /** Opens the case of the stop, with what is to be tried. @param {Try} [one] */
+  open(one = {words: ""}) {
+    const {app, stop} = this,
+      text = this.stages.get(RIG + stop.stage) || "";
+    this.opened = stop.change ? text.replace(...stop.change) : text;
+    this.first = null;
+    this.rows = [];
+    app.open(this.opened, {name: stop.stage, isBuiltIn: true});
+    app.factor = stop.factor || 100;
+    const span = stop.window ? stop.window[1] - stop.window[0] : 1;
+    app.rate = RATES.find(rate => span / rate >= LEAST) || app.rate;
+    this.isNew = true;
+    this.one = one;
+  }
 
-/** Scrolls to a heading, once the page that has it is made. @param {string} text @param {number} turns to wait at most */
-function heading(text, turns) {
-  const found = [...document.querySelectorAll(".view:not([hidden]) h2")].find(one => one.textContent === text);
-  if (found) found.scrollIntoView({block: "start", behavior: "smooth"});
-  else if (turns > 0) setTimeout(() => heading(text, turns - 1), 100);
-}
+  /** Begins with the first run of the case. */
+  begin() {
+    const {app, stop} = this;
+    this.first = app.run;
+    this.isNew = false;
+    const parameters = stop.question.keys.map(key => app.parameters.find(one => one.key === key)).filter(Boolean);
+    this.values = new Map(parameters.map(({key, value}) => [key, value]));
+    this.rows = parameters.map(parameter => new Row(parameter, app, "t-"));
+    this.sliders.replaceChildren(...this.rows.map(row => row.element));
+    if (this.one.experiment) app.choose(this.one.experiment);
+    if (stop.window) app.look(stop.window);
+    if (stop.at !== undefined) app.seek(stop.at);
+    for (const [key, value] of this.one.set || []) app.drag(key, value);
+    app.drop();
+    app.isPlaying = !matchMedia("(prefers-reduced-motion: reduce)").matches;
+    app.tell("play");
+  }
 
-/** Calls once, when the case that is being opened has run. @param {App} app @param {() => void} then */
-function waitFor(app, then) {
-  let isOver = false;
-  app.on("opened", () => { if (!isOver) { isOver = true; then(); } });
+  /** Reads from the run what the question is about. */
+  read() {
+    const {app, stop} = this;
+    if (app.view !== key || app.original !== this.opened) return;
+    // What is changed here is nobody's work.
+    app.isTouched = false;
+    if (!app.run) return;
+    // A run that comes late may be of the stop before.
+    if (this.isNew && app.isCurrent) this.begin();
+    if (!this.first) return;
+    for (const row of this.rows) {
+      row.parameter = app.parameters.find(one => one.key === row.parameter.key) || row.parameter;
+      row.show();
+    }
+    const value = key => (app.parameters.find(one => one.key === key) || {value: NaN}).value,
+      ratio = key => value(key) / (this.values.get(key) || NaN);
+    const seen = {run: app.run, first: this.first, ratio, value},
+      [what, size, unit] = stop.question.reading(seen);
+    const reading = isFinite(size) ? `${what} ${number(size, 3)} ${unit}.` : stop.question.none || "";
+    tell(this.reading, app.mistake ? String(app.mistake.what) : reading);
+    const isAsked = app.experiment === this.first.head.experiment;
+    if (isAsked && stop.question.isAnswered(seen)) tell(this.answer, stop.question.answer);
+    if (stop.view) this.friction();
+  }
+
+  /** The figure of the cart among those of the view of frequencies that a stop is about. */
+  friction() {
+    const {app, stop} = this,
+      speeds = (this.first && this.first.columns.get("cart_speed")) || new Float64Array(1),
+      speed = speeds.reduce((most, value) => Math.max(most, Math.abs(value)), 0);
+    const text = app.text;
+    if (text === this.drawn && this.report.firstChild) return;
+    this.drawn = text;
+    app.wire.newest(
+      "modes",
+      () => ({text: app.text, speed}),
+      answer => {
+        if (!answer || this.stop !== stop) return;
+        const whole = element("div", {});
+        whole.innerHTML = answer.head.html;
+        const heading = [...whole.querySelectorAll("h2")].find(one => one.textContent === stop.panel);
+        const parts = [];
+        for (let at = heading && heading.nextElementSibling; at && at.tagName !== "H2"; at = at.nextElementSibling)
+          if (at.tagName === "FIGURE" && at.textContent.startsWith("Cart")) parts.push(at.outerHTML);
+        showReport(this.report, parts.join(""));
+      },
+    );
+  }
 }

@@ -42,7 +42,10 @@ export function unpack(buffer) {
 export class Wire {
   constructor() {
     this.last = 0;
-    /** @type {Map<number, {done: (answer: Answer) => void, failed: (error: Error) => void, progress?: (step: any) => void}>} */
+    /**
+     * @type {Map<number, {done: (answer: Answer) => void, failed: (error: Error) => void,
+     * progress?: (step: any) => void}>}
+     */
     this.open = new Map();
     /** @type {Map<string, {busy: boolean, next: null | (() => void)}>} */
     this.lanes = new Map();
@@ -53,7 +56,9 @@ export class Wire {
   }
 
   /** Whether an answer is to come. */
-  get isBusy() { return this.open.size > 0 || [...this.lanes.values()].some(lane => lane.busy); }
+  get isBusy() {
+    return this.open.size > 0 || [...this.lanes.values()].some(lane => lane.busy);
+  }
 
   /** What was asked for is answered no more. @param {string} why */
   lose(why) {
@@ -71,11 +76,16 @@ export class Wire {
 
   /** @param {Answer} answer */
   take(answer) {
-    const {id, error, progress} = answer.head, waiting = this.open.get(id);
+    const {id, error, progress} = answer.head,
+      waiting = this.open.get(id);
     if (!waiting) return;
-    if (progress !== undefined) { if (waiting.progress) waiting.progress(progress); return; }
+    if (progress !== undefined) {
+      if (waiting.progress) waiting.progress(progress);
+      return;
+    }
     this.open.delete(id);
-    if (error) waiting.failed(new Mistake(error)); else waiting.done(answer);
+    if (error) waiting.failed(new Mistake(error));
+    else waiting.done(answer);
   }
 
   /** Asks, and waits for the answer.
@@ -85,18 +95,25 @@ export class Wire {
    * @returns {Promise<Answer> & {id: number}} */
   ask(act, body = {}, progress = undefined) {
     const id = ++this.last;
-    const answer = this.carrier.ready.then(() => new Promise((done, failed) => {
-      this.open.set(id, {done, failed, progress});
-      this.carrier.send({id, do: act, ...body});
-    }));
+    const answer = this.carrier.ready.then(
+      () =>
+        new Promise((done, failed) => {
+          this.open.set(id, {done, failed, progress});
+          this.carrier.send({id, do: act, ...body});
+        }),
+    );
     return Object.assign(answer, {id});
   }
 
   /** Stops long work. @param {number} id */
-  cancel(id) { return this.ask("cancel", {of: id}); }
+  cancel(id) {
+    return this.ask("cancel", {of: id});
+  }
 
   /** Sends a file. @param {File} file @returns {Promise<string>} the path that acts know it by */
-  upload(file) { return this.carrier.upload(file); }
+  upload(file) {
+    return this.carrier.upload(file);
+  }
 
   /** Asks for the newest of a kind alone: what is asked for while another of its kind is under way waits, and only the
    * last that waits is asked for. So the last picture is always of the last value.
@@ -109,11 +126,17 @@ export class Wire {
     const go = () => {
       lane.busy = true;
       lane.next = null;
-      this.ask(act, body()).then(answer => take(answer, null), error => take(null, error)).finally(() => {
-        lane.busy = false;
-        if (lane.next) lane.next();
-      });
+      this.ask(act, body())
+        .then(
+          answer => take(answer, null),
+          error => take(null, error),
+        )
+        .finally(() => {
+          lane.busy = false;
+          if (lane.next) lane.next();
+        });
     };
-    if (lane.busy) lane.next = go; else go();
+    if (lane.busy) lane.next = go;
+    else go();
   }
 }

@@ -7,8 +7,12 @@ const scope = self;
 /** Time between two checks for cancellation, ms. */
 const LOOKS = 50;
 
-let module, made, files = [];
-let go = "", isStopped = false, looked = 0;
+let module,
+  made,
+  files = [];
+let go = "",
+  isStopped = false,
+  looked = 0;
 
 /** True if the address, which is revoked to cancel an act, still exists. */
 function isThere(address) {
@@ -17,31 +21,38 @@ function isThere(address) {
     request.open("GET", address, false);
     request.send();
     return true;
-  } catch { return false; }
+  } catch {
+    return false;
+  }
 }
 
 const bytes = (at, length) => made.exports.memory.buffer.slice(at, at + length);
 const output = length => bytes(made.exports.output() >>> 0, length >>> 0);
 
-const imports = {worker: {
-  seconds: () => performance.now() / 1000,
-  is_stopped: () => {
-    if (go && !isStopped && performance.now() - looked > LOOKS) {
-      isStopped = !isThere(go);
-      looked = performance.now();
-    }
-    return Number(isStopped);
+const imports = {
+  worker: {
+    seconds: () => performance.now() / 1000,
+    is_stopped: () => {
+      if (go && !isStopped && performance.now() - looked > LOOKS) {
+        isStopped = !isThere(go);
+        looked = performance.now();
+      }
+      return Number(isStopped);
+    },
+    tell: (at, length) => {
+      const frame = bytes(at >>> 0, length >>> 0);
+      scope.postMessage({frame}, [frame]);
+    },
   },
-  tell: (at, length) => {
-    const frame = bytes(at >>> 0, length >>> 0);
-    scope.postMessage({frame}, [frame]);
-  },
-}};
+};
 
 /** Writes the input of the next call. */
 function hand(...parts) {
   let at = made.exports.room(parts.reduce((sum, part) => sum + part.length, 0)) >>> 0;
-  for (const part of parts) { new Uint8Array(made.exports.memory.buffer).set(part, at); at += part.length; }
+  for (const part of parts) {
+    new Uint8Array(made.exports.memory.buffer).set(part, at);
+    at += part.length;
+  }
 }
 
 const text = words => new TextEncoder().encode(words);
@@ -53,7 +64,9 @@ function keep({place, file}) {
     const name = text(file.name);
     hand(name, new Uint8Array(new scope.FileReaderSync().readAsArrayBuffer(file)));
     return json(made.exports.keep(place, name.length));
-  } catch (error) { return {error: `${file.name} cannot be read: ${error}`}; }
+  } catch (error) {
+    return {error: `${file.name} cannot be read: ${error}`};
+  }
 }
 
 /** Creates an instance of the module with the dropped files. */
@@ -84,7 +97,8 @@ scope.onmessage = ({data}) => {
   }
   if (data.file) {
     const kept = keep(data.file);
-    if (kept.path !== undefined) files.push(data.file); else make();
+    if (kept.path !== undefined) files.push(data.file);
+    else make();
     scope.postMessage({kept, place: data.file.place});
   }
   if (data.ask) {

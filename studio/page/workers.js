@@ -20,7 +20,10 @@ export class Workers {
     };
     /** @type {Dropped[]} */
     this.files = [];
-    /** Who waits for the path of a file, by its number. @type {Map<number, (kept: {path?: string, error?: string}) => void>} */
+    /**
+     * Who waits for the path of a file, by its number.
+     * @type {Map<number, (kept: {path?: string, error?: string}) => void>}
+     */
     this.waiting = new Map();
     /** Long works, by the number of the request. @type {Map<number, {worker: Worker, go: string}>} */
     this.long = new Map();
@@ -28,7 +31,10 @@ export class Workers {
     this.isLong = new Set();
     /** @type {Promise<void>} */
     this.ready = this.begin();
-    this.ready.catch(error => { console.error(error); wire.changed(false); });
+    this.ready.catch(error => {
+      console.error(error);
+      wire.changed(false);
+    });
   }
 
   async begin() {
@@ -37,17 +43,31 @@ export class Workers {
     // Streaming would require the server to send the type application/wasm.
     this.module = await WebAssembly.compile(await answer.arrayBuffer());
     performance.mark("module");
-    await new Promise((done, failed) => { this.quick = this.worker(done, failed); });
+    await new Promise((done, failed) => {
+      this.quick = this.worker(done, failed);
+    });
     this.wire.changed(true);
   }
 
-  /** A new worker, with the files that were dropped. @param {(value?: any) => void} begun @param {(error: Error) => void} failed @returns {Worker} */
+  /**
+   * A new worker, with the files that were dropped.
+   * @param {(value?: any) => void} begun
+   * @param {(error: Error) => void} failed
+   * @returns {Worker}
+   */
   worker(begun, failed) {
     const worker = new Worker(new URL("worker.js", import.meta.url));
     worker.onmessage = ({data}) => {
-      if (data.long) { this.isLong = new Set(data.long); begun(); }
+      if (data.long) {
+        this.isLong = new Set(data.long);
+        begun();
+      }
       if (data.frame) this.take(data.frame);
-      if (data.kept) { const take = this.waiting.get(data.place); this.waiting.delete(data.place); if (take) take(data.kept); }
+      if (data.kept) {
+        const take = this.waiting.get(data.place);
+        this.waiting.delete(data.place);
+        if (take) take(data.kept);
+      }
     };
     worker.onerror = event => failed(new Error(event.message || "worker.js cannot be loaded"));
     worker.postMessage({module: this.module, files: this.files});
@@ -72,12 +92,19 @@ export class Workers {
 
   /** @param {{id: number, do?: string, of?: number}} request */
   send(request) {
-    const {id} = request, ask = JSON.stringify(request);
+    const {id} = request,
+      ask = JSON.stringify(request);
     if (request.do === "cancel") this.cancel(id, request.of || 0);
     else if (this.isLong.has(request.do || "")) {
       // A busy worker receives no messages, but it notices that this address was revoked.
       const go = URL.createObjectURL(new Blob(["go"]));
-      const worker = this.worker(() => {}, error => { this.end(id); this.fail(id, error.message); });
+      const worker = this.worker(
+        () => {},
+        error => {
+          this.end(id);
+          this.fail(id, error.message);
+        },
+      );
       this.long.set(id, {worker, go});
       worker.postMessage({ask, go});
     } else /** @type {Worker} */ (this.quick).postMessage({ask});
@@ -88,20 +115,28 @@ export class Workers {
     const work = this.long.get(of);
     if (work) {
       URL.revokeObjectURL(work.go);
-      setTimeout(() => { if (this.end(of)) this.fail(of, "stopped before there was a result"); }, PATIENCE);
+      setTimeout(() => {
+        if (this.end(of)) this.fail(of, "stopped before there was a result");
+      }, PATIENCE);
     }
     this.wire.take({head: {id, cancelled: !!work}, columns: new Map()});
   }
 
   /** @param {number} id @param {string} what */
-  fail(id, what) { this.wire.take({head: {id, error: {what, text: what}}, columns: new Map()}); }
+  fail(id, what) {
+    this.wire.take({head: {id, error: {what, text: what}}, columns: new Map()});
+  }
 
   /** @param {File} file @returns {Promise<string>} */
   async upload(file) {
     await this.ready;
-    const place = this.files.length, dropped = {place, file};
+    const place = this.files.length,
+      dropped = {place, file};
     this.files.push(dropped);
-    const kept = await new Promise(done => { this.waiting.set(place, done); /** @type {Worker} */ (this.quick).postMessage({file: dropped}); });
+    const kept = await new Promise(done => {
+      this.waiting.set(place, done);
+      /** @type {Worker} */ (this.quick).postMessage({file: dropped});
+    });
     if (kept.path !== undefined) return kept.path;
     this.files = this.files.filter(other => other !== dropped);
     throw new Error(kept.error);

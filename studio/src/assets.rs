@@ -26,8 +26,12 @@ const ASSETS: &[Asset] = page![
     "cases.js": SCRIPT,
     "drop.js": SCRIPT,
     "editor.js": SCRIPT,
+    "film.js": SCRIPT,
     "format.js": SCRIPT,
     "gallery.js": SCRIPT,
+    "gif.js": SCRIPT,
+    "hints.js": SCRIPT,
+    "layout.js": SCRIPT,
     "link.js": SCRIPT,
     "logs.js": SCRIPT,
     "main.js": SCRIPT,
@@ -36,9 +40,11 @@ const ASSETS: &[Asset] = page![
     "parameters.js": SCRIPT,
     "pen.js": SCRIPT,
     "picture.js": SCRIPT,
+    "player.js": SCRIPT,
     "plots.js": SCRIPT,
     "shape.js": SCRIPT,
     "stage.js": SCRIPT,
+    "stops.js": SCRIPT,
     "socket.js": SCRIPT,
     "sweep.js": SCRIPT,
     "tour.js": SCRIPT,
@@ -89,4 +95,18 @@ pub async fn serve(uri: Uri) -> Response {
 fn from_folder(path: &str) -> Option<String> {
     let folder = std::env::var_os("TAUT_STUDIO_PAGE").filter(|_| cfg!(debug_assertions))?;
     std::fs::read_to_string(std::path::Path::new(&folder).join(path.trim_start_matches('/'))).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::ASSETS;
+
+    #[test]
+    fn the_files_of_the_page_have_lines_of_120_columns_at_most() {
+        for (path, _, content) in ASSETS.iter().filter(|(path, _, _)| !path.ends_with(".svg")) {
+            for (k, line) in content.lines().enumerate() {
+                assert!(line.chars().count() <= 120, "{path}, line {}: {line}", k + 1);
+            }
+        }
+    }
 }

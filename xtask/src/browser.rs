@@ -89,7 +89,7 @@ fn studio(taut: &Path, browser: &Path, shots: &Path, counts: &mut Counts) -> Res
     let mut types = Command::new("node");
     types.arg(Path::new(FOLDER).join("node_modules/typescript/bin/tsc")).args(["-p", "studio/page/tsconfig.json"]);
     let mut passed = crate::run(types, counts)?;
-    for script in ["studio.mjs", "studio-edits.mjs", "studio-work.mjs"] {
+    for script in ["studio.mjs", "studio-edits.mjs", "studio-work.mjs", "studio-lesson.mjs"] {
         let mut node = Command::new("node");
         node.arg(Path::new(FOLDER).join(script)).arg(browser).arg(taut).arg(shots);
         passed &= crate::run(node, counts)?;

@@ -1,0 +1,11 @@
+//! The JSON Schema of the case file, by which the page completes and explains what is typed.
+
+use crate::Context;
+use crate::message::{Reply, Request};
+use serde_json::json;
+use taut::error::Result;
+
+/// What `taut schema case` prints.
+pub fn schema(_: &Request, _: &Context) -> Result<Reply> {
+    Ok(Reply::of(json!({ "schema": taut::json::case_schema() })))
+}
