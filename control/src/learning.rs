@@ -194,7 +194,7 @@ pub fn learn(
         every,
         now,
         share: if kept.is_finite() { kept } else { 0.0 },
-        band: [frequencies().next().map_or(0.0, hertz), frequencies().last().map_or(0.0, hertz)],
+        band: [frequencies().next().map_or(0.0, hertz), frequencies().next_back().map_or(0.0, hertz)],
         contraction: rule.contraction(),
         points: (0..transform.bins())
             .map(|k| Point { frequency: hertz(k), left: rule.left[k], kept: rule.kept[k] })

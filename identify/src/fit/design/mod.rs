@@ -29,7 +29,7 @@ pub use verify::{Verified, verify};
 use crate::case::{Case, Plan, parameters};
 use crate::error::{Error, Result};
 use crate::fit::asked::problem::{Problem, Stop};
-use crate::fit::limits::{DURATION, DESIGN_MODEL_ERROR, MOST_ROWS, SAMPLE_INTERVAL};
+use crate::fit::limits::{DESIGN_MODEL_ERROR, DURATION, MOST_ROWS, SAMPLE_INTERVAL};
 use crate::fit::trust::identify::Group;
 use crate::log::Quantity;
 use crate::machine::{Channel, EncoderPlace, Machine, Measurement};
