@@ -54,6 +54,7 @@
 //! - [`fit`]: parameters from logs, and what the logs cannot tell.
 //! - [`sweep`]: many runs with parameters varied.
 //! - [`tune`]: gains of a controller, good for the worst axis that parameters, loads and places can make.
+//! - [`planning`]: the fastest moves. [`learning`]: the next feed-forward signal of a repeated move.
 //! - [`export`]: machines and controllers as texts for other tools.
 //! - `json`: results as data (feature `json`).
 //!
@@ -69,7 +70,7 @@ pub mod reduction;
 pub mod sweep;
 
 pub use taut_case::{case, files, log};
-pub use taut_control::{control, frf, linear, planning, tune};
+pub use taut_control::{control, frf, learning, linear, planning, tune};
 pub use taut_core::{
     Error, Result, chance, design, error, friction, machine, measure, mechanism, metrics, number, parameter, plan,
     polyline, quantity, reach, signal, solve,

@@ -31,7 +31,7 @@ fn promises_hold_on_simulated_logs() {
     let names = ["cart.mass", "cart.friction.coulomb", "cart.friction.viscous"];
     for kind in [Kind::Trapezoid, Kind::Multisine] {
         let measured = vec![noisy(Quantity::DriveAngle, 2e-3)];
-        let request = Request { measured, ..request(&names, &[kind]) };
+        let request = Request { measured, doubt: 0.0, ..request(&names, &[kind]) };
         let found = design(&case, &request, &|| false, &mut |_| {}).unwrap();
         assert!(found.promises.iter().all(|promise| promise.is_determined()), "{:?}", found.promises);
         let logs = 40;
@@ -48,12 +48,58 @@ fn promises_hold_on_simulated_logs() {
 #[test]
 fn promises_for_an_encoder_alone_are_kept() {
     let case = template();
-    let request = request(&["cart.mass", "cart.friction.viscous"], &[Kind::Trapezoid]);
+    let request = Request { doubt: 0.0, ..request(&["cart.mass", "cart.friction.viscous"], &[Kind::Trapezoid]) };
     let found = design(&case, &request, &|| false, &mut |_| {}).unwrap();
     assert_eq!(found.measured.len(), 1);
     for one in verify(&case, &request, &found, 24, &|| false).unwrap() {
         assert!(one.ratio < 1.5 && one.fits == 24, "{one:?}");
     }
+}
+
+/// The truth is another machine each time: estimates are nearer to it than the promise, in which the model's error is,
+/// and of the size of that of an exact model.
+#[test]
+fn promises_hold_on_machines_that_are_off() {
+    let case = template();
+    let measured = vec![noisy(Quantity::DriveAngle, 2e-3)];
+    let request = Request { measured, ..request(&["cart.mass", "cart.friction.coulomb"], &[Kind::Trapezoid]) };
+    let found = design(&case, &request, &|| false, &mut |_| {}).unwrap();
+    for one in verify(&case, &request, &found, 16, &|| false).unwrap() {
+        assert!((0.4..2.0).contains(&one.ratio) && one.fits == 16 && one.coverage > 0.7, "{one:?}");
+    }
+}
+
+/// A machine alone, without experiment, fit or log.
+#[test]
+fn a_machine_alone_has_a_design() {
+    let machine = TEMPLATE.split("[[experiment]]").next().unwrap();
+    let case = Case::from_text("axis.toml", machine).unwrap();
+    assert!(case.experiments.is_empty() && case.fit.is_none());
+    let limits = Request { input: Some(6.0), travel: Some(0.1), ..request(&["cart.mass"], &[Kind::Trapezoid]) };
+    let found = design(&case, &limits, &|| false, &mut |_| {}).unwrap();
+    assert!(found.promises[0].is_determined() && found.own.is_empty() && found.reached.way() <= 0.0901);
+    let text = found.case_text(&case, "axis.toml".as_ref()).unwrap();
+    assert_eq!(Case::from_text("designed.toml", &text).unwrap().experiments.len(), 1);
+    assert_eq!(verify(&case, &limits, &found, 2, &|| false).unwrap()[0].fits, 2);
+}
+
+/// However quiet the sensor, no standard error is below that of the model.
+#[test]
+fn no_promise_is_better_than_the_model() {
+    let case = template();
+    for model_error in [0.0, 0.01, 0.05] {
+        let measured = vec![noisy(Quantity::DriveAngle, 1e-6)];
+        let request = Request { measured, model_error, ..request(&["cart.mass"], &[Kind::Trapezoid]) };
+        let found = design(&case, &request, &|| false, &mut |_| {}).unwrap();
+        let [promise] = &found.promises[..] else { panic!("{:?}", found.promises) };
+        assert!(promise.random < 1e-3 * promise.value, "{promise:?}");
+        assert!((promise.relative - model_error).abs() < 1e-3, "{promise:?}");
+        let root = promise.random.hypot(model_error * promise.value);
+        assert!((promise.error / root - 1.0).abs() < 1e-9, "{promise:?}");
+    }
+    let wild = Request { model_error: 1.0, ..request(&["cart.mass"], &[Kind::Trapezoid]) };
+    let told = design(&case, &wild, &|| false, &mut |_| {}).unwrap_err().to_string();
+    assert!(told.contains("a model error of 1 cannot be"), "{told}");
 }
 
 /// A designed input tells more than the experiments that the case has, in no more time.

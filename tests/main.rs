@@ -33,6 +33,7 @@ mod golden;
 mod hard;
 mod instant;
 mod laws;
+mod learning;
 mod linear;
 mod logs;
 mod lugre;

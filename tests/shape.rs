@@ -118,10 +118,10 @@ fn humps_are_as_high_as_the_tolerance() {
 
 const TODAY: [(Kind, f64); 3] = [(Kind::Ei, 0.4), (Kind::TwoHumpEi, 0.3), (Kind::ThreeHumpEi, 0.2)];
 
-/// Today's EI shapers keep what defines them with damping: no more than the tolerance between their outermost zeros,
-/// and the tolerance at every hump.
+/// Today's polynomials keep the equations that define EI shapers with damping, to a fifth of the tolerance: humps as
+/// high as the tolerance, between them next to nothing.
 #[test]
-fn humps_are_as_high_as_the_tolerance_with_damping() {
+fn humps_are_near_the_tolerance_with_damping() {
     for (kind, most) in TODAY {
         for part in 0..=8 {
             let zeta = most * f64::from(part) / 8.0;
@@ -131,110 +131,27 @@ fn humps_are_as_high_as_the_tolerance_with_damping() {
             let v: Vec<f64> =
                 (0..=40_000).map(|k| shaper.residual_vibration(0.3 + 5e-5 * f64::from(k), zeta)).collect();
             let tops: Vec<f64> = v.windows(3).filter(|w| w[1] > w[0] && w[1] >= w[2]).map(|w| w[1]).collect();
-            let humps = tops.iter().filter(|top| (**top - TOLERANCE).abs() < 2e-4).count();
+            let bottoms = v.windows(3).filter(|w| w[1] < w[0] && w[1] <= w[2]).map(|w| w[1]);
+            let humps = tops.iter().filter(|top| (**top / TOLERANCE - 1.0).abs() < 0.2).count();
             let wanted = [1, 2, 3][kind as usize - Kind::Ei as usize];
-            // The last impulse of EI stands after a damped period; its one hump then is not quite at the frequency
-            // itself.
-            let is_near = kind == Kind::Ei && tops.iter().any(|top| (*top / TOLERANCE - 1.0).abs() < 0.05);
-            assert!(humps == wanted || is_near, "{kind:?} {zeta}: {tops:?}");
+            assert_eq!(humps, wanted, "{kind:?} {zeta}: {tops:?}");
+            assert!(bottoms.fold(0.0, f64::max) < 0.016, "{kind:?} {zeta}");
             let own = shaper.residual_vibration(1.0, zeta);
             let expected = if kind == Kind::TwoHumpEi { 0.0 } else { TOLERANCE };
-            assert!((own - expected).abs() < 1e-7, "{kind:?} {zeta}: {own}");
+            assert!((own - expected).abs() < 6e-3, "{kind:?} {zeta}: {own}");
         }
     }
 }
 
-/// Without damping they are what they were.
+/// Without damping they are what they were, but for the rounding of the polynomials.
 #[test]
-fn without_damping_nothing_has_changed() {
+fn without_damping_little_has_changed() {
     for kind in Kind::ALL {
         let [new, old] = Firmware::ALL.map(|firmware| Shaper::formed(kind.into(), firmware, 40.0, 0.0).unwrap());
         for (a, b) in new.impulses().iter().zip(old.impulses()) {
-            assert!((a.0 - b.0).abs() < 1e-12 && (a.1 - b.1).abs() < 1e-10, "{kind:?}: {new:?} {old:?}");
-        }
-    }
-}
-
-/// Cubic through pairs by least squares, constant first.
-fn cubic(points: &[(f64, f64)]) -> [f64; 4] {
-    let mut rows = [[0.0; 5]; 4];
-    for (x, y) in points {
-        for (i, row) in rows.iter_mut().enumerate() {
-            for (j, value) in row.iter_mut().take(4).enumerate() {
-                *value += x.powi((i + j) as i32);
-            }
-            row[4] += x.powi(i as i32) * y;
-        }
-    }
-    for i in 0..4 {
-        let own = rows[i];
-        for (_, row) in rows.iter_mut().enumerate().filter(|(k, _)| *k != i) {
-            let factor = row[i] / own[i];
-            row.iter_mut().zip(own).for_each(|(value, own)| *value -= factor * own);
-        }
-    }
-    [0, 1, 2, 3].map(|i| rows[i][4] / rows[i][i])
-}
-
-/// Coefficients of t₂ … and A₁ … over the damping ratio.
-type Published = (Kind, f64, &'static [[f64; 4]], &'static [[f64; 4]]);
-
-/// The polynomials that Singhose, Porter, Tuttle and Singer (1997) publish, cubic in the damping ratio, for a tolerance
-/// of 5 %; times in undamped periods. Klipper has taken them since 2025-09, and in its table they were read, not in the
-/// paper. Two of the numbers are misprints there: of the third amplitude of two humps the constant 0.34089, with which the sum is 1.0005, and of the last time of three
-/// humps the sign of the quadratic term.
-const PUBLISHED_CUBICS: [Published; 2] = [
-    (
-        Kind::TwoHumpEi,
-        0.3,
-        &[
-            [0.49890, 0.16270, -0.54262, 6.16180],
-            [0.99748, 0.18382, -1.58270, 8.17120],
-            [1.49920, -0.09297, -0.28338, 1.85710],
-        ],
-        &[
-            [0.16054, 0.76699, 2.26560, -1.22750],
-            [0.33911, 0.45081, -2.58080, 1.73650],
-            [0.34038, -0.61533, -0.68765, 0.42261],
-        ],
-    ),
-    (
-        Kind::ThreeHumpEi,
-        0.2,
-        &[
-            [0.49974, 0.23834, 0.44559, 12.4720],
-            [0.99849, 0.29808, -2.36460, 23.3990],
-            [1.49870, 0.10306, -2.01390, 17.0320],
-            [1.99960, -0.28231, -0.61536, 5.40450],
-        ],
-        &[
-            [0.11275, 0.76632, 3.29160, -1.44380],
-            [0.23698, 0.61164, -2.57850, 4.85220],
-            [0.30008, -0.19062, -2.14560, 0.13744],
-            [0.23775, -0.73297, 0.46885, -2.08650],
-        ],
-    ),
-];
-
-#[test]
-fn cubics_through_the_solutions_are_the_published_ones() {
-    for (kind, most, times, amplitudes) in PUBLISHED_CUBICS {
-        let zetas: Vec<f64> = (0..=(100.0 * most).round() as i32).map(|k| 0.01 * f64::from(k)).collect();
-        let all: Vec<Shaper> =
-            zetas.iter().map(|zeta| Pattern::new(kind.into(), Firmware::Klipper, *zeta).unwrap().at(1.0)).collect();
-        let near = |found: [f64; 4], published: &[f64; 4], what: &str| {
-            for (a, b) in found.iter().zip(published) {
-                assert!((a - b).abs() < 8e-4 + 2e-4 * b.abs(), "{kind:?} {what}: {found:?} {published:?}");
-            }
-        };
-        let through = |value: &dyn Fn(&Shaper) -> f64| {
-            cubic(&zetas.iter().copied().zip(all.iter().map(value)).collect::<Vec<_>>())
-        };
-        for (i, published) in times.iter().enumerate() {
-            near(through(&|shaper| shaper.impulses()[i + 1].0), published, "time");
-        }
-        for (i, published) in amplitudes.iter().enumerate() {
-            near(through(&|shaper| shaper.impulses()[i].1), published, "amplitude");
+            let rounding = if EXACT.contains(&kind) { 1e-12 } else { 1e-3 };
+            let is_near = (40.0 * (a.0 - b.0)).abs() < 3.0 * rounding && (a.1 - b.1).abs() < 2.0 * rounding;
+            assert!(is_near, "{kind:?}: {new:?} {old:?}");
         }
     }
 }
@@ -268,13 +185,14 @@ fn generalised_mzv() {
     assert_eq!(Form::read("MZV(n=4, tau=1)").unwrap(), Form::Mzv { pulses: 4, duration: 0.75 });
 }
 
-/// A tolerance of its own is what an EI shaper leaves at its frequency.
+/// A tolerance of its own is what an EI shaper leaves at its frequency, to a twentieth.
 #[test]
 fn ei_with_a_tolerance() {
-    for tolerance in [0.01, 0.05, 0.1, 0.2] {
+    for tolerance in [0.02, 0.05, 0.1, 0.2] {
         let form = Form::read(&format!("ei(v_tol={tolerance})")).unwrap();
         let shaper = Shaper::formed(form, Firmware::Klipper, 30.0, 0.1).unwrap();
-        assert!((shaper.residual_vibration(30.0, 0.1) - tolerance).abs() < 1e-9);
+        let left = shaper.residual_vibration(30.0, 0.1);
+        assert!((left / tolerance - 1.0).abs() < 0.05, "{tolerance}: {left}");
     }
 }
 
@@ -290,7 +208,7 @@ fn wrong_forms_are_told_what_is_wrong_with_them() {
         ("mzv(n=4,t=0.3)", "mzv(n=4,t=0.3) has no impulses that are all positive"),
         ("mzv(n=4,t=1,tau=1)", "mzv takes either t or tau"),
         ("zv(t=1)", "zv has no parameter \"t\""),
-        ("ei(v_tol=0.5)", "ei(v_tol=0.5) has no solution for a damping ratio of 0.1"),
+        ("ei(v_tol=0.5)", "ei(v_tol=0.5) has no positive impulses for a damping ratio of 0.1"),
     ] {
         let told = Form::read(text).map(|form| form.name()).unwrap_err().what;
         // A value without a key is no number of one.
@@ -330,7 +248,8 @@ fn together_the_worst_counts() {
         assert!((fitted.vibration - each[0].max(each[1])).abs() < 1e-12, "{fitted:?} {each:?}");
     }
     let alone = choose(Target::Spectrum(&all[0]), &criterion).unwrap();
-    assert!(both.best().vibration >= alone.best().vibration && both.best().smoothing > alone.best().smoothing);
+    // One frequency for both: a ZV leaves more than of one alone, and the best is a longer shaper.
+    assert!(both.fitted[0].vibration > alone.fitted[0].vibration && both.best().smoothing > alone.best().smoothing);
 }
 
 /// Since 2025-10 a ZV gives way to a shaper that leaves a tenth less, and less vibration can be asked for.
@@ -466,6 +385,53 @@ fn what_klipper_printed() {
             }
         }
     }
+}
+
+/// Every digit that today's Klipper prints, of 64 drawn spectra and with its options: frequency, vibration, smoothing and
+/// acceleration of each shaper, and the recommendation. The authority is its rule written out again with NumPy.
+#[test]
+fn every_digit_of_todays_klipper() {
+    let text = fs::read_to_string("tests/authorities/klipper.json").unwrap();
+    let value: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let sets = value["sets"].as_array().unwrap();
+    assert!(sets.len() >= 48);
+    let mut wrong = Vec::new();
+    for (place, set) in sets.iter().enumerate() {
+        let column = |key: &str| set[key].as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect::<Vec<_>>();
+        let (frequency, density) = (column("frequency"), column("density"));
+        let still = vec![0.0; density.len()];
+        let density = [density.clone(), still.clone(), still, density];
+        let data = Accelerometer::Spectrum { frequency, density, per_frequency: false };
+        let spectrum = Spectrum::by(&data, Axis::All, Firmware::Klipper);
+        let mut criterion = Criterion {
+            max_smoothing: set["max_smoothing"].as_f64().map(|mm| 1e-3 * mm),
+            max_vibrations: set["max_vibrations"].as_f64(),
+            ..Criterion::default()
+        };
+        if let (Some(zeta), Some(speed)) = (set["zeta"].as_f64(), set["corner"].as_f64()) {
+            criterion = criterion.designed_for(zeta).unwrap();
+            criterion.corner.speed = 1e-3 * speed;
+        }
+        let choice = choose(Target::Spectrum(&spectrum), &criterion).unwrap();
+        let best = &choice.best().shaper;
+        let mut printed = vec![vec![best.form.name(), format!("{:.1}", best.frequency)]];
+        for one in choice.fitted.iter().filter(|one| one.is_candidate) {
+            printed.push(vec![
+                one.shaper.form.name(),
+                format!("{:.1}", one.shaper.frequency),
+                format!("{:.1}", 100.0 * one.vibration),
+                format!("{:.3}", 1e3 * one.smoothing),
+                format!("{:.0}", (10.0 * one.max_acceleration).round() * 100.0),
+            ]);
+        }
+        let rows = std::iter::once(&set["recommended"]).chain(set["shapers"].as_array().unwrap());
+        let expected: Vec<Vec<&str>> =
+            rows.map(|row| row.as_array().unwrap().iter().map(|x| x.as_str().unwrap()).collect()).collect();
+        if printed != expected {
+            wrong.push(format!("{place}: {printed:?}, expected {expected:?}"));
+        }
+    }
+    assert!(wrong.is_empty(), "{} of {}:\n{}", wrong.len(), sets.len(), wrong.join("\n"));
 }
 
 fn temporary(name: &str, text: &str) -> PathBuf {

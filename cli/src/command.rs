@@ -53,7 +53,8 @@ impl Common {
         Ok(case)
     }
 
-    fn accepting(&self, path: &Path, (files, accepted): (Files, Accepted)) -> Result<Case> {
+    /// Opens the case of one of these machines, with these files.
+    pub fn accepting(&self, path: &Path, (files, accepted): (Files, Accepted)) -> Result<Case> {
         match is_standard_input(path) {
             true => Case::from_text_accepting(path, &standard_input()?, &self.changes(), (files, accepted)),
             false => Case::read_accepting(path, &self.changes(), (files, accepted)),

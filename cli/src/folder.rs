@@ -10,7 +10,9 @@ use std::ffi::OsStr;
 use std::fmt::Write;
 use std::path::{Component, Path, PathBuf};
 use taut::case::{self, Case, Files, InputFile};
+use taut::control::Added;
 use taut::files::{Batch, Claim, Inputs, MARKER, write_atomically};
+use taut::log::read_samples;
 use taut::solve::Event;
 use taut::{Error, Result, files};
 
@@ -88,7 +90,19 @@ pub fn noted(claim: Claim) -> Claim {
 
 /// The files that a command reads: the case and those that it names.
 pub fn inputs(path: &Path, files: &[InputFile]) -> Inputs {
-    Inputs::new(std::iter::once(path).chain(files.iter().map(|file| file.path.as_path())))
+    inputs_with(path, None, files)
+}
+
+/// The files that a command reads: the case, others of the command line, and those that the case names.
+pub fn inputs_with<'a>(path: &'a Path, others: impl IntoIterator<Item = &'a Path>, files: &'a [InputFile]) -> Inputs {
+    let files = files.iter().map(|file| file.path.as_path());
+    Inputs::new(std::iter::once(path).chain(others).chain(files))
+}
+
+/// The signal of a file that `taut learn` wrote, in V or A.
+pub fn read_added(file: &Path, unit: &str) -> Result<Added> {
+    let (times, values) = read_samples(file, "time_s", &format!("added_{unit}"))?;
+    Ok(Added { times, values })
 }
 
 impl Folder {

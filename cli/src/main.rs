@@ -14,6 +14,7 @@ mod frf;
 mod hypot;
 mod init;
 mod interrupt;
+mod learn;
 mod listing;
 mod manual;
 mod modes;
@@ -56,6 +57,7 @@ fn main() -> ExitCode {
         Command::Shape(args) => shape::run(&args),
         Command::Tune(args) => tune::run(&args),
         Command::Plan(args) => plan::run(&args),
+        Command::Learn(args) => learn::run(&args),
         Command::Sweep(args) => sweep::run(&args),
         Command::Modes(args) => modes::run(&args),
         Command::Frf(args) => frf::run(&args),

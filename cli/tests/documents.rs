@@ -175,6 +175,11 @@ fn the_page_on_plans_shows_what_the_program_prints() {
 }
 
 #[test]
+fn the_page_on_learning_shows_what_the_program_prints() {
+    check("docs/learn.md");
+}
+
+#[test]
 fn the_page_on_sweeps_shows_what_the_program_prints() {
     check("docs/sweep.md");
 }

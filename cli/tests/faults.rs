@@ -314,6 +314,22 @@ fn plan_is_killed() {
     Writer::new(command, "", "--reserve 20%").reading("pid.toml", "controllers/pid.toml").withstands_kills(15);
 }
 
+/// Learning from the log of a cart that creeps to its target.
+fn learner() -> Writer {
+    let command =
+        "learn pid-shaped.toml --move fast --set move.0.name=fast --set tune.spread=0 --log trial.csv --out out";
+    let mut writer = Writer::new(command, "", "--encoder --position cart_position_m");
+    let row = |k: u32| format!("{},{}\n", 1e-3 * f64::from(k), 0.02 * (1.0 - (-20e-3 * f64::from(k)).exp()));
+    let rows: String = (0..600).map(row).collect();
+    writer.read.insert("trial.csv".into(), format!("time_s,cart_position_m\n{rows}").into_bytes());
+    writer.reading("pid-shaped.toml", "controllers/pid-shaped.toml")
+}
+
+#[test]
+fn learn_is_killed() {
+    learner().withstands_kills(16);
+}
+
 #[test]
 fn tune_in_place_is_killed() {
     let command = format!("tune pid.toml {TUNING} --in-place --anyway").leak();
@@ -429,6 +445,7 @@ fn writers() -> Vec<(Writer, &'static str)> {
         (pid(&format!("tune pid.toml {TUNING} --out out")), "out"),
         (pid(&format!("tune pid.toml {TUNING} --in-place --anyway")), "."),
         (pid(&format!("{PLAN} --set move.0.name=fast --set tune.spread=0")), "out"),
+        (learner(), "out"),
         (logs("check nonlinear.toml --out out"), "out"),
         (table4("show table4.toml --out out"), "out"),
         (logs("frf nonlinear.toml --out out"), "out"),

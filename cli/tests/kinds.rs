@@ -2,6 +2,7 @@
 
 use assert_cmd::Command;
 use std::path::Path;
+use std::sync::OnceLock;
 use tempfile::TempDir;
 
 /// The outcome of a command with a kind of machine.
@@ -15,6 +16,8 @@ use Ends::{Refused, Runs};
 
 const AXIS: &str = "stages/sollmann-jouaneh/table4.toml";
 const PID: &str = "stages/sollmann-jouaneh/controllers/pid.toml";
+/// A loop that is stable on the whole family.
+const SHAPED: &str = "stages/sollmann-jouaneh/controllers/pid-shaped.toml";
 const LOGS: &str = "stages/sollmann-jouaneh/identification/separate.toml";
 const GANTRIES: [&str; 2] = ["stages/h-frame/h-frame.toml", "stages/core-xy/core-xy.toml"];
 /// Gantries with a controller and moves.
@@ -44,6 +47,7 @@ const TABLE: &[(&str, &[&str], &str, Ends)] = &[
     ("move", &[], PID, Runs),
     ("tune", &["--evaluate"], PID, Runs),
     ("plan", &["--move", "short fast"], PID, Runs),
+    ("learn", &["--move", "short fast", "--log", "trial.csv"], SHAPED, YET_TO_COME),
     ("check", &[], LOGS, YET_TO_COME),
     ("fit", &[], LOGS, YET_TO_COME),
     ("shape", &[], PID, Runs),
@@ -58,6 +62,19 @@ const TABLE: &[(&str, &[&str], &str, Ends)] = &[
     // It serves until it is ended.
     ("studio", &["--port", "none"], AXIS, Refused("--port")),
 ];
+
+/// The log of a repeated move.
+fn trial() -> &'static str {
+    static FILE: OnceLock<(TempDir, String)> = OnceLock::new();
+    let make = || {
+        let folder = TempDir::new().unwrap();
+        let out = folder.path().join("out");
+        let arguments = ["move", SHAPED, "--move", "short fast", "--no-report", "--out", out.to_str().unwrap()];
+        assert!(matches!(taut().args(arguments).output().unwrap().status.code(), Some(0 | 1)));
+        (folder, out.join("short-fast.csv").display().to_string())
+    };
+    &FILE.get_or_init(make).1
+}
 
 fn taut() -> Command {
     let mut command = Command::cargo_bin("taut").unwrap();
@@ -90,6 +107,7 @@ fn every_kind_goes_through_every_command() {
             let there = format!("{}/", folder.path().display());
             let options = options.iter().map(|option| match *option {
                 "there/" => there.as_str(),
+                "trial.csv" => trial(),
                 "short fast" if case != *axis => "square",
                 option => option,
             });

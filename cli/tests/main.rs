@@ -15,6 +15,7 @@ mod gantry;
 #[path = "../../tests/common/ignored.rs"]
 mod ignored;
 mod kinds;
+mod learn;
 mod missing_logs;
 mod moves;
 mod outputs;

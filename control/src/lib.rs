@@ -6,6 +6,7 @@ use taut_core::*;
 
 pub mod control;
 pub mod frf;
+pub mod learning;
 pub mod linear;
 pub mod planning;
 pub mod tune;

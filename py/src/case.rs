@@ -11,6 +11,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use taut::Error;
 use taut::case::{Accepted, Files, InputFile, Plan, TEMPLATE};
+use taut::control::Added;
 use taut::export::{Exported, Options, Part, Place, Real, Target, export};
 use taut::files::{Inputs, write_atomically};
 use taut::fit::Effort;
@@ -19,6 +20,7 @@ use taut::fit::experiment_design::{Criterion, Kind, Request, design, verify};
 use taut::fit::{Posterior, Profile, check_watched, drift, fit, posterior, profiles};
 use taut::frf::{Cut, Known, measure};
 use taut::json;
+use taut::learning::{At, Trial, learn};
 use taut::linear::Analysis;
 use taut::machine::{Channel, Quantity};
 use taut::overview::Overview;
@@ -225,7 +227,7 @@ impl Case {
         inputs: Vec<String>,
         criterion: &str,
         times: (f64, Option<f64>),
-        shares: (f64, f64),
+        shares: (f64, f64, f64),
         limits: (Option<f64>, Option<f64>, Option<f64>),
         measured: Vec<(String, f64)>,
         verified: u32,
@@ -252,7 +254,7 @@ impl Case {
             "a" => Ok(Criterion::A),
             other => Err(Error::new(format!("there is no criterion \"{other}\"")).allowed("d, a")),
         };
-        let ((duration, every), (margin, doubt), (input, current, travel)) = (times, shares, limits);
+        let ((duration, every), (margin, doubt, model_error), (input, current, travel)) = (times, shares, limits);
         let request = Request {
             names,
             kinds: inputs.iter().map(kind).collect::<taut::Result<_>>().told(py)?,
@@ -261,6 +263,7 @@ impl Case {
             every,
             margin,
             doubt,
+            model_error,
             input,
             current,
             travel,
@@ -334,6 +337,33 @@ impl Case {
         let changed = Self::from_text(py, self.path.clone(), &text, Vec::new())?;
         let told = guarded(|| json::plan(case, &wanted, &plans))?;
         Ok((value::json(py, &told)?.unbind(), Py::new(py, changed)?))
+    }
+
+    /// Learns from a repetition of a move: what `--json` prints.
+    fn learn<'py>(
+        &self,
+        py: Python<'py>,
+        names: Vec<String>,
+        time: Vec<f64>,
+        position: Vec<f64>,
+        added: Option<Vec<f64>>,
+        encoder: bool,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let case = self.axis(py)?;
+        let (design, moves) = case.moves_named(&self.path, &names).told(py)?;
+        let [motion] = moves[..] else {
+            let error = Error::new(format!("the case has {} moves, and a log is of one", moves.len()));
+            return Err(error.next("name the move of the log: move=\"...\"")).told(py);
+        };
+        let at = if encoder { At::Encoder } else { At::Cart };
+        let before =
+            added.map(|values| Added { times: (0..values.len()).map(|k| k as f64 * design.every).collect(), values });
+        let trial = Trial { time, position, at };
+        let interrupt = Interrupt::listen();
+        let found = unlocked(py, || learn(case, motion, &trial, before.as_ref(), &|| interrupt.stop()));
+        interrupt.finish()?;
+        let found = found?.map_err(|error| error.in_file(&self.path)).told(py)?;
+        value::json(py, &guarded(|| json::learned(case, motion, at, &found))?)
     }
 
     /// Compares friction laws and windows: the comparison as JSON, and the case with the estimates of the chosen ones.

@@ -209,6 +209,31 @@ def test_plans_are_the_command_lines(root, moving):
             moving.plan(**wrong)
 
 
+def test_learning_is_that_of_the_command_line(root, tmp_path):
+    from test_results import program
+
+    moving = taut.read(root / STAGE / "controllers/pid-shaped.toml")
+    # A cart that lags behind by two milliseconds and a little more.
+    every, until = 1e-3, 0.6
+    times = [k * every for k in range(int(until / every) + 1)]
+    run = moving.move("short fast")["short fast"]
+    lagging = [float(np.interp(max(t - 2e-3, 0.0), run["time"], run["cart_position"])) for t in times]
+    log = tmp_path / "log.csv"
+    log.write_text("time_s,cart_position_m\n" + "".join(f"{t!r},{x!r}\n" for t, x in zip(times, lagging)))
+    told = program(root, "learn", f"{STAGE}/controllers/pid-shaped.toml", "--move", "short fast", "--log", str(log))
+    found = moving.learn(times, lagging, move="short fast")
+    assert found.data == told
+    assert len(found.added) == len(found.times) == len(found.to_pandas()) and np.abs(found.added).max() > 0
+    assert "short fast" in repr(found) and "repetition" in found._repr_html_()
+    again = moving.learn(times, lagging, move="short fast", added=found.added)
+    assert again.data["added_before"] == list(found.added)
+    for wrong in ({"move": "gone"}, {}):
+        with pytest.raises(taut.Error):
+            moving.learn(times, lagging, **wrong)
+    with pytest.raises(taut.Error, match="the log ends at"):
+        moving.learn(times[:20], lagging[:20], move="short fast")
+
+
 def test_pairs_of_shapers_are_the_command_lines(root):
     from test_results import program
 

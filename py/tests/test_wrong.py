@@ -541,7 +541,7 @@ def test_fits_with_nonsense(case, tmp_path):
 
 def test_designs_with_nonsense(short):
     names = ["cart.mass"]
-    options = ("duration", "every", "margin", "doubt", "amplitude", "current", "travel", "verify", "criterion", "inputs", "measured")
+    options = ("duration", "every", "margin", "doubt", "model_error", "amplitude", "current", "travel", "verify", "criterion", "inputs", "measured")
     for value in THINGS:
         for option in options:
             call = {"duration": 0.02, "inputs": ["trapezoid"], "travel": 0.05, option: value}
@@ -561,6 +561,10 @@ def test_tunings_and_logs_with_nonsense(short, moving):
             allowed(lambda: moving.tune(spread=value, evaluate=True), told("tune", spread=value))
             allowed(lambda: moving.plan("gone", speed=value), told("plan", speed=value))
             allowed(lambda: moving.plan("gone", reserve=value), told("plan", reserve=value))
+        allowed(lambda: moving.learn(value, [0.0]), told("learn", value, "…"))
+        allowed(lambda: moving.learn([0.0], value), told("learn", "…", value))
+        allowed(lambda: moving.learn([0.0, 1.0], [0.0, 1.0], added=value), told("learn", added=value))
+        allowed(lambda: moving.learn([0.0], [0.0], move=value), told("learn", move=value))
         allowed(lambda: short.tune(spread=value), told("tune without a controller", spread=value))
         allowed(lambda: short.with_log(value, {"t": [0.0, 1.0]}, {"time": "t"}), told("with_log", value))
         allowed(lambda: short.with_log("log", value, {"time": "t"}), told("with_log", "log", value))
@@ -627,7 +631,7 @@ def test_everything_public_is_called_here():
     source = pathlib.Path(__file__).read_text(encoding="utf-8")
     called = {
         "Case": [
-            "changed", "check", "compare", "copy", "design", "drift", "fit", "frf", "get", "modes", "move", "plan", "save", "show", "simulate", "sweep",
+            "changed", "check", "compare", "copy", "design", "drift", "fit", "frf", "get", "learn", "modes", "move", "plan", "save", "show", "simulate", "sweep",
             "tune", "update", "with_log",
         ],  # fmt: skip
         "Run": ["plot", "write"],

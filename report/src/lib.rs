@@ -33,6 +33,7 @@ pub mod fit;
 pub mod frf;
 mod gantry;
 mod layout;
+pub mod learn;
 pub mod modes;
 pub mod motion;
 pub mod page;

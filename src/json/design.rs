@@ -33,6 +33,7 @@ pub fn design(case: &Case, found: &Designed, verified: &[Verified]) -> Value {
             "value": promise.value,
             "standard_error": number(promise.error),
             "relative_error": number(promise.relative),
+            "random_error": number(promise.random),
             "determined": promise.is_determined(),
             "counts": promise.wanted,
         })).collect::<Vec<_>>(),
@@ -49,6 +50,7 @@ pub fn design(case: &Case, found: &Designed, verified: &[Verified]) -> Value {
             "margin": margin,
             "doubt": found.doubt,
         },
+        "model_error": found.model_error,
         "reached": {
             "input": reached.input,
             "current_A": reached.current,

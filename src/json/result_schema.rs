@@ -20,6 +20,7 @@ const RESULTS: &[(&str, &str, &str)] = &[
     ("files", "What a folder of results holds: files.json", include_str!("results/files.txt")),
     ("fit", "`taut fit`", include_str!("results/fit.txt")),
     ("frf", "`taut frf`", include_str!("results/frf.txt")),
+    ("learn", "`taut learn`", include_str!("results/learn.txt")),
     ("modes", "`taut modes`", include_str!("results/modes.txt")),
     ("move", "`taut move`", include_str!("results/move.txt")),
     ("paper", "`taut paper`: claims.json", include_str!("results/paper.txt")),

@@ -205,10 +205,10 @@ impl Case {
         let folder = Folder::of(name, files);
         let controller = controller::controller(&root, &machine)?;
         let moves = motion::moves(&root, &machine, controller.as_ref())?;
-        // A case of moves needs no experiments, nor does one of a controller that is to be tuned.
+        // A machine alone can be shown, shaped, exported, and an experiment can be designed for it.
         let (experiments, unread) = match root.optional("experiment") {
-            None if !moves.is_empty() || controller.is_some() => (Vec::new(), Vec::new()),
-            _ => experiments(&root, &machine, &folder)?,
+            None => (Vec::new(), Vec::new()),
+            Some(_) => experiments(&root, &machine, &folder)?,
         };
         let measurement = measurement::measurement(&root, &machine, &experiments)?;
         let fit = fit::plan(&root, &machine, &experiments, unread.is_empty())?;

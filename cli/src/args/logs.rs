@@ -1,10 +1,10 @@
 //! Logs: `check`, `fit`, `frf`, and the experiment to make next, `design`.
 
-use super::values::{amperes, channel, count, delay, length, metres, seconds, share};
+use super::values::{amperes, channel, count, count_or_none, delay, length, metres, seconds, share};
 use crate::command::Common;
 use clap::ValueEnum;
 use std::path::PathBuf;
-use taut::fit::experiment_design::{Criterion, Kind as InputKind};
+use taut::fit::experiment_design::{Criterion, Kind as InputKind, VERIFIED};
 use taut::machine::Channel;
 
 /// Check which [fit] parameters the logs of a case determine.
@@ -145,9 +145,13 @@ pub struct Design {
     /// repeated [default: [encoder] and [measurement], or the noise of the logs]
     #[arg(long = "measure", value_name = "QUANTITY=NOISE", value_parser = channel)]
     pub measured: Vec<Channel>,
-    /// Also simulate this number of logs and fit each, to verify the predicted errors
-    #[arg(long, value_name = "LOGS", value_parser = count)]
-    pub verify: Option<usize>,
+    /// Relative error of the model, which no predicted error is below
+    #[arg(long, value_name = "SHARE", value_parser = share, default_value = "1%")]
+    pub model_error: f64,
+    /// Number of machines, off by up to --doubt, on which a log is simulated and fitted to verify the predicted errors;
+    /// 0 for none
+    #[arg(long, value_name = "MACHINES", value_parser = count_or_none, default_value_t = VERIFIED)]
+    pub verify: usize,
     /// Seed of the starting points of the search
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,

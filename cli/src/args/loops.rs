@@ -1,8 +1,8 @@
 //! Vibrations and controllers: `modes`, `tune`, `shape`.
 
 use super::values::{
-    Shapers, acceleration, corner_speed, damping, delay, effort, hertz, jerk, metres, metres_per_second, reserve,
-    seconds, shapers, share, smoothing, speed, uncertainty, vibrations,
+    Shapers, acceleration, corner_speed, damping, delay, effort, hertz, jerk, metre_unit, metres, metres_per_second,
+    reserve, seconds, shapers, share, smoothing, speed, uncertainty, vibrations,
 };
 use crate::command::Common;
 use clap::ValueEnum;
@@ -101,6 +101,59 @@ Examples:
 
 Exit status 1: a move has no plan, or its cart does not stay in its window.";
 
+/// Learn the next feed-forward signal of a repeated move from its log.
+///
+/// Iterative learning: from the position that a repetition of a move logged, and the signal that was added to the
+/// command meanwhile, computes the signal to add in the next repetition. Learns only at frequencies at which this
+/// converges on every machine of the family of `taut tune`, and prints how fast, with the errors of the next eight
+/// repetitions. With --out DIR it writes next.csv (time_s and added_V or added_A), learn.json and a report.
+#[derive(Debug, clap::Args)]
+#[command(after_help = LEARN)]
+pub struct Learn {
+    /// The case file; - is standard input
+    pub case: PathBuf,
+    /// Log of the repetition (CSV, Parquet, MATLAB), with times from the beginning of the move on
+    #[arg(long, value_name = "FILE")]
+    pub log: PathBuf,
+    /// The move of the log, if the case has several
+    #[arg(long = "move", value_name = "NAME")]
+    pub moves: Vec<String>,
+    /// Signal that was added to the command of the log, as --out wrote it [default: none]
+    #[arg(long, value_name = "FILE")]
+    pub added: Option<PathBuf>,
+    /// Column of the times, s
+    #[arg(long, value_name = "COLUMN", default_value = "time_s")]
+    pub time: String,
+    /// Column of the position [default: cart_position_m, or measured_m with --encoder]
+    #[arg(long, value_name = "COLUMN")]
+    pub position: Option<String>,
+    /// Unit of the position
+    #[arg(long, value_name = "UNIT", default_value = "m", value_parser = metre_unit)]
+    pub unit: f64,
+    /// The position is the one that the controller measures, along the belt, and not that of the cart
+    #[arg(long)]
+    pub encoder: bool,
+    #[command(flatten)]
+    pub common: Common,
+}
+
+impl Learn {
+    /// The column of the position.
+    pub fn column(&self) -> &str {
+        let usual = if self.encoder { "measured_m" } else { "cart_position_m" };
+        self.position.as_deref().unwrap_or(usual)
+    }
+}
+
+const LEARN: &str = "\
+Examples:
+  taut move axis.toml --move long --out trial-0
+  taut learn axis.toml --move long --log trial-0/long.csv --out learned-1
+  taut move axis.toml --move long --added learned-1/next.csv --out trial-1
+  taut learn axis.toml --move long --log trial-1/long.csv --added learned-1/next.csv --out learned-2
+
+Exit status 1: learning would not converge on a machine of the family, or the signal exceeds the controller's limit.";
+
 /// Recommend an input shaper, from a measured spectrum or from a model.
 ///
 /// Takes a spectrum (Klipper's resonances_*.csv, calibration_data_*.csv), raw accelerometer samples (raw_data_*.csv),
@@ -117,7 +170,7 @@ pub struct Shape {
     /// Choose one shaper for all spectra, by the largest remaining vibration
     #[arg(long)]
     pub together: bool,
-    /// Firmware whose shapers and selection rule are used [default: klipper, as of 2026-03]
+    /// Firmware whose shapers and selection rule are used [default: klipper, of 2026]
     #[arg(long, value_enum, default_value_t, hide_default_value = true)]
     pub firmware: FirmwareName,
     /// Axis of the accelerometer [default: the sum of x, y and z]
@@ -209,7 +262,7 @@ Examples:
 /// Whose shapers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
 pub enum FirmwareName {
-    /// Klipper as of 2026-03: shapers of 2025-09, choice of 2025-10, parameters of mzv and ei
+    /// Klipper of 2026: shapers of 2025-09, choice of 2025-10, parameters of mzv and ei, up to 200 Hz
     #[default]
     Klipper,
     /// Klipper until 2025-08

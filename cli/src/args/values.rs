@@ -14,6 +14,18 @@ pub fn count(text: &str) -> Result<usize, String> {
     }
 }
 
+/// Metres of one of a unit of length.
+pub fn metre_unit(text: &str) -> Result<f64, String> {
+    quantity::read(&format!("1 {}", text.trim()), "m").map_err(|_| "a unit of length is needed, such as mm".into())
+}
+
+pub fn count_or_none(text: &str) -> Result<usize, String> {
+    match text.parse() {
+        Ok(number @ 0..=1_000_000) => Ok(number),
+        _ => Err("a whole number from 0 to 1000000 is needed".into()),
+    }
+}
+
 pub fn share(text: &str) -> Result<f64, String> {
     let share = match text.parse() {
         Ok(number) => number,

@@ -29,12 +29,12 @@ pub fn run(args: &Args) -> Outcome {
     let progress = Progress::new("looking at inputs", None, common.quiet);
     let found = design(&case, &request, &stop, &mut |kind| progress.tell(|| kind.to_string()));
     let found = found.map_err(|error| error.in_file(&args.case))?;
-    let verified = match args.verify.filter(|_| !stop()) {
-        Some(logs) => {
+    let verified = match args.verify {
+        machines if machines > 0 && !stop() => {
             progress.tell(|| "fitting simulated logs".into());
-            verify(&case, &request, &found, logs, &stop)?
+            verify(&case, &request, &found, machines, &stop)?
         }
-        None => Vec::new(),
+        _ => Vec::new(),
     };
     progress.clear();
     let whole = found.case_text(&case, &args.case)?;
@@ -84,6 +84,7 @@ fn request(args: &Args, case: &Case) -> Result<Request> {
         every: args.every,
         margin: args.margin,
         doubt: args.doubt,
+        model_error: args.model_error,
         input: input.transpose()?,
         current: args.current,
         travel: args.travel,

@@ -12,15 +12,18 @@ pub fn text(title: &str, found: &Designed, checked: &[Verified]) -> String {
     let mut part = |heading: &str, rows: String| {
         let _ = write!(text, "{}\n{rows}\n", bold(heading));
     };
-    let promised = "Standard errors that it promises, all others free";
-    part(promised, format!("{}  {}\n", columns(&promises(found)), measured(found)));
+    let promised = format!(
+        "Standard errors that it promises, all others free, {} % of the value for the model included",
+        taut::quantity::rounded(100.0 * found.model_error)
+    );
+    part(&promised, format!("{}  {}\n", columns(&promises(found)), measured(found)));
     for (group, choices) in &found.undetermined {
         let choices: String = choices.iter().map(|choice| format!("  - {choice}\n")).collect();
         part("Not determined", format!("  {}\n{choices}", group.words));
     }
     if !checked.is_empty() {
         let heading =
-            "Fits of simulated logs: errors over the promise (root mean square, mean), 95 % intervals that hold";
+            "Fits of simulated logs: errors over those of an exact model (rms, mean), 95 % intervals that hold";
         part(heading, columns(&verified(checked)));
     }
     let heading = format!(

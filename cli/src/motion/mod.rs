@@ -10,7 +10,8 @@ use crate::interrupt::Interrupt;
 use std::fmt::Write;
 use std::path::Path;
 use taut::case::{Case, Files, Move};
-use taut::control::{Loop, MoveRun, Rows, Standard, each, stream, worst};
+use taut::control::fed::Fed;
+use taut::control::{Added, Loop, MoveRun, Rows, Standard, each, stream, worst};
 use taut::design::Design;
 use taut::files::write_atomically;
 use taut::json::{self, Moved};
@@ -34,9 +35,13 @@ pub fn run(args: &Args) -> Outcome {
             .into());
     }
     let folder = match (&cases[..], &args.case[..]) {
-        ([case], [path]) => Folder::wanted(common, || folder::inputs(path, &case.files), names(args, case, path)?)?,
+        ([case], [path]) => {
+            let inputs = || folder::inputs_with(path, args.added.as_deref(), &case.files);
+            Folder::wanted(common, inputs, names(args, case, path)?)?
+        }
         _ => None,
     };
+    let added = added(args, &cases)?;
     let interrupt = Interrupt::listen();
     let mut tried = Vec::new();
     for (case, path) in cases.iter().zip(&args.case) {
@@ -46,7 +51,7 @@ pub fn run(args: &Args) -> Outcome {
             if interrupt.signal().is_some() {
                 break;
             }
-            done.push(one(case, design, motion, args, folder.as_ref(), &interrupt)?);
+            done.push(one(case, design, motion, (args, added.as_ref()), folder.as_ref(), &interrupt)?);
         }
         tried.push(Tried { case, design, done });
     }
@@ -73,6 +78,26 @@ pub fn run(args: &Args) -> Outcome {
     finished.finish(common, folder)
 }
 
+/// The signal of `--added`, which is of one move of one axis.
+fn added(args: &Args, cases: &[Case]) -> Result<Option<Added>> {
+    let Some(file) = &args.added else { return Ok(None) };
+    let wrong = |what: String, next: &str| Err(Error::new(what).in_file("--added").next(next));
+    let ([case], [path]) = (cases, &args.case[..]) else {
+        return wrong(format!("a signal is of one case, and there are {}", cases.len()), "name one case");
+    };
+    if case.machine.drives.len() > 1 {
+        return wrong("a signal is of one axis, and the case describes a gantry".into(), "leave --added out");
+    }
+    let (_, moves) = case.moves_named(path, &args.moves)?;
+    if moves.len() > 1 {
+        return wrong(format!("a signal is of one move, and the case has {}", moves.len()), "name one with --move");
+    }
+    if args.spread.is_some() {
+        return wrong("--spread runs without what was learned".into(), "leave --spread or --added out");
+    }
+    folder::read_added(file, case.machine.drives[0].amplifier.mode.unit()).map(Some)
+}
+
 /// The files that will be written, but for plots.
 fn names(args: &Args, case: &Case, path: &Path) -> Result<Vec<String>> {
     let (_, moves) = case.moves_named(path, &args.moves)?;
@@ -95,7 +120,7 @@ fn one<'a>(
     case: &'a Case,
     design: &'a Design,
     motion: &'a Move,
-    args: &Args,
+    (args, added): (&Args, Option<&Added>),
     folder: Option<&Folder>,
     interrupt: &Interrupt,
 ) -> std::result::Result<Done<'a>, Failure> {
@@ -117,8 +142,14 @@ fn one<'a>(
         if trouble.is_some() || interrupt.signal().is_some() { Flow::Stop } else { Flow::Continue }
     };
     let keep = folder.is_some();
-    let (controllers, timing) = (&mut each(&mut controllers), Loop::of(design));
-    let run = stream(machine, controllers, &timing, &profiles, &rows, solver, keep, &mut take)?;
+    let timing = Loop::of(design);
+    let run = match (added, &controllers[..]) {
+        (Some(added), [controller]) => {
+            let mut fed = Fed::new(controller.clone(), added);
+            stream(machine, &mut [&mut fed], &timing, &profiles, &rows, solver, keep, &mut take)?
+        }
+        _ => stream(machine, &mut each(&mut controllers), &timing, &profiles, &rows, solver, keep, &mut take)?,
+    };
     if let Some(trouble) = trouble {
         return Err(Failure::work(trouble));
     }

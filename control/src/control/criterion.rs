@@ -6,8 +6,6 @@ use super::spectrum::Spectrum;
 use crate::error::Result;
 use crate::reach::resonance::Resonance;
 
-/// The highest frequency of a shaper for a spectrum, Hz; it is not reached.
-const HIGHEST: f64 = 150.0;
 /// Steps of a shaper's frequency within one hertz.
 const STEPS: f64 = 5.0;
 /// Smoothing that is not too much, m: what the greatest acceleration is suggested for.
@@ -78,7 +76,14 @@ impl Default for Criterion {
 }
 
 impl Criterion {
-    /// Designs for a damping ratio ζ, and looks at ¾ ζ, ζ and 1½ ζ.
+    /// Designs for a damping ratio ζ; a spectrum is still evaluated at the usual ratios, as Klipper does.
+    pub fn designed_for(mut self, damping: f64) -> Result<Self> {
+        check_damping(damping)?;
+        self.damping = damping;
+        Ok(self)
+    }
+
+    /// Designs for a damping ratio ζ that is known of the machine, and evaluates ¾ ζ, ζ and 1½ ζ.
     pub fn with_damping(mut self, damping: f64) -> Result<Self> {
         check_damping(damping)?;
         self.assume(damping);
@@ -133,11 +138,11 @@ impl Target<'_> {
     }
 
     /// Frequencies that are tried for a kind, ascending.
-    pub(super) fn grid(&self, kind: Kind) -> Vec<f64> {
+    pub(super) fn grid(&self, kind: Kind, firmware: Firmware) -> Vec<f64> {
         match self {
             Target::Spectrum(_) | Target::Spectra(_) => {
                 let first = lowest(kind) * STEPS;
-                let count = (HIGHEST * STEPS - first) as usize;
+                let count = (highest(firmware) * STEPS - first) as usize;
                 (0..count).map(|k| (first + k as f64) / STEPS).collect()
             }
             Target::Modes { modes, .. } => {
@@ -159,6 +164,14 @@ fn of_spectrum(spectrum: &Spectrum, v: &mut dyn FnMut(f64, f64) -> f64, dampings
     let whole: f64 = lines().map(|(_, p)| above(*p)).sum();
     let left = |zeta: &f64| -> f64 { lines().map(|(f, p)| above(v(*f, *zeta) * p)).sum() };
     dampings.iter().map(left).fold(0.0, f64::max) / whole
+}
+
+/// The frequencies that are tried on a spectrum end below this one, Hz.
+fn highest(firmware: Firmware) -> f64 {
+    match firmware {
+        Firmware::Klipper => 200.0,
+        Firmware::Klipper202508 => 150.0,
+    }
 }
 
 /// The lowest frequency that is tried on a spectrum, Hz: below, hardly 1500 mm/s² would be left.

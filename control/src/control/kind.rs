@@ -45,11 +45,7 @@ impl Kind {
 
     /// Amplitudes of the impulses for a mode without damping; their sum is 1.
     pub fn amplitudes(self) -> Vec<f64> {
-        self.amplitudes_for(TOLERANCE)
-    }
-
-    /// Amplitudes for a tolerance V of the EI shapers.
-    pub(super) fn amplitudes_for(self, v: f64) -> Vec<f64> {
+        let v = TOLERANCE;
         match self {
             Kind::Zv => vec![0.5, 0.5],
             // A₁ + A₂ e^{3πi/4} + A₁ e^{3πi/2} = 0 and 2 A₁ + A₂ = 1
@@ -77,7 +73,7 @@ impl Kind {
         Kind::ALL.into_iter().find(|kind| kind.name().eq_ignore_ascii_case(name.trim()))
     }
 
-    /// Most damping that today's definition is used for.
+    /// Largest damping ratio that Klipper accepts in its configuration.
     pub(super) fn most_damping(self) -> f64 {
         match self {
             Kind::Zv | Kind::Mzv | Kind::Zvd => 0.99,

@@ -103,7 +103,7 @@ fn rank(pair: &Pair, criterion: &Criterion) -> f64 {
 
 fn table(target: Target, criterion: &Criterion, form: Form) -> Option<Tabled> {
     let pattern = Pattern::new(form, criterion.firmware, criterion.damping).ok()?;
-    let grid = target.grid(form.kind());
+    let grid = target.grid(form.kind(), criterion.firmware);
     let (low, high) = (*grid.first()?, *grid.last()?);
     let shapers = (0..GRID).map(|k| {
         let shaper = pattern.at(low * (high / low).powf(k as f64 / (GRID - 1) as f64));

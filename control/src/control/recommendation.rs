@@ -211,7 +211,11 @@ fn chosen(args: &Question, file: &Path, source: Source, also: Vec<PathBuf>) -> R
     };
     if let Some(damping) = known {
         let option = |e: Error| if args.damping.is_some() { e.in_file("--damping") } else { e };
-        criterion = criterion.with_damping(damping).map_err(option)?;
+        let is_guess = !matches!(source, Source::Model { .. }) && matches!(args.damping, Some(Damping::Ratio(_)));
+        criterion = match is_guess {
+            true => criterion.designed_for(damping).map_err(option)?,
+            false => criterion.with_damping(damping).map_err(option)?,
+        };
     }
     let spectra: Vec<Spectrum>;
     let uncertainty = args.uncertainty.unwrap_or(UNCERTAINTY);

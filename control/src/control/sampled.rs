@@ -110,7 +110,7 @@ pub struct Added {
 
 impl Added {
     /// The value at `time`, and when the next one comes.
-    pub(super) fn at(&self, time: f64) -> (f64, f64) {
+    pub(crate) fn at(&self, time: f64) -> (f64, f64) {
         let next = self.times.partition_point(|t| *t <= time);
         let value = next.checked_sub(1).and_then(|k| self.values.get(k)).copied().unwrap_or(0.0);
         (value, self.times.get(next).copied().unwrap_or(f64::INFINITY))

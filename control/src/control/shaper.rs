@@ -7,8 +7,8 @@
 //! as the first, 119, 1997. MZV is Klipper's: three impulses within three quarters of a period (its documentation,
 //! "Resonance Compensation").
 
-use super::insensitive;
 pub use super::kind::{Kind, TOLERANCE};
+use super::polynomials;
 use crate::error::{Error, Result};
 use nalgebra::Complex;
 use std::f64::consts::{PI, SQRT_2};
@@ -19,8 +19,8 @@ pub const USUAL_DAMPING: f64 = 0.1;
 /// Whose definitions of shapers, and whose rule to choose one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Firmware {
-    /// Klipper since 2025-09-16 (extra-insensitive shapers for a damped mode), 2025-10 (choice) and 2026-03-22
-    /// (parameters of MZV and EI).
+    /// Klipper of 2026 (commit 034cb673): extra-insensitive shapers for a damped mode (2025-09-16), choice (2025-10),
+    /// parameters of MZV and EI (2026-03-22), frequencies up to 200 Hz (2026).
     #[default]
     Klipper,
     /// Klipper until 2025-08.
@@ -173,8 +173,8 @@ impl Pattern {
         }
         let impulses = match form {
             Form::Usual(Kind::Zv | Kind::Mzv | Kind::Zvd) => weighted(&kind.amplitudes(), kind.spacing(), damping),
-            Form::Usual(_) => solved(form, TOLERANCE, damping)?,
-            Form::Ei { tolerance } => solved(form, tolerance, damping)?,
+            Form::Usual(_) => extra_insensitive(form, TOLERANCE, damping)?,
+            Form::Ei { tolerance } => extra_insensitive(form, tolerance, damping)?,
             Form::Mzv { pulses, duration } => {
                 let amplitudes = modified(pulses, duration).ok_or_else(|| {
                     let most = 0.5 * (pulses - 1) as f64;
@@ -207,13 +207,13 @@ fn weighted(amplitudes: &[f64], spacing: f64, zeta: f64) -> Vec<(f64, f64)> {
     all.map(|(i, a)| (i as f64 * spacing / root, a / sum)).collect()
 }
 
-/// The solution of the constraint equations of an EI shaper.
-fn solved(form: Form, tolerance: f64, damping: f64) -> Result<Vec<(f64, f64)>> {
+/// An EI shaper of today's Klipper.
+fn extra_insensitive(form: Form, tolerance: f64, damping: f64) -> Result<Vec<(f64, f64)>> {
     let kind = form.kind();
     let known = (1e-4..=0.3).contains(&tolerance);
-    let found = known.then(|| insensitive::impulses(kind, tolerance, damping, &kind.amplitudes_for(tolerance)));
+    let found = known.then(|| polynomials::impulses(kind, tolerance, damping));
     found.flatten().ok_or_else(|| {
-        Error::new(format!("{} has no solution for a damping ratio of {damping}", form.name()))
+        Error::new(format!("{} has no positive impulses for a damping ratio of {damping}", form.name()))
             .allowed("v_tol from 0.0001 to 0.3")
             .next("take another tolerance, or a smaller damping ratio")
     })

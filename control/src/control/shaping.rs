@@ -162,7 +162,7 @@ fn recommended(fitted: &mut [Tried], candidates: &[usize], wanted: Option<f64>, 
 impl Tried {
     /// A form at every frequency; none if it always smooths too much.
     fn all(target: Target<'_>, pattern: &Pattern, criterion: &Criterion) -> Option<Self> {
-        let grid = target.grid(pattern.form.kind());
+        let grid = target.grid(pattern.form.kind(), criterion.firmware);
         let point = |frequency: f64| {
             let shaper = pattern.at(frequency);
             let smoothing = shaper.smoothing(&criterion.corner);

@@ -71,9 +71,10 @@ impl Spectrum {
             }
             Accelerometer::Samples { time, acceleration } => {
                 let span = time[time.len() - 1] - time[0];
-                let rate = (time.len() - 1) as f64 / span;
-                let length = (rate * SEGMENT).ceil() as usize;
-                let length = length.next_power_of_two();
+                // Klipper's rate: samples, not intervals, over the time from first to last. Its segments are as many
+                // samples as the least power of two above n = ⌊rate/2 − 1⌋.
+                let rate = time.len() as f64 / span;
+                let length = ((rate * SEGMENT - 1.0) as usize + 1).next_power_of_two();
                 let [x, y, z] = acceleration.each_ref().map(|values| power_spectral_density(values, rate, length));
                 let frequency = x.0;
                 let all: Vec<f64> = x.1.iter().zip(&y.1).zip(&z.1).map(|((x, y), z)| x + y + z).collect();

@@ -228,6 +228,16 @@ impl Family {
         }
     }
 
+    /// The axis as it is taken for with each unknown by itself at either end.
+    pub fn ends(&self) -> Vec<Corner> {
+        let end = |(unknown, end): (usize, f64)| {
+            let mut corner = self.nominal();
+            self.put(&mut corner, unknown, end);
+            corner
+        };
+        self.leading().flat_map(|unknown| [(unknown, -1.0), (unknown, 1.0)]).map(end).collect()
+    }
+
     /// The machine at a corner.
     pub fn stage_at(&self, corner: &Corner) -> Machine {
         let mut machine = self.machine.clone();

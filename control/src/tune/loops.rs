@@ -14,7 +14,7 @@
 //! are the same loop. Of several drives |S| and |T| are the largest singular values, and the loop of one drive with
 //! those of the others closed is L_j = T_jj/S_jj.
 
-use super::plant::{Answer, Plant, Sampled, Square, by_drives};
+use super::plant::{Answer, ByDrives, Plant, Sampled, Square, by_drives};
 use crate::control::feedback::{Feedback, Turn};
 use crate::mechanism::DRIVES;
 use nalgebra::Complex;
@@ -251,6 +251,16 @@ impl Loops {
     pub fn complementary(&self) -> f64 {
         self.broken.iter().map(|broken| broken.complementary).fold(0.0, f64::max)
     }
+}
+
+/// Motion of the cart and of the measured position per value beside the command of an axis, m per V or A, at ω, rad/s:
+/// responses of the closed loop. None with several drives.
+pub fn from_command(plant: &Plant, feedback: &Feedback, omega: f64) -> Option<[Complex<f64>; 2]> {
+    let ByDrives::One(sampled) = &plant.of else { return None };
+    let answer = sampled.at(omega);
+    let open = Open::of(sampled, &answer, feedback, &Turn::of(omega, plant.every));
+    // y = G_y D Δ⁻¹ v
+    Some([open.pushed[(0, 0)], answer.position[(0, 0)] * open.own / open.difference])
 }
 
 /// The loops at all frequencies of the machine.

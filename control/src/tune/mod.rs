@@ -36,7 +36,7 @@ pub use family::{Corner, Family, MACHINES, Source};
 pub use gains::{Gain, gains};
 pub use hunting::{Hunt, hunting};
 pub use judged::{Figure, Forced, Judgement, Least, Limit, MoveVerdict, Standing, Verdict, Worse};
-pub use loops::{Break, Broken, Loops, breaks, loops};
+pub use loops::{Break, Broken, Loops, breaks, from_command, loops};
 pub use margins::{Breaks, Margins, Peaks, Rough};
 pub use objective::{AtWorst, BALANCES, Balance, MoveFigures, look, objective};
 pub use plant::Plant;

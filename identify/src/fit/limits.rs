@@ -787,6 +787,16 @@ pub(crate) const BRISTLE_BEND: f64 = 2e-5;
 /// Unit: s. Source: chosen.
 pub const DURATION: f64 = 4.0;
 
+/// Smallest relative error that a designed experiment promises: no model is better than this.
+///
+/// Unit: relative. Source: chosen. Test: `no_promise_is_better_than_the_model`.
+pub const DESIGN_MODEL_ERROR: f64 = 0.01;
+
+/// Machines on which a designed experiment is verified unless another number is given.
+///
+/// Unit: machines. Source: time.
+pub const VERIFIED: usize = 4;
+
 /// Sample interval of an experiment where none is given.
 ///
 /// Unit: s. Source: chosen.

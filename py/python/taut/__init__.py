@@ -12,7 +12,7 @@ Mistakes are :class:`taut.Error`, a ``ValueError`` with the text that the comman
 
 from ._native import Bug, Error, Observation, __version__
 from .case import Case, export, read, show, template
-from .results import Check, Comparison, Designed, Drift, Estimate, Fit, FitLog, FrequencyResponses, LinearModel, Modes, Plans, Shown, Tuned
+from .results import Check, Comparison, Designed, Drift, Estimate, Fit, FitLog, FrequencyResponses, Learned, LinearModel, Modes, Plans, Shown, Tuned
 from .runs import Run, Runs
 from .shapers import Shape, shape
 from .sweeps import sweep, sweep_tables
@@ -30,6 +30,7 @@ __all__ = [
     "Fit",
     "FitLog",
     "FrequencyResponses",
+    "Learned",
     "LinearModel",
     "Modes",
     "Observation",

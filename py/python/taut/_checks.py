@@ -70,6 +70,17 @@ def names(name: str, value: Iterable[str] | None) -> list[str]:
     return [text(name, item) for item in each]
 
 
+def column(name: str, value: Any) -> list[float]:
+    """Numbers in a list; of an array, a column of a table or any other sequence."""
+    if isinstance(value, (str, bytes, bytearray)):
+        raise TypeError(f"{name}: expected numbers, found {type(value).__name__}")
+    try:
+        each = iter(value)
+    except TypeError:
+        raise TypeError(f"{name}: expected numbers, found {type(value).__name__}") from None
+    return [given(name, item) for item in each]
+
+
 def path(value: Any) -> str:
     """A path as a text: os.PathLike, or a text."""
     found = os.fspath(value)

@@ -141,7 +141,7 @@ class Case:
         inputs: list[str],
         criterion: str,
         times: tuple[float, float | None],
-        shares: tuple[float, float],
+        shares: tuple[float, float, float],
         limits: tuple[float | None, float | None, float | None],
         measured: list[tuple[str, float]],
         verified: int,
@@ -153,6 +153,9 @@ class Case:
     def plan(
         self, names: list[str], limits: tuple[float | None, float | None, float | None], reserve: float
     ) -> tuple[dict[str, Any], Case]: ...
+    def learn(
+        self, names: list[str], time: list[float], position: list[float], added: list[float] | None, encoder: bool
+    ) -> dict[str, Any]: ...
     def compare(self, laws: list[str], windows: list[float | None] | None) -> tuple[dict[str, Any], Case]: ...
     def drift(self) -> dict[str, Any]: ...
     def modes(

@@ -11,7 +11,7 @@ from . import _checks, _html, _native
 from ._logs import write_log
 from ._toml import change
 from ._toml import written as toml
-from .results import Check, Comparison, Designed, Drift, Fit, FitLog, FrequencyResponses, LinearModel, Modes, Plans, Shown, Tuned
+from .results import Check, Comparison, Designed, Drift, Fit, FitLog, FrequencyResponses, Learned, LinearModel, Modes, Plans, Shown, Tuned
 from .runs import Run, Runs
 from .sweeps import sweep
 from .table import Table
@@ -221,11 +221,12 @@ class Case:
         every: float | None = None,
         margin: float = 0.1,
         doubt: float = 0.2,
+        model_error: float = 0.01,
         amplitude: float | None = None,
         current: float | None = None,
         travel: float | None = None,
         measured: Mapping[str, float] | None = None,
-        verify: int = 0,
+        verify: int = 4,
         seed: int = 1,
     ) -> Designed:
         """The experiment that determines the named parameters best (those of [fit] unless named) within travel, input
@@ -233,8 +234,9 @@ class Case:
 
         ``inputs`` are those to choose among: ``trapezoid``, ``sweep``, ``chirp``, ``multisine``, ``prbs``;
         ``criterion`` is ``d`` or ``a``; ``margin`` is the share of each limit that is left free, ``doubt`` that by
-        which each parameter may be off and the limits hold; ``measured`` has quantities with the standard deviations of
-        their noise. ``verify`` logs are simulated and fitted. Ctrl-C ends it with the best so far.
+        which each parameter may be off and the limits hold; no standard error is below ``model_error`` of the value;
+        ``measured`` has quantities with the standard deviations of their noise. On ``verify`` machines, off by up to
+        ``doubt``, a log is simulated and fitted. Ctrl-C ends it with the best so far.
         """
         n = _checks.number
         noises = [(_checks.text("measured", name), n(f"measured[{name!r}]", noise) or 0.0) for name, noise in dict(measured or {}).items()]
@@ -243,7 +245,7 @@ class Case:
             _checks.names("inputs", inputs),
             _checks.text("criterion", criterion),
             (_checks.given("duration", duration), n("every", every)),
-            (_checks.given("margin", margin), _checks.given("doubt", doubt)),
+            (_checks.given("margin", margin), _checks.given("doubt", doubt), _checks.given("model_error", model_error)),
             (n("amplitude", amplitude), n("current", current), n("travel", travel)),
             noises,
             _checks.whole("verify", verify, 0, 100_000),
@@ -296,6 +298,31 @@ class Case:
         limits = (n("speed", speed), n("acceleration", acceleration), n("jerk", jerk))
         data, case = self._native.plan(names, limits, _checks.given("reserve", reserve))
         return Plans(data, self._of(case))
+
+    def learn(
+        self,
+        time: Any,
+        position: Any,
+        *,
+        move: str | None = None,
+        added: Any = None,
+        encoder: bool = False,
+    ) -> Learned:
+        """The next feed-forward signal of a repeated move, from the positions (m) at the times (s) of a repetition.
+
+        ``move`` is its name, if the case has several moves. ``added`` is the signal that was added to the command
+        meanwhile, a value (V or A) for each sample of the controller: :attr:`Learned.added` of the repetition before.
+        ``position`` is that of the cart, or with ``encoder`` the one that the controller measures, along the belt.
+        Ctrl-C ends it.
+        """
+        data = self._native.learn(
+            _checks.names("move", None if move is None else [_checks.text("move", move)]),
+            _checks.column("time", time),
+            _checks.column("position", position),
+            None if added is None else _checks.column("added", added),
+            bool(encoder),
+        )
+        return Learned(data)
 
     def with_log(
         self,

@@ -688,6 +688,36 @@ class Plans:
 
 
 @dataclass(frozen=True)
+class Learned:
+    """What was learned of a repeated move."""
+
+    data: dict[str, Any]
+    """The output of ``taut learn --json``."""
+
+    @property
+    def added(self) -> NDArray[np.float64]:
+        """The signal to add to the command of the next repetition, V or A: a value for each sample of the controller."""
+        return np.array(self.data["added"], dtype=np.float64)
+
+    @property
+    def times(self) -> NDArray[np.float64]:
+        """The times of :attr:`added` from the beginning of the move on, s."""
+        return np.arange(len(self.data["added"])) * float(self.data["every_s"])
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """A pandas.DataFrame of time, signal of the log and next one, error of the log and expected next one (m)."""
+        names = ("added_before", "added", "error_m", "expected_m")
+        return frame({"time_s": self.times, **{name: self.data[name] for name in names}})
+
+    def __repr__(self) -> str:
+        return f"<taut.Learned {self.data['title']!r}: {self.data['move']}>"
+
+    def _repr_html_(self) -> str:
+        rows = [(k + 1, one["nominal"]["rms_m"], one["worst"]["rms_m"]) for k, one in enumerate(self.data["predicted"])]
+        return _html.table(self.data["title"], ("repetition", "error on the axis of the file, m", "at worst, m"), rows)
+
+
+@dataclass(frozen=True)
 class FrequencyResponses:
     """Frequency responses from logs."""
 

@@ -19,11 +19,16 @@ pub fn page(case: &Case, found: &Designed, checked: &[Verified], figure: &Figure
         choices.iter().for_each(|choice| page.prose(choice.to_string()));
     }
     page.section("What it promises");
-    let caption = "Standard errors, all others free; those that the design is for stand first.";
-    page.table(&table(caption, ["Parameter", "Value", "Standard error", "Relative"], promises(found)));
+    let caption = format!(
+        "Standard errors, all others free, {} % of the value for the model included; those that the design is for stand \
+         first.",
+        taut::quantity::rounded(100.0 * found.model_error)
+    );
+    page.table(&table(&caption, ["Parameter", "Value", "Standard error", "Relative"], promises(found)));
     page.prose(format!("{}.", measured(found)));
     if !checked.is_empty() {
-        let caption = "What fits of simulated logs found: errors over what is promised, and how many intervals hold.";
+        let caption = "What fits of simulated logs found, each of a machine of its own: errors over those of an exact \
+                       model, and how many intervals hold.";
         page.table(&table(caption, ["Parameter", "Root mean square", "Mean", "95 % intervals"], verified(checked)));
     }
     page.section("The experiment");

@@ -43,10 +43,11 @@ impl Information {
         }
     }
 
-    /// The standard error of parameter `j` by itself, in SI units; infinite where it is not determined.
-    pub fn error(&self, j: usize) -> f64 {
+    /// The size in SI units to which the relative error of parameter `j` refers: its value, or a typical one if the
+    /// value may be zero.
+    pub fn size(&self, j: usize) -> f64 {
         let value = self.problem.value(j, self.x[j]);
-        self.known.error[j] * self.whole[j] * self.problem.slope(j, value).abs()
+        self.whole[j] * self.problem.slope(j, value).abs()
     }
 
     /// About a standard error of variable `j`.

@@ -20,6 +20,7 @@ mod text;
 mod trial;
 mod verify;
 
+pub use crate::fit::limits::VERIFIED;
 pub use candidates::{Kind, Shape};
 pub use limits::{Limits, Origin, Reached};
 pub use search::{Alternative, Designed, Own, Promise};
@@ -28,10 +29,10 @@ pub use verify::{Verified, verify};
 use crate::case::{Case, Plan, parameters};
 use crate::error::{Error, Result};
 use crate::fit::asked::problem::{Problem, Stop};
-use crate::fit::limits::{DURATION, MOST_ROWS, SAMPLE_INTERVAL};
+use crate::fit::limits::{DESIGN_MODEL_ERROR, DURATION, MOST_ROWS, SAMPLE_INTERVAL};
 use crate::fit::trust::identify::Group;
 use crate::log::Quantity;
-use crate::machine::{Channel, EncoderPlace, Measurement};
+use crate::machine::{Channel, EncoderPlace, Machine, Measurement};
 
 /// The measure that is made small.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -70,6 +71,8 @@ pub struct Request {
     pub margin: f64,
     /// By what share each free parameter may be off, the limits still being kept.
     pub doubt: f64,
+    /// Relative error of the model: no promise is better.
+    pub model_error: f64,
     /// Greatest input, V or A.
     pub input: Option<f64>,
     /// Greatest current, A.
@@ -92,6 +95,7 @@ impl Default for Request {
             every: None,
             margin: 0.1,
             doubt: 0.2,
+            model_error: DESIGN_MODEL_ERROR,
             input: None,
             current: None,
             travel: None,
@@ -116,7 +120,7 @@ impl Request {
                 return Err(Error::new(format!("a {name} of {value} cannot be")).allowed("above 0"));
             }
         }
-        for (name, value) in [("margin", self.margin), ("doubt", self.doubt)] {
+        for (name, value) in [("margin", self.margin), ("doubt", self.doubt), ("model error", self.model_error)] {
             if !(0.0..=0.9).contains(&value) {
                 return Err(Error::new(format!("a {name} of {value} cannot be")).allowed("0 to 0.9"));
             }
@@ -136,6 +140,7 @@ pub(super) struct Task<'a> {
     pub duration: f64,
     pub every: f64,
     pub doubt: f64,
+    pub model_error: f64,
     pub limits: Limits,
     pub measured: Vec<Channel>,
     pub seed: u64,
@@ -162,6 +167,18 @@ pub fn design(case: &Case, request: &Request, stop: Stop, watch: &mut dyn FnMut(
 }
 
 impl<'a> Task<'a> {
+    /// The same task on another machine.
+    fn on(&self, machine: Machine) -> Self {
+        Self {
+            case: Case { machine, ..self.case.clone() },
+            plan: self.plan.clone(),
+            wanted: self.wanted.clone(),
+            names: self.names.clone(),
+            measured: self.measured.clone(),
+            ..*self
+        }
+    }
+
     fn new(case: &Case, request: &Request, stop: Stop<'a>) -> Result<Self> {
         request.checked()?;
         let every = request.every.unwrap_or_else(|| usual_interval(case));
@@ -202,6 +219,7 @@ impl<'a> Task<'a> {
             duration: request.duration,
             every,
             doubt: request.doubt,
+            model_error: request.model_error,
             limits,
             measured,
             seed: request.seed,

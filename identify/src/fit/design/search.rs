@@ -29,10 +29,12 @@ pub struct Promise {
     pub unit: &'static str,
     /// The value that it is promised for, that of the case.
     pub value: f64,
-    /// Standard error; infinite where it is not determined.
+    /// Standard error, the error of the model included; infinite where it is not determined.
     pub error: f64,
     /// Standard error relative to the value, or to a typical one if the value may be zero.
     pub relative: f64,
+    /// Standard error of an exact model, from the noise and steps of what is measured alone.
+    pub random: f64,
     /// True if it is one of those that count.
     pub wanted: bool,
 }
@@ -89,6 +91,8 @@ pub struct Designed {
     pub limits: Limits,
     /// By what share each free parameter may be off and the limits hold.
     pub doubt: f64,
+    /// Relative error of the model, in every promise.
+    pub model_error: f64,
     /// Outputs that are measured, and how well.
     pub measured: Vec<Channel>,
     /// Its promise for every free parameter.
@@ -270,13 +274,18 @@ impl Task<'_> {
         let Judged { shape, initial, reached, information, score } = best;
         let known = &information.known;
         let problem = &information.problem;
-        let promise = |(j, parameter): (usize, &crate::parameter::Free)| Promise {
-            name: parameter.name.clone(),
-            unit: parameter.unit,
-            value: problem.value(j, information.x[j]),
-            error: information.error(j),
-            relative: known.error[j],
-            wanted: self.wanted.contains(&j),
+        let promise = |(j, parameter): (usize, &crate::parameter::Free)| {
+            // √(σ² + ε²) with the relative error ε of the model
+            let (size, relative) = (information.size(j), known.error[j].hypot(self.model_error));
+            Promise {
+                name: parameter.name.clone(),
+                unit: parameter.unit,
+                value: problem.value(j, information.x[j]),
+                error: size * relative,
+                relative,
+                random: size * known.error[j],
+                wanted: self.wanted.contains(&j),
+            }
         };
         let is_taken = |name: &str| case.experiments.iter().any(|experiment| experiment.name == name);
         let mut name = "designed".to_string();
@@ -298,6 +307,7 @@ impl Task<'_> {
             reached,
             limits: self.limits,
             doubt: self.doubt,
+            model_error: self.model_error,
             measured: self.measured.clone(),
             criterion: self.criterion,
             score,
@@ -313,15 +323,7 @@ impl Task<'_> {
         if (self.stop)() || experiment.until / self.every > MOST_ROWS || experiment.until < 10.0 * self.every {
             return None;
         }
-        let task = Task {
-            duration: experiment.until,
-            case: self.case.clone(),
-            plan: self.plan.clone(),
-            wanted: self.wanted.clone(),
-            names: self.names.clone(),
-            measured: self.measured.clone(),
-            ..*self
-        };
+        let task = Task { duration: experiment.until, ..self.on(self.case.machine.clone()) };
         let input: &Signal = &experiment.inputs[0];
         let information = task.information(input, experiment.initial, &Differences::Central)?;
         let determined = self.wanted.iter().filter(|&&j| information.known.error[j].is_finite()).count();

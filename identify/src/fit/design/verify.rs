@@ -1,4 +1,5 @@
-//! Verifies predicted errors: noisy logs of the experiment, each fitted from a wrong start.
+//! Verifies predicted errors: noisy logs of the experiment on machines that differ from the case, each fitted from a
+//! wrong start.
 
 use super::{Designed, Request, Task};
 use crate::case::{Case, parameters};
@@ -20,7 +21,7 @@ use rand_pcg::rand_core::SeedableRng;
 pub struct Verified {
     /// Its name.
     pub name: String,
-    /// Root mean square of estimate − truth, over the standard error that was promised.
+    /// Root mean square of estimate − truth, over the standard error that was promised of an exact model.
     pub ratio: f64,
     /// Mean of estimate − truth, over the same.
     pub bias: f64,
@@ -30,8 +31,9 @@ pub struct Verified {
     pub fits: usize,
 }
 
-/// Simulates `logs` logs of a designed experiment and fits each; of every parameter that it determines, how far the
-/// estimates are from what they should be.
+/// Simulates a log of a designed experiment on each of `logs` machines and fits it; of every parameter that it
+/// determines, how far the estimates are from the truth. The first machine is that of the case; of the others each free
+/// parameter is off by up to `request.doubt`.
 pub fn verify(case: &Case, request: &Request, found: &Designed, logs: usize, stop: Stop) -> Result<Vec<Verified>> {
     let task = Task::new(case, request, stop)?;
     let frees = parameters(&case.machine, &task.plan, &[])?;
@@ -48,23 +50,32 @@ pub fn verify(case: &Case, request: &Request, found: &Designed, logs: usize, sto
         initial.position[DRIVE] += off / case.machine.pulley_radius;
         initial.position[IDLER] += off / case.machine.pulley_radius;
         let noise = task.seed.wrapping_add(1 + k as u64);
+        let mut symmetric = |share: f64| 1.0 + share * (2.0 * uniform(&mut random) - 1.0);
+        let mut machine = case.machine.clone();
+        let doubt = if k == 0 { 0.0 } else { task.doubt };
+        let mut truths = Vec::with_capacity(frees.len());
+        for free in &frees {
+            let truth = (free.start * symmetric(doubt)).clamp(free.low, free.high);
+            free.set(&mut machine, truth);
+            truths.push(truth);
+        }
         let experiment = task
+            .on(machine)
             .experiment(&found.name, &found.shape.signal(), initial, noise)
             .ok_or_else(|| Error::new("the designed experiment cannot be simulated"))?;
         let mut own = Case { experiments: vec![experiment], ..task.case.clone() };
-        for free in &frees {
-            let start = free.start * (1.0 + START_OFF * (2.0 * uniform(&mut random) - 1.0));
-            free.set(&mut own.machine, start.clamp(free.low, free.high));
+        for (free, truth) in frees.iter().zip(&truths) {
+            free.set(&mut own.machine, (truth * symmetric(START_OFF)).clamp(free.low, free.high));
         }
         let fit = fit(&own, &task.plan, Some(stop), &mut |_| Flow::Continue)?;
         if fit.ending == Ending::Interrupted {
             break;
         }
-        for ((seen, free), promise) in seen.iter_mut().zip(&frees).zip(&found.promises) {
+        for (((seen, free), promise), truth) in seen.iter_mut().zip(&frees).zip(&found.promises).zip(&truths) {
             let Some(estimate) = fit.estimates.iter().find(|estimate| estimate.name == free.name) else { continue };
             if let (true, Some([low, high])) = (promise.is_determined() && estimate.is_determined(), estimate.interval)
             {
-                seen.push(((estimate.value - promise.value) / promise.error, (low..=high).contains(&promise.value)));
+                seen.push(((estimate.value - truth) / promise.random, (low..=high).contains(truth)));
             }
         }
     }

@@ -1,0 +1,79 @@
+//! `taut learn` as a user runs it.
+
+use serde_json::Value;
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+use tempfile::TempDir;
+
+/// A loop that is stable on the whole family.
+const SHAPED: &str = "stages/sollmann-jouaneh/controllers/pid-shaped.toml";
+
+fn taut(args: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_taut"));
+    command.args(args).current_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("..")).output().unwrap()
+}
+
+/// The error of the cart, rms, of a move that was run with what was learned on a machine that the case does not know.
+#[test]
+fn a_move_is_repeated_and_learned() {
+    let folder = TempDir::new().unwrap();
+    let at = |name: &str| folder.path().join(name).display().to_string();
+    let hidden = ["--set", "cart.mass=0.4 kg", "--set", "cart.friction.coulomb=0.25 N"];
+    let mut errors = Vec::new();
+    let mut added: Option<String> = None;
+    for k in 0..4 {
+        let (out, learned) = (at(&format!("trial-{k}")), at(&format!("learned-{k}")));
+        let given: Vec<&str> = added.iter().flat_map(|file| ["--added", file.as_str()]).collect();
+        let run =
+            [&["move", SHAPED, "--move", "short fast", "--no-report", "--out", &out][..], &hidden, &given].concat();
+        assert!(matches!(taut(&run).status.code(), Some(0 | 1)));
+        let log = format!("{out}/short-fast.csv");
+        let learn =
+            [&["learn", SHAPED, "--move", "short fast", "--log", &log, "--out", &learned, "--json"][..], &given]
+                .concat();
+        let output = taut(&learn);
+        let told: Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert_eq!((output.status.code(), &told["schema"]), (Some(0), &"taut/learn/1".into()), "{told}");
+        errors.push(told["error"]["rms_m"].as_f64().unwrap());
+        for name in ["learn.json", "next.csv", "report.html", "plots/learned.svg", "plots/convergence.svg"] {
+            assert!(Path::new(&learned).join(name).is_file(), "{name}");
+        }
+        let written: Value = serde_json::from_slice(&fs::read(format!("{learned}/learn.json")).unwrap()).unwrap();
+        assert_eq!(written, told);
+        added = Some(format!("{learned}/next.csv"));
+    }
+    assert!(errors[3] < 0.5 * errors[0], "{errors:?}");
+}
+
+#[test]
+fn what_cannot_be_learned_is_told() {
+    let folder = TempDir::new().unwrap();
+    let at = |name: &str| folder.path().join(name).display().to_string();
+    let out = at("trial");
+    taut(&["move", SHAPED, "--move", "short fast", "--no-report", "--out", &out]);
+    let log = format!("{out}/short-fast.csv");
+    let short = at("short.csv");
+    let lines: Vec<String> = fs::read_to_string(&log).unwrap().lines().take(50).map(String::from).collect();
+    fs::write(&short, lines.join("\n")).unwrap();
+    let gone = at("gone.csv");
+    let usual = ["learn", SHAPED, "--move", "short fast", "--log", &log];
+    let cases: [(Vec<&str>, i32, &str); 10] = [
+        (vec!["learn", SHAPED, "--log", &log], 2, "the case has 3 moves, and a log is of one"),
+        (vec!["learn", SHAPED, "--move", "gone", "--log", &log], 2, "gone"),
+        (vec!["learn", SHAPED, "--move", "short fast", "--log", &gone], 2, "there is no such file"),
+        (vec!["learn", SHAPED, "--move", "short fast", "--log", &short], 1, "the log ends at"),
+        ([&usual[..], &["--position", "nowhere"]].concat(), 2, "nowhere"),
+        ([&usual[..], &["--unit", "V"]].concat(), 2, "a unit of length is needed"),
+        ([&usual[..], &["--added", &log]].concat(), 2, "added_V"),
+        ([&usual[..], &["--set", "controller.pid.proportional=300 V/mm"]].concat(), 1, "the loop is not stable"),
+        (vec!["learn", "stages/core-xy/square.toml", "--log", &log], 2, "this needs a single axis"),
+        (vec!["move", SHAPED, "--added", &log], 2, "a signal is of one move, and the case has 3"),
+    ];
+    for (args, status, words) in cases {
+        let output = taut(&args);
+        let told = String::from_utf8(output.stderr).unwrap();
+        assert!(output.status.code() == Some(status) && told.contains(words), "{args:?}: {:?} {told}", output.status);
+        assert!(["next: ", "allowed: ", "--help"].iter().any(|word| told.contains(word)), "{args:?}: {told}");
+    }
+}

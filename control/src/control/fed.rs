@@ -1,0 +1,43 @@
+//! A controller with a known signal added to its command: what was learned for a repeated move.
+
+use super::sampled::{Added, Controller, Observation};
+use super::standard::Standard;
+use crate::signal::profile::Reference;
+
+/// The controller of an axis whose command has a signal added at each sample, before delay and limit.
+#[derive(Debug, Clone)]
+pub struct Fed<'a> {
+    controller: Standard,
+    signal: &'a Added,
+    /// What was added at the last sample, V or A.
+    last: f64,
+}
+
+impl<'a> Fed<'a> {
+    /// A controller and the signal, V or A, held between its times.
+    pub fn new(controller: Standard, signal: &'a Added) -> Self {
+        Self { controller, signal, last: 0.0 }
+    }
+}
+
+impl Controller for Fed<'_> {
+    fn step(&mut self, seen: &Observation) -> f64 {
+        // Times of samples are rounded.
+        let near = 1e-9 * (1.0 + seen.time);
+        self.last = self.signal.at(seen.time + near).0;
+        self.controller.step(seen) + self.last
+    }
+
+    fn forward(&self, slides: &[Reference]) -> f64 {
+        self.controller.forward(slides)
+    }
+
+    fn limited(&mut self, given: f64) {
+        self.controller.limited(given - self.last);
+    }
+
+    fn reset(&mut self) {
+        self.controller.reset();
+        self.last = 0.0;
+    }
+}
