@@ -44,7 +44,10 @@ impl Fit {
             fitted.as_ref().map_or(true, |fitted| differs(&fitted.machine, machine, DIGITS_READ).is_some())
         };
         let mut fitted = read(&changes, false);
-        if let Some(change) = fitted.as_ref().ok().and_then(|fitted| damping_share(case, &fitted.machine, machine)) {
+        let damping = fitted.as_ref().ok().and_then(|fitted| damping_share(case, &fitted.machine, machine));
+        // A damping ratio is that of all digits of mass and stiffness.
+        let is_rounded = damping.is_none();
+        if let Some(change) = damping {
             changes.push(change);
             fitted = read(&changes, false);
         }
@@ -69,7 +72,7 @@ impl Fit {
                 .in_file(name)
                 .next("give the case file a value of its own for it, or leave it out of [fit]"));
         }
-        let fitted = read(&changes, true)?;
+        let fitted = read(&changes, is_rounded)?;
         let text = fitted.text;
         let mut document: toml_edit::DocumentMut =
             text.parse().map_err(|_| Error::new("this is not TOML").in_file(name))?;
