@@ -563,12 +563,12 @@ pub(crate) const SUSPECT_DELAY: f64 = 0.95;
 
 /// Numbers of windows that the longest log is cut into where the whole is not explained.
 ///
-/// Unit: windows. Source: steps of 4. Test: `a_long_log_that_drifts_apart_is_explained_in_windows`.
+/// Unit: windows. Source: steps of 4.
 pub(crate) const UNEXPLAINED_WINDOWS: [f64; 3] = [4.0, 16.0, 64.0];
 
 /// Explained share of the windows, beyond a straight line in each, from which on errors add up along the log.
 ///
-/// Unit: 1. Source: chosen. Test: `a_long_log_that_drifts_apart_is_explained_in_windows`.
+/// Unit: 1. Source: chosen.
 pub(crate) const WINDOWS_EXPLAIN: f64 = 0.8;
 
 /// Entries of the Jacobian up to which windows are tried.
