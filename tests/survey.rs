@@ -104,6 +104,55 @@ fn wrong_units_are_suspected_aloud() {
     says(&time, "unit", "cart_speed adds up to");
 }
 
+/// A gain in newtons was answered with "it reaches 317.6 A, beyond any drive of this kind: is the column in mA?".
+#[test]
+fn newtons_are_no_amperes() {
+    let (mut machine, log) = clean();
+    let note = |machine: &Machine, log: &Log| {
+        let survey = Survey::new(&only(log, Quantity::CartPosition), machine);
+        survey
+            .notes
+            .iter()
+            .find(|note| note.column == Some("input") && note.code == "unit")
+            .map(|note| note.text.clone())
+    };
+    machine.drives[0].amplifier.mode = taut::machine::AmplifierMode::Current;
+    machine.drives[0].amplifier.gain = 100.0;
+    // A column that is not in amperes by itself: the gain is as likely to be wrong as a unit.
+    let text = note(&machine, &log).unwrap();
+    assert!(text.contains("500 A") && text.contains("amplifier.gain") && !text.contains("mA"), "{text}");
+    let mut large = log.clone();
+    large.input.iter_mut().for_each(|u| *u *= 100.0);
+    machine.drives[0].amplifier.gain = 1.0;
+    assert!(note(&machine, &large).unwrap().contains("units = { input = \"mA\" }"));
+    // One newton per ampere: a force.
+    let motor = &mut machine.drives[0].motor;
+    motor.torque_constant = machine.pulley_radius / motor.gear_ratio / motor.gear_efficiency;
+    assert_eq!(note(&machine, &large), None);
+}
+
+/// A rotor's angle before the gear was taken for degrees, or for nothing that has a name.
+#[test]
+fn a_gear_ratio_is_tried() {
+    let (mut machine, log) = clean();
+    machine.drives[0].motor.gear_ratio = 40.0;
+    machine.drives[0].motor.torque_constant /= 40.0;
+    machine.drives[0].motor.back_emf_constant /= 40.0;
+    let mut own = only(&log, Quantity::DriveAngle);
+    own.outputs[0].values.iter_mut().for_each(|x| *x *= 40.0);
+    let survey = Survey::new(&own, &machine);
+    assert!(survey.notes.iter().any(|note| note.text.contains("scale = { drive_angle = 0.025 }")), "{survey}");
+    // Beside the cart's position the ratio is exact, and so is the gear's.
+    let mut both = log.clone();
+    both.outputs.truncate(2);
+    values(&mut both, Quantity::DriveAngle).iter_mut().for_each(|x| *x *= 40.0);
+    let survey = Survey::new(&both, &machine);
+    assert!(survey.notes.iter().any(|note| note.text.contains("that is the gear ratio")), "{survey}");
+    values(&mut both, Quantity::DriveAngle).iter_mut().for_each(|x| *x *= 2.5);
+    let survey = Survey::new(&both, &machine);
+    assert!(survey.notes.iter().any(|note| note.text.contains("that is a power of ten")), "{survey}");
+}
+
 #[test]
 fn swapped_columns_and_signs_are_suspected() {
     let (_, log) = clean();

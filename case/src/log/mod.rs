@@ -25,7 +25,8 @@ pub use mapping::{Clock, Mapping, Source, Unit};
 pub use presets::{End, In, PRESETS, Pick, Preset};
 pub use sheet::{ColumnId, Dialect, Filter};
 pub use survey::{
-    Channel, Clipped, Gap, Jump, Motion, Note, Outlier, Remedy, Severity, Steady, Survey, Timing, jumps_text,
+    Channel, Clipped, Gap, Held, Jump, Motion, Note, Outlier, Remedy, Severity, Steady, Survey, Timing, jumps_text,
+    step_of,
 };
 
 use crate::error::Result;

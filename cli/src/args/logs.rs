@@ -12,7 +12,7 @@ use taut::machine::Channel;
 /// Prints a survey of each log, the expected accuracy of each parameter, the combinations that the logs cannot
 /// separate, and the experiments that would separate them.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Example:\n  taut check axis.toml")]
+#[command(after_help = "Example:\n  taut check axis.toml\n\nExit status 1: the logs determine none of the parameters.")]
 pub struct Check {
     /// The case file; - is standard input
     pub case: PathBuf,

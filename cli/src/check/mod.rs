@@ -2,7 +2,7 @@
 
 use crate::args::Check as Args;
 use crate::command::{Finished, Report};
-use crate::failure::{Failure, Outcome};
+use crate::failure::{Failure, Outcome, Status};
 use crate::folder::{self, Folder};
 use crate::interrupt::{Interrupt, interrupted};
 use crate::progress::Progress;
@@ -12,11 +12,8 @@ use taut::case::{Case, Plan};
 use taut::fit::{Check, check_watched};
 use taut::json;
 use taut::solve::Flow;
-use taut_report::check::{page, regression, shares, shown};
+use taut_report::check::{findings, page, regression, shares, surveys};
 use taut_report::fit::value;
-
-/// So many logs are shown with all that is known of them; of more, what matters.
-const MOST_WHOLE: usize = 4;
 
 /// Reads the case, looks, tells.
 pub fn run(args: &Args) -> Outcome {
@@ -30,6 +27,9 @@ pub fn run(args: &Args) -> Outcome {
     let mut finished = Finished::new("check", json, text, "add --out DIR for check.json and a report");
     if common.reports() {
         finished.report = Some(Report { page: page(&case, &found), pictures: Vec::new() });
+    }
+    if !found.tells() {
+        finished.status = Status::Incomplete;
     }
     finished.finish(common, folder)
 }
@@ -54,9 +54,7 @@ fn watched(case: &Case, plan: &Plan, quiet: bool) -> Result<Check, Failure> {
 fn text(case: &Case, found: &Check) -> String {
     let mut text = format!("{}\n", bold(&case.title));
     let _ = write!(text, "\n{}\n", bold("Logs"));
-    for log in &found.logs {
-        text.push_str(&shown(log, found.logs.len() <= MOST_WHOLE));
-    }
+    text.push_str(&surveys(found));
     if let Some(found) = &found.balance {
         let _ = write!(text, "\n{}\n", bold("A rigid axis by regression, all at the drive pulley"));
         for (name, unit, own, error) in regression(found) {
@@ -70,8 +68,7 @@ fn text(case: &Case, found: &Check) -> String {
             found.words()
         );
     }
-    let own = |finding: &&taut::fit::Finding| finding.log.is_none() || finding.code == "unexplained";
-    for finding in found.fit.findings.iter().filter(own) {
+    for finding in findings(found) {
         let _ = write!(text, "\n{finding}\n");
     }
     let _ = write!(text, "\n{}\n", bold("Accuracy of each parameter, all others free"));
@@ -89,6 +86,9 @@ fn text(case: &Case, found: &Check) -> String {
         Some(_) => "",
         None => "\nall free parameters ended at a bound: their sensitivity is unknown\n",
     });
+    if !found.tells() {
+        text.push_str("\nthese logs determine none of the free parameters\n");
+    }
     for (group, choices) in found.groups() {
         let _ = write!(text, "\n{}\n  {}\n", bold("Not determined"), group.words);
         for combination in &group.combinations {

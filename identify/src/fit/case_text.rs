@@ -2,9 +2,12 @@
 
 use crate::case::{Case, Files, Given};
 use crate::error::{Error, Result};
+use crate::fit::limits::{DIGITS_KNOWN, DIGITS_READ};
 use crate::fit::trust::found::{Estimate, Fit};
 use crate::machine::Machine;
 use crate::parameter::{self, Field, Parameter, named, values};
+use crate::quantity;
+use nalgebra::DMatrix;
 use std::path::Path;
 
 impl Fit {
@@ -25,36 +28,51 @@ impl Fit {
     fn text(&self, case: &Case, name: &Path, part: usize) -> Result<String> {
         let machine = self.parts.get(part).map_or(&self.machine, |(_, machine)| machine);
         let is_own = |estimate: &&Estimate| estimate.part.is_none_or(|own| own == part);
-        let sets = || self.estimates.iter().filter(is_own).flat_map(|estimate| &estimate.sets);
-        let text = without_other_forms(&case.text, sets().map(|(key, _)| key.as_str()));
-        let mut changes: Vec<String> = sets().flat_map(|(key, value)| changes_of(machine, case, key, *value)).collect();
-        let read = |changes: &[String]| {
+        let digits = Digits::new(self);
+        let own = || self.estimates.iter().zip(&digits.0).filter(|(estimate, _)| is_own(estimate));
+        let sets = || own().flat_map(|(estimate, share)| estimate.sets.iter().map(move |(key, to)| (key, *to, *share)));
+        let text = without_other_forms(&case.text, sets().map(|(key, ..)| key.as_str()));
+        let written = text.parse().unwrap_or_default();
+        let mut changes: Vec<Change> =
+            sets().flat_map(|(key, to, share)| changes_of(machine, case, &written, key, (to, share))).collect();
+        let read = |changes: &[Change], is_rounded: bool| {
+            let changes: Vec<String> = changes.iter().map(|change| change.text(is_rounded)).collect();
             let changes: Vec<&str> = changes.iter().map(String::as_str).collect();
             Case::from_text_for(name, &text, &changes, Files::Nothing)
         };
-        let mut fitted = read(&changes);
-        if let Some(change) = fitted.as_ref().ok().and_then(|fitted| damping_share(case, &fitted.machine, machine)) {
+        let is_another = |fitted: &Result<Case>| {
+            fitted.as_ref().map_or(true, |fitted| differs(&fitted.machine, machine, DIGITS_READ).is_some())
+        };
+        let mut fitted = read(&changes, false);
+        let damping = fitted.as_ref().ok().and_then(|fitted| damping_share(case, &fitted.machine, machine));
+        // A damping ratio is that of all digits of mass and stiffness.
+        let is_rounded = damping.is_none();
+        if let Some(change) = damping {
             changes.push(change);
-            fitted = read(&changes);
+            fitted = read(&changes, false);
         }
-        if fitted.as_ref().map_or(true, |fitted| differs(&fitted.machine, machine).is_some()) {
-            // The other direction, or the breakaway, stands in the text and went with what was fitted.
-            let is_fitted = |body: &str| sets().any(|(key, _)| key.starts_with(&format!("{body}.friction.")));
-            for (key, value) in values(machine) {
+        // The other direction, or the breakaway, went with what was fitted: where the text has it, or else anyway.
+        for is_anywhere in [false, true] {
+            if !is_another(&fitted) {
+                break;
+            }
+            for (key, to) in values(machine) {
                 let went_along = named(&key).is_some_and(|row| !row.follows.is_empty());
-                if went_along && key.split_once(".friction.").is_some_and(|(body, _)| is_fitted(body)) {
-                    changes.push(format!("{key}={value}"));
+                let Some((body, _)) = key.split_once(".friction.").filter(|_| went_along) else { continue };
+                let fitted = sets().find(|(set, ..)| set.starts_with(&format!("{body}.friction.")));
+                if let Some((_, _, share)) = fitted.filter(|_| is_anywhere || case.value(&key).is_ok()) {
+                    changes.push(Change::new(&written, key, to, share));
                 }
             }
-            fitted = read(&changes);
+            fitted = read(&changes, false);
         }
-        let fitted = fitted?;
         // A file that is another machine than the fit has other errors than those that are told of it.
-        if let Some((key, is, read)) = differs(machine, &fitted.machine) {
+        if let Some((key, is, read)) = differs(machine, &fitted?.machine, DIGITS_READ) {
             return Err(Error::new(format!("the fit cannot be written: `{key}` would be read as {read}, and is {is}"))
                 .in_file(name)
                 .next("give the case file a value of its own for it, or leave it out of [fit]"));
         }
+        let fitted = read(&changes, is_rounded)?;
         let text = fitted.text;
         let mut document: toml_edit::DocumentMut =
             text.parse().map_err(|_| Error::new("this is not TOML").in_file(name))?;
@@ -64,10 +82,12 @@ impl Fit {
             self.ending_word()
         );
         table.decor_mut().set_prefix(how);
-        for estimate in &self.estimates {
+        for (estimate, known) in self.estimates.iter().zip(&digits.0) {
             let mut row = toml_edit::InlineTable::new();
+            let error = estimate.error.unwrap_or(0.0);
             let mut put = |key: &str, value: f64| {
-                row.insert(key, toml_edit::Value::from(value));
+                let step = if key == "value" { known * value.abs() } else { DIGITS_KNOWN * error };
+                row.insert(key, toml_edit::Value::from(rounded_to(value, step)));
             };
             put("value", estimate.value);
             match (estimate.error, estimate.interval) {
@@ -106,18 +126,120 @@ impl Fit {
 /// fitted mass or stiffness changes. None where the text gives neither, or `read` has that damping.
 ///
 /// c = 2 ζ k / ω₀
-fn damping_share(case: &Case, read: &Machine, machine: &Machine) -> Option<String> {
+fn damping_share(case: &Case, read: &Machine, machine: &Machine) -> Option<Change> {
     let (is, read) = (machine.belt.damping[0], read.belt.damping[0]);
     let mut keys = ["belt.damping_ratio", "belt.loss_factor"].into_iter();
     let (key, given) = keys.find_map(|key| match case.value(key) {
         Ok(Given::Number(given)) => Some((key, given)),
         _ => None,
     })?;
-    (is != read && read > 0.0).then(|| format!("{key}={}", given * is / read))
+    let change =
+        || Change { key: key.to_string(), values: vec![(None, given * is / read)], is_list: false, share: 0.0 };
+    (is != read && read > 0.0).then(change)
 }
 
-/// The changes of the text with which `key` is `value`.
-fn changes_of(machine: &Machine, case: &Case, key: &str, value: f64) -> Vec<String> {
+/// A change of the text of a case.
+struct Change {
+    key: String,
+    /// Each value with the unit that the text has for it.
+    values: Vec<(Option<String>, f64)>,
+    is_list: bool,
+    /// The share of itself to which a value is known.
+    share: f64,
+}
+
+impl Change {
+    fn new(document: &toml_edit::DocumentMut, key: String, value: f64, share: f64) -> Self {
+        Self { values: vec![(unit_at(document, &key), value)], key, is_list: false, share }
+    }
+
+    /// As `--set` reads it.
+    fn text(&self, is_rounded: bool) -> String {
+        let share = if is_rounded { self.share } else { 0.0 };
+        let values: Vec<String> =
+            self.values.iter().map(|(unit, value)| literal(unit.as_deref(), *value, share)).collect();
+        let values = values.join(", ");
+        if self.is_list { format!("{}=[{values}]", self.key) } else { format!("{}={values}", self.key) }
+    }
+}
+
+/// Digits of the estimates that are known: a relative step for each, zero where all digits are written.
+struct Digits(Vec<f64>);
+
+impl Digits {
+    /// A tenth of the standard error with all other parameters held, as a share of the estimate: rounding to that moves
+    /// the residuals by no more than noise, however much the estimates depend on each other. All digits where something
+    /// is not determined: the file then has the values of the case as far as the logs allow.
+    ///
+    /// σ_j/√((R⁻¹)_jj), R the correlations
+    fn new(fit: &Fit) -> Self {
+        let n = fit.estimates.len();
+        let all = Self(vec![0.0; n]);
+        let is_known = fit.estimates.iter().all(|estimate| !estimate.at_bound && estimate.error.is_some());
+        if !is_known || !fit.is_complete() || fit.correlation.len() != n {
+            return all;
+        }
+        let correlation = DMatrix::from_fn(n, n, |i, j| if i == j { 1.0 } else { fit.correlation[i][j] });
+        let Some(inverse) = correlation.try_inverse() else { return all };
+        let step = |(j, estimate): (usize, &Estimate)| {
+            let held = estimate.error.unwrap_or(0.0) / inverse[(j, j)].sqrt();
+            let share = DIGITS_KNOWN * held / estimate.value.abs();
+            if share.is_finite() { share.min(DIGITS_KNOWN) } else { 0.0 }
+        };
+        Self(fit.estimates.iter().enumerate().map(step).collect())
+    }
+}
+
+/// A number to the power of ten below this step; as it is for a step of zero.
+fn rounded_to(value: f64, step: f64) -> f64 {
+    let place = step.log10().floor();
+    if step <= 0.0 || !place.is_finite() || !value.is_finite() {
+        return value;
+    }
+    // The shortest decimal number of so many places: 0.1 and not 3 · 0.1 − 0.2.
+    let text = match place {
+        coarse if coarse > 0.0 => {
+            let unit = 10f64.powf(coarse);
+            format!("{}", (value / unit).round() * unit)
+        }
+        fine => format!("{value:.0$}", -fine as usize),
+    };
+    text.parse().unwrap_or(value)
+}
+
+/// The unit of the quantity at a key, where the text gives one.
+fn unit_at(document: &toml_edit::DocumentMut, key: &str) -> Option<String> {
+    let mut item = document.as_item();
+    for step in key.split('.') {
+        item = match step.parse::<usize>() {
+            Ok(index) if item.is_array() => item.get(index)?,
+            _ => item.get(step)?,
+        };
+    }
+    let unit = quantity::parse(item.as_str()?).ok()?.unit;
+    (!unit.is_empty()).then_some(unit)
+}
+
+/// A value as it stands in a file: in this unit, rounded to a share of itself.
+fn literal(unit: Option<&str>, value: f64, share: f64) -> String {
+    let one = unit.and_then(|unit| Some((unit, quantity::parse(&format!("1 {unit}")).ok()?.value)));
+    match one.filter(|(_, factor)| *factor > 0.0) {
+        Some((unit, factor)) => {
+            let own = value / factor;
+            format!("\"{} {unit}\"", quantity::shortest(rounded_to(own, share * own.abs())))
+        }
+        None => rounded_to(value, share * value.abs()).to_string(),
+    }
+}
+
+/// The changes of the text with which `key` is a value that is known to a share of itself.
+fn changes_of(
+    machine: &Machine,
+    case: &Case,
+    document: &toml_edit::DocumentMut,
+    key: &str,
+    (value, share): (f64, f64),
+) -> Vec<Change> {
     let Some(row) = named(key) else { return Vec::new() };
     let own: Vec<(String, f64)> = values(machine)
         .into_iter()
@@ -128,11 +250,14 @@ fn changes_of(machine: &Machine, case: &Case, key: &str, value: f64) -> Vec<Stri
     match key.starts_with("belt.") {
         // All spans at once, or one of a list that is not there.
         true if listed && !(is_element && given) => {
-            let spans: Vec<String> = own.iter().map(|(_, value)| value.to_string()).collect();
-            vec![format!("{}=[{}]", row.key, spans.join(", "))]
+            let unit = |k: usize| unit_at(document, &format!("{}.{k}", row.key)).or_else(|| unit_at(document, row.key));
+            let values = own.iter().enumerate().map(|(k, (_, value))| (unit(k), *value)).collect();
+            vec![Change { key: row.key.to_string(), values, is_list: true, share }]
         }
-        _ if listed && !is_element => own.iter().map(|(element, value)| format!("{element}={value}")).collect(),
-        _ => vec![format!("{key}={value}")],
+        _ if listed && !is_element => {
+            own.into_iter().map(|(element, value)| Change::new(document, element, value, share)).collect()
+        }
+        _ => vec![Change::new(document, key.to_string(), value, share)],
     }
 }
 
@@ -160,9 +285,10 @@ fn without_other_forms<'a>(text: &str, keys: impl Iterator<Item = &'a str>) -> S
     if changed { document.to_string() } else { text.to_string() }
 }
 
-/// A number that two machines do not share but for rounding in text, and what it is in each; NaN where it is not there.
-fn differs(a: &Machine, b: &Machine) -> Option<(String, f64, f64)> {
-    let near = |a: f64, b: f64| a == b || (a - b).abs() <= 1e-9 * a.abs().max(b.abs());
+/// A number that two machines do not share but for rounding in text, relative, and what it is in each; NaN where it is
+/// not there.
+fn differs(a: &Machine, b: &Machine, rounding: f64) -> Option<(String, f64, f64)> {
+    let near = |a: f64, b: f64| a == b || (a - b).abs() <= rounding * a.abs().max(b.abs());
     let (a, b) = (values(a), values(b));
     let of = |all: &[(String, f64)], key: &str| all.iter().find(|(own, _)| own == key).map_or(f64::NAN, |own| own.1);
     let mut keys = a.iter().chain(&b).map(|(key, _)| key);

@@ -4,12 +4,11 @@ use crate::case::{Case, Plan};
 use crate::error::Result;
 use crate::fit::asked::problem::Stop;
 use crate::fit::search::regression::{Balance, regression};
-use crate::fit::trust::found::Fit;
+use crate::fit::trust::found::{Estimate, Fit};
 use crate::fit::trust::identify::{Group, Identifiability};
 use crate::fit::trust::nearest::search;
 use crate::fit::trust::proposals::{Proposal, proposals};
 use crate::fit::trust::result::told;
-use crate::fit::trust::trials;
 use crate::log::Survey;
 use crate::solve::Flow;
 
@@ -33,6 +32,13 @@ pub struct Check {
 }
 
 impl Check {
+    /// True if the logs determine a parameter or a combination of some, or nothing is searched for.
+    pub fn tells(&self) -> bool {
+        let is_known = |estimate: &Estimate| !estimate.at_bound && estimate.is_determined();
+        let estimates = &self.fit.estimates;
+        estimates.is_empty() || estimates.iter().any(is_known) || self.fit.combinations().next().is_some()
+    }
+
     /// Groups of parameters that are not determined, and what to do about each.
     pub fn groups(&self) -> impl Iterator<Item = (&Group, &Vec<String>)> {
         self.identifiability.iter().flat_map(|known| &known.groups).zip(&self.choices)
@@ -66,10 +72,10 @@ pub fn check_watched(
     let alike = judged.as_ref().map_or(String::new(), |judged| format!(", {}", judged.slow_words(&found.problem)));
     let noise_words = format!("residual noise: {}{alike}", noise.join(", "));
     let balance = regression(&found.problem);
-    let fit = told(case, plan, &found, judged.as_ref());
+    let (fit, logs) = told(case, plan, &found, judged.as_ref());
     Ok(Check {
         balance,
-        logs: trials::surveys(case, plan, &found),
+        logs,
         identifiability: judged.map(|judged| judged.identifiability),
         choices: fit.choices.clone(),
         noise_words,

@@ -524,17 +524,68 @@ pub(crate) const OPPOSITE: f64 = -0.5;
 /// Longest delay of an input that is looked for.
 ///
 /// Unit: samples. Source: chosen; below `INPUT_BEFORE_WINDOW`.
-pub(crate) const LONGEST_DELAY: usize = 40;
+pub(crate) const LONGEST_DELAY: isize = 40;
 
 /// Shortest delay of an input that is tested.
 ///
 /// Unit: samples. Source: chosen.
-pub(crate) const SHORTEST_DELAY: usize = 2;
+pub(crate) const SHORTEST_DELAY: isize = 2;
+
+/// Longest shift of an input against the outputs that is looked for.
+///
+/// Unit: samples. Source: chosen. Test: `an_input_that_is_logged_early_or_late_is_found`.
+pub(crate) const LONGEST_SHIFT: isize = 500;
+
+/// Longest shift of an input that is looked for, relative to the log.
+///
+/// Unit: 1. Source: chosen: three quarters of the log are left to compare.
+pub(crate) const SHIFT_SHARE: f64 = 0.25;
+
+/// Distance of the shifts that are tried first.
+///
+/// Unit: samples. Source: chosen: shorter than an input holds its values.
+pub(crate) const SHIFT_STRIDE: isize = 5;
+
+/// Unexplained torque from which on a shift is looked for.
+///
+/// Unit: 1. Source: chosen: an input that is off by more than a delay leaves more.
+pub(crate) const SHIFT_UNEXPLAINED: f64 = 0.25;
+
+/// Unexplained torque with a shift, relative to that without, below which the shift is tested.
+///
+/// Unit: 1. Source: chosen. Test: `an_input_that_is_logged_early_or_late_is_found`.
+pub(crate) const SUSPECT_SHIFT: f64 = 0.5;
 
 /// Unexplained torque with a delay, relative to that without, below which the delay is tested.
 ///
 /// Unit: 1. Source: chosen. Test: `a_delay_is_found_beside_narrow_band_noise`.
 pub(crate) const SUSPECT_DELAY: f64 = 0.95;
+
+/// Numbers of windows that the longest log is cut into where the whole is not explained.
+///
+/// Unit: windows. Source: steps of 4.
+pub(crate) const UNEXPLAINED_WINDOWS: [f64; 3] = [4.0, 16.0, 64.0];
+
+/// Explained share of the windows, beyond a straight line in each, from which on errors add up along the log.
+///
+/// Unit: 1. Source: chosen.
+pub(crate) const WINDOWS_EXPLAIN: f64 = 0.8;
+
+/// Entries of the Jacobian up to which windows are tried.
+///
+/// Unit: values. Source: chosen: 160 MB.
+pub(crate) const WINDOWS_MOST: usize = 20_000_000;
+
+/// Powers of ten that are tried as factors on a column where the model explains little, and the units of angles and
+/// lengths: degrees and inches.
+///
+/// Unit: 1. Source: chosen; SI. Test: `a_factor_on_a_column_is_named`.
+pub(crate) const FACTORS: [f64; 8] = [0.1, 0.01, 0.001, 10.0, 100.0, 1000.0, std::f64::consts::PI / 180.0, 0.0254];
+
+/// Cost with a factor on a column, relative to that without, below which the factor explains it.
+///
+/// Unit: 1. Source: chosen. Test: `a_factor_on_a_column_is_named`.
+pub(crate) const FACTOR_LEAVES: f64 = 0.1;
 
 /// Share of the logged input that the controller of a case must explain.
 ///
@@ -1011,3 +1062,14 @@ pub(crate) const STRIBECK_POINTS: [f64; 9] = [0.2, 0.4, 0.6, 0.8, 1.0, 1.25, 1.5
 ///
 /// Unit: 1. Source: chosen: a hundred times the motor's greatest force.
 pub(crate) const FORCE_MOST: f64 = 1e4;
+
+/// Step to which an estimate is rounded in a file.
+///
+/// Unit: standard errors of the estimate with all others held. Source: 2.2503 kg ± 0.0022 kg has two digits of its
+/// error. Test: `a_file_has_the_digits_that_are_known_and_the_units_that_were_there`.
+pub(crate) const DIGITS_KNOWN: f64 = 0.1;
+
+/// Rounding of numbers that go through text.
+///
+/// Unit: relative. Source: sums and units of 64-bit numbers; a wrong form of a parameter is further off.
+pub(crate) const DIGITS_READ: f64 = 1e-9;

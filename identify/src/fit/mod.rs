@@ -73,5 +73,5 @@ pub fn fit_watched(
 ) -> Result<Fit> {
     let settled = search(case, plan, stop, watch)?;
     let judged = settled.judged(case, plan);
-    Ok(told(case, plan, &settled.searched, judged.as_ref()))
+    Ok(told(case, plan, &settled.searched, judged.as_ref()).0)
 }

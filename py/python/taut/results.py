@@ -403,7 +403,7 @@ class Drift:
 
     @property
     def changes(self) -> dict[str, float]:
-        """The value of each parameter that explains the logs best by itself, the one that explains most first."""
+        """The value of each parameter that explains the logs best by itself: those that act alike first."""
         return {row["name"]: row["to"] for row in self.data["changes"]}
 
     def to_pandas(self) -> pandas.DataFrame:

@@ -6,7 +6,6 @@ pub use page::page;
 
 use crate::fit::value;
 use taut::fit::{Balance, Check, Estimate};
-use taut::log::{Severity, Survey};
 
 /// Each parameter with its standard error in words: that of the fit, and so what `taut fit` says.
 pub fn shares(found: &Check) -> impl Iterator<Item = (String, String)> {
@@ -33,12 +32,28 @@ pub fn regression(found: &Balance) -> impl Iterator<Item = (&'static str, &'stat
     rows.map(|(((name, unit), value), error)| (name, unit, value, error))
 }
 
-/// The survey of a log, indented; not `whole`: its first line and its warnings.
-pub fn shown(log: &Survey, whole: bool) -> String {
-    let mut log = log.clone();
-    if !whole {
-        log.channels.clear();
-        log.notes.retain(|note| note.severity > Severity::Fact);
+/// Logs up to this number are shown with all that is known of each; of more, notes that many share are told once.
+const MOST_WHOLE: usize = 4;
+
+/// The survey of each log, indented: of many logs the first lines.
+pub fn surveys(found: &Check) -> String {
+    let mut text = String::new();
+    for log in &found.logs {
+        let mut log = log.clone();
+        if found.logs.len() > MOST_WHOLE {
+            log.channels.clear();
+            log.notes.clear();
+        }
+        log.to_string().lines().for_each(|line| text += &format!("  {line}\n"));
     }
-    log.to_string().lines().fold(String::new(), |text, line| format!("{text}  {line}\n"))
+    text
+}
+
+/// What is to be known beside the surveys: of many logs their notes, too, those that many share once.
+pub fn findings(found: &Check) -> Vec<String> {
+    let mut fit = found.fit.clone();
+    if found.logs.len() <= MOST_WHOLE {
+        fit.findings.retain(|finding| finding.log.is_none() || finding.code == "unexplained");
+    }
+    crate::fit::findings(&fit)
 }

@@ -1,6 +1,6 @@
 //! The report: one HTML file.
 
-use super::{shares, shown};
+use super::{findings, shares, surveys};
 use crate::fit::value as told;
 use crate::{Callout, Cell, Page, Table};
 use taut::case::Case;
@@ -18,6 +18,7 @@ pub fn page(case: &Case, found: &Check) -> Page {
     }
     page.table(&rows);
     page.prose(format!("{}.", found.noise_words));
+    findings(found).iter().for_each(|finding| page.prose(finding.as_str()));
     if !found.experiments.is_empty() {
         page.section("Most useful next experiments");
         let mut rows = Table::new("By simulation, the best first.").column("Experiment", "").column("Effect", "");
@@ -30,14 +31,15 @@ pub fn page(case: &Case, found: &Check) -> Page {
         regression(&mut page, found);
     }
     page.section("Logs");
-    for log in &found.logs {
-        shown(log, true).lines().for_each(|line| page.prose(line.trim()));
-    }
+    surveys(found).lines().for_each(|line| page.prose(line.trim()));
     page.case("", "case.toml", &case.text);
     page
 }
 
 fn verdict(page: &mut Page, found: &Check) {
+    if !found.tells() {
+        page.callout(Callout::Fails, "Nothing", "these logs determine none of the free parameters.");
+    }
     match &found.identifiability {
         Some(known) if known.complete() => {
             page.callout(Callout::Holds, "All of it", "all free parameters are determined.");

@@ -36,7 +36,8 @@ pub fn verdict(found: &Drift) -> String {
         [] => "nothing could be changed".into(),
         [one] => format!("a change of {one} explains most: {explained:.1} % of the sum of squares"),
         [one, others @ ..] => format!(
-            "a change of {one} explains most: {explained:.1} % of the sum of squares; as well does one of {}, which these logs do not tell from it",
+            "a change of {one} explains {explained:.1} % of the sum of squares; {} act alike in these logs, which do not \
+             tell them apart",
             others.join(", ")
         ),
     }
@@ -47,7 +48,8 @@ pub fn page(case: &Case, found: &Drift) -> Page {
     let mut page = Page::new(case.title.clone()).subtitle("Which single change explains the logs.");
     page.section("Single changes");
     page.prose(format!("{}.", verdict(found)));
-    let mut rows = Table::new("Each change by itself, all else as the case has it, the one that explains most first.");
+    let mut rows =
+        Table::new("Each change by itself, all else as the case has it; those that act alike and explain most first.");
     for heading in ["Parameter", "From", "To", "Change"] {
         rows = rows.column(heading, "");
     }

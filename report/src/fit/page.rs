@@ -52,7 +52,7 @@ pub fn page_with(case: &Case, found: &Found, text: &str, first: impl FnOnce(&mut
     let few = fit.logs.len() <= plots::MOST_LOGS;
     for log in plots::worst(&fit.logs, &fit.noise) {
         for output in &log.outputs {
-            page.figure(&plots::overlay(log, output));
+            page.figure(&plots::overlay(log, output, &fit.noise));
             // Of many logs, that of the worst.
             if let Some(figure) = plots::memory(log, output).filter(|_| few) {
                 page.figure(&figure);

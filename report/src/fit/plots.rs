@@ -2,7 +2,7 @@
 
 use crate::{Axis, Colour, Figure, Panel, Series, Style};
 use taut::fit::{Estimate, Fit, LogFit, OutputFit, Posterior, Profile, ResidualForce};
-use taut::log::Quantity;
+use taut::log::{Quantity, step_of};
 
 /// Logs drawn; the numbers of the rest are in the tables.
 pub const MOST_LOGS: usize = 6;
@@ -45,23 +45,73 @@ fn axis_of(quantity: Quantity, label: &str) -> Axis {
     }
 }
 
-/// One output of a log: what was seen, what the model says, what is between them.
-pub fn overlay(log: &LogFit, output: &OutputFit) -> Figure {
+/// Steps longer than this many usual intervals are gaps.
+const GAP: f64 = 1.75;
+
+/// A curve over time that is broken where samples are missing, and not drawn across.
+fn broken(time: &[f64], values: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    let mut steps: Vec<f64> = time.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let middle = steps.len() / 2;
+    let usual = if steps.is_empty() { 0.0 } else { *steps.select_nth_unstable_by(middle, f64::total_cmp).1 };
+    let (mut x, mut y) = (Vec::with_capacity(time.len()), Vec::with_capacity(time.len()));
+    for (k, (&at, &value)) in time.iter().zip(values).enumerate() {
+        if k > 0 && at - time[k - 1] > GAP * usual {
+            x.push(time[k - 1]);
+            y.push(f64::NAN);
+        }
+        x.push(at);
+        y.push(value);
+    }
+    (x, y)
+}
+
+/// The deviation of the residuals of a quantity.
+fn deviation_of(noise: &[(Quantity, f64)], quantity: Quantity) -> Option<f64> {
+    noise.iter().find(|(own, _)| *own == quantity).map(|(_, deviation)| *deviation)
+}
+
+/// A panel of residuals with the band in which 95 % of them are by chance.
+fn with_band(panel: Panel, deviation: Option<f64>) -> Panel {
+    match deviation {
+        Some(deviation) => panel.horizontal(NORMAL * deviation, "95 % of chance").horizontal(-NORMAL * deviation, ""),
+        None => panel,
+    }
+}
+
+/// The step of a log's values where rounding to it explains at least half of the residuals' variance.
+fn rounding(output: &OutputFit, deviation: Option<f64>) -> Option<f64> {
+    // An error of rounding is evenly distributed: q/√12.
+    let explains = |step: &f64| deviation.is_some_and(|deviation| step * step / 12.0 > 0.5 * deviation * deviation);
+    step_of(&output.seen).filter(explains)
+}
+
+/// One output of a log: what was seen, what the model says, what is between them, with the band that chance has by the
+/// deviation of the fit's residuals.
+pub fn overlay(log: &LogFit, output: &OutputFit, noise: &[(Quantity, f64)]) -> Figure {
     let residual: Vec<f64> = output.model.iter().zip(&output.seen).map(|(model, seen)| model - seen).collect();
+    let deviation = deviation_of(noise, output.quantity);
+    let line = |name: &str, values: &[f64]| {
+        let (x, y) = broken(&log.time, values);
+        Series::new(name, x, y)
+    };
+    let below = Panel::new(axis(output, "Model − log")).series(line("model − log", &residual)).horizontal(0.0, "");
+    let caption = match rounding(output, deviation) {
+        None => "Above log and model, below what is between them.".to_string(),
+        Some(step) => format!(
+            "Above log and model, below what is between them: mostly the rounding of the log to steps of {}.",
+            super::rows::value(step, output.quantity.unit(), 3)
+        ),
+    };
     let name = output.quantity.name().replace('_', " ");
     let mut figure = Figure::new(format!("{}: {name}", log.name), Axis::new("Time", "s"))
         .panel(
             Panel::new(axis(output, "Value"))
-                .series(Series::new("log", log.time.clone(), output.seen.clone()).style(Style::Solid))
-                .series(
-                    Series::new("model", log.time.clone(), output.model.clone())
-                        .style(Style::Dashed)
-                        .colour(Colour::Vermillion),
-                )
+                .series(line("log", &output.seen).style(Style::Solid))
+                .series(line("model", &output.model).style(Style::Dashed).colour(Colour::Vermillion))
                 .weight(2.0),
         )
-        .panel(Panel::new(axis(output, "Model − log")).line("model − log", &log.time, &residual).horizontal(0.0, ""))
-        .caption("Above log and model, below what is between them.");
+        .panel(with_band(below, deviation))
+        .caption(caption);
     if log.fitted_rows > 0 && log.fitted_rows < log.time.len() {
         figure = figure.vertical(log.time[log.fitted_rows], "held out from here");
     }
@@ -82,8 +132,10 @@ pub fn together(fit: &Fit) -> Vec<Figure> {
             let (mut x, mut y) = (Vec::new(), Vec::new());
             for log in fit.logs.iter().filter(|log| log.held_out == held).take(MOST_OVERLAID) {
                 for output in log.outputs.iter().filter(|output| output.quantity == quantity) {
-                    x.extend_from_slice(&log.time);
-                    y.extend(output.model.iter().zip(&output.seen).map(|(model, seen)| model - seen));
+                    let residual: Vec<f64> = output.model.iter().zip(&output.seen).map(|(m, seen)| m - seen).collect();
+                    let (time, residual) = broken(&log.time, &residual);
+                    x.extend(time);
+                    y.extend(residual);
                     // A gap between one log and the next.
                     x.push(0.0);
                     y.push(f64::NAN);
@@ -95,7 +147,7 @@ pub fn together(fit: &Fit) -> Vec<Figure> {
         }
         let name = quantity.name().replace('_', " ");
         Figure::new(format!("All logs: {name}"), Axis::new("Time", "s"))
-            .panel(panel.horizontal(0.0, ""))
+            .panel(with_band(panel.horizontal(0.0, ""), deviation_of(&fit.noise, quantity)))
             .caption("Model minus log, all logs over each other.")
     };
     quantities.into_iter().map(one).collect()
@@ -130,10 +182,14 @@ pub fn by_log(logs: &[LogFit], quantity: Quantity) -> Option<Figure> {
     )
 }
 
+/// Half-width of a 95 % interval of a normal distribution, in standard deviations.
+const NORMAL: f64 = 1.96;
+
 /// Bins of a residual force.
 const BINS: usize = 40;
 
-/// Means of a force over bins of what it is drawn beside, those with few values left out.
+/// Means of a force over bins of what it is drawn beside, with no number in those with few values: no line crosses
+/// them.
 fn binned(x: &[f64], force: &[f64], chosen: impl Fn(usize) -> bool) -> (Vec<f64>, Vec<f64>) {
     let (low, high) = x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(*v), high.max(*v)));
     let mut sums = [(0.0, 0.0, 0usize); BINS];
@@ -143,7 +199,11 @@ fn binned(x: &[f64], force: &[f64], chosen: impl Fn(usize) -> bool) -> (Vec<f64>
         *bin = (bin.0 + x[k], bin.1 + force[k], bin.2 + 1);
     }
     let fewest = (x.len() / (20 * BINS)).max(3);
-    sums.iter().filter(|bin| bin.2 >= fewest).map(|(x, f, n)| (x / *n as f64, f / *n as f64)).unzip()
+    let mean = |(bin, (x, f, n)): (usize, &(f64, f64, usize))| match *n >= fewest {
+        true => (x / *n as f64, f / *n as f64),
+        false => (low + (bin as f64 + 0.5) * wide, f64::NAN),
+    };
+    sums.iter().enumerate().map(mean).unzip()
 }
 
 /// The force that the model lacks, beside position, speed and force of the motor: `all` over all logs.
@@ -153,7 +213,7 @@ pub fn residual_forces(all: &ResidualForce) -> Vec<Figure> {
         let mut panel = Panel::new(force());
         for (name, forward, colour) in [("forward", true, Colour::Blue), ("backward", false, Colour::Vermillion)] {
             let (x, y) = binned(values, &all.force, |k| (all.speed[k] > 0.0) == forward);
-            if x.len() > 2 {
+            if y.iter().filter(|force| force.is_finite()).count() > 2 {
                 panel = panel.series(Series::new(name, x, y).colour(colour));
             }
         }
@@ -184,8 +244,9 @@ pub fn residual_forces(all: &ResidualForce) -> Vec<Figure> {
 
 /// Residual force over time, for one log.
 pub fn residual_over_time(log: &LogFit, own: &ResidualForce) -> Figure {
+    let (time, force) = broken(&own.time, &own.force);
     Figure::new(format!("{}: residual force", log.name), Axis::new("Time", "s"))
-        .panel(Panel::new(Axis::new("Residual force", "N")).line("", &own.time, &own.force).horizontal(0.0, ""))
+        .panel(Panel::new(Axis::new("Residual force", "N")).line("", &time, &force).horizontal(0.0, ""))
         .caption("What would have to act on the cart beside the model, so that it followed the log; stretches at rest are left out. A mean that wanders is a drift.")
 }
 
@@ -203,7 +264,7 @@ pub fn memory(log: &LogFit, output: &OutputFit) -> Option<Figure> {
         (0..=lags).map(|lag| residual.iter().zip(&residual[lag..]).map(|(a, b)| a * b).sum::<f64>() / own).collect();
     let interval = (log.time[log.time.len() - 1] - log.time[0]) / (log.time.len() - 1) as f64;
     let at: Vec<f64> = (0..=lags).map(|lag| lag as f64 * interval).collect();
-    let chance = 1.96 / (n as f64).sqrt();
+    let chance = NORMAL / (n as f64).sqrt();
     Some(
         Figure::new(format!("{}: autocorrelation of residuals", log.name), Axis::new("Lag", "s"))
             .panel(
@@ -227,7 +288,7 @@ pub fn profile(profile: &Profile) -> Figure {
                         .style(Style::Dashed)
                         .colour(Colour::Vermillion),
                 )
-                .horizontal(1.96, "95 %"),
+                .horizontal(NORMAL, "95 %"),
         )
         .caption("With this parameter held and all others fitted anew; where both lines agree, the interval is as long as it should be.")
 }
@@ -294,6 +355,38 @@ mod tests {
             extras: Vec::new(),
             complete: true,
         }
+    }
+
+    /// Lines were drawn across gaps of a log and across speeds at which it never was, as if something had been measured
+    /// there.
+    #[test]
+    fn no_line_crosses_what_was_not_measured() {
+        let time = [0.0, 1.0, 2.0, 7.0, 8.0];
+        let (x, y) = broken(&time, &[1.0, 2.0, 3.0, 4.0, 5.0]);
+        assert_eq!(x, [0.0, 1.0, 2.0, 2.0, 7.0, 8.0]);
+        assert!(y[3].is_nan() && y.iter().filter(|value| value.is_nan()).count() == 1);
+        // Speeds near −1 and 1 alone.
+        let speeds: Vec<f64> = (0..400).map(|k| if k < 200 { -1.0 } else { 1.0 } + 1e-3 * f64::from(k % 100)).collect();
+        let (x, y) = binned(&speeds, &speeds, |_| true);
+        assert_eq!(x.len(), BINS);
+        assert!(y[BINS / 2].is_nan() && y[0].is_finite() && y[BINS - 1].is_finite());
+    }
+
+    /// Residuals that are the rounding of an encoder are called so, and have a band; others have a band alone.
+    #[test]
+    fn rounding_is_named_and_residuals_have_a_band() {
+        let step = 0.25;
+        let model: Vec<f64> = (0..200).map(|k| 0.01 * f64::from(k * k % 331)).collect();
+        let seen: Vec<f64> = model.iter().map(|value| (value / step).round() * step).collect();
+        let mut log = log("counts", [0.07, 0.1], false);
+        log.time = (0..200).map(f64::from).collect();
+        let output = OutputFit { seen, model, ..log.outputs[0].clone() };
+        let drawn = |deviation: f64| overlay(&log, &output, &[(Quantity::DriveAngle, deviation)]);
+        let figure = drawn(step / 12f64.sqrt());
+        assert!(figure.caption.contains("rounding of the log to steps of 0.25"), "{}", figure.caption);
+        let band: Vec<f64> = figure.panels[1].horizontals.iter().map(|marker| marker.at).collect();
+        assert_eq!(band, [0.0, NORMAL * step / 12f64.sqrt(), -NORMAL * step / 12f64.sqrt()]);
+        assert!(!drawn(1.0).caption.contains("rounding"));
     }
 
     /// Of 42 logs the first twelve were drawn, and those that were met badly were not seen.

@@ -15,11 +15,17 @@ const OUTLYING: f64 = 10.0;
 const JUMP: f64 = 5.0;
 const BESIDE: usize = 3;
 
+/// The mean speed over a held value is within this factor of the speeds before and behind it.
+const CAUGHT_UP: f64 = 2.0;
+
 /// Steps differ by at least this share of the largest value, or by rounding alone.
 const ROUNDING: f64 = 1e-6;
 
 /// The shortest run at an extreme value that may be a limit, samples.
 const CLIPPED: usize = 5;
+
+/// Share of all samples from which on held values are a suspicion, however few there are in a row.
+const HELD_MANY: f64 = 0.01;
 
 /// Inputs of no more different values only switch.
 const MOST_SWITCHED: usize = 30;
@@ -53,6 +59,8 @@ pub struct Channel {
     pub wraps: usize,
     /// Jumps of a position by any other amount.
     pub jumps: Vec<Jump>,
+    /// Runs of a position that keep one value although the motion goes on.
+    pub held: Vec<Held>,
     /// How many different values there are, counted up to 1000.
     pub levels: usize,
 }
@@ -79,6 +87,19 @@ pub struct Jump {
     pub time: f64,
     /// Its size, beyond the usual step at that place.
     pub size: f64,
+}
+
+/// A value that is repeated although the motion goes on: the next value has caught up with it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Held {
+    /// The first repeated sample, from 0.
+    pub sample: usize,
+    /// The time of that sample, s.
+    pub time: f64,
+    /// How many samples repeat the value.
+    pub samples: usize,
+    /// From the value to the next one.
+    pub travel: f64,
 }
 
 /// A run of equal values at an extreme.
@@ -115,10 +136,12 @@ impl Channel {
             clipped: Vec::new(),
             wraps: 0,
             jumps: Vec::new(),
+            held: Vec::new(),
             levels: sorted.len().min(1000),
         };
         channel.wraps = channel.count_wraps(values);
         if channel.wraps == 0 {
+            channel.held = channel.find_held(values, time);
             channel.jumps = channel.find_jumps(values, time);
         }
         channel.outliers = channel.find_outliers(values, time);
@@ -149,9 +172,47 @@ impl Channel {
         jumps.filter(|jump| (jump - turn).abs() < 0.1 * turn && *jump > 5.0 * usual).count()
     }
 
-    /// Steps of a position that differ from the steps on both sides by far more than these do among each other.
+    fn is_position(&self) -> bool {
+        Quantity::ALL.iter().any(|quantity| quantity.name() == self.name && is_position(*quantity))
+    }
+
+    /// Runs of equal values of a position that moves on both sides of them, and whose next value is where the motion
+    /// has come to.
+    fn find_held(&self, values: &[f64], time: &[f64]) -> Vec<Held> {
+        if !self.is_position() {
+            return Vec::new();
+        }
+        // Noise without the repeated values, which hide it.
+        let mut distinct = values.to_vec();
+        distinct.dedup();
+        let least = OUTLYING * noise(&distinct).max(self.step.map_or(0.0, |q| q / 12f64.sqrt()));
+        let speed = |a: usize, b: usize| (values[b] - values[a]) / (time[b] - time[a]);
+        let mut held = Vec::new();
+        let mut first = 0;
+        for run in values.chunk_by(|a, b| a == b) {
+            let (n, next) = (run.len(), first + run.len());
+            let beside = BESIDE.max(n);
+            if n > 1 && first >= beside && next + beside < values.len() {
+                let (before, across, after) =
+                    (speed(first - beside, first), speed(first, next), speed(next, next + beside));
+                let [slow, fast] = [before.abs().min(after.abs()), before.abs().max(after.abs())];
+                let goes_on = before * across > 0.0
+                    && after * across > 0.0
+                    && (slow / CAUGHT_UP..CAUGHT_UP * fast).contains(&across.abs());
+                if goes_on && slow * (time[next - 1] - time[first]) > least {
+                    let travel = values[next] - values[first];
+                    held.push(Held { sample: first + 1, time: time[first + 1], samples: n - 1, travel });
+                }
+            }
+            first = next;
+        }
+        held
+    }
+
+    /// Steps of a position that differ from the steps on both sides by far more than these do among each other, and do
+    /// not catch up with a value that was held.
     fn find_jumps(&self, values: &[f64], time: &[f64]) -> Vec<Jump> {
-        if !Quantity::ALL.iter().any(|quantity| quantity.name() == self.name && is_position(*quantity)) {
+        if !self.is_position() {
             return Vec::new();
         }
         let steps: Vec<f64> = values.windows(2).map(|pair| pair[1] - pair[0]).collect();
@@ -176,7 +237,8 @@ impl Channel {
         let count = sizes.fold(f64::INFINITY, f64::min);
         let count = if count.is_finite() { count } else { 0.0 };
         let least = OUTLYING * usual.max(self.resolution()).max(count);
-        let found = all.into_iter().filter(|(_, size, apart)| size.abs() > least.max(JUMP * apart));
+        let caught_up = |k: usize| self.held.iter().any(|held| held.sample + held.samples == k + 1);
+        let found = all.into_iter().filter(|(k, size, apart)| size.abs() > least.max(JUMP * apart) && !caught_up(*k));
         found.map(|(k, size, _)| Jump { sample: k + 1, time: time[k + 1], size }).collect()
     }
 
@@ -319,6 +381,18 @@ impl Channel {
                 format!("it jumps by {turn} {} times: a counter that wraps; unwrap it before use", self.wraps),
             );
         }
+        if let Some(longest) = self.held.iter().max_by_key(|held| held.samples) {
+            let n: usize = self.held.iter().map(|held| held.samples).sum();
+            let (travel, at) = (value(longest.travel.abs()), seconds(longest.time));
+            let many = if n == 1 { "one sample repeats".to_string() } else { format!("{n} samples repeat") };
+            let text = format!(
+                "{many} the value before although it moves on, at most {} in a row, from {at} on, while it moves by \
+                 {travel}: a sensor or recorder that holds its last value; leave these cells empty",
+                longest.samples
+            );
+            let is_bad = longest.samples >= CLIPPED || n as f64 > HELD_MANY * samples;
+            note("held", if is_bad { Severity::Suspicion } else { Severity::Warning }, text);
+        }
         if !self.jumps.is_empty() {
             note("jumps", Severity::Suspicion, jumps_text(&self.jumps, self.unit));
         }
@@ -370,6 +444,10 @@ impl Channel {
         match code {
             "wraps" => self.turn().map(|turn| Remedy::Unwrap(output.quantity, turn)),
             "jumps" => Some(Remedy::Step(output.quantity, self.jumps.clone())),
+            "held" => {
+                let samples = self.held.iter().flat_map(|held| held.sample..held.sample + held.samples).collect();
+                Some(Remedy::Leave(output.quantity, samples))
+            }
             "outliers" => {
                 let samples = self.outliers.iter().map(|outlier| outlier.sample).collect();
                 Some(Remedy::Leave(output.quantity, samples))
@@ -397,8 +475,8 @@ pub fn jumps_text(jumps: &[Jump], unit: &str) -> String {
         n => format!(", and {} more times", n - 1),
     };
     format!(
-        "it jumps by {}{more}, which is not motion: lost counts, a counter that was reset, or a belt that skipped teeth; take \
-         the jumps out, or split the log there",
+        "it jumps by {}{more}, which is not motion: lost counts, a counter that was reset, a belt that skipped teeth, or \
+         samples that were dropped without a gap in time; take the jumps out, or split the log there",
         first.unwrap_or_default()
     )
 }
@@ -413,6 +491,22 @@ fn longest_run(values: &[f64], holds: impl Fn(f64) -> bool) -> (usize, usize) {
         }
     }
     best
+}
+
+/// Step of an encoder or converter: all values are multiples of it, but for their rounding in print. None where they
+/// are not, or where there are too few.
+///
+/// ```
+/// use taut::log::step_of;
+/// let counts: Vec<f64> = (0..40).map(|k| f64::from(k * k % 17) * 0.25).collect();
+/// assert_eq!(step_of(&counts), Some(0.25));
+/// ```
+pub fn step_of(values: &[f64]) -> Option<f64> {
+    let mut sorted: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();
+    let samples = sorted.len();
+    sorted.sort_by(f64::total_cmp);
+    sorted.dedup();
+    step(&sorted, samples)
 }
 
 /// The step of which all values are multiples, give or take their rounding in print; `sorted` has each once.

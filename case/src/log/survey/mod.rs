@@ -9,8 +9,8 @@ mod remedy;
 mod timing;
 mod units;
 
-pub use channel::jumps_text;
-pub use channel::{Channel, Clipped, Jump, Outlier};
+pub use channel::{Channel, Clipped, Held, Jump, Outlier};
+pub use channel::{jumps_text, step_of};
 pub use motion::{Motion, Steady};
 pub use remedy::Remedy;
 pub use timing::{Gap, Timing};

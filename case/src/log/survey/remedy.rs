@@ -24,6 +24,10 @@ pub enum Remedy {
     Step(Quantity, Vec<Jump>),
     /// Samples of an output that do not count.
     Leave(Quantity, Vec<usize>),
+    /// The input so many samples later than it is logged; earlier if negative.
+    Shift(isize),
+    /// A factor on the input.
+    Drive(f64),
 }
 
 impl Remedy {
@@ -61,6 +65,12 @@ impl Remedy {
                     values.iter_mut().skip(sample).for_each(|value| *value -= size);
                 }
             }),
+            Self::Shift(rows) => {
+                let last = log.input.len().saturating_sub(1);
+                let at = |k: usize| log.input[k.saturating_add_signed(-rows).min(last)];
+                log.input = (0..log.input.len()).map(at).collect();
+            }
+            Self::Drive(factor) => scaled(&mut log.input, *factor),
             Self::Leave(quantity, samples) => of(quantity, &mut |values| {
                 for &k in samples {
                     values[k] = f64::NAN;
@@ -87,7 +97,31 @@ fn unwrap(values: &mut [f64], turn: f64) {
 
 #[cfg(test)]
 mod tests {
-    use super::unwrap;
+    use super::{Remedy, unwrap};
+    use crate::log::Log;
+    use crate::signal::Hold;
+
+    #[test]
+    fn a_shifted_input_keeps_its_ends() {
+        let shifted = |rows: isize| {
+            let mut log = Log {
+                name: "log".into(),
+                file: "log.csv".into(),
+                time: vec![0.0, 1.0, 2.0, 3.0],
+                input: vec![1.0, 2.0, 3.0, 4.0],
+                added: None,
+                hold: Hold::Zero,
+                reference: None,
+                outputs: Vec::new(),
+                ended: None,
+            };
+            Remedy::Shift(rows).apply(&mut log);
+            log.input
+        };
+        assert_eq!(shifted(1), [1.0, 1.0, 2.0, 3.0]);
+        assert_eq!(shifted(-2), [3.0, 4.0, 4.0, 4.0]);
+        assert_eq!(shifted(9), [1.0; 4]);
+    }
 
     #[test]
     fn an_angle_that_wraps_goes_on() {

@@ -22,6 +22,12 @@ const HASTY: f64 = 12.0;
 /// Steps that differ by less than this factor are the same.
 const ALIKE: f64 = 1.02;
 
+/// A measured ratio is a known factor within this difference of logarithms.
+const NEARLY: f64 = 0.05;
+
+/// An expected ratio is a known factor within this difference of logarithms: the parameters are rough.
+const ROUGHLY: f64 = 1.2;
+
 /// Of fewer different values a step cannot be told.
 const FEWEST_LEVELS: usize = 10;
 
@@ -95,9 +101,15 @@ fn encoder_note(stage: &Machine, channels: &[Channel]) -> Option<Note> {
 
 /// An input that no such amplifier gives.
 fn input_note(stage: &Machine, input: &Channel) -> Option<Note> {
-    let peak = (stage.drives[0].amplifier.gain * input.greatest)
-        .abs()
-        .max((stage.drives[0].amplifier.gain * input.least).abs());
+    let gain = stage.drives[0].amplifier.gain;
+    let peak = (gain * input.greatest).abs().max((gain * input.least).abs());
+    // A motor of one newton, or newton metre, per ampere stands for a force or torque, which no amplifier limits.
+    let motor = &stage.drives[0].motor;
+    let per_ampere = motor.torque_constant * motor.gear_ratio * motor.gear_efficiency;
+    let is_force = per_ampere == 1.0 || per_ampere == stage.pulley_radius;
+    if is_force && stage.drives[0].amplifier.mode == AmplifierMode::Current {
+        return None;
+    }
     let (most, unit, milli) = match stage.drives[0].amplifier.mode {
         AmplifierMode::Voltage => (MOST_VOLTS, "V", "mV"),
         AmplifierMode::Current => (MOST_AMPERES, "A", "mA"),
@@ -106,10 +118,11 @@ fn input_note(stage: &Machine, input: &Channel) -> Option<Note> {
     if peak <= most {
         return None;
     }
-    let text = format!(
-        "it reaches {}, beyond any drive of this kind: is the column in {milli}? then set units = {{ input = \"{milli}\" }}",
-        shown(peak, unit)
-    );
+    let next = match gain.abs() {
+        1.0 => format!("is the column in {milli}? then set units = {{ input = \"{milli}\" }}"),
+        _ => format!("check amplifier.gain, which is {} {unit} per unit of the column", rounded(gain)),
+    };
+    let text = format!("it reaches {}, beyond any drive of this kind: {next}", shown(peak, unit));
     Some(Note::new("unit", Severity::Suspicion, text).on("input"))
 }
 
@@ -255,15 +268,40 @@ fn ratio_note(ratio: f64, base: &Output, other: &Output, stage: &Machine, what: 
             ),
             Remedy::Exchange(b, o),
         ),
-        Kind::Factor(factor) => note(
-            "unit",
-            format!(
-                "it goes {factor} what {other} says of the same {what}, with a pulley of {}: is one of their units wrong?",
-                shown(stage.pulley_radius, "m")
-            ),
-            Remedy::Ratio(b, o, ratio),
-        ),
+        Kind::Factor(factor) => {
+            let next = match usual_factor(ratio, stage) {
+                Some(Factor::Gear) => format!(
+                    "that is the gear ratio, and angles of the rotor count at the pulley: set scale = {{ {} = {} }}",
+                    if ratio > 1.0 { name } else { other },
+                    rounded(1.0 / stage.drives[0].motor.gear_ratio)
+                ),
+                Some(Factor::Ten) => "that is a power of ten: set units for one of the two".into(),
+                None => "is one of their units wrong?".into(),
+            };
+            let radius = shown(stage.pulley_radius, "m");
+            let text =
+                format!("it goes {factor} what {other} says of the same {what}, with a pulley of {radius}: {next}");
+            note("unit", text, Remedy::Ratio(b, o, ratio))
+        }
     }
+}
+
+/// A factor that has a reason.
+enum Factor {
+    /// The gear ratio of the case, or its inverse.
+    Gear,
+    /// A power of ten.
+    Ten,
+}
+
+/// The reason for a measured ratio, if it is within [`NEARLY`] of one.
+fn usual_factor(ratio: f64, stage: &Machine) -> Option<Factor> {
+    let (size, gear) = (ratio.abs().ln().abs(), stage.drives[0].motor.gear_ratio.ln().abs());
+    let tens = size / 10f64.ln();
+    if gear > NEARLY && (size - gear).abs() < NEARLY {
+        return Some(Factor::Gear);
+    }
+    (tens.round() > 0.0 && (tens - tens.round()).abs() * 10f64.ln() < NEARLY).then_some(Factor::Ten)
 }
 
 /// The units that people confuse, and what a value is wrong by if they do.
@@ -277,7 +315,11 @@ fn confused(quantity: Quantity, ratio: f64) -> Option<&'static str> {
         _ => &[("rpm", 9.55), ("deg/s", 57.3), ("mrad/s", 1e3)],
     };
     let distance = |factor: f64| (ratio / factor).ln().abs();
-    units.iter().filter(|(_, f)| distance(*f) < 1.2).min_by(|a, b| distance(a.1).total_cmp(&distance(b.1))).map(|u| u.0)
+    units
+        .iter()
+        .filter(|(_, f)| distance(*f) < ROUGHLY)
+        .min_by(|a, b| distance(a.1).total_cmp(&distance(b.1)))
+        .map(|u| u.0)
 }
 
 /// The largest speed and acceleration, against what the machine of the case would do.
@@ -292,14 +334,29 @@ fn magnitude(log: &Log, stage: &Machine, motion: &Motion) -> Option<Note> {
     let (is, would) = (shown(motion.peak_speed, unit), shown(expected.speed / lever, unit));
     let times = if ratio > 1.0 { format!("{ratio:.0} times") } else { format!("1/{:.0} of", 1.0 / ratio) };
     let unit_meant = confused(motion.quantity, ratio);
-    let remedy = unit_meant.map(|meant| {
-        let factor = quantity::read(&format!("1 {meant}"), motion.quantity.unit()).unwrap_or(1.0 / ratio);
-        Remedy::Unit(motion.quantity, factor)
-    });
+    let gear = stage.drives[0].motor.gear_ratio;
+    let is_gear = unit == "rad/s" && gear != 1.0 && (ratio / gear).ln().abs() < ROUGHLY;
+    let factor = match unit_meant {
+        Some(meant) => Some(quantity::read(&format!("1 {meant}"), motion.quantity.unit()).unwrap_or(1.0 / ratio)),
+        None => is_gear.then_some(1.0 / gear),
+    };
+    let remedy = factor.map(|factor| Remedy::Unit(motion.quantity, factor));
+    let of_rotor = format!(
+        "the rotor's before the gear of {}? then set scale = {{ {name} = {} }}",
+        rounded(gear),
+        rounded(1.0 / gear)
+    );
     let next = match unit_meant {
+        Some(unit) if is_gear => {
+            format!("is the column in {unit}? then set units = {{ {name} = \"{unit}\" }}; or is it {of_rotor}")
+        }
         Some(unit) => format!("is the column in {unit}? then set units = {{ {name} = \"{unit}\" }}"),
+        None if is_gear => format!("is it {of_rotor}"),
         None if ratio < 1.0 => "are the times in ms or us, or the input in a larger unit? then set units".into(),
-        None => "check the units of the time, the input and this column".into(),
+        None => format!(
+            "is it about {} times too large? then set scale; or check the units of the time and the input",
+            rounded(10f64.powf(ratio.log10().round()))
+        ),
     };
     let text = format!(
         "it moves at up to {is}, {times} the {would} that the machine of the case would do with this input: {next}"

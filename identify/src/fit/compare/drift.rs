@@ -1,5 +1,9 @@
 //! Which single change of a machine explains logs that it does not meet: those of another day, after a repair, with
 //! another load.
+//!
+//! Numbers of one cause change together: friction in both directions of one surface, both pulleys of one make, the two
+//! constants of one motor. Each such pair is a change beside those of its members. Otherwise a smaller pulley may
+//! explain more than Coulomb friction in one direction where it fell in both.
 
 use crate::case::{Case, Nuisances, Plan, Scope};
 use crate::error::Result;
@@ -13,6 +17,7 @@ use crate::fit::trust::result::result;
 use crate::fit::trust::scores::{Together, together};
 use crate::fit::trust::uncertainty::Judged;
 use crate::log::Quantity;
+use crate::machine::Machine;
 use crate::parameter::{self, Free};
 use crate::solve::Flow;
 
@@ -21,8 +26,11 @@ use crate::solve::Flow;
 pub struct Drift {
     /// The errors of the machine as it is.
     pub unchanged: Vec<Together>,
-    /// Single changes, the one that explains most first.
+    /// Single changes: those that the logs do not tell from the one that explains most, in the order of [`Cause`]; then
+    /// the others, the one that explains most first.
     pub changes: Vec<Change>,
+    /// How many of them the logs do not tell from the one that explains most, itself included.
+    pub alike: usize,
     /// The effort.
     pub work: Work,
 }
@@ -44,15 +52,79 @@ impl Drift {
         self.unchanged.iter().filter(|one| !one.held_out).map(|one| one.quantity).collect()
     }
 
-    /// The changes that leave as little as the best one, the best among them.
+    /// The changes that leave as little as the best one, those of machines that wear first.
     pub fn best(&self) -> impl Iterator<Item = &Change> {
-        let least = self.changes.first().map_or(0.0, |change| change.left);
-        self.changes.iter().take_while(move |change| change.left <= least * (1.0 + CHANGE_ALIKE) + 1e-12)
+        self.changes.iter().take(self.alike)
+    }
+
+    fn new(unchanged: Vec<Together>, mut changes: Vec<Change>, work: Work) -> Self {
+        changes.sort_by(|a, b| a.left.total_cmp(&b.left));
+        let least = changes.first().map_or(0.0, |change| change.left);
+        let alike = changes.partition_point(|change| change.left <= least * (1.0 + CHANGE_ALIKE) + 1e-12);
+        // Of a pair and its members, the pair.
+        let members = |change: &Change| change.estimate.name.split(" = ").count();
+        changes[..alike].sort_by_key(|change| (Cause::of(&change.estimate.name), std::cmp::Reverse(members(change))));
+        Self { unchanged, changes, alike, work }
     }
 }
 
+/// What changes in a machine, the most likely first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Cause {
+    /// Friction: wear, grease, temperature, dirt.
+    Friction,
+    /// What is moved or hangs on it.
+    Load,
+    /// The belt: age, tension.
+    Belt,
+    /// The motor and what feeds it: temperature, supply.
+    Drive,
+    /// The wiring and timing of the input.
+    Input,
+    /// What does not change in use: radii, gear ratios, encoders.
+    Make,
+}
+
+impl Cause {
+    /// Of a change by its name: a key, several joined by ` = `, a sum, or a nuisance.
+    fn of(name: &str) -> Self {
+        let has = |words: &[&str]| words.iter().any(|word| name.contains(word));
+        match () {
+            () if has(&["radius", "gear_ratio", "teeth", "pitch", "encoder", "length"]) => Self::Make,
+            () if has(&["friction", "total.viscous", "total.coulomb", "efficiency"]) => Self::Friction,
+            () if has(&["mass", "inertia", "load"]) => Self::Load,
+            () if name.starts_with("belt.") => Self::Belt,
+            () if name.starts_with("motor.") => Self::Drive,
+            () if has(&["amplifier", "input", "delay"]) => Self::Input,
+            () => Self::Make,
+        }
+    }
+}
+
+/// Pairs that change together, as far as a machine has both and neither is zero.
+fn pairs(machine: &Machine) -> Vec<Vec<String>> {
+    let bodies = ["drive_pulley", "cart", "idler_pulley", "bridge"];
+    let kinds = ["viscous", "coulomb", "static"];
+    let sides = bodies.into_iter().flat_map(|body| {
+        kinds
+            .into_iter()
+            .map(move |kind| [format!("{body}.friction.{kind}"), format!("{body}.friction.{kind}_backward")])
+    });
+    let of_pulleys = ["inertia".to_string()].into_iter().chain(kinds.map(|kind| format!("friction.{kind}")));
+    let pulleys = of_pulleys.map(|number| ["drive_pulley", "idler_pulley"].map(|body| format!("{body}.{number}")));
+    let motor = ["motor.torque_constant", "motor.back_emf_constant"].map(String::from);
+    let is_there = |key: &String| parameter::value(machine, key).is_some_and(|value| value != 0.0);
+    // A direction that is not given by itself goes along with the other one.
+    let are_two = |[one, other]: &[String; 2]| {
+        let free = |key: &str| Free::new(machine, key, &[], &[]).ok();
+        free(one).zip(free(other)).is_some_and(|(one, other)| !one.overlaps(&other))
+    };
+    let all = sides.chain(pulleys).chain([motor]);
+    all.filter(|pair| pair.iter().all(is_there) && are_two(pair)).map(|pair| pair.to_vec()).collect()
+}
+
 /// Changes one parameter of the machine after the other, each by itself, to meet the logs of `case`: what `plan`
-/// searches for, whatever else may be off, and delay, gain and offset of the input.
+/// searches for, whatever else may be off, pairs that change together, and delay, gain and offset of the input.
 pub fn drift(case: &Case, plan: &Plan, stop: Option<Stop>, watch: &mut dyn FnMut(&str) -> Flow) -> Result<Drift> {
     let none = nothing(plan);
     let quiet = &mut |_: &[f64], _| Flow::Continue;
@@ -84,8 +156,7 @@ pub fn drift(case: &Case, plan: &Plan, stop: Option<Stop>, watch: &mut dyn FnMut
         let left = left(&unchanged, &errors);
         changes.push(Change { estimate, errors, left });
     }
-    changes.sort_by(|a, b| a.left.total_cmp(&b.left));
-    Ok(Drift { unchanged, changes, work })
+    Ok(Drift::new(unchanged, changes, work))
 }
 
 fn errors(found: &Searched) -> Vec<Together> {
@@ -112,8 +183,8 @@ fn singles(case: &Case, plan: &Plan, none: &Plan) -> Vec<Plan> {
     for key in plan.free.iter().cloned().chain(parameter::every(machine)).chain(["cart.load".to_string()]) {
         single(Plan { free: vec![key], ..none.clone() });
     }
-    for keys in &plan.tied {
-        single(Plan { tied: vec![keys.clone()], ..none.clone() });
+    for keys in plan.tied.iter().cloned().chain(pairs(machine)) {
+        single(Plan { tied: vec![keys], ..none.clone() });
     }
     for name in &plan.lumped {
         single(Plan { lumped: vec![name.clone()], ..none.clone() });

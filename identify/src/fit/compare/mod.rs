@@ -358,7 +358,7 @@ impl Course<'_> {
         let judged = settled.judged(&case, &plan);
         let found = settled.searched;
         self.work.add(&found.work);
-        let fit = told(&case, &plan, &found, judged.as_ref());
+        let (fit, _) = told(&case, &plan, &found, judged.as_ref());
         Ok(Comparison {
             chosen,
             by_training,

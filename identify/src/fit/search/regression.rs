@@ -12,13 +12,14 @@ use super::triangle::inverse_of_square;
 use crate::fit::asked::problem::Problem;
 use crate::fit::asked::run::{Run, is_position};
 use crate::fit::limits::{
-    LONGEST_DELAY, REGRESSION_BLOCK, REGRESSION_NOISE, REST_ROWS, SHORTEST_DELAY, SUSPECT_DELAY, WIDEST_IN_REGRESSION,
-    WIDTHS,
+    LONGEST_DELAY, LONGEST_SHIFT, REGRESSION_BLOCK, REGRESSION_NOISE, REST_ROWS, SHIFT_SHARE, SHIFT_STRIDE,
+    SHIFT_UNEXPLAINED, SHORTEST_DELAY, SUSPECT_DELAY, SUSPECT_SHIFT, WIDEST_IN_REGRESSION, WIDTHS,
 };
 use crate::log::Quantity;
 use crate::machine::{AmplifierMode, Machine};
 use crate::parameter::{Free, Sum, at_pulley, value};
 use nalgebra::{DMatrix, DVector};
+use std::ops::RangeInclusive;
 
 /// The balance of torques of a rigid axis, at the drive pulley.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -55,13 +56,36 @@ pub(crate) struct Smoothed<'a> {
     derivatives: Vec<[f64; 2]>,
 }
 
-/// A delay of the input with which less of the torque is left, s; none where none leaves markedly less.
+/// A delay of the input, of either sign, with which less of the torque is left, s; none where none leaves markedly
+/// less.
 pub(crate) fn suspected_delay(problem: &Problem) -> Option<f64> {
     let logs = smoothed(problem);
-    let left: Vec<f64> = (0..=LONGEST_DELAY).map_while(|late| Some(balance(&logs, late)?.unexplained)).collect();
-    let late = (0..left.len()).min_by(|&a, &b| left[a].total_cmp(&left[b]))?;
-    let is_suspect = late >= SHORTEST_DELAY && left[late] <= SUSPECT_DELAY * left[0];
-    is_suspect.then(|| late as f64 * problem.runs[0].interval())
+    let late = least_left(&logs, -LONGEST_DELAY..=LONGEST_DELAY, 1, SUSPECT_DELAY)?;
+    (late.abs() >= SHORTEST_DELAY).then(|| late as f64 * problem.runs[0].interval())
+}
+
+/// Rows by which the input of the log of this name is logged too early, beyond what a delay comes to; negative if too
+/// late. None where no shift leaves far less of the torque.
+pub(crate) fn suspected_shift(problem: &Problem, name: &str) -> Option<isize> {
+    let mut logs = smoothed(problem);
+    logs.retain(|log| log.run.name == name);
+    let rows = logs.iter().map(|log| log.run.time.len()).min()?;
+    if balance(&logs, 0)?.unexplained < SHIFT_UNEXPLAINED {
+        return None;
+    }
+    let most = LONGEST_SHIFT.min((SHIFT_SHARE * rows as f64) as isize);
+    let rough = least_left(&logs, -most..=most, SHIFT_STRIDE, SUSPECT_SHIFT)?;
+    let late = least_left(&logs, rough - SHIFT_STRIDE..=rough + SHIFT_STRIDE, 1, f64::INFINITY)?;
+    (late.abs() > LONGEST_DELAY).then_some(late)
+}
+
+/// The delay among these rows, so many apart, with which least of the torque is left; none where that is more than this
+/// part of what is left without.
+fn least_left(logs: &[Smoothed], rows: RangeInclusive<isize>, apart: isize, most: f64) -> Option<isize> {
+    let left = |late: isize| Some((late, balance(logs, late)?.unexplained));
+    let tried = rows.step_by(apart.unsigned_abs()).filter_map(left);
+    let (late, least) = tried.min_by(|a, b| a.1.total_cmp(&b.1))?;
+    (least <= most * left(0)?.1).then_some(late)
 }
 
 /// The logs of a problem that hold positions on an even raster, as [`balance`] wants them.
@@ -78,7 +102,7 @@ pub(crate) fn smoothed<'a>(problem: &'a Problem) -> Vec<Smoothed<'a>> {
 }
 
 /// The balance with the inputs so many rows later than logged.
-pub(crate) fn balance(logs: &[Smoothed], late: usize) -> Option<Balance> {
+pub(crate) fn balance(logs: &[Smoothed], late: isize) -> Option<Balance> {
     let mut rows: Vec<[f64; 5]> = Vec::new();
     for log in logs {
         log.add_to(late, &mut rows);
@@ -129,7 +153,7 @@ impl<'a> Smoothed<'a> {
     }
 
     /// Adds its equations: φ̈, φ̇, sgn φ̇, 1 and the torque.
-    fn add_to(&self, late: usize, rows: &mut Vec<[f64; 5]>) {
+    fn add_to(&self, late: isize, rows: &mut Vec<[f64; 5]>) {
         let Self { run, machine, .. } = self;
         let seen = &run.seen[self.output];
         let motor = &machine.drives[0].motor;
@@ -138,7 +162,7 @@ impl<'a> Smoothed<'a> {
         let mut block: Vec<[f64; 5]> = Vec::with_capacity(REGRESSION_BLOCK);
         for (k, &[speed, acceleration]) in self.derivatives.iter().enumerate() {
             let row = k + self.margin;
-            let given = amplifier.gain * run.logged[row.saturating_sub(late)];
+            let given = amplifier.gain * run.logged[row.saturating_add_signed(-late).min(run.logged.len() - 1)];
             let clipped = |value: f64, limit: Option<f64>| limit.map_or(value, |limit| value.clamp(-limit, limit));
             // τ_M = η n K_t i, i = (V − K_e n φ̇)/R
             let current = match amplifier.mode {

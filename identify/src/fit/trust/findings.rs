@@ -2,7 +2,9 @@
 
 use super::finding::{Finding, Grade};
 use super::found::Fit;
-use super::trials::{self, is_borne_out};
+use super::scores::LogFit;
+use super::trials::is_borne_out;
+use super::unexplained;
 use crate::case::{Case, Plan};
 use crate::fit::asked::controller::reproduced;
 use crate::fit::asked::problem::Problem;
@@ -14,19 +16,19 @@ use crate::fit::noise::Wave;
 use crate::fit::search::point::Ending;
 use crate::fit::search::regression::Balance;
 use crate::fit::search::starts::Searched;
-use crate::log::{Note, Remedy, Severity};
+use crate::log::{Note, Quantity, Remedy, Severity, Survey};
 use crate::machine::AmplifierMode;
 use crate::number::engineering;
 use crate::solve::Bench;
 
 /// All there is to say, warnings first.
-pub(crate) fn findings(case: &Case, plan: &Plan, found: &Searched, fit: &Fit) -> Vec<Finding> {
-    let mut all = of_logs(case, plan, found);
+pub(crate) fn findings(case: &Case, plan: &Plan, found: &Searched, fit: &Fit, surveys: &[Survey]) -> Vec<Finding> {
+    let mut all = of_logs(case, plan, found, surveys);
     all.extend(of_controller(case, plan));
     all.extend(of_cause(fit));
     all.extend(of_search(fit));
     all.extend(of_motor(case, fit));
-    all.extend(of_residuals(fit));
+    all.extend(of_residuals(case, plan, found, fit, &all));
     all.sort_by_key(|finding| std::cmp::Reverse(finding.grade));
     all
 }
@@ -36,9 +38,9 @@ fn finding(grade: Grade, code: &'static str, text: String) -> Finding {
 }
 
 /// The findings of the survey of each log, as far as simulation bears them out.
-fn of_logs(case: &Case, plan: &Plan, found: &Searched) -> Vec<Finding> {
+fn of_logs(case: &Case, plan: &Plan, found: &Searched, surveys: &[Survey]) -> Vec<Finding> {
     let mut all = Vec::new();
-    for survey in trials::surveys(case, plan, found) {
+    for survey in surveys {
         let name = &survey.log;
         for note in survey.notes.iter().filter(|note| note.severity != Severity::Fact) {
             let grade = grade(note, case, plan);
@@ -248,19 +250,32 @@ fn of_motor(case: &Case, fit: &Fit) -> Option<Finding> {
     Some(finding(Grade::Warning, "motor", text))
 }
 
-/// Logs that the model does not explain.
-fn of_residuals(fit: &Fit) -> Vec<Finding> {
+/// Logs that the model does not explain, with the reason, if windows or a factor are one.
+fn of_residuals(case: &Case, plan: &Plan, found: &Searched, fit: &Fit, others: &[Finding]) -> Vec<Finding> {
+    // A log that shows no motion is not explained by any model.
+    let is_known = |log: &LogFit| others.iter().any(|one| one.code == "still" && one.log.as_ref() == Some(&log.name));
+    let poor = |log: &LogFit, quantity: Quantity| {
+        let own = log.outputs.iter().find(|output| output.quantity == quantity);
+        own.and_then(|output| output.fitted).filter(|score| score.percent < POOR_FIT)
+    };
+    let logs: Vec<&LogFit> = fit.logs.iter().filter(|log| !log.held_out && !is_known(log)).collect();
     let mut all = Vec::new();
-    for log in fit.logs.iter().filter(|log| !log.held_out) {
-        for output in &log.outputs {
-            let Some(score) = output.fitted.filter(|score| score.percent < POOR_FIT) else { continue };
-            let text = format!(
-                "{}: the model explains only {:.0} % of it: check units, signs and columns of this log, and missing parts of the model",
-                output.quantity.name(),
-                score.percent.max(0.0)
-            );
-            all.push(Finding { grade: Grade::Warning, code: "unexplained", log: Some(log.name.clone()), text });
+    for quantity in found.problem.quantities() {
+        let own: Vec<_> = logs.iter().filter_map(|log| Some((log.name.as_str(), poor(log, quantity)?))).collect();
+        let names: Vec<&str> = own.iter().map(|(name, _)| *name).collect();
+        if names.is_empty() {
+            continue;
         }
+        let reason = unexplained::reason(case, plan, found, quantity, &names).unwrap_or_else(|| {
+            "neither windows nor a factor on it or on the input mends that: check signs, columns and units of this log, \
+             and missing parts of the model"
+                .into()
+        });
+        all.extend(own.into_iter().map(|(name, score)| {
+            let text =
+                format!("{}: the model explains only {:.0} % of it: {reason}", quantity.name(), score.percent.max(0.0));
+            Finding { grade: Grade::Warning, code: "unexplained", log: Some(name.to_string()), text }
+        }));
     }
     all
 }
@@ -276,7 +291,10 @@ impl Balance {
             left if left < 0.1 => "a rigid axis with viscous and Coulomb friction explains these logs",
             left if left < 0.3 => "a rigid axis with viscous and Coulomb friction explains most of these logs",
             left if left < 0.7 => "a rigid axis with viscous and Coulomb friction explains little of these logs",
-            _ => "it explains next to nothing: look at units, signs and columns first",
+            _ => {
+                "a rigid axis with viscous and Coulomb friction explains next to nothing of these logs: check columns and \
+                 times; a wrong unit would not matter to it"
+            }
         }
     }
 }

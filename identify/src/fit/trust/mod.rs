@@ -20,3 +20,4 @@ pub(crate) mod scores;
 pub(crate) mod sub_records;
 pub(crate) mod trials;
 pub(crate) mod uncertainty;
+pub(crate) mod unexplained;

@@ -132,6 +132,7 @@ pub(crate) fn proposals(found: &Searched, judged: &Judged) -> Vec<Proposal> {
     let Searched { problem, best, noise, .. } = found;
     // White noise that is as bad as what the residuals show.
     let deviation = judged.covariance.deviation * judged.inflation;
+    let unexplained = unexplained(problem, noise);
     let Some(now) = Identifiability::new(problem, &best.jacobian, &best.x, deviation) else { return Vec::new() };
     let score = |found: &Identifiability| {
         found.error.iter().map(|e| if e.is_finite() { e.clamp(1e-12, UNDETERMINED).ln() } else { 0.0 }).sum::<f64>()
@@ -140,7 +141,7 @@ pub(crate) fn proposals(found: &Searched, judged: &Judged) -> Vec<Proposal> {
     let before = (count(&now), score(&now));
     let mut proposals = Vec::new();
     for idea in IDEAS.iter().filter(|idea| !(idea.is_there)(problem)) {
-        let Some(all) = with_rows(problem, idea, &best.jacobian, &best.x, noise) else { continue };
+        let Some(all) = with_rows(problem, idea, &best.jacobian, &best.x, (noise, unexplained)) else { continue };
         let Some(found) = Identifiability::new(problem, &all, &best.x, deviation) else { continue };
         let told = told(&now, &found);
         if !told.is_empty() {
@@ -150,6 +151,25 @@ pub(crate) fn proposals(found: &Searched, judged: &Judged) -> Vec<Proposal> {
     proposals.retain(|p| p.determined > before.0 || p.score < before.1);
     proposals.sort_by(|a, b| b.determined.cmp(&a.determined).then(a.score.total_cmp(&b.score)));
     proposals
+}
+
+/// The least share of any measured signal that the residuals are: what the model does not explain of what is measured,
+/// it does not explain of another quantity either.
+fn unexplained(problem: &Problem, noise: &[(Quantity, f64)]) -> f64 {
+    let share = |(quantity, deviation): &(Quantity, f64)| {
+        let seen = problem.runs.iter().flat_map(|run| &run.seen).filter(|seen| seen.quantity == *quantity);
+        let spread = seen.map(|seen| spread(&seen.values)).fold(0.0, f64::max);
+        if spread > 0.0 { (deviation / spread).min(1.0) } else { 1.0 }
+    };
+    noise.iter().map(share).fold(1.0, f64::min)
+}
+
+/// Standard deviation of the values that are there.
+fn spread(values: &[f64]) -> f64 {
+    let there: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();
+    let n = there.len().max(1) as f64;
+    let mean = there.iter().sum::<f64>() / n;
+    (there.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / n).sqrt()
 }
 
 /// The gain of `found` over `now`.
@@ -180,9 +200,17 @@ fn with_rows(
     idea: &Idea,
     jacobian: &DMatrix<f64>,
     x: &[f64],
-    noise: &[(Quantity, f64)],
+    (noise, unexplained): (&[(Quantity, f64)], f64),
 ) -> Option<DMatrix<f64>> {
-    let measured = (idea.measured)(problem, noise);
+    let mut measured = (idea.measured)(problem, noise);
+    let is_new = |quantity: Quantity| !noise.iter().any(|(own, _)| *own == quantity);
+    for (quantity, deviation) in measured.iter_mut().filter(|(quantity, _)| is_new(*quantity)) {
+        let one = [(*quantity, 1.0)];
+        let signals: Option<Vec<Vec<f64>>> =
+            (0..problem.runs.len()).map(|index| answer(problem, idea, &one, index, x)).collect();
+        let signal = signals?.iter().map(|signal| spread(signal)).fold(0.0, f64::max);
+        *deviation = deviation.max(unexplained * signal);
+    }
     let (globals, before) = (problem.globals(), jacobian.ncols());
     let bounds = problem.bounds();
     let mut blocks: Vec<DMatrix<f64>> = Vec::new();

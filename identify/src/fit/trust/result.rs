@@ -4,19 +4,22 @@ use super::findings::findings;
 use super::found::{Estimate, Fit};
 use super::held_out::{Known, met};
 use super::scores::compared;
+use super::trials::surveys;
 use super::uncertainty::Judged;
 use crate::case::{Case, Plan};
 use crate::fit::asked::run::Nuisance;
 use crate::fit::noise::student::student;
 use crate::fit::search::starts::Searched;
 use crate::fit::search::triangle::inverse_of_square;
+use crate::log::Survey;
 use nalgebra::DVector;
 
-/// The result, and what is to be known of it.
-pub(crate) fn told(case: &Case, plan: &Plan, found: &Searched, judged: Option<&Judged>) -> Fit {
+/// The result with its findings, and the surveys of the logs.
+pub(crate) fn told(case: &Case, plan: &Plan, found: &Searched, judged: Option<&Judged>) -> (Fit, Vec<Survey>) {
     let mut fit = result(found, judged);
-    fit.findings = findings(case, plan, found, &fit);
-    fit
+    let surveys = surveys(case, plan, found);
+    fit.findings = findings(case, plan, found, &fit, &surveys);
+    (fit, surveys)
 }
 
 /// Everything that is told of a minimum.

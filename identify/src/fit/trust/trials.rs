@@ -10,8 +10,10 @@ use crate::fit::asked::problem::Problem;
 use crate::fit::limits::{HUBER, JUMP, MENDED, NO_WORSE, ROUGH_TOLERANCE, STAND_OUT, TRIAL_FIT_ITERATIONS, UNIT_WORSE};
 use crate::fit::search::least_squares::minimise;
 use crate::fit::search::point::{Ending, Minimum, Options};
+use crate::fit::search::regression::suspected_shift;
 use crate::fit::search::starts::Searched;
 use crate::log::{Log, Note, Quantity, Remedy, Severity, Survey, jumps_text};
+use crate::number::engineering_typed;
 use crate::solve::Flow;
 use std::sync::Arc;
 
@@ -26,9 +28,35 @@ pub(crate) fn surveys(case: &Case, plan: &Plan, found: &Searched) -> Vec<Survey>
             Some(remedy) if note.severity != Severity::Fact => is_borne_out(case, plan, found, &log.name, remedy),
             _ => true,
         });
+        survey.notes.splice(0..0, shift(case, plan, found, &log.name));
         survey
     };
     logs.map(tested).collect()
+}
+
+/// An input that is logged earlier or later than it acted, by more than a delay comes to.
+fn shift(case: &Case, plan: &Plan, found: &Searched, name: &str) -> Option<Note> {
+    if plan.closed_loop || found.problem.is_stopped() {
+        return None;
+    }
+    let rows = suspected_shift(&found.problem, name)?;
+    let remedy = Remedy::Shift(rows);
+    let run = found.problem.runs.iter().find(|run| run.name == name)?;
+    let by = engineering_typed(rows.unsigned_abs() as f64 * run.interval(), "s", 3);
+    let early = if rows > 0 { "early" } else { "late" };
+    let text = format!(
+        "it is logged {by} too {early}: the outputs answer it as if it stood {} rows {} in the file; record both with one \
+         clock, or shift the column",
+        rows.unsigned_abs(),
+        if rows > 0 { "further down" } else { "further up" }
+    );
+    is_borne_out(case, plan, found, name, &remedy).then_some(Note {
+        code: "shift",
+        severity: Severity::Suspicion,
+        column: Some("input"),
+        text,
+        remedy: Some(remedy),
+    })
 }
 
 /// Leaves out of a note on jumps those that are motion: the fitted model makes them too, as an axis does that slips
@@ -68,7 +96,7 @@ pub(crate) fn is_borne_out(case: &Case, plan: &Plan, found: &Searched, name: &st
         Remedy::Ratio(a, b, ratio) => vec![Remedy::Scale(*a, 1.0 / ratio), Remedy::Scale(*b, *ratio)],
         other => vec![other.clone()],
     };
-    let tried: Vec<Mended> = ways.iter().filter_map(|way| mended(case, plan, found, name, way)).collect();
+    let tried: Vec<Mended> = ways.iter().filter_map(|way| mended(case, plan, found, &[name], way)).collect();
     let before = found.problem.counted();
     let is_better = |one: &Mended| match remedy {
         Remedy::Unit(..) | Remedy::Leave(..) => one.left < most(before, one.counted),
@@ -77,10 +105,10 @@ pub(crate) fn is_borne_out(case: &Case, plan: &Plan, found: &Searched, name: &st
     tried.is_empty() || tried.iter().any(is_better)
 }
 
-/// How a log is met that was mended.
-struct Mended {
-    /// Cost of a value, as a part of that with the log as it is.
-    left: f64,
+/// How logs are met that were mended.
+pub(crate) struct Mended {
+    /// Cost of a value, as a part of that with the logs as they are.
+    pub left: f64,
     /// The least such part of any quantity.
     least: f64,
     /// How many values count.
@@ -104,10 +132,11 @@ fn squares(problem: &Problem, residuals: &[f64]) -> Vec<(Quantity, f64)> {
     problem.quantities().into_iter().map(of).collect()
 }
 
-/// How the logs are met with one that was mended; none where no model gets through.
-fn mended(case: &Case, plan: &Plan, found: &Searched, name: &str, remedy: &Remedy) -> Option<Mended> {
+/// How the logs are met with those of these names mended; none where no model gets through.
+pub(crate) fn mended(case: &Case, plan: &Plan, found: &Searched, names: &[&str], remedy: &Remedy) -> Option<Mended> {
+    let is_named = |name: &str| names.contains(&name);
     let mut own = case.clone();
-    for experiment in own.experiments.iter_mut().filter(|experiment| experiment.name == name) {
+    for experiment in own.experiments.iter_mut().filter(|experiment| is_named(&experiment.name)) {
         let log: &mut Log = Arc::make_mut(experiment.log.as_mut()?);
         remedy.apply(log);
     }
@@ -115,7 +144,7 @@ fn mended(case: &Case, plan: &Plan, found: &Searched, name: &str, remedy: &Remed
     problem.weigh_by(&found.noise);
     if let Remedy::Scale(quantity, factor) | Remedy::Unit(quantity, factor) = remedy {
         // Residuals in the unit that they had.
-        let runs = problem.runs.iter_mut().filter(|run| run.name == name);
+        let runs = problem.runs.iter_mut().filter(|run| is_named(&run.name));
         for seen in runs.flat_map(|run| &mut run.seen).filter(|seen| seen.quantity == *quantity) {
             seen.weights.iter_mut().for_each(|weight| *weight /= factor.abs());
         }

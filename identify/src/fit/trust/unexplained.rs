@@ -1,0 +1,123 @@
+//! Reasons why a model explains little of an output: windows and factors, each tried by a fit.
+
+use super::trials::mended;
+use crate::case::{Case, Plan};
+use crate::fit::asked::problem::Problem;
+use crate::fit::asked::residuals::Residuals;
+use crate::fit::asked::run::is_position;
+use crate::fit::limits::{
+    FACTOR_LEAVES, FACTORS, REFIT_TOLERANCE, TRIAL_FIT_ITERATIONS, UNEXPLAINED_WINDOWS, WINDOW_SAMPLES,
+    WINDOWS_EXPLAIN, WINDOWS_MOST,
+};
+use crate::fit::search::least_squares::minimise;
+use crate::fit::search::point::{Ending, Options};
+use crate::fit::search::starts::Searched;
+use crate::log::{Quantity, Remedy};
+use crate::number::engineering_typed;
+use crate::quantity::rounded;
+use crate::solve::Flow;
+
+/// The reason why the model explains little of an output in the logs of these names, with what to do; none where
+/// neither windows nor a factor mends it.
+pub(super) fn reason(case: &Case, plan: &Plan, found: &Searched, quantity: Quantity, names: &[&str]) -> Option<String> {
+    if found.problem.is_stopped() {
+        return None;
+    }
+    windows(case, plan, found, quantity).or_else(|| factor(case, plan, found, quantity, names))
+}
+
+/// Windows that the model explains.
+fn windows(case: &Case, plan: &Plan, found: &Searched, quantity: Quantity) -> Option<String> {
+    let runs = &found.problem.runs;
+    if plan.windows.is_some() || plan.closed_loop || plan.until.is_some() || !is_position(quantity) {
+        return None;
+    }
+    let lengths = runs.iter().filter_map(|run| Some((run.time.len(), *run.time.last()?)));
+    let (rows, longest) = lengths.max_by(|a, b| a.1.total_cmp(&b.1))?;
+    for parts in UNEXPLAINED_WINDOWS {
+        // To two digits, as it would stand in the file.
+        let unit = 10f64.powf((longest / parts).log10().floor() - 1.0);
+        let length = (longest / parts / unit).round() * unit;
+        if (rows as f64) < parts * WINDOW_SAMPLES {
+            break;
+        }
+        let windowed = Plan { windows: Some(length), starts: 1, ..plan.clone() };
+        let mut problem = Problem::new(case, &windowed).ok()?.stopped_by(found.problem.stop());
+        problem.swings = found.problem.swings;
+        problem.weigh_by(&found.noise);
+        let start = problem.start();
+        if start.len() * problem.rows() > WINDOWS_MOST {
+            break;
+        }
+        let options = Options {
+            iterations: TRIAL_FIT_ITERATIONS,
+            tolerance: REFIT_TOLERANCE,
+            evolutions: 0,
+            rounding: problem.rounding(),
+            ..Options::default()
+        };
+        let bounds = problem.bounds();
+        let best = minimise(&mut problem, &start, &bounds, &options, &mut |_, _| Flow::Continue);
+        if matches!(best.ending, Ending::Failed | Ending::Interrupted) || best.residuals.len() != problem.rows() {
+            return None;
+        }
+        let share = explained(&problem, &best.residuals, quantity);
+        if share >= WINDOWS_EXPLAIN {
+            let length = engineering_typed(length, "s", 2);
+            return Some(format!(
+                "in windows of {length} it explains {:.0} %, beyond a straight line in each: its errors add up along the \
+                 log, and units and columns are right; set windows = \"{length}\" in [fit]",
+                100.0 * share
+            ));
+        }
+    }
+    None
+}
+
+/// Share of a quantity that residuals leave explained, beyond a straight line in each run.
+///
+/// 1 − √(Σ e²/Σ l²), e the residuals of the model, and l those of the lines
+fn explained(problem: &Problem, residuals: &[f64], quantity: Quantity) -> f64 {
+    let (mut ours, mut lines) = (0.0, 0.0);
+    for (index, run) in problem.runs.iter().enumerate() {
+        let (first, n) = (problem.first_row(index), run.time.len());
+        for (output, seen) in run.seen.iter().enumerate().filter(|(_, seen)| seen.quantity == quantity) {
+            let counted: Vec<usize> = (0..n).filter(|&k| seen.weights[k] > 0.0 && seen.values[k].is_finite()).collect();
+            ours += counted.iter().map(|&k| (residuals[first + output * n + k] / seen.weights[k]).powi(2)).sum::<f64>();
+            let m = counted.len().max(1) as f64;
+            let mean = |of: &dyn Fn(usize) -> f64| counted.iter().map(|&k| of(k)).sum::<f64>() / m;
+            let (t, y) = (mean(&|k| run.time[k]), mean(&|k| seen.values[k]));
+            let tt = mean(&|k| (run.time[k] - t).powi(2)).max(f64::MIN_POSITIVE);
+            let slope = mean(&|k| (run.time[k] - t) * (seen.values[k] - y)) / tt;
+            lines += m * mean(&|k| (seen.values[k] - y - slope * (run.time[k] - t)).powi(2));
+        }
+    }
+    1.0 - (ours / lines.max(f64::MIN_POSITIVE)).sqrt()
+}
+
+/// A factor on the output or on the input with which the model explains the logs.
+fn factor(case: &Case, plan: &Plan, found: &Searched, quantity: Quantity, names: &[&str]) -> Option<String> {
+    let gear = found.problem.machine.drives[0].motor.gear_ratio;
+    let gears = [gear, 1.0 / gear].into_iter().filter(|_| gear != 1.0);
+    let factors: Vec<f64> = gears.chain(FACTORS).collect();
+    let outputs = factors.iter().map(|&factor| (quantity.name(), factor, Remedy::Scale(quantity, factor)));
+    let inputs = factors.iter().map(|&factor| ("input", factor, Remedy::Drive(factor)));
+    let tried = outputs
+        .chain(inputs)
+        .filter_map(|(column, factor, remedy)| Some((column, factor, mended(case, plan, found, names, &remedy)?.left)));
+    let (column, factor, left) = tried.min_by(|a, b| a.2.total_cmp(&b.2))?;
+    if left > FACTOR_LEAVES {
+        return None;
+    }
+    let what = match factor {
+        own if own == gear => ", the gear ratio,".to_string(),
+        own if own == 1.0 / gear => ", one over the gear ratio,".to_string(),
+        _ => String::new(),
+    };
+    let factor = rounded(factor);
+    Some(format!(
+        "with {column} times {factor}{what} {:.1} % of the squared residuals are left: set its unit, or \
+         scale = {{ {column} = {factor} }}",
+        100.0 * left
+    ))
+}
