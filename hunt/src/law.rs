@@ -113,6 +113,10 @@ pub struct Law {
     currents: Vec<Row>,
 }
 
+/// What an FMU for model exchange forgives a speed that falls to zero, 1e-9 rad/s or m/s, over the 2⁻⁴⁰ of its unit by
+/// which every condition falls later (docs/fmu.md).
+const FORGIVEN: f64 = 1e-9 * (1_u64 << 40) as f64;
+
 impl Change {
     /// The size along the belt of one SI unit of its condition: of 1 rad or rad/s it is the lever, of 1 N m its inverse.
     fn unit(self, machine: &Model, mode: &Mode) -> Double {
@@ -127,7 +131,7 @@ impl Change {
             Change::GearSign(drive) => Double::ONE / machine.lever[machine.drives[drive].body],
             Change::Gear(drive, then) => flank(machine.lever[machine.drives[drive].body], mode.gear[drive], then),
             Change::Stop(body, then) => flank(machine.lever[body], mode.stop[body], then),
-            Change::Turn(body) | Change::Rest(body) => machine.lever[body],
+            Change::Turn(body) | Change::Rest(body) => Double::from(1.0 + FORGIVEN) * machine.lever[body],
             Change::Break(body, _) => Double::ONE / machine.lever[body],
         }
     }
