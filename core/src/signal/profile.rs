@@ -283,6 +283,13 @@ impl<P: Clone> Leg<P> {
     }
 }
 
+/// Where a leg of a path begins and ends, m; of an arc its circle, and the limits along it.
+struct Course {
+    from: Vec<f64>,
+    to: Vec<f64>,
+    circle: Option<(Circle, Limits)>,
+}
+
 /// One coordinate of a leg.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Passage {
@@ -413,13 +420,13 @@ impl Profile {
             };
             gone += length;
             lengths.push(Leg::To(gone, limits));
-            courses.push((std::mem::replace(&mut position, to.clone()), to, circle));
+            courses.push(Course { from: std::mem::replace(&mut position, to.clone()), to, circle });
         }
         let whole = Self::new(0.0, &lengths)?;
         let of_coordinate = |k: usize| {
-            let passage = |(along, (from, to, circle)): (&Passage, &(Vec<f64>, Vec<f64>, Option<(Circle, Limits)>))| {
-                let (Passage { begin, stroke, .. }, from, to) = (along, from[k], to[k]);
-                let turn = circle.as_ref().map(|(circle, limits)| circle.coordinate(k, limits));
+            let passage = |(along, course): (&Passage, &Course)| {
+                let (Passage { begin, stroke, .. }, from, to) = (along, course.from[k], course.to[k]);
+                let turn = course.circle.as_ref().map(|(circle, limits)| circle.coordinate(k, limits));
                 let share = if stroke.distance > 0.0 { (to - from) / stroke.distance } else { 0.0 };
                 let stroke = if turn.is_some() { stroke.clone() } else { stroke.scaled(share, to - from) };
                 Passage { begin: *begin, from, to, turn, stroke }
