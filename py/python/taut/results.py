@@ -702,7 +702,7 @@ class Learned:
     @property
     def times(self) -> NDArray[np.float64]:
         """The times of :attr:`added` from the beginning of the move on, s."""
-        return np.arange(len(self.data["added"])) * float(self.data["every_s"])
+        return np.arange(len(self.data["added"]), dtype=np.float64) * np.float64(self.data["every_s"])
 
     def to_pandas(self) -> pandas.DataFrame:
         """A pandas.DataFrame of time, signal of the log and next one, error of the log and expected next one (m)."""
