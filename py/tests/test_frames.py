@@ -216,7 +216,7 @@ def test_learning_is_that_of_the_command_line(root, tmp_path):
     # A cart that lags behind by two milliseconds and a little more.
     every, until = 1e-3, 0.6
     times = [k * every for k in range(int(until / every) + 1)]
-    run = moving.move("short fast")["short fast"]
+    run = moving.move("short fast")
     lagging = [float(np.interp(max(t - 2e-3, 0.0), run["time"], run["cart_position"])) for t in times]
     log = tmp_path / "log.csv"
     log.write_text("time_s,cart_position_m\n" + "".join(f"{t!r},{x!r}\n" for t, x in zip(times, lagging)))
