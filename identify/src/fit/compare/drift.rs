@@ -26,8 +26,8 @@ use crate::solve::Flow;
 pub struct Drift {
     /// The errors of the machine as it is.
     pub unchanged: Vec<Together>,
-    /// Single changes: those that the logs do not tell from the one that explains most, in the order of [`Cause`]; then
-    /// the others, the one that explains most first.
+    /// Single changes: those that the logs do not tell from the one that explains most, in the order of what causes
+    /// them; then the others, the one that explains most first.
     pub changes: Vec<Change>,
     /// How many of them the logs do not tell from the one that explains most, itself included.
     pub alike: usize,
