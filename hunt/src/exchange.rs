@@ -12,13 +12,11 @@ use taut_fmu::instance::{Instance, Phase, Use};
 /// How far positions may be off, m.
 const ALLOWED: f64 = 1e-6;
 
-/// Relative to values, or to this share of nominal values where that is larger: motions of a tenth of a millimetre are
-/// as exact as those of a centimetre, whose events come as often.
+/// Relative to nominal values or values, whichever is larger.
 const TOLERANCE: f64 = 1e-11;
-const NOMINAL: f64 = 1e-2;
 
 /// The same for positions: their nominal value is 1 cm, m.
-pub(crate) const POSITIONS: f64 = 0.01 * NOMINAL * TOLERANCE;
+pub(crate) const POSITIONS: f64 = 0.01 * TOLERANCE;
 
 /// Rounding of a step as a multiple of that of a rate times its length.
 const ROUNDING: f64 = 16.0;
@@ -98,7 +96,7 @@ impl Importer<'_> {
         let other = self.rates(self.time, self.time, &rounded)?;
         let quantities = y.iter().zip(&self.nominals).zip(first.iter().zip(&other));
         let error = quantities.map(|((y, nominal), (f, other))| {
-            (TOLERANCE * y.abs().max(NOMINAL * nominal)).max(ROUNDING * h.abs() * (f - other).abs())
+            (TOLERANCE * nominal.max(y.abs())).max(ROUNDING * h.abs() * (f - other).abs())
         });
         Ok(error.collect())
     }

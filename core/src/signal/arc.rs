@@ -8,7 +8,7 @@
 //!
 //! φ being the angle at which it begins, less a quarter of a turn for the second coordinate.
 
-use super::profile::{Limits, Reference};
+use super::reference::{Limits, Reference};
 use crate::error::{Error, Result};
 use std::f64::consts::{FRAC_PI_2, TAU};
 

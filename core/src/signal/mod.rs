@@ -15,6 +15,7 @@ mod edges;
 pub mod gcode;
 mod prbs;
 pub mod profile;
+mod reference;
 mod smooth;
 #[cfg(test)]
 mod tests;

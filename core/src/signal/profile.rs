@@ -9,53 +9,8 @@
 //! and feedforward design for electromechanical motion systems", Control Engineering Practice 13, 2005).
 
 use super::arc::{Arc, Circle, Turn};
+pub use super::reference::{Limits, Reference};
 use crate::error::{Error, Result};
-
-/// Limits of a move. SI units; all above zero.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Limits {
-    /// Speed, m/s.
-    pub speed: f64,
-    /// Acceleration, m/s².
-    pub acceleration: f64,
-    /// Jerk, m/s³; without it the acceleration jumps.
-    pub jerk: Option<f64>,
-    /// Snap, m/s⁴; needs a jerk limit. Without it the jerk jumps.
-    pub snap: Option<f64>,
-}
-
-/// Reference position of the cart and its first four derivatives.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Reference<N = f64> {
-    /// y, m.
-    pub position: N,
-    /// y′, m/s.
-    pub speed: N,
-    /// y″, m/s².
-    pub acceleration: N,
-    /// y‴, m/s³; zero for a trapezoid, whose acceleration jumps.
-    pub jerk: N,
-    /// y⁗, m/s⁴; zero where the jerk jumps.
-    pub snap: N,
-}
-
-impl Reference {
-    /// At rest there.
-    pub fn at(position: f64) -> Self {
-        Self { position, ..Self::default() }
-    }
-
-    /// Itself and `weight` times another.
-    pub fn plus(self, weight: f64, other: Self) -> Self {
-        Self {
-            position: self.position + weight * other.position,
-            speed: self.speed + weight * other.speed,
-            acceleration: self.acceleration + weight * other.acceleration,
-            jerk: self.jerk + weight * other.jerk,
-            snap: self.snap + weight * other.snap,
-        }
-    }
-}
 
 /// A move from rest to rest over some distance.
 #[derive(Debug, Clone, PartialEq)]
