@@ -289,18 +289,21 @@ await test("a sweep of the page shows its progress and is stopped by its button"
 
 await test("all stops of the tour show their machine", async open => {
   const {page} = await open();
+  await page.click("#go-tour");
+  await page.waitForSelector("#tour-show");
   let stops = 0,
     isLast = false;
   for (; !isLast; stops++) {
-    await page.click("#go-tour");
-    await page.waitForSelector("#tour-show");
+    await quiet(page);
     isLast = await page.locator("#tour-next").isDisabled();
     await page.click("#tour-show");
-    await page.waitForFunction(() => window.studio.view !== "tour", null, {timeout: 15_000});
     await quiet(page);
-    const told = await page.evaluate(() => window.studio.mistake && window.studio.mistake.text);
-    expect(!told, `stop ${stops + 1}: ${told}`);
-    await page.click("#go-tour");
+    await page.waitForSelector(".tour-show .stage-box svg");
+    const {view, told, hasRun} = await page.evaluate(() => {
+      const {view, mistake, run} = window.studio;
+      return {view, told: mistake && mistake.text, hasRun: Boolean(run)};
+    });
+    expect(view === "tour" && hasRun && !told, `stop ${stops + 1}: ${view} ${told}`);
     if (!isLast) await page.click("#tour-next");
   }
   expect(stops >= 10, `${stops} stops`);
