@@ -47,7 +47,7 @@ fn repeated(case: &Case, truth: &Case, at: At, added: Option<&Added>) -> Trial {
     trial
 }
 
-/// What is learned in each of some repetitions.
+/// Signals learned in successive repetitions.
 fn learned(case: &Case, truth: &Case, at: At, repetitions: usize) -> Vec<Learned> {
     let mut all: Vec<Learned> = Vec::new();
     for _ in 0..repetitions {

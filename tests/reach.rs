@@ -1,4 +1,4 @@
-//! What a reference needs of a machine, and which of its limits that exceeds; feed-forward at rest.
+//! Needs of a reference, and the limits of the machine that they exceed; feed-forward at rest.
 
 use std::path::Path;
 use taut::case::Case;

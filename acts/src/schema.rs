@@ -5,7 +5,7 @@ use crate::message::{Reply, Request};
 use serde_json::json;
 use taut::error::Result;
 
-/// What `taut schema case` prints.
+/// The schema of case files, as `taut schema case` prints it.
 pub fn schema(_: &Request, _: &Context) -> Result<Reply> {
     Ok(Reply::of(json!({ "schema": taut::json::case_schema() })))
 }

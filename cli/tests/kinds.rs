@@ -26,7 +26,7 @@ const IN_LOOP: [&str; 2] = ["stages/h-frame/square.toml", "stages/core-xy/square
 /// An axis whose motor is told a position.
 const STEPPER: &str = "stages/stepper-axis/stepper-axis.toml";
 
-/// What takes a stepper; all else refuses it.
+/// Commands that take a stepper; all others refuse it.
 const WITH_STEPPER: [&str; 3] = ["show", "simulate", "sweep"];
 
 /// Of whatever does not.

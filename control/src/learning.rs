@@ -70,7 +70,7 @@ pub struct Trial {
     pub time: Vec<f64>,
     /// m.
     pub position: Vec<f64>,
-    /// What it is the position of.
+    /// The measured place.
     pub at: At,
 }
 
@@ -152,8 +152,7 @@ impl Learned {
 
     /// The next signal as something to add to a command.
     pub fn added(&self) -> Added {
-        let times = (0..self.next.len()).map(|k| k as f64 * self.every).collect();
-        Added { times, values: self.next.clone() }
+        Added::new(self.every, self.next.clone())
     }
 }
 
@@ -360,7 +359,7 @@ struct Rule {
     left: Vec<f64>,
 }
 
-/// What a trial leads to.
+/// The next signal, and the repetitions to come.
 struct Predictions {
     next: Vec<f64>,
     expected: Vec<f64>,

@@ -113,7 +113,7 @@ pub struct Law {
     currents: Vec<Row>,
 }
 
-/// What an FMU for model exchange forgives a speed that falls to zero, 1e-9 rad/s or m/s, over the 2⁻⁴⁰ of its unit by
+/// Tolerance of an FMU for model exchange for speeds at zero, 1e-9 rad/s or m/s, over the 2⁻⁴⁰ of its unit by
 /// which every condition falls later (docs/fmu.md).
 const FORGIVEN: f64 = 1e-9 * (1_u64 << 40) as f64;
 

@@ -356,8 +356,7 @@ impl Case {
             return Err(error.next("name the move of the log: move=\"...\"")).told(py);
         };
         let at = if encoder { At::Encoder } else { At::Cart };
-        let before =
-            added.map(|values| Added { times: (0..values.len()).map(|k| k as f64 * design.every).collect(), values });
+        let before = added.map(|values| Added::new(design.every, values));
         let trial = Trial { time, position, at };
         let interrupt = Interrupt::listen();
         let found = unlocked(py, || learn(case, motion, &trial, before.as_ref(), &|| interrupt.stop()));

@@ -138,3 +138,16 @@ export const value = (page, key) =>
 
 /** A parameter with its field and its slider. */
 export const row = (page, key) => page.locator(`.row[data-key="${key}"]`);
+
+/** At how many of three places an element is seen, top to bottom, and not what lies over it. */
+export const seen = (page, selector) =>
+  page
+    .locator(selector)
+    .first()
+    .evaluate(element => {
+      const {left, top, right, bottom} = element.getBoundingClientRect();
+      const shares = [0.1, 0.5, 0.9].map(share =>
+        document.elementFromPoint((left + right) / 2, top + share * (bottom - top)),
+      );
+      return shares.filter(at => at && (element.contains(at) || at.contains(element))).length;
+    });

@@ -5,7 +5,7 @@
 //
 // TAUT is the program; it is run in the folder of the project. Of tests with NAME in their names only these are done.
 import {readFileSync} from "node:fs";
-import {Harness, expect, quiet, row, settled, value} from "./harness.mjs";
+import {Harness, expect, quiet, row, seen, settled, value} from "./harness.mjs";
 
 const [program, taut, , only] = process.argv.slice(2);
 const TABLE4 = "stages/sollmann-jouaneh/table4.toml",
@@ -294,25 +294,14 @@ for (const [width, height, stage] of [
       (await value(page, "cart.mass")) > 0.1 && Math.abs((await top()) - before) < 1.5,
       `the slider went from ${before} to ${await top()}`,
     );
-    const seen = selector =>
-      page
-        .locator(selector)
-        .first()
-        .evaluate(element => {
-          const {left, top, right, bottom} = element.getBoundingClientRect();
-          const shares = [0.1, 0.5, 0.9].map(share =>
-            document.elementFromPoint((left + right) / 2, top + share * (bottom - top)),
-          );
-          return shares.filter(at => at && (element.contains(at) || at.contains(element))).length;
-        });
     for (const selector of [
       ".stage-box svg",
       "[data-panel=position] .area",
       '[data-key="cart.mass"] input[type=range]',
     ])
       expect(
-        (await seen(selector)) >= (selector.includes("area") ? 2 : 3),
-        `${selector} is seen at ${await seen(selector)} of 3 places`,
+        (await seen(page, selector)) >= (selector.includes("area") ? 2 : 3),
+        `${selector} is seen at ${await seen(page, selector)} of 3 places`,
       );
     expect(
       (await page.locator("[data-again]").evaluateAll(all => all.map(one => one.getAttribute("data-again")).join()))

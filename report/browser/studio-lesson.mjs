@@ -7,7 +7,7 @@
 // only these are done.
 import {mkdirSync, readFileSync} from "node:fs";
 import {join} from "node:path";
-import {Harness, expect, quiet, row, settled, value} from "./harness.mjs";
+import {Harness, expect, quiet, row, seen, settled, value} from "./harness.mjs";
 
 const [program, taut, shots, only] = process.argv.slice(2);
 mkdirSync(shots, {recursive: true});
@@ -33,19 +33,6 @@ async function dragTo(page, input, ratio) {
   await page.mouse.up();
   await quiet(page);
 }
-
-/** At how many of three places an element is seen, top to bottom, and not what lies over it. */
-const seen = (page, selector) =>
-  page
-    .locator(selector)
-    .first()
-    .evaluate(element => {
-      const {left, top, right, bottom} = element.getBoundingClientRect();
-      const shares = [0.1, 0.5, 0.9].map(share =>
-        document.elementFromPoint((left + right) / 2, top + share * (bottom - top)),
-      );
-      return shares.filter(at => at && (element.contains(at) || at.contains(element))).length;
-    });
 
 // ---- The tour
 

@@ -1,4 +1,4 @@
-//! What was learned of a repeated move: `taut learn --json`, `learn.json`.
+//! The learned signal of a repeated move: `taut learn --json`, `learn.json`.
 
 use super::number;
 use crate::case::{Case, Move};

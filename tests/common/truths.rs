@@ -45,7 +45,7 @@ every = "1 ms"
 free = ["cart.mass", "cart.friction.viscous", "cart.friction.coulomb"]
 "#;
 
-/// What the model lacks.
+/// The element that the model lacks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Truth {
     /// Nothing.

@@ -7,10 +7,10 @@ use crate::mechanism::State;
 use crate::quantity::show;
 use crate::signal::Signal;
 
-/// What a case of a stepper cannot have yet, and what is wanted in its place.
+/// Sections that a case of a stepper cannot have yet.
 const YET_TO_COME: [&str; 6] = ["measurement", "controller", "move", "tune", "fit", "uncertainty"];
 
-/// What is said where a motor that is commanded by voltage or current is wanted.
+/// The error where a motor that is commanded by voltage or current is needed: message, and sections to add.
 const NO_MOTOR: [&str; 3] = [
     "this needs a motor that is commanded by voltage or current, and the case describes a stepper",
     "[motor] and [amplifier]",

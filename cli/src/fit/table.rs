@@ -13,7 +13,7 @@ pub fn text(case: &Case, found: &Found, took: Duration) -> String {
     let fit = &found.fit;
     let mut text = format!("{}\n", bold(&case.title));
     let _ = writeln!(text, "{}", ending(fit));
-    for finding in findings(fit) {
+    for finding in findings(fit.findings.iter()) {
         let _ = writeln!(text, "{finding}");
     }
     if !fit.estimates.is_empty() {

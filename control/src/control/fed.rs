@@ -9,7 +9,7 @@ use crate::signal::profile::Reference;
 pub struct Fed<'a> {
     controller: Standard,
     signal: &'a Added,
-    /// What was added at the last sample, V or A.
+    /// Value added at the last sample, V or A.
     last: f64,
 }
 

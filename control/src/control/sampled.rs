@@ -109,6 +109,11 @@ pub struct Added {
 }
 
 impl Added {
+    /// Values every so often from time zero on, s.
+    pub fn new(every: f64, values: Vec<f64>) -> Self {
+        Self { times: (0..values.len()).map(|k| k as f64 * every).collect(), values }
+    }
+
     /// The value at `time`, and when the next one comes.
     pub(crate) fn at(&self, time: f64) -> (f64, f64) {
         let next = self.times.partition_point(|t| *t <= time);

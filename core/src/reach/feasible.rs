@@ -175,7 +175,7 @@ fn of_drive(machine: &Machine, limit: Option<f64>, drive: usize, profiles: &[Pro
     electrical.map(|short| Shortfall { words: format!("{name}: {}", short.words), ..short }).collect()
 }
 
-/// What one of several drives needs, the belts taken for rigid.
+/// Needs of one of several drives, with rigid belts.
 fn needs_of_drive(machine: &Machine, drive: usize, profiles: &[Profile], instants: usize) -> Vec<Need> {
     let all = FeedForward { model: FeedForwardModel::Rigid, ..FeedForward::NONE };
     let Some(forward) = Forward::of(all, machine, drive) else { return Vec::new() };

@@ -1,5 +1,4 @@
-//! What each drive of a machine with several has to do, from the references of all that slides, which have to be known
-//! together.
+//! Feed-forward of each drive of a machine with several, from the references of all sliding parts together.
 
 use super::compensation::direction;
 use crate::design::{FeedForward, FeedForwardModel};
@@ -13,7 +12,7 @@ pub struct Forward {
     settings: FeedForward,
     /// The drive with its pulley.
     pulley: Rigid,
-    /// What slides: its share of the drive's way, how far it goes per way of the drive, and itself.
+    /// Each sliding part: its share of the drive's travel, its travel per travel of the drive, and itself.
     slides: Vec<(f64, f64, Rigid)>,
 }
 

@@ -5,6 +5,7 @@ use super::feasible::{limits, loads, shortfalls};
 use super::resonance::{Drive, reaches, resonances};
 use crate::design::Design;
 use crate::error::{Error, Result};
+use crate::golden;
 use crate::machine::{BeltModel, Machine};
 use crate::signal::arc::Arc;
 use crate::signal::profile::{Leg, Limits, Passage, Profile};
@@ -251,18 +252,13 @@ impl Quickest<'_> {
         let best = (0..SPEEDS).min_by(|&a, &b| found[a].0.total_cmp(&found[b].0))?;
         let mut best_yet = (found[best].0, found[best].2);
         best_yet.1?;
-        let (mut low, mut high) = (grid((best + 1).min(SPEEDS - 1)), grid(best.saturating_sub(1)));
-        const GOLDEN: f64 = 0.618_033_988_749_895;
-        for _ in 0..NARROWED {
-            let inner = [high - GOLDEN * (high - low), low + GOLDEN * (high - low)];
-            let [a, b] = inner.map(duration);
-            for (time, limits) in [a, b] {
-                if time < best_yet.0 {
-                    best_yet = (time, limits);
-                }
+        golden::top([grid((best + 1).min(SPEEDS - 1)), grid(best.saturating_sub(1))], NARROWED, |speed| {
+            let (time, limits) = duration(speed);
+            if time < best_yet.0 {
+                best_yet = (time, limits);
             }
-            if a.0 <= b.0 { high = inner[1] } else { low = inner[0] }
-        }
+            -time
+        });
         let limits = best_yet.1?;
         // Where no stroke cruises, the largest speed of the longest.
         let profiles = way.within(&limits).ok()?;

@@ -10,7 +10,7 @@
 
 use super::reference::{Limits, Reference};
 use crate::error::{Error, Result};
-use std::f64::consts::{FRAC_PI_2, TAU};
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// An arc of a circle from where a path is.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -75,20 +75,13 @@ impl Arc {
             y.atan2(x)
         };
         let (begin, end) = (angle(from), angle(self.to));
-        // Above 0 and up to one turn.
-        let whole = |turn: f64| if turn <= 0.0 || length(chord) == 0.0 { turn + TAU } else { turn };
-        let turn = match (length(chord) == 0.0, self.clockwise) {
-            (true, clockwise) => {
-                if clockwise {
-                    -TAU
-                } else {
-                    TAU
-                }
-            }
-            (false, false) => whole((end - begin) % TAU),
-            (false, true) => -whole((begin - end) % TAU),
+        let sense = if self.clockwise { -1.0 } else { 1.0 };
+        let turn = match (sense * (end - begin)).rem_euclid(TAU) {
+            // To where it begins: a whole turn.
+            0.0 => TAU,
+            turn => turn,
         };
-        Ok(Circle { center, radius: length(away(from, center)), begin, turn })
+        Ok(Circle { center, radius: length(away(from, center)), begin, turn: sense * turn })
     }
 }
 
@@ -186,7 +179,7 @@ impl Turn {
         let [low, high] = [ends[0].min(ends[1]), ends[0].max(ends[1])];
         // True if the angle or a whole number of turns from it lies within.
         let passes = |angle: f64| angle + TAU * ((low - angle) / TAU).ceil() <= high;
-        let least = if passes(FRAC_PI_2 * 2.0) { -self.radius } else { values[0].min(values[1]) };
+        let least = if passes(PI) { -self.radius } else { values[0].min(values[1]) };
         let most = if passes(0.0) { self.radius } else { values[0].max(values[1]) };
         [self.center + least, self.center + most]
     }

@@ -56,7 +56,7 @@ struct State {
     position: Vec<f64>,
 }
 
-/// What a block without a code of motion does: the last one.
+/// Motion of a block, and of the blocks behind it that name none.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Motion {
     /// G0

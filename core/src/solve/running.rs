@@ -22,7 +22,7 @@ pub(super) trait Running {
     /// Takes up new inputs, now.
     fn set_input(&mut self, pieces: &Pieces);
 
-    /// What drives make of these inputs: a stepper's goes to the microstep that is nearest.
+    /// The inputs as drives apply them: that of a stepper goes to the nearest microstep.
     fn told(&self, pieces: Pieces) -> Pieces {
         pieces
     }

@@ -5,7 +5,7 @@ mod page;
 pub use page::page;
 
 use crate::fit::value;
-use taut::fit::{Balance, Check, Estimate};
+use taut::fit::{Balance, Check, Estimate, Finding};
 
 /// Each parameter with its standard error in words: that of the fit, and so what `taut fit` says.
 pub fn shares(found: &Check) -> impl Iterator<Item = (String, String)> {
@@ -49,11 +49,9 @@ pub fn surveys(found: &Check) -> String {
     text
 }
 
-/// What is to be known beside the surveys: of many logs their notes, too, those that many share once.
+/// Findings beside the surveys: of many logs their notes, too, those that many share once.
 pub fn findings(found: &Check) -> Vec<String> {
-    let mut fit = found.fit.clone();
-    if found.logs.len() <= MOST_WHOLE {
-        fit.findings.retain(|finding| finding.log.is_none() || finding.code == "unexplained");
-    }
-    crate::fit::findings(&fit)
+    let notes_too = found.logs.len() > MOST_WHOLE;
+    let is_told = |finding: &&Finding| notes_too || finding.log.is_none() || finding.code == "unexplained";
+    crate::fit::findings(found.fit.findings.iter().filter(is_told))
 }

@@ -19,7 +19,7 @@ pub fn page_with(case: &Case, found: &Found, text: &str, first: impl FnOnce(&mut
     page.section("How it ended");
     let kind = if fit.is_converged() { Callout::Holds } else { Callout::Fails };
     page.callout(kind, fit.ending_word().replace('_', " "), format!("{}.", told::ending(fit)));
-    for told in told::findings(fit) {
+    for told in told::findings(fit.findings.iter()) {
         let (grade, text) = told.split_once(": ").unwrap_or(("note", &told));
         let kind = if grade == Grade::Warning.word() { Callout::Fails } else { Callout::Note };
         page.callout(kind, grade, text.to_string());

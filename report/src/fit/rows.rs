@@ -2,19 +2,18 @@
 
 use super::plots;
 use std::fmt::Write;
-use taut::fit::{Ending, Estimate, Fit, LogFit, Profile, Score, Together, together};
+use taut::fit::{Ending, Estimate, Finding, Fit, LogFit, Profile, Score, Together, together};
 use taut::number;
 
 /// Findings of one kind in so many logs are told of the first.
 const MOST_ALIKE: usize = 3;
 
 /// Warnings and notes; of those that many logs share, the first and how many more.
-pub fn findings(fit: &Fit) -> Vec<String> {
+pub fn findings<'a>(all: impl Iterator<Item = &'a Finding> + Clone) -> Vec<String> {
     let mut told: Vec<String> = Vec::new();
     let mut codes: Vec<&str> = Vec::new();
-    for finding in &fit.findings {
-        let alike =
-            fit.findings.iter().filter(|other| (other.code, other.grade) == (finding.code, finding.grade)).count();
+    for finding in all.clone() {
+        let alike = all.clone().filter(|other| (other.code, other.grade) == (finding.code, finding.grade)).count();
         if alike <= MOST_ALIKE || finding.log.is_none() {
             told.push(finding.to_string());
         } else if !codes.contains(&finding.code) {

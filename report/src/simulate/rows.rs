@@ -169,7 +169,7 @@ pub fn lines(run: &Run, machine: &Machine, solver: Solver) -> Vec<(&'static str,
     lines
 }
 
-/// What a stepper lost on its way, and what error of position is left.
+/// Steps that a stepper lost, and the position error that remains.
 fn lost_steps(own: &OfStepper) -> String {
     let error = format!("position error {}", value(own.position_error, "m"));
     let Some(first) = own.first_slip else { return format!("none, {error}") };

@@ -40,7 +40,7 @@ pub(super) enum Source {
     },
     /// The torque of a stepper, N m.
     Torque(Phasing),
-    /// What is not linear of the rate of a phase current, by the number of the phase, A/s.
+    /// Nonlinear part of the rate of a phase current, by the number of the phase, A/s.
     Phase(usize, Phasing),
 }
 
@@ -357,7 +357,7 @@ impl Phasing {
         model.phased[self.phased].at + arguments[self.angle][i]
     }
 
-    /// What is not linear of the rate of a phase current at a node, A/s.
+    /// Nonlinear part of the rate of a phase current at a node, A/s.
     #[inline(always)]
     fn rate(&self, model: &Model, phase: usize, arguments: &[Lane], i: usize) -> PhaseRate {
         let [speed, current, told] = [self.speed, self.currents[phase], self.told].map(|number| arguments[number][i]);

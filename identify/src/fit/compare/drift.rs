@@ -68,12 +68,12 @@ impl Drift {
     }
 }
 
-/// What changes in a machine, the most likely first.
+/// Causes of a change in a machine, the most likely first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Cause {
     /// Friction: wear, grease, temperature, dirt.
     Friction,
-    /// What is moved or hangs on it.
+    /// Load: moved masses, and forces on the cart.
     Load,
     /// The belt: age, tension.
     Belt,
@@ -81,7 +81,7 @@ enum Cause {
     Drive,
     /// The wiring and timing of the input.
     Input,
-    /// What does not change in use: radii, gear ratios, encoders.
+    /// Make, which does not change in use: radii, gear ratios, encoders.
     Make,
 }
 
