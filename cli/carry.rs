@@ -8,47 +8,40 @@ use std::process::Command;
 
 /// Writes `carried.rs`: the shared object, or none, and the licences of what is in it.
 ///
-/// It is built where the program is built to be used: in release profiles, with the feature `fmu`, from the whole
-/// repository. A program that is being worked on takes the one that lies beside it, so that it is not compiled twice.
-/// Cargo holds its lock on the folder of this build while this runs, so the object has a folder of its own.
+/// It is built where the program is built to be used: in release profiles, with the feature `fmu`. The source is that
+/// of the package `taut-fmu`, which this package depends on, in a repository or unpacked. A program that is being worked
+/// on takes the object that lies beside it, so that it is not compiled twice. Cargo holds its lock on the folder of this
+/// build while this runs, so the object has a folder of its own.
 pub fn carry() {
     let out = PathBuf::from(env::var_os("OUT_DIR").unwrap_or_default());
-    let source = Path::new("../fmu/Cargo.toml");
-    let wanted = env::var_os("CARGO_FEATURE_FMU").is_some() && env::var("PROFILE").is_ok_and(|name| name == "release");
+    // Said by its build script; there with the feature `fmu`.
+    let folder = env::var_os("DEP_TAUT_FMU_FOLDER").map(PathBuf::from);
+    let released = env::var("PROFILE").is_ok_and(|name| name == "release");
     let mut text = String::new();
-    if wanted && source.is_file() {
-        for path in [
-            "../case",
-            "../control",
-            "../core",
-            "../export",
-            "../fmu/src",
-            "../fmu/Cargo.toml",
-            "../Cargo.toml",
-            "../Cargo.lock",
-            "../cli/carry.rs",
-        ] {
-            println!("cargo::rerun-if-changed={path}");
+    if let Some(folder) = folder.filter(|_| released) {
+        let beside = ["../case", "../control", "../core", "../export", "../Cargo.toml", "../Cargo.lock", "../cli/carry.rs"];
+        let all = beside.iter().map(|path| folder.join(path)).filter(|path| path.exists());
+        for path in all.chain([folder.join("src"), folder.join("Cargo.toml")]) {
+            println!("cargo::rerun-if-changed={}", path.display());
         }
+        let source = &folder.join("Cargo.toml");
         let object = build(source, &out.join("fmu"));
         let _ = writeln!(text, "pub const CARRIED: Option<&[u8]> = Some(include_bytes!({object:?}));");
         let notices = out.join("notices.txt");
         std::fs::write(&notices, self::notices(source)).expect("the folder of the build can be written to");
         let _ = writeln!(text, "pub const NOTICES: &str = include_str!({notices:?});");
     } else {
-        if wanted {
-            println!("cargo::warning=this is not the whole repository: the program will carry no object for FMUs");
-        }
         text.push_str("pub const CARRIED: Option<&[u8]> = None;\npub const NOTICES: &str = \"\";\n");
     }
     std::fs::write(out.join("carried.rs"), text).expect("the folder of the build can be written to");
 }
 
-/// Builds the shared object into a folder of its own; its path.
+/// Builds the shared object into a folder of its own; its path. It unwinds: a panic within a call ends there and is the
+/// standard's "fatal", where an abort would take the importer along.
 fn build(source: &Path, folder: &Path) -> PathBuf {
     let target = env::var("TARGET").unwrap_or_default();
     let mut command = cargo("build");
-    command.args(["--lib", "--profile", "fmu", "--target", &target]).arg("--manifest-path").arg(source);
+    command.args(["--lib", "--release", "--config", "profile.release.strip=true", "--target", &target]).arg("--manifest-path").arg(source);
     command.arg("--target-dir").arg(folder);
     command.env("CARGO_ENCODED_RUSTFLAGS", without_paths().join("\u{1f}"));
     let done = command.output().expect("cargo can be started");
@@ -60,7 +53,7 @@ fn build(source: &Path, folder: &Path) -> PathBuf {
         Ok("macos") => ("lib", ".dylib"),
         _ => ("lib", ".so"),
     };
-    let object = folder.join(&target).join("fmu").join(format!("{prefix}taut_fmu{suffix}"));
+    let object = folder.join(&target).join("release").join(format!("{prefix}taut_fmu{suffix}"));
     assert!(object.is_file(), "cargo left no {}: this target has no shared objects", object.display());
     object
 }

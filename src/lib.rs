@@ -55,7 +55,7 @@
 //! - [`sweep`]: many runs with parameters varied.
 //! - [`tune`]: gains of a controller, good for the worst axis that parameters, loads and places can make.
 //! - [`planning`]: the fastest moves. [`learning`]: the next feed-forward signal of a repeated move.
-//! - [`export`]: machines and controllers as texts for other tools.
+//! - [`export`]: machines and controllers as texts for other tools. [`stages`]: machines to begin with.
 //! - `json`: results as data (feature `json`).
 //!
 //! # Features
@@ -67,6 +67,7 @@
 pub mod json;
 pub mod overview;
 pub mod reduction;
+pub mod stages;
 pub mod sweep;
 
 pub use taut_case::{case, files, log};

@@ -14,6 +14,7 @@ use taut::design::Design;
 use taut::error::{Error, Result};
 use taut::machine::{DriveAt, Machine};
 use taut::solve::Solver;
+use taut::stages;
 use taut::trajectory::Trajectory;
 use taut::tune::{Family, Loops, Margins, Verdict, loops, trouble, tune};
 use taut_report::motion::{Done, Tried};
@@ -22,30 +23,16 @@ use taut_report::tune::{Work, figures, page};
 /// Time between two steps of progress, s.
 const STEPS: f64 = 0.1;
 
-/// Controllers to begin with, from the bundled cases.
-const CONTROLLERS: &[(&str, &str)] = bundled!["sollmann-jouaneh/controllers/";
-    "pid.toml",
-    "pid-rigid.toml",
-    "pid-elastic.toml",
-    "pid-observer.toml",
-    "cascade.toml",
-    "cascade-current.toml",
-    "lqi.toml",
-    "lqg.toml",
-    "sliding.toml",
-    "fuzzy-pd.toml",
-    "fuzzy-pi.toml",
-];
-
 /// The controllers to begin with: name, and the table `[controller]` on one line, in SI units; and the moves of their
 /// case.
 pub fn controllers(_: &Request, _: &Context) -> Result<Reply> {
-    let one = |(path, text): &(&str, &str)| {
+    let one = |(path, text): (&str, &str)| {
         let case = Case::from_text(path, text)?;
         let told = |key: &str| case.value(key).map(|given| written(&given));
         Ok(json!({ "name": case.title, "file": path, "controller": told("controller")?, "moves": told("move")? }))
     };
-    Ok(Reply::of(json!({ "controllers": CONTROLLERS.iter().map(one).collect::<Result<Vec<_>>>()? })))
+    let all = stages::inside("sollmann-jouaneh/controllers").map(one).collect::<Result<Vec<_>>>()?;
+    Ok(Reply::of(json!({ "controllers": all })))
 }
 
 /// A value of a case on one line.

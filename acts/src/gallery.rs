@@ -5,10 +5,11 @@ use crate::message::{Reply, Request};
 use crate::scene::scene;
 use serde_json::{Value, json};
 use taut::case::Case;
-use taut::error::Result;
+use taut::error::{Error, Result};
+use taut::stages;
 
 /// Their case files, none of which names another file.
-const STAGES: &[(&str, &str)] = bundled!["";
+const GALLERY: &[&str] = &[
     "sollmann-jouaneh/table4.toml",
     "sollmann-jouaneh/table1.toml",
     "sollmann-jouaneh/table2.toml",
@@ -27,10 +28,11 @@ const STAGES: &[(&str, &str)] = bundled!["";
 
 /// All of them: path, title, text, and what their pictures need.
 pub fn gallery(_: &Request, _: &Context) -> Result<Reply> {
-    let one = |(path, text): &(&str, &str)| {
+    let one = |path: &&str| {
+        let text = stages::text(path).ok_or_else(|| Error::new("this stage is not bundled").in_file(path))?;
         let case = Case::from_text_with(path, text, &[])?;
         Ok(json!({ "path": path, "title": case.title.as_str(), "text": text, "scene": scene(&case) }))
     };
-    let stages = STAGES.iter().map(one).collect::<Result<Vec<Value>>>()?;
+    let stages = GALLERY.iter().map(one).collect::<Result<Vec<Value>>>()?;
     Ok(Reply::of(json!({ "stages": stages })))
 }

@@ -2,13 +2,6 @@
 //!
 //! They need no server: a [`Host`] provides what depends on the surroundings of the page, such as saving a file.
 
-/// Names and texts of bundled case files in a folder of `stages`.
-macro_rules! bundled {
-    ($folder:literal; $($path:literal),* $(,)?) => {
-        &[$(($path, include_str!(concat!("../../stages/", $folder, $path)))),*]
-    };
-}
-
 mod case;
 mod closed;
 mod curves;

@@ -11,7 +11,6 @@ mod both;
 pub mod fmi2;
 pub mod fmi3;
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
-#[path = "../../cli/hypot.rs"]
 mod hypot;
 pub mod instance;
 mod saved;

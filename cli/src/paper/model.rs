@@ -1,12 +1,13 @@
 //! The paper's parameter sets, its pulses, and what it plots of a run: position and speed of the motor in metres.
 
 use taut::case::{Case, Experiment};
-use taut::error::Result;
+use taut::error::{Error, Result};
 use taut::friction::{Friction, Motion, Side};
 use taut::machine::Machine;
 use taut::mechanism::State;
 use taut::signal::Signal;
 use taut::solve::{Event, Solver, simulate};
+use taut::stages;
 
 /// Length of the pulses, s (section 3).
 pub const PULSE: f64 = 0.25;
@@ -33,11 +34,14 @@ pub struct Sets {
 impl Sets {
     /// Reads the files that are part of the program.
     pub fn read() -> Result<Self> {
-        let case = |name: &str, text: &str| Case::from_text(name, text);
+        let case = |name: &str| {
+            let text = stages::text(&format!("sollmann-jouaneh/{name}"));
+            Case::from_text(name, text.ok_or_else(|| Error::new("this stage is not bundled").in_file(name))?)
+        };
         Ok(Self {
-            table1: case("table1.toml", include_str!("../../../stages/sollmann-jouaneh/table1.toml"))?,
-            table2: case("table2.toml", include_str!("../../../stages/sollmann-jouaneh/table2.toml"))?,
-            table4: case("table4.toml", include_str!("../../../stages/sollmann-jouaneh/table4.toml"))?,
+            table1: case("table1.toml")?,
+            table2: case("table2.toml")?,
+            table4: case("table4.toml")?,
         })
     }
 }

@@ -3,7 +3,7 @@
 //! Nobody observes the motion, which takes a third of the time. What is between samples is missing: a peak by about
 //! (ω T)²/8 of itself at a frequency ω and a sample time T, 1e-3 at 14 Hz and 1 kHz.
 
-use super::figures::{Deviation, DriveFigures, Figures, LoadFigures};
+use super::figures::{Deviation, DriveFigures, Figures, LoadFigures, is_made};
 use super::outcome::{at_rest, each, unrecorded};
 use super::sampled::Loop;
 use super::standard::Standard;
@@ -128,7 +128,10 @@ impl<'a> Gathered<'a> {
 
     fn finish(self) -> Figures {
         let end = self.last.unwrap_or_default();
-        let is_inside = end >= self.done && self.slides.iter().all(|slide| slide.away <= self.window);
+        let inside = |slide: &OfSlide| {
+            slide.away <= self.window && is_made(slide.profile, self.window, slide.peak.value)
+        };
+        let is_inside = end >= self.done && self.slides.iter().all(inside);
         let entered = self.slides.iter().filter_map(|slide| slide.entered).reduce(f64::max);
         let load = |slide: &OfSlide| LoadFigures {
             error: Deviation { peak: slide.peak, rms: slide.squared.root(end), last: slide.error },

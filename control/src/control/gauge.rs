@@ -1,7 +1,7 @@
 //! The observer that gathers the figures of a move.
 
 use super::contour::{Contour, ContourGauge};
-use super::figures::{DriveFigures, Figures, LoadFigures};
+use super::figures::{DriveFigures, Figures, LoadFigures, is_made};
 use super::quadrature::{at_places, integral, larger, product, shifted, slope, square};
 use super::sampled::SLIDES;
 use crate::case::Experiment;
@@ -267,7 +267,9 @@ impl<'a> Gauge<'a> {
             load.peak_speed = peak.unwrap_or(load.peak_speed);
         }
         let left = self.loads.iter().filter_map(|load| load.outside).reduce(f64::max);
-        let is_outside = self.loads.iter().any(|load| load.is_outside);
+        let made = |(load, profile): (&LoadGauge, &Profile)| is_made(profile, self.window, load.seen.error.peak.value);
+        let is_outside =
+            self.loads.iter().any(|load| load.is_outside) || !self.loads.iter().zip(self.profiles).all(made);
         let figures = Figures {
             settling: match left {
                 _ if self.end < end || is_outside => None,

@@ -526,6 +526,12 @@ impl Profile {
         self.start
     }
 
+    /// The largest distance from its start on its passages, m; 0 of a sampled one.
+    pub fn excursion(&self) -> f64 {
+        let away = |passage: &Passage| passage.extremes().map(|place| (place - self.start()).abs());
+        self.passages.iter().flat_map(away).fold(0.0, f64::max)
+    }
+
     /// End position, m.
     pub fn target(&self) -> f64 {
         let sampled = self.samples.last().map(|(_, reference)| reference.position);

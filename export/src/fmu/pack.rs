@@ -8,8 +8,8 @@ use crate::{Exported, Part, controller, shaper_note};
 use std::fmt::Write;
 use std::path::PathBuf;
 
-const MIT: &str = include_str!("../../../LICENSE-MIT");
-const APACHE: &str = include_str!("../../../LICENSE-APACHE");
+const MIT: &str = include_str!("../../LICENSE-MIT");
+const APACHE: &str = include_str!("../../LICENSE-APACHE");
 
 /// The parts of an FMU that its case does not give.
 #[derive(Debug, Clone, Copy)]
