@@ -2,6 +2,8 @@
 
 #[path = "carry.rs"]
 mod carry;
+#[path = "notices.rs"]
+mod notices;
 #[path = "wrap.rs"]
 mod wrap;
 

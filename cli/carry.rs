@@ -28,7 +28,10 @@ pub fn carry() {
         let object = build(source, &out.join("fmu"));
         let _ = writeln!(text, "pub const CARRIED: Option<&[u8]> = Some(include_bytes!({object:?}));");
         let notices = out.join("notices.txt");
-        std::fs::write(&notices, self::notices(source)).expect("the folder of the build can be written to");
+        let mut tree = cargo("tree");
+        tree.args(["--offline", "--manifest-path"]).arg(source);
+        let opening = "The shared object contains these packages of others, under these licences.";
+        std::fs::write(&notices, super::notices::notices(tree, opening)).expect("the folder of the build can be written to");
         let _ = writeln!(text, "pub const NOTICES: &str = include_str!({notices:?});");
     } else {
         text.push_str("pub const CARRIED: Option<&[u8]> = None;\npub const NOTICES: &str = \"\";\n");
@@ -86,57 +89,4 @@ fn cargo(command: &str) -> Command {
         }
     }
     cargo
-}
-
-/// The packages in the shared object with their licences, and the texts of these as far as they can be found.
-fn notices(source: &Path) -> String {
-    let mut command = cargo("tree");
-    command.args(["--offline", "--edges", "normal", "--prefix", "none", "--format", "{p}|{l}"]);
-    command.arg("--manifest-path").arg(source);
-    let listed = command.output().ok().filter(|done| done.status.success()).map(|done| done.stdout);
-    let listed = String::from_utf8(listed.unwrap_or_default()).unwrap_or_default();
-    // "name v1.2.3 (proc-macro)|MIT": those of this repository have a path instead.
-    let mut packages: Vec<(String, String, String)> = Vec::new();
-    for line in listed.lines() {
-        let (package, licence) = line.split_once('|').unwrap_or((line, ""));
-        let mut words = package.split(' ');
-        let (Some(name), Some(version)) = (words.next(), words.next()) else { continue };
-        if name.starts_with("taut-") {
-            continue;
-        }
-        let licence = licence.trim_end_matches(" (*)").to_string();
-        packages.push((name.to_string(), version.trim_start_matches('v').to_string(), licence));
-    }
-    packages.sort();
-    packages.dedup();
-    let mut text = String::from("The shared object contains these packages of others, under these licences.\n");
-    for (name, version, licence) in &packages {
-        let _ = write!(text, "\n{}\n{name} {version}: {licence}\n", "=".repeat(72));
-        for file in licence_files(name, version) {
-            if let Ok(content) = std::fs::read_to_string(&file) {
-                let _ = write!(text, "\n{}\n\n{}\n", file.file_name().unwrap_or_default().to_string_lossy(), content);
-            }
-        }
-    }
-    text
-}
-
-/// Texts of the licence of a package, in cargo's own folder.
-fn licence_files(name: &str, version: &str) -> Vec<PathBuf> {
-    let home = env::var_os("CARGO_HOME").map(PathBuf::from);
-    let home = home.or_else(|| Some(PathBuf::from(env::var_os("HOME")?).join(".cargo")));
-    let entries = |path: PathBuf| std::fs::read_dir(path).into_iter().flatten().flatten().map(|entry| entry.path());
-    let mut files: Vec<PathBuf> = home
-        .into_iter()
-        .flat_map(|home| entries(home.join("registry/src")))
-        .flat_map(|registry| entries(registry.join(format!("{name}-{version}"))))
-        .filter(|path| {
-            let name = path.file_name().unwrap_or_default().to_string_lossy().to_uppercase();
-            // Apache's text is beside this one already.
-            let is_licence = name.starts_with("LICEN") || name.starts_with("COPYING") || name.starts_with("NOTICE");
-            path.is_file() && is_licence && !name.contains("APACHE")
-        })
-        .collect();
-    files.sort();
-    files
 }

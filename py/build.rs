@@ -2,6 +2,8 @@
 
 #[path = "../cli/carry.rs"]
 mod carry;
+#[path = "../cli/notices.rs"]
+mod notices;
 #[path = "../cli/wrap.rs"]
 mod wrap;
 

@@ -10,7 +10,7 @@ mod links;
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::Command;
 
 pub const USAGE: &str = "cargo xtask book [--program TAUT]";
 
@@ -25,7 +25,7 @@ pub fn run(words: &[&str]) -> Result<(), String> {
         ["--program", program] => PathBuf::from(program),
         _ => return Err(format!("usage: {USAGE}")),
     };
-    let mdbook = mdbook(&target)?;
+    let mdbook = installed("mdbook", VERSION, &["--no-default-features", "--features", "search"])?;
     let folder = target.join("book");
     let _ = fs::remove_dir_all(&folder);
     let pages = folder.join("docs");
@@ -61,24 +61,21 @@ fn built(target: &Path) -> Result<PathBuf, String> {
     }
 }
 
-/// Path of mdBook in the wanted version, which is installed first where it is missing.
-fn mdbook(target: &Path) -> Result<PathBuf, String> {
-    let root = target.join("mdbook");
-    let program = root.join("bin").join(format!("mdbook{}", std::env::consts::EXE_SUFFIX));
-    let version = || {
-        let output = Command::new(&program).arg("--version").stderr(Stdio::null()).output().ok()?;
-        Some(String::from_utf8_lossy(&output.stdout).trim().trim_start_matches("mdbook v").to_string())
-    };
-    if version().as_deref() == Some(VERSION) {
+/// A program of cargo's registry, in this version, under `target`; it is installed first, with `features`, unless it is
+/// there.
+pub fn installed(name: &str, version: &str, features: &[&str]) -> Result<PathBuf, String> {
+    let root = crate::python::target().join(name);
+    let program = root.join("bin").join(format!("{name}{}", std::env::consts::EXE_SUFFIX));
+    let mark = root.join("version.txt");
+    if fs::read_to_string(&mark).is_ok_and(|there| there == version) && program.is_file() {
         return Ok(program);
     }
-    println!("installing mdbook {VERSION} under {}", root.display());
-    let mut install = crate::cargo(&["install", "--locked", "--force", "--version", VERSION, "mdbook"]);
-    install.args(["--no-default-features", "--features", "search"]).arg("--root").arg(&root);
-    install.arg("--target-dir").arg(root.join("build"));
+    println!("installing {name} {version} under {}", root.display());
+    let mut install = crate::cargo(&["install", "--locked", "--force", "--version", version, name]);
+    install.args(features).arg("--root").arg(&root).arg("--target-dir").arg(root.join("build"));
     match install.status() {
-        Ok(status) if status.success() && version().as_deref() == Some(VERSION) => Ok(program),
-        Ok(_) => Err(format!("mdbook {VERSION} could not be installed under {}", root.display())),
+        Ok(status) if status.success() => write(&mark, version).map(|()| program),
+        Ok(_) => Err(format!("{name} {version} could not be installed under {}", root.display())),
         Err(error) => Err(format!("cargo cannot be started: {error}")),
     }
 }

@@ -1,7 +1,7 @@
 //! The project's own chores: `cargo xtask test` checks all that can be checked, `cargo xtask python` the Python package
 //! alone, `cargo xtask browser` the reports alone, `cargo xtask export` exported machines in their tools alone,
 //! `cargo xtask data` fetches other people's measurements, `cargo xtask bad` writes the wrong inputs of `tests/bad` as
-//! whole files, `cargo xtask dist` builds the program that is handed out,
+//! whole files, `cargo xtask package` builds all that a release consists of and tries it,
 //! `cargo xtask hunt` looks for what is wrong with larger means, `cargo xtask coverage` and `cargo xtask faults` make
 //! the tables of docs/fit.md, `cargo xtask counts` counts the instructions of standard works, `cargo xtask fmu` calls the
 //! functions of FMI at random under address sanitizer, `cargo xtask drag`, `cargo xtask load` and `cargo xtask first-fit`
@@ -13,11 +13,11 @@ mod book;
 mod browser;
 mod counts;
 mod data;
-mod dist;
 mod export;
 mod fmu;
 mod hunt;
 mod ignored;
+mod package;
 mod python;
 mod studio;
 mod web;
@@ -100,7 +100,7 @@ fn main() -> ExitCode {
         ["bad"] => bad::run(),
         ["book", ref words @ ..] => book::run(words),
         ["data", ref words @ ..] => data::run(words),
-        ["dist", ref words @ ..] => dist::run(words),
+        ["package", ref words @ ..] => package::run(words),
         ["web", ref words @ ..] => web::run(words),
         ["counts", ref words @ ..] => counts::run(words),
         ["fmu", ref words @ ..] => fmu::run(words),
@@ -122,7 +122,7 @@ fn main() -> ExitCode {
                  cargo xtask python | cargo xtask coverage [...] | cargo xtask faults [...] | \
                  {} | {} | {} | {} | {} | {} | {} | {} | {} | {}",
                 book::USAGE,
-                dist::USAGE,
+                package::USAGE,
                 web::USAGE,
                 counts::USAGE,
                 studio::FIRST_FIT,

@@ -13,7 +13,7 @@ const OLDEST: (u32, u32) = (3, 10);
 
 /// Builds, installs, checks types, tests. False where a program says no.
 pub fn test(counts: &mut Counts) -> Result<bool, String> {
-    let environment = environment()?;
+    let environment = environment("python", REQUIREMENTS)?;
     let python = program(&environment, "python");
     let target = target();
     let wheels = target.join("wheels");
@@ -46,10 +46,10 @@ pub fn test(counts: &mut Counts) -> Result<bool, String> {
     Ok(true)
 }
 
-/// The environment with everything that is required in it.
-fn environment() -> Result<PathBuf, String> {
-    let folder = target().join("python");
-    let wanted = std::fs::read_to_string(REQUIREMENTS).map_err(|e| format!("{REQUIREMENTS} cannot be read: {e}"))?;
+/// The environment of this name with everything in it that a file of requirements names.
+pub fn environment(name: &str, requirements: &str) -> Result<PathBuf, String> {
+    let folder = target().join(name);
+    let wanted = std::fs::read_to_string(requirements).map_err(|e| format!("{requirements} cannot be read: {e}"))?;
     let installed = folder.join("installed.txt");
     if std::fs::read_to_string(&installed).is_ok_and(|there| there == wanted) {
         return Ok(folder);
@@ -58,7 +58,7 @@ fn environment() -> Result<PathBuf, String> {
     let mut make = Command::new(python);
     make.args(["-m", "venv", "--clear"]).arg(&folder);
     let mut install = Command::new(program(&folder, "python"));
-    install.args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--requirement", REQUIREMENTS]);
+    install.args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--requirement", requirements]);
     for command in [make, install] {
         if !crate::run(command, &mut Counts::default())? {
             return Err(format!(
@@ -72,7 +72,7 @@ fn environment() -> Result<PathBuf, String> {
 }
 
 /// A Python that is new enough.
-fn interpreter() -> Result<&'static str, String> {
+pub fn interpreter() -> Result<&'static str, String> {
     let version = format!("import sys; sys.exit(sys.version_info < {OLDEST:?})");
     let answers = |name: &&str| {
         let answer = Command::new(name).args(["-c", &version]).stdout(Stdio::null()).stderr(Stdio::null()).status();

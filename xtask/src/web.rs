@@ -5,7 +5,7 @@
 //! Debian's compiler for browsers and the source of the library are unpacked under `target/web`, without being
 //! installed.
 
-use crate::{browser, dist, python};
+use crate::{browser, package, python};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -69,7 +69,7 @@ fn module(compiler: &Compiler) -> Result<PathBuf, String> {
     let mut build = crate::cargo(&["build", "--locked", "--profile", "web", "--package", "taut-web", "--lib"]);
     build.args(["--target", TARGET, "--target-dir"]).arg(&target);
     // Paths of the machine that builds it do not belong in a published file.
-    build.env("CARGO_ENCODED_RUSTFLAGS", dist::flags()?.join("\u{1f}"));
+    build.env("CARGO_ENCODED_RUSTFLAGS", package::flags()?.join("\u{1f}"));
     if let Compiler::Debian(root) = compiler {
         build.args(["-Z", "build-std=std,panic_abort"]).env("RUSTC_BOOTSTRAP", "1");
         build.env("RUSTC", root.join("usr/bin/rustc")).env("LD_LIBRARY_PATH", libraries(root)?);

@@ -1,0 +1,69 @@
+//! Crates, packed as they would be published, and installed from their packages.
+
+use super::{Places, hash, must, output, write};
+use serde_json::{Value, json};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// Packs the crates and installs the program from the packages. Returns the program.
+pub fn make(places: &Places) -> Result<PathBuf, String> {
+    println!("== crates");
+    let (published, others) = members()?;
+    let mut pack = crate::cargo(&["package", "--workspace", "--no-verify", "--allow-dirty", "--quiet"]);
+    for name in &others {
+        pack.args(["--exclude", name]);
+    }
+    must(pack)?;
+    let packed = crate::python::target().join("package");
+    let registry = places.work.join("registry");
+    let _ = fs::remove_dir_all(&registry);
+    // All that the workspace needs of others, and our own crates beside it.
+    let mut vendor = crate::cargo(&["vendor", "--locked", "--versioned-dirs", "--quiet"]);
+    vendor.arg(&registry);
+    output(vendor)?;
+    for (name, version) in &published {
+        let file = format!("{name}-{version}.crate");
+        let bytes = fs::read(packed.join(&file)).map_err(|e| format!("{file}: {e}"))?;
+        let mut unpack = Command::new("tar");
+        unpack.arg("-xzf").arg(packed.join(&file)).arg("-C").arg(&registry);
+        must(unpack)?;
+        let sums = json!({ "files": {}, "package": hash(&bytes) });
+        write(&registry.join(format!("{name}-{version}/.cargo-checksum.json")), sums.to_string())?;
+        write(&places.out.join(&file), &bytes)?;
+    }
+    install(places, &registry, &published)
+}
+
+/// Members of the workspace that are published, with their versions, and names of the others.
+fn members() -> Result<(Vec<(String, String)>, Vec<String>), String> {
+    let listed = output(crate::cargo(&["metadata", "--no-deps", "--format-version", "1"]))?;
+    let listed: Value = serde_json::from_slice(&listed).map_err(|e| format!("cargo metadata: {e}"))?;
+    let (mut published, mut others) = (Vec::new(), Vec::new());
+    for package in listed["packages"].as_array().into_iter().flatten() {
+        let text = |key: &str| package[key].as_str().unwrap_or_default().to_string();
+        match package["publish"].is_null() {
+            true => published.push((text("name"), text("version"))),
+            false => others.push(text("name")),
+        }
+    }
+    Ok((published, others))
+}
+
+/// `cargo install` from that registry, with a home of its own and in a folder without a configuration.
+fn install(places: &Places, registry: &Path, published: &[(String, String)]) -> Result<PathBuf, String> {
+    let (home, root) = (places.work.join("home"), places.work.join("installed"));
+    let _ = fs::remove_dir_all(&root);
+    let config = format!(
+        "[source.crates-io]\nreplace-with = \"packed\"\n\n[source.packed]\ndirectory = {:?}\n\n[net]\noffline = true\n",
+        registry.display().to_string()
+    );
+    write(&home.join("config.toml"), config)?;
+    let program = "taut-cli";
+    let version = published.iter().find(|(name, _)| name == program).map(|(_, version)| version.as_str());
+    let mut install = crate::cargo(&["install", program, "--locked", "--version", version.unwrap_or_default()]);
+    install.arg("--root").arg(&root).current_dir(&home).env("CARGO_HOME", &home);
+    install.env("CARGO_TARGET_DIR", places.work.join("crates")).env_remove("CARGO_ENCODED_RUSTFLAGS");
+    must(install)?;
+    Ok(root.join("bin").join(format!("taut{}", std::env::consts::EXE_SUFFIX)))
+}
