@@ -7,6 +7,7 @@
 
 mod generated;
 mod links;
+mod studio;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -19,20 +20,34 @@ const VERSION: &str = "0.5.4";
 
 /// Builds the book and checks its links.
 pub fn run(words: &[&str]) -> Result<(), String> {
-    let target = crate::python::target();
     let program = match words {
-        [] => built(&target)?,
-        ["--program", program] => PathBuf::from(program),
+        [] => built(&crate::python::target())?,
+        ["--program", program] => std::path::absolute(program).map_err(|error| format!("{program}: {error}"))?,
         _ => return Err(format!("usage: {USAGE}")),
     };
+    let html = make(&program, false)?;
+    println!("the book begins at {}", html.join("index.html").display());
+    Ok(())
+}
+
+/// Builds the book for a folder of the studio, in which its examples can be opened; its folder.
+pub fn beside_studio() -> Result<PathBuf, String> {
+    make(&built(&crate::python::target())?, true)
+}
+
+fn make(program: &Path, has_studio: bool) -> Result<PathBuf, String> {
     let mdbook = installed("mdbook", VERSION, &["--no-default-features", "--features", "search"])?;
-    let folder = target.join("book");
+    let folder = crate::python::target().join("book");
     let _ = fs::remove_dir_all(&folder);
     let pages = folder.join("docs");
     copy(Path::new("docs"), &pages)?;
     write(&folder.join("book.toml"), &read(Path::new("book.toml"))?)?;
+    let mut examples = studio::Links::new(program);
     for page in files(&pages)?.iter().filter(|path| path.extension().is_some_and(|e| e == "md")) {
-        let text = generated::filled(&read(page)?, &program)?;
+        let mut text = generated::filled(&read(page)?, program)?;
+        if has_studio {
+            text = examples.below(&text)?;
+        }
         write(page, &links::within(&text, &pages)?)?;
     }
     let html = folder.join("html");
@@ -46,8 +61,8 @@ pub fn run(words: &[&str]) -> Result<(), String> {
     if !broken.is_empty() {
         return Err(format!("broken links:\n{}", broken.join("\n")));
     }
-    println!("{checked} links lead somewhere; the book begins at {}", html.join("index.html").display());
-    Ok(())
+    println!("{checked} links lead somewhere");
+    Ok(html)
 }
 
 /// Path of the program `taut`, which is built first.
@@ -106,7 +121,7 @@ fn files(folder: &Path) -> Result<Vec<PathBuf>, String> {
 }
 
 /// Copies a folder with everything in it.
-fn copy(from: &Path, to: &Path) -> Result<(), String> {
+pub fn copy(from: &Path, to: &Path) -> Result<(), String> {
     for path in files(from)? {
         let name = path.strip_prefix(from).map_err(|error| error.to_string())?;
         copy_file(&path, &to.join(name))?;

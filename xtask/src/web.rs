@@ -1,11 +1,11 @@
 //! `cargo xtask web`: the studio as a folder of files for any server of static files, with its commands as a
-//! WebAssembly module.
+//! WebAssembly module, and the book in `book`, whose examples open in the studio.
 //!
 //! Compiling the module requires the standard library for `wasm32-unknown-unknown`. If rustup cannot provide it,
 //! Debian's compiler for browsers and the source of the library are unpacked under `target/web`, without being
 //! installed.
 
-use crate::{browser, package, python};
+use crate::{book, browser, package, python};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -38,6 +38,7 @@ pub fn run(words: &[&str]) -> Result<(), String> {
     };
     let compiler = compiler().map_err(|needs| format!("the module needs {needs}"))?;
     let bytes = make(&folder, &compiler)?;
+    book::copy(&book::beside_studio()?, &folder.join("book"))?;
     println!("{}: serve it by any server of static files; {MODULE} has {bytes} bytes", folder.display());
     Ok(())
 }

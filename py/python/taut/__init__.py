@@ -11,6 +11,7 @@ Mistakes are :class:`taut.Error`, a ``ValueError`` with the text that the comman
 """
 
 from ._native import Bug, Error, Observation, __version__
+from . import types
 from .case import Case, export, read, show, template
 from .results import Check, Comparison, Designed, Drift, Estimate, Fit, FitLog, FrequencyResponses, Learned, LinearModel, Modes, Plans, Shown, Tuned
 from .runs import Run, Runs
@@ -49,4 +50,5 @@ __all__ = [
     "sweep",
     "sweep_tables",
     "template",
+    "types",
 ]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, overload
+from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeAlias, overload
 
 from . import _checks, _html, _native
 from ._logs import write_log
@@ -18,6 +18,8 @@ from .table import Table
 
 if TYPE_CHECKING:
     from distributed import Client
+
+    from .types import Criterion, Hold, Method, Part, Real, Solver, SweepDesign, Target
 
 
 class Controller(Protocol):
@@ -136,29 +138,29 @@ class Case:
         self,
         experiment: str,
         *,
-        solver: str | None = None,
+        solver: Solver | None = None,
         tolerance: float | None = None,
         step: float | None = None,
-        method: str | None = None,
+        method: Method | None = None,
     ) -> Run: ...
     @overload
     def simulate(
         self,
         experiment: list[str] | tuple[str, ...] | None = None,
         *,
-        solver: str | None = None,
+        solver: Solver | None = None,
         tolerance: float | None = None,
         step: float | None = None,
-        method: str | None = None,
+        method: Method | None = None,
     ) -> Runs: ...
     def simulate(
         self,
         experiment: str | list[str] | tuple[str, ...] | None = None,
         *,
-        solver: str | None = None,
+        solver: Solver | None = None,
         tolerance: float | None = None,
         step: float | None = None,
-        method: str | None = None,
+        method: Method | None = None,
     ) -> Run | Runs:
         """Runs one experiment by its name, several, or all.
 
@@ -216,7 +218,7 @@ class Case:
         names: Sequence[str] | None = None,
         *,
         inputs: Sequence[str] | None = None,
-        criterion: str = "d",
+        criterion: Criterion = "d",
         duration: float = 4.0,
         every: float | None = None,
         margin: float = 0.1,
@@ -375,7 +377,7 @@ class Case:
         speed: float | None = None,
         stuck: Sequence[str] = (),
         sample_time: float | None = None,
-        hold: str = "zero",
+        hold: Hold = "zero",
         delay: float = 0.0,
         lowest: float | None = None,
         highest: float | None = None,
@@ -457,7 +459,7 @@ class Case:
         n: int | None = None,
         *,
         vary: Mapping[str, Any] | None = None,
-        design: str | None = None,
+        design: SweepDesign | None = None,
         seed: int | None = None,
         indices: bool = False,
         interval: str | float | None = None,
@@ -518,13 +520,13 @@ def show(case: Case | str | PathLike[str]) -> Shown:
 
 def export(
     case: Case | str | PathLike[str],
-    target: str,
+    target: Target,
     out: str | PathLike[str],
     *,
-    part: str | None = None,
-    real: str = "double",
+    part: Part | None = None,
+    real: Real = "double",
     step: float | None = None,
-    fmi: int = 3,
+    fmi: Literal[2, 3] = 3,
 ) -> list[Path]:
     """Writes a case, or a case file, for another tool, as ``taut export`` does, and returns the files.
 

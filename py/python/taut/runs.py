@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from os import PathLike
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any, cast, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     import pandas
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from .types import Event, Metrics
 
 
 class _Kept:
@@ -87,18 +89,16 @@ class Run(Table):
         return list(self._native.decided_within_rounding)
 
     @property
-    def metrics(self) -> dict[str, Any]:
+    def metrics(self) -> Metrics:
         """The key figures, as ``taut simulate --json`` has them, of a move also those of ``taut move --json``; keys say
         their units."""
-        figures: dict[str, Any] = self._native.figures()
-        return figures
+        return cast("Metrics", self._native.figures())
 
     @property
-    def events(self) -> list[dict[str, Any]]:
+    def events(self) -> list[Event]:
         """Every stick, slip and reversal: ``time_s``, ``part``, ``from``, ``to``, ``load``, ``load_unit``,
         ``by_rounding``."""
-        events: list[dict[str, Any]] = self._native.events()
-        return events
+        return cast("list[Event]", self._native.events())
 
     @property
     def took(self) -> float:

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from .types import Firmware
+
 
 @dataclass(frozen=True)
 class Shape:
@@ -83,7 +85,7 @@ def shape(
     files: str | PathLike[str] | Sequence[str | PathLike[str]],
     *,
     together: bool = False,
-    firmware: str = "klipper",
+    firmware: Firmware = "klipper",
     axis: str | None = None,
     damping: float | str | None = None,
     max_smoothing: float | None = None,

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     import pyarrow
     from distributed import Client
 
+    from .types import SweepDesign
+
     from .case import Case
 
 SECONDS_OF_A_TASK = 2.0
@@ -32,7 +34,7 @@ def sweep(
     n: int | None = None,
     *,
     vary: Mapping[str, Any] | None = None,
-    design: str | None = None,
+    design: SweepDesign | None = None,
     seed: int | None = None,
     indices: bool = False,
     interval: str | float | None = None,
@@ -72,7 +74,7 @@ def sweep_tables(
     n: int | None = None,
     *,
     vary: Mapping[str, Any] | None = None,
-    design: str | None = None,
+    design: SweepDesign | None = None,
     seed: int | None = None,
     indices: bool = False,
     interval: str | float | None = None,
@@ -119,7 +121,7 @@ def _planned(
     case: Case,
     n: int | None,
     vary: Mapping[str, Any] | None,
-    design: str | None,
+    design: SweepDesign | None,
     seed: int | None,
     indices: bool,
     interval: str | float | None,

@@ -47,6 +47,9 @@ pub fn check(html: &Path) -> Result<(usize, Vec<String>), String> {
             if link.is_empty() || link.contains("://") || link.starts_with("mailto:") || link.starts_with("data:") {
                 continue;
             }
+            if link.starts_with(super::studio::PAGE) {
+                continue; // beside the book
+            }
             checked += 1;
             let (file, anchor) = link.split_once('#').unwrap_or((link, ""));
             let to = match file {

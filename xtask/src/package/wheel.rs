@@ -7,8 +7,8 @@ use std::process::Command;
 
 /// Simulates the case that `taut init` writes, and prints where the cart ends.
 const SCRIPT: &str = "import sys, taut
-case = taut.load(sys.argv[1])
-print(repr(float(case.simulate().metrics['final_cart_position_m'])))
+case = taut.read(sys.argv[1])
+print(repr(case.simulate()[0].metrics['final_cart_position_m']))
 taut.export(case, 'fmu', sys.argv[2])
 ";
 

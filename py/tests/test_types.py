@@ -1,0 +1,102 @@
+"""Types of dictionaries and words: they have to be those that come out and are taken."""
+
+from __future__ import annotations
+
+import re
+import types as python_types
+from typing import Any, get_args, get_origin, get_type_hints, is_typeddict
+
+import pytest
+
+import taut
+from conftest import ROOT
+
+STAGE = f"{ROOT}/stages/sollmann-jouaneh"
+
+
+def fits(value: Any, hint: Any) -> bool:
+    """Whether a value is of a type as annotations have it."""
+    if is_typeddict(hint):
+        hints = get_type_hints(hint)
+        known = isinstance(value, dict) and all(key in hints and fits(one, hints[key]) for key, one in value.items())
+        return known and hint.__required_keys__ <= set(value)
+    origin, arguments = get_origin(hint), get_args(hint)
+    if origin is list:
+        return isinstance(value, list) and all(fits(one, arguments[0]) for one in value)
+    if origin is dict:
+        return isinstance(value, dict) and all(fits(one, arguments[1]) for one in value.values())
+    if origin is python_types.UnionType:
+        return any(fits(value, one) for one in arguments)
+    if hint is float:
+        return isinstance(value, (float, int)) and not isinstance(value, bool)
+    return type(value) is hint
+
+
+RUNS = {
+    "axis": lambda: taut.read(f"{STAGE}/table4.toml").simulate(),
+    "a move": lambda: taut.read(f"{STAGE}/controllers/pid.toml").move(),
+    "gantry": lambda: taut.read(f"{ROOT}/stages/core-xy/core-xy.toml").simulate(),
+    "H-frame": lambda: taut.read(f"{ROOT}/stages/h-frame/h-frame.toml").simulate(),
+    "a path": lambda: taut.read(f"{ROOT}/stages/core-xy/square.toml").move(),
+}
+
+
+@pytest.mark.parametrize("kind", RUNS)
+def test_figures_and_events_have_their_types(kind):
+    hints = get_type_hints(taut.types.Metrics)
+    for run in RUNS[kind]():
+        for key, value in run.metrics.items():
+            assert key in hints, f"{kind}: {key} is not in Metrics"
+            assert fits(value, hints[key]), f"{kind}: {key} is {value}, of {hints[key]}"
+        for event in run.events:
+            assert fits(event, taut.types.Event), f"{kind}: {event}"
+
+
+def test_what_does_not_fit_is_found():
+    assert not fits({"value": 1.0}, taut.types.Peak)
+    assert not fits({"value": 1.0, "time_s": "now"}, taut.types.Peak)
+    assert not fits({"value": 1.0, "time_s": 0.0, "more": 1.0}, taut.types.Peak)
+
+
+CASE = taut.Case(taut.template())
+WORDS = [
+    (taut.types.Solver, lambda word: CASE.simulate(solver=word)),
+    (taut.types.Method, lambda word: CASE.simulate(solver="table3", step=1e-4, method=word)),
+    (taut.types.Hold, lambda word: CASE.modes(sample_time=1e-3, hold=word)),
+    (taut.types.Criterion, lambda word: CASE.design(criterion=word)),
+    (taut.types.SweepDesign, lambda word: taut.sweep(CASE, design=word)),
+    (taut.types.Target, lambda word: taut.export(CASE, word, "nowhere")),
+    (taut.types.Part, lambda word: taut.export(CASE, "c", "nowhere", part=word)),
+    (taut.types.Real, lambda word: taut.export(CASE, "c", "nowhere", real=word)),
+    (taut.types.Firmware, lambda word: taut.shape("nowhere.csv", firmware=word)),
+]
+
+
+@pytest.mark.parametrize(("words", "call"), WORDS)
+def test_a_word_that_is_not_allowed_is_answered_with_those_that_are(words, call):
+    with pytest.raises(ValueError) as told:
+        call("nonsense")
+    text = str(told.value).replace("nonsense", "")
+    # The words of the sentence that lists them, and no other.
+    listed = re.search(r"(?:none of|allowed:|expected) (.*?)(?:, found.*)?$", text, re.MULTILINE)
+    found = re.split(r", | or ", listed.group(1).replace('"', ""))
+    assert sorted(found) == sorted(get_args(words)), text
+
+
+WRONG = [
+    lambda: CASE.simulate("no such experiment"),
+    lambda: CASE.move("no such move"),
+    lambda: CASE.design(criterion="nonsense"),
+    lambda: taut.sweep(CASE, interval="nonsense"),
+    lambda: CASE.modes(at=1e9),
+    lambda: CASE.tune(draws="no such file.csv"),
+    lambda: taut.shape(f"{STAGE}/table4.toml"),
+]
+
+
+@pytest.mark.parametrize("call", WRONG)
+def test_errors_name_arguments_as_python_has_them(call):
+    with pytest.raises(ValueError) as told:
+        call()
+    lines = [line for line in str(told.value).splitlines() if "taut " not in line]
+    assert not any(re.search(r"(^|[^\w-])--[a-z]", line) for line in lines), str(told.value)
