@@ -19,7 +19,8 @@ pub fn carry() {
     let released = env::var("PROFILE").is_ok_and(|name| name == "release");
     let mut text = String::new();
     if let Some(folder) = folder.filter(|_| released) {
-        let beside = ["../case", "../control", "../core", "../export", "../Cargo.toml", "../Cargo.lock", "../cli/carry.rs"];
+        let beside =
+            ["../case", "../control", "../core", "../export", "../Cargo.toml", "../Cargo.lock", "../cli/carry.rs"];
         let all = beside.iter().map(|path| folder.join(path)).filter(|path| path.exists());
         for path in all.chain([folder.join("src"), folder.join("Cargo.toml")]) {
             println!("cargo::rerun-if-changed={}", path.display());
@@ -31,7 +32,8 @@ pub fn carry() {
         let mut tree = cargo("tree");
         tree.args(["--offline", "--manifest-path"]).arg(source);
         let opening = "The shared object contains these packages of others, under these licences.";
-        std::fs::write(&notices, super::notices::notices(tree, opening)).expect("the folder of the build can be written to");
+        std::fs::write(&notices, super::notices::notices(tree, opening))
+            .expect("the folder of the build can be written to");
         let _ = writeln!(text, "pub const NOTICES: &str = include_str!({notices:?});");
     } else {
         text.push_str("pub const CARRIED: Option<&[u8]> = None;\npub const NOTICES: &str = \"\";\n");
@@ -44,7 +46,10 @@ pub fn carry() {
 fn build(source: &Path, folder: &Path) -> PathBuf {
     let target = env::var("TARGET").unwrap_or_default();
     let mut command = cargo("build");
-    command.args(["--lib", "--release", "--config", "profile.release.strip=true", "--target", &target]).arg("--manifest-path").arg(source);
+    command
+        .args(["--lib", "--release", "--config", "profile.release.strip=true", "--target", &target])
+        .arg("--manifest-path")
+        .arg(source);
     command.arg("--target-dir").arg(folder);
     command.env("CARGO_ENCODED_RUSTFLAGS", without_paths().join("\u{1f}"));
     let done = command.output().expect("cargo can be started");

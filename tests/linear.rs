@@ -8,7 +8,7 @@ use nalgebra::Complex;
 use proptest::prelude::*;
 use serde_json::Value;
 use std::f64::consts::PI;
-use taut::case::Case;
+use taut::case::{Case, Template};
 use taut::friction::{Friction, Law, Shape};
 use taut::linear::{Hold, Natural, Operation, Range, Root, StateSpace, places, travel, undamped};
 use taut::machine::{Belt, BeltMake, BeltModel, Machine};
@@ -404,4 +404,29 @@ fn natural_modes_have_the_poles_of_the_state_space() {
             }
         }
     }
+}
+
+#[test]
+fn a_machine_with_spans_held_is_the_one_that_follows_at_that_place() {
+    proptest!(cases(40), |(shares in [-0.9..0.9, -0.9..0.9_f64], template in 0..3)| {
+        let template = [Template::Stage, Template::Printer, Template::Gantry][template as usize];
+        let machine = Case::from_text("machine.toml", template.text()).unwrap().machine;
+        let slides: Vec<f64> = machine
+            .travels()
+            .zip(shares)
+            .map(|((_, travel), share)| travel.map_or(0.0, |travel| share * travel.max))
+            .collect();
+        let held = machine.with_spans_held(&slides);
+        prop_assert!(!held.belt.follows_cart && held.mechanism().is_piecewise_linear());
+        let there = StateSpace::of(&machine, Operation::at(&slides)).unwrap();
+        let here = StateSpace::of(&held, Operation::default()).unwrap();
+        let apart = (&there.a - &here.a).amax() / there.a.amax();
+        prop_assert!(apart < 1e-14, "{apart:e} of the largest element");
+        // The law of a span: k = A E / l.
+        let lengths = machine.span_lengths(&slides).unwrap();
+        for (stiffness, length) in held.belt.stiffness.into_iter().zip(lengths) {
+            let wanted = machine.belt.make.unwrap().rigidity() / length;
+            prop_assert!((stiffness / wanted - 1.0).abs() < 1e-14);
+        }
+    });
 }

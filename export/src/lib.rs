@@ -25,7 +25,10 @@ pub use tables::{Does, Element, ElementKind, Row, StateName, TableGuard, Tables,
 use crate::case::Case;
 use crate::design::FeedForward;
 use crate::error::{Error, Result};
+use crate::linear::{Operation, placed, within_travel};
 use crate::machine::{DriveAt, SlideAt};
+use crate::number::engineering_typed;
+use std::borrow::Cow;
 
 /// A target whose files are made here.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -94,6 +97,10 @@ pub struct Options {
     pub real: Real,
     /// Step of the plant, s; none for 1 ms.
     pub step: Option<f64>,
+    /// Where the cart is, m, and the bridge of a gantry, for which spans that follow them are held; none for zero.
+    pub at: Option<f64>,
+    /// See `at`.
+    pub bridge: Option<f64>,
 }
 
 /// The step of a plant where none is named, s.
@@ -202,12 +209,56 @@ fn shaper_remark(design: &crate::design::Design) -> Vec<String> {
 /// The files of a target, called `stem`. Errors: what the target cannot do, and what can be done instead.
 pub fn export(case: &Case, target: Target, stem: &str, options: &Options) -> Result<Exported> {
     crate::case::needs_motors(&case.machine)?;
-    match target {
+    let has_plant = match target {
+        Target::C => part(case, options.part)?.has_plant(),
+        Target::StructuredText => false,
+        Target::Matlab | Target::Python => true,
+    };
+    let (held, note) = match has_plant {
+        true => with_spans_held(case, options)?,
+        false => (Cow::Borrowed(case), None),
+    };
+    let case = &*held;
+    let mut exported = match target {
         Target::C => c::export(case, part(case, options.part)?, stem, options),
         Target::StructuredText => st::export(case, options.part, stem),
         Target::Matlab => matlab::export(plant_of(case, options.part)?, stem, options),
         Target::Python => python::export(plant_of(case, options.part)?, stem, options),
+    }?;
+    exported.notes.extend(note);
+    Ok(exported)
+}
+
+/// The case with spans that do not follow cart and bridge but are as they are at a place, and a note that says so.
+fn with_spans_held<'a>(case: &'a Case, options: &Options) -> Result<(Cow<'a, Case>, Option<String>)> {
+    within_travel(&case.machine, options.at, options.bridge)?;
+    if case.machine.belt.following().is_none() {
+        let given = [("--at", options.at), ("--bridge", options.bridge)].into_iter().find(|(_, at)| at.is_some());
+        return match given {
+            Some((option, _)) => {
+                Err(Error::new("spans of this belt do not follow the cart: it is the same everywhere")
+                    .in_file(option)
+                    .next("leave it out"))
+            }
+            None => Ok((Cow::Borrowed(case), None)),
+        };
     }
+    let place = |at: Option<f64>| engineering_typed(at.unwrap_or(0.0), "m", 6);
+    let (cart, bridge) =
+        (format!("the cart at {}", place(options.at)), format!("the bridge at {}", place(options.bridge)));
+    let (slides, words) = match case.is_axis() {
+        true => (vec![options.at], cart),
+        false => (vec![options.bridge, options.at], format!("{bridge} and {cart}")),
+    };
+    let slides: Vec<f64> = slides.into_iter().map(Option::unwrap_or_default).collect();
+    let mut held = case.clone();
+    held.machine = placed(&case.machine, Operation::at(&slides))?;
+    held.title = format!("{} (spans held as with {words})", case.title);
+    let note = format!(
+        "spans do not follow the cart here, but are held as with {words}: --at names another place, and `taut export fmu` \
+         has them follow"
+    );
+    Ok((Cow::Owned(held), Some(note)))
 }
 
 /// The mechanism of a case.

@@ -70,7 +70,7 @@ fn stepped(subject: &Subject, fewest: usize) -> Result<Answer, String> {
     let mut parts = 1;
     for count in STEPS.into_iter().filter(|count| *count >= fewest) {
         (step, parts) = (tick / count as f64, count);
-        let options = Options { part: Some(part), real: Real::Double, step: Some(step) };
+        let options = Options { part: Some(part), real: Real::Double, step: Some(step), ..Options::default() };
         exported = export::export(&subject.opened(), Target::C, "axis", &options).map_err(|error| error.to_string());
         if exported.is_ok() {
             break;

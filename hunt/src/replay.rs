@@ -361,7 +361,12 @@ const CLOCK: (&str, &str) = ("    plant.since_change = R(0.0);\n    if (", "    
 const CHANGES: (&str, &str) = ("    plant.does[element] = (uint8_t)to;\n", "    tell(element, to);\n");
 
 fn in_c(folder: &Folder, gcc: &Path, machine: &Drawn) -> Result<Raw, String> {
-    let options = Options { part: Some(Part::Plant), real: Real::Double, step: Some(machine.step / PARTS as f64) };
+    let options = Options {
+        part: Some(Part::Plant),
+        real: Real::Double,
+        step: Some(machine.step / PARTS as f64),
+        ..Options::default()
+    };
     let exported = export::export(&machine.opened, Target::C, "axis", &options).map_err(|error| error.to_string())?;
     for (name, content) in &exported.files {
         let mut text = String::from_utf8_lossy(content).into_owned();
@@ -424,7 +429,7 @@ fn in_python(folder: &Folder, python: &Path, known: &[(&Drawn, Told)]) -> Result
     let mut commands = String::from("MACHINES = [\n");
     for (machine, _) in known {
         let name = format!("m{}", machine.number);
-        let options = Options { part: None, real: Real::Double, step: None };
+        let options = Options { part: None, real: Real::Double, step: None, ..Options::default() };
         let exported =
             export::export(&machine.opened, Target::Python, &name, &options).map_err(|error| error.to_string())?;
         exported.files.iter().try_for_each(|(name, content)| folder.write(name, content))?;
@@ -451,7 +456,7 @@ fn in_octave(folder: &Folder, octave: &Path, known: &[(&Drawn, Told)]) -> Result
     let mut main = String::from("1;\n");
     for (machine, own) in known {
         let name = format!("m{}", machine.number);
-        let options = Options { part: None, real: Real::Double, step: None };
+        let options = Options { part: None, real: Real::Double, step: None, ..Options::default() };
         let exported =
             export::export(&machine.opened, Target::Matlab, &name, &options).map_err(|error| error.to_string())?;
         exported.files.iter().try_for_each(|(name, content)| folder.write(name, content))?;

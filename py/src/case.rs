@@ -432,17 +432,18 @@ impl Case {
     }
 
     /// Writes the files of a target, as `taut export` does, and says where they are and what should be known besides. `how`
-    /// is the part, the numbers of C, the step, s, and the version of FMI.
+    /// is the part, the numbers of C, the step, s, the places of cart and bridge, m, and the version of FMI.
     fn export(
         &self,
         py: Python<'_>,
         target: &str,
         out: PathBuf,
-        how: (Option<String>, String, Option<f64>, u32),
+        how: (Option<String>, String, Option<f64>, Option<f64>, Option<f64>, u32),
     ) -> PyResult<(Vec<PathBuf>, Vec<String>)> {
-        let (part, real, step, fmi) = how;
+        let (part, real, step, at, bridge, fmi) = how;
         let opened = &*self.inner;
-        let options = Options { part: exported_part(part.as_deref())?, real: exported_real(&real)?, step };
+        let part = exported_part(part.as_deref())?;
+        let options = Options { part, real: exported_real(&real)?, step, at, bridge };
         let own = self.path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
         let made = unlocked(py, || {
             let inputs = inputs(&opened.files);

@@ -1,6 +1,6 @@
 //! `export`.
 
-use super::values::seconds;
+use super::values::{metres, seconds};
 use crate::command::Common;
 use clap::ValueEnum;
 use std::path::PathBuf;
@@ -33,6 +33,12 @@ pub struct Export {
     /// C, MATLAB and Python only: time step of the plant [default: 1 ms]
     #[arg(long, value_name = "TIME", value_parser = seconds)]
     pub step: Option<f64>,
+    /// C, MATLAB and Python only: position of the cart for which spans that follow it are held [default: 0 m]
+    #[arg(long, value_name = "POSITION", value_parser = metres, allow_hyphen_values = true)]
+    pub at: Option<f64>,
+    /// C, MATLAB and Python only: position of the bridge of a gantry for which spans are held [default: 0 m]
+    #[arg(long, value_name = "POSITION", value_parser = metres, allow_hyphen_values = true)]
+    pub bridge: Option<f64>,
     /// FMU only: version of FMI [default: 3]
     #[arg(long, value_name = "VERSION", value_parser = clap::value_parser!(u8).range(2..=3))]
     pub fmi: Option<u8>,

@@ -114,10 +114,13 @@ fn check(args: &Args, target: TargetName) -> Result<()> {
     if args.fmi.is_some() && target != TargetName::Fmu {
         return Err(not_of("--fmi", "fmu"));
     }
-    if args.step.is_some() && !matches!(target, TargetName::C | TargetName::Matlab | TargetName::Python) {
-        return Err(not_of("--step", "c, matlab and python"));
+    let given = [("--step", args.step), ("--at", args.at), ("--bridge", args.bridge)];
+    match given.iter().find(|(_, value)| value.is_some()) {
+        Some((option, _)) if !matches!(target, TargetName::C | TargetName::Matlab | TargetName::Python) => {
+            Err(not_of(option, "c, matlab and python"))
+        }
+        _ => Ok(()),
     }
-    Ok(())
 }
 
 /// The files of a target, called `stem`.
@@ -131,7 +134,7 @@ fn make(args: &Args, target: TargetName, case: &Case, stem: &str) -> Result<Expo
         Some(RealName::Float) => Real::Float,
         Some(RealName::Double) | None => Real::Double,
     };
-    let options = Options { part, real, step: args.step };
+    let options = Options { part, real, step: args.step, at: args.at, bridge: args.bridge };
     let of = |target| export::export(case, target, stem, &options);
     match target {
         TargetName::Fmu => fmu::make(args, part, case, stem),

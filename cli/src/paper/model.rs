@@ -38,11 +38,7 @@ impl Sets {
             let text = stages::text(&format!("sollmann-jouaneh/{name}"));
             Case::from_text(name, text.ok_or_else(|| Error::new("this stage is not bundled").in_file(name))?)
         };
-        Ok(Self {
-            table1: case("table1.toml")?,
-            table2: case("table2.toml")?,
-            table4: case("table4.toml")?,
-        })
+        Ok(Self { table1: case("table1.toml")?, table2: case("table2.toml")?, table4: case("table4.toml")? })
     }
 }
 

@@ -35,7 +35,10 @@ fn wrong_requests_are_refused_with_what_can_be_done_instead() {
     words[2] = &pid;
     let (_, _, error) = told(&words);
     assert!(error.contains("taut export fmu") && error.contains("--part controller"), "{error}");
-    let cases: [(&[&str], &[&str]); 9] = [
+    let cases: [(&[&str], &[&str]); 12] = [
+        (&["export", "c", &table4, "--at", "1 mm"], &["--at: spans of this belt do not follow", "leave it out"]),
+        (&["export", "c", &table4, "--bridge", "1 mm"], &["--bridge: this machine has no bridge"]),
+        (&["export", "st", &pid, "--at", "1 mm"], &["--at means nothing to st", "c, matlab and python"]),
         (&["export", "c", &table4, "--part", "controller"], &["no controller", "[controller]", "leave --part out"]),
         (&["export", "st", &table4], &["no controller", "[controller]", "export fmu"]),
         (&["export", "c", &core, "--part", "both"], &["this case has no controller", "leave --part out"]),
@@ -155,4 +158,38 @@ fn a_path_that_ends_so_names_the_file_and_any_other_a_folder() {
     assert_eq!(output.status.code(), Some(2), "{output:?}");
     let quiet = taut(folder.path(), &["export", "c", &case, "--quiet"]);
     assert!(quiet.stdout.is_empty() && quiet.status.success());
+}
+
+#[test]
+fn spans_that_follow_the_cart_are_held_where_it_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str| {
+        let done = taut(folder.path(), &["init", "--template", name, &format!("{name}.toml")]);
+        assert!(done.status.success());
+    };
+    ["stage", "printer", "gantry"].into_iter().for_each(write);
+    let exported = |words: &[&str]| {
+        let done = taut(folder.path(), &[&["export"], words].concat());
+        let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+        (done.status.code(), text(done.stdout), text(done.stderr))
+    };
+    for name in ["stage", "printer", "gantry"] {
+        let case = format!("{name}.toml");
+        // The loop of a gantry has feed-forward, which no exported controller has.
+        let part: &[&str] = if name == "gantry" { &["--part", "plant"] } else { &[] };
+        for target in ["c", "matlab", "python"] {
+            let part = if target == "c" { part } else { &[] };
+            let out = format!("{name}-{target}");
+            let (code, shown, error) = exported(&[&[target, &case, "--out", &out, "--at", "50 mm"], part].concat());
+            assert_eq!(code, Some(0), "{name}, {target}: {error}");
+            assert!(shown.contains("the cart at 50 mm: --at names another place"), "{name}, {target}: {shown}");
+            let files = std::fs::read_dir(folder.path().join(&out)).unwrap().flatten();
+            let says = |path: std::path::PathBuf| std::fs::read(path).unwrap();
+            let mut texts = files.map(|file| String::from_utf8_lossy(&says(file.path())).into_owned());
+            assert!(texts.any(|text| text.contains("spans held as with")), "{name}, {target}");
+        }
+        let (code, _, error) = exported(&["c", &case, "--at", "3 m"]);
+        assert_eq!(code, Some(2), "{name}");
+        assert!(error.contains("3 m is outside the travel"), "{error}");
+    }
 }

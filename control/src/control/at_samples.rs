@@ -128,9 +128,8 @@ impl<'a> Gathered<'a> {
 
     fn finish(self) -> Figures {
         let end = self.last.unwrap_or_default();
-        let inside = |slide: &OfSlide| {
-            slide.away <= self.window && is_made(slide.profile, self.window, slide.peak.value)
-        };
+        let inside =
+            |slide: &OfSlide| slide.away <= self.window && is_made(slide.profile, self.window, slide.peak.value);
         let is_inside = end >= self.done && self.slides.iter().all(inside);
         let entered = self.slides.iter().filter_map(|slide| slide.entered).reduce(f64::max);
         let load = |slide: &OfSlide| LoadFigures {

@@ -99,7 +99,7 @@ impl<'a> Analysis<'a> {
     pub fn of(case: &'a Case, question: &Question) -> Result<Self> {
         let machine = &case.machine;
         numbers(question)?;
-        within(machine, question)?;
+        within_travel(machine, question.at, question.bridge)?;
         let usual = Operation::default();
         let operation = Operation {
             speed: question.speed.unwrap_or(usual.speed),
@@ -157,13 +157,13 @@ fn numbers(question: &Question) -> Result<()> {
     found.map_or(Ok(()), Err)
 }
 
-/// Refuses a place outside the travel, and that of a bridge where there is none.
-fn within(machine: &Machine, question: &Question) -> Result<()> {
-    if question.bridge.is_some() && machine.bridge.is_none() {
+/// Refuses a place of the cart or the bridge, m, outside the travel, and that of a bridge where there is none.
+pub fn within_travel(machine: &Machine, at: Option<f64>, bridge: Option<f64>) -> Result<()> {
+    if bridge.is_some() && machine.bridge.is_none() {
         return Err(Error::new("this machine has no bridge").in_file("--bridge").next("leave it out, or give --at"));
     }
-    let bridge = machine.bridge.as_ref().and_then(|bridge| bridge.travel);
-    for (option, at, travel) in [("--at", question.at, machine.cart.travel), ("--bridge", question.bridge, bridge)] {
+    let bridge_travel = machine.bridge.as_ref().and_then(|bridge| bridge.travel);
+    for (option, at, travel) in [("--at", at, machine.cart.travel), ("--bridge", bridge, bridge_travel)] {
         let (Some(at), Some(travel)) = (at, travel) else { continue };
         if !(travel.min..=travel.max).contains(&at) {
             return Err(Error::new(format!("{at} m is outside the travel"))

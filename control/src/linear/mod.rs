@@ -22,11 +22,11 @@ mod travel;
 mod words;
 mod zeros;
 
-pub use analysis::{Analysis, ByInput, Question};
+pub use analysis::{Analysis, ByInput, Question, within_travel};
 pub use area::ResonanceMap;
 pub use discrete::{Discrete, Hold};
 pub use frame::Variable;
-pub use model::{Operation, StateSpace, System};
+pub use model::{Operation, StateSpace, System, placed};
 pub use natural::{ElasticMode, Natural, RigidMode};
 pub use response::{Range, Response, Transfer};
 pub use travel::{Place, place, places, travel, undamped};

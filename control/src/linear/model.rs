@@ -213,12 +213,14 @@ impl StateSpace {
     }
 }
 
-/// The machine with its spans as stiff as they are with what slides at its place.
-pub(super) fn placed(machine: &Machine, operation: Operation) -> Result<Machine> {
-    let mut machine = machine.clone();
+/// The machine with its spans held as they are with what slides at its place. Errors: a place where a span would have
+/// no length.
+pub fn placed(machine: &Machine, operation: Operation) -> Result<Machine> {
     let slides = machine.geometry().slides;
-    let at = operation.coordinates(&machine);
-    let Some((make, lengths)) = machine.belt.following().zip(machine.span_lengths(&at)) else { return Ok(machine) };
+    let at = operation.coordinates(machine);
+    let Some((make, lengths)) = machine.belt.following().zip(machine.span_lengths(&at)) else {
+        return Ok(machine.clone());
+    };
     if lengths.iter().any(|length| length.is_nan() || *length <= 0.0) {
         let name = |body: usize| machine.geometry().label(body).name;
         let places = slides.iter().zip(&at).map(|(slide, at)| format!("the {} at {at} m", name(slide.body)));
@@ -230,8 +232,7 @@ pub(super) fn placed(machine: &Machine, operation: Operation) -> Result<Machine>
         };
         return Err(error.next("name a place on the travel, between the pulleys"));
     }
-    machine.belt.stiffness = BeltMake { spans: lengths, ..make }.stiffness();
-    Ok(machine)
+    Ok(machine.with_spans_held(&at))
 }
 
 /// Where the one sliding part can be, in words: no span shorter than nothing.

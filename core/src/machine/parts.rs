@@ -339,6 +339,18 @@ impl Machine {
         Some(spans.into_iter().zip(geometry.spans).map(length).collect())
     }
 
+    /// The machine with spans that do not follow what slides, but have the lengths that they have with it at these
+    /// positions, m. As it is where they do not follow.
+    pub fn with_spans_held(&self, slides: &[f64]) -> Self {
+        let mut held = self.clone();
+        if let (Some(lengths), Some(make)) = (self.span_lengths(slides), &mut held.belt.make) {
+            make.spans = lengths;
+            held.belt.stiffness = make.stiffness();
+            held.belt.follows_cart = false;
+        }
+        held
+    }
+
     /// Refuses what is no gantry.
     pub fn check_gantry(&self) -> Result<()> {
         let geometry = self.geometry();

@@ -26,7 +26,7 @@ pub(super) fn export(case: &Case, stem: &str, options: &Options) -> Result<Expor
             .replace("@leave@", &LEAVE.to_string())
             .replace("@NAME@", &name.to_uppercase())
     };
-    let plant = Options { part: Some(Part::Plant), real: Real::Double, step: Some(step) };
+    let plant = Options { part: Some(Part::Plant), real: Real::Double, step: Some(step), ..Options::default() };
     let own = format!("{name}_plant");
     let files = c::named(case, Part::Plant, (&own, &own), &plant)?.files;
     let mut all = vec![

@@ -526,16 +526,24 @@ def export(
     part: Part | None = None,
     real: Real = "double",
     step: float | None = None,
+    at: float | None = None,
+    bridge: float | None = None,
     fmi: Literal[2, 3] = 3,
 ) -> list[Path]:
     """Writes a case, or a case file, for another tool, as ``taut export`` does, and returns the files.
 
     ``target`` is ``fmu``, ``c``, ``st``, ``matlab``, ``python`` or ``json``. ``out`` names the file where it ends as
     the target's files do, else a folder. ``part`` is ``plant``, ``controller`` or ``both``, ``real`` the numbers of C
-    (``float`` or ``double``), ``step`` the step of the plant, s, ``fmi`` the version of an FMU: 2 or 3.
+    (``float`` or ``double``), ``step`` the step of the plant, s, ``at`` and ``bridge`` the positions of cart and bridge, m,
+    for which spans that follow them are held in C, MATLAB and Python, ``fmi`` the version of an FMU: 2 or 3.
     """
+    number = _checks.number
+    places = (number("at", at), number("bridge", bridge))
+    for name, value in (("step", step), ("at", at), ("bridge", bridge)):
+        if value is not None and target not in ("c", "matlab", "python"):
+            raise ValueError(f"{name}: means nothing to {target!r}; c, matlab and python take it")
     found = case if isinstance(case, Case) else read(case)
-    how = (_checks.word("part", part), _checks.text("real", real), _checks.number("step", step), _checks.whole("fmi", fmi, 2, 3))
+    how = (_checks.word("part", part), _checks.text("real", real), number("step", step), *places, _checks.whole("fmi", fmi, 2, 3))
     files, _ = found._native.export(_checks.text("target", target), _checks.path(out), how)
     return [Path(file) for file in files]
 
