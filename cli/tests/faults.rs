@@ -1,7 +1,7 @@
 //! Faults around a command that writes: it is killed, the disk is full, the folder cannot be written to, somebody
 //! presses Ctrl-C. What stood before still stands, and what is new is whole or absent.
 //!
-//! `TAUT_KILLS=200` kills each command so often instead of 20 times, `TAUT_SEED=2` at other moments.
+//! `TAUT_KILLS=200` kills each command so often instead of 8 times, `TAUT_SEED=2` at other moments.
 #![cfg(unix)]
 
 #[path = "faults/claims.rs"]
@@ -27,6 +27,9 @@ type Files = BTreeMap<String, Vec<u8>>;
 fn stages(name: &str) -> String {
     format!("{}/../stages/sollmann-jouaneh/{name}", env!("CARGO_MANIFEST_DIR"))
 }
+
+/// How often each command is killed.
+const KILLS: u64 = 8;
 
 fn number(name: &str) -> Option<u64> {
     std::env::var(name).ok()?.parse().ok()
@@ -124,7 +127,7 @@ impl Writer {
         let whole = self.whole();
         let mut random = Pcg64::seed_from_u64(number("TAUT_SEED").unwrap_or(1) << 8 | seed);
         let (mut killed, mut amid) = (0, 0);
-        for k in 0..number("TAUT_KILLS").unwrap_or(20) {
+        for k in 0..number("TAUT_KILLS").unwrap_or(KILLS) {
             let folder = TempDir::new().unwrap();
             put(folder.path(), &whole.before);
             let mut child = taut(folder.path(), &self.words[1]).spawn().unwrap();
@@ -223,7 +226,7 @@ impl Writer {
     /// Here the file that stands before is another one.
     fn withstands_kills_of_init(self) {
         let template = taut::case::TEMPLATE.as_bytes();
-        for k in 0..number("TAUT_KILLS").unwrap_or(20) {
+        for k in 0..number("TAUT_KILLS").unwrap_or(KILLS) {
             let folder = TempDir::new().unwrap();
             put(folder.path(), &self.read);
             let mut child = taut(folder.path(), &self.words[0]).spawn().unwrap();
@@ -404,7 +407,7 @@ fn saving_in_the_studio_is_killed() {
     let old = text("stages/sollmann-jouaneh/table4.toml");
     let new = old.replace("0.362 kg", "0.5 kg") + &"# a long file\n".repeat(20_000);
     let mut saved = 0;
-    for k in 0..number("TAUT_KILLS").unwrap_or(20) {
+    for k in 0..number("TAUT_KILLS").unwrap_or(KILLS) {
         let folder = TempDir::new().unwrap();
         let path = folder.path().join("axis.toml");
         fs::write(&path, &old).unwrap();
