@@ -453,3 +453,42 @@ fn along(case: &Case, count: usize) -> [Vec<f64>; 2] {
         None => [Vec::new(), whole],
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::case::Template;
+
+    /// Counts of values in so many equal strata of an interval; those at its ends or outside count in none.
+    fn strata(values: impl Iterator<Item = f64>, [from, to]: [f64; 2], count: usize) -> Vec<usize> {
+        let mut counts = vec![0; count];
+        for value in values {
+            let share = (value - from) / (to - from);
+            if (0.0..1.0).contains(&share) {
+                counts[(share * count as f64) as usize] += 1;
+            }
+        }
+        counts
+    }
+
+    #[test]
+    fn drawn_axes_have_one_in_every_stratum() {
+        for template in [Template::Stage, Template::Gantry] {
+            let case = Case::from_text("machine.toml", template.text()).unwrap();
+            let family = Family::of(&case, &Tuning::default()).unwrap();
+            let drawn = &family.machines[family.loads.len()..];
+            assert_eq!(drawn.len(), MACHINES);
+            let ends = |places: &[f64]| [places[0], places[places.len() - 1]];
+            let one_each = vec![1; MACHINES];
+            assert_eq!(strata(drawn.iter().map(|one| one.place), ends(&family.places), MACHINES), one_each);
+            if family.bridges.len() > 1 {
+                assert_eq!(strata(drawn.iter().map(|one| one.bridge), ends(&family.bridges), MACHINES), one_each);
+            }
+            // Within a spread all values are as likely.
+            for (k, unknown) in family.unknowns.iter().enumerate().filter(|(k, unknown)| unknown.with == *k) {
+                let offs = drawn.iter().map(|one| one.off[k]);
+                assert_eq!(strata(offs, [-1.0, 1.0], MACHINES), one_each, "{}", unknown.name);
+            }
+        }
+    }
+}

@@ -139,6 +139,15 @@ mod tests {
     use rand_pcg::rand_core::SeedableRng;
 
     #[test]
+    fn mean_and_deviation_are_those_of_all_chains() {
+        let chain = |values: [f64; 2]| values.map(|value| vec![value]).to_vec();
+        let chains = vec![chain([1.0, 2.0]), chain([4.0, 5.0])];
+        let draws = Draws { chains, divergences: 0, evaluations: 0, interrupted: false };
+        // (4 + 1 + 1 + 4)/3
+        assert_eq!((draws.mean(0), draws.deviation(0)), (3.0, (10.0_f64 / 3.0).sqrt()));
+    }
+
+    #[test]
     fn chains_apart_are_told() {
         let chain = |middle: f64| (0..400).map(|k| vec![middle + (f64::from(k) * 0.7).sin()]).collect::<Vec<_>>();
         let together =
