@@ -117,7 +117,7 @@ pub fn pair(seed: u64, number: u64) -> (Drawn, Vec<Feature>) {
     let title = format!("seed {seed}, pair {number}");
     let sizes = draw.sizes();
     draw.share_curves();
-    let is_gantry = features.iter().any(|one| matches!(one, Feature::HFrame | Feature::CoreXy));
+    let is_gantry = features.iter().any(|one| one.is_gantry());
     (if is_gantry { draw.gantry(title, sizes) } else { draw.machine(title, sizes, lines) }, features)
 }
 
@@ -248,7 +248,7 @@ impl Draw {
             _ => "elastic",
         };
         // A rigid belt has no spans, and a gantry is elastic.
-        let has_spans = [Feature::Slack, Feature::Follows, Feature::HFrame, Feature::CoreXy];
+        let has_spans = [Feature::Slack, Feature::Follows, Feature::HFrame, Feature::CoreXy, Feature::DualBelt];
         let model = if has_spans.into_iter().any(|one| self.wants(one)) { "elastic" } else { model };
         if model != "elastic" {
             self.kind(Kind::Reduced);

@@ -6,6 +6,7 @@ use std::sync::atomic::AtomicBool;
 use taut_hunt::answer::{self, By};
 use taut_hunt::compare::Verdict;
 use taut_hunt::draw::{self, Feature, Kind};
+use taut_hunt::machine::BODIES;
 use taut_hunt::stages::{self, Drawing, Hunt};
 use taut_hunt::subject::Subject;
 
@@ -123,7 +124,15 @@ fn a_wrong_answer_of_any_kind_is_unexplained() {
         let (drawn, features) = draw::pair(1, number);
         let asked =
             features.iter().find_map(|one| if let Feature::Asked(by) = one { Some(*by) } else { None }).unwrap();
-        let kinds = [Feature::HFrame, Feature::CoreXy, Feature::LuGre, Feature::Stribeck, Feature::Pid, Feature::Fuzzy];
+        let kinds = [
+            Feature::HFrame,
+            Feature::CoreXy,
+            Feature::DualBelt,
+            Feature::LuGre,
+            Feature::Stribeck,
+            Feature::Pid,
+            Feature::Fuzzy,
+        ];
         let kind = kinds.into_iter().find(|kind| features.contains(kind));
         if seen.contains(&(asked, kind)) || (asked == By::C && !with_c) || seen.len() > 16 {
             continue;
@@ -138,7 +147,7 @@ fn a_wrong_answer_of_any_kind_is_unexplained() {
             Subject::Loop(case) => case.machine.drives[0].motor.torque_constant *= 1.01,
         }
         let known = |subject: &Subject| subject.known_as_is(&answer.fed, &answer.times).unwrap().rows;
-        let apart = |rows: &[[taut_hunt::double::Double; 4]]| {
+        let apart = |rows: &[[taut_hunt::double::Double; BODIES]]| {
             let pairs = answer.rows.iter().flatten().zip(rows.iter().flatten()).filter(|(a, _)| !a.high.is_nan());
             pairs.map(|(a, b)| (*a - *b).high.abs()).fold(0.0, f64::max)
         };

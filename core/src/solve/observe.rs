@@ -6,7 +6,7 @@ use crate::solve::widest::widest;
 use crate::trajectory::Trajectory;
 
 /// Number of quantities in a [`Reading`].
-pub const QUANTITIES: usize = 12;
+pub const QUANTITIES: usize = 20;
 
 /// The readings of a run at one instant, in the order of [`Mechanism::readings`], which of an axis is that of
 /// [`reading`]. SI units.

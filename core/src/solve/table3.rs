@@ -59,7 +59,7 @@ pub(crate) fn run(
         let motion = model.motion(&state, input);
         // A row shows the state itself: angles of its own, held as they are.
         recorder.segment(row, &coordinates.at(&state), &Mode::of(motion));
-        recorder.push_state(&inner_of(&layout, mechanism, &state), &[input, 0.0], None);
+        recorder.push_state(&inner_of(&layout, mechanism, &state), &[input, 0.0, 0.0], None);
         if recorder.flow == Flow::Stop {
             ending = Ending::Interrupted { time };
             break;
@@ -73,7 +73,7 @@ pub(crate) fn run(
         };
         let read = |state: &State, input: f64| {
             let inner = inner_of(&layout, mechanism, state);
-            readout.read(&layout, &inner, &mechanism.origin, &[input, 0.0])
+            readout.read(&layout, &inner, &mechanism.origin, &[input, 0.0, 0.0])
         };
         let mut before = read(&state, input);
         show(time, 0.0, &before, &before);
