@@ -23,6 +23,9 @@ const STAGES: &[(&str, &str)] = bundled!["";
     "core-xy/core-xy.toml",
     "core-xy/follows.toml",
     "core-xy/square.toml",
+    "dual-belt/dual-belt.toml",
+    "dual-belt/follows.toml",
+    "dual-belt/square.toml",
 ];
 
 /// All of them: path, title, text, and what their pictures need.

@@ -315,8 +315,9 @@ fn drive(out: &mut Svg, gantry: &Machine, side: usize) {
         AmplifierMode::Position => "x*",
     };
     let (end, name) = (if is_at_cart { radius } else { RADIUS } + 3.0, gantry.geometry().drives[side].side());
-    out.arrow((x, y + end + 33.0), (x, y + end), svg::INK, 1.5);
-    out.symbol((x + 8.0, y + end + 31.0), 13.0, Anchor::Start, svg::INK, "", &format!("{fed}_{name}"));
+    let tail = y + end + if is_at_cart { 24.0 } else { 33.0 };
+    out.arrow((x, tail), (x, y + end), svg::INK, 1.5);
+    out.symbol((x + 8.0, tail - 2.0), 13.0, Anchor::Start, svg::INK, "", &format!("{fed}_{name}"));
 
     let (heading, at) = match side {
         0 => ("Left motor", 16.0),

@@ -64,12 +64,11 @@ pub fn gantry_template(kind: Kind) -> String {
 #     │   │              │  │
 #    (left)              (right)   drive pulleys A and B";
     const DUAL_BELT: &str = "\
-#    (O)                     (O)     idlers at the far end
-#     ││                     ││
-#   ══╪┴[cart motor]──[cart]─┴╪══   bridge    x upward
-#     │          └──────[    ]  │               y to the right
-#     │                         │
-#    (left)             (right)      drive pulleys";
+#    (O)                       (O)      idlers at the far end
+#    │ │                       │ │
+#   ═│═╪═(cart)──[cart]──(O)═══╪═│═     bridge with the cart's motor    x upward
+#    │ │                       │ │                                      y to the right
+#    (left)               (right)       drive pulleys";
     // An axis has a template of its own.
     let kind = if kind == Kind::Axis { Kind::CoreXy } else { kind };
     let others = Kind::ALL.into_iter().filter(|other| ![Kind::Axis, kind].contains(other));

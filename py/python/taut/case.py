@@ -61,7 +61,7 @@ class Case:
 
     @property
     def kind(self) -> str:
-        """The kind of machine: ``axis``, ``h-frame`` or ``core-xy``."""
+        """The kind of machine: ``axis``, ``h-frame``, ``core-xy`` or ``dual-belt``."""
         return self._native.kind
 
     @property

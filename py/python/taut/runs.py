@@ -114,7 +114,7 @@ class Run(Table):
         """A matplotlib figure of these columns over time, one panel for each unit.
 
         Without names: where the cart is and should be, its speed, and the voltage; of a gantry also those of the bridge
-        and both drives. ``ax`` is what to draw into: one Axes, or as many as there are units.
+        and all drives. ``ax`` is what to draw into: one Axes, or as many as there are units.
         """
         usual = ["reference", "bridge_position", "cart_position", "bridge_speed", "cart_speed"]
         usual += ["voltage", "left_voltage", "right_voltage"]
