@@ -308,14 +308,12 @@ fn a_load_picked_up_under_way_is_a_tunable_mass() {
 #[test]
 fn gantries_and_general_stages_end_where_their_solver_does() {
     // Exact but for rounding; and with the general solver, whose steps begin anew with ours, to its tolerance.
-    for (name, tolerance) in
-        [
-            ("core-xy/core-xy.toml", SAME),
-            ("h-frame/h-frame.toml", SAME),
-            ("dual-belt/dual-belt.toml", SAME),
-            ("core-xy/follows.toml", 1e-9),
-        ]
-    {
+    for (name, tolerance) in [
+        ("core-xy/core-xy.toml", SAME),
+        ("h-frame/h-frame.toml", SAME),
+        ("dual-belt/dual-belt.toml", SAME),
+        ("core-xy/follows.toml", 1e-9),
+    ] {
         let case = Case::read_with(machine(name), &[]).unwrap();
         let (mechanism, mut end) = (case.machine.mechanism(), Vec::new());
         let sides = case.machine.geometry().sides();

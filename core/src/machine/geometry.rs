@@ -132,6 +132,11 @@ impl Geometry {
         self.drives.iter().map(DriveAt::side)
     }
 
+    /// The key of a drive in results: its side, or its pulley's where it is the only one.
+    pub fn drive_key(&self, drive: &DriveAt) -> &'static str {
+        if drive.side().is_empty() { self.label(drive.pulley).key } else { drive.side() }
+    }
+
     /// The name of a slide's or drive pulley's body.
     pub fn label(&self, body: usize) -> Label {
         self.bodies[body].label

@@ -68,7 +68,7 @@ pub(crate) fn run(
         let mode = Mode::of(motion);
         let mut show = |begin: f64, length: f64, from: &Reading, to: &Reading| {
             if let Some(observer) = &mut recorder.observer {
-                observer.pass(&Gap { begin, length, from, to, bow: &[0.0; QUANTITIES], mode: &mode });
+                observer.pass(&Gap { begin, length, from, to, bow: &[0.0; QUANTITIES], mode: &mode, few: readout.few });
             }
         };
         let read = |state: &State, input: f64| {

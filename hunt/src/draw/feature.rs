@@ -77,11 +77,10 @@ use Feature::{
 };
 
 impl Feature {
-    /// All of them.
-    pub const ALL: [Feature; 36] = [
+    /// All that pairs are drawn of. A dual belt is drawn in place of another machine: see [`super::dual_belt`].
+    pub const ALL: [Feature; 35] = [
         HFrame,
         CoreXy,
-        DualBelt,
         Stribeck,
         Exponential,
         Smooth,

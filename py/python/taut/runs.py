@@ -117,7 +117,7 @@ class Run(Table):
         and all drives. ``ax`` is what to draw into: one Axes, or as many as there are units.
         """
         usual = ["reference", "bridge_position", "cart_position", "bridge_speed", "cart_speed"]
-        usual += ["voltage", "left_voltage", "right_voltage"]
+        usual += ["voltage", "left_voltage", "right_voltage", "cart_voltage"]
         names = columns or tuple(name for name in usual if name in self)
         units: dict[str, list[str]] = {}
         for name in names:
