@@ -402,16 +402,16 @@ fn spans(machine: &Machine, taken: Taken, cart_start: Double) -> Vec<Span> {
     let follows = |which: usize, more: bool| {
         let (rigidity, l1, l2, l3) = follows?;
         match which {
-            0 => Some(Follows { rigidity, length: l1, of: [0.0, -1.0, 0.0, 0.0] }),
-            1 if more => Some(Follows { rigidity, length: l2 + l3, of: [0.0, 1.0, 0.0, 0.0] }),
-            1 => Some(Follows { rigidity, length: l2, of: [0.0, 1.0, 0.0, 0.0] }),
+            0 => Some(Follows { rigidity, length: l1, of: [0.0, -1.0, 0.0, 0.0, 0.0] }),
+            1 if more => Some(Follows { rigidity, length: l2 + l3, of: [0.0, 1.0, 0.0, 0.0, 0.0] }),
+            1 => Some(Follows { rigidity, length: l2, of: [0.0, 1.0, 0.0, 0.0, 0.0] }),
             _ => None,
         }
     };
-    let first = [1.0, -1.0, 0.0, 0.0];
+    let first = [1.0, -1.0, 0.0, 0.0, 0.0];
     match machine.belt.model {
         BeltModel::Rigid => Vec::new(),
-        BeltModel::Elastic => [first, [0.0, 1.0, -1.0, 0.0], [-1.0, 0.0, 1.0, 0.0]]
+        BeltModel::Elastic => [first, [0.0, 1.0, -1.0, 0.0, 0.0], [-1.0, 0.0, 1.0, 0.0, 0.0]]
             .into_iter()
             .enumerate()
             .map(|(j, arms)| Span { arms, stiffness: k[j], damping: c[j], follows: follows(j, false) })
@@ -421,7 +421,8 @@ fn spans(machine: &Machine, taken: Taken, cart_start: Double) -> Vec<Span> {
             let sum = k[1] + k[2];
             let k23 = k[1] * k[2] / sum;
             let c23 = (c[1] * k[2] * k[2] + c[2] * k[1] * k[1]) / (sum * sum);
-            let second = Span { arms: [0.0, 1.0, -1.0, 0.0], stiffness: k23, damping: c23, follows: follows(1, true) };
+            let second =
+                Span { arms: [0.0, 1.0, -1.0, 0.0, 0.0], stiffness: k23, damping: c23, follows: follows(1, true) };
             vec![Span { arms: first, stiffness: k[0], damping: c[0], follows: follows(0, false) }, second]
         }
     }
