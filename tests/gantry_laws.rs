@@ -284,7 +284,7 @@ proptest! {
     fn a_dual_belt_moves_its_bridge_as_a_core_xy_does(gantry in gantry(), inputs in inputs()) {
         let [k, c] = [gantry.belt.stiffness, gantry.belt.damping].map(|all| [all[0], all[1], all[0], all[1]]);
         let unit = gantry.drives[0];
-        let core = Machine { kind: Kind::CoreXy, drives: vec![unit; 2], belt: Belt::given(k.into(), c.into()), ..gantry.clone() };
+        let core = Machine { kind: Kind::CoreXy, drives: vec![unit; 2], belt: Belt::given(Spans::from(k), Spans::from(c)), ..gantry.clone() };
         let six = |of: [f64; 4]| -> Spans { of.into_iter().chain([of[0], of[1]]).collect() };
         let belt = Belt::given(six(k), six(c));
         let dual = Machine { kind: Kind::DualBelt, drives: vec![unit; 3], belt, ..gantry };
