@@ -230,7 +230,7 @@ fn drives_that_are_alike_are_off_alike() {
     let told = Free::new(&apart, "motor.resistance", &[], &[]).unwrap_err().to_string();
     assert_eq!(
         told,
-        "`motor.resistance` is not the same in both drives\n  \
+        "`motor.resistance` is not the same in all drives\n  \
          next: name `left_drive.motor.resistance` or `right_drive.motor.resistance`"
     );
     // What is named by itself goes by itself, and `motor.resistance` is the other one.

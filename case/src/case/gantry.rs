@@ -235,7 +235,7 @@ pub(super) fn initial(table: &Table, gantry: &Machine) -> Result<State> {
         is_of_slide || geometry.drives.iter().any(of_drive)
     };
     if let Some(field) = table.keys().find(|key| !own(key)).and_then(|key| table.optional(key)) {
-        let what = format!("a {} gantry has no such coordinate", geometry.word);
+        let what = format!("a gantry of kind \"{}\" has no such coordinate", geometry.word);
         return Err(field.fail(what).next("leave it out"));
     }
     let two = |of: [&str; 2]| -> Result<[f64; 2]> { Ok([table.number(of[0])?, table.number(of[1])?]) };
