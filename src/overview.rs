@@ -46,7 +46,7 @@ const MAIN: [&str; 10] = [
 pub struct Overview {
     /// The title of the case.
     pub title: String,
-    /// `axis`, `h-frame` or `core-xy`.
+    /// `axis`, `h-frame`, `core-xy` or `dual-belt`.
     pub kind: &'static str,
     /// The rows, by what they are about.
     pub groups: Vec<Group>,

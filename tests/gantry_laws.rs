@@ -70,20 +70,23 @@ fn slide(mass: f64) -> impl Strategy<Value = Slide> {
     (0.3 * mass..3.0 * mass, dry(30.0, 1.0)).prop_map(|(mass, friction)| Slide::new(mass, friction))
 }
 
-/// Gantries with one motor for both drives.
+/// Gantries of any kind with one motor for all drives.
 fn gantry() -> impl Strategy<Value = Machine> {
-    let stiffness = || prop::collection::vec(2e4..3e5_f64, 4);
-    let damping = prop_oneof![Just(vec![0.0; 4]), prop::collection::vec(0.0..50.0_f64, 4)];
+    let stiffness = || prop::collection::vec(2e4..3e5_f64, 6);
+    let damping = prop_oneof![Just(vec![0.0; 6]), prop::collection::vec(0.0..50.0_f64, 6)];
+    let kinds = prop::sample::select(vec![Kind::HFrame, Kind::CoreXy, Kind::DualBelt]);
     let pulley = (1e-5..2e-4_f64, dry(2e-3, 0.02)).prop_map(|(inertia, friction)| Pulley { inertia, friction });
-    (any::<bool>(), motor(), 0.005..0.03_f64, pulley, slide(0.8), slide(0.4), stiffness(), damping).prop_map(
-        |(core, motor, pulley_radius, drive_pulley, bridge, cart, mut stiffness, mut damping)| {
-            let kind = if core { Kind::CoreXy } else { Kind::HFrame };
+    (kinds, motor(), 0.005..0.03_f64, pulley, slide(0.8), slide(0.4), stiffness(), damping).prop_map(
+        |(kind, motor, pulley_radius, drive_pulley, bridge, cart, mut stiffness, mut damping)| {
             stiffness.truncate(kind.geometry().spans.len());
             damping.truncate(kind.geometry().spans.len());
             let (stiffness, damping): (Spans, Spans) = (stiffness.into_iter().collect(), damping.into_iter().collect());
             Machine {
                 kind,
-                drives: vec![DriveUnit { motor, amplifier: Amplifier::ideal(AmplifierMode::Voltage, 1.0) }; 2],
+                drives: vec![
+                    DriveUnit { motor, amplifier: Amplifier::ideal(AmplifierMode::Voltage, 1.0) };
+                    kind.geometry().drives.len()
+                ],
                 pulley_radius,
                 drive_pulley,
                 idler_pulley: Pulley { inertia: 0.0, friction: Friction::default() },
@@ -110,7 +113,13 @@ fn inputs() -> impl Strategy<Value = [Signal; 2]> {
 
 fn follow(gantry: &Machine, inputs: &[Signal; 2]) -> Run {
     let mechanism = gantry.mechanism();
-    let course = Course { inputs: inputs.to_vec(), start: State::default(), until: 0.15, every: 1e-3 };
+    // A third drive, which moves the cart alone, gets half of the second one's input.
+    let third = || {
+        let Signal::Pulse { value, duration, at } = inputs[1] else { unreachable!("only pulses are drawn") };
+        Signal::Pulse { value: 0.5 * value, duration, at }
+    };
+    let inputs = inputs.iter().cloned().chain([third()]).take(gantry.drives.len()).collect();
+    let course = Course { inputs, start: State::default(), until: 0.15, every: 1e-3 };
     let mut rows = Trajectory::default();
     let sink = &mut |block: &Trajectory| {
         rows.columns.is_empty().then(|| rows = Trajectory::with_capacity(&block.columns, 256));
@@ -144,13 +153,17 @@ proptest! {
     #[test]
     fn belts_are_closed(gantry in gantry(), x in -0.3..0.3_f64, y in -0.3..0.3_f64) {
         let mechanism = gantry.mechanism();
-        let belts: &[&[usize]] = if gantry.kind == Kind::HFrame { &[&[0, 1, 2]] } else { &[&[0, 1], &[2, 3]] };
+        let belts: &[&[usize]] = match gantry.kind {
+            Kind::HFrame => &[&[0, 1, 2]],
+            Kind::Axis | Kind::CoreXy => &[&[0, 1], &[2, 3]],
+            Kind::DualBelt => &[&[0, 1], &[2, 3], &[4, 5]],
+        };
         for belt in belts {
-            let mut sum = [0.0; 4];
+            let mut sum = [0.0; 5];
             for span in *belt {
                 mechanism.springs[*span].arms.iter().for_each(|(body, arm)| sum[*body] += arm);
             }
-            prop_assert_eq!(sum, [0.0; 4]);
+            prop_assert_eq!(sum, [0.0; 5]);
         }
         let mut state = gantry.without_strain(&[x, y], &[]);
         let stiffest = gantry.belt.stiffness.iter().fold(0.0, |most: f64, k| most.max(*k));
@@ -162,19 +175,19 @@ proptest! {
     /// Power that comes in goes into heat or is stored, in any state and mode.
     #[test]
     fn power_is_balanced(
-        gantry in gantry(), speeds in prop::collection::vec(-2.0..2.0_f64, 4), ways in prop::collection::vec(-1e-4..1e-4_f64, 4),
-        volts in prop::collection::vec(-12.0..12.0_f64, 2),
+        gantry in gantry(), speeds in prop::collection::vec(-2.0..2.0_f64, 5), ways in prop::collection::vec(-1e-4..1e-4_f64, 5),
+        volts in prop::collection::vec(-12.0..12.0_f64, 3),
     ) {
         let mechanism = gantry.mechanism();
         let mut state = State::default();
-        for body in 0..4 {
+        for body in 0..mechanism.bodies.len() {
             let lever = mechanism.bodies[body].kind.lever();
             (state.position[body], state.speed[body]) = (ways[body] / lever, speeds[body] / lever);
         }
         for (current, drive) in state.current.iter_mut().zip(&mechanism.drives) {
             *current = if drive.has_current_state() { 1.5 } else { 0.0 };
         }
-        let power = mechanism.power(mechanism.first_mode(&state), &state, &[volts[0], volts[1]]);
+        let power = mechanism.power(mechanism.first_mode(&state), &state, &[volts[0], volts[1], volts[2]]);
         prop_assert!(power.imbalance().abs() <= 1e-12 * power.scale(), "{power:?}");
         prop_assert!(power.friction.iter().chain(&power.spring).all(|&loss| loss >= 0.0), "{power:?}");
     }
@@ -182,7 +195,8 @@ proptest! {
     /// Where nothing sticks, a run is that of the linear equations, whose exponential is another library's: every output
     /// at the end, and poles are those of the modes.
     #[test]
-    fn the_linear_system_is_the_machine(gantry in gantry(), volts in prop::collection::vec(-12.0..12.0_f64, 2)) {
+    fn the_linear_system_is_the_machine(gantry in gantry(), volts in prop::collection::vec(-12.0..12.0_f64, 3)) {
+        let volts = &volts[..gantry.drives.len()];
         let mut gantry = gantry;
         let smooth = |friction: Friction| Friction::with_breakaway(friction.forward.viscous, 0.0, 0.0);
         gantry.drive_pulley.friction = smooth(gantry.drive_pulley.friction);
@@ -192,9 +206,9 @@ proptest! {
         }
         let system = System::of(&gantry, Operation::default()).unwrap();
         prop_assert_eq!(system.inputs.iter().map(|input| input.name.as_str()).collect::<Vec<_>>(),
-            ["left_voltage_command", "right_voltage_command"]);
+            ["left_voltage_command", "right_voltage_command", "cart_voltage_command"][..volts.len()].to_vec());
         let (until, n) = (0.02, system.a.nrows());
-        let u = nalgebra::DVector::from_row_slice(&volts);
+        let u = nalgebra::DVector::from_row_slice(volts);
         // d/dt (x, 1) = [A, B u; 0, 0] (x, 1)
         let mut whole = nalgebra::DMatrix::zeros(n + 1, n + 1);
         whole.view_mut((0, 0), (n, n)).copy_from(&system.a);
@@ -242,7 +256,11 @@ proptest! {
     #[test]
     fn left_and_right_mirror_each_other(gantry in gantry(), inputs in inputs()) {
         let mut mirrored = gantry.clone();
-        let order: &[usize] = if gantry.kind == Kind::HFrame { &[1, 0, 2] } else { &[2, 3, 0, 1] };
+        let order: &[usize] = match gantry.kind {
+            Kind::HFrame => &[1, 0, 2],
+            Kind::Axis | Kind::CoreXy => &[2, 3, 0, 1],
+            Kind::DualBelt => &[2, 3, 0, 1, 4, 5],
+        };
         mirrored.belt.stiffness = order.iter().map(|span| gantry.belt.stiffness[*span]).collect();
         mirrored.belt.damping = order.iter().map(|span| gantry.belt.damping[*span]).collect();
         // r φ₁ = −x − y and r φ₂ = x − y: the pulleys of an H-frame turn against each other, those of CoreXY alike.
@@ -250,12 +268,31 @@ proptest! {
         let [left, right] = &inputs;
         let exchanged = match gantry.kind {
             Kind::HFrame => [negative(right), negative(left)],
-            Kind::Axis | Kind::CoreXy => [right.clone(), left.clone()],
+            Kind::Axis | Kind::CoreXy | Kind::DualBelt => [right.clone(), left.clone()],
         };
         let (a, b) = (follow(&gantry, &inputs), follow(&mirrored, &exchanged));
         proportional((&a, "bridge_position"), (&b, "bridge_position"), 1.0, 1e-12)?;
-        proportional((&a, "cart_position"), (&b, "cart_position"), -1.0, 1e-12)?;
+        // The cart of a dual belt has a drive of its own, whose input is another one here.
+        if gantry.kind != Kind::DualBelt {
+            proportional((&a, "cart_position"), (&b, "cart_position"), -1.0, 1e-12)?;
+        }
         proportional((&a, "left_angle"), (&b, "right_angle"), sign, 1e-10)?;
+    }
+
+    /// The bridge of a dual belt, pulled alike on both sides, moves as that of a CoreXY whose motors turn alike does.
+    #[test]
+    fn a_dual_belt_moves_its_bridge_as_a_core_xy_does(gantry in gantry(), inputs in inputs()) {
+        let [k, c] = [gantry.belt.stiffness, gantry.belt.damping].map(|all| [all[0], all[1], all[0], all[1]]);
+        let unit = gantry.drives[0];
+        let core = Machine { kind: Kind::CoreXy, drives: vec![unit; 2], belt: Belt::given(Spans::from(k), Spans::from(c)), ..gantry.clone() };
+        let six = |of: [f64; 4]| -> Spans { of.into_iter().chain([of[0], of[1]]).collect() };
+        let belt = Belt::given(six(k), six(c));
+        let dual = Machine { kind: Kind::DualBelt, drives: vec![unit; 3], belt, ..gantry };
+        let alike = [inputs[0].clone(), inputs[0].clone()];
+        let (a, b) = (follow(&core, &alike), follow(&dual, &alike));
+        for column in ["bridge_position", "left_angle", "right_angle"] {
+            proportional((&a, column), (&b, column), 1.0, 1e-11)?;
+        }
     }
 
     /// A machine with all its inertias, stiffnesses, frictions and torques ten times as large moves alike.
@@ -288,6 +325,7 @@ proptest! {
     #[test]
     fn equal_spans_do_not_couple(gantry in gantry(), volts in 1.0..12.0_f64) {
         let mut gantry = Machine { kind: Kind::HFrame, ..gantry };
+        gantry.drives.truncate(2);
         gantry.belt.stiffness = [1e5, 1e5, 6e4].into();
         gantry.belt.damping = [3.0, 3.0, 1.0].into();
         for friction in [&mut gantry.drive_pulley.friction, &mut gantry.bridge.as_mut().unwrap().friction, &mut gantry.cart.friction] {

@@ -1,6 +1,6 @@
-//! Loops round two drives: margins against matrices put together from their definitions on dense grids, and against runs.
+//! Loops round several drives: margins against matrices put together from their definitions on dense grids, and against runs.
 
-use nalgebra::{Complex, DMatrix, Matrix2};
+use nalgebra::{Complex, DMatrix};
 use rand_pcg::Pcg64;
 use std::f64::consts::PI;
 use taut::case::Case;
@@ -12,13 +12,13 @@ use taut::signal::profile::Reference;
 use taut::solve::{Ending, Solver};
 use taut::tune::{Break, Margins, Plant, breaks};
 
-type Square = Matrix2<Complex<f64>>;
+type Square = DMatrix<Complex<f64>>;
 
-/// A gantry in closed loop without dry friction and counts, of either kind.
+/// A gantry in closed loop without dry friction and counts, of any kind.
 fn drawn(number: u64) -> Case {
     let mut random = Pcg64::new(71, u128::from(number));
     let mut between = |low: f64, high: f64| low * (high / low).powf(uniform(&mut random));
-    let (kind, spans) = [("h-frame", 3), ("core-xy", 4)][number as usize % 2];
+    let (kind, spans) = [("h-frame", 3), ("core-xy", 4), ("dual-belt", 6)][number as usize % 3];
     let stiffness: Vec<String> = (0..spans).map(|_| between(4e4, 2e5).to_string()).collect();
     let damping = vec![between(5.0, 60.0).to_string(); spans];
     let pid = format!(
@@ -35,7 +35,7 @@ fn drawn(number: u64) -> Case {
         between(0.2, 1.0),
         between(10.0, 300.0),
     );
-    let structure = if number % 3 == 2 { cascade } else { pid };
+    let structure = if number % 5 == 2 { cascade } else { pid };
     let every = between(4e-4, 1.5e-3);
     let changes = [
         format!("belt.stiffness=[{}]", stiffness.join(", ")),
@@ -50,7 +50,7 @@ fn drawn(number: u64) -> Case {
         "amplifier={}".into(),
         format!(
             "controller={{ every = {every}, delay = {}, {structure} }}",
-            every * [0.0, 0.4, 1.0][number as usize % 3]
+            every * [0.0, 0.4, 1.0][number as usize % 4 % 3]
         ),
     ];
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("stages").join(kind).join("square.toml");
@@ -61,6 +61,7 @@ fn drawn(number: u64) -> Case {
 struct Sampled {
     phi: DMatrix<f64>,
     gamma: [DMatrix<f64>; 2],
+    drives: usize,
     rows: DMatrix<f64>,
     t: f64,
 }
@@ -69,23 +70,28 @@ impl Sampled {
     fn of(case: &Case) -> Self {
         let design = case.controller.as_ref().unwrap();
         let system = System::of(&case.machine, Operation::default()).unwrap();
-        let n = system.a.nrows();
+        let (n, drives) = (system.a.nrows(), case.machine.drives.len());
         let held = |time: f64| {
-            let mut whole = DMatrix::zeros(n + 2, n + 2);
+            let mut whole = DMatrix::zeros(n + drives, n + drives);
             whole.view_mut((0, 0), (n, n)).copy_from(&(&system.a * time));
-            whole.view_mut((0, n), (n, 2)).copy_from(&(&system.b * time));
+            whole.view_mut((0, n), (n, drives)).copy_from(&(&system.b * time));
             let done = whole.exp();
-            (done.view((0, 0), (n, n)).into_owned(), done.view((0, n), (n, 2)).into_owned())
+            (done.view((0, 0), (n, n)).into_owned(), done.view((0, n), (n, drives)).into_owned())
         };
         let late = design.delay;
         let ((early, first), (rest, second)) = (held(late), held(design.every - late));
         let find = |name: &str| system.outputs.iter().position(|output| output.name == name).unwrap();
-        let names = ["left_angle", "right_angle", "left_current", "right_current"];
-        let rows = DMatrix::from_fn(4, n, |row, column| {
-            let length = if row < 2 { case.machine.pulley_radius } else { 1.0 };
+        let names = match drives {
+            2 => vec!["left_angle", "right_angle", "left_current", "right_current"],
+            _ => {
+                vec!["left_angle", "right_angle", "cart_pulley_angle", "left_current", "right_current", "cart_current"]
+            }
+        };
+        let rows = DMatrix::from_fn(2 * drives, n, |row, column| {
+            let length = if row < drives { case.machine.pulley_radius } else { 1.0 };
             length * system.c[(find(names[row]), column)]
         });
-        Self { phi: &rest * early, gamma: [rest * first, second], rows, t: design.every }
+        Self { phi: &rest * early, gamma: [rest * first, second], drives, rows, t: design.every }
     }
 
     /// Positions and currents per command at ω.
@@ -97,36 +103,43 @@ impl Sampled {
             if i == j { own + z } else { own }
         });
         let [old, new] = &self.gamma;
-        let input = DMatrix::from_fn(n, 2, |i, j| old[(i, j)] / z + new[(i, j)]);
+        let input = DMatrix::from_fn(n, self.drives, |i, j| old[(i, j)] / z + new[(i, j)]);
         let states = whole.lu().solve(&input).unwrap();
-        let all = DMatrix::from_fn(4, n, |i, j| Complex::new(self.rows[(i, j)], 0.0)) * states;
-        [0, 2].map(|row| Square::from_fn(|i, j| all[(row + i, j)]))
+        let all = DMatrix::from_fn(2 * self.drives, n, |i, j| Complex::new(self.rows[(i, j)], 0.0)) * states;
+        [0, self.drives].map(|row| Square::from_fn(self.drives, self.drives, |i, j| all[(row + i, j)]))
     }
 }
 
-/// S, T and the loop of each drive with the other closed, all by their definitions, broken there.
+/// S, T and the loop of each drive with the others closed, all by their definitions, broken there.
 fn broken(
     at: Break,
     [position, current]: [Square; 2],
     feedback: &Feedback,
     omega: f64,
-) -> (f64, f64, [Complex<f64>; 2]) {
+) -> (f64, f64, Vec<Complex<f64>>) {
     let terms = feedback.at(omega);
-    let one = Square::identity();
+    let drives = position.nrows();
+    let one = || Square::identity(drives, drives);
     let inverse = |a: Square| a.try_inverse().unwrap();
     let [by_position, by_current] = [terms.position / terms.own, terms.current / terms.own];
     let l = match at {
         Break::Command => position * by_position + current * by_current,
         // y = G u with the loop of the current closed about u
-        Break::Position => position * inverse(one + current * by_current) * by_position,
-        Break::Current => current * inverse(one + position * by_position) * by_current,
+        Break::Position => position * inverse(one() + current * by_current) * by_position,
+        Break::Current => current * inverse(one() + position * by_position) * by_current,
         Break::Scale => unreachable!("no gantry has a scale"),
     };
-    let s = inverse(one + l);
+    let whole = one() + &l;
+    let s = inverse(whole.clone());
     let size = |a: Square| a.singular_values()[0];
-    // The other drive's loop is closed: u₂ = −l₂₁ u₁/(1 + l₂₂)
-    let alone = |j: usize, k: usize| l[(j, j)] - l[(j, k)] * l[(k, j)] / (l[(k, k)] + 1.0);
-    (size(s), size(l * s), [alone(0, 1), alone(1, 0)])
+    // The loops of the other drives are closed: u_k = −(1 + L_kk)⁻¹ L_kj u_j
+    let alone = |j: usize| {
+        let closed = whole.clone().remove_row(j).remove_column(j);
+        let from = l.column(j).into_owned().remove_row(j);
+        let to = l.row(j).into_owned().remove_column(j);
+        l[(j, j)] - (to * inverse(closed) * from)[(0, 0)]
+    };
+    (size(s.clone()), size(&l * s), (0..drives).map(alone).collect())
 }
 
 #[test]
@@ -149,11 +162,11 @@ fn margins_are_those_of_matrices_on_a_dense_grid() {
         let (mut ms, mut mt, mut gain, mut phase) = (0.0_f64, 0.0_f64, f64::INFINITY, f64::INFINITY);
         for &at in breaks(&feedback) {
             breaks_seen += 1;
-            let mut before: Option<[Complex<f64>; 2]> = None;
+            let mut before: Option<Vec<Complex<f64>>> = None;
             for (k, &omega) in grid.iter().enumerate() {
                 let (s, t, loops) = broken(at, sampled.at(omega), &feedback, omega);
                 (ms, mt) = (ms.max(s), mt.max(t));
-                for (was, is) in before.filter(|_| k < 3999).iter().flatten().zip(loops) {
+                for (was, is) in before.filter(|_| k < 3999).iter().flatten().zip(&loops) {
                     if was.im * is.im < 0.0 && was.re < 0.0 && is.re < 0.0 && (is - was).norm() < 0.3 * is.norm() {
                         // Where the straight line between them is real.
                         let share = was.im / (was.im - is.im);
@@ -210,7 +223,8 @@ fn a_drive_swings_beyond_its_gain_margin() {
         let feedback = Feedback::new(design, &case.machine).unwrap();
         let plant = Plant::of(&case.machine, Operation::default(), design, &feedback.corners()).unwrap();
         let margins = Margins::of(&plant, &feedback);
-        let calm = |gains: [f64; 2]| {
+        let drives = case.machine.drives.len();
+        let calm = |gains: Vec<f64>| {
             let of_drive = |inner: Standard, gain: f64| Louder { inner, gain };
             let both = Standard::of_drives(design, &case.machine).unwrap();
             let mut louder: Vec<Louder> = both.into_iter().zip(gains).map(|(one, gain)| of_drive(one, gain)).collect();
@@ -224,11 +238,11 @@ fn a_drive_swings_beyond_its_gain_margin() {
         if margins.stable && (margins.sensitivity > 8.0 || !(1.15..20.0).contains(&margins.gain)) {
             continue;
         }
-        assert_eq!(margins.stable, calm([1.0, 1.0]), "{number}: {margins:?}");
+        assert_eq!(margins.stable, calm(vec![1.0; drives]), "{number}: {margins:?}");
         // Broken at a measurement, another gain grows; a loop of several drives has one for each.
         if margins.stable && margins.breaks.gain == Break::Command {
             let louder = |factor: f64| {
-                let mut gains = [1.0; 2];
+                let mut gains = vec![1.0; drives];
                 gains[margins.breaks.gain_drive] = 1.0 + factor * (margins.gain - 1.0);
                 gains
             };

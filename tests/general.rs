@@ -375,7 +375,7 @@ fn events_of_equations_for_another_integrator_are_bounded() {
     let mut count = 0;
     let ending = (0..200_000_u32).find_map(|k| {
         let volts = if k % 2 == 0 { 12.0 } else { -12.0 };
-        dynamics.put(1e-9 * f64::from(k), &values, &[volts, 0.0]);
+        dynamics.put(1e-9 * f64::from(k), &values, &[volts, 0.0, 0.0]);
         let ending = dynamics.settle(&mut events).err();
         count += events.len();
         events.clear();

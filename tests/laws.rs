@@ -87,7 +87,7 @@ proptest! {
             let mode = |positive| Mode::of(codes.map(motion)).with_torque(positive);
             let state = state(trajectory, row);
             // The sign of the gear's torque is the one that is consistent with itself.
-            let both = [true, false].map(|positive| mechanism.power(mode(positive), &state, &[input_at(row), 0.0]));
+            let both = [true, false].map(|positive| mechanism.power(mode(positive), &state, &[input_at(row), 0.0, 0.0]));
             let loss = |p: &Power| p.gear;
             let power = if loss(&both[0]) >= 0.0 { both[0] } else { both[1] };
             prop_assert!(power.imbalance().abs() <= 1e-9 * power.scale().max(1e-12), "{power:?}");
@@ -187,7 +187,7 @@ proptest! {
                 prop_assert!(torque == 0.0);
             }
             let both = [true, false]
-                .map(|positive| mechanism.power(mode.with_torque(positive), &state, &[command / amplifier.gain, 0.0]));
+                .map(|positive| mechanism.power(mode.with_torque(positive), &state, &[command / amplifier.gain, 0.0, 0.0]));
             let power = if both[0].gear >= 0.0 { both[0] } else { both[1] };
             // What a spring at its very end stores is known to the rounding of where it is.
             prop_assert!(power.imbalance().abs() <= 1e-8 * power.scale().max(1e-6), "row {row}: {power:?}\n{mode:?}");

@@ -221,11 +221,12 @@ fn every_number_is_set_where_a_case_file_has_it() {
         let written = |change: &str| Ok(Case::from_text_with(&name, &text, &[change])?.machine);
         set_each(&case.machine, &|key| case.value(key).is_ok(), &written, &mut seen);
     }
-    for (kind, law) in ["h-frame", "core-xy", "core-xy"].into_iter().zip(LAWS) {
+    for (kind, law) in ["h-frame", "core-xy", "core-xy", "dual-belt"].into_iter().zip(LAWS.into_iter().cycle()) {
         let text = GANTRY.replace("KIND", kind).replace("LAW", law).replace(
             "SPANS",
             match kind {
                 "h-frame" => "1024, 1024, 512",
+                "dual-belt" => "1024, 512, 1024, 512, 1024, 512",
                 _ => "1024, 512, 1024, 512",
             },
         );
@@ -553,6 +554,7 @@ fn each_number_of_each_bundled_machine_takes_its_own_value_back() {
         "two-mass/two-mass.toml",
         "h-frame/follows.toml",
         "core-xy/core-xy.toml",
+        "dual-belt/dual-belt.toml",
     ];
     for path in cases {
         let path = format!("stages/{path}");

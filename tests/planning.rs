@@ -140,10 +140,10 @@ fn gantry(kind: &str, motion: &str) -> Case {
 }
 
 #[test]
-fn a_path_is_planned_within_the_limits_of_both_motors() {
+fn a_path_is_planned_within_the_limits_of_all_motors() {
     let path = "points = [[0.05, 0.0], { to = [0.05, 0.04], wait = 0.05 }, \
                 { to = [0.03, 0.02], center = [0.03, 0.04] }, [-0.03, -0.02]]";
-    for kind in ["h-frame", "core-xy"] {
+    for kind in ["h-frame", "core-xy", "dual-belt"] {
         let slow = format!("move=[{{ name = \"path\", {path}, speed = 0.2, acceleration = 2, until = 2 }}]");
         let case = gantry(kind, &slow);
         let design = case.controller.as_ref().unwrap();

@@ -20,6 +20,8 @@ fn machines() -> Vec<(&'static str, String)> {
         "stages/h-frame/follows.toml",
         "stages/core-xy/core-xy.toml",
         "stages/core-xy/follows.toml",
+        "stages/dual-belt/dual-belt.toml",
+        "stages/dual-belt/follows.toml",
         "stages/sollmann-jouaneh/table4.toml",
         "stages/two-mass/two-mass.toml",
         "stages/printer-axis/printer-axis.toml",

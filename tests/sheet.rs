@@ -160,7 +160,7 @@ fn both_ways_to_the_slowest_swing_agree() {
     let mut rigid = common::table4();
     rigid.belt.model = BeltModel::Rigid;
     assert_eq!(slowest_swing(&rigid.mechanism()), None);
-    for kind in [Kind::HFrame, Kind::CoreXy] {
+    for kind in [Kind::HFrame, Kind::CoreXy, Kind::DualBelt] {
         let gantry = Case::from_text_with("gantry.toml", &gantry_template(kind), &[]).unwrap().machine;
         let hertz = Natural::frequencies(&gantry.mechanism(), &[0.0; 6]).unwrap()[0];
         assert!((slowest_swing(&gantry.mechanism()).unwrap() / (TAU * hertz) - 1.0).abs() < 1e-9);

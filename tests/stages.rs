@@ -85,7 +85,10 @@ fn curve_of_gantry(path: &Path, case: &Case) -> String {
         for kept in 0..=KEPT {
             let row = (rows.len() - 1) * kept / KEPT;
             let at = |name: &str| rows.get(name).unwrap()[row];
-            let angles = [at("left_angle"), at("right_angle"), 0.0, 0.0, 0.0, 0.0];
+            let (geometry, mut angles) = (case.machine.geometry(), [0.0; 6]);
+            for drive in geometry.drives {
+                angles[drive.pulley] = at(&format!("{}_angle", geometry.label(drive.pulley).key));
+            }
             let places: [f64; 2] = case.machine.by_drives(&angles).try_into().unwrap();
             let [x, y] = places.map(|way| way + 0.0);
             let (time, bridge, cart) = (at("time"), at("bridge_position"), at("cart_position"));

@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 use taut::case::Case;
-use taut::machine::{BeltModel, Machine};
+use taut::machine::{BeltModel, DriveAt, Machine};
 use taut::mechanism::Heading;
 use taut::trajectory::Trajectory;
 
@@ -121,17 +121,25 @@ fn of_axis(machine: &Machine) -> Vec<Panel> {
 }
 
 fn of_gantry(gantry: &Machine) -> Vec<Panel> {
+    let geometry = gantry.geometry();
+    let angles: Vec<String> =
+        geometry.drives.iter().map(|drive| format!("{}_angle", geometry.label(drive.pulley).key)).collect();
     // As Machine::by_drives has it, term by term.
-    let weights = |slide: usize| {
-        let weights = gantry.geometry().slides[slide].by_drives;
-        [0, 1].map(|drive: usize| weights[drive] * gantry.pulley_radius)
+    let by_drives = |slide: usize| -> Vec<(&str, f64)> {
+        let weights = geometry.slides[slide].by_drives.iter().map(|weight| weight * gantry.pulley_radius);
+        angles.iter().map(String::as_str).zip(weights).filter(|(_, weight)| *weight != 0.0).collect()
     };
-    let [x, y] = [0, 1].map(weights);
-    let drives = |[left, right]: [f64; 2]| [("left_angle", left), ("right_angle", right)];
-    let error = |weights: [f64; 2], slide: &'static str| {
-        let [left, right] = weights.map(|weight| -weight);
-        [(slide, 1.0), ("left_angle", left), ("right_angle", right)]
+    let error = |number: usize, slide: &'static str| -> Vec<(&str, f64)> {
+        let drives = by_drives(number).into_iter().map(|(angle, weight)| (angle, -weight));
+        std::iter::once((slide, 1.0)).chain(drives).collect()
     };
+    let of_drives = |mut panel: Panel, column: &dyn Fn(&DriveAt) -> &'static str| {
+        for drive in geometry.drives {
+            panel = panel.column(column(drive), drive.side());
+        }
+        panel
+    };
+    let drawing = angles.iter().fold(panel("drawing", "", "", ("", 1.0)), |panel, angle| panel.column(angle, ""));
     let mut force =
         panel("force", "Span forces", "Force of each span beyond its pretension; positive pulls", ("N", 1.0));
     for label in gantry.kind.geometry().span_labels() {
@@ -149,21 +157,13 @@ fn of_gantry(gantry: &Machine) -> Vec<Panel> {
             .column("bridge_speed", "bridge x′")
             .column("cart_speed", "cart y′"),
         panel("error", "Place minus drives", "How far bridge and cart are from where the drives say", UM)
-            .curve("x_error", "bridge", &error(x, "bridge_position"))
-            .curve("y_error", "cart", &error(y, "cart_position")),
+            .curve("x_error", "bridge", &error(0, "bridge_position"))
+            .curve("y_error", "cart", &error(1, "cart_position")),
         force,
-        panel("voltage", "Voltage", "Voltage at each motor", ("V", 1.0))
-            .column("left_voltage", "left")
-            .column("right_voltage", "right"),
-        panel("current", "Current", "Current of each motor", ("A", 1.0))
-            .column("left_current", "left")
-            .column("right_current", "right"),
+        of_drives(panel("voltage", "Voltage", "Voltage at each motor", ("V", 1.0)), &|drive| drive.voltage.key),
+        of_drives(panel("current", "Current", "Current of each motor", ("A", 1.0)), &|drive| drive.current_column),
         state,
-        panel("drawing", "", "", ("", 1.0))
-            .column("left_angle", "")
-            .column("right_angle", "")
-            .curve("bridge_by_drives", "", &drives(x))
-            .curve("cart_by_drives", "", &drives(y)),
+        drawing.curve("bridge_by_drives", "", &by_drives(0)).curve("cart_by_drives", "", &by_drives(1)),
     ]
 }
 

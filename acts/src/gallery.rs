@@ -24,6 +24,9 @@ const GALLERY: &[&str] = &[
     "core-xy/core-xy.toml",
     "core-xy/follows.toml",
     "core-xy/square.toml",
+    "dual-belt/dual-belt.toml",
+    "dual-belt/follows.toml",
+    "dual-belt/square.toml",
 ];
 
 /// All of them: path, title, text, and what their pictures need.

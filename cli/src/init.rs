@@ -17,7 +17,9 @@ pub fn run(args: &Init) -> Outcome {
             (Some(TemplateName::Stage), _) => "stage.toml",
             (Some(TemplateName::Printer), _) => "printer.toml",
             (None, KindName::Axis) => "axis.toml",
-            (Some(TemplateName::Gantry), _) | (None, KindName::HFrame | KindName::CoreXy) => "gantry.toml",
+            (Some(TemplateName::Gantry), _) | (None, KindName::HFrame | KindName::CoreXy | KindName::DualBelt) => {
+                "gantry.toml"
+            }
         });
         return Err(Error::new("this is a folder")
             .in_file(file)
@@ -39,6 +41,7 @@ pub fn run(args: &Init) -> Outcome {
         (None, KindName::Axis) => TEMPLATE.to_string(),
         (None, KindName::HFrame) => gantry_template(Kind::HFrame),
         (None, KindName::CoreXy) => gantry_template(Kind::CoreXy),
+        (None, KindName::DualBelt) => gantry_template(Kind::DualBelt),
     };
     write_atomically(file, text).map_err(Failure::work)?;
     let name = quoted(&file.display().to_string());

@@ -201,6 +201,7 @@ fn the_pictures_are_those_that_the_commands_draw() {
         "taut simulate stages/sollmann-jouaneh/table4.toml --out out/table4 --quiet",
         "taut simulate stages/h-frame/h-frame.toml --out out/h-frame --quiet",
         "taut simulate stages/core-xy/core-xy.toml --out out/core-xy --quiet",
+        "taut simulate stages/dual-belt/dual-belt.toml --out out/dual-belt --quiet",
         "taut paper --out out/paper --json > claims.json",
     ] {
         assert_eq!(printed(folder.path(), line), "", "{line}");
@@ -209,6 +210,7 @@ fn the_pictures_are_those_that_the_commands_draw() {
         ("encoder-and-cart.svg", "out/table4/plots/5-v-pulse-positions.svg"),
         ("h-frame.svg", "out/h-frame/plots/machine.svg"),
         ("core-xy.svg", "out/core-xy/plots/machine.svg"),
+        ("dual-belt.svg", "out/dual-belt/plots/machine.svg"),
         ("stage.svg", "out/paper/figures/figure-01-02.svg"),
         ("friction-laws.svg", "out/paper/figures/friction-laws.svg"),
         ("modes-along-the-travel.svg", "out/paper/figures/modes-along-the-travel.svg"),

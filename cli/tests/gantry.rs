@@ -405,7 +405,7 @@ fn a_sweep_that_a_gantry_cannot_have_is_told() {
     let interval = told("cart.mass=20%", &["--interval", "2 s"]);
     assert!(interval.contains("an interval of 2 s does not suit \"one motor\"\n"), "{interval}");
     let apart = told("motor.resistance=20%", &["--set", "left_drive.motor.resistance=0.8 ohm"]);
-    assert!(apart.contains("`motor.resistance` is not the same in both drives\n"), "{apart}");
+    assert!(apart.contains("`motor.resistance` is not the same in all drives\n"), "{apart}");
     assert_eq!(
         refused(&["sweep"], &case),
         "error: stages/h-frame.toml: this case has no parameters to vary\n  \

@@ -19,9 +19,10 @@ const PID: &str = "stages/sollmann-jouaneh/controllers/pid.toml";
 /// A loop that is stable on the whole family.
 const SHAPED: &str = "stages/sollmann-jouaneh/controllers/pid-shaped.toml";
 const LOGS: &str = "stages/sollmann-jouaneh/identification/separate.toml";
-const GANTRIES: [&str; 2] = ["stages/h-frame/h-frame.toml", "stages/core-xy/core-xy.toml"];
+const GANTRIES: [&str; 3] =
+    ["stages/h-frame/h-frame.toml", "stages/core-xy/core-xy.toml", "stages/dual-belt/dual-belt.toml"];
 /// Gantries with a controller and moves.
-const IN_LOOP: [&str; 2] = ["stages/h-frame/square.toml", "stages/core-xy/square.toml"];
+const IN_LOOP: [&str; 3] = ["stages/h-frame/square.toml", "stages/core-xy/square.toml", "stages/dual-belt/square.toml"];
 
 /// An axis whose motor is told a position.
 const STEPPER: &str = "stages/stepper-axis/stepper-axis.toml";

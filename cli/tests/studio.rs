@@ -471,6 +471,7 @@ fn a_section_goes_through_the_rows_of_the_run() {
     let cases = [
         "stages/sollmann-jouaneh/table4.toml",
         "stages/h-frame/h-frame.toml",
+        "stages/dual-belt/dual-belt.toml",
         "stages/printer-axis/printer-axis.toml",
         "stages/laser-gantry/laser-gantry.toml",
     ];

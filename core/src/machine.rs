@@ -1,6 +1,7 @@
 //! The machine: motor, amplifier, pulleys, belt, cart, encoder, recorder. Everything in SI units.
 
 pub mod axis;
+mod dual_belt;
 pub mod gantry;
 mod geometry;
 mod kind;
@@ -20,7 +21,7 @@ pub use spans::Spans;
 use std::f64::consts::PI;
 pub use swing::slowest_swing;
 
-/// A belt-driven machine: an axis (paper, Fig. 1 and 2), or a gantry with two drives.
+/// A belt-driven machine: an axis (paper, Fig. 1 and 2), or a gantry with several drives.
 ///
 /// [`Kind`] has its geometry; how many drives, spans and slides there are follows from it.
 #[derive(Debug, Clone, PartialEq)]

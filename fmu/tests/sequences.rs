@@ -164,6 +164,7 @@ fn random_sequences_of_calls_end_well() {
         Unit::of("sollmann-jouaneh/table4.toml", false),
         Unit::of("core-xy/core-xy.toml", false),
         Unit::of("core-xy/follows.toml", false),
+        Unit::of("dual-belt/dual-belt.toml", false),
         Unit::of("sollmann-jouaneh/controllers/pid.toml", true),
         Unit::with("sollmann-jouaneh/table4.toml", &["travel={ min = \"-1 mm\", max = \"1 mm\" }"], false),
     ];

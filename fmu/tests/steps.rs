@@ -155,6 +155,7 @@ fn a_state_as_bytes_goes_on_bit_for_bit_in_another_instance() {
     for (case, input) in [
         ("sollmann-jouaneh/table4.toml", "command"),
         ("core-xy/core-xy.toml", "left_command"),
+        ("dual-belt/dual-belt.toml", "cart_command"),
         ("emps/emps.toml", "command"),
     ] {
         let unit = Unit::of(case, false);
@@ -307,12 +308,17 @@ fn a_load_picked_up_under_way_is_a_tunable_mass() {
 #[test]
 fn gantries_and_general_stages_end_where_their_solver_does() {
     // Exact but for rounding; and with the general solver, whose steps begin anew with ours, to its tolerance.
-    for (name, tolerance) in
-        [("core-xy/core-xy.toml", SAME), ("h-frame/h-frame.toml", SAME), ("core-xy/follows.toml", 1e-9)]
-    {
+    for (name, tolerance) in [
+        ("core-xy/core-xy.toml", SAME),
+        ("h-frame/h-frame.toml", SAME),
+        ("dual-belt/dual-belt.toml", SAME),
+        ("core-xy/follows.toml", 1e-9),
+    ] {
         let case = Case::read_with(machine(name), &[]).unwrap();
         let (mechanism, mut end) = (case.machine.mechanism(), Vec::new());
-        let inputs = [6.0, -2.0].map(|value| Signal::Step { value, at: 0.0 }).to_vec();
+        let sides = case.machine.geometry().sides();
+        let commands: Vec<(&str, f64)> = sides.zip([6.0, -2.0, 4.0]).collect();
+        let inputs = commands.iter().map(|(_, value)| Signal::Step { value: *value, at: 0.0 }).collect();
         let course = Course { inputs, start: case.experiments[0].initial, until: 0.1, every: 0.01 };
         let mut keep = |block: &Trajectory| {
             end = block.columns.iter().map(|column| (column.name.clone(), *column.values.last().unwrap())).collect();
@@ -323,8 +329,9 @@ fn gantries_and_general_stages_end_where_their_solver_does() {
         let unit = Unit::of(name, false);
         let instance = unit.three(false, false);
         instance.start();
-        assert_eq!(instance.set("left_command", 6.0), OK);
-        assert_eq!(instance.set("right_command", -2.0), OK);
+        for (side, value) in commands {
+            assert_eq!(instance.set(&format!("{side}_command"), value), OK);
+        }
         let mut time = 0.0;
         for size in [0.0137, 0.0005, 0.0458] {
             time = instance.step(time, size).last;

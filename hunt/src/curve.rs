@@ -5,13 +5,16 @@
 //! products, quotients, e^y (k E_k = Σ j y_j E_{k−j}) and tanh (T′ = N y′, N′ = −2 T N y′, N = 1 − T²).
 
 use crate::double::{Double, ROUNDING};
-use crate::machine::{BODIES, STATES};
+use crate::machine::{BODIES, SPANS, STATES};
 use crate::series::{ORDER, PLACES, Terms};
 
 /// Place of the curved part of the friction of each body.
-pub const FRICTION: [usize; BODIES] = [STATES, STATES + 1, STATES + 2, STATES + 3];
+pub const FRICTION: [usize; BODIES] = [STATES, STATES + 1, STATES + 2, STATES + 3, STATES + 4];
 /// Place of the force of each span that follows, k(x) s.
-pub const SPAN: [usize; BODIES] = [STATES + 4, STATES + 5, STATES + 6, STATES + 7];
+pub const SPAN: [usize; SPANS] = {
+    let behind = STATES + BODIES;
+    [behind, behind + 1, behind + 2, behind + 3, behind + 4, behind + 5]
+};
 
 /// A straight line of a position: value + slope · state.
 #[derive(Debug, Clone, Copy)]

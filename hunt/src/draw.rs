@@ -98,6 +98,7 @@ pub struct Drawn {
 /// Added to the seed for lines, which are drawn by themselves, and for cases with features.
 const LINES: u64 = 0x6c69_6e65;
 const PAIRS: u64 = 0x7477_6f73;
+const DUAL_BELTS: u64 = 0x6475_616c;
 
 /// The stage of this number.
 pub fn stage(seed: u64, number: u64) -> Drawn {
@@ -117,8 +118,29 @@ pub fn pair(seed: u64, number: u64) -> (Drawn, Vec<Feature>) {
     let title = format!("seed {seed}, pair {number}");
     let sizes = draw.sizes();
     draw.share_curves();
-    let is_gantry = features.iter().any(|one| matches!(one, Feature::HFrame | Feature::CoreXy));
+    let is_gantry = features.iter().any(|one| one.is_gantry());
     (if is_gantry { draw.gantry(title, sizes) } else { draw.machine(title, sizes, lines) }, features)
+}
+
+/// The case of this number with a dual belt in place of its machine, and the features that such a gantry can have.
+pub fn dual_belt(seed: u64, number: u64) -> (Drawn, Vec<Feature>) {
+    let mut features = recipe(seed, number);
+    features.retain(|one| one.goes_with(Feature::DualBelt));
+    features.push(Feature::DualBelt);
+    // A move has become an open loop.
+    if !features.contains(&Feature::Open) {
+        features.push(Feature::Open);
+    }
+    if !features.iter().any(|one| one.is_input()) {
+        features.push(Feature::Step);
+    }
+    features.sort();
+    let mut draw = Draw::new(seed ^ DUAL_BELTS, number);
+    draw.features = Some(features.clone());
+    let title = format!("seed {seed}, dual belt {number}");
+    let sizes = draw.sizes();
+    draw.share_curves();
+    (draw.gantry(title, sizes), features)
 }
 
 /// Inertias as masses at the belt, stiffnesses and what follows from them.
@@ -248,7 +270,7 @@ impl Draw {
             _ => "elastic",
         };
         // A rigid belt has no spans, and a gantry is elastic.
-        let has_spans = [Feature::Slack, Feature::Follows, Feature::HFrame, Feature::CoreXy];
+        let has_spans = [Feature::Slack, Feature::Follows, Feature::HFrame, Feature::CoreXy, Feature::DualBelt];
         let model = if has_spans.into_iter().any(|one| self.wants(one)) { "elastic" } else { model };
         if model != "elastic" {
             self.kind(Kind::Reduced);

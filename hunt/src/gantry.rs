@@ -1,8 +1,8 @@
-//! H-frame and CoreXY as the independent solver wants them: their rows of lever arms, written from the paper.
+//! H-frame, CoreXY and dual belt as the independent solver wants them: their rows of lever arms, written from the paper.
 //!
 //! H-frame: ½ k_l (r φ₁ + x + y)² + ½ k_r (−r φ₂ + x − y)² + ½ k_b (−r φ₁ + r φ₂ − 2 x)² (Sollmann, Jouaneh and
 //! Lavender 2010, eq. (13)). CoreXY: belt A is let out by φ_A on one side of its motor and taken in on the other, where
-//! the cart goes by x + y; belt B by x − y.
+//! the cart goes by x + y; belt B by x − y. A dual belt does the same on either side with x alone, and along the bridge with y.
 
 use crate::double::Double;
 use crate::machine::{
@@ -15,24 +15,39 @@ use taut::machine::{Kind, Machine};
 type Row = ([f64; BODIES], [f64; 2]);
 
 /// Left, right, back.
-const H_FRAME: [Row; 3] =
-    [([1.0, 0.0, 1.0, 1.0], [1.0, 1.0]), ([0.0, -1.0, 1.0, -1.0], [1.0, -1.0]), ([-1.0, 1.0, -2.0, 0.0], [-2.0, 0.0])];
+const H_FRAME: [Row; 3] = [
+    ([1.0, 0.0, 1.0, 1.0, 0.0], [1.0, 1.0]),
+    ([0.0, -1.0, 1.0, -1.0, 0.0], [1.0, -1.0]),
+    ([-1.0, 1.0, -2.0, 0.0, 0.0], [-2.0, 0.0]),
+];
 
 /// A out, A back, B out, B back.
 const CORE_XY: [Row; 4] = [
-    ([1.0, 0.0, -1.0, -1.0], [-1.0, -1.0]),
-    ([-1.0, 0.0, 1.0, 1.0], [1.0, 1.0]),
-    ([0.0, 1.0, -1.0, 1.0], [-1.0, 1.0]),
-    ([0.0, -1.0, 1.0, -1.0], [1.0, -1.0]),
+    ([1.0, 0.0, -1.0, -1.0, 0.0], [-1.0, -1.0]),
+    ([-1.0, 0.0, 1.0, 1.0, 0.0], [1.0, 1.0]),
+    ([0.0, 1.0, -1.0, 1.0, 0.0], [-1.0, 1.0]),
+    ([0.0, -1.0, 1.0, -1.0, 0.0], [1.0, -1.0]),
 ];
 
-/// Changes of r φ₁ and r φ₂ with x and with y where no span is strained.
-fn pulleys(kind: Kind) -> [[f64; 2]; 2] {
+/// Left out, left back, right out, right back, cart out, cart back; the third pulley is the cart's.
+const DUAL_BELT: [Row; 6] = [
+    ([1.0, 0.0, 0.0, -1.0, 0.0], [-1.0, 0.0]),
+    ([-1.0, 0.0, 0.0, 1.0, 0.0], [1.0, 0.0]),
+    ([0.0, 1.0, 0.0, -1.0, 0.0], [-1.0, 0.0]),
+    ([0.0, -1.0, 0.0, 1.0, 0.0], [1.0, 0.0]),
+    ([0.0, 0.0, 1.0, 0.0, -1.0], [0.0, -1.0]),
+    ([0.0, 0.0, -1.0, 0.0, 1.0], [0.0, 1.0]),
+];
+
+/// The spans, and the changes of r φ of each pulley with x and with y where no span is strained.
+fn frame(kind: Kind) -> (&'static [Row], &'static [[f64; 2]]) {
     match kind {
         // r φ₁ = −x − y, r φ₂ = x − y
-        Kind::HFrame => [[-1.0, 1.0], [-1.0, -1.0]],
+        Kind::HFrame => (&H_FRAME, &[[-1.0, -1.0], [1.0, -1.0]]),
         // r φ_A = x + y, r φ_B = x − y
-        Kind::CoreXy => [[1.0, 1.0], [1.0, -1.0]],
+        Kind::CoreXy => (&CORE_XY, &[[1.0, 1.0], [1.0, -1.0]]),
+        // r φ₁ = r φ₂ = x, r φ₃ = y
+        Kind::DualBelt => (&DUAL_BELT, &[[1.0, 0.0], [1.0, 0.0], [0.0, 1.0]]),
         Kind::Axis => panic!("an axis has one drive"),
     }
 }
@@ -41,14 +56,15 @@ fn pulleys(kind: Kind) -> [[f64; 2]; 2] {
 pub fn machine(gantry: &Machine, experiment: &Experiment, taken: Taken) -> Model {
     let r = taken(gantry.pulley_radius);
     let initial = &experiment.initial;
-    let [x, y] = [2, 3].map(|body| Double::from(initial.position[body]));
-    let [of_x, of_y] = pulleys(gantry.kind);
-    let origin = [x * of_x[0] + y * of_y[0], x * of_x[1] + y * of_y[1], x, y];
-    let rows: &[Row] = match gantry.kind {
-        Kind::HFrame => &H_FRAME,
-        Kind::CoreXy => &CORE_XY,
-        Kind::Axis => panic!("an axis has one drive"),
-    };
+    let (rows, pulleys) = frame(gantry.kind);
+    // Bridge and cart are the bodies behind the pulleys.
+    let (bridge_body, cart_body) = (pulleys.len(), pulleys.len() + 1);
+    let [x, y] = [bridge_body, cart_body].map(|body| Double::from(initial.position[body]));
+    let mut origin = [Double::ZERO; BODIES];
+    for (origin, [of_x, of_y]) in origin.iter_mut().zip(pulleys) {
+        *origin = x * *of_x + y * *of_y;
+    }
+    (origin[bridge_body], origin[cart_body]) = (x, y);
     let follows = gantry
         .belt
         .following()
@@ -58,7 +74,11 @@ pub fn machine(gantry: &Machine, experiment: &Experiment, taken: Taken) -> Model
         let follows = follows.as_ref().map(|(rigidity, lengths)| Follows {
             rigidity: *rigidity,
             length: lengths[j] + x * a + y * b,
-            of: [0.0, 0.0, a, b],
+            of: std::array::from_fn(|body| match body {
+                body if body == bridge_body => a,
+                body if body == cart_body => b,
+                _ => 0.0,
+            }),
         });
         let (stiffness, damping) = (taken(gantry.belt.stiffness[j]), taken(gantry.belt.damping[j]));
         spans.push(Span { arms, stiffness, damping, follows });
@@ -71,35 +91,54 @@ pub fn machine(gantry: &Machine, experiment: &Experiment, taken: Taken) -> Model
     let [end_x, end_y] = [0, 1].map(|i| slides[i].travel.map(|travel| ends(travel, taken, if i == 0 { x } else { y })));
     let mut z = [Double::ZERO; STATES];
     let mut beyond = [Double::ZERO; BODIES];
-    for body in 0..2 {
+    for body in 0..pulleys.len() {
         let strain = Double::from(gantry.pulley_radius) * initial.position[body] - origin[body];
         match is_strain(strain, origin[body].abs() + x.abs() + y.abs()) {
             true => z[WAY[body]] = strain * taken(1.0),
             false => beyond[body] = strain,
         }
         z[SPEED[body]] = taken(initial.speed[body]) * r;
-        z[SPEED[2 + body]] = taken(initial.speed[2 + body]);
         z[CURRENT[body]] = taken(initial.current[body]);
         (z[ROTOR[body][0]], z[ROTOR[body][1]]) = (z[WAY[body]], z[SPEED[body]]);
     }
+    for body in [bridge_body, cart_body] {
+        z[SPEED[body]] = taken(initial.speed[body]);
+    }
+    // What the pulleys have in common, and then bridge and cart.
+    let bridge = taken(gantry.first_slide().mass) + cart;
+    let (mut mass, mut frictions, mut lever) = ([pulley; BODIES], [own; BODIES], [r; BODIES]);
+    // The cart rides along with the bridge.
+    (mass[bridge_body], mass[cart_body]) = (bridge, cart);
+    (frictions[bridge_body], frictions[cart_body]) = (of_bridge, of_cart);
+    (lever[bridge_body], lever[cart_body]) = (Double::ONE, Double::ONE);
+    let mut travels = [None; BODIES];
+    (travels[bridge_body], travels[cart_body]) = (end_x, end_y);
+    // Changes of all positions with x, and with y.
+    let with = |number: usize, own: usize| {
+        let mut all = [0.0; BODIES];
+        all.iter_mut().zip(pulleys).for_each(|(all, of)| *all = of[number]);
+        all[own] = 1.0;
+        all
+    };
     Model {
-        bodies: 4,
-        leader: [0, 1, 2, 3],
-        // The cart rides along with the bridge.
-        mass: [pulley, pulley, taken(gantry.first_slide().mass) + cart, cart],
-        friction: [own, own, of_bridge, of_cart],
+        bodies: pulleys.len() + 2,
+        leader: std::array::from_fn(|body| body),
+        mass,
+        friction: frictions,
         along: None,
         spans,
         pretension: gantry.belt.pretension.map(&mut *taken),
         force: Double::ZERO,
         lines: [None, None],
-        ends: [None, None, end_x, end_y],
-        drives: (0..2).map(|i| drive(i, &gantry.drives[i].motor, &gantry.drives[i].amplifier, taken, r)).collect(),
+        ends: travels,
+        drives: (0..pulleys.len())
+            .map(|i| drive(i, &gantry.drives[i].motor, &gantry.drives[i].amplifier, taken, r))
+            .collect(),
         start: z,
         beyond,
         origin,
-        lever: [r, r, Double::ONE, Double::ONE],
-        place: vec![(2, [of_x[0], of_x[1], 1.0, 0.0]), (3, [of_y[0], of_y[1], 0.0, 1.0])],
+        lever,
+        place: vec![(bridge_body, with(0, bridge_body)), (cart_body, with(1, cart_body))],
         delayed: 0.0,
     }
 }

@@ -3,7 +3,8 @@
 use crate::curve::{self, Curved, Kind, Ramp};
 use crate::double::Double;
 use crate::machine::{
-    BODIES, BRISTLE, CURRENT, Curve, DRIVES, Drive, Ends, Flanks, Line, Model, Play, ROTOR, SPEED, STATES, State, WAY,
+    BODIES, BRISTLE, CURRENT, Curve, DRIVES, Drive, Ends, Flanks, Line, Model, Play, ROTOR, SPANS, SPEED, STATES,
+    State, WAY,
 };
 use crate::root::Polynomial;
 use crate::series::{Form, Rates, Row};
@@ -51,7 +52,7 @@ pub struct Mode {
     /// True if the torque that each motor hands to its gear is positive.
     pub gear_positive: [bool; DRIVES],
     /// Spans.
-    pub slack: [bool; BODIES],
+    pub slack: [bool; SPANS],
     /// Gears with backlash.
     pub gear: [Touch; DRIVES],
     /// End stops.

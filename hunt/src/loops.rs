@@ -111,7 +111,7 @@ pub fn run(
 }
 
 fn pieces(at: f64, value: f64) -> Pieces {
-    [Piece::line(Double::from(at), Double::from(value), Double::ZERO), Piece::default()]
+    [Piece::line(Double::from(at), Double::from(value), Double::ZERO), Piece::default(), Piece::default()]
 }
 
 /// The measured position along the belt.

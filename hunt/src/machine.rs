@@ -12,23 +12,25 @@ use taut::mechanism::{Amplifier, Motor};
 use taut::polyline::Polyline;
 
 /// Bodies that a machine can have beside its rotors, and its drives.
-pub const BODIES: usize = 4;
+pub const BODIES: usize = 5;
 /// Drives.
-pub const DRIVES: usize = 2;
+pub const DRIVES: usize = 3;
+/// Spans.
+pub const SPANS: usize = 6;
 
 /// States: positions and speeds along the belt of the bodies, currents, positions and speeds of rotors that turn by
 /// themselves, deflections of bristles.
 pub const STATES: usize = 2 * BODIES + DRIVES + 2 * DRIVES + BODIES;
 /// Position of each body; its speed stands behind it.
-pub const WAY: [usize; BODIES] = [0, 2, 4, 6];
+pub const WAY: [usize; BODIES] = [0, 2, 4, 6, 8];
 /// Speed of each body.
-pub const SPEED: [usize; BODIES] = [1, 3, 5, 7];
+pub const SPEED: [usize; BODIES] = [1, 3, 5, 7, 9];
 /// Current of each drive.
-pub const CURRENT: [usize; DRIVES] = [8, 9];
+pub const CURRENT: [usize; DRIVES] = [10, 11, 12];
 /// Each rotor's position and speed.
-pub const ROTOR: [[usize; 2]; DRIVES] = [[10, 11], [12, 13]];
+pub const ROTOR: [[usize; 2]; DRIVES] = [[13, 14], [15, 16], [17, 18]];
 /// Deflection of each body's bristles.
-pub const BRISTLE: [usize; BODIES] = [14, 15, 16, 17];
+pub const BRISTLE: [usize; BODIES] = [19, 20, 21, 22, 23];
 
 /// A state.
 pub type State = [Double; STATES];
@@ -227,12 +229,12 @@ impl Model {
         Self {
             bodies: 3,
             leader: match machine.belt.model {
-                BeltModel::Elastic => [0, 1, 2, 3],
-                BeltModel::TwoMass => [0, 1, 0, 3],
-                BeltModel::Rigid => [1, 1, 1, 3],
+                BeltModel::Elastic => [0, 1, 2, 3, 4],
+                BeltModel::TwoMass => [0, 1, 0, 3, 4],
+                BeltModel::Rigid => [1, 1, 1, 3, 4],
             },
             mass,
-            friction: [pulleys[0], cart, pulleys[1], Friction::default()],
+            friction: [pulleys[0], cart, pulleys[1], Friction::default(), Friction::default()],
             along: line(machine.cart.along.as_ref(), taken, cart_start),
             spans: spans(machine, taken, cart_start),
             pretension: machine.belt.pretension.map(&mut *taken),
@@ -246,7 +248,7 @@ impl Model {
             start,
             beyond,
             origin: [cart_start; BODIES],
-            lever: [r, Double::ONE, r, Double::ONE],
+            lever: [r, Double::ONE, r, Double::ONE, Double::ONE],
             place: vec![(1, [1.0; BODIES])],
             delayed: 0.0,
         }
@@ -400,16 +402,16 @@ fn spans(machine: &Machine, taken: Taken, cart_start: Double) -> Vec<Span> {
     let follows = |which: usize, more: bool| {
         let (rigidity, l1, l2, l3) = follows?;
         match which {
-            0 => Some(Follows { rigidity, length: l1, of: [0.0, -1.0, 0.0, 0.0] }),
-            1 if more => Some(Follows { rigidity, length: l2 + l3, of: [0.0, 1.0, 0.0, 0.0] }),
-            1 => Some(Follows { rigidity, length: l2, of: [0.0, 1.0, 0.0, 0.0] }),
+            0 => Some(Follows { rigidity, length: l1, of: [0.0, -1.0, 0.0, 0.0, 0.0] }),
+            1 if more => Some(Follows { rigidity, length: l2 + l3, of: [0.0, 1.0, 0.0, 0.0, 0.0] }),
+            1 => Some(Follows { rigidity, length: l2, of: [0.0, 1.0, 0.0, 0.0, 0.0] }),
             _ => None,
         }
     };
-    let first = [1.0, -1.0, 0.0, 0.0];
+    let first = [1.0, -1.0, 0.0, 0.0, 0.0];
     match machine.belt.model {
         BeltModel::Rigid => Vec::new(),
-        BeltModel::Elastic => [first, [0.0, 1.0, -1.0, 0.0], [-1.0, 0.0, 1.0, 0.0]]
+        BeltModel::Elastic => [first, [0.0, 1.0, -1.0, 0.0, 0.0], [-1.0, 0.0, 1.0, 0.0, 0.0]]
             .into_iter()
             .enumerate()
             .map(|(j, arms)| Span { arms, stiffness: k[j], damping: c[j], follows: follows(j, false) })
@@ -419,7 +421,8 @@ fn spans(machine: &Machine, taken: Taken, cart_start: Double) -> Vec<Span> {
             let sum = k[1] + k[2];
             let k23 = k[1] * k[2] / sum;
             let c23 = (c[1] * k[2] * k[2] + c[2] * k[1] * k[1]) / (sum * sum);
-            let second = Span { arms: [0.0, 1.0, -1.0, 0.0], stiffness: k23, damping: c23, follows: follows(1, true) };
+            let second =
+                Span { arms: [0.0, 1.0, -1.0, 0.0, 0.0], stiffness: k23, damping: c23, follows: follows(1, true) };
             vec![Span { arms: first, stiffness: k[0], damping: c[0], follows: follows(0, false) }, second]
         }
     }

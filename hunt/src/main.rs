@@ -26,6 +26,8 @@ enum Part {
     Stages(Stages),
     /// Cases in which each pair of features occurs, curved ones, gantries, loops and exports among them.
     Pairs(Stages),
+    /// The same with a dual belt in place of their machines.
+    DualBelts(Stages),
     /// Drawn machines event by event: exported C, Python and MATLAB against the exact solver.
     Replay(Replay),
 }
@@ -84,6 +86,7 @@ fn main() -> ExitCode {
     match Arguments::parse().part {
         Part::Stages(arguments) => arguments.run(Drawing::Stages),
         Part::Pairs(arguments) => arguments.run(Drawing::Pairs),
+        Part::DualBelts(arguments) => arguments.run(Drawing::DualBelts),
         Part::Replay(arguments) => arguments.run(),
     }
 }
@@ -122,6 +125,7 @@ impl Stages {
             match drawing {
                 Drawing::Stages => print!("{}", draw::stage(self.seed, self.first).text),
                 Drawing::Pairs => print!("{}", draw::pair(self.seed, self.first).0.text),
+                Drawing::DualBelts => print!("{}", draw::dual_belt(self.seed, self.first).0.text),
             }
             return ExitCode::SUCCESS;
         }

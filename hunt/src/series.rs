@@ -3,7 +3,7 @@
 
 use crate::curve::{Curved, Work};
 use crate::double::{Double, ROUNDING};
-use crate::machine::{BODIES, CURRENT, DRIVES, ROTOR, STATES, State};
+use crate::machine::{BODIES, CURRENT, DRIVES, ROTOR, SPANS, STATES, State};
 use crate::root::Polynomial;
 use std::ops::{Add, Mul, Neg, Sub};
 
@@ -11,7 +11,7 @@ use std::ops::{Add, Mul, Neg, Sub};
 pub const ORDER: usize = 32;
 
 /// States, and the forces behind them that are no straight lines: friction of each body, each span.
-pub const PLACES: usize = STATES + 2 * BODIES;
+pub const PLACES: usize = STATES + BODIES + SPANS;
 
 /// Rounding of a state so far, as a share of the largest value that it had.
 const GATHERED: f64 = 1e-27;

@@ -9,7 +9,7 @@
 use crate::double::Double;
 use crate::input::Piece;
 use crate::law::{Change, Guard, Law, Limit, Mode, Motion, Touch};
-use crate::machine::{BODIES, BRISTLE, CURRENT, DRIVES, Model, ROTOR, SPEED, STATES, State, Taken, WAY};
+use crate::machine::{BODIES, BRISTLE, CURRENT, DRIVES, Model, ROTOR, SPANS, SPEED, STATES, State, Taken, WAY};
 use crate::root::{self, Polynomial};
 use crate::series::{Noise, ORDER, PLACES, Series, Size};
 use std::collections::HashMap;
@@ -128,7 +128,7 @@ impl<'a, 'b> Solver<'a, 'b> {
         let mode = Mode {
             motion,
             gear_positive: [true; DRIVES],
-            slack: [false; BODIES],
+            slack: [false; SPANS],
             gear: [Touch::Apart; DRIVES],
             stop: [Touch::Apart; BODIES],
             passed: [0; 3],

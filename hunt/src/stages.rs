@@ -2,7 +2,7 @@
 
 use crate::answer::By;
 use crate::compare::{Compared, Verdict, compare};
-use crate::draw::{self, Feature, Kind};
+use crate::draw::{self, Drawn, Feature, Kind};
 use serde_json::{Value, json};
 use std::fmt::Write;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
@@ -41,6 +41,8 @@ pub enum Drawing {
     Stages,
     /// Cases in which each pair of features occurs.
     Pairs,
+    /// The same with a dual belt in place of their machines.
+    DualBelts,
 }
 
 /// A stage that was compared.
@@ -68,7 +70,15 @@ pub fn one(seed: u64, number: u64) -> Outcome {
 
 /// Compares the case of this number that is drawn by features.
 pub fn pair(seed: u64, number: u64) -> Outcome {
-    let (drawn, features) = draw::pair(seed, number);
+    by_features(number, draw::pair(seed, number))
+}
+
+/// Compares the dual belt of this number.
+pub fn dual_belt(seed: u64, number: u64) -> Outcome {
+    by_features(number, draw::dual_belt(seed, number))
+}
+
+fn by_features(number: u64, (drawn, features): (Drawn, Vec<Feature>)) -> Outcome {
     let asked = features.iter().find_map(|feature| if let Feature::Asked(by) = feature { Some(*by) } else { None });
     // Rows farther apart or nearer together change no position.
     let every = if number.is_multiple_of(2) { 3.1 } else { 0.17 };
@@ -102,6 +112,7 @@ impl Hunt {
                             let outcome = match self.drawing {
                                 Drawing::Stages => one(self.seed, number),
                                 Drawing::Pairs => pair(self.seed, number),
+                                Drawing::DualBelts => dual_belt(self.seed, number),
                             };
                             *lock(busy) = None;
                             // The signal that ends the hunt ends its compilers and programs, too.

@@ -6,7 +6,7 @@ use crate::loops::{self, Looks};
 use crate::machine::{BODIES, Model, Taken};
 use crate::solve::{self, Run};
 use taut::case::{Case, Experiment, Move};
-use taut::machine::Machine;
+use taut::machine::{Kind, Machine};
 use taut::signal::Signal;
 
 /// The subject of a run.
@@ -86,6 +86,9 @@ impl Subject {
     /// Names of its bodies.
     pub fn names(&self) -> &'static [&'static str] {
         match self {
+            Subject::Gantry(case) if case.machine.kind == Kind::DualBelt => {
+                &["left pulley", "right pulley", "cart pulley", "bridge", "cart"]
+            }
             Subject::Axis(_) | Subject::Loop(_) => &["drive pulley", "cart", "idler pulley"],
             Subject::Gantry(_) => &["left pulley", "right pulley", "bridge", "cart"],
         }
@@ -94,6 +97,9 @@ impl Subject {
     /// Names of the columns that hold their positions.
     pub fn columns(&self) -> &'static [&'static str] {
         match self {
+            Subject::Gantry(case) if case.machine.kind == Kind::DualBelt => {
+                &["left_angle", "right_angle", "cart_pulley_angle", "bridge_position", "cart_position"]
+            }
             Subject::Axis(_) | Subject::Loop(_) => &["drive_angle", "cart_position", "idler_angle"],
             Subject::Gantry(_) => &["left_angle", "right_angle", "bridge_position", "cart_position"],
         }

@@ -41,8 +41,9 @@ pub fn run(subject: &Subject) -> Result<Answer, String> {
     let mut row = [nothing; BODIES];
     match &swept {
         Subject::Gantry(_) => {
-            row[2] = Double::from(column("final_bridge_position")?) - machine.origin[2];
-            row[3] = Double::from(column("final_cart_position")?) - machine.origin[3];
+            let (bridge, cart) = (machine.bodies - 2, machine.bodies - 1);
+            row[bridge] = Double::from(column("final_bridge_position")?) - machine.origin[bridge];
+            row[cart] = Double::from(column("final_cart_position")?) - machine.origin[cart];
         }
         // x = y + error
         Subject::Loop(case) => {

@@ -6,11 +6,15 @@ use std::sync::atomic::AtomicBool;
 use taut_hunt::answer::{self, By};
 use taut_hunt::compare::Verdict;
 use taut_hunt::draw::{self, Feature, Kind};
+use taut_hunt::machine::BODIES;
 use taut_hunt::stages::{self, Drawing, Hunt};
 use taut_hunt::subject::Subject;
 
 /// Cases of the small hunt over pairs.
 const PAIRS: u64 = 120;
+
+/// Dual belts.
+const DUAL_BELTS: u64 = 60;
 
 fn hunt(count: u64, threads: usize) -> Hunt {
     let stop = Arc::new(AtomicBool::new(false));
@@ -114,6 +118,37 @@ fn nothing_is_unexplained_among_pairs_of_features() {
     }
 }
 
+/// Dual belts in every way of asking, by their geometry written a second time.
+#[test]
+fn nothing_is_unexplained_among_dual_belts() {
+    let with_c = taut_hunt::c::has_compiler();
+    let asks_c = |number: u64| draw::dual_belt(1, number).1.contains(&Feature::Asked(By::C));
+    let numbers = (0..DUAL_BELTS).filter(|&number| with_c || !asks_c(number));
+    let outcomes: Vec<_> = numbers.map(|number| stages::dual_belt(1, number)).collect();
+    println!("{}", stages::table(&outcomes));
+    let compared = || outcomes.iter().flat_map(|outcome| &outcome.compared);
+    let unexplained = compared().filter(|one| one.verdict.is_unexplained()).count();
+    assert_eq!(unexplained, 0, "{}", stages::told(1, &outcomes, false));
+    let agree = compared().filter(|one| one.verdict == Verdict::Agrees).count();
+    assert!(agree * 100 >= 95 * compared().count(), "{agree} of {} agree", compared().count());
+    // A cart that is off by a thousandth shows.
+    let notices = |number: u64| {
+        let right = Subject::new("right.toml", &draw::dual_belt(1, number).0.text).ok()?;
+        let mut wrong = right.clone();
+        let Subject::Gantry(case) = &mut wrong else { panic!("a dual belt is a gantry") };
+        case.machine.cart.mass *= 1.001;
+        let answer = answer::ask(&right, By::General).ok()?;
+        let apart = |subject: &Subject| {
+            let known = subject.known_as_is(&answer.fed, &answer.times).ok()?.rows;
+            let pairs = answer.rows.iter().flatten().zip(known.iter().flatten()).filter(|(a, _)| !a.high.is_nan());
+            Some(pairs.map(|(a, b)| (*a - *b).high.abs()).fold(0.0, f64::max))
+        };
+        Some(apart(&right)? <= answer.allowed && apart(&wrong)? > answer.allowed)
+    };
+    let seen = (0..24).filter(|&number| notices(number) == Some(true)).count();
+    assert!(seen >= 6, "{seen} of 24 wrong carts are noticed");
+}
+
 /// A machine that is off by a thousandth, or a gain by a hundredth, is found out whatever is asked.
 #[test]
 fn a_wrong_answer_of_any_kind_is_unexplained() {
@@ -138,7 +173,7 @@ fn a_wrong_answer_of_any_kind_is_unexplained() {
             Subject::Loop(case) => case.machine.drives[0].motor.torque_constant *= 1.01,
         }
         let known = |subject: &Subject| subject.known_as_is(&answer.fed, &answer.times).unwrap().rows;
-        let apart = |rows: &[[taut_hunt::double::Double; 4]]| {
+        let apart = |rows: &[[taut_hunt::double::Double; BODIES]]| {
             let pairs = answer.rows.iter().flatten().zip(rows.iter().flatten()).filter(|(a, _)| !a.high.is_nan());
             pairs.map(|(a, b)| (*a - *b).high.abs()).fold(0.0, f64::max)
         };

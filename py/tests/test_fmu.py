@@ -99,6 +99,7 @@ JUMPS = [(0.0, 10.0), (0.25, 10.0), (0.25, 0.0), (1.0, 0.0)]
         ("stages/core-xy/core-xy.toml", ()),
         ("stages/core-xy/follows.toml", ()),
         ("stages/h-frame/h-frame.toml", ()),
+        ("stages/dual-belt/dual-belt.toml", ()),
         ("stages/emps/emps.toml", ()),
         ("stages/two-mass/two-mass.toml", ()),
         ("stages/laser-gantry/laser-gantry.toml", ()),

@@ -158,6 +158,22 @@ def test_loops_of_both_motors_have_margins(root):
     assert not case.tune(evaluate=True).data["after"]["nominal"]["stable"]
 
 
+def test_a_dual_belt_has_three_drives(root):
+    case = taut.read(root / "stages/dual-belt/dual-belt.toml")
+    assert case.kind == "dual-belt" and case["experiment.2.input.cart.at"] == 0.1
+    run = case.simulate("one side")
+    r = case["drive_pulley.radius"]
+    # Two pulleys say where the bridge is, the third one where the cart is, but for what belts stretch.
+    assert np.abs(r * (run["left_angle"] + run["right_angle"]) / 2 - run["bridge_position"]).max() < 1e-4
+    assert np.abs(r * run["cart_pulley_angle"] - run["cart_position"]).max() < 1e-4
+    assert abs(run.metrics["peak_cart_current_A"]["value"]) >= np.abs(run["cart_current"]).max()
+    assert len(case.modes().data["elastic"]) == 3
+    square = taut.read(root / "stages/dual-belt/square.toml").move("square")
+    assert set(square.metrics["drives"]) == {"left", "right", "cart"}
+    with pytest.raises(taut.Error, match="cannot have compliant gears"):
+        case.changed({"motor.rotor_inertia": "1e-5 kg m^2", "motor.gear_stiffness": "300 N m/rad"})
+
+
 def test_what_is_not_there_says_so(gantry):
     assert repr(gantry) == "<taut.Case 'H-frame': one motor, along x, along y>"
     for refused in (gantry.check, gantry.fit):

@@ -325,7 +325,7 @@ await test("the case text is completed and explained by the schema", async open 
   await page.evaluate(() => window.studio.edit("kind = \n[cart]\nmass = "));
   await field.evaluate(field => field.setSelectionRange(7, 7));
   await page.keyboard.press("Control+ ");
-  expect((await hints.locator("b").allInnerTexts()).join() === '"axis","h-frame","core-xy"', await hints.innerText());
+  expect((await hints.locator("b").allInnerTexts()).join() === '"axis","h-frame","core-xy","dual-belt"', await hints.innerText());
   await page.keyboard.press("ArrowDown");
   await page.keyboard.press("Tab");
   expect((await text()).startsWith('kind = "h-frame"\n'), await text());

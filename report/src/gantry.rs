@@ -24,6 +24,9 @@ const RAILS: [f64; 2] = [192.0, 668.0];
 const FAR: f64 = 62.0;
 /// Of an idler at a corner.
 const IDLER: f64 = 12.0;
+/// Edges of the bridge, and the centre of a motor on it.
+const BRIDGE: [f64; 2] = [284.0, 376.0];
+const CART_MOTOR: (f64, f64) = (318.0, 330.0);
 const CART: ((f64, f64), (f64, f64)) = ((382.0, 288.0), (96.0, 84.0));
 
 /// Belts, drive pulleys, idlers, bridge and cart as they run, with positive directions. Works in light and dark.
@@ -34,9 +37,10 @@ pub fn gantry_drawing(gantry: &Machine) -> String {
     match gantry.kind {
         Kind::HFrame => h_frame(&mut out, gantry),
         Kind::Axis | Kind::CoreXy => core_xy(&mut out, gantry),
+        Kind::DualBelt => dual_belt(&mut out, gantry),
     }
     directions(&mut out);
-    for side in 0..2 {
+    for side in 0..gantry.drives.len() {
         drive(&mut out, gantry, side);
     }
     let pulley = gantry.drive_pulley;
@@ -47,9 +51,14 @@ pub fn gantry_drawing(gantry: &Machine) -> String {
     lines.extend(friction(&pulley.friction, ["B", "τ_c", "τ_s"], ["N m s", "N m"]));
     block(&mut out, (430.0, 508.0), Anchor::Middle, "Drive pulleys", &lines);
     block(&mut out, (16.0, 276.0), Anchor::Start, "Bridge", &slide(gantry.first_slide(), "m_b", "x"));
-    let cart = if gantry.kind == Kind::HFrame { 496.0 } else { 430.0 };
-    block(&mut out, (cart, 184.0), Anchor::Middle, "Cart", &slide(&gantry.cart, "m_c", "y"));
-    out.finish(&format!("The gantry in plan view, {}: two drive pulleys, belt, bridge and cart", gantry.kind.name()))
+    let cart = match gantry.kind {
+        Kind::HFrame => (496.0, 184.0),
+        Kind::Axis | Kind::CoreXy => (430.0, 184.0),
+        Kind::DualBelt => (430.0, 156.0),
+    };
+    block(&mut out, cart, Anchor::Middle, "Cart", &slide(&gantry.cart, "m_c", "y"));
+    let (name, count) = (gantry.kind.name(), if gantry.drives.len() == 2 { "two" } else { "three" });
+    out.finish(&format!("The gantry in plan view, {name}: {count} drive pulleys, belt, bridge and cart"))
 }
 
 /// The numbers of bridge or cart.
@@ -79,7 +88,7 @@ fn rails(out: &mut Svg) {
 
 fn bridge(out: &mut Svg) {
     let [left, right] = RAILS;
-    out.rect((left - 12.0, 284.0), (right - left + 24.0, 92.0), 5.0, svg::SOFT, svg::AXIS, 1.4);
+    out.rect((left - 12.0, BRIDGE[0]), (right - left + 24.0, BRIDGE[1] - BRIDGE[0]), 5.0, svg::SOFT, svg::AXIS, 1.4);
     for x in RAILS {
         for y in [298.0, 362.0] {
             out.circle((x, y), 5.0, svg::PAPER, svg::AXIS, 1.4);
@@ -152,6 +161,42 @@ fn core_xy(out: &mut Svg, gantry: &Machine) {
     label(out, gantry, 3, (INNER[1] - 20.0, 448.0), Anchor::End, paints[1]);
     for (x, y) in [(left, LOWER), (right, LOWER), (left, UPPER), (right, UPPER)] {
         out.circle((x, y), 3.2, svg::INK, svg::INK, 1.0);
+    }
+}
+
+/// Three belts: on either side one from its motor round the far end to the bridge and back to the motor, and one along
+/// the bridge from the cart's motor on its left end.
+fn dual_belt(out: &mut Svg, gantry: &Machine) {
+    let paints = [Colour::Blue, Colour::Purple, Colour::Green].map(Colour::paint);
+    let far = FAR + RADIUS;
+    for side in 0..2 {
+        let (inner, outer, belt) = (INNER[side], OUTER[side], paints[side]);
+        wrap(out, side, belt);
+        out.line((outer, MOTORS[side].1), (outer, far), belt, 1.7);
+        let sweep = if side == 0 { 1 } else { 0 };
+        out.path(&format!("M{} {far}A{RADIUS} {RADIUS} 0 0 {sweep} {} {far}", n(outer), n(inner)), belt, 1.7, "");
+        idler(out, (MOTORS[side].0, far), RADIUS - 4.0);
+        vertical(out, inner, far, BRIDGE[0], true, belt);
+        vertical(out, inner, BRIDGE[1], MOTORS[side].1, true, belt);
+        BRIDGE.iter().for_each(|&y| out.circle((inner, y), 3.2, svg::INK, svg::INK, 1.0));
+    }
+    let belt = paints[2];
+    let ([left, right], (from, y)) = ([CART.0.0, CART.0.0 + CART.1.0], CART_MOTOR);
+    let (to, r) = (2.0 * (CART.0.0 + 0.5 * CART.1.0) - from, y - UPPER);
+    out.line((from, UPPER), (to, UPPER), belt, 1.7);
+    out.path(&format!("M{} {UPPER}A{r} {r} 0 0 1 {} {LOWER}", n(to), n(to)), belt, 1.7, "");
+    out.line((to, LOWER), (right, LOWER), belt, 1.7);
+    out.path(&format!("M{} {UPPER}A{r} {r} 0 0 0 {} {LOWER}", n(from), n(from)), belt, 1.7, "");
+    out.line((from, LOWER), (left, LOWER), belt, 1.7);
+    idler(out, (to, y), r - 3.0);
+    label(out, gantry, 0, (INNER[0] + 20.0, 92.0), Anchor::Start, paints[0]);
+    label(out, gantry, 1, (INNER[0] + 20.0, 448.0), Anchor::Start, paints[0]);
+    label(out, gantry, 2, (INNER[1] - 20.0, 92.0), Anchor::End, paints[1]);
+    label(out, gantry, 3, (INNER[1] - 20.0, 448.0), Anchor::End, paints[1]);
+    label(out, gantry, 4, (430.0, BRIDGE[0] - 10.0), Anchor::Middle, belt);
+    label(out, gantry, 5, (430.0, BRIDGE[1] + 48.0), Anchor::Middle, belt);
+    for x in [left, right] {
+        out.circle((x, LOWER), 3.2, svg::INK, svg::INK, 1.0);
     }
 }
 
@@ -245,31 +290,39 @@ fn directions(out: &mut Svg) {
 
 /// Pulley, the way it turns, its motor's values and what feeds it.
 fn drive(out: &mut Svg, gantry: &Machine, side: usize) {
-    let (x, y) = MOTORS[side];
+    let is_at_cart = side == MOTORS.len();
+    let (x, y) = MOTORS.get(side).copied().unwrap_or(CART_MOTOR);
     let (motor, amplifier) = (&gantry.drives[side].motor, &gantry.drives[side].amplifier);
-    out.circle((x, y), RADIUS - 4.0, svg::SOFT, svg::AXIS, 1.2);
+    let radius = if is_at_cart { y - UPPER - 2.0 } else { RADIUS - 4.0 };
+    out.circle((x, y), radius, svg::SOFT, svg::AXIS, 1.2);
     out.circle((x, y), 3.5, svg::PAPER, svg::INK, 1.4);
     let (symbol, clockwise) = match (gantry.kind, side) {
         (Kind::HFrame, 0) => ("φ₁", true),
         (Kind::HFrame, _) => ("φ₂", true),
         (Kind::Axis | Kind::CoreXy, 0) => ("φ_A", false),
         (Kind::Axis | Kind::CoreXy, _) => ("φ_B", true),
+        (Kind::DualBelt, 0) => ("φ₁", false),
+        (Kind::DualBelt, 1) => ("φ₂", true),
+        (Kind::DualBelt, _) => ("φ₃", false),
     };
-    turn(out, (x, y), clockwise);
-    out.symbol((x, y - 40.0), 14.0, Anchor::Middle, Colour::Vermillion.paint(), "", symbol);
+    turn(out, (x, y), clockwise, if is_at_cart { 9.0 } else { 15.0 });
+    let above = if is_at_cart { -20.0 } else { -40.0 };
+    out.symbol((x, y + above), 14.0, Anchor::Middle, Colour::Vermillion.paint(), "", symbol);
 
     let fed = match amplifier.mode {
         AmplifierMode::Voltage => "u",
         AmplifierMode::Current => "i",
         AmplifierMode::Position => "x*",
     };
-    out.arrow((x, y + 66.0), (x, y + RADIUS + 3.0), svg::INK, 1.5);
-    let name = ["left", "right"][side];
-    out.symbol((x + 8.0, y + 64.0), 13.0, Anchor::Start, svg::INK, "", &format!("{fed}_{name}"));
+    let (end, name) = (if is_at_cart { radius } else { RADIUS } + 3.0, gantry.geometry().drives[side].side());
+    let tail = y + end + if is_at_cart { 24.0 } else { 33.0 };
+    out.arrow((x, tail), (x, y + end), svg::INK, 1.5);
+    out.symbol((x + 8.0, tail - 2.0), 13.0, Anchor::Start, svg::INK, "", &format!("{fed}_{name}"));
 
     let (heading, at) = match side {
         0 => ("Left motor", 16.0),
-        _ => ("Right motor", 700.0),
+        1 => ("Right motor", 700.0),
+        _ => ("Cart motor", 700.0),
     };
     let heading =
         if gantry.kind == Kind::CoreXy { format!("{heading} ({})", ["A", "B"][side]) } else { heading.into() };
@@ -279,7 +332,7 @@ fn drive(out: &mut Svg, gantry: &Machine, side: usize) {
         lines.push(format!("encoder at the {at},"));
         lines.push(format!("{} lines", engineering(encoder.lines, "", 6)));
     }
-    let top = (y + 40.0 - 17.0 * lines.len() as f64).min(470.0);
+    let top = if is_at_cart { 60.0 } else { (y + 40.0 - 17.0 * lines.len() as f64).min(470.0) };
     block(out, (at, top), Anchor::Start, &heading, &lines);
 }
 
@@ -309,9 +362,8 @@ fn motor_lines(motor: &Motor, amplifier: &Amplifier) -> Vec<String> {
 }
 
 /// An arrow round the hub of a pulley.
-fn turn(out: &mut Svg, (x, y): (f64, f64), clockwise: bool) {
+fn turn(out: &mut Svg, (x, y): (f64, f64), clockwise: bool, r: f64) {
     let arrow = Colour::Vermillion.paint();
-    let r = 15.0;
     let way = if clockwise { 1.0 } else { -1.0 };
     // From one side over the top to the other, and the way along the circle there.
     let at = |degrees: f64| {

@@ -5,7 +5,7 @@
 
 use crate::design::FeedForwardModel;
 use crate::log::PRESETS;
-use crate::machine::{BELTS, Quantity};
+use crate::machine::{BELTS, Kind, Quantity};
 use crate::parameter::{self, Fallback, Parameter};
 use serde_json::{Map, Value, json};
 
@@ -113,7 +113,7 @@ fn root() -> Properties {
     };
     let tables = [
         ("title", text("What the file describes")),
-        ("kind", described(words(["axis", "h-frame", "core-xy"]), "Which machine it is (default: axis)")),
+        ("kind", described(words(Kind::ALL.map(Kind::word)), "Which machine it is (default: axis)")),
         ("motor", table("motor", &[])),
         ("drive", described(table("drive", &[]), "Instead of [motor]: a drive of which only the force is known")),
         ("amplifier", amplifier()),
@@ -126,6 +126,7 @@ fn root() -> Properties {
         ),
         ("left_drive", described(drive(), "Of a gantry: what is different at the left drive")),
         ("right_drive", described(drive(), "Of a gantry: what is different at the right drive")),
+        ("cart_drive", described(drive(), "Of a dual belt: what is different at the cart's drive")),
         ("drive_pulley", pulley("drive_pulley")),
         ("idler_pulley", pulley("idler_pulley")),
         ("bridge", slide("bridge")),
@@ -249,7 +250,8 @@ fn experiment() -> Value {
         both.extend(keys("gantry.initial", &[]));
         object(&both)
     };
-    let sides = ["left", "right"].map(|side| (side.to_string(), reference("input"))).into_iter().collect();
+    let sides = Kind::ALL.into_iter().filter(|kind| *kind != Kind::Axis).flat_map(|kind| kind.geometry().sides());
+    let sides = sides.map(|side| (side.to_string(), reference("input"))).collect();
     table(
         "experiment",
         &[

@@ -87,7 +87,7 @@ pub fn motion(done: &Moved) -> Value {
         .drives
         .iter()
         .zip(&figures.drives)
-        .map(|(at, drive)| (geometry.label(at.pulley).key.to_string(), of_drive(drive)));
+        .map(|(at, drive)| (geometry.drive_key(at).to_string(), of_drive(drive)));
     let mut value = json!({
         "name": done.motion.name,
         "files": done.files,

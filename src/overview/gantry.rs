@@ -5,12 +5,8 @@ use super::{Group, Note, Overview, Place, belt_mass, drive_at_belt, motor_rows, 
 use crate::case::Case;
 use crate::error::Result;
 use crate::linear::Natural;
-use crate::machine::gantry::{BRIDGE, CART};
 use crate::machine::{AmplifierMode, BeltMake, DriveUnit, Machine, Travel};
 use std::f64::consts::PI;
-
-/// The drives, as rows call them.
-const SIDES: [&str; 2] = ["left", "right"];
 
 /// The directions that it moves in, and what moves then.
 const WAYS: [(&str, &str); 2] = [("x", "bridge and cart along x"), ("y", "cart along y")];
@@ -24,7 +20,7 @@ pub(super) fn overview(case: &Case) -> Result<Overview> {
     let mut groups =
         vec![drive(gantry, &mut notes), inertia(gantry, &mut notes), belt(gantry, &place(gantry, [0.0, 0.0])?)];
     groups.extend(limits(case, &mut notes));
-    for (motor, side) in gantry.drives.iter().map(|unit| &unit.motor).zip(SIDES) {
+    for (motor, side) in gantry.drives.iter().map(|unit| &unit.motor).zip(gantry.geometry().sides()) {
         of_constants(motor, &format!("{side} drive: "), &mut notes);
     }
     notes.dedup_by(|a, b| {
@@ -47,8 +43,8 @@ fn corners(gantry: &Machine) -> Vec<[f64; 2]> {
 fn drive(gantry: &Machine, notes: &mut Vec<Note>) -> Group {
     let mut group = Group::new("drive", "Drives");
     let r = gantry.pulley_radius;
-    let alike = gantry.drives[0] == gantry.drives[1];
-    for (k, side) in SIDES.into_iter().enumerate().take(if alike { 1 } else { 2 }) {
+    let alike = gantry.drives.iter().all(|unit| *unit == gantry.drives[0]);
+    for (k, side) in gantry.geometry().sides().enumerate().take(if alike { 1 } else { gantry.drives.len() }) {
         let prefix = if alike { String::new() } else { format!("{side}_") };
         let before = group.rows.len();
         let (motor, amplifier) = (&gantry.drives[k].motor, &gantry.drives[k].amplifier);
@@ -73,46 +69,67 @@ fn drive(gantry: &Machine, notes: &mut Vec<Note>) -> Group {
         if !alike {
             group.rows[before..].iter_mut().for_each(|row| row.name = format!("{side}: {}", row.name));
         }
-        if k == 0 && force > 0.0 {
-            for ((way, _), held) in WAYS.into_iter().zip(breakaway(gantry)) {
-                let both = force * 2.0;
-                let row =
-                    group.add(format!("breakaway_input_{way}"), format!("breakaway along {way}"), held / both, input);
-                row.how(if alike { "of both drives alike" } else { "of both drives, each with the left one's force" });
+        for (number, (way, _)) in WAYS.into_iter().enumerate().filter(|_| force > 0.0) {
+            let movers = movers(gantry, number);
+            if !alike && movers[0] != k {
+                continue;
             }
+            let input_of_each = breakaway(gantry, number) / (force * movers.len() as f64);
+            let row =
+                group.add(format!("breakaway_input_{way}"), format!("breakaway along {way}"), input_of_each, input);
+            match movers[..] {
+                [_] => row.how(format!("of the {} drive", gantry.geometry().drives[movers[0]].side())),
+                _ if alike => row.how("of both drives alike"),
+                _ => row.how(format!("of both drives, each with the {side} one's force")),
+            };
         }
     }
     let _ = notes;
     group
 }
 
-/// Breakaway along x and along y, N at what moves: that of both pulleys, and of the bridge or the cart.
-fn breakaway(gantry: &Machine) -> [f64; 2] {
-    let pulleys = 2.0 * gantry.drive_pulley.friction.forward.breakaway / gantry.pulley_radius;
-    [pulleys + gantry.first_slide().friction.forward.breakaway, pulleys + gantry.cart.friction.forward.breakaway]
+/// The drives that move what slides along the coordinate of this number, as much as it moves.
+fn movers(gantry: &Machine, number: usize) -> Vec<usize> {
+    let shares = gantry.belt_shares();
+    (0..shares.len()).filter(|drive| shares[*drive][number] != 0.0).collect()
 }
 
-/// The mass of both pulleys and rotors at the belt, kg.
-fn turning(gantry: &Machine) -> f64 {
+/// Breakaway along x or y, N at what moves: that of the pulleys that turn, and of the bridge or the cart.
+fn breakaway(gantry: &Machine, number: usize) -> f64 {
+    let count = movers(gantry, number).len() as f64;
+    let pulleys = count * gantry.drive_pulley.friction.forward.breakaway / gantry.pulley_radius;
+    pulleys + gantry.slide(number).map_or(0.0, |slide| slide.friction.forward.breakaway)
+}
+
+/// The mass at the belt of the pulleys and rotors that turn with a coordinate, kg.
+fn turning(gantry: &Machine, number: usize) -> f64 {
     let r = gantry.pulley_radius;
-    let rotors: f64 = {
-        let rotor = |unit: &DriveUnit| unit.motor.rotor_inertia * unit.motor.gear_ratio.powi(2);
-        gantry.drives.iter().map(rotor).sum()
-    };
-    (2.0 * gantry.drive_pulley.inertia + rotors) / (r * r)
+    let movers = movers(gantry, number);
+    let rotor = |unit: &DriveUnit| unit.motor.rotor_inertia * unit.motor.gear_ratio.powi(2);
+    let rotors: f64 = movers.iter().map(|drive| rotor(&gantry.drives[*drive])).sum();
+    (movers.len() as f64 * gantry.drive_pulley.inertia + rotors) / (r * r)
 }
 
-/// Moved mass along x and along y, kg: both pulleys turn with either.
+/// Moved mass along x and along y, kg: of bridge and cart, of the cart, and of the pulleys that turn then.
 fn masses(gantry: &Machine) -> [f64; 2] {
-    let turning = turning(gantry);
-    [gantry.first_slide().mass + gantry.cart.mass + turning, gantry.cart.mass + turning]
+    let sliding = [gantry.first_slide().mass + gantry.cart.mass, gantry.cart.mass];
+    std::array::from_fn(|number| sliding[number] + turning(gantry, number))
 }
 
 fn inertia(gantry: &Machine, notes: &mut Vec<Note>) -> Group {
     let mut group = Group::new("inertia", "Moved mass");
-    let turning = turning(gantry);
-    group.add("turning_mass", "both pulleys and rotors, at the belt", turning, "kg").how("(2 J + n² J_r of both)/r²");
-    for ((way, words), mass) in WAYS.into_iter().zip(masses(gantry)) {
+    // With the same pulleys along both coordinates there is one mass that turns, else one for each.
+    let turns_alike = movers(gantry, 0) == movers(gantry, 1);
+    if turns_alike {
+        let words = "both pulleys and rotors, at the belt";
+        group.add("turning_mass", words, turning(gantry, 0), "kg").how("(2 J + n² J_r of both)/r²");
+    }
+    for (number, ((way, words), mass)) in WAYS.into_iter().zip(masses(gantry)).enumerate() {
+        let turning = turning(gantry, number);
+        if !turns_alike {
+            let words = format!("pulleys and rotors that turn along {way}, at the belt");
+            group.add(format!("turning_mass_{way}"), words, turning, "kg").how("(Σ J + n² J_r)/r²");
+        }
         group.add(format!("total_mass_{way}"), words, mass, "kg");
         group.add(format!("reflected_share_{way}"), "share of rotating parts", turning / mass, "");
     }
@@ -159,7 +176,7 @@ fn place(gantry: &Machine, [x, y]: [f64; 2]) -> Result<Place> {
     let mut k = [[0.0; 2]; 2];
     for (&span, stiffness) in mechanism.roles.spans.iter().zip(&stiffness) {
         let arms = mechanism.leading_arms(span);
-        let a = [arms[BRIDGE], arms[CART]];
+        let a = [0, 1].map(|number: usize| arms[gantry.geometry().slides[number].body]);
         for (row, left) in k.iter_mut().zip(a) {
             for (entry, right) in row.iter_mut().zip(a) {
                 *entry += stiffness * left * right;
@@ -177,24 +194,27 @@ fn limits(case: &Case, notes: &mut Vec<Note>) -> Option<Group> {
     let inputs = case.experiments.iter().flat_map(|done| done.inputs.iter().map(|input| (input, done.until)));
     let most = most(None, inputs);
     let power = |k: usize| Power::of(&gantry.drives[k].motor, &gantry.drives[k].amplifier, r, most.as_ref());
-    let (Some((left, from)), Some((right, _))) = (power(0), power(1)) else {
+    let Some(powers) = (0..gantry.drives.len()).map(power).collect::<Option<Vec<_>>>() else {
         let text = "the inputs are unlimited: give amplifier.voltage_limit or current_limit for the largest speeds and accelerations";
         notes.push(Note { code: "no-limit", text: text.to_string() });
         return None;
     };
-    let mut group = Group::new("limits", "Limits, both drives pulling alike");
-    let force = left.force.min(right.force);
-    group.add("largest_force", "largest force of a motor at the belt", force, "N").how(format!("by {from}"));
+    let name = if powers.len() == 2 { "Limits, both drives pulling alike" } else { "Limits" };
+    let mut group = Group::new("limits", name);
+    let force = powers.iter().map(|(power, _)| power.force).fold(f64::INFINITY, f64::min);
+    group.add("largest_force", "largest force of a motor at the belt", force, "N").how(format!("by {}", powers[0].1));
     let pulleys = &gantry.drive_pulley.friction.forward;
     let slides = [&gantry.first_slide().friction.forward, &gantry.cart.friction.forward];
-    for (((way, _), mass), slide) in WAYS.into_iter().zip(masses(gantry)).zip(slides) {
-        let coulomb = slide.coulomb + 2.0 * pulleys.coulomb / r;
-        let viscous = slide.viscous + 2.0 * pulleys.viscous / (r * r);
+    for (number, (((way, _), mass), slide)) in WAYS.into_iter().zip(masses(gantry)).zip(slides).enumerate() {
+        let movers: Vec<Power> = movers(gantry, number).into_iter().map(|drive| powers[drive].0).collect();
+        let count = movers.len() as f64;
+        let coulomb = slide.coulomb + count * pulleys.coulomb / r;
+        let viscous = slide.viscous + count * pulleys.viscous / (r * r);
         let both = Power {
-            force: 2.0 * force,
-            voltage: left.voltage,
-            per_volt: left.per_volt + right.per_volt,
-            brake: left.brake + right.brake,
+            force: count * movers.iter().map(|power| power.force).fold(f64::INFINITY, f64::min),
+            voltage: movers[0].voltage,
+            per_volt: movers.iter().map(|power| power.per_volt).sum(),
+            brake: movers.iter().map(|power| power.brake).sum(),
         };
         let acceleration = ((both.force - coulomb) / mass).max(0.0);
         let row = group.add(

@@ -103,7 +103,7 @@ const OF_MOVE: &[Row] = &[
 pub fn of_move(kind: Kind) -> Vec<Measure> {
     let geometry = kind.geometry();
     let loads: Vec<Label> = geometry.slides.iter().map(|slide| geometry.label(slide.body)).collect();
-    let side = |drive: &DriveAt| Label { key: geometry.label(drive.pulley).key, name: drive.label.name };
+    let side = |drive: &DriveAt| Label { key: geometry.drive_key(drive), name: drive.label.name };
     let drives: Vec<Label> = geometry.drives.iter().map(side).collect();
     let of_row = |row: &'static Row| -> Vec<Measure> {
         let &Row { names, unit, words, per, of } = row;

@@ -21,6 +21,7 @@ const GROUPS = {
   controller: "Controller",
   left_drive: "Left drive",
   right_drive: "Right drive",
+  cart_drive: "Cart drive",
   measurement: "Recorder",
   move: "Move",
   fit: "Fit",

@@ -132,6 +132,12 @@ function pulley(root, x, y, r, name) {
   const label = svg("text", {x, y: y + r + 22, "text-anchor": "middle", class: "f-grey small"});
   root.append(wheel, hub, label);
   return {
+    /** Moves it to another place. @param {number} u @param {number} v */
+    place(u, v) {
+      [x, y] = [u, v];
+      put(hub, {cx: x, cy: y});
+      put(label, {x, y: y + r + 22});
+    },
     /** @param {number} angle clockwise on the picture @param {number} state @param {boolean} hasState */
     turn(angle, state, hasState = true) {
       put(wheel, {transform: `translate(${x} ${y}) rotate(${((angle * 180) / Math.PI) % 360})`});
@@ -312,7 +318,8 @@ function gantry(scene) {
     OUTER = [220, 680],
     INNER = [280, 620],
     I = 12;
-  const isH = scene.kind === "h-frame";
+  const isH = scene.kind === "h-frame",
+    isDual = scene.kind === "dual-belt";
   const root = svg("svg", {viewBox: `0 0 ${W} ${H}`, role: "img"});
   for (const x of RAILS)
     root.append(svg("line", {x1: x, x2: x, y1: FAR - 20, y2: 520, class: "s-grid", "stroke-width": 5}));
@@ -348,11 +355,16 @@ function gantry(scene) {
     told = svg("text", {"text-anchor": "middle", class: "f-verm small"});
   root.append(ghost, cart, cartState, told);
   const drives = MOTORS.map(([x, y], side) =>
-    pulley(root, x, y, R - 3, isH ? ["left", "right"][side] : ["A", "B"][side]),
+    pulley(root, x, y, R - 3, isH || isDual ? ["left", "right"][side] : ["A", "B"][side]),
   );
+  // The cart's motor rides on the bridge.
+  const CART_MOTOR = 290,
+    CART_IDLER = 610;
+  if (isDual) drives.push(pulley(root, CART_MOTOR, 0, 13, "cart"));
+  const pulleys = isDual ? ["left", "right", "cart_pulley"] : ["left", "right"];
   const forces = scene.spans.map(() => svg("text", {class: "f-mark small"}));
   root.append(...forces);
-  root.append(svg("text", {x: RAILS[1] + 40, y: 250, class: "f-grey small"}, "x ↑  y →"));
+  root.append(svg("text", {x: RAILS[1] + 40, y: isDual ? 60 : 250, class: "f-grey small"}, "x ↑  y →"));
   const hold = [steady(), steady()];
   return {
     root,
@@ -386,19 +398,23 @@ function gantry(scene) {
         LOW = by + 15,
         [l, r] = [cx - 48, cx + 48],
         share = name => value(name) / force;
-      const travel = ["left_angle", "right_angle"].map(name => scene.radius * value(name) * k);
+      const travel = pulleys.map(name => scene.radius * value(`${name}_angle`) * k);
       idlers.replaceChildren();
       const idler = (u, v, size) =>
         idlers.append(svg("circle", {cx: u, cy: v, r: size, class: "f-paper s-axis", "stroke-width": 1.2}));
-      const paths = isH ? hFrame() : coreXy();
+      const paths = isH ? hFrame() : isDual ? dualBelt() : coreXy();
       paths.forEach(([d, offset, u, v, anchor], i) => {
         spans[i].set(d, share(scene.spans[i]), offset);
         put(forces[i], {x: u, y: v, "text-anchor": anchor});
         tell(forces[i], `${number(value(scene.spans[i]), 3)} N`);
       });
-      // Angles count clockwise but for drive A of CoreXY.
+      if (isDual) drives[2].place(CART_MOTOR, by);
+      // Angles count clockwise but for drive A of CoreXY, and the left and the cart's of a dual belt.
       drives.forEach((drive, side) =>
-        drive.turn(((isH || side ? 1 : -1) * travel[side]) / (R - 3), stateOf(["left_state", "right_state"][side])),
+        drive.turn(
+          ((isH || side === 1 ? 1 : -1) * travel[side]) / (side === 2 ? 13 : R - 3),
+          stateOf(`${pulleys[side]}_state`),
+        ),
       );
       put(root, {
         "aria-label":
@@ -468,8 +484,32 @@ function gantry(scene) {
         return [
           [out(0), -travel[0], 450, FAR - 12, "middle"],
           [back(0), -travel[0], INNER[0] + 10, 420, "start"],
-          [out(1), travel[1], 450, FAR + 50, "middle"],
-          [back(1), travel[1], INNER[1] - 10, 420, "end"],
+          [out(1), -travel[1], 450, FAR + 50, "middle"],
+          [back(1), -travel[1], INNER[1] - 10, 420, "end"],
+        ];
+      }
+      // Three belts: on either side one from its motor round the far end to the bridge and back, and one along the
+      // bridge.
+      function dualBelt() {
+        const far = FAR + R,
+          [top, bottom] = [by - 46, by + 46];
+        const side = number => {
+          const [u, o, w, y] = [INNER[number], OUTER[number], number ? 0 : 1, MOTORS[number][1]];
+          idler(MOTORS[number][0], far, R - 4);
+          return [
+            `M${u} ${y}A${R} ${R} 0 0 ${w} ${o} ${y}V${far}A${R} ${R} 0 0 ${w} ${u} ${far}V${top}`,
+            `M${u} ${bottom}V${y}`,
+          ];
+        };
+        idler(CART_IDLER, by, 12);
+        const [[leftOut, leftBack], [rightOut, rightBack]] = [side(0), side(1)];
+        return [
+          [leftOut, -travel[0], INNER[0] + 10, 130, "start"],
+          [leftBack, -travel[0], INNER[0] + 10, 430, "start"],
+          [rightOut, -travel[1], INNER[1] - 10, 130, "end"],
+          [rightBack, -travel[1], INNER[1] - 10, 430, "end"],
+          [`M${CART_MOTOR} ${UP}H${CART_IDLER}A15 15 0 0 1 ${CART_IDLER} ${LOW}H${r}`, -travel[2], 730, by - 6, "start"],
+          [`M${l} ${LOW}H${CART_MOTOR}A15 15 0 0 1 ${CART_MOTOR} ${UP}`, -travel[2], 730, by + 16, "start"],
         ];
       }
     },

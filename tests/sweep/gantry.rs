@@ -11,6 +11,7 @@ use taut::trajectory::Trajectory;
 
 const H_FRAME: &str = include_str!("../../stages/h-frame/h-frame.toml");
 const CORE_XY: &str = include_str!("../../stages/core-xy/core-xy.toml");
+const DUAL_BELT: &str = include_str!("../../stages/dual-belt/dual-belt.toml");
 
 fn case(text: &str, changes: &[&str]) -> Case {
     Case::from_text_with("gantry.toml", text, changes).unwrap_or_else(|error| panic!("{error}"))
@@ -57,7 +58,7 @@ fn a_row_is_the_run_of_its_machine() {
         "motor.torque_constant",
     ];
     let mut compared = 0;
-    for text in [H_FRAME, CORE_XY] {
+    for text in [H_FRAME, CORE_XY, DUAL_BELT] {
         for design in ["random", "latin-hypercube", "sobol"] {
             let mut changes = vec![format!("sweep.design={design}"), "sweep.runs=6".to_string()];
             changes.extend(keys.iter().map(|key| format!("sweep.vary.\"{key}\"=10 %")));
@@ -104,7 +105,8 @@ fn figures_are_those_of_the_columns() {
     ];
     let plan = ["sweep.runs=4", "sweep.interval=20 us", "sweep.vary.all=15 %", "sweep.seed=5"];
     let mut compared = 0;
-    for (text, more) in [(H_FRAME, &[][..]), (CORE_XY, &[]), (H_FRAME, &more), (CORE_XY, &more)] {
+    let all = [(H_FRAME, &[][..]), (CORE_XY, &[]), (DUAL_BELT, &[]), (H_FRAME, &more), (CORE_XY, &more)];
+    for (text, more) in all {
         let sweep = sweep(text, &[&plan[..], more].concat());
         let table = rows(&sweep, 0, 4);
         for (row, (number, group)) in (0..4).flat_map(|row| sweep.groups().iter().enumerate().map(move |g| (row, g))) {
@@ -129,19 +131,35 @@ fn figures_are_those_of_the_columns() {
                 near(&format!("final_{body}_speed"), last(&format!("{body}_speed")), 0.0);
                 near(&format!("peak_{body}_speed"), most(column(&format!("{body}_speed")).iter().copied()), 2e-4);
             }
-            for side in ["left", "right"] {
-                let motor = columns.get(&format!("{side}_rotor_speed")).unwrap_or(column(&format!("{side}_speed")));
-                near(&format!("peak_{side}_speed"), most(motor.iter().copied()), 0.02);
+            for at in gantry.geometry().drives {
+                let (side, pulley) = (at.side(), gantry.geometry().label(at.pulley).key);
+                let motor = columns.get(&format!("{side}_rotor_speed")).unwrap_or(column(&format!("{pulley}_speed")));
+                near(
+                    &format!(
+                        "peak_{}",
+                        if side == "cart" { "cart_drive_speed".into() } else { format!("{side}_speed") }
+                    ),
+                    most(motor.iter().copied()),
+                    0.02,
+                );
                 near(&format!("peak_{side}_current"), most(column(&format!("{side}_current")).iter().copied()), 2e-3);
             }
-            let [left, right, x, y] = ["left_angle", "right_angle", "bridge_position", "cart_position"].map(column);
+            let [x, y] = ["bridge_position", "cart_position"].map(column);
             let r = gantry.pulley_radius;
-            // Two spans tell of all: those of a belt add up to nothing.
-            let (spans, signs) = match gantry.kind {
-                Kind::HFrame => (["left_span", "right_span"], [[1.0, 1.0, 1.0], [-1.0, 1.0, -1.0]]),
-                Kind::Axis | Kind::CoreXy => (["a_out_span", "b_out_span"], [[1.0, -1.0, -1.0], [1.0, -1.0, 1.0]]),
+            // One span for each drive tells of all: those of a belt add up to nothing.
+            let spans: &[(&str, &str, [f64; 3])] = match gantry.kind {
+                Kind::HFrame => &[("left_span", "left", [1.0, 1.0, 1.0]), ("right_span", "right", [-1.0, 1.0, -1.0])],
+                Kind::Axis | Kind::CoreXy => {
+                    &[("a_out_span", "left", [1.0, -1.0, -1.0]), ("b_out_span", "right", [1.0, -1.0, 1.0])]
+                }
+                Kind::DualBelt => &[
+                    ("left_back_span", "left", [-1.0, 1.0, 0.0]),
+                    ("right_out_span", "right", [1.0, -1.0, 0.0]),
+                    ("cart_back_span", "cart_pulley", [-1.0, 0.0, 1.0]),
+                ],
             };
-            for ((span, [of_angle, of_x, of_y]), angle) in spans.into_iter().zip(signs).zip([left, right]) {
+            for &(span, pulley, [of_angle, of_x, of_y]) in spans {
+                let angle = column(&format!("{pulley}_angle"));
                 let stretch =
                     angle.iter().zip(x).zip(y).map(|((angle, x), y)| of_angle * r * angle + of_x * x + of_y * y);
                 near(&format!("peak_{span}_stretch"), most(stretch), 50e-9);
@@ -212,7 +230,7 @@ fn drives_that_are_alike_are_off_alike() {
     let told = Free::new(&apart, "motor.resistance", &[], &[]).unwrap_err().to_string();
     assert_eq!(
         told,
-        "`motor.resistance` is not the same in both drives\n  \
+        "`motor.resistance` is not the same in all drives\n  \
          next: name `left_drive.motor.resistance` or `right_drive.motor.resistance`"
     );
     // What is named by itself goes by itself, and `motor.resistance` is the other one.

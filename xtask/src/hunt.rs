@@ -15,6 +15,8 @@ pub struct Hunt {
     stages: u64,
     /// Cases in which each pair of features occurs.
     pairs: u64,
+    /// The same with a dual belt in place of their machines.
+    dual_belts: u64,
     seed: u64,
     /// For each reader, s.
     seconds: u64,
@@ -43,21 +45,23 @@ pub struct Hunt {
 enum Part {
     Stages,
     Pairs,
+    DualBelts,
     Readers,
     Faults,
     Mutants,
 }
 
-const PARTS: [(&str, Part); 5] = [
+const PARTS: [(&str, Part); 6] = [
     ("stages", Part::Stages),
     ("pairs", Part::Pairs),
+    ("dual-belts", Part::DualBelts),
     ("readers", Part::Readers),
     ("faults", Part::Faults),
     ("mutants", Part::Mutants),
 ];
 
-pub const USAGE: &str = "cargo xtask hunt [--part stages|pairs|readers|faults|mutants]... [--seed S]
-                       [--threads N] [--stages N [--json]] [--pairs N] [--seconds B] [--kills N]
+pub const USAGE: &str = "cargo xtask hunt [--part stages|pairs|dual-belts|readers|faults|mutants]... [--seed S]
+                       [--threads N] [--stages N [--json]] [--pairs N] [--dual-belts N] [--seconds B] [--kills N]
                        [--mutants N [--area FOLDER]... [--tests NAME]... [--longest S] [--list | --only K...]]";
 
 impl Hunt {
@@ -68,6 +72,7 @@ impl Hunt {
             parts: Vec::new(),
             stages: 10_000,
             pairs: 2_000,
+            dual_belts: 300,
             areas: Vec::new(),
             tests: Vec::new(),
             seed: 1,
@@ -108,6 +113,7 @@ impl Hunt {
                 }
                 "--stages" => hunt.stages = number()?,
                 "--pairs" => hunt.pairs = number()?,
+                "--dual-belts" => hunt.dual_belts = number()?,
                 "--seed" => hunt.seed = number()?,
                 "--seconds" => hunt.seconds = number()?,
                 "--kills" => hunt.kills = number()?,
@@ -120,6 +126,7 @@ impl Hunt {
             let part = match word {
                 "--stages" => Some(Part::Stages),
                 "--pairs" => Some(Part::Pairs),
+                "--dual-belts" => Some(Part::DualBelts),
                 "--seconds" => Some(Part::Readers),
                 "--kills" => Some(Part::Faults),
                 "--mutants" | "--only" => Some(Part::Mutants),
@@ -131,7 +138,7 @@ impl Hunt {
             hunt.parts = sized;
         }
         if hunt.parts.is_empty() {
-            hunt.parts = vec![Part::Stages, Part::Pairs, Part::Readers, Part::Faults];
+            hunt.parts = vec![Part::Stages, Part::Pairs, Part::DualBelts, Part::Readers, Part::Faults];
         }
         Ok(hunt)
     }
@@ -143,6 +150,7 @@ impl Hunt {
             let done = match part {
                 Part::Stages => stages::run("stages", self.stages, self.seed, self.threads, self.json),
                 Part::Pairs => stages::run("pairs", self.pairs, self.seed, self.threads, self.json),
+                Part::DualBelts => stages::run("dual-belts", self.dual_belts, self.seed, self.threads, self.json),
                 Part::Readers => readers::run(self.seconds, self.seed),
                 Part::Faults => faults::run(self.kills, self.seed),
                 Part::Mutants => {
@@ -180,7 +188,7 @@ mod tests {
         let hunt = Hunt::new(&["--part", "faults", "--seed", "7", "--part", "readers"]).unwrap();
         assert!(hunt.parts == [Part::Faults, Part::Readers] && hunt.seed == 7);
         assert!(Hunt::new(&["--stages", "5", "--seed", "3"]).unwrap().parts == [Part::Stages]);
-        assert_eq!(Hunt::new(&[]).unwrap().parts.len(), 4);
+        assert_eq!(Hunt::new(&[]).unwrap().parts.len(), 5);
         assert!(Hunt::new(&["--pairs", "5"]).unwrap().parts == [Part::Pairs]);
         let hunt = Hunt::new(&["--mutants", "5", "--threads", "0", "--longest", "6", "--only", "2"]).unwrap();
         assert!(hunt.parts == [Part::Mutants] && hunt.threads == Some(1) && hunt.longest == 6);

@@ -1,4 +1,4 @@
-//! The case file of a gantry: two drives, a bridge, a cart on it.
+//! The case file of a gantry: its drives, a bridge, a cart on it.
 
 use super::friction::friction;
 use super::reader::{Field, Table};
@@ -6,7 +6,7 @@ use super::{input, machine, sheet};
 use crate::error::{Error, Result};
 use crate::friction::Friction;
 use crate::machine::{
-    Belt, BeltMake, BeltSheet, DriveUnit, Encoder, EncoderPlace, Kind, Machine, Pulley, Slide, Spans,
+    Belt, BeltMake, BeltSheet, DriveAt, DriveUnit, Encoder, EncoderPlace, Kind, Machine, Pulley, Slide, Spans,
 };
 use crate::mechanism::State;
 use crate::signal::Signal;
@@ -28,7 +28,7 @@ pub(super) fn no_axis(root: &Table, kind: Kind) -> Error {
 }
 
 /// The tables of a gantry's case. Errors: one that belongs to an axis, or that is not there yet.
-pub(super) fn tables(root: &Table) -> Result<&'static [&'static str]> {
+pub(super) fn tables(root: &Table, kind: Kind) -> Result<Vec<&'static str>> {
     for key in ["travel", "idler_pulley"] {
         if let Some(field) = root.optional(key) {
             return Err(field.fail("this belongs to an axis").next(match key {
@@ -42,25 +42,11 @@ pub(super) fn tables(root: &Table) -> Result<&'static [&'static str]> {
             return Err(field.fail("this is not there yet for a gantry").next("leave it out for now"));
         }
     }
-    Ok(&[
-        "title",
-        "kind",
-        "motor",
-        "drive",
-        "amplifier",
-        "left_drive",
-        "right_drive",
-        "drive_pulley",
-        "bridge",
-        "cart",
-        "belt",
-        "encoder",
-        "experiment",
-        "controller",
-        "move",
-        "tune",
-        "sweep",
-    ])
+    let drives = kind.geometry().drives.iter().map(|drive| drive.label.key);
+    let before = ["title", "kind", "motor", "drive", "amplifier"].into_iter();
+    let behind =
+        ["drive_pulley", "bridge", "cart", "belt", "encoder", "experiment", "controller", "move", "tune", "sweep"];
+    Ok(before.chain(drives).chain(behind).collect())
 }
 
 /// The machine of the file `name`.
@@ -75,7 +61,7 @@ fn table<'a>(root: &Table<'a>, name: &str, holds: &str) -> Result<Table<'a>> {
 }
 
 fn gantry(root: &Table, kind: Kind) -> Result<Machine> {
-    let drives = [drive(root, "left_drive")?, drive(root, "right_drive")?];
+    let drives = kind.geometry().drives.iter().map(|at| drive(root, at.label.key)).collect::<Result<Vec<_>>>()?;
     let pulley = table(root, "drive_pulley", "radius and inertia")?;
     pulley.check_keys(&[], &[])?;
     let belt = table(root, "belt", "stiffness")?;
@@ -100,7 +86,7 @@ fn gantry(root: &Table, kind: Kind) -> Result<Machine> {
     let encoder = root.optional("encoder").map(|field| encoder(&field.table()?)).transpose()?;
     let mut gantry = Machine {
         kind,
-        drives: drives.into(),
+        drives,
         pulley_radius: machine::radius(&pulley, sheet::pitch(root)?)?,
         drive_pulley: machine::pulley(&pulley)?,
         idler_pulley: Pulley { inertia: 0.0, friction: Friction::default() },
@@ -110,13 +96,30 @@ fn gantry(root: &Table, kind: Kind) -> Result<Machine> {
         encoder,
         scale: None,
     };
+    gantry.check_gears().map_err(|error| of_gears(root, &gantry, error))?;
     if let Some(proportion) = sheet::proportion(&belt, &gantry.mechanism())? {
         gantry.belt.damping = gantry.belt.stiffness.map(|stiffness| proportion * stiffness);
     }
     Ok(gantry)
 }
 
-/// Motor and amplifier of a side: those of both, with what its own table says.
+/// The error about compliant gears where the first of them is given.
+fn of_gears(root: &Table, gantry: &Machine, error: Error) -> Error {
+    let of_all = std::iter::once(root.optional("motor"));
+    let tables = gantry.geometry().drives.iter().map(|at| root.optional(at.label.key)?.table().ok()?.optional("motor"));
+    match of_all.chain(tables).find_map(gear) {
+        Some(field) => Error { place: field.fail("").place, ..error },
+        None => error,
+    }
+}
+
+/// What makes the gear of a motor compliant.
+fn gear<'a>(motor: Option<Field<'a>>) -> Option<Field<'a>> {
+    let motor = motor?.table().ok()?;
+    ["gear_stiffness", "backlash", "gear_damping"].iter().find_map(|key| motor.optional(key))
+}
+
+/// Motor and amplifier of a side: those of all, with what its own table says.
 fn drive(root: &Table, side: &str) -> Result<DriveUnit> {
     let own = root.optional(side).map(|field| field.table()).transpose()?;
     if let Some(own) = &own {
@@ -200,14 +203,15 @@ fn encoder(table: &Table) -> Result<Encoder> {
     Ok(Encoder { at, lines: sheet::lines(table)? })
 }
 
-/// The inputs of both drives.
+/// The input of each drive.
 pub(super) fn inputs(experiment: &Table, gantry: &Machine, context: &input::Context) -> Result<Vec<Signal>> {
     let such_as = "for example input = { left = { pulse = \"5 V\", for = \"0.25 s\" }, right = { step = \"0 V\" } }";
     let inputs = experiment.required("input", such_as)?.table()?;
-    let sides = ["left", "right"];
+    let sides: Vec<&str> = gantry.geometry().sides().collect();
     if let Some(key) = inputs.keys().find(|key| !sides.contains(key)) {
         let field = inputs.optional(key).unwrap_or_else(|| inputs.field.clone());
-        return Err(field.fail(format!("`{key}` is not an input of a gantry")).allowed("left, right").next(such_as));
+        let what = format!("`{key}` is not an input of this gantry");
+        return Err(field.fail(what).allowed(sides.join(", ")).next(such_as));
     }
     let signal = |(side, unit): (&str, &DriveUnit)| match inputs.optional(side) {
         None => Ok(Signal::Step { value: 0.0, at: 0.0 }),
@@ -219,20 +223,35 @@ pub(super) fn inputs(experiment: &Table, gantry: &Machine, context: &input::Cont
 /// Where bridge and cart are; the pulleys where the belt is without strain, unless they are given.
 pub(super) fn initial(table: &Table, gantry: &Machine) -> Result<State> {
     table.check_keys(&[], &[])?;
+    let geometry = gantry.geometry();
+    let own = |key: &str| {
+        let of_drive = |at: &DriveAt| {
+            let rest = key.strip_prefix(geometry.label(at.pulley).key);
+            matches!(rest, Some("_angle" | "_speed")) || key == at.current_column
+        };
+        let is_of_slide = geometry.slides.iter().any(|slide| {
+            key.strip_prefix(geometry.label(slide.body).key).is_some_and(|rest| ["_position", "_speed"].contains(&rest))
+        });
+        is_of_slide || geometry.drives.iter().any(of_drive)
+    };
+    if let Some(field) = table.keys().find(|key| !own(key)).and_then(|key| table.optional(key)) {
+        let what = format!("a gantry of kind \"{}\" has no such coordinate", geometry.word);
+        return Err(field.fail(what).next("leave it out"));
+    }
     let two = |of: [&str; 2]| -> Result<[f64; 2]> { Ok([table.number(of[0])?, table.number(of[1])?]) };
     let (positions, speeds) = (["bridge_position", "cart_position"], ["bridge_speed", "cart_speed"]);
     let mut state = gantry.without_strain(&two(positions)?, &two(speeds)?);
-    for (index, (drive, side)) in gantry.mechanism().drives.iter().zip(["left", "right"]).enumerate() {
-        let body = drive.pulley;
-        if let Some(angle) = table.number_if_given(&format!("{side}_angle"))? {
+    for (index, (drive, at)) in gantry.mechanism().drives.iter().zip(geometry.drives).enumerate() {
+        let (body, pulley) = (drive.pulley, geometry.label(at.pulley).key);
+        if let Some(angle) = table.number_if_given(&format!("{pulley}_angle"))? {
             state.position[body] = angle;
         }
-        if let Some(speed) = table.number_if_given(&format!("{side}_speed"))? {
+        if let Some(speed) = table.number_if_given(&format!("{pulley}_speed"))? {
             state.speed[body] = speed;
         }
         // The rotor in the middle of its play.
         (state.position[drive.shaft], state.speed[drive.shaft]) = (state.position[body], state.speed[body]);
-        if let Some(field) = table.optional(&format!("{side}_current")) {
+        if let Some(field) = table.optional(at.current_column) {
             if !drive.has_current_state() {
                 return Err(field.fail("this current would have no effect").next(
                     "it needs an inductance above zero in voltage mode, or a bandwidth in current mode; or leave it out",

@@ -4,7 +4,7 @@ use super::source::Source;
 use super::tree::{Kind, Node};
 use super::{Case, set};
 use crate::error::{Error, Result};
-use crate::machine;
+use crate::machine::{DriveAt, Geometry};
 use crate::parameter::{self, Fallback, Parameter};
 use crate::quantity;
 use std::path::Path;
@@ -48,28 +48,28 @@ impl Case {
     /// How the numbers of this case are found in the table of parameters.
     fn rows(&self) -> Rows<impl Fn(&str) -> &'static str> {
         let drives: Vec<_> = self.machine.drives.iter().map(|unit| unit.amplifier.mode.unit()).collect();
+        let geometry = self.machine.geometry();
         let input_unit = move |section: &str| {
-            let right = section.split('.').any(|step| step == "right");
-            drives[if right { drives.len() - 1 } else { 0 }]
+            let side = geometry.sides().position(|side| section.split('.').any(|step| step == side));
+            drives[side.unwrap_or_default()]
         };
-        let place: fn(&str) -> String =
-            if self.machine.kind == machine::Kind::Axis { str::to_string } else { of_gantry };
-        Rows { input_unit, place }
+        Rows { input_unit, place: Box::new(move |section| in_table(geometry, section)) }
     }
 }
 
-/// Where the table of parameters has what stands in this section of a gantry's file.
-fn of_gantry(section: &str) -> String {
-    let instead = [
-        ("left_drive.", ""),
-        ("right_drive.", ""),
-        ("cart.", "bridge."),
-        ("experiment.initial.", "gantry.initial."),
-        ("experiment.input.left.", "experiment.input."),
-        ("experiment.input.right.", "experiment.input."),
-    ];
+/// Where the table of parameters has what stands in this section of a file.
+fn in_table(geometry: &Geometry, section: &str) -> String {
+    if geometry.drives.len() == 1 {
+        return section.to_string();
+    }
+    let of_drive = |drive: &DriveAt| {
+        let input = section.strip_prefix("experiment.input.").and_then(|rest| rest.strip_prefix(drive.side()));
+        let input = input.and_then(|rest| Some(format!("experiment.input.{}", rest.strip_prefix('.')?)));
+        input.or_else(|| section.strip_prefix(drive.key).map(str::to_string))
+    };
+    let instead = [("cart.", "bridge."), ("experiment.initial.", "gantry.initial.")];
     let found = instead.iter().find_map(|(from, to)| Some(format!("{to}{}", section.strip_prefix(from)?)));
-    found.unwrap_or_else(|| section.to_string())
+    found.or_else(|| geometry.drives.iter().find_map(of_drive)).unwrap_or_else(|| section.to_string())
 }
 
 /// How the rows of the table of parameters are found.
@@ -77,7 +77,7 @@ struct Rows<U: Fn(&str) -> &'static str> {
     /// The unit of an input that stands in this section.
     input_unit: U,
     /// Where the table has what stands in this section.
-    place: fn(&str) -> String,
+    place: Box<dyn Fn(&str) -> String>,
 }
 
 fn value<U: Fn(&str) -> &'static str>(text: &str, key: &str, rows: &Rows<U>) -> Result<Given> {

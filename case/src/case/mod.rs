@@ -195,7 +195,8 @@ impl Case {
         if accepted != Accepted::All && root.optional("stepper").is_some() {
             return Err(stepper::no_motor(&root));
         }
-        root.check_keys(if kind == Kind::Axis { &AXIS_TABLES } else { gantry::tables(&root)? }, &[])?;
+        let tables = if kind == Kind::Axis { AXIS_TABLES.to_vec() } else { gantry::tables(&root, kind)? };
+        root.check_keys(&tables, &[])?;
 
         let title = title(&root, name)?;
         let machine = match kind {

@@ -42,7 +42,7 @@ impl Template {
 /// ```
 /// use taut::case::{Case, gantry_template};
 /// use taut::machine::Kind;
-/// for kind in [Kind::HFrame, Kind::CoreXy] {
+/// for kind in [Kind::HFrame, Kind::CoreXy, Kind::DualBelt] {
 ///     let case = Case::from_text("gantry.toml", &gantry_template(kind))?;
 ///     assert_eq!(case.machine.kind, kind);
 /// }
@@ -63,30 +63,56 @@ pub fn gantry_template(kind: Kind) -> String {
 #     │   ┌──[    ]──────┐  │              y to the right
 #     │   │              │  │
 #    (left)              (right)   drive pulleys A and B";
-    let [word, other] = match kind {
-        Kind::HFrame => [Kind::HFrame, Kind::CoreXy],
-        Kind::Axis | Kind::CoreXy => [Kind::CoreXy, Kind::HFrame],
-    }
-    .map(Kind::word);
-    let (drawing, stiffness, lengths, left) = match kind {
+    const DUAL_BELT: &str = "\
+#    (O)                       (O)      idlers at the far end
+#    │ │                       │ │
+#   ═│═╪═(cart)──[cart]──(O)═══╪═│═     bridge with the cart's motor    x upward
+#    │ │                       │ │                                      y to the right
+#    (left)               (right)       drive pulleys";
+    // An axis has a template of its own.
+    let kind = if kind == Kind::Axis { Kind::CoreXy } else { kind };
+    let others = Kind::ALL.into_iter().filter(|other| ![Kind::Axis, kind].contains(other));
+    let others: Vec<String> = others.map(|other| format!("\"{}\"", other.word())).collect();
+    // With three drives the bridge is no part of what one motor does, and both sides have to pull it.
+    let moves_both = r#""one motor"                  # moves bridge and cart alike"#;
+    let moves_cart = r#""cart alone"                 # on the bridge, which stays where it is"#;
+    let (drawing, stiffness, lengths, left, first) = match kind {
         Kind::HFrame => (
             H_FRAME,
             ["132.76 kN/m", "132.76 kN/m", "58.885 kN/m"].as_slice(),
             ["0.7 m", "0.7 m", "1.6 m"].as_slice(),
             "-5 V",
+            ("left", moves_both),
+        ),
+        Kind::DualBelt => (
+            DUAL_BELT,
+            ["60 kN/m", "130 kN/m", "60 kN/m", "130 kN/m", "90 kN/m", "130 kN/m"].as_slice(),
+            ["1.6 m", "0.7 m", "1.6 m", "0.7 m", "1 m", "0.7 m"].as_slice(),
+            "5 V",
+            ("cart", moves_cart),
         ),
         Kind::Axis | Kind::CoreXy => (
             CORE_XY,
             ["60 kN/m", "130 kN/m", "60 kN/m", "130 kN/m"].as_slice(),
             ["1.6 m", "0.7 m", "1.6 m", "0.7 m"].as_slice(),
             "5 V",
+            ("left", moves_both),
         ),
+    };
+    let [count, all, others_drives] = match kind.geometry().drives.len() {
+        2 => ["two", "both", "the other"],
+        _ => ["three", "all", "the others"],
     };
     let list = |values: &[&str]| values.iter().map(|value| format!("\"{value}\"")).collect::<Vec<_>>().join(", ");
     let spans: Vec<&str> = kind.geometry().span_labels().map(|span| span.name.trim_end_matches(" span")).collect();
     [
-        ("{kind}", word.to_string()),
-        ("{other}", other.to_string()),
+        ("{kind}", kind.word().to_string()),
+        ("{other}", others.join(", ")),
+        ("{count}", count.to_string()),
+        ("{all}", all.to_string()),
+        ("{other_drives}", others_drives.to_string()),
+        ("{side}", first.0.to_string()),
+        ("{one_motor}", first.1.to_string()),
         ("{drawing}", drawing.to_string()),
         ("{stiffness}", list(stiffness)),
         ("{spans}", spans.join(", ")),

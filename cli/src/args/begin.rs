@@ -102,6 +102,8 @@ pub enum KindName {
     HFrame,
     /// Two motors, each with a belt of its own, move a cart in a plane
     CoreXy,
+    /// Two motors with a belt each move a bridge, a third motor the cart on it
+    DualBelt,
 }
 
 /// Compute masses, stiffness, frequencies and limits from the numbers of a case, without a simulation.

@@ -227,8 +227,8 @@ pub struct Modes {
     /// Position of the bridge of a gantry [default: 0 m]
     #[arg(long, value_name = "POSITION", value_parser = metres, allow_hyphen_values = true)]
     pub bridge: Option<f64>,
-    /// Bodies that stick, separated by commas: drive, cart or idler; left, right, bridge
-    /// or cart of a gantry
+    /// Bodies that stick, separated by commas: drive, cart or idler; left, right, cart_pulley,
+    /// bridge or cart of a gantry
     #[arg(long, value_delimiter = ',', value_name = "BODY")]
     pub stuck: Vec<String>,
     /// Also give the discrete-time model for this sample time

@@ -176,7 +176,7 @@ fn write_samples(folder: &Folder, name: &str, case: &Case, run: &MoveRun) -> Res
     let geometry = case.machine.geometry();
     let drives: Vec<String> = match geometry.drives {
         [_] => vec![String::new()],
-        several => several.iter().map(|drive| format!("{},", geometry.label(drive.pulley).key)).collect(),
+        several => several.iter().map(|drive| format!("{},", geometry.drive_key(drive))).collect(),
     };
     let name_of_drive = if drives.len() > 1 { "drive," } else { "" };
     let mut text = format!("time_s,{name_of_drive}reference_m,measured_m,asked_{unit},given_{unit}\n");

@@ -22,7 +22,7 @@ const ARM: [&str; 4] = ["-mcpu=cortex-m4", "-mthumb", "-mfpu=fpv4-sp-d16", "-mfl
 const TABLE4: &str = "stages/sollmann-jouaneh/table4.toml";
 
 /// Machines with their commands' size: each kind of part that works piece by piece is in one of them.
-pub const MACHINES: [(&str, &[&str], f64); 11] = [
+pub const MACHINES: [(&str, &[&str], f64); 12] = [
     (TABLE4, &[], 8.0),
     ("stages/sollmann-jouaneh/table1.toml", &["cart.friction.coulomb=0.2 N"], 8.0),
     ("stages/sollmann-jouaneh/rig.toml", &[], 8.0),
@@ -45,6 +45,7 @@ pub const MACHINES: [(&str, &[&str], f64); 11] = [
     ),
     ("stages/h-frame/h-frame.toml", &[], 6.0),
     ("stages/core-xy/core-xy.toml", &[], 6.0),
+    ("stages/dual-belt/dual-belt.toml", &[], 6.0),
 ];
 
 /// The bundled controllers: every structure, feed-forward, observer and filter.
@@ -188,9 +189,10 @@ fn the_controller_replays_moves_bit_for_bit() {
 }
 
 /// Gantries in closed loop, with changes.
-pub const GANTRIES: [(&str, &[&str]); 4] = [
+pub const GANTRIES: [(&str, &[&str]); 5] = [
     ("stages/h-frame/square.toml", &[]),
     ("stages/core-xy/square.toml", &["controller.limit=3 V"]),
+    ("stages/dual-belt/square.toml", &[]),
     (
         "stages/core-xy/square.toml",
         &[
@@ -210,7 +212,7 @@ fn the_controllers_of_a_gantry_replay_moves_bit_for_bit() {
         let case = opened(path, changes);
         let folder = exported(&file(path), changes, &["--part", "controller"]);
         let harness = fs::read_to_string(folder.path().join("control.c")).unwrap();
-        for (side, seen) in ["left", "right"].into_iter().zip(observed_drives(&case, 0)) {
+        for (side, seen) in case.machine.geometry().sides().zip(observed_drives(&case, 0)) {
             let own = format!("model_{side}");
             let text = harness.replace("model_", &format!("{own}_")).replace("\"model.h\"", &format!("\"{own}.h\""));
             fs::write(folder.path().join("control.c"), text).unwrap();

@@ -146,9 +146,14 @@ impl<const N: usize> Open<N> {
         self.sensitivity(self.outer())
     }
 
-    /// T x/y: from the references of the sliding parts to their positions, without feed-forward.
+    /// T x/y: from the references of the sliding parts to their positions, without feed-forward. Of parts that a machine
+    /// with more drives than these does not have it is 1.
     pub fn reference_to_slides(&self) -> Square<N> {
-        self.slides * (self.closed(self.outer())[1] / self.difference) * self.shares
+        let mut all = self.slides * (self.closed(self.outer())[1] / self.difference) * self.shares;
+        for slide in (0..N).filter(|&slide| self.shares.column(slide).iter().all(|share| *share == Complex::ZERO)) {
+            all[(slide, slide)] = Complex::ONE;
+        }
+        all
     }
 
     /// True if `other` is turned by more than `most` from this in any of the loops.
@@ -180,6 +185,15 @@ fn inverse<const N: usize>(a: &Square<N>) -> (Square<N>, Complex<f64>) {
     if N == 1 {
         return (adjugate, a[(0, 0)]);
     }
+    if N == 3 {
+        // Rows of the adjugate are cross products of columns: its entry (i, j) is a cofactor of a at (j, i).
+        let next = |k: usize| [(k + 1) % 3, (k + 2) % 3];
+        for (row, column) in (0..9).map(|entry| (entry / 3, entry % 3)) {
+            let ([i, j], [k, l]) = (next(column), next(row));
+            adjugate[(row, column)] = a[(i, k)] * a[(j, l)] - a[(i, l)] * a[(j, k)];
+        }
+        return (adjugate, (0..3).map(|k| a[(0, k)] * adjugate[(k, 0)]).sum());
+    }
     for (row, column) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
         let own = if row == column { a[(1 - row, 1 - column)] } else { -a[(row, column)] };
         adjugate[(row, column)] = own;
@@ -197,6 +211,9 @@ fn largest_square<const N: usize>(a: &Square<N>) -> f64 {
     if N == 1 {
         return a[(0, 0)].norm_sqr();
     }
+    if N == 3 {
+        return largest_of_three(&Square::from_fn(|i, j| a[(i, j)]));
+    }
     let sum: f64 = a.iter().map(Complex::norm_sqr).sum();
     let [first, second] = [0, 1].map(|row| a[(row, 0)].norm_sqr() + a[(row, 1)].norm_sqr());
     let inner = a[(0, 0)] * a[(1, 0)].conj() + a[(0, 1)] * a[(1, 1)].conj();
@@ -204,9 +221,28 @@ fn largest_square<const N: usize>(a: &Square<N>) -> f64 {
     0.5 * (sum + ((first - second).powi(2) + 4.0 * inner.norm_sqr()).sqrt())
 }
 
-/// The smallest singular value: |det A| over the largest.
+/// The largest eigenvalue of H = A Aᴴ of three rows: with q = tr H/3, p² = tr (H − q)²/6 and r = det ((H − q)/p)/2 it is
+/// q + 2 p cos (acos(r)/3).
+fn largest_of_three(a: &Square<3>) -> f64 {
+    let mut h = a * a.adjoint();
+    let q = h.trace().re / 3.0;
+    (0..3).for_each(|k| h[(k, k)] -= q);
+    let p = (h.iter().map(Complex::norm_sqr).sum::<f64>() / 6.0).sqrt();
+    // Three that are alike, or no numbers.
+    if p.is_nan() || p <= f64::MIN_POSITIVE {
+        return q + p;
+    }
+    let r = 0.5 * inverse(&(h / Complex::new(p, 0.0))).1.re;
+    q + 2.0 * p * (r.clamp(-1.0, 1.0).acos() / 3.0).cos()
+}
+
+/// The smallest singular value: |det A| over the largest of the adjugate.
 pub(super) fn smallest<const N: usize>(a: &Square<N>) -> f64 {
-    if N == 1 { a[(0, 0)].norm() } else { inverse(a).1.norm() / largest(a) }
+    if N == 1 {
+        return a[(0, 0)].norm();
+    }
+    let (adjugate, determinant) = inverse(a);
+    determinant.norm() / largest(&adjugate)
 }
 
 /// The loops broken at one place, at one frequency.

@@ -43,14 +43,15 @@ pub struct Plant {
     pub(super) of: ByDrives,
 }
 
-/// The answers of a machine with one drive or with two.
+/// The answers of a machine with one drive, with two or with three.
 #[derive(Debug, Clone)]
 pub(super) enum ByDrives {
     One(Box<Sampled<1>>),
     Two(Box<Sampled<2>>),
+    Three(Box<Sampled<3>>),
 }
 
-/// The same code for either number of drives.
+/// The same code for any number of drives.
 macro_rules! by_drives {
     ($plant:expr, |$sampled:ident| $value:expr) => {
         match &$plant.of {
@@ -59,6 +60,10 @@ macro_rules! by_drives {
                 $value
             }
             $crate::tune::plant::ByDrives::Two(sampled) => {
+                let $sampled = &**sampled;
+                $value
+            }
+            $crate::tune::plant::ByDrives::Three(sampled) => {
                 let $sampled = &**sampled;
                 $value
             }
@@ -74,10 +79,11 @@ pub(super) struct Sampled<const N: usize> {
     models: [Discrete; N],
     /// Outputs of the models: what is measured, what slides, the currents; and metres per unit of the first.
     measured: [usize; N],
-    slides: [usize; N],
+    slides: [Option<usize>; N],
     currents: [usize; N],
     length: f64,
-    /// Travel of each drive's part of the belt per travel of each sliding part.
+    /// Travel of each drive's part of the belt per travel of each sliding part; zero of those that a machine with more
+    /// drives than sliding parts does not have.
     pub shares: Square<N>,
 }
 
@@ -93,8 +99,11 @@ impl Plant {
             2 => Self::sampled([model(0)?, model(1)?], &system.input(0), machine, corners, |sampled| {
                 ByDrives::Two(Box::new(sampled))
             }),
+            3 => Self::sampled([model(0)?, model(1)?, model(2)?], &system.input(0), machine, corners, |sampled| {
+                ByDrives::Three(Box::new(sampled))
+            }),
             count => {
-                Err(Error::new(format!("a machine with {count} drives has no margins")).allowed("one or two drives"))
+                Err(Error::new(format!("a machine with {count} drives has no margins")).allowed("up to three drives"))
             }
         }
     }
@@ -121,7 +130,8 @@ impl Plant {
             find(name).or(find(&pulley)).unwrap_or_default()
         };
         let slide = |slide: usize| {
-            find(&format!("{}_position", geometry.label(geometry.slides[slide].body).key)).unwrap_or_default()
+            let body = geometry.slides.get(slide)?.body;
+            Some(find(&format!("{}_position", geometry.label(body).key)).unwrap_or_default())
         };
         let shares = machine.belt_shares();
         let mut sampled = Sampled {
@@ -130,7 +140,9 @@ impl Plant {
             slides: std::array::from_fn(slide),
             currents: std::array::from_fn(|drive| find(geometry.drives[drive].current_column).unwrap_or_default()),
             length: if measures_cart(machine) { 1.0 } else { machine.pulley_radius },
-            shares: Square::from_fn(|drive, slide| Complex::new(shares[drive][slide], 0.0)),
+            shares: Square::from_fn(|drive, slide| {
+                Complex::new(shares[drive].get(slide).copied().unwrap_or_default(), 0.0)
+            }),
             models,
         };
         let unstable = sampled.models[0].poles().iter().filter(|z| z.norm() > 1.0 + 1e-9).count();
@@ -161,7 +173,7 @@ impl<const N: usize> Sampled<N> {
                 let output = self.currents[row];
                 all[input][output] + lag * self.models[input].d[output]
             }),
-            slides: Square::from_fn(|row, input| all[input][self.slides[row]]),
+            slides: Square::from_fn(|row, input| self.slides[row].map_or(Complex::ZERO, |slide| all[input][slide])),
         }
     }
 }

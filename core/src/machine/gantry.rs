@@ -33,30 +33,33 @@ pub const CART: usize = 3;
 /// Number of bodies with friction of their own.
 pub const BODIES: usize = 4;
 
-const DRIVES: [DriveAt; 2] = [
-    DriveAt {
-        label: Label { key: "left_drive", name: "left drive" },
-        voltage: Label { key: "left_voltage", name: "left voltage limit" },
-        current: Label { key: "left_current", name: "left current limit" },
-        current_column: "left_current",
-        pulley: LEFT,
-        gear: Label { key: "left_gear", name: "left gear" },
-        rotor: Label { key: "left_rotor", name: "left rotor" },
-        key: "left_drive.",
-        prefix: "left_",
-    },
-    DriveAt {
-        label: Label { key: "right_drive", name: "right drive" },
-        voltage: Label { key: "right_voltage", name: "right voltage limit" },
-        current: Label { key: "right_current", name: "right current limit" },
-        current_column: "right_current",
-        pulley: RIGHT,
-        gear: Label { key: "right_gear", name: "right gear" },
-        rotor: Label { key: "right_rotor", name: "right rotor" },
-        key: "right_drive.",
-        prefix: "right_",
-    },
-];
+/// The drive on the left.
+pub(super) const LEFT_DRIVE: DriveAt = DriveAt {
+    label: Label { key: "left_drive", name: "left drive" },
+    voltage: Label { key: "left_voltage", name: "left voltage limit" },
+    current: Label { key: "left_current", name: "left current limit" },
+    current_column: "left_current",
+    pulley: LEFT,
+    gear: Label { key: "left_gear", name: "left gear" },
+    rotor: Label { key: "left_rotor", name: "left rotor" },
+    key: "left_drive.",
+    prefix: "left_",
+};
+
+/// The drive on the right.
+pub(super) const RIGHT_DRIVE: DriveAt = DriveAt {
+    label: Label { key: "right_drive", name: "right drive" },
+    voltage: Label { key: "right_voltage", name: "right voltage limit" },
+    current: Label { key: "right_current", name: "right current limit" },
+    current_column: "right_current",
+    pulley: RIGHT,
+    gear: Label { key: "right_gear", name: "right gear" },
+    rotor: Label { key: "right_rotor", name: "right rotor" },
+    key: "right_drive.",
+    prefix: "right_",
+};
+
+const DRIVES: [DriveAt; 2] = [LEFT_DRIVE, RIGHT_DRIVE];
 
 /// Bodies, with where the pulleys are by x and y.
 const fn bodies(left: &'static [f64; 2]) -> [BodyAt; BODIES] {
@@ -74,24 +77,31 @@ const fn bodies(left: &'static [f64; 2]) -> [BodyAt; BODIES] {
 
 /// The sliding parts, with their positions by the drives and the errors of those.
 const fn slides(by_drives: [&'static [f64]; 2], errors: [&'static [(usize, f64)]; 2]) -> [SlideAt; 2] {
-    [
-        SlideAt {
-            body: BRIDGE,
-            stop: Label { key: "bridge_stop", name: "bridge's end stop" },
-            force_along: Label { key: "bridge_force_along", name: "force along the bridge's travel" },
-            force_by_speed: Label { key: "bridge_force_by_speed", name: "force by the bridge's speed" },
-            by_drives: by_drives[0],
-            error: errors[0],
-        },
-        SlideAt {
-            body: CART,
-            stop: Label { key: "cart_stop", name: "cart's end stop" },
-            force_along: Label { key: "cart_force_along", name: "force along the cart's travel" },
-            force_by_speed: Label { key: "cart_force_by_speed", name: "force by the cart's speed" },
-            by_drives: by_drives[1],
-            error: errors[1],
-        },
-    ]
+    [bridge(BRIDGE, by_drives[0], errors[0]), cart(CART, by_drives[1], errors[1])]
+}
+
+/// The bridge, which is this body.
+pub(super) const fn bridge(body: usize, by_drives: &'static [f64], error: &'static [(usize, f64)]) -> SlideAt {
+    SlideAt {
+        body,
+        stop: Label { key: "bridge_stop", name: "bridge's end stop" },
+        force_along: Label { key: "bridge_force_along", name: "force along the bridge's travel" },
+        force_by_speed: Label { key: "bridge_force_by_speed", name: "force by the bridge's speed" },
+        by_drives,
+        error,
+    }
+}
+
+/// The cart on the bridge, which is this body.
+pub(super) const fn cart(body: usize, by_drives: &'static [f64], error: &'static [(usize, f64)]) -> SlideAt {
+    SlideAt {
+        body,
+        stop: Label { key: "cart_stop", name: "cart's end stop" },
+        force_along: Label { key: "cart_force_along", name: "force along the cart's travel" },
+        force_by_speed: Label { key: "cart_force_by_speed", name: "force by the cart's speed" },
+        by_drives,
+        error,
+    }
 }
 
 pub(super) static H_FRAME: Geometry = Geometry {

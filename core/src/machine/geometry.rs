@@ -13,7 +13,7 @@ pub struct Geometry {
     pub belts: &'static str,
     /// The drives.
     pub drives: &'static [DriveAt],
-    /// The bodies other than rotors, by their numbers.
+    /// The bodies other than rotors, by their numbers: drive pulleys first, in the order of the drives.
     pub bodies: &'static [BodyAt],
     /// The spans of the belt, by their numbers.
     pub spans: &'static [SpanAt],
@@ -119,7 +119,24 @@ pub struct SlideAt {
     pub error: &'static [(usize, f64)],
 }
 
+impl DriveAt {
+    /// Its side, as inputs and commands are named: `left`. Without the line it has the name of its only input.
+    pub fn side(&self) -> &'static str {
+        self.prefix.strip_suffix('_').unwrap_or(self.prefix)
+    }
+}
+
 impl Geometry {
+    /// The names of the drives' sides, as inputs and commands are named.
+    pub fn sides(&self) -> impl Iterator<Item = &'static str> {
+        self.drives.iter().map(DriveAt::side)
+    }
+
+    /// The key of a drive in results: its side, or its pulley's where it is the only one.
+    pub fn drive_key(&self, drive: &DriveAt) -> &'static str {
+        if drive.side().is_empty() { self.label(drive.pulley).key } else { drive.side() }
+    }
+
     /// The name of a slide's or drive pulley's body.
     pub fn label(&self, body: usize) -> Label {
         self.bodies[body].label
@@ -137,6 +154,7 @@ impl Geometry {
 
     /// The spans whose stretches tell by how much all drives are off, and from which those of all spans follow.
     pub fn telling_spans(&self) -> impl Iterator<Item = usize> {
-        self.slides[0].error.iter().map(|(span, _)| *span)
+        let tells = |span: &usize| self.slides.iter().any(|slide| slide.error.iter().any(|(own, _)| own == span));
+        (0..self.spans.len()).filter(tells)
     }
 }

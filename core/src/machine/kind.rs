@@ -1,7 +1,7 @@
 //! The kinds of machines, each a constant of geometry.
 
 use super::geometry::Geometry;
-use super::{axis, gantry};
+use super::{axis, dual_belt, gantry};
 
 /// The kinds of machines.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -12,11 +12,13 @@ pub enum Kind {
     HFrame,
     /// A cart on a bridge, two belts, one for each drive pulley.
     CoreXy,
+    /// A cart on a bridge, a belt on either side of the bridge and one along it, each with a motor.
+    DualBelt,
 }
 
 impl Kind {
     /// All of them.
-    pub const ALL: [Kind; 3] = [Kind::Axis, Kind::HFrame, Kind::CoreXy];
+    pub const ALL: [Kind; 4] = [Kind::Axis, Kind::HFrame, Kind::CoreXy, Kind::DualBelt];
 
     /// Its geometry.
     pub const fn geometry(self) -> &'static Geometry {
@@ -24,6 +26,7 @@ impl Kind {
             Kind::Axis => &axis::AXIS,
             Kind::HFrame => &gantry::H_FRAME,
             Kind::CoreXy => &gantry::CORE_XY,
+            Kind::DualBelt => &dual_belt::DUAL_BELT,
         }
     }
 

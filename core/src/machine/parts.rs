@@ -7,7 +7,8 @@ use super::{
 use crate::error::{Error, Result};
 use crate::friction::{Friction, Law};
 use crate::mechanism::{
-    self, BODIES, Body, Drive, Follows, Heading, Label, Mechanism, Over, Roles, Shown, Spring, SpringLaw, State,
+    self, BODIES, BODIES_AND_DRIVES, Body, Drive, Follows, Heading, Label, Mechanism, Over, Roles, SPRINGS, Shown,
+    Spring, SpringLaw, State,
 };
 
 impl Machine {
@@ -351,6 +352,20 @@ impl Machine {
         held
     }
 
+    /// Refuses compliant gears where the solvers have no room for the bodies and springs that these are.
+    pub fn check_gears(&self) -> Result<()> {
+        let geometry = self.geometry();
+        let gears = self.drives.iter().filter(|unit| unit.motor.gear_play.is_some()).count();
+        let [bodies, springs] = [geometry.bodies.len() + gears, geometry.spans.len() + geometry.slides.len() + gears];
+        let has_room = bodies + self.drives.len() <= BODIES_AND_DRIVES && bodies <= BODIES && springs <= SPRINGS;
+        match has_room || gears == 0 {
+            true => Ok(()),
+            false => Err(Error::new(format!("a {} gantry cannot have compliant gears yet", geometry.word))
+                .allowed("gears without gear_stiffness and backlash: there is no room for rotors beside its bodies")
+                .next("leave gear_stiffness, gear_damping and backlash out")),
+        }
+    }
+
     /// Refuses what is no gantry.
     pub fn check_gantry(&self) -> Result<()> {
         let geometry = self.geometry();
@@ -360,8 +375,9 @@ impl Machine {
                 .allowed(format!("{spans} values of stiffness and of damping")));
         }
         let Some(bridge) = self.bridge.as_ref().filter(|_| self.drives.len() == geometry.drives.len()) else {
-            return Err(Error::new("a gantry has two drives and a bridge"));
+            return Err(Error::new(format!("this gantry has {} drives and a bridge", geometry.drives.len())));
         };
+        self.check_gears()?;
         let positive = |what: &str, value: f64| match (1e-15..=1e15).contains(&value) {
             true => Ok(()),
             false => Err(Error::new(format!("{what} cannot be {value:e}")).allowed("above zero: from 1e-15 to 1e15")),

@@ -40,16 +40,16 @@ impl Rigid {
         if machine.drives.len() == 1 {
             return Self::of_drive(machine, 0);
         }
-        let pulley = Self::of_pulley(machine, 0);
-        // With y = s q and q = Σ l y the work Σ f dy = M q̈ dq gives f = l M q̈ = (l/s) M ÿ.
+        // With y = s q and q = Σ l y the work Σ f dy = M q̈ dq gives f = l M q̈ = (l/s) M ÿ, for each that moves it.
         let share = |(number, at): (usize, &SlideAt)| {
-            let weight = at.by_drives[0] / machine.belt_shares()[0][number];
-            Self::of_slide(machine, number).map(|slide| (weight, slide))
+            let drive = at.by_drives.iter().position(|weight| *weight != 0.0)?;
+            let weight = at.by_drives[drive] / machine.belt_shares()[drive][number];
+            Self::of_slide(machine, number).map(|slide| (drive, weight, slide))
         };
         let shares = machine.geometry().slides.iter().enumerate().filter_map(share);
-        let Some((weight, slide)) = shares.max_by(|(v, a), (w, b)| (v * a.mass).total_cmp(&(w * b.mass))) else {
-            return pulley;
-        };
+        let heaviest = shares.max_by(|(_, v, a), (_, w, b)| (v * a.mass).total_cmp(&(w * b.mass)));
+        let Some((drive, weight, slide)) = heaviest else { return Self::of_pulley(machine, 0) };
+        let pulley = Self::of_pulley(machine, drive);
         let sum = |own: [f64; 2], more: [f64; 2]| [own[0] + weight * more[0], own[1] + weight * more[1]];
         Self {
             mass: pulley.mass + weight * slide.mass,

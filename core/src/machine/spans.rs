@@ -4,7 +4,7 @@ use std::fmt;
 use std::ops::{Deref, DerefMut};
 
 /// Room for spans.
-const ROOM: usize = 4;
+const ROOM: usize = 6;
 
 /// A number of each span, in the order of the geometry: a slice of them, but one that is copied.
 #[derive(Clone, Copy, PartialEq)]
@@ -27,7 +27,7 @@ impl Spans {
 
     /// Values of the three spans of an axis.
     pub fn three(self) -> [f64; 3] {
-        let [first, second, third, _] = self.values;
+        let [first, second, third, ..] = self.values;
         [first, second, third]
     }
 }

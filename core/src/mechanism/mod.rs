@@ -40,7 +40,9 @@ pub const BODIES: usize = 6;
 /// Room for springs.
 pub const SPRINGS: usize = 8;
 /// Room for drives.
-pub const DRIVES: usize = 2;
+pub const DRIVES: usize = 3;
+/// Room for both together: three drives leave room for one body fewer than two.
+pub const BODIES_AND_DRIVES: usize = BODIES + 2;
 /// Room for currents that are states: one of each brushed motor, or both of a stepper.
 pub const CURRENTS: usize = DRIVES;
 
@@ -347,6 +349,7 @@ impl Mechanism {
     /// for.
     pub fn new(bodies: Vec<Body>, springs: Vec<Spring>, drives: Vec<Drive>) -> Self {
         assert!(bodies.len() <= BODIES && springs.len() <= SPRINGS && drives.len() <= DRIVES);
+        assert!(bodies.len() + drives.len() <= BODIES_AND_DRIVES);
         assert!(bodies.iter().is_sorted_by_key(|body| body.is_rotor));
         assert!(drives.iter().map(Drive::windings).sum::<usize>() <= CURRENTS);
         let mut friction = vec![(Friction::default(), Friction::default()); bodies.len()];

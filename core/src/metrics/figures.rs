@@ -14,6 +14,8 @@ pub enum Role {
     Pulley,
     /// A motor.
     Motor,
+    /// The shaft of a motor.
+    Shaft,
     /// A span of the belt.
     Span,
     /// A body other than rotors.
@@ -139,7 +141,7 @@ impl FigureRow {
     }
 }
 
-use Role::{Body, Load, Motor, Pulley, Span, Whole};
+use Role::{Body, Load, Motor, Pulley, Shaft, Span, Whole};
 use Worth::{Flag, Number, TimeOfPeak};
 
 /// The key figures.
@@ -158,7 +160,7 @@ pub static FIGURES: &[FigureRow] = &[
         .on_an_axis("peak_drive_travel_minus_cart", "largest drive travel minus cart").again(),
     row(Pulley, "peak_*_speed", "m/s", "peak speed r φ′ of the *", |m, k| Worth::Peak(m.drives[k].peak_belt_speed.unwrap_or_default()))
         .seeking(Seek::BeltSpeed).of_one_drive().on_an_axis("peak_drive_speed", "peak drive speed r φ₁′"),
-    row(Motor, "peak_*_speed", "rad/s", "peak speed of the *", |m, k| Worth::Peak(m.drives[k].peak_speed)).seeking(Seek::ShaftSpeed).again(),
+    row(Shaft, "peak_*_speed", "rad/s", "peak speed of the *", |m, k| Worth::Peak(m.drives[k].peak_speed)).seeking(Seek::ShaftSpeed).again(),
     row(Whole, "steady_speed", "m/s", "steady cart speed", |m, _| Number(m.steady_speed.map_or(f64::NAN, |steady| steady.value)))
         .seeking(Seek::SteadySpeed).of_one_drive(),
     row(Span, "peak_*_stretch", "m", "peak stretch of *", |m, k| Worth::Peak(m.spans[k].peak_stretch)).seeking(Seek::Stretch),
@@ -207,15 +209,21 @@ impl Figure {
     }
 }
 
+/// The name of a motor, as its current's column begins.
+fn motor(drive: &DriveAt) -> Label {
+    Label { key: drive.current_column.trim_end_matches("_current"), name: drive.label.name }
+}
+
 /// The parts of a role: their keys as columns have them, and their names.
 fn parts(geometry: &Geometry, role: Role) -> Vec<(&'static str, String)> {
     let labels: Vec<Label> = match role {
         Role::Load => geometry.slides.iter().map(|slide| geometry.label(slide.body)).collect(),
         Role::Pulley => geometry.drives.iter().map(|drive| geometry.label(drive.pulley)).collect(),
-        Role::Motor => {
-            // As its current's column begins.
-            let key = |column: &'static str| column.trim_end_matches("_current");
-            let label = |drive: &DriveAt| Label { key: key(drive.current_column), name: drive.label.name };
+        Role::Motor => geometry.drives.iter().map(motor).collect(),
+        Role::Shaft => {
+            // What slides has a speed, too.
+            let slides = |key: &str| geometry.slides.iter().any(|slide| geometry.label(slide.body).key == key);
+            let label = |drive: &DriveAt| if slides(motor(drive).key) { drive.label } else { motor(drive) };
             geometry.drives.iter().map(label).collect()
         }
         Role::Span => geometry.spans.iter().map(|span| Label { key: span.column, name: span.label.name }).collect(),
@@ -249,4 +257,21 @@ pub fn figures(kind: Kind, has_stepper: bool) -> Vec<Figure> {
         })
     };
     rows.flat_map(of_parts).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The cart of a dual belt and its motor have a peak speed each, which were both `peak_cart_speed`.
+    #[test]
+    fn no_two_figures_of_a_kind_share_a_name() {
+        for kind in Kind::ALL {
+            let mut names: Vec<String> = figures(kind, true).into_iter().map(|figure| figure.name).collect();
+            let count = names.len();
+            names.sort();
+            names.dedup();
+            assert_eq!(names.len(), count, "{}", kind.word());
+        }
+    }
 }

@@ -1,7 +1,7 @@
 //! Location of a parameter in a machine, with access to it.
 
 use crate::friction::{Friction, Law, Shape, decay_of_velocity, velocity_of_decay};
-use crate::machine::{Amplifier, AmplifierMode, Belt, BeltModel, Machine, Motor, SimpleDrive};
+use crate::machine::{Amplifier, AmplifierMode, Belt, BeltModel, Kind, Machine, Motor, SimpleDrive};
 
 /// Location of a parameter in a machine.
 #[derive(Debug, Clone, Copy)]
@@ -52,7 +52,7 @@ impl Accessor {
             Of::Machine => Some((List::None, 1)),
             Of::Axis => (slides == 1).then_some((List::None, 1)),
             Of::Drive if drives == 1 => Some((List::None, 1)),
-            Of::Drive => Some((List::Drives, drives)),
+            Of::Drive => Some((List::Drives(machine.kind), drives)),
             Of::Slide => (slides > 1).then_some((List::Slides, slides)),
             Of::Span => Some((List::Numbers, machine.belt.stiffness.len())),
             Of::Point(count) => (slides == 1).then(|| (List::Points, count(machine))),
@@ -69,14 +69,11 @@ pub enum List {
     Numbers,
     /// `cart.friction.along.0.factor`: a list of points.
     Points,
-    /// `left_drive.motor.resistance`, `right_drive.motor.resistance`: one of each drive. `motor.resistance` is both.
-    Drives,
+    /// `left_drive.motor.resistance`, `right_drive.motor.resistance`: one of each drive. `motor.resistance` is all.
+    Drives(Kind),
     /// `bridge.mass`, `cart.mass`: one of each thing that slides, with the key of the bridge's in the table.
     Slides,
 }
-
-/// The drives of a gantry in keys, before the key of an axis.
-pub(super) const DRIVES: [&str; 2] = ["left_drive.", "right_drive."];
 
 /// The sliding bodies of a gantry, as keys begin.
 pub(super) const SLIDES: [&str; 2] = ["bridge.", "cart."];
@@ -91,7 +88,9 @@ impl List {
                 Some((points, name)) => format!("{points}.{index}.{name}"),
                 None => key.to_string(),
             },
-            List::Drives => format!("{}{key}", DRIVES.get(index).copied().unwrap_or_default()),
+            List::Drives(kind) => {
+                format!("{}{key}", kind.geometry().drives.get(index).map_or("", |drive| drive.key))
+            }
             List::Slides => match (SLIDES.get(index), key.strip_prefix(SLIDES[0])) {
                 (Some(slide), Some(rest)) => format!("{slide}{rest}"),
                 _ => key.to_string(),

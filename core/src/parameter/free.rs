@@ -295,9 +295,9 @@ fn present<'a>(machine: &'a Machine, row: &'static Parameter) -> impl Iterator<I
     })
 }
 
-/// True if both drives of a gantry have this number, and the same one: it is then that of the motor that both are.
+/// True if all drives of a gantry have this number, and the same one: it is then that of the motor that all are.
 fn are_alike_drives(machine: &Machine, row: &'static Parameter) -> bool {
-    let Some((List::Drives, count)) = machine.sits(row).listed() else { return false };
+    let Some((List::Drives(_), count)) = machine.sits(row).listed() else { return false };
     let first = machine.get(row, 0);
     first.is_some() && (1..count).all(|index| machine.get(row, index) == first)
 }
@@ -377,20 +377,19 @@ fn numbers(machine: &Machine, key: &str, free: &[&str]) -> Result<(Vec<Number>, 
     if numbers.is_empty() && count > 0 {
         // Of a number there are no elements, of a list not that many.
         return Err(match list {
-            List::None | List::Drives | List::Slides => unknown(machine, key),
+            List::None | List::Drives(_) | List::Slides => unknown(machine, key),
             List::Numbers | List::Points => Error::new(format!("`{key}` does not exist: there are {count}"))
                 .allowed(format!("{} to {}", list.key(row.key, 0), list.key(row.key, count - 1))),
         });
     }
-    if whole && list == List::Drives {
+    if whole && matches!(list, List::Drives(_)) {
         numbers.retain(|number| !free.contains(&number.key(machine).as_str()));
         if let [first, rest @ ..] = &numbers[..]
             && rest.iter().any(|other| other.value(machine) != first.value(machine))
         {
-            return Err(Error::new(format!("`{key}` is not the same in both drives")).next(format!(
-                "name `{}` or `{}`",
-                list.key(key, 0),
-                list.key(key, 1)
+            return Err(Error::new(format!("`{key}` is not the same in all drives")).next(format!(
+                "name {}",
+                (0..count).map(|index| format!("`{}`", list.key(key, index))).collect::<Vec<_>>().join(" or ")
             )));
         }
     }
@@ -452,7 +451,7 @@ fn of_gantries(machine: &Machine, error: Error) -> Error {
     error.allowed(keys).next("of one drive alone write for example left_drive.motor.resistance")
 }
 
-/// The keys of the numbers that a machine has, lists and both drives together where they have a key of their own.
+/// The keys of the numbers that a machine has, lists and all drives together where they have a key of their own.
 fn keys_there(machine: &Machine) -> Vec<String> {
     let keys = |row: &'static Parameter| -> Vec<String> {
         let sits = machine.sits(row);

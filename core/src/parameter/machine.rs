@@ -1,6 +1,6 @@
 //! Machines by the table of parameters: numbers that are read and set by row.
 
-use super::field::{DRIVES, List, SLIDES};
+use super::field::{List, SLIDES};
 use super::{Field, Parameter, find, named};
 use crate::friction::Friction;
 use crate::machine::Machine;
@@ -74,11 +74,11 @@ impl Machine {
         }
         // The cart of a gantry has the rows of its bridge, and each drive those of an axis's.
         let of_cart = key.strip_prefix(SLIDES[1]).map(|rest| format!("{}{rest}", SLIDES[0]));
-        let of_drive = DRIVES.iter().find_map(|drive| key.strip_prefix(drive));
+        let of_drive = self.geometry().drives.iter().find_map(|drive| key.strip_prefix(drive.key));
         let row = named(of_cart.as_deref().or(of_drive).unwrap_or(key))?;
         let list = self.sits(row).listed().map(|(list, _)| list);
         // Nothing but the parts of a drive stands below one.
-        (of_drive.is_none() || list == Some(List::Drives)).then_some(row)
+        (of_drive.is_none() || matches!(list, Some(List::Drives(_)))).then_some(row)
     }
 
     /// The friction of each of its bodies.

@@ -76,7 +76,7 @@ fn last(key: &str) -> &str {
 fn keys(row: &Parameter, list: List) -> String {
     let element = |index| list.key(row.key, index);
     match list {
-        List::None | List::Drives => format!("`{}`", row.key),
+        List::None | List::Drives(_) => format!("`{}`", row.key),
         List::Numbers => format!("`{}`, `{}` to `.2`", row.key, element(0)),
         List::Points => format!("`{}`, `{}` and so on", row.key, element(0)),
         List::Slides => format!("`{}`, `{}`", element(0), element(1)),

@@ -639,6 +639,9 @@ const GANTRY_INITIAL: &[Parameter] = &[
     row("gantry.initial.right_angle", "φ₂", "rad", Words("without strain of the belt"), ANY, "0 rad", "Angle of the right drive pulley (B)."),
     row("gantry.initial.right_speed", "φ₂′", "rad/s", Words("without strain of the belt"), ANY, "0 rad/s", "Its speed."),
     row("gantry.initial.right_current", "i₂", "A", Value(0.0), ANY, "0 A", "Current of the right motor; only where it does not follow at once."),
+    row("gantry.initial.cart_pulley_angle", "φ₃", "rad", Words("without strain of the belt"), ANY, "0 rad", "Angle of the cart's drive pulley, of a dual belt alone."),
+    row("gantry.initial.cart_pulley_speed", "φ₃′", "rad/s", Words("without strain of the belt"), ANY, "0 rad/s", "Its speed."),
+    row("gantry.initial.cart_current", "i₃", "A", Value(0.0), ANY, "0 A", "Current of the cart's motor; only where it does not follow at once."),
 ];
 
 #[rustfmt::skip]

@@ -6,7 +6,10 @@ use crate::solve::widest::widest;
 use crate::trajectory::Trajectory;
 
 /// Number of quantities in a [`Reading`].
-pub const QUANTITIES: usize = 12;
+pub const QUANTITIES: usize = 20;
+
+/// So many of them are enough for most machines, whose readings end with zeros: these are not computed.
+pub(super) const FEW: usize = 12;
 
 /// The readings of a run at one instant, in the order of [`Mechanism::readings`], which of an axis is that of
 /// [`reading`]. SI units.
@@ -32,6 +35,18 @@ pub mod reading {
     pub const CART_POSITION: usize = 11;
 }
 
+/// The reading of these values, of the first [`FEW`] quantities or of all.
+#[inline(always)]
+pub(super) fn reading_of(few: bool, mut value: impl FnMut(usize) -> f64) -> Reading {
+    let mut reading = [0.0; QUANTITIES];
+    // Two loops of known lengths, each compiled for vectors.
+    match few {
+        true => (0..FEW).for_each(|q| reading[q] = value(q)),
+        false => (0..QUANTITIES).for_each(|q| reading[q] = value(q)),
+    }
+    reading
+}
+
 /// A part of a run with one mode and no jump of the input in it, told by its ends.
 #[derive(Debug, Clone, Copy)]
 pub struct Gap<'a> {
@@ -47,6 +62,8 @@ pub struct Gap<'a> {
     pub bow: &'a Reading,
     /// The states of all parts.
     pub mode: &'a Mode,
+    /// True if all that is read is among the first [`FEW`] quantities.
+    pub(super) few: bool,
 }
 
 impl Gap<'_> {
@@ -71,9 +88,18 @@ impl Gap<'_> {
     }
 
     #[inline(always)]
-    fn rises_above_by_any(&self, heights: &Reading, [at_ends, inside]: [f64; 2]) -> (bool, bool) {
+    fn rises_above_by_any(&self, heights: &Reading, factors: [f64; 2]) -> (bool, bool) {
+        match self.few {
+            true => self.rises_above_of::<FEW>(heights, factors),
+            false => self.rises_above_of::<QUANTITIES>(heights, factors),
+        }
+    }
+
+    #[inline(always)]
+    fn rises_above_of<const Q: usize>(&self, heights: &Reading, [at_ends, inside]: [f64; 2]) -> (bool, bool) {
         let (mut ends, mut within) = (0_u64, 0_u64);
-        for (((from, to), bow), height) in self.from.iter().zip(self.to).zip(self.bow).zip(heights) {
+        let both = self.from[..Q].iter().zip(&self.to[..Q]);
+        for (((from, to), bow), height) in both.zip(&self.bow[..Q]).zip(&heights[..Q]) {
             let least = *height * at_ends;
             ends |= u64::from(from.abs() > least) | u64::from(to.abs() > least);
             within |= u64::from(Self::bound_of(*from, *to, *bow) > height * inside);
@@ -140,6 +166,7 @@ pub struct Stretch<'a> {
     pub bow: &'a Reading,
     /// The states of all parts.
     pub mode: &'a Mode,
+    few: bool,
 }
 
 impl<'a> Stretch<'a> {
@@ -148,12 +175,10 @@ impl<'a> Stretch<'a> {
         readings: &'a [Reading],
         bow: &'a Reading,
         mode: &'a Mode,
+        few: bool,
     ) -> Self {
-        let mut most = [0.0_f64; QUANTITIES];
-        for reading in readings {
-            most.iter_mut().zip(reading).for_each(|(most, r)| *most = if r.abs() > *most { r.abs() } else { *most });
-        }
-        Self { begin, interval, readings, most, bow, mode }
+        let most = if few { most_of::<FEW>(readings) } else { most_of::<QUANTITIES>(readings) };
+        Self { begin, interval, readings, most, bow, mode, few }
     }
 
     /// When it ends, s.
@@ -190,12 +215,24 @@ impl<'a> Stretch<'a> {
         if all.into_iter().any(|((most, bow), height)| most + bow > height * factor) {
             for (gap, ends) in self.readings.array_windows().enumerate() {
                 let [from, to] = ends;
-                let gap_of = Gap { begin: 0.0, length: self.interval, from, to, bow: self.bow, mode: self.mode };
+                let (begin, length, few) = (0.0, self.interval, self.few);
+                let gap_of = Gap { begin, length, from, to, bow: self.bow, mode: self.mode, few };
                 gaps.set(gap, gap_of.rises_above(heights, [1.0, factor]).1);
             }
         }
         gaps
     }
+}
+
+/// The largest magnitudes of the first quantities.
+#[inline(always)]
+fn most_of<const Q: usize>(readings: &[Reading]) -> Reading {
+    let mut most = [0.0_f64; QUANTITIES];
+    for reading in readings {
+        let both = most[..Q].iter_mut().zip(&reading[..Q]);
+        both.for_each(|(most, r)| *most = if r.abs() > *most { r.abs() } else { *most });
+    }
+    most
 }
 
 /// The gaps of a stretch that an observer wants to see closer.
@@ -226,6 +263,8 @@ pub struct Curve {
     pub length: f64,
     /// Coefficients of the powers of s, the share of the length: what is read is Σ terms_k sᵏ.
     pub terms: [Reading; TERMS],
+    /// True if all that is read is among the first [`FEW`] quantities.
+    pub(super) few: bool,
 }
 
 impl Curve {
@@ -237,17 +276,23 @@ impl Curve {
 
     widest! {
         /// The curve from values and the first three derivatives by s, each over its order's factorial, at both ends.
-        pub(super) fn through(begin: f64, length: f64, from: &[Reading; 4], to: &[Reading; 4]) -> Self
+        pub(super) fn through(few: bool, ends: [f64; 2], from: &[Reading; 4], to: &[Reading; 4]) -> Self
             = Self::through_by_any, through_by_avx2;
     }
 
     #[inline(always)]
-    fn through_by_any(begin: f64, length: f64, from: &[Reading; 4], to: &[Reading; 4]) -> Self {
+    fn through_by_any(few: bool, [begin, length]: [f64; 2], from: &[Reading; 4], to: &[Reading; 4]) -> Self {
+        let terms = if few { Self::terms_of::<FEW>(from, to) } else { Self::terms_of::<QUANTITIES>(from, to) };
+        Self { begin, length, terms, few }
+    }
+
+    #[inline(always)]
+    fn terms_of<const Q: usize>(from: &[Reading; 4], to: &[Reading; 4]) -> [Reading; TERMS] {
         let mut terms = [[0.0; QUANTITIES]; TERMS];
         terms[..4].copy_from_slice(from);
         let ([a0, a1, a2, a3], [b0, b1, b2, b3]) = (from, to);
         let [.., c4, c5, c6, c7] = &mut terms;
-        for q in 0..QUANTITIES {
+        for q in 0..Q {
             // What the first four terms leave at the other end, by order.
             let r0 = b0[q] - (a0[q] + a1[q] + a2[q] + a3[q]);
             let r1 = b1[q] - (a1[q] + 2.0 * a2[q] + 3.0 * a3[q]);
@@ -258,7 +303,7 @@ impl Curve {
             c6[q] = 70.0 * r0 - 34.0 * r1 + 13.0 * r2 - 3.0 * r3;
             c7[q] = -20.0 * r0 + 10.0 * r1 - 4.0 * r2 + r3;
         }
-        Self { begin, length, terms }
+        terms
     }
 
     widest! {
@@ -268,29 +313,39 @@ impl Curve {
 
     #[inline(always)]
     fn ranges_by_any(&self) -> (Reading, Reading) {
+        if self.few { self.ranges_of::<FEW>() } else { self.ranges_of::<QUANTITIES>() }
+    }
+
+    #[inline(always)]
+    fn ranges_of<const Q: usize>(&self) -> (Reading, Reading) {
         let mut b = self.terms;
         for (b, binomial) in b.iter_mut().zip(BINOMIAL) {
-            b.iter_mut().for_each(|b| *b /= binomial);
+            b[..Q].iter_mut().for_each(|b| *b /= binomial);
         }
         for i in 1..TERMS {
             for k in (i..TERMS).rev() {
                 let (before, here) = b.split_at_mut(k);
-                here[0].iter_mut().zip(&before[k - 1]).for_each(|(b, before)| *b += before);
+                here[0][..Q].iter_mut().zip(&before[k - 1][..Q]).for_each(|(b, before)| *b += before);
             }
         }
         let (mut low, mut high) = (b[0], b[0]);
         for b in &b[1..] {
-            low.iter_mut().zip(b).for_each(|(low, b)| *low = if *b < *low { *b } else { *low });
-            high.iter_mut().zip(b).for_each(|(high, b)| *high = if *b > *high { *b } else { *high });
+            low[..Q].iter_mut().zip(&b[..Q]).for_each(|(low, b)| *low = if *b < *low { *b } else { *low });
+            high[..Q].iter_mut().zip(&b[..Q]).for_each(|(high, b)| *high = if *b > *high { *b } else { *high });
         }
         (low, high)
     }
 
     /// The reading at the share `s` of the length.
     pub fn at(&self, s: f64) -> Reading {
+        if self.few { self.at_of::<FEW>(s) } else { self.at_of::<QUANTITIES>(s) }
+    }
+
+    #[inline(always)]
+    fn at_of<const Q: usize>(&self, s: f64) -> Reading {
         let mut sum = self.terms[TERMS - 1];
         for term in self.terms[..TERMS - 1].iter().rev() {
-            for (sum, term) in sum.iter_mut().zip(term) {
+            for (sum, term) in sum[..Q].iter_mut().zip(&term[..Q]) {
                 *sum = *sum * s + term;
             }
         }
@@ -487,6 +542,8 @@ pub(super) struct Readout {
     ways: Vec<(usize, usize, f64)>,
     /// Limits of voltages and currents: what they hold is not beyond them by one bit.
     limits: Vec<(usize, f64)>,
+    /// True if all readings are among the first [`FEW`] quantities.
+    pub(super) few: bool,
 }
 
 impl Readout {
@@ -520,7 +577,7 @@ impl Readout {
                 _ => Form::ZERO,
             };
         }
-        Self { forms, ways, limits }
+        Self { forms, ways, limits, few: mechanism.readings.len() <= FEW }
     }
 
     /// By how much readings can be off straight lines where no more is known than their forms: not at all those that
@@ -554,7 +611,7 @@ impl Readout {
         input: &[f64; DRIVES],
     ) -> Reading {
         let stretch = layout.stretches(inner);
-        self.placed(self.forms.each_ref().map(|form| form.value_at(&stretch, inner, input)), origin)
+        self.placed(reading_of(self.few, |q| self.forms[q].value_at(&stretch, inner, input)), origin)
     }
 }
 

@@ -16,8 +16,8 @@ use std::sync::Arc;
 /// Rows handed on at a time; small enough to stay in the processor's cache.
 const BLOCK: usize = 256;
 
-/// Room for a state with the inputs behind it, whatever the mechanism.
-pub(crate) const STATE: usize = 2 * BODIES + 2 * DRIVES;
+/// Room for a state with the inputs behind it, whatever the mechanism; a multiple of four.
+pub(crate) const STATE: usize = (2 * BODIES + 2 * DRIVES).next_multiple_of(4);
 
 /// The values of a row that do not follow from its state by the linear equations.
 #[derive(Debug, Clone, Copy, Default)]

@@ -59,7 +59,7 @@ pub(crate) fn run(
         let motion = model.motion(&state, input);
         // A row shows the state itself: angles of its own, held as they are.
         recorder.segment(row, &coordinates.at(&state), &Mode::of(motion));
-        recorder.push_state(&inner_of(&layout, mechanism, &state), &[input, 0.0], None);
+        recorder.push_state(&inner_of(&layout, mechanism, &state), &[input, 0.0, 0.0], None);
         if recorder.flow == Flow::Stop {
             ending = Ending::Interrupted { time };
             break;
@@ -68,12 +68,12 @@ pub(crate) fn run(
         let mode = Mode::of(motion);
         let mut show = |begin: f64, length: f64, from: &Reading, to: &Reading| {
             if let Some(observer) = &mut recorder.observer {
-                observer.pass(&Gap { begin, length, from, to, bow: &[0.0; QUANTITIES], mode: &mode });
+                observer.pass(&Gap { begin, length, from, to, bow: &[0.0; QUANTITIES], mode: &mode, few: readout.few });
             }
         };
         let read = |state: &State, input: f64| {
             let inner = inner_of(&layout, mechanism, state);
-            readout.read(&layout, &inner, &mechanism.origin, &[input, 0.0])
+            readout.read(&layout, &inner, &mechanism.origin, &[input, 0.0, 0.0])
         };
         let mut before = read(&state, input);
         show(time, 0.0, &before, &before);

@@ -8,7 +8,7 @@ use crate::control::Loop;
 use crate::design::{Design, FeedForwardModel};
 use crate::error::{Error, Result};
 use crate::machine::Machine;
-use crate::mechanism::{Amplifier, AmplifierMode, DRIVES, Drive, Heading, Label, Mechanism, Motor, Shown, State};
+use crate::mechanism::{Amplifier, AmplifierMode, Drive, Heading, Label, Mechanism, Motor, Shown, State};
 use crate::parameter::{self, Free, Parameter, unit_for};
 use crate::quantity::shortest;
 use crate::solve::{Dynamics, Quantity, check_stage};
@@ -126,7 +126,7 @@ impl Model {
         let machine = self.set(parameters);
         check_stage(&machine)?;
         let mut mechanism = machine.mechanism();
-        if machine.drives.len() < DRIVES {
+        if self.force_input(0).is_some() {
             mechanism.drives.push(push(machine.geometry().cart()));
         }
         let has = |drive: usize| self.quantities.iter().any(|(quantity, _)| *quantity == Quantity::Current(drive));
@@ -147,10 +147,10 @@ impl Model {
         self.mechanism(&self.defaults()).is_ok_and(|mechanism| mechanism.is_piecewise_linear())
     }
 
-    /// Whether a force is an input of the mechanism beside those of the drives, and its place there; else it is a
-    /// number of a body.
+    /// Whether a force is an input of the mechanism beside those of the drives, as that on the cart of an axis is, and
+    /// its place there; else it is a number of a body.
     pub fn force_input(&self, load: usize) -> Option<usize> {
-        (self.drives() < DRIVES).then_some(self.drives() + load)
+        (self.drives() == 1).then_some(self.drives() + load)
     }
 
     /// The drives of the machine itself.
@@ -223,7 +223,7 @@ impl Model {
         list.extend(self.inputs(mechanism));
         for (index, (free, row)) in self.parameters.iter().enumerate() {
             let unit = unit_for(row.unit, self.input_unit());
-            let role = Role::Parameter(index, is_tunable(&free.name));
+            let role = Role::Parameter(index, is_tunable(&self.machine, &free.name));
             let words = match row.symbol {
                 "" => row.sentence.to_string(),
                 symbol => format!("{symbol}: {}", row.sentence),
@@ -269,8 +269,13 @@ impl Model {
                 add(format!("reference{end}"), words.into(), unit, shown, Role::Reference(k));
             }
         } else {
+            let geometry = self.machine.geometry();
             for (index, drive) in mechanism.drives.iter().take(self.drives()).enumerate() {
-                let name = if self.drives() == 1 { "command".into() } else { format!("{}_command", SIDES[index]) };
+                let name = if self.drives() == 1 {
+                    "command".into()
+                } else {
+                    format!("{}_command", geometry.drives[index].side())
+                };
                 let unit = drive.amplifier.mode.unit();
                 add(name, format!("Input of the amplifier of the {}.", drive.label.name), unit, "", Role::Input(index));
             }
@@ -359,8 +364,6 @@ impl Model {
     }
 }
 
-const SIDES: [&str; DRIVES] = ["left", "right"];
-
 /// The numbers of a machine that can be set, each by itself.
 fn parameters(machine: &Machine) -> Result<Vec<(Free, &'static Parameter)>> {
     let own = parameter::own(machine);
@@ -371,8 +374,9 @@ fn parameters(machine: &Machine) -> Result<Vec<(Free, &'static Parameter)>> {
 
 /// True if a number can change while the machine runs: what it carries, what it rubs, what warmth and supply do. What
 /// tells its geometry, or which quantities its states are, cannot.
-fn is_tunable(key: &str) -> bool {
-    let drive = ["left_drive.", "right_drive."].into_iter().find_map(|side| key.strip_prefix(side));
+fn is_tunable(machine: &Machine, key: &str) -> bool {
+    let mut prefixes = machine.geometry().drives.iter().map(|drive| drive.key).filter(|prefix| !prefix.is_empty());
+    let drive = prefixes.find_map(|prefix| key.strip_prefix(prefix));
     let key = drive.unwrap_or(key);
     let fixed = ["lugre", "stribeck", "smooth", "along"];
     let last = key.rsplit('.').next().unwrap_or_default();

@@ -62,7 +62,7 @@ fn at_rest(case: &Case) -> Item {
         return value(step(case.machine.drives[0].amplifier.mode.unit()));
     }
     let mut table = toml_edit::InlineTable::new();
-    for (side, unit) in ["left", "right"].into_iter().zip(&case.machine.drives) {
+    for (side, unit) in case.machine.geometry().sides().zip(&case.machine.drives) {
         table.insert(side, step(unit.amplifier.mode.unit()).into());
     }
     value(table)

@@ -10,6 +10,8 @@ pub enum Feature {
     HFrame,
     /// Two belts.
     CoreXy,
+    /// Three belts, and three drives.
+    DualBelt,
     /// Stribeck friction, gaussian.
     Stribeck,
     /// Stribeck friction, exponential.
@@ -69,13 +71,13 @@ pub enum Feature {
 }
 
 use Feature::{
-    Along, Asked, Cascade, CoreXy, Current, CurrentLoop, Exponential, Follows, Fuzzy, Gear, HFrame, Inductance, Late,
-    Limit, Line, Losses, LuGre, Open, Pid, Ramp, Sine, Slack, SlidingMode, Smooth, StateFeedback, Step, Stop, Stribeck,
-    Table, Triangle,
+    Along, Asked, Cascade, CoreXy, Current, CurrentLoop, DualBelt, Exponential, Follows, Fuzzy, Gear, HFrame,
+    Inductance, Late, Limit, Line, Losses, LuGre, Open, Pid, Ramp, Sine, Slack, SlidingMode, Smooth, StateFeedback,
+    Step, Stop, Stribeck, Table, Triangle,
 };
 
 impl Feature {
-    /// All of them.
+    /// All that pairs are drawn of. A dual belt is drawn in place of another machine: see [`super::dual_belt`].
     pub const ALL: [Feature; 35] = [
         HFrame,
         CoreXy,
@@ -119,6 +121,7 @@ impl Feature {
         match self {
             HFrame => ["H-frame", "H"],
             CoreXy => ["CoreXY", "XY"],
+            DualBelt => ["dual belt", "DB"],
             Stribeck => ["Stribeck curve", "St"],
             Exponential => ["Stribeck curve, exponential", "Ex"],
             Smooth => ["smooth law", "Sm"],
@@ -155,8 +158,9 @@ impl Feature {
         }
     }
 
-    fn is_gantry(self) -> bool {
-        matches!(self, HFrame | CoreXy)
+    /// True if it is a kind of gantry.
+    pub fn is_gantry(self) -> bool {
+        matches!(self, HFrame | CoreXy | DualBelt)
     }
 
     /// True if the general solver alone has it.
@@ -192,6 +196,8 @@ impl Feature {
             // A move has no input, and an open loop no controller.
             || either(Feature::is_controller, |f| f == Open || f.is_input())
             || either(|f| f == Gear, |f| f == Losses)
+            // Its gears are stiff.
+            || either(|f| f == Gear, |f| f == DualBelt)
             // A current loop commands volts.
             || either(|f| f == CurrentLoop, |f| f == Current)
             || either(Feature::is_curved, |f| matches!(f, Asked(By::Exact | By::C)));
@@ -226,7 +232,7 @@ pub fn recipe(seed: u64, number: u64) -> Vec<Feature> {
         Asked(_) => 0,
         Open => 1,
         one if one.is_controller() => 1,
-        HFrame | CoreXy => 2,
+        one if one.is_gantry() => 2,
         one if one.is_input() => 4,
         _ => 3,
     };
@@ -235,7 +241,7 @@ pub fn recipe(seed: u64, number: u64) -> Vec<Feature> {
         let share = match feature {
             Asked(By::Sweep) => 0.25,
             Asked(_) => 0.22,
-            HFrame | CoreXy => 0.15,
+            one if one.is_gantry() => 0.15,
             Open => 0.5,
             one if one.is_controller() => 0.1,
             one if one.is_law() || one.is_curved() => 0.12,

@@ -6,8 +6,12 @@ use std::fmt::Write;
 impl Draw {
     /// Of these sizes: masses of a pulley, of the bridge with the cart, of the cart.
     pub(super) fn gantry(mut self, title: String, mut sizes: Sizes) -> Drawn {
-        let is_frame = self.wants(Feature::HFrame);
-        let _ = writeln!(self.text, "title = \"{title}\"\nkind = \"{}\"", if is_frame { "h-frame" } else { "core-xy" });
+        let (kind, spans, sides): (&str, usize, &[&str]) = match () {
+            () if self.wants(Feature::HFrame) => ("h-frame", 3, &["left", "right"]),
+            () if self.wants(Feature::DualBelt) => ("dual-belt", 6, &["left", "right", "cart"]),
+            () => ("core-xy", 4, &["left", "right"]),
+        };
+        let _ = writeln!(self.text, "title = \"{title}\"\nkind = \"{kind}\"");
         let cart = {
             let value = sizes.mass[1] * self.random.even(0.2, 0.8);
             self.digits(value)
@@ -39,16 +43,18 @@ impl Draw {
             self.text.push_str(&friction);
             self.travel_of(&sizes, mass);
         }
-        self.belts(&sizes, if is_frame { 3 } else { 4 });
+        self.belts(&sizes, spans);
         let until = self.digits(sizes.time);
         let every = {
             let value = until / (20.0 + self.random.below(30) as f64);
             self.digits(value)
         }
         .min(until);
-        let inputs = [0, 1].map(|number| self.input_by_recipe(until, scale.input, number));
+        let input =
+            |(number, side): (usize, &&str)| format!("{side} = {}", self.input_by_recipe(until, scale.input, number));
+        let inputs: Vec<String> = sides.iter().enumerate().map(input).collect();
         self.text.push_str("\n[[experiment]]\nname = \"run\"\n");
-        let _ = writeln!(self.text, "input = {{ left = {}, right = {} }}", inputs[0], inputs[1]);
+        let _ = writeln!(self.text, "input = {{ {} }}", inputs.join(", "));
         let _ = writeln!(self.text, "until = {until:e}\nevery = {every:e}");
         if self.random.chance(0.3) {
             let [x, y] = [(); 2].map(|()| self.even(-0.5, 0.5) * sizes.way / until);
@@ -84,9 +90,9 @@ impl Draw {
 
     fn belts(&mut self, sizes: &Sizes, count: usize) {
         let mut spans: Vec<[f64; 2]> = (0..3).map(|j| [sizes.stiffness[j], sizes.damping[j]]).collect();
-        if count == 4 {
+        for more in 0..count - 3 {
             let again = self.random.even(0.5, 2.0);
-            spans.push([self.digits(sizes.stiffness[0] * again), sizes.damping[0]]);
+            spans.push([self.digits(sizes.stiffness[more] * again), sizes.damping[more]]);
         }
         let list = |of: &dyn Fn(&[f64; 2]) -> f64| {
             let values: Vec<String> = spans.iter().map(|span| format!("{:e}", of(span))).collect();

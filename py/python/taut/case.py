@@ -63,7 +63,7 @@ class Case:
 
     @property
     def kind(self) -> str:
-        """The kind of machine: ``axis``, ``h-frame`` or ``core-xy``."""
+        """The kind of machine: ``axis``, ``h-frame``, ``core-xy`` or ``dual-belt``."""
         return self._native.kind
 
     @property
@@ -385,8 +385,8 @@ class Case:
         """Linearises the machine while everything slides: matrices, poles, zeros, frequency responses, resonances.
 
         ``at`` is where the cart is (m), ``bridge`` where the bridge of a gantry is (m), ``speed`` how fast it slides
-        (m/s, 0.1 if not said), ``stuck`` which of ``drive``, ``cart``, ``idler`` (``left``, ``right``, ``bridge``,
-        ``cart`` of a gantry) are held. With ``sample_time`` (s) also a discrete-time model, whose inputs are held
+        (m/s, 0.1 if not said), ``stuck`` which of ``drive``, ``cart``, ``idler`` (``left``, ``right``, ``cart_pulley``,
+        ``bridge``, ``cart`` of a gantry) are held. With ``sample_time`` (s) also a discrete-time model, whose inputs are held
         (``zero``, ``first`` or ``tustin``) and late by ``delay`` (s). ``lowest`` and ``highest`` bound the responses,
         Hz.
         """

@@ -114,10 +114,10 @@ class Run(Table):
         """A matplotlib figure of these columns over time, one panel for each unit.
 
         Without names: where the cart is and should be, its speed, and the voltage; of a gantry also those of the bridge
-        and both drives. ``ax`` is what to draw into: one Axes, or as many as there are units.
+        and all drives. ``ax`` is what to draw into: one Axes, or as many as there are units.
         """
         usual = ["reference", "bridge_position", "cart_position", "bridge_speed", "cart_speed"]
-        usual += ["voltage", "left_voltage", "right_voltage"]
+        usual += ["voltage", "left_voltage", "right_voltage", "cart_voltage"]
         names = columns or tuple(name for name in usual if name in self)
         units: dict[str, list[str]] = {}
         for name in names:

@@ -4,6 +4,7 @@ use super::Run;
 use super::marks;
 use crate::{Axis, Colour, Figure, Panel, Plane, Series, Style};
 use taut::case::Case;
+use taut::machine::DriveAt;
 
 /// Every plot of a run over time, in the order of a report; none if its curves were not kept.
 pub fn figures(case: &Case, run: &Run) -> Vec<(&'static str, Figure)> {
@@ -16,31 +17,40 @@ pub fn figures(case: &Case, run: &Run) -> Vec<(&'static str, Figure)> {
         for (k, (curve, name)) in names.iter().enumerate() {
             if let Some((x, y)) = curves.get(curve) {
                 panel = panel.series(
-                    Series::new(*name, x, y).colour(colours[k % 4]).style(styles[k % 4]).thinned_from(curves.rows()),
+                    Series::new(*name, x, y)
+                        .colour(colours[k % 4])
+                        .style(styles[(k + 2 * (k / 4)) % 4])
+                        .thinned_from(curves.rows()),
                 );
             }
         }
         panel
     };
     let gantry = &case.machine;
-    let sides = |quantity: &str| [format!("left_{quantity}"), format!("right_{quantity}")];
-    let two = |axis: Axis, quantity: &str| {
-        let [left, right] = sides(quantity);
-        panel(axis, &[(&left, "left"), (&right, "right")])
+    let geometry = gantry.geometry();
+    let of_drives = |axis: Axis, column: &dyn Fn(&DriveAt) -> String| {
+        let names: Vec<(String, &str)> = geometry.drives.iter().map(|drive| (column(drive), drive.side())).collect();
+        let names: Vec<(&str, &str)> = names.iter().map(|(column, name)| (column.as_str(), *name)).collect();
+        panel(axis, &names)
     };
+    let input = |drive: &DriveAt| format!("{}input", drive.prefix);
 
     let mut drives = figure("drives");
-    if curves.get("left_input").is_some() || curves.get("right_input").is_some() {
-        drives = drives.panel(two(Axis::new("Input", gantry.drives[0].amplifier.mode.unit()), "input"));
+    if geometry.drives.iter().any(|drive| curves.get(&input(drive)).is_some()) {
+        drives = drives.panel(of_drives(Axis::new("Input", gantry.drives[0].amplifier.mode.unit()), &input));
     }
     let drives = drives
-        .panel(two(Axis::new("Voltage", "V"), "voltage"))
-        .panel(two(Axis::new("Current", "A"), "current"))
+        .panel(of_drives(Axis::new("Voltage", "V"), &|drive| drive.voltage.key.to_string()))
+        .panel(of_drives(Axis::new("Current", "A"), &|drive| drive.current_column.to_string()))
         .caption("What the motors get, and the currents they draw.");
 
-    // Bodies two and three are bridge and cart; a pulley is at no place of its own.
-    let marked = |panel: Panel, [bridge, cart]: [&str; 2]| {
-        marks::marked(panel, &run.outcome.events, &[None, None, curves.get(bridge), curves.get(cart)])
+    // A pulley is at no place of its own.
+    let marked = |panel: Panel, names: [&str; 2]| {
+        let mut of_bodies = vec![None; geometry.bodies.len()];
+        for (slide, name) in geometry.slides.iter().zip(names) {
+            of_bodies[slide.body] = curves.get(name);
+        }
+        marks::marked(panel, &run.outcome.events, &of_bodies)
     };
     let position = panel(
         Axis::new("Position", "m").shown_as("mm", 1e3),
@@ -59,7 +69,7 @@ pub fn figures(case: &Case, run: &Run) -> Vec<(&'static str, Figure)> {
     );
     let speeds = figure("speeds")
         .panel(marked(speed, ["bridge_speed", "cart_speed"]))
-        .panel(two(Axis::new("Pulleys", "rad/s"), "speed"))
+        .panel(of_drives(Axis::new("Pulleys", "rad/s"), &|drive| format!("{}_speed", geometry.label(drive.pulley).key)))
         .caption("Speeds of bridge and cart, and of the drive pulleys.");
     let spans: Vec<(String, &str)> =
         gantry.kind.geometry().span_labels().map(|span| (format!("{}_force", span.key), span.name)).collect();
@@ -74,15 +84,17 @@ pub fn figures(case: &Case, run: &Run) -> Vec<(&'static str, Figure)> {
     };
     let friction = of_bodies("friction");
     let states = of_bodies("state");
+    // Drive pulleys are the first bodies.
+    let pulleys = geometry.drives.len();
     let of = |axis: Axis, list: &[(String, &str)]| {
         let names: Vec<(&str, &str)> = list.iter().map(|(column, name)| (column.as_str(), *name)).collect();
         panel(axis, &names)
     };
     let friction_figure = figure("friction")
-        .panel(of(Axis::new("Torque", "N m").shown_as("mN m", 1e3), &friction[..2]))
-        .panel(of(Axis::new("Force", "N"), &friction[2..]))
-        .panel(of(Axis::new("State", ""), &states[..2]).weight(0.6))
-        .panel(of(Axis::new("State", ""), &states[2..]).weight(0.6))
+        .panel(of(Axis::new("Torque", "N m").shown_as("mN m", 1e3), &friction[..pulleys]))
+        .panel(of(Axis::new("Force", "N"), &friction[pulleys..]))
+        .panel(of(Axis::new("State", ""), &states[..pulleys]).weight(0.6))
+        .panel(of(Axis::new("State", ""), &states[pulleys..]).weight(0.6))
         .caption(
             "What friction takes or holds, and the states: 1 forward, 0 stuck, −1 backward, 2 without dry friction.",
         );

@@ -7,7 +7,7 @@ use taut::number::engineering;
 use taut::sweep::{Measured, Shown, Summary, Sweep};
 
 /// Figures that are drawn of each experiment, where they vary.
-const DRAWN: [&str; 12] = [
+const DRAWN: [&str; 13] = [
     "final_bridge_position",
     "final_cart_position",
     "peak_bridge_speed",
@@ -16,6 +16,7 @@ const DRAWN: [&str; 12] = [
     "peak_motor_current",
     "peak_left_current",
     "peak_right_current",
+    "peak_cart_current",
     "stop_time",
     "peak_cart_error",
     "settling_time",

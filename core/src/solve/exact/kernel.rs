@@ -5,7 +5,7 @@
 //! processor can add or multiply four numbers at once, if they lie side by side in memory and the program says so. The
 //! compiler says so by itself where three things hold:
 //!
-//! - **The length is known when it compiles.** A vector here has `N` places, `N` being 8, 12, 16, 20 or 32 and never
+//! - **The length is known when it compiles.** A vector here has `N` places, `N` being 8, 12, 16, 20 or 40 and never
 //!   just "some". So every function of the solver exists five times, and [`in_kernel`] picks the smallest that has room
 //!   for a machine: 8 for an axis of three bodies with its input held (six states, u, and a one for what is constant).
 //!   What is left over is zero, and costs as much as anything else.
@@ -25,7 +25,7 @@
 //! knows an axis from a gantry.
 
 use super::ModeMatrices;
-use crate::mechanism::{BODIES, DRIVES};
+use crate::mechanism::{BODIES, BODIES_AND_DRIVES, DRIVES};
 use crate::signal::DEGREE;
 use std::sync::Arc;
 
@@ -49,8 +49,9 @@ macro_rules! kernels {
             }
         }
 
-        // The last one has room for every mechanism.
-        const _: () = assert!($most > 2 * BODIES + DRIVES + DRIVES * (DEGREE + 1));
+        // The last one has room for every mechanism, however many of its parts are drives.
+        const _: () = assert!($most > 2 * BODIES + (BODIES_AND_DRIVES - BODIES) * (DEGREE + 2));
+        const _: () = assert!($most > 2 * (BODIES_AND_DRIVES - DRIVES) + DRIVES * (DEGREE + 2));
     };
 }
 
@@ -63,8 +64,8 @@ kernels! {
     [16]
     // The same with inductance or a rotor
     [20]
-    // Two drives and smooth inputs
-    else [32]
+    // Two drives or three, and smooth inputs
+    else [40]
 }
 
 /// The modes of one machine that are ready, in one kernel.

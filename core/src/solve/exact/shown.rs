@@ -3,7 +3,7 @@
 use super::matrices::Shown;
 use super::{ModeMatrices, Run};
 use crate::mechanism::{BODIES, Transition};
-use crate::solve::observe::{Closer, Curve, Gap, Gaps, Observe, QUANTITIES, Reading, Stretch};
+use crate::solve::observe::{Closer, Curve, Gap, Gaps, Observe, QUANTITIES, Reading, Stretch, reading_of};
 use std::sync::Arc;
 
 /// The error of a curve that is allowed in the middle, as a share of the largest value seen of that quantity.
@@ -157,7 +157,8 @@ impl<const N: usize> Run<'_, N> {
     pub(super) fn show_stretch(&mut self, law: &Arc<ModeMatrices<N>>, z: [[f64; N]; 2], (begin, interval): (f64, f64)) {
         let readings = std::mem::take(&mut self.watching.readings);
         let bow = self.bow(law, &z[0], interval, interval * (readings.len() - 1) as f64);
-        let stretch = Stretch::new((begin, interval), &readings, &bow, &law.mode);
+        let few = self.is_few(law);
+        let stretch = Stretch::new((begin, interval), &readings, &bow, &law.mode, few);
         for (scale, most) in self.watching.scale.iter_mut().zip(&stretch.most) {
             *scale = if *most > *scale { *most } else { *scale };
         }
@@ -236,7 +237,7 @@ impl<const N: usize> Run<'_, N> {
         [from, to]: [&Reading; 2],
         bow: &Reading,
     ) -> bool {
-        let gap = Gap { begin, length, from, to, bow, mode: &law.mode };
+        let gap = Gap { begin, length, from, to, bow, mode: &law.mode, few: self.is_few(law) };
         self.recorder.observer.as_mut().is_some_and(|observer| observer.pass(&gap))
     }
 
@@ -357,7 +358,7 @@ impl<const N: usize> Run<'_, N> {
         let (from_value, to_value) = (from.value, to.value);
         let ((_, from_slope), (_, to_slope)) = (self.rate(law, from), self.rate(law, to));
         let square = length * length;
-        std::array::from_fn(|q| {
+        reading_of(self.is_few(law), |q| {
             let across = to_value[q] - from_value[q];
             let (a, b) = ((from_slope[q] * length - across).abs(), (to_slope[q] * length - across).abs());
             0.25 * if a > b { a } else { b } + bends[q] * (square * square / 384.0)
@@ -373,6 +374,11 @@ impl<const N: usize> Run<'_, N> {
         let input = |order| space.input_bounds(z, order, length);
         let third = law.rate(&law.rate(&law.rate(z)));
         law.change_of(law.shown(&self.core.common.mechanism, space), &third, (&input(3), &input(4)), length)
+    }
+
+    /// True if no more is read than the first quantities.
+    fn is_few(&self, law: &ModeMatrices<N>) -> bool {
+        law.shown(&self.core.common.mechanism, &self.core.common.space).readout.few
     }
 
     /// ż, and what is read of it.
@@ -403,12 +409,15 @@ impl<const N: usize> Run<'_, N> {
         let slope = self.rate(law, sight).1;
         let [second, third] = self.higher(law, sight).each_ref().map(|higher| self.rates(law, higher));
         let [h1, h2, h3] = [length, length * length / 2.0, length * length * length / 6.0];
-        [sight.value, slope.map(|v| v * h1), second.map(|v| v * h2), third.map(|v| v * h3)]
+        let few = self.is_few(law);
+        let times = |reading: &Reading, by: f64| reading_of(few, |q| reading[q] * by);
+        [sight.value, times(&slope, h1), times(&second, h2), times(&third, h3)]
     }
 
     /// The curve between two sights.
     fn curve(&self, law: &ModeMatrices<N>, from: &mut Sight<N>, to: &mut Sight<N>, begin: f64, length: f64) -> Curve {
-        Curve::through(begin, length, &self.terms(law, from, length), &self.terms(law, to, length))
+        let [from, to] = [self.terms(law, from, length), self.terms(law, to, length)];
+        Curve::through(self.is_few(law), [begin, length], &from, &to)
     }
 
     fn see(&mut self, curve: &Curve) {

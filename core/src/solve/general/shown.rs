@@ -6,7 +6,7 @@ use super::rows::{Rows, Shown};
 use super::{Core, Way};
 use crate::mechanism::{DRIVES, Mode, Shown as Quantity};
 use crate::solve::engine::Engine;
-use crate::solve::observe::{Curve, Gap, QUANTITIES, Reading, Readout, TERMS};
+use crate::solve::observe::{Curve, FEW, Gap, QUANTITIES, Reading, Readout, TERMS};
 
 /// Places within a step at which it is shown, its ends among them: as many as a curve has terms.
 const PLACES: usize = TERMS;
@@ -54,17 +54,17 @@ impl Rows<'_> {
                 *values = read(readout, model, mode, &y, &way.stretch.input(tau));
             }
             let (begin, length) = (way.stretch.begin + from, until - from);
-            let bow = readout.unknown_bow();
-            let gap = Gap { begin, length, from: &nodes[0], to: &nodes[PLACES - 1], bow: &bow, mode };
+            let (bow, few) = (readout.unknown_bow(), readout.few);
+            let gap = Gap { begin, length, from: &nodes[0], to: &nodes[PLACES - 1], bow: &bow, mode, few };
             let Some(observer) = &mut self.recorder.observer else { return };
             if observer.pass(&gap) && length > 0.0 {
                 let mut terms = [[0.0; QUANTITIES]; PLACES];
-                for q in 0..QUANTITIES {
+                for q in 0..if few { FEW } else { QUANTITIES } {
                     for (term, value) in terms.iter_mut().zip(through(&nodes.map(|node| node[q]))) {
                         term[q] = value;
                     }
                 }
-                observer.see(&Curve { begin, length, terms });
+                observer.see(&Curve { begin, length, terms, few });
             }
         }
     }
@@ -76,8 +76,8 @@ impl Rows<'_> {
         let Some(observer) = &mut self.recorder.observer else { return };
         let readout = Shown::of(&mut self.shown, &model.mechanism, mode);
         let now = read(readout, model, mode, &core.y, &core.input());
-        let bow = [0.0; QUANTITIES];
-        observer.pass(&Gap { begin: time, length: 0.0, from: &now, to: &now, bow: &bow, mode });
+        let (bow, few) = ([0.0; QUANTITIES], readout.few);
+        observer.pass(&Gap { begin: time, length: 0.0, from: &now, to: &now, bow: &bow, mode, few });
         observer.end(time, &state, mode);
     }
 }

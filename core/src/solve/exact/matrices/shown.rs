@@ -3,9 +3,12 @@
 use super::{ModeMatrices, Space};
 use crate::friction::Motion;
 use crate::mechanism::{BODIES, DRIVES, Mechanism};
-use crate::solve::observe::{QUANTITIES, Reading, Readout};
+use crate::solve::observe::{FEW, QUANTITIES, Reading, Readout, reading_of};
 use crate::solve::propagator::Matrix;
 use crate::solve::widest::widest;
+
+/// Readings behind the first ones.
+const MORE: usize = QUANTITIES - FEW;
 
 /// The least size of a rate: nothing next to any other.
 const STILL: f64 = 1e-250;
@@ -13,8 +16,9 @@ const STILL: f64 = 1e-250;
 /// Readings of one mode, and the norms of their forms.
 pub(in crate::solve) struct Shown<const N: usize> {
     pub(in crate::solve) readout: Readout,
-    /// The weight of each place of z in each reading.
-    matrix: Matrix<QUANTITIES, N>,
+    /// The weight of each place of z in each of the first readings, and in those behind them where there are any.
+    matrix: Matrix<FEW, N>,
+    more: Option<Box<Matrix<MORE, N>>>,
     /// The norm dual to the energy, of what springs hold and speeds, and of currents.
     mechanical: Reading,
     magnetic: Reading,
@@ -28,9 +32,14 @@ impl<const N: usize> Shown<N> {
     fn new(law: &ModeMatrices<N>, mechanism: &Mechanism, space: &Space) -> Self {
         let readout = Readout::new(mechanism, &law.mode);
         let mut matrix = Matrix::zero();
+        let mut more = (!readout.few).then(|| Box::new(Matrix::zero()));
         for (q, form) in readout.forms.iter().enumerate() {
             for (place, weight) in space.row::<N>(form).into_iter().enumerate() {
-                matrix.set(q, place, weight);
+                match (q.checked_sub(FEW), &mut more) {
+                    (None, _) => matrix.set(q, place, weight),
+                    (Some(q), Some(more)) => more.set(q, place, weight),
+                    (Some(_), None) => {}
+                }
             }
         }
         let stuck = law.mode.motion.map(|motion| motion == Motion::Stuck);
@@ -65,13 +74,13 @@ impl<const N: usize> Shown<N> {
             }
         }
         let input = std::array::from_fn(|drive| readout.forms.map(|form| form.input[drive].abs()));
-        Self { readout, matrix, mechanical, magnetic, unsprung, input }
+        Self { readout, matrix, more, mechanical, magnetic, unsprung, input }
     }
 
     /// The readings in z, ways being counted from `origin`.
     #[inline]
     pub(in crate::solve) fn read(&self, z: &[f64; N], origin: &[f64; BODIES]) -> Reading {
-        self.readout.placed(self.matrix.rate(z), origin)
+        self.readout.placed(self.change(z), origin)
     }
 
     widest! {
@@ -84,15 +93,27 @@ impl<const N: usize> Shown<N> {
     fn read_rows_by_any(&self, rows: &[[f64; N]], origin: &[f64; BODIES], readings: &mut Vec<Reading>) {
         // Not by an iterator's closure, which would not be compiled for the wider vectors.
         for z in rows {
-            readings.push(self.readout.placed(self.matrix.times(z), origin));
+            let more = self.more.as_ref().map(|more| more.times(z));
+            readings.push(self.readout.placed(joined(&self.matrix.times(z), more), origin));
         }
     }
 
     /// Reading of a change of z.
     #[inline]
     pub(in crate::solve) fn change(&self, change: &[f64; N]) -> Reading {
-        self.matrix.rate(change)
+        joined(&self.matrix.rate(change), self.more.as_ref().map(|more| more.rate(change)))
     }
+}
+
+/// The first readings, and those behind them.
+#[inline(always)]
+fn joined(first: &[f64; FEW], more: Option<[f64; MORE]>) -> Reading {
+    let mut all = [0.0; QUANTITIES];
+    all[..FEW].copy_from_slice(first);
+    if let Some(more) = more {
+        all[FEW..].copy_from_slice(&more);
+    }
+    all
 }
 
 impl<const N: usize> ModeMatrices<N> {
@@ -110,7 +131,7 @@ impl<const N: usize> ModeMatrices<N> {
         rates: (&[f64; DRIVES], &[f64; DRIVES]),
         (interval, length): (f64, f64),
     ) -> Reading {
-        self.change_of(shown, y, rates, length).map(|second| 0.125 * interval * interval * second)
+        self.change_by(shown, y, rates, length, |second| 0.125 * interval * interval * second)
     }
 
     /// Bounds of |q⁽ᵏ⁾| within the next `length`, `y` being z⁽ᵏ⁻¹⁾ now: with bounds of |u⁽ᵏ⁻¹⁾| and |u⁽ᵏ⁾| of each input
@@ -122,18 +143,32 @@ impl<const N: usize> ModeMatrices<N> {
         (rate, curvature): (&[f64; DRIVES], &[f64; DRIVES]),
         length: f64,
     ) -> Reading {
+        self.change_by(shown, y, (rate, curvature), length, |change| change)
+    }
+
+    /// What `factor` makes of each of these bounds.
+    #[inline(always)]
+    fn change_by(
+        &self,
+        shown: &Shown<N>,
+        y: &[f64; N],
+        (rate, curvature): (&[f64; DRIVES], &[f64; DRIVES]),
+        length: f64,
+        factor: impl Fn(f64) -> f64,
+    ) -> Reading {
         let grow = self.growth_over(length);
         let (first, second) = (self.size(y), self.size(&self.rate(y)));
         let (first, push) = (first.whole() + self.push(rate) * length, self.push(curvature) * length);
         let (mechanical, magnetic) = self.parted(second, push);
         // What can change is never told to stand still, though rounding may have stopped it.
         let [mechanical, magnetic, first] = [mechanical, magnetic, first].map(|size| (grow * size).max(STILL));
-        let mut change: Reading = std::array::from_fn(|q| {
+        let few = shown.readout.few;
+        let mut change = reading_of(few, |q| {
             shown.mechanical[q] * mechanical + shown.magnetic[q] * magnetic + shown.unsprung[q] * first
         });
         for (input, curvature) in shown.input.iter().zip(curvature).filter(|(_, curvature)| **curvature > 0.0) {
             change.iter_mut().zip(input).for_each(|(change, input)| *change += input * curvature);
         }
-        change
+        reading_of(few, |q| factor(change[q]))
     }
 }
