@@ -52,8 +52,11 @@ fn members() -> Result<(Vec<(String, String)>, Vec<String>), String> {
 
 /// `cargo install` from that registry, with a home of its own and in a folder without a configuration.
 fn install(places: &Places, registry: &Path, published: &[(String, String)]) -> Result<PathBuf, String> {
-    let (home, root) = (places.work.join("home"), places.work.join("installed"));
-    let _ = fs::remove_dir_all(&root);
+    let (home, root, built) = (places.work.join("home"), places.work.join("installed"), places.work.join("crates"));
+    // Cargo takes a version of a package for the same whatever is in it.
+    for folder in [&root, &built] {
+        let _ = fs::remove_dir_all(folder);
+    }
     let config = format!(
         "[source.crates-io]\nreplace-with = \"packed\"\n\n[source.packed]\ndirectory = {:?}\n\n[net]\noffline = true\n",
         registry.display().to_string()
@@ -63,7 +66,7 @@ fn install(places: &Places, registry: &Path, published: &[(String, String)]) -> 
     let version = published.iter().find(|(name, _)| name == program).map(|(_, version)| version.as_str());
     let mut install = crate::cargo(&["install", program, "--locked", "--version", version.unwrap_or_default()]);
     install.arg("--root").arg(&root).current_dir(&home).env("CARGO_HOME", &home);
-    install.env("CARGO_TARGET_DIR", places.work.join("crates")).env_remove("CARGO_ENCODED_RUSTFLAGS");
+    install.env("CARGO_TARGET_DIR", &built).env_remove("CARGO_ENCODED_RUSTFLAGS");
     must(install)?;
     Ok(root.join("bin").join(format!("taut{}", std::env::consts::EXE_SUFFIX)))
 }
