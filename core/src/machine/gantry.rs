@@ -44,6 +44,7 @@ const DRIVES: [DriveAt; 2] = [
         rotor: Label { key: "left_rotor", name: "left rotor" },
         key: "left_drive.",
         prefix: "left_",
+        input: "left_input",
     },
     DriveAt {
         label: Label { key: "right_drive", name: "right drive" },
@@ -55,6 +56,7 @@ const DRIVES: [DriveAt; 2] = [
         rotor: Label { key: "right_rotor", name: "right rotor" },
         key: "right_drive.",
         prefix: "right_",
+        input: "right_input",
     },
 ];
 

@@ -8,7 +8,6 @@ use crate::chance;
 use crate::error::{Error, Result};
 use crate::fit::asked::problem::{Problem, Stop, extent};
 use crate::fit::asked::residuals::Residuals;
-use crate::fit::asked::run::is_position;
 use crate::fit::limits::{FILE_ROUNDING, HUBER, ROUGH_TOLERANCE, SWINGS_KEEP, TRIAL_ITERATIONS, WEIGHT_ROUNDS};
 use crate::log::Quantity;
 use crate::solve::Flow;
@@ -177,7 +176,7 @@ fn uniform(problem: &Problem) -> bool {
 fn swings(problem: &Problem, at: &Minimum) -> bool {
     let all = problem.runs.iter().enumerate().flat_map(|(index, run)| {
         let (first, n) = (problem.first_row(index), run.time.len());
-        let own = run.seen.iter().enumerate().filter(|(_, seen)| is_position(seen.quantity));
+        let own = run.seen.iter().enumerate().filter(|(_, seen)| seen.quantity.is_position());
         own.map(move |(output, _)| &at.residuals[first + output * n..first + (output + 1) * n])
     });
     let is_swinging = |values: &[f64]| {
