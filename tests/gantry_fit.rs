@@ -195,6 +195,21 @@ fn spans_of_one_belt_show_by_their_sum() {
     assert_eq!(belts.looser(), Some(1), "{}", belts.words());
 }
 
+/// Belts that are off by up to a half swing out of step with the log: a search over the whole log alone ends where a few
+/// swings more or less fit.
+#[test]
+fn belts_are_found_from_a_stiffness_that_is_far_off() {
+    let truth = case(Kind::CoreXy, &["belt.stiffness=[1.2e5, 1e5, 1.05e5, 0.9e5]"]);
+    for start in [0.8e5, 1.3e5, 1.6e5] {
+        let begins = format!("belt.stiffness=[{start}, {start}, {start}, {start}]");
+        let own = with_log(case(Kind::CoreXy, &[&begins]), &truth, None, 3);
+        let found = fitted(&own, &belts_of_core_xy(&["bridge.mass", "cart.mass"]));
+        for (estimate, value) in found.estimates[2..].iter().zip([1.1e5, 0.975e5]) {
+            assert!((estimate.value / value - 1.0).abs() < 2e-3, "{start}: {estimate:?}");
+        }
+    }
+}
+
 /// A log that does not stretch the belts says so.
 #[test]
 fn a_slow_log_does_not_say_which_belt_is_looser() {

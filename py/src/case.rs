@@ -173,7 +173,7 @@ impl Case {
     }
 
     fn check<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let case = self.axis(py)?;
+        let case = &self.inner;
         let plan = case.fit_plan(&self.path).told(py)?;
         let interrupt = Interrupt::listen();
         let watch = &mut |_: &[f64], _: f64| if interrupt.stop() { Flow::Stop } else { Flow::Continue };
@@ -185,7 +185,7 @@ impl Case {
 
     /// Fits, and draws from the posterior if so many draws and chains are asked for.
     fn fit(&self, py: Python<'_>, effort: Option<(usize, usize)>, profiled: bool) -> PyResult<Fit> {
-        let case = self.axis(py)?;
+        let case = &self.inner;
         let plan = case.fit_plan(&self.path).told(py)?;
         let effort = effort.map(|(draws, chains)| Effort { chains, draws, tune: TUNE, seed: plan.seed });
         // Before the fit, which may take long.
@@ -372,7 +372,7 @@ impl Case {
         laws: Vec<String>,
         windows: Option<Vec<Option<f64>>>,
     ) -> PyResult<(Py<PyAny>, Py<Self>)> {
-        let case = self.axis(py)?;
+        let case = &self.inner;
         let plan = case.fit_plan(&self.path).told(py)?;
         let mut setting = Setting::usual(case, &plan);
         if !laws.is_empty() {
@@ -395,7 +395,7 @@ impl Case {
 
     /// Which single change explains the logs, as JSON.
     fn drift(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
-        let case = self.axis(py)?;
+        let case = &self.inner;
         let plan = case.fit_plan(&self.path).told(py)?;
         let interrupt = Interrupt::listen();
         let stop = || interrupt.stop();

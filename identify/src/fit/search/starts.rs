@@ -8,7 +8,10 @@ use crate::chance;
 use crate::error::{Error, Result};
 use crate::fit::asked::problem::{Problem, Stop, extent};
 use crate::fit::asked::residuals::Residuals;
-use crate::fit::limits::{FILE_ROUNDING, HUBER, ROUGH_TOLERANCE, SWINGS_KEEP, TRIAL_ITERATIONS, WEIGHT_ROUNDS};
+use crate::fit::limits::{
+    FILE_ROUNDING, HUBER, MORE_THAN_NOISE, MOST_START_WINDOWS, ROUGH_TOLERANCE, START_WINDOW_ROWS, SWINGS_KEEP,
+    TRIAL_ITERATIONS, WEIGHT_ROUNDS,
+};
 use crate::log::Quantity;
 use crate::solve::Flow;
 use nalgebra::DMatrix;
@@ -74,6 +77,22 @@ pub(crate) fn search_as_far<'a>(
             .next("run `taut simulate` on the case to see why, or start from other values"));
     }
     let mut starts = vec![best.cost];
+    if let Some(mut windowed) = in_windows(case, plan, &problem, &best)? {
+        let globals = problem.globals();
+        let rough = Options { iterations: TRIAL_ITERATIONS, tolerance: ROUGH_TOLERANCE, evolutions: 0, ..whole };
+        let first = windowed.start();
+        let found = descend(&mut windowed, &first, &rough);
+        problem.simulations += windowed.simulations;
+        if !matches!(found.ending, Ending::Failed | Ending::Interrupted) {
+            let mut x = problem.start();
+            x[..globals].copy_from_slice(&found.x[..globals]);
+            let trial = descend(&mut problem, &x, &whole);
+            starts.push(trial.cost);
+            if trial.ending != Ending::Failed && trial.cost < best.cost {
+                best = trial;
+            }
+        }
+    }
     let mut random = Pcg64::seed_from_u64(plan.seed);
     for _ in 1..plan.starts {
         if problem.is_stopped() || best.ending == Ending::Interrupted {
@@ -129,6 +148,28 @@ pub(crate) fn search_as_far<'a>(
     }
     work.simulations = problem.simulations;
     Ok(Searched { problem, best, noise, starts, work })
+}
+
+/// The logs in short windows, each with a start of its own; none where a search in them is of no use: for a single
+/// coordinate, where the residuals are noise, and where the plan has windows or a loop.
+///
+/// A belt whose stiffness is off swings out of step with the log, and the longer the log, the closer to each other are
+/// the minima that this makes. In a window of a few swings there is one.
+fn in_windows<'a>(case: &Case, plan: &Plan, problem: &Problem<'a>, at: &Minimum) -> Result<Option<Problem<'a>>> {
+    let is_open = plan.windows.is_none() && !plan.closed_loop && problem.globals() > 0;
+    if problem.machine.has_one_coordinate() || !is_open || at.ending == Ending::Interrupted {
+        return Ok(None);
+    }
+    let noise = problem.noise();
+    let is_noise = |(quantity, deviation): &(Quantity, f64)| *deviation <= MORE_THAN_NOISE * noise.of(*quantity);
+    if noise_of(problem, at, plan.huber).iter().all(is_noise) {
+        return Ok(None);
+    }
+    let total: f64 = problem.runs.iter().map(|run| run.time.last().copied().unwrap_or(0.0)).sum();
+    let rows: usize = problem.runs.iter().map(|run| run.time.len()).sum();
+    let length = (START_WINDOW_ROWS * total / rows as f64).max(total / MOST_START_WINDOWS);
+    let windowed = Plan { windows: Some(length), ..plan.clone() };
+    Ok(Some(Problem::new(case, &windowed)?.stopped_by(problem.stop())))
 }
 
 /// Where nothing is searched for.
