@@ -24,7 +24,7 @@ fn case(kind: Kind, changes: &[&str]) -> Case {
         Kind::HFrame => "stages/h-frame/h-frame.toml",
         Kind::Axis | Kind::CoreXy => "stages/core-xy/core-xy.toml",
     };
-    let rows = [INPUTS, "experiment.0.until=0.8", "experiment.0.every=1ms"];
+    let rows = [INPUTS, "experiment.0.until=0.5", "experiment.0.every=1ms"];
     let mut case = Case::read_with(file, &[&rows, changes].concat()).unwrap();
     case.experiments.truncate(1);
     case

@@ -9,7 +9,8 @@ use crate::case::{Case, Plan};
 use crate::fit::asked::controller::reproduced;
 use crate::fit::asked::problem::Problem;
 use crate::fit::limits::{
-    CAUSE_EXPLAINS, CAUSE_MOVES, CAUSE_WARNS, KINK_PROMISE, MOTOR_CONSTANTS, NORMAL, OPPOSITE, POOR_FIT, REPRODUCED,
+    CAUSE_EXPLAINS, CAUSE_MOVES, CAUSE_WARNS, KINK_PROMISE, MORE_THAN_NOISE, MOTOR_CONSTANTS, NORMAL, OPPOSITE,
+    POOR_FIT, REPRODUCED,
 };
 use crate::fit::noise::Wave;
 use crate::fit::search::point::Ending;
@@ -17,7 +18,7 @@ use crate::fit::search::regression::Balance;
 use crate::fit::search::starts::Searched;
 use crate::log::{Note, Quantity, Remedy, Severity, Survey};
 use crate::machine::{AmplifierMode, DriveAt, DriveUnit, Motor};
-use crate::number::engineering;
+use crate::number::{engineering, significant};
 use crate::solve::Bench;
 
 /// All there is to say, warnings first.
@@ -26,6 +27,7 @@ pub(crate) fn findings(case: &Case, plan: &Plan, found: &Searched, fit: &Fit, su
     all.extend(of_controller(case, plan));
     all.extend(of_cause(fit));
     all.extend(of_search(fit));
+    all.extend(of_noise(found));
     all.extend(of_motor(case, fit));
     all.extend(of_residuals(case, plan, found, fit, &all));
     all.sort_by_key(|finding| std::cmp::Reverse(finding.grade));
@@ -118,6 +120,27 @@ fn of_controller(case: &Case, plan: &Plan) -> Vec<Finding> {
         Some(Finding { grade, code: "controller", log: Some(log.name.clone()), text })
     });
     told.collect()
+}
+
+/// Residuals of a machine with several coordinates that are more than the noise of its logs: its elastic modes make many
+/// minima.
+fn of_noise(found: &Searched) -> Option<Finding> {
+    let problem = &found.problem;
+    if problem.machine.has_one_coordinate() || problem.parameters.is_empty() {
+        return None;
+    }
+    let noise = problem.noise();
+    let beyond = |(quantity, deviation): &(Quantity, f64)| {
+        let times = deviation / noise.of(*quantity);
+        (times > MORE_THAN_NOISE).then(|| format!("{} {} times", quantity.name(), significant(times, 2)))
+    };
+    let beyond: Vec<String> = found.noise.iter().filter_map(beyond).collect();
+    let text = format!(
+        "residuals are more than the noise of the logs ({}): the model lacks something, or the search ended in one of \
+         several minima; try starts = 8 in [fit], or begin with values nearer to the machine's",
+        beyond.join(", ")
+    );
+    (!beyond.is_empty()).then(|| finding(Grade::Note, "noise", text))
 }
 
 /// How the search ended.
