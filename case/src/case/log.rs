@@ -6,7 +6,7 @@ use super::reader::{Field, Table};
 use super::tree::Kind;
 use crate::error::{Error, Result};
 use crate::log::{Clock, ColumnId, Dialect, Fed, Filter, In, Log, Mapping, PRESETS, Preset, Quantity, Source, Unit};
-use crate::machine::{BeltModel, Machine};
+use crate::machine::{self, BeltModel, Machine};
 use crate::parameter::Parameter;
 use crate::quantity::{self, shortest};
 use crate::signal::Hold;
@@ -39,7 +39,13 @@ pub(super) fn logs(
     driven: bool,
 ) -> Result<Vec<(Option<String>, Log)>> {
     let table = field.table()?;
-    let keys: Vec<&str> = KEYS.iter().copied().chain(columns_of(machine)).collect();
+    let keys: Vec<&str> = KEYS.iter().copied().chain(columns_of(machine.kind)).collect();
+    let is_of_another =
+        |key: &&str| !keys.contains(key) && machine::Kind::ALL.into_iter().flat_map(columns_of).any(|own| own == *key);
+    if let Some(field) = table.keys().find(is_of_another).and_then(|key| table.optional(key)) {
+        let what = format!("the log of this machine ({}) has no `{}`", machine.kind.name(), field.key());
+        return Err(field.fail(what).allowed(columns_of(machine.kind).collect::<Vec<_>>().join(", ")));
+    }
     table.check_keys(&keys, &[])?;
     if let Some(field) = ["preset", "added", "reference"].iter().find_map(|key| table.optional(key))
         && !machine.has_one_coordinate()
@@ -108,10 +114,10 @@ pub(super) fn logs(
     folder.read(&file, &path, || mapping.read()).map_err(missing)
 }
 
-/// Keys of the columns that a log of this machine can name, without time: inputs of the drives, then quantities.
-fn columns_of(machine: &Machine) -> impl Iterator<Item = &'static str> + Clone {
-    let inputs = machine.geometry().drives.iter().map(|drive| drive.input);
-    inputs.chain(machine.quantities().iter().map(|quantity| quantity.name()))
+/// Keys of the columns that a log of this kind of machine can name, without time: inputs of the drives, then quantities.
+fn columns_of(kind: machine::Kind) -> impl Iterator<Item = &'static str> + Clone {
+    let inputs = kind.geometry().drives.iter().map(|drive| drive.input);
+    inputs.chain(Quantity::of(kind).iter().map(|quantity| quantity.name()))
 }
 
 /// The column of each drive's input, unless the experiment has inputs of its own.
@@ -190,7 +196,7 @@ impl<'a> Sources<'a> {
         let (units, scale, offset) = (part("units")?, part("scale")?, part("offset")?);
         let sources = Self { units, scale, offset, table, columns: known, machine, steps_per_turn };
         for part in [&sources.units, &sources.scale, &sources.offset].into_iter().flatten() {
-            let columns = ["time", "added", "reference"].into_iter().chain(columns_of(machine));
+            let columns = ["time", "added", "reference"].into_iter().chain(columns_of(machine.kind));
             let named: Vec<&'static str> = columns.clone().filter(|key| sources.is_named(key)).collect();
             // A quantity without a column, rather than a word that is none.
             let other = part.keys().find(|key| !named.contains(key) && columns.clone().any(|column| column == *key));

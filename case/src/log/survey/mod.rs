@@ -111,7 +111,7 @@ impl Survey {
             notes.extend(channel.notes(output, &timing));
         }
         match &motion {
-            Some(motion) => notes.extend(motion.notes()),
+            Some(motion) => notes.extend(motion.notes(log.inputs.len())),
             None => notes.push(Note::new(
                 "no-motion",
                 Severity::Warning,

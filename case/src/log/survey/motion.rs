@@ -206,7 +206,8 @@ impl Motion {
         if self.quantity.is_linear() { "m/s" } else { "rad/s" }
     }
 
-    pub(super) fn notes(&self) -> Vec<Note> {
+    /// Notes on it in a log of so many inputs; steady speeds are those under a single one.
+    pub(super) fn notes(&self, inputs: usize) -> Vec<Note> {
         let name = self.quantity.name();
         let mut notes = Vec::new();
         let mut note = |code, severity, text: String| notes.push(Note::new(code, severity, text).on(name));
@@ -242,6 +243,7 @@ impl Motion {
         }
         let longest = self.steady.iter().max_by(|a, b| (a.to - a.from).total_cmp(&(b.to - b.from)));
         match (longest, self.steady_speeds()) {
+            (None, _) if inputs > 1 => {}
             (None, _) => note(
                 "unsteady",
                 Severity::Fact,

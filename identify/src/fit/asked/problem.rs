@@ -110,9 +110,7 @@ impl<'a> Problem<'a> {
             }
         }
         if runs.is_empty() {
-            return Err(Error::new("there is no log to fit").next(
-                "add log = { file = \"...\", time = \"...\", input = \"...\", drive_angle = \"...\" } to an experiment",
-            ));
+            return Err(no_log(&machine));
         }
         let mut problem = Self {
             units: parameters.iter().map(|parameter| scale(&machine, parameter, &runs)).collect(),
@@ -619,6 +617,19 @@ impl<'a> Problem<'a> {
     }
 }
 
+/// The error where no log is fitted, with the columns that a log of this machine would have.
+fn no_log(machine: &Machine) -> Error {
+    let geometry = machine.geometry();
+    let pulleys: Vec<&str> = geometry.drives.iter().map(|drive| geometry.label(drive.pulley).key).collect();
+    let is_angle =
+        |quantity: &&Quantity| quantity.is_position() && quantity.body().is_some_and(|body| pulleys.contains(&body));
+    let inputs = geometry.drives.iter().map(|drive| drive.input);
+    let angles = machine.quantities().iter().filter(is_angle).map(|quantity| quantity.name());
+    let columns: String = inputs.chain(angles).map(|key| format!(", {key} = \"...\"")).collect();
+    Error::new("there is no log to fit")
+        .next(format!("add log = {{ file = \"...\", time = \"...\"{columns} }} to an experiment"))
+}
+
 /// A run, where its residuals begin, and the variables that move them.
 type Left = (usize, usize, Vec<usize>);
 
@@ -707,7 +718,8 @@ impl Start<'_> {
             let free = initial_state || windowed;
             // Positions count from where the log begins, unless the case says where that is; its first value says that
             // no better than any other value says where the slide is.
-            let noise = self.reading.and_then(|reading| reading.deviation(run, |q| Some(self.noise.of(q))));
+            let noise =
+                self.reading.and_then(|reading| reading.deviation(run, |quantity| Some(self.noise.of(quantity))));
             let noise = noise.unwrap_or_default();
             let (unit, room) = if free { (1e-2 * wide, wide) } else { (noise, 6.0 * noise) };
             if free || !given {
@@ -722,7 +734,8 @@ impl Start<'_> {
             }
         }
         if initial_state || windowed {
-            let (slope, doubt) = self.reading.map_or((0.0, 0.0), |reading| reading.speed_at_start(run, self.noise));
+            let of = |quantity| Some(self.noise.of(quantity));
+            let (slope, doubt) = self.reading.map_or((0.0, 0.0), |reading| reading.speed_at_start(run, of));
             // A log begins at rest, unless it shows that it does not: a start at rest sticks, and a search from there
             // sees nothing of the speed.
             let start = if windowed || slope.abs() > STARTS_MOVING * doubt { slope } else { 0.0 };

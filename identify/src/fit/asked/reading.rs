@@ -1,6 +1,5 @@
 //! The coordinates of a machine as the outputs of a log show them: where its slides are, without strain of the belt.
 
-use super::problem::Noise;
 use super::run::Run;
 use crate::log::Quantity;
 use crate::machine::Machine;
@@ -60,8 +59,9 @@ impl Reading {
         parts.map(|parts| parts.into_iter().fold(0.0, f64::hypot))
     }
 
-    /// The speed at the start of a log or window, m/s, from a line through its first rows, and its standard error.
-    pub fn speed_at_start(&self, run: &Run, noise: &Noise) -> (f64, f64) {
+    /// The speed at the start of a log or window, m/s, from a line through its first rows, and its standard error for
+    /// these deviations of the outputs.
+    pub fn speed_at_start(&self, run: &Run, of: impl Fn(Quantity) -> Option<f64>) -> (f64, f64) {
         let values = self.values(run);
         let rows: Vec<usize> = (0..run.time.len().min(15)).filter(|&k| values[k].is_finite()).collect();
         let n = rows.len().max(1) as f64;
@@ -72,7 +72,7 @@ impl Reading {
             above += (run.time[k] - t) * (values[k] - y);
             below += (run.time[k] - t).powi(2);
         }
-        let deviation = self.deviation(run, |quantity| Some(noise.of(quantity))).unwrap_or_default();
+        let deviation = self.deviation(run, of).unwrap_or_default();
         if below > 0.0 { (above / below, deviation / below.sqrt()) } else { (0.0, 0.0) }
     }
 }
