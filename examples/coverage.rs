@@ -308,7 +308,7 @@ fn recorded(cell: &Cell, truth: [f64; 3], chance: &mut Chance) -> Case {
             name: format!("{name} {place}"),
             file: Default::default(),
             time: time.clone(),
-            input: voltage.clone(),
+            inputs: vec![voltage.clone()],
             hold: Hold::Zero,
             added: None,
             reference: None,
@@ -342,8 +342,8 @@ fn known(cell: &Cell, case: &Case, plan: &Plan, truth: [f64; 3], noise: &[(Quant
     let mut problem = Problem::new(&case, plan).ok()?;
     for &(quantity, deviation) in noise {
         problem.weigh(quantity, deviation, true);
-        problem.doubt_starts(quantity, deviation);
     }
+    problem.doubt_starts(noise);
     let x = problem.start();
     let mut residuals = vec![0.0; problem.rows()];
     if !problem.evaluate(&x, &mut residuals) {

@@ -226,7 +226,7 @@ fn made(fault: Fault, seed: u64) -> Case {
         name: "log".into(),
         file: Default::default(),
         time,
-        input: values,
+        inputs: vec![values],
         hold: Hold::Zero,
         added: None,
         reference: None,

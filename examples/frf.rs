@@ -95,7 +95,7 @@ fn log(machine: &Machine, closed: bool, delay: f64, seed: u64) -> taut::Result<L
         name: "simulated".into(),
         file: "simulated.csv".into(),
         time: cut(&exciter.time),
-        input: cut(&exciter.input),
+        inputs: vec![cut(&exciter.input)],
         added: None,
         hold: taut::signal::Hold::Zero,
         reference: closed.then(|| cut(&exciter.reference)),

@@ -28,7 +28,7 @@ fn made(truth: &[&str], seed: u64) -> Case {
     let mut log: Log = (*logged(&name, &run, values)).clone();
     // A sine is none that is held between samples.
     log.hold = Hold::Linear;
-    case.experiments[0].inputs[0] = log.signal();
+    case.experiments[0].inputs = log.signals();
     case.experiments[0].log = Some(Arc::new(log));
     case
 }
@@ -277,14 +277,14 @@ fn the_start_of_a_log_that_is_held_out_is_fitted() {
     let mut log: Log = (**case.experiments[0].log.as_ref().unwrap()).clone();
     let begin = log.time.iter().position(|t| *t > 1.7).unwrap();
     // It begins in motion.
-    for column in [&mut log.time, &mut log.input, &mut log.outputs[0].values] {
+    for column in [&mut log.time, &mut log.inputs[0], &mut log.outputs[0].values] {
         column.drain(..begin);
     }
     let first = log.time[0];
     log.time.iter_mut().for_each(|t| *t -= first);
     log.name = "later".into();
     let mut later = case.experiments[0].clone();
-    (later.name, later.inputs) = ("later".into(), vec![log.signal()]);
+    (later.name, later.inputs) = ("later".into(), log.signals());
     later.log = Some(Arc::new(log));
     case.experiments.push(later);
     let own = Plan { held_out: vec!["later".into()], ..plan(&["cart.friction.viscous"]) };
@@ -295,7 +295,7 @@ fn the_start_of_a_log_that_is_held_out_is_fitted() {
     assert_eq!(held.len(), 2, "it is cut into windows like the others");
     for log in held {
         assert!(log.outputs[0].held_out.unwrap().rmse < 2e-3, "{:?}", log.outputs[0].held_out);
-        assert!(log.extras.iter().any(|(what, ..)| what.name() == "start_speed"));
+        assert!(log.extras.iter().any(|(what, ..)| matches!(what, taut::fit::Nuisance::StartSpeed(_))));
     }
 }
 

@@ -232,7 +232,8 @@ fn late(mut truth: Case, rows: usize) -> Case {
     let mut case = with_logs_of(truth);
     for experiment in &mut case.experiments {
         let log = experiment.log.as_ref().unwrap();
-        experiment.inputs[0] = Signal::Sampled { times: log.time.clone(), values: log.input.clone(), hold: log.hold };
+        experiment.inputs[0] =
+            Signal::Sampled { times: log.time.clone(), values: log.inputs[0].clone(), hold: log.hold };
     }
     case
 }
@@ -277,8 +278,9 @@ fn a_log_that_begins_at_rest_does_so_in_its_first_window() {
             *value += slow;
             slow = 0.99 * slow + 3e-3 * 0.0199f64.sqrt() * chance.normal();
         }
-        log.input.fill(volts);
-        experiment.inputs[0] = Signal::Sampled { times: log.time.clone(), values: log.input.clone(), hold: log.hold };
+        log.inputs[0].fill(volts);
+        experiment.inputs[0] =
+            Signal::Sampled { times: log.time.clone(), values: log.inputs[0].clone(), hold: log.hold };
         experiment.name = format!("step of {volts} V");
         case.experiments.push(experiment);
     }
@@ -293,7 +295,7 @@ fn a_log_that_begins_at_rest_does_so_in_its_first_window() {
     assert!(found.estimates[3].error.unwrap() < 2e-3, "{:?}", found.estimates[3].error);
     let windows = Plan { windows: Some(0.3), ..plan };
     for run in Problem::new(&case, &windows).unwrap().runs {
-        let is_free = run.extras.iter().any(|extra| extra.what == Nuisance::StartSpeed);
+        let is_free = run.extras.iter().any(|extra| extra.what == Nuisance::StartSpeed(0));
         assert_eq!(is_free, run.window > 0, "{} {}", run.name, run.window);
     }
 }

@@ -21,7 +21,7 @@ fn made(own: &[&str], key: &str, truth: f64, noise: f64) -> Case {
     let name = case.experiments[0].name.clone();
     let mut log = (*logged(&name, &run, values)).clone();
     // What was meant, and not what came out of the amplifier.
-    log.input = log.time.iter().map(|&t| experiment.inputs[0].value(t)).collect();
+    log.inputs[0] = log.time.iter().map(|&t| experiment.inputs[0].value(t)).collect();
     case.experiments[0].log = Some(std::sync::Arc::new(log));
     case
 }

@@ -56,7 +56,7 @@ fn log(model: &(Discrete, usize), input: &dyn Fn(usize) -> f64, gain: Option<f64
         name: "made".into(),
         file: "made.csv".into(),
         time,
-        input: u,
+        inputs: vec![u],
         hold: taut::signal::Hold::Zero,
         reference: gain.map(|_| r),
         outputs: vec![Output { quantity: Quantity::DriveAngle, absolute: false, values: y }],
@@ -207,7 +207,7 @@ fn what_cannot_be_measured_is_told() {
     let mut missing = good.clone();
     missing.outputs[0].values[17] = f64::NAN;
     assert!(told(&missing, plain).contains("drive_angle has no value at 0.017000 s"), "{}", told(&missing, plain));
-    let still = Log { input: vec![1.0; 4000], ..good.clone() };
+    let still = Log { inputs: vec![vec![1.0; 4000]], ..good.clone() };
     assert!(told(&still, plain).contains("the input does not change"), "{}", told(&still, plain));
     let mut signless = good.clone();
     signless.outputs[0].absolute = true;
@@ -231,7 +231,7 @@ fn a_period_longer_than_any_log_is_refused() {
         file: "made.csv".into(),
         outputs: vec![Output { quantity: Quantity::DriveAngle, absolute: false, values: input.clone() }],
         time,
-        input,
+        inputs: vec![input],
         added: None,
         hold: taut::signal::Hold::Zero,
         reference: None,

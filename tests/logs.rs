@@ -37,7 +37,7 @@ fn a_log_drives_its_experiment() {
     let experiment = &case.experiments[0];
     assert_eq!((experiment.until, experiment.every), (0.2, 0.1));
     let log = experiment.log.as_ref().unwrap();
-    assert_eq!((log.name.as_str(), &log.time, &log.input), ("run", &vec![0.0, 0.1, 0.2], &vec![5.0, 5.0, 0.0]));
+    assert_eq!((log.name.as_str(), &log.time, &log.inputs[0]), ("run", &vec![0.0, 0.1, 0.2], &vec![5.0, 5.0, 0.0]));
     assert_eq!(output(log, Quantity::CartPosition), [0.0, 2.5e-3, 5e-3]);
     assert_eq!(output(log, Quantity::MotorCurrent), [0.1, 0.2, 0.3]);
     assert_eq!(experiment.inputs[0].value(0.15), 5.0);
@@ -64,7 +64,7 @@ fn holds_the_samples(log: &str) {
     let x = output(log, Quantity::CartPosition);
     assert_eq!(log.len(), 20);
     for (k, x) in x.iter().enumerate() {
-        assert_eq!([log.time[k], log.input[k], *x], expected(k), "{k}");
+        assert_eq!([log.time[k], log.inputs[0][k], *x], expected(k), "{k}");
     }
 }
 
@@ -154,7 +154,7 @@ fn csv_in_many_dialects() {
     for (k, (text, log)) in cases.into_iter().enumerate() {
         let case = read(&format!("dialect-{k}"), text, &format!("log = {{ file = \"log.csv\", {log} }}"));
         let log = case.experiments[0].log.as_ref().unwrap();
-        assert_eq!((&log.time[..], &log.input[..]), (&[0.0, 0.5][..], &[5.0, 0.0][..]), "{text:?}");
+        assert_eq!((&log.time[..], &log.inputs[0][..]), (&[0.0, 0.5][..], &[5.0, 0.0][..]), "{text:?}");
         assert_eq!(output(log, Quantity::CartPosition), [0.0, 1.0], "{text:?}");
     }
     let text = "time (ms),u [mV],enc,speed_rpm\n10,5000,0,60\n20,5000,512,NaN\n30,0,,30\n";
@@ -166,7 +166,7 @@ fn csv_in_many_dialects() {
     let log = case.experiments[0].log.as_ref().unwrap();
     let counts = case.machine.encoder.unwrap().counts_per_unit(case.machine.drives[0].motor.gear_ratio);
     let angle = output(log, Quantity::DriveAngle);
-    assert!((log.time[1] - 0.01).abs() < 1e-15 && log.input == [5.0, 5.0, 0.0]);
+    assert!((log.time[1] - 0.01).abs() < 1e-15 && log.inputs[0] == [5.0, 5.0, 0.0]);
     assert_eq!(angle[0], std::f64::consts::FRAC_PI_2);
     assert!((angle[1] - angle[0] + 512.0 / counts).abs() < 1e-12 && angle[2].is_nan());
     assert!((output(log, Quantity::DriveSpeed)[0] - std::f64::consts::TAU).abs() < 1e-12);
@@ -183,19 +183,19 @@ fn windows_runs_and_missing_inputs() {
     let whole = log("whole", "");
     assert_eq!((whole.time[0], whole.time[99], whole.len()), (0.0, 12.375, 100));
     let part = log("part", r#", from = "11 s", to = "12 s""#);
-    assert_eq!((part.time.first(), part.time.last(), part.input[0]), (Some(&0.0), Some(&1.0), 8.0));
+    assert_eq!((part.time.first(), part.time.last(), part.inputs[0][0]), (Some(&0.0), Some(&1.0), 8.0));
     // A window that begins between two rows begins with the input that held then.
     let between = log("between", r#", from = "11.0625 s", to = "12 s""#);
-    assert_eq!((&between.time[..2], &between.input[..2]), (&[0.0, 0.0625][..], &[8.0, 9.0][..]));
+    assert_eq!((&between.time[..2], &between.inputs[0][..2]), (&[0.0, 0.0625][..], &[8.0, 9.0][..]));
     assert!(output(&between, Quantity::CartPosition)[0].is_nan());
     let joined = log("joined", r#", from = "11.0625 s", to = "12 s", hold = "linear""#);
-    assert_eq!(joined.input[..2], [8.5, 9.0]);
+    assert_eq!(joined.inputs[0][..2], [8.5, 9.0]);
 
     let split = read("split", &text, &mapped(r#", split = "run", to = "1 s""#));
     let names: Vec<&str> = split.experiments.iter().map(|e| e.name.as_str()).collect();
     assert_eq!(names, ["run/0", "run/1", "run/2", "run/3"]);
     let third = split.experiments[2].log.as_ref().unwrap();
-    assert_eq!((third.time[0], third.input[0], third.len()), (0.0, 50.0, 9));
+    assert_eq!((third.time[0], third.inputs[0][0], third.len()), (0.0, 50.0, 9));
     assert_eq!(split.experiments[2].file_name(), "run-2");
     let some = read("some", &text, &mapped(r#", split = "run", where = { column = "run", is_not = [0, 3.0] }"#));
     assert_eq!(some.experiments.len(), 2);
@@ -205,12 +205,12 @@ fn windows_runs_and_missing_inputs() {
 log = { file = "log.csv", time = "t", cart_position = "x", from = "9.5 s" }"#;
     let own = read("own-input", &text, own);
     let log = own.experiments[0].log.as_ref().unwrap();
-    assert_eq!((log.time[0], log.input[3]), (0.5, 5.0));
+    assert_eq!((log.time[0], log.inputs[0][3]), (0.5, 5.0));
 
     let gaps = "t,u,x\n0,,\n1,5,0\n2,,NaN\n3,0,2\n";
     let held = mapped(r#", missing_input = "hold", from = 1"#);
     let log = read("held", gaps, &held).experiments[0].log.clone().unwrap();
-    assert_eq!(log.input, [5.0, 5.0, 0.0]);
+    assert_eq!(log.inputs[0], [5.0, 5.0, 0.0]);
 }
 
 use crate::common;
@@ -234,7 +234,7 @@ fn measured_data_of_others() {
     assert_eq!(runs.iter().map(|run| run.log.as_ref().unwrap().len()).sum::<usize>(), 19257);
     let run = runs.iter().find(|run| run.name == "run/-100").expect("a run at -100");
     let log = run.log.as_ref().unwrap();
-    assert!((log.input[0] + 100.0 * 12.0 / 255.0).abs() < 1e-12);
+    assert!((log.inputs[0][0] + 100.0 * 12.0 / 255.0).abs() < 1e-12);
     assert!((log.interval() - 5e-3).abs() < 1e-4);
     let x = output(log, Quantity::CartPosition);
     assert!((x[0] - x[x.len() - 1]).abs() > 0.4);
@@ -275,7 +275,7 @@ fn damaged_files_are_told_or_read() {
         let path = folder.join(file);
         let [time, input, x] = *columns;
         let mut mapping = Mapping::new(&path, Source::column(time));
-        mapping.input = Some(Source::column(input));
+        mapping.fed_by(Source::column(input));
         mapping.outputs = vec![(Quantity::CartPosition, Source::column(x))];
         let mut told = 0;
         let mut try_out = |bytes: &[u8]| {

@@ -25,6 +25,7 @@ mod fitted_files;
 mod free;
 mod frf;
 mod gantry;
+mod gantry_fit;
 mod gantry_laws;
 mod gantry_loops;
 mod gantry_moves;

@@ -105,7 +105,7 @@ fn reprapfirmware_counts_in_steps_of_the_motor_and_says_when_data_were_lost() {
         assert_eq!((log.len(), log.ended.as_deref()), (run.len(), ended));
         agrees(&log, Quantity::DriveAngle, run.get("drive_angle").unwrap(), 1e-6);
         agrees(&log, Quantity::MotorCurrent, run.get("motor_current").unwrap(), 1e-3);
-        assert!((log.time[100] - 0.1).abs() < 1e-9 && log.input[50] == 5.0 && log.input[150] == -5.0);
+        assert!((log.time[100] - 0.1).abs() < 1e-9 && log.inputs[0][50] == 5.0 && log.inputs[0][150] == -5.0);
         let reference = &log.reference.as_ref().unwrap()[400];
         let angle = run.get("drive_angle").unwrap()[400];
         assert!((reference - angle * stage.pulley_radius).abs() < 1e-6);

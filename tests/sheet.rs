@@ -208,7 +208,7 @@ fn counted(counts: f64) -> Log {
         name: "to and fro".into(),
         file: "log.csv".into(),
         time,
-        input,
+        inputs: vec![input],
         hold: Hold::Zero,
         reference: None,
         outputs,

@@ -21,7 +21,7 @@ fn clean() -> (Machine, Log) {
     let log = Log {
         name: "square".into(),
         file: "square.csv".into(),
-        input: time.iter().map(|&t| input.value(t)).collect(),
+        inputs: vec![time.iter().map(|&t| input.value(t)).collect()],
         time,
         hold: Hold::Zero,
         added: None,
@@ -96,7 +96,7 @@ fn wrong_units_are_suspected_aloud() {
     values(&mut two, Quantity::CartPosition).iter_mut().for_each(|x| *x *= 1e3);
     says(&two, "unit", "drive_angle says of the same position");
     let mut input = log.clone();
-    input.input.iter_mut().for_each(|u| *u *= 1e3);
+    input.inputs[0].iter_mut().for_each(|u| *u *= 1e3);
     says(&input, "unit", "units = { input = \"mV\" }");
     let mut time = log.clone();
     time.time.iter_mut().for_each(|t| *t *= 1e3);
@@ -122,7 +122,7 @@ fn newtons_are_no_amperes() {
     let text = note(&machine, &log).unwrap();
     assert!(text.contains("500 A") && text.contains("amplifier.gain") && !text.contains("mA"), "{text}");
     let mut large = log.clone();
-    large.input.iter_mut().for_each(|u| *u *= 100.0);
+    large.inputs[0].iter_mut().for_each(|u| *u *= 100.0);
     machine.drives[0].amplifier.gain = 1.0;
     assert!(note(&machine, &large).unwrap().contains("units = { input = \"mA\" }"));
     // One newton per ampere: a force.
@@ -163,7 +163,7 @@ fn swapped_columns_and_signs_are_suspected() {
     swapped.outputs[0].values = std::mem::replace(&mut swapped.outputs[1].values, angle);
     says(&swapped, "swapped", "exchanged, they agree with the pulley's radius of 19.4 mm");
     let mut exchanged = only(&log, Quantity::CartPosition);
-    std::mem::swap(&mut exchanged.input, &mut exchanged.outputs[0].values);
+    std::mem::swap(&mut exchanged.inputs[0], &mut exchanged.outputs[0].values);
     says(&exchanged, "swapped", "as an input does");
     let mut sign = only(&log, Quantity::CartPosition);
     sign.outputs[0].values.iter_mut().for_each(|x| *x = -*x);
@@ -179,7 +179,7 @@ fn clocks() {
     let mut gaps = log.clone();
     let cut = |values: &mut Vec<f64>| drop(values.drain(300..340));
     cut(&mut gaps.time);
-    cut(&mut gaps.input);
+    cut(&mut gaps.inputs[0]);
     gaps.outputs.iter_mut().for_each(|output| cut(&mut output.values));
     says(&gaps, "gaps", "one gap of 41 ms after 0.299 s, where 40 samples are missing");
     let mut jitter = log.clone();
@@ -190,7 +190,7 @@ fn clocks() {
     says(&coarse, "coarse-clock", "steps of 1 ms");
     let few = Log {
         time: log.time[..30].to_vec(),
-        input: log.input[..30].to_vec(),
+        inputs: vec![log.inputs[0][..30].to_vec()],
         outputs: vec![Output { values: log.outputs[0].values[..30].to_vec(), ..log.outputs[0].clone() }],
         ..log.clone()
     };

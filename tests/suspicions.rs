@@ -258,9 +258,9 @@ fn an_input_that_is_logged_early_or_late_is_found() {
     let rows = 100;
     for is_early in [true, false] {
         let case = changed(701, |log| {
-            let n = log.input.len();
+            let n = log.inputs[0].len();
             let at = |k: usize| if is_early { (k + rows).min(n - 1) } else { k.saturating_sub(rows) };
-            log.input = (0..n).map(|k| log.input[at(k)]).collect();
+            log.inputs[0] = (0..n).map(|k| log.inputs[0][at(k)]).collect();
         });
         let found = fitted(&case);
         let words = if is_early { "too early" } else { "too late" };
@@ -283,7 +283,7 @@ fn a_factor_on_a_column_is_named() {
         (4, 7.0, false, 7.0, "cart_position times 0.142857, one over the gear ratio,"),
     ] {
         let mut case = changed(900 + seed, |log| {
-            let values = if on_input { &mut log.input } else { &mut log.outputs[0].values };
+            let values = if on_input { &mut log.inputs[0] } else { &mut log.outputs[0].values };
             values.iter_mut().for_each(|value| *value *= factor);
         });
         let motor = &mut case.machine.drives[0].motor;

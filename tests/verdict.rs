@@ -284,10 +284,10 @@ fn a_verdict_does_not_depend_on_the_unit_of_the_input() {
         let real = made(&[], &["cart.friction.coulomb=0.6"], &[1], slow(7, 0.0, 1.0, 1e-3));
         for (own, other) in case.experiments.iter_mut().zip(&real.experiments) {
             let log: &Log = other.log.as_ref().unwrap();
-            let input: Vec<f64> = log.input.iter().map(|u| u * unit).collect();
+            let input: Vec<f64> = log.inputs[0].iter().map(|u| u * unit).collect();
             own.inputs[0] =
                 taut::signal::Signal::Sampled { times: log.time.clone(), values: input.clone(), hold: log.hold };
-            own.log = Some(Arc::new(Log { input, ..log.clone() }));
+            own.log = Some(Arc::new(Log { inputs: vec![input], ..log.clone() }));
         }
         let found = fitted(&case, &plan(&["amplifier.gain", "cart.friction.coulomb"]));
         let errors: Vec<f64> = found.identifiability.as_ref().unwrap().error.clone();
@@ -361,7 +361,7 @@ fn faults_are_told_and_good_logs_are_not() {
         let mut case = good.clone();
         let mut log: Log = (**case.experiments[0].log.as_ref().unwrap()).clone();
         change(&mut log);
-        case.experiments[0].inputs[0] = log.signal();
+        case.experiments[0].inputs = log.signals();
         case.experiments[0].log = Some(Arc::new(log));
         fitted(&case, &plan(&KEYS))
     };
@@ -370,7 +370,7 @@ fn faults_are_told_and_good_logs_are_not() {
         assert!(!found.is_converged() && found.ending_word() != "converged");
     };
     says(&change(&|log| log.outputs[0].values.iter_mut().for_each(|v| *v = -*v)), "sign");
-    says(&change(&|log| log.input.iter_mut().for_each(|u| *u *= 1e-3)), "unit");
+    says(&change(&|log| log.inputs[0].iter_mut().for_each(|u| *u *= 1e-3)), "unit");
     says(&change(&|log| log.time.iter_mut().for_each(|t| *t *= 0.1)), "time-unit");
     says(&change(&|log| log.outputs[0].values = late(&log.outputs[0].values)), "delay");
 }

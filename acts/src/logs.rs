@@ -10,6 +10,7 @@ use taut::case::{Case, Plan};
 use taut::error::{Error, Result};
 use taut::fit::{Problem, Run, check_watched, fit_watched, profiles};
 use taut::log::{ColumnId, Looked, PRESETS, Quantity, look};
+use taut::machine::Kind;
 use taut::solve::{Bench, Flow};
 use taut_report::fit::Found;
 
@@ -50,7 +51,7 @@ pub fn columns(request: &Request, context: &Context) -> Result<Reply> {
         "found": columns.iter().map(one).collect::<Vec<_>>(),
         "rows": rows,
         "guess": { "preset": guess.preset, "columns": guess.columns.iter().map(keys).collect::<Vec<_>>(), "split": guess.split },
-        "quantities": Quantity::ALL.map(quantity),
+        "quantities": Quantity::of(Kind::Axis).iter().copied().map(quantity).collect::<Vec<_>>(),
         "presets": PRESETS.iter().map(|preset| json!({ "name": preset.name, "title": preset.title })).collect::<Vec<_>>(),
     })))
 }
@@ -70,7 +71,8 @@ fn planned(request: &Request, context: &Context) -> Result<(Case, Plan)> {
     let name = context.host.name();
     let case = opened(&request, context)?;
     if !case.is_axis() {
-        return Err(Error::new("a fit takes an axis, and this case is a gantry").next("open the case of an axis"));
+        return Err(Error::new("the studio fits a single axis, and this case is a gantry")
+            .next("use `taut fit` or `taut check` on the command line, which take gantries"));
     }
     let plan = case.fit_plan(name)?;
     Ok((case, plan))

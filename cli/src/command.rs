@@ -47,6 +47,11 @@ impl Common {
         self.accepting(path, (files, Accepted::Motors))
     }
 
+    /// Opens the case of a machine whose motors are commanded by voltage or current, with all its files.
+    pub fn open_motors(&self, path: &Path) -> Result<Case> {
+        self.whole(path, Accepted::Motors)
+    }
+
     fn whole(&self, path: &Path, accepted: Accepted) -> Result<Case> {
         let case = self.accepting(path, (Files::All, accepted))?;
         case.complete()?;

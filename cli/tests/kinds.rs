@@ -24,6 +24,9 @@ const GANTRIES: [&str; 3] =
 /// Gantries with a controller and moves.
 const IN_LOOP: [&str; 3] = ["stages/h-frame/square.toml", "stages/core-xy/square.toml", "stages/dual-belt/square.toml"];
 
+/// Gantries with a log of both motors.
+const WITH_LOGS: [&str; 2] = ["stages/h-frame/belts.toml", "stages/core-xy/belts.toml"];
+
 /// An axis whose motor is told a position.
 const STEPPER: &str = "stages/stepper-axis/stepper-axis.toml";
 
@@ -49,8 +52,8 @@ const TABLE: &[(&str, &[&str], &str, Ends)] = &[
     ("tune", &["--evaluate"], PID, Runs),
     ("plan", &["--move", "short fast"], PID, Runs),
     ("learn", &["--move", "short fast", "--log", "trial.csv"], SHAPED, YET_TO_COME),
-    ("check", &[], LOGS, YET_TO_COME),
-    ("fit", &[], LOGS, YET_TO_COME),
+    ("check", &[], LOGS, Runs),
+    ("fit", &[], LOGS, Runs),
     ("shape", &[], PID, Runs),
     ("frf", &[], LOGS, YET_TO_COME),
     ("design", &["--for", "cart.mass", "--measure", "motor_current=10mA"], AXIS, YET_TO_COME),
@@ -139,7 +142,28 @@ fn every_kind_goes_through_every_command() {
             taken if WITH_STEPPER.contains(&taken) => run(STEPPER, &Runs),
             _ => run(STEPPER, &NO_MOTOR),
         }
-        let gantries = if ["move", "tune", "plan"].contains(command) { IN_LOOP } else { GANTRIES };
+        let gantries = match *command {
+            "move" | "tune" | "plan" => &IN_LOOP[..],
+            "check" | "fit" => &WITH_LOGS,
+            _ => &GANTRIES,
+        };
         gantries.iter().for_each(|case| run(case, of_gantry));
+    }
+}
+
+#[test]
+fn what_a_fit_tries_on_an_axis_alone_is_refused_for_a_gantry() {
+    let tried = [
+        ("--drift", "single changes are looked for on a single axis"),
+        ("--compare", "friction laws are compared on a single axis"),
+    ];
+    for ((option, words), case) in tried.into_iter().flat_map(|one| WITH_LOGS.map(|case| (one, case))) {
+        let output = taut().args(["fit", option, case]).output().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{option} {case}: {said}");
+        assert!(
+            said.starts_with("error: ") && said.contains(words) && said.contains("next: "),
+            "{option} {case}: {said}"
+        );
     }
 }

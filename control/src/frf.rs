@@ -138,14 +138,14 @@ pub fn estimate(log: &Log, cut: &Cut) -> Result<Vec<Frf>> {
     // Of periods the first is the machine taking up its swing.
     let first = if periodic { length } else { 0 };
     let reference = log.reference.as_deref();
-    let excitation = reference.unwrap_or(&log.input);
+    let excitation = reference.unwrap_or(&log.inputs[0]);
     let mut all = Vec::new();
     for output in log.outputs.iter().filter(|output| !output.absolute) {
         if let Some(place) = output.values.iter().position(|value| !value.is_finite()) {
             return Err(wrong(format!("{} has no value at {:.6} s", output.quantity.name(), log.time[place]))
                 .next("cut the log where values are missing"));
         }
-        let signals = [&log.input[..], &output.values[..], excitation].map(differences);
+        let signals = [&log.inputs[0][..], &output.values[..], excitation].map(differences);
         let [u, y, r] = signals.map(|signal| transforms(&signal, first, length, step, periodic));
         if u.len() < FEWEST {
             return Err(wrong(format!("{} segments of {length} samples", u.len()))
@@ -341,17 +341,7 @@ pub fn measure(case: &Case, cut: &Cut, known: Known) -> Result<Measurement> {
 
 /// True if a quantity is a position or a speed.
 fn is_kinematic(quantity: Quantity) -> bool {
-    match quantity {
-        Quantity::MotorCurrent | Quantity::MotorVoltage | Quantity::CartAcceleration => false,
-        Quantity::DriveAngle
-        | Quantity::DriveSpeed
-        | Quantity::CartPosition
-        | Quantity::CartSpeed
-        | Quantity::IdlerAngle
-        | Quantity::IdlerSpeed
-        | Quantity::RotorAngle
-        | Quantity::RotorSpeed => true,
-    }
+    quantity.is_position() || quantity.is_speed()
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@ mod dual_belt;
 pub mod gantry;
 mod geometry;
 mod kind;
+mod measured;
 mod parts;
 pub mod rigid;
 mod sheet;
@@ -16,6 +17,7 @@ pub use crate::mechanism::{Amplifier, AmplifierMode, GearPlay, Motor, Stepper};
 use crate::polyline::Polyline;
 pub use geometry::{BodyAt, DriveAt, Geometry, Lever, Part, SlideAt, SpanAt};
 pub use kind::Kind;
+pub use measured::Quantity;
 pub use sheet::{BELTS, BeltSheet, BeltType, Rating, SimpleDrive, Width};
 pub use spans::Spans;
 use std::f64::consts::PI;
@@ -395,78 +397,4 @@ pub struct Channel {
     pub noise: f64,
     /// Greatest absolute value that the converter gives; none where it does not clip.
     pub range: Option<f64>,
-}
-
-/// Quantities that can be measured; a recorder takes those up to [`Quantity::CartSpeed`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Quantity {
-    /// Current of the armature, A.
-    MotorCurrent,
-    /// Voltage at the motor, V.
-    MotorVoltage,
-    /// φ₁, rad.
-    DriveAngle,
-    /// φ₁′, rad/s.
-    DriveSpeed,
-    /// x, m.
-    CartPosition,
-    /// x′, m/s.
-    CartSpeed,
-    /// φ₃, rad.
-    IdlerAngle,
-    /// φ₃′, rad/s.
-    IdlerSpeed,
-    /// φ_r, rad: the rotor's, divided by the gear ratio.
-    RotorAngle,
-    /// φ_r′, rad/s.
-    RotorSpeed,
-    /// x″, m/s².
-    CartAcceleration,
-}
-
-impl Quantity {
-    /// All of them, in the order of a log.
-    pub const ALL: [Quantity; 11] = [
-        Quantity::MotorCurrent,
-        Quantity::MotorVoltage,
-        Quantity::DriveAngle,
-        Quantity::DriveSpeed,
-        Quantity::CartPosition,
-        Quantity::CartSpeed,
-        Quantity::IdlerAngle,
-        Quantity::IdlerSpeed,
-        Quantity::RotorAngle,
-        Quantity::RotorSpeed,
-        Quantity::CartAcceleration,
-    ];
-
-    /// Its name, in case files and as a column.
-    pub fn name(self) -> &'static str {
-        match self {
-            Quantity::MotorCurrent => "motor_current",
-            Quantity::MotorVoltage => "motor_voltage",
-            Quantity::DriveAngle => "drive_angle",
-            Quantity::DriveSpeed => "drive_speed",
-            Quantity::CartPosition => "cart_position",
-            Quantity::CartSpeed => "cart_speed",
-            Quantity::IdlerAngle => "idler_angle",
-            Quantity::IdlerSpeed => "idler_speed",
-            Quantity::RotorAngle => "rotor_angle",
-            Quantity::RotorSpeed => "rotor_speed",
-            Quantity::CartAcceleration => "cart_acceleration",
-        }
-    }
-
-    /// Its unit.
-    pub fn unit(self) -> &'static str {
-        match self {
-            Quantity::MotorCurrent => "A",
-            Quantity::MotorVoltage => "V",
-            Quantity::DriveAngle | Quantity::IdlerAngle | Quantity::RotorAngle => "rad",
-            Quantity::DriveSpeed | Quantity::IdlerSpeed | Quantity::RotorSpeed => "rad/s",
-            Quantity::CartPosition => "m",
-            Quantity::CartSpeed => "m/s",
-            Quantity::CartAcceleration => "m/s^2",
-        }
-    }
 }

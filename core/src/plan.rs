@@ -61,11 +61,11 @@ pub struct Log {
     pub file: PathBuf,
     /// Times, s: increasing, not always evenly. Zero is the log's first row, or where its window begins.
     pub time: Vec<f64>,
-    /// The input of the amplifier at those times, V or A before its gain; with any input that was added to it.
-    pub input: Vec<f64>,
-    /// The part of it that was added behind the controller, if the log says so: a known disturbance.
+    /// The input of each drive's amplifier at those times, V or A before its gain; with any input that was added to it.
+    pub inputs: Vec<Vec<f64>>,
+    /// The part of an axis' input that was added behind the controller, if the log says so: a known disturbance.
     pub added: Option<Vec<f64>>,
-    /// The input between them.
+    /// The inputs between them.
     pub hold: Hold,
     /// Logged reference of the cart at those times, m, if there is one.
     pub reference: Option<Vec<f64>>,
@@ -102,9 +102,11 @@ impl Log {
         self.outputs.iter().find(|output| output.quantity == quantity)
     }
 
-    /// The input as a signal, to be fed into a model.
-    pub fn signal(&self) -> Signal {
-        Signal::Sampled { times: self.time.clone(), values: self.input.clone(), hold: self.hold }
+    /// The inputs as signals, to be fed into a model.
+    pub fn signals(&self) -> Vec<Signal> {
+        let signal =
+            |values: &Vec<f64>| Signal::Sampled { times: self.time.clone(), values: values.clone(), hold: self.hold };
+        self.inputs.iter().map(signal).collect()
     }
 
     /// The usual interval between samples, s: the median, which a few gaps do not change.

@@ -201,7 +201,7 @@ pub(crate) fn quantity(bytes: &[u8]) -> Reached {
 fn mappings(file: &Path) -> [Mapping; 4] {
     let named = |time: &str, input: &str, output: (Quantity, &str)| {
         let mut mapping = Mapping::new(file, Source::column(time));
-        mapping.input = Some(Source::column(input));
+        mapping.fed_by(Source::column(input));
         mapping.outputs = vec![(output.0, Source::column(output.1))];
         mapping
     };
@@ -213,7 +213,7 @@ fn mappings(file: &Path) -> [Mapping; 4] {
     let mut numbered = short.clone();
     let number = |k| Source { column: ColumnId::Number(k), ..Source::column("") };
     numbered.time = taut::log::Clock::Column(number(1));
-    numbered.input = Some(number(2));
+    numbered.fed_by(number(2));
     numbered.outputs = vec![(Quantity::CartSpeed, number(3))];
     numbered.dialect = Dialect { separator: None, decimal_comma: true };
     [part, short, long, numbered]
@@ -242,7 +242,7 @@ fn surveyed(log: &Log) {
     static STAGE: OnceLock<Machine> = OnceLock::new();
     let stage = STAGE.get_or_init(|| Case::from_text("axis.toml", TEMPLATE).expect("the template is a case").machine);
     assert!(log.time.windows(2).all(|pair| pair[0] < pair[1]), "times that do not increase");
-    assert!(log.time.iter().chain(&log.input).all(|value| value.is_finite()), "a time or an input is no number");
+    assert!(log.time.iter().chain(&log.inputs[0]).all(|value| value.is_finite()), "a time or an input is no number");
     assert!(log.outputs.iter().all(|output| output.values.len() == log.len()), "columns of different lengths");
     let survey = Survey::new(log, stage);
     assert!(survey.to_string().len() < 1_000_000);

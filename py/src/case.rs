@@ -22,7 +22,7 @@ use taut::frf::{Cut, Known, measure};
 use taut::json;
 use taut::learning::{At, Trial, learn};
 use taut::linear::Analysis;
-use taut::machine::{Channel, Quantity};
+use taut::machine::{Channel, Kind, Quantity};
 use taut::overview::Overview;
 use taut::planning::plan;
 use taut::reach::quickest::Wanted;
@@ -173,7 +173,7 @@ impl Case {
     }
 
     fn check<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let case = self.axis(py)?;
+        let case = &self.inner;
         let plan = case.fit_plan(&self.path).told(py)?;
         let interrupt = Interrupt::listen();
         let watch = &mut |_: &[f64], _: f64| if interrupt.stop() { Flow::Stop } else { Flow::Continue };
@@ -185,7 +185,7 @@ impl Case {
 
     /// Fits, and draws from the posterior if so many draws and chains are asked for.
     fn fit(&self, py: Python<'_>, effort: Option<(usize, usize)>, profiled: bool) -> PyResult<Fit> {
-        let case = self.axis(py)?;
+        let case = &self.inner;
         let plan = case.fit_plan(&self.path).told(py)?;
         let effort = effort.map(|(draws, chains)| Effort { chains, draws, tune: TUNE, seed: plan.seed });
         // Before the fit, which may take long.
@@ -240,8 +240,8 @@ impl Case {
             found.ok_or_else(|| Error::new(format!("there is no input \"{word}\"")).allowed(kinds))
         };
         let channel = |(name, noise): &(String, f64)| {
-            let names = Quantity::ALL.map(Quantity::name).join(", ");
-            let quantity = Quantity::ALL.into_iter().find(|quantity| quantity.name() == name);
+            let names = Quantity::of(Kind::Axis).iter().map(|quantity| quantity.name()).collect::<Vec<_>>().join(", ");
+            let quantity = Quantity::of(Kind::Axis).iter().copied().find(|quantity| quantity.name() == name);
             let quantity = quantity
                 .ok_or_else(|| Error::new(format!("there is no measured quantity \"{name}\"")).allowed(names))?;
             match *noise > 0.0 && noise.is_finite() {
@@ -372,7 +372,7 @@ impl Case {
         laws: Vec<String>,
         windows: Option<Vec<Option<f64>>>,
     ) -> PyResult<(Py<PyAny>, Py<Self>)> {
-        let case = self.axis(py)?;
+        let case = &self.inner;
         let plan = case.fit_plan(&self.path).told(py)?;
         let mut setting = Setting::usual(case, &plan);
         if !laws.is_empty() {
@@ -395,7 +395,7 @@ impl Case {
 
     /// Which single change explains the logs, as JSON.
     fn drift(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
-        let case = self.axis(py)?;
+        let case = &self.inner;
         let plan = case.fit_plan(&self.path).told(py)?;
         let interrupt = Interrupt::listen();
         let stop = || interrupt.stop();

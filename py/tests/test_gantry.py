@@ -176,9 +176,22 @@ def test_a_dual_belt_has_three_drives(root):
 
 def test_what_is_not_there_says_so(gantry):
     assert repr(gantry) == "<taut.Case 'H-frame': one motor, along x, along y>"
-    for refused in (gantry.check, gantry.fit):
-        with pytest.raises(taut.Error, match="this needs a single axis") as told:
-            refused()
-        assert told.value.line == 4
+    with pytest.raises(taut.Error, match="this needs a single axis") as told:
+        gantry.frf()
+    assert told.value.line == 4
     with pytest.raises(taut.Error, match="is of a single axis"):
         gantry.simulate(solver="table3")
+
+
+def test_logs_of_both_motors_are_checked_and_fitted(root):
+    case = taut.read(root / "stages/core-xy/belts.toml")
+    told = case.check()
+    assert told["complete"] and told["regression"] is None and told["experiments"] == []
+    found = case.fit()
+    ratio = (105 + 90) / (120 + 100)
+    low, high = found.data["belts"]["interval_95"]
+    assert found.data["belts"]["looser"] == "right drive" and low < ratio < high < 0.92
+    with pytest.raises(taut.Error, match="friction laws are compared on a single axis"):
+        case.compare()
+    with pytest.raises(taut.Error, match="single changes are looked for on a single axis"):
+        case.drift()

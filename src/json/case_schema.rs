@@ -280,7 +280,7 @@ fn log() -> Value {
         ("units", columns()),
         ("scale", columns()),
         ("offset", columns()),
-        ("absolute", list(words(Quantity::ALL.map(Quantity::name)))),
+        ("absolute", list(words(Quantity::all().map(Quantity::name)))),
         ("where", object(&filter.map(|(name, schema)| (name.to_string(), schema)).into_iter().collect())),
         ("split", column()),
         ("hold", words(["zero", "linear"])),
@@ -288,7 +288,7 @@ fn log() -> Value {
         ("separator", json!({ "type": "string" })),
         ("decimal", words([".", ","])),
     ];
-    own.extend(Quantity::ALL.map(|quantity| (quantity.name(), column())));
+    own.extend(Quantity::all().map(|quantity| (quantity.name(), column())));
     table("experiment.log", &own)
 }
 

@@ -112,7 +112,7 @@ pub fn fit(case: &Case, fit: &Fit, profiles: &[Profile], posterior: Option<Value
                     "held_out": score(output.held_out),
                 })).collect::<Vec<_>>(),
                 "fitted_along": log.extras.iter().map(|(what, value, error)| json!({
-                    "name": what.name(),
+                    "name": what.name(&fit.machine),
                     "value": number(*value),
                     "standard_error": error.map_or(Value::Null, number),
                 })).collect::<Vec<_>>(),
@@ -146,6 +146,13 @@ pub fn fit(case: &Case, fit: &Fit, profiles: &[Profile], posterior: Option<Value
         "variables": fit.variables,
         "parameters": parameters,
         "not_determined": not_determined,
+        "belts": fit.belts().map(|belts| json!({
+            "drives": belts.drives,
+            "stiffness_ratio": number(belts.ratio),
+            "interval_95": belts.interval().map(number),
+            "looser": belts.looser().map(|drive| belts.drives[drive]),
+            "words": belts.words(),
+        })),
         "disagreement": fit.disagreement.as_ref().map(|found| json!({
             "windows": found.windows,
             "length_s": number(found.length),

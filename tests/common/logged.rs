@@ -11,7 +11,7 @@ pub fn columns(name: &str, time: Vec<f64>, input: Vec<f64>, outputs: Vec<Output>
         name: name.into(),
         file: Default::default(),
         time,
-        input,
+        inputs: vec![input],
         added: None,
         hold: Hold::Zero,
         reference: None,

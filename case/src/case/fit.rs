@@ -254,7 +254,7 @@ pub(super) fn plan(root: &Table, stage: &Machine, experiments: &[Experiment], wh
     let closed_loop =
         table.optional("loop").map_or(Ok(false), |field| field.choice(&[("logged", false), ("closed", true)]))?;
     if let (true, Some(field)) = (closed_loop, table.optional("loop")) {
-        closed(&field, &table, root, experiments, nuisance)?;
+        closed(&field, &table, (root, stage), experiments, nuisance)?;
     }
     Ok(Some(Plan {
         bounds: bounds(&table, &seen)?,
@@ -311,7 +311,18 @@ fn campaigns(root: &Table) -> Result<Vec<(String, Vec<String>)>> {
 }
 
 /// Refuses what a loop that is closed again cannot have.
-fn closed(field: &Field, table: &Table, root: &Table, experiments: &[Experiment], nuisance: Nuisances) -> Result<()> {
+fn closed(
+    field: &Field,
+    table: &Table,
+    (root, machine): (&Table, &Machine),
+    experiments: &[Experiment],
+    nuisance: Nuisances,
+) -> Result<()> {
+    if !machine.has_one_coordinate() {
+        return Err(field
+            .fail("a loop is closed again on a single axis only, and this is a gantry")
+            .next("leave out `loop`: the inputs are then those that were logged"));
+    }
     if root.optional("controller").is_none() {
         return Err(field.fail("there is no controller that could close the loop").next("add [controller]"));
     }

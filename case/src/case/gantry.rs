@@ -23,7 +23,7 @@ pub(super) fn no_axis(root: &Table, kind: Kind) -> Error {
     let field = root.optional("kind").unwrap_or_else(|| root.field.clone());
     let what = format!("this needs a single axis, and the case describes a gantry ({})", kind.name());
     field.fail(what).allowed("kind = \"axis\", or no kind at all").next(
-        "`taut simulate`, `taut modes`, `taut move`, `taut tune`, `taut plan`, `taut shape` and `taut sweep` take gantries; fits of them are yet to come",
+        "use `taut simulate`, `taut modes`, `taut check`, `taut fit`, `taut move`, `taut tune`, `taut plan`, `taut shape` or `taut sweep`, which take gantries",
     )
 }
 
@@ -37,15 +37,27 @@ pub(super) fn tables(root: &Table, kind: Kind) -> Result<Vec<&'static str>> {
             }));
         }
     }
-    for key in ["stepper", "measurement", "fit", "uncertainty"] {
+    for key in ["stepper", "measurement"] {
         if let Some(field) = root.optional(key) {
             return Err(field.fail("this is not there yet for a gantry").next("leave it out for now"));
         }
     }
     let drives = kind.geometry().drives.iter().map(|drive| drive.label.key);
     let before = ["title", "kind", "motor", "drive", "amplifier"].into_iter();
-    let behind =
-        ["drive_pulley", "bridge", "cart", "belt", "encoder", "experiment", "controller", "move", "tune", "sweep"];
+    let behind = [
+        "drive_pulley",
+        "bridge",
+        "cart",
+        "belt",
+        "encoder",
+        "experiment",
+        "controller",
+        "move",
+        "fit",
+        "tune",
+        "uncertainty",
+        "sweep",
+    ];
     Ok(before.chain(drives).chain(behind).collect())
 }
 

@@ -5,19 +5,18 @@ use super::files::Folder;
 use super::reader::{Field, Table};
 use super::tree::Kind;
 use crate::error::{Error, Result};
-use crate::log::{Clock, ColumnId, Dialect, Filter, In, Log, Mapping, PRESETS, Preset, Quantity, Source, Unit};
-use crate::machine::{BeltModel, EncoderPlace, Machine};
+use crate::log::{Clock, ColumnId, Dialect, Fed, Filter, In, Log, Mapping, PRESETS, Preset, Quantity, Source, Unit};
+use crate::machine::{self, BeltModel, Machine};
 use crate::parameter::Parameter;
 use crate::quantity::{self, shortest};
 use crate::signal::Hold;
 use std::f64::consts::TAU;
 
-/// Keys of the table beside its quantities.
+/// Keys of the table beside the inputs and quantities of the machine.
 const KEYS: &[&str] = &[
     "file",
     "fetch",
     "preset",
-    "input",
     "added",
     "reference",
     "units",
@@ -40,8 +39,22 @@ pub(super) fn logs(
     driven: bool,
 ) -> Result<Vec<(Option<String>, Log)>> {
     let table = field.table()?;
-    let keys: Vec<&str> = KEYS.iter().copied().chain(Quantity::ALL.map(Quantity::name)).collect();
+    let keys: Vec<&str> = KEYS.iter().copied().chain(columns_of(machine.kind)).collect();
+    let is_of_another =
+        |key: &&str| !keys.contains(key) && machine::Kind::ALL.into_iter().flat_map(columns_of).any(|own| own == *key);
+    if let Some(field) = table.keys().find(is_of_another).and_then(|key| table.optional(key)) {
+        let what = format!("the log of this machine ({}) has no `{}`", machine.kind.name(), field.key());
+        return Err(field.fail(what).allowed(columns_of(machine.kind).collect::<Vec<_>>().join(", ")));
+    }
     table.check_keys(&keys, &[])?;
+    if let Some(field) = ["preset", "added", "reference"].iter().find_map(|key| table.optional(key))
+        && !machine.has_one_coordinate()
+    {
+        return Err(field.fail("this is for the log of a single axis").next(match field.key() {
+            "preset" => "name the columns of the gantry's drives: left_input, right_input, left_angle and so on",
+            _ => "leave it out: fits of gantries take the inputs as they were logged",
+        }));
+    }
     let file = table.required("file", "file = \"...\" with the path of the log")?;
     let path = folder.name(&file)?;
     let fetch = table.optional("fetch").map(|field| field.text()).transpose()?;
@@ -59,9 +72,9 @@ pub(super) fn logs(
     columns.retain(|(key, ..)| *key != "input" || !driven);
     let sources = Sources::new(&table, columns, machine)?;
 
-    let input = input(field, &table, &sources, driven)?;
+    let inputs = inputs(field, &table, &sources, driven)?;
     let added = sources.source("added", field.input_unit)?;
-    if let (Some(_), None, Some(field)) = (&added, &input, table.optional("added")) {
+    if let (Some(_), true, Some(field)) = (&added, inputs.is_empty(), table.optional("added")) {
         return Err(field
             .fail("there is no logged input that this could be added to")
             .next("name the column of the controller's output: input = \"...\""));
@@ -84,8 +97,7 @@ pub(super) fn logs(
     let mapping = Mapping {
         file: path.clone(),
         time,
-        input,
-        input_unit: field.input_unit,
+        inputs,
         hold_missing: word("missing_input", &[("refuse", false), ("hold", true)])?,
         absolute: absolute(&table, &outputs)?,
         outputs,
@@ -102,31 +114,41 @@ pub(super) fn logs(
     folder.read(&file, &path, || mapping.read()).map_err(missing)
 }
 
-/// The column of the input, unless the experiment has one of its own.
-fn input(field: &Field, table: &Table, sources: &Sources, driven: bool) -> Result<Option<Source>> {
-    let input = sources.source("input", field.input_unit)?;
-    match (&input, driven) {
-        (None, false) => {
-            return Err(table.missing(
-                "input",
-                "input = \"...\" with the name of the input's column; or an input to the experiment",
-            ));
+/// Keys of the columns that a log of this kind of machine can name, without time: inputs of the drives, then quantities.
+fn columns_of(kind: machine::Kind) -> impl Iterator<Item = &'static str> + Clone {
+    let inputs = kind.geometry().drives.iter().map(|drive| drive.input);
+    inputs.chain(Quantity::of(kind).iter().map(|quantity| quantity.name()))
+}
+
+/// The column of each drive's input, unless the experiment has inputs of its own.
+fn inputs(field: &Field, table: &Table, sources: &Sources, driven: bool) -> Result<Vec<Fed>> {
+    let mut inputs = Vec::new();
+    for (at, drive) in sources.machine.geometry().drives.iter().zip(&sources.machine.drives) {
+        let unit = drive.amplifier.mode.unit();
+        match (sources.source(at.input, unit)?, driven) {
+            (None, false) => {
+                let key = at.input;
+                let wanted =
+                    format!("{key} = \"...\" with the name of the input's column; or an input to the experiment");
+                return Err(table.missing(key, &wanted));
+            }
+            (Some(_), true) => {
+                let field = table.optional(at.input).unwrap_or_else(|| field.clone());
+                return Err(field
+                    .fail("the experiment has an input already")
+                    .next("leave out one of them: the logged input or the experiment's own"));
+            }
+            (Some(source), false) => inputs.push(Fed { key: at.input, unit, source }),
+            (None, true) => {}
         }
-        (Some(_), true) => {
-            let field = table.optional("input").unwrap_or_else(|| field.clone());
-            return Err(field
-                .fail("the experiment has an input already")
-                .next("leave out one of them: the logged input or the experiment's own"));
-        }
-        _ => {}
     }
-    Ok(input)
+    Ok(inputs)
 }
 
 /// The columns of what was measured; at least one.
 fn outputs(field: &Field, table: &Table, sources: &Sources) -> Result<Vec<(Quantity, Source)>> {
     let mut outputs = Vec::new();
-    for quantity in Quantity::ALL {
+    for &quantity in sources.machine.quantities() {
         if quantity == Quantity::CartAcceleration
             && sources.machine.belt.model == BeltModel::Rigid
             && sources.is_named(quantity.name())
@@ -139,11 +161,12 @@ fn outputs(field: &Field, table: &Table, sources: &Sources) -> Result<Vec<(Quant
         outputs.extend(sources.source(quantity.name(), quantity.unit())?.map(|source| (quantity, source)));
     }
     if outputs.is_empty() {
-        let names: Vec<&str> = Quantity::ALL.iter().map(|quantity| quantity.name()).collect();
+        let names: Vec<&str> = sources.machine.quantities().iter().map(|quantity| quantity.name()).collect();
+        let such_as = if sources.machine.has_one_coordinate() { "drive_angle" } else { "left_angle" };
         return Err(field
             .fail("nothing measured is named")
             .allowed(names.join(", "))
-            .next("add for example drive_angle = \"...\" with the name of its column"));
+            .next(format!("add for example {such_as} = \"...\" with the name of its column")));
     }
     Ok(outputs)
 }
@@ -173,7 +196,7 @@ impl<'a> Sources<'a> {
         let (units, scale, offset) = (part("units")?, part("scale")?, part("offset")?);
         let sources = Self { units, scale, offset, table, columns: known, machine, steps_per_turn };
         for part in [&sources.units, &sources.scale, &sources.offset].into_iter().flatten() {
-            let columns = ["time", "input", "added", "reference"].into_iter().chain(Quantity::ALL.map(Quantity::name));
+            let columns = ["time", "added", "reference"].into_iter().chain(columns_of(machine.kind));
             let named: Vec<&'static str> = columns.clone().filter(|key| sources.is_named(key)).collect();
             // A quantity without a column, rather than a word that is none.
             let other = part.keys().find(|key| !named.contains(key) && columns.clone().any(|column| column == *key));
@@ -258,11 +281,7 @@ impl<'a> Sources<'a> {
                 .fail("there is no encoder whose counts these could be")
                 .next("add [encoder] with at and lines"));
         };
-        let counted: &[&str] = match encoder.at {
-            EncoderPlace::Motor => &["drive_angle", "rotor_angle"],
-            EncoderPlace::DrivePulley => &["drive_angle"],
-            EncoderPlace::Cart => &["cart_position"],
-        };
+        let counted: Vec<&str> = self.machine.counted().map(Quantity::name).collect();
         if !counted.contains(&field.key()) {
             let at = counted.join(" or ");
             return Err(field

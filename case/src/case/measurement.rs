@@ -15,7 +15,7 @@ pub(super) fn measurement(root: &Table, machine: &Machine, experiments: &[Experi
     let table = field.table()?;
     table.check_keys(&[], &[])?;
     let mut channels = Vec::new();
-    for quantity in Quantity::ALL {
+    for &quantity in machine.quantities() {
         if let Some(field) = table.optional(quantity.name()) {
             channels.push(channel(&field, quantity, machine)?);
         }
@@ -48,7 +48,8 @@ fn channel(field: &Field, quantity: Quantity, machine: &Machine) -> Result<Chann
     });
     if counted == Some(quantity) {
         let others = parameter::names_in("measurement");
-        let others = Quantity::ALL.iter().map(|q| q.name()).filter(|q| *q != quantity.name() && others.contains(q));
+        let others =
+            machine.quantities().iter().map(|q| q.name()).filter(|q| *q != quantity.name() && others.contains(q));
         return Err(field
             .fail("the encoder gives this quantity already")
             .allowed(others.collect::<Vec<_>>().join(", "))

@@ -44,6 +44,7 @@ use crate::machine::axis::{CART, LABELS};
 use crate::machine::{Kind, Machine, Measurement};
 use crate::mechanism::State;
 use crate::reach::feasible::Shortfall;
+use crate::signal::Signal;
 use files::Folder;
 use reader::{Field, Table};
 use std::collections::HashMap;
@@ -382,53 +383,52 @@ fn unique(field: &Field, name: &str, files: &mut HashMap<String, String>) -> Res
 fn experiment(field: &Field, machine: &Machine, folder: &Folder) -> Result<Vec<Experiment>> {
     let field = Field { input_unit: machine.drives[0].amplifier.mode.unit(), ..field.clone() };
     let table = field.table()?;
-    let one_drive = machine.drives.len() == 1;
-    match one_drive {
-        true => table.check_keys(&["name", "input", "log", "campaign"], &[])?,
-        false => table.check_keys(&["name", "input"], &["log"])?,
-    }
+    table.check_keys(&["name", "input", "log", "campaign"], &[])?;
     let name = named(&table)?;
     if let Some(log) = table.optional("log").filter(|_| machine.stepper().is_some()) {
         return Err(log.fail("logs of a stepper are not read yet").next("leave it out, and give the input"));
     }
-    let Some(log) = table.optional("log").filter(|_| one_drive) else {
+    let Some(log) = table.optional("log") else {
         let (until, every) = times(&table, None)?;
-        let context = input::Context { folder, until };
-        let (inputs, initial) = match one_drive {
-            false => (gantry::inputs(&table, machine, &context)?, initial(&table, machine)?),
-            true => {
-                let unit = field.input_unit;
-                let such_as = match unit {
-                    "m" => "for example input = { ramp = \"100 mm\", over = \"1 s\" }".into(),
-                    _ => format!("for example input = {{ pulse = \"5 {unit}\", for = \"0.25 s\" }}"),
-                };
-                let field = table.required("input", &such_as)?;
-                let signal = input::signal(&field, &context)?;
-                let initial = initial(&table, machine)?;
-                if machine.stepper().is_some() {
-                    stepper::check_command(&field, machine, &signal, (&initial, until))?;
-                }
-                (vec![signal], initial)
-            }
-        };
+        let inputs = inputs(&table, machine, &input::Context { folder, until })?;
+        let initial = initial(&table, machine)?;
+        if machine.stepper().is_some()
+            && let Some(field) = table.optional("input")
+        {
+            stepper::check_command(&field, machine, &inputs[0], (&initial, until))?;
+        }
         return Ok(vec![Experiment { name, inputs, until, every, initial, log: None }]);
     };
-    let (initial, input) = (initial(&table, machine)?, table.optional("input"));
-    let runs = log::logs(&log, machine, folder, input.is_some())?;
+    let (initial, driven) = (initial(&table, machine)?, table.optional("input").is_some());
+    let runs = log::logs(&log, machine, folder, driven)?;
     let of_run = |(run, mut log): (Option<String>, Log)| {
         let (until, every) = times(&table, Some(&log))?;
-        let input = match &input {
-            Some(field) => {
-                let signal = input::signal(field, &input::Context { folder, until })?;
-                log.input = log.time.iter().map(|&t| signal.value(t)).collect();
-                signal
+        let inputs = match driven {
+            true => {
+                let signals = inputs(&table, machine, &input::Context { folder, until })?;
+                let values = |signal: &Signal| log.time.iter().map(|&t| signal.value(t)).collect();
+                log.inputs = signals.iter().map(values).collect();
+                signals
             }
-            None => log.signal(),
+            false => log.signals(),
         };
         log.name = run.map_or(name.clone(), |run| format!("{name}/{run}"));
-        Ok(Experiment { name: log.name.clone(), inputs: vec![input], until, every, initial, log: Some(Arc::new(log)) })
+        Ok(Experiment { name: log.name.clone(), inputs, until, every, initial, log: Some(Arc::new(log)) })
     };
     runs.into_iter().map(of_run).collect()
+}
+
+/// The input of each drive of an experiment.
+fn inputs(table: &Table, machine: &Machine, context: &input::Context) -> Result<Vec<Signal>> {
+    if machine.drives.len() > 1 {
+        return gantry::inputs(table, machine, context);
+    }
+    let unit = machine.drives[0].amplifier.mode.unit();
+    let such_as = match unit {
+        "m" => "for example input = { ramp = \"100 mm\", over = \"1 s\" }".into(),
+        _ => format!("for example input = {{ pulse = \"5 {unit}\", for = \"0.25 s\" }}"),
+    };
+    Ok(vec![input::signal(&table.required("input", &such_as)?, context)?])
 }
 
 /// `until` and `every`; those of the log where the table does not say.

@@ -121,7 +121,7 @@ fn of_preset(preset: &'static Preset, file: &Path, columns: &[Seen]) -> Option<G
         };
         known.push((key, place(&id)?, unit));
     }
-    let is_measured = |key: &str| Quantity::ALL.iter().any(|quantity| quantity.name() == key);
+    let is_measured = |key: &str| Quantity::all().any(|quantity| quantity.name() == key);
     let found = known.iter().any(|(key, ..)| is_measured(key)) && known.iter().any(|(key, ..)| *key == "time");
     found.then_some(Guess { preset: Some(preset.name), columns: known, split: None })
 }
@@ -137,7 +137,7 @@ fn by_name(columns: &[Seen]) -> Guess {
         let wanted = match *key {
             "input" => "V",
             "reference" => "m",
-            key => Quantity::ALL.iter().find(|quantity| quantity.name() == key).map_or("", |one| one.unit()),
+            key => Quantity::all().find(|quantity| quantity.name() == key).map_or("", |one| one.unit()),
         };
         let free = |place: &usize| !guess.columns.iter().any(|(_, taken, _)| taken == place);
         let ranked = (0..columns.len()).filter(free).filter_map(|place| {

@@ -18,7 +18,7 @@ const MOST_RUNS: usize = 1000;
 /// ```no_run
 /// use taut::log::{Mapping, Quantity, Source};
 /// let mut mapping = Mapping::new("pulse5.csv", Source::column("time_s"));
-/// mapping.input = Some(Source::column("voltage_V"));
+/// mapping.fed_by(Source::column("voltage_V"));
 /// mapping.outputs = vec![(Quantity::DriveAngle, Source::column("angle_deg").unit("deg"))];
 /// let (_, log) = mapping.read()?.remove(0);
 /// println!("{} samples in {} s", log.len(), log.time.last().unwrap());
@@ -30,10 +30,9 @@ pub struct Mapping {
     pub file: PathBuf,
     /// When the samples were taken.
     pub time: Clock,
-    /// The column of what was fed into the amplifier, unless it is known otherwise.
-    pub input: Option<Source>,
-    /// Unit of the input, V or A.
-    pub input_unit: &'static str,
+    /// The columns of what was fed into the drives' amplifiers, with their keys and units, V or A; no columns, and zeros in the
+    /// log, where the inputs are known otherwise.
+    pub inputs: Vec<Fed>,
     /// True if an input that is missing is the one before it; otherwise it is an error.
     pub hold_missing: bool,
     /// The column of what was added to the input behind the controller.
@@ -58,6 +57,17 @@ pub struct Mapping {
     pub dialect: Dialect,
     /// The recorder that made the file, where it says more of it than its columns.
     pub preset: Option<&'static Preset>,
+}
+
+/// The column of a drive's input.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Fed {
+    /// Its key in the table of a log: `input` of an axis.
+    pub key: &'static str,
+    /// Unit of the input, V or A.
+    pub unit: &'static str,
+    /// Its column.
+    pub source: Source,
 }
 
 /// When samples were taken.
@@ -107,7 +117,7 @@ impl Source {
 #[derive(Clone, Copy)]
 enum Role {
     Time,
-    Input(&'static str),
+    Input { key: &'static str, unit: &'static str },
     Added(&'static str),
     Reference,
     Output(Quantity),
@@ -117,7 +127,7 @@ impl Role {
     fn key(self) -> &'static str {
         match self {
             Role::Time => "time",
-            Role::Input(_) => "input",
+            Role::Input { key, .. } => key,
             Role::Added(_) => "added",
             Role::Reference => "reference",
             Role::Output(quantity) => quantity.name(),
@@ -127,7 +137,7 @@ impl Role {
     fn unit(self) -> &'static str {
         match self {
             Role::Time => "s",
-            Role::Input(unit) | Role::Added(unit) => unit,
+            Role::Input { unit, .. } | Role::Added(unit) => unit,
             Role::Reference => "m",
             Role::Output(quantity) => quantity.unit(),
         }
@@ -148,8 +158,7 @@ impl Mapping {
         Self {
             file: file.into(),
             time: Clock::Column(time),
-            input: None,
-            input_unit: "V",
+            inputs: Vec::new(),
             hold_missing: false,
             added: None,
             reference: None,
@@ -165,6 +174,11 @@ impl Mapping {
         }
     }
 
+    /// The column of an axis' input, V, in place of any before.
+    pub fn fed_by(&mut self, source: Source) {
+        self.inputs = vec![Fed { key: "input", unit: "V", source }];
+    }
+
     /// True if the numbers in the first column have to increase from the first row to the last.
     fn is_ordered(&self) -> bool {
         let increases = matches!(&self.time, Clock::Column(time) if time.scale > 0.0);
@@ -178,8 +192,10 @@ impl Mapping {
             sources.push((Role::Time, source));
         }
         let complete = sources.len();
-        sources.extend(self.input.iter().map(|source| (Role::Input(self.input_unit), source)));
-        sources.extend(self.added.iter().map(|source| (Role::Added(self.input_unit), source)));
+        let role = |fed: &Fed| Role::Input { key: fed.key, unit: fed.unit };
+        sources.extend(self.inputs.iter().map(|fed| (role(fed), &fed.source)));
+        let unit = self.inputs.first().map_or("V", |fed| fed.unit);
+        sources.extend(self.added.iter().map(|source| (Role::Added(unit), source)));
         sources.extend(self.reference.iter().map(|source| (Role::Reference, source)));
         sources.extend(self.outputs.iter().map(|(quantity, source)| (Role::Output(*quantity), source)));
         let ids: Vec<ColumnId> = sources.iter().map(|(_, source)| source.column.clone()).collect();
@@ -314,7 +330,7 @@ impl Columns<'_> {
             name: String::new(),
             file: mapping.file.clone(),
             time: time_from_start,
-            input: vec![0.0; within.len()],
+            inputs: Vec::new(),
             added: None,
             hold: mapping.hold,
             reference: None,
@@ -327,19 +343,28 @@ impl Columns<'_> {
         if let Some(i) = self.roles.iter().position(|role| matches!(role, Role::Added(_))) {
             log.added = Some(self.inputs(i, &rows, &within)?);
         }
-        if let Some(i) = self.roles.iter().position(|role| matches!(role, Role::Input(_))) {
-            log.input = self.inputs(i, &rows, &within)?;
-            for (input, added) in log.input.iter_mut().zip(log.added.iter().flatten()) {
+        let fed: Vec<usize> = (0..self.roles.len()).filter(|i| matches!(self.roles[*i], Role::Input { .. })).collect();
+        for &i in &fed {
+            let mut input = self.inputs(i, &rows, &within)?;
+            for (input, added) in input.iter_mut().zip(log.added.iter().flatten()) {
                 *input += added;
             }
-            // A window that begins between two rows begins with the input of that moment, when nothing was seen.
-            if let (Some(held), true) = (self.held(i, &rows, &within), log.time[0] > 0.0) {
+            log.inputs.push(input);
+        }
+        if fed.is_empty() {
+            log.inputs.push(vec![0.0; within.len()]);
+        } else if log.time[0] > 0.0 {
+            // A window that begins between two rows begins with the inputs of that moment, when nothing was seen.
+            let held: Option<Vec<f64>> = fed.iter().map(|&i| self.held(i, &rows, &within)).collect();
+            if let Some(held) = held {
                 let before = time[window.start - 1] - start;
                 let share = match mapping.hold {
                     Hold::Zero => 0.0,
                     Hold::Linear => before / (before - log.time[0]),
                 };
-                log.input.insert(0, held + share * (log.input[0] - held));
+                for (input, held) in log.inputs.iter_mut().zip(held) {
+                    input.insert(0, held + share * (input[0] - held));
+                }
                 log.time.insert(0, 0.0);
                 log.reference.iter_mut().for_each(|reference| reference.insert(0, reference[0]));
                 log.added.iter_mut().for_each(|added| added.insert(0, added[0]));
@@ -434,13 +459,13 @@ impl Columns<'_> {
 
     /// The rows between `from` and `to`, counted within the run.
     fn window(&self, time: &[f64], zero: f64, rows: &Range<usize>, run: Option<&Run>) -> Result<Range<usize>> {
-        let &Mapping { from, to, ref input, ref file, .. } = self.mapping;
+        let &Mapping { from, to, ref inputs, ref file, .. } = self.mapping;
         let fail = |what: String| Error::new(what).in_file(file);
         let (first, last) = (time.first().copied().unwrap_or_default(), time.last().copied().unwrap_or_default());
         let [first, last] = [first - zero, last - zero];
         let of = run.map(|run| format!("the run {}", shown(&run.label))).unwrap_or("the log".into());
         let extent = format!("from {} to {}", show(first, "s"), show(last, "s"));
-        if let Some(from) = from.filter(|&from| from < first && input.is_some()) {
+        if let Some(from) = from.filter(|&from| from < first && !inputs.is_empty()) {
             let what = format!(
                 "{of} begins at {}; what was fed in from {} on is not known",
                 show(first, "s"),

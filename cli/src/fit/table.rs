@@ -43,6 +43,9 @@ pub fn text(case: &Case, found: &Found, took: Duration) -> String {
             "  among the machines that fit equally well, fitted.toml is the one nearest to the case file"
         );
     }
+    if let Some(belts) = fit.belts() {
+        let _ = write!(text, "\n{}\n  {}\n", bold("Belts"), belts.words());
+    }
     let names = crooked(&found.profiles);
     if !names.is_empty() {
         let _ = writeln!(

@@ -50,6 +50,7 @@ pub(super) static AXIS: Geometry = Geometry {
         rotor: Label { key: "rotor", name: "rotor" },
         key: "",
         prefix: "",
+        input: "input",
     }],
     bodies: &[
         BodyAt { label: LABELS[DRIVE], part: Part::DrivePulley, by_slides: &[1.0] },

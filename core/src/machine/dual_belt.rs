@@ -43,6 +43,7 @@ const CART_DRIVE: DriveAt = DriveAt {
     rotor: Label { key: "cart_rotor", name: "cart rotor" },
     key: "cart_drive.",
     prefix: "cart_",
+    input: "cart_input",
 };
 
 /// A span: its arms, how its own length follows what slides, and its stretch by those of the spans that run out.

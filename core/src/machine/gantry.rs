@@ -44,6 +44,7 @@ pub(super) const LEFT_DRIVE: DriveAt = DriveAt {
     rotor: Label { key: "left_rotor", name: "left rotor" },
     key: "left_drive.",
     prefix: "left_",
+    input: "left_input",
 };
 
 /// The drive on the right.
@@ -57,6 +58,7 @@ pub(super) const RIGHT_DRIVE: DriveAt = DriveAt {
     rotor: Label { key: "right_rotor", name: "right rotor" },
     key: "right_drive.",
     prefix: "right_",
+    input: "right_input",
 };
 
 const DRIVES: [DriveAt; 2] = [LEFT_DRIVE, RIGHT_DRIVE];

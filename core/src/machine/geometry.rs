@@ -42,6 +42,8 @@ pub struct DriveAt {
     pub key: &'static str,
     /// Prefix of an axis' column: `left_`. Without the line it is its input's name.
     pub prefix: &'static str,
+    /// Key of the column of its input in a log.
+    pub input: &'static str,
 }
 
 /// A body.
@@ -150,6 +152,17 @@ impl Geometry {
     /// The body of the cart.
     pub fn cart(&self) -> usize {
         self.slides[self.slides.len() - 1].body
+    }
+
+    /// The spans that only this drive pulls at: those of its own belt, or of its side of a common one.
+    pub fn spans_of(&self, drive: usize) -> impl Iterator<Item = usize> {
+        let is_pulley = |body: usize| self.drives.iter().any(|drive| drive.pulley == body);
+        let own = self.drives[drive].pulley;
+        let is_own = move |span: &SpanAt| {
+            let mut pulleys = span.arms.iter().map(|(body, _)| *body).filter(|body| is_pulley(*body)).peekable();
+            pulleys.peek().is_some() && pulleys.all(|pulley| pulley == own)
+        };
+        self.spans.iter().enumerate().filter(move |(_, span)| is_own(span)).map(|(index, _)| index)
     }
 
     /// The spans whose stretches tell by how much all drives are off, and from which those of all spans follow.

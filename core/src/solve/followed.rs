@@ -24,11 +24,18 @@ pub enum Variable {
         /// w₀, w₁, w₂
         weights: [f64; 3],
     },
-    /// All changes of the input come later by so many seconds per unit of it. Where one falls on a row, the derivative
+    /// All changes of all inputs come later by so many seconds per unit of it. Where one falls on a row, the derivative
     /// is that towards later ones.
     Delay(f64),
-    /// So much is added to the input per unit of it, from the time on, s, at which the input begins.
-    Offset(f64, f64),
+    /// So much is added to the input of a drive per unit of it, from the time on, s, at which the input begins.
+    Offset {
+        /// The drive.
+        drive: usize,
+        /// What is added per unit of the variable.
+        unit: f64,
+        /// From then on, s.
+        from: f64,
+    },
 }
 
 impl Variable {

@@ -63,6 +63,7 @@ impl Bench {
 impl Task<'_> {
     /// Where what stands in the solver's vector of a mechanism.
     pub(super) fn space(&self, mechanism: &Mechanism) -> super::exact::Space {
-        super::exact::Space::new(mechanism, self.experiment.inputs[0].degree())
+        let degree = self.experiment.inputs.iter().map(|input| input.degree()).max().unwrap_or(0);
+        super::exact::Space::new(mechanism, degree)
     }
 }

@@ -403,6 +403,22 @@ pub(crate) const MOST_SWEEPS: usize = 10_000;
 /// Unit: 1. Source: chosen. Test: `ratios_are_told_where_a_gain_is_free`.
 pub(crate) const WHOLE_POWER: f64 = 0.03;
 
+/// Residuals within this multiple of the noise end the search for a start.
+///
+/// Unit: 1. Source: chosen: the noise is by third differences, and is not known to a few per cent.
+pub(crate) const MORE_THAN_NOISE: f64 = 1.2;
+
+/// Lengths of the windows that a search of a machine with several coordinates begins in, one after the other.
+///
+/// Unit: samples. Source: chosen: from a few swings of a belt to some ten, in logs that show them. Test:
+/// `belts_are_found_from_a_stiffness_that_is_far_off`.
+pub(crate) const START_WINDOWS: [f64; 3] = [20.0, 60.0, 180.0];
+
+/// Most windows that a search begins in; longer logs have longer ones.
+///
+/// Unit: windows. Source: chosen: each has a start of its own, and the work grows with their square.
+pub(crate) const MOST_START_WINDOWS: f64 = 60.0;
+
 /// Least number of windows that are compared with the whole logs.
 ///
 /// Unit: windows. Source: chosen.

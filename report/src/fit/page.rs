@@ -78,6 +78,9 @@ fn parameters(page: &mut Page, fit: &Fit) {
         rows.row([estimate.name.clone(), value, error, interval, start].map(Cell::from));
     }
     page.table(&rows);
+    if let Some(belts) = fit.belts() {
+        page.prose(format!("Belts: {}.", belts.words()));
+    }
 }
 
 fn profiles(page: &mut Page, profiles: &[Profile]) {

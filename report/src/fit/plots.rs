@@ -349,7 +349,7 @@ mod tests {
             window: 0,
             held_out: held,
             time: Vec::new(),
-            input: Vec::new(),
+            inputs: vec![Vec::new()],
             fitted_rows: 0,
             outputs: vec![output(Quantity::DriveAngle, angle), output(Quantity::MotorCurrent, current)],
             extras: Vec::new(),

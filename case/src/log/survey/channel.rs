@@ -2,7 +2,7 @@
 
 use super::super::{Output, Quantity};
 use super::timing::{GAP, Timing};
-use super::{Note, Remedy, Severity, is_position, median, percent, quantile, shown};
+use super::{Note, Remedy, Severity, median, percent, quantile, shown};
 
 /// Unit of an acceleration, which jumps by its nature.
 const ACCELERATION: &str = "m/s^2";
@@ -33,7 +33,7 @@ const MOST_SWITCHED: usize = 30;
 /// One column of a log.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Channel {
-    /// `input`, or the quantity's name.
+    /// Key of a drive's input in a log, or the quantity's name.
     pub name: &'static str,
     /// Its unit.
     pub unit: &'static str,
@@ -172,8 +172,13 @@ impl Channel {
         jumps.filter(|jump| (jump - turn).abs() < 0.1 * turn && *jump > 5.0 * usual).count()
     }
 
+    /// True if it is the input of a drive.
+    fn is_input(&self) -> bool {
+        self.name.ends_with("input")
+    }
+
     fn is_position(&self) -> bool {
-        Quantity::ALL.iter().any(|quantity| quantity.name() == self.name && is_position(*quantity))
+        Quantity::all().any(|quantity| quantity.name() == self.name && quantity.is_position())
     }
 
     /// Runs of equal values of a position that moves on both sides of them, and whose next value is where the motion
@@ -244,7 +249,7 @@ impl Channel {
 
     /// Single samples that are far from both neighbours, on the same side.
     fn find_outliers(&self, values: &[f64], time: &[f64]) -> Vec<Outlier> {
-        if self.name == "input" || self.unit == ACCELERATION || values.len() < 10 {
+        if self.is_input() || self.unit == ACCELERATION || values.len() < 10 {
             return Vec::new();
         }
         let off = |k: usize| values[k] - 0.5 * (values[k - 1] + values[k + 1]);
@@ -268,7 +273,7 @@ impl Channel {
     /// The longest run at each extreme that was reached abruptly.
     fn find_clipped(&self, values: &[f64], time: &[f64]) -> Vec<Clipped> {
         const REACH: usize = 5;
-        if self.name == "input" {
+        if self.is_input() {
             return self.find_flat(values, time);
         }
         if self.levels < 10 || values.len() <= REACH {
@@ -319,7 +324,7 @@ impl Channel {
         if let Some(step) = self.step {
             line += &format!(", in steps of {}", shown(step, self.unit));
         }
-        if self.name != "input" && self.noise > 1e-4 * self.span() {
+        if !self.is_input() && self.noise > 1e-4 * self.span() {
             line += &format!(", noise {}", shown(self.noise, self.unit));
         }
         line
@@ -358,7 +363,7 @@ impl Channel {
         }
         for &Clipped { value: limit, at, samples } in &self.clipped {
             let what = match output {
-                Some(output) if is_position(output.quantity) => "an end stop, or the end of its sensor",
+                Some(output) if output.quantity.is_position() => "an end stop, or the end of its sensor",
                 Some(_) => "the limit of its sensor, perhaps",
                 None => "it was limited there, and what was logged may not be what the motor had",
             };

@@ -15,7 +15,7 @@ pub use motion::{Motion, Steady};
 pub use remedy::Remedy;
 pub use timing::{Gap, Timing};
 
-use super::{Log, Quantity};
+use super::Log;
 use crate::machine::Machine;
 use crate::number::engineering_typed;
 use std::fmt;
@@ -27,7 +27,7 @@ pub struct Survey {
     pub log: String,
     /// Its clock.
     pub timing: Timing,
-    /// The input, then the outputs.
+    /// The input of each drive, then the outputs.
     pub channels: Vec<Channel>,
     /// The motion; none where nothing that was measured is a motion.
     pub motion: Option<Motion>,
@@ -42,7 +42,7 @@ pub struct Note {
     pub code: &'static str,
     /// How much it matters.
     pub severity: Severity,
-    /// The column it is about: `input` or a quantity's name; none if it is about all.
+    /// The column it is about: the key of a drive's input or a quantity's name; none if it is about all.
     pub column: Option<&'static str>,
     /// The finding, in a sentence with numbers, and what to do.
     pub text: String,
@@ -84,8 +84,8 @@ impl Survey {
     /// let time: Vec<f64> = (0..500).map(|k| f64::from(k) * 1e-3).collect();
     /// let values = time.iter().map(|t| 224.0 * (t - 0.01 * (1.0 - (-t / 0.01).exp()))).collect();
     /// let position = Output { quantity: Quantity::CartPosition, absolute: false, values };
-    /// let input = vec![5.0; 500];
-    /// let log = Log { name: "5 V".into(), file: "log.csv".into(), time, input, added: None, hold: Hold::Zero,
+    /// let inputs = vec![vec![5.0; 500]];
+    /// let log = Log { name: "5 V".into(), file: "log.csv".into(), time, inputs, added: None, hold: Hold::Zero,
     ///     reference: None, outputs: vec![position], ended: None };
     /// let survey = Survey::new(&log, &stage);
     /// assert!(survey.has("unit"));
@@ -93,7 +93,10 @@ impl Survey {
     /// ```
     pub fn new(log: &Log, machine: &Machine) -> Self {
         let timing = Timing::new(&log.time);
-        let mut channels = vec![Channel::new("input", units::input_unit(machine), &log.input, &log.time)];
+        let drives = machine.geometry().drives.iter().zip(&machine.drives).zip(&log.inputs);
+        let mut channels: Vec<Channel> = drives
+            .map(|((at, unit), values)| Channel::new(at.input, unit.amplifier.mode.unit(), values, &log.time))
+            .collect();
         for output in &log.outputs {
             channels.push(Channel::new(output.quantity.name(), output.quantity.unit(), &output.values, &log.time));
         }
@@ -104,11 +107,11 @@ impl Survey {
             Note::new("ended", Severity::Warning, text)
         }));
         for (k, channel) in channels.iter().enumerate() {
-            let output = k.checked_sub(1).map(|k| &log.outputs[k]);
+            let output = k.checked_sub(log.inputs.len()).map(|k| &log.outputs[k]);
             notes.extend(channel.notes(output, &timing));
         }
         match &motion {
-            Some(motion) => notes.extend(motion.notes()),
+            Some(motion) => notes.extend(motion.notes(log.inputs.len())),
             None => notes.push(Note::new(
                 "no-motion",
                 Severity::Warning,
@@ -126,7 +129,7 @@ impl Survey {
         self.notes.iter().any(|note| note.code == code)
     }
 
-    /// The channel called `input`, or as a quantity.
+    /// The channel called as a drive's input or as a quantity.
     pub fn channel(&self, name: &str) -> Option<&Channel> {
         self.channels.iter().find(|channel| channel.name == name)
     }
@@ -197,14 +200,4 @@ fn quantile(values: &[f64], share: f64) -> f64 {
     }
     let k = ((values.len() - 1) as f64 * share).round() as usize;
     *values.select_nth_unstable_by(k, f64::total_cmp).1
-}
-
-fn is_speed(quantity: Quantity) -> bool {
-    use Quantity::{CartSpeed, DriveSpeed, IdlerSpeed, RotorSpeed};
-    matches!(quantity, CartSpeed | DriveSpeed | IdlerSpeed | RotorSpeed)
-}
-
-fn is_position(quantity: Quantity) -> bool {
-    use Quantity::{CartPosition, DriveAngle, IdlerAngle, RotorAngle};
-    matches!(quantity, CartPosition | DriveAngle | IdlerAngle | RotorAngle)
 }

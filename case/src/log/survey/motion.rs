@@ -1,9 +1,9 @@
 //! The motion in a log: rest, reversals, steady speeds.
 
-use super::super::{Log, Quantity};
+use super::super::{Log, Output, Quantity};
 use super::channel::Channel;
 use super::timing::Timing;
-use super::{Note, Severity, is_position, is_speed, median, quantile, shown};
+use super::{Note, Severity, median, quantile, shown};
 
 /// A speed below this share of the largest is rest, as far as reversals go.
 const SLOW: f64 = 0.05;
@@ -22,6 +22,28 @@ const FEWEST_MISSING: usize = 3;
 
 /// Fewest samples of a steady speed.
 const SHORTEST: usize = 20;
+
+/// Columns that tell the motion, the best first: positions, then speeds.
+const ORDER: [Quantity; 18] = [
+    Quantity::BridgePosition,
+    Quantity::CartPosition,
+    Quantity::DriveAngle,
+    Quantity::RotorAngle,
+    Quantity::IdlerAngle,
+    Quantity::LeftAngle,
+    Quantity::RightAngle,
+    Quantity::LeftRotorAngle,
+    Quantity::RightRotorAngle,
+    Quantity::BridgeSpeed,
+    Quantity::CartSpeed,
+    Quantity::DriveSpeed,
+    Quantity::RotorSpeed,
+    Quantity::IdlerSpeed,
+    Quantity::LeftSpeed,
+    Quantity::RightSpeed,
+    Quantity::LeftRotorSpeed,
+    Quantity::RightRotorSpeed,
+];
 
 /// The motion in a log, judged by one of its columns.
 #[derive(Debug, Clone, PartialEq)]
@@ -60,14 +82,19 @@ pub struct Steady {
 }
 
 impl Motion {
-    /// By the first position there is, or else by the first speed.
+    /// By the first position there is, or else by the first speed; of a machine with several coordinates by the first
+    /// that moves.
     pub(super) fn of(log: &Log, channels: &[Channel], timing: &Timing) -> Option<Self> {
-        use Quantity::{
-            CartPosition, CartSpeed, DriveAngle, DriveSpeed, IdlerAngle, IdlerSpeed, RotorAngle, RotorSpeed,
+        let column = |quantity: &Quantity| {
+            let output = log.output(*quantity)?;
+            Some((output, channels.iter().find(|channel| channel.name == output.quantity.name())?))
         };
-        let order = [CartPosition, DriveAngle, RotorAngle, IdlerAngle, CartSpeed, DriveSpeed, RotorSpeed, IdlerSpeed];
-        let output = order.iter().find_map(|quantity| log.output(*quantity))?;
-        let channel = channels.iter().find(|channel| channel.name == output.quantity.name())?;
+        let moves = |(_, channel): &(&Output, &Channel)| channel.span() > 10.0 * channel.resolution();
+        let found = || ORDER.iter().filter_map(column);
+        let (output, channel) = match log.inputs.len() {
+            1 => found().next(),
+            _ => found().find(moves).or_else(|| found().next()),
+        }?;
         let (speed, fuzz) = speeds(log, output.quantity, timing, channel);
         let peak_speed = quantile(&speed.iter().map(|v| v.abs()).collect::<Vec<_>>(), 0.995);
         let resolution = channel.resolution();
@@ -109,12 +136,14 @@ impl Motion {
         turns
     }
 
+    /// Steady speeds, where a single input goes with them.
     fn steadiness(&self, log: &Log, channels: &[Channel], fuzz: f64) -> Vec<Steady> {
+        let [fed] = &log.inputs[..] else { return Vec::new() };
         let input = 0.01 * channels.first().map_or(0.0, Channel::span).max(1e-12);
         let mut steady: Vec<Steady> = Vec::new();
         let mut begin = 0;
         while begin + SHORTEST <= log.len() {
-            let u = log.input[begin];
+            let u = fed[begin];
             let (early, late) = self.speed[begin..begin + SHORTEST].split_at(SHORTEST / 2);
             let [early, late] = [early, late].map(|half| half.iter().sum::<f64>() / half.len() as f64);
             let v = 0.5 * (early + late);
@@ -124,7 +153,7 @@ impl Motion {
                 continue;
             }
             let allowed = (STEADY * v.abs()).max(2.0 * fuzz);
-            let same = |k: &usize| (self.speed[*k] - v).abs() <= allowed && (log.input[*k] - u).abs() <= input;
+            let same = |k: &usize| (self.speed[*k] - v).abs() <= allowed && (fed[*k] - u).abs() <= input;
             let end = begin + (begin..log.len()).take_while(same).count();
             if end - begin >= SHORTEST {
                 let speed = median(&mut self.speed[begin..end].to_vec());
@@ -140,11 +169,14 @@ impl Motion {
     /// A gap in motion, or over a change of the input: a model that is put through the log does not know what was fed
     /// in there.
     pub(super) fn across_gaps(&self, log: &Log, timing: &Timing) -> Option<Note> {
-        let wide = log.input.iter().fold(0.0_f64, |most, u| most.max(u.abs()));
+        let changes_of = |input: &Vec<f64>, k: usize| {
+            let wide = input.iter().fold(0.0_f64, |most, u| most.max(u.abs()));
+            (input[k] - input[k - 1]).abs() > 0.01 * wide
+        };
         let moving = |k: usize| self.speed.get(k).is_some_and(|v| v.abs() > SLOW * self.peak_speed);
         let mut bad = timing.gaps.iter().filter(|gap| gap.missing >= FEWEST_MISSING).filter(|gap| {
             let k = log.time.partition_point(|t| *t <= gap.at);
-            let changes = k > 0 && k < log.len() && (log.input[k] - log.input[k - 1]).abs() > 0.01 * wide;
+            let changes = k > 0 && k < log.len() && log.inputs.iter().any(|input| changes_of(input, k));
             self.moves && (changes || moving(k.saturating_sub(1)) || moving(k))
         });
         let first = bad.next()?;
@@ -171,13 +203,11 @@ impl Motion {
 
     /// Unit of its speeds.
     pub fn unit(&self) -> &'static str {
-        match self.quantity {
-            Quantity::CartPosition | Quantity::CartSpeed | Quantity::CartAcceleration => "m/s",
-            _ => "rad/s",
-        }
+        if self.quantity.is_linear() { "m/s" } else { "rad/s" }
     }
 
-    pub(super) fn notes(&self) -> Vec<Note> {
+    /// Notes on it in a log of so many inputs; steady speeds are those under a single one.
+    pub(super) fn notes(&self, inputs: usize) -> Vec<Note> {
         let name = self.quantity.name();
         let mut notes = Vec::new();
         let mut note = |code, severity, text: String| notes.push(Note::new(code, severity, text).on(name));
@@ -213,6 +243,7 @@ impl Motion {
         }
         let longest = self.steady.iter().max_by(|a, b| (a.to - a.from).total_cmp(&(b.to - b.from)));
         match (longest, self.steady_speeds()) {
+            (None, _) if inputs > 1 => {}
             (None, _) => note(
                 "unsteady",
                 Severity::Fact,
@@ -241,7 +272,7 @@ impl Motion {
 /// Speeds of an output, and how uncertain they are.
 fn speeds(log: &Log, quantity: Quantity, timing: &Timing, channel: &Channel) -> (Vec<f64>, f64) {
     let values = log.output(quantity).map_or(&[][..], |output| &output.values);
-    if is_speed(quantity) || !is_position(quantity) {
+    if quantity.is_speed() || !quantity.is_position() {
         return (values.to_vec(), channel.resolution());
     }
     // Half a window on either side, wide enough that noise does not matter.
@@ -263,7 +294,7 @@ fn end_speed(log: &Log, quantity: Quantity, channel: &Channel, from_end: bool) -
         there = (0..values.len()).rev().filter(|&k| !values[k].is_nan()).take(3).collect();
     }
     let &[a, b, c] = &there[..] else { return (0.0, 0.0) };
-    if is_speed(quantity) {
+    if quantity.is_speed() {
         return (values[a], channel.resolution());
     }
     // The slope at the end of the parabola through three points.

@@ -24,9 +24,9 @@ pub enum Remedy {
     Step(Quantity, Vec<Jump>),
     /// Samples of an output that do not count.
     Leave(Quantity, Vec<usize>),
-    /// The input so many samples later than it is logged; earlier if negative.
+    /// The inputs so many samples later than it is logged; earlier if negative.
     Shift(isize),
-    /// A factor on the input.
+    /// A factor on the inputs.
     Drive(f64),
 }
 
@@ -66,11 +66,13 @@ impl Remedy {
                 }
             }),
             Self::Shift(rows) => {
-                let last = log.input.len().saturating_sub(1);
-                let at = |k: usize| log.input[k.saturating_add_signed(-rows).min(last)];
-                log.input = (0..log.input.len()).map(at).collect();
+                for input in &mut log.inputs {
+                    let last = input.len().saturating_sub(1);
+                    let at = |k: usize| input[k.saturating_add_signed(-rows).min(last)];
+                    *input = (0..input.len()).map(at).collect();
+                }
             }
-            Self::Drive(factor) => scaled(&mut log.input, *factor),
+            Self::Drive(factor) => log.inputs.iter_mut().for_each(|input| scaled(input, *factor)),
             Self::Leave(quantity, samples) => of(quantity, &mut |values| {
                 for &k in samples {
                     values[k] = f64::NAN;
@@ -108,7 +110,7 @@ mod tests {
                 name: "log".into(),
                 file: "log.csv".into(),
                 time: vec![0.0, 1.0, 2.0, 3.0],
-                input: vec![1.0, 2.0, 3.0, 4.0],
+                inputs: vec![vec![1.0, 2.0, 3.0, 4.0]],
                 added: None,
                 hold: Hold::Zero,
                 reference: None,
@@ -116,7 +118,7 @@ mod tests {
                 ended: None,
             };
             Remedy::Shift(rows).apply(&mut log);
-            log.input
+            log.inputs.remove(0)
         };
         assert_eq!(shifted(1), [1.0, 1.0, 2.0, 3.0]);
         assert_eq!(shifted(-2), [3.0, 4.0, 4.0, 4.0]);

@@ -4,7 +4,7 @@ use super::super::{Log, Output, Quantity};
 use super::channel::Channel;
 use super::motion::Motion;
 use super::{Note, Remedy, Severity, quantile, shown};
-use crate::machine::{AmplifierMode, EncoderPlace, Machine};
+use crate::machine::{AmplifierMode, DriveUnit, EncoderPlace, Machine};
 use crate::quantity::{self, rounded};
 
 /// Measured and expected may differ by this factor without a suspicion: the machine's parameters may be rough.
@@ -43,7 +43,13 @@ pub(super) fn input_unit(stage: &Machine) -> &'static str {
 
 pub(super) fn notes(log: &Log, stage: &Machine, channels: &[Channel], motion: Option<&Motion>) -> Vec<Note> {
     let mut notes = Vec::new();
-    let input = input_note(stage, &channels[0]);
+    if !stage.has_one_coordinate() {
+        notes.extend(stage.drives.iter().zip(channels).filter_map(|(unit, channel)| input_note(stage, unit, channel)));
+        notes.extend(beside_drives(log, stage, channels));
+        notes.extend(encoder_note(stage, channels));
+        return notes;
+    }
+    let input = input_note(stage, &stage.drives[0], &channels[0]);
     let swapped = swapped_note(log, channels);
     let trusted = input.is_none() && swapped.is_none();
     notes.extend(input);
@@ -64,11 +70,7 @@ pub(super) fn notes(log: &Log, stage: &Machine, channels: &[Channel], motion: Op
 /// Steps of a position that are not those of the case's encoder.
 fn encoder_note(stage: &Machine, channels: &[Channel]) -> Option<Note> {
     let encoder = stage.encoder?;
-    let counted: &[&'static str] = match encoder.at {
-        EncoderPlace::Motor => &["drive_angle", "rotor_angle"],
-        EncoderPlace::DrivePulley => &["drive_angle"],
-        EncoderPlace::Cart => &["cart_position"],
-    };
+    let counted: Vec<&str> = stage.counted().map(Quantity::name).collect();
     let count = 1.0 / encoder.counts_per_unit(stage.drives[0].motor.gear_ratio);
     let (channel, step) = channels.iter().find_map(|channel| {
         let step = channel.step.filter(|_| counted.contains(&channel.name) && channel.levels > FEWEST_LEVELS)?;
@@ -100,17 +102,17 @@ fn encoder_note(stage: &Machine, channels: &[Channel]) -> Option<Note> {
 }
 
 /// An input that no such amplifier gives.
-fn input_note(stage: &Machine, input: &Channel) -> Option<Note> {
-    let gain = stage.drives[0].amplifier.gain;
+fn input_note(stage: &Machine, unit: &DriveUnit, input: &Channel) -> Option<Note> {
+    let (gain, mode) = (unit.amplifier.gain, unit.amplifier.mode);
     let peak = (gain * input.greatest).abs().max((gain * input.least).abs());
     // A motor of one newton, or newton metre, per ampere stands for a force or torque, which no amplifier limits.
-    let motor = &stage.drives[0].motor;
+    let motor = &unit.motor;
     let per_ampere = motor.torque_constant * motor.gear_ratio * motor.gear_efficiency;
     let is_force = per_ampere == 1.0 || per_ampere == stage.pulley_radius;
-    if is_force && stage.drives[0].amplifier.mode == AmplifierMode::Current {
+    if is_force && mode == AmplifierMode::Current {
         return None;
     }
-    let (most, unit, milli) = match stage.drives[0].amplifier.mode {
+    let (most, unit, milli) = match mode {
         AmplifierMode::Voltage => (MOST_VOLTS, "V", "mV"),
         AmplifierMode::Current => (MOST_AMPERES, "A", "mA"),
         AmplifierMode::Position => (MOST_TRAVEL, "m", "mm"),
@@ -119,11 +121,11 @@ fn input_note(stage: &Machine, input: &Channel) -> Option<Note> {
         return None;
     }
     let next = match gain.abs() {
-        1.0 => format!("is the column in {milli}? then set units = {{ input = \"{milli}\" }}"),
+        1.0 => format!("is the column in {milli}? then set units = {{ {} = \"{milli}\" }}", input.name),
         _ => format!("check amplifier.gain, which is {} {unit} per unit of the column", rounded(gain)),
     };
     let text = format!("it reaches {}, beyond any drive of this kind: {next}", shown(peak, unit));
-    Some(Note::new("unit", Severity::Suspicion, text).on("input"))
+    Some(Note::new("unit", Severity::Suspicion, text).on(input.name))
 }
 
 /// An output that looks like a command while the input looks like a measurement.
@@ -133,7 +135,7 @@ fn swapped_note(log: &Log, channels: &[Channel]) -> Option<Note> {
         same as f64 > 0.9 * values.len() as f64
     };
     let input = &channels[0];
-    if input.levels < 50 || jumpy(&log.input) {
+    if input.levels < 50 || jumpy(&log.inputs[0]) {
         return None;
     }
     let (output, channel) = log.outputs.iter().zip(&channels[1..]).find(|(output, channel)| {
@@ -149,10 +151,7 @@ fn swapped_note(log: &Log, channels: &[Channel]) -> Option<Note> {
 
 /// Positions along the belt, m per unit.
 fn lever(quantity: Quantity, stage: &Machine) -> f64 {
-    match quantity {
-        Quantity::CartPosition | Quantity::CartSpeed | Quantity::CartAcceleration => 1.0,
-        _ => stage.pulley_radius,
-    }
+    if quantity.is_linear() { 1.0 } else { stage.pulley_radius }
 }
 
 /// Outputs compared with each other: all positions are the belt's, and speeds their rates.
@@ -204,6 +203,52 @@ fn consistency(log: &Log, stage: &Machine, channels: &[Channel]) -> Vec<Note> {
             let remedy = matches!(kind, Kind::Sign).then(sign);
             notes.push(Note::new(code, Severity::Suspicion, text).on(p).mended_by(remedy));
         }
+    }
+    notes
+}
+
+/// Positions of slides compared with those that the angles of all drives give.
+fn beside_drives(log: &Log, stage: &Machine, channels: &[Channel]) -> Vec<Note> {
+    let geometry = stage.geometry();
+    let output = |body: usize| {
+        let label = geometry.label(body);
+        let of_body = |output: &&Output| output.quantity.is_position() && output.quantity.body() == Some(label.key);
+        log.outputs.iter().find(|output| of_body(output) && !output.absolute)
+    };
+    let angles: Vec<Option<&Output>> = geometry.drives.iter().map(|drive| output(drive.pulley)).collect();
+    let Some(angles) = angles.into_iter().collect::<Option<Vec<_>>>() else { return Vec::new() };
+    let names: Vec<&str> = angles.iter().map(|output| output.quantity.name()).collect();
+    let mut notes = Vec::new();
+    for slide in geometry.slides {
+        let Some(position) = output(slide.body) else { continue };
+        let name = position.quantity.name();
+        // Where it hardly moves there is nothing to compare.
+        if channels.iter().any(|channel| channel.name == name && channel.span() <= 10.0 * channel.resolution()) {
+            continue;
+        }
+        let by_drives: Vec<f64> = (0..log.len())
+            .map(|k| {
+                let drives = angles.iter().zip(slide.by_drives);
+                stage.pulley_radius * drives.map(|(angle, weight)| weight * angle.values[k]).sum::<f64>()
+            })
+            .collect();
+        let Some(kind) = kind(slope(&travel(&by_drives), &travel(&position.values))) else { continue };
+        let drives = names.join(" and ");
+        let (code, text) = match kind {
+            Kind::Sign => (
+                "sign",
+                format!(
+                    "it moves against what {drives} give for it: two columns are swapped, or one has the wrong sign; set scale = {{ {name} = -1 }}, or so for an angle"
+                ),
+            ),
+            Kind::Factor(factor) => (
+                "unit",
+                format!(
+                    "it goes {factor} what {drives} give for it: is the unit of one of them wrong, or the pulleys' radius?"
+                ),
+            ),
+        };
+        notes.push(Note::new(code, Severity::Suspicion, text).on(name));
     }
     notes
 }
@@ -366,7 +411,7 @@ fn magnitude(log: &Log, stage: &Machine, motion: &Motion) -> Option<Note> {
 
 /// A log that moves with an input that would not move the machine of the case.
 fn idle(log: &Log, stage: &Machine, motion: &Motion) -> Option<Note> {
-    let most = log.input.iter().fold(0.0_f64, |most, u| most.max(u.abs()));
+    let most = log.inputs[0].iter().fold(0.0_f64, |most, u| most.max(u.abs()));
     if most == 0.0 {
         return None;
     }
@@ -459,7 +504,7 @@ fn expected(log: &Log, stage: &Machine) -> Option<Expected> {
     for k in 1..log.len() {
         let dt = log.time[k] - log.time[k - 1];
         // F = K i − b v, and with a voltage i = (u − K_e n v / r) / R
-        let force = drive.force * stage.drives[0].amplifier.gain * log.input[k - 1];
+        let force = drive.force * stage.drives[0].amplifier.gain * log.inputs[0][k - 1];
         let driven = force.abs() > coulomb || v != 0.0;
         let direction = if v == 0.0 { force.signum() } else { v.signum() };
         if driven {
@@ -473,7 +518,7 @@ fn expected(log: &Log, stage: &Machine) -> Option<Expected> {
         }
         speed = speed.max(v.abs());
     }
-    let most = log.input.iter().fold(0.0_f64, |most, u| most.max((stage.drives[0].amplifier.gain * u).abs()));
+    let most = log.inputs[0].iter().fold(0.0_f64, |most, u| most.max((stage.drives[0].amplifier.gain * u).abs()));
     let free = match stage.drives[0].amplifier.mode {
         AmplifierMode::Voltage if motor.back_emf_constant > 0.0 => {
             most * r / (motor.back_emf_constant * motor.gear_ratio)
@@ -489,7 +534,7 @@ fn direction(log: &Log, stage: &Machine, motion: &Motion) -> Option<Note> {
         return None;
     }
     let (mut uu, mut uv, mut vv) = (0.0, 0.0, 0.0);
-    for (u, v) in log.input.iter().zip(&motion.speed).filter(|(_, v)| v.is_finite()) {
+    for (u, v) in log.inputs[0].iter().zip(&motion.speed).filter(|(_, v)| v.is_finite()) {
         let u = u * stage.drives[0].amplifier.gain;
         uu += u * u;
         uv += u * v;
@@ -510,7 +555,7 @@ fn direction(log: &Log, stage: &Machine, motion: &Motion) -> Option<Note> {
 fn current_note(log: &Log, stage: &Machine) -> Option<Note> {
     let output = log.output(Quantity::MotorCurrent)?;
     let peak = quantile(&output.values.iter().map(|i| i.abs()).collect::<Vec<_>>(), 0.995);
-    let most = log.input.iter().fold(0.0_f64, |most, u| most.max((stage.drives[0].amplifier.gain * u).abs()));
+    let most = log.inputs[0].iter().fold(0.0_f64, |most, u| most.max((stage.drives[0].amplifier.gain * u).abs()));
     let most = match stage.drives[0].amplifier.mode {
         AmplifierMode::Voltage => 2.0 * most / stage.drives[0].motor.resistance,
         AmplifierMode::Current => most,
@@ -529,14 +574,13 @@ fn current_note(log: &Log, stage: &Machine) -> Option<Note> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::is_speed;
     use crate::machine::Quantity;
 
     #[test]
     fn every_quantity_is_of_one_kind() {
-        let others = [Quantity::MotorCurrent, Quantity::MotorVoltage, Quantity::CartAcceleration];
-        for quantity in Quantity::ALL {
-            let kinds = [is_speed(quantity), super::super::is_position(quantity), others.contains(&quantity)];
+        for quantity in Quantity::all() {
+            let is_other = matches!(quantity.unit(), "A" | "V" | "m/s^2");
+            let kinds = [quantity.is_speed(), quantity.is_position(), is_other];
             assert_eq!(kinds.iter().filter(|kind| **kind).count(), 1);
         }
     }

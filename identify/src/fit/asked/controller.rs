@@ -51,7 +51,7 @@ pub(crate) fn reproduced(case: &Case, log: &Log) -> Option<f64> {
         let acts = time + timing.delay + late;
         let row = log.time.partition_point(|time| *time <= acts).checked_sub(1)?;
         made.push(given);
-        logged.push(log.input[row] - log.added.as_ref().map_or(0.0, |added| added[row]));
+        logged.push(log.inputs[0][row] - log.added.as_ref().map_or(0.0, |added| added[row]));
         k += 1;
     }
     let mean = logged.iter().sum::<f64>() / logged.len().max(1) as f64;

@@ -17,7 +17,7 @@ const STATE: [&str; 6] = ["drive_angle", "drive_speed", "cart_position", "cart_s
 /// Weighted residuals, model minus log, of machines that follow each other in equal parts of the log; false where the
 /// log is not one of an open loop at even times, or a machine does not get through its part.
 pub(crate) fn residuals(run: &Run, stages: &[Machine], extras: &[f64], out: &mut [f64]) -> bool {
-    let is_known = |seen: &Quantity| !seen.name().starts_with("rotor") && *seen != Quantity::CartAcceleration;
+    let is_known = |seen: &Quantity| !seen.is_of_rotor() && !seen.is_acceleration();
     let quantities: Vec<Quantity> = run.seen.iter().map(|seen| seen.quantity).collect();
     if !run.is_even() || run.is_closed() || !quantities.iter().all(is_known) {
         return false;

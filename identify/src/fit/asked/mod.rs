@@ -4,6 +4,7 @@ mod acceleration;
 pub(crate) mod controller;
 pub(crate) mod drifting;
 pub(crate) mod problem;
+mod reading;
 pub(crate) mod residuals;
 pub(crate) mod run;
 mod sensitivity;

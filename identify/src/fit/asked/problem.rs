@@ -1,12 +1,13 @@
 //! All logs of a case as one least-squares problem.
 
+use super::reading::Reading;
 use super::residuals::{Bounds, Differences, Residuals, Step};
-use super::run::{Extra, MeasuredOutput, Nuisance, Run, Setting, is_position, rounding_at_rest};
+use super::run::{Extra, MeasuredOutput, Nuisance, Run, Setting, rounding_at_rest};
 use crate::case::{Case, Nuisances, Plan, Scope, matches, parameters};
 use crate::error::{Error, Result};
 use crate::fit::limits::{FILE_ROUNDING, KNOWN_DELAY, SLOW_BY_DIFFERENCE, STARTS_MOVING};
 use crate::log::Quantity;
-use crate::machine::{AmplifierMode, Machine};
+use crate::machine::{AmplifierMode, DriveUnit, Machine};
 use crate::parameter::{self, Free};
 use crate::signal::Signal;
 use crate::solve::Bench;
@@ -109,9 +110,7 @@ impl<'a> Problem<'a> {
             }
         }
         if runs.is_empty() {
-            return Err(Error::new("there is no log to fit").next(
-                "add log = { file = \"...\", time = \"...\", input = \"...\", drive_angle = \"...\" } to an experiment",
-            ));
+            return Err(no_log(&machine));
         }
         let mut problem = Self {
             units: parameters.iter().map(|parameter| scale(&machine, parameter, &runs)).collect(),
@@ -171,69 +170,37 @@ impl<'a> Problem<'a> {
     fn add_extras(&mut self, case: &Case, plan: &Plan) {
         let &Nuisances { delay, input_gain, input_offset, initial_state, bias } = &plan.nuisance;
         let interval = self.runs[0].interval();
-        let most = self.runs.iter().flat_map(|run| run.logged.iter()).fold(0.0, |most: f64, u| most.max(u.abs()));
-        let most = if most > 0.0 { most } else { 1.0 };
         // Samples that are taken after their stamps are an input that acts early: as far as the input is logged.
-        let is_sampled = self.runs.iter().all(|run| matches!(run.input(), Signal::Sampled { .. }));
+        let mut inputs = self.runs.iter().flat_map(Run::inputs);
+        let is_sampled = inputs.all(|input| matches!(input, Signal::Sampled { .. }));
         let (early, high) = (if is_sampled { -50.0 * interval } else { 0.0 }, 50.0 * interval);
         let late = Extra { what: Nuisance::Delay, start: 0.0, unit: interval, low: early, high, known: None };
-        let gain = Extra { what: Nuisance::InputGain, start: 1.0, unit: 1.0, low: 0.2, high: 5.0, known: None };
-        let offset = Extra { what: Nuisance::InputOffset, start: 0.0, unit: most, low: -most, high: most, known: None };
-        let scopes = [(delay, late), (input_gain, gain), (input_offset, offset)];
+        let mut scopes = vec![(delay, late)];
+        for drive in 0..self.machine.drives.len() {
+            let logged = self.runs.iter().flat_map(|run| &run.logged[drive]);
+            let most = logged.fold(0.0, |most: f64, u| most.max(u.abs()));
+            let most = if most > 0.0 { most } else { 1.0 };
+            let what = Nuisance::InputGain(drive);
+            scopes.push((input_gain, Extra { what, start: 1.0, unit: 1.0, low: 0.2, high: 5.0, known: None }));
+            let what = Nuisance::InputOffset(drive);
+            scopes.push((input_offset, Extra { what, start: 0.0, unit: most, low: -most, high: most, known: None }));
+        }
         self.shared = scopes.iter().filter(|(scope, _)| *scope == Scope::Shared).map(|(_, extra)| *extra).collect();
-        let r = self.machine.pulley_radius;
         let noise = self.noise();
         for run in self.runs.iter_mut().chain(&mut self.held_out) {
             let own = scopes.iter().filter(|(scope, _)| *scope == Scope::Each).map(|(_, extra)| *extra);
             run.extras.extend(own);
             let given = case.experiments.iter().any(|e| e.name == run.name && e.initial != Default::default());
-            let position = run.seen.iter().find(|seen| is_position(seen.quantity));
-            let first = position.and_then(|seen| {
-                let value = seen.values.iter().copied().find(|v| v.is_finite())?;
-                Some(if seen.quantity == Quantity::CartPosition { value } else { value * r })
-            });
-            let span = position.map_or(0.0, |seen| {
-                let arm = if seen.quantity == Quantity::CartPosition { 1.0 } else { r };
-                arm * extent(&seen.values)
-            });
-            let fastest = run.seen.iter().find(|seen| !is_position(seen.quantity)).map_or(0.0, |seen| {
-                let arm = if seen.quantity == Quantity::CartSpeed { 1.0 } else { r };
-                arm * extent(&seen.values)
-            });
-            let long = run.time.last().copied().unwrap_or(1.0);
-            let fast = f64::max(span / long, fastest).max(1e-6);
-            let wide = span.max(1e-6);
-            // A window in the middle of a log begins in motion; the first begins as the log does.
-            let windowed = run.window > 0;
-            if let Some(start) = first {
-                let free = initial_state || windowed;
-                // Positions count from where the log begins, unless the case says where that is; its first value says
-                // that no better than any other value says where the cart is.
-                let arm = position.map_or(1.0, |seen| if seen.quantity == Quantity::CartPosition { 1.0 } else { r });
-                let noise = arm * position.map_or(0.0, |seen| noise.of(seen.quantity));
-                let (unit, room) = if free { (1e-2 * wide, wide) } else { (noise, 6.0 * noise) };
-                if free || !given {
-                    run.extras.push(Extra {
-                        what: Nuisance::StartPosition,
-                        start,
-                        unit,
-                        low: start - room,
-                        high: start + room,
-                        known: if free { None } else { Some(noise) },
-                    });
-                }
-            }
-            if initial_state || windowed {
-                let (slope, doubt) = slope_at_start(run, r, &noise);
-                // A log begins at rest, unless it shows that it does not: a start at rest sticks, and a search from
-                // there sees nothing of the speed.
-                let start = if windowed || slope.abs() > STARTS_MOVING * doubt { slope } else { 0.0 };
-                let (low, high) = (start - 20.0 * fast, start + 20.0 * fast);
-                run.extras.push(Extra { what: Nuisance::StartSpeed, start, unit: fast, low, high, known: None });
+            let machine = &self.machine;
+            let slides = 0..machine.geometry().slides.len();
+            let readings: Vec<_> = slides.map(|slide| Reading::of(run, machine, slide)).collect();
+            for (slide, reading) in readings.iter().enumerate() {
+                let start = Start { slide, reading: reading.as_ref(), noise: &noise };
+                let extras = start.extras(run, machine, (initial_state, given));
+                run.extras.extend(extras);
             }
             for (index, seen) in run.seen.iter().enumerate() {
-                let counted =
-                    is_position(seen.quantity) && run.seen.iter().position(|s| is_position(s.quantity)) == Some(index);
+                let counted = readings.iter().flatten().any(|reading| reading.takes(index));
                 if bias && !counted {
                     let wide = extent(&seen.values).max(1e-9);
                     run.extras.push(Extra {
@@ -290,8 +257,8 @@ impl<'a> Problem<'a> {
     pub fn weigh_by(&mut self, noise: &[(Quantity, f64)]) {
         for &(quantity, deviation) in noise {
             self.weigh(quantity, deviation, true);
-            self.doubt_starts(quantity, deviation);
         }
+        self.doubt_starts(noise);
     }
 
     /// Weighs a quantity: each value with the variance σ² of the noise and of what rounding makes of m equal values in
@@ -317,19 +284,18 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// A first value is no better than any other: what is known of starts beforehand is as uncertain as this deviation
-    /// of a position, as far as noise that neighbouring values share can be more than what they differ by; beyond that
-    /// it is the model that is off, and not the value.
-    pub fn doubt_starts(&mut self, quantity: Quantity, deviation: f64) {
-        let r = self.machine.pulley_radius;
+    /// A first value is no better than any other: what is known of starts beforehand is as uncertain as these deviations
+    /// of the positions that tell it, as far as noise that neighbouring values share can be more than what they differ
+    /// by; beyond that it is the model that is off, and not the value.
+    pub fn doubt_starts(&mut self, noise: &[(Quantity, f64)]) {
+        let of = |quantity: Quantity| noise.iter().find(|(own, _)| *own == quantity).map(|(_, deviation)| *deviation);
         for run in &mut self.runs {
-            let Some(first) = run.seen.iter().find(|seen| is_position(seen.quantity)) else { continue };
-            if first.quantity != quantity {
-                continue;
-            }
-            let deviation = deviation * if quantity == Quantity::CartPosition { 1.0 } else { r };
-            for extra in run.extras.iter_mut().filter(|extra| extra.what == Nuisance::StartPosition) {
-                if let Some(known) = &mut extra.known {
+            for slide in 0..self.machine.geometry().slides.len() {
+                let Some(reading) = Reading::of(run, &self.machine, slide) else { continue };
+                let Some(deviation) = reading.deviation(run, of) else { continue };
+                let what = Nuisance::StartPosition(slide);
+                for extra in run.extras.iter_mut().filter(|extra| extra.what == what) {
+                    let Some(known) = &mut extra.known else { continue };
                     // Its unit is what neighbouring values differ by.
                     let most = if self.swings { f64::INFINITY } else { SLOW_BY_DIFFERENCE * extra.unit };
                     *known = known.max(deviation.min(most));
@@ -651,6 +617,19 @@ impl<'a> Problem<'a> {
     }
 }
 
+/// The error where no log is fitted, with the columns that a log of this machine would have.
+fn no_log(machine: &Machine) -> Error {
+    let geometry = machine.geometry();
+    let pulleys: Vec<&str> = geometry.drives.iter().map(|drive| geometry.label(drive.pulley).key).collect();
+    let is_angle =
+        |quantity: &&Quantity| quantity.is_position() && quantity.body().is_some_and(|body| pulleys.contains(&body));
+    let inputs = geometry.drives.iter().map(|drive| drive.input);
+    let angles = machine.quantities().iter().filter(is_angle).map(|quantity| quantity.name());
+    let columns: String = inputs.chain(angles).map(|key| format!(", {key} = \"...\"")).collect();
+    Error::new("there is no log to fit")
+        .next(format!("add log = {{ file = \"...\", time = \"...\"{columns} }} to an experiment"))
+}
+
 /// A run, where its residuals begin, and the variables that move them.
 type Left = (usize, usize, Vec<usize>);
 
@@ -709,20 +688,63 @@ pub(crate) fn extent(values: &[f64]) -> f64 {
     if high >= low { high - low } else { 0.0 }
 }
 
-/// Speed of the cart at the start of a log or window, m/s, from a line through its first rows, and its standard error.
-fn slope_at_start(run: &Run, r: f64, noise: &Noise) -> (f64, f64) {
-    let Some(seen) = run.seen.iter().find(|seen| is_position(seen.quantity)) else { return (0.0, 0.0) };
-    let rows: Vec<usize> = (0..run.time.len().min(15)).filter(|&k| seen.values[k].is_finite()).collect();
-    let n = rows.len().max(1) as f64;
-    let (t, y) =
-        (rows.iter().map(|&k| run.time[k]).sum::<f64>() / n, rows.iter().map(|&k| seen.values[k]).sum::<f64>() / n);
-    let (mut above, mut below) = (0.0, 0.0);
-    for &k in &rows {
-        above += (run.time[k] - t) * (seen.values[k] - y);
-        below += (run.time[k] - t).powi(2);
+/// Where a slide begins in a run, as far as that is searched for.
+struct Start<'r> {
+    slide: usize,
+    /// Its position by the outputs of the run, if they tell it.
+    reading: Option<&'r Reading>,
+    noise: &'r Noise,
+}
+
+impl Start<'_> {
+    /// Position and speed at the start of a run, as far as they are searched for: `initial_state` asks for both, and
+    /// `given` is true if the case says where the run begins.
+    fn extras(&self, run: &Run, machine: &Machine, (initial_state, given): (bool, bool)) -> Vec<Extra> {
+        let mut extras = Vec::new();
+        let r = machine.pulley_radius;
+        let values = self.reading.map(|reading| reading.values(run));
+        let first = values.as_ref().and_then(|values| values.iter().copied().find(|v| v.is_finite()));
+        let span = values.as_deref().map_or(0.0, extent);
+        let fastest = run.seen.iter().find(|seen| !seen.quantity.is_position()).map_or(0.0, |seen| {
+            let arm = if seen.quantity.is_speed() && seen.quantity.is_linear() { 1.0 } else { r };
+            arm * extent(&seen.values)
+        });
+        let long = run.time.last().copied().unwrap_or(1.0);
+        let fast = f64::max(span / long, fastest).max(1e-6);
+        let wide = span.max(1e-6);
+        // A window in the middle of a log begins in motion; the first begins as the log does.
+        let windowed = run.window > 0;
+        if let Some(start) = first {
+            let free = initial_state || windowed;
+            // Positions count from where the log begins, unless the case says where that is; its first value says that
+            // no better than any other value says where the slide is.
+            let noise =
+                self.reading.and_then(|reading| reading.deviation(run, |quantity| Some(self.noise.of(quantity))));
+            let noise = noise.unwrap_or_default();
+            let (unit, room) = if free { (1e-2 * wide, wide) } else { (noise, 6.0 * noise) };
+            if free || !given {
+                extras.push(Extra {
+                    what: Nuisance::StartPosition(self.slide),
+                    start,
+                    unit,
+                    low: start - room,
+                    high: start + room,
+                    known: if free { None } else { Some(noise) },
+                });
+            }
+        }
+        if initial_state || windowed {
+            let of = |quantity| Some(self.noise.of(quantity));
+            let (slope, doubt) = self.reading.map_or((0.0, 0.0), |reading| reading.speed_at_start(run, of));
+            // A log begins at rest, unless it shows that it does not: a start at rest sticks, and a search from there
+            // sees nothing of the speed.
+            let start = if windowed || slope.abs() > STARTS_MOVING * doubt { slope } else { 0.0 };
+            let (low, high) = (start - 20.0 * fast, start + 20.0 * fast);
+            let what = Nuisance::StartSpeed(self.slide);
+            extras.push(Extra { what, start, unit: fast, low, high, known: None });
+        }
+        extras
     }
-    let arm = if seen.quantity == Quantity::CartPosition { 1.0 } else { r };
-    if below > 0.0 { (arm * above / below, arm * noise.of(seen.quantity) / below.sqrt()) } else { (0.0, 0.0) }
 }
 
 /// The scale on which a parameter is searched for.
@@ -739,21 +761,24 @@ fn scale(machine: &Machine, parameter: &Free, runs: &[Run]) -> Scale {
 /// A typical value of a quantity that may be zero: of friction a tenth of the motor's force at the greatest input; none
 /// where that depends on the machine alone, as the gain of an amplifier, which has whatever unit its input has.
 fn typical(machine: &Machine, parameter: &Free, runs: &[Run]) -> Option<f64> {
-    let most = runs.iter().flat_map(|run| run.logged.iter()).fold(0.0, |most: f64, u| most.max(u.abs()));
-    let motor = &machine.drives[0].motor;
-    let per_unit = match machine.drives[0].amplifier.mode {
-        AmplifierMode::Voltage => motor.torque_constant / motor.resistance,
-        AmplifierMode::Current | AmplifierMode::Position => motor.torque_constant,
+    let most = runs.iter().flat_map(|run| run.logged.iter().flatten()).fold(0.0, |most: f64, u| most.max(u.abs()));
+    let torque_of = |unit: &DriveUnit| {
+        let (motor, amplifier) = (&unit.motor, &unit.amplifier);
+        let per_unit = match amplifier.mode {
+            AmplifierMode::Voltage => motor.torque_constant / motor.resistance,
+            AmplifierMode::Current | AmplifierMode::Position => motor.torque_constant,
+        };
+        (0.1 * per_unit * motor.gear_ratio * amplifier.gain * most).abs()
     };
-    let torque = (0.1 * per_unit * motor.gear_ratio * machine.drives[0].amplifier.gain * most).abs();
+    let torque = machine.drives.iter().map(torque_of).fold(0.0, f64::max);
     let r = machine.pulley_radius;
     let speed = runs
         .iter()
         .flat_map(|run| run.seen.iter().map(move |seen| (run, seen)))
         .map(|(run, seen)| {
-            let along = if seen.quantity.name().starts_with("cart") { 1.0 / r } else { 1.0 };
+            let along = if seen.quantity.is_linear() { 1.0 / r } else { 1.0 };
             let wide = extent(&seen.values) * along;
-            if is_position(seen.quantity) { 2.0 * wide / run.time.last().copied().unwrap_or(1.0) } else { wide }
+            if seen.quantity.is_position() { 2.0 * wide / run.time.last().copied().unwrap_or(1.0) } else { wide }
         })
         .fold(0.0, f64::max)
         .max(1e-3);
@@ -763,7 +788,7 @@ fn typical(machine: &Machine, parameter: &Free, runs: &[Run]) -> Option<f64> {
         "N m s/rad" => torque / speed,
         "N s/m" => torque / (speed * r * r),
         "rad" => 0.01,
-        "H" => 1e-3 * motor.resistance,
+        "H" => 1e-3 * machine.drives[0].motor.resistance,
         _ if parameter.high.is_finite() && parameter.high < 1e14 => 0.1 * parameter.high.abs().max(parameter.low.abs()),
         _ => return None,
     };

@@ -1,12 +1,11 @@
 //! A log made ready to be compared: when the model is asked, what it is told, and what its answer is weighed with.
 
-use super::acceleration::cart_acceleration;
+use super::acceleration::acceleration;
 use crate::case::{Case, Experiment};
 use crate::control::{Added, follow};
 use crate::design::Design;
 use crate::fit::limits::{DITHER_STEPS, EVEN_RASTER, INPUT_BEFORE_WINDOW, RASTER_POINTS};
 use crate::log::{Log, Quantity};
-use crate::machine::axis::{CART, DRIVE, IDLER};
 use crate::machine::{AmplifierMode, Machine};
 use crate::mechanism::State;
 use crate::signal::Signal;
@@ -20,29 +19,51 @@ use std::sync::Arc;
 pub enum Nuisance {
     /// The input acts this much later, s.
     Delay,
-    /// Factor on the input.
-    InputGain,
-    /// Added to the input.
-    InputOffset,
-    /// Position at the start, m of the cart.
-    StartPosition,
-    /// Speed at the start, m/s of the cart.
-    StartSpeed,
+    /// Factor on the input of this drive.
+    InputGain(usize),
+    /// Added to the input of this drive.
+    InputOffset(usize),
+    /// Position of this slide at the start, m.
+    StartPosition(usize),
+    /// Speed of this slide at the start, m/s.
+    StartSpeed(usize),
     /// Added to an output.
     Bias(usize),
 }
 
 impl Nuisance {
-    /// Its name in results.
-    pub fn name(self) -> &'static str {
+    /// Its name in results; of a machine with several drives and slides with that of its own before it.
+    pub fn name(self, machine: &Machine) -> String {
+        let geometry = machine.geometry();
+        let of_slide = |slide: usize, what: &str| match geometry.slides.len() {
+            1 => what.to_string(),
+            _ => format!("{}_{what}", geometry.label(geometry.slides[slide].body).key),
+        };
+        let of_drive = |drive: usize, what: &str| format!("{}_{what}", geometry.drives[drive].input);
         match self {
-            Nuisance::Delay => "delay",
-            Nuisance::InputGain => "input_gain",
-            Nuisance::InputOffset => "input_offset",
-            Nuisance::StartPosition => "start_position",
-            Nuisance::StartSpeed => "start_speed",
-            Nuisance::Bias(_) => "bias",
+            Nuisance::Delay => "delay".into(),
+            Nuisance::InputGain(drive) => of_drive(drive, "gain"),
+            Nuisance::InputOffset(drive) => of_drive(drive, "offset"),
+            Nuisance::StartPosition(slide) => of_slide(slide, "start_position"),
+            Nuisance::StartSpeed(slide) => of_slide(slide, "start_speed"),
+            Nuisance::Bias(_) => "bias".into(),
         }
+    }
+
+    /// Its unit; none of its own for a bias, which has that of its output.
+    pub fn unit(self, machine: &Machine) -> &'static str {
+        match self {
+            Nuisance::Delay => "s",
+            Nuisance::InputOffset(drive) => machine.drives[drive].amplifier.mode.unit(),
+            Nuisance::StartPosition(_) => "m",
+            Nuisance::StartSpeed(_) => "m/s",
+            Nuisance::InputGain(_) | Nuisance::Bias(_) => "",
+        }
+    }
+
+    /// True if it is where a run begins, or how fast.
+    pub(crate) fn is_start(self) -> bool {
+        matches!(self, Nuisance::StartPosition(_) | Nuisance::StartSpeed(_))
     }
 }
 
@@ -100,8 +121,8 @@ pub struct Run {
     pub window: usize,
     /// Times, s.
     pub time: Vec<f64>,
-    /// The input at these times.
-    pub logged: Vec<f64>,
+    /// The input of each drive at these times.
+    pub logged: Vec<Vec<f64>>,
     /// The outputs.
     pub seen: Vec<MeasuredOutput>,
     /// The part of the logs that it is of, as far as these have parameters for themselves.
@@ -116,7 +137,7 @@ pub struct Run {
     shared: Vec<Extra>,
     /// The closed loop, where the input is not as logged.
     closed: Option<Arc<Closed>>,
-    input: Signal,
+    inputs: Vec<Signal>,
     initial: State,
     every: f64,
     until: f64,
@@ -170,7 +191,7 @@ impl Run {
         let whole = rows.len() == log.time.len();
         let shift = if whole { 0.0 } else { log.time[rows.start] };
         let time: Vec<f64> = log.time[rows.clone()].iter().map(|t| t - shift).collect();
-        let logged = log.input[rows.clone()].to_vec();
+        let logged: Vec<Vec<f64>> = log.inputs.iter().map(|input| input[rows.clone()].to_vec()).collect();
         let n = time.len();
         let (first, last) = (time[0], time[n - 1]);
         let interval = (last - first) / (n - 1) as f64;
@@ -187,15 +208,19 @@ impl Run {
         // On the raster, where the solver need not stop twice for a sample.
         let grid = Grid::new(every, until);
         let times = if even { (0..n as u64).map(|k| grid.time(k)).collect() } else { time.clone() };
-        let is_logged = matches!(&experiment.inputs[0], Signal::Sampled { times: own, .. } if *own == log.time);
-        let input = if whole && !is_logged {
-            experiment.inputs[0].clone()
+        let is_logged = |input: &Signal| matches!(input, Signal::Sampled { times: own, .. } if *own == log.time);
+        let inputs = if whole && !experiment.inputs.iter().all(is_logged) {
+            experiment.inputs.clone()
         } else {
-            // A window that is late still has the input of what came before it.
+            // A window that is late still has the inputs of what came before it.
             let earlier = rows.start.saturating_sub(INPUT_BEFORE_WINDOW)..rows.start;
             let before = log.time[earlier.clone()].iter().map(|t| t - shift);
-            let values = log.input[earlier].iter().chain(&logged).copied().collect();
-            Signal::Sampled { times: before.chain(times).collect(), values, hold: log.hold }
+            let times: Vec<f64> = before.chain(times).collect();
+            let of_drive = |(input, logged): (&Vec<f64>, &Vec<f64>)| {
+                let values = input[earlier.clone()].iter().chain(logged).copied().collect();
+                Signal::Sampled { times: times.clone(), values, hold: log.hold }
+            };
+            log.inputs.iter().zip(&logged).map(of_drive).collect()
         };
         let limit = setting.fitted_until.map_or(f64::INFINITY, |until| until - shift);
         let fitted_rows = if setting.held_out { 0 } else { time.partition_point(|&t| t < limit) };
@@ -216,7 +241,7 @@ impl Run {
             extras: Vec::new(),
             shared: Vec::new(),
             closed: None,
-            input,
+            inputs,
             initial: experiment.initial,
             every,
             until,
@@ -224,7 +249,7 @@ impl Run {
         }
     }
 
-    /// Has the controller of a case follow the reference of the log, instead of taking the input as logged.
+    /// Has the controller of an axis follow the reference of the log, instead of taking the input as logged.
     ///
     /// A loop hides in its output what it makes up for, and shows it in its command: what was logged as the input is
     /// compared, too.
@@ -243,7 +268,7 @@ impl Run {
                 let given = |input: &f64| {
                     limit.map_or(amplifier.gain * input, |limit| (amplifier.gain * input).clamp(-limit, limit))
                 };
-                self.seen.push(MeasuredOutput::new(quantity, false, self.logged.iter().map(given).collect()));
+                self.seen.push(MeasuredOutput::new(quantity, false, self.logged[0].iter().map(given).collect()));
             }
             self.closed =
                 Some(Arc::new(Closed { design: design.clone(), model: case.machine.clone(), profile, added }));
@@ -275,12 +300,12 @@ impl Run {
 
     /// True if an extra does no more than shift outputs.
     pub(crate) fn only_shifts(&self, machine: &Machine, extra: &Extra) -> bool {
-        // Whether it matters where the cart is, and not only how far it goes.
-        let is_placed = machine.changes_along_travel() || machine.cart.travel.is_some();
+        // Whether it matters where the slides are, and not only how far they go.
+        let is_placed = machine.changes_along_travel() || machine.slides().any(|slide| slide.travel.is_some());
         match extra.what {
             Nuisance::Bias(_) => true,
-            Nuisance::StartPosition => self.seen.iter().all(|seen| !seen.absolute) && !is_placed,
-            Nuisance::Delay | Nuisance::InputGain | Nuisance::InputOffset | Nuisance::StartSpeed => false,
+            Nuisance::StartPosition(_) => self.seen.iter().all(|seen| !seen.absolute) && !is_placed,
+            Nuisance::Delay | Nuisance::InputGain(_) | Nuisance::InputOffset(_) | Nuisance::StartSpeed(_) => false,
         }
     }
 
@@ -290,7 +315,7 @@ impl Run {
         for (i, seen) in self.seen.iter().enumerate() {
             let per_unit = match extra.what {
                 Nuisance::Bias(index) if index == i => 1.0,
-                Nuisance::StartPosition => per_position(seen.quantity, machine.pulley_radius),
+                Nuisance::StartPosition(slide) => per_position(machine, seen.quantity, slide),
                 _ => 0.0,
             };
             for (out, weight) in out[i * n..(i + 1) * n].iter_mut().zip(&seen.weights) {
@@ -324,22 +349,29 @@ impl Run {
         pairs.find(|(extra, _)| extra.what == what).map(|(_, value)| *value)
     }
 
-    /// The input as logged, or as the case gives it.
-    pub(crate) fn input(&self) -> &Signal {
-        &self.input
+    /// The inputs of the drives as logged, or as the case gives them.
+    pub(crate) fn inputs(&self) -> &[Signal] {
+        &self.inputs
     }
 
-    /// Where the model begins with these values of the extras, which set the gain of its amplifier, too.
+    /// Where the model begins with these values of the extras, which set the gains of its amplifiers, too.
     pub(crate) fn initial(&self, machine: &mut Machine, extras: &[f64]) -> State {
-        machine.drives[0].amplifier.gain *= self.extra(Nuisance::InputGain, extras).unwrap_or(1.0);
-        let r = machine.pulley_radius;
-        let mut initial = self.initial;
-        if let Some(position) = self.extra(Nuisance::StartPosition, extras) {
-            (initial.position[CART], initial.position[DRIVE], initial.position[IDLER]) =
-                (position, position / r, position / r);
+        for (drive, unit) in machine.drives.iter_mut().enumerate() {
+            unit.amplifier.gain *= self.extra(Nuisance::InputGain(drive), extras).unwrap_or(1.0);
         }
-        if let Some(speed) = self.extra(Nuisance::StartSpeed, extras) {
-            (initial.speed[CART], initial.speed[DRIVE], initial.speed[IDLER]) = (speed, speed / r, speed / r);
+        let slides = machine.geometry().slides;
+        // Of all slides, where an extra has one of them.
+        let fitted = |what: fn(usize) -> Nuisance, given: &[f64]| -> Option<Vec<f64>> {
+            let own: Vec<_> = (0..slides.len()).map(|slide| self.extra(what(slide), extras)).collect();
+            let all = own.iter().zip(slides).map(|(own, slide)| own.unwrap_or(given[slide.body]));
+            own.iter().any(Option::is_some).then(|| all.collect())
+        };
+        let mut initial = self.initial;
+        if let Some(positions) = fitted(Nuisance::StartPosition, &initial.position) {
+            initial.position = machine.without_strain(&positions, &[]).position;
+        }
+        if let Some(speeds) = fitted(Nuisance::StartSpeed, &initial.speed) {
+            initial.speed = machine.without_strain(&[], &speeds).speed;
         }
         initial
     }
@@ -347,9 +379,15 @@ impl Run {
     /// The experiment that the model is put through, with these values of the extras.
     pub fn experiment(&self, machine: &mut Machine, extras: &[f64]) -> Experiment {
         let initial = self.initial(machine, extras);
+        let inputs = (0..self.inputs.len()).map(|drive| self.fed(drive, extras)).collect();
+        Experiment { inputs, initial, until: self.until, every: self.every, ..empty() }
+    }
+
+    /// The input of a drive, later and with more added to it by the extras.
+    fn fed(&self, drive: usize, extras: &[f64]) -> Signal {
         let delay = self.extra(Nuisance::Delay, extras).unwrap_or(0.0);
-        let offset = self.extra(Nuisance::InputOffset, extras).unwrap_or(0.0);
-        let mut input = match &self.input {
+        let offset = self.extra(Nuisance::InputOffset(drive), extras).unwrap_or(0.0);
+        let mut input = match &self.inputs[drive] {
             Signal::Sampled { times, values, hold } if delay != 0.0 || offset != 0.0 => Signal::Sampled {
                 times: times.iter().map(|t| t + delay).collect(),
                 values: values.iter().map(|u| u + offset).collect(),
@@ -366,7 +404,7 @@ impl Run {
                 input = Signal::Sum(vec![input, Signal::Step { value: offset, at: 0.0 }]);
             }
         }
-        Experiment { inputs: vec![input], initial, until: self.until, every: self.every, ..empty() }
+        input
     }
 
     /// The model's outputs at the log's times, one column for each, biases not yet added; false where it does not
@@ -384,15 +422,15 @@ impl Run {
         let mut slopes: Vec<Vec<f64>> = vec![Vec::new(); quantities.len()];
         out.iter_mut().for_each(Vec::clear);
         let solver = Solver::of(&machine);
-        let cart = machine.cart.clone();
+        let shown = machine.clone();
         let mut take = |block: &Trajectory| {
             for (i, quantity) in quantities.iter().enumerate() {
-                match quantity {
-                    Quantity::CartAcceleration => out[i].extend(cart_acceleration(block, &cart)),
-                    _ => out[i].extend_from_slice(column(block, *quantity)),
+                match quantity.is_acceleration() {
+                    true => out[i].extend(acceleration(block, &shown, *quantity)),
+                    false => out[i].extend_from_slice(column(block, *quantity)),
                 }
                 if !self.even
-                    && let Some(speed) = speed_of(*quantity)
+                    && let Some(speed) = quantity.speed()
                 {
                     slopes[i].extend_from_slice(column(block, speed));
                 }
@@ -406,10 +444,8 @@ impl Run {
             }
             None => {
                 machine.encoder = None;
-                // A rotor of its own has columns that only the whole table has, and so have all forces at the cart.
-                let is_beyond = |quantity: &Quantity| {
-                    quantity.name().starts_with("rotor") || *quantity == Quantity::CartAcceleration
-                };
+                // A rotor of its own has columns that only the whole table has, and so have all forces on a slide.
+                let is_beyond = |quantity: &Quantity| quantity.is_of_rotor() || quantity.is_acceleration();
                 let detail = if quantities.iter().any(is_beyond) { Detail::Full } else { Detail::Lean };
                 bench.mount(&machine).and_then(|()| bench.run(&experiment, detail, &mut take))
             }
@@ -491,32 +527,18 @@ pub(crate) fn heading_of(quantity: Quantity) -> (&'static str, &'static str) {
         "motor_voltage" => "voltage",
         "rotor_angle" => "drive_angle",
         "rotor_speed" => "drive_speed",
+        "left_rotor_angle" => "left_angle",
+        "left_rotor_speed" => "left_speed",
+        "right_rotor_angle" => "right_angle",
+        "right_rotor_speed" => "right_speed",
         _ => name,
     };
     (name, other)
 }
 
-/// The speed that belongs to a position.
-pub(crate) fn speed_of(quantity: Quantity) -> Option<Quantity> {
-    match quantity {
-        Quantity::DriveAngle => Some(Quantity::DriveSpeed),
-        Quantity::CartPosition => Some(Quantity::CartSpeed),
-        _ => None,
-    }
-}
-
-/// True if it is a way, so that a constant added to it changes nothing else.
-pub fn is_position(quantity: Quantity) -> bool {
-    quantity.name().ends_with("_angle") || quantity.name().ends_with("_position")
-}
-
-/// By how much a quantity is more for each metre that the start is further on.
-pub(crate) fn per_position(quantity: Quantity, pulley_radius: f64) -> f64 {
-    match (quantity.name().ends_with("_position"), is_position(quantity)) {
-        (true, _) => 1.0,
-        (_, true) => 1.0 / pulley_radius,
-        (_, false) => 0.0,
-    }
+/// By how much a quantity is more for each metre that the start of a slide is further on.
+pub(crate) fn per_position(machine: &Machine, quantity: Quantity, slide: usize) -> f64 {
+    machine.geometry().by_slides(quantity, machine.pulley_radius).get(slide).copied().unwrap_or(0.0)
 }
 
 /// The value at `at` rows of a raster of `h`.
@@ -630,7 +652,7 @@ mod tests {
             name: experiment.name.clone(),
             file: Default::default(),
             time: column("time"),
-            input: column("voltage"),
+            inputs: vec![column("voltage")],
             added: None,
             hold: Hold::Zero,
             reference: None,
@@ -639,7 +661,8 @@ mod tests {
                 .to_vec(),
             ended: None,
         };
-        experiment.inputs[0] = Signal::Sampled { times: log.time.clone(), values: log.input.clone(), hold: log.hold };
+        experiment.inputs[0] =
+            Signal::Sampled { times: log.time.clone(), values: log.inputs[0].clone(), hold: log.hold };
         let predicted = |run: &mut Run, known: &[(Nuisance, f64)]| {
             let extra = |what| Extra { what, start: 0.0, unit: 1.0, low: -1.0, high: 1.0, known: None };
             run.extras = known.iter().map(|(what, _)| extra(*what)).collect();
@@ -654,7 +677,7 @@ mod tests {
         let setting = Setting { window: Some(0.04), ..Setting::default() };
         let mut first = 0;
         for mut run in Run::all(&experiment, &log, &setting) {
-            let begin = [(Nuisance::StartPosition, whole[0][first]), (Nuisance::StartSpeed, whole[1][first])];
+            let begin = [(Nuisance::StartPosition(0), whole[0][first]), (Nuisance::StartSpeed(0), whole[1][first])];
             let own = predicted(&mut run, &[late, begin[0], begin[1]]);
             for (own, whole) in own.iter().zip(&whole) {
                 for (k, (own, whole)) in own.iter().zip(&whole[first..]).enumerate() {

@@ -2,11 +2,10 @@
 
 use super::problem::Problem;
 use super::residuals::{Bounds, Differences, Step};
-use super::run::{Nuisance, Run, between, heading_of, per_position, speed_of};
+use super::run::{Nuisance, Run, between, heading_of, per_position};
 use crate::fit::limits::{EQUATION_STEP, START_STEP};
 use crate::log::Quantity;
 use crate::machine::Machine;
-use crate::machine::axis::{CART, DRIVE};
 use crate::mechanism::Mechanism;
 use crate::signal::Signal;
 use crate::solve::{Begun, Bench, Differentiated, Variable};
@@ -50,9 +49,13 @@ impl Problem<'_> {
         let rows = run.time.len();
         if let Some(residuals) = residuals {
             let own = self.extras_of(index, x);
-            let start = if is_moved { run.extra(Nuisance::StartPosition, &own).unwrap_or(0.0) } else { 0.0 };
+            let slides = 0..machine.geometry().slides.len();
+            let start =
+                |slide| if is_moved { run.extra(Nuisance::StartPosition(slide), &own).unwrap_or(0.0) } else { 0.0 };
+            let starts: Vec<f64> = slides.map(start).collect();
             let shown = run.seen.iter().zip(&slopes).map(|(seen, (values, _))| {
-                let by = start * per_position(seen.quantity, machine.pulley_radius);
+                let part = |(slide, start): (usize, &f64)| start * per_position(machine, seen.quantity, slide);
+                let by: f64 = starts.iter().enumerate().map(part).sum();
                 values.iter().map(|value| value + by).collect()
             });
             let shown: Vec<Vec<f64>> = shown.collect();
@@ -87,7 +90,7 @@ impl Problem<'_> {
     fn extras_from(&self, index: usize, x: &[f64], is_moved: bool) -> Vec<f64> {
         let mut extras = self.extras_of(index, x);
         for (extra, value) in self.runs[index].extras.iter().zip(&mut extras) {
-            if is_moved && extra.what == Nuisance::StartPosition {
+            if is_moved && matches!(extra.what, Nuisance::StartPosition(_)) {
                 *value = 0.0;
             }
         }
@@ -110,12 +113,15 @@ impl Problem<'_> {
         };
         match extra.map(|extra| (extra.what, extra.unit)) {
             Some((Nuisance::Delay, unit)) => Some(Variable::Delay(unit)),
-            Some((Nuisance::InputOffset, unit)) => Some(Variable::Offset(unit, run.begins(&self.extras_of(index, x))?)),
+            Some((Nuisance::InputOffset(drive), unit)) => {
+                let from = run.begins(drive, &self.extras_of(index, x))?;
+                Some(Variable::Offset { drive, unit, from })
+            }
             Some((Nuisance::Bias(_), _)) => None,
-            Some((Nuisance::StartPosition | Nuisance::StartSpeed, _)) => {
+            Some((Nuisance::StartPosition(_) | Nuisance::StartSpeed(_), _)) => {
                 Some(Variable::central(START_STEP, |by| begun(x[j] + by)))
             }
-            None | Some((Nuisance::InputGain, _)) => {
+            None | Some((Nuisance::InputGain(_), _)) => {
                 let steps = Differences::Coarse(x.iter().map(|x| EQUATION_STEP * x.abs().max(1.0)).collect());
                 let step = Step::new(x, bounds, j, &steps);
                 let second = step.second?;
@@ -143,7 +149,7 @@ type Sloped = (Vec<f64>, Vec<Vec<f64>>);
 impl Run {
     /// True if its start only shifts its outputs.
     fn is_shifted(&self, machine: &Machine) -> bool {
-        let mut starts = self.extras.iter().filter(|extra| extra.what == Nuisance::StartPosition);
+        let mut starts = self.extras.iter().filter(|extra| matches!(extra.what, Nuisance::StartPosition(_)));
         starts.any(|extra| self.only_shifts(machine, extra))
     }
 
@@ -168,15 +174,15 @@ impl Run {
         let mechanism = machine.mechanism();
         let mut outputs = Vec::new();
         for seen in &self.seen {
-            outputs.push(differentiated(&mechanism, seen.quantity)?);
+            outputs.push(differentiated(&machine, &mechanism, seen.quantity)?);
         }
         // Between rows positions go by speeds.
         let mut bends = vec![None; self.seen.len()];
         if !self.is_even() {
             for (bend, seen) in bends.iter_mut().zip(&self.seen) {
-                if let Some(speed) = speed_of(seen.quantity) {
+                if let Some(speed) = seen.quantity.speed() {
                     *bend = Some(outputs.len());
-                    outputs.push(differentiated(&mechanism, speed)?);
+                    outputs.push(differentiated(&machine, &mechanism, speed)?);
                 }
             }
         }
@@ -201,10 +207,10 @@ impl Run {
         Some(all)
     }
 
-    /// When what is added to the input begins to be, s; none where the input has no such moment.
-    fn begins(&self, extras: &[f64]) -> Option<f64> {
+    /// When what is added to the input of a drive begins to be, s; none where the input has no such moment.
+    fn begins(&self, drive: usize, extras: &[f64]) -> Option<f64> {
         let delay = self.extra(Nuisance::Delay, extras);
-        match self.input() {
+        match &self.inputs()[drive] {
             Signal::Sampled { times, .. } => Some(times.first()? + delay.unwrap_or(0.0)),
             // It is added from the first instant on, whenever the rest comes.
             _ if delay.is_none() => Some(0.0),
@@ -214,10 +220,13 @@ impl Run {
 }
 
 /// A quantity of a log as what is differentiated.
-fn differentiated(mechanism: &Mechanism, quantity: Quantity) -> Option<Differentiated> {
+fn differentiated(machine: &Machine, mechanism: &Mechanism, quantity: Quantity) -> Option<Differentiated> {
     let shown = |name: &str| mechanism.columns.iter().find(|heading| heading.name == name);
-    if quantity == Quantity::CartAcceleration {
-        return shown("span1_force").map(|_| Differentiated::Acceleration(CART));
+    if quantity.is_acceleration() {
+        let geometry = machine.geometry();
+        let body = geometry.bodies.iter().position(|body| Some(body.label.key) == quantity.body());
+        let is_elastic = shown(&format!("{}_force", geometry.spans[0].column)).is_some();
+        return body.filter(|_| is_elastic).map(Differentiated::Acceleration);
     }
     let (name, other) = heading_of(quantity);
     shown(name).or_else(|| shown(other)).map(|heading| Differentiated::Shown(heading.shown))
@@ -225,6 +234,7 @@ fn differentiated(mechanism: &Mechanism, quantity: Quantity) -> Option<Different
 
 /// True if a variable changes the radius of the pulleys.
 fn changes_radius(machine: &Machine, variable: &Variable) -> bool {
-    let is_other = |begun: &Begun| begun.mechanism.bodies[DRIVE].kind.lever() != machine.pulley_radius;
+    let pulley = machine.geometry().drives[0].pulley;
+    let is_other = |begun: &Begun| begun.mechanism.bodies[pulley].kind.lever() != machine.pulley_radius;
     matches!(variable, Variable::Machine { points, .. } if points.iter().any(is_other))
 }

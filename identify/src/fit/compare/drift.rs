@@ -6,7 +6,7 @@
 //! explain more than Coulomb friction in one direction where it fell in both.
 
 use crate::case::{Case, Nuisances, Plan, Scope};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::fit::asked::problem::Stop;
 use crate::fit::limits::CHANGE_ALIKE;
 use crate::fit::search::starts::{Searched, Work};
@@ -126,6 +126,10 @@ fn pairs(machine: &Machine) -> Vec<Vec<String>> {
 /// Changes one parameter of the machine after the other, each by itself, to meet the logs of `case`: what `plan`
 /// searches for, whatever else may be off, pairs that change together, and delay, gain and offset of the input.
 pub fn drift(case: &Case, plan: &Plan, stop: Option<Stop>, watch: &mut dyn FnMut(&str) -> Flow) -> Result<Drift> {
+    if !case.machine.has_one_coordinate() {
+        return Err(Error::new("single changes are looked for on a single axis, and the case describes a gantry")
+            .next("free the parameters that may have changed in [fit], and use `taut fit`"));
+    }
     let none = nothing(plan);
     let quiet = &mut |_: &[f64], _| Flow::Continue;
     watch("the machine as it is");

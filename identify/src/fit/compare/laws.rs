@@ -2,7 +2,6 @@
 
 use crate::case::{Case, Files, Plan};
 use crate::error::{Error, Result};
-use crate::fit::asked::run::is_position;
 use crate::fit::limits::{BRISTLE_BEND, MOST_BREAKAWAY, SPEED_POINTS, STRIBECK_ABOVE, STRIBECK_FALL, TRAVEL_POINTS};
 use crate::friction::Friction;
 use crate::log::Quantity;
@@ -310,7 +309,7 @@ fn fastest(case: &Case) -> f64 {
         log.outputs.iter().map(move |output| {
             let arm = if output.quantity.name().starts_with("cart") { 1.0 } else { r };
             let values = &output.values;
-            if !is_position(output.quantity) {
+            if !output.quantity.is_position() {
                 return arm * values.iter().filter(|v| v.is_finite()).fold(0.0, |most: f64, v| most.max(v.abs()));
             }
             let step = (values.len() / 100).max(1);
@@ -333,7 +332,7 @@ fn travel(case: &Case) -> (f64, f64) {
     let r = case.machine.pulley_radius;
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
     for log in case.experiments.iter().filter_map(|experiment| experiment.log.as_ref()) {
-        for output in log.outputs.iter().filter(|output| is_position(output.quantity)) {
+        for output in log.outputs.iter().filter(|output| output.quantity.is_position()) {
             let arm = if output.quantity == Quantity::CartPosition { 1.0 } else { r };
             for value in output.values.iter().filter(|value| value.is_finite()) {
                 (low, high) = (low.min(arm * value), high.max(arm * value));

@@ -133,6 +133,10 @@ pub fn compare(
     watch: &mut dyn FnMut(&str) -> Flow,
 ) -> Result<Comparison> {
     case.complete()?;
+    if !case.machine.has_one_coordinate() {
+        return Err(Error::new("friction laws are compared on a single axis, and the case describes a gantry")
+            .next("fit each law with `taut fit`, and compare the errors of the logs that [fit] holds out"));
+    }
     if setting.laws.is_empty() || setting.windows.is_empty() {
         return Err(
             Error::new("there is nothing to compare").next("name a law and a length of windows, or leave both out")

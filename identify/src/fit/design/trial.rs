@@ -93,7 +93,7 @@ impl Task<'_> {
         let log = Log {
             name: name.to_string(),
             file: Default::default(),
-            input: time.iter().map(|&t| input.value(t)).collect(),
+            inputs: vec![time.iter().map(|&t| input.value(t)).collect()],
             time,
             added: None,
             hold: Hold::Zero,
@@ -117,8 +117,10 @@ impl Task<'_> {
         for channel in &self.measured {
             let deviation = Self::deviation(channel);
             problem.weigh(channel.quantity, deviation, channel.step.is_some());
-            problem.doubt_starts(channel.quantity, deviation);
         }
+        let deviations: Vec<_> =
+            self.measured.iter().map(|channel| (channel.quantity, Self::deviation(channel))).collect();
+        problem.doubt_starts(&deviations);
         Some(problem)
     }
 

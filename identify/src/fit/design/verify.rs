@@ -6,7 +6,6 @@ use crate::case::{Case, parameters};
 use crate::chance::uniform;
 use crate::error::{Error, Result};
 use crate::fit::asked::problem::Stop;
-use crate::fit::asked::run::is_position;
 use crate::fit::fit;
 use crate::fit::limits::START_OFF;
 use crate::fit::search::point::Ending;
@@ -96,6 +95,6 @@ pub fn verify(case: &Case, request: &Request, found: &Designed, logs: usize, sto
 fn step(task: &Task) -> f64 {
     let arm =
         |quantity: Quantity| if quantity == Quantity::CartPosition { 1.0 } else { task.case.machine.pulley_radius };
-    let positions = task.measured.iter().filter(|channel| is_position(channel.quantity));
+    let positions = task.measured.iter().filter(|channel| channel.quantity.is_position());
     positions.map(|channel| arm(channel.quantity) * channel.step.unwrap_or(0.0)).fold(0.0, f64::max)
 }

@@ -24,7 +24,6 @@ mod series;
 pub(crate) mod student;
 
 use crate::fit::asked::problem::Problem;
-use crate::fit::asked::run::is_position;
 use crate::fit::limits::{
     LEAST_POWER, MOST_POWERS, NOISE_TURNS, NOTHING, POWER_RATIO, ROUNDED, SWING_AROUND, SWING_BEFOREHAND,
     SWING_DAMPING, SWING_FASTEST, SWING_POWERS, SWING_RATIO, SWING_ROUNDS, SWING_SHRINKS, SWING_STEPS, SWINGS_IN_LOG,
@@ -217,7 +216,7 @@ impl Estimate {
         let all = || scales.iter().flatten().flatten().copied();
         let unevenness =
             if scales.is_some() { all().fold(0.0, f64::max) / all().fold(f64::INFINITY, f64::min) } else { 1.0 };
-        let lengths = if is_position(self.quantity) { self.waves_beside(&mut told)? } else { Vec::new() };
+        let lengths = if self.quantity.is_position() { self.waves_beside(&mut told)? } else { Vec::new() };
         let first = best(&told)?;
         let (top, freedom, slow) = (first.weight, first.freedom, first.slow.clone());
         let (waves, shift, unsure) = self.waves(first, &lengths);

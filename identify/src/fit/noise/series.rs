@@ -1,7 +1,6 @@
 //! The rows of a quantity, taken together where they are many or share an error of rounding.
 
 use crate::fit::asked::problem::Problem;
-use crate::fit::asked::run::is_position;
 use crate::fit::limits::BLOCKS;
 use crate::log::Quantity;
 use nalgebra::DMatrix;
@@ -122,7 +121,7 @@ pub(super) fn series(
             }
         }
         let blocks = series.time.len();
-        series.speed = match is_position(quantity) && blocks > 1 {
+        series.speed = match quantity.is_position() && blocks > 1 {
             true => (0..blocks)
                 .map(|k| {
                     let (before, after) = (k.saturating_sub(1), (k + 1).min(blocks - 1));

@@ -341,7 +341,7 @@ mod tests {
             name: "a".into(),
             file: Default::default(),
             time: column("time"),
-            input: column("voltage"),
+            inputs: vec![column("voltage")],
             added: None,
             hold: Hold::Zero,
             reference: None,

@@ -254,11 +254,11 @@ impl Scale<'_> {
         (self.value)(x)
     }
 
-    fn of_extra(name: String, unit: &'static str, extra: Extra) -> Self {
+    fn of_extra((name, known_as): (String, String), unit: &'static str, extra: Extra) -> Self {
         Scale {
             name,
             unit,
-            known_as: vec![(extra.what.name().to_string(), 1.0)],
+            known_as: vec![(known_as, 1.0)],
             value: Box::new(move |x| extra.start + extra.unit * x),
             variable: Box::new(move |value| (value - extra.start) / extra.unit),
             slope: Box::new(move |_| extra.unit),
@@ -268,16 +268,7 @@ impl Scale<'_> {
 }
 
 fn scales<'a>(problem: &'a Problem<'a>) -> Vec<Scale<'a>> {
-    let of_input = |what: Nuisance| match what {
-        Nuisance::Delay => "s",
-        Nuisance::InputOffset if problem.machine.drives[0].amplifier.mode == crate::machine::AmplifierMode::Current => {
-            "A"
-        }
-        Nuisance::InputOffset => "V",
-        Nuisance::StartPosition => "m",
-        Nuisance::StartSpeed => "m/s",
-        _ => "",
-    };
+    let machine = &problem.machine;
     let mut scales = Vec::new();
     for (j, parameter) in problem.parameters.iter().enumerate() {
         scales.push(Scale {
@@ -291,7 +282,8 @@ fn scales<'a>(problem: &'a Problem<'a>) -> Vec<Scale<'a>> {
         });
     }
     for extra in &problem.shared {
-        scales.push(Scale::of_extra(extra.what.name().to_string(), of_input(extra.what), *extra));
+        let name = extra.what.name(machine);
+        scales.push(Scale::of_extra((name.clone(), name), extra.what.unit(machine), *extra));
     }
     let of_log = |run: &Run| match run.window {
         0 => file_name(&run.name),
@@ -304,9 +296,10 @@ fn scales<'a>(problem: &'a Problem<'a>) -> Vec<Scale<'a>> {
                     let quantity = run.seen[output].quantity;
                     (format!("bias_{}", quantity.name()), quantity.unit())
                 }
-                what => (what.name().to_string(), of_input(what)),
+                what => (what.name(machine), what.unit(machine)),
             };
-            scales.push(Scale::of_extra(format!("{}.{name}", of_log(run)), unit, extra));
+            let known_as = extra.what.name(machine);
+            scales.push(Scale::of_extra((format!("{}.{name}", of_log(run)), known_as), unit, extra));
         }
     }
     scales

@@ -10,7 +10,7 @@
 
 use super::triangle::inverse_of_square;
 use crate::fit::asked::problem::Problem;
-use crate::fit::asked::run::{Run, is_position};
+use crate::fit::asked::run::Run;
 use crate::fit::limits::{
     LONGEST_DELAY, LONGEST_SHIFT, REGRESSION_BLOCK, REGRESSION_NOISE, REST_ROWS, SHIFT_SHARE, SHIFT_STRIDE,
     SHIFT_UNEXPLAINED, SHORTEST_DELAY, SUSPECT_DELAY, SUSPECT_SHIFT, WIDEST_IN_REGRESSION, WIDTHS,
@@ -92,8 +92,12 @@ fn least_left(logs: &[Smoothed], rows: RangeInclusive<isize>, apart: isize, most
 pub(crate) fn smoothed<'a>(problem: &'a Problem) -> Vec<Smoothed<'a>> {
     let noise = problem.noise();
     let mut all = Vec::new();
+    // One balance of torques is that of one coordinate.
+    if !problem.machine.has_one_coordinate() {
+        return all;
+    }
     for run in problem.runs.iter().filter(|run| run.is_even()) {
-        let seen = run.seen.iter().position(|seen| is_position(seen.quantity) && !seen.absolute);
+        let seen = run.seen.iter().position(|seen| seen.quantity.is_position() && !seen.absolute);
         if let Some(output) = seen {
             all.extend(Smoothed::new(run, &problem.machine, output, noise.of(run.seen[output].quantity)));
         }
@@ -162,7 +166,7 @@ impl<'a> Smoothed<'a> {
         let mut block: Vec<[f64; 5]> = Vec::with_capacity(REGRESSION_BLOCK);
         for (k, &[speed, acceleration]) in self.derivatives.iter().enumerate() {
             let row = k + self.margin;
-            let given = amplifier.gain * run.logged[row.saturating_add_signed(-late).min(run.logged.len() - 1)];
+            let given = amplifier.gain * run.logged[0][row.saturating_add_signed(-late).min(run.time.len() - 1)];
             let clipped = |value: f64, limit: Option<f64>| limit.map_or(value, |limit| value.clamp(-limit, limit));
             // τ_M = η n K_t i, i = (V − K_e n φ̇)/R
             let current = match amplifier.mode {

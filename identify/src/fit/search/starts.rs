@@ -8,8 +8,11 @@ use crate::chance;
 use crate::error::{Error, Result};
 use crate::fit::asked::problem::{Problem, Stop, extent};
 use crate::fit::asked::residuals::Residuals;
-use crate::fit::asked::run::is_position;
-use crate::fit::limits::{FILE_ROUNDING, HUBER, ROUGH_TOLERANCE, SWINGS_KEEP, TRIAL_ITERATIONS, WEIGHT_ROUNDS};
+use crate::fit::asked::run::Run;
+use crate::fit::limits::{
+    FILE_ROUNDING, HUBER, MORE_THAN_NOISE, MOST_START_WINDOWS, ROUGH_TOLERANCE, START_WINDOWS, SWINGS_KEEP,
+    TRIAL_ITERATIONS, WEIGHT_ROUNDS,
+};
 use crate::log::Quantity;
 use crate::solve::Flow;
 use nalgebra::DMatrix;
@@ -68,7 +71,7 @@ pub(crate) fn search_as_far<'a>(
         work.evaluations += minimum.evaluations;
         minimum
     };
-    let start = first_guess(&mut problem);
+    let start = first_guess(case, plan, &mut problem, &mut descend)?;
     let mut best = descend(&mut problem, &start, &whole);
     if best.ending == Ending::Failed {
         return Err(Error::new("the model does not get through these logs with the values of the case file")
@@ -177,7 +180,7 @@ fn uniform(problem: &Problem) -> bool {
 fn swings(problem: &Problem, at: &Minimum) -> bool {
     let all = problem.runs.iter().enumerate().flat_map(|(index, run)| {
         let (first, n) = (problem.first_row(index), run.time.len());
-        let own = run.seen.iter().enumerate().filter(|(_, seen)| is_position(seen.quantity));
+        let own = run.seen.iter().enumerate().filter(|(_, seen)| seen.quantity.is_position());
         own.map(move |(output, _)| &at.residuals[first + output * n..first + (output + 1) * n])
     });
     let is_swinging = |values: &[f64]| {
@@ -206,21 +209,98 @@ fn told_beforehand(problem: &Problem, noise: &[(Quantity, f64)]) -> bool {
     problem.runs.iter().flat_map(|run| &run.extras).any(|extra| extra.known.is_some_and(|own| own > 0.1 * arm * most))
 }
 
-/// Where the case starts, or with the totals that a regression finds, whichever is nearer to the logs.
-fn first_guess(problem: &mut Problem) -> Vec<f64> {
+/// A search of a problem from a point.
+type Descend<'d> = dyn FnMut(&mut Problem, &[f64], &Options) -> Minimum + 'd;
+
+/// Where the case starts, or what a regression makes of that, or of a machine with several coordinates fits in short
+/// windows, whichever is nearer to the logs.
+fn first_guess(case: &Case, plan: &Plan, problem: &mut Problem, descend: &mut Descend) -> Result<Vec<f64>> {
     let start = problem.start();
-    let Some(balance) = regression(problem) else { return start };
-    let bounds = problem.bounds();
-    let mut guess = start.clone();
-    for (j, value) in balance.guess(problem).into_iter().enumerate() {
-        let x = problem.variable(j, value);
-        guess[j] = if x.is_finite() { x.clamp(bounds.low[j], bounds.high[j]) } else { start[j] };
-    }
+    let guess = match problem.machine.has_one_coordinate() {
+        true => by_regression(problem, &start),
+        false => in_windows(case, plan, problem, &start, descend)?,
+    };
+    let Some(guess) = guess else { return Ok(start) };
     let mut residuals = vec![0.0; problem.rows()];
     let mut cost = |x: &[f64]| {
         if problem.evaluate(x, &mut residuals) { residuals.iter().map(|r| r * r).sum() } else { f64::INFINITY }
     };
-    if cost(&guess) < cost(&start) { guess } else { start }
+    Ok(if cost(&guess) < cost(&start) { guess } else { start })
+}
+
+/// The start with the totals that a regression finds.
+fn by_regression(problem: &Problem, start: &[f64]) -> Option<Vec<f64>> {
+    let balance = regression(problem)?;
+    let bounds = problem.bounds();
+    let mut guess = start.to_vec();
+    for (j, value) in balance.guess(problem).into_iter().enumerate() {
+        let x = problem.variable(j, value);
+        guess[j] = if x.is_finite() { x.clamp(bounds.low[j], bounds.high[j]) } else { start[j] };
+    }
+    Some(guess)
+}
+
+/// The nearest to the logs of what a few steps lead to from the start, and from fits in windows of a few swings of the
+/// belt, each window with a start of its own, and the next ones longer, until the residuals are noise; none where the
+/// plan has windows or a loop, or no step leads anywhere.
+///
+/// A belt whose stiffness is off swings out of step with the log, and the longer the log, the closer to each other are
+/// the minima that this makes. In a window of a few swings there is one.
+fn in_windows(
+    case: &Case,
+    plan: &Plan,
+    problem: &mut Problem,
+    start: &[f64],
+    descend: &mut Descend,
+) -> Result<Option<Vec<f64>>> {
+    let globals = problem.globals();
+    if plan.windows.is_some() || plan.closed_loop || globals == 0 {
+        return Ok(None);
+    }
+    let rough =
+        Options { iterations: TRIAL_ITERATIONS, tolerance: ROUGH_TOLERANCE, evolutions: 0, ..Options::default() };
+    let total: f64 = problem.runs.iter().map(|run| run.time.last().copied().unwrap_or(0.0)).sum();
+    let rows: usize = problem.runs.iter().map(|run| run.time.len()).sum();
+    let (mut guess, mut best) = (start.to_vec(), None);
+    for length in std::iter::once(None).chain(START_WINDOWS.map(Some)) {
+        if let Some(length) = length {
+            let length = (length * total / rows as f64).max(total / MOST_START_WINDOWS);
+            let windowed = Plan { windows: Some(length), ..plan.clone() };
+            let mut windowed = Problem::new(case, &windowed)?.stopped_by(problem.stop());
+            let mut first = windowed.start();
+            first[..globals].copy_from_slice(&guess[..globals]);
+            let found = descend(&mut windowed, &first, &rough);
+            problem.simulations += windowed.simulations;
+            if found.ending == Ending::Failed {
+                break;
+            }
+            guess[..globals].copy_from_slice(&found.x[..globals]);
+        }
+        let found = descend(problem, &guess, &rough);
+        let is_better = best.as_ref().is_none_or(|best: &Minimum| found.cost < best.cost);
+        if found.ending != Ending::Failed && is_better {
+            best = Some(found);
+        }
+        if problem.is_stopped() || best.as_ref().is_some_and(|best| is_noise(problem, best)) {
+            break;
+        }
+    }
+    Ok(best.map(|best| best.x))
+}
+
+/// True if residuals are no more than the noise of the logs. That is by third differences, which motion only adds to.
+fn is_noise(problem: &Problem, at: &Minimum) -> bool {
+    let noise = problem.noise();
+    let is_own = |(index, run): (usize, &Run)| {
+        let (first, n) = (problem.first_row(index), run.time.len());
+        run.seen.iter().enumerate().all(|(output, seen)| {
+            let of = |k: usize| at.residuals[first + output * n + k] / seen.weights[k];
+            let own: Vec<f64> = (0..n).filter(|&k| seen.weights[k] > 0.0).map(of).collect();
+            let mean = own.iter().map(|r| r * r).sum::<f64>() / own.len().max(1) as f64;
+            mean.sqrt() <= MORE_THAN_NOISE * noise.of(seen.quantity)
+        })
+    };
+    problem.runs.iter().enumerate().all(is_own)
 }
 
 /// A point within the bounds, near enough to the start to be a machine of its kind: within a factor of ten, or for what

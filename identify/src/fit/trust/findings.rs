@@ -8,17 +8,17 @@ use super::unexplained;
 use crate::case::{Case, Plan};
 use crate::fit::asked::controller::reproduced;
 use crate::fit::asked::problem::Problem;
-use crate::fit::asked::run::is_position;
 use crate::fit::limits::{
-    CAUSE_EXPLAINS, CAUSE_MOVES, CAUSE_WARNS, KINK_PROMISE, MOTOR_CONSTANTS, NORMAL, OPPOSITE, POOR_FIT, REPRODUCED,
+    CAUSE_EXPLAINS, CAUSE_MOVES, CAUSE_WARNS, KINK_PROMISE, MORE_THAN_NOISE, MOTOR_CONSTANTS, NORMAL, OPPOSITE,
+    POOR_FIT, REPRODUCED,
 };
 use crate::fit::noise::Wave;
 use crate::fit::search::point::Ending;
 use crate::fit::search::regression::Balance;
 use crate::fit::search::starts::Searched;
 use crate::log::{Note, Quantity, Remedy, Severity, Survey};
-use crate::machine::AmplifierMode;
-use crate::number::engineering;
+use crate::machine::{AmplifierMode, DriveAt, DriveUnit, Motor};
+use crate::number::{engineering, significant};
 use crate::solve::Bench;
 
 /// All there is to say, warnings first.
@@ -27,6 +27,7 @@ pub(crate) fn findings(case: &Case, plan: &Plan, found: &Searched, fit: &Fit, su
     all.extend(of_controller(case, plan));
     all.extend(of_cause(fit));
     all.extend(of_search(fit));
+    all.extend(of_noise(found));
     all.extend(of_motor(case, fit));
     all.extend(of_residuals(case, plan, found, fit, &all));
     all.sort_by_key(|finding| std::cmp::Reverse(finding.grade));
@@ -50,18 +51,29 @@ fn of_logs(case: &Case, plan: &Plan, found: &Searched, surveys: &[Survey]) -> Ve
         }
         let told = all.iter().any(|one: &Finding| one.code == "sign" && one.log.as_ref() == Some(name));
         if !told && is_opposite(&found.problem, name) && is_borne_out(case, plan, found, name, &Remedy::Reverse) {
-            let text = "it moves against what the model does with the values of the case: swapped wires, or a sign; \
-                        say scale = { input = -1 }, or -1 for the outputs";
-            all.push(Finding { grade: Grade::Warning, code: "sign", log: Some(name.clone()), text: text.into() });
+            let inputs = case.machine.geometry().drives.iter().map(|drive| format!("{} = -1", drive.input));
+            let text = format!(
+                "it moves against what the model does with the values of the case: swapped wires, or a sign; say \
+                 scale = {{ {} }}, or -1 for the outputs",
+                inputs.collect::<Vec<_>>().join(", ")
+            );
+            all.push(Finding { grade: Grade::Warning, code: "sign", log: Some(name.clone()), text });
         }
     }
     all
 }
 
+/// True if nothing that slides ends at a stop.
+fn is_free(case: &Case) -> bool {
+    case.machine.slides().all(|slide| slide.travel.is_none())
+}
+
 fn grade(note: &Note, case: &Case, plan: &Plan) -> Grade {
     match (note.severity, note.code) {
         (Severity::Suspicion, _) | (_, "still") => Grade::Warning,
-        (_, "saturation") if case.machine.cart.travel.is_none() || note.column == Some("input") => Grade::Warning,
+        (_, "saturation") if is_free(case) || note.column.is_some_and(|column| column.ends_with("input")) => {
+            Grade::Warning
+        }
         (_, "outliers") if !plan.huber => Grade::Warning,
         _ => Grade::Note,
     }
@@ -71,7 +83,7 @@ fn grade(note: &Note, case: &Case, plan: &Plan) -> Grade {
 fn is_opposite(problem: &Problem, name: &str) -> bool {
     let (x, mut worst) = (problem.start(), None);
     for (index, run) in problem.runs.iter().enumerate().filter(|(_, run)| run.name == name) {
-        let Some(seen) = run.seen.iter().find(|seen| is_position(seen.quantity) && !seen.absolute) else { continue };
+        let Some(seen) = run.seen.iter().find(|seen| seen.quantity.is_position() && !seen.absolute) else { continue };
         let mut column = vec![Vec::new()];
         let extras = problem.extras_of(index, &x);
         if !run.predict(&mut Bench::default(), &problem.stage_at(&x), &extras, &[seen.quantity], &mut column) {
@@ -108,6 +120,27 @@ fn of_controller(case: &Case, plan: &Plan) -> Vec<Finding> {
         Some(Finding { grade, code: "controller", log: Some(log.name.clone()), text })
     });
     told.collect()
+}
+
+/// Residuals of a machine with several coordinates that are more than the noise of its logs: its elastic modes make many
+/// minima.
+fn of_noise(found: &Searched) -> Option<Finding> {
+    let problem = &found.problem;
+    if problem.machine.has_one_coordinate() || problem.parameters.is_empty() {
+        return None;
+    }
+    let noise = problem.noise();
+    let beyond = |(quantity, deviation): &(Quantity, f64)| {
+        let times = deviation / noise.of(*quantity);
+        (times > MORE_THAN_NOISE).then(|| format!("{} {} times", quantity.name(), significant(times, 2)))
+    };
+    let beyond: Vec<String> = found.noise.iter().filter_map(beyond).collect();
+    let text = format!(
+        "residuals are more than the noise of the logs ({}): the model lacks something, or the search ended in one of \
+         several minima; try starts = 8 in [fit], or begin with values nearer to the machine's",
+        beyond.join(", ")
+    );
+    (!beyond.is_empty()).then(|| finding(Grade::Note, "noise", text))
 }
 
 /// How the search ended.
@@ -231,9 +264,14 @@ fn shown(value: f64, unit: &str) -> String {
 
 /// Finding if K_t and K_e cannot belong to one motor.
 fn of_motor(case: &Case, fit: &Fit) -> Option<Finding> {
-    let motor = &fit.machine.drives[0].motor;
+    let drives = fit.machine.geometry().drives.iter().zip(&fit.machine.drives);
+    drives.zip(&case.machine.drives).find_map(|((at, fitted), given)| constants(at, &fitted.motor, given))
+}
+
+/// Finding if K_t and K_e of this drive's motor cannot belong to one motor.
+fn constants(at: &DriveAt, motor: &Motor, given: &DriveUnit) -> Option<Finding> {
     let (k_t, k_e) = (motor.torque_constant, motor.back_emf_constant);
-    if motor.is_simple || case.machine.drives[0].amplifier.mode != AmplifierMode::Voltage || k_t <= 0.0 || k_e <= 0.0 {
+    if motor.is_simple || given.amplifier.mode != AmplifierMode::Voltage || k_t <= 0.0 || k_e <= 0.0 {
         return None;
     }
     let ratio = k_t / k_e;
@@ -241,8 +279,9 @@ fn of_motor(case: &Case, fit: &Fit) -> Option<Finding> {
         return None;
     }
     let text = format!(
-        "K_t = {} and K_e = {} are one number of one motor in SI units, and here {} times apart: tie them, or check what else \
+        "{}K_t = {} and K_e = {} are one number of one motor in SI units, and here {} times apart: tie them, or check what else \
          brakes or drives (the gain, the resistance, friction)",
+        if at.key.is_empty() { String::new() } else { format!("{}: ", at.label.name) },
         plain(k_t, "N m/A"),
         plain(k_e, "V s/rad"),
         crate::quantity::rounded((10.0 * ratio.max(1.0 / ratio)).round() / 10.0)

@@ -1,5 +1,6 @@
 //! The result of a fit, and how well it is known.
 
+use super::belts::Belts;
 use super::combinations::Combination;
 use super::doubts::{Cause, Disagreement, OtherLaw};
 use super::finding::{Finding, Grade};
@@ -132,6 +133,11 @@ impl Fit {
             Ending::Converged if !self.is_reliable() => "doubtful",
             ending => ending.word(),
         }
+    }
+
+    /// The belts of two drives compared; none of a machine with one drive, or where no free parameter changes them.
+    pub fn belts(&self) -> Option<&Belts> {
+        self.identifiability.as_ref().and_then(|found| found.belts.as_ref())
     }
 
     /// The combinations of undetermined parameters that are determined.

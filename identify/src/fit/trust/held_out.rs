@@ -24,9 +24,8 @@ pub(crate) struct Known<'a> {
 /// A log beside `stage`: delay, gain and offsets are what the fitted logs say. Where it starts is fitted to the first
 /// `share` of its rows.
 pub(crate) fn met(run: &Run, machine: &Machine, known: &Known, share: f64) -> LogFit {
-    let is_start = |what| matches!(what, Nuisance::StartPosition | Nuisance::StartSpeed);
     let mut alone = run.clone();
-    for extra in alone.extras.iter_mut().filter(|extra| !is_start(extra.what)) {
+    for extra in alone.extras.iter_mut().filter(|extra| !extra.what.is_start()) {
         let mean = known.means.iter().find(|(what, _)| *what == extra.what);
         *extra = held(extra, mean.map_or(extra.start, |(_, mean)| *mean));
     }
@@ -49,7 +48,7 @@ pub(crate) fn met(run: &Run, machine: &Machine, known: &Known, share: f64) -> Lo
     let extras = problem.extras_of(0, &x);
     let alone = &problem.runs[0];
     let own = alone.extras.iter().zip(&extras);
-    let told = own.filter(|(extra, _)| is_start(extra.what) && extra.known.is_none()).map(|(e, v)| (e.what, *v, None));
+    let told = own.filter(|(extra, _)| extra.what.is_start() && extra.known.is_none()).map(|(e, v)| (e.what, *v, None));
     let told = told.collect();
     let mut shown = alone.clone();
     shown.fitted_rows = run.fitted_rows;

@@ -6,6 +6,7 @@
 //! than [`UNDETERMINED`], or where the outputs move by less than a machine shows ([`LEAST_SHOWN`], [`MODEL_ERROR`]), it
 //! is not determined.
 
+use super::belts::Belts;
 use super::combinations::{self, Combination};
 use super::directions::Directions;
 use crate::fit::asked::problem::{Problem, extent};
@@ -30,6 +31,8 @@ pub struct Identifiability {
     /// The directions that are not determined, a column each: orthonormal, in relative changes of what concerns all
     /// runs.
     pub lost: DMatrix<f64>,
+    /// The belts of two drives compared, where a free parameter changes them.
+    pub belts: Option<Belts>,
 }
 
 /// Parameters that the logs do not tell apart.
@@ -74,7 +77,7 @@ impl Identifiability {
         let Directions { v, singular, norms, alive, rows, .. } = directions;
         let n = v.nrows();
         let mut names: Vec<String> = problem.parameters.iter().map(|parameter| parameter.name.clone()).collect();
-        names.extend(problem.shared.iter().map(|extra| extra.what.name().to_string()));
+        names.extend(problem.shared.iter().map(|extra| extra.what.name(&problem.machine)));
         let sensitivity = norms.iter().map(|norm| norm / deviation / rows.sqrt()).collect();
         let least = shows(problem).least * rows.sqrt();
         let lost: Vec<usize> =
@@ -91,7 +94,8 @@ impl Identifiability {
             .collect();
         let singular = singular.iter().map(|s| s / deviation).collect();
         let hidden = v.select_columns(&lost);
-        let mut result = Self { names, sensitivity, singular, error, groups: Vec::new(), lost: hidden };
+        let belts = Belts::compared(problem, directions, &lost, x, of);
+        let mut result = Self { names, sensitivity, singular, error, groups: Vec::new(), lost: hidden, belts };
         result.groups = result.grouped(problem, directions, (&lost, off), x, of);
         result
     }

@@ -1,5 +1,6 @@
 //! The trust in a minimum: which parameters are determined, how well, and what speaks against it.
 
+pub(crate) mod belts;
 pub(crate) mod causes;
 pub(crate) mod combinations;
 pub(crate) mod directions;

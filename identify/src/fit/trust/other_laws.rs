@@ -243,6 +243,10 @@ pub(crate) fn other_law(found: &Searched, judged: &Judged) -> Option<OtherLaw> {
 fn candidates(problem: &Problem, x: &[f64]) -> Vec<Candidate> {
     let mut machine = problem.stage_at(x);
     let mut all = Vec::new();
+    // Pulley and cart are the bodies of an axis.
+    if !machine.has_one_coordinate() {
+        return all;
+    }
     for body in Body::ALL {
         let prefix = format!("{}.friction.", body.key());
         let is_free = problem.parameters.iter().flat_map(|own| &own.keys).any(|(key, _)| key.starts_with(&prefix));

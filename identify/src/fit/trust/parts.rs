@@ -124,7 +124,7 @@ fn cut(experiment: &Experiment, rows: Range<usize>) -> Option<Experiment> {
     let output = |output: &Output| Output { values: output.values[rows.clone()].to_vec(), ..output.clone() };
     let own = Log {
         time: log.time[rows.clone()].iter().map(|t| t - begin).collect(),
-        input: log.input[rows.clone()].to_vec(),
+        inputs: log.inputs.iter().map(|input| input[rows.clone()].to_vec()).collect(),
         added: log.added.as_ref().map(|added| added[rows.clone()].to_vec()),
         reference: log.reference.as_ref().map(|reference| reference[rows.clone()].to_vec()),
         outputs: log.outputs.iter().map(output).collect(),
@@ -133,7 +133,7 @@ fn cut(experiment: &Experiment, rows: Range<usize>) -> Option<Experiment> {
     let initial = if rows.start == 0 { experiment.initial } else { Default::default() };
     Some(Experiment {
         name: format!("{} from row {}", experiment.name, rows.start + 1),
-        inputs: vec![own.signal()],
+        inputs: own.signals(),
         until: own.time.last().copied().unwrap_or_default(),
         every: experiment.every,
         initial,

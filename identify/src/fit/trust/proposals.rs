@@ -4,7 +4,6 @@ use super::identify::Identifiability;
 use super::uncertainty::Judged;
 use crate::fit::asked::problem::Problem;
 use crate::fit::asked::residuals::{Differences, Step};
-use crate::fit::asked::run::is_position;
 use crate::fit::limits::UNDETERMINED;
 use crate::fit::search::starts::Searched;
 use crate::log::Quantity;
@@ -54,7 +53,7 @@ fn with(noise: &[(Quantity, f64)], quantity: Quantity, deviation: f64) -> Vec<(Q
 /// The deviation of a position of the cart, if an encoder like that of the logs were there.
 fn cart_noise(problem: &Problem, noise: &[(Quantity, f64)]) -> f64 {
     let r = problem.machine.pulley_radius;
-    let known = noise.iter().find(|(quantity, _)| is_position(*quantity));
+    let known = noise.iter().find(|(quantity, _)| quantity.is_position());
     known.map_or(10e-6, |(quantity, sigma)| if *quantity == Quantity::CartPosition { *sigma } else { sigma * r })
 }
 
@@ -118,7 +117,7 @@ const IDEAS: &[Idea] = &[
 ];
 
 fn peak_current(problem: &Problem) -> f64 {
-    let most = problem.runs.iter().flat_map(|run| run.logged.iter()).fold(0.0, |most: f64, u| most.max(u.abs()));
+    let most = problem.runs.iter().flat_map(|run| &run.logged[0]).fold(0.0, |most: f64, u| most.max(u.abs()));
     let amplifier = &problem.machine.drives[0].amplifier;
     let output = (most * amplifier.gain).abs().max(1e-9);
     match amplifier.mode {
@@ -127,9 +126,13 @@ fn peak_current(problem: &Problem) -> f64 {
     }
 }
 
-/// The gain of each idea, ranked; only those that gain something and are not in the logs already.
+/// The gain of each idea, ranked; only those that gain something and are not in the logs already. They are of an axis: no
+/// ideas for a machine with more coordinates.
 pub(crate) fn proposals(found: &Searched, judged: &Judged) -> Vec<Proposal> {
     let Searched { problem, best, noise, .. } = found;
+    if !problem.machine.has_one_coordinate() {
+        return Vec::new();
+    }
     // White noise that is as bad as what the residuals show.
     let deviation = judged.covariance.deviation * judged.inflation;
     let unexplained = unexplained(problem, noise);
@@ -284,7 +287,7 @@ fn answer(problem: &Problem, idea: &Idea, measured: &[(Quantity, f64)], index: u
 /// True if some log moves both ways.
 fn turns_round(problem: &Problem) -> bool {
     let (mut most, mut least) = (0.0_f64, 0.0_f64);
-    for u in problem.runs.iter().flat_map(|run| run.logged.iter()) {
+    for u in problem.runs.iter().flat_map(|run| &run.logged[0]) {
         (most, least) = (most.max(*u), least.min(*u));
     }
     most.min(-least) > 0.2 * most.max(-least)

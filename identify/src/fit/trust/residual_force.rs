@@ -11,7 +11,6 @@
 //! first, another law in the second, a gain in the third and a drift in the last.
 
 use super::scores::LogFit;
-use crate::fit::asked::run::is_position;
 use crate::fit::limits::{CART_AT_REST, RESIDUAL_FORCE_NOISE, WIDTHS};
 use crate::fit::search::regression::{derived, reach};
 use crate::log::Quantity;
@@ -49,10 +48,11 @@ impl ResidualForce {
     }
 }
 
-/// The force that a log lacks beside `stage`; none without an evenly sampled position, or where the model does not
+/// The force that a log of an axis lacks beside `stage`; none without an evenly sampled position, or where the model does not
 /// reach the end.
 pub fn residual_force(machine: &Machine, log: &LogFit) -> Option<ResidualForce> {
-    let output = log.outputs.iter().find(|output| is_position(output.quantity)).filter(|_| log.complete)?;
+    let is_known = log.complete && machine.has_one_coordinate();
+    let output = log.outputs.iter().find(|output| output.quantity.is_position()).filter(|_| is_known)?;
     let n = log.time.len();
     let h = (log.time.last()? - log.time.first()?) / (n.max(2) - 1) as f64;
     let is_even = log.time.iter().enumerate().all(|(k, t)| (t - log.time[0] - k as f64 * h).abs() < 0.05 * h);
@@ -109,7 +109,7 @@ pub fn residual_force(machine: &Machine, log: &LogFit) -> Option<ResidualForce> 
         all.time.push(log.time[row]);
         all.position.push(way[row]);
         all.speed.push(*speed);
-        all.drive.push(per_input * log.input[row] - brake * speed);
+        all.drive.push(per_input * log.inputs[0][row] - brake * speed);
         all.force.push(*force);
     }
     Some(all)

@@ -80,16 +80,9 @@ pub(crate) fn result(found: &Searched, judged: Option<&Judged>) -> Fit {
         let j = problem.parameters.len() + i;
         let value = extra.start + extra.unit * best.x[j];
         let error = if best.at_bound[j] { None } else { error(j).map(|e| e * extra.unit) };
-        let unit = match extra.what {
-            Nuisance::Delay => "s",
-            Nuisance::InputGain => "",
-            Nuisance::InputOffset => problem.machine.drives[0].amplifier.mode.unit(),
-            // Each log has its own: they are never shared.
-            Nuisance::StartPosition | Nuisance::StartSpeed | Nuisance::Bias(_) => "",
-        };
         estimates.push(Estimate {
-            name: extra.what.name().to_string(),
-            unit,
+            name: extra.what.name(&problem.machine),
+            unit: extra.what.unit(&problem.machine),
             start: extra.start,
             value,
             error,

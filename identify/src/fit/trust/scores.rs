@@ -18,8 +18,8 @@ pub struct LogFit {
     pub held_out: bool,
     /// Times, s.
     pub time: Vec<f64>,
-    /// The input as logged.
-    pub input: Vec<f64>,
+    /// The input of each drive as logged.
+    pub inputs: Vec<Vec<f64>>,
     /// First row that was not fitted.
     pub fitted_rows: usize,
     /// Each output.
@@ -103,7 +103,7 @@ pub(crate) fn compared(
         window: run.window,
         held_out: run.held_out,
         time: run.time.clone(),
-        input: run.logged.clone(),
+        inputs: run.logged.clone(),
         fitted_rows: run.fitted_rows,
         outputs,
         extras: told,

@@ -43,8 +43,8 @@ pub(crate) fn disagreement(case: &Case, plan: &Plan, found: &Searched, judged: &
     problem.swings = whole.swings;
     for &(quantity, deviation) in &found.noise {
         problem.weigh(quantity, deviation, true);
-        problem.doubt_starts(quantity, deviation);
     }
+    problem.doubt_starts(&found.noise);
     let mut start = problem.start();
     start[..g].copy_from_slice(&found.best.x[..g]);
     let bounds = problem.bounds();

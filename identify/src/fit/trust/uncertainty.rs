@@ -127,6 +127,9 @@ impl Judged {
         let added = added.chain(cause.iter().map(|found| &found.added));
         for added in added {
             let globals = added.nrows();
+            if let Some(belts) = &mut self.identifiability.belts {
+                belts.widen(added);
+            }
             for (a, &i) in self.covariance.free.iter().enumerate().filter(|(_, i)| **i < globals) {
                 for (b, &j) in self.covariance.free.iter().enumerate().filter(|(_, j)| **j < globals) {
                     self.covariance.matrix[(a, b)] += added[(i, j)];

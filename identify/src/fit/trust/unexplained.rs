@@ -4,7 +4,6 @@ use super::trials::mended;
 use crate::case::{Case, Plan};
 use crate::fit::asked::problem::Problem;
 use crate::fit::asked::residuals::Residuals;
-use crate::fit::asked::run::is_position;
 use crate::fit::limits::{
     FACTOR_LEAVES, FACTORS, REFIT_TOLERANCE, TRIAL_FIT_ITERATIONS, UNEXPLAINED_WINDOWS, WINDOW_SAMPLES,
     WINDOWS_EXPLAIN, WINDOWS_MOST,
@@ -29,7 +28,7 @@ pub(super) fn reason(case: &Case, plan: &Plan, found: &Searched, quantity: Quant
 /// Windows that the model explains.
 fn windows(case: &Case, plan: &Plan, found: &Searched, quantity: Quantity) -> Option<String> {
     let runs = &found.problem.runs;
-    if plan.windows.is_some() || plan.closed_loop || plan.until.is_some() || !is_position(quantity) {
+    if plan.windows.is_some() || plan.closed_loop || plan.until.is_some() || !quantity.is_position() {
         return None;
     }
     let lengths = runs.iter().filter_map(|run| Some((run.time.len(), *run.time.last()?)));
@@ -101,7 +100,9 @@ fn factor(case: &Case, plan: &Plan, found: &Searched, quantity: Quantity, names:
     let gears = [gear, 1.0 / gear].into_iter().filter(|_| gear != 1.0);
     let factors: Vec<f64> = gears.chain(FACTORS).collect();
     let outputs = factors.iter().map(|&factor| (quantity.name(), factor, Remedy::Scale(quantity, factor)));
-    let inputs = factors.iter().map(|&factor| ("input", factor, Remedy::Drive(factor)));
+    // Which of several inputs it is, a factor on all of them would not say.
+    let drives = found.problem.machine.drives.len();
+    let inputs = factors.iter().filter(|_| drives == 1).map(|&factor| ("input", factor, Remedy::Drive(factor)));
     let tried = outputs
         .chain(inputs)
         .filter_map(|(column, factor, remedy)| Some((column, factor, mended(case, plan, found, names, &remedy)?.left)));

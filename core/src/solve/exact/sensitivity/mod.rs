@@ -106,7 +106,7 @@ impl<'t, const N: usize> Follower<'t, N> {
                     let is_start = points.iter().all(|point| point.mechanism == seen.mechanism);
                     Some(Varied { machines, points, weights: *weights, is_start })
                 }
-                Variable::Delay(_) | Variable::Offset(..) => None,
+                Variable::Delay(_) | Variable::Offset { .. } => None,
             });
         }
         let changes = |j: &usize| varied[*j].as_ref().is_some_and(|varied: &Varied| !varied.is_start);
@@ -206,8 +206,8 @@ impl<'t, const N: usize> Follower<'t, N> {
     fn offset(&mut self, time: f64) {
         let space = &self.core.common.space;
         for (variable, &place) in self.task.variables.iter().zip(&self.places) {
-            if let Variable::Offset(unit, from) = *variable {
-                self.s[place][space.chain(0, 0)] = if time >= from { unit } else { 0.0 };
+            if let Variable::Offset { drive, unit, from } = *variable {
+                self.s[place][space.chain(drive, 0)] = if time >= from { unit } else { 0.0 };
             }
         }
     }

@@ -115,7 +115,7 @@ impl<'s, 'a> Site<'s, 'a> {
     /// The motor's force on the cart at the greatest input, N.
     pub fn force(&self) -> f64 {
         let drive = &self.machine.drives[0];
-        let inputs = self.found.problem.runs.iter().flat_map(|run| &run.logged);
+        let inputs = self.found.problem.runs.iter().flat_map(|run| &run.logged[0]);
         let most = inputs.fold(0.0, |most: f64, input| most.max(input.abs()));
         let motor = &drive.motor;
         // F = n K_t g u/r, or over R

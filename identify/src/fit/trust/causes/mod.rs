@@ -30,7 +30,7 @@ use crate::fit::limits::{
 };
 use crate::fit::search::point::Options;
 use crate::fit::search::starts::Searched;
-use crate::machine::{Kind, Machine};
+use crate::machine::Machine;
 use extension::{Extended, Extension, Fitted, Said, Site};
 use nalgebra::{DMatrix, DVector};
 use tried::Tried;
@@ -108,7 +108,7 @@ pub(crate) fn cause(
 fn is_asked(case: &Case, plan: &Plan, found: &Searched, judged: &Judged) -> bool {
     let problem = &found.problem;
     judged.inflation >= COLOURED
-        && case.machine.kind == Kind::Axis
+        && case.machine.has_one_coordinate()
         && plan.windows.is_none()
         && plan.until.is_none()
         && plan.separate.is_empty()

@@ -4,7 +4,6 @@ use super::extension::{Extended, Fitted, Said, Site, Telling, shown};
 use crate::case::{Plan, Scope};
 use crate::fit::asked::problem::Problem;
 use crate::fit::asked::residuals::Residuals;
-use crate::fit::asked::run::is_position;
 use crate::fit::limits::{CAUSE_DELAYS, CAUSE_ERRORS};
 use crate::fit::search::regression::suspected_delay;
 
@@ -52,7 +51,7 @@ pub(super) fn scatter(problem: &Problem, residuals: &[f64]) -> Option<[f64; 2]> 
     let mut pairs = Vec::new();
     for (index, run) in problem.runs.iter().enumerate() {
         let (first, n) = (problem.first_row(index), run.time.len());
-        let Some((i, seen)) = run.seen.iter().enumerate().find(|(_, seen)| is_position(seen.quantity)) else {
+        let Some((i, seen)) = run.seen.iter().enumerate().find(|(_, seen)| seen.quantity.is_position()) else {
             continue;
         };
         let errors: Vec<f64> = (0..n).map(|k| residuals[first + i * n + k] / seen.weights[k]).collect();

@@ -129,7 +129,7 @@ impl<'a> Tried<'a> {
             (&self.extended.telling, self.problem.shared.last(), self.telling())
         {
             let error = error(j).map_or(f64::INFINITY, |error| error * last.unit);
-            parameters.push(Size { name: last.what.name().into(), unit: "s", value: self.value(j), error });
+            parameters.push(Size { name: last.what.name(&site.machine), unit: "s", value: self.value(j), error });
             scatter = stamp::scatter(&self.problem, &self.best.residuals);
         }
         if let Some([value, error]) = scatter {

@@ -1,0 +1,309 @@
+//! What can be measured of a machine: the quantities, and how positions go with the slides of a geometry.
+
+use super::{EncoderPlace, Geometry, Kind, Machine, Part};
+
+/// Quantities that can be measured; the recorder of an axis takes those up to [`Quantity::CartSpeed`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Quantity {
+    /// Current of the armature, A.
+    MotorCurrent,
+    /// Voltage at the motor, V.
+    MotorVoltage,
+    /// φ₁, rad.
+    DriveAngle,
+    /// φ₁′, rad/s.
+    DriveSpeed,
+    /// x of an axis, y on a gantry's bridge, m.
+    CartPosition,
+    /// Its derivative, m/s.
+    CartSpeed,
+    /// φ₃, rad.
+    IdlerAngle,
+    /// φ₃′, rad/s.
+    IdlerSpeed,
+    /// φ_r, rad: the rotor's, divided by the gear ratio.
+    RotorAngle,
+    /// φ_r′, rad/s.
+    RotorSpeed,
+    /// Acceleration of the cart along its travel, m/s².
+    CartAcceleration,
+    /// Current of the left motor (A of CoreXY), A.
+    LeftCurrent,
+    /// Current of the right motor (B), A.
+    RightCurrent,
+    /// Voltage at the left motor, V.
+    LeftVoltage,
+    /// Voltage at the right motor, V.
+    RightVoltage,
+    /// φ₁ of a gantry: the left drive pulley, rad.
+    LeftAngle,
+    /// Its speed, rad/s.
+    LeftSpeed,
+    /// φ₂ of a gantry: the right drive pulley, rad.
+    RightAngle,
+    /// Its speed, rad/s.
+    RightSpeed,
+    /// x of a gantry's bridge, m.
+    BridgePosition,
+    /// Its speed, m/s.
+    BridgeSpeed,
+    /// The left motor's rotor, divided by the gear ratio, rad.
+    LeftRotorAngle,
+    /// Its speed, rad/s.
+    LeftRotorSpeed,
+    /// The right motor's rotor, divided by the gear ratio, rad.
+    RightRotorAngle,
+    /// Its speed, rad/s.
+    RightRotorSpeed,
+    /// Acceleration of the bridge along x, m/s²: what an accelerometer at the cart shows of it, too.
+    BridgeAcceleration,
+    /// Current of the motor of a cart that has one of its own, A.
+    CartCurrent,
+    /// Voltage at that motor, V.
+    CartVoltage,
+    /// φ₃ of a dual belt: the cart's drive pulley, rad.
+    CartPulleyAngle,
+    /// Its speed, rad/s.
+    CartPulleySpeed,
+}
+
+use Quantity::*;
+
+/// Of an axis, in the order of a log.
+const OF_AXIS: [Quantity; 11] = [
+    MotorCurrent,
+    MotorVoltage,
+    DriveAngle,
+    DriveSpeed,
+    CartPosition,
+    CartSpeed,
+    IdlerAngle,
+    IdlerSpeed,
+    RotorAngle,
+    RotorSpeed,
+    CartAcceleration,
+];
+
+/// Of a gantry.
+const OF_GANTRY: [Quantity; 18] = [
+    LeftCurrent,
+    RightCurrent,
+    LeftVoltage,
+    RightVoltage,
+    LeftAngle,
+    LeftSpeed,
+    RightAngle,
+    RightSpeed,
+    BridgePosition,
+    BridgeSpeed,
+    CartPosition,
+    CartSpeed,
+    LeftRotorAngle,
+    LeftRotorSpeed,
+    RightRotorAngle,
+    RightRotorSpeed,
+    BridgeAcceleration,
+    CartAcceleration,
+];
+
+/// Of a gantry whose cart has a motor of its own, and whose gears are stiff.
+const OF_DUAL_BELT: [Quantity; 18] = [
+    LeftCurrent,
+    RightCurrent,
+    CartCurrent,
+    LeftVoltage,
+    RightVoltage,
+    CartVoltage,
+    LeftAngle,
+    LeftSpeed,
+    RightAngle,
+    RightSpeed,
+    CartPulleyAngle,
+    CartPulleySpeed,
+    BridgePosition,
+    BridgeSpeed,
+    CartPosition,
+    CartSpeed,
+    BridgeAcceleration,
+    CartAcceleration,
+];
+
+impl Quantity {
+    /// Those that a kind of machine has, in the order of a log.
+    pub const fn of(kind: Kind) -> &'static [Quantity] {
+        match kind {
+            Kind::Axis => &OF_AXIS,
+            Kind::HFrame | Kind::CoreXy => &OF_GANTRY,
+            Kind::DualBelt => &OF_DUAL_BELT,
+        }
+    }
+
+    /// Those of every kind of machine, each once.
+    pub fn all() -> impl Iterator<Item = Quantity> {
+        let gantries = OF_GANTRY.into_iter().filter(|quantity| !OF_AXIS.contains(quantity));
+        let known = |quantity: &Quantity| OF_AXIS.contains(quantity) || OF_GANTRY.contains(quantity);
+        OF_AXIS.into_iter().chain(gantries).chain(OF_DUAL_BELT.into_iter().filter(move |quantity| !known(quantity)))
+    }
+
+    /// Its name, in case files and as a column.
+    pub fn name(self) -> &'static str {
+        self.row().0
+    }
+
+    /// Its unit.
+    pub fn unit(self) -> &'static str {
+        self.row().1
+    }
+
+    /// Name and unit.
+    const fn row(self) -> (&'static str, &'static str) {
+        match self {
+            MotorCurrent => ("motor_current", "A"),
+            MotorVoltage => ("motor_voltage", "V"),
+            DriveAngle => ("drive_angle", "rad"),
+            DriveSpeed => ("drive_speed", "rad/s"),
+            CartPosition => ("cart_position", "m"),
+            CartSpeed => ("cart_speed", "m/s"),
+            IdlerAngle => ("idler_angle", "rad"),
+            IdlerSpeed => ("idler_speed", "rad/s"),
+            RotorAngle => ("rotor_angle", "rad"),
+            RotorSpeed => ("rotor_speed", "rad/s"),
+            CartAcceleration => ("cart_acceleration", "m/s^2"),
+            LeftCurrent => ("left_current", "A"),
+            RightCurrent => ("right_current", "A"),
+            LeftVoltage => ("left_voltage", "V"),
+            RightVoltage => ("right_voltage", "V"),
+            LeftAngle => ("left_angle", "rad"),
+            LeftSpeed => ("left_speed", "rad/s"),
+            RightAngle => ("right_angle", "rad"),
+            RightSpeed => ("right_speed", "rad/s"),
+            BridgePosition => ("bridge_position", "m"),
+            BridgeSpeed => ("bridge_speed", "m/s"),
+            LeftRotorAngle => ("left_rotor_angle", "rad"),
+            LeftRotorSpeed => ("left_rotor_speed", "rad/s"),
+            RightRotorAngle => ("right_rotor_angle", "rad"),
+            RightRotorSpeed => ("right_rotor_speed", "rad/s"),
+            BridgeAcceleration => ("bridge_acceleration", "m/s^2"),
+            CartCurrent => ("cart_current", "A"),
+            CartVoltage => ("cart_voltage", "V"),
+            CartPulleyAngle => ("cart_pulley_angle", "rad"),
+            CartPulleySpeed => ("cart_pulley_speed", "rad/s"),
+        }
+    }
+
+    /// True if it is a position or an angle, so that a constant added to it changes nothing else.
+    pub fn is_position(self) -> bool {
+        matches!(self.unit(), "m" | "rad")
+    }
+
+    /// True if it is a speed.
+    pub fn is_speed(self) -> bool {
+        matches!(self.unit(), "m/s" | "rad/s")
+    }
+
+    /// True if it is measured along the travel of a slide, m and its derivatives, and not around a pulley.
+    pub fn is_linear(self) -> bool {
+        matches!(self.unit(), "m" | "m/s" | "m/s^2")
+    }
+
+    /// True if it is of a rotor behind a gear.
+    pub fn is_of_rotor(self) -> bool {
+        self.name().contains("rotor_")
+    }
+
+    /// True if it is an acceleration.
+    pub fn is_acceleration(self) -> bool {
+        self.unit() == "m/s^2"
+    }
+
+    /// The speed that belongs to a position, among the bodies with a column for each of both.
+    pub fn speed(self) -> Option<Quantity> {
+        match self {
+            DriveAngle => Some(DriveSpeed),
+            CartPosition => Some(CartSpeed),
+            LeftAngle => Some(LeftSpeed),
+            RightAngle => Some(RightSpeed),
+            BridgePosition => Some(BridgeSpeed),
+            CartPulleyAngle => Some(CartPulleySpeed),
+            _ => None,
+        }
+    }
+
+    /// The name of the body or rotor whose motion it is: `cart` of `cart_position`; none if it is no motion.
+    pub fn body(self) -> Option<&'static str> {
+        let is_motion = self.is_linear() || self.is_position() || self.is_speed();
+        self.name().rsplit_once('_').map(|(body, _)| body).filter(|_| is_motion)
+    }
+}
+
+impl Geometry {
+    /// Change of a position or angle per metre of each slide where the belt has no strain and pulleys the radius `r`;
+    /// no values for any other quantity.
+    pub fn by_slides(&self, quantity: Quantity, r: f64) -> Vec<f64> {
+        let Some(name) = quantity.body().filter(|_| quantity.is_position()) else { return Vec::new() };
+        let rotor = self.drives.iter().find(|drive| drive.rotor.key == name).map(|drive| drive.pulley);
+        let of_label = || self.bodies.iter().position(|body| body.label.key == name);
+        let Some(body) = rotor.or_else(of_label).map(|body| &self.bodies[body]) else { return Vec::new() };
+        let arm = if matches!(body.part, Part::DrivePulley | Part::IdlerPulley) { r } else { 1.0 };
+        body.by_slides.iter().map(|weight| weight / arm).collect()
+    }
+}
+
+impl Machine {
+    /// The quantities that a log of it can have.
+    pub fn quantities(&self) -> &'static [Quantity] {
+        Quantity::of(self.kind)
+    }
+
+    /// The quantities that its encoder counts, one for each drive, or that of the cart; before a gear the rotor's, too.
+    pub fn counted(&self) -> impl Iterator<Item = Quantity> {
+        let geometry = self.geometry();
+        let at = self.encoder.map(|encoder| encoder.at);
+        let is_counted = move |quantity: &Quantity| {
+            let Some(body) = quantity.body().filter(|_| quantity.is_position()) else { return false };
+            let pulley = geometry.drives.iter().any(|drive| geometry.label(drive.pulley).key == body);
+            match at {
+                Some(EncoderPlace::Motor) => pulley || quantity.is_of_rotor(),
+                Some(EncoderPlace::DrivePulley) => pulley,
+                Some(EncoderPlace::Cart) => geometry.label(geometry.cart()).key == body,
+                None => false,
+            }
+        };
+        self.quantities().iter().copied().filter(is_counted)
+    }
+
+    /// True if it has one coordinate, so that it can be taken for a single mass along a belt.
+    pub fn has_one_coordinate(&self) -> bool {
+        self.geometry().slides.len() == 1
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_of_quantities_are_unique_and_those_of_the_bodies() {
+        let all: Vec<Quantity> = Quantity::all().collect();
+        for (k, quantity) in all.iter().enumerate() {
+            assert!(all[..k].iter().all(|other| other.name() != quantity.name()), "{}", quantity.name());
+        }
+        for kind in Kind::ALL {
+            let geometry = kind.geometry();
+            for quantity in Quantity::of(kind).iter().filter(|quantity| quantity.is_position()) {
+                assert_eq!(geometry.by_slides(*quantity, 0.02).len(), geometry.slides.len(), "{}", quantity.name());
+            }
+        }
+    }
+
+    #[test]
+    fn positions_go_with_the_slides_as_equations_of_the_geometry_have_it() {
+        // r φ₁ = −x − y, r φ₂ = x − y
+        let weights = |quantity| Kind::HFrame.geometry().by_slides(quantity, 0.5);
+        assert_eq!(weights(LeftAngle), [-2.0, -2.0]);
+        assert_eq!(weights(RightRotorAngle), [2.0, -2.0]);
+        assert_eq!(weights(BridgePosition), [1.0, 0.0]);
+        assert_eq!(weights(CartPosition), [0.0, 1.0]);
+        assert!(weights(CartSpeed).is_empty() && weights(LeftCurrent).is_empty());
+    }
+}

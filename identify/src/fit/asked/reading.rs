@@ -1,0 +1,78 @@
+//! The coordinates of a machine as the outputs of a log show them: where its slides are, without strain of the belt.
+
+use super::run::Run;
+use crate::log::Quantity;
+use crate::machine::Machine;
+
+/// The position of a slide, m, as a sum over outputs of a log that are positions.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Reading {
+    /// Outputs by their numbers, and their weights in the position, m per unit of each.
+    parts: Vec<(usize, f64)>,
+}
+
+impl Reading {
+    /// The position of a slide by the first output that shows it alone, or else by the angles of all drives; none where
+    /// the log has neither.
+    pub fn of(run: &Run, machine: &Machine, slide: usize) -> Option<Self> {
+        let (geometry, r) = (machine.geometry(), machine.pulley_radius);
+        let arm = |quantity: Quantity| if quantity.is_linear() { 1.0 } else { r };
+        let shows_alone = |quantity: Quantity| {
+            // At the belt, where the angle of a pulley counts times its radius.
+            let weights = geometry.by_slides(quantity, 1.0);
+            let is_alone = weights.iter().enumerate().all(|(k, weight)| (*weight != 0.0) == (k == slide));
+            weights.get(slide).filter(|_| is_alone).map(|weight| arm(quantity) / weight)
+        };
+        let alone = run.seen.iter().enumerate().find_map(|(k, seen)| Some((k, shows_alone(seen.quantity)?)));
+        if let Some(part) = alone {
+            return Some(Self { parts: vec![part] });
+        }
+        let of_drive = |pulley: usize, weight: f64| {
+            let turns_with = |quantity: Quantity| {
+                let drive = geometry.drives.iter().find(|drive| drive.pulley == pulley);
+                let names = [Some(geometry.label(pulley).key), drive.map(|drive| drive.rotor.key)];
+                quantity.is_position() && names.contains(&quantity.body())
+            };
+            let output = run.seen.iter().position(|seen| turns_with(seen.quantity))?;
+            Some((output, r * weight))
+        };
+        let drives = geometry.drives.iter().zip(geometry.slides[slide].by_drives);
+        let parts: Option<Vec<_>> = drives.map(|(drive, weight)| of_drive(drive.pulley, *weight)).collect();
+        parts.map(|parts| Self { parts })
+    }
+
+    /// True if an output is a part of it.
+    pub fn takes(&self, output: usize) -> bool {
+        self.parts.iter().any(|(own, _)| *own == output)
+    }
+
+    /// The position in each row of a run, NaN where an output is missing.
+    pub fn values(&self, run: &Run) -> Vec<f64> {
+        let row = |k: usize| self.parts.iter().map(|(output, weight)| run.seen[*output].values[k] * weight).sum();
+        (0..run.time.len()).map(row).collect()
+    }
+
+    /// Its standard deviation for these of the outputs; none where one of them is not known.
+    pub fn deviation(&self, run: &Run, of: impl Fn(Quantity) -> Option<f64>) -> Option<f64> {
+        let parts = self.parts.iter().map(|(output, weight)| Some(weight.abs() * of(run.seen[*output].quantity)?));
+        let parts: Option<Vec<f64>> = parts.collect();
+        parts.map(|parts| parts.into_iter().fold(0.0, f64::hypot))
+    }
+
+    /// The speed at the start of a log or window, m/s, from a line through its first rows, and its standard error for
+    /// these deviations of the outputs.
+    pub fn speed_at_start(&self, run: &Run, of: impl Fn(Quantity) -> Option<f64>) -> (f64, f64) {
+        let values = self.values(run);
+        let rows: Vec<usize> = (0..run.time.len().min(15)).filter(|&k| values[k].is_finite()).collect();
+        let n = rows.len().max(1) as f64;
+        let mean = |of: &dyn Fn(usize) -> f64| rows.iter().map(|&k| of(k)).sum::<f64>() / n;
+        let (t, y) = (mean(&|k| run.time[k]), mean(&|k| values[k]));
+        let (mut above, mut below) = (0.0, 0.0);
+        for &k in &rows {
+            above += (run.time[k] - t) * (values[k] - y);
+            below += (run.time[k] - t).powi(2);
+        }
+        let deviation = self.deviation(run, of).unwrap_or_default();
+        if below > 0.0 { (above / below, deviation / below.sqrt()) } else { (0.0, 0.0) }
+    }
+}

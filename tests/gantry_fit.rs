@@ -1,0 +1,243 @@
+//! Fits of gantries with logs of both motors: the numbers that made a log are found, and intervals hold them about as
+//! often as they say.
+
+use crate::common::chance::Chance;
+use std::sync::Arc;
+use taut::case::{Case, Plan};
+use taut::fit::{Fit, check, fit};
+use taut::log::{Log, Output, Quantity};
+use taut::machine::Kind;
+use taut::signal::Hold;
+use taut::solve::{Flow, Solver, simulate};
+use taut::trajectory::Trajectory;
+
+/// Bits of 8 V on both motors, each with its own.
+const INPUTS: &str =
+    "experiment.0.input={ left = { prbs = 8, bit = 0.005, seed = 3 }, right = { prbs = 8, bit = 0.005, seed = 8 } }";
+
+/// The encoder of both motors: 10 000 counts a turn.
+const COUNT: f64 = std::f64::consts::TAU / 10_000.0;
+
+/// A stage of this kind with one experiment on both motors.
+fn case(kind: Kind, changes: &[&str]) -> Case {
+    let file = match kind {
+        Kind::HFrame => "stages/h-frame/h-frame.toml",
+        Kind::Axis | Kind::CoreXy => "stages/core-xy/core-xy.toml",
+    };
+    let rows = [INPUTS, "experiment.0.until=0.5", "experiment.0.every=1ms"];
+    let mut case = Case::read_with(file, &[&rows, changes].concat()).unwrap();
+    case.experiments.truncate(1);
+    case
+}
+
+/// The log of a run: angles of both motors in counts, and positions with noise of a standard deviation, m.
+fn logged(run: &Trajectory, positions: Option<f64>, seed: u64) -> Log {
+    let mut chance = Chance::new(seed);
+    let column = |name: &str| run.get(name).unwrap().to_vec();
+    let output = |quantity: Quantity, values: Vec<f64>| Output { quantity, absolute: false, values };
+    let mut outputs: Vec<Output> = [Quantity::LeftAngle, Quantity::RightAngle]
+        .map(|quantity| {
+            let counts = column(quantity.name()).iter().map(|angle| COUNT * (angle / COUNT).floor()).collect();
+            output(quantity, counts)
+        })
+        .into();
+    if let Some(deviation) = positions {
+        outputs.extend([Quantity::BridgePosition, Quantity::CartPosition].map(|quantity| {
+            let values = column(quantity.name()).iter().map(|x| x + deviation * chance.normal()).collect();
+            output(quantity, values)
+        }));
+    }
+    Log {
+        name: "both motors".into(),
+        file: Default::default(),
+        time: column("time"),
+        inputs: vec![column("left_voltage"), column("right_voltage")],
+        added: None,
+        hold: Hold::Zero,
+        reference: None,
+        outputs,
+        ended: None,
+    }
+}
+
+/// The case with the log of `truth`, to be fitted from its own values.
+fn with_log(mut case: Case, truth: &Case, positions: Option<f64>, seed: u64) -> Case {
+    let run = simulate(&truth.machine, &truth.experiments[0], Solver::Exact).unwrap().trajectory;
+    let log = logged(&run, positions, seed);
+    case.experiments[0].inputs = log.signals();
+    case.experiments[0].log = Some(Arc::new(log));
+    case
+}
+
+fn fitted(case: &Case, plan: &Plan) -> Fit {
+    fit(case, plan, None, &mut |_| Flow::Continue).unwrap()
+}
+
+/// The two spans of each belt of a CoreXY show by their sum only.
+fn belts_of_core_xy(free: &[&str]) -> Plan {
+    let tie = |keys: [&str; 2]| keys.map(String::from).to_vec();
+    Plan {
+        free: free.iter().map(|key| key.to_string()).collect(),
+        tied: vec![tie(["belt.stiffness.0", "belt.stiffness.1"]), tie(["belt.stiffness.2", "belt.stiffness.3"])],
+        ..Plan::default()
+    }
+}
+
+/// Of drawn machines.
+#[derive(Default)]
+struct Coverage {
+    machines: usize,
+    /// Intervals that hold the truth, of how many.
+    held: [usize; 2],
+    /// Intervals of the ratio of the belts that hold it.
+    ratios: usize,
+    /// Statements of the looser belt, and those that are wrong.
+    stated: usize,
+    wrong: usize,
+    /// Fits that were no minimum.
+    lost: usize,
+}
+
+impl Coverage {
+    fn told(&self) -> String {
+        let Self { machines, held: [inside, all], ratios, stated, wrong, lost } = self;
+        format!(
+            "{machines} machines: {inside} of {all} intervals hold the truth, {ratios} of the ratio; {stated} statements, {wrong} \
+             wrong; {lost} lost"
+        )
+    }
+}
+
+const FREE: [&str; 5] =
+    ["cart.mass", "bridge.mass", "cart.friction.viscous", "bridge.friction.viscous", "bridge.friction.coulomb"];
+
+/// So many CoreXY with drawn masses, friction and belts, logged by encoders at the motors and, every other one, scales.
+fn coverage(machines: u64) -> Coverage {
+    let mut found = Coverage { machines: machines as usize, ..Coverage::default() };
+    for seed in 1..=machines {
+        let mut chance = Chance::new(40_000 + seed);
+        let mut between = |low: f64, high: f64| low + (high - low) * chance.uniform();
+        let truth = [between(0.3, 0.6), between(0.6, 1.2), between(5.0, 15.0), between(8.0, 20.0), between(0.3, 0.7)];
+        let belts = [between(8e4, 1.5e5), between(8e4, 1.5e5)];
+        let mut changes: Vec<String> = FREE.iter().zip(truth).map(|(key, value)| format!("{key}={value}")).collect();
+        changes.extend((0..4).map(|span| format!("belt.stiffness.{span}={}", belts[span / 2])));
+        let changes: Vec<&str> = changes.iter().map(String::as_str).collect();
+        let positions = (seed % 2 == 0).then_some(5e-6);
+        let alike = ["belt.stiffness=[1e5, 1e5, 1e5, 1e5]"];
+        let own = with_log(case(Kind::CoreXy, &alike), &case(Kind::CoreXy, &changes), positions, seed);
+        let result = fitted(&own, &belts_of_core_xy(&FREE));
+        let is_known = result.is_complete() && result.estimates.iter().all(|one| !one.at_bound);
+        let Some(compared) = result.belts().filter(|_| is_known) else {
+            found.lost += 1;
+            continue;
+        };
+        for (estimate, value) in result.estimates.iter().zip(truth.into_iter().chain(belts)) {
+            let [low, high] = estimate.interval.unwrap();
+            found.held[0] += usize::from(low <= value && value <= high);
+            found.held[1] += 1;
+        }
+        let [low, high] = compared.interval();
+        let ratio = belts[1] / belts[0];
+        found.ratios += usize::from(low <= ratio && ratio <= high);
+        if let Some(looser) = compared.looser() {
+            found.stated += 1;
+            found.wrong += usize::from((looser == 1) != (ratio < 1.0));
+        }
+    }
+    found
+}
+
+/// 20 machines; with `TAUT_CASES`, that many.
+#[test]
+fn intervals_of_gantries_hold_the_truth_about_as_often_as_they_say() {
+    let machines = std::env::var("TAUT_CASES").ok().and_then(|text| text.parse().ok()).unwrap_or(20);
+    let found = coverage(machines);
+    println!("{}", found.told());
+    let share = found.held[0] as f64 / found.held[1] as f64;
+    assert!(found.lost == 0 && found.wrong == 0, "{}", found.told());
+    assert!(share >= 0.9 && found.ratios as f64 >= 0.85 * found.machines as f64, "{}", found.told());
+    assert!(found.stated as f64 >= 0.8 * found.machines as f64, "{}", found.told());
+}
+
+#[test]
+fn an_h_frame_is_fitted_with_all_three_spans() {
+    let truth = ["belt.stiffness=[1.2e5, 0.9e5, 0.6e5]", "left_drive.motor.resistance=0.74", "cart.mass=0.4"];
+    let own = with_log(case(Kind::HFrame, &[]), &case(Kind::HFrame, &truth), Some(2e-6), 5);
+    let free = ["belt.stiffness.0", "belt.stiffness.1", "belt.stiffness.2", "left_drive.motor.resistance", "cart.mass"];
+    let plan = Plan { free: free.map(String::from).to_vec(), ..Plan::default() };
+    let found = fitted(&own, &plan);
+    for (estimate, value) in found.estimates.iter().zip([1.2e5, 0.9e5, 0.6e5, 0.74, 0.4]) {
+        let error = estimate.error.unwrap();
+        assert!((estimate.value - value).abs() < 4.0 * error && error < 0.02 * value, "{estimate:?}");
+    }
+    let belts = found.belts().unwrap();
+    assert_eq!(belts.looser(), Some(1), "{}", belts.words());
+    // As one equation of balance is of one coordinate, there is none.
+    let told = check(&own, &plan).unwrap();
+    assert!(told.balance.is_none() && told.experiments.is_empty() && told.tells());
+    assert_eq!(told.logs[0].channels[1].name, "right_input");
+}
+
+/// Out and back of a CoreXY's belt are stretched alike: only the sum of their stiffnesses shows.
+#[test]
+fn spans_of_one_belt_show_by_their_sum() {
+    let own = with_log(case(Kind::CoreXy, &[]), &case(Kind::CoreXy, &["belt.stiffness.2=1.1e5"]), None, 7);
+    let free = ["belt.stiffness.0", "belt.stiffness.1", "belt.stiffness.2", "belt.stiffness.3"];
+    let plan = Plan { free: free.map(String::from).to_vec(), ..Plan::default() };
+    let found = fitted(&own, &plan);
+    assert!(!found.is_complete());
+    let known = found.identifiability.as_ref().unwrap();
+    assert_eq!(known.groups.iter().map(|group| group.members.clone()).collect::<Vec<_>>(), [vec![0, 1], vec![2, 3]]);
+    // The comparison of the belts is one of sums: 240 kN/m and 205 kN/m.
+    let belts = found.belts().unwrap();
+    let [low, high] = belts.interval();
+    assert!(low < 205.0 / 240.0 && 205.0 / 240.0 < high && high - low < 0.1, "{}", belts.words());
+    assert_eq!(belts.looser(), Some(1), "{}", belts.words());
+}
+
+/// Belts that are off by up to a half swing out of step with the log: a search over the whole log alone ends where a few
+/// swings more or less fit.
+#[test]
+fn belts_are_found_from_a_stiffness_that_is_far_off() {
+    let truth = case(Kind::CoreXy, &["belt.stiffness=[1.2e5, 1e5, 1.05e5, 0.9e5]"]);
+    for start in [0.8e5, 1.3e5, 1.6e5] {
+        let begins = format!("belt.stiffness=[{start}, {start}, {start}, {start}]");
+        let own = with_log(case(Kind::CoreXy, &[&begins]), &truth, None, 3);
+        let found = fitted(&own, &belts_of_core_xy(&["bridge.mass", "cart.mass"]));
+        for (estimate, value) in found.estimates[2..].iter().zip([1.1e5, 0.975e5]) {
+            assert!((estimate.value / value - 1.0).abs() < 2e-3, "{start}: {estimate:?}");
+        }
+    }
+}
+
+/// A log that does not stretch the belts says so.
+#[test]
+fn a_slow_log_does_not_say_which_belt_is_looser() {
+    let slow = "experiment.0.input={ left = { sine = 2, frequency = 2 }, right = { sine = 2, frequency = 3 } }";
+    let truth = case(Kind::CoreXy, &[slow]);
+    let own = with_log(case(Kind::CoreXy, &[slow]), &truth, None, 9);
+    let found = fitted(&own, &belts_of_core_xy(&["cart.friction.viscous"]));
+    let belts = found.belts().unwrap();
+    assert_eq!(belts.looser(), None, "{}", belts.words());
+    assert!(belts.words().starts_with("the logs do not"), "{}", belts.words());
+}
+
+/// Positions by the encoders of the motors say where bridge and cart begin, and offsets of each input are found.
+#[test]
+fn a_log_that_begins_elsewhere_and_inputs_with_offsets_are_fitted() {
+    let begins = "experiment.0.initial={ bridge_position = 0.03, cart_position = -0.02 }";
+    let truth = case(Kind::CoreXy, &[begins]);
+    let mut own = with_log(case(Kind::CoreXy, &[]), &truth, None, 11);
+    let log = Arc::make_mut(own.experiments[0].log.as_mut().unwrap());
+    log.inputs[0].iter_mut().for_each(|u| *u += 0.05);
+    log.inputs[1].iter_mut().for_each(|u| *u -= 0.08);
+    own.experiments[0].inputs = log.signals();
+    let mut plan = Plan { free: vec!["cart.mass".into()], ..Plan::default() };
+    plan.nuisance.input_offset = taut::case::Scope::Shared;
+    let found = fitted(&own, &plan);
+    let names: Vec<&str> = found.estimates.iter().map(|one| one.name.as_str()).collect();
+    assert_eq!(names, ["cart.mass", "left_input_offset", "right_input_offset"]);
+    for (estimate, value) in found.estimates.iter().zip([0.362, -0.05, 0.08]) {
+        assert!((estimate.value - value).abs() < 4.0 * estimate.error.unwrap(), "{estimate:?}");
+    }
+}
