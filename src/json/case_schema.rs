@@ -274,7 +274,6 @@ fn log() -> Value {
         ("fetch", described(json!({ "type": "string" }), "The command that brings the file where it is not there")),
         ("preset", words(PRESETS.iter().map(|preset| preset.name))),
         ("time", any(vec![column(), table("experiment.log.time", &[])])),
-        ("input", column()),
         ("added", column()),
         ("reference", column()),
         ("units", columns()),
@@ -288,6 +287,8 @@ fn log() -> Value {
         ("separator", json!({ "type": "string" })),
         ("decimal", words([".", ","])),
     ];
+    let drives = Kind::ALL.iter().flat_map(|kind| kind.geometry().drives);
+    own.extend(drives.map(|drive| (drive.input, column())));
     own.extend(Quantity::all().map(|quantity| (quantity.name(), column())));
     table("experiment.log", &own)
 }

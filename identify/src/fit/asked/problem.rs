@@ -704,7 +704,7 @@ impl Start<'_> {
         let r = machine.pulley_radius;
         let values = self.reading.map(|reading| reading.values(run));
         let first = values.as_ref().and_then(|values| values.iter().copied().find(|v| v.is_finite()));
-        let span = values.as_deref().map_or(0.0, extent);
+        let span = self.reading.map_or(0.0, |reading| reading.extent(run, extent));
         let fastest = run.seen.iter().find(|seen| !seen.quantity.is_position()).map_or(0.0, |seen| {
             let arm = if seen.quantity.is_speed() && seen.quantity.is_linear() { 1.0 } else { r };
             arm * extent(&seen.values)

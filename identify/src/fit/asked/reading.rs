@@ -59,20 +59,30 @@ impl Reading {
         parts.map(|parts| parts.into_iter().fold(0.0, f64::hypot))
     }
 
+    /// Greatest minus least position, m; of several outputs at most that.
+    pub fn extent(&self, run: &Run, of: impl Fn(&[f64]) -> f64) -> f64 {
+        self.parts.iter().map(|(output, weight)| weight.abs() * of(&run.seen[*output].values)).sum()
+    }
+
     /// The speed at the start of a log or window, m/s, from a line through its first rows, and its standard error for
     /// these deviations of the outputs.
     pub fn speed_at_start(&self, run: &Run, of: impl Fn(Quantity) -> Option<f64>) -> (f64, f64) {
-        let values = self.values(run);
-        let rows: Vec<usize> = (0..run.time.len().min(15)).filter(|&k| values[k].is_finite()).collect();
+        let is_there = |k: &usize| self.parts.iter().all(|(output, _)| run.seen[*output].values[*k].is_finite());
+        let rows: Vec<usize> = (0..run.time.len().min(15)).filter(is_there).collect();
         let n = rows.len().max(1) as f64;
-        let mean = |of: &dyn Fn(usize) -> f64| rows.iter().map(|&k| of(k)).sum::<f64>() / n;
-        let (t, y) = (mean(&|k| run.time[k]), mean(&|k| values[k]));
-        let (mut above, mut below) = (0.0, 0.0);
-        for &k in &rows {
-            above += (run.time[k] - t) * (values[k] - y);
-            below += (run.time[k] - t).powi(2);
+        let t = rows.iter().map(|&k| run.time[k]).sum::<f64>() / n;
+        let below: f64 = rows.iter().map(|&k| (run.time[k] - t).powi(2)).sum();
+        if below <= 0.0 {
+            return (0.0, 0.0);
         }
+        // Σ w (t − t̄)(y − ȳ)/Σ (t − t̄)²
+        let slope = |(output, weight): &(usize, f64)| {
+            let values = &run.seen[*output].values;
+            let y = rows.iter().map(|&k| values[k]).sum::<f64>() / n;
+            let above: f64 = rows.iter().map(|&k| (run.time[k] - t) * (values[k] - y)).sum();
+            weight * above / below
+        };
         let deviation = self.deviation(run, of).unwrap_or_default();
-        if below > 0.0 { (above / below, deviation / below.sqrt()) } else { (0.0, 0.0) }
+        (self.parts.iter().map(slope).sum(), deviation / below.sqrt())
     }
 }
