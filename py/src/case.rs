@@ -22,7 +22,7 @@ use taut::frf::{Cut, Known, measure};
 use taut::json;
 use taut::learning::{At, Trial, learn};
 use taut::linear::Analysis;
-use taut::machine::{Channel, Kind, Quantity};
+use taut::machine::Channel;
 use taut::overview::Overview;
 use taut::planning::plan;
 use taut::reach::quickest::Wanted;
@@ -240,8 +240,8 @@ impl Case {
             found.ok_or_else(|| Error::new(format!("there is no input \"{word}\"")).allowed(kinds))
         };
         let channel = |(name, noise): &(String, f64)| {
-            let names = Quantity::of(Kind::Axis).iter().map(|quantity| quantity.name()).collect::<Vec<_>>().join(", ");
-            let quantity = Quantity::of(Kind::Axis).iter().copied().find(|quantity| quantity.name() == name);
+            let names = case.machine.quantities().iter().map(|quantity| quantity.name()).collect::<Vec<_>>().join(", ");
+            let quantity = case.machine.quantities().iter().copied().find(|quantity| quantity.name() == name);
             let quantity = quantity
                 .ok_or_else(|| Error::new(format!("there is no measured quantity \"{name}\"")).allowed(names))?;
             match *noise > 0.0 && noise.is_finite() {
