@@ -37,6 +37,8 @@ RUNS = {
     "a move": lambda: taut.read(f"{STAGE}/controllers/pid.toml").move(),
     "gantry": lambda: taut.read(f"{ROOT}/stages/core-xy/core-xy.toml").simulate(),
     "H-frame": lambda: taut.read(f"{ROOT}/stages/h-frame/h-frame.toml").simulate(),
+    "dual belt": lambda: taut.read(f"{ROOT}/stages/dual-belt/dual-belt.toml").simulate(),
+    "a path of three drives": lambda: taut.read(f"{ROOT}/stages/dual-belt/square.toml").move(),
     "a path": lambda: taut.read(f"{ROOT}/stages/core-xy/square.toml").move(),
 }
 

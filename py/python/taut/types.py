@@ -103,7 +103,7 @@ class DriveOfMove(TypedDict):
 
 class Metrics(TypedDict, total=False):
     """The key figures of a run. Which there are depends on the machine: ``bridge`` stands for the bridge of a gantry,
-    ``left`` and ``right`` for its drives. Those from ``samples`` on are of moves."""
+    ``left``, ``right`` and ``cart`` for its drives. Those from ``samples`` on are of moves."""
 
     end_time_s: float
     event_counts: list[EventCount]
@@ -123,6 +123,7 @@ class Metrics(TypedDict, total=False):
     final_drive_travel_minus_cart_m: float
     final_left_angle_rad: float
     final_right_angle_rad: float
+    final_cart_pulley_angle_rad: float
     peak_cart_speed_m_s: Peak
     peak_bridge_speed_m_s: Peak
     peak_drives_minus_cart_m: Peak
@@ -135,6 +136,8 @@ class Metrics(TypedDict, total=False):
     peak_left_speed_rad_s: Peak
     peak_right_current_A: Peak
     peak_right_speed_rad_s: Peak
+    peak_cart_current_A: Peak
+    peak_cart_drive_speed_rad_s: Peak
     peak_belt_force_N: Peak
     peak_span_force_N: dict[str, Peak]
     peak_span_stretch_m: dict[str, Peak]
