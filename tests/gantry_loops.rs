@@ -35,7 +35,8 @@ fn drawn(number: u64) -> Case {
         between(0.2, 1.0),
         between(10.0, 300.0),
     );
-    let structure = if number % 5 == 2 { cascade } else { pid };
+    let turn = number as usize / 3 % 3;
+    let structure = if turn == 2 { cascade } else { pid };
     let every = between(4e-4, 1.5e-3);
     let changes = [
         format!("belt.stiffness=[{}]", stiffness.join(", ")),
@@ -48,10 +49,7 @@ fn drawn(number: u64) -> Case {
         "drive_pulley.friction={ viscous = 0.0016 }".into(),
         "encoder.lines=1e12".into(),
         "amplifier={}".into(),
-        format!(
-            "controller={{ every = {every}, delay = {}, {structure} }}",
-            every * [0.0, 0.4, 1.0][number as usize % 4 % 3]
-        ),
+        format!("controller={{ every = {every}, delay = {}, {structure} }}", every * [0.0, 0.4, 1.0][turn]),
     ];
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("stages").join(kind).join("square.toml");
     Case::read_with(path, &changes.each_ref().map(String::as_str)).unwrap_or_else(|error| panic!("{error}"))
