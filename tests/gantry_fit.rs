@@ -11,36 +11,46 @@ use taut::signal::Hold;
 use taut::solve::{Flow, Solver, simulate};
 use taut::trajectory::Trajectory;
 
-/// Bits of 8 V on both motors, each with its own.
-const INPUTS: &str =
-    "experiment.0.input={ left = { prbs = 8, bit = 0.005, seed = 3 }, right = { prbs = 8, bit = 0.005, seed = 8 } }";
+/// Bits of 8 V on all motors, each with its own.
+fn inputs(kind: Kind) -> String {
+    let bits = |(drive, side): (usize, &str)| format!("{side} = {{ prbs = 8, bit = 0.005, seed = {} }}", 3 + 5 * drive);
+    let all: Vec<String> = kind.geometry().sides().enumerate().map(bits).collect();
+    format!("experiment.0.input={{ {} }}", all.join(", "))
+}
 
-/// The encoder of both motors: 10 000 counts a turn.
+/// The encoder of all motors: 10 000 counts a turn.
 const COUNT: f64 = std::f64::consts::TAU / 10_000.0;
 
 /// A stage of this kind with one experiment on both motors.
 fn case(kind: Kind, changes: &[&str]) -> Case {
     let file = match kind {
         Kind::HFrame => "stages/h-frame/h-frame.toml",
+        Kind::DualBelt => "stages/dual-belt/dual-belt.toml",
         Kind::Axis | Kind::CoreXy => "stages/core-xy/core-xy.toml",
     };
-    let rows = [INPUTS, "experiment.0.until=0.5", "experiment.0.every=1ms"];
+    let rows = [&*inputs(kind), "experiment.0.until=0.5", "experiment.0.every=1ms"];
     let mut case = Case::read_with(file, &[&rows, changes].concat()).unwrap();
     case.experiments.truncate(1);
     case
 }
 
-/// The log of a run: angles of both motors in counts, and positions with noise of a standard deviation, m.
-fn logged(run: &Trajectory, positions: Option<f64>, seed: u64) -> Log {
+/// The log of a run: angles of all motors in counts, and positions with noise of a standard deviation, m.
+fn logged(run: &Trajectory, kind: Kind, positions: Option<f64>, seed: u64) -> Log {
     let mut chance = Chance::new(seed);
     let column = |name: &str| run.get(name).unwrap().to_vec();
     let output = |quantity: Quantity, values: Vec<f64>| Output { quantity, absolute: false, values };
-    let mut outputs: Vec<Output> = [Quantity::LeftAngle, Quantity::RightAngle]
-        .map(|quantity| {
+    let geometry = kind.geometry();
+    let is_counted = |quantity: &&Quantity| {
+        geometry.drives.iter().any(|drive| quantity.name() == format!("{}_angle", geometry.label(drive.pulley).key))
+    };
+    let mut outputs: Vec<Output> = Quantity::of(kind)
+        .iter()
+        .filter(is_counted)
+        .map(|&quantity| {
             let counts = column(quantity.name()).iter().map(|angle| COUNT * (angle / COUNT).floor()).collect();
             output(quantity, counts)
         })
-        .into();
+        .collect();
     if let Some(deviation) = positions {
         outputs.extend([Quantity::BridgePosition, Quantity::CartPosition].map(|quantity| {
             let values = column(quantity.name()).iter().map(|x| x + deviation * chance.normal()).collect();
@@ -51,7 +61,7 @@ fn logged(run: &Trajectory, positions: Option<f64>, seed: u64) -> Log {
         name: "both motors".into(),
         file: Default::default(),
         time: column("time"),
-        inputs: vec![column("left_voltage"), column("right_voltage")],
+        inputs: geometry.sides().map(|side| column(&format!("{side}_voltage"))).collect(),
         added: None,
         hold: Hold::Zero,
         reference: None,
@@ -63,7 +73,7 @@ fn logged(run: &Trajectory, positions: Option<f64>, seed: u64) -> Log {
 /// The case with the log of `truth`, to be fitted from its own values.
 fn with_log(mut case: Case, truth: &Case, positions: Option<f64>, seed: u64) -> Case {
     let run = simulate(&truth.machine, &truth.experiments[0], Solver::Exact).unwrap().trajectory;
-    let log = logged(&run, positions, seed);
+    let log = logged(&run, truth.machine.kind, positions, seed);
     case.experiments[0].inputs = log.signals();
     case.experiments[0].log = Some(Arc::new(log));
     case
@@ -176,6 +186,28 @@ fn an_h_frame_is_fitted_with_all_three_spans() {
     let told = check(&own, &plan).unwrap();
     assert!(told.balance.is_none() && told.experiments.is_empty() && told.tells());
     assert_eq!(told.logs[0].channels[1].name, "right_input");
+}
+
+/// Three inputs and three belts, of each of which only the sum of both spans shows.
+#[test]
+fn a_dual_belt_is_fitted_with_the_logs_of_three_motors() {
+    let values = [0.9, 0.4, 9.0, 14.0, 1.9e5, 2.2e5, 2.4e5];
+    let spans: Vec<f64> = values[4..].iter().flat_map(|sum| [0.5 * sum, 0.5 * sum]).collect();
+    let free = ["bridge.mass", "cart.mass", "cart.friction.viscous", "bridge.friction.viscous"];
+    let mut truth: Vec<String> = free.iter().zip(values).map(|(key, value)| format!("{key}={value}")).collect();
+    truth.push(format!("belt.stiffness={spans:?}"));
+    let truth: Vec<&str> = truth.iter().map(String::as_str).collect();
+    let alike = ["belt.stiffness=[1e5, 1e5, 1e5, 1e5, 1e5, 1e5]"];
+    let own = with_log(case(Kind::DualBelt, &alike), &case(Kind::DualBelt, &truth), None, 13);
+    let tie = |belt: usize| [2 * belt, 2 * belt + 1].map(|span| format!("belt.stiffness.{span}")).to_vec();
+    let plan = Plan { free: free.map(String::from).to_vec(), tied: (0..3).map(tie).collect(), ..Plan::default() };
+    let found = fitted(&own, &plan);
+    let single = values.iter().enumerate().map(|(k, value)| if k < 4 { *value } else { 0.5 * value });
+    for (estimate, value) in found.estimates.iter().zip(single) {
+        let error = estimate.error.unwrap();
+        assert!((estimate.value - value).abs() < 4.0 * error && error < 0.02 * value, "{estimate:?}, {value}");
+    }
+    assert_eq!(found.estimates.len(), 7);
 }
 
 /// Out and back of a CoreXY's belt are stretched alike: only the sum of their stiffnesses shows.
