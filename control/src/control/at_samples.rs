@@ -51,6 +51,8 @@ struct OfSlide<'a> {
     target: f64,
     peak: Peak,
     squared: Squared,
+    /// The largest distance from its start, m.
+    reached: f64,
     /// The error at the last sample, and the distance from the target, m.
     error: f64,
     away: f64,
@@ -89,6 +91,7 @@ impl<'a> Gathered<'a> {
             target: profile.target(),
             peak: Peak::default(),
             squared: Squared::default(),
+            reached: 0.0,
             error: 0.0,
             away: 0.0,
             entered: None,
@@ -108,6 +111,7 @@ impl<'a> Gathered<'a> {
         for slide in &mut self.slides {
             let x = state.position[slide.body];
             let error = x - slide.profile.at(time).position;
+            slide.reached = slide.reached.max((x - slide.profile.start()).abs());
             if error.abs() > slide.peak.value.abs() {
                 slide.peak = Peak { value: error, time };
             }
@@ -128,8 +132,7 @@ impl<'a> Gathered<'a> {
 
     fn finish(self) -> Figures {
         let end = self.last.unwrap_or_default();
-        let inside =
-            |slide: &OfSlide| slide.away <= self.window && is_made(slide.profile, self.window, slide.peak.value);
+        let inside = |slide: &OfSlide| slide.away <= self.window && is_made(slide.profile, self.window, slide.reached);
         let is_inside = end >= self.done && self.slides.iter().all(inside);
         let entered = self.slides.iter().filter_map(|slide| slide.entered).reduce(f64::max);
         let load = |slide: &OfSlide| LoadFigures {

@@ -3,15 +3,15 @@
 use crate::metrics::Peak;
 use crate::signal::profile::Profile;
 
-/// Share of the way out from which on the error of a move that returns says that the move was not made.
-const NOT_MADE: f64 = 0.5;
+/// Share of the way out that a load has to go at least, or it has not made a move that returns.
+const MADE: f64 = 0.5;
 
-/// True if a load whose largest error is `peak`, m, makes the move of its reference. A move that returns to its start
-/// ends at its target without any motion, too: it is not made where the error reaches half of the way out.
-pub(super) fn is_made(profile: &Profile, window: f64, peak: f64) -> bool {
+/// True if a load that goes as far as `reached` from its start, m, makes the move of its reference. A move that returns to
+/// its start ends at its target without any motion, too: it is made by going half of the way out at least.
+pub(super) fn is_made(profile: &Profile, window: f64, reached: f64) -> bool {
     let out = profile.excursion();
     let returns = (profile.target() - profile.start()).abs() <= window;
-    !(returns && out > window && peak.abs() >= NOT_MADE * out)
+    !(returns && out > window && reached < MADE * out)
 }
 
 /// A difference over time.
@@ -37,7 +37,7 @@ pub struct Figures {
     /// the same for a while; about corners its peak is sought between nine places of each piece of the motion.
     pub contour: Option<Deviation>,
     /// From the end of the profile, a shaper apart, until all that slides stays within the window around its target, s;
-    /// none if it does not, or if the move returns to its start and was not made: its error reaches half of the way out.
+    /// none if it does not, or if the move returns to its start and it does not go half of the way out.
     pub settling: Option<f64>,
 }
 

@@ -46,6 +46,9 @@ struct LoadGauge {
     target: f64,
     /// ∫ of the square of its error.
     square: f64,
+    /// The largest distance from its start at the end of any curve, m.
+    reached: f64,
+    start: f64,
     /// When it was outside its window for the last time after the profile, and whether it is now.
     outside: Option<f64>,
     is_outside: bool,
@@ -103,6 +106,8 @@ impl LoadGauge {
             stretches: slide.error.iter().filter_map(stretch).collect(),
             approach: approaches.find(|(_, direction)| *direction != 0.0).unwrap_or_default(),
             target: profile.target(),
+            reached: 0.0,
+            start: profile.start(),
             square: 0.0,
             outside: None,
             is_outside: false,
@@ -122,7 +127,9 @@ impl LoadGauge {
                 self.seen.overshoot = self.seen.overshoot.max(beyond.greatest(last, 1.0).1);
             }
         }
-        self.is_outside = done < 1.0 && away.at(1.0).abs() > window;
+        let ends = away.at(1.0);
+        self.reached = self.reached.max((ends + self.target - self.start).abs());
+        self.is_outside = done < 1.0 && ends.abs() > window;
         if done < 1.0 && away.bound() > window {
             if self.is_outside {
                 self.outside = Some(curve.begin + curve.length);
@@ -267,7 +274,7 @@ impl<'a> Gauge<'a> {
             load.peak_speed = peak.unwrap_or(load.peak_speed);
         }
         let left = self.loads.iter().filter_map(|load| load.outside).reduce(f64::max);
-        let made = |(load, profile): (&LoadGauge, &Profile)| is_made(profile, self.window, load.seen.error.peak.value);
+        let made = |(load, profile): (&LoadGauge, &Profile)| is_made(profile, self.window, load.reached);
         let is_outside =
             self.loads.iter().any(|load| load.is_outside) || !self.loads.iter().zip(self.profiles).all(made);
         let figures = Figures {

@@ -408,6 +408,12 @@ pub(crate) const WHOLE_POWER: f64 = 0.03;
 /// Unit: 1. Source: chosen: the noise is by third differences, and is not known to a few per cent.
 pub(crate) const MORE_THAN_NOISE: f64 = 1.2;
 
+/// Costs that differ by less are taken for those of one minimum.
+///
+/// Unit: 1. Source: chosen: a rough search ends within a few per mille of its minimum. Test:
+/// `a_dual_belt_is_fitted_with_the_logs_of_three_motors`.
+pub(crate) const SAME_MINIMUM: f64 = 0.01;
+
 /// Lengths of the windows that a search of a machine with several coordinates begins in, one after the other.
 ///
 /// Unit: samples. Source: chosen: from a few swings of a belt to some ten, in logs that show them. Test:

@@ -10,8 +10,8 @@ use crate::fit::asked::problem::{Problem, Stop, extent};
 use crate::fit::asked::residuals::Residuals;
 use crate::fit::asked::run::Run;
 use crate::fit::limits::{
-    FILE_ROUNDING, HUBER, MORE_THAN_NOISE, MOST_START_WINDOWS, ROUGH_TOLERANCE, START_WINDOWS, SWINGS_KEEP,
-    TRIAL_ITERATIONS, WEIGHT_ROUNDS,
+    FILE_ROUNDING, HUBER, MORE_THAN_NOISE, MOST_START_WINDOWS, ROUGH_TOLERANCE, SAME_MINIMUM, START_WINDOWS,
+    SWINGS_KEEP, TRIAL_ITERATIONS, WEIGHT_ROUNDS,
 };
 use crate::log::Quantity;
 use crate::solve::Flow;
@@ -241,8 +241,8 @@ fn by_regression(problem: &Problem, start: &[f64]) -> Option<Vec<f64>> {
 }
 
 /// The nearest to the logs of what a few steps lead to from the start, and from fits in windows of a few swings of the
-/// belt, each window with a start of its own, and the next ones longer, until the residuals are noise; none where the
-/// plan has windows or a loop, or no step leads anywhere.
+/// belt, each window with a start of its own, and the next ones longer, until two of them lead to one minimum whose
+/// residuals are noise; none where the plan has windows or a loop, or no step leads anywhere.
 ///
 /// A belt whose stiffness is off swings out of step with the log, and the longer the log, the closer to each other are
 /// the minima that this makes. In a window of a few swings there is one.
@@ -277,11 +277,13 @@ fn in_windows(
             guess[..globals].copy_from_slice(&found.x[..globals]);
         }
         let found = descend(problem, &guess, &rough);
+        // Two starts that lead to one minimum say that there is no other near.
+        let agrees = best.as_ref().is_some_and(|best: &Minimum| (found.cost / best.cost - 1.0).abs() < SAME_MINIMUM);
         let is_better = best.as_ref().is_none_or(|best: &Minimum| found.cost < best.cost);
         if found.ending != Ending::Failed && is_better {
             best = Some(found);
         }
-        if problem.is_stopped() || best.as_ref().is_some_and(|best| is_noise(problem, best)) {
+        if problem.is_stopped() || agrees && best.as_ref().is_some_and(|best| is_noise(problem, best)) {
             break;
         }
     }
