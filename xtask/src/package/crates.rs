@@ -6,6 +6,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+/// Name and version of a crate.
+type Published = (String, String);
+
 /// Packs the crates and installs the program from the packages. Returns the program.
 pub fn make(places: &Places) -> Result<PathBuf, String> {
     println!("== crates");
@@ -36,7 +39,7 @@ pub fn make(places: &Places) -> Result<PathBuf, String> {
 }
 
 /// Members of the workspace that are published, with their versions, and names of the others.
-fn members() -> Result<(Vec<(String, String)>, Vec<String>), String> {
+fn members() -> Result<(Vec<Published>, Vec<String>), String> {
     let listed = output(crate::cargo(&["metadata", "--no-deps", "--format-version", "1"]))?;
     let listed: Value = serde_json::from_slice(&listed).map_err(|e| format!("cargo metadata: {e}"))?;
     let (mut published, mut others) = (Vec::new(), Vec::new());
@@ -51,7 +54,7 @@ fn members() -> Result<(Vec<(String, String)>, Vec<String>), String> {
 }
 
 /// `cargo install` from that registry, with a home of its own and in a folder without a configuration.
-fn install(places: &Places, registry: &Path, published: &[(String, String)]) -> Result<PathBuf, String> {
+fn install(places: &Places, registry: &Path, published: &[Published]) -> Result<PathBuf, String> {
     let (home, root, built) = (places.work.join("home"), places.work.join("installed"), places.work.join("crates"));
     // Cargo takes a version of a package for the same whatever is in it.
     for folder in [&root, &built] {
