@@ -55,12 +55,19 @@ fn wrong_cases() -> impl Iterator<Item = (String, Vec<u8>)> {
     all.into_iter().map(|wrong| (wrong.path.display().to_string(), wrong.bytes()))
 }
 
-/// Case files; those whose logs are fetched need not be read.
+/// True if the logs that a case file names lie where the reader of the fuzzer has case files.
+fn has_its_logs(bytes: &[u8]) -> bool {
+    let text = String::from_utf8_lossy(bytes);
+    let named = text.split("file = \"").skip(1).filter_map(|rest| rest.split('"').next());
+    named.into_iter().all(|path| repository().join("stages/sollmann-jouaneh/identification").join(path).exists())
+}
+
+/// Case files; those whose logs are elsewhere need not be read.
 pub fn cases() -> Vec<Seed> {
     let mut seeds = vec![good("the template", TEMPLATE), good("every part", EVERY_PART), good("moves", MOVES)];
     for (name, bytes) in files("stages", "toml") {
-        let away = bytes.windows(7).any(|window| window == b"fetch =");
-        seeds.push(Seed { name, bytes, good: !away });
+        let good = has_its_logs(&bytes);
+        seeds.push(Seed { name, bytes, good });
     }
     seeds.extend(wrong_cases().map(|(name, bytes)| any(&name, bytes)));
     seeds

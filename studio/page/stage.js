@@ -503,13 +503,15 @@ function gantry(scene) {
         };
         idler(CART_IDLER, by, 12);
         const [[leftOut, leftBack], [rightOut, rightBack]] = [side(0), side(1)];
+        const cartOut = `M${CART_MOTOR} ${UP}H${CART_IDLER}A15 15 0 0 1 ${CART_IDLER} ${LOW}H${r}`;
+        const cartBack = `M${l} ${LOW}H${CART_MOTOR}A15 15 0 0 1 ${CART_MOTOR} ${UP}`;
         return [
           [leftOut, -travel[0], INNER[0] + 10, 130, "start"],
           [leftBack, -travel[0], INNER[0] + 10, 430, "start"],
           [rightOut, -travel[1], INNER[1] - 10, 130, "end"],
           [rightBack, -travel[1], INNER[1] - 10, 430, "end"],
-          [`M${CART_MOTOR} ${UP}H${CART_IDLER}A15 15 0 0 1 ${CART_IDLER} ${LOW}H${r}`, -travel[2], 730, by - 6, "start"],
-          [`M${l} ${LOW}H${CART_MOTOR}A15 15 0 0 1 ${CART_MOTOR} ${UP}`, -travel[2], 730, by + 16, "start"],
+          [cartOut, -travel[2], 730, by - 6, "start"],
+          [cartBack, -travel[2], 730, by + 16, "start"],
         ];
       }
     },

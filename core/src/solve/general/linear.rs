@@ -661,14 +661,16 @@ mod tests {
         let mut x = vec![0.0; full.end.len()];
         (x[0], x[1], x[8]) = (y[0], y[1], 1.0);
         x[9..12].copy_from_slice(&u);
-        x[15..20].copy_from_slice(&f);
+        // Behind the powers of all inputs.
+        let forced = 9 + POWERS * DRIVES;
+        x[forced..forced + POINTS].copy_from_slice(&f);
         let mut end = y;
         full.advance::<8>(&mut end, &x);
         for node in 0..NODES {
             let at = series.at(8, radau::C[node]);
             let (want, c) = (0.7 * at[0] + at[1], radau::C[node]);
             let forces = (0..POINTS).fold(0.0, |sum, p| sum + set.weights(0, 0, 1)[p][node] * f[p]);
-            assert!((set.base(0, &x[..15])[node] + forces - want).abs() < 1e-14, "node {node}");
+            assert!((set.base(0, &x[..forced])[node] + forces - want).abs() < 1e-14, "node {node}");
             let guard = want + 0.1 * (u[0] + c * (u[1] + c * u[2])) + 0.2 + 0.5 * f[node + 1];
             assert!((full.guard(0, &x)[node] - guard).abs() < 1e-14, "node {node}");
             if node == NODES - 1 {
