@@ -33,6 +33,9 @@ pub const STAGES: &[(&str, &str)] = bundled![
     "core-xy/core-xy.toml",
     "core-xy/follows.toml",
     "core-xy/square.toml",
+    "dual-belt/dual-belt.toml",
+    "dual-belt/follows.toml",
+    "dual-belt/square.toml",
 ];
 
 /// The text of the bundled case file at this path within `stages`; none if there is no such file.

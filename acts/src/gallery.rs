@@ -39,3 +39,15 @@ pub fn gallery(_: &Request, _: &Context) -> Result<Reply> {
     let stages = GALLERY.iter().map(one).collect::<Result<Vec<Value>>>()?;
     Ok(Reply::of(json!({ "stages": stages })))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_machine_of_the_gallery_is_bundled() {
+        for path in GALLERY {
+            assert!(stages::text(path).is_some(), "{path}");
+        }
+    }
+}

@@ -17,7 +17,7 @@ const DESIGNS = [
   ["latin-hypercube", "Latin hypercube"],
   ["random", "random"],
 ];
-const MACHINE = /^(motor|amplifier|drive|drive_pulley|idler_pulley|cart|bridge|belt|left_drive|right_drive|cart_drive)\./;
+const MACHINE = /^(motor|amplifier|(left_|right_|cart_)?drive|drive_pulley|idler_pulley|cart|bridge|belt)\./;
 
 /** @param {HTMLElement} root @param {App} app */
 export function mount(root, app) {

@@ -661,8 +661,8 @@ mod tests {
         let mut x = vec![0.0; full.end.len()];
         (x[0], x[1], x[8]) = (y[0], y[1], 1.0);
         x[9..12].copy_from_slice(&u);
-        // Behind the powers of all inputs.
-        let forced = 9 + POWERS * DRIVES;
+        // Behind the three powers of each input.
+        let forced = 9 + 3 * DRIVES;
         x[forced..forced + POINTS].copy_from_slice(&f);
         let mut end = y;
         full.advance::<8>(&mut end, &x);
