@@ -42,7 +42,8 @@ pub fn fail_as_a_bug(py: Python<'_>, told: String) -> PyResult<()> {
     unlocked(py, || panic!("{told}"))
 }
 
-/// A sentence of the library as Python has it: `--move` is the argument `move=`. A command of the command line stays.
+/// A sentence of the library as Python has it: `--move` is the argument `move=`. A command of the command line stays, and
+/// so does `--set`, which is a way to write changes.
 fn spoken(text: &str) -> String {
     let mut spoken = String::with_capacity(text.len());
     let mut rest = text;
@@ -52,7 +53,7 @@ fn spoken(text: &str) -> String {
         let begins_a_word = before.chars().next_back().is_none_or(|c| !c.is_alphanumeric() && c != '-');
         spoken.push_str(before);
         let is_option = option.starts_with(|c: char| c.is_ascii_lowercase()) && begins_a_word;
-        match is_option && !spoken.contains("taut ") {
+        match is_option && option[..end] != *"set" && !spoken.contains("taut ") {
             true => spoken.push_str(&format!("{}=", option[..end].replace('-', "_"))),
             false => spoken.push_str(&rest[at..at + 2 + end]),
         }
@@ -67,7 +68,8 @@ pub fn told(py: Python<'_>, mut error: taut::Error) -> PyErr {
     error.allowed = error.allowed.map(|text| spoken(&text));
     error.next = error.next.map(|text| spoken(&text));
     if let Some(place) = &mut error.place
-        && let Some(argument) = place.file.to_str().and_then(|name| name.strip_prefix("--"))
+        && let Some(argument) =
+            place.file.to_str().and_then(|name| name.strip_prefix("--")).filter(|name| *name != "set")
     {
         place.file = argument.replace('-', "_").into();
     }

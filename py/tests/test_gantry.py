@@ -186,7 +186,7 @@ def test_what_is_not_there_says_so(gantry):
 def test_logs_of_both_motors_are_checked_and_fitted(root):
     case = taut.read(root / "stages/core-xy/belts.toml")
     told = case.check()
-    assert told["complete"] and told["regression"] is None and told["experiments"] == []
+    assert told.complete and told.data["regression"] is None and told.data["experiments"] == []
     found = case.fit()
     ratio = (105 + 90) / (120 + 100)
     low, high = found.data["belts"]["interval_95"]
