@@ -42,7 +42,7 @@ pub const STAGES: &[(&str, &str)] = bundled![
 ///
 /// ```
 /// let text = taut::stages::text("sollmann-jouaneh/table4.toml").unwrap();
-/// assert!(text.contains("pulley_radius"));
+/// assert!(text.contains("[drive_pulley]"));
 /// assert_eq!(taut::stages::text("no-such.toml"), None);
 /// ```
 pub fn text(path: &str) -> Option<&'static str> {

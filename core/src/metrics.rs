@@ -166,11 +166,13 @@ impl EventCount {
 }
 
 impl Peak {
-    /// Takes a value that is larger, and its time where it is larger by more than [`NEWS`].
+    /// Takes a value that is larger, and its time and sign where it is larger by more than [`NEWS`].
     fn take(&mut self, value: f64, time: f64) {
         let (new, old) = (value.abs(), self.value.abs());
-        if new > old {
-            *self = Peak { value, time: if new > old * (1.0 + NEWS) { time } else { self.time } };
+        if new > old * (1.0 + NEWS) {
+            *self = Peak { value, time };
+        } else if new > old {
+            self.value = new.copysign(self.value);
         }
     }
 
@@ -181,7 +183,8 @@ impl Peak {
         if new > old * (1.0 + NEWS) {
             *self = Peak { value, time };
         } else if new > 0.0 && new >= old * (1.0 - NEWS) {
-            *self = Peak { value: if new > old { value } else { self.value }, time: self.time.max(time) };
+            let last = if time >= self.time { value } else { self.value };
+            *self = Peak { value: new.max(old).copysign(last), time: self.time.max(time) };
         }
     }
 
