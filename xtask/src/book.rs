@@ -9,6 +9,7 @@ mod generated;
 mod links;
 mod studio;
 
+use crate::write;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -97,11 +98,6 @@ pub fn installed(name: &str, version: &str, features: &[&str]) -> Result<PathBuf
 
 fn read(path: &Path) -> Result<String, String> {
     fs::read_to_string(path).map_err(|error| format!("{} cannot be read: {error}", path.display()))
-}
-
-fn write(path: &Path, text: &str) -> Result<(), String> {
-    let written = path.parent().map_or(Ok(()), fs::create_dir_all).and_then(|()| fs::write(path, text));
-    written.map_err(|error| format!("{} cannot be written: {error}", path.display()))
 }
 
 /// All files below a folder, in the order of their paths.

@@ -24,7 +24,7 @@ mod web;
 
 use ignored::Ignored;
 use std::io::{BufRead, BufReader};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode, Stdio};
 use std::time::Instant;
 
@@ -221,6 +221,21 @@ fn run(mut command: Command, counts: &mut Counts) -> Result<bool, String> {
         }
     }
     Ok(child.wait().map_err(|e| format!("{name} was lost: {e}"))?.success())
+}
+
+/// The output of a command. Errors: it fails.
+fn output(mut command: Command) -> Result<Vec<u8>, String> {
+    let done = command.output().map_err(|e| format!("{command:?} cannot be started: {e}"))?;
+    match done.status.success() {
+        true => Ok(done.stdout),
+        false => Err(format!("failed: {command:?}\n{}", String::from_utf8_lossy(&done.stderr))),
+    }
+}
+
+/// Writes a file, and makes its folder first.
+fn write(path: &Path, bytes: impl AsRef<[u8]>) -> Result<(), String> {
+    let written = path.parent().map_or(Ok(()), std::fs::create_dir_all).and_then(|()| std::fs::write(path, bytes));
+    written.map_err(|error| format!("{} cannot be written: {error}", path.display()))
 }
 
 /// The cargo that runs this program.

@@ -61,6 +61,8 @@ pub fn environment(name: &str, requirements: &str) -> Result<PathBuf, String> {
     install.args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--requirement", requirements]);
     for command in [make, install] {
         if !crate::run(command, &mut Counts::default())? {
+            // Half an environment must not be taken for a whole one.
+            let _ = std::fs::remove_dir_all(&folder);
             return Err(format!(
                 "the environment {} cannot be made; it needs Python's venv (Debian: apt install python3-venv) and PyPI",
                 folder.display()

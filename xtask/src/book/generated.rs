@@ -3,7 +3,7 @@
 use serde_json::Value;
 use std::fmt::Write;
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::Command;
 
 /// The case whose exported header stands for all.
 const EXPORTED: &str = "stages/sollmann-jouaneh/controllers/pid.toml";
@@ -16,7 +16,7 @@ pub fn filled(text: &str, program: &Path) -> Result<String, String> {
         filled += &match name {
             None => line.to_string(),
             Some("schemas") => schemas(program)?,
-            Some("python") => output(Command::new("python3").arg("py/reference.py"))?,
+            Some("python") => reference()?,
             Some("header") => header(program)?,
             Some(other) => return Err(format!("{other} cannot be generated; schemas, python and header can")),
         };
@@ -25,20 +25,24 @@ pub fn filled(text: &str, program: &Path) -> Result<String, String> {
     Ok(filled)
 }
 
-/// The output of a command.
-fn output(command: &mut Command) -> Result<String, String> {
-    let name = command.get_program().to_string_lossy().into_owned();
-    let output = command.stderr(Stdio::inherit()).output();
-    let output = output.map_err(|error| format!("{name} cannot be started: {error}"))?;
-    if !output.status.success() {
-        return Err(format!("{command:?} failed"));
-    }
-    String::from_utf8(output.stdout).map_err(|_| format!("the output of {name} is not text"))
+/// The output of a command as text.
+fn text_of(command: Command) -> Result<String, String> {
+    let shown = format!("{command:?}");
+    String::from_utf8(crate::output(command)?).map_err(|_| format!("the output of {shown} is not text"))
+}
+
+/// The reference of the Python package.
+fn reference() -> Result<String, String> {
+    let mut command = Command::new("python3");
+    command.arg("py/reference.py");
+    text_of(command)
 }
 
 /// The output of the program.
 fn taut(program: &Path, words: &[&str]) -> Result<String, String> {
-    output(Command::new(program).args(words))
+    let mut command = Command::new(program);
+    command.args(words);
+    text_of(command)
 }
 
 /// A header as `taut export c` writes it.

@@ -54,7 +54,7 @@ impl<'a> Links<'a> {
         if let Some(known) = self.known.get(case) {
             return Ok(*known);
         }
-        super::write(&self.tried.join("case.toml"), case)?;
+        crate::write(&self.tried.join("case.toml"), case)?;
         let mut show = Command::new(self.program);
         show.args(["show", "case.toml"]).current_dir(&self.tried).stdout(Stdio::null()).stderr(Stdio::null());
         let opens = show.status().map_err(|e| format!("{} cannot be started: {e}", self.program.display()))?.success();

@@ -1,6 +1,7 @@
 //! Crates, packed as they would be published, and installed from their packages.
 
-use super::{Places, hash, must, output, write};
+use super::{Places, hash, members, must};
+use crate::{output, write};
 use serde_json::{Value, json};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -12,7 +13,7 @@ type Published = (String, String);
 /// Packs the crates and installs the program from the packages. Returns the program.
 pub fn make(places: &Places) -> Result<PathBuf, String> {
     println!("== crates");
-    let (published, others) = members()?;
+    let (published, others) = published()?;
     let mut pack = crate::cargo(&["package", "--workspace", "--no-verify", "--allow-dirty", "--quiet"]);
     for name in &others {
         pack.args(["--exclude", name]);
@@ -39,24 +40,18 @@ pub fn make(places: &Places) -> Result<PathBuf, String> {
 }
 
 /// Members of the workspace that are published, with their versions, and names of the others.
-fn members() -> Result<(Vec<Published>, Vec<String>), String> {
-    let listed = output(crate::cargo(&["metadata", "--no-deps", "--format-version", "1"]))?;
-    let listed: Value = serde_json::from_slice(&listed).map_err(|e| format!("cargo metadata: {e}"))?;
-    let (mut published, mut others) = (Vec::new(), Vec::new());
-    for package in listed["packages"].as_array().into_iter().flatten() {
-        let text = |key: &str| package[key].as_str().unwrap_or_default().to_string();
-        match package["publish"].is_null() {
-            true => published.push((text("name"), text("version"))),
-            false => others.push(text("name")),
-        }
-    }
-    Ok((published, others))
+fn published() -> Result<(Vec<Published>, Vec<String>), String> {
+    let text = |package: &Value, key: &str| package[key].as_str().unwrap_or_default().to_string();
+    let (published, others): (Vec<Value>, Vec<Value>) =
+        members()?.into_iter().partition(|package| package["publish"].is_null());
+    let published = published.iter().map(|package| (text(package, "name"), text(package, "version"))).collect();
+    Ok((published, others.iter().map(|package| text(package, "name")).collect()))
 }
 
 /// `cargo install` from that registry, with a home of its own and in a folder without a configuration.
 fn install(places: &Places, registry: &Path, published: &[Published]) -> Result<PathBuf, String> {
     let (home, root, built) = (places.work.join("home"), places.work.join("installed"), places.work.join("crates"));
-    // Cargo takes a version of a package for the same whatever is in it.
+    // Cargo does not compile a package again if only its content has changed, and not its version.
     for folder in [&root, &built] {
         let _ = fs::remove_dir_all(folder);
     }

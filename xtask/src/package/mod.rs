@@ -6,14 +6,15 @@
 //!   bill of materials (CycloneDX), in one archive.
 //! - The Python wheel, for the same C library, installed into an empty environment.
 //!
-//! Both programs have to give the same results, and so has the wheel.
+//! The two programs and the wheel must give equal results.
 
 mod crates;
 mod paths;
 mod program;
 mod wheel;
 
-use crate::{Counts, python};
+use crate::{Counts, output, python, write};
+use serde_json::Value;
 use sha2::{Digest, Sha256};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -35,7 +36,7 @@ struct Asked {
     parts: Vec<Part>,
     /// The target of program and wheel; none: this machine.
     target: Option<String>,
-    /// True if the program is built a second time and has to have the same bytes.
+    /// True if the program is built twice, and both builds must be equal byte by byte.
     twice: bool,
 }
 
@@ -111,28 +112,19 @@ fn must(command: Command) -> Result<(), String> {
     }
 }
 
-/// The output of a command. Errors: it fails.
-fn output(mut command: Command) -> Result<Vec<u8>, String> {
-    let done = command.output().map_err(|e| format!("{command:?} cannot be started: {e}"))?;
-    match done.status.success() {
-        true => Ok(done.stdout),
-        false => Err(format!("failed: {command:?}\n{}", String::from_utf8_lossy(&done.stderr))),
-    }
-}
-
-fn write(path: &Path, bytes: impl AsRef<[u8]>) -> Result<(), String> {
-    let written = path.parent().map_or(Ok(()), fs::create_dir_all).and_then(|()| fs::write(path, bytes));
-    written.map_err(|error| format!("{} cannot be written: {error}", path.display()))
+/// What cargo says of the members of the workspace.
+fn members() -> Result<Vec<Value>, String> {
+    let listed = output(crate::cargo(&["metadata", "--no-deps", "--format-version", "1"]))?;
+    let mut listed: Value = serde_json::from_slice(&listed).map_err(|e| format!("cargo metadata: {e}"))?;
+    Ok(listed["packages"].as_array_mut().map(std::mem::take).unwrap_or_default())
 }
 
 /// Errors: two programs differ in what they compute, or one carries no object for FMUs.
 fn same(first: &Path, second: &Path, work: &Path) -> Result<(), String> {
-    let results = [first, second].map(|program| tried(program, work));
-    let [first_result, second_result] = results;
-    match first_result? == second_result? {
-        true => println!("{} and {} give the same results", first.display(), second.display()),
-        false => return Err(format!("{} and {} give different results", first.display(), second.display())),
+    if tried(first, work)? != tried(second, work)? {
+        return Err(format!("{} and {} give different results", first.display(), second.display()));
     }
+    println!("{} and {} give the same results", first.display(), second.display());
     Ok(())
 }
 

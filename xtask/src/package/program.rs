@@ -3,7 +3,8 @@
 #[path = "../../../cli/notices.rs"]
 mod notices;
 
-use super::{Asked, GLIBC, Places, hash, must, output, paths, write};
+use super::{Asked, GLIBC, Places, hash, members, must, paths};
+use crate::{output, write};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -109,11 +110,8 @@ fn materials(places: &Places, triple: &str) -> Result<Vec<u8>, String> {
     list.args(["--override-filename", name]).env("SOURCE_DATE_EPOCH", "0").env("PATH", with_tools(places)?);
     output(list)?;
     // It writes beside the manifest of every member; the program's is the one that is wanted.
-    let listed = crate::cargo(&["metadata", "--no-deps", "--format-version", "1"]);
-    let listed: serde_json::Value = serde_json::from_slice(&output(listed)?).map_err(|e| e.to_string())?;
-    let mut found = None;
-    for manifest in listed["packages"].as_array().into_iter().flatten().filter_map(|one| one["manifest_path"].as_str())
-    {
+    let (members, mut found) = (members()?, None);
+    for manifest in members.iter().filter_map(|one| one["manifest_path"].as_str()) {
         let file = Path::new(manifest).with_file_name(format!("{name}.json"));
         if manifest.ends_with("cli/Cargo.toml") {
             found = fs::read(&file).ok();
@@ -134,7 +132,7 @@ fn executable(_: &Path) -> Result<(), String> {
     Ok(())
 }
 
-/// An archive that has the same bytes for the same files.
+/// Packs a folder so that equal files give equal bytes.
 fn archive(folder: &Path, file: &Path) -> Result<(), String> {
     let (above, name) = (folder.parent().unwrap_or(folder), folder.file_name().unwrap_or_default());
     let mut tar = Command::new("tar");
@@ -148,10 +146,8 @@ fn archive(folder: &Path, file: &Path) -> Result<(), String> {
         "-cf",
         "-",
     ]);
-    let bytes = {
-        tar.arg("-C").arg(above).arg(name);
-        output(tar)?
-    };
+    tar.arg("-C").arg(above).arg(name);
+    let bytes = output(tar)?;
     let mut packed = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::best());
     std::io::Write::write_all(&mut packed, &bytes).map_err(|e| e.to_string())?;
     write(file, packed.finish().map_err(|e| e.to_string())?)

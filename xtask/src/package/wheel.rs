@@ -1,6 +1,7 @@
 //! The Python wheel.
 
-use super::{Asked, GLIBC, Places, must, output, paths, program, tried, write};
+use super::{Asked, GLIBC, Places, must, paths, program, tried};
+use crate::{output, write};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
