@@ -25,7 +25,7 @@
 
 use super::gantry::{LEFT, LEFT_DRIVE, RIGHT, RIGHT_DRIVE, bridge, cart};
 use super::geometry::Lever::{One, Radius};
-use super::geometry::{BodyAt, DriveAt, Geometry, Lever, Part, SpanAt};
+use super::geometry::{BodyAt, DriveAt, Geometry, Part, SpanAt, drive};
 use crate::mechanism::Label;
 
 /// Number of the cart's drive pulley among the bodies.
@@ -33,28 +33,20 @@ const CART_PULLEY: usize = 2;
 const BRIDGE: usize = 3;
 const CART: usize = 4;
 
-const CART_DRIVE: DriveAt = DriveAt {
-    label: Label { key: "cart_drive", name: "cart drive" },
-    voltage: Label { key: "cart_voltage", name: "cart voltage limit" },
-    current: Label { key: "cart_current", name: "cart current limit" },
-    current_column: "cart_current",
-    pulley: CART_PULLEY,
-    gear: Label { key: "cart_gear", name: "cart gear" },
-    rotor: Label { key: "cart_rotor", name: "cart rotor" },
-    key: "cart_drive.",
-    prefix: "cart_",
-    input: "cart_input",
-};
+const CART_DRIVE: DriveAt = drive!("cart", CART_PULLEY);
 
-/// A span: its arms, how its own length follows what slides, and its stretch by those of the spans that run out.
-const fn span(
-    key: &'static str,
-    name: &'static str,
-    arms: &'static [(usize, Lever)],
-    follows: &'static [(usize, f64)],
-    by_others: &'static [(usize, f64)],
-) -> SpanAt {
-    SpanAt { label: Label { key, name }, column: key, arms, follows, by_others }
+/// A span of the belt on this side, between its drive pulley and what slides. `sign` is 1 where the pulley stretches it
+/// forward; `out` is the number of the span that runs out.
+macro_rules! span {
+    ($side:literal, $way:literal, ($pulley:expr, $slide:expr), sign = $sign:literal, out = $out:literal) => {
+        SpanAt {
+            label: Label { key: concat!($side, "_", $way, "_span"), name: concat!($side, " ", $way, " span") },
+            column: concat!($side, "_", $way, "_span"),
+            arms: &[($pulley, Radius($sign)), ($slide, One(-$sign))],
+            follows: &[($slide, -$sign)],
+            by_others: &[($out, $sign)],
+        }
+    };
 }
 
 pub(super) static DUAL_BELT: Geometry = Geometry {
@@ -74,48 +66,12 @@ pub(super) static DUAL_BELT: Geometry = Geometry {
         BodyAt { label: Label { key: "cart", name: "cart" }, part: Part::Cart, by_slides: &[0.0, 1.0] },
     ],
     spans: &[
-        span(
-            "left_out_span",
-            "left out span",
-            &[(LEFT, Radius(1.0)), (BRIDGE, One(-1.0))],
-            &[(BRIDGE, -1.0)],
-            &[(0, 1.0)],
-        ),
-        span(
-            "left_back_span",
-            "left back span",
-            &[(LEFT, Radius(-1.0)), (BRIDGE, One(1.0))],
-            &[(BRIDGE, 1.0)],
-            &[(0, -1.0)],
-        ),
-        span(
-            "right_out_span",
-            "right out span",
-            &[(RIGHT, Radius(1.0)), (BRIDGE, One(-1.0))],
-            &[(BRIDGE, -1.0)],
-            &[(2, 1.0)],
-        ),
-        span(
-            "right_back_span",
-            "right back span",
-            &[(RIGHT, Radius(-1.0)), (BRIDGE, One(1.0))],
-            &[(BRIDGE, 1.0)],
-            &[(2, -1.0)],
-        ),
-        span(
-            "cart_out_span",
-            "cart out span",
-            &[(CART_PULLEY, Radius(1.0)), (CART, One(-1.0))],
-            &[(CART, -1.0)],
-            &[(4, 1.0)],
-        ),
-        span(
-            "cart_back_span",
-            "cart back span",
-            &[(CART_PULLEY, Radius(-1.0)), (CART, One(1.0))],
-            &[(CART, 1.0)],
-            &[(4, -1.0)],
-        ),
+        span!("left", "out", (LEFT, BRIDGE), sign = 1.0, out = 0),
+        span!("left", "back", (LEFT, BRIDGE), sign = -1.0, out = 0),
+        span!("right", "out", (RIGHT, BRIDGE), sign = 1.0, out = 2),
+        span!("right", "back", (RIGHT, BRIDGE), sign = -1.0, out = 2),
+        span!("cart", "out", (CART_PULLEY, CART), sign = 1.0, out = 4),
+        span!("cart", "back", (CART_PULLEY, CART), sign = -1.0, out = 4),
     ],
     slides: &[bridge(BRIDGE, &[0.5, 0.5, 0.0], &[(0, 0.5), (2, 0.5)]), cart(CART, &[0.0, 0.0, 1.0], &[(4, 1.0)])],
 };

@@ -19,7 +19,7 @@
 //! (s_right − s_left)/2 of the H-frame, r (φ_A ± φ_B)/2 − (x or y) = (s_A out ± s_B out)/2 of CoreXY.
 
 use super::geometry::Lever::{One, Radius};
-use super::geometry::{BodyAt, DriveAt, Geometry, Part, SlideAt, SpanAt};
+use super::geometry::{BodyAt, DriveAt, Geometry, Part, SlideAt, SpanAt, drive};
 use crate::mechanism::Label;
 
 /// Number of the left drive pulley (A) among the bodies.
@@ -33,33 +33,9 @@ pub const CART: usize = 3;
 /// Number of bodies with friction of their own.
 pub const BODIES: usize = 4;
 
-/// The drive on the left.
-pub(super) const LEFT_DRIVE: DriveAt = DriveAt {
-    label: Label { key: "left_drive", name: "left drive" },
-    voltage: Label { key: "left_voltage", name: "left voltage limit" },
-    current: Label { key: "left_current", name: "left current limit" },
-    current_column: "left_current",
-    pulley: LEFT,
-    gear: Label { key: "left_gear", name: "left gear" },
-    rotor: Label { key: "left_rotor", name: "left rotor" },
-    key: "left_drive.",
-    prefix: "left_",
-    input: "left_input",
-};
-
-/// The drive on the right.
-pub(super) const RIGHT_DRIVE: DriveAt = DriveAt {
-    label: Label { key: "right_drive", name: "right drive" },
-    voltage: Label { key: "right_voltage", name: "right voltage limit" },
-    current: Label { key: "right_current", name: "right current limit" },
-    current_column: "right_current",
-    pulley: RIGHT,
-    gear: Label { key: "right_gear", name: "right gear" },
-    rotor: Label { key: "right_rotor", name: "right rotor" },
-    key: "right_drive.",
-    prefix: "right_",
-    input: "right_input",
-};
+/// The drives on the left and on the right.
+pub(super) const LEFT_DRIVE: DriveAt = drive!("left", LEFT);
+pub(super) const RIGHT_DRIVE: DriveAt = drive!("right", RIGHT);
 
 const DRIVES: [DriveAt; 2] = [LEFT_DRIVE, RIGHT_DRIVE];
 

@@ -46,6 +46,25 @@ pub struct DriveAt {
     pub input: &'static str,
 }
 
+/// The drive of a gantry on this side, whose gear turns this body.
+macro_rules! drive {
+    ($side:literal, $pulley:expr) => {
+        DriveAt {
+            label: Label { key: concat!($side, "_drive"), name: concat!($side, " drive") },
+            voltage: Label { key: concat!($side, "_voltage"), name: concat!($side, " voltage limit") },
+            current: Label { key: concat!($side, "_current"), name: concat!($side, " current limit") },
+            current_column: concat!($side, "_current"),
+            pulley: $pulley,
+            gear: Label { key: concat!($side, "_gear"), name: concat!($side, " gear") },
+            rotor: Label { key: concat!($side, "_rotor"), name: concat!($side, " rotor") },
+            key: concat!($side, "_drive."),
+            prefix: concat!($side, "_"),
+            input: concat!($side, "_input"),
+        }
+    };
+}
+pub(super) use drive;
+
 /// A body.
 #[derive(Debug)]
 pub struct BodyAt {
