@@ -24,7 +24,7 @@ const FEWEST_MISSING: usize = 3;
 const SHORTEST: usize = 20;
 
 /// Columns that tell the motion, the best first: positions, then speeds.
-const ORDER: [Quantity; 18] = [
+const ORDER: [Quantity; 20] = [
     Quantity::BridgePosition,
     Quantity::CartPosition,
     Quantity::DriveAngle,
@@ -32,6 +32,7 @@ const ORDER: [Quantity; 18] = [
     Quantity::IdlerAngle,
     Quantity::LeftAngle,
     Quantity::RightAngle,
+    Quantity::CartPulleyAngle,
     Quantity::LeftRotorAngle,
     Quantity::RightRotorAngle,
     Quantity::BridgeSpeed,
@@ -41,6 +42,7 @@ const ORDER: [Quantity; 18] = [
     Quantity::IdlerSpeed,
     Quantity::LeftSpeed,
     Quantity::RightSpeed,
+    Quantity::CartPulleySpeed,
     Quantity::LeftRotorSpeed,
     Quantity::RightRotorSpeed,
 ];
@@ -302,4 +304,18 @@ fn end_speed(log: &Log, quantity: Quantity, channel: &Channel, from_end: bool) -
     let (first, second) = ((values[b] - values[a]) / h, (values[c] - values[a]) / k);
     let slope = (first * k - second * h) / (k - h);
     (slope, 2.6 * channel.resolution() / h.abs())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_position_and_speed_tells_the_motion() {
+        let tells = |quantity: &Quantity| quantity.is_position() || quantity.is_speed();
+        let missing: Vec<Quantity> = Quantity::all().filter(tells).filter(|own| !ORDER.contains(own)).collect();
+        assert!(missing.is_empty(), "{missing:?}");
+        assert!(ORDER.iter().all(tells));
+        assert!(ORDER.is_sorted_by_key(|quantity| quantity.is_speed()), "positions come first");
+    }
 }
