@@ -14,7 +14,7 @@ use std::process::Command;
 /// build while this runs, so the object has a folder of its own.
 pub fn carry() {
     let out = PathBuf::from(env::var_os("OUT_DIR").unwrap_or_default());
-    // Said by its build script; there with the feature `fmu`.
+    // The build script of `taut-fmu` sets this; without the feature `fmu` it is not a dependency.
     let folder = env::var_os("DEP_TAUT_FMU_FOLDER").map(PathBuf::from);
     let released = env::var("PROFILE").is_ok_and(|name| name == "release");
     let mut text = String::new();

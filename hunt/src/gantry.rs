@@ -2,7 +2,8 @@
 //!
 //! H-frame: ½ k_l (r φ₁ + x + y)² + ½ k_r (−r φ₂ + x − y)² + ½ k_b (−r φ₁ + r φ₂ − 2 x)² (Sollmann, Jouaneh and
 //! Lavender 2010, eq. (13)). CoreXY: belt A is let out by φ_A on one side of its motor and taken in on the other, where
-//! the cart goes by x + y; belt B by x − y. A dual belt does the same on either side with x alone, and along the bridge with y.
+//! the cart goes by x + y; belt B by x − y. The belts on the sides of a dual belt go by x alone,
+//! that along its bridge by y.
 
 use crate::double::Double;
 use crate::machine::{

@@ -15,7 +15,7 @@ STAGE = f"{ROOT}/stages/sollmann-jouaneh"
 
 
 def fits(value: Any, hint: Any) -> bool:
-    """Whether a value is of a type as annotations have it."""
+    """True if a value is of an annotated type."""
     if is_typeddict(hint):
         hints = get_type_hints(hint)
         known = isinstance(value, dict) and all(key in hints and fits(one, hints[key]) for key, one in value.items())

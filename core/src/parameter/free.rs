@@ -295,7 +295,7 @@ fn present<'a>(machine: &'a Machine, row: &'static Parameter) -> impl Iterator<I
     })
 }
 
-/// True if all drives of a gantry have this number, and the same one: it is then that of the motor that all are.
+/// True if all drives of a gantry have equal values of this number, which then belongs to `motor` or `amplifier`.
 fn are_alike_drives(machine: &Machine, row: &'static Parameter) -> bool {
     let Some((List::Drives(_), count)) = machine.sits(row).listed() else { return false };
     let first = machine.get(row, 0);

@@ -300,7 +300,7 @@ impl Run {
 
     /// True if an extra does no more than shift outputs.
     pub(crate) fn only_shifts(&self, machine: &Machine, extra: &Extra) -> bool {
-        // Whether it matters where the slides are, and not only how far they go.
+        // True if the motion depends on where the slides are, and not only on how far they go.
         let is_placed = machine.changes_along_travel() || machine.slides().any(|slide| slide.travel.is_some());
         match extra.what {
             Nuisance::Bias(_) => true,

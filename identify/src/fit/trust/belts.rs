@@ -145,7 +145,7 @@ mod tests {
         assert_eq!(belts(0.5, f64::INFINITY).looser(), None);
         let words = belts(0.8, 0.01).words();
         assert!(words.contains("right drive are looser") && words.contains("20.0 % less stiff"), "{words}");
-        // Of the other side the same.
+        // The other side.
         let words = belts(1.25, 0.01).words();
         assert!(words.contains("left drive are looser") && words.contains("20.0 % less stiff"), "{words}");
     }
