@@ -479,3 +479,36 @@ fn a_path_that_a_motor_cannot_drive_is_told() {
     assert!((needed / most - 1.0).abs() < 0.15, "{needed} {most}");
     assert!(moved(&low, &low.moves[0], 1e-2).0.figures.drives.iter().any(|drive| drive.amplifier_limited > 0.0));
 }
+
+/// Breakaway friction beyond the force of all motors that move a slide is told with its name; the other slide, which
+/// they do move, is not.
+#[test]
+fn a_slide_that_the_motors_cannot_move_is_told() {
+    for (slide, other) in [("bridge", "cart"), ("cart", "bridge")] {
+        let breakaway = format!("{slide}.friction={{ coulomb = \"1 N\", static = \"300 N\" }}");
+        let case = rig(&[&breakaway, "amplifier.voltage_limit=24 V"]);
+        let found = case.moves[0].shortfalls(&case.machine, case.controller.as_ref().unwrap());
+        let found: Vec<_> = found.iter().filter(|short| short.limit == "breakaway").collect();
+        assert!(matches!(&found[..], [one] if one.words.starts_with(slide)), "{other}: {found:?}");
+        // Both motors pull, each with η n K_t/(R r) per volt of 24, less what their pulleys take.
+        let unit = &case.machine.drives[0];
+        let one = 24.0 * unit.motor.torque_constant / (unit.motor.resistance * case.machine.pulley_radius);
+        assert!((found[0].allowed / (2.0 * one) - 1.0).abs() < 1e-9, "{} {one}", found[0].allowed);
+        assert!(found[0].needed >= 300.0);
+    }
+}
+
+/// An arc may touch the end of the travel, and not go 1 µm beyond.
+#[test]
+fn an_arc_may_touch_the_end_of_the_travel() {
+    let read = |end: &str| {
+        let arc = "move=[{ name = \"arc\", from = [\"140 mm\", \"0 mm\"], until = \"3 s\", window = \"0.1 mm\", \
+                   points = [{ to = [\"140 mm\", \"20 mm\"], center = [\"140 mm\", \"10 mm\"] }], \
+                   speed = \"0.05 m/s\", acceleration = \"1 m/s^2\", jerk = \"100 m/s^3\" }]";
+        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("stages/core-xy/square.toml");
+        Case::read_with(path, &[arc, &format!("bridge.travel={{ min = \"-150 mm\", max = \"{end}\" }}")])
+    };
+    assert!(read("150 mm").is_ok(), "{:?}", read("150 mm").err());
+    let error = read("149.999 mm").unwrap_err().to_string();
+    assert!(error.contains("it leads to 150 mm, off the travel of the bridge"), "{error}");
+}

@@ -62,7 +62,7 @@ fn each_limit_is_named_where_it_is_exceeded() {
     let most = |limit: &str| needed(&case.machine, motion.profile(), limit);
     let [volts, amperes, off, on] = ["voltage", "current", "slack", "tension"].map(most);
     let far = motion.profile().target();
-    let away = case.machine.breakaway(1.0, 0.0) / Rigid::of(&case.machine).force_per_command();
+    let away = case.machine.breakaway(0, 1.0, 0.0) / Rigid::of(&case.machine).force_per_command();
     type Set = fn(&mut Machine, f64) -> Option<f64>;
     let limits: [(&str, f64, Set); 6] = [
         ("voltage", volts, |machine, most| {

@@ -65,17 +65,35 @@ impl Machine {
         self.drives.iter().find_map(|unit| unit.motor.stepper.as_ref())
     }
 
-    /// Force at the belt that moves everything from rest with the cart at `position` (m), N; the sign of `side` is the
-    /// direction.
-    pub fn breakaway(&self, side: f64, position: f64) -> f64 {
-        let (forward, cart) = (side > 0.0, &self.cart);
-        let [drive, idler] =
-            [&self.drive_pulley, &self.idler_pulley].map(|pulley| pulley.friction.side(forward).breakaway);
-        let along = cart.along.as_ref().map_or(1.0, |along| along.value(position));
-        let lines = [(&cart.forces.along, position), (&cart.forces.by_speed, 0.0)];
+    /// The drives that turn when the slide of this number moves alone, each with the direction that it turns in.
+    pub fn movers(&self, number: usize) -> impl Iterator<Item = (usize, f64)> {
+        let shares = self.belt_shares().into_iter().enumerate();
+        shares.map(move |(drive, shares)| (drive, shares[number])).filter(|(_, share)| *share != 0.0)
+    }
+
+    /// The mass that moves with the slide of this number, kg: its own, and that of what it carries.
+    pub fn sliding_mass(&self, number: usize) -> f64 {
+        self.slides().skip(number).map(|slide| slide.mass).sum()
+    }
+
+    /// The constant force on the slide of this number with what it carries, N: F_L − M g sin θ.
+    pub fn constant_force(&self, number: usize) -> f64 {
+        let of_slide = |slide: &Slide| slide.load - self.sliding_mass(number) * GRAVITY * slide.inclination.sin();
+        self.slide(number).map_or(0.0, of_slide)
+    }
+
+    /// Force at the belt that moves the slide of this number from rest at `position` (m), and all that turns with it, N;
+    /// the sign of `side` is the direction.
+    pub fn breakaway(&self, number: usize, side: f64, position: f64) -> f64 {
+        let Some(slide) = self.slide(number) else { return 0.0 };
+        let forward = |sign: f64| side * sign > 0.0;
+        let drives = self.movers(number).map(|(_, sign)| self.drive_pulley.friction.side(forward(sign)).breakaway);
+        let pulleys = drives.sum::<f64>() + self.idler_pulley.friction.side(forward(1.0)).breakaway;
+        let along = slide.along.as_ref().map_or(1.0, |along| along.value(position));
+        let lines = [(&slide.forces.along, position), (&slide.forces.by_speed, 0.0)];
         let of_lines = lines.iter().filter_map(|(line, at)| Some(line.as_ref()?.value(*at))).sum::<f64>();
-        let own = along * cart.friction.side(forward).breakaway;
-        own + (drive + idler) / self.pulley_radius - side * (cart.constant_force() + of_lines)
+        let own = along * slide.friction.side(forward(1.0)).breakaway;
+        own + pulleys / self.pulley_radius - side * (self.constant_force(number) + of_lines)
     }
 
     /// The sliding parts, in the order of the geometry: the cart, behind the bridge where there is one.

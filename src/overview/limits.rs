@@ -1,12 +1,95 @@
-//! How fast and how quickly a drive can go, and what its belt takes then.
+//! How fast and how quickly the drives move the load, and what their belt takes then.
 
-use super::{Group, Note, told};
-use crate::machine::{Amplifier, AmplifierMode, BeltSheet, Motor};
+use super::direction::{Direction, Resistance};
+use super::{Group, Note, Place, stepper, told};
+use crate::case::Case;
+use crate::machine::{Amplifier, AmplifierMode, BeltModel, BeltSheet, Machine, Motor};
 use crate::signal::Signal;
+
+pub(super) fn limits(case: &Case, directions: &[Direction], origin: &Place, notes: &mut Vec<Note>) -> Option<Group> {
+    let machine = &case.machine;
+    if machine.stepper().is_some() {
+        return stepper::limits(machine);
+    }
+    let inputs = case.experiments.iter().flat_map(|done| done.inputs.iter().map(|input| (input, done.until)));
+    let most = most(case.controller.as_ref().and_then(|design| design.limit), inputs);
+    let r = machine.pulley_radius;
+    let power = |unit: &crate::machine::DriveUnit| Power::of(&unit.motor, &unit.amplifier, r, most.as_ref());
+    let Some(powers) = machine.drives.iter().map(power).collect::<Option<Vec<_>>>() else {
+        let text = "nothing bounds the input: give amplifier.voltage_limit or current_limit to see the largest speed and \
+                    acceleration";
+        notes.push(Note { code: "no-limit", text: text.to_string() });
+        return None;
+    };
+    let least = powers.iter().map(|(power, _)| power.force).fold(f64::INFINITY, f64::min);
+    let mut group =
+        Group::new("limits", if powers.len() == 2 { "Limits, both drives pulling alike" } else { "Limits" });
+    let name = format!("largest force of {} motor at the belt", if powers.len() == 1 { "the" } else { "a" });
+    group.add("largest_force", name, least, "N").how(format!("by {}", powers[0].1));
+    for direction in directions {
+        let movers: Vec<Power> = direction.movers.iter().map(|drive| powers[*drive].0).collect();
+        let power = Power::together(&movers);
+        let one_sided = direction.is_one_sided(machine);
+        for side in [1.0, -1.0].into_iter().take(if one_sided { 2 } else { 1 }) {
+            reached(&mut group, machine, direction, (power, side), notes);
+        }
+    }
+    if machine.belt.model != BeltModel::Rigid {
+        for (direction, stretch) in directions.iter().zip(&origin.stretch) {
+            let movers: Vec<Power> = direction.movers.iter().map(|drive| powers[*drive].0).collect();
+            let stretch = Power::together(&movers).force * stretch;
+            let [name, how] = match directions {
+                [_] => ["stretch of the belt under this force", "at the cart, the drive held"],
+                _ => ["largest stretch", "the drive pulleys held, against all that pull"],
+            };
+            group.add(direction.key("largest_stretch"), direction.words(name), stretch, "m").how(how);
+        }
+        safety(&mut group, notes, &machine.belt.sheet, machine.belt.pretension, r, least);
+        notes.extend(little_pretension(machine, least));
+    }
+    Some(group)
+}
+
+/// The largest acceleration and speed in a direction; `side` is the sign of the speed.
+fn reached(
+    group: &mut Group,
+    machine: &Machine,
+    direction: &Direction,
+    (power, side): (Power, f64),
+    notes: &mut Vec<Note>,
+) {
+    let (end, words) = if side > 0.0 { ("", "") } else { ("_backward", " backward") };
+    let Resistance { coulomb, viscous } = direction.resistance(machine, side);
+    let against = -side * machine.constant_force(direction.number);
+    let left = (power.force - coulomb - against) / direction.mass();
+    let name = format!("{}{words}", direction.words("largest acceleration"));
+    group
+        .add(direction.key("largest_acceleration") + end, name, left.max(0.0), "m/s^2")
+        .how("at low speed, against friction");
+    match power.speed(coulomb, viscous, against) {
+        Some(speed) => {
+            let name = format!("{}{words}", direction.words("largest speed"));
+            group.add(direction.key("largest_speed") + end, name, speed, "m/s").how("at steady state");
+        }
+        None => notes.push(Note {
+            code: "no-largest-speed",
+            text: "the speed is unlimited: in current mode give amplifier.voltage_limit".to_string(),
+        }),
+    }
+    if left <= 0.0 {
+        let whose = if direction.movers.len() == 1 { "the motor" } else { "the motors" };
+        let text = format!(
+            "the largest force of {whose}, {}, does not move {}{words}",
+            told(power.force, "N"),
+            direction.name
+        );
+        notes.push(Note { code: "does-not-move", text });
+    }
+}
 
 /// The power of a drive: at the belt, per direction alike.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Power {
+struct Power {
     /// Largest force at standstill, N.
     pub force: f64,
     /// Largest voltage at the terminals, V, where one is known.
@@ -18,7 +101,7 @@ pub(super) struct Power {
 }
 
 /// Where the largest input comes from.
-pub(super) struct Most {
+struct Most {
     /// V or A into the amplifier.
     pub input: f64,
     /// In words.
@@ -26,7 +109,7 @@ pub(super) struct Most {
 }
 
 /// The largest input that a machine gets: of its controller's limit, or of its experiments.
-pub(super) fn most<'a>(limit: Option<f64>, inputs: impl Iterator<Item = (&'a Signal, f64)>) -> Option<Most> {
+fn most<'a>(limit: Option<f64>, inputs: impl Iterator<Item = (&'a Signal, f64)>) -> Option<Most> {
     if let Some(input) = limit {
         return Some(Most { input, from: "the controller's limit" });
     }
@@ -91,6 +174,17 @@ impl Power {
         Some((Self { force, voltage: volts, per_volt, brake }, words.join(" and ")))
     }
 
+    /// Of drives that pull alike, none harder than the weakest can.
+    fn together(drives: &[Self]) -> Self {
+        let count = drives.len() as f64;
+        Self {
+            force: count * drives.iter().map(|power| power.force).fold(f64::INFINITY, f64::min),
+            voltage: drives.iter().filter_map(|power| power.voltage).reduce(f64::min),
+            per_volt: drives.iter().map(|power| power.per_volt).sum(),
+            brake: drives.iter().map(|power| power.brake).sum(),
+        }
+    }
+
     /// The speed at which the force is used up by Coulomb friction, viscous friction and a constant load against it,
     /// m/s.
     pub fn speed(&self, coulomb: f64, viscous: f64, against: f64) -> Option<f64> {
@@ -114,14 +208,7 @@ impl Most {
 }
 
 /// Teeth and tension against the largest force of one drive.
-pub(super) fn safety(
-    group: &mut Group,
-    notes: &mut Vec<Note>,
-    sheet: &BeltSheet,
-    pretension: Option<f64>,
-    r: f64,
-    force: f64,
-) {
+fn safety(group: &mut Group, notes: &mut Vec<Note>, sheet: &BeltSheet, pretension: Option<f64>, r: f64, force: f64) {
     if let Some((in_mesh, carried)) = sheet.mesh(r) {
         group.add("teeth_in_mesh", "teeth in mesh at the drive pulley", in_mesh, "");
         if let Some(carried) = carried {
@@ -149,4 +236,15 @@ fn unsafe_note(notes: &mut Vec<Note>, code: &'static str, allowed: f64, there: f
         let text = format!("{words} {}, and the motor can bring it to {}", told(allowed, "N"), told(there, "N"));
         notes.push(Note { code, text });
     }
+}
+
+/// Of a belt that the largest force makes slack.
+fn little_pretension(machine: &Machine, force: f64) -> Option<Note> {
+    let pretension = machine.belt.pretension.filter(|pretension| *pretension < 0.5 * force)?;
+    let text = format!(
+        "a pretension of {} is less than half of the largest force, {}: a span may go slack",
+        told(pretension, "N"),
+        told(force, "N")
+    );
+    Some(Note { code: "little-pretension", text })
 }

@@ -13,6 +13,9 @@ use crate::signal::arc::Arc;
 use crate::signal::gcode;
 use crate::signal::profile::{Leg, Limits, Passage, Profile};
 
+/// What rounding adds to the ends of an arc, m.
+const ROUNDING: f64 = 1e-12;
+
 /// A move in closed loop: where all that slides should be, and what is looked at.
 #[derive(Debug, Clone)]
 pub struct Move {
@@ -126,7 +129,8 @@ fn one(table: &Table, machine: &Machine, design: &Design) -> Result<Move> {
         let Some(travel) = travel else { continue };
         let legs = profile.passages().iter().flat_map(Passage::extremes);
         let places = std::iter::once(profile.start()).chain(legs);
-        if let Some(out) = places.into_iter().find(|x| !(travel.min..=travel.max).contains(x)) {
+        let is_off = |x: &f64| (x - travel.max).max(travel.min - x) > ROUNDING;
+        if let Some(out) = places.into_iter().find(is_off) {
             let whose = if profiles.len() == 1 { String::new() } else { format!(" of the {}", slide.name) };
             return Err(table
                 .field

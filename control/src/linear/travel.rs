@@ -4,7 +4,8 @@ use super::model::placed;
 use super::{Operation, Root, StateSpace};
 use crate::error::Result;
 use crate::friction::{Friction, Law, Side};
-use crate::machine::{Amplifier, AmplifierMode, Machine, SlideForces, Spans};
+use crate::machine::{Amplifier, AmplifierMode, BeltModel, Machine, SlideAt, SlideForces, Spans};
+use nalgebra::{DMatrix, DVector};
 
 /// The resonances at one place. All frequencies in Hz, the lowest first.
 #[derive(Debug, Clone, PartialEq)]
@@ -15,6 +16,8 @@ pub struct Place {
     pub bridge: Option<f64>,
     /// Stiffness of each span there, N/m.
     pub stiffness: Spans,
+    /// By how much each slide gives way per force on it, the drive pulleys held, m/N.
+    pub compliance: Vec<f64>,
     /// Resonances: the pairs among the poles.
     pub resonances: Vec<Root>,
     /// Resonances with the drive pulleys held: the anti-resonances of the drive angle of an axis.
@@ -49,10 +52,12 @@ pub fn travel(machine: &Machine, operation: Operation, positions: &[f64]) -> Res
             Ok(Root::of(&poles).into_iter().filter(|root| root.hertz().is_some()).collect())
         };
         let hertz = |roots: Vec<Root>| roots.into_iter().filter_map(Root::hertz).collect();
+        let held = placed(machine, Operation { position, ..operation })?;
         Ok(Place {
             position,
             bridge: machine.bridge.as_ref().map(|_| operation.bridge),
-            stiffness: placed(machine, Operation { position, ..operation })?.belt.stiffness,
+            stiffness: held.belt.stiffness,
+            compliance: compliance(&held),
             resonances: pairs(machine, operation)?,
             antiresonances: pairs(machine, drives_held)?,
             undamped_resonances: hertz(pairs(&bare, operation)?),
@@ -60,6 +65,30 @@ pub fn travel(machine: &Machine, operation: Operation, positions: &[f64]) -> Res
         })
     };
     positions.iter().map(place).collect()
+}
+
+/// The diagonal of K⁻¹ at the slides, m/N: K = Σ k a aᵀ over the spans, a being their arms on the bodies that neither
+/// are drive pulleys nor move with one.
+fn compliance(machine: &Machine) -> Vec<f64> {
+    let (geometry, mechanism) = (machine.geometry(), machine.mechanism());
+    if machine.belt.model == BeltModel::Rigid {
+        return vec![0.0; geometry.slides.len()];
+    }
+    let is_held = |body: usize| geometry.drives.iter().any(|drive| mechanism.leader(drive.pulley) == body);
+    let free: Vec<usize> =
+        (0..geometry.bodies.len()).filter(|&body| mechanism.leader(body) == body && !is_held(body)).collect();
+    let mut stiffness = DMatrix::zeros(free.len(), free.len());
+    for &span in &mechanism.roles.spans {
+        let arms = mechanism.leading_arms(span);
+        let arms = DVector::from_iterator(free.len(), free.iter().map(|body| arms[*body]));
+        stiffness.ger(mechanism.springs[span].stiffness, &arms, &arms, 1.0);
+    }
+    let inverse = stiffness.try_inverse();
+    let of_slide = |slide: &SlideAt| {
+        let row = free.iter().position(|body| *body == slide.body)?;
+        Some(inverse.as_ref()?[(row, row)])
+    };
+    geometry.slides.iter().map(|slide| of_slide(slide).unwrap_or(f64::INFINITY)).collect()
 }
 
 /// The machine at the place of `operation`.

@@ -30,10 +30,15 @@ pub struct Shortfall {
     pub words: String,
 }
 
-/// The need at one instant of a reference.
-struct Need {
+/// A reference at one instant.
+struct Instant {
     time: f64,
     y: Reference,
+}
+
+/// The need at one instant of a reference.
+struct Need {
+    at: Instant,
     /// Force of the motor at the belt, N; motor current, A; voltage at its terminals, V.
     force: f64,
     current: f64,
@@ -160,10 +165,13 @@ pub fn loads(machine: &Machine, limit: Option<f64>, profiles: &[Profile], instan
 ///
 /// Of a machine with several drives voltage and current of each are looked at, the belts taken for rigid.
 pub fn shortfalls(machine: &Machine, limit: Option<f64>, profiles: &[Profile]) -> Vec<Shortfall> {
-    match profiles {
+    let of_drives: Vec<Shortfall> = match profiles {
         [profile] => of_axis(machine, limit, profile),
         _ => (0..machine.drives.len()).flat_map(|drive| of_drive(machine, limit, drive, profiles)).collect(),
-    }
+    };
+    let slides = profiles.iter().enumerate();
+    let of_slides = slides.flat_map(|(number, profile)| of_slide(machine, limit, number, profile));
+    of_drives.into_iter().chain(of_slides).collect()
 }
 
 /// The limits that the references of a machine with several drives exceed at one of these.
@@ -185,21 +193,19 @@ fn needs_of_drive(machine: &Machine, drive: usize, profiles: &[Profile], instant
         let slides: Vec<Reference> = profiles.iter().map(|profile| profile.at(time)).collect();
         let (current, voltage) = forward.electrical(&slides);
         let (force, spans) = (forward.force(&slides)[0], [0.0; 3]);
-        Need { time, y: forward.along(&slides), force, current, voltage, spans }
+        Need { at: Instant { time, y: forward.along(&slides) }, force, current, voltage, spans }
     };
     (0..=instants).map(need).collect()
 }
 
 fn of_axis(machine: &Machine, limit: Option<f64>, profile: &Profile) -> Vec<Shortfall> {
     let needs = needs(machine, profile, INSTANTS);
-    let (volts, amperes) = limits(machine, limit);
+    let (volts, _) = limits(machine, limit);
     let mut found: Vec<Shortfall> = Vec::new();
     for demand in demands(machine, limit) {
         let by_speed = if demand.limit == "voltage" { of_speed(machine, volts, &needs) } else { None };
         found.extend(by_speed.or_else(|| exceeded(&needs, &demand)));
     }
-    found.extend(of_breakaway(machine, (volts, amperes), &needs));
-    found.extend(of_travel(machine, &needs));
     found
 }
 
@@ -208,7 +214,7 @@ fn told(value: f64, unit: &str) -> String {
     engineering(value, unit, 3)
 }
 
-impl Need {
+impl Instant {
     /// Time and place, in a sentence.
     fn when(&self) -> String {
         format!("at {}, {}", told(self.time, "s"), told(self.y.position, "m"))
@@ -221,8 +227,8 @@ impl Need {
 }
 
 /// The instant at which most is needed, where that is more than there is.
-fn most(needs: &[Need], allowed: f64, needed: impl Fn(&Need) -> f64) -> Option<&Need> {
-    let most = needs.iter().max_by(|a, b| needed(a).total_cmp(&needed(b)))?;
+fn most<T>(instants: &[T], allowed: f64, needed: impl Fn(&T) -> f64) -> Option<&T> {
+    let most = instants.iter().max_by(|a, b| needed(a).total_cmp(&needed(b)))?;
     (needed(most) - allowed > 1e-9 * allowed.abs().max(1.0)).then_some(most)
 }
 
@@ -230,14 +236,14 @@ fn most(needs: &[Need], allowed: f64, needed: impl Fn(&Need) -> f64) -> Option<&
 fn exceeded(needs: &[Need], demand: &Demand) -> Option<Shortfall> {
     let Demand { limit, unit, allowed, needed, words: [comes_by, behind, there] } = demand;
     let need = most(needs, *allowed, needed)?;
-    let (speed, acceleration) = (told(need.y.speed.abs(), "m/s"), told(need.y.acceleration.abs(), "m/s^2"));
+    let (speed, acceleration) = (told(need.at.y.speed.abs(), "m/s"), told(need.at.y.acceleration.abs(), "m/s^2"));
     let words = format!(
         "{acceleration} at {speed} {comes_by} {}{behind} ({}){there} {}",
         told(needed(need), unit),
-        need.when(),
+        need.at.when(),
         told(*allowed, unit)
     );
-    Some(need.beyond(limit, [needed(need), *allowed], unit, words))
+    Some(need.at.beyond(limit, [needed(need), *allowed], unit, words))
 }
 
 /// The voltage, where the largest speed needs too much of it without any acceleration.
@@ -248,8 +254,8 @@ fn of_speed(machine: &Machine, volts: Option<f64>, needs: &[Need]) -> Option<Sho
         let (viscous, dry) = rigid.friction(speed, speed.signum());
         rigid.electrical(viscous + dry - rigid.constant, 0.0, speed).1.abs()
     };
-    let fastest = needs.iter().max_by(|a, b| a.y.speed.abs().total_cmp(&b.y.speed.abs()))?;
-    let speed = fastest.y.speed;
+    let fastest = needs.iter().max_by(|a, b| a.at.y.speed.abs().total_cmp(&b.at.y.speed.abs()))?;
+    let speed = fastest.at.y.speed;
     let (at_rest, needed) = (steady(1e-9 * speed), steady(speed));
     if needed <= volts {
         return None;
@@ -260,39 +266,60 @@ fn of_speed(machine: &Machine, volts: Option<f64>, needs: &[Need]) -> Option<Sho
         "{} needs {} ({}); {} reach {}",
         told(speed.abs(), "m/s"),
         told(needed, "V"),
-        fastest.when(),
+        fastest.at.when(),
         told(volts, "V"),
         told(reached, "m/s")
     );
-    Some(fastest.beyond("voltage", [needed, volts], "V", words))
+    Some(fastest.at.beyond("voltage", [needed, volts], "V", words))
 }
 
-/// The force that moves everything from rest, where the motor gives less at standstill.
-fn of_breakaway(machine: &Machine, (volts, amperes): (Option<f64>, Option<f64>), needs: &[Need]) -> Option<Shortfall> {
-    let (current, voltage) = Rigid::of(machine).electrical(1.0, 0.0, 0.0);
-    let force = [volts.map(|volts| volts / voltage), amperes.map(|amperes| amperes / current)];
-    let force = force.into_iter().flatten().reduce(f64::min)?;
-    needs.iter().find_map(|need| {
-        let side = direction(&need.y);
-        let needed = machine.breakaway(side, need.y.position);
-        let words = || format!("to break away takes {}; the motor gives {}", told(needed, "N"), told(force, "N"));
-        (side != 0.0 && needed > force).then(|| need.beyond("breakaway", [needed, force], "N", words()))
+/// The limits that the reference of one slide exceeds; with several slides they name it.
+fn of_slide(machine: &Machine, limit: Option<f64>, number: usize, profile: &Profile) -> Vec<Shortfall> {
+    let end = profile.rest();
+    let at = |time: f64| Instant { time, y: profile.at(time) };
+    let instants: Vec<Instant> = (0..=INSTANTS).map(|k| at(end * k as f64 / INSTANTS as f64)).collect();
+    let found = [of_breakaway(machine, limit, number, &instants), of_travel(machine, number, &instants)];
+    let body = machine.geometry().slides[number].body;
+    let name = machine.bridge.as_ref().map(|_| machine.geometry().label(body).name);
+    let named = |short: Shortfall| match name {
+        Some(name) => Shortfall { words: format!("{name}: {}", short.words), ..short },
+        None => short,
+    };
+    found.into_iter().flatten().map(named).collect()
+}
+
+/// The force that moves a slide from rest with all that turns then, where the motors give less at standstill.
+fn of_breakaway(machine: &Machine, limit: Option<f64>, number: usize, instants: &[Instant]) -> Option<Shortfall> {
+    let at_standstill = |drive: usize| {
+        let (volts, amperes) = limits_of(machine, drive, limit);
+        let (current, voltage) = Rigid::of_pulley(machine, drive).electrical(1.0, 0.0, 0.0);
+        let force = [volts.map(|volts| volts / voltage), amperes.map(|amperes| amperes / current)];
+        force.into_iter().flatten().reduce(f64::min)
+    };
+    let force = machine.movers(number).map(|(drive, _)| at_standstill(drive)).sum::<Option<f64>>()?;
+    instants.iter().find_map(|at| {
+        let side = direction(&at.y);
+        let needed = machine.breakaway(number, side, at.y.position);
+        let gives = if machine.movers(number).count() == 1 { "the motor gives" } else { "the motors give" };
+        let words = || format!("to break away takes {}; {gives} {}", told(needed, "N"), told(force, "N"));
+        (side != 0.0 && needed > force).then(|| at.beyond("breakaway", [needed, force], "N", words()))
     })
 }
 
-/// The end of the travel, where the reference goes beyond it.
-fn of_travel(machine: &Machine, needs: &[Need]) -> Option<Shortfall> {
-    let travel = machine.cart.travel?;
-    let need = most(needs, 0.0, |need| (need.y.position - travel.max).max(travel.min - need.y.position))?;
-    let position = need.y.position;
+/// The end of the travel of a slide, where its reference goes beyond it.
+fn of_travel(machine: &Machine, number: usize, instants: &[Instant]) -> Option<Shortfall> {
+    let travel = machine.slide(number)?.travel?;
+    let beyond = |at: &Instant| (at.y.position - travel.max).max(travel.min - at.y.position);
+    let at = most(instants, 0.0, beyond)?;
+    let position = at.y.position;
     let end = if position > travel.max { travel.max } else { travel.min };
     let words = format!(
         "the reference goes to {} (at {}); the travel ends at {}",
         told(position, "m"),
-        told(need.time, "s"),
+        told(at.time, "s"),
         told(end, "m")
     );
-    Some(need.beyond("travel", [position, end], "m", words))
+    Some(at.beyond("travel", [position, end], "m", words))
 }
 
 /// In a sentence, all of a move's.
@@ -328,7 +355,7 @@ fn needs(machine: &Machine, profile: &Profile, instants: usize) -> Vec<Need> {
             + lines.by_speed.as_ref().map_or(0.0, |line| line.value(y.speed));
         let force = needed.force[0] - of_lines;
         let (current, voltage) = compensation.rigid.electrical(force, needed.force[1], needed.drive.speed);
-        Need { time, y, force, current, voltage, spans: needed.spans }
+        Need { at: Instant { time, y }, force, current, voltage, spans: needed.spans }
     };
     let end = profile.rest();
     (0..=instants).map(|k| need(end * k as f64 / instants as f64)).collect()
