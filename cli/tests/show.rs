@@ -119,6 +119,24 @@ fn what_nothing_bounds_is_said() {
     assert!(rows(&found).iter().all(|row| row["key"] != "largest_force"));
 }
 
+/// What is said of an axis is said of a gantry: by hand from the numbers of the CoreXY, both motors for each direction.
+#[test]
+fn a_gantry_is_answered_as_an_axis_is() {
+    let square = "stages/core-xy/square.toml";
+    let found = shown(&[square, "--set", "controller.limit=12 V"]);
+    let (r, k, ohm) = (0.0194, 0.023, 0.71);
+    near(value(&found, "largest_force"), 12.0 * k / (ohm * r));
+    near(value(&found, "breakaway_input_x"), (2.0 * 0.015 / r + 0.7) * ohm * r / (2.0 * k));
+    near(value(&found, "total_mass_y"), value(&found, "cart_mass") + value(&found, "turning_mass"));
+    let both = 2.0 * value(&found, "largest_force");
+    near(value(&found, "largest_stretch_x"), both * value(&found, "stretch_per_force_x"));
+    assert!(codes(&found).iter().all(|code| *code != "move-out-of-reach"), "{:?}", codes(&found));
+    // 0.5 V move nothing, and no move can be made with them.
+    let weak = shown(&[square, "--set", "controller.limit=0.5 V"]);
+    let codes = codes(&weak);
+    assert!(codes.contains(&"does-not-move") && codes.contains(&"move-out-of-reach"), "{codes:?}");
+}
+
 #[test]
 fn a_belt_that_is_too_weak_is_told_with_both_forces() {
     let folder = TempDir::new().unwrap();

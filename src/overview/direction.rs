@@ -31,7 +31,7 @@ impl Direction {
     /// All of a machine, in the order of what slides.
     pub fn all(machine: &Machine) -> Vec<Self> {
         let words: &[_] = match machine.bridge {
-            Some(_) => &[("_x", " along x", "bridge and cart along x"), ("_y", " along y", "cart along y")],
+            Some(_) => &[("_x", " along x", "bridge and cart along x"), ("_y", " along y", "the cart along y")],
             None => &[("", "", "the axis")],
         };
         let r = machine.pulley_radius;

@@ -17,8 +17,7 @@ pub(super) fn inertia(machine: &Machine, directions: &[Direction], notes: &mut V
     }
     turning(&mut group, machine, directions);
     for direction in directions {
-        let name = if directions.len() == 1 { "total" } else { direction.name };
-        group.add(direction.key("total_mass"), name, direction.mass(), "kg");
+        group.add(direction.key("total_mass"), direction.words("total"), direction.mass(), "kg");
         let share = direction.turning / direction.mass();
         group.add(direction.key("reflected_share"), "share of rotating parts", share, "");
     }

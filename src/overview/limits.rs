@@ -40,7 +40,7 @@ pub(super) fn limits(case: &Case, directions: &[Direction], origin: &Place, note
             let stretch = Power::together(&movers).force * stretch;
             let [name, how] = match directions {
                 [_] => ["stretch of the belt under this force", "at the cart, the drive held"],
-                _ => ["largest stretch", "the drive pulleys held, against all that pull"],
+                _ => ["largest stretch", "all pulling, the drive pulleys held"],
             };
             group.add(direction.key("largest_stretch"), direction.words(name), stretch, "m").how(how);
         }
