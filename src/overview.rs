@@ -201,7 +201,7 @@ fn of_constants(motor: &Motor, whose: &str, notes: &mut Vec<Note>) {
         return;
     }
     let text = format!(
-        "{whose}K_t = {} and K_e = {} are one number of one motor in SI units: one of them, or its unit, is doubtful",
+        "{whose}K_t = {} and K_e = {} of one motor are equal in SI units: one of them, or its unit, is doubtful",
         told(k_t, "N m/A"),
         told(k_e, "V s/rad")
     );
@@ -212,8 +212,8 @@ fn of_constants(motor: &Motor, whose: &str, notes: &mut Vec<Note>) {
 fn of_belt(sheet: &BeltSheet, damping: &[f64], r: f64, notes: &mut Vec<Note>) {
     if damping.iter().all(|c| *c == 0.0) {
         let text = format!(
-            "the belt has no damping, so that only friction and the motor end its swinging; of damping ratios, {TYPICAL_DAMPING}: give \
-             belt.damping_ratio, or measure it"
+            "the belt has no damping, so only friction and the motor damp its vibration; of damping ratios, \
+             {TYPICAL_DAMPING}: give belt.damping_ratio, or measure it"
         );
         notes.push(Note { code: "no-damping", text });
     }

@@ -131,7 +131,7 @@ fn spans_that_follow_are_solved_in_general_with_an_error_that_is_estimated() {
     let told = refused(&["simulate", "--solver", "exact"], &machine("h-frame/follows.toml"));
     assert_eq!(
         told,
-        "error: the belt's spans follow the cart: this solver does not take it\n  \
+        "error: the belt's spans follow the cart: this solver does not support it\n  \
          next: leave --solver out, or write --solver general: it takes all of these\n"
     );
 }
@@ -152,12 +152,12 @@ fn options_of_an_axis_are_refused() {
     for (args, told) in [
         (
             &["simulate", "--as-measured", "--out", "out"][..],
-            "error: --as-measured: this is there for a single axis, and not yet for a gantry\n  \
+            "error: --as-measured: this is available for a single axis, not yet for a gantry\n  \
              next: leave it out: the columns hold the encoder's counts, where the case has an [encoder]\n",
         ),
         (
             &["simulate", "--draws", "posterior.csv"],
-            "error: --draws: this is there for a single axis, and not yet for a gantry\n  \
+            "error: --draws: this is available for a single axis, not yet for a gantry\n  \
              next: leave it out: gantries are not fitted yet, so there are no draws of one\n",
         ),
         (

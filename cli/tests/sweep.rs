@@ -250,7 +250,7 @@ fn a_sweep_says_before_it_begins_what_it_takes() {
     let (status, told) = sweep(&["--runs", "1e12", "--out", "runs.csv"]);
     assert!(status == Some(2) && begin.elapsed() < Duration::from_secs(20));
     assert!(told.starts_with("error: --runs: 1000000000000 runs make a file of about "), "{told}");
-    assert!(told.contains(" TB while it is made\n  allowed: up to 10000000000 runs\n"), "{told}");
+    assert!(told.contains(" TB while it is written\n  allowed: up to 10000000000 runs\n"), "{told}");
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
     let (status, told) = sweep(&["--runs", "1e1", "--threads", "100000", "--out", "runs.csv"]);
     assert_eq!(status, Some(0));

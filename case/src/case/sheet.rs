@@ -166,7 +166,7 @@ pub(super) fn specific_stiffness(table: &Table, sheet: &BeltSheet) -> Result<Opt
     match sheet.width {
         Some(width) => table.computed("specific_stiffness", &field, per_width * width).map(Some),
         None => Err(field
-            .fail("this is a stiffness per width, and the width is not said")
+            .fail("this is a stiffness per width, and the width is missing")
             .next("add width, for example width = \"10 mm\", or give that of the whole belt, in N")),
     }
 }

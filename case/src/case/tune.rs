@@ -144,7 +144,7 @@ pub(super) fn tuning(
     }
     if cost.is_none() && bandwidth.is_none() {
         let next = if placed { "add for example bandwidth = \"8 Hz\"" } else { "write for example cost = \"moves\"" };
-        return Err(field.fail("without a cost the gains follow from a bandwidth, which is not said").next(next));
+        return Err(field.fail("without a cost the gains follow from a bandwidth, which is missing").next(next));
     }
     Ok(Some(Tuning {
         cost,

@@ -45,7 +45,7 @@ pub fn run(args: &Args, case: &Case, plan: &Plan) -> Outcome {
     let own = &compared.case;
     let text = format!("{}{}", shown(&compared), table::text(own, &found, begin.elapsed()));
     let advice = match common.out.is_some() {
-        true => "something warns; --anyway writes it all the same",
+        true => "there are warnings; --anyway writes it nevertheless",
         false => "add --out DIR for fitted.toml, compare.json, fit.json and a report",
     };
     let folder = folder.filter(|_| !is_held_back(&found.fit, args));

@@ -58,7 +58,7 @@ pub fn run(args: &Args) -> Outcome {
         None => Status::Incomplete,
     };
     if args.in_place && tuned.judgement == Judgement::Worse && !args.anyway {
-        let told = "the case file is as it was: the gains that were found make moves worse; --anyway writes them";
+        let told = "the case file was not changed: the gains that were found make moves worse; --anyway writes them";
         finished.remarks.push(Remark::Error(told.into()));
         return finished.finish(common, None);
     }

@@ -70,7 +70,7 @@ impl StateSpace {
         let t = sample_time;
         let allowed = |what: String, allowed: &str| Err(Error::new(what).allowed(allowed));
         if !(t > 0.0 && t.is_finite()) {
-            return allowed(format!("a sample time of {t} s is none"), "above zero");
+            return allowed(format!("a sample time of {t} s is invalid"), "above zero");
         }
         if !(0.0..=MOST_DELAY * t).contains(&delay) {
             return allowed(format!("an input cannot be late by {delay} s"), "from 0 to 100 sample times");

@@ -214,7 +214,7 @@ fn beginning<'a>(case: &'a Case, tuning: &Tuning) -> Result<(&'a Design, Family,
     if !EFFORTS.contains(&tuning.effort) {
         let (least, most) = (EFFORTS.start(), EFFORTS.end());
         return Err(
-            Error::new(format!("an effort of {} cannot be", tuning.effort)).allowed(format!("from {least} to {most}"))
+            Error::new(format!("an effort of {} is invalid", tuning.effort)).allowed(format!("from {least} to {most}"))
         );
     }
     Ok((design, Family::of(case, tuning)?, moves::of(case, design)?))
