@@ -17,7 +17,7 @@ pub struct Tuning {
     pub cost: Option<Cost>,
     /// Bandwidth that the gains are placed for, Hz; one that suits the axis where it is not said.
     pub bandwidth: Option<f64>,
-    /// Damping ratio that they are placed for.
+    /// Damping ratio for which they are placed.
     pub damping: f64,
     /// Largest |S| allowed.
     pub sensitivity: f64,
@@ -27,7 +27,7 @@ pub struct Tuning {
     pub spread: Option<f64>,
     /// Masses that are added to the cart, kg.
     pub loads: Vec<f64>,
-    /// Places along the travel that are looked at.
+    /// Number of positions along the travel that are evaluated.
     pub places: usize,
     /// True if all parameters may be at their ends at once, and no axis is left out.
     pub corners: bool,
