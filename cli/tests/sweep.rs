@@ -131,7 +131,7 @@ fn a_killed_sweep_goes_on() {
         assert_eq!(output.status.code(), status);
         if status.is_some() {
             let told = String::from_utf8(output.stderr).unwrap();
-            assert!(told.contains("the same command goes on from there"), "{told}");
+            assert!(told.contains("the same command continues from there"), "{told}");
         }
         assert!(!folder.path().join("killed.parquet").exists());
         assert!(parts(&parts_folder) >= before + 2, "what was done is kept");
@@ -255,7 +255,7 @@ fn a_sweep_says_before_it_begins_what_it_takes() {
     let (status, told) = sweep(&["--runs", "1e1", "--threads", "100000", "--out", "runs.csv"]);
     assert_eq!(status, Some(0));
     let started = std::thread::available_parallelism().unwrap().get().min(10);
-    assert!(told.starts_with(&format!("note: --threads 100000: {started} are started, for there are ")), "{told}");
+    assert!(told.starts_with(&format!("note: --threads 100000: {started} are started, because there are ")), "{told}");
     assert_eq!(fs::read_to_string(folder.path().join("runs.csv")).unwrap().lines().count(), 11);
 }
 

@@ -330,7 +330,7 @@ fn curved(mechanism: &Mechanism) -> Error {
         (None, Some(spring)) => format!("the stiffness of {} follows the cart", spring.label.name),
         (None, None) => "this machine is not linear between its events".to_string(),
     };
-    Error::new(format!("{what}, and what is exported here is linear between its events"))
+    Error::new(format!("{what}; this export requires a machine that is linear between its events"))
         .allowed("Coulomb friction with or without a breakaway (`coulomb`, `static`), and spans of constant stiffness")
         .next("`taut export fmu` takes it as it is")
 }

@@ -66,5 +66,5 @@ pub fn parameters(machine: &Machine, plan: &Plan, others: &[&str]) -> Result<Vec
 /// There is one machine for each campaign, and draws are of one.
 pub fn draws_are_of_one_machine() -> Error {
     Error::new("draws are of one machine, and `separate` makes one for each campaign")
-        .next("leave `separate` out of [fit], and hold out what is of the other campaigns")
+        .next("leave `separate` out of [fit], and hold out the logs of the other campaigns")
 }

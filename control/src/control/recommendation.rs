@@ -271,7 +271,7 @@ fn measured(args: &Question, files: &[PathBuf], file: &Path) -> Result<Source> {
     let axis = args.axis.unwrap_or(Axis::All);
     let spectrum = Spectrum::by(&read_accelerometer(file)?, axis, args.firmware);
     if spectrum.greatest() <= 0.0 {
-        let error = Error::new(format!("there is no vibration along {} from 5 to 200 Hz", axis.word())).in_file(file);
+        let error = Error::new(format!("no vibration along {} from 5 to 200 Hz", axis.word())).in_file(file);
         return Err(error.next("choose another axis, or leave --axis out"));
     }
     Ok(Source::Spectrum(spectrum))

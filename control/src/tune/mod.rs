@@ -165,7 +165,7 @@ pub fn tune(case: &Case, tuning: &Tuning, stop: &dyn Fn() -> bool) -> Result<Tun
     let (finalists, placed) = work.screened(design, is_good)?;
     let Some(best) = finalists.first() else {
         return Err(Error::new(format!(
-            "no gains of this structure that were tried keep Ms within {} and Mt within {} over the family",
+            "none of the tried gains of this structure keeps Ms within {} and Mt within {} over the family",
             tuning.sensitivity, tuning.complementary
         ))
         .next(match without_derivative(case, design) {

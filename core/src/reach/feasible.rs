@@ -275,7 +275,7 @@ fn of_breakaway(machine: &Machine, (volts, amperes): (Option<f64>, Option<f64>),
     needs.iter().find_map(|need| {
         let side = direction(&need.y);
         let needed = machine.breakaway(side, need.y.position);
-        let words = || format!("to break away takes {}; the motor gives {}", told(needed, "N"), told(force, "N"));
+        let words = || format!("breakaway requires {}; the motor provides {}", told(needed, "N"), told(force, "N"));
         (side != 0.0 && needed > force).then(|| need.beyond("breakaway", [needed, force], "N", words()))
     })
 }

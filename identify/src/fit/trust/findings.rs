@@ -53,8 +53,8 @@ fn of_logs(case: &Case, plan: &Plan, found: &Searched, surveys: &[Survey]) -> Ve
         if !told && is_opposite(&found.problem, name) && is_borne_out(case, plan, found, name, &Remedy::Reverse) {
             let inputs = case.machine.geometry().drives.iter().map(|drive| format!("{} = -1", drive.input));
             let text = format!(
-                "it moves against what the model does with the values of the case: swapped wires, or a sign; say \
-                 scale = {{ {} }}, or -1 for the outputs",
+                "it moves opposite to the model with the values of the case: swapped wires, or a sign; set scale = {{ \
+                 {} }}, or -1 for the outputs",
                 inputs.collect::<Vec<_>>().join(", ")
             );
             all.push(Finding { grade: Grade::Warning, code: "sign", log: Some(name.clone()), text });
