@@ -361,10 +361,10 @@ fn a_sweep_that_a_gantry_cannot_have_is_told() {
             "idler_pulley.inertia=20%",
             "sweep.vary.idler_pulley.inertia: `idler_pulley.inertia` is of a single axis, and this is a gantry\n",
         ),
-        ("cart.load=20%", "`cart.load` is no parameter of the machine\n"),
-        ("sweep.runs=20%", "`sweep.runs` is no number of the machine\n"),
-        ("third_drive.motor.resistance=20%", "`third_drive.motor.resistance` is no parameter of the machine\n"),
-        ("left_drive.cart.mass=20%", "`left_drive.cart.mass` is no parameter of the machine\n"),
+        ("cart.load=20%", "`cart.load` is not a parameter of the machine\n"),
+        ("sweep.runs=20%", "`sweep.runs` is not a number of the machine\n"),
+        ("third_drive.motor.resistance=20%", "`third_drive.motor.resistance` is not a parameter of the machine\n"),
+        ("left_drive.cart.mass=20%", "`left_drive.cart.mass` is not a parameter of the machine\n"),
         ("bridge.mas=20%", "next: did you mean `bridge.mass`?\n"),
         (
             "belt.stiffness.3=20%",
@@ -396,7 +396,7 @@ fn a_sweep_that_a_gantry_cannot_have_is_told() {
 
     let from = told("cart.mass=20%", &["--set", "sweep.from=uncertainty"]);
     assert!(
-        from.contains("sweep.from: a gantry is not fitted yet, so nothing is known of how its parameters are spread\n"),
+        from.contains("sweep.from: gantries are not fitted yet, so the uncertainty of their parameters is unknown\n"),
         "{from}"
     );
     let interval = told("cart.mass=20%", &["--interval", "2 s"]);

@@ -324,7 +324,7 @@ fn curved(mechanism: &Mechanism) -> Error {
     let body = mechanism.bodies.iter().find(|body| !body.friction.is_piecewise_linear() || body.along.is_some());
     let what = match (body, mechanism.springs.iter().find(|spring| spring.follows.is_some())) {
         (Some(body), _) if body.along.is_some() => {
-            format!("the friction of the {} changes along its way", body.label.name)
+            format!("the friction of the {} changes along its travel", body.label.name)
         }
         (Some(body), _) => format!("the friction of the {} is a curve", body.label.name),
         (None, Some(spring)) => format!("the stiffness of {} follows the cart", spring.label.name),

@@ -121,7 +121,7 @@ fn root() -> Properties {
             "stepper",
             described(
                 table("stepper", &[("drive", words(["chopper", "voltage"]))]),
-                "Instead of [motor] and [amplifier]: a stepper that is told a position",
+                "Instead of [motor] and [amplifier]: a stepper that follows a position",
             ),
         ),
         ("left_drive", described(drive(), "Gantry: differences at the left drive")),

@@ -55,7 +55,7 @@ fn rating(field: &Field) -> Result<Rating> {
         && rating.no_load_current >= rating.current
     {
         return Err(field
-            .fail(format!("{} without load is no less than under it", show(rating.no_load_current, "A")))
+            .fail(format!("{} without load is not less than under load", show(rating.no_load_current, "A")))
             .allowed(format!("below `current`, {}", show(rating.current, "A"))));
     }
     Ok(rating)

@@ -38,7 +38,7 @@ pub(super) fn drive(root: &Table) -> Result<Option<DriveUnit>> {
             .next("give either [stepper], or [motor] and [amplifier]"));
     }
     if let Some(other) = YET_TO_COME.iter().find_map(|key| root.optional(key)) {
-        return Err(other.fail("this is not there yet for a stepper").next("leave it out for now"));
+        return Err(other.fail("this is not available yet for a stepper").next("leave it out for now"));
     }
     let table = field.table()?;
     table.check_keys(&["drive"], &[])?;

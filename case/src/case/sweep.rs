@@ -193,7 +193,7 @@ fn origin(field: &Field, context: &Context) -> Result<Origin> {
     let text = field.text()?;
     if context.machine.bridge.is_some() {
         return Err(field
-            .fail("a gantry is not fitted yet, so nothing is known of how its parameters are spread")
+            .fail("gantries are not fitted yet, so the uncertainty of their parameters is unknown")
             .next("leave it out, and say in [sweep.vary] how each parameter varies"));
     }
     if text != "uncertainty" {

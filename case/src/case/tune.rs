@@ -201,7 +201,9 @@ pub(super) fn known(root: &Table) -> Result<Vec<Known>> {
         };
         let interval = match (number("low")?, number("high")?) {
             (Some(low), Some(high)) if low > high => {
-                return Err(field.fail(format!("the interval from {low} to {high} is none")).allowed("low up to high"));
+                return Err(field
+                    .fail(format!("the interval from {low} to {high} is empty"))
+                    .allowed("low up to high"));
             }
             (Some(low), Some(high)) => Some([low, high]),
             (Some(_), None) | (None, Some(_)) => {

@@ -82,7 +82,7 @@ fn window(text: &str) -> Result<Option<f64>> {
         return Ok(None);
     }
     let allowed = || {
-        Error::new(format!("\"{text}\" is no length of windows"))
+        Error::new(format!("\"{text}\" is not a length of windows"))
             .in_file("--windows")
             .allowed("whole, or a time above zero such as 2s")
     };

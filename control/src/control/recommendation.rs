@@ -321,7 +321,7 @@ impl Found {
             best.shaper.form.name()
         );
         Some(match self.choice.is_pair_better {
-            true => format!("better, one behind the other: {told}; Klipper has no pairs, [controller] of a case has"),
+            true => format!("better in series: {told}; Klipper has no pairs, but [controller] of a case has"),
             false => format!("no pair is clearly better: {told}"),
         })
     }

@@ -77,16 +77,13 @@ impl StateSpace {
         }
         if delay > 0.0 && hold != Hold::Zero {
             return allowed(
-                "a late input needs one that stands between samples".into(),
+                "a delay requires an input that is held between samples".into(),
                 "a zero-order hold with a delay",
             );
         }
         let n = self.a.nrows();
         if n == 0 {
-            return allowed(
-                "nothing is left to move, and so nothing to sample".into(),
-                "a stage of which a body moves",
-            );
+            return allowed("no body can move, so there is nothing to sample".into(), "a stage of which a body moves");
         }
         let (a, b, c, scale) = self.balanced();
         let (change, input, output, direct) = match hold {

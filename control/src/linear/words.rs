@@ -154,10 +154,10 @@ fn sliding(plant: &Mechanism, operation: Operation, moving: &[usize]) -> Option<
         false => format!("at {}", engineering_typed(operation.speed.abs(), "m/s", 4)),
     };
     Some(match (holds.is_empty(), operation.speed == 0.0) {
-        _ if moving.is_empty() => "nothing is left to move but the current and the rotor".into(),
+        _ if moving.is_empty() => "only the current and the rotor can move".into(),
         (true, true) => "linearised at rest: nothing sticks".into(),
         (true, false) if curve => format!("linearised while it moves {way} {pace}"),
-        (true, false) => "linear as it stands: nothing sticks".into(),
+        (true, false) => "linear without assumptions: nothing sticks".into(),
         (false, true) => format!(
             "at rest this stage sticks: dry friction holds {}, which then do not respond to inputs; linearised instead \
              while everything slides {way}, {pace}; --stuck leaves them out",

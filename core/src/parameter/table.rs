@@ -405,7 +405,7 @@ const MOTOR: &[Parameter] = &[
         .at(motor!(gear_ratio)),
     row("motor.gear_efficiency", "η", "", Value(1.0), UP_TO_ONE, "0.73", "Share of the power that the gear transmits, whichever side drives.")
         .at(of_drive!(motor, |m| (m.gear_play.is_none() && is_brushed(m)).then_some(m.gear_efficiency), |m, value| m.gear_efficiency = value)),
-    row("motor.backlash", "2α", "rad", Value(0.0), Range { below: true, ..Range::new(0.0, 6.3) }, "0.5 deg", "Play of the gear: by how much the drive pulley can turn while the rotor stands. Needs `gear_stiffness`.")
+    row("motor.backlash", "2α", "rad", Value(0.0), Range { below: true, ..Range::new(0.0, 6.3) }, "0.5 deg", "Backlash of the gear: angle by which the drive pulley can turn while the rotor stands still. Needs `gear_stiffness`.")
         .at(motor!(play backlash)).off("gear's backlash"),
     row("motor.gear_stiffness", "k_g", "N m/rad", Words("stiff"), POSITIVE, "300 N m/rad", "Stiffness of the gear between rotor and drive pulley, at the pulley; makes the rotor an inertia of its own.")
         .at(motor!(play stiffness)).off("gear's stiffness"),
@@ -484,7 +484,8 @@ const CART: &[Parameter] = &[
 #[rustfmt::skip]
 const BELT: &[Parameter] = &[
     row("belt.stiffness", "k₁ k₂ k₃", "N/m", Words("from `modulus`, `section` and `spans`"), POSITIVE, "132.76 kN/m",
-        "Stiffness of each span: drive pulley to cart, cart to idler pulley, and the way back. Three values in a list.")
+        "Stiffness of each span: drive pulley to cart, cart to idler pulley, idler pulley to drive pulley. Three \
+         values in a list.")
         .at(Field::of(Of::Span, |s, span| stiffness(&s.belt, span), |s, span, value| s.belt.stiffness[span] = value))
         .off("belt's stiffness").part(Sum::Stiffness, One),
     row("belt.modulus", "E", "Pa", Words("not used with `stiffness`"), POSITIVE, "8.335 GPa",

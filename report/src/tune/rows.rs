@@ -275,14 +275,14 @@ pub fn given(work: &Work) -> Option<String> {
     let (nominal, worst) = (&before.nominal, &before.worst);
     let mut told = Vec::new();
     if !nominal.stable {
-        told.push(format!("not stable on the axis as it is taken for, swinging at {}", hertz(nominal.at)));
+        told.push(format!("not stable on the nominal axis, swinging at {}", hertz(nominal.at)));
     } else if nominal.excess(tuning.sensitivity, tuning.complementary) > 1.0 {
         let (ms, gain) = (nominal.sensitivity, nominal.gain);
         let peak = match nominal.complementary > tuning.complementary && ms <= tuning.sensitivity {
             true => format!("Mt {:.3}", nominal.complementary),
             false => format!("Ms {ms:.3}"),
         };
-        told.push(format!("{peak}, gain margin {gain:.2} on the axis as it is taken for"));
+        told.push(format!("{peak}, gain margin {gain:.2} on the nominal axis"));
     }
     if worst.stable {
         let axis = numbered(work, place(work, &before.corner));

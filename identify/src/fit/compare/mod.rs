@@ -143,7 +143,7 @@ pub fn compare(
         );
     }
     if let Some(window) = setting.windows.iter().flatten().find(|window| !(**window > 0.0 && window.is_finite())) {
-        return Err(Error::new(format!("{window} s is no length of windows")).allowed("above zero"));
+        return Err(Error::new(format!("{window} s is not a length of windows")).allowed("above zero"));
     }
     let parts = Parts::new(case, plan);
     if parts.folds.len() < 2 {
