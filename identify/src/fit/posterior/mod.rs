@@ -76,7 +76,7 @@ pub fn posterior(case: &Case, plan: &Plan, fit: &Fit, effort: Effort, watch: &Wa
         return Err(crate::case::draws_are_of_one_machine());
     }
     if fit.estimates.is_empty() {
-        return Err(Error::new("nothing is searched for").next("add free = [\"cart.mass\"] to [fit]"));
+        return Err(Error::new("there are no free parameters").next("add free = [\"cart.mass\"] to [fit]"));
     }
     refuse_undetermined(fit)?;
     let mut problem = Problem::new(case, plan)?;
