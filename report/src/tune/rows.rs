@@ -97,8 +97,9 @@ pub fn margins(before: &Margins, after: &Margins) -> Vec<Row> {
     };
     type Shown<'a> = Box<dyn Fn(&Margins) -> String + 'a>;
     let peak = |value: f64| if value.is_finite() { format!("{value:.3}") } else { "not stable".into() };
-    let top =
-        |m: &Margins| if m.stable { format!(" at {}", hertz(m.at)) } else { format!(", oscillates at {}", hertz(m.at)) };
+    let top = |m: &Margins| {
+        if m.stable { format!(" at {}", hertz(m.at)) } else { format!(", oscillates at {}", hertz(m.at)) }
+    };
     let rows: [(&str, Shown); 7] = [
         (
             "Ms",
