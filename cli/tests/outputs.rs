@@ -198,8 +198,8 @@ fn a_sweep_does_not_remove_its_case_with_its_parts() {
     assert_eq!(output.status.code(), Some(2));
     assert_eq!(
         String::from_utf8_lossy(&output.stderr),
-        "error: runs.csv.parts: runs.csv.parts/rig.toml is read and lies in this folder, which is removed in the end; \
-         nothing was written\n  next: move that file, or write to another place\n"
+        "error: runs.csv.parts: runs.csv.parts/rig.toml is read and is in this folder, which would be removed at the \
+         end; nothing was written\n  next: move that file, or write to another place\n"
     );
     assert_eq!(contents(at).len(), 2);
 }

@@ -226,7 +226,7 @@ fn mistakes_on_the_command_line_are_told() {
         (vec!["--runs", "10", "--vary", "cart.mass=20%", "--vary", "total.inertia=20%"], "set the same number"),
         (
             vec!["--indices", "--design", "grid", "--vary", "cart.mass=values(1 kg)"],
-            "sensitivity indices cannot be had",
+            "sensitivity indices are not available",
         ),
     ] {
         let told = told(folder.path(), &[&[&case as &str], &arguments[..]].concat());

@@ -357,7 +357,7 @@ fn scale(field: &Field, encoder: Option<Encoder>) -> Result<Encoder> {
     match encoder.map(|encoder| encoder.at) {
         Some(EncoderPlace::Motor | EncoderPlace::DrivePulley) => Ok(scale),
         Some(EncoderPlace::Cart) => {
-            Err(field.fail("the encoder of this case sits at the cart already").next("leave the one or the other out"))
+            Err(field.fail("the encoder of this case is already at the cart").next("leave one of them out"))
         }
         None => Err(field
             .fail("a scale is a second sensor, and this case has no first one")

@@ -100,7 +100,7 @@ pub(super) fn simple_drive(root: &Table) -> Result<Option<SimpleDrive>> {
     table.check_keys(&[], &[])?;
     if let Some(motor) = root.optional("motor") {
         return Err(motor
-            .fail("there is a [drive] already, which is all of motor and gear")
+            .fail("there is already a [drive], which replaces motor and gear")
             .next("give [motor] if its data are known, or [drive] with force_per_input and drag if not"));
     }
     if let Some(mode) = root.optional("amplifier").and_then(|field| field.table().ok()?.optional("mode"))
@@ -182,7 +182,7 @@ fn of_type(table: &Table, sheet: &BeltSheet) -> Result<Option<f64>> {
         None => {
             let known = BELTS.iter().filter(|belt| !belt.widths.is_empty()).map(|belt| belt.name);
             Err(field
-                .fail(format!("no source says how stiff a belt {} is", kind.name))
+                .fail(format!("no source has the stiffness of a belt {}", kind.name))
                 .allowed(format!("{}; or any type with a stiffness of your own", known.collect::<Vec<_>>().join(", ")))
                 .next("add specific_stiffness from its data sheet (E A in N, or per width in N/mm), or stiffness, or modulus and section"))
         }

@@ -14,7 +14,7 @@ const YET_TO_COME: [&str; 6] = ["measurement", "controller", "move", "tune", "fi
 const NO_MOTOR: [&str; 3] = [
     "this needs a motor that is commanded by voltage or current, and the case describes a stepper",
     "[motor] and [amplifier]",
-    "`taut show`, `taut simulate` and `taut sweep` take steppers; all else is yet to come",
+    "`taut show`, `taut simulate` and `taut sweep` support steppers; other commands do not yet",
 ];
 
 /// Refuses a stepper where a motor that is commanded by voltage or current is needed.

@@ -130,7 +130,7 @@ pub(super) fn tuning(
             let cost = field.choice(&words)?;
             if moves.is_empty() && matches!(cost, Some(Cost::Squares | Cost::Peak)) {
                 return Err(field
-                    .fail("there is no move whose error could be made small")
+                    .fail("there is no move whose error could be minimised")
                     .next("add [[move]], or write cost = \"moves\" for a set that suits the axis"));
             }
             cost
