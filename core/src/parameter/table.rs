@@ -250,7 +250,7 @@ macro_rules! friction {
                 Words("from `decay`"),
                 POSITIVE,
                 $velocity_example,
-                "Speed at which 1/e of the excess is left. With `shape = \"exponential\"` it goes as e^(−v/v_s), else as e^(−(v/v_s)²).",
+                "Speed at which 1/e of that is left. With `shape = \"exponential\"` it goes as e^(−v/v_s), else as e^(−(v/v_s)²).",
             )
             .at(of_friction!($body, |f| stribeck_velocity(f), |f, value| set_stribeck_velocity(f, value)))
             .off(concat!($whose, " Stribeck velocity")),
