@@ -97,7 +97,7 @@ fn what_cannot_be_compared_is_refused() {
         "there is nothing to compare\n  next: name a law and a length of windows, or leave both out"
     );
     let never = Setting { laws: vec![FrictionLaw::Coulomb], windows: vec![Some(-1.0)] };
-    assert_eq!(told(&never), "-1 s is no length of windows\n  allowed: above zero");
+    assert_eq!(told(&never), "-1 s is not a length of windows\n  allowed: above zero");
     assert_eq!(
         FrictionLaw::named("dry").unwrap_err().to_string(),
         "there is no friction law \"dry\" to compare\n  allowed: viscous, coulomb, asymmetric, stribeck, along, force-along, force-by-speed, lugre"

@@ -531,7 +531,8 @@ fn a_spread_that_is_no_share_is_refused() {
     for share in [f64::NAN, -0.2, 0.0, 1.0, f64::INFINITY] {
         let told = taut::control::worst(&case.machine, design, motion, share, Solver::Exact, &|| false).unwrap_err();
         let expected = format!(
-            "parameters cannot be off by a share of {share:?}\n  allowed: above 0, below 1\n  next: write 0.2 for 20 %"
+            "a relative error of parameters cannot be {share:?}\n  allowed: above 0, below 1\n  next: write 0.2 for 20 \
+             %"
         );
         assert_eq!(told.to_string(), expected);
     }

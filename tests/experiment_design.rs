@@ -190,7 +190,7 @@ fn what_cannot_be_designed_is_told() {
     assert!(told(&blind, &one).contains("nothing is measured in this case"));
     let mut endless = case.clone();
     endless.experiments.clear();
-    assert!(told(&endless, &one).contains("nothing limits the input"));
+    assert!(told(&endless, &one).contains("the input is unlimited"));
     let amplitude = Request { input: Some(5.0), ..one.clone() };
     assert!(told(&endless, &amplitude).contains("the travel of the cart is unlimited"));
     let mut limited = case.clone();

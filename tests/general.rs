@@ -357,7 +357,7 @@ fn the_exact_solver_says_what_it_cannot_take() {
     let refused = |machine: &Machine| {
         simulate(machine, &experiment(&pulse(), 1.0, 1e-3), Solver::Exact).map(|_| ()).unwrap_err().to_string()
     };
-    assert!(refused(&stage_of(LAWS[0])).starts_with("the friction law of the drive pulley is no straight line"));
+    assert!(refused(&stage_of(LAWS[0])).starts_with("the friction law of the drive pulley is not linear"));
     assert!(refused(&following(Law::Coulomb)).starts_with("the belt's spans follow the cart"));
     assert_eq!(Solver::of(&stage_of(LAWS[3])), Solver::GENERAL);
     assert_eq!(Solver::of(&common::table4()), Solver::Exact);

@@ -359,14 +359,23 @@ fn a_question_whose_numbers_are_none_is_refused() {
     let nan = f64::NAN;
     let usual = Question::default();
     for (question, expected) in [
-        (Question { at: Some(nan), ..usual.clone() }, "--at: NaN is of no use here\n  allowed: a finite number, in m"),
+        (
+            Question { at: Some(nan), ..usual.clone() },
+            "--at: NaN is not allowed here\n  allowed: a finite number, in m",
+        ),
         (
             Question { speed: Some(f64::INFINITY), ..usual.clone() },
-            "--speed: inf is of no use here\n  allowed: a finite number, in m/s",
+            "--speed: inf is not allowed here\n  allowed: a finite number, in m/s",
         ),
-        (Question { delay: nan, ..usual.clone() }, "--delay: NaN is of no use here\n  allowed: a finite number, in s"),
-        (Question { from: Some(0.0), ..usual.clone() }, "--from: 0.0 is of no use here\n  allowed: above zero, in Hz"),
-        (Question { to: Some(-1.0), ..usual.clone() }, "--to: -1.0 is of no use here\n  allowed: above zero, in Hz"),
+        (
+            Question { delay: nan, ..usual.clone() },
+            "--delay: NaN is not allowed here\n  allowed: a finite number, in s",
+        ),
+        (
+            Question { from: Some(0.0), ..usual.clone() },
+            "--from: 0.0 is not allowed here\n  allowed: above zero, in Hz",
+        ),
+        (Question { to: Some(-1.0), ..usual.clone() }, "--to: -1.0 is not allowed here\n  allowed: above zero, in Hz"),
     ] {
         assert_eq!(told(question), expected);
     }

@@ -339,10 +339,10 @@ fn keys_that_cannot_be_free_say_what_can() {
         (&plain, "belt.modulus", "allowed: belt.stiffness.0, belt.stiffness.1, belt.stiffness.2, belt.damping.0"),
         (&plain, "cart.friction.along.1.factor", "give along to start from"),
         (&plain, "drive_pulley.teeth", "next: name `drive_pulley.radius` instead"),
-        (&plain, "controller.every", "is no number of the machine"),
-        (&plain, "cart.friction", "is no parameter of the machine"),
+        (&plain, "controller.every", "is not a number of the machine"),
+        (&plain, "cart.friction", "is not a parameter of the machine"),
         (&plain, "cart.mass.0", "next: did you mean `cart.mass`?"),
-        (&plain, "", "is no parameter of the machine"),
+        (&plain, "", "is not a parameter of the machine"),
         (&plain, "total.mass", "allowed: total.viscous, total.coulomb, total.inertia, total.stiffness"),
         (&whole, "belt.stiffness.3", "allowed: belt.stiffness.0 to belt.stiffness.2"),
         (

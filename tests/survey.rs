@@ -94,7 +94,7 @@ fn wrong_units_are_suspected_aloud() {
     says(&two, "unit", "units = { motor_current = \"mA\" }");
     let mut two = log.clone();
     values(&mut two, Quantity::CartPosition).iter_mut().for_each(|x| *x *= 1e3);
-    says(&two, "unit", "drive_angle says of the same position");
+    says(&two, "unit", "drive_angle reports for the same position");
     let mut input = log.clone();
     input.inputs[0].iter_mut().for_each(|u| *u *= 1e3);
     says(&input, "unit", "units = { input = \"mV\" }");

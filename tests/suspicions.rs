@@ -265,7 +265,7 @@ fn an_input_that_is_logged_early_or_late_is_found() {
         let found = fitted(&case);
         let words = if is_early { "too early" } else { "too late" };
         let told: Vec<String> = found.warnings().map(ToString::to_string).filter(|one| one.contains(words)).collect();
-        let size = |one: &String| one.split("as if it stood ").nth(1)?.split(' ').next()?.parse::<usize>().ok();
+        let size = |one: &String| one.split("as if it were ").nth(1)?.split(' ').next()?.parse::<usize>().ok();
         assert!(told.iter().find_map(size).is_some_and(|own| own.abs_diff(rows) <= 3), "{words}: {:?}", found.findings);
     }
     let late = fitted(&drawn(701, 0.0, 8));

@@ -101,9 +101,13 @@ fn what_the_table_does_not_know_is_refused() {
         side.breakaway *= 1.5;
         *friction = Friction::sided(side, friction.backward);
     };
-    assert!(told(&|machine| breakaway(&mut machine.cart.friction)).contains("does not know the friction of the cart"));
+    assert!(
+        told(&|machine| breakaway(&mut machine.cart.friction)).contains("does not support the friction of the cart")
+    );
     assert!(told(&|machine| machine.drives[0].motor.gear_efficiency = 0.9).contains("gear efficiency below 1"));
-    assert!(told(&|machine| machine.drives[0].amplifier.voltage_limit = Some(3.0)).contains("Table 3 does not know"));
+    assert!(
+        told(&|machine| machine.drives[0].amplifier.voltage_limit = Some(3.0)).contains("Table 3 does not support")
+    );
 }
 
 /// A step too long for the belt's swing: that the state is none of a machine is told at the first row where it is.

@@ -448,7 +448,7 @@ fn a_search_takes_the_effort_that_it_may() {
     assert!(more.after.objective <= less.after.objective, "{} {}", less.after.objective, more.after.objective);
     for effort in [0.0, f64::NAN, 101.0] {
         let told = of(effort).unwrap_err().to_string();
-        assert_eq!(told, format!("an effort of {effort} cannot be\n  allowed: from 0.1 to 100"));
+        assert_eq!(told, format!("an effort of {effort} is invalid\n  allowed: from 0.1 to 100"));
     }
 }
 

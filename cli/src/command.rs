@@ -191,7 +191,7 @@ impl Finished {
             && !common.no_report
             && self.report.is_none()
         {
-            terminal::show_note(&"the report was left out, for the command was interrupted");
+            terminal::show_note(&"the report was left out because the command was interrupted");
         }
         Ok(self.status)
     }

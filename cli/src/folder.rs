@@ -128,7 +128,8 @@ impl Folder {
         let marker = root.join(MARKER);
         if marker.is_file() {
             terminal::show_note(&format!(
-                "{}: an earlier run was ended while it replaced these results: some may be of the run before it",
+                "{}: an earlier run was interrupted while it replaced these results: some may be from the run before \
+                 it",
                 marker.display()
             ));
         }
@@ -159,7 +160,7 @@ impl Folder {
         if !left.changed.is_empty() && !quiet {
             let changed: Vec<String> = left.changed.iter().map(|name| name.display().to_string()).collect();
             terminal::show_note(&format!(
-                "{}: of an earlier run, and changed since it was written, so it stays: {}",
+                "{}: files of an earlier run that were changed since are kept: {}",
                 self.root.display(),
                 changed.join(", ")
             ));
@@ -248,8 +249,8 @@ fn between(folder: &Path, file: &Path) -> Result<String> {
     let (from, to): (Vec<Component>, Vec<Component>) = (from.components().collect(), to.components().collect());
     let same = from.iter().zip(&to).take_while(|(a, b)| a == b).count();
     let word = |part: &OsStr| {
-        let error = || Error::new("a case file is UTF-8 and cannot name this file, whose path is not").in_file(file);
-        part.to_str().map(str::to_string).ok_or_else(|| error().next("rename it, or what it lies in"))
+        let error = || Error::new("the path of this file is not UTF-8, so a case file cannot name it").in_file(file);
+        part.to_str().map(str::to_string).ok_or_else(|| error().next("rename the file or its folder"))
     };
     if same == 0 {
         return word(file.as_os_str());

@@ -52,7 +52,7 @@ fn what_it_cannot_do_it_says() {
         (vec![], "there is nothing to determine: the case has no [fit]", 2),
         (vec!["--for", "cart.mas"], "`cart.mas`", 2),
         (vec!["--for", "cart.mass"], "nothing is measured in this case", 2),
-        ([&name[..], &["--measure", "angle=1mrad"]].concat(), "`angle` is no measured quantity; there are", 2),
+        ([&name[..], &["--measure", "angle=1mrad"]].concat(), "`angle` is not a measured quantity; available are", 2),
         ([&name[..], &["--measure", "drive_angle"]].concat(), "such as drive_angle=1mrad", 2),
         ([&name[..], &["--measure", "drive_angle=-1"]].concat(), "a standard deviation above zero is needed", 2),
         ([&name[..], &ANGLE, &["--amplitude", "5 A"]].concat(), "--amplitude: \"5 A\" is a current", 2),

@@ -135,7 +135,7 @@ fn laws_and_windows_that_are_none_are_refused() {
     for window in ["0s", "-1s", "long", "1 m"] {
         let (status, text) = told(&["--compare", &format!("--windows={window}")]);
         assert_eq!(status, Some(2), "{window}: {text}");
-        assert!(text.contains(&format!("\"{window}\" is no length of windows")), "{text}");
+        assert!(text.contains(&format!("\"{window}\" is not a length of windows")), "{text}");
         assert!(text.contains("allowed: whole, or a time above zero such as 2s"), "{text}");
     }
     for args in [&["--laws", "coulomb"][..], &["--compare", "--drift"], &["--drift", "--posterior"]] {
@@ -179,7 +179,7 @@ fn nothing_to_search_for_gives_errors_alone() {
     let folder = with_a_log();
     let output = taut(folder.path()).args(["fit", "mine.toml", "--set", "fit.free=[]"]).output().unwrap();
     let text = String::from_utf8(output.stdout).unwrap();
-    assert!(text.contains("nothing is searched for: the errors of the case as it is"), "{text}");
+    assert!(text.contains("no search: errors of the case as it is"), "{text}");
     assert!(text.contains("log  drive_angle: RMSE") && !text.contains("Parameters"), "{text}");
     assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
 }

@@ -131,7 +131,7 @@ fn spans_that_follow_are_solved_in_general_with_an_error_that_is_estimated() {
     let told = refused(&["simulate", "--solver", "exact"], &machine("h-frame/follows.toml"));
     assert_eq!(
         told,
-        "error: the belt's spans follow the cart: this solver does not take it\n  \
+        "error: the belt's spans follow the cart: this solver does not support it\n  \
          next: leave --solver out, or write --solver general: it takes all of these\n"
     );
 }
@@ -152,12 +152,12 @@ fn options_of_an_axis_are_refused() {
     for (args, told) in [
         (
             &["simulate", "--as-measured", "--out", "out"][..],
-            "error: --as-measured: this is there for a single axis, and not yet for a gantry\n  \
+            "error: --as-measured: this is available for a single axis, not yet for a gantry\n  \
              next: leave it out: the columns hold the encoder's counts, where the case has an [encoder]\n",
         ),
         (
             &["simulate", "--draws", "posterior.csv"],
-            "error: --draws: this is there for a single axis, and not yet for a gantry\n  \
+            "error: --draws: this is available for a single axis, not yet for a gantry\n  \
              next: leave it out: gantries are not fitted yet, so there are no draws of one\n",
         ),
         (
@@ -361,10 +361,10 @@ fn a_sweep_that_a_gantry_cannot_have_is_told() {
             "idler_pulley.inertia=20%",
             "sweep.vary.idler_pulley.inertia: `idler_pulley.inertia` is of a single axis, and this is a gantry\n",
         ),
-        ("cart.load=20%", "`cart.load` is no parameter of the machine\n"),
-        ("sweep.runs=20%", "`sweep.runs` is no number of the machine\n"),
-        ("third_drive.motor.resistance=20%", "`third_drive.motor.resistance` is no parameter of the machine\n"),
-        ("left_drive.cart.mass=20%", "`left_drive.cart.mass` is no parameter of the machine\n"),
+        ("cart.load=20%", "`cart.load` is not a parameter of the machine\n"),
+        ("sweep.runs=20%", "`sweep.runs` is not a number of the machine\n"),
+        ("third_drive.motor.resistance=20%", "`third_drive.motor.resistance` is not a parameter of the machine\n"),
+        ("left_drive.cart.mass=20%", "`left_drive.cart.mass` is not a parameter of the machine\n"),
         ("bridge.mas=20%", "next: did you mean `bridge.mass`?\n"),
         (
             "belt.stiffness.3=20%",
@@ -396,7 +396,7 @@ fn a_sweep_that_a_gantry_cannot_have_is_told() {
 
     let from = told("cart.mass=20%", &["--set", "sweep.from=uncertainty"]);
     assert!(
-        from.contains("sweep.from: a gantry is not fitted yet, so nothing is known of how its parameters are spread\n"),
+        from.contains("sweep.from: gantries are not fitted yet, so the uncertainty of their parameters is unknown\n"),
         "{from}"
     );
     let interval = told("cart.mass=20%", &["--interval", "2 s"]);

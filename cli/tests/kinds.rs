@@ -154,7 +154,7 @@ fn every_kind_goes_through_every_command() {
 #[test]
 fn what_a_fit_tries_on_an_axis_alone_is_refused_for_a_gantry() {
     let tried = [
-        ("--drift", "single changes are looked for on a single axis"),
+        ("--drift", "single changes are searched for on a single axis"),
         ("--compare", "friction laws are compared on a single axis"),
     ];
     for ((option, words), case) in tried.into_iter().flat_map(|one| WITH_LOGS.map(|case| (one, case))) {

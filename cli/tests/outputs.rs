@@ -198,8 +198,8 @@ fn a_sweep_does_not_remove_its_case_with_its_parts() {
     assert_eq!(output.status.code(), Some(2));
     assert_eq!(
         String::from_utf8_lossy(&output.stderr),
-        "error: runs.csv.parts: runs.csv.parts/rig.toml is read and lies in this folder, which is removed in the end; \
-         nothing was written\n  next: move that file, or write to another place\n"
+        "error: runs.csv.parts: runs.csv.parts/rig.toml is read and is in this folder, which would be removed at the \
+         end; nothing was written\n  next: move that file, or write to another place\n"
     );
     assert_eq!(contents(at).len(), 2);
 }
@@ -258,7 +258,7 @@ fn a_folder_whose_name_is_not_utf_8_is_written_whole() {
     let output = taut(at).arg("fit").arg(inner.join("rig.toml")).args(["--out", "found"]).output().unwrap();
     assert_eq!(output.status.code(), Some(2));
     let told = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(told.contains("a case file is UTF-8 and cannot name this file, whose path is not"), "{told}");
+    assert!(told.contains("the path of this file is not UTF-8, so a case file cannot name it"), "{told}");
     assert!(!at.join("found").exists());
 }
 
@@ -296,8 +296,8 @@ fn a_folder_that_was_left_half_replaced_says_so() {
     let told = String::from_utf8_lossy(&second.stderr).into_owned();
     assert_eq!(
         told.replace('\\', "/"),
-        "note: out/unfinished.txt: an earlier run was ended while it replaced these results: some may be of the run \
-         before it\n"
+        "note: out/unfinished.txt: an earlier run was interrupted while it replaced these results: some may be from \
+         the run before it\n"
     );
     assert!(!at.join("out/unfinished.txt").exists() && run().stderr.is_empty());
 }
@@ -369,7 +369,7 @@ fn a_later_run_takes_away_what_it_wrote_before_and_nothing_else() {
     );
     let told = run(&["simulate", "rig.toml", "--no-report", "--set", "experiment.0.name=another"]);
     assert!(
-        told.contains("out: of an earlier run, and changed since it was written, so it stays: 5-v-pulse.events.csv"),
+        told.contains("out: files of an earlier run that were changed since are kept: 5-v-pulse.events.csv"),
         "{told}"
     );
     for gone in ["report.html", "plots", "5-v-pulse.csv"] {

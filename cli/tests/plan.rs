@@ -53,7 +53,7 @@ fn what_cannot_be_planned_is_told() {
         (&[PID, "--reserve", "95%"], 2, "a share from 0 to 90% is needed"),
         (&[PID, "--speed", "0"], 2, "speed above zero"),
         (&[PID, "--jerk", "5 m/s"], 2, "m/s^3"),
-        (&[PID, "--move", "long", "--set", "cart.friction.static=1 kN"], 1, "to break away takes"),
+        (&[PID, "--move", "long", "--set", "cart.friction.static=1 kN"], 1, "breakaway requires"),
         (&[PID, "--move", "long", "--set", "controller.limit=0.5 V"], 1, "there is no plan"),
         (&["stages/core-xy/core-xy.toml"], 2, "no move and no controller"),
         (
@@ -68,7 +68,7 @@ fn what_cannot_be_planned_is_told() {
         ("{ reserve = 0.95 }", "motor.resistance=1", "from 0 to 0.9"),
         ("{}, speed = 1", "motor.resistance=1", "the move has a plan already"),
         ("3", "motor.resistance=1", "expected a table"),
-        ("{}", "cart.friction.static=1 kN", "there is no plan: to break away takes"),
+        ("{}", "cart.friction.static=1 kN", "there is no plan: breakaway requires"),
         ("{}", "motor.resistance=1", ""),
     ] {
         let planned = format!("move=[{{ name = \"long\", to = \"40 mm\", plan = {plan}, until = \"1 s\" }}]");

@@ -131,7 +131,7 @@ fn a_killed_sweep_goes_on() {
         assert_eq!(output.status.code(), status);
         if status.is_some() {
             let told = String::from_utf8(output.stderr).unwrap();
-            assert!(told.contains("the same command goes on from there"), "{told}");
+            assert!(told.contains("the same command continues from there"), "{told}");
         }
         assert!(!folder.path().join("killed.parquet").exists());
         assert!(parts(&parts_folder) >= before + 2, "what was done is kept");
@@ -226,7 +226,7 @@ fn mistakes_on_the_command_line_are_told() {
         (vec!["--runs", "10", "--vary", "cart.mass=20%", "--vary", "total.inertia=20%"], "set the same number"),
         (
             vec!["--indices", "--design", "grid", "--vary", "cart.mass=values(1 kg)"],
-            "sensitivity indices cannot be had",
+            "sensitivity indices are not available",
         ),
     ] {
         let told = told(folder.path(), &[&[&case as &str], &arguments[..]].concat());
@@ -250,12 +250,12 @@ fn a_sweep_says_before_it_begins_what_it_takes() {
     let (status, told) = sweep(&["--runs", "1e12", "--out", "runs.csv"]);
     assert!(status == Some(2) && begin.elapsed() < Duration::from_secs(20));
     assert!(told.starts_with("error: --runs: 1000000000000 runs make a file of about "), "{told}");
-    assert!(told.contains(" TB while it is made\n  allowed: up to 10000000000 runs\n"), "{told}");
+    assert!(told.contains(" TB while it is written\n  allowed: up to 10000000000 runs\n"), "{told}");
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
     let (status, told) = sweep(&["--runs", "1e1", "--threads", "100000", "--out", "runs.csv"]);
     assert_eq!(status, Some(0));
     let started = std::thread::available_parallelism().unwrap().get().min(10);
-    assert!(told.starts_with(&format!("note: --threads 100000: {started} are started, for there are ")), "{told}");
+    assert!(told.starts_with(&format!("note: --threads 100000: {started} are started, because there are ")), "{told}");
     assert_eq!(fs::read_to_string(folder.path().join("runs.csv")).unwrap().lines().count(), 11);
 }
 

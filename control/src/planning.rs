@@ -164,7 +164,7 @@ impl Planner<'_> {
             .map_err(|error| Error { what: format!("the move \"{}\": {}", motion.name, error.what), ..error })?;
         let mut tried = self.tried(&quickest, &way, motion)?;
         if tried.is_empty() {
-            return Err(impossible("what is left of voltage and current accelerates no axis of the family".into()));
+            return Err(impossible("after the reserve, voltage and current accelerate no axis of the family".into()));
         }
         tried.sort_by(|a, b| a.rank().total_cmp(&b.rank()));
         let mut best = tried[0].clone();

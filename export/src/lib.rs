@@ -142,7 +142,8 @@ pub fn controller(case: &Case) -> Result<(&Case, &crate::design::Design)> {
     match &case.controller {
         Some(design) if case.is_axis() || design.feed_forward == FeedForward::NONE => Ok((case, design)),
         Some(_) => Err(Error::new(
-            "the feed-forward of a gantry needs the references of bridge and cart together, which an exported controller does not have",
+            "the feed-forward of a gantry needs the references of both bridge and cart, and an exported controller has \
+             only one",
         )),
         None => Err(Error::new("this case has no controller")),
     }
@@ -195,8 +196,9 @@ fn drives_note(case: &Case) -> Option<String> {
 /// Note that a controller is exported without its input shaper: how many impulses, and what to do.
 fn shaper_note(design: &crate::design::Design) -> Option<String> {
     let impulses = &design.shaper;
-    (!impulses.is_empty())
-        .then(|| format!("the input shaper of {} impulses is not in it: shape the reference before it", impulses.len()))
+    (!impulses.is_empty()).then(|| {
+        format!("the input shaper of {} impulses is not included: shape the reference before it", impulses.len())
+    })
 }
 
 /// The shaper as lines of a comment, with the impulses.

@@ -324,13 +324,13 @@ fn curved(mechanism: &Mechanism) -> Error {
     let body = mechanism.bodies.iter().find(|body| !body.friction.is_piecewise_linear() || body.along.is_some());
     let what = match (body, mechanism.springs.iter().find(|spring| spring.follows.is_some())) {
         (Some(body), _) if body.along.is_some() => {
-            format!("the friction of the {} changes along its way", body.label.name)
+            format!("the friction of the {} changes along its travel", body.label.name)
         }
         (Some(body), _) => format!("the friction of the {} is a curve", body.label.name),
         (None, Some(spring)) => format!("the stiffness of {} follows the cart", spring.label.name),
         (None, None) => "this machine is not linear between its events".to_string(),
     };
-    Error::new(format!("{what}, and what is exported here is linear between its events"))
+    Error::new(format!("{what}; this export requires a machine that is linear between its events"))
         .allowed("Coulomb friction with or without a breakaway (`coulomb`, `static`), and spans of constant stiffness")
         .next("`taut export fmu` takes it as it is")
 }

@@ -21,7 +21,7 @@ def test_values_are_read_in_si_units(case):
     # A default that the text does not say.
     assert case["motor.gear_efficiency"] == 1.0
     assert "cart.mass" in case and "cart.weight" not in case
-    with pytest.raises(KeyError, match="says nothing of `cart.weight`"):
+    with pytest.raises(KeyError, match="does not set `cart.weight`"):
         case["cart.weight"]
 
 

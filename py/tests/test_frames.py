@@ -187,7 +187,7 @@ def test_tuning_is_the_command_lines(root, moving):
     assert all(name in tuned._repr_html_() for name in tuned.gains)
     with pytest.raises(TypeError, match="spread: expected a number in SI units"):
         moving.tune(spread="10 %")
-    with pytest.raises(taut.Error, match="an effort of 0 cannot be"):
+    with pytest.raises(taut.Error, match="an effort of 0 is invalid"):
         moving.tune(effort=0)
     with pytest.raises(taut.Error):
         taut.Case(taut.template()).tune()

@@ -193,5 +193,5 @@ def test_logs_of_both_motors_are_checked_and_fitted(root):
     assert found.data["belts"]["looser"] == "right drive" and low < ratio < high < 0.92
     with pytest.raises(taut.Error, match="friction laws are compared on a single axis"):
         case.compare()
-    with pytest.raises(taut.Error, match="single changes are looked for on a single axis"):
+    with pytest.raises(taut.Error, match="single changes are searched for on a single axis"):
         case.drift()

@@ -121,12 +121,12 @@ fn root() -> Properties {
             "stepper",
             described(
                 table("stepper", &[("drive", words(["chopper", "voltage"]))]),
-                "Instead of [motor] and [amplifier]: a stepper that is told a position",
+                "Instead of [motor] and [amplifier]: a stepper that follows a position",
             ),
         ),
-        ("left_drive", described(drive(), "Of a gantry: what is different at the left drive")),
-        ("right_drive", described(drive(), "Of a gantry: what is different at the right drive")),
-        ("cart_drive", described(drive(), "Of a dual belt: what is different at the cart's drive")),
+        ("left_drive", described(drive(), "Gantry: differences at the left drive")),
+        ("right_drive", described(drive(), "Gantry: differences at the right drive")),
+        ("cart_drive", described(drive(), "Dual belt: differences at the cart's drive")),
         ("drive_pulley", pulley("drive_pulley")),
         ("idler_pulley", pulley("idler_pulley")),
         ("bridge", slide("bridge")),
@@ -141,7 +141,7 @@ fn root() -> Properties {
         ("move", list(motion())),
         ("fit", fit()),
         ("tune", table("tune", &[("cost", words(["squares", "peak", "bandwidth", "none"])), ("load", list(plain()))])),
-        ("uncertainty", described(json!({ "type": "object" }), "What a fit says of its own result")),
+        ("uncertainty", described(json!({ "type": "object" }), "Values and intervals of fitted parameters")),
         ("sweep", sweep()),
     ];
     tables.map(|(name, schema)| (name.to_string(), schema)).into_iter().collect()
@@ -271,7 +271,7 @@ fn log() -> Value {
     let columns = || json!({ "type": "object" });
     let mut own = vec![
         ("file", json!({ "type": "string" })),
-        ("fetch", described(json!({ "type": "string" }), "The command that brings the file where it is not there")),
+        ("fetch", described(json!({ "type": "string" }), "Command that downloads the file if it is missing")),
         ("preset", words(PRESETS.iter().map(|preset| preset.name))),
         ("time", any(vec![column(), table("experiment.log.time", &[])])),
         ("added", column()),

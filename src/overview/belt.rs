@@ -123,8 +123,8 @@ pub(super) fn notes(machine: &Machine, notes: &mut Vec<Note>) {
     let (sheet, r) = (&machine.belt.sheet, machine.pulley_radius);
     if machine.belt.damping.iter().all(|c| *c == 0.0) {
         let text = format!(
-            "the belt has no damping, so that only friction and the motor end its swinging; of damping ratios, {TYPICAL_DAMPING}: give \
-             belt.damping_ratio, or measure it"
+            "the belt has no damping, so only friction and the motor damp its vibration; of damping ratios, \
+             {TYPICAL_DAMPING}: give belt.damping_ratio, or measure it"
         );
         notes.push(Note { code: "no-damping", text });
     }

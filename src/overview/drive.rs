@@ -115,7 +115,7 @@ pub(super) fn constants(machine: &Machine, notes: &mut Vec<Note>) {
         before.push([k_t, k_e]);
         let whose = if machine.drives.len() == 1 { String::new() } else { format!("{side} drive: ") };
         let text = format!(
-            "{whose}K_t = {} and K_e = {} are one number of one motor in SI units: one of them, or its unit, is doubtful",
+            "{whose}K_t = {} and K_e = {} of one motor must be equal in SI units: one of them, or its unit, is doubtful",
             told(k_t, "N m/A"),
             told(k_e, "V s/rad")
         );

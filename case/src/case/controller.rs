@@ -64,7 +64,7 @@ fn structure(table: &Table, machine: &Machine, (every, delay): (f64, f64)) -> Re
         [] => {
             return Err(table
                 .field
-                .fail("the structure is not said")
+                .fail("the structure of the controller is missing")
                 .allowed(if machine.drives.len() == 1 { words.join(", ") } else { "pid, cascade, fuzzy".into() })
                 .next(format!("add for example {}", suggestion::pid(machine, every, delay))));
         }
@@ -214,7 +214,7 @@ fn filters(table: &Table) -> Result<Vec<Filter>> {
                 Err(low.fail("this is a notch already").next("write each filter as a table of its own"))
             }
             (None, None) => Err(field
-                .fail("the kind of filter is not said")
+                .fail("the kind of filter is missing")
                 .allowed("notch or low_pass")
                 .next("write for example { notch = \"180 Hz\" }")),
         }

@@ -28,7 +28,7 @@ pub fn machines(case: &Case, plan: &Plan, file: &Path) -> Result<Vec<Machine>> {
 pub fn drawn(case: &Case, plan: &Plan, others: &[&str], file: &Path) -> Result<(Vec<Free>, Vec<Vec<f64>>)> {
     let parameters = parameters(&case.machine, plan, others)?;
     if parameters.is_empty() {
-        return Err(Error::new("nothing is searched for").next("add free = [\"cart.mass\"] to [fit]"));
+        return Err(Error::new("there are no free parameters").next("add free = [\"cart.mass\"] to [fit]"));
     }
     if !plan.separate.is_empty() {
         return Err(draws_are_of_one_machine());
@@ -66,5 +66,5 @@ pub fn parameters(machine: &Machine, plan: &Plan, others: &[&str]) -> Result<Vec
 /// There is one machine for each campaign, and draws are of one.
 pub fn draws_are_of_one_machine() -> Error {
     Error::new("draws are of one machine, and `separate` makes one for each campaign")
-        .next("leave `separate` out of [fit], and hold out what is of the other campaigns")
+        .next("leave `separate` out of [fit], and hold out the logs of the other campaigns")
 }

@@ -192,7 +192,7 @@ pub(super) fn plan(root: &Table, stage: &Machine, experiments: &[Experiment], wh
     let lumped = table.optional("lumped").map_or(Ok(Vec::new()), |field| words(&field))?;
     if free.is_empty() && tied.is_empty() && lumped.is_empty() && table.optional("free").is_none() {
         return Err(field
-            .fail("nothing is searched for")
+            .fail("there are no free parameters")
             .next("add for example free = [\"cart.mass\", \"cart.friction.viscous\"], or free = [] for the errors of the case as it is"));
     }
     let mut seen: Vec<&str> = Vec::new();

@@ -39,7 +39,7 @@ pub(super) fn tables(root: &Table, kind: Kind) -> Result<Vec<&'static str>> {
     }
     for key in ["stepper", "measurement"] {
         if let Some(field) = root.optional(key) {
-            return Err(field.fail("this is not there yet for a gantry").next("leave it out for now"));
+            return Err(field.fail("this is not available yet for a gantry").next("leave it out for now"));
         }
     }
     let drives = kind.geometry().drives.iter().map(|drive| drive.label.key);

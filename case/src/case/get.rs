@@ -89,7 +89,7 @@ fn value<U: Fn(&str) -> &'static str>(text: &str, key: &str, rows: &Rows<U>) -> 
         Some((node, section)) => Ok(given(node, &section, rows)),
         None => match parameter::find(&(rows.place)(&steps.join("."))).map(|row| &row.default) {
             Some(Fallback::Value(value)) => Ok(Given::Number(*value)),
-            _ => Err(Error::new(format!("this case says nothing of `{key}`"))),
+            _ => Err(Error::new(format!("this case does not set `{key}`"))),
         },
     }
 }

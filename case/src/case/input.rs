@@ -52,7 +52,7 @@ fn nested(field: &Field, context: &Context, depth: usize, in_sequence: bool) -> 
     }
     if !field.is_table() {
         let such_as = format!("an input is a table, such as {{ step = \"5 {}\" }}", field.input_unit);
-        return Err(field.fail("the kind of input is not said").allowed(KINDS.join(", ")).next(such_as));
+        return Err(field.fail("the kind of input is missing").allowed(KINDS.join(", ")).next(such_as));
     }
     let kind = kind(&field.clone().table()?)?;
     let table = field.clone().named(format!("input.{kind}")).table()?;
@@ -118,7 +118,7 @@ fn kind(table: &Table) -> Result<&'static str> {
     match given[..] {
         [kind] => Ok(kind),
         [] => {
-            let error = table.field.fail("the kind of input is not said").allowed(KINDS.join(", "));
+            let error = table.field.fail("the kind of input is missing").allowed(KINDS.join(", "));
             let near = table.keys().find_map(|key| nearest(key, KINDS));
             Err(match near {
                 Some(near) => error.next(format!("did you mean `{near}`?")),
@@ -254,7 +254,7 @@ fn sequence(field: &Field, context: &Context, depth: usize) -> Result<Signal> {
             None if i == last => f64::INFINITY,
             None => {
                 return Err(element
-                    .fail("it is not said how long this element of the sequence lasts")
+                    .fail("the duration of this element of the sequence is missing")
                     .next("add for example lasts = \"1 s\""));
             }
         };

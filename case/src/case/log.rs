@@ -76,7 +76,7 @@ pub(super) fn logs(
     let added = sources.source("added", field.input_unit)?;
     if let (Some(_), true, Some(field)) = (&added, inputs.is_empty(), table.optional("added")) {
         return Err(field
-            .fail("there is no logged input that this could be added to")
+            .fail("this is added to a logged input, and the log has none")
             .next("name the column of the controller's output: input = \"...\""));
     }
     let outputs = outputs(field, &table, &sources)?;
@@ -155,7 +155,7 @@ fn outputs(field: &Field, table: &Table, sources: &Sources) -> Result<Vec<(Quant
         {
             let field = table.optional(quantity.name()).unwrap_or_else(|| field.clone());
             return Err(field
-                .fail("a rigid belt has no force at the cart, of which its acceleration would be made")
+                .fail("a rigid belt has no force at the cart, from which its acceleration would be computed")
                 .next("write model = \"elastic\" in [belt], or leave the accelerometer out"));
         }
         outputs.extend(sources.source(quantity.name(), quantity.unit())?.map(|source| (quantity, source)));
@@ -278,7 +278,7 @@ impl<'a> Sources<'a> {
     fn count(&self, field: &Field) -> Result<f64> {
         let Some(encoder) = self.machine.encoder else {
             return Err(field
-                .fail("there is no encoder whose counts these could be")
+                .fail("counts need an encoder, and this case has none")
                 .next("add [encoder] with at and lines"));
         };
         let counted: Vec<&str> = self.machine.counted().map(Quantity::name).collect();

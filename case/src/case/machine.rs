@@ -130,7 +130,7 @@ pub(super) fn travel(table: &Table) -> Result<Travel> {
     let stop = table.number_if_given("stop_stiffness")?.map(|stiffness| EndStop { stiffness, damping });
     match table.optional("stop_damping") {
         Some(field) if stop.is_none() => Err(field
-            .fail("there are no stops that this could be the damping of")
+            .fail("this is the damping of end stops, and there are none")
             .next("add for example stop_stiffness = \"20 kN/m\"")),
         _ => Ok(Travel { min, max, stop }),
     }
@@ -234,7 +234,7 @@ fn belt(table: &Table, travel: Option<&Table>) -> Result<Belt> {
         && model == BeltModel::Rigid
     {
         return Err(field
-            .fail("a rigid belt has no tension that could be used up")
+            .fail("a rigid belt has no tension, so it cannot go slack")
             .next("leave it out, or set model = \"two-mass\" or \"elastic\""));
     }
     let follows_cart = table.optional("follows_cart").map_or(Ok(false), |field| field.truth())?;
@@ -303,7 +303,7 @@ pub(super) fn rigidity(table: &Table, sheet: &BeltSheet) -> Result<(f64, f64, bo
 fn spans_left(follows: &Field, make: &BeltMake, travel: Option<&Table>) -> Result<()> {
     let Some(table) = travel else {
         return Err(follows
-            .fail("how far the cart may go is not said")
+            .fail("the travel of the cart is missing")
             .next("add a table [travel] with min and max, such as min = \"-0.3 m\" and max = \"0.3 m\""));
     };
     let Travel { min, max, .. } = self::travel(table)?;
@@ -357,7 +357,7 @@ fn scale(field: &Field, encoder: Option<Encoder>) -> Result<Encoder> {
     match encoder.map(|encoder| encoder.at) {
         Some(EncoderPlace::Motor | EncoderPlace::DrivePulley) => Ok(scale),
         Some(EncoderPlace::Cart) => {
-            Err(field.fail("the encoder of this case sits at the cart already").next("leave the one or the other out"))
+            Err(field.fail("the encoder of this case is already at the cart").next("leave one of them out"))
         }
         None => Err(field
             .fail("a scale is a second sensor, and this case has no first one")

@@ -265,7 +265,7 @@ const AXIS_TABLES: [&str; 21] = [
     "move",
     "fit",
     "tune",
-    // What a fit says of its own result.
+    // Values and intervals of fitted parameters.
     "uncertainty",
     "sweep",
 ];

@@ -175,7 +175,7 @@ fn at(field: &Field, error: Error) -> Error {
 fn planned(table: &Table, field: &Field, from: &[f64], machine: &Machine, design: &Design) -> Result<Limits> {
     if let Some(other) = ["speed", "acceleration", "jerk", "snap", "gcode"].iter().find_map(|key| table.optional(key)) {
         let next = format!(
-            "leave out plan, or {}; limits of the plan stand in it: plan = {{ speed = \"0.5 m/s\" }}",
+            "leave out plan, or {}; limits of the plan belong into it: plan = {{ speed = \"0.5 m/s\" }}",
             other.key()
         );
         return Err(other.fail("the move has a plan already").next(next));

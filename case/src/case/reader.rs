@@ -174,7 +174,7 @@ impl<'a> Field<'a> {
 
     /// Three numbers, one for each span of an axis.
     pub fn three(&self) -> Result<[f64; 3]> {
-        let per_span = "three values: drive pulley to cart, cart to idler pulley, and the way back";
+        let per_span = "three values: drive pulley to cart, cart to idler pulley, idler pulley to drive pulley";
         let mut values = [0.0; 3];
         values.copy_from_slice(&self.numbers(3, per_span)?);
         Ok(values)

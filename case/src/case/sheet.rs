@@ -55,7 +55,7 @@ fn rating(field: &Field) -> Result<Rating> {
         && rating.no_load_current >= rating.current
     {
         return Err(field
-            .fail(format!("{} without load is no less than under it", show(rating.no_load_current, "A")))
+            .fail(format!("{} without load is not less than under load", show(rating.no_load_current, "A")))
             .allowed(format!("below `current`, {}", show(rating.current, "A"))));
     }
     Ok(rating)
@@ -100,7 +100,7 @@ pub(super) fn simple_drive(root: &Table) -> Result<Option<SimpleDrive>> {
     table.check_keys(&[], &[])?;
     if let Some(motor) = root.optional("motor") {
         return Err(motor
-            .fail("there is a [drive] already, which is all of motor and gear")
+            .fail("there is already a [drive], which replaces motor and gear")
             .next("give [motor] if its data are known, or [drive] with force_per_input and drag if not"));
     }
     if let Some(mode) = root.optional("amplifier").and_then(|field| field.table().ok()?.optional("mode"))
@@ -166,7 +166,7 @@ pub(super) fn specific_stiffness(table: &Table, sheet: &BeltSheet) -> Result<Opt
     match sheet.width {
         Some(width) => table.computed("specific_stiffness", &field, per_width * width).map(Some),
         None => Err(field
-            .fail("this is a stiffness per width, and the width is not said")
+            .fail("this is a stiffness per width, and the width is missing")
             .next("add width, for example width = \"10 mm\", or give that of the whole belt, in N")),
     }
 }
@@ -182,7 +182,7 @@ fn of_type(table: &Table, sheet: &BeltSheet) -> Result<Option<f64>> {
         None => {
             let known = BELTS.iter().filter(|belt| !belt.widths.is_empty()).map(|belt| belt.name);
             Err(field
-                .fail(format!("no source says how stiff a belt {} is", kind.name))
+                .fail(format!("no source has the stiffness of a belt {}", kind.name))
                 .allowed(format!("{}; or any type with a stiffness of your own", known.collect::<Vec<_>>().join(", ")))
                 .next("add specific_stiffness from its data sheet (E A in N, or per width in N/mm), or stiffness, or modulus and section"))
         }

@@ -14,7 +14,7 @@ const YET_TO_COME: [&str; 6] = ["measurement", "controller", "move", "tune", "fi
 const NO_MOTOR: [&str; 3] = [
     "this needs a motor that is commanded by voltage or current, and the case describes a stepper",
     "[motor] and [amplifier]",
-    "`taut show`, `taut simulate` and `taut sweep` take steppers; all else is yet to come",
+    "`taut show`, `taut simulate` and `taut sweep` support steppers; other commands do not yet",
 ];
 
 /// Refuses a stepper where a motor that is commanded by voltage or current is needed.
@@ -38,7 +38,7 @@ pub(super) fn drive(root: &Table) -> Result<Option<DriveUnit>> {
             .next("give either [stepper], or [motor] and [amplifier]"));
     }
     if let Some(other) = YET_TO_COME.iter().find_map(|key| root.optional(key)) {
-        return Err(other.fail("this is not there yet for a stepper").next("leave it out for now"));
+        return Err(other.fail("this is not available yet for a stepper").next("leave it out for now"));
     }
     let table = field.table()?;
     table.check_keys(&["drive"], &[])?;

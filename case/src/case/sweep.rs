@@ -159,7 +159,7 @@ pub(super) fn sweeping(root: &Table, context: &Context) -> Result<Option<Sweepin
     }
     if let (Some(field), true) = (table.optional("indices"), indices && !design.is_drawn()) {
         return Err(field
-            .fail(format!("sensitivity indices cannot be had from design = \"{}\"", design.word()))
+            .fail(format!("sensitivity indices are not available for design = \"{}\"", design.word()))
             .allowed("design = \"random\", \"latin-hypercube\" or \"sobol\""));
     }
     match (table.optional("runs"), design.is_drawn()) {
@@ -168,7 +168,7 @@ pub(super) fn sweeping(root: &Table, context: &Context) -> Result<Option<Sweepin
         }
         (Some(field), false) => {
             return Err(field
-                .fail(format!("how many runs there are follows from design = \"{}\"", design.word()))
+                .fail(format!("the number of runs follows from design = \"{}\"", design.word()))
                 .next("leave runs out, or take design = \"random\""));
         }
         _ => {}
@@ -193,7 +193,7 @@ fn origin(field: &Field, context: &Context) -> Result<Origin> {
     let text = field.text()?;
     if context.machine.bridge.is_some() {
         return Err(field
-            .fail("a gantry is not fitted yet, so nothing is known of how its parameters are spread")
+            .fail("gantries are not fitted yet, so the uncertainty of their parameters is unknown")
             .next("leave it out, and say in [sweep.vary] how each parameter varies"));
     }
     if text != "uncertainty" {
@@ -246,7 +246,7 @@ fn variation(field: &Field, key: &str, design: Sampling, machine: &Machine) -> R
     }
     if !design.is_drawn() && design == Sampling::Grid && !matches!(kind, "values" | "grid" | "factors") {
         return Err(at
-            .fail(format!("{} is drawn from, and has no values of a grid", kind.replace('_', "-")))
+            .fail(format!("{} is a density, without values for a grid", kind.replace('_', "-")))
             .allowed("values = [...], grid = [from, to, count] or factors = [...]")
             .next("or take design = \"sobol\""));
     }
@@ -285,7 +285,7 @@ fn variation(field: &Field, key: &str, design: Sampling, machine: &Machine) -> R
         kind => Kinds::Drawn(prior_of(kind, &at, row.map_or(key, |row| row.key))?),
     };
     if let (Kinds::Values(_) | Kinds::Factors(_), Some(field)) = (&kind, table.optional("within")) {
-        return Err(field.fail("values that are given are not cut off").next("leave `within` out"));
+        return Err(field.fail("given values cannot be truncated").next("leave `within` out"));
     }
     Ok(Variation { kind, within })
 }

@@ -70,7 +70,7 @@ fn syntax(source: &Source, error: &toml_edit::TomlError) -> Error {
     Error::new(what).at(source.place(span)).next(next)
 }
 
-const A_LINE: &str = "a line is key = value; a number with a unit stands in quotes, such as mass = \"0.362 kg\"";
+const A_LINE: &str = "a line is key = value; a number with a unit is written in quotes, such as mass = \"0.362 kg\"";
 
 /// Mistakes of the notation: what the reader of TOML says, and what we say instead.
 const TOML_MISTAKES: &[(&str, &str, &str)] = &[

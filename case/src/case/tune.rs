@@ -17,7 +17,7 @@ pub struct Tuning {
     pub cost: Option<Cost>,
     /// Bandwidth that the gains are placed for, Hz; one that suits the axis where it is not said.
     pub bandwidth: Option<f64>,
-    /// Damping ratio that they are placed for.
+    /// Damping ratio for which they are placed.
     pub damping: f64,
     /// Largest |S| allowed.
     pub sensitivity: f64,
@@ -27,7 +27,7 @@ pub struct Tuning {
     pub spread: Option<f64>,
     /// Masses that are added to the cart, kg.
     pub loads: Vec<f64>,
-    /// Places along the travel that are looked at.
+    /// Number of positions along the travel that are evaluated.
     pub places: usize,
     /// True if all parameters may be at their ends at once, and no axis is left out.
     pub corners: bool,
@@ -130,7 +130,7 @@ pub(super) fn tuning(
             let cost = field.choice(&words)?;
             if moves.is_empty() && matches!(cost, Some(Cost::Squares | Cost::Peak)) {
                 return Err(field
-                    .fail("there is no move whose error could be made small")
+                    .fail("there is no move whose error could be minimised")
                     .next("add [[move]], or write cost = \"moves\" for a set that suits the axis"));
             }
             cost
@@ -144,7 +144,7 @@ pub(super) fn tuning(
     }
     if cost.is_none() && bandwidth.is_none() {
         let next = if placed { "add for example bandwidth = \"8 Hz\"" } else { "write for example cost = \"moves\"" };
-        return Err(field.fail("without a cost the gains follow from a bandwidth, which is not said").next(next));
+        return Err(field.fail("without a cost the gains follow from a bandwidth, which is missing").next(next));
     }
     Ok(Some(Tuning {
         cost,
@@ -201,7 +201,9 @@ pub(super) fn known(root: &Table) -> Result<Vec<Known>> {
         };
         let interval = match (number("low")?, number("high")?) {
             (Some(low), Some(high)) if low > high => {
-                return Err(field.fail(format!("the interval from {low} to {high} is none")).allowed("low up to high"));
+                return Err(field
+                    .fail(format!("the interval from {low} to {high} is empty"))
+                    .allowed("low up to high"));
             }
             (Some(low), Some(high)) => Some([low, high]),
             (Some(_), None) | (None, Some(_)) => {

@@ -11,8 +11,8 @@ use std::path::{Path, PathBuf};
 pub const MARKER: &str = "unfinished.txt";
 
 const MARKED: &str = "\
-taut was ended while it replaced the results in this folder: some of the files are new, and some may be of an earlier run.
-Run the same command again; this file goes when all files are in place.
+taut was interrupted while it replaced the results in this folder: some of the files are new, and some may be from an
+earlier run. Run the same command again; this file disappears once all files are in place.
 ";
 
 /// Files that are being written for one folder. Dropped before [`Batch::place`], they are removed, and what stands in

@@ -176,7 +176,8 @@ impl Claim {
                 Err(TryLockError::WouldBlock) => return Err(taken(shown, &Owner::read(&file))),
                 Err(TryLockError::Error(e)) => {
                     self.unlocked = Some(format!(
-                        "{}: this file system has no locks ({e}): make sure that no other taut writes here meanwhile",
+                        "{}: this file system has no locks ({e}): make sure that no other taut writes here at the same \
+                         time",
                         shown.display()
                     ));
                     let _ = fs::remove_file(&path);

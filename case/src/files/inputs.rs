@@ -68,7 +68,7 @@ impl Inputs {
         match self.files.iter().find(|(input, _)| lies_in(input)) {
             None => Ok(()),
             Some((input, _)) => Err(Error::new(format!(
-                "{} is read and lies in this folder, which is removed in the end; nothing was written",
+                "{} is read and is in this folder, which would be removed at the end; nothing was written",
                 input.display()
             ))
             .in_file(folder)

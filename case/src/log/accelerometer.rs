@@ -68,7 +68,7 @@ pub fn read_accelerometer(file: &Path) -> Result<Accelerometer> {
     }
     let numbers = heading.text.split([',', ';', '\t', ' ']).any(|field| field.trim().parse::<f64>().is_ok());
     let what = match numbers {
-        true => "the columns have no names, so what they hold cannot be told",
+        true => "the columns have no names, so their content is unknown",
         false => "these are not the columns of a spectrum or of accelerometer samples",
     };
     let next = match numbers {

@@ -474,7 +474,8 @@ impl Layout {
         }
         let error = lines.error(format!("there is no column {number}"));
         Err(error.allowed(format!("columns 1 to {there}, as line {} has them", lines.number)).next(
-            "correct the column's number in the case file; if there should be more columns, say what parts them: separator = \";\"",
+            "correct the column's number in the case file; if there should be more columns, state the separator: \
+             separator = \";\"",
         ))
     }
 
@@ -510,7 +511,7 @@ impl Layout {
         let error = error.allowed(list.join(", "));
         if let (Some(said), 1) = (self.said, self.names.len()) {
             let next =
-                format!("the case file says that `{said}` parts the columns, and line {} has none", lines.number);
+                format!("the case file has the separator `{said}`, and line {} does not contain it", lines.number);
             return error.next(next);
         }
         match near(name, self.names.iter().map(String::as_str)) {

@@ -415,7 +415,7 @@ impl Columns<'_> {
         let Some(k) = lost else { return Ok(shifted) };
         let (here, there) = (self.sheet.row(first + k), self.sheet.row(first + k - 1));
         let what = format!(
-            "counted from the log's beginning at {}, the times {} in {there} and {} in {here} are no longer apart",
+            "counted from the log's beginning at {}, the times {} in {there} and {} in {here} are equal after rounding",
             show(start, "s"),
             show(time[k - 1], "s"),
             show(time[k], "s")
@@ -466,11 +466,8 @@ impl Columns<'_> {
         let of = run.map(|run| format!("the run {}", shown(&run.label))).unwrap_or("the log".into());
         let extent = format!("from {} to {}", show(first, "s"), show(last, "s"));
         if let Some(from) = from.filter(|&from| from < first && !inputs.is_empty()) {
-            let what = format!(
-                "{of} begins at {}; what was fed in from {} on is not known",
-                show(first, "s"),
-                show(from, "s")
-            );
+            let what =
+                format!("{of} begins at {}; the input from {} on is not known", show(first, "s"), show(from, "s"));
             return Err(fail(what).allowed(extent).next("correct `from`, or leave it out"));
         }
         let begin = from.map_or(0, |from| time.partition_point(|&t| t - zero < from));

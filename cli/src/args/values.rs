@@ -89,7 +89,7 @@ pub fn channel(text: &str) -> Result<Channel, String> {
     let (name, noise) = text.split_once('=').ok_or("a quantity and its noise are needed, such as drive_angle=1mrad")?;
     let quantity = Quantity::of(Kind::Axis).iter().copied().find(|quantity| quantity.name() == name.trim());
     let quantity =
-        quantity.ok_or_else(|| format!("`{}` is no measured quantity; there are {}", name.trim(), names()))?;
+        quantity.ok_or_else(|| format!("`{}` is not a measured quantity; available are {}", name.trim(), names()))?;
     let noise = positive(noise.trim(), quantity.unit(), "standard deviation above zero")?;
     Ok(Channel { quantity, step: None, noise, range: None })
 }

@@ -13,7 +13,7 @@ pub fn text(title: &str, found: &Designed, checked: &[Verified]) -> String {
         let _ = write!(text, "{}\n{rows}\n", bold(heading));
     };
     let promised = format!(
-        "Standard errors that it promises, all others free, {} % of the value for the model included",
+        "Predicted standard errors, all others free, including {} % of the value for the model",
         taut::quantity::rounded(100.0 * found.model_error)
     );
     part(&promised, format!("{}  {}\n", columns(&promises(found)), measured(found)));
@@ -22,12 +22,12 @@ pub fn text(title: &str, found: &Designed, checked: &[Verified]) -> String {
         part("Not determined", format!("  {}\n{choices}", group.words));
     }
     if !checked.is_empty() {
-        let heading =
-            "Fits of simulated logs: errors over those of an exact model (rms, mean), 95 % intervals that hold";
+        let heading = "Fits of simulated logs: errors relative to those predicted for an exact model (rms, mean), 95 % \
+             intervals that contain the truth";
         part(heading, columns(&verified(checked)));
     }
     let heading = format!(
-        "Reached and limit; {:.0} % is left free, also with a parameter off by {:.0} %",
+        "Reached value and limit; {:.0} % is kept free, also with a parameter wrong by {:.0} %",
         100.0 * found.limits.margin,
         100.0 * found.doubt
     );

@@ -45,7 +45,7 @@ pub fn run(args: &Args, case: &Case, plan: &Plan) -> Outcome {
     let own = &compared.case;
     let text = format!("{}{}", shown(&compared), table::text(own, &found, begin.elapsed()));
     let advice = match common.out.is_some() {
-        true => "something warns; --anyway writes it all the same",
+        true => "there are warnings; --anyway writes it nevertheless",
         false => "add --out DIR for fitted.toml, compare.json, fit.json and a report",
     };
     let folder = folder.filter(|_| !is_held_back(&found.fit, args));
@@ -82,7 +82,7 @@ fn window(text: &str) -> Result<Option<f64>> {
         return Ok(None);
     }
     let allowed = || {
-        Error::new(format!("\"{text}\" is no length of windows"))
+        Error::new(format!("\"{text}\" is not a length of windows"))
             .in_file("--windows")
             .allowed("whole, or a time above zero such as 2s")
     };

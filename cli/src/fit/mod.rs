@@ -47,7 +47,7 @@ pub fn run(args: &Args) -> Outcome {
     // A folder that is left here leaves nothing behind.
     let folder = folder.filter(|_| !is_held_back(fit, args));
     let advice = match common.out.is_some() {
-        true => "something warns; --anyway writes it all the same",
+        true => "there are warnings; --anyway writes it nevertheless",
         false => "add --out DIR for fitted.toml, fit.json and a report",
     };
     let mut finished = Finished::new("fit", ("fit.json", json::text(&json)), table::text(&case, &found, took), advice);

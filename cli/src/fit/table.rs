@@ -50,7 +50,8 @@ pub fn text(case: &Case, found: &Found, took: Duration) -> String {
     if !names.is_empty() {
         let _ = writeln!(
             text,
-            "  not to be taken as linear: {}; see their profiles in the report, or `--posterior` for other intervals",
+            "  not linear within the intervals: {}; see the profiles in the report, or use `--posterior` for other \
+             intervals",
             names.join(", ")
         );
     }

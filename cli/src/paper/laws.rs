@@ -23,7 +23,7 @@ pub fn toothed(f: &Findings) -> Plot {
     let stretches: Vec<f64> = ratio.iter().map(|a| series_over_plain_stretches(*a, 0.5)).collect();
     Plot::new(
         "figure-03",
-        "Figure 3. Toothed and plain stretches in series",
+        "Figure 3. Toothed and plain segments in series",
         Axis::new("Toothed section / plain section", ""),
         "area_ratio",
         &ratio,
@@ -33,13 +33,12 @@ pub fn toothed(f: &Findings) -> Plot {
         1.0,
         vec![
             Curve::new("l in (13): the whole span", "whole_span", &whole, Colour::Blue),
-            Curve::new("l in (13): the plain stretches", "plain_stretches", &stretches, Colour::Vermillion),
+            Curve::new("l in (13): the plain segments", "plain_stretches", &stretches, Colour::Vermillion),
         ],
     )
     .caption(format!(
-        "Teeth on half the length, of the same composite as the belt. The larger their section, the \
-             better (13) holds with l the \
-             plain stretches, and the worse with l the whole span, which is what the tables use. Teeth of neoprene, \
+        "Teeth on half the length, of the same composite as the belt. The larger their section, the better (13) holds \
+         with l the plain segments, and the worse with l the whole span, as the tables have it. Teeth of neoprene, \
              which the cords do not enter, add only {} to the stiffness: then the whole span is right.",
         share(f.belt.neoprene_teeth)
     ))

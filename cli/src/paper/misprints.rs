@@ -51,9 +51,8 @@ pub const MISPRINTS: [Misprint; 10] = [
         number: "P6",
         prefix: "p6-",
         title: "Table 3 at rest",
-        text: "Inside its band the function cancels the torque, and so keeps whatever speed there is. It is \
-         available here as a labelled reproduction; what runs otherwise brings a body to rest and holds it \
-         there.",
+        text: "Inside its band the function cancels the torque, and so keeps the present speed. It is available here \
+               as a labelled reproduction; the other solvers bring a body to rest and hold it there.",
     },
     Misprint {
         number: "P7",

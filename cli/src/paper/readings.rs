@@ -166,8 +166,8 @@ pub fn readings(f: &Findings) -> Vec<Claim> {
         .further("largest difference in r φ₁", shared, "m", Rule::AtMost(i.count))
         .found(format!("up to {} or {}", um(shared, 3), share(shared_share)))
         .remark(format!(
-            "The largest difference is {}, {} counts of an encoder before the gear: the belt's stretch \
-                 betrays a little of where friction acts. Totals: {} and {}.",
+            "The largest difference is {}, {} counts of an encoder before the gear: the belt's stretch reveals \
+             slightly where friction acts. Totals: {} and {}.",
             um(shared, 3),
             significant(shared / i.count, 2),
             si(i.total_viscous, "N m s", 4),
@@ -235,7 +235,7 @@ pub fn readings(f: &Findings) -> Vec<Claim> {
         ),
         reading("p9-scaled", "figures 14, 15", "a linear set that meets Table 4 at 5 V misses it by -13 % at 10 V")
             .decide("final position, relative", m.scaled_to_5, "1", near(-0.13, 0.005))
-            .remark(format!("The other way round, a set that meets 10 V is {} off at 5 V.", percent(m.scaled_to_10))),
+            .remark(format!("Conversely, a set that meets 10 V is {} off at 5 V.", percent(m.scaled_to_10))),
         reading("p10-inertia", "figure 10", "the final position is independent of inertia for viscous friction only")
             .decide("largest change, Table 1", final_position(From::Table1), "1", Rule::AtMost(1e-5))
             .decide(

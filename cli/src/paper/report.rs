@@ -189,9 +189,8 @@ impl Report<'_> {
         }
         self.page.subsection("Teeth");
         self.page.prose(
-            "Equation (12) puts toothed and plain stretches in series; eq. (13) keeps the plain section. \
-             How far they differ depends on \
-             the length that is meant.",
+            "Equation (12) puts toothed and plain segments in series; eq. (13) keeps the plain section. Their \
+             difference depends on the length that is meant.",
         );
         self.figure("figure-03");
         self.page.table(&tables::toothed());
@@ -202,9 +201,9 @@ impl Report<'_> {
         self.claim("pulley-inertia");
         self.page.subsection("Modes");
         self.page.prose(format!(
-            "Three inertias and three springs move as one with a slow decay, and oscillate in two ways that \
-             lie close together: {} and {} Hz \
-             for Table 2. With l₁ = l₂ the modes are nearly equal; away from the middle they part.",
+            "Three inertias and three springs move together with a slow decay, and oscillate in two modes with similar \
+             frequencies: {} and {} Hz for Table 2. With l₁ = l₂ the modes are nearly equal; away from the middle \
+             their frequencies separate.",
             significant(f.linear.modes[1].first().map_or(f64::NAN, |m| m.frequency), 4),
             significant(f.linear.modes[1].get(1).map_or(f64::NAN, |m| m.frequency), 4)
         ));
@@ -263,9 +262,9 @@ impl Report<'_> {
         self.claim("linear-misses-10-V");
         self.claim("table2-fits-5-V");
         self.page.prose(format!(
-            "There are two readings. Either the measured 5 V response was that of Table 2: then Table 4 \
-             misses it by {}. Or it was that of \
-             Table 4: then Table 2 was matched at 10 V, where the two differ by {}. The measured curves would decide.",
+            "There are two readings. Either the measured 5 V response was that of Table 2, and Table 4 misses it by \
+             {}. Or it was that of Table 4, and Table 2 was matched at 10 V, where the two differ by {}. \
+             The measured curves would decide.",
             percent(1.0 / (1.0 + m.final_position[0]) - 1.0),
             percent(m.final_position[1])
         ));

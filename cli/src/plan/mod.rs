@@ -82,6 +82,8 @@ fn remark(planned: &Planned) -> Option<Remark> {
         )));
     }
     planned.is_kept.then(|| {
-        Remark::Note(format!("no plan of the move \"{name}\" arrives sooner than the limits of the file, which stay"))
+        Remark::Note(format!(
+            "no plan of the move \"{name}\" arrives sooner than with the limits of the file, which stay"
+        ))
     })
 }

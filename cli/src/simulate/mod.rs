@@ -39,7 +39,7 @@ fn one(args: &Simulate, path: &Path) -> Outcome {
 /// One case after the other, each into a folder of its own; the gravest end is that of all.
 fn several(args: &Simulate) -> Outcome {
     if args.common.json {
-        let error = Error::new("the summaries of several cases are not one JSON").in_file("--json");
+        let error = Error::new("--json prints the summary of one case only").in_file("--json");
         return Err(error.next("name one case; or take --out, which writes a summary for each").into());
     }
     let stem = |path: &Path| path.file_stem().unwrap_or_default().to_os_string();
@@ -132,7 +132,7 @@ fn refuse(args: &Simulate, case: &Case) -> Result<()> {
         }
         false => return Ok(()),
     };
-    Err(Error::new("this is there for a single axis, and not yet for a gantry").in_file(option).next(next))
+    Err(Error::new("this is available for a single axis, not yet for a gantry").in_file(option).next(next))
 }
 
 /// The files that will be written, but for plots: `brought` are those of the case's inputs, `experiments` the names of

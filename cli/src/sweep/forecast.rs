@@ -56,7 +56,7 @@ impl Room {
 
     fn words(&self) -> String {
         let Self { runs, file, all } = self;
-        format!("{runs} runs make a file of about {}, and up to {} while it is made", bytes(*file), bytes(*all))
+        format!("{runs} runs make a file of about {}, and up to {} while it is written", bytes(*file), bytes(*all))
     }
 
     /// Refuses more runs than there may be, and more than there is room for.
@@ -65,7 +65,7 @@ impl Room {
             return Err(Error::new(self.words())
                 .in_file("--runs")
                 .allowed(format!("up to {MOST_RUNS} runs"))
-                .next("sweep fewer runs: a million of them tell a share to 0.1 %")
+                .next("sweep fewer runs: a million determine a share to 0.1 %")
                 .into());
         }
         match free.filter(|&free| self.all > free) {
@@ -121,7 +121,8 @@ mod tests {
         assert_eq!(failure.status, 1);
         assert_eq!(
             failure.error.to_string(),
-            "out: 1000000000 runs make a file of about 246 GB, and up to 486 GB while it is made; 100 GB are free\n  \
+            "out: 1000000000 runs make a file of about 246 GB, and up to 486 GB while it is written; 100 GB are \
+             free\n  \
              next: sweep fewer runs, or name an --out on a larger disk"
         );
         assert!(room.check(Path::new("out"), Some(500e9)).is_ok() && room.check(Path::new("out"), None).is_ok());

@@ -101,7 +101,7 @@ fn threads(args: &Args, sweep: &Sweep) -> usize {
     let useful = processors.min(usize::try_from(sweep.runs()).unwrap_or(usize::MAX)).max(1);
     if let Some(asked) = args.threads.filter(|&asked| asked > useful && !args.common.quiet) {
         let runs = if useful < processors { format!("{useful} runs") } else { format!("{processors} processors") };
-        terminal::show_note(&format!("--threads {asked}: {useful} are started, for there are {runs}"));
+        terminal::show_note(&format!("--threads {asked}: {useful} are started, because there are {runs}"));
     }
     args.threads.unwrap_or(processors).min(useful)
 }
@@ -128,7 +128,7 @@ fn left_at(work: &Work, store: &Store, signal: u8) -> Failure {
     let done = store.done();
     let what = match store.folder() {
         Some(folder) => format!(
-            "interrupted: {done} of {} runs are done and kept in {}; the same command goes on from there",
+            "interrupted: {done} of {} runs are done and kept in {}; the same command continues from there",
             work.sweep.runs(),
             folder.display()
         ),

@@ -47,7 +47,7 @@ pub fn text(work: &Work, summary: &Summary, took: Duration, run: u64) -> String 
     }
     let rate = run as f64 * work.sweep.groups().len() as f64 / took.as_secs_f64().max(1e-9);
     let _ = match run {
-        0 => writeln!(text, "\n  took nothing: all runs were done already"),
+        0 => writeln!(text, "\n  took no time: all runs were already done"),
         _ => writeln!(text, "\n  took {}: {run} runs, {rate:.0} simulations a second", shown(took)),
     };
     text.replace('\u{a0}', " ")

@@ -58,7 +58,7 @@ pub fn run(args: &Args) -> Outcome {
         None => Status::Incomplete,
     };
     if args.in_place && tuned.judgement == Judgement::Worse && !args.anyway {
-        let told = "the case file is as it was: the gains that were found make moves worse; --anyway writes them";
+        let told = "the case file was not changed: the gains that were found make moves worse; --anyway writes them";
         finished.remarks.push(Remark::Error(told.into()));
         return finished.finish(common, None);
     }
@@ -91,7 +91,7 @@ fn remarks(work: &Work) -> Vec<Remark> {
     let mut remarks = Vec::new();
     if !tuned.after.nominal.stable {
         let told = "the loop is not stable on the axis as the file has it";
-        remarks.push(Remark::Warning(format!("{told}: it swings at {}", hertz(tuned.after.nominal.at))));
+        remarks.push(Remark::Warning(format!("{told}: it oscillates at {}", hertz(tuned.after.nominal.at))));
     }
     let short = work.case.shortfalls();
     remarks.extend(short.iter().map(|(name, short)| Remark::Warning(sentence(name, short))));

@@ -51,8 +51,11 @@ pub fn text(work: &Work, is_verbose: bool) -> String {
         let _ = writeln!(text, "  before on {first}, after on {second}");
     }
     if let Some(mode) = tuned.undamped {
-        let told = "the belt has no damping: what limits Ms near its modes, from";
-        let _ = writeln!(text, "note: {told} {mode:.0} Hz on, is an undamped mode; give belt.damping if it is known");
+        let told = "the belt has no damping: near its modes, from";
+        let _ = writeln!(
+            text,
+            "note: {told} {mode:.0} Hz on, Ms is limited by undamped modes; give belt.damping if it is known"
+        );
     }
     // The verdict on other gains compares the moves itself.
     let is_compared = tuned.searched && tuned.judgement != Judgement::Unchanged;

@@ -122,7 +122,7 @@ fn a_shaper_that_is_left_out_is_told() {
         let out = format!("x.{target}");
         let output = taut(folder.path(), &["export", target, &shaped, "--out", &out]);
         let shown = String::from_utf8(output.stdout).unwrap();
-        assert!(shown.contains("the input shaper of 2 impulses is not in it"), "{shown}");
+        assert!(shown.contains("the input shaper of 2 impulses is not included"), "{shown}");
         let text = std::fs::read_to_string(folder.path().join(path)).unwrap();
         assert!(
             text.contains("the input shaper of 2 impulses") && text.contains("of the reference 0.0 s ago"),

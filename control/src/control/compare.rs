@@ -105,19 +105,22 @@ impl Comparison {
             let same = self.pairs.iter().any(|pair| pair == main);
             let change = 100.0 * (main.stiffness_per_mass() - 1.0);
             told.push(if (g - f).abs() <= self.resolution + ROUNDING {
-                format!("The highest peaks, {f:.1} and {g:.1} Hz, are not told apart at steps of {:.1} Hz.", self.resolution)
+                format!(
+                    "The highest peaks, {f:.1} and {g:.1} Hz, are not separate at steps of {:.1} Hz.",
+                    self.resolution
+                )
             } else if same {
                 let word = if g > f { "stiffer, or moves less mass" } else { "softer, or moves more mass" };
                 let belt = if g > f { "a tighter or shorter belt" } else { "a looser or longer belt" };
                 format!(
                     "The highest peak goes from {f:.1} to {g:.1} Hz. If it is one mode, stiffness over mass differs by \
-                     {change:+.0} %: the second is {word}. With the same mass that speaks for {belt}; a frame or a \
+                     {change:+.0} %: the second is {word}. With the same mass that suggests {belt}; a frame or a \
                      fastening would show the same."
                 )
             } else {
                 format!(
-                    "The highest peaks, {f:.1} and {g:.1} Hz, are too far apart to be taken for one mode: which mode is \
-                     excited most has changed, and tension cannot be told from that."
+                    "The highest peaks, {f:.1} and {g:.1} Hz, are too far apart to be taken for one mode: another mode \
+                     is excited most, which says nothing about the tension."
                 )
             });
         }
@@ -126,7 +129,7 @@ impl Comparison {
                 true => format!("Both are mostly along {}", one.word()),
                 false => format!("The first is mostly along {}, the second along {}", one.word(), other.word()),
             };
-            told.push(format!("{along}; a belt acts along its own axis, which --axis looks at alone."));
+            told.push(format!("{along}; a belt acts along its own axis, which --axis selects."));
         }
         let vibration = 100.0 * (self.level - 1.0);
         if vibration.abs() >= 10.0 {

@@ -146,7 +146,7 @@ pub fn recommend(args: &Question, files: &[PathBuf]) -> Result<Findings> {
 fn together(args: &Question, files: &[PathBuf]) -> Result<Found> {
     if let Some(file) = files.iter().find(|file| is_case(file)) {
         let error = Error::new("a case file has no spectrum to put together with others").in_file(file);
-        return Err(error.next("leave --together out; a case is looked at along its whole travel anyway"));
+        return Err(error.next("leave --together out; a case is evaluated along its whole travel anyway"));
     }
     let mut spectra = Vec::new();
     for file in files {
@@ -168,7 +168,7 @@ fn find(args: &Question, files: &[PathBuf], file: &Path) -> Result<Vec<Found>> {
     }
     let (sources, also) = model(args, file)?;
     if sources.len() > 1 && files.len() > 1 {
-        let error = Error::new("a gantry has a shaper for each coordinate, and is compared with nothing").in_file(file);
+        let error = Error::new("a gantry has a shaper for each coordinate, and cannot be compared").in_file(file);
         return Err(error.next("name this case alone"));
     }
     sources.into_iter().map(|source| chosen(args, file, source, also.clone())).collect()
@@ -202,7 +202,8 @@ fn chosen(args: &Question, file: &Path, source: Source, also: Vec<PathBuf>) -> R
         (Source::Model { modes, .. }, _) => Some(damping(modes)),
         (Source::Spectrum(_) | Source::Spectra(_), Some(Damping::Fitted)) => {
             let error = || {
-                let error = Error::new("no curve of one mode goes through the highest peak").in_file("--damping");
+                let error =
+                    Error::new("the response of a single mode does not fit the highest peak").in_file("--damping");
                 error.next("give a damping ratio, such as --damping 0.1")
             };
             Some(mode.ok_or_else(error)?.damping)
@@ -270,7 +271,7 @@ fn measured(args: &Question, files: &[PathBuf], file: &Path) -> Result<Source> {
     let axis = args.axis.unwrap_or(Axis::All);
     let spectrum = Spectrum::by(&read_accelerometer(file)?, axis, args.firmware);
     if spectrum.greatest() <= 0.0 {
-        let error = Error::new(format!("there is no vibration along {} from 5 to 200 Hz", axis.word())).in_file(file);
+        let error = Error::new(format!("no vibration along {} from 5 to 200 Hz", axis.word())).in_file(file);
         return Err(error.next("choose another axis, or leave --axis out"));
     }
     Ok(Source::Spectrum(spectrum))
@@ -320,7 +321,7 @@ impl Found {
             best.shaper.form.name()
         );
         Some(match self.choice.is_pair_better {
-            true => format!("better, one behind the other: {told}; Klipper has no pairs, [controller] of a case has"),
+            true => format!("better in series: {told}; Klipper has no pairs, but [controller] of a case has"),
             false => format!("no pair is clearly better: {told}"),
         })
     }

@@ -131,7 +131,7 @@ fn accepted(best: Option<Solution>) -> Result<Solution> {
             None => "the Riccati equation has no stabilising solution".into(),
         })
         .allowed(format!("a residual of up to {ACCURACY:e}"))
-        .next("something that has no weight, or that the command does not reach, does not die out: give it a weight")),
+        .next("a state without weight, or that the command does not affect, does not decay: give it a weight")),
     }
 }
 

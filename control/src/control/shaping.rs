@@ -73,7 +73,7 @@ pub fn choose(target: Target<'_>, criterion: &Criterion) -> Result<Choice> {
             return Err(error);
         }
         let limit = rounded(criterion.max_smoothing.unwrap_or_default() * 1e3);
-        let error = Error::new(format!("no shaper has so little smoothing as {limit} mm"));
+        let error = Error::new(format!("no shaper has a smoothing of at most {limit} mm"));
         return Err(error.next("allow more smoothing, or more kinds of shapers"));
     };
     let recommended = match criterion.firmware {

@@ -47,7 +47,7 @@ pub fn worst(
     stop: &dyn Fn() -> bool,
 ) -> Result<Option<Worst>> {
     if !(share > 0.0 && share < 1.0) {
-        return Err(Error::new(format!("parameters cannot be off by a share of {share:?}"))
+        return Err(Error::new(format!("a relative error of parameters cannot be {share:?}"))
             .allowed("above 0, below 1")
             .next("write 0.2 for 20 %"));
     }

@@ -146,7 +146,7 @@ fn numbers(question: &Question) -> Result<()> {
     let frequency = |value: f64| value > 0.0 && value.is_finite();
     let wrong = |option: &str, value: Option<f64>, good: fn(f64) -> bool, allowed: &str| {
         let value = value.filter(|value| !good(*value));
-        value.map(|value| Error::new(format!("{value:?} is of no use here")).in_file(option).allowed(allowed))
+        value.map(|value| Error::new(format!("{value:?} is not allowed here")).in_file(option).allowed(allowed))
     };
     let found = wrong("--speed", speed, finite, "a finite number, in m/s")
         .or_else(|| wrong("--at", at, finite, "a finite number, in m"))

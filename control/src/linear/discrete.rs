@@ -70,23 +70,20 @@ impl StateSpace {
         let t = sample_time;
         let allowed = |what: String, allowed: &str| Err(Error::new(what).allowed(allowed));
         if !(t > 0.0 && t.is_finite()) {
-            return allowed(format!("a sample time of {t} s is none"), "above zero");
+            return allowed(format!("a sample time of {t} s is invalid"), "above zero");
         }
         if !(0.0..=MOST_DELAY * t).contains(&delay) {
             return allowed(format!("an input cannot be late by {delay} s"), "from 0 to 100 sample times");
         }
         if delay > 0.0 && hold != Hold::Zero {
             return allowed(
-                "a late input needs one that stands between samples".into(),
+                "a delay requires an input that is held between samples".into(),
                 "a zero-order hold with a delay",
             );
         }
         let n = self.a.nrows();
         if n == 0 {
-            return allowed(
-                "nothing is left to move, and so nothing to sample".into(),
-                "a stage of which a body moves",
-            );
+            return allowed("no body can move, so there is nothing to sample".into(), "a stage of which a body moves");
         }
         let (a, b, c, scale) = self.balanced();
         let (change, input, output, direct) = match hold {

@@ -44,11 +44,14 @@ fn damping_of_modes(machine: &Machine, plant: &Mechanism) -> Vec<String> {
         friction.law != Law::Coulomb || friction.forward.viscous != friction.backward.viscous
     };
     if plant.held_bodies().any(is_curved) {
-        words.push("the modes' damping has of friction the viscous part of forward motion; the poles have all".into());
+        words.push(
+            "the damping of the modes has only the viscous friction of forward motion; the poles have all friction"
+                .into(),
+        );
     }
     let is_sluggish = |unit: &DriveUnit| unit.amplifier.mode == AmplifierMode::Voltage && unit.motor.inductance != 0.0;
     if machine.drives.iter().any(is_sluggish) {
-        words.push("the modes' damping leaves out motors with an inductance; the poles have them".into());
+        words.push("the damping of the modes does not include motors with an inductance; the poles do".into());
     }
     words
 }
@@ -82,7 +85,7 @@ fn forces(machine: &Machine, plant: &Mechanism, operation: Operation, moving: &[
     }
     if machine.slides().any(|slide| slide.constant_force() != 0.0) {
         let who = if machine.bridge.is_some() { "bridge or cart" } else { "the cart" };
-        words.push(format!("the constant force on {who} changes where the machine is, not how it swings"));
+        words.push(format!("the constant force on {who} changes the position of the machine, not its vibration"));
     }
     words
 }
@@ -151,13 +154,13 @@ fn sliding(plant: &Mechanism, operation: Operation, moving: &[usize]) -> Option<
         false => format!("at {}", engineering_typed(operation.speed.abs(), "m/s", 4)),
     };
     Some(match (holds.is_empty(), operation.speed == 0.0) {
-        _ if moving.is_empty() => "nothing is left to move but the current and the rotor".into(),
+        _ if moving.is_empty() => "only the current and the rotor can move".into(),
         (true, true) => "linearised at rest: nothing sticks".into(),
         (true, false) if curve => format!("linearised while it moves {way} {pace}"),
-        (true, false) => "linear as it stands: nothing sticks".into(),
+        (true, false) => "linear without assumptions: nothing sticks".into(),
         (false, true) => format!(
-            "at rest this stage sticks: dry friction holds {}, and what is held answers no input; \
-             linearised instead while everything slides {way}, {pace}; --stuck takes who is held out",
+            "at rest this stage sticks: dry friction holds {}, which then do not respond to inputs; linearised instead \
+             while everything slides {way}, {pace}; --stuck leaves them out",
             holds.join(", ")
         ),
         (false, false) => {

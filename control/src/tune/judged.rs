@@ -13,7 +13,7 @@ use crate::design::Design;
 pub struct Verdict {
     /// The controller.
     pub design: Design,
-    /// Its margins on the axis as it is taken for.
+    /// Its margins on the nominal axis.
     pub nominal: Margins,
     /// The axis on which its sensitivity is furthest beyond its limits, or nearest to them, once the bad end is left
     /// out.
@@ -35,7 +35,7 @@ pub struct Verdict {
 pub struct MoveVerdict {
     /// Its name.
     pub name: String,
-    /// x − y on the axis as it is taken for.
+    /// x − y on the nominal axis.
     pub cart: Deviation,
     /// Until the cart settles, s, if it does.
     pub settling: Option<f64>,

@@ -165,7 +165,7 @@ pub fn tune(case: &Case, tuning: &Tuning, stop: &dyn Fn() -> bool) -> Result<Tun
     let (finalists, placed) = work.screened(design, is_good)?;
     let Some(best) = finalists.first() else {
         return Err(Error::new(format!(
-            "no gains of this structure that were tried keep Ms within {} and Mt within {} over the family",
+            "none of the tried gains of this structure keeps Ms within {} and Mt within {} over the family",
             tuning.sensitivity, tuning.complementary
         ))
         .next(match without_derivative(case, design) {
@@ -214,7 +214,7 @@ fn beginning<'a>(case: &'a Case, tuning: &Tuning) -> Result<(&'a Design, Family,
     if !EFFORTS.contains(&tuning.effort) {
         let (least, most) = (EFFORTS.start(), EFFORTS.end());
         return Err(
-            Error::new(format!("an effort of {} cannot be", tuning.effort)).allowed(format!("from {least} to {most}"))
+            Error::new(format!("an effort of {} is invalid", tuning.effort)).allowed(format!("from {least} to {most}"))
         );
     }
     Ok((design, Family::of(case, tuning)?, moves::of(case, design)?))

@@ -86,8 +86,8 @@ pub fn trouble(machine: &Machine, design: &Design, run: &MoveRun, motion: &Move)
     let cause = cause(machine, design, kind, frequency, at);
     let place = frequency.map_or(String::new(), |hertz| format!(" at {hertz:.1} Hz"));
     let what = match kind {
-        Kind::Unstable => format!("the loop is unstable and swings{place}"),
-        Kind::Saturated if frequency.is_some() => format!("the command is saturated and swings{place}"),
+        Kind::Unstable => format!("the loop is unstable and oscillates{place}"),
+        Kind::Saturated if frequency.is_some() => format!("the command is saturated and oscillates{place}"),
         Kind::Saturated => "the command is saturated".into(),
         Kind::Howling => format!("the loop howls{place}"),
     };

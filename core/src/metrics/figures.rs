@@ -170,7 +170,7 @@ pub static FIGURES: &[FigureRow] = &[
         .on_an_axis("peak_motor_current", "peak motor current"),
     row(Whole, "lost_steps", "", "full steps lost at the end", |m, _| Number(m.stepper.map_or(f64::NAN, |own| own.lost_steps as f64))).of_steppers(),
     row(Whole, "in_step", "", "in step all the way", |m, _| Flag(m.stepper.is_some_and(|own| own.slips == 0))).of_steppers(),
-    row(Whole, "position_error", "m", "position told minus cart at the end", |m, _| Number(m.stepper.map_or(f64::NAN, |own| own.position_error)))
+    row(Whole, "position_error", "m", "commanded minus cart position at the end", |m, _| Number(m.stepper.map_or(f64::NAN, |own| own.position_error)))
         .of_steppers(),
     row(Whole, "stop_time", "s", "time of the last stop", |m, _| Number(m.stop_time.unwrap_or(f64::NAN))).seeking(Seek::StopTime),
     row(Whole, "settled", "", "at rest at the end", |m, _| Flag(m.settled)),

@@ -356,7 +356,7 @@ fn numbers(machine: &Machine, key: &str, free: &[&str]) -> Result<(Vec<Number>, 
             let what = if row.field.accessor().is_some() {
                 "is of a single axis, and this is a gantry"
             } else {
-                "is no number of the machine"
+                "is not a number of the machine"
             };
             return Err(of_gantries(machine, Error::new(format!("`{key}` {what}"))));
         }
@@ -366,7 +366,7 @@ fn numbers(machine: &Machine, key: &str, free: &[&str]) -> Result<(Vec<Number>, 
             ));
         }
         Sits::Elsewhere => {
-            return Err(Error::new(format!("`{key}` is no number of the machine"))
+            return Err(Error::new(format!("`{key}` is not a number of the machine"))
                 .allowed("numbers of motor, amplifier, pulleys, cart, belt, travel and encoder")
                 .next("name one of them as --set does, such as cart.mass or cart.friction.viscous"));
         }
@@ -431,7 +431,7 @@ fn limits(
 }
 
 fn unknown(machine: &Machine, key: &str) -> Error {
-    let error = Error::new(format!("`{key}` is no parameter of the machine"));
+    let error = Error::new(format!("`{key}` is not a parameter of the machine"));
     let whole = |row: &Parameter| machine.sits(row).listed().is_some_and(|(list, _)| list.has_whole());
     let whole = all().filter(|row| whole(row)).map(|row| row.key.to_string());
     let known: Vec<String> = whole.chain(values(machine).into_iter().map(|(key, _)| key)).collect();

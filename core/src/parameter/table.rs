@@ -166,7 +166,7 @@ macro_rules! friction {
                 Value(0.0),
                 NOT_NEGATIVE,
                 $load_example,
-                "Coulomb friction: what resists at any speed.",
+                "Coulomb friction: friction that does not depend on speed.",
             )
             .at(of_friction!($body, |f| Some(f.forward.coulomb), |f, value| set_coulomb(f, true, value)))
             .off(concat!($whose, " dry friction"))
@@ -178,7 +178,7 @@ macro_rules! friction {
                 Words("as `coulomb`, on each side"),
                 NOT_NEGATIVE,
                 $static_example,
-                "Breakaway: what it holds at rest before it slides; at least `coulomb`.",
+                "Breakaway: largest friction at rest; at least `coulomb`.",
             )
             .at(of_friction!($body, |f| breakaway(f, true), |f, value| f.forward.breakaway = value))
             .off(concat!($whose, " dry friction"))
@@ -239,7 +239,7 @@ macro_rules! friction {
                 Words("from `velocity`"),
                 POSITIVE,
                 $decay_example,
-                "How fast that excess is gone: e^(−F_τ v²), eq. (14); 1 / velocity².",
+                "Decay of that excess with speed: e^(−F_τ v²), eq. (14); 1 / velocity².",
             )
             .at(of_friction!($body, |f| stribeck_decay(f), |f, value| set_stribeck_decay(f, value))
                 .form(concat!($key, ".friction.stribeck.velocity"))),
@@ -250,7 +250,7 @@ macro_rules! friction {
                 Words("from `decay`"),
                 POSITIVE,
                 $velocity_example,
-                "Speed at which 1/e of it is left. With `shape = \"exponential\"` it goes as e^(−v/v_s), else as e^(−(v/v_s)²).",
+                "Speed at which 1/e of that is left. With `shape = \"exponential\"` it goes as e^(−v/v_s), else as e^(−(v/v_s)²).",
             )
             .at(of_friction!($body, |f| stribeck_velocity(f), |f, value| set_stribeck_velocity(f, value)))
             .off(concat!($whose, " Stribeck velocity")),
@@ -272,7 +272,7 @@ macro_rules! friction {
                 Required,
                 POSITIVE,
                 $stiffness_example,
-                "Stiffness of the bristles, which hold where others stick.",
+                "Stiffness of the bristles, which replace sticking.",
             )
             .at(of_law!($body, LuGre, stiffness))
             .off(concat!($whose, " bristles' stiffness")),
@@ -294,7 +294,7 @@ macro_rules! friction {
                 Required,
                 POSITIVE,
                 $velocity_example,
-                "Stribeck velocity of the way from `static` to `coulomb`.",
+                "Stribeck velocity of the transition from `static` to `coulomb`.",
             )
             .at(of_law!($body, LuGre, velocity))
             .off(concat!($whose, " Stribeck velocity")),
@@ -325,7 +325,7 @@ macro_rules! pulley {
                 Required,
                 POSITIVE,
                 "38.3 mm",
-                "Outer diameter of the hollow cylinder that stands for the pulley.",
+                "Outer diameter of the hollow cylinder that represents the pulley.",
             )
             .at(Field::PartOf(concat!(stringify!($body), ".inertia"))),
             row(
@@ -383,7 +383,7 @@ macro_rules! channel {
                 Words("not clipped"),
                 POSITIVE,
                 $range,
-                "Greatest absolute value that the converter gives; at least `step`.",
+                "Largest magnitude that the converter outputs; at least `step`.",
             ),
         ]
     };
@@ -403,35 +403,35 @@ const MOTOR: &[Parameter] = &[
         .at(motor!(rotor_inertia)).off("rotor inertia").part(Sum::Inertia, Gear(2)),
     row("motor.gear_ratio", "n", "", Value(1.0), Range::new(1e-6, 1e6), "5.9", "Motor turns per turn of the drive pulley.")
         .at(motor!(gear_ratio)),
-    row("motor.gear_efficiency", "η", "", Value(1.0), UP_TO_ONE, "0.73", "The part of the power that passes the gear, whichever side drives.")
+    row("motor.gear_efficiency", "η", "", Value(1.0), UP_TO_ONE, "0.73", "Share of the power that the gear transmits, whichever side drives.")
         .at(of_drive!(motor, |m| (m.gear_play.is_none() && is_brushed(m)).then_some(m.gear_efficiency), |m, value| m.gear_efficiency = value)),
-    row("motor.backlash", "2α", "rad", Value(0.0), Range { below: true, ..Range::new(0.0, 6.3) }, "0.5 deg", "Play of the gear: by how much the drive pulley can turn while the rotor stands. Needs `gear_stiffness`.")
+    row("motor.backlash", "2α", "rad", Value(0.0), Range { below: true, ..Range::new(0.0, 6.3) }, "0.5 deg", "Backlash of the gear: angle by which the drive pulley can turn while the rotor stands still. Needs `gear_stiffness`.")
         .at(motor!(play backlash)).off("gear's backlash"),
     row("motor.gear_stiffness", "k_g", "N m/rad", Words("stiff"), POSITIVE, "300 N m/rad", "Stiffness of the gear between rotor and drive pulley, at the pulley; makes the rotor an inertia of its own.")
         .at(motor!(play stiffness)).off("gear's stiffness"),
     row("motor.gear_damping", "c_g", "N m s/rad", Value(0.0), NOT_NEGATIVE, "0.01 N m s", "Damping of the gear where its flanks touch, at the pulley.")
         .at(motor!(play damping)).off("gear's damping"),
-    row("motor.speed_constant", "K_v", "rad/s/V", Words("not used with both constants"), POSITIVE, "190 rpm/V", "Speed per volt without load: K_t = K_e = 1/K_v, as far as these are not given themselves."),
-    row("motor.rated.voltage", "V_n", "V", Required, POSITIVE, "24 V", "Voltage of the rating, from which K_t, K_e and `resistance` follow as far as they are not given themselves."),
+    row("motor.speed_constant", "K_v", "rad/s/V", Words("not used with both constants"), POSITIVE, "190 rpm/V", "Speed per volt without load: K_t = K_e = 1/K_v, unless these are given."),
+    row("motor.rated.voltage", "V_n", "V", Required, POSITIVE, "24 V", "Rated voltage; K_t, K_e and `resistance` follow from the rating unless they are given."),
     row("motor.rated.speed", "ω_n", "rad/s", Required, POSITIVE, "3000 rpm", "Speed under the rated load."),
     row("motor.rated.torque", "M_n", "N m", Required, POSITIVE, "0.32 N m", "Rated torque, at the motor's own shaft."),
     row("motor.rated.current", "I_n", "A", Required, POSITIVE, "5.5 A", "Current at that torque."),
-    row("motor.rated.no_load_current", "I_0", "A", Value(0.0), NOT_NEGATIVE, "0.4 A", "Current without load, which turns the motor itself."),
+    row("motor.rated.no_load_current", "I_0", "A", Value(0.0), NOT_NEGATIVE, "0.4 A", "Current without load, which overcomes the motor's own friction."),
 ];
 
 #[rustfmt::skip]
 const DRIVE: &[Parameter] = &[
-    row("drive.force_per_input", "k_F", "N/V", Required, POSITIVE, "0.65 N/V", "Force at the belt per unit of input; where inputs are counts, a count stands for a volt.")
+    row("drive.force_per_input", "k_F", "N/V", Required, POSITIVE, "0.65 N/V", "Force at the belt per unit of input; if inputs are counts, a count counts as a volt.")
         .at(of_simple!(force)).off("motor constants"),
-    row("drive.drag", "d", "N s/m", Value(0.0), NOT_NEGATIVE, "12 N s/m", "Force per speed that the drive takes away: back-EMF, and what brakes with the motor.")
+    row("drive.drag", "d", "N s/m", Value(0.0), NOT_NEGATIVE, "12 N s/m", "Braking force of the drive per speed: back-EMF and friction of the motor.")
         .at(of_simple!(drag)).off("drag"),
 ];
 
 #[rustfmt::skip]
 const AMPLIFIER: &[Parameter] = &[
-    row("amplifier.gain", "", "", Value(1.0), ANY, "1", "Output, V or A, per unit of input; negative where the wires are swapped.")
+    row("amplifier.gain", "", "", Value(1.0), ANY, "1", "Output, V or A, per unit of input; negative if the wires are swapped.")
         .at(of_drive!(amplifier, |a| is_amplifier(a).then_some(a.gain), |a, value| a.gain = if is_amplifier(a) { value } else { a.gain })),
-    row("amplifier.voltage_limit", "V_max", "V", Words("none"), POSITIVE, "24 V", "Largest voltage at the motor's terminals, either way.")
+    row("amplifier.voltage_limit", "V_max", "V", Words("none"), POSITIVE, "24 V", "Largest voltage at the motor's terminals, in either direction.")
         .at(amplifier!(voltage_limit)),
     row("amplifier.current_limit", "I_max", "A", Words("none"), POSITIVE, "12 A", "Largest current, either way.")
         .at(amplifier!(current_limit)),
@@ -451,9 +451,9 @@ const STEPPER: &[Parameter] = &[
         .at(stepper!(motor resistance)).off("resistance"),
     row("stepper.inductance", "L", "H", Required, POSITIVE, "3 mH", "Inductance of a phase.")
         .at(stepper!(motor inductance)).off("inductance"),
-    row("stepper.supply", "V", "V", Required, POSITIVE, "24 V", "Voltage of the driver's supply: the most that a phase gets, either way.")
+    row("stepper.supply", "V", "V", Required, POSITIVE, "24 V", "Voltage of the driver's supply: largest voltage of a phase, in either direction.")
         .at(of_drive!(amplifier, |a| a.voltage_limit.filter(|_| !is_amplifier(a)), |a, value| if !is_amplifier(a) { a.voltage_limit = Some(value) })),
-    row("stepper.microsteps", "", "", Value(1.0), Range::whole(1.0, 1024.0), "16", "Microsteps per full step: the field goes in these.")
+    row("stepper.microsteps", "", "", Value(1.0), Range::whole(1.0, 1024.0), "16", "Microsteps per full step.")
         .at(stepper!(microsteps)),
     row("stepper.detent_torque", "T_d", "N m", Value(0.0), NOT_NEGATIVE, "15 mN m", "Amplitude of the torque without current, four periods per tooth pitch; below a quarter of the holding torque.")
         .at(stepper!(detent_torque)).off("detent torque"),
@@ -484,7 +484,8 @@ const CART: &[Parameter] = &[
 #[rustfmt::skip]
 const BELT: &[Parameter] = &[
     row("belt.stiffness", "k₁ k₂ k₃", "N/m", Words("from `modulus`, `section` and `spans`"), POSITIVE, "132.76 kN/m",
-        "Stiffness of each span: drive pulley to cart, cart to idler pulley, and the way back. Three values in a list.")
+        "Stiffness of each span: drive pulley to cart, cart to idler pulley, idler pulley to drive pulley. Three \
+         values in a list.")
         .at(Field::of(Of::Span, |s, span| stiffness(&s.belt, span), |s, span, value| s.belt.stiffness[span] = value))
         .off("belt's stiffness").part(Sum::Stiffness, One),
     row("belt.modulus", "E", "Pa", Words("not used with `stiffness`"), POSITIVE, "8.335 GPa",
@@ -507,8 +508,8 @@ const BELT: &[Parameter] = &[
         "Force per unit strain, C_spez of catalogues, instead of modulus and section; in N/m, N/mm it is that per width, and `width` goes with it.")
         .at(make!(Machine, |belt| belt.sheet.is_specific, |make, _| make.modulus)).off("belt's stiffness"),
     row("belt.width", "b", "m", Words("needed with `type`, or a stiffness per width"), POSITIVE, "10 mm", "Width of the belt."),
-    row("belt.mass_per_length", "", "kg/m", Words("of the `type`, or unknown"), POSITIVE, "0.03 kg/m", "Mass per length; not in the equations, `taut show` says what its share is."),
-    row("belt.allowed_tension", "F_zul", "N", Words("of the `type`, or unknown"), POSITIVE, "560 N", "Tension that the belt may have; `taut show` says what is left of it."),
+    row("belt.mass_per_length", "", "kg/m", Words("of the `type`, or unknown"), POSITIVE, "0.03 kg/m", "Mass per length; not in the equations, but `taut show` reports its share."),
+    row("belt.allowed_tension", "F_zul", "N", Words("of the `type`, or unknown"), POSITIVE, "560 N", "Allowed tension of the belt; `taut show` reports the safety."),
     row("belt.spans", "l₁ l₂ l₃", "m", Words("not used with `stiffness`"), POSITIVE, "0.34925 m", "Length of each span. Three values in a list.")
         .at(make!(Span, |_belt| true, |make, span| make.spans[span])),
     row("belt.damping", "c₁ c₂ c₃", "N s/m", Value(0.0), NOT_NEGATIVE, "0 N s/m", "Damping of each span, parallel to its stiffness. Three values in a list.")
@@ -520,7 +521,7 @@ const BELT: &[Parameter] = &[
     row("belt.loss_factor", "η", "", Words("not used with `damping`"), Range { below: true, ..Range::new(0.0, 2.0) }, "0.04",
         "Loss factor of the belt at that mode: η = 2 ζ.")
         .at(Field::PartOf("belt.damping")),
-    row("belt.pretension", "T₀", "N", Words("none: spans can push"), POSITIVE, "50 N", "Tension of every span at rest; a span whose tension is used up goes slack and carries nothing.")
+    row("belt.pretension", "T₀", "N", Words("none: spans can push"), POSITIVE, "50 N", "Tension of every span at rest; a span without tension is slack and carries no force.")
         .at(Field::number(|s, _| s.belt.pretension, |s, _, value| s.belt.pretension = s.belt.pretension.map(|_| value))).off("belt's pretension"),
 ];
 
@@ -538,21 +539,21 @@ const TRAVEL: &[Parameter] = &[
 
 #[rustfmt::skip]
 const ALONG: &[Parameter] = &[
-    row("cart.friction.along.position", "x", "m", Required, ANY, "0.1 m", "First number of each point of `along`: where along the travel, growing from point to point.")
+    row("cart.friction.along.position", "x", "m", Required, ANY, "0.1 m", "First number of each point of `along`: position along the travel, increasing.")
         .at(points!(0, |s| s.cart.along)),
-    row("cart.friction.along.factor", "", "", Required, NOT_NEGATIVE, "1.5", "Second number: what Coulomb friction, breakaway and `stribeck.force` are multiplied by there; straight lines between points.")
+    row("cart.friction.along.factor", "", "", Required, NOT_NEGATIVE, "1.5", "Second number: factor on Coulomb friction, breakaway and `stribeck.force` there; linear between points.")
         .at(points!(1, |s| s.cart.along)),
 ];
 
 #[rustfmt::skip]
 const FORCES: &[Parameter] = &[
-    row("cart.force_along.position", "x", "m", Required, ANY, "0.1 m", "First number of each point of `force_along`: where along the travel, growing from point to point.")
+    row("cart.force_along.position", "x", "m", Required, ANY, "0.1 m", "First number of each point of `force_along`: position along the travel, increasing.")
         .at(points!(0, |s| s.cart.forces.along)),
-    row("cart.force_along.force", "F_x", "N", Required, ANY, "1.5 N", "Second number: force on the cart there, whichever way it goes, positive towards larger x; straight lines between points.")
+    row("cart.force_along.force", "F_x", "N", Required, ANY, "1.5 N", "Second number: force on the cart there in either direction of motion, positive towards larger x; linear between points.")
         .at(points!(1, |s| s.cart.forces.along)),
-    row("cart.force_by_speed.speed", "v", "m/s", Required, ANY, "0.1 m/s", "First number of each point of `force_by_speed`: speed of the cart, growing from point to point.")
+    row("cart.force_by_speed.speed", "v", "m/s", Required, ANY, "0.1 m/s", "First number of each point of `force_by_speed`: speed of the cart, increasing.")
         .at(points!(0, |s| s.cart.forces.by_speed)),
-    row("cart.force_by_speed.force", "F_v", "N", Required, ANY, "-1.5 N", "Second number: force on the cart at that speed, positive towards larger x; straight lines between points.")
+    row("cart.force_by_speed.force", "F_v", "N", Required, ANY, "-1.5 N", "Second number: force on the cart at that speed, positive towards larger x; linear between points.")
         .at(points!(1, |s| s.cart.forces.by_speed)),
 ];
 
@@ -575,9 +576,9 @@ const SCALE: &[Parameter] = &[
 #[rustfmt::skip]
 const MEASUREMENT: &[Parameter] = &[
     row("measurement.every", "", "s", Words("the experiment's `every`"), DURATION, "1 ms", "Interval between samples."),
-    row("measurement.delay", "", "s", Value(0.0), TIME, "2 ms", "The row of time t shows what was at t minus this."),
+    row("measurement.delay", "", "s", Value(0.0), TIME, "2 ms", "Delay of the recorded value: the row of time t shows the value at t minus this."),
     row("measurement.jitter", "", "s", Value(0.0), TIME, "20 us", "Standard deviation of a sample's instant; at most a quarter of the interval."),
-    row("measurement.seed", "", "", Value(1.0), SEED, "1", "Which noise and jitter; the same seed gives the same ones."),
+    row("measurement.seed", "", "", Value(1.0), SEED, "1", "Seed of noise and jitter; the same seed gives the same ones."),
 ];
 
 #[rustfmt::skip]
@@ -588,9 +589,9 @@ const EXPERIMENT: &[Parameter] = &[
 
 #[rustfmt::skip]
 const FIT: &[Parameter] = &[
-    row("fit.starts", "", "", Value(1.0), Range::whole(1.0, 1000.0), "8", "From how many points the search starts: that of the file, and others within the bounds."),
+    row("fit.starts", "", "", Value(1.0), Range::whole(1.0, 1000.0), "8", "Number of points from which the search starts: the values of the file, and others within the bounds."),
     row("fit.seed", "", "", Value(1.0), SEED, "1", "Which other points."),
-    row("fit.until", "", "s", Words("all of each log"), DURATION, "8 s", "Time in each log after which it is only compared, not fitted."),
+    row("fit.until", "", "s", Words("all of each log"), DURATION, "8 s", "Time in each log from which on it is compared, but not fitted."),
     row("fit.windows", "", "s", Words("each log is one"), DURATION, "1 s", "Length of the windows into which logs are cut, each but the first of a log with a start of its own."),
 ];
 
@@ -610,7 +611,7 @@ const INITIAL: &[Parameter] = &[
     row("experiment.initial.cart_speed", "x′", "m/s", Value(0.0), ANY, "0 m/s", "Its speed."),
     row("experiment.initial.idler_angle", "φ₃", "rad", Value(0.0), ANY, "0 rad", "Angle of the idler pulley at time zero."),
     row("experiment.initial.idler_speed", "φ₃′", "rad/s", Value(0.0), ANY, "0 rad/s", "Its speed."),
-    row("experiment.initial.motor_current", "i", "A", Value(0.0), ANY, "0 A", "Armature current at time zero; only where it does not follow at once: with an inductance, or in current mode with a bandwidth."),
+    row("experiment.initial.motor_current", "i", "A", Value(0.0), ANY, "0 A", "Armature current at time zero; only if it does not follow at once: with an inductance, or in current mode with a bandwidth."),
 ];
 
 #[rustfmt::skip]
@@ -663,7 +664,7 @@ const INPUTS: &[Parameter] = &[
     row("input.sine.frequency", "", "Hz", Required, FREQUENCY, "2 Hz", "Periods per second."),
     row("input.sine.phase", "", "rad", Value(0.0), Range::new(-1e6, 1e6), "90 deg", "Phase at time zero."),
     row("input.sine.offset", "", INPUT, Value(0.0), ANY, "0 V", "Added to the sine."),
-    row("input.chirp", "", INPUT, Required, ANY, "2 V", "Peak of a sine whose frequency moves evenly; zero when it is over."),
+    row("input.chirp", "", INPUT, Required, ANY, "2 V", "Peak of a sine whose frequency changes linearly; zero afterwards."),
     row("input.chirp.from", "", "Hz", Required, Range::new(0.0, 1e9), "1 Hz", "Frequency at the beginning."),
     row("input.chirp.to", "", "Hz", Required, Range::new(0.0, 1e9), "300 Hz", "Frequency at the end."),
     row("input.chirp.over", "", "s", Required, DURATION, "10 s", "How long it takes."),
@@ -671,13 +672,13 @@ const INPUTS: &[Parameter] = &[
     row("input.multisine.frequencies", "", "Hz", Words("from `from`, `to` and `tones`"), FREQUENCY, "1 Hz", "Frequencies in a list, at most 1000."),
     row("input.multisine.from", "", "Hz", Words("not used with `frequencies`"), FREQUENCY, "1 Hz", "Lowest frequency."),
     row("input.multisine.to", "", "Hz", Words("not used with `frequencies`"), FREQUENCY, "50 Hz", "Highest frequency."),
-    row("input.multisine.tones", "", "", Words("not used with `frequencies`"), Range::whole(2.0, 1000.0), "50", "How many sines, equally spaced in frequency."),
+    row("input.multisine.tones", "", "", Words("not used with `frequencies`"), Range::whole(2.0, 1000.0), "50", "Number of sines, equally spaced in frequency."),
     row("input.prbs", "", INPUT, Required, ANY, "3 V", "Height of a pseudo-random binary sequence, which jumps between plus and minus this."),
     row("input.prbs.bit", "", "s", Required, DURATION, "20 ms", "Shortest time between jumps."),
-    row("input.prbs.seed", "", "", Value(1.0), SEED, "1", "Which sequence; the same seed gives the same one."),
-    row("input.point.time", "", "s", Required, TIME, "0.1 s", "First number of each point of a `table`, growing from point to point."),
-    row("input.point.value", "", INPUT, Required, ANY, "5 V", "Second number of each point; straight lines between points, the last one held."),
-    row("input.element.lasts", "", "s", Words("as long as a `pulse`, `ramp`, `chirp`, `table` or `file` takes"), DURATION, "1 s", "How long an element of a `sequence` has its turn."),
+    row("input.prbs.seed", "", "", Value(1.0), SEED, "1", "Seed of the sequence; the same seed gives the same one."),
+    row("input.point.time", "", "s", Required, TIME, "0.1 s", "First number of each point of a `table`, increasing."),
+    row("input.point.value", "", INPUT, Required, ANY, "5 V", "Second number of each point; linear between points, the last one held."),
+    row("input.element.lasts", "", "s", Words("as long as a `pulse`, `ramp`, `chirp`, `table` or `file` takes"), DURATION, "1 s", "Duration of an element of a `sequence`."),
 ];
 
 #[rustfmt::skip]
@@ -691,24 +692,24 @@ const CONTROLLER: &[Parameter] = &[
     row("controller.pid.filter", "", "Hz", Value(200.0), FREQUENCY, "200 Hz", "Corner of the derivative's filter, of first order.").held(gain!(Pid.filter, Tuned::Corner("controller.pid.derivative"))),
     row("controller.pid.reference_speed", "c", "", Value(1.0), Range::new(0.0, 10.0), "0", "Weight of the reference's speed in the derivative: 1 differentiates the error, 0 the measurement alone.").held(gain!(Pid.reference_speed, Tuned::No)),
     row("controller.pid.tracking", "", "s", Value(0.05), DURATION, "50 ms", "Time in which the integral follows a command that is limited (anti-windup).").held(gain!(Pid.tracking, Tuned::No)),
-    row("controller.cascade.position", "K_v", "rad/s", Required, NOT_NEGATIVE, "60 rad/s", "Speed asked for per error of position.").held(gain!(Cascade.position, Tuned::Gain)),
+    row("controller.cascade.position", "K_v", "rad/s", Required, NOT_NEGATIVE, "60 rad/s", "Commanded speed per error of position.").held(gain!(Cascade.position, Tuned::Gain)),
     row("controller.cascade.speed", "", "V s/m or A s/m", Required, ANY, "30 V s/m", "Command per error of speed; with a current loop the current.").held(gain!(Cascade.speed, Tuned::Gain)),
     row("controller.cascade.speed_integral", "", "V/m or A/m", Value(0.0), ANY, "1 V/mm", "Command per integral of that; with a current loop the current.").held(gain!(Cascade.speed_integral, Tuned::Gain)),
     row("controller.cascade.filter", "", "Hz", Value(200.0), FREQUENCY, "200 Hz", "Corner of the filter of the measured speed, of first order.").held(gain!(Cascade.filter, Tuned::Corner("controller.cascade.speed"))),
-    row("controller.cascade.reference_speed", "c", "", Value(1.0), Range::new(0.0, 10.0), "0", "Weight of the reference's speed in the speed that is asked for; 0 where the drive feeds none forward.").held(gain!(Cascade.reference_speed, Tuned::No)),
-    row("controller.cascade.tracking", "", "s", Value(0.02), DURATION, "20 ms", "Time in which the integrals follow what is limited.").held(gain!(Cascade.tracking, Tuned::No)),
+    row("controller.cascade.reference_speed", "c", "", Value(1.0), Range::new(0.0, 10.0), "0", "Weight of the reference's speed in the commanded speed; 0 if the drive does not feed it forward.").held(gain!(Cascade.reference_speed, Tuned::No)),
+    row("controller.cascade.tracking", "", "s", Value(0.02), DURATION, "20 ms", "Time in which the integrals follow a limited command or current.").held(gain!(Cascade.tracking, Tuned::No)),
     row("controller.cascade.current.proportional", "", "V/A", Required, ANY, "0.3 V/A", "Voltage per error of current.").held(gain!(Cascade.current?.proportional, Tuned::Gain)),
     row("controller.cascade.current.integral", "", "V/(A s)", Value(0.0), ANY, "200 V/(A s)", "Voltage per integral of that.").held(gain!(Cascade.current?.integral, Tuned::Gain)),
     row("controller.cascade.current.limit", "", "A", Words("none"), POSITIVE, "10 A", "Largest current asked for.").held(gain!(Cascade.current?.limit, Tuned::No)),
     row("controller.state_feedback.position", "", "m", Required, POSITIVE, "0.1 mm", "Error of the cart's position that weighs as much as `command`.").held(gain!(StateFeedback.position, Tuned::Gain)),
     row("controller.state_feedback.speed", "", "m/s", Words("no weight"), POSITIVE, "0.1 m/s", "The same of its speed.").held(gain!(StateFeedback.speed, Tuned::Gain)),
-    row("controller.state_feedback.integral", "", "m s", Words("no integral"), POSITIVE, "5e-6 m s", "The same of the integral of the measured error: makes it LQI.").held(gain!(StateFeedback.integral, Tuned::Gain)),
+    row("controller.state_feedback.integral", "", "m s", Words("no integral"), POSITIVE, "5e-6 m s", "Integral of the measured error that weighs as much: makes it LQI.").held(gain!(StateFeedback.integral, Tuned::Gain)),
     row("controller.state_feedback.command", "", INPUT, Required, POSITIVE, "5 V", "Command that weighs as much as each of these.").held(gain!(StateFeedback.command, Tuned::No)),
     row("controller.state_feedback.disturbance", "", INPUT, Required, POSITIVE, "1 V", "Standard deviation of an unknown command, and of a force on the cart as large, that the Kalman filter expects at each sample.").held(gain!(StateFeedback.disturbance, Tuned::Gain)),
     row("controller.state_feedback.noise", "", "m", Value(0.0), NOT_NEGATIVE, "5 um", "Standard deviation of a measured position; at least 0.3 counts are taken.").held(gain!(StateFeedback.noise, Tuned::No)),
-    row("controller.sliding_mode.bandwidth", "λ", "rad/s", Required, POSITIVE, "60 rad/s", "How fast the error dies out on the sliding surface ė + λ e = 0.").held(gain!(SlidingMode.bandwidth, Tuned::No)),
+    row("controller.sliding_mode.bandwidth", "λ", "rad/s", Required, POSITIVE, "60 rad/s", "Decay rate of the error on the sliding surface ė + λ e = 0.").held(gain!(SlidingMode.bandwidth, Tuned::No)),
     row("controller.sliding_mode.reaching", "K", "m/s^2", Required, POSITIVE, "4 m/s^2", "Acceleration that drives to the surface.").held(gain!(SlidingMode.reaching, Tuned::No)),
-    row("controller.sliding_mode.boundary", "Φ", "m/s", Required, POSITIVE, "0.05 m/s", "Boundary layer: distance from the surface below which only a share of it does.").held(gain!(SlidingMode.boundary, Tuned::No)),
+    row("controller.sliding_mode.boundary", "Φ", "m/s", Required, POSITIVE, "0.05 m/s", "Boundary layer: distance from the surface within which `reaching` acts in proportion.").held(gain!(SlidingMode.boundary, Tuned::No)),
     row("controller.sliding_mode.integral", "", "s^-2", Value(0.0), NOT_NEGATIVE, "900 s^-2", "Weight of the error's integral in the surface.").held(gain!(SlidingMode.integral, Tuned::No)),
     row("controller.sliding_mode.filter", "", "Hz", Value(200.0), FREQUENCY, "200 Hz", "Corner of the filter of the measured speed, of first order.").held(gain!(SlidingMode.filter, Tuned::No)),
     row("controller.fuzzy.error", "", "m", Required, POSITIVE, "2 mm", "Error at the outermost sets.").held(gain!(Fuzzy.error, Tuned::No)),
@@ -717,54 +718,54 @@ const CONTROLLER: &[Parameter] = &[
     row("controller.fuzzy.slope", "", "V/s or A/s", Words("none with `command`"), POSITIVE, "100 V/s", "Change of the command of a rule of 1: makes it PI."),
     row("controller.fuzzy.rule", "", "", Required, Range::new(-1.0, 1.0), "0.5", "Each value in `rules`."),
     row("controller.fuzzy.filter", "", "Hz", Value(200.0), FREQUENCY, "200 Hz", "Corner of the filter of the rate, of first order.").held(gain!(Fuzzy.filter, Tuned::No)),
-    row("controller.feed_forward.inertia", "", "", Value(1.0), Range::new(0.0, 2.0), "1", "Share of the inertia's part that is fed forward."),
-    row("controller.feed_forward.friction", "", "", Value(1.0), Range::new(0.0, 2.0), "0.8", "Share of the friction's."),
-    row("controller.feed_forward.lead", "", "s", Words("the delay and half a sample"), TIME, "1 ms", "How far ahead of a sample it looks."),
-    row("controller.disturbance_observer.bandwidth", "", "Hz", Required, FREQUENCY, "10 Hz", "Its three poles."),
-    row("controller.filters.notch", "", "Hz", Words("one of these two"), FREQUENCY, "180 Hz", "Frequency that a notch takes out of the command."),
-    row("controller.filters.low_pass", "", "Hz", Words("one of these two"), FREQUENCY, "300 Hz", "Frequency above which a low-pass of second order takes out everything."),
-    row("controller.filters.damping", "ζ_p", "", Value(0.7), Range { above: true, ..Range::new(0.0, 10.0) }, "0.7", "Damping of the filter's poles: the more, the wider a notch."),
+    row("controller.feed_forward.inertia", "", "", Value(1.0), Range::new(0.0, 2.0), "1", "Share of the inertial force that is fed forward."),
+    row("controller.feed_forward.friction", "", "", Value(1.0), Range::new(0.0, 2.0), "0.8", "Share of the friction that is fed forward."),
+    row("controller.feed_forward.lead", "", "s", Words("the delay and half a sample"), TIME, "1 ms", "Time ahead of the sample at which the reference is evaluated."),
+    row("controller.disturbance_observer.bandwidth", "", "Hz", Required, FREQUENCY, "10 Hz", "Frequency of its three poles."),
+    row("controller.filters.notch", "", "Hz", Words("one of these two"), FREQUENCY, "180 Hz", "Frequency that a notch removes from the command."),
+    row("controller.filters.low_pass", "", "Hz", Words("one of these two"), FREQUENCY, "300 Hz", "Corner frequency of a low-pass of second order."),
+    row("controller.filters.damping", "ζ_p", "", Value(0.7), Range { above: true, ..Range::new(0.0, 10.0) }, "0.7", "Damping of the filter's poles; a larger value widens a notch."),
     row("controller.filters.depth", "ζ_z", "", Value(0.05), Range::new(0.0, 10.0), "0.05", "Damping of a notch's zeros: its gain there is depth over damping."),
-    row("controller.shaper.time", "", "s", Required, TIME, "2.8 ms", "First number of each impulse of `shaper`, growing from impulse to impulse."),
-    row("controller.shaper.amplitude", "", "", Required, Range::new(-10.0, 10.0), "0.5", "Second number; together they are 1."),
+    row("controller.shaper.time", "", "s", Required, TIME, "2.8 ms", "First number of each impulse of `shaper`, increasing."),
+    row("controller.shaper.amplitude", "", "", Required, Range::new(-10.0, 10.0), "0.5", "Second number; their sum is 1."),
 ];
 
 #[rustfmt::skip]
 const TUNE: &[Parameter] = &[
-    row("tune.bandwidth", "", "Hz", Words("one that suits the axis"), FREQUENCY, "8 Hz", "Bandwidth that the gains are placed for, and from which a search begins."),
-    row("tune.damping", "ζ", "", Value(0.8), Range { above: true, ..Range::new(0.0, 10.0) }, "0.8", "Damping ratio that they are placed for."),
-    row("tune.sensitivity", "M_s", "", Value(1.8), Range { above: true, ..Range::new(1.0, 100.0) }, "1.6", "Largest magnitude that the sensitivity 1/(1 + L) may have; 1.6 is careful, 2 is bold."),
-    row("tune.complementary", "M_t", "", Value(1.8), Range { above: true, ..Range::new(1.0, 100.0) }, "1.5", "The same of L/(1 + L)."),
-    row("tune.spread", "", "", Words("what a fit says, or 0.2"), Range { below: true, ..Range::new(0.0, 1.0) }, "20 %", "Share by which each parameter of the axis can be off."),
+    row("tune.bandwidth", "", "Hz", Words("one that suits the axis"), FREQUENCY, "8 Hz", "Bandwidth for which the gains are placed, and from which a search begins."),
+    row("tune.damping", "ζ", "", Value(0.8), Range { above: true, ..Range::new(0.0, 10.0) }, "0.8", "Damping ratio for which they are placed."),
+    row("tune.sensitivity", "M_s", "", Value(1.8), Range { above: true, ..Range::new(1.0, 100.0) }, "1.6", "Largest allowed magnitude of the sensitivity 1/(1 + L); 1.6 is cautious, 2 is bold."),
+    row("tune.complementary", "M_t", "", Value(1.8), Range { above: true, ..Range::new(1.0, 100.0) }, "1.5", "Largest allowed magnitude of the complementary sensitivity L/(1 + L)."),
+    row("tune.spread", "", "", Words("uncertainty of a fit, or 0.2"), Range { below: true, ..Range::new(0.0, 1.0) }, "20 %", "Relative uncertainty of each parameter of the axis."),
     row("tune.load", "", "kg", Value(0.0), Range::new(0.0, 1e6), "0.5 kg", "Each value of `load`: a mass that is added to the cart."),
-    row("tune.places", "", "", Value(7.0), Range::whole(1.0, 1000.0), "7", "Places along the travel that are looked at."),
+    row("tune.places", "", "", Value(7.0), Range::whole(1.0, 1000.0), "7", "Number of positions along the travel that are evaluated."),
 ];
 
 #[rustfmt::skip]
 const SWEEP: &[Parameter] = &[
-    row("sweep.runs", "N", "", Words("required where machines are drawn"), Range::whole(1.0, 1e12), "100000", "How many machines are run; `grid` and `one-at-a-time` say it themselves."),
-    row("sweep.seed", "", "", Value(1.0), SEED, "1", "Which draws; the same seed gives the same ones."),
+    row("sweep.runs", "N", "", Words("required where machines are drawn"), Range::whole(1.0, 1e12), "100000", "Number of machines; `grid` and `one-at-a-time` determine it."),
+    row("sweep.seed", "", "", Value(1.0), SEED, "1", "Seed of the draws; the same seed gives the same ones."),
     row("sweep.interval", "", "s", Words("the experiment's `every`"), DURATION, "1 ms", "Interval between the rows of `--trajectories`; figures do not depend on it."),
 ];
 
 #[rustfmt::skip]
 const MOVE: &[Parameter] = &[
-    row("move.from", "", "m", Value(0.0), ANY, "0 mm", "Where the cart stands at time zero; of a gantry a list: bridge, cart."),
-    row("move.to", "", "m", Words("`points` or `gcode` instead"), ANY, "50 mm", "Where it goes; of a gantry a list: bridge, cart."),
+    row("move.from", "", "m", Value(0.0), ANY, "0 mm", "Position of the cart at time zero; for a gantry a list: bridge, cart."),
+    row("move.to", "", "m", Words("`points` or `gcode` instead"), ANY, "50 mm", "Target of the cart; for a gantry a list: bridge, cart."),
     row("move.speed", "", "m/s", Words("`plan` instead"), POSITIVE, "0.4 m/s", "Largest speed, along the path of a gantry."),
     row("move.acceleration", "", "m/s^2", Words("`plan` instead"), POSITIVE, "5 m/s^2", "Largest acceleration."),
     row("move.jerk", "", "m/s^3", Words("none: a trapezoid"), POSITIVE, "200 m/s^3", "Largest jerk."),
     row("move.snap", "", "m/s^4", Words("none: third order"), POSITIVE, "20000 m/s^4", "Largest snap; only with `jerk`."),
     row("move.plan.speed", "", "m/s", Words("what the machine allows"), POSITIVE, "0.5 m/s", "Largest speed of a move that is planned."),
     row("move.plan.acceleration", "", "m/s^2", Words("what the machine allows"), POSITIVE, "20 m/s^2", "Largest acceleration."),
-    row("move.plan.jerk", "", "m/s^3", Words("what the jerk time asks for"), POSITIVE, "500 m/s^3", "Largest jerk."),
-    row("move.plan.reserve", "", "", Value(0.1), RESERVE, "20 %", "Share of voltage and current that is left to the loop."),
+    row("move.plan.jerk", "", "m/s^3", Words("what the jerk time requires"), POSITIVE, "500 m/s^3", "Largest jerk."),
+    row("move.plan.reserve", "", "", Value(0.1), RESERVE, "20 %", "Share of voltage and current that is reserved for the loop."),
     row("move.until", "", "s", Required, DURATION, "1 s", "End of the run."),
     row("move.every", "", "s", Words("the controller's `every`"), DURATION, "1 ms", "Interval between the rows of the result, the last of which is at the end; it affects neither accuracy nor figures."),
-    row("move.window", "", "m", Value(1e-4), POSITIVE, "50 um", "How near its target the cart counts as settled."),
+    row("move.window", "", "m", Value(1e-4), POSITIVE, "50 um", "Distance from its target within which the cart counts as settled."),
     row("move.points.to", "", "m", Required, ANY, "50 mm", "Each point of a list, or its `to`."),
-    row("move.points.center", "", "m", Words("a straight leg"), ANY, "20 mm", "Centre of an arc to the point, of a gantry a list: bridge, cart; counterclockwise unless `clockwise = true`."),
-    row("move.points.speed", "", "m/s", Words("the move's"), POSITIVE, "0.1 m/s", "Largest speed on the way there."),
+    row("move.points.center", "", "m", Words("a straight leg"), ANY, "20 mm", "Centre of an arc to the point, for a gantry a list: bridge, cart; counterclockwise unless `clockwise = true`."),
+    row("move.points.speed", "", "m/s", Words("the move's"), POSITIVE, "0.1 m/s", "Largest speed towards this point."),
     row("move.points.wait", "", "s", Value(0.0), TIME, "0.2 s", "How long it stands there."),
 ];
 

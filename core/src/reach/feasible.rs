@@ -300,8 +300,8 @@ fn of_breakaway(machine: &Machine, limit: Option<f64>, number: usize, instants: 
     instants.iter().find_map(|at| {
         let side = direction(&at.y);
         let needed = machine.breakaway(number, side, at.y.position);
-        let gives = if machine.movers(number).count() == 1 { "the motor gives" } else { "the motors give" };
-        let words = || format!("to break away takes {}; {gives} {}", told(needed, "N"), told(force, "N"));
+        let provides = if machine.movers(number).count() == 1 { "the motor provides" } else { "the motors provide" };
+        let words = || format!("breakaway requires {}; {provides} {}", told(needed, "N"), told(force, "N"));
         (side != 0.0 && needed > force).then(|| at.beyond("breakaway", [needed, force], "N", words()))
     })
 }

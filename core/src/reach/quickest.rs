@@ -51,7 +51,7 @@ impl Wanted {
         let limits = [("speed", self.speed), ("acceleration", self.acceleration), ("jerk", self.jerk)];
         for (name, value) in limits {
             if let Some(value) = value.filter(|value| !(*value > 0.0 && value.is_finite())) {
-                return Err(Error::new(format!("{value} is no limit of {name}")).allowed("above 0"));
+                return Err(Error::new(format!("{value} is not a valid limit of {name}")).allowed("above 0"));
             }
         }
         match (0.0..=0.9).contains(&self.reserve) {

@@ -135,17 +135,17 @@ pub fn machine(machine: &Machine) -> Result<()> {
 pub(super) fn piecewise_linear(mechanism: &Mechanism) -> Result<()> {
     let mut bodies = mechanism.bodies.iter();
     let what = if let Some(body) = bodies.find(|body| !body.friction.is_piecewise_linear()) {
-        format!("the friction law of the {} is no straight line", body.label.name)
+        format!("the friction law of the {} is not linear", body.label.name)
     } else if let Some(body) = mechanism.bodies.iter().find(|body| body.along.is_some()) {
         format!("the {}'s friction changes along the travel", body.label.name)
     } else if mechanism.springs.iter().any(|spring| spring.follows.is_some()) {
         "the belt's spans follow the cart".into()
     } else if mechanism.drives.iter().any(|drive| drive.motor.stepper.is_some()) {
-        "the torque of a stepper goes with the sine of its angle".into()
+        "the torque of a stepper depends on the sine of its angle".into()
     } else {
         return Ok(());
     };
-    Err(Error::new(format!("{what}: this solver does not take it"))
+    Err(Error::new(format!("{what}: this solver does not support it"))
         .next("leave --solver out, or write --solver general: it takes all of these"))
 }
 
@@ -266,7 +266,8 @@ pub(super) fn experiment(mechanism: &Mechanism, experiment: &Experiment) -> Resu
             let (own, wanted) = (values[body], mechanism.ratio(body) * values[leader]);
             if (own - wanted).abs() > 1e-9 * wanted.abs() {
                 return Err(Error::new(format!(
-                    "in this model of the belt {} and {} move as one, and do not begin so: {own} instead of {wanted}",
+                    "in this belt model {} and {} move together, but their initial values disagree: {own} instead of \
+                     {wanted}",
                     mechanism.bodies[body].label.name, mechanism.bodies[leader].label.name
                 ))
                 .allowed("positions and speeds at the start that fit: x = r φ₁ = r φ₃"));

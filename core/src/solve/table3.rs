@@ -149,7 +149,8 @@ impl<'a> Model<'a> {
             let law = mechanism.friction(body);
             if law.forward != law.backward || law.forward.breakaway != law.forward.coulomb {
                 return Err(unfit(format!(
-                    "the paper's Table 3 does not know the friction of the {}: it has directions or a breakaway of its own",
+                    "the paper's Table 3 does not support the friction of the {}: it has directions or a breakaway of \
+                     its own",
                     mechanism.bodies[body].label.name
                 )));
             }
@@ -157,10 +158,10 @@ impl<'a> Model<'a> {
             coulomb[body] = law.forward.coulomb;
         }
         if machine.drives[0].motor.gear_efficiency < 1.0 {
-            return Err(unfit("the paper's Table 3 does not know a gear efficiency below 1".into()));
+            return Err(unfit("the paper's Table 3 does not support a gear efficiency below 1".into()));
         }
         if let Some(part) = machine.beyond_the_paper() {
-            return Err(unfit(format!("the paper's Table 3 does not know {part}")));
+            return Err(unfit(format!("the paper's Table 3 does not support {part}")));
         }
         let free = Mode::of([]);
         let equations = mechanism.equations(free);

@@ -42,7 +42,7 @@ pub(super) fn program(design: &Design, model: &Machine) -> Result<Program> {
     let current = c.input("current".into(), "measured motor current, A".into());
     let seen = Observation { time: 0.0, reference: now, ahead, position, scale: None, current };
     let asked = text.step(c, &seen);
-    c.remark("what is no number asks for nothing; then the limit");
+    c.remark("a command that is not a number is taken as zero; then the limit");
     let (zero, most) = (c.number(0.0), f64::from(f32::MAX));
     let low = c.choose(more(asked, most), zero, asked);
     let finite = c.choose(at_least(asked, -most), low, zero);
@@ -52,7 +52,7 @@ pub(super) fn program(design: &Design, model: &Machine) -> Result<Program> {
     }
     text.limited(c, given);
     writer.finish(given, "given").map_err(|value| {
-        Error::new(format!("a constant of this controller is {value}, which no program can hold"))
+        Error::new(format!("a constant of this controller is {value}, not a finite number"))
             .next("give the belt a stiffness that is finite, or take a simpler feed-forward")
     })
 }

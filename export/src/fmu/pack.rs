@@ -30,7 +30,7 @@ pub fn object_in(folders: &[PathBuf]) -> Result<Vec<u8>> {
     let age = |path: &PathBuf| path.metadata().and_then(|data| data.modified()).ok();
     let found = paths.filter(|path| path.is_file()).max_by_key(age);
     let path = found.ok_or_else(|| {
-        Error::new("this build of taut carries no shared object for FMUs")
+        Error::new("this build of taut contains no shared object for FMUs")
             .next("build it with `cargo build --release --bin taut`, with its feature fmu, from the whole repository")
     })?;
     std::fs::read(&path).map_err(|e| Error::new(e.to_string()).in_file(path))

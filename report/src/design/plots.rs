@@ -24,5 +24,5 @@ pub fn figure(case: &Case, found: &Designed) -> Result<Figure> {
                 .horizontal(to + free, ""),
         )
         .panel(Panel::new(Axis::new("Current", "A")).series(line(column("motor_current"), Colour::Ink)))
-        .caption("On the machine of the case, with the way that the cart may take."))
+        .caption("On the machine of the case, with the travel available to the cart."))
 }

@@ -328,7 +328,7 @@ pub fn histogram(drawn: &Posterior, j: usize, estimate: Option<&Estimate>) -> Op
         .panel(panel)
         .vertical(from, "2.5 %")
         .vertical(to, "97.5 %")
-        .caption("How the draws are spread, and the normal distribution that the fit stands for.");
+        .caption("Distribution of the draws, and the normal distribution of the fit.");
     Some(figure)
 }
 

@@ -45,7 +45,7 @@ pub fn crooked(profiles: &[Profile]) -> Vec<&str> {
 /// How the search ended, in a sentence.
 pub fn ending(fit: &Fit) -> String {
     if fit.estimates.is_empty() && fit.ending == Ending::Converged {
-        return "nothing is searched for: the errors of the case as it is".into();
+        return "no search: errors of the case as it is".into();
     }
     let mut text = match fit.ending {
         Ending::Converged if !fit.is_converged() => {

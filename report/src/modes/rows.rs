@@ -121,7 +121,7 @@ pub fn elastic(mechanism: &Mechanism, modes: &Natural, mode: &ElasticMode) -> [S
             time(root),
             plain(root.damped_hertz().unwrap_or(0.0))
         ),
-        _ => "damped so much that not every mode swings".into(),
+        _ => "damped so much that not every mode oscillates".into(),
     };
     let name = |body: usize| mechanism.bodies[body].label.name;
     let bodies = || modes.bodies.iter().copied();

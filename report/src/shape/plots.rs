@@ -57,9 +57,9 @@ fn shaped(one: &Found, title: String, spectrum: &Spectrum) -> Figure {
         .panel(responses(one, f, &one.criterion.tested))
         .vertical(best.shaper.frequency, "")
         .caption(format!(
-            "Above the spectrum as measured and behind each shaper, below the part of the vibration that each leaves, both at the \
-             worst of the damping ratios that are looked at. Recommended: {} at {:.1} Hz, the solid line; the vertical line is its \
-             frequency.",
+            "Above the spectrum as measured and behind each shaper, below the part of the vibration that each leaves, \
+             both at the worst of the evaluated damping ratios. Recommended: {} at {:.1} Hz, the solid line; the \
+             vertical line is its frequency.",
             best.shaper.form.name(),
             best.shaper.frequency
         ))

@@ -26,7 +26,7 @@ pub fn figures(overview: &Overview) -> Vec<Named> {
         .panel(frequencies)
         .panel(stretch)
         .caption(
-            "Natural frequencies without damping, and by how much the cart gives way per force, the drive pulley held.",
+            "Natural frequencies without damping, and displacement of the cart per force, with the drive pulley held.",
         );
     vec![("travel", figure)]
 }

@@ -111,12 +111,16 @@ pub fn figures(case: &Case, run: &Run) -> Vec<(&'static str, Figure)> {
 pub fn way(case: &Case, run: &Run) -> Option<Plane> {
     let (y, x) = run.curves.as_ref()?.way()?;
     let millimetres = |name: &str| Axis::new(name, "m").shown_as("mm", 1e3);
-    let mut plane = Plane::new(format!("{}: path", run.experiment.name), millimetres("Cart y"), millimetres("Bridge x"))
-        .path(Series::new("", y, x).colour(Colour::Blue))
-        .caption(
-            "The way of the cart in the plane, at one scale for both directions and seen as the drawing is: x upward, y to the right. \
-             It begins at the open circle.",
-        );
+    let mut plane = Plane::new(
+        format!("{}: path", run.experiment.name),
+        millimetres("Cart y"),
+        millimetres("Bridge x"),
+    )
+    .path(Series::new("", y, x).colour(Colour::Blue))
+    .caption(
+        "Path of the cart in the plane, at one scale for both directions and oriented as the drawing: x upward, y \
+             to the right. It begins at the open circle.",
+    );
     if let (Some(bridge), Some(cart)) = (case.machine.first_slide().travel, case.machine.cart.travel) {
         plane = plane.bounds((cart.min, cart.max), (bridge.min, bridge.max));
         plane.caption += " The dotted frame is the travel of both.";

@@ -261,7 +261,7 @@ pub fn hidden(name: &str, outcome: &Outcome) -> Option<String> {
         ),
         false => {
             let [off, way] = [error.value, error.way].map(|length| value(length, "m"));
-            format!("positions of the run \"{name}\" may be off by {off}, and it moves by no more than {way}")
+            format!("positions of the run \"{name}\" may be wrong by {off}, and its motion is at most {way}")
         }
     };
     Some(format!(

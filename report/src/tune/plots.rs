@@ -33,7 +33,7 @@ pub fn figures(work: &Work) -> Result<Vec<(String, Figure)>> {
     Ok(figures)
 }
 
-/// L and |S| of the loop before and after, on the axis as it is taken for and on the worst.
+/// L and |S| of the loop before and after, on the nominal axis and on the worst.
 fn frequency(work: &Work) -> Result<Vec<Named>> {
     let tuned = work.tuned;
     let nominal = tuned.family.nominal();
@@ -99,7 +99,7 @@ fn frequency(work: &Work) -> Result<Vec<Named>> {
     ])
 }
 
-/// Magnitude and phase of L before and after on the axis as it is taken for, with the crossover after and the modes
+/// Magnitude and phase of L before and after on the nominal axis, with the crossover after and the modes
 /// along the travel marked.
 fn bode(work: &Work) -> Result<Figure> {
     let tuned = work.tuned;
@@ -161,7 +161,7 @@ fn of_slide(machine: &Machine, name: &str, key: &str) -> String {
     if machine.geometry().slides.len() > 1 { format!("{name}, {key}") } else { name.to_string() }
 }
 
-/// The loops before and after on the axis as it is taken for, those alone that are stable.
+/// The loops before and after on the nominal axis, those alone that are stable.
 fn ways(work: &Work) -> Result<Vec<Way>> {
     let nominal = work.tuned.family.nominal();
     let both = [("before", &work.tuned.before, Colour::Amber), ("after", &work.tuned.after, Colour::Blue)];

@@ -97,8 +97,9 @@ pub fn margins(before: &Margins, after: &Margins) -> Vec<Row> {
     };
     type Shown<'a> = Box<dyn Fn(&Margins) -> String + 'a>;
     let peak = |value: f64| if value.is_finite() { format!("{value:.3}") } else { "not stable".into() };
-    let top =
-        |m: &Margins| if m.stable { format!(" at {}", hertz(m.at)) } else { format!(", swings at {}", hertz(m.at)) };
+    let top = |m: &Margins| {
+        if m.stable { format!(" at {}", hertz(m.at)) } else { format!(", oscillates at {}", hertz(m.at)) }
+    };
     let rows: [(&str, Shown); 7] = [
         (
             "Ms",
@@ -275,14 +276,14 @@ pub fn given(work: &Work) -> Option<String> {
     let (nominal, worst) = (&before.nominal, &before.worst);
     let mut told = Vec::new();
     if !nominal.stable {
-        told.push(format!("not stable on the axis as it is taken for, swinging at {}", hertz(nominal.at)));
+        told.push(format!("not stable on the nominal axis, oscillating at {}", hertz(nominal.at)));
     } else if nominal.excess(tuning.sensitivity, tuning.complementary) > 1.0 {
         let (ms, gain) = (nominal.sensitivity, nominal.gain);
         let peak = match nominal.complementary > tuning.complementary && ms <= tuning.sensitivity {
             true => format!("Mt {:.3}", nominal.complementary),
             false => format!("Ms {ms:.3}"),
         };
-        told.push(format!("{peak}, gain margin {gain:.2} on the axis as it is taken for"));
+        told.push(format!("{peak}, gain margin {gain:.2} on the nominal axis"));
     }
     if worst.stable {
         let axis = numbered(work, place(work, &before.corner));

@@ -365,7 +365,7 @@ impl Channel {
             let what = match output {
                 Some(output) if output.quantity.is_position() => "an end stop, or the end of its sensor",
                 Some(_) => "the limit of its sensor, perhaps",
-                None => "it was limited there, and what was logged may not be what the motor had",
+                None => "it was limited there, and the motor may have received another value than the logged one",
             };
             let reached = if output.is_some() { ", reached abruptly" } else { "" };
             note(
@@ -410,7 +410,11 @@ impl Channel {
                     "{n} samples stand out from their neighbours; the first is {is} at {at}, where {expected} would be usual"
                 ),
             };
-            note("outliers", Severity::Warning, format!("{text}; a robust fit (loss = \"huber\") minds them less"));
+            note(
+                "outliers",
+                Severity::Warning,
+                format!("{text}; a robust fit (loss = \"huber\") is less sensitive to them"),
+            );
         }
         if let Some(step) = self.step
             && output.is_some()

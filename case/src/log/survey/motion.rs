@@ -187,8 +187,8 @@ impl Motion {
             n => format!(" and in {n} more"),
         };
         let text = format!(
-            "it moves, or its input changes, in the gap of {} after {}{others}, and a fit would go on as if nothing had been fed in but \
-             what was before it: cut the log there, with from and to",
+            "it moves, or its input changes, in the gap of {} after {}{others}, and a fit would assume that the input \
+             before the gap lasted through it: cut the log there, with from and to",
             shown(first.length, "s"),
             shown(first.at, "s")
         );

@@ -325,7 +325,7 @@ fn ratio_note(ratio: f64, base: &Output, other: &Output, stage: &Machine, what: 
             };
             let radius = shown(stage.pulley_radius, "m");
             let text =
-                format!("it goes {factor} what {other} says of the same {what}, with a pulley of {radius}: {next}");
+                format!("it goes {factor} what {other} reports for the same {what}, with a pulley of {radius}: {next}");
             note("unit", text, Remedy::Ratio(b, o, ratio))
         }
     }
@@ -546,7 +546,8 @@ fn direction(log: &Log, stage: &Machine, motion: &Motion) -> Option<Note> {
     }
     let name = motion.quantity.name();
     let text = format!(
-        "it moves against its input (correlation of input and speed {correlation:.2}): swapped wires, or a sign; say scale = {{ {name} = -1 }}, or a negative amplifier.gain"
+        "it moves against its input (correlation of input and speed {correlation:.2}): swapped wires, or a sign; set \
+         scale = {{ {name} = -1 }}, or a negative amplifier.gain"
     );
     Some(Note::new("sign", Severity::Suspicion, text).on(name).mended_by(Remedy::Reverse))
 }

@@ -54,7 +54,7 @@ const MOST_KNOWN: usize = 256;
 /// Rejects an invalid tolerance, and a run of too many steps.
 pub(super) fn check(fastest: f64, until: f64, tolerance: f64) -> Result<()> {
     if !(1e-14..=1e-2).contains(&tolerance) {
-        return Err(Error::new(format!("a tolerance of {tolerance:e} is of no use"))
+        return Err(Error::new(format!("a tolerance of {tolerance:e} is invalid"))
             .allowed("from 1e-14 to 0.01")
             .next("take 1e-9, the default"));
     }

@@ -143,7 +143,7 @@ pub fn compare(
         );
     }
     if let Some(window) = setting.windows.iter().flatten().find(|window| !(**window > 0.0 && window.is_finite())) {
-        return Err(Error::new(format!("{window} s is no length of windows")).allowed("above zero"));
+        return Err(Error::new(format!("{window} s is not a length of windows")).allowed("above zero"));
     }
     let parts = Parts::new(case, plan);
     if parts.folds.len() < 2 {
@@ -330,7 +330,7 @@ impl Course<'_> {
         let quantities = self.rank();
         let Some(best) = self.tried.first().filter(|tried| tried.candidate.held_out.is_finite()) else {
             let why = self.tried.iter().find_map(|tried| tried.candidate.failed.clone()).unwrap_or_default();
-            return Err(Error::new(format!("no law of friction gets through the parts of these logs: {why}"))
+            return Err(Error::new(format!("no friction law can be run through the blocks of these logs: {why}"))
                 .next("run `taut fit` with one law to see why"));
         };
         let best = best.candidate.squares.clone();

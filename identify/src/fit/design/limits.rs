@@ -79,7 +79,7 @@ impl Limits {
         let machine = machine.map(|limit| (limit / amplifier.gain.abs(), Origin::Machine));
         let asked = |value: Option<f64>| value.map(|value| (value, Origin::Asked));
         let input = asked(request.input).or(machine).or_else(|| most(|one| one.input)).ok_or_else(|| {
-            Error::new("nothing limits the input: the amplifier has no limit and the case no experiment")
+            Error::new("the input is unlimited: the amplifier has no limit, and the case no experiment")
                 .next("say how large it may get with --amplitude, or give amplifier.voltage_limit or current_limit")
         })?;
         if let (Some((limit, _)), Some(asked)) = (machine, request.input)

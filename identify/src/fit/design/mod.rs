@@ -197,7 +197,7 @@ impl<'a> Task<'a> {
         let named = request.names.iter().map(|name| {
             all.iter()
                 .position(|own| own == name || own.split(" = ").any(|key| key == name))
-                .ok_or_else(|| Error::new(format!("`{name}` is no parameter of this fit")).allowed(all.join(", ")))
+                .ok_or_else(|| Error::new(format!("`{name}` is not a parameter of this fit")).allowed(all.join(", ")))
         });
         let mut wanted = named.collect::<Result<Vec<_>>>()?;
         if wanted.is_empty() {

@@ -174,7 +174,7 @@ fn nothing(task: &Task) -> Error {
         false => "no input was found that stays within the limits and moves the cart",
     };
     Error::new(what).next(
-        "look with `taut simulate` whether the axis moves at all within its limits; allow more with --travel, \
+        "check with `taut simulate` that the axis moves within its limits; allow more with --travel, \
          --amplitude or --current, or a smaller --margin",
     )
 }

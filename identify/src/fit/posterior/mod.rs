@@ -70,13 +70,13 @@ pub struct Credible {
 /// not determined, priors outside the bounds.
 pub fn posterior(case: &Case, plan: &Plan, fit: &Fit, effort: Effort, watch: &Watch) -> Result<Posterior> {
     if matches!(fit.ending, Ending::Interrupted | Ending::Failed) {
-        return Err(Error::new("draws begin at a fit that has ended, and this one has not").next("fit it again"));
+        return Err(Error::new("draws start from a fit that has ended, and this one has not").next("fit it again"));
     }
     if !plan.separate.is_empty() {
         return Err(crate::case::draws_are_of_one_machine());
     }
     if fit.estimates.is_empty() {
-        return Err(Error::new("nothing is searched for").next("add free = [\"cart.mass\"] to [fit]"));
+        return Err(Error::new("there are no free parameters").next("add free = [\"cart.mass\"] to [fit]"));
     }
     refuse_undetermined(fit)?;
     let mut problem = Problem::new(case, plan)?;
@@ -84,7 +84,7 @@ pub fn posterior(case: &Case, plan: &Plan, fit: &Fit, effort: Effort, watch: &Wa
     let mut bounds = problem.bounds();
     let at = fit.point.clone();
     let mut residuals = vec![0.0; problem.rows()];
-    let failed = || Error::new("the model does not get through these logs at the fit");
+    let failed = || Error::new("the model cannot be run through these logs at the fit");
     if at.len() != problem.variables() || !problem.evaluate(&at, &mut residuals) {
         return Err(failed());
     }

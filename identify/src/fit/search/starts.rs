@@ -74,7 +74,7 @@ pub(crate) fn search_as_far<'a>(
     let start = first_guess(case, plan, &mut problem, &mut descend)?;
     let mut best = descend(&mut problem, &start, &whole);
     if best.ending == Ending::Failed {
-        return Err(Error::new("the model does not get through these logs with the values of the case file")
+        return Err(Error::new("the model cannot be run through these logs with the values of the case file")
             .next("run `taut simulate` on the case to see why, or start from other values"));
     }
     let mut starts = vec![best.cost];

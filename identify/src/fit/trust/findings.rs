@@ -53,8 +53,8 @@ fn of_logs(case: &Case, plan: &Plan, found: &Searched, surveys: &[Survey]) -> Ve
         if !told && is_opposite(&found.problem, name) && is_borne_out(case, plan, found, name, &Remedy::Reverse) {
             let inputs = case.machine.geometry().drives.iter().map(|drive| format!("{} = -1", drive.input));
             let text = format!(
-                "it moves against what the model does with the values of the case: swapped wires, or a sign; say \
-                 scale = {{ {} }}, or -1 for the outputs",
+                "it moves opposite to the model with the values of the case: swapped wires, or a sign; set scale = {{ \
+                 {} }}, or -1 for the outputs",
                 inputs.collect::<Vec<_>>().join(", ")
             );
             all.push(Finding { grade: Grade::Warning, code: "sign", log: Some(name.clone()), text });
@@ -136,7 +136,7 @@ fn of_noise(found: &Searched) -> Option<Finding> {
     };
     let beyond: Vec<String> = found.noise.iter().filter_map(beyond).collect();
     let text = format!(
-        "residuals are more than the noise of the logs ({}): the model lacks something, or the search ended in one of \
+        "residuals exceed the noise of the logs ({}): the model lacks something, or the search ended in one of \
          several minima; try starts = 8 in [fit], or begin with values nearer to the machine's",
         beyond.join(", ")
     );
@@ -221,7 +221,7 @@ fn of_search(fit: &Fit) -> Vec<Finding> {
     let waves = fit.waves.iter().filter(|wave| fit.cause.is_none() && share(wave) >= CAUSE_EXPLAINS);
     for Wave { quantity, length, amplitude } in waves {
         let text = format!(
-            "{}: its error repeats with position, by ±{} every {}; the intervals are widened by what that moves",
+            "{}: its error repeats with position, by ±{} every {}; the intervals are widened by its effect",
             quantity.name(),
             engineering(*amplitude, quantity.unit(), 2).replace('\u{a0}', " "),
             plain(*length, quantity.unit())
@@ -279,8 +279,8 @@ fn constants(at: &DriveAt, motor: &Motor, given: &DriveUnit) -> Option<Finding> 
         return None;
     }
     let text = format!(
-        "{}K_t = {} and K_e = {} are one number of one motor in SI units, and here {} times apart: tie them, or check what else \
-         brakes or drives (the gain, the resistance, friction)",
+        "{}K_t = {} and K_e = {} of one motor are equal in SI units, and here differ by a factor of {}: tie them, or \
+         check what else brakes or drives (the gain, the resistance, friction)",
         if at.key.is_empty() { String::new() } else { format!("{}: ", at.label.name) },
         plain(k_t, "N m/A"),
         plain(k_e, "V s/rad"),
@@ -306,8 +306,8 @@ fn of_residuals(case: &Case, plan: &Plan, found: &Searched, fit: &Fit, others: &
             continue;
         }
         let reason = unexplained::reason(case, plan, found, quantity, &names).unwrap_or_else(|| {
-            "neither windows nor a factor on it or on the input mends that: check signs, columns and units of this log, \
-             and missing parts of the model"
+            "neither windows nor a factor on it or on the input explains that: check signs, columns and units of this \
+             log, and missing parts of the model"
                 .into()
         });
         all.extend(own.into_iter().map(|(name, score)| {

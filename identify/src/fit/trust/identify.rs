@@ -181,8 +181,8 @@ impl Identifiability {
         let names: Vec<&str> = members.iter().map(|&j| self.names[j].as_str()).collect();
         if determined == 0 {
             return match names[..] {
-                [one] => format!("{one} does not show in these logs"),
-                _ => format!("{} do not show in these logs", listed(&names)),
+                [one] => format!("{one} has no visible effect in these logs"),
+                _ => format!("{} have no visible effect in these logs", listed(&names)),
             };
         }
         let parameters = members.iter().all(|&j| j < problem.parameters.len());

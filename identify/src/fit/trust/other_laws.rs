@@ -162,7 +162,7 @@ impl Candidate {
                 if amplitude > 0.0 { "greater" } else { "less" }
             ),
             Kind::Drift => format!(
-                "friction of the {whose} that {} by {} % from the begin of each log to its end",
+                "friction of the {whose} that {} by {} % from the beginning of each log to its end",
                 if amplitude > 0.0 { "rises" } else { "falls" },
                 percent(200.0 * amplitude.abs())
             ),

@@ -45,7 +45,7 @@ fn shift(case: &Case, plan: &Plan, found: &Searched, name: &str) -> Option<Note>
     let by = engineering_typed(rows.unsigned_abs() as f64 * run.interval(), "s", 3);
     let early = if rows > 0 { "early" } else { "late" };
     let text = format!(
-        "it is logged {by} too {early}: the outputs answer it as if it stood {} rows {} in the file; record both with one \
+        "it is logged {by} too {early}: the outputs respond as if it were {} rows {} in the file; record both with one \
          clock, or shift the column",
         rows.unsigned_abs(),
         if rows > 0 { "further down" } else { "further up" }

@@ -144,7 +144,7 @@ impl Judged {
         let quantities = problem.quantities();
         let shown = |value: f64, unit| crate::number::engineering(value, unit, 2).replace('\u{a0}', " ");
         let told_time = |slow: &Slow| match slow.frequency > 0.0 {
-            true => format!("swings of {}", shown(slow.frequency / std::f64::consts::TAU, "Hz")),
+            true => format!("oscillations of {}", shown(slow.frequency / std::f64::consts::TAU, "Hz")),
             false => shown(slow.time, "s"),
         };
         let mut told = Vec::new();
