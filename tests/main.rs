@@ -26,6 +26,7 @@ mod free;
 mod frf;
 mod gantry;
 mod gantry_fit;
+mod gantry_frf;
 mod gantry_laws;
 mod gantry_loops;
 mod gantry_moves;

@@ -55,7 +55,7 @@ const TABLE: &[(&str, &[&str], &str, Ends)] = &[
     ("check", &[], LOGS, Runs),
     ("fit", &[], LOGS, Runs),
     ("shape", &[], PID, Runs),
-    ("frf", &[], LOGS, YET_TO_COME),
+    ("frf", &["--segment", "0.128s"], LOGS, Runs),
     ("design", &["--for", "cart.mass", "--measure", "motor_current=10mA"], AXIS, YET_TO_COME),
     ("export c", &[], AXIS, Runs),
     ("export matlab", &["--out", "there/"], AXIS, Runs),
@@ -144,7 +144,7 @@ fn every_kind_goes_through_every_command() {
         }
         let gantries = match *command {
             "move" | "tune" | "plan" => &IN_LOOP[..],
-            "check" | "fit" => &WITH_LOGS,
+            "check" | "fit" | "frf" => &WITH_LOGS,
             _ => &GANTRIES,
         };
         gantries.iter().for_each(|case| run(case, of_gantry));

@@ -209,11 +209,11 @@ impl Case {
         segment: Option<f64>,
         period: Option<f64>,
         at: Option<f64>,
+        bridge: Option<f64>,
         delay: Option<f64>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let case = self.axis(py)?;
-        let delay = delay.or(case.controller.as_ref().map(|design| design.delay)).unwrap_or_default();
-        let (cut, known) = (Cut { segment, period }, Known { place: at.unwrap_or_default(), delay });
+        let case = &self.inner;
+        let (cut, known) = (Cut { segment, period }, Known::of(case, at, bridge, delay).told(py)?);
         let found = unlocked(py, || measure(case, &cut, known))?.map_err(|error| error.in_file(&self.path)).told(py)?;
         value::json(py, &guarded(|| json::frf(case, &found))?)
     }

@@ -177,8 +177,10 @@ def test_a_dual_belt_has_three_drives(root):
 def test_what_is_not_there_says_so(gantry):
     assert repr(gantry) == "<taut.Case 'H-frame': one motor, along x, along y>"
     with pytest.raises(taut.Error, match="this needs a single axis") as told:
-        gantry.frf()
+        gantry.design(["cart.mass"])
     assert told.value.line == 4
+    with pytest.raises(taut.Error, match="no log to measure a response from"):
+        gantry.frf()
     with pytest.raises(taut.Error, match="is of a single axis"):
         gantry.simulate(solver="table3")
 
@@ -195,3 +197,19 @@ def test_logs_of_both_motors_are_checked_and_fitted(root):
         case.compare()
     with pytest.raises(taut.Error, match="single changes are looked for on a single axis"):
         case.drift()
+
+
+def test_responses_of_every_output_to_every_motor(root):
+    case = taut.read(root / "stages/core-xy/belts.toml")
+    found = case.frf(segment=0.128, at=0.0, bridge=0.0)
+    titles = [(one["input"], one["quantity"]) for one in found.data["responses"]]
+    sides = ("left", "right")
+    assert titles == [(f"{motor}_input", f"{pulley}_angle") for motor in sides for pulley in sides]
+    assert found.data["bridge_m"] == 0 and found.data["warnings"] == []
+    assert all(one["input_coherence"] < 0.5 for one in found.data["responses"])
+    assert set(found.to_pandas()["input"]) == {"left_input", "right_input"}
+    assert "both motors: left_input to left_angle" in repr(found)
+    with pytest.raises(taut.Error, match="segments of 1000 samples"):
+        case.frf(segment=1.0)
+    with pytest.raises(taut.Error, match="of no use here"):
+        case.frf(bridge=float("nan"))

@@ -133,7 +133,12 @@ class Case:
     def check(self) -> dict[str, Any]: ...
     def fit(self, effort: tuple[int, int] | None, profiled: bool) -> Fit: ...
     def frf(
-        self, segment: float | None, period: float | None, at: float | None, delay: float | None
+        self,
+        segment: float | None,
+        period: float | None,
+        at: float | None,
+        bridge: float | None,
+        delay: float | None,
     ) -> dict[str, Any]: ...
     def design(
         self,

@@ -201,16 +201,19 @@ class Case:
         segment: float | None = None,
         period: float | None = None,
         at: float | None = None,
+        bridge: float | None = None,
         delay: float | None = None,
     ) -> FrequencyResponses:
         """Frequency responses from the logs, without a model, and stiffness, damping and delay fitted to them.
 
         ``segment`` is the length of the pieces of Welch's method (s), ``period`` that of a multisine (s); ``at`` is
-        where the cart is (m), ``delay`` the time from a sample to its command (s, that of the controller unless said).
+        where the cart is (m), ``bridge`` where a gantry's bridge is, ``delay`` the time from a sample to its command
+        (s, that of the controller unless said). Of a gantry there is a response for each input and output.
         """
         n = _checks.number
+        place = n("at", at), n("bridge", bridge)
         return FrequencyResponses(
-            self._native.frf(n("segment", segment), n("period", period), n("at", at), n("delay", delay))
+            self._native.frf(n("segment", segment), n("period", period), *place, n("delay", delay))
         )
 
     def design(

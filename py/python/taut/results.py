@@ -737,7 +737,7 @@ class FrequencyResponses:
         columns: dict[str, list[Any]] = {}
         for one in self.data["responses"]:
             count = len(one["frequency_Hz"])
-            for name in ("log", "quantity"):
+            for name in ("log", "input", "quantity"):
                 columns.setdefault(name, []).extend([one[name]] * count)
             for name in ("frequency_Hz", "real", "imaginary", "radius", "coherence"):
                 columns.setdefault(name, []).extend(one[name])
@@ -760,9 +760,11 @@ class FrequencyResponses:
         return figure
 
     def __repr__(self) -> str:
-        told = ", ".join(f"{one['log']}: {one['quantity']}" for one in self.data["responses"])
+        several = len({one["input"] for one in self.data["responses"]}) > 1
+        name = "{log}: {input} to {quantity}" if several else "{log}: {quantity}"
+        told = ", ".join(name.format(**one) for one in self.data["responses"])
         return f"<taut.FrequencyResponses {self.data['title']!r}: {told}>"
 
     def _repr_html_(self) -> str:
-        rows = [(one["log"], one["quantity"], len(one["frequency_Hz"])) for one in self.data["responses"]]
-        return _html.table(str(self.data["title"]), ("log", "quantity", "frequencies"), rows)
+        rows = [(one["log"], one["input"], one["quantity"], len(one["frequency_Hz"])) for one in self.data["responses"]]
+        return _html.table(str(self.data["title"]), ("log", "input", "quantity", "frequencies"), rows)
