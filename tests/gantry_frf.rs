@@ -9,7 +9,7 @@ use taut::control::feedback::Feedback;
 use taut::frf::{Cut, Frf, Known, estimate_all, fit, measure};
 use taut::linear::{Discrete, Hold, Operation, System};
 use taut::log::{Log, Output, Quantity};
-use taut::machine::{Kind, Machine};
+use taut::machine::Machine;
 use taut::solve::{Solver, simulate};
 use taut::tune::{Plant, loops};
 

@@ -25,6 +25,7 @@ mod fitted_files;
 mod free;
 mod frf;
 mod gantry;
+mod gantry_design;
 mod gantry_fit;
 mod gantry_frf;
 mod gantry_laws;

@@ -280,11 +280,11 @@ fn modes_of_a_gantry_answer_every_question() {
 fn commands_for_an_axis_say_what_takes_a_gantry() {
     let case = machine("core-xy/core-xy.toml");
     assert_eq!(
-        refused(&["design"], &case),
+        refused(&["learn", "--log", "trial.csv"], &case),
         "error: stages/core-xy.toml:4:9: kind: this needs a single axis, and the case describes a gantry (CoreXY)\n  \
          4 | kind  = \"core-xy\"\n    |         ^^^^^^^^^\n  \
          allowed: kind = \"axis\", or no kind at all\n  \
-         next: use `taut simulate`, `taut modes`, `taut check`, `taut fit`, `taut move`, `taut tune`, `taut plan`, `taut shape`, `taut frf` or `taut sweep`, which take gantries\n"
+         next: use `taut simulate`, `taut modes`, `taut check`, `taut fit`, `taut move`, `taut tune`, `taut plan`, `taut shape`, `taut frf`, `taut design` or `taut sweep`, which take gantries\n"
     );
 }
 

@@ -56,7 +56,23 @@ const TABLE: &[(&str, &[&str], &str, Ends)] = &[
     ("fit", &[], LOGS, Runs),
     ("shape", &[], PID, Runs),
     ("frf", &["--segment", "0.128s"], LOGS, Runs),
-    ("design", &["--for", "cart.mass", "--measure", "motor_current=10mA"], AXIS, YET_TO_COME),
+    (
+        "design",
+        &[
+            "--for",
+            "cart.mass",
+            "--measure",
+            "motor_current=10mA",
+            "--input",
+            "trapezoid",
+            "--duration",
+            "0.3s",
+            "--verify",
+            "1",
+        ],
+        AXIS,
+        Runs,
+    ),
     ("export c", &[], AXIS, Runs),
     ("export matlab", &["--out", "there/"], AXIS, Runs),
     ("export python", &[], AXIS, Runs),
@@ -113,6 +129,7 @@ fn every_kind_goes_through_every_command() {
                 "there/" => there.as_str(),
                 "trial.csv" => trial(),
                 "short fast" if case != *axis => "square",
+                "motor_current=10mA" if GANTRIES.contains(&case) => "left_current=10mA",
                 option => option,
             });
             let output = taut().args(&words).arg(case).args(options).output().unwrap();

@@ -224,7 +224,7 @@ impl Case {
         &self,
         py: Python<'_>,
         names: Vec<String>,
-        inputs: Vec<String>,
+        (inputs, driven): (Vec<String>, Vec<String>),
         criterion: &str,
         times: (f64, Option<f64>),
         shares: (f64, f64, f64),
@@ -233,7 +233,7 @@ impl Case {
         verified: u32,
         seed: u64,
     ) -> PyResult<(Py<PyAny>, Py<Self>)> {
-        let case = self.axis(py)?;
+        let case = &self.inner;
         let kind = |word: &String| {
             let kinds = Kind::ALL.map(Kind::word).join(", ");
             let found = Kind::ALL.into_iter().find(|kind| kind.word() == word);
@@ -258,6 +258,7 @@ impl Case {
         let request = Request {
             names,
             kinds: inputs.iter().map(kind).collect::<taut::Result<_>>().told(py)?,
+            driven,
             criterion: criterion.told(py)?,
             duration,
             every,

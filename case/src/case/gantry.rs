@@ -23,7 +23,7 @@ pub(super) fn no_axis(root: &Table, kind: Kind) -> Error {
     let field = root.optional("kind").unwrap_or_else(|| root.field.clone());
     let what = format!("this needs a single axis, and the case describes a gantry ({})", kind.name());
     field.fail(what).allowed("kind = \"axis\", or no kind at all").next(
-        "use `taut simulate`, `taut modes`, `taut check`, `taut fit`, `taut move`, `taut tune`, `taut plan`, `taut shape`, `taut frf` or `taut sweep`, which take gantries",
+        "use `taut simulate`, `taut modes`, `taut check`, `taut fit`, `taut move`, `taut tune`, `taut plan`, `taut shape`, `taut frf`, `taut design` or `taut sweep`, which take gantries",
     )
 }
 

@@ -121,6 +121,10 @@ pub struct Design {
     /// Kinds of input to try, separated by commas [default: all]
     #[arg(long = "input", value_enum, value_name = "INPUT", value_delimiter = ',')]
     pub kinds: Vec<InputName>,
+    /// Gantries only: what the input drives, separated by commas: left, right or another motor alone, bridge or cart,
+    /// or all motors alike [default: all of these are tried]
+    #[arg(long = "drive", value_name = "NAME", value_delimiter = ',')]
+    pub driven: Vec<String>,
     /// Criterion to minimise: volume of the confidence ellipsoid, or mean square of the errors
     #[arg(long, value_enum, default_value = "d")]
     pub criterion: CriterionName,
@@ -142,7 +146,8 @@ pub struct Design {
     /// Largest current, such as "3 A" [default: amplifier.current_limit]
     #[arg(long, value_name = "CURRENT", value_parser = amperes)]
     pub current: Option<f64>,
-    /// Travel available to the cart, such as "0.4 m" [default: [travel], or the largest of the experiments]
+    /// Travel available to the cart, of a gantry to bridge and cart each, such as "0.4 m" [default: [travel], or the
+    /// largest of the experiments]
     #[arg(long, value_name = "LENGTH", value_parser = length)]
     pub travel: Option<f64>,
     /// Measured quantity and standard deviation of its noise, such as drive_angle=1mrad; may be

@@ -143,7 +143,7 @@ class Case:
     def design(
         self,
         names: list[str],
-        inputs: list[str],
+        inputs: tuple[list[str], list[str]],
         criterion: str,
         times: tuple[float, float | None],
         shares: tuple[float, float, float],

@@ -221,6 +221,7 @@ class Case:
         names: Sequence[str] | None = None,
         *,
         inputs: Sequence[str] | None = None,
+        drives: Sequence[str] | None = None,
         criterion: Criterion = "d",
         duration: float = 4.0,
         every: float | None = None,
@@ -237,7 +238,8 @@ class Case:
         """The experiment that determines the named parameters best (those of [fit] unless named) within travel, input
         and current.
 
-        ``inputs`` are those to choose among: ``trapezoid``, ``sweep``, ``chirp``, ``multisine``, ``prbs``;
+        ``inputs`` are those to choose among: ``trapezoid``, ``sweep``, ``chirp``, ``multisine``, ``prbs``; of a gantry
+        ``drives`` are what they may drive: a motor by its side, ``bridge``, ``cart`` or ``all``;
         ``criterion`` is ``d`` or ``a``; ``margin`` is the share of each limit that is left free, ``doubt`` that by
         which each parameter may be off and the limits hold; no standard error is below ``model_error`` of the value;
         ``measured`` has quantities with the standard deviations of their noise. On ``verify`` machines, off by up to
@@ -247,7 +249,7 @@ class Case:
         noises = [(_checks.text("measured", name), n(f"measured[{name!r}]", noise) or 0.0) for name, noise in dict(measured or {}).items()]
         data, case = self._native.design(
             _checks.names("names", names),
-            _checks.names("inputs", inputs),
+            (_checks.names("inputs", inputs), _checks.names("drives", drives)),
             _checks.text("criterion", criterion),
             (_checks.given("duration", duration), n("every", every)),
             (_checks.given("margin", margin), _checks.given("doubt", doubt), _checks.given("model_error", model_error)),
