@@ -121,7 +121,8 @@ fn core_xy() -> Machine {
     Case::read("stages/core-xy/core-xy.toml").unwrap().machine
 }
 
-/// Every response of each kind, from 5 Hz to 150 Hz: circles hold the model's, and errors have a mean of less than 1 %.
+/// Every response of each kind, from 5 Hz to 150 Hz: circles hold the model's, and the mean of the errors is half a per
+/// cent and what noise makes of it, at most.
 #[test]
 fn circles_hold_the_response_of_the_model() {
     for (file, volts) in GANTRIES {
@@ -140,12 +141,14 @@ fn circles_hold_the_response_of_the_model() {
             });
             let errors: Vec<Complex<f64>> =
                 points.clone().map(|(point, truth)| (point.value - truth) / truth).collect();
+            let noise: f64 = points.clone().map(|(point, truth)| (point.deviation / truth.norm()).powi(2)).sum();
             holds += points.filter(|(point, truth)| (point.value - **truth).norm() <= point.radius).count();
             all += errors.len();
             // What is hardly moved is coherent nowhere.
             if errors.len() > 50 {
                 let off = errors.iter().sum::<Complex<f64>>().norm() / errors.len() as f64;
-                assert!(off < 0.01, "{file} {}: {off} of {}", frf.title(), errors.len());
+                let most = 0.005 + 3.0 * noise.sqrt() / errors.len() as f64;
+                assert!(off < most, "{file} {}: {off} of {}, {most}", frf.title(), errors.len());
             }
         }
         let share = holds as f64 / all as f64;

@@ -223,3 +223,20 @@ def test_an_experiment_is_designed(gantry):
     assert found.case.simulate("designed").metrics["final_bridge_position_m"] is not None
     with pytest.raises(taut.Error, match="`middle` is nothing that an input can go to"):
         gantry.design(["cart.mass"], drives=["middle"], **options)
+
+
+def test_a_repeated_move_is_learned(root):
+    gains = {"proportional": "3 V/mm", "derivative": "20 V s/m"}
+    case = taut.read(root / "stages/core-xy/square.toml").changed({f"controller.pid.{key}": value for key, value in gains.items()})
+    run = case.move("square")
+    positions = {"bridge": run["bridge_position"], "cart": run["cart_position"]}
+    found = case.learn(run["time"], positions, move="square")
+    assert [load["name"] for load in found.data["loads"]] == ["bridge", "cart"]
+    assert set(found.added) == {"left", "right"} and len(found.added["left"]) == len(found.times)
+    assert "right_added" in found.to_pandas() and "bridge_error_m" in found.to_pandas()
+    again = case.learn(run["time"], positions, move="square", added=found.added)
+    assert again.data["drives"][1]["added_before"] == list(found.added["right"])
+    with pytest.raises(TypeError, match="position: expected a mapping with bridge, cart"):
+        case.learn(run["time"], run["cart_position"], move="square")
+    with pytest.raises(TypeError, match="added: expected a mapping with left, right"):
+        case.learn(run["time"], positions, move="square", added=found.added["left"])

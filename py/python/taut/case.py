@@ -306,6 +306,15 @@ class Case:
         data, case = self._native.plan(names, limits, _checks.given("reserve", reserve))
         return Plans(data, self._of(case))
 
+    def _columns(self, name: str, values: Any, drives: bool) -> list[list[float]]:
+        """A column for each drive or sliding part: of an axis the values, of a gantry those of a mapping."""
+        keys = self._native.drives if drives else self._native.slides
+        if self.kind == "axis":
+            return [_checks.column(name, values)]
+        if not isinstance(values, Mapping) or set(values) != set(keys):
+            raise TypeError(f"{name}: expected a mapping with {', '.join(keys)}")
+        return [_checks.column(f"{name}[{key!r}]", values[key]) for key in keys]
+
     def learn(
         self,
         time: Any,
@@ -319,14 +328,15 @@ class Case:
 
         ``move`` is its name, if the case has several moves. ``added`` is the signal that was added to the command
         meanwhile, a value (V or A) for each sample of the controller: :attr:`Learned.added` of the repetition before.
-        ``position`` is that of the cart, or with ``encoder`` the one that the controller measures, along the belt.
-        Ctrl-C ends it.
+        ``position`` is that of the cart, or with ``encoder`` the one that the controller measures, along the belt. Of a
+        gantry it is a mapping of the positions of ``bridge`` and ``cart``, or of those that the controllers measure by
+        their motors (``left``, ``right``), and so is ``added``. Ctrl-C ends it.
         """
         data = self._native.learn(
             _checks.names("move", None if move is None else [_checks.text("move", move)]),
             _checks.column("time", time),
-            _checks.column("position", position),
-            None if added is None else _checks.column("added", added),
+            self._columns("position", position, drives=bool(encoder)),
+            None if added is None else self._columns("added", added, drives=True),
             bool(encoder),
         )
         return Learned(data)
