@@ -158,7 +158,7 @@ fn main() -> taut::Result<()> {
             }
             let mut model = machine.clone();
             model.belt.stiffness = named;
-            let found = fit(&model, &Known { place: 0.0, delay: 0.7e-3 }, &frfs)?;
+            let found = fit(&model, &Known { place: 0.0, bridge: 0.0, delay: 0.7e-3 }, &frfs)?;
             let holds =
                 |(_, [low, high]): (f64, [f64; 2]), truth: f64| f64::from(u8::from((low..=high).contains(&truth)));
             known[0] += holds(found.stiffness, stiffer);

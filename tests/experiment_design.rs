@@ -77,7 +77,7 @@ fn a_machine_alone_has_a_design() {
     assert!(case.experiments.is_empty() && case.fit.is_none());
     let limits = Request { input: Some(6.0), travel: Some(0.1), ..request(&["cart.mass"], &[Kind::Trapezoid]) };
     let found = design(&case, &limits, &|| false, &mut |_| {}).unwrap();
-    assert!(found.promises[0].is_determined() && found.own.is_empty() && found.reached.way() <= 0.0901);
+    assert!(found.promises[0].is_determined() && found.own.is_empty() && found.reached.way(0) <= 0.0901);
     let text = found.case_text(&case, "axis.toml".as_ref()).unwrap();
     assert_eq!(Case::from_text("designed.toml", &text).unwrap().experiments.len(), 1);
     assert_eq!(verify(&case, &limits, &found, 2, &|| false).unwrap()[0].fits, 2);
@@ -139,7 +139,7 @@ fn what_is_written_is_what_was_judged_and_keeps_its_limits() {
             assert!(high - low <= 0.9 * 0.06 * 1.002 && low > -0.02 && high < 0.04, "{kind:?}: {low} {high}");
         }
         // The middle of the way is the middle of the travel.
-        let [low, high] = found.reached.positions;
+        let [low, high] = found.reached.positions[0];
         assert!((0.5 * (low + high) - 0.01).abs() < 1e-3, "{kind:?}: {low} {high}");
     }
 }

@@ -153,7 +153,7 @@ fn stiffness_damping_and_delay() {
     let truth = model(&machine, 0.9e-3);
     let log = log(&truth, &white(60_000, 3.0), None, 2e-6, 60_000);
     let frfs = estimate(&log, &Cut { segment: Some(1.024), period: None }).unwrap();
-    let found = fit(&stage(), &Known { place: 0.0, delay: 0.2e-3 }, &frfs).unwrap();
+    let found = fit(&stage(), &Known { place: 0.0, bridge: 0.0, delay: 0.2e-3 }, &frfs).unwrap();
     let near = |(value, _): (f64, [f64; 2]), truth: f64, within: f64| (value / truth - 1.0).abs() < within;
     assert!(
         near(found.stiffness, 1.3, 0.01) && near(found.delay, 0.9e-3, 0.02),
@@ -176,7 +176,7 @@ fn measured_margins() {
     let log = log(&truth, &white(120_000, 3.0), None, 1e-7, 120_000);
     let frf = &estimate(&log, &Cut { segment: Some(2.048), period: None }).unwrap()[0];
     let stage = stage();
-    let found = measured(frf, &design, &stage, stage.pulley_radius).unwrap();
+    let found = measured(&[vec![frf]], 0, &design, &stage, stage.pulley_radius).unwrap();
     let feedback = taut::control::feedback::Feedback::new(&design, &stage).unwrap();
     let [low, high] = found.range;
     let exact = (0..4000).map(|k| low + (high - low) * f64::from(k) / 4000.0).map(|omega| {
@@ -214,7 +214,7 @@ fn what_cannot_be_measured_is_told() {
     assert!(told(&signless, plain).contains("no output has a sign"), "{}", told(&signless, plain));
     let rigid = Case::read("stages/emps/emps.toml").unwrap().machine;
     let frfs = estimate(&good, &plain).unwrap();
-    let known = Known { place: 0.0, delay: 0.0 };
+    let known = Known { place: 0.0, bridge: 0.0, delay: 0.0 };
     assert!(fit(&rigid, &known, &frfs).unwrap_err().what.contains("a rigid belt has no stiffness"));
     let empty = Case::read("stages/sollmann-jouaneh/table4.toml").unwrap();
     let none = measure(&empty, &plain, known);

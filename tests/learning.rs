@@ -6,7 +6,7 @@ use std::path::Path;
 use taut::case::Case;
 use taut::chance::uniform;
 use taut::control::fed::Fed;
-use taut::control::{Added, Loop, Rows, Standard, stream};
+use taut::control::{Added, Controller, Loop, Rows, Standard, stream};
 use taut::learning::{At, CONTRACTION, Learned, Trial, learn};
 use taut::solve::{Flow, Solver};
 use taut::tune::{Corner, Family};
@@ -26,24 +26,31 @@ const LINEAR: [&str; 4] = [
 ];
 
 /// A repetition of the first move on the machine of `truth` with the controller of `case`.
-fn repeated(case: &Case, truth: &Case, at: At, added: Option<&Added>) -> Trial {
+fn repeated(case: &Case, truth: &Case, at: At, added: Option<&[Added]>) -> Trial {
     let (design, motion) = (case.controller.as_ref().unwrap(), &case.moves[0]);
-    let none = Added { times: vec![0.0], values: vec![0.0] };
-    let mut fed = Fed::new(Standard::new(design, &case.machine).unwrap(), added.unwrap_or(&none));
+    let (geometry, r) = (truth.machine.geometry(), truth.machine.pulley_radius);
+    let none = vec![Added { times: vec![0.0], values: vec![0.0] }; geometry.drives.len()];
+    let controllers = Standard::of_drives(design, &case.machine).unwrap();
+    let mut fed: Vec<Fed> =
+        controllers.into_iter().zip(added.unwrap_or(&none)).map(|(own, added)| Fed::new(own, added)).collect();
+    let mut each: Vec<&mut dyn Controller> = fed.iter_mut().map(|fed| fed as &mut dyn Controller).collect();
     let (timing, profiles) = (Loop::of(design), motion.references(design));
     let rows = Rows { until: motion.until, every: design.every, window: motion.window };
-    let mut trial = Trial { time: Vec::new(), position: Vec::new(), at };
+    let name = |body: usize| geometry.label(body).key;
+    let columns: Vec<(String, f64)> = match at {
+        At::Cart => geometry.slides.iter().map(|slide| (format!("{}_position", name(slide.body)), 1.0)).collect(),
+        At::Encoder => geometry.drives.iter().map(|drive| (format!("{}_angle", name(drive.pulley)), r)).collect(),
+    };
+    let mut trial = Trial { time: Vec::new(), positions: vec![Vec::new(); columns.len()], at };
     let mut sink = |block: &taut::trajectory::Trajectory| {
         trial.time.extend_from_slice(block.get("time").unwrap());
-        let (name, arm) = match at {
-            At::Cart => ("cart_position", 1.0),
-            At::Encoder => ("drive_angle", truth.machine.pulley_radius),
-        };
-        trial.position.extend(block.get(name).unwrap().iter().map(|value| arm * value));
+        for ((name, arm), position) in columns.iter().zip(&mut trial.positions) {
+            position.extend(block.get(name).unwrap().iter().map(|value| arm * value));
+        }
         Flow::Continue
     };
     let solver = Solver::of(&truth.machine);
-    stream(&truth.machine, &mut [&mut fed], &timing, &profiles, &rows, solver, false, &mut sink).unwrap();
+    stream(&truth.machine, &mut each, &timing, &profiles, &rows, solver, false, &mut sink).unwrap();
     trial
 }
 
@@ -52,8 +59,8 @@ fn learned(case: &Case, truth: &Case, at: At, repetitions: usize) -> Vec<Learned
     let mut all: Vec<Learned> = Vec::new();
     for _ in 0..repetitions {
         let added = all.last().map(Learned::added);
-        let trial = repeated(case, truth, at, added.as_ref());
-        all.push(learn(case, &case.moves[0], &trial, added.as_ref(), &|| false).unwrap());
+        let trial = repeated(case, truth, at, added.as_deref());
+        all.push(learn(case, &case.moves[0], &trial, added.as_deref(), &|| false).unwrap());
     }
     all
 }
@@ -80,19 +87,21 @@ fn errors_are_as_predicted() {
     for at in [At::Cart, At::Encoder] {
         let own = learned(&case, &case, at, 3);
         for pair in own.windows(2) {
-            let (told, is) = (pair[0].predicted[0].nominal, pair[1].now);
+            let (told, is) = (pair[0].slides[0].predicted[0].nominal, pair[1].slides[0].now);
             assert!((is.rms / told.rms - 1.0).abs() < 0.02, "{at:?}: {told:?} {is:?}");
             assert!(pair[0].contraction <= CONTRACTION + 1e-12);
         }
-        assert!(own[2].now.rms < 0.2 * own[0].now.rms, "{at:?}: {:?} {:?}", own[0].now, own[2].now);
+        let [first, last] = [0, 2].map(|k| own[k].slides[0].now);
+        assert!(last.rms < 0.2 * first.rms, "{at:?}: {first:?} {last:?}");
         for seed in 0..3 {
             let truth = hidden(&case, seed);
             let all = learned(&case, &truth, at, 4);
             for (k, one) in all.iter().enumerate().skip(1) {
-                let told = all[k - 1].predicted[0].worst;
-                assert!(one.now.rms < 1.05 * told.rms, "{at:?} {seed} {k}: {told:?} {:?}", one.now);
+                let (told, is) = (all[k - 1].slides[0].predicted[0].worst, one.slides[0].now);
+                assert!(is.rms < 1.05 * told.rms, "{at:?} {seed} {k}: {told:?} {is:?}");
             }
-            assert!(all[3].now.rms < 0.5 * all[0].now.rms, "{at:?} {seed}: {:?} {:?}", all[0].now, all[3].now);
+            let [first, last] = [0, 3].map(|k| all[k].slides[0].now);
+            assert!(last.rms < 0.5 * first.rms, "{at:?} {seed}: {first:?} {last:?}");
         }
     }
 }
@@ -104,7 +113,7 @@ fn dry_friction_is_learned() {
     for seed in 0..3 {
         let truth = hidden(&case, seed);
         let all = learned(&case, &truth, At::Cart, 5);
-        let errors: Vec<f64> = all.iter().map(|one| one.now.rms).collect();
+        let errors: Vec<f64> = all.iter().map(|one| one.slides[0].now.rms).collect();
         println!("{seed}: {errors:?}");
         assert!(errors[4] < 0.2 * errors[0], "{seed}: {errors:?}");
     }
@@ -136,18 +145,100 @@ fn logs_that_are_no_trial_are_told() {
     let cut = |count: usize| {
         move |trial: &mut Trial| {
             trial.time.truncate(count);
-            trial.position.truncate(count);
+            trial.positions[0].truncate(count);
         }
     };
     assert!(told(&cut(0)).contains("the log has no rows"));
     assert!(told(&cut(20)).contains("the log ends at"), "{}", told(&cut(20)));
     assert!(told(&|trial| trial.time.iter_mut().for_each(|t| *t += 1.0)).contains("the log begins 1 s after the move"));
-    assert!(told(&|trial| trial.position[3] = f64::NAN).contains("values that are no numbers"));
+    assert!(told(&|trial| trial.positions[0][3] = f64::NAN).contains("values that are no numbers"));
     let sparse = told(&|trial| {
         trial.time = trial.time.iter().copied().step_by(10).collect();
-        trial.position = trial.position.iter().copied().step_by(10).collect();
+        trial.positions[0] = trial.positions[0].iter().copied().step_by(10).collect();
     });
     assert!(sparse.contains("the rows of the log are"), "{sparse}");
+    let two = told(&|trial| trial.positions.push(Vec::new()));
+    assert!(two.contains("the log has 2 columns of positions") && two.contains("1: one for each part"), "{two}");
+    let signals = [Added::new(1e-3, vec![0.0]), Added::new(1e-3, vec![0.0])];
+    let many = learn(&case, &case.moves[0], &whole, Some(&signals), &|| false).unwrap_err().to_string();
+    assert!(many.contains("there are 2 signals that were added") && many.contains("1: one for each drive"), "{many}");
     let stopped = learn(&case, &case.moves[0], &whole, None, &|| true).unwrap_err().to_string();
     assert!(stopped.contains("interrupted"), "{stopped}");
+}
+
+/// A gantry in closed loop, whose friction is viscous alone and whose encoders are as good as exact.
+fn gantry(file: &str, changes: &[&str]) -> Case {
+    let linear = [
+        "drive_pulley.friction.coulomb=0",
+        "bridge.friction={ viscous = 12 }",
+        "cart.friction={ viscous = 8 }",
+        "encoder.lines=1000000",
+        "controller.pid={ proportional = \"5 V/mm\", integral = \"20 V/(mm s)\", derivative = \"40 V s/m\" }",
+    ];
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(file);
+    let text = std::fs::read_to_string(&path).unwrap();
+    let case = Case::from_text_with(&path, &text, &[&linear[..], changes].concat());
+    case.unwrap_or_else(|error| panic!("{error}"))
+}
+
+const SQUARES: [&str; 3] = ["stages/h-frame/square.toml", "stages/core-xy/square.toml", "stages/dual-belt/square.toml"];
+
+/// Bridge and cart of each kind make the errors that were predicted, and both converge.
+#[test]
+fn errors_of_gantries_are_as_predicted() {
+    for (file, at) in SQUARES.into_iter().flat_map(|file| [(file, At::Cart), (file, At::Encoder)]) {
+        let case = gantry(file, &["tune={ spread = \"10 %\" }"]);
+        let own = learned(&case, &case, at, 3);
+        for pair in own.windows(2) {
+            for (told, is) in pair[0].slides.iter().zip(&pair[1].slides) {
+                let (told, is) = (told.predicted[0].nominal, is.now);
+                assert!((is.rms / told.rms - 1.0).abs() < 0.03, "{file} {at:?}: {told:?} {is:?}");
+            }
+            assert!(pair[0].contraction <= CONTRACTION + 1e-12);
+        }
+        for (slide, (first, last)) in own[0].slides.iter().zip(&own[2].slides).enumerate() {
+            println!("{file} {at:?} {slide}: {:?} {:?}", first.now, last.now);
+            assert!(last.now.rms < 0.4 * first.now.rms, "{file} {at:?}: {:?} {:?}", first.now, last.now);
+        }
+        let truth = hidden(&case, 1);
+        let all = learned(&case, &truth, at, 3);
+        for (k, one) in all.iter().enumerate().skip(1) {
+            for (told, is) in all[k - 1].slides.iter().zip(&one.slides) {
+                let (told, is) = (told.predicted[0].worst, is.now);
+                assert!(is.rms < 1.1 * told.rms, "{file} {at:?} {k}: {told:?} {is:?}");
+            }
+        }
+    }
+}
+
+/// Dry friction on all bodies of a CoreXY comes again with each repetition.
+#[test]
+fn dry_friction_of_a_gantry_is_learned() {
+    let dry = ["bridge.friction={ viscous = 12, coulomb = 0.5 }", "cart.friction={ viscous = 8, coulomb = 0.2 }"];
+    let case = gantry(
+        SQUARES[1],
+        &[&dry[..], &["drive_pulley.friction.coulomb=0.015", "tune={ spread = \"10 %\" }"]].concat(),
+    );
+    let all = learned(&case, &hidden(&case, 3), At::Cart, 5);
+    for slide in 0..2 {
+        let errors: Vec<f64> = all.iter().map(|one| one.slides[slide].now.rms).collect();
+        println!("{slide}: {errors:?}");
+        assert!(errors[4] < 0.3 * errors[0], "{slide}: {errors:?}");
+    }
+}
+
+#[test]
+fn what_a_gantry_cannot_learn_is_told() {
+    let case = gantry(SQUARES[1], &["tune={ spread = \"0 %\" }"]);
+    let whole = repeated(&case, &case, At::Cart, None);
+    let told = |case: &Case, trial: &Trial| {
+        learn(case, &case.moves[0], trial, None, &|| false).map(|found| found.band).unwrap_err().to_string()
+    };
+    let one = Trial { positions: vec![whole.positions[0].clone()], ..whole.clone() };
+    assert!(told(&case, &one).contains("2: one for each part that slides"), "{}", told(&case, &one));
+    let encoders = Trial { at: At::Encoder, positions: Vec::new(), ..whole.clone() };
+    assert!(told(&case, &encoders).contains("2: one for the encoder of each drive"), "{}", told(&case, &encoders));
+    let stiff = "controller.pid={ proportional = \"100 V/mm\", derivative = \"60 V s/m\" }";
+    let unstable = told(&gantry(SQUARES[1], &["tune={ spread = \"0 %\" }", stiff]), &whole);
+    assert!(unstable.contains("the loop is not stable"), "{unstable}");
 }

@@ -71,11 +71,6 @@ impl Common {
         self.accepting(path, (files, Accepted::All))
     }
 
-    /// Reads the case of an axis at `path` with all its files; `-` is standard input.
-    pub fn case(&self, path: &Path) -> Result<Case> {
-        self.whole(path, Accepted::Axis)
-    }
-
     fn changes(&self) -> Vec<&str> {
         self.changes.iter().map(String::as_str).collect()
     }

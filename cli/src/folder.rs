@@ -13,6 +13,7 @@ use taut::case::{self, Case, Files, InputFile};
 use taut::control::Added;
 use taut::files::{Batch, Claim, Inputs, MARKER, write_atomically};
 use taut::log::read_samples;
+use taut::machine::Machine;
 use taut::solve::Event;
 use taut::{Error, Result, files};
 
@@ -99,10 +100,19 @@ pub fn inputs_with<'a>(path: &'a Path, others: impl IntoIterator<Item = &'a Path
     Inputs::new(std::iter::once(path).chain(others).chain(files))
 }
 
-/// The signal of a file that `taut learn` wrote, in V or A.
-pub fn read_added(file: &Path, unit: &str) -> Result<Added> {
-    let (times, values) = read_samples(file, "time_s", &format!("added_{unit}"))?;
-    Ok(Added { times, values })
+/// The columns of a file of signals that are added to commands, one for each drive: `added_V`, or `left_added_V`.
+pub fn added_columns(machine: &Machine) -> impl Iterator<Item = String> {
+    let drives = machine.geometry().drives.iter().zip(&machine.drives);
+    drives.map(|(at, drive)| format!("{}added_{}", at.prefix, drive.amplifier.mode.unit()))
+}
+
+/// The signal of each drive from a file that `taut learn` wrote, in V or A.
+pub fn read_added(file: &Path, machine: &Machine) -> Result<Vec<Added>> {
+    let of_drive = |column: String| {
+        let (times, values) = read_samples(file, "time_s", &column)?;
+        Ok(Added { times, values })
+    };
+    added_columns(machine).map(of_drive).collect()
 }
 
 impl Folder {

@@ -68,8 +68,18 @@ fn what_it_cannot_do_it_says() {
         let text = String::from_utf8(output.stderr).unwrap();
         assert!(text.contains(told) && output.status.code() == Some(status), "{args:?}: {:?} {text}", output.status);
     }
-    let gantry = taut(&["design", "stages/core-xy/core-xy.toml", "--for", "cart.mass"]);
-    assert_eq!(gantry.status.code(), Some(2));
+    let gantry = ["design", "stages/core-xy/core-xy.toml", "--for", "cart.mass"];
+    for (args, words) in [
+        (vec![], "--measure left_angle=1mrad --measure right_angle=1mrad"),
+        (vec!["--measure", "drive_angle=1mrad"], "`drive_angle` is no measured quantity of this machine"),
+        (vec!["--measure", "left_angle=1mrad", "--drive", "middle"], "allowed: left, right, bridge, cart"),
+    ] {
+        let output = taut(&[&gantry[..], &args].concat());
+        let text = String::from_utf8(output.stderr).unwrap();
+        assert!(text.contains(words) && output.status.code() == Some(2), "{args:?}: {text}");
+    }
+    let axis = taut(&[&["design", TABLE4, "--for", "cart.mass", "--drive", "left"][..], &ANGLE].concat());
+    assert!(String::from_utf8(axis.stderr).unwrap().contains("this machine has one drive"));
 }
 
 #[test]

@@ -180,6 +180,16 @@ fn the_page_on_learning_shows_what_the_program_prints() {
 }
 
 #[test]
+fn the_page_on_frequency_responses_shows_what_the_program_prints() {
+    check("docs/frf.md");
+}
+
+#[test]
+fn the_page_on_designed_experiments_shows_what_the_program_prints() {
+    check("docs/design.md");
+}
+
+#[test]
 fn the_page_on_sweeps_shows_what_the_program_prints() {
     check("docs/sweep.md");
 }

@@ -277,18 +277,6 @@ fn modes_of_a_gantry_answer_every_question() {
 
 /// Options that a gantry does not have are refused, at the line that makes it one.
 #[test]
-fn commands_for_an_axis_say_what_takes_a_gantry() {
-    let case = machine("core-xy/core-xy.toml");
-    assert_eq!(
-        refused(&["frf"], &case),
-        "error: stages/core-xy.toml:4:9: kind: this needs a single axis, and the case describes a gantry (CoreXY)\n  \
-         4 | kind  = \"core-xy\"\n    |         ^^^^^^^^^\n  \
-         allowed: kind = \"axis\", or no kind at all\n  \
-         next: use `taut simulate`, `taut modes`, `taut check`, `taut fit`, `taut move`, `taut tune`, `taut plan`, `taut shape` or `taut sweep`, which take gantries\n"
-    );
-}
-
-#[test]
 fn a_sweep_writes_a_whole_folder_that_repeats_it() {
     let folder = TempDir::new().unwrap();
     let plan =

@@ -35,7 +35,7 @@ fn a_move_is_repeated_and_learned() {
         let output = taut(&learn);
         let told: Value = serde_json::from_slice(&output.stdout).unwrap();
         assert_eq!((output.status.code(), &told["schema"]), (Some(0), &"taut/learn/1".into()), "{told}");
-        errors.push(told["error"]["rms_m"].as_f64().unwrap());
+        errors.push(told["loads"][0]["error"]["rms_m"].as_f64().unwrap());
         for name in ["learn.json", "next.csv", "report.html", "plots/learned.svg", "plots/convergence.svg"] {
             assert!(Path::new(&learned).join(name).is_file(), "{name}");
         }
@@ -58,7 +58,8 @@ fn what_cannot_be_learned_is_told() {
     fs::write(&short, lines.join("\n")).unwrap();
     let gone = at("gone.csv");
     let usual = ["learn", SHAPED, "--move", "short fast", "--log", &log];
-    let cases: [(Vec<&str>, i32, &str); 10] = [
+    let square = ["learn", "stages/core-xy/square.toml", "--move", "square", "--log", &log];
+    let cases: [(Vec<&str>, i32, &str); 13] = [
         (vec!["learn", SHAPED, "--log", &log], 2, "the case has 3 moves, and a log is of one"),
         (vec!["learn", SHAPED, "--move", "gone", "--log", &log], 2, "gone"),
         (vec!["learn", SHAPED, "--move", "short fast", "--log", &gone], 2, "there is no such file"),
@@ -67,7 +68,14 @@ fn what_cannot_be_learned_is_told() {
         ([&usual[..], &["--unit", "V"]].concat(), 2, "a unit of length is needed"),
         ([&usual[..], &["--added", &log]].concat(), 2, "added_V"),
         ([&usual[..], &["--set", "controller.pid.proportional=300 V/mm"]].concat(), 1, "the loop is not stable"),
-        (vec!["learn", "stages/core-xy/square.toml", "--log", &log], 2, "this needs a single axis"),
+        (square.to_vec(), 2, "bridge_position_m"),
+        (
+            [&square[..], &["--position", "cart_position_m"]].concat(),
+            2,
+            "2, separated by commas, in the order bridge, cart",
+        ),
+        ([&square[..], &["--encoder"]].concat(), 2, "name 2 with --position, in the order left, right"),
+        (vec!["move", "stages/core-xy/square.toml", "--move", "square", "--added", &log], 2, "left_added_V"),
         (vec!["move", SHAPED, "--added", &log], 2, "a signal is of one move, and the case has 3"),
     ];
     for (args, status, words) in cases {

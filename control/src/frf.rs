@@ -11,6 +11,19 @@
 //! |ΔG| ≤ √(E|ΔG|² F₂,ν(0.95)),  ν = 2 (K_e − 1)          the circle that holds it in 95 of 100
 //! ```
 //!
+//! Of a machine with n drives U and R are vectors and G is a row, an element for each drive:
+//!
+//! ```text
+//! G = S_yr S_ur⁻¹,  S_yr = Σ Y Rᴴ,  S_ur = Σ U Rᴴ,  S_rr = Σ R Rᴴ
+//! E|ΔG_j|² = Σ |Y − G U|² [S_ur⁻ᴴ S_rr S_ur⁻¹]_jj / (K_e − n),  ν = 2 (K_e − n)
+//! γ_j² = w_j/(w_j + S_yy − H S_ryᴴ),  H = S_yr S_rr⁻¹,  w_j = |H_j|²/[S_rr⁻¹]_jj      partial coherence
+//! β_j² = 1 − 1/([S_rr]_jj [S_rr⁻¹]_jj)                 coherence of an input with the others
+//! ```
+//!
+//! Inputs that are excited at a line are solved for there; one whose β² is above [`ALIKE`] cannot be told from the
+//! others and has no point. Logs that do not tell all inputs apart each by itself, as those of motors that were moved
+//! one after the other, are taken together.
+//!
 //! A window smears: a sum over segments is that of the spectrum about a line, (2/3, 1/6, 1/6) of it from the line and its
 //! neighbours under Hann's. Where the input's spectrum rises within that, as Σ U R* does in closed loop towards low
 //! frequencies, G would be off by 2 G′ Φ′/(6 Φ) of the lines' distance; so both sums are taken less a sixth of their
@@ -28,39 +41,24 @@
 
 mod fit;
 mod margins;
+mod spectra;
 
 pub use fit::{FrfFit, Known, fit};
 pub use margins::{Measured, measured};
+pub use spectra::ALIKE;
 
 use crate::case::Case;
 use crate::control::measures_cart;
 use crate::error::{Error, Result};
+use crate::linear::within_travel;
 use crate::log::{Log, Quantity};
-use crate::machine::EncoderPlace;
+use crate::machine::{EncoderPlace, Kind, Machine};
 use nalgebra::Complex;
-use rustfft::FftPlanner;
+use spectra::{Row, Spectra};
 use std::f64::consts::PI;
 
-/// Segments that a record is cut into where nothing is said.
-const SEGMENTS: f64 = 16.0;
-
-/// Fewest segments or periods.
-const FEWEST: usize = 4;
-
-/// Longest and shortest segment, samples.
-const LONGEST: usize = 1 << 16;
-const SHORTEST: usize = 16;
-
-/// Share of independent segments among those that overlap by half under Hann's window.
-const INDEPENDENT: f64 = 0.947;
-
-/// Share of their second difference over the lines that sums over segments are taken less of: half of the second moment
-/// of the power of Hann's window, 1/3 of a line squared.
-const SMEARED: f64 = 1.0 / 6.0;
-
-/// Effect on the variance: neighbouring lines are alike by 4/9, the next by 1/36, so that
-/// (1 + 2/6)² + 2/36 − 4 (4/3) (1/6) (4/9) + 2/36² = 1.44.
-const NOISIER: f64 = 1.44;
+/// Share of the lines at which an input cannot be told from the others that is worth a warning.
+const SOME: f64 = 0.1;
 
 /// Least coherence of a point that a fit, a margin or a peak may use.
 pub const COHERENT: f64 = 0.5;
@@ -89,11 +87,17 @@ pub struct Point {
     pub coherence: f64,
 }
 
-/// A frequency response from one log.
+/// A frequency response from one log, or from several that are taken together.
 #[derive(Debug, Clone)]
 pub struct Frf {
-    /// Of the log.
+    /// Of the log; of several with commas between.
     pub name: String,
+    /// The number of the drive whose input it is from.
+    pub drive: usize,
+    /// The key of that input's column in a log.
+    pub input: &'static str,
+    /// β² of that input with the others: the median over the lines at which it is excited. Zero with a single drive.
+    pub alike: f64,
     /// The measured quantity.
     pub quantity: Quantity,
     /// Between samples, s.
@@ -113,7 +117,21 @@ pub struct Frf {
 impl Frf {
     /// Points that a fit can use.
     pub fn coherent(&self) -> impl Iterator<Item = &Point> {
-        self.points.iter().filter(|point| point.coherence >= COHERENT && point.radius < point.value.norm())
+        self.points.iter().filter(|point| Self::is_coherent(point))
+    }
+
+    /// True if a fit can use it.
+    fn is_coherent(point: &Point) -> bool {
+        point.coherence >= COHERENT && point.radius < point.value.norm()
+    }
+
+    /// The log and the measured quantity; of a machine with several drives from which input.
+    pub fn title(&self) -> String {
+        let quantity = self.quantity.name();
+        match self.input {
+            "input" => format!("{}: {quantity}", self.name),
+            input => format!("{}: {input} to {quantity}", self.name),
+        }
     }
 
     /// Number of the line that a point is.
@@ -122,160 +140,99 @@ impl Frf {
     }
 }
 
-/// The frequency responses of a log, one for each of its outputs that has a sign.
+/// The frequency responses of an axis' log, one for each of its outputs that has a sign.
 pub fn estimate(log: &Log, cut: &Cut) -> Result<Vec<Frf>> {
-    let every = log.interval();
-    let uneven = log.time.windows(2).find(|pair| ((pair[1] - pair[0]) / every - 1.0).abs() > 0.01);
-    let wrong = |what: String| Error::new(what).in_file(format!("log \"{}\"", log.name));
-    if let Some(pair) = uneven {
-        return Err(wrong(format!("the samples at {:.6} s and {:.6} s are not {every:.6} s apart", pair[0], pair[1]))
-            .allowed("even samples, to 1 %")
-            .next("resample the log, or cut it where samples are missing"));
-    }
-    let (length, step) =
-        segments(log.len(), every, cut).map_err(|error| error.in_file(format!("log \"{}\"", log.name)))?;
-    let periodic = cut.period.is_some();
-    // Of periods the first is the machine taking up its swing.
-    let first = if periodic { length } else { 0 };
-    let reference = log.reference.as_deref();
-    let excitation = reference.unwrap_or(&log.inputs[0]);
-    let mut all = Vec::new();
-    for output in log.outputs.iter().filter(|output| !output.absolute) {
-        if let Some(place) = output.values.iter().position(|value| !value.is_finite()) {
-            return Err(wrong(format!("{} has no value at {:.6} s", output.quantity.name(), log.time[place]))
-                .next("cut the log where values are missing"));
-        }
-        let signals = [&log.inputs[0][..], &output.values[..], excitation].map(differences);
-        let [u, y, r] = signals.map(|signal| transforms(&signal, first, length, step, periodic));
-        if u.len() < FEWEST {
-            return Err(wrong(format!("{} segments of {length} samples", u.len()))
-                .allowed(format!("at least {FEWEST}"))
-                .next("give a shorter --segment, or log for longer"));
-        }
-        let points = points(&u, &y, &r, every, length, periodic);
-        if points.is_empty() {
-            return Err(wrong("the input does not change".into())
-                .next("excite the axis with a sweep, noise or several sines at once"));
-        }
-        let (segments, closed) = (u.len(), reference.is_some());
-        let (name, quantity) = (log.name.clone(), output.quantity);
-        all.push(Frf { name, quantity, every, segments, length, periodic, closed, points });
-    }
-    if all.is_empty() {
-        return Err(wrong("no output has a sign".into()).next("log a position or a speed"));
-    }
-    Ok(all)
+    Ok(estimate_all(Kind::Axis, &[log], cut)?.0)
 }
 
-/// Samples of a segment, and from one to the next.
-fn segments(samples: usize, every: f64, cut: &Cut) -> Result<(usize, usize)> {
-    if let Some(period) = cut.period {
-        let length = (period / every).round() as usize;
-        let is_whole = ((length as f64 * every) / period - 1.0).abs() <= 1e-4;
-        if !is_whole || !(SHORTEST..=LONGEST).contains(&length) {
-            return Err(Error::new(format!("a period of {period} s is no whole number of samples of {every} s"))
-                .allowed(format!("{SHORTEST} to {LONGEST} samples"))
-                .next("give the period of the input exactly"));
+/// The frequency responses of the logs of a machine of this kind, by log, input and output, and warnings. Logs that do
+/// not tell all inputs apart each by itself are taken together.
+pub fn estimate_all(kind: Kind, logs: &[&Log], cut: &Cut) -> Result<(Vec<Frf>, Vec<String>)> {
+    let (mut each, mut rest) = (Vec::new(), Vec::new());
+    for log in logs {
+        let spectra = Spectra::of(&[*log], cut)?;
+        let is_whole = (0..spectra.drives()).all(|drive| spectra.tells(drive));
+        match is_whole || logs.len() == 1 || spectra.drives() == 1 {
+            true => each.push(spectra),
+            false => rest.push(*log),
         }
-        return Ok((length, length));
     }
-    let wanted = cut.segment.map_or(2.0 * samples as f64 / (SEGMENTS + 1.0), |segment| segment / every);
-    let length = match cut.segment {
-        // The longest power of two that leaves as many segments.
-        None => 1 << (wanted.max(1.0).log2().floor() as usize),
-        Some(_) => wanted.round() as usize,
-    };
-    let length = length & !1;
-    if !(SHORTEST..=LONGEST).contains(&length) {
-        return Err(Error::new(format!("segments of {length} samples"))
-            .allowed(format!("{SHORTEST} to {LONGEST}"))
-            .next("give --segment, or a longer log"));
+    if !rest.is_empty() {
+        each.push(Spectra::of(&rest, cut)?);
     }
-    Ok((length, length / 2))
-}
-
-fn differences(values: &[f64]) -> Vec<f64> {
-    values.windows(2).map(|pair| pair[1] - pair[0]).collect()
-}
-
-/// Transforms of the segments from `first` on, at frequencies above zero up to half the sampling rate.
-fn transforms(values: &[f64], first: usize, length: usize, step: usize, periodic: bool) -> Vec<Vec<Complex<f64>>> {
-    let transform = FftPlanner::new().plan_fft_forward(length);
-    let window = |k: usize| match periodic {
-        true => 1.0,
-        false => 0.5 - 0.5 * (2.0 * PI * k as f64 / length as f64).cos(),
-    };
-    let window: Vec<f64> = (0..length).map(window).collect();
-    let mut all = Vec::new();
-    let mut begin = first;
-    while begin + length <= values.len() {
-        let segment = &values[begin..begin + length];
-        let mean = if periodic { 0.0 } else { segment.iter().sum::<f64>() / length as f64 };
-        let mut buffer: Vec<Complex<f64>> =
-            segment.iter().zip(&window).map(|(value, w)| Complex::new((value - mean) * w, 0.0)).collect();
-        transform.process(&mut buffer);
-        all.push(buffer[1..length / 2].to_vec());
-        begin += step;
-    }
-    all
-}
-
-/// Sums over segments without the second moment of the window; those of whole periods as they are.
-fn sharpened(sums: Vec<Complex<f64>>, periodic: bool) -> Vec<Complex<f64>> {
-    let mut sharp = sums.clone();
-    for k in (1..sums.len().saturating_sub(1)).filter(|_| !periodic) {
-        sharp[k] -= (sums[k + 1] - sums[k] * 2.0 + sums[k - 1]) * SMEARED;
-    }
-    sharp
-}
-
-/// G, coherence and interval at every frequency that is excited.
-fn points(
-    u: &[Vec<Complex<f64>>],
-    y: &[Vec<Complex<f64>>],
-    r: &[Vec<Complex<f64>>],
-    every: f64,
-    length: usize,
-    periodic: bool,
-) -> Vec<Point> {
-    let lines = u.first().map_or(0, Vec::len);
-    let sum = |a: &[Vec<Complex<f64>>], b: &[Vec<Complex<f64>>], k: usize| -> Complex<f64> {
-        a.iter().zip(b).map(|(a, b)| a[k] * b[k].conj()).sum()
-    };
-    let power: Vec<f64> = (0..lines).map(|k| sum(r, r, k).re).collect();
-    // What a difference leaves of a line, |1 − e^{−jωT}|², is no lack of excitation.
-    let plain = |k: usize| power[k] / (2.0 * (PI * (k + 1) as f64 / length as f64).sin()).powi(2);
-    let most = (0..lines).map(plain).fold(0.0, f64::max);
-    // Lines of a multisine stand out; of noise every one is excited.
-    let least = if periodic { 1e-4 * most } else { 1e-12 * most };
-    let count = u.len() as f64 * if periodic { 1.0 } else { INDEPENDENT };
-    let freedom = 2.0 * (count - 1.0);
-    // F of 2 and ν degrees of freedom at 95 %: (ν/2) (0.05^(−2/ν) − 1)
-    let quantile = 0.5 * freedom * (0.05f64.powf(-2.0 / freedom) - 1.0);
-    let crossed = |a: &[Vec<Complex<f64>>]| sharpened((0..lines).map(|k| sum(a, r, k)).collect(), periodic);
-    let (yr, ur) = (crossed(y), crossed(u));
-    let noisier = if periodic { 1.0 } else { NOISIER };
-    // Hann's window spreads the mean that is taken away into the first two lines.
-    let first = if periodic { 0 } else { 2 };
-    let mut all = Vec::new();
-    for k in first..lines {
-        let (seen, yr, ur, rr) = (sum(y, r, k), yr[k], ur[k], power[k]);
-        if plain(k).is_nan() || plain(k) <= least || ur.norm() == 0.0 {
-            continue;
+    let (mut frfs, mut warnings) = (Vec::new(), Vec::new());
+    for spectra in each {
+        let (rows, untold) = (spectra.rows(), untold(kind, &spectra));
+        if let (true, Some(error)) = (rows.is_empty(), untold.first()) {
+            return Err(error.clone().in_file(format!("log \"{}\"", spectra.name)));
         }
-        let g = yr / ur;
-        let left: f64 = u.iter().zip(y).map(|(u, y)| (y[k] - g * u[k]).norm_sqr()).sum();
-        let variance = noisier * left * rr / ((count - 1.0) * ur.norm_sqr());
-        let yy = sum(y, y, k).re;
-        all.push(Point {
-            omega: 2.0 * PI * (k + 1) as f64 / (length as f64 * every),
-            value: g,
-            radius: (variance * quantile).sqrt(),
-            deviation: variance.sqrt(),
-            coherence: if yy > 0.0 { (seen.norm_sqr() / (yy * rr)).min(1.0) } else { 0.0 },
-        });
+        warnings
+            .extend(untold.into_iter().map(|error| format!("{}: {}; it has no response", spectra.name, error.what)));
+        for Row { drive, quantity, points } in rows {
+            let mut alike = spectra.alike(drive);
+            let left = alike.iter().filter(|alike| **alike > ALIKE).count();
+            if left as f64 > SOME * alike.len() as f64 && quantity == spectra.first_output() {
+                let input = kind.geometry().drives[drive].input;
+                warnings.push(format!(
+                    "{}: at {left} of {} frequencies {input} cannot be told from the other inputs",
+                    spectra.name,
+                    alike.len()
+                ));
+            }
+            frfs.push(Frf {
+                name: spectra.name.clone(),
+                drive,
+                input: kind.geometry().drives[drive].input,
+                alike: median(&mut alike),
+                quantity,
+                every: spectra.every,
+                segments: spectra.segments(),
+                length: spectra.length,
+                periodic: spectra.periodic,
+                closed: spectra.closed(),
+                points,
+            });
+        }
     }
-    all
+    Ok((frfs, warnings))
+}
+
+/// Why there is no response to some inputs.
+fn untold(kind: Kind, spectra: &Spectra) -> Vec<Error> {
+    let name = |drive: &usize| kind.geometry().drives[*drive].input;
+    let listed = |drives: &[usize]| drives.iter().map(name).collect::<Vec<_>>().join(" and ");
+    let all = (0..spectra.drives()).filter(|drive| !spectra.tells(*drive));
+    let (alike, resting): (Vec<usize>, Vec<usize>) = all.partition(|drive| !spectra.alike(*drive).is_empty());
+    let mut errors = Vec::new();
+    if !alike.is_empty() {
+        let coherence = alike.iter().map(|drive| median(&mut spectra.alike(*drive))).fold(f64::INFINITY, f64::min);
+        errors.push(
+            Error::new(format!("{} cannot be told apart: their coherence is {coherence:.3}", listed(&alike)))
+                .allowed(format!("at most {ALIKE}"))
+                .next("move one motor after the other, or each by a signal of its own: prbs with different seeds"),
+        );
+    }
+    match resting[..] {
+        [] => {}
+        [_] if spectra.drives() == 1 => errors.push(
+            Error::new("the input does not change")
+                .next("excite the axis with a sweep, noise or several sines at once"),
+        ),
+        _ => errors
+            .push(Error::new(format!("no change of {}", listed(&resting))).next(
+                "move each motor, one after the other or by a signal of its own, in the same or in further logs",
+            )),
+    }
+    errors
+}
+
+/// The middle one of numbers; zero of none.
+fn median(values: &mut [f64]) -> f64 {
+    let middle = values.len() / 2;
+    match values.is_empty() {
+        true => 0.0,
+        false => *values.select_nth_unstable_by(middle, f64::total_cmp).1,
+    }
 }
 
 /// A response beside the model's.
@@ -287,7 +244,7 @@ pub struct Response {
     pub model: Vec<Complex<f64>>,
     /// Of the model with what was fitted; empty without a fit.
     pub fitted: Vec<Complex<f64>>,
-    /// Margins of the case's controller, of the position that it measures.
+    /// Margins of the case's controllers, of the position that that of this drive measures.
     pub margins: Option<Measured>,
 }
 
@@ -296,47 +253,56 @@ pub struct Response {
 pub struct Measurement {
     /// Where the model was asked.
     pub known: Known,
-    /// By log and output.
+    /// By log, input and output.
     pub responses: Vec<Response>,
+    /// Inputs that the logs do not tell apart.
+    pub warnings: Vec<String>,
     /// Stiffness, damping, delay; or why not.
     pub fit: Result<FrfFit>,
 }
 
+impl Known {
+    /// Of a case, with the cart and the bridge here, m, and this delay, s: at zero, and that of the controller where
+    /// nothing is said. Errors: no numbers, a place outside the travel, and that of a
+    /// bridge where there is none.
+    pub fn of(case: &Case, at: Option<f64>, bridge: Option<f64>, delay: Option<f64>) -> Result<Self> {
+        for (option, value) in [("--at", at), ("--bridge", bridge), ("--delay", delay)] {
+            if let Some(value) = value.filter(|value| !value.is_finite()) {
+                let error = Error::new(format!("{value:?} is of no use here")).in_file(option);
+                return Err(error.allowed("a finite number, in m or s"));
+            }
+        }
+        within_travel(&case.machine, at, bridge)?;
+        let delay = delay.or(case.controller.as_ref().map(|design| design.delay)).unwrap_or_default();
+        Ok(Self { place: at.unwrap_or_default(), bridge: bridge.unwrap_or_default(), delay })
+    }
+}
+
 /// Measures the responses of all logs of a case, and what follows from them.
 pub fn measure(case: &Case, cut: &Cut, known: Known) -> Result<Measurement> {
+    crate::case::needs_motors(&case.machine)?;
     case.complete()?;
     let machine = &case.machine;
-    let mut frfs = Vec::new();
-    for log in case.experiments.iter().filter_map(|experiment| experiment.log.as_ref()) {
-        frfs.extend(estimate(log, cut)?);
+    let logs: Vec<&Log> = case.experiments.iter().filter_map(|experiment| experiment.log.as_deref()).collect();
+    if logs.is_empty() {
+        let such_as = match machine.drives.len() {
+            1 => "input = \"u\", drive_angle = \"phi\"",
+            _ => "left_input = \"u1\", right_input = \"u2\", left_angle = \"phi1\"",
+        };
+        return Err(Error::new("this case has no log to measure a response from")
+            .next(format!("give an experiment log = {{ file = \"log.csv\", time = \"t\", {such_as} }}")));
     }
-    if frfs.is_empty() {
-        return Err(Error::new("this case has no log to measure a response from").next(
-            "give an experiment log = { file = \"log.csv\", time = \"t\", input = \"u\", drive_angle = \"phi\" }",
-        ));
-    }
+    let (frfs, warnings) = estimate_all(machine.kind, &logs, cut)?;
     let kinematic: Vec<Frf> = frfs.iter().filter(|frf| is_kinematic(frf.quantity)).cloned().collect();
     let fit = fit(machine, &known, &kinematic);
     let mut fitted = fit.as_ref().map(|fit| fit.curves.clone()).unwrap_or_default().into_iter();
-    let place = match (machine.encoder, measures_cart(machine)) {
-        (_, true) => Quantity::CartPosition,
-        (Some(encoder), _) if encoder.at != EncoderPlace::DrivePulley => Quantity::RotorAngle,
-        _ => Quantity::DriveAngle,
-    };
     let mut responses = Vec::new();
-    for frf in frfs {
-        // Without play in a gear the rotor's angle, divided by its ratio, is that of the pulley.
-        let is_own = frf.quantity == place || place == Quantity::RotorAngle && frf.quantity == Quantity::DriveAngle;
-        let length = if measures_cart(machine) { 1.0 } else { machine.pulley_radius };
-        let margins = match &case.controller {
-            Some(design) if is_own => measured(&frf, design, machine, length).ok(),
-            _ => None,
-        };
-        let model = fit::model(machine, known.place, known.delay, &frf).unwrap_or_default();
+    for frf in &frfs {
+        let model = fit::model(machine, &known, frf).unwrap_or_default();
         let fitted = if is_kinematic(frf.quantity) { fitted.next().unwrap_or_default() } else { Vec::new() };
-        responses.push(Response { frf, model, fitted, margins });
+        responses.push(Response { frf: frf.clone(), model, fitted, margins: margins_of(case, frf, &frfs) });
     }
-    Ok(Measurement { known, responses, fit })
+    Ok(Measurement { known, responses, warnings, fit })
 }
 
 /// True if a quantity is a position or a speed.
@@ -344,31 +310,41 @@ fn is_kinematic(quantity: Quantity) -> bool {
     quantity.is_position() || quantity.is_speed()
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::chance::normal;
-    use rand_pcg::Pcg64;
-    use rand_pcg::rand_core::SeedableRng;
-
-    /// Intervals of the delay held 92.5 % for 95 %: the fit took noise at neighbouring lines for independent.
-    #[test]
-    fn noise_at_neighbouring_lines_is_alike_by_what_the_fit_takes() {
-        let mut random = Pcg64::seed_from_u64(6);
-        let mut sums = [0.0; 4];
-        for _ in 0..100 {
-            let mut white = || -> Vec<f64> { (0..4096).map(|_| normal(&mut random)).collect() };
-            let [u, y] = [white(), white()].map(|values| transforms(&values, 0, 256, 128, false));
-            let points = points(&u, &y, &u, 1e-3, 256, false);
-            for (distance, sum) in sums.iter_mut().enumerate() {
-                let pairs = points.iter().zip(&points[distance..]);
-                *sum += pairs.map(|(a, b)| (a.value / a.deviation * (b.value / b.deviation).conj()).re).sum::<f64>()
-                    / (points.len() - distance) as f64;
-            }
+/// The names of the position that the controller of a drive measures; the first is that itself.
+fn measured_by(machine: &Machine, drive: usize) -> Vec<String> {
+    let geometry = machine.geometry();
+    let at = &geometry.drives[drive];
+    let pulley = format!("{}_angle", geometry.label(at.pulley).key);
+    match (machine.encoder, measures_cart(machine)) {
+        (_, true) => vec![Quantity::CartPosition.name().into()],
+        // Without play in a gear the rotor's angle, divided by its ratio, is that of the pulley.
+        (Some(encoder), _) if encoder.at != EncoderPlace::DrivePulley => {
+            vec![format!("{}_angle", at.rotor.key), pulley]
         }
-        for (distance, rho) in [(1, fit::ALIKE[0]), (2, fit::ALIKE[1]), (3, 0.0)] {
-            let seen = sums[distance] / sums[0];
-            assert!((seen - rho).abs() < 0.02, "{distance}: {seen} {rho}");
-        }
+        _ => vec![pulley],
     }
+}
+
+/// Margins of the case's controllers, if this is the response of what that of its drive measures, and those of the
+/// other drives were measured with it.
+fn margins_of(case: &Case, frf: &Frf, all: &[Frf]) -> Option<Measured> {
+    let (design, machine) = (case.controller.as_ref()?, &case.machine);
+    if !measured_by(machine, frf.drive).iter().any(|name| name == frf.quantity.name()) {
+        return None;
+    }
+    let response = |row: usize, drive: usize| {
+        if row == frf.drive && drive == row {
+            return Some(frf);
+        }
+        let names = measured_by(machine, row);
+        let of = |name: &String| {
+            all.iter().find(|one| one.name == frf.name && one.drive == drive && one.quantity.name() == name)
+        };
+        names.iter().find_map(of)
+    };
+    let drives = 0..machine.drives.len();
+    let row = |row: usize| drives.clone().map(|drive| response(row, drive)).collect::<Option<Vec<_>>>();
+    let matrix = drives.clone().map(row).collect::<Option<Vec<_>>>()?;
+    let length = if measures_cart(machine) { 1.0 } else { machine.pulley_radius };
+    measured(&matrix, frf.drive, design, machine, length).ok()
 }

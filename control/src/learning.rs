@@ -21,6 +21,15 @@
 //! larger at no frequency. Q is the largest gain of at most 1 with which the bound holds, and falls to zero where T₀ is
 //! too small to be inverted; there the feedback is left alone.
 //!
+//! Of a gantry e and w are vectors: the errors of bridge and cart, and the signals that move one of them alone, which
+//! the motors get as their belts have it, B w with r φ = B q. T is a matrix of two rows, and
+//!
+//! ```text
+//! L = s T̃₀ᴴ (T̃₀ T̃₀ᴴ + 1)⁻¹ R⁻¹,  T̃₀ = R⁻¹ T₀,  R = diag ρ_i          (ρ_i of the largest row i of T₀)
+//! ```
+//!
+//! with largest singular values in place of magnitudes, and the smallest of T̃₀ where T₀ is to be inverted.
+//!
 //! M. Norrlöf, S. Gunnarsson, "Time and frequency domain convergence properties in iterative learning control", *Int.
 //! J. Control* 75 (2002) 1114-1126. D. Bristow, M. Tharayil, A. Alleyne, "A survey of iterative learning control",
 //! *IEEE Control Systems Magazine* 26 (2006) 96-114.
@@ -30,9 +39,10 @@ use crate::control::Added;
 use crate::control::feedback::Feedback;
 use crate::design::Design;
 use crate::error::{Error, Result};
+use crate::machine::Geometry;
 use crate::quantity::rounded;
-use crate::tune::{Corner, Family, Peaks, from_command};
-use nalgebra::Complex;
+use crate::tune::{Corner, Family, Peaks, from_commands, inverse, largest, over, smallest};
+use nalgebra::{Complex, SMatrix, SVector};
 use rustfft::{Fft, FftPlanner};
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -57,9 +67,9 @@ const COARSEST: f64 = 2.5;
 /// The position that a trial was measured by.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum At {
-    /// The cart.
+    /// What slides: the cart; of a gantry bridge and cart.
     Cart,
-    /// The controller's measurement, along the belt.
+    /// The measurements of the controllers of all drives, along the belt.
     Encoder,
 }
 
@@ -68,8 +78,8 @@ pub enum At {
 pub struct Trial {
     /// s from the beginning of the move, increasing.
     pub time: Vec<f64>,
-    /// m.
-    pub position: Vec<f64>,
+    /// Those of each sliding part, or of each drive, m.
+    pub positions: Vec<Vec<f64>>,
     /// The measured place.
     pub at: At,
 }
@@ -115,23 +125,44 @@ pub struct Point {
     pub kept: f64,
 }
 
+/// The signal of a drive.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DriveSignal {
+    /// In the trial, V or A.
+    pub before: Vec<f64>,
+    /// The next one, V or A.
+    pub next: Vec<f64>,
+}
+
+impl DriveSignal {
+    /// Largest magnitude of the next signal, V or A.
+    pub fn largest(&self) -> f64 {
+        self.next.iter().fold(0.0, |most, w| most.max(w.abs()))
+    }
+}
+
+/// The error of what slides.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SlideError {
+    /// In the trial, m: reference less position.
+    pub error: Vec<f64>,
+    /// The next one on the machine of the file, m.
+    pub expected: Vec<f64>,
+    /// Size of that of the trial.
+    pub now: Size,
+    /// The repetitions to come.
+    pub predicted: Vec<Predicted>,
+}
+
 /// The next signal, and what it does.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Learned {
     /// Between values, s: the controller's sample time.
     pub every: f64,
-    /// The signal of the trial, V or A.
-    pub before: Vec<f64>,
-    /// The next one, V or A.
-    pub next: Vec<f64>,
-    /// The error of the trial, m: reference less position.
-    pub error: Vec<f64>,
-    /// The next one on the machine of the file, m.
-    pub expected: Vec<f64>,
-    /// Size of the error of the trial.
-    pub now: Size,
-    /// The repetitions to come.
-    pub predicted: Vec<Predicted>,
+    /// The signal of each drive.
+    pub drives: Vec<DriveSignal>,
+    /// The error of each sliding part.
+    pub slides: Vec<SlideError>,
     /// max |Q (1 − L T)| over frequencies and family.
     pub contraction: f64,
     /// Lowest and highest frequency with Q = 1, Hz.
@@ -145,27 +176,48 @@ pub struct Learned {
 }
 
 impl Learned {
-    /// Largest magnitude of the next signal, V or A.
+    /// Largest magnitude of the next signals, V or A.
     pub fn largest(&self) -> f64 {
-        self.next.iter().fold(0.0, |most, w| most.max(w.abs()))
+        self.drives.iter().map(DriveSignal::largest).fold(0.0, f64::max)
     }
 
-    /// The next signal as something to add to a command.
-    pub fn added(&self) -> Added {
-        Added::new(self.every, self.next.clone())
+    /// The next signal of each drive as something to add to its command.
+    pub fn added(&self) -> Vec<Added> {
+        self.drives.iter().map(|drive| Added::new(self.every, drive.next.clone())).collect()
+    }
+
+    /// True if the next repetition may have no smaller error on the worst machine, by the root of the sum of squares.
+    pub fn is_near_its_limit(&self) -> bool {
+        let sum = |of: &dyn Fn(&SlideError) -> f64| self.slides.iter().map(|slide| of(slide).powi(2)).sum::<f64>();
+        let next = |slide: &SlideError| slide.predicted.first().map_or(0.0, |next| next.worst.rms);
+        sum(&next) >= sum(&|slide: &SlideError| slide.now.rms)
     }
 }
 
-/// The next signal of a move from its last repetition, in which `before` was added to the command. Errors: a log that
-/// does not cover the move, a controller that is not linear, a loop that is unstable on a machine of the family, a
-/// family on which learning would not converge.
+/// The next signal of a move from its last repetition, in which `before` was added to the command of each drive. Errors:
+/// a log that does not cover the move, a controller that is not linear, a loop that is unstable on a machine of the
+/// family, a family on which learning would not converge.
 pub fn learn(
     case: &Case,
     motion: &Move,
     trial: &Trial,
-    before: Option<&Added>,
+    before: Option<&[Added]>,
     stop: &dyn Fn() -> bool,
 ) -> Result<Learned> {
+    match case.machine.has_one_coordinate() {
+        true => learned::<1>(case, motion, trial, before, stop),
+        false => learned::<2>(case, motion, trial, before, stop),
+    }
+}
+
+fn learned<const M: usize>(
+    case: &Case,
+    motion: &Move,
+    trial: &Trial,
+    before: Option<&[Added]>,
+    stop: &dyn Fn() -> bool,
+) -> Result<Learned> {
+    crate::case::needs_motors(&case.machine)?;
     let Some(design) = &case.controller else {
         return Err(Error::new("there is no controller whose moves could be learned").next("add [controller]"));
     };
@@ -174,24 +226,46 @@ pub fn learn(
         return Err(Error::new("the controller is not linear: no response of its loop exists to learn with")
             .next("learn with a linear structure, such as pid or cascade"));
     }
-    let error = errors(motion, design, trial)?;
-    let (n, every) = (error.len(), design.every);
-    let signal = |k: usize| before.map_or(0.0, |added| added.at((k as f64 + 1e-3) * every).0);
-    let before: Vec<f64> = (0..n).map(signal).collect();
+    let geometry = case.machine.geometry();
+    if let Some(signals) = before.filter(|signals| signals.len() != geometry.drives.len()) {
+        return Err(Error::new(format!("there are {} signals that were added", signals.len()))
+            .allowed(format!("{}: one for each drive", geometry.drives.len())));
+    }
+    let errors = errors(geometry, motion, design, trial)?;
+    let (n, every) = (errors[0].len(), design.every);
+    let signal = |drive: usize| -> Vec<f64> {
+        let value = |k: usize| before.map_or(0.0, |added| added[drive].at((k as f64 + 1e-3) * every).0);
+        (0..n).map(value).collect()
+    };
+    let before: Vec<Vec<f64>> = (0..geometry.drives.len()).map(signal).collect();
+    let signals: Vec<Vec<f64>> = geometry.slides.iter().map(|slide| weighed(&before, slide.by_drives, n)).collect();
     let transform = Transform::new(n, every);
     let family = Family::of(case, &case.tune.clone().unwrap_or_default())?;
     let responses = responses(&family, (design, &feedback), trial.at, &transform, stop)?;
-    let rule = Rule::new(&responses)?;
+    let rule = Rule::<M>::new(&responses)?;
     let taper = taper(n, motion.end() / every);
-    let predictions = rule.predicted(&responses, &transform, (&error, &before), &taper);
-    let now = Size::of(&error);
-    let kept = transform.squared(&error, &|k| rule.kept[k] >= 1.0) / transform.squared(&error, &|_| true);
+    let predictions = rule.predicted(&responses, &transform, (&errors, &signals), &taper);
+    let squared = |is_chosen: &dyn Fn(usize) -> bool| -> f64 {
+        errors.iter().map(|error| transform.squared(error, is_chosen)).sum()
+    };
+    let kept = squared(&|k| rule.kept[k] >= 1.0) / squared(&|_| true);
     let within = |k: &usize| rule.kept[*k] >= 1.0;
     let hertz = |k: usize| transform.omega(k) / (2.0 * PI);
     let frequencies = || (0..transform.bins()).filter(within);
+    // Of each drive what its belt's travel has of it.
+    let shares = case.machine.belt_shares();
+    let next = |drive: usize| weighed(&predictions.next, shares[drive], n);
+    let drives = before.into_iter().enumerate().map(|(drive, before)| DriveSignal { before, next: next(drive) });
+    let of_slide = |(slide, error): (usize, &Vec<f64>)| SlideError {
+        now: Size::of(error),
+        error: error.clone(),
+        expected: predictions.expected[slide].clone(),
+        predicted: predictions.sizes[slide].clone(),
+    };
     Ok(Learned {
         every,
-        now,
+        drives: drives.collect(),
+        slides: errors.iter().enumerate().map(of_slide).collect(),
         share: if kept.is_finite() { kept } else { 0.0 },
         band: [frequencies().next().map_or(0.0, hertz), frequencies().next_back().map_or(0.0, hertz)],
         contraction: rule.contraction(),
@@ -199,22 +273,33 @@ pub fn learn(
             .map(|k| Point { frequency: hertz(k), left: rule.left[k], kept: rule.kept[k] })
             .collect(),
         axes: responses.len(),
-        next: predictions.next,
-        expected: predictions.expected,
-        predicted: predictions.sizes,
-        before,
-        error,
     })
 }
 
-/// Reference less position at the controller's samples, m.
-fn errors(motion: &Move, design: &Design, trial: &Trial) -> Result<Vec<f64>> {
-    let Trial { time, position, .. } = trial;
+/// A sum of signals of `n` values with these weights.
+fn weighed(signals: &[Vec<f64>], weights: &[f64], n: usize) -> Vec<f64> {
+    (0..n).map(|k| signals.iter().zip(weights).map(|(signal, weight)| weight * signal[k]).sum()).collect()
+}
+
+/// Reference less position of each sliding part at the controller's samples, m.
+fn errors(geometry: &Geometry, motion: &Move, design: &Design, trial: &Trial) -> Result<Vec<Vec<f64>>> {
+    let Trial { time, positions, at } = trial;
     let every = design.every;
+    let wanted = match at {
+        At::Cart => geometry.slides.len(),
+        At::Encoder => geometry.drives.len(),
+    };
+    if positions.len() != wanted {
+        return Err(Error::new(format!("the log has {} columns of positions", positions.len())).allowed(match at {
+            At::Cart => format!("{wanted}: one for each part that slides"),
+            At::Encoder => format!("{wanted}: one for the encoder of each drive"),
+        }));
+    }
     let (Some(&first), Some(&last)) = (time.first(), time.last()) else {
         return Err(Error::new("the log has no rows"));
     };
-    if time.len() != position.len() || time.iter().chain(position).any(|value| !value.is_finite()) {
+    let is_whole = |position: &Vec<f64>| position.len() == time.len() && position.iter().all(|x| x.is_finite());
+    if time.iter().any(|value| !value.is_finite()) || !positions.iter().all(is_whole) {
         return Err(Error::new("the log has values that are no numbers").next("keep complete rows"));
     }
     if first > every {
@@ -237,18 +322,28 @@ fn errors(motion: &Move, design: &Design, trial: &Trial) -> Result<Vec<f64>> {
             .allowed(format!("a rest of at least {LEAST_REST} samples after the move"))
             .next("log a little longer, or give the move a longer `until`"));
     }
-    let profile = &motion.references(design)[0];
-    let mut row = 0;
-    let at = |k: usize| {
-        let t = k as f64 * every;
-        while row + 2 < time.len() && time[row + 1] <= t {
-            row += 1;
-        }
-        let next = (row + 1).min(time.len() - 1);
-        let share = if next > row { ((t - time[row]) / (time[next] - time[row])).clamp(0.0, 1.0) } else { 0.0 };
-        profile.at(t).position - (position[row] + share * (position[next] - position[row]))
+    let profiles = motion.references(design);
+    let one = |slide: usize| -> Vec<f64> {
+        let position = |row: usize| match at {
+            At::Cart => positions[slide][row],
+            At::Encoder => {
+                let by_drives = geometry.slides[slide].by_drives;
+                positions.iter().zip(by_drives).map(|(position, weight)| weight * position[row]).sum()
+            }
+        };
+        let mut row = 0;
+        let at = |k: usize| {
+            let t = k as f64 * every;
+            while row + 2 < time.len() && time[row + 1] <= t {
+                row += 1;
+            }
+            let next = (row + 1).min(time.len() - 1);
+            let share = if next > row { ((t - time[row]) / (time[next] - time[row])).clamp(0.0, 1.0) } else { 0.0 };
+            profiles[slide].at(t).position - (position(row) + share * (position(next) - position(row)))
+        };
+        (0..n).map(at).collect()
     };
-    Ok((0..n).map(at).collect())
+    Ok((0..geometry.slides.len()).map(one).collect())
 }
 
 /// 1 during the move, then down to 0 over the rest, half a cosine: a cart that sticks does not answer as T does.
@@ -268,6 +363,10 @@ struct Transform {
 }
 
 type Spectrum = Vec<Complex<f64>>;
+
+/// A matrix and a vector at a frequency, of what slides and the signals that move it.
+type Matrix<const M: usize> = SMatrix<Complex<f64>, M, M>;
+type Vector<const M: usize> = SVector<Complex<f64>, M>;
 
 impl Transform {
     fn new(n: usize, every: f64) -> Self {
@@ -313,13 +412,13 @@ impl Transform {
 }
 
 /// The response T of each machine of the family, that of the file first.
-fn responses(
+fn responses<const M: usize>(
     family: &Family,
     (design, feedback): (&Design, &Feedback),
     at: At,
     transform: &Transform,
     stop: &dyn Fn() -> bool,
-) -> Result<Vec<Spectrum>> {
+) -> Result<Vec<Vec<Matrix<M>>>> {
     let mut corners: Vec<Corner> = vec![family.nominal()];
     for corner in family.machines.iter().cloned().chain(family.ends()) {
         if !corners.contains(&corner) {
@@ -340,47 +439,57 @@ fn responses(
             .next("tune the controller first: `taut tune`; or reduce tune.spread"));
         }
         let response = |k: usize| {
-            from_command(&plant, feedback, transform.omega(k)).map(|[cart, encoder]| match at {
-                At::Cart => cart,
-                At::Encoder => encoder,
-            })
+            let [slides, by_drives] = from_commands(&plant, feedback, transform.omega(k));
+            match at {
+                At::Cart => slides,
+                At::Encoder => by_drives,
+            }
         };
-        let found: Option<Spectrum> = (0..transform.bins()).map(response).collect();
-        all.push(found.ok_or_else(|| Error::new("learning needs a single axis"))?);
+        all.push((0..transform.bins()).map(response).collect());
     }
     Ok(all)
 }
 
 /// L and Q.
-struct Rule {
-    gain: Spectrum,
+struct Rule<const M: usize> {
+    gain: Vec<Matrix<M>>,
     kept: Vec<f64>,
     /// |1 − L T|, the largest of the family.
     left: Vec<f64>,
 }
 
-/// The next signal, and the repetitions to come.
+/// The next signals that move one part alone, and the repetitions to come, of each sliding part.
 struct Predictions {
-    next: Vec<f64>,
-    expected: Vec<f64>,
-    sizes: Vec<Predicted>,
+    next: Vec<Vec<f64>>,
+    expected: Vec<Vec<f64>>,
+    sizes: Vec<Vec<Predicted>>,
 }
 
-impl Rule {
-    fn new(responses: &[Spectrum]) -> Result<Self> {
+impl<const M: usize> Rule<M> {
+    fn new(responses: &[Vec<Matrix<M>>]) -> Result<Self> {
         let own = &responses[0];
-        let rho = INVERTIBLE * own.iter().map(|t| t.norm()).fold(0.0, f64::max);
-        // L = s T₀*/(|T₀|² + ρ²)
-        let mut gain: Spectrum = own.iter().map(|t| t.conj() / (t.norm_sqr() + rho * rho)).collect();
-        let left_of =
-            |gain: &Complex<f64>, k: usize| responses.iter().map(|t| (1.0 - gain * t[k]).norm()).fold(0.0, f64::max);
+        let rho: [f64; M] =
+            std::array::from_fn(|row| INVERTIBLE * own.iter().map(|t| t.row(row).norm()).fold(0.0, f64::max));
+        // T̃₀ = R⁻¹ T₀
+        let scaled = |t: &Matrix<M>| Matrix::<M>::from_fn(|row, column| t[(row, column)] / rho[row]);
+        // L = s T̃₀ᴴ (T̃₀ T̃₀ᴴ + 1)⁻¹ R⁻¹
+        let whole_gain = |t: &Matrix<M>| {
+            let t = scaled(t);
+            let (adjugate, determinant) = inverse(&(t * t.adjoint() + Matrix::<M>::identity()));
+            let gain = over(&t.adjoint(), &adjugate, determinant);
+            Matrix::<M>::from_fn(|row, column| gain[(row, column)] / rho[column])
+        };
+        let mut gain: Vec<Matrix<M>> = own.iter().map(whole_gain).collect();
+        let left_of = |gain: &Matrix<M>, k: usize| {
+            responses.iter().map(|t| largest(&(Matrix::<M>::identity() - gain * t[k]))).fold(0.0, f64::max)
+        };
         let whole: Vec<f64> = gain.iter().enumerate().map(|(k, gain)| left_of(gain, k)).collect();
         for (gain, left) in gain.iter_mut().zip(&whole) {
-            *gain *= ((1.0 - left) / (1.0 - CONTRACTION)).clamp(0.0, 1.0);
+            *gain *= Complex::from(((1.0 - left) / (1.0 - CONTRACTION)).clamp(0.0, 1.0));
         }
         let left: Vec<f64> = gain.iter().enumerate().map(|(k, gain)| left_of(gain, k)).collect();
-        let rise = |t: &Complex<f64>| {
-            let share = ((t.norm() / rho).ln() / KEPT_FROM.ln()).clamp(0.0, 1.0);
+        let rise = |t: &Matrix<M>| {
+            let share = (smallest(&scaled(t)).ln() / KEPT_FROM.ln()).clamp(0.0, 1.0);
             (0.5 * PI * share).sin().powi(2)
         };
         let kept: Vec<f64> = own.iter().zip(&left).map(|(t, left)| rise(t) * (CONTRACTION / left).min(1.0)).collect();
@@ -402,34 +511,42 @@ impl Rule {
     }
 
     /// w⁺ = Q (w + L e)
-    fn next(&self, transform: &Transform, error: &[f64], signal: &[f64], taper: &[f64]) -> Vec<f64> {
-        let error: Vec<f64> = error.iter().zip(taper).map(|(e, share)| e * share).collect();
-        let (e, w) = (transform.of(&error), transform.of(signal));
-        let next = |k: usize| (w[k] + self.gain[k] * e[k]) * self.kept[k];
-        transform.signal(&(0..transform.bins()).map(next).collect::<Spectrum>())
+    fn next(&self, transform: &Transform, errors: &[Vec<f64>], signals: &[Vec<f64>], taper: &[f64]) -> Vec<Vec<f64>> {
+        let tapered = |error: &Vec<f64>| -> Vec<f64> { error.iter().zip(taper).map(|(e, share)| e * share).collect() };
+        let e: Vec<Spectrum> = errors.iter().map(|error| transform.of(&tapered(error))).collect();
+        let w: Vec<Spectrum> = signals.iter().map(|signal| transform.of(signal)).collect();
+        let next = |k: usize| (vector(&w, k) + self.gain[k] * vector(&e, k)) * Complex::from(self.kept[k]);
+        parted((0..transform.bins()).map(next), transform)
     }
 
     /// The repetitions to come on each machine.
     fn predicted(
         &self,
-        responses: &[Spectrum],
+        responses: &[Vec<Matrix<M>>],
         transform: &Transform,
-        (error, signal): (&[f64], &[f64]),
+        (errors, signals): (&[Vec<f64>], &[Vec<f64>]),
         taper: &[f64],
     ) -> Predictions {
-        let next = self.next(transform, error, signal, taper);
-        let mut predictions = Predictions { next: next.clone(), expected: Vec::new(), sizes: Vec::new() };
+        let next = self.next(transform, errors, signals, taper);
+        let mut predictions = Predictions { next: next.clone(), expected: Vec::new(), sizes: vec![Vec::new(); M] };
         for (number, response) in responses.iter().enumerate() {
-            let (mut e, mut w, mut after) = (error.to_vec(), signal.to_vec(), next.clone());
+            let (mut e, mut w, mut after) = (errors.to_vec(), signals.to_vec(), next.clone());
             for trial in 0..PREDICTED {
                 // e⁺ = e − T (w⁺ − w)
-                let change: Vec<f64> = after.iter().zip(&w).map(|(next, before)| next - before).collect();
-                let moved: Spectrum = transform.of(&change).iter().zip(response).map(|(w, t)| w * t).collect();
-                e.iter_mut().zip(transform.signal(&moved)).for_each(|(e, moved)| *e -= moved);
-                let size = Size::of(&e);
-                match predictions.sizes.get_mut(trial) {
-                    Some(predicted) => predicted.worst = predicted.worst.or_larger(size),
-                    None => predictions.sizes.push(Predicted { nominal: size, worst: size }),
+                let change = |(next, before): (&Vec<f64>, &Vec<f64>)| -> Spectrum {
+                    transform.of(&next.iter().zip(before).map(|(next, before)| next - before).collect::<Vec<_>>())
+                };
+                let change: Vec<Spectrum> = after.iter().zip(&w).map(change).collect();
+                let moved = parted((0..transform.bins()).map(|k| response[k] * vector(&change, k)), transform);
+                for (e, moved) in e.iter_mut().zip(moved) {
+                    e.iter_mut().zip(moved).for_each(|(e, moved)| *e -= moved);
+                }
+                for (e, sizes) in e.iter().zip(&mut predictions.sizes) {
+                    let size = Size::of(e);
+                    match sizes.get_mut(trial) {
+                        Some(predicted) => predicted.worst = predicted.worst.or_larger(size),
+                        None => sizes.push(Predicted { nominal: size, worst: size }),
+                    }
                 }
                 if (number, trial) == (0, 0) {
                     predictions.expected = e.clone();
@@ -440,4 +557,18 @@ impl Rule {
         }
         predictions
     }
+}
+
+/// The values of spectra at a frequency.
+fn vector<const M: usize>(spectra: &[Spectrum], k: usize) -> Vector<M> {
+    Vector::from_fn(|row, _| spectra[row][k])
+}
+
+/// The signals of spectra that are given frequency by frequency.
+fn parted<const M: usize>(all: impl Iterator<Item = Vector<M>>, transform: &Transform) -> Vec<Vec<f64>> {
+    let mut spectra: Vec<Spectrum> = vec![Vec::with_capacity(transform.bins()); M];
+    for values in all {
+        spectra.iter_mut().zip(values.iter()).for_each(|(spectrum, value)| spectrum.push(*value));
+    }
+    spectra.iter().map(|spectrum| transform.signal(spectrum)).collect()
 }

@@ -10,7 +10,7 @@ use pyo3::types::{PyDict, PyList};
 use std::path::PathBuf;
 use std::sync::Arc;
 use taut::Error;
-use taut::case::{Accepted, Files, InputFile, Plan, TEMPLATE};
+use taut::case::{Files, InputFile, Plan, TEMPLATE};
 use taut::control::Added;
 use taut::export::{Exported, Options, Part, Place, Real, Target, export};
 use taut::files::{Inputs, write_atomically};
@@ -91,6 +91,19 @@ impl Case {
     #[getter]
     fn kind(&self) -> &str {
         self.inner.machine.kind.word()
+    }
+
+    /// The names of its drives, of a gantry their sides.
+    #[getter]
+    fn drives(&self) -> Vec<&'static str> {
+        let geometry = self.inner.machine.geometry();
+        geometry.drives.iter().map(|drive| geometry.drive_key(drive)).collect()
+    }
+
+    /// The names of what slides.
+    #[getter]
+    fn slides(&self) -> Vec<&'static str> {
+        self.inner.machine.travels().map(|(label, _)| label.key).collect()
     }
 
     #[getter]
@@ -209,11 +222,11 @@ impl Case {
         segment: Option<f64>,
         period: Option<f64>,
         at: Option<f64>,
+        bridge: Option<f64>,
         delay: Option<f64>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let case = self.axis(py)?;
-        let delay = delay.or(case.controller.as_ref().map(|design| design.delay)).unwrap_or_default();
-        let (cut, known) = (Cut { segment, period }, Known { place: at.unwrap_or_default(), delay });
+        let case = &self.inner;
+        let (cut, known) = (Cut { segment, period }, Known::of(case, at, bridge, delay).told(py)?);
         let found = unlocked(py, || measure(case, &cut, known))?.map_err(|error| error.in_file(&self.path)).told(py)?;
         value::json(py, &guarded(|| json::frf(case, &found))?)
     }
@@ -224,7 +237,7 @@ impl Case {
         &self,
         py: Python<'_>,
         names: Vec<String>,
-        inputs: Vec<String>,
+        inputs: (Vec<String>, Vec<String>),
         criterion: &str,
         times: (f64, Option<f64>),
         shares: (f64, f64, f64),
@@ -233,7 +246,7 @@ impl Case {
         verified: u32,
         seed: u64,
     ) -> PyResult<(Py<PyAny>, Py<Self>)> {
-        let case = self.axis(py)?;
+        let case = &self.inner;
         let kind = |word: &String| {
             let kinds = Kind::ALL.map(Kind::word).join(", ");
             let found = Kind::ALL.into_iter().find(|kind| kind.word() == word);
@@ -255,9 +268,11 @@ impl Case {
             other => Err(Error::new(format!("there is no criterion \"{other}\"")).allowed("d, a")),
         };
         let ((duration, every), (margin, doubt, model_error), (input, current, travel)) = (times, shares, limits);
+        let (inputs, driven) = inputs;
         let request = Request {
             names,
             kinds: inputs.iter().map(kind).collect::<taut::Result<_>>().told(py)?,
+            driven,
             criterion: criterion.told(py)?,
             duration,
             every,
@@ -345,21 +360,22 @@ impl Case {
         py: Python<'py>,
         names: Vec<String>,
         time: Vec<f64>,
-        position: Vec<f64>,
-        added: Option<Vec<f64>>,
+        positions: Vec<Vec<f64>>,
+        added: Option<Vec<Vec<f64>>>,
         encoder: bool,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let case = self.axis(py)?;
+        let case = &self.inner;
         let (design, moves) = case.moves_named(&self.path, &names).told(py)?;
         let [motion] = moves[..] else {
             let error = Error::new(format!("the case has {} moves, and a log is of one", moves.len()));
             return Err(error.next("name the move of the log: move=\"...\"")).told(py);
         };
         let at = if encoder { At::Encoder } else { At::Cart };
-        let before = added.map(|values| Added::new(design.every, values));
-        let trial = Trial { time, position, at };
+        let before: Option<Vec<Added>> =
+            added.map(|signals| signals.into_iter().map(|values| Added::new(design.every, values)).collect());
+        let trial = Trial { time, positions, at };
         let interrupt = Interrupt::listen();
-        let found = unlocked(py, || learn(case, motion, &trial, before.as_ref(), &|| interrupt.stop()));
+        let found = unlocked(py, || learn(case, motion, &trial, before.as_deref(), &|| interrupt.stop()));
         interrupt.finish()?;
         let found = found?.map_err(|error| error.in_file(&self.path)).told(py)?;
         value::json(py, &guarded(|| json::learned(case, motion, at, &found))?)
@@ -481,18 +497,6 @@ impl Case {
 }
 
 impl Case {
-    /// The case of an axis; told where it has to be one.
-    pub fn axis(&self, py: Python<'_>) -> PyResult<&Arc<taut::case::Case>> {
-        if self.inner.is_axis() {
-            return Ok(&self.inner);
-        }
-        // Read as that of an axis, it is told where it says that it is none.
-        let told = guarded(|| {
-            taut::case::Case::from_text_accepting(&self.path, self.text(), &[], (Files::All, Accepted::Axis))
-        })?;
-        Err(crate::error::told(py, told.err().unwrap_or_else(|| taut::Error::new("this needs a single axis"))))
-    }
-
     fn files(&self) -> &[InputFile] {
         &self.inner.files
     }

@@ -226,7 +226,7 @@ def test_learning_is_that_of_the_command_line(root, tmp_path):
     assert len(found.added) == len(found.times) == len(found.to_pandas()) and np.abs(found.added).max() > 0
     assert "short fast" in repr(found) and "repetition" in found._repr_html_()
     again = moving.learn(times, lagging, move="short fast", added=found.added)
-    assert again.data["added_before"] == list(found.added)
+    assert again.data["drives"][0]["added_before"] == list(found.added)
     for wrong in ({"move": "gone"}, {}):
         with pytest.raises(taut.Error):
             moving.learn(times, lagging, **wrong)

@@ -176,9 +176,10 @@ def test_a_dual_belt_has_three_drives(root):
 
 def test_what_is_not_there_says_so(gantry):
     assert repr(gantry) == "<taut.Case 'H-frame': one motor, along x, along y>"
-    with pytest.raises(taut.Error, match="this needs a single axis") as told:
+    with pytest.raises(taut.Error, match="nothing is measured in this case"):
+        gantry.design(["cart.mass"])
+    with pytest.raises(taut.Error, match="no log to measure a response from"):
         gantry.frf()
-    assert told.value.line == 4
     with pytest.raises(taut.Error, match="is of a single axis"):
         gantry.simulate(solver="table3")
 
@@ -195,3 +196,47 @@ def test_logs_of_both_motors_are_checked_and_fitted(root):
         case.compare()
     with pytest.raises(taut.Error, match="single changes are searched for on a single axis"):
         case.drift()
+
+
+def test_responses_of_every_output_to_every_motor(root):
+    case = taut.read(root / "stages/core-xy/belts.toml")
+    found = case.frf(segment=0.128, at=0.0, bridge=0.0)
+    titles = [(one["input"], one["quantity"]) for one in found.data["responses"]]
+    sides = ("left", "right")
+    assert titles == [(f"{motor}_input", f"{pulley}_angle") for motor in sides for pulley in sides]
+    assert found.data["bridge_m"] == 0 and found.data["warnings"] == []
+    assert all(one["input_coherence"] < 0.5 for one in found.data["responses"])
+    assert set(found.to_pandas()["input"]) == {"left_input", "right_input"}
+    assert "both motors: left_input to left_angle" in repr(found)
+    with pytest.raises(taut.Error, match="segments of 1000 samples"):
+        case.frf(segment=1.0)
+    with pytest.raises(taut.Error, match="of no use here"):
+        case.frf(bridge=float("nan"))
+
+
+def test_an_experiment_is_designed(gantry):
+    measured = {"left_angle": 1e-3, "right_angle": 1e-3}
+    options = {"inputs": ["trapezoid"], "duration": 0.3, "verify": 0, "measured": measured}
+    found = gantry.design(["cart.mass"], drives=["left"], **options)
+    assert found.data["drive"] == "left" and found.data["bridge"]["travel_m"]["value"] == 0.5
+    assert "input = { left = {" in found.toml and found.data["complete"]
+    assert found.case.simulate("designed").metrics["final_bridge_position_m"] is not None
+    with pytest.raises(taut.Error, match="`middle` is nothing that an input can go to"):
+        gantry.design(["cart.mass"], drives=["middle"], **options)
+
+
+def test_a_repeated_move_is_learned(root):
+    gains = {"proportional": "3 V/mm", "derivative": "20 V s/m"}
+    case = taut.read(root / "stages/core-xy/square.toml").changed({f"controller.pid.{key}": value for key, value in gains.items()})
+    run = case.move("square")
+    positions = {"bridge": run["bridge_position"], "cart": run["cart_position"]}
+    found = case.learn(run["time"], positions, move="square")
+    assert [load["name"] for load in found.data["loads"]] == ["bridge", "cart"]
+    assert set(found.added) == {"left", "right"} and len(found.added["left"]) == len(found.times)
+    assert "right_added" in found.to_pandas() and "bridge_error_m" in found.to_pandas()
+    again = case.learn(run["time"], positions, move="square", added=found.added)
+    assert again.data["drives"][1]["added_before"] == list(found.added["right"])
+    with pytest.raises(TypeError, match="position: expected a mapping with bridge, cart"):
+        case.learn(run["time"], run["cart_position"], move="square")
+    with pytest.raises(TypeError, match="added: expected a mapping with left, right"):
+        case.learn(run["time"], positions, move="square", added=found.added["left"])

@@ -3,25 +3,42 @@
 use super::number;
 use crate::case::Case;
 use crate::fit::experiment_design::{Designed, Limits, Verified};
-use crate::machine::axis::CART;
 use serde_json::{Value, json};
 
 /// The experiment, what it promises, and what else was looked at.
 pub fn design(case: &Case, found: &Designed, verified: &[Verified]) -> Value {
-    let Limits { input, current, travel, margin, .. } = found.limits;
+    let Limits { input, current, travel, margin, .. } = &found.limits;
     let limit = |(value, origin): (f64, crate::fit::experiment_design::Origin)| json!({ "value": value, "origin": origin.words() });
     let reached = &found.reached;
+    let geometry = case.machine.geometry();
+    // Of an axis there is the cart alone, of a gantry the bridge before it.
+    let cart = geometry.slides.len() - 1;
+    let start = |slide: usize| found.initial.position[geometry.slides[slide].body];
+    let bridge = (cart > 0).then(|| {
+        json!({
+            "start_m": start(0),
+            "from_m": reached.positions[0][0],
+            "to_m": reached.positions[0][1],
+            "travel_m": limit(travel[0]),
+        })
+    });
+    let driven = |driven: &crate::fit::experiment_design::Driven| match driven.name {
+        "" => Value::Null,
+        name => name.into(),
+    };
     json!({
         "schema": super::identity("design"),
         "title": case.title,
         "version": env!("CARGO_PKG_VERSION"),
         "name": found.name,
         "input": found.shape.kind().word(),
-        "words": found.shape.words(found.unit),
-        "toml": found.toml(),
+        "drive": driven(&found.driven),
+        "words": found.driven.words(&found.shape, found.unit),
+        "toml": found.toml(&case.machine),
         "duration_s": found.duration,
         "every_s": found.every,
-        "start_m": found.initial.position[CART],
+        "start_m": start(cart),
+        "bridge": bridge,
         "criterion": found.criterion.word(),
         "mean_relative_error": number(found.score),
         "complete": found.promises.iter().filter(|promise| promise.wanted).all(|promise| promise.is_determined()),
@@ -44,9 +61,9 @@ pub fn design(case: &Case, found: &Designed, verified: &[Verified]) -> Value {
             "choices": choices,
         })).collect::<Vec<_>>(),
         "limits": {
-            "input": limit(input),
+            "input": limit(*input),
             "current_A": current.map(limit),
-            "travel_m": limit(travel),
+            "travel_m": limit(travel[cart]),
             "margin": margin,
             "doubt": found.doubt,
         },
@@ -54,8 +71,8 @@ pub fn design(case: &Case, found: &Designed, verified: &[Verified]) -> Value {
         "reached": {
             "input": reached.input,
             "current_A": reached.current,
-            "from_m": reached.positions[0],
-            "to_m": reached.positions[1],
+            "from_m": reached.positions[cart][0],
+            "to_m": reached.positions[cart][1],
             "speed_m_per_s": reached.speed,
         },
         "measured": found.measured.iter().map(|channel| json!({
@@ -66,7 +83,8 @@ pub fn design(case: &Case, found: &Designed, verified: &[Verified]) -> Value {
         })).collect::<Vec<_>>(),
         "inputs": found.alternatives.iter().map(|one| json!({
             "input": one.shape.kind().word(),
-            "words": one.shape.words(found.unit),
+            "drive": driven(&one.driven),
+            "words": one.driven.words(&one.shape, found.unit),
             "mean_relative_error": number(one.score),
             "refined": one.refined,
         })).collect::<Vec<_>>(),

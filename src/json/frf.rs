@@ -17,7 +17,7 @@ pub fn frf(case: &Case, found: &Measurement) -> Value {
             "damping_s": pair(fit.damping),
             "delay_s": pair(fit.delay),
             "gain": pair(fit.gain),
-            "spans_N_per_m": fit.spans,
+            "spans_N_per_m": fit.spans.to_vec(),
             "chi": number(fit.chi),
             "points": fit.points,
             "mode_Hz": fit.mode.map(|mode| mode.1),
@@ -29,8 +29,10 @@ pub fn frf(case: &Case, found: &Measurement) -> Value {
         "title": case.title,
         "version": env!("CARGO_PKG_VERSION"),
         "place_m": found.known.place,
+        "bridge_m": case.machine.bridge.as_ref().map(|_| found.known.bridge),
         "delay_s": found.known.delay,
         "responses": found.responses.iter().map(response).collect::<Vec<_>>(),
+        "warnings": found.warnings,
         "fit": fit,
         "fit_words": found.fit.as_ref().err().map(|error| error.what.clone()),
     })
@@ -56,7 +58,9 @@ fn response(one: &Response) -> Value {
     });
     json!({
         "log": frf.name,
+        "input": frf.input,
         "quantity": frf.quantity.name(),
+        "input_coherence": frf.alike,
         "closed_loop": frf.closed,
         "periodic": frf.periodic,
         "segments": frf.segments,

@@ -2,11 +2,32 @@
 
 use super::number;
 use crate::case::{Case, Move};
-use crate::learning::{At, Learned, Size};
+use crate::learning::{At, DriveSignal, Learned, Size, SlideError};
 use serde_json::{Value, json};
 
 /// The next signal, and what it does.
 pub fn learned(case: &Case, motion: &Move, at: At, found: &Learned) -> Value {
+    let geometry = case.machine.geometry();
+    let drive = |(at, one): (&crate::machine::DriveAt, &DriveSignal)| {
+        json!({
+            "name": geometry.drive_key(at),
+            "largest": one.largest(),
+            "added": one.next,
+            "added_before": one.before,
+        })
+    };
+    let slide = |(at, one): (&crate::machine::SlideAt, &SlideError)| {
+        json!({
+            "name": geometry.label(at.body).key,
+            "error": size(&one.now),
+            "predicted": one.predicted.iter().map(|one| json!({
+                "nominal": size(&one.nominal),
+                "worst": size(&one.worst),
+            })).collect::<Vec<_>>(),
+            "error_m": one.error,
+            "expected_m": one.expected,
+        })
+    };
     json!({
         "schema": super::identity("learn"),
         "title": case.title,
@@ -20,16 +41,8 @@ pub fn learned(case: &Case, motion: &Move, at: At, found: &Learned) -> Value {
         "from_Hz": found.band[0],
         "to_Hz": found.band[1],
         "share": number(found.share),
-        "error": size(&found.now),
-        "predicted": found.predicted.iter().map(|one| json!({
-            "nominal": size(&one.nominal),
-            "worst": size(&one.worst),
-        })).collect::<Vec<_>>(),
-        "largest": found.largest(),
-        "added": found.next,
-        "added_before": found.before,
-        "error_m": found.error,
-        "expected_m": found.expected,
+        "drives": geometry.drives.iter().zip(&found.drives).map(drive).collect::<Vec<_>>(),
+        "loads": geometry.slides.iter().zip(&found.slides).map(slide).collect::<Vec<_>>(),
         "frequency_Hz": found.points.iter().map(|point| point.frequency).collect::<Vec<_>>(),
         "left": found.points.iter().map(|point| number(point.left)).collect::<Vec<_>>(),
         "kept": found.points.iter().map(|point| number(point.kept)).collect::<Vec<_>>(),

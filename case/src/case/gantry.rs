@@ -18,15 +18,6 @@ pub(super) fn kind(root: &Table) -> Result<Kind> {
     root.optional("kind").map_or(Ok(Kind::Axis), |field| field.choice(&kinds))
 }
 
-/// The error where an axis is wanted.
-pub(super) fn no_axis(root: &Table, kind: Kind) -> Error {
-    let field = root.optional("kind").unwrap_or_else(|| root.field.clone());
-    let what = format!("this needs a single axis, and the case describes a gantry ({})", kind.name());
-    field.fail(what).allowed("kind = \"axis\", or no kind at all").next(
-        "use `taut simulate`, `taut modes`, `taut check`, `taut fit`, `taut move`, `taut tune`, `taut plan`, `taut shape` or `taut sweep`, which take gantries",
-    )
-}
-
 /// The tables of a gantry's case. Errors: one that belongs to an axis, or that is not there yet.
 pub(super) fn tables(root: &Table, kind: Kind) -> Result<Vec<&'static str>> {
     for key in ["travel", "idler_pulley"] {

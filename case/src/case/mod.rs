@@ -95,8 +95,6 @@ pub enum Accepted {
     All,
     /// Those with motors that are commanded by voltage or current.
     Motors,
-    /// An axis with such a motor.
-    Axis,
 }
 
 impl Case {
@@ -190,9 +188,6 @@ impl Case {
                 .next("write a commented one to start from with `taut init`"));
         }
         let kind = gantry::kind(&root)?;
-        if accepted == Accepted::Axis && kind != Kind::Axis {
-            return Err(gantry::no_axis(&root, kind));
-        }
         if accepted != Accepted::All && root.optional("stepper").is_some() {
             return Err(stepper::no_motor(&root));
         }

@@ -76,9 +76,10 @@ Ctrl-C ends a fit early: the best estimates so far are written and marked as not
 /// Measure a frequency response: from the logs of a case, without a model, with coherence and intervals.
 ///
 /// Averages segments of every log after Welch, or whole periods with --period. A log with a reference is taken as made
-/// in closed loop: the response is the ratio of the responses of output and input to the reference. Prints the coherent
-/// frequencies of each output, fits stiffness and damping of the belt and the delay, and computes the margins of the
-/// case's controller with the measured response. With --out it also writes frf.json, frf.csv and a report.
+/// in closed loop: the response is the ratio of the responses of output and input to the reference. A gantry has a
+/// response from each motor to each output; logs of motors that move one after the other are taken together. Prints the
+/// coherent frequencies of each output, fits stiffness and damping of the belt and the delay, and computes the margins
+/// of the case's controller with the measured response. With --out it also writes frf.json, frf.csv and a report.
 #[derive(Debug, clap::Args)]
 #[command(after_help = FRF)]
 pub struct Frf {
@@ -93,6 +94,9 @@ pub struct Frf {
     /// Position of the cart, for the model [default: 0 m]
     #[arg(long, value_name = "POSITION", value_parser = metres, allow_hyphen_values = true)]
     pub at: Option<f64>,
+    /// Position of the bridge, for the model of a gantry [default: 0 m]
+    #[arg(long, value_name = "POSITION", value_parser = metres, allow_hyphen_values = true)]
+    pub bridge: Option<f64>,
     /// Input delay of the model, the start value of its fit [default: that of the controller]
     #[arg(long, value_name = "TIME", value_parser = delay)]
     pub delay: Option<f64>,
@@ -117,6 +121,10 @@ pub struct Design {
     /// Kinds of input to try, separated by commas [default: all]
     #[arg(long = "input", value_enum, value_name = "INPUT", value_delimiter = ',')]
     pub kinds: Vec<InputName>,
+    /// Gantries only: what the input drives, separated by commas: left, right or another motor alone, bridge or cart,
+    /// or all motors alike [default: all of these are tried]
+    #[arg(long = "drive", value_name = "NAME", value_delimiter = ',')]
+    pub driven: Vec<String>,
     /// Criterion to minimise: volume of the confidence ellipsoid, or mean square of the errors
     #[arg(long, value_enum, default_value = "d")]
     pub criterion: CriterionName,
@@ -138,7 +146,8 @@ pub struct Design {
     /// Largest current, such as "3 A" [default: amplifier.current_limit]
     #[arg(long, value_name = "CURRENT", value_parser = amperes)]
     pub current: Option<f64>,
-    /// Travel available to the cart, such as "0.4 m" [default: [travel], or the largest of the experiments]
+    /// Travel available to the cart, of a gantry to bridge and cart each, such as "0.4 m" [default: [travel], or the
+    /// largest of the experiments]
     #[arg(long, value_name = "LENGTH", value_parser = length)]
     pub travel: Option<f64>,
     /// Measured quantity and standard deviation of its noise, such as drive_angle=1mrad; may be
@@ -219,4 +228,5 @@ const FRF: &str = "\
 Examples:
   taut frf axis.toml
   taut frf axis.toml --segment 0.5s --out response
-  taut frf axis.toml --period 1s --json | jq .fit.stiffness";
+  taut frf axis.toml --period 1s --json | jq .fit.stiffness
+  taut frf gantry.toml --bridge \"-100 mm\"";

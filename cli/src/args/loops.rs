@@ -9,6 +9,8 @@ use clap::ValueEnum;
 use std::path::PathBuf;
 use taut::control::recommendation::Damping;
 use taut::control::shaper::Firmware;
+use taut::machine::Machine;
+use taut::{Error, Result};
 
 /// Find gains and filters for the controller of a case that hold over a family of machines
 ///
@@ -106,7 +108,8 @@ Exit status 1: a move has no plan, or its cart does not stay in its window.";
 /// Iterative learning: from the position that a repetition of a move logged, and the signal that was added to the
 /// command meanwhile, computes the signal to add in the next repetition. Learns only at frequencies at which this
 /// converges on every machine of the family of `taut tune`, and prints how fast, with the errors of the next eight
-/// repetitions. With --out DIR it writes next.csv (time_s and added_V or added_A), learn.json and a report.
+/// repetitions. With --out DIR it writes next.csv (time_s and added_V or added_A; left_added_V
+/// and so on of a gantry), learn.json and a report.
 #[derive(Debug, clap::Args)]
 #[command(after_help = LEARN)]
 pub struct Learn {
@@ -124,9 +127,10 @@ pub struct Learn {
     /// Column of the times, s
     #[arg(long, value_name = "COLUMN", default_value = "time_s")]
     pub time: String,
-    /// Column of the position [default: cart_position_m, or measured_m with --encoder]
-    #[arg(long, value_name = "COLUMN")]
-    pub position: Option<String>,
+    /// Column of the position [default: cart_position_m, or measured_m with --encoder]; of a gantry those of bridge and
+    /// cart, separated by a comma [default: bridge_position_m,cart_position_m], or with --encoder one for each motor
+    #[arg(long, value_name = "COLUMN", value_delimiter = ',')]
+    pub position: Vec<String>,
     /// Unit of the position
     #[arg(long, value_name = "UNIT", default_value = "m", value_parser = metre_unit)]
     pub unit: f64,
@@ -138,11 +142,36 @@ pub struct Learn {
 }
 
 impl Learn {
-    /// The column of the position.
-    pub fn column(&self) -> &str {
-        let usual = if self.encoder { "measured_m" } else { "cart_position_m" };
-        self.position.as_deref().unwrap_or(usual)
+    /// The columns of the position: of what slides, or of each drive's encoder.
+    pub fn columns(&self, machine: &Machine) -> Result<Vec<String>> {
+        let geometry = machine.geometry();
+        let wanted = if self.encoder { geometry.drives.len() } else { geometry.slides.len() };
+        if self.position.is_empty() {
+            return match (self.encoder, geometry.drives.len()) {
+                (true, 1) => Ok(vec!["measured_m".into()]),
+                (true, _) => Err(Error::new("each motor's encoder has a column of its own, and none is named")
+                    .in_file("--encoder")
+                    .next(format!("name {wanted} with --position, in the order {}", sides(machine)))),
+                (false, _) => Ok(machine.travels().map(|(label, _)| format!("{}_position_m", label.key)).collect()),
+            };
+        }
+        if self.position.len() != wanted {
+            let whose: Vec<&str> = machine.travels().map(|(label, _)| label.key).collect();
+            let whose = if self.encoder { sides(machine) } else { whose.join(", ") };
+            let what = format!("there are {} columns of positions", self.position.len());
+            let error = Error::new(what).in_file("--position");
+            return Err(error.allowed(match geometry.drives.len() {
+                1 => "one".into(),
+                _ => format!("{wanted}, separated by commas, in the order {whose}"),
+            }));
+        }
+        Ok(self.position.clone())
     }
+}
+
+/// The drives of a gantry, in their order.
+fn sides(machine: &Machine) -> String {
+    machine.geometry().sides().collect::<Vec<_>>().join(", ")
 }
 
 const LEARN: &str = "\
@@ -151,6 +180,7 @@ Examples:
   taut learn axis.toml --move long --log trial-0/long.csv --out learned-1
   taut move axis.toml --move long --added learned-1/next.csv --out trial-1
   taut learn axis.toml --move long --log trial-1/long.csv --added learned-1/next.csv --out learned-2
+  taut learn gantry.toml --move square --log trial-0/square.csv --out learned-1
 
 Exit status 1: learning would not converge on a machine of the family, or the signal exceeds the controller's limit.";
 

@@ -80,7 +80,8 @@ pub struct Move {
     /// Also run with each parameter of the axis off by this share, unknown to the controller: 20%
     #[arg(long, value_name = "SHARE", value_parser = share)]
     pub spread: Option<f64>,
-    /// Add the signal of this file to the command, as `taut learn` wrote it: time_s and added_V or added_A; one axis and
+    /// Add the signal of this file to the command, as `taut learn` wrote it: time_s and added_V or added_A (left_added_V and
+    /// so on of a gantry); one case and
     /// one move
     #[arg(long, value_name = "FILE")]
     pub added: Option<PathBuf>,

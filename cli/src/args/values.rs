@@ -3,7 +3,7 @@
 use taut::case::EFFORTS;
 use taut::control::recommendation::Damping;
 use taut::control::shaper::Form;
-use taut::machine::{Channel, Kind, Quantity};
+use taut::machine::{Channel, Quantity};
 use taut::quantity;
 
 /// A number of draws or chains.
@@ -85,9 +85,9 @@ pub fn amperes(text: &str) -> Result<f64, String> {
 
 /// A measured quantity and its noise: `drive_angle=1mrad`.
 pub fn channel(text: &str) -> Result<Channel, String> {
-    let names = || Quantity::of(Kind::Axis).iter().map(|quantity| quantity.name()).collect::<Vec<_>>().join(", ");
+    let names = || Quantity::all().map(Quantity::name).collect::<Vec<_>>().join(", ");
     let (name, noise) = text.split_once('=').ok_or("a quantity and its noise are needed, such as drive_angle=1mrad")?;
-    let quantity = Quantity::of(Kind::Axis).iter().copied().find(|quantity| quantity.name() == name.trim());
+    let quantity = Quantity::all().find(|quantity| quantity.name() == name.trim());
     let quantity =
         quantity.ok_or_else(|| format!("`{}` is not a measured quantity; available are {}", name.trim(), names()))?;
     let noise = positive(noise.trim(), quantity.unit(), "standard deviation above zero")?;

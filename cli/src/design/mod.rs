@@ -17,7 +17,7 @@ use taut_report::design::{figure, page};
 /// Reads the case, designs, writes, tells.
 pub fn run(args: &Args) -> Outcome {
     let common = &args.common;
-    let case = common.case(&args.case)?;
+    let case = common.open_motors(&args.case)?;
     let request = request(args, &case)?;
     let names = ["designed.toml", "design.json", "report.html"];
     let folder = Folder::wanted(common, || folder::inputs(&args.case, &case.files), names)?;
@@ -40,7 +40,7 @@ pub fn run(args: &Args) -> Outcome {
     let whole = found.case_text(&case, &args.case)?;
     let data = json::text(&json::design(&case, &found, &verified));
     let advice = "add --out DIR for the case with the experiment in it, and a report";
-    let text = table::text(&case.title, &found, &verified);
+    let text = table::text(&case, &found, &verified);
     let mut finished = Finished::new("design", ("design.json", data), text, advice);
     if let Some(folder) = &folder {
         let text = folder::leading(&whole, &folder::files_of(&args.case, &whole)?, folder.root())?;
@@ -79,6 +79,7 @@ fn request(args: &Args, case: &Case) -> Result<Request> {
     Ok(Request {
         names: args.names.clone(),
         kinds: args.kinds.iter().map(|kind| kind.kind()).collect(),
+        driven: args.driven.clone(),
         criterion: args.criterion.criterion(),
         duration: args.duration,
         every: args.every,

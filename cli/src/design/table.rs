@@ -2,13 +2,14 @@
 
 use crate::terminal::bold;
 use std::fmt::Write;
+use taut::case::Case;
 use taut::fit::experiment_design::{Designed, Verified};
 use taut_report::design::{heading, inputs, limits, measured, own, promises, verified};
 
 /// The text on the terminal.
-pub fn text(title: &str, found: &Designed, checked: &[Verified]) -> String {
-    let mut text = format!("{}\n\n{}\n", bold(title), bold("The experiment"));
-    let _ = writeln!(text, "{}\n\n{}", heading(found), found.toml());
+pub fn text(case: &Case, found: &Designed, checked: &[Verified]) -> String {
+    let mut text = format!("{}\n\n{}\n", bold(&case.title), bold("The experiment"));
+    let _ = writeln!(text, "{}\n\n{}", heading(found), found.toml(&case.machine));
     let mut part = |heading: &str, rows: String| {
         let _ = write!(text, "{}\n{rows}\n", bold(heading));
     };
@@ -31,7 +32,7 @@ pub fn text(title: &str, found: &Designed, checked: &[Verified]) -> String {
         100.0 * found.limits.margin,
         100.0 * found.doubt
     );
-    part(&heading, columns(&limits(found)));
+    part(&heading, columns(&limits(found, &case.machine)));
     part(
         &format!("Mean relative error of the best of each input ({})", found.criterion.word()),
         columns(&inputs(found)),

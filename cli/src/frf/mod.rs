@@ -3,7 +3,7 @@
 mod table;
 
 use crate::args::Frf as Args;
-use crate::command::{Finished, Report};
+use crate::command::{Finished, Remark, Report};
 use crate::failure::Outcome;
 use crate::folder::{self, Folder};
 use std::f64::consts::PI;
@@ -15,16 +15,16 @@ use taut_report::frf::{figures, page};
 /// Reads the case and its logs, measures, writes, tells.
 pub fn run(args: &Args) -> Outcome {
     let common = &args.common;
-    let case = common.case(&args.case)?;
+    let case = common.open_motors(&args.case)?;
     let folder =
         Folder::wanted(common, || folder::inputs(&args.case, &case.files), ["frf.json", "frf.csv", "report.html"])?;
-    let delay = args.delay.or(case.controller.as_ref().map(|design| design.delay)).unwrap_or_default();
-    let known = Known { place: args.at.unwrap_or_default(), delay };
+    let known = Known::of(&case, args.at, args.bridge, args.delay)?;
     let cut = Cut { segment: args.segment, period: args.period };
     let found = measure(&case, &cut, known).map_err(|error| error.in_file(&args.case))?;
     let data = json::text(&json::frf(&case, &found));
     let advice = "add --out DIR for the responses as a table and a report";
     let mut finished = Finished::new("frf", ("frf.json", data), table::text(&case.title, &found), advice);
+    finished.remarks.extend(found.warnings.iter().cloned().map(Remark::Warning));
     if common.out.is_some() {
         finished.files.push(("frf.csv".into(), csv(&found)));
     }
@@ -39,7 +39,8 @@ pub fn run(args: &Args) -> Outcome {
 
 /// One row for each frequency of each response.
 fn csv(found: &Measurement) -> String {
-    let mut text = String::from("log,quantity,frequency_Hz,real,imaginary,magnitude,phase_deg,radius,coherence\n");
+    let mut text =
+        String::from("log,input,quantity,frequency_Hz,real,imaginary,magnitude,phase_deg,radius,coherence\n");
     for one in &found.responses {
         // A name with a comma in it stands in quotes.
         let name = format!("\"{}\"", one.frf.name.replace('"', "\"\""));
@@ -47,7 +48,8 @@ fn csv(found: &Measurement) -> String {
             let (value, hertz) = (point.value, point.omega / (2.0 * PI));
             let _ = writeln!(
                 text,
-                "{name},{},{hertz},{},{},{},{},{},{}",
+                "{name},{},{},{hertz},{},{},{},{},{},{}",
+                one.frf.input,
                 one.frf.quantity.name(),
                 value.re,
                 value.im,

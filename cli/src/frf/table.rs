@@ -9,7 +9,7 @@ use taut_report::frf::{lines, quality};
 pub fn text(title: &str, found: &Measurement) -> String {
     let mut text = format!("{}\n", bold(title));
     for one in &found.responses {
-        let _ = write!(text, "\n{}\n", bold(&format!("{}: {}", one.frf.name, one.frf.quantity.name())));
+        let _ = write!(text, "\n{}\n", bold(&one.frf.title()));
         for line in lines(&one.frf) {
             let _ = writeln!(text, "  {line}");
         }

@@ -10,16 +10,17 @@ use crate::interrupt::{Interrupt, interrupted};
 use crate::progress::Progress;
 use std::fmt::Write;
 use taut::Error;
-use taut::case::{Accepted, Files, Move};
+use taut::case::{Files, Move};
 use taut::json;
 use taut::learning::{At, Learned, Trial, learn};
 use taut::log::read_samples;
+use taut::machine::Machine;
 use taut_report::learn::{figures, page};
 
 /// Reads the case and the log, learns, writes, tells.
 pub fn run(args: &Args) -> Outcome {
     let common = &args.common;
-    let case = common.accepting(&args.case, (Files::Nothing, Accepted::Axis))?;
+    let case = common.open_motors_for(&args.case, Files::Nothing)?;
     let (design, moves) = case.moves_named(&args.case, &args.moves)?;
     let motion: &Move = match &moves[..] {
         [one] => one,
@@ -32,15 +33,19 @@ pub fn run(args: &Args) -> Outcome {
     let others = || std::iter::once(args.log.as_path()).chain(args.added.as_deref());
     let inputs = || folder::inputs_with(&args.case, others(), &case.files);
     let folder = Folder::wanted(common, inputs, ["learn.json", "next.csv", "report.html"])?;
-    let (time, position) = read_samples(&args.log, &args.time, args.column())?;
-    let position = position.into_iter().map(|value| value * args.unit).collect();
     let at = if args.encoder { At::Encoder } else { At::Cart };
-    let trial = Trial { time, position, at };
+    let (mut time, mut positions) = (Vec::new(), Vec::new());
+    for column in args.columns(&case.machine)? {
+        let (times, position) = read_samples(&args.log, &args.time, &column)?;
+        time = times;
+        positions.push(position.into_iter().map(|value| value * args.unit).collect());
+    }
+    let trial = Trial { time, positions, at };
     let unit = case.machine.drives[0].amplifier.mode.unit();
-    let before = args.added.as_deref().map(|file| folder::read_added(file, unit)).transpose()?;
+    let before = args.added.as_deref().map(|file| folder::read_added(file, &case.machine)).transpose()?;
     let interrupt = Interrupt::listen();
     let progress = Progress::new("learning", None, common.quiet);
-    let found = learn(&case, motion, &trial, before.as_ref(), &|| interrupt.signal().is_some());
+    let found = learn(&case, motion, &trial, before.as_deref(), &|| interrupt.signal().is_some());
     progress.clear();
     if let Some(signal) = interrupt.signal() {
         return Err(interrupted(signal, "interrupted before anything was learned; nothing was written"));
@@ -50,7 +55,7 @@ pub fn run(args: &Args) -> Outcome {
     let advice = "add --out DIR for the signal as next.csv and a report";
     let mut finished = Finished::new("learn", ("learn.json", data), table::text(&case, motion, &found), advice);
     finished.remarks.extend(beyond(design.limit, unit, &found));
-    if found.predicted.first().is_some_and(|next| next.worst.rms >= found.now.rms) {
+    if found.is_near_its_limit() {
         let told = "the error is near its limit: it may not be smaller after the next repetition; keep the signal with \
                     which it was smallest";
         finished.remarks.push(Remark::Note(told.into()));
@@ -59,10 +64,10 @@ pub fn run(args: &Args) -> Outcome {
         finished.status = Status::Incomplete;
     }
     if common.out.is_some() {
-        finished.files.push(("next.csv".into(), csv(&found, unit)));
+        finished.files.push(("next.csv".into(), csv(&found, &case.machine)));
     }
     if common.reports() {
-        let figures = figures(&found, unit);
+        let figures = figures(&found, &case.machine);
         let page = page(&case, motion, &found, &figures);
         let pictures = figures.into_iter().map(|(name, figure)| (name, figure.into())).collect();
         finished.report = Some(Report { page, pictures });
@@ -83,10 +88,12 @@ fn beyond(limit: Option<f64>, unit: &str, found: &Learned) -> Option<Remark> {
 }
 
 /// The signal as a table.
-fn csv(found: &Learned, unit: &str) -> String {
-    let mut text = format!("time_s,added_{unit}\n");
-    for (time, value) in found.added().times.iter().zip(&found.next) {
-        let _ = writeln!(text, "{time},{}", value + 0.0);
+fn csv(found: &Learned, machine: &Machine) -> String {
+    let mut text = format!("time_s,{}\n", folder::added_columns(machine).collect::<Vec<_>>().join(","));
+    let signals = found.added();
+    for (row, time) in signals.first().map(|signal| &signal.times).into_iter().flatten().enumerate() {
+        let values = signals.iter().map(|signal| format!("{}", signal.values[row] + 0.0)).collect::<Vec<_>>();
+        let _ = writeln!(text, "{time},{}", values.join(","));
     }
     text
 }

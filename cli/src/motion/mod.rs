@@ -11,7 +11,7 @@ use std::fmt::Write;
 use std::path::Path;
 use taut::case::{Case, Files, Move};
 use taut::control::fed::Fed;
-use taut::control::{Added, Loop, MoveRun, Rows, Standard, each, stream, worst};
+use taut::control::{Added, Controller, Loop, MoveRun, Rows, Standard, each, stream, worst};
 use taut::design::Design;
 use taut::files::write_atomically;
 use taut::json::{self, Moved};
@@ -51,7 +51,7 @@ pub fn run(args: &Args) -> Outcome {
             if interrupt.signal().is_some() {
                 break;
             }
-            done.push(one(case, design, motion, (args, added.as_ref()), folder.as_ref(), &interrupt)?);
+            done.push(one(case, design, motion, (args, added.as_deref()), folder.as_ref(), &interrupt)?);
         }
         tried.push(Tried { case, design, done });
     }
@@ -78,16 +78,13 @@ pub fn run(args: &Args) -> Outcome {
     finished.finish(common, folder)
 }
 
-/// The signal of `--added`, which is of one move of one axis.
-fn added(args: &Args, cases: &[Case]) -> Result<Option<Added>> {
+/// The signals of `--added`, one for each drive, which are of one move of one machine.
+fn added(args: &Args, cases: &[Case]) -> Result<Option<Vec<Added>>> {
     let Some(file) = &args.added else { return Ok(None) };
     let wrong = |what: String, next: &str| Err(Error::new(what).in_file("--added").next(next));
     let ([case], [path]) = (cases, &args.case[..]) else {
         return wrong(format!("a signal is of one case, and there are {}", cases.len()), "name one case");
     };
-    if case.machine.drives.len() > 1 {
-        return wrong("a signal is of one axis, and the case describes a gantry".into(), "leave --added out");
-    }
     let (_, moves) = case.moves_named(path, &args.moves)?;
     if moves.len() > 1 {
         return wrong(format!("a signal is of one move, and the case has {}", moves.len()), "name one with --move");
@@ -95,7 +92,7 @@ fn added(args: &Args, cases: &[Case]) -> Result<Option<Added>> {
     if args.spread.is_some() {
         return wrong("--spread runs without what was learned".into(), "leave --spread or --added out");
     }
-    folder::read_added(file, case.machine.drives[0].amplifier.mode.unit()).map(Some)
+    folder::read_added(file, &case.machine).map(Some)
 }
 
 /// The files that will be written, but for plots.
@@ -120,7 +117,7 @@ fn one<'a>(
     case: &'a Case,
     design: &'a Design,
     motion: &'a Move,
-    (args, added): (&Args, Option<&Added>),
+    (args, added): (&Args, Option<&[Added]>),
     folder: Option<&Folder>,
     interrupt: &Interrupt,
 ) -> std::result::Result<Done<'a>, Failure> {
@@ -143,12 +140,14 @@ fn one<'a>(
     };
     let keep = folder.is_some();
     let timing = Loop::of(design);
-    let run = match (added, &controllers[..]) {
-        (Some(added), [controller]) => {
-            let mut fed = Fed::new(controller.clone(), added);
-            stream(machine, &mut [&mut fed], &timing, &profiles, &rows, solver, keep, &mut take)?
+    let run = match added {
+        Some(added) => {
+            let mut fed: Vec<Fed> =
+                controllers.into_iter().zip(added).map(|(own, added)| Fed::new(own, added)).collect();
+            let mut each: Vec<&mut dyn Controller> = fed.iter_mut().map(|fed| fed as &mut dyn Controller).collect();
+            stream(machine, &mut each, &timing, &profiles, &rows, solver, keep, &mut take)?
         }
-        _ => stream(machine, &mut each(&mut controllers), &timing, &profiles, &rows, solver, keep, &mut take)?,
+        None => stream(machine, &mut each(&mut controllers), &timing, &profiles, &rows, solver, keep, &mut take)?,
     };
     if let Some(trouble) = trouble {
         return Err(Failure::work(trouble));

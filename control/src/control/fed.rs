@@ -4,7 +4,7 @@ use super::sampled::{Added, Controller, Observation};
 use super::standard::Standard;
 use crate::signal::profile::Reference;
 
-/// The controller of an axis whose command has a signal added at each sample, before delay and limit.
+/// The controller of a drive whose command has a signal added at each sample, before delay and limit.
 #[derive(Debug, Clone)]
 pub struct Fed<'a> {
     controller: Standard,

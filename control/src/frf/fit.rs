@@ -18,8 +18,8 @@
 
 use super::{Frf, Point};
 use crate::error::{Error, Result};
-use crate::linear::{Hold, Operation, StateSpace};
-use crate::machine::{BeltModel, Machine};
+use crate::linear::{Hold, Operation, StateSpace, System, placed};
+use crate::machine::{BeltModel, Machine, Spans};
 use crate::number::engineering;
 use nalgebra::{Complex, DMatrix, DVector};
 use std::f64::consts::PI;
@@ -39,6 +39,8 @@ const FEWEST: usize = 10;
 pub struct Known {
     /// Cart position, m.
     pub place: f64,
+    /// Bridge position, m, of a machine that has one.
+    pub bridge: f64,
     /// Delay of the input where the model says, s.
     pub delay: f64,
 }
@@ -49,7 +51,7 @@ pub struct FrfFit {
     /// Factor on the stiffness of every span.
     pub stiffness: (f64, [f64; 2]),
     /// Stiffness of each span at the place, N/m.
-    pub spans: [f64; 3],
+    pub spans: Spans,
     /// Damping over stiffness, s.
     pub damping: (f64, [f64; 2]),
     /// Delay of the input, s.
@@ -90,48 +92,64 @@ pub(super) const ALIKE: [f64; 2] = [0.25723, -0.08250];
 /// ln s, ln τ, t_d, ln g.
 const UNKNOWNS: usize = 4;
 
-/// The stage with its belt so many times as stiff, and damped.
-fn changed(machine: &Machine, known: &Known, x: &[f64]) -> Machine {
-    let mut machine = machine.clone();
-    if let (true, Some(make)) = (machine.belt.follows_cart, machine.belt.make) {
-        let [k1, k2] = make.stiffness_at(known.place);
-        (machine.belt.stiffness[0], machine.belt.stiffness[1]) = (k1, k2);
+impl Known {
+    fn operation(&self) -> Operation {
+        Operation { position: self.place, bridge: self.bridge, ..Operation::default() }
     }
+}
+
+/// The machine with its belts so many times as stiff, and damped.
+fn changed(machine: &Machine, known: &Known, x: &[f64]) -> Result<Machine> {
+    let mut machine = placed(machine, known.operation())?;
     (machine.belt.follows_cart, machine.belt.make) = (false, None);
     for (k, c) in machine.belt.stiffness.iter_mut().zip(&mut machine.belt.damping) {
         *k *= x[0].exp();
         *c = x[1].exp() * *k;
     }
-    machine
-}
-
-/// Response smeared by the window as in the averages: Σ W Ĝ/Σ W about each line, for a white input. Of whole periods
-/// nothing is smeared.
-fn smeared(machine: &Machine, place: f64, delay: f64, frf: &Frf) -> Result<Vec<Complex<f64>>> {
-    if frf.periodic {
-        return model(machine, place, delay, frf);
-    }
-    let line = 2.0 * PI / (frf.length as f64 * frf.every);
-    let sum: f64 = WINDOW.iter().map(|one| one.1).sum();
-    let mut seen = vec![Complex::ZERO; frf.points.len()];
-    for (distance, weight) in WINDOW {
-        let points = frf.points.iter().map(|point| Point { omega: point.omega + distance * line, ..*point }).collect();
-        let moved = Frf { points, ..frf.clone() };
-        for (sum_of, value) in seen.iter_mut().zip(model(machine, place, delay, &moved)?) {
-            *sum_of += value * (weight / sum);
-        }
-    }
-    Ok(seen)
+    Ok(machine)
 }
 
 /// The sampled model's response at these points.
-pub(super) fn model(machine: &Machine, place: f64, delay: f64, frf: &Frf) -> Result<Vec<Complex<f64>>> {
-    let system = StateSpace::of(machine, Operation { position: place, ..Operation::default() })?;
-    let Some(output) = system.output(frf.quantity.name()) else {
-        return Err(Error::new(format!("the model has no {}", frf.quantity.name())).next("log another quantity"));
-    };
-    let discrete = system.discrete(frf.every, Hold::Zero, delay)?;
-    Ok(frf.points.iter().map(|point| discrete.at(point.omega)[output]).collect())
+pub(super) fn model(machine: &Machine, known: &Known, frf: &Frf) -> Result<Vec<Complex<f64>>> {
+    Ok(curves(machine, known, known.delay, &[(frf, &[(0.0, 1.0)])])?.remove(0))
+}
+
+/// The sampled model's responses at the points of these, each seen through a window as in the averages, Σ W Ĝ/Σ W about
+/// each line, for white inputs.
+fn curves(
+    machine: &Machine,
+    known: &Known,
+    delay: f64,
+    frfs: &[(&Frf, &[(f64, f64)])],
+) -> Result<Vec<Vec<Complex<f64>>>> {
+    let system = System::of(machine, known.operation())?;
+    let mut all = Vec::new();
+    // All outputs of an input at once.
+    for same in frfs.chunk_by(|(a, _), (b, _)| a.drive == b.drive && a.name == b.name) {
+        let (first, window) = same[0];
+        let of_input = system.input(first.drive);
+        let output = |(frf, _): &(&Frf, &[(f64, f64)])| {
+            let name = frf.quantity.name();
+            of_input
+                .output(name)
+                .ok_or_else(|| Error::new(format!("the model has no {name}")).next("log another quantity"))
+        };
+        let outputs = same.iter().map(output).collect::<Result<Vec<_>>>()?;
+        let discrete = of_input.discrete(first.every, Hold::Zero, delay)?;
+        let line = 2.0 * PI / (first.length as f64 * first.every);
+        let sum: f64 = window.iter().map(|one| one.1).sum();
+        let mut seen = vec![vec![Complex::ZERO; first.points.len()]; same.len()];
+        for (k, point) in first.points.iter().enumerate() {
+            for (distance, weight) in window {
+                let answers = discrete.at(point.omega + distance * line);
+                for (curve, output) in seen.iter_mut().zip(&outputs) {
+                    curve[k] += answers[*output] * (weight / sum);
+                }
+            }
+        }
+        all.extend(seen);
+    }
+    Ok(all)
 }
 
 struct Problem<'a> {
@@ -142,13 +160,14 @@ struct Problem<'a> {
 
 impl Problem<'_> {
     fn curves(&self, x: &[f64]) -> Result<Vec<Vec<Complex<f64>>>> {
-        let machine = changed(self.machine, self.known, x);
+        let machine = changed(self.machine, self.known, x)?;
         let gain = x[3].exp();
-        let one = |frf: &Frf| {
-            let curve = smeared(&machine, self.known.place, x[2].max(0.0), frf)?;
-            Ok(curve.into_iter().map(|value| value * gain).collect())
-        };
-        self.frfs.iter().map(one).collect()
+        // Of whole periods nothing is smeared.
+        let window = |frf: &Frf| if frf.periodic { &[(0.0, 1.0)][..] } else { &WINDOW[..] };
+        let seen: Vec<(&Frf, &[(f64, f64)])> = self.frfs.iter().map(|frf| (frf, window(frf))).collect();
+        let mut all = curves(&machine, self.known, x[2].max(0.0), &seen)?;
+        all.iter_mut().flatten().for_each(|value| *value *= gain);
+        Ok(all)
     }
 
     /// Real and imaginary parts of (G − g Ĝ)/σ √2, of variance 1.
@@ -204,7 +223,7 @@ impl Problem<'_> {
 }
 
 fn is_used(point: &Point) -> bool {
-    point.coherence >= super::COHERENT && point.deviation > 0.0 && point.radius < point.value.norm()
+    point.deviation > 0.0 && Frf::is_coherent(point)
 }
 
 /// Fits the belt and the delay of a stage to frequency responses.
@@ -219,7 +238,8 @@ pub fn fit(machine: &Machine, known: &Known, frfs: &[Frf]) -> Result<FrfFit> {
             .allowed(format!("at least {FEWEST}"))
             .next("excite the axis harder or for longer, or give a shorter --segment"));
     }
-    let ratio = machine.belt.damping.iter().zip(&machine.belt.stiffness).map(|(c, k)| c / k).sum::<f64>() / 3.0;
+    let ratio = machine.belt.damping.iter().zip(&machine.belt.stiffness).map(|(c, k)| c / k).sum::<f64>();
+    let ratio = ratio / machine.belt.stiffness.len() as f64;
     let mut best: Option<(f64, Vec<f64>)> = None;
     // Resonances that are far off hide from each other: from several stiffnesses and dampings, until noise explains
     // what is left.
@@ -250,17 +270,14 @@ pub fn fit(machine: &Machine, known: &Known, frfs: &[Frf]) -> Result<FrfFit> {
     };
     let grown = |j: usize| (x[j].exp(), [(x[j] - wide(j)).exp(), (x[j] + wide(j)).exp()]);
     let delay = x[2].max(0.0);
-    let found = changed(machine, known, &x);
-    let mode = StateSpace::of(&found, Operation { position: known.place, ..Operation::default() })
-        .and_then(|system| system.poles())
-        .ok()
-        .and_then(|poles| {
-            let swinging = poles.into_iter().filter(|pole| pole.im > 0.0 && pole.re.abs() < 0.7 * pole.norm());
-            swinging.min_by(|a, b| a.norm().total_cmp(&b.norm()))
-        });
+    let found = changed(machine, known, &x)?;
+    let mode = StateSpace::of(&found, known.operation()).and_then(|system| system.poles()).ok().and_then(|poles| {
+        let swinging = poles.into_iter().filter(|pole| pole.im > 0.0 && pole.re.abs() < 0.7 * pole.norm());
+        swinging.min_by(|a, b| a.norm().total_cmp(&b.norm()))
+    });
     Ok(FrfFit {
         stiffness: grown(0),
-        spans: found.belt.stiffness.three(),
+        spans: found.belt.stiffness,
         damping: grown(1),
         delay: (delay, [(delay - wide(2)).max(0.0), delay + wide(2)]),
         gain: grown(3),

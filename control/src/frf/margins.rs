@@ -1,23 +1,24 @@
-//! Margins of a controller around a measured frequency response.
+//! Margins of controllers around measured frequency responses.
 
-use super::{Frf, Point};
+use super::Frf;
 use crate::control::feedback::Feedback;
 use crate::design::Design;
 use crate::error::{Error, Result};
 use crate::machine::Machine;
-use nalgebra::Complex;
+use nalgebra::{Complex, DMatrix};
 use std::f64::consts::PI;
 
-/// Margins of L = N_y G/D with a measured G, over the frequencies at which it is coherent.
+/// Margins of L = N_y G/D with a measured G, over the frequencies at which it is coherent. Of several drives G is a
+/// matrix, with a row for each measured position and a column for each input, and N_y/D is the same for each.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Measured {
-    /// max |1/(1 + L)|, and where, rad/s.
+    /// max |1/(1 + L)|, of several drives the largest singular value of (1 + L)⁻¹, and where, rad/s.
     pub sensitivity: (f64, f64),
     /// The most it may be: with G anywhere in its circle; infinite where a circle holds −1.
     pub sensitivity_at_most: f64,
-    /// Phase margin, rad, and where |L| passes 1, rad/s.
+    /// Phase margin of the loop of one drive with the others closed, rad, and where |L| passes 1, rad/s.
     pub phase: Option<(f64, f64)>,
-    /// Gain margin, and where L passes the negative real axis, rad/s.
+    /// Gain margin of that loop, and where L passes the negative real axis, rad/s.
     pub gain: Option<(f64, f64)>,
     /// True if it holds for small motions about rest alone: the controller is not linear.
     pub is_at_rest: bool,
@@ -25,19 +26,28 @@ pub struct Measured {
     pub range: [f64; 2],
 }
 
-/// Margins of a design around the response of the position that it measures; `length` is metres per unit of it.
-pub fn measured(frf: &Frf, design: &Design, machine: &Machine, length: f64) -> Result<Measured> {
+/// Margins of a design around the responses of the positions that its drives measure, one row of `matrix` for each;
+/// `length` is metres per unit of these. Gain and phase margin are of the loop of `drive`.
+pub fn measured(
+    matrix: &[Vec<&Frf>],
+    drive: usize,
+    design: &Design,
+    machine: &Machine,
+    length: f64,
+) -> Result<Measured> {
     let feedback = Feedback::new(design, machine)?;
-    if (frf.every / design.every - 1.0).abs() > 1e-6 {
+    let own = matrix[drive][drive];
+    if (own.every / design.every - 1.0).abs() > 1e-6 {
         return Err(Error::new(format!(
             "the log is sampled every {} s, the controller every {} s",
-            frf.every, design.every
+            own.every, design.every
         ))
         .next("log at the controller's samples for margins"));
     }
-    let points: Vec<&Point> = frf.coherent().collect();
+    let points: Vec<(f64, DMatrix<Complex<f64>>, f64)> =
+        own.coherent().filter_map(|point| at(matrix, point.omega)).collect();
     let (Some(first), Some(last)) = (points.first(), points.last()) else {
-        return Err(Error::new("no frequency is coherent").next("excite the axis harder, or for longer"));
+        return Err(Error::new("no frequency is coherent").next("excite the machine harder, or for longer"));
     };
     let mut found = Measured {
         sensitivity: (0.0, 0.0),
@@ -45,11 +55,11 @@ pub fn measured(frf: &Frf, design: &Design, machine: &Machine, length: f64) -> R
         phase: None,
         gain: None,
         is_at_rest: !feedback.is_linear(),
-        range: [first.omega, last.omega],
+        range: [first.0, last.0],
     };
     let mut before: Option<(f64, Complex<f64>)> = None;
-    for point in &points {
-        let terms = feedback.at(point.omega);
+    for (omega, g, radius) in &points {
+        let (omega, terms) = (*omega, feedback.at(*omega));
         if terms.current != Complex::ZERO {
             return Err(Error::new("a current loop needs the response of the current, too")
                 .next("leave its margins to taut tune"));
@@ -59,31 +69,52 @@ pub fn measured(frf: &Frf, design: &Design, machine: &Machine, length: f64) -> R
                 .next("leave its margins to taut tune"));
         }
         let factor = terms.position / terms.own * length;
-        let l = factor * point.value;
-        let far = (l + 1.0).norm();
+        let difference = DMatrix::identity(matrix.len(), matrix.len()) + g * factor;
+        let far = difference.clone().singular_values().min();
         if 1.0 / far > found.sensitivity.0 {
-            found.sensitivity = (1.0 / far, point.omega);
+            found.sensitivity = (1.0 / far, omega);
         }
-        let nearest = far - factor.norm() * point.radius;
+        let nearest = far - factor.norm() * radius;
         let most = if nearest > 0.0 { 1.0 / nearest } else { f64::INFINITY };
         found.sensitivity_at_most = found.sensitivity_at_most.max(most);
-        if let Some((omega, was)) = before {
+        // 1 + L of a drive with the others closed is 1/[(1 + L)⁻¹]_kk
+        let Some(inverse) = difference.try_inverse() else { continue };
+        let l = inverse[(drive, drive)].inv() - 1.0;
+        if let Some((last, was)) = before {
             if was.norm() >= 1.0 && l.norm() < 1.0 {
                 let margin = (-l).arg().abs().min((-was).arg().abs());
                 if found.phase.is_none_or(|(least, _)| margin < least) {
-                    found.phase = Some((margin, 0.5 * (omega + point.omega)));
+                    found.phase = Some((margin, 0.5 * (last + omega)));
                 }
             }
             if was.im * l.im < 0.0 && was.re < 0.0 && l.re < 0.0 {
                 let size = 0.5 * (was.re + l.re).abs();
                 if size < 1.0 && found.gain.is_none_or(|(least, _)| 1.0 / size < least) {
-                    found.gain = Some((1.0 / size, 0.5 * (omega + point.omega)));
+                    found.gain = Some((1.0 / size, 0.5 * (last + omega)));
                 }
             }
         }
-        before = Some((point.omega, l));
+        before = Some((omega, l));
     }
     Ok(found)
+}
+
+/// G at a frequency and the root of the squares of all radii, where the response of each drive's own position is
+/// coherent. Of the others a small one need not be.
+fn at(matrix: &[Vec<&Frf>], omega: f64) -> Option<(f64, DMatrix<Complex<f64>>, f64)> {
+    let (mut g, mut squares) = (DMatrix::zeros(matrix.len(), matrix.len()), 0.0);
+    for (i, row) in matrix.iter().enumerate() {
+        for (j, frf) in row.iter().enumerate() {
+            let place = frf.points.binary_search_by(|point| point.omega.total_cmp(&omega)).ok()?;
+            let point = &frf.points[place];
+            if i == j && !Frf::is_coherent(point) {
+                return None;
+            }
+            g[(i, j)] = point.value;
+            squares += point.radius * point.radius;
+        }
+    }
+    Some((omega, g, squares.sqrt()))
 }
 
 impl Measured {

@@ -14,10 +14,10 @@
 //! are the same loop. Of several drives |S| and |T| are the largest singular values, and the loop of one drive with
 //! those of the others closed is L_j = T_jj/S_jj.
 
-use super::plant::{Answer, ByDrives, Plant, Sampled, Square, by_drives};
+use super::plant::{Answer, Plant, Sampled, Square, by_drives};
 use crate::control::feedback::{Feedback, Turn};
 use crate::mechanism::DRIVES;
-use nalgebra::Complex;
+use nalgebra::{Complex, SMatrix};
 
 /// Where a loop is broken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -175,12 +175,12 @@ fn times<const N: usize>(a: &Square<N>, adjugate: &Square<N>) -> Square<N> {
 }
 
 /// A product with an inverse: the adjugate over the determinant.
-fn over<const N: usize>(a: &Square<N>, adjugate: &Square<N>, determinant: Complex<f64>) -> Square<N> {
+pub(crate) fn over<const N: usize>(a: &Square<N>, adjugate: &Square<N>, determinant: Complex<f64>) -> Square<N> {
     times(a, adjugate) / determinant
 }
 
 /// Adjugate and determinant.
-fn inverse<const N: usize>(a: &Square<N>) -> (Square<N>, Complex<f64>) {
+pub(crate) fn inverse<const N: usize>(a: &Square<N>) -> (Square<N>, Complex<f64>) {
     let mut adjugate = diagonal(Complex::ONE);
     if N == 1 {
         return (adjugate, a[(0, 0)]);
@@ -202,7 +202,7 @@ fn inverse<const N: usize>(a: &Square<N>) -> (Square<N>, Complex<f64>) {
 }
 
 /// The largest singular value.
-fn largest<const N: usize>(a: &Square<N>) -> f64 {
+pub(crate) fn largest<const N: usize>(a: &Square<N>) -> f64 {
     if N == 1 { a[(0, 0)].norm() } else { largest_square(a).sqrt() }
 }
 
@@ -237,7 +237,7 @@ fn largest_of_three(a: &Square<3>) -> f64 {
 }
 
 /// The smallest singular value: |det A| over the largest of the adjugate.
-pub(super) fn smallest<const N: usize>(a: &Square<N>) -> f64 {
+pub(crate) fn smallest<const N: usize>(a: &Square<N>) -> f64 {
     if N == 1 {
         return a[(0, 0)].norm();
     }
@@ -289,14 +289,36 @@ impl Loops {
     }
 }
 
-/// Motion of the cart and of the measured position per value beside the command of an axis, m per V or A, at ω, rad/s:
-/// responses of the closed loop. None with several drives.
-pub fn from_command(plant: &Plant, feedback: &Feedback, omega: f64) -> Option<[Complex<f64>; 2]> {
-    let ByDrives::One(sampled) = &plant.of else { return None };
+/// Motion per value beside the commands, m per V or A, at ω, rad/s: responses of the closed loop. A column for the
+/// commands of all drives in proportion to the travel of their belts when one part alone slides; rows of the positions
+/// of all that slides, and of where the drives' measurements have it. There are M such parts.
+pub fn from_commands<const M: usize>(
+    plant: &Plant,
+    feedback: &Feedback,
+    omega: f64,
+) -> [SMatrix<Complex<f64>, M, M>; 2] {
+    by_drives!(plant, |sampled| pushed(plant, sampled, feedback, omega))
+}
+
+fn pushed<const N: usize, const M: usize>(
+    plant: &Plant,
+    sampled: &Sampled<N>,
+    feedback: &Feedback,
+    omega: f64,
+) -> [SMatrix<Complex<f64>, M, M>; 2] {
     let answer = sampled.at(omega);
     let open = Open::of(sampled, &answer, feedback, &Turn::of(omega, plant.every));
     // y = G_y D Δ⁻¹ v
-    Some([open.pushed[(0, 0)], answer.position[(0, 0)] * open.own / open.difference])
+    let measured = over(&(answer.position * open.own), &open.adjugate, open.difference);
+    let slides = plant.kind.geometry().slides;
+    let along = |matrix: &Square<N>, row: usize, slide: usize| -> Complex<f64> {
+        (0..N).map(|drive| matrix[(row, drive)] * sampled.shares[(drive, slide)]).sum()
+    };
+    let by_drives = |slide: usize, column: usize| -> Complex<f64> {
+        let drives = slides[slide].by_drives.iter().enumerate();
+        drives.map(|(drive, weight)| along(&measured, drive, column) * *weight).sum()
+    };
+    [SMatrix::from_fn(|row, column| along(&open.pushed, row, column)), SMatrix::from_fn(by_drives)]
 }
 
 /// The loops at all frequencies of the machine.

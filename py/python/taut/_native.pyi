@@ -104,6 +104,10 @@ class Case:
     def from_text(path: str, text: str, changes: list[str]) -> Case: ...
     def changed(self, changes: list[str]) -> Case: ...
     @property
+    def drives(self) -> list[str]: ...
+    @property
+    def slides(self) -> list[str]: ...
+    @property
     def kind(self) -> str: ...
     @property
     def title(self) -> str: ...
@@ -133,12 +137,17 @@ class Case:
     def check(self) -> dict[str, Any]: ...
     def fit(self, effort: tuple[int, int] | None, profiled: bool) -> Fit: ...
     def frf(
-        self, segment: float | None, period: float | None, at: float | None, delay: float | None
+        self,
+        segment: float | None,
+        period: float | None,
+        at: float | None,
+        bridge: float | None,
+        delay: float | None,
     ) -> dict[str, Any]: ...
     def design(
         self,
         names: list[str],
-        inputs: list[str],
+        inputs: tuple[list[str], list[str]],
         criterion: str,
         times: tuple[float, float | None],
         shares: tuple[float, float, float],
@@ -154,7 +163,12 @@ class Case:
         self, names: list[str], limits: tuple[float | None, float | None, float | None], reserve: float
     ) -> tuple[dict[str, Any], Case]: ...
     def learn(
-        self, names: list[str], time: list[float], position: list[float], added: list[float] | None, encoder: bool
+        self,
+        names: list[str],
+        time: list[float],
+        positions: list[list[float]],
+        added: list[list[float]] | None,
+        encoder: bool,
     ) -> dict[str, Any]: ...
     def compare(self, laws: list[str], windows: list[float | None] | None) -> tuple[dict[str, Any], Case]: ...
     def drift(self) -> dict[str, Any]: ...

@@ -201,16 +201,19 @@ class Case:
         segment: float | None = None,
         period: float | None = None,
         at: float | None = None,
+        bridge: float | None = None,
         delay: float | None = None,
     ) -> FrequencyResponses:
         """Frequency responses from the logs, without a model, and stiffness, damping and delay fitted to them.
 
         ``segment`` is the length of the pieces of Welch's method (s), ``period`` that of a multisine (s); ``at`` is
-        where the cart is (m), ``delay`` the time from a sample to its command (s, that of the controller unless said).
+        where the cart is (m), ``bridge`` where a gantry's bridge is, ``delay`` the time from a sample to its command
+        (s, that of the controller unless said). Of a gantry there is a response for each input and output.
         """
         n = _checks.number
+        place = n("at", at), n("bridge", bridge)
         return FrequencyResponses(
-            self._native.frf(n("segment", segment), n("period", period), n("at", at), n("delay", delay))
+            self._native.frf(n("segment", segment), n("period", period), *place, n("delay", delay))
         )
 
     def design(
@@ -218,6 +221,7 @@ class Case:
         names: Sequence[str] | None = None,
         *,
         inputs: Sequence[str] | None = None,
+        drives: Sequence[str] | None = None,
         criterion: Criterion = "d",
         duration: float = 4.0,
         every: float | None = None,
@@ -234,7 +238,8 @@ class Case:
         """The experiment that determines the named parameters best (those of [fit] unless named) within travel, input
         and current.
 
-        ``inputs`` are those to choose among: ``trapezoid``, ``sweep``, ``chirp``, ``multisine``, ``prbs``;
+        ``inputs`` are those to choose among: ``trapezoid``, ``sweep``, ``chirp``, ``multisine``, ``prbs``; of a gantry
+        ``drives`` are what they may drive: a motor by its side, ``bridge``, ``cart`` or ``all``;
         ``criterion`` is ``d`` or ``a``; ``margin`` is the share of each limit that is left free, ``doubt`` that by
         which each parameter may be off and the limits hold; no standard error is below ``model_error`` of the value;
         ``measured`` has quantities with the standard deviations of their noise. On ``verify`` machines, off by up to
@@ -244,7 +249,7 @@ class Case:
         noises = [(_checks.text("measured", name), n(f"measured[{name!r}]", noise) or 0.0) for name, noise in dict(measured or {}).items()]
         data, case = self._native.design(
             _checks.names("names", names),
-            _checks.names("inputs", inputs),
+            (_checks.names("inputs", inputs), _checks.names("drives", drives)),
             _checks.text("criterion", criterion),
             (_checks.given("duration", duration), n("every", every)),
             (_checks.given("margin", margin), _checks.given("doubt", doubt), _checks.given("model_error", model_error)),
@@ -301,6 +306,15 @@ class Case:
         data, case = self._native.plan(names, limits, _checks.given("reserve", reserve))
         return Plans(data, self._of(case))
 
+    def _columns(self, name: str, values: Any, drives: bool) -> list[list[float]]:
+        """A column for each drive or sliding part: of an axis the values, of a gantry those of a mapping."""
+        keys = self._native.drives if drives else self._native.slides
+        if self.kind == "axis":
+            return [_checks.column(name, values)]
+        if not isinstance(values, Mapping) or set(values) != set(keys):
+            raise TypeError(f"{name}: expected a mapping with {', '.join(keys)}")
+        return [_checks.column(f"{name}[{key!r}]", values[key]) for key in keys]
+
     def learn(
         self,
         time: Any,
@@ -314,14 +328,15 @@ class Case:
 
         ``move`` is its name, if the case has several moves. ``added`` is the signal that was added to the command
         meanwhile, a value (V or A) for each sample of the controller: :attr:`Learned.added` of the repetition before.
-        ``position`` is that of the cart, or with ``encoder`` the one that the controller measures, along the belt.
-        Ctrl-C ends it.
+        ``position`` is that of the cart, or with ``encoder`` the one that the controller measures, along the belt. Of a
+        gantry it is a mapping of the positions of ``bridge`` and ``cart``, or of those that the controllers measure by
+        their motors (``left``, ``right``), and so is ``added``. Ctrl-C ends it.
         """
         data = self._native.learn(
             _checks.names("move", None if move is None else [_checks.text("move", move)]),
             _checks.column("time", time),
-            _checks.column("position", position),
-            None if added is None else _checks.column("added", added),
+            self._columns("position", position, drives=bool(encoder)),
+            None if added is None else self._columns("added", added, drives=True),
             bool(encoder),
         )
         return Learned(data)

@@ -695,26 +695,39 @@ class Learned:
     """The output of ``taut learn --json``."""
 
     @property
-    def added(self) -> NDArray[np.float64]:
-        """The signal to add to the command of the next repetition, V or A: a value for each sample of the controller."""
-        return np.array(self.data["added"], dtype=np.float64)
+    def added(self) -> Any:
+        """The signal to add to the command of the next repetition, V or A: a value for each sample of the controller. Of
+        a gantry a mapping with the signal of each motor."""
+        signals = {one["name"]: np.array(one["added"], dtype=np.float64) for one in self.data["drives"]}
+        return signals if len(signals) > 1 else next(iter(signals.values()))
 
     @property
     def times(self) -> NDArray[np.float64]:
         """The times of :attr:`added` from the beginning of the move on, s."""
-        return np.arange(len(self.data["added"]), dtype=np.float64) * np.float64(self.data["every_s"])
+        count = len(self.data["drives"][0]["added"])
+        return np.arange(count, dtype=np.float64) * np.float64(self.data["every_s"])
 
     def to_pandas(self) -> pandas.DataFrame:
-        """A pandas.DataFrame of time, signal of the log and next one, error of the log and expected next one (m)."""
-        names = ("added_before", "added", "error_m", "expected_m")
-        return frame({"time_s": self.times, **{name: self.data[name] for name in names}})
+        """A pandas.DataFrame of time, signal of the log and next one, error of the log and expected next one (m); of a
+        gantry with the motor, ``bridge`` or ``cart`` before each name."""
+        columns: dict[str, Any] = {"time_s": self.times}
+        for group, names in (("drives", ("added_before", "added")), ("loads", ("error_m", "expected_m"))):
+            for one in self.data[group]:
+                prefix = f"{one['name']}_" if len(self.data["drives"]) > 1 else ""
+                columns.update({prefix + name: one[name] for name in names})
+        return frame(columns)
 
     def __repr__(self) -> str:
         return f"<taut.Learned {self.data['title']!r}: {self.data['move']}>"
 
     def _repr_html_(self) -> str:
-        rows = [(k + 1, one["nominal"]["rms_m"], one["worst"]["rms_m"]) for k, one in enumerate(self.data["predicted"])]
-        return _html.table(self.data["title"], ("repetition", "error on the axis of the file, m", "at worst, m"), rows)
+        rows = [
+            (k + 1, load["name"], one["nominal"]["rms_m"], one["worst"]["rms_m"])
+            for load in self.data["loads"]
+            for k, one in enumerate(load["predicted"])
+        ]
+        columns = ("repetition", "of the", "error on the machine of the file, m", "at worst, m")
+        return _html.table(self.data["title"], columns, rows)
 
 
 @dataclass(frozen=True)
@@ -737,7 +750,7 @@ class FrequencyResponses:
         columns: dict[str, list[Any]] = {}
         for one in self.data["responses"]:
             count = len(one["frequency_Hz"])
-            for name in ("log", "quantity"):
+            for name in ("log", "input", "quantity"):
                 columns.setdefault(name, []).extend([one[name]] * count)
             for name in ("frequency_Hz", "real", "imaginary", "radius", "coherence"):
                 columns.setdefault(name, []).extend(one[name])
@@ -760,9 +773,11 @@ class FrequencyResponses:
         return figure
 
     def __repr__(self) -> str:
-        told = ", ".join(f"{one['log']}: {one['quantity']}" for one in self.data["responses"])
+        several = len({one["input"] for one in self.data["responses"]}) > 1
+        name = "{log}: {input} to {quantity}" if several else "{log}: {quantity}"
+        told = ", ".join(name.format(**one) for one in self.data["responses"])
         return f"<taut.FrequencyResponses {self.data['title']!r}: {told}>"
 
     def _repr_html_(self) -> str:
-        rows = [(one["log"], one["quantity"], len(one["frequency_Hz"])) for one in self.data["responses"]]
-        return _html.table(str(self.data["title"]), ("log", "quantity", "frequencies"), rows)
+        rows = [(one["log"], one["input"], one["quantity"], len(one["frequency_Hz"])) for one in self.data["responses"]]
+        return _html.table(str(self.data["title"]), ("log", "input", "quantity", "frequencies"), rows)

@@ -38,8 +38,8 @@ pub fn page(case: &Case, found: &Designed, checked: &[Verified], figure: &Figure
         100.0 * found.limits.margin,
         100.0 * found.doubt
     );
-    page.table(&table(&caption, ["", "Reached", "Limit", "Whose"], limits(found)));
-    page.embed("As the case file has it", &found.toml());
+    page.table(&table(&caption, ["", "Reached", "Limit", "Whose"], limits(found, &case.machine)));
+    page.embed("As the case file has it", &found.toml(&case.machine));
     page.section("Other inputs");
     let caption = format!("Mean relative error ({}) of the best of each kind.", found.criterion.word());
     page.table(&table(&caption, ["Input", "Error", "Search"], inputs(found)));

@@ -2,6 +2,7 @@
 
 use crate::fit::value;
 use taut::fit::experiment_design::{Designed, Limits, Promise, Verified};
+use taut::machine::Machine;
 
 /// A share as people write it.
 fn percent(share: f64) -> String {
@@ -13,7 +14,7 @@ fn percent(share: f64) -> String {
 
 /// The input in a sentence.
 pub fn heading(found: &Designed) -> String {
-    format!("{}, {} in all", found.shape.words(found.unit), value(found.duration, "s", 3))
+    format!("{}, {} in all", found.driven.words(&found.shape, found.unit), value(found.duration, "s", 3))
 }
 
 /// Name, value, standard error and the same relative of each parameter; those that count first.
@@ -39,7 +40,11 @@ pub fn inputs(found: &Designed) -> Vec<[String; 3]> {
     let all = found.alternatives.iter();
     all.map(|one| {
         let how = if one.refined { "" } else { "first points only" };
-        [one.shape.kind().word().to_string(), percent(one.score), how.to_string()]
+        let input = match one.driven.name {
+            "" => one.shape.kind().word().to_string(),
+            name => format!("{}, {name}", one.shape.kind().word()),
+        };
+        [input, percent(one.score), how.to_string()]
     })
     .collect()
 }
@@ -56,18 +61,20 @@ pub fn own(found: &Designed) -> Vec<[String; 3]> {
 }
 
 /// How far it goes, what limits it, and where that comes from.
-pub fn limits(found: &Designed) -> Vec<[String; 4]> {
-    let Limits { input, current, travel, .. } = found.limits;
+pub fn limits(found: &Designed, machine: &Machine) -> Vec<[String; 4]> {
+    let Limits { input, current, travel, .. } = &found.limits;
     let reached = &found.reached;
     let row = |name: &str, is: f64, unit: &str, limit: (f64, taut::fit::experiment_design::Origin)| {
         [name.to_string(), value(is, unit, 3), value(limit.0, unit, 3), limit.1.words().to_string()]
     };
-    let mut rows = vec![row("input", reached.input, found.unit, input)];
+    let mut rows = vec![row("input", reached.input, found.unit, *input)];
     match current {
-        Some(current) => rows.push(row("current", reached.current, "A", current)),
+        Some(current) => rows.push(row("current", reached.current, "A", *current)),
         None => rows.push(["current".into(), value(reached.current, "A", 3), "none".into(), String::new()]),
     }
-    rows.push(row("way of the cart", reached.way(), "m", travel));
+    for (slide, ((label, _), travel)) in machine.travels().zip(travel).enumerate() {
+        rows.push(row(&format!("way of the {}", label.name), reached.way(slide), "m", *travel));
+    }
     rows
 }
 

@@ -8,6 +8,9 @@ use taut::frf::Measurement;
 /// The page.
 pub fn page(case: &Case, found: &Measurement, figures: &[(String, Figure)]) -> Page {
     let mut page = Page::new(case.title.clone()).subtitle("Frequency responses from logs, without a model.");
+    for warning in &found.warnings {
+        page.callout(Callout::Note, "An input without a response", format!("{warning}."));
+    }
     match &found.fit {
         Ok(fit) => {
             let kind = if fit.chi < 3.0 { Callout::Holds } else { Callout::Note };
@@ -24,7 +27,7 @@ pub fn page(case: &Case, found: &Measurement, figures: &[(String, Figure)]) -> P
         Err(error) => page.callout(Callout::Note, "Nothing was fitted", error.what.clone()),
     }
     for (one, (_, figure)) in found.responses.iter().zip(figures) {
-        page.section(&format!("{}: {}", one.frf.name, one.frf.quantity.name()));
+        page.section(&one.frf.title());
         for line in lines(&one.frf) {
             page.prose(format!("{line}."));
         }

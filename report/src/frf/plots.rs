@@ -14,7 +14,7 @@ pub fn figures(found: &Measurement, machine: &Machine) -> Vec<(String, Figure)> 
 
 fn bode(one: &Response, machine: &Machine) -> Figure {
     let frf = &one.frf;
-    let unit = machine.drives[0].amplifier.mode.unit();
+    let unit = machine.drives[frf.drive].amplifier.mode.unit();
     let hertz: Vec<f64> = frf.points.iter().map(|point| point.omega / (2.0 * PI)).collect();
     let decibels = |value: f64| 20.0 * value.max(1e-300).log10();
     let measured: Vec<Complex<f64>> = frf.points.iter().map(|point| point.value).collect();
@@ -49,7 +49,7 @@ fn bode(one: &Response, machine: &Machine) -> Figure {
     let below = Panel::new(Axis::new("Coherence", ""))
         .series(Series::new("", hertz, coherence).colour(Colour::Ink))
         .horizontal(COHERENT, "");
-    Figure::new(format!("{}: {}", frf.name, frf.quantity.name()), Axis::new("Frequency", "Hz").logarithmic())
+    Figure::new(frf.title(), Axis::new("Frequency", "Hz").logarithmic())
         .panel(magnitude)
         .panel(phase)
         .panel(below)

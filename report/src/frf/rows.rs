@@ -14,6 +14,9 @@ pub fn lines(frf: &Frf) -> Vec<String> {
     let seconds = frf.length as f64 * frf.every;
     let mut lines =
         vec![format!("{what}: {} of {seconds:.3} s, {:.2} Hz between frequencies", frf.segments, 1.0 / seconds)];
+    if frf.input != "input" {
+        lines.push(format!("coherence of this input with the others {:.3} in the median", frf.alike));
+    }
     let coherent: Vec<_> = frf.coherent().collect();
     lines.push(match (coherent.first(), coherent.last()) {
         (Some(first), Some(last)) => {

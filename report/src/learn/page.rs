@@ -10,15 +10,15 @@ use taut::learning::Learned;
 pub fn page(case: &Case, motion: &Move, found: &Learned, figures: &[(String, Figure)]) -> Page {
     let mut page = Page::new(case.title.clone())
         .subtitle(format!("The next feed-forward signal of the move \"{}\", learned from its log.", motion.name));
-    page.callout(Callout::Holds, "Learning converges", format!("{}.", head(found)));
-    page.table(&figures_table(lines(found, case.machine.drives[0].amplifier.mode.unit())));
+    page.callout(Callout::Holds, "Learning converges", format!("{}.", head(found, &case.machine)));
+    page.table(&figures_table(lines(found, &case.machine)));
     let caption = "Errors of the repetitions to come, each learned from the one before: on the machine of the file, and \
                    the largest of the family.";
     let mut table = Table::new(caption);
     for name in ["Repetition", "File, rms", "File, peak", "Worst, rms", "Worst, peak"] {
         table = table.column(name, "");
     }
-    trials(found).into_iter().for_each(|row| table.row(row.map(Cell::from)));
+    trials(found, &case.machine).into_iter().for_each(|row| table.row(row.map(Cell::from)));
     page.table(&table);
     for (_, figure) in figures {
         page.figure(figure);

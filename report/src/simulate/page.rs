@@ -49,10 +49,10 @@ pub fn how(solver: Solver) -> &'static str {
 }
 
 /// The key figures, a row for each.
-pub fn figures_table(lines: Vec<(&'static str, String)>) -> Table {
+pub fn figures_table(lines: Vec<(impl Into<String>, String)>) -> Table {
     let mut table = Table::new("").column("Quantity", "").column("Value", "");
     for (name, value) in lines {
-        table.row([Cell::from(name), Cell::from(value.replace('-', "−"))]);
+        table.row([Cell::from(name.into()), Cell::from(value.replace('-', "−"))]);
     }
     table
 }

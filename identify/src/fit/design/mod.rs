@@ -14,6 +14,7 @@
 
 mod candidates;
 mod criterion;
+mod driven;
 mod limits;
 mod search;
 mod text;
@@ -22,6 +23,7 @@ mod verify;
 
 pub use crate::fit::limits::VERIFIED;
 pub use candidates::{Kind, Shape};
+pub use driven::Driven;
 pub use limits::{Limits, Origin, Reached};
 pub use search::{Alternative, Designed, Own, Promise};
 pub use verify::{Verified, verify};
@@ -32,7 +34,7 @@ use crate::fit::asked::problem::{Problem, Stop};
 use crate::fit::limits::{DESIGN_MODEL_ERROR, DURATION, MOST_ROWS, SAMPLE_INTERVAL};
 use crate::fit::trust::identify::Group;
 use crate::log::Quantity;
-use crate::machine::{Channel, EncoderPlace, Machine, Measurement};
+use crate::machine::{Channel, Machine, Measurement};
 
 /// The measure that is made small.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -61,6 +63,8 @@ pub struct Request {
     pub names: Vec<String>,
     /// The inputs to choose among; all where none is named.
     pub kinds: Vec<Kind>,
+    /// What inputs may go to, by the names of [`Driven::all`]; all of these where none is named.
+    pub driven: Vec<String>,
     /// The measure that is made small.
     pub criterion: Criterion,
     /// Length, s.
@@ -77,7 +81,7 @@ pub struct Request {
     pub input: Option<f64>,
     /// Greatest current, A.
     pub current: Option<f64>,
-    /// Length of the travel, m.
+    /// Length of the travel, m; of a gantry that of bridge and cart.
     pub travel: Option<f64>,
     /// Outputs that are measured; the case's encoder and recorder where nothing is named.
     pub measured: Vec<Channel>,
@@ -90,6 +94,7 @@ impl Default for Request {
         Self {
             names: Vec::new(),
             kinds: Vec::new(),
+            driven: Vec::new(),
             criterion: Criterion::D,
             duration: DURATION,
             every: None,
@@ -136,6 +141,7 @@ pub(super) struct Task<'a> {
     /// Places of the parameters that count, among the problem's.
     pub wanted: Vec<usize>,
     pub names: Vec<String>,
+    pub driven: Vec<Driven>,
     pub criterion: Criterion,
     pub duration: f64,
     pub every: f64,
@@ -174,6 +180,8 @@ impl<'a> Task<'a> {
             plan: self.plan.clone(),
             wanted: self.wanted.clone(),
             names: self.names.clone(),
+            driven: self.driven.clone(),
+            limits: self.limits.clone(),
             measured: self.measured.clone(),
             ..*self
         }
@@ -181,6 +189,12 @@ impl<'a> Task<'a> {
 
     fn new(case: &Case, request: &Request, stop: Stop<'a>) -> Result<Self> {
         request.checked()?;
+        crate::case::needs_motors(&case.machine)?;
+        let modes = || case.machine.drives.iter().map(|drive| drive.amplifier.mode.unit());
+        if let Some(other) = modes().find(|unit| Some(*unit) != modes().next()) {
+            return Err(Error::new(format!("one amplifier is commanded in {other} and another one is not"))
+                .allowed("amplifiers of one mode: an input has one unit"));
+        }
         let every = request.every.unwrap_or_else(|| usual_interval(case));
         if request.duration < 10.0 * every || request.duration / every > MOST_ROWS {
             return Err(Error::new(format!(
@@ -207,6 +221,7 @@ impl<'a> Task<'a> {
         wanted.dedup();
         let measured = measured(case, request)?;
         let limits = Limits::new(case, request)?;
+        let driven = Driven::named(&case.machine, &request.driven)?;
         let mut own = case.clone();
         own.experiments.clear();
         let names = wanted.iter().map(|&j| all[j].clone()).collect();
@@ -215,6 +230,7 @@ impl<'a> Task<'a> {
             plan,
             wanted,
             names,
+            driven,
             criterion: request.criterion,
             duration: request.duration,
             every,
@@ -257,24 +273,29 @@ fn plan_of(case: &Case, request: &Request) -> Result<Plan> {
 /// The recorder's interval, else the shortest of the experiments.
 fn usual_interval(case: &Case) -> f64 {
     let recorder = case.measurement.as_ref().and_then(|measurement| measurement.every);
-    let shortest = case.experiments.iter().map(|experiment| experiment.every).reduce(f64::min);
+    // That of a log is a difference of its times, with their rounding.
+    let written = |every: f64| format!("{every:.9e}").parse().unwrap_or(every);
+    let shortest = case.experiments.iter().map(|experiment| written(experiment.every)).reduce(f64::min);
     recorder.or(shortest).unwrap_or(SAMPLE_INTERVAL)
 }
 
 /// Outputs that are measured, and how well: as asked for; else the encoder and the recorder of the case; else the
 /// outputs of its logs, with the noise that they show.
 fn measured(case: &Case, request: &Request) -> Result<Vec<Channel>> {
+    let own = case.machine.quantities();
+    if let Some(channel) = request.measured.iter().find(|channel| !own.contains(&channel.quantity)) {
+        let names: Vec<&str> = own.iter().map(|quantity| quantity.name()).collect();
+        return Err(Error::new(format!("`{}` is no measured quantity of this machine", channel.quantity.name()))
+            .allowed(names.join(", ")));
+    }
     if !request.measured.is_empty() {
         return Ok(request.measured.clone());
     }
     let mut all = Vec::new();
     if let Some(encoder) = case.machine.encoder {
-        let quantity = match encoder.at {
-            EncoderPlace::Motor | EncoderPlace::DrivePulley => Quantity::DriveAngle,
-            EncoderPlace::Cart => Quantity::CartPosition,
-        };
         let step = Some(1.0 / encoder.counts_per_unit(case.machine.drives[0].motor.gear_ratio));
-        all.push(Channel { quantity, step, noise: 0.0, range: None });
+        let counted = case.machine.counted().filter(|quantity| !quantity.is_of_rotor());
+        all.extend(counted.map(|quantity| Channel { quantity, step, noise: 0.0, range: None }));
     }
     let of_recorder = case.measurement.iter().flat_map(|Measurement { channels, .. }| channels.iter().copied());
     all.extend(of_recorder);
@@ -299,10 +320,13 @@ fn measured(case: &Case, request: &Request) -> Result<Vec<Channel>> {
             "give it a step or a noise in [measurement], or name what is measured with --measure drive_angle=1mrad",
         ));
     }
+    let such_as = match case.machine.has_one_coordinate() {
+        true => "--measure drive_angle=1mrad --measure motor_current=10mA",
+        false => "--measure left_angle=1mrad --measure right_angle=1mrad",
+    };
     match all.is_empty() {
-        true => Err(Error::new("nothing is measured in this case: there is no [encoder], no [measurement] and no log").next(
-            "add [encoder], or name what is measured and its noise: --measure drive_angle=1mrad --measure motor_current=10mA",
-        )),
+        true => Err(Error::new("nothing is measured in this case: there is no [encoder], no [measurement] and no log")
+            .next(format!("add [encoder], or name what is measured and its noise: {such_as}"))),
         false => Ok(all),
     }
 }

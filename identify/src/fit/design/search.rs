@@ -2,6 +2,7 @@
 
 use super::candidates::{Kind, Room, Shape};
 use super::criterion::Information;
+use super::driven::Driven;
 use super::limits::{Limits, Reached};
 use super::{Criterion, Task, Undetermined};
 use crate::case::parameters;
@@ -16,7 +17,6 @@ use crate::fit::limits::{
 use crate::fit::search::cmaes;
 use crate::machine::{Channel, Machine};
 use crate::mechanism::State;
-use crate::signal::Signal;
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
 
@@ -51,6 +51,8 @@ impl Promise {
 pub struct Alternative {
     /// The input.
     pub shape: Shape,
+    /// The drives that it goes to.
+    pub driven: Driven,
     /// The mean relative error.
     pub score: f64,
     /// True if it was searched beyond the first points.
@@ -75,6 +77,8 @@ pub struct Own {
 pub struct Designed {
     /// The input.
     pub shape: Shape,
+    /// The drives that it goes to.
+    pub driven: Driven,
     /// Its name in the case file.
     pub name: String,
     /// The unit of the input.
@@ -116,6 +120,7 @@ pub struct Designed {
 /// An input of which is known what it tells.
 struct Judged {
     shape: Shape,
+    driven: Driven,
     initial: State,
     reached: Reached,
     information: Information,
@@ -129,9 +134,14 @@ pub(super) fn best(task: &Task, case: &Case, kinds: &[Kind], watch: &mut dyn FnM
     let mut found: Vec<(Alternative, Vec<f64>)> = Vec::new();
     for &kind in kinds {
         watch(kind.word());
-        if let Some((shape, point, score)) = screened(task, kind, &mut tried) {
-            found.push((Alternative { shape, score, refined: false }, point));
+        let mut best: Option<(Alternative, Vec<f64>)> = None;
+        for driven in &task.driven {
+            let Some((shape, point, score)) = screened(task, kind, driven, &mut tried) else { continue };
+            if best.as_ref().is_none_or(|(best, _)| score < best.score) {
+                best = Some((Alternative { shape, driven: driven.clone(), score, refined: false }, point));
+            }
         }
+        found.extend(best);
         if (task.stop)() && !found.is_empty() {
             break;
         }
@@ -146,7 +156,8 @@ pub(super) fn best(task: &Task, case: &Case, kinds: &[Kind], watch: &mut dyn FnM
             }
             let kind = alternative.shape.kind();
             watch(kind.word());
-            if let Some((shape, better, score)) = refined(task, kind, point, alternative.score, &mut tried) {
+            let from = (&**point, alternative.score);
+            if let Some((shape, better, score)) = refined(task, kind, &alternative.driven, from, &mut tried) {
                 (alternative.shape, *point, alternative.score) = (shape, better, score);
             }
             alternative.refined = true;
@@ -156,7 +167,7 @@ pub(super) fn best(task: &Task, case: &Case, kinds: &[Kind], watch: &mut dyn FnM
     let doubtful = doubtful(task)?;
     let mut best: Option<Judged> = None;
     for (alternative, _) in found.iter_mut().take(FINALISTS) {
-        let Some(judged) = task.finally(alternative.shape, &doubtful) else { continue };
+        let Some(judged) = task.finally(alternative.shape, &alternative.driven, &doubtful) else { continue };
         (alternative.shape, alternative.score) = (judged.shape, judged.score);
         if best.as_ref().is_none_or(|best| judged.score < best.score) {
             best = Some(judged);
@@ -186,15 +197,15 @@ fn room(task: &Task) -> Room {
 }
 
 /// Value of an input at a point of the unit cube.
-fn look(task: &Task, kind: Kind, point: &[f64], tried: &mut usize) -> Option<(Shape, f64)> {
+fn look(task: &Task, kind: Kind, driven: &Driven, point: &[f64], tried: &mut usize) -> Option<(Shape, f64)> {
     *tried += 1;
-    let (shape, initial, _) = task.fitted(Shape::at(kind, point, &room(task)), &[])?;
-    let score = task.information(&shape.signal(), initial, &Differences::Forward)?.score(task.criterion);
+    let (shape, initial, _) = task.fitted(Shape::at(kind, point, &room(task)), driven, &[])?;
+    let score = task.information(&driven.inputs(&shape), initial, &Differences::Forward)?.score(task.criterion);
     score.is_finite().then_some((shape, score))
 }
 
 /// The best of points that are spread evenly along each number, in random order.
-fn screened(task: &Task, kind: Kind, tried: &mut usize) -> Option<(Shape, Vec<f64>, f64)> {
+fn screened(task: &Task, kind: Kind, driven: &Driven, tried: &mut usize) -> Option<(Shape, Vec<f64>, f64)> {
     let n = kind.numbers();
     let mut random = Pcg64::seed_from_u64(task.seed);
     let orders: Vec<Vec<usize>> = (0..n).map(|_| shuffled(FIRST_POINTS, &mut random)).collect();
@@ -204,7 +215,7 @@ fn screened(task: &Task, kind: Kind, tried: &mut usize) -> Option<(Shape, Vec<f6
             break;
         }
         let point: Vec<f64> = orders.iter().map(|order| (order[k] as f64 + 0.5) / FIRST_POINTS as f64).collect();
-        if let Some((shape, score)) = look(task, kind, &point, tried)
+        if let Some((shape, score)) = look(task, kind, driven, &point, tried)
             && best.as_ref().is_none_or(|(_, _, least)| score < *least)
         {
             best = Some((shape, point, score));
@@ -222,7 +233,13 @@ fn shuffled(count: usize, random: &mut Pcg64) -> Vec<usize> {
 }
 
 /// The best that an evolution strategy finds from a point, if that is better.
-fn refined(task: &Task, kind: Kind, from: &[f64], score: f64, tried: &mut usize) -> Option<(Shape, Vec<f64>, f64)> {
+fn refined(
+    task: &Task,
+    kind: Kind,
+    driven: &Driven,
+    (from, score): (&[f64], f64),
+    tried: &mut usize,
+) -> Option<(Shape, Vec<f64>, f64)> {
     let logit: Vec<f64> = from.iter().map(|share| (share / (1.0 - share)).ln()).collect();
     let mut best: Option<(Shape, Vec<f64>, f64)> = None;
     let first = *tried;
@@ -231,7 +248,7 @@ fn refined(task: &Task, kind: Kind, from: &[f64], score: f64, tried: &mut usize)
             return (f64::INFINITY, false);
         }
         let point: Vec<f64> = logit.iter().zip(z.iter()).map(|(a, z)| 1.0 / (1.0 + (-a - z).exp())).collect();
-        let Some((shape, value)) = look(task, kind, &point, tried) else { return (f64::INFINITY, false) };
+        let Some((shape, value)) = look(task, kind, driven, &point, tried) else { return (f64::INFINITY, false) };
         let least = best.as_ref().map_or(score, |(.., least)| *least);
         if value < least {
             best = Some((shape, point, value));
@@ -259,19 +276,19 @@ fn doubtful(task: &Task) -> Result<Vec<Machine>> {
 
 impl Task<'_> {
     /// An input that keeps the limits on all of these machines, too, and what it surely tells.
-    fn finally(&self, shape: Shape, doubtful: &[Machine]) -> Option<Judged> {
-        let (shape, initial, reached) = self.fitted(shape, doubtful)?;
+    fn finally(&self, shape: Shape, driven: &Driven, doubtful: &[Machine]) -> Option<Judged> {
+        let (shape, initial, reached) = self.fitted(shape, driven, doubtful)?;
         // What does not break away tells nothing.
         if reached.speed == 0.0 {
             return None;
         }
-        let information = self.surely(self.information(&shape.signal(), initial, &Differences::Central)?)?;
+        let information = self.surely(self.information(&driven.inputs(&shape), initial, &Differences::Central)?)?;
         let score = information.score(self.criterion);
-        Some(Judged { shape, initial, reached, information, score })
+        Some(Judged { shape, driven: driven.clone(), initial, reached, information, score })
     }
 
     fn told(&self, case: &Case, best: Judged, alternatives: Vec<Alternative>, tried: usize) -> Designed {
-        let Judged { shape, initial, reached, information, score } = best;
+        let Judged { shape, driven, initial, reached, information, score } = best;
         let known = &information.known;
         let problem = &information.problem;
         let promise = |(j, parameter): (usize, &crate::parameter::Free)| {
@@ -300,12 +317,13 @@ impl Task<'_> {
             undetermined: known.groups.iter().map(|group| (group.clone(), known.choices(problem, group))).collect(),
             name,
             shape,
+            driven,
             unit: case.machine.drives[0].amplifier.mode.unit(),
             duration: self.duration,
             every: self.every,
             initial,
             reached,
-            limits: self.limits,
+            limits: self.limits.clone(),
             doubt: self.doubt,
             model_error: self.model_error,
             measured: self.measured.clone(),
@@ -324,8 +342,7 @@ impl Task<'_> {
             return None;
         }
         let task = Task { duration: experiment.until, ..self.on(self.case.machine.clone()) };
-        let input: &Signal = &experiment.inputs[0];
-        let information = task.information(input, experiment.initial, &Differences::Central)?;
+        let information = task.information(&experiment.inputs, experiment.initial, &Differences::Central)?;
         let determined = self.wanted.iter().filter(|&&j| information.known.error[j].is_finite()).count();
         Some(Own {
             name: experiment.name.clone(),

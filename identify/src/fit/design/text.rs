@@ -3,7 +3,8 @@
 use super::Designed;
 use crate::case::{Case, Experiment};
 use crate::error::{Error, Result};
-use crate::machine::axis::{CART, DRIVE, IDLER};
+use crate::machine::Machine;
+use crate::mechanism::BODIES;
 use std::path::Path;
 
 impl Designed {
@@ -11,7 +12,7 @@ impl Designed {
     pub fn experiment(&self) -> Experiment {
         Experiment {
             name: self.name.clone(),
-            inputs: vec![self.shape.signal()],
+            inputs: self.driven.inputs(&self.shape),
             until: self.duration,
             every: self.every,
             initial: self.initial,
@@ -19,30 +20,38 @@ impl Designed {
         }
     }
 
-    /// The experiment as a table of the case file.
-    pub fn toml(&self) -> String {
+    /// The experiment as a table of the case file of this machine.
+    pub fn toml(&self, machine: &Machine) -> String {
         let mut text = String::from("[[experiment]]\n");
         let mut put = |key: &str, value: String| text.push_str(&format!("{key} = {value}\n"));
         put("name", format!("\"{}\"", self.name));
-        put("input", self.shape.toml(self.unit));
+        put("input", self.driven.toml(machine, &self.shape, self.unit));
         put("until", format!("\"{} s\"", self.duration));
         put("every", format!("\"{} s\"", self.every));
-        if self.initial.position[CART] != 0.0 {
-            let at = self.initial.position;
-            put(
-                "initial",
-                format!(
-                    "{{ cart_position = \"{} m\", drive_angle = \"{} rad\", idler_angle = \"{} rad\" }}",
-                    at[CART], at[DRIVE], at[IDLER]
-                ),
-            );
+        if self.initial.position != [0.0; BODIES] {
+            put("initial", format!("{{ {} }}", self.start(machine)));
         }
         text
     }
 
+    /// Where what slides begins; of an axis its pulleys, too: those of a gantry are where the belt is without strain.
+    fn start(&self, machine: &Machine) -> String {
+        let (geometry, at) = (machine.geometry(), self.initial.position);
+        let slides = geometry.slides.iter().map(|slide| slide.body);
+        let pulleys = (0..geometry.bodies.len()).filter(|body| !slides.clone().any(|slide| slide == *body));
+        let place = |body: usize, what: &str, unit: &str| {
+            format!("{}_{what} = \"{} {unit}\"", geometry.label(body).key, at[body])
+        };
+        let mut all: Vec<String> = slides.clone().map(|body| place(body, "position", "m")).collect();
+        if machine.has_one_coordinate() {
+            all.extend(pulleys.map(|body| place(body, "angle", "rad")));
+        }
+        all.join(", ")
+    }
+
     /// The text of the case with the experiment behind all else; `name` stands in messages.
     pub fn case_text(&self, case: &Case, name: &Path) -> Result<String> {
-        let whole = format!("{}\n\n{}", case.text.trim_end(), self.toml());
+        let whole = format!("{}\n\n{}", case.text.trim_end(), self.toml(&case.machine));
         let read = Case::from_text(name, &whole).map_err(|error| {
             if case.text.lines().any(|line| line.trim_start().starts_with("experiment") && line.contains('=')) {
                 Error::new("the experiments of this case are an inline list, to which a table cannot be added")
@@ -54,7 +63,7 @@ impl Designed {
         })?;
         // What is written is what was judged.
         match read.experiments.last() {
-            Some(last) if last.name == self.name && last.inputs[0] == self.shape.signal() => Ok(whole),
+            Some(last) if last.name == self.name && last.inputs == self.driven.inputs(&self.shape) => Ok(whole),
             _ => Err(Error::new("the designed experiment does not read back as it was written").in_file(name)),
         }
     }

@@ -3,6 +3,7 @@
 use super::Task;
 use super::candidates::Shape;
 use super::criterion::Information;
+use super::driven::Driven;
 use super::limits::{Reached, reach, unbounded};
 use crate::case::Experiment;
 use crate::chance::{hash, normal};
@@ -10,7 +11,6 @@ use crate::fit::asked::problem::Problem;
 use crate::fit::asked::residuals::{Differences, Residuals};
 use crate::fit::limits::SMALLER;
 use crate::log::{Log, Output, Quantity};
-use crate::machine::axis::CART;
 use crate::machine::{Channel, Machine};
 use crate::mechanism::State;
 use crate::signal::{Hold, Signal};
@@ -22,30 +22,35 @@ use rand_pcg::rand_core::SeedableRng;
 use std::sync::Arc;
 
 impl Task<'_> {
-    /// Where an input begins so that its way is in the middle of the travel, and how far it goes; none where the run
+    /// Where inputs begin so that their ways are in the middle of the travel, and how far they go; none where the run
     /// does not get to its end.
-    pub(super) fn placed(&self, machine: &Machine, input: &Signal) -> Option<(State, Reached)> {
+    pub(super) fn placed(&self, machine: &Machine, inputs: &[Signal]) -> Option<(State, Reached)> {
         let machine = unbounded(machine);
-        let at = |x: f64| machine.at_rest(x);
-        let mut initial = at(self.limits.middle.unwrap_or(0.0));
-        let mut reached = reach(&machine, input, initial, self.every, self.duration)?;
-        if let Some(middle) = self.limits.middle {
-            let off = 0.5 * (reached.positions[0] + reached.positions[1]) - middle;
-            initial = at(round(initial.position[CART] - off));
-            reached = reach(&machine, input, initial, self.every, self.duration)?;
+        let middle = &self.limits.middle;
+        let mut places: Vec<f64> = middle.iter().map(|middle| middle.unwrap_or(0.0)).collect();
+        let mut initial = machine.without_strain(&places, &[]);
+        let mut reached = reach(&machine, inputs, initial, self.every, self.duration)?;
+        if middle.iter().any(Option::is_some) {
+            for ((place, middle), [least, most]) in places.iter_mut().zip(middle).zip(&reached.positions) {
+                if let Some(middle) = middle {
+                    *place = round(*place - (0.5 * (least + most) - middle));
+                }
+            }
+            initial = machine.without_strain(&places, &[]);
+            reached = reach(&machine, inputs, initial, self.every, self.duration)?;
         }
         Some((initial, reached))
     }
 
     /// The input with an amplitude that keeps the limits, as it is or smaller; none where that is not found.
-    pub(super) fn fitted(&self, shape: Shape, stages: &[Machine]) -> Option<(Shape, State, Reached)> {
+    pub(super) fn fitted(&self, shape: Shape, driven: &Driven, stages: &[Machine]) -> Option<(Shape, State, Reached)> {
         let mut shape = shape;
         for _ in 0..SMALLER {
-            let signal = shape.signal();
-            let (initial, reached) = self.placed(&self.case.machine, &signal)?;
+            let inputs = driven.inputs(&shape);
+            let (initial, reached) = self.placed(&self.case.machine, &inputs)?;
             let mut used = self.limits.used(&reached);
             for machine in stages {
-                let reached = reach(&unbounded(machine), &signal, initial, self.every, self.duration)?;
+                let reached = reach(&unbounded(machine), &inputs, initial, self.every, self.duration)?;
                 used = used.max(self.limits.used(&reached));
             }
             // Four digits.
@@ -58,7 +63,7 @@ impl Task<'_> {
     }
 
     /// The experiment with the log that the model makes of it; `noise` is which one.
-    pub(super) fn experiment(&self, name: &str, input: &Signal, initial: State, noise: u64) -> Option<Experiment> {
+    pub(super) fn experiment(&self, name: &str, inputs: &[Signal], initial: State, noise: u64) -> Option<Experiment> {
         let time: Vec<f64> = {
             let grid = Grid::new(self.every, self.duration);
             (0..=grid.intervals()).map(|k| grid.time(k)).collect()
@@ -66,7 +71,7 @@ impl Task<'_> {
         let until = *time.last()?;
         let mut experiment = Experiment {
             name: name.to_string(),
-            inputs: vec![input.clone()],
+            inputs: inputs.to_vec(),
             until,
             every: self.every,
             initial,
@@ -93,7 +98,7 @@ impl Task<'_> {
         let log = Log {
             name: name.to_string(),
             file: Default::default(),
-            inputs: vec![time.iter().map(|&t| input.value(t)).collect()],
+            inputs: inputs.iter().map(|input| time.iter().map(|&t| input.value(t)).collect()).collect(),
             time,
             added: None,
             hold: Hold::Zero,
@@ -124,9 +129,9 @@ impl Task<'_> {
         Some(problem)
     }
 
-    /// Knowledge of a fit of a log of this input, by such derivatives.
-    pub(super) fn information(&self, input: &Signal, initial: State, how: &Differences) -> Option<Information> {
-        let mut problem = self.problem(self.experiment("designed", input, initial, self.seed)?)?;
+    /// Knowledge of a fit of a log of these inputs, by such derivatives.
+    pub(super) fn information(&self, inputs: &[Signal], initial: State, how: &Differences) -> Option<Information> {
+        let mut problem = self.problem(self.experiment("designed", inputs, initial, self.seed)?)?;
         let x = problem.start();
         let mut residuals = vec![0.0; problem.rows()];
         if !problem.evaluate(&x, &mut residuals) {
@@ -162,13 +167,14 @@ fn round(position: f64) -> f64 {
 /// The column of a run with that quantity.
 fn source(block: &Trajectory, quantity: Quantity) -> &[f64] {
     let name = quantity.name();
+    // A rotor without play is where its pulley is.
     let other = match name {
-        "motor_voltage" => "voltage",
-        "rotor_angle" => "drive_angle",
-        "rotor_speed" => "drive_speed",
-        _ => name,
+        "motor_voltage" => "voltage".into(),
+        "rotor_angle" => "drive_angle".into(),
+        "rotor_speed" => "drive_speed".into(),
+        _ => name.replace("_rotor_", "_"),
     };
-    block.get(name).or_else(|| block.get(other)).unwrap_or(&[])
+    block.get(name).or_else(|| block.get(&other)).unwrap_or(&[])
 }
 
 /// A value as a converter gives it.

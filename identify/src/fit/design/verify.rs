@@ -10,7 +10,6 @@ use crate::fit::fit;
 use crate::fit::limits::START_OFF;
 use crate::fit::search::point::Ending;
 use crate::log::Quantity;
-use crate::machine::axis::{CART, DRIVE, IDLER};
 use crate::solve::Flow;
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
@@ -44,10 +43,9 @@ pub fn verify(case: &Case, request: &Request, found: &Designed, logs: usize, sto
         }
         // Somewhere within a step of a converter, so that rounding is another each time.
         let mut initial = found.initial;
-        let off = uniform(&mut random) * step(&task);
-        initial.position[CART] += off;
-        initial.position[DRIVE] += off / case.machine.pulley_radius;
-        initial.position[IDLER] += off / case.machine.pulley_radius;
+        let off: Vec<f64> = found.reached.positions.iter().map(|_| uniform(&mut random) * step(&task)).collect();
+        let moved = case.machine.without_strain(&off, &[]).position;
+        initial.position.iter_mut().zip(moved).for_each(|(place, off)| *place += off);
         let noise = task.seed.wrapping_add(1 + k as u64);
         let mut symmetric = |share: f64| 1.0 + share * (2.0 * uniform(&mut random) - 1.0);
         let mut machine = case.machine.clone();
@@ -60,7 +58,7 @@ pub fn verify(case: &Case, request: &Request, found: &Designed, logs: usize, sto
         }
         let experiment = task
             .on(machine)
-            .experiment(&found.name, &found.shape.signal(), initial, noise)
+            .experiment(&found.name, &found.driven.inputs(&found.shape), initial, noise)
             .ok_or_else(|| Error::new("the designed experiment cannot be simulated"))?;
         let mut own = Case { experiments: vec![experiment], ..task.case.clone() };
         for (free, truth) in frees.iter().zip(&truths) {
@@ -91,10 +89,9 @@ pub fn verify(case: &Case, request: &Request, found: &Designed, logs: usize, sto
     Ok(frees.iter().zip(seen).map(told).filter(|one| one.fits > 0).collect())
 }
 
-/// The coarsest step of a position that is recorded, m at the cart.
+/// The coarsest step of a position that is recorded, m along the belt.
 fn step(task: &Task) -> f64 {
-    let arm =
-        |quantity: Quantity| if quantity == Quantity::CartPosition { 1.0 } else { task.case.machine.pulley_radius };
+    let arm = |quantity: Quantity| if quantity.is_linear() { 1.0 } else { task.case.machine.pulley_radius };
     let positions = task.measured.iter().filter(|channel| channel.quantity.is_position());
     positions.map(|channel| arm(channel.quantity) * channel.step.unwrap_or(0.0)).fold(0.0, f64::max)
 }
