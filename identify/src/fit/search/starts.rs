@@ -49,16 +49,33 @@ pub(crate) struct Searched<'a> {
     pub work: Work,
 }
 
-/// The search of a fit, as far as `whole` says, and to wherever that leads along directions that are not determined.
+/// How far a search goes.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Effort {
+    pub options: Options,
+    /// True if curves of friction are simulated as straight lines.
+    pub is_straight: bool,
+}
+
+impl Effort {
+    /// Of a fit that is compared: what another step would move it by is far less than what models differ by in records
+    /// that were held out.
+    pub fn compared(iterations: usize) -> Self {
+        let options = Options { tolerance: ROUGH_TOLERANCE, iterations, evolutions: 0, ..Options::default() };
+        Self { options, is_straight: true }
+    }
+}
+
+/// The search of a fit, as far as `effort` says, and to wherever that leads along directions that are not determined.
 pub(crate) fn search_as_far<'a>(
     case: &Case,
     plan: &Plan,
     stop: Option<Stop<'a>>,
-    whole: &Options,
+    effort: &Effort,
     watch: &mut dyn FnMut(&[f64], f64) -> Flow,
 ) -> Result<Searched<'a>> {
-    let whole = *whole;
-    let mut problem = Problem::new(case, plan)?.stopped_by(stop);
+    let whole = effort.options;
+    let mut problem = Problem::new(case, plan)?.stopped_by(stop).straight(effort.is_straight);
     let mut work = Work::default();
     let mut descend = |problem: &mut Problem, x: &[f64], options: &Options| {
         let options = Options { rounding: problem.rounding(), ..*options };
