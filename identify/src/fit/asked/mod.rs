@@ -8,4 +8,4 @@ mod reading;
 pub(crate) mod residuals;
 pub(crate) mod run;
 mod sensitivity;
-mod straight;
+pub(crate) mod straight;

@@ -6,6 +6,12 @@ use crate::friction::{Friction, Law, Shape};
 use crate::machine::{BeltModel, Machine};
 use crate::polyline::Polyline;
 
+/// True if fits to this machine that are compared have exact derivatives: others take twenty times as long, with one or
+/// two runs for each variable.
+pub(crate) fn has_exact_derivatives(machine: &Machine) -> bool {
+    machine.is_piecewise_linear() || straightened(machine).is_some()
+}
+
 /// The machine with the Stribeck curve of its cart, or of its drive pulley on a belt that does not stretch, as Coulomb
 /// friction at its breakaway and a force of straight lines over the speed, F_b − F_f(v) at its points:
 ///
@@ -44,4 +50,41 @@ pub(super) fn straightened(machine: &Machine) -> Option<Machine> {
         return None;
     }
     own.is_piecewise_linear().then_some(own)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::case::{Case, TEMPLATE};
+
+    /// Coulomb friction at the breakaway and the force over the speed together, beside the curve.
+    #[test]
+    fn lines_resist_as_their_curve_does() {
+        let curve =
+            "{ viscous = 19, coulomb = 0.2, coulomb_backward = 0.25, stribeck = { force = 0.1, velocity = 0.02 } }";
+        let rigid = "belt = { model = \"rigid\" }";
+        for (change, own, is_pulley) in
+            [(format!("cart.friction={curve}"), "", false), (format!("drive_pulley.friction={curve}"), rigid, true)]
+        {
+            let changes: Vec<&str> = [change.as_str(), own].into_iter().filter(|change| !change.is_empty()).collect();
+            let machine = Case::from_text_with("axis.toml", TEMPLATE, &changes).unwrap().machine;
+            let straight = straightened(&machine).unwrap();
+            assert!(straight.is_piecewise_linear() && has_exact_derivatives(&machine));
+            let r = machine.pulley_radius;
+            let (friction, lever, lines) = match is_pulley {
+                true => (machine.drive_pulley.friction, r, straight.drive_pulley.friction),
+                false => (machine.cart.friction, 1.0, straight.cart.friction),
+            };
+            let line = straight.cart.forces.by_speed.as_ref().unwrap();
+            for k in (-400..=400).filter(|k| *k != 0) {
+                let v = 0.0002 * f64::from(k);
+                let own = lines.sliding(v) - lever * line.value(lever * v);
+                assert!((own - friction.sliding(v)).abs() < 0.016 * 0.1, "{v}: {own} {}", friction.sliding(v));
+            }
+            assert_eq!(lines.breakaway(true), friction.breakaway(true));
+        }
+        // On a belt that stretches the cart does not move as the pulley does.
+        let elastic = format!("drive_pulley.friction={curve}");
+        assert_eq!(straightened(&Case::from_text_with("axis.toml", TEMPLATE, &[&elastic]).unwrap().machine), None);
+    }
 }

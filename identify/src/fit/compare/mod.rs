@@ -14,6 +14,7 @@ pub use laws::FrictionLaw;
 use crate::case::{Case, Files, Plan};
 use crate::error::{Error, Result};
 use crate::fit::asked::problem::{Problem, Stop};
+use crate::fit::asked::straight::has_exact_derivatives;
 use crate::fit::limits::{STEPS, STEPS_IN_PART};
 use crate::fit::search::starts::{Effort, Work, search_as_far};
 use crate::fit::trust::found::Fit;
@@ -159,9 +160,9 @@ pub fn compare(
         let sided = law == FrictionLaw::Asymmetric || (law.is_above() && course.is_sided_better());
         let (own, searched) = laws::with(case, name, plan, law, sided, &from)?;
         let mut start = own.machine.clone();
-        let windows = match law.is_curved() {
-            true => course.best_window().map_or(setting.windows.clone(), |window| vec![window]),
-            false => setting.windows.clone(),
+        let windows = match course.best_window() {
+            Some(window) if !has_exact_derivatives(&own.machine) => vec![window],
+            _ => setting.windows.clone(),
         };
         for window in windows {
             let told = Candidate::new(law, sided, window, searched.names().count());

@@ -7,7 +7,7 @@ use super::linear::Linear;
 use super::point::{Ending, Options, Point, Strategy, cost_of};
 use super::rung::{Climb, Rung, Watch};
 use crate::fit::asked::residuals::{Bounds, Differences, Residuals};
-use crate::fit::limits::{KINK, NEAR, PAST_KINKS, SHOWS};
+use crate::fit::limits::{KINK, NEAR, PAST_KINKS, SHARP, SHOWS};
 use crate::solve::Flow;
 use nalgebra::{DMatrix, DVector};
 
@@ -97,7 +97,7 @@ impl Damped {
         }
         if at.best.decrement < NEAR && *how == Differences::Forward && !at.is_exact {
             *how = at.differences_over(PAST_KINKS);
-        } else if at.best.decrement < 100.0 * at.options.tolerance {
+        } else if at.best.decrement < SHARP {
             *how = Differences::Central;
         }
     }

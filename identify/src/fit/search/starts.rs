@@ -53,8 +53,9 @@ pub(crate) struct Searched<'a> {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Effort {
     pub options: Options,
-    /// True if curves of friction are simulated as straight lines.
-    pub is_straight: bool,
+    /// True for a fit that is only compared: curves of friction are simulated as straight lines, and a search whose
+    /// iterations are used up does not begin again.
+    pub is_compared: bool,
 }
 
 impl Effort {
@@ -62,7 +63,7 @@ impl Effort {
     /// that were held out.
     pub fn compared(iterations: usize) -> Self {
         let options = Options { tolerance: ROUGH_TOLERANCE, iterations, evolutions: 0, ..Options::default() };
-        Self { options, is_straight: true }
+        Self { options, is_compared: true }
     }
 }
 
@@ -75,7 +76,7 @@ pub(crate) fn search_as_far<'a>(
     watch: &mut dyn FnMut(&[f64], f64) -> Flow,
 ) -> Result<Searched<'a>> {
     let whole = effort.options;
-    let mut problem = Problem::new(case, plan)?.stopped_by(stop).straight(effort.is_straight);
+    let mut problem = Problem::new(case, plan)?.stopped_by(stop).straight(effort.is_compared);
     let mut work = Work::default();
     let mut descend = |problem: &mut Problem, x: &[f64], options: &Options| {
         let options = Options { rounding: problem.rounding(), ..*options };
@@ -133,7 +134,12 @@ pub(crate) fn search_as_far<'a>(
         let alike = fresh.len() == 1 && !plan.huber && !told_beforehand(&problem, &fresh) && uniform(&problem);
         noise = fresh;
         let options = Options { huber: if plan.huber { HUBER } else { f64::INFINITY }, ..whole };
-        if alike && round == 0 && matches!(best.ending, Ending::Converged | Ending::Stalled) {
+        let has_ended = match best.ending {
+            Ending::Converged | Ending::Stalled => true,
+            Ending::OutOfIterations => effort.is_compared,
+            Ending::Interrupted | Ending::Failed => false,
+        };
+        if alike && round == 0 && has_ended {
             // One weight for all: only the unit of the residuals changes.
             if let (Some(now), Some(before)) = (first_weight(&problem), before) {
                 rescale(&mut best, now / before);

@@ -4,7 +4,7 @@ use super::finding::{Finding, Grade};
 use super::found::Fit;
 use super::scores::LogFit;
 use super::trials::is_borne_out;
-use super::unexplained;
+use super::unexplained::{self, Reason};
 use crate::case::{Case, Plan};
 use crate::fit::asked::controller::reproduced;
 use crate::fit::asked::problem::Problem;
@@ -29,7 +29,11 @@ pub(crate) fn findings(case: &Case, plan: &Plan, found: &Searched, fit: &Fit, su
     all.extend(of_search(fit));
     all.extend(of_noise(found));
     all.extend(of_motor(case, fit));
-    all.extend(of_residuals(case, plan, found, fit, &all));
+    let unexplained = of_residuals(case, plan, found, fit, &all);
+    // Of columns that have changed places each may move against the model, but with its sign changed neither is met.
+    let is_swapped = |log: &Option<String>| unexplained.iter().any(|one| one.code == "swapped" && one.log == *log);
+    all.retain(|one| !(one.code == "sign" && is_swapped(&one.log)));
+    all.extend(unexplained);
     all.sort_by_key(|finding| std::cmp::Reverse(finding.grade));
     all
 }
@@ -305,15 +309,17 @@ fn of_residuals(case: &Case, plan: &Plan, found: &Searched, fit: &Fit, others: &
         if names.is_empty() {
             continue;
         }
-        let reason = unexplained::reason(case, plan, found, quantity, &names).unwrap_or_else(|| {
-            "neither windows nor a factor on it or on the input mends that: check signs, columns and units of this log, \
-             and missing parts of the model"
-                .into()
+        let reason = unexplained::reason(case, plan, found, quantity, &names).unwrap_or_else(|| Reason {
+            code: "unexplained",
+            text: "neither windows nor other columns nor a factor on it or on the input mends that: check signs, \
+                   columns and units of this log, and missing parts of the model"
+                .into(),
         });
+        let Reason { code, text } = reason;
         all.extend(own.into_iter().map(|(name, score)| {
             let text =
-                format!("{}: the model explains only {:.0} % of it: {reason}", quantity.name(), score.percent.max(0.0));
-            Finding { grade: Grade::Warning, code: "unexplained", log: Some(name.to_string()), text }
+                format!("{}: the model explains only {:.0} % of it: {text}", quantity.name(), score.percent.max(0.0));
+            Finding { grade: Grade::Warning, code, log: Some(name.to_string()), text }
         }));
     }
     all
