@@ -68,11 +68,6 @@ pub(crate) const START_STEP: f64 = 1e-2;
 /// Unit: standard deviations. Source: P. J. Huber 1964: 95 % efficient for Gaussian noise.
 pub(crate) const HUBER: f64 = 1.345;
 
-/// Steps of coarse derivatives, tried one after the other.
-///
-/// Unit: standard errors of a variable by itself. Source: chosen.
-pub(crate) const COARSE: [f64; 2] = [1.0, 10.0];
-
 /// Promised gain below which a search measures derivatives over `PAST_KINKS`.
 ///
 /// Unit: standard errors. Source: chosen.

@@ -19,7 +19,7 @@ pub(crate) fn has_exact_derivatives(machine: &Machine) -> bool {
 /// F_b − F_c − (F_b − F_c) e^{−(v/v_s)²}
 /// ```
 ///
-/// Between the points it is off by at most 1.5 % of F_b − F_c. None where the machine has another curve, or has such a
+/// Between the points it is off by at most 1.6 % of F_b − F_c. None where the machine has another curve, or has such a
 /// force already.
 pub(super) fn straightened(machine: &Machine) -> Option<Machine> {
     let r = machine.pulley_radius;

@@ -171,7 +171,6 @@ fn as_it_is(problem: &mut Problem) -> Minimum {
         at_bound: Vec::new(),
         ending: if good { Ending::Converged } else { Ending::Failed },
         strategy: None,
-        coarse: 0.0,
         pieces: 1,
         evolved: 0,
         iterations: 0,
