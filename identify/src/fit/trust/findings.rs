@@ -9,8 +9,8 @@ use crate::case::{Case, Plan};
 use crate::fit::asked::controller::reproduced;
 use crate::fit::asked::problem::Problem;
 use crate::fit::limits::{
-    CAUSE_EXPLAINS, CAUSE_MOVES, CAUSE_WARNS, KINK_PROMISE, MORE_THAN_NOISE, MOTOR_CONSTANTS, NORMAL, OPPOSITE,
-    POOR_FIT, REPRODUCED,
+    CAUSE_EXPLAINS, CAUSE_MOVES, CAUSE_WARNS, FACTOR_LEAVES, KINK_PROMISE, MORE_THAN_NOISE, MOTOR_CONSTANTS, NORMAL,
+    OPPOSITE, POOR_FIT, REPRODUCED,
 };
 use crate::fit::noise::Wave;
 use crate::fit::search::point::Ending;
@@ -295,6 +295,10 @@ fn constants(at: &DriveAt, motor: &Motor, given: &DriveUnit) -> Option<Finding> 
 
 /// Logs that the model does not explain, with the reason, if windows or a factor are one.
 fn of_residuals(case: &Case, plan: &Plan, found: &Searched, fit: &Fit, others: &[Finding]) -> Vec<Finding> {
+    // An element that the model lacks is the reason already.
+    if fit.cause.as_ref().is_some_and(|cause| cause.explained >= 1.0 - FACTOR_LEAVES) {
+        return Vec::new();
+    }
     // A log that shows no motion is not explained by any model.
     let is_known = |log: &LogFit| others.iter().any(|one| one.code == "still" && one.log.as_ref() == Some(&log.name));
     let poor = |log: &LogFit, quantity: Quantity| {
