@@ -75,7 +75,8 @@ pub(crate) const NEAR: f64 = 1.0;
 
 /// Promised gain below which a search measures central derivatives, which cost twice as much.
 ///
-/// Unit: standard errors. Source: chosen: a hundred times the usual tolerance.
+/// Unit: standard errors. Source: chosen: a hundred times the usual tolerance. Test:
+/// `a_rough_search_measures_central_derivatives_at_its_end_only`.
 pub(crate) const SHARP: f64 = 0.1;
 
 /// Step of derivatives near a minimum and in a posterior: it passes over the small kinks that sticks and slips make,

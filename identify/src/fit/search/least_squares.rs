@@ -188,6 +188,50 @@ mod tests {
         }
     }
 
+    /// A smooth valley, with how its derivatives were measured.
+    struct Recorded(Vec<Differences>);
+
+    impl Residuals for Recorded {
+        fn rows(&self) -> usize {
+            30
+        }
+
+        fn evaluate(&mut self, x: &[f64], r: &mut [f64]) -> bool {
+            let noise = |k: usize| if k.is_multiple_of(2) { 1.0 } else { -1.0 };
+            let value = |k: usize| (x[0] * k as f64 / 30.0).exp() + x[1] * k as f64 - noise(k);
+            r.iter_mut().enumerate().for_each(|(k, r)| *r = value(k));
+            true
+        }
+
+        fn jacobian(&mut self, x: &[f64], r: &[f64], bounds: &Bounds, how: &Differences) -> Option<DMatrix<f64>> {
+            struct Plain<'a>(&'a mut Recorded);
+            impl Residuals for Plain<'_> {
+                fn rows(&self) -> usize {
+                    self.0.rows()
+                }
+
+                fn evaluate(&mut self, x: &[f64], r: &mut [f64]) -> bool {
+                    self.0.evaluate(x, r)
+                }
+            }
+            self.0.push(how.clone());
+            Plain(self).jacobian(x, r, bounds, how)
+        }
+    }
+
+    /// A search to a tenth of a standard error measured central derivatives, which cost twice as much, from ten standard
+    /// errors on.
+    #[test]
+    fn a_rough_search_measures_central_derivatives_at_its_end_only() {
+        let (bounds, options) = (Bounds::none(2), Options { tolerance: 0.1, ..Options::default() });
+        let mut valley = Recorded(Vec::new());
+        let found = minimise(&mut valley, &[4.0, 3.0], &bounds, &options, &mut |_, _| Flow::Continue);
+        assert_eq!(found.ending, Ending::Converged);
+        let central = valley.0.iter().filter(|how| **how == Differences::Central).count();
+        assert!(central == 1 && valley.0.last() == Some(&Differences::Central), "{:?}", valley.0);
+        assert!(valley.0.len() > 3 && valley.0[0] == Differences::Forward, "{:?}", valley.0);
+    }
+
     /// A rung that ends as it is told, and writes down that it was climbed.
     struct Told {
         ends: Vec<Climb>,
