@@ -15,7 +15,6 @@ use crate::case::{Case, Files, Plan};
 use crate::error::{Error, Result};
 use crate::fit::asked::problem::{Problem, Stop};
 use crate::fit::asked::straight::has_exact_derivatives;
-use crate::fit::limits::{STEPS, STEPS_IN_PART};
 use crate::fit::search::starts::{Effort, Work, search_as_far};
 use crate::fit::trust::found::Fit;
 use crate::fit::trust::held_out::{met, nothing};
@@ -240,7 +239,7 @@ impl Course<'_> {
 
     /// The fit to all logs, and its errors over whole logs with their starts fitted.
     fn whole(&mut self, case: &Case, plan: &Plan) -> Result<(Machine, Vec<(Quantity, f64)>)> {
-        let found = search_as_far(case, plan, self.stop, &Effort::compared(STEPS), &mut |_, _| Flow::Continue)?;
+        let found = search_as_far(case, plan, self.stop, &Effort::compared(), &mut |_, _| Flow::Continue)?;
         self.work.add(&found.work);
         let stages = found.problem.stages(&found.best.x);
         let simulated: Vec<Machine> =
@@ -256,7 +255,7 @@ impl Course<'_> {
     /// The errors in a part that is not fitted.
     fn fold(&mut self, case: &Case, plan: &Plan, part: usize) -> Result<Vec<(Quantity, f64, usize)>> {
         let parts = &self.parts;
-        let effort = Effort::compared(STEPS_IN_PART);
+        let effort = Effort::of_part();
         let (found, work) = errors(case, plan, &parts.folds[part], (parts.is_cut, &effort), self.stop)?;
         self.work.add(&work);
         Ok(found)

@@ -10,8 +10,8 @@ use crate::fit::asked::problem::{Problem, Stop, extent};
 use crate::fit::asked::residuals::Residuals;
 use crate::fit::asked::run::Run;
 use crate::fit::limits::{
-    FILE_ROUNDING, HUBER, MORE_THAN_NOISE, MOST_START_WINDOWS, ROUGH_TOLERANCE, SAME_MINIMUM, START_WINDOWS,
-    SWINGS_KEEP, TRIAL_ITERATIONS, WEIGHT_ROUNDS,
+    FILE_ROUNDING, HUBER, MORE_THAN_NOISE, MOST_START_WINDOWS, ROUGH_TOLERANCE, SAME_MINIMUM, START_WINDOWS, STEPS,
+    STEPS_IN_PART, SWINGS_KEEP, TRIAL_ITERATIONS, WEIGHT_ROUNDS,
 };
 use crate::log::Quantity;
 use crate::solve::Flow;
@@ -53,17 +53,24 @@ pub(crate) struct Searched<'a> {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Effort {
     pub options: Options,
-    /// True for a fit that is only compared: curves of friction are simulated as straight lines, and a search whose
-    /// iterations are used up does not begin again.
-    pub is_compared: bool,
+    /// True if curves of friction are simulated as straight lines.
+    pub is_straight: bool,
+    /// True if a search by differences whose iterations are used up does not begin again with new weights.
+    pub is_short: bool,
 }
 
 impl Effort {
     /// Of a fit that is compared: what another step would move it by is far less than what models differ by in records
     /// that were held out.
-    pub fn compared(iterations: usize) -> Self {
-        let options = Options { tolerance: ROUGH_TOLERANCE, iterations, evolutions: 0, ..Options::default() };
-        Self { options, is_compared: true }
+    pub fn compared() -> Self {
+        let options = Options { tolerance: ROUGH_TOLERANCE, iterations: STEPS, evolutions: 0, ..Options::default() };
+        Self { options, is_straight: true, is_short: false }
+    }
+
+    /// Of such a fit to a part of the logs, which begins where that to all of them ended.
+    pub fn of_part() -> Self {
+        let whole = Self::compared();
+        Self { options: Options { iterations: STEPS_IN_PART, ..whole.options }, is_short: true, ..whole }
     }
 }
 
@@ -76,7 +83,7 @@ pub(crate) fn search_as_far<'a>(
     watch: &mut dyn FnMut(&[f64], f64) -> Flow,
 ) -> Result<Searched<'a>> {
     let whole = effort.options;
-    let mut problem = Problem::new(case, plan)?.stopped_by(stop).straight(effort.is_compared);
+    let mut problem = Problem::new(case, plan)?.stopped_by(stop).straight(effort.is_straight);
     let mut work = Work::default();
     let mut descend = |problem: &mut Problem, x: &[f64], options: &Options| {
         let options = Options { rounding: problem.rounding(), ..*options };
@@ -136,7 +143,7 @@ pub(crate) fn search_as_far<'a>(
         let options = Options { huber: if plan.huber { HUBER } else { f64::INFINITY }, ..whole };
         let has_ended = match best.ending {
             Ending::Converged | Ending::Stalled => true,
-            Ending::OutOfIterations => effort.is_compared,
+            Ending::OutOfIterations => effort.is_short && problem.differences > 0,
             Ending::Interrupted | Ending::Failed => false,
         };
         if alike && round == 0 && has_ended {

@@ -70,7 +70,8 @@ pub(crate) fn search_near<'a>(
     watch: &mut dyn FnMut(&[f64], f64) -> Flow,
 ) -> Result<Settled<'a>> {
     let whole = Options::default();
-    let mut searched = search_as_far(case, plan, stop, &Effort { options: whole, is_compared: false }, watch)?;
+    let mut searched =
+        search_as_far(case, plan, stop, &Effort { options: whole, is_straight: false, is_short: false }, watch)?;
     let Searched { problem, best, work, .. } = &mut searched;
     let huber = if plan.huber { HUBER } else { f64::INFINITY };
     let options = Options { huber, rounding: problem.rounding(), ..whole };

@@ -26,7 +26,7 @@ use crate::fit::asked::problem::Stop;
 use crate::fit::asked::run::Run;
 use crate::fit::limits::{
     CAUSE_ERRORS, CAUSE_EXPLAINS, CAUSE_MOST_VALUES, CAUSE_NEAR, CAUSE_STEPS, CAUSES_FITTED, COLOURED, NORMAL,
-    STARTS_FITTED, STEPS_IN_PART,
+    STARTS_FITTED,
 };
 use crate::fit::search::starts::{Effort, Searched};
 use crate::machine::Machine;
@@ -126,7 +126,7 @@ fn predicts(site: &Site, tried: &Tried, stop: Option<Stop>) -> Option<[usize; 2]
     let plan = Plan { starts: 1, ..site.plan.clone() };
     let (with, own) = tried.case_and_plan();
     let parts = [Parts::new(&without, &plan), Parts::new(&with, &own)];
-    let effort = Effort::compared(STEPS_IN_PART);
+    let effort = Effort::of_part();
     let [before, after] = &parts;
     let mut gains = Vec::new();
     for (one, other) in before.folds.iter().zip(&after.folds) {
