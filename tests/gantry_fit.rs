@@ -93,6 +93,24 @@ fn belts_of_core_xy(free: &[&str]) -> Plan {
     }
 }
 
+/// With the angles of both motors in each other's columns a check took a minute of factors on them, none of which helped,
+/// and said to change a sign.
+#[test]
+fn exchanged_columns_of_two_motors_are_named() {
+    for kind in [Kind::CoreXy, Kind::HFrame] {
+        let mut own = with_log(case(kind, &[]), &case(kind, &["cart.mass=0.5"]), None, 3);
+        let log = Arc::make_mut(own.experiments[0].log.as_mut().unwrap());
+        let (one, other) = (log.outputs[0].quantity, log.outputs[1].quantity);
+        (log.outputs[0].quantity, log.outputs[1].quantity) = (other, one);
+        let plan = Plan { free: vec!["cart.mass".into()], ..Plan::default() };
+        let found = check(&own, &plan).unwrap();
+        let told: Vec<String> = found.fit.warnings().map(ToString::to_string).collect();
+        let words = format!("with the columns of {} and {} exchanged", one.name(), other.name());
+        assert!(told.iter().any(|one| one.contains(&words)), "{kind:?}: {told:#?}");
+        assert!(!found.fit.findings.iter().any(|one| one.code == "sign"), "{kind:?}: {told:#?}");
+    }
+}
+
 /// Of drawn machines.
 #[derive(Default)]
 struct Coverage {

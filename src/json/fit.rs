@@ -138,7 +138,6 @@ pub fn fit(case: &Case, fit: &Fit, profiles: &[Profile], posterior: Option<Value
         "findings": fit.findings.iter().map(finding).collect::<Vec<_>>(),
         "last_step_standard_errors": number(fit.decrement),
         "cost": number(fit.cost),
-        "coarse_derivatives_standard_errors": number(fit.coarse),
         "kink_gradients": fit.pieces,
         "evolutions": fit.evolved,
         "starts": fit.starts.iter().map(|cost| number(*cost)).collect::<Vec<_>>(),

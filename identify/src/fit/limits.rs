@@ -68,15 +68,16 @@ pub(crate) const START_STEP: f64 = 1e-2;
 /// Unit: standard deviations. Source: P. J. Huber 1964: 95 % efficient for Gaussian noise.
 pub(crate) const HUBER: f64 = 1.345;
 
-/// Steps of coarse derivatives, tried one after the other.
-///
-/// Unit: standard errors of a variable by itself. Source: chosen.
-pub(crate) const COARSE: [f64; 2] = [1.0, 10.0];
-
 /// Promised gain below which a search measures derivatives over `PAST_KINKS`.
 ///
 /// Unit: standard errors. Source: chosen.
 pub(crate) const NEAR: f64 = 1.0;
+
+/// Promised gain below which a search measures central derivatives, which cost twice as much.
+///
+/// Unit: standard errors. Source: chosen: a hundred times the usual tolerance. Test:
+/// `a_rough_search_measures_central_derivatives_at_its_end_only`.
+pub(crate) const SHARP: f64 = 0.1;
 
 /// Step of derivatives near a minimum and in a posterior: it passes over the small kinks that sticks and slips make,
 /// and is as good as another where there are none.
@@ -608,6 +609,16 @@ pub(crate) const FACTORS: [f64; 8] = [0.1, 0.01, 0.001, 10.0, 100.0, 1000.0, std
 ///
 /// Unit: 1. Source: chosen. Test: `a_factor_on_a_column_is_named`.
 pub(crate) const FACTOR_LEAVES: f64 = 0.1;
+
+/// Maximum Jacobians of the fits that rank factors.
+///
+/// Unit: Jacobians. Source: chosen: a right factor shows within a few steps. Test: `a_factor_on_a_column_is_named`.
+pub(crate) const FACTOR_STEPS: usize = 4;
+
+/// Factors that are fitted whole, the best of those that were ranked.
+///
+/// Unit: factors. Source: chosen. Test: `a_factor_on_a_column_is_named`.
+pub(crate) const FACTORS_FITTED: usize = 2;
 
 /// Share of the logged input that the controller of a case must explain.
 ///

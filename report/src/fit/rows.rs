@@ -24,16 +24,12 @@ pub fn findings<'a>(all: impl Iterator<Item = &'a Finding> + Clone) -> Vec<Strin
     told
 }
 
-/// The steps of the search past kinks, where the order of events left no derivative; empty where there were none.
+/// The search past kinks, where derivatives did not help; empty where there was none.
 pub fn past_kinks(fit: &Fit) -> String {
-    let evolved = match fit.evolved {
+    match fit.evolved {
         0 => String::new(),
-        1 => " and an evolution strategy".into(),
-        times => format!(" and an evolution strategy, {times} times"),
-    };
-    match fit.coarse {
-        0.0 => String::new(),
-        steps => format!("; where events change their order: derivatives over {steps} standard errors{evolved}"),
+        1 => "; where events change their order: an evolution strategy".into(),
+        times => format!("; where events change their order: an evolution strategy, {times} times"),
     }
 }
 

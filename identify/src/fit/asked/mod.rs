@@ -8,3 +8,4 @@ mod reading;
 pub(crate) mod residuals;
 pub(crate) mod run;
 mod sensitivity;
+pub(crate) mod straight;

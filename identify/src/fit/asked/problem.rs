@@ -3,6 +3,7 @@
 use super::reading::Reading;
 use super::residuals::{Bounds, Differences, Residuals, Step};
 use super::run::{Extra, MeasuredOutput, Nuisance, Run, Setting, rounding_at_rest};
+use super::straight::straightened;
 use crate::case::{Case, Nuisances, Plan, Scope, matches, parameters};
 use crate::error::{Error, Result};
 use crate::fit::limits::{FILE_ROUNDING, KNOWN_DELAY, SLOW_BY_DIFFERENCE, STARTS_MOVING};
@@ -36,6 +37,8 @@ pub struct Problem<'a> {
     pub differences: usize,
     /// True if residuals swing to and fro, so that a first value is as far off as any other, however smooth they are.
     pub swings: bool,
+    /// True if curves of friction are simulated as straight lines.
+    is_straight: bool,
     units: Vec<Scale>,
     /// Called between evaluations; true ends the search.
     stop: Option<Stop<'a>>,
@@ -124,6 +127,7 @@ impl<'a> Problem<'a> {
             simulations: 0,
             differences: 0,
             swings: false,
+            is_straight: false,
             stop: None,
         };
         problem.add_extras(case, plan);
@@ -146,6 +150,7 @@ impl<'a> Problem<'a> {
             simulations: 0,
             differences: 0,
             swings: false,
+            is_straight: false,
             units: Vec::new(),
             stop: None,
         }
@@ -155,6 +160,11 @@ impl<'a> Problem<'a> {
     pub fn stopped_by(mut self, stop: Option<Stop<'a>>) -> Self {
         self.stop = stop;
         self
+    }
+
+    /// Simulates Stribeck curves as straight lines, where the machine allows it.
+    pub(crate) fn straight(self, is_straight: bool) -> Self {
+        Self { is_straight, ..self }
     }
 
     /// The question.
@@ -452,6 +462,17 @@ impl<'a> Problem<'a> {
         (0..self.parts.len().max(1)).map(|part| self.stage_of(part, x)).collect()
     }
 
+    /// The machine that is simulated for a part of the logs.
+    pub(crate) fn simulated(&self, part: usize, x: &[f64]) -> Machine {
+        let machine = self.stage_of(part, x);
+        if self.is_straight { straightened(&machine).unwrap_or(machine) } else { machine }
+    }
+
+    /// The machines that are simulated.
+    fn all_simulated(&self, x: &[f64]) -> Vec<Machine> {
+        (0..self.parts.len().max(1)).map(|part| self.simulated(part, x)).collect()
+    }
+
     /// Where the extras of run `index` begin among the variables.
     fn place(&self, index: usize) -> usize {
         self.globals() + self.runs[..index].iter().map(|run| variable_extras(run).count()).sum::<usize>()
@@ -505,7 +526,7 @@ impl<'a> Problem<'a> {
 
     /// Residuals of all runs.
     fn residuals(&mut self, x: &[f64], r: &mut [f64]) -> bool {
-        let stages = self.stages(x);
+        let stages = self.all_simulated(x);
         let mut bench = Bench::default();
         let mut first = 0;
         for index in 0..self.runs.len() {
@@ -539,7 +560,7 @@ impl<'a> Problem<'a> {
         how: &Differences,
     ) -> Option<(DMatrix<f64>, Vec<Left>)> {
         let mut jacobian = DMatrix::zeros(self.rows(), x.len());
-        let stages = self.stages(x);
+        let stages = self.all_simulated(x);
         let mut bench = Bench::default();
         let is_exact = !matches!(how, Differences::Coarse(_));
         let (mut first, mut left) = (0, Vec::new());
@@ -586,7 +607,7 @@ impl<'a> Problem<'a> {
             for (to, out) in points.into_iter().flatten() {
                 moved[j] = to;
                 // Runs of one machine share what it has made ready.
-                let (stages, mut bench) = (self.stages(&moved), Bench::default());
+                let (stages, mut bench) = (self.all_simulated(&moved), Bench::default());
                 for &(index, first, ref columns) in left {
                     let run = &self.runs[index];
                     let (rows, machine) = (run.rows(), &stages[run.part]);

@@ -109,7 +109,7 @@ impl Problem<'_> {
         let begun = |to: f64| {
             let mut moved = x.to_vec();
             moved[j] = to;
-            run.begun(&self.stage_of(run.part, &moved), &self.extras_from(index, &moved, is_moved))
+            run.begun(&self.simulated(run.part, &moved), &self.extras_from(index, &moved, is_moved))
         };
         match extra.map(|extra| (extra.what, extra.unit)) {
             Some((Nuisance::Delay, unit)) => Some(Variable::Delay(unit)),

@@ -76,16 +76,6 @@ impl FrictionLaw {
             Self::Stribeck | Self::Along | Self::LuGre | Self::ForceAlong | Self::ForceBySpeed => true,
         }
     }
-
-    /// True if it curves with speed: a run takes a hundred times as long then.
-    pub(super) fn is_curved(self) -> bool {
-        match self {
-            Self::Viscous | Self::Coulomb | Self::Asymmetric | Self::Along | Self::ForceAlong | Self::ForceBySpeed => {
-                false
-            }
-            Self::Stribeck | Self::LuGre => true,
-        }
-    }
 }
 
 /// The body whose friction is compared: that of which most is searched for; the cart where that is none.

@@ -14,9 +14,8 @@ pub use laws::FrictionLaw;
 use crate::case::{Case, Files, Plan};
 use crate::error::{Error, Result};
 use crate::fit::asked::problem::{Problem, Stop};
-use crate::fit::limits::{ROUGH_TOLERANCE, STEPS, STEPS_IN_PART};
-use crate::fit::search::point::Options;
-use crate::fit::search::starts::{Work, search_as_far};
+use crate::fit::asked::straight::has_exact_derivatives;
+use crate::fit::search::starts::{Effort, Work, search_as_far};
 use crate::fit::trust::found::Fit;
 use crate::fit::trust::held_out::{met, nothing};
 use crate::fit::trust::nearest::search_near;
@@ -27,12 +26,6 @@ use crate::log::Quantity;
 use crate::machine::Machine;
 use crate::solve::Flow;
 use std::path::Path;
-
-/// How far the fits go that are compared: what another step would move them by is far less than what laws differ by in
-/// records that were held out. Fits to parts begin where that to the whole ended.
-fn compared(iterations: usize) -> Options {
-    Options { tolerance: ROUGH_TOLERANCE, iterations, evolutions: 0, ..Options::default() }
-}
 
 /// The laws and windows to compare.
 #[derive(Debug, Clone, PartialEq)]
@@ -166,9 +159,9 @@ pub fn compare(
         let sided = law == FrictionLaw::Asymmetric || (law.is_above() && course.is_sided_better());
         let (own, searched) = laws::with(case, name, plan, law, sided, &from)?;
         let mut start = own.machine.clone();
-        let windows = match law.is_curved() {
-            true => course.best_window().map_or(setting.windows.clone(), |window| vec![window]),
-            false => setting.windows.clone(),
+        let windows = match course.best_window() {
+            Some(window) if !has_exact_derivatives(&own.machine) => vec![window],
+            _ => setting.windows.clone(),
         };
         for window in windows {
             let told = Candidate::new(law, sided, window, searched.names().count());
@@ -246,13 +239,15 @@ impl Course<'_> {
 
     /// The fit to all logs, and its errors over whole logs with their starts fitted.
     fn whole(&mut self, case: &Case, plan: &Plan) -> Result<(Machine, Vec<(Quantity, f64)>)> {
-        let found = search_as_far(case, plan, self.stop, &compared(STEPS), &mut |_, _| Flow::Continue)?;
+        let found = search_as_far(case, plan, self.stop, &Effort::compared(), &mut |_, _| Flow::Continue)?;
         self.work.add(&found.work);
         let stages = found.problem.stages(&found.best.x);
+        let simulated: Vec<Machine> =
+            (0..stages.len()).map(|part| found.problem.simulated(part, &found.best.x)).collect();
         let known = known(&found);
         let whole = Plan { windows: None, held_out: plan.held_out.clone(), ..nothing(plan) };
         let logs: Vec<_> =
-            Problem::new(case, &whole)?.runs.iter().map(|run| met(run, &stages[run.part], &known, 1.0)).collect();
+            Problem::new(case, &whole)?.runs.iter().map(|run| met(run, &simulated[run.part], &known, 1.0)).collect();
         let errors = together(&logs, |_| String::new());
         Ok((stages[0].clone(), errors.iter().map(|one| (one.quantity, one.rmse)).collect()))
     }
@@ -260,8 +255,8 @@ impl Course<'_> {
     /// The errors in a part that is not fitted.
     fn fold(&mut self, case: &Case, plan: &Plan, part: usize) -> Result<Vec<(Quantity, f64, usize)>> {
         let parts = &self.parts;
-        let options = compared(STEPS_IN_PART);
-        let (found, work) = errors(case, plan, &parts.folds[part], (parts.is_cut, &options), self.stop)?;
+        let effort = Effort::of_part();
+        let (found, work) = errors(case, plan, &parts.folds[part], (parts.is_cut, &effort), self.stop)?;
         self.work.add(&work);
         Ok(found)
     }

@@ -1,22 +1,20 @@
 //! Damped steps: Levenberg and Marquardt's method with an active set for the bounds.
 //!
-//! λ follows the ratio of gain and promise (Nielsen 1999). Derivatives are cheap ones far from a minimum and central
-//! ones near it, or coarse ones, which see past kinks.
+//! λ follows the ratio of gain and promise (Nielsen 1999). Derivatives are cheap ones far from a minimum, over a part of
+//! a standard error on the way, and central ones near it.
 
 use super::linear::Linear;
 use super::point::{Ending, Options, Point, Strategy, cost_of};
 use super::rung::{Climb, Rung, Watch};
 use crate::fit::asked::residuals::{Bounds, Differences, Residuals};
-use crate::fit::limits::{KINK, NEAR, PAST_KINKS, SHOWS};
+use crate::fit::limits::{KINK, NEAR, PAST_KINKS, SHARP, SHOWS};
 use crate::solve::Flow;
 use nalgebra::{DMatrix, DVector};
 
 /// Damped steps as long as they lower the cost.
 pub(crate) struct Damped {
-    /// Step of coarse derivatives, in standard errors; none for those at the point.
-    coarse: Option<f64>,
     /// Derivatives that were measured last.
-    how: Option<Differences>,
+    how: Differences,
     /// λ; none before the first step.
     lambda: Option<f64>,
     /// Factor by which λ grows when a step is refused.
@@ -31,30 +29,15 @@ pub(crate) struct Damped {
 }
 
 impl Damped {
-    /// By derivatives at the point: cheap ones first, where these are asked for.
+    /// By cheap derivatives first, where these are asked for.
     pub fn new(options: &Options) -> Self {
         let how = if options.frugal { Differences::Forward } else { Differences::Central };
-        Self { how: Some(how), ..Self::coarse(None) }
+        Self { how, lambda: None, growth: 2.0, ahead: None, is_likely: true, slow: 0, trial: Vec::new() }
     }
 
-    /// By derivatives over this number of standard errors.
-    pub fn over(coarse: f64) -> Self {
-        Self::coarse(Some(coarse))
-    }
-
-    fn coarse(coarse: Option<f64>) -> Self {
-        let (how, lambda, ahead, trial) = (None, None, None, Vec::new());
-        Self { coarse, how, lambda, growth: 2.0, ahead, is_likely: true, slow: 0, trial }
-    }
-
-    /// Goes down from `at` by derivatives that begin as `how` has them.
-    fn descend(
-        &mut self,
-        mut how: Differences,
-        at: &mut Point,
-        problem: &mut dyn Residuals,
-        watch: &mut Watch,
-    ) -> Climb {
+    /// Goes down from `at`, by derivatives that begin as they were measured last.
+    fn descend(&mut self, at: &mut Point, problem: &mut dyn Residuals, watch: &mut Watch) -> Climb {
+        let mut how = self.how.clone();
         (self.lambda, self.growth) = (None, 2.0);
         let end = loop {
             if watch(&at.best.x, at.best.cost) == Flow::Stop {
@@ -63,7 +46,7 @@ impl Damped {
             if !at.linearise(problem, &how, self.ahead.take()) {
                 break Climb::Ended(Ending::Stalled);
             }
-            let is_sharp = how == Differences::Central || self.coarse.is_some() || at.is_exact;
+            let is_sharp = how == Differences::Central || at.is_exact;
             if at.is_at_minimum() {
                 if is_sharp {
                     break Climb::Converged;
@@ -71,7 +54,7 @@ impl Damped {
                 how = Differences::Central;
                 continue;
             }
-            self.sharpen(&mut how, at);
+            sharpen(&mut how, at);
             if at.best.iterations >= at.options.iterations {
                 break Climb::Ended(Ending::OutOfIterations);
             }
@@ -79,27 +62,15 @@ impl Damped {
                 continue;
             }
             (self.slow, self.ahead) = (0, None);
-            if self.coarse.is_none() && how != Differences::Central && !at.is_exact {
+            if how != Differences::Central && !at.is_exact {
                 // The cheap derivatives may be to blame.
                 (how, self.lambda) = (Differences::Central, None);
                 continue;
             }
             break if at.best.decrement <= KINK { Climb::Converged } else { Climb::Passed };
         };
-        self.how = Some(how);
+        self.how = how;
         end
-    }
-
-    /// Derivatives for the next Jacobian: better ones near a minimum.
-    fn sharpen(&self, how: &mut Differences, at: &Point) {
-        if self.coarse.is_some() {
-            return;
-        }
-        if at.best.decrement < NEAR && *how == Differences::Forward && !at.is_exact {
-            *how = at.differences_over(PAST_KINKS);
-        } else if at.best.decrement < 100.0 * at.options.tolerance {
-            *how = Differences::Central;
-        }
     }
 
     /// Takes a step that lowers the cost, with as much damping as it takes; whether it did, and did not creep.
@@ -161,7 +132,7 @@ impl Damped {
 
 impl Rung for Damped {
     fn strategy(&self) -> Strategy {
-        self.coarse.map_or(Strategy::Damped, Strategy::Coarse)
+        Strategy::Damped
     }
 
     fn applies(&self, _: &Point) -> bool {
@@ -169,17 +140,16 @@ impl Rung for Damped {
     }
 
     fn climb(&mut self, at: &mut Point, problem: &mut dyn Residuals, watch: &mut Watch) -> Climb {
-        // Where it was, with the derivatives that it had.
-        if let Some(how) = self.how.take() {
-            let end = self.descend(how, at, problem, watch);
-            if self.coarse.is_none() || end != Climb::Passed {
-                return end;
-            }
-        }
-        let Some(coarse) = self.coarse else { return Climb::Passed };
-        at.best.coarse = coarse;
-        let how = at.differences_over(coarse);
-        self.descend(how, at, problem, watch)
+        self.descend(at, problem, watch)
+    }
+}
+
+/// Derivatives for the next Jacobian: better ones near a minimum.
+fn sharpen(how: &mut Differences, at: &Point) {
+    if at.best.decrement < NEAR && *how == Differences::Forward && !at.is_exact {
+        *how = at.differences_over(PAST_KINKS);
+    } else if at.best.decrement < SHARP {
+        *how = Differences::Central;
     }
 }
 

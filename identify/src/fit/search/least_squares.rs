@@ -12,8 +12,8 @@
 //!
 //! Logs with dry friction make the cost kinked where sticks and slips change their order. So the search is a ladder of
 //! strategies. Where no damped step helps (`damped.rs`) and the test is not passed, a bundle of exact gradients goes on
-//! (`bundle.rs`), which knows a minimum on kinks. Where gradients are none or do not lead there, derivatives over
-//! longer steps are tried, and then an evolution strategy that needs none (`evolved.rs`), before it is called stalled.
+//! (`bundle.rs`), which knows a minimum on kinks. Where gradients are none or do not lead there, an evolution strategy
+//! that needs none is tried (`evolved.rs`) before it is called stalled.
 
 use super::bundle::Bundle;
 use super::damped::Damped;
@@ -21,7 +21,6 @@ use super::evolved::Evolved;
 use super::point::{Ending, Minimum, Options, Point, Strategy};
 use super::rung::{Climb, Rung, Watch};
 use crate::fit::asked::residuals::{Bounds, Residuals};
-use crate::fit::limits::COARSE;
 use crate::solve::Flow;
 
 /// Searches from `start` for the least cost. `watch` sees the best point and its cost after each step, and may end it.
@@ -43,7 +42,6 @@ pub fn minimise(
 /// The strategies, the first one tried first.
 fn ladder(options: &Options) -> Vec<Box<dyn Rung>> {
     let mut rungs: Vec<Box<dyn Rung>> = vec![Box::new(Damped::new(options)), Box::new(Bundle::default())];
-    rungs.extend(COARSE.map(|coarse| Box::new(Damped::over(coarse)) as Box<dyn Rung>));
     rungs.push(Box::new(Evolved { most: options.evolutions }));
     rungs
 }
@@ -168,16 +166,6 @@ mod tests {
     }
 
     #[test]
-    fn coarse_derivatives_lead_on_unless_they_are_too_coarse() {
-        let ends = COARSE.map(|coarse| {
-            let (end, found) = alone(&mut Damped::over(coarse), &START, false);
-            assert!(matches!(end, Climb::Converged | Climb::Passed) && found.coarse == coarse, "{end:?} {found:?}");
-            found.cost
-        });
-        assert!(ends[0] < cost(&START) && ends[1] <= cost(&START), "{ends:?}");
-    }
-
-    #[test]
     fn evolution_needs_no_derivatives() {
         let (end, found) = alone(&mut Evolved { most: 1 }, &START, false);
         assert_eq!((end, found.evolved), (Climb::Lowered, 1));
@@ -190,10 +178,9 @@ mod tests {
 
     #[test]
     fn the_result_says_which_strategy_ended_the_search() {
-        for (is_exact, strategies) in [
-            (true, &[Strategy::Bundle] as &[Strategy]),
-            (false, &[Strategy::Coarse(1.0), Strategy::Coarse(10.0), Strategy::Evolution]),
-        ] {
+        for (is_exact, strategies) in
+            [(true, &[Strategy::Bundle] as &[Strategy]), (false, &[Strategy::Damped, Strategy::Evolution])]
+        {
             let (bounds, options) = (Bounds::none(2), Options::default());
             let toy = &mut Kinked { is_exact };
             let found = minimise(toy, &START, &bounds, &options, &mut |_, _| Flow::Continue);
@@ -201,16 +188,60 @@ mod tests {
         }
     }
 
+    /// A smooth valley, with how its derivatives were measured.
+    struct Recorded(Vec<Differences>);
+
+    impl Residuals for Recorded {
+        fn rows(&self) -> usize {
+            30
+        }
+
+        fn evaluate(&mut self, x: &[f64], r: &mut [f64]) -> bool {
+            let noise = |k: usize| if k.is_multiple_of(2) { 1.0 } else { -1.0 };
+            let value = |k: usize| (x[0] * k as f64 / 30.0).exp() + x[1] * k as f64 - noise(k);
+            r.iter_mut().enumerate().for_each(|(k, r)| *r = value(k));
+            true
+        }
+
+        fn jacobian(&mut self, x: &[f64], r: &[f64], bounds: &Bounds, how: &Differences) -> Option<DMatrix<f64>> {
+            struct Plain<'a>(&'a mut Recorded);
+            impl Residuals for Plain<'_> {
+                fn rows(&self) -> usize {
+                    self.0.rows()
+                }
+
+                fn evaluate(&mut self, x: &[f64], r: &mut [f64]) -> bool {
+                    self.0.evaluate(x, r)
+                }
+            }
+            self.0.push(how.clone());
+            Plain(self).jacobian(x, r, bounds, how)
+        }
+    }
+
+    /// A search to a tenth of a standard error measured central derivatives, which cost twice as much, from ten standard
+    /// errors on.
+    #[test]
+    fn a_rough_search_measures_central_derivatives_at_its_end_only() {
+        let (bounds, options) = (Bounds::none(2), Options { tolerance: 0.1, ..Options::default() });
+        let mut valley = Recorded(Vec::new());
+        let found = minimise(&mut valley, &[4.0, 3.0], &bounds, &options, &mut |_, _| Flow::Continue);
+        assert_eq!(found.ending, Ending::Converged);
+        let central = valley.0.iter().filter(|how| **how == Differences::Central).count();
+        assert!(central == 1 && valley.0.last() == Some(&Differences::Central), "{:?}", valley.0);
+        assert!(valley.0.len() > 3 && valley.0[0] == Differences::Forward, "{:?}", valley.0);
+    }
+
     /// A rung that ends as it is told, and writes down that it was climbed.
     struct Told {
         ends: Vec<Climb>,
-        own: f64,
-        climbed: Rc<RefCell<Vec<f64>>>,
+        own: Strategy,
+        climbed: Rc<RefCell<Vec<Strategy>>>,
     }
 
     impl Rung for Told {
         fn strategy(&self) -> Strategy {
-            Strategy::Coarse(self.own)
+            self.own
         }
 
         fn applies(&self, _: &Point) -> bool {
@@ -226,12 +257,13 @@ mod tests {
     #[test]
     fn what_is_lowered_goes_on_from_the_rung_below() {
         use Climb::{Converged, Lowered, Passed};
+        use Strategy::{Bundle, Damped, Evolution};
         let (bounds, options) = (Bounds::none(2), Options::default());
         let climbed = Rc::new(RefCell::new(Vec::new()));
         let ended = |ends: [Vec<Climb>; 3]| {
-            let mut own = 0.0;
+            let mut names = [Damped, Bundle, Evolution].into_iter();
             let mut ladder = ends.map(|ends| {
-                own += 1.0;
+                let own = names.next().unwrap();
                 Box::new(Told { ends, own, climbed: climbed.clone() }) as Box<dyn Rung>
             });
             let toy = &mut Differenced;
@@ -241,10 +273,10 @@ mod tests {
         };
         // The second one does not apply any more where the first one passes again.
         let (end, order) = ended([vec![Passed, Passed], vec![Lowered], vec![Lowered, Converged]]);
-        assert_eq!((end, order), ((Ending::Converged, Strategy::Coarse(3.0)), vec![1.0, 2.0, 1.0, 3.0, 3.0]));
+        assert_eq!((end, order), ((Ending::Converged, Evolution), vec![Damped, Bundle, Damped, Evolution, Evolution]));
         let (end, order) = ended([vec![Passed], vec![Passed], vec![Converged]]);
-        assert_eq!((end, order), ((Ending::Converged, Strategy::Coarse(3.0)), vec![1.0, 2.0, 3.0]));
+        assert_eq!((end, order), ((Ending::Converged, Evolution), vec![Damped, Bundle, Evolution]));
         let (end, order) = ended([vec![Passed], vec![Passed], vec![Passed]]);
-        assert_eq!((end, order), ((Ending::Stalled, Strategy::Coarse(3.0)), vec![1.0, 2.0, 3.0]));
+        assert_eq!((end, order), ((Ending::Stalled, Evolution), vec![Damped, Bundle, Evolution]));
     }
 }

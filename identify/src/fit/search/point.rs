@@ -63,8 +63,6 @@ pub enum Strategy {
     Damped,
     /// A bundle of gradients around a kink.
     Bundle,
-    /// Damped steps by derivatives over this number of standard errors.
-    Coarse(f64),
     /// An evolution strategy, which needs no derivatives.
     Evolution,
 }
@@ -88,8 +86,6 @@ pub struct Minimum {
     pub ending: Ending,
     /// The strategy with which it ended; none where nothing was searched for.
     pub strategy: Option<Strategy>,
-    /// Steps of the derivatives, in standard errors, where the cost has kinks; 0 where it is smooth.
-    pub coarse: f64,
     /// How many gradients around balance there; more than one at a kink.
     pub pieces: usize,
     /// How often an evolution strategy went on where derivatives did not help.
@@ -142,7 +138,6 @@ impl<'a> Point<'a> {
             at_bound: vec![false; n],
             ending: Ending::Failed,
             strategy: None,
-            coarse: 0.0,
             pieces: 1,
             evolved: 0,
             iterations: 0,

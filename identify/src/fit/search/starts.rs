@@ -10,8 +10,8 @@ use crate::fit::asked::problem::{Problem, Stop, extent};
 use crate::fit::asked::residuals::Residuals;
 use crate::fit::asked::run::Run;
 use crate::fit::limits::{
-    FILE_ROUNDING, HUBER, MORE_THAN_NOISE, MOST_START_WINDOWS, ROUGH_TOLERANCE, SAME_MINIMUM, START_WINDOWS,
-    SWINGS_KEEP, TRIAL_ITERATIONS, WEIGHT_ROUNDS,
+    FILE_ROUNDING, HUBER, MORE_THAN_NOISE, MOST_START_WINDOWS, ROUGH_TOLERANCE, SAME_MINIMUM, START_WINDOWS, STEPS,
+    STEPS_IN_PART, SWINGS_KEEP, TRIAL_ITERATIONS, WEIGHT_ROUNDS,
 };
 use crate::log::Quantity;
 use crate::solve::Flow;
@@ -49,16 +49,41 @@ pub(crate) struct Searched<'a> {
     pub work: Work,
 }
 
-/// The search of a fit, as far as `whole` says, and to wherever that leads along directions that are not determined.
+/// How far a search goes.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Effort {
+    pub options: Options,
+    /// True if curves of friction are simulated as straight lines.
+    pub is_straight: bool,
+    /// True if a search by differences whose iterations are used up does not begin again with new weights.
+    pub is_short: bool,
+}
+
+impl Effort {
+    /// Of a fit that is compared: what another step would move it by is far less than what models differ by in records
+    /// that were held out.
+    pub fn compared() -> Self {
+        let options = Options { tolerance: ROUGH_TOLERANCE, iterations: STEPS, evolutions: 0, ..Options::default() };
+        Self { options, is_straight: true, is_short: false }
+    }
+
+    /// Of such a fit to a part of the logs, which begins where that to all of them ended.
+    pub fn of_part() -> Self {
+        let whole = Self::compared();
+        Self { options: Options { iterations: STEPS_IN_PART, ..whole.options }, is_short: true, ..whole }
+    }
+}
+
+/// The search of a fit, as far as `effort` says, and to wherever that leads along directions that are not determined.
 pub(crate) fn search_as_far<'a>(
     case: &Case,
     plan: &Plan,
     stop: Option<Stop<'a>>,
-    whole: &Options,
+    effort: &Effort,
     watch: &mut dyn FnMut(&[f64], f64) -> Flow,
 ) -> Result<Searched<'a>> {
-    let whole = *whole;
-    let mut problem = Problem::new(case, plan)?.stopped_by(stop);
+    let whole = effort.options;
+    let mut problem = Problem::new(case, plan)?.stopped_by(stop).straight(effort.is_straight);
     let mut work = Work::default();
     let mut descend = |problem: &mut Problem, x: &[f64], options: &Options| {
         let options = Options { rounding: problem.rounding(), ..*options };
@@ -116,7 +141,12 @@ pub(crate) fn search_as_far<'a>(
         let alike = fresh.len() == 1 && !plan.huber && !told_beforehand(&problem, &fresh) && uniform(&problem);
         noise = fresh;
         let options = Options { huber: if plan.huber { HUBER } else { f64::INFINITY }, ..whole };
-        if alike && round == 0 && matches!(best.ending, Ending::Converged | Ending::Stalled) {
+        let has_ended = match best.ending {
+            Ending::Converged | Ending::Stalled => true,
+            Ending::OutOfIterations => effort.is_short && problem.differences > 0,
+            Ending::Interrupted | Ending::Failed => false,
+        };
+        if alike && round == 0 && has_ended {
             // One weight for all: only the unit of the residuals changes.
             if let (Some(now), Some(before)) = (first_weight(&problem), before) {
                 rescale(&mut best, now / before);
@@ -148,7 +178,6 @@ fn as_it_is(problem: &mut Problem) -> Minimum {
         at_bound: Vec::new(),
         ending: if good { Ending::Converged } else { Ending::Failed },
         strategy: None,
-        coarse: 0.0,
         pieces: 1,
         evolved: 0,
         iterations: 0,

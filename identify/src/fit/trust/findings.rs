@@ -4,13 +4,13 @@ use super::finding::{Finding, Grade};
 use super::found::Fit;
 use super::scores::LogFit;
 use super::trials::is_borne_out;
-use super::unexplained;
+use super::unexplained::{self, Reason};
 use crate::case::{Case, Plan};
 use crate::fit::asked::controller::reproduced;
 use crate::fit::asked::problem::Problem;
 use crate::fit::limits::{
-    CAUSE_EXPLAINS, CAUSE_MOVES, CAUSE_WARNS, KINK_PROMISE, MORE_THAN_NOISE, MOTOR_CONSTANTS, NORMAL, OPPOSITE,
-    POOR_FIT, REPRODUCED,
+    CAUSE_EXPLAINS, CAUSE_MOVES, CAUSE_WARNS, FACTOR_LEAVES, KINK_PROMISE, MORE_THAN_NOISE, MOTOR_CONSTANTS, NORMAL,
+    OPPOSITE, POOR_FIT, REPRODUCED,
 };
 use crate::fit::noise::Wave;
 use crate::fit::search::point::Ending;
@@ -29,7 +29,11 @@ pub(crate) fn findings(case: &Case, plan: &Plan, found: &Searched, fit: &Fit, su
     all.extend(of_search(fit));
     all.extend(of_noise(found));
     all.extend(of_motor(case, fit));
-    all.extend(of_residuals(case, plan, found, fit, &all));
+    let unexplained = of_residuals(case, plan, found, fit, &all);
+    // Of columns that have changed places each may move against the model, but with its sign changed neither is met.
+    let is_swapped = |log: &Option<String>| unexplained.iter().any(|one| one.code == "swapped" && one.log == *log);
+    all.retain(|one| !(one.code == "sign" && is_swapped(&one.log)));
+    all.extend(unexplained);
     all.sort_by_key(|finding| std::cmp::Reverse(finding.grade));
     all
 }
@@ -291,6 +295,10 @@ fn constants(at: &DriveAt, motor: &Motor, given: &DriveUnit) -> Option<Finding> 
 
 /// Logs that the model does not explain, with the reason, if windows or a factor are one.
 fn of_residuals(case: &Case, plan: &Plan, found: &Searched, fit: &Fit, others: &[Finding]) -> Vec<Finding> {
+    // An element that the model lacks is the reason already.
+    if fit.cause.as_ref().is_some_and(|cause| cause.explained >= 1.0 - FACTOR_LEAVES) {
+        return Vec::new();
+    }
     // A log that shows no motion is not explained by any model.
     let is_known = |log: &LogFit| others.iter().any(|one| one.code == "still" && one.log.as_ref() == Some(&log.name));
     let poor = |log: &LogFit, quantity: Quantity| {
@@ -305,15 +313,18 @@ fn of_residuals(case: &Case, plan: &Plan, found: &Searched, fit: &Fit, others: &
         if names.is_empty() {
             continue;
         }
-        let reason = unexplained::reason(case, plan, found, quantity, &names).unwrap_or_else(|| {
-            "neither windows nor a factor on it or on the input explains that: check signs, columns and units of this \
-             log, and missing parts of the model"
-                .into()
+        let reason = unexplained::reason(case, plan, found, quantity, &names).unwrap_or_else(|| Reason {
+            code: "unexplained",
+            text:
+                "neither windows nor exchanged columns nor a factor on it or on the input explains that: check signs, \
+                   columns and units of this log, and missing parts of the model"
+                    .into(),
         });
+        let Reason { code, text } = reason;
         all.extend(own.into_iter().map(|(name, score)| {
             let text =
-                format!("{}: the model explains only {:.0} % of it: {reason}", quantity.name(), score.percent.max(0.0));
-            Finding { grade: Grade::Warning, code: "unexplained", log: Some(name.to_string()), text }
+                format!("{}: the model explains only {:.0} % of it: {text}", quantity.name(), score.percent.max(0.0));
+            Finding { grade: Grade::Warning, code, log: Some(name.to_string()), text }
         }));
     }
     all

@@ -55,8 +55,6 @@ pub struct Fit {
     /// The cost that each start led to, in the first weights; the first start is that of the case, or what a regression
     /// makes of it if that is nearer.
     pub starts: Vec<f64>,
-    /// Steps of derivatives, in standard errors, where the order of events left none; 0 where the cost was smooth.
-    pub coarse: f64,
     /// How many gradients around the estimates balance there; more than one at a kink.
     pub pieces: usize,
     /// How often an evolution strategy, which needs no derivatives, went on.

@@ -21,7 +21,7 @@ use crate::fit::asked::residuals::{Bounds, Differences, Residuals};
 use crate::fit::limits::{COST_GROWTH, HUBER, NEAREST_ALL, NEAREST_ITERATIONS, NEAREST_ROUNDS, NEAREST_SETTLED};
 use crate::fit::search::least_squares::minimise;
 use crate::fit::search::point::{Ending, Minimum, Options, cost_of};
-use crate::fit::search::starts::{Searched, Work, search_as_far};
+use crate::fit::search::starts::{Effort, Searched, Work, search_as_far};
 use crate::machine::Machine;
 use crate::solve::Flow;
 use nalgebra::{DMatrix, DVector};
@@ -70,7 +70,8 @@ pub(crate) fn search_near<'a>(
     watch: &mut dyn FnMut(&[f64], f64) -> Flow,
 ) -> Result<Settled<'a>> {
     let whole = Options::default();
-    let mut searched = search_as_far(case, plan, stop, &whole, watch)?;
+    let mut searched =
+        search_as_far(case, plan, stop, &Effort { options: whole, is_straight: false, is_short: false }, watch)?;
     let Searched { problem, best, work, .. } = &mut searched;
     let huber = if plan.huber { HUBER } else { f64::INFINITY };
     let options = Options { huber, rounding: problem.rounding(), ..whole };

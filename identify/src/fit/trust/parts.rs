@@ -8,8 +8,7 @@ use crate::case::{Case, Experiment, matches};
 use crate::error::Result;
 use crate::fit::asked::problem::{Problem, Stop};
 use crate::fit::limits::{BLOCK_SAMPLES, FEWEST_LOGS, FOLDS, LOG_BLOCKS, START_SHARE};
-use crate::fit::search::point::Options;
-use crate::fit::search::starts::{Work, search_as_far};
+use crate::fit::search::starts::{Effort, Work, search_as_far};
 use crate::log::{Log, Output, Quantity};
 use crate::solve::Flow;
 use std::ops::Range;
@@ -60,15 +59,15 @@ pub(crate) fn errors(
     case: &Case,
     plan: &Plan,
     fold: &Fold,
-    (is_cut, options): (bool, &Options),
+    (is_cut, effort): (bool, &Effort),
     stop: Option<Stop>,
 ) -> Result<(Errors, Work)> {
     let Fold { fitted, held_out } = fold;
     let mut plan = Plan { held_out: Vec::new(), separate: Vec::new(), ..plan.clone() };
     plan.nuisance.initial_state |= is_cut;
     let own = Case { experiments: fitted.clone(), ..case.clone() };
-    let found = search_as_far(&own, &plan, stop, options, &mut |_, _| Flow::Continue)?;
-    let machine = found.problem.stage_at(&found.best.x);
+    let found = search_as_far(&own, &plan, stop, effort, &mut |_, _| Flow::Continue)?;
+    let machine = found.problem.simulated(0, &found.best.x);
     let known = known(&found);
     let held = Case { experiments: held_out.clone(), ..case.clone() };
     let scored = Plan { windows: None, nuisance: plan.nuisance, ..nothing(&plan) };

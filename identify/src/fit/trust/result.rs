@@ -137,7 +137,6 @@ pub(crate) fn result(found: &Searched, judged: Option<&Judged>) -> Fit {
         decrement: best.decrement,
         cost: best.cost,
         starts: starts.clone(),
-        coarse: best.coarse,
         pieces: best.pieces,
         evolved: best.evolved,
         values: problem.counted(),

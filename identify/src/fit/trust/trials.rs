@@ -96,7 +96,8 @@ pub(crate) fn is_borne_out(case: &Case, plan: &Plan, found: &Searched, name: &st
         Remedy::Ratio(a, b, ratio) => vec![Remedy::Scale(*a, 1.0 / ratio), Remedy::Scale(*b, *ratio)],
         other => vec![other.clone()],
     };
-    let tried: Vec<Mended> = ways.iter().filter_map(|way| mended(case, plan, found, &[name], way)).collect();
+    let tried: Vec<Mended> =
+        ways.iter().filter_map(|way| mended(case, plan, found, &[name], way, TRIAL_FIT_ITERATIONS)).collect();
     let before = found.problem.counted();
     let is_better = |one: &Mended| match remedy {
         Remedy::Unit(..) | Remedy::Leave(..) => one.left < most(before, one.counted),
@@ -132,8 +133,15 @@ fn squares(problem: &Problem, residuals: &[f64]) -> Vec<(Quantity, f64)> {
     problem.quantities().into_iter().map(of).collect()
 }
 
-/// How the logs are met with those of these names mended; none where no model gets through.
-pub(crate) fn mended(case: &Case, plan: &Plan, found: &Searched, names: &[&str], remedy: &Remedy) -> Option<Mended> {
+/// How the logs are met with those of these names mended, after so many Jacobians; none where no model gets through.
+pub(crate) fn mended(
+    case: &Case,
+    plan: &Plan,
+    found: &Searched,
+    names: &[&str],
+    remedy: &Remedy,
+    iterations: usize,
+) -> Option<Mended> {
     let is_named = |name: &str| names.contains(&name);
     let mut own = case.clone();
     for experiment in own.experiments.iter_mut().filter(|experiment| is_named(&experiment.name)) {
@@ -151,7 +159,7 @@ pub(crate) fn mended(case: &Case, plan: &Plan, found: &Searched, names: &[&str],
     }
     let before = found.best.cost / found.problem.counted().max(1) as f64;
     let starts = [problem.start(), found.best.x.clone()];
-    let ends: Vec<_> = starts.iter().filter_map(|start| descend(&mut problem, plan, start)).collect();
+    let ends: Vec<_> = starts.iter().filter_map(|start| descend(&mut problem, plan, start, iterations)).collect();
     let (end, cost) = ends.into_iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
     let counted = problem.counted();
     let own = squares(&found.problem, &found.best.residuals);
@@ -164,13 +172,13 @@ pub(crate) fn mended(case: &Case, plan: &Plan, found: &Searched, names: &[&str],
 }
 
 /// Where a short search from `start` leads, and the cost there.
-fn descend(problem: &mut Problem, plan: &Plan, start: &[f64]) -> Option<(Minimum, f64)> {
+fn descend(problem: &mut Problem, plan: &Plan, start: &[f64], iterations: usize) -> Option<(Minimum, f64)> {
     if start.len() != problem.variables() || problem.is_stopped() {
         return None;
     }
     let huber = if plan.huber { HUBER } else { f64::INFINITY };
     let options = Options {
-        iterations: TRIAL_FIT_ITERATIONS,
+        iterations,
         tolerance: ROUGH_TOLERANCE,
         huber,
         evolutions: 0,

@@ -1,12 +1,12 @@
-//! Reasons why a model explains little of an output: windows and factors, each tried by a fit.
+//! Reasons why a model explains little of an output: windows, exchanged columns and factors, each tried by a fit.
 
 use super::trials::mended;
 use crate::case::{Case, Plan};
 use crate::fit::asked::problem::Problem;
 use crate::fit::asked::residuals::Residuals;
 use crate::fit::limits::{
-    FACTOR_LEAVES, FACTORS, REFIT_TOLERANCE, TRIAL_FIT_ITERATIONS, UNEXPLAINED_WINDOWS, WINDOW_SAMPLES,
-    WINDOWS_EXPLAIN, WINDOWS_MOST,
+    FACTOR_LEAVES, FACTOR_STEPS, FACTORS, FACTORS_FITTED, REFIT_TOLERANCE, TRIAL_FIT_ITERATIONS, UNEXPLAINED_WINDOWS,
+    WINDOW_SAMPLES, WINDOWS_EXPLAIN, WINDOWS_MOST,
 };
 use crate::fit::search::least_squares::minimise;
 use crate::fit::search::point::{Ending, Options};
@@ -16,13 +16,23 @@ use crate::number::engineering_typed;
 use crate::quantity::rounded;
 use crate::solve::Flow;
 
-/// The reason why the model explains little of an output in the logs of these names, with what to do; none where
-/// neither windows nor a factor mends it.
-pub(super) fn reason(case: &Case, plan: &Plan, found: &Searched, quantity: Quantity, names: &[&str]) -> Option<String> {
+/// A reason, in words with what to do, and the code of its finding.
+pub(super) struct Reason {
+    pub code: &'static str,
+    pub text: String,
+}
+
+/// The reason why the model explains little of an output in the logs of these names; none where
+/// neither windows nor exchanged columns nor a factor mends it.
+pub(super) fn reason(case: &Case, plan: &Plan, found: &Searched, quantity: Quantity, names: &[&str]) -> Option<Reason> {
     if found.problem.is_stopped() {
         return None;
     }
-    windows(case, plan, found, quantity).or_else(|| factor(case, plan, found, quantity, names))
+    let told = |code| move |text| Reason { code, text };
+    exchange(case, plan, found, quantity, names)
+        .map(told("swapped"))
+        .or_else(|| windows(case, plan, found, quantity).map(told("unexplained")))
+        .or_else(|| factor(case, plan, found, quantity, names).map(told("unexplained")))
 }
 
 /// Windows that the model explains.
@@ -94,6 +104,30 @@ fn explained(problem: &Problem, residuals: &[f64], quantity: Quantity) -> f64 {
     1.0 - (ours / lines.max(f64::MIN_POSITIVE)).sqrt()
 }
 
+/// Another output of the same kind with which it has changed places: the two motors of a gantry.
+fn exchange(case: &Case, plan: &Plan, found: &Searched, quantity: Quantity, names: &[&str]) -> Option<String> {
+    let is_alike = |other: &Quantity| {
+        *other != quantity
+            && other.unit() == quantity.unit()
+            && other.is_position() == quantity.is_position()
+            && other.is_linear() == quantity.is_linear()
+    };
+    let others: Vec<Quantity> = found.problem.quantities().into_iter().filter(is_alike).collect();
+    others.into_iter().find_map(|other| {
+        let remedy = Remedy::Exchange(quantity, other);
+        let left = mended(case, plan, found, names, &remedy, TRIAL_FIT_ITERATIONS)?.left;
+        (left <= FACTOR_LEAVES).then(|| {
+            format!(
+                "with the columns of {} and {} exchanged {:.1} % of the squared residuals are left: exchange them, or \
+                 those of their inputs",
+                quantity.name(),
+                other.name(),
+                100.0 * left
+            )
+        })
+    })
+}
+
 /// A factor on the output or on the input with which the model explains the logs.
 fn factor(case: &Case, plan: &Plan, found: &Searched, quantity: Quantity, names: &[&str]) -> Option<String> {
     let gear = found.problem.machine.drives[0].motor.gear_ratio;
@@ -103,10 +137,15 @@ fn factor(case: &Case, plan: &Plan, found: &Searched, quantity: Quantity, names:
     // Which of several inputs it is, a factor on all of them would not say.
     let drives = found.problem.machine.drives.len();
     let inputs = factors.iter().filter(|_| drives == 1).map(|&factor| ("input", factor, Remedy::Drive(factor)));
-    let tried = outputs
-        .chain(inputs)
-        .filter_map(|(column, factor, remedy)| Some((column, factor, mended(case, plan, found, names, &remedy)?.left)));
-    let (column, factor, left) = tried.min_by(|a, b| a.2.total_cmp(&b.2))?;
+    // A few steps rank them; the best are fitted whole.
+    let left = |remedy: &Remedy, steps| Some(mended(case, plan, found, names, remedy, steps)?.left);
+    let mut ranked: Vec<_> =
+        outputs.chain(inputs).filter_map(|own| left(&own.2, FACTOR_STEPS).map(|left| (own, left))).collect();
+    ranked.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let best = ranked.into_iter().take(FACTORS_FITTED);
+    let fitted =
+        best.filter_map(|((column, factor, remedy), _)| Some((column, factor, left(&remedy, TRIAL_FIT_ITERATIONS)?)));
+    let (column, factor, left) = fitted.min_by(|a, b| a.2.total_cmp(&b.2))?;
     if left > FACTOR_LEAVES {
         return None;
     }

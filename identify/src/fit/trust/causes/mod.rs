@@ -26,10 +26,9 @@ use crate::fit::asked::problem::Stop;
 use crate::fit::asked::run::Run;
 use crate::fit::limits::{
     CAUSE_ERRORS, CAUSE_EXPLAINS, CAUSE_MOST_VALUES, CAUSE_NEAR, CAUSE_STEPS, CAUSES_FITTED, COLOURED, NORMAL,
-    ROUGH_TOLERANCE, STARTS_FITTED, STEPS_IN_PART,
+    STARTS_FITTED,
 };
-use crate::fit::search::point::Options;
-use crate::fit::search::starts::Searched;
+use crate::fit::search::starts::{Effort, Searched};
 use crate::machine::Machine;
 use extension::{Extended, Extension, Fitted, Said, Site};
 use nalgebra::{DMatrix, DVector};
@@ -127,13 +126,12 @@ fn predicts(site: &Site, tried: &Tried, stop: Option<Stop>) -> Option<[usize; 2]
     let plan = Plan { starts: 1, ..site.plan.clone() };
     let (with, own) = tried.case_and_plan();
     let parts = [Parts::new(&without, &plan), Parts::new(&with, &own)];
-    let options =
-        Options { tolerance: ROUGH_TOLERANCE, iterations: STEPS_IN_PART, evolutions: 0, ..Options::default() };
+    let effort = Effort::of_part();
     let [before, after] = &parts;
     let mut gains = Vec::new();
     for (one, other) in before.folds.iter().zip(&after.folds) {
         let mean = |case: &Case, plan: &Plan, fold| {
-            let (found, _) = errors(case, plan, fold, (before.is_cut, &options), stop).ok()?;
+            let (found, _) = errors(case, plan, fold, (before.is_cut, &effort), stop).ok()?;
             // Quantities in units of their residuals.
             let own = found.iter().map(|(quantity, squares, count)| {
                 let deviation = site.deviation(*quantity);
