@@ -158,7 +158,7 @@ fn options_of_an_axis_are_refused() {
         (
             &["simulate", "--draws", "posterior.csv"],
             "error: --draws: this is available for a single axis, not yet for a gantry\n  \
-             next: leave it out: gantries are not fitted yet, so there are no draws of one\n",
+             next: leave it out: the band is that of the drive and cart of an axis\n",
         ),
         (
             &["simulate", "--solver", "table3"],

@@ -128,7 +128,7 @@ fn refuse(args: &Simulate, case: &Case) -> Result<()> {
             ("--as-measured", "leave it out: the columns hold the encoder's counts, where the case has an [encoder]")
         }
         false if args.draws.is_some() => {
-            ("--draws", "leave it out: gantries are not fitted yet, so there are no draws of one")
+            ("--draws", "leave it out: the band is that of the drive and cart of an axis")
         }
         false => return Ok(()),
     };
