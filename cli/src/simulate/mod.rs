@@ -127,9 +127,7 @@ fn refuse(args: &Simulate, case: &Case) -> Result<()> {
         false if args.as_measured => {
             ("--as-measured", "leave it out: the columns hold the encoder's counts, where the case has an [encoder]")
         }
-        false if args.draws.is_some() => {
-            ("--draws", "leave it out: the band is that of the drive and cart of an axis")
-        }
+        false if args.draws.is_some() => ("--draws", "leave it out: the band is that of the drive and cart of an axis"),
         false => return Ok(()),
     };
     Err(Error::new("this is available for a single axis, not yet for a gantry").in_file(option).next(next))
