@@ -210,7 +210,7 @@ const SEARCHES: [&str; 9] = [
     "fit CASE",
     "fit CASE --drift",
     "fit CASE --compare --laws viscous,coulomb --windows whole",
-    "design CASE",
+    "design CASE --input prbs --verify 1",
     "tune CASE",
     "plan CASE",
     "shape CASE",

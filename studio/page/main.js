@@ -70,8 +70,13 @@ app.show = key => {
     const button = find(`go-${view.key}`);
     if (view.key === app.view) button.setAttribute("aria-current", "page");
     else button.removeAttribute("aria-current");
-    // On a narrow screen the list of views is longer than its place.
-    if (view.key === app.view) button.scrollIntoView({block: "nearest", inline: "nearest"});
+    // On a narrow screen the list of views is longer than its place. `scrollIntoView` would let the tab key go on from
+    // the button, past the link to the content.
+    if (view.key === app.view) {
+      const list = /** @type {HTMLElement} */ (button.parentElement),
+        [outer, inner] = [list, button].map(element => element.getBoundingClientRect());
+      list.scrollLeft += Math.min(0, inner.left - outer.left) + Math.max(0, inner.right - outer.right);
+    }
   }
   app.tell("view");
 };
