@@ -48,6 +48,7 @@ pub use margins::{Measured, measured};
 pub use spectra::ALIKE;
 
 use crate::case::Case;
+use crate::chance::median;
 use crate::control::measures_cart;
 use crate::error::{Error, Result};
 use crate::linear::within_travel;
@@ -224,15 +225,6 @@ fn untold(kind: Kind, spectra: &Spectra) -> Vec<Error> {
             )),
     }
     errors
-}
-
-/// The middle one of numbers; zero of none.
-fn median(values: &mut [f64]) -> f64 {
-    let middle = values.len() / 2;
-    match values.is_empty() {
-        true => 0.0,
-        false => *values.select_nth_unstable_by(middle, f64::total_cmp).1,
-    }
 }
 
 /// A response beside the model's.

@@ -36,6 +36,15 @@ pub fn quantile(sorted: &[f64], share: f64) -> f64 {
     sorted[below] + (place - below as f64) * (sorted[above] - sorted[below])
 }
 
+/// The middle one of these; of an even number the upper of two. Zero if there are none.
+pub fn median(values: &mut [f64]) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
 /// The quantile of the standard normal distribution, to about 1e-16 of itself: M. J. Wichura, "Algorithm AS 241: The
 /// percentage points of the normal distribution", Appl. Statist. 37 (1988), its PPND16.
 pub fn normal_quantile(p: f64) -> f64 {

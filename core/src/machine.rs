@@ -76,10 +76,9 @@ impl Machine {
         self.slides().skip(number).map(|slide| slide.mass).sum()
     }
 
-    /// The constant force on the slide of this number with what it carries, N: F_L − M g sin θ.
+    /// The constant force on the slide of this number with what it carries, N.
     pub fn constant_force(&self, number: usize) -> f64 {
-        let of_slide = |slide: &Slide| slide.load - self.sliding_mass(number) * GRAVITY * slide.inclination.sin();
-        self.slide(number).map_or(0.0, of_slide)
+        self.slide(number).map_or(0.0, |slide| slide.constant_force_with(self.sliding_mass(number)))
     }
 
     /// Force at the belt that moves the slide of this number from rest at `position` (m), and all that turns with it, N;
@@ -202,9 +201,14 @@ impl Slide {
         Self { mass, friction, along: None, forces, load: 0.0, inclination: 0.0, travel: None }
     }
 
-    /// The constant force on it, N: F_L − M g sin θ.
+    /// The constant force on it, N, if it carries nothing.
     pub fn constant_force(&self) -> f64 {
-        self.load - self.mass * GRAVITY * self.inclination.sin()
+        self.constant_force_with(self.mass)
+    }
+
+    /// The constant force on it, N, with `mass` in all, kg: F_L − M g sin θ.
+    pub fn constant_force_with(&self, mass: f64) -> f64 {
+        self.load - mass * GRAVITY * self.inclination.sin()
     }
 }
 

@@ -26,18 +26,18 @@ pub(super) fn limits(case: &Case, directions: &[Direction], origin: &Place, note
         Group::new("limits", if powers.len() == 2 { "Limits, both drives pulling alike" } else { "Limits" });
     let name = format!("largest force of {} motor at the belt", if powers.len() == 1 { "the" } else { "a" });
     group.add("largest_force", name, least, "N").how(format!("by {}", powers[0].1));
+    let together = |direction: &Direction| {
+        Power::together(&direction.movers.iter().map(|drive| powers[*drive].0).collect::<Vec<_>>())
+    };
     for direction in directions {
-        let movers: Vec<Power> = direction.movers.iter().map(|drive| powers[*drive].0).collect();
-        let power = Power::together(&movers);
-        let one_sided = direction.is_one_sided(machine);
-        for side in [1.0, -1.0].into_iter().take(if one_sided { 2 } else { 1 }) {
-            reached(&mut group, machine, direction, (power, side), notes);
+        let sides = if direction.is_one_sided(machine) { &[1.0, -1.0][..] } else { &[1.0] };
+        for side in sides {
+            reached(&mut group, machine, direction, (together(direction), *side), notes);
         }
     }
     if machine.belt.model != BeltModel::Rigid {
         for (direction, stretch) in directions.iter().zip(&origin.stretch) {
-            let movers: Vec<Power> = direction.movers.iter().map(|drive| powers[*drive].0).collect();
-            let stretch = Power::together(&movers).force * stretch;
+            let stretch = together(direction).force * stretch;
             let [name, how] = match directions {
                 [_] => ["stretch of the belt under this force", "at the cart, the drive held"],
                 _ => ["largest stretch", "all pulling, the drive pulleys held"],

@@ -99,7 +99,7 @@ impl Machine {
                 kind,
                 inertia,
                 friction,
-                force: slide.map_or(0.0, |slide| slide.load - inertia * super::GRAVITY * slide.inclination.sin()),
+                force: slide.map_or(0.0, |slide| slide.constant_force_with(inertia)),
                 along: slide.and_then(|slide| slide.along.clone()),
                 leader: leader.unwrap_or((index, 1.0)),
                 is_rotor: false,

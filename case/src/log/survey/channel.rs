@@ -2,7 +2,8 @@
 
 use super::super::{Output, Quantity};
 use super::timing::{GAP, Timing};
-use super::{Note, Remedy, Severity, median, percent, quantile, shown};
+use super::{Note, Remedy, Severity, percent, quantile, shown};
+use crate::chance::median;
 
 /// Unit of an acceleration, which jumps by its nature.
 const ACCELERATION: &str = "m/s^2";

@@ -183,15 +183,6 @@ fn percent(part: f64) -> String {
     }
 }
 
-/// The middle one of these; zero if there are none.
-fn median(values: &mut [f64]) -> f64 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
-}
-
 /// The value below which this share of all lies.
 fn quantile(values: &[f64], share: f64) -> f64 {
     let mut values: Vec<f64> = values.iter().copied().filter(|x| x.is_finite()).collect();

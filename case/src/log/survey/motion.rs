@@ -3,7 +3,8 @@
 use super::super::{Log, Output, Quantity};
 use super::channel::Channel;
 use super::timing::Timing;
-use super::{Note, Severity, median, quantile, shown};
+use super::{Note, Severity, quantile, shown};
+use crate::chance::median;
 
 /// A speed below this share of the largest is rest, as far as reversals go.
 const SLOW: f64 = 0.05;

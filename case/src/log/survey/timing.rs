@@ -1,6 +1,7 @@
 //! The clock of a log: interval, jitter, gaps.
 
-use super::{Note, Severity, median, percent, shown};
+use super::{Note, Severity, percent, shown};
+use crate::chance::median;
 
 /// Steps longer than so many intervals are gaps.
 pub(super) const GAP: f64 = 1.75;
