@@ -92,7 +92,7 @@ pub enum Method {
     DormandPrince5,
 }
 
-/// A body that starts to slide, stops, or turns back, or another part that begins to do something else.
+/// A change of mode: a body that starts to slide, stops or reverses, or another part that changes its state.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Event {
     /// When, s.
@@ -145,8 +145,8 @@ impl Event {
     }
 }
 
-/// A decision that lies within rounding: whether a body at rest breaks away whose load is its breakaway, or one that
-/// rounding turns back again and again rests. Numbers that differ in their last bit may have it go on otherwise.
+/// A decision within rounding: a body at rest whose load equals its breakaway, or a body that rounding reverses
+/// repeatedly. Parameters that differ in their last bit may lead to the other decision.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tie {
     /// When, s.
@@ -198,7 +198,7 @@ pub enum Ending {
         /// Steps forecast for the whole run.
         steps: f64,
     },
-    /// The receiver of the results asked to stop.
+    /// The receiver of the results stopped the run.
     Interrupted {
         /// Time reached, s.
         time: f64,
@@ -252,7 +252,7 @@ pub struct Cost {
     pub propagators: u64,
     /// Steps taken: products of a propagator and a state, or steps of a fixed-step method.
     pub steps: u64,
-    /// Intervals looked at for an event.
+    /// Intervals examined for an event.
     pub looks: u64,
     /// Taylor series of the state expanded.
     pub series: u64,
@@ -265,22 +265,22 @@ pub struct Cost {
 pub struct Outcome {
     /// Every stick, slip and reversal, in order.
     pub events: Vec<Event>,
-    /// Decisions within rounding, as far as the exact solver knows of them; of many the first ones.
+    /// The first decisions within rounding that the exact solver detected.
     pub ties: Vec<Tie>,
     /// Its ending.
     pub ending: Ending,
     /// Its cost.
     pub cost: Cost,
-    /// By how much positions may be off: of the exact solver a bound of what rounding does under the inputs that were
-    /// given, whoever gave them; the general solver's is estimated by [`ErrorEstimate`]. Table 3 with
-    /// a fixed step has none, nor has a run without rows of a machine in which errors can grow.
+    /// Bound of the position error: for the exact solver that of rounding, for given inputs; for the general solver
+    /// estimated by [`ErrorEstimate`]. `None` for Table 3, and for a run without rows of a machine in which errors can
+    /// grow.
     pub error: Option<PositionError>,
     /// Events of the general solver whose own condition (a speed of zero, a load at its breakaway, a limit at its
     /// level) does not hold at their time: found too late to be located. A run that has any is not to be relied on.
     pub unmet: u64,
 }
 
-/// By how much positions at the belt (r φ₁, x, r φ₃) may be off.
+/// Bound of the error of positions at the belt (r φ₁, x, r φ₃).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PositionError {
     /// Bound of the error, m.
@@ -403,7 +403,7 @@ fn nothing_mounted() -> Error {
 /// # Ok::<(), taut::Error>(())
 /// ```
 pub fn simulate(machine: &Machine, experiment: &Experiment, solver: Solver) -> Result<Solution> {
-    // What does not fit at once is asked for as it comes.
+    // Longer runs allocate more rows as needed.
     let rows = Grid::new(experiment.every, experiment.until).intervals().min(1 << 20) as usize + 1;
     let mut trajectory = Trajectory::default();
     let outcome = stream(machine, experiment, solver, &mut |block| {

@@ -6,7 +6,7 @@ use super::known::Known;
 use crate::mechanism::State;
 use crate::signal::Signal;
 
-/// Where a run begins, when it ends, and when there are rows.
+/// Initial state, end and output interval of a run.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Start {
     pub(super) state: State,
@@ -34,7 +34,7 @@ pub(super) trait Running {
         pieces.end
     }
 
-    /// Goes on to `until`, or to the end of the run; false if it ends before.
+    /// Advances to `until`, or to the end of the run; false if it ends before.
     fn advance(&mut self, until: f64) -> bool;
 
     fn state(&self) -> State;

@@ -1,4 +1,4 @@
-//! Derivatives of matrix exponentials: how what a linear system does changes with a parameter of its matrix.
+//! Derivatives of matrix exponentials with respect to a parameter of the matrix.
 //!
 //! With z(t + h) = z + P z, P = e^{A h} − I, the derivative of z by a parameter moves by
 //!
@@ -7,8 +7,8 @@
 //! L(2h) = 2 L + L P + P L
 //! ```
 //!
-//! Where A_p meets nothing but constants (dry friction, gravity, a held input), ∂z/∂p is what a constant rate does, and
-//! L has those columns alone: l(2h) = 2 l + P l.
+//! If A_p acts on constants only (dry friction, gravity, a held input), L has the columns of those constants alone:
+//! l(2h) = 2 l + P l.
 
 use super::{EXPONENTIAL_ORDER, EXPONENTIAL_REACH, Matrix, RECIPROCAL_FACTORIAL, Series};
 use crate::solve::widest::widest;
@@ -141,7 +141,7 @@ impl<const N: usize> Matrix<N, N> {
 
 impl<const N: usize> SlopedStep<N> {
     widest! {
-        /// S ← S + P S + L z for each of `s`, z being where the step begins; those behind the last L have none.
+        /// S ← S + P S + L z for each of `s`, with z at the beginning of the step; those beyond the last L have no L.
         pub(crate) fn advance(&self, z: &[f64; N], s: &mut [[f64; N]]) = advance_by_any, advance_by_avx2;
     }
 

@@ -191,7 +191,7 @@ impl Columns {
                 for (rows, elements) in block.elements() {
                     elements.voltage[drive].put(&self.values, rows.clone(), &mut out[rows]);
                 }
-                // What a limit holds is not beyond it by one bit.
+                // A limited value does not exceed its limit by a bit.
                 clamp(out, block.mechanism.drives[drive].amplifier.voltage_limit);
             }
             Shown::Current(drive) => out.copy_from_slice(column(places.current(drive))),
