@@ -29,7 +29,7 @@ pub(super) struct Field {
     pub(super) measured: Vec<(usize, f64)>,
     /// True if guards depend on what stands still: friction along the travel of a body at rest, and bent bristles.
     pub(super) shifted: bool,
-    /// Inertia that moves with each body, per unit of its leader's way.
+    /// Inertia that moves with each body, per unit of its leader's position.
     mass: [f64; BODIES],
 }
 
@@ -225,7 +225,7 @@ impl Field {
     /// Value that the forces add to a guard at once.
     fn on_sources(&self, cause: Cause) -> Vec<f64> {
         let mechanism = &*self.model.mechanism;
-        // By the loads on a body, and by the friction that is taken off it.
+        // Derivatives with respect to the loads on a body, and to its friction.
         let by = |body: usize, load: f64, friction: f64| -> Vec<f64> {
             let of = |source: &Source| match source {
                 Source::Friction { curved, .. } => {
@@ -306,7 +306,7 @@ impl Field {
         ROUNDING * on_state.sum::<f64>()
     }
 
-    /// How much more a guard is than its output says: what friction along the travel and bent bristles hold at rest.
+    /// Difference of a guard from its output: the load held at rest by friction along the travel and by bent bristles.
     pub(super) fn shift(&self, cause: Cause, y: &[f64]) -> f64 {
         let (body, forward) = match cause {
             Cause::BreakForward(body) => (body, true),
