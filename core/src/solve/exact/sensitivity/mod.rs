@@ -30,10 +30,10 @@ use std::sync::Arc;
 pub(super) use tangent::Sloped;
 use tangent::{Seen, Tangent, Varied, are_alike};
 
-/// A guard that falls no faster than so many roundings of its rate only grazes.
+/// A guard that falls at no more than this multiple of the rounding of its rate only grazes.
 const GRAZES: f64 = 1e5;
 
-/// So many roundings of a rate are no jump of it.
+/// Change of a rate, in roundings, that does not count as a jump.
 const NO_JUMP: f64 = 40.0;
 
 /// Makes the sensitivities of one run: see [`Task`].
@@ -57,7 +57,7 @@ impl Make for Following<'_> {
     }
 }
 
-/// A run and its sensitivities under way.
+/// A run in progress with its sensitivities.
 struct Follower<'t, const N: usize> {
     task: Task<'t>,
     core: Core<N>,
@@ -66,7 +66,7 @@ struct Follower<'t, const N: usize> {
     /// Rows put out so far.
     rows: u64,
     seen: Seen,
-    /// By variable; none for one of the input.
+    /// By variable; `None` for a variable of the input.
     varied: Vec<Option<Varied>>,
     /// The places of the variables in `s`: those that change the equations first.
     places: Vec<usize>,
@@ -171,7 +171,7 @@ impl<'t, const N: usize> Follower<'t, N> {
             (false, _) => [0.0; N],
             (true, false) => self.core.matrices.rate(&self.core.z),
             (true, true) => {
-                // The input that begins at once would begin later: until then there is none.
+                // An input that begins at once would begin later; until then it is zero.
                 let mut idle = self.core.clone();
                 idle.set_input(&Pieces::held(&[0.0; DRIVES], 0.0, f64::INFINITY));
                 idle.resolve();
@@ -190,7 +190,7 @@ impl<'t, const N: usize> Follower<'t, N> {
             let mut jump: [f64; N] = std::array::from_fn(|k| before[k] - after[k]);
             let space = &self.core.common.space;
             for place in (0..space.layout.inputs).flat_map(|drive| (0..=space.highest).map(move |k| (drive, k))) {
-                // Where it stands, and how it is from now on: u(t − d).
+                // Its index, and its values from now on: u(t − d).
                 let at = space.chain(place.0, place.1);
                 jump[at] = f64::NAN;
             }
@@ -253,7 +253,7 @@ impl<'t, const N: usize> Follower<'t, N> {
         Some(())
     }
 
-    /// Goes on to `offset` behind row `row`, event by event.
+    /// Advances to `offset` after row `row`, event by event.
     fn reach(&mut self, row: u64, offset: f64) -> Option<()> {
         while self.row < row || (self.row == row && self.core.common.offset < offset) {
             self.core.check();
@@ -325,7 +325,7 @@ impl<'t, const N: usize> Follower<'t, N> {
         }
     }
 
-    /// Goes through an event: a guard falls.
+    /// Passes an event: a guard falls.
     fn event(&mut self, fallen: Transition) -> Option<()> {
         let law = Arc::clone(&self.core.matrices);
         let guard = law.guards.iter().position(|guard| guard.transition.cause == fallen.cause)?;
