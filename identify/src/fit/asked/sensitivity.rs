@@ -13,8 +13,8 @@ use nalgebra::DMatrix;
 use std::sync::Arc;
 
 impl Problem<'_> {
-    /// Puts the derivatives of the residuals of run `index`, which begin at row `first`, into the columns of these
-    /// variables, and the residuals where they are asked for; false where derivatives cannot be told exactly.
+    /// Writes the derivatives of the residuals of run `index`, from row `first` on, to the columns of these variables,
+    /// and the residuals if requested; returns false if there are no exact derivatives.
     pub(crate) fn exact_block(
         &mut self,
         (bench, machine): (&mut Bench, &Machine),
@@ -97,8 +97,8 @@ impl Problem<'_> {
         extras
     }
 
-    /// The meaning of variable `j` of the search for run `index`; none for what is no number of a machine, nor known
-    /// how it moves the input.
+    /// The meaning of variable `j` of the search for run `index`; `None` if it is neither a parameter of a machine nor
+    /// a known change of the input.
     fn variable_of(&self, (index, j): (usize, usize), x: &[f64], bounds: &Bounds, is_moved: bool) -> Option<Variable> {
         let extra = match j.checked_sub(self.parameters.len()) {
             None => None,
@@ -161,7 +161,7 @@ impl Run {
         Begun { start: mechanism.begun(&initial), mechanism }
     }
 
-    /// Each output with its derivatives by the variables at the log's times; none where they cannot be told exactly.
+    /// Each output with its derivatives by the variables at the log's times; `None` if there are no exact ones.
     fn slopes(
         &self,
         bench: &mut Bench,
@@ -207,7 +207,7 @@ impl Run {
         Some(all)
     }
 
-    /// When what is added to the input of a drive begins to be, s; none where the input has no such moment.
+    /// Time at which an offset of the input of a drive begins, s; `None` if the input has no such time.
     fn begins(&self, drive: usize, extras: &[f64]) -> Option<f64> {
         let delay = self.extra(Nuisance::Delay, extras);
         match &self.inputs()[drive] {

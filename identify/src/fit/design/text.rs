@@ -34,7 +34,8 @@ impl Designed {
         text
     }
 
-    /// Where what slides begins; of an axis its pulleys, too: those of a gantry are where the belt is without strain.
+    /// Initial positions of the sliding parts; for an axis also of its pulleys. Pulleys of a gantry begin without belt
+    /// strain.
     fn start(&self, machine: &Machine) -> String {
         let (geometry, at) = (machine.geometry(), self.initial.position);
         let slides = geometry.slides.iter().map(|slide| slide.body);

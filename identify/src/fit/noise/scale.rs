@@ -17,7 +17,7 @@ use super::filter::innovations;
 use super::series::Series;
 use crate::fit::limits::{BLOCK_AT_REST, CLASSES_CLEAR, FEWEST_BLOCKS, LEAST_SIZE, SPEED_CLASSES};
 
-/// The size of the noise in each block of each series; none where it is the same as far as the residuals show it.
+/// The size of the noise in each block of each series; `None` if it is the same as far as the residuals show it.
 pub(super) fn scales(all: &[Series], slow: &[Slow]) -> Option<Vec<Vec<f64>>> {
     let mut squares: Vec<f64> = Vec::new();
     for series in all {
@@ -56,7 +56,7 @@ pub(super) fn scales(all: &[Series], slow: &[Slow]) -> Option<Vec<Vec<f64>>> {
     Some(all.iter().map(|series| sizes.by_ref().take(series.time.len()).collect()).collect())
 }
 
-/// Classes of speed: at rest, and the rest in equal numbers; none where too few blocks are in one.
+/// Classes of speed: at rest, and the rest in equal numbers; `None` if too few blocks are in one.
 fn by_speed(all: &[Series]) -> Option<Vec<usize>> {
     let speeds: Vec<f64> = all.iter().flat_map(|series| &series.speed).copied().collect();
     let rest = BLOCK_AT_REST * speeds.iter().copied().fold(0.0, f64::max);

@@ -15,7 +15,7 @@
 //! ∫ₗʰ e^{−|r|²/2T} dy ∝ e^{−|P r|²/2T} ΔΦ,   ΔΦ = Φ((h − ŷ)/s) − Φ((l − ŷ)/s)        ρ = √(−2 T ln ΔΦ)
 //! ```
 //!
-//! Of several shifts with a near bound, and with a prior, none is integrated over: they stay among the variables.
+//! Several shifts with a near bound, and shifts with a prior, are not integrated over: they stay variables.
 
 use crate::chance::{normal, normal_quantile, uniform};
 use crate::fit::asked::problem::Problem;
@@ -116,7 +116,7 @@ impl<'a> Marginal<'a> {
         all
     }
 
-    /// Of each run with shifts their columns, at a point in all variables.
+    /// The columns of the shifts of each run, at a point in all variables.
     fn columns(&self, all: &[f64]) -> Cow<'_, [Columns]> {
         if let Some(fixed) = &self.fixed {
             return Cow::Borrowed(fixed);
@@ -241,7 +241,7 @@ impl Between {
         (share(self.low) - share(self.high)) / self.deviation
     }
 
-    /// By the inverse of its distribution; far out it falls as e^{−|z| Δz}.
+    /// A draw by the inverse of its distribution; in the far tail it falls as e^{−|z| Δz}.
     fn draw(self, random: &mut Pcg64) -> f64 {
         let (sign, a, b) = if self.low > 0.0 { (-1.0, -self.high, -self.low) } else { (1.0, self.low, self.high) };
         let z = if b > FAR_TAIL {

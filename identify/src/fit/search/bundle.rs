@@ -120,7 +120,7 @@ impl Promise {
 }
 
 /// Goes down from `best`, which is changed, until the pieces balance to within `tolerance` standard errors, or `most`
-/// gradients are taken; none where the model does not get through, or it was told to stop.
+/// gradients are taken; `None` if the model does not get through, or it was told to stop.
 fn descend(
     problem: &mut dyn Residuals,
     best: &mut Minimum,

@@ -84,7 +84,7 @@ pub struct Minimum {
     pub at_bound: Vec<bool>,
     /// How it ended.
     pub ending: Ending,
-    /// The strategy with which it ended; none where nothing was searched for.
+    /// The strategy with which it ended; `None` if nothing was searched for.
     pub strategy: Option<Strategy>,
     /// How many gradients around balance there; more than one at a kink.
     pub pieces: usize,

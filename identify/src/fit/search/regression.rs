@@ -40,7 +40,7 @@ pub struct Balance {
     pub equations: usize,
 }
 
-/// The balance over all logs of a problem; none where they hold no positions on an even raster, or do not move enough.
+/// The balance over all logs of a problem; `None` if they hold no positions on an even raster, or do not move enough.
 pub fn regression(problem: &Problem) -> Option<Balance> {
     balance(&smoothed(problem), 0)
 }
@@ -56,7 +56,7 @@ pub(crate) struct Smoothed<'a> {
     derivatives: Vec<[f64; 2]>,
 }
 
-/// A delay of the input, of either sign, with which less of the torque is left, s; none where none leaves markedly
+/// A delay of the input, of either sign, with which less of the torque is left, s; `None` if none leaves markedly
 /// less.
 pub(crate) fn suspected_delay(problem: &Problem) -> Option<f64> {
     let logs = smoothed(problem);
@@ -79,7 +79,7 @@ pub(crate) fn suspected_shift(problem: &Problem, name: &str) -> Option<isize> {
     (late.abs() > LONGEST_DELAY).then_some(late)
 }
 
-/// The delay among these rows, so many apart, with which least of the torque is left; none where that is more than this
+/// The delay among these rows, so many apart, with which least of the torque is left; `None` if that is more than this
 /// part of what is left without.
 fn least_left(logs: &[Smoothed], rows: RangeInclusive<isize>, apart: isize, most: f64) -> Option<isize> {
     let left = |late: isize| Some((late, balance(logs, late)?.unexplained));
@@ -133,7 +133,7 @@ pub(crate) fn balance(logs: &[Smoothed], late: isize) -> Option<Balance> {
 }
 
 impl<'a> Smoothed<'a> {
-    /// Regression of one output of a run; none if it is too short.
+    /// Regression of one output of a run; `None` if it is too short.
     fn new(run: &'a Run, machine: &'a Machine, output: usize, noise: f64) -> Option<Self> {
         let seen = &run.seen[output];
         let (n, h) = (run.fitted_rows.min(run.time.len()), run.interval());

@@ -271,7 +271,7 @@ fn by_regression(problem: &Problem, start: &[f64]) -> Option<Vec<f64>> {
 
 /// The nearest to the logs of what a few steps lead to from the start, and from fits in windows of a few swings of the
 /// belt, each window with a start of its own, and the next ones longer, until two of them lead to one minimum whose
-/// residuals are noise; none where the plan has windows or a loop, or no step leads anywhere.
+/// residuals are noise; `None` if the plan has windows or a loop, or no step leads anywhere.
 ///
 /// A belt whose stiffness is off swings out of step with the log, and the longer the log, the closer to each other are
 /// the minima that this makes. In a window of a few swings there is one.

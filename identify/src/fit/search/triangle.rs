@@ -32,7 +32,7 @@ pub(crate) fn shortened(matrix: &DMatrix<f64>) -> DMatrix<f64> {
     short
 }
 
-/// (JᵀJ)⁻¹ by QR of J with columns of unit length; none where a column depends on the others to within rounding.
+/// (JᵀJ)⁻¹ by QR of J with columns of unit length; `None` if a column depends on the others to within rounding.
 pub fn inverse_of_square(jacobian: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let n = jacobian.ncols();
     let norms: Vec<f64> = (0..n).map(|j| jacobian.column(j).norm()).collect();

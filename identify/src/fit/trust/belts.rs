@@ -87,7 +87,7 @@ impl Belts {
         [self.ratio / reach, self.ratio * reach]
     }
 
-    /// Number of the drive whose spans are less stiff; none where the interval leaves that open.
+    /// Number of the drive whose spans are less stiff; `None` if the interval leaves that open.
     pub fn looser(&self) -> Option<usize> {
         match self.interval() {
             [_, high] if high < 1.0 => Some(1),

@@ -50,7 +50,7 @@ pub struct Cause {
     pub standard_errors: f64,
     /// Its parameters.
     pub parameters: Vec<Size>,
-    /// The estimates of the fit as they are with it, in their order; none where the fit with it has no such value.
+    /// The estimates of the fit as they are with it, in their order; `None` if the fit with it has no such value.
     pub estimates: Vec<Option<Size>>,
     /// The change of the case file that adds it.
     pub add: String,

@@ -26,7 +26,7 @@ pub struct Finding {
     pub grade: Grade,
     /// Its subject, in a word for programs.
     pub code: &'static str,
-    /// The log it is about; none if it is about the fit.
+    /// The log it is about; `None` if it is about the fit.
     pub log: Option<String>,
     /// In a sentence.
     pub text: String,

@@ -46,7 +46,7 @@ pub struct Fit {
     pub point: Vec<f64>,
     /// How the search ended.
     pub ending: Ending,
-    /// The strategy with which it ended; none where nothing was searched for.
+    /// The strategy with which it ended; `None` if nothing was searched for.
     pub strategy: Option<Strategy>,
     /// The gain that the last step promised, in standard errors.
     pub decrement: f64,
@@ -81,13 +81,13 @@ pub struct Estimate {
     /// Its standard error; infinite where it is not determined, none where it is at a bound.
     pub error: Option<f64>,
     /// 95 % interval; infinite where it is not determined. At a bound it reaches from there to where it would without
-    /// that bound; none where even that cannot be said.
+    /// that bound; `None` if even that cannot be said.
     pub interval: Option<[f64; 2]>,
     /// Its bounds.
     pub bounds: [f64; 2],
     /// True if it ended at one of them.
     pub at_bound: bool,
-    /// The part of the logs that it is for, by its place among the fit's; none where it is for all of them.
+    /// The part of the logs that it is for, by its place among the fit's; `None` if it is for all of them.
     pub part: Option<usize>,
     /// The keys that it sets in the case file, with their values.
     pub sets: Vec<(String, f64)>,

@@ -54,7 +54,7 @@ impl Identifiability {
         self.groups.is_empty()
     }
 
-    /// From a Jacobian of `problem` at `x`, for white noise of this deviation; none if numbers fail.
+    /// From a Jacobian of `problem` at `x`, for white noise of this deviation; `None` if numbers fail.
     pub fn new(problem: &Problem, jacobian: &DMatrix<f64>, x: &[f64], deviation: f64) -> Option<Self> {
         let all: Vec<usize> = (0..problem.globals()).collect();
         let directions = Directions::new(problem, jacobian, x, &all)?;
@@ -257,7 +257,7 @@ impl Identifiability {
     }
 }
 
-/// The tie of these parameters; none where they cannot be tied: values of different units, sums, and what campaigns
+/// The tie of these parameters; `None` if they cannot be tied: values of different units, sums, and what campaigns
 /// have for themselves.
 fn tie(problem: &Problem, members: &[usize]) -> Option<String> {
     let mut keys = Vec::new();

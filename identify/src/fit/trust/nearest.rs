@@ -182,7 +182,7 @@ fn nearest(
     None
 }
 
-/// One round with these directions; none where the logs are not met as well by what it leads to.
+/// One round with these directions; `None` if the logs are not met as well by what it leads to.
 fn round(
     problem: &mut Problem,
     best: &Minimum,

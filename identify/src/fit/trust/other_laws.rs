@@ -207,7 +207,7 @@ struct Place<'a> {
     inverse: DMatrix<f64>,
 }
 
-/// The law that the residuals suggest most; none if none is significant or too little is determined.
+/// The law that the residuals suggest most; `None` if none is significant or too little is determined.
 pub(crate) fn other_law(found: &Searched, judged: &Judged) -> Option<OtherLaw> {
     let (problem, best) = (&found.problem, &found.best);
     let g = problem.globals();
@@ -280,7 +280,7 @@ fn fastest(problem: &Problem, x: &[f64], body: Body) -> f64 {
 }
 
 impl Place<'_> {
-    /// The residuals at `x` with so much of a law; none where the model does not get through with it.
+    /// The residuals at `x` with so much of a law; `None` if the model does not get through with it.
     fn with(&self, candidate: Candidate, amplitude: f64, x: &[f64]) -> Option<DVector<f64>> {
         let mut residuals = vec![0.0; self.residuals.len()];
         let mut bench = Bench::default();
@@ -326,7 +326,7 @@ impl Place<'_> {
         (gain >= LAW_KEEPS * tried.gain).then_some(gain)
     }
 
-    /// The amplitude that a law would have, from what so much of it makes of the residuals; none where the model does
+    /// The amplitude that a law would have, from what so much of it makes of the residuals; `None` if the model does
     /// not get through with it, or where it is what the parameters do already.
     fn attempt(&self, candidate: Candidate, step: f64) -> Option<Tried> {
         let moved = self.with(candidate, step, self.x)?;

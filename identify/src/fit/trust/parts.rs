@@ -113,7 +113,7 @@ fn by_block(logs: &[&Experiment]) -> Vec<Fold> {
     folds
 }
 
-/// Some rows of an experiment's log as an experiment; none if they are too few.
+/// Some rows of an experiment's log as an experiment; `None` if they are too few.
 fn cut(experiment: &Experiment, rows: Range<usize>) -> Option<Experiment> {
     let log = experiment.log.as_ref()?;
     if rows.len() < BLOCK_SAMPLES / 2 {

@@ -32,7 +32,7 @@ pub struct Profile {
 }
 
 impl Profile {
-    /// The growth two standard errors below and above the estimate over that of a linear model; none where it was not
+    /// The growth two standard errors below and above the estimate over that of a linear model; `None` if it was not
     /// held there.
     pub fn bends(&self) -> [Option<f64>; 2] {
         let middle = self.linear.iter().position(|off| *off == 0.0).unwrap_or(0);

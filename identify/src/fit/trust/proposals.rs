@@ -260,7 +260,7 @@ fn with_rows(
     Some(all)
 }
 
-/// The outputs of run `index` with the idea, in standard deviations; none where the model does not reach its end.
+/// The outputs of run `index` with the idea, in standard deviations; `None` if the model does not reach its end.
 fn answer(problem: &Problem, idea: &Idea, measured: &[(Quantity, f64)], index: usize, x: &[f64]) -> Option<Vec<f64>> {
     let run = &problem.runs[index];
     let mut machine = problem.stage_at(x);

@@ -25,7 +25,7 @@ use crate::fit::search::triangle::inverse_of_square;
 use crate::solve::Flow;
 use nalgebra::{DMatrix, DVector};
 
-/// Compares windows with the whole; none where they agree within noise, or tell too little.
+/// Compares windows with the whole; `None` if they agree within noise, or tell too little.
 pub(crate) fn disagreement(case: &Case, plan: &Plan, found: &Searched, judged: &Judged) -> Option<Disagreement> {
     let whole = &found.problem;
     let g = whole.globals();

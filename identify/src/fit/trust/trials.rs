@@ -133,7 +133,7 @@ fn squares(problem: &Problem, residuals: &[f64]) -> Vec<(Quantity, f64)> {
     problem.quantities().into_iter().map(of).collect()
 }
 
-/// How the logs are met with those of these names mended, after so many Jacobians; none where no model gets through.
+/// How the logs are met with those of these names mended, after so many Jacobians; `None` if no model gets through.
 pub(crate) fn mended(
     case: &Case,
     plan: &Plan,

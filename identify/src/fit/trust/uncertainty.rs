@@ -13,7 +13,7 @@ use crate::fit::noise::{self, Slow, Spread, Wave, half_width};
 use crate::fit::search::triangle::inverse_of_square;
 use nalgebra::{DMatrix, DVector};
 
-/// Covariance of the variables that are free, in their order; none if they are not determined.
+/// Covariance of the variables that are free, in their order; `None` if they are not determined.
 #[derive(Debug, Clone)]
 pub struct Covariance {
     /// Variables that are free.
@@ -47,7 +47,7 @@ pub(crate) struct Judged {
 }
 
 impl Judged {
-    /// At `x` with these residuals and this Jacobian, the variables that are `held` left out; none if numbers fail.
+    /// At `x` with these residuals and this Jacobian, the variables that are `held` left out; `None` if numbers fail.
     pub fn new(
         problem: &Problem,
         residuals: &[f64],
@@ -177,7 +177,7 @@ impl Judged {
 }
 
 impl Covariance {
-    /// At a minimum with these residuals and this Jacobian, its variables at bounds left out; none where they are not
+    /// At a minimum with these residuals and this Jacobian, its variables at bounds left out; `None` if they are not
     /// determined.
     pub fn new(problem: &Problem, residuals: &[f64], jacobian: &DMatrix<f64>, at_bound: &[bool]) -> Option<Self> {
         let free: Vec<usize> = (0..at_bound.len()).filter(|&j| !at_bound[j]).collect();

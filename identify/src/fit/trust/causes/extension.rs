@@ -18,7 +18,7 @@ pub(super) struct Site<'s, 'a> {
 /// One element.
 pub(super) struct Extension {
     pub key: &'static str,
-    /// The case and the plan with it, once for each start; none where the case has it already.
+    /// The case and the plan with it, once for each start; `None` if the case has it already.
     pub tries: fn(&Site) -> Vec<Extended>,
     /// The element in words.
     pub words: fn(&Site, &Extended, &Fitted) -> Said,
@@ -97,7 +97,7 @@ impl<'s, 'a> Site<'s, 'a> {
         of(quantity).or(stands_for).unwrap_or(1e-12)
     }
 
-    /// The standard deviation of the residuals of positions, as lengths at the cart, m; none where no log has one.
+    /// The standard deviation of the residuals of positions, as lengths at the cart, m; `None` if no log has one.
     pub fn position_deviation(&self) -> Option<f64> {
         let r = self.machine.pulley_radius;
         self.found.noise.iter().find_map(|(quantity, sigma)| match quantity {

@@ -12,7 +12,7 @@ use crate::machine::Machine;
 use crate::polyline::Polyline;
 use crate::solve::Bench;
 
-/// The case with a force of this shape over the speed, in N, on the cart, which keeps its sign; none if it has such a
+/// The case with a force of this shape over the speed, in N, on the cart, which keeps its sign; `None` if it has such a
 /// line.
 fn shaped(site: &Site, points: Vec<[f64; 2]>, size: Measure) -> Option<Extended> {
     let mut machine = site.machine.clone();

@@ -70,7 +70,7 @@ impl Site<'_, '_> {
     }
 }
 
-/// The case with positions and speeds read at the motor, whatever they were called; none where no log has one.
+/// The case with positions and speeds read at the motor, whatever they were called; `None` if no log has one.
 fn at_motor(case: &Case) -> Option<Case> {
     let mut case = case.clone();
     let (r, mut any) = (case.machine.pulley_radius, false);

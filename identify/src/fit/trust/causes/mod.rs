@@ -57,7 +57,7 @@ fn as_it_is(_: &Site, machine: Machine) -> Machine {
     machine
 }
 
-/// The element that explains most of what the fit leaves; none where none is accepted, or `law`, a friction law,
+/// The element that explains most of what the fit leaves; `None` if none is accepted, or `law`, a friction law,
 /// explains more.
 pub(crate) fn cause(
     case: &Case,

@@ -36,7 +36,7 @@ pub(super) fn words(_: &Site, _: &Extended, found: &Fitted) -> Said {
     Said { words, add: "add nuisance = { delay = \"shared\" } to [fit]".into() }
 }
 
-/// The standard deviation of the times at which positions are sampled, s, and its standard error; none where the
+/// The standard deviation of the times at which positions are sampled, s, and its standard error; `None` if the
 /// residuals show no scatter.
 ///
 /// A sample that is taken τ late is off by ẏ τ. With noise of variance σ² beside it,

@@ -22,7 +22,7 @@ pub(super) struct Tried<'a> {
 }
 
 impl<'a> Tried<'a> {
-    /// So many steps from where the fit without the element ended; none where the model does not get through the logs.
+    /// So many steps from where the fit without the element ended; `None` if the model does not get through the logs.
     pub fn begun(site: &Site<'_, 'a>, row: &'static Extension, extended: Extended, steps: usize) -> Option<Self> {
         let mut problem = Problem::new(&extended.case, &extended.plan).ok()?.stopped_by(site.found.problem.stop());
         let noise: Vec<_> = problem.quantities().iter().map(|&own| (own, site.deviation(own))).collect();
@@ -102,7 +102,7 @@ impl<'a> Tried<'a> {
         (case, self.extended.plan.clone())
     }
 
-    /// The cause with its sizes; none where its sizes cannot be told.
+    /// The cause with its sizes; `None` if its sizes cannot be told.
     pub fn told(
         &self,
         site: &Site,
