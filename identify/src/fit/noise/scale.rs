@@ -8,16 +8,16 @@
 //! Σ n_k ln(s/s_k) − (K − 1)/2 ln n           (G. Schwarz 1978)
 //! ```
 //!
-//! Where that is enough, D Σ D with the s_k/s on the diagonal of D is a second covariance of the noise beside Σ. Of a
-//! variance the greater counts: where a model is wrong its errors are small at rest and large in motion, too, and there
-//! they tell nothing of how well a parameter is known that the motion at rest determines.
+//! If that is enough, D Σ D with the s_k/s on the diagonal of D is a second covariance of the noise beside Σ. The
+//! larger of both variances counts: errors of a wrong model are also small at rest and large in motion, which does not
+//! make a parameter that rest determines better known.
 
 use super::Slow;
 use super::filter::innovations;
 use super::series::Series;
 use crate::fit::limits::{BLOCK_AT_REST, CLASSES_CLEAR, FEWEST_BLOCKS, LEAST_SIZE, SPEED_CLASSES};
 
-/// The size of the noise in each block of each series; `None` if it is the same as far as the residuals show it.
+/// The size of the noise in each block of each series; `None` if the residuals show no difference.
 pub(super) fn scales(all: &[Series], slow: &[Slow]) -> Option<Vec<Vec<f64>>> {
     let mut squares: Vec<f64> = Vec::new();
     for series in all {

@@ -119,7 +119,7 @@ struct Density<'a, R> {
     fixed: Option<Vec<DMatrix<f64>>>,
 }
 
-/// Draws from the density. Returns an error if the model cannot simulate the logs at the start.
+/// Draws from the density. Returns an error if the density is zero at the starts.
 pub fn draw<R: Residuals + Clone + Send + Sync>(
     ingredients: &Ingredients<R>,
     effort: Effort,

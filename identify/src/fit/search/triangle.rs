@@ -1,8 +1,8 @@
-//! Tall matrices made small: as many rows as it takes for the same products of columns.
+//! Reduction of tall matrices to as many rows as the same products of columns need.
 //!
-//! A Jacobian has a row for each value of each log, and a log's own variables move its rows alone. QR of one stretch of
-//! rows after the other, with the columns that are not zero there, leaves a triangle of each: M = Q M′ with QᵀQ = I, so
-//! that MᵀM = M′ᵀM′, and nothing is squared on the way.
+//! A Jacobian has a row for each value of each log, and a log's own variables affect its rows alone. QR of successive
+//! blocks of rows, with their nonzero columns, leaves a triangle of each: M = Q M′ with QᵀQ = I, so that MᵀM = M′ᵀM′
+//! without squaring.
 
 use crate::fit::limits::STRETCH;
 use nalgebra::DMatrix;
