@@ -28,7 +28,7 @@ pub(crate) struct Parts {
 }
 
 impl Parts {
-    /// Of the logs of a case that its plan fits.
+    /// The parts of the logs of a case that its plan fits.
     pub fn new(case: &Case, plan: &Plan) -> Self {
         let is_held = |name: &str| plan.held_out.iter().any(|pattern| matches(name, pattern));
         let logs: Vec<&Experiment> = case.experiments.iter().filter(|e| e.log.is_some() && !is_held(&e.name)).collect();
@@ -78,7 +78,7 @@ pub(crate) fn errors(
     Ok((errors.collect(), found.work))
 }
 
-/// Every so many logs, so that each part is like the others.
+/// Interleaved logs, so that the parts are alike.
 fn by_log(logs: &[&Experiment]) -> Vec<Fold> {
     let count = FOLDS.min(logs.len());
     let fold = |part: usize| {

@@ -22,7 +22,7 @@ pub(crate) fn told(case: &Case, plan: &Plan, found: &Searched, judged: Option<&J
     (fit, surveys)
 }
 
-/// Everything that is told of a minimum.
+/// The complete result at a minimum.
 pub(crate) fn result(found: &Searched, judged: Option<&Judged>) -> Fit {
     let Searched { problem, best, noise, starts, work, .. } = found;
     let bounds = problem.bounds();

@@ -1,16 +1,15 @@
 //! Tests whether parts of the logs agree with the whole, beyond noise.
 //!
-//! A friction that drifts, or one of another law, leaves residuals that the parameters follow as far as they can: the
-//! estimates go where the integrated error is least, and noise says nothing of how far that is from the truth. So the
-//! logs are cut into windows, each but the first of a log with a start of its own, in which errors cannot add up, and
-//! the same parameters are fitted to all of them. With ĝ_c = J_cᵀ r_c of window c and A = (JᵀJ)⁻¹ the windows disagree
-//! by
+//! Drifting friction, or friction of another law, leaves residuals that the parameters partly absorb: the estimates
+//! minimise the integrated error, and noise does not show their distance from the truth. The logs are therefore cut
+//! into windows, each but the first of a log with a start of its own, in which errors cannot accumulate, and the same
+//! parameters are fitted to all of them. With ĝ_c = J_cᵀ r_c of window c and A = (JᵀJ)⁻¹ the windows disagree by
 //!
 //! ```text
 //! V = A (Σ_c ĝ_c ĝ_cᵀ) A G/(G−1)           (K.-Y. Liang and S. L. Zeger 1986)
 //! ```
 //!
-//! and with the whole logs by d. If either is more than noise makes of it, intervals are widened by both.
+//! and with the whole logs by d. If either is significant, intervals are widened by both.
 
 use super::doubts::Disagreement;
 use super::uncertainty::Judged;
@@ -25,7 +24,7 @@ use crate::fit::search::triangle::inverse_of_square;
 use crate::solve::Flow;
 use nalgebra::{DMatrix, DVector};
 
-/// Compares windows with the whole; `None` if they agree within noise, or tell too little.
+/// Compares windows with the whole; `None` if they agree within noise, or contain too little information.
 pub(crate) fn disagreement(case: &Case, plan: &Plan, found: &Searched, judged: &Judged) -> Option<Disagreement> {
     let whole = &found.problem;
     let g = whole.globals();

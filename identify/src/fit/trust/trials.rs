@@ -106,13 +106,13 @@ pub(crate) fn is_borne_out(case: &Case, plan: &Plan, found: &Searched, name: &st
     tried.is_empty() || tried.iter().any(is_better)
 }
 
-/// How logs are met that were mended.
+/// Agreement with corrected logs.
 pub(crate) struct Mended {
     /// Cost of a value, as a part of that with the logs as they are.
     pub left: f64,
     /// The least such part of any quantity.
     least: f64,
-    /// How many values count.
+    /// Number of values that count.
     counted: usize,
 }
 
@@ -133,7 +133,8 @@ fn squares(problem: &Problem, residuals: &[f64]) -> Vec<(Quantity, f64)> {
     problem.quantities().into_iter().map(of).collect()
 }
 
-/// How the logs are met with those of these names mended, after so many Jacobians; `None` if no model gets through.
+/// Agreement with the logs after correction of those with these names, after a limited number of Jacobians; `None` if
+/// no model can simulate them.
 pub(crate) fn mended(
     case: &Case,
     plan: &Plan,
@@ -171,7 +172,7 @@ pub(crate) fn mended(
     Some(Mended { left: cost / counted.max(1) as f64 / before.max(f64::MIN_POSITIVE), least, counted })
 }
 
-/// Where a short search from `start` leads, and the cost there.
+/// Result of a short search from `start`, and its cost.
 fn descend(problem: &mut Problem, plan: &Plan, start: &[f64], iterations: usize) -> Option<(Minimum, f64)> {
     if start.len() != problem.variables() || problem.is_stopped() {
         return None;
