@@ -1,6 +1,6 @@
 //! Checks of a stage and an experiment before anything is computed.
 //!
-//! The case reader checks what is in a file, and says on which line; here it is what a program built by itself.
+//! The case reader checks files and reports the line; this module checks machines built by a program.
 
 use super::Course;
 use crate::error::{Error, Result};

@@ -8,8 +8,7 @@ use super::saved::{Pass, Passed};
 use crate::friction::Motion;
 use crate::mechanism::{BODIES, Layout, Mode, Replaced, State};
 
-/// Parts of the last place by which positions at the start may contradict each other and still mean a belt without
-/// strain.
+/// Units in the last place within which positions at the start count as a belt without strain.
 const LAST_PLACES: f64 = 4.0;
 
 /// Origin of a run: its start, and the angles of pulleys at rest.
@@ -18,7 +17,7 @@ pub(crate) struct Coordinates {
     start: State,
     /// Coordinates of the origin.
     origin: [f64; BODIES],
-    /// Lengths at the start, by the bodies in whose places they stand.
+    /// Elongations at the start, by the bodies whose positions they replace.
     strain: [f64; BODIES],
     /// Angles of pulleys while they are stuck, rad: they keep every bit while the rest moves.
     held: [Option<f64>; BODIES],

@@ -31,9 +31,9 @@ impl Level {
 }
 
 impl Simulator {
-    /// The derivative of `order`, one and more, of each of [`Simulator::columns`] with respect to time, as it is right
-    /// after now; `into` has a place for each. None, and nothing is done, of a machine that is not linear between its
-    /// events.
+    /// Derivatives of `order`, one or more, of each of [`Simulator::columns`] with respect to time, just after the
+    /// present time; `into` has an element for each. Returns `None`, without an effect, for a machine that is not
+    /// linear between events.
     pub fn derivatives(&self, order: usize, into: &mut [f64]) -> Option<()> {
         let mechanism = self.mechanism();
         if order == 0 || !mechanism.is_piecewise_linear() {

@@ -20,7 +20,7 @@ pub(super) trait Engine: Send + Sync {
     /// The highest degree of the inputs that it takes.
     fn degree(&self) -> usize;
 
-    /// One that takes inputs of this degree, where this one stands.
+    /// A solver for inputs of this degree in the same state.
     fn raised(&self, degree: usize) -> Box<dyn Engine>;
 
     /// Takes up new inputs, and what they bring about at once.
@@ -50,7 +50,7 @@ pub(super) trait Engine: Send + Sync {
     /// Continues with other parameters of the same mechanism.
     fn replace(&mut self, mechanism: &Mechanism);
 
-    /// All that it needs to go on, as plain numbers; nothing of one that has ended early.
+    /// Passes the complete state as plain numbers; fails after an early end.
     fn pass(&mut self, pass: &mut Pass) -> Passed;
 
     /// Bound of the position error, if known.

@@ -23,16 +23,16 @@ const FACTOR: f64 = 100.0;
 /// interval: where the two intervals differ by a power of two, both runs take the same steps.
 const ROWS: [u64; 3] = [3, 2, 5];
 
-/// The estimate as a multiple of what the two runs differ by, and its least value as a share of the tolerance: where
-/// neither run's steps are limited by the tolerance (corners of a friction curve, of a line along the travel), both are
-/// off by about as much.
+/// The estimate as a multiple of the difference of the two runs, and its least value as a share of the tolerance: if
+/// the tolerance limits the steps of neither run (corners of a friction curve, or of a line along the travel), both
+/// have about the same error.
 const SAFETY: f64 = 10.0;
 const LEAST: f64 = 0.1;
 
 /// Relative change of the start in the second run: the last digits of a start can decide where a line feeds the motion.
 const OF_START: f64 = 4.0 * f64::EPSILON;
 
-/// Relative changes of speeds by which the second run shows how rounding grows: 64 times what rounding does to them.
+/// Relative changes of speeds by which the second run shows the growth of rounding errors: 64 times their rounding.
 const NOISE: f64 = 64.0 * f64::EPSILON;
 
 /// Receiver of rows.

@@ -1,4 +1,4 @@
-//! Quantities followed with a run, and the variables by which they are differentiated.
+//! Quantities recorded with a run, and the variables with respect to which they are differentiated.
 
 use crate::mechanism::{Mechanism, Shown, State};
 use crate::plan::Experiment;

@@ -55,7 +55,7 @@ pub enum Solver {
     Exact,
     /// Collocation with steps by their error between located events: any friction law, spans that follow the cart.
     General {
-        /// About what positions at the belt are off by, m.
+        /// Approximate error of positions at the belt, m.
         tolerance: f64,
     },
     /// The paper's Table 3 with a fixed step: a reproduction, not a recommendation.
@@ -68,7 +68,7 @@ pub enum Solver {
 }
 
 impl Solver {
-    /// The general solver with the default tolerance, a nanometre; [`ErrorEstimate`] says how far any run is off.
+    /// The general solver with the default tolerance, a nanometre; [`ErrorEstimate`] estimates the error of a run.
     pub const GENERAL: Self = Self::General { tolerance: 1e-9 };
 
     /// The solver for this stage: the exact one where it can be.
@@ -122,7 +122,7 @@ impl Event {
     /// Adds it to `events`, unless nothing that shows has changed. A part other than a body that passes through a state
     /// without staying there goes straight.
     fn note(mut self, events: &mut Vec<Event>) {
-        // A body that is at once what it was before has done nothing, and one that stops and goes on at once, turned.
+        // A body that returns to its state at once has not changed; one that stops and starts at once has reversed.
         let at_once = |e: &Event| self.time - e.time <= 4.0 * f64::EPSILON * self.time;
         let last = events.iter().rposition(|e| e.part == self.part).filter(|&last| at_once(&events[last]));
         if let Some(last) = last.filter(|&last| self.body().is_some() && events[last].from.code() == self.to.code()) {
@@ -181,7 +181,7 @@ pub enum Ending {
         /// Time reached, s.
         time: f64,
     },
-    /// The cart left its travel, and nothing stands there to stop it.
+    /// The cart left its travel, which has no end stops.
     LeftTravel {
         /// Time reached, s.
         time: f64,
@@ -191,7 +191,7 @@ pub enum Ending {
         /// Time reached, s.
         time: f64,
     },
-    /// Something in it changes so fast that at the pace so far it would need more than 1e10 steps.
+    /// The run would need more than 1e10 steps at its present rate.
     TooStiff {
         /// Time reached, s.
         time: f64,
@@ -236,13 +236,13 @@ impl fmt::Display for Ending {
     }
 }
 
-/// The ending of [`Simulator::advance`] and [`Dynamics::settle`] that cannot go on.
+/// The error of [`Simulator::advance`] and [`Dynamics::settle`] if they cannot continue.
 impl std::error::Error for Ending {}
 
 /// The cost of a run, in pieces of work rather than seconds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Cost {
-    /// Rows put out.
+    /// Number of rows.
     pub samples: u64,
     /// Pieces of the input.
     pub pieces: u64,

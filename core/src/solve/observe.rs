@@ -426,8 +426,8 @@ impl Polynomial {
         top
     }
 
-    /// The top between two places, of which the lower has a rising slope and the higher a falling one:
-    /// Newton's method on the slope, in a bracket that it keeps by the slope's sign.
+    /// Maximum between two points, with a positive slope at the lower and a negative one at the higher: bracketed
+    /// Newton's method on the slope.
     fn top(&self, [mut low, mut high]: [f64; 2]) -> (f64, f64) {
         let mut s = 0.5 * (low + high);
         for _ in 0..60 {

@@ -13,7 +13,7 @@ use columns::{Block, Columns};
 use sheet::Sheets;
 use std::sync::Arc;
 
-/// Rows handed on at a time; small enough to stay in the processor's cache.
+/// Rows passed on at a time; small enough to stay in the processor's cache.
 const BLOCK: usize = 256;
 
 /// Room for a state with the inputs behind it, whatever the mechanism; a multiple of four.
@@ -67,7 +67,7 @@ pub(crate) struct Recorder<'a> {
     sink: &'a mut dyn FnMut(&Trajectory) -> Flow,
     /// Observer of the motion between rows.
     pub(crate) observer: Option<&'a mut dyn Observe>,
-    /// Rows handed on.
+    /// Number of rows passed on.
     pub(crate) rows: u64,
     /// The last answer of the receiver.
     pub(crate) flow: Flow,
@@ -173,7 +173,7 @@ impl<'a> Recorder<'a> {
         let mut left = times;
         while left > 0 && self.flow == Flow::Continue {
             if self.count == 0 {
-                // The last row has just been handed on: its numbers stand yet.
+                // The last row has just been passed on, and its values are still stored.
                 self.columns.begin_with(self.last);
                 self.written = 1;
                 self.extra.extend(self.last_extra);
@@ -215,7 +215,7 @@ impl<'a> Recorder<'a> {
         self.rows += rows;
     }
 
-    /// Hands on what there is, be it nothing, to hear whether to go on.
+    /// Passes on the present rows, even none, and asks the receiver to continue.
     pub(crate) fn ask(&mut self) {
         if self.count > 0 {
             self.hand_on();

@@ -190,7 +190,7 @@ impl<'a> Run<'a> {
         self.running.current(drive)
     }
 
-    /// Ends the run where it stands: complete, with its last row, if it has come to its end, and interrupted before.
+    /// Ends the run: complete, with its last row, if it has reached its end, otherwise interrupted.
     pub fn finish(mut self) -> Outcome {
         self.running.finish(self.time >= self.end)
     }

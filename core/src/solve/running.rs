@@ -27,7 +27,7 @@ pub(super) trait Running {
         pieces
     }
 
-    /// Takes up what these signals do from `time`, which is now, on, and says until when that is.
+    /// Sets the pieces of these signals from the present `time` on, and returns their end.
     fn set_signals(&mut self, signals: &[Signal], time: f64) -> f64 {
         let pieces = self.told(Pieces::of(signals, time));
         self.set_input(&pieces);
@@ -41,7 +41,7 @@ pub(super) trait Running {
 
     fn current(&self, drive: usize) -> f64;
 
-    /// Ends the run where it stands: at its end, where the last row is put out, or before.
+    /// Ends the run: at its end, with the last row, or before.
     fn finish(&mut self, is_at_end: bool) -> Outcome;
 
     /// The modes that it has made ready.

@@ -58,7 +58,7 @@ pub(super) struct Ellipsoid<const N: usize> {
     largest: f64,
 }
 
-/// A guard that falls, as it is before the mode changes.
+/// A guard that falls, before the change of mode.
 pub(super) struct Crossing<const N: usize> {
     /// w.
     guard: [f64; N],
@@ -185,7 +185,7 @@ fn transposed<const N: usize>(c: &[[f64; N]; N], states: usize) -> [[f64; N]; N]
 }
 
 impl<const N: usize> Core<N> {
-    /// Brings the errors to where the run stands, in the present mode.
+    /// Carries the errors to the present time, in the present mode.
     pub(super) fn carry_errors(&mut self) {
         let Some(mut errors) = self.errors.take() else { return };
         self.see();
@@ -267,7 +267,7 @@ impl<const N: usize> Core<N> {
         })
     }
 
-    /// Takes the errors through an event: C ← S C Sᵀ ⊕ q. It stands in the mode that follows.
+    /// Carries the errors through an event: C ← S C Sᵀ ⊕ q. The state is already in the next mode.
     pub(super) fn cross(&mut self, crossing: Option<Crossing<N>>) {
         let (Some(crossing), Some(mut errors)) = (crossing, self.errors.take()) else { return };
         let states = errors.states;

@@ -40,7 +40,7 @@ impl Space {
         self.layout.states + input * (self.highest + 1) + k
     }
 
-    /// The state that `z` stands for, in the solver's coordinates.
+    /// The state of `z`, in the solver's coordinates.
     #[inline]
     pub(in crate::solve) fn inner(&self, z: &[f64]) -> State {
         let layout = &self.layout;
@@ -221,7 +221,7 @@ pub(in crate::solve) struct ModeMatrices<const N: usize> {
     growth: f64,
     inertia: [f64; BODIES],
     stiffness: [f64; SPRINGS],
-    /// Forms of which the squares of their rates add up to the mechanical part of 2V.
+    /// Forms whose squared rates sum to the mechanical part of 2V.
     energy: Vec<Lanes<N>>,
     /// Weight of each (di/dt)² in 2V, by the places of the currents; and whether there is any.
     magnetic: [(usize, f64); DRIVES],
@@ -602,7 +602,7 @@ impl<const N: usize> ModeMatrices<N> {
         if self.growth == 0.0 { 1.0 } else { 2.0 }
     }
 
-    /// Time in which √V grows by itself to no more than twice its value.
+    /// Time in which √V without input grows to at most twice its value.
     pub(super) fn growth_time(&self) -> f64 {
         if self.growth == 0.0 { f64::INFINITY } else { 0.69 / self.growth }
     }

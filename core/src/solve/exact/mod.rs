@@ -48,7 +48,7 @@ const SOON: f64 = 1e-6;
 pub(super) struct Core<const N: usize> {
     /// State in the solver's coordinates, inputs and their derivatives, and a one.
     z: [f64; N],
-    /// The largest magnitudes that each place of it has had in rows so far.
+    /// The largest magnitudes of its elements in rows so far.
     largest: [f64; N],
     matrices: Arc<ModeMatrices<N>>,
     known: Modes<N>,
@@ -158,7 +158,7 @@ impl<const N: usize> Core<N> {
         self.common.base + self.common.offset
     }
 
-    /// The bound of what rounding has done so far.
+    /// The bound of rounding errors so far.
     fn bound_of_rounding(&mut self) -> PositionError {
         self.common.rounding.see(&self.largest);
         self.common.rounding.swing(self.matrices.swing, self.time());
@@ -388,7 +388,7 @@ impl<const N: usize> Core<N> {
         }
     }
 
-    /// True if nothing stands against going on.
+    /// True if the run may continue.
     fn goes(&self) -> bool {
         self.common.rules.trouble.is_none() && !self.common.asks
     }
@@ -531,7 +531,7 @@ impl<const N: usize> Core<N> {
     }
 }
 
-/// Makes what goes on where another one stands, with room for inputs that bend.
+/// Creates a solver in the state of another, for inputs of a higher degree.
 struct Smoothed<const M: usize> {
     /// State of another kernel: states and inputs, at the indices of [`Space::inner`] and [`Space::chain`] there.
     z: Vec<f64>,

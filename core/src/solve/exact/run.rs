@@ -16,7 +16,7 @@ use std::sync::Arc;
 pub(in crate::solve) struct Run<'a, const N: usize> {
     pub(super) core: Core<N>,
     grid: Grid,
-    /// The row where it stands, or that it has passed last.
+    /// The present row, or the last one passed.
     row: u64,
     pub(super) recorder: Recorder<'a>,
     pub(super) watching: Watching<N>,
@@ -82,7 +82,7 @@ impl<'a, const N: usize> Run<'a, N> {
         self.core.count_from(self.grid.time(row));
     }
 
-    /// Asks the receiver whether to go on.
+    /// Asks the receiver to continue.
     fn ask_receiver(&mut self) {
         self.core.common.asks = false;
         self.recorder.ask();
@@ -237,7 +237,7 @@ impl<const N: usize> Running for Run<'_, N> {
         self.core.note_ties();
         if self.core.common.rules.trouble.is_none() {
             if is_at_end {
-                // Behind a last, shorter interval it stands at the last row, too.
+                // After a last, shorter interval the run is at the last row, too.
                 self.go_to(self.grid.intervals());
                 self.put_out();
             } else {

@@ -140,9 +140,9 @@ impl Dynamics {
         }
     }
 
-    /// The conditions as residuals: of a body that slides its speed in the direction of motion, of one at rest what is
-    /// left to its breakaway on either side, of any other part what is left to its limit; each larger by a tolerance, so
-    /// that all are above zero after [`Dynamics::settle`]. One that the mode does not watch is 1.
+    /// The conditions as residuals: the speed of a sliding body in its direction of motion, the distance of a body at
+    /// rest from its breakaway on either side, the distance of any other part from its limit; each larger by a
+    /// tolerance, so that all are positive after [`Dynamics::settle`]. Conditions that the mode does not have are 1.
     pub fn residuals(&self, into: &mut [f64]) {
         into.fill(1.0);
         let mut seen = [false; Cause::KINDS];

@@ -56,7 +56,7 @@ fn second_half_by_any(c: &[f64]) -> [f64; SERIES_TERMS] {
 
 /// The first s in (0, 1] at which Σ c_k sᵏ, with highest power `order`, becomes negative.
 pub(super) fn first_fall(c: &[f64; TERMS], order: usize) -> Option<f64> {
-    // Zero at the beginning: the first power that is there says whether it falls at once, whatever it does later.
+    // Zero at the beginning: the first nonzero power decides if it falls at once.
     if c[0] == 0.0 && c[1..=order].iter().find(|c| **c != 0.0).is_some_and(|c| *c < 0.0) {
         return Some(0.0);
     }
@@ -67,7 +67,7 @@ pub(super) fn first_fall(c: &[f64; TERMS], order: usize) -> Option<f64> {
     if c[1..].iter().fold(c[0], |sum, &c| sum + if c < 0.0 { c } else { 0.0 }) >= 0.0 {
         return None;
     }
-    // Over half the step the powers beyond say nothing any more.
+    // Higher powers are negligible over half the step.
     let mut first = [0.0; SERIES_TERMS];
     first.iter_mut().zip(c).zip(&HALVES).for_each(|((first, c), half)| *first = c * half);
     if let Some(s) = roots::first_fall(&first) {

@@ -150,7 +150,7 @@ trait Witness {
     /// Sees a step.
     fn see(&mut self, core: &mut Core, way: &Way);
 
-    /// True if to go on.
+    /// True to continue.
     fn ask(&mut self) -> bool;
 }
 

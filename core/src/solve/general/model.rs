@@ -12,7 +12,7 @@ pub(super) const MOST: usize = 3 * BODIES + CURRENTS;
 /// bristles.
 pub(super) type Vector = [f64; MOST];
 
-/// Most conditions watched at once: two for each body, one for each gear, two for each limit and for each spring.
+/// Largest number of guards: two for each body, one for each gear, two for each limit and for each spring.
 pub(super) const MOST_GUARDS: usize = 2 * BODIES + 5 * DRIVES + 2 * SPRINGS;
 
 /// A spring that follows the bodies.
@@ -137,8 +137,8 @@ impl Curved {
         y[self.speed] - sliding.slip * y[place]
     }
 
-    /// The law at `v`, dry friction being multiplied by `factor`. The speed is counted in the direction of motion:
-    /// where a trial step overshoots, the law goes on smoothly.
+    /// The law at `v`, with dry friction multiplied by `factor`. The speed is positive in the direction of motion; if a
+    /// trial step overshoots, the law continues smoothly.
     #[inline(always)]
     pub(super) fn sliding(&self, motion: Motion, v: f64, factor: f64, slopes: bool) -> Sliding {
         let friction = &self.friction;

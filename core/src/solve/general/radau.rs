@@ -138,7 +138,7 @@ pub(super) static FREE: [Lane; TERMS] = {
     table
 };
 
-/// ∫ from 0 to c_i of (c_i − σ)ᵐ/m! σᵏ dσ = k!/(m + k + 1)! c_iᵐ⁺ᵏ⁺¹: what the m-th power makes of a force σᵏ.
+/// ∫ from 0 to c_i of (c_i − σ)ᵐ/m! σᵏ dσ = k!/(m + k + 1)! c_iᵐ⁺ᵏ⁺¹: effect of a force σᵏ by the m-th power.
 pub(super) static FORCED: [[Lane; TERMS]; POWERS] = {
     let mut table = [[[0.0; NODES]; TERMS]; POWERS];
     let mut k = 0;

@@ -470,8 +470,8 @@ impl Bent {
         self.solve(&std::array::from_fn(right))
     }
 
-    /// Slopes of the force where the rate of the bristles at node q changes by `by`(q) beside what their deflection
-    /// makes, and `direct` says whether b v changes, too.
+    /// Slopes of the force if the rate of the bristles at node q changes by `by`(q) in addition to the effect of their
+    /// deflection; `direct` is true if b v changes, too.
     fn slopes(
         &self,
         h: f64,

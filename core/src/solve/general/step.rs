@@ -139,7 +139,7 @@ impl Room {
         }
     }
 
-    /// Begins anew, with these forces: what was before says nothing of what comes.
+    /// Restarts with these forces, without values of previous steps.
     pub(super) fn begin(&mut self, forces: &[f64]) {
         self.forces.iter_mut().zip(forces).for_each(|(force, value)| force[0] = *value);
         self.past = None;
@@ -452,7 +452,7 @@ fn basis<const N: usize>(places: [f64; N]) -> [[f64; N]; POINTS] {
     values
 }
 
-/// Coordinates, speeds and currents of a whole state; what stands behind them does not count.
+/// Coordinates, speeds and currents of a whole state; the elements after them do not count.
 pub(super) fn states(y: &Vector) -> States {
     const LEAST: usize = if MOST < STATES { MOST } else { STATES };
     let mut states = [0.0; STATES];

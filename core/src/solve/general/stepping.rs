@@ -141,7 +141,7 @@ impl Core {
                 (Some(error), Some(end)) if (error <= 1.0 || least) && end.iter().sum::<f64>().is_finite() => {
                     *guess = Guess::After(set.h);
                     room.keep(set.h, field.sources.len());
-                    // The error is of sixth order. A step that had to be short says little of much longer ones.
+                    // The error is of sixth order. A short step predicts little about much longer ones.
                     self.step = (SAFETY * set.h * error.powf(-1.0 / 6.0)).min(self.step.max(GROW * set.h));
                     let reversing = room.reversing(field);
                     let hit = self.take(room, (stretch, &step), (from, length.to), end, witness);
@@ -316,7 +316,7 @@ impl Core {
             let slack = self.forgiven(cause);
             let own = &mut self.rules.tolerance[cause.kind()];
             if matches!(cause, Cause::Switch(_)) && values[POINTS - 1] > 10.0 * *own {
-                // A part that has clearly left its edge is watched to the last bit again.
+                // A part that has clearly left its limit is guarded to the last bit again.
                 *own = 0.0;
             }
             if !fall::may_fall(&values.map(|value| value + slack)) {

@@ -1,4 +1,4 @@
-//! The inputs under which a machine goes on: polynomials from a beginning to an end.
+//! The present inputs of a machine: polynomials from a beginning to an end.
 
 use super::step::Inputs;
 use crate::mechanism::DRIVES;

@@ -13,7 +13,7 @@
 use super::{EXPONENTIAL_ORDER, EXPONENTIAL_REACH, Matrix, RECIPROCAL_FACTORIAL, Series};
 use crate::solve::widest::widest;
 
-/// A matrix of which most columns are zero: those that are not.
+/// The nonzero columns of a sparse matrix.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Columns<const N: usize>(pub(crate) Vec<(usize, [f64; N])>);
 
@@ -105,8 +105,8 @@ impl<const N: usize> Matrix<N, N> {
     }
 
     widest! {
-        /// Adds to each of `s` how it changes along `series`, which goes so far as `distance`, up to its share `part` of
-        /// it, where A changes by `slopes`, and not at all for those behind the last of these: T_k = d/k (A T_{k−1} + A_p z_{k−1}).
+        /// Advances each of `s` along `series` of length `distance`, up to its share `part`, with the derivatives
+        /// `slopes` of A, which are zero beyond the last: T_k = d/k (A T_{k−1} + A_p z_{k−1}).
         pub(crate) fn add_slopes(&self, slopes: &[Columns<N>], along: (&Series<N>, f64, f64), s: &mut [[f64; N]])
             = add_slopes_by_any, add_slopes_by_avx2;
     }

@@ -1,5 +1,5 @@
-//! The columns of rows of one mode, made ready once: the forms of forces, currents and voltages, and the quantities
-//! that stand still.
+//! The columns of rows of one mode, prepared once: the forms of forces, currents and voltages, and the constant
+//! quantities.
 
 use super::sum::{Places, Sum};
 use crate::friction::Motion;

@@ -58,7 +58,7 @@ impl Sum {
     }
 }
 
-/// Which column stands where, each behind those that it follows from: first the numbers of a row as they stand in it.
+/// Indices of the columns, each after those that it depends on: first the numbers of a row in their order.
 #[derive(Clone)]
 pub(super) struct Places {
     pub(super) bodies: usize,

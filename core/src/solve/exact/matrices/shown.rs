@@ -1,4 +1,4 @@
-//! The readings of an observer in a mode, and how far they can be off straight lines.
+//! The readings of an observer in a mode, and bounds of their deviation from straight lines.
 
 use super::{ModeMatrices, Space};
 use crate::friction::Motion;

@@ -63,7 +63,7 @@ struct Follower<'t, const N: usize> {
     core: Core<N>,
     grid: Grid,
     row: u64,
-    /// Rows put out so far.
+    /// Number of rows output so far.
     rows: u64,
     seen: Seen,
     /// By variable; `None` for a variable of the input.
@@ -71,7 +71,7 @@ struct Follower<'t, const N: usize> {
     /// The places of the variables in `s`: those that change the equations first.
     places: Vec<usize>,
     s: Vec<[f64; N]>,
-    /// Jumps of S by later changes of the input, where one falls on a row that is not put out yet.
+    /// Jumps of S by later changes of the input, if one falls on the next row.
     pending: Option<[f64; N]>,
     /// The modes of this machine, with their derivatives, and what this run needs of them besides.
     slopes: Vec<Sloped<N>>,
@@ -79,7 +79,7 @@ struct Follower<'t, const N: usize> {
     /// The number of the present mode among them.
     now: usize,
     series: Box<Series<N>>,
-    /// True if it stands on a row or at a change of the input.
+    /// True at a row or at a change of the input.
     is_regular: bool,
     out: Sensitivities,
 }
@@ -157,7 +157,7 @@ impl<'t, const N: usize> Follower<'t, N> {
             self.reach(row, offset)?;
             time = time.max(until);
         }
-        // Behind a last, shorter interval it stands at the last row, too.
+        // After a last, shorter interval the run is at the last row, too.
         self.go_to(self.grid.intervals());
         self.put_out();
         Some(())
@@ -212,7 +212,7 @@ impl<'t, const N: usize> Follower<'t, N> {
         }
     }
 
-    /// Jump of the derivatives by a delay at the change of the input at which it stands.
+    /// Jump of the derivatives by a delay at the present change of the input.
     fn move_seam(&mut self) {
         let Some(jump) = self.pending.take() else { return };
         let (space, z) = (&self.core.common.space, &self.core.z);
@@ -305,7 +305,7 @@ impl<'t, const N: usize> Follower<'t, N> {
         self.go_to(self.row + 1);
     }
 
-    /// Moves S so far from where the state was `begin`, in the present mode.
+    /// Advances S by `distance` from the state `begin`, in the present mode.
     fn follow(&mut self, begin: &[f64; N], distance: f64, ends_regularly: bool) {
         let sloped = &mut self.slopes[self.tangents[self.now].sloped];
         let is_regular = self.is_regular && ends_regularly;

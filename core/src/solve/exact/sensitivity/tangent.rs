@@ -134,7 +134,7 @@ impl<const N: usize> Sloped<N> {
         Some(Self { law: Arc::clone(law), of, slopes, guards, steps: Vec::new() })
     }
 
-    /// ∂g/∂p of a guard by a variable, for the state as it is.
+    /// ∂g/∂p of a guard with respect to a variable, at the present state.
     pub(super) fn guard_slope(&self, variable: usize, guard: usize, z: &[f64; N]) -> f64 {
         self.guards.get(variable).map_or(0.0, |guards| guards[guard].times(z))
     }
