@@ -67,7 +67,7 @@ impl Fit {
             }
             fitted = read(&changes, false);
         }
-        // A file that is another machine than the fit has other errors than those that are told of it.
+        // The stated errors are wrong for a file with another machine than the fit's.
         if let Some((key, is, read)) = differs(machine, &fitted?.machine, DIGITS_READ) {
             return Err(Error::new(format!("the fit cannot be written: `{key}` would be read as {read}, and is {is}"))
                 .in_file(name)
@@ -197,7 +197,7 @@ fn rounded_to(value: f64, step: f64) -> f64 {
     if step <= 0.0 || !place.is_finite() || !value.is_finite() {
         return value;
     }
-    // The shortest decimal number of so many places: 0.1 and not 3 · 0.1 − 0.2.
+    // The shortest decimal number with this number of places: 0.1 and not 3 · 0.1 − 0.2.
     let text = match place {
         coarse if coarse > 0.0 => {
             let unit = 10f64.powf(coarse);

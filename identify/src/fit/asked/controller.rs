@@ -47,7 +47,7 @@ pub(crate) fn reproduced(case: &Case, log: &Log) -> Option<f64> {
         let asked = controller.step(&seen);
         let given = timing.limit.map_or(asked, |limit| asked.clamp(-limit, limit));
         controller.limited(given);
-        // What acts when the command is due; clocks of logs are off by a little.
+        // The input at the time at which the command acts; clocks of logs deviate a little.
         let acts = time + timing.delay + late;
         let row = log.time.partition_point(|time| *time <= acts).checked_sub(1)?;
         made.push(given);

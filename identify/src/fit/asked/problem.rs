@@ -180,7 +180,7 @@ impl<'a> Problem<'a> {
     fn add_extras(&mut self, case: &Case, plan: &Plan) {
         let &Nuisances { delay, input_gain, input_offset, initial_state, bias } = &plan.nuisance;
         let interval = self.runs[0].interval();
-        // Samples that are taken after their stamps are an input that acts early: as far as the input is logged.
+        // Samples that are taken after their stamps appear as an early input, if the input is logged.
         let mut inputs = self.runs.iter().flat_map(Run::inputs);
         let is_sampled = inputs.all(|input| matches!(input, Signal::Sampled { .. }));
         let (early, high) = (if is_sampled { -50.0 * interval } else { 0.0 }, 50.0 * interval);
@@ -277,7 +277,7 @@ impl<'a> Problem<'a> {
     pub fn weigh(&mut self, quantity: Quantity, deviation: f64, rounding: bool) {
         for run in &mut self.runs {
             let fitted = run.fitted_rows;
-            // Of the deviation, rounding has its part.
+            // Rounding is a part of the deviation.
             let trembles = |step: f64| (deviation * deviation - step * step / 12.0).max(0.0).sqrt();
             for seen in run.seen.iter_mut().filter(|seen| seen.quantity == quantity) {
                 for k in 0..seen.values.len() {
@@ -411,12 +411,12 @@ impl<'a> Problem<'a> {
         match self.units.get(j) {
             Some(Scale::Linear(unit)) => {
                 let typical = typical(machine, &self.parameters[j], &self.runs);
-                // Of what has no size by nature, the value itself, or where it started.
+                // Without a typical size, the value itself, or its start.
                 typical.map_or(if x == 0.0 { 1.0 } else { x.abs() }, |typical| x.abs().max(typical / unit))
             }
             Some(Scale::Log(_)) => 1.0,
             None => match self.shared[j - self.parameters.len()].what {
-                // Its unit is a sample's interval, to which few logs tell a delay.
+                // Its unit is a sample's interval; few logs determine a delay to that.
                 Nuisance::Delay => KNOWN_DELAY,
                 _ => 1.0,
             },
@@ -756,8 +756,8 @@ impl Start<'_> {
         if initial_state || windowed {
             let of = |quantity| Some(self.noise.of(quantity));
             let (slope, doubt) = self.reading.map_or((0.0, 0.0), |reading| reading.speed_at_start(run, of));
-            // A log begins at rest, unless it shows that it does not: a start at rest sticks, and a search from there
-            // sees nothing of the speed.
+            // A log begins at rest unless it shows motion: a start at rest sticks, and a search from there does not
+            // depend on the speed.
             let start = if windowed || slope.abs() > STARTS_MOVING * doubt { slope } else { 0.0 };
             let (low, high) = (start - 20.0 * fast, start + 20.0 * fast);
             let what = Nuisance::StartSpeed(self.slide);

@@ -360,7 +360,7 @@ impl Run {
             unit.amplifier.gain *= self.extra(Nuisance::InputGain(drive), extras).unwrap_or(1.0);
         }
         let slides = machine.geometry().slides;
-        // Of all slides, where an extra has one of them.
+        // Of all slides, if an extra has one of them.
         let fitted = |what: fn(usize) -> Nuisance, given: &[f64]| -> Option<Vec<f64>> {
             let own: Vec<_> = (0..slides.len()).map(|slide| self.extra(what(slide), extras)).collect();
             let all = own.iter().zip(slides).map(|(own, slide)| own.unwrap_or(given[slide.body]));

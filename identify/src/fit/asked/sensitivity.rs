@@ -30,8 +30,8 @@ impl Problem<'_> {
             let all = columns.iter().map(|&j| self.variable_of((index, j), x, bounds, is_moved));
             all.collect::<Option<Vec<_>>>()
         };
-        // Where it does not matter where the cart begins, it begins at the origin, so that all runs count from there
-        // and share what the machine has made ready; but angles there depend on the radius.
+        // If the start of the cart does not matter, it is the origin, so that all runs share the prepared matrices; but
+        // angles then depend on the radius.
         let mut is_moved = self.runs[index].is_shifted(machine);
         let Some(mut all) = variables(is_moved) else { return false };
         if is_moved && all.iter().any(|variable| changes_radius(machine, variable)) {
@@ -73,7 +73,7 @@ impl Problem<'_> {
                 }
             }
         }
-        // What is known of the run's own beforehand.
+        // Prior knowledge of the run's own variables.
         let known = run.extras.iter().filter(|extra| extra.known.is_some());
         for (at, extra) in known.enumerate() {
             let own = self.own_variables(index).into_iter().find(|(_, own)| own.what == extra.what);

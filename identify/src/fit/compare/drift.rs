@@ -61,7 +61,7 @@ impl Drift {
         changes.sort_by(|a, b| a.left.total_cmp(&b.left));
         let least = changes.first().map_or(0.0, |change| change.left);
         let alike = changes.partition_point(|change| change.left <= least * (1.0 + CHANGE_ALIKE) + 1e-12);
-        // Of a pair and its members, the pair.
+        // A pair precedes its members.
         let members = |change: &Change| change.estimate.name.split(" = ").count();
         changes[..alike].sort_by_key(|change| (Cause::of(&change.estimate.name), std::cmp::Reverse(members(change))));
         Self { unchanged, changes, alike, work }
@@ -142,7 +142,7 @@ pub fn drift(case: &Case, plan: &Plan, stop: Option<Stop>, watch: &mut dyn FnMut
         if watch(&name) == Flow::Stop || stop.is_some_and(|stop| stop()) {
             break;
         }
-        // What cannot be changed so that the model gets through the logs explains nothing.
+        // A change with which the model cannot simulate the logs explains nothing.
         let Ok(Settled { searched: found, .. }) = search(case, &single, stop, quiet) else { continue };
         work.add(&found.work);
         let judged = Judged::new(

@@ -174,7 +174,7 @@ fn line(case: &Case, law: FrictionLaw, is_held: bool) -> Option<Line> {
             Some(Line { key: "force_along", over: over_travel(case).collect(), free })
         }
         FrictionLaw::ForceBySpeed => {
-            // What goes with the speed is viscous friction, and what has its sign Coulomb friction.
+            // The part proportional to speed is viscous friction, the part with its sign Coulomb friction.
             let fastest = fastest(case);
             let is_free = |k: &usize| SPEED_POINTS[*k] != 0.0 && SPEED_POINTS[*k].abs() != 1.0;
             let free = (0..SPEED_POINTS.len()).filter(is_free).collect();

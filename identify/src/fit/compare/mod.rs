@@ -336,7 +336,7 @@ impl Course<'_> {
         let near = |one: &Candidate| one.held_out.powi(2) - top * top <= one.error;
         let fewest = self.tried.iter().map(|tried| &tried.candidate).filter(|one| one.failed.is_none() && near(one));
         let fewest = fewest.map(|one| one.parameters).min().unwrap_or(usize::MAX);
-        // The first of so many parameters predicts best of them.
+        // The first with this number of parameters predicts best among them.
         let chosen = self.tried.iter().position(|tried| tried.candidate.parameters == fewest).unwrap_or(0);
         let by_training = (0..self.tried.len())
             .filter(|&k| self.tried[k].candidate.failed.is_none())

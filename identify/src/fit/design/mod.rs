@@ -273,7 +273,7 @@ fn plan_of(case: &Case, request: &Request) -> Result<Plan> {
 /// The recorder's interval, else the shortest of the experiments.
 fn usual_interval(case: &Case) -> f64 {
     let recorder = case.measurement.as_ref().and_then(|measurement| measurement.every);
-    // That of a log is a difference of its times, with their rounding.
+    // The interval of a log is a difference of its times, with their rounding.
     let written = |every: f64| format!("{every:.9e}").parse().unwrap_or(every);
     let shortest = case.experiments.iter().map(|experiment| written(experiment.every)).reduce(f64::min);
     recorder.or(shortest).unwrap_or(SAMPLE_INTERVAL)

@@ -278,7 +278,7 @@ impl Task<'_> {
     /// An input that keeps the limits on all of these machines, too, with its information.
     fn finally(&self, shape: Shape, driven: &Driven, doubtful: &[Machine]) -> Option<Judged> {
         let (shape, initial, reached) = self.fitted(shape, driven, doubtful)?;
-        // What does not break away tells nothing.
+        // An input that does not break the machine away contains no information.
         if reached.speed == 0.0 {
             return None;
         }

@@ -62,7 +62,7 @@ impl Designed {
                 error
             }
         })?;
-        // What is written is what was judged.
+        // The written experiment is the evaluated one.
         match read.experiments.last() {
             Some(last) if last.name == self.name && last.inputs == self.driven.inputs(&self.shape) => Ok(whole),
             _ => Err(Error::new("the designed experiment does not read back as it was written").in_file(name)),

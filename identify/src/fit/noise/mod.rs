@@ -269,7 +269,7 @@ impl Estimate {
         let blocks = self.blocks();
         let sum: f64 = self.series.iter().map(long).sum();
         let interval = (sum / blocks.max(2) as f64).max(1e-12);
-        // Of one block the gain is √m.
+        // The gain of one block is √m.
         let gain = self.series.iter().flat_map(|s| &s.gain).map(|g| g * g).sum::<f64>() / blocks as f64;
         let mut times = Vec::new();
         let mut time = interval;

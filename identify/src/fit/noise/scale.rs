@@ -33,7 +33,7 @@ pub(super) fn scales(all: &[Series], slow: &[Slow]) -> Option<Vec<Vec<f64>>> {
             sums[class] += square;
             counts[class] += 1.0;
         }
-        // What is exact at rest is not infinitely so.
+        // Values that are exact at rest have a least noise.
         sums.iter_mut().zip(counts).for_each(|(sum, count)| *sum = sum.max(LEAST_SIZE * LEAST_SIZE * mean * count));
         let there = (0..SPEED_CLASSES).filter(|&k| counts[k] > 0.0);
         let gain: f64 = there.clone().map(|k| 0.5 * counts[k] * (mean * counts[k] / sums[k]).ln()).sum();

@@ -137,7 +137,7 @@ pub fn posterior(case: &Case, plan: &Plan, fit: &Fit, effort: Effort, watch: &Wa
 /// Draws the shifts that were integrated over beside each draw; if that is ended early, as many of each chain are left.
 fn complete(draws: &mut Draws, marginal: &Marginal, effort: Effort, watch: &Watch) {
     let made = effort.chains * (effort.tune + effort.draws);
-    // What there was when it was interrupted is completed: that takes one simulation each.
+    // Draws before an interruption are completed, with one simulation each.
     let goes_on = || draws.interrupted || watch(made);
     let one = |number: usize, chain: &[Vec<f64>]| {
         let mut random = Pcg64::seed_from_u64(effort.seed.wrapping_add(number as u64) ^ 0xc0de);
@@ -176,7 +176,7 @@ impl Posterior {
         if self.draws.interrupted {
             doubts.push("it was interrupted".to_string());
         }
-        // What is no number is no good either.
+        // NaN counts as bad.
         let worst = |of: fn(&Credible) -> f64, bad: fn(f64, f64) -> bool| {
             let number = |c: &Credible| if of(c).is_finite() { of(c) } else { f64::NAN };
             self.variables

@@ -86,7 +86,7 @@ impl Piece {
     fn seen_from(&self, u: &DVector<f64>, cost: f64) -> (DVector<f64>, f64) {
         let away = &self.y - u;
         let own = self.cost - self.gradient.dot(&away) + 0.5 * away.norm_squared();
-        // Where the cost is not convex a piece may stand above: it counts for less the further away it is.
+        // If the cost is not convex, a piece may lie above it: its weight decreases with distance.
         (&self.gradient - &away, (cost - own).abs())
     }
 }

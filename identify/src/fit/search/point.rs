@@ -174,7 +174,7 @@ impl<'a> Point<'a> {
         let newton = model.step(&best.at_bound, &self.scale, 0.0);
         let freedom = (best.residuals.len().saturating_sub(n)).max(1) as f64;
         let spread = (2.0 * best.cost / freedom).sqrt();
-        // What is left of logs that a model made is what rounding made of them.
+        // The residuals of logs that a model made are rounding errors.
         let rounding = self.options.rounding;
         let is_rounding = spread <= rounding;
         self.deviation = if is_rounding { rounding } else { spread * inflation(&best.residuals, n) };

@@ -233,7 +233,7 @@ impl Balance {
                 free.keys.iter().map(|(key, factor)| factor * free.start * at_pulley(machine, key)).sum()
             };
             let total: f64 = keys.iter().map(|key| value(machine, key).unwrap_or(0.0) * at_pulley(machine, key)).sum();
-            // Of what each campaign has for itself, that of the first.
+            // Of parameters of single campaigns, the first campaign's.
             let first = |(_, of): &(&Free, &Option<usize>)| of.is_none_or(|of| of == 0);
             let counted = problem.parameters.iter().zip(&problem.of).filter(first).map(|(free, _)| free);
             let searched: f64 = counted.filter(|free| own(free)).map(part).sum();

@@ -74,7 +74,7 @@ mod tests {
         assert!(short.nrows() < 100, "{}", short.nrows());
         let (known, own) = (tall.tr_mul(&tall), short.tr_mul(&short));
         assert!((&known - &own).abs().max() < 1e-12 * known.abs().max(), "{known} {own}");
-        // What is short already stays as it is.
+        // A short matrix stays unchanged.
         let few = tall.rows(0, 100).into_owned();
         assert_eq!(shortened(&few), few);
     }

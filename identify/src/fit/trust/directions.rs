@@ -36,7 +36,7 @@ impl Directions {
         for (column, &j) in which.iter().enumerate() {
             own.column_mut(column).scale_mut(whole[j]);
         }
-        // Of a simulation that was ended early there are no numbers, and the decomposition would panic.
+        // A simulation that ended early has no numbers, and the decomposition would panic.
         if own.iter().any(|entry| !entry.is_finite()) {
             return None;
         }

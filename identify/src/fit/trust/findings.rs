@@ -30,7 +30,7 @@ pub(crate) fn findings(case: &Case, plan: &Plan, found: &Searched, fit: &Fit, su
     all.extend(of_noise(found));
     all.extend(of_motor(case, fit));
     let unexplained = of_residuals(case, plan, found, fit, &all);
-    // Of columns that have changed places each may move against the model, but with its sign changed neither is met.
+    // Each of two exchanged columns may move against the model, but a change of sign corrects neither.
     let is_swapped = |log: &Option<String>| unexplained.iter().any(|one| one.code == "swapped" && one.log == *log);
     all.retain(|one| !(one.code == "sign" && is_swapped(&one.log)));
     all.extend(unexplained);

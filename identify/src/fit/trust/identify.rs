@@ -313,13 +313,13 @@ pub(crate) fn sum_of(machine: &crate::machine::Machine, parameters: &[&Free], we
             parts.push(arm.times(symbol));
             total += arm.of(machine) * value(machine, key)?;
         }
-        // All weights are the same number of times the arms, within a tenth: the belt gives way a little.
+        // All weights are the arms times one number, within a tenth, since the belt is elastic.
         let ratio = weight / own;
         if (ratio / *scale.get_or_insert(ratio) - 1.0).abs() > 0.1 {
             return None;
         }
     }
-    // What is not searched for and adds to it.
+    // Fixed parameters that contribute to it.
     let is_free = |key: &str| parameters.iter().any(|free| free.keys.iter().any(|(own, _)| own == key));
     for row in sum.parts(true).filter(|row| !is_free(row.key)) {
         let (arm, symbol) = arm_and_symbol(row.key)?;

@@ -214,7 +214,7 @@ fn round(
         let value = given[j].clamp(open.low[j], open.high[j]);
         (held.low[j], held.high[j], kept[j]) = (value, value, value);
     }
-    // What is hidden as it was given; else drawn to it like the rest; else from where the case began.
+    // Hidden variables as given; else drawn towards their values like the rest; else from the start of the case.
     let mut tries = vec![(kept, &held), (best.x.clone(), &open), (given.to_vec(), &open)];
     if hidden.is_empty() {
         tries.remove(0);

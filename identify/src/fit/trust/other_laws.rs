@@ -350,7 +350,7 @@ impl Place<'_> {
         columns.columns_mut(0, g).copy_from(&self.jacobian.columns(0, g));
         columns.set_column(g, &tried.column);
         columns.columns_mut(g + 1, n - g).copy_from(&self.jacobian.columns(g, n - g));
-        // Of logs without noise any law takes off some of what their last digits left.
+        // In logs without noise, any law explains a part of the rounding errors.
         let moved = (&tried.column * tried.amplitude).amax();
         if moved < LAW_DUST / FILE_ROUNDING * self.problem.rounding() {
             return None;
@@ -366,8 +366,8 @@ impl Place<'_> {
         }
         let shift = tried.along.rows(0, g) * -tried.amplitude;
         let off = (0..g).map(|j| shift[j].abs() / judged.covariance.error(j).unwrap_or(f64::INFINITY)).collect();
-        // (|d| + h)² ≤ 2 (d² + h²), d being as far as an interval reaches, and h what noise makes of both; the law is
-        // one of its kind, and the true one may do half as much again.
+        // (|d| + h)² ≤ 2 (d² + h²), with the half-width d of an interval and the effect h of noise on both; the true
+        // law may have one and a half times the effect of the one tried.
         let square = &shift * shift.transpose();
         let added = &square * (3.0 / (NORMAL * NORMAL)) + square * (error / tried.amplitude).powi(2);
         let Candidate { body, kind, .. } = tried.candidate;

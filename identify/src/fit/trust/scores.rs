@@ -160,7 +160,7 @@ pub fn together(logs: &[LogFit], name: impl Fn(&LogFit) -> String) -> Vec<Togeth
             let mut parts: Vec<_> =
                 [of(output.fitted, false), of(output.held_out, true)].into_iter().flatten().collect();
             if !log.complete {
-                // What the model does not reach is missed by as much as can be.
+                // Values that the model does not reach count as an infinite error.
                 parts = vec![(f64::INFINITY, output.seen.len(), log.held_out)];
             }
             for (squares, count, held_out) in parts {

@@ -79,7 +79,7 @@ pub(crate) fn disagreement(case: &Case, plan: &Plan, found: &Searched, judged: &
     let clusters = windows as f64;
     let between = &inverse * squares * &inverse * (clusters / (clusters - 1.0));
     let shift = DVector::from_fn(g, |j, _| best.x[j] - found.best.x[j]);
-    // Of windows, noise makes a variance that is off by √(2/(G − 1)) of itself.
+    // The variance between G windows has a relative standard error of √(2/(G − 1)).
     let most = 1.0 + WINDOWS_OFF * (2.0 / (clusters - 1.0)).sqrt();
     let off: Vec<f64> = (0..g)
         .map(|j| {
@@ -91,8 +91,8 @@ pub(crate) fn disagreement(case: &Case, plan: &Plan, found: &Searched, judged: &
         return None;
     }
     let wider = (student(windows - 1) / student(1_000_000)).powi(2);
-    // (|d| + h)² ≤ 2 (d² + h²), d being as far as an interval reaches; and windows are still long enough for half as
-    // much again.
+    // (|d| + h)² ≤ 2 (d² + h²), with the half-width d of an interval; windows are still long enough for one and a half
+    // times that.
     let added = (&shift * shift.transpose() / student(1_000_000).powi(2) + between * wider) * 3.0;
     Some(Disagreement { windows, length, off, added })
 }

@@ -70,7 +70,7 @@ fn leave_motion(case: &Case, found: &Searched, log: &Log, note: &mut Note) {
     jumps.retain(|jump| {
         let step = |values: &[f64]| values[jump.sample] - values[jump.sample - 1];
         let left = step(&output.seen) - step(&output.model);
-        // What the model does not reach, it does not explain.
+        // Values that the model does not reach are not explained.
         left.is_nan() || left * jump.size.signum() > JUMP * jump.size.abs()
     });
     note.text = jumps_text(jumps, quantity.unit());
@@ -78,7 +78,7 @@ fn leave_motion(case: &Case, found: &Searched, log: &Log, note: &mut Note) {
 
 /// True if the logs are met better with the log of this name as `remedy` has it; true where that cannot be said.
 pub(crate) fn is_borne_out(case: &Case, plan: &Plan, found: &Searched, name: &str, remedy: &Remedy) -> bool {
-    // What was not fitted, or not to its end, says nothing.
+    // An incomplete fit, or a log that was not fitted, does not count.
     if found.problem.is_stopped() || !found.problem.runs.iter().any(|run| run.name == name) {
         return true;
     }

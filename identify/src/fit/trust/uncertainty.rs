@@ -63,7 +63,7 @@ impl Judged {
         let squares: f64 = residuals.iter().map(|r| r * r).sum();
         let deviation = (squares / freedom).sqrt();
 
-        // Along the directions, of which a column each can be inverted whatever the logs tell.
+        // In terms of the directions, each of whose columns can be inverted for any logs.
         let mut turned = DMatrix::zeros(globals, alive);
         for i in 0..alive {
             for j in 0..globals {
@@ -76,7 +76,7 @@ impl Judged {
         for (place, &j) in locals.iter().enumerate() {
             columns.set_column(alive + place, &jacobian.column(j));
         }
-        // What belongs to one run and does not show there is known beforehand or not at all.
+        // A variable of one run without an effect there has prior knowledge only.
         let shown: Vec<usize> =
             (0..columns.ncols()).filter(|&c| c < alive || columns.column(c).iter().any(|v| *v != 0.0)).collect();
         let columns = columns.select_columns(&shown);

@@ -33,7 +33,7 @@ impl Draws {
     /// Rank-normalised split R̂: 1 if all halves of all chains agree; above 1.01 the chains have not converged.
     pub fn r_hat(&self, parameter: usize) -> f64 {
         let halves = self.halves(parameter);
-        // How far the chains are apart in place, and, folded, in width.
+        // Differences of the chains in location and, folded, in width.
         let mut all: Vec<f64> = halves.iter().flatten().copied().collect();
         all.sort_by(f64::total_cmp);
         let Some(&median) = all.get(all.len() / 2) else { return f64::NAN };

@@ -104,7 +104,7 @@ fn chains(starts: &[Vec<f64>], effort: Effort, watch: &Watch, chain: &MakeChain)
         // Each chain has a stream of its own.
         let own = effort.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(number as u64);
         let drawn = chain(&job, &starts[number % starts.len()], Pcg64::seed_from_u64(own));
-        // Whoever watches sees the end, too.
+        // The observer receives the end, too.
         job.goes_on();
         drawn
     };

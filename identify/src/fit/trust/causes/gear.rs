@@ -51,7 +51,7 @@ impl Site<'_, '_> {
         machine.drives[0].motor.gear_play = Some(play);
         let mut plan: Plan = self.plan.clone();
         plan.free.extend(keys.iter().map(|key| key.to_string()));
-        // What is far off takes long to simulate, and is not what was tried.
+        // A distant value takes long to simulate, and differs from the one tried.
         let n = machine.drives[0].motor.gear_ratio;
         let around = |key: &str| match key {
             "motor.rotor_inertia" => KNOWN_SHARES.map(|share| share * self.inertia() / (n * n)),

@@ -28,7 +28,7 @@ pub(super) fn words(_: &Site, _: &Extended, found: &Fitted) -> Said {
         (true, Some(deviation)) => format!(
             "samples that are taken {} after their time stamps in the mean, and scatter over {}",
             shown(-found.value, "s"),
-            // Of a uniform distribution.
+            // Width of a uniform distribution.
             shown(12f64.sqrt() * deviation, "s")
         ),
         (false, _) => format!("an input that acts {} late", shown(found.value, "s")),
