@@ -1,4 +1,4 @@
-//! Parameters from logs, what the logs cannot tell, and the experiments that would.
+//! Parameters from logs, identifiability, and design of experiments.
 
 // Paths below `crate` are those of the facade: a module is named alike wherever it lives.
 use taut_case::*;

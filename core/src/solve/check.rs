@@ -1,6 +1,6 @@
 //! Checks of a stage and an experiment before anything is computed.
 //!
-//! The case reader checks what is in a file, and says on which line; here it is what a program built by itself.
+//! The case reader checks files and reports the line; this module checks machines built by a program.
 
 use super::Course;
 use crate::error::{Error, Result};
@@ -160,7 +160,7 @@ pub(super) fn fastest_rate(mechanism: &Mechanism) -> f64 {
         let leader = mechanism.leader(drive.shaft);
         let moved: f64 = mechanism.followers(leader).map(mass).sum();
         let shaft = moved / mechanism.ratio(drive.shaft).powi(2);
-        // Of the current by itself, and of current and motor with each other
+        // Rates of the current alone, and of the exchange between current and motor
         fastest = fastest.max(if motor.inductance > 0.0 {
             f64::max(motor.resistance / motor.inductance, (emf.abs() / (motor.inductance * shaft)).sqrt())
         } else {
@@ -229,7 +229,7 @@ fn commands(mechanism: &Mechanism, course: &Course) -> Result<()> {
     Ok(())
 }
 
-/// Refuses a state that is none.
+/// Rejects an invalid state.
 pub(super) fn state(start: &State) -> Result<()> {
     match start.position.iter().chain(&start.speed).chain(&start.current).find(|value| !value.is_finite()) {
         Some(value) => {
@@ -258,7 +258,7 @@ pub(super) fn experiment(mechanism: &Mechanism, experiment: &Experiment) -> Resu
     let begun = Course::of(mechanism, experiment);
     course(mechanism, &begun)?;
     commands(mechanism, &begun)?;
-    // What moves as one begins as one.
+    // Joined bodies begin at one speed and position.
     let state = begun.start;
     for body in 0..mechanism.bodies.len() {
         let leader = mechanism.leader(body);

@@ -1,4 +1,4 @@
-//! Which solver, as it is asked for by name.
+//! The choice of a solver by name.
 
 use super::{Method, Solver};
 use crate::error::{Error, Result};
@@ -15,22 +15,22 @@ pub enum Kind {
     Table3,
 }
 
-/// The solver that is asked for; the rest is chosen.
+/// The requested solver and its options; missing ones have defaults.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Choice {
-    /// By default the one for the stage.
+    /// Default: the solver that the machine needs.
     pub solver: Option<Kind>,
-    /// Of the general solver.
+    /// Position tolerance of the general solver, m.
     pub tolerance: Option<f64>,
-    /// Of the fixed steps of Table 3, s.
+    /// Step of Table 3, s.
     pub step: Option<f64>,
-    /// Of the fixed steps of Table 3.
+    /// Integration method of Table 3.
     pub method: Option<Method>,
 }
 
 impl Choice {
-    /// The solver that is asked for, or else the one for this machine. Options that do not go with it are told by the
-    /// names of the command line; Table 3 is of an axis alone.
+    /// The requested solver, or the one for this machine. Errors about options that do not apply to it use the names of
+    /// the command line; Table 3 is for an axis only.
     pub fn solver(&self, machine: &Machine) -> Result<Solver> {
         let option = match (self.solver, self.step, self.method) {
             _ if machine.kind == crate::machine::Kind::Axis => return self.instead_of(Solver::of(machine)),

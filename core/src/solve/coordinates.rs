@@ -8,17 +8,16 @@ use super::saved::{Pass, Passed};
 use crate::friction::Motion;
 use crate::mechanism::{BODIES, Layout, Mode, Replaced, State};
 
-/// Parts of the last place by which positions at the start may contradict each other and still mean a belt without
-/// strain.
+/// Units in the last place within which positions at the start count as a belt without strain.
 const LAST_PLACES: f64 = 4.0;
 
-/// Where a run begins, and the angles of pulleys at rest.
+/// Origin of a run: its start, and the angles of pulleys at rest.
 #[derive(Debug, Clone)]
 pub(crate) struct Coordinates {
     start: State,
     /// Coordinates of the origin.
     origin: [f64; BODIES],
-    /// Lengths at the start, by the bodies in whose places they stand.
+    /// Elongations at the start, by the bodies whose positions they replace.
     strain: [f64; BODIES],
     /// Angles of pulleys while they are stuck, rad: they keep every bit while the rest moves.
     held: [Option<f64>; BODIES],
@@ -83,7 +82,7 @@ impl Coordinates {
             let length = inner.position[body];
             state.position[body] = match self.held[body] {
                 Some(angle) => angle,
-                // What hangs on a pulley is as far as that one is.
+                // A body on a pulley has the position of the pulley.
                 None if replaced.on_replaced => {
                     let others: f64 = replaced.others.iter().map(|&(other, arm)| arm * state.position[other]).sum();
                     (length - others) / replaced.own
@@ -100,7 +99,7 @@ impl Coordinates {
         state
     }
 
-    /// The way of a body that is not held, as weights of the positions in the solvers' coordinates and a constant.
+    /// Position of a body that is not held, as weights of the positions in the solvers' coordinates and a constant.
     pub(super) fn way(&self, layout: &Layout, body: usize) -> ([f64; BODIES], f64) {
         let mut weights = [0.0; BODIES];
         let Some(replaced) = layout.replaced.iter().find(|replaced| replaced.body == body) else {
@@ -123,8 +122,8 @@ impl Coordinates {
         (weights, self.start.position[body] - self.strain[body] / replaced.own)
     }
 
-    /// The ways of a body whose place a length takes, row by row: `own` has that length, `others` gives coordinates of
-    /// bodies, and ways of those that are placed already.
+    /// Positions, row by row, of a body whose coordinate is an elongation: `own` has that elongation, `others` the
+    /// coordinates of other bodies, and the positions of those that are known already.
     #[inline(always)]
     pub(crate) fn place<'v>(&self, replaced: &Replaced, own: &mut [f64], others: impl Fn(usize) -> &'v [f64]) {
         let body = replaced.body;

@@ -1,7 +1,7 @@
-//! Derivatives of the columns of a machine under way with respect to time, of any order, in its present mode.
+//! Derivatives of the columns of a running machine with respect to time, of any order, in its present mode.
 //!
-//! In a mode of a machine that is linear between its events every column is a form of lengths s, speeds v, currents i,
-//! inputs u and one. So are their rates, so that each derivative follows from the one before:
+//! In a mode of a machine that is linear between events, every column is a linear form of lengths s, speeds v, currents
+//! i, inputs u and one. So are the rates of these, so each derivative follows from the previous one:
 //!
 //! ```text
 //! s⁽ⁿ⁺¹⁾ = A v⁽ⁿ⁾      v⁽ⁿ⁺¹⁾ = a·(s, v, i, u)⁽ⁿ⁾      i⁽ⁿ⁺¹⁾ = e·(s, v, i, u)⁽ⁿ⁾
@@ -23,7 +23,7 @@ struct Level {
 }
 
 impl Level {
-    /// The derivative of a form: its constant has none.
+    /// Derivative of a form; that of its constant is zero.
     fn of(&self, form: &Form) -> f64 {
         let form = if self.order == 0 { *form } else { Form { constant: 0.0, ..*form } };
         form.value_at(&self.stretch, &self.state, &self.input)
@@ -31,9 +31,9 @@ impl Level {
 }
 
 impl Simulator {
-    /// The derivative of `order`, one and more, of each of [`Simulator::columns`] with respect to time, as it is right
-    /// after now; `into` has a place for each. None, and nothing is done, of a machine that is not linear between its
-    /// events.
+    /// Derivatives of `order`, one or more, of each of [`Simulator::columns`] with respect to time, just after the
+    /// present time; `into` has an element for each. Returns `None`, without an effect, for a machine that is not
+    /// linear between events.
     pub fn derivatives(&self, order: usize, into: &mut [f64]) -> Option<()> {
         let mechanism = self.mechanism();
         if order == 0 || !mechanism.is_piecewise_linear() {
@@ -61,7 +61,7 @@ impl Simulator {
                 Shown::Stretch(spring) => level.stretch[spring],
                 Shown::Force(spring, factor) => level.of(&mechanism.spring_force(spring, mode)) * factor,
                 Shown::Friction(body) => self.friction_rate(body, &now, &level),
-                // They jump at events and stand between; bristles are none of a machine that is linear.
+                // They are constant between events; a linear machine has no bristles.
                 Shown::Motion(_) | Shown::Contact(_) | Shown::Counts(..) | Shown::Bristle(_) => 0.0,
             } + 0.0;
         }
@@ -99,7 +99,7 @@ impl Simulator {
         next
     }
 
-    /// The derivative of the friction on a body: of one at rest that of the load it holds, as far as its gear does not.
+    /// Derivative of the friction on a body: at rest that of the load that its gear does not hold.
     fn friction_rate(&self, body: usize, now: &Level, level: &Level) -> f64 {
         let (mechanism, mode) = (self.mechanism(), self.engine().mode());
         let law = mechanism.friction(body);

@@ -6,21 +6,21 @@ use super::saved::{Pass, Passed};
 use super::{Ending, Event, PositionError};
 use crate::mechanism::{DRIVES, Form, Mechanism, Mode, Shown, SpringLaw, State, What};
 
-/// The solver of a machine under way: one of the exact solver's kernels, or the general solver.
+/// The solver of a running machine: a kernel of the exact solver, or the general solver.
 pub(super) trait Engine: Send + Sync {
-    /// A copy that goes on in the same way.
+    /// A copy that continues identically.
     fn copy(&self) -> Box<dyn Engine>;
 
-    /// The mechanism, its ways counted from where it began.
+    /// The mechanism, with positions relative to its start.
     fn mechanism(&self) -> &Mechanism;
 
-    /// Where it stands, s.
+    /// Present time, s.
     fn time(&self) -> f64;
 
     /// The highest degree of the inputs that it takes.
     fn degree(&self) -> usize;
 
-    /// One that takes inputs of this degree, where this one stands.
+    /// A solver for inputs of this degree in the same state.
     fn raised(&self, degree: usize) -> Box<dyn Engine>;
 
     /// Takes up new inputs, and what they bring about at once.
@@ -29,7 +29,7 @@ pub(super) trait Engine: Send + Sync {
     /// Bounds how fast the inputs change until `until`.
     fn bound_input(&mut self, pieces: &Pieces, until: f64);
 
-    /// Goes on to `until` and adds the events on the way to `events`.
+    /// Advances to `until` and appends the events to `events`.
     fn go_to(&mut self, until: f64, events: &mut Vec<Event>) -> std::result::Result<(), Ending>;
 
     /// The state in angles and positions.
@@ -47,13 +47,13 @@ pub(super) trait Engine: Send + Sync {
     /// The values of a row beyond the linear equations.
     fn extra(&self) -> Extra;
 
-    /// Goes on with other numbers of the same mechanism.
+    /// Continues with other parameters of the same mechanism.
     fn replace(&mut self, mechanism: &Mechanism);
 
-    /// All that it needs to go on, as plain numbers; nothing of one that has ended early.
+    /// Passes the complete state as plain numbers; fails after an early end.
     fn pass(&mut self, pass: &mut Pass) -> Passed;
 
-    /// By how much positions may be off, where that is known.
+    /// Bound of the position error, if known.
     fn error(&self) -> Option<PositionError>;
 }
 
@@ -100,7 +100,7 @@ pub(super) fn shown(engine: &dyn Engine, into: &mut [f64]) {
 /// Friction on a body now.
 fn friction(engine: &dyn Engine, body: usize, state: &State) -> f64 {
     let (mechanism, mode, extra) = (engine.mechanism(), engine.mode(), engine.extra());
-    // What holds a body at rest is what acts on it, least and most by the way that a gear with losses counts.
+    // Friction on a body at rest balances its load, which a lossy gear determines between two limits only.
     let load =
         |positive: bool, forward: bool| engine.value(&mechanism.load(body, forward, &mode.with_torque(positive)));
     let all = [load(true, true), load(true, false), load(false, true), load(false, false)];

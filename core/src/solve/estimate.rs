@@ -23,33 +23,32 @@ const FACTOR: f64 = 100.0;
 /// interval: where the two intervals differ by a power of two, both runs take the same steps.
 const ROWS: [u64; 3] = [3, 2, 5];
 
-/// The estimate as a multiple of what the two runs differ by, and its least value as a share of the tolerance: where
-/// neither run's steps are limited by the tolerance (corners of a friction curve, of a line along the travel), both are
-/// off by about as much.
+/// The estimate as a multiple of the difference of the two runs, and its least value as a share of the tolerance: if
+/// the tolerance limits the steps of neither run (corners of a friction curve, or of a line along the travel), both
+/// have about the same error.
 const SAFETY: f64 = 10.0;
 const LEAST: f64 = 0.1;
 
 /// Relative change of the start in the second run: the last digits of a start can decide where a line feeds the motion.
 const OF_START: f64 = 4.0 * f64::EPSILON;
 
-/// Relative changes of speeds by which the second run shows how rounding grows: 64 times what rounding does to them.
+/// Relative changes of speeds by which the second run shows the growth of rounding errors: 64 times their rounding.
 const NOISE: f64 = 64.0 * f64::EPSILON;
 
-/// Where rows go.
+/// Receiver of rows.
 type Sink<'a> = dyn FnMut(&Trajectory) -> Flow + 'a;
 
-/// Keeps some of a run's rows, and compares them with those of a second run.
+/// Error estimate of a run, by comparison of some of its rows with a second run.
 ///
-/// The error of a step is about in proportion to the tolerance, so the second run, with a hundred times the tolerance, is
-/// off by far more than the first: ten times their difference is an estimate on the safe side, and it is never below a
-/// tenth of the tolerance. Steps and rows of the second run are others, so that no event is located in the same step of
-/// both. Its machine has inertias, forces and force lines that are off by some roundings, and its speeds are changed at
-/// random by 64 times what rounding does to them, so that a motion that magnifies rounding shows by how much. Where the
-/// motion is sensitive to its last digits (flanks that rattle, loads just at a breakaway) both runs differ by what that
-/// makes of them.
+/// The error of a step is about proportional to the tolerance, so the second run, with a hundred times the tolerance,
+/// has a far larger error than the first: ten times their difference is a safe estimate, and it is never below a tenth
+/// of the tolerance. Steps and rows of the second run differ, so that no event is located in the same step of both.
+/// Inertias, forces and force lines of its machine are perturbed by a few roundings, and its speeds at random by 64
+/// times their rounding. If the motion amplifies rounding (flanks that rattle, loads just at a breakaway), the two runs
+/// show by how much.
 ///
-/// The estimate is at least the whole way where a run has located an event whose own condition does not hold there
-/// ([`Outcome::unmet`]), or where the second run ends otherwise.
+/// The estimate is at least the whole motion if an event was located at which its condition does not hold
+/// ([`Outcome::unmet`]), or if the second run ends differently.
 ///
 /// ```
 /// use taut::case::{Case, TEMPLATE};
@@ -67,7 +66,7 @@ type Sink<'a> = dyn FnMut(&Trajectory) -> Flow + 'a;
 /// ```
 #[derive(Debug, Clone)]
 pub struct ErrorEstimate {
-    /// Columns of the ways that are compared, and what makes lengths at the belt of them.
+    /// Columns of the compared positions, each with the factor that converts it to a length at the belt.
     ways: Vec<(String, f64)>,
     every: f64,
     until: f64,
@@ -75,7 +74,7 @@ pub struct ErrorEstimate {
     rows: u64,
     /// Time of each row kept.
     times: Vec<f64>,
-    /// Its ways at the belt, one row after the other.
+    /// Its positions at the belt, row after row.
     kept: Vec<f64>,
 }
 
@@ -113,8 +112,8 @@ impl ErrorEstimate {
         self.rows += block.len() as u64;
     }
 
-    /// Runs it again with another tolerance and compares; `flow` is asked now and then whether to go on. None where it
-    /// said no.
+    /// Repeats the run with another tolerance and compares. Calls `flow` from time to time; returns `None` if that
+    /// stops the run.
     pub fn finish(
         self,
         machine: &Machine,
@@ -156,7 +155,7 @@ impl ErrorEstimate {
         flow: &mut dyn FnMut() -> Flow,
         again: &mut dyn FnMut(&mut Sink) -> Result<Outcome>,
     ) -> Result<Option<PositionError>> {
-        // An early end is compared as far as it came.
+        // A run that ended early is compared up to its end.
         let until = outcome.ending.time().unwrap_or(self.until);
         let (mut apart, mut way, mut largest): (f64, f64, f64) = (0.0, 0.0, 0.0);
         let width = self.ways.len();
@@ -186,7 +185,7 @@ impl ErrorEstimate {
             interrupted |= flow() == Flow::Stop;
             if interrupted { Flow::Stop } else { Flow::Continue }
         })?;
-        // What is far from the origin is rounded where it is put out.
+        // Output far from the origin is rounded.
         let mut value = (SAFETY * apart + 2.0 * f64::EPSILON * largest).max(LEAST * tolerance);
         if outcome.unmet > 0 || second.unmet > 0 || !ends_alike(outcome.ending, second.ending) {
             value = value.max(way);
@@ -195,20 +194,20 @@ impl ErrorEstimate {
     }
 }
 
-/// Rows of the second run for each that is compared, where the first run has `stride` rows for each: log₂ of the ratio
-/// of the two numbers is as far as possible from a whole number.
+/// Rows of the second run per compared row, if the first run has `stride`: log₂ of the ratio of the two numbers is as
+/// far as possible from a whole number.
 fn rows_between(stride: u64) -> u64 {
     let off = |rows: &u64| ((stride as f64 / *rows as f64).log2().rem_euclid(1.0) - 0.5).abs();
     ROWS.into_iter().min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(ROWS[0])
 }
 
-/// True if two runs end in the same way; one that was asked to stop says nothing of another.
+/// True if two runs end alike, or one of them was interrupted.
 fn ends_alike(first: Ending, second: Ending) -> bool {
     let is_stopped = |ending| matches!(ending, Ending::Interrupted { .. });
     is_stopped(first) || is_stopped(second) || std::mem::discriminant(&first) == std::mem::discriminant(&second)
 }
 
-/// A column of ways, and its lever.
+/// A column of positions, and its lever.
 struct Way<'a> {
     values: &'a [f64],
     lever: f64,
@@ -221,7 +220,7 @@ impl Way<'_> {
     }
 }
 
-/// The columns of these ways.
+/// The columns of these positions.
 fn columns<'a>(ways: &[(String, f64)], block: &'a Trajectory) -> Vec<Way<'a>> {
     ways.iter().map(|(name, lever)| Way { values: block.get(name).unwrap_or(&[]), lever: *lever }).collect()
 }
@@ -278,8 +277,8 @@ mod tests {
         }
     }
 
-    /// Where every third row was compared, both runs had the same steps: a drawn machine like this one was off by 13 nm
-    /// with 2200 rows where 11 nm were stated, and with 100 rows 840 nm.
+    /// With every third row compared, both runs had the same steps: a random machine like this one had an error of 13
+    /// nm with 2200 rows, and of 840 nm with 100 rows, where 11 nm were stated.
     #[test]
     fn an_estimate_did_not_depend_on_the_number_of_rows() {
         let points = vec![[0.034068, -7.7184], [0.071573, 11.963], [0.13486, 9.8118], [0.23144, 3.7546]];

@@ -1,4 +1,4 @@
-//! Quantities followed with a run, and the variables by which they are differentiated.
+//! Quantities recorded with a run, and the variables with respect to which they are differentiated.
 
 use crate::mechanism::{Mechanism, Shown, State};
 use crate::plan::Experiment;
@@ -24,14 +24,14 @@ pub enum Variable {
         /// w₀, w₁, w₂
         weights: [f64; 3],
     },
-    /// All changes of all inputs come later by so many seconds per unit of it. Where one falls on a row, the derivative
-    /// is that towards later ones.
+    /// Delay of all changes of all inputs, s per unit of the variable. The derivative at a row on such a change is that
+    /// towards later changes.
     Delay(f64),
-    /// So much is added to the input of a drive per unit of it, from the time on, s, at which the input begins.
+    /// Offset of the input of a drive per unit of the variable, from the time, s, at which the input begins.
     Offset {
         /// The drive.
         drive: usize,
-        /// What is added per unit of the variable.
+        /// Change of the input per unit of the variable.
         unit: f64,
         /// From then on, s.
         from: f64,
@@ -49,7 +49,7 @@ impl Variable {
 /// The quantity that is differentiated.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Differentiated {
-    /// A column of the run: of way, speed, stretch, force, current, voltage or input.
+    /// A column of the run: position, speed, elongation, force, current, voltage or input.
     Shown(Shown),
     /// The acceleration of a body.
     Acceleration(usize),
@@ -62,7 +62,7 @@ pub struct Sensitivities {
     pub values: Vec<Vec<f64>>,
     /// Their derivatives, by output, then by variable.
     pub columns: Vec<Vec<Vec<f64>>>,
-    /// Changes of mode on the way.
+    /// Number of mode changes.
     pub events: u64,
 }
 

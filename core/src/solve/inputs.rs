@@ -7,9 +7,9 @@ use crate::signal::{DEGREE, Piece, Signal};
 /// One polynomial for each input, from `start` to `end`; what is not there is zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Pieces {
-    /// Where they begin, s; powers count from here.
+    /// Begin of the pieces, s; powers count from here.
     pub start: f64,
-    /// Where the first of them ends, s.
+    /// End of the first piece, s.
     pub end: f64,
     /// u_i(t) = Σ c_ik (t − start)ᵏ.
     pub coefficients: [[f64; DEGREE + 1]; DRIVES],
@@ -60,8 +60,8 @@ impl Pieces {
         shifted
     }
 
-    /// The same with one input at the nearest multiple of `step`, up to where another one becomes the nearest, or to
-    /// `until`: what a driver of microsteps makes of a position.
+    /// These pieces with one input rounded to a multiple of `step`, as by a driver of microsteps, up to the time at
+    /// which another multiple becomes the nearest, or to `until`.
     pub fn stepped(&self, input: usize, step: f64, until: f64) -> Self {
         let powers = &self.coefficients[input];
         let at = |tau: f64| powers.iter().rev().fold(0.0, |sum, c| sum * tau + c);
@@ -100,7 +100,7 @@ impl Pieces {
     }
 }
 
-/// How far ahead a command is looked at to know its microstep, s: much less than any driver takes for one.
+/// Time ahead at which a command is evaluated to find its microstep, s: much less than a microstep takes.
 const AHEAD: f64 = 1e-9;
 
 /// The first time at which a polynomial is beyond `level`, above it or below it by `side`: where `within` begins, if it
@@ -110,7 +110,7 @@ fn first_beyond(powers: &[f64; DEGREE + 1], level: f64, side: f64, within: std::
     if length <= 0.0 {
         return None;
     }
-    // What is left up to the level, over the share of `within`.
+    // Remainder up to the level, over the fraction of `within`.
     let mut left = Pieces::shifted(powers, within.start);
     left[0] -= level;
     let mut scale = -side;

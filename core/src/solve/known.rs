@@ -12,7 +12,7 @@ impl Known {
         self.0.clear();
     }
 
-    /// The list of what is of this type, empty where there is none yet: modes of a kernel, or their derivatives.
+    /// The list of this type, created empty if missing: modes of a kernel, or their derivatives.
     pub(super) fn list<T: Send + 'static>(&mut self) -> &mut Vec<T> {
         let index = self.0.iter().position(|list| list.is::<Vec<T>>()).unwrap_or_else(|| {
             self.0.push(Box::new(Vec::<T>::new()));

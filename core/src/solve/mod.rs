@@ -55,7 +55,7 @@ pub enum Solver {
     Exact,
     /// Collocation with steps by their error between located events: any friction law, spans that follow the cart.
     General {
-        /// About what positions at the belt are off by, m.
+        /// Approximate error of positions at the belt, m.
         tolerance: f64,
     },
     /// The paper's Table 3 with a fixed step: a reproduction, not a recommendation.
@@ -68,7 +68,7 @@ pub enum Solver {
 }
 
 impl Solver {
-    /// The general solver with the default tolerance, a nanometre; [`ErrorEstimate`] says how far any run is off.
+    /// The general solver with the default tolerance, a nanometre; [`ErrorEstimate`] estimates the error of a run.
     pub const GENERAL: Self = Self::General { tolerance: 1e-9 };
 
     /// The solver for this stage: the exact one where it can be.
@@ -92,7 +92,7 @@ pub enum Method {
     DormandPrince5,
 }
 
-/// A body that starts to slide, stops, or turns back, or another part that begins to do something else.
+/// A change of mode: a body that starts to slide, stops or reverses, or another part that changes its state.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Event {
     /// When, s.
@@ -122,7 +122,7 @@ impl Event {
     /// Adds it to `events`, unless nothing that shows has changed. A part other than a body that passes through a state
     /// without staying there goes straight.
     fn note(mut self, events: &mut Vec<Event>) {
-        // A body that is at once what it was before has done nothing, and one that stops and goes on at once, turned.
+        // A body that returns to its state at once has not changed; one that stops and starts at once has reversed.
         let at_once = |e: &Event| self.time - e.time <= 4.0 * f64::EPSILON * self.time;
         let last = events.iter().rposition(|e| e.part == self.part).filter(|&last| at_once(&events[last]));
         if let Some(last) = last.filter(|&last| self.body().is_some() && events[last].from.code() == self.to.code()) {
@@ -145,8 +145,8 @@ impl Event {
     }
 }
 
-/// A decision that lies within rounding: whether a body at rest breaks away whose load is its breakaway, or one that
-/// rounding turns back again and again rests. Numbers that differ in their last bit may have it go on otherwise.
+/// A decision within rounding: a body at rest whose load equals its breakaway, or a body that rounding reverses
+/// repeatedly. Parameters that differ in their last bit may lead to the other decision.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tie {
     /// When, s.
@@ -181,7 +181,7 @@ pub enum Ending {
         /// Time reached, s.
         time: f64,
     },
-    /// The cart left its travel, and nothing stands there to stop it.
+    /// The cart left its travel, which has no end stops.
     LeftTravel {
         /// Time reached, s.
         time: f64,
@@ -191,14 +191,14 @@ pub enum Ending {
         /// Time reached, s.
         time: f64,
     },
-    /// Something in it changes so fast that at the pace so far it would need more than 1e10 steps.
+    /// The run would need more than 1e10 steps at its present rate.
     TooStiff {
         /// Time reached, s.
         time: f64,
         /// Steps forecast for the whole run.
         steps: f64,
     },
-    /// The receiver of the results asked to stop.
+    /// The receiver of the results stopped the run.
     Interrupted {
         /// Time reached, s.
         time: f64,
@@ -236,13 +236,13 @@ impl fmt::Display for Ending {
     }
 }
 
-/// The ending of [`Simulator::advance`] and [`Dynamics::settle`] that cannot go on.
+/// The error of [`Simulator::advance`] and [`Dynamics::settle`] if they cannot continue.
 impl std::error::Error for Ending {}
 
 /// The cost of a run, in pieces of work rather than seconds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Cost {
-    /// Rows put out.
+    /// Number of rows.
     pub samples: u64,
     /// Pieces of the input.
     pub pieces: u64,
@@ -252,7 +252,7 @@ pub struct Cost {
     pub propagators: u64,
     /// Steps taken: products of a propagator and a state, or steps of a fixed-step method.
     pub steps: u64,
-    /// Intervals looked at for an event.
+    /// Intervals examined for an event.
     pub looks: u64,
     /// Taylor series of the state expanded.
     pub series: u64,
@@ -265,22 +265,22 @@ pub struct Cost {
 pub struct Outcome {
     /// Every stick, slip and reversal, in order.
     pub events: Vec<Event>,
-    /// Decisions within rounding, as far as the exact solver knows of them; of many the first ones.
+    /// The first decisions within rounding that the exact solver detected.
     pub ties: Vec<Tie>,
     /// Its ending.
     pub ending: Ending,
     /// Its cost.
     pub cost: Cost,
-    /// By how much positions may be off: of the exact solver a bound of what rounding does under the inputs that were
-    /// given, whoever gave them; the general solver's is estimated by [`ErrorEstimate`]. Table 3 with
-    /// a fixed step has none, nor has a run without rows of a machine in which errors can grow.
+    /// Bound of the position error: for the exact solver that of rounding, for given inputs; for the general solver
+    /// estimated by [`ErrorEstimate`]. `None` for Table 3, and for a run without rows of a machine in which errors can
+    /// grow.
     pub error: Option<PositionError>,
     /// Events of the general solver whose own condition (a speed of zero, a load at its breakaway, a limit at its
     /// level) does not hold at their time: found too late to be located. A run that has any is not to be relied on.
     pub unmet: u64,
 }
 
-/// By how much positions at the belt (r φ₁, x, r φ₃) may be off.
+/// Bound of the error of positions at the belt (r φ₁, x, r φ₃).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PositionError {
     /// Bound of the error, m.
@@ -403,7 +403,7 @@ fn nothing_mounted() -> Error {
 /// # Ok::<(), taut::Error>(())
 /// ```
 pub fn simulate(machine: &Machine, experiment: &Experiment, solver: Solver) -> Result<Solution> {
-    // What does not fit at once is asked for as it comes.
+    // Longer runs allocate more rows as needed.
     let rows = Grid::new(experiment.every, experiment.until).intervals().min(1 << 20) as usize + 1;
     let mut trajectory = Trajectory::default();
     let outcome = stream(machine, experiment, solver, &mut |block| {

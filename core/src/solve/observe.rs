@@ -1,4 +1,4 @@
-//! A run seen without rows: what an [`Observe`]r is shown of the motion between events, changes of the input and rows.
+//! Observation of a run without rows: the motion between events, changes of the input and rows, for an [`Observe`]r.
 
 use super::{Detail, Flow};
 use crate::mechanism::{BODIES, DRIVES, Form, Layout, Mechanism, Mode, Shown, State};
@@ -8,7 +8,7 @@ use crate::trajectory::Trajectory;
 /// Number of quantities in a [`Reading`].
 pub const QUANTITIES: usize = 20;
 
-/// So many of them are enough for most machines, whose readings end with zeros: these are not computed.
+/// Number of readings that suffices for most machines; the remaining ones are zero and not computed.
 pub(super) const FEW: usize = 12;
 
 /// The readings of a run at one instant, in the order of [`Mechanism::readings`], which of an axis is that of
@@ -27,7 +27,7 @@ pub mod reading {
     pub const FORCE: usize = 5;
     /// Motor current, A.
     pub const CURRENT: usize = 8;
-    /// φ̇_r, rad/s: the rotor's speed seen from behind the gear.
+    /// φ̇_r, rad/s: speed of the rotor behind the gear.
     pub const ROTOR_SPEED: usize = 9;
     /// Voltage at the motor's terminals, V; of a stepper the commanded position, m.
     pub const VOLTAGE: usize = 10;
@@ -47,7 +47,7 @@ pub(super) fn reading_of(few: bool, mut value: impl FnMut(usize) -> f64) -> Read
     reading
 }
 
-/// A part of a run with one mode and no jump of the input in it, told by its ends.
+/// A part of a run with one mode and no jump of the input, described by its ends.
 #[derive(Debug, Clone, Copy)]
 pub struct Gap<'a> {
     /// Where it begins, s.
@@ -58,7 +58,7 @@ pub struct Gap<'a> {
     pub from: &'a Reading,
     /// The reading at its end.
     pub to: &'a Reading,
-    /// By how much a quantity can be off the straight line between the two; infinite where no bound is known.
+    /// Largest deviation of a quantity from the straight line between the two; infinite if no bound is known.
     pub bow: &'a Reading,
     /// The states of all parts.
     pub mode: &'a Mode,
@@ -81,8 +81,8 @@ impl Gap<'_> {
     }
 
     widest! {
-        /// Whether the magnitude of any quantity is above the first of `factors` times its height at either end, and whether
-        /// it can be above the second times that within.
+        /// True if the magnitude of any quantity exceeds the first of `factors` times its height at either end; true if
+        /// it can exceed the second times that within.
         pub fn rises_above(&self, heights: &Reading, factors: [f64; 2]) -> (bool, bool)
             = rises_above_by_any, rises_above_by_avx2;
     }
@@ -126,10 +126,10 @@ impl Gap<'_> {
 pub struct Gaps(u64);
 
 impl Gaps {
-    /// None of them.
+    /// No gap.
     pub const NONE: Self = Self(0);
 
-    /// The first ones, so many.
+    /// The first `count` gaps.
     pub fn first(count: usize) -> Self {
         Self(if count < 64 { (1 << count) - 1 } else { u64::MAX })
     }
@@ -151,18 +151,18 @@ impl Gaps {
     }
 }
 
-/// A part of a run with one mode and no jump of the input in it, told by what is read at even intervals.
+/// A part of a run with one mode and no jump of the input, described by readings at even intervals.
 #[derive(Debug, Clone, Copy)]
 pub struct Stretch<'a> {
     /// Where it begins, s.
     pub begin: f64,
-    /// How far apart readings are, s; 0 for a single instant.
+    /// Interval between readings, s; 0 for a single instant.
     pub interval: f64,
-    /// The readings: at its beginning, and behind each gap, of which there are at most 64.
+    /// The readings: at its beginning, and after each of at most 64 gaps.
     pub readings: &'a [Reading],
     /// The largest magnitudes of each quantity in them.
     pub most: Reading,
-    /// By how much a quantity can be off the straight line between two of them; infinite where no bound is known.
+    /// Largest deviation of a quantity from the straight line between two of them; infinite if no bound is known.
     pub bow: &'a Reading,
     /// The states of all parts.
     pub mode: &'a Mode,
@@ -235,16 +235,16 @@ fn most_of<const Q: usize>(readings: &[Reading]) -> Reading {
     most
 }
 
-/// The gaps of a stretch that an observer wants to see closer.
+/// The gaps of a stretch that an observer examines more closely.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Closer {
     /// Every gap, at once, if [`Observe::pass`] says so.
     Now,
-    /// These gaps, later, when [`Observe::pass`] is asked: it seeks extremes, and there may be greater ones by then.
+    /// These gaps, later, if [`Observe::pass`] says so: it searches extremes, and greater ones may be known by then.
     Later(Gaps),
 }
 
-/// By how much a line from −`half` to `half` with a parabola of height `bow` on it rises above zero:
+/// Largest height above zero of a line from −`half` to `half` plus a parabola of height `bow`:
 /// max over s of half (2s − 1) + 4 bow s (1 − s).
 #[inline(always)]
 fn rise(half: f64, bow: f64) -> f64 {
@@ -293,7 +293,7 @@ impl Curve {
         let ([a0, a1, a2, a3], [b0, b1, b2, b3]) = (from, to);
         let [.., c4, c5, c6, c7] = &mut terms;
         for q in 0..Q {
-            // What the first four terms leave at the other end, by order.
+            // Remainder of the first four terms at the other end, by order.
             let r0 = b0[q] - (a0[q] + a1[q] + a2[q] + a3[q]);
             let r1 = b1[q] - (a1[q] + 2.0 * a2[q] + 3.0 * a3[q]);
             let r2 = b2[q] - (a2[q] + 3.0 * a3[q]);
@@ -360,7 +360,7 @@ pub struct Polynomial(pub [f64; TERMS]);
 /// C(7, k)
 const BINOMIAL: [f64; TERMS] = [1.0, 7.0, 21.0, 35.0, 35.0, 21.0, 7.0, 1.0];
 
-/// Places at which a polynomial is looked at first: it swings no faster than these tell.
+/// Number of places at which a polynomial is evaluated first; it does not oscillate faster than these resolve.
 const LOOKS: usize = 8;
 
 impl Polynomial {
@@ -386,7 +386,7 @@ impl Polynomial {
         high.max(-low)
     }
 
-    /// Bounds of its values on 0..1, in the same way.
+    /// Bounds of its values on 0..1, likewise.
     #[inline]
     pub fn range(&self) -> (f64, f64) {
         // Each step adds neighbours: Pascal's triangle.
@@ -404,7 +404,7 @@ impl Polynomial {
         self.0[0].abs() > self.0[1..].iter().map(|c| c.abs()).sum()
     }
 
-    /// Where between `from` and `to` it is greatest, and its value there.
+    /// Position between `from` and `to` of the greatest value, and that value.
     pub fn greatest(&self, from: f64, to: f64) -> (f64, f64) {
         let place = |k: usize| if k == LOOKS { to } else { from + (to - from) * k as f64 / LOOKS as f64 };
         let values: [f64; LOOKS + 1] = std::array::from_fn(|k| self.at(place(k)));
@@ -414,7 +414,7 @@ impl Polynomial {
                 best = (place(k), value);
             }
         }
-        // Where the slope changes its sign from one place to the next there is a top between them.
+        // A maximum lies between two places at which the slope has different signs.
         let slopes: [f64; LOOKS + 1] = std::array::from_fn(|k| self.slope(place(k)));
         let mut top = best;
         for k in (0..LOOKS).filter(|&k| slopes[k] > 0.0 && slopes[k + 1] < 0.0) {
@@ -426,8 +426,8 @@ impl Polynomial {
         top
     }
 
-    /// The top between two places, of which the lower has a rising slope and the higher a falling one:
-    /// Newton's method on the slope, in a bracket that it keeps by the slope's sign.
+    /// Maximum between two points, with a positive slope at the lower and a negative one at the higher: bracketed
+    /// Newton's method on the slope.
     fn top(&self, [mut low, mut high]: [f64; 2]) -> (f64, f64) {
         let mut s = 0.5 * (low + high);
         for _ in 0..60 {
@@ -448,7 +448,7 @@ impl Polynomial {
         (s, self.at(s))
     }
 
-    /// Where between `from` and `to` its magnitude is largest, and its value there.
+    /// Position between `from` and `to` of the largest magnitude, and the value there.
     pub fn largest(&self, from: f64, to: f64) -> (f64, f64) {
         let (high, low) = (self.greatest(from, to), self.negative().greatest(from, to));
         if low.1 > high.1 { (low.0, -low.1) } else { high }
@@ -501,31 +501,30 @@ impl Polynomial {
     }
 }
 
-/// Whoever is shown a run as it goes on: every instant of it, and not only those of its rows.
+/// An observer of every instant of a run, not only of its rows.
 ///
-/// The run comes in [`Stretch`]es, each beginning where the last one ended; before and after a jump of the input or a
-/// change of mode are two stretches' ends. Whoever wants to know what is between readings is shown it in smaller gaps or
-/// as a [`Curve`].
+/// The run comes in [`Stretch`]es, each beginning where the last one ended; a jump of the input or a change of mode
+/// separates two stretches. Between readings, the observer can request smaller gaps or a [`Curve`].
 pub trait Observe {
-    /// Takes the next stretch; says which of its gaps it wants to see closer.
+    /// Takes the next stretch; returns the gaps to examine more closely.
     fn stretch(&mut self, stretch: &Stretch) -> Closer {
         let _ = stretch;
         Closer::Now
     }
 
-    /// Takes a gap of a stretch that it wanted to see closer, or one within such a gap; says whether it wants to see
-    /// closer into this one.
+    /// Takes a gap that was to be examined more closely, or one within such a gap; returns true to continue into this
+    /// one.
     fn pass(&mut self, gap: &Gap) -> bool;
 
-    /// Takes what is in a gap that it wanted to see closer.
+    /// Takes the motion within a requested gap.
     fn see(&mut self, curve: &Curve);
 
-    /// True if it wants to be shown the motion at all; if not, only the end is told.
+    /// True if it observes the motion; otherwise it is notified of the end only.
     fn follows(&self) -> bool {
         true
     }
 
-    /// True if it wants to see all of the motion closely, whatever a bound says.
+    /// True if it examines the whole motion closely, whatever the bounds.
     fn sees_all(&self) -> bool {
         false
     }
@@ -538,7 +537,7 @@ pub trait Observe {
 #[derive(Debug, Clone)]
 pub(super) struct Readout {
     pub(super) forms: [Form; QUANTITIES],
-    /// Where a way is read off that is counted from its origin: the quantity, the body, its factor.
+    /// Readings of positions relative to the origin: the quantity, the body, its factor.
     ways: Vec<(usize, usize, f64)>,
     /// Limits of voltages and currents: what they hold is not beyond them by one bit.
     limits: Vec<(usize, f64)>,
@@ -580,8 +579,7 @@ impl Readout {
         Self { forms, ways, limits, few: mechanism.readings.len() <= FEW }
     }
 
-    /// By how much readings can be off straight lines where no more is known than their forms: not at all those that
-    /// are held.
+    /// Largest deviation of readings from straight lines if only their forms are known: zero for those that are held.
     pub(super) fn unknown_bow(&self) -> Reading {
         let is_held = |q: usize| {
             let Form { constant, .. } = self.forms[q];
@@ -590,7 +588,7 @@ impl Readout {
         std::array::from_fn(|q| if is_held(q) { 0.0 } else { f64::INFINITY })
     }
 
-    /// The values of the forms, with ways from their origin and limits as they are.
+    /// The values of the forms, with positions relative to their origin, and limits applied.
     #[inline]
     pub(super) fn placed(&self, mut reading: Reading, origin: &[f64; BODIES]) -> Reading {
         for &(q, body, factor) in &self.ways {
@@ -602,7 +600,7 @@ impl Readout {
         reading
     }
 
-    /// The readings in a state in the solver's coordinates, whose ways are counted from `origin`, under `input`.
+    /// The readings in a state in the solver's coordinates, whose positions are relative to `origin`, under `input`.
     pub(super) fn read(
         &self,
         layout: &Layout,
@@ -615,7 +613,7 @@ impl Readout {
     }
 }
 
-/// Where a run goes: blocks of rows to a receiver, and all that is between them to an observer.
+/// Output of a run: blocks of rows to a receiver, the motion between them to an observer.
 pub(crate) struct Output<'a> {
     pub(crate) detail: Detail,
     pub(crate) sink: &'a mut dyn FnMut(&Trajectory) -> Flow,
@@ -651,8 +649,8 @@ mod tests {
         Polynomial(c)
     }
 
-    /// Where the best of nine places stood on a bend that opens upwards, Newton's method gave up there, and the peak was
-    /// 9e-8 of itself too low.
+    /// If the best of nine places was on a bend that opens upwards, Newton's method gave up there, and the peak was too
+    /// low by a relative 9e-8.
     #[test]
     fn a_top_beside_an_upward_bend_was_missed() {
         let mut random = Pcg64::new(5, 1);

@@ -1,8 +1,8 @@
-//! How fast a run gets on: whether it will end, and when to ask the receiver whether to go on.
+//! Progress of a run: whether it will end, and when to ask the receiver to continue.
 
 use super::Ending;
 
-/// Steps or looks after which the receiver of the rows is asked again, whether there are new rows or not.
+/// Number of steps or examined intervals after which the receiver is asked to continue, with or without new rows.
 pub(super) const STEPS_BETWEEN_QUESTIONS: u64 = 4096;
 
 /// Steps before a forecast is made, and the most that a run may need: some minutes to an hour.
@@ -20,7 +20,7 @@ pub(super) fn most_events(time: f64) -> f64 {
     f64::min(EVENTS_AT_LEAST + EVENTS_PER_SECOND * time, EVENTS_AT_MOST)
 }
 
-/// Where a run stood when it was looked at last.
+/// Progress of a run at the last check.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Pace {
     steps: u64,
@@ -28,12 +28,12 @@ pub(super) struct Pace {
 }
 
 impl Pace {
-    /// From so many steps at this time on.
+    /// Starts at this number of steps and this time.
     pub(super) fn since(steps: u64, time: f64) -> Self {
         Self { steps, time }
     }
 
-    /// The word for a run that at its pace since the last look would need more than [`MOST_STEPS`] steps.
+    /// The ending of a run that, at its pace since the last check, would need more than [`MOST_STEPS`] steps.
     pub(super) fn too_stiff(&mut self, steps: u64, time: f64, end: f64) -> Option<Ending> {
         if steps - self.steps < STEPS_BEFORE_FORECAST {
             return None;
@@ -41,7 +41,7 @@ impl Pace {
         let per_second = (steps - self.steps) as f64 / (time - self.time);
         let forecast = steps as f64 + per_second * (end - time);
         *self = Self { steps, time };
-        // Where no time has passed the forecast is infinite, or no number.
+        // If no time has passed, the forecast is infinite or NaN.
         (forecast.is_nan() || forecast > MOST_STEPS).then_some(Ending::TooStiff { time, steps: forecast })
     }
 }

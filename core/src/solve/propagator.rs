@@ -1,4 +1,4 @@
-//! Matrix exponentials: what a linear system does in a given time.
+//! Matrix exponentials: propagators of linear systems.
 //!
 //! A vector holds `R` quantities that move and, behind them, constants, `C` in all. A matrix has `R` rows and `C`
 //! columns and is kept by columns, so that its product with a vector is a chain of scaled vector additions that the
@@ -34,7 +34,7 @@ const SERIES: [(f64, usize); 4] = [(0.25, 12), (0.55, 15), (1.15, 19), (2.0, 23)
 /// Most terms of it.
 pub(crate) const SERIES_TERMS: usize = SERIES[SERIES.len() - 1].1 + 1;
 
-/// The order that ‖A‖ d, at most [`SERIES_REACH`], asks for.
+/// The order of the series for ‖A‖ d, at most [`SERIES_REACH`].
 pub(crate) fn series_order(reach: f64) -> usize {
     SERIES.iter().find(|(most, _)| reach <= *most).map_or(SERIES_TERMS - 1, |(_, order)| *order)
 }
@@ -203,7 +203,7 @@ impl<const R: usize, const C: usize> Matrix<R, C> {
         for (to, from) in out.column.iter_mut().zip(&other.column) {
             let mut sum = [0.0; R];
             for (column, &factor) in self.column.iter().zip(from) {
-                // What is stuck, and much of A itself, is zero.
+                // Rows of stuck bodies, and most entries of A, are zero.
                 if factor != 0.0 {
                     for (s, c) in sum.iter_mut().zip(column) {
                         *s += c * factor;
@@ -328,7 +328,7 @@ mod tests {
 
     #[test]
     fn rotation_by_doubling() {
-        // ż₀ = ω z₁, ż₁ = −ω z₀ turns by ω t; a constant drives z₂ = t.
+        // ż₀ = ω z₁, ż₁ = −ω z₀ rotates by ω t; a constant drives z₂ = t.
         let omega = 3.0;
         let mut a = Matrix::<3, 4>::zero();
         a.set(0, 1, omega);

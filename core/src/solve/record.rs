@@ -1,4 +1,4 @@
-//! From states to the columns that a user sees, block by block.
+//! Conversion of states to output columns, block by block.
 
 mod columns;
 mod sheet;
@@ -13,7 +13,7 @@ use columns::{Block, Columns};
 use sheet::Sheets;
 use std::sync::Arc;
 
-/// Rows handed on at a time; small enough to stay in the processor's cache.
+/// Rows passed on at a time; small enough to stay in the processor's cache.
 const BLOCK: usize = 256;
 
 /// Room for a state with the inputs behind it, whatever the mechanism; a multiple of four.
@@ -48,26 +48,26 @@ pub(crate) struct Recorder<'a> {
     grid: Grid,
     pub(crate) detail: Detail,
     columns: Columns,
-    /// Where the inputs stand in a row.
+    /// Indices of the inputs in a row.
     inputs: [usize; DRIVES],
-    /// How many rows there are; those behind the ones that are written out are like the last of them.
+    /// Number of rows; those beyond the stored ones equal the last stored one.
     count: usize,
     written: usize,
-    /// Where the last row of the block before stands.
+    /// Index of the last row of the previous block.
     last: usize,
     segments: Vec<Segment>,
     /// Which mode the last one is of.
     taken: Option<u64>,
-    /// One for each row, or none at all where the linear equations say everything.
+    /// One for each row; empty if the linear equations determine everything.
     extra: Vec<Extra>,
     /// Extra values of the last row of the previous block.
     last_extra: Option<Extra>,
     sheets: Sheets,
     block: Trajectory,
     sink: &'a mut dyn FnMut(&Trajectory) -> Flow,
-    /// Whoever sees what is between the rows, too.
+    /// Observer of the motion between rows.
     pub(crate) observer: Option<&'a mut dyn Observe>,
-    /// Rows handed on.
+    /// Number of rows passed on.
     pub(crate) rows: u64,
     /// The last answer of the receiver.
     pub(crate) flow: Flow,
@@ -117,7 +117,7 @@ impl<'a> Recorder<'a> {
         self.rows + self.count as u64
     }
 
-    /// Rows from here on are in this mode; `taken` tells one from another.
+    /// Following rows are in this mode; `taken` identifies it.
     #[inline]
     pub(crate) fn segment(&mut self, taken: u64, coordinates: &Coordinates, mode: &Mode) {
         if self.detail != Detail::None && self.taken != Some(taken) {
@@ -147,7 +147,7 @@ impl<'a> Recorder<'a> {
         self.columns.rows(self.count)
     }
 
-    /// Takes so many rows out of the room for them.
+    /// Takes `count` rows from the buffer.
     #[inline]
     pub(crate) fn take(&mut self, rows: usize) {
         self.count += rows;
@@ -167,13 +167,13 @@ impl<'a> Recorder<'a> {
         }
     }
 
-    /// Adds the last row so many times more, or until the receiver wants no more; says how often. Nothing but time goes
-    /// on.
+    /// Repeats the last row `times` times, with increasing time, or until the receiver stops; returns the number of
+    /// rows.
     pub(crate) fn repeat(&mut self, times: u64) -> u64 {
         let mut left = times;
         while left > 0 && self.flow == Flow::Continue {
             if self.count == 0 {
-                // The last row has just been handed on: its numbers stand yet.
+                // The last row has just been passed on, and its values are still stored.
                 self.columns.begin_with(self.last);
                 self.written = 1;
                 self.extra.extend(self.last_extra);
@@ -210,12 +210,12 @@ impl<'a> Recorder<'a> {
         self.push(&row);
     }
 
-    /// Counts so many rows that nobody is to see.
+    /// Counts rows without output.
     pub(crate) fn skip(&mut self, rows: u64) {
         self.rows += rows;
     }
 
-    /// Hands on what there is, be it nothing, to hear whether to go on.
+    /// Passes on the present rows, even none, and asks the receiver to continue.
     pub(crate) fn ask(&mut self) {
         if self.count > 0 {
             self.hand_on();
@@ -253,7 +253,7 @@ impl<'a> Recorder<'a> {
         }
         self.last = self.written - 1;
         (self.count, self.written) = (0, 0);
-        // What comes next is in the mode of the last.
+        // The following rows are in the mode of the last segment.
         self.segments.drain(..self.segments.len().saturating_sub(1));
         self.segments.iter_mut().for_each(|segment| segment.start = 0);
         self.last_extra = self.extra.last().copied();

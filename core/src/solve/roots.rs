@@ -1,9 +1,9 @@
-//! The first place in (0, 1] where a polynomial becomes negative.
+//! The first point in (0, 1] at which a polynomial becomes negative.
 //!
-//! Most are told by their coefficients: where c₀ and the negative ones add up to zero or more, Σ c_k sᵏ does not fall;
-//! where the coefficients change their sign once, there is one root above zero (Descartes), and the sign at the end
-//! says whether it lies in the interval. Of others the first fall is approached in steps that cannot pass it, and what
-//! all but touches zero is told by Bernstein coefficients.
+//! Most cases follow from the coefficients: if c₀ plus all negative ones is not negative, Σ c_k sᵏ does not fall; if
+//! the coefficients change their sign once, there is one positive root (Descartes), and the sign at the end shows if it
+//! is in the interval. Otherwise the first fall is approached in steps that cannot pass it, and near contacts with zero
+//! are resolved by Bernstein coefficients.
 
 use super::propagator::SERIES_TERMS;
 use crate::solve::widest::widest;
@@ -25,7 +25,7 @@ fn value_and_slope(c: &[f64], s: f64) -> (f64, f64) {
     (even + s * odd, 2.0 * s * even_slope + odd + 2.0 * q * odd_slope)
 }
 
-/// The first s in (0, 1] at which Σ c_k sᵏ, not negative at 0, turns negative; `None` if it stays.
+/// The first s in (0, 1] at which Σ c_k sᵏ, not negative at 0, becomes negative; `None` if there is none.
 pub(crate) fn first_fall(c: &[f64]) -> Option<f64> {
     let (&c0, rest) = c.split_first()?;
     if c0 < 0.0 {
@@ -72,10 +72,10 @@ fn least(c: &[f64]) -> f64 {
     (sums[0] + sums[2]) + (sums[1] + sums[3])
 }
 
-/// Steps after which a polynomial that all but touches zero is left to another way.
+/// Steps after which a polynomial that nearly touches zero is passed to Bernstein coefficients.
 const MOST_STEPS: usize = 12;
 
-/// The first fall of Σ c_k sᵏ, positive at 0, by steps that cannot pass it; none where it takes too many.
+/// The first fall of Σ c_k sᵏ, positive at 0, by steps that cannot pass it; `None` if that takes too many.
 ///
 /// With |p″| ≤ B = Σ k (k − 1) |c_k|, p(s + δ) ≥ p + p′ δ − ½ B δ² stays positive up to
 ///
@@ -83,8 +83,7 @@ const MOST_STEPS: usize = 12;
 /// δ = 2p/(√(p′² + 2 B p) − p′) = (√(p′² + 2 B p) + p′)/B
 /// ```
 ///
-/// of which the first holds its digits where p falls, the second where it rises. Near a fall these steps are those of
-/// Newton's method.
+/// of which the first is accurate where p falls, the second where it rises. Near a fall these are Newton steps.
 fn by_steps(c: &[f64]) -> Option<Option<f64>> {
     let mut bends = [0.0; 4];
     for (c, weights) in c.chunks(4).zip(&BENDS) {
@@ -103,7 +102,7 @@ fn by_steps(c: &[f64]) -> Option<Option<f64>> {
             return Some(Some(s));
         }
         s += by;
-        // What falls just at the end is told by the sign there.
+        // The sign at the end decides about a fall just there.
         if s >= 1.0 {
             return Some((c.iter().sum::<f64>() < 0.0).then_some(1.0));
         }
@@ -182,7 +181,7 @@ fn search<const N: usize>(c: &[f64], b: &[f64; N], low: f64, high: f64) -> Optio
         return None;
     }
     if changes <= 1 || high - low < NARROWEST {
-        // What only touches within a point is told by the sign at the end.
+        // The sign at the end decides about a contact within one point.
         return ends_below.then(|| polish(c, (low, b[0]), (high, b[N - 1])));
     }
     let (left, right) = halves(b);
@@ -204,7 +203,7 @@ fn halves_by_any<const N: usize>(b: &[f64; N]) -> ([f64; N], [f64; N]) {
             right[j] = 0.5 * (right[j] + right[j + 1]);
         }
     }
-    // What is left runs from the middle outwards.
+    // The left part runs from the middle outwards.
     (left, right)
 }
 

@@ -20,10 +20,10 @@ use crate::mechanism::{Body, Layout, Mechanism};
 /// one.
 const UNITS: f64 = 8.0;
 
-/// The run so far, as far as the bound needs it.
+/// Quantities of the run so far that the bound needs.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Rounding {
-    /// Where speeds and ways stand in the solver's state, with what they are at the belt.
+    /// Indices of speeds and positions in the solver's state, with their factors at the belt.
     places: Vec<[(usize, f64); 2]>,
     /// Φ, rad, up to `since`.
     phase: f64,
@@ -35,7 +35,7 @@ pub(super) struct Rounding {
 }
 
 impl Rounding {
-    /// Of a machine.
+    /// The bound for a machine.
     pub(super) fn new(layout: &Layout, mechanism: &Mechanism) -> Self {
         let place = |(body, part): (usize, &Body)| {
             // A length of the belt is what it is.
@@ -70,7 +70,7 @@ impl Rounding {
         self.since = time;
     }
 
-    /// The bound after so many steps, of a machine in which errors have grown to no more than `grown`, m.
+    /// The bound after `steps` steps, for a machine in which errors have grown to at most `grown`, m.
     pub(super) fn bound(&self, steps: u64, time: f64, (origin, grown): (f64, f64)) -> PositionError {
         let units = UNITS * (steps as f64 + self.phase);
         let steady = f64::EPSILON * units * (self.speed * time + self.way);

@@ -1,8 +1,8 @@
-//! The rules of events: how modes follow each other at one instant, whatever solver goes on between them.
+//! The rules of events: the succession of modes at one instant, for every solver.
 //!
-//! The consequence of a condition that falls is the mechanism's ([`Transition`]). Here stands in which order conditions
-//! are settled, what rounding is forgiven after a change, and how many changes there may be. A solver tells what it
-//! knows of its conditions ([`Between`]).
+//! The mechanism defines the consequence of a condition that falls ([`Transition`]). This module defines the order in
+//! which conditions are settled, the tolerance for rounding after a change, and the largest number of changes. A solver
+//! provides its conditions by [`Between`].
 
 use super::pace::most_events;
 use super::saved::{Pass, Passed};
@@ -20,11 +20,11 @@ pub(super) const MOMENT: f64 = 1e-12;
 /// Mode changes allowed at one instant.
 const CHANGES_AT_ONCE: usize = 100;
 
-/// Changes at one instant after which rounding is taken to turn a part back again and again: it then stays as it is.
+/// Changes of a part at one instant after which they are attributed to rounding, and the part keeps its state.
 const TURNS_AT_ONCE: usize = 20;
 
-/// A value that is zero but for rounding is within so many times its noise: where it is looked at, where its condition
-/// has just begun to hold, and what it may be below zero by where rounding moves its part back and forth.
+/// A value is zero but for rounding if it is within this multiple of its noise: when it is evaluated, when its
+/// condition has just begun to hold, and as the tolerance below zero of a part that rounding moves back and forth.
 pub(super) const NEAR: f64 = 2.0;
 pub(super) const BEGUN: f64 = 20.0;
 const BACK_AND_FORTH: f64 = 40.0;
@@ -33,15 +33,14 @@ const BACK_AND_FORTH: f64 = 40.0;
 #[derive(Debug, Clone)]
 pub(super) struct Rules {
     pub(super) mode: Mode,
-    /// How many leading Taylor coefficients of a sliding body's speed are zero by definition, because it starts from
-    /// rest: 1 where it is accelerated, 2 where the load has only just reached its friction. The same for all else that
-    /// is watched.
+    /// Number of leading Taylor coefficients of a sliding body's speed that are zero by definition, because it starts
+    /// from rest: 1 if it is accelerated, 2 if the load has only just reached its friction. Likewise for all other
+    /// guards.
     pub(super) fresh: [u8; Cause::KINDS],
     pub(super) is_fresh: bool,
-    /// By how much the load on a stuck body may pass its breakaway before it counts: what rounding can do to the load.
-    /// Without it a body that comes to rest just at its limit would chatter on the last bit. The same for all else that
-    /// is watched where it is zero but for rounding, and would count as wrong in either state. The place behind the
-    /// others stays zero.
+    /// Tolerance, from rounding of the load, by which the load on a stuck body may exceed its breakaway; without it a
+    /// body that comes to rest just at its limit would chatter on the last bit. Likewise for all other guards that are
+    /// zero but for rounding, and would be violated in either state. The last entry stays zero.
     pub(super) tolerance: [f64; Cause::KINDS + 1],
     /// True after a change of the input, when the rounding of loads on stuck bodies has to be evaluated anew.
     pub(super) at_edge: bool,
@@ -50,7 +49,7 @@ pub(super) struct Rules {
     pub(super) changes: usize,
     pub(super) events: Vec<Event>,
     pub(super) ties: Vec<Tie>,
-    /// How many events were handed on before those.
+    /// Number of events that were passed on before these.
     pub(super) handed_on: usize,
     pub(super) trouble: Option<Ending>,
 }
@@ -81,7 +80,7 @@ pub(super) trait Between {
     fn time(&self) -> f64;
     /// The time within which changes count as one instant, s.
     fn instant(&self) -> f64;
-    /// How many conditions the mode has.
+    /// Number of conditions of the mode.
     fn conditions(&self) -> usize;
     /// The consequence of the fall of the condition of this number.
     fn transition(&self, index: usize) -> &Transition;
@@ -89,12 +88,12 @@ pub(super) trait Between {
     fn known(&self, index: usize) -> Known;
     /// Known terms of a condition at the beginning of a mode, whose time is known to rounding, too.
     fn known_at_begin(&self, index: usize) -> Known;
-    /// Further tolerance for a condition that has just begun to hold: a solver that knows by their series which
-    /// conditions rise from zero needs nothing.
+    /// Further tolerance for a condition that has just begun to hold: zero for a solver whose series show which
+    /// conditions rise from zero.
     fn margin(&self, index: usize) -> f64;
     /// Looks at all conditions; false if each of them holds for certain.
     fn look(&mut self) -> bool;
-    /// True if a condition falls here, by the last look.
+    /// True if a condition falls here, by the last evaluation.
     fn falls(&mut self, index: usize) -> bool;
     /// The load on a body at rest that would go forward, or backward; gears carry as they do at rest.
     fn load(&self, body: usize, forward: bool) -> Load;
@@ -124,7 +123,7 @@ impl Rules {
         }
     }
 
-    /// How many leading Taylor coefficients of a condition's value are zero by definition.
+    /// Number of leading Taylor coefficients of a condition's value that are zero by definition.
     pub(super) fn fresh_order(&self, cause: Cause) -> usize {
         match cause {
             Cause::BreakForward(_) | Cause::BreakBackward(_) => 0,
@@ -132,7 +131,7 @@ impl Rules {
         }
     }
 
-    /// As plain numbers; those of a run that has ended early are none.
+    /// Passes the rules as plain numbers; fails for a run that has ended early.
     pub(super) fn pass(&mut self, pass: &mut Pass) -> Passed {
         pass.mode(&mut self.mode)?;
         for fresh in &mut self.fresh {
@@ -183,7 +182,7 @@ impl Rules {
 pub(super) fn settle<B: Between>(solver: &mut B) {
     for _ in 0..CHANGES_AT_ONCE {
         let fallen = fallen(solver);
-        // What does not depend on bodies is settled: now their loads are known, and to which rounding.
+        // Everything that does not depend on bodies is settled: now their loads and the rounding of these are known.
         if solver.rules().at_edge && fallen.is_none_or(|fallen| fallen.rank == BODIES) {
             solver.rules_mut().at_edge = false;
             widen_all_breakaways(solver);
@@ -222,7 +221,7 @@ fn fallen<B: Between>(solver: &mut B) -> Option<Transition> {
     fallen
 }
 
-/// Goes into the mode that follows where a condition falls.
+/// Enters the mode that follows the fall of a condition.
 pub(super) fn change<B: Between>(solver: &mut B, fallen: Transition) {
     let (time, instant) = (solver.time(), solver.instant());
     let rules = solver.rules_mut();
@@ -239,7 +238,7 @@ pub(super) fn change<B: Between>(solver: &mut B, fallen: Transition) {
     }
 }
 
-/// Lets a body do something else; none for what its load decides.
+/// Changes the motion of a body; `None` lets its load decide.
 fn move_on<B: Between>(solver: &mut B, fallen: &Transition, body: usize, to: Option<Motion>) {
     let mechanism = Arc::clone(solver.mechanism());
     let stops = to.is_none();
@@ -255,14 +254,14 @@ fn move_on<B: Between>(solver: &mut B, fallen: &Transition, body: usize, to: Opt
         }
         None => decide(solver, body),
     };
-    // Where it stops, the load is the one on the side it came from.
+    // When it stops, the load is that of the previous direction.
     let from = solver.rules().mode.motion[body];
     let side = if to == Motion::Stuck { from } else { to };
     let load = solver.load(body, side != Motion::Backward);
     let order = match to {
         Motion::Stuck | Motion::Free => 0,
         _ if stops => 1,
-        // Where breakaway equals Coulomb friction the acceleration starts from zero, but for rounding.
+        // If breakaway equals Coulomb friction, the acceleration starts from zero but for rounding.
         _ if (load.value - load.sliding).abs() <= NEAR * load.noise => 2,
         _ => 1,
     };
@@ -328,11 +327,11 @@ fn hold_part<B: Between>(solver: &mut B, cause: Cause) {
         let (Known { value, noise }, margin) = (solver.known_at_begin(index), solver.margin(index));
         let rules = solver.rules_mut();
         let (tolerance, order) = match (value.abs() <= BEGUN * noise, rules.is_back_and_forth()) {
-            // A torque that turns again and again without a moment passing is none.
+            // A torque that reverses repeatedly at one instant is zero.
             (false, true) if matches!(cause, Cause::GearTorque(_)) => (NEAR * value.abs(), 0),
             (false, _) => (0.0, 0),
             (true, false) => (f64::max(-value, 0.0) + margin, 1),
-            // Where rounding moves a part back and forth without a moment passing, it stays where it is.
+            // A part that rounding moves back and forth at one instant keeps its state.
             (true, true) => (BACK_AND_FORTH * noise, 0),
         };
         rules.tolerance[own.kind()] = tolerance;
@@ -351,7 +350,7 @@ fn widen_all_breakaways<B: Between>(solver: &mut B) {
     }
 }
 
-/// A torque that starts from zero does so whichever way the gear counts as carrying.
+/// A torque that starts from zero does so in either case of the gear.
 fn start_gears<B: Between>(solver: &mut B) {
     for index in 0..solver.conditions() {
         if let cause @ Cause::GearTorque(_) = solver.transition(index).cause {

@@ -1,4 +1,4 @@
-//! Runs: a machine and a recorder, stepped by whoever decides its inputs.
+//! Runs: a machine and a recorder, stepped by the provider of its inputs.
 
 use super::exact::{self, Make};
 use super::inputs::Pieces;
@@ -53,7 +53,7 @@ impl<'a> Make for OfExact<'_, 'a> {
     }
 }
 
-/// A run whose inputs are set from outside: a sampled controller's, or those of anything else that answers the motion.
+/// A run whose inputs are set from outside, by a sampled controller or anything else that responds to the motion.
 ///
 /// ```
 /// use taut::case::{Case, TEMPLATE};
@@ -81,7 +81,7 @@ impl<'a> Make for OfExact<'_, 'a> {
 /// ```
 pub struct Run<'a> {
     running: Box<dyn Running + 'a>,
-    /// Where it stands, s, and where it is to end.
+    /// Present time and end, s.
     time: f64,
     end: f64,
 }
@@ -166,7 +166,7 @@ impl<'a> Run<'a> {
         self.advance(until)
     }
 
-    /// Goes on to `until`, s, or to the end of the run; false if something ended it before.
+    /// Advances to `until`, s, or to the end of the run; false if something ended it before.
     fn advance(&mut self, until: f64) -> bool {
         let goes_on = self.time >= self.end || self.running.advance(until);
         if goes_on {
@@ -175,7 +175,7 @@ impl<'a> Run<'a> {
         goes_on
     }
 
-    /// Where it stands, s.
+    /// Present time, s.
     pub fn time(&self) -> f64 {
         self.time
     }
@@ -190,7 +190,7 @@ impl<'a> Run<'a> {
         self.running.current(drive)
     }
 
-    /// Ends the run where it stands: complete, with its last row, if it has come to its end, and interrupted before.
+    /// Ends the run: complete, with its last row, if it has reached its end, otherwise interrupted.
     pub fn finish(mut self) -> Outcome {
         self.running.finish(self.time >= self.end)
     }

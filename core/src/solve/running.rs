@@ -6,7 +6,7 @@ use super::known::Known;
 use crate::mechanism::State;
 use crate::signal::Signal;
 
-/// Where a run begins, when it ends, and when there are rows.
+/// Initial state, end and output interval of a run.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Start {
     pub(super) state: State,
@@ -27,21 +27,21 @@ pub(super) trait Running {
         pieces
     }
 
-    /// Takes up what these signals do from `time`, which is now, on, and says until when that is.
+    /// Sets the pieces of these signals from the present `time` on, and returns their end.
     fn set_signals(&mut self, signals: &[Signal], time: f64) -> f64 {
         let pieces = self.told(Pieces::of(signals, time));
         self.set_input(&pieces);
         pieces.end
     }
 
-    /// Goes on to `until`, or to the end of the run; false if it ends before.
+    /// Advances to `until`, or to the end of the run; false if it ends before.
     fn advance(&mut self, until: f64) -> bool;
 
     fn state(&self) -> State;
 
     fn current(&self, drive: usize) -> f64;
 
-    /// Ends the run where it stands: at its end, where the last row is put out, or before.
+    /// Ends the run: at its end, with the last row, or before.
     fn finish(&mut self, is_at_end: bool) -> Outcome;
 
     /// The modes that it has made ready.

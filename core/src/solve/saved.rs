@@ -1,10 +1,10 @@
-//! A machine under way as plain numbers, and back: what [`Machine::save`](super::Machine::save) hands out.
+//! Conversion of a running machine to plain numbers and back, for [`Simulator::save`](super::Simulator::save).
 
 use super::inputs::Pieces;
 use crate::friction::Motion;
 use crate::mechanism::{Contact, Limit, Mode, State};
 
-/// Numbers on their way out of a machine, or into one: one function of each part does both.
+/// Numbers that are read from a machine or written to one; one function of each part does both.
 pub(super) enum Pass<'a> {
     /// Out.
     Out(&'a mut Vec<u64>),
@@ -12,7 +12,7 @@ pub(super) enum Pass<'a> {
     In(std::slice::Iter<'a, u64>),
 }
 
-/// Nothing where the numbers end too soon, or are none of this machine.
+/// `None` if there are too few numbers, or if they belong to another machine.
 pub(super) type Passed = Option<()>;
 
 impl Pass<'_> {
@@ -104,8 +104,7 @@ impl Pass<'_> {
     }
 }
 
-/// A copy that goes on from numbers that were handed out, all of which it has to take; none where they are of something
-/// else.
+/// A copy that continues from saved numbers, all of which it must use; `None` if they belong to another machine.
 pub(super) fn restored<T: Clone>(own: &T, saved: &[u64], pass: impl FnOnce(&mut T, &mut Pass) -> Passed) -> Option<T> {
     let mut copy = own.clone();
     let mut numbers = Pass::In(saved.iter());

@@ -13,10 +13,10 @@ use crate::mechanism::Mechanism;
 use crate::plan::Experiment;
 
 impl Bench {
-    /// The derivatives of the outputs of an experiment on the mounted stage by `variables`, in the rows of the
-    /// experiment. None where there are none that can be told exactly: the stage needs the general solver, the run
-    /// does not reach its end, a variable changes which parts the machine has, or a condition is only grazed, so that it
-    /// is met or not as a variable is a little more or less.
+    /// Derivatives of the outputs of an experiment on the mounted stage with respect to `variables`, in the rows of the
+    /// experiment. `None` if there are no exact ones: the stage needs the general solver, the run does not reach its
+    /// end, a variable changes the parts of the machine, or a condition is only grazed, so that a small change of a
+    /// variable decides if it is met.
     ///
     /// ```
     /// use taut::case::{Case, TEMPLATE};
@@ -61,7 +61,7 @@ impl Bench {
 }
 
 impl Task<'_> {
-    /// Where what stands in the solver's vector of a mechanism.
+    /// Layout of the solver's vector for a mechanism.
     pub(super) fn space(&self, mechanism: &Mechanism) -> super::exact::Space {
         let degree = self.experiment.inputs.iter().map(|input| input.degree()).max().unwrap_or(0);
         super::exact::Space::new(mechanism, degree)

@@ -11,11 +11,11 @@ use crate::mechanism::{DRIVES, Heading, Layout, Mechanism, Mode, State};
 use crate::signal::{DEGREE, Piece};
 use std::sync::Arc;
 
-/// The interval that steps are computed fastest for, where none is named, s; and its halves, quarters and so on.
+/// Default interval for which steps are computed fastest, s, as are its halves, quarters and so on.
 const INTERVAL: f64 = 1e-3;
 
-/// A machine under way, which owns all that it needs: stepped, looked at, copied, sent elsewhere. A clone is its saved
-/// state, and goes on bit for bit as it would have.
+/// A running machine that owns all its data, and can be stepped, inspected, copied and sent to another thread. A clone
+/// continues bit for bit as the original would.
 ///
 /// ```
 /// use taut::case::{Case, TEMPLATE};
@@ -102,12 +102,12 @@ impl Simulator {
         Ok(Self { engine, inputs: Pieces::held(&[], 0.0, f64::INFINITY), is_set: true })
     }
 
-    /// The mechanism, its ways counted from where it began.
+    /// The mechanism, with positions relative to its start.
     pub fn mechanism(&self) -> &Mechanism {
         self.engine.mechanism()
     }
 
-    /// Where it stands, s.
+    /// Present time, s.
     pub fn time(&self) -> f64 {
         self.engine.time()
     }
@@ -131,8 +131,8 @@ impl Simulator {
         Ok(())
     }
 
-    /// Goes on to `until`, s, and adds the events on the way to `events`. An early end is told, and where it stands
-    /// then; it goes no further.
+    /// Advances to `until`, s, and appends the events to `events`. Returns an early ending, after which the machine
+    /// stays at the time it reached.
     pub fn advance(&mut self, until: f64, events: &mut Vec<Event>) -> std::result::Result<(), Ending> {
         if std::mem::take(&mut self.is_set) {
             let degree = self.inputs.degree();
@@ -169,7 +169,7 @@ impl Simulator {
         self.inputs.since(self.time()).coefficients
     }
 
-    /// By how much positions may be off, m; of the general solver nothing is known.
+    /// Bound of the position error, m; `None` for the general solver.
     pub fn error(&self) -> Option<PositionError> {
         self.engine.error()
     }
@@ -184,14 +184,14 @@ impl Simulator {
         shown(&*self.engine, into);
     }
 
-    /// Goes on with other numbers of the same mechanism: masses, friction, stiffness, constants of a motor, forces. Its
-    /// geometry, which tells ways from lengths, and what its states are, stay.
+    /// Continues with other parameters of the same mechanism: masses, friction, stiffness, motor constants, forces. Its
+    /// geometry, which relates positions to lengths, and its states must stay the same.
     pub fn replace(&mut self, mechanism: &Mechanism) {
         self.engine.replace(mechanism);
         self.is_set = true;
     }
 
-    /// All that it needs to go on, as plain numbers; none of one that has ended early.
+    /// The complete state as plain numbers; `None` after an early end.
     pub fn save(&self) -> Option<Vec<u64>> {
         let mut copy = self.clone();
         let mut list = vec![self.engine.degree() as u64];
@@ -199,8 +199,8 @@ impl Simulator {
         Some(list)
     }
 
-    /// Goes on from what [`Simulator::save`] gave, bit for bit, of a machine of the same numbers that began in the same
-    /// state. None, and nothing has changed, where `saved` is not of such a machine.
+    /// Continues bit for bit from the result of [`Simulator::save`] of a machine with the same parameters and initial
+    /// state. Returns `None`, and changes nothing, if `saved` does not belong to such a machine.
     pub fn restore(&mut self, saved: &[u64]) -> Option<()> {
         let (degree, rest) = saved.split_first()?;
         let mut copy = self.clone();

@@ -19,7 +19,8 @@ use std::sync::Arc;
 /// Half-width of Table 3's band of "zero" speed, rad/s for the pulleys and m/s for the cart.
 const BAND: f64 = 0.01;
 
-/// A state beyond it, in SI units, is none of a machine: the step was too long for the belt's swing.
+/// Largest plausible value of a state, in SI units; a larger one means that the step is too long for the belt's
+/// oscillation.
 const BOUND: f64 = 1e9;
 
 /// Runs the experiment with steps of `step` or a little less, so that they fill the output interval.
@@ -50,7 +51,7 @@ pub(crate) fn run(
     let mut ending = Ending::Complete;
     for row in 0..=grid.intervals() {
         let time = grid.time(row);
-        // What is no number fails the comparison too.
+        // NaN fails the comparison, too.
         if row > 0 && !values(&state).all(|value| value.abs() <= BOUND) {
             ending = Ending::Diverged { time };
             break;
@@ -84,7 +85,7 @@ pub(crate) fn run(
         let substeps = steps(interval);
         let h = interval / substeps;
         for k in 0..substeps as u64 {
-            // A step sees the input as it is at its beginning: an edge at its end belongs to the next one.
+            // A step uses the input at its beginning: an edge at its end belongs to the next one.
             let t = time + k as f64 * h;
             let step = Step { model: &model, input: experiment.inputs[0].piece(t), h };
             state = match method {

@@ -11,11 +11,12 @@ use nalgebra::DMatrix;
 use std::path::Path;
 
 impl Fit {
-    /// The text of the case with the estimates in place of what they were, and a table of how well they are known.
-    /// Paths in it are those of `case`; `name` stands in messages. Read again, it is the machine of the fit: where
-    /// estimates are not determined, the one of all that meet the logs alike that is nearest to that of the case.
+    /// The text of the case with the estimates and a table of their uncertainty. Paths in it are those of `case`;
+    /// `name` is used in messages. Read again, it gives the machine of the fit: if estimates are not determined, the
+    /// machine nearest to that of the case among all that fit the logs equally well.
     ///
-    /// Of what campaigns have for themselves, the values of the first; [`Fit::case_text_of`] has those of the others.
+    /// Parameters that differ between campaigns have the values of the first; [`Fit::case_text_of`] has those of the
+    /// others.
     pub fn case_text(&self, case: &Case, name: &Path) -> Result<String> {
         self.text(case, name, 0)
     }
@@ -66,7 +67,7 @@ impl Fit {
             }
             fitted = read(&changes, false);
         }
-        // A file that is another machine than the fit has other errors than those that are told of it.
+        // The stated errors are wrong for a file with another machine than the fit's.
         if let Some((key, is, read)) = differs(machine, &fitted?.machine, DIGITS_READ) {
             return Err(Error::new(format!("the fit cannot be written: `{key}` would be read as {read}, and is {is}"))
                 .in_file(name)
@@ -167,9 +168,9 @@ impl Change {
 struct Digits(Vec<f64>);
 
 impl Digits {
-    /// A tenth of the standard error with all other parameters held, as a share of the estimate: rounding to that moves
-    /// the residuals by no more than noise, however much the estimates depend on each other. All digits where something
-    /// is not determined: the file then has the values of the case as far as the logs allow.
+    /// A tenth of the standard error with all other parameters held, relative to the estimate: rounding to that moves
+    /// the residuals by less than noise, even with correlated estimates. All digits if something is not determined,
+    /// since the file then has the values of the case as far as the logs allow.
     ///
     /// σ_j/√((R⁻¹)_jj), R the correlations
     fn new(fit: &Fit) -> Self {
@@ -196,7 +197,7 @@ fn rounded_to(value: f64, step: f64) -> f64 {
     if step <= 0.0 || !place.is_finite() || !value.is_finite() {
         return value;
     }
-    // The shortest decimal number of so many places: 0.1 and not 3 · 0.1 − 0.2.
+    // The shortest decimal number with this number of places: 0.1 and not 3 · 0.1 − 0.2.
     let text = match place {
         coarse if coarse > 0.0 => {
             let unit = 10f64.powf(coarse);

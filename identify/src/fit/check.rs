@@ -12,14 +12,14 @@ use crate::fit::trust::result::told;
 use crate::log::Survey;
 use crate::solve::Flow;
 
-/// The result of a check: all that there is to know before a fit.
+/// The result of a check before a fit.
 #[derive(Debug, Clone)]
 pub struct Check {
     /// The survey of each log.
     pub logs: Vec<Survey>,
-    /// The balance of torques of a rigid axis, by regression; none where the logs do not allow one.
+    /// The torque balance of a rigid axis, by regression; `None` if the logs do not allow it.
     pub balance: Option<Balance>,
-    /// The parameters that they determine together; none where every free parameter ended at a bound.
+    /// The identifiability of the parameters from all logs; `None` if every free parameter ended at a bound.
     pub identifiability: Option<Identifiability>,
     /// Advice for each group that is not determined.
     pub choices: Vec<Vec<String>>,

@@ -1,7 +1,7 @@
 //! Limits and thresholds of the fit, room by room.
 //!
-//! Each has its meaning, its unit (1 for a ratio), its source, and where there is one a test of what it does. A source
-//! of "chosen" marks a number of judgement. Rooms declare no numbers of their own: `tests/rooms.rs` looks for them.
+//! Each has its meaning, its unit (1 for a ratio), its source, and a test of its effect, if any. The source "chosen"
+//! marks a judgement. Other modules declare no such numbers; `tests/rooms.rs` checks this.
 
 // asked: what is compared with what
 
@@ -10,9 +10,9 @@
 /// Unit: 1. Source: ten digits, which the usual logs of simulations have.
 pub(crate) const FILE_ROUNDING: f64 = 1e-10;
 
-/// Error of a delay that counts as 100 %: one known no better is not known.
+/// Error of a delay that counts as 100 %, from which on it is not determined.
 ///
-/// Unit: samples. Source: chosen: few logs tell a delay to a sample. Test:
+/// Unit: samples. Source: chosen: few logs determine a delay to a sample. Test:
 /// `a_delay_is_found_in_windows_as_in_the_whole_log`.
 pub(crate) const KNOWN_DELAY: f64 = 10.0;
 
@@ -79,8 +79,7 @@ pub(crate) const NEAR: f64 = 1.0;
 /// `a_rough_search_measures_central_derivatives_at_its_end_only`.
 pub(crate) const SHARP: f64 = 0.1;
 
-/// Step of derivatives near a minimum and in a posterior: it passes over the small kinks that sticks and slips make,
-/// and is as good as another where there are none.
+/// Step of derivatives near a minimum and in a posterior: large enough to pass over small kinks by sticks and slips.
 ///
 /// Unit: standard errors of a variable by itself. Source: chosen.
 pub(crate) const PAST_KINKS: f64 = 0.3;
@@ -544,7 +543,7 @@ pub(crate) const MOTOR_CONSTANTS: f64 = 1.5;
 /// Unit: 1. Source: chosen. Test: `signs_and_ratios_are_found_beside_narrow_band_noise`.
 pub(crate) const OPPOSITE: f64 = -0.5;
 
-/// Longest delay of an input that is looked for.
+/// Longest delay of an input that is searched for.
 ///
 /// Unit: samples. Source: chosen; below `INPUT_BEFORE_WINDOW`.
 pub(crate) const LONGEST_DELAY: isize = 40;
@@ -554,12 +553,12 @@ pub(crate) const LONGEST_DELAY: isize = 40;
 /// Unit: samples. Source: chosen.
 pub(crate) const SHORTEST_DELAY: isize = 2;
 
-/// Longest shift of an input against the outputs that is looked for.
+/// Longest shift of an input against the outputs that is searched for.
 ///
 /// Unit: samples. Source: chosen. Test: `an_input_that_is_logged_early_or_late_is_found`.
 pub(crate) const LONGEST_SHIFT: isize = 500;
 
-/// Longest shift of an input that is looked for, relative to the log.
+/// Longest shift of an input that is searched for, relative to the log.
 ///
 /// Unit: 1. Source: chosen: three quarters of the log are left to compare.
 pub(crate) const SHIFT_SHARE: f64 = 0.25;
@@ -569,9 +568,9 @@ pub(crate) const SHIFT_SHARE: f64 = 0.25;
 /// Unit: samples. Source: chosen: shorter than an input holds its values.
 pub(crate) const SHIFT_STRIDE: isize = 5;
 
-/// Unexplained torque from which on a shift is looked for.
+/// Least unexplained torque for the search for a shift.
 ///
-/// Unit: 1. Source: chosen: an input that is off by more than a delay leaves more.
+/// Unit: 1. Source: chosen: an input with more than a delay leaves more.
 pub(crate) const SHIFT_UNEXPLAINED: f64 = 0.25;
 
 /// Unexplained torque with a shift, relative to that without, below which the shift is tested.
@@ -657,7 +656,8 @@ pub(crate) const JUMP: f64 = 0.5;
 /// Unit: Jacobians. Source: chosen.
 pub(crate) const TRIAL_FIT_ITERATIONS: usize = 15;
 
-/// Where a profile holds its parameter, off the estimate; outwards, so that each fit starts where the one before ended.
+/// Deviations from the estimate at which a profile holds its parameter; outwards, so that each fit starts where the
+/// previous one ended.
 ///
 /// Unit: standard errors. Source: chosen. Test: `the_profile_of_what_is_well_known_is_that_of_a_linear_model`.
 pub(crate) const PROFILE_AT: [[f64; 3]; 2] = [[-1.0, -2.0, -3.0], [1.0, 2.0, 3.0]];
@@ -720,7 +720,7 @@ pub(crate) const DIVERGING: f64 = 0.01;
 /// `what_stays_has_the_density_of_quadrature`.
 pub(crate) const FAR_BOUND: f64 = 6.0;
 
-/// Where the tail of a normal distribution is taken for that of an exponential one.
+/// Value below which the tail of a normal distribution is replaced by that of an exponential one.
 ///
 /// Unit: standard deviations. Source: relative error 1/30². Test: `shares_far_out_have_their_logarithms`.
 pub(crate) const FAR_TAIL: f64 = -30.0;
@@ -866,7 +866,7 @@ pub(crate) const BRISTLE_BEND: f64 = 2e-5;
 
 // design: the best experiment
 
-/// Length of an experiment where none is given.
+/// Default length of an experiment.
 ///
 /// Unit: s. Source: chosen.
 pub const DURATION: f64 = 4.0;
@@ -881,7 +881,7 @@ pub const DESIGN_MODEL_ERROR: f64 = 0.01;
 /// Unit: machines. Source: time.
 pub const VERIFIED: usize = 4;
 
-/// Sample interval of an experiment where none is given.
+/// Default sample interval of an experiment.
 ///
 /// Unit: s. Source: chosen.
 pub(crate) const SAMPLE_INTERVAL: f64 = 1e-3;
@@ -916,7 +916,7 @@ pub(crate) const HOPEFUL: f64 = 1.6;
 /// Unit: logit of a share. Source: chosen.
 pub(crate) const FIRST_SIGMA: f64 = 0.7;
 
-/// Values that the evolution may ask for, of every kind, and again of the best.
+/// Largest number of evaluations by the evolution strategy, for each kind, and again for the best.
 ///
 /// Unit: evaluations. Source: chosen.
 pub(crate) const MOST_VALUES: usize = 60;
@@ -1046,7 +1046,7 @@ pub(crate) const CAUSE_DELAYS: [f64; 2] = [0.5, -0.5];
 /// Unit: 1. Source: chosen.
 pub(crate) const CAUSE_SHARE: f64 = 0.35;
 
-/// Share of the inertia from which on a rotor is one that the case knows.
+/// Least share of the inertia for which the case is taken to contain the rotor.
 ///
 /// Unit: 1. Source: chosen.
 pub(crate) const KNOWN_SHARE: f64 = 0.05;
@@ -1066,14 +1066,14 @@ pub(crate) const SWINGS_KEEP: f64 = 0.1;
 /// Unit: 1. Source: chosen: what is further off does not get there.
 pub(crate) const CAUSE_NEAR: f64 = 3.0;
 
-/// Where the size of an element may go, relative to where it begins.
+/// Bounds of the size of an element, relative to its start.
 ///
 /// Unit: 1. Source: chosen: starts are 2 to 4 times apart.
 pub(crate) const CAUSE_AROUND: [f64; 2] = [0.1, 10.0];
 
-/// Where the share of the inertia before a spring or play may go.
+/// Bounds of the share of the inertia before a spring or play.
 ///
-/// Unit: 1. Source: chosen: less is not seen, and takes long to simulate.
+/// Unit: 1. Source: chosen: less is not visible, and takes long to simulate.
 pub(crate) const KNOWN_SHARES: [f64; 2] = [0.05, 0.95];
 
 /// First size of a force on the cart that is tried.

@@ -1,7 +1,7 @@
-//! Parameters from logs, and what the logs cannot tell.
+//! Parameters from logs, and their identifiability.
 //!
-//! Output error: the model is put through every log's input, and what it would have shown is compared with what was
-//! seen, all logs at once. The recipe is [`fit`]; before it, [`check`] says what the logs can determine.
+//! Output error method: the model is driven by every log's input, and its outputs are compared with the measured ones,
+//! all logs at once. The entry point is [`fit`]; before it, [`check`] reports what the logs can determine.
 
 mod asked;
 mod case_text;
@@ -60,7 +60,7 @@ use trust::result::told;
 
 /// Finds the parameters of `plan` from the logs of `case`.
 ///
-/// `watch` sees the cost after each step; `stop` ends the search, which then gives the best so far.
+/// `watch` receives the cost after each step; `stop` ends the search, which then returns the best point so far.
 pub fn fit(case: &Case, plan: &Plan, stop: Option<Stop>, watch: &mut dyn FnMut(f64) -> Flow) -> Result<Fit> {
     fit_watched(case, plan, stop, &mut |_, cost| watch(cost))
 }

@@ -43,8 +43,8 @@ impl<const N: usize> Between for Core<N> {
 
     fn known_at_begin(&self, index: usize) -> Known {
         let (law, guard) = (&self.matrices, &self.matrices.guards[index]);
-        // The moment at which it fell is known to the rounding of the way there: of a line whose point is at zero the
-        // value itself says nothing of it.
+        // The rounding of the path limits the time of the fall: for a force line with a point at zero, the value itself
+        // does not show it.
         let on_the_way = ROUNDING * law.far() * guard.value(&law.rate(&self.z)).abs();
         let Known { value, noise } = self.known(index);
         Known { value, noise: noise.max(on_the_way) }
@@ -119,7 +119,7 @@ impl<const N: usize> Between for Core<N> {
 }
 
 impl<const N: usize> Core<N> {
-    /// Goes into the mode that follows where a condition falls.
+    /// Enters the mode that follows the fall of a condition.
     pub(super) fn change(&mut self, fallen: Transition) {
         rules::change(self, fallen);
     }

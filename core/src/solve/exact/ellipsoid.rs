@@ -1,9 +1,8 @@
-//! A bound of what rounding does to a run whose errors can grow.
+//! A bound of rounding errors for a run whose errors can grow.
 //!
-//! Where springs do no more than pull and push in proportion, errors do not grow ([`crate::solve::rounding`]). A force
-//! line can feed the motion, and a flank, a stop or a slack span turns a small difference of the moment at which it
-//! touches into a larger one of the motion. Of such machines the errors of the state are followed, as an ellipsoid
-//! {C^½ u, |u| ≤ 1} that holds all of them:
+//! With linear springs alone errors do not grow ([`crate::solve::rounding`]). A force line can feed the motion, and a
+//! flank, a stop or a slack span turns a small error of its contact time into a larger one of the motion. For such
+//! machines the errors of the state are bounded by an ellipsoid {C^½ u, |u| ≤ 1}:
 //!
 //! ```text
 //! within a mode        C ← F C Fᵀ ⊕ Q,   F = e^{A τ}
@@ -14,10 +13,10 @@
 //!                      all sums of two errors
 //! ```
 //!
-//! N counts steps, Φ the radians of the fastest swing, K the constant forces of a mode before they are added up: near
-//! an unstable equilibrium they cancel, and their rounding is the error from which all others grow. A guard that only
-//! grazes falls by its bend: |w·f⁻| is taken for no less than √(½ |w·f̈| δg), the slope at which it leaves its
-//! rounding. A belt position w·z is off by at most √(wᵀ C w).
+//! N is the number of steps, Φ the phase of the fastest vibration in radians, K the constant forces of a mode before
+//! summation: near an unstable equilibrium they cancel, and their rounding is the error from which all others grow. A
+//! guard that only grazes falls by its curvature: |w·f⁻| is taken as at least √(½ |w·f̈| δg), the slope at which it
+//! leaves its rounding. The error of a belt position w·z is at most √(wᵀ C w).
 
 use super::Core;
 use super::matrices::Watch;
@@ -38,7 +37,7 @@ const PARTS: u32 = 4;
 /// Halvings of the time in a mode, at most.
 const HALVINGS: i32 = 60;
 
-/// So many roundings of a rate are no jump of it.
+/// Change of a rate, in roundings, that does not count as a jump.
 const NO_JUMP: f64 = 40.0;
 
 /// Entries beyond this are not squared any more.
@@ -59,7 +58,7 @@ pub(super) struct Ellipsoid<const N: usize> {
     largest: f64,
 }
 
-/// A guard that falls, as it is before the mode changes.
+/// A guard that falls, before the change of mode.
 pub(super) struct Crossing<const N: usize> {
     /// w.
     guard: [f64; N],
@@ -119,7 +118,7 @@ impl<const N: usize> Ellipsoid<N> {
     fn evaluate(&mut self, positions: &[[f64; N]]) {
         for row in positions {
             let square = self.variance(row);
-            // What is no number has grown beyond all bounds.
+            // NaN has grown beyond all bounds.
             self.largest = self.largest.max(if square.is_nan() { f64::INFINITY } else { square.sqrt() });
         }
     }
@@ -147,7 +146,7 @@ fn add<const N: usize>(c: &mut [[f64; N]; N], other: &[[f64; N]; N], weights: &[
     let (own, added) = (trace(c), trace(other));
     let (first, second) = match own > 0.0 && added > 0.0 {
         true => (1.0 + (added / own).sqrt(), 1.0 + (own / added).sqrt()),
-        // Of what has no size no share is known; of nothing none is needed.
+        // The ratio is unknown for sizes of zero, and not needed.
         false if own == 0.0 && added == 0.0 => (2.0, 2.0),
         false => (1.0, 1.0),
     };
@@ -163,7 +162,7 @@ fn carried<const N: usize>(step: &Matrix<N, N>, c: &[[f64; N]; N], states: usize
     for row in moved.iter_mut().take(states) {
         step.advance(row);
     }
-    // The rows of `moved` are the columns of T; those of its transpose are moved in the same way.
+    // The rows of `moved` are the columns of T; those of its transpose are moved likewise.
     let mut out = transposed(&moved, states);
     for row in out.iter_mut().take(states) {
         step.advance(row);
@@ -186,7 +185,7 @@ fn transposed<const N: usize>(c: &[[f64; N]; N], states: usize) -> [[f64; N]; N]
 }
 
 impl<const N: usize> Core<N> {
-    /// Brings the errors to where the run stands, in the present mode.
+    /// Carries the errors to the present time, in the present mode.
     pub(super) fn carry_errors(&mut self) {
         let Some(mut errors) = self.errors.take() else { return };
         self.see();
@@ -201,7 +200,7 @@ impl<const N: usize> Core<N> {
         self.errors = Some(errors);
     }
 
-    /// C ← F C Fᵀ ⊕ Q over a time in which so many steps were taken.
+    /// C ← F C Fᵀ ⊕ Q over a time of `taken` steps.
     fn carry_errors_by(&self, errors: &mut Ellipsoid<N>, length: f64, taken: f64) {
         let (law, states) = (&self.matrices, errors.states);
         let part = length / f64::from(PARTS);
@@ -268,7 +267,7 @@ impl<const N: usize> Core<N> {
         })
     }
 
-    /// Takes the errors through an event: C ← S C Sᵀ ⊕ q. It stands in the mode that follows.
+    /// Carries the errors through an event: C ← S C Sᵀ ⊕ q. The state is already in the next mode.
     pub(super) fn cross(&mut self, crossing: Option<Crossing<N>>) {
         let (Some(crossing), Some(mut errors)) = (crossing, self.errors.take()) else { return };
         let states = errors.states;

@@ -40,7 +40,7 @@ impl Space {
         self.layout.states + input * (self.highest + 1) + k
     }
 
-    /// The state that `z` stands for, in the solver's coordinates.
+    /// The state of `z`, in the solver's coordinates.
     #[inline]
     pub(in crate::solve) fn inner(&self, z: &[f64]) -> State {
         let layout = &self.layout;
@@ -114,7 +114,7 @@ pub(in crate::solve) struct Size {
 impl Size {
     pub(super) const ZERO: Size = Size { mechanical: 0.0, magnetic: 0.0 };
 
-    /// Of both parts together.
+    /// The size of both parts together.
     fn whole(self) -> f64 {
         (self.mechanical * self.mechanical + self.magnetic * self.magnetic).sqrt()
     }
@@ -133,8 +133,8 @@ fn at_rest(mechanism: &Mechanism, stuck: &[bool; BODIES]) -> [bool; SPRINGS] {
 pub(super) fn straight<const N: usize>(mechanism: &Mechanism, space: &Space, mode: &Mode) -> (Equations, Matrix<N, N>) {
     let layout = &space.layout;
     let mut equations = mechanism.equations(*mode);
-    // What is stuck has no speed, and a span between stuck bodies does not change: leaving both out of the conditions
-    // lets the bounds know it.
+    // Stuck bodies have no speed, and spans between them do not change: without both in the conditions, the bounds are
+    // tighter.
     let stuck = mode.motion.map(|motion| motion == Motion::Stuck);
     let without_stuck = |form: &mut Form| {
         for (speed, stuck) in form.speed.iter_mut().zip(stuck) {
@@ -199,13 +199,13 @@ pub(in crate::solve) struct ModeMatrices<const N: usize> {
     pub(super) guards: Vec<Watch<N>>,
     /// Guards in groups, for vector instructions.
     beside: Vec<Beside<N>>,
-    /// The load on each body without its friction; none where a gear loses power, and it is another at rest.
+    /// The load on each body without its friction; `None` if a gear with losses changes it at rest.
     load: Option<[Row<N>; BODIES]>,
     /// |b|: how fast √(2V) of ż can grow per unit of |u̇|.
     pub(super) forcing: [f64; DRIVES],
     /// A bound of ‖A‖, 1/s.
     speed: f64,
-    /// Halvings of the interval until a Taylor series tells the state, and until one tells the matrix exponential.
+    /// Halvings of the interval until a Taylor series gives the state, and until one gives the matrix exponential.
     pub(super) coarsest: usize,
     pub(super) finest: usize,
     h: f64,
@@ -221,7 +221,7 @@ pub(in crate::solve) struct ModeMatrices<const N: usize> {
     growth: f64,
     inertia: [f64; BODIES],
     stiffness: [f64; SPRINGS],
-    /// Forms of which the squares of their rates add up to the mechanical part of 2V.
+    /// Forms whose squared rates sum to the mechanical part of 2V.
     energy: Vec<Lanes<N>>,
     /// Weight of each (di/dt)² in 2V, by the places of the currents; and whether there is any.
     magnetic: [(usize, f64); DRIVES],
@@ -237,8 +237,7 @@ pub(in crate::solve) struct ModeMatrices<const N: usize> {
 }
 
 impl<const N: usize> ModeMatrices<N> {
-    /// Those of a mode and an interval, among those that are known, or new ones, which are added; and whether they are
-    /// new.
+    /// The matrices of a mode and an interval: known ones, or new ones, which are added; true if they are new.
     pub(super) fn of(
         known: &mut Vec<Arc<Self>>,
         mechanism: &Mechanism,
@@ -246,7 +245,7 @@ impl<const N: usize> ModeMatrices<N> {
         mode: &Mode,
         h: f64,
     ) -> (Arc<Self>, bool) {
-        // Of one machine, seen from several places: the ends of its travel are what differs.
+        // Origins of one machine differ in the ends of its travel only.
         let fits = |known: &&Arc<Self>| known.mode == *mode && known.h == h && known.origin == mechanism.origin;
         if let Some(known) = known.iter().find(fits) {
             return (Arc::clone(known), false);
@@ -264,7 +263,7 @@ impl<const N: usize> ModeMatrices<N> {
         let row_of = |form: &Form| space.row::<N>(form);
 
         // The current does g i φ̇ of work, and its own rate is −δ i − β φ̇. With the weight w = g/β on its share ½ w i²
-        // in V the two cancel. Where there is no β to speak of, a large weight leaves next to nothing.
+        // in V the two cancel. If β is very small, a large weight leaves almost nothing.
         let inertia = mechanism.balanced_inertia(&equations, mode);
         let (mut magnetic, mut growth, mut decays, mut coupled) = ([0.0; DRIVES], 0.0, 0.0, false);
         for (index, drive) in mechanism.drives.iter().enumerate().filter(|(_, drive)| drive.has_current_state()) {
@@ -277,7 +276,7 @@ impl<const N: usize> ModeMatrices<N> {
             if moves != 0.0 && decay > 0.0 {
                 let g = moved / moves;
                 let mass = g / moves;
-                // What is left of the exchange feeds V at (g − w β)²/(4 w δ m).
+                // The remaining exchange feeds V at (g − w β)²/(4 w δ m).
                 let enough = g * g / (4.0 * GROWTH_OF_CURRENT * decay * mass);
                 let weight = if back > 0.0 { f64::min(g / back, enough) } else { enough };
                 let left = g - weight * back;
@@ -291,8 +290,8 @@ impl<const N: usize> ModeMatrices<N> {
             coupled |= exchange > 0.0 && moves != 0.0;
         }
 
-        // What a condition watches and no spring holds is bounded by a small stiffness κ that is not there: it feeds V.
-        // So does a line by its damping c where that is below zero.
+        // Guarded quantities without a spring are bounded by a small fictitious stiffness κ, which feeds V. So does a
+        // line with negative damping c.
         //
         //   V = ½ κ s² + ½ m ṡ²,  m s̈ = −k s − c ṡ:   d√V/dt ≤ (½ |κ − k|/√(κ m) + max(−c, 0)/m) √V,  1/m = Σ arm²/m_j
         let mut stiffness = equations.stiffness;
@@ -434,7 +433,7 @@ impl<const N: usize> ModeMatrices<N> {
     }
 
     widest! {
-        /// A look at z: ż and its size, and the guards into `value`; or, with ż for z, at what is one derivative higher.
+        /// Evaluates ż, its size, and the guards into `value` at z; with ż for z, one derivative higher.
         pub(super) fn look(&self, z: &[f64; N], value: &mut Values) -> ([f64; N], Size) = look_by_any, look_by_avx2;
     }
 
@@ -478,7 +477,7 @@ impl<const N: usize> ModeMatrices<N> {
         Size { mechanical, magnetic: f64::sqrt(magnetic) }
     }
 
-    /// By how much √(2V) of ż can grow in a unit of time while the inputs change no faster than this.
+    /// Largest growth rate of √(2V) of ż while the rates of the inputs are at most `rate`.
     pub(super) fn push(&self, rate: &[f64; DRIVES]) -> f64 {
         self.forcing.iter().zip(rate).fold(0.0, |sum, (forcing, rate)| sum + forcing * rate)
     }
@@ -493,8 +492,8 @@ impl<const N: usize> ModeMatrices<N> {
         }
     }
 
-    /// How fast the guards can change while ż has at most this size times `grow`, the inputs add at most `push` to it,
-    /// and change at most at this rate.
+    /// Largest rates of the guards while ż has at most this size times `grow`, the inputs add at most `push` to it, and
+    /// have at most this rate.
     #[inline]
     pub(super) fn steepness(&self, (size, push): (Size, f64), grow: f64, rate: &[f64; DRIVES], steepness: &mut Values) {
         let (mechanical, magnetic) = self.parted(size, push);
@@ -603,7 +602,7 @@ impl<const N: usize> ModeMatrices<N> {
         if self.growth == 0.0 { 1.0 } else { 2.0 }
     }
 
-    /// Time in which √V grows by itself to no more than twice its value.
+    /// Time in which √V without input grows to at most twice its value.
     pub(super) fn growth_time(&self) -> f64 {
         if self.growth == 0.0 { f64::INFINITY } else { 0.69 / self.growth }
     }

@@ -1,14 +1,12 @@
 //! The exact solver: modes and matrix exponentials.
 //!
-//! Within a mode the stage is linear and a step is a product with e^{A h}. A mode may be left only when one of its
-//! guards becomes negative, so the solver moves in the largest steps on which no guard can, by a bound that holds for
-//! certain, and looks closer (halves the step, and at last expands the state into a Taylor series) only where the bound
-//! does not decide.
+//! Within a mode the stage is linear and a step is a product with e^{A h}. A mode ends only when one of its guards
+//! becomes negative, so the solver takes the largest steps on which a rigorous bound excludes this. Only where the
+//! bound does not decide, it halves the step, and finally expands the state into a Taylor series.
 //!
 //! The bound. y = ż obeys ẏ = A y + b u̇, and friction, resistance and damping only take energy away, so its energy
 //! V(y) = ½ Σ m a² + ½ Σ k (Δv)² + ½ w L (di/dt)² can only grow by the input's rate: √(2V)(τ) ≤ √(2V)(0) + |b|·|u̇|·τ.
-//! A guard g = w·z therefore changes no faster than |w|·√(2V), |w| being the norm dual to V; and likewise its slope,
-//! with ẏ.
+//! A guard g = w·z therefore has a rate of at most |w|·√(2V), with the norm |w| dual to V; likewise its slope, with ẏ.
 
 mod change;
 mod ellipsoid;
@@ -45,12 +43,12 @@ const HALVES: usize = 3;
 /// Fraction of the series radius below which the sign of a speed leaving zero is taken from the series.
 const SOON: f64 = 1e-6;
 
-/// A machine under way: its state, its mode, and what is needed to go on. A clone of it goes on in the same way.
+/// A running machine: state, mode, and all data to continue. A clone continues identically.
 #[derive(Clone)]
 pub(super) struct Core<const N: usize> {
     /// State in the solver's coordinates, inputs and their derivatives, and a one.
     z: [f64; N],
-    /// The largest magnitudes that each place of it has had in rows so far.
+    /// The largest magnitudes of its elements in rows so far.
     largest: [f64; N],
     matrices: Arc<ModeMatrices<N>>,
     known: Modes<N>,
@@ -62,7 +60,7 @@ pub(super) struct Core<const N: usize> {
     pub(super) common: Common,
 }
 
-/// The parts of a machine under way that do not depend on the kernel.
+/// The parts of a running machine that do not depend on the kernel.
 #[derive(Clone)]
 pub(super) struct Common {
     pub(super) mechanism: Arc<Mechanism>,
@@ -74,7 +72,7 @@ pub(super) struct Common {
     /// Bounds of |u̇| and |ü| on the present pieces.
     input_rate: [f64; DRIVES],
     input_curvature: [f64; DRIVES],
-    /// Where it stands: so far behind `base`, s.
+    /// Present time relative to `base`, s.
     base: f64,
     offset: f64,
     /// Number of modes so far.
@@ -85,7 +83,7 @@ pub(super) struct Common {
     questions: u64,
     pace: Pace,
     end: f64,
-    /// True if somebody is to be asked whether to go on.
+    /// True if the receiver is to be asked to continue.
     pub(super) asks: bool,
 }
 
@@ -116,8 +114,8 @@ impl Lanes {
 }
 
 impl<const N: usize> Core<N> {
-    /// Solver of a machine in `start`. `known` are the matrices of modes for intervals of any length;
-    /// `end` is how far it is to go, to tell whether it gets there.
+    /// Solver of a machine in `start`. `known` are the matrices of modes for intervals of any length; `end` is the end
+    /// of the run, for the estimate of its steps.
     pub(super) fn new(
         mechanism: Arc<Mechanism>,
         space: Arc<Space>,
@@ -160,7 +158,7 @@ impl<const N: usize> Core<N> {
         self.common.base + self.common.offset
     }
 
-    /// The bound of what rounding has done so far.
+    /// The bound of rounding errors so far.
     fn bound_of_rounding(&mut self) -> PositionError {
         self.common.rounding.see(&self.largest);
         self.common.rounding.swing(self.matrices.swing, self.time());
@@ -171,13 +169,13 @@ impl<const N: usize> Core<N> {
         self.common.rounding.bound(steps, self.time(), (origin, grown))
     }
 
-    /// Goes on to `until` and adds the events on the way to `events`.
+    /// Advances to `until` and appends the events to `events`.
     fn go_on_to(&mut self, until: f64, events: &mut Vec<Event>) -> Result<(), Ending> {
         self.common.end = until;
         (self.common.questions, self.common.pace) = (0, Pace::default());
         self.count_from(self.time());
         let length = until - self.common.base;
-        // What a sum of decimal times may be off by; no part of the interval, which may be long.
+        // Rounding of a sum of decimal times; not a fraction of the interval, which may be long.
         let near = (8.0 * f64::EPSILON * until.abs()).min(1e-9 * self.common.h);
         while length - self.common.offset > near && self.common.rules.trouble.is_none() {
             self.check();
@@ -272,7 +270,7 @@ impl<const N: usize> Core<N> {
         (self.common.base, self.common.offset) = (base, 0.0);
     }
 
-    /// How many whole intervals, up to `most`, no guard can fall on; and whether nothing moves.
+    /// Number of whole intervals, up to `most`, on which no guard can fall; and true if nothing moves.
     fn safe_intervals(&mut self, law: &ModeMatrices<N>, most: u64) -> (u64, bool) {
         self.look(law);
         let resting = self.room.rate == [0.0; N];
@@ -293,7 +291,7 @@ impl<const N: usize> Core<N> {
         let mut time = f64::INFINITY;
         if push == 0.0 {
             for (g, slope) in value.iter().zip(steepness).take(law.guards.len()) {
-                // What does not move has no end; 0/0 is no number, and not less.
+                // A constant guard does not fall; 0/0 is NaN, which is not less.
                 let until = if *g < 0.0 { 0.0 } else { *g / *slope };
                 time = if until < time { until } else { time };
             }
@@ -331,12 +329,12 @@ impl<const N: usize> Core<N> {
         }
     }
 
-    /// Advances by `distance`, at most an interval; stops at the first guard that falls and says why. `looked` says
-    /// that it has just been looked at where it stands.
+    /// Advances by `distance`, at most an interval; stops at the first guard that falls and returns it. `looked` is
+    /// true if the present state has just been evaluated.
     pub(super) fn advance(&mut self, mut distance: f64, mut looked: bool) -> Option<Transition> {
         let law = Arc::clone(&self.matrices);
         if self.common.rules.is_fresh && distance > 0.0 {
-            // A speed that starts from zero is told apart from one that falls to zero by its series.
+            // Its series distinguishes a speed that starts from zero from one that falls to zero.
             let first = distance.min(law.far());
             if let Some(fallen) = self.advance_by_series(&law, first, looked) {
                 return Some(fallen);
@@ -390,12 +388,12 @@ impl<const N: usize> Core<N> {
         }
     }
 
-    /// True if nothing stands against going on.
+    /// True if the run may continue.
     fn goes(&self) -> bool {
         self.common.rules.trouble.is_none() && !self.common.asks
     }
 
-    /// Wants to be asked now and then whether to go on, and looks whether this leads anywhere; false if not.
+    /// Requests a question to the receiver from time to time, and checks the progress; false if the run will not end.
     fn goes_on(&mut self) -> bool {
         self.common.questions += 1;
         if self.common.questions.is_multiple_of(STEPS_BETWEEN_QUESTIONS) && self.common.rules.trouble.is_none() {
@@ -410,7 +408,7 @@ impl<const N: usize> Core<N> {
         self.common.rules.since_change += by;
     }
 
-    /// Decides by the last look, if it can, that no guard falls within `length`.
+    /// Decides by the last evaluation, if possible, that no guard falls within `length`.
     fn bound(&mut self, law: &ModeMatrices<N>, length: f64, level: usize) -> Bound<N> {
         if law.guards.is_empty() {
             return Bound::Safe(None);
@@ -420,7 +418,7 @@ impl<const N: usize> Core<N> {
         match (unsure, falling) {
             (Lanes::NONE, Lanes::NONE) => Bound::Safe(None),
             (Lanes::NONE, falling) => {
-                // What falls all the way has not fallen through if it is still positive at the end.
+                // A guard that decreases throughout has not fallen if it is still positive at the end.
                 let mut end = self.z;
                 law.step(level).advance(&mut end);
                 let value = &mut self.room.slope;
@@ -434,8 +432,8 @@ impl<const N: usize> Core<N> {
         }
     }
 
-    /// The guards of which the last look does not say that they stay within `length`; and those among the others that
-    /// fall all the way.
+    /// The guards that may fall within `length` by the last evaluation; and those among the others that decrease
+    /// throughout.
     fn undecided(&mut self, law: &ModeMatrices<N>, length: f64) -> (Lanes, Lanes) {
         let (mut open, mut falling) = (Lanes::NONE, Lanes::NONE);
         let grow = law.growth_over(length);
@@ -449,7 +447,7 @@ impl<const N: usize> Core<N> {
             return (open, falling);
         }
 
-        // The same one derivative higher: its guards are the slopes.
+        // One derivative higher: its guards are the slopes.
         let (_, size) = law.look(rate, slope);
         law.steepness((size, law.push(curvature) * length), grow, curvature, bend);
         let mut unsure = Lanes::NONE;
@@ -533,9 +531,9 @@ impl<const N: usize> Core<N> {
     }
 }
 
-/// Makes what goes on where another one stands, with room for inputs that bend.
+/// Creates a solver in the state of another, for inputs of a higher degree.
 struct Smoothed<const M: usize> {
-    /// Of another kernel: states and inputs, as [`Space::inner`] and [`Space::chain`] find them there.
+    /// State of another kernel: states and inputs, at the indices of [`Space::inner`] and [`Space::chain`] there.
     z: Vec<f64>,
     derivatives: Vec<Vec<f64>>,
     errors: Option<Box<Ellipsoid<M>>>,

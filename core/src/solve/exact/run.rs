@@ -12,11 +12,11 @@ use crate::solve::running::{Running, Start};
 use crate::solve::{Detail, Ending, Flow, Grid, Outcome};
 use std::sync::Arc;
 
-/// A run under way.
+/// A run in progress.
 pub(in crate::solve) struct Run<'a, const N: usize> {
     pub(super) core: Core<N>,
     grid: Grid,
-    /// The row where it stands, or that it has passed last.
+    /// The present row, or the last one passed.
     row: u64,
     pub(super) recorder: Recorder<'a>,
     pub(super) watching: Watching<N>,
@@ -38,8 +38,8 @@ impl<'a, const N: usize> Run<'a, N> {
         let inputs = |drive| space.chain(drive, 0);
         let recorder = Recorder::new(&seen, &space.layout, (N, &inputs), grid, output);
         let mut core = Core::new(seen, Arc::new(space), &start.state, (grid.interval(), grid.end()), list);
-        // Where no rows are made, nobody asks how far they are off, but whether they are determined, which only a line
-        // that feeds the motion can spoil.
+        // A run without rows needs no error bound, only whether it is determined, which a force line that feeds the
+        // motion alone can prevent.
         let feeds = |law: &SpringLaw| matches!(law, SpringLaw::Line { .. });
         if recorder.detail == Detail::None && !core.common.mechanism.springs.iter().any(|spring| feeds(&spring.law)) {
             core.errors = None;
@@ -82,7 +82,7 @@ impl<'a, const N: usize> Run<'a, N> {
         self.core.count_from(self.grid.time(row));
     }
 
-    /// Asks the receiver whether to go on.
+    /// Asks the receiver to continue.
     fn ask_receiver(&mut self) {
         self.core.common.asks = false;
         self.recorder.ask();
@@ -93,7 +93,7 @@ impl<'a, const N: usize> Run<'a, N> {
         self.core.common.rules.trouble.is_none()
     }
 
-    /// Ends where the receiver wants no more.
+    /// Ends the run if the receiver stops.
     #[inline]
     fn heed(&mut self) {
         if self.recorder.flow == Flow::Stop && self.core.common.rules.trouble.is_none() {
@@ -105,7 +105,7 @@ impl<'a, const N: usize> Run<'a, N> {
         self.grid.time(self.row) + self.core.common.offset
     }
 
-    /// Puts out the present row, once, and looks whether all is well.
+    /// Outputs the present row, once, and checks the state.
     fn put_out(&mut self) {
         if !self.core.is_finite() {
             self.core.common.rules.trouble = Some(Ending::Diverged { time: self.time() });
@@ -152,7 +152,7 @@ impl<'a, const N: usize> Run<'a, N> {
         true
     }
 
-    /// Goes so many intervals on, shows the way, and puts out all rows on it but the last.
+    /// Advances by `intervals`, shows the motion, and outputs all rows but the last.
     fn take_rows(&mut self, law: &Arc<ModeMatrices<N>>, intervals: u64) {
         let (step, observed) = (law.step(0), self.is_observed());
         let most = if observed { ROWS } else { usize::MAX };
@@ -192,7 +192,7 @@ impl<'a, const N: usize> Run<'a, N> {
         }
     }
 
-    /// Goes so many rows on, and puts out the first `put` of them; false if the receiver wants no more.
+    /// Advances by `rows`, and outputs the first `put` of them; false if the receiver stops.
     fn passed(&mut self, rows: usize, put: usize) -> bool {
         self.row += rows as u64;
         self.core.common.cost.steps += rows as u64;
@@ -237,7 +237,7 @@ impl<const N: usize> Running for Run<'_, N> {
         self.core.note_ties();
         if self.core.common.rules.trouble.is_none() {
             if is_at_end {
-                // Behind a last, shorter interval it stands at the last row, too.
+                // After a last, shorter interval the run is at the last row, too.
                 self.go_to(self.grid.intervals());
                 self.put_out();
             } else {
@@ -287,7 +287,7 @@ pub(super) fn locate(grid: &Grid, now: u64, time: f64) -> (u64, f64) {
         row += 1;
     }
     let offset = time - grid.time(row);
-    // What a sum of decimal times may be off by; no part of the interval, which may be long.
+    // Rounding of a sum of decimal times; not a fraction of the interval, which may be long.
     let near = (8.0 * f64::EPSILON * time).min(1e-9 * h);
     // The last interval may be shorter: what is left of the run behind the last row at this distance.
     let length = if row < last { h } else { grid.rest() };

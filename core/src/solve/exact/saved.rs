@@ -7,7 +7,7 @@ use crate::solve::saved::{Pass, Passed};
 use std::sync::Arc;
 
 impl<const N: usize> Core<N> {
-    /// As plain numbers. Whoever puts them into another machine sees to it that this one has the same equations.
+    /// Passes the state as plain numbers. The caller ensures that another machine has the same equations.
     pub(super) fn pass(&mut self, pass: &mut Pass) -> Passed {
         let common = &mut self.common;
         if common.rules.trouble.is_some() {
@@ -37,7 +37,7 @@ impl<const N: usize> Core<N> {
         Some(())
     }
 
-    /// Goes on with other numbers of the same mechanism.
+    /// Continues with other parameters of the same mechanism.
     pub(super) fn replace(&mut self, mechanism: &Mechanism) {
         let common = &mut self.common;
         let seen = mechanism.seen_from(&common.space.layout, common.coordinates.start());

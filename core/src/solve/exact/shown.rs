@@ -6,14 +6,13 @@ use crate::mechanism::{BODIES, Transition};
 use crate::solve::observe::{Closer, Curve, Gap, Gaps, Observe, QUANTITIES, Reading, Stretch, reading_of};
 use std::sync::Arc;
 
-/// The error of a curve that is allowed in the middle, as a share of the largest value seen of that quantity.
+/// Allowed error of a curve in the middle, relative to the largest value of that quantity so far.
 const OFF: f64 = 1e-9;
 
-/// Curves of a run that are looked at closer at most: what swings more often than that between its rows is not seen
-/// whole.
+/// Largest number of curves of a run; faster oscillations between rows are not resolved completely.
 const MOST_CURVES: u64 = 2_000_000;
 
-/// Rows of a stretch at most: an observer has a bit for each gap, and what swings dies down on the way.
+/// Largest number of rows of a stretch: an observer has a bit for each gap, and oscillations decay within it.
 pub(super) const ROWS: usize = 32;
 
 /// Stretches that are put off at most.
@@ -25,7 +24,7 @@ const SAME: f64 = 1e-10;
 /// Curves in a row that are right before longer ones are tried.
 const RIGHT: u32 = 32;
 
-/// An instant as an observer sees it; rates are made ready when they are first wanted.
+/// An instant for an observer; rates are computed when first needed.
 #[derive(Clone, Copy)]
 struct Sight<const N: usize> {
     z: [f64; N],
@@ -50,10 +49,10 @@ struct Part {
     level: usize,
 }
 
-/// A stretch of which an observer wants to see some gaps closer.
+/// A stretch of which an observer examines some gaps more closely.
 struct Later<const N: usize> {
     law: Arc<ModeMatrices<N>>,
-    /// The states at both ends of its first gap, what is read there, and where ways are counted from.
+    /// The states at both ends of its first gap, the readings there, and the origin of positions.
     z: [[f64; N]; 2],
     ends: [Reading; 2],
     origin: [f64; BODIES],
@@ -62,9 +61,9 @@ struct Later<const N: usize> {
     wanted: Gaps,
 }
 
-/// Where an observer is.
+/// State of the observation of a run.
 pub(super) struct Watching<const N: usize> {
-    /// True if there is an observer who follows the motion, and whether one who wants to see all of it closely.
+    /// True if there is an observer of the motion; and true if it examines all of it closely.
     follows: bool,
     sees_all: bool,
     /// Readings at the beginning of a stretch and at its rows; the last one is the present.
@@ -74,7 +73,7 @@ pub(super) struct Watching<const N: usize> {
     /// Coordinates of the origin.
     origin: [f64; BODIES],
     later: Vec<Later<N>>,
-    /// The largest magnitudes seen.
+    /// The largest magnitudes so far.
     scale: Reading,
     /// Curves tried.
     curves: u64,
@@ -181,7 +180,7 @@ impl<const N: usize> Run<'_, N> {
         }
     }
 
-    /// Shows gaps of a stretch closer, as far as the observer still wants to see them.
+    /// Shows gaps of a stretch more closely, if the observer still needs them.
     fn show_gaps(&mut self, later: &Later<N>) {
         let Later { law, begin, interval, wanted, .. } = later;
         let count = wanted.end();
@@ -219,7 +218,7 @@ impl<const N: usize> Run<'_, N> {
         self.watching.later = all;
     }
 
-    /// How far readings can be off a straight line over intervals of this length, within `whole` from `z` on.
+    /// Largest deviation of readings from a straight line over intervals of this length, within `whole` from `z` on.
     fn bow(&self, law: &ModeMatrices<N>, z: &[f64; N], interval: f64, whole: f64) -> Reading {
         if self.watching.sees_all {
             return [f64::INFINITY; QUANTITIES];
@@ -241,8 +240,8 @@ impl<const N: usize> Run<'_, N> {
         self.recorder.observer.as_mut().is_some_and(|observer| observer.pass(&gap))
     }
 
-    /// Shows a gap of any length closer: as it is where there are matrices for it, else in parts that there are matrices
-    /// for, and a rest that a series tells.
+    /// Shows a gap of any length more closely: whole if there are matrices for its length, else in parts with matrices,
+    /// and the rest by a series.
     fn show_closer(
         &mut self,
         law: &ModeMatrices<N>,
@@ -251,7 +250,7 @@ impl<const N: usize> Run<'_, N> {
         (mut begin, mut length): (f64, f64),
         bends: &Reading,
     ) {
-        // What a sum of times is off by makes no difference here.
+        // Rounding of a sum of times does not matter here.
         let reaches = |length: f64, part: f64| length >= part * (1.0 - SAME);
         if reaches(length, law.length(0)) && reaches(law.length(0), length) {
             return self.show_part(law, from, to, Part { begin, length, level: 0 }, bends);
@@ -288,7 +287,7 @@ impl<const N: usize> Run<'_, N> {
         law.shown(&self.core.common.mechanism, &self.core.common.space).read(z, &self.watching.origin)
     }
 
-    /// Shows a part if the observer wants to see closer what a cubic tells of it.
+    /// Shows a part if the observer examines its cubic more closely.
     fn show_asked(
         &mut self,
         law: &ModeMatrices<N>,
@@ -321,13 +320,13 @@ impl<const N: usize> Run<'_, N> {
             return self.see(&curve);
         }
         let mut middle = self.after(law, from, level + 1);
-        // Where curves have not been right lately, none is tried that is longer than two of those that were.
+        // After recent inaccurate curves, none longer than two of the accurate ones is tried.
         if level + 1 >= self.watching.level {
             self.watching.curves += 1;
             let curve = self.curve(law, from, to, begin, length);
             let near = |((is, told), scale): ((&f64, f64), &f64)| (is - told).abs() <= OFF * scale;
             if middle.value.iter().zip(curve.at(0.5)).zip(&self.watching.scale).all(near) {
-                // What has been right for a while may be right over a longer way.
+                // After a number of accurate curves, a longer one is tried.
                 self.watching.right += 1;
                 if self.watching.right >= RIGHT {
                     (self.watching.right, self.watching.level) = (0, level.saturating_sub(1));
@@ -341,10 +340,10 @@ impl<const N: usize> Run<'_, N> {
         self.show_asked(law, &mut middle, to, half(begin + 0.5 * length), bends);
     }
 
-    /// By how much readings can be off the straight line between two sights, `bends` being a bound of |q⁗|. With slopes
-    /// a and b at its ends and d between, a cubic is off a straight line by s (1 − s) ((a − d)(1 − s) − (b − d) s), and
-    /// what is read is off the cubic by no more than s² (1 − s)² |q⁗| h⁴/24: together by no more than 4 s (1 − s) times
-    /// max(|a − d|, |b − d|)/4 + |q⁗| h⁴/384.
+    /// Largest deviation of readings from the straight line between two instants, with a bound `bends` of |q⁗|. With
+    /// slopes a and b at its ends and d between, a cubic deviates from a straight line by s (1 − s) ((a − d)(1 − s) −
+    /// (b − d) s), and the reading from the cubic by at most s² (1 − s)² |q⁗| h⁴/24: together by at most 4 s (1 − s)
+    /// times max(|a − d|, |b − d|)/4 + |q⁗| h⁴/384.
     fn bow_between(
         &self,
         law: &ModeMatrices<N>,

@@ -9,7 +9,7 @@ use std::sync::Arc;
 /// The share of a breakaway that rounding may take of the load on a body at rest, at least.
 const OF_BREAKAWAY: f64 = 5e-13;
 
-/// A condition that has just begun to hold is zero within so many times what the formula may be off by.
+/// A condition that has just begun to hold is zero within this multiple of the error of the formula.
 const ERRORS: f64 = 4.0;
 
 impl Between for Core {
@@ -56,7 +56,7 @@ impl Between for Core {
 
     fn known_at_begin(&self, index: usize) -> Known {
         let Known { value, noise } = self.known(index);
-        // Of a torque nothing less than this counts.
+        // Smaller torques do not count.
         let least = match self.transition(index).cause {
             Cause::GearTorque(drive) => self.relative * self.torque[drive] / BEGUN,
             _ => 0.0,
@@ -81,7 +81,7 @@ impl Between for Core {
         let value = self.values[index] + self.forgiven(cause);
         match (self.outside, cause) {
             (Some(shift), _) => value + shift <= 0.0,
-            // A speed tells by itself, over the next step.
+            // The next step decides about a speed.
             (None, Cause::Stop(_)) => false,
             (None, _) => value < 0.0,
         }
@@ -91,7 +91,7 @@ impl Between for Core {
         let (model, mode, y, input) = (&*self.model, &self.rules.mode, &self.y, &self.stretch.input(self.tau));
         let coulomb = model.mechanism.friction(body).side(forward).coulomb;
         let own = model.breakaway(body, forward, y);
-        // What bent bristles hold is friction.
+        // Bent bristles hold the body like friction.
         let held = model.bristle_force(body, y);
         let (sliding, breakaway) = if forward { (coulomb, own + held) } else { (-coulomb, own - held) };
         let noise = model.noise(body, mode, y, input).max(OF_BREAKAWAY * own);
@@ -99,8 +99,7 @@ impl Between for Core {
     }
 
     fn dies_out(&mut self, body: usize) -> bool {
-        // What still slows it down is less than the formula may be off by within the time in which the fastest of it
-        // changes.
+        // The remaining deceleration is below the error of the formula within the time constant of its fastest change.
         let rate = self.field().rate(&self.stretch.input(self.tau), &self.y);
         let place = self.model.speed(body);
         rate[place].abs() * self.moment <= self.absolute[place]

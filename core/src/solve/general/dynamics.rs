@@ -19,7 +19,7 @@ const SHIFT: f64 = 1.0 / (1_u64 << 40) as f64;
 /// A quantity that is integrated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Quantity {
-    /// The way of a body, rad or m.
+    /// The position of a body, rad or m.
     Position(usize),
     /// Its speed.
     Speed(usize),
@@ -39,7 +39,7 @@ pub struct Dynamics {
 }
 
 impl Dynamics {
-    /// A machine in `start` at time zero, its inputs zero. Errors: a state that is none.
+    /// A machine in `start` at time zero, with zero inputs. Returns an error if the state is invalid.
     pub fn new(mechanism: &Mechanism, start: &State) -> Result<Self> {
         check::state(start)?;
         let errors = (TOLERANCE, check::fastest_rate(mechanism));
@@ -55,12 +55,12 @@ impl Dynamics {
         &self.quantities
     }
 
-    /// How many conditions there are, in whichever mode.
+    /// Number of conditions over all modes.
     pub fn conditions(&self) -> usize {
         self.kinds.len()
     }
 
-    /// The mechanism, its ways counted from where it began.
+    /// The mechanism, with positions relative to its start.
     pub fn mechanism(&self) -> &Mechanism {
         &self.core.model.mechanism
     }
@@ -98,7 +98,7 @@ impl Dynamics {
             *position -= origin;
         }
         for replaced in &model.layout.replaced {
-            // The length that stands in the place of a way.
+            // The elongation in place of a position.
             let others: f64 = replaced.others.iter().map(|&(other, arm)| arm * state.position[other]).sum();
             inner.position[replaced.body] = replaced.own.mul_add(state.position[replaced.body], others);
         }
@@ -140,9 +140,9 @@ impl Dynamics {
         }
     }
 
-    /// The conditions as residuals: of a body that slides its speed in the direction of motion, of one at rest what is
-    /// left to its breakaway on either side, of any other part what is left to its limit; each larger by a tolerance, so
-    /// that all are above zero after [`Dynamics::settle`]. One that the mode does not watch is 1.
+    /// The conditions as residuals: the speed of a sliding body in its direction of motion, the distance of a body at
+    /// rest from its breakaway on either side, the distance of any other part from its limit; each larger by a
+    /// tolerance, so that all are positive after [`Dynamics::settle`]. Conditions that the mode does not have are 1.
     pub fn residuals(&self, into: &mut [f64]) {
         into.fill(1.0);
         let mut seen = [false; Cause::KINDS];
@@ -184,19 +184,20 @@ impl Dynamics {
         shown(&self.core, into);
     }
 
-    /// Goes on with other numbers of the same mechanism; [`crate::solve::Simulator::replace`] says which.
+    /// Continues with other parameters of the same mechanism; see [`crate::solve::Simulator::replace`].
     pub fn replace(&mut self, mechanism: &Mechanism) {
         self.core.replace(mechanism);
     }
 
-    /// All that it needs to go on, as plain numbers; none of one that has ended early.
+    /// The complete state as plain numbers; `None` after an early end.
     pub fn save(&self) -> Option<Vec<u64>> {
         let mut list = Vec::new();
         self.clone().pass(&mut Pass::Out(&mut list))?;
         Some(list)
     }
 
-    /// Goes on from what [`Dynamics::save`] gave. None, and nothing has changed, where `saved` is not of such a machine.
+    /// Continues from the result of [`Dynamics::save`]. Returns `None`, and changes nothing, if `saved` does not belong
+    /// to such a machine.
     pub fn restore(&mut self, saved: &[u64]) -> Option<()> {
         *self = restored(self, saved, Self::pass)?;
         Some(())
@@ -219,8 +220,8 @@ fn quantities(mechanism: &Mechanism) -> Vec<Quantity> {
     list
 }
 
-/// The kinds of conditions that a mechanism can watch in any of its modes, whatever its numbers are: friction that is none
-/// may be set, and so may a loss of the gear.
+/// The kinds of conditions in all modes of a mechanism, for any parameters: friction and losses of the gear that are
+/// zero now may be set later.
 fn kinds(mechanism: &Mechanism) -> Vec<usize> {
     use crate::mechanism::{Contact, Limit, Switch};
     let mut causes = Vec::new();

@@ -1,15 +1,16 @@
-//! Where a guard that is told by a series over a step first turns negative.
+//! The first fall of a guard that is a series over a step.
 
 use super::radau::{POINTS, TERMS};
 use crate::solve::propagator::SERIES_TERMS;
 use crate::solve::roots;
 use crate::solve::widest::widest;
 
-/// True if what has these values at the points of a step can turn negative within. A quartic leaves the range of its
-/// values at the points by at most their spread; what swings by up to four radians within the step adds to that.
+/// True if a function with these values at the points of a step can become negative within. A quartic leaves the range
+/// of its values at the points by at most their spread; an oscillation by up to four radians within the step adds to
+/// that.
 pub(super) fn may_fall(values: &[f64; POINTS]) -> bool {
     let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &v| (l.min(v), h.max(v)));
-    // What is no number may do anything.
+    // NaN counts as a possible fall.
     !(low > 5.0 * (high - low) || (low == high && low >= 0.0))
 }
 
@@ -53,9 +54,9 @@ fn second_half_by_any(c: &[f64]) -> [f64; SERIES_TERMS] {
     second
 }
 
-/// The place in (0, 1] where Σ c_k sᵏ, `order` being the highest power, first turns negative.
+/// The first s in (0, 1] at which Σ c_k sᵏ, with highest power `order`, becomes negative.
 pub(super) fn first_fall(c: &[f64; TERMS], order: usize) -> Option<f64> {
-    // Zero at the beginning: the first power that is there says whether it falls at once, whatever it does later.
+    // Zero at the beginning: the first nonzero power decides if it falls at once.
     if c[0] == 0.0 && c[1..=order].iter().find(|c| **c != 0.0).is_some_and(|c| *c < 0.0) {
         return Some(0.0);
     }
@@ -66,7 +67,7 @@ pub(super) fn first_fall(c: &[f64; TERMS], order: usize) -> Option<f64> {
     if c[1..].iter().fold(c[0], |sum, &c| sum + if c < 0.0 { c } else { 0.0 }) >= 0.0 {
         return None;
     }
-    // Over half the step the powers beyond say nothing any more.
+    // Higher powers are negligible over half the step.
     let mut first = [0.0; SERIES_TERMS];
     first.iter_mut().zip(c).zip(&HALVES).for_each(|((first, c), half)| *first = c * half);
     if let Some(s) = roots::first_fall(&first) {
@@ -74,7 +75,7 @@ pub(super) fn first_fall(c: &[f64; TERMS], order: usize) -> Option<f64> {
     }
     let mut second = second_half(c);
     if second[0] <= 0.0 {
-        // Zero between the halves: what begins there is told by the first power that is there.
+        // Zero between the halves: the first nonzero power decides about the second half.
         second[0] = 0.0;
         if second[1..].iter().find(|c| **c != 0.0).is_some_and(|c| *c < 0.0) {
             return Some(0.5);
@@ -92,7 +93,7 @@ pub(super) fn zero_near(c: &[f64; TERMS], order: usize, mut s: f64) -> f64 {
             value = value * s + c;
         }
         let next = (s - value / slope).clamp(0.0, 1.05);
-        // Where it only touches there is no slope to follow.
+        // A contact with zero has no slope for Newton's method.
         if slope >= 0.0 || !next.is_finite() || (next - s).abs() > 0.25 {
             return s;
         }
@@ -125,7 +126,7 @@ mod tests {
         assert!(values.iter().all(|&v| v > 0.0) && may_fall(&values));
     }
 
-    /// A load that passed a breakaway of zero at once and came back within the step was never seen: −s² + 4 s³.
+    /// A load that passed a breakaway of zero at once and came back within the step was not detected: −s² + 4 s³.
     #[test]
     fn what_falls_from_zero_falls_at_once() {
         for order in [3, 20, TERMS - 1] {

@@ -27,9 +27,9 @@ pub(super) struct Field {
     pub(super) output: Vec<usize>,
     /// Arguments that errors are measured by: their places in the state, and their weights there.
     pub(super) measured: Vec<(usize, f64)>,
-    /// True if guards depend on what stands still: friction along the travel of a body at rest, and bent bristles.
+    /// True if guards depend on friction along the travel of a body at rest, or on bent bristles.
     pub(super) shifted: bool,
-    /// Inertia that moves with each body, per unit of its leader's way.
+    /// Inertia that moves with each body, per unit of its leader's position.
     mass: [f64; BODIES],
 }
 
@@ -148,7 +148,7 @@ impl Field {
             let arms = model.mechanism.springs[following.spring].follows.iter().flat_map(|follows| &follows.arms);
             let ways = arms.map(|&(body, _)| (body, self.argument_at(model.coordinate(body)))).collect();
             self.sources.push(Source::spring(&model, index, length, ways));
-            // A slack one pulls at nothing; what it would pull is watched.
+            // A slack span has no force; its guard is the force that it would have.
             let slack = self.mode.slack[following.spring];
             let arm = |leader: usize| -> f64 {
                 following.arms.iter().filter(|(body, _)| *body == leader).map(|(_, arm)| -arm).sum()
@@ -225,7 +225,7 @@ impl Field {
     /// Value that the forces add to a guard at once.
     fn on_sources(&self, cause: Cause) -> Vec<f64> {
         let mechanism = &*self.model.mechanism;
-        // By the loads on a body, and by the friction that is taken off it.
+        // Derivatives with respect to the loads on a body, and to its friction.
         let by = |body: usize, load: f64, friction: f64| -> Vec<f64> {
             let of = |source: &Source| match source {
                 Source::Friction { curved, .. } => {
@@ -299,14 +299,13 @@ impl Field {
         form.noise(&self.model.layout, &self.model.inner(y), input) / ROUNDING
     }
 
-    /// Rounding error of a guard where states are as large as `usual`: of a guard of one speed, its size at the
-    /// event says nothing.
+    /// Rounding error of a guard for states as large as `usual`, since a speed at its event is near zero.
     pub(super) fn rounding(&self, index: usize, usual: &Vector) -> f64 {
         let on_state = self.guards[index].row.iter().zip(usual).map(|(weight, usual)| (weight * usual).abs());
         ROUNDING * on_state.sum::<f64>()
     }
 
-    /// How much more a guard is than its output says: what friction along the travel and bent bristles hold at rest.
+    /// Difference of a guard from its output: the load held at rest by friction along the travel and by bent bristles.
     pub(super) fn shift(&self, cause: Cause, y: &[f64]) -> f64 {
         let (body, forward) = match cause {
             Cause::BreakForward(body) => (body, true),
@@ -318,7 +317,7 @@ impl Field {
         model.breakaway(body, forward, y) - law.side(forward).breakaway + held
     }
 
-    /// The values that must not become negative, in the order of the watches.
+    /// The values that must not become negative, in the order of the guards.
     pub(super) fn guards(&self, input: &[f64; DRIVES], y: &Vector) -> [f64; MOST_GUARDS] {
         let mut values = [0.0; MOST_GUARDS];
         let mut forces = [0.0; SOURCES];

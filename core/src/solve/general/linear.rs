@@ -1,18 +1,18 @@
-//! The linear part of a mode, and what a step of some length makes of it.
+//! The linear part of a mode, and its propagation over a step.
 //!
 //! ```text
 //! ẏ = A y + g + B u + Σ_j b_j f_j
 //! ```
 //!
-//! The forces f_j are what friction laws and springs add; each is a quartic within a step, told by its values at the
-//! five points of [`super::radau`]. All else is exact. An *output* is a quantity that is wanted at the nodes: the
-//! arguments of the forces, then the guards. With r_m = c Aᵐ, c being an output's row,
+//! The forces f_j are the nonlinear parts of friction laws and springs; each is a quartic within a step, through its
+//! values at the five points of [`super::radau`]. Everything else is exact. An *output* is a quantity that is needed at
+//! the nodes: the arguments of the forces, then the guards. With r_m = c Aᵐ for the row c of an output,
 //!
 //! ```text
 //! c y(c_i h) = Σ_m (c_i h)ᵐ/m! r_m y + Σ_m hᵐ⁺¹ r_m b_j ∫ (c_i − σ)ᵐ/m! f_j(σ) dσ
 //! ```
 //!
-//! so that a [`Set`] for a step's length takes no products of matrices: the r_m are made once for a mode, and the
+//! so that a [`Set`] for a step's length needs no products of matrices: the r_m are computed once for a mode, and the
 //! integrals are tables.
 
 use super::radau::{self, DRIVEN, FORCED, FREE, Lane, NODES, POINTS, POWER, POWERS, TERMS};
@@ -56,11 +56,11 @@ pub(super) struct Linear {
     rows: Vec<States>,
     pub(super) constant: States,
     pub(super) input: [States; DRIVES],
-    /// How many inputs there are.
+    /// Number of inputs.
     pub(super) inputs: usize,
     pub(super) source: Vec<States>,
     pub(super) outputs: Vec<Output>,
-    /// How many of them are arguments of forces.
+    /// Number of outputs that are arguments of forces.
     pub(super) arguments: usize,
     /// ν: a bound of ‖A‖, 1/s.
     pub(super) norm: f64,
@@ -134,7 +134,7 @@ impl Linear {
         self.moments[which as usize].get_or_init(all)
     }
 
-    /// How many drives there are: one, inputs, forces.
+    /// Number of driving terms: one, inputs, forces.
     fn drives(&self) -> usize {
         1 + self.inputs + self.source.len()
     }
@@ -294,7 +294,7 @@ fn powers_of<const N: usize>(columns: &[States], x: &States, norm: f64, chain: &
     }
 }
 
-/// ‖A⁶⁴‖^(1/64): so high a power does not know the units of what it couples.
+/// ‖A⁶⁴‖^(1/64), which hardly depends on the units of the states.
 fn norm(size: usize, columns: &[States]) -> f64 {
     match size {
         8 => norm_of::<8>(columns),
@@ -352,14 +352,14 @@ pub(super) struct Set {
 /// The results of a step by all that it depends on, column by column: states, one, inputs and their powers, then the values
 /// of the forces at the points.
 pub(super) struct Full {
-    /// Of the guards: `[guard][column]`.
+    /// Rows of the guards: `[guard][column]`.
     guards: Vec<Lane>,
     /// Changes of the states over the whole step.
     pub(super) end: Vec<States>,
     /// Matrices up to each eighth of the step.
     inner: [OnceLock<Vec<States>>; EIGHTHS - 1],
     columns: usize,
-    /// How many of them there are without the forces.
+    /// Number of columns without the forces.
     pub(super) known: usize,
 }
 
@@ -394,8 +394,7 @@ impl Set {
         sum_of(&self.base[argument * x.len()..][..x.len()], x)
     }
 
-    /// The rest of it. Whoever asks has taken so many steps of this length that it is worth making: what others know of
-    /// the mode changes nothing.
+    /// The remaining matrices, computed on first use: the caller has taken enough steps of this length for them to pay.
     pub(super) fn full(&self, linear: &Linear) -> &Full {
         self.full.get_or_init(|| Full::new(linear, self.h, self.degree))
     }
@@ -496,7 +495,7 @@ impl Full {
         Self { guards, end: Self::ends(linear, h, degree, columns), inner, columns, known }
     }
 
-    /// The states at so many eighths of a step of this length, from those at its beginning.
+    /// The states after `eighth` eighths of a step of this length, from those at its beginning.
     pub(super) fn at_eighth(&self, linear: &Linear, (h, degree): (f64, usize), eighth: usize, x: &[f64]) -> States {
         let columns = self.inner[eighth - 1].get_or_init(|| self.inner(linear, (h, degree), eighth));
         #[cfg(target_arch = "x86_64")]

@@ -1,10 +1,10 @@
 //! The general solver: any friction law, and spans that follow the cart.
 //!
-//! The modes, their linear equations and their guards are those of the exact solver. What laws and belts add to them is
-//! told within a step by quartics of time, which collocation finds ([`step`]); with them the equations are linear again,
-//! and solved as exactly as the exact solver does ([`linear`]): a step is a product of matrices, or a Taylor series
-//! along which guards are searched for their first fall, so that two crossings within a step are seen. A step with an
-//! event in it is taken again up to the event.
+//! The modes, their linear equations and their guards are those of the exact solver. Nonlinear forces of friction laws
+//! and belts are approximated within a step by quartics of time, which collocation finds ([`step`]). With these the
+//! equations are linear, and solved as by the exact solver ([`linear`]): a step is a product of matrices, or a Taylor
+//! series along which guards are searched for their first fall, so that two crossings within a step are detected. A
+//! step with an event is repeated up to the event.
 
 mod change;
 mod dynamics;
@@ -74,11 +74,11 @@ pub(super) fn check(fastest: f64, until: f64, tolerance: f64) -> Result<()> {
 #[derive(Clone)]
 struct Known {
     field: Arc<Field>,
-    /// By their lengths, with how often each was taken.
+    /// Sets by length, each with the number of its steps.
     sets: Vec<(Arc<Set>, u32)>,
 }
 
-/// A machine under way: its state, its mode, and what is needed to go on. A clone of it goes on in the same way.
+/// A running machine: state, mode, and all data to continue. A clone continues identically.
 #[derive(Clone)]
 pub(super) struct Core {
     model: Arc<Model>,
@@ -98,13 +98,13 @@ pub(super) struct Core {
     present: usize,
     room: Option<Box<Room>>,
     stretch: Stretch,
-    /// Where it stands, counted from the beginning of the stretch, s.
+    /// Present time from the beginning of the stretch, s.
     tau: f64,
     /// The largest torque that each gear has carried, N m at the motor's shaft.
     torque: [f64; DRIVES],
-    /// Values of the conditions at the last look.
+    /// Values of the conditions at the last evaluation.
     values: [f64; MOST_GUARDS],
-    /// Where steps do not tell of speeds that pass zero: what a condition may be above zero by and has fallen.
+    /// If steps do not detect speeds that pass zero: the value above zero below which a condition counts as fallen.
     outside: Option<f64>,
     pace: Pace,
     end: f64,
@@ -132,10 +132,10 @@ impl Noise {
     }
 }
 
-/// A step that was taken, as far as it counts: to its end, or to the first event in it.
+/// The valid part of a step: to its end, or to its first event.
 struct Way<'a> {
     stretch: &'a Stretch,
-    /// Where it begins and where it ends, and where it would have ended.
+    /// Beginning and end, and the end without an event.
     from: f64,
     until: f64,
     to: f64,
@@ -145,16 +145,16 @@ struct Way<'a> {
     dense: &'a dyn Fn(f64) -> Vector,
 }
 
-/// Whoever is told of each step.
+/// Observer of each step.
 trait Witness {
     /// Sees a step.
     fn see(&mut self, core: &mut Core, way: &Way);
 
-    /// True if to go on.
+    /// True to continue.
     fn ask(&mut self) -> bool;
 }
 
-/// Nobody looks, and it goes on.
+/// An observer that does nothing and continues.
 struct Nobody;
 
 impl Witness for Nobody {

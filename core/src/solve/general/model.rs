@@ -12,7 +12,7 @@ pub(super) const MOST: usize = 3 * BODIES + CURRENTS;
 /// bristles.
 pub(super) type Vector = [f64; MOST];
 
-/// Most conditions watched at once: two for each body, one for each gear, two for each limit and for each spring.
+/// Largest number of guards: two for each body, one for each gear, two for each limit and for each spring.
 pub(super) const MOST_GUARDS: usize = 2 * BODIES + 5 * DRIVES + 2 * SPRINGS;
 
 /// A spring that follows the bodies.
@@ -20,7 +20,7 @@ pub(super) struct Following {
     pub(super) spring: usize,
     /// Its length from the integrated quantities: places and weights.
     pub(super) terms: Vec<(usize, f64)>,
-    /// By how much its force acts on each body that moves by itself.
+    /// Lever arms of its force on the independent bodies.
     pub(super) arms: Vec<(usize, f64)>,
 }
 
@@ -31,10 +31,10 @@ pub(super) struct Phased {
     /// The rotor's angle from the integrated quantities, places and weights, and where they are zero, rad.
     pub(super) terms: Vec<(usize, f64)>,
     pub(super) at: f64,
-    /// Where the rotor's speed and the two currents stand.
+    /// Indices of the rotor's speed and the two currents.
     pub(super) speed: usize,
     pub(super) currents: [usize; 2],
-    /// The body that the rotor moves with, and its way per way of that one.
+    /// The body that the rotor moves with, and the ratio of their positions.
     pub(super) leader: usize,
     pub(super) ratio: f64,
     /// Commanded angle per unit of the input, rad/m.
@@ -77,11 +77,11 @@ impl Phased {
 /// A body whose own friction is not that of the linear equations, be it moved by another or not.
 pub(super) struct Curved {
     pub(super) body: usize,
-    /// The body that it moves with, and its way per way of that one.
+    /// The body that it moves with, and the ratio of their positions.
     pub(super) leader: usize,
     pub(super) ratio: f64,
     pub(super) friction: Friction,
-    /// Where its speed stands, and the deflection of its bristles, if it has them.
+    /// Indices of its speed, and of the deflection of its bristles, if any.
     pub(super) speed: usize,
     pub(super) bristle: Option<usize>,
 }
@@ -101,7 +101,7 @@ pub(super) struct Sliding {
 }
 
 impl Curved {
-    /// Which way a body goes whose law can hold it at rest.
+    /// Direction of motion of a body whose law can hold it at rest.
     #[inline(always)]
     pub(super) fn direction(&self, motion: Motion) -> Option<bool> {
         match (self.friction.law, motion) {
@@ -137,8 +137,8 @@ impl Curved {
         y[self.speed] - sliding.slip * y[place]
     }
 
-    /// The law at `v`, dry friction being multiplied by `factor`. The speed is counted in the direction of motion:
-    /// where a trial step overshoots, the law goes on smoothly.
+    /// The law at `v`, with dry friction multiplied by `factor`. The speed is positive in the direction of motion; if a
+    /// trial step overshoots, the law continues smoothly.
     #[inline(always)]
     pub(super) fn sliding(&self, motion: Motion, v: f64, factor: f64, slopes: bool) -> Sliding {
         let friction = &self.friction;
@@ -187,11 +187,11 @@ impl Curved {
 pub(super) struct Model {
     pub(super) mechanism: Arc<Mechanism>,
     pub(super) layout: Layout,
-    /// Where each body's coordinate stands; its speed behind it.
+    /// Index of each body's coordinate; its speed follows.
     place: [usize; BODIES],
-    /// Where the currents stand that are states.
+    /// Indices of the currents that are states.
     pub(super) current: [Option<usize>; CURRENTS],
-    /// Where a body's bristle deflection stands, if it has one.
+    /// Index of a body's bristle deflection, if any.
     pub(super) bristle: [Option<usize>; BODIES],
     /// True if anything is added to the linear equations at all.
     pub(super) adds: bool,
@@ -301,7 +301,7 @@ impl Model {
         self.layout.value(form, inner, input)
     }
 
-    /// By how much a body's dry friction is multiplied where it is.
+    /// Factor on a body's dry friction at its position.
     #[inline(always)]
     fn factor(&self, body: usize, y: &[f64]) -> f64 {
         self.factor_at(body, || y[self.coordinate(body)])
@@ -323,7 +323,7 @@ impl Model {
         self.stiffer(following.spring, |body| y[self.coordinate(body)]) * length
     }
 
-    /// By how much a spring is stiffer than at the origin: k(q) − k.
+    /// Stiffness of a spring relative to the origin: k(q) − k.
     #[inline(always)]
     pub(super) fn stiffer(&self, spring: usize, coordinate: impl Fn(usize) -> f64) -> f64 {
         let spring = &self.mechanism.springs[spring];
@@ -331,8 +331,8 @@ impl Model {
         spring.follows.as_ref().map_or(0.0, |follows| stiffness(follows) - spring.stiffness)
     }
 
-    /// The loads of the springs that follow on each body that moves by itself, −Aᵀ f, where a slack one has none; and of
-    /// the phases of steppers.
+    /// Loads on the independent bodies by the springs that follow, −Aᵀ f, zero for slack ones, and by the phases of
+    /// steppers.
     #[inline(always)]
     fn loads(&self, mode: &Mode, y: &[f64]) -> [f64; BODIES] {
         let mut loads = [0.0; BODIES];
@@ -356,7 +356,7 @@ impl Model {
         self.mechanism.load(body, true, mode).noise(&self.layout, &self.inner(y), input)
     }
 
-    /// The breakaway of a body at rest this way, where it is, with all that moves with it: Σ ρ a(x) F_b.
+    /// Breakaway in this direction of a body at rest and all bodies joined to it, at its position: Σ ρ a(x) F_b.
     #[inline]
     pub(super) fn breakaway(&self, leader: usize, forward: bool, y: &[f64]) -> f64 {
         let own = |body: usize| {
@@ -406,7 +406,7 @@ impl Model {
         }
     }
 
-    /// Rate of deflection of a body's bristles, rad/s or m/s; zero of a body that is held, or has none.
+    /// Rate of deflection of a body's bristles, rad/s or m/s; zero if the body is held or has none.
     pub(super) fn bristle_rate(&self, body: usize, mode: &Mode, y: &[f64]) -> f64 {
         let motion = mode.motion[body];
         let curved = self.curved.iter().find(|curved| curved.body == body && motion != Motion::Stuck);

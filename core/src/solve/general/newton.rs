@@ -10,7 +10,7 @@ use super::sources::Bristles;
 pub(super) struct Newton {
     matrix: Vec<f64>,
     order: Vec<usize>,
-    /// Of which mode and length it is.
+    /// The mode and step length that it belongs to.
     pub(super) of: Option<(u64, f64)>,
     /// True if steps of that length need it.
     pub(super) wanted: bool,

@@ -1,5 +1,5 @@
-//! The places within a step at which forces are told: its beginning, and the four nodes of Radau's formula IIA, the last
-//! of which is its end.
+//! The points within a step at which forces are evaluated: its beginning, and the four nodes of Radau IIA, the last of
+//! which is its end.
 //!
 //! ```text
 //! f(s) = Σ_p f_p ℓ_p(s),   s = 0 … 1,   ℓ_p being 1 at point p and 0 at the other four
@@ -20,20 +20,20 @@ pub(super) const C: Lane = [0.088_587_959_512_703_95, 0.409_466_864_440_734_7, 0
 /// Beginning and nodes.
 pub(super) const PLACES: [f64; POINTS] = [0.0, C[0], C[1], C[2], C[3]];
 
-/// Largest ‖A‖ h of a step, and the order of the series that tells it: 4³³/33! is 9e-18 of the leading term, and the
-/// largest term, 11, costs one digit.
+/// Largest ‖A‖ h of a step, and the order of its series: 4³³/33! is 9e-18 of the leading term, and the largest term,
+/// 11, costs one digit.
 pub(super) const REACH: f64 = 4.0;
 const ORDERS: [(f64, usize); 6] = [(0.25, 12), (0.55, 15), (1.15, 19), (2.0, 23), (3.0, 28), (REACH, 33)];
 
 /// Room for its terms.
 pub(super) const TERMS: usize = 34;
 
-/// The order that ‖A‖ h asks for.
+/// The order of the series for ‖A‖ h.
 pub(super) fn order(reach: f64) -> usize {
     ORDERS.iter().find(|(most, _)| reach <= *most).map_or(TERMS - 1, |(_, order)| *order)
 }
 
-/// Powers of time that are told: those of forces, which are quartic, and of inputs.
+/// Number of powers of time: of forces, which are quartic, and of inputs.
 pub(super) const POWERS: usize = crate::signal::DEGREE + 1;
 
 /// Coefficients of ℓ_p by powers of s: `[power][point]`.
@@ -138,7 +138,7 @@ pub(super) static FREE: [Lane; TERMS] = {
     table
 };
 
-/// ∫ from 0 to c_i of (c_i − σ)ᵐ/m! σᵏ dσ = k!/(m + k + 1)! c_iᵐ⁺ᵏ⁺¹: what the m-th power makes of a force σᵏ.
+/// ∫ from 0 to c_i of (c_i − σ)ᵐ/m! σᵏ dσ = k!/(m + k + 1)! c_iᵐ⁺ᵏ⁺¹: effect of a force σᵏ by the m-th power.
 pub(super) static FORCED: [[Lane; TERMS]; POWERS] = {
     let mut table = [[[0.0; NODES]; TERMS]; POWERS];
     let mut k = 0;

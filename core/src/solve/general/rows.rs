@@ -1,4 +1,4 @@
-//! Where the rows of a run go, and what is shown beside them.
+//! Output of the rows of a run, and of the motion between them.
 
 use super::Core;
 use super::model::Vector;
@@ -7,7 +7,7 @@ use crate::solve::Grid;
 use crate::solve::observe::Readout;
 use crate::solve::record::Recorder;
 
-/// Where the rows go, and what is shown.
+/// Receiver of rows, and of the motion between them.
 pub(super) struct Rows<'a> {
     pub(super) grid: Grid,
     pub(super) recorder: Recorder<'a>,

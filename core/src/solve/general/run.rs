@@ -11,7 +11,7 @@ use crate::solve::record::{Recorder, STATE};
 use crate::solve::running::{Running, Start};
 use crate::solve::{Detail, Ending, Flow, Grid, Outcome};
 
-/// A run under way.
+/// A run in progress.
 pub(in crate::solve) struct Run<'a> {
     core: Core,
     rows: Rows<'a>,
@@ -35,7 +35,7 @@ impl<'a> Run<'a> {
         Self { core, rows: Rows { grid, recorder, shown: None } }
     }
 
-    /// Notices that the receiver wants no more.
+    /// Ends the run if the receiver stops.
     fn heed(&mut self) {
         if self.rows.recorder.flow == Flow::Stop && self.core.rules.trouble.is_none() {
             self.core.rules.trouble = Some(Ending::Interrupted { time: self.core.time() });

@@ -9,7 +9,7 @@ use crate::solve::saved::{Pass, Passed};
 use std::sync::Arc;
 
 impl Core {
-    /// As plain numbers. Whoever puts them into another machine sees to it that this one has the same equations.
+    /// Passes the state as plain numbers. The caller ensures that another machine has the same equations.
     pub(super) fn pass(&mut self, pass: &mut Pass) -> Passed {
         if self.rules.trouble.is_some() {
             return None;
@@ -33,7 +33,7 @@ impl Core {
         (*self.coordinates.start() == start).then_some(())
     }
 
-    /// Goes on with other numbers of the same mechanism.
+    /// Continues with other parameters of the same mechanism.
     pub(super) fn replace(&mut self, mechanism: &Mechanism) {
         let model = Arc::clone(&self.model);
         let seen = mechanism.seen_from(&model.layout, self.coordinates.start());

@@ -44,7 +44,7 @@ impl Room {
         powers
     }
 
-    /// The whole state at so many eighths of the step that was solved by its columns.
+    /// The whole state after `eighth` eighths of the step that was solved by its columns.
     pub(super) fn at_eighth(&self, field: &Field, set: &Set, begin: &Begin, eighth: usize) -> Vector {
         let full = set.full(&field.linear);
         let x = &self.x[..full.end.len()];

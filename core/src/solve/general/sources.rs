@@ -1,14 +1,14 @@
-//! The forces of a mode that are not linear: what friction laws and springs that follow the bodies add.
+//! The nonlinear forces of a mode: of friction laws, and of springs that follow the bodies.
 //!
-//! Bristles are told at the nodes of a step along with their force. With a_i = σ₀ |v_i|/g(v_i) and the matrix R that
-//! integrates a polynomial to the nodes, ż = v − a z is a linear system for the deflections there, whatever a is:
+//! Bristles are solved at the nodes of a step together with their force. With a_i = σ₀ |v_i|/g(v_i) and the matrix R
+//! that integrates a polynomial to the nodes, ż = v − a z is a linear system for the deflections there, whatever a is:
 //!
 //! ```text
 //! z_i + h Σ_j R_ij a_j z_j = z₀ + h Σ_j R_ij v_j
 //! ```
 //!
-//! Where bristles slip within a step, R is Radau's: z follows g(v) without a sign of ringing. Where they bend, the rate
-//! at the beginning is a fifth value, which makes the quartic of it as good as that of the force.
+//! If bristles slip within a step, R is Radau's: z follows g(v) without oscillation. If they bend, the rate at the
+//! beginning is a fifth value, which makes its quartic as accurate as that of the force.
 
 use super::model::{Curved, Model, Phased, Sliding, Vector};
 use super::radau::{FOUND, Lane, NODES, PLACES, POINTS, QUARTIC, RADAU, monomials};
@@ -20,7 +20,7 @@ pub(super) const SOURCES: usize = BODIES + SPRINGS + 2 * DRIVES;
 
 /// A force, with the arguments that it depends on by their numbers.
 pub(super) enum Source {
-    /// Of the law of a body, by the number among those with a law of their own.
+    /// Force of a body's law; the index counts bodies with a law of their own.
     Friction {
         curved: usize,
         motion: Motion,
@@ -28,7 +28,7 @@ pub(super) enum Source {
         /// Its coordinate, where friction changes along the travel.
         way: Option<usize>,
     },
-    /// Of a spring, by the number among those that follow.
+    /// Force of a spring; the index counts springs that follow.
     Spring {
         following: usize,
         length: usize,
@@ -59,7 +59,7 @@ pub(super) struct Phasing {
 /// A step that begins this near a kink, as a share of how far it goes from there, begins at it.
 const AT_KINK: f64 = 1e-8;
 
-/// Parts of the interval between two nodes in which a quartic is looked at for a change of its sign.
+/// Number of parts of the interval between two nodes in which a quartic is examined for a change of sign.
 const PARTS: usize = 4;
 
 /// Bristles that slip by more than this share of their deflection within a step are stiff.
@@ -78,7 +78,7 @@ pub(super) struct Bristle {
 /// Bristles of all bodies.
 pub(super) type Bristles = [Bristle; crate::mechanism::BODIES];
 
-/// How a force at each node changes with an argument at each node.
+/// Derivatives of a force at each node with respect to an argument at each node.
 pub(super) type Slopes = [Lane; NODES];
 
 impl Source {
@@ -265,7 +265,7 @@ impl Source {
         }
     }
 
-    /// How it changes with each argument.
+    /// Its derivatives with respect to each argument.
     pub(super) fn slopes(
         &self,
         model: &Model,
@@ -365,7 +365,7 @@ impl Phasing {
         model.phased[self.phased].phases.rate(phase, angle, speed, current, told)
     }
 
-    /// The voltage that the regulator of a phase wants beyond either limit, V, at the points of a step.
+    /// The voltage beyond either limit that the regulator of a phase requires, V, at the points of a step.
     fn excess(
         &self,
         phased: &Phased,
@@ -406,7 +406,7 @@ fn crossing(values: &[f64; POINTS], negligible: f64) -> Option<f64> {
         (0..PARTS).map(move |part| (pair, part, begin + length * part as f64 / PARTS as f64))
     });
     let places = between.map(|(pair, part, s)| (s, if part == 0 { values[pair] } else { at(s) }));
-    // Where it begins at zero, it has no side yet.
+    // If it begins at zero, it has no sign yet.
     let mut places = places.chain([(1.0, values[NODES])]).skip_while(|(_, value)| value.abs() <= AT_KINK * farthest);
     let (mut low, side) = places.next()?;
     for (mut high, value) in places {
@@ -470,8 +470,8 @@ impl Bent {
         self.solve(&std::array::from_fn(right))
     }
 
-    /// Slopes of the force where the rate of the bristles at node q changes by `by`(q) beside what their deflection
-    /// makes, and `direct` says whether b v changes, too.
+    /// Slopes of the force if the rate of the bristles at node q changes by `by`(q) in addition to the effect of their
+    /// deflection; `direct` is true if b v changes, too.
     fn slopes(
         &self,
         h: f64,
@@ -579,8 +579,8 @@ mod tests {
         (0..arguments.len()).map(of_argument).collect()
     }
 
-    /// Newton's method takes the slopes for the derivatives of the forces. Where they are not, it needs more steps, and
-    /// no position tells.
+    /// Newton's method uses the slopes as derivatives of the forces. Wrong slopes cost steps without an error of
+    /// positions.
     #[test]
     fn slopes_are_the_derivatives_of_the_forces() {
         let laws = [

@@ -9,14 +9,14 @@
 //! z ← z + P z + G f                     the end of the step, once f is known
 //! ```
 //!
-//! Where the laws are flat, f ← f(E z + W f) finds it: each turn shrinks what is left to h F_s/(v_s m) of itself. Where
-//! they are steep (bristles, Simscape's smooth law, belts that follow), Newton's method does: with the slopes f′ of the
-//! laws, (I − f′ W) δ = f(v) − f.
+//! For flat laws the iteration f ← f(E z + W f) converges, each time by a factor of h F_s/(v_s m). For steep ones
+//! (bristles, Simscape's smooth law, belts that follow) Newton's method does: with the slopes f′ of the laws, (I − f′
+//! W) δ = f(v) − f.
 //!
-//! The error is estimated by what the quartics leave of the forces. With a sixth value, from the step before, a force is
-//! known to be off by D ω(s), ω being zero at the five points: led through W, that is what the arguments are off by. Of
-//! this, Radau's nodes leave next to nothing at the end of the step; what is off at the nodes counts, too: it comes back
-//! as a force, and rows stand there. A step that has none before it is judged by the cubics through the nodes alone.
+//! The error is estimated from the residual of the quartics. With a sixth value, from the previous step, the error of a
+//! force is D ω(s), with ω zero at the five points; multiplied by W, it gives the error of the arguments. Radau's nodes
+//! make this very small at the end of the step. Errors at the nodes count, too, since they act as forces, and rows may
+//! be there. A first step is judged by the cubics through the nodes alone.
 
 use super::field::Field;
 use super::linear::{Forcing, STATES, Series, Set, States};
@@ -27,7 +27,7 @@ use super::sources::{Bristle, Bristles, SOURCES};
 use crate::mechanism::{BODIES, DRIVES, SPRINGS};
 use crate::signal::DEGREE;
 
-/// Most arguments of forces: speeds, ways, lengths, currents, inputs.
+/// Largest number of arguments of forces: speeds, positions, lengths, currents, inputs.
 pub(super) const ARGUMENTS: usize = 2 * BODIES + SPRINGS + 2 * DRIVES;
 
 /// Most columns of what a step depends on.
@@ -42,7 +42,7 @@ const SLOW: f64 = 0.2;
 /// The error of the quartics, as a multiple of what cubics would be off by, where nothing else is known.
 const OF_CUBIC: f64 = 1.0;
 
-/// The rest that a kink leaves of a force counts so many times: it is told by few values.
+/// Factor on the residual of a force at a kink, which is estimated from few values.
 const OF_KINK: f64 = 10.0;
 
 /// The values of the forces at the points of a step.
@@ -58,7 +58,7 @@ pub(super) type Lanes<T> = [T; ARGUMENTS];
 #[derive(Clone, Copy)]
 pub(super) struct Begin<'a> {
     pub(super) y: &'a Vector,
-    /// By powers of the share of the step: they belong to its length.
+    /// Inputs by powers of the fraction of the step; valid for its length only.
     pub(super) input: Inputs,
     pub(super) degree: usize,
     /// One over what each argument may be off by.
@@ -98,8 +98,7 @@ pub(super) struct Room {
     pub(super) evaluations: u64,
 }
 
-/// Where a guess of the forces comes from; with the length of the step there, s, or with how many times as long the
-/// next one is.
+/// Source of the first guess of the forces, with the length of that step, s, or the ratio of the next length to it.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Guess {
     /// The forces at the beginning of the step, held constant.
@@ -140,7 +139,7 @@ impl Room {
         }
     }
 
-    /// Begins anew, with these forces: what was before says nothing of what comes.
+    /// Restarts with these forces, without values of previous steps.
     pub(super) fn begin(&mut self, forces: &[f64]) {
         self.forces.iter_mut().zip(forces).for_each(|(force, value)| force[0] = *value);
         self.past = None;
@@ -263,7 +262,7 @@ impl Room {
     fn values<const AVX2: bool>(&mut self, step: &Step, values: &mut [Lane]) {
         #[cfg(target_arch = "x86_64")]
         if AVX2 {
-            // SAFETY: whoever says so has looked.
+            // SAFETY: the caller has checked the processor.
             return unsafe { self.values_by_avx2(step, values) };
         }
         self.values_by_any(step, values);
@@ -316,12 +315,12 @@ impl Room {
             let then: [Lane; A] = self.led(set, counts, &next);
             let most = farthest(&then[..arguments], &now[..arguments], begin.strict)?;
             let contraction = most / before;
-            // What runs away is not followed.
+            // Divergent iterations are not continued.
             if contraction <= 1.0 || turn == 0 || newton {
                 (forces, now) = (next, then);
                 self.arguments[..arguments].copy_from_slice(&now[..arguments]);
             }
-            // One change alone tells nothing of the next.
+            // One change alone does not predict the next.
             if most <= FOUND || (before.is_finite() && most * contraction <= FOUND && contraction < 1.0) {
                 for (own, force) in self.forces[..sources].iter_mut().zip(&forces) {
                     own[1..].copy_from_slice(force);
@@ -330,7 +329,7 @@ impl Room {
             }
             before = most;
             if turn > 0 && contraction > SLOW && !fresh {
-                // By the slopes where it stands; what has run away begins anew.
+                // With the slopes at the present values; a divergent iteration starts again.
                 self.newton.prepare(field, number, set, &self.arguments, &self.bristles);
                 (newton, fresh, before) = (true, true, f64::INFINITY);
                 self.newton.wanted = true;
@@ -347,7 +346,7 @@ impl Room {
         shares.reduce(f64::min)
     }
 
-    /// Which bodies have friction that turns where the step ends.
+    /// Bodies whose friction reverses at the end of the step.
     pub(super) fn reversing(&self, field: &Field) -> [bool; BODIES] {
         let mut reversing = [false; BODIES];
         let bodies = field.sources.iter().filter_map(|source| source.reversing(&field.model, &self.arguments));
@@ -362,7 +361,7 @@ impl Room {
         step.field.sources[source].kink(&step.field.model, begin, &self.arguments, &strict[..])
     }
 
-    /// By how much the arguments are off where the step ends, as a multiple of what is allowed.
+    /// Error of the arguments at the end of the step, as a multiple of the allowed one.
     #[inline(always)]
     fn error<const A: usize, const S: usize>(&self, step: &Step) -> f64 {
         let &Step { field, set, begin, .. } = step;
@@ -396,21 +395,21 @@ impl Room {
             }
             let within = lane.iter().fold(0.0, |most: f64, off| most.max(off.abs()));
             let own = (lane[NODES - 1].abs() + within) * begin.strict[argument];
-            // What is no number counts as no error at all in `max`.
+            // `max` would ignore NaN.
             most = if lane.iter().sum::<f64>().is_finite() { most.max(own) } else { f64::INFINITY };
         }
         most
     }
 }
 
-/// How many arguments and forces there are, where the compiler does not know it.
+/// Number of arguments and forces, if unknown to the compiler.
 #[inline(always)]
 fn counts<const A: usize, const S: usize>(field: &Field) -> (usize, usize) {
     let arguments = if A < ARGUMENTS { A } else { field.linear.arguments };
     (arguments, if S < SOURCES { S } else { field.sources.len() })
 }
 
-/// The largest difference of two lists of arguments, as a multiple of what is allowed; none where one is no number.
+/// Largest difference of two lists of arguments, as a multiple of the allowed one; `None` for NaN.
 #[inline(always)]
 fn farthest(a: &[Lane], b: &[Lane], strict: &Lanes<f64>) -> Option<f64> {
     let (mut most, mut sum) = ([0.0; NODES], [0.0; NODES]);
@@ -453,7 +452,7 @@ fn basis<const N: usize>(places: [f64; N]) -> [[f64; N]; POINTS] {
     values
 }
 
-/// Coordinates, speeds and currents of a whole state; what stands behind them does not count.
+/// Coordinates, speeds and currents of a whole state; the elements after them do not count.
 pub(super) fn states(y: &Vector) -> States {
     const LEAST: usize = if MOST < STATES { MOST } else { STATES };
     let mut states = [0.0; STATES];

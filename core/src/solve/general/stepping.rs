@@ -1,4 +1,4 @@
-//! From step to step: lengths by the error, guards along the way, events.
+//! Stepping: step lengths by error, guards, events.
 
 use super::fall;
 use super::field::Field;
@@ -14,12 +14,12 @@ use crate::solve::{Ending, rules};
 use std::cell::RefCell;
 use std::sync::Arc;
 
-/// The error of a step that is allowed, as a multiple of the tolerance: such that the positions of a whole run are off by
-/// the tolerance in metres at worst, of most machines by a tenth or less of it (`tests/collocation.rs`). Part of what a
-/// speed is off by is lost again before it becomes a way.
+/// Allowed error of a step, as a multiple of the tolerance: positions of a whole run then have an error of at most the
+/// tolerance in metres, for most machines of a tenth or less of it (`tests/collocation.rs`). Part of the error of a
+/// speed decays before it becomes one of position.
 const EASE: f64 = 10.0;
 
-/// Steps are so much shorter than their error asks for, and at most so much shorter or longer at once.
+/// Factor on the step length that the error allows, and limits of its change in one step.
 const SAFETY: f64 = 0.85;
 const SHRINK: f64 = 0.1;
 const GROW: f64 = 4.0;
@@ -37,7 +37,7 @@ const HALVINGS: usize = 60;
 const SOLUTIONS: usize = 6;
 const NEAR_KINK: f64 = 1e-11;
 
-/// Largest ‖A‖ h of a step in which the crossing of zero by a free motion is told by a quartic.
+/// Largest ‖A‖ h of a step in which a quartic describes the zero crossing of a free motion.
 const NEAR_QUARTIC: f64 = 1.0;
 
 /// Lengths of steps of one mode that are kept.
@@ -75,7 +75,7 @@ impl Core {
         }
     }
 
-    /// Goes to the end of the stretch, or to the first guard that falls.
+    /// Advances to the end of the stretch, or to the first guard that falls.
     fn integrate(&mut self, witness: &mut dyn Witness) -> Option<Hit> {
         let (field, stretch) = (self.field(), self.stretch);
         let mut room = self.room.take().unwrap_or_else(|| Box::new(Room::new()));
@@ -88,7 +88,7 @@ impl Core {
         let mut hit = None;
         while hit.is_none() && self.rules.trouble.is_none() {
             if stretch.length() - self.tau <= 64.0 * f64::EPSILON * stretch.length() {
-                // What is left is no step, but rounding.
+                // The remaining time is rounding, not a step.
                 self.tau = stretch.length();
                 break;
             }
@@ -117,7 +117,7 @@ impl Core {
                 Begin { y: &begin, input: stretch.inputs(from, set.h), degree: stretch.degree, strict: &strict };
             let number = self.present as u64;
             let mut error = room.solve(&Step { field, number, set: &set, begin: &start, whole }, guess.of(set.h));
-            // No step goes over a kink of a force: its quartics would not know of it.
+            // No step crosses a kink of a force, which quartics cannot describe.
             let mut is_cut = false;
             for _ in 0..SOLUTIONS {
                 let step = Step { field, number, set: &set, begin: &start, whole };
@@ -141,12 +141,12 @@ impl Core {
                 (Some(error), Some(end)) if (error <= 1.0 || least) && end.iter().sum::<f64>().is_finite() => {
                     *guess = Guess::After(set.h);
                     room.keep(set.h, field.sources.len());
-                    // The error is of sixth order. A step that had to be short says little of much longer ones.
+                    // The error is of sixth order. A short step predicts little about much longer ones.
                     self.step = (SAFETY * set.h * error.powf(-1.0 / 6.0)).min(self.step.max(GROW * set.h));
                     let reversing = room.reversing(field);
                     let hit = self.take(room, (stretch, &step), (from, length.to), end, witness);
                     if is_cut && hit.is_none() {
-                        // What was before the kink says nothing of what comes.
+                        // Values before a kink do not predict those after it.
                         let model = &*self.model;
                         for body in (0..model.mechanism.bodies.len()).filter(|&body| reversing[body]) {
                             let leader = model.mechanism.leader(body);
@@ -210,7 +210,7 @@ impl Core {
             let is_whole = (left - regular).abs() <= near.min(1e-12 * regular + 8.0 * f64::EPSILON * time);
             return Length { h: if is_whole { regular } else { left }, to: stretch.length(), regular: is_whole };
         }
-        // What the sum of times is off by.
+        // Rounding of the sum of times.
         let is_whole = (h - regular).abs() <= 8.0 * f64::EPSILON * (time + h);
         Length { h: if is_whole { regular } else { h }, to: to - stretch.begin, regular: is_whole }
     }
@@ -237,7 +237,7 @@ impl Core {
         (set, false)
     }
 
-    /// Takes a step that was solved, as far as no guard falls.
+    /// Takes a solved step up to the first guard that falls.
     fn take(
         &mut self,
         room: &mut Room,
@@ -310,13 +310,13 @@ impl Core {
             };
             if let Cause::GearTorque(drive) = cause {
                 self.torque[drive] = values.iter().fold(self.torque[drive], |most, value| most.max(value.abs()));
-                // What was told by nothing but rounding is told by the step.
+                // The step decides what rounding had decided before.
                 self.rules.tolerance[cause.kind()] = self.relative * self.torque[drive];
             }
             let slack = self.forgiven(cause);
             let own = &mut self.rules.tolerance[cause.kind()];
             if matches!(cause, Cause::Switch(_)) && values[POINTS - 1] > 10.0 * *own {
-                // A part that has clearly left its edge is watched to the last bit again.
+                // A part that has clearly left its limit is guarded to the last bit again.
                 *own = 0.0;
             }
             if !fall::may_fall(&values.map(|value| value + slack)) {
@@ -342,7 +342,7 @@ impl Core {
         let cause = fallen.cause;
         let (begin, length) = (dense.start.y, to - from);
         let shift = if field.shifted { field.shift(cause, begin) } else { 0.0 };
-        // A speed that has fallen through is looked for where it was zero.
+        // A speed that has passed zero is located at its zero.
         let slack = if matches!(cause, Cause::Stop(_)) { 0.0 } else { fall.slack };
         let mut coefficients = [0.0; TERMS];
         dense.guard(room, fall.index, shift + slack, &mut coefficients);
@@ -357,7 +357,7 @@ impl Core {
             if is_linear || (share - 1.0).abs() < 1e-4 || h <= 64.0 * f64::EPSILON * from.max(self.moment) {
                 break;
             }
-            // Where that fails the longer step was good enough.
+            // If that fails, the longer step was accurate enough.
             if !dense.shorten(room, &stretch, self.present as u64, (from, h)) {
                 break;
             }
@@ -413,8 +413,8 @@ impl Core {
         best
     }
 
-    /// By how much the condition of an event is off its limit at this state and under the inputs of this moment, as a
-    /// multiple of what tolerance and rounding explain.
+    /// Deviation of the condition of an event from its limit, at this state and the present inputs, as a multiple of
+    /// tolerance and rounding.
     fn off(&self, field: &Field, check: &Check, hit: &Hit) -> f64 {
         let input = self.stretch.input(hit.tau);
         let value = field.guards(&input, &hit.y)[check.index] + check.slack;

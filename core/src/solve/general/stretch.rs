@@ -1,4 +1,4 @@
-//! The inputs under which a machine goes on: polynomials from a beginning to an end.
+//! The present inputs of a machine: polynomials from a beginning to an end.
 
 use super::step::Inputs;
 use crate::mechanism::DRIVES;
@@ -8,9 +8,9 @@ use crate::solve::inputs::Pieces;
 /// One piece of the inputs.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Stretch {
-    /// Where it begins, s.
+    /// Begin, s.
     pub(super) begin: f64,
-    /// Where it ends, s.
+    /// End, s.
     pub(super) end: f64,
     pieces: Pieces,
     /// The highest power of time.

@@ -1,4 +1,4 @@
-//! Derivatives of matrix exponentials: how what a linear system does changes with a parameter of its matrix.
+//! Derivatives of matrix exponentials with respect to a parameter of the matrix.
 //!
 //! With z(t + h) = z + P z, P = e^{A h} − I, the derivative of z by a parameter moves by
 //!
@@ -7,13 +7,13 @@
 //! L(2h) = 2 L + L P + P L
 //! ```
 //!
-//! Where A_p meets nothing but constants (dry friction, gravity, a held input), ∂z/∂p is what a constant rate does, and
-//! L has those columns alone: l(2h) = 2 l + P l.
+//! If A_p acts on constants only (dry friction, gravity, a held input), L has the columns of those constants alone:
+//! l(2h) = 2 l + P l.
 
 use super::{EXPONENTIAL_ORDER, EXPONENTIAL_REACH, Matrix, RECIPROCAL_FACTORIAL, Series};
 use crate::solve::widest::widest;
 
-/// A matrix of which most columns are zero: those that are not.
+/// The nonzero columns of a sparse matrix.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Columns<const N: usize>(pub(crate) Vec<(usize, [f64; N])>);
 
@@ -105,8 +105,8 @@ impl<const N: usize> Matrix<N, N> {
     }
 
     widest! {
-        /// Adds to each of `s` how it changes along `series`, which goes so far as `distance`, up to its share `part` of
-        /// it, where A changes by `slopes`, and not at all for those behind the last of these: T_k = d/k (A T_{k−1} + A_p z_{k−1}).
+        /// Advances each of `s` along `series` of length `distance`, up to its share `part`, with the derivatives
+        /// `slopes` of A, which are zero beyond the last: T_k = d/k (A T_{k−1} + A_p z_{k−1}).
         pub(crate) fn add_slopes(&self, slopes: &[Columns<N>], along: (&Series<N>, f64, f64), s: &mut [[f64; N]])
             = add_slopes_by_any, add_slopes_by_avx2;
     }
@@ -141,7 +141,7 @@ impl<const N: usize> Matrix<N, N> {
 
 impl<const N: usize> SlopedStep<N> {
     widest! {
-        /// S ← S + P S + L z for each of `s`, z being where the step begins; those behind the last L have none.
+        /// S ← S + P S + L z for each of `s`, with z at the beginning of the step; those beyond the last L have no L.
         pub(crate) fn advance(&self, z: &[f64; N], s: &mut [[f64; N]]) = advance_by_any, advance_by_avx2;
     }
 

@@ -35,7 +35,7 @@ pub(super) struct Block<'b> {
     /// [`stretches`] of them.
     pub(super) stretches: &'b [Stretch],
     pub(super) extra: &'b [Extra],
-    /// Rows that stand in the columns; those up to `count` are like the last of them.
+    /// Number of rows in the columns; those up to `count` equal the last of them.
     pub(super) written: usize,
     pub(super) count: usize,
     pub(super) grid: Grid,
@@ -184,14 +184,14 @@ impl Columns {
             out.iter_mut().zip(column(place)).for_each(|(out, value)| *out = value * factor + 0.0);
         };
         match heading.shown {
-            // It goes on where all else stands.
+            // Time alone changes in repeated rows.
             Shown::Time => {}
             Shown::Input(drive) => out.copy_from_slice(column(places.input(drive))),
             Shown::Voltage(drive) => {
                 for (rows, elements) in block.elements() {
                     elements.voltage[drive].put(&self.values, rows.clone(), &mut out[rows]);
                 }
-                // What a limit holds is not beyond it by one bit.
+                // A limited value does not exceed its limit by a bit.
                 clamp(out, block.mechanism.drives[drive].amplifier.voltage_limit);
             }
             Shown::Current(drive) => out.copy_from_slice(column(places.current(drive))),
@@ -305,7 +305,7 @@ pub(super) fn stretches(segments: &[Segment], sheets: &Sheets, written: usize) -
     stretches
 }
 
-/// True if a column is put out.
+/// True if a column is output.
 pub(super) fn is_shown(heading: &Heading, detail: Detail) -> bool {
     detail == Detail::Full || heading.lean
 }

@@ -1,5 +1,5 @@
-//! The columns of rows of one mode, made ready once: the forms of forces, currents and voltages, and the quantities
-//! that stand still.
+//! The columns of rows of one mode, prepared once: the forms of forces, currents and voltages, and the constant
+//! quantities.
 
 use super::sum::{Places, Sum};
 use crate::friction::Motion;
@@ -117,7 +117,7 @@ fn load(mechanism: &Mechanism, places: &Places, leader: usize) -> Sum {
     let mut sum = Sum::constant(0.0);
     for body in mechanism.followers(leader) {
         let ratio = mechanism.ratio(body);
-        // What the phases of a stepper put on it is added to each row.
+        // The torque of the phases of a stepper is added to each row.
         let own = |drive: &Drive| drive.shaft == body && drive.motor.stepper.is_none();
         for (index, drive) in mechanism.drives.iter().enumerate().filter(|(_, drive)| own(drive)) {
             let factor = ratio * (drive.motor.gear_ratio * drive.motor.torque_constant);

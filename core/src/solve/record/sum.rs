@@ -58,20 +58,20 @@ impl Sum {
     }
 }
 
-/// Which column stands where, each behind those that it follows from: first the numbers of a row as they stand in it.
+/// Indices of the columns, each after those that it depends on: first the numbers of a row in their order.
 #[derive(Clone)]
 pub(super) struct Places {
     pub(super) bodies: usize,
     pub(super) springs: usize,
     pub(super) drives: usize,
-    /// How many numbers a row has, and where the inputs stand.
+    /// Numbers per row, and indices of the inputs.
     pub(super) stride: usize,
     pub(super) inputs: [usize; DRIVES],
     pub(super) layout: Layout,
 }
 
 impl Places {
-    /// A body's coordinate: its way from the origin, or the length that stands in its place.
+    /// A body's coordinate: its position relative to the origin, or the elongation in its place.
     pub(super) fn coordinate(&self, body: usize) -> usize {
         self.layout.coordinate[body]
     }

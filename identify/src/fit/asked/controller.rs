@@ -7,8 +7,8 @@ use crate::log::{Log, Quantity};
 use crate::machine::{EncoderPlace, Machine};
 use crate::signal::profile::Profile;
 
-/// The share of the logged input that the controller of `case` makes of reference and position of a log, 100 (1 − ‖u −
-/// û‖/‖u − ū‖); none without a controller, a reference or a position.
+/// Fit of the output û of the controller of `case`, for reference and position of a log, to the logged input u, per
+/// cent: 100 (1 − ‖u − û‖/‖u − ū‖). `None` without a controller, a reference or a position.
 pub(crate) fn reproduced(case: &Case, log: &Log) -> Option<f64> {
     let (design, reference) = (case.controller.as_ref()?, log.reference.as_ref()?);
     let position = position(&case.machine, log)?;
@@ -47,7 +47,7 @@ pub(crate) fn reproduced(case: &Case, log: &Log) -> Option<f64> {
         let asked = controller.step(&seen);
         let given = timing.limit.map_or(asked, |limit| asked.clamp(-limit, limit));
         controller.limited(given);
-        // What acts when the command is due; clocks of logs are off by a little.
+        // The input at the time at which the command acts; clocks of logs deviate a little.
         let acts = time + timing.delay + late;
         let row = log.time.partition_point(|time| *time <= acts).checked_sub(1)?;
         made.push(given);
@@ -61,7 +61,7 @@ pub(crate) fn reproduced(case: &Case, log: &Log) -> Option<f64> {
     percent.is_finite().then_some(percent)
 }
 
-/// The reading of the controller's encoder along a log, m along the belt, gaps filled.
+/// The position measured by the controller's encoder along a log, m along the belt, with missing values interpolated.
 fn position(machine: &Machine, log: &Log) -> Option<Vec<f64>> {
     let cart = filled(log, Quantity::CartPosition, 1.0);
     let angle = filled(log, Quantity::DriveAngle, machine.pulley_radius);
@@ -71,7 +71,7 @@ fn position(machine: &Machine, log: &Log) -> Option<Vec<f64>> {
     }
 }
 
-/// A quantity of a log times `arm`, gaps filled.
+/// A quantity of a log times `arm`, with missing values interpolated.
 fn filled(log: &Log, quantity: Quantity, arm: f64) -> Option<Vec<f64>> {
     let output = log.output(quantity).filter(|output| !output.absolute)?;
     let mut last = output.values.iter().copied().find(|value| value.is_finite())?;

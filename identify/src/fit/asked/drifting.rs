@@ -11,7 +11,7 @@ use crate::signal::{Hold, Signal};
 use crate::solve::{Bench, Detail, Ending, Flow};
 use crate::trajectory::Trajectory;
 
-/// Columns of the state, way and speed of each body.
+/// Columns of the state: position and speed of each body.
 const STATE: [&str; 6] = ["drive_angle", "drive_speed", "cart_position", "cart_speed", "idler_angle", "idler_speed"];
 
 /// Weighted residuals, model minus log, of machines that follow each other in equal parts of the log; false where the
@@ -73,7 +73,7 @@ fn rows(machine: &Machine, experiment: &Experiment, quantities: &[Quantity]) -> 
     (outcome.ending == Ending::Complete && state.iter().all(|v| v.is_finite())).then_some((columns, last))
 }
 
-/// A sampled input as it goes on from time `from`, s; none of another kind.
+/// A sampled input from time `from` on, s; `None` for another kind of input.
 fn later(input: &Signal, from: f64) -> Option<Signal> {
     let Signal::Sampled { times, values, hold } = input else { return None };
     let first = times.partition_point(|&t| t <= from).saturating_sub(1);

@@ -21,7 +21,7 @@ pub struct Problem<'a> {
     pub machine: Machine,
     /// The free parameters of it.
     pub parameters: Vec<Free>,
-    /// The part of the logs that each of these is for, by its place in `parts`; none where it is for all of them.
+    /// The part of the logs that each parameter is for, by its index in `parts`; `None` if it is for all of them.
     pub of: Vec<Option<usize>>,
     /// Names of the parts of the logs that have parameters for themselves: campaigns, or logs.
     pub parts: Vec<String>,
@@ -58,7 +58,7 @@ impl Noise {
 /// Asked whether to stop: Ctrl-C, say.
 pub type Stop<'a> = &'a (dyn Fn() -> bool + Sync);
 
-/// How a variable of the search becomes the value of a free parameter.
+/// Conversion of a variable of the search to the value of a free parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Scale {
     /// p = start · eˣ
@@ -172,7 +172,7 @@ impl<'a> Problem<'a> {
         self.stop
     }
 
-    /// True if it is asked to end.
+    /// True if the search is to end.
     pub fn is_stopped(&self) -> bool {
         self.stop.is_some_and(|stop| stop())
     }
@@ -180,7 +180,7 @@ impl<'a> Problem<'a> {
     fn add_extras(&mut self, case: &Case, plan: &Plan) {
         let &Nuisances { delay, input_gain, input_offset, initial_state, bias } = &plan.nuisance;
         let interval = self.runs[0].interval();
-        // Samples that are taken after their stamps are an input that acts early: as far as the input is logged.
+        // Samples that are taken after their stamps appear as an early input, if the input is logged.
         let mut inputs = self.runs.iter().flat_map(Run::inputs);
         let is_sampled = inputs.all(|input| matches!(input, Signal::Sampled { .. }));
         let (early, high) = (if is_sampled { -50.0 * interval } else { 0.0 }, 50.0 * interval);
@@ -277,7 +277,7 @@ impl<'a> Problem<'a> {
     pub fn weigh(&mut self, quantity: Quantity, deviation: f64, rounding: bool) {
         for run in &mut self.runs {
             let fitted = run.fitted_rows;
-            // Of the deviation, rounding has its part.
+            // Rounding is a part of the deviation.
             let trembles = |step: f64| (deviation * deviation - step * step / 12.0).max(0.0).sqrt();
             for seen in run.seen.iter_mut().filter(|seen| seen.quantity == quantity) {
                 for k in 0..seen.values.len() {
@@ -294,9 +294,9 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// A first value is no better than any other: what is known of starts beforehand is as uncertain as these deviations
-    /// of the positions that tell it, as far as noise that neighbouring values share can be more than what they differ
-    /// by; beyond that it is the model that is off, and not the value.
+    /// Raises the prior uncertainty of starts to these deviations of the positions that show them, since a first value
+    /// is as noisy as any other. The increase is limited to the factor by which correlated noise can exceed the
+    /// difference of neighbouring values; a larger deviation is an error of the model.
     pub fn doubt_starts(&mut self, noise: &[(Quantity, f64)]) {
         let of = |quantity: Quantity| noise.iter().find(|(own, _)| *own == quantity).map(|(_, deviation)| *deviation);
         for run in &mut self.runs {
@@ -356,7 +356,7 @@ impl<'a> Problem<'a> {
         self.runs.iter().flat_map(|run| (0..run.seen.len()).map(|output| run.independent(output))).sum()
     }
 
-    /// Where the case starts.
+    /// The start values of the case.
     pub fn start(&self) -> Vec<f64> {
         let mut x: Vec<f64> =
             self.parameters.iter().zip(&self.units).map(|(parameter, unit)| unit.variable(parameter.start)).collect();
@@ -411,12 +411,12 @@ impl<'a> Problem<'a> {
         match self.units.get(j) {
             Some(Scale::Linear(unit)) => {
                 let typical = typical(machine, &self.parameters[j], &self.runs);
-                // Of what has no size by nature, the value itself, or where it started.
+                // Without a typical size, the value itself, or its start.
                 typical.map_or(if x == 0.0 { 1.0 } else { x.abs() }, |typical| x.abs().max(typical / unit))
             }
             Some(Scale::Log(_)) => 1.0,
             None => match self.shared[j - self.parameters.len()].what {
-                // Its unit is a sample's interval, to which few logs tell a delay.
+                // Its unit is a sample's interval; few logs determine a delay to that.
                 Nuisance::Delay => KNOWN_DELAY,
                 _ => 1.0,
             },
@@ -428,8 +428,8 @@ impl<'a> Problem<'a> {
         matches!(self.units[j], Scale::Log(_))
     }
 
-    /// The same machine, with each variable as the machine has it: a breakaway that was asked for below Coulomb
-    /// friction is at it.
+    /// The variables of the same machine with the values that it uses: a breakaway below Coulomb friction is raised to
+    /// it.
     pub fn as_set(&self, x: &[f64]) -> Vec<f64> {
         let mut own = x.to_vec();
         for (j, (parameter, unit)) in self.parameters.iter().zip(&self.units).enumerate() {
@@ -473,12 +473,12 @@ impl<'a> Problem<'a> {
         (0..self.parts.len().max(1)).map(|part| self.simulated(part, x)).collect()
     }
 
-    /// Where the extras of run `index` begin among the variables.
+    /// Index of the first extra of run `index` among the variables.
     fn place(&self, index: usize) -> usize {
         self.globals() + self.runs[..index].iter().map(|run| variable_extras(run).count()).sum::<usize>()
     }
 
-    /// The values of a run's extras, and of the shared ones, as [`Run::experiment`] wants them.
+    /// The values of a run's extras, and of the shared ones, for [`Run::experiment`].
     pub fn extras_of(&self, index: usize, x: &[f64]) -> Vec<f64> {
         let mut at = self.place(index);
         let own = self.runs[index].extras.iter().map(|extra| {
@@ -519,7 +519,7 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// Where the residuals of run `index` begin.
+    /// Index of the first residual of run `index`.
     pub fn first_row(&self, index: usize) -> usize {
         self.runs[..index].iter().map(Run::rows).sum()
     }
@@ -549,9 +549,8 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// The Jacobian as far as it is exact, and the runs that are left with where their residuals begin and the
-    /// variables that move them; the residuals of all runs, where they are asked for. None where a run cannot be
-    /// computed.
+    /// The exact part of the Jacobian; the remaining runs, each with the index of its first residual and the variables
+    /// that affect it; and the residuals of all runs, if requested. `None` if a run cannot be computed.
     fn blocks(
         &mut self,
         x: &[f64],
@@ -709,17 +708,17 @@ pub(crate) fn extent(values: &[f64]) -> f64 {
     if high >= low { high - low } else { 0.0 }
 }
 
-/// Where a slide begins in a run, as far as that is searched for.
+/// The variables of the start of a slide in a run.
 struct Start<'r> {
     slide: usize,
-    /// Its position by the outputs of the run, if they tell it.
+    /// Its position by the outputs of the run, if they show it.
     reading: Option<&'r Reading>,
     noise: &'r Noise,
 }
 
 impl Start<'_> {
-    /// Position and speed at the start of a run, as far as they are searched for: `initial_state` asks for both, and
-    /// `given` is true if the case says where the run begins.
+    /// Extras for position and speed at the start of a run: both with `initial_state`; `given` is true if the case
+    /// states the start.
     fn extras(&self, run: &Run, machine: &Machine, (initial_state, given): (bool, bool)) -> Vec<Extra> {
         let mut extras = Vec::new();
         let r = machine.pulley_radius;
@@ -757,8 +756,8 @@ impl Start<'_> {
         if initial_state || windowed {
             let of = |quantity| Some(self.noise.of(quantity));
             let (slope, doubt) = self.reading.map_or((0.0, 0.0), |reading| reading.speed_at_start(run, of));
-            // A log begins at rest, unless it shows that it does not: a start at rest sticks, and a search from there
-            // sees nothing of the speed.
+            // A log begins at rest unless it shows motion: a start at rest sticks, and a search from there does not
+            // depend on the speed.
             let start = if windowed || slope.abs() > STARTS_MOVING * doubt { slope } else { 0.0 };
             let (low, high) = (start - 20.0 * fast, start + 20.0 * fast);
             let what = Nuisance::StartSpeed(self.slide);
@@ -779,8 +778,8 @@ fn scale(machine: &Machine, parameter: &Free, runs: &[Run]) -> Scale {
     }
 }
 
-/// A typical value of a quantity that may be zero: of friction a tenth of the motor's force at the greatest input; none
-/// where that depends on the machine alone, as the gain of an amplifier, which has whatever unit its input has.
+/// A typical value of a quantity that may be zero: for friction a tenth of the motor's force at the greatest input.
+/// `None` if it depends on the machine alone, such as the gain of an amplifier, whose unit depends on the input.
 fn typical(machine: &Machine, parameter: &Free, runs: &[Run]) -> Option<f64> {
     let most = runs.iter().flat_map(|run| run.logged.iter().flatten()).fold(0.0, |most: f64, u| most.max(u.abs()));
     let torque_of = |unit: &DriveUnit| {

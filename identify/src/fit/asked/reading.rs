@@ -12,7 +12,7 @@ pub(crate) struct Reading {
 }
 
 impl Reading {
-    /// The position of a slide by the first output that shows it alone, or else by the angles of all drives; none where
+    /// The position of a slide by the first output that shows it alone, or else by the angles of all drives; `None` if
     /// the log has neither.
     pub fn of(run: &Run, machine: &Machine, slide: usize) -> Option<Self> {
         let (geometry, r) = (machine.geometry(), machine.pulley_radius);
@@ -52,7 +52,7 @@ impl Reading {
         (0..run.time.len()).map(row).collect()
     }
 
-    /// Its standard deviation for these of the outputs; none where one of them is not known.
+    /// Its standard deviation, from those of the outputs; `None` if one of them is unknown.
     pub fn deviation(&self, run: &Run, of: impl Fn(Quantity) -> Option<f64>) -> Option<f64> {
         let parts = self.parts.iter().map(|(output, weight)| Some(weight.abs() * of(run.seen[*output].quantity)?));
         let parts: Option<Vec<f64>> = parts.collect();

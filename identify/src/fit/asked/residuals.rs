@@ -11,7 +11,7 @@ pub trait Residuals {
     /// r(x); false where it cannot be computed.
     fn evaluate(&mut self, x: &[f64], r: &mut [f64]) -> bool;
 
-    /// True if the last Jacobian is exact, whatever differences were asked for.
+    /// True if the last Jacobian is exact, independent of the requested differences.
     fn is_exact(&self) -> bool {
         false
     }
@@ -46,8 +46,8 @@ pub trait Residuals {
     }
 }
 
-/// How derivatives are measured. The step is the cube root of the rounding unit for central differences, where the
-/// error of the formula and that of rounding balance (1e-10 of the value), and the square root for one-sided ones.
+/// Step sizes of finite differences. The step is the cube root of the rounding unit for central differences, which
+/// balances the errors of formula and rounding (1e-10 of the value), and the square root for one-sided ones.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Differences {
     /// One-sided, from the values at hand.
@@ -60,7 +60,7 @@ pub enum Differences {
     Coarse(Vec<f64>),
 }
 
-/// Where a derivative is measured.
+/// The point of a derivative.
 #[derive(Debug, Clone, Copy)]
 pub struct Step {
     /// The first point.

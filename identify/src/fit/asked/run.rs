@@ -1,4 +1,4 @@
-//! A log made ready to be compared: when the model is asked, what it is told, and what its answer is weighed with.
+//! A log prepared for the comparison: times, inputs and weights.
 
 use super::acceleration::acceleration;
 use crate::case::{Case, Experiment};
@@ -50,7 +50,7 @@ impl Nuisance {
         }
     }
 
-    /// Its unit; none of its own for a bias, which has that of its output.
+    /// Its unit; empty for a bias, which has that of its output.
     pub fn unit(self, machine: &Machine) -> &'static str {
         match self {
             Nuisance::Delay => "s",
@@ -95,11 +95,11 @@ pub struct MeasuredOutput {
     pub values: Vec<f64>,
     /// 1/σ of each; zero for what does not count.
     pub weights: Vec<f64>,
-    /// Step of the converter as far as the values show it; 0 where they show none.
+    /// Step of the converter shown by the values; 0 if there is none.
     pub step: f64,
-    /// How many equal values stand in a row here: what rounds them is the same for all of them.
+    /// Number of equal values in a row here, which share one rounding error.
     pub repeats: Vec<f64>,
-    /// How many values stand in a row here that go to and fro within two steps: at rest, with noise.
+    /// Number of values in a row here that alternate within two steps: at rest, with noise.
     pub alike: Vec<f64>,
 }
 
@@ -125,7 +125,7 @@ pub struct Run {
     pub logged: Vec<Vec<f64>>,
     /// The outputs.
     pub seen: Vec<MeasuredOutput>,
-    /// The part of the logs that it is of, as far as these have parameters for themselves.
+    /// The part of the logs that it belongs to, if parts have parameters of their own.
     pub part: usize,
     /// True if none of it is fitted.
     pub held_out: bool,
@@ -154,7 +154,7 @@ struct Closed {
     added: Option<Added>,
 }
 
-/// How a run is made of a log.
+/// Options for the conversion of a log to a run.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Setting {
     /// Length of a window, s; the whole log without.
@@ -343,7 +343,7 @@ impl Run {
         self.even
     }
 
-    /// The value of an extra among these; none if it has no such one.
+    /// The value of an extra among these; `None` if the run does not have it.
     pub(crate) fn extra(&self, what: Nuisance, extras: &[f64]) -> Option<f64> {
         let mut pairs = self.extras.iter().chain(&self.shared).zip(extras);
         pairs.find(|(extra, _)| extra.what == what).map(|(_, value)| *value)
@@ -354,13 +354,13 @@ impl Run {
         &self.inputs
     }
 
-    /// Where the model begins with these values of the extras, which set the gains of its amplifiers, too.
+    /// Initial state of the model for these values of the extras, which also set the gains of its amplifiers.
     pub(crate) fn initial(&self, machine: &mut Machine, extras: &[f64]) -> State {
         for (drive, unit) in machine.drives.iter_mut().enumerate() {
             unit.amplifier.gain *= self.extra(Nuisance::InputGain(drive), extras).unwrap_or(1.0);
         }
         let slides = machine.geometry().slides;
-        // Of all slides, where an extra has one of them.
+        // Of all slides, if an extra has one of them.
         let fitted = |what: fn(usize) -> Nuisance, given: &[f64]| -> Option<Vec<f64>> {
             let own: Vec<_> = (0..slides.len()).map(|slide| self.extra(what(slide), extras)).collect();
             let all = own.iter().zip(slides).map(|(own, slide)| own.unwrap_or(given[slide.body]));
@@ -520,7 +520,7 @@ pub(crate) fn column(block: &Trajectory, quantity: Quantity) -> &[f64] {
     block.get(name).or_else(|| block.get(other)).unwrap_or(&[])
 }
 
-/// The heading of the column of a quantity, and of that which takes its place where there is none.
+/// The heading of the column of a quantity, and that of its replacement if it has no column.
 pub(crate) fn heading_of(quantity: Quantity) -> (&'static str, &'static str) {
     let name = quantity.name();
     let other = match name {
@@ -536,7 +536,7 @@ pub(crate) fn heading_of(quantity: Quantity) -> (&'static str, &'static str) {
     (name, other)
 }
 
-/// By how much a quantity is more for each metre that the start of a slide is further on.
+/// Derivative of a quantity with respect to the start position of a slide, per metre.
 pub(crate) fn per_position(machine: &Machine, quantity: Quantity, slide: usize) -> f64 {
     machine.geometry().by_slides(quantity, machine.pulley_radius).get(slide).copied().unwrap_or(0.0)
 }

@@ -13,8 +13,8 @@ use nalgebra::DMatrix;
 use std::sync::Arc;
 
 impl Problem<'_> {
-    /// Puts the derivatives of the residuals of run `index`, which begin at row `first`, into the columns of these
-    /// variables, and the residuals where they are asked for; false where derivatives cannot be told exactly.
+    /// Writes the derivatives of the residuals of run `index`, from row `first` on, to the columns of these variables,
+    /// and the residuals if requested; returns false if there are no exact derivatives.
     pub(crate) fn exact_block(
         &mut self,
         (bench, machine): (&mut Bench, &Machine),
@@ -30,8 +30,8 @@ impl Problem<'_> {
             let all = columns.iter().map(|&j| self.variable_of((index, j), x, bounds, is_moved));
             all.collect::<Option<Vec<_>>>()
         };
-        // Where it does not matter where the cart begins, it begins at the origin, so that all runs count from there
-        // and share what the machine has made ready; but angles there depend on the radius.
+        // If the start of the cart does not matter, it is the origin, so that all runs share the prepared matrices; but
+        // angles then depend on the radius.
         let mut is_moved = self.runs[index].is_shifted(machine);
         let Some(mut all) = variables(is_moved) else { return false };
         if is_moved && all.iter().any(|variable| changes_radius(machine, variable)) {
@@ -73,7 +73,7 @@ impl Problem<'_> {
                 }
             }
         }
-        // What is known of the run's own beforehand.
+        // Prior knowledge of the run's own variables.
         let known = run.extras.iter().filter(|extra| extra.known.is_some());
         for (at, extra) in known.enumerate() {
             let own = self.own_variables(index).into_iter().find(|(_, own)| own.what == extra.what);
@@ -97,8 +97,8 @@ impl Problem<'_> {
         extras
     }
 
-    /// The meaning of variable `j` of the search for run `index`; none for what is no number of a machine, nor known
-    /// how it moves the input.
+    /// The meaning of variable `j` of the search for run `index`; `None` if it is neither a parameter of a machine nor
+    /// a known change of the input.
     fn variable_of(&self, (index, j): (usize, usize), x: &[f64], bounds: &Bounds, is_moved: bool) -> Option<Variable> {
         let extra = match j.checked_sub(self.parameters.len()) {
             None => None,
@@ -161,7 +161,7 @@ impl Run {
         Begun { start: mechanism.begun(&initial), mechanism }
     }
 
-    /// Each output with its derivatives by the variables at the log's times; none where they cannot be told exactly.
+    /// Each output with its derivatives by the variables at the log's times; `None` if there are no exact ones.
     fn slopes(
         &self,
         bench: &mut Bench,
@@ -207,7 +207,7 @@ impl Run {
         Some(all)
     }
 
-    /// When what is added to the input of a drive begins to be, s; none where the input has no such moment.
+    /// Time at which an offset of the input of a drive begins, s; `None` if the input has no such time.
     fn begins(&self, drive: usize, extras: &[f64]) -> Option<f64> {
         let delay = self.extra(Nuisance::Delay, extras);
         match &self.inputs()[drive] {

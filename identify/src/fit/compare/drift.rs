@@ -26,10 +26,10 @@ use crate::solve::Flow;
 pub struct Drift {
     /// The errors of the machine as it is.
     pub unchanged: Vec<Together>,
-    /// Single changes: those that the logs do not tell from the one that explains most, in the order of what causes
-    /// them; then the others, the one that explains most first.
+    /// Single changes: first those that the logs cannot distinguish from the one that explains most, ordered by
+    /// likelihood of their causes; then the others, ordered by their explained share.
     pub changes: Vec<Change>,
-    /// How many of them the logs do not tell from the one that explains most, itself included.
+    /// Number of changes that the logs cannot distinguish from the one that explains most, including it.
     pub alike: usize,
     /// The effort.
     pub work: Work,
@@ -61,7 +61,7 @@ impl Drift {
         changes.sort_by(|a, b| a.left.total_cmp(&b.left));
         let least = changes.first().map_or(0.0, |change| change.left);
         let alike = changes.partition_point(|change| change.left <= least * (1.0 + CHANGE_ALIKE) + 1e-12);
-        // Of a pair and its members, the pair.
+        // A pair precedes its members.
         let members = |change: &Change| change.estimate.name.split(" = ").count();
         changes[..alike].sort_by_key(|change| (Cause::of(&change.estimate.name), std::cmp::Reverse(members(change))));
         Self { unchanged, changes, alike, work }
@@ -86,7 +86,7 @@ enum Cause {
 }
 
 impl Cause {
-    /// Of a change by its name: a key, several joined by ` = `, a sum, or a nuisance.
+    /// Cause of a change by its name: a key, several joined by ` = `, a sum, or a nuisance.
     fn of(name: &str) -> Self {
         let has = |words: &[&str]| words.iter().any(|word| name.contains(word));
         match () {
@@ -101,7 +101,7 @@ impl Cause {
     }
 }
 
-/// Pairs that change together, as far as a machine has both and neither is zero.
+/// Pairs that change together, if the machine has both and neither is zero.
 fn pairs(machine: &Machine) -> Vec<Vec<String>> {
     let bodies = ["drive_pulley", "cart", "idler_pulley", "bridge"];
     let kinds = ["viscous", "coulomb", "static"];
@@ -142,7 +142,7 @@ pub fn drift(case: &Case, plan: &Plan, stop: Option<Stop>, watch: &mut dyn FnMut
         if watch(&name) == Flow::Stop || stop.is_some_and(|stop| stop()) {
             break;
         }
-        // What cannot be changed so that the model gets through the logs explains nothing.
+        // A change with which the model cannot simulate the logs explains nothing.
         let Ok(Settled { searched: found, .. }) = search(case, &single, stop, quiet) else { continue };
         work.add(&found.work);
         let judged = Judged::new(

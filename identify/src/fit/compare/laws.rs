@@ -78,7 +78,7 @@ impl FrictionLaw {
     }
 }
 
-/// The body whose friction is compared: that of which most is searched for; the cart where that is none.
+/// The body whose friction is compared: the one with most free parameters, or else the cart.
 pub(super) fn body(plan: &Plan) -> &'static str {
     let count = |body: &str| {
         let own = plan.free.iter().chain(plan.tied.iter().flatten());
@@ -174,7 +174,7 @@ fn line(case: &Case, law: FrictionLaw, is_held: bool) -> Option<Line> {
             Some(Line { key: "force_along", over: over_travel(case).collect(), free })
         }
         FrictionLaw::ForceBySpeed => {
-            // What goes with the speed is viscous friction, and what has its sign Coulomb friction.
+            // The part proportional to speed is viscous friction, the part with its sign Coulomb friction.
             let fastest = fastest(case);
             let is_free = |k: &usize| SPEED_POINTS[*k] != 0.0 && SPEED_POINTS[*k].abs() != 1.0;
             let free = (0..SPEED_POINTS.len()).filter(is_free).collect();
@@ -311,13 +311,13 @@ fn fastest(case: &Case) -> f64 {
     speeds.fold(1e-3, f64::max)
 }
 
-/// Places along the way that the logs show, m.
+/// Positions along the travel in the logs, m.
 fn over_travel(case: &Case) -> impl Iterator<Item = f64> {
     let (low, high) = travel(case);
     (0..TRAVEL_POINTS).map(move |k| low + (high - low) * k as f64 / (TRAVEL_POINTS - 1) as f64)
 }
 
-/// Where the cart is in the logs, m.
+/// Range of cart positions in the logs, m.
 fn travel(case: &Case) -> (f64, f64) {
     let r = case.machine.pulley_radius;
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);

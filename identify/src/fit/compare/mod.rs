@@ -32,7 +32,7 @@ use std::path::Path;
 pub struct Setting {
     /// Friction laws.
     pub laws: Vec<FrictionLaw>,
-    /// Lengths of windows, s; none for whole logs.
+    /// Lengths of windows, s; `None` for whole logs.
     pub windows: Vec<Option<f64>>,
 }
 
@@ -86,7 +86,7 @@ pub struct Candidate {
     pub law: FrictionLaw,
     /// True if each direction has its own values.
     pub sided: bool,
-    /// Length of windows, s; none for whole logs.
+    /// Length of windows, s; `None` for whole logs.
     pub window: Option<f64>,
     /// How many parameters of the machine are searched for.
     pub parameters: usize,
@@ -98,7 +98,7 @@ pub struct Candidate {
     pub error: f64,
     /// Mean square of each part that was held out.
     pub squares: Vec<f64>,
-    /// Why there is no result; none where there is one.
+    /// Why there is no result; `None` if there is one.
     pub failed: Option<String>,
 }
 
@@ -116,7 +116,7 @@ impl Candidate {
     }
 }
 
-/// Compares laws and windows for the logs of `case`, whose file is `name`; `watch` is told what is fitted.
+/// Compares laws and windows for the logs of `case`, whose file is `name`; `watch` receives the name of each fit.
 pub fn compare(
     case: &Case,
     name: &Path,
@@ -181,7 +181,7 @@ pub fn compare(
     course.chosen()
 }
 
-/// A comparison on its way.
+/// A comparison in progress.
 struct Course<'a> {
     case: &'a Case,
     name: &'a Path,
@@ -195,7 +195,7 @@ struct Course<'a> {
 
 struct Tried {
     candidate: Candidate,
-    /// By part and quantity: sum of squares, values.
+    /// Sum of squares and number of values, by part and quantity.
     errors: Vec<Vec<(Quantity, f64, usize)>>,
     training: Vec<(Quantity, f64)>,
     case: Case,
@@ -261,14 +261,14 @@ impl Course<'_> {
         Ok(found)
     }
 
-    /// The windows with which the laws of straight lines predict best; none where none was tried yet.
+    /// The windows with which the laws of straight lines predict best; `None` if none was tried yet.
     fn best_window(&self) -> Option<Option<f64>> {
         let is_simple = |tried: &&Tried| tried.candidate.failed.is_none() && !tried.candidate.law.is_above();
         let tried = self.tried.iter().filter(is_simple);
         tried.min_by(|a, b| a.squares().total_cmp(&b.squares())).map(|tried| tried.candidate.window)
     }
 
-    /// True if friction with a value for each direction predicts better than without, as far as both were tried.
+    /// True if friction with a value for each direction predicts better than without, and both were tried.
     fn is_sided_better(&self) -> bool {
         let of = |law: FrictionLaw| {
             let own = self.tried.iter().filter(|tried| tried.candidate.law == law && tried.candidate.failed.is_none());
@@ -336,7 +336,7 @@ impl Course<'_> {
         let near = |one: &Candidate| one.held_out.powi(2) - top * top <= one.error;
         let fewest = self.tried.iter().map(|tried| &tried.candidate).filter(|one| one.failed.is_none() && near(one));
         let fewest = fewest.map(|one| one.parameters).min().unwrap_or(usize::MAX);
-        // The first of so many parameters predicts best of them.
+        // The first with this number of parameters predicts best among them.
         let chosen = self.tried.iter().position(|tried| tried.candidate.parameters == fewest).unwrap_or(0);
         let by_training = (0..self.tried.len())
             .filter(|&k| self.tried[k].candidate.failed.is_none())

@@ -57,8 +57,8 @@ pub(super) struct Room {
 /// An input of a kind, its numbers rounded to what is written.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Shape {
-    /// From zero in `ramp` to ± `amplitude`, held for `hold`, back in `ramp`, nothing for `rest`; forward, then
-    /// backward, so often.
+    /// From zero in `ramp` to ± `amplitude`, held for `hold`, back in `ramp`, zero for `rest`; forward, then backward,
+    /// repeated.
     Trapezoid {
         /// Greatest value.
         amplitude: f64,
@@ -68,20 +68,20 @@ pub enum Shape {
         hold: f64,
         /// s.
         rest: f64,
-        /// Of every other time there and back, the share of the amplitude.
+        /// Amplitude of every second repetition, relative to the first.
         ratio: f64,
         /// Times there and back.
         cycles: usize,
     },
     /// Sines from one frequency to the other, equally far apart in their logarithm.
     Sweep {
-        /// Of the greatest.
+        /// Amplitude of the greatest sine.
         amplitude: f64,
         /// Hz.
         from: f64,
         /// Hz.
         to: f64,
-        /// How many.
+        /// Number of sines.
         sines: usize,
         /// Amplitude ∝ frequency to this power.
         tilt: f64,
@@ -101,13 +101,13 @@ pub enum Shape {
     },
     /// Equal sines with Schroeder's phases.
     Multisine {
-        /// Of each.
+        /// Amplitude of each sine.
         amplitude: f64,
         /// Hz.
         from: f64,
         /// Hz.
         to: f64,
-        /// How many.
+        /// Number of sines.
         tones: usize,
         /// s.
         lasts: f64,

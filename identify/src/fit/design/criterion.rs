@@ -17,7 +17,7 @@ pub(super) struct Information {
 }
 
 impl Information {
-    /// From derivatives at `x`; none if numbers fail.
+    /// The criterion from derivatives at `x`; `None` if numbers fail.
     pub fn new(problem: Problem<'static>, jacobian: DMatrix<f64>, x: Vec<f64>, wanted: &[usize]) -> Option<Self> {
         let all: Vec<usize> = (0..problem.globals()).collect();
         let Directions { v, singular, whole, .. } = Directions::new(&problem, &jacobian, &x, &all)?;

@@ -12,7 +12,7 @@ pub struct Driven {
     pub name: &'static str,
     /// In words.
     words: String,
-    /// For each drive whether it gets the input, 1, its negative, −1, or none, 0.
+    /// Factor on the input for each drive: 1, −1, or 0 for no input.
     pub signs: Vec<f64>,
 }
 
@@ -46,7 +46,7 @@ impl Driven {
         each
     }
 
-    /// Those of these names; all where none is named.
+    /// The choices with these names; all if the list is empty.
     pub(super) fn named(machine: &Machine, names: &[String]) -> Result<Vec<Self>> {
         let all = Self::all(machine);
         if names.is_empty() {

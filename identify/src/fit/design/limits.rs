@@ -1,4 +1,4 @@
-//! How far an experiment may go, and how far one goes.
+//! Limits of an experiment, and their use.
 
 use super::Request;
 use crate::case::{Case, Experiment};
@@ -8,7 +8,7 @@ use crate::mechanism::State;
 use crate::signal::Signal;
 use crate::solve::{Bench, Detail, Ending, Flow};
 
-/// Where a limit comes from.
+/// Origin of a limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Origin {
     /// The request.
@@ -37,7 +37,7 @@ pub struct Limits {
     pub input: (f64, Origin),
     /// Greatest current of any motor, A, if there is a limit.
     pub current: Option<(f64, Origin)>,
-    /// Length of the way that each sliding part may take, m.
+    /// Travel available to each sliding part, m.
     pub travel: Vec<(f64, Origin)>,
     /// Its middle, where the case says where the travel is.
     pub middle: Vec<Option<f64>>,
@@ -45,7 +45,7 @@ pub struct Limits {
     pub margin: f64,
 }
 
-/// How far an experiment goes.
+/// Extremes of an experiment.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Reached {
     /// Greatest input, V or A.
@@ -125,7 +125,7 @@ impl Limits {
         Ok(Self { input, current, travel, middle, margin: request.margin })
     }
 
-    /// The greatest of the shares of the limits that is used, the margin being none of them: 1 is just within.
+    /// Greatest used share of the limits without the margin: 1 is just within.
     pub fn used(&self, reached: &Reached) -> f64 {
         let room = 1.0 - self.margin;
         let current = self.current.map_or(0.0, |(limit, _)| reached.current / (room * limit));
@@ -134,8 +134,7 @@ impl Limits {
     }
 }
 
-/// A machine whose travel has no ends: how far it goes is looked at afterwards. Spans that follow the cart need their
-/// travel.
+/// The machine with unlimited travel, since travel is checked afterwards; spans that follow the cart keep their travel.
 pub(super) fn unbounded(stage: &Machine) -> Machine {
     let mut stage = stage.clone();
     if !stage.belt.follows_cart {
@@ -145,7 +144,7 @@ pub(super) fn unbounded(stage: &Machine) -> Machine {
     stage
 }
 
-/// How far the case's own experiments go; those that do not get to their end are left out.
+/// Extremes of the case's own experiments, without those that end early.
 fn seen(case: &Case) -> Vec<Reached> {
     let stage = unbounded(&case.machine);
     let one = |experiment: &Experiment| {
@@ -154,7 +153,7 @@ fn seen(case: &Case) -> Vec<Reached> {
     case.experiments.iter().filter_map(one).collect()
 }
 
-/// How far inputs go on a machine; none where the run does not get to its end.
+/// Extremes of a run with these inputs; `None` if it ends early.
 pub(super) fn reach(stage: &Machine, inputs: &[Signal], initial: State, every: f64, until: f64) -> Option<Reached> {
     let geometry = stage.geometry();
     let none = [f64::INFINITY, f64::NEG_INFINITY];

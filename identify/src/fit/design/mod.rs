@@ -59,11 +59,11 @@ impl Criterion {
 /// The experiment that is wanted; what is not said follows from the case.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Request {
-    /// The parameters that count; the free ones of `[fit]` where none is named.
+    /// The parameters of the criterion; if empty, the free ones of `[fit]`.
     pub names: Vec<String>,
-    /// The inputs to choose among; all where none is named.
+    /// The kinds of inputs to choose from; all if empty.
     pub kinds: Vec<Kind>,
-    /// What inputs may go to, by the names of [`Driven::all`]; all of these where none is named.
+    /// The driven motors to choose from, by the names of [`Driven::all`]; all if empty.
     pub driven: Vec<String>,
     /// The measure that is made small.
     pub criterion: Criterion,
@@ -73,7 +73,7 @@ pub struct Request {
     pub every: Option<f64>,
     /// Share of each limit that is left free.
     pub margin: f64,
-    /// By what share each free parameter may be off, the limits still being kept.
+    /// Relative error of each free parameter within which the limits must still hold.
     pub doubt: f64,
     /// Relative error of the model: no promise is better.
     pub model_error: f64,
@@ -153,8 +153,8 @@ pub(super) struct Task<'a> {
     pub stop: Stop<'a>,
 }
 
-/// Designs an experiment for a case; `stop` is asked now and then and ends the search with the best so far, `watch` is
-/// told of each kind of input that is looked at.
+/// Designs an experiment for a case. `stop` is called from time to time and ends the search with the best input so far;
+/// `watch` receives each kind of input.
 ///
 /// ```
 /// use taut::case::{Case, TEMPLATE};
@@ -273,14 +273,14 @@ fn plan_of(case: &Case, request: &Request) -> Result<Plan> {
 /// The recorder's interval, else the shortest of the experiments.
 fn usual_interval(case: &Case) -> f64 {
     let recorder = case.measurement.as_ref().and_then(|measurement| measurement.every);
-    // That of a log is a difference of its times, with their rounding.
+    // The interval of a log is a difference of its times, with their rounding.
     let written = |every: f64| format!("{every:.9e}").parse().unwrap_or(every);
     let shortest = case.experiments.iter().map(|experiment| written(experiment.every)).reduce(f64::min);
     recorder.or(shortest).unwrap_or(SAMPLE_INTERVAL)
 }
 
-/// Outputs that are measured, and how well: as asked for; else the encoder and the recorder of the case; else the
-/// outputs of its logs, with the noise that they show.
+/// Measured outputs and their noise: as requested, else by the encoder and the recorder of the case, else the outputs
+/// of its logs with their noise.
 fn measured(case: &Case, request: &Request) -> Result<Vec<Channel>> {
     let own = case.machine.quantities();
     if let Some(channel) = request.measured.iter().find(|channel| !own.contains(&channel.quantity)) {
@@ -331,5 +331,5 @@ fn measured(case: &Case, request: &Request) -> Result<Vec<Channel>> {
     }
 }
 
-/// Groups of parameters that the experiment does not tell apart, and what to do about each.
+/// Groups of parameters that the experiment cannot distinguish, each with remedies.
 pub type Undetermined = Vec<(Group, Vec<String>)>;

@@ -59,7 +59,7 @@ pub struct Alternative {
     pub refined: bool,
 }
 
-/// An experiment of the case, measured in the same way.
+/// An experiment of the case with the same measurement.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Own {
     /// Its name.
@@ -87,13 +87,13 @@ pub struct Designed {
     pub duration: f64,
     /// Between samples, s.
     pub every: f64,
-    /// Where it begins.
+    /// Initial state.
     pub initial: State,
-    /// How far it goes on the machine of the case.
+    /// Its extremes on the machine of the case.
     pub reached: Reached,
-    /// How far it may go.
+    /// Its limits.
     pub limits: Limits,
-    /// By what share each free parameter may be off and the limits hold.
+    /// Relative error of each free parameter within which the limits hold.
     pub doubt: f64,
     /// Relative error of the model, in every promise.
     pub model_error: f64,
@@ -105,19 +105,19 @@ pub struct Designed {
     pub criterion: Criterion,
     /// The same.
     pub score: f64,
-    /// Parameters that it does not tell apart, and what to do about them.
+    /// Parameters that it cannot distinguish, with remedies.
     pub undetermined: Undetermined,
     /// The best of each kind, the best first.
     pub alternatives: Vec<Alternative>,
     /// The case's own experiments.
     pub own: Vec<Own>,
-    /// Inputs that were looked at.
+    /// Number of inputs tried.
     pub tried: usize,
     /// True if the search was ended early.
     pub interrupted: bool,
 }
 
-/// An input of which is known what it tells.
+/// An evaluated input.
 struct Judged {
     shape: Shape,
     driven: Driven,
@@ -127,7 +127,7 @@ struct Judged {
     score: f64,
 }
 
-/// The best input of these kinds, of all where none is named.
+/// The best input of these kinds, or of all if the list is empty.
 pub(super) fn best(task: &Task, case: &Case, kinds: &[Kind], watch: &mut dyn FnMut(&str)) -> Result<Designed> {
     let kinds = if kinds.is_empty() { &Kind::ALL[..] } else { kinds };
     let mut tried = 0;
@@ -275,10 +275,10 @@ fn doubtful(task: &Task) -> Result<Vec<Machine>> {
 }
 
 impl Task<'_> {
-    /// An input that keeps the limits on all of these machines, too, and what it surely tells.
+    /// An input that keeps the limits on all of these machines, too, with its information.
     fn finally(&self, shape: Shape, driven: &Driven, doubtful: &[Machine]) -> Option<Judged> {
         let (shape, initial, reached) = self.fitted(shape, driven, doubtful)?;
-        // What does not break away tells nothing.
+        // An input that does not break the machine away contains no information.
         if reached.speed == 0.0 {
             return None;
         }

@@ -34,7 +34,8 @@ impl Designed {
         text
     }
 
-    /// Where what slides begins; of an axis its pulleys, too: those of a gantry are where the belt is without strain.
+    /// Initial positions of the sliding parts; for an axis also of its pulleys. Pulleys of a gantry begin without belt
+    /// strain.
     fn start(&self, machine: &Machine) -> String {
         let (geometry, at) = (machine.geometry(), self.initial.position);
         let slides = geometry.slides.iter().map(|slide| slide.body);
@@ -61,7 +62,7 @@ impl Designed {
                 error
             }
         })?;
-        // What is written is what was judged.
+        // The written experiment is the evaluated one.
         match read.experiments.last() {
             Some(last) if last.name == self.name && last.inputs == self.driven.inputs(&self.shape) => Ok(whole),
             _ => Err(Error::new("the designed experiment does not read back as it was written").in_file(name)),

@@ -1,4 +1,4 @@
-//! One input looked at: where it begins, how far it goes, and what a fit of its log would know.
+//! Evaluation of one input: its start, its extremes, and the information of its log.
 
 use super::Task;
 use super::candidates::Shape;
@@ -22,8 +22,7 @@ use rand_pcg::rand_core::SeedableRng;
 use std::sync::Arc;
 
 impl Task<'_> {
-    /// Where inputs begin so that their ways are in the middle of the travel, and how far they go; none where the run
-    /// does not get to its end.
+    /// Start at which the motion is centred in the travel, and its extremes; `None` if the run ends early.
     pub(super) fn placed(&self, machine: &Machine, inputs: &[Signal]) -> Option<(State, Reached)> {
         let machine = unbounded(machine);
         let middle = &self.limits.middle;
@@ -42,7 +41,7 @@ impl Task<'_> {
         Some((initial, reached))
     }
 
-    /// The input with an amplitude that keeps the limits, as it is or smaller; none where that is not found.
+    /// The input with its amplitude, or a smaller one, that keeps the limits; `None` if there is none.
     pub(super) fn fitted(&self, shape: Shape, driven: &Driven, stages: &[Machine]) -> Option<(Shape, State, Reached)> {
         let mut shape = shape;
         for _ in 0..SMALLER {
@@ -142,8 +141,8 @@ impl Task<'_> {
         Information::new(problem, jacobian, x, &self.wanted)
     }
 
-    /// The same by derivatives over steps of a standard error, as far as sticking and sliding in another order show in
-    /// them.
+    /// The information by derivatives over steps of a standard error, which include changes in the order of sticking
+    /// and sliding.
     pub(super) fn surely(&self, mut information: Information) -> Option<Information> {
         let x = information.x.clone();
         let steps: Vec<f64> = (0..x.len()).map(|j| information.step(j)).collect();

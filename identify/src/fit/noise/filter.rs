@@ -84,7 +84,7 @@ fn innovations_of_swing(
                 turn = [cos + damped, stiff, -stiff, cos - damped].map(|one| decay * one);
             }
             let [a, b, c, d] = turn;
-            // P − σ² I, which A turns, and σ² I, which stays.
+            // P − σ² I, which A rotates, and σ² I, which is constant.
             let q = [p[0] - slow.variance, p[1], p[2] - slow.variance];
             p = [
                 a * a * q[0] + 2.0 * a * b * q[1] + b * b * q[2] + slow.variance,

@@ -1,7 +1,7 @@
-//! Noise that is alike from sample to sample: how much, over which times, and what it makes of estimates.
+//! Correlated noise: its variance, its time constants, and its effect on estimates.
 //!
-//! The residuals of an output are taken for white noise and one or two slow ones, as large everywhere or larger in some
-//! places ([`scale`]), beside errors that come again at the same place ([`place`]),
+//! The residuals of an output are modelled as white noise and one or two slow ones, of constant or varying size
+//! ([`scale`]), and errors that repeat with position ([`place`]),
 //!
 //! ```text
 //! r(t) = J(t) δ + d(t) (w(t) (x₁(t) + x₂(t)) + s ε(t)) + Σ a cos κ ŷ(t) + b sin κ ŷ(t)
@@ -9,13 +9,13 @@
 //! cov x(t), x(u) = σ² e^{−|t−u|/τ} (cos ω|t−u| + sin ω|t−u|/(ωτ))         of one that swings
 //! ```
 //!
-//! with the derivatives J of the model, as a fit has moved its residuals along them: what is slow in noise looks like a
-//! change of a parameter, and a fit takes it away. So the likelihood is that of what no change of the parameters can
-//! make (restricted likelihood, H. D. Patterson and R. Thompson 1971), by a Kalman filter that takes all columns of J
-//! along with the residuals.
+//! with the derivatives J of the model, along which a fit has moved its residuals: slow noise resembles a change of a
+//! parameter, and the fit absorbs it. The likelihood is therefore that of the part of the residuals that no change of
+//! the parameters can make (restricted likelihood, H. D. Patterson and R. Thompson 1971), by a Kalman filter that
+//! processes all columns of J with the residuals.
 //!
-//! How slow noise is cannot be told well by a short record, so no single answer is taken: over a grid of σ and τ each
-//! counts by its likelihood, and an interval holds 95 % of what all of them say together.
+//! A short record does not determine time constants, so the result is an average: each point of a grid of σ and τ is
+//! weighted by its likelihood, and an interval covers 95 % of the mixture.
 
 mod filter;
 mod place;
@@ -49,9 +49,9 @@ pub(super) struct Slow {
 /// An error that comes again at the same place.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Wave {
-    /// Of what.
+    /// The quantity with the error.
     pub quantity: Quantity,
-    /// The way from one crest to the next, in the quantity's unit.
+    /// Wavelength, in the quantity's unit.
     pub length: f64,
     /// Its amplitude, in the same unit.
     pub amplitude: f64,
@@ -70,7 +70,7 @@ struct Told {
 
 /// Normal equations.
 struct Normal {
-    /// Of the globals, the waves and the residuals.
+    /// Columns of the globals, the waves and the residuals.
     sum: DMatrix<f64>,
     /// Logarithm of the determinants of the noise and of what was eliminated.
     determinant: f64,
@@ -93,7 +93,7 @@ pub(super) struct Spread {
     pub slow: Vec<Slow>,
     /// Errors that come again at the same place.
     pub waves: Vec<Wave>,
-    /// How many times larger noise is in some places than in others.
+    /// Ratio of the largest to the smallest noise.
     pub unevenness: f64,
 }
 
@@ -126,8 +126,8 @@ impl Spread {
     }
 }
 
-/// Where a function has its zero between two places at which it has opposite signs, to twelve digits of the greater one
-/// (T. R. Chandrupatla 1997: inverse quadratic interpolation where that is known to help, halves elsewhere).
+/// Zero of a function between two points at which it has opposite signs, to twelve digits of the greater one (T. R.
+/// Chandrupatla 1997: inverse quadratic interpolation if that is known to help, else bisection).
 fn zero(of: &dyn Fn(f64) -> f64, low: f64, high: f64) -> f64 {
     let (mut a, mut b) = ((low, of(low)), (high, of(high)));
     let mut part = 0.5;
@@ -199,7 +199,7 @@ struct Estimate {
     step: f64,
     series: Vec<Series>,
     globals: usize,
-    /// By how much each block moves each global, by series, as the fit weighs them.
+    /// Influence of each block on each global, by series, with the weights of the fit.
     influence: Vec<Vec<f64>>,
 }
 
@@ -269,7 +269,7 @@ impl Estimate {
         let blocks = self.blocks();
         let sum: f64 = self.series.iter().map(long).sum();
         let interval = (sum / blocks.max(2) as f64).max(1e-12);
-        // Of one block the gain is √m.
+        // The gain of one block is √m.
         let gain = self.series.iter().flat_map(|s| &s.gain).map(|g| g * g).sum::<f64>() / blocks as f64;
         let mut times = Vec::new();
         let mut time = interval;
@@ -333,10 +333,10 @@ impl Estimate {
         all
     }
 
-    /// Noises that swing: the most likely one, and those next to it, with what they counted for before.
+    /// Narrow-band noises: the most likely one and its neighbours, with their prior weights.
     ///
-    /// Frequencies are tried one after the other with a usual damping; from the best, frequency, time and variance are
-    /// improved in turns by steps that are halved.
+    /// Frequencies are tried one after the other with a usual damping; from the best, frequency, time constant and
+    /// variance are improved alternately by steps that are halved.
     fn swinging(&self, [interval, longest]: [f64; 2], gain: f64) -> Vec<Told> {
         let of = |[frequency, time, variance]: [f64; 3]| {
             let [frequency, time, variance] = [frequency.exp(), time.exp(), variance.exp()];

@@ -14,17 +14,17 @@ use super::series::Series;
 use crate::fit::limits::{BOTH_WAYS, FEWEST_WAVES, MOST_WAVE_NUMBERS, WAVE_CLEAR, WAVE_HALVINGS, WAVE_STEP};
 use std::f64::consts::TAU;
 
-/// A wave along the way.
+/// An error that is periodic in position.
 pub(super) struct Found {
     /// Its wave number, rad in the quantity's unit.
     pub kappa: f64,
-    /// By how much it raises the logarithm of the likelihood at least.
+    /// Least increase of the logarithm of the likelihood by it.
     pub gain: f64,
     /// Its amplitude, in standard deviations of a value with the greatest weight; and how far the quantity ranges, in its
     /// unit.
     pub amplitude: f64,
     pub travel: f64,
-    /// How many were tried.
+    /// Number of wave numbers tried.
     pub tried: usize,
 }
 
@@ -67,7 +67,7 @@ pub(super) fn wave(all: &[Series], amplitudes: &[f64], slow: &[Slow], white: f64
     Some(Found { kappa, gain: most.0 / white, amplitude: most.1, travel, tried: count })
 }
 
-/// By how much a wave raises the logarithm of the likelihood, times the variance of white noise; and its amplitude.
+/// Increase of the logarithm of the likelihood by a wave, times the variance of white noise; and its amplitude.
 fn gain(all: &[Series], amplitudes: &[f64], slow: &[Slow], kappa: f64) -> (f64, f64) {
     // Σ c c, c s, s s, c r, s r of the innovations.
     let mut sums = [0.0; 5];

@@ -8,16 +8,16 @@
 //! Σ n_k ln(s/s_k) − (K − 1)/2 ln n           (G. Schwarz 1978)
 //! ```
 //!
-//! Where that is enough, D Σ D with the s_k/s on the diagonal of D is a second covariance of the noise beside Σ. Of a
-//! variance the greater counts: where a model is wrong its errors are small at rest and large in motion, too, and there
-//! they tell nothing of how well a parameter is known that the motion at rest determines.
+//! If that is enough, D Σ D with the s_k/s on the diagonal of D is a second covariance of the noise beside Σ. The
+//! larger of both variances counts: errors of a wrong model are also small at rest and large in motion, which does not
+//! make a parameter that rest determines better known.
 
 use super::Slow;
 use super::filter::innovations;
 use super::series::Series;
 use crate::fit::limits::{BLOCK_AT_REST, CLASSES_CLEAR, FEWEST_BLOCKS, LEAST_SIZE, SPEED_CLASSES};
 
-/// The size of the noise in each block of each series; none where it is the same as far as the residuals show it.
+/// The size of the noise in each block of each series; `None` if the residuals show no difference.
 pub(super) fn scales(all: &[Series], slow: &[Slow]) -> Option<Vec<Vec<f64>>> {
     let mut squares: Vec<f64> = Vec::new();
     for series in all {
@@ -33,7 +33,7 @@ pub(super) fn scales(all: &[Series], slow: &[Slow]) -> Option<Vec<Vec<f64>>> {
             sums[class] += square;
             counts[class] += 1.0;
         }
-        // What is exact at rest is not infinitely so.
+        // Values that are exact at rest have a least noise.
         sums.iter_mut().zip(counts).for_each(|(sum, count)| *sum = sum.max(LEAST_SIZE * LEAST_SIZE * mean * count));
         let there = (0..SPEED_CLASSES).filter(|&k| counts[k] > 0.0);
         let gain: f64 = there.clone().map(|k| 0.5 * counts[k] * (mean * counts[k] / sums[k]).ln()).sum();
@@ -56,7 +56,7 @@ pub(super) fn scales(all: &[Series], slow: &[Slow]) -> Option<Vec<Vec<f64>>> {
     Some(all.iter().map(|series| sizes.by_ref().take(series.time.len()).collect()).collect())
 }
 
-/// Classes of speed: at rest, and the rest in equal numbers; none where too few blocks are in one.
+/// Classes of speed: at rest, and the rest in equal numbers; `None` if too few blocks are in one.
 fn by_speed(all: &[Series]) -> Option<Vec<usize>> {
     let speeds: Vec<f64> = all.iter().flat_map(|series| &series.speed).copied().collect();
     let rest = BLOCK_AT_REST * speeds.iter().copied().fold(0.0, f64::max);

@@ -10,9 +10,9 @@ use nalgebra::DMatrix;
 pub(super) struct Series {
     /// Columns of the Jacobian that are not zero here: those of the run alone first.
     pub moved: Vec<usize>,
-    /// How many of them are the run's alone.
+    /// Number of columns that belong to the run alone.
     pub own: usize,
-    /// How many columns stand between them and the residual that are not of the Jacobian.
+    /// Number of columns between these and the residual that are not of the Jacobian.
     pub more: usize,
     /// Block by block the moved columns, those that are not of the Jacobian, and the residual.
     pub rows: Vec<f64>,
@@ -58,8 +58,8 @@ impl Series {
     }
 }
 
-/// The rows of a quantity: as many together as share an error of rounding, and so many that no more than [`BLOCKS`]
-/// remain; and the greatest weight of a value. Columns from `globals` on concern one run.
+/// The rows of a quantity, in blocks that share a rounding error and are at most [`BLOCKS`] in number; and the greatest
+/// weight of a value. Columns from `globals` on concern one run.
 pub(super) fn series(
     problem: &Problem,
     quantity: Quantity,

@@ -10,8 +10,7 @@ pub(crate) fn student_share(t: f64, freedom: f64) -> f64 {
     libm::erfc(z / std::f64::consts::SQRT_2)
 }
 
-/// The value below which Student's t stays with 97.5 %, for so many degrees of freedom (Hill's expansion, to 1e-3 from
-/// 3 on).
+/// The 97.5 % quantile of Student's t for `freedom` degrees of freedom (Hill's expansion, to 1e-3 from 3 on).
 pub fn student(freedom: usize) -> f64 {
     let (z, n) = (NORMAL, freedom.max(1) as f64);
     match freedom {

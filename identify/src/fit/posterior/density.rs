@@ -38,7 +38,7 @@ pub struct Ingredients<'a, R> {
     pub at: Vec<f64>,
     /// The Jacobian there.
     pub jacobian: DMatrix<f64>,
-    /// Where the variables may be.
+    /// Bounds of the variables.
     pub bounds: Bounds,
     /// The priors; flat without.
     pub priors: Vec<Option<Prior<'a>>>,
@@ -56,7 +56,7 @@ pub struct Sampled {
     pub fixed: bool,
 }
 
-/// How a variable without bounds becomes one with them.
+/// Transformation of an unbounded variable to a bounded one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Change {
     None,
@@ -115,11 +115,11 @@ struct Density<'a, R> {
     errors: Vec<f64>,
     /// L of the correlations.
     correlation: DMatrix<f64>,
-    /// The Jacobian about the fit, and its derivatives by z; none where these do not say how the density goes on.
+    /// The Jacobian at the fit, and its derivatives by z; `None` if these do not approximate the density.
     fixed: Option<Vec<DMatrix<f64>>>,
 }
 
-/// Draws from the density; none where the model does not get through.
+/// Draws from the density. Returns an error if the density is zero at the starts.
 pub fn draw<R: Residuals + Clone + Send + Sync>(
     ingredients: &Ingredients<R>,
     effort: Effort,
@@ -244,7 +244,7 @@ impl<'a, R: Residuals + Clone + Send> Density<'a, R> {
         self.changes.iter().zip(u.iter()).map(|(change, u)| change.at(*u)).collect()
     }
 
-    /// ln p and, where it is asked for, its gradient.
+    /// ln p and, if requested, its gradient.
     fn log(&self, z: &[f64], gradient: Option<&mut [f64]>) -> Option<f64> {
         self.log_with(self.fixed.as_deref(), z, gradient)
     }
@@ -338,7 +338,7 @@ impl<'a, R: Residuals + Clone + Send> Density<'a, R> {
     }
 }
 
-/// (JᵀJ/T + curvature of the priors + 12/(h − l)²)⁻¹: what a flat prior between bounds tells is in it too.
+/// (JᵀJ/T + curvature of the priors + 12/(h − l)²)⁻¹, with the information of flat priors between bounds.
 fn covariance<R>(ingredients: &Ingredients<R>, jacobian: &DMatrix<f64>) -> DMatrix<f64> {
     let mut precision = jacobian.tr_mul(jacobian) / ingredients.inflation;
     for (j, prior) in ingredients.priors.iter().enumerate() {

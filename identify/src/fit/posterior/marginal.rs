@@ -15,7 +15,7 @@
 //! ∫ₗʰ e^{−|r|²/2T} dy ∝ e^{−|P r|²/2T} ΔΦ,   ΔΦ = Φ((h − ŷ)/s) − Φ((l − ŷ)/s)        ρ = √(−2 T ln ΔΦ)
 //! ```
 //!
-//! Of several shifts with a near bound, and with a prior, none is integrated over: they stay among the variables.
+//! Several shifts with a near bound, and shifts with a prior, are not integrated over: they stay variables.
 
 use crate::chance::{normal, normal_quantile, uniform};
 use crate::fit::asked::problem::Problem;
@@ -116,7 +116,7 @@ impl<'a> Marginal<'a> {
         all
     }
 
-    /// Of each run with shifts their columns, at a point in all variables.
+    /// The columns of the shifts of each run, at a point in all variables.
     fn columns(&self, all: &[f64]) -> Cow<'_, [Columns]> {
         if let Some(fixed) = &self.fixed {
             return Cow::Borrowed(fixed);
@@ -228,7 +228,7 @@ struct Between {
 impl Between {
     /// ln ΔΦ
     fn log(self) -> f64 {
-        // What lies above the mean is mirrored, where less is lost to rounding.
+        // Intervals above the mean are mirrored, which loses less to rounding.
         let (a, b) = if self.low > 0.0 { (-self.high, -self.low) } else { (self.low, self.high) };
         let (below, above) = (log_share(a), log_share(b));
         (above + (-(below - above).exp()).ln_1p()).min(0.0)
@@ -241,7 +241,7 @@ impl Between {
         (share(self.low) - share(self.high)) / self.deviation
     }
 
-    /// By the inverse of its distribution; far out it falls as e^{−|z| Δz}.
+    /// A draw by the inverse of its distribution; in the far tail it falls as e^{−|z| Δz}.
     fn draw(self, random: &mut Pcg64) -> f64 {
         let (sign, a, b) = if self.low > 0.0 { (-1.0, -self.high, -self.low) } else { (1.0, self.low, self.high) };
         let z = if b > FAR_TAIL {
@@ -280,7 +280,7 @@ impl Residuals for Marginal<'_> {
     }
 
     fn jacobian(&mut self, x: &[f64], _: &[f64], bounds: &Bounds, how: &Differences) -> Option<DMatrix<f64>> {
-        // Those that were given are projected, and differences are of what they were before.
+        // The given residuals are projected; differences refer to those before.
         let mut own = vec![0.0; self.rows()];
         self.linearised(x, &mut own, bounds, how)
     }
@@ -293,7 +293,7 @@ impl Residuals for Marginal<'_> {
         }
         let how = match how {
             Differences::Coarse(steps) => {
-                // Of shifts no difference is taken.
+                // Shifts have no differences.
                 let mut own = vec![1.0; all.len()];
                 self.kept.iter().zip(steps).for_each(|(&j, step)| own[j] = *step);
                 Differences::Coarse(own)
@@ -382,7 +382,7 @@ mod tests {
                     points.iter().step_by(10).map(|y| cost(&mut problem, &[x, *y])).fold(f64::INFINITY, f64::min);
                 let terms: Vec<f64> = points.iter().map(|y| (least - cost(&mut problem, &[x, *y])).exp()).collect();
                 let all: f64 = terms.iter().sum();
-                // What is drawn beside it has the mean of quadrature.
+                // Its draws have the mean of the quadrature.
                 let mean = points.iter().zip(&terms).map(|(y, term)| y * term).sum::<f64>() / all;
                 let square = points.iter().zip(&terms).map(|(y, term)| y * y * term).sum::<f64>() / all - mean * mean;
                 let mut random = Pcg64::seed_from_u64(1);

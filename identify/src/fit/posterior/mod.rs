@@ -1,10 +1,9 @@
-//! Draws from the posterior of a fit's parameters: what priors and logs together leave possible.
+//! Draws from the posterior distribution of a fit's parameters, given priors and logs.
 //!
 //! The likelihood is normal, with the deviation of each quantity that the fit found, or Huber's where the fit is
-//! robust. Residuals that are alike from sample to sample tell less than their number says: the logarithm of the
-//! likelihood is divided by the greatest factor by which the covariance of the fit grows for that reason, so that with
-//! flat priors and a model that is linear no interval is narrower than the fit's. How it is drawn from stands in
-//! `density.rs`.
+//! robust. Since correlated residuals contain less information than their number suggests, the logarithm of the
+//! likelihood is divided by the greatest factor by which they increase the covariance of the fit. With flat priors and
+//! a linear model no interval is then narrower than the fit's. `density.rs` defines the sampling.
 
 mod density;
 mod marginal;
@@ -33,7 +32,7 @@ use rand_pcg::rand_core::SeedableRng;
 pub struct Posterior {
     /// The variables: parameters, nuisances that all logs share, then those of each log.
     pub variables: Vec<Credible>,
-    /// How many of them stand among the estimates of the fit, in its order.
+    /// Number of these that are estimates of the fit, in its order.
     pub globals: usize,
     /// The draws, SI.
     pub draws: Draws,
@@ -66,8 +65,8 @@ pub struct Credible {
 
 /// Draws from the posterior of the parameters of `plan` about `fit`, which was made of the same case and plan.
 ///
-/// `watch` sees how many draws are made, and may end it early. Errors: a fit that was interrupted, an estimate that is
-/// not determined, priors outside the bounds.
+/// `watch` receives the number of draws, and may end the sampling early. Returns an error for an interrupted fit, an
+/// undetermined estimate, or priors outside the bounds.
 pub fn posterior(case: &Case, plan: &Plan, fit: &Fit, effort: Effort, watch: &Watch) -> Result<Posterior> {
     if matches!(fit.ending, Ending::Interrupted | Ending::Failed) {
         return Err(Error::new("draws start from a fit that has ended, and this one has not").next("fit it again"));
@@ -138,7 +137,7 @@ pub fn posterior(case: &Case, plan: &Plan, fit: &Fit, effort: Effort, watch: &Wa
 /// Draws the shifts that were integrated over beside each draw; if that is ended early, as many of each chain are left.
 fn complete(draws: &mut Draws, marginal: &Marginal, effort: Effort, watch: &Watch) {
     let made = effort.chains * (effort.tune + effort.draws);
-    // What there was when it was interrupted is completed: that takes one simulation each.
+    // Draws before an interruption are completed, with one simulation each.
     let goes_on = || draws.interrupted || watch(made);
     let one = |number: usize, chain: &[Vec<f64>]| {
         let mut random = Pcg64::seed_from_u64(effort.seed.wrapping_add(number as u64) ^ 0xc0de);
@@ -177,7 +176,7 @@ impl Posterior {
         if self.draws.interrupted {
             doubts.push("it was interrupted".to_string());
         }
-        // What is no number is no good either.
+        // NaN counts as bad.
         let worst = |of: fn(&Credible) -> f64, bad: fn(f64, f64) -> bool| {
             let number = |c: &Credible| if of(c).is_finite() { of(c) } else { f64::NAN };
             self.variables
@@ -235,7 +234,7 @@ fn inflation(problem: &Problem, residuals: &[f64], jacobian: &DMatrix<f64>, at: 
     (most * (found.reach / NORMAL).powi(2).max(1.0), variance)
 }
 
-/// How a variable of the search is a number.
+/// Conversion of a variable of the search to a number.
 struct Scale<'a> {
     name: String,
     unit: &'static str,

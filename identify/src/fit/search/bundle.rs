@@ -52,13 +52,13 @@ impl Rung for Bundle {
     }
 }
 
-/// Where a descent ended.
+/// End of a descent.
 struct Balanced {
     /// The gain that the next step promises, in standard errors.
     promise: f64,
     /// Σ λₖ Jₖ
     jacobian: DMatrix<f64>,
-    /// How many points are in it.
+    /// Number of points in it.
     pieces: usize,
 }
 
@@ -82,11 +82,11 @@ struct Piece {
 }
 
 impl Piece {
-    /// g̃ and α, seen from a point with this cost.
+    /// g̃ and α relative to a point with this cost.
     fn seen_from(&self, u: &DVector<f64>, cost: f64) -> (DVector<f64>, f64) {
         let away = &self.y - u;
         let own = self.cost - self.gradient.dot(&away) + 0.5 * away.norm_squared();
-        // Where the cost is not convex a piece may stand above: it counts for less the further away it is.
+        // If the cost is not convex, a piece may lie above it: its weight decreases with distance.
         (&self.gradient - &away, (cost - own).abs())
     }
 }
@@ -96,7 +96,7 @@ struct Promise {
     weights: Vec<f64>,
     /// −d
     mean: DVector<f64>,
-    /// By how much the cost falls, in units of σ².
+    /// Decrease of the cost, in units of σ².
     fall: f64,
 }
 
@@ -119,8 +119,8 @@ impl Promise {
     }
 }
 
-/// Goes down from `best`, which is changed, until the pieces balance to within `tolerance` standard errors, or `most`
-/// gradients are taken; none where the model does not get through, or it was told to stop.
+/// Descends from `best`, which is changed, until the pieces balance to within `tolerance` standard errors, or after
+/// `most` gradients; `None` if the model fails or the search is stopped.
 fn descend(
     problem: &mut dyn Residuals,
     best: &mut Minimum,

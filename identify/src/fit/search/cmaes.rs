@@ -15,9 +15,8 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
 
-/// Searches around zero in `n` dimensions with the first step size `sigma`, for so many generations at most, or until
-/// none of `barren` in a row showed anything. `evaluate` gives the cost of a point, infinite where there is none, and
-/// whether it shows anything.
+/// Searches around zero in `n` dimensions with the first step size `sigma`, until `barren` generations in a row have
+/// not improved. `evaluate` returns the cost of a point, infinite if there is none, and true if it is an improvement.
 pub fn search(n: usize, mut sigma: f64, barren: usize, evaluate: &mut dyn FnMut(&DVector<f64>) -> (f64, bool)) {
     let size = n as f64;
     let lambda = 4 + (3.0 * size.ln()).floor() as usize;

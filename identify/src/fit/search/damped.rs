@@ -1,7 +1,7 @@
 //! Damped steps: Levenberg and Marquardt's method with an active set for the bounds.
 //!
-//! λ follows the ratio of gain and promise (Nielsen 1999). Derivatives are cheap ones far from a minimum, over a part of
-//! a standard error on the way, and central ones near it.
+//! λ follows the ratio of actual and predicted gain (Nielsen 1999). Derivatives are cheap far from a minimum, then over
+//! a fraction of a standard error, and central near it.
 
 use super::linear::Linear;
 use super::point::{Ending, Options, Point, Strategy, cost_of};
@@ -15,7 +15,7 @@ use nalgebra::{DMatrix, DVector};
 pub(crate) struct Damped {
     /// Derivatives that were measured last.
     how: Differences,
-    /// λ; none before the first step.
+    /// λ; `None` before the first step.
     lambda: Option<f64>,
     /// Factor by which λ grows when a step is refused.
     growth: f64,
@@ -29,13 +29,13 @@ pub(crate) struct Damped {
 }
 
 impl Damped {
-    /// By cheap derivatives first, where these are asked for.
+    /// Begins with cheap derivatives, if requested.
     pub fn new(options: &Options) -> Self {
         let how = if options.frugal { Differences::Forward } else { Differences::Central };
         Self { how, lambda: None, growth: 2.0, ahead: None, is_likely: true, slow: 0, trial: Vec::new() }
     }
 
-    /// Goes down from `at`, by derivatives that begin as they were measured last.
+    /// Descends from `at`, beginning with the last kind of derivatives.
     fn descend(&mut self, at: &mut Point, problem: &mut dyn Residuals, watch: &mut Watch) -> Climb {
         let mut how = self.how.clone();
         (self.lambda, self.growth) = (None, 2.0);
@@ -73,7 +73,8 @@ impl Damped {
         end
     }
 
-    /// Takes a step that lowers the cost, with as much damping as it takes; whether it did, and did not creep.
+    /// Takes a step that lowers the cost, with as much damping as needed; returns true if it succeeded with a
+    /// sufficient gain.
     fn step(&mut self, at: &mut Point, problem: &mut dyn Residuals, how: &Differences) -> bool {
         let (n, shows, bounds) = (at.best.x.len(), at.shows(), at.bounds);
         let best = &mut at.best;

@@ -6,14 +6,14 @@
 //! min ‖J d + r‖² + λ ‖D d‖²        D = greatest column norms of J so far (Moré 1978)
 //! ```
 //!
-//! by QR, with variables that would leave the box held at its edge. Nothing counts as converged but what passes the
-//! test of the projected gradient: the Gauss-Newton step in the variables that are free to move promises less than
-//! `tolerance` of a standard error, and no variable at its bound is pushed inwards.
+//! by QR, with variables that would leave the box held at its edge. Convergence requires the test of the projected
+//! gradient: the Gauss-Newton step in the free variables predicts less than `tolerance` of a standard error, and no
+//! variable at its bound is pushed inwards.
 //!
-//! Logs with dry friction make the cost kinked where sticks and slips change their order. So the search is a ladder of
-//! strategies. Where no damped step helps (`damped.rs`) and the test is not passed, a bundle of exact gradients goes on
-//! (`bundle.rs`), which knows a minimum on kinks. Where gradients are none or do not lead there, an evolution strategy
-//! that needs none is tried (`evolved.rs`) before it is called stalled.
+//! With dry friction the cost has kinks where the order of sticks and slips changes. The search is therefore a ladder
+//! of strategies. If no damped step helps (`damped.rs`) and the test is not passed, a bundle of exact gradients
+//! continues (`bundle.rs`), which detects a minimum on kinks. If there are no gradients, or they do not lead there, an
+//! evolution strategy without gradients is tried (`evolved.rs`) before the search counts as stalled.
 
 use super::bundle::Bundle;
 use super::damped::Damped;
@@ -23,7 +23,8 @@ use super::rung::{Climb, Rung, Watch};
 use crate::fit::asked::residuals::{Bounds, Residuals};
 use crate::solve::Flow;
 
-/// Searches from `start` for the least cost. `watch` sees the best point and its cost after each step, and may end it.
+/// Minimises the cost from `start`. `watch` receives the best point and its cost after each step, and may end the
+/// search.
 pub fn minimise(
     problem: &mut dyn Residuals,
     start: &[f64],
@@ -46,8 +47,8 @@ fn ladder(options: &Options) -> Vec<Box<dyn Rung>> {
     rungs
 }
 
-/// Goes from rung to rung until one of them ends the search, or none is left. Where a rung lowers the cost, the one
-/// from which it was reached goes on.
+/// Tries rung after rung until one of them ends the search, or none is left. If a rung lowers the cost, the previous
+/// rung continues.
 fn search(
     ladder: &mut [Box<dyn Rung>],
     at: &mut Point,
@@ -126,8 +127,7 @@ mod tests {
 
     const START: [f64; 2] = [0.6, 0.9];
 
-    /// The result of one rung alone in the valley, from a point where it knows the derivatives: its end, and where it
-    /// led.
+    /// The result of one rung alone in the valley, from a point with known derivatives: its end and its minimum.
     fn alone(rung: &mut dyn Rung, start: &[f64], is_exact: bool) -> (Climb, Minimum) {
         let (bounds, options) = (Bounds::none(2), Options::default());
         let mut toy = Kinked { is_exact };
@@ -232,7 +232,7 @@ mod tests {
         assert!(valley.0.len() > 3 && valley.0[0] == Differences::Forward, "{:?}", valley.0);
     }
 
-    /// A rung that ends as it is told, and writes down that it was climbed.
+    /// A rung with a given end that records its use.
     struct Told {
         ends: Vec<Climb>,
         own: Strategy,

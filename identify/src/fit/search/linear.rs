@@ -11,12 +11,12 @@ pub(crate) struct Linear {
 }
 
 impl Linear {
-    /// Of no rows.
+    /// A problem without rows.
     pub fn none(n: usize) -> Self {
         Self { r: DMatrix::zeros(0, n), qtr: DVector::zeros(0) }
     }
 
-    /// Of this Jacobian and these residuals, beyond `huber` of which they count linearly.
+    /// The problem of this Jacobian and these residuals, which count linearly beyond `huber`.
     pub fn new(jacobian: &DMatrix<f64>, residuals: &[f64], huber: f64) -> Self {
         let n = jacobian.ncols();
         let mut jacobian = jacobian.clone();
@@ -96,7 +96,7 @@ impl Linear {
         (&self.r * step).norm()
     }
 
-    /// By how much the linear model says that the cost falls.
+    /// Predicted decrease of the cost by the linear model.
     pub fn promise(&self, step: &DVector<f64>) -> f64 {
         let moved = &self.r * step;
         -(moved.dot(&self.qtr) + 0.5 * moved.norm_squared())

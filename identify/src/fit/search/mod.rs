@@ -1,4 +1,4 @@
-//! Where the least is: bounded least squares past kinks, from several starts.
+//! The search for the minimum: bounded least squares with kinks, from several starts.
 
 mod bundle;
 pub(crate) mod cmaes;

@@ -5,7 +5,7 @@ use crate::fit::asked::residuals::{Bounds, Differences, Residuals};
 use crate::fit::limits::SHOWS;
 use nalgebra::{DMatrix, DVector};
 
-/// How far to go.
+/// Options of a search.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Options {
     /// Standard errors that the last step may promise.
@@ -16,9 +16,9 @@ pub struct Options {
     pub huber: f64,
     /// One-sided differences until the last few steps.
     pub frugal: bool,
-    /// How often an evolution strategy may go on where derivatives do not help.
+    /// Largest number of uses of an evolution strategy.
     pub evolutions: usize,
-    /// Residuals as small as this are taken for rounding, and not for what tells how good a step has to be.
+    /// Residuals up to this size are taken for rounding, and do not set the accuracy of a step.
     pub rounding: f64,
 }
 
@@ -28,7 +28,7 @@ impl Default for Options {
     }
 }
 
-/// How a search ended.
+/// End of a search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ending {
     /// The projected gradient is zero to within the tolerance.
@@ -37,7 +37,7 @@ pub enum Ending {
     Stalled,
     /// The iterations were used up.
     OutOfIterations,
-    /// It was asked to stop.
+    /// It was stopped.
     Interrupted,
     /// The residuals could not be computed where it started.
     Failed,
@@ -67,7 +67,7 @@ pub enum Strategy {
     Evolution,
 }
 
-/// Where a search ended.
+/// Result of a search.
 #[derive(Debug, Clone)]
 pub struct Minimum {
     /// The variables.
@@ -82,13 +82,13 @@ pub struct Minimum {
     pub decrement: f64,
     /// Variables held at a bound.
     pub at_bound: Vec<bool>,
-    /// How it ended.
+    /// Its end.
     pub ending: Ending,
-    /// The strategy with which it ended; none where nothing was searched for.
+    /// Its last strategy; `None` without a search.
     pub strategy: Option<Strategy>,
-    /// How many gradients around balance there; more than one at a kink.
+    /// Number of gradients that balance there; more than one at a kink.
     pub pieces: usize,
-    /// How often an evolution strategy went on where derivatives did not help.
+    /// Number of uses of an evolution strategy.
     pub evolved: usize,
     /// Jacobians computed.
     pub iterations: usize,
@@ -121,7 +121,7 @@ pub(crate) struct Point<'a> {
 }
 
 impl<'a> Point<'a> {
-    /// Where a search starts, put within the bounds; where the residuals cannot be computed there, what is told of it.
+    /// The start of a search, moved within the bounds. Returns an error if the residuals cannot be computed there.
     pub fn new(
         problem: &mut dyn Residuals,
         start: &[f64],
@@ -174,7 +174,7 @@ impl<'a> Point<'a> {
         let newton = model.step(&best.at_bound, &self.scale, 0.0);
         let freedom = (best.residuals.len().saturating_sub(n)).max(1) as f64;
         let spread = (2.0 * best.cost / freedom).sqrt();
-        // What is left of logs that a model made is what rounding made of them.
+        // The residuals of logs that a model made are rounding errors.
         let rounding = self.options.rounding;
         let is_rounding = spread <= rounding;
         self.deviation = if is_rounding { rounding } else { spread * inflation(&best.residuals, n) };
@@ -206,8 +206,8 @@ impl<'a> Point<'a> {
     }
 }
 
-/// By how much standard errors are greater than those of as many independent residuals, roughly: √((1 + ρ)/(1 − ρ))
-/// with ρ the correlation of neighbours, as if no fewer than ten residuals for each variable were independent.
+/// Approximate factor of standard errors relative to independent residuals: √((1 + ρ)/(1 − ρ)) with the correlation ρ
+/// of neighbours, limited to at least ten independent residuals per variable.
 fn inflation(residuals: &[f64], variables: usize) -> f64 {
     let own: f64 = residuals.iter().map(|r| r * r).sum();
     let next: f64 = residuals.windows(2).map(|pair| pair[0] * pair[1]).sum();

@@ -40,7 +40,7 @@ pub struct Balance {
     pub equations: usize,
 }
 
-/// The balance over all logs of a problem; none where they hold no positions on an even raster, or do not move enough.
+/// The balance over all logs of a problem; `None` without evenly sampled positions or sufficient motion.
 pub fn regression(problem: &Problem) -> Option<Balance> {
     balance(&smoothed(problem), 0)
 }
@@ -56,8 +56,7 @@ pub(crate) struct Smoothed<'a> {
     derivatives: Vec<[f64; 2]>,
 }
 
-/// A delay of the input, of either sign, with which less of the torque is left, s; none where none leaves markedly
-/// less.
+/// Delay of the input, of either sign, that leaves clearly less unexplained torque, s; `None` if there is none.
 pub(crate) fn suspected_delay(problem: &Problem) -> Option<f64> {
     let logs = smoothed(problem);
     let late = least_left(&logs, -LONGEST_DELAY..=LONGEST_DELAY, 1, SUSPECT_DELAY)?;
@@ -79,8 +78,8 @@ pub(crate) fn suspected_shift(problem: &Problem, name: &str) -> Option<isize> {
     (late.abs() > LONGEST_DELAY).then_some(late)
 }
 
-/// The delay among these rows, so many apart, with which least of the torque is left; none where that is more than this
-/// part of what is left without.
+/// The delay among these rows, `apart` rows apart, with the least unexplained torque; `None` if that exceeds `most`
+/// times the value without delay.
 fn least_left(logs: &[Smoothed], rows: RangeInclusive<isize>, apart: isize, most: f64) -> Option<isize> {
     let left = |late: isize| Some((late, balance(logs, late)?.unexplained));
     let tried = rows.step_by(apart.unsigned_abs()).filter_map(left);
@@ -88,7 +87,7 @@ fn least_left(logs: &[Smoothed], rows: RangeInclusive<isize>, apart: isize, most
     (least <= most * left(0)?.1).then_some(late)
 }
 
-/// The logs of a problem that hold positions on an even raster, as [`balance`] wants them.
+/// The logs of a problem with evenly sampled positions, for [`balance`].
 pub(crate) fn smoothed<'a>(problem: &'a Problem) -> Vec<Smoothed<'a>> {
     let noise = problem.noise();
     let mut all = Vec::new();
@@ -105,7 +104,7 @@ pub(crate) fn smoothed<'a>(problem: &'a Problem) -> Vec<Smoothed<'a>> {
     all
 }
 
-/// The balance with the inputs so many rows later than logged.
+/// The balance with inputs `late` rows later than logged.
 pub(crate) fn balance(logs: &[Smoothed], late: isize) -> Option<Balance> {
     let mut rows: Vec<[f64; 5]> = Vec::new();
     for log in logs {
@@ -133,7 +132,7 @@ pub(crate) fn balance(logs: &[Smoothed], late: isize) -> Option<Balance> {
 }
 
 impl<'a> Smoothed<'a> {
-    /// Regression of one output of a run; none if it is too short.
+    /// Regression of one output of a run; `None` if it is too short.
     fn new(run: &'a Run, machine: &'a Machine, output: usize, noise: f64) -> Option<Self> {
         let seen = &run.seen[output];
         let (n, h) = (run.fitted_rows.min(run.time.len()), run.interval());
@@ -234,7 +233,7 @@ impl Balance {
                 free.keys.iter().map(|(key, factor)| factor * free.start * at_pulley(machine, key)).sum()
             };
             let total: f64 = keys.iter().map(|key| value(machine, key).unwrap_or(0.0) * at_pulley(machine, key)).sum();
-            // Of what each campaign has for itself, that of the first.
+            // Of parameters of single campaigns, the first campaign's.
             let first = |(_, of): &(&Free, &Option<usize>)| of.is_none_or(|of| of == 0);
             let counted = problem.parameters.iter().zip(&problem.of).filter(first).map(|(free, _)| free);
             let searched: f64 = counted.filter(|free| own(free)).map(part).sum();

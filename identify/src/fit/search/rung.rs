@@ -7,7 +7,7 @@ use crate::solve::Flow;
 /// Sees the best point and its cost after each step, and may end the search.
 pub(crate) type Watch<'a> = dyn FnMut(&[f64], f64) -> Flow + 'a;
 
-/// How a rung ends.
+/// End of a rung.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Climb {
     /// At a minimum.
@@ -28,6 +28,6 @@ pub(crate) trait Rung {
     /// True if it can do anything at this point.
     fn applies(&self, at: &Point) -> bool;
 
-    /// Goes on from `at` as long as that helps.
+    /// Continues from `at` as long as that helps.
     fn climb(&mut self, at: &mut Point, problem: &mut dyn Residuals, watch: &mut Watch) -> Climb;
 }

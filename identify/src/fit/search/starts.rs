@@ -39,7 +39,7 @@ impl Work {
     }
 }
 
-/// Where a search ended.
+/// Result of a search.
 pub(crate) struct Searched<'a> {
     pub problem: Problem<'a>,
     pub best: Minimum,
@@ -49,7 +49,7 @@ pub(crate) struct Searched<'a> {
     pub work: Work,
 }
 
-/// How far a search goes.
+/// Effort of a search.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Effort {
     pub options: Options,
@@ -60,21 +60,20 @@ pub(crate) struct Effort {
 }
 
 impl Effort {
-    /// Of a fit that is compared: what another step would move it by is far less than what models differ by in records
-    /// that were held out.
+    /// Effort of a fit for comparison: another step would change it by far less than models differ on held-out records.
     pub fn compared() -> Self {
         let options = Options { tolerance: ROUGH_TOLERANCE, iterations: STEPS, evolutions: 0, ..Options::default() };
         Self { options, is_straight: true, is_short: false }
     }
 
-    /// Of such a fit to a part of the logs, which begins where that to all of them ended.
+    /// Effort of such a fit to a part of the logs, which begins at the result for all of them.
     pub fn of_part() -> Self {
         let whole = Self::compared();
         Self { options: Options { iterations: STEPS_IN_PART, ..whole.options }, is_short: true, ..whole }
     }
 }
 
-/// The search of a fit, as far as `effort` says, and to wherever that leads along directions that are not determined.
+/// The search of a fit with this `effort`, to any point along undetermined directions.
 pub(crate) fn search_as_far<'a>(
     case: &Case,
     plan: &Plan,
@@ -165,7 +164,7 @@ pub(crate) fn search_as_far<'a>(
     Ok(Searched { problem, best, noise, starts, work })
 }
 
-/// Where nothing is searched for.
+/// The result without a search.
 fn as_it_is(problem: &mut Problem) -> Minimum {
     let mut residuals = vec![0.0; problem.rows()];
     let good = problem.evaluate(&[], &mut residuals);
@@ -241,8 +240,8 @@ fn told_beforehand(problem: &Problem, noise: &[(Quantity, f64)]) -> bool {
 /// A search of a problem from a point.
 type Descend<'d> = dyn FnMut(&mut Problem, &[f64], &Options) -> Minimum + 'd;
 
-/// Where the case starts, or what a regression makes of that, or of a machine with several coordinates fits in short
-/// windows, whichever is nearer to the logs.
+/// The start values of the case, or those of a regression, or for a machine with several coordinates of fits in short
+/// windows: whichever fits the logs better.
 fn first_guess(case: &Case, plan: &Plan, problem: &mut Problem, descend: &mut Descend) -> Result<Vec<f64>> {
     let start = problem.start();
     let guess = match problem.machine.has_one_coordinate() {
@@ -269,12 +268,12 @@ fn by_regression(problem: &Problem, start: &[f64]) -> Option<Vec<f64>> {
     Some(guess)
 }
 
-/// The nearest to the logs of what a few steps lead to from the start, and from fits in windows of a few swings of the
-/// belt, each window with a start of its own, and the next ones longer, until two of them lead to one minimum whose
-/// residuals are noise; none where the plan has windows or a loop, or no step leads anywhere.
+/// The best result of a few steps from the start, and from fits in windows of a few oscillations of the belt, each
+/// window with a start of its own; windows become longer until two of them lead to one minimum whose residuals are
+/// noise. `None` if the plan has windows or a loop, or no step succeeds.
 ///
-/// A belt whose stiffness is off swings out of step with the log, and the longer the log, the closer to each other are
-/// the minima that this makes. In a window of a few swings there is one.
+/// With a wrong stiffness the belt oscillates out of phase with the log, which causes local minima that are closer
+/// together the longer the log is. In a window of a few oscillations there is one.
 fn in_windows(
     case: &Case,
     plan: &Plan,

@@ -1,8 +1,8 @@
-//! Tall matrices made small: as many rows as it takes for the same products of columns.
+//! Reduction of tall matrices to as many rows as the same products of columns need.
 //!
-//! A Jacobian has a row for each value of each log, and a log's own variables move its rows alone. QR of one stretch of
-//! rows after the other, with the columns that are not zero there, leaves a triangle of each: M = Q M′ with QᵀQ = I, so
-//! that MᵀM = M′ᵀM′, and nothing is squared on the way.
+//! A Jacobian has a row for each value of each log, and a log's own variables affect its rows alone. QR of successive
+//! blocks of rows, with their nonzero columns, leaves a triangle of each: M = Q M′ with QᵀQ = I, so that MᵀM = M′ᵀM′
+//! without squaring.
 
 use crate::fit::limits::STRETCH;
 use nalgebra::DMatrix;
@@ -32,7 +32,7 @@ pub(crate) fn shortened(matrix: &DMatrix<f64>) -> DMatrix<f64> {
     short
 }
 
-/// (JᵀJ)⁻¹ by QR of J with columns of unit length; none where a column depends on the others to within rounding.
+/// (JᵀJ)⁻¹ by QR of J with columns of unit length; `None` if a column depends on the others to within rounding.
 pub fn inverse_of_square(jacobian: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let n = jacobian.ncols();
     let norms: Vec<f64> = (0..n).map(|j| jacobian.column(j).norm()).collect();
@@ -74,7 +74,7 @@ mod tests {
         assert!(short.nrows() < 100, "{}", short.nrows());
         let (known, own) = (tall.tr_mul(&tall), short.tr_mul(&short));
         assert!((&known - &own).abs().max() < 1e-12 * known.abs().max(), "{known} {own}");
-        // What is short already stays as it is.
+        // A short matrix stays unchanged.
         let few = tall.rows(0, 100).into_owned();
         assert_eq!(shortened(&few), few);
     }

@@ -32,8 +32,8 @@ fn logarithm(machine: &Machine) -> f64 {
 }
 
 impl Belts {
-    /// At `x`; none of a machine with one drive, or where no free parameter changes the ratio. `of` is the standard error
-    /// along a combination of directions, of which `lost` are not determined.
+    /// The comparison at `x`; `None` for a machine with one drive, or if no free parameter changes the ratio. `of` is
+    /// the standard error along a combination of directions, of which `lost` are not determined.
     pub(super) fn compared(
         problem: &Problem,
         directions: &Directions,
@@ -87,7 +87,7 @@ impl Belts {
         [self.ratio / reach, self.ratio * reach]
     }
 
-    /// Number of the drive whose spans are less stiff; none where the interval leaves that open.
+    /// Number of the drive whose spans are less stiff; `None` if the interval leaves that open.
     pub fn looser(&self) -> Option<usize> {
         match self.interval() {
             [_, high] if high < 1.0 => Some(1),

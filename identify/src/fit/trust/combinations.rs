@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, DVector};
 pub struct Combination {
     /// In symbols of the keys: `cart.friction.viscous / amplifier.gain`.
     pub name: String,
-    /// SI unit; empty where it has none of its own.
+    /// SI unit; empty if it has no name.
     pub unit: String,
     /// Its value.
     pub value: f64,

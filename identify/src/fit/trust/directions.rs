@@ -13,7 +13,7 @@ pub(crate) struct Directions {
     pub singular: Vec<f64>,
     /// Norm of each parameter's own column.
     pub norms: Vec<f64>,
-    /// How many of them are more than rounding.
+    /// Number of directions above rounding.
     pub alive: usize,
     /// A change by 100 %, in the variable of each.
     pub whole: Vec<f64>,
@@ -22,7 +22,8 @@ pub(crate) struct Directions {
 }
 
 impl Directions {
-    /// From a Jacobian of `problem` at `x` for these of what concerns all runs, the others held; none if numbers fail.
+    /// The directions of a Jacobian of `problem` at `x` for these of the shared variables, with the others held; `None`
+    /// if numbers fail.
     pub fn new(problem: &Problem, jacobian: &DMatrix<f64>, x: &[f64], which: &[usize]) -> Option<Self> {
         let globals = problem.globals();
         if which.is_empty() {
@@ -35,7 +36,7 @@ impl Directions {
         for (column, &j) in which.iter().enumerate() {
             own.column_mut(column).scale_mut(whole[j]);
         }
-        // Of a simulation that was ended early there are no numbers, and the decomposition would panic.
+        // A simulation that ended early has no numbers, and the decomposition would panic.
         if own.iter().any(|entry| !entry.is_finite()) {
             return None;
         }

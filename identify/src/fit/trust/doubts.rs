@@ -10,7 +10,7 @@ pub struct Disagreement {
     pub windows: usize,
     /// Their length, s.
     pub length: f64,
-    /// By how many standard errors of noise each of the parameters is off in them.
+    /// Deviation of each parameter in them, in standard errors of noise.
     pub off: Vec<f64>,
     /// The addition to the covariance of the variables that concern all runs.
     pub(crate) added: DMatrix<f64>,
@@ -31,7 +31,7 @@ pub struct OtherLaw {
     pub standard_errors: f64,
     /// Amount that it takes off the sum of the squared residuals.
     pub(crate) gain: f64,
-    /// By how many of its standard errors each parameter would move.
+    /// Change of each parameter, in standard errors.
     pub off: Vec<f64>,
     /// The addition to the covariance of the variables that concern all runs.
     pub(crate) added: DMatrix<f64>,
@@ -50,7 +50,7 @@ pub struct Cause {
     pub standard_errors: f64,
     /// Its parameters.
     pub parameters: Vec<Size>,
-    /// The estimates of the fit as they are with it, in their order; none where the fit with it has no such value.
+    /// The estimates of the fit with it, in their order; `None` if the fit with it has no such value.
     pub estimates: Vec<Option<Size>>,
     /// The change of the case file that adds it.
     pub add: String,

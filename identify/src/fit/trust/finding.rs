@@ -1,9 +1,9 @@
 //! Findings of a fit, a sentence each.
 
-/// How much something matters.
+/// Severity of a finding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Grade {
-    /// Good to know.
+    /// Information.
     Note,
     /// The result is not to be relied on.
     Warning,
@@ -22,11 +22,11 @@ impl Grade {
 /// Something to be known.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Finding {
-    /// How much it matters.
+    /// Its severity.
     pub grade: Grade,
     /// Its subject, in a word for programs.
     pub code: &'static str,
-    /// The log it is about; none if it is about the fit.
+    /// The log that it concerns; `None` if it concerns the fit.
     pub log: Option<String>,
     /// In a sentence.
     pub text: String,

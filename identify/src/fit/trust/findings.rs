@@ -30,7 +30,7 @@ pub(crate) fn findings(case: &Case, plan: &Plan, found: &Searched, fit: &Fit, su
     all.extend(of_noise(found));
     all.extend(of_motor(case, fit));
     let unexplained = of_residuals(case, plan, found, fit, &all);
-    // Of columns that have changed places each may move against the model, but with its sign changed neither is met.
+    // Each of two exchanged columns may move against the model, but a change of sign corrects neither.
     let is_swapped = |log: &Option<String>| unexplained.iter().any(|one| one.code == "swapped" && one.log == *log);
     all.retain(|one| !(one.code == "sign" && is_swapped(&one.log)));
     all.extend(unexplained);
@@ -42,7 +42,7 @@ fn finding(grade: Grade, code: &'static str, text: String) -> Finding {
     Finding { grade, code, log: None, text }
 }
 
-/// The findings of the survey of each log, as far as simulation bears them out.
+/// The findings of the survey of each log that simulation confirms.
 fn of_logs(case: &Case, plan: &Plan, found: &Searched, surveys: &[Survey]) -> Vec<Finding> {
     let mut all = Vec::new();
     for survey in surveys {
@@ -147,7 +147,7 @@ fn of_noise(found: &Searched) -> Option<Finding> {
     (!beyond.is_empty()).then(|| finding(Grade::Note, "noise", text))
 }
 
-/// How the search ended.
+/// Findings about the end of the search.
 fn of_search(fit: &Fit) -> Vec<Finding> {
     let mut all = Vec::new();
     match fit.ending {

@@ -26,7 +26,7 @@ pub struct Fit {
     pub correlation: Vec<Vec<f64>>,
     /// The standard deviation of each quantity's residuals.
     pub noise: Vec<(Quantity, f64)>,
-    /// How each log is met: those fitted, then those held out.
+    /// Agreement with each log: those fitted, then those held out.
     pub logs: Vec<LogFit>,
     /// The information of the logs at the estimates.
     pub identifiability: Option<Identifiability>,
@@ -44,9 +44,9 @@ pub struct Fit {
     pub findings: Vec<Finding>,
     /// The variables of the search where it ended.
     pub point: Vec<f64>,
-    /// How the search ended.
+    /// End of the search.
     pub ending: Ending,
-    /// The strategy with which it ended; none where nothing was searched for.
+    /// Its last strategy; `None` without a search.
     pub strategy: Option<Strategy>,
     /// The gain that the last step promised, in standard errors.
     pub decrement: f64,
@@ -55,9 +55,9 @@ pub struct Fit {
     /// The cost that each start led to, in the first weights; the first start is that of the case, or what a regression
     /// makes of it if that is nearer.
     pub starts: Vec<f64>,
-    /// How many gradients around the estimates balance there; more than one at a kink.
+    /// Number of gradients around the estimates that balance; more than one at a kink.
     pub pieces: usize,
-    /// How often an evolution strategy, which needs no derivatives, went on.
+    /// Number of uses of an evolution strategy.
     pub evolved: usize,
     /// Values that count.
     pub values: usize,
@@ -74,27 +74,27 @@ pub struct Estimate {
     pub name: String,
     /// SI unit.
     pub unit: &'static str,
-    /// Where the search started.
+    /// Start of the search.
     pub start: f64,
     /// The estimate.
     pub value: f64,
-    /// Its standard error; infinite where it is not determined, none where it is at a bound.
+    /// Its standard error; infinite if it is not determined, `None` at a bound.
     pub error: Option<f64>,
-    /// 95 % interval; infinite where it is not determined. At a bound it reaches from there to where it would without
-    /// that bound; none where even that cannot be said.
+    /// 95 % interval; infinite if it is not determined. At a bound it extends from the bound to the limit of the
+    /// interval without the bound; `None` if that is unknown.
     pub interval: Option<[f64; 2]>,
     /// Its bounds.
     pub bounds: [f64; 2],
     /// True if it ended at one of them.
     pub at_bound: bool,
-    /// The part of the logs that it is for, by its place among the fit's; none where it is for all of them.
+    /// The part of the logs that it is for, by its index among the fit's; `None` if it is for all of them.
     pub part: Option<usize>,
     /// The keys that it sets in the case file, with their values.
     pub sets: Vec<(String, f64)>,
 }
 
 impl Estimate {
-    /// True if the logs tell it, or it is at a bound.
+    /// True if the logs determine it, or it is at a bound.
     pub fn is_determined(&self) -> bool {
         self.at_bound || self.error.is_some_and(f64::is_finite)
     }
@@ -123,7 +123,7 @@ impl Fit {
             && self.is_reliable()
     }
 
-    /// How it ended, for files: `converged` only where it is.
+    /// The word for its end in files.
     pub fn ending_word(&self) -> &'static str {
         match self.ending {
             Ending::Converged if self.estimates.iter().any(|estimate| estimate.at_bound) => "at_bound",
@@ -133,7 +133,8 @@ impl Fit {
         }
     }
 
-    /// The belts of two drives compared; none of a machine with one drive, or where no free parameter changes them.
+    /// The comparison of the belts of two drives; `None` for a machine with one drive, or if no free parameter changes
+    /// them.
     pub fn belts(&self) -> Option<&Belts> {
         self.identifiability.as_ref().and_then(|found| found.belts.as_ref())
     }

@@ -35,16 +35,16 @@ pub struct Identifiability {
     pub belts: Option<Belts>,
 }
 
-/// Parameters that the logs do not tell apart.
+/// Parameters that the logs cannot distinguish.
 #[derive(Debug, Clone)]
 pub struct Group {
     /// Places among the names.
     pub members: Vec<usize>,
-    /// How many combinations of them are determined.
+    /// Number of their determined combinations.
     pub determined: usize,
     /// The combination in words and numbers.
     pub words: String,
-    /// The sums, ratios and products of them that are determined, as far as they have a name.
+    /// Their determined sums, ratios and products that have a name.
     pub combinations: Vec<Combination>,
 }
 
@@ -54,7 +54,7 @@ impl Identifiability {
         self.groups.is_empty()
     }
 
-    /// From a Jacobian of `problem` at `x`, for white noise of this deviation; none if numbers fail.
+    /// Identifiability from a Jacobian of `problem` at `x`, for white noise of this deviation; `None` if numbers fail.
     pub fn new(problem: &Problem, jacobian: &DMatrix<f64>, x: &[f64], deviation: f64) -> Option<Self> {
         let all: Vec<usize> = (0..problem.globals()).collect();
         let directions = Directions::new(problem, jacobian, x, &all)?;
@@ -257,8 +257,7 @@ impl Identifiability {
     }
 }
 
-/// The tie of these parameters; none where they cannot be tied: values of different units, sums, and what campaigns
-/// have for themselves.
+/// The tie of these parameters; `None` for values of different units, sums, and parameters of single campaigns.
 fn tie(problem: &Problem, members: &[usize]) -> Option<String> {
     let mut keys = Vec::new();
     let unit = problem.parameters.get(*members.first()?)?.unit;
@@ -314,13 +313,13 @@ pub(crate) fn sum_of(machine: &crate::machine::Machine, parameters: &[&Free], we
             parts.push(arm.times(symbol));
             total += arm.of(machine) * value(machine, key)?;
         }
-        // All weights are the same number of times the arms, within a tenth: the belt gives way a little.
+        // All weights are the arms times one number, within a tenth, since the belt is elastic.
         let ratio = weight / own;
         if (ratio / *scale.get_or_insert(ratio) - 1.0).abs() > 0.1 {
             return None;
         }
     }
-    // What is not searched for and adds to it.
+    // Fixed parameters that contribute to it.
     let is_free = |key: &str| parameters.iter().any(|free| free.keys.iter().any(|(own, _)| own == key));
     for row in sum.parts(true).filter(|row| !is_free(row.key)) {
         let (arm, symbol) = arm_and_symbol(row.key)?;

@@ -1,4 +1,4 @@
-//! The trust in a minimum: which parameters are determined, how well, and what speaks against it.
+//! Reliability of a minimum: which parameters are determined, how well, and possible errors.
 
 pub(crate) mod belts;
 pub(crate) mod causes;

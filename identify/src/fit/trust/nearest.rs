@@ -1,16 +1,15 @@
-//! Of all machines that meet the logs alike, the one that is nearest to that of the case.
+//! The machine nearest to that of the case among all that fit the logs equally well.
 //!
-//! Where a direction is not determined, a search ends anywhere along it. With x₁ where it ended, x₀ the values of the
-//! case, D what counts as 100 % of each variable, V the directions that are not determined, and C the cost,
+//! A search ends anywhere along an undetermined direction. With its end x₁, the values x₀ of the case, D as 100 % of
+//! each variable, the undetermined directions V, and the cost C, the minimum of
 //!
 //! ```text
 //! min C(x) + ½ ρ² ‖Vᵀ D⁻¹ (x − x₀)‖²        ½ ρ² ‖Vᵀ D⁻¹ (x₁ − x₀)‖² = ε C(x₁)
 //! ```
 //!
-//! is at the point of the identified set that is nearest to x₀, where that set is a plane; all that is determined is
-//! optimised again. The sum is no greater there than at x₁, so C grows by no more than ε of itself, however much the
-//! logs tell of these directions. A set that is curved is approached in rounds, each with the directions of the point
-//! that it begins at.
+//! is the point of the identified set nearest to x₀, if that set is a plane; determined directions are optimised again.
+//! The sum is at most that at x₁, so C grows by at most a relative ε, however well the logs determine these directions.
+//! A curved set is approached in rounds, each with the directions at its starting point.
 
 use super::uncertainty::Judged;
 use super::{causes, other_laws, sub_records};
@@ -34,7 +33,7 @@ pub(crate) struct Settled<'a> {
 }
 
 impl Settled<'_> {
-    /// The information of the logs there, and whether their parts agree and their law is the right one; none if numbers
+    /// The information of the logs there, with the tests of their parts and of the friction law; `None` if numbers
     /// fail.
     pub fn judged(&self, case: &Case, plan: &Plan) -> Option<Judged> {
         let Minimum { residuals, jacobian, x, at_bound, .. } = &self.searched.best;
@@ -182,7 +181,7 @@ fn nearest(
     None
 }
 
-/// One round with these directions; none where the logs are not met as well by what it leads to.
+/// One round with these directions; `None` if its result fits the logs less well.
 fn round(
     problem: &mut Problem,
     best: &Minimum,
@@ -215,7 +214,7 @@ fn round(
         let value = given[j].clamp(open.low[j], open.high[j]);
         (held.low[j], held.high[j], kept[j]) = (value, value, value);
     }
-    // What is hidden as it was given; else drawn to it like the rest; else from where the case began.
+    // Hidden variables as given; else drawn towards their values like the rest; else from the start of the case.
     let mut tries = vec![(kept, &held), (best.x.clone(), &open), (given.to_vec(), &open)];
     if hidden.is_empty() {
         tries.remove(0);

@@ -1,17 +1,16 @@
 //! Tests whether another friction law explains the residuals.
 //!
-//! Where friction in truth falls with speed, or is not the same in both directions, and the fit has neither, its
-//! parameters take what they can of the difference: residuals stay small, and estimates are off by far more than noise
-//! says. So laws that the case does not have are tried as a further column of the Jacobian. With the residuals r, the
+//! If friction falls with speed, or differs between the directions, and the fit has neither, its parameters absorb part
+//! of the difference: residuals stay small, and the errors of the estimates are far larger than noise suggests. Laws
+//! that the case does not have are therefore tried as a further column of the Jacobian. With the residuals r, the
 //! columns J of the fit, the column j of the amplitude a of such a law and A = (JᵀJ)⁻¹
 //!
 //! ```text
 //! j⊥ = j − J A Jᵀ j      a = −j⊥·r / j⊥·j⊥      d = −a A Jᵀ j
 //! ```
 //!
-//! d is what the law would change of the parameters: the bias of a variable that was left out. Where a is more than
-//! noise makes of it, and a run with the law and the parameters moved by d bears out what the column promises, intervals
-//! are widened by d, and it is said which law it is.
+//! d is the change of the parameters with the law: omitted-variable bias. If a is significant, and a run with the law
+//! and the parameters moved by d confirms the predicted gain, intervals are widened by d, and the law is reported.
 
 use super::doubts::{OtherLaw, falling};
 use super::uncertainty::Judged;
@@ -196,7 +195,7 @@ struct Tried {
     gain: f64,
 }
 
-/// Where the fit ended, as all candidates need it.
+/// The end of the fit, shared by all candidates.
 struct Place<'a> {
     problem: &'a Problem<'a>,
     x: &'a [f64],
@@ -207,7 +206,7 @@ struct Place<'a> {
     inverse: DMatrix<f64>,
 }
 
-/// The law that the residuals suggest most; none if none is significant or too little is determined.
+/// The law that the residuals suggest most; `None` if none is significant or too little is determined.
 pub(crate) fn other_law(found: &Searched, judged: &Judged) -> Option<OtherLaw> {
     let (problem, best) = (&found.problem, &found.best);
     let g = problem.globals();
@@ -280,7 +279,7 @@ fn fastest(problem: &Problem, x: &[f64], body: Body) -> f64 {
 }
 
 impl Place<'_> {
-    /// The residuals at `x` with so much of a law; none where the model does not get through with it.
+    /// The residuals at `x` with this amplitude of a law; `None` if the model fails with it.
     fn with(&self, candidate: Candidate, amplitude: f64, x: &[f64]) -> Option<DVector<f64>> {
         let mut residuals = vec![0.0; self.residuals.len()];
         let mut bench = Bench::default();
@@ -309,8 +308,8 @@ impl Place<'_> {
         Some(DVector::from_vec(residuals))
     }
 
-    /// Decrease of Σ r² by a law at x + s d, with the best of the shares s;
-    /// none if it is below [`LAW_KEEPS`] of the predicted decrease.
+    /// Decrease of Σ r² by a law at x + s d, with the best of the shares s; `None` if it is below [`LAW_KEEPS`] of the
+    /// predicted decrease.
     fn gained(&self, tried: &Tried) -> Option<f64> {
         let bounds = self.problem.bounds();
         let own = |share: &f64| {
@@ -326,8 +325,8 @@ impl Place<'_> {
         (gain >= LAW_KEEPS * tried.gain).then_some(gain)
     }
 
-    /// The amplitude that a law would have, from what so much of it makes of the residuals; none where the model does
-    /// not get through with it, or where it is what the parameters do already.
+    /// The estimated amplitude of a law, from the change of the residuals by an amplitude of `step`; `None` if the
+    /// model fails with it, or if the parameters have the same effect.
     fn attempt(&self, candidate: Candidate, step: f64) -> Option<Tried> {
         let moved = self.with(candidate, step, self.x)?;
         let column = (moved - &self.residuals) / step;
@@ -351,7 +350,7 @@ impl Place<'_> {
         columns.columns_mut(0, g).copy_from(&self.jacobian.columns(0, g));
         columns.set_column(g, &tried.column);
         columns.columns_mut(g + 1, n - g).copy_from(&self.jacobian.columns(g, n - g));
-        // Of logs without noise any law takes off some of what their last digits left.
+        // In logs without noise, any law explains a part of the rounding errors.
         let moved = (&tried.column * tried.amplitude).amax();
         if moved < LAW_DUST / FILE_ROUNDING * self.problem.rounding() {
             return None;
@@ -367,8 +366,8 @@ impl Place<'_> {
         }
         let shift = tried.along.rows(0, g) * -tried.amplitude;
         let off = (0..g).map(|j| shift[j].abs() / judged.covariance.error(j).unwrap_or(f64::INFINITY)).collect();
-        // (|d| + h)² ≤ 2 (d² + h²), d being as far as an interval reaches, and h what noise makes of both; the law is
-        // one of its kind, and the true one may do half as much again.
+        // (|d| + h)² ≤ 2 (d² + h²), with the half-width d of an interval and the effect h of noise on both; the true
+        // law may have one and a half times the effect of the one tried.
         let square = &shift * shift.transpose();
         let added = &square * (3.0 / (NORMAL * NORMAL)) + square * (error / tried.amplitude).powi(2);
         let Candidate { body, kind, .. } = tried.candidate;

@@ -28,7 +28,7 @@ pub(crate) struct Parts {
 }
 
 impl Parts {
-    /// Of the logs of a case that its plan fits.
+    /// The parts of the logs of a case that its plan fits.
     pub fn new(case: &Case, plan: &Plan) -> Self {
         let is_held = |name: &str| plan.held_out.iter().any(|pattern| matches(name, pattern));
         let logs: Vec<&Experiment> = case.experiments.iter().filter(|e| e.log.is_some() && !is_held(&e.name)).collect();
@@ -78,7 +78,7 @@ pub(crate) fn errors(
     Ok((errors.collect(), found.work))
 }
 
-/// Every so many logs, so that each part is like the others.
+/// Interleaved logs, so that the parts are alike.
 fn by_log(logs: &[&Experiment]) -> Vec<Fold> {
     let count = FOLDS.min(logs.len());
     let fold = |part: usize| {
@@ -113,7 +113,7 @@ fn by_block(logs: &[&Experiment]) -> Vec<Fold> {
     folds
 }
 
-/// Some rows of an experiment's log as an experiment; none if they are too few.
+/// Some rows of an experiment's log as an experiment; `None` if they are too few.
 fn cut(experiment: &Experiment, rows: Range<usize>) -> Option<Experiment> {
     let log = experiment.log.as_ref()?;
     if rows.len() < BLOCK_SAMPLES / 2 {

@@ -1,7 +1,7 @@
-//! Profiles: how much worse the logs are met with one parameter held off its estimate and all others fitted anew.
+//! Profiles: increase of the cost with one parameter held away from its estimate and all others fitted again.
 //!
-//! Where the model is linear, √ of the growth of the sum of squares is a straight line on either side, |p − p̂|/error
-//! on the scale of the search. A profile that is not says how far to trust the interval, and on which side it is too
+//! For a linear model, the root of the growth of the sum of squares is a straight line on either side, |p − p̂|/error
+//! on the scale of the search. A curved profile shows how far the interval is reliable, and on which side it is too
 //! short.
 
 use super::found::Fit;
@@ -23,7 +23,7 @@ pub struct Profile {
     pub name: String,
     /// SI unit.
     pub unit: &'static str,
-    /// Where it was held, ascending; the estimate among them.
+    /// The held values, ascending, including the estimate.
     pub values: Vec<f64>,
     /// √ of the growth of the sum of squares, in standard errors.
     pub growth: Vec<f64>,
@@ -32,8 +32,8 @@ pub struct Profile {
 }
 
 impl Profile {
-    /// The growth two standard errors below and above the estimate over that of a linear model; none where it was not
-    /// held there.
+    /// The growth two standard errors below and above the estimate, relative to that of a linear model; `None` if it
+    /// was not held there.
     pub fn bends(&self) -> [Option<f64>; 2] {
         let middle = self.linear.iter().position(|off| *off == 0.0).unwrap_or(0);
         let at = |mut rows: std::ops::Range<usize>| {
@@ -48,8 +48,8 @@ impl Profile {
     }
 }
 
-/// The profiles of what `fit` found for the parameters of `plan` in the logs of `case`, as many as `stop` and what they
-/// cost allow; a parameter that is at a bound or not determined has none.
+/// Profiles of the estimates of `fit` for the parameters of `plan` and the logs of `case`, as many as `stop` and their
+/// cost allow; parameters that are at a bound or not determined have none.
 pub fn profiles(case: &Case, plan: &Plan, fit: &Fit, stop: Option<Stop>) -> Result<Vec<Profile>> {
     let mut problem = Problem::new(case, plan)?.stopped_by(stop);
     problem.weigh_by(&fit.noise);
@@ -65,11 +65,11 @@ pub fn profiles(case: &Case, plan: &Plan, fit: &Fit, stop: Option<Stop>) -> Resu
     Ok(profiles)
 }
 
-/// Where the profiles begin.
+/// Common start of the profiles.
 struct Bottom {
     x: Vec<f64>,
     cost: f64,
-    /// Standard error of each variable for residuals of one; none at a bound.
+    /// Standard error of each variable for residuals of one; `None` at a bound.
     unit: Vec<Option<f64>>,
     options: Options,
 }

@@ -196,8 +196,7 @@ fn told(now: &Identifiability, found: &Identifiability) -> String {
     told.join("; ")
 }
 
-/// The Jacobian with the rows that an idea adds: every log once more, each with a start, a delay and offsets of its own
-/// that nobody knows.
+/// The Jacobian with the rows that an idea adds: every log again, each with an unknown start, delay and offsets.
 fn with_rows(
     problem: &Problem,
     idea: &Idea,
@@ -260,7 +259,7 @@ fn with_rows(
     Some(all)
 }
 
-/// The outputs of run `index` with the idea, in standard deviations; none where the model does not reach its end.
+/// The outputs of run `index` with the idea, in standard deviations; `None` if the model does not reach its end.
 fn answer(problem: &Problem, idea: &Idea, measured: &[(Quantity, f64)], index: usize, x: &[f64]) -> Option<Vec<f64>> {
     let run = &problem.runs[index];
     let mut machine = problem.stage_at(x);
@@ -284,7 +283,7 @@ fn answer(problem: &Problem, idea: &Idea, measured: &[(Quantity, f64)], index: u
     Some(values)
 }
 
-/// True if some log moves both ways.
+/// True if some log has motion in both directions.
 fn turns_round(problem: &Problem) -> bool {
     let (mut most, mut least) = (0.0_f64, 0.0_f64);
     for u in problem.runs.iter().flat_map(|run| &run.logged[0]) {

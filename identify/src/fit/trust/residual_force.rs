@@ -1,14 +1,14 @@
-//! The force that a model lacks: what would have to act on the cart beside it, so that it followed the log.
+//! The force that a model lacks: the additional force on the cart with which it would follow the log.
 //!
-//! With e the way of the cart in the log minus that of the model, M all that moves and b all that brakes in proportion
-//! to speed, as seen at the cart,
+//! With the position error e of the cart, log minus model, the total mass M and the total viscous friction b at the
+//! cart,
 //!
 //! ```text
 //! ΔF = M ë + b ė
 //! ```
 //!
-//! It is drawn beside position, speed, force of the motor and time: friction that changes along the travel shows in the
-//! first, another law in the second, a gain in the third and a drift in the last.
+//! It is plotted over position, speed, force of the motor and time: the first shows friction that changes along the
+//! travel, the second another law, the third a gain and the last a drift.
 
 use super::scores::LogFit;
 use crate::fit::limits::{CART_AT_REST, RESIDUAL_FORCE_NOISE, WIDTHS};
@@ -48,8 +48,8 @@ impl ResidualForce {
     }
 }
 
-/// The force that a log of an axis lacks beside `stage`; none without an evenly sampled position, or where the model does not
-/// reach the end.
+/// The force that `stage` lacks for a log of an axis; `None` without an evenly sampled position, or if the model does
+/// not reach the end.
 pub fn residual_force(machine: &Machine, log: &LogFit) -> Option<ResidualForce> {
     let is_known = log.complete && machine.has_one_coordinate();
     let output = log.outputs.iter().find(|output| output.quantity.is_position()).filter(|_| is_known)?;

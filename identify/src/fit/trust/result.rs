@@ -22,7 +22,7 @@ pub(crate) fn told(case: &Case, plan: &Plan, found: &Searched, judged: Option<&J
     (fit, surveys)
 }
 
-/// Everything that is told of a minimum.
+/// The complete result at a minimum.
 pub(crate) fn result(found: &Searched, judged: Option<&Judged>) -> Fit {
     let Searched { problem, best, noise, starts, work, .. } = found;
     let bounds = problem.bounds();
@@ -54,7 +54,7 @@ pub(crate) fn result(found: &Searched, judged: Option<&Judged>) -> Fit {
         let interval = match error {
             Some(e) if e.is_finite() => Some([end(x - t * e), end(x + t * e)]),
             Some(_) => Some([f64::NEG_INFINITY, f64::INFINITY]),
-            // Where it would be without its bound, but no further off than a standard error.
+            // Its value without the bound, but at most a standard error away.
             None => beyond.as_ref().filter(|(judged, _)| judged.identifiability.error[j].is_finite()).map(
                 |(judged, step)| {
                     let e = judged.covariance.error(j).unwrap_or(f64::INFINITY);
@@ -105,7 +105,7 @@ pub(crate) fn result(found: &Searched, judged: Option<&Judged>) -> Fit {
         let own = problem.own_variables(index);
         for (extra, &value) in run.extras.iter().zip(&extras) {
             let j = own.iter().find(|(_, other)| other.what == extra.what).map(|(j, _)| *j);
-            // What is known beforehand is no result.
+            // Prior knowledge is not a result.
             if let (Some(j), None) = (j, extra.known) {
                 told.push((extra.what, value, error(j).map(|e| e * extra.unit)));
             }

@@ -7,7 +7,7 @@ use crate::log::Quantity;
 use crate::machine::Machine;
 use crate::solve::Bench;
 
-/// How a log is met.
+/// Agreement with a log.
 #[derive(Debug, Clone)]
 pub struct LogFit {
     /// The experiment.
@@ -30,7 +30,7 @@ pub struct LogFit {
     pub complete: bool,
 }
 
-/// How an output is met.
+/// Agreement with an output.
 #[derive(Debug, Clone)]
 pub struct OutputFit {
     /// The quantity.
@@ -45,7 +45,7 @@ pub struct OutputFit {
     pub held_out: Option<Score>,
 }
 
-/// How far model and log are apart.
+/// Deviation of model and log.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Score {
     /// Values compared.
@@ -131,12 +131,12 @@ fn score(seen: &[f64], model: &[f64], rows: std::ops::Range<usize>) -> Option<Sc
     })
 }
 
-/// How several logs are met together.
+/// Agreement with several logs together.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Together {
     /// The name that they share; empty where it is all of them.
     pub name: String,
-    /// How many logs and windows.
+    /// Number of logs and windows.
     pub logs: usize,
     /// The measured values.
     pub quantity: Quantity,
@@ -148,7 +148,7 @@ pub struct Together {
     pub rmse: f64,
 }
 
-/// How the logs that have the same `name` are met together, in the order in which they come.
+/// Agreement with the logs of each `name`, in the order of their first occurrence.
 pub fn together(logs: &[LogFit], name: impl Fn(&LogFit) -> String) -> Vec<Together> {
     let mut all: Vec<Together> = Vec::new();
     for log in logs {
@@ -160,7 +160,7 @@ pub fn together(logs: &[LogFit], name: impl Fn(&LogFit) -> String) -> Vec<Togeth
             let mut parts: Vec<_> =
                 [of(output.fitted, false), of(output.held_out, true)].into_iter().flatten().collect();
             if !log.complete {
-                // What the model does not reach is missed by as much as can be.
+                // Values that the model does not reach count as an infinite error.
                 parts = vec![(f64::INFINITY, output.seen.len(), log.held_out)];
             }
             for (squares, count, held_out) in parts {

@@ -1,16 +1,15 @@
 //! Tests whether parts of the logs agree with the whole, beyond noise.
 //!
-//! A friction that drifts, or one of another law, leaves residuals that the parameters follow as far as they can: the
-//! estimates go where the integrated error is least, and noise says nothing of how far that is from the truth. So the
-//! logs are cut into windows, each but the first of a log with a start of its own, in which errors cannot add up, and
-//! the same parameters are fitted to all of them. With ĝ_c = J_cᵀ r_c of window c and A = (JᵀJ)⁻¹ the windows disagree
-//! by
+//! Drifting friction, or friction of another law, leaves residuals that the parameters partly absorb: the estimates
+//! minimise the integrated error, and noise does not show their distance from the truth. The logs are therefore cut
+//! into windows, each but the first of a log with a start of its own, in which errors cannot accumulate, and the same
+//! parameters are fitted to all of them. With ĝ_c = J_cᵀ r_c of window c and A = (JᵀJ)⁻¹ the windows disagree by
 //!
 //! ```text
 //! V = A (Σ_c ĝ_c ĝ_cᵀ) A G/(G−1)           (K.-Y. Liang and S. L. Zeger 1986)
 //! ```
 //!
-//! and with the whole logs by d. If either is more than noise makes of it, intervals are widened by both.
+//! and with the whole logs by d. If either is significant, intervals are widened by both.
 
 use super::doubts::Disagreement;
 use super::uncertainty::Judged;
@@ -25,7 +24,7 @@ use crate::fit::search::triangle::inverse_of_square;
 use crate::solve::Flow;
 use nalgebra::{DMatrix, DVector};
 
-/// Compares windows with the whole; none where they agree within noise, or tell too little.
+/// Compares windows with the whole; `None` if they agree within noise, or contain too little information.
 pub(crate) fn disagreement(case: &Case, plan: &Plan, found: &Searched, judged: &Judged) -> Option<Disagreement> {
     let whole = &found.problem;
     let g = whole.globals();
@@ -80,7 +79,7 @@ pub(crate) fn disagreement(case: &Case, plan: &Plan, found: &Searched, judged: &
     let clusters = windows as f64;
     let between = &inverse * squares * &inverse * (clusters / (clusters - 1.0));
     let shift = DVector::from_fn(g, |j, _| best.x[j] - found.best.x[j]);
-    // Of windows, noise makes a variance that is off by √(2/(G − 1)) of itself.
+    // The variance between G windows has a relative standard error of √(2/(G − 1)).
     let most = 1.0 + WINDOWS_OFF * (2.0 / (clusters - 1.0)).sqrt();
     let off: Vec<f64> = (0..g)
         .map(|j| {
@@ -92,8 +91,8 @@ pub(crate) fn disagreement(case: &Case, plan: &Plan, found: &Searched, judged: &
         return None;
     }
     let wider = (student(windows - 1) / student(1_000_000)).powi(2);
-    // (|d| + h)² ≤ 2 (d² + h²), d being as far as an interval reaches; and windows are still long enough for half as
-    // much again.
+    // (|d| + h)² ≤ 2 (d² + h²), with the half-width d of an interval; windows are still long enough for one and a half
+    // times that.
     let added = (&shift * shift.transpose() / student(1_000_000).powi(2) + between * wider) * 3.0;
     Some(Disagreement { windows, length, off, added })
 }

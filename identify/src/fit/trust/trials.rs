@@ -70,7 +70,7 @@ fn leave_motion(case: &Case, found: &Searched, log: &Log, note: &mut Note) {
     jumps.retain(|jump| {
         let step = |values: &[f64]| values[jump.sample] - values[jump.sample - 1];
         let left = step(&output.seen) - step(&output.model);
-        // What the model does not reach, it does not explain.
+        // Values that the model does not reach are not explained.
         left.is_nan() || left * jump.size.signum() > JUMP * jump.size.abs()
     });
     note.text = jumps_text(jumps, quantity.unit());
@@ -78,7 +78,7 @@ fn leave_motion(case: &Case, found: &Searched, log: &Log, note: &mut Note) {
 
 /// True if the logs are met better with the log of this name as `remedy` has it; true where that cannot be said.
 pub(crate) fn is_borne_out(case: &Case, plan: &Plan, found: &Searched, name: &str, remedy: &Remedy) -> bool {
-    // What was not fitted, or not to its end, says nothing.
+    // An incomplete fit, or a log that was not fitted, does not count.
     if found.problem.is_stopped() || !found.problem.runs.iter().any(|run| run.name == name) {
         return true;
     }
@@ -106,13 +106,13 @@ pub(crate) fn is_borne_out(case: &Case, plan: &Plan, found: &Searched, name: &st
     tried.is_empty() || tried.iter().any(is_better)
 }
 
-/// How logs are met that were mended.
+/// Agreement with corrected logs.
 pub(crate) struct Mended {
     /// Cost of a value, as a part of that with the logs as they are.
     pub left: f64,
     /// The least such part of any quantity.
     least: f64,
-    /// How many values count.
+    /// Number of values that count.
     counted: usize,
 }
 
@@ -133,7 +133,8 @@ fn squares(problem: &Problem, residuals: &[f64]) -> Vec<(Quantity, f64)> {
     problem.quantities().into_iter().map(of).collect()
 }
 
-/// How the logs are met with those of these names mended, after so many Jacobians; none where no model gets through.
+/// Agreement with the logs after correction of those with these names, after a limited number of Jacobians; `None` if
+/// no model can simulate them.
 pub(crate) fn mended(
     case: &Case,
     plan: &Plan,
@@ -171,7 +172,7 @@ pub(crate) fn mended(
     Some(Mended { left: cost / counted.max(1) as f64 / before.max(f64::MIN_POSITIVE), least, counted })
 }
 
-/// Where a short search from `start` leads, and the cost there.
+/// Result of a short search from `start`, and its cost.
 fn descend(problem: &mut Problem, plan: &Plan, start: &[f64], iterations: usize) -> Option<(Minimum, f64)> {
     if start.len() != problem.variables() || problem.is_stopped() {
         return None;

@@ -1,8 +1,7 @@
-//! How far the truth may be from an estimate: the covariance, for the noise that the residuals show.
+//! Uncertainty of estimates: their covariance for the noise of the residuals.
 //!
-//! For white residuals it is s² (JᵀJ)⁻¹. Residuals that are alike from sample to sample tell less than their number
-//! says: with the covariance Σ of the noise it is (JᵀJ)⁻¹ Jᵀ Σ J (JᵀJ)⁻¹, for every Σ that the residuals allow
-//! ([`crate::fit::noise`]).
+//! For white residuals it is s² (JᵀJ)⁻¹. Correlated residuals contain less information: with the covariance Σ of the
+//! noise it is (JᵀJ)⁻¹ Jᵀ Σ J (JᵀJ)⁻¹, for every Σ that the residuals allow ([`crate::fit::noise`]).
 
 use super::directions::Directions;
 use super::doubts::{Cause, Disagreement, OtherLaw};
@@ -13,7 +12,7 @@ use crate::fit::noise::{self, Slow, Spread, Wave, half_width};
 use crate::fit::search::triangle::inverse_of_square;
 use nalgebra::{DMatrix, DVector};
 
-/// Covariance of the variables that are free, in their order; none if they are not determined.
+/// Covariance of the free variables, in their order; exists only if they are determined.
 #[derive(Debug, Clone)]
 pub struct Covariance {
     /// Variables that are free.
@@ -24,8 +23,7 @@ pub struct Covariance {
     pub deviation: f64,
     /// Independent values minus variables.
     pub freedom: usize,
-    /// How many standard errors a 95 % interval reaches to each side; few degrees of freedom are in the standard
-    /// errors.
+    /// Half-width of a 95 % interval, in standard errors; these include the effect of few degrees of freedom.
     pub reach: f64,
 }
 
@@ -34,7 +32,7 @@ pub struct Covariance {
 pub(crate) struct Judged {
     pub identifiability: Identifiability,
     pub covariance: Covariance,
-    /// By how much slow noise makes errors greater than white noise of the same size would.
+    /// Ratio of the errors to those with white noise of the same size.
     pub inflation: f64,
     /// The slow noises of each quantity, by its place among the problem's.
     pub spreads: Vec<Spread>,
@@ -47,7 +45,8 @@ pub(crate) struct Judged {
 }
 
 impl Judged {
-    /// At `x` with these residuals and this Jacobian, the variables that are `held` left out; none if numbers fail.
+    /// The uncertainty at `x` with these residuals and this Jacobian, without the `held` variables; `None` if numbers
+    /// fail.
     pub fn new(
         problem: &Problem,
         residuals: &[f64],
@@ -64,7 +63,7 @@ impl Judged {
         let squares: f64 = residuals.iter().map(|r| r * r).sum();
         let deviation = (squares / freedom).sqrt();
 
-        // Along the directions, of which a column each can be inverted whatever the logs tell.
+        // In terms of the directions, each of whose columns can be inverted for any logs.
         let mut turned = DMatrix::zeros(globals, alive);
         for i in 0..alive {
             for j in 0..globals {
@@ -77,7 +76,7 @@ impl Judged {
         for (place, &j) in locals.iter().enumerate() {
             columns.set_column(alive + place, &jacobian.column(j));
         }
-        // What belongs to one run and does not show there is known beforehand or not at all.
+        // A variable of one run without an effect there has prior knowledge only.
         let shown: Vec<usize> =
             (0..columns.ncols()).filter(|&c| c < alive || columns.column(c).iter().any(|v| *v != 0.0)).collect();
         let columns = columns.select_columns(&shown);
@@ -177,8 +176,8 @@ impl Judged {
 }
 
 impl Covariance {
-    /// At a minimum with these residuals and this Jacobian, its variables at bounds left out; none where they are not
-    /// determined.
+    /// The covariance at a minimum with these residuals and this Jacobian, without variables at bounds; `None` if they
+    /// are not determined.
     pub fn new(problem: &Problem, residuals: &[f64], jacobian: &DMatrix<f64>, at_bound: &[bool]) -> Option<Self> {
         let free: Vec<usize> = (0..at_bound.len()).filter(|&j| !at_bound[j]).collect();
         inverse_of_square(&jacobian.select_columns(&free))?;
@@ -187,7 +186,7 @@ impl Covariance {
         Some(Judged::new(problem, residuals, jacobian, &x, at_bound)?.covariance)
     }
 
-    /// Standard deviation of variable `j`; none for one at a bound.
+    /// Standard deviation of variable `j`; `None` at a bound.
     pub fn error(&self, j: usize) -> Option<f64> {
         let place = self.free.iter().position(|&free| free == j)?;
         Some(self.matrix[(place, place)].max(0.0).sqrt())

@@ -22,8 +22,8 @@ pub(super) struct Reason {
     pub text: String,
 }
 
-/// The reason why the model explains little of an output in the logs of these names; none where
-/// neither windows nor exchanged columns nor a factor mends it.
+/// The reason why the model explains little of an output in the logs of these names; `None` if neither windows nor
+/// exchanged columns nor a factor correct it.
 pub(super) fn reason(case: &Case, plan: &Plan, found: &Searched, quantity: Quantity, names: &[&str]) -> Option<Reason> {
     if found.problem.is_stopped() {
         return None;

@@ -72,7 +72,7 @@ impl<const N: usize> Row<N> {
 pub(in crate::solve) struct Watch<const N: usize> {
     pub(in crate::solve::exact) row: Row<N>,
     pub(in crate::solve::exact) transition: Transition,
-    /// Where its tolerance stands; the speed of a body that stops has none.
+    /// Index of its tolerance; the speed of a stopping body has none.
     pub(in crate::solve::exact) tolerance: usize,
 }
 
@@ -115,10 +115,10 @@ const GUARDS: usize = (2 * BODIES + 5 * DRIVES + 2 * SPRINGS).next_multiple_of(L
 /// One number for each guard of a mode.
 pub(in crate::solve::exact) type Values = [f64; GUARDS];
 
-/// Room for what looks at the guards need.
+/// Buffers for evaluations of the guards.
 #[derive(Clone)]
 pub(in crate::solve::exact) struct Room<const N: usize> {
-    /// ż and its size at the last look.
+    /// ż and its size at the last evaluation.
     pub(in crate::solve::exact) rate: [f64; N],
     pub(in crate::solve::exact) size: Size,
     pub(in crate::solve::exact) value: Values,
@@ -142,7 +142,7 @@ impl<const N: usize> Room<N> {
 #[derive(Clone)]
 pub(super) struct Beside<const N: usize> {
     pub(super) rows: Lanes<N>,
-    /// How fast their values can change: per unit of √(2V), mechanical and magnetic, and of the inputs' rates.
+    /// Largest rates of their values: per unit of √(2V), mechanical and magnetic, and of the inputs' rates.
     pub(super) mechanical: [f64; LANES],
     pub(super) magnetic: [f64; LANES],
     pub(super) at_once: [[f64; LANES]; DRIVES],

@@ -1,4 +1,4 @@
-//! The readings of an observer in a mode, and how far they can be off straight lines.
+//! The readings of an observer in a mode, and bounds of their deviation from straight lines.
 
 use super::{ModeMatrices, Space};
 use crate::friction::Motion;
@@ -77,7 +77,7 @@ impl<const N: usize> Shown<N> {
         Self { readout, matrix, more, mechanical, magnetic, unsprung, input }
     }
 
-    /// The readings in z, ways being counted from `origin`.
+    /// The readings at z, with positions relative to `origin`.
     #[inline]
     pub(in crate::solve) fn read(&self, z: &[f64; N], origin: &[f64; BODIES]) -> Reading {
         self.readout.placed(self.change(z), origin)
@@ -122,8 +122,8 @@ impl<const N: usize> ModeMatrices<N> {
         self.shown.get_or_init(|| Box::new(Shown::new(self, mechanism, space)))
     }
 
-    /// By how much readings can be off a straight line over any `interval` within the next `length`, `y` being ż now:
-    /// with bounds of |u̇| and |ü| of each input, |q̈| interval²/8.
+    /// Largest deviation of readings from a straight line over any `interval` within the next `length`, with `y` = ż
+    /// now and bounds of |u̇| and |ü| of each input: |q̈| interval²/8.
     pub(in crate::solve) fn bow(
         &self,
         shown: &Shown<N>,
@@ -134,8 +134,8 @@ impl<const N: usize> ModeMatrices<N> {
         self.change_by(shown, y, rates, length, |second| 0.125 * interval * interval * second)
     }
 
-    /// Bounds of |q⁽ᵏ⁾| within the next `length`, `y` being z⁽ᵏ⁻¹⁾ now: with bounds of |u⁽ᵏ⁻¹⁾| and |u⁽ᵏ⁾| of each input
-    /// on the way.
+    /// Bounds of |q⁽ᵏ⁾| within the next `length`, with `y` = z⁽ᵏ⁻¹⁾ now and bounds of |u⁽ᵏ⁻¹⁾| and |u⁽ᵏ⁾| of each
+    /// input.
     pub(in crate::solve) fn change_of(
         &self,
         shown: &Shown<N>,
@@ -146,7 +146,7 @@ impl<const N: usize> ModeMatrices<N> {
         self.change_by(shown, y, (rate, curvature), length, |change| change)
     }
 
-    /// What `factor` makes of each of these bounds.
+    /// These bounds, each multiplied by `factor`.
     #[inline(always)]
     fn change_by(
         &self,
@@ -160,7 +160,7 @@ impl<const N: usize> ModeMatrices<N> {
         let (first, second) = (self.size(y), self.size(&self.rate(y)));
         let (first, push) = (first.whole() + self.push(rate) * length, self.push(curvature) * length);
         let (mechanical, magnetic) = self.parted(second, push);
-        // What can change is never told to stand still, though rounding may have stopped it.
+        // A quantity that can change is never taken to be constant, although rounding may have stopped it.
         let [mechanical, magnetic, first] = [mechanical, magnetic, first].map(|size| (grow * size).max(STILL));
         let few = shown.readout.few;
         let mut change = reading_of(few, |q| {

@@ -30,10 +30,10 @@ use std::sync::Arc;
 pub(super) use tangent::Sloped;
 use tangent::{Seen, Tangent, Varied, are_alike};
 
-/// A guard that falls no faster than so many roundings of its rate only grazes.
+/// A guard that falls at no more than this multiple of the rounding of its rate only grazes.
 const GRAZES: f64 = 1e5;
 
-/// So many roundings of a rate are no jump of it.
+/// Change of a rate, in roundings, that does not count as a jump.
 const NO_JUMP: f64 = 40.0;
 
 /// Makes the sensitivities of one run: see [`Task`].
@@ -57,21 +57,21 @@ impl Make for Following<'_> {
     }
 }
 
-/// A run and its sensitivities under way.
+/// A run in progress with its sensitivities.
 struct Follower<'t, const N: usize> {
     task: Task<'t>,
     core: Core<N>,
     grid: Grid,
     row: u64,
-    /// Rows put out so far.
+    /// Number of rows output so far.
     rows: u64,
     seen: Seen,
-    /// By variable; none for one of the input.
+    /// By variable; `None` for a variable of the input.
     varied: Vec<Option<Varied>>,
     /// The places of the variables in `s`: those that change the equations first.
     places: Vec<usize>,
     s: Vec<[f64; N]>,
-    /// Jumps of S by later changes of the input, where one falls on a row that is not put out yet.
+    /// Jumps of S by later changes of the input, if one falls on the next row.
     pending: Option<[f64; N]>,
     /// The modes of this machine, with their derivatives, and what this run needs of them besides.
     slopes: Vec<Sloped<N>>,
@@ -79,7 +79,7 @@ struct Follower<'t, const N: usize> {
     /// The number of the present mode among them.
     now: usize,
     series: Box<Series<N>>,
-    /// True if it stands on a row or at a change of the input.
+    /// True at a row or at a change of the input.
     is_regular: bool,
     out: Sensitivities,
 }
@@ -157,7 +157,7 @@ impl<'t, const N: usize> Follower<'t, N> {
             self.reach(row, offset)?;
             time = time.max(until);
         }
-        // Behind a last, shorter interval it stands at the last row, too.
+        // After a last, shorter interval the run is at the last row, too.
         self.go_to(self.grid.intervals());
         self.put_out();
         Some(())
@@ -171,7 +171,7 @@ impl<'t, const N: usize> Follower<'t, N> {
             (false, _) => [0.0; N],
             (true, false) => self.core.matrices.rate(&self.core.z),
             (true, true) => {
-                // The input that begins at once would begin later: until then there is none.
+                // An input that begins at once would begin later; until then it is zero.
                 let mut idle = self.core.clone();
                 idle.set_input(&Pieces::held(&[0.0; DRIVES], 0.0, f64::INFINITY));
                 idle.resolve();
@@ -190,7 +190,7 @@ impl<'t, const N: usize> Follower<'t, N> {
             let mut jump: [f64; N] = std::array::from_fn(|k| before[k] - after[k]);
             let space = &self.core.common.space;
             for place in (0..space.layout.inputs).flat_map(|drive| (0..=space.highest).map(move |k| (drive, k))) {
-                // Where it stands, and how it is from now on: u(t − d).
+                // Its index, and its values from now on: u(t − d).
                 let at = space.chain(place.0, place.1);
                 jump[at] = f64::NAN;
             }
@@ -212,7 +212,7 @@ impl<'t, const N: usize> Follower<'t, N> {
         }
     }
 
-    /// Jump of the derivatives by a delay at the change of the input at which it stands.
+    /// Jump of the derivatives by a delay at the present change of the input.
     fn move_seam(&mut self) {
         let Some(jump) = self.pending.take() else { return };
         let (space, z) = (&self.core.common.space, &self.core.z);
@@ -253,7 +253,7 @@ impl<'t, const N: usize> Follower<'t, N> {
         Some(())
     }
 
-    /// Goes on to `offset` behind row `row`, event by event.
+    /// Advances to `offset` after row `row`, event by event.
     fn reach(&mut self, row: u64, offset: f64) -> Option<()> {
         while self.row < row || (self.row == row && self.core.common.offset < offset) {
             self.core.check();
@@ -305,7 +305,7 @@ impl<'t, const N: usize> Follower<'t, N> {
         self.go_to(self.row + 1);
     }
 
-    /// Moves S so far from where the state was `begin`, in the present mode.
+    /// Advances S by `distance` from the state `begin`, in the present mode.
     fn follow(&mut self, begin: &[f64; N], distance: f64, ends_regularly: bool) {
         let sloped = &mut self.slopes[self.tangents[self.now].sloped];
         let is_regular = self.is_regular && ends_regularly;
@@ -325,7 +325,7 @@ impl<'t, const N: usize> Follower<'t, N> {
         }
     }
 
-    /// Goes through an event: a guard falls.
+    /// Passes an event: a guard falls.
     fn event(&mut self, fallen: Transition) -> Option<()> {
         let law = Arc::clone(&self.core.matrices);
         let guard = law.guards.iter().position(|guard| guard.transition.cause == fallen.cause)?;

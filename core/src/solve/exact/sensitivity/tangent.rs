@@ -9,7 +9,7 @@ use crate::solve::followed::Differentiated;
 use crate::solve::propagator::{Columns, Matrix, SlopedStep};
 use std::sync::Arc;
 
-/// Differences up to so many roundings of what they are taken of are none.
+/// Differences up to this multiple of the rounding of their terms count as zero.
 const ROUNDINGS: f64 = 16.0;
 
 /// Distances between rows and changes of the input that have matrices of their own; where there are more, the changes
@@ -78,7 +78,7 @@ impl Sparse {
     }
 }
 
-/// How the equations of one mode change with the variables of the machine: the same in all runs of it.
+/// Derivatives of the equations of one mode with respect to the variables of the machine, for all its runs.
 pub(in crate::solve::exact) struct Sloped<const N: usize> {
     pub(super) law: Arc<ModeMatrices<N>>,
     /// The machines at the points of each variable's differences, and the weights of the points.
@@ -92,8 +92,7 @@ pub(in crate::solve::exact) struct Sloped<const N: usize> {
 }
 
 impl<const N: usize> Sloped<N> {
-    /// That of the mode of `law`, among those that are known, or a new one; none where a variable changes what ends the
-    /// mode.
+    /// Derivatives of the mode of `law`, known or new; `None` if a variable changes the guards of the mode.
     pub(super) fn of(
         known: &mut Vec<Self>,
         law: &Arc<ModeMatrices<N>>,
@@ -135,7 +134,7 @@ impl<const N: usize> Sloped<N> {
         Some(Self { law: Arc::clone(law), of, slopes, guards, steps: Vec::new() })
     }
 
-    /// ∂g/∂p of a guard by a variable, for the state as it is.
+    /// ∂g/∂p of a guard with respect to a variable, at the present state.
     pub(super) fn guard_slope(&self, variable: usize, guard: usize, z: &[f64; N]) -> f64 {
         self.guards.get(variable).map_or(0.0, |guards| guards[guard].times(z))
     }
@@ -158,7 +157,7 @@ impl<const N: usize> Sloped<N> {
     }
 }
 
-/// How the outputs of one run follow from z in one mode, and how that changes with the variables.
+/// Outputs of one run as forms of z in one mode, with their derivatives with respect to the variables.
 pub(super) struct Tangent {
     /// The number of the mode among those that are known.
     pub(super) sloped: usize,
@@ -169,7 +168,7 @@ pub(super) struct Tangent {
 }
 
 impl Tangent {
-    /// Tangent of a mode; none if an output is not linear in z.
+    /// Tangent of a mode; `None` if an output is not linear in z.
     pub(super) fn new<const N: usize>(
         sloped: usize,
         mode: &Mode,
@@ -190,7 +189,7 @@ impl Tangent {
     }
 }
 
-/// So often a distance is crossed by series before matrices are made for it.
+/// Number of times that a distance is crossed by series before matrices are computed for it.
 const FEW: u32 = 4;
 
 /// One machine in one mode: A, and the guards as rows of weights.
@@ -206,7 +205,7 @@ impl<const N: usize> Equated<N> {
     }
 }
 
-/// An output as a form of z; none for what is no straight function of it.
+/// An output as a linear form of z; `None` if it is not linear.
 fn row<const N: usize>(seen: &Seen, mode: &Mode, output: Differentiated) -> Option<[f64; N]> {
     let (mechanism, space) = (&seen.mechanism, &seen.space);
     let scaled = |mut row: [f64; N], factor: f64| {
@@ -214,7 +213,7 @@ fn row<const N: usize>(seen: &Seen, mode: &Mode, output: Differentiated) -> Opti
         row
     };
     let shown = match output {
-        // What is stuck is not accelerated.
+        // A stuck body has no acceleration.
         Differentiated::Acceleration(body) if mode.motion[body] == Motion::Stuck => return Some([0.0; N]),
         Differentiated::Acceleration(body) => {
             let (equations, _) = straight::<N>(mechanism, space, mode);

@@ -54,7 +54,7 @@ pub struct Windows {
 }
 
 impl Windows {
-    /// For so many draws.
+    /// Adaptation over `tune` draws.
     pub fn new(tune: usize) -> Self {
         let (begin, last, mut length) =
             if tune >= 150 { (75, 50, 25) } else { (tune * 15 / 100, tune / 10, tune - tune * 15 / 100 - tune / 10) };
@@ -76,8 +76,8 @@ impl Windows {
     }
 }
 
-/// L of the covariance of these draws, whose correlations are made smaller by as much as few draws of many variables
-/// overrate them; none where a variable did not move.
+/// Cholesky factor L of the covariance of these draws, with correlations shrunk to compensate for few draws of many
+/// variables; `None` if a variable did not move.
 pub fn factor(draws: &[Vec<f64>]) -> Option<DMatrix<f64>> {
     let n = draws.first()?.len();
     let count = draws.len() as f64;

@@ -49,7 +49,7 @@ struct Stretch {
     chosen: Point,
 }
 
-/// Which way a path is extended.
+/// Direction in which a path is extended.
 #[derive(Clone, Copy, PartialEq)]
 enum Way {
     Back,
@@ -163,8 +163,8 @@ impl<'a> Chain<'a> {
         }
     }
 
-    /// Goes to the next draw, and gives the mean probability of acceptance along the path; none if it was interrupted:
-    /// then it stays where it is.
+    /// Advances to the next draw, and returns the mean probability of acceptance along the path; `None` if it was
+    /// interrupted, without a change.
     pub fn draw(&mut self) -> Option<f64> {
         (self.diverged, self.accepted) = (false, [0.0; 2]);
         self.kick();
@@ -215,7 +215,8 @@ impl Stretch {
         Self { ends: [point.clone(), point.clone()], momenta: point.momentum.clone(), weight, chosen: point }
     }
 
-    /// Takes in what follows that way, its chosen point too if `take` says so; whether the whole turns back.
+    /// Adds the continuation in this direction, and its chosen point if `take` is true; returns true if the whole path
+    /// makes a U-turn.
     fn join(&mut self, more: Stretch, way: Way, take: bool) -> bool {
         let [first, last] = if way == Way::Forth { [&*self, &more] } else { [&more, &*self] };
         let momenta = &first.momenta + &last.momenta;

@@ -30,10 +30,10 @@ impl Draws {
         (values.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>() / (values.len() as f64 - 1.0)).sqrt()
     }
 
-    /// Rank-normalised split R̂: 1 if all halves of all chains look alike, and not to be trusted above 1.01.
+    /// Rank-normalised split R̂: 1 if all halves of all chains agree; above 1.01 the chains have not converged.
     pub fn r_hat(&self, parameter: usize) -> f64 {
         let halves = self.halves(parameter);
-        // How far the chains are apart in place, and, folded, in width.
+        // Differences of the chains in location and, folded, in width.
         let mut all: Vec<f64> = halves.iter().flatten().copied().collect();
         all.sort_by(f64::total_cmp);
         let Some(&median) = all.get(all.len() / 2) else { return f64::NAN };
@@ -41,7 +41,8 @@ impl Draws {
         f64::max(r_hat(&rank_normalised(&halves)), r_hat(&rank_normalised(&folded)))
     }
 
-    /// Bulk effective sample size: as many independent draws would know the middle of the distribution as well.
+    /// Bulk effective sample size: number of independent draws with the same accuracy of the middle of the
+    /// distribution.
     pub fn effective(&self, parameter: usize) -> f64 {
         effective(&rank_normalised(&self.halves(parameter)))
     }

@@ -17,7 +17,7 @@ use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-/// How many draws, from how many chains.
+/// Number of draws and chains.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Effort {
     /// Chains, each from its own start.
@@ -66,20 +66,20 @@ pub struct Draws {
     pub interrupted: bool,
 }
 
-/// The logarithm of the density at a point, and its gradient into the second argument; none where the density is zero.
+/// The logarithm of the density at a point, and its gradient into the second argument; `None` if the density is zero.
 pub type LogDensity<'a> = dyn Fn(&[f64], &mut [f64]) -> Option<f64> + Sync + 'a;
 
-/// The logarithm of the density at a point alone; none where the density is zero.
+/// The logarithm of the density at a point alone; `None` if the density is zero.
 pub type Plain<'a> = dyn Fn(&[f64]) -> Option<f64> + Sync + 'a;
 
 /// Told how many draws all chains have made so far, those for tuning included, at each evaluation of the density; says
 /// whether to go on.
 pub type Watch<'a> = dyn Fn(usize) -> bool + Sync + 'a;
 
-/// Draws from `log`, each chain beginning at one of `starts` in turn; each on a thread of its own. `watch` sees how far
-/// it is, and may end it early: then each chain keeps as many draws as the shortest has.
+/// Draws from `log`, with a thread for each chain, which begins at one of `starts` in turn. `watch` receives the
+/// progress, and may end the sampling early: each chain then keeps as many draws as the shortest has.
 ///
-/// Variables that are about as wide as one, and not correlated, save draws for tuning; they need not be.
+/// Uncorrelated variables of about unit width save draws for tuning, but are not required.
 pub fn sample(log: &LogDensity, starts: &[Vec<f64>], effort: Effort, watch: &Watch) -> Result<Draws> {
     chains(starts, effort, watch, &|job, start, random| job.chain(log, start, random))
 }
@@ -104,7 +104,7 @@ fn chains(starts: &[Vec<f64>], effort: Effort, watch: &Watch, chain: &MakeChain)
         // Each chain has a stream of its own.
         let own = effort.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(number as u64);
         let drawn = chain(&job, &starts[number % starts.len()], Pcg64::seed_from_u64(own));
-        // Whoever watches sees the end, too.
+        // The observer receives the end, too.
         job.goes_on();
         drawn
     };
@@ -160,7 +160,7 @@ impl Job<'_> {
         self.made.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// The draws that count, each with whether it diverged; as many as there are before none comes.
+    /// The draws after tuning, each with true if it diverged, up to the first that is `None`.
     fn keep(&self, next: &mut dyn FnMut() -> Option<(Vec<f64>, bool)>) -> Drawn {
         let mut drawn = Drawn::default();
         while drawn.draws.len() < self.effort.draws
@@ -243,8 +243,8 @@ mod tests {
         assert!(draws.r_hat(0) < 1.01 && draws.effective(0) > 1000.0, "{} {}", draws.r_hat(0), draws.effective(0));
     }
 
-    /// Ten correlated normal variables, from a thousandth to ten thousand wide: means and covariances to five standard
-    /// errors of the draws, seen in the standard normal variables that they are made of.
+    /// Ten correlated normal variables of widths from a thousandth to ten thousand: means and covariances to five
+    /// standard errors of the draws, in terms of the underlying standard normal variables.
     #[test]
     fn ten_correlated_normal_variables_of_all_sizes_have_their_moments() {
         const N: usize = 10;

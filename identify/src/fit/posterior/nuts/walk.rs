@@ -35,7 +35,7 @@ struct Walk<'a> {
 }
 
 impl Walk<'_> {
-    /// A draw, and the share of its steps that were taken; none once `goes_on` says no.
+    /// Advances to the next draw, and returns the share of accepted steps; `None` once `goes_on` returns false.
     fn draw(&mut self, goes_on: &dyn Fn() -> bool) -> Option<f64> {
         let n = self.position.len();
         let steps = WALK_STEPS * n;

@@ -6,7 +6,7 @@ use crate::log::Quantity;
 use crate::machine::{AmplifierMode, Machine};
 use crate::number::engineering;
 
-/// Where the fit without the element ended.
+/// End of the fit without the element.
 pub(super) struct Site<'s, 'a> {
     pub case: &'s Case,
     pub plan: &'s Plan,
@@ -18,7 +18,7 @@ pub(super) struct Site<'s, 'a> {
 /// One element.
 pub(super) struct Extension {
     pub key: &'static str,
-    /// The case and the plan with it, once for each start; none where the case has it already.
+    /// The case and the plan with it, once for each start; empty if the case has it already.
     pub tries: fn(&Site) -> Vec<Extended>,
     /// The element in words.
     pub words: fn(&Site, &Extended, &Fitted) -> Said,
@@ -57,9 +57,9 @@ pub(super) struct Measure {
 /// A fit with the element.
 pub(super) struct Fitted {
     pub machine: Machine,
-    /// The parameter that tells the element, SI.
+    /// The size of the element, SI.
     pub value: f64,
-    /// Standard deviation of the times at which samples are taken, s, as far as the residuals show it.
+    /// Standard deviation of the sampling times, s, if the residuals show it.
     pub scatter: Option<f64>,
 }
 
@@ -97,7 +97,7 @@ impl<'s, 'a> Site<'s, 'a> {
         of(quantity).or(stands_for).unwrap_or(1e-12)
     }
 
-    /// The standard deviation of the residuals of positions, as lengths at the cart, m; none where no log has one.
+    /// The standard deviation of the residuals of positions, as lengths at the cart, m; `None` if no log has one.
     pub fn position_deviation(&self) -> Option<f64> {
         let r = self.machine.pulley_radius;
         self.found.noise.iter().find_map(|(quantity, sigma)| match quantity {

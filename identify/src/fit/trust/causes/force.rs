@@ -12,7 +12,7 @@ use crate::machine::Machine;
 use crate::polyline::Polyline;
 use crate::solve::Bench;
 
-/// The case with a force of this shape over the speed, in N, on the cart, which keeps its sign; none if it has such a
+/// The case with a force of this shape over the speed, in N, on the cart, which keeps its sign; `None` if it has such a
 /// line.
 fn shaped(site: &Site, points: Vec<[f64; 2]>, size: Measure) -> Option<Extended> {
     let mut machine = site.machine.clone();
@@ -108,8 +108,8 @@ pub(super) fn falls(site: &Site) -> Vec<Extended> {
     STRIBECK_SHARES.iter().filter_map(of).collect()
 }
 
-/// The body whose Coulomb friction is searched for, as its key, with what a torque of it is for each N at the cart; none
-/// where no body's is, or where it follows another law.
+/// Key of the body whose Coulomb friction is free, with its torque per N at the cart; `None` if there is no such body,
+/// or if it follows another law.
 fn body(site: &Site) -> Option<(&'static str, f64)> {
     let Machine { pulley_radius: r, cart, drive_pulley, idler_pulley, .. } = &site.machine;
     let bodies = [

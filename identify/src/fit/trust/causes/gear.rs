@@ -23,8 +23,8 @@ impl Site<'_, '_> {
         drive_pulley.inertia + idler_pulley.inertia + r * r * cart.mass + self.rotor()
     }
 
-    /// The machine with a rotor of its own behind a gear, and whether its inertia was split off the cart; none where
-    /// there is nothing to split, or no rotor.
+    /// The machine with a rotor behind a gear, and true if its inertia was taken from the cart; `None` if there is
+    /// nothing to split, or no rotor.
     fn split(&self) -> Option<(Machine, bool)> {
         let mut machine = self.machine.clone();
         let (r, inertia) = (machine.pulley_radius, self.inertia());
@@ -51,7 +51,7 @@ impl Site<'_, '_> {
         machine.drives[0].motor.gear_play = Some(play);
         let mut plan: Plan = self.plan.clone();
         plan.free.extend(keys.iter().map(|key| key.to_string()));
-        // What is far off takes long to simulate, and is not what was tried.
+        // A distant value takes long to simulate, and differs from the one tried.
         let n = machine.drives[0].motor.gear_ratio;
         let around = |key: &str| match key {
             "motor.rotor_inertia" => KNOWN_SHARES.map(|share| share * self.inertia() / (n * n)),
@@ -70,7 +70,7 @@ impl Site<'_, '_> {
     }
 }
 
-/// The case with positions and speeds read at the motor, whatever they were called; none where no log has one.
+/// The case with positions and speeds taken as those of the motor; `None` if no log has one.
 fn at_motor(case: &Case) -> Option<Case> {
     let mut case = case.clone();
     let (r, mut any) = (case.machine.pulley_radius, false);

@@ -57,8 +57,8 @@ fn as_it_is(_: &Site, machine: Machine) -> Machine {
     machine
 }
 
-/// The element that explains most of what the fit leaves; none where none is accepted, or `law`, a friction law,
-/// explains more.
+/// The element that explains most of the residuals; `None` if none is accepted, or if the friction law `law` explains
+/// more.
 pub(crate) fn cause(
     case: &Case,
     plan: &Plan,
@@ -103,7 +103,7 @@ pub(crate) fn cause(
     None
 }
 
-/// True if causes are looked for: the residuals are no white noise, and the fit is one of its kind.
+/// True if missing elements are searched for: the residuals are not white, and the fit supports it.
 fn is_asked(case: &Case, plan: &Plan, found: &Searched, judged: &Judged) -> bool {
     let problem = &found.problem;
     judged.inflation >= COLOURED
@@ -119,8 +119,8 @@ fn is_asked(case: &Case, plan: &Plan, found: &Searched, judged: &Judged) -> bool
         && !problem.parameters.is_empty()
 }
 
-/// In how many of the parts of the logs the fit with an element to the other parts predicts better, and of how many;
-/// none where it does not clearly do so.
+/// Number of parts of the logs that a fit with an element to the other parts predicts better, and number of parts;
+/// `None` if the prediction is not clearly better.
 fn predicts(site: &Site, tried: &Tried, stop: Option<Stop>) -> Option<[usize; 2]> {
     let without = Case { machine: site.machine.clone(), ..site.case.clone() };
     let plan = Plan { starts: 1, ..site.plan.clone() };

@@ -28,7 +28,7 @@ pub(super) fn words(_: &Site, _: &Extended, found: &Fitted) -> Said {
         (true, Some(deviation)) => format!(
             "samples that are taken {} after their time stamps in the mean, and scatter over {}",
             shown(-found.value, "s"),
-            // Of a uniform distribution.
+            // Width of a uniform distribution.
             shown(12f64.sqrt() * deviation, "s")
         ),
         (false, _) => format!("an input that acts {} late", shown(found.value, "s")),
@@ -36,16 +36,16 @@ pub(super) fn words(_: &Site, _: &Extended, found: &Fitted) -> Said {
     Said { words, add: "add nuisance = { delay = \"shared\" } to [fit]".into() }
 }
 
-/// The standard deviation of the times at which positions are sampled, s, and its standard error; none where the
-/// residuals show no scatter.
+/// The standard deviation of the sampling times of positions, s, and its standard error; `None` if the residuals show
+/// no scatter.
 ///
-/// A sample that is taken τ late is off by ẏ τ. With noise of variance σ² beside it,
+/// A sample that is late by τ has an error of ẏ τ. With additional noise of variance σ²,
 ///
 /// ```text
 /// E e² = σ² + s² ẏ²
 /// ```
 ///
-/// a line over ẏ², whose slope has an error as the deviations from it say (White 1980).
+/// a line over ẏ², whose slope has a standard error from its residuals (White 1980).
 pub(super) fn scatter(problem: &Problem, residuals: &[f64]) -> Option<[f64; 2]> {
     debug_assert_eq!(residuals.len(), problem.rows());
     let mut pairs = Vec::new();

@@ -22,7 +22,8 @@ pub(super) struct Tried<'a> {
 }
 
 impl<'a> Tried<'a> {
-    /// So many steps from where the fit without the element ended; none where the model does not get through the logs.
+    /// The result of `steps` steps from the end of the fit without the element; `None` if the model cannot simulate the
+    /// logs.
     pub fn begun(site: &Site<'_, 'a>, row: &'static Extension, extended: Extended, steps: usize) -> Option<Self> {
         let mut problem = Problem::new(&extended.case, &extended.plan).ok()?.stopped_by(site.found.problem.stop());
         let noise: Vec<_> = problem.quantities().iter().map(|&own| (own, site.deviation(own))).collect();
@@ -102,7 +103,7 @@ impl<'a> Tried<'a> {
         (case, self.extended.plan.clone())
     }
 
-    /// The cause with its sizes; none where its sizes cannot be told.
+    /// The cause with its sizes; `None` if its sizes are not determined.
     pub fn told(
         &self,
         site: &Site,
@@ -185,7 +186,7 @@ impl<'a> Tried<'a> {
     }
 }
 
-/// Where a short search from `start` leads.
+/// Result of a short search from `start`.
 fn descend(problem: &mut Problem, start: &[f64], iterations: usize) -> Option<Minimum> {
     if start.len() != problem.variables() || problem.is_stopped() {
         return None;
