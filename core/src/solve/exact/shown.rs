@@ -3,7 +3,7 @@
 use super::matrices::Shown;
 use super::{ModeMatrices, Run};
 use crate::mechanism::{BODIES, Transition};
-use crate::solve::observe::{Closer, Curve, Gap, Gaps, Observe, QUANTITIES, Reading, Stretch, reading_of};
+use crate::solve::observe::{Closer, Curve, FEW, Gap, Gaps, Observe, QUANTITIES, Reading, Stretch, reading_of};
 use std::sync::Arc;
 
 /// Allowed error of a curve in the middle, relative to the largest value of that quantity so far.
@@ -58,6 +58,8 @@ struct Later<const N: usize> {
     origin: [f64; BODIES],
     begin: f64,
     interval: f64,
+    /// Bounds of the deviation of readings from straight lines over one interval.
+    bow: Reading,
     wanted: Gaps,
 }
 
@@ -168,7 +170,7 @@ impl<const N: usize> Run<'_, N> {
         };
         if wanted != Gaps::NONE {
             let (law, origin, ends) = (Arc::clone(law), self.watching.origin, [readings[0], readings[1]]);
-            let later = Later { law, z, ends, origin, begin, interval, wanted };
+            let later = Later { law, z, ends, origin, begin, interval, bow, wanted };
             match is_now {
                 true => self.show_gaps(&later),
                 false => self.watching.later.push(later),
@@ -182,7 +184,7 @@ impl<const N: usize> Run<'_, N> {
 
     /// Shows gaps of a stretch more closely, if the observer still needs them.
     fn show_gaps(&mut self, later: &Later<N>) {
-        let Later { law, begin, interval, wanted, .. } = later;
+        let Later { law, begin, interval, bow, wanted, .. } = later;
         let count = wanted.end();
         let bends = self.bends(law, &later.z[0], *interval * count as f64);
         let [first, second] = [0, 1].map(|end| Sight::new(later.z[end], later.ends[end]));
@@ -198,6 +200,14 @@ impl<const N: usize> Run<'_, N> {
             }
             if wanted.has(gap) {
                 let ends = (begin + gap as f64 * interval, *interval);
+                // Larger values may have come since it was wanted: a cubic is asked only where there is still a reason.
+                if !self.ask(law, ends, [&from.value, &to.value], bow) {
+                    continue;
+                }
+                if self.watching.sees_all {
+                    self.show_closer(law, from, to, ends, &bends);
+                    continue;
+                }
                 let bow = self.bow_between(law, [from, to], *interval, &bends);
                 if self.ask(law, ends, [&from.value, &to.value], &bow) {
                     self.show_closer(law, from, to, ends, &bends);
@@ -351,9 +361,6 @@ impl<const N: usize> Run<'_, N> {
         length: f64,
         bends: &Reading,
     ) -> Reading {
-        if self.watching.sees_all {
-            return [f64::INFINITY; QUANTITIES];
-        }
         let (from_value, to_value) = (from.value, to.value);
         let ((_, from_slope), (_, to_slope)) = (self.rate(law, from), self.rate(law, to));
         let square = length * length;
@@ -404,19 +411,29 @@ impl<const N: usize> Run<'_, N> {
 
     /// A reading and its first three derivatives, each times h to its order and over its factorial: q, q̇ h, q̈ h²/2,
     /// q⃛ h³/6.
-    fn terms(&self, law: &ModeMatrices<N>, sight: &mut Sight<N>, length: f64) -> [Reading; 4] {
-        let slope = self.rate(law, sight).1;
-        let [second, third] = self.higher(law, sight).each_ref().map(|higher| self.rates(law, higher));
-        let [h1, h2, h3] = [length, length * length / 2.0, length * length * length / 6.0];
+    fn terms(&self, law: &ModeMatrices<N>, sight: &mut Sight<N>, length: f64, terms: &mut [Reading; 4]) {
         let few = self.is_few(law);
-        let times = |reading: &Reading, by: f64| reading_of(few, |q| reading[q] * by);
-        [sight.value, times(&slope, h1), times(&second, h2), times(&third, h3)]
+        let [value, first, second, third] = terms;
+        *value = sight.value;
+        let times = |term: &mut Reading, by: f64| {
+            let all = if few { FEW } else { QUANTITIES };
+            term[..all].iter_mut().for_each(|term| *term *= by);
+        };
+        *first = self.rate(law, sight).1;
+        let higher = self.higher(law, sight);
+        *second = self.rates(law, &higher[0]);
+        *third = self.rates(law, &higher[1]);
+        times(first, length);
+        times(second, length * length / 2.0);
+        times(third, length * length * length / 6.0);
     }
 
     /// The curve between two sights.
     fn curve(&self, law: &ModeMatrices<N>, from: &mut Sight<N>, to: &mut Sight<N>, begin: f64, length: f64) -> Curve {
-        let [from, to] = [self.terms(law, from, length), self.terms(law, to, length)];
-        Curve::through(self.is_few(law), [begin, length], &from, &to)
+        let mut ends = [[[0.0; QUANTITIES]; 4]; 2];
+        self.terms(law, from, length, &mut ends[0]);
+        self.terms(law, to, length, &mut ends[1]);
+        Curve::through(self.is_few(law), [begin, length], &ends[0], &ends[1])
     }
 
     fn see(&mut self, curve: &Curve) {
