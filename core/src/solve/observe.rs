@@ -271,7 +271,8 @@ impl Curve {
     /// The polynomial of one quantity.
     #[inline]
     pub fn of(&self, q: usize) -> Polynomial {
-        Polynomial(self.terms.map(|term| term[q]))
+        // Not by `map`, which would copy all readings.
+        Polynomial(std::array::from_fn(|k| self.terms[k][q]))
     }
 
     widest! {
