@@ -139,10 +139,10 @@ impl AtWorst {
         Self { error: (0.0, 0), rms: 0.0, settles: (0.0, true), current, settled: 0, unsettled: 0 }
     }
 
-    /// Time by which S is later than here, s; zero where the cart does not settle here: S then depends on where it
+    /// Time by which S is later than here, s; zero where the cart settles on no axis here: S then depends on where it
     /// happens to be when the run ends, and no settling is later than none.
     pub(super) fn later(&self, settles: f64) -> f64 {
-        if self.settles.1 { (settles - self.settles.0).max(0.0) } else { 0.0 }
+        if self.settled > 0 { (settles - self.settles.0).max(0.0) } else { 0.0 }
     }
 
     /// With so many axes left out of each figure.

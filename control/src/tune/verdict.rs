@@ -136,6 +136,7 @@ impl Work<'_> {
             let at_worst = AtWorst::of(&seen, left_out);
             moves.push(MoveVerdict {
                 name: motion.name.clone(),
+                window: motion.window,
                 cart: own.figures.worst_load().error,
                 settling: own.figures.settling.filter(|_| own.outcome.ending == Ending::Complete),
                 current: own.figures.worst_current(),
@@ -240,7 +241,8 @@ pub(super) fn worse(before: &Verdict, after: &Verdict) -> Option<Worse> {
     let all = before.moves.iter().zip(&after.moves).enumerate().flat_map(of_move);
     // A cart that came to rest at no target hunts about none.
     let came_to_rest = before.moves.iter().any(|one| one.at_worst.settled > 0);
-    let hunts = after.hunt.as_ref().filter(|hunt| came_to_rest && hunt.is_more_than(before.hunt.as_ref()));
+    let window = after.moves.iter().map(|one| one.window).fold(f64::INFINITY, f64::min);
+    let hunts = after.hunt.as_ref().filter(|hunt| came_to_rest && hunt.is_more_than(before.hunt.as_ref(), window));
     let hunts = hunts.map(|hunt| {
         let was = before.hunt.as_ref().map_or(0.0, |hunt| hunt.amplitude);
         let by = if was > 0.0 { hunt.amplitude / was - 1.0 } else { f64::INFINITY };
