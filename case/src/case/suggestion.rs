@@ -19,8 +19,9 @@ const AT_RESONANCE: f64 = 0.4;
 /// Least share of the bandwidth that the slowest swing allows, for an axis that nothing damps.
 const LEAST: f64 = 0.1;
 
-/// Inertia of a pulley that is held, as a multiple of the whole axis'.
-const HELD: f64 = 1e6;
+/// Inertia of a pulley that is held, as a multiple of the whole axis': two such pulleys that swing against each other on
+/// their belts count as standing still.
+const HELD: f64 = 1e12;
 
 /// A PID controller for an axis, as a case file has it.
 pub(super) fn pid(machine: &Machine, every: f64, delay: f64) -> String {

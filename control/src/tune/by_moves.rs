@@ -351,7 +351,7 @@ impl Work<'_> {
             value += steep * (is.error.0 / (was.error.0 * (1.0 - BETWEEN))).ln().max(0.0);
             // As a share of the profile's duration, as J counts it.
             let duration = motion.profile().end().max(f64::MIN_POSITIVE);
-            value += steep * (is.settles.0 - was.settles.0).max(0.0) / duration;
+            value += steep * was.later(is.settles.0) / duration;
             value += steep * LOST * is.unsettled.saturating_sub(was.unsettled) as f64;
         }
         if value.is_nan() { f64::INFINITY } else { value }

@@ -153,13 +153,15 @@ fn hunts_at(machine: &Machine, design: &Design, start: f64) -> Result<Option<Hun
 }
 
 impl Hunt {
-    /// True if it hunts more than the other: where that one rests, or wider; more often where an amplitude is unknown
-    /// because no slip was waited for.
-    pub(super) fn is_more_than(&self, other: Option<&Hunt>) -> bool {
+    /// True if it hunts more than the other: where that one rests, or wider. Slips of the other that were not waited for
+    /// have an unknown size: a swing is more than these where it leaves the `window` (m) of a move, rarer slips never
+    /// are.
+    pub(super) fn is_more_than(&self, other: Option<&Hunt>, window: f64) -> bool {
         let Some(other) = other else { return true };
-        match self.amplitude.is_finite() && other.amplitude.is_finite() {
-            true => self.amplitude > (1.0 + WIDER) * other.amplitude,
-            false => (1.0 + WIDER) * self.interval() < other.interval(),
+        match (self.amplitude.is_finite(), other.amplitude.is_finite()) {
+            (true, true) => self.amplitude > (1.0 + WIDER) * other.amplitude,
+            (true, false) => self.amplitude > window,
+            (false, _) => (1.0 + WIDER) * self.interval() < other.interval(),
         }
     }
 

@@ -35,6 +35,8 @@ pub struct Verdict {
 pub struct MoveVerdict {
     /// Its name.
     pub name: String,
+    /// Distance from the target within which the cart counts as settled, m.
+    pub window: f64,
     /// x − y on the nominal axis.
     pub cart: Deviation,
     /// Until the cart settles, s, if it does.

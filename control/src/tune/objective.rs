@@ -11,7 +11,8 @@
 //! ```
 //!
 //! An axis on which the cart is not within its window at the end of the run, t_end, but away by e, has S = (t_end −
-//! D)(1 + ln(1 + e/w)).
+//! D)(1 + ln(1 + e/w)). Where it is within its window, and yet has not made the move (a reversal during which it
+//! sticks), e is its largest error.
 
 use crate::case::{Cost, Move};
 use crate::control::{Figures, LoadFigures, Loop, Standard, closed_loop_at_samples, closed_loop_briefly, each};
@@ -103,9 +104,11 @@ fn figures_of(figures: &Figures, ending: Ending, motion: &Move) -> MoveFigures {
     }
     let left = (motion.until - motion.end()).max(motion.end() * 1e-3);
     let worst = |of: fn(&LoadFigures) -> f64| figures.loads.iter().map(of).fold(0.0, f64::max);
-    let away = left * (1.0 + (worst(|load| load.error.last.abs()) / motion.window).ln_1p());
+    let (error, last) = (worst(|load| load.error.peak.value.abs()), worst(|load| load.error.last.abs()));
+    let off = if last > motion.window { last } else { error };
+    let away = left * (1.0 + (off / motion.window).ln_1p());
     MoveFigures {
-        error: worst(|load| load.error.peak.value.abs()),
+        error,
         rms: worst(|load| load.error.rms),
         settling: figures.settling,
         settles: figures.settling.unwrap_or(away),
@@ -134,6 +137,12 @@ impl AtWorst {
     /// Figures that nothing with this current, A, falls below.
     pub(super) fn at_least(current: f64) -> Self {
         Self { error: (0.0, 0), rms: 0.0, settles: (0.0, true), current, settled: 0, unsettled: 0 }
+    }
+
+    /// Time by which S is later than here, s; zero where the cart settles on no axis here: S then depends on where it
+    /// happens to be when the run ends, and no settling is later than none.
+    pub(super) fn later(&self, settles: f64) -> f64 {
+        if self.settled > 0 { (settles - self.settles.0).max(0.0) } else { 0.0 }
     }
 
     /// With so many axes left out of each figure.

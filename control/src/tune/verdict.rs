@@ -58,7 +58,7 @@ impl Verdict {
     pub(super) fn worse_on(&self, before: &Verdict, count: usize) -> Watch {
         let of_move = |(is, was): (&MoveVerdict, &MoveVerdict)| {
             let beyond = |seen: &MoveFigures| {
-                let later = (seen.settles - was.at_worst.settles.0) / was.at_worst.settles.0.max(SHORT);
+                let later = was.at_worst.later(seen.settles) / was.at_worst.settles.0.max(SHORT);
                 let left = if seen.settling.is_none() && is.settled.0 < was.settled.0 { 1.0 } else { 0.0 };
                 (seen.error / was.at_worst.error.0).ln().max(later).max(left)
             };
@@ -136,6 +136,7 @@ impl Work<'_> {
             let at_worst = AtWorst::of(&seen, left_out);
             moves.push(MoveVerdict {
                 name: motion.name.clone(),
+                window: motion.window,
                 cart: own.figures.worst_load().error,
                 settling: own.figures.settling.filter(|_| own.outcome.ending == Ending::Complete),
                 current: own.figures.worst_current(),
@@ -223,12 +224,12 @@ pub(super) fn worse(before: &Verdict, after: &Verdict) -> Option<Worse> {
                 (Figure::Error, was.error.0, is.error.0, finite(is.error.0 / was.error.0 - 1.0)),
             ),
             (
-                is.settles.0 > was.settles.0 * (1.0 + SAME) + SAME,
+                was.later(is.settles.0) > SAME * (was.settles.0 + 1.0),
                 (
                     Figure::Settling,
                     was.settles.0,
                     is.settles.0,
-                    finite((is.settles.0 - was.settles.0) / was.settles.0.max(SHORT)),
+                    finite(was.later(is.settles.0) / was.settles.0.max(SHORT)),
                 ),
             ),
             (lost > 0.0, (Figure::Settled, was.settled as f64, is.settled as f64, lost / axes)),
@@ -238,7 +239,10 @@ pub(super) fn worse(before: &Verdict, after: &Verdict) -> Option<Worse> {
             .collect::<Vec<_>>()
     };
     let all = before.moves.iter().zip(&after.moves).enumerate().flat_map(of_move);
-    let hunts = after.hunt.as_ref().filter(|hunt| hunt.is_more_than(before.hunt.as_ref()));
+    // A cart that came to rest at no target hunts about none.
+    let came_to_rest = before.moves.iter().any(|one| one.at_worst.settled > 0);
+    let window = after.moves.iter().map(|one| one.window).fold(f64::INFINITY, f64::min);
+    let hunts = after.hunt.as_ref().filter(|hunt| came_to_rest && hunt.is_more_than(before.hunt.as_ref(), window));
     let hunts = hunts.map(|hunt| {
         let was = before.hunt.as_ref().map_or(0.0, |hunt| hunt.amplitude);
         let by = if was > 0.0 { hunt.amplitude / was - 1.0 } else { f64::INFINITY };
