@@ -287,7 +287,7 @@ async function taps(name) {
       let i = xs.length >> 1;
       while (i < xs.length - 1 && !isFinite(ys[i])) i++;
       // A tap near a name in the legend is one on the name.
-      const y = plot.rising[series.x] ? P.top + P.height / 2 : plot.up(P, ys[i]);
+      const y = plot.rising[series.x] ? P.top + P.height / 2 : P.axes.up(ys[i]);
       return {x: box.left + (plot.across(xs[i]) * box.width) / L.width, y: box.top + (y * box.width) / L.width};
     });
     const inside = (v, from, length) => Math.max(from + 3, Math.min(from + length - 3, v));
@@ -310,8 +310,8 @@ async function taps(name) {
 const farIn = page =>
   page.evaluate(() => {
     const {plot} = document.querySelectorAll("figure.plot")[1];
-    const series = plot.svg.querySelectorAll('svg>path[stroke-width="4.4"]');
-    const curves = [...series].filter(path => !path.closest("g") && !path.classList.contains("s-ink"));
+    const series = plot.svg.querySelectorAll('svg>path[class^="f-"]:not(.f-ink)');
+    const curves = [...series].filter(path => !path.closest("g"));
     return {dots: curves.length, limit: plot.limit.textContent};
   });
 
@@ -323,10 +323,10 @@ const particular = {
       const {plot} = [...document.querySelectorAll("figure.plot")].find(figure => /Nyquist/.test(figure.innerText));
       const L = plot.shown,
         P = L.panels[0],
-        [low, high] = [L.xScale.low, L.xScale.high];
+        [low, high] = [L.x.low, L.x.high];
       return {
         right: L.wide / (high - low),
-        up: P.height / (P.yScale.high - P.yScale.low),
+        up: P.height / (P.y.high - P.y.low),
         sees: low < -1 && high > 0,
         named: P.panel.series.some(series => series.name === "\u22121"),
       };
@@ -341,7 +341,7 @@ const particular = {
       return P.panel.series.map(series => {
         const x = plot.arrays[series.x],
           y = plot.arrays[series.y];
-        return plot.shown.xScale.place(x[y.indexOf(Math.max(...y))]);
+        return plot.shown.x.place(x[y.indexOf(Math.max(...y))]);
       });
     });
     expect(

@@ -425,11 +425,24 @@ pub fn style() -> String {
     format!("{palette}.report{{{}}}", include_str!("page.css"))
 }
 
-/// The script without its indentation and without the lines that are remarks. It brings the figures of its document to
-/// life; those that come later, by `tautFigures(element)`.
+/// The module that draws plots, of reports and of the studio.
+pub const PEN: &str = include_str!("pen.js");
+
+/// The module that brings the figures of a document to life by its function `bring`; it imports [`PEN`] as `./pen.js`.
+pub const PLOT: &str = include_str!("plot.js");
+
+/// Both modules as one script, without indentation and without the lines that are remarks. It brings the figures of its
+/// document to life.
 pub fn script() -> String {
-    let lines = include_str!("plot.js").lines().map(str::trim_start);
-    lines.filter(|line| !line.is_empty() && !line.starts_with("//")).flat_map(|line| [line, "\n"]).collect()
+    let mut is_remark = false;
+    let kept = PEN.lines().chain(PLOT.lines()).map(str::trim_start).filter(|line| {
+        is_remark |= line.starts_with("/**");
+        let drops = is_remark || line.is_empty() || line.starts_with("//") || line.starts_with("import ");
+        is_remark &= !line.ends_with("*/");
+        !drops
+    });
+    let lines = kept.flat_map(|line| [line.strip_prefix("export ").unwrap_or(line), "\n"]);
+    format!("(() => {{\n\"use strict\";\n{}bring(document);\n}})();\n", lines.collect::<String>())
 }
 
 /// The palette as variables for both themes, paper always light, and the classes that pictures use.

@@ -1,6 +1,7 @@
 // @ts-check
 // The state of a page: the case text and its history, the run that it gives, what is compared with it, and what is
 // looked at. Views listen and draw; nothing here computes a motion.
+import {lowerBound} from "./pen.js";
 import {Wire, Mistake} from "./wire.js";
 
 /** @typedef {import("./wire.js").Answer} Answer */
@@ -459,16 +460,4 @@ export class App {
     }
     return 0;
   }
-}
-
-/** The first index whose value is not below. @param {Float64Array} x @param {number} value */
-export function lowerBound(x, value) {
-  let from = 0,
-    to = x.length;
-  while (from < to) {
-    const middle = (from + to) >> 1;
-    if (x[middle] < value) from = middle + 1;
-    else to = middle;
-  }
-  return from;
 }

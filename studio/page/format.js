@@ -1,22 +1,9 @@
 // @ts-check
 // Numbers and small elements for people.
 
-const MINUS = "\u2212";
+import {MINUS} from "./pen.js";
 
-/** As short as it can be with so many digits. @param {number} value @param {number} [digits] */
-export function number(value, digits = 5) {
-  if (!isFinite(value)) return "\u2013";
-  if (value === 0) return "0";
-  const size = Math.abs(value);
-  if (size >= 1e7 || size < 1e-4) {
-    const [mantissa, exponent] = value.toExponential(digits - 1).split("e");
-    const up = [...String(+exponent)]
-      .map(c => (c === "-" ? "\u207b" : "\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079"[+c]))
-      .join("");
-    return `${String(+mantissa).replace("-", MINUS)}\u00d710${up}`;
-  }
-  return String(+value.toPrecision(digits)).replace("-", MINUS);
-}
+export {number} from "./pen.js";
 
 const PREFIXES = [
   [1, "s"],
@@ -58,6 +45,23 @@ export function fold(attributes, words, name, ...children) {
     ...children,
   );
 }
+
+/** A table: texts of its head, and rows of texts, cells or whole.
+ * @param {string[]} head @param {((Node | string)[] | Node)[]} rows @param {string} [caption] @returns {any} */
+export const table = (head, rows, caption) =>
+  element(
+    "table",
+    {},
+    caption ? element("caption", {}, caption) : null,
+    element("thead", {}, element("tr", {}, ...head.map(text => element("th", {scope: "col"}, text)))),
+    element("tbody", {}, ...rows.map(row => (Array.isArray(row) ? element("tr", {}, ...row.map(cell)) : row))),
+  );
+
+/** @param {Node | string} content */
+const cell = content => (typeof content === "string" ? element("td", {}, content) : content);
+
+/** The head of a row. @param {string} text */
+export const rowHead = text => element("th", {scope: "row"}, text);
 
 /** An element of a drawing.
  * @param {string} tag @param {Object<string, any>} [attributes] @param {...(Node|string)} children

@@ -1,6 +1,6 @@
 // @ts-check
 // The view of the motion: the machine above its plots, the parameters and the text beside them.
-import {element, number, put, tell, time as timeText} from "./format.js";
+import {element, number, put, table, tell, time as timeText} from "./format.js";
 import {splitter} from "./layout.js";
 import {RATES, Stage, playing, start} from "./player.js";
 import {Plots} from "./plots.js";
@@ -286,7 +286,7 @@ class Glance {
             ...rows.flatMap(row => [element("dt", {title: row.how || null}, row.name), element("dd", {}, row.value)]),
           ),
         );
-      const table = () =>
+      const along = () =>
         places.length
           ? element(
               "div",
@@ -295,16 +295,7 @@ class Glance {
               element(
                 "div",
                 {class: "scroll", tabindex: "0", role: "group", "aria-label": "Along the travel"},
-                element(
-                  "table",
-                  {},
-                  element("thead", {}, element("tr", {}, ...head.map(text => element("th", {scope: "col"}, text)))),
-                  element(
-                    "tbody",
-                    {},
-                    ...places.map(row => element("tr", {}, ...row.map(text => element("td", {}, text)))),
-                  ),
-                ),
+                table(head, places),
               ),
             )
           : null;
@@ -324,7 +315,7 @@ class Glance {
         notes,
       ];
       cells.fill(shape, [...groups.flatMap(({rows}) => rows.map(row => row.value)), ...places.flat()], () =>
-        [...groups.map(card), table(), noted()].filter(Boolean),
+        [...groups.map(card), along(), noted()].filter(Boolean),
       );
     });
   }

@@ -38,7 +38,6 @@ const ASSETS: &[Asset] = page![
     "modes.js": SCRIPT,
     "motion.js": SCRIPT,
     "parameters.js": SCRIPT,
-    "pen.js": SCRIPT,
     "picture.js": SCRIPT,
     "player.js": SCRIPT,
     "plots.js": SCRIPT,
@@ -54,8 +53,8 @@ const ASSETS: &[Asset] = page![
     "workers.js": SCRIPT,
 ];
 
-/// The files that the report's style and script are served as.
-const REPORT: [&str; 2] = ["/report.css", "/report.js"];
+/// The files that the report's style and scripts are served as.
+const REPORT: [&str; 3] = ["/report.css", "/pen.js", "/plot.js"];
 
 /// The paths of all files.
 pub fn paths() -> impl Iterator<Item = &'static str> {
@@ -64,10 +63,11 @@ pub fn paths() -> impl Iterator<Item = &'static str> {
 
 /// Type and content of the file at a path.
 pub fn file(path: &str) -> Option<(&'static str, String)> {
-    let [style, script] = REPORT;
+    let [style, pen, plot] = REPORT;
     match path {
         path if path == style => Some((CSS, taut_report::page::style())),
-        path if path == script => Some((SCRIPT, taut_report::page::script())),
+        path if path == pen => Some((SCRIPT, taut_report::page::PEN.to_string())),
+        path if path == plot => Some((SCRIPT, taut_report::page::PLOT.to_string())),
         path => {
             let found = ASSETS.iter().find(|(known, _, _)| *known == path);
             found.map(|(_, kind, content)| (*kind, (*content).to_string()))
