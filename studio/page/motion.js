@@ -1,7 +1,7 @@
 // @ts-check
 // The view of the motion: the machine above its plots, the parameters and the text beside them.
 import {element, number, put, table, tell, time as timeText} from "./format.js";
-import {splitter} from "./layout.js";
+import {Panels, reset, splitter} from "./layout.js";
 import {RATES, Stage, playing, start} from "./player.js";
 import {Plots} from "./plots.js";
 import {Parameters} from "./parameters.js";
@@ -25,9 +25,10 @@ export function mount(root, app) {
   );
   const plotted = element(
     "section",
-    {"aria-labelledby": "plots-title"},
+    {class: "plotted", "aria-labelledby": "plots-title"},
     element("h2", {id: "plots-title", class: "unseen"}, "Plots"),
     plots,
+    reset,
   );
   side.append(
     splitter({
@@ -54,7 +55,8 @@ export function mount(root, app) {
     element("div", {class: "centre", id: "centre", tabindex: "-1"}, stage, bar(app), size, plotted, glance),
   );
   sides(side, app);
-  app.scene = {stage: new Stage(stage, app), plots: new Plots(plots, app)};
+  const panels = new Panels(plots, words => app.say(words));
+  app.scene = {stage: new Stage(stage, app), plots: new Plots(plots, app, undefined, panels)};
   new Glance(glance, app);
 }
 

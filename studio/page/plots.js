@@ -29,11 +29,12 @@ const STATES = new Map([
 
 export class Plots {
   /** @param {HTMLElement} root @param {App} app @param {(panel: any) => boolean} [isWanted] tells which panels have a
-   * plot here */
-  constructor(root, app, isWanted = panel => panel.title) {
+   * plot here @param {import("./layout.js").Panels | null} [panels] that arranges them */
+  constructor(root, app, isWanted = panel => panel.title, panels = null) {
     this.root = root;
     this.app = app;
     this.isWanted = isWanted;
+    this.panels = panels;
     /** @type {Plot[]} */
     this.plots = [];
     this.shape = "";
@@ -58,9 +59,9 @@ export class Plots {
     const isSmall = matchMedia("(max-width: 52rem), (max-height: 34rem)");
     new ResizeObserver(() => {
       this.tall = isSmall.matches ? SMALL_HEIGHT : HEIGHT;
-      for (const plot of this.plots) plot.measure();
-      this.later();
+      this.measure();
     }).observe(root);
+    if (panels) panels.resized = () => this.measure();
     // A plot that is scrolled out of sight is drawn when it comes in: pictures of a drag are of what is looked at.
     this.sight = new IntersectionObserver(
       entries => {
@@ -99,9 +100,16 @@ export class Plots {
     }
     this.shape = shape;
     this.plots = panels.map(panel => new Plot(panel, this));
-    this.root.replaceChildren(...this.plots.map(plot => plot.figure));
+    if (this.panels) this.panels.place(this.plots);
+    else this.root.replaceChildren(...this.plots.map(plot => plot.figure));
     this.sight.disconnect();
     for (const plot of this.plots) this.sight.observe(plot.area);
+  }
+
+  /** Draws all plots in the sizes that they have now. */
+  measure() {
+    for (const plot of this.plots) plot.measure();
+    this.later();
   }
 
   /** Draws with the next picture. @param {boolean} [onlyCursor] */
@@ -251,8 +259,14 @@ class Plot {
   measure() {
     return (this.wide = this.area.clientWidth);
   }
+  /** Height of the curves, pixels. */
+  get curves() {
+    const {panels, tall} = this.plots;
+    if (this.isStates) return 26 + 22 * this.panel.curves.length;
+    return (panels && panels.tall(this.panel.key)) || tall;
+  }
   get height() {
-    return (this.isStates ? 26 + 22 * this.panel.curves.length : this.plots.tall) + BOTTOM;
+    return this.curves + BOTTOM;
   }
   get axes() {
     const {low, high} = this.range || {low: 0, high: 1};
