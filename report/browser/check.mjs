@@ -3,11 +3,13 @@
 //   node check.mjs BROWSER REPORTS SHOTS
 //
 // REPORTS holds a folder for each report, with report.html in it; pictures of all pages go to SHOTS.
-import {mkdirSync, readdirSync} from "node:fs";
+import {mkdirSync, readFileSync, readdirSync} from "node:fs";
+import {createRequire} from "node:module";
 import {join, resolve} from "node:path";
 import {pathToFileURL} from "node:url";
 import {chromium} from "playwright-core";
 
+const axe = createRequire(import.meta.url).resolve("axe-core/axe.min.js");
 const [program, reports, shots] = process.argv.slice(2);
 mkdirSync(shots, {recursive: true});
 const names = readdirSync(reports, {withFileTypes: true})
@@ -315,6 +317,39 @@ const farIn = page =>
     return {dots: curves.length, limit: plot.limit.textContent};
   });
 
+/** Machines of a report: each is drawn at its start, and moves by its slider and while it is played. */
+async function moves(page, count, before, after) {
+  const machines = page.locator("figure.machine");
+  expect((await machines.count()) === count, `${await machines.count()} machines`);
+  for (let k = 0; k < count; k++) {
+    const machine = machines.nth(k),
+      told = () => machine.locator("svg").getAttribute("aria-label"),
+      clock = async () => parseFloat(await machine.locator(".clock").innerText());
+    await machine.scrollIntoViewIfNeeded();
+    expect(before.test(await told()), `at first ${await told()}`);
+    await machine.locator(".play").click();
+    await page.waitForFunction(
+      k => parseFloat(document.querySelectorAll("figure.machine .clock")[k].textContent) > 0,
+      k,
+    );
+    await machine.locator(".play").click();
+    expect((await machine.locator(".play").getAttribute("aria-label")) === "Play", "it does not pause");
+    const paused = await clock();
+    await settled(page);
+    expect((await clock()) === paused, "it goes on");
+    await machine.locator(".scrub").focus();
+    await page.keyboard.press("End");
+    await settled(page);
+    expect(after.test(await told()), `at the end ${await told()}`);
+    await page.keyboard.press("Home");
+    await settled(page);
+    expect(before.test(await told()), `back at the start ${await told()}`);
+  }
+  await page.evaluate(readFileSync(axe, "utf8"));
+  const {violations} = await page.evaluate(() => window.axe.run("figure.machine", {resultTypes: ["violations"]}));
+  expect(!violations.length, violations.map(one => `${one.id}: ${one.nodes[0].html}`).join("\n"));
+}
+
 // ---- What single reports have to show
 
 const particular = {
@@ -379,6 +414,9 @@ const particular = {
     expect(dots > 0, "no sample is drawn as a dot");
     expect(!limit, `all rows are there, and the page says: ${limit}`);
   },
+
+  live: page => moves(page, 2, /cart at 0 mm/, /cart at [1-9][\d.]* mm/),
+  "live-gantry": page => moves(page, 3, /bridge at 0 mm.*cart at 0 mm/, /at (\u2212|[1-9])[\d.]* mm/),
 
   async long(page) {
     for (let k = 0; k < 4; k++) await drag(page, 1, [0.3, 0.5], [0.35, 0.5]);

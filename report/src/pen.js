@@ -31,6 +31,21 @@ export function lowerBound(x, value) {
   return from;
 }
 
+/** The value of a curve at a place within it, between points along a line.
+ * @param {ArrayLike<number>} x @param {ArrayLike<number>} y @param {number} at */
+export function valueAt(x, y, at) {
+  const i = Math.min(x.length - 1, lowerBound(x, at));
+  if (i === 0 || x[i] === at) return y[i];
+  return y[i - 1] + ((at - x[i - 1]) / (x[i] - x[i - 1])) * (y[i] - y[i - 1]);
+}
+
+/** The value of a state at a place within its curve: no line leads from one to the next.
+ * @param {ArrayLike<number>} x @param {ArrayLike<number>} y @param {number} at */
+export function stateAt(x, y, at) {
+  const i = Math.min(x.length - 1, lowerBound(x, at));
+  return i === 0 || x[i] === at ? y[i] : y[i - 1];
+}
+
 /** Does what a key stands for, if it stands for something. @param {KeyboardEvent} event
  * @param {Object<string, () => void>} acts by key */
 export function obey(event, acts) {

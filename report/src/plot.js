@@ -11,7 +11,7 @@ const withUnit = (value, unit) => number(value, 7) + (unit ? "\u00a0" + escaped(
 // ---- Data
 
 // The numbers of an array: a start and a step, or a least value and a unit with 32-bit counts (embed.rs).
-function decode(array) {
+export function decode(array) {
   const values = new Float64Array(array.n);
   if (!array.d) {
     for (let i = 0; i < array.n; i++) values[i] = array.o + i * array.s;

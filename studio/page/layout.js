@@ -297,7 +297,7 @@ export class Panels {
         words,
       ),
     );
-    const menu = fold({class: "menu keep move"}, "Move", `Move ${title}`, element("div", {}, ...ways));
+    const menu = fold({class: "menu move"}, "Move", `Move ${title}`, element("div", {}, ...ways));
     /** @type {HTMLElement} */ (figure.querySelector("figcaption")).append(menu);
     this.drag(plot);
   }

@@ -1,7 +1,7 @@
 // @ts-check
 // The plots of a run on canvases: all share the part of time that is seen, and the cursor. Each can be used by keys,
 // and has its values as a table.
-import {element, fold, number, table, time as timeText, download, fileName, isOutOfView, tell} from "./format.js";
+import {element, fold, number, table, timeText, download, fileName, isOutOfView, tell} from "./format.js";
 import {Axes, COLOURS, Scale, SvgPen, density, line, lowerBound, obey, palette, sized, step} from "./pen.js";
 
 /** @typedef {import("./app.js").App} App */
