@@ -326,7 +326,7 @@ async function moves(page, count, before, after) {
       told = () => machine.locator("svg").getAttribute("aria-label"),
       clock = async () => parseFloat(await machine.locator(".clock").innerText());
     await machine.scrollIntoViewIfNeeded();
-    expect(before.test(await told()), `at first ${await told()}`);
+    expect(before.test(await told()) && !/undefined/.test(await told()), `at first ${await told()}`);
     await machine.locator(".play").click();
     await page.waitForFunction(
       k => parseFloat(document.querySelectorAll("figure.machine .clock")[k].textContent) > 0,
@@ -340,7 +340,7 @@ async function moves(page, count, before, after) {
     await machine.locator(".scrub").focus();
     await page.keyboard.press("End");
     await settled(page);
-    expect(after.test(await told()), `at the end ${await told()}`);
+    expect(after.test(await told()) && !/undefined/.test(await told()), `at the end ${await told()}`);
     await page.keyboard.press("Home");
     await settled(page);
     expect(before.test(await told()), `back at the start ${await told()}`);

@@ -16,6 +16,11 @@ class Held extends Playing {
     this.run = {head: {scene, until}, columns: pick("y"), times: pick("x")};
     this.rate = RATES.find(rate => until / rate >= WATCHED) || RATES[RATES.length - 1];
   }
+
+  /** Whole numbers, which the page holds to 32 bits of their range. @param {string} name @param {number} time */
+  state(name, time) {
+    return Math.round(super.state(name, time));
+  }
 }
 
 /** Gives each machine below an element its drawing and what plays it. @param {ParentNode} root */
