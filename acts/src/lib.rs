@@ -15,7 +15,6 @@ mod report;
 mod rows;
 mod run;
 mod save;
-mod scene;
 mod schema;
 mod section;
 pub mod sent;

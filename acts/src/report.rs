@@ -16,6 +16,6 @@ pub fn report(request: &Request, context: &Context) -> Result<Reply> {
     let solver = Solver::of(&case.machine);
     let experiments = case.experiments.iter();
     let runs = experiments.map(|one| simulated(case, one, solver, context, &mut Keep::Curves));
-    let (page, _) = simulate::report(case, &case.text, solver, &runs.collect::<Result<Vec<_>>>()?);
+    let (page, _) = simulate::report(case, &case.text, solver, &runs.collect::<Result<Vec<_>>>()?, false);
     Ok(Reply::of(json!({ "html": page.html() })))
 }

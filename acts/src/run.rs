@@ -5,7 +5,6 @@ use crate::case::{chosen, opened, parameters, runnable};
 use crate::curves::{Kept, bodies, panels, told};
 use crate::message::{Reply, Request};
 use crate::rows::interval;
-use crate::scene::scene;
 use serde_json::{Value, json};
 use std::time::Duration;
 use taut::case::{Case, Experiment};
@@ -48,7 +47,7 @@ pub fn run(request: &Request, context: &Context) -> Result<Reply> {
         "ending": simulated.early,
         "events": simulated.outcome.events.iter().take(EVENTS).map(event).collect::<Vec<_>>(),
         "events_left_out": simulated.outcome.events.len().saturating_sub(EVENTS),
-        "scene": scene(&case),
+        "scene": simulate::scene(&case),
         "columns": kept.told(),
         "panels": simulated.panels,
         "bodies": bodies(&case),

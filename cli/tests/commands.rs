@@ -211,6 +211,50 @@ fn a_run_as_measured() {
     }
 }
 
+/// With --live the report holds, for each run, the drawing of the machine and the rows that move it.
+#[test]
+fn the_machine_moves_in_a_report() {
+    let folder = TempDir::new().unwrap();
+    let report = |case: &str, more: &[&str]| {
+        let case = Path::new(env!("CARGO_MANIFEST_DIR")).join("../stages").join(case);
+        taut(folder.path()).arg("simulate").arg(case).args(["--out", "out"]).args(more).assert().success();
+        fs::read_to_string(folder.path().join("out/report.html")).unwrap()
+    };
+    let machines = |html: &str| -> Vec<serde_json::Value> {
+        let parts = html.split("<figure class=\"machine\">").skip(1);
+        let texts = parts.map(|part| part.split("<script type=\"application/json\">").nth(1).unwrap());
+        texts.map(|text| serde_json::from_str(text.split("</script>").next().unwrap()).unwrap()).collect()
+    };
+    let plain = report("sollmann-jouaneh/table4.toml", &[]);
+    assert!(machines(&plain).is_empty() && !plain.contains("liven") && !plain.contains(".stage-box"));
+    let live = machines(&report("sollmann-jouaneh/table4.toml", &["--live"]));
+    assert_eq!(live.len(), 2);
+    for machine in &live {
+        assert_eq!((&machine["scene"]["kind"], &machine["until"]), (&"axis".into(), &1.0.into()));
+        let curves = machine["curves"].as_array().unwrap();
+        assert_eq!(curves.len(), 13);
+        let rows = |curve: &serde_json::Value, axis: &str| {
+            machine["arrays"][curve[axis].as_u64().unwrap() as usize]["n"].as_u64().unwrap()
+        };
+        assert!(curves.iter().all(|curve| rows(curve, "x") == 1001 && rows(curve, "y") == 1001));
+    }
+    // Of 20 001 rows a report has fewer.
+    let long = ["--live", "--experiment", "5 V pulse", "--set", "experiment.0.every=50us"];
+    let long = machines(&report("sollmann-jouaneh/table4.toml", &long));
+    let rows = long[0]["arrays"].as_array().unwrap().iter().map(|array| array["n"].as_u64().unwrap());
+    assert!(rows.clone().all(|n| (500..=2000).contains(&n)), "{:?}", rows.collect::<Vec<_>>());
+    for (case, spans) in [("h-frame/h-frame.toml", 3), ("core-xy/core-xy.toml", 4), ("dual-belt/dual-belt.toml", 6)] {
+        let found = machines(&report(case, &["--live"]));
+        let names: Vec<&str> =
+            found[0]["curves"].as_array().unwrap().iter().map(|curve| curve["name"].as_str().unwrap()).collect();
+        assert_eq!(found[0]["scene"]["spans"].as_array().unwrap().len(), spans, "{case}");
+        let wanted = found[0]["scene"]["spans"].as_array().unwrap().iter().map(|span| span.as_str().unwrap());
+        for name in wanted.chain(["bridge_position", "cart_position", "x_error", "y_error", "cart_state"]) {
+            assert!(names.contains(&name), "{case}: {name} is not in {names:?}");
+        }
+    }
+}
+
 /// Simulated against its log, a machine shows by how much it misses it: by the encoder's rounding where it is the
 /// machine that was logged, by much more where its friction is another.
 #[test]
@@ -274,7 +318,7 @@ fn wrong_input_is_told_on_stderr_with_status_2() {
     fs::write(folder.path().join("file"), "").unwrap();
     let table4 = table4();
     let table4 = table4.to_str().unwrap();
-    let wrong: [(&[&str], &str); 12] = [
+    let wrong: [(&[&str], &str); 14] = [
         (&["simulate", "nowhere.toml"], "error: nowhere.toml: this case file cannot be read: there is no such file"),
         (&["simulate", "axis.toml"], "did you mean `torque_constant`?"),
         (&["simulate", table4, "--set", "cart.mass=0.5 m"], "a length"),
@@ -286,6 +330,8 @@ fn wrong_input_is_told_on_stderr_with_status_2() {
         (&["init", "."], "this is a folder"),
         (&["simulate", table4, "--as-measured", "--out", "out"], "add [encoder] with for example at = \"motor\""),
         (&["simulate", table4, "--as-measured"], "--out <DIR>"),
+        (&["simulate", table4, "--live"], "--out <DIR>"),
+        (&["simulate", table4, "--live", "--no-report", "--out", "out"], "cannot be used with '--no-report'"),
         (
             &[
                 "simulate",

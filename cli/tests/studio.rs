@@ -236,7 +236,7 @@ fn the_token_is_exchanged_for_a_cookie_with_the_port_in_its_name() {
     assert!(cookie.contains("HttpOnly") && cookie.contains("SameSite=Strict") && !cookie.contains(&studio.token));
     assert_protected(&answer);
     let cookie = studio.cookie();
-    for (path, wanted) in [("/", 200), ("/main.js", 200), ("/report.js", 200), ("/nothing", 404)] {
+    for (path, wanted) in [("/", 200), ("/main.js", 200), ("/plot.js", 200), ("/nothing", 404)] {
         let answer = studio.ask(&format!("GET {path}"), &[&studio.host(), &cookie]);
         assert_eq!(status(&answer), wanted, "{path}");
         assert_protected(&answer);

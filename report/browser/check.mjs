@@ -3,11 +3,13 @@
 //   node check.mjs BROWSER REPORTS SHOTS
 //
 // REPORTS holds a folder for each report, with report.html in it; pictures of all pages go to SHOTS.
-import {mkdirSync, readdirSync} from "node:fs";
+import {mkdirSync, readFileSync, readdirSync} from "node:fs";
+import {createRequire} from "node:module";
 import {join, resolve} from "node:path";
 import {pathToFileURL} from "node:url";
 import {chromium} from "playwright-core";
 
+const axe = createRequire(import.meta.url).resolve("axe-core/axe.min.js");
 const [program, reports, shots] = process.argv.slice(2);
 mkdirSync(shots, {recursive: true});
 const names = readdirSync(reports, {withFileTypes: true})
@@ -287,7 +289,7 @@ async function taps(name) {
       let i = xs.length >> 1;
       while (i < xs.length - 1 && !isFinite(ys[i])) i++;
       // A tap near a name in the legend is one on the name.
-      const y = plot.rising[series.x] ? P.top + P.height / 2 : plot.up(P, ys[i]);
+      const y = plot.rising[series.x] ? P.top + P.height / 2 : P.axes.up(ys[i]);
       return {x: box.left + (plot.across(xs[i]) * box.width) / L.width, y: box.top + (y * box.width) / L.width};
     });
     const inside = (v, from, length) => Math.max(from + 3, Math.min(from + length - 3, v));
@@ -310,10 +312,43 @@ async function taps(name) {
 const farIn = page =>
   page.evaluate(() => {
     const {plot} = document.querySelectorAll("figure.plot")[1];
-    const series = plot.svg.querySelectorAll('svg>path[stroke-width="4.4"]');
-    const curves = [...series].filter(path => !path.closest("g") && !path.classList.contains("s-ink"));
+    const series = plot.svg.querySelectorAll('svg>path[class^="f-"]:not(.f-ink)');
+    const curves = [...series].filter(path => !path.closest("g"));
     return {dots: curves.length, limit: plot.limit.textContent};
   });
+
+/** Machines of a report: each is drawn at its start, and moves by its slider and while it is played. */
+async function moves(page, count, before, after) {
+  const machines = page.locator("figure.machine");
+  expect((await machines.count()) === count, `${await machines.count()} machines`);
+  for (let k = 0; k < count; k++) {
+    const machine = machines.nth(k),
+      told = () => machine.locator("svg").getAttribute("aria-label"),
+      clock = async () => parseFloat(await machine.locator(".clock").innerText());
+    await machine.scrollIntoViewIfNeeded();
+    expect(before.test(await told()) && !/undefined/.test(await told()), `at first ${await told()}`);
+    await machine.locator(".play").click();
+    await page.waitForFunction(
+      k => parseFloat(document.querySelectorAll("figure.machine .clock")[k].textContent) > 0,
+      k,
+    );
+    await machine.locator(".play").click();
+    expect((await machine.locator(".play").getAttribute("aria-label")) === "Play", "it does not pause");
+    const paused = await clock();
+    await settled(page);
+    expect((await clock()) === paused, "it goes on");
+    await machine.locator(".scrub").focus();
+    await page.keyboard.press("End");
+    await settled(page);
+    expect(after.test(await told()) && !/undefined/.test(await told()), `at the end ${await told()}`);
+    await page.keyboard.press("Home");
+    await settled(page);
+    expect(before.test(await told()), `back at the start ${await told()}`);
+  }
+  await page.evaluate(readFileSync(axe, "utf8"));
+  const {violations} = await page.evaluate(() => window.axe.run("figure.machine", {resultTypes: ["violations"]}));
+  expect(!violations.length, violations.map(one => `${one.id}: ${one.nodes[0].html}`).join("\n"));
+}
 
 // ---- What single reports have to show
 
@@ -323,10 +358,10 @@ const particular = {
       const {plot} = [...document.querySelectorAll("figure.plot")].find(figure => /Nyquist/.test(figure.innerText));
       const L = plot.shown,
         P = L.panels[0],
-        [low, high] = [L.xScale.low, L.xScale.high];
+        [low, high] = [L.x.low, L.x.high];
       return {
         right: L.wide / (high - low),
-        up: P.height / (P.yScale.high - P.yScale.low),
+        up: P.height / (P.y.high - P.y.low),
         sees: low < -1 && high > 0,
         named: P.panel.series.some(series => series.name === "\u22121"),
       };
@@ -341,7 +376,7 @@ const particular = {
       return P.panel.series.map(series => {
         const x = plot.arrays[series.x],
           y = plot.arrays[series.y];
-        return plot.shown.xScale.place(x[y.indexOf(Math.max(...y))]);
+        return plot.shown.x.place(x[y.indexOf(Math.max(...y))]);
       });
     });
     expect(
@@ -379,6 +414,9 @@ const particular = {
     expect(dots > 0, "no sample is drawn as a dot");
     expect(!limit, `all rows are there, and the page says: ${limit}`);
   },
+
+  live: page => moves(page, 2, /cart at 0 mm/, /cart at [1-9][\d.]* mm/),
+  "live-gantry": page => moves(page, 3, /bridge at 0 mm.*cart at 0 mm/, /at (\u2212|[1-9])[\d.]* mm/),
 
   async long(page) {
     for (let k = 0; k < 4; k++) await drag(page, 1, [0.3, 0.5], [0.35, 0.5]);

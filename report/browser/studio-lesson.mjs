@@ -173,6 +173,136 @@ await test("the panels have the sizes that they were given, also after a reload"
   expect((await page.evaluate(() => localStorage.getItem("layout"))) === null, "the browser keeps what was reset");
 });
 
+/** Keys of the plots as they stand in the page. */
+const order = page => page.evaluate(() => [...document.querySelectorAll("#plots>*")].map(plot => plot.dataset.panel));
+const layout = page => page.evaluate(() => localStorage.getItem("layout"));
+
+async function again(page) {
+  await page.reload();
+  await page.waitForFunction(() => window.studio && window.studio.run && document.querySelector(".live-plot"));
+  await settled(page);
+}
+
+await test("plots are moved by buttons, keys and the mouse, and stay there until the layout is reset", async open => {
+  const {page} = await open({viewport: {width: 1440, height: 950}}),
+    first = await order(page),
+    [a, b, c, d] = first;
+  const menu = page.locator(`[data-panel=${c}] .move`),
+    way = name => menu.getByRole("button", {name, exact: true});
+  expect(!(await page.locator("#reset-layout").isVisible()), "there is something to reset");
+  await menu.locator("summary").focus();
+  await page.keyboard.press("Enter");
+  await page.screenshot({path: join(shots, "studio-move.png")});
+  await way("Up").focus();
+  await page.keyboard.press("Enter");
+  expect((await order(page)).slice(0, 4).join() === [c, a, b, d].join(), `up gives ${await order(page)}`);
+  expect(/ is 1 of 9$/.test(await page.locator("#said").textContent()), await page.locator("#said").textContent());
+  expect(await way("Up").evaluate(button => button === document.activeElement), "the focus is lost");
+  await way("Up").click();
+  expect((await order(page)).slice(0, 4).join() === [c, a, b, d].join(), `up again gives ${await order(page)}`);
+  await way("Right").click();
+  expect((await order(page)).slice(0, 4).join() === [a, c, b, d].join(), `right gives ${await order(page)}`);
+  await way("Down").click();
+  expect((await order(page)).slice(0, 4).join() === [a, b, d, c].join(), `down gives ${await order(page)}`);
+  await way("Left").click();
+  expect((await order(page)).slice(0, 4).join() === [a, b, c, d].join(), `left gives ${await order(page)}`);
+  await way("To the front").click();
+  await page.keyboard.press("Escape");
+  const from = await page.locator(`[data-panel=${c}] h3`).boundingBox(),
+    to = await page.locator(`[data-panel=${a}] .area`).boundingBox();
+  await page.mouse.move(from.x + 10, from.y + 10);
+  await page.mouse.down();
+  await page.mouse.move(to.x + 80, to.y + 40, {steps: 3});
+  expect((await page.locator(".target").count()) === 1, "the place is not marked");
+  await page.mouse.up();
+  const moved = [a, c, ...first.slice(1).filter(key => key !== c)].join();
+  expect((await order(page)).join() === moved, `the mouse gives ${await order(page)}`);
+  await again(page);
+  expect((await order(page)).join() === moved, `after a reload ${await order(page)}`);
+  // A narrow page has the plots as ever, and nothing that arranges them.
+  await page.setViewportSize({width: 1000, height: 900});
+  await settled(page);
+  expect((await order(page)).join() === first.join(), `a narrow page has ${await order(page)}`);
+  expect(!(await page.locator(".move, .live-plot>.splitter, #reset-layout").filter({visible: true}).count()), "tools");
+  await page.setViewportSize({width: 1440, height: 950});
+  await settled(page);
+  expect((await order(page)).join() === moved, `a wide page again ${await order(page)}`);
+  await page.locator("#reset-layout").click();
+  expect((await order(page)).join() === first.join(), `reset gives ${await order(page)}`);
+  expect((await layout(page)) === null, "the browser keeps what was reset");
+  expect(!(await page.locator("#reset-layout").isVisible()), "there is more to reset");
+});
+
+for (const by of ["mouse", "touch", "keys"]) {
+  await test(`plots have the sizes that they were given by ${by}, also after a reload`, async open => {
+    const {page} = await open({viewport: {width: 1440, height: 950}, hasTouch: by === "touch"}),
+      box = () => page.locator("[data-panel=position] .area").boundingBox(),
+      bar = name => page.locator(`#${name}-position`);
+    const before = await box(),
+      session = by === "touch" ? await page.context().newCDPSession(page) : null;
+    const touch = (type, points) => session.send("Input.dispatchTouchEvent", {type, touchPoints: points});
+    const drag = async (name, right, down) => {
+      if (by === "keys") {
+        await bar(name).focus();
+        for (let k = 0; k < 3; k++) await page.keyboard.press(name === "wide" ? "ArrowRight" : "ArrowDown");
+        return;
+      }
+      const {x, y, width, height} = await bar(name).boundingBox(),
+        at = part => ({x: x + width / 2 + part * right, y: y + height / 2 + part * down});
+      if (session) {
+        await touch("touchStart", [at(0)]);
+        for (const part of [0.3, 0.6, 1]) await touch("touchMove", [at(part)]);
+        await touch("touchEnd", []);
+        return;
+      }
+      await page.mouse.move(at(0).x, at(0).y);
+      await page.mouse.down();
+      for (const part of [0.3, 0.6, 1]) await page.mouse.move(at(part).x, at(part).y);
+      await page.mouse.up();
+    };
+    const columns = Number(await bar("wide").evaluate(bar => (bar.focus(), bar.getAttribute("aria-valuenow"))));
+    expect(columns === 6, `at first ${columns} columns`);
+    // Three columns of the grid, and as many pixels as three strokes of a key.
+    await drag("wide", (before.width + 25.6) / 2, 0);
+    await drag("tall", 0, 48);
+    await settled(page);
+    const now = await box(),
+      wide = 1.5 * (before.width + 25.6) - 25.6;
+    expect(Math.abs(now.width - wide) < 2, `${before.width} pixels became ${now.width}, not ${wide}`);
+    expect(Math.abs(now.height - before.height - 48) < 2, `${before.height} pixels became ${now.height}`);
+    expect((await bar("wide").getAttribute("aria-valuetext")) === "9 of 12 columns", "the width is not told");
+    const drawn = await page.locator("[data-panel=position] canvas").first().evaluate(canvas => canvas.clientHeight);
+    expect(Math.abs(drawn - now.height) < 2, `curves are drawn ${drawn} high`);
+    await again(page);
+    const then = await box();
+    expect(Math.abs(then.width - now.width) < 2 && Math.abs(then.height - now.height) < 2, "a reload changes sizes");
+    await page.screenshot({path: join(shots, `studio-sizes-${by}.png`)});
+    for (const name of ["wide", "tall"]) await bar(name).dblclick();
+    await settled(page);
+    expect(Math.abs((await box()).width - before.width) < 2, `a double click leaves ${(await box()).width}`);
+    expect((await layout(page)) === null, `the browser keeps ${await layout(page)}`);
+  });
+}
+
+await test("what is no layout in the browser's storage harms nothing", async open => {
+  const {page} = await open({viewport: {width: 1440, height: 950}}),
+    first = await order(page);
+  const mixed = ["state", 3, "nothing"],
+    panels = {order: mixed, wide: {position: "x", speed: 400}, tall: {position: -1e9, error: null}};
+  for (const kept of ["null", "[]", "7", "{", JSON.stringify({panels: 3, side: "x"}), JSON.stringify({panels})]) {
+    await page.evaluate(kept => localStorage.setItem("layout", kept), kept);
+    await again(page);
+    expect((await order(page)).length === first.length, `${kept}: ${await order(page)}`);
+    expect((await page.evaluate(() => document.documentElement.scrollWidth)) <= 1440, `${kept}: it scrolls sideways`);
+    const {height} = await page.locator("[data-panel=position] .area").boundingBox();
+    expect(height > 60, `${kept}: a plot is ${height} high`);
+    await page.locator("#tall-speed").focus();
+    await page.keyboard.press("ArrowDown");
+    expect(JSON.parse(await layout(page)).panels.tall.speed === 186, `${kept}: ${await layout(page)}`);
+  }
+  expect((await order(page))[0] === "state", `${await order(page)}`);
+});
+
 await test("drawing, plot and slider are on a phone on its side together", async open => {
   const {page} = await open({viewport: {width: 844, height: 390}, hasTouch: true});
   await page
@@ -325,7 +455,8 @@ await test("the case text is completed and explained by the schema", async open 
   await page.evaluate(() => window.studio.edit("kind = \n[cart]\nmass = "));
   await field.evaluate(field => field.setSelectionRange(7, 7));
   await page.keyboard.press("Control+ ");
-  expect((await hints.locator("b").allInnerTexts()).join() === '"axis","h-frame","core-xy","dual-belt"', await hints.innerText());
+  const kinds = (await hints.locator("b").allInnerTexts()).join();
+  expect(kinds === '"axis","h-frame","core-xy","dual-belt"', kinds);
   await page.keyboard.press("ArrowDown");
   await page.keyboard.press("Tab");
   expect((await text()).startsWith('kind = "h-frame"\n'), await text());

@@ -1,4 +1,4 @@
-//! A figure's data as `plot.js` reads them: exact enough to zoom by a million, small enough for twenty plots.
+//! A figure's data as `plot.js` reads them, and curves for `live.js`: exact enough to zoom by a million, small enough for twenty plots.
 
 use super::decimate::decimate;
 use super::figure::{Axis, Figure, Marker, Panel, Series, Style};
@@ -50,7 +50,7 @@ pub(crate) fn json(figure: &Figure) -> String {
         marks(&figure.verticals, figure.x.factor),
         panels.join(","),
         layouts.join(","),
-        arrays.done.iter().map(|(_, text)| text.as_str()).collect::<Vec<_>>().join(",")
+        arrays.joined()
     )
 }
 
@@ -125,14 +125,20 @@ fn colour(colour: Colour) -> &'static str {
     colour.paint().class
 }
 
-/// The arrays of one figure, each once.
+/// The arrays of one figure or machine, each once.
 #[derive(Default)]
-struct Arrays {
+pub(crate) struct Arrays {
     done: Vec<(Vec<f64>, String)>,
 }
 
 impl Arrays {
-    fn index(&mut self, values: Vec<f64>, factor: f64) -> usize {
+    /// All of them, separated by commas.
+    pub(crate) fn joined(&self) -> String {
+        self.done.iter().map(|(_, text)| text.as_str()).collect::<Vec<_>>().join(",")
+    }
+
+    /// The number of the array of these values, each multiplied by `factor`.
+    pub(crate) fn index(&mut self, values: Vec<f64>, factor: f64) -> usize {
         let values: Vec<f64> = values.into_iter().map(|v| v * factor).collect();
         let same =
             |a: &[f64], b: &[f64]| a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits());
@@ -152,7 +158,15 @@ fn encode(values: &[f64]) -> String {
     }
     let (lo, hi) = least_and_greatest(values);
     const TOP: f64 = 4294967294.0; // the value above is the gap
-    let (lo, unit) = if lo <= hi { (lo, (hi / TOP - lo / TOP).max(f64::MIN_POSITIVE)) } else { (0.0, 1.0) };
+    let unit = if lo <= hi { (hi / (TOP - 1.0) - lo / (TOP - 1.0)).max(f64::MIN_POSITIVE) } else { 1.0 };
+    // Zero among the values is a multiple of the unit away, so that it reads back as zero.
+    let lo = if lo > hi {
+        0.0
+    } else if lo < 0.0 && hi >= 0.0 {
+        -(-lo / unit).ceil() * unit
+    } else {
+        lo
+    };
     let bytes: Vec<u8> = values
         .iter()
         .flat_map(|v| {
@@ -164,7 +178,7 @@ fn encode(values: &[f64]) -> String {
 }
 
 /// The step from each value to the next, if it is the same everywhere.
-fn spacing(values: &[f64]) -> Option<f64> {
+pub(crate) fn spacing(values: &[f64]) -> Option<f64> {
     let (lo, hi) = least_and_greatest(values);
     let (first, last) = (*values.first()?, *values.last()?);
     let step = if values.len() > 1 { (last - first) / (values.len() - 1) as f64 } else { 0.0 };
@@ -227,5 +241,21 @@ mod tests {
         let t: Vec<f64> = (0..1001).map(|i| f64::from(i) * 1e-3).collect();
         assert!(encode(&t).len() < 60);
         assert!(encode(&[1.0, f64::NAN]).contains("\"d\""));
+    }
+
+    /// A force of nothing was shown as 10⁻¹⁰ N.
+    #[test]
+    fn zero_reads_back_as_zero() {
+        for values in [[-0.3, 0.0, 17.0], [-1e-7, 0.0, 3e5], [-5.0, -2.0, 0.0], [0.0, 0.1, 7.7]] {
+            let text = encode(&values);
+            let number = |key: &str| -> f64 {
+                let rest = text.split(&format!("\"{key}\":")).nth(1).unwrap();
+                rest.split([',', '}']).next().unwrap().parse().unwrap()
+            };
+            let (start, unit) = (number("o"), number("s"));
+            let count = (-start / unit).round();
+            assert_eq!(start + count * unit, 0.0, "{text}");
+            assert!((start - values[0]).abs() <= unit && start + 4294967294.0 * unit >= values[2] - unit, "{text}");
+        }
     }
 }

@@ -20,6 +20,7 @@ pub struct Page {
     body: String,
     contents: Vec<(String, String)>,
     figures: usize,
+    machines: usize,
     axes: Vec<SharedAxis>,
     folds: usize,
 }
@@ -328,6 +329,20 @@ impl Page {
         });
     }
 
+    /// A machine in motion under its title, moved by a script; `json` is what `live.js` reads.
+    pub(crate) fn machine(&mut self, title: &str, json: &str, caption: &str) {
+        self.machines += 1;
+        self.push(html! {
+            figure.machine {
+                div.figtitle { span { (title) } }
+                div.stage-box {}
+                div.transport role="toolbar" aria-label={ "Time: " (title) } {}
+                script type="application/json" { (PreEscaped(json)) }
+                figcaption { (words(caption)) }
+            }
+        });
+    }
+
     /// An equation as MathML (`html! { math { mi { "x" } } }`) with its number, if it has one.
     pub fn equation(&mut self, math: impl Render, number: Option<&str>) {
         self.push(html! { div.equation { (math) @if let Some(number) = number { span.number { (number) } } } });
@@ -367,7 +382,10 @@ impl Page {
                     meta name="viewport" content="width=device-width, initial-scale=1";
                     meta name="color-scheme" content="light dark";
                     title { (self.title) }
-                    style { (PreEscaped(colours())) (PreEscaped(include_str!("page.css"))) }
+                    style {
+                        (PreEscaped(colours())) (PreEscaped(include_str!("page.css")))
+                        @if self.machines > 0 { (PreEscaped(MACHINE)) }
+                    }
                 }
                 body {
                     main.page.with-nav[nav] {
@@ -383,7 +401,7 @@ impl Page {
                         (PreEscaped(&self.body))
                         @if let Some(footer) = &self.footer { footer { (footer) } }
                     }
-                    @if self.figures > 0 { script { (PreEscaped(script())) } }
+                    @if self.figures + self.machines > 0 { script { (PreEscaped(script(self.machines > 0))) } }
                     @if self.folds > 0 { script { (PreEscaped(UNFOLD)) } }
                 }
             }
@@ -396,6 +414,9 @@ impl Page {
         write_atomically(path, self.html())
     }
 }
+
+/// The style of machines in motion and of their controls.
+const MACHINE: &str = include_str!("machine.css");
 
 /// Opens the folded section of the element that the address names, and all of them for printing.
 const UNFOLD: &str = "\
@@ -422,14 +443,36 @@ pub fn style() -> String {
         variables(|paint| paint.dark),
         classes()
     );
-    format!("{palette}.report{{{}}}", include_str!("page.css"))
+    format!("{palette}.report{{{}}}{MACHINE}", include_str!("page.css"))
 }
 
-/// The script without its indentation and without the lines that are remarks. It brings the figures of its document to
-/// life; those that come later, by `tautFigures(element)`.
-pub fn script() -> String {
-    let lines = include_str!("plot.js").lines().map(str::trim_start);
-    lines.filter(|line| !line.is_empty() && !line.starts_with("//")).flat_map(|line| [line, "\n"]).collect()
+/// The modules that draw plots and machines and bring them to life, by the names under which they import each other;
+/// reports carry them, and the studio serves them.
+pub const MODULES: [(&str, &str); 5] = [
+    ("pen.js", include_str!("pen.js")),
+    ("plot.js", include_str!("plot.js")),
+    ("element.js", include_str!("element.js")),
+    ("stage.js", include_str!("stage.js")),
+    ("player.js", include_str!("player.js")),
+];
+
+/// What a report needs beside the modules to play its machines.
+const LIVE: &str = include_str!("live.js");
+
+/// The modules as one script, without indentation and without the lines that are remarks. It brings the figures of its
+/// document to life, and with `machines` those, too.
+pub fn script(machines: bool) -> String {
+    let modules = MODULES.iter().map(|(_, text)| *text).take(if machines { MODULES.len() } else { 2 });
+    let mut is_remark = false;
+    let kept = modules.chain(machines.then_some(LIVE)).flat_map(str::lines).map(str::trim_start).filter(|line| {
+        is_remark |= line.starts_with("/**");
+        let drops = is_remark || line.is_empty() || line.starts_with("//") || line.starts_with("import ");
+        is_remark &= !line.ends_with("*/");
+        !drops
+    });
+    let lines = kept.flat_map(|line| [line.strip_prefix("export ").unwrap_or(line), "\n"]);
+    let start = if machines { "bring(document);\nliven(document);\n" } else { "bring(document);\n" };
+    format!("(() => {{\n\"use strict\";\n{}{start}}})();\n", lines.collect::<String>())
 }
 
 /// The palette as variables for both themes, paper always light, and the classes that pictures use.

@@ -184,6 +184,26 @@ fn the_page_asks_for_nothing_and_runs_nothing_foreign() {
     }
 }
 
+/// A name that both modules declared would keep every figure of every report from coming to life.
+#[test]
+fn the_modules_of_the_script_declare_each_name_once() {
+    let texts = page::MODULES.map(|(_, text)| text).into_iter().chain([include_str!("../src/live.js")]);
+    let declared = texts.flat_map(str::lines).map(|line| line.strip_prefix("export ").unwrap_or(line));
+    let declared: Vec<&str> = declared.collect();
+    let mut names: Vec<&str> = ["const ", "let ", "function ", "class "]
+        .iter()
+        .flat_map(|word| declared.iter().filter_map(|line| line.strip_prefix(word)))
+        .filter_map(|rest| rest.split(|c: char| !c.is_alphanumeric()).next())
+        .collect();
+    names.sort_unstable();
+    assert!(names.len() > 30, "{names:?}");
+    assert!(names.windows(2).all(|pair| pair[0] != pair[1]), "{names:?}");
+    for line in page::script(true).lines().skip(1) {
+        let starts = ["export ", "import ", "//", "*", "/**", " "].iter().any(|start| line.starts_with(start));
+        assert!(!line.is_empty() && !starts, "{line}");
+    }
+}
+
 #[test]
 fn the_same_input_gives_the_same_bytes() {
     assert_eq!(page().html(), page().html());

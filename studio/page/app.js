@@ -1,6 +1,7 @@
 // @ts-check
 // The state of a page: the case text and its history, the run that it gives, what is compared with it, and what is
 // looked at. Views listen and draw; nothing here computes a motion.
+import {Playing} from "./player.js";
 import {Wire, Mistake} from "./wire.js";
 
 /** @typedef {import("./wire.js").Answer} Answer */
@@ -21,17 +22,15 @@ import {Wire, Mistake} from "./wire.js";
  * @property {boolean} isBuiltIn
  * @property {boolean} isUnsaved
  * @property {string} at when it was left */
-/** @typedef {"run"|"text"|"mistake"|"cursor"|"window"|"compare"|"play"|"leave"|"opened"|"view"|"theme"} What */
 
 const MOST_UNDO = 200,
   MOST_PINS = 6,
   MOST_MOVED = 4;
 
-export class App {
+export class App extends Playing {
   constructor() {
+    super();
     this.wire = new Wire();
-    /** @type {Map<What, Array<() => void>>} */
-    this.listeners = new Map();
     this.path = "";
     this.name = "studio.toml";
     /** The text that was opened. */
@@ -69,16 +68,8 @@ export class App {
     this.showsBefore = true;
     /** @type {{name: string, answer: Answer}[]} */
     this.pins = [];
-    /** The part of time that is seen; null for all. @type {[number, number] | null} */
-    this.window = null;
     /** Rows of the window, or around the cursor in slow motion, at a finer interval. @type {Answer | null} */
     this.section = null;
-    this.cursor = 0;
-    this.isPlaying = false;
-    /** Seconds of the machine for one second of the watcher. */
-    this.rate = 0.1;
-    /** By how much stretch and error are magnified. */
-    this.factor = 100;
     this.view = "motion";
     /** The stop of the tour. */
     this.stop = 0;
@@ -100,34 +91,10 @@ export class App {
     this.show = () => {};
   }
 
-  /** Plays, or pauses. */
-  play() {
-    this.isPlaying = !this.isPlaying;
-    if (this.isPlaying && this.cursor >= this.until) this.cursor = 0;
-    this.tell("play");
-  }
-
   /** The contents of a link. */
   snapshot() {
     const {text, name, experiment, view, stop, cursor, window, factor, rate} = this;
     return {text, name, experiment, view, stop, cursor, window, factor, rate};
-  }
-
-  /** @param {What} what @param {() => void} listener */
-  on(what, listener) {
-    const listeners = this.listeners.get(what) || [];
-    listeners.push(listener);
-    this.listeners.set(what, listeners);
-  }
-
-  /** @param {...What} whats */
-  tell(...whats) {
-    for (const what of whats) for (const listener of this.listeners.get(what) || []) listener();
-  }
-
-  /** The end of the run, s. */
-  get until() {
-    return this.run ? this.run.head.until : 1;
   }
 
   // ---- The text and its history
@@ -380,12 +347,6 @@ export class App {
 
   // ---- What is looked at
 
-  /** @param {number} time */
-  seek(time) {
-    this.cursor = Math.max(0, Math.min(this.until, time));
-    this.tell("cursor");
-  }
-
   /** Shows a part of time, or all. @param {[number, number] | null} window */
   look(window) {
     if (window) {
@@ -432,43 +393,4 @@ export class App {
       },
     );
   }
-
-  /** The value of a curve at a time, between rows along a line. @param {string} name @param {number} time */
-  value(name, time) {
-    for (const answer of [this.section, this.run]) {
-      const times = answer && answer.columns.get("time"),
-        values = answer && answer.columns.get(name);
-      if (!times || !values || !times.length || time < times[0] || time > times[times.length - 1]) continue;
-      const i = Math.min(times.length - 1, lowerBound(times, time));
-      if (i === 0 || times[i] === time) return values[i];
-      const share = (time - times[i - 1]) / (times[i] - times[i - 1]);
-      return values[i - 1] + share * (values[i] - values[i - 1]);
-    }
-    const last = this.run && this.run.columns.get(name);
-    return last && last.length ? last[last.length - 1] : 0;
-  }
-
-  /** The state of a body at a time: no line leads from stuck to sliding. @param {string} name @param {number} time */
-  state(name, time) {
-    for (const answer of [this.section, this.run]) {
-      const times = answer && answer.columns.get("time"),
-        values = answer && answer.columns.get(name);
-      if (!times || !values || !times.length || time < times[0] || time > times[times.length - 1]) continue;
-      const i = Math.min(times.length - 1, lowerBound(times, time));
-      return times[i] === time || i === 0 ? values[i] : values[i - 1];
-    }
-    return 0;
-  }
-}
-
-/** The first index whose value is not below. @param {Float64Array} x @param {number} value */
-export function lowerBound(x, value) {
-  let from = 0,
-    to = x.length;
-  while (from < to) {
-    const middle = (from + to) >> 1;
-    if (x[middle] < value) from = middle + 1;
-    else to = middle;
-  }
-  return from;
 }

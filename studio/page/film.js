@@ -1,6 +1,6 @@
 // @ts-check
 // The motion as moving pictures: the machine, and the plots that are in sight, with the cursor running through them.
-import {time as timeText} from "./format.js";
+import {timeText} from "./format.js";
 import {Gif, palette} from "./gif.js";
 
 /** @typedef {import("./app.js").App} App */

@@ -1,6 +1,6 @@
 // @ts-check
 // From a log to a model: drop files, say what their columns are, see what they determine, fit, keep.
-import {download, element, fileName, fold, number, svg} from "./format.js";
+import {download, element, fileName, fold, number, rowHead, svg, table} from "./format.js";
 import {Picture} from "./picture.js";
 import {dropPlace, wordsOf} from "./drop.js";
 import {showReport} from "./modes.js";
@@ -387,43 +387,16 @@ class Logs {
   show(head) {
     this.result = head;
     const {result} = head;
-    const rows = head.rows.map((row, k) =>
-      element(
-        "tr",
-        {},
-        element("th", {scope: "row"}, row.name),
-        element("td", {}, row.value),
-        element("td", {}, row.error),
-        element("td", {}, row.interval.replace(/^95 %: /, "")),
-        element("td", {class: "quiet"}, row.start),
-        element(
-          "td",
-          {},
-          result.parameters[k].determined ? "" : result.parameters[k].at_bound ? "at its bound" : "not determined",
-        ),
-      ),
-    );
-    const table = element(
-      "div",
-      {class: "scroll card"},
-      element(
-        "table",
-        {},
-        element("caption", {}, "Estimates and 95 % intervals"),
-        element(
-          "thead",
-          {},
-          element(
-            "tr",
-            {},
-            ...["Parameter", "Estimate", "Standard error", "95 % interval", "Start", ""].map(text =>
-              element("th", {scope: "col"}, text),
-            ),
-          ),
-        ),
-        element("tbody", {}, ...rows),
-      ),
-    );
+    const rows = head.rows.map((row, k) => [
+      rowHead(row.name),
+      row.value,
+      row.error,
+      row.interval.replace(/^95 %: /, ""),
+      element("td", {class: "quiet"}, row.start),
+      result.parameters[k].determined ? "" : result.parameters[k].at_bound ? "at its bound" : "not determined",
+    ]);
+    const columns = ["Parameter", "Estimate", "Standard error", "95 % interval", "Start", ""],
+      estimates = element("div", {class: "scroll card"}, table(columns, rows, "Estimates and 95 % intervals"));
     const warned = result.findings.filter(one => one.grade === "warning");
     const notes = warned.length
       ? element("ul", {class: "warnings"}, ...warned.map(one => element("li", {}, one.text)))
@@ -467,7 +440,7 @@ class Logs {
         element("h3", {}, "Result"),
         element("p", {}, `${head.ending}.`),
         notes,
-        table,
+        estimates,
         correlation(result),
         element("p", {class: "buttons"}, keep, discard, json, toml),
       ].filter(Boolean),
@@ -545,7 +518,11 @@ function correlation(result) {
       "figcaption",
       {},
       element("h3", {}, "Correlations"),
-      element("span", {class: "quiet"}, "Near 1 or −1 the logs tell one combination of the two far better than each."),
+      element(
+        "span",
+        {class: "quiet"},
+        "Near 1 or −1 the logs determine one combination of the two far better than each.",
+      ),
     ),
     element("div", {class: "scroll", tabindex: "0", role: "group", "aria-label": "Correlations"}, drawing),
   );
@@ -576,21 +553,11 @@ class LogFile {
       height: 170,
       words: "The chosen columns, each scaled to its own range.",
     });
-    const table = keys =>
-      element(
-        "table",
-        {class: "mapping"},
-        element(
-          "thead",
-          {},
-          element(
-            "tr",
-            {},
-            ...["What", "Column", "Unit", "First values"].map(text => element("th", {scope: "col"}, text)),
-          ),
-        ),
-        element("tbody", {}, ...keys.map(row)),
-      );
+    const mapping = keys => {
+      const made = table(["What", "Column", "Unit", "First values"], keys.map(row));
+      made.className = "mapping";
+      return made;
+    };
     const others = keys.filter(key => !isShown(key));
     this.split = this.columns("split", head.guess.split);
     this.preset = element(
@@ -611,14 +578,14 @@ class LogFile {
         element("span", {class: "quiet"}, ` ${head.rows} rows, ${head.found.length} columns `),
         element("button", {type: "button", onclick: remove, "aria-label": `Remove ${file.name}`}, "Remove"),
       ),
-      element("div", {class: "scroll"}, table(keys.filter(isShown))),
+      element("div", {class: "scroll"}, mapping(keys.filter(isShown))),
       element(
         "div",
         {class: "fields"},
         element("label", {}, `${WORDS.split}: `, this.split),
         element("label", {}, "Recorder: ", this.preset),
       ),
-      fold({class: "more"}, "More quantities", "More quantities", element("div", {class: "scroll"}, table(others))),
+      fold({class: "more"}, "More quantities", "More quantities", element("div", {class: "scroll"}, mapping(others))),
       this.preview.figure,
     );
     this.look();

@@ -1,6 +1,7 @@
 // @ts-check
 // How the machine swings: the page of `taut modes`, made by the library, brought to life by the reports' own script.
 import {element} from "./format.js";
+import {bring} from "./plot.js";
 
 /** @typedef {import("./app.js").App} App */
 
@@ -44,5 +45,5 @@ export function mount(root, app) {
  */
 export function showReport(body, html) {
   body.innerHTML = html;
-  /** @type {any} */ (window).tautFigures(body);
+  bring(body);
 }

@@ -1,8 +1,8 @@
 // @ts-check
 // The view of the motion: the machine above its plots, the parameters and the text beside them.
-import {element, number, put, tell, time as timeText} from "./format.js";
-import {splitter} from "./layout.js";
-import {RATES, Stage, playing, start} from "./player.js";
+import {element, number, put, table, tell, timeText} from "./format.js";
+import {Panels, reset, splitter} from "./layout.js";
+import {Stage, magnifier, playing, slowness, start} from "./player.js";
 import {Plots} from "./plots.js";
 import {Parameters} from "./parameters.js";
 import {Editor} from "./editor.js";
@@ -25,9 +25,10 @@ export function mount(root, app) {
   );
   const plotted = element(
     "section",
-    {"aria-labelledby": "plots-title"},
+    {class: "plotted", "aria-labelledby": "plots-title"},
     element("h2", {id: "plots-title", class: "unseen"}, "Plots"),
     plots,
+    reset,
   );
   side.append(
     splitter({
@@ -54,7 +55,8 @@ export function mount(root, app) {
     element("div", {class: "centre", id: "centre", tabindex: "-1"}, stage, bar(app), size, plotted, glance),
   );
   sides(side, app);
-  app.scene = {stage: new Stage(stage, app), plots: new Plots(plots, app)};
+  const panels = new Panels(plots, words => app.say(words));
+  app.scene = {stage: new Stage(stage, app), plots: new Plots(plots, app, undefined, panels)};
   new Glance(glance, app);
 }
 
@@ -141,31 +143,6 @@ function sides(root, app) {
 /** Experiment, playing, and what is compared. @param {App} app */
 function bar(app) {
   const {play, scrub, clock} = playing(app);
-  const rate = element(
-    "select",
-    {
-      id: "rate",
-      "aria-label": "Slow motion",
-      onchange: () => {
-        app.rate = Number(rate.value);
-        app.tell("play");
-      },
-    },
-    ...RATES.map(value => element("option", {value}, value === 1 ? "as it is" : `${number(1 / value)} × slower`)),
-  );
-  const factor = element("input", {
-    type: "range",
-    id: "factor",
-    min: 0,
-    max: 40,
-    step: 1,
-    "aria-label": "Magnification of stretch and error",
-    oninput: () => {
-      app.factor = Number((10 ** (Number(factor.value) / 10)).toPrecision(2));
-      app.tell("cursor");
-    },
-  });
-  const factorTold = element("span", {class: "factor-value"});
   const experiment = element("select", {
     id: "experiment",
     "aria-label": "Experiment",
@@ -188,22 +165,12 @@ function bar(app) {
   const pin = element("button", {type: "button", id: "pin", onclick: () => app.pin()}, "Pin");
   const unpin = element("button", {type: "button", id: "unpin", hidden: true, onclick: () => app.unpin()}, "Unpin");
   const all = element("button", {type: "button", id: "all", hidden: true, onclick: () => app.look(null)}, "Whole run");
-  const show = () => {
-    tell(factorTold, `× ${number(app.factor)}`);
-    factor.value = String(Math.round(10 * Math.log10(app.factor)));
-    put(factor, {"aria-valuetext": factorTold.textContent});
-  };
-  app.on("cursor", show);
   app.on("window", () => {
     all.hidden = !app.window;
-    show();
   });
   app.on("compare", () => {
     unpin.hidden = !app.pins.length;
     unpin.textContent = `Unpin ${app.pins.length}`;
-  });
-  app.on("play", () => {
-    rate.value = String(app.rate);
   });
   app.on("run", () => {
     const names = app.run ? app.run.head.experiments.map(({name}) => name) : [];
@@ -212,7 +179,6 @@ function bar(app) {
       experiment.replaceChildren(...names.map((name, k) => element("option", {value: k}, name)));
     }
     if (experiment.value !== String(app.experiment)) experiment.value = String(app.experiment);
-    show();
   });
   start(app);
   app.tell("play");
@@ -222,14 +188,8 @@ function bar(app) {
     play,
     scrub,
     clock,
-    rate,
-    element(
-      "label",
-      {class: "factor", title: "Stretch and error on the drawing are magnified"},
-      element("span", {class: "quiet"}, "stretch"),
-      factor,
-      factorTold,
-    ),
+    slowness(app),
+    magnifier(app),
     element("span", {class: "gap"}),
     experiment,
     before,
@@ -286,7 +246,7 @@ class Glance {
             ...rows.flatMap(row => [element("dt", {title: row.how || null}, row.name), element("dd", {}, row.value)]),
           ),
         );
-      const table = () =>
+      const along = () =>
         places.length
           ? element(
               "div",
@@ -295,16 +255,7 @@ class Glance {
               element(
                 "div",
                 {class: "scroll", tabindex: "0", role: "group", "aria-label": "Along the travel"},
-                element(
-                  "table",
-                  {},
-                  element("thead", {}, element("tr", {}, ...head.map(text => element("th", {scope: "col"}, text)))),
-                  element(
-                    "tbody",
-                    {},
-                    ...places.map(row => element("tr", {}, ...row.map(text => element("td", {}, text)))),
-                  ),
-                ),
+                table(head, places),
               ),
             )
           : null;
@@ -324,7 +275,7 @@ class Glance {
         notes,
       ];
       cells.fill(shape, [...groups.flatMap(({rows}) => rows.map(row => row.value)), ...places.flat()], () =>
-        [...groups.map(card), table(), noted()].filter(Boolean),
+        [...groups.map(card), along(), noted()].filter(Boolean),
       );
     });
   }

@@ -1,7 +1,7 @@
 // @ts-check
 // Figures of results: lines, points and bars on a canvas, with a cursor for keys, values as a table, and brushing.
-import {element, fold, number} from "./format.js";
-import {Axes, COLOURS, sized, ticks} from "./pen.js";
+import {element, fold, number, table} from "./format.js";
+import {Axes, COLOURS, Scale, limited, obey, palette, sized} from "./pen.js";
 
 const LEFT = 70,
   RIGHT = 14,
@@ -10,7 +10,7 @@ const LEFT = 70,
   MARGINS = {left: LEFT, right: RIGHT, top: TOP, bottom: BOTTOM},
   ROWS = 60;
 
-/** @typedef {{name: string, x: ArrayLike<number>, y: ArrayLike<number>, kind?: "line"|"points"|"bars"|"cross",
+/** @typedef {{name: string, x: ArrayLike<number>, y: ArrayLike<number>, kind?: "line"|"points"|"bars"|"crosses",
  * colour?: string, dash?: number[], alpha?: number, quiet?: boolean}} Series
  * quiet: neither in the legend nor in the table */
 /**
@@ -171,40 +171,35 @@ export class Picture {
     this.wasShown = true;
     const {width, height, axes} = this,
       pen = sized(this.canvas, this),
-      style = getComputedStyle(document.documentElement);
-    const colour = name => style.getPropertyValue("--" + name).trim() || "#888";
-    const range = this.ranges();
+      colours = palette(),
+      range = this.ranges();
     if (axes.equal) this.square(range, (width - LEFT - RIGHT) / (height - TOP - BOTTOM));
-    const frame = new Axes(this, MARGINS, range.x, range.y, axes.logX);
+    const frame = new Axes(this, MARGINS, new Scale(range.x, {log: axes.logX}), new Scale(range.y)),
+      columns = frame.x.ticks(frame.wide / 62);
     this.drawn = frame;
-    const {x0, x1} = frame,
-      columns = frame.isLog ? ticks(x0, x1, x1 - x0).map(power => 10 ** power) : ticks(x0, x1, frame.wide / 62);
-    const told = (/** @type {number} */ value) => /** @type {[number, string]} */ ([value, number(value, 5)]);
-    const colours = {grid: colour("grid"), grey: colour("grey"), axis: colour("axis")};
-    frame.grid(pen, colours, columns.map(told), frame.rows(34).map(told));
-    pen.fillStyle = colours.grey;
-    pen.textAlign = "center";
+    frame.grid(pen, colours, columns, frame.y.ticks(frame.tall / 34));
+    frame.base(pen, colours, columns);
     pen.fillText(axes.x + (axes.xUnit ? `, ${axes.xUnit}` : ""), LEFT + frame.wide / 2, height - 6);
     frame.clip(pen);
-    pen.strokeStyle = colours.axis;
+    pen.lineWidth = 1;
     pen.setLineDash([5, 4]);
     frame.marks(pen, axes.marks || []);
     const across = (/** @type {number} */ x) => frame.across(x),
       up = (/** @type {number} */ y) => frame.up(y);
-    for (const one of this.series) this.one(pen, one, colour(this.colourOf(one)), frame);
+    for (const one of this.series) this.one(pen, one, colours[this.colourOf(one)], frame);
     if (this.brush) {
       const {x, y} = this.brush;
       pen.globalAlpha = 0.16;
-      pen.fillStyle = colour("blue");
+      pen.fillStyle = colours.blue;
       pen.fillRect(across(x[0]), up(y[1]), across(x[1]) - across(x[0]), up(y[0]) - up(y[1]));
       pen.globalAlpha = 1;
-      pen.strokeStyle = colour("blue");
+      pen.strokeStyle = colours.blue;
       pen.strokeRect(across(x[0]), up(y[1]), across(x[1]) - across(x[0]), up(y[0]) - up(y[1]));
     }
     if (this.cursor) {
       const one = this.series[this.cursor[0]],
         i = this.cursor[1];
-      pen.strokeStyle = colour("ink");
+      pen.strokeStyle = colours.ink;
       pen.beginPath();
       pen.arc(across(one.x[i]), up(one.y[i]), 5, 0, 7);
       pen.stroke();
@@ -227,32 +222,20 @@ export class Picture {
   /** @param {CanvasRenderingContext2D} pen @param {Series} one @param {string} colour @param {Axes} frame */
   one(pen, one, colour, frame) {
     const {x, y, kind = "line"} = one,
-      n = x.length,
-      places = Array.from({length: kind === "bars" || kind === "cross" ? n : 0}, (_, i) => [
-        frame.across(x[i]),
-        frame.up(y[i]),
-      ]);
+      n = x.length;
     pen.strokeStyle = pen.fillStyle = colour;
     pen.globalAlpha = one.alpha === undefined ? 1 : one.alpha;
-    pen.lineWidth = kind === "line" ? 1.6 : kind === "cross" ? 2 : 1;
+    pen.lineWidth = kind === "line" ? 1.6 : kind === "crosses" ? 2 : 1;
     pen.setLineDash(one.dash || []);
     if (kind === "line") frame.curve(pen, x, y);
-    else if (kind === "points") frame.points(pen, x, y, n > 400 ? 1.7 : 2.6);
     else if (kind === "bars") {
-      places.forEach(([a, top], i) => {
-        const end = i + 1 < n ? places[i + 1][0] : a + (n > 1 ? a - places[i - 1][0] : 20);
+      const places = Array.from(x, value => frame.across(value));
+      places.forEach((a, i) => {
+        const end = i + 1 < n ? places[i + 1] : a + (n > 1 ? a - places[i - 1] : 20),
+          top = frame.up(y[i]);
         pen.fillRect(a + 0.5, top, Math.max(1, end - a - 1), Math.max(0, frame.bottom - top));
       });
-    } else {
-      pen.beginPath();
-      for (const [a, b] of places) {
-        pen.moveTo(a - 5, b - 5);
-        pen.lineTo(a + 5, b + 5);
-        pen.moveTo(a + 5, b - 5);
-        pen.lineTo(a - 5, b + 5);
-      }
-      pen.stroke();
-    }
+    } else frame.symbols(pen, kind, x, y, kind === "crosses" ? 5 : n > 400 ? 1.7 : 2.6);
     pen.globalAlpha = 1;
     pen.setLineDash([]);
   }
@@ -317,17 +300,14 @@ export class Picture {
   nearest(px, py) {
     const {drawn} = this;
     if (!drawn) return;
-    let best = 26 * 26,
-      found = null;
+    let best = 26;
+    /** @type {[number, number] | null} */
+    let found = null;
     this.series.forEach((one, s) => {
-      if (one.quiet) return;
-      for (let i = 0; i < one.x.length; i++) {
-        const far = (drawn.across(one.x[i]) - px) ** 2 + (drawn.up(one.y[i]) - py) ** 2;
-        if (far < best) {
-          best = far;
-          found = [s, i];
-        }
-      }
+      const {row, distance} = drawn.nearest(one.x, one.y, [px, py], one.quiet ? 0 : best);
+      if (row < 0) return;
+      best = Math.sqrt(distance);
+      found = [s, row];
     });
     this.cursor = found;
     this.tell();
@@ -358,21 +338,24 @@ export class Picture {
       this.brushed(null);
       return;
     }
-    let [s, i] = this.cursor || [rows[0], -1];
-    const by = {ArrowRight: 1, ArrowLeft: -1, PageDown: 10, PageUp: -10}[event.key];
-    if (by) i = Math.max(0, Math.min(this.series[s].x.length - 1, i + by));
-    else if (event.key === "ArrowDown" || event.key === "ArrowUp")
-      s = rows[(rows.indexOf(s) + (event.key === "ArrowDown" ? 1 : rows.length - 1)) % rows.length];
-    else if (event.key === "Home") i = 0;
-    else if (event.key === "End") i = this.series[s].x.length - 1;
-    else return;
-    event.preventDefault();
-    i = Math.max(0, Math.min(i, this.series[s].x.length - 1));
-    this.cursor = [s, i];
-    if (event.shiftKey && this.brushed) {
+    const [s, i] = this.cursor || [rows[0], -1];
+    const go = (/** @type {number} */ by, curves = 0) => () => {
+      const at = rows[(rows.indexOf(s) + curves + rows.length) % rows.length];
+      this.cursor = [at, limited(i + by, 0, this.series[at].x.length - 1)];
+      this.followed(event.shiftKey);
+    };
+    const steps = {ArrowRight: 1, ArrowLeft: -1, PageDown: 10, PageUp: -10, Home: -Infinity, End: Infinity};
+    const acts = Object.entries(steps).map(([key, by]) => [key, go(by)]);
+    obey(event, {...Object.fromEntries(acts), ArrowDown: go(0, 1), ArrowUp: go(0, -1)});
+  }
+
+  /** Tells where the cursor is after keys, and chooses up to it where they are held with Shift.
+   * @param {boolean} chooses */
+  followed(chooses) {
+    if (chooses && this.brushed && this.cursor) {
       // From where it began to the cursor, over the whole height.
       const {drawn} = this,
-        x = this.series[s].x[i];
+        x = this.series[this.cursor[0]].x[this.cursor[1]];
       this.anchor = this.brush && this.anchor !== undefined ? this.anchor : x;
       const y = drawn ? [drawn.yAt(drawn.bottom), drawn.yAt(TOP)] : [-Infinity, Infinity];
       this.brush = {x: [Math.min(this.anchor, x), Math.max(this.anchor, x)], y: /** @type {[number, number]} */ (y)};
@@ -391,24 +374,8 @@ export class Picture {
       .map(one => {
         const thin = Math.max(1, Math.ceil(one.x.length / ROWS)),
           rows = [];
-        for (let i = 0; i < one.x.length; i += thin)
-          rows.push(element("tr", {}, element("td", {}, number(one.x[i], 6)), element("td", {}, number(one.y[i], 6))));
-        return element(
-          "table",
-          {},
-          one.name ? element("caption", {}, one.name) : null,
-          element(
-            "thead",
-            {},
-            element(
-              "tr",
-              {},
-              element("th", {scope: "col"}, axes.x + unit(axes.xUnit)),
-              element("th", {scope: "col"}, axes.y + unit(axes.yUnit)),
-            ),
-          ),
-          element("tbody", {}, ...rows),
-        );
+        for (let i = 0; i < one.x.length; i += thin) rows.push([number(one.x[i], 6), number(one.y[i], 6)]);
+        return table([axes.x + unit(axes.xUnit), axes.y + unit(axes.yUnit)], rows, one.name);
       });
     this.table.lastElementChild.replaceChildren(...tables);
   }

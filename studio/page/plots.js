@@ -1,12 +1,12 @@
 // @ts-check
 // The plots of a run on canvases: all share the part of time that is seen, and the cursor. Each can be used by keys,
 // and has its values as a table.
-import {element, fold, number, time as timeText, download, fileName, isOutOfView, tell} from "./format.js";
-import {lowerBound} from "./app.js";
-import {Axes, COLOURS, density, line, sized, step, ticks} from "./pen.js";
+import {element, fold, number, table, timeText, download, fileName, isOutOfView, tell} from "./format.js";
+import {Axes, COLOURS, Scale, SvgPen, density, line, lowerBound, obey, palette, sized, step} from "./pen.js";
 
 /** @typedef {import("./app.js").App} App */
 /** @typedef {import("./wire.js").Answer} Answer */
+/** @typedef {import("./pen.js").Pen} Pen */
 
 const LEFT = 66,
   RIGHT = 12,
@@ -29,15 +29,16 @@ const STATES = new Map([
 
 export class Plots {
   /** @param {HTMLElement} root @param {App} app @param {(panel: any) => boolean} [isWanted] tells which panels have a
-   * plot here */
-  constructor(root, app, isWanted = panel => panel.title) {
+   * plot here @param {import("./layout.js").Panels | null} [panels] that arranges them */
+  constructor(root, app, isWanted = panel => panel.title, panels = null) {
     this.root = root;
     this.app = app;
     this.isWanted = isWanted;
+    this.panels = panels;
     /** @type {Plot[]} */
     this.plots = [];
     this.shape = "";
-    this.colours = {};
+    this.colours = palette();
     /** Height of the curves, pixels. */
     this.tall = 0;
     /** The states strip and its like are not to be hidden by what a panel is called. */
@@ -49,20 +50,18 @@ export class Plots {
     }
     for (const what of /** @type {const} */ (["window", "compare", "cursor"]))
       app.on(what, () => this.later(what === "cursor"));
-    app.on("theme", () => {
-      this.readColours();
+    const recolour = () => {
+      this.colours = palette();
       this.later();
-    });
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
-      this.readColours();
-      this.later();
-    });
+    };
+    app.on("theme", recolour);
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", recolour);
     const isSmall = matchMedia("(max-width: 52rem), (max-height: 34rem)");
     new ResizeObserver(() => {
       this.tall = isSmall.matches ? SMALL_HEIGHT : HEIGHT;
-      for (const plot of this.plots) plot.measure();
-      this.later();
+      this.measure();
     }).observe(root);
+    if (panels) panels.resized = () => this.measure();
     // A plot that is scrolled out of sight is drawn when it comes in: pictures of a drag are of what is looked at.
     this.sight = new IntersectionObserver(
       entries => {
@@ -82,16 +81,9 @@ export class Plots {
         plot.catchUp();
       }),
     );
-    this.readColours();
     this.frame = 0;
     this.rest = 0;
     this.onlyCursor = true;
-  }
-
-  readColours() {
-    const style = getComputedStyle(document.documentElement);
-    for (const name of [...COLOURS, "ink", "grey", "axis", "grid", "soft", "paper", "mark"])
-      this.colours[name] = style.getPropertyValue("--" + name).trim() || "#888";
   }
 
   /** Makes a plot for each panel, where they are others than before. */
@@ -108,9 +100,16 @@ export class Plots {
     }
     this.shape = shape;
     this.plots = panels.map(panel => new Plot(panel, this));
-    this.root.replaceChildren(...this.plots.map(plot => plot.figure));
+    if (this.panels) this.panels.place(this.plots);
+    else this.root.replaceChildren(...this.plots.map(plot => plot.figure));
     this.sight.disconnect();
     for (const plot of this.plots) this.sight.observe(plot.area);
+  }
+
+  /** Draws all plots in the sizes that they have now. */
+  measure() {
+    for (const plot of this.plots) plot.measure();
+    this.later();
   }
 
   /** Draws with the next picture. @param {boolean} [onlyCursor] */
@@ -187,8 +186,7 @@ class Plot {
     this.legend = element("div", {class: "legend"});
     this.values = [];
     panel.curves.forEach((curve, k) => this.addEntry(curve, k));
-    const table = fold({class: "data", ontoggle: () => this.fill(table)}, "Values", `Values of ${panel.title}`);
-    this.table = table;
+    this.table = fold({class: "data", ontoggle: () => this.fill(this.table)}, "Values", `Values of ${panel.title}`);
     const keep = fold(
       {class: "menu keep"},
       "Keep",
@@ -220,7 +218,7 @@ class Plot {
         keep,
       ),
       this.area,
-      table,
+      this.table,
     );
     this.listen();
   }
@@ -261,12 +259,18 @@ class Plot {
   measure() {
     return (this.wide = this.area.clientWidth);
   }
+  /** Height of the curves, pixels. */
+  get curves() {
+    const {panels, tall} = this.plots;
+    if (this.isStates) return 26 + 22 * this.panel.curves.length;
+    return (panels && panels.tall(this.panel.key)) || tall;
+  }
   get height() {
-    return (this.isStates ? 26 + 22 * this.panel.curves.length : this.plots.tall) + BOTTOM;
+    return this.curves + BOTTOM;
   }
   get axes() {
     const {low, high} = this.range || {low: 0, high: 1};
-    return new Axes(this, MARGINS, this.plots.seen, [low, high]);
+    return new Axes(this, MARGINS, new Scale(this.plots.seen), new Scale([low, high]));
   }
   across(time) {
     return this.axes.across(time);
@@ -359,9 +363,22 @@ class Plot {
   drawCurves(pen) {
     this.fit();
     pen.drawImage(this.ground(), 0, 0, this.width, this.height);
+    this.drawRun(pen);
+  }
+
+  /** The curves of the run itself, and its events. @param {Pen} pen */
+  drawRun(pen) {
     this.axes.clip(pen);
     this.marks(pen);
     for (const layer of this.layers()) if (layer.style === "now") this.strokes(pen, layer);
+    pen.restore();
+  }
+
+  /** The grid, and the curves of other runs. @param {Pen} pen */
+  drawGround(pen) {
+    this.grid(pen, this.axes.y.ticks(4));
+    this.axes.clip(pen);
+    for (const layer of this.layers()) if (layer.style !== "now") this.strokes(pen, layer);
     pen.restore();
   }
 
@@ -369,34 +386,18 @@ class Plot {
    * change. @returns {HTMLCanvasElement} */
   ground() {
     const {colours, seen} = this.plots,
-      {width, height} = this,
-      range = /** @type {{low: number, high: number}} */ (this.range);
+      {width, height} = this;
     const below = this.layers().filter(({style}) => style !== "now");
-    const shape = JSON.stringify([
-      width,
-      height,
-      density(),
-      range,
-      seen,
-      [...this.hidden],
-      colours,
-      below.map(({style}) => style),
-    ]);
+    const drawn = [width, height, density(), this.range, seen, [...this.hidden], colours],
+      shape = JSON.stringify([drawn, below.map(({style}) => style)]);
     const isSame = shape === this.grounded.shape && below.every(({answer}, k) => answer === this.grounded.answers[k]);
     if (isSame) return this.back;
     this.grounded = {shape, answers: below.map(({answer}) => answer)};
-    const pen = sized(this.back, this);
-    this.grid(
-      pen,
-      ticks(range.low, range.high, 4).map(value => [value, number(value, 6)]),
-    );
-    this.axes.clip(pen);
-    for (const layer of below) this.strokes(pen, layer);
-    pen.restore();
+    this.drawGround(sized(this.back, this));
     return this.back;
   }
 
-  /** All curves of a run. @param {CanvasRenderingContext2D} pen @param {{answer: Answer, style: string}} layer */
+  /** All curves of a run. @param {Pen} pen @param {{answer: Answer, style: string}} layer */
   strokes(pen, {answer, style}) {
     const {colours, app} = this.plots;
     this.panel.curves.forEach(({key}, k) => {
@@ -412,7 +413,7 @@ class Plot {
   }
 
   /** Draws what is seen of a curve: all points, or the least and greatest of those that share a pixel.
-   * @param {CanvasRenderingContext2D} pen @param {Float64Array} x @param {Float64Array} y */
+   * @param {Pen} pen @param {Float64Array} x @param {Float64Array} y */
   curve(pen, x, y) {
     const [from, to] = this.plots.seen,
       {axes} = this;
@@ -424,11 +425,11 @@ class Plot {
     axes.curve(pen, x, y, part);
     if (last - first < axes.wide / 9 && pen.globalAlpha === 1) {
       pen.fillStyle = pen.strokeStyle;
-      axes.points(pen, x, y, 2.1, part);
+      axes.symbols(pen, "points", x, y, 2.1, part);
     }
   }
 
-  /** Lines at the events. @param {CanvasRenderingContext2D} pen */
+  /** Lines at the events. @param {Pen} pen */
   marks(pen) {
     const {app, colours} = this.plots,
       [from, to] = this.plots.seen;
@@ -436,6 +437,7 @@ class Plot {
     const seen = app.run.head.events.filter(event => event.time >= from && event.time <= to);
     if (seen.length > 120) return;
     pen.strokeStyle = colours.grid;
+    pen.lineWidth = 1;
     pen.setLineDash([2, 2]);
     this.axes.marks(
       pen,
@@ -443,14 +445,13 @@ class Plot {
     );
   }
 
-  /** A strip for each body, and the events on it. @param {CanvasRenderingContext2D} pen */
+  /** A strip for each body, and the events on it. @param {Pen} pen */
   drawStates(pen) {
     const {app, colours} = this.plots,
-      {width, height} = this;
+      {width} = this;
     this.grid(pen, []);
     if (!app.run) return;
     pen.save();
-    pen.font = "12px system-ui, sans-serif";
     this.panel.curves.forEach(({key, name}, k) => {
       const {x, y} = this.rows(app.run, key),
         top = TOP + 6 + 22 * k;
@@ -485,10 +486,9 @@ class Plot {
       pen.stroke();
     }
     pen.restore();
-    void height;
   }
 
-  /** @param {CanvasRenderingContext2D} pen @param {[number, string][]} rows */
+  /** @param {Pen} pen @param {[number, string][]} rows */
   grid(pen, rows) {
     const {colours} = this.plots,
       [from, to] = this.plots.seen,
@@ -498,12 +498,13 @@ class Plot {
       // Far in, what counts is the distance from the left.
       isFar = to - from < 1e-3 * Math.abs(from);
     const columns = /** @type {[number, string][]} */ (
-      ticks(from, to, most).map(value => [value, isFar ? "+" + timeText(value - from, by) : timeText(value, by)])
+      axes.x.ticks(most).map(([value]) => [value, isFar ? "+" + timeText(value - from, by) : timeText(value, by)])
     );
     axes.grid(pen, colours, columns, rows);
+    axes.base(pen, colours, columns);
     if (!isFar) return;
     pen.textAlign = "left";
-    pen.fillText(number(from, 9) + " s", 2, axes.bottom + 16);
+    pen.fillText(number(from, 9) + " s", 2, axes.bottom + 18);
   }
 
   drawCursor() {
@@ -623,7 +624,6 @@ class Plot {
   }
 
   key(event) {
-    if (event.ctrlKey || event.metaKey || event.altKey) return;
     const {app} = this.plots,
       [from, to] = this.plots.seen,
       span = to - from;
@@ -655,9 +655,7 @@ class Plot {
       0: () => app.look(null),
       Escape: () => app.look(null),
     };
-    if (!acts[event.key]) return;
-    acts[event.key]();
-    event.preventDefault();
+    obey(event, acts);
   }
 
   /** Tells the values at the cursor to those who do not see them. */
@@ -695,18 +693,15 @@ class Plot {
   fill(details) {
     if (!details.open) return;
     const unit = this.panel.unit ? ` (${this.panel.unit})` : "";
-    const head = ["time (s)", ...this.panel.curves.map(curve => curve.name + unit)].map(text =>
-      element("th", {scope: "col"}, text),
-    );
-    const cell = (value, k) =>
-      element("td", {}, this.isStates && k ? (STATES.get(value) || [""])[0] : number(value, 7));
-    const rows = this.chosen(TABLE_ROWS).map(row => element("tr", {}, ...row.map(cell)));
-    const table = element(
+    const head = ["time (s)", ...this.panel.curves.map(curve => curve.name + unit)];
+    const words = (value, k) => (this.isStates && k ? (STATES.get(value) || [""])[0] : number(value, 7));
+    const rows = this.chosen(TABLE_ROWS).map(row => row.map(words));
+    const shown = element(
       "div",
       {class: "scroll", tabindex: "0", role: "group", "aria-label": `Values of ${this.panel.title}`},
-      element("table", {}, element("thead", {}, element("tr", {}, ...head)), element("tbody", {}, ...rows)),
+      table(head, rows),
     );
-    details.replaceChildren(details.firstElementChild, table);
+    details.replaceChildren(details.firstElementChild, shown);
   }
 
   csv() {
@@ -734,39 +729,20 @@ class Plot {
     });
   }
 
-  /** The curves as lines with axes. */
+  /** The picture as SVG. */
   svg() {
-    const {colours} = this.plots,
-      {width, height} = this,
-      [from, to] = this.plots.seen;
-    const lines = this.panel.curves.map(({key, name}, k) => {
-      const rows = this.chosen(4000).map(
-        row =>
-          `${this.across(row[0]).toFixed(2)},`
-          + `${(this.isStates ? TOP + 20 + 22 * k - 8 * row[k + 1] : this.up(row[k + 1])).toFixed(2)}`,
-      );
-      return this.hidden.has(key)
-        ? ""
-        : `<polyline fill="none" stroke="${colours[COLOURS[k % COLOURS.length]]}" stroke-width="1.6" `
-            + `points="${rows.join(" ")}"><title>${name}</title></polyline>`;
-    });
-    const text = (x, y, anchor, words) =>
-      `<text x="${x.toFixed(1)}" y="${y.toFixed(1)}" text-anchor="${anchor}" `
-      + `font-family="sans-serif" font-size="12" fill="${colours.grey}">${words}</text>`;
-    const {low, high} = this.range || {low: 0, high: 1};
-    const rows = this.isStates
-      ? []
-      : ticks(low, high, 4).map(value => text(LEFT - 8, this.up(value) + 4, "end", number(value, 6)));
-    const steps = ticks(from, to, 8).map(value =>
-      text(this.across(value), height - 6, "middle", timeText(value, step(to - from, 8))),
-    );
-    const frame =
-      `<rect x="${LEFT}" y="${TOP}" width="${width - LEFT - RIGHT}" height="${height - TOP - BOTTOM}" `
-      + `fill="none" stroke="${colours.axis}"/>`;
+    const pen = new SvgPen(),
+      {width, height} = this;
+    if (this.isStates) this.drawStates(pen);
+    else {
+      this.fit();
+      this.drawGround(pen);
+      this.drawRun(pen);
+    }
     return (
-      `<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 ${width} ${height}" width="${width}" height="${height}">`
-      + `<rect width="100%" height="100%" fill="${colours.paper}"/>${frame}${rows.join("")}`
-      + `${steps.join("")}${lines.join("")}</svg>\n`
+      `<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 ${width} ${height}" width="${width}" height="${height}" `
+      + `font-family="system-ui, sans-serif" fill="none"><rect width="100%" height="100%" `
+      + `fill="${this.plots.colours.paper}"/>${pen.text}</svg>\n`
     );
   }
 }

@@ -1,7 +1,7 @@
 // @ts-check
 // Many machines at once: histograms and scatter plots as runs come, and brushing: what is chosen in one figure is shown
 // in all, with its trajectories and parameters.
-import {element, number} from "./format.js";
+import {element, number, rowHead, table} from "./format.js";
 import {Picture, histogram} from "./picture.js";
 import {wordsOf} from "./drop.js";
 
@@ -347,36 +347,12 @@ class Sweep {
     const inputs = this.headings.map((one, k) => [one, k]).filter(([one]) => one.kind === "input");
     const rows = chosen
       .slice(0, LISTED)
-      .map(row =>
-        element(
-          "tr",
-          {},
-          element("th", {scope: "row"}, number(row[0], 7)),
-          element("td", {}, number(row[f], 5)),
-          ...inputs.map(([, k]) => element("td", {}, number(row[k], 5))),
-        ),
-      );
+      .map(row => [rowHead(number(row[0], 7)), number(row[f]), ...inputs.map(([, k]) => number(row[k]))]);
     const unit = one => (one.unit ? ` (${one.unit})` : "");
     const left = chosen.length - rows.length;
-    this.table.replaceChildren(
-      element(
-        "table",
-        {},
-        element("caption", {}, `Runs and their parameters${left > 0 ? `; ${left} more are not listed` : ""}`),
-        element(
-          "thead",
-          {},
-          element(
-            "tr",
-            {},
-            element("th", {scope: "col"}, "Run"),
-            element("th", {scope: "col"}, (figure.words || figure.name) + unit(figure)),
-            ...inputs.map(([one]) => element("th", {scope: "col"}, one.name + unit(one))),
-          ),
-        ),
-        element("tbody", {}, ...rows),
-      ),
-    );
+    const head = ["Run", (figure.words || figure.name) + unit(figure), ...inputs.map(([one]) => one.name + unit(one))];
+    const caption = `Runs and their parameters${left > 0 ? `; ${left} more are not listed` : ""}`;
+    this.table.replaceChildren(table(head, rows, caption));
   }
 
   /** Trajectories of the chosen runs, spread over all of them. */

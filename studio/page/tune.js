@@ -1,6 +1,6 @@
 // @ts-check
 // A controller and its moves: gains under sliders, the cart's error and Nyquist's curve with them, and the tuning.
-import {element, number} from "./format.js";
+import {element, number, rowHead, table} from "./format.js";
 import {Picture} from "./picture.js";
 import {wordsOf} from "./drop.js";
 import {showReport} from "./modes.js";
@@ -285,7 +285,7 @@ class Tune {
           colour: "green",
           dash: [4, 3],
         },
-        {name: "−1", x: [-1], y: [0], kind: "cross", colour: "ink"},
+        {name: "−1", x: [-1], y: [0], kind: "crosses", colour: "ink"},
       ],
       {xRange: [-2.4, 1.2], yRange: [-1.8, 1.8]},
     );
@@ -371,34 +371,13 @@ class Tune {
       },
       "Discard",
     );
-    const gains = element(
-      "div",
-      {class: "scroll card"},
-      element(
-        "table",
-        {},
-        element("caption", {}, "Gains"),
-        element(
-          "thead",
-          {},
-          element("tr", {}, ...["Gain", "Before", "After", "Unit"].map(text => element("th", {scope: "col"}, text))),
-        ),
-        element(
-          "tbody",
-          {},
-          ...head.result.gains.map(one =>
-            element(
-              "tr",
-              {},
-              element("th", {scope: "row"}, one.key.replace(/^controller\./, "")),
-              element("td", {}, number(one.before, 5)),
-              element("td", {}, number(one.after, 5)),
-              element("td", {class: "quiet"}, one.unit),
-            ),
-          ),
-        ),
-      ),
-    );
+    const rows = head.result.gains.map(one => [
+      rowHead(one.key.replace(/^controller\./, "")),
+      number(one.before),
+      number(one.after),
+      element("td", {class: "quiet"}, one.unit),
+    ]);
+    const gains = element("div", {class: "scroll card"}, table(["Gain", "Before", "After", "Unit"], rows, "Gains"));
     const pictures = head.moves.map((name, k) => this.pareto(name, k, head)).filter(Boolean);
     this.result.replaceChildren(
       element("p", {}, `${head.verdict}.`),
@@ -427,7 +406,7 @@ class Tune {
     };
     const colours = ["sky", "blue", "green", "purple"];
     const series = [
-      one("before", "amber", head.before, "cross"),
+      one("before", "amber", head.before, "crosses"),
       ...head.choices.map((choice, i) =>
         one(choice.name + (choice.chosen ? ", chosen" : ""), colours[i % 4], choice.worst),
       ),

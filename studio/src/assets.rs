@@ -4,8 +4,10 @@ use axum::body::Body;
 use axum::http::header::{self, HeaderValue};
 use axum::http::{StatusCode, Uri};
 use axum::response::Response;
+use std::borrow::Cow;
+use taut_report::page::MODULES;
 
-/// Path, type and content.
+/// Name, type and content.
 type Asset = (&'static str, &'static str, &'static str);
 
 const HTML: &str = "text/html; charset=utf-8";
@@ -14,7 +16,7 @@ const SCRIPT: &str = "text/javascript; charset=utf-8";
 
 macro_rules! page {
     ($($path:literal: $kind:expr),* $(,)?) => {
-        &[$((concat!("/", $path), $kind, include_str!(concat!("../page/", $path)))),*]
+        &[$(($path, $kind, include_str!(concat!("../page/", $path)))),*]
     };
 }
 
@@ -38,12 +40,9 @@ const ASSETS: &[Asset] = page![
     "modes.js": SCRIPT,
     "motion.js": SCRIPT,
     "parameters.js": SCRIPT,
-    "pen.js": SCRIPT,
     "picture.js": SCRIPT,
-    "player.js": SCRIPT,
     "plots.js": SCRIPT,
     "shape.js": SCRIPT,
-    "stage.js": SCRIPT,
     "stops.js": SCRIPT,
     "socket.js": SCRIPT,
     "sweep.js": SCRIPT,
@@ -54,58 +53,45 @@ const ASSETS: &[Asset] = page![
     "workers.js": SCRIPT,
 ];
 
-/// The files that the report's style and script are served as.
-const REPORT: [&str; 2] = ["/report.css", "/report.js"];
-
-/// The paths of all files.
-pub fn paths() -> impl Iterator<Item = &'static str> {
-    ASSETS.iter().map(|(path, _, _)| *path).chain(REPORT)
-}
-
-/// Type and content of the file at a path.
-pub fn file(path: &str) -> Option<(&'static str, String)> {
-    let [style, script] = REPORT;
-    match path {
-        path if path == style => Some((CSS, taut_report::page::style())),
-        path if path == script => Some((SCRIPT, taut_report::page::script())),
-        path => {
-            let found = ASSETS.iter().find(|(known, _, _)| *known == path);
-            found.map(|(_, kind, content)| (*kind, (*content).to_string()))
-        }
-    }
+/// All files: name, type and content.
+pub fn files() -> impl Iterator<Item = (&'static str, &'static str, Cow<'static, str>)> {
+    let modules = MODULES.iter().map(|(name, content)| (*name, SCRIPT, *content));
+    let files = ASSETS.iter().copied().chain(modules).map(|(name, kind, content)| (name, kind, content.into()));
+    files.chain(std::iter::once_with(|| ("report.css", CSS, taut_report::page::style().into())))
 }
 
 /// The file at a path; `/` is the page itself.
 pub async fn serve(uri: Uri) -> Response {
-    let path = if uri.path() == "/" { "/index.html" } else { uri.path() };
-    let (status, kind, content) = match file(path) {
-        Some((kind, content)) => (StatusCode::OK, kind, from_folder(path).unwrap_or(content)),
+    let name = if uri.path() == "/" { "index.html" } else { uri.path().strip_prefix('/').unwrap_or_default() };
+    let (status, kind, content) = match files().find(|(known, _, _)| *known == name) {
+        Some((_, kind, content)) => (StatusCode::OK, kind, from_folder(name).map_or(content, Cow::Owned)),
         None => {
             (StatusCode::NOT_FOUND, HTML, "<!DOCTYPE html><title>taut studio</title><p>There is no such page.\n".into())
         }
     };
-    let mut response = Response::new(Body::from(content));
+    let mut response = Response::new(Body::from(content.into_owned()));
     *response.status_mut() = status;
     response.headers_mut().insert(header::CONTENT_TYPE, HeaderValue::from_static(kind));
     response
 }
 
 /// The same file from the folder that `TAUT_STUDIO_PAGE` names, so that whoever writes the page need not build: in
-/// builds for debugging alone, and only under the names of [`ASSETS`].
-fn from_folder(path: &str) -> Option<String> {
+/// builds for debugging alone, and only under the names of [`files`].
+fn from_folder(name: &str) -> Option<String> {
     let folder = std::env::var_os("TAUT_STUDIO_PAGE").filter(|_| cfg!(debug_assertions))?;
-    std::fs::read_to_string(std::path::Path::new(&folder).join(path.trim_start_matches('/'))).ok()
+    std::fs::read_to_string(std::path::Path::new(&folder).join(name)).ok()
 }
 
 #[cfg(test)]
 mod tests {
-    use super::ASSETS;
+    use super::files;
 
     #[test]
     fn the_files_of_the_page_have_lines_of_120_columns_at_most() {
-        for (path, _, content) in ASSETS.iter().filter(|(path, _, _)| !path.ends_with(".svg")) {
+        // The report's style is made by a program.
+        for (name, _, content) in files().filter(|(name, _, _)| !["icon.svg", "report.css"].contains(name)) {
             for (k, line) in content.lines().enumerate() {
-                assert!(line.chars().count() <= 120, "{path}, line {}: {line}", k + 1);
+                assert!(line.chars().count() <= 120, "{name}, line {}: {line}", k + 1);
             }
         }
     }

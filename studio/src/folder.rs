@@ -10,8 +10,8 @@ const ELEMENT: (&str, &str) = ("taut-stage.js", include_str!("../page/taut-stage
 
 /// Names and contents of the files, except the module `taut.wasm`.
 pub fn page_without_server() -> Vec<(&'static str, String)> {
-    let files = assets::paths().filter_map(|path| Some((path.trim_start_matches('/'), assets::file(path)?.1)));
-    let page = files.map(|(name, file)| (name, if name == "index.html" { without_server(&file) } else { file }));
+    let own = |name: &str, file: &str| if name == "index.html" { without_server(file) } else { file.to_string() };
+    let page = assets::files().map(|(name, _, file)| (name, own(name, &file)));
     page.chain([(ELEMENT.0, ELEMENT.1.to_string())]).collect()
 }
 

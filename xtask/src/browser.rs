@@ -20,11 +20,13 @@ const SPECTRA: [&str; 2] =
     ["target/browser/resonances_x_20210701_223821.csv", "target/browser/resonances_x_20210821_152037.csv"];
 
 /// The reports that are looked at: a name, and the command that makes it.
-const REPORTS: [(&str, &[&str]); 16] = [
+const REPORTS: [(&str, &[&str]); 18] = [
     ("simulate", &["simulate", "stages/sollmann-jouaneh/table4.toml"]),
     // More rows than a page holds.
     ("long", &["simulate", "stages/sollmann-jouaneh/table4.toml", "--set", "experiment.0.every=0.05ms"]),
     ("gantry", &["simulate", "stages/h-frame/h-frame.toml"]),
+    ("live", &["simulate", "stages/sollmann-jouaneh/table4.toml", "--live"]),
+    ("live-gantry", &["simulate", "stages/h-frame/h-frame.toml", "--live"]),
     ("modes", &["modes", "stages/printer-axis/printer-axis.toml"]),
     ("modes-of-a-gantry", &["modes", "stages/h-frame/h-frame.toml"]),
     ("move", &["move", "stages/sollmann-jouaneh/controllers/pid.toml"]),

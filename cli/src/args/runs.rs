@@ -41,6 +41,9 @@ pub struct Simulate {
     /// Also write each run as a recorder logs it: [encoder] and [measurement] of the case
     #[arg(long, requires = "out")]
     pub as_measured: bool,
+    /// Put the machine in motion into the report, for each experiment
+    #[arg(long, requires = "out", conflicts_with = "no_report")]
+    pub live: bool,
     /// Also run machines drawn by `taut fit --posterior`, and write the 95 % band of their motion
     #[arg(long, value_name = "FILE")]
     pub draws: Option<PathBuf>,
@@ -58,6 +61,7 @@ Examples:
   taut simulate axis.toml --set cart.mass=\"0.5 kg\" --set experiment.0.until=2s
   taut simulate axis.toml --experiment \"5 V pulse\" --json | jq .experiments[0].metrics
   taut simulate axis.toml --as-measured --out results
+  taut simulate axis.toml --live --out results
   taut simulate axis.toml --solver table3 --step 1ms --out as-printed
 
 Ctrl-C ends a run early: the results so far are written and reported, with exit status 130.";

@@ -107,7 +107,7 @@ fn simulate(args: &Simulate, path: &Path, case: &Case) -> Outcome {
     if let Some(folder) = &folder {
         let text = folder.bring(&case.text, &case.files).map_err(Failure::work)?;
         if common.draws() {
-            let (page, pictures) = report(case, &text, solver, &runs);
+            let (page, pictures) = report(case, &text, solver, &runs, args.live);
             finished.report = Some(Report { page, pictures });
         }
         finished.files.push(("case.toml".into(), text));

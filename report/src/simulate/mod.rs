@@ -3,6 +3,7 @@
 mod band;
 mod curves;
 mod in_plane;
+mod live;
 mod marks;
 mod page;
 mod plots;
@@ -11,6 +12,7 @@ pub(crate) mod rows;
 pub use band::Band;
 pub(crate) use curves::Way;
 pub use curves::{Curves, Samples, decimator};
+pub use live::scene;
 pub(crate) use page::figures_table;
 pub use page::report;
 pub use plots::{Named, named};

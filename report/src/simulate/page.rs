@@ -1,6 +1,7 @@
 //! The report: one HTML file.
 
 use super::Run;
+use super::live::live;
 use super::plots::{Named, figures, way};
 use super::rows::{early_end, lines, machine};
 use crate::page::{Callout, Cell, Page, Table};
@@ -15,8 +16,9 @@ use taut::solve::{Event, Solver};
 /// Events shown; the rest is in the events' own file.
 const MOST_EVENTS: usize = 200;
 
-/// The page for these runs, and its pictures by the names of their files; `text` is the case that repeats them.
-pub fn report(case: &Case, text: &str, solver: Solver, runs: &[Run]) -> (Page, Vec<(String, Picture)>) {
+/// The page for these runs, and its pictures by the names of their files; `text` is the case that repeats them. With
+/// `is_live`, the page has the machine in motion for each run.
+pub fn report(case: &Case, text: &str, solver: Solver, runs: &[Run], is_live: bool) -> (Page, Vec<(String, Picture)>) {
     let mechanism = case.machine.mechanism();
     let mut page = Page::new(case.title.clone()).subtitle(how(solver));
     let mut pictures = Vec::new();
@@ -29,7 +31,7 @@ pub fn report(case: &Case, text: &str, solver: Solver, runs: &[Run]) -> (Page, V
     for run in runs {
         let name = run.experiment.file_name();
         let (figures, way) = (figures(case, run), way(case, run));
-        experiment(&mut page, (case, &mechanism, solver), run, &figures, way.as_ref());
+        experiment(&mut page, (case, &mechanism, solver), run, (&figures, way.as_ref()), is_live);
         pictures.extend(way.map(|way| (format!("{name}-path"), way.into())));
         pictures.extend(figures.into_iter().map(|(figure, drawn)| (format!("{name}-{figure}"), drawn.into())));
     }
@@ -61,14 +63,19 @@ fn experiment(
     page: &mut Page,
     (case, mechanism, solver): (&Case, &Mechanism, Solver),
     run: &Run,
-    figures: &[Named],
-    way: Option<&Plane>,
+    (figures, way): (&[Named], Option<&Plane>),
+    is_live: bool,
 ) {
     page.section(&run.experiment.name);
     if let Some(told) = early_end(run, &case.machine) {
         page.callout(Callout::Fails, "The whole run", format!("This run {told}."));
     }
     page.table(&figures_table(lines(run, &case.machine, solver)));
+    if let Some(json) = run.curves.as_ref().filter(|_| is_live).and_then(|curves| live(case, curves)) {
+        let title = format!("{}: the machine in motion", run.experiment.name);
+        let caption = "Play, or move the time. Stretch and the error between drive and load are magnified.";
+        page.machine(&title, &json, caption);
+    }
     for (name, figure) in figures {
         page.figure(figure);
         // The path stands behind the positions that it is made of.

@@ -1,9 +1,8 @@
 // @ts-check
 // The machine, drawn and moved by what was computed: pulleys turn, teeth run, bodies slide, spans are coloured by their
 // force. Stretch and the error between drive and load are magnified by a factor; nothing else is invented.
-import {svg, number, put, tell} from "./format.js";
-
-/** @typedef {import("./app.js").App} App */
+import {put, svg, tell} from "./element.js";
+import {number} from "./pen.js";
 
 const PITCH = 9; // of the teeth, in pixels of the drawing
 const WORDS = new Map([
@@ -35,7 +34,7 @@ export function drawing(scene) {
 
 /**
  * The range of each curve of a run, and the largest force.
- * @param {import("./wire.js").Answer} run
+ * @param {{columns: Map<string, Float64Array>}} run
  * @param {any} scene
  * @returns {Extent}
  */
