@@ -15,10 +15,12 @@ use taut::signal::Hold;
 use taut::solve::{Flow, Solver};
 
 /// PID with rigid feed-forward; a slow motion over 300 mm there and back, twice, and a move.
-const MOVES: &str = r#"move=[
-    { name = "slow", points = ["300 mm", "0 mm", "300 mm", "0 mm"], speed = "60 mm/s", acceleration = "0.5 m/s^2", jerk = "20 m/s^3", until = "22 s", window = "1 mm" },
-    { name = "far", to = "280 mm", speed = "0.15 m/s", acceleration = "1 m/s^2", jerk = "50 m/s^3", until = "2.5 s", window = "1 mm" },
-]"#;
+const MOVES: &str = "move=[
+    { name = 'slow', points = ['300 mm', '0 mm', '300 mm', '0 mm'], speed = '60 mm/s', acceleration = '0.5 m/s^2', \
+        jerk = '20 m/s^3', until = '22 s', window = '1 mm' },
+    { name = 'far', to = '280 mm', speed = '0.15 m/s', acceleration = '1 m/s^2', jerk = '50 m/s^3', until = '2.5 s', \
+        window = '1 mm' },
+]";
 
 fn case(changes: &[&str]) -> Case {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("stages/sollmann-jouaneh/controllers/pid-shaped.toml");

@@ -96,7 +96,8 @@ fn a_force_along_the_travel_is_mapped() {
     let text = fs::read_to_string(root.join(SHAPED)).unwrap();
     let log = r#"{ file = "slow/slow.csv", time = "time_s", input = "voltage_V", drive_angle = "drive_angle_rad" }"#;
     fs::write(&axis, format!("{text}\n[[experiment]]\nname = \"slow\"\nlog = {log}\n")).unwrap();
-    let slow = r#"move=[{ name = "slow", points = ["300 mm", "0 mm"], speed = "60 mm/s", acceleration = "0.5 m/s^2", until = "11 s", window = "1 mm" }]"#;
+    let slow = "move=[{ name = 'slow', points = ['300 mm', '0 mm'], speed = '60 mm/s', acceleration = '0.5 m/s^2', \
+                until = '11 s', window = '1 mm' }]";
     let bump = r#"cart.force_along=[["50 mm", "0 N"], ["100 mm", "1.5 N"], ["200 mm", "-1 N"], ["250 mm", "0 N"]]"#;
     taut(&["move", &axis, "--set", slow, "--set", bump, "--no-report", "--quiet", "--out", &at("slow")]);
     let output = taut(&["learn", &axis, "--map", "--out", &out, "--json"]);

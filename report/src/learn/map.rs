@@ -3,7 +3,7 @@
 use crate::simulate::figures_table;
 use crate::{Axis, Callout, Colour, Figure, Page, Panel, Series, Style};
 use taut::case::Case;
-use taut::fit::map::{Component, ForceMap, Origin, Point};
+use taut::fit::map::{Component, ForceMap, Point};
 use taut::number::engineering_typed;
 
 /// Three digits are what a map is worth.
@@ -33,10 +33,7 @@ pub fn lines(found: &ForceMap) -> Vec<(String, String)> {
     let half = |point: &Point| 0.5 * (point.band[1] - point.band[0]);
     let wide = found.points.iter().map(half).sum::<f64>() / found.points.len().max(1) as f64;
     let mut lines = vec![
-        (
-            "logs".into(),
-            format!("{forward} passes forward, {backward} backward, up to {}", shown(found.speed, "m/s")),
-        ),
+        ("logs".into(), format!("{forward} passes forward, {backward} backward, up to {}", shown(found.speed, "m/s"))),
         (
             "map".into(),
             format!(
@@ -48,11 +45,11 @@ pub fn lines(found: &ForceMap) -> Vec<(String, String)> {
             ),
         ),
         ("mean".into(), shown(found.mean, "N")),
-        ("friction".into(), format!("{} beyond that of the case; it is not part of the map", shown(found.friction, "N"))),
         (
-            "resolution".into(),
-            format!("periods from {} on, by {}", shown(found.resolution, "m"), found.limit.words()),
+            "friction".into(),
+            format!("{} beyond that of the case; it is not part of the map", shown(found.friction, "N")),
         ),
+        ("resolution".into(), format!("periods from {} on, by {}", shown(found.resolution, "m"), found.limit.words())),
     ];
     lines.extend(found.components.iter().map(|one| ("period".into(), component(one))));
     lines
@@ -77,17 +74,16 @@ pub fn notes(found: &ForceMap) -> Vec<String> {
     let mut notes = Vec::new();
     if found.may_be_eccentric() {
         notes.push(
-            "a component has the period of a turn of the pulley: an eccentric pulley and cogging cannot be told apart by \
-             force alone; measure the cart's position with a scale to see whether it is off with the same period"
+            "a component has the period of a turn of the pulley: force alone cannot tell an eccentric pulley from \
+             cogging; a scale at the cart shows whether its position is off with the same period"
                 .into(),
         );
     }
     for origin in &found.too_long {
-        let Origin::Pulley { period } | Origin::Motor { period, .. } | Origin::Tooth { period } = *origin;
         notes.push(format!(
             "the travel is shorter than two periods of {} ({} each): a component of that period is not named",
             origin.words(),
-            shown(period, "m")
+            shown(origin.period(), "m")
         ));
     }
     notes

@@ -149,15 +149,13 @@ impl Limit {
     }
 }
 
-/// The force along the travel from all logs of a case. Errors: not an axis, no log, no position, uneven times, motion in
-/// one direction only, too few rows.
+/// The force along the travel from all logs of a case. Errors: not an axis, no log, no position, uneven times, motion
+/// in one direction only, too few rows.
 pub fn map(case: &Case) -> Result<ForceMap> {
     let machine = &case.machine;
     if !machine.has_one_coordinate() {
-        return Err(Error::new(
-            "a force along the travel is mapped on an axis, and this machine slides in two directions",
-        )
-        .next("give a case of one axis"));
+        return Err(Error::new("a force along the travel is mapped on an axis, and this machine has several drives")
+            .next("give a case of one axis"));
     }
     let logs: Vec<_> = case.experiments.iter().filter_map(|experiment| experiment.log.as_deref()).collect();
     if logs.is_empty() {
