@@ -124,7 +124,10 @@ fn a_hidden_force_is_found() {
         println!("{seed}: {own} of {}", found.points.len());
         found.components.iter().for_each(|one| println!("  {:?} {:?} {:?}", one.period, one.amplitude, one.origins));
         assert!(found.is_significant && found.may_be_eccentric());
-        assert!(matches!(named(0), [Origin::Pulley { .. }]) && matches!(named(1), [Origin::Motor { count: 1, .. }]));
+        assert!(
+            matches!(named(0), [Origin::Pulley { count: 1, .. }])
+                && matches!(named(1), [Origin::Motor { count: 1, .. }])
+        );
         assert!(found.friction.abs() < 0.02 && found.components.len() < 4, "{found:?}");
     }
     println!("{inside} of {all}");

@@ -1153,8 +1153,8 @@ pub(crate) const MAP_HALF: f64 = 0.4;
 
 /// Difference of wave numbers up to which a period matches one of the machine, where the noise makes it no larger.
 ///
-/// Unit: reciprocals of the mapped travel. Source: chosen: a pulley's radius is known to some per cent.
-pub(crate) const MAP_MATCH: f64 = 0.1;
+/// Unit: reciprocals of the mapped travel. Source: chosen: a pulley's radius is known to a per cent.
+pub(crate) const MAP_MATCH: f64 = 0.05;
 
 /// Deviation of the Gaussian that smooths a log, along the travel.
 ///

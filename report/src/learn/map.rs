@@ -1,5 +1,6 @@
 //! The force along the travel as a person sees it.
 
+use crate::motion::length;
 use crate::simulate::figures_table;
 use crate::{Axis, Callout, Colour, Figure, Page, Panel, Series, Style};
 use taut::case::Case;
@@ -29,11 +30,11 @@ pub fn head(found: &ForceMap) -> String {
 pub fn lines(found: &ForceMap) -> Vec<(String, String)> {
     let [forward, backward] = found.passes;
     let (first, last) = (found.points.first(), found.points.last());
-    let position = |point: Option<&Point>| shown(point.map_or(0.0, |point| point.position), "m");
+    let position = |point: Option<&Point>| length(point.map_or(0.0, |point| point.position));
     let half = |point: &Point| 0.5 * (point.band[1] - point.band[0]);
     let wide = found.points.iter().map(half).sum::<f64>() / found.points.len().max(1) as f64;
     let mut lines = vec![
-        ("logs".into(), format!("{forward} passes forward, {backward} backward, up to {}", shown(found.speed, "m/s"))),
+        ("passes".into(), format!("{forward} forward, {backward} backward, up to {}", shown(found.speed, "m/s"))),
         (
             "map".into(),
             format!(
@@ -49,7 +50,7 @@ pub fn lines(found: &ForceMap) -> Vec<(String, String)> {
             "friction".into(),
             format!("{} beyond that of the case; it is not part of the map", shown(found.friction, "N")),
         ),
-        ("resolution".into(), format!("periods from {} on, by {}", shown(found.resolution, "m"), found.limit.words())),
+        ("resolution".into(), format!("periods from {} on, by {}", length(found.resolution), found.limit.words())),
     ];
     lines.extend(found.components.iter().map(|one| ("period".into(), component(one))));
     lines
@@ -57,13 +58,13 @@ pub fn lines(found: &ForceMap) -> Vec<(String, String)> {
 
 fn component(one: &Component) -> String {
     let names: Vec<String> =
-        one.origins.iter().map(|origin| format!("{} ({})", origin.words(), shown(origin.period(), "m"))).collect();
+        one.origins.iter().map(|origin| format!("{} ({})", origin.words(), length(origin.period()))).collect();
     let whose = if names.is_empty() { "matches nothing known of the machine".into() } else { names.join(" or ") };
     let [[period, period_error], [amplitude, error]] = [one.period, one.amplitude];
     format!(
         "{} ± {}, amplitude {} ± {}: {whose}",
-        shown(period, "m"),
-        shown(1.96 * period_error, "m"),
+        length(period),
+        length(1.96 * period_error),
         shown(amplitude, "N"),
         shown(1.96 * error, "N")
     )
@@ -83,7 +84,7 @@ pub fn notes(found: &ForceMap) -> Vec<String> {
         notes.push(format!(
             "the travel is shorter than two periods of {} ({} each): a component of that period is not named",
             origin.words(),
-            shown(origin.period(), "m")
+            length(origin.period())
         ));
     }
     notes

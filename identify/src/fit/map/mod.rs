@@ -89,8 +89,10 @@ pub struct Component {
 /// What has a period along the travel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Origin {
-    /// A turn of the pulleys, which have one radius.
+    /// So many periods per turn of the pulleys, which have one radius: one of an eccentric pulley.
     Pulley {
+        /// Periods per turn.
+        count: u32,
         /// m
         period: f64,
     },
@@ -112,14 +114,15 @@ impl Origin {
     /// m
     pub fn period(self) -> f64 {
         match self {
-            Self::Pulley { period } | Self::Motor { period, .. } | Self::Tooth { period } => period,
+            Self::Pulley { period, .. } | Self::Motor { period, .. } | Self::Tooth { period } => period,
         }
     }
 
     /// In words.
     pub fn words(self) -> String {
         match self {
-            Self::Pulley { .. } => "a turn of the pulley".into(),
+            Self::Pulley { count: 1, .. } => "a turn of the pulley".into(),
+            Self::Pulley { count, .. } => format!("{count} per turn of the pulley"),
             Self::Motor { count: 1, .. } => "a turn of the motor".into(),
             Self::Motor { count, .. } => format!("{count} per turn of the motor"),
             Self::Tooth { .. } => "a tooth of the belt".into(),
@@ -264,7 +267,7 @@ fn of_passes(case: &Case, mut all: Vec<Pass>) -> Result<ForceMap> {
         }
     };
     let is_too_long = |origin: &Origin| match origin {
-        Origin::Motor { count: 2.., .. } => false,
+        Origin::Pulley { count: 2.., .. } | Origin::Motor { count: 2.., .. } => false,
         origin => MAP_PERIODS * origin.period() > length,
     };
     Ok(ForceMap {
@@ -323,8 +326,10 @@ fn origins(case: &Case, resolution: f64) -> Vec<Origin> {
     };
     let of_belt = machine.belt.sheet.kind.map(|kind| kind.pitch);
     let pitch = of_belt.or(number("drive_pulley.pitch")).or(number("drive_pulley.teeth").map(|teeth| turn / teeth));
+    let of_pulley = (1..).map(|count| Origin::Pulley { count, period: turn / f64::from(count) });
     let of_motor = (1..).map(|count| Origin::Motor { count, period: motor / f64::from(count) });
-    std::iter::once(Origin::Pulley { period: turn })
+    of_pulley
+        .take_while(|origin| origin.period() >= resolution)
         .chain(of_motor.take_while(|origin| origin.period() >= resolution))
         .chain(pitch.map(|period| Origin::Tooth { period }))
         .filter(|origin| origin.period() >= resolution)
@@ -345,7 +350,7 @@ impl ForceMap {
 
     /// True if a component has the period of a turn of the pulley, which an eccentric pulley has, too.
     pub fn may_be_eccentric(&self) -> bool {
-        let is_turn = |origin: &Origin| matches!(origin, Origin::Pulley { .. });
+        let is_turn = |origin: &Origin| matches!(origin, Origin::Pulley { count: 1, .. });
         self.components.iter().any(|component| component.origins.iter().any(is_turn))
     }
 }
