@@ -22,6 +22,7 @@ mod elements;
 mod experiment_design;
 mod fit;
 mod fitted_files;
+mod force_map;
 mod free;
 mod frf;
 mod gantry;

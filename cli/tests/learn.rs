@@ -85,3 +85,44 @@ fn what_cannot_be_learned_is_told() {
         assert!(["next: ", "allowed: ", "--help"].iter().any(|word| told.contains(word)), "{args:?}: {told}");
     }
 }
+
+/// Slow motion on a machine with a force along the travel: its map, the case with it, and what is refused.
+#[test]
+fn a_force_along_the_travel_is_mapped() {
+    let folder = TempDir::new().unwrap();
+    let at = |name: &str| folder.path().join(name).display().to_string();
+    let (axis, out) = (at("axis.toml"), at("mapped"));
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let text = fs::read_to_string(root.join(SHAPED)).unwrap();
+    let log = r#"{ file = "slow/slow.csv", time = "time_s", input = "voltage_V", drive_angle = "drive_angle_rad" }"#;
+    fs::write(&axis, format!("{text}\n[[experiment]]\nname = \"slow\"\nlog = {log}\n")).unwrap();
+    let slow = "move=[{ name = 'slow', points = ['300 mm', '0 mm'], speed = '60 mm/s', acceleration = '0.5 m/s^2', \
+                until = '11 s', window = '1 mm' }]";
+    let bump = r#"cart.force_along=[["50 mm", "0 N"], ["100 mm", "1.5 N"], ["200 mm", "-1 N"], ["250 mm", "0 N"]]"#;
+    taut(&["move", &axis, "--set", slow, "--set", bump, "--no-report", "--quiet", "--out", &at("slow")]);
+    let output = taut(&["learn", &axis, "--map", "--out", &out, "--json"]);
+    let told: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((output.status.code(), &told["schema"]), (Some(0), &"taut/map/1".into()), "{told}");
+    assert_eq!((&told["is_significant"], &told["passes"]["forward"]), (&true.into(), &1.into()), "{told}");
+    for name in ["map.json", "mapped.toml", "report.html", "plots/map.svg"] {
+        assert!(Path::new(&out).join(name).is_file(), "{name}");
+    }
+    let largest = told["force_N"].as_array().unwrap().iter().filter_map(Value::as_f64).fold(0.0, f64::max);
+    assert!((largest - 1.5).abs() < 0.15, "{largest}");
+    // The case with the map leads to the log from where it lies, and has nothing left to learn.
+    let mapped = format!("{out}/mapped.toml");
+    let again: Value = serde_json::from_slice(&taut(&["learn", &mapped, "--map", "--json"]).stdout).unwrap();
+    let left = again["force_N"].as_array().unwrap().iter().filter_map(Value::as_f64);
+    assert!(left.map(f64::abs).fold(0.0, f64::max) < 0.1, "{again}");
+    let cases: [(&[&str], &str); 4] = [
+        (&["learn", &axis, "--map", "--log", "slow.csv"], "cannot be used with"),
+        (&["learn", &axis], "--log <FILE>"),
+        (&["learn", SHAPED, "--map"], "no experiment has a log"),
+        (&["learn", "stages/core-xy/core-xy.toml", "--map"], "mapped on an axis"),
+    ];
+    for (args, words) in cases {
+        let output = taut(args);
+        let told = String::from_utf8(output.stderr).unwrap();
+        assert!(output.status.code() == Some(2) && told.contains(words), "{args:?}: {:?} {told}", output.status);
+    }
+}

@@ -1,5 +1,7 @@
 //! Lines through points.
 
+use crate::calculator::{Calculator, at_least};
+
 /// Points that a line of a machine may have.
 pub const MOST_POINTS: usize = 100;
 
@@ -39,6 +41,16 @@ impl Polyline {
     pub fn value(&self, x: f64) -> f64 {
         let [constant, slope] = self.piece(self.piece_at(x));
         constant + slope * x
+    }
+
+    /// As [`Polyline::value`], for any calculator.
+    pub fn value_by<C: Calculator>(&self, c: &mut C, x: C::N) -> C::N {
+        let first = c.number(self.piece(0)[0]);
+        let numbered = self.points.iter().enumerate();
+        numbered.fold(first, |before, (number, point)| {
+            let [constant, slope] = self.piece(number + 1);
+            c.choose(at_least(x, point[0]), x * slope + constant, before)
+        })
     }
 
     /// The piece that `x` is on: 0 before the first point, behind each point the next one.
@@ -89,12 +101,14 @@ impl Polyline {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::calculator::Run;
 
     #[test]
     fn lines_between_points_and_held_beyond() {
         let line = Polyline::new(vec![[0.0, 1.0], [0.1, 2.0], [0.2, 0.5]]).unwrap();
         for (x, value) in [(-1.0, 1.0), (0.0, 1.0), (0.05, 1.5), (0.1, 2.0), (0.15, 1.25), (0.2, 0.5), (9.0, 0.5)] {
             assert!((line.value(x) - value).abs() < 1e-15, "{x}");
+            assert_eq!(line.value_by(&mut Run::plain(), x), line.value(x), "{x}");
             assert!((line.shifted(0.3).value(x - 0.3) - value).abs() < 1e-14, "{x}");
             let [begin, end] = line.ends(line.piece_at(x));
             assert!(begin.is_none_or(|begin| begin <= x) && end.is_none_or(|end| x < end), "{x}");

@@ -17,6 +17,7 @@ use taut::files::{Inputs, write_atomically};
 use taut::fit::Effort;
 use taut::fit::compare::{FrictionLaw, Setting, compare};
 use taut::fit::experiment_design::{Criterion, Kind, Request, design, verify};
+use taut::fit::map::map;
 use taut::fit::{Posterior, Profile, check_watched, drift, fit, posterior, profiles};
 use taut::frf::{Cut, Known, measure};
 use taut::json;
@@ -379,6 +380,16 @@ impl Case {
         interrupt.finish()?;
         let found = found?.map_err(|error| error.in_file(&self.path)).told(py)?;
         value::json(py, &guarded(|| json::learned(case, motion, at, &found))?)
+    }
+
+    /// The force along the travel from the logs: what `--json` prints, and the case with it, if it is significant.
+    fn force_map(&self, py: Python<'_>) -> PyResult<(Py<PyAny>, Option<Py<Self>>)> {
+        let case = &self.inner;
+        let found = unlocked(py, || map(case))?.map_err(|error| error.in_file(&self.path)).told(py)?;
+        let text = guarded(|| found.case_text(case, &self.path))?.told(py)?;
+        let mapped = text.map(|text| Self::from_text(py, self.path.clone(), &text, Vec::new()));
+        let mapped = mapped.transpose()?.map(|mapped| Py::new(py, mapped)).transpose()?;
+        Ok((value::json(py, &guarded(|| json::map(case, &found))?)?.unbind(), mapped))
     }
 
     /// Compares friction laws and windows: the comparison as JSON, and the case with the estimates of the chosen ones.

@@ -537,6 +537,8 @@ def test_fits_with_nonsense(case, tmp_path):
         allowed(lambda: fitted.frf(period=value), told("frf", period=value))
     with pytest.raises(taut.Error):
         case.drift()
+    with pytest.raises(taut.Error, match="no experiment has a log"):
+        case.force_map()
 
 
 def test_designs_with_nonsense(short):
@@ -631,7 +633,7 @@ def test_everything_public_is_called_here():
     source = pathlib.Path(__file__).read_text(encoding="utf-8")
     called = {
         "Case": [
-            "changed", "check", "compare", "copy", "design", "drift", "fit", "frf", "get", "learn", "modes", "move", "plan", "save", "show", "simulate", "sweep",
+            "changed", "check", "compare", "copy", "design", "drift", "fit", "force_map", "frf", "get", "learn", "modes", "move", "plan", "save", "show", "simulate", "sweep",
             "tune", "update", "with_log",
         ],  # fmt: skip
         "Run": ["plot", "write"],

@@ -21,6 +21,7 @@ const RESULTS: &[(&str, &str, &str)] = &[
     ("fit", "`taut fit`", include_str!("results/fit.txt")),
     ("frf", "`taut frf`", include_str!("results/frf.txt")),
     ("learn", "`taut learn`", include_str!("results/learn.txt")),
+    ("map", "`taut learn --map`", include_str!("results/map.txt")),
     ("modes", "`taut modes`", include_str!("results/modes.txt")),
     ("move", "`taut move`", include_str!("results/move.txt")),
     ("paper", "`taut paper`: claims.json", include_str!("results/paper.txt")),

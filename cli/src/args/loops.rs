@@ -103,21 +103,28 @@ Examples:
 
 Exit status 1: a move has no plan, or its cart does not stay in its window.";
 
-/// Learn the next feed-forward signal of a repeated move from its log.
+/// Learn the next feed-forward signal of a repeated move, or the force along the travel, from logs.
 ///
 /// Iterative learning: from the position that a repetition of a move logged, and the signal that was added to the
 /// command meanwhile, computes the signal to add in the next repetition. Learns only at frequencies at which this
 /// converges on every machine of the family of `taut tune`, and prints how fast, with the errors of the next eight
 /// repetitions. With --out DIR it writes next.csv (time_s and added_V or added_A; left_added_V
 /// and so on of a gantry), learn.json and a report.
+///
+/// With --map: from the logs of the case, slow motion over the travel in both directions, the force that depends on the
+/// position (cogging), with an uncertainty and its periods. With --out DIR it writes mapped.toml, the case with this
+/// force in cart.force_along, map.json and a report.
 #[derive(Debug, clap::Args)]
 #[command(after_help = LEARN)]
 pub struct Learn {
     /// The case file; - is standard input
     pub case: PathBuf,
     /// Log of the repetition (CSV, Parquet, MATLAB), with times from the beginning of the move on
-    #[arg(long, value_name = "FILE")]
-    pub log: PathBuf,
+    #[arg(long, value_name = "FILE", required_unless_present = "map")]
+    pub log: Option<PathBuf>,
+    /// Map the force along the travel from the logs of the case
+    #[arg(long, conflicts_with_all = ["log", "moves", "added", "time", "position", "unit", "encoder"])]
+    pub map: bool,
     /// The move of the log, if the case has several
     #[arg(long = "move", value_name = "NAME")]
     pub moves: Vec<String>,
@@ -181,6 +188,7 @@ Examples:
   taut move axis.toml --move long --added learned-1/next.csv --out trial-1
   taut learn axis.toml --move long --log trial-1/long.csv --added learned-1/next.csv --out learned-2
   taut learn gantry.toml --move square --log trial-0/square.csv --out learned-1
+  taut learn fit/fitted.toml --map --out mapped
 
 Exit status 1: learning would not converge on a machine of the family, or the signal exceeds the controller's limit.";
 

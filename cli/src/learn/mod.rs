@@ -1,5 +1,6 @@
-//! `taut learn`: the next feed-forward signal of a repeated move, from its log.
+//! `taut learn`: the next feed-forward signal of a repeated move, from its log, or the force along the travel.
 
+mod map;
 mod table;
 
 use crate::args::Learn as Args;
@@ -19,6 +20,8 @@ use taut_report::learn::{figures, page};
 
 /// Reads the case and the log, learns, writes, tells.
 pub fn run(args: &Args) -> Outcome {
+    // Without --map there is a log.
+    let Some(log) = args.log.as_deref() else { return map::run(args) };
     let common = &args.common;
     let case = common.open_motors_for(&args.case, Files::Nothing)?;
     let (design, moves) = case.moves_named(&args.case, &args.moves)?;
@@ -30,13 +33,13 @@ pub fn run(args: &Args) -> Outcome {
             return Err(error.in_file("--move").allowed(names.join(", ")).next("name the move of the log").into());
         }
     };
-    let others = || std::iter::once(args.log.as_path()).chain(args.added.as_deref());
+    let others = || std::iter::once(log).chain(args.added.as_deref());
     let inputs = || folder::inputs_with(&args.case, others(), &case.files);
     let folder = Folder::wanted(common, inputs, ["learn.json", "next.csv", "report.html"])?;
     let at = if args.encoder { At::Encoder } else { At::Cart };
     let (mut time, mut positions) = (Vec::new(), Vec::new());
     for column in args.columns(&case.machine)? {
-        let (times, position) = read_samples(&args.log, &args.time, &column)?;
+        let (times, position) = read_samples(log, &args.time, &column)?;
         time = times;
         positions.push(position.into_iter().map(|value| value * args.unit).collect());
     }
@@ -50,7 +53,7 @@ pub fn run(args: &Args) -> Outcome {
     if let Some(signal) = interrupt.signal() {
         return Err(interrupted(signal, "interrupted before anything was learned; nothing was written"));
     }
-    let found = found.map_err(|error| Failure::work(error.in_file(&args.log)))?;
+    let found = found.map_err(|error| Failure::work(error.in_file(log)))?;
     let data = json::text(&json::learned(&case, motion, at, &found));
     let advice = "add --out DIR for the signal as next.csv and a report";
     let mut finished = Finished::new("learn", ("learn.json", data), table::text(&case, motion, &found), advice);

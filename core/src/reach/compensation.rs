@@ -91,10 +91,11 @@ impl Compensation {
         let (idler_b, idler_c) = (both(idler.map(|side| side.viscous)), both(idler.map(|side| side.coulomb)));
         let drive = [machine.drive_pulley.friction.forward, machine.drive_pulley.friction.backward];
         let (drive_b, drive_c) = (both(drive.map(|side| side.viscous / (r * r))), both(drive.map(|side| side.coulomb)));
-        // L = f₁ − f₂ = M y″ + b y′ + F_c sgn y′ − F                             (17)
+        // L = f₁ − f₂ = M y″ + b y′ + F_c sgn y′ − F − F_x(y)                    (17); the rate without F_x′ y′
         let mass = machine.cart.mass;
+        let resisting = acceleration * mass + cart_b * speed + cart_c * sign - machine.cart.constant_force();
         let load = [
-            acceleration * mass + cart_b * speed + cart_c * sign - machine.cart.constant_force(),
+            self.force_along(c, position).map_or(resisting, |along| resisting - along),
             jerk * mass + cart_b * acceleration,
             snap * mass + cart_b * jerk,
         ]
@@ -173,11 +174,12 @@ impl Compensation {
         let (rigid, settings) = (&self.rigid, &self.settings);
         match settings.model {
             FeedForwardModel::None => None,
-            // F = M y″ + b y′ + F_c sgn y′
+            // F = M y″ + b y′ + F_c sgn y′ − F₀ − F_x(y)
             FeedForwardModel::Rigid => {
                 let (viscous, dry) = self.friction(c, y);
                 let mass = settings.inertia * rigid.mass;
                 let force = y.acceleration * mass + (viscous + dry) * settings.friction - rigid.constant;
+                let force = self.force_along(c, y.position).map_or(force, |along| force - along);
                 let command = rigid.command_by(c, force, y.jerk * mass, y.speed);
                 Some(c.name("forward", command))
             }
@@ -199,9 +201,23 @@ impl Compensation {
         self.rigid.friction_by(c, y.speed, sign)
     }
 
-    /// The part of friction that does not grow with speed, as a command, V or A: what a linear model does not know.
+    /// Force on the cart that depends on its position, N; none if the machine has no such force.
+    fn force_along<C: Calculator>(&self, c: &mut C, position: C::N) -> Option<C::N> {
+        let line = self.machine.cart.forces.along.as_ref()?;
+        let along = line.value_by(c, position);
+        Some(c.name("along", along))
+    }
+
+    /// The part of friction that does not grow with speed, and a force along the travel that is fed forward, as a
+    /// command, V or A: what a linear model does not know.
     pub fn dry<C: Calculator>(&self, c: &mut C, y: &Reference<C::N>) -> C::N {
         let (_, dry) = self.friction(c, y);
-        c.name("dry", (dry - self.rigid.constant) / self.rigid.force_per_command())
+        let mut held = dry - self.rigid.constant;
+        if self.settings.model != FeedForwardModel::None
+            && let Some(along) = self.force_along(c, y.position)
+        {
+            held = held - along;
+        }
+        c.name("dry", held / self.rigid.force_per_command())
     }
 }

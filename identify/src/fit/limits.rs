@@ -1106,3 +1106,92 @@ pub(crate) const DIGITS_KNOWN: f64 = 0.1;
 ///
 /// Unit: relative. Source: sums and units of 64-bit numbers; a wrong form of a parameter is further off.
 pub(crate) const DIGITS_READ: f64 = 1e-9;
+
+// map: the force along the travel
+
+/// Chance that logs without a force along the travel show one.
+///
+/// Unit: 1, for a whole map. Source: chosen, below the 5 % that a user accepts. Test:
+/// `noise_makes_no_map`.
+pub(crate) const MAP_FALSE_ALARM: f64 = 0.01;
+
+/// Wave numbers that are tried per reciprocal of the mapped travel.
+///
+/// Unit: 1. Source: chosen: between two of them a peak loses 5 % of its power.
+pub(crate) const MAP_RASTER: f64 = 4.0;
+
+/// Steps of the golden section that finds the top of a peak.
+///
+/// Unit: steps. Source: 1e-3 of the raster is left.
+pub(crate) const MAP_SECTIONS: usize = 15;
+
+/// Rounds in which wave numbers are refined one after the other.
+///
+/// Unit: rounds. Source: chosen.
+pub(crate) const MAP_ROUNDS: usize = 3;
+
+/// Neighbours on either side, at distances of the reciprocal of the mapped travel, from which the noise at a wave
+/// number is estimated, too.
+///
+/// Unit: 1. Source: chosen: ten degrees of freedom from two passes.
+pub(crate) const MAP_NEIGHBOURS: i32 = 2;
+
+/// Most periodic components.
+///
+/// Unit: 1. Source: chosen.
+pub(crate) const MAP_WAVES: usize = 8;
+
+/// Least periods within the mapped travel of what is called periodic.
+///
+/// Unit: periods. Source: chosen: each half of the travel has to show one.
+pub(crate) const MAP_PERIODS: f64 = 2.0;
+
+/// Least amplitude of a periodic component in each half of the travel, relative to that in all of it.
+///
+/// Unit: 1. Source: chosen.
+pub(crate) const MAP_HALF: f64 = 0.4;
+
+/// Difference of wave numbers up to which a period matches one of the machine, where the noise makes it no larger.
+///
+/// Unit: reciprocals of the mapped travel. Source: chosen: a pulley's radius is known to a per cent.
+pub(crate) const MAP_MATCH: f64 = 0.05;
+
+/// Deviation of the Gaussian that smooths a log, along the travel.
+///
+/// Unit: distances of the points. Source: chosen: it then resolves what the points do.
+pub(crate) const MAP_SMOOTHING: f64 = 0.25;
+
+/// Loss of amplitude at the shortest period that a map resolves.
+///
+/// Unit: 1. Source: chosen.
+pub(crate) const MAP_LOSS: f64 = 0.1;
+
+/// Speed at which a pass begins and ends.
+///
+/// Unit: median speed of the pass. Source: chosen.
+pub(crate) const MAP_SPEED: f64 = 0.5;
+
+/// Least length of a pass.
+///
+/// Unit: that of the longest. Source: chosen.
+pub(crate) const MAP_LENGTH: f64 = 0.8;
+
+/// Least rows of a pass for each point.
+///
+/// Unit: rows. Source: chosen.
+pub(crate) const MAP_ROWS: usize = 4;
+
+/// Least points of a map.
+///
+/// Unit: points. Source: chosen.
+pub(crate) const MAP_POINTS: usize = 16;
+
+/// Degrees of freedom of the residuals of a pass, relative to its points: neighbours share noise.
+///
+/// Unit: 1. Source: chosen.
+pub(crate) const MAP_FREEDOM: f64 = 0.25;
+
+/// Points on either side whose scatter is that of a point.
+///
+/// Unit: points. Source: chosen.
+pub(crate) const MAP_LOCAL: usize = 5;

@@ -9,6 +9,7 @@ mod check;
 pub mod compare;
 mod design;
 mod limits;
+pub mod map;
 mod noise;
 mod posterior;
 mod search;

@@ -13,7 +13,7 @@ Mistakes are :class:`taut.Error`, a ``ValueError`` with the text that the comman
 from ._native import Bug, Error, Observation, __version__
 from . import types
 from .case import Case, export, read, show, template
-from .results import Check, Comparison, Designed, Drift, Estimate, Fit, FitLog, FrequencyResponses, Learned, LinearModel, Modes, Plans, Shown, Tuned
+from .results import Check, Comparison, Designed, Drift, Estimate, Fit, FitLog, ForceMap, FrequencyResponses, Learned, LinearModel, Modes, Plans, Shown, Tuned
 from .runs import Run, Runs
 from .shapers import Shape, shape
 from .sweeps import sweep, sweep_tables
@@ -30,6 +30,7 @@ __all__ = [
     "Estimate",
     "Fit",
     "FitLog",
+    "ForceMap",
     "FrequencyResponses",
     "Learned",
     "LinearModel",

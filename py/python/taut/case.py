@@ -11,7 +11,7 @@ from . import _checks, _html, _native
 from ._logs import write_log
 from ._toml import change
 from ._toml import written as toml
-from .results import Check, Comparison, Designed, Drift, Fit, FitLog, FrequencyResponses, Learned, LinearModel, Modes, Plans, Shown, Tuned
+from .results import Check, Comparison, Designed, Drift, Fit, FitLog, ForceMap, FrequencyResponses, Learned, LinearModel, Modes, Plans, Shown, Tuned
 from .runs import Run, Runs
 from .sweeps import sweep
 from .table import Table
@@ -340,6 +340,11 @@ class Case:
             bool(encoder),
         )
         return Learned(data)
+
+    def force_map(self) -> ForceMap:
+        """The force that depends on the position of the cart, from logs of slow motion in both directions."""
+        data, case = self._native.force_map()
+        return ForceMap(data, None if case is None else self._of(case))
 
     def with_log(
         self,

@@ -731,6 +731,33 @@ class Learned:
 
 
 @dataclass(frozen=True)
+class ForceMap:
+    """A force along the travel."""
+
+    data: dict[str, Any]
+    """The output of ``taut learn --map --json``."""
+
+    case: Case | None
+    """The case with the map in ``cart.force_along``; None if no force along the travel is significant."""
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """A pandas.DataFrame with a row for each point: position, force, its 95 % band, and the means of the passes in
+        each direction."""
+        names = ("position_m", "force_N", "low_N", "high_N", "forward_N", "backward_N")
+        return frame({name: self.data[name] for name in names})
+
+    def __repr__(self) -> str:
+        return f"<taut.ForceMap {self.data['title']!r}: {len(self.data['position_m'])} points>"
+
+    def _repr_html_(self) -> str:
+        rows = [
+            (" or ".join(origin["words"] for origin in one["origins"]), one["period_m"], one["amplitude_N"])
+            for one in self.data["components"]
+        ]
+        return _html.table(self.data["title"], ("component", "period, m", "amplitude, N"), rows)
+
+
+@dataclass(frozen=True)
 class FrequencyResponses:
     """Frequency responses from logs."""
 

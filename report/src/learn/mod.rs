@@ -1,5 +1,6 @@
-//! A learned signal as a person sees it.
+//! A learned signal or map as a person sees it.
 
+pub mod map;
 mod page;
 mod plots;
 mod rows;

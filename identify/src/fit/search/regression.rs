@@ -159,23 +159,11 @@ impl<'a> Smoothed<'a> {
     fn add_to(&self, late: isize, rows: &mut Vec<[f64; 5]>) {
         let Self { run, machine, .. } = self;
         let seen = &run.seen[self.output];
-        let motor = &machine.drives[0].motor;
-        let (n_gear, amplifier) = (motor.gear_ratio, &machine.drives[0].amplifier);
-        let per_ampere = motor.gear_efficiency * n_gear * motor.torque_constant;
         let mut block: Vec<[f64; 5]> = Vec::with_capacity(REGRESSION_BLOCK);
         for (k, &[speed, acceleration]) in self.derivatives.iter().enumerate() {
             let row = k + self.margin;
-            let given = amplifier.gain * run.logged[0][row.saturating_add_signed(-late).min(run.time.len() - 1)];
-            let clipped = |value: f64, limit: Option<f64>| limit.map_or(value, |limit| value.clamp(-limit, limit));
-            // τ_M = η n K_t i, i = (V − K_e n φ̇)/R
-            let current = match amplifier.mode {
-                AmplifierMode::Current | AmplifierMode::Position => given,
-                AmplifierMode::Voltage => {
-                    (clipped(given, amplifier.voltage_limit) - motor.back_emf_constant * n_gear * speed)
-                        / motor.resistance
-                }
-            };
-            let torque = per_ampere * clipped(current, amplifier.current_limit);
+            let input = run.logged[0][row.saturating_add_signed(-late).min(run.time.len() - 1)];
+            let torque = torque(machine, input, speed);
             let moves = speed != 0.0 && seen.repeats[row] < REST_ROWS && seen.alike[row] < REST_ROWS;
             if moves && torque.is_finite() && acceleration.is_finite() {
                 block.push([acceleration, speed, speed.signum(), 1.0, torque]);
@@ -192,19 +180,50 @@ impl<'a> Smoothed<'a> {
     }
 }
 
+/// Torque of the motor of an axis at the drive pulley, N m, at an input of its amplifier and a speed of the pulley
+/// (rad/s); without inductance.
+pub(crate) fn torque(machine: &Machine, input: f64, speed: f64) -> f64 {
+    let (motor, amplifier) = (&machine.drives[0].motor, &machine.drives[0].amplifier);
+    let n = motor.gear_ratio;
+    let given = amplifier.gain * input;
+    let clipped = |value: f64, limit: Option<f64>| limit.map_or(value, |limit| value.clamp(-limit, limit));
+    // τ_M = η n K_t i, i = (V − K_e n φ̇)/R
+    let current = match amplifier.mode {
+        AmplifierMode::Current | AmplifierMode::Position => given,
+        AmplifierMode::Voltage => {
+            (clipped(given, amplifier.voltage_limit) - motor.back_emf_constant * n * speed) / motor.resistance
+        }
+    };
+    motor.gear_efficiency * n * motor.torque_constant * clipped(current, amplifier.current_limit)
+}
+
 /// Rows to each side that a Gaussian of this width weighs.
 pub(crate) fn reach(width: f64) -> usize {
     (5.0 * width).ceil() as usize
 }
 
+/// Offsets in rows and the weights of a Gaussian of this width.
+fn bell(width: f64) -> (Vec<f64>, Vec<f64>) {
+    let reach = reach(width) as i64;
+    let offsets: Vec<f64> = (-reach..=reach).map(|k| k as f64).collect();
+    let bell = offsets.iter().map(|x| (-x * x / (2.0 * width * width)).exp()).collect();
+    (offsets, bell)
+}
+
+/// `values` smoothed as [`derived`] smooths their derivatives, without the margins.
+pub(crate) fn averaged(values: &[f64], width: f64) -> Vec<f64> {
+    let (_, bell) = bell(width);
+    let total: f64 = bell.iter().sum();
+    let mean = |window: &[f64]| window.iter().zip(&bell).map(|(v, w)| v * w).sum::<f64>() / total;
+    values.windows(bell.len()).map(mean).collect()
+}
+
 /// First and second derivative of `values` at interval `h`, smoothed, without the margins; exact for parabolas.
 pub(crate) fn derived(values: &[f64], width: f64, h: f64) -> Option<Vec<[f64; 2]>> {
-    let reach = reach(width) as i64;
-    if (values.len() as i64) < 2 * reach + 10 {
+    let (offsets, bell) = bell(width);
+    if values.len() < offsets.len() + 9 {
         return None;
     }
-    let offsets: Vec<f64> = (-reach..=reach).map(|k| k as f64).collect();
-    let bell: Vec<f64> = offsets.iter().map(|x| (-x * x / (2.0 * width * width)).exp()).collect();
     let total: f64 = bell.iter().sum();
     let variance = offsets.iter().zip(&bell).map(|(x, g)| x * x * g).sum::<f64>() / total;
     // Weights x g for the slope, (x² − x̄²) g for the curvature.

@@ -1,0 +1,173 @@
+//! Periodic components of a force along the travel, and whether it changes at all, judged by what differs between
+//! passes.
+//!
+//! With c_p(f) the Fourier coefficient of pass p at the wave number f, and A(f) that of the map, their mean over both
+//! directions, the noise is the mean over passes and neighbouring wave numbers
+//!
+//! ```text
+//! S(f) = Σ |c_p − A|²/(ν B)
+//! ```
+//!
+//! whatever its colour. Without a force |A|²/(S w) has the F distribution with 2 and 2 ν B degrees of freedom,
+//! P(> x) = (1 + x/(ν B))^(−ν B), and N wave numbers are tried.
+
+use crate::fit::limits::{
+    MAP_FALSE_ALARM, MAP_HALF, MAP_NEIGHBOURS, MAP_PERIODS, MAP_RASTER, MAP_ROUNDS, MAP_SECTIONS, MAP_WAVES,
+};
+use crate::fit::search::triangle::inverse_of_square;
+use crate::golden;
+use nalgebra::{Complex, DMatrix, DVector};
+use std::f64::consts::PI;
+
+/// A sine along the travel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Wave {
+    /// Periods per metre, and its standard error.
+    pub number: [f64; 2],
+    /// N, and its standard error.
+    pub amplitude: [f64; 2],
+    /// Chance of so large an amplitude without a force, over all wave numbers that are tried.
+    pub chance: f64,
+}
+
+/// What differs between passes.
+pub(super) struct Noise<'a> {
+    /// What each pass has beside the map, N.
+    pub residuals: &'a [Vec<f64>],
+    /// ν: degrees of freedom of a point.
+    pub freedom: f64,
+    /// w: variance of the map relative to that of a pass.
+    pub weight: f64,
+    /// Distance of the points, m.
+    pub step: f64,
+}
+
+/// What the search found.
+pub(super) struct Found {
+    /// True if the force changes along the travel.
+    pub changes: bool,
+    /// The periodic components, the largest first.
+    pub waves: Vec<Wave>,
+    /// Amplitude that a sine needs to be found, N.
+    pub visible: f64,
+}
+
+impl Noise<'_> {
+    fn count(&self) -> usize {
+        self.residuals[0].len()
+    }
+
+    /// Length of the travel that the points stand for, m.
+    fn length(&self) -> f64 {
+        self.step * self.count() as f64
+    }
+
+    /// S(f) and ν B.
+    fn at(&self, number: f64) -> [f64; 2] {
+        let bins = (-MAP_NEIGHBOURS..=MAP_NEIGHBOURS).map(|k| number + f64::from(k) / self.length());
+        let bins: Vec<f64> = bins.filter(|f| *f >= 0.5 / self.length() && *f <= 0.5 / self.step).collect();
+        let power = |f: &f64| self.residuals.iter().map(|own| coefficient(own, f * self.step).norm_sqr()).sum::<f64>();
+        let freedom = self.freedom * bins.len() as f64;
+        [bins.iter().map(power).sum::<f64>() / freedom, freedom]
+    }
+}
+
+/// Searches wave numbers up to `highest` (1/m) in the values of a map.
+pub(super) fn search(values: &[f64], noise: &Noise, highest: f64) -> Found {
+    let (length, step) = (noise.length(), 1.0 / (MAP_RASTER * noise.length()));
+    let raster: Vec<f64> = (MAP_RASTER as usize..).map(|k| k as f64 * step).take_while(|f| *f <= highest).collect();
+    let tried = raster.len().max(1) as f64;
+    // Chance that |A|² is so large without a force.
+    let chance = |f: f64, square: f64| {
+        let [power, freedom] = noise.at(f);
+        let x = square / (power * noise.weight).max(f64::MIN_POSITIVE);
+        (tried * (-freedom * (x / freedom).ln_1p()).exp()).min(1.0)
+    };
+    let strongest = |left: &[f64], from: f64| {
+        let judged = |f: &f64| (*f, chance(*f, coefficient(left, f * noise.step).norm_sqr()));
+        raster.iter().filter(|f| **f >= from).map(judged).min_by(|a, b| a.1.total_cmp(&b.1))
+    };
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    let whole: Vec<f64> = values.iter().map(|value| value - mean).collect();
+    let mut changes = strongest(&whole, 0.0).is_some_and(|(_, chance)| chance < MAP_FALSE_ALARM);
+    let (mut numbers, mut found): (Vec<f64>, Vec<(bool, f64)>) = (Vec::new(), Vec::new());
+    for _ in 0..MAP_WAVES {
+        let Some((left, _)) = without(values, &numbers, noise.step) else { break };
+        let Some((first, chance)) = strongest(&left, MAP_PERIODS / length) else { break };
+        if chance >= MAP_FALSE_ALARM {
+            break;
+        }
+        changes = true;
+        let power = |f: f64| coefficient(&left, f * noise.step).norm_sqr();
+        let number = golden::top([first - step, first + step], MAP_SECTIONS, power);
+        if numbers.iter().any(|other| (other - number).abs() < 0.5 / length) {
+            break;
+        }
+        // What is in one half alone is no period.
+        let size = coefficient(&left, number * noise.step).norm();
+        let is_periodic = left
+            .chunks(left.len().div_ceil(2))
+            .all(|half| coefficient(half, number * noise.step).norm() > MAP_HALF * size);
+        numbers.push(number);
+        found.push((is_periodic, chance));
+        refine(values, &mut numbers, noise.step, step);
+    }
+    let amplitudes = without(values, &numbers, noise.step).map(|(_, amplitudes)| amplitudes).unwrap_or_default();
+    let wave = |((number, (is_periodic, chance)), amplitude): ((&f64, (bool, f64)), &f64)| {
+        let (number, amplitude) = (*number, *amplitude);
+        let variance = noise.at(number)[0] * noise.weight;
+        // σ_A² = S w/2, σ_ω² = 6 S w/(A L)²                            (Cramér-Rao bounds of a sine in white noise)
+        let error = (6.0 * variance).sqrt() / (2.0 * PI * amplitude * length);
+        let amplitude = [amplitude, (0.5 * variance).sqrt()];
+        is_periodic.then_some(Wave { number: [number, error], amplitude, chance })
+    };
+    let mut waves: Vec<Wave> = numbers.iter().zip(found).zip(&amplitudes).filter_map(wave).collect();
+    waves.sort_by(|a, b| b.amplitude[0].total_cmp(&a.amplitude[0]));
+    let needed = |f: &f64| {
+        let [power, freedom] = noise.at(*f);
+        let x = freedom * ((MAP_FALSE_ALARM / tried).powf(-freedom.recip()) - 1.0);
+        (x * power * noise.weight).sqrt()
+    };
+    Found { changes, waves, visible: raster.iter().map(needed).fold(0.0, f64::max) }
+}
+
+/// Moves each wave number to where all of them together leave least of the values: a sine alone is displaced by the
+/// others.
+fn refine(values: &[f64], numbers: &mut [f64], step: f64, raster: f64) {
+    for _ in 0..MAP_ROUNDS {
+        for k in 0..numbers.len() {
+            let mut all = numbers.to_vec();
+            let explained = |number: f64| {
+                all[k] = number;
+                let left = without(values, &all, step);
+                left.map_or(f64::NEG_INFINITY, |(left, _)| -left.iter().map(|y| y * y).sum::<f64>())
+            };
+            let ends = [numbers[k] - 0.5 * raster, numbers[k] + 0.5 * raster];
+            numbers[k] = golden::top(ends, MAP_SECTIONS, explained);
+        }
+    }
+}
+
+/// c = (2/n) Σ_j y_j e^(−2πi f j), f in periods per point.
+fn coefficient(values: &[f64], number: f64) -> Complex<f64> {
+    let sum: Complex<f64> =
+        values.iter().enumerate().map(|(j, y)| Complex::from_polar(*y, -2.0 * PI * number * j as f64)).sum();
+    sum * (2.0 / values.len() as f64)
+}
+
+/// What a cubic and sines of these wave numbers leave of the values by least squares, and the amplitudes of the sines.
+fn without(values: &[f64], numbers: &[f64], step: f64) -> Option<(Vec<f64>, Vec<f64>)> {
+    let n = values.len();
+    let matrix = DMatrix::from_fn(n, 4 + 2 * numbers.len(), |j, column| match column {
+        0..4 => (2.0 * j as f64 / (n - 1) as f64 - 1.0).powi(column as i32),
+        _ => {
+            let angle = 2.0 * PI * numbers[(column - 4) / 2] * step * j as f64;
+            if column % 2 == 0 { angle.cos() } else { angle.sin() }
+        }
+    });
+    let values = DVector::from_column_slice(values);
+    let found = inverse_of_square(&matrix)? * matrix.tr_mul(&values);
+    let left = values - &matrix * &found;
+    let amplitudes = (0..numbers.len()).map(|k| found[4 + 2 * k].hypot(found[5 + 2 * k])).collect();
+    Some((left.as_slice().to_vec(), amplitudes))
+}
