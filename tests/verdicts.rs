@@ -224,7 +224,7 @@ fn suggested_gains_lead_to_better_ones() {
 }
 
 /// The two motors of a bridge with their pulleys held swing against each other on the belts: that was taken for the
-/// slowest swing, and gains a millionth of those of other gantries were suggested.
+/// slowest swing, and gains of a thousandth and less of those of other gantries were suggested.
 #[test]
 fn suggested_gains_of_two_motors_on_a_bridge_move_it() {
     for kind in [Kind::HFrame, Kind::CoreXy, Kind::DualBelt] {
