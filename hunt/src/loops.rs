@@ -383,7 +383,22 @@ impl Rigid {
         }
     }
 
-    /// F = p M y″ + q (b y′ + s F_c) − F_L, and the command for it.
+    /// F_x: straight between the points, constant beyond them.
+    fn along(&self, x: f64) -> f64 {
+        let Some(line) = &self.machine.cart.forces.along else { return 0.0 };
+        let points = line.points();
+        let behind = points.iter().position(|point| x < point[0]).unwrap_or(points.len());
+        match (behind.checked_sub(1), points.get(behind)) {
+            (Some(before), Some([x1, y1])) => {
+                let [x0, y0] = points[before];
+                y0 + (y1 - y0) * ((x - x0) / (x1 - x0))
+            }
+            (Some(last), None) => points[last][1],
+            (None, first) => first.map_or(0.0, |first| first[1]),
+        }
+    }
+
+    /// F = p M y″ + q (b y′ + s F_c) − F_L − F_x(y), and the command for it.
     fn command(&self, y: &Reference) -> f64 {
         let (motor, amplifier, r) =
             (&self.machine.drives[0].motor, &self.machine.drives[0].amplifier, self.machine.pulley_radius);
@@ -395,7 +410,7 @@ impl Rigid {
         };
         let side = usize::from(s < 0.0);
         let resists = self.viscous[side] * y.speed + s * self.coulomb[side];
-        let force = self.inertia * self.mass * y.acceleration + self.dry * resists - self.load;
+        let force = self.inertia * self.mass * y.acceleration + self.dry * resists - self.load - self.along(y.position);
         let rate = self.inertia * self.mass * y.jerk;
         let (eta, n) = (motor.gear_efficiency, motor.gear_ratio);
         let per_force = match force * y.speed < 0.0 && y.speed.abs() > 1e-6 {

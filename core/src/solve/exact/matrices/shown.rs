@@ -73,8 +73,7 @@ impl<const N: usize> Shown<N> {
                 (mechanical[q], magnetic[q]) = (mechanical[q].hypot(magnetic[q]), 0.0);
             }
         }
-        let input =
-            std::array::from_fn(|drive| std::array::from_fn(|q: usize| readout.forms[q].input[drive].abs()));
+        let input = std::array::from_fn(|drive| std::array::from_fn(|q: usize| readout.forms[q].input[drive].abs()));
         Self { readout, matrix, more, mechanical, magnetic, unsprung, input }
     }
 
