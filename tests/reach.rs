@@ -8,6 +8,7 @@ use taut::machine::rigid::{REST_ACCELERATION, REST_SPEED, Rigid};
 use taut::machine::{Machine, Travel};
 use taut::metrics::{Balance, balanced_speed};
 use taut::number::engineering;
+use taut::polyline::Polyline;
 use taut::reach::compensation::{Compensation, direction};
 use taut::reach::feasible::{loads, shortfalls};
 use taut::signal::profile::{Profile, Reference};
@@ -51,6 +52,25 @@ fn needs_are_those_of_a_loop_that_follows_closely() {
         let (given, taken) = (figures.drive().voltage.0.value.abs(), figures.drive().current.0.value.abs());
         assert!((volts / given - 1.0).abs() < 0.1, "{}: {volts} V, {given} V in the loop", motion.name);
         assert!((amperes / taken - 1.0).abs() < 0.25, "{}: {amperes} A, {taken} A in the loop", motion.name);
+    }
+}
+
+/// A force that is the same all along the travel is a load. It was counted twice once feed-forward knew it.
+#[test]
+fn a_force_along_the_travel_is_needed_once() {
+    let case = case();
+    for force in [-6.0, 2.5] {
+        let [mut along, mut loaded] = [(); 2].map(|()| case.machine.clone());
+        along.cart.forces.along = Polyline::new(vec![[-1.0, force], [1.0, force]]);
+        loaded.cart.load += force;
+        for motion in &case.moves {
+            for limit in ["voltage", "current"] {
+                let [is, wanted] = [&along, &loaded].map(|machine| needed(machine, motion.profile(), limit));
+                let without = needed(&case.machine, motion.profile(), limit);
+                assert!((is / wanted - 1.0).abs() < 1e-12, "{}: {limit} {is}, {wanted} with a load", motion.name);
+                assert!((is / without - 1.0).abs() > 1e-3, "{}: {limit} {is}, {without} without", motion.name);
+            }
+        }
     }
 }
 

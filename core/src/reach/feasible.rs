@@ -347,13 +347,12 @@ fn limits_of(machine: &Machine, drive: usize, limit: Option<f64>) -> (Option<f64
 
 fn needs(machine: &Machine, profile: &Profile, instants: usize) -> Vec<Need> {
     let compensation = Compensation::new(machine, &FeedForward::NONE);
-    let lines = &machine.cart.forces;
     let need = |time: f64| {
         let y = profile.at(time);
+        // A force along the travel is in it; one by the speed is not.
         let needed = compensation.needed(&y);
-        let of_lines = lines.along.as_ref().map_or(0.0, |line| line.value(y.position))
-            + lines.by_speed.as_ref().map_or(0.0, |line| line.value(y.speed));
-        let force = needed.force[0] - of_lines;
+        let by_speed = machine.cart.forces.by_speed.as_ref().map_or(0.0, |line| line.value(y.speed));
+        let force = needed.force[0] - by_speed;
         let (current, voltage) = compensation.rigid.electrical(force, needed.force[1], needed.drive.speed);
         Need { at: Instant { time, y }, force, current, voltage, spans: needed.spans }
     };

@@ -58,8 +58,6 @@ struct Later<const N: usize> {
     origin: [f64; BODIES],
     begin: f64,
     interval: f64,
-    /// Bounds of the deviation of readings from straight lines over one interval.
-    bow: Reading,
     wanted: Gaps,
 }
 
@@ -170,7 +168,7 @@ impl<const N: usize> Run<'_, N> {
         };
         if wanted != Gaps::NONE {
             let (law, origin, ends) = (Arc::clone(law), self.watching.origin, [readings[0], readings[1]]);
-            let later = Later { law, z, ends, origin, begin, interval, bow, wanted };
+            let later = Later { law, z, ends, origin, begin, interval, wanted };
             match is_now {
                 true => self.show_gaps(&later),
                 false => self.watching.later.push(later),
@@ -184,7 +182,7 @@ impl<const N: usize> Run<'_, N> {
 
     /// Shows gaps of a stretch more closely, if the observer still needs them.
     fn show_gaps(&mut self, later: &Later<N>) {
-        let Later { law, begin, interval, bow, wanted, .. } = later;
+        let Later { law, begin, interval, wanted, .. } = later;
         let count = wanted.end();
         let bends = self.bends(law, &later.z[0], *interval * count as f64);
         let [first, second] = [0, 1].map(|end| Sight::new(later.z[end], later.ends[end]));
@@ -200,14 +198,6 @@ impl<const N: usize> Run<'_, N> {
             }
             if wanted.has(gap) {
                 let ends = (begin + gap as f64 * interval, *interval);
-                // Larger values may have come since it was wanted: a cubic is asked only where there is still a reason.
-                if !self.ask(law, ends, [&from.value, &to.value], bow) {
-                    continue;
-                }
-                if self.watching.sees_all {
-                    self.show_closer(law, from, to, ends, &bends);
-                    continue;
-                }
                 let bow = self.bow_between(law, [from, to], *interval, &bends);
                 if self.ask(law, ends, [&from.value, &to.value], &bow) {
                     self.show_closer(law, from, to, ends, &bends);
@@ -361,6 +351,9 @@ impl<const N: usize> Run<'_, N> {
         length: f64,
         bends: &Reading,
     ) -> Reading {
+        if self.watching.sees_all {
+            return [f64::INFINITY; QUANTITIES];
+        }
         let (from_value, to_value) = (from.value, to.value);
         let ((_, from_slope), (_, to_slope)) = (self.rate(law, from), self.rate(law, to));
         let square = length * length;
