@@ -3,10 +3,12 @@
 
 use crate::common::chance::Chance;
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
-use taut::case::Case;
+use taut::case::{Case, Move};
+use taut::control::{Loop, Rows, Setup, Standard, closed_loop, each, stream};
 use taut::mechanism::{Status, What};
 use taut::reach::pull_out::PullOut;
-use taut::solve::{Ending, Solver, simulate};
+use taut::solve::{Ending, Flow, Solver, simulate};
+use taut::trajectory::Trajectory;
 
 /// Step of the integration, s.
 const STEP: f64 = 1e-6;
@@ -341,4 +343,253 @@ fn the_pull_out_torque_that_is_shown_is_that_at_which_a_slow_ramp_loses_its_step
     let needed = damping * speed + inertia * acceleration / radius;
     let shown = PullOut::of(&case.machine).unwrap().torque(speed);
     assert!((needed / shown - 1.0).abs() < 0.04, "{needed} N m at {speed} rad/s, shown {shown} N m");
+}
+
+/// A CoreXY with two steppers and no dry friction, on the way to one point of its plane after another.
+#[derive(Debug, Clone)]
+struct Plotter {
+    holding: f64,
+    rated: f64,
+    resistance: f64,
+    inductance: f64,
+    supply: f64,
+    microsteps: f64,
+    detent: f64,
+    rotor: f64,
+    radius: f64,
+    pulley: f64,
+    /// Of bridge and cart.
+    mass: [f64; 2],
+    viscous: [f64; 2],
+    /// Of both spans of a belt together: N/m and N s/m.
+    stiffness: [f64; 2],
+    damping: [f64; 2],
+    speed: f64,
+    acceleration: f64,
+    points: [[f64; 2]; 2],
+    until: f64,
+}
+
+/// Angles, positions of bridge and cart, the speeds of all, two currents of each motor.
+type Plane = [f64; 12];
+
+impl Plotter {
+    fn drawn(chance: &mut Chance) -> Self {
+        let mut between = |low: f64, high: f64| low + (high - low) * chance.uniform();
+        let (holding, rated, resistance) = (between(0.3, 0.6), between(1.0, 2.5), between(0.8, 2.0));
+        let k = [between(4e4, 1.2e5), between(4e4, 1.2e5)];
+        Self {
+            holding,
+            rated,
+            resistance,
+            inductance: resistance * between(1e-3, 2.5e-3),
+            supply: between(18.0, 36.0),
+            microsteps: [2.0, 4.0, 8.0][(3.0 * between(0.0, 0.999)) as usize],
+            detent: holding * between(0.0, 0.05),
+            rotor: holding * 1.2e-5,
+            radius: between(5e-3, 8e-3),
+            pulley: between(5e-7, 2e-6),
+            mass: [between(0.2, 0.4), between(0.15, 0.3)],
+            viscous: [between(2.0, 8.0), between(2.0, 8.0)],
+            stiffness: k,
+            damping: k.map(|k| 2e-4 * k),
+            speed: between(0.05, 0.15),
+            acceleration: between(1.0, 3.0),
+            points: [[between(2e-3, 6e-3), 0.0], [between(2e-3, 6e-3), between(-6e-3, 6e-3)]],
+            until: 0.25,
+        }
+    }
+
+    fn case(&self) -> String {
+        let halves = |[a, b]: [f64; 2]| [0.4 * a, 0.6 * a, 0.7 * b, 0.3 * b];
+        format!(
+            "kind = \"core-xy\"\n[stepper]\nsteps_per_turn = 200\nholding_torque = {:e}\nrated_current = {:e}\n\
+             resistance = {:e}\ninductance = {:e}\nsupply = {:e}\nmicrosteps = {}\ndetent_torque = {:e}\n\
+             rotor_inertia = {:e}\n[drive_pulley]\nradius = {:e}\ninertia = {:e}\n[bridge]\nmass = {:e}\n\
+             friction = {{ viscous = {:e} }}\n[cart]\nmass = {:e}\nfriction = {{ viscous = {:e} }}\n[belt]\n\
+             stiffness = {:?}\ndamping = {:?}\n[[move]]\nname = \"path\"\npoints = {:?}\nspeed = {:e}\n\
+             acceleration = {:e}\nuntil = {:e}\nevery = 1e-3\n",
+            self.holding,
+            self.rated,
+            self.resistance,
+            self.inductance,
+            self.supply,
+            self.microsteps,
+            self.detent,
+            self.rotor,
+            self.radius,
+            self.pulley,
+            self.mass[0],
+            self.viscous[0],
+            self.mass[1],
+            self.viscous[1],
+            halves(self.stiffness),
+            halves(self.damping),
+            self.points,
+            self.speed,
+            self.acceleration,
+            self.until,
+        )
+    }
+
+    /// Where bridge and cart should be: from rest to rest along each leg, with a trapezoid of speed.
+    fn reference(&self, mut time: f64) -> [f64; 2] {
+        let mut from = [0.0; 2];
+        for to in self.points {
+            let length = (to[0] - from[0]).hypot(to[1] - from[1]);
+            let top = self.speed.min((length * self.acceleration).sqrt());
+            let (ramp, whole) = (top / self.acceleration, length / top + top / self.acceleration);
+            if time < whole {
+                let after = |time: f64| 0.5 * self.acceleration * time * time;
+                let gone = match time {
+                    _ if time < ramp => after(time),
+                    _ if time < whole - ramp => after(ramp) + top * (time - ramp),
+                    _ => length - after(whole - time),
+                };
+                return [0, 1].map(|k| from[k] + (to[k] - from[k]) * gone / length);
+            }
+            (time, from) = (time - whole, to);
+        }
+        from
+    }
+
+    /// The commanded angles: motor A moves bridge and cart alike, motor B against each other, each in whole microsteps.
+    fn told(&self, time: f64) -> [f64; 2] {
+        let [x, y] = self.reference(time);
+        let step = 2.0 * PI / (200.0 * self.microsteps);
+        [x + y, x - y].map(|belt| (belt / self.radius / step).round() * step)
+    }
+
+    fn rate(&self, s: &Plane, told: [f64; 2]) -> Plane {
+        let (r, n, k) = (self.radius, 50.0, self.holding * FRAC_1_SQRT_2 / self.rated);
+        let mut rate = [0.0; 12];
+        rate[..4].copy_from_slice(&s[4..8]);
+        let (x, y) = ([s[2] + s[3], s[2] - s[3]], [s[6] + s[7], s[6] - s[7]]);
+        let mut pull = [0.0; 2];
+        for m in 0..2 {
+            let (rotor, field) = (n * s[m] + PI / 4.0, n * told[m] + PI / 4.0);
+            let [a, b] = [s[8 + 2 * m], s[9 + 2 * m]];
+            let speed = s[4 + m];
+            pull[m] = self.stiffness[m] * (r * s[m] - x[m]) + self.damping[m] * (r * speed - y[m]);
+            let torque = k * (b * rotor.cos() - a * rotor.sin()) - self.detent * (4.0 * rotor).sin();
+            rate[4 + m] = (torque - r * pull[m]) / (self.rotor + self.pulley);
+            let phases = [(a, -k * speed * rotor.sin(), field.cos()), (b, k * speed * rotor.cos(), field.sin())];
+            for (phase, (i, emf, wanted)) in phases.into_iter().enumerate() {
+                let aim = 2.0_f64.sqrt() * self.rated * wanted;
+                let volts = self.resistance * i + emf + self.inductance * 2.0 * PI * 1e4 * (aim - i);
+                let volts = volts.clamp(-self.supply, self.supply);
+                rate[8 + 2 * m + phase] = (volts - self.resistance * i - emf) / self.inductance;
+            }
+        }
+        rate[6] = (pull[0] + pull[1] - self.viscous[0] * s[6]) / (self.mass[0] + self.mass[1]);
+        rate[7] = (pull[0] - pull[1] - self.viscous[1] * s[7]) / self.mass[1];
+        rate
+    }
+
+    /// Positions of bridge and cart every millisecond: classical formula from edge to edge of the microsteps.
+    fn integrate(&self) -> Vec<[f64; 2]> {
+        let mut s = [0.0; 12];
+        s[8..].fill(self.rated);
+        let (mut time, mut rows) = (0.0, vec![[0.0; 2]]);
+        while time < self.until - 1e-9 {
+            let (told, end) = (self.told(time + 1e-12), (rows.len() as f64 * 1e-3).min(self.until));
+            let mut h = STEP.min(end - time);
+            if self.told(time + h) != told {
+                let (mut low, mut high) = (0.0, h);
+                for _ in 0..40 {
+                    let middle = 0.5 * (low + high);
+                    if self.told(time + middle) == told { low = middle } else { high = middle }
+                }
+                h = high;
+            }
+            let add = |h: f64, k: &Plane| -> Plane { std::array::from_fn(|i| s[i] + h * k[i]) };
+            let k1 = self.rate(&s, told);
+            let k2 = self.rate(&add(0.5 * h, &k1), told);
+            let k3 = self.rate(&add(0.5 * h, &k2), told);
+            let k4 = self.rate(&add(h, &k3), told);
+            s = std::array::from_fn(|i| s[i] + h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]));
+            time += h;
+            if (time - end).abs() < 1e-10 {
+                rows.push([s[2], s[3]]);
+            }
+        }
+        rows
+    }
+}
+
+#[test]
+fn drawn_plotters_with_steppers_follow_their_paths_as_their_phases_take_them() {
+    for seed in 0..machines().div_ceil(2) {
+        let plotter = Plotter::drawn(&mut Chance::new(5100 + seed));
+        let text = plotter.case();
+        let case = Case::from_text("plotter.toml", &text).unwrap_or_else(|error| panic!("{error}\n{text}"));
+        let (design, motion) = (case.controller.as_ref().unwrap(), &case.moves[0]);
+        let mut controllers = Standard::of_drives(design, &case.machine).unwrap();
+        let rows = Rows { until: motion.until, every: motion.every, window: motion.window };
+        let mut kept = Trajectory::default();
+        let mut sink = |block: &Trajectory| {
+            if kept.is_empty() {
+                kept = Trajectory::with_capacity(&block.columns, 1024);
+            }
+            kept.append(block);
+            Flow::Continue
+        };
+        let (profiles, timing) = (motion.references(design), Loop::of(design));
+        let solver = Solver::of(&case.machine);
+        let run =
+            stream(&case.machine, &mut each(&mut controllers), &timing, &profiles, &rows, solver, false, &mut sink)
+                .unwrap();
+        assert_eq!(run.outcome.ending, Ending::Complete, "{seed}\n{text}");
+        assert!(run.metrics.in_step(), "{seed}\n{text}");
+        let columns = ["bridge_position", "cart_position"].map(|name| kept.get(name).unwrap());
+        let others = plotter.integrate();
+        assert_eq!(columns[0].len(), others.len());
+        for (row, other) in others.iter().enumerate() {
+            let off = (0..2).map(|k| (columns[k][row] - other[k]).abs()).fold(0.0, f64::max);
+            assert!(off < 5e-9, "{seed}: {off:.1e} m apart at {row} ms\n{text}");
+        }
+        // Commanded minus reached, of whole microsteps.
+        let (told, end) = (plotter.told(plotter.until), others.last().unwrap());
+        let asked = [told[0] + told[1], told[0] - told[1]].map(|sum| 0.5 * plotter.radius * sum);
+        for (k, load) in run.metrics.loads.iter().enumerate() {
+            assert!((load.command_error.unwrap() - (asked[k] - end[k])).abs() < 5e-9, "{seed}\n{text}");
+        }
+    }
+}
+
+#[test]
+fn a_move_beyond_the_pull_out_torque_is_told_and_a_planned_one_loses_no_step() {
+    let text = plain(0.45, 6.4e-3, 4, "[cart]\nmass = 0.4\n")
+        + "friction = { viscous = 1e-4 }\n[[move]]\nname = \"far\"\nto = 0.1\nspeed = 1.5\nacceleration = 80\n\
+           until = 0.4\n[[move]]\nname = \"planned\"\nto = 0.1\nplan = { reserve = 0.4 }\nuntil = 0.6\n";
+    let case = Case::from_text("moves.toml", &text).unwrap();
+    let design = case.controller.as_ref().unwrap();
+    let short = case.moves[0].shortfalls(&case.machine, design);
+    // 80 m/s² of 0.4 kg, rotor and pulleys at 6.4 mm
+    let mass = 0.4 + (5.4e-6 + 2e-6) / (6.4e-3_f64 * 6.4e-3);
+    let [torque] = &short[..] else { panic!("{short:?}") };
+    assert_eq!(torque.limit, "pull_out");
+    assert!(torque.needed >= 80.0 * mass * 6.4e-3 && torque.allowed < torque.needed, "{torque:?}");
+    assert!(case.moves[1].shortfalls(&case.machine, design).is_empty());
+    let run = |motion: &Move| {
+        let until = motion.until;
+        let setup = Setup {
+            machine: &case.machine,
+            model: &case.machine,
+            design,
+            profiles: &motion.profiles,
+            until,
+            window: motion.window,
+            solver: Solver::of(&case.machine),
+        };
+        closed_loop(&setup).unwrap()
+    };
+    let [far, planned] = [0, 1].map(|k| run(&case.moves[k]));
+    assert!(!far.metrics.in_step());
+    assert!(planned.metrics.in_step() && planned.metrics.cart().command_error.unwrap().abs() < 5e-5);
+    // The quickest one that takes six tenths of the torque everywhere is not slow.
+    let most = PullOut::of(&case.machine).unwrap().largest_acceleration(&case.machine, 0.1);
+    let bound = 2.0 * (0.1 / most).sqrt();
+    let end = case.moves[1].end();
+    assert!(bound < end && end < 2.2 * bound, "{end} s, {bound} s at the pull-out torque");
 }

@@ -33,6 +33,21 @@ pub struct Design {
 }
 
 impl Design {
+    /// The design of steppers, which follow their references without feedback, through this shaper; `every` is the
+    /// interval between rows, s.
+    pub fn open_loop(every: f64, shaper: Vec<[f64; 2]>) -> Self {
+        Self {
+            every,
+            delay: 0.0,
+            limit: None,
+            structure: Structure::OpenLoop(OpenLoop),
+            feed_forward: FeedForward::NONE,
+            disturbance_observer: None,
+            filters: Vec::new(),
+            shaper,
+        }
+    }
+
     /// References through its shaper.
     pub fn shaped(&self, profiles: &[Profile]) -> Vec<Profile> {
         profiles.iter().map(|profile| profile.clone().shaped(&self.shaper)).collect()
@@ -92,6 +107,8 @@ structures! {
     SlidingMode,
     /// A table of rules.
     Fuzzy,
+    /// The reference itself, as steppers are commanded it.
+    OpenLoop,
 }
 
 impl Structure {
@@ -198,6 +215,10 @@ pub struct Fuzzy {
     /// Corner of the filter of the rate, Hz.
     pub filter: f64,
 }
+
+/// No feedback: the command is the reference.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct OpenLoop;
 
 /// Feed-forward from the reference alone.
 #[derive(Debug, Clone, Copy, PartialEq)]

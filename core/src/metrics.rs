@@ -43,24 +43,20 @@ pub struct Metrics {
     pub settled: bool,
     /// True if all bodies other than rotors are stuck at the end, at a speed of exactly zero.
     pub bodies_rest: bool,
-    /// Of a machine with a stepper.
-    pub stepper: Option<OfStepper>,
     /// True if no rotor turns at the end: that of a gear with play turns no faster than a millionth of its largest
     /// speed. True for stiff gears, whose rotors are part of their pulleys.
     pub rotors_rest: bool,
 }
 
-/// Figures of a stepper that was told where to go.
+/// Steps that a stepper lost.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct OfStepper {
+pub struct LostSteps {
     /// Full steps by which the rotor is behind its field at the end: four for each tooth pitch.
-    pub lost_steps: i64,
+    pub at_end: i64,
     /// How often the rotor fell to another tooth.
     pub slips: u64,
     /// When it did so first, s.
     pub first_slip: Option<f64>,
-    /// Commanded position at the end minus that of the cart, m.
-    pub position_error: f64,
 }
 
 /// Figures of what slides.
@@ -78,6 +74,8 @@ pub struct OfLoad {
     /// Peak of the position by the drives minus the true position, m: the error of an encoder at the drive
     /// pulley as a measurement of the cart.
     pub peak_error: Peak,
+    /// Position commanded of the steppers at the end minus its own, m; none without steppers.
+    pub command_error: Option<f64>,
 }
 
 /// Figures of a drive.
@@ -93,6 +91,8 @@ pub struct OfDrive {
     pub peak_speed: Peak,
     /// Its current of largest magnitude, A.
     pub peak_current: Peak,
+    /// Steps that it lost; none of a motor that is no stepper.
+    pub lost_steps: Option<LostSteps>,
 }
 
 /// Figures of a span of the belt.
@@ -114,6 +114,11 @@ impl Metrics {
     /// The figures of the first drive.
     pub fn drive(&self) -> OfDrive {
         self.drives.first().copied().unwrap_or_default()
+    }
+
+    /// True if no stepper lost a step.
+    pub fn in_step(&self) -> bool {
+        self.drives.iter().all(|drive| drive.lost_steps.is_none_or(|lost| lost.slips == 0))
     }
 
     /// The largest stretch of a span, and the span's place.

@@ -181,6 +181,7 @@ impl Law {
             | Structure::Cascade(_)
             | Structure::SlidingMode(_)
             | Structure::Fuzzy(_)
+            | Structure::OpenLoop(_)
             | Structure::StateFeedback(_) => {
                 let mut standard = Standard::new(design, machine).map_err(|error| error.to_string())?;
                 standard.reset();

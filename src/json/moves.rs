@@ -5,6 +5,7 @@ use crate::case::Move;
 use crate::control::drives::{DriveGain, drive_gains};
 use crate::control::{Deviation, DriveFigures, Loop, MoveRun, Worst};
 use crate::machine::Machine;
+use crate::metrics::LostSteps;
 use crate::reach::feasible::Shortfall;
 use crate::tune::trouble::Trouble;
 use serde_json::{Map, Value, json};
@@ -56,19 +57,30 @@ pub(super) fn shortfall(short: &Shortfall) -> Value {
     })
 }
 
-fn of_drive(drive: &DriveFigures) -> Value {
-    json!({
+fn of_drive(drive: &DriveFigures, lost: Option<LostSteps>) -> Map<String, Value> {
+    let value = match lost {
+        // A stepper has no samples, and its phases have voltages of their own.
+        Some(lost) => json!({
+            "lost_steps": lost.at_end,
+            "slips": lost.slips,
+            "first_slip_s": lost.first_slip,
+        }),
+        None => json!({
+            "peak_voltage_V": peak(drive.voltage.0),
+            "rms_voltage_V": drive.voltage.1,
+            "limited_s": drive.limited,
+            "amplifier_limited_s": drive.amplifier_limited,
+            "energy_in_J": drive.energy.0,
+            "energy_back_J": drive.energy.1,
+            "command_turns_per_s": drive.restlessness,
+        }),
+    };
+    let both = json!({
         "following_error": deviation(drive.following),
         "peak_current_A": peak(drive.current.0),
         "rms_current_A": drive.current.1,
-        "peak_voltage_V": peak(drive.voltage.0),
-        "rms_voltage_V": drive.voltage.1,
-        "limited_s": drive.limited,
-        "amplifier_limited_s": drive.amplifier_limited,
-        "energy_in_J": drive.energy.0,
-        "energy_back_J": drive.energy.1,
-        "command_turns_per_s": drive.restlessness,
-    })
+    });
+    [both, value].into_iter().filter_map(|value| value.as_object().cloned()).flatten().collect()
 }
 
 /// One of them.
@@ -83,11 +95,10 @@ pub fn motion(done: &Moved) -> Value {
         });
         (name.to_string(), told)
     });
-    let drives = geometry
-        .drives
-        .iter()
-        .zip(&figures.drives)
-        .map(|(at, drive)| (geometry.drive_key(at).to_string(), of_drive(drive)));
+    let lost = |number: usize| run.metrics.drives.get(number).and_then(|drive| drive.lost_steps);
+    let drives = geometry.drives.iter().zip(&figures.drives).enumerate();
+    let drives = drives
+        .map(|(number, (at, drive))| (geometry.drive_key(at).to_string(), json!(of_drive(drive, lost(number)))));
     let mut value = json!({
         "name": done.motion.name,
         "files": done.files,
@@ -116,9 +127,7 @@ pub fn motion(done: &Moved) -> Value {
         object.insert("target_m".into(), json!(done.motion.profile().target()));
         object.insert("cart_error".into(), deviation(cart.error));
         object.insert("overshoot_m".into(), json!(cart.overshoot));
-        if let Value::Object(drive) = of_drive(drive) {
-            object.extend(drive);
-        }
+        object.extend(of_drive(drive, lost(0)));
     }
     if let Some(worst) = done.worst {
         object.insert(

@@ -123,7 +123,7 @@ impl<'a> Worker<'a> {
         let Self { subject, machine, bench, held } = self;
         let mounted = bench.mount(machine);
         for (experiment, held) in subject.experiments.iter().zip(held) {
-            let mut meter = Meter::with(machine, &subject.sought, *held);
+            let mut meter = Meter::with(machine, &subject.sought, *held, &experiment.inputs);
             let outcome = mounted.clone().and_then(|()| bench.observe(experiment, &mut meter));
             let told = outcome.map(|outcome| (status(&outcome), meter.finish(&outcome.events)));
             put_figures(told, &subject.of_experiment, |figure, metrics| figure.of(metrics).number(), values);

@@ -11,6 +11,9 @@ use crate::parameter::{self, Fallback};
 const MOST_DELAY: f64 = 1000.0;
 
 pub(super) fn controller(root: &Table, machine: &Machine) -> Result<Option<Design>> {
+    if machine.stepper().is_some() {
+        return of_stepper(root);
+    }
     let Some(field) = root.optional("controller") else { return Ok(None) };
     let input_unit = if machine.drives[0].amplifier.mode == AmplifierMode::Current { "A" } else { "V" };
     let field = Field { input_unit, ..field };
@@ -54,8 +57,30 @@ pub(super) fn controller(root: &Table, machine: &Machine) -> Result<Option<Desig
     Ok(Some(design))
 }
 
+/// Interval between the rows of a stepper's move where none is given, s.
+const EVERY: f64 = 1e-3;
+
+/// What a stepper has in place of a controller: an input shaper, if any. None where the file has neither that nor a move.
+fn of_stepper(root: &Table) -> Result<Option<Design>> {
+    let Some(field) = root.optional("controller") else {
+        return Ok(root.optional("move").map(|_| Design::open_loop(EVERY, Vec::new())));
+    };
+    let table = field.table()?;
+    if let Some(key) = table.keys().find(|key| !["shaper", "every"].contains(key)) {
+        return Err(table
+            .optional(key)
+            .unwrap_or_else(|| table.field.clone())
+            .fail("a stepper follows its reference without a controller")
+            .allowed("shaper, and every for the interval between rows")
+            .next("leave it out"));
+    }
+    let every = table.number_if_given("every")?.unwrap_or(EVERY);
+    Ok(Some(Design::open_loop(every, shaper(&table)?)))
+}
+
 fn structure(table: &Table, machine: &Machine, (every, delay): (f64, f64)) -> Result<Structure> {
-    let known = Structure::each();
+    let is_fed_back = |one: &Structure| !matches!(one, Structure::OpenLoop(_));
+    let known: Vec<Structure> = Structure::each().into_iter().filter(is_fed_back).collect();
     let words: Vec<&str> = known.iter().map(|one| one.tunable().word()).collect();
     // Exactly one of them.
     let given: Vec<Field> = words.iter().filter_map(|key| table.optional(key)).collect();
@@ -109,7 +134,9 @@ fn structure(table: &Table, machine: &Machine, (every, delay): (f64, f64)) -> Re
             (rules.command, rules.incremental, rules.rules) = fuzzy(&own)?;
             gains(&own, &mut structure)?;
         }
-        Structure::StateFeedback(_) | Structure::SlidingMode(_) => gains(&own, &mut structure)?,
+        Structure::StateFeedback(_) | Structure::SlidingMode(_) | Structure::OpenLoop(_) => {
+            gains(&own, &mut structure)?;
+        }
     }
     Ok(structure)
 }

@@ -2,7 +2,7 @@
 
 use super::friction::friction;
 use super::reader::{Field, Table};
-use super::{input, machine, sheet};
+use super::{input, machine, sheet, stepper};
 use crate::error::{Error, Result};
 use crate::friction::Friction;
 use crate::machine::{
@@ -11,6 +11,9 @@ use crate::machine::{
 use crate::mechanism::State;
 use crate::signal::Signal;
 use std::path::Path;
+
+/// Most motors of a machine that can be steppers.
+const STEPPERS: usize = 2;
 
 /// The kind of machine that the file describes.
 pub(super) fn kind(root: &Table) -> Result<Kind> {
@@ -28,13 +31,16 @@ pub(super) fn tables(root: &Table, kind: Kind) -> Result<Vec<&'static str>> {
             }));
         }
     }
-    for key in ["stepper", "measurement"] {
-        if let Some(field) = root.optional(key) {
-            return Err(field.fail("this is not available yet for a gantry").next("leave it out for now"));
-        }
+    if let Some(field) = root.optional("measurement") {
+        return Err(field.fail("this is not available yet for a gantry").next("leave it out for now"));
+    }
+    if let Some(field) = root.optional("stepper").filter(|_| kind.geometry().drives.len() > STEPPERS) {
+        return Err(field
+            .fail(format!("a gantry of kind \"{}\" has three motors, and only two can be steppers", kind.word()))
+            .next("describe [motor] and [amplifier] instead, or a gantry with two motors"));
     }
     let drives = kind.geometry().drives.iter().map(|drive| drive.label.key);
-    let before = ["title", "kind", "motor", "drive", "amplifier"].into_iter();
+    let before = ["title", "kind", "motor", "stepper", "drive", "amplifier"].into_iter();
     let behind = [
         "drive_pulley",
         "bridge",
@@ -122,9 +128,17 @@ fn gear<'a>(motor: Option<Field<'a>>) -> Option<Field<'a>> {
     ["gear_stiffness", "backlash", "gear_damping"].iter().find_map(|key| motor.optional(key))
 }
 
-/// Motor and amplifier of a side: those of all, with what its own table says.
+/// Motor and amplifier of a side: those of all, with what its own table says; or the stepper of all sides.
 fn drive(root: &Table, side: &str) -> Result<DriveUnit> {
     let own = root.optional(side).map(|field| field.table()).transpose()?;
+    if let Some(stepper) = stepper::drive(root)? {
+        return match own {
+            Some(own) => {
+                Err(own.field.fail("both motors are the stepper of [stepper]").next("leave this table out"))
+            }
+            None => Ok(stepper),
+        };
+    }
     if let Some(own) = &own {
         own.check_keys(&["motor", "amplifier"], &[])?;
     }
@@ -255,6 +269,9 @@ pub(super) fn initial(table: &Table, gantry: &Machine) -> Result<State> {
         // The rotor in the middle of its play.
         (state.position[drive.shaft], state.speed[drive.shaft]) = (state.position[body], state.speed[body]);
         if let Some(field) = table.optional(at.current_column) {
+            if drive.motor.stepper.is_some() {
+                return Err(stepper::begins_energised(&field));
+            }
             if !drive.has_current_state() {
                 return Err(field.fail("this current would have no effect").next(
                     "it needs an inductance above zero in voltage mode, or a bandwidth in current mode; or leave it out",

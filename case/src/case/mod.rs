@@ -387,10 +387,8 @@ fn experiment(field: &Field, machine: &Machine, folder: &Folder) -> Result<Vec<E
         let (until, every) = times(&table, None)?;
         let inputs = inputs(&table, machine, &input::Context { folder, until })?;
         let initial = initial(&table, machine)?;
-        if machine.stepper().is_some()
-            && let Some(field) = table.optional("input")
-        {
-            stepper::check_command(&field, machine, &inputs[0], (&initial, until))?;
+        if let Some(field) = table.optional("input").filter(|_| machine.stepper().is_some()) {
+            stepper::check_commands(&field, machine, &inputs, (&initial, until))?;
         }
         return Ok(vec![Experiment { name, inputs, until, every, initial, log: None }]);
     };
@@ -477,9 +475,7 @@ fn initial(experiment: &Table, machine: &Machine) -> Result<State> {
     let table = field.table()?;
     table.check_keys(&[], &[])?;
     if let Some(current) = table.optional("motor_current").filter(|_| machine.stepper().is_some()) {
-        return Err(current
-            .fail("the phases of a stepper begin with the currents that hold it where it is")
-            .next("leave it out"));
+        return Err(stepper::begins_energised(&current));
     }
     if let Some(current) = table.optional("motor_current")
         && !machine.mechanism().drives.iter().any(|drive| drive.has_current_state())

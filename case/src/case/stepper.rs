@@ -8,13 +8,13 @@ use crate::quantity::show;
 use crate::signal::Signal;
 
 /// Sections that a case of a stepper cannot have yet.
-const YET_TO_COME: [&str; 6] = ["measurement", "controller", "move", "tune", "fit", "uncertainty"];
+const YET_TO_COME: [&str; 2] = ["measurement", "fit"];
 
 /// The error where a motor that is commanded by voltage or current is needed: message, and sections to add.
 const NO_MOTOR: [&str; 3] = [
     "this needs a motor that is commanded by voltage or current, and the case describes a stepper",
     "[motor] and [amplifier]",
-    "`taut show`, `taut simulate` and `taut sweep` support steppers; other commands do not yet",
+    "`taut show`, `simulate`, `move`, `plan`, `shape` and `sweep` support steppers; other commands do not yet",
 ];
 
 /// Refuses a stepper where a motor that is commanded by voltage or current is needed.
@@ -100,21 +100,30 @@ fn steps_per_turn(table: &Table) -> Result<f64> {
     }
 }
 
-/// Refuses a command that jumps farther than a rotor follows; `field` is the input.
-pub(super) fn check_command(
+/// The error about a current at the start.
+pub(super) fn begins_energised(current: &Field) -> Error {
+    current.fail("the phases of a stepper begin with the currents that hold it where it is").next("leave it out")
+}
+
+/// Refuses commands that jump farther than a rotor follows; `field` is the input.
+pub(super) fn check_commands(
     field: &Field,
     machine: &Machine,
-    input: &Signal,
+    inputs: &[Signal],
     (initial, until): (&State, f64),
 ) -> Result<()> {
     let mechanism = machine.mechanism();
-    let Some(most) = mechanism.farthest_jump(0) else { return Ok(()) };
-    let begin = initial.position[mechanism.drives[0].pulley] / mechanism.angle_per_input(0);
-    match input.first_jump(begin, most, until) {
-        None => Ok(()),
-        Some((time, jump)) => Err(field
-            .fail(format!("the command jumps by {} at {}", show(jump, "m"), show(time, "s")))
-            .allowed(format!("up to {} at once, two full steps: a rotor does not follow more", show(most, "m")))
-            .next("let it grow, with ramp, table or sine")),
+    for (drive, input) in inputs.iter().enumerate() {
+        let Some(most) = mechanism.farthest_jump(drive) else { continue };
+        let begin = initial.position[mechanism.drives[drive].pulley] / mechanism.angle_per_input(drive);
+        if let Some((time, jump)) = input.first_jump(begin, most, until) {
+            let motor = mechanism.drives[drive].label.name;
+            let whose = if inputs.len() > 1 { format!(" of the {motor}") } else { String::new() };
+            return Err(field
+                .fail(format!("the command{whose} jumps by {} at {}", show(jump, "m"), show(time, "s")))
+                .allowed(format!("up to {} at once, two full steps: a rotor does not follow more", show(most, "m")))
+                .next("let it grow, with ramp, table or sine"));
+        }
     }
+    Ok(())
 }

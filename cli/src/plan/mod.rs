@@ -18,7 +18,7 @@ use taut_report::plan::{figures, page};
 /// Reads the case, plans, writes, tells.
 pub fn run(args: &Args) -> Outcome {
     let common = &args.common;
-    let case = common.open_motors_for(&args.case, Files::Nothing)?;
+    let case = common.open_for(&args.case, Files::Nothing)?;
     let (_, moves) = case.moves_named(&args.case, &args.moves)?;
     let places: Vec<usize> =
         (0..case.moves.len()).filter(|&k| moves.iter().any(|m| m.name == case.moves[k].name)).collect();

@@ -76,11 +76,14 @@ enum Voltage {
     Read(usize),
     /// R i + L di/dt + K_e n φ̇ of the reading of the shaft's speed behind the gear.
     Computed { speed: usize, resistance: f64, inductance: f64, back_emf: f64 },
+    /// That of no single winding: a stepper's phases have one each.
+    OfPhases,
 }
 
 impl Voltage {
     fn on(&self, curve: &Curve, current: &Polynomial) -> Polynomial {
         match *self {
+            Self::OfPhases => Polynomial([0.0; TERMS]),
             Self::Read(q) => curve.of(q),
             Self::Computed { speed, resistance, inductance, back_emf } => {
                 let (rate, speed) = (slope(current, curve.length), curve.of(speed));
@@ -156,6 +159,7 @@ impl DriveGauge {
             pulley: mechanisms_drive.pulley,
             current: find(Shown::Current(drive)).unwrap_or_default(),
             voltage: match find(Shown::Voltage(drive)) {
+                _ if motor.stepper.is_some() => Voltage::OfPhases,
                 Some(q) => Voltage::Read(q),
                 None => Voltage::Computed {
                     speed: find(Shown::Speed(mechanisms_drive.shaft, 1.0)).unwrap_or_default(),
@@ -212,7 +216,7 @@ impl<'a> Gauge<'a> {
         let (_, mechanism) = read(machine);
         let loads = machine.geometry().slides.iter().zip(profiles);
         Self {
-            meter: Meter::with(machine, &Sought::all(machine, &mechanism), Held::last(experiment)),
+            meter: Meter::with(machine, &Sought::all(machine, &mechanism), Held::last(experiment), &experiment.inputs),
             profiles,
             window,
             loads: loads.map(|load| LoadGauge::new(load, &mechanism)).collect(),
@@ -319,7 +323,7 @@ impl Observe for Gauge<'_> {
             let current = Some((&mut drive.seen.current.0, drive.current));
             let voltage = match drive.voltage {
                 Voltage::Read(q) => Some((&mut drive.seen.voltage.0, q)),
-                Voltage::Computed { .. } => None,
+                Voltage::Computed { .. } | Voltage::OfPhases => None,
             };
             for (peak, q) in [voltage, current].into_iter().flatten() {
                 for (value, time) in [(gap.from[q], gap.begin), (gap.to[q], gap.begin + gap.length)] {

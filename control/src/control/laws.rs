@@ -6,7 +6,7 @@ use super::pid::{CascadeLaw, PidLaw};
 use super::sliding::SlidingLaw;
 use super::state_feedback::StateFeedbackLaw;
 use crate::calculator::{Calculator, Slots};
-use crate::design::{Design, Structure};
+use crate::design::{Design, OpenLoop, Structure};
 use crate::error::Result;
 use crate::machine::Machine;
 use crate::machine::rigid::Rigid;
@@ -19,6 +19,7 @@ pub enum AnyLaw {
     StateFeedback(Box<StateFeedbackLaw>),
     SlidingMode(SlidingLaw),
     Fuzzy(FuzzyLaw),
+    OpenLoop(OpenLoop),
 }
 
 /// Expands an expression for each law.
@@ -30,6 +31,7 @@ macro_rules! each_law {
             AnyLaw::StateFeedback($law) => $done,
             AnyLaw::SlidingMode($law) => $done,
             AnyLaw::Fuzzy($law) => $done,
+            AnyLaw::OpenLoop($law) => $done,
         }
     };
 }
@@ -46,6 +48,7 @@ impl AnyLaw {
             }
             Structure::SlidingMode(gains) => Self::SlidingMode(SlidingLaw::new(slots, gains, &Rigid::of(model), every)),
             Structure::Fuzzy(rules) => Self::Fuzzy(FuzzyLaw::new(slots, rules, every)),
+            Structure::OpenLoop(open) => Self::OpenLoop(*open),
         })
     }
 }
@@ -70,4 +73,24 @@ impl Law for AnyLaw {
     fn limited<C: Calculator>(&self, c: &mut C, excess: C::N, effective: C::N) {
         each_law!(self, law => law.limited(c, excess, effective))
     }
+}
+
+impl Law for OpenLoop {
+    fn about(&self) -> &'static str {
+        "the reference is the command"
+    }
+
+    fn commands_current(&self) -> bool {
+        false
+    }
+
+    fn is_linear(&self) -> bool {
+        true
+    }
+
+    fn step<C: Calculator>(&self, _: &mut C, seen: &Seen<C::N>) -> C::N {
+        seen.reference.position
+    }
+
+    fn limited<C: Calculator>(&self, _: &mut C, _: C::N, _: C::N) {}
 }

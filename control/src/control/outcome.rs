@@ -100,22 +100,44 @@ pub(super) fn unrecorded(
     let mut sampled = Sampled::new(machine, controllers, *timing, profiles, false).until(experiment.until);
     let sink = &mut |_: &Trajectory| Flow::Continue;
     let observer = observer.map(|observer| observer as &mut dyn Observe);
-    let mut run = solve::Run::reading(read(machine), experiment, solver, Detail::None, observer, sink)?;
-    sampled.drive(&mut run, experiment.until, see);
-    Ok(run.finish())
+    let run = solve::Run::reading(read(machine), experiment, solver, Detail::None, observer, sink)?;
+    Ok(driven(run, machine, experiment, &mut sampled, see))
 }
 
-/// A run from rest at the start of the profiles, without inputs of its own.
+/// Runs to the end: steppers along their references, other motors as sampled controllers say.
+fn driven(
+    mut run: solve::Run,
+    machine: &Machine,
+    experiment: &Experiment,
+    sampled: &mut Sampled,
+    see: impl FnMut(f64, &State, &[f64]),
+) -> solve::Outcome {
+    if machine.stepper().is_some() {
+        return run.follow(&experiment.inputs);
+    }
+    sampled.drive(&mut run, experiment.until, see);
+    run.finish()
+}
+
+/// A run from rest at the start of the profiles; its inputs are the references of steppers, and none of other motors.
 pub(super) fn at_rest(machine: &Machine, profiles: &[Profile], until: f64, every: f64) -> Experiment {
     let starts: Vec<f64> = profiles.iter().map(Profile::start).collect();
     Experiment {
         name: String::new(),
-        inputs: vec![Signal::Step { value: 0.0, at: 0.0 }; machine.drives.len()],
+        inputs: match machine.stepper() {
+            Some(_) => machine.belt_shares().into_iter().map(|weights| commanded(profiles, weights)).collect(),
+            None => vec![Signal::Step { value: 0.0, at: 0.0 }; machine.drives.len()],
+        },
         until,
         every,
         initial: machine.without_strain(&starts, &[]),
         log: None,
     }
+}
+
+/// The position that a stepper is commanded, which is moved by each coordinate with its weight.
+fn commanded(profiles: &[Profile], weights: &[f64]) -> Signal {
+    Signal::References { profiles: profiles.to_vec(), weights: weights.to_vec() }
 }
 
 /// Runs controllers, one for each drive, along profiles, one for each coordinate, from rest at their start, for `until`
@@ -187,9 +209,8 @@ fn run(
     controllers.iter_mut().for_each(|controller| controller.reset());
     let mut sampled = Sampled::new(machine, controllers, *timing, profiles, keep).until(rows.until);
     let mut gauge = Gauge::new(machine, &experiment, profiles, rows.window);
-    let mut run = solve::Run::reading(read(machine), &experiment, solver, detail, Some(&mut gauge), sink)?;
-    sampled.drive(&mut run, experiment.until, |_, _, _| {});
-    let outcome = run.finish();
+    let run = solve::Run::reading(read(machine), &experiment, solver, detail, Some(&mut gauge), sink)?;
+    let outcome = driven(run, machine, &experiment, &mut sampled, |_, _, _| {});
     let (mut figures, metrics) = gauge.finish(&outcome.events);
     for (drive, told) in figures.drives.iter_mut().zip(&sampled.told) {
         drive.limited = told.held_back;

@@ -245,7 +245,7 @@ fn model(args: &Question, file: &Path) -> Result<(Vec<Source>, Vec<PathBuf>)> {
         return Err(error.next("leave --axis out, or give a spectrum"));
     }
     let changes: Vec<&str> = args.changes.iter().map(String::as_str).collect();
-    let case = Case::read_accepting(file, &changes, (Files::All, Accepted::Motors))?;
+    let case = Case::read_accepting(file, &changes, (Files::All, Accepted::All))?;
     let drive = args.drive.unwrap_or(Drive::Held);
     let labels: Vec<Label> = case.machine.travels().map(|(label, _)| label).collect();
     let of_coordinate = |(number, (label, letter)): (usize, (&Label, &'static str))| {

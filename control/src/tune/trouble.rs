@@ -1,4 +1,4 @@
-//! Troubles of a closed loop, as its model and its run show them: not stable, at its limit, howling.
+//! Troubles of a move, as the model of its loop and its run show them: not stable, at its limit, howling; steps lost.
 
 use super::margins::Margins;
 use super::plant::Plant;
@@ -7,7 +7,9 @@ use crate::control::MoveRun;
 use crate::control::feedback::Feedback;
 use crate::design::Design;
 use crate::linear::{Operation, travel};
-use crate::machine::{AmplifierMode, Machine};
+use crate::machine::{AmplifierMode, DriveAt, Machine};
+use crate::metrics::OfDrive;
+use crate::quantity::show;
 use crate::signal::profile::Profile;
 use std::f64::consts::PI;
 
@@ -35,6 +37,8 @@ pub enum Kind {
     Saturated,
     /// The command swings at rest.
     Howling,
+    /// A stepper lost steps.
+    LostSteps,
 }
 
 impl Kind {
@@ -44,11 +48,12 @@ impl Kind {
             Self::Unstable => "unstable",
             Self::Saturated => "saturated",
             Self::Howling => "howling",
+            Self::LostSteps => "out of step",
         }
     }
 }
 
-/// A loop that is not to be relied on.
+/// A move that is not to be relied on.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trouble {
     /// The kind.
@@ -63,6 +68,9 @@ pub struct Trouble {
 
 /// The trouble of a move as it was run; none if it has none.
 pub fn trouble(machine: &Machine, design: &Design, run: &MoveRun, motion: &Move) -> Option<Trouble> {
+    if machine.stepper().is_some() {
+        return lost_steps(machine, run);
+    }
     let targets: Vec<f64> = motion.profiles.iter().map(Profile::target).collect();
     let at = Operation::at(&targets);
     let model = unstable(machine, design, at);
@@ -89,10 +97,23 @@ pub fn trouble(machine: &Machine, design: &Design, run: &MoveRun, motion: &Move)
         Kind::Unstable => format!("the loop is unstable and oscillates{place}"),
         Kind::Saturated if frequency.is_some() => format!("the command is saturated and oscillates{place}"),
         Kind::Saturated => "the command is saturated".into(),
-        Kind::Howling => format!("the loop howls{place}"),
+        Kind::Howling | Kind::LostSteps => format!("the loop howls{place}"),
     };
     let held = if limited > 0 { format!("; {limited} of {samples} samples at the limit") } else { String::new() };
     Some(Trouble { kind, frequency, words: format!("{what}: {cause}{held}"), cause })
+}
+
+/// Steps that steppers lost, if any did.
+fn lost_steps(machine: &Machine, run: &MoveRun) -> Option<Trouble> {
+    let drives = machine.geometry().drives.iter().zip(&run.metrics.drives);
+    let of_drive = |(at, drive): (&DriveAt, &OfDrive)| {
+        let (lost, first) = drive.lost_steps.and_then(|lost| Some((lost.at_end, lost.first_slip?)))?;
+        Some(format!("the {} loses step at {} and is {lost} full steps behind at the end", at.label.name, show(first, "s")))
+    };
+    let lost: Vec<String> = drives.filter_map(of_drive).collect();
+    let cause = "its torque does not suffice for this speed and acceleration: `taut plan` finds what does".to_string();
+    let words = format!("{}: {cause}", lost.join(", and "));
+    (!lost.is_empty()).then_some(Trouble { kind: Kind::LostSteps, frequency: None, words, cause })
 }
 
 /// Where the sampled loop swings, Hz, if it is not stable; none too for structures that are not linear.
@@ -116,7 +137,7 @@ fn cause(machine: &Machine, design: &Design, kind: Kind, frequency: Option<f64>,
     let Some(hertz) = frequency else {
         return match kind {
             Kind::Saturated => "the move asks for more than the limit of the command allows".into(),
-            Kind::Unstable | Kind::Howling => "its gains are too high".into(),
+            Kind::Unstable | Kind::Howling | Kind::LostSteps => "its gains are too high".into(),
         };
     };
     let places = travel(machine, at, &[at.position]).unwrap_or_default();

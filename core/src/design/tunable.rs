@@ -3,7 +3,8 @@
 
 use super::placement::{CASCADE, least};
 use super::{
-    Cascade, CurrentLoop, Design, FeedForwardModel, Filter, Fuzzy, Pid, SlidingMode, StateFeedback, Structure,
+    Cascade, CurrentLoop, Design, FeedForwardModel, Filter, Fuzzy, OpenLoop, Pid, SlidingMode, StateFeedback,
+    Structure,
 };
 use crate::machine::Machine;
 use crate::machine::rigid::Rigid;
@@ -489,6 +490,64 @@ impl Tunable for Fuzzy {
     }
 
     /// Drives have no such gains.
+    fn in_drives(&self) -> Vec<InDrives> {
+        Vec::new()
+    }
+}
+
+impl Tunable for OpenLoop {
+    fn word(&self) -> &'static str {
+        "open_loop"
+    }
+
+    fn name(&self) -> &'static str {
+        "open loop"
+    }
+
+    fn reads_scale(&self) -> bool {
+        false
+    }
+
+    fn follows_scale(&self) -> bool {
+        false
+    }
+
+    fn commands_current(&self) -> bool {
+        false
+    }
+
+    fn feed_forward(&self) -> FeedForwardModel {
+        FeedForwardModel::None
+    }
+
+    fn tuned_by(&self) -> TunedBy {
+        TunedBy::Nothing
+    }
+
+    fn placed(&self, _: &Design, _: &Machine, _: f64, _: f64) -> Option<Structure> {
+        None
+    }
+
+    fn starts(&self, _: &Design, _: &Machine) -> Vec<Structure> {
+        Vec::new()
+    }
+
+    fn integral_times(&self, _: f64) -> Option<Structure> {
+        None
+    }
+
+    fn ramp(&self) -> f64 {
+        0.0
+    }
+
+    fn lacks_damping(&self) -> bool {
+        false
+    }
+
+    fn costs(&self) -> u64 {
+        QUICK
+    }
+
     fn in_drives(&self) -> Vec<InDrives> {
         Vec::new()
     }

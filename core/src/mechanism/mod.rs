@@ -43,8 +43,8 @@ pub const SPRINGS: usize = 8;
 pub const DRIVES: usize = 3;
 /// Room for both together: three drives leave room for one body fewer than two.
 pub const BODIES_AND_DRIVES: usize = BODIES + 2;
-/// Room for currents that are states: one of each brushed motor, or both of a stepper.
-pub const CURRENTS: usize = DRIVES;
+/// Room for currents that are states: one of each brushed motor, both of each of two steppers.
+pub const CURRENTS: usize = 4;
 
 /// Names of a part: for programs and for people.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

@@ -168,10 +168,11 @@ pub static FIGURES: &[FigureRow] = &[
     row(Whole, "peak_belt_force", "N", "largest force in the belt", |m, _| Worth::Peak(m.largest_force().1)).seeking(Seek::Force),
     row(Motor, "peak_*_current", "A", "peak current of the *", |m, k| Worth::Peak(m.drives[k].peak_current)).seeking(Seek::Current)
         .on_an_axis("peak_motor_current", "peak motor current"),
-    row(Whole, "lost_steps", "", "full steps lost at the end", |m, _| Number(m.stepper.map_or(f64::NAN, |own| own.lost_steps as f64))).of_steppers(),
-    row(Whole, "in_step", "", "in step all the way", |m, _| Flag(m.stepper.is_some_and(|own| own.slips == 0))).of_steppers(),
-    row(Whole, "position_error", "m", "commanded minus cart position at the end", |m, _| Number(m.stepper.map_or(f64::NAN, |own| own.position_error)))
-        .of_steppers(),
+    row(Motor, "*_lost_steps", "", "full steps lost by the * at the end", |m, k| Number(m.drives[k].lost_steps.map_or(f64::NAN, |own| own.at_end as f64)))
+        .of_steppers().on_an_axis("lost_steps", "full steps lost at the end"),
+    row(Whole, "in_step", "", "in step all the way", |m, _| Flag(m.in_step())).of_steppers(),
+    row(Load, "*_position_error", "m", "commanded minus * position at the end", |m, k| Number(m.loads[k].command_error.unwrap_or(f64::NAN)))
+        .of_steppers().on_an_axis("position_error", "commanded minus cart position at the end"),
     row(Whole, "stop_time", "s", "time of the last stop", |m, _| Number(m.stop_time.unwrap_or(f64::NAN))).seeking(Seek::StopTime),
     row(Whole, "settled", "", "at rest at the end", |m, _| Flag(m.settled)),
     row(Body, "*_stops", "", "stops of the *", |m, k| Number(m.bodies[k].stops as f64)),

@@ -2,12 +2,13 @@
 
 use super::rotor::Rotor;
 use super::steady::{Held, Plateau};
-use super::{EventCount, Metrics, NEWS, OfDrive, OfLoad, OfSpan, OfStepper, Peak, Seek};
+use super::{EventCount, LostSteps, Metrics, NEWS, OfDrive, OfLoad, OfSpan, Peak, Seek};
 use crate::friction::Motion;
 use crate::machine::{Machine, Stepper};
-use crate::mechanism::{Mechanism, Mode, Shown, State, Status};
+use crate::mechanism::{Mechanism, Mode, Shown, State, Status, What};
 use crate::plan::Experiment;
-use crate::solve::{Closer, Curve, Event, Gap, Gaps, Observe, Polynomial, QUANTITIES, Reading, Stretch, reading};
+use crate::signal::Signal;
+use crate::solve::{Closer, Curve, Event, Gap, Gaps, Observe, Polynomial, QUANTITIES, Reading, Stretch};
 use std::sync::Arc;
 
 /// Where the peak of a quantity is sought: in a reading, or in a sum of readings.
@@ -182,8 +183,8 @@ pub struct Meter {
     sums: Vec<Peak>,
     plateau: Option<Plateau>,
     rotors: Vec<(usize, Rotor)>,
-    /// The last commanded position of a stepper, m.
-    told: Option<f64>,
+    /// Positions commanded of steppers; empty of other motors.
+    commands: Vec<Signal>,
     /// True if any body slid or was free.
     moved: bool,
     end: f64,
@@ -194,11 +195,12 @@ pub struct Meter {
 impl Meter {
     /// A meter for all figures of a run of `experiment` on `machine`.
     pub fn new(machine: &Machine, experiment: &Experiment) -> Self {
-        Self::with(machine, &Sought::all(machine, &machine.mechanism()), Held::last(experiment))
+        let sought = Sought::all(machine, &machine.mechanism());
+        Self::with(machine, &sought, Held::last(experiment), &experiment.inputs)
     }
 
-    /// A meter for these figures, where the last stretch of constant input is known.
-    pub fn with(machine: &Machine, sought: &Sought, held: Option<Held>) -> Self {
+    /// A meter for these figures of a run with these inputs, where their last stretch of a constant value is known.
+    pub fn with(machine: &Machine, sought: &Sought, held: Option<Held>, inputs: &[Signal]) -> Self {
         let sums = if sought.sums { sought.places.sums.len() } else { 0 };
         Self {
             machine: machine.clone(),
@@ -207,7 +209,7 @@ impl Meter {
             sums: vec![Peak::default(); sums],
             plateau: held.filter(|_| sought.steady_speed).map(Plateau::new),
             rotors: sought.places.rotors.iter().map(|&(body, reading)| (body, Rotor::new(reading))).collect(),
-            told: machine.stepper().map(|_| 0.0),
+            commands: if machine.stepper().is_some() { inputs.to_vec() } else { Vec::new() },
             moved: false,
             end: 0.0,
             state: State::default(),
@@ -241,6 +243,20 @@ impl Meter {
         mode.motion[..self.sought.places.bodies].iter().any(|motion| *motion != Motion::Stuck)
     }
 
+    /// Positions of what slides that the commands of steppers ask for at the end, without stretch, m.
+    fn commanded(&self) -> Vec<f64> {
+        if self.commands.is_empty() {
+            return Vec::new();
+        }
+        let (mechanism, mut state) = (self.machine.mechanism(), State::default());
+        for (drive, command) in self.commands.iter().enumerate() {
+            let step = mechanism.microstep(drive).unwrap_or(f64::NAN);
+            let input = (command.value(self.end) / step).round() * step;
+            state.position[mechanism.drives[drive].pulley] = input * mechanism.angle_per_input(drive);
+        }
+        self.machine.by_drives(&state.position)
+    }
+
     /// The metrics of the run that was observed and whose events these are.
     pub fn finish(self, events: &[Event]) -> Metrics {
         let (places, machine, state) = (&*self.sought.places, &self.machine, &self.state);
@@ -264,12 +280,14 @@ impl Meter {
             None => Some(0.0).filter(|_| !self.moved),
         };
         let settled = self.bodies_rest && rotors_rest;
+        let commanded = self.commanded();
         let load = |(number, (slide, by_drives)): (usize, (&crate::machine::SlideAt, f64))| OfLoad {
             position: state.position[slide.body],
             speed: state.speed[slide.body],
             by_drives,
             peak_speed: peak(places.load_speeds.get(number)),
             peak_error: peak(places.load_errors.get(number)),
+            command_error: commanded.get(number).map(|commanded| commanded - state.position[slide.body]),
         };
         let drive = |(number, at): (usize, &crate::machine::DriveAt)| OfDrive {
             angle: state.position[at.pulley],
@@ -277,6 +295,7 @@ impl Meter {
             peak_belt_speed: places.belt_speeds.get(number).map(|place| peak(Some(place))),
             peak_speed: peak(places.shaft_speeds.get(number)),
             peak_current: peak(places.currents.get(number)),
+            lost_steps: machine.drives[number].motor.stepper.map(|_| lost_steps(events, number)),
         };
         let span = |span: usize| OfSpan {
             peak_stretch: peak(places.stretches.get(span)),
@@ -291,21 +310,20 @@ impl Meter {
             steady_speed: self.plateau.as_ref().and_then(|plateau| plateau.steady_speed(machine)),
             stop_time: last.map(|time| time.max(turned)).filter(|_| settled),
             settled,
-            stepper: self.told.map(|told| of_stepper(events, told - state.position[geometry.cart()])),
             bodies_rest: self.bodies_rest,
             rotors_rest,
         }
     }
 }
 
-/// The figures of a stepper with these events and this error at the end.
-fn of_stepper(events: &[Event], position_error: f64) -> OfStepper {
-    let mut own = OfStepper { position_error, ..OfStepper::default() };
-    for event in events {
+/// Steps that a drive lost in these events.
+fn lost_steps(events: &[Event], drive: usize) -> LostSteps {
+    let mut own = LostSteps::default();
+    for event in events.iter().filter(|event| event.part.what == What::Field(drive)) {
         if let (Status::Slipped(from), Status::Slipped(to)) = (event.from, event.to) {
             own.first_slip = own.first_slip.or(Some(event.time));
             own.slips += u64::from(to.abs_diff(from));
-            own.lost_steps = i64::from(to) * i64::from(Stepper::STEPS_PER_TOOTH);
+            own.at_end = i64::from(to) * i64::from(Stepper::STEPS_PER_TOOTH);
         }
     }
     own
@@ -360,9 +378,6 @@ impl Observe for Meter {
 
     fn pass(&mut self, gap: &Gap) -> bool {
         let end = gap.begin + gap.length;
-        if let Some(told) = &mut self.told {
-            *told = gap.to[reading::VOLTAGE];
-        }
         let (news, mut closer) = gap.rises_above(&self.heights(), [1.0 - NEWS, 1.0 + NEWS]);
         if news {
             for (q, peak) in self.sought() {

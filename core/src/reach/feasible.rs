@@ -2,6 +2,7 @@
 
 use super::compensation::{Compensation, direction};
 use super::forward::Forward;
+use super::pull_out::Curve;
 use crate::design::{FeedForward, FeedForwardModel};
 use crate::machine::rigid::Rigid;
 use crate::machine::{AmplifierMode, Machine};
@@ -14,7 +15,7 @@ const INSTANTS: usize = 4000;
 /// A limit that a reference needs more than.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Shortfall {
-    /// `voltage`, `current`, `breakaway`, `travel`, `slack`, `tension` or `teeth`.
+    /// `voltage`, `current`, `pull_out`, `breakaway`, `travel`, `slack`, `tension` or `teeth`.
     pub limit: &'static str,
     /// When most is needed, s.
     pub time: f64,
@@ -24,7 +25,7 @@ pub struct Shortfall {
     pub needed: f64,
     /// Limit.
     pub allowed: f64,
-    /// V, A, N or m.
+    /// V, A, N, N m or m.
     pub unit: &'static str,
     /// All of it in a sentence.
     pub words: String,
@@ -47,21 +48,32 @@ struct Need {
     spans: [f64; 3],
 }
 
+/// A quantity at one instant of a reference.
+type AtInstant = Box<dyn Fn(&Need) -> f64>;
+
 /// A limit of the machine and the need that it bounds, with the words before, behind and after what is needed.
 struct Demand {
     limit: &'static str,
     unit: &'static str,
-    allowed: f64,
-    needed: Box<dyn Fn(&Need) -> f64>,
+    allowed: AtInstant,
+    needed: AtInstant,
     words: [&'static str; 3],
+}
+
+impl Demand {
+    /// The instant that takes the largest share of the limit, what it needs, and what is allowed there.
+    fn most<'a>(&self, needs: &'a [Need]) -> Option<(&'a Need, [f64; 2])> {
+        let both = needs.iter().map(|need| (need, [(self.needed)(need), (self.allowed)(need)]));
+        both.max_by(|(_, [a, of_a]), (_, [b, of_b])| (a / of_a).total_cmp(&(b / of_b)))
+    }
 }
 
 /// Most that a reference needs of something limited, and the limit, both in `unit`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Load {
-    /// `voltage`, `current`, `slack`, `tension` or `teeth`.
+    /// `voltage`, `current`, `pull_out`, `slack`, `tension` or `teeth`.
     pub limit: &'static str,
-    /// V, A or N.
+    /// V, A, N or N m.
     pub unit: &'static str,
     /// Largest requirement.
     pub needed: f64,
@@ -84,9 +96,9 @@ impl Load {
         }
     }
 
-    /// True if the motor's supply bounds it, of which a loop needs some for itself.
-    pub fn is_electrical(&self) -> bool {
-        ["V", "A"].contains(&self.unit)
+    /// True if the motor or its supply bounds it, of which a loop needs some for itself, and a stepper for its swinging.
+    pub fn is_of_motor(&self) -> bool {
+        ["voltage", "current", "pull_out"].contains(&self.limit)
     }
 }
 
@@ -98,9 +110,8 @@ fn demands(machine: &Machine, limit: Option<f64>) -> Vec<Demand> {
     let off = |need: &Need| -need.spans.iter().copied().fold(0.0, f64::min);
     let tension = move |need: &Need| pretension + need.spans.iter().copied().fold(0.0, f64::max);
     let carried = belt.sheet.mesh(machine.pulley_radius).and_then(|(_, carried)| carried);
-    type Needed = Box<dyn Fn(&Need) -> f64>;
-    let demand = |(limit, unit), allowed: Option<f64>, needed: Needed, words| {
-        allowed.map(|allowed| Demand { limit, unit, allowed, needed, words })
+    let demand = |(limit, unit), allowed: Option<f64>, needed: AtInstant, words| {
+        allowed.map(|allowed| Demand { limit, unit, allowed: Box::new(move |_| allowed), needed, words })
     };
     let all = [
         demand(
@@ -122,7 +133,20 @@ fn demands(machine: &Machine, limit: Option<f64>) -> Vec<Demand> {
             ["takes", " at the drive pulley", "; the teeth in mesh carry"],
         ),
     ];
-    electrical(volts, amperes).into_iter().chain(all.into_iter().flatten()).collect()
+    let of_motor = electrical(volts, amperes).into_iter().chain(pull_out(machine, 0));
+    of_motor.chain(all.into_iter().flatten()).collect()
+}
+
+/// The demand on a stepper; none on another motor.
+fn pull_out(machine: &Machine, drive: usize) -> Option<Demand> {
+    let (curve, r) = (Curve::of(&machine.drives[drive])?, machine.pulley_radius);
+    Some(Demand {
+        limit: "pull_out",
+        unit: "N m",
+        allowed: Box::new(move |need| curve.torque(need.at.y.speed / r)),
+        needed: Box::new(move |need| (r * need.force).abs()),
+        words: ["needs", " from the motor", "; its pull-out torque at that speed is"],
+    })
 }
 
 /// The demands on a motor with these limits of voltage and current.
@@ -130,11 +154,11 @@ fn electrical(volts: Option<f64>, amperes: Option<f64>) -> Vec<Demand> {
     let words = ["needs", "", "; the limit is"];
     let voltage = volts.map(|allowed| {
         let needed = Box::new(|need: &Need| need.voltage.abs());
-        Demand { limit: "voltage", unit: "V", allowed, needed, words }
+        Demand { limit: "voltage", unit: "V", allowed: Box::new(move |_| allowed), needed, words }
     });
     let current = amperes.map(|allowed| {
         let needed = Box::new(|need: &Need| need.current.abs());
-        Demand { limit: "current", unit: "A", allowed, needed, words }
+        Demand { limit: "current", unit: "A", allowed: Box::new(move |_| allowed), needed, words }
     });
     voltage.into_iter().chain(current).collect()
 }
@@ -143,8 +167,8 @@ fn electrical(volts: Option<f64>, amperes: Option<f64>) -> Vec<Demand> {
 /// the one that needs most of it.
 pub fn loads(machine: &Machine, limit: Option<f64>, profiles: &[Profile], instants: usize) -> Vec<Load> {
     let load = |needs: &[Need], demand: Demand| {
-        let needed = needs.iter().map(&demand.needed).fold(0.0, f64::max);
-        Load { limit: demand.limit, unit: demand.unit, needed, allowed: demand.allowed }
+        let [needed, allowed] = demand.most(needs).map_or([0.0, 1.0], |(_, both)| both);
+        Load { limit: demand.limit, unit: demand.unit, needed: needed.max(0.0), allowed }
     };
     if let [profile] = profiles {
         let needs = needs(machine, profile, instants);
@@ -154,7 +178,8 @@ pub fn loads(machine: &Machine, limit: Option<f64>, profiles: &[Profile], instan
     for drive in 0..machine.drives.len() {
         let needs = needs_of_drive(machine, drive, profiles, instants);
         let (volts, amperes) = limits_of(machine, drive, limit);
-        electrical(volts, amperes).into_iter().for_each(|demand| load(&needs, demand).join(&mut all));
+        let demands = electrical(volts, amperes).into_iter().chain(pull_out(machine, drive));
+        demands.for_each(|demand| load(&needs, demand).join(&mut all));
     }
     all
 }
@@ -179,8 +204,9 @@ fn of_drive(machine: &Machine, limit: Option<f64>, drive: usize, profiles: &[Pro
     let needs = needs_of_drive(machine, drive, profiles, INSTANTS);
     let name = machine.geometry().drives[drive].label.name;
     let (volts, amperes) = limits_of(machine, drive, limit);
-    let electrical = electrical(volts, amperes).into_iter().filter_map(|demand| exceeded(&needs, &demand));
-    electrical.map(|short| Shortfall { words: format!("{name}: {}", short.words), ..short }).collect()
+    let demands = electrical(volts, amperes).into_iter().chain(pull_out(machine, drive));
+    let exceeded = demands.filter_map(|demand| exceeded(&needs, &demand));
+    exceeded.map(|short| Shortfall { words: format!("{name}: {}", short.words), ..short }).collect()
 }
 
 /// Needs of one of several drives, with rigid belts.
@@ -234,16 +260,19 @@ fn most<T>(instants: &[T], allowed: f64, needed: impl Fn(&T) -> f64) -> Option<&
 
 /// The limit where the motion exceeds it.
 fn exceeded(needs: &[Need], demand: &Demand) -> Option<Shortfall> {
-    let Demand { limit, unit, allowed, needed, words: [comes_by, behind, there] } = demand;
-    let need = most(needs, *allowed, needed)?;
+    let &Demand { limit, unit, words: [comes_by, behind, there], .. } = demand;
+    let (need, [needed, allowed]) = demand.most(needs)?;
+    if needed - allowed <= 1e-9 * allowed.abs().max(1.0) {
+        return None;
+    }
     let (speed, acceleration) = (told(need.at.y.speed.abs(), "m/s"), told(need.at.y.acceleration.abs(), "m/s^2"));
     let words = format!(
         "{acceleration} at {speed} {comes_by} {}{behind} ({}){there} {}",
-        told(needed(need), unit),
+        told(needed, unit),
         need.at.when(),
-        told(*allowed, unit)
+        told(allowed, unit)
     );
-    Some(need.at.beyond(limit, [needed(need), *allowed], unit, words))
+    Some(need.at.beyond(limit, [needed, allowed], unit, words))
 }
 
 /// The voltage, where the largest speed needs too much of it without any acceleration.
@@ -291,6 +320,9 @@ fn of_slide(machine: &Machine, limit: Option<f64>, number: usize, profile: &Prof
 /// The force that moves a slide from rest with all that turns then, where the motors give less at standstill.
 fn of_breakaway(machine: &Machine, limit: Option<f64>, number: usize, instants: &[Instant]) -> Option<Shortfall> {
     let at_standstill = |drive: usize| {
+        if let Some(curve) = Curve::of(&machine.drives[drive]) {
+            return Some(curve.torque(0.0) / machine.pulley_radius);
+        }
         let (volts, amperes) = limits_of(machine, drive, limit);
         let (current, voltage) = Rigid::of_pulley(machine, drive).electrical(1.0, 0.0, 0.0);
         let force = [volts.map(|volts| volts / voltage), amperes.map(|amperes| amperes / current)];
@@ -340,7 +372,8 @@ fn limits_of(machine: &Machine, drive: usize, limit: Option<f64>) -> (Option<f64
     let least = |a: Option<f64>, b: Option<f64>| a.into_iter().chain(b).reduce(f64::min);
     match amplifier.mode {
         AmplifierMode::Voltage => (least(amplifier.voltage_limit, commanded), amplifier.current_limit),
-        AmplifierMode::Position => (amplifier.voltage_limit, amplifier.current_limit),
+        // Its limit is the pull-out torque.
+        AmplifierMode::Position => (None, None),
         AmplifierMode::Current => (amplifier.voltage_limit, least(amplifier.current_limit, commanded)),
     }
 }

@@ -8,20 +8,27 @@
 //! ```
 //!
 //! That is the torque in steady motion: a rotor that swings in its field is lost earlier.
+//!
+//! Below a speed the chopper's regulator has voltage left, and the currents lag by the same angle at any δ: then
+//!
+//! ```text
+//! T = T_h / √(1 + (N ω/ω_c)²)   while   (R A + K_m ω)² + (N ω L A)² ≤ V²,   A = √2 I / √(1 + (N ω/ω_c)²)
+//! ```
 
 use crate::golden;
-use crate::machine::Machine;
 use crate::machine::rigid::Rigid;
+use crate::machine::{DriveUnit, Machine};
 use crate::mechanism::Phases;
 use std::f64::consts::{FRAC_PI_4, PI};
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// Steps of a period at least, and the longest one as a share of the fastest time constant.
 const STEPS: f64 = 240.0;
 const FINE: f64 = 0.5;
 
 /// Angles at which the largest torque is looked for at first, and golden sections between them.
-const ANGLES: usize = 24;
-const SECTIONS: usize = 24;
+const ANGLES: usize = 12;
+const SECTIONS: usize = 16;
 
 /// Periods at most until the current repeats itself, and the share of its amplitude that it may miss by.
 const PERIODS: usize = 400;
@@ -33,8 +40,74 @@ const SLOW: f64 = 4.0;
 /// Speeds between rest and the largest at which an acceleration is checked.
 const SPEEDS: usize = 24;
 
+/// Number of speeds of a [`Curve`] beyond the one to which the regulator has voltage left, and the largest as a multiple
+/// of that.
+const KEPT: usize = 16;
+const FASTEST: f64 = 32.0;
+
+/// Pull-out torque of a stepper over its speed, from a table.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Curve {
+    phases: Phases,
+    /// rad/s, the first zero.
+    speeds: Vec<f64>,
+    /// N m
+    torques: Vec<f64>,
+}
+
+/// Curves that were made last: a search asks again and again for those of the same motors.
+static KNOWN: Mutex<Vec<Arc<Curve>>> = Mutex::new(Vec::new());
+const REMEMBERED: usize = 64;
+
+impl Curve {
+    /// Curve of a motor with its driver; none of a motor that is no stepper.
+    pub fn of(unit: &DriveUnit) -> Option<Arc<Self>> {
+        let phases = Phases::of_motor(&unit.motor, &unit.amplifier)?;
+        let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(curve) = known.iter().find(|curve| curve.phases == phases) {
+            return Some(curve.clone());
+        }
+        let curve = Arc::new(Self::new(phases));
+        if known.len() == REMEMBERED {
+            known.remove(0);
+        }
+        known.push(curve.clone());
+        Some(curve)
+    }
+
+    fn new(phases: Phases) -> Self {
+        // Where the back-EMF alone is the supply, no voltage is left.
+        let (mut low, mut high) = (0.0, phases.supply / phases.torque_constant);
+        for _ in 0..50 {
+            let middle = 0.5 * (low + high);
+            if regulated(&phases, middle).is_some() { low = middle } else { high = middle }
+        }
+        // A driver that sets the voltage has no such speed: there the resistance is as large as the reactance.
+        let corner = match phases.regulator {
+            Some(_) => high,
+            None => phases.resistance / phases.inductance / phases.teeth,
+        };
+        let at = |k: usize| corner * FASTEST.powf(k as f64 / KEPT as f64);
+        let speeds: Vec<f64> = std::iter::once(0.0).chain((0..=KEPT).map(at)).collect();
+        let torques = speeds.iter().map(|speed| torque(&phases, *speed)).collect();
+        Self { phases, speeds, torques }
+    }
+
+    /// The torque at a speed, rad/s, N m: beyond the last speed zero.
+    pub fn torque(&self, speed: f64) -> f64 {
+        let speed = speed.abs();
+        if let Some(torque) = regulated(&self.phases, speed) {
+            return torque;
+        }
+        let next = self.speeds.partition_point(|own| *own <= speed);
+        let (Some(last), Some(after)) = (next.checked_sub(1), self.speeds.get(next)) else { return 0.0 };
+        let share = (speed - self.speeds[last]) / (after - self.speeds[last]);
+        self.torques[last] + share * (self.torques[next] - self.torques[last])
+    }
+}
+
 /// A stepper and all that it moves, as one mass.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PullOut {
     phases: Phases,
     rigid: Rigid,
@@ -54,59 +127,12 @@ impl PullOut {
 
     /// Full steps per second at a speed of the rotor, rad/s.
     pub fn steps_per_second(&self, speed: f64) -> f64 {
-        4.0 * self.phases.teeth * speed / (2.0 * PI)
+        steps_per_second(&self.phases, speed)
     }
 
     /// The pull-out torque at a speed of the rotor, rad/s, N m.
     pub fn torque(&self, speed: f64) -> f64 {
-        let at = |k: usize| PI * k as f64 / ANGLES as f64;
-        let torques: Vec<f64> = (0..=ANGLES).map(|k| self.mean_torque(speed, at(k))).collect();
-        let best = (0..=ANGLES).fold(0, |best, k| if torques[k] > torques[best] { k } else { best });
-        let about = [at(best.saturating_sub(1)), at((best + 1).min(ANGLES))];
-        let lead = golden::top(about, SECTIONS, |lead| self.mean_torque(speed, lead));
-        self.mean_torque(speed, lead).max(torques[best]).max(0.0)
-    }
-
-    /// T(δ) at this speed, N m.
-    fn mean_torque(&self, speed: f64, lead: f64) -> f64 {
-        let phases = &self.phases;
-        if self.steps_per_second(speed) < SLOW {
-            // At rest τ = K_m (−i_a sin ε + i_b cos ε), and nothing of it changes with ε.
-            let angle = -FRAC_PI_4 / phases.teeth;
-            let [a, b] = phases.at_rest(angle + lead / phases.teeth);
-            let free = Phases { detent_torque: 0.0, ..*phases };
-            return free.torque(angle, [a, b]).0;
-        }
-        let period = 2.0 * PI / (phases.teeth * speed);
-        let fastest = (phases.resistance / phases.inductance).max(phases.regulator.unwrap_or(0.0));
-        let steps = STEPS.max((period * fastest / FINE).ceil());
-        let h = period / steps;
-        let rate = |time: f64, current: f64| {
-            // ε is zero where time is.
-            let angle = speed * time - FRAC_PI_4 / phases.teeth;
-            let beyond = phases.rate(0, angle, speed, current, angle + lead / phases.teeth).value;
-            beyond - phases.resistance / phases.inductance * current
-        };
-        let (mut current, mut torque) = (0.0, 0.0);
-        for _ in 0..PERIODS {
-            let before: f64 = current;
-            torque = 0.0;
-            for step in 0..steps as usize {
-                let time = h * step as f64;
-                let k1 = rate(time, current);
-                let k2 = rate(time + 0.5 * h, current + 0.5 * h * k1);
-                let k3 = rate(time + 0.5 * h, current + 0.5 * h * k2);
-                let k4 = rate(time + h, current + h * k3);
-                let next = current + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4);
-                let sine = |time: f64| (phases.teeth * speed * time).sin();
-                torque -= phases.torque_constant * (current * sine(time) + next * sine(time + h)) / steps;
-                current = next;
-            }
-            if (current - before).abs() <= REPEATS * phases.amplitude {
-                break;
-            }
-        }
-        torque
+        torque(&self.phases, speed)
     }
 
     /// The largest constant acceleration, m/s², with which it goes over this way, m: half of it up and half of it down,
@@ -143,5 +169,116 @@ impl PullOut {
             least = least.min(*own);
         }
         least.min(top * top / way).max(0.0)
+    }
+}
+
+/// The pull-out torque at a speed of the rotor, rad/s, N m.
+fn torque(phases: &Phases, speed: f64) -> f64 {
+    if let Some(torque) = regulated(phases, speed) {
+        return torque;
+    }
+    let at = |k: usize| PI * k as f64 / ANGLES as f64;
+    // The current of one angle is near that of the next.
+    let mut current = 0.0;
+    let mut torque = |lead: f64| mean_torque(phases, speed, lead, &mut current);
+    let torques: Vec<f64> = (0..=ANGLES).map(|k| torque(at(k))).collect();
+    let best = (0..=ANGLES).fold(0, |best, k| if torques[k] > torques[best] { k } else { best });
+    let about = [at(best.saturating_sub(1)), at((best + 1).min(ANGLES))];
+    let lead = golden::top(about, SECTIONS, &mut torque);
+    torque(lead).max(torques[best]).max(0.0)
+}
+
+/// The pull-out torque at a speed, rad/s, to which the regulator of a chopper has voltage left, N m; none beyond.
+fn regulated(phases: &Phases, speed: f64) -> Option<f64> {
+    let electrical = phases.teeth * speed.abs();
+    let falls = (1.0 + (electrical / phases.regulator?).powi(2)).sqrt();
+    let amplitude = phases.amplitude / falls;
+    let resisting = phases.resistance * amplitude + phases.torque_constant * speed.abs();
+    let voltage = resisting.hypot(electrical * phases.inductance * amplitude);
+    (voltage <= phases.supply).then_some(phases.torque_constant * amplitude)
+}
+
+/// T(δ) at this speed, N m, and the phase current at the end of a period, A, to begin another with.
+fn mean_torque(phases: &Phases, speed: f64, lead: f64, begin: &mut f64) -> f64 {
+    if steps_per_second(phases, speed) < SLOW {
+        // At rest τ = K_m (−i_a sin ε + i_b cos ε), and nothing of it changes with ε.
+        let angle = -FRAC_PI_4 / phases.teeth;
+        let [a, b] = phases.at_rest(angle + lead / phases.teeth);
+        let free = Phases { detent_torque: 0.0, ..*phases };
+        return free.torque(angle, [a, b]).0;
+    }
+    let period = 2.0 * PI / (phases.teeth * speed);
+    let fastest = (phases.resistance / phases.inductance).max(phases.regulator.unwrap_or(0.0));
+    let steps = STEPS.max((period * fastest / FINE).ceil());
+    let h = period / steps;
+    let rate = |time: f64, current: f64| {
+        // ε is zero where time is.
+        let angle = speed * time - FRAC_PI_4 / phases.teeth;
+        let beyond = phases.rate(0, angle, speed, current, angle + lead / phases.teeth).value;
+        beyond - phases.resistance / phases.inductance * current
+    };
+    let (mut current, mut torque) = (*begin, 0.0);
+    for _ in 0..PERIODS {
+        let before: f64 = current;
+        torque = 0.0;
+        for step in 0..steps as usize {
+            let time = h * step as f64;
+            let k1 = rate(time, current);
+            let k2 = rate(time + 0.5 * h, current + 0.5 * h * k1);
+            let k3 = rate(time + 0.5 * h, current + 0.5 * h * k2);
+            let k4 = rate(time + h, current + h * k3);
+            let next = current + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4);
+            let sine = |time: f64| (phases.teeth * speed * time).sin();
+            torque -= phases.torque_constant * (current * sine(time) + next * sine(time + h)) / steps;
+            current = next;
+        }
+        if (current - before).abs() <= REPEATS * phases.amplitude {
+            break;
+        }
+    }
+    *begin = current;
+    torque
+}
+
+/// Full steps per second at a speed of the rotor, rad/s.
+fn steps_per_second(phases: &Phases, speed: f64) -> f64 {
+    4.0 * phases.teeth * speed / (2.0 * PI)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PHASES: Phases = Phases {
+        teeth: 50.0,
+        torque_constant: 0.16,
+        detent_torque: 0.0,
+        resistance: 1.4,
+        inductance: 3e-3,
+        supply: 24.0,
+        amplitude: 2.83,
+        regulator: Some(2.0 * PI * 1e4),
+    };
+
+    /// The closed form is the largest mean torque of the integrated currents.
+    #[test]
+    fn a_regulator_with_voltage_left_gives_the_torque_of_its_integrated_currents() {
+        for speed in [5.0, 20.0, 25.0] {
+            let closed = regulated(&PHASES, speed).unwrap();
+            let leads = (0..200).map(|k| PI * f64::from(k) / 200.0);
+            let most = leads.map(|lead| mean_torque(&PHASES, speed, lead, &mut 0.0)).fold(0.0, f64::max);
+            assert!((closed / most - 1.0).abs() < 2e-4, "{speed} rad/s: {closed} N m, integrated {most} N m");
+        }
+    }
+
+    #[test]
+    fn between_its_speeds_a_curve_is_near_the_torque() {
+        for phases in [PHASES, Phases { regulator: None, supply: 3.9, ..PHASES }] {
+            let curve = Curve::new(phases);
+            for speed in [3.0, 30.0, 47.0, 80.0, 111.0, 160.0] {
+                let (near, exact) = (curve.torque(speed), torque(&phases, speed));
+                assert!((near - exact).abs() < 0.02 * phases.torque_constant * phases.amplitude, "{speed}: {near}, {exact}");
+            }
+        }
     }
 }

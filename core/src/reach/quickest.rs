@@ -153,7 +153,8 @@ impl Quickest<'_> {
             return Err(Error::new(format!("there is no plan: {}", short.words)));
         }
         let (volts, amperes) = limits(self.machine, self.design.limit);
-        if volts.is_none() && amperes.is_none() && (self.wanted.speed.is_none() || self.wanted.acceleration.is_none()) {
+        let is_limited = volts.is_some() || amperes.is_some() || self.machine.stepper().is_some();
+        if !is_limited && (self.wanted.speed.is_none() || self.wanted.acceleration.is_none()) {
             return Err(Error::new("there is no plan: neither voltage nor current is limited")
                 .next("give limit in [controller], amplifier.voltage_limit, or a speed and an acceleration"));
         }
@@ -198,7 +199,7 @@ impl Quickest<'_> {
             let profiles = self.design.shaped(&way.within(&limits)?);
             // Looked at more closely, the axis needs a little more than during the search.
             let closely = loads(self.machine, self.design.limit, &profiles, CLOSELY);
-            let most = closely.iter().map(|load| load.share() / if load.is_electrical() { wanted } else { 1.0 });
+            let most = closely.iter().map(|load| load.share() / if load.is_of_motor() { wanted } else { 1.0 });
             let most = most.fold(others(&profiles), f64::max);
             if most <= 1.0 {
                 return Ok(Some(limits));
@@ -276,6 +277,6 @@ impl Quickest<'_> {
     fn is_within(&self, way: &Way, limits: &Limits, share: f64) -> bool {
         let Ok(profiles) = way.within(limits) else { return false };
         let loads = loads(self.machine, self.design.limit, &self.design.shaped(&profiles), INSTANTS);
-        loads.iter().all(|load| load.share() <= if load.is_electrical() { share } else { 1.0 })
+        loads.iter().all(|load| load.share() <= if load.is_of_motor() { share } else { 1.0 })
     }
 }

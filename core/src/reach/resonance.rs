@@ -16,7 +16,8 @@ const LEAST: f64 = 1e-3;
 /// The state of the drive pulley.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Drive {
-    /// A position loop or a stepper motor makes it follow its command: what vibrates is the cart on its belt.
+    /// A position loop makes it follow its command: what vibrates is the cart on its belt. A stepper holds it by the
+    /// stiffness of its field, so that its rotor vibrates, too.
     #[default]
     Held,
     /// The motor's torque is commanded and the pulley gives way: the resonance of the open loop.
@@ -153,7 +154,8 @@ fn at(machine: &Machine, (drive, coordinate): (Drive, usize), slides: &[f64]) ->
     // Drive pulleys that are held, the first bodies, are no coordinates, but what they do is felt through their columns
     // of K.
     let drives = geometry.drives.len();
-    let first = if drive == Drive::Held { drives } else { 0 };
+    let fields: Option<Vec<f64>> = machine.drives.iter().map(|unit| unit.motor.field_stiffness()).collect();
+    let first = if drive == Drive::Held && fields.is_none() { drives } else { 0 };
     let size = m.nrows() - first;
     let part = |a: &DMatrix<f64>| a.view((first, first), (size, size)).into_owned();
     let root = m.diagonal().rows(first, size).map(|mass| mass.sqrt().recip());
@@ -161,15 +163,23 @@ fn at(machine: &Machine, (drive, coordinate): (Drive, usize), slides: &[f64]) ->
     let scaled = DMatrix::from_fn(size, size, |i, j| part(&k)[(i, j)] * root[i] * root[j]);
     let eigen = SymmetricEigen::new(scaled);
     let slide = &geometry.slides[coordinate];
-    let force = match drive {
+    let force = match (drive, fields) {
+        // A step of the commands pulls on the rotors with the stiffness of their fields.
+        (Drive::Held, Some(fields)) => {
+            let mut force = DVector::zeros(size);
+            for (at, field) in geometry.drives.iter().zip(fields) {
+                force[at.pulley] = field * geometry.bodies[at.pulley].by_slides[coordinate];
+            }
+            force
+        }
         // A step of the drives, as much as the coordinate's own asks for, pulls with their columns of −K.
-        Drive::Held => {
+        (Drive::Held, None) => {
             let share = |at: &DriveAt| geometry.bodies[at.pulley].by_slides[coordinate];
             let column = |at: &DriveAt| -k.view((first, at.pulley), (size, 1)).column(0) * share(at);
             geometry.drives.iter().map(column).fold(DVector::zeros(size), |sum, column| sum + column)
         }
         // The torques that push the coordinate: Σ τ_k dφ_k = F dq
-        Drive::Free => DVector::from_fn(size, |i, _| {
+        (Drive::Free, _) => DVector::from_fn(size, |i, _| {
             let of = geometry.drives.iter().zip(slide.by_drives).find(|(at, _)| at.pulley == i);
             of.map_or(0.0, |(_, weight)| *weight)
         }),
@@ -224,16 +234,22 @@ fn matrices(machine: &Machine, drive: Drive, slides: &[f64]) -> (DMatrix<f64>, D
         }
     }
     let diagonal = |values: &[f64]| DMatrix::from_diagonal(&DVector::from_column_slice(values));
+    let mut held = vec![0.0; count];
+    if drive == Drive::Held {
+        for (at, unit) in geometry.drives.iter().zip(&machine.drives) {
+            held[at.pulley] = unit.motor.field_stiffness().unwrap_or(0.0);
+        }
+    }
     if let (BeltModel::TwoMass, [k1, k2, k3], [c1, c2, c3]) = (machine.belt.model, &stiffness[..], &damping[..]) {
         // Spans 2 and 3 in series between the cart and both pulleys, which turn as one.
         let (r, all) = (machine.pulley_radius, k2 + k3);
         let (k, c) = (k1 + k2 * k3 / all, c1 + (c2 * k3 * k3 + c3 * k2 * k2) / (all * all));
         let both = |value: f64| DMatrix::from_row_slice(2, 2, &[r * r * value, -r * value, -r * value, value]);
         let two = |values: &[f64]| diagonal(&[values[0] + values[2], values[1]]);
-        return (two(&masses), both(c) + two(&resisting), both(k));
+        return (two(&masses), both(c) + two(&resisting), both(k) + two(&held));
     }
     // A pulley without inertia follows at once; the smallest weight keeps the matrix of masses regular.
     let tiny = 1e-9 * machine.cart.mass * machine.pulley_radius * machine.pulley_radius;
     masses.iter_mut().for_each(|mass| *mass = mass.max(tiny));
-    (diagonal(&masses), sum(&damping) + diagonal(&resisting), sum(&stiffness))
+    (diagonal(&masses), sum(&damping) + diagonal(&resisting), sum(&stiffness) + diagonal(&held))
 }

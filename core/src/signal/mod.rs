@@ -21,10 +21,14 @@ mod smooth;
 mod tests;
 
 use clock::Now;
+use profile::Profile;
 pub use clock::Sequence;
 
 /// Highest power of time in a [`Piece`].
 pub const DEGREE: usize = 7;
+
+/// Highest power of time in a reference: its snap is constant.
+const POWERS_OF_A_REFERENCE: usize = 4;
 
 /// A stretch of time on which the input is a polynomial.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -163,6 +167,13 @@ pub enum Signal {
         /// The input between samples.
         hold: Hold,
     },
+    /// References of what slides, each with its weight: the position along the belt that a stepper is commanded.
+    References {
+        /// One of each coordinate.
+        profiles: Vec<Profile>,
+        /// A weight for each.
+        weights: Vec<f64>,
+    },
     /// All of these added.
     Sum(Vec<Signal>),
     /// One after another, each on its own clock; the last goes on.
@@ -259,6 +270,7 @@ impl Signal {
             &Self::Chirp { over, .. } => Some(over.max(0.0)),
             Self::Table { points } => Some(points.last().map_or(0.0, |p| p[0].max(0.0))),
             Self::Sampled { times, .. } => Some(times.last().map_or(0.0, |t| t.max(0.0))),
+            Self::References { profiles, .. } => Some(Profile::last_rest(profiles)),
             Self::Sum(signals) => signals.iter().try_fold(0.0, |end: f64, s| Some(end.max(s.duration()?))),
             Self::Sequence(turns) => turns.duration(),
         }
@@ -281,6 +293,19 @@ impl Signal {
             &Self::Prbs { amplitude, bit, seed } => prbs::part(now, amplitude, bit, seed),
             Self::Table { points } => edges::Points::of_table(points).part(now),
             Self::Sampled { times, values, hold } => edges::Points::of_samples(times, values, *hold).part(now),
+            Self::References { profiles, weights } => {
+                let mut sum = Part::held(0.0, f64::INFINITY);
+                for (profile, weight) in profiles.iter().zip(weights) {
+                    let (mut powers, mut end) = profile.piece(now.t);
+                    // A seam that is reached belongs to the piece that begins there.
+                    while now.reached(end) {
+                        (powers, end) = profile.piece(end.max(now.t).next_up());
+                    }
+                    sum.end = sum.end.min(end);
+                    sum.coefficients.iter_mut().zip(powers).for_each(|(sum, power)| *sum += weight * power);
+                }
+                sum
+            }
             Self::Sum(signals) => {
                 let mut sum = Part::held(0.0, f64::INFINITY);
                 for part in signals.iter().map(|signal| signal.part(now)) {
@@ -312,6 +337,9 @@ impl Signal {
             Self::Multisine { tones } => smooth::multisine_value(now, tones),
             Self::Table { points } => edges::Points::of_table(points).value(now),
             Self::Sampled { times, values, hold } => edges::Points::of_samples(times, values, *hold).value(now),
+            Self::References { profiles, weights } => {
+                profiles.iter().zip(weights).map(|(profile, weight)| weight * profile.at(now.t).position).sum()
+            }
             Self::Sum(signals) => signals.iter().map(|signal| signal.value_at(now)).sum::<f64>() + 0.0,
             Self::Sequence(turns) => turns.turn(now).map_or(0.0, |turn| turn.signal.value_at(turn.now)),
         }
@@ -327,6 +355,7 @@ impl Signal {
             Signal::Sampled { hold: Hold::Zero, .. } => 0,
             Signal::Sampled { hold: Hold::Linear, .. } => 1,
             Signal::Sine { .. } | Signal::Chirp { .. } | Signal::Multisine { .. } => DEGREE,
+            Signal::References { .. } => POWERS_OF_A_REFERENCE,
             Signal::Sum(parts) => parts.iter().map(Signal::degree).max().unwrap_or(0),
             Signal::Sequence(turns) => turns.slots().iter().map(|slot| slot.signal.degree()).max().unwrap_or(0),
         }

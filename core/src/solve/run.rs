@@ -87,7 +87,8 @@ pub struct Run<'a> {
 }
 
 impl<'a> Run<'a> {
-    /// A run of `experiment` on `stage`; the experiment's own input counts for nothing. Rows go to `sink` in blocks,
+    /// A run of `experiment` on `stage`; the experiment's own input counts for nothing, unless it is [followed](Self::follow).
+    /// Rows go to `sink` in blocks,
     /// all that is between them to `observer`. Not for the paper's Table 3.
     pub fn new(
         machine: &Machine,
@@ -193,6 +194,11 @@ impl<'a> Run<'a> {
     /// Ends the run: complete, with its last row, if it has reached its end, otherwise interrupted.
     pub fn finish(mut self) -> Outcome {
         self.running.finish(self.time >= self.end)
+    }
+
+    /// Runs to the end along these inputs, one for each drive, and ends the run.
+    pub fn follow(self, inputs: &[Signal]) -> Outcome {
+        self.along(inputs).0
     }
 
     /// Runs to the end along these signals.

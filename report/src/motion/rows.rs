@@ -1,7 +1,7 @@
 //! A move in words.
 
 use super::{Done, Tried};
-use crate::simulate::rows::ties;
+use crate::simulate::rows::{lost_steps, ties};
 use crate::simulate::{plain, time, value};
 use std::fmt::Write;
 use taut::control::{Deviation, DriveFigures, LoadFigures, sliding};
@@ -39,6 +39,10 @@ pub fn controller(design: &Design, machine: &Machine) -> String {
     }
     if !design.shaper.is_empty() {
         words.push(format!("shaper of {} impulses", design.shaper.len()));
+    }
+    if machine.stepper().is_some() {
+        words.push("commanded in microsteps".into());
+        return words.join(", ");
     }
     let timing = format!("every {}", time(design.every));
     words.push(if design.delay > 0.0 { format!("{timing}, delay {}", time(design.delay)) } else { timing });
@@ -80,6 +84,7 @@ pub fn lines(tried: &Tried, done: &Done) -> Vec<(&'static str, String)> {
         Some(settling) => format!("{} after the profile, within {}", time(settling), length(done.motion.window)),
         None => format!("not within {} until the end", length(done.motion.window)),
     };
+    let is_stepper = machine.stepper().is_some();
     let mut held = format!("{} of {} samples", run.samples.1, run.samples.0);
     let is_limited =
         |unit: &DriveUnit| unit.amplifier.voltage_limit.is_some() || unit.amplifier.current_limit.is_some();
@@ -104,8 +109,16 @@ pub fn lines(tried: &Tried, done: &Done) -> Vec<(&'static str, String)> {
             of_drives(&|drive| format!("{} in, {} back", value(drive.energy.0, "J"), value(drive.energy.1, "J"))),
         ),
         // The bound of a run holds without a controller, which answers to what rounding does.
-        ("accuracy", format!("not stated in closed loop{}", ties(&run.outcome.ties))),
+        (
+            "accuracy",
+            format!("not stated {}{}", if is_stepper { "for a move" } else { "in closed loop" }, ties(&run.outcome.ties)),
+        ),
     ];
+    if is_stepper {
+        // It has no samples, and its phases have voltages of their own.
+        lines.retain(|(name, _)| !["voltage", "saturated", "energy"].contains(name));
+        lines.extend(lost_steps(&run.metrics, geometry).map(|words| ("lost steps", words)));
+    }
     if let Some(contour) = &figures.contour {
         lines.insert(1, ("contour error", format!("{}, {} at the end", deviation(contour), length(contour.last))));
     }

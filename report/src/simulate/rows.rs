@@ -3,9 +3,9 @@
 use super::Run;
 use super::band::Band;
 use crate::fit::outputs;
-use taut::machine::{BeltModel, Geometry, Machine, Slide};
+use taut::machine::{BeltModel, DriveAt, Geometry, Machine, Slide, SlideAt};
 use taut::mechanism::Part;
-use taut::metrics::{Balance, Metrics, OfLoad, OfStepper, Peak};
+use taut::metrics::{Balance, LostSteps, Metrics, OfLoad, Peak};
 use taut::number;
 use taut::reduction::Reduction;
 use taut::solve::{Cost, Ending, Event, Method, Outcome, PositionError, Solver, Tie};
@@ -145,9 +145,7 @@ pub fn lines(run: &Run, machine: &Machine, solver: Solver) -> Vec<(&'static str,
         lines.push(("peak force", forces(metrics, geometry)));
     }
     lines.push(("peak current", currents(metrics, geometry)));
-    if let Some(own) = &metrics.stepper {
-        lines.push(("lost steps", lost_steps(own)));
-    }
+    lines.extend(lost_steps(metrics, geometry).map(|words| ("lost steps", words)));
     lines.push(("stop time", stop(metrics, &labels, solver)));
     lines.push(("events", events(&run.outcome.events, solver)));
     if !stiff {
@@ -169,12 +167,24 @@ pub fn lines(run: &Run, machine: &Machine, solver: Solver) -> Vec<(&'static str,
     lines
 }
 
-/// Steps that a stepper lost, and the position error that remains.
-fn lost_steps(own: &OfStepper) -> String {
-    let error = format!("position error {}", value(own.position_error, "m"));
-    let Some(first) = own.first_slip else { return format!("none, {error}") };
-    let teeth = if own.slips == 1 { "tooth" } else { "teeth" };
-    format!("{} at the end, {error}; over {} {teeth}, first at {}", own.lost_steps, own.slips, value(first, "s"))
+/// Steps that steppers lost, and the position error that remains; none of other motors.
+pub fn lost_steps(metrics: &Metrics, geometry: &Geometry) -> Option<String> {
+    let lost: Vec<LostSteps> = metrics.drives.iter().filter_map(|drive| drive.lost_steps).collect();
+    let of_drive = |(own, at): (&LostSteps, &DriveAt)| {
+        let first = own.first_slip?;
+        let by = if lost.len() > 1 { format!(" by the {}", at.label.name) } else { String::new() };
+        let teeth = if own.slips == 1 { "tooth" } else { "teeth" };
+        Some(format!("{}{by} at the end, over {} {teeth}, first at {}", own.at_end, own.slips, value(first, "s")))
+    };
+    let slipped: Vec<String> = lost.iter().zip(geometry.drives).filter_map(of_drive).collect();
+    let of_load = |(load, at): (&OfLoad, &SlideAt)| {
+        let error = value(load.command_error?, "m");
+        let name = if metrics.loads.len() > 1 { format!("{} ", geometry.label(at.body).name) } else { String::new() };
+        Some(format!("{name}{error}"))
+    };
+    let errors: Vec<String> = metrics.loads.iter().zip(geometry.slides).filter_map(of_load).collect();
+    let steps = if slipped.is_empty() { "none".to_string() } else { slipped.join(", ") };
+    (!lost.is_empty()).then(|| format!("{steps}; position error {}", errors.join(", ")))
 }
 
 /// The largest force of a machine with one drive; that of each span of one with several.

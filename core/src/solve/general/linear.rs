@@ -16,12 +16,12 @@
 //! integrals are tables.
 
 use super::radau::{self, DRIVEN, FORCED, FREE, Lane, NODES, POINTS, POWER, POWERS, TERMS};
-use crate::mechanism::{BODIES, DRIVES};
+use crate::mechanism::{BODIES, CURRENTS, DRIVES};
 use crate::solve::widest::widest;
 use std::sync::OnceLock;
 
 /// Room for coordinates, speeds and currents, a multiple of four.
-pub(super) const STATES: usize = (2 * BODIES + DRIVES).next_multiple_of(4);
+pub(super) const STATES: usize = (2 * BODIES + CURRENTS).next_multiple_of(4);
 
 /// One number for each of them.
 pub(super) type States = [f64; STATES];
