@@ -418,7 +418,7 @@ fn natural_modes_have_the_poles_of_the_state_space() {
 #[test]
 fn a_machine_with_spans_held_is_the_one_that_follows_at_that_place() {
     proptest!(cases(40), |(shares in [-0.9..0.9, -0.9..0.9_f64], template in 0..3)| {
-        let template = [Template::Stage, Template::Printer, Template::Gantry][template as usize];
+        let template = [Template::Stage, Template::PrinterServo, Template::Gantry][template as usize];
         let machine = Case::from_text("machine.toml", template.text()).unwrap().machine;
         let slides: Vec<f64> = machine
             .travels()

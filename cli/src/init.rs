@@ -15,7 +15,7 @@ pub fn run(args: &Init) -> Outcome {
     if file.is_dir() {
         let inside = file.join(match (args.template, args.kind) {
             (Some(TemplateName::Stage), _) => "stage.toml",
-            (Some(TemplateName::Printer), _) => "printer.toml",
+            (Some(TemplateName::Printer | TemplateName::PrinterServo), _) => "printer.toml",
             (None, KindName::Axis) => "axis.toml",
             (Some(TemplateName::Gantry), _) | (None, KindName::HFrame | KindName::CoreXy | KindName::DualBelt) => {
                 "gantry.toml"
@@ -34,6 +34,7 @@ pub fn run(args: &Init) -> Outcome {
     let template = args.template.map(|name| match name {
         TemplateName::Stage => Template::Stage,
         TemplateName::Printer => Template::Printer,
+        TemplateName::PrinterServo => Template::PrinterServo,
         TemplateName::Gantry => Template::Gantry,
     });
     let text = match (template, args.kind) {

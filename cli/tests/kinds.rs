@@ -26,11 +26,11 @@ const IN_LOOP: [&str; 3] = ["stages/h-frame/square.toml", "stages/core-xy/square
 /// Gantries with a log of both motors.
 const WITH_LOGS: [&str; 2] = ["stages/h-frame/belts.toml", "stages/core-xy/belts.toml"];
 
-/// An axis whose motor is told a position.
-const STEPPER: &str = "stages/stepper-axis/stepper-axis.toml";
+/// An axis and a gantry whose motors are commanded positions.
+const STEPPERS: [&str; 2] = ["stages/stepper-axis/stepper-axis.toml", "stages/printer-core-xy/printer.toml"];
 
 /// Commands that take a stepper; all others refuse it.
-const WITH_STEPPER: [&str; 3] = ["show", "simulate", "sweep"];
+const WITH_STEPPER: [&str; 7] = ["show", "simulate", "sweep", "move", "plan", "shape", "export fmu"];
 
 /// Of whatever does not.
 const NO_MOTOR: Ends = Refused("this needs a motor that is commanded by voltage or current");
@@ -126,6 +126,7 @@ fn every_kind_goes_through_every_command() {
                 .iter()
                 .map(|option| match *option {
                     "there/" => there.as_str(),
+                    "short fast" if case == STEPPERS[0] => "there and back",
                     "short fast" if case != *axis => "square",
                     "title=calm" if case != *axis => CALM,
                     "motor_current=10mA" if GANTRIES.contains(&case) => "left_current=10mA",
@@ -158,8 +159,8 @@ fn every_kind_goes_through_every_command() {
         }
         match *command {
             "studio" => {}
-            taken if WITH_STEPPER.contains(&taken) => run(STEPPER, &Runs),
-            _ => run(STEPPER, &NO_MOTOR),
+            taken if WITH_STEPPER.contains(&taken) => STEPPERS.iter().for_each(|case| run(case, &Runs)),
+            _ => STEPPERS.iter().for_each(|case| run(case, &NO_MOTOR)),
         }
         let gantries = match *command {
             "move" | "tune" | "plan" | "learn" => &IN_LOOP[..],

@@ -80,7 +80,7 @@ fn frequencies_are_those_of_the_modes() {
 #[test]
 fn templates_begin_with_data_sheets_and_run_as_they_stand() {
     let folder = TempDir::new().unwrap();
-    for name in ["stage", "printer", "gantry"] {
+    for name in ["stage", "printer-servo", "gantry"] {
         let file = folder.path().join(format!("{name}.toml"));
         let file = file.to_str().unwrap();
         let told = taut(&["init", "--template", name, file]).output().unwrap();
@@ -102,6 +102,22 @@ fn templates_begin_with_data_sheets_and_run_as_they_stand() {
     }
     let refused = taut(&["init", "--template", "stage", "--kind", "h-frame", "x.toml"]).output().unwrap();
     assert_eq!(refused.status.code(), Some(2));
+}
+
+#[test]
+fn the_template_of_a_printer_has_a_stepper_and_goes_through_its_commands() {
+    let folder = TempDir::new().unwrap();
+    let file = folder.path().join("printer.toml");
+    let file = file.to_str().unwrap();
+    taut(&["init", "--template", "printer", file]).assert().success();
+    let found = shown(&[file]);
+    assert_eq!(value(&found, "holding_torque"), 0.45);
+    for command in ["simulate", "move", "shape"] {
+        taut(&[command, file, "--quiet"]).assert().success();
+    }
+    let refused = taut(&["tune", file]).output().unwrap();
+    let said = String::from_utf8(refused.stderr).unwrap();
+    assert!(refused.status.code() == Some(2) && said.contains("this needs a motor"), "{said}");
 }
 
 #[test]
@@ -142,7 +158,7 @@ fn a_belt_that_is_too_weak_is_told_with_both_forces() {
     let folder = TempDir::new().unwrap();
     let file = folder.path().join("printer.toml");
     let file = file.to_str().unwrap();
-    taut(&["init", "--template", "printer", file]).assert().success();
+    taut(&["init", "--template", "printer-servo", file]).assert().success();
     let found = shown(&[file, "--set", "motor.speed_constant=60 rpm/V", "--set", "belt.width=3 mm"]);
     assert!(codes(&found).contains(&"belt-overloaded"), "{:?}", codes(&found));
     assert!(value(&found, "tension_safety") < 1.0);

@@ -140,6 +140,9 @@ pub fn identifier(name: &str) -> String {
 /// what to do about it is the caller's to say.
 pub fn controller(case: &Case) -> Result<(&Case, &crate::design::Design)> {
     match &case.controller {
+        Some(_) if case.machine.stepper().is_some() => {
+            Err(Error::new("a stepper follows its command without a controller"))
+        }
         Some(design) if case.is_axis() || design.feed_forward == FeedForward::NONE => Ok((case, design)),
         Some(_) => Err(Error::new(
             "the feed-forward of a gantry needs the references of both bridge and cart, and an exported controller has \
@@ -152,6 +155,7 @@ pub fn controller(case: &Case) -> Result<(&Case, &crate::design::Design)> {
 /// The next step where a controller is missing: to add one, where the case can have one, or `instead`.
 fn without_controller(case: &Case, error: Error, instead: &str) -> Error {
     error.next(match case.is_axis() {
+        _ if case.machine.stepper().is_some() => instead.to_string(),
         _ if case.controller.is_some() => format!("leave controller.feed_forward out, or {instead}"),
         true => format!("add a [controller], as in docs/control.md, or {instead}"),
         false => instead.to_string(),

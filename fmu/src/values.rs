@@ -150,7 +150,7 @@ impl Instance {
         let of = |(quantity, column): &(Quantity, Option<usize>)| match *quantity {
             Quantity::Position(body) => state.position[body],
             Quantity::Speed(body) => state.speed[body],
-            Quantity::Current(drive) => state.current[drive],
+            Quantity::Current(number) => state.current[number],
             Quantity::Bristle(_) => column.map_or(0.0, |column| columns[column]),
         };
         Ok(places.iter().map(of).collect())

@@ -377,3 +377,48 @@ def test_the_package_exports_the_units_of_the_program(root: Path, tmp_path: Path
         assert one.read("modelDescription.xml") == other.read("modelDescription.xml")
     result = simulate_fmu(str(own), stop_time=0.5, input=signal(JUMPS), output=["cart_position"])
     assert result["cart_position"][-1] > 0.05
+
+
+def test_a_stepper_is_the_machine_of_the_program(root: Path, tmp_path: Path) -> None:
+    """A held command goes to the nearest microstep in co-simulation. Model exchange has no microsteps: it is near the
+    program with the finest ones, in half of one (0.1 um of belt) and what the integrator adds."""
+    text = (root / "stages/stepper-axis/stepper-axis.toml").read_text()
+    text = text[: text.index("[[experiment]]")]
+    times = [k * 1e-4 for k in range(1201)]
+    held = [0.01 * (1 - np.cos(10 * np.pi * t)) if t < 0.1 else 0.02 for t in times]
+    (tmp_path / "command.csv").write_text(
+        "time_s,command_m\n" + "".join(f"{t!r},{float(u)!r}\n" for t, u in zip(times, held, strict=True))
+    )
+    file = '{ file = "command.csv", time = "time_s", input = "command_m", hold = "zero" }'
+    case = tmp_path / "held.toml"
+    case.write_text(f'{text}[[experiment]]\nname = "held"\nuntil = 0.12\nevery = 1e-4\ninput = {file}\n')
+    wanted = rows(case, tmp_path / "rows", "held.csv")
+    for version in (2, 3):
+        unit, references, place = slave(export(case, tmp_path / f"{version}.fmu", version), version)
+        command = [references["command"]]
+        (read, write) = (unit.getReal, unit.setReal) if version == 2 else (unit.getFloat64, unit.setFloat64)
+        off = 0.0
+        for k, value in enumerate(held[:-1]):
+            write(command, [float(value)])
+            unit.doStep(times[k], times[k + 1] - times[k])
+            off = max(off, abs(read([references["cart_position"]])[0] - wanted["cart_position_m"][k + 1]))
+        assert off <= SAME, off
+        unit.terminate()
+        unit.freeInstance()
+        shutil.rmtree(place)
+    line = [(0.0, 0.0), (0.05, 5e-3), (0.1, 5e-3)]
+    points = ", ".join(f"[{t}, {u}]" for t, u in line)
+    case = tmp_path / "line.toml"
+    case.write_text(f'{text}[[experiment]]\nname = "line"\nuntil = 0.1\nevery = 1e-3\ninput = {{ table = [{points}] }}\n')
+    wanted = rows(case, tmp_path / "fine", "line.csv", "stepper.microsteps=1024")
+    result = simulate_fmu(
+        export(case, tmp_path / "line.fmu", 3),
+        fmi_type="ModelExchange",
+        stop_time=0.1,
+        output_interval=1e-5,
+        relative_tolerance=1e-6,
+        input=signal(line),
+        output=["cart_position"],
+    )
+    reached = np.interp(wanted["time_s"], result["time"], result["cart_position"])
+    assert np.max(np.abs(reached - wanted["cart_position_m"])) < 5e-7

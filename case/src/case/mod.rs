@@ -380,9 +380,6 @@ fn experiment(field: &Field, machine: &Machine, folder: &Folder) -> Result<Vec<E
     let table = field.table()?;
     table.check_keys(&["name", "input", "log", "campaign"], &[])?;
     let name = named(&table)?;
-    if let Some(log) = table.optional("log").filter(|_| machine.stepper().is_some()) {
-        return Err(log.fail("logs of a stepper are not read yet").next("leave it out, and give the input"));
-    }
     let Some(log) = table.optional("log") else {
         let (until, every) = times(&table, None)?;
         let inputs = inputs(&table, machine, &input::Context { folder, until })?;

@@ -1,4 +1,4 @@
-//! The table `[stepper]`, a motor that is commanded a position with its driver, and what its case cannot have yet.
+//! The table `[stepper]`: a motor that is commanded a position, with its driver.
 
 use super::reader::{Field, Table};
 use crate::error::{Error, Result};
@@ -7,14 +7,11 @@ use crate::mechanism::State;
 use crate::quantity::show;
 use crate::signal::Signal;
 
-/// Sections that a case of a stepper cannot have yet.
-const YET_TO_COME: [&str; 2] = ["measurement", "fit"];
-
 /// The error where a motor that is commanded by voltage or current is needed: message, and sections to add.
 const NO_MOTOR: [&str; 3] = [
     "this needs a motor that is commanded by voltage or current, and the case describes a stepper",
     "[motor] and [amplifier]",
-    "`taut show`, `simulate`, `move`, `plan`, `shape` and `sweep` support steppers; other commands do not yet",
+    "steppers are supported by `taut show`, `simulate`, `move`, `plan`, `shape`, `sweep` and `export fmu`",
 ];
 
 /// Refuses a stepper where a motor that is commanded by voltage or current is needed.
@@ -37,8 +34,8 @@ pub(super) fn drive(root: &Table) -> Result<Option<DriveUnit>> {
             .fail("a stepper is a motor with its driver: this would be a second one")
             .next("give either [stepper], or [motor] and [amplifier]"));
     }
-    if let Some(other) = YET_TO_COME.iter().find_map(|key| root.optional(key)) {
-        return Err(other.fail("this is not available yet for a stepper").next("leave it out for now"));
+    if let Some(fit) = root.optional("fit") {
+        return Err(fit.fail("steppers are not fitted yet").next("leave it out for now"));
     }
     let table = field.table()?;
     table.check_keys(&["drive"], &[])?;

@@ -10,8 +10,10 @@ pub const TEMPLATE: &str = include_str!("template.toml");
 pub enum Template {
     /// A linear stage: a rated motor, an AT5 belt.
     Stage,
-    /// An axis of a printer: a motor by its K_v, a GT2 belt.
+    /// An axis of a printer: a stepper, a GT2 belt.
     Printer,
+    /// An axis of a printer: a servo motor by its K_v, a GT2 belt.
+    PrinterServo,
     /// A CoreXY gantry.
     Gantry,
 }
@@ -22,7 +24,7 @@ impl Template {
     /// ```
     /// use taut::case::{Case, Template};
     /// use taut::overview::Overview;
-    /// for template in [Template::Stage, Template::Printer, Template::Gantry] {
+    /// for template in [Template::Stage, Template::PrinterServo, Template::Gantry] {
     ///     let case = Case::from_text("machine.toml", template.text())?;
     ///     assert!(Overview::of(&case)?.value("largest_force").unwrap() > 10.0);
     /// }
@@ -32,6 +34,7 @@ impl Template {
         match self {
             Template::Stage => include_str!("templates/stage.toml"),
             Template::Printer => include_str!("templates/printer.toml"),
+            Template::PrinterServo => include_str!("templates/printer-servo.toml"),
             Template::Gantry => include_str!("templates/gantry.toml"),
         }
     }

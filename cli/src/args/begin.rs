@@ -87,8 +87,10 @@ pub struct Init {
 pub enum TemplateName {
     /// A linear stage: a rated motor, an AT5 belt
     Stage,
-    /// An axis of a printer: a motor by its K_v, a GT2 belt
+    /// An axis of a printer: a stepper, a GT2 belt
     Printer,
+    /// An axis of a printer: a servo motor by its K_v, a GT2 belt
+    PrinterServo,
     /// A CoreXY gantry with GT2 belts
     Gantry,
 }

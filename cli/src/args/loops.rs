@@ -88,7 +88,7 @@ pub struct Plan {
     /// Largest jerk: "500 m/s^3"
     #[arg(long, value_name = "JERK", value_parser = jerk)]
     pub jerk: Option<f64>,
-    /// Share of voltage and current reserved for the control loop
+    /// Share of voltage and current, or of the pull-out torque of a stepper, that is reserved
     #[arg(long, value_name = "SHARE", default_value = "10%", value_parser = reserve)]
     pub reserve: f64,
     #[command(flatten)]

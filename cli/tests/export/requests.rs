@@ -167,13 +167,13 @@ fn spans_that_follow_the_cart_are_held_where_it_is_said() {
         let done = taut(folder.path(), &["init", "--template", name, &format!("{name}.toml")]);
         assert!(done.status.success());
     };
-    ["stage", "printer", "gantry"].into_iter().for_each(write);
+    ["stage", "printer-servo", "gantry"].into_iter().for_each(write);
     let exported = |words: &[&str]| {
         let done = taut(folder.path(), &[&["export"], words].concat());
         let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
         (done.status.code(), text(done.stdout), text(done.stderr))
     };
-    for name in ["stage", "printer", "gantry"] {
+    for name in ["stage", "printer-servo", "gantry"] {
         let case = format!("{name}.toml");
         // The loop of a gantry has feed-forward, which no exported controller has.
         let part: &[&str] = if name == "gantry" { &["--part", "plant"] } else { &[] };

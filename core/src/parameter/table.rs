@@ -759,7 +759,7 @@ const MOVE: &[Parameter] = &[
     row("move.plan.speed", "", "m/s", Words("what the machine allows"), POSITIVE, "0.5 m/s", "Largest speed of a move that is planned."),
     row("move.plan.acceleration", "", "m/s^2", Words("what the machine allows"), POSITIVE, "20 m/s^2", "Largest acceleration."),
     row("move.plan.jerk", "", "m/s^3", Words("what the jerk time requires"), POSITIVE, "500 m/s^3", "Largest jerk."),
-    row("move.plan.reserve", "", "", Value(0.1), RESERVE, "20 %", "Share of voltage and current that is reserved for the loop."),
+    row("move.plan.reserve", "", "", Value(0.1), RESERVE, "20 %", "Share of voltage and current, or of the pull-out torque of a stepper, that is reserved."),
     row("move.until", "", "s", Required, DURATION, "1 s", "End of the run."),
     row("move.every", "", "s", Words("the controller's `every`"), DURATION, "1 ms", "Interval between the rows of the result, the last of which is at the end; it affects neither accuracy nor figures."),
     row("move.window", "", "m", Value(1e-4), POSITIVE, "50 um", "Distance from its target within which the cart counts as settled."),

@@ -1,3 +1,4 @@
+use super::profile::{Leg, Limits, Profile};
 use super::*;
 use proptest::prelude::*;
 use std::f64::consts::TAU;
@@ -57,6 +58,7 @@ fn negated(signal: &Signal) -> Signal {
         Signal::Multisine { tones } => tones.iter_mut().for_each(|tone| tone.amplitude = -tone.amplitude),
         Signal::Table { points } => points.iter_mut().for_each(|p| p[1] = -p[1]),
         Signal::Sampled { values, .. } => values.iter_mut().for_each(|v| *v = -*v),
+        Signal::References { weights, .. } => weights.iter_mut().for_each(|weight| *weight = -*weight),
         Signal::Sum(signals) => signals.iter_mut().for_each(|s| *s = negated(s)),
         Signal::Sequence(turns) => {
             let slots = turns.slots().iter().map(|slot| Slot { signal: negated(&slot.signal), lasts: slot.lasts });
@@ -114,7 +116,27 @@ fn simple() -> impl Strategy<Value = Signal> {
             let (times, values) = points.iter().map(|p| (p[0], p[1])).unzip();
             Signal::Sampled { times, values, hold }
         }),
+        references(),
     ]
+}
+
+/// Paths in a plane of a few legs and rests, of each order.
+fn references() -> impl Strategy<Value = Signal> {
+    let limits = (0.05..1.0, 0.5..20.0, prop::option::of((20.0..2000.0, prop::option::of(1e3..1e5))));
+    let limits = limits.prop_map(|(speed, acceleration, more)| Limits {
+        speed,
+        acceleration,
+        jerk: more.map(|(jerk, _)| jerk),
+        snap: more.and_then(|(_, snap)| snap),
+    });
+    let place = || (-5i32..6).prop_map(|k| f64::from(k) * 0.02);
+    let leg = (prop::option::weighted(0.7, (place(), place())), limits, 0.0..0.3_f64).prop_map(|(to, limits, wait)| {
+        to.map_or(Leg::Wait(wait), |(x, y)| Leg::To(vec![x, y], limits))
+    });
+    (prop::collection::vec(leg, 0..4), -1.0..1.0, -1.0..1.0).prop_map(|(legs, a, b)| Signal::References {
+        profiles: Profile::along(&[0.0, 0.0], &legs).unwrap(),
+        weights: vec![a, b],
+    })
 }
 
 fn any_signal() -> impl Strategy<Value = Signal> {

@@ -1,7 +1,7 @@
 //! The inputs of all drives at once: stretches of time on which each is one polynomial.
 
 use super::roots::first_fall;
-use crate::mechanism::DRIVES;
+use crate::mechanism::{DRIVES, Mechanism};
 use crate::signal::{DEGREE, Piece, Signal};
 
 /// One polynomial for each input, from `start` to `end`; what is not there is zero.
@@ -62,7 +62,7 @@ impl Pieces {
 
     /// These pieces with one input rounded to a multiple of `step`, as by a driver of microsteps, up to the time at
     /// which another multiple becomes the nearest, or to `until`.
-    pub fn stepped(&self, input: usize, step: f64, until: f64) -> Self {
+    fn stepped(&self, input: usize, step: f64, until: f64) -> Self {
         let powers = &self.coefficients[input];
         let at = |tau: f64| powers.iter().rev().fold(0.0, |sum, c| sum * tau + c);
         // On the very edge between two steps it is known by what comes next.
@@ -77,6 +77,14 @@ impl Pieces {
             pieces.end = pieces.end.min(self.start + first);
         }
         pieces
+    }
+
+    /// These pieces as the drives of a mechanism apply them: a stepper's goes to the nearest microstep.
+    pub fn applied(self, mechanism: &Mechanism, until: f64) -> Self {
+        (0..mechanism.drives.len()).fold(self, |pieces, drive| match mechanism.microstep(drive) {
+            Some(step) => pieces.stepped(drive, step, until),
+            None => pieces,
+        })
     }
 
     /// The highest power of time in any of them.

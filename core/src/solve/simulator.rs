@@ -134,6 +134,9 @@ impl Simulator {
     /// Advances to `until`, s, and appends the events to `events`. Returns an early ending, after which the machine
     /// stays at the time it reached.
     pub fn advance(&mut self, until: f64, events: &mut Vec<Event>) -> std::result::Result<(), Ending> {
+        if self.mechanism().drives.iter().any(|drive| drive.motor.stepper.is_some()) {
+            return self.advance_in_microsteps(until, events);
+        }
         if std::mem::take(&mut self.is_set) {
             let degree = self.inputs.degree();
             if degree > self.engine.degree() {
@@ -147,6 +150,17 @@ impl Simulator {
             self.engine.bound_input(&inputs, until);
         }
         self.engine.go_to(until, events)
+    }
+
+    /// The same of steppers: from edge to edge of their microsteps.
+    fn advance_in_microsteps(&mut self, until: f64, events: &mut Vec<Event>) -> std::result::Result<(), Ending> {
+        self.is_set = false;
+        while self.time() < until {
+            let pieces = self.inputs.since(self.time()).applied(self.mechanism(), until);
+            self.engine.take_input(&pieces);
+            self.engine.go_to(pieces.end.min(until), events)?;
+        }
+        Ok(())
     }
 
     /// The state in angles and positions.

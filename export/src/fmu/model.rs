@@ -54,7 +54,6 @@ impl Model {
     /// The machine of a case, with the controller inside if it is asked for. Errors: a controller that the case has
     /// not.
     pub fn new(case: &Case, with_controller: bool) -> Result<Self> {
-        crate::case::needs_motors(&case.machine)?;
         let resource = resource::resource(case)?;
         Self::of_resource(&resource, with_controller)
     }
@@ -129,7 +128,8 @@ impl Model {
         if self.force_input(0).is_some() {
             mechanism.drives.push(push(machine.geometry().cart()));
         }
-        let has = |drive: usize| self.quantities.iter().any(|(quantity, _)| *quantity == Quantity::Current(drive));
+        let current = |drive: usize| Quantity::Current(mechanism.first_current(drive));
+        let has = |drive: usize| self.quantities.iter().any(|(quantity, _)| *quantity == current(drive));
         let own = mechanism.drives.iter().enumerate();
         let changed = own.filter(|(drive, own)| own.has_current_state() != has(*drive)).map(|(_, own)| own).next();
         match changed.filter(|_| !self.quantities.is_empty()) {
@@ -173,7 +173,7 @@ impl Model {
                 Quantity::Speed(leader) => {
                     mechanism.followers(leader).for_each(|body| state.speed[body] = mechanism.ratio(body) * value);
                 }
-                Quantity::Current(drive) => state.current[drive] = value,
+                Quantity::Current(number) => state.current[number] = value,
                 // Bristles begin straight.
                 Quantity::Bristle(_) => {}
             }
@@ -298,7 +298,7 @@ impl Model {
     fn outputs(&self, mechanism: &Mechanism) -> Vec<Variable> {
         let mut list = Vec::new();
         for (column, heading) in mechanism.columns.iter().enumerate().filter(|(_, h)| h.shown != Shown::Time) {
-            let quantity = self.quantities.iter().position(|(quantity, _)| shows(heading, *quantity));
+            let quantity = self.quantities.iter().position(|(quantity, _)| shows(heading, *quantity, mechanism));
             let kind = match heading.shown {
                 Shown::Motion(_) | Shown::Contact(_) => Kind::Whole,
                 _ => Kind::Real,
@@ -412,12 +412,16 @@ fn push(body: usize) -> Drive {
 }
 
 /// True if a column is an integrated quantity as it stands.
-fn shows(heading: &Heading, quantity: Quantity) -> bool {
+fn shows(heading: &Heading, quantity: Quantity, mechanism: &Mechanism) -> bool {
     heading.shown
         == match quantity {
             Quantity::Position(body) => Shown::Position(body, 1.0),
             Quantity::Speed(body) => Shown::Speed(body, 1.0),
-            Quantity::Current(drive) => Shown::Current(drive),
+            Quantity::Current(number) => match mechanism.drive_of_current(number) {
+                Some(drive) if mechanism.first_current(drive) == number => Shown::Current(drive),
+                Some(drive) => Shown::SecondPhase(drive),
+                None => return false,
+            },
             Quantity::Bristle(body) => Shown::Bristle(body),
         }
 }

@@ -144,7 +144,10 @@ pub(super) fn named(quantity: Quantity, mechanism: &Mechanism) -> (String, &'sta
     match quantity {
         Quantity::Position(b) => (format!("{}_way", body(b).0), body(b).1[0]),
         Quantity::Speed(b) => (format!("{}_rate", body(b).0), body(b).1[1]),
-        Quantity::Current(drive) => (format!("{}_armature_current", mechanism.drives[drive].label.key), "A"),
+        Quantity::Current(number) => {
+            let drive = mechanism.drive_of_current(number).unwrap_or_default();
+            (format!("{}_armature_current", mechanism.drives[drive].label.key), "A")
+        }
         Quantity::Bristle(b) => (format!("{}_bristle", body(b).0), body(b).1[0]),
     }
 }

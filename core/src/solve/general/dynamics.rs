@@ -89,7 +89,7 @@ impl Dynamics {
                 Quantity::Speed(leader) => {
                     mechanism.followers(leader).for_each(|body| state.speed[body] = mechanism.ratio(body) * value);
                 }
-                Quantity::Current(drive) => state.current[drive] = value,
+                Quantity::Current(number) => state.current[number] = value,
                 Quantity::Bristle(body) => bristles[body] = value,
             }
         }
@@ -119,7 +119,7 @@ impl Dynamics {
             *into = match *quantity {
                 Quantity::Position(body) => state.position[body],
                 Quantity::Speed(body) => state.speed[body],
-                Quantity::Current(drive) => state.current[drive],
+                Quantity::Current(number) => state.current[number],
                 Quantity::Bristle(body) => model.bristle[body].map_or(0.0, |place| self.core.y[place]),
             };
         }
@@ -134,7 +134,7 @@ impl Dynamics {
                 Quantity::Position(body) if core.rules.mode.motion[body] == Motion::Stuck => 0.0,
                 Quantity::Position(body) => core.y[model.speed(body)],
                 Quantity::Speed(body) => rate[model.speed(body)],
-                Quantity::Current(drive) => model.current[drive].map_or(0.0, |place| rate[place]),
+                Quantity::Current(number) => model.current[number].map_or(0.0, |place| rate[place]),
                 Quantity::Bristle(body) => model.bristle_rate(body, &core.rules.mode, &core.y),
             } + 0.0;
         }
@@ -231,7 +231,10 @@ fn kinds(mechanism: &Mechanism) -> Vec<usize> {
     for (index, drive) in mechanism.drives.iter().enumerate() {
         if drive.motor.stepper.is_some() {
             causes.extend([0, 2].map(|to| Cause::Switch(Switch::Field(index, to))));
-        } else if !drive.motor.is_simple {
+            // The limit of its phases is part of their rates.
+            continue;
+        }
+        if !drive.motor.is_simple {
             causes.push(Cause::GearTorque(index));
         }
         for to in [Limit::Inside, Limit::High, Limit::Low] {

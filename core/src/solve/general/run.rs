@@ -49,12 +49,7 @@ impl Running for Run<'_> {
     }
 
     fn told(&self, pieces: Pieces) -> Pieces {
-        let mechanism = &self.core.model.mechanism;
-        let end = self.rows.grid.end();
-        (0..mechanism.drives.len()).fold(pieces, |pieces, drive| match mechanism.microstep(drive) {
-            Some(step) => pieces.stepped(drive, step, end),
-            None => pieces,
-        })
+        pieces.applied(&self.core.model.mechanism, self.rows.grid.end())
     }
 
     fn advance(&mut self, until: f64) -> bool {
