@@ -5,10 +5,12 @@ use crate::common::chance::Chance;
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 use taut::case::{Case, Move};
 use taut::control::{Loop, Rows, Setup, Standard, closed_loop, each, stream};
+use taut::fit::fit;
+use taut::measure::measure;
 use taut::mechanism::{Status, What};
 use taut::reach::pull_out::PullOut;
 use taut::solve::{Ending, Flow, Solver, simulate};
-use taut::trajectory::Trajectory;
+use taut::trajectory::{CsvWriter, Trajectory};
 
 /// Step of the integration, s.
 const STEP: f64 = 1e-6;
@@ -592,4 +594,47 @@ fn a_move_beyond_the_pull_out_torque_is_told_and_a_planned_one_loses_no_step() {
     let bound = 2.0 * (0.1 / most).sqrt();
     let end = case.moves[1].end();
     assert!(bound < end && end < 2.2 * bound, "{end} s, {bound} s at the pull-out torque");
+}
+
+/// An axis with full steps, and its log: the cart on a scale, in micrometres.
+fn logged(folder: &std::path::Path) -> String {
+    let text = plain(0.45, 6.4e-3, 1, "[cart]\nmass = 0.4\nfriction = { viscous = 3, coulomb = 1 }\n")
+        + "[measurement]\nevery = 5e-4\ncart_position = { step = 1e-6, noise = 1e-6 }\n\
+           [[experiment]]\nname = \"ramps\"\ninput = { sequence = [{ ramp = 8e-3, over = 0.05, lasts = 0.07 }, \
+           { step = 8e-3 }] }\nuntil = 0.12\nevery = 5e-4\n";
+    let case = Case::from_text("truth.toml", &text).unwrap();
+    let log =
+        measure(&case.machine, case.measurement.as_ref().unwrap(), &case.experiments[0], Solver::GENERAL).unwrap();
+    let mut writer = CsvWriter::create(folder.join("ramps.csv")).unwrap();
+    writer.write(&log.trajectory).unwrap();
+    writer.finish().unwrap();
+    text
+}
+
+#[test]
+fn a_stepper_is_fitted_from_a_holding_torque_and_a_mass_that_are_far_off() {
+    let folder = std::env::temp_dir().join(format!("taut-stepper-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let text = logged(&folder);
+    let begin = text.find("[measurement]").unwrap();
+    let end = text.find("[[experiment]]").unwrap();
+    let log = "log = { file = \"ramps.csv\", time = \"time_s\", cart_position = \"cart_position_m\" }\n";
+    let text = format!("{}{}{log}", &text[..begin], &text[end..]).replace("until = 0.12\nevery = 5e-4\n", "")
+        + "[fit]\nfree = [\"stepper.holding_torque\", \"cart.mass\", \"cart.friction.coulomb\"]\n";
+    let off = text
+        .replace("holding_torque = 0.45", "holding_torque = 0.3")
+        .replace("mass = 0.4", "mass = 0.55")
+        .replace("coulomb = 1 ", "coulomb = 0.5 ");
+    let path = folder.join("off.toml");
+    std::fs::write(&path, &off).unwrap();
+    let case = Case::read(&path).unwrap();
+    let plan = case.fit_plan(&path).unwrap();
+    let fit = fit(&case, &plan, None, &mut |_| Flow::Continue).unwrap();
+    std::fs::remove_dir_all(&folder).unwrap();
+    for (name, truth) in [("stepper.holding_torque", 0.45), ("cart.mass", 0.4), ("cart.friction.coulomb", 1.0)] {
+        let own = fit.estimates.iter().find(|own| own.name == name).unwrap();
+        let interval = own.interval.unwrap();
+        assert!(interval[0] <= truth && truth <= interval[1], "{name}: {interval:?}");
+        assert!(interval[1] - interval[0] < 0.1 * truth, "{name}: {interval:?}");
+    }
 }

@@ -97,8 +97,8 @@ pub fn motion(done: &Moved) -> Value {
     });
     let lost = |number: usize| run.metrics.drives.get(number).and_then(|drive| drive.lost_steps);
     let drives = geometry.drives.iter().zip(&figures.drives).enumerate();
-    let drives = drives
-        .map(|(number, (at, drive))| (geometry.drive_key(at).to_string(), json!(of_drive(drive, lost(number)))));
+    let drives =
+        drives.map(|(number, (at, drive))| (geometry.drive_key(at).to_string(), json!(of_drive(drive, lost(number)))));
     let mut value = json!({
         "name": done.motion.name,
         "files": done.files,

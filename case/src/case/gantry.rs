@@ -133,9 +133,7 @@ fn drive(root: &Table, side: &str) -> Result<DriveUnit> {
     let own = root.optional(side).map(|field| field.table()).transpose()?;
     if let Some(stepper) = stepper::drive(root)? {
         return match own {
-            Some(own) => {
-                Err(own.field.fail("both motors are the stepper of [stepper]").next("leave this table out"))
-            }
+            Some(own) => Err(own.field.fail("both motors are the stepper of [stepper]").next("leave this table out")),
             None => Ok(stepper),
         };
     }

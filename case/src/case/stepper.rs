@@ -11,7 +11,7 @@ use crate::signal::Signal;
 const NO_MOTOR: [&str; 3] = [
     "this needs a motor that is commanded by voltage or current, and the case describes a stepper",
     "[motor] and [amplifier]",
-    "steppers are supported by `taut show`, `simulate`, `move`, `plan`, `shape`, `sweep` and `export fmu`",
+    "steppers are supported by `taut show`, `simulate`, `move`, `plan`, `shape`, `sweep`, `fit` and `export fmu`",
 ];
 
 /// Refuses a stepper where a motor that is commanded by voltage or current is needed.
@@ -33,9 +33,6 @@ pub(super) fn drive(root: &Table) -> Result<Option<DriveUnit>> {
         return Err(other
             .fail("a stepper is a motor with its driver: this would be a second one")
             .next("give either [stepper], or [motor] and [amplifier]"));
-    }
-    if let Some(fit) = root.optional("fit") {
-        return Err(fit.fail("steppers are not fitted yet").next("leave it out for now"));
     }
     let table = field.table()?;
     table.check_keys(&["drive"], &[])?;

@@ -23,7 +23,7 @@ use taut_report::fit::{Found, page};
 /// Reads the case, fits, writes, tells.
 pub fn run(args: &Args) -> Outcome {
     let common = &args.common;
-    let case = common.open_motors(&args.case)?;
+    let case = common.open(&args.case)?;
     let plan = case.fit_plan(&args.case)?;
     if args.compare {
         return compare::run(args, &case, &plan);

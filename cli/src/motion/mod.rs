@@ -26,8 +26,7 @@ use taut_report::simulate::{ended_early, time};
 /// Reads the cases, runs their moves, reports.
 pub fn run(args: &Args) -> Outcome {
     let common = &args.common;
-    let cases: Vec<Case> =
-        args.case.iter().map(|path| common.open_for(path, Files::Nothing)).collect::<Result<_>>()?;
+    let cases: Vec<Case> = args.case.iter().map(|path| common.open_for(path, Files::Nothing)).collect::<Result<_>>()?;
     if cases.len() > 1 && common.out.is_some() {
         return Err(Error::new("--out takes the results of one case")
             .in_file("--out")

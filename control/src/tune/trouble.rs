@@ -108,7 +108,11 @@ fn lost_steps(machine: &Machine, run: &MoveRun) -> Option<Trouble> {
     let drives = machine.geometry().drives.iter().zip(&run.metrics.drives);
     let of_drive = |(at, drive): (&DriveAt, &OfDrive)| {
         let (lost, first) = drive.lost_steps.and_then(|lost| Some((lost.at_end, lost.first_slip?)))?;
-        Some(format!("the {} loses step at {} and is {lost} full steps behind at the end", at.label.name, show(first, "s")))
+        Some(format!(
+            "the {} loses step at {} and is {lost} full steps behind at the end",
+            at.label.name,
+            show(first, "s")
+        ))
     };
     let lost: Vec<String> = drives.filter_map(of_drive).collect();
     let cause = "its torque does not suffice for this speed and acceleration: `taut plan` finds what does".to_string();

@@ -3,8 +3,7 @@
 
 use super::placement::{CASCADE, least};
 use super::{
-    Cascade, CurrentLoop, Design, FeedForwardModel, Filter, Fuzzy, OpenLoop, Pid, SlidingMode, StateFeedback,
-    Structure,
+    Cascade, CurrentLoop, Design, FeedForwardModel, Filter, Fuzzy, OpenLoop, Pid, SlidingMode, StateFeedback, Structure,
 };
 use crate::machine::Machine;
 use crate::machine::rigid::Rigid;

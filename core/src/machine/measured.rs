@@ -276,6 +276,12 @@ impl Machine {
     pub fn has_one_coordinate(&self) -> bool {
         self.geometry().slides.len() == 1
     }
+
+    /// True if the torque of its motor follows from the input, so that the forces on it balance as on a single mass: it
+    /// has one coordinate, and no stepper.
+    pub fn has_torque_balance(&self) -> bool {
+        self.has_one_coordinate() && self.stepper().is_none()
+    }
 }
 
 #[cfg(test)]

@@ -277,7 +277,10 @@ mod tests {
             let curve = Curve::new(phases);
             for speed in [3.0, 30.0, 47.0, 80.0, 111.0, 160.0] {
                 let (near, exact) = (curve.torque(speed), torque(&phases, speed));
-                assert!((near - exact).abs() < 0.02 * phases.torque_constant * phases.amplitude, "{speed}: {near}, {exact}");
+                assert!(
+                    (near - exact).abs() < 0.02 * phases.torque_constant * phases.amplitude,
+                    "{speed}: {near}, {exact}"
+                );
             }
         }
     }

@@ -21,8 +21,8 @@ mod smooth;
 mod tests;
 
 use clock::Now;
-use profile::Profile;
 pub use clock::Sequence;
+use profile::Profile;
 
 /// Highest power of time in a [`Piece`].
 pub const DEGREE: usize = 7;

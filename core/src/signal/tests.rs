@@ -130,9 +130,8 @@ fn references() -> impl Strategy<Value = Signal> {
         snap: more.and_then(|(_, snap)| snap),
     });
     let place = || (-5i32..6).prop_map(|k| f64::from(k) * 0.02);
-    let leg = (prop::option::weighted(0.7, (place(), place())), limits, 0.0..0.3_f64).prop_map(|(to, limits, wait)| {
-        to.map_or(Leg::Wait(wait), |(x, y)| Leg::To(vec![x, y], limits))
-    });
+    let leg = (prop::option::weighted(0.7, (place(), place())), limits, 0.0..0.3_f64)
+        .prop_map(|(to, limits, wait)| to.map_or(Leg::Wait(wait), |(x, y)| Leg::To(vec![x, y], limits)));
     (prop::collection::vec(leg, 0..4), -1.0..1.0, -1.0..1.0).prop_map(|(legs, a, b)| Signal::References {
         profiles: Profile::along(&[0.0, 0.0], &legs).unwrap(),
         weights: vec![a, b],

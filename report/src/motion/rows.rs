@@ -111,7 +111,11 @@ pub fn lines(tried: &Tried, done: &Done) -> Vec<(&'static str, String)> {
         // The bound of a run holds without a controller, which answers to what rounding does.
         (
             "accuracy",
-            format!("not stated {}{}", if is_stepper { "for a move" } else { "in closed loop" }, ties(&run.outcome.ties)),
+            format!(
+                "not stated {}{}",
+                if is_stepper { "for a move" } else { "in closed loop" },
+                ties(&run.outcome.ties)
+            ),
         ),
     ];
     if is_stepper {

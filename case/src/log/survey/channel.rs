@@ -363,7 +363,9 @@ impl Channel {
                 format!("{} samples have no value ({share}), at most {run} in a row, from {at} on", self.missing),
             );
         }
-        for &Clipped { value: limit, at, samples } in &self.clipped {
+        // A commanded position stands where it is for as long as it likes.
+        let is_position = output.is_none() && self.unit == "m";
+        for &Clipped { value: limit, at, samples } in self.clipped.iter().filter(|_| !is_position) {
             let what = match output {
                 Some(output) if output.quantity.is_position() => "an end stop, or the end of its sensor",
                 Some(_) => "the limit of its sensor, perhaps",

@@ -43,7 +43,7 @@ pub(super) fn input_unit(stage: &Machine) -> &'static str {
 
 pub(super) fn notes(log: &Log, stage: &Machine, channels: &[Channel], motion: Option<&Motion>) -> Vec<Note> {
     let mut notes = Vec::new();
-    if !stage.has_one_coordinate() {
+    if !stage.has_torque_balance() {
         notes.extend(stage.drives.iter().zip(channels).filter_map(|(unit, channel)| input_note(stage, unit, channel)));
         notes.extend(beside_drives(log, stage, channels));
         notes.extend(encoder_note(stage, channels));

@@ -126,6 +126,7 @@ fn pairs(machine: &Machine) -> Vec<Vec<String>> {
 /// Changes one parameter of the machine after the other, each by itself, to meet the logs of `case`: what `plan`
 /// searches for, whatever else may be off, pairs that change together, and delay, gain and offset of the input.
 pub fn drift(case: &Case, plan: &Plan, stop: Option<Stop>, watch: &mut dyn FnMut(&str) -> Flow) -> Result<Drift> {
+    crate::case::needs_motors(&case.machine)?;
     if !case.machine.has_one_coordinate() {
         return Err(Error::new("single changes are searched for on a single axis, and the case describes a gantry")
             .next("free the parameters that may have changed in [fit], and use `taut fit`"));

@@ -126,6 +126,7 @@ pub fn compare(
     watch: &mut dyn FnMut(&str) -> Flow,
 ) -> Result<Comparison> {
     case.complete()?;
+    crate::case::needs_motors(&case.machine)?;
     if !case.machine.has_one_coordinate() {
         return Err(Error::new("friction laws are compared on a single axis, and the case describes a gantry")
             .next("fit each law with `taut fit`, and compare the errors of the logs that [fit] holds out"));

@@ -92,7 +92,7 @@ pub(crate) fn smoothed<'a>(problem: &'a Problem) -> Vec<Smoothed<'a>> {
     let noise = problem.noise();
     let mut all = Vec::new();
     // One balance of torques is that of one coordinate.
-    if !problem.machine.has_one_coordinate() {
+    if !problem.machine.has_torque_balance() {
         return all;
     }
     for run in problem.runs.iter().filter(|run| run.is_even()) {

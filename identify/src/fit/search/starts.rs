@@ -10,14 +10,17 @@ use crate::fit::asked::problem::{Problem, Stop, extent};
 use crate::fit::asked::residuals::Residuals;
 use crate::fit::asked::run::Run;
 use crate::fit::limits::{
-    FILE_ROUNDING, HUBER, MORE_THAN_NOISE, MOST_START_WINDOWS, ROUGH_TOLERANCE, SAME_MINIMUM, START_WINDOWS, STEPS,
-    STEPS_IN_PART, SWINGS_KEEP, TRIAL_ITERATIONS, WEIGHT_ROUNDS,
+    FILE_ROUNDING, FIRST_BEGINNING, HUBER, LEAST_ROWS, MORE_THAN_NOISE, MOST_START_WINDOWS, ROUGH_TOLERANCE,
+    SAME_MINIMUM, SHORTEST_BEGINNING, START_WINDOWS, STEPS, STEPS_IN_PART, SWINGS_KEEP, TRIAL_ITERATIONS,
+    WEIGHT_ROUNDS,
 };
 use crate::log::Quantity;
+use crate::reach::resonance::{Drive, resonances};
 use crate::solve::Flow;
 use nalgebra::DMatrix;
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
+use std::sync::Arc;
 
 /// The effort of a fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -240,13 +243,14 @@ fn told_beforehand(problem: &Problem, noise: &[(Quantity, f64)]) -> bool {
 /// A search of a problem from a point.
 type Descend<'d> = dyn FnMut(&mut Problem, &[f64], &Options) -> Minimum + 'd;
 
-/// The start values of the case, or those of a regression, or for a machine with several coordinates of fits in short
-/// windows: whichever fits the logs better.
+/// The start values of the case, or those of a regression, or for a stepper of fits of their beginnings, or for a machine with several
+/// coordinates of fits in short windows: whichever fits the logs better.
 fn first_guess(case: &Case, plan: &Plan, problem: &mut Problem, descend: &mut Descend) -> Result<Vec<f64>> {
     let start = problem.start();
-    let guess = match problem.machine.has_one_coordinate() {
-        true => by_regression(problem, &start),
-        false => in_windows(case, plan, problem, &start, descend)?,
+    let guess = match &problem.machine {
+        machine if machine.has_torque_balance() => by_regression(problem, &start),
+        machine if machine.stepper().is_some() => Some(by_beginnings(case, plan, problem, &start, descend)?),
+        _ => in_windows(case, plan, problem, &start, descend)?,
     };
     let Some(guess) = guess else { return Ok(start) };
     let mut residuals = vec![0.0; problem.rows()];
@@ -254,6 +258,56 @@ fn first_guess(case: &Case, plan: &Plan, problem: &mut Problem, descend: &mut De
         if problem.evaluate(x, &mut residuals) { residuals.iter().map(|r| r * r).sum() } else { f64::INFINITY }
     };
     Ok(if cost(&guess) < cost(&start) { guess } else { start })
+}
+
+/// The start with what fits of the beginnings of the logs find, each longer than the one before.
+///
+/// A rotor swings on its field, with the cart on its belt, at a frequency by holding torque and mass: with a wrong one it is
+/// soon out of phase with the log, and there is a minimum for each cycle. In a beginning of a cycle there is one.
+fn by_beginnings<'a>(
+    case: &Case,
+    plan: &Plan,
+    problem: &mut Problem<'a>,
+    start: &[f64],
+    descend: &mut Descend,
+) -> Result<Vec<f64>> {
+    let rough =
+        Options { iterations: TRIAL_ITERATIONS, tolerance: ROUGH_TOLERANCE, evolutions: 0, ..Options::default() };
+    let (globals, mut guess) = (problem.globals(), start.to_vec());
+    let end = problem.runs.iter().map(|run| run.time.last().copied().unwrap_or(0.0)).fold(0.0, f64::max);
+    let modes = resonances(&problem.machine, Drive::Held, 0).unwrap_or_default();
+    let slowest = modes.iter().map(|mode| mode.frequency).fold(f64::INFINITY, f64::min);
+    let first = (FIRST_BEGINNING / slowest).max(end * SHORTEST_BEGINNING);
+    for length in std::iter::successors(Some(first), |length| Some(2.0 * length)).take_while(|length| *length < end) {
+        let plan = Plan { until: None, ..plan.clone() };
+        let mut part = Problem::new(&beginning(case, length), &plan)?.stopped_by(problem.stop());
+        let mut first = part.start();
+        first[..globals].copy_from_slice(&guess[..globals]);
+        let found = descend(&mut part, &first, &rough);
+        problem.simulations += part.simulations;
+        if problem.is_stopped() {
+            break;
+        }
+        if found.ending != Ending::Failed {
+            guess[..globals].copy_from_slice(&found.x[..globals]);
+        }
+    }
+    Ok(guess)
+}
+
+/// A case with the first part of its logs, s.
+fn beginning(case: &Case, length: f64) -> Case {
+    let mut short = case.clone();
+    for experiment in &mut short.experiments {
+        let Some(log) = &mut experiment.log else { continue };
+        let rows = log.time.partition_point(|time| *time <= length).clamp(LEAST_ROWS.min(log.len()), log.len());
+        let log = Arc::make_mut(log);
+        log.time.truncate(rows);
+        let values = log.inputs.iter_mut().chain(&mut log.added).chain(&mut log.reference);
+        values.chain(log.outputs.iter_mut().map(|output| &mut output.values)).for_each(|values| values.truncate(rows));
+        experiment.until = log.time.last().copied().unwrap_or(experiment.until);
+    }
+    short
 }
 
 /// The start with the totals that a regression finds.

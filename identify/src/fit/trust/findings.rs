@@ -126,11 +126,11 @@ fn of_controller(case: &Case, plan: &Plan) -> Vec<Finding> {
     told.collect()
 }
 
-/// Residuals of a machine with several coordinates that are more than the noise of its logs: its elastic modes make many
-/// minima.
+/// Residuals of a machine with several coordinates, or with a stepper, that are more than the noise of its logs: its
+/// elastic modes make many minima.
 fn of_noise(found: &Searched) -> Option<Finding> {
     let problem = &found.problem;
-    if problem.machine.has_one_coordinate() || problem.parameters.is_empty() {
+    if problem.machine.has_torque_balance() || problem.parameters.is_empty() {
         return None;
     }
     let noise = problem.noise();

@@ -243,7 +243,7 @@ fn candidates(problem: &Problem, x: &[f64]) -> Vec<Candidate> {
     let mut machine = problem.stage_at(x);
     let mut all = Vec::new();
     // Pulley and cart are the bodies of an axis.
-    if !machine.has_one_coordinate() {
+    if !machine.has_torque_balance() {
         return all;
     }
     for body in Body::ALL {

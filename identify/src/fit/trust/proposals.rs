@@ -130,7 +130,7 @@ fn peak_current(problem: &Problem) -> f64 {
 /// ideas for a machine with more coordinates.
 pub(crate) fn proposals(found: &Searched, judged: &Judged) -> Vec<Proposal> {
     let Searched { problem, best, noise, .. } = found;
-    if !problem.machine.has_one_coordinate() {
+    if !problem.machine.has_torque_balance() {
         return Vec::new();
     }
     // White noise that is as bad as what the residuals show.

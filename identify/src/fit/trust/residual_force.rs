@@ -51,7 +51,7 @@ impl ResidualForce {
 /// The force that `stage` lacks for a log of an axis; `None` without an evenly sampled position, or if the model does
 /// not reach the end.
 pub fn residual_force(machine: &Machine, log: &LogFit) -> Option<ResidualForce> {
-    let is_known = log.complete && machine.has_one_coordinate();
+    let is_known = log.complete && machine.has_torque_balance();
     let output = log.outputs.iter().find(|output| output.quantity.is_position()).filter(|_| is_known)?;
     let n = log.time.len();
     let h = (log.time.last()? - log.time.first()?) / (n.max(2) - 1) as f64;

@@ -107,7 +107,7 @@ pub(crate) fn cause(
 fn is_asked(case: &Case, plan: &Plan, found: &Searched, judged: &Judged) -> bool {
     let problem = &found.problem;
     judged.inflation >= COLOURED
-        && case.machine.has_one_coordinate()
+        && case.machine.has_torque_balance()
         && plan.windows.is_none()
         && plan.until.is_none()
         && plan.separate.is_empty()
