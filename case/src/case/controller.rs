@@ -63,7 +63,8 @@ const EVERY: f64 = 1e-3;
 /// What a stepper has in place of a controller: an input shaper, if any. None where the file has neither that nor a move.
 fn of_stepper(root: &Table) -> Result<Option<Design>> {
     let Some(field) = root.optional("controller") else {
-        return Ok(root.optional("move").map(|_| Design::open_loop(EVERY, Vec::new())));
+        let asks = ["move", "tune"].iter().find_map(|key| root.optional(key));
+        return Ok(asks.map(|_| Design::open_loop(EVERY, Vec::new())));
     };
     let table = field.table()?;
     if let Some(key) = table.keys().find(|key| !["shaper", "every"].contains(key)) {
