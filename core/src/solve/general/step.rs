@@ -376,14 +376,20 @@ impl Room {
         let mut off = [(0, 0.0); S];
         for (source, off) in off[..sources].iter_mut().enumerate() {
             let force = &self.forces[source];
+            let missed =
+                field.sources[source].missed((&field.model, set.h, begin.y), &self.arguments, (force, &self.bristles));
             *off = match &there {
                 // A kink leaves as much to a quartic as to a cubic.
                 _ if self.kink_of(step, source).is_some() => (0, OF_KINK * cubic(force)),
                 Some((basis, rest)) => {
                     let quartic = basis.iter().zip(force).fold(0.0, |sum, ([weight], value)| sum + weight * value);
-                    (POINTS, (self.kept[source] - quartic) / rest)
+                    let predicted = (self.kept[source] - quartic) / rest;
+                    (POINTS, missed.map_or(predicted, |[_, missed]| predicted.abs().max(missed)))
                 }
-                None => (0, OF_CUBIC * cubic(force)),
+                None => match (missed, OF_CUBIC * cubic(force)) {
+                    (Some([off, missed]), cubic) if off > cubic.abs() => (POINTS, missed),
+                    (_, cubic) => (0, cubic),
+                },
             };
         }
         let mut most: f64 = 0.0;
