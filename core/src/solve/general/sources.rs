@@ -67,6 +67,9 @@ const PARTS: usize = 4;
 const ROUNDING: f64 = 1e-13;
 const LEAST_REST: f64 = 5e-5;
 
+/// Halvings of a part of a step in which such a place is found.
+const HALVINGS: usize = 40;
+
 /// Bristles that slip by more than this share of their deflection within a step are stiff.
 const STIFF: f64 = 2.0;
 
@@ -186,9 +189,9 @@ impl Source {
         first
     }
 
-    /// Deviation of a friction force from the quartic through its points where its body is slowest within a step of
-    /// length `h` from `y` on, between two of them, and by it D of the deviation D ω(s). The nodes can miss a curve that
-    /// is passed within a part of the step.
+    /// Deviation of a friction force from the quartic through its points at a place between them, and by it D of the
+    /// deviation D ω(s). The nodes can miss a curve that is passed within a part of the step: its peak where the body is
+    /// slowest, and that of bristles, which zero speed hides, where the body is as fast as the curve is wide.
     #[inline(always)]
     pub(super) fn missed(
         &self,
@@ -199,44 +202,13 @@ impl Source {
         let &Source::Friction { curved, motion, speed, way } = self else { return None };
         let curved = &model.curved[curved];
         let speeds = course(y[curved.speed], &arguments[speed]);
-        let powers = slowest_inside(&speeds)?;
-        self.missed_by((model, h, y), (curved, motion, way), (arguments, &powers), (force, bristles))
-    }
-
-    /// The same for a speed with these powers of the share of the step.
-    #[cold]
-    fn missed_by(
-        &self,
-        (model, h, y): (&Model, f64, &Vector),
-        (curved, motion, way): (&Curved, Motion, Option<usize>),
-        (arguments, powers): (&[Lane], &[f64; POINTS]),
-        (force, bristles): (&[f64; POINTS], &Bristles),
-    ) -> Option<[f64; 2]> {
-        let ways = way.map(|way| monomials(&course(y[model.coordinate(curved.body)], &arguments[way])));
-        let law = |s: f64| {
-            let factor = model.factor_at(curved.body, || ways.map_or(0.0, |ways| polynomial(&ways, s)));
-            curved.sliding(motion, polynomial(powers, s), factor, false)
-        };
-        let mut worst: Option<[f64; 2]> = None;
-        slowest(powers, |s| {
-            let (own, there) = match (curved.friction.law, curved.bristle) {
-                (Law::LuGre { stiffness, damping, .. }, Some(place)) => {
-                    // a = σ₀ |v|/g is off by δ: σ₀ z by σ₀ δ z min(h, 1/a), σ₁ ż by σ₁ δ z
-                    let [a, b, c, d] = bristles[curved.body].bent;
-                    let bent = polynomial(&monomials(&[y[place], a, b, c, d]), s);
-                    let slip = law(s).slip;
-                    let weight = (stiffness * h.min(1.0 / slip) + damping) * bent;
-                    let through = polynomial(&monomials(&PLACES.map(|s| law(s).slip)), s);
-                    (weight * slip, weight * through)
-                }
-                _ => (law(s).beyond, polynomial(&monomials(force), s)),
-            };
-            let off = (own - there).abs();
-            if off > ROUNDING * own.abs().max(there.abs()) && worst.is_none_or(|[most, _]| off > most) {
-                worst = Some([off, off / rest(s).abs().max(LEAST_REST)]);
-            }
-        });
-        worst
+        let powers = monomials(&speeds);
+        let width = if let Law::LuGre { velocity, .. } = curved.friction.law { velocity } else { 0.0 };
+        if !has_slowest(&speeds, &powers) && !passes(&speeds, width) {
+            return None;
+        }
+        let (friction, course) = ((curved, motion, way), (arguments, &powers));
+        missed_by((model, h, y), friction, course, (force, bristles), width)
     }
 
     /// True if it is zero in one direction of a body that reverses without sticking. What such a body does is then
@@ -449,35 +421,87 @@ fn polynomial(powers: &[f64; POINTS], s: f64) -> f64 {
     powers.iter().rev().fold(0.0, |sum, power| sum * s + power)
 }
 
-/// The powers of a speed with these values at the points of a step, if it can be slowest between two of them: it does
-/// not grow or fall all the way, nor at its ends.
+/// True if a speed with these values at the points of a step, and these powers of its share, can be slowest between two
+/// of them: it does not grow or fall all the way, nor at its ends.
 #[inline(always)]
-fn slowest_inside(speeds: &[f64; POINTS]) -> Option<[f64; POINTS]> {
-    let powers = monomials(speeds);
+fn has_slowest(speeds: &[f64; POINTS], powers: &[f64; POINTS]) -> bool {
     let (begin, end) = (powers[1], (1..POINTS).map(|k| k as f64 * powers[k]).sum::<f64>());
     let mut changes = speeds.windows(2).map(|pair| pair[1] - pair[0]).chain([begin, end]);
-    let is_monotonic = changes.clone().all(|change| change >= 0.0) || changes.all(|change| change <= 0.0);
-    (!is_monotonic).then_some(powers)
+    !(changes.clone().all(|change| change >= 0.0) || changes.all(|change| change <= 0.0))
 }
 
-/// Calls `each` with every share of a step at which |Σ c_k sᵏ| is least.
-fn slowest(powers: &[f64; POINTS], mut each: impl FnMut(f64)) {
+/// True if |v| passes `width` between two points of a step.
+#[inline(always)]
+fn passes(speeds: &[f64; POINTS], width: f64) -> bool {
+    let below = speeds.map(|v| v.abs() < width);
+    below.contains(&true) && below.contains(&false)
+}
+
+/// The worst deviation of a friction force from the quartic through its points, where its body is slowest and where its
+/// speed is `width`, and by it D of the deviation D ω(s).
+#[cold]
+fn missed_by(
+    (model, h, y): (&Model, f64, &Vector),
+    (curved, motion, way): (&Curved, Motion, Option<usize>),
+    (arguments, powers): (&[Lane], &[f64; POINTS]),
+    (force, bristles): (&[f64; POINTS], &Bristles),
+    width: f64,
+) -> Option<[f64; 2]> {
+    let ways = way.map(|way| monomials(&course(y[model.coordinate(curved.body)], &arguments[way])));
+    let law = |s: f64| {
+        let factor = model.factor_at(curved.body, || ways.map_or(0.0, |ways| polynomial(&ways, s)));
+        curved.sliding(motion, polynomial(powers, s), factor, false)
+    };
+    let mut worst: Option<[f64; 2]> = None;
+    let mut take = |s: f64| {
+        let (own, there) = match (curved.friction.law, curved.bristle) {
+            (Law::LuGre { stiffness, damping, .. }, Some(place)) => {
+                // a = σ₀ |v|/g is off by δ: σ₀ z by σ₀ δ z min(h, 1/a), σ₁ ż by σ₁ δ z
+                let [a, b, c, d] = bristles[curved.body].bent;
+                let bent = polynomial(&monomials(&[y[place], a, b, c, d]), s);
+                let slip = law(s).slip;
+                let weight = (stiffness * h.min(1.0 / slip) + damping) * bent;
+                (weight * slip, weight * polynomial(&monomials(&PLACES.map(|s| law(s).slip)), s))
+            }
+            _ => (law(s).beyond, polynomial(&monomials(force), s)),
+        };
+        let off = (own - there).abs();
+        if off > ROUNDING * own.abs().max(there.abs()) && worst.is_none_or(|[most, _]| off > most) {
+            worst = Some([off, off / rest(s).abs().max(LEAST_REST)]);
+        }
+    };
+    let speed = |s: f64| polynomial(powers, s);
     let slope = |s: f64| (1..POINTS).rev().fold(0.0, |sum, k| sum * s + k as f64 * powers[k]);
-    // |p| falls where p p′ < 0.
-    let rises = |s: f64| polynomial(powers, s) * slope(s) > 0.0;
-    let mut begin = 0.0;
-    for part in 1..=NODES * PARTS {
-        let end = part as f64 / (NODES * PARTS) as f64;
-        let (mut low, mut high) = (begin, end);
-        begin = end;
-        if rises(low) || !rises(high) {
-            continue;
+    // |v| grows where v v′ > 0.
+    places(
+        |s| speed(s) * slope(s) > 0.0,
+        |s, grows| {
+            if grows {
+                take(s)
+            }
+        },
+    );
+    if width > 0.0 {
+        places(|s| speed(s).abs() > width, |s, _| take(s));
+    }
+    worst
+}
+
+/// Calls `each` with every share of a step at which `is` changes, and its value after that.
+fn places(is: impl Fn(f64) -> bool, mut each: impl FnMut(f64, bool)) {
+    const COUNT: usize = NODES * PARTS;
+    let mut before = (0.0, is(0.0));
+    for part in 1..=COUNT {
+        let s = part as f64 / COUNT as f64;
+        let (mut low, mut high, now) = (before.0, s, is(s));
+        if now != before.1 {
+            for _ in 0..HALVINGS {
+                let middle = 0.5 * (low + high);
+                if is(middle) == now { high = middle } else { low = middle }
+            }
+            each(0.5 * (low + high), now);
         }
-        for _ in 0..40 {
-            let middle = 0.5 * (low + high);
-            if rises(middle) { high = middle } else { low = middle }
-        }
-        each(0.5 * (low + high));
+        before = (s, now);
     }
 }
 

@@ -383,14 +383,14 @@ impl Room {
                 _ if self.kink_of(step, source).is_some() => (0, OF_KINK * cubic(force)),
                 Some((basis, rest)) => {
                     let quartic = basis.iter().zip(force).fold(0.0, |sum, ([weight], value)| sum + weight * value);
-                    let predicted = (self.kept[source] - quartic) / rest;
-                    (POINTS, missed.map_or(predicted, |[_, missed]| predicted.abs().max(missed)))
+                    (POINTS, (self.kept[source] - quartic) / rest)
                 }
-                None => match (missed, OF_CUBIC * cubic(force)) {
-                    (Some([off, missed]), cubic) if off > cubic.abs() => (POINTS, missed),
-                    (_, cubic) => (0, cubic),
-                },
+                None => (0, OF_CUBIC * cubic(force)),
             };
+            if let Some([deviation, missed]) = missed {
+                let is_more = if off.0 == POINTS { missed > off.1.abs() } else { deviation > off.1.abs() };
+                *off = if is_more { (POINTS, missed) } else { *off };
+            }
         }
         let mut most: f64 = 0.0;
         for argument in 0..arguments {
