@@ -11,7 +11,7 @@
 //! beginning is a fifth value, which makes its quartic as accurate as that of the force.
 
 use super::model::{Curved, Model, Phased, Sliding, Vector};
-use super::radau::{FOUND, Lane, NODES, PLACES, POINTS, QUARTIC, RADAU, monomials, rest};
+use super::radau::{FOUND, Lane, NODES, PLACES, POINTS, QUARTIC, RADAU, SLOPES, monomials, rest};
 use crate::friction::{Law, Motion, Side};
 use crate::mechanism::{BODIES, DRIVES, PhaseRate, SPRINGS};
 
@@ -202,12 +202,11 @@ impl Source {
         let &Source::Friction { curved, motion, speed, way } = self else { return None };
         let curved = &model.curved[curved];
         let speeds = course(y[curved.speed], &arguments[speed]);
-        let powers = monomials(&speeds);
         let width = if let Law::LuGre { velocity, .. } = curved.friction.law { velocity } else { 0.0 };
-        if !has_slowest(&speeds, &powers) && !passes(&speeds, width) {
+        if !has_slowest(&speeds) && !passes(&speeds, width) {
             return None;
         }
-        let (friction, course) = ((curved, motion, way), (arguments, &powers));
+        let (friction, course) = ((curved, motion, way), (arguments, &monomials(&speeds)));
         missed_by((model, h, y), friction, course, (force, bristles), width)
     }
 
@@ -421,11 +420,12 @@ fn polynomial(powers: &[f64; POINTS], s: f64) -> f64 {
     powers.iter().rev().fold(0.0, |sum, power| sum * s + power)
 }
 
-/// True if a speed with these values at the points of a step, and these powers of its share, can be slowest between two
-/// of them: it does not grow or fall all the way, nor at its ends.
+/// True if a speed with these values at the points of a step can be slowest between two of them: it does not grow or fall
+/// all the way, nor at its ends.
 #[inline(always)]
-fn has_slowest(speeds: &[f64; POINTS], powers: &[f64; POINTS]) -> bool {
-    let (begin, end) = (powers[1], (1..POINTS).map(|k| k as f64 * powers[k]).sum::<f64>());
+fn has_slowest(speeds: &[f64; POINTS]) -> bool {
+    let slope = |weights: &[f64; POINTS]| weights.iter().zip(speeds).fold(0.0, |sum, (weight, v)| sum + weight * v);
+    let (begin, end) = (slope(&SLOPES[0]), slope(&SLOPES[1]));
     let mut changes = speeds.windows(2).map(|pair| pair[1] - pair[0]).chain([begin, end]);
     !(changes.clone().all(|change| change >= 0.0) || changes.all(|change| change <= 0.0))
 }
