@@ -11,7 +11,7 @@
 //! beginning is a fifth value, which makes its quartic as accurate as that of the force.
 
 use super::model::{Curved, Model, Phased, Sliding, Vector};
-use super::radau::{FOUND, Lane, NODES, PLACES, POINTS, QUARTIC, RADAU, SLOPES, monomials, rest};
+use super::radau::{BACKWARD, C, FOUND, Lane, NODES, PLACES, POINTS, QUARTIC, RADAU, SLOPES, monomials, rest};
 use crate::friction::{Law, Motion, Side};
 use crate::mechanism::{BODIES, DRIVES, PhaseRate, SPRINGS};
 
@@ -454,19 +454,29 @@ fn missed_by(
     };
     let mut worst: Option<[f64; 2]> = None;
     let mut take = |s: f64| {
-        let (own, there) = match (curved.friction.law, curved.bristle) {
+        // Both, and a size that rounding is a part of.
+        let (own, there, size) = match (curved.friction.law, curved.bristle) {
             (Law::LuGre { stiffness, damping, .. }, Some(place)) => {
-                // a = σ₀ |v|/g is off by δ: σ₀ z by σ₀ δ z min(h, 1/a), σ₁ ż by σ₁ δ z
-                let [a, b, c, d] = bristles[curved.body].bent;
-                let bent = polynomial(&monomials(&[y[place], a, b, c, d]), s);
-                let slip = law(s).slip;
-                let weight = (stiffness * h.min(1.0 / slip) + damping) * bent;
-                (weight * slip, weight * polynomial(&monomials(&PLACES.map(|s| law(s).slip)), s))
+                // The defect δ = p(s) − (v − a z), p being the polynomial of ż at the points: σ₀ z is off by
+                // σ₀ δ min(h, 1/a), and σ₁ ż by σ₁ δ.
+                let own = &bristles[curved.body];
+                let [a, b, c, d] = own.bent;
+                let bent = monomials(&[y[place], a, b, c, d]);
+                let rate = |s: f64| polynomial(powers, s) - law(s).slip * polynomial(&bent, s);
+                let rates = C.map(rate);
+                let begin = if own.is_stiff { BACKWARD.iter().zip(rates).map(|(b, r)| b * r).sum() } else { own.rate };
+                let [a, b, c, d] = rates;
+                let weight = stiffness * h.min(1.0 / law(s).slip) + damping;
+                let through = polynomial(&monomials(&[begin, a, b, c, d]), s);
+                (weight * rate(s), weight * through, weight * polynomial(powers, s).abs())
             }
-            _ => (law(s).beyond, polynomial(&monomials(force), s)),
+            _ => {
+                let own = law(s).beyond;
+                (own, polynomial(&monomials(force), s), own.abs())
+            }
         };
         let off = (own - there).abs();
-        if off > ROUNDING * own.abs().max(there.abs()) && worst.is_none_or(|[most, _]| off > most) {
+        if off > ROUNDING * size && worst.is_none_or(|[most, _]| off > most) {
             worst = Some([off, off / rest(s).abs().max(LEAST_REST)]);
         }
     };
