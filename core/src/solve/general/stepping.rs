@@ -259,8 +259,8 @@ impl Core {
         (set, false)
     }
 
-    /// Takes a solved step up to the first guard that falls. Errors: the part up to there is less accurate than
-    /// allowed; then nothing was taken, unless the step is the smallest one.
+    /// Takes a solved step up to the first guard that falls. Errors: the part up to there has a larger error than allowed,
+    /// and nothing was taken; the smallest step is taken all the same.
     fn take(
         &mut self,
         room: &mut Room,
