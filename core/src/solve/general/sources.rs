@@ -67,8 +67,11 @@ const PARTS: usize = 4;
 const ROUNDING: f64 = 1e-13;
 const LEAST_REST: f64 = 5e-5;
 
-/// Halvings of a part of a step in which such a place is found.
-const HALVINGS: usize = 40;
+/// A speed that changes by less than this share of the width of its curve within a step shows all of it at the nodes.
+const NARROW: f64 = 0.25;
+
+/// Halvings of a part of a step in which such a place is found. Near its least value a speed hardly changes.
+const HALVINGS: usize = 12;
 
 /// Bristles that slip by more than this share of their deflection within a step are stiff.
 const STIFF: f64 = 2.0;
@@ -202,12 +205,18 @@ impl Source {
         let &Source::Friction { curved, motion, speed, way } = self else { return None };
         let curved = &model.curved[curved];
         let speeds = course(y[curved.speed], &arguments[speed]);
-        let width = if let Law::LuGre { velocity, .. } = curved.friction.law { velocity } else { 0.0 };
-        if !has_slowest(&speeds) && !passes(&speeds, width) {
+        let (width, hides) = match curved.friction.law {
+            Law::Coulomb => return None,
+            Law::Stribeck { velocity, .. } => (velocity, false),
+            // tanh 10 v/v_b
+            Law::Smooth { breakaway_velocity } => (0.1 * breakaway_velocity, false),
+            Law::LuGre { velocity, .. } => (velocity, true),
+        };
+        if spread(&speeds) <= NARROW * width || !(has_slowest(&speeds) || (hides && passes(&speeds, width))) {
             return None;
         }
         let (friction, course) = ((curved, motion, way), (arguments, &monomials(&speeds)));
-        missed_by((model, h, y), friction, course, (force, bristles), width)
+        missed_by((model, h, y), friction, course, (force, bristles), hides.then_some(width))
     }
 
     /// True if it is zero in one direction of a body that reverses without sticking. What such a body does is then
@@ -430,6 +439,13 @@ fn has_slowest(speeds: &[f64; POINTS]) -> bool {
     !(changes.clone().all(|change| change >= 0.0) || changes.all(|change| change <= 0.0))
 }
 
+/// The largest difference of two values.
+#[inline(always)]
+fn spread(values: &[f64; POINTS]) -> f64 {
+    let (least, most) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, m), v| (l.min(*v), m.max(*v)));
+    most - least
+}
+
 /// True if |v| passes `width` between two points of a step.
 #[inline(always)]
 fn passes(speeds: &[f64; POINTS], width: f64) -> bool {
@@ -437,15 +453,15 @@ fn passes(speeds: &[f64; POINTS], width: f64) -> bool {
     below.contains(&true) && below.contains(&false)
 }
 
-/// The worst deviation of a friction force from the quartic through its points, where its body is slowest and where its
-/// speed is `width`, and by it D of the deviation D ω(s).
+/// The worst deviation of a friction force from the quartic through its points, where its body is slowest and, if
+/// a width is given, where its speed is that, and by it D of the deviation D ω(s).
 #[cold]
 fn missed_by(
     (model, h, y): (&Model, f64, &Vector),
     (curved, motion, way): (&Curved, Motion, Option<usize>),
     (arguments, powers): (&[Lane], &[f64; POINTS]),
     (force, bristles): (&[f64; POINTS], &Bristles),
-    width: f64,
+    width: Option<f64>,
 ) -> Option<[f64; 2]> {
     let ways = way.map(|way| monomials(&course(y[model.coordinate(curved.body)], &arguments[way])));
     let law = |s: f64| {
@@ -491,7 +507,7 @@ fn missed_by(
             }
         },
     );
-    if width > 0.0 {
+    if let Some(width) = width {
         places(|s| speed(s).abs() > width, |s, _| take(s));
     }
     worst
