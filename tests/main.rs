@@ -46,6 +46,7 @@ mod measure;
 mod merged;
 mod metrics;
 mod moves;
+mod narrow;
 mod parameters;
 mod posterior;
 mod published;

@@ -44,7 +44,7 @@ pub enum Verdict {
     Agrees,
     /// They differ as perturbed runs of the independent solver do among themselves.
     IllConditioned(String),
-    /// The independent solver gave up: there is nothing to compare with.
+    /// Both say the same up to a time at which the independent solver gave up.
     Unknown(String),
     /// They differ.
     Unexplained(String),
@@ -156,18 +156,22 @@ impl Pair<'_> {
         let exceeds = self.answer.is_stated && difference > allowed && self.answer.ties == 0;
         let compared =
             |spread, verdict| Compared { by: self.by, difference, allowed, spread, events: count, exceeds, verdict };
-        if let Ending::GaveUp(time, why) = &self.known.ending {
-            return compared(None, Verdict::Unknown(format!("the independent solver gave up at {time:e} s: {why}")));
-        }
-        let wrong_end = self.wrong_end(self.known);
+        // Where it gave up, what came before is known.
+        let gave_up = match &self.known.ending {
+            Ending::GaveUp(time, why) => Some(format!("the independent solver gave up at {time:e} s: {why}")),
+            Ending::Complete | Ending::LeftTravel(_) => None,
+        };
+        let wrong_end = if gave_up.is_none() { self.wrong_end(self.known) } else { None };
         let far = difference > allowed;
         let [until, _] = self.subject.times();
+        let compared_until = if let Ending::GaveUp(time, _) = self.known.ending { time } else { f64::INFINITY };
         let events = self.answer.events.as_ref().and_then(|ours| {
-            events::undone(ours, &self.known.events, until, self.subject.names())
-                .or_else(|| self.disagreement(ours, self.known))
+            let ours: Vec<Event> = ours.iter().filter(|event| event.time <= compared_until).copied().collect();
+            events::undone(&ours, &self.known.events, until, self.subject.names())
+                .or_else(|| self.disagreement(&ours, self.known))
         });
         if wrong_end.is_none() && !far && events.is_none() {
-            return compared(None, Verdict::Agrees);
+            return compared(None, gave_up.map_or(Verdict::Agrees, Verdict::Unknown));
         }
         let perturbed = self.perturbed();
         let spread = perturbed.iter().map(|run| apart(&run.rows, &self.known.rows)).fold(0.0, f64::max);
@@ -178,7 +182,7 @@ impl Pair<'_> {
             far || perturbed.iter().any(|run| self.disagreement(&run.events, self.known).is_some())
         };
         let explained = !too_far && (wrong_end.is_none() || other_end()) && (events.is_none() || other_events());
-        let mut told: Vec<String> = wrong_end.into_iter().collect();
+        let mut told: Vec<String> = gave_up.into_iter().chain(wrong_end).collect();
         if far {
             let from = self.first_apart();
             told.push(format!("positions differ by {difference:.1e} m{from}, {allowed:.1e} m allowed"));

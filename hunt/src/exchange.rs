@@ -1,12 +1,15 @@
 //! An FMU for model exchange under an integrator of the hunt: extrapolation of the midpoint rule (Gragg, Bulirsch,
-//! Stoer), events by bisection of a step, an indicator that is zero counted with the negative ones, as FMI has it.
+//! Stoer), of the linearly implicit one where there are bristles, whose rate σ₀ |v|/g grows with the speed (Bader,
+//! Deuflhard); events by bisection of a step, an indicator that is zero counted with the negative ones, as FMI has it.
 
-use crate::answer::{Answer, End, rows};
+use crate::answer::{Answer, End, mechanism, rows};
 use crate::double::Double;
 use crate::input::{self, Piece};
+use crate::linear::Factors;
 use crate::steps::{Case, references, told};
 use crate::subject::{Fed, Subject};
 use std::sync::Arc;
+use taut::friction::Law;
 use taut_fmu::instance::{Instance, Phase, Use};
 
 /// How far positions may be off, m.
@@ -23,6 +26,10 @@ const ROUNDING: f64 = 16.0;
 
 /// Columns of the extrapolation.
 const COLUMNS: usize = 8;
+
+/// Steps of each column, by the explicit and by the linearly implicit rule.
+const EXPLICIT: [usize; COLUMNS] = [2, 4, 6, 8, 10, 12, 14, 16];
+const IMPLICIT: [usize; COLUMNS] = [2, 6, 10, 14, 22, 34, 50, 70];
 
 /// Steps and events after which it gives up.
 const MOST: usize = 300_000;
@@ -41,6 +48,8 @@ struct Importer<'a> {
     longest: f64,
     work: usize,
     next_event: Option<f64>,
+    /// True if some of its rates may be far faster than its motion.
+    is_stiff: bool,
 }
 
 impl Importer<'_> {
@@ -101,31 +110,83 @@ impl Importer<'_> {
         Ok(error.collect())
     }
 
+    /// ∂f/∂y by columns, from differences: the rule is of the same order with any matrix.
+    fn jacobian(&mut self, y: &[f64], first: &[f64]) -> Result<Vec<Vec<f64>>, String> {
+        let mut columns = Vec::new();
+        for place in 0..y.len() {
+            let mut moved = y.to_vec();
+            moved[place] += f64::EPSILON.sqrt() * y[place].abs().max(self.nominals[place]);
+            let change = moved[place] - y[place];
+            let rates = self.rates(self.time, self.time, &moved)?;
+            columns.push(rates.iter().zip(first).map(|(f, first)| (f - first) / change).collect());
+        }
+        Ok(columns)
+    }
+
+    /// `count` steps of the midpoint rule over `h`: y₁ = y₀ + d f₀, y_{m+1} = y_{m−1} + 2 d f_m; nothing where it runs
+    /// off every number.
+    fn explicit(&mut self, (y, first): (&[f64], &[f64]), h: f64, count: usize) -> Result<Option<Vec<f64>>, String> {
+        let (t, d) = (self.time, h / count as f64);
+        let mut before = y.to_vec();
+        let mut now: Vec<f64> = y.iter().zip(first).map(|(y, f)| y + d * f).collect();
+        for m in 1..count {
+            if now.iter().any(|y| !y.is_finite()) {
+                return Ok(None);
+            }
+            let rates = self.rates(t, t + m as f64 * d, &now)?;
+            let next = before.iter().zip(&rates).map(|(y, f)| y + 2.0 * d * f).collect();
+            before = std::mem::replace(&mut now, next);
+        }
+        Ok(Some(now))
+    }
+
+    /// The same of the linearly implicit rule: (1 − d A) Δ₀ = d f₀, (1 − d A)(Δ_m − Δ_{m−1})/2 = d f_m − Δ_{m−1},
+    /// y_{m+1} = y_m + Δ_m, and at the end half of the last change.
+    fn implicit(
+        &mut self,
+        (y, first, jacobian): (&[f64], &[f64], &[Vec<f64>]),
+        h: f64,
+        count: usize,
+    ) -> Result<Option<Vec<f64>>, String> {
+        let (t, d) = (self.time, h / count as f64);
+        let factors = Factors::new(jacobian, d);
+        let mut delta = factors.solve(first.iter().map(|f| d * f).collect());
+        let mut now: Vec<f64> = y.iter().zip(&delta).map(|(y, delta)| y + delta).collect();
+        for m in 1..=count {
+            if now.iter().any(|y| !y.is_finite()) {
+                return Ok(None);
+            }
+            let rates = self.rates(t, t + m as f64 * d, &now)?;
+            let half = factors.solve(rates.iter().zip(&delta).map(|(f, delta)| d * f - delta).collect());
+            if m == count {
+                now.iter_mut().zip(&half).for_each(|(y, half)| *y += half);
+                break;
+            }
+            delta.iter_mut().zip(&half).for_each(|(delta, half)| *delta += 2.0 * half);
+            now.iter_mut().zip(&delta).for_each(|(y, delta)| *y += delta);
+        }
+        Ok(Some(now))
+    }
+
     /// The state a step of `h` on, and its error by the tolerance.
     fn extrapolated(&mut self, h: f64) -> Result<(Vec<f64>, f64), String> {
         let (t, y) = (self.time, self.states.clone());
         let first = self.rates(t, t, &y)?;
         let most = self.errors(&y, &first, h)?;
+        let jacobian = if self.is_stiff { Some(self.jacobian(&y, &first)?) } else { None };
+        let counts = if self.is_stiff { IMPLICIT } else { EXPLICIT };
         let mut last: Vec<Vec<f64>> = Vec::new();
-        for column in 0..COLUMNS {
-            let count = steps_of(column);
-            let d = h / count as f64;
-            // Midpoint rule: y₁ = y₀ + d f₀, y_{m+1} = y_{m−1} + 2 d f_m
-            let mut before = y.clone();
-            let mut now: Vec<f64> = y.iter().zip(&first).map(|(y, f)| y + d * f).collect();
-            for m in 1..count {
-                // A step that runs off every number is too long.
-                if now.iter().any(|y: &f64| !y.is_finite()) {
-                    return Ok((y, f64::INFINITY));
-                }
-                let rates = self.rates(t, t + m as f64 * d, &now)?;
-                let next = before.iter().zip(&rates).map(|(y, f)| y + 2.0 * d * f).collect();
-                before = std::mem::replace(&mut now, next);
-            }
+        for (column, &count) in counts.iter().enumerate() {
+            let now = match &jacobian {
+                Some(jacobian) => self.implicit((&y, &first, jacobian), h, count)?,
+                None => self.explicit((&y, &first), h, count)?,
+            };
+            // A step that runs off every number is too long.
+            let Some(now) = now else { return Ok((y, f64::INFINITY)) };
             // T_{j,k} = T_{j,k−1} + (T_{j,k−1} − T_{j−1,k−1})/((n_j/n_{j−k})² − 1)
             let mut row = vec![now];
             for k in 1..=column {
-                let ratio = count as f64 / steps_of(column - k) as f64;
+                let ratio = count as f64 / counts[column - k] as f64;
                 let pairs = row[k - 1].iter().zip(&last[k - 1]);
                 row.push(pairs.map(|(new, old)| new + (new - old) / (ratio * ratio - 1.0)).collect());
             }
@@ -215,11 +276,6 @@ impl Importer<'_> {
     }
 }
 
-/// Steps of a column.
-fn steps_of(column: usize) -> usize {
-    2 * (column + 1)
-}
-
 /// Runs it.
 pub fn run(subject: &Subject) -> Result<Answer, String> {
     let opened = Case::new(subject)?;
@@ -245,6 +301,7 @@ pub fn run(subject: &Subject) -> Result<Answer, String> {
         longest: every / 16.0,
         work: 0,
         next_event: None,
+        is_stiff: mechanism(subject).bodies.iter().any(|body| matches!(body.friction.law, Law::LuGre { .. })),
     };
     let first = importer.inputs(0.0);
     importer.instance.set_reals(&opened.inputs[..first.len()], &first).map_err(told)?;

@@ -16,6 +16,7 @@ pub mod exchange;
 pub mod gantry;
 pub mod input;
 pub mod law;
+pub mod linear;
 pub mod loops;
 pub mod machine;
 pub mod replay;

@@ -61,11 +61,42 @@ fn what_the_hunt_had_wrong_once_agrees() {
     }
 }
 
-/// Cases of pairs that amplify what an answer may be off by: the tolerance of an integrator (2638, 3083, 3544, 7130), the
-/// delay of each condition in model exchange (3560, 4830), a controller's clock at an edge of the profile (5736, 8548).
+/// Cases of pairs, by seed and number, in which a step of the general solver up to a reversal missed the peak of a
+/// Stribeck curve; co-simulation was off by 8.7e-7 m and 1.8e-6 m.
+#[test]
+fn reversals_in_narrow_curves_are_right_in_co_simulation() {
+    for (seed, number) in [(2, 3042), (1, 7130)] {
+        let outcome = stages::pair(seed, number);
+        assert!(outcome.features.contains(&Feature::Asked(By::CoSimulation)));
+        let agrees = outcome.compared.iter().all(|one| one.verdict == Verdict::Agrees);
+        assert!(agrees && !outcome.compared.is_empty(), "{}", stages::told(seed, &[outcome], true));
+    }
+}
+
+/// In an unstable loop the bristles of a pulley slip ever faster (case 1971 of seed 2): the explicit integrator of the
+/// importer for model exchange had too many steps.
+#[test]
+fn bristles_that_slip_ever_faster_are_followed_in_model_exchange() {
+    let mut subject = Subject::new("pair.toml", &draw::pair(2, 1971).0.text).unwrap();
+    let Subject::Loop(case) = &mut subject else { panic!("the case has a controller") };
+    case.moves[0].until = 30.0;
+    // Rows of co-simulation are at the samples of the controller.
+    let every = case.controller.as_ref().unwrap().every;
+    let subject = subject.with_every(every);
+    let [exchange, steps] = [By::ModelExchange, By::CoSimulation].map(|by| answer::ask(&subject, by).unwrap());
+    assert_eq!(exchange.times.len(), steps.times.len());
+    let farthest = steps.rows.iter().flatten().map(|way| way.high.abs()).fold(0.0, f64::max);
+    let pairs = exchange.rows.iter().flatten().zip(steps.rows.iter().flatten());
+    let apart = pairs.map(|(a, b)| (*a - *b).high.abs()).fold(0.0, f64::max);
+    println!("{apart:e} of {farthest:e} m");
+    assert!(farthest > 100.0 && apart < 1e-9 * farthest, "{apart:e} of {farthest:e} m");
+}
+
+/// Cases of pairs that amplify what an answer may be off by: the tolerance of an integrator (2638, 3083, 3544), the delay
+/// of each condition in model exchange (3560, 4830), a controller's clock at an edge of the profile (5736, 8548).
 #[test]
 fn what_amplifies_a_tolerance_is_ill_conditioned() {
-    for number in [2638, 3083, 3544, 7130, 3560, 4830, 5736, 8548] {
+    for number in [2638, 3083, 3544, 3560, 4830, 5736, 8548] {
         let outcome = stages::pair(1, number);
         let known = outcome.compared.iter().all(|one| matches!(one.verdict, Verdict::IllConditioned(_)));
         assert!(known && !outcome.compared.is_empty(), "{}", stages::told(1, &[outcome], true));

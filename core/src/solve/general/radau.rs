@@ -39,6 +39,20 @@ pub(super) const POWERS: usize = crate::signal::DEGREE + 1;
 /// Coefficients of ℓ_p by powers of s: `[power][point]`.
 pub(super) const MONOMIALS: [[f64; POINTS]; POINTS] = inverse(PLACES);
 
+/// Derivatives of ℓ_p at the beginning and at the end of a step.
+pub(super) const SLOPES: [[f64; POINTS]; 2] = {
+    let (mut slopes, mut p) = ([MONOMIALS[1], [0.0; POINTS]], 0);
+    while p < POINTS {
+        let mut k = 1;
+        while k < POINTS {
+            slopes[1][p] += k as f64 * MONOMIALS[k][p];
+            k += 1;
+        }
+        p += 1;
+    }
+    slopes
+};
+
 /// Coefficients of ω(s) = s ∏ (s − c_i), by powers of s: the shape of what a quartic through the points leaves of a force
 /// whose fifth derivative does not change.
 const REST: [f64; POINTS + 1] = {

@@ -11,7 +11,7 @@
 //! beginning is a fifth value, which makes its quartic as accurate as that of the force.
 
 use super::model::{Curved, Model, Phased, Sliding, Vector};
-use super::radau::{FOUND, Lane, NODES, PLACES, POINTS, QUARTIC, RADAU, monomials};
+use super::radau::{BACKWARD, C, FOUND, Lane, NODES, PLACES, POINTS, QUARTIC, RADAU, SLOPES, monomials, rest};
 use crate::friction::{Law, Motion, Side};
 use crate::mechanism::{BODIES, DRIVES, PhaseRate, SPRINGS};
 
@@ -61,6 +61,17 @@ const AT_KINK: f64 = 1e-8;
 
 /// Number of parts of the interval between two nodes in which a quartic is examined for a change of sign.
 const PARTS: usize = 4;
+
+/// Deviations of a force below this share of it are rounding, and so near to a node ω counts as this much: a tenth of its
+/// largest value between the first two.
+const ROUNDING: f64 = 1e-13;
+const LEAST_REST: f64 = 5e-5;
+
+/// A speed that changes by less than this share of the width of its curve within a step shows all of it at the nodes.
+const NARROW: f64 = 0.25;
+
+/// Halvings of a part of a step in which such a place is found. Near its least value a speed hardly changes.
+const HALVINGS: usize = 12;
 
 /// Bristles that slip by more than this share of their deflection within a step are stiff.
 const STIFF: f64 = 2.0;
@@ -179,6 +190,33 @@ impl Source {
             }
         }
         first
+    }
+
+    /// Deviation of a friction force from the quartic through its points at a place between them, and by it D of the
+    /// deviation D ω(s). The nodes can miss a curve that is passed within a part of the step: its peak where the body is
+    /// slowest, and that of bristles, which zero speed hides, where the body is as fast as the curve is wide.
+    #[inline(always)]
+    pub(super) fn missed(
+        &self,
+        (model, h, y): (&Model, f64, &Vector),
+        arguments: &[Lane],
+        (force, bristles): (&[f64; POINTS], &Bristles),
+    ) -> Option<[f64; 2]> {
+        let &Source::Friction { curved, motion, speed, way } = self else { return None };
+        let curved = &model.curved[curved];
+        let speeds = course(y[curved.speed], &arguments[speed]);
+        let (width, hides) = match curved.friction.law {
+            Law::Coulomb => return None,
+            Law::Stribeck { velocity, .. } => (velocity, false),
+            // tanh 10 v/v_b
+            Law::Smooth { breakaway_velocity } => (0.1 * breakaway_velocity, false),
+            Law::LuGre { velocity, .. } => (velocity, true),
+        };
+        if spread(&speeds) <= NARROW * width || !(has_slowest(&speeds) || (hides && passes(&speeds, width))) {
+            return None;
+        }
+        let (friction, course) = ((curved, motion, way), (arguments, &monomials(&speeds)));
+        missed_by((model, h, y), friction, course, (force, bristles), hides.then_some(width))
     }
 
     /// True if it is zero in one direction of a body that reverses without sticking. What such a body does is then
@@ -382,6 +420,114 @@ impl Phasing {
             phased.phases.excess(phase, angle[p], speed[p], current[p], told[p]).unwrap_or_default()
         });
         [excess.map(|[high, _]| high), excess.map(|[_, low]| low)]
+    }
+}
+
+/// Σ c_k sᵏ.
+#[inline(always)]
+fn polynomial(powers: &[f64; POINTS], s: f64) -> f64 {
+    powers.iter().rev().fold(0.0, |sum, power| sum * s + power)
+}
+
+/// True if a speed with these values at the points of a step can be slowest between two of them: it does not grow or fall
+/// all the way, nor at its ends.
+#[inline(always)]
+fn has_slowest(speeds: &[f64; POINTS]) -> bool {
+    let slope = |weights: &[f64; POINTS]| weights.iter().zip(speeds).fold(0.0, |sum, (weight, v)| sum + weight * v);
+    let (begin, end) = (slope(&SLOPES[0]), slope(&SLOPES[1]));
+    let mut changes = speeds.windows(2).map(|pair| pair[1] - pair[0]).chain([begin, end]);
+    !(changes.clone().all(|change| change >= 0.0) || changes.all(|change| change <= 0.0))
+}
+
+/// The largest difference of two values.
+#[inline(always)]
+fn spread(values: &[f64; POINTS]) -> f64 {
+    let (least, most) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, m), v| (l.min(*v), m.max(*v)));
+    most - least
+}
+
+/// True if |v| passes `width` between two points of a step.
+#[inline(always)]
+fn passes(speeds: &[f64; POINTS], width: f64) -> bool {
+    let below = speeds.map(|v| v.abs() < width);
+    below.contains(&true) && below.contains(&false)
+}
+
+/// The worst deviation of a friction force from the quartic through its points, where its body is slowest and, if
+/// a width is given, where its speed is that, and by it D of the deviation D ω(s).
+#[cold]
+fn missed_by(
+    (model, h, y): (&Model, f64, &Vector),
+    (curved, motion, way): (&Curved, Motion, Option<usize>),
+    (arguments, powers): (&[Lane], &[f64; POINTS]),
+    (force, bristles): (&[f64; POINTS], &Bristles),
+    width: Option<f64>,
+) -> Option<[f64; 2]> {
+    let ways = way.map(|way| monomials(&course(y[model.coordinate(curved.body)], &arguments[way])));
+    let law = |s: f64| {
+        let factor = model.factor_at(curved.body, || ways.map_or(0.0, |ways| polynomial(&ways, s)));
+        curved.sliding(motion, polynomial(powers, s), factor, false)
+    };
+    let mut worst: Option<[f64; 2]> = None;
+    let mut take = |s: f64| {
+        // Both, and a size that rounding is a part of.
+        let (own, there, size) = match (curved.friction.law, curved.bristle) {
+            (Law::LuGre { stiffness, damping, .. }, Some(place)) => {
+                // The defect δ = p(s) − (v − a z), p being the polynomial of ż at the points: σ₀ z is off by
+                // σ₀ δ min(h, 1/a), and σ₁ ż by σ₁ δ.
+                let own = &bristles[curved.body];
+                let [a, b, c, d] = own.bent;
+                let bent = monomials(&[y[place], a, b, c, d]);
+                let rate = |s: f64| polynomial(powers, s) - law(s).slip * polynomial(&bent, s);
+                let rates = C.map(rate);
+                let begin = if own.is_stiff { BACKWARD.iter().zip(rates).map(|(b, r)| b * r).sum() } else { own.rate };
+                let [a, b, c, d] = rates;
+                let weight = stiffness * h.min(1.0 / law(s).slip) + damping;
+                let through = polynomial(&monomials(&[begin, a, b, c, d]), s);
+                (weight * rate(s), weight * through, weight * polynomial(powers, s).abs())
+            }
+            _ => {
+                let own = law(s).beyond;
+                (own, polynomial(&monomials(force), s), own.abs())
+            }
+        };
+        let off = (own - there).abs();
+        if off > ROUNDING * size && worst.is_none_or(|[most, _]| off > most) {
+            worst = Some([off, off / rest(s).abs().max(LEAST_REST)]);
+        }
+    };
+    let speed = |s: f64| polynomial(powers, s);
+    let slope = |s: f64| (1..POINTS).rev().fold(0.0, |sum, k| sum * s + k as f64 * powers[k]);
+    // |v| grows where v v′ > 0.
+    places(
+        |s| speed(s) * slope(s) > 0.0,
+        |s, grows| {
+            if grows {
+                take(s)
+            }
+        },
+    );
+    if let Some(width) = width {
+        places(|s| speed(s).abs() > width, |s, _| take(s));
+    }
+    worst
+}
+
+/// Calls `each` with every share of a step at which `is` changes, and its value after that.
+fn places(is: impl Fn(f64) -> bool, mut each: impl FnMut(f64, bool)) {
+    const COUNT: usize = NODES * PARTS;
+    let mut before = (0.0, is(0.0));
+    for part in 1..=COUNT {
+        let s = part as f64 / COUNT as f64;
+        let (mut low, mut high, now) = (before.0, s, is(s));
+        if now != before.1 {
+            for _ in 0..HALVINGS {
+                let middle = 0.5 * (low + high);
+                if is(middle) == now { high = middle } else { low = middle }
+            }
+            each(0.5 * (low + high), now);
+        }
+        before = (s, now);
     }
 }
 

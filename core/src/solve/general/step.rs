@@ -376,6 +376,8 @@ impl Room {
         let mut off = [(0, 0.0); S];
         for (source, off) in off[..sources].iter_mut().enumerate() {
             let force = &self.forces[source];
+            let missed =
+                field.sources[source].missed((&field.model, set.h, begin.y), &self.arguments, (force, &self.bristles));
             *off = match &there {
                 // A kink leaves as much to a quartic as to a cubic.
                 _ if self.kink_of(step, source).is_some() => (0, OF_KINK * cubic(force)),
@@ -385,6 +387,10 @@ impl Room {
                 }
                 None => (0, OF_CUBIC * cubic(force)),
             };
+            if let Some([deviation, missed]) = missed {
+                let is_more = if off.0 == POINTS { missed > off.1.abs() } else { deviation > off.1.abs() };
+                *off = if is_more { (POINTS, missed) } else { *off };
+            }
         }
         let mut most: f64 = 0.0;
         for argument in 0..arguments {

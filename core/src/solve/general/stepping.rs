@@ -50,6 +50,20 @@ struct Fall {
     slack: f64,
 }
 
+/// A step up to an event: the error of the step that ends there, as a multiple of the allowed one, infinite if that step
+/// has no solution; and true if the condition of the event does not hold at its time.
+struct Part {
+    hit: Hit,
+    error: f64,
+    is_unmet: bool,
+}
+
+/// A step whose part up to an event has a larger error than allowed: the length of that part, s, and its error.
+struct Inexact {
+    h: f64,
+    error: f64,
+}
+
 /// The check of an event: which guard, its slack, and how far its value may be off because the event's time is rounded.
 struct Check {
     index: usize,
@@ -139,12 +153,20 @@ impl Core {
             let least = set.h <= 256.0 * f64::EPSILON * (stretch.begin + from).max(self.moment);
             match (error, end) {
                 (Some(error), Some(end)) if (error <= 1.0 || least) && end.iter().sum::<f64>().is_finite() => {
+                    let reversing = room.reversing(field);
+                    let taken = self.take(room, (stretch, &step), (from, length.to), (end, least), witness);
+                    let hit = match taken {
+                        Ok(hit) => hit,
+                        Err(Inexact { h, error }) => {
+                            self.step = h * shrink(error);
+                            *guess = Guess::Within(h);
+                            continue;
+                        }
+                    };
                     *guess = Guess::After(set.h);
                     room.keep(set.h, field.sources.len());
                     // The error is of sixth order. A short step predicts little about much longer ones.
                     self.step = (SAFETY * set.h * error.powf(-1.0 / 6.0)).min(self.step.max(GROW * set.h));
-                    let reversing = room.reversing(field);
-                    let hit = self.take(room, (stretch, &step), (from, length.to), end, witness);
                     if is_cut && hit.is_none() {
                         // Values before a kink do not predict those after it.
                         let model = &*self.model;
@@ -160,7 +182,7 @@ impl Core {
                     return hit;
                 }
                 (Some(error), Some(_)) if error > 1.0 && !least => {
-                    self.step = set.h * (SAFETY * error.powf(-1.0 / 6.0)).clamp(SHRINK, 0.9);
+                    self.step = set.h * shrink(error);
                     *guess = Guess::Within(set.h);
                 }
                 _ if least => {
@@ -237,25 +259,36 @@ impl Core {
         (set, false)
     }
 
-    /// Takes a solved step up to the first guard that falls.
+    /// Takes a solved step up to the first guard that falls. Errors: the part up to there has a larger error than allowed,
+    /// and nothing was taken; the smallest step is taken all the same.
     fn take(
         &mut self,
         room: &mut Room,
         (stretch, step): (&Stretch, &Step),
         (from, to): (f64, f64),
-        end: Vector,
+        (end, least): (Vector, bool),
         witness: &mut dyn Witness,
-    ) -> Option<Hit> {
-        self.cost.steps += 1;
+    ) -> Result<Option<Hit>, Inexact> {
         let (field, start) = (step.field, *step.begin);
         let time = stretch.begin + to;
-        if self.cost.steps.is_multiple_of(STEPS_BETWEEN_QUESTIONS) {
-            self.rules.trouble = self.pace.too_stiff(self.cost.steps, time, self.end);
-        }
         let mut dense =
             Dense { field, start, set: step.set, h: step.set.h, whole: step.whole, is_expanded: !step.whole };
         let fall = self.first_fall(room, &mut dense);
-        let hit = fall.map(|fall| self.up_to(room, &mut dense, (from, to), &fall));
+        let part = fall.map(|fall| self.up_to(room, &mut dense, (from, to), &fall));
+        if let Some(Part { error, .. }) = part
+            && error > 1.0
+            && !least
+        {
+            return Err(Inexact { h: dense.h, error });
+        }
+        let hit = part.map(|Part { hit, is_unmet, .. }| {
+            self.unmet += u64::from(is_unmet);
+            hit
+        });
+        self.cost.steps += 1;
+        if self.cost.steps.is_multiple_of(STEPS_BETWEEN_QUESTIONS) {
+            self.rules.trouble = self.pace.too_stiff(self.cost.steps, time, self.end);
+        }
         let until = hit.as_ref().map_or(to, |hit| hit.tau);
         self.rules.since_change += until - from;
         let rests = end == *start.y
@@ -276,7 +309,7 @@ impl Core {
         }
         (self.y, self.tau) = (end, to);
         self.shake();
-        hit
+        Ok(hit)
     }
 
     /// Changes speeds at random, as coarser rounding would: those of bodies that move together by the same factor.
@@ -336,8 +369,10 @@ impl Core {
         first
     }
 
-    /// The state at a fall: the step is taken again up to there, until it ends at the fall.
-    fn up_to(&mut self, room: &mut Room, dense: &mut Dense, (from, to): (f64, f64), fall: &Fall) -> Hit {
+    /// The state at a fall: the step is taken again up to there, until it ends at the fall. The nodes of the whole step
+    /// can miss what a force does near the event, such as the peak of a narrow Stribeck curve where the speed is zero;
+    /// those of the shorter one do not, so that its own error counts.
+    fn up_to(&self, room: &mut Room, dense: &mut Dense, (from, to): (f64, f64), fall: &Fall) -> Part {
         let (field, stretch, fallen) = (dense.field, self.stretch, dense.field.watches[fall.index]);
         let cause = fallen.cause;
         let (begin, length) = (dense.start.y, to - from);
@@ -351,14 +386,21 @@ impl Core {
         let change: f64 = coefficients[1..=order].iter().map(|c| c.abs()).sum();
         let change = change * (self.relative + 8.0 * f64::EPSILON * (stretch.begin + to) / length);
         let mut share = fall::zero_near(&coefficients, order, fall.share);
+        let mut error = 0.0;
         for _ in 0..4 {
             let h = share * dense.h;
-            let is_linear = room.forces[..field.sources.len()].iter().flatten().all(|force| *force == 0.0);
-            if is_linear || (share - 1.0).abs() < 1e-4 || h <= 64.0 * f64::EPSILON * from.max(self.moment) {
+            if (share - 1.0).abs() < 1e-4 || h <= 64.0 * f64::EPSILON * from.max(self.moment) {
                 break;
             }
-            // If that fails, the longer step was accurate enough.
-            if !dense.shorten(room, &stretch, self.present as u64, (from, h)) {
+            let sources = field.sources.len();
+            let mut there = [0.0; SOURCES];
+            field.forces(&stretch.input(from + h), &dense.at(room, share), &mut there);
+            if room.forces[..sources].iter().flatten().chain(&there[..sources]).all(|force| *force == 0.0) {
+                // The step is linear.
+                break;
+            }
+            error = dense.shorten(room, &stretch, self.present as u64, (from, h));
+            if error == f64::INFINITY {
                 break;
             }
             dense.guard(room, fall.index, shift + slack, &mut coefficients);
@@ -368,7 +410,7 @@ impl Core {
         let hit = Hit { tau: from + span, y: dense.at(room, span / dense.h), fallen };
         let check = Check { index: fall.index, slack, change };
         if self.off(field, &check, &hit).abs() <= 1.0 {
-            hit
+            Part { hit, error, is_unmet: false }
         } else {
             self.locate(room, dense, (from, length), &check, hit)
         }
@@ -377,18 +419,18 @@ impl Core {
     /// Locates an event again whose condition is not at its limit there: by halving, between a time of the step at which
     /// the condition holds and one at which it does not.
     fn locate(
-        &mut self,
+        &self,
         room: &mut Room,
         dense: &mut Dense,
         (from, length): (f64, f64),
         check: &Check,
         first: Hit,
-    ) -> Hit {
+    ) -> Part {
         let (field, stretch, number) = (dense.field, self.stretch, self.present as u64);
         let (mut low, mut high, mut best) = (0.0, length, first);
         for _ in 0..HALVINGS {
             let middle = 0.5 * (low + high);
-            if !dense.shorten(room, &stretch, number, (from, middle)) {
+            if dense.shorten(room, &stretch, number, (from, middle)) == f64::INFINITY {
                 break;
             }
             let there = Hit { tau: from + middle, y: dense.at(room, 1.0), fallen: best.fallen };
@@ -402,15 +444,14 @@ impl Core {
             (low, high) = if off < 0.0 { (low, middle) } else { (middle, high) };
         }
         let is_between = low > 0.0 && high < length;
-        if !is_between && self.off(field, check, &best).abs() > 1.0 {
-            // It was due before this step, or does not happen in it.
-            self.unmet += 1;
-        }
+        // It was due before this step, or does not happen in it.
+        let is_unmet = !is_between && self.off(field, check, &best).abs() > 1.0;
+        let mut error = 0.0;
         if best.tau > from {
             // Rows up to the event are of a step that ends there.
-            dense.shorten(room, &stretch, number, (from, best.tau - from));
+            error = dense.shorten(room, &stretch, number, (from, best.tau - from));
         }
-        best
+        Part { hit: best, error, is_unmet }
     }
 
     /// Deviation of the condition of an event from its limit, at this state and the present inputs, as a multiple of
@@ -431,6 +472,11 @@ impl Core {
     }
 }
 
+/// Factor on the length of a step with an error above the allowed one, for the next try.
+fn shrink(error: f64) -> f64 {
+    (SAFETY * error.powf(-1.0 / 6.0)).clamp(SHRINK, 0.9)
+}
+
 /// The largest power of two that is not above `ratio`, a positive number: its bits without those of the fraction.
 fn power_of_two_below(ratio: f64) -> f64 {
     f64::from_bits(ratio.clamp(1e-300, 1e300).to_bits() & (0x7ff << 52))
@@ -449,21 +495,21 @@ struct Dense<'a> {
 }
 
 impl Dense<'_> {
-    /// Solves it again from the same beginning over `h` alone, and its series with the inputs of that length; false, and
-    /// nothing has changed, where that fails.
-    fn shorten(&mut self, room: &mut Room, stretch: &Stretch, number: u64, (from, h): (f64, f64)) -> bool {
+    /// Solves it again from the same beginning over `h` alone, and its series with the inputs of that length. Returns its
+    /// error as a multiple of the allowed one; infinity, and nothing has changed, if there is no solution.
+    fn shorten(&mut self, room: &mut Room, stretch: &Stretch, number: u64, (from, h): (f64, f64)) -> f64 {
         let field = self.field;
         let before = room.clone();
         let set = Set::new(&field.linear, h, stretch.degree);
         let start = Begin { input: stretch.inputs(from, h), ..self.start };
         let step = Step { field, number, set: &set, begin: &start, whole: false };
-        if room.solve(&step, Guess::Within(self.h).of(h)).is_none() {
+        let Some(error) = room.solve(&step, Guess::Within(self.h).of(h)) else {
             *room = before;
-            return false;
-        }
+            return f64::INFINITY;
+        };
         room.expand(field, h, &start);
         (self.start, self.h, self.is_expanded) = (start, h, true);
-        true
+        error
     }
 
     fn expand(&mut self, room: &mut Room) {
