@@ -101,7 +101,7 @@ fn read(path: &Path) -> Result<String, String> {
 }
 
 /// All files below a folder, in the order of their paths.
-fn files(folder: &Path) -> Result<Vec<PathBuf>, String> {
+pub fn files(folder: &Path) -> Result<Vec<PathBuf>, String> {
     let cannot = |error: std::io::Error| format!("{} cannot be read: {error}", folder.display());
     let mut found = Vec::new();
     for entry in fs::read_dir(folder).map_err(cannot)? {
