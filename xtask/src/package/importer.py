@@ -9,8 +9,8 @@ from fmpy.validation import validate_fmu
 unit = sys.argv[1]
 found = validate_fmu(unit)
 assert not found, found
-points = [(0.0, 5.0), (0.25, 5.0), (0.25, 0.0), (1.0, 0.0)]
-pulse = np.array(points, dtype=[("time", np.float64), ("command", np.float64)])
+points = [(0.0, 5.0, 0.0), (0.25, 5.0, 0.0), (0.25, 0.0, 0.0), (1.0, 0.0, 0.0)]
+pulse = np.array(points, dtype=[(name, np.float64) for name in ("time", "command", "cart_force")])
 result = simulate_fmu(
     unit, fmi_type="CoSimulation", stop_time=1.0, output_interval=0.25, input=pulse, output=["cart_position"]
 )

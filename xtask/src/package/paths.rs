@@ -32,7 +32,7 @@ fn folders(source: &Path) -> Result<Vec<(PathBuf, &'static str)>, String> {
     let home = std::env::var_os(if cfg!(windows) { "USERPROFILE" } else { "HOME" }).map(PathBuf::from);
     let home = home.ok_or("the home folder is not known; set HOME")?;
     let cargo = std::env::var_os("CARGO_HOME").map_or_else(|| home.join(".cargo"), PathBuf::from);
-    let source = source.canonicalize().map_err(|e| format!("{}: {e}", source.display()))?;
+    let source = std::path::absolute(source).map_err(|e| format!("{}: {e}", source.display()))?;
     Ok(vec![(home, "home"), (source, "taut"), (cargo.join("registry").join("src"), "packages")])
 }
 

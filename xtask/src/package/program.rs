@@ -215,7 +215,8 @@ pub fn licences(member: &str, triple: &str, opening: &str) -> Result<Licences, S
 
 /// A bill of materials of the program, by cargo-cyclonedx, without the time at which it was written.
 fn materials(places: &Places, triple: &str) -> Result<Vec<u8>, String> {
-    let tool = crate::book::installed("cargo-cyclonedx", CYCLONEDX, &[])?;
+    // A debug build: it is built for one use.
+    let tool = crate::book::installed("cargo-cyclonedx", CYCLONEDX, &["--debug"])?;
     let name = "taut-materials";
     let mut list = Command::new(tool);
     list.args(["cyclonedx", "--format", "json", "--manifest-path", "cli/Cargo.toml", "--target", triple, "--quiet"]);
@@ -267,23 +268,9 @@ fn executable(_: &Path) -> Result<(), String> {
 
 /// Packs a folder so that equal files give equal bytes.
 fn archive(folder: &Path, file: &Path) -> Result<(), String> {
-    let (above, name) = (folder.parent().unwrap_or(folder), folder.file_name().unwrap_or_default());
-    let mut tar = Command::new("tar");
-    tar.args([
-        "--sort=name",
-        "--mtime=@0",
-        "--owner=0",
-        "--group=0",
-        "--numeric-owner",
-        "--mode=go=rX,u+rw,a-s",
-        "-cf",
-        "-",
-    ]);
-    tar.arg("-C").arg(above).arg(name);
-    let bytes = output(tar)?;
-    let mut packed = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::best());
-    std::io::Write::write_all(&mut packed, &bytes).map_err(|e| e.to_string())?;
-    write(file, packed.finish().map_err(|e| e.to_string())?)
+    let mut pack = Command::new(crate::python::interpreter()?);
+    pack.args(["-c", include_str!("archive.py")]).arg(folder).arg(file);
+    output(pack).map(drop)
 }
 
 #[cfg(test)]
