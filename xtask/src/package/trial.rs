@@ -40,7 +40,7 @@ impl Program {
         program.output(&["init", "axis.toml"])?;
         write(&program.folder.join(RESULTS), program.output(&["simulate", "axis.toml", "--json"])?)?;
         write(&program.folder.join("modes.json"), program.output(&["modes", "axis.toml", "--json"])?)?;
-        program.output(&["simulate", "axis.toml", "--out", "rows", "--format", "parquet", "--no-report", "--png"])?;
+        program.output(&["simulate", "axis.toml", "--out", "rows", "--format", "parquet", "--png"])?;
         for target in ["c", "python", "matlab"] {
             program.output(&["export", target, "axis.toml", "--out", target])?;
         }
