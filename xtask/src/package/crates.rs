@@ -68,13 +68,21 @@ pub fn make(places: &Places, claims: &mut Claims) -> Result<Program, String> {
     Ok(program)
 }
 
-/// Names and hashes of the files of an unpacked crate, a line each, except the name of the commit.
+/// Names and hashes of the files of an unpacked crate, a line each, without what depends on the name of the commit alone:
+/// that name, and the hashes of our own packages in `Cargo.lock`.
 fn content_of(folder: &Path) -> Result<String, String> {
     let mut lines = String::new();
     for path in crate::book::files(folder)? {
-        if path.file_name().is_none_or(|name| name != ".cargo_vcs_info.json") {
-            lines += &format!("{} {}\n", path.display(), hash(&read(&path)?));
+        let mut bytes = read(&path)?;
+        if path.ends_with(".cargo_vcs_info.json") {
+            continue;
         }
+        if path.ends_with("Cargo.lock") {
+            let text = String::from_utf8_lossy(&bytes);
+            let versions: Vec<&str> = text.lines().filter(|line| !line.starts_with("checksum")).collect();
+            bytes = versions.join("\n").into_bytes();
+        }
+        lines += &format!("{} {}\n", path.display(), hash(&bytes));
     }
     Ok(lines)
 }
@@ -137,6 +145,15 @@ mod tests {
         let first = content_of(&folder).unwrap();
         write(&folder.join(".cargo_vcs_info.json"), "{}").unwrap();
         assert_eq!(content_of(&folder).unwrap(), first);
+        let lock =
+            |sum: &str, version: u32| format!("name = \"taut-core\"\nversion = \"{version}\"\nchecksum = \"{sum}\"\n");
+        write(&folder.join("Cargo.lock"), lock("aa", 1)).unwrap();
+        let first = content_of(&folder).unwrap();
+        write(&folder.join("Cargo.lock"), lock("bb", 1)).unwrap();
+        assert_eq!(content_of(&folder).unwrap(), first);
+        write(&folder.join("Cargo.lock"), lock("bb", 2)).unwrap();
+        assert_ne!(content_of(&folder).unwrap(), first);
+        let first = content_of(&folder).unwrap();
         write(&folder.join("src/lib.rs"), "fn b() {}").unwrap();
         assert_ne!(content_of(&folder).unwrap(), first);
         fs::remove_dir_all(folder).unwrap();
