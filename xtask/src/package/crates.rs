@@ -128,7 +128,7 @@ fn installed(
     let version = published.iter().find(|(published, _)| published == name).map(|(_, version)| version.as_str());
     let mut install = crate::cargo(&["install", name, "--locked", "--version", version.unwrap_or_default()]);
     install.arg("--root").arg(&root).current_dir(&home).env("CARGO_HOME", &home);
-    install.env("CARGO_TARGET_DIR", &built).env_remove("CARGO_ENCODED_RUSTFLAGS");
+    install.env("CARGO_TARGET_DIR", &built).env_remove("CARGO_ENCODED_RUSTFLAGS").env("CARGO_INCREMENTAL", "0");
     must(install)?;
     write(&ended, content)?;
     Ok((program, false))

@@ -9,11 +9,7 @@ use std::process::Command;
 pub fn newest(file: &Path) -> Result<Option<(u32, u32)>, String> {
     let mut list = Command::new("objdump");
     list.arg("-T").arg(file);
-    let listed = output(list).map_err(|error| {
-        format!(
-            "{error}\nobjdump is in Debian's binutils; that of binutils-multiarch reads programs of other processors"
-        )
-    })?;
+    let listed = output(list).map_err(|error| format!("{error}\nobjdump is in Debian's package binutils"))?;
     Ok(newest_in(&String::from_utf8_lossy(&listed)))
 }
 

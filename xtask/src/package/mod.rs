@@ -107,6 +107,7 @@ pub fn run(words: &[&str]) -> Result<(), String> {
     let places = Places { out: target.join("package").join("release"), work, tools };
     // What lies there from an earlier run must not be taken for a part of this one.
     let _ = fs::remove_dir_all(&places.out);
+    fs::create_dir_all(&places.out).map_err(|error| format!("{}: {error}", places.out.display()))?;
     let mut claims = Claims::default();
     let mut programs = Vec::new();
     for part in &asked.parts {

@@ -15,7 +15,7 @@ const OTHERS: [Other; 5] = [
     Other { triple: "x86_64-unknown-linux-gnu", recipe: "cargo xtask package --twice", system: None },
     Other {
         triple: "aarch64-unknown-linux-gnu",
-        recipe: "cargo xtask package --target aarch64-unknown-linux-gnu",
+        recipe: "cargo xtask package --target aarch64-unknown-linux-gnu (untried)",
         system: None,
     },
     Other {

@@ -37,6 +37,8 @@ impl Build<'_> {
 
     /// Has a command that builds from `source` use the compiler, the tools of Python, and no paths of this machine.
     pub fn set(&self, build: &mut Command, source: &Path) -> Result<(), String> {
+        // Incremental builds are larger and slower, and depend on the builds before them.
+        build.env("CARGO_INCREMENTAL", "0");
         build.env("CARGO_ENCODED_RUSTFLAGS", paths::flags(source)?.join("\u{1f}"));
         build.env("PATH", with_tools(self.places)?);
         self.compiler.set(build)
@@ -107,7 +109,7 @@ pub fn make(build: &Build, twice: bool, claims: &mut Claims) -> Result<Option<Pr
     claims.add("bill of materials", listed(&materials, &licences)?);
     write(&folder.join("taut.cdx.json"), materials)?;
     let runner = build.runner()?;
-    let tried = runner.map(|runner| Program::tried("program for all", program, runner, &places.work)).transpose()?;
+    let tried = runner.map(|runner| Program::tried("released program", program, runner, &places.work)).transpose()?;
     match &tried {
         Some(tried) => {
             for shell in SHELLS {
@@ -286,6 +288,24 @@ mod tests {
         let bill = br#"{"bomFormat": "CycloneDX", "specVersion": "1.3", "components": [{"name": "libm", "version": "0.2.1"}]}"#;
         assert_eq!(listed(bill, &licences()), Err("the bill of materials lacks [\"libm 0.2.16\"]".into()));
         assert!(listed(b"no JSON", &licences()).unwrap_err().starts_with("the bill of materials: "));
+    }
+
+    #[test]
+    fn equal_files_give_equal_archives() {
+        let folder = std::env::temp_dir().join(format!("taut-xtask-archive-{}", std::process::id()));
+        let pack = |name: &str| {
+            let whole = folder.join("whole");
+            let _ = fs::remove_dir_all(&whole);
+            ["taut", "man/taut.1"].iter().try_for_each(|file| write(&whole.join(file), file)).unwrap();
+            executable(&whole.join("taut")).unwrap();
+            archive(&whole, &folder.join(name)).unwrap();
+            read(&folder.join(name)).unwrap()
+        };
+        let first = pack("first.tar.gz");
+        assert!(first == pack("second.tar.gz"));
+        let refused = archive(&folder.join("whole"), &folder.join("nowhere").join("third.tar.gz")).unwrap_err();
+        assert!(refused.contains("No such file"), "{refused}");
+        fs::remove_dir_all(folder).unwrap();
     }
 
     #[test]

@@ -55,12 +55,11 @@ fn built(build: &Build, claims: &mut Claims) -> Result<PathBuf, String> {
     let licences = licences("taut-python", build.triple, opening)?;
     write(Path::new(LICENCES), &licences.text)?;
     let mut maturin = Command::new(crate::python::program(&build.places.tools, "maturin"));
-    maturin.args(["build", "--locked", "--profile", "dist", "--manifest-path", "py/Cargo.toml", "--out"]).arg(&wheels);
+    maturin.args(["build", "--locked", "--release", "--manifest-path", "py/Cargo.toml", "--out"]).arg(&wheels);
     if build.has_zig() {
         maturin.args(["--zig", "--compatibility", &format!("manylinux_{}_{}", GLIBC.0, GLIBC.1)]);
     }
-    // Beside the program, whose library is the same.
-    maturin.args(["--target", build.triple]).arg("--target-dir").arg(build.places.work.join("program"));
+    maturin.args(["--target", build.triple]).arg("--target-dir").arg(build.places.work.join("wheel"));
     let done = build.set(&mut maturin, Path::new(".")).and_then(|()| must(maturin));
     let _ = fs::remove_file(LICENCES);
     done?;
