@@ -94,6 +94,7 @@ pub fn run(words: &[&str]) -> Result<(), String> {
     asked.pythons.iter().try_for_each(|program| python::is_new_enough(program))?;
     let own = program::own_target()?;
     let triple = asked.target.clone().unwrap_or_else(|| own.clone());
+    others::refuse_static(&triple)?;
     let compiler = compiler::find(&triple).map_err(|needs| format!("{triple} needs {needs}"))?;
     if asked.twice {
         committed()?;
@@ -251,6 +252,8 @@ mod tests {
     fn a_target_that_rust_does_not_know_is_refused_before_anything_is_built() {
         let refused = run(&["--target", "pdp11-unknown-unix"]).unwrap_err();
         assert!(refused.starts_with("pdp11-unknown-unix needs"), "{refused}");
+        let refused = run(&["--target", "x86_64-unknown-linux-musl"]).unwrap_err();
+        assert!(refused.starts_with("x86_64-unknown-linux-musl has no shared objects"), "{refused}");
     }
 
     #[test]

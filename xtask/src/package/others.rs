@@ -11,6 +11,10 @@ struct Other {
     system: Option<&'static str>,
 }
 
+/// The recipe of a static program.
+const MUSL: &str = "cargo zigbuild --locked --profile dist --package taut-cli --no-default-features --features parquet \
+                    --target x86_64-unknown-linux-musl (static, therefore without `taut export fmu`; untried)";
+
 const OTHERS: [Other; 5] = [
     Other { triple: "x86_64-unknown-linux-gnu", recipe: "cargo xtask package --twice", system: None },
     Other {
@@ -18,12 +22,7 @@ const OTHERS: [Other; 5] = [
         recipe: "cargo xtask package --target aarch64-unknown-linux-gnu (untried)",
         system: None,
     },
-    Other {
-        triple: "x86_64-unknown-linux-musl",
-        recipe: "cargo zigbuild --locked --profile dist --package taut-cli --no-default-features --features parquet \
-                 --target x86_64-unknown-linux-musl (static, therefore without `taut export fmu`; untried)",
-        system: None,
-    },
+    Other { triple: "x86_64-unknown-linux-musl", recipe: MUSL, system: None },
     Other { triple: "aarch64-apple-darwin", recipe: "cargo xtask package (untried)", system: Some("macos") },
     Other { triple: "x86_64-pc-windows-msvc", recipe: "cargo xtask package (untried)", system: Some("windows") },
 ];
@@ -33,6 +32,14 @@ pub fn print(built: &str) {
     println!("\n== not built here");
     for other in OTHERS.iter().filter(|other| other.triple != built) {
         println!("{}: {}; recipe: {}", other.triple, reason(other, built), other.recipe);
+    }
+}
+
+/// Errors: a target whose programs are static and cannot carry the shared object for FMUs.
+pub fn refuse_static(triple: &str) -> Result<(), String> {
+    match triple.contains("musl") {
+        true => Err(format!("{triple} has no shared objects, which FMUs need; without them: {MUSL}")),
+        false => Ok(()),
     }
 }
 
