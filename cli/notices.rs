@@ -37,14 +37,17 @@ pub fn notices(mut tree: Command, opening: &str) -> String {
     text
 }
 
-/// Texts of the licence of a package, in cargo's own folder.
+/// Texts of the licence of a package, in cargo's own folder; or beside the package that is built, where cargo has all
+/// packages in a folder.
 fn licence_files(name: &str, version: &str) -> Vec<PathBuf> {
     let home = env::var_os("CARGO_HOME").map(PathBuf::from);
     let home = home.or_else(|| Some(PathBuf::from(env::var_os("HOME")?).join(".cargo")));
+    let beside = env::var_os("CARGO_MANIFEST_DIR").and_then(|own| Some(PathBuf::from(own).parent()?.to_path_buf()));
     let entries = |path: PathBuf| std::fs::read_dir(path).into_iter().flatten().flatten().map(|entry| entry.path());
     let mut files: Vec<PathBuf> = home
         .into_iter()
         .flat_map(|home| entries(home.join("registry/src")))
+        .chain(beside)
         .flat_map(|registry| entries(registry.join(format!("{name}-{version}"))))
         .filter(|path| {
             let name = path.file_name().unwrap_or_default().to_string_lossy().to_uppercase();
@@ -53,6 +56,8 @@ fn licence_files(name: &str, version: &str) -> Vec<PathBuf> {
             path.is_file() && is_licence && !name.contains("APACHE")
         })
         .collect();
-    files.sort();
+    // A registry may be there under two names.
+    files.sort_by(|a, b| a.file_name().cmp(&b.file_name()));
+    files.dedup_by(|a, b| a.file_name() == b.file_name());
     files
 }

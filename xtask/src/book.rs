@@ -77,9 +77,9 @@ fn built(target: &Path) -> Result<PathBuf, String> {
     }
 }
 
-/// A program of cargo's registry, in this version, under `target`; it is installed first, with `features`, unless it is
-/// there.
-pub fn installed(name: &str, version: &str, features: &[&str]) -> Result<PathBuf, String> {
+/// A program of cargo's registry, in this version, under `target`; it is installed first, with these `options`, unless it
+/// is there.
+pub fn installed(name: &str, version: &str, options: &[&str]) -> Result<PathBuf, String> {
     let root = crate::python::target().join(name);
     let program = root.join("bin").join(format!("{name}{}", std::env::consts::EXE_SUFFIX));
     let mark = root.join("version.txt");
@@ -88,7 +88,7 @@ pub fn installed(name: &str, version: &str, features: &[&str]) -> Result<PathBuf
     }
     println!("installing {name} {version} under {}", root.display());
     let mut install = crate::cargo(&["install", "--locked", "--force", "--version", version, name]);
-    install.args(features).arg("--root").arg(&root).arg("--target-dir").arg(root.join("build"));
+    install.args(options).arg("--root").arg(&root).arg("--target-dir").arg(root.join("build"));
     match install.status() {
         Ok(status) if status.success() => write(&mark, version).map(|()| program),
         Ok(_) => Err(format!("{name} {version} could not be installed under {}", root.display())),
@@ -101,7 +101,7 @@ fn read(path: &Path) -> Result<String, String> {
 }
 
 /// All files below a folder, in the order of their paths.
-fn files(folder: &Path) -> Result<Vec<PathBuf>, String> {
+pub fn files(folder: &Path) -> Result<Vec<PathBuf>, String> {
     let cannot = |error: std::io::Error| format!("{} cannot be read: {error}", folder.display());
     let mut found = Vec::new();
     for entry in fs::read_dir(folder).map_err(cannot)? {

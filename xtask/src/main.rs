@@ -11,6 +11,7 @@
 mod bad;
 mod book;
 mod browser;
+mod compiler;
 mod counts;
 mod data;
 mod export;
@@ -221,6 +222,12 @@ fn run(mut command: Command, counts: &mut Counts) -> Result<bool, String> {
         }
     }
     Ok(child.wait().map_err(|e| format!("{name} was lost: {e}"))?.success())
+}
+
+/// True if a command succeeds.
+fn succeeds(command: &mut Command) -> Result<bool, String> {
+    let name = command.get_program().to_string_lossy().into_owned();
+    command.status().map(|status| status.success()).map_err(|error| format!("{name} cannot be started: {error}"))
 }
 
 /// The output of a command. Errors: it fails.

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 /// Packages that have to be installed, to the digit.
-const REQUIREMENTS: &str = "py/requirements.txt";
+pub const REQUIREMENTS: &str = "py/requirements.txt";
 
 /// The oldest Python that works.
 const OLDEST: (u32, u32) = (3, 10);
@@ -75,18 +75,23 @@ pub fn environment(name: &str, requirements: &str) -> Result<PathBuf, String> {
 
 /// A Python that is new enough.
 pub fn interpreter() -> Result<&'static str, String> {
-    let version = format!("import sys; sys.exit(sys.version_info < {OLDEST:?})");
-    let answers = |name: &&str| {
-        let answer = Command::new(name).args(["-c", &version]).stdout(Stdio::null()).stderr(Stdio::null()).status();
-        answer.is_ok_and(|status| status.success())
-    };
-    ["python3", "python"].into_iter().find(answers).ok_or_else(|| {
+    ["python3", "python"].into_iter().find(|name| is_new_enough(name).is_ok()).ok_or_else(|| {
         format!(
             "the tests of the Python package need Python {}.{} or later with venv, as python3 on the path \
              (Debian: apt install python3 python3-venv; others: python.org)",
             OLDEST.0, OLDEST.1
         )
     })
+}
+
+/// Errors: this program is no Python, or too old.
+pub fn is_new_enough(name: &str) -> Result<(), String> {
+    let version = format!("import sys; sys.exit(sys.version_info < {OLDEST:?})");
+    let answer = Command::new(name).args(["-c", &version]).stdout(Stdio::null()).stderr(Stdio::null()).status();
+    match answer.is_ok_and(|status| status.success()) {
+        true => Ok(()),
+        false => Err(format!("{name} is not Python {}.{} or later", OLDEST.0, OLDEST.1)),
+    }
 }
 
 /// A program of the environment.

@@ -4,16 +4,21 @@
 //!   packages that they need, into an empty folder, by a cargo without a configuration.
 //! - The program for a glibc of 2.17 and later, with completions, manual pages, the licences of all packages in it and a
 //!   bill of materials (CycloneDX), in one archive.
-//! - The Python wheel, for the same C library, installed into an empty environment.
+//! - The Python wheel, for the same C library, installed into empty environments.
 //!
-//! The two programs and the wheel must give equal results.
+//! The two programs and the wheel must give equal results. A run that failed can be repeated: what was built from the
+//! same source is kept in `target/package-work`. The run ends with all that it has shown, each with its figure, and with
+//! the targets that it did not build.
 
 mod crates;
+mod glibc;
+mod others;
 mod paths;
 mod program;
+mod trial;
 mod wheel;
 
-use crate::{Counts, output, python, write};
+use crate::{Counts, compiler, output, python, write};
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 use std::fs;
@@ -22,7 +27,8 @@ use std::process::Command;
 
 pub use paths::flags;
 
-pub const USAGE: &str = "cargo xtask package [--part crates|program|wheel]... [--target TRIPLE] [--twice]";
+pub const USAGE: &str = "cargo xtask package [--part crates|program|wheel]... [--target TRIPLE] [--twice] \
+                         [--python PROGRAM]... [--fresh]";
 
 /// Packages of Python that have to be installed, to the digit.
 const REQUIREMENTS: &str = "xtask/requirements.txt";
@@ -30,14 +36,18 @@ const REQUIREMENTS: &str = "xtask/requirements.txt";
 /// The oldest glibc that programs run with.
 const GLIBC: (u32, u32) = (2, 17);
 
-/// What is asked for.
+/// Arguments of the command.
 #[derive(Debug, PartialEq)]
 struct Asked {
     parts: Vec<Part>,
     /// The target of program and wheel; none: this machine.
     target: Option<String>,
-    /// True if the program is built twice, and both builds must be equal byte by byte.
+    /// True if the program is built a second time in another folder, and both builds must be equal byte by byte.
     twice: bool,
+    /// Further versions of Python that the wheel is tried with.
+    pythons: Vec<String>,
+    /// True if nothing of earlier runs is kept.
+    fresh: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -57,49 +67,114 @@ struct Places {
     tools: PathBuf,
 }
 
+/// What a run has shown: claims with their figures, in order.
+#[derive(Default)]
+struct Claims(Vec<(String, String)>);
+
+impl Claims {
+    /// Adds one and prints it.
+    fn add(&mut self, claim: &str, figure: String) {
+        println!("{claim}: {figure}");
+        self.0.push((claim.to_string(), figure));
+    }
+
+    /// Prints all.
+    fn print(&self) {
+        println!("\n== shown");
+        let width = self.0.iter().map(|(claim, _)| claim.chars().count()).max().unwrap_or(0);
+        for (claim, figure) in &self.0 {
+            println!("{claim:width$}  {figure}");
+        }
+    }
+}
+
 /// Builds and tries all of it. Errors: a build that fails, or what was built does not work.
 pub fn run(words: &[&str]) -> Result<(), String> {
     let asked = Asked::new(words)?;
+    asked.pythons.iter().try_for_each(|program| python::is_new_enough(program))?;
+    let own = program::own_target()?;
+    let triple = asked.target.clone().unwrap_or_else(|| own.clone());
+    others::refuse_static(&triple)?;
+    let compiler = compiler::find(&triple).map_err(|needs| format!("{triple} needs {needs}"))?;
+    if asked.twice {
+        committed()?;
+    }
     let target = python::target();
+    let work = target.join("package-work");
+    if asked.fresh {
+        let _ = fs::remove_dir_all(&work);
+    }
     let tools = python::environment("package-tools", REQUIREMENTS)?;
-    let places = Places { out: target.join("package").join("release"), work: target.join("package-work"), tools };
+    let places = Places { out: target.join("package").join("release"), work, tools };
     // What lies there from an earlier run must not be taken for a part of this one.
     let _ = fs::remove_dir_all(&places.out);
+    fs::create_dir_all(&places.out).map_err(|error| format!("{}: {error}", places.out.display()))?;
+    let mut claims = Claims::default();
     let mut programs = Vec::new();
     for part in &asked.parts {
         match part {
-            Part::Crates => programs.push(crates::make(&places)?),
-            Part::Program => programs.extend(program::make(&places, &asked)?),
-            Part::Wheel => wheel::make(&places, &asked, programs.first().map(PathBuf::as_path))?,
+            Part::Crates => programs.push(crates::make(&places, &mut claims)?),
+            Part::Program => {
+                let build = program::Build { places: &places, triple: &triple, compiler: &compiler };
+                programs.extend(program::make(&build, asked.twice, &mut claims)?);
+            }
+            Part::Wheel => {
+                let build = program::Build { places: &places, triple: &triple, compiler: &compiler };
+                wheel::make(&build, &asked.pythons, programs.first(), &mut claims)?;
+            }
         }
     }
     if let [first, second] = &programs[..] {
-        same(first, second, &places.work)?;
+        let files = trial::same(first, second)?;
+        let names = format!("{} and {}", first.name, second.name);
+        claims.add(
+            "equal results",
+            format!("{names}: {files} equal files of the trial, the FMU but its object included"),
+        );
     }
-    sums(&places.out)
+    sums(&places.out)?;
+    claims.print();
+    others::print(&triple);
+    Ok(())
 }
 
 impl Asked {
     fn new(words: &[&str]) -> Result<Self, String> {
-        let mut asked = Self { parts: Vec::new(), target: None, twice: false };
+        let mut asked = Self { parts: Vec::new(), target: None, twice: false, pythons: Vec::new(), fresh: false };
         let mut words = words.iter();
         while let Some(word) = words.next() {
             match (*word, words.as_slice().first().copied()) {
                 ("--twice", _) => asked.twice = true,
+                ("--fresh", _) => asked.fresh = true,
                 ("--target", Some(triple)) => asked.target = Some(triple.to_string()),
+                ("--python", Some(program)) => asked.pythons.push(program.to_string()),
                 ("--part", Some("crates")) => asked.parts.push(Part::Crates),
                 ("--part", Some("program")) => asked.parts.push(Part::Program),
                 ("--part", Some("wheel")) => asked.parts.push(Part::Wheel),
                 _ => return Err(format!("`{word}` is not understood\nusage: {USAGE}")),
             }
-            if *word != "--twice" {
+            if !["--twice", "--fresh"].contains(word) {
                 words.next();
             }
         }
         if asked.parts.is_empty() {
-            asked.parts = vec![Part::Crates, Part::Program, Part::Wheel];
+            asked.parts = match asked.target {
+                // The crates are the same for every target.
+                Some(_) => vec![Part::Program, Part::Wheel],
+                None => vec![Part::Crates, Part::Program, Part::Wheel],
+            };
         }
         Ok(asked)
+    }
+}
+
+/// Errors: files that are not in the commit, from which the second build is made.
+fn committed() -> Result<(), String> {
+    let mut status = Command::new("git");
+    status.args(["status", "--porcelain"]);
+    match String::from_utf8_lossy(&output(status)?).trim_end() {
+        "" => Ok(()),
+        files => Err(format!("--twice builds the last commit a second time; commit these files first:\n{files}")),
     }
 }
 
@@ -119,31 +194,6 @@ fn members() -> Result<Vec<Value>, String> {
     Ok(listed["packages"].as_array_mut().map(std::mem::take).unwrap_or_default())
 }
 
-/// Errors: two programs differ in what they compute, or one carries no object for FMUs.
-fn same(first: &Path, second: &Path, work: &Path) -> Result<(), String> {
-    if tried(first, work)? != tried(second, work)? {
-        return Err(format!("{} and {} give different results", first.display(), second.display()));
-    }
-    println!("{} and {} give the same results", first.display(), second.display());
-    Ok(())
-}
-
-/// Tries a program in an empty folder: a case file, its simulation and its FMU. Returns what `simulate --json` prints.
-fn tried(program: &Path, work: &Path) -> Result<Vec<u8>, String> {
-    let folder = work.join("tried");
-    let _ = fs::remove_dir_all(&folder);
-    fs::create_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
-    let taut = |words: &[&str]| {
-        let mut command = Command::new(program);
-        command.args(words).current_dir(&folder).env_clear();
-        output(command)
-    };
-    taut(&["init", "axis.toml"])?;
-    let result = taut(&["simulate", "axis.toml", "--json"])?;
-    taut(&["export", "fmu", "axis.toml", "--out", "axis.fmu"])?;
-    Ok(result)
-}
-
 /// Writes SHA256SUMS of the files that are handed out, and lists them.
 fn sums(out: &Path) -> Result<(), String> {
     let cannot = |e: std::io::Error| format!("{}: {e}", out.display());
@@ -151,20 +201,24 @@ fn sums(out: &Path) -> Result<(), String> {
         fs::read_dir(out).map_err(cannot)?.flatten().map(|entry| entry.path()).filter(|path| path.is_file()).collect();
     names.sort();
     let mut text = String::new();
+    println!("\n== {}", out.display());
     for path in &names {
         let bytes = fs::read(path).map_err(cannot)?;
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         println!("{:>12} bytes  {name}", bytes.len());
         text += &format!("{}  {name}\n", hash(&bytes));
     }
-    write(&out.join("SHA256SUMS"), text)?;
-    println!("{}", out.display());
-    Ok(())
+    write(&out.join("SHA256SUMS"), text)
 }
 
 /// SHA-256 in hexadecimal digits.
 fn hash(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// Reads a file.
+fn read(path: &Path) -> Result<Vec<u8>, String> {
+    fs::read(path).map_err(|error| format!("{}: {error}", path.display()))
 }
 
 #[cfg(test)]
@@ -173,13 +227,38 @@ mod tests {
 
     #[test]
     fn words_are_understood_or_refused() {
+        let nothing = Asked { parts: Vec::new(), target: None, twice: false, pythons: Vec::new(), fresh: false };
         let all = vec![Part::Crates, Part::Program, Part::Wheel];
-        assert_eq!(Asked::new(&[]), Ok(Asked { parts: all, target: None, twice: false }));
-        let words = ["--part", "program", "--twice", "--target", "aarch64-unknown-linux-gnu"];
-        let target = Some("aarch64-unknown-linux-gnu".to_string());
-        assert_eq!(Asked::new(&words), Ok(Asked { parts: vec![Part::Program], target, twice: true }));
-        for wrong in [&["--part"][..], &["--part", "all"], &["--target"], &["twice"]] {
+        assert_eq!(Asked::new(&[]), Ok(Asked { parts: all, ..nothing }));
+        let words =
+            ["--part", "program", "--twice", "--target", "aarch64-unknown-linux-gnu", "--python", "p", "--fresh"];
+        let asked = Asked {
+            parts: vec![Part::Program],
+            target: Some("aarch64-unknown-linux-gnu".into()),
+            twice: true,
+            pythons: vec!["p".into()],
+            fresh: true,
+        };
+        assert_eq!(Asked::new(&words), Ok(asked));
+        let of_target = Asked::new(&["--target", "aarch64-unknown-linux-gnu"]).unwrap();
+        assert_eq!(of_target.parts, [Part::Program, Part::Wheel]);
+        for wrong in [&["--part"][..], &["--part", "all"], &["--target"], &["twice"], &["--python"], &["--fresh", "a"]]
+        {
             assert!(Asked::new(wrong).unwrap_err().contains("is not understood"), "{wrong:?}");
         }
+    }
+
+    #[test]
+    fn a_target_that_rust_does_not_know_is_refused_before_anything_is_built() {
+        let refused = run(&["--target", "pdp11-unknown-unix"]).unwrap_err();
+        assert!(refused.starts_with("pdp11-unknown-unix needs"), "{refused}");
+        let refused = run(&["--target", "x86_64-unknown-linux-musl"]).unwrap_err();
+        assert!(refused.starts_with("x86_64-unknown-linux-musl has no shared objects"), "{refused}");
+    }
+
+    #[test]
+    fn a_python_that_does_not_run_is_refused_before_anything_is_built() {
+        let refused = run(&["--python", "python-of-nobody"]).unwrap_err();
+        assert!(refused.starts_with("python-of-nobody is not Python 3.10 or later"), "{refused}");
     }
 }

@@ -3,8 +3,12 @@
 #[path = "../../../cli/notices.rs"]
 mod notices;
 
-use super::{Asked, GLIBC, Places, hash, members, must, paths};
+use super::trial::{Program, in_importer};
+use super::{Claims, GLIBC, Places, glibc, hash, members, must, paths, read};
+use crate::compiler::Compiler;
 use crate::{output, write};
+use serde_json::Value;
+use std::ffi::OsString;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -18,56 +22,144 @@ const DOCUMENTS: [&str; 4] = ["README.md", "CHANGELOG.md", "LICENSE-APACHE", "LI
 /// The version of cargo-cyclonedx, which writes the bill of materials.
 const CYCLONEDX: &str = "0.5.9";
 
-/// Builds the program and its archive. Returns the program, if this machine can run it.
-pub fn make(places: &Places, asked: &Asked) -> Result<Option<PathBuf>, String> {
-    println!("== program");
-    let own = own_target()?;
-    let triple = asked.target.clone().unwrap_or_else(|| own.clone());
-    let program = build(places, &triple, "program")?;
-    let bytes = paths::check(&program)?;
-    let needed = paths::glibc(&bytes);
-    println!("{}: {} bytes, glibc {}", program.display(), bytes.len(), needed.map_or("none".into(), said));
-    if triple.contains("gnu") && needed > Some(GLIBC) {
-        return Err(format!("{} needs a later glibc than {}", program.display(), said(GLIBC)));
+/// For which target and by what program and wheel are built.
+pub struct Build<'a> {
+    pub places: &'a Places,
+    pub triple: &'a str,
+    pub compiler: &'a Compiler,
+}
+
+impl Build<'_> {
+    /// True if zig links, which has the C libraries of old, for other processors too.
+    pub fn has_zig(&self) -> bool {
+        self.triple.contains("linux-gnu")
     }
-    if asked.twice {
-        let again = build(places, &triple, "program-again")?;
-        let [first, second] = [hash(&bytes), hash(&fs::read(&again).map_err(|e| e.to_string())?)];
-        if first != second {
-            return Err(format!("two builds differ: {first} and {second}"));
+
+    /// Has a command that builds from `source` use the compiler, the tools of Python, and no paths of this machine.
+    pub fn set(&self, build: &mut Command, source: &Path) -> Result<(), String> {
+        // Incremental builds are larger and slower, and depend on the builds before them.
+        build.env("CARGO_INCREMENTAL", "0");
+        build.env("CARGO_ENCODED_RUSTFLAGS", paths::flags(source)?.join("\u{1f}"));
+        build.env("PATH", with_tools(self.places)?);
+        self.compiler.set(build)
+    }
+
+    /// Words that run a program for the target; none: this machine does not run it. A runner of another processor's
+    /// programs has the variable that cargo reads, as CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUNNER.
+    pub fn runner(&self) -> Result<Option<Vec<String>>, String> {
+        if self.triple == own_target()? {
+            return Ok(Some(Vec::new()));
         }
-        println!("a second build has the same bytes: {first}");
+        let variable = format!("CARGO_TARGET_{}_RUNNER", self.triple.replace(['-', '.'], "_").to_uppercase());
+        Ok(std::env::var(variable).ok().map(|words| words.split_whitespace().map(str::to_string).collect()))
+    }
+
+    /// Errors: a file needs a later glibc than it should, or holds paths of this machine. Returns the glibc in words.
+    pub fn checked(&self, file: &Path) -> Result<String, String> {
+        paths::check(file)?;
+        if !self.has_zig() {
+            return Ok("no glibc".into());
+        }
+        let needed = glibc::newest(file)?;
+        match needed > Some(GLIBC) {
+            true => Err(format!("{} needs a later glibc than {}", file.display(), dotted(GLIBC))),
+            false => Ok(needed.map_or("no glibc".into(), |version| format!("glibc {} (objdump -T)", dotted(version)))),
+        }
+    }
+
+    /// Builds the program from the source in a folder.
+    fn program(&self, source: &Path, target: &Path) -> Result<PathBuf, String> {
+        let mut build = crate::cargo(&[if self.has_zig() { "zigbuild" } else { "build" }]);
+        build.args(["--locked", "--profile", "dist", "--package", "taut-cli", "--bin", "taut"]);
+        let triple = self.triple;
+        let version = if self.has_zig() { format!("{triple}.{}", dotted(GLIBC)) } else { triple.to_string() };
+        build.args(["--target", &version]).arg("--target-dir").arg(target).current_dir(source);
+        self.set(&mut build, source)?;
+        must(build)?;
+        let windows = triple.contains("windows");
+        Ok(target.join(triple).join("dist").join(if windows { "taut.exe" } else { "taut" }))
+    }
+}
+
+/// Builds the program and its archive. Returns the program, if this machine can run it.
+pub fn make(build: &Build, twice: bool, claims: &mut Claims) -> Result<Option<Program>, String> {
+    println!("== program");
+    let (places, triple) = (build.places, build.triple);
+    let built = build.program(Path::new("."), &places.work.join("program"))?;
+    let glibc = build.checked(&built)?;
+    let bytes = read(&built)?;
+    claims.add("program", format!("{triple}, {} bytes, {glibc}, no paths of this machine", bytes.len()));
+    if twice {
+        let sum = hash(&bytes);
+        again(build, &sum)?;
+        claims.add("two builds", format!("same bytes from two folders, SHA-256 {sum}"));
     }
     let name = format!("taut-{}-{triple}", env!("CARGO_PKG_VERSION"));
     let folder = places.work.join("archive").join(&name);
     let _ = fs::remove_dir_all(&folder);
-    write(&folder.join("taut"), &bytes)?;
-    executable(&folder.join("taut"))?;
-    DOCUMENTS.iter().try_for_each(|name| write(&folder.join(name), fs::read(name).map_err(|e| e.to_string())?))?;
-    let mut tree = crate::cargo(&["tree", "--locked", "--package", "taut-cli"]);
-    tree.args(["--target", &triple]);
-    let opening = "The program contains these packages of others, under these licences.";
-    write(&folder.join("LICENCES.txt"), notices::notices(tree, opening))?;
-    write(&folder.join("taut.cdx.json"), materials(places, &triple)?)?;
-    let runs = triple == own;
-    if runs {
-        let taut = |words: &[&str]| {
-            let mut command = Command::new(&program);
-            command.args(words);
-            output(command)
-        };
-        for shell in SHELLS {
-            write(&folder.join("completions").join(format!("taut.{shell}")), taut(&["completions", shell])?)?;
+    let program = folder.join(built.file_name().unwrap_or_default());
+    write(&program, &bytes)?;
+    executable(&program)?;
+    DOCUMENTS.iter().try_for_each(|name| write(&folder.join(name), read(Path::new(name))?))?;
+    let licences =
+        licences("taut-cli", triple, "The program contains these packages of others, under these licences.")?;
+    claims.add("licences", licences.figure());
+    write(&folder.join("LICENCES.txt"), &licences.text)?;
+    let materials = materials(places, triple)?;
+    claims.add("bill of materials", listed(&materials, &licences)?);
+    write(&folder.join("taut.cdx.json"), materials)?;
+    let runner = build.runner()?;
+    let tried = runner.map(|runner| Program::tried("released program", program, runner, &places.work)).transpose()?;
+    match &tried {
+        Some(tried) => {
+            for shell in SHELLS {
+                let text = tried.output(&["completions", shell])?;
+                write(&folder.join("completions").join(format!("taut.{shell}")), text)?;
+            }
+            let manual = folder.join("man");
+            tried.output(&["man", "--out", &manual.display().to_string()])?;
+            let pages = crate::book::files(&manual)?.len();
+            claims.add("in the archive", format!("completions for {} shells, {pages} manual pages", SHELLS.len()));
+            let object = tried.object()?;
+            let glibc = build.checked(&object)?;
+            let size = read(&object)?.len();
+            claims.add("object of its FMUs", format!("{size} bytes, {glibc}, no paths of this machine"));
         }
-        taut(&["man", "--out", &folder.join("man").display().to_string()])?;
-    } else {
-        println!("untried: this machine does not run {triple}; its archive has no completions and manual pages");
+        None => {
+            let figure = "this machine does not run it; no completions and no manual pages are in its archive";
+            claims.add("untried", figure.into());
+        }
+    }
+    if let Some(tried) = tried.as_ref().filter(|_| own_target().is_ok_and(|own| own == triple)) {
+        claims.add("its FMU in FMPy", in_importer(&tried.unit(), tried)?);
     }
     archive(&folder, &places.out.join(format!("{name}.tar.gz")))?;
-    Ok(runs.then_some(program))
+    Ok(tried)
 }
 
-fn said((major, minor): (u32, u32)) -> String {
+/// Builds the last commit in another folder. Errors: the program has another hash than `first`.
+fn again(build: &Build, first: &str) -> Result<(), String> {
+    let source = build.places.work.join("again");
+    let here = std::env::current_dir().map_err(|e| format!("the present folder: {e}"))?;
+    let git = |words: &[&str]| {
+        let mut git = Command::new("git");
+        git.args(words);
+        output(git)
+    };
+    let (of, from) = (source.display().to_string(), here.display().to_string());
+    if !source.join(".git").exists() {
+        git(&["clone", "--quiet", "--no-checkout", &from, &of])?;
+    }
+    git(&["-C", &of, "fetch", "--quiet", &from, "HEAD"])?;
+    git(&["-C", &of, "checkout", "--quiet", "--force", "--detach", "FETCH_HEAD"])?;
+    let second = hash(&read(&build.program(&source, &source.join("target"))?)?);
+    match first == second {
+        true => Ok(()),
+        false => Err(format!("two builds differ: {first} and {second}")),
+    }
+}
+
+fn dotted((major, minor): (u32, u32)) -> String {
     format!("{major}.{minor}")
 }
 
@@ -80,30 +172,53 @@ pub fn own_target() -> Result<String, String> {
     line.map(str::to_string).ok_or_else(|| "rustc -vV names no host".into())
 }
 
-/// Builds the program for a target. On Linux zig links, which knows the C libraries of old.
-fn build(places: &Places, triple: &str, folder: &str) -> Result<PathBuf, String> {
-    let linux = triple.contains("linux-gnu");
-    let target = places.work.join(folder);
-    let mut build = crate::cargo(&[if linux { "zigbuild" } else { "build" }]);
-    build.args(["--locked", "--profile", "dist", "--package", "taut-cli", "--bin", "taut"]);
-    let version = if linux { format!("{triple}.{}", said(GLIBC)) } else { triple.to_string() };
-    build.args(["--target", &version]).arg("--target-dir").arg(&target);
-    build.env("CARGO_ENCODED_RUSTFLAGS", paths::flags()?.join("\u{1f}")).env("PATH", with_tools(places)?);
-    must(build)?;
-    let windows = triple.contains("windows");
-    Ok(target.join(triple).join("dist").join(if windows { "taut.exe" } else { "taut" }))
-}
-
 /// The path with the tools of Python in front.
-pub fn with_tools(places: &Places) -> Result<std::ffi::OsString, String> {
+pub fn with_tools(places: &Places) -> Result<OsString, String> {
     let before = std::env::var_os("PATH").unwrap_or_default();
     let own = crate::python::program(&places.tools, "python").parent().map(Path::to_path_buf).unwrap_or_default();
     std::env::join_paths([own].into_iter().chain(std::env::split_paths(&before))).map_err(|e| e.to_string())
 }
 
+/// Licences of the packages of others in a program or wheel.
+pub struct Licences {
+    pub text: String,
+    /// Names and versions.
+    packages: Vec<String>,
+    /// Those whose text is not in `text`: Apache's, which is handed out as a file, or none in their package.
+    without_text: usize,
+}
+
+impl Licences {
+    pub fn figure(&self) -> String {
+        let (all, without) = (self.packages.len(), self.without_text);
+        format!("{all} packages of others, each with its licence, {} with its text in the package", all - without)
+    }
+}
+
+/// Licences of the packages in a member of the workspace. Errors: none are found, or a package has none.
+pub fn licences(member: &str, triple: &str, opening: &str) -> Result<Licences, String> {
+    let mut tree = crate::cargo(&["tree", "--locked", "--package", member]);
+    tree.args(["--target", triple]);
+    let text = notices::notices(tree, opening);
+    let (mut packages, mut without_text) = (Vec::new(), 0);
+    for section in text.split(&format!("\n{}\n", "=".repeat(72))).skip(1) {
+        let (first, rest) = section.split_once('\n').unwrap_or((section, ""));
+        match first.split_once(": ").map(|(name, licence)| (name, licence.trim())) {
+            Some((name, licence)) if !licence.is_empty() => packages.push(name.to_string()),
+            _ => return Err(format!("{member}: a package without a licence: {first}")),
+        }
+        without_text += usize::from(rest.trim().is_empty());
+    }
+    match packages.is_empty() {
+        false => Ok(Licences { text, packages, without_text }),
+        true => Err(format!("cargo tree names no packages in {member}")),
+    }
+}
+
 /// A bill of materials of the program, by cargo-cyclonedx, without the time at which it was written.
 fn materials(places: &Places, triple: &str) -> Result<Vec<u8>, String> {
-    let tool = crate::book::installed("cargo-cyclonedx", CYCLONEDX, &[])?;
+    // A debug build: it is built for one use.
+    let tool = crate::book::installed("cargo-cyclonedx", CYCLONEDX, &["--debug"])?;
     let name = "taut-materials";
     let mut list = Command::new(tool);
     list.args(["cyclonedx", "--format", "json", "--manifest-path", "cli/Cargo.toml", "--target", triple, "--quiet"]);
@@ -121,6 +236,27 @@ fn materials(places: &Places, triple: &str) -> Result<Vec<u8>, String> {
     found.ok_or_else(|| "cargo-cyclonedx wrote no bill of materials".into())
 }
 
+/// What a bill of materials lists, in words. Errors: it is none, or lacks a package of `licences`.
+fn listed(materials: &[u8], licences: &Licences) -> Result<String, String> {
+    let bill: Value = serde_json::from_slice(materials).map_err(|e| format!("the bill of materials: {e}"))?;
+    let components = bill["components"].as_array().map(Vec::as_slice).unwrap_or_default();
+    let word = |component: &Value, key: &str| component[key].as_str().unwrap_or_default().to_string();
+    let names: Vec<String> = components
+        .iter()
+        .map(|component| format!("{} {}", word(component, "name"), word(component, "version")))
+        .collect();
+    let missing: Vec<&String> = licences.packages.iter().filter(|package| !names.contains(package)).collect();
+    match &missing[..] {
+        [] => Ok(format!(
+            "{} {}, {} components, all packages of LICENCES.txt among them",
+            word(&bill, "bomFormat"),
+            word(&bill, "specVersion"),
+            names.len()
+        )),
+        _ => Err(format!("the bill of materials lacks {missing:?}")),
+    }
+}
+
 #[cfg(unix)]
 fn executable(path: &Path) -> Result<(), String> {
     use std::os::unix::fs::PermissionsExt;
@@ -134,21 +270,47 @@ fn executable(_: &Path) -> Result<(), String> {
 
 /// Packs a folder so that equal files give equal bytes.
 fn archive(folder: &Path, file: &Path) -> Result<(), String> {
-    let (above, name) = (folder.parent().unwrap_or(folder), folder.file_name().unwrap_or_default());
-    let mut tar = Command::new("tar");
-    tar.args([
-        "--sort=name",
-        "--mtime=@0",
-        "--owner=0",
-        "--group=0",
-        "--numeric-owner",
-        "--mode=go=rX,u+rw,a-s",
-        "-cf",
-        "-",
-    ]);
-    tar.arg("-C").arg(above).arg(name);
-    let bytes = output(tar)?;
-    let mut packed = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::best());
-    std::io::Write::write_all(&mut packed, &bytes).map_err(|e| e.to_string())?;
-    write(file, packed.finish().map_err(|e| e.to_string())?)
+    let mut pack = Command::new(crate::python::interpreter()?);
+    pack.args(["-c", include_str!("archive.py")]).arg(folder).arg(file);
+    output(pack).map(drop)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn licences() -> Licences {
+        Licences { text: String::new(), packages: vec!["libm 0.2.16".into()], without_text: 0 }
+    }
+
+    #[test]
+    fn a_bill_that_lacks_a_package_is_refused() {
+        let bill = br#"{"bomFormat": "CycloneDX", "specVersion": "1.3", "components": [{"name": "libm", "version": "0.2.1"}]}"#;
+        assert_eq!(listed(bill, &licences()), Err("the bill of materials lacks [\"libm 0.2.16\"]".into()));
+        assert!(listed(b"no JSON", &licences()).unwrap_err().starts_with("the bill of materials: "));
+    }
+
+    #[test]
+    fn equal_files_give_equal_archives() {
+        let folder = std::env::temp_dir().join(format!("taut-xtask-archive-{}", std::process::id()));
+        let pack = |name: &str| {
+            let whole = folder.join("whole");
+            let _ = fs::remove_dir_all(&whole);
+            ["taut", "man/taut.1"].iter().try_for_each(|file| write(&whole.join(file), file)).unwrap();
+            executable(&whole.join("taut")).unwrap();
+            archive(&whole, &folder.join(name)).unwrap();
+            read(&folder.join(name)).unwrap()
+        };
+        let first = pack("first.tar.gz");
+        assert!(first == pack("second.tar.gz"));
+        let refused = archive(&folder.join("whole"), &folder.join("nowhere").join("third.tar.gz")).unwrap_err();
+        assert!(refused.contains("No such file"), "{refused}");
+        fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    fn licences_of_a_member_that_does_not_exist_are_an_error() {
+        let refused = super::licences("taut-nothing", "x86_64-unknown-linux-gnu", "").err();
+        assert_eq!(refused.as_deref(), Some("cargo tree names no packages in taut-nothing"));
+    }
 }
