@@ -4,7 +4,7 @@ use super::fit::score;
 use crate::case::{Case, Experiment};
 use crate::fit::LogFit;
 use crate::machine::{AmplifierMode, Kind, Machine, Motor, axis};
-use crate::mechanism::Mechanism;
+use crate::mechanism::{CURRENTS, Mechanism};
 use crate::metrics::{
     self, EventCount, Figure, Metrics, OfDrive, OfLoad, OfSpan, Peak, Role, Seek, SteadySpeed, Worth,
 };
@@ -428,6 +428,9 @@ fn unit_key(unit: &str) -> String {
     if unit.is_empty() { String::new() } else { format!("_{}", unit.replace('/', "_")) }
 }
 
+/// Most motors of a machine with steppers.
+const STEPPERS: usize = CURRENTS / 2;
+
 /// The lines of the table of a schema that stand for the key figures: path below the metrics, type and meaning.
 pub(super) fn figure_lines() -> Vec<[String; 3]> {
     let mut lines: Vec<[String; 3]> = Vec::new();
@@ -436,8 +439,9 @@ pub(super) fn figure_lines() -> Vec<[String; 3]> {
             lines.push([path, kind.into(), words.into()]);
         }
     };
+    let with_steppers = Kind::ALL.into_iter().filter(|kind| kind.geometry().drives.len() <= STEPPERS);
     let machines: Vec<(Kind, bool)> =
-        Kind::ALL.map(|kind| (kind, false)).into_iter().chain([(Kind::Axis, true)]).collect();
+        Kind::ALL.into_iter().map(|kind| (kind, false)).chain(with_steppers.map(|kind| (kind, true))).collect();
     // Of more parts than any machine has.
     let nothing = Metrics {
         loads: vec![OfLoad::default(); 8],

@@ -64,7 +64,11 @@ impl Demand {
     /// The instant that takes the largest share of the limit, what it needs, and what is allowed there.
     fn most<'a>(&self, needs: &'a [Need]) -> Option<(&'a Need, [f64; 2])> {
         let both = needs.iter().map(|need| (need, [(self.needed)(need), (self.allowed)(need)]));
-        both.max_by(|(_, [a, of_a]), (_, [b, of_b])| (a / of_a).total_cmp(&(b / of_b)))
+        // a/of_a against b/of_b, where a limit may be zero.
+        both.max_by(|(_, [a, of_a]), (_, [b, of_b])| match of_a == of_b {
+            true => a.total_cmp(b),
+            false => (a * of_b).total_cmp(&(b * of_a)),
+        })
     }
 }
 

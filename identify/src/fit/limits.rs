@@ -414,12 +414,15 @@ pub(crate) const MORE_THAN_NOISE: f64 = 1.2;
 /// `a_dual_belt_is_fitted_with_the_logs_of_three_motors`.
 pub(crate) const SAME_MINIMUM: f64 = 0.01;
 
-/// Length of the part of the logs of a stepper that a search begins with, and its least share of them; each further one
-/// is twice as long.
+/// Length of the part of the logs of a stepper that a search begins with; each further one is twice as long.
 ///
-/// Unit: periods of the slowest mode at the start values; 1. Source: chosen: a swing or two, which have one minimum.
-/// Test: `a_stepper_is_fitted_from_a_holding_torque_and_a_mass_that_are_far_off`.
+/// Unit: periods of the slowest mode at the start values. Source: chosen: a swing or two, which have one minimum. Test:
+/// `a_stepper_is_fitted_from_a_holding_torque_and_a_mass_that_are_far_off`.
 pub(crate) const FIRST_BEGINNING: f64 = 1.5;
+
+/// Least length of that part.
+///
+/// Unit: share of the logs. Source: chosen.
 pub(crate) const SHORTEST_BEGINNING: f64 = 0.01;
 
 /// Rows that such a beginning has at least.
