@@ -97,8 +97,12 @@ fn added(args: &Args, cases: &[Case]) -> Result<Option<Vec<Added>>> {
 /// The files that will be written, but for plots.
 fn names(args: &Args, case: &Case, path: &Path) -> Result<Vec<String>> {
     let (_, moves) = case.moves_named(path, &args.moves)?;
-    let tables = ["csv", "events.csv", "samples.csv"];
-    let tables = moves.iter().flat_map(|one| tables.map(|ending| format!("{}.{ending}", one.file_name())));
+    // A stepper has no samples.
+    let tables: &[&str] = match case.machine.stepper() {
+        Some(_) => &["csv", "events.csv"],
+        None => &["csv", "events.csv", "samples.csv"],
+    };
+    let tables = moves.iter().flat_map(|one| tables.iter().map(move |ending| format!("{}.{ending}", one.file_name())));
     let report = (!args.common.no_report).then(|| "report.html".to_string());
     let common = ["summary.json", "case.toml"].map(str::to_string);
     Ok(tables.chain(common).chain(report).chain(folder::brought(&case.files).into_values()).collect())
@@ -156,7 +160,9 @@ fn one<'a>(
         writer.finish().map_err(Failure::work)?;
         files.push(format!("{name}.csv"));
         files.push(folder.write_events(&name, &run.outcome.events).map_err(Failure::work)?);
-        files.push(write_samples(folder, &name, case, &run).map_err(Failure::work)?);
+        if machine.stepper().is_none() {
+            files.push(write_samples(folder, &name, case, &run).map_err(Failure::work)?);
+        }
     }
     let worst = match args.spread.filter(|_| interrupt.signal().is_none()) {
         Some(share) => worst(&case.machine, design, motion, share, solver, &|| interrupt.signal().is_some())?,

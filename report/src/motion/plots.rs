@@ -176,8 +176,12 @@ pub fn figures(machine: &Machine, done: &Done) -> Vec<Named> {
         geometry.drives.iter().map(|drive| line(column(drive), &side(drive))).collect()
     };
     let forces = geometry.spans.iter().map(|span| line(&format!("{}_force", span.column), span.label.name)).collect();
-    let effort = figure("effort")
-        .panel(panel(Axis::new("Voltage", "V"), of_drives(|drive| drive.voltage.key)))
+    let mut effort = figure("effort");
+    if machine.stepper().is_none() {
+        // The phases of a stepper have voltages of their own.
+        effort = effort.panel(panel(Axis::new("Voltage", "V"), of_drives(|drive| drive.voltage.key)));
+    }
+    let effort = effort
         .panel(panel(Axis::new("Current", "A"), of_drives(|drive| drive.current_column)))
         .panel(panel(Axis::new("Force", "N"), forces))
         .caption(match several {

@@ -39,8 +39,11 @@ pub fn figures(case: &Case, run: &Run) -> Vec<(&'static str, Figure)> {
     if geometry.drives.iter().any(|drive| curves.get(&input(drive)).is_some()) {
         drives = drives.panel(of_drives(Axis::new("Input", gantry.drives[0].amplifier.mode.unit()), &input));
     }
+    if gantry.stepper().is_none() {
+        // The phases of a stepper have voltages of their own.
+        drives = drives.panel(of_drives(Axis::new("Voltage", "V"), &|drive| drive.voltage.key.to_string()));
+    }
     let drives = drives
-        .panel(of_drives(Axis::new("Voltage", "V"), &|drive| drive.voltage.key.to_string()))
         .panel(of_drives(Axis::new("Current", "A"), &|drive| drive.current_column.to_string()))
         .caption("What the motors get, and the currents they draw.");
 
