@@ -389,7 +389,7 @@ def test_a_stepper_is_the_machine_of_the_program(root: Path, tmp_path: Path) -> 
     (tmp_path / "command.csv").write_text(
         "time_s,command_m\n" + "".join(f"{t!r},{float(u)!r}\n" for t, u in zip(times, held, strict=True))
     )
-    file = '{ file = "command.csv", time = "time_s", input = "command_m", hold = "zero" }'
+    file = '{ file = "command.csv", time = "time_s", column = "command_m", hold = "zero" }'
     case = tmp_path / "held.toml"
     case.write_text(f'{text}[[experiment]]\nname = "held"\nuntil = 0.12\nevery = 1e-4\ninput = {file}\n')
     wanted = rows(case, tmp_path / "rows", "held.csv")
@@ -409,7 +409,8 @@ def test_a_stepper_is_the_machine_of_the_program(root: Path, tmp_path: Path) -> 
     line = [(0.0, 0.0), (0.05, 5e-3), (0.1, 5e-3)]
     points = ", ".join(f"[{t}, {u}]" for t, u in line)
     case = tmp_path / "line.toml"
-    case.write_text(f'{text}[[experiment]]\nname = "line"\nuntil = 0.1\nevery = 1e-3\ninput = {{ table = [{points}] }}\n')
+    table = f"{{ table = [{points}] }}"
+    case.write_text(f'{text}[[experiment]]\nname = "line"\nuntil = 0.1\nevery = 1e-3\ninput = {table}\n')
     wanted = rows(case, tmp_path / "fine", "line.csv", "stepper.microsteps=1024")
     result = simulate_fmu(
         export(case, tmp_path / "line.fmu", 3),
