@@ -15,9 +15,9 @@ use taut::trajectory::{CsvWriter, Trajectory};
 /// Step of the integration, s.
 const STEP: f64 = 1e-6;
 
-/// A stepper axis on its way: u(t) = A (1 − cos 2πft), one period, and a rest.
+/// A stepper with its driver.
 #[derive(Debug, Clone)]
-struct Axis {
+struct Motor {
     steps: f64,
     holding: f64,
     rated: f64,
@@ -28,6 +28,76 @@ struct Axis {
     microsteps: f64,
     detent: f64,
     rotor: f64,
+}
+
+impl Motor {
+    /// Its table of a case file.
+    fn table(&self) -> String {
+        let drive = if self.chopper { "chopper" } else { "voltage" };
+        format!(
+            "[stepper]\nsteps_per_turn = {}\nholding_torque = {:e}\nrated_current = {:e}\nresistance = {:e}\n\
+             inductance = {:e}\nsupply = {:e}\ndrive = \"{drive}\"\nmicrosteps = {}\ndetent_torque = {:e}\n\
+             rotor_inertia = {:e}\n",
+            self.steps,
+            self.holding,
+            self.rated,
+            self.resistance,
+            self.inductance,
+            self.supply,
+            self.microsteps,
+            self.detent,
+            self.rotor,
+        )
+    }
+
+    fn teeth(&self) -> f64 {
+        self.steps / 4.0
+    }
+
+    /// Angle of a microstep.
+    fn microstep(&self) -> f64 {
+        2.0 * PI / (self.steps * self.microsteps)
+    }
+
+    /// Torque, and the rates of both currents, at an angle and a speed of the rotor and a commanded angle.
+    fn phases(&self, (angle, speed): (f64, f64), currents: [f64; 2], told: f64) -> (f64, [f64; 2]) {
+        let k = self.holding * FRAC_1_SQRT_2 / self.rated;
+        let rotor = self.teeth() * angle + PI / 4.0;
+        let field = self.teeth() * told + PI / 4.0;
+        let [a, b] = currents;
+        let torque = k * (b * rotor.cos() - a * rotor.sin()) - self.detent * (4.0 * rotor).sin();
+        let emf = [-k * speed * rotor.sin(), k * speed * rotor.cos()];
+        let wanted = [field.cos(), field.sin()];
+        let rates = [0, 1].map(|phase| {
+            let i = currents[phase];
+            let volts = match self.chopper {
+                false => self.supply * wanted[phase],
+                true => {
+                    let regulated = 2.0 * PI * 1e4 * (2.0_f64.sqrt() * self.rated * wanted[phase] - i);
+                    let volts = self.resistance * i + emf[phase] + self.inductance * regulated;
+                    volts.max(-self.supply).min(self.supply)
+                }
+            };
+            (volts - self.resistance * i - emf[phase]) / self.inductance
+        });
+        (torque, rates)
+    }
+}
+
+/// A step of the classical formula.
+fn classical<const N: usize>(y: &[f64; N], h: f64, rate: impl Fn(&[f64; N]) -> [f64; N]) -> [f64; N] {
+    let add = |h: f64, k: &[f64; N]| -> [f64; N] { std::array::from_fn(|i| y[i] + h * k[i]) };
+    let k1 = rate(y);
+    let k2 = rate(&add(0.5 * h, &k1));
+    let k3 = rate(&add(0.5 * h, &k2));
+    let k4 = rate(&add(h, &k3));
+    std::array::from_fn(|i| y[i] + h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]))
+}
+
+/// A stepper axis on its way: u(t) = A (1 − cos 2πft), one period, and a rest.
+#[derive(Debug, Clone)]
+struct Axis {
+    motor: Motor,
     radius: f64,
     /// Inertias of pulleys and mass of the cart, with viscous and Coulomb friction of each.
     inertia: [f64; 3],
@@ -61,7 +131,7 @@ impl Axis {
         let frequency = (share * holding / radius / total / amplitude).sqrt() / (2.0 * PI);
         let frequency = frequency.min(0.6 / amplitude / (2.0 * PI));
         let k = between(4e4, 2e5);
-        Self {
+        let motor = Motor {
             steps: if between(0.0, 1.0) < 0.7 { 200.0 } else { 400.0 },
             holding,
             rated,
@@ -72,6 +142,9 @@ impl Axis {
             microsteps: [1.0, 1.0, 2.0, 4.0, 8.0][(5.0 * between(0.0, 0.999)) as usize],
             detent: holding * between(0.0, 0.06),
             rotor,
+        };
+        Self {
+            motor,
             radius,
             inertia: [drive, mass, idler],
             viscous: [between(1e-5, 3e-4), between(0.5, 8.0), between(1e-6, 2e-5)],
@@ -90,23 +163,12 @@ impl Axis {
             let (inertia, b, c) = (self.inertia[k], self.viscous[k], self.coulomb[k]);
             format!("{name} = {inertia:e}\nfriction = {{ viscous = {b:e}, coulomb = {c:e} }}\n")
         });
-        let drive_word = if self.chopper { "chopper" } else { "voltage" };
         format!(
-            "[stepper]\nsteps_per_turn = {}\nholding_torque = {:e}\nrated_current = {:e}\nresistance = {:e}\n\
-             inductance = {:e}\nsupply = {:e}\ndrive = \"{drive_word}\"\nmicrosteps = {}\ndetent_torque = {:e}\n\
-             rotor_inertia = {:e}\n[drive_pulley]\nradius = {:e}\n{drive}[cart]\n{cart}[idler_pulley]\n{idler}[belt]\n\
+            "{}[drive_pulley]\nradius = {:e}\n{drive}[cart]\n{cart}[idler_pulley]\n{idler}[belt]\n\
              stiffness = {:?}\ndamping = {:?}\n[[experiment]]\nname = \"there and back\"\nuntil = {:e}\nevery = 1e-3\n\
              input = {{ sequence = [{{ sine = {:e}, frequency = {:e}, phase = {:e}, offset = {:e}, lasts = {:e} }}, \
              {{ step = 0.0 }}] }}\n",
-            self.steps,
-            self.holding,
-            self.rated,
-            self.resistance,
-            self.inductance,
-            self.supply,
-            self.microsteps,
-            self.detent,
-            self.rotor,
+            self.motor.table(),
             self.radius,
             self.stiffness,
             self.damping,
@@ -119,10 +181,6 @@ impl Axis {
         )
     }
 
-    fn teeth(&self) -> f64 {
-        self.steps / 4.0
-    }
-
     /// Commanded position as a whole number of microsteps, and the length of one.
     fn microstep(&self, time: f64) -> f64 {
         let told = match time * self.frequency < 1.0 {
@@ -133,31 +191,14 @@ impl Axis {
     }
 
     fn length(&self) -> f64 {
-        2.0 * PI * self.radius / (self.steps * self.microsteps)
+        self.motor.microstep() * self.radius
     }
 
     /// All that acts on the bodies but friction, and the rates of the currents.
     fn forces(&self, y: &State, told: f64) -> ([f64; 3], [f64; 2]) {
         let &[p1, x, p3, w1, v, w3, ia, ib] = y;
-        let (r, n) = (self.radius, self.teeth());
-        let k = self.holding * FRAC_1_SQRT_2 / self.rated;
-        let rotor = n * p1 + PI / 4.0;
-        let field = n * told / r + PI / 4.0;
-        let torque = k * (ib * rotor.cos() - ia * rotor.sin()) - self.detent * (4.0 * rotor).sin();
-        let emf = [-k * w1 * rotor.sin(), k * w1 * rotor.cos()];
-        let wanted = [field.cos(), field.sin()];
-        let rates = [0, 1].map(|phase| {
-            let i = [ia, ib][phase];
-            let volts = match self.chopper {
-                false => self.supply * wanted[phase],
-                true => {
-                    let regulated = 2.0 * PI * 1e4 * (2.0_f64.sqrt() * self.rated * wanted[phase] - i);
-                    let volts = self.resistance * i + emf[phase] + self.inductance * regulated;
-                    volts.max(-self.supply).min(self.supply)
-                }
-            };
-            (volts - self.resistance * i - emf[phase]) / self.inductance
-        });
+        let r = self.radius;
+        let (torque, rates) = self.motor.phases((p1, w1), [ia, ib], told / r);
         let [k1, k2, k3] = self.stiffness;
         let [c1, c2, c3] = self.damping;
         let f1 = k1 * (r * p1 - x) + c1 * (r * w1 - v);
@@ -167,7 +208,7 @@ impl Axis {
     }
 
     fn inertias(&self) -> [f64; 3] {
-        [self.inertia[0] + self.rotor, self.inertia[1], self.inertia[2]]
+        [self.inertia[0] + self.motor.rotor, self.inertia[1], self.inertia[2]]
     }
 
     fn rate(&self, y: &State, told: f64, motion: &[i8; 3]) -> State {
@@ -184,14 +225,8 @@ impl Axis {
         rate
     }
 
-    /// A step of the classical formula.
     fn step(&self, y: &State, h: f64, told: f64, motion: &[i8; 3]) -> State {
-        let add = |h: f64, k: &State| -> State { std::array::from_fn(|i| y[i] + h * k[i]) };
-        let k1 = self.rate(y, told, motion);
-        let k2 = self.rate(&add(0.5 * h, &k1), told, motion);
-        let k3 = self.rate(&add(0.5 * h, &k2), told, motion);
-        let k4 = self.rate(&add(h, &k3), told, motion);
-        std::array::from_fn(|i| y[i] + h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]))
+        classical(y, h, |y| self.rate(y, told, motion))
     }
 
     /// True if a step ends as it began: no body has reversed or broken away, and the command is the same.
@@ -206,9 +241,9 @@ impl Axis {
 
     /// Positions every millisecond, and when the rotor is half a tooth pitch off the field: times and pitches behind.
     fn integrate(&self) -> (Vec<[f64; 3]>, Vec<(f64, i32)>) {
-        let mut y: State = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, self.rated, self.rated];
-        if !self.chopper {
-            let at_rest = self.supply / self.resistance * FRAC_1_SQRT_2;
+        let mut y: State = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, self.motor.rated, self.motor.rated];
+        if !self.motor.chopper {
+            let at_rest = self.motor.supply / self.motor.resistance * FRAC_1_SQRT_2;
             (y[6], y[7]) = (at_rest, at_rest);
         }
         let (mut motion, mut time, mut behind) = ([0_i8; 3], 0.0, 0);
@@ -241,7 +276,7 @@ impl Axis {
             }
             (y, time) = (next, time + h);
             let told = self.microstep(time + 1e-12) * self.length();
-            let pitches = ((told / self.radius - y[0]) * self.teeth() / (2.0 * PI)).round() as i32;
+            let pitches = ((told / self.radius - y[0]) * self.motor.teeth() / (2.0 * PI)).round() as i32;
             if pitches != behind {
                 behind = pitches;
                 slips.push((time, behind));
@@ -350,14 +385,7 @@ fn the_pull_out_torque_that_is_shown_is_that_at_which_a_slow_ramp_loses_its_step
 /// A CoreXY with two steppers and no dry friction, on the way to one point of its plane after another.
 #[derive(Debug, Clone)]
 struct Plotter {
-    holding: f64,
-    rated: f64,
-    resistance: f64,
-    inductance: f64,
-    supply: f64,
-    microsteps: f64,
-    detent: f64,
-    rotor: f64,
+    motor: Motor,
     radius: f64,
     pulley: f64,
     /// Of bridge and cart.
@@ -380,15 +408,20 @@ impl Plotter {
         let mut between = |low: f64, high: f64| low + (high - low) * chance.uniform();
         let (holding, rated, resistance) = (between(0.3, 0.6), between(1.0, 2.5), between(0.8, 2.0));
         let k = [between(4e4, 1.2e5), between(4e4, 1.2e5)];
-        Self {
+        let motor = Motor {
+            steps: 200.0,
             holding,
             rated,
             resistance,
             inductance: resistance * between(1e-3, 2.5e-3),
             supply: between(18.0, 36.0),
+            chopper: true,
             microsteps: [2.0, 4.0, 8.0][(3.0 * between(0.0, 0.999)) as usize],
             detent: holding * between(0.0, 0.05),
             rotor: holding * 1.2e-5,
+        };
+        Self {
+            motor,
             radius: between(5e-3, 8e-3),
             pulley: between(5e-7, 2e-6),
             mass: [between(0.2, 0.4), between(0.15, 0.3)],
@@ -405,20 +438,11 @@ impl Plotter {
     fn case(&self) -> String {
         let halves = |[a, b]: [f64; 2]| [0.4 * a, 0.6 * a, 0.7 * b, 0.3 * b];
         format!(
-            "kind = \"core-xy\"\n[stepper]\nsteps_per_turn = 200\nholding_torque = {:e}\nrated_current = {:e}\n\
-             resistance = {:e}\ninductance = {:e}\nsupply = {:e}\nmicrosteps = {}\ndetent_torque = {:e}\n\
-             rotor_inertia = {:e}\n[drive_pulley]\nradius = {:e}\ninertia = {:e}\n[bridge]\nmass = {:e}\n\
+            "kind = \"core-xy\"\n{}[drive_pulley]\nradius = {:e}\ninertia = {:e}\n[bridge]\nmass = {:e}\n\
              friction = {{ viscous = {:e} }}\n[cart]\nmass = {:e}\nfriction = {{ viscous = {:e} }}\n[belt]\n\
              stiffness = {:?}\ndamping = {:?}\n[[move]]\nname = \"path\"\npoints = {:?}\nspeed = {:e}\n\
              acceleration = {:e}\nuntil = {:e}\nevery = 1e-3\n",
-            self.holding,
-            self.rated,
-            self.resistance,
-            self.inductance,
-            self.supply,
-            self.microsteps,
-            self.detent,
-            self.rotor,
+            self.motor.table(),
             self.radius,
             self.pulley,
             self.mass[0],
@@ -458,30 +482,21 @@ impl Plotter {
     /// The commanded angles: motor A moves bridge and cart alike, motor B against each other, each in whole microsteps.
     fn told(&self, time: f64) -> [f64; 2] {
         let [x, y] = self.reference(time);
-        let step = 2.0 * PI / (200.0 * self.microsteps);
+        let step = self.motor.microstep();
         [x + y, x - y].map(|belt| (belt / self.radius / step).round() * step)
     }
 
     fn rate(&self, s: &Plane, told: [f64; 2]) -> Plane {
-        let (r, n, k) = (self.radius, 50.0, self.holding * FRAC_1_SQRT_2 / self.rated);
-        let mut rate = [0.0; 12];
+        let (r, mut rate) = (self.radius, [0.0; 12]);
         rate[..4].copy_from_slice(&s[4..8]);
         let (x, y) = ([s[2] + s[3], s[2] - s[3]], [s[6] + s[7], s[6] - s[7]]);
         let mut pull = [0.0; 2];
         for m in 0..2 {
-            let (rotor, field) = (n * s[m] + PI / 4.0, n * told[m] + PI / 4.0);
-            let [a, b] = [s[8 + 2 * m], s[9 + 2 * m]];
-            let speed = s[4 + m];
-            pull[m] = self.stiffness[m] * (r * s[m] - x[m]) + self.damping[m] * (r * speed - y[m]);
-            let torque = k * (b * rotor.cos() - a * rotor.sin()) - self.detent * (4.0 * rotor).sin();
-            rate[4 + m] = (torque - r * pull[m]) / (self.rotor + self.pulley);
-            let phases = [(a, -k * speed * rotor.sin(), field.cos()), (b, k * speed * rotor.cos(), field.sin())];
-            for (phase, (i, emf, wanted)) in phases.into_iter().enumerate() {
-                let aim = 2.0_f64.sqrt() * self.rated * wanted;
-                let volts = self.resistance * i + emf + self.inductance * 2.0 * PI * 1e4 * (aim - i);
-                let volts = volts.clamp(-self.supply, self.supply);
-                rate[8 + 2 * m + phase] = (volts - self.resistance * i - emf) / self.inductance;
-            }
+            let (angle, speed, currents) = (s[m], s[4 + m], 8 + 2 * m);
+            pull[m] = self.stiffness[m] * (r * angle - x[m]) + self.damping[m] * (r * speed - y[m]);
+            let (torque, rates) = self.motor.phases((angle, speed), [s[currents], s[currents + 1]], told[m]);
+            rate[4 + m] = (torque - r * pull[m]) / (self.motor.rotor + self.pulley);
+            rate[currents..currents + 2].copy_from_slice(&rates);
         }
         rate[6] = (pull[0] + pull[1] - self.viscous[0] * s[6]) / (self.mass[0] + self.mass[1]);
         rate[7] = (pull[0] - pull[1] - self.viscous[1] * s[7]) / self.mass[1];
@@ -491,7 +506,7 @@ impl Plotter {
     /// Positions of bridge and cart every millisecond: classical formula from edge to edge of the microsteps.
     fn integrate(&self) -> Vec<[f64; 2]> {
         let mut s = [0.0; 12];
-        s[8..].fill(self.rated);
+        s[8..].fill(self.motor.rated);
         let (mut time, mut rows) = (0.0, vec![[0.0; 2]]);
         while time < self.until - 1e-9 {
             let (told, end) = (self.told(time + 1e-12), (rows.len() as f64 * 1e-3).min(self.until));
@@ -504,12 +519,7 @@ impl Plotter {
                 }
                 h = high;
             }
-            let add = |h: f64, k: &Plane| -> Plane { std::array::from_fn(|i| s[i] + h * k[i]) };
-            let k1 = self.rate(&s, told);
-            let k2 = self.rate(&add(0.5 * h, &k1), told);
-            let k3 = self.rate(&add(0.5 * h, &k2), told);
-            let k4 = self.rate(&add(h, &k3), told);
-            s = std::array::from_fn(|i| s[i] + h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]));
+            s = classical(&s, h, |s| self.rate(s, told));
             time += h;
             if (time - end).abs() < 1e-10 {
                 rows.push([s[2], s[3]]);

@@ -115,9 +115,12 @@ fn the_template_of_a_printer_has_a_stepper_and_goes_through_its_commands() {
     for command in ["simulate", "move", "shape"] {
         taut(&[command, file, "--quiet"]).assert().success();
     }
-    let refused = taut(&["tune", file]).output().unwrap();
-    let said = String::from_utf8(refused.stderr).unwrap();
-    assert!(refused.status.code() == Some(2) && said.contains("this needs a motor"), "{said}");
+    // Learned signals are voltages or currents.
+    for command in [&["tune"][..], &["move", "--move", "80 mm", "--added", "learned.csv"]] {
+        let refused = taut(&[command, &[file]].concat()).output().unwrap();
+        let said = String::from_utf8(refused.stderr).unwrap();
+        assert!(refused.status.code() == Some(2) && said.contains("this needs a motor"), "{said}");
+    }
 }
 
 #[test]

@@ -4,7 +4,7 @@ use super::fit::score;
 use crate::case::{Case, Experiment};
 use crate::fit::LogFit;
 use crate::machine::{AmplifierMode, Kind, Machine, Motor, axis};
-use crate::mechanism::{CURRENTS, Mechanism};
+use crate::mechanism::{Mechanism, STEPPERS};
 use crate::metrics::{
     self, EventCount, Figure, Metrics, OfDrive, OfLoad, OfSpan, Peak, Role, Seek, SteadySpeed, Worth,
 };
@@ -427,9 +427,6 @@ fn key(figure: &Figure) -> Key {
 fn unit_key(unit: &str) -> String {
     if unit.is_empty() { String::new() } else { format!("_{}", unit.replace('/', "_")) }
 }
-
-/// Most motors of a machine with steppers.
-const STEPPERS: usize = CURRENTS / 2;
 
 /// The lines of the table of a schema that stand for the key figures: path below the metrics, type and meaning.
 pub(super) fn figure_lines() -> Vec<[String; 3]> {

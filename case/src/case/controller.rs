@@ -60,7 +60,7 @@ pub(super) fn controller(root: &Table, machine: &Machine) -> Result<Option<Desig
 /// Interval between the rows of a stepper's move where none is given, s.
 const EVERY: f64 = 1e-3;
 
-/// What a stepper has in place of a controller: an input shaper, if any. None where the file has neither that nor a move.
+/// The design of a stepper, which has an input shaper at most. None where the file has no move and no controller.
 fn of_stepper(root: &Table) -> Result<Option<Design>> {
     let Some(field) = root.optional("controller") else {
         let asks = ["move", "tune"].iter().find_map(|key| root.optional(key));

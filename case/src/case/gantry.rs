@@ -8,12 +8,9 @@ use crate::friction::Friction;
 use crate::machine::{
     Belt, BeltMake, BeltSheet, DriveAt, DriveUnit, Encoder, EncoderPlace, Kind, Machine, Pulley, Slide, Spans,
 };
-use crate::mechanism::{CURRENTS, State};
+use crate::mechanism::{STEPPERS, State};
 use crate::signal::Signal;
 use std::path::Path;
-
-/// Most motors of a machine that can be steppers, each with two phases.
-const STEPPERS: usize = CURRENTS / 2;
 
 /// The kind of machine that the file describes.
 pub(super) fn kind(root: &Table) -> Result<Kind> {

@@ -6,6 +6,7 @@ use crate::machine::{Amplifier, AmplifierMode, DriveUnit, Machine, Motor, Steppe
 use crate::mechanism::State;
 use crate::quantity::show;
 use crate::signal::Signal;
+use crate::solve::{Jump, first_jump};
 
 /// The error where a motor that is commanded by voltage or current is needed: message, and sections to add.
 const NO_MOTOR: [&str; 3] = [
@@ -107,17 +108,13 @@ pub(super) fn check_commands(
     (initial, until): (&State, f64),
 ) -> Result<()> {
     let mechanism = machine.mechanism();
-    for (drive, input) in inputs.iter().enumerate() {
-        let Some(most) = mechanism.farthest_jump(drive) else { continue };
-        let begin = initial.position[mechanism.drives[drive].pulley] / mechanism.angle_per_input(drive);
-        if let Some((time, jump)) = input.first_jump(begin, most, until) {
-            let motor = mechanism.drives[drive].label.name;
-            let whose = if inputs.len() > 1 { format!(" of the {motor}") } else { String::new() };
-            return Err(field
-                .fail(format!("the command{whose} jumps by {} at {}", show(jump, "m"), show(time, "s")))
-                .allowed(format!("up to {} at once, two full steps: a rotor does not follow more", show(most, "m")))
-                .next("let it grow, with ramp, table or sine"));
-        }
-    }
-    Ok(())
+    // A rotor begins where its pulley does.
+    let start = mechanism.begun(initial);
+    let Some(Jump { drive, time, by, most }) = first_jump(&mechanism, inputs, &start, until) else { return Ok(()) };
+    let motor = mechanism.drives[drive].label.name;
+    let whose = if inputs.len() > 1 { format!(" of the {motor}") } else { String::new() };
+    Err(field
+        .fail(format!("the command{whose} jumps by {} at {}", show(by, "m"), show(time, "s")))
+        .allowed(format!("up to {} at once, two full steps: a rotor does not follow more", show(most, "m")))
+        .next("let it grow, with ramp, table or sine"))
 }

@@ -9,7 +9,7 @@ use crate::folder::{self, Folder};
 use crate::interrupt::Interrupt;
 use std::fmt::Write;
 use std::path::Path;
-use taut::case::{Case, Files, Move};
+use taut::case::{Case, Files, Move, needs_motors};
 use taut::control::fed::Fed;
 use taut::control::{Added, Controller, Loop, MoveRun, Rows, Standard, each, stream, worst};
 use taut::design::Design;
@@ -84,6 +84,7 @@ fn added(args: &Args, cases: &[Case]) -> Result<Option<Vec<Added>>> {
     let ([case], [path]) = (cases, &args.case[..]) else {
         return wrong(format!("a signal is of one case, and there are {}", cases.len()), "name one case");
     };
+    needs_motors(&case.machine)?;
     let (_, moves) = case.moves_named(path, &args.moves)?;
     if moves.len() > 1 {
         return wrong(format!("a signal is of one move, and the case has {}", moves.len()), "name one with --move");

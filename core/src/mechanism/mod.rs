@@ -45,6 +45,8 @@ pub const DRIVES: usize = 3;
 pub const BODIES_AND_DRIVES: usize = BODIES + 2;
 /// Room for currents that are states: one of each brushed motor, both of each of two steppers.
 pub const CURRENTS: usize = 4;
+/// Most steppers of a machine, each with two currents.
+pub const STEPPERS: usize = CURRENTS / 2;
 
 /// Names of a part: for programs and for people.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

@@ -100,7 +100,7 @@ impl Load {
         }
     }
 
-    /// True if the motor or its supply bounds it, of which a loop needs some for itself, and a stepper for its swinging.
+    /// True if the motor or its supply bounds it: a loop needs some of that for itself, and a stepper for its swinging.
     pub fn is_of_motor(&self) -> bool {
         ["voltage", "current", "pull_out"].contains(&self.limit)
     }
@@ -108,7 +108,6 @@ impl Load {
 
 /// The limits of this machine under a controller with this limit of its command (V or A).
 fn demands(machine: &Machine, limit: Option<f64>) -> Vec<Demand> {
-    let (volts, amperes) = limits(machine, limit);
     let belt = &machine.belt;
     let pretension = belt.pretension.unwrap_or(0.0);
     let off = |need: &Need| -need.spans.iter().copied().fold(0.0, f64::min);
@@ -137,8 +136,13 @@ fn demands(machine: &Machine, limit: Option<f64>) -> Vec<Demand> {
             ["takes", " at the drive pulley", "; the teeth in mesh carry"],
         ),
     ];
-    let of_motor = electrical(volts, amperes).into_iter().chain(pull_out(machine, 0));
-    of_motor.chain(all.into_iter().flatten()).collect()
+    of_motor(machine, 0, limit).into_iter().chain(all.into_iter().flatten()).collect()
+}
+
+/// The demands on a motor under a controller with this limit of its command (V or A).
+fn of_motor(machine: &Machine, drive: usize, limit: Option<f64>) -> Vec<Demand> {
+    let (volts, amperes) = limits_of(machine, drive, limit);
+    electrical(volts, amperes).into_iter().chain(pull_out(machine, drive)).collect()
 }
 
 /// The demand on a stepper; none on another motor.
@@ -181,9 +185,7 @@ pub fn loads(machine: &Machine, limit: Option<f64>, profiles: &[Profile], instan
     let mut all: Vec<Load> = Vec::new();
     for drive in 0..machine.drives.len() {
         let needs = needs_of_drive(machine, drive, profiles, instants);
-        let (volts, amperes) = limits_of(machine, drive, limit);
-        let demands = electrical(volts, amperes).into_iter().chain(pull_out(machine, drive));
-        demands.for_each(|demand| load(&needs, demand).join(&mut all));
+        of_motor(machine, drive, limit).into_iter().for_each(|demand| load(&needs, demand).join(&mut all));
     }
     all
 }
@@ -207,9 +209,7 @@ pub fn shortfalls(machine: &Machine, limit: Option<f64>, profiles: &[Profile]) -
 fn of_drive(machine: &Machine, limit: Option<f64>, drive: usize, profiles: &[Profile]) -> Vec<Shortfall> {
     let needs = needs_of_drive(machine, drive, profiles, INSTANTS);
     let name = machine.geometry().drives[drive].label.name;
-    let (volts, amperes) = limits_of(machine, drive, limit);
-    let demands = electrical(volts, amperes).into_iter().chain(pull_out(machine, drive));
-    let exceeded = demands.filter_map(|demand| exceeded(&needs, &demand));
+    let exceeded = of_motor(machine, drive, limit).into_iter().filter_map(|demand| exceeded(&needs, &demand));
     exceeded.map(|short| Shortfall { words: format!("{name}: {}", short.words), ..short }).collect()
 }
 

@@ -40,8 +40,8 @@ const SLOW: f64 = 4.0;
 /// Speeds between rest and the largest at which an acceleration is checked.
 const SPEEDS: usize = 24;
 
-/// Number of speeds of a [`Curve`] beyond the one to which the regulator has voltage left, and the largest as a multiple
-/// of that.
+/// Number of speeds of a [`Curve`] beyond the one to which the regulator has voltage left, and the largest as a
+/// multiple of that.
 const KEPT: usize = 16;
 const FASTEST: f64 = 32.0;
 

@@ -11,6 +11,7 @@ use crate::mechanism::{AmplifierMode, Mechanism, SpringLaw, State};
 use crate::parameter;
 use crate::plan::Experiment;
 use crate::polyline::MOST_POINTS;
+use crate::signal::Signal;
 use std::f64::consts::PI;
 
 /// The range of anything that has to be above zero, as in a case file.
@@ -215,18 +216,39 @@ pub(super) fn course(mechanism: &Mechanism, course: &Course) -> Result<()> {
     state(&course.start)
 }
 
+/// A jump of the command of a stepper that is farther than its rotor follows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Jump {
+    /// Number of the drive.
+    pub drive: usize,
+    /// s
+    pub time: f64,
+    /// m
+    pub by: f64,
+    /// Farthest jump that the rotor follows, m.
+    pub most: f64,
+}
+
+/// The first such jump of these commands of a machine that begins in `start`, before `until`, s.
+pub fn first_jump(mechanism: &Mechanism, inputs: &[Signal], start: &State, until: f64) -> Option<Jump> {
+    inputs.iter().enumerate().find_map(|(drive, input)| {
+        let most = mechanism.farthest_jump(drive)?;
+        let begin = start.position[mechanism.drives[drive].shaft] / mechanism.angle_per_input(drive);
+        let (time, by) = input.first_jump(begin, most, until)?;
+        Some(Jump { drive, time, by, most })
+    })
+}
+
 /// Refuses commands of steppers that jump farther than a rotor follows, from where it begins on.
 fn commands(mechanism: &Mechanism, course: &Course) -> Result<()> {
-    for (number, (drive, input)) in mechanism.drives.iter().zip(&course.inputs).enumerate() {
-        let Some(most) = mechanism.farthest_jump(number) else { continue };
-        let begin = course.start.position[drive.shaft] / mechanism.angle_per_input(number);
-        if let Some((time, jump)) = input.first_jump(begin, most, course.until) {
-            return Err(Error::new(format!("the command of the stepper jumps by {jump} m at {time} s"))
+    match first_jump(mechanism, &course.inputs, &course.start, course.until) {
+        None => Ok(()),
+        Some(Jump { time, by, most, .. }) => {
+            Err(Error::new(format!("the command of the stepper jumps by {by} m at {time} s"))
                 .allowed(format!("up to {most} m at once, two full steps: a rotor does not follow more"))
-                .next("begin where the rotor is, and let the command grow"));
+                .next("begin where the rotor is, and let the command grow"))
         }
     }
-    Ok(())
 }
 
 /// Rejects an invalid state.

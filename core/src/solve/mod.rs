@@ -37,6 +37,7 @@ pub use sensitivity::{Begun, Differentiated, Sensitivities, Variable};
 pub use simulator::Simulator;
 
 pub use check::machine as check_stage;
+pub use check::{Jump, first_jump};
 
 use crate::error::{Error, Result};
 use crate::friction::Motion;

@@ -3,8 +3,7 @@
 use super::{Done, Tried};
 use crate::simulate::rows::{lost_steps, ties};
 use crate::simulate::{plain, time, value};
-use std::fmt::Write;
-use taut::control::{Deviation, DriveFigures, LoadFigures, sliding};
+use taut::control::{Deviation, DriveFigures, LoadFigures, MoveRun, sliding};
 use taut::design::{Design, FeedForwardModel, Structure};
 use taut::machine::rigid::Rigid;
 use taut::machine::{DriveUnit, EncoderPlace, Machine};
@@ -84,13 +83,6 @@ pub fn lines(tried: &Tried, done: &Done) -> Vec<(&'static str, String)> {
         Some(settling) => format!("{} after the profile, within {}", time(settling), length(done.motion.window)),
         None => format!("not within {} until the end", length(done.motion.window)),
     };
-    let is_stepper = machine.stepper().is_some();
-    let mut held = format!("{} of {} samples", run.samples.1, run.samples.0);
-    let is_limited =
-        |unit: &DriveUnit| unit.amplifier.voltage_limit.is_some() || unit.amplifier.current_limit.is_some();
-    if machine.drives.iter().any(is_limited) {
-        let _ = write!(held, "; the amplifier for {}", of_drives(&|drive| time(drive.amplifier_limited)));
-    }
     let mut lines = vec![
         (
             if figures.loads.len() == 1 { "cart error" } else { "error" },
@@ -102,26 +94,21 @@ pub fn lines(tried: &Tried, done: &Done) -> Vec<(&'static str, String)> {
         ("peak stretch", format!("{} in {} at {}", value(stretch.value, "m"), span(place), time(stretch.time))),
         ("peak force", format!("{} in {} at {}", value(force.value, "N"), span(force_place), time(force.time))),
         ("current", of_drives(&|drive| largest(drive.current, "A"))),
-        ("voltage", of_drives(&|drive| largest(drive.voltage, "V"))),
-        ("saturated", held),
-        (
-            "energy",
-            of_drives(&|drive| format!("{} in, {} back", value(drive.energy.0, "J"), value(drive.energy.1, "J"))),
-        ),
-        // The bound of a run holds without a controller, which answers to what rounding does.
-        (
-            "accuracy",
-            format!(
-                "not stated {}{}",
-                if is_stepper { "for a move" } else { "in closed loop" },
-                ties(&run.outcome.ties)
-            ),
-        ),
     ];
-    if is_stepper {
-        // It has no samples, and its phases have voltages of their own.
-        lines.retain(|(name, _)| !["voltage", "saturated", "energy"].contains(name));
-        lines.extend(lost_steps(&run.metrics, geometry).map(|words| ("lost steps", words)));
+    let accuracy = |whose: &str| format!("not stated {whose}{}", ties(&run.outcome.ties));
+    // A stepper has no samples, and its phases have voltages of their own.
+    match lost_steps(&run.metrics, geometry) {
+        Some(lost) => lines.extend([("accuracy", accuracy("for a move")), ("lost steps", lost)]),
+        None => lines.extend([
+            ("voltage", of_drives(&|drive| largest(drive.voltage, "V"))),
+            ("saturated", saturated(machine, run, &of_drives(&|drive| time(drive.amplifier_limited)))),
+            (
+                "energy",
+                of_drives(&|drive| format!("{} in, {} back", value(drive.energy.0, "J"), value(drive.energy.1, "J"))),
+            ),
+            // The bound of a run holds without a controller, which answers to what rounding does.
+            ("accuracy", accuracy("in closed loop")),
+        ]),
     }
     if let Some(contour) = &figures.contour {
         lines.insert(1, ("contour error", format!("{}, {} at the end", deviation(contour), length(contour.last))));
@@ -155,6 +142,17 @@ pub fn lines(tried: &Tried, done: &Done) -> Vec<(&'static str, String)> {
         lines.push(("spread", words));
     }
     lines
+}
+
+/// Samples at the limit of the command, and the time that amplifiers with limits are at theirs.
+fn saturated(machine: &Machine, run: &MoveRun, amplifiers: &str) -> String {
+    let is_limited =
+        |unit: &DriveUnit| unit.amplifier.voltage_limit.is_some() || unit.amplifier.current_limit.is_some();
+    let samples = format!("{} of {} samples", run.samples.1, run.samples.0);
+    match machine.drives.iter().any(is_limited) {
+        true => format!("{samples}; the amplifier for {amplifiers}"),
+        false => samples,
+    }
 }
 
 /// Words about each part: alone where there is one, with its name where there are several.

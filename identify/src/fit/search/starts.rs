@@ -243,8 +243,8 @@ fn told_beforehand(problem: &Problem, noise: &[(Quantity, f64)]) -> bool {
 /// A search of a problem from a point.
 type Descend<'d> = dyn FnMut(&mut Problem, &[f64], &Options) -> Minimum + 'd;
 
-/// The start values of the case, or those of a regression, or for a stepper of fits of their beginnings, or for a machine with several
-/// coordinates of fits in short windows: whichever fits the logs better.
+/// The start values of the case or those of a regression, for a stepper of fits of the beginnings of its logs, for a
+/// machine with several coordinates of fits in short windows: whichever fits the logs better.
 fn first_guess(case: &Case, plan: &Plan, problem: &mut Problem, descend: &mut Descend) -> Result<Vec<f64>> {
     let start = problem.start();
     let guess = match &problem.machine {
@@ -262,37 +262,48 @@ fn first_guess(case: &Case, plan: &Plan, problem: &mut Problem, descend: &mut De
 
 /// The start with what fits of the beginnings of the logs find, each longer than the one before.
 ///
-/// A rotor swings on its field, with the cart on its belt, at a frequency by holding torque and mass: with a wrong one it is
-/// soon out of phase with the log, and there is a minimum for each cycle. In a beginning of a cycle there is one.
-fn by_beginnings<'a>(
+/// A rotor swings on its field, with the cart on its belt, at a frequency by holding torque and mass: with a wrong one it
+/// is soon out of phase with the log, and there is a minimum for each cycle. In a beginning of a cycle there is one.
+fn by_beginnings(
     case: &Case,
     plan: &Plan,
-    problem: &mut Problem<'a>,
+    problem: &mut Problem,
     start: &[f64],
     descend: &mut Descend,
 ) -> Result<Vec<f64>> {
-    let rough =
-        Options { iterations: TRIAL_ITERATIONS, tolerance: ROUGH_TOLERANCE, evolutions: 0, ..Options::default() };
-    let (globals, mut guess) = (problem.globals(), start.to_vec());
+    let (plan, mut guess) = (Plan { until: None, ..plan.clone() }, start.to_vec());
     let end = problem.runs.iter().map(|run| run.time.last().copied().unwrap_or(0.0)).fold(0.0, f64::max);
     let modes = resonances(&problem.machine, Drive::Held, 0).unwrap_or_default();
     let slowest = modes.iter().map(|mode| mode.frequency).fold(f64::INFINITY, f64::min);
     let first = (FIRST_BEGINNING / slowest).max(end * SHORTEST_BEGINNING);
     for length in std::iter::successors(Some(first), |length| Some(2.0 * length)).take_while(|length| *length < end) {
-        let plan = Plan { until: None, ..plan.clone() };
-        let mut part = Problem::new(&beginning(case, length), &plan)?.stopped_by(problem.stop());
-        let mut first = part.start();
-        first[..globals].copy_from_slice(&guess[..globals]);
-        let found = descend(&mut part, &first, &rough);
-        problem.simulations += part.simulations;
+        improve(&beginning(case, length), &plan, problem, &mut guess, descend)?;
         if problem.is_stopped() {
             break;
         }
-        if found.ending != Ending::Failed {
-            guess[..globals].copy_from_slice(&found.x[..globals]);
-        }
     }
     Ok(guess)
+}
+
+/// A few steps of a rough search.
+fn rough() -> Options {
+    Options { iterations: TRIAL_ITERATIONS, tolerance: ROUGH_TOLERANCE, evolutions: 0, ..Options::default() }
+}
+
+/// Takes what concerns all runs of `guess` from a rough search for another case or plan, which begins at it; false, and
+/// nothing has changed, if that fails.
+fn improve(case: &Case, plan: &Plan, problem: &mut Problem, guess: &mut [f64], descend: &mut Descend) -> Result<bool> {
+    let globals = problem.globals();
+    let mut other = Problem::new(case, plan)?.stopped_by(problem.stop());
+    let mut first = other.start();
+    first[..globals].copy_from_slice(&guess[..globals]);
+    let found = descend(&mut other, &first, &rough());
+    problem.simulations += other.simulations;
+    let is_good = found.ending != Ending::Failed;
+    if is_good {
+        guess[..globals].copy_from_slice(&found.x[..globals]);
+    }
+    Ok(is_good)
 }
 
 /// A case with the first part of its logs, s.
@@ -339,8 +350,6 @@ fn in_windows(
     if plan.windows.is_some() || plan.closed_loop || globals == 0 {
         return Ok(None);
     }
-    let rough =
-        Options { iterations: TRIAL_ITERATIONS, tolerance: ROUGH_TOLERANCE, evolutions: 0, ..Options::default() };
     let total: f64 = problem.runs.iter().map(|run| run.time.last().copied().unwrap_or(0.0)).sum();
     let rows: usize = problem.runs.iter().map(|run| run.time.len()).sum();
     let (mut guess, mut best) = (start.to_vec(), None);
@@ -348,17 +357,11 @@ fn in_windows(
         if let Some(length) = length {
             let length = (length * total / rows as f64).max(total / MOST_START_WINDOWS);
             let windowed = Plan { windows: Some(length), ..plan.clone() };
-            let mut windowed = Problem::new(case, &windowed)?.stopped_by(problem.stop());
-            let mut first = windowed.start();
-            first[..globals].copy_from_slice(&guess[..globals]);
-            let found = descend(&mut windowed, &first, &rough);
-            problem.simulations += windowed.simulations;
-            if found.ending == Ending::Failed {
+            if !improve(case, &windowed, problem, &mut guess, descend)? {
                 break;
             }
-            guess[..globals].copy_from_slice(&found.x[..globals]);
         }
-        let found = descend(problem, &guess, &rough);
+        let found = descend(problem, &guess, &rough());
         // Two starts that lead to one minimum say that there is no other near.
         let agrees = best.as_ref().is_some_and(|best: &Minimum| (found.cost / best.cost - 1.0).abs() < SAME_MINIMUM);
         let is_better = best.as_ref().is_none_or(|best: &Minimum| found.cost < best.cost);
