@@ -296,11 +296,7 @@ impl Signal {
             Self::References { profiles, weights } => {
                 let mut sum = Part::held(0.0, f64::INFINITY);
                 for (profile, weight) in profiles.iter().zip(weights) {
-                    let (mut powers, mut end) = profile.piece(now.t);
-                    // A seam that is reached belongs to the piece that begins there.
-                    while now.reached(end) {
-                        (powers, end) = profile.piece(end.max(now.t).next_up());
-                    }
+                    let (powers, end) = now.piece_of(profile);
                     sum.end = sum.end.min(end);
                     sum.coefficients.iter_mut().zip(powers).for_each(|(sum, power)| *sum += weight * power);
                 }

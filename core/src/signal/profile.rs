@@ -216,6 +216,17 @@ fn moved(state: &[f64; 5], h: f64) -> [f64; 5] {
     next
 }
 
+/// A polynomial Σ c_k τᵏ in powers of a time that begins `by` earlier.
+fn earlier(mut coefficients: [f64; 5], by: f64) -> [f64; 5] {
+    for first in 0..coefficients.len() {
+        // Horner's rule, once for each power.
+        for k in (first..coefficients.len() - 1).rev() {
+            coefficients[k] -= by * coefficients[k + 1];
+        }
+    }
+    coefficients
+}
+
 /// One move of a chain, or a wait.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Leg<P = f64> {
@@ -473,8 +484,26 @@ impl Profile {
         }
     }
 
-    /// The position from `t` on as a polynomial Σ c_k (time − t)ᵏ, m, and until when it holds, s.
+    /// The position from `t` on as a polynomial Σ c_k (time − t)ᵏ, m, and until when it holds, s: later than `t` by more
+    /// than rounding.
     pub fn piece(&self, t: f64) -> ([f64; 5], f64) {
+        self.piece_beyond(t, 8.0 * f64::EPSILON * t.abs())
+    }
+
+    /// The same where seams up to `slack` (s) later than `t` are behind.
+    pub(super) fn piece_beyond(&self, t: f64, slack: f64) -> ([f64; 5], f64) {
+        let mut late = 0.0;
+        loop {
+            let (coefficients, until) = self.piece_at(t + late);
+            if until > t + slack {
+                return (earlier(coefficients, late), until);
+            }
+            // A seam is a sum and may lie before the time at which its piece is found: look farther, however small t is.
+            late = (until - t).max(2.0 * late).max(f64::EPSILON * t.abs()).max(slack).max(f64::MIN_POSITIVE);
+        }
+    }
+
+    fn piece_at(&self, t: f64) -> ([f64; 5], f64) {
         if self.shaper.is_empty() {
             return self.plain_piece(t);
         }

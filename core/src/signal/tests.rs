@@ -120,7 +120,7 @@ fn simple() -> impl Strategy<Value = Signal> {
     ]
 }
 
-/// Paths in a plane of a few legs and rests, of each order.
+/// Paths in a plane of a few legs and rests, of each order, some of them shaped.
 fn references() -> impl Strategy<Value = Signal> {
     let limits = (0.05..1.0, 0.5..20.0, prop::option::of((20.0..2000.0, prop::option::of(1e3..1e5))));
     let limits = limits.prop_map(|(speed, acceleration, more)| Limits {
@@ -132,9 +132,12 @@ fn references() -> impl Strategy<Value = Signal> {
     let place = || (-5i32..6).prop_map(|k| f64::from(k) * 0.02);
     let leg = (prop::option::weighted(0.7, (place(), place())), limits, 0.0..0.3_f64)
         .prop_map(|(to, limits, wait)| to.map_or(Leg::Wait(wait), |(x, y)| Leg::To(vec![x, y], limits)));
-    (prop::collection::vec(leg, 0..4), -1.0..1.0, -1.0..1.0).prop_map(|(legs, a, b)| Signal::References {
-        profiles: Profile::along(&[0.0, 0.0], &legs).unwrap(),
-        weights: vec![a, b],
+    let shaper = prop::option::of((0.0..0.2_f64, 0.0..1.0_f64));
+    let shaper = shaper.prop_map(|second| second.map_or(vec![], |(late, part)| vec![[0.0, 1.0 - part], [late, part]]));
+    (prop::collection::vec(leg, 0..4), shaper, -1.0..1.0, -1.0..1.0).prop_map(|(legs, shaper, a, b)| {
+        let profiles = Profile::along(&[0.0, 0.0], &legs).unwrap();
+        let profiles = profiles.into_iter().map(|profile| profile.shaped(&shaper)).collect();
+        Signal::References { profiles, weights: vec![a, b] }
     })
 }
 
