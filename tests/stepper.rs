@@ -26,6 +26,7 @@ struct Motor {
     supply: f64,
     chopper: bool,
     microsteps: f64,
+    interpolate: bool,
     detent: f64,
     rotor: f64,
 }
@@ -36,7 +37,7 @@ impl Motor {
         let drive = if self.chopper { "chopper" } else { "voltage" };
         format!(
             "[stepper]\nsteps_per_turn = {}\nholding_torque = {:e}\nrated_current = {:e}\nresistance = {:e}\n\
-             inductance = {:e}\nsupply = {:e}\ndrive = \"{drive}\"\nmicrosteps = {}\ndetent_torque = {:e}\n\
+             inductance = {:e}\nsupply = {:e}\ndrive = \"{drive}\"\nmicrosteps = {}\ninterpolate = {}\ndetent_torque = {:e}\n\
              rotor_inertia = {:e}\n",
             self.steps,
             self.holding,
@@ -45,6 +46,7 @@ impl Motor {
             self.inductance,
             self.supply,
             self.microsteps,
+            self.interpolate,
             self.detent,
             self.rotor,
         )
@@ -54,9 +56,15 @@ impl Motor {
         self.steps / 4.0
     }
 
-    /// Angle of a microstep.
-    fn microstep(&self) -> f64 {
-        2.0 * PI / (self.steps * self.microsteps)
+    /// Where the field goes for a commanded angle: to the nearest microstep, if the driver does not interpolate.
+    fn field(&self, told: f64) -> f64 {
+        let step = 2.0 * PI / (self.steps * self.microsteps);
+        if self.interpolate { told } else { (told / step).round() * step }
+    }
+
+    /// The time at which the command of a step of this length from `time` on is taken: one that moves, in its middle.
+    fn heard(&self, time: f64, h: f64) -> f64 {
+        time + if self.interpolate { 0.5 * h } else { 1e-12 }
     }
 
     /// Torque, and the rates of both currents, at an angle and a speed of the rotor and a commanded angle.
@@ -140,6 +148,7 @@ impl Axis {
             supply,
             chopper,
             microsteps: [1.0, 1.0, 2.0, 4.0, 8.0][(5.0 * between(0.0, 0.999)) as usize],
+            interpolate: between(0.0, 1.0) < 0.3,
             detent: holding * between(0.0, 0.06),
             rotor,
         };
@@ -181,17 +190,13 @@ impl Axis {
         )
     }
 
-    /// Commanded position as a whole number of microsteps, and the length of one.
-    fn microstep(&self, time: f64) -> f64 {
+    /// Position that the field is at, m.
+    fn told(&self, time: f64) -> f64 {
         let told = match time * self.frequency < 1.0 {
             true => self.amplitude * (1.0 - (2.0 * PI * self.frequency * time).cos()),
             false => 0.0,
         };
-        (told / self.length()).round()
-    }
-
-    fn length(&self) -> f64 {
-        self.motor.microstep() * self.radius
+        self.motor.field(told / self.radius) * self.radius
     }
 
     /// All that acts on the bodies but friction, and the rates of the currents.
@@ -236,7 +241,7 @@ impl Axis {
             0 => load[k].abs() <= self.coulomb[k],
             way => f64::from(way) * y[3 + k] >= 0.0,
         };
-        (0..3).all(|k| self.coulomb[k] == 0.0 || body(k)) && self.microstep(time) * self.length() == told
+        (0..3).all(|k| self.coulomb[k] == 0.0 || body(k)) && (self.motor.interpolate || self.told(time) == told)
     }
 
     /// Positions every millisecond, and when the rotor is half a tooth pitch off the field: times and pitches behind.
@@ -250,14 +255,14 @@ impl Axis {
         let (mut rows, mut slips) = (vec![[0.0; 3]], Vec::new());
         while time < self.until - 1e-9 {
             let end = (rows.len() as f64 * 1e-3).min(self.until);
-            let told = self.microstep(time + 1e-12) * self.length();
+            let mut h = STEP.min(end - time);
+            let told = self.told(self.motor.heard(time, h));
             for (k, motion) in motion.iter_mut().enumerate() {
                 let load = self.forces(&y, told).0[k];
                 if self.coulomb[k] > 0.0 && y[3 + k] == 0.0 {
                     *motion = if load.abs() <= self.coulomb[k] { 0 } else { load.signum() as i8 };
                 }
             }
-            let mut h = STEP.min(end - time);
             let mut next = self.step(&y, h, told, &motion);
             if !self.holds(&next, time + h, told, &motion) {
                 // Up to where it ceases to hold.
@@ -275,7 +280,7 @@ impl Axis {
                 }
             }
             (y, time) = (next, time + h);
-            let told = self.microstep(time + 1e-12) * self.length();
+            let told = self.told(time + 1e-12);
             let pitches = ((told / self.radius - y[0]) * self.motor.teeth() / (2.0 * PI)).round() as i32;
             if pitches != behind {
                 behind = pitches;
@@ -417,6 +422,7 @@ impl Plotter {
             supply: between(18.0, 36.0),
             chopper: true,
             microsteps: [2.0, 4.0, 8.0][(3.0 * between(0.0, 0.999)) as usize],
+            interpolate: between(0.0, 1.0) < 0.4,
             detent: holding * between(0.0, 0.05),
             rotor: holding * 1.2e-5,
         };
@@ -479,11 +485,10 @@ impl Plotter {
         from
     }
 
-    /// The commanded angles: motor A moves bridge and cart alike, motor B against each other, each in whole microsteps.
+    /// The angles of the fields: motor A moves bridge and cart alike, motor B against each other.
     fn told(&self, time: f64) -> [f64; 2] {
         let [x, y] = self.reference(time);
-        let step = self.motor.microstep();
-        [x + y, x - y].map(|belt| (belt / self.radius / step).round() * step)
+        [x + y, x - y].map(|belt| self.motor.field(belt / self.radius))
     }
 
     fn rate(&self, s: &Plane, told: [f64; 2]) -> Plane {
@@ -509,9 +514,10 @@ impl Plotter {
         s[8..].fill(self.motor.rated);
         let (mut time, mut rows) = (0.0, vec![[0.0; 2]]);
         while time < self.until - 1e-9 {
-            let (told, end) = (self.told(time + 1e-12), (rows.len() as f64 * 1e-3).min(self.until));
+            let end = (rows.len() as f64 * 1e-3).min(self.until);
             let mut h = STEP.min(end - time);
-            if self.told(time + h) != told {
+            let told = self.told(self.motor.heard(time, h));
+            if !self.motor.interpolate && self.told(time + h) != told {
                 let (mut low, mut high) = (0.0, h);
                 for _ in 0..40 {
                     let middle = 0.5 * (low + high);
@@ -560,7 +566,7 @@ fn drawn_plotters_with_steppers_follow_their_paths_as_their_phases_take_them() {
             let off = (0..2).map(|k| (columns[k][row] - other[k]).abs()).fold(0.0, f64::max);
             assert!(off < 5e-9, "{seed}: {off:.1e} m apart at {row} ms\n{text}");
         }
-        // Commanded minus reached, of whole microsteps.
+        // Commanded minus reached.
         let (told, end) = (plotter.told(plotter.until), others.last().unwrap());
         let asked = [told[0] + told[1], told[0] - told[1]].map(|sum| 0.5 * plotter.radius * sum);
         for (k, load) in run.metrics.loads.iter().enumerate() {

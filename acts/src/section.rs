@@ -19,28 +19,13 @@ const SHORTEST: f64 = 1e-12;
 /// Rows from `from` to `to`, s, so many as `points` says.
 pub fn section(request: &Request, context: &Context) -> Result<Reply> {
     let case = opened(request, context)?;
-    taut::case::needs_motors(&case.machine)?;
     runnable(&case)?;
     let number = |key: &str| request.number(key).ok_or_else(|| Error::new(format!("a section needs a number `{key}`")));
     let (from, to) = (number("from")?.max(0.0), number("to")?);
     let points = request.number("points").unwrap_or(1001.0).clamp(2.0, POINTS) as usize;
-    let (mechanism, inputs, start, (until, every)) = match &case {
-        case if case.is_axis() => {
-            let experiment = &case.experiments[chosen(request, case.experiments.len())?];
-            let mechanism = case.machine.mechanism();
-            let start = mechanism.begun(&experiment.initial);
-            (mechanism, vec![experiment.inputs[0].clone()], start, (experiment.until, experiment.every))
-        }
-        case => {
-            let experiment = &case.experiments[chosen(request, case.experiments.len())?];
-            (
-                case.machine.mechanism(),
-                experiment.inputs.to_vec(),
-                experiment.initial,
-                (experiment.until, experiment.every),
-            )
-        }
-    };
+    let experiment = &case.experiments[chosen(request, case.experiments.len())?];
+    let (mechanism, until) = (case.machine.mechanism(), experiment.until);
+    let start = mechanism.begun(&experiment.initial);
     let to = to.min(until);
     if to - from <= SHORTEST * to {
         let error = Error::new(format!("a section from {from} s to {to} s holds nothing"));
@@ -48,7 +33,7 @@ pub fn section(request: &Request, context: &Context) -> Result<Reply> {
     }
     let mut kept = Kept::new(&panels(&case, &mechanism.columns));
     let window = Window { from, to, points };
-    rows(&mechanism, (&inputs, &start), (&window, every), &mut kept, context)?;
+    rows(&mechanism, (&experiment.inputs, &start), (&window, experiment.every), &mut kept, context)?;
     let mut reply = Reply::of(json!({ "from": from, "to": to, "columns": kept.told() }));
     reply.columns = kept.columns;
     Ok(reply)

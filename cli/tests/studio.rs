@@ -474,6 +474,8 @@ fn a_section_goes_through_the_rows_of_the_run() {
         "stages/dual-belt/dual-belt.toml",
         "stages/printer-axis/printer-axis.toml",
         "stages/laser-gantry/laser-gantry.toml",
+        "stages/stepper-axis/stepper-axis.toml",
+        "stages/printer-core-xy/printer.toml",
     ];
     for case in cases {
         page.ask("run", json!({ "text": text(case) }));

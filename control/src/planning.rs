@@ -110,7 +110,8 @@ pub fn plan(case: &Case, places: &[usize], wanted: &Wanted, stop: &dyn Fn() -> b
             None => machines.push((machine, 1)),
         }
     }
-    let planner = Planner { design, family: &family, machines, modes: &modes, wanted, stop };
+    let machines = Machines { own: family.machine.clone(), all: machines };
+    let planner = Planner { design, family: &family, smooth: machines.smooth(), machines, modes: &modes, wanted, stop };
     let moves: Result<Vec<_>> = places.iter().map(|&place| planner.planned(&case.moves[place], place)).collect();
     let moves = moves?;
     Ok(Plans { family, modes, moves })
@@ -141,12 +142,35 @@ impl Plans {
     }
 }
 
+/// A machine and its family.
+#[derive(Clone, PartialEq)]
+struct Machines {
+    /// The machine of the file.
+    own: Machine,
+    /// The machines of the family that differ, and how many there are of each.
+    all: Vec<(Machine, usize)>,
+}
+
+impl Machines {
+    /// With drivers of steppers that interpolate: the edges of microsteps take most of the time of a search.
+    fn smooth(&self) -> Self {
+        let mut smooth = self.clone();
+        for machine in smooth.all.iter_mut().map(|(machine, _)| machine).chain([&mut smooth.own]) {
+            for unit in &mut machine.drives {
+                unit.motor.stepper.iter_mut().for_each(|stepper| stepper.interpolate = true);
+            }
+        }
+        smooth
+    }
+}
+
 /// Data shared by the plans of a case.
 struct Planner<'a> {
     design: &'a Design,
     family: &'a Family,
-    /// The machines of the family that differ, and how many there are of each.
-    machines: Vec<(Machine, usize)>,
+    machines: Machines,
+    /// The same as they are searched with.
+    smooth: Machines,
     modes: &'a [f64],
     wanted: &'a Wanted,
     stop: &'a dyn Fn() -> bool,
@@ -174,13 +198,16 @@ impl Planner<'_> {
             if (self.stop)() || is_run && best.rank() <= one.rank() {
                 break;
             }
-            one.arrival = self.arrival(motion, &way.within(&one.limits)?, true)?;
+            one.arrival = self.arrival(motion, &way.within(&one.limits)?, &self.smooth, true)?;
             if !is_run || one.rank() < best.rank() {
                 (best, is_run) = (one.clone(), true);
             }
         }
         let profiles = way.within(&best.limits)?;
-        let given = self.arrival(motion, &motion.profiles, true)?;
+        if self.smooth != self.machines {
+            best.arrival = self.arrival(motion, &profiles, &self.machines, true)?;
+        }
+        let given = self.arrival(motion, &motion.profiles, &self.machines, true)?;
         let is_sooner = short.is_empty() && Tried::rank_of(&given) <= best.rank();
         Ok(Planned {
             is_kept: is_sooner,
@@ -209,7 +236,7 @@ impl Planner<'_> {
                 let all =
                     |profiles: &[Profile]| self.loads(profiles, INSTANTS).iter().map(Load::share).fold(0.0, f64::max);
                 let Some(limits) = quickest.limits_for(way, periods, share, &all)? else { continue };
-                let arrival = self.arrival(motion, &way.within(&limits)?, false)?;
+                let arrival = self.arrival(motion, &way.within(&limits)?, &self.smooth, false)?;
                 tried.push(Tried { limits, periods, share, arrival });
             }
         }
@@ -219,15 +246,15 @@ impl Planner<'_> {
     /// Largest use of each limit by references with their shaper, over the family.
     fn loads(&self, profiles: &[Profile], instants: usize) -> Vec<Load> {
         let mut all: Vec<Load> = Vec::new();
-        for (machine, _) in &self.machines {
+        for (machine, _) in &self.machines.all {
             let own = loads(machine, self.design.limit, profiles, instants);
             own.into_iter().for_each(|load| load.join(&mut all));
         }
         all
     }
 
-    /// When the cart arrives, in closed loop.
-    fn arrival(&self, motion: &Move, profiles: &[Profile], whole: bool) -> Result<Arrival> {
+    /// When the cart arrives on the machine of the file, and if `whole` on all of its family.
+    fn arrival(&self, motion: &Move, profiles: &[Profile], machines: &Machines, whole: bool) -> Result<Arrival> {
         let watched = (motion.until - motion.end()).max(WATCHED);
         let rest = Profile::last_rest(&self.design.shaped(profiles));
         let run = |machine: &Machine| -> Result<MoveRun> {
@@ -243,7 +270,7 @@ impl Planner<'_> {
         };
         let end = Profile::last_end(profiles);
         let time = |run: &MoveRun| run.figures.settling.filter(|_| run.outcome.ending == Ending::Complete);
-        let own = run(&self.family.machine)?;
+        let own = run(&machines.own)?;
         let nominal = time(&own).map(|settling| end + settling);
         let mut arrival = Arrival {
             duration: end,
@@ -256,7 +283,7 @@ impl Planner<'_> {
         if whole {
             let mut worst = Some(0.0_f64);
             (arrival.settled, arrival.axes) = (0, 0);
-            for (machine, count) in &self.machines {
+            for (machine, count) in &machines.all {
                 if (self.stop)() {
                     worst = None;
                     break;

@@ -120,7 +120,10 @@ fn root() -> Properties {
         (
             "stepper",
             described(
-                table("stepper", &[("drive", words(["chopper", "voltage"]))]),
+                table(
+                    "stepper",
+                    &[("drive", words(["chopper", "voltage"])), ("interpolate", json!({ "type": "boolean" }))],
+                ),
                 "Instead of [motor] and [amplifier]: a stepper that follows a position",
             ),
         ),

@@ -36,12 +36,13 @@ pub(super) fn drive(root: &Table) -> Result<Option<DriveUnit>> {
             .next("give either [stepper], or [motor] and [amplifier]"));
     }
     let table = field.table()?;
-    table.check_keys(&["drive"], &[])?;
+    table.check_keys(&["drive", "interpolate"], &[])?;
     let stepper = Stepper {
         steps_per_turn: steps_per_turn(&table)?,
         rated_current: table.number("rated_current")?,
         detent_torque: table.number("detent_torque")?,
         microsteps: table.number("microsteps")?,
+        interpolate: table.optional("interpolate").map_or(Ok(false), |field| field.truth())?,
     };
     let drives = [("chopper", true), ("voltage", false)];
     let is_chopper = table.optional("drive").map_or(Ok(true), |field| field.choice(&drives))?;

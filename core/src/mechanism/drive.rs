@@ -61,6 +61,8 @@ pub struct Stepper {
     pub detent_torque: f64,
     /// Microsteps per full step.
     pub microsteps: f64,
+    /// True if the driver interpolates between microsteps: its field then follows the command without steps.
+    pub interpolate: bool,
 }
 
 impl Stepper {

@@ -148,10 +148,15 @@ impl Mechanism {
         self.drives[drive].amplifier.gain / self.bodies[self.drives[drive].pulley].kind.lever()
     }
 
-    /// The input of a microstep, m; none of a brushed motor.
+    /// The input of a microstep, m; none of a brushed motor, and where the driver interpolates.
     pub fn microstep(&self, drive: usize) -> Option<f64> {
-        let stepper = self.drives[drive].motor.stepper?;
+        let stepper = self.drives[drive].motor.stepper.filter(|stepper| !stepper.interpolate)?;
         Some(stepper.microstep() / self.angle_per_input(drive))
+    }
+
+    /// True if the command of a drive goes in microsteps.
+    pub fn is_stepped(&self) -> bool {
+        (0..self.drives.len()).any(|drive| self.microstep(drive).is_some())
     }
 
     /// The farthest that the command of a stepper may jump, m: two full steps, half a tooth pitch.

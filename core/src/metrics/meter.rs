@@ -250,8 +250,8 @@ impl Meter {
         }
         let (mechanism, mut state) = (self.machine.mechanism(), State::default());
         for (drive, command) in self.commands.iter().enumerate() {
-            let step = mechanism.microstep(drive).unwrap_or(f64::NAN);
-            let input = (command.value(self.end) / step).round() * step;
+            let command = command.value(self.end);
+            let input = mechanism.microstep(drive).map_or(command, |step| (command / step).round() * step);
             state.position[mechanism.drives[drive].pulley] = input * mechanism.angle_per_input(drive);
         }
         self.machine.by_drives(&state.position)

@@ -54,6 +54,19 @@ impl Piece {
     }
 }
 
+/// Coefficients in powers of (τ − `by`) of Σ c_k τᵏ: Horner's rule, again and again.
+pub(crate) fn shifted<const POWERS: usize>(coefficients: &[f64; POWERS], by: f64) -> [f64; POWERS] {
+    let mut shifted = *coefficients;
+    if by != 0.0 && coefficients[1..].iter().any(|&c| c != 0.0) {
+        for i in 0..POWERS - 1 {
+            for k in (i..POWERS - 1).rev() {
+                shifted[k] += by * shifted[k + 1];
+            }
+        }
+    }
+    shifted
+}
+
 impl Signal {
     /// The first jump, s and by how much, that is farther than `most` from `begin` on and before `until`.
     pub fn first_jump(&self, begin: f64, most: f64, until: f64) -> Option<(f64, f64)> {

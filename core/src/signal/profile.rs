@@ -10,6 +10,7 @@
 
 use super::arc::{Arc, Circle, Turn};
 pub use super::reference::{Limits, Reference};
+use super::shifted;
 use crate::error::{Error, Result};
 
 /// A move from rest to rest over some distance.
@@ -214,17 +215,6 @@ fn moved(state: &[f64; 5], h: f64) -> [f64; 5] {
         }
     }
     next
-}
-
-/// A polynomial Σ c_k τᵏ in powers of a time that begins `by` earlier.
-fn earlier(mut coefficients: [f64; 5], by: f64) -> [f64; 5] {
-    for first in 0..coefficients.len() {
-        // Horner's rule, once for each power.
-        for k in (first..coefficients.len() - 1).rev() {
-            coefficients[k] -= by * coefficients[k + 1];
-        }
-    }
-    coefficients
 }
 
 /// One move of a chain, or a wait.
@@ -496,7 +486,7 @@ impl Profile {
         loop {
             let (coefficients, until) = self.piece_at(t + late);
             if until > t + slack {
-                return (earlier(coefficients, late), until);
+                return (shifted(&coefficients, -late), until);
             }
             // A seam is a sum and may lie before the time at which its piece is found: look farther, however small t is.
             late = (until - t).max(2.0 * late).max(f64::EPSILON * t.abs()).max(slack).max(f64::MIN_POSITIVE);

@@ -2,7 +2,7 @@
 
 use super::roots::first_fall;
 use crate::mechanism::{DRIVES, Mechanism};
-use crate::signal::{DEGREE, Piece, Signal};
+use crate::signal::{DEGREE, Piece, Signal, shifted};
 
 /// One polynomial for each input, from `start` to `end`; what is not there is zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,22 +42,9 @@ impl Pieces {
         let by = time - self.start;
         let mut pieces = Self { start: time, ..*self };
         for coefficients in &mut pieces.coefficients {
-            *coefficients = Self::shifted(coefficients, by);
+            *coefficients = shifted(coefficients, by);
         }
         pieces
-    }
-
-    /// Coefficients in powers of (τ − `by`) of Σ c_k τᵏ: Horner's rule, again and again.
-    pub(super) fn shifted(coefficients: &[f64; DEGREE + 1], by: f64) -> [f64; DEGREE + 1] {
-        let mut shifted = *coefficients;
-        if by != 0.0 && coefficients[1..].iter().any(|&c| c != 0.0) {
-            for i in 0..DEGREE {
-                for k in (i..DEGREE).rev() {
-                    shifted[k] += by * shifted[k + 1];
-                }
-            }
-        }
-        shifted
     }
 
     /// These pieces with one input rounded to a multiple of `step`, as by a driver of microsteps, up to the time at
@@ -119,7 +106,7 @@ fn first_beyond(powers: &[f64; DEGREE + 1], level: f64, side: f64, within: std::
         return None;
     }
     // Remainder up to the level, over the fraction of `within`.
-    let mut left = Pieces::shifted(powers, within.start);
+    let mut left = shifted(powers, within.start);
     left[0] -= level;
     let mut scale = -side;
     for power in &mut left {

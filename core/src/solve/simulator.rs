@@ -8,7 +8,7 @@ use super::{Ending, Event, PositionError, Solver, check, general};
 use crate::error::{Error, Result};
 use crate::machine::Machine;
 use crate::mechanism::{DRIVES, Heading, Layout, Mechanism, Mode, State};
-use crate::signal::{DEGREE, Piece};
+use crate::signal::{DEGREE, Piece, shifted};
 use std::sync::Arc;
 
 /// Default interval for which steps are computed fastest, s, as are its halves, quarters and so on.
@@ -126,7 +126,7 @@ impl Simulator {
         }
         let pieces = self.inputs.since(now);
         self.inputs = pieces;
-        self.inputs.coefficients[drive] = Pieces::shifted(&piece.coefficients, now - piece.start);
+        self.inputs.coefficients[drive] = shifted(&piece.coefficients, now - piece.start);
         self.is_set = true;
         Ok(())
     }
@@ -134,7 +134,7 @@ impl Simulator {
     /// Advances to `until`, s, and appends the events to `events`. Returns an early ending, after which the machine
     /// stays at the time it reached.
     pub fn advance(&mut self, until: f64, events: &mut Vec<Event>) -> std::result::Result<(), Ending> {
-        if self.mechanism().drives.iter().any(|drive| drive.motor.stepper.is_some()) {
+        if self.mechanism().is_stepped() {
             return self.advance_in_microsteps(until, events);
         }
         if std::mem::take(&mut self.is_set) {

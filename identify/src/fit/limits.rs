@@ -1012,9 +1012,10 @@ pub(crate) const CAUSE_EXPLAINS: f64 = 0.02;
 /// Unit: standard errors of its size. Source: chosen. Test: `the_right_model_lacks_nothing`.
 pub(crate) const CAUSE_ERRORS: f64 = 4.0;
 
-/// Share of the squared residuals from which on an element is a warning.
+/// Share of the squared residuals from which on an element that the model lacks is a warning, known or not.
 ///
-/// Unit: 1. Source: chosen: 0.8 of the residuals are left. Test: `a_missing_spring_is_named`.
+/// Unit: 1. Source: chosen: 0.8 of the residuals are left. Tests: `a_missing_spring_is_named` and
+/// `what_a_gantry_lacks_is_a_warning`.
 pub(crate) const CAUSE_WARNS: f64 = 0.36;
 
 /// Most values of logs for which elements are tried.

@@ -39,8 +39,8 @@ pub fn controller(design: &Design, machine: &Machine) -> String {
     if !design.shaper.is_empty() {
         words.push(format!("shaper of {} impulses", design.shaper.len()));
     }
-    if machine.stepper().is_some() {
-        words.push("commanded in microsteps".into());
+    if let Some(stepper) = machine.stepper() {
+        words.push(if stepper.interpolate { "commanded" } else { "commanded in microsteps" }.into());
         return words.join(", ");
     }
     let timing = format!("every {}", time(design.every));

@@ -6,6 +6,7 @@
 //! series along which guards are searched for their first fall, so that two crossings within a step are detected. A
 //! step with an event is repeated up to the event.
 
+mod bristles;
 mod change;
 mod dynamics;
 mod fall;
@@ -13,6 +14,7 @@ mod field;
 mod linear;
 mod model;
 mod newton;
+mod quartic;
 mod radau;
 mod rows;
 mod run;

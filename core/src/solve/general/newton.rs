@@ -1,9 +1,9 @@
 //! Newton's method for the forces of a step: (I − f′ W) δ = f(v) − f.
 
+use super::bristles::Bristles;
 use super::field::Field;
 use super::linear::Set;
 use super::radau::{Lane, NODES, POINTS};
-use super::sources::Bristles;
 
 /// The parted matrix of Newton's method, and the length of the step that it is of.
 #[derive(Clone, Default)]

@@ -14,6 +14,9 @@ pub(super) const POINTS: usize = NODES + 1;
 /// One number for each node.
 pub(super) type Lane = [f64; NODES];
 
+/// Derivatives of a force at each node with respect to an argument at each node.
+pub(super) type Slopes = [Lane; NODES];
+
 /// Zeros of P₄(2s − 1) − P₃(2s − 1), P being Legendre's polynomials.
 pub(super) const C: Lane = [0.088_587_959_512_703_95, 0.409_466_864_440_734_7, 0.787_659_461_760_847, 1.0];
 

@@ -1,17 +1,9 @@
 //! The nonlinear forces of a mode: of friction laws, and of springs that follow the bodies.
-//!
-//! Bristles are solved at the nodes of a step together with their force. With a_i = σ₀ |v_i|/g(v_i) and the matrix R
-//! that integrates a polynomial to the nodes, ż = v − a z is a linear system for the deflections there, whatever a is:
-//!
-//! ```text
-//! z_i + h Σ_j R_ij a_j z_j = z₀ + h Σ_j R_ij v_j
-//! ```
-//!
-//! If bristles slip within a step, R is Radau's: z follows g(v) without oscillation. If they bend, the rate at the
-//! beginning is a fifth value, which makes its quartic as accurate as that of the force.
 
+use super::bristles::{Bent, Bristles, STIFF};
 use super::model::{Curved, Model, Phased, Sliding, Vector};
-use super::radau::{BACKWARD, C, FOUND, Lane, NODES, PLACES, POINTS, QUARTIC, RADAU, SLOPES, monomials, rest};
+use super::quartic::{AT_KINK, course, crossing, has_slowest, passes, places, polynomial, spread};
+use super::radau::{BACKWARD, C, FOUND, Lane, NODES, POINTS, Slopes, monomials, rest};
 use crate::friction::{Law, Motion, Side};
 use crate::mechanism::{BODIES, DRIVES, PhaseRate, SPRINGS};
 
@@ -56,12 +48,6 @@ pub(super) struct Phasing {
     pub(super) told: usize,
 }
 
-/// A step that begins this near a kink, as a share of how far it goes from there, begins at it.
-const AT_KINK: f64 = 1e-8;
-
-/// Number of parts of the interval between two nodes in which a quartic is examined for a change of sign.
-const PARTS: usize = 4;
-
 /// Deviations of a force below this share of it are rounding, and so near to a node ω counts as this much: a tenth of its
 /// largest value between the first two.
 const ROUNDING: f64 = 1e-13;
@@ -69,28 +55,6 @@ const LEAST_REST: f64 = 5e-5;
 
 /// A speed that changes by less than this share of the width of its curve within a step shows all of it at the nodes.
 const NARROW: f64 = 0.25;
-
-/// Halvings of a part of a step in which such a place is found. Near its least value a speed hardly changes.
-const HALVINGS: usize = 12;
-
-/// Bristles that slip by more than this share of their deflection within a step are stiff.
-const STIFF: f64 = 2.0;
-
-/// The bristles of a body in a step.
-#[derive(Clone, Copy, Default)]
-pub(super) struct Bristle {
-    /// Their deflections at the nodes.
-    pub(super) bent: Lane,
-    /// ż at the beginning.
-    rate: f64,
-    is_stiff: bool,
-}
-
-/// Bristles of all bodies.
-pub(super) type Bristles = [Bristle; crate::mechanism::BODIES];
-
-/// Derivatives of a force at each node with respect to an argument at each node.
-pub(super) type Slopes = [Lane; NODES];
 
 impl Source {
     /// Force of a spring; its arguments are its elongation and the coordinates of the bodies that it follows.
@@ -423,36 +387,6 @@ impl Phasing {
     }
 }
 
-/// Σ c_k sᵏ.
-#[inline(always)]
-fn polynomial(powers: &[f64; POINTS], s: f64) -> f64 {
-    powers.iter().rev().fold(0.0, |sum, power| sum * s + power)
-}
-
-/// True if a speed with these values at the points of a step can be slowest between two of them: it does not grow or fall
-/// all the way, nor at its ends.
-#[inline(always)]
-fn has_slowest(speeds: &[f64; POINTS]) -> bool {
-    let slope = |weights: &[f64; POINTS]| weights.iter().zip(speeds).fold(0.0, |sum, (weight, v)| sum + weight * v);
-    let (begin, end) = (slope(&SLOPES[0]), slope(&SLOPES[1]));
-    let mut changes = speeds.windows(2).map(|pair| pair[1] - pair[0]).chain([begin, end]);
-    !(changes.clone().all(|change| change >= 0.0) || changes.all(|change| change <= 0.0))
-}
-
-/// The largest difference of two values.
-#[inline(always)]
-fn spread(values: &[f64; POINTS]) -> f64 {
-    let (least, most) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, m), v| (l.min(*v), m.max(*v)));
-    most - least
-}
-
-/// True if |v| passes `width` between two points of a step.
-#[inline(always)]
-fn passes(speeds: &[f64; POINTS], width: f64) -> bool {
-    let below = speeds.map(|v| v.abs() < width);
-    below.contains(&true) && below.contains(&false)
-}
-
 /// The worst deviation of a friction force from the quartic through its points, where its body is slowest and, if
 /// a width is given, where its speed is that, and by it D of the deviation D ω(s).
 #[cold]
@@ -513,161 +447,9 @@ fn missed_by(
     worst
 }
 
-/// Calls `each` with every share of a step at which `is` changes, and its value after that.
-fn places(is: impl Fn(f64) -> bool, mut each: impl FnMut(f64, bool)) {
-    const COUNT: usize = NODES * PARTS;
-    let mut before = (0.0, is(0.0));
-    for part in 1..=COUNT {
-        let s = part as f64 / COUNT as f64;
-        let (mut low, mut high, now) = (before.0, s, is(s));
-        if now != before.1 {
-            for _ in 0..HALVINGS {
-                let middle = 0.5 * (low + high);
-                if is(middle) == now { high = middle } else { low = middle }
-            }
-            each(0.5 * (low + high), now);
-        }
-        before = (s, now);
-    }
-}
-
-/// An argument at the points of a step.
-#[inline(always)]
-fn course(begin: f64, [a, b, c, d]: &Lane) -> [f64; POINTS] {
-    [begin, *a, *b, *c, *d]
-}
-
-/// The share of a step at which a quartic through these values first changes its sign, also between two nodes and back,
-/// if it goes farther than `negligible` from zero, and not where it begins.
-#[inline(always)]
-fn crossing(values: &[f64; POINTS], negligible: f64) -> Option<f64> {
-    let farthest = values.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
-    if farthest <= negligible || stays_on_its_side(values) {
-        return None;
-    }
-    let powers = monomials(values);
-    let at = |s: f64| powers.iter().rev().fold(0.0, |sum, power| sum * s + power);
-    let between = (0..NODES).flat_map(|pair| {
-        let (begin, length) = (PLACES[pair], PLACES[pair + 1] - PLACES[pair]);
-        (0..PARTS).map(move |part| (pair, part, begin + length * part as f64 / PARTS as f64))
-    });
-    let places = between.map(|(pair, part, s)| (s, if part == 0 { values[pair] } else { at(s) }));
-    // If it begins at zero, it has no sign yet.
-    let mut places = places.chain([(1.0, values[NODES])]).skip_while(|(_, value)| value.abs() <= AT_KINK * farthest);
-    let (mut low, side) = places.next()?;
-    for (mut high, value) in places {
-        if value * side >= 0.0 {
-            low = high;
-            continue;
-        }
-        for _ in 0..52 {
-            let middle = 0.5 * (low + high);
-            if at(middle) * side > 0.0 { low = middle } else { high = middle }
-        }
-        return Some(0.5 * (low + high));
-    }
-    None
-}
-
-/// True if a quartic through these values surely keeps their sign: it goes beyond them by less than they differ.
-#[inline(always)]
-fn stays_on_its_side(values: &[f64; POINTS]) -> bool {
-    let (least, most) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, m), v| (l.min(*v), m.max(*v)));
-    most - least < least.max(-most)
-}
-
-/// The matrix of the deflections at the nodes, I + h R diag(a), parted in two triangles.
-struct Bent {
-    parts: Slopes,
-    order: [usize; NODES],
-    is_stiff: bool,
-}
-
-impl Bent {
-    fn new(h: f64, laws: &[Sliding; NODES], is_stiff: bool) -> Self {
-        let mut parts: Slopes = std::array::from_fn(|i| {
-            std::array::from_fn(|j| h * weight(is_stiff, i, j) * laws[j].slip + if i == j { 1.0 } else { 0.0 })
-        });
-        let order = decompose(&mut parts);
-        Self { parts, order, is_stiff }
-    }
-
-    fn solve(&self, right: &Lane) -> Lane {
-        let mut x: Lane = self.order.map(|row| right[row]);
-        for i in 1..NODES {
-            for j in 0..i {
-                x[i] -= self.parts[i][j] * x[j];
-            }
-        }
-        for i in (0..NODES).rev() {
-            for j in i + 1..NODES {
-                x[i] -= self.parts[i][j] * x[j];
-            }
-            x[i] /= self.parts[i][i];
-        }
-        x
-    }
-
-    fn deflections(&self, h: f64, begin: f64, rate: f64, v: &Lane) -> Lane {
-        let right = |i: usize| {
-            let known = if self.is_stiff { 0.0 } else { QUARTIC[i][0] * rate };
-            begin + h * v.iter().enumerate().fold(known, |sum, (j, v)| sum + weight(self.is_stiff, i, j) * v)
-        };
-        self.solve(&std::array::from_fn(right))
-    }
-
-    /// Slopes of the force if the rate of the bristles at node q changes by `by`(q) in addition to the effect of their
-    /// deflection; `direct` is true if b v changes, too.
-    fn slopes(
-        &self,
-        h: f64,
-        curved: &Curved,
-        laws: &[Sliding; NODES],
-        by: impl Fn(usize) -> f64,
-        direct: f64,
-    ) -> Slopes {
-        let Law::LuGre { stiffness, damping, .. } = curved.friction.law else { return [[0.0; NODES]; NODES] };
-        let mut slopes = [[0.0; NODES]; NODES];
-        for q in 0..NODES {
-            let by = by(q);
-            let bent = self.solve(&std::array::from_fn(|i| h * weight(self.is_stiff, i, q) * by));
-            for (i, slopes) in slopes.iter_mut().enumerate() {
-                let own = if i == q { by } else { 0.0 };
-                let rate = own - laws[i].slip * bent[i];
-                slopes[q] = stiffness * bent[i] + damping * rate + if i == q { direct * laws[i].slope } else { 0.0 };
-            }
-        }
-        slopes
-    }
-}
-
-/// Deflection at node i by a rate at node j.
-#[inline(always)]
-fn weight(is_stiff: bool, i: usize, j: usize) -> f64 {
-    if is_stiff { RADAU[i][j] } else { QUARTIC[i][j + 1] }
-}
-
-/// Parts a matrix in two triangles with exchange of rows; what was where.
-fn decompose(matrix: &mut Slopes) -> [usize; NODES] {
-    let mut order: [usize; NODES] = std::array::from_fn(|i| i);
-    for k in 0..NODES {
-        let best = (k..NODES).fold(k, |best, i| if matrix[i][k].abs() > matrix[best][k].abs() { i } else { best });
-        matrix.swap(k, best);
-        order.swap(k, best);
-        let lead = matrix[k];
-        for row in &mut matrix[k + 1..] {
-            let factor = row[k] / lead[k];
-            row[k] = factor;
-            for (own, lead) in row[k + 1..].iter_mut().zip(&lead[k + 1..]) {
-                *own -= factor * lead;
-            }
-        }
-    }
-    order
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::bristles::Bristle;
     use super::*;
     use crate::friction::{Friction, Shape};
     use crate::mechanism::{BODIES, Body, Follows, Kind, Label, Layout, Mechanism, Spring, SpringLaw};

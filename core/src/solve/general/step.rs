@@ -18,12 +18,13 @@
 //! make this very small at the end of the step. Errors at the nodes count, too, since they act as forces, and rows may
 //! be there. A first step is judged by the cubics through the nodes alone.
 
+use super::bristles::{Bristle, Bristles};
 use super::field::Field;
 use super::linear::{Forcing, STATES, Series, Set, States};
 use super::model::{MOST, MOST_GUARDS, Vector};
 use super::newton::Newton;
 use super::radau::{BACKWARD, C, FOUND, Lane, MONOMIALS, NODES, POINTS, POWER, POWERS, rest};
-use super::sources::{Bristle, Bristles, SOURCES};
+use super::sources::SOURCES;
 use crate::mechanism::{BODIES, DRIVES, SPRINGS};
 use crate::signal::DEGREE;
 

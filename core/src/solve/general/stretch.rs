@@ -2,7 +2,7 @@
 
 use super::step::Inputs;
 use crate::mechanism::DRIVES;
-use crate::signal::DEGREE;
+use crate::signal::{DEGREE, shifted};
 use crate::solve::inputs::Pieces;
 
 /// One piece of the inputs.
@@ -48,7 +48,7 @@ impl Stretch {
             return inputs;
         }
         for (own, coefficients) in inputs.iter_mut().zip(&self.pieces.coefficients) {
-            *own = Pieces::shifted(coefficients, tau);
+            *own = shifted(coefficients, tau);
             let mut power = 1.0;
             for value in own.iter_mut() {
                 *value *= power;

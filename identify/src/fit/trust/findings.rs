@@ -134,17 +134,18 @@ fn of_noise(found: &Searched) -> Option<Finding> {
         return None;
     }
     let noise = problem.noise();
-    let beyond = |(quantity, deviation): &(Quantity, f64)| {
-        let times = deviation / noise.of(*quantity);
-        (times > MORE_THAN_NOISE).then(|| format!("{} {} times", quantity.name(), significant(times, 2)))
-    };
-    let beyond: Vec<String> = found.noise.iter().filter_map(beyond).collect();
+    let times = |(quantity, deviation): &(Quantity, f64)| (*quantity, deviation / noise.of(*quantity));
+    let beyond: Vec<(Quantity, f64)> = found.noise.iter().map(times).filter(|(_, t)| *t > MORE_THAN_NOISE).collect();
+    let named = |(quantity, times): &(Quantity, f64)| format!("{} {} times", quantity.name(), significant(*times, 2));
     let text = format!(
         "residuals exceed the noise of the logs ({}): the model lacks something, or the search ended in one of \
          several minima; try starts = 8 in [fit], or begin with values nearer to the machine's",
-        beyond.join(", ")
+        beyond.iter().map(named).collect::<Vec<_>>().join(", ")
     );
-    (!beyond.is_empty()).then(|| finding(Grade::Note, "noise", text))
+    // The share of the squared residuals that noise does not explain: 1 − σ²/σ_e².
+    let unexplained = beyond.iter().map(|(_, times)| 1.0 - times.powi(-2)).fold(0.0, f64::max);
+    let grade = if unexplained >= CAUSE_WARNS { Grade::Warning } else { Grade::Note };
+    (!beyond.is_empty()).then(|| finding(grade, "noise", text))
 }
 
 /// Findings about the end of the search.
