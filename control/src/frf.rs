@@ -24,8 +24,8 @@
 //! others and has no point. Logs that do not tell all inputs apart each by itself, as those of motors that were moved
 //! one after the other, are taken together.
 //!
-//! A window smears: a sum over segments is that of the spectrum about a line, (2/3, 1/6, 1/6) of it from the line and its
-//! neighbours under Hann's. Where the input's spectrum rises within that, as Σ U R* does in closed loop towards low
+//! A window smears: a sum over segments is that of the spectrum about a line, (2/3, 1/6, 1/6) of it from the line and
+//! its neighbours under Hann's. Where the input's spectrum rises within that, as Σ U R* does in closed loop towards low
 //! frequencies, G would be off by 2 G′ Φ′/(6 Φ) of the lines' distance; so both sums are taken less a sixth of their
 //! second difference, which makes the window's second moment zero and E|ΔG|² 1.44 times as large.
 //!

@@ -194,9 +194,9 @@ impl Learned {
     }
 }
 
-/// The next signal of a move from its last repetition, in which `before` was added to the command of each drive. Errors:
-/// a log that does not cover the move, a controller that is not linear, a loop that is unstable on a machine of the
-/// family, a family on which learning would not converge.
+/// The next signal of a move from its last repetition, in which `before` was added to the command of each drive.
+/// Errors: a log that does not cover the move, a controller that is not linear, a loop that is unstable on a machine of
+/// the family, a family on which learning would not converge.
 pub fn learn(
     case: &Case,
     motion: &Move,

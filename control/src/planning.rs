@@ -1,6 +1,6 @@
-//! The fastest move of a machine: speed, acceleration and jerk that its limits allow, with jerk times on the zeros of the
-//! belt's modes, chosen by how soon the cart stays in its window over a family of machines. The limits themselves are those of
-//! [`Quickest`].
+//! The fastest move of a machine: speed, acceleration and jerk that its limits allow, with jerk times on the zeros of
+//! the belt's modes, chosen by how soon the cart stays in its window over a family of machines. [`Quickest`] defines
+//! the limits.
 
 use crate::case::{Case, Files, Move};
 use crate::control::{MoveRun, Setup, closed_loop};
@@ -78,8 +78,7 @@ pub struct Planned {
     pub references: Vec<Profile>,
     /// Use of each limit of the machine, worst case over the family.
     pub loads: Vec<Load>,
-    /// The least time in which the rigid axis could do it within voltage and current, s; none where nothing limits it, and
-    /// of a machine with several drives.
+    /// Minimum time of the rigid axis within voltage and current, s; none if nothing limits it, or with several drives.
     pub bound: Option<f64>,
     /// All plans that were tried, in order.
     pub tried: Vec<Tried>,
@@ -117,7 +116,8 @@ pub fn plan(case: &Case, places: &[usize], wanted: &Wanted, stop: &dyn Fn() -> b
 }
 
 impl Plans {
-    /// The text of the case with the planned limits, its remarks left alone but for moves that have a plan in the file; `name` stands in messages.
+    /// The case text with the planned limits; comments are kept except in moves that have a plan in the file. `name` is
+    /// used in messages.
     pub fn case_text(&self, case: &Case, name: &Path) -> Result<String> {
         let mut changes = Vec::new();
         let is_written = |planned: &&Planned| !planned.is_kept && !case.moves[planned.place].is_planned;

@@ -81,8 +81,8 @@ impl Machine {
         self.slide(number).map_or(0.0, |slide| slide.constant_force_with(self.sliding_mass(number)))
     }
 
-    /// Force at the belt that moves the slide of this number from rest at `position` (m), and all that turns with it, N;
-    /// the sign of `side` is the direction.
+    /// Force at the belt that moves the slide of this number from rest at `position` (m), and all that turns with it,
+    /// N; the sign of `side` is the direction.
     pub fn breakaway(&self, number: usize, side: f64, position: f64) -> f64 {
         let Some(slide) = self.slide(number) else { return 0.0 };
         let forward = |sign: f64| side * sign > 0.0;

@@ -72,7 +72,7 @@ impl Polyline {
         }
     }
 
-    /// The size of the terms that the value of a piece where x is 0 is a difference of, with the rounding of the points'
+    /// Magnitude of the terms whose difference is the value of a piece at x = 0, including the rounding of the points'
     /// distance: 2 (|y₀ x₁| + |y₁ x₀|)/(x₁ − x₀).
     pub(crate) fn size_of_constant(&self, piece: usize) -> f64 {
         match (piece.checked_sub(1).and_then(|i| self.points.get(i)), self.points.get(piece)) {

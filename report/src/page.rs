@@ -433,8 +433,8 @@ fn words(text: impl Render) -> Markup {
     PreEscaped(together::numbers_and_units(&text.render().into_string()))
 }
 
-/// The styles of a page's body within an element of the class `report`, and the palette; `data-theme` of the root, which
-/// is `light` or `dark`, goes before the system's theme.
+/// The styles of a page's body within an element of the class `report`, and the palette; `data-theme` of the root,
+/// which is `light` or `dark`, goes before the system's theme.
 pub fn style() -> String {
     let palette = format!(
         ":root{{{0}}}@media screen and (prefers-color-scheme:dark){{:root:not([data-theme=light]){{{1}}}}}\

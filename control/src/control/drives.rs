@@ -12,9 +12,9 @@
 //! | Beckhoff AX8000 3140:07, TwinCAT CNC P-AXIS-00391 | load inertia | kg m² | M (r/n)² less the rotor's; with it |
 //!
 //! Sources: docs.wpilib.org, "Feedforward Control in WPILib": V = kS sgn v + kV v + kA a. LinuxCNC, pid(9): FF1, FF2,
-//! FF3 times the first three derivatives of the command. ODrive's firmware, velocity ramp of
-//! the controller: the torque is `inertia` times the change of the speed in turn/s per second, in N m. Beckhoff Information System, AX8xxx object 3140:07 "Load
-//! inertia/mass", TF5200 P-AXIS-00391 "Load inertia": the total at the motor shaft.
+//! FF3 times the first three derivatives of the command. ODrive's firmware, velocity ramp of the controller: the torque
+//! is `inertia` times the change of the speed in turn/s per second, in N m. Beckhoff Information System, AX8xxx object
+//! 3140:07 "Load inertia/mass", TF5200 P-AXIS-00391 "Load inertia": the total at the motor shaft.
 
 use crate::machine::rigid::Rigid;
 use crate::machine::{AmplifierMode, Machine};

@@ -6,8 +6,8 @@ use crate::signal::profile::Profile;
 /// Share of the way out that a load has to go at least, or it has not made a move that returns.
 const MADE: f64 = 0.5;
 
-/// True if a load that goes as far as `reached` from its start, m, makes the move of its reference. A move that returns to
-/// its start ends at its target without any motion, too: it is made by going half of the way out at least.
+/// True if a load that goes as far as `reached` from its start, m, makes the move of its reference. A move that returns
+/// to its start ends at its target without any motion, too: it is made by going half of the way out at least.
 pub(super) fn is_made(profile: &Profile, window: f64, reached: f64) -> bool {
     let out = profile.excursion();
     let returns = (profile.target() - profile.start()).abs() <= window;
@@ -33,8 +33,8 @@ pub struct Figures {
     pub loads: Vec<LoadFigures>,
     /// Of the drives.
     pub drives: Vec<DriveFigures>,
-    /// Distance from the path, to its left above zero, of a machine with two coordinates. Exact where the nearest leg is
-    /// the same for a while; about corners its peak is sought between nine places of each piece of the motion.
+    /// Distance from the path, to its left above zero, of a machine with two coordinates. Exact where the nearest leg
+    /// is the same for a while; about corners its peak is sought between nine places of each piece of the motion.
     pub contour: Option<Deviation>,
     /// From the end of the profile, a shaper apart, until all that slides stays within the window around its target, s;
     /// none if it does not, or if the move returns to its start and it does not go half of the way out.
@@ -77,8 +77,8 @@ pub struct LoadFigures {
 /// Key figures of a drive.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct DriveFigures {
-    /// r φ − y: its pulley from the reference of its part of the belt. A controller that makes up for the belt's stretch
-    /// means part of it.
+    /// r φ − y: its pulley from the reference of its part of the belt. A controller that compensates for the belt's
+    /// elongation causes part of it on purpose.
     pub following: Deviation,
     /// Motor current: largest and root mean square, A.
     pub current: (Peak, f64),

@@ -68,9 +68,9 @@ pub fn each(controllers: &mut [Standard]) -> Vec<&mut dyn Controller> {
     controllers.iter_mut().map(|controller| controller as &mut dyn Controller).collect()
 }
 
-/// The same as [`closed_loop`] of a search that runs it a thousand times, with controllers and shaped profiles that are made once: of the
-/// figures the error of what slides, settling and the root mean square of the current, equal to those of [`closed_loop`]
-/// (root mean squares to rounding, the others to the last bit), and how it ended.
+/// The same as [`closed_loop`] of a search that runs it a thousand times, with controllers and shaped profiles that are
+/// made once: of the figures the error of what slides, settling and the root mean square of the current, equal to those
+/// of [`closed_loop`] (root mean squares to rounding, the others to the last bit), and how it ended.
 pub fn closed_loop_briefly(
     machine: &Machine,
     controllers: &mut [&mut dyn Controller],

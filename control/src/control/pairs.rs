@@ -1,6 +1,6 @@
-//! Pairs of shapers: one behind the other, which convolves their impulses. What they leave of a vibration is the product
-//! of what each leaves, so that a pair takes two modes, or the two ends of what one mode goes through along the travel,
-//! where one shaper would have to be long to cover both.
+//! Pairs of shapers: one behind the other, which convolves their impulses. What they leave of a vibration is the
+//! product of what each leaves, so that a pair takes two modes, or the two ends of what one mode goes through along the
+//! travel, where one shaper would have to be long to cover both.
 //!
 //! W. Singhose, E. Crain, W. Seering, "Convolved and simultaneous two-mode input shapers", *IEE Proceedings - Control
 //! Theory and Applications* 144 (1997) 515-520.
@@ -131,8 +131,8 @@ fn pair(one: &Shaper, other: &Shaper, vibration: f64, criterion: &Criterion) -> 
     Some(Pair { parts, vibration, smoothing, max_acceleration, score: score(smoothing, vibration) })
 }
 
-/// The best pair of two forms, by the rule for single ones: of those that leave hardly more than the least vibration the
-/// one with the best score. Each is looked for on a grid, and moved from there.
+/// The best pair of two forms, by the rule for single ones: of those that leave hardly more than the least vibration
+/// the one with the best score. Each is looked for on a grid, and moved from there.
 fn best(target: Target, criterion: &Criterion, one: &Tabled, other: &Tabled) -> Option<Pair> {
     let mut on_grid: Vec<Pair> = Vec::new();
     for (a, left) in &one.shapers {

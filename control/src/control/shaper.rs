@@ -367,8 +367,8 @@ pub fn smoothing(impulses: &[(f64, f64)], corner: &Corner) -> f64 {
     right.max(0.5 * corner.acceleration * half)
 }
 
-/// The greatest acceleration, m/s², at which [`smoothing`] stays within `limit` (m) at a corner speed in m/s; 0 if there
-/// is none.
+/// Largest acceleration, m/s², for which [`smoothing`] stays within `limit` (m) at a corner speed in m/s; 0 if none
+/// does.
 pub fn max_acceleration(impulses: &[(f64, f64)], limit: f64, corner_speed: f64) -> f64 {
     let (quarter, half) = corner_moments(impulses);
     let right = 2.0 * (limit / SQRT_2 - corner_speed * quarter.0) / quarter.1;

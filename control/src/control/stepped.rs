@@ -156,8 +156,8 @@ impl Stepped {
     /// Decides at [`Stepped::next`] from the state, the motor's current, A, and the reference at that time.
     ///
     /// `ahead` is the reference one lead later ([`Loop::lead`]). Without it the reference is extrapolated by its
-    /// derivatives with constant snap, which is wrong where the snap of a profile jumps within the lead. The command acts
-    /// until the next decision.
+    /// derivatives with constant snap, which is wrong where the snap of a profile jumps within the lead. The command
+    /// acts until the next decision.
     pub fn decide(&mut self, state: &State, current: f64, reference: &Reference, ahead: Option<&Reference>) -> f64 {
         let ahead = ahead.copied().unwrap_or_else(|| after(reference, self.clocked.timing.lead));
         let (mut currents, mut references) = (Commands::default(), References::default());

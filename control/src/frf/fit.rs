@@ -9,8 +9,8 @@
 //! is made least by Gauss and Newton's method, damped after Levenberg and Marquardt. One number τ stands for all spans,
 //! whose damping then is in proportion to their stiffness; g takes up what mass and friction of the model are off.
 //! Errors are those of the linearised problem, widened by the root of χ² per degree of freedom where the curves fit
-//! worse than noise allows. Noise at neighbouring lines is alike under a window, by ρ of [`ALIKE`], so that with the rows
-//! J_k of the residuals at line k
+//! worse than noise allows. Noise at neighbouring lines is alike under a window, by ρ of [`ALIKE`], so that with the
+//! rows J_k of the residuals at line k
 //!
 //! ```text
 //! cov x = (Σ J_kᵀ J_k)⁻¹ (Σ ρ(k − l) J_kᵀ J_l) (Σ J_kᵀ J_k)⁻¹

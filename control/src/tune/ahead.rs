@@ -55,8 +55,8 @@ fn forms(machine: &Machine, design: &Design) -> Vec<FeedForward> {
 }
 
 impl Work<'_> {
-    /// The feed-forward that pays most beside the gains of `after`: J is smaller with it, and the largest error by a tenth
-    /// or more; none where none does.
+    /// The feed-forward that improves most on the gains of `after`: it reduces J, and the largest error by a tenth or
+    /// more; none if no feed-forward does.
     pub fn ahead(&self, after: &Verdict) -> Result<Option<Ahead>> {
         let mut best: Option<Verdict> = None;
         for feed_forward in forms(&self.case.machine, &after.design) {

@@ -52,8 +52,8 @@ const SLACK: f64 = 0.05;
 /// Largest ln J excess over the best at which a finalist is refined.
 const NEAR: f64 = 0.3;
 
-/// Samples of moves that a search of usual effort may simulate, each design that it looks at counted as some more: a few
-/// seconds of a processor.
+/// Samples of moves that a search of default effort may simulate, plus a fixed charge per evaluated design: a few
+/// processor seconds.
 const SAMPLES: u64 = 6_000_000;
 
 /// How often a search goes on with the axes that are worst for what it found.
@@ -328,7 +328,8 @@ impl Work<'_> {
         layouts
     }
 
-    /// Runs the best designs of a layout, as many as a population begins with, again, on other axes, and forgets the rest of it.
+    /// Reruns the best designs of a layout, the initial population size of them, on other machines and discards the
+    /// rest.
     pub fn again(&self, archive: &mut Vec<Tried>, layout: usize, watch: &Watch, weighed: &Weighed) {
         let (mut own, other): (Vec<Tried>, Vec<Tried>) = archive.drain(..).partition(|tried| tried.layout == layout);
         own.sort_by(|a, b| self.worth(a, weighed).total_cmp(&self.worth(b, weighed)));

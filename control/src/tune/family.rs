@@ -88,7 +88,8 @@ pub enum Source {
 
 impl Family {
     /// Family of a case. Its machines are a Latin hypercube: within a spread all values are as likely, within the
-    /// interval of a fit they are normal; what was never fitted is off by the default spread. With `tuning.corners` the worst corner of all intervals joins them.
+    /// interval of a fit they are normal; what was never fitted is off by the default spread. With `tuning.corners` the
+    /// worst corner of all intervals joins them.
     pub fn of(case: &Case, tuning: &Tuning) -> Result<Self> {
         if let Some(file) = &tuning.draws {
             return Self::of_draws(case, tuning, file);
@@ -432,7 +433,7 @@ pub(super) fn modes_along(machine: &Machine, bridge: f64, places: &[f64]) -> Res
     travel(&following(machine.clone()), Operation { bridge, ..Operation::default() }, places)
 }
 
-/// Places of the bridge, where there is one, and of the cart along their travel: of `[travel]`, or where the moves lead.
+/// Positions of the bridge, if any, and of the cart along their travel: from `[travel]` or else the range of the moves.
 fn along(case: &Case, count: usize) -> [Vec<f64>; 2] {
     let machine = following(case.machine.clone());
     let steps = count.max(2) - 1;

@@ -150,8 +150,8 @@ mod tests {
     use crate::design::Structure;
     use std::path::Path;
 
-    /// A search ended with a notch of damping 0.05 and depth 0.1, which amplifies by 6 dB, and with a corner of 15 kHz at
-    /// 4 kHz.
+    /// A search ended with a notch of damping 0.05 and depth 0.1, which amplifies by 6 dB, and with a corner of 15 kHz
+    /// at 4 kHz.
     #[test]
     fn a_searched_filter_neither_amplifies_nor_passes_half_the_sampling_rate() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../stages/sollmann-jouaneh/controllers");

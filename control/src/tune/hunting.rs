@@ -153,9 +153,9 @@ fn hunts_at(machine: &Machine, design: &Design, start: f64) -> Result<Option<Hun
 }
 
 impl Hunt {
-    /// True if it hunts more than the other: where that one rests, or wider. Slips of the other that were not waited for
-    /// have an unknown size: a swing is more than these where it leaves the `window` (m) of a move, rarer slips never
-    /// are.
+    /// True if it hunts more than the other: where that one rests, or wider. Slips of the other that were not waited
+    /// for have an unknown size: a swing is more than these where it leaves the `window` (m) of a move, rarer slips
+    /// never are.
     pub(super) fn is_more_than(&self, other: Option<&Hunt>, window: f64) -> bool {
         let Some(other) = other else { return true };
         match (self.amplitude.is_finite(), other.amplitude.is_finite()) {
@@ -214,8 +214,8 @@ struct Swing {
     slips_every: f64,
 }
 
-/// A watched swing of what slides, its places (m) over time (s), and the command where it ended, with its slope where it
-/// is a ramp.
+/// A recorded oscillation of a sliding part, its positions (m) over time (s), and the final command, with its slope if
+/// it is a ramp.
 struct Seen {
     swing: Option<Swing>,
     slides: Vec<Vec<(f64, f64)>>,

@@ -146,8 +146,8 @@ impl<const N: usize> Open<N> {
         self.sensitivity(self.outer())
     }
 
-    /// T x/y: from the references of the sliding parts to their positions, without feed-forward. Of parts that a machine
-    /// with more drives than these does not have it is 1.
+    /// T x/y: from the references of the sliding parts to their positions, without feed-forward. 1 for parts that the
+    /// machine does not have.
     pub fn reference_to_slides(&self) -> Square<N> {
         let mut all = self.slides * (self.closed(self.outer())[1] / self.difference) * self.shares;
         for slide in (0..N).filter(|&slide| self.shares.column(slide).iter().all(|share| *share == Complex::ZERO)) {
@@ -221,8 +221,8 @@ fn largest_square<const N: usize>(a: &Square<N>) -> f64 {
     0.5 * (sum + ((first - second).powi(2) + 4.0 * inner.norm_sqr()).sqrt())
 }
 
-/// The largest eigenvalue of H = A Aᴴ of three rows: with q = tr H/3, p² = tr (H − q)²/6 and r = det ((H − q)/p)/2 it is
-/// q + 2 p cos (acos(r)/3).
+/// The largest eigenvalue of H = A Aᴴ of three rows: with q = tr H/3, p² = tr (H − q)²/6 and r = det ((H − q)/p)/2 it
+/// is q + 2 p cos (acos(r)/3).
 fn largest_of_three(a: &Square<3>) -> f64 {
     let mut h = a * a.adjoint();
     let q = h.trace().re / 3.0;

@@ -10,8 +10,8 @@
 //!
 //! The peaks of |S| and |T| stand at poles of the closed loop, which no grid knows beforehand. So a grid that is dense
 //! about the poles of the axis is first divided wherever one L or 1 + L turns by much from one point to the next, which
-//! it does about every lightly damped pole of the closed loop; then every local maximum is followed to its top, and every
-//! crossing to where it is.
+//! it does about every lightly damped pole of the closed loop; then every local maximum is followed to its top, and
+//! every crossing to where it is.
 
 use super::loops::{Break, Open, breaks, smallest};
 use super::plant::{Plant, Sampled, Square, by_drives};

@@ -92,8 +92,8 @@ impl Work<'_> {
         Ok(verdict)
     }
 
-    /// The verdict on a design whose ln J is at most `bar`; none for another, which is told as soon as the machines that
-    /// were run until then, in this order, say so.
+    /// The verdict on a design whose ln J is at most `bar`; none otherwise, which is reported as soon as the machines
+    /// run so far, in this order, show it.
     pub fn verdict_below(&self, design: &Design, bar: f64, order: &[usize]) -> Result<Option<Verdict>> {
         if let Some(known) = self.known.borrow().iter().find(|known| known.design == *design) {
             return Ok(Some(known.clone()).filter(|known| known.objective <= bar));

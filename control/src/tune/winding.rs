@@ -5,8 +5,8 @@ use crate::control::feedback::{Feedback, Turn};
 use nalgebra::Complex;
 use std::f64::consts::PI;
 
-/// Nyquist's criterion: F(z) = det (1 + L)(1 − 1/z)^m, with m poles at z = 1, turns by π (P − Z) from θ = 0 to π, P poles
-/// of the machine and its controllers and Z of the closed loop being outside.
+/// Nyquist's criterion: F(z) = det (1 + L)(1 − 1/z)^m, with m poles at z = 1, turns by π (P − Z) from θ = 0 to π, P
+/// poles of the machine and its controllers and Z of the closed loop being outside.
 pub(super) struct Winding {
     unstable: f64,
     /// The first two of ω and det (1 + L), of which m is known.

@@ -375,8 +375,8 @@ fn slower(design: &Design, own: usize, stage: &Machine, factor: f64) -> Design {
     shaped(design, own, &powers)
 }
 
-/// The power of the speed of a loop that each gain, and each number of filters from number `own` on, is to be multiplied
-/// by: of a PID or a cascade as if time went by more slowly, of state feedback by its weights.
+/// The power of the speed of a loop that each gain, and each number of filters from number `own` on, is to be
+/// multiplied by: of a PID or a cascade as if time went by more slowly, of state feedback by its weights.
 pub(super) fn slowing(design: &Design, own: usize, stage: &Machine) -> Vec<f64> {
     let power = |key: &str| match key {
         "controller.pid.proportional" => 2.0,

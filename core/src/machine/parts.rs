@@ -141,8 +141,8 @@ impl Machine {
         }
     }
 
-    /// How a span's length follows what slides. Spans 2 and 3 in series are one of their lengths together; their damping
-    /// stays as it is at x = 0.
+    /// Dependence of a span's length on the sliding parts. Spans 2 and 3 in series are one span of their total length;
+    /// their damping keeps its value at x = 0.
     fn follows(&self, index: usize, at: &SpanAt) -> Option<Follows> {
         let mut make = self.belt.following()?;
         match self.belt.model {

@@ -87,8 +87,8 @@ impl Rigid {
         }
     }
 
-    /// A drive of a machine with several, alone with its pulley and what turns with it: its motor, and as mass and friction
-    /// those of its pulley.
+    /// One drive of a machine with several drives, without the load: its motor, with the mass and friction of its
+    /// pulley.
     pub fn of_pulley(machine: &Machine, drive: usize) -> Self {
         let (whole, r) = (Self::of_drive(machine, drive), machine.pulley_radius);
         let sides = [true, false].map(|forward| machine.drive_pulley.friction.side(forward));
@@ -116,7 +116,7 @@ impl Rigid {
         })
     }
 
-    /// Motor current, A, and voltage at its terminals, V, that push with `force` (N, changing at `rate`, N/s) at `speed`.
+    /// Motor current, A, and terminal voltage, V, that give `force` (N, changing at `rate`, N/s) at `speed`.
     pub fn electrical(&self, force: f64, rate: f64, speed: f64) -> (f64, f64) {
         self.electrical_by(&mut Run::plain(), force, rate, speed)
     }

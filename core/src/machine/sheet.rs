@@ -174,8 +174,8 @@ const ELATECH_ATL5: &str =
     "Elatech polyurethane belts with steel cords, catalogue of Goodyear Rubber Products 2012, p. 20";
 
 impl BeltSheet {
-    /// Teeth in mesh at a pulley of this radius, m, and the force that they carry at rest, N; of a belt of known type and
-    /// width.
+    /// Teeth in mesh at a pulley of this radius, m, and the force that they carry at rest, N; for a belt of known type
+    /// and width.
     pub fn mesh(&self, radius: f64) -> Option<(f64, Option<f64>)> {
         let (kind, width) = (self.kind?, self.width?);
         let teeth = 2.0 * PI * radius / kind.pitch;

@@ -49,8 +49,8 @@ impl Motor {
 
 /// The phases of a hybrid stepper with its driver, beyond what [`Motor`] and [`Amplifier`] have.
 ///
-/// Two phases, a quarter of a tooth pitch apart; N = `steps_per_turn`/4 rotor teeth. The angle is zero where both phases
-/// carry the rated current, a full step.
+/// Two phases, a quarter of a tooth pitch apart; N = `steps_per_turn`/4 rotor teeth. The angle is zero where both
+/// phases carry the rated current, a full step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stepper {
     /// Full steps per turn, 4 N.

@@ -91,8 +91,8 @@ impl Mechanism {
         }
     }
 
-    /// Voltage at the motor's terminals, V: R i + L di/dt + K_e n φ̇, or what the amplifier puts there. Zero of a stepper,
-    /// the voltages of whose phases are no linear forms.
+    /// Voltage at the motor's terminals, V: R i + L di/dt + K_e n φ̇, or what the amplifier puts there. Zero for a
+    /// stepper, whose phase voltages are not linear in the state.
     pub fn voltage(&self, drive: usize, mode: &Mode) -> Form {
         let Drive { motor, amplifier, .. } = &self.drives[drive];
         let now = &mode.drive[drive];

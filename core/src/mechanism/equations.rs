@@ -32,8 +32,8 @@ impl Mechanism {
         Mode { piece: self.pieces(state), ..Mode::of(motion) }
     }
 
-    /// Takes a machine over from another of the same parts but other numbers: a body that did not have modes and now does,
-    /// or the other way round, moves as its speed says; a part that is no more is in order.
+    /// Takes a machine over from another of the same parts but other numbers: a body that did not have modes and now
+    /// does, or the other way round, moves as its speed says; a part that is no more is in order.
     pub(crate) fn take_over(&self, from: &Mechanism, mode: &mut Mode, speed: impl Fn(usize) -> f64) {
         let mut state = State::default();
         for (body, own) in state.speed.iter_mut().enumerate().take(self.bodies.len()) {

@@ -311,7 +311,7 @@ pub struct State {
     pub position: [f64; BODIES],
     /// rad/s or m/s
     pub speed: [f64; BODIES],
-    /// A; only where the current is a state of its own. In the order of the drives, both of a stepper one after the other.
+    /// A; only if the current is a state. In the order of the drives; a stepper has two in a row.
     pub current: [f64; CURRENTS],
 }
 

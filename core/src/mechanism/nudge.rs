@@ -6,8 +6,8 @@ use super::{Mechanism, SpringLaw};
 const NUDGE: f64 = 16.0 * f64::EPSILON;
 
 impl Mechanism {
-    /// The same with inertias, constant forces and force lines that are off by 16 ε of themselves, neighbours in opposite
-    /// directions, so that forces which balance do so no longer.
+    /// The same with inertias, constant forces and force lines that are off by 16 ε of themselves, neighbours in
+    /// opposite directions, so that forces which balance do so no longer.
     pub(crate) fn nudged(&self) -> Self {
         let mut nudged = self.clone();
         for (number, body) in nudged.bodies.iter_mut().enumerate() {

@@ -1,7 +1,7 @@
 //! The phases of a stepper: two windings whose torque goes with the sine of the rotor's angle.
 //!
-//! With N rotor teeth, the rotor's angle φ counted from a full step, ε = N φ + π/4, and the field that the driver is told,
-//! ψ = N x*/r + π/4 (Kuo and Kelemen 1979; Kenjo and Sugawara 1994):
+//! With N rotor teeth, the rotor's angle φ counted from a full step, ε = N φ + π/4, and the field that the driver is
+//! told, ψ = N x*/r + π/4 (Kuo and Kelemen 1979; Kenjo and Sugawara 1994):
 //!
 //! ```text
 //! L di_a/dt = v_a − R i_a + K_m φ̇ sin ε
@@ -9,8 +9,8 @@
 //! τ = K_m (−i_a sin ε + i_b cos ε) − T_d sin 4ε
 //! ```
 //!
-//! Phase b is phase a a quarter of a tooth pitch on: with σ_a = 0 and σ_b = π/2 both are one formula. The rate −R i/L is
-//! in the linear equations of a mode; the rest is not linear and stands here.
+//! Phase b is phase a a quarter of a tooth pitch on: with σ_a = 0 and σ_b = π/2 both are one formula. The rate −R i/L
+//! is in the linear equations of a mode; the rest is not linear and stands here.
 
 use super::{Amplifier, Cause, Drive, Form, Mechanism, Mode, Motor, SpringLaw, State, Switch};
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};

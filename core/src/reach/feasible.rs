@@ -171,8 +171,7 @@ fn electrical(volts: Option<f64>, amperes: Option<f64>) -> Vec<Demand> {
     voltage.into_iter().chain(current).collect()
 }
 
-/// How much of each limit references need at most, looked at `instants` times along their way; of several drives that of
-/// the one that needs most of it.
+/// Largest use of each limit by references, evaluated at `instants` times; of several drives, the most loaded one.
 pub fn loads(machine: &Machine, limit: Option<f64>, profiles: &[Profile], instants: usize) -> Vec<Load> {
     let load = |needs: &[Need], demand: Demand| {
         let [needed, allowed] = demand.most(needs).map_or([0.0, 1.0], |(_, both)| both);
@@ -190,9 +189,9 @@ pub fn loads(machine: &Machine, limit: Option<f64>, profiles: &[Profile], instan
     all
 }
 
-/// The limits that `profile`, shaper included, exceeds on this machine under a controller with this limit of its command
-/// (V or A); none if the reference can be followed. Friction counts as viscous and Coulomb friction, the idler's own
-/// swing as quasi-static.
+/// Limits that `profile`, shaper included, exceeds on this machine under a controller with this command limit (V or A);
+/// none if the reference can be followed. Friction is taken as viscous plus Coulomb, the idler's own mode as
+/// quasi-static.
 ///
 /// Of a machine with several drives voltage and current of each are looked at, the belts taken for rigid.
 pub fn shortfalls(machine: &Machine, limit: Option<f64>, profiles: &[Profile]) -> Vec<Shortfall> {

@@ -39,9 +39,9 @@ impl Forward {
 
     /// The force of its motor at the belt, N, and how fast its inertial part changes, N/s.
     ///
-    /// The motors do the work of the forces on what slides: Σ_k f_k r dφ_k = Σ_s F_s dq_s with q_s = Σ_k w_sk r φ_k, so that
-    /// f_k = Σ_s w_sk F_s, and each turns its own pulley beside that. Dry friction goes the way of what rubs: of pulleys
-    /// that of r φ, of bridge and cart that of x and y.
+    /// The motors do the work of the forces on what slides: Σ_k f_k r dφ_k = Σ_s F_s dq_s with q_s = Σ_k w_sk r φ_k, so
+    /// that f_k = Σ_s w_sk F_s, and each also accelerates its own pulley. Dry friction follows the direction of the
+    /// rubbing part: of r φ for pulleys, of x and y for bridge and cart.
     pub fn force(&self, slides: &[Reference]) -> [f64; 2] {
         let [mut force, mut rate] = self.of_part(&self.pulley, &self.along(slides));
         for ((_, lever, slide), reference) in self.slides.iter().zip(slides) {

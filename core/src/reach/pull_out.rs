@@ -1,7 +1,7 @@
 //! The torque at which a stepper loses its field, over its speed, and the acceleration that this leaves.
 //!
-//! At a constant speed ω the phase currents become periodic. Where the rotor is behind the field by the electrical angle
-//! δ, ψ = ε + δ, each phase gives the same mean torque, and the detents give none:
+//! At a constant speed ω the phase currents become periodic. Where the rotor is behind the field by the electrical
+//! angle δ, ψ = ε + δ, each phase gives the same mean torque, and the detents give none:
 //!
 //! ```text
 //! T(δ) = 2 · mean over a period of −K_m i_a sin ε,   pull-out torque = max over δ of T(δ)

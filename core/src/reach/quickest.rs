@@ -61,8 +61,8 @@ impl Wanted {
     }
 }
 
-/// Lowest frequencies along the travel of the modes with the drive pulleys held, Hz, the lowest first; of a gantry those
-/// that move the bridge and those that move the cart. None of a rigid belt, or of one that does not swing.
+/// Lowest frequencies along the travel of the modes with the drive pulleys held, Hz, the lowest first; of a gantry
+/// those that move the bridge and those that move the cart. None of a rigid belt, or of one that does not swing.
 pub fn modes(machine: &Machine) -> Vec<f64> {
     if machine.belt.model == BeltModel::Rigid {
         return Vec::new();
@@ -209,8 +209,8 @@ impl Quickest<'_> {
         Ok(None)
     }
 
-    /// The limits of the quickest move with these averaging times that takes no more than a share of the machine's; none
-    /// where there is none.
+    /// Limits of the quickest move with these averaging times within a share of the machine's capability; none if no
+    /// move is.
     fn searched(&self, way: &Way, periods: [u8; 2], share: f64) -> Option<Limits> {
         let times = self.times(periods)?;
         let both: f64 = times.iter().sum();

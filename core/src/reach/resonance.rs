@@ -33,7 +33,7 @@ pub struct Resonance {
     pub frequency: f64,
     /// Damping ratio.
     pub damping: f64,
-    /// How far it moves the coordinate after a step of the command, of what the strongest mode at that place does: 0 to 1.
+    /// Displacement of the coordinate after a command step, relative to the strongest mode at that position: 0 to 1.
     pub share: f64,
 }
 
@@ -89,10 +89,9 @@ impl Reach {
 /// The modes of a machine that move one of its coordinates: the cart of an axis, bridge or cart of a gantry. They are
 /// those at every place along the travel if the spans follow what slides, else at one.
 ///
-/// The masses, springs and dampers are those of the sliding machine: M q̈ + C q̇ + K q = 0 with the viscous friction, the
-/// belt's damping and, where a free motor is fed by a voltage, its back-EMF. Frequencies are of K and M alone; damping
-/// ratios ζ = φᵀ C φ / (2 ω φᵀ M φ) hold for light damping. Modes that are damped so much that they do not vibrate are
-/// left out.
+/// The masses, springs and dampers are those of the sliding machine: M q̈ + C q̇ + K q = 0 with the viscous friction,
+/// the belt's damping and, where a free motor is fed by a voltage, its back-EMF. Frequencies follow from K and M alone;
+/// damping ratios ζ = φᵀ C φ / (2 ω φᵀ M φ) hold for light damping. Overdamped modes are left out.
 pub fn resonances(machine: &Machine, drive: Drive, coordinate: usize) -> Result<Vec<Resonance>> {
     if machine.belt.model == BeltModel::Rigid {
         let error = Error::new("a rigid belt has no resonance").allowed("belt.model = \"elastic\" or \"two-mass\"");

@@ -1,7 +1,7 @@
 //! From the solvers' coordinates to angles and positions: where a run begins, and what stands still.
 //!
 //! ```text
-//! q_b = q_b0 + (c_b − c_b0 − Σ a_j (q_j − q_j0))/a_b        c_b = Σ a_j q_j, the length that stands in the place of q_b
+//! q_b = q_b0 + (c_b − c_b0 − Σ a_j (q_j − q_j0))/a_b        c_b = Σ a_j q_j, the length in place of q_b
 //! ```
 
 use super::saved::{Pass, Passed};

@@ -88,8 +88,8 @@ pub struct Run<'a> {
 
 impl<'a> Run<'a> {
     /// A run of `experiment` on `stage`; the experiment's own input counts for nothing, unless it is
-    /// [followed](Self::follow). Rows go to `sink` in blocks, all that is between them to `observer`. Not for the paper's
-    /// Table 3.
+    /// [followed](Self::follow). Rows go to `sink` in blocks, everything between rows to `observer`. Not for the
+    /// paper's Table 3.
     pub fn new(
         machine: &Machine,
         experiment: &Experiment,

@@ -1,8 +1,8 @@
 //! Sensitivities: how the columns of a run change with parameters of the machine, its start and its input.
 //!
 //! Within a mode ∂z/∂p obeys the linear equations of that mode, and where the mode changes it jumps, because the change
-//! comes sooner or later: see [`super::exact`]'s `sensitivity`. One run gives the derivatives by all variables, exact but
-//! for rounding, where differences take two runs for each and are as good as their step.
+//! comes sooner or later: see [`super::exact`]'s `sensitivity`. One run gives the derivatives by all variables, exact
+//! but for rounding, where differences take two runs for each and are as good as their step.
 
 use super::exact::{Following, in_kernel};
 use super::followed::Task;

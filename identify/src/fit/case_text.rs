@@ -123,8 +123,8 @@ impl Fit {
     }
 }
 
-/// The damping ratio or loss factor that gives the belt of `stage` its damping: it belongs to the slowest swing, which a
-/// fitted mass or stiffness changes. None where the text gives neither, or `read` has that damping.
+/// The damping ratio or loss factor that gives the belt of `stage` its damping: it belongs to the slowest swing, which
+/// a fitted mass or stiffness changes. None where the text gives neither, or `read` has that damping.
 ///
 /// c = 2 ζ k / ω₀
 fn damping_share(case: &Case, read: &Machine, machine: &Machine) -> Option<Change> {

@@ -10,8 +10,8 @@ use taut::machine::{Kind, Machine, Travel};
 /// Rows of a curve that a page holds for its machine. A screen shows fewer pictures in 8 s, the time of a first look.
 const ROWS: usize = 2000;
 
-/// What `live.js` reads: the scene, the end of the run in s, and the curves that `stage.js` asks for, at most [`ROWS`] of
-/// each. None if the run has no rows.
+/// What `live.js` reads: the scene, the end of the run in s, and the curves that `stage.js` asks for, at most [`ROWS`]
+/// of each. None if the run has no rows.
 pub(super) fn live(case: &Case, curves: &Curves) -> Option<String> {
     let (times, _) = curves.get(if case.is_axis() { "cart" } else { "cart_position" })?;
     let mut arrays = Arrays::default();

@@ -2,12 +2,12 @@
 //!
 //! - The crates as they would be published. They are installed from a registry that has nothing but them and the
 //!   packages that they need, into an empty folder, by a cargo without a configuration.
-//! - The program for a glibc of 2.17 and later, with completions, manual pages, the licences of all packages in it and a
-//!   bill of materials (CycloneDX), in one archive.
+//! - The program for a glibc of 2.17 and later, with completions, manual pages, the licences of all packages in it and
+//!   a bill of materials (CycloneDX), in one archive.
 //! - The Python wheel, for the same C library, installed into empty environments.
 //!
 //! The two programs and the wheel must give equal results. A run that failed can be repeated: what was built from the
-//! same source is kept in `target/package-work`. The run ends with all that it has shown, each with its figure, and with
+//! same source is kept in `target/package-work`. The run ends with a list of its results, each with its figure, and of
 //! the targets that it did not build.
 
 mod crates;

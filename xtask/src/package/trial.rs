@@ -77,8 +77,8 @@ impl Program {
     }
 }
 
-/// Returns the number of files that two programs wrote alike in their trials. The object of the FMU and the archive that
-/// contains it are not compared: they depend on the linker. Errors: files differ.
+/// Returns the number of files that two programs wrote alike in their trials. The object of the FMU and the archive
+/// that contains it are not compared: they depend on the linker. Errors: files differ.
 pub fn same(first: &Program, second: &Program) -> Result<usize, String> {
     let [one, other] = [files(&first.folder)?, files(&second.folder)?];
     let names: BTreeSet<&String> = one.keys().chain(other.keys()).collect();

@@ -471,8 +471,8 @@ impl Estimate {
         Some((amplitudes, inverse.view((waves, waves), (more, more)) * noise.white))
     }
 
-    /// Finds errors that come again at the same place, and the noise beside them. At a steady speed such an error swings
-    /// as noise may: the likelier of both counts.
+    /// Finds errors that repeat with position, and the noise beside them. At a steady speed such an error oscillates
+    /// like noise: the likelier of both counts.
     fn waves_beside(&mut self, told: &mut Vec<Told>) -> Option<Vec<f64>> {
         let top = best(told)?;
         let swings = |one: &Told| one.slow.iter().any(|slow| slow.frequency > 0.0);

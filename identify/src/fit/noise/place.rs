@@ -20,8 +20,7 @@ pub(super) struct Found {
     pub kappa: f64,
     /// Least increase of the logarithm of the likelihood by it.
     pub gain: f64,
-    /// Its amplitude, in standard deviations of a value with the greatest weight; and how far the quantity ranges, in its
-    /// unit.
+    /// Amplitude, in standard deviations of the value with the largest weight, and range of the quantity in its unit.
     pub amplitude: f64,
     pub travel: f64,
     /// Number of wave numbers tried.

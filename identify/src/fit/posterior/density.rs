@@ -475,8 +475,8 @@ mod tests {
         }
     }
 
-    /// No draw of a delay and a gain came in four minutes: in the logarithm of the delay their ridge was bent, and steps
-    /// as short as it was narrow led nowhere.
+    /// Sampling a delay and a gain gave no draw in four minutes: in the logarithm of the delay their ridge was curved,
+    /// and steps as short as it was narrow made no progress.
     #[test]
     fn a_narrow_ridge_that_ends_at_a_bound_is_drawn_from() {
         let ingredients = Ingredients {

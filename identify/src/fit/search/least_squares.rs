@@ -219,8 +219,8 @@ mod tests {
         }
     }
 
-    /// A search to a tenth of a standard error measured central derivatives, which cost twice as much, from ten standard
-    /// errors on.
+    /// A search to a tenth of a standard error measured central derivatives, which cost twice as much, from ten
+    /// standard errors on.
     #[test]
     fn a_rough_search_measures_central_derivatives_at_its_end_only() {
         let (bounds, options) = (Bounds::none(2), Options { tolerance: 0.1, ..Options::default() });

@@ -262,8 +262,8 @@ fn first_guess(case: &Case, plan: &Plan, problem: &mut Problem, descend: &mut De
 
 /// The start with what fits of the beginnings of the logs find, each longer than the one before.
 ///
-/// A rotor swings on its field, with the cart on its belt, at a frequency by holding torque and mass: with a wrong one it
-/// is soon out of phase with the log, and there is a minimum for each cycle. In a beginning of a cycle there is one.
+/// A rotor swings on its field, with the cart on its belt, at a frequency by holding torque and mass: with a wrong one
+/// it is soon out of phase with the log, and there is a minimum for each cycle. In a beginning of a cycle there is one.
 fn by_beginnings(
     case: &Case,
     plan: &Plan,

@@ -126,8 +126,8 @@ fn peak_current(problem: &Problem) -> f64 {
     }
 }
 
-/// The gain of each idea, ranked; only those that gain something and are not in the logs already. They are of an axis: no
-/// ideas for a machine with more coordinates.
+/// Proposals ranked by gain; only those that gain something and are not in the logs already. For an axis only: machines
+/// with more coordinates get none.
 pub(crate) fn proposals(found: &Searched, judged: &Judged) -> Vec<Proposal> {
     let Searched { problem, best, noise, .. } = found;
     if !problem.machine.has_torque_balance() {
