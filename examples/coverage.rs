@@ -433,7 +433,7 @@ fn one(cell: &Cell, seed: u64, found: &Mutex<Found>) {
     }
 }
 
-/// What the fits of a kind of truth said.
+/// Findings of the fits for one kind of true machine.
 #[derive(Default)]
 struct Named {
     machines: usize,

@@ -67,7 +67,7 @@ const COARSEST: f64 = 2.5;
 /// The position that a trial was measured by.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum At {
-    /// What slides: the cart; of a gantry bridge and cart.
+    /// Sliding parts: the cart; for a gantry, bridge and cart.
     Cart,
     /// The measurements of the controllers of all drives, along the belt.
     Encoder,

@@ -456,7 +456,7 @@ pub const MODULES: [(&str, &str); 5] = [
     ("player.js", include_str!("player.js")),
 ];
 
-/// What a report needs beside the modules to play its machines.
+/// Script that plays a report's machines with the modules.
 const LIVE: &str = include_str!("live.js");
 
 /// The modules as one script, without indentation and without the lines that are remarks. It brings the figures of its

@@ -176,7 +176,7 @@ impl Spectra {
         self.alike(drive).into_iter().any(|alike| alike <= ALIKE)
     }
 
-    /// What excites: the references, or the inputs.
+    /// Excitation: the references, or the inputs.
     fn excitations(&self) -> &[Signal] {
         self.references.as_deref().unwrap_or(&self.inputs)
     }

@@ -1,4 +1,4 @@
-//! What can be measured of a machine: the quantities, and how positions go with the slides of a geometry.
+//! Measurable quantities of a machine, and positions from the slide coordinates of a geometry.
 
 use super::{EncoderPlace, Geometry, Kind, Machine, Part};
 

@@ -59,15 +59,15 @@ enum Part {
 
 /// Folders of the work.
 struct Places {
-    /// What is handed out.
+    /// Output folder of the release.
     out: PathBuf,
-    /// What it is built and tried in.
+    /// Folder for builds and trials.
     work: PathBuf,
     /// Tools of Python.
     tools: PathBuf,
 }
 
-/// What a run has shown: claims with their figures, in order.
+/// Claims shown by a run with their figures, in order.
 #[derive(Default)]
 struct Claims(Vec<(String, String)>);
 
@@ -187,7 +187,7 @@ fn must(command: Command) -> Result<(), String> {
     }
 }
 
-/// What cargo says of the members of the workspace.
+/// Members of the workspace according to `cargo metadata`.
 fn members() -> Result<Vec<Value>, String> {
     let listed = output(crate::cargo(&["metadata", "--no-deps", "--format-version", "1"]))?;
     let mut listed: Value = serde_json::from_slice(&listed).map_err(|e| format!("cargo metadata: {e}"))?;

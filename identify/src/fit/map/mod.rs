@@ -54,7 +54,7 @@ pub struct ForceMap {
     pub too_long: Vec<Origin>,
     /// Shortest period that is resolved, m: less than 10 % of its amplitude are lost.
     pub resolution: f64,
-    /// What limits it.
+    /// Cause of the resolution limit.
     pub limit: Limit,
     /// `cart.force_along` of the case with the map added; none if it is not significant.
     pub line: Option<Polyline>,
@@ -82,14 +82,14 @@ pub struct Component {
     pub amplitude: [f64; 2],
     /// Chance that noise shows it anywhere.
     pub chance: f64,
-    /// What on the machine has this period; empty if nothing known has.
+    /// Parts of the machine with this period; empty if none is known.
     pub origins: Vec<Origin>,
 }
 
-/// What has a period along the travel.
+/// Source of a period along the travel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Origin {
-    /// So many periods per turn of the pulleys, which have one radius: one of an eccentric pulley.
+    /// Number of periods per turn of the pulleys, which have one radius: 1 for an eccentric pulley.
     Pulley {
         /// Periods per turn.
         count: u32,
@@ -130,7 +130,7 @@ impl Origin {
     }
 }
 
-/// What limits the resolution of a map.
+/// Cause of a map's resolution limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Limit {
     /// The smoothing of the log at its speed.

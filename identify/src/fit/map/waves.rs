@@ -30,9 +30,9 @@ pub(super) struct Wave {
     pub chance: f64,
 }
 
-/// What differs between passes.
+/// Differences between passes.
 pub(super) struct Noise<'a> {
-    /// What each pass has beside the map, N.
+    /// Residuals of each pass against the map, N.
     pub residuals: &'a [Vec<f64>],
     /// ν: degrees of freedom of a point.
     pub freedom: f64,
@@ -42,7 +42,7 @@ pub(super) struct Noise<'a> {
     pub step: f64,
 }
 
-/// What the search found.
+/// Result of the search.
 pub(super) struct Found {
     /// True if the force changes along the travel.
     pub changes: bool,
@@ -155,7 +155,7 @@ fn coefficient(values: &[f64], number: f64) -> Complex<f64> {
     sum * (2.0 / values.len() as f64)
 }
 
-/// What a cubic and sines of these wave numbers leave of the values by least squares, and the amplitudes of the sines.
+/// Residuals of a least-squares fit of a cubic and sines with these wave numbers, and the amplitudes of the sines.
 fn without(values: &[f64], numbers: &[f64], step: f64) -> Option<(Vec<f64>, Vec<f64>)> {
     let n = values.len();
     let matrix = DMatrix::from_fn(n, 4 + 2 * numbers.len(), |j, column| match column {
