@@ -1,16 +1,16 @@
-//! The consequence of a condition that falls: the rule of events, as data that is made with the conditions.
+//! Transition rules of events, as data made with their guards.
 //!
-//! Solvers and exports read it, and none of them decides by itself what follows.
+//! Solvers and exports read them; none decides by itself.
 
 use super::{AmplifierMode, Cause, Drive, Form, Limit, Mechanism, Mode, Switch, What};
 use crate::friction::Motion;
 
-/// The consequence of a condition of a mode that falls.
+/// Transition of a guard that becomes negative.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Transition {
     /// The condition.
     pub cause: Cause,
-    /// Which of several conditions that have fallen at one instant is settled first: the one of least rank.
+    /// Rank among simultaneous events; the lowest is settled first.
     pub rank: u8,
     /// The next state.
     pub then: Then,
