@@ -3,12 +3,10 @@
 //! This is the only place where units are converted. A quantity is a number and a unit expression:
 //!
 //! - numbers: `19.4`, `1.5e-3`, `5.5626×10^-6`, `2/3`; the decimal point is a point;
-//! - units with SI prefixes: `mm`, `kN`, `µH`, `GPa`, and those of the workshop: `in`, `lbf`, `ozf`, `rpm`, `deg`,
-//!   `psi`;
+//! - units with SI prefixes: `mm`, `kN`, `µH`, `GPa`, and workshop units: `in`, `lbf`, `ozf`, `rpm`, `deg`, `psi`;
 //! - products by a space, `*`, `·`, `.` or `-`; powers as `m^2`, `m²`, `m2` or `s^-1`;
-//! - a `/` divides by the one factor that follows it, so `N m/rad/s` is N m rad⁻¹ s⁻¹; after a `/` a product has to
-//!   stand in brackets: `V/(rad s)`. Whether `V/rad s` means `V/(rad s)` or `V s/rad` nobody can tell, so it is
-//!   refused.
+//! - a `/` divides by the one factor that follows it, so `N m/rad/s` is N m rad⁻¹ s⁻¹; after a `/` a product must be in
+//!   brackets: `V/(rad s)`. `V/rad s` is ambiguous between `V/(rad s)` and `V s/rad`, so it is rejected.
 //!
 //! Powers of ten are applied to the digits of the number itself: `"19.4 mm"` gives the same bits as the literal
 //! `0.0194`.
@@ -27,7 +25,7 @@ use numeral::Number;
 use product::Product;
 use std::f64::consts::PI;
 
-/// The advice for a text that is no quantity at all.
+/// Advice for a text that is not a quantity.
 pub const SUCH_AS: &str = "write a number with its unit, such as \"19.4 mm\"";
 
 /// A number with its unit, in SI.
@@ -37,7 +35,7 @@ pub struct Quantity {
     pub value: f64,
     /// Its dimension.
     pub dimension: Dimension,
-    /// The unit as it was typed; empty for a pure number.
+    /// The unit as typed; empty for a pure number.
     pub unit: String,
     /// Power of `Hz` in that unit: a frequency counts turns, an angular speed radians.
     pub hertz: i8,
