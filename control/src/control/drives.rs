@@ -1,4 +1,4 @@
-//! Feed-forward gains as drives and controllers of others take them, with their units.
+//! Feed-forward gains for drives and controllers of other makers, with their units.
 //!
 //! The axis is one mass along the belt, M ÿ + b ẏ + F sgn ẏ = κ η i with κ = n K_t/r, fed by V = R i + L di/dt + n K_e
 //! ẏ/r ([`Rigid`]). So, forward,
@@ -25,22 +25,22 @@ use std::f64::consts::PI;
 pub struct DriveGain {
     /// Whose.
     pub system: &'static str,
-    /// As it is called there.
+    /// Name in the manual of the drive.
     pub name: &'static str,
-    /// In the unit that is used there.
+    /// Value in `unit`.
     pub value: f64,
     /// Unit of the value.
     pub unit: &'static str,
 }
 
-/// The gains for an axis going forward; those in volts where a voltage is commanded.
+/// Gains for an axis moving forward; in volts in voltage mode.
 pub fn drive_gains(machine: &Machine) -> Vec<DriveGain> {
     if machine.drives.len() > 1 {
         return Vec::new();
     }
     let rigid = Rigid::of(machine);
     let motor = &machine.drives[0].motor;
-    // Before the amplifier's gain, which is the drive's own affair: the voltage or current at the motor.
+    // Voltage or current at the motor, without the amplifier's gain, which belongs to the drive.
     let gain = machine.drives[0].amplifier.gain;
     let friction = rigid.coulomb[0];
     let at_rest = |force: f64| rigid.command(force, 0.0, 0.0) * gain;
@@ -63,7 +63,7 @@ pub fn drive_gains(machine: &Machine) -> Vec<DriveGain> {
             vec![one("LinuxCNC", "FF1", 1e-3 * v, "A/(mm/s)"), one("LinuxCNC", "FF2", 1e-3 * a, "A/(mm/s^2)")]
         }
     };
-    // Of the motor's shaft: a way x is an angle n x/r.
+    // At the motor's shaft: a displacement x is an angle n x/r.
     let arm = machine.pulley_radius / motor.gear_ratio;
     let loss = motor.gear_efficiency;
     let total = rigid.mass * arm * arm;

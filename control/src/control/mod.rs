@@ -1,5 +1,5 @@
-//! Control of a machine: controllers stepped in time around the exact plant, input shapers, and the spectra that these
-//! are chosen from.
+//! Control of a machine: controllers stepped in time around the exact plant, input shapers, and spectra for their
+//! choice.
 //!
 //! [`closed_loop`] runs a [`Design`] on each drive of a machine along a [`Profile`] for each coordinate; [`close`] does
 //! so with any [`Controller`]s, including user-defined ones.
