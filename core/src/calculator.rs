@@ -51,7 +51,7 @@ pub enum Relation {
 pub struct Test<N> {
     /// The number.
     pub of: N,
-    /// How it relates.
+    /// Relation of the number to the constant.
     pub relation: Relation,
     /// To this constant.
     pub than: f64,

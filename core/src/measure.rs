@@ -26,7 +26,7 @@ const INTERPOLATED: u32 = 20;
 /// Largest shift of an instant by jitter, in intervals, so that samples keep their order.
 const FARTHEST: f64 = 0.5;
 
-/// Runs `experiment` on `stage` and records it.
+/// Runs `experiment` on `machine` and records it.
 ///
 /// The columns are time, the commanded input (`voltage` or `current`), `encoder_count` with its angle or position, and
 /// the channels of the measurement.
@@ -287,7 +287,7 @@ fn convert(value: f64, channel: &Channel) -> f64 {
     // Full steps only: a range of 10 in steps of 3 ends at 9.
     let most = (range / step * (1.0 + 1e-12)).floor();
     let code = (value / step).round().clamp(-most, most) + 0.0;
-    // Of a step that is 1/n, three are 3/n: 0.03, where 3 × 0.01 is not.
+    // For a step of 1/n, three steps are 3/n: 0.03, which 3 × 0.01 is not.
     let inverse = (1.0 / step).round();
     if inverse >= 1.0 && 1.0 / inverse == step { code / inverse } else { code * step }
 }

@@ -50,7 +50,7 @@ pub struct Setup<'a> {
     pub until: f64,
     /// Half the width of the window in which the cart counts as settled, m.
     pub window: f64,
-    /// How the equations are solved.
+    /// Solver of the equations.
     pub solver: Solver,
 }
 

@@ -67,9 +67,9 @@ pub struct Found {
 /// The shapers of each file, and the comparison of two spectra.
 #[derive(Debug, Clone)]
 pub struct Findings {
-    /// By file.
+    /// Result for each file.
     pub each: Vec<Found>,
-    /// Of two spectra.
+    /// Comparison of two spectra.
     pub comparison: Option<Comparison>,
 }
 

@@ -9,7 +9,7 @@ use crate::parameter::{Free, kinds};
 use crate::solve::{Ending, Flow, Solver};
 use crate::trajectory::Trajectory;
 
-/// `stage` with one uncertain parameter at a time, and everything physically linked to it, times 1 + `share` and times
+/// `machine` with one uncertain parameter at a time, and everything physically linked to it, times 1 + `share` and times
 /// 1 − `share`; with a description.
 pub fn spread(machine: &Machine, share: f64) -> Vec<(String, Machine)> {
     let axis = |kind: &Free, word: &str, factor: f64| {
@@ -36,7 +36,7 @@ pub struct Worst {
     pub axes: usize,
 }
 
-/// The controller made for `stage` on axes with each parameter changed by a relative `share`. None if `stop`, called
+/// The controller made for `machine` on axes with each parameter changed by a relative `share`. None if `stop`, called
 /// with every block of rows, ends it.
 pub fn worst(
     machine: &Machine,

@@ -115,7 +115,7 @@ impl StateFeedbackLaw {
         if let Some(scale) = weights.integral {
             let last = size - 1;
             a[(last, last)] = 1.0;
-            // Of the scale, if any, since the cart has to reach its target.
+            // The position by the scale, if any, since the cart has to reach its target.
             let measured = linear.scale.as_ref().unwrap_or(&linear.measured);
             for j in 0..n {
                 a[(last, j)] = every * measured[j];

@@ -136,7 +136,7 @@ pub struct Stepped {
 }
 
 impl Stepped {
-    /// The controller of `design` on `stage`, its first sample at time zero.
+    /// The controller of `design` on `machine`, its first sample at time zero.
     pub fn new(design: &Design, machine: &Machine) -> Result<Self> {
         let timing = Loop::of(design);
         timing.check(timing.every)?;

@@ -69,7 +69,7 @@ pub enum Quantity {
 
 use Quantity::*;
 
-/// Of an axis, in the order of a log.
+/// Quantities of an axis, in the order of a log.
 const OF_AXIS: [Quantity; 11] = [
     MotorCurrent,
     MotorVoltage,
@@ -84,7 +84,7 @@ const OF_AXIS: [Quantity; 11] = [
     CartAcceleration,
 ];
 
-/// Of a gantry.
+/// Quantities of a gantry.
 const OF_GANTRY: [Quantity; 18] = [
     LeftCurrent,
     RightCurrent,
@@ -106,7 +106,7 @@ const OF_GANTRY: [Quantity; 18] = [
     CartAcceleration,
 ];
 
-/// Of a gantry whose cart has a motor of its own, and whose gears are stiff.
+/// Quantities of a gantry with a motor for the cart and stiff gears.
 const OF_DUAL_BELT: [Quantity; 18] = [
     LeftCurrent,
     RightCurrent,

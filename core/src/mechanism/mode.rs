@@ -192,17 +192,17 @@ impl Part {
 /// The state of a part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Status {
-    /// Of a body.
+    /// State of a body.
     Motion(Motion),
-    /// Of a span: whether it is slack.
+    /// State of a span: true if slack.
     Slack(bool),
-    /// Of a limit.
+    /// State of a limit.
     Limit(Limit),
-    /// Of gear and end stops.
+    /// State of a gear or an end stop.
     Contact(Contact),
-    /// Of a line: which piece.
+    /// State of a line: index of its piece.
     Piece(u8),
-    /// Of a stepper: tooth pitches, four full steps each, by which its rotor is behind.
+    /// State of a stepper: tooth pitches, four full steps each, by which its rotor is behind.
     Slipped(i32),
 }
 

@@ -1,7 +1,7 @@
 //! Phases of a stepper: two windings with sinusoidal torque over the rotor angle.
 //!
-//! With N rotor teeth, the rotor's angle φ counted from a full step, ε = N φ + π/4, and the commanded field ψ = N x*/r
-//! + π/4 (Kuo and Kelemen 1979; Kenjo and Sugawara 1994):
+//! With N rotor teeth, the rotor's angle φ counted from a full step, ε = N φ + π/4, and the angle ψ = N x*/r + π/4 of
+//! the commanded field (Kuo and Kelemen 1979; Kenjo and Sugawara 1994):
 //!
 //! ```text
 //! L di_a/dt = v_a − R i_a + K_m φ̇ sin ε

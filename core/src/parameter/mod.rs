@@ -57,7 +57,7 @@ pub struct InStructure {
     pub get: fn(&Structure) -> Option<f64>,
     /// Sets it in a structure that has it.
     pub set: fn(&mut Structure, f64),
-    /// How a search for gains changes it.
+    /// Its role in a search for gains.
     pub tuned: Tuned,
 }
 
@@ -72,7 +72,7 @@ pub enum Tuned {
     Corner(&'static str),
 }
 
-/// How a parameter varies with `--spread` without being named.
+/// Variation of a parameter by `--spread` without being named.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Off {
     /// Not varied: it is counted, chosen or set.

@@ -32,7 +32,7 @@ impl Dimension {
         Self { mass, length, time, current, angle }
     }
 
-    /// `self` · `other`ⁿ, or none if an exponent exceeds [`LARGEST_EXPONENT`].
+    /// `self` · `other`ⁿ, or none if an exponent becomes too large.
     pub fn times(self, other: Self, n: i8) -> Option<Self> {
         let add = |a: i8, b: i8| {
             let sum = a.checked_add(b.checked_mul(n)?)?;

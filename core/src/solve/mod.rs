@@ -389,7 +389,7 @@ fn nothing_mounted() -> Error {
     Error::new("there is no stage to run").next("take one up with Bench::mount")
 }
 
-/// Runs `experiment` on `stage` and keeps everything in memory.
+/// Runs `experiment` on `machine` and keeps everything in memory.
 ///
 /// ```
 /// use taut::case::{Case, TEMPLATE};
