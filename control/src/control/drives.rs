@@ -5,16 +5,18 @@
 //!
 //! | system | gain | unit | value |
 //! |---|---|---|---|
-//! | WPILib, `SimpleMotorFeedforward` in metres | kS, kV, kA | V, V/(m/s), V/(m/s²) | R F/(κ η), R b/(κ η) + n K_e/r, R M/(κ η) |
-//! | LinuxCNC, `pid`, command in mm, output in V | FF1, FF2, FF3 | V s/mm, V s²/mm, V s³/mm | kV, kA and L M/(κ η), over 1000 |
+//! | WPILib, in metres | kS, kV, kA | V, V/(m/s), V/(m/s²) | R F/(κ η), R b/(κ η) + n K_e/r, R M/(κ η) |
+//! | LinuxCNC, command in mm, output in V | FF1, FF2, FF3 | V s/mm, V s²/mm, V s³/mm | kV, kA and L M/(κ η), over 1000 |
 //! | LinuxCNC, output in A | FF1, FF2 | A s/mm, A s²/mm | b and M over κ η, over 1000 |
-//! | ODrive | `config.inertia`; torque with the speed; torque against dry friction | N m/(turn/s²), N m/(turn/s), N m | 2π M (r/n)²/η, 2π b (r/n)²/η, F r/(n η) |
+//! | ODrive | `config.inertia` | N m/(turn/s²) | 2π M (r/n)²/η |
+//! | ODrive | torque with the speed; against dry friction | N m/(turn/s), N m | 2π b (r/n)²/η, F r/(n η) |
 //! | Beckhoff AX8000 3140:07, TwinCAT CNC P-AXIS-00391 | load inertia | kg m² | M (r/n)² less the rotor's; with it |
 //!
-//! Sources: docs.wpilib.org, "Feedforward Control in WPILib": V = kS sgn v + kV v + kA a. LinuxCNC, pid(9): FF1, FF2,
-//! FF3 times the first three derivatives of the command. ODrive's firmware, velocity ramp of the controller: the torque
-//! is `inertia` times the change of the speed in turn/s per second, in N m. Beckhoff Information System, AX8xxx object
-//! 3140:07 "Load inertia/mass", TF5200 P-AXIS-00391 "Load inertia": the total at the motor shaft.
+//! Sources: docs.wpilib.org, "Feedforward Control in WPILib", `SimpleMotorFeedforward`: V = kS sgn v + kV v + kA a.
+//! LinuxCNC, pid(9): FF1, FF2, FF3 times the first three derivatives of the command. ODrive's firmware, velocity ramp
+//! of the controller: the torque is `inertia` times the change of the speed in turn/s per second, in N m. Beckhoff
+//! Information System, AX8xxx object 3140:07 "Load inertia/mass", TF5200 P-AXIS-00391 "Load inertia": the total at the
+//! motor shaft.
 
 use crate::machine::rigid::Rigid;
 use crate::machine::{AmplifierMode, Machine};
