@@ -6,8 +6,8 @@
 //! | system | gain | unit | value |
 //! |---|---|---|---|
 //! | WPILib, in metres | kS, kV, kA | V, V/(m/s), V/(m/s²) | R F/(κ η), R b/(κ η) + n K_e/r, R M/(κ η) |
-//! | LinuxCNC, command in mm, output in V | FF1, FF2, FF3 | V s/mm, V s²/mm, V s³/mm | kV, kA and L M/(κ η), over 1000 |
-//! | LinuxCNC, output in A | FF1, FF2 | A s/mm, A s²/mm | b and M over κ η, over 1000 |
+//! | LinuxCNC, mm, output in V | FF1, FF2, FF3 | V s/mm, V s²/mm, V s³/mm | kV, kA and L M/(κ η), over 1000 |
+//! | LinuxCNC, mm, output in A | FF1, FF2 | A s/mm, A s²/mm | b and M over κ η, over 1000 |
 //! | ODrive | `config.inertia` | N m/(turn/s²) | 2π M (r/n)²/η |
 //! | ODrive | torque with the speed; against dry friction | N m/(turn/s), N m | 2π b (r/n)²/η, F r/(n η) |
 //! | Beckhoff AX8000 3140:07, TwinCAT CNC P-AXIS-00391 | load inertia | kg m² | M (r/n)² less the rotor's; with it |

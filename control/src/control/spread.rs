@@ -9,8 +9,8 @@ use crate::parameter::{Free, kinds};
 use crate::solve::{Ending, Flow, Solver};
 use crate::trajectory::Trajectory;
 
-/// `machine` with one uncertain parameter at a time, and everything physically linked to it, times 1 + `share` and times
-/// 1 − `share`; with a description.
+/// `machine` with one uncertain parameter at a time, and everything physically linked to it, times 1 + `share` and
+/// times 1 − `share`; with a description.
 pub fn spread(machine: &Machine, share: f64) -> Vec<(String, Machine)> {
     let axis = |kind: &Free, word: &str, factor: f64| {
         let mut other = machine.clone();
