@@ -9,9 +9,9 @@ use std::process::Command;
 /// Writes `carried.rs`: the shared object, or none, and the licences of what is in it.
 ///
 /// It is built where the program is built to be used: in release profiles, with the feature `fmu`. The source is that
-/// of the package `taut-fmu`, which this package depends on, in a repository or unpacked. A program that is being worked
-/// on takes the object that lies beside it, so that it is not compiled twice. Cargo holds its lock on the folder of this
-/// build while this runs, so the object has a folder of its own.
+/// of the package `taut-fmu`, which this package depends on, in a repository or unpacked. A program that is being
+/// worked on takes the object that lies beside it, so that it is not compiled twice. Cargo holds its lock on the folder
+/// of this build while this runs, so the object has a folder of its own.
 pub fn carry() {
     let out = PathBuf::from(env::var_os("OUT_DIR").unwrap_or_default());
     // The build script of `taut-fmu` sets this; without the feature `fmu` it is not a dependency.

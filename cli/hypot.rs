@@ -1,6 +1,6 @@
-//! √(x² + y²) in the place of the C library's: glibc has a new version of it since 2.35, and for it alone what is linked
-//! here would run on no older one. A part of the program, of the Python package and of the shared object for FMUs;
-//! `cli/wrap.rs` has the linker take it.
+//! √(x² + y²) in place of the C library's: glibc has a new version of it since 2.35, which alone would keep programs
+//! linked here from running with an older glibc. Part of the program, the Python package and the shared object for
+//! FMUs; `cli/wrap.rs` makes the linker use it.
 //!
 //! Only the linker calls these two.
 

@@ -1,9 +1,9 @@
 //! How often 95 % intervals hold the truth: machines with random friction and mass, logs with a disturbance that is
 //! known, a fit each.
 //!
-//! `cargo xtask coverage [--machines N] [--seed N] [--threads N] [--cell WORDS]...` prints a table; with `--causes` that
-//! of machines which a rigid axis with viscous and Coulomb friction is not, integrated without taut's solvers, and with
-//! `--told` what is said of each of them.
+//! `cargo xtask coverage [--machines N] [--seed N] [--threads N] [--cell WORDS]...` prints a table; with `--causes` for
+//! machines that differ from a rigid axis with viscous and Coulomb friction, integrated without taut's solvers, and
+//! with `--told` the findings of each.
 
 // Each of them is used in part.
 #[allow(dead_code)]
@@ -433,7 +433,7 @@ fn one(cell: &Cell, seed: u64, found: &Mutex<Found>) {
     }
 }
 
-/// What the fits of a kind of truth said.
+/// Findings of the fits for one kind of true machine.
 #[derive(Default)]
 struct Named {
     machines: usize,

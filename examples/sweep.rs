@@ -1,8 +1,8 @@
 //! Times the kernel of a sweep: the Table 4 machine, all of its parameters by ±20 %, 5 V and 10 V for 0.25 s, one
 //! simulated second at 1 kHz; prints JSON.
 //!
-//! `cargo run --release --package taut --example sweep [-- RUNS [THREADS [FIGURES]]]`, figures as `--figures` of `taut sweep`
-//! takes them
+//! `cargo run --release --package taut --example sweep [-- RUNS [THREADS [FIGURES]]]`, FIGURES as in `taut sweep
+//! --figures`
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;

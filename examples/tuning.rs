@@ -1,11 +1,12 @@
-//! `taut tune` on each of these cases, as a table: before and after at worst over the family, verdict, the limit that is
-//! active where it is worse, processor time; with `--evolution N` how far J is from what a differential evolution of N
-//! generations finds.
+//! `taut tune` on each of these cases, as a table: before and after at worst over the family, verdict, the active limit
+//! where it is worse, processor time; with `--evolution N` the distance of J from the result of a differential
+//! evolution of N generations.
 //!
-//! cargo run --release --package taut --example tuning -- [--evolution N] [--drawn N] stages/sollmann-jouaneh/controllers/*.toml
+//! cargo run --release --package taut --example tuning -- [--evolution N] [--drawn N]
+//! stages/sollmann-jouaneh/controllers/*.toml
 //!
-//! `--drawn N` also tunes N machines that are drawn about the first case named: mass, friction, pulleys' inertia and motor
-//! off by up to a factor of two. `--only-drawn` leaves out the cases themselves.
+//! `--drawn N` also tunes N machines that are drawn about the first case named: mass, friction, pulleys' inertia and
+//! motor off by up to a factor of two. `--only-drawn` leaves out the cases themselves.
 
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;

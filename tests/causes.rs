@@ -24,8 +24,8 @@ fn warns(found: &Fit, code: &str) -> bool {
     found.findings.iter().any(|one| one.code == code && one.grade == Grade::Warning)
 }
 
-/// A spring of 17 Hz between motor and cart made the mass's interval hold the truth of 7 of 100 machines, and `fit` said
-/// nothing of it.
+/// With a spring of 17 Hz between motor and cart, the mass's interval held the truth for 7 of 100 machines, and `fit`
+/// did not report it.
 #[test]
 fn a_missing_spring_is_named() {
     for truth in [Truth::Spring, Truth::SpringAtMotor] {
@@ -133,8 +133,8 @@ fn check_and_fit_say_the_same() {
     assert_eq!(fitted.findings, checked.fit.findings);
 }
 
-/// Intervals under narrow-band noise were nine times too wide: noises of first order have most of their power where that
-/// has next to none.
+/// Intervals under narrow-band noise were nine times too wide: first-order noise has most of its power where that has
+/// almost none.
 #[test]
 fn noise_that_swings_is_known_as_such() {
     let (mut squares, mut widths, mut inside) = ([0.0; 3], [0.0; 3], 0);

@@ -43,7 +43,7 @@ fn with_force(plain: &Case, phases: [f64; 2]) -> Case {
     case(&[&format!("cart.force_along=[{}]", points.join(", "))])
 }
 
-/// What a move on the machine of `truth` with the controller of `case` gives: columns of rows at the controller's rate.
+/// Simulates a move on the machine of `truth` with the controller of `case`: columns at the controller's rate.
 fn moved<const N: usize>(case: &Case, truth: &Case, name: &str, columns: [&str; N]) -> [Vec<f64>; N] {
     let design = case.controller.as_ref().unwrap();
     let motion = case.moves.iter().find(|one| one.name == name).unwrap();

@@ -286,8 +286,8 @@ fn the_machines_of_the_note() {
     }
 }
 
-/// With sides alike a dual belt swings as three pairs of masses do: both pulleys against each other on all four spans, both
-/// against the bridge, and the cart's pulley against the cart.
+/// With sides alike a dual belt swings as three pairs of masses do: both pulleys against each other on all four spans,
+/// both against the bridge, and the cart's pulley against the cart.
 #[test]
 fn a_dual_belt_swings_as_its_masses_do() {
     let text = r#"

@@ -44,7 +44,7 @@ fn promises_hold_on_simulated_logs_of_both_motors() {
     }
 }
 
-/// What is written reads back, and the run keeps the limits of bridge and cart and stands in the middle of both.
+/// A written design reads back; its run keeps the limits of bridge and cart and is centred in both.
 #[test]
 fn what_is_written_keeps_the_limits_of_both() {
     let case = Case::read(CORE_XY).unwrap();

@@ -93,8 +93,8 @@ fn belts_of_core_xy(free: &[&str]) -> Plan {
     }
 }
 
-/// With the angles of both motors in each other's columns a check took a minute of factors on them, none of which helped,
-/// and said to change a sign.
+/// With the angles of both motors in each other's columns a check took a minute of factors on them, none of which
+/// helped, and said to change a sign.
 #[test]
 fn exchanged_columns_of_two_motors_are_named() {
     for kind in [Kind::CoreXy, Kind::HFrame] {
@@ -248,8 +248,8 @@ fn spans_of_one_belt_show_by_their_sum() {
     assert_eq!(belts.looser(), Some(1), "{}", belts.words());
 }
 
-/// Belts that are off by up to a half swing out of step with the log: a search over the whole log alone ends where a few
-/// swings more or less fit.
+/// Belts that are off by up to a half swing out of step with the log: a search over the whole log alone ends at a fit
+/// that is off by a few periods.
 #[test]
 fn belts_are_found_from_a_stiffness_that_is_far_off() {
     let truth = case(Kind::CoreXy, &["belt.stiffness=[1.2e5, 1e5, 1.05e5, 0.9e5]"]);

@@ -192,8 +192,8 @@ proptest! {
         prop_assert!(power.friction.iter().chain(&power.spring).all(|&loss| loss >= 0.0), "{power:?}");
     }
 
-    /// Where nothing sticks, a run is that of the linear equations, whose exponential is another library's: every output
-    /// at the end, and poles are those of the modes.
+    /// Without sticking, a run solves the linear equations, whose exponential another library computes: all final
+    /// outputs agree, and the poles are those of the modes.
     #[test]
     fn the_linear_system_is_the_machine(gantry in gantry(), volts in prop::collection::vec(-12.0..12.0_f64, 3)) {
         let volts = &volts[..gantry.drives.len()];

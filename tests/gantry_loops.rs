@@ -1,4 +1,4 @@
-//! Loops round several drives: margins against matrices put together from their definitions on dense grids, and against runs.
+//! Loops with several drives: margins against matrices built from their definitions on dense grids, and against runs.
 
 use nalgebra::{Complex, DMatrix};
 use rand_pcg::Pcg64;

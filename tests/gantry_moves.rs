@@ -34,7 +34,7 @@ struct Course {
     speed: f64,
 }
 
-/// A gantry without dry friction under proportional control of each motor, along two lines and an arc with trapezoids of
+/// A gantry without dry friction under proportional control of each motor, along two lines and an arc with trapezoidal
 /// speed.
 struct Plain {
     kind: &'static str,
@@ -248,8 +248,8 @@ impl Plain {
         legs.iter().map(of_leg).fold(f64::INFINITY, f64::min)
     }
 
-    /// Runge and Kutta's method with this many steps a sample: the end of bridge and cart, peak and root mean square of the
-    /// distance from the path, and by how much that changed in the step before the peak.
+    /// Runge and Kutta's method with this many steps a sample: the end of bridge and cart, peak and root mean square of
+    /// the distance from the path, and by how much that changed in the step before the peak.
     fn integrated(&self, steps: usize) -> ([f64; 2], [f64; 3]) {
         let (mut z, h) = ([0.0; 10], self.every / steps as f64);
         let samples = (self.until / self.every).round() as usize;

@@ -1,5 +1,6 @@
 //! Results keep their bits, on any machine, until a change of the solvers is meant: `UPDATE_EXPECT=1 cargo test
-//! --package taut --test all golden::` writes `tests/golden.txt` anew. Everywhere else tolerances are lengths and times.
+//! --package taut --test all golden::` writes `tests/golden.txt` anew. Everywhere else tolerances are lengths and
+//! times.
 
 use std::fmt::Write;
 use taut::case::Case;

@@ -443,8 +443,8 @@ fn the_time_of_a_plateaus_peak_depended_on_the_output_interval_of_the_general_so
     }
 }
 
-/// Drawn machines with a rigid belt, by both solvers. A body whose rate depends on its speed alone approaches its steady
-/// speed from one side and never reaches it: it is fastest where the pulse ends.
+/// Drawn machines with a rigid belt, by both solvers. A body whose rate depends on its speed alone approaches its
+/// steady speed from one side and never reaches it: it is fastest where the pulse ends.
 #[test]
 fn the_time_of_a_plateaus_peak_is_the_same_on_drawn_machines() {
     let mut chance = common::chance::Chance::new(28);

@@ -1,5 +1,5 @@
-//! Machines of every kind with any of their numbers set to anything, by the general solver: a result or an error, never a
-//! panic, and an accuracy for every result.
+//! Machines of every kind with any of their numbers set to anything, by the general solver: a result or an error, never
+//! a panic, and an accuracy for every result.
 
 use crate::common::chance::Chance;
 use std::panic::{AssertUnwindSafe, catch_unwind};

@@ -213,7 +213,7 @@ fn intervals_change_positions_by_no_more_than_is_stated() {
     assert!(found.is_empty(), "{}", found.join("\n"));
 }
 
-// --- events under inputs that change with time -------------------------------------------------------------------------
+// --- events under inputs that change with time -----------------------------------------------------------------------
 
 /// A drive pulley that holds up to 0.03 N m, with curved friction elsewhere.
 const PLAIN: &str = r#"

@@ -1,5 +1,5 @@
-//! Steppers against an integration of their own: the two phases, rotor and belt by the classical formula with steps of a
-//! microsecond, which shares nothing with the solvers. Also limit laws that hold by hand.
+//! Steppers against an integration of their own: the two phases, rotor and belt by the classical formula with steps of
+//! a microsecond, which shares nothing with the solvers. Also limit laws that hold by hand.
 
 use crate::common::chance::Chance;
 use std::f64::consts::{FRAC_1_SQRT_2, PI};

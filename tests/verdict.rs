@@ -154,8 +154,8 @@ fn a_law_that_was_not_asked_for_widens_intervals_and_is_named() {
     assert!(held >= 3 * machines - 2, "{held} of {}", 3 * machines);
 }
 
-/// Logs without noise, as a program writes them to six digits or to twelve, were said to speak for Coulomb friction "that
-/// is 640 nN less forward than backward": such a law moves an angle by less than the last digit.
+/// Logs without noise, as a program writes them to six digits or to twelve, were said to speak for Coulomb friction
+/// "that is 640 nN less forward than backward": such a law moves an angle by less than the last digit.
 #[test]
 fn last_digits_of_a_log_speak_for_no_law() {
     for digits in [6, 7, 12] {

@@ -50,9 +50,9 @@ fn slips(case: &Case, target: f64, watched: f64) -> Vec<f64> {
     times
 }
 
-/// Sticky axes with an integral, drawn, every third without a breakaway above Coulomb friction: one that slips again and
-/// again in long runs from three starts is not said to rest, one that slips in none is not said to slip, and where the
-/// runs agree, so does the time between slips. `TAUT_CASES` sets how many.
+/// Sticky axes with an integral, drawn, every third without a breakaway above Coulomb friction: one that slips again
+/// and again in long runs from three starts is not said to rest, one that slips in none is not said to slip, and where
+/// the runs agree, so does the time between slips. `TAUT_CASES` sets how many.
 #[test]
 fn hunting_is_that_of_long_runs() {
     let file = case("hunts-slowly.toml").text;

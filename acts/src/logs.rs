@@ -56,8 +56,8 @@ pub fn columns(request: &Request, context: &Context) -> Result<Reply> {
     })))
 }
 
-/// The case of a request with its logs in the place of its experiments, and its plan: `logs`, a list of `name` and `log`,
-/// the table of a log; `plan`, the table `[fit]`. Both are the text's own where they are left out.
+/// The case of a request with its logs in the place of its experiments, and its plan: `logs`, a list of `name` and
+/// `log`, the table of a log; `plan`, the table `[fit]`. Both are the text's own where they are left out.
 fn planned(request: &Request, context: &Context) -> Result<(Case, Plan)> {
     let mut request = request.clone();
     let mut changes = request.list("changes").to_vec();

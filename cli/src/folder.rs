@@ -229,8 +229,7 @@ pub fn files_of(name: &Path, text: &str) -> Result<Vec<InputFile>> {
     Ok(Case::from_text_for(name, text, &[], Files::Nothing)?.files)
 }
 
-/// The files of a case that are there, and what they are called in a folder of results: as they are, with a number where
-/// that is taken.
+/// Existing files of a case with their names in a folder of results: unchanged, or with a number if the name is taken.
 pub fn brought(files: &[InputFile]) -> HashMap<PathBuf, String> {
     let mut names: HashMap<PathBuf, String> = HashMap::new();
     for file in files {

@@ -3,8 +3,8 @@
 //!
 //! A command that keeps what there is calls [`Interrupt::listen`] and has [`GRACE`] from the first signal on; any other
 //! ends at once, as does every command at a second signal. Ending removes the temporary files and locks of the program:
-//! each result is as it was before or as it will be. Signals that are ignored when the program starts (under `nohup`, in
-//! the background of a script) stay ignored.
+//! each result is as it was before or as it will be. Signals that are ignored when the program starts (under `nohup`,
+//! in the background of a script) stay ignored.
 
 use crate::failure::Failure;
 use crate::terminal;
@@ -64,8 +64,8 @@ pub fn ignored() -> Vec<i32> {
     Vec::new()
 }
 
-/// Starts the thread that waits for signals; `json` if an error is wanted as JSON. Where it cannot be started, signals do
-/// what they do by default.
+/// Starts the thread that waits for signals; `json` for errors as JSON. If it cannot be started, signals keep their
+/// default actions.
 #[cfg(unix)]
 pub fn watch(json: bool) {
     use signal_hook::iterator::Signals;

@@ -79,7 +79,7 @@ const TABLE: &[(&str, &[&str], &str, Ends)] = &[
     ("studio", &["--port", "none"], AXIS, Refused("--port")),
 ];
 
-/// What a repeated move needs of a gantry of the examples: gains that are stable on every machine of the family.
+/// Gains for a repeated move of an example gantry, stable on every machine of the family.
 const CALM: &str =
     "controller.pid={ proportional = \"5 V/mm\", integral = \"20 V/(mm s)\", derivative = \"40 V s/m\" }";
 

@@ -84,7 +84,8 @@ runs = 4
     folder
 }
 
-/// `taut simulate rig.toml --out .` replaced the measured log `5-v-pulse.csv` by the simulation of it, with exit status 0.
+/// `taut simulate rig.toml --out .` replaced the measured log `5-v-pulse.csv` by the simulation of it, with exit status
+/// 0.
 #[test]
 fn a_simulation_does_not_replace_its_log() {
     let folder = with_a_log("5-v-pulse.csv");

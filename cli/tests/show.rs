@@ -138,7 +138,7 @@ fn what_nothing_bounds_is_said() {
     assert!(rows(&found).iter().all(|row| row["key"] != "largest_force"));
 }
 
-/// What is said of an axis is said of a gantry: by hand from the numbers of the CoreXY, both motors for each direction.
+/// A gantry is described as an axis is; values by hand from the numbers of the CoreXY, both motors for each direction.
 #[test]
 fn a_gantry_is_answered_as_an_axis_is() {
     let square = "stages/core-xy/square.toml";

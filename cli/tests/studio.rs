@@ -654,8 +654,8 @@ fn memory(id: u32) -> Option<u64> {
     Some(1024 * kilobytes.parse::<u64>().ok()?)
 }
 
-/// Fifty pages drag at once while ten thousand requests come in; `TAUT_STUDIO_MINUTES=60` goes on for an hour, and prints
-/// what memory it needs.
+/// Fifty pages drag at once while ten thousand requests come in; `TAUT_STUDIO_MINUTES=60` goes on for an hour, and
+/// prints what memory it needs.
 #[test]
 fn fifty_pages_drag_at_once_and_memory_stays() {
     let studio = Studio::start(&[TABLE4]);

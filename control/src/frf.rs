@@ -11,7 +11,7 @@
 //! |ΔG| ≤ √(E|ΔG|² F₂,ν(0.95)),  ν = 2 (K_e − 1)          the circle that holds it in 95 of 100
 //! ```
 //!
-//! Of a machine with n drives U and R are vectors and G is a row, an element for each drive:
+//! For a machine with n drives, U and R are vectors and G is a row with an element for each drive:
 //!
 //! ```text
 //! G = S_yr S_ur⁻¹,  S_yr = Σ Y Rᴴ,  S_ur = Σ U Rᴴ,  S_rr = Σ R Rᴴ
@@ -20,20 +20,19 @@
 //! β_j² = 1 − 1/([S_rr]_jj [S_rr⁻¹]_jj)                 coherence of an input with the others
 //! ```
 //!
-//! Inputs that are excited at a line are solved for there; one whose β² is above [`ALIKE`] cannot be told from the
-//! others and has no point. Logs that do not tell all inputs apart each by itself, as those of motors that were moved
-//! one after the other, are taken together.
+//! At each line, G is solved for the excited inputs; one whose β² is above [`ALIKE`] cannot be distinguished from the
+//! others and has no point. Logs that do not distinguish all inputs by themselves, such as those of motors moved one
+//! after the other, are combined.
 //!
-//! A window smears: a sum over segments is that of the spectrum about a line, (2/3, 1/6, 1/6) of it from the line and its
-//! neighbours under Hann's. Where the input's spectrum rises within that, as Σ U R* does in closed loop towards low
-//! frequencies, G would be off by 2 G′ Φ′/(6 Φ) of the lines' distance; so both sums are taken less a sixth of their
-//! second difference, which makes the window's second moment zero and E|ΔG|² 1.44 times as large.
+//! A window smears: a sum over segments averages the spectrum around a line, with weights (2/3, 1/6, 1/6) of the line
+//! and its neighbours for Hann's window. If the input's spectrum changes within that, as Σ U R* in closed loop towards
+//! low frequencies, G would have an error of 2 G′ Φ′/(6 Φ) of the line spacing; so a sixth of their second difference
+//! is subtracted from both sums, which makes the window's second moment zero and E|ΔG|² 1.44 times as large.
 //!
-//! In closed loop Σ Y U*/Σ |U|² would tend to −1/C where noise is strong, as the controller answers it; the reference
-//! knows nothing of noise. Segments overlap by half under Hann's window, which makes K_e = 0.95 K of them count. Of a
-//! periodic input segments are whole periods without a window, the first one left out, and only lines that are excited
-//! count. All signals are taken as first differences, which leaves G as it is, and keeps the integrator of a position
-//! from leaking over the spectrum.
+//! In closed loop Σ Y U*/Σ |U|² would tend to −1/C under strong noise, to which the controller responds; the reference
+//! is independent of noise. Segments overlap by half under Hann's window, which gives K_e = 0.95 K effective ones. For
+//! a periodic input, segments are whole periods without a window, the first one omitted, and only excited lines count.
+//! All signals are differenced once, which does not change G and prevents leakage from the integrator of a position.
 //!
 //! J. S. Bendat, A. G. Piersol, *Random Data*, 4th ed., Wiley 2010, chapters 9 and 11; L. Ljung, *System
 //! Identification*, 2nd ed., Prentice Hall 1999, section 13.5; R. Pintelon, J. Schoukens, *System Identification: A
@@ -58,13 +57,13 @@ use nalgebra::Complex;
 use spectra::{Row, Spectra};
 use std::f64::consts::PI;
 
-/// Share of the lines at which an input cannot be told from the others that is worth a warning.
+/// Fraction of lines with an indistinguishable input that causes a warning.
 const SOME: f64 = 0.1;
 
-/// Least coherence of a point that a fit, a margin or a peak may use.
+/// Least coherence of a point for fits, margins and peaks.
 pub const COHERENT: f64 = 0.5;
 
-/// How a record is cut.
+/// Segmentation of a record.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Cut {
     /// Length of a segment, s.
@@ -80,7 +79,7 @@ pub struct Point {
     pub omega: f64,
     /// G, units of the output per unit of the input.
     pub value: Complex<f64>,
-    /// Radius of the circle that holds the true one in 95 of 100 logs.
+    /// Radius of the circle that contains the true value in 95 of 100 logs.
     pub radius: f64,
     /// √E|ΔG|².
     pub deviation: f64,
@@ -88,30 +87,30 @@ pub struct Point {
     pub coherence: f64,
 }
 
-/// A frequency response from one log, or from several that are taken together.
+/// A frequency response from one log, or from several combined.
 #[derive(Debug, Clone)]
 pub struct Frf {
-    /// Of the log; of several with commas between.
+    /// Name of the log, or of several, separated by commas.
     pub name: String,
-    /// The number of the drive whose input it is from.
+    /// Index of the drive of its input.
     pub drive: usize,
     /// The key of that input's column in a log.
     pub input: &'static str,
-    /// β² of that input with the others: the median over the lines at which it is excited. Zero with a single drive.
+    /// β² of that input with the others: median over the lines at which it is excited. Zero for a single drive.
     pub alike: f64,
     /// The measured quantity.
     pub quantity: Quantity,
-    /// Between samples, s.
+    /// Sample interval, s.
     pub every: f64,
-    /// Segments or periods.
+    /// Number of segments or periods.
     pub segments: usize,
-    /// Samples in each.
+    /// Number of samples in each.
     pub length: usize,
-    /// True if those are periods.
+    /// True for periods.
     pub periodic: bool,
     /// True if a reference was used.
     pub closed: bool,
-    /// By frequency.
+    /// Points by frequency.
     pub points: Vec<Point>,
 }
 
@@ -126,7 +125,7 @@ impl Frf {
         point.coherence >= COHERENT && point.radius < point.value.norm()
     }
 
-    /// The log and the measured quantity; of a machine with several drives from which input.
+    /// The log and the measured quantity, with the input if there are several drives.
     pub fn title(&self) -> String {
         let quantity = self.quantity.name();
         match self.input {
@@ -135,19 +134,19 @@ impl Frf {
         }
     }
 
-    /// Number of the line that a point is.
+    /// Line number of a point.
     fn line(&self, point: &Point) -> f64 {
         (point.omega * self.length as f64 * self.every / (2.0 * PI)).round()
     }
 }
 
-/// The frequency responses of an axis' log, one for each of its outputs that has a sign.
+/// Frequency responses from the log of an axis, one for each signed output.
 pub fn estimate(log: &Log, cut: &Cut) -> Result<Vec<Frf>> {
     Ok(estimate_all(Kind::Axis, &[log], cut)?.0)
 }
 
-/// The frequency responses of the logs of a machine of this kind, by log, input and output, and warnings. Logs that do
-/// not tell all inputs apart each by itself are taken together.
+/// Frequency responses from logs of a machine of this kind, by log, input and output, and warnings. Logs that do not
+/// distinguish all inputs by themselves are combined.
 pub fn estimate_all(kind: Kind, logs: &[&Log], cut: &Cut) -> Result<(Vec<Frf>, Vec<String>)> {
     let (mut each, mut rest) = (Vec::new(), Vec::new());
     for log in logs {
@@ -198,7 +197,7 @@ pub fn estimate_all(kind: Kind, logs: &[&Log], cut: &Cut) -> Result<(Vec<Frf>, V
     Ok((frfs, warnings))
 }
 
-/// Why there is no response to some inputs.
+/// Reasons for missing responses to some inputs.
 fn untold(kind: Kind, spectra: &Spectra) -> Vec<Error> {
     let name = |drive: &usize| kind.geometry().drives[*drive].input;
     let listed = |drives: &[usize]| drives.iter().map(name).collect::<Vec<_>>().join(" and ");
@@ -227,36 +226,35 @@ fn untold(kind: Kind, spectra: &Spectra) -> Vec<Error> {
     errors
 }
 
-/// A response beside the model's.
+/// A measured response with that of the model.
 #[derive(Debug, Clone)]
 pub struct Response {
-    /// As it was measured.
+    /// The measured response.
     pub frf: Frf,
-    /// Of the model as the file has it, at the same points; empty where the model has no such quantity.
+    /// Response of the model of the file at the same points; empty if the model lacks the quantity.
     pub model: Vec<Complex<f64>>,
-    /// Of the model with what was fitted; empty without a fit.
+    /// Response of the fitted model; empty without a fit.
     pub fitted: Vec<Complex<f64>>,
-    /// Margins of the case's controllers, of the position that that of this drive measures.
+    /// Margins of the case's controllers, for the position measured by this drive's controller.
     pub margins: Option<Measured>,
 }
 
-/// All that the logs of a case say.
+/// All results from the logs of a case.
 #[derive(Debug, Clone)]
 pub struct Measurement {
-    /// Where the model was asked.
+    /// Operating point of the model.
     pub known: Known,
-    /// By log, input and output.
+    /// Responses by log, input and output.
     pub responses: Vec<Response>,
-    /// Inputs that the logs do not tell apart.
+    /// Warnings about inputs that the logs do not distinguish.
     pub warnings: Vec<String>,
-    /// Stiffness, damping, delay; or why not.
+    /// Stiffness, damping and delay, or the reason for a missing fit.
     pub fit: Result<FrfFit>,
 }
 
 impl Known {
-    /// Of a case, with the cart and the bridge here, m, and this delay, s: at zero, and that of the controller where
-    /// nothing is said. Errors: no numbers, a place outside the travel, and that of a
-    /// bridge where there is none.
+    /// Operating point of a case, for these positions of cart and bridge, m, zero by default, and this delay, s, by
+    /// default that of the controller. Errors: NaN, a position outside the travel, or a position of a missing bridge.
     pub fn of(case: &Case, at: Option<f64>, bridge: Option<f64>, delay: Option<f64>) -> Result<Self> {
         for (option, value) in [("--at", at), ("--bridge", bridge), ("--delay", delay)] {
             if let Some(value) = value.filter(|value| !value.is_finite()) {
@@ -270,7 +268,7 @@ impl Known {
     }
 }
 
-/// Measures the responses of all logs of a case, and what follows from them.
+/// Measures the responses of all logs of a case, with fit and margins.
 pub fn measure(case: &Case, cut: &Cut, known: Known) -> Result<Measurement> {
     crate::case::needs_motors(&case.machine)?;
     case.complete()?;
@@ -302,14 +300,14 @@ fn is_kinematic(quantity: Quantity) -> bool {
     quantity.is_position() || quantity.is_speed()
 }
 
-/// The names of the position that the controller of a drive measures; the first is that itself.
+/// Names of the position measured by the controller of a drive, the measured quantity first.
 fn measured_by(machine: &Machine, drive: usize) -> Vec<String> {
     let geometry = machine.geometry();
     let at = &geometry.drives[drive];
     let pulley = format!("{}_angle", geometry.label(at.pulley).key);
     match (machine.encoder, measures_cart(machine)) {
         (_, true) => vec![Quantity::CartPosition.name().into()],
-        // Without play in a gear the rotor's angle, divided by its ratio, is that of the pulley.
+        // With a stiff gear, the rotor's angle divided by the ratio is that of the pulley.
         (Some(encoder), _) if encoder.at != EncoderPlace::DrivePulley => {
             vec![format!("{}_angle", at.rotor.key), pulley]
         }
@@ -317,8 +315,8 @@ fn measured_by(machine: &Machine, drive: usize) -> Vec<String> {
     }
 }
 
-/// Margins of the case's controllers, if this is the response of what that of its drive measures, and those of the
-/// other drives were measured with it.
+/// Margins of the case's controllers, if this is the response of the position measured by its drive's controller, and
+/// those of the other drives were measured with it.
 fn margins_of(case: &Case, frf: &Frf, all: &[Frf]) -> Option<Measured> {
     let (design, machine) = (case.controller.as_ref()?, &case.machine);
     if !measured_by(machine, frf.drive).iter().any(|name| name == frf.quantity.name()) {

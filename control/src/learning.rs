@@ -1,34 +1,35 @@
-//! Iterative learning: from the log of a repeated move the signal to add to the command at its next repetition.
+//! Iterative learning control: from the log of a repeated move, the signal to add to the command at its next
+//! repetition.
 //!
-//! With the error e = r − y of a trial, the signal w that was added to the command, and the closed loop's response T
-//! from there to y, the next signal is
+//! With the error e = r − y of a trial, the signal w that was added to the command, and the closed-loop response T from
+//! w to y, the next signal is
 //!
 //! ```text
 //! w⁺ = Q (w + L e),  L = s T₀*/(|T₀|² + ρ²)                    (T₀ of the machine of the file)
 //! ```
 //!
-//! Signals are finite and known whole, so L and Q need not be causal: both act on their transforms. On a machine with
-//! the response T the next error is e − T (w⁺ − w), and the distance of w from its limit shrinks in each repetition by
-//! at least
+//! Signals are finite and completely known, so L and Q need not be causal: both act on their transforms. On a machine
+//! with the response T the next error is e − T (w⁺ − w), and the distance of w from its limit shrinks in each
+//! repetition by at least
 //!
 //! ```text
 //! max |Q (1 − L T)| ≤ γ < 1                            (M. Norrlöf, S. Gunnarsson 2002)
 //! ```
 //!
-//! in the root of its sum of squares, also where the signal is cut to the time of the move. Where s = 1 would leave
-//! more than γ on a machine of the family, s falls, to zero where one would be left with all of its error or more: then
-//! |1 − L T| ≤ 1 on all of them, and the error at the limit, (1 − Q)/(1 − Q (1 − L T)) of that without learning, is
-//! larger at no frequency. Q is the largest gain of at most 1 with which the bound holds, and falls to zero where T₀ is
-//! too small to be inverted; there the feedback is left alone.
+//! in its root sum of squares, also if the signal is cut to the time of the move. At frequencies where s = 1 would
+//! leave more than γ on a machine of the family, s is reduced, to zero where one machine would keep all of its error or
+//! more: then |1 − L T| ≤ 1 on all of them, and the final error, (1 − Q)/(1 − Q (1 − L T)) times that without learning,
+//! does not increase at any frequency. Q is the largest gain of at most 1 with which the bound holds, and falls to zero
+//! where T₀ is too small to be inverted; there only feedback acts.
 //!
-//! Of a gantry e and w are vectors: the errors of bridge and cart, and the signals that move one of them alone, which
-//! the motors get as their belts have it, B w with r φ = B q. T is a matrix of two rows, and
+//! For a gantry, e and w are vectors: the errors of bridge and cart, and the signals that move one of them alone, which
+//! give the motors B w with r φ = B q. T is a 2 × 2 matrix, and
 //!
 //! ```text
 //! L = s T̃₀ᴴ (T̃₀ T̃₀ᴴ + 1)⁻¹ R⁻¹,  T̃₀ = R⁻¹ T₀,  R = diag ρ_i          (ρ_i of the largest row i of T₀)
 //! ```
 //!
-//! with largest singular values in place of magnitudes, and the smallest of T̃₀ where T₀ is to be inverted.
+//! with largest singular values instead of magnitudes, and the smallest of T̃₀ for its inversion.
 //!
 //! M. Norrlöf, S. Gunnarsson, "Time and frequency domain convergence properties in iterative learning control", *Int.
 //! J. Control* 75 (2002) 1114-1126. D. Bristow, M. Tharayil, A. Alleyne, "A survey of iterative learning control",
@@ -47,27 +48,27 @@ use rustfft::{Fft, FftPlanner};
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-/// γ: the share of the distance from the limit that is left by each repetition at most.
+/// γ: largest fraction of the distance from the limit that remains after each repetition.
 pub const CONTRACTION: f64 = 0.8;
 
 /// ρ over the largest |T₀|, and multiples of ρ between which Q rises from 0 to 1.
 const INVERTIBLE: f64 = 0.05;
 const KEPT_FROM: f64 = 3.0;
 
-/// Repetitions that are predicted.
+/// Number of predicted repetitions.
 const PREDICTED: usize = 8;
 
-/// Most samples of a trial, and least of its rest after the move.
+/// Maximum number of samples of a trial, and minimum number at rest after the move.
 const MOST_SAMPLES: usize = 1 << 17;
 const LEAST_REST: usize = 10;
 
-/// Most samples of the controller between two rows of a log.
+/// Maximum number of controller samples between two rows of a log.
 const COARSEST: f64 = 2.5;
 
-/// The position that a trial was measured by.
+/// The measured position of a trial.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum At {
-    /// What slides: the cart; of a gantry bridge and cart.
+    /// Sliding parts: the cart; for a gantry, bridge and cart.
     Cart,
     /// The measurements of the controllers of all drives, along the belt.
     Encoder,
@@ -76,11 +77,11 @@ pub enum At {
 /// A repetition of a move.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trial {
-    /// s from the beginning of the move, increasing.
+    /// Times from the start of the move, s, increasing.
     pub time: Vec<f64>,
-    /// Those of each sliding part, or of each drive, m.
+    /// Positions of each sliding part, or of each drive, m.
     pub positions: Vec<Vec<f64>>,
-    /// The measured place.
+    /// The measured position.
     pub at: At,
 }
 
@@ -105,7 +106,7 @@ impl Size {
     }
 }
 
-/// A repetition to come: on the machine of the file, and the largest over the family.
+/// Predicted errors of a repetition: on the nominal machine, and the largest over the family.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Predicted {
     /// On the machine of the file.
@@ -119,7 +120,7 @@ pub struct Predicted {
 pub struct Point {
     /// Hz.
     pub frequency: f64,
-    /// |1 − L T|, the largest of the family.
+    /// |1 − L T|, largest over the family.
     pub left: f64,
     /// Q.
     pub kept: f64,
@@ -128,9 +129,9 @@ pub struct Point {
 /// The signal of a drive.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DriveSignal {
-    /// In the trial, V or A.
+    /// Signal of the trial, V or A.
     pub before: Vec<f64>,
-    /// The next one, V or A.
+    /// The next signal, V or A.
     pub next: Vec<f64>,
 }
 
@@ -141,23 +142,23 @@ impl DriveSignal {
     }
 }
 
-/// The error of what slides.
+/// Error of a sliding part.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SlideError {
-    /// In the trial, m: reference less position.
+    /// Error of the trial, m: reference minus position.
     pub error: Vec<f64>,
-    /// The next one on the machine of the file, m.
+    /// Predicted error of the next repetition on the nominal machine, m.
     pub expected: Vec<f64>,
-    /// Size of that of the trial.
+    /// Size of the error of the trial.
     pub now: Size,
-    /// The repetitions to come.
+    /// Predicted repetitions.
     pub predicted: Vec<Predicted>,
 }
 
-/// The next signal, and what it does.
+/// The next signal, and its predicted effect.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Learned {
-    /// Between values, s: the controller's sample time.
+    /// Interval between values, s: the controller's sample time.
     pub every: f64,
     /// The signal of each drive.
     pub drives: Vec<DriveSignal>,
@@ -167,11 +168,11 @@ pub struct Learned {
     pub contraction: f64,
     /// Lowest and highest frequency with Q = 1, Hz.
     pub band: [f64; 2],
-    /// Share of the squared error of the trial at frequencies with Q = 1.
+    /// Fraction of the squared error of the trial at frequencies with Q = 1.
     pub share: f64,
-    /// Along the frequencies.
+    /// Points over frequency.
     pub points: Vec<Point>,
-    /// Machines of the family.
+    /// Number of machines of the family.
     pub axes: usize,
 }
 
@@ -181,12 +182,12 @@ impl Learned {
         self.drives.iter().map(DriveSignal::largest).fold(0.0, f64::max)
     }
 
-    /// The next signal of each drive as something to add to its command.
+    /// The next signal of each drive, as an addition to its command.
     pub fn added(&self) -> Vec<Added> {
         self.drives.iter().map(|drive| Added::new(self.every, drive.next.clone())).collect()
     }
 
-    /// True if the next repetition may have no smaller error on the worst machine, by the root of the sum of squares.
+    /// True if the next repetition may not reduce the RMS error on the worst machine.
     pub fn is_near_its_limit(&self) -> bool {
         let sum = |of: &dyn Fn(&SlideError) -> f64| self.slides.iter().map(|slide| of(slide).powi(2)).sum::<f64>();
         let next = |slide: &SlideError| slide.predicted.first().map_or(0.0, |next| next.worst.rms);
@@ -194,9 +195,9 @@ impl Learned {
     }
 }
 
-/// The next signal of a move from its last repetition, in which `before` was added to the command of each drive. Errors:
-/// a log that does not cover the move, a controller that is not linear, a loop that is unstable on a machine of the
-/// family, a family on which learning would not converge.
+/// Next signal of a move from its last repetition, in which `before` was added to the command of each drive. Errors: a
+/// log that does not cover the move, a nonlinear controller, a loop that is unstable on a machine of the family, or a
+/// family for which learning would not converge.
 pub fn learn(
     case: &Case,
     motion: &Move,
@@ -252,7 +253,7 @@ fn learned<const M: usize>(
     let within = |k: &usize| rule.kept[*k] >= 1.0;
     let hertz = |k: usize| transform.omega(k) / (2.0 * PI);
     let frequencies = || (0..transform.bins()).filter(within);
-    // Of each drive what its belt's travel has of it.
+    // Each drive gets its share of the belt's travel.
     let shares = case.machine.belt_shares();
     let next = |drive: usize| weighed(&predictions.next, shares[drive], n);
     let drives = before.into_iter().enumerate().map(|(drive, before)| DriveSignal { before, next: next(drive) });
@@ -281,7 +282,7 @@ fn weighed(signals: &[Vec<f64>], weights: &[f64], n: usize) -> Vec<f64> {
     (0..n).map(|k| signals.iter().zip(weights).map(|(signal, weight)| weight * signal[k]).sum()).collect()
 }
 
-/// Reference less position of each sliding part at the controller's samples, m.
+/// Reference minus position of each sliding part at the controller's samples, m.
 fn errors(geometry: &Geometry, motion: &Move, design: &Design, trial: &Trial) -> Result<Vec<Vec<f64>>> {
     let Trial { time, positions, at } = trial;
     let every = design.every;
@@ -346,14 +347,14 @@ fn errors(geometry: &Geometry, motion: &Move, design: &Design, trial: &Trial) ->
     Ok((0..geometry.slides.len()).map(one).collect())
 }
 
-/// 1 during the move, then down to 0 over the rest, half a cosine: a cart that sticks does not answer as T does.
+/// 1 during the move, then half a cosine to 0 over the rest, since a stuck cart does not respond as T does.
 fn taper(n: usize, end: f64) -> Vec<f64> {
     let rest = (n as f64 - end).max(1.0);
     let at = |k: usize| ((k as f64 - end) / rest).clamp(0.0, 1.0);
     (0..n).map(|k| 0.5 * (1.0 + (PI * at(k)).cos())).collect()
 }
 
-/// Transforms of signals as long as a trial, with as much silence behind them.
+/// Transforms of signals of a trial's length, padded with as many zeros.
 struct Transform {
     n: usize,
     length: usize,
@@ -364,7 +365,7 @@ struct Transform {
 
 type Spectrum = Vec<Complex<f64>>;
 
-/// A matrix and a vector at a frequency, of what slides and the signals that move it.
+/// Matrix and vector at a frequency, over slides and the signals that move them.
 type Matrix<const M: usize> = SMatrix<Complex<f64>, M, M>;
 type Vector<const M: usize> = SVector<Complex<f64>, M>;
 
@@ -375,12 +376,12 @@ impl Transform {
         Self { n, length, every, there: planner.plan_fft_forward(length), back: planner.plan_fft_inverse(length) }
     }
 
-    /// Frequencies from 0 to half the sampling rate.
+    /// Number of frequencies from 0 to half the sampling rate.
     fn bins(&self) -> usize {
         self.length / 2 + 1
     }
 
-    /// rad/s; of the first, at which an integrator has no response, next to nothing.
+    /// rad/s; a tiny value for the first, at which an integrator has no finite response.
     fn omega(&self, k: usize) -> f64 {
         let step = 2.0 * PI / (self.length as f64 * self.every);
         if k == 0 { 1e-3 * step } else { k as f64 * step }
@@ -397,7 +398,7 @@ impl Transform {
     /// The signal of a spectrum within the time of the trial.
     fn signal(&self, spectrum: &[Complex<f64>]) -> Vec<f64> {
         let mut all = spectrum.to_vec();
-        // Ends of the spectrum of a real signal are real.
+        // The ends of the spectrum of a real signal are real.
         all[0].im = 0.0;
         all[self.length / 2].im = 0.0;
         all.extend((1..self.length / 2).rev().map(|k| spectrum[k].conj()));
@@ -411,7 +412,7 @@ impl Transform {
     }
 }
 
-/// The response T of each machine of the family, that of the file first.
+/// Response T of each machine of the family, the nominal one first.
 fn responses<const M: usize>(
     family: &Family,
     (design, feedback): (&Design, &Feedback),
@@ -454,11 +455,11 @@ fn responses<const M: usize>(
 struct Rule<const M: usize> {
     gain: Vec<Matrix<M>>,
     kept: Vec<f64>,
-    /// |1 − L T|, the largest of the family.
+    /// |1 − L T|, largest over the family.
     left: Vec<f64>,
 }
 
-/// The next signals that move one part alone, and the repetitions to come, of each sliding part.
+/// For each sliding part, the next signal that moves it alone, and predicted repetitions.
 struct Predictions {
     next: Vec<Vec<f64>>,
     expected: Vec<Vec<f64>>,
@@ -519,7 +520,7 @@ impl<const M: usize> Rule<M> {
         parted((0..transform.bins()).map(next), transform)
     }
 
-    /// The repetitions to come on each machine.
+    /// Predicted repetitions on each machine.
     fn predicted(
         &self,
         responses: &[Vec<Matrix<M>>],
@@ -564,7 +565,7 @@ fn vector<const M: usize>(spectra: &[Spectrum], k: usize) -> Vector<M> {
     Vector::from_fn(|row, _| spectra[row][k])
 }
 
-/// The signals of spectra that are given frequency by frequency.
+/// Signals of spectra given frequency by frequency.
 fn parted<const M: usize>(all: impl Iterator<Item = Vector<M>>, transform: &Transform) -> Vec<Vec<f64>> {
     let mut spectra: Vec<Spectrum> = vec![Vec::with_capacity(transform.bins()); M];
     for values in all {

@@ -1,6 +1,6 @@
 //! Controllers of belt axes: stepped in time, linearised, tuned, and frequency responses from logs.
 
-// Paths below `crate` are those of the facade: a module is named alike wherever it lives.
+// Paths below `crate` are those of the facade, so that a module has the same name in all crates.
 use taut_case::*;
 use taut_core::*;
 

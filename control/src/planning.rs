@@ -1,6 +1,5 @@
-//! The fastest move of a machine: speed, acceleration and jerk that its limits allow, with jerk times on the zeros of the
-//! belt's modes, chosen by how soon the cart stays in its window over a family of machines. The limits themselves are those of
-//! [`Quickest`].
+//! Fastest move of a machine: speed, acceleration and jerk within its limits, with jerk times on the zeros of the
+//! belt's modes, chosen by the arrival in the window over a family of machines. [`Quickest`] defines the limits.
 
 use crate::case::{Case, Files, Move};
 use crate::control::{MoveRun, Setup, closed_loop};
@@ -18,59 +17,60 @@ use std::path::Path;
 /// Jerk times in periods of the belt's lowest mode, and snap times in periods of its next; 0 is a few samples.
 const PERIODS: [[u8; 2]; 5] = [[0, 0], [1, 0], [2, 0], [3, 0], [1, 1]];
 
-/// Shares of the limits that plans take, the quickest first.
+/// Fractions of the limits that plans use, the quickest first.
 const SHARES: [f64; 8] = [1.0, 0.85, 0.72, 0.6, 0.5, 0.4, 0.3, 0.2];
 
-/// Shortest time at rest that is watched, s, and a time that is longer than any move, s.
+/// Shortest observed time at rest, s, and a time longer than any move, s.
 const WATCHED: f64 = 0.3;
 const NEVER: f64 = 1e12;
 
-/// How soon the cart stays in its window, from the beginning of the move, in closed loop.
+/// Arrival: time from the start of the move until the cart stays in its window, in closed loop.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Arrival {
     /// Duration of the reference, s.
     pub duration: f64,
-    /// Of the axis as the file has it, s; none if it does not stay there.
+    /// Arrival on the nominal machine, s; none if it does not stay there.
     pub nominal: Option<f64>,
-    /// Of the slowest axis of the family, s; none if one of them does not stay there, or if the family was not run.
+    /// Arrival on the slowest machine of the family, s; none if one of them does not stay there, or if the family was
+    /// not run.
     pub worst: Option<f64>,
-    /// Axes that stay in the window, of how many that were run.
+    /// Number of machines that stay in the window.
     pub settled: usize,
-    /// How many were run.
+    /// Number of machines run.
     pub axes: usize,
     /// Largest error of a sliding part on the machine of the file, m.
     pub cart_error: f64,
 }
 
-/// A plan that was tried.
+/// A tried plan.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tried {
     /// Limits of its strokes.
     pub limits: Limits,
     /// Jerk and snap time in periods of the belt's modes; 0 is none.
     pub periods: [u8; 2],
-    /// Share of the machine's limits that it takes.
+    /// Fraction of the machine's limits that it uses.
     pub share: f64,
-    /// When the cart arrives.
+    /// Arrival of the cart.
     pub arrival: Arrival,
 }
 
 /// The plan of a move.
 #[derive(Debug, Clone)]
 pub struct Planned {
-    /// The move's place in the case, and its name.
+    /// Index of the move in the case.
     pub place: usize,
     /// The move's name.
     pub name: String,
     /// Half the width of the window, m.
     pub window: f64,
-    /// The best that was tried.
+    /// The best plan.
     pub best: Tried,
     /// Its references.
     pub profiles: Vec<Profile>,
-    /// True if the limits of the file stay because nothing that was tried arrives sooner.
+    /// True if the limits of the file are kept because no plan arrives sooner.
     pub is_kept: bool,
-    /// When the cart arrives with the limits of the file.
+    /// Arrival with the limits of the file.
     pub given: Arrival,
     /// Limits that the move of the file exceeds.
     pub shortfalls: Vec<Shortfall>,
@@ -78,10 +78,9 @@ pub struct Planned {
     pub references: Vec<Profile>,
     /// Use of each limit of the machine, worst case over the family.
     pub loads: Vec<Load>,
-    /// The least time in which the rigid axis could do it within voltage and current, s; none where nothing limits it, and
-    /// of a machine with several drives.
+    /// Minimum time of the rigid axis within voltage and current, s; none if nothing limits it, or with several drives.
     pub bound: Option<f64>,
-    /// All plans that were tried, in order.
+    /// All tried plans, in order.
     pub tried: Vec<Tried>,
 }
 
@@ -92,11 +91,11 @@ pub struct Plans {
     pub family: Family,
     /// Frequencies of the belt with the drive pulley held, lowest along the travel, Hz.
     pub modes: Vec<f64>,
-    /// One for each move that was asked for.
+    /// Plan of each requested move.
     pub moves: Vec<Planned>,
 }
 
-/// Plans the moves at these places of the case; `stop` ends the search early, with what was found so far.
+/// Plans the moves with these indices of the case; `stop` ends the search early, with the best so far.
 pub fn plan(case: &Case, places: &[usize], wanted: &Wanted, stop: &dyn Fn() -> bool) -> Result<Plans> {
     let Some(design) = &case.controller else {
         return Err(Error::new("there is no controller that could follow a move").next("add [controller]"));
@@ -118,7 +117,8 @@ pub fn plan(case: &Case, places: &[usize], wanted: &Wanted, stop: &dyn Fn() -> b
 }
 
 impl Plans {
-    /// The text of the case with the planned limits, its remarks left alone but for moves that have a plan in the file; `name` stands in messages.
+    /// The case text with the planned limits; comments are kept except in moves that have a plan in the file. `name` is
+    /// used in messages.
     pub fn case_text(&self, case: &Case, name: &Path) -> Result<String> {
         let mut changes = Vec::new();
         let is_written = |planned: &&Planned| !planned.is_kept && !case.moves[planned.place].is_planned;
@@ -194,7 +194,7 @@ impl Planner<'_> {
         let mut best = tried[0].clone();
         let mut is_run = false;
         for one in &mut tried {
-            // No axis arrives sooner than the slowest of a family that it is in.
+            // The slowest machine of a family does not arrive before any of its members.
             if (self.stop)() || is_run && best.rank() <= one.rank() {
                 break;
             }
@@ -225,7 +225,7 @@ impl Planner<'_> {
         })
     }
 
-    /// Plans for each jerk time and share of the limits, with their arrival on the axis as the file has it.
+    /// Plans for each jerk time and fraction of the limits, with their arrival on the nominal machine.
     fn tried(&self, quickest: &Quickest, way: &Way, motion: &Move) -> Result<Vec<Tried>> {
         let mut tried = Vec::new();
         for periods in PERIODS {
@@ -298,7 +298,7 @@ impl Planner<'_> {
         Ok(arrival)
     }
 
-    /// The least time of all legs of the rigid axis, with their rests.
+    /// Minimum time of all legs of the rigid axis, with their rests.
     fn bound(&self, way: &Way) -> Option<f64> {
         let [mut from] = way.start[..] else { return None };
         let limits = limits(&self.family.machine, self.design.limit);
@@ -323,7 +323,7 @@ impl Tried {
         Self::rank_of(&self.arrival)
     }
 
-    /// The smaller the better: the arrival, where all arrive; those that do not, behind all that do.
+    /// Rank, smaller is better: the arrival if all machines arrive; others come last.
     fn rank_of(arrival: &Arrival) -> f64 {
         let Arrival { duration, nominal, worst, settled, axes, .. } = arrival;
         let missed = (axes - settled) as f64 / (*axes).max(1) as f64;

@@ -1,5 +1,5 @@
-//! Arithmetic for control laws. The text of a law is written once: it runs on numbers ([`Run`]), gives its slopes
-//! ([`Slope`]), and is written down as a program (`export::program`).
+//! Arithmetic for control laws. A law is written once; it runs on numbers ([`Run`]), gives its derivatives ([`Slope`]),
+//! and is exported as a program (`export::program`).
 
 use std::fmt::Debug;
 use std::ops::{Add, Div, Mul, Neg, Sub};
@@ -35,14 +35,14 @@ impl<N> Number for N where
 {
 }
 
-/// The relation of a number to a constant.
+/// Relation of a number to a constant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Relation {
-    /// Below it.
+    /// Less than the constant.
     Less,
-    /// Above it.
+    /// Greater than the constant.
     More,
-    /// It, or above it.
+    /// At least the constant.
     AtLeast,
 }
 
@@ -51,7 +51,7 @@ pub enum Relation {
 pub struct Test<N> {
     /// The number.
     pub of: N,
-    /// How it relates.
+    /// Relation of the number to the constant.
     pub relation: Relation,
     /// To this constant.
     pub than: f64,
@@ -73,7 +73,7 @@ pub fn at_least<N>(of: N, than: f64) -> Test<N> {
 }
 
 impl Test<f64> {
-    /// True if it holds; not of what is no number.
+    /// True if the condition holds; false for NaN.
     #[inline]
     pub fn holds(&self) -> bool {
         match self.relation {
@@ -84,46 +84,45 @@ impl Test<f64> {
     }
 }
 
-/// A number that is remembered from sample to sample, by its place. All begin with zero.
+/// Index of a number stored from sample to sample. All begin at zero.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Slot(usize);
 
 impl Slot {
-    /// Its place among the numbers that are remembered.
+    /// Index among the stored numbers.
     pub const fn place(self) -> usize {
         self.0
     }
 }
 
-/// The numbers that a law remembers.
+/// Stored numbers of a law.
 #[derive(Debug, Clone, Default)]
 pub struct Slots(Vec<(String, &'static str)>);
 
 impl Slots {
-    /// One more, with a name and what it is in words.
+    /// Adds a stored number with its name and description.
     pub fn add(&mut self, name: impl Into<String>, about: &'static str) -> Slot {
         self.0.push((name.into(), about));
         Slot(self.0.len() - 1)
     }
 
-    /// As many of one kind, by their numbers.
+    /// Adds a numbered list of stored numbers.
     pub fn list(&mut self, count: usize, name: &str, about: &'static str) -> Vec<Slot> {
         (0..count).map(|k| self.add(format!("{name}{k}"), about)).collect()
     }
 
-    /// How many there are.
+    /// Number of stored numbers.
     pub fn count(&self) -> usize {
         self.0.len()
     }
 
-    /// Names, and what they are in words.
+    /// Names and descriptions.
     pub fn all(&self) -> impl Iterator<Item = (&str, &'static str)> {
         self.0.iter().map(|(name, about)| (name.as_str(), *about))
     }
 }
 
-/// Arithmetic that a law is computed with: it has no loops that depend on numbers, and both sides of a choice are
-/// computed.
+/// Arithmetic of a control law, without loops that depend on values; both sides of a choice are evaluated.
 pub trait Calculator {
     /// Its numbers.
     type N: Number;
@@ -137,26 +136,26 @@ pub trait Calculator {
     /// Remembers.
     fn keep(&mut self, slot: Slot, value: Self::N);
 
-    /// One of two.
+    /// Selects one of two values.
     fn choose(&mut self, test: Test<Self::N>, yes: Self::N, no: Self::N) -> Self::N;
 
-    /// The whole number below a number that is not negative.
+    /// Integer part of a number that is not negative.
     fn whole(&mut self, value: Self::N) -> Self::N;
 
-    /// Of a square table four neighbours, `row` and `column` being whole numbers: itself, the next in its row, the next
-    /// in its column, and the one across.
+    /// Four neighbours in a square table at integer `row` and `column`: the element, the next in its row, the next in
+    /// its column, and the diagonal one.
     fn neighbours(&mut self, table: &[Vec<f64>], row: Self::N, column: Self::N) -> [Self::N; 4];
 
-    /// Gives a number a name in a program.
+    /// Names a number in an exported program.
     fn name(&mut self, name: &'static str, value: Self::N) -> Self::N;
 
     /// Names a value with a number.
     fn numbered(&mut self, name: &'static str, number: usize, value: Self::N) -> Self::N;
 
-    /// A remark in a program on what follows.
+    /// Comment in an exported program on the next lines.
     fn remark(&mut self, text: &str);
 
-    /// A number within two limits.
+    /// Clips a number to two limits.
     fn within(&mut self, value: Self::N, low: f64, high: f64) -> Self::N {
         let [low_end, high_end] = [low, high].map(|end| self.number(end));
         let held = self.choose(more(value, high), high_end, value);
@@ -164,21 +163,21 @@ pub trait Calculator {
     }
 }
 
-/// Runs on numbers.
+/// Evaluation on numbers.
 #[derive(Debug)]
 pub struct Run<'m> {
     memory: &'m mut [f64],
 }
 
 impl<'m> Run<'m> {
-    /// With what is remembered.
+    /// Evaluation with this memory.
     pub fn on(memory: &'m mut [f64]) -> Self {
         Self { memory }
     }
 }
 
 impl Run<'static> {
-    /// Of formulas that remember nothing.
+    /// Evaluation of formulas without memory.
     pub fn plain() -> Self {
         Self { memory: &mut [] }
     }
@@ -237,7 +236,7 @@ fn neighbours(table: &[Vec<f64>], row: f64, column: f64) -> [f64; 4] {
     [at(i, j), at(i, j + 1), at(i + 1, j), at(i + 1, j + 1)]
 }
 
-/// A number with its slope along one direction.
+/// A number with its derivative along one direction (forward-mode differentiation).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Dual {
     /// The number.
@@ -317,8 +316,8 @@ impl Div<f64> for Dual {
     }
 }
 
-/// Gives slopes along one direction: of what is remembered, and of what the law is shown. At a corner the slope is that
-/// of the side that the text chooses there.
+/// Derivatives along one direction of the memory and the inputs of a law. At a kink, the derivative belongs to the
+/// branch that the law selects.
 #[derive(Debug)]
 pub struct Slope {
     /// The memory.

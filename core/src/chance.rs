@@ -1,15 +1,15 @@
-//! Random numbers from a generator, hashes, and shares of distributions and of samples.
+//! Random numbers from a generator, hashes, and quantiles of distributions and samples.
 
 use libm::{log, sqrt};
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::Rng;
 
-/// A number that is equally likely everywhere from 0 to below 1.
+/// Uniform random number in [0, 1).
 pub fn uniform(random: &mut Pcg64) -> f64 {
     (random.next_u64() >> 11) as f64 * 2f64.powi(-53)
 }
 
-/// A normally distributed number: Marsaglia's polar method, with a logarithm that is the same on every machine.
+/// Normal random number by Marsaglia's polar method, with a logarithm that has the same bits on every processor.
 pub fn normal(random: &mut Pcg64) -> f64 {
     loop {
         let [u, v] = std::array::from_fn(|_| (random.next_u64() >> 11) as f64 * 2f64.powi(-52) - 1.0);
@@ -20,14 +20,14 @@ pub fn normal(random: &mut Pcg64) -> f64 {
     }
 }
 
-/// FNV-1a of 64 bits: a number that stands for these bytes, the same on every machine.
+/// 64-bit FNV-1a hash of these bytes, the same on every processor.
 pub fn hash(bytes: impl IntoIterator<Item = u8>) -> u64 {
     bytes.into_iter().fold(FNV_BEGIN, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3))
 }
 
 const FNV_BEGIN: u64 = 0xcbf2_9ce4_8422_2325;
 
-/// The quantile of sorted values, between two of them by a straight line (Hyndman & Fan 1996, their definition 7).
+/// Quantile of sorted values with linear interpolation (Hyndman & Fan 1996, definition 7).
 pub fn quantile(sorted: &[f64], share: f64) -> f64 {
     let Some(last) = sorted.len().checked_sub(1) else { return f64::NAN };
     let place = share * last as f64;
@@ -36,7 +36,7 @@ pub fn quantile(sorted: &[f64], share: f64) -> f64 {
     sorted[below] + (place - below as f64) * (sorted[above] - sorted[below])
 }
 
-/// The middle one of these; of an even number the upper of two. Zero if there are none.
+/// Median; the upper of the two middle values for an even number, zero for none.
 pub fn median(values: &mut [f64]) -> f64 {
     if values.is_empty() {
         return 0.0;
@@ -45,7 +45,7 @@ pub fn median(values: &mut [f64]) -> f64 {
     *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
-/// The quantile of the standard normal distribution, to about 1e-16 of itself: M. J. Wichura, "Algorithm AS 241: The
+/// Quantile of the standard normal distribution, relative error about 1e-16: M. J. Wichura, "Algorithm AS 241: The
 /// percentage points of the normal distribution", Appl. Statist. 37 (1988), its PPND16.
 pub fn normal_quantile(p: f64) -> f64 {
     let ratio = |above: &[f64; 8], below: &[f64; 8], x: f64| {

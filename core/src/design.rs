@@ -1,8 +1,7 @@
 //! A controller as data: its timing, its structure with its gains, and the parts around it.
 //!
 //! A command is in units of the amplifier's input (V in voltage mode, A in current mode), a position in m along the
-//! belt: of an encoder at motor or pulley r φ, of one at the cart x. The crate `taut-control` steps
-//! it in time.
+//! belt: r φ from an encoder at motor or pulley, x from one at the cart. The crate `taut-control` steps it in time.
 
 pub mod placement;
 mod tunable;
@@ -18,7 +17,7 @@ pub struct Design {
     pub every: f64,
     /// Time from a sample to the command that follows from it, s; it may be longer than T.
     pub delay: f64,
-    /// Largest command, either way, V or A; none without a limit of its own.
+    /// Largest magnitude of the command, V or A; none without a limit of its own.
     pub limit: Option<f64>,
     /// The structure of the feedback.
     pub structure: Structure,
@@ -26,7 +25,7 @@ pub struct Design {
     pub feed_forward: FeedForward,
     /// The disturbance observer.
     pub disturbance_observer: Option<DisturbanceObserver>,
-    /// Filters on what the structure gives, in this order.
+    /// Filters on the command of the structure, in this order.
     pub filters: Vec<Filter>,
     /// Impulses (time, s; amplitude) that the reference is convolved with; amplitudes add up to 1. Empty for none.
     pub shaper: Vec<[f64; 2]>,
@@ -48,13 +47,13 @@ impl Design {
         }
     }
 
-    /// References through its shaper.
+    /// References after its shaper.
     pub fn shaped(&self, profiles: &[Profile]) -> Vec<Profile> {
         profiles.iter().map(|profile| profile.clone().shaped(&self.shaper)).collect()
     }
 
-    /// The key of a part of it that needs the model of a single axis, which a machine with several drives does not
-    /// have; none if it has no such part.
+    /// Key of the first part that needs the model of a single axis, which a machine with several drives does not have;
+    /// none without such a part.
     pub fn needs_axis(&self) -> Option<&'static str> {
         let FeedForward { model, compensate_stretch, .. } = self.feed_forward;
         let commands_current = self.structure.tunable().commands_current();
@@ -71,7 +70,7 @@ impl Design {
     }
 }
 
-/// The structures, one list for all that goes through them.
+/// Defines the structures by one list for everything that iterates over them.
 macro_rules! structures {
     ($($(#[$about:meta])* $name:ident),* $(,)?) => {
         /// The structure and its gains.
@@ -81,12 +80,12 @@ macro_rules! structures {
         }
 
         impl Structure {
-            /// One of each, without gains.
+            /// One of each structure, without gains.
             pub fn each() -> Vec<Self> {
                 vec![$(Self::$name($name::default())),*]
             }
 
-            /// Its answers for tuning, hunting, reader and reports.
+            /// Its properties for tuning, limit cycles, the reader and reports.
             pub fn tunable(&self) -> &dyn Tunable {
                 match self {
                     $(Self::$name(structure) => structure),*
@@ -107,7 +106,7 @@ structures! {
     SlidingMode,
     /// A table of rules.
     Fuzzy,
-    /// The reference itself, as steppers are commanded it.
+    /// The reference itself, as a stepper's command.
     OpenLoop,
 }
 
@@ -129,16 +128,16 @@ pub struct Pid {
     pub derivative: f64,
     /// Corner of the derivative's filter, Hz.
     pub filter: f64,
-    /// Weight of the reference in the derivative: 0 for one of the measurement alone.
+    /// Weight of the reference in the derivative; 0 if it acts on the measurement alone.
     pub reference_speed: f64,
-    /// Time in which the integral follows a command that is limited, s.
+    /// Tracking time of the anti-windup, s.
     pub tracking: f64,
 }
 
 /// Gains of a cascade.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Cascade {
-    /// K_v, 1/s: speed asked for per error of position.
+    /// K_v, 1/s: reference speed per position error.
     pub position: f64,
     /// V s/m or A s/m; with a current loop A s/m.
     pub speed: f64,
@@ -146,9 +145,9 @@ pub struct Cascade {
     pub speed_integral: f64,
     /// Corner of the filter of the measured speed, Hz.
     pub filter: f64,
-    /// Weight of the reference's speed in the speed that is asked for.
+    /// Weight of the reference speed in the speed loop's reference.
     pub reference_speed: f64,
-    /// Time in which the integrals follow what is limited, s.
+    /// Tracking time of the anti-windup of both integrals, s.
     pub tracking: f64,
     /// The current loop; needs an amplifier in voltage mode.
     pub current: Option<CurrentLoop>,
@@ -161,12 +160,11 @@ pub struct CurrentLoop {
     pub proportional: f64,
     /// V/(A s).
     pub integral: f64,
-    /// Largest current asked for, A.
+    /// Limit of the reference current, A.
     pub limit: Option<f64>,
 }
 
-/// Weights of a linear-quadratic regulator and spreads for its Kalman filter: each an amount that counts as much as the
-/// others.
+/// Weights of a linear-quadratic regulator and noise of its Kalman filter; each weight is a deviation of equal cost.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct StateFeedback {
     /// Error of the cart's position, m.
@@ -177,7 +175,7 @@ pub struct StateFeedback {
     pub integral: Option<f64>,
     /// Command, V or A.
     pub command: f64,
-    /// Standard deviation of an unknown command that acts along, V or A, new at each sample.
+    /// Standard deviation of the process noise at the command, V or A, drawn anew at each sample.
     pub disturbance: f64,
     /// Standard deviation of a measured position, m.
     pub noise: f64,
@@ -186,19 +184,19 @@ pub struct StateFeedback {
 /// Parameters of a sliding-mode controller, σ = ė + λ e.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SlidingMode {
-    /// λ, 1/s: how fast the error goes on the sliding surface.
+    /// λ, 1/s: decay rate of the error on the sliding surface.
     pub bandwidth: f64,
-    /// K, m/s²: acceleration that drives to the surface.
+    /// K, m/s²: reaching acceleration.
     pub reaching: f64,
-    /// Φ, m/s: |σ| below which it is only a part of that.
+    /// Φ, m/s: boundary layer, |σ| below which the reaching acceleration is proportional to σ.
     pub boundary: f64,
-    /// 1/s²: of an integral of the error in σ; 0 for none.
+    /// 1/s²: gain of an integral of the error in σ; 0 for none.
     pub integral: f64,
     /// Corner of the filter of the measured speed, Hz.
     pub filter: f64,
 }
 
-/// A fuzzy controller: triangular sets, the same on both axes, and a singleton for each pair of them.
+/// Fuzzy controller: triangular sets, the same for error and rate, and a singleton for each pair.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Fuzzy {
     /// Error at the outermost sets, m.
@@ -225,9 +223,9 @@ pub struct OpenLoop;
 pub struct FeedForward {
     /// Model of the feed-forward.
     pub model: FeedForwardModel,
-    /// Share of the inertia's part.
+    /// Factor on the inertia force.
     pub inertia: f64,
-    /// Share of the friction's.
+    /// Factor on the friction force.
     pub friction: f64,
     /// True if an encoder at the motor is given the cart's reference with the belt's stretch added.
     pub compensate_stretch: bool,
@@ -248,7 +246,7 @@ pub enum FeedForwardModel {
     None,
     /// One mass with its friction (Li & Rehani 1996).
     Rigid,
-    /// The belt's stretch, too: needs a reference of fourth order for all of it.
+    /// Rigid model plus the belt's elongation; complete only with a fourth-order reference.
     Elastic,
 }
 
@@ -266,23 +264,23 @@ impl FeedForwardModel {
     }
 }
 
-/// An observer of a disturbance at the command: one mass, its friction, and a third pole for the disturbance.
+/// Disturbance observer for a disturbance at the command: one mass, its friction, and a third pole for the disturbance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DisturbanceObserver {
-    /// All three poles, Hz.
+    /// Frequency of all three poles, Hz.
     pub bandwidth: f64,
 }
 
-/// A filter of second order, sampled by Tustin's rule with its frequency kept.
+/// Second-order filter, discretised by Tustin's rule with frequency prewarping.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Filter {
     /// (s² + 2 ζ_z ω s + ω²)/(s² + 2 ζ_p ω s + ω²)
     Notch {
         /// Hz.
         frequency: f64,
-        /// ζ_z: the less, the deeper; the gain at the frequency is ζ_z/ζ_p.
+        /// ζ_z: numerator damping; the gain at the frequency is ζ_z/ζ_p.
         depth: f64,
-        /// ζ_p: the more, the wider.
+        /// ζ_p: denominator damping, which sets the width.
         damping: f64,
     },
     /// ω²/(s² + 2 ζ ω s + ω²)

@@ -1,7 +1,7 @@
 //! Errors: what went wrong, where, with which value, what is allowed, and what to do next.
 //!
-//! An [`Error`] is for something a person can correct: a wrong file, a wrong flag, a wrong argument.
-//! A computation that stops early is no error; it has a result that says how it ended.
+//! An [`Error`] is for something a person can correct: a wrong file, flag or argument. A computation that stops early
+//! is not an error; its result contains how it ended.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -9,12 +9,12 @@ use std::path::{Path, PathBuf};
 /// Shorthand for results of this library.
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// A mistake in an input, told to the person who made it.
+/// A mistake in an input, reported to the person who made it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Error {
-    /// One sentence: which thing, which value, what is wrong with it.
+    /// One sentence: the key, its value, and what is wrong with it.
     pub what: String,
-    /// Where it stands, if it stands anywhere.
+    /// Its place in a file, if any.
     pub place: Option<Place>,
     /// Values that would be accepted.
     pub allowed: Option<String>,

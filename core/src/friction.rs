@@ -1,10 +1,10 @@
-//! The friction laws: what resists a body that slides, and how much a body at rest can hold.
+//! Friction laws: resistance of a sliding body, and breakaway of a body at rest.
 
 mod law;
 
 pub use law::{Law, Shape, decay_of_velocity, velocity_of_decay};
 
-/// Friction with breakaway, each side of zero speed with its own values, and the law that joins them.
+/// Friction with breakaway, separate values for each direction, and the law between breakaway and Coulomb friction.
 ///
 /// By the paper's law, sliding forward: F_f = b v + F_c, sliding backward: F_f = b v − F_c (eq. 15); at rest: whatever
 /// holds the body, up to the breakaway. Units: for a cart N s/m and N, for a pulley N m s and N m.
@@ -25,7 +25,7 @@ pub struct Side {
     pub viscous: f64,
     /// Coulomb force F_c (N) or torque τ_c (N m), eq. (15).
     pub coulomb: f64,
-    /// The friction that a body at rest overcomes before it starts to slide this way; at least `coulomb`.
+    /// Breakaway: friction that a body at rest overcomes before it slides in this direction; at least `coulomb`.
     pub breakaway: f64,
 }
 
@@ -47,12 +47,12 @@ impl Friction {
         Self { forward, backward, law: Law::Coulomb }
     }
 
-    /// These values under another law.
+    /// These values with another law.
     pub fn following(self, law: Law) -> Self {
         Self { law, ..self }
     }
 
-    /// Adds the friction of another body that goes `ratio` times as far.
+    /// Adds the friction of another body that moves `ratio` times as far.
     pub fn add(&mut self, other: &Friction, ratio: f64) {
         for (side, other) in [(&mut self.forward, other.forward), (&mut self.backward, other.backward)] {
             // Power is conserved: F = ρ τ, and τ = B ρ v
@@ -62,12 +62,12 @@ impl Friction {
         }
     }
 
-    /// True if it is b v and no more, so that nothing ever sticks and the direction makes no difference.
+    /// True if it is b v alone, so that nothing sticks and the direction makes no difference.
     pub fn is_linear(&self) -> bool {
         self.forward == self.backward && self.forward.breakaway == 0.0 && self.forward.coulomb == 0.0
     }
 
-    /// True if it is made of straight lines and jumps: what the exact solver takes.
+    /// True if it is piecewise linear, as the exact solver requires.
     pub fn is_piecewise_linear(&self) -> bool {
         self.law == Law::Coulomb || self.is_linear()
     }

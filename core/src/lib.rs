@@ -1,7 +1,7 @@
 //! Machines with belts as data, and their motion computed exactly: no file, no text format, no thread.
 //!
-//! The ground of `taut`, whose facade re-exports these modules. In the order of dependence; each uses only those above
-//! it.
+//! The base of `taut`, whose facade re-exports these modules, listed in the order of dependence; each uses only those
+//! above it.
 //!
 //! - [`error`]: what is wrong, where, what is allowed, what to do next. [`number`]: numbers written for people.
 //!   [`chance`]: random numbers, hashes, quantiles.
@@ -9,8 +9,8 @@
 //! - [`trajectory`]: named columns with units.
 //! - [`friction`], [`mechanism`]: bodies, springs and drives as data, and their equations of motion, mode by mode.
 //! - [`machine`]: what a person has. [`parameter`]: the one table of everything a case file can say.
-//! - [`signal`]: inputs, and the references of moves. [`design`]: what a controller is, in data. [`reach`]: what
-//!   references need of a machine, and its limits. [`plan`]: experiments and their logs.
+//! - [`signal`]: inputs, and the references of moves. [`design`]: controllers as data. [`reach`]: what references need
+//!   of a machine, and its limits. [`plan`]: experiments and their logs.
 //! - [`solve`]: the motion. [`measure`]: what a recorder makes of it. [`metrics`]: what it shows.
 
 pub mod calculator;

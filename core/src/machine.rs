@@ -30,7 +30,7 @@ pub use swing::slowest_swing;
 pub struct Machine {
     /// The geometry.
     pub kind: Kind,
-    /// The drives, in the order of the geometry.
+    /// Drives, in the order of the geometry.
     pub drives: Vec<DriveUnit>,
     /// Pitch radius r of all pulleys, m.
     pub pulley_radius: f64,
@@ -44,7 +44,7 @@ pub struct Machine {
     pub cart: Slide,
     /// The belt, or belts.
     pub belt: Belt,
-    /// Encoder of each drive, if there is one; on an axis it can be at the cart.
+    /// Encoder of each drive, if any; on an axis it can be at the cart.
     pub encoder: Option<Encoder>,
     /// A second encoder at the cart, beside one at motor or drive pulley.
     pub scale: Option<Encoder>,
@@ -60,12 +60,12 @@ pub struct DriveUnit {
 }
 
 impl Machine {
-    /// The stepper that drives it, if one does.
+    /// The stepper of an axis or a gantry driven by steppers.
     pub fn stepper(&self) -> Option<&Stepper> {
         self.drives.iter().find_map(|unit| unit.motor.stepper.as_ref())
     }
 
-    /// The drives that turn when the slide of this number moves alone, each with the direction that it turns in.
+    /// Drives that turn when the slide of this number moves alone, each with its direction.
     pub fn movers(&self, number: usize) -> impl Iterator<Item = (usize, f64)> {
         let shares = self.belt_shares().into_iter().enumerate();
         shares.map(move |(drive, shares)| (drive, shares[number])).filter(|(_, share)| *share != 0.0)
@@ -81,8 +81,8 @@ impl Machine {
         self.slide(number).map_or(0.0, |slide| slide.constant_force_with(self.sliding_mass(number)))
     }
 
-    /// Force at the belt that moves the slide of this number from rest at `position` (m), and all that turns with it, N;
-    /// the sign of `side` is the direction.
+    /// Breakaway force at the belt, N, of the slide of this number at `position` (m) with everything that turns with
+    /// it; the sign of `side` is the direction.
     pub fn breakaway(&self, number: usize, side: f64, position: f64) -> f64 {
         let Some(slide) = self.slide(number) else { return 0.0 };
         let forward = |sign: f64| side * sign > 0.0;
@@ -95,7 +95,7 @@ impl Machine {
         own + pulleys / self.pulley_radius - side * (self.constant_force(number) + of_lines)
     }
 
-    /// The sliding parts, in the order of the geometry: the cart, behind the bridge where there is one.
+    /// The sliding parts, in the order of the geometry: the bridge, if any, then the cart.
     pub fn slides(&self) -> impl Iterator<Item = &Slide> {
         self.bridge.iter().chain(std::iter::once(&self.cart))
     }
@@ -115,11 +115,11 @@ impl Machine {
         self.bridge.iter_mut().chain(std::iter::once(&mut self.cart)).nth(index)
     }
 
-    /// True if its equations are linear but for stick, slip and other changes of mode: what the exact solver takes.
+    /// True if its equations are linear except for changes of mode, as the exact solver requires.
     pub fn is_piecewise_linear(&self) -> bool {
         let pulleys = [self.drive_pulley.friction, self.idler_pulley.friction];
         let mut laws = pulleys.iter().chain(self.slides().map(|slide| &slide.friction));
-        // A belt that does not stretch does so at any length.
+        // A rigid belt has no stiffness that could follow.
         let follows = self.belt.follows_cart && self.belt.model != BeltModel::Rigid;
         laws.all(Friction::is_piecewise_linear)
             && self.slides().all(|slide| slide.along.is_none())
@@ -127,12 +127,12 @@ impl Machine {
             && self.stepper().is_none()
     }
 
-    /// True if it is another machine elsewhere along its travel, but for the ends.
+    /// True if its parameters change along the travel, apart from the ends.
     pub fn changes_along_travel(&self) -> bool {
         self.slides().any(|slide| slide.along.is_some() || slide.forces.along.is_some()) || self.belt.follows_cart
     }
 
-    /// The first part of it that the paper's equations do not have, in words.
+    /// The first of its parts that the paper's equations lack, in words.
     pub fn beyond_the_paper(&self) -> Option<&'static str> {
         let DriveUnit { motor, amplifier } = &self.drives[0];
         let parts = [
@@ -172,8 +172,7 @@ pub struct Slide {
     pub along: Option<Polyline>,
     /// Forces on it that change along the travel or with its speed, if any.
     pub forces: SlideForces,
-    /// A constant force on it F_L, N, positive towards larger x: what a hanging mass or a spring of constant force
-    /// pulls.
+    /// Constant force F_L, N, positive towards larger x, as of a hanging mass or a constant-force spring.
     pub load: f64,
     /// Inclination of its travel, rad: positive if it climbs towards larger x.
     pub inclination: f64,
@@ -181,8 +180,8 @@ pub struct Slide {
     pub travel: Option<Travel>,
 }
 
-/// Forces that are the same in both directions of motion, N over m and over m/s, positive towards larger x: what a
-/// cable chain, magnets, a tilted rail or a fan do, and what a model leaves.
+/// Forces that do not depend on the direction of motion, N over m and over m/s, positive towards larger x: of a cable
+/// chain, magnets, a tilted rail or a fan, or residuals of a model.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct SlideForces {
     /// Over the position.
@@ -195,36 +194,36 @@ pub struct SlideForces {
 pub const GRAVITY: f64 = 9.80665;
 
 impl Slide {
-    /// A sliding part on the level, without end stops and external forces.
+    /// A horizontal sliding part without end stops and external forces.
     pub fn new(mass: f64, friction: Friction) -> Self {
         let forces = SlideForces::default();
         Self { mass, friction, along: None, forces, load: 0.0, inclination: 0.0, travel: None }
     }
 
-    /// The constant force on it, N, if it carries nothing.
+    /// The constant force on it, N, without a load that it carries.
     pub fn constant_force(&self) -> f64 {
         self.constant_force_with(self.mass)
     }
 
-    /// The constant force on it, N, with `mass` in all, kg: F_L − M g sin θ.
+    /// The constant force on it, N, for a total `mass`, kg: F_L − M g sin θ.
     pub fn constant_force_with(&self, mass: f64) -> f64 {
         self.load - mass * GRAVITY * self.inclination.sin()
     }
 }
 
-/// The spans of the belt, or of both belts, in the order of the geometry. Of an axis these are 1 drive pulley to cart,
-/// 2 cart to idler pulley, 3 idler pulley back to drive pulley.
+/// The spans of the belt, or of all belts, in the order of the geometry. For an axis: 1 drive pulley to cart, 2 cart to
+/// idler pulley, 3 idler pulley back to drive pulley.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Belt {
-    /// Span stiffness k₁, k₂, k₃, N/m, at the origin; infinite in a rigid model that is given none.
+    /// Span stiffness k₁, k₂, k₃, N/m, at the origin; infinite in a rigid model without stiffness.
     pub stiffness: Spans,
     /// Span damping c₁, c₂, c₃, N s/m.
     pub damping: Spans,
-    /// The make that the stiffness was computed from, where it was not given as such.
+    /// Modulus, section and lengths from which the stiffness was computed, if it was not given directly.
     pub make: Option<BeltMake>,
-    /// Tension T₀ of every span at rest, N. A span whose tension is used up goes slack; none for spans that can push.
+    /// Tension T₀ of every span at rest, N. A span without tension goes slack; none for spans that can also push.
     pub pretension: Option<f64>,
-    /// True if spans get shorter and longer, and so stiffer and softer, as what slides moves; needs `make`.
+    /// True if the lengths of spans, and so their stiffness, follow the sliding parts; needs `make`.
     pub follows_cart: bool,
     /// Belt model: the number of inertias that move independently.
     pub model: BeltModel,
@@ -233,27 +232,27 @@ pub struct Belt {
 }
 
 impl Belt {
-    /// Spans of given stiffness (N/m) and damping (N s/m) and no more.
+    /// Spans of given stiffness (N/m) and damping (N s/m), without other data.
     pub fn given(stiffness: impl Into<Spans>, damping: impl Into<Spans>) -> Self {
         let (stiffness, damping) = (stiffness.into(), damping.into());
         let (model, sheet) = (BeltModel::Elastic, BeltSheet::default());
         Self { stiffness, damping, make: None, pretension: None, follows_cart: false, model, sheet }
     }
 
-    /// Takes up what was changed of the make.
+    /// Updates the stiffness after a change of `make`.
     pub fn follow_make(&mut self) {
         if let Some(make) = &self.make {
             self.stiffness = make.stiffness();
         }
     }
 
-    /// The make of spans that follow what slides.
+    /// `make`, if the spans follow the sliding parts.
     pub fn following(&self) -> Option<BeltMake> {
         self.make.filter(|_| self.follows_cart)
     }
 }
 
-/// The bodies that the model of the belt lets move by themselves.
+/// Belt model: the bodies that move independently.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum BeltModel {
     /// All three inertias: the paper's model.
@@ -296,7 +295,7 @@ pub struct EndStop {
     pub damping: f64,
 }
 
-/// The make of a belt; gives its stiffness by eq. (11).
+/// Modulus, section and lengths of a belt, which give its stiffness by eq. (11).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BeltMake {
     /// Modulus E, Pa.
@@ -335,9 +334,9 @@ pub fn composite_modulus(parts: &[(f64, f64)]) -> f64 {
     parts.iter().map(|&(share, modulus)| share * modulus).sum()
 }
 
-/// The uniform section that is as stiff as a toothed belt: toothed and plain stretches in series.
+/// Uniform section as stiff as a toothed belt: toothed and plain segments in series.
 ///
-/// `toothed_share` is the part of the length on which the section is `toothed`; sections in m².
+/// `toothed_share` is the fraction of the length with the section `toothed`; sections in m².
 pub fn toothed_section(plain: f64, toothed: f64, toothed_share: f64) -> f64 {
     // 1/k_eff = 1/k_t + 1/k_nt, with k = A E / l of each share of the length        (12)
     1.0 / (toothed_share / toothed + (1.0 - toothed_share) / plain)
@@ -349,7 +348,7 @@ pub fn cylinder_inertia(outer_diameter: f64, bore_diameter: f64, width: f64, den
     PI * density * width * (outer_diameter.powi(4) - bore_diameter.powi(4)) / 32.0
 }
 
-/// Pitch radius, m, of a pulley with so many teeth (grooves) at a pitch in m.
+/// Pitch radius, m, of a pulley with this number of teeth (grooves) at a pitch in m.
 pub fn pitch_radius(teeth: f64, pitch: f64) -> f64 {
     // 2 π r = z p
     teeth * pitch / (2.0 * PI)
@@ -364,7 +363,7 @@ pub struct Encoder {
     pub lines: f64,
 }
 
-/// The shaft or slide that an encoder watches.
+/// Shaft or slide that an encoder measures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum EncoderPlace {
     /// The motor's own shaft, before the gear.
@@ -389,7 +388,7 @@ impl Encoder {
 /// Recorder: sample times, converters and noise.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Measurement {
-    /// Interval between samples, s; the experiment's where there is none.
+    /// Interval between samples, s; by default that of the experiment.
     pub every: Option<f64>,
     /// Age of a sample when it is recorded, s.
     pub delay: f64,
@@ -413,10 +412,10 @@ impl Default for Measurement {
 pub struct Channel {
     /// The quantity that is recorded.
     pub quantity: Quantity,
-    /// Step of the converter; none where it does not round.
+    /// Step of the converter; none if it does not round.
     pub step: Option<f64>,
     /// Standard deviation of the noise before the converter.
     pub noise: f64,
-    /// Greatest absolute value that the converter gives; none where it does not clip.
+    /// Largest absolute value of the converter; none if it does not clip.
     pub range: Option<f64>,
 }

@@ -1,12 +1,11 @@
 //! Logs as a recorder writes them: encoder counts, and converters with steps, noise and limits, at its own instants.
 //!
-//! Sample k is taken at k·T − delay + jitter and recorded as that of time k·T. For it the run is solved on a raster of
-//! T/n:
-//! - Without jitter, n ≤ 1000 is chosen so that every instant lies on the raster; then samples are those of the solver.
-//! - With jitter, or where there is no such n, n is 20, and samples lie on straight lines between neighbours on the
-//!   raster: next to a smooth value by at most (T/20)² max|ÿ| / 8, where a value jumps between its two sides.
+//! Sample k is taken at k·T − delay + jitter and recorded with the time k·T. The run is solved on a grid of T/n:
+//! - Without jitter, n ≤ 1000 is chosen so that every instant lies on the grid; then samples are exact.
+//! - With jitter, or without such an n, n is 20, and samples are interpolated linearly: the error is at most (T/20)²
+//!   max|ÿ| / 8 for a smooth value; near a jump they lie between both sides.
 //!
-//! A sample from before time zero shows the state at the start, with no input yet.
+//! A sample before time zero has the initial state without input.
 
 use crate::chance::normal;
 use crate::error::{Error, Result};
@@ -18,19 +17,19 @@ use crate::trajectory::{Column, Trajectory};
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
 
-/// Finest raster on which instants are looked for.
+/// Finest grid tried for the instants.
 const FINEST: u32 = 1000;
 
-/// Raster between whose points samples are interpolated.
+/// Grid for interpolated samples.
 const INTERPOLATED: u32 = 20;
 
-/// Farthest that jitter moves an instant, in intervals: samples keep their order.
+/// Largest shift of an instant by jitter, in intervals, so that samples keep their order.
 const FARTHEST: f64 = 0.5;
 
-/// Runs `experiment` on `stage` and records it.
+/// Runs `experiment` on `machine` and records it.
 ///
-/// The columns are time, the commanded input (`voltage` or `current`), `encoder_count` and the angle or position it
-/// stands for, and what the measurement's channels record.
+/// The columns are time, the commanded input (`voltage` or `current`), `encoder_count` with its angle or position, and
+/// the channels of the measurement.
 ///
 /// ```
 /// use taut::case::{Case, TEMPLATE};
@@ -67,7 +66,7 @@ pub fn stream(
         return Err(Error::new("nothing is recorded: there is no encoder and no other recorded quantity")
             .next("add [encoder], or [measurement] with a quantity such as motor_current = { step = \"10 mA\" }"));
     }
-    // A recorder keeps its rhythm: what is left of the run behind its last beat it does not see.
+    // A recorder keeps its interval: the rest of the run after its last sample is not recorded.
     let grid = Grid::new(measurement.every.unwrap_or(experiment.every), experiment.until).beats();
     let raster = Raster::new(grid.interval(), measurement);
     let devices = Device::all(machine, measurement, experiment);
@@ -105,11 +104,11 @@ pub fn stream(
     solve::stream(machine, &fine, solver, &mut |rows| recorder.take(rows, sink))
 }
 
-/// The points at which the run is solved, seen from the samples.
+/// Grid on which the run is solved, relative to the samples.
 struct Raster {
     /// Points per interval.
     points: u32,
-    /// Delay in points; a whole number where every instant lies on a point.
+    /// Delay in points; an integer if every instant lies on a point.
     delay: f64,
     /// Standard deviation of an instant, in points.
     jitter: f64,
@@ -133,19 +132,19 @@ impl Raster {
     }
 }
 
-/// Takes the rows of the raster and gives samples.
+/// Makes samples from the rows of the grid.
 struct Recorder<'a> {
     grid: Grid,
     raster: Raster,
     jitter: Pcg64,
     input: &'a Signal,
     devices: Vec<Device>,
-    /// The values that the devices see before time zero, and those that they saw last.
+    /// Inputs of the devices before time zero, and the latest ones.
     before: Vec<f64>,
     last: Vec<f64>,
-    /// Rows of the raster taken.
+    /// Number of grid rows received.
     seen: u64,
-    /// The next sample, and its instant in points of the raster.
+    /// The next sample, and its instant in grid points.
     sample: u64,
     instant: f64,
     block: Trajectory,
@@ -213,7 +212,7 @@ impl Recorder<'_> {
 
 /// Sensor or recorder of a quantity.
 enum Device {
-    /// Counts, and what they stand for.
+    /// Counts with their angle or position.
     Encoder {
         at: EncoderPlace,
         /// Counts per radian of the drive pulley, or per metre.
@@ -237,16 +236,16 @@ impl Device {
         encoder.into_iter().chain(scale).chain(measurement.channels.iter().map(converter)).collect()
     }
 
-    /// The column of a run that it sees.
+    /// The column of a run that it measures.
     fn source<'a>(&self, rows: &'a Trajectory) -> Option<&'a [f64]> {
         match self {
-            // Before the gear it sees the rotor, which is the drive pulley unless there is play between them.
+            // Before the gear it measures the rotor, which turns with the drive pulley unless the gear is compliant.
             Device::Encoder { at: EncoderPlace::Motor, .. } => {
                 rows.get("rotor_angle").or_else(|| rows.get("drive_angle"))
             }
             Device::Encoder { at: EncoderPlace::DrivePulley, .. } => rows.get("drive_angle"),
             Device::Encoder { at: EncoderPlace::Cart, .. } | Device::Scale { .. } => rows.get("cart_position"),
-            // Where the terminals' voltage has no column of its own, it is the one the amplifier gives.
+            // Without a column of its own, the terminal voltage is that of the amplifier.
             Device::Converter { channel: Channel { quantity: Quantity::MotorVoltage, .. }, .. } => {
                 rows.get("motor_voltage").or_else(|| rows.get("voltage"))
             }
@@ -288,7 +287,7 @@ fn convert(value: f64, channel: &Channel) -> f64 {
     // Full steps only: a range of 10 in steps of 3 ends at 9.
     let most = (range / step * (1.0 + 1e-12)).floor();
     let code = (value / step).round().clamp(-most, most) + 0.0;
-    // Of a step that is 1/n, three are 3/n: 0.03, where 3 × 0.01 is not.
+    // For a step of 1/n, three steps are 3/n: 0.03, which 3 × 0.01 is not.
     let inverse = (1.0 / step).round();
     if inverse >= 1.0 && 1.0 / inverse == step { code / inverse } else { code * step }
 }

@@ -1,9 +1,9 @@
-//! The key figures of a run: where it ended, how fast it went, the load on belt and motor, when it stopped, and how far
-//! the encoder's pulley and the cart were apart.
+//! Key figures of a run: final positions, peak speeds, loads on belt and motor, stop time, and the difference between
+//! the encoder's pulley and the cart.
 //!
-//! A [`Meter`] observes a run as it goes on and keeps nothing of it, so that a run of any length needs the same memory.
-//! It sees the motion between rows, on both sides of every event and jump of the input: what it reports does not depend
-//! on the output interval but for rounding. Of the paper's Table 3 it sees the steps.
+//! A [`Meter`] observes a run without storing it, so that memory does not depend on its length. It evaluates the motion
+//! between rows and on both sides of every event and jump of the input: except for rounding, its figures do not depend
+//! on the output interval. For the paper's Table 3 it evaluates the steps.
 
 mod figures;
 mod meter;
@@ -21,7 +21,7 @@ use crate::solve::Event;
 /// drive pulley.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Metrics {
-    /// When the run ended, s.
+    /// End of the run, s.
     pub end: f64,
     /// The sliding parts: the cart of an axis, bridge and cart of a gantry.
     pub loads: Vec<OfLoad>,
@@ -31,20 +31,20 @@ pub struct Metrics {
     pub spans: Vec<OfSpan>,
     /// Events of each body other than rotors.
     pub bodies: Vec<EventCount>,
-    /// The speed that the cart settles at under constant input; none if no input but zero lasts a fiftieth of the run,
-    /// or the run ended before that input did, and none of a machine with several drives.
+    /// Steady speed of the cart under constant input; none if no non-zero input lasts a fiftieth of the run, if the run
+    /// ended before that input did, or for several drives.
     pub steady_speed: Option<SteadySpeed>,
-    /// When everything came to rest, s, if it has: the time of the last event of a body, or when a rotor that turns by
-    /// itself was last faster than a millionth of its largest speed, whichever is later; 0 if nothing ever moved. None
-    /// while anything moves, where a body has no dry friction to stick by, and for a solver that locates no events
-    /// (`table3` freezes speeds and creeps on).
+    /// Time at which everything came to rest, s: the last event of a body, or the last time at which an independent
+    /// rotor was faster than a millionth of its largest speed, whichever is later; 0 if nothing moved. None while
+    /// anything moves, for a body without dry friction, and for a solver that locates no events (`table3` freezes
+    /// speeds and creeps on).
     pub stop_time: Option<f64>,
     /// True if everything is at rest at the end: bodies and rotors.
     pub settled: bool,
     /// True if all bodies other than rotors are stuck at the end, at a speed of exactly zero.
     pub bodies_rest: bool,
-    /// True if no rotor turns at the end: that of a gear with play turns no faster than a millionth of its largest
-    /// speed. True for stiff gears, whose rotors are part of their pulleys.
+    /// True if no rotor turns at the end, with a threshold of a millionth of its largest speed for a compliant gear.
+    /// Always true for stiff gears, whose rotors are part of their pulleys.
     pub rotors_rest: bool,
 }
 
@@ -53,13 +53,13 @@ pub struct Metrics {
 pub struct LostSteps {
     /// Full steps by which the rotor is behind its field at the end: four for each tooth pitch.
     pub at_end: i64,
-    /// How often the rotor fell to another tooth.
+    /// Number of times that the rotor fell to another tooth.
     pub slips: u64,
-    /// When it did so first, s.
+    /// Time of the first one, s.
     pub first_slip: Option<f64>,
 }
 
-/// Figures of what slides.
+/// Figures of a sliding part.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct OfLoad {
     /// Final position, m.
@@ -69,12 +69,12 @@ pub struct OfLoad {
     /// Final position by the angles of the drive pulleys without stretch of the belt, m: r φ of an
     /// axis.
     pub by_drives: f64,
-    /// Its speed of largest magnitude, m/s.
+    /// Peak speed, m/s.
     pub peak_speed: Peak,
     /// Peak of the position by the drives minus the true position, m: the error of an encoder at the drive
     /// pulley as a measurement of the cart.
     pub peak_error: Peak,
-    /// Position commanded of the steppers at the end minus its own, m; none without steppers.
+    /// Final commanded position minus true position, m; none without steppers.
     pub command_error: Option<f64>,
 }
 
@@ -83,25 +83,24 @@ pub struct OfLoad {
 pub struct OfDrive {
     /// The angle of its pulley at the end, rad.
     pub angle: f64,
-    /// The speed of its motor at the end, seen from behind the gear, rad/s: that of the pulley where the gear is stiff.
+    /// Final speed of its motor divided by the gear ratio, rad/s: the pulley's speed if the gear is stiff.
     pub shaft_speed: f64,
-    /// r φ̇ of its pulley, of largest magnitude, m/s; of a machine with one drive.
+    /// Peak of r φ̇ of its pulley, m/s; only for a machine with one drive.
     pub peak_belt_speed: Option<Peak>,
-    /// The speed of its motor behind the gear, of largest magnitude, rad/s.
+    /// Peak speed of its motor divided by the gear ratio, rad/s.
     pub peak_speed: Peak,
-    /// Its current of largest magnitude, A.
+    /// Peak current, A.
     pub peak_current: Peak,
-    /// Steps that it lost; none of a motor that is no stepper.
+    /// Lost steps; none unless it is a stepper.
     pub lost_steps: Option<LostSteps>,
 }
 
 /// Figures of a span of the belt.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct OfSpan {
-    /// Its stretch of largest magnitude, m; negative where it is shorter than at rest (a belt that is tensioned by more
-    /// than that is meant).
+    /// Peak elongation, m; negative if it is shorter than at rest, which assumes sufficient pretension.
     pub peak_stretch: Peak,
-    /// Its force of largest magnitude, N, damping included.
+    /// Peak force, N, damping included.
     pub peak_force: Peak,
 }
 
@@ -121,23 +120,23 @@ impl Metrics {
         self.drives.iter().all(|drive| drive.lost_steps.is_none_or(|lost| lost.slips == 0))
     }
 
-    /// The largest stretch of a span, and the span's place.
+    /// Largest elongation of a span, and its index.
     pub fn largest_stretch(&self) -> (usize, Peak) {
         largest(self.spans.iter().map(|span| span.peak_stretch))
     }
 
-    /// The largest force in a span, and the span's place.
+    /// Largest force in a span, and its index.
     pub fn largest_force(&self) -> (usize, Peak) {
         largest(self.spans.iter().map(|span| span.peak_force))
     }
 }
 
-/// The value of largest magnitude, with its sign, and when that was.
+/// Value of largest magnitude, with its sign and time.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Peak {
-    /// The value, in the unit of what was looked at.
+    /// The value, in the unit of its quantity.
     pub value: f64,
-    /// When, s.
+    /// Time, s.
     pub time: f64,
 }
 
@@ -148,12 +147,12 @@ pub struct EventCount {
     pub stops: u64,
     /// It started to slide.
     pub starts: u64,
-    /// It turned back without a rest.
+    /// It reversed without a rest.
     pub reversals: u64,
 }
 
 impl EventCount {
-    /// All of them.
+    /// Total number.
     pub fn total(&self) -> u64 {
         self.stops + self.starts + self.reversals
     }
@@ -171,7 +170,7 @@ impl EventCount {
 }
 
 impl Peak {
-    /// Takes a value that is larger, and its time and sign where it is larger by more than [`NEWS`].
+    /// Updates the peak by a larger value, and its time and sign if it is larger by more than [`NEWS`].
     fn take(&mut self, value: f64, time: f64) {
         let (new, old) = (value.abs(), self.value.abs());
         if new > old * (1.0 + NEWS) {
@@ -181,8 +180,8 @@ impl Peak {
         }
     }
 
-    /// Takes the value that something has come to: of values that are the same to [`NEWS`], the last one counts. On the
-    /// way to a steady value only rounding tells where it is largest, and it is largest at its end.
+    /// Updates the peak by the value at the end of an approach: of values equal within [`NEWS`], the last one counts.
+    /// Near a steady value, only rounding would decide where it is largest.
     fn come_to(&mut self, value: f64, time: f64) {
         let (new, old) = (value.abs(), self.value.abs());
         if new > old * (1.0 + NEWS) {
@@ -193,7 +192,8 @@ impl Peak {
         }
     }
 
-    /// Takes the values at both ends of an interval; `holds` says that a limit holds the value on all of it.
+    /// Updates the peak by the values at both ends of an interval; `holds` is true if a limit holds the value on all of
+    /// it.
     fn pass(&mut self, [from, to]: [f64; 2], (begin, end): (f64, f64), holds: bool) {
         self.take(from, begin);
         if !holds {
@@ -202,13 +202,12 @@ impl Peak {
     }
 }
 
-/// A bound that passes a peak by no more than this share of it is no reason to look closer, and values that differ by
-/// no more are one. The peak itself is the top of a polynomial that is good to 1e-9 of the largest value, the share
-/// that peaks are stated to; its time is off by the square root of that, as a share of the time in which the quantity
-/// bends.
+/// Relative excess of a bound over a peak that needs no closer search, and relative difference of equal values. The
+/// peak itself is the maximum of a polynomial with a relative accuracy of 1e-9, the stated accuracy of peaks; the
+/// relative error of its time, on the time scale of the curvature, is the square root of that.
 const NEWS: f64 = 1e-12;
 
-/// The largest of these peaks, with its place; the first of equal ones.
+/// Largest of these peaks, with its index; the first of equal ones.
 fn largest(peaks: impl Iterator<Item = Peak>) -> (usize, Peak) {
     let larger =
         |best: (usize, Peak), one: (usize, Peak)| if one.1.value.abs() > best.1.value.abs() { one } else { best };

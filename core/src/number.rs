@@ -9,10 +9,10 @@ const NO_BREAK: char = '\u{a0}';
 /// Prefixes from pico to giga with their powers of ten.
 const PREFIXES: [(i32, &str); 8] = [(-12, "p"), (-9, "n"), (-6, "µ"), (-3, "m"), (0, ""), (3, "k"), (6, "M"), (9, "G")];
 
-/// `value` in `unit` with at most `digits` significant digits and the prefix that suits: `132.8 kN/m`.
+/// `value` in `unit` with at most `digits` significant digits and a suitable prefix: `132.8 kN/m`.
 ///
 /// Between 0.1 and 1000 the unit stays as it is (`0.71 Ω`, not `710 mΩ`); trailing zeros are dropped.
-/// Units that take no prefix (`kg m^2`, `rad`, `%`) get a power of ten where they need one.
+/// Units without prefixes (`kg m^2`, `rad`, `%`) get a power of ten if necessary.
 ///
 /// ```
 /// use taut::number::engineering;
@@ -64,7 +64,7 @@ pub fn fixed(value: f64, decimals: usize) -> String {
     signed(&format!("{value:.decimals$}"))
 }
 
-/// A unit as it is set in print: `kg m^2` becomes `kg m²`, `ohm` becomes `Ω`.
+/// A unit as printed: `kg m^2` becomes `kg m²`, `ohm` becomes `Ω`.
 pub fn pretty_unit(unit: &str) -> String {
     let mut out = String::with_capacity(unit.len());
     let mut raised = false;
@@ -84,7 +84,7 @@ pub fn pretty_unit(unit: &str) -> String {
     out.replace("ohm", "Ω")
 }
 
-/// The same text with spaces, minus signs and powers of ten as they are typed, so that a terminal and `grep` find them.
+/// The text with spaces, minus signs and powers of ten as typed on a keyboard, for terminals and `grep`.
 pub fn typed(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     let mut exponent = false;
@@ -114,7 +114,7 @@ fn scaled(value: f64, unit: &str, digits: usize) -> (String, &'static str) {
     if (-1..=2).contains(&exponent) {
         return (plain(value, digits), "");
     }
-    // The first factor of the unit takes the prefix, unless it has one (kg), a power, or a habit of having none.
+    // The first factor of the unit gets the prefix, unless it has one (kg), a power, or is usual without one.
     let first = unit.split([' ', '/', '*', '·']).next().unwrap_or("");
     let takes = match first {
         "" | "1" | "%" | "°" | "deg" | "rpm" | "kg" | "dB" | "counts" => false,

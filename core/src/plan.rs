@@ -23,15 +23,14 @@ pub struct Experiment {
     pub until: f64,
     /// Output interval, s.
     pub every: f64,
-    /// Where it starts from: rotors stand in the middle of their play, and a current that is no state of its own counts
-    /// for nothing.
+    /// Initial state: rotors are in the middle of their play, and currents that are not states are ignored.
     pub initial: State,
     /// Its log, if the file names one. Its times are the experiment's.
     pub log: Option<Arc<Log>>,
 }
 
 impl Experiment {
-    /// Its name as that of a file, without ending: in lower case, what is neither letter nor digit as `-`.
+    /// Its name as a file name without ending: in lower case, with `-` for everything but letters and digits.
     pub fn file_name(&self) -> String {
         file_name(&self.name)
     }
@@ -42,7 +41,7 @@ impl Experiment {
     }
 }
 
-/// A name as that of a file: `5 V pulse` becomes `5-v-pulse`. Of a name that is too long for one, the end is a hash.
+/// A name as a file name: `5 V pulse` becomes `5-v-pulse`. The end of a name that is too long becomes a hash.
 pub fn file_name(name: &str) -> String {
     let plain: String = name.to_lowercase().chars().map(|c| if c.is_alphanumeric() { c } else { '-' }).collect();
     if plain.len() <= LONGEST_FILE_NAME {
@@ -52,26 +51,26 @@ pub fn file_name(name: &str) -> String {
     format!("{}{hash}", &plain[..plain.floor_char_boundary(LONGEST_FILE_NAME - hash.len())])
 }
 
-/// A measured run: what went in and what was seen, at its own times.
+/// A measured run: inputs and outputs at its own times.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Log {
     /// Its experiment's name.
     pub name: String,
     /// The file that it was read from.
     pub file: PathBuf,
-    /// Times, s: increasing, not always evenly. Zero is the log's first row, or where its window begins.
+    /// Times, s: increasing, not necessarily equidistant. Zero is the log's first row, or the start of its window.
     pub time: Vec<f64>,
-    /// The input of each drive's amplifier at those times, V or A before its gain; with any input that was added to it.
+    /// Input of each drive's amplifier at those times, V or A before its gain, including any added signal.
     pub inputs: Vec<Vec<f64>>,
-    /// The part of an axis' input that was added behind the controller, if the log says so: a known disturbance.
+    /// Part of an axis' input that was added after the controller, if logged: a known disturbance.
     pub added: Option<Vec<f64>>,
-    /// The inputs between them.
+    /// Interpolation of the inputs between them.
     pub hold: Hold,
     /// Logged reference of the cart at those times, m, if there is one.
     pub reference: Option<Vec<f64>>,
     /// The outputs; at least one.
     pub outputs: Vec<Output>,
-    /// With which words the recorder ended the file early.
+    /// Message with which the recorder ended the file early.
     pub ended: Option<String>,
 }
 
@@ -80,9 +79,9 @@ pub struct Log {
 pub struct Output {
     /// The quantity.
     pub quantity: Quantity,
-    /// True if its sign was lost, as by a counter of pulses: then it is to be compared with an absolute value.
+    /// True if only the magnitude was logged, as by a pulse counter; it is compared with absolute values.
     pub absolute: bool,
-    /// A value for each time, SI; NaN where one is missing.
+    /// A value for each time, SI; NaN if missing.
     pub values: Vec<f64>,
 }
 
@@ -92,7 +91,7 @@ impl Log {
         self.time.len()
     }
 
-    /// True if there are none.
+    /// True without samples.
     pub fn is_empty(&self) -> bool {
         self.time.is_empty()
     }
@@ -109,7 +108,7 @@ impl Log {
         self.inputs.iter().map(signal).collect()
     }
 
-    /// The usual interval between samples, s: the median, which a few gaps do not change.
+    /// Median interval between samples, s, which a few gaps do not change.
     pub fn interval(&self) -> f64 {
         let mut steps: Vec<f64> = self.time.windows(2).map(|pair| pair[1] - pair[0]).collect();
         if steps.is_empty() {

@@ -1,31 +1,30 @@
-//! Lines through points.
+//! Piecewise linear functions.
 
 use crate::calculator::{Calculator, at_least};
 
-/// Points that a line of a machine may have.
+/// Maximum number of points of a line of a machine.
 pub const MOST_POINTS: usize = 100;
 
-/// A value over x by straight lines between points, the first and the last value held beyond them: what changes along
-/// the travel, or with the speed.
+/// Piecewise linear function of x (position or speed) through points, constant beyond the first and the last.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Polyline {
     points: Vec<[f64; 2]>,
 }
 
 impl Polyline {
-    /// From points (x, value), x growing from point to point; `None` where they do not grow, or there are none.
+    /// From points (x, value) with increasing x; `None` if x does not increase, or without points.
     pub fn new(points: Vec<[f64; 2]>) -> Option<Self> {
         let line = Self { points };
         let is_finite = line.points.iter().flatten().all(|number| number.is_finite());
         (!line.points.is_empty() && line.grows() && is_finite).then_some(line)
     }
 
-    /// True if x grows from point to point, as it must.
+    /// True if x increases, as required.
     pub(crate) fn grows(&self) -> bool {
         self.points.windows(2).all(|pair| pair[0][0] < pair[1][0])
     }
 
-    /// Sets x (`part` 0) or the value (1) of a point. What it makes is checked with the stage.
+    /// Sets x (`part` 0) or the value (1) of a point. The result is checked with the machine.
     pub(crate) fn set(&mut self, point: usize, part: usize, value: f64) {
         if let Some(number) = self.points.get_mut(point).and_then(|point| point.get_mut(part)) {
             *number = value;
@@ -53,13 +52,13 @@ impl Polyline {
         })
     }
 
-    /// The piece that `x` is on: 0 before the first point, behind each point the next one.
+    /// Index of the piece at `x`: 0 before the first point, one more after each point.
     pub fn piece_at(&self, x: f64) -> usize {
         self.points.partition_point(|point| point[0] <= x)
     }
 
-    /// A piece: its value where x is 0, and its slope; the same numbers from either end, so that the image of a line
-    /// has the images of its pieces.
+    /// A piece: its value at x = 0, and its slope; computed symmetrically, so that the pieces of a mirrored line are
+    /// exact mirror images.
     ///
     /// ```text
     /// y = (y₀ x₁ − y₁ x₀)/(x₁ − x₀) + (y₁ − y₀)/(x₁ − x₀) x
@@ -72,7 +71,7 @@ impl Polyline {
         }
     }
 
-    /// The size of the terms that the value of a piece where x is 0 is a difference of, with the rounding of the points'
+    /// Magnitude of the terms whose difference is the value of a piece at x = 0, including the rounding of the points'
     /// distance: 2 (|y₀ x₁| + |y₁ x₀|)/(x₁ − x₀).
     pub(crate) fn size_of_constant(&self, piece: usize) -> f64 {
         match (piece.checked_sub(1).and_then(|i| self.points.get(i)), self.points.get(piece)) {
@@ -81,18 +80,18 @@ impl Polyline {
         }
     }
 
-    /// Where a piece begins and ends; the first and the last have one end.
+    /// Ends of a piece; the first and the last have one end.
     pub fn ends(&self, piece: usize) -> [Option<f64>; 2] {
         let x = |point: Option<&[f64; 2]>| point.map(|point| point[0]);
         [x(piece.checked_sub(1).and_then(|i| self.points.get(i))), x(self.points.get(piece))]
     }
 
-    /// The same with values times `factor`.
+    /// The function times `factor`.
     pub(crate) fn scaled(&self, factor: f64) -> Self {
         Self { points: self.points.iter().map(|[x, value]| [*x, factor * value]).collect() }
     }
 
-    /// The same values over x − `shift`.
+    /// The function of x − `shift`.
     pub(crate) fn shifted(&self, shift: f64) -> Self {
         Self { points: self.points.iter().map(|[x, value]| [x - shift, *value]).collect() }
     }

@@ -174,8 +174,8 @@ fn an_integrator_bends_bristles() {
     assert!(one.get("cart_bristle").abs() > 1e-6, "they are bent");
 }
 
-/// An importer whose root is exact to the last bit was told of no event: a zero counted as above zero here, and as below
-/// in the standard.
+/// An importer whose root is exact to the last bit got no event: zero counted as positive here, and as negative in the
+/// standard.
 #[test]
 fn an_indicator_that_is_exactly_zero_is_an_event() {
     for (name, column) in [("drive_speed", "drive_state"), ("idler_speed", "idler_state"), ("cart_speed", "cart_state")]

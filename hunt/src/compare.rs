@@ -248,8 +248,9 @@ impl Pair<'_> {
         }
     }
 
-    /// Runs of the independent solver with numbers that are off by their last bit, or by the tolerance of an integrator;
-    /// half of them keep their state in 64 bits, too. A controller's clock is off by its last bit. Against model exchange the conditions of half of them fall later.
+    /// Runs of the independent solver with numbers perturbed by their last bit, or by the tolerance of an integrator;
+    /// half of them also keep their state in 64 bits. A controller's clock is off by its last bit. For model exchange,
+    /// the conditions of half of them fall later.
     fn perturbed(&self) -> Vec<Run> {
         let mut runs = Vec::new();
         let (own, of_input) = match (self.by.tolerance(self.subject), self.subject.has_sines()) {

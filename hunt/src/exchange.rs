@@ -97,8 +97,8 @@ impl Importer<'_> {
         Ok(values.into_iter().map(|value| value > 0.0).collect())
     }
 
-    /// The error that each quantity may have after a step of `h`: the tolerance, but no less than rounding. Far from the
-    /// origin stiff springs turn the last bit of a position into a force that no step is short enough for.
+    /// The error that each quantity may have after a step of `h`: the tolerance, but no less than rounding. Far from
+    /// the origin stiff springs turn the last bit of a position into a force that no step is short enough for.
     fn errors(&mut self, y: &[f64], first: &[f64], h: f64) -> Result<Vec<f64>, String> {
         let sign = |j: usize| if j.is_multiple_of(2) { f64::EPSILON } else { -f64::EPSILON };
         let rounded: Vec<f64> = y.iter().enumerate().map(|(j, y)| y * (1.0 + sign(j / 2))).collect();

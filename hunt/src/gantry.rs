@@ -1,4 +1,4 @@
-//! H-frame, CoreXY and dual belt as the independent solver wants them: their rows of lever arms, written from the paper.
+//! H-frame, CoreXY and dual belt for the independent solver: their rows of lever arms, written from the paper.
 //!
 //! H-frame: ½ k_l (r φ₁ + x + y)² + ½ k_r (−r φ₂ + x − y)² + ½ k_b (−r φ₁ + r φ₂ − 2 x)² (Sollmann, Jouaneh and
 //! Lavender 2010, eq. (13)). CoreXY: belt A is let out by φ_A on one side of its motor and taken in on the other, where

@@ -119,7 +119,7 @@ pub struct Law {
 const FORGIVEN: f64 = 1e-9 * (1_u64 << 40) as f64;
 
 impl Change {
-    /// The size along the belt of one SI unit of its condition: of 1 rad or rad/s it is the lever, of 1 N m its inverse.
+    /// Size along the belt of one SI unit of its condition: the lever for 1 rad or rad/s, its inverse for 1 N m.
     fn unit(self, machine: &Model, mode: &Mode) -> Double {
         let flank = |lever: Double, now: Touch, then: Touch| match (now, then) {
             (Touch::Carries(_), Touch::Loose(_)) | (Touch::Loose(_), Touch::Carries(_)) => Double::ONE / lever,

@@ -35,8 +35,8 @@ fn later(y: &Reference, t: f64) -> Reference {
     Reference { position: from(0), speed: from(1), acceleration: from(2), jerk: from(3), snap: from(4) }
 }
 
-/// Runs the first move of a case on this machine, which its controller takes for `model`. `clock` are the times at which
-/// it takes its reference: at an edge of the profile a last bit decides between two accelerations.
+/// Runs the first move of a case on this machine, which its controller takes for `model`. `clock` are the times at
+/// which it takes its reference: at an edge of the profile a last bit decides between two accelerations.
 pub fn run(
     (case, model, looks): (&Case, &Machine, Looks),
     own: &Model,

@@ -251,7 +251,8 @@ impl<'a, 'b> Solver<'a, 'b> {
         }
     }
 
-    /// Rounds what moves as if it were kept in fewer bits: positions of the machine, strains, speeds, currents, bristles.
+    /// Rounds the state as if it were kept in fewer bits: positions of the machine, strains, speeds, currents,
+    /// bristles.
     fn keep(&mut self) {
         let Some(kept) = &mut self.kept else { return };
         let mut change = |value: Double| kept(value.high) - Double::from(value.high);

@@ -92,8 +92,8 @@ fn bristles_that_slip_ever_faster_are_followed_in_model_exchange() {
     assert!(farthest > 100.0 && apart < 1e-9 * farthest, "{apart:e} of {farthest:e} m");
 }
 
-/// Cases of pairs that amplify what an answer may be off by: the tolerance of an integrator (2638, 3083, 3544), the delay
-/// of each condition in model exchange (3560, 4830), a controller's clock at an edge of the profile (5736, 8548).
+/// Cases of pairs that amplify what an answer may be off by: the tolerance of an integrator (2638, 3083, 3544), the
+/// delay of each condition in model exchange (3560, 4830), a controller's clock at an edge of the profile (5736, 8548).
 #[test]
 fn what_amplifies_a_tolerance_is_ill_conditioned() {
     for number in [2638, 3083, 3544, 3560, 4830, 5736, 8548] {

@@ -1,6 +1,6 @@
 //! Parameters from logs, identifiability, and design of experiments.
 
-// Paths below `crate` are those of the facade: a module is named alike wherever it lives.
+// Paths below `crate` are those of the facade, so that a module has the same name in all crates.
 use taut_case::*;
 use taut_control::*;
 use taut_core::*;

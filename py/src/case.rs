@@ -458,8 +458,8 @@ impl Case {
         value::json(py, &guarded(|| json::show(&overview))?)
     }
 
-    /// Writes the files of a target, as `taut export` does, and says where they are and what should be known besides. `how`
-    /// is the part, the numbers of C, the step, s, the places of cart and bridge, m, and the version of FMI.
+    /// Writes the files of a target, as `taut export` does, and says where they are and what should be known besides.
+    /// `how` is the part, the numbers of C, the step, s, the places of cart and bridge, m, and the version of FMI.
     fn export(
         &self,
         py: Python<'_>,

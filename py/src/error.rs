@@ -42,8 +42,8 @@ pub fn fail_as_a_bug(py: Python<'_>, told: String) -> PyResult<()> {
     unlocked(py, || panic!("{told}"))
 }
 
-/// A sentence of the library as Python has it: `--move` is the argument `move=`. A command of the command line stays, and
-/// so does `--set`, which is a way to write changes.
+/// A message of the library in Python's terms: `--move` becomes the argument `move=`. Commands of the command line are
+/// kept, and so is `--set`, a notation for changes.
 fn spoken(text: &str) -> String {
     let mut spoken = String::with_capacity(text.len());
     let mut rest = text;

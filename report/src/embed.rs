@@ -1,4 +1,5 @@
-//! A figure's data as `plot.js` reads them, and curves for `live.js`: exact enough to zoom by a million, small enough for twenty plots.
+//! A figure's data as `plot.js` reads them, and curves for `live.js`: exact enough to zoom by a million, small enough
+//! for twenty plots.
 
 use super::decimate::decimate;
 use super::figure::{Axis, Figure, Marker, Panel, Series, Style};

@@ -433,8 +433,8 @@ fn words(text: impl Render) -> Markup {
     PreEscaped(together::numbers_and_units(&text.render().into_string()))
 }
 
-/// The styles of a page's body within an element of the class `report`, and the palette; `data-theme` of the root, which
-/// is `light` or `dark`, goes before the system's theme.
+/// The styles of a page's body within an element of the class `report`, and the palette; `data-theme` of the root,
+/// which is `light` or `dark`, goes before the system's theme.
 pub fn style() -> String {
     let palette = format!(
         ":root{{{0}}}@media screen and (prefers-color-scheme:dark){{:root:not([data-theme=light]){{{1}}}}}\
@@ -456,7 +456,7 @@ pub const MODULES: [(&str, &str); 5] = [
     ("player.js", include_str!("player.js")),
 ];
 
-/// What a report needs beside the modules to play its machines.
+/// Script that plays a report's machines with the modules.
 const LIVE: &str = include_str!("live.js");
 
 /// The modules as one script, without indentation and without the lines that are remarks. It brings the figures of its

@@ -1,4 +1,4 @@
-//! What moves along each coordinate of the load, and what it takes.
+//! Directions of motion of the load: moving masses, drives and friction.
 
 use crate::machine::{DriveUnit, Machine};
 
@@ -16,7 +16,7 @@ pub(super) struct Direction {
     suffix: &'static str,
     /// ` along x` or ` along y` at the end of names.
     words: &'static str,
-    /// What moves, in words.
+    /// Moving part, in words.
     pub name: &'static str,
 }
 

@@ -26,7 +26,7 @@ pub(super) fn inertia(machine: &Machine, directions: &[Direction], notes: &mut V
     group
 }
 
-/// What turns: of one drive part by part, of several what turns in each direction, once where that is the same.
+/// Rotating inertia: part by part for one drive, per direction for several, listed once if it is equal.
 fn turning(group: &mut Group, machine: &Machine, directions: &[Direction]) {
     let r = machine.pulley_radius;
     if let [unit] = &machine.drives[..] {

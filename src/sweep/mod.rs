@@ -8,7 +8,11 @@
 //! ```
 //! use taut::case::{Case, TEMPLATE};
 //! use taut::sweep::Sweep;
-//! let changes = ["sweep.runs=1000", "sweep.vary.\"cart.mass\"=20 %", "sweep.vary.\"motor.resistance\"=normal(0.7 ohm, 0.02 ohm)"];
+//! let changes = [
+//!     "sweep.runs=1000",
+//!     "sweep.vary.\"cart.mass\"=20 %",
+//!     "sweep.vary.\"motor.resistance\"=normal(0.7 ohm, 0.02 ohm)",
+//! ];
 //! let case = Case::from_text_with("axis.toml", TEMPLATE, &changes)?;
 //! let sweep = Sweep::new(&case)?;
 //! let table = sweep.rows(990, 10, &|| false).expect("not stopped");

@@ -57,8 +57,8 @@ impl Spread {
     }
 }
 
-/// A column with the rank of each of its values, for Spearman's correlations with other columns of the same runs: sorted
-/// once, however many these are.
+/// A column with the rank of each value, for Spearman's correlations with other columns of the same runs; sorted only
+/// once.
 #[derive(Debug, Clone)]
 pub struct Ranked {
     /// Places of the values that are numbers, by value; equal ones have the same second number.

@@ -1,8 +1,9 @@
 //! Machines that a rigid axis with viscous and Coulomb friction is not, integrated here: nothing is shared with taut's
 //! solvers.
 //!
-//! Two masses with a spring or play between them, in steps of [`STEP`]; a position moves by the mean of the speeds before
-//! and behind a step. Dry friction takes off as much of a speed as it can in a step, and holds what is left of less.
+//! Two masses with a spring or play between them, in steps of [`STEP`]; a position moves by the mean of the speeds
+//! before and behind a step. Dry friction reduces a speed by as much as it can in a step, and stops a body whose speed
+//! is lower.
 
 use super::chance::Chance;
 use super::logged::{columns, output};

@@ -1,9 +1,8 @@
-//! `cargo xtask book [--program TAUT]`: builds the documents as a book under `target/book/html` and checks every link in
-//! it.
+//! `cargo xtask book [--program TAUT]`: builds the documents as a book under `target/book/html` and checks every link.
 //!
-//! The pages of `docs` are copied to `target/book/docs`. Lines `<!-- generated: ... -->` are replaced there by tables of
-//! the JSON schemas, the Python API and a C header, which the program and the package themselves provide. The program is
-//! built first, unless a built one is named.
+//! The pages of `docs` are copied to `target/book/docs`. Lines `<!-- generated: ... -->` are replaced there by tables
+//! of the JSON schemas, the Python API and a C header, which the program and the package themselves provide. The
+//! program is built first, unless a built one is named.
 
 mod generated;
 mod links;
@@ -77,8 +76,7 @@ fn built(target: &Path) -> Result<PathBuf, String> {
     }
 }
 
-/// A program of cargo's registry, in this version, under `target`; it is installed first, with these `options`, unless it
-/// is there.
+/// A program from cargo's registry, in this version, under `target`; installed first, with these `options`, if missing.
 pub fn installed(name: &str, version: &str, options: &[&str]) -> Result<PathBuf, String> {
     let root = crate::python::target().join(name);
     let program = root.join("bin").join(format!("{name}{}", std::env::consts::EXE_SUFFIX));

@@ -1,6 +1,6 @@
 //! Compilers of Rust for other targets. If rustup cannot provide the standard library of a target, Debian's compiler
-//! for browsers, which has LLVM for all processors and the source of the library, is unpacked under `target/web`, without
-//! being installed; cargo then compiles the library too.
+//! for browsers, which has LLVM for all processors and the source of the library, is unpacked under `target/web`,
+//! without being installed; cargo then compiles the library too.
 
 use crate::{browser, python, succeeds};
 use std::fs;

@@ -1,5 +1,6 @@
-//! `cargo xtask drag` measures how quick the studio is, `cargo xtask load` what it bears, `cargo xtask first-fit` the way
-//! from an empty page to a fitted model: all with the program as it is released, by the scripts of `report/browser`.
+//! `cargo xtask drag` measures how quick the studio is, `cargo xtask load` what it bears, `cargo xtask first-fit` the
+//! way from an empty page to a fitted model: all with the program as it is released, by the scripts of
+//! `report/browser`.
 
 use crate::{browser, cargo, python, web};
 use std::path::Path;

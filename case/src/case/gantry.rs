@@ -119,7 +119,7 @@ fn of_gears(root: &Table, gantry: &Machine, error: Error) -> Error {
     }
 }
 
-/// What makes the gear of a motor compliant.
+/// First key of a motor that makes its gear compliant.
 fn gear<'a>(motor: Option<Field<'a>>) -> Option<Field<'a>> {
     let motor = motor?.table().ok()?;
     ["gear_stiffness", "backlash", "gear_damping"].iter().find_map(|key| motor.optional(key))

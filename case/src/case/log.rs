@@ -114,7 +114,7 @@ pub(super) fn logs(
     folder.read(&file, &path, || mapping.read()).map_err(missing)
 }
 
-/// Keys of the columns that a log of this kind of machine can name, without time: inputs of the drives, then quantities.
+/// Keys of the columns that a log of this kind of machine can name, except time: drive inputs, then quantities.
 fn columns_of(kind: machine::Kind) -> impl Iterator<Item = &'static str> + Clone {
     let inputs = kind.geometry().drives.iter().map(|drive| drive.input);
     inputs.chain(Quantity::of(kind).iter().map(|quantity| quantity.name()))

@@ -13,10 +13,10 @@ use crate::signal::arc::Arc;
 use crate::signal::gcode;
 use crate::signal::profile::{Leg, Limits, Passage, Profile};
 
-/// What rounding adds to the ends of an arc, m.
+/// Tolerance for rounding at the ends of an arc, m.
 const ROUNDING: f64 = 1e-12;
 
-/// A move in closed loop: where all that slides should be, and what is looked at.
+/// A closed-loop move: references of the sliding parts, and what is evaluated.
 #[derive(Debug, Clone)]
 pub struct Move {
     /// Its name, unique among the moves.

@@ -19,8 +19,8 @@ const AT_RESONANCE: f64 = 0.4;
 /// Least share of the bandwidth that the slowest swing allows, for an axis that nothing damps.
 const LEAST: f64 = 0.1;
 
-/// Inertia of a pulley that is held, as a multiple of the whole axis': two such pulleys that swing against each other on
-/// their belts count as standing still.
+/// Inertia of a held pulley, as a multiple of that of the whole axis: large enough that the relative motion of two such
+/// pulleys on their belts is negligible.
 const HELD: f64 = 1e12;
 
 /// A PID controller for an axis, as a case file has it.
@@ -54,8 +54,8 @@ fn unit(machine: &Machine) -> &'static str {
     machine.drives[0].amplifier.mode.unit()
 }
 
-/// Gains placed well below the slowest swing and what sampling, delay and the derivative's filter allow; ordinary ones for
-/// an axis that has none.
+/// Gains for a bandwidth well below the slowest mode and what sampling, delay and derivative filter allow; default
+/// gains for an axis without a mode.
 fn gains(machine: &Machine, every: f64, delay: f64) -> Pid {
     let ordinary = Pid {
         proportional: 2000.0,

@@ -20,8 +20,8 @@ pub(super) fn name(of: &OsStr, k: usize) -> OsString {
     hidden(of, &format!(".{k}{ENDING}"))
 }
 
-/// The hidden name of something that belongs to a file: `.NAME` and `ending`, with a hash in place of a name that is too
-/// long for that.
+/// The hidden name of something that belongs to a file: `.NAME` and `ending`, with a hash in place of a name that would
+/// be too long.
 pub(super) fn hidden(of: &OsStr, ending: &str) -> OsString {
     let mut name = OsString::from(".");
     if of.as_encoded_bytes().len() + ENDING.len() + 6 <= LONGEST {

@@ -1,5 +1,5 @@
-//! The files of this process that are not results yet: temporary files, hidden folders, locks. A program that has to end
-//! at once removes them with [`abandon`].
+//! The files of this process that are not results yet: temporary files, hidden folders, locks. A program that has to
+//! end at once removes them with [`abandon`].
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -15,8 +15,8 @@ static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 /// Held while a batch gives its files their places: they get them together or not at all.
 static PLACING: Mutex<()> = Mutex::new(());
 
-/// Longest time that [`abandon`] waits for a batch that is being placed; beyond that, the marker in its folder says that
-/// it was not completed.
+/// Maximum time that [`abandon`] waits for a batch being placed; after that, the marker in its folder reports it as
+/// incomplete.
 const LONGEST_PLACING: Duration = Duration::from_secs(2);
 
 /// Adds a path that is to be removed if the process has to end now.

@@ -164,7 +164,7 @@ fn unit(column: &Seen, wanted: &str) -> Option<String> {
     suspected(name, wanted).map(str::to_string)
 }
 
-/// The unit of a clock without a name for it, by the step between its rows: recorders take a sample every 10 µs to 0.1 s.
+/// Unit of a clock whose header names none, from the step between rows: recorders sample every 10 µs to 0.1 s.
 fn by_step(column: &Seen) -> Option<String> {
     if column.unit.is_some() {
         return None;
@@ -268,8 +268,8 @@ mod tests {
         assert_eq!(guess.split, None);
     }
 
-    /// The speed of the drive was taken for that of the cart, as the first column that speaks of a speed, and the log was
-    /// refused for its unit.
+    /// The drive speed was taken for the cart speed, as the first column named a speed, and the log was refused for its
+    /// unit.
     #[test]
     fn columns_of_our_own_results_are_what_they_are_called() {
         let text = "time_s,voltage_V,drive_angle_rad,drive_speed_rad_s,cart_position_m,cart_speed_m_s,motor_current_A\n\

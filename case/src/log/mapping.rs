@@ -30,8 +30,8 @@ pub struct Mapping {
     pub file: PathBuf,
     /// When the samples were taken.
     pub time: Clock,
-    /// The columns of what was fed into the drives' amplifiers, with their keys and units, V or A; no columns, and zeros in the
-    /// log, where the inputs are known otherwise.
+    /// Columns of the amplifier inputs of the drives, with their keys and units, V or A; empty, with zeros in the log,
+    /// if the inputs are known otherwise.
     pub inputs: Vec<Fed>,
     /// True if an input that is missing is the one before it; otherwise it is an error.
     pub hold_missing: bool,

@@ -36,8 +36,8 @@ pub struct Fit {
     /// Compare friction laws and windows by their error on held-out parts of the logs, and fit with the best
     #[arg(long, conflicts_with_all = ["posterior", "drift"])]
     pub compare: bool,
-    /// Laws to compare, separated by commas: viscous, coulomb, asymmetric, stribeck, along, force-along, force-by-speed,
-    /// lugre [default: the first five]
+    /// Laws to compare, separated by commas: viscous, coulomb, asymmetric, stribeck, along, force-along,
+    /// force-by-speed, lugre [default: the first five]
     #[arg(long, value_name = "NAMES", value_delimiter = ',', requires = "compare")]
     pub laws: Vec<String>,
     /// Windows to compare, separated by commas: lengths such as 2s, and whole for whole logs

@@ -17,7 +17,8 @@ use taut::solve::{Choice, Kind as SolverKind, Method, Solver};
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = SIMULATE)]
 pub struct Simulate {
-    /// The case file; - is standard input. Several are run one after the other, each into a folder of its own name in --out
+    /// The case file; - is standard input. Several are run one after the other, each into a folder of its own name in
+    /// --out
     #[arg(required = true)]
     pub cases: Vec<PathBuf>,
     /// Run only the experiment of this name; may be repeated
@@ -84,8 +85,8 @@ pub struct Move {
     /// Also run with each parameter of the axis off by this share, unknown to the controller: 20%
     #[arg(long, value_name = "SHARE", value_parser = share)]
     pub spread: Option<f64>,
-    /// Add the signal of this file to the command, as `taut learn` wrote it: time_s and added_V or added_A (left_added_V and
-    /// so on of a gantry); one case and
+    /// Add the signal of this file to the command, as `taut learn` wrote it: time_s and added_V or added_A
+    /// (left_added_V and so on of a gantry); one case and
     /// one move
     #[arg(long, value_name = "FILE")]
     pub added: Option<PathBuf>,

@@ -232,8 +232,8 @@ fn the_controllers_of_a_gantry_replay_moves_bit_for_bit() {
 const SAMPLES: usize = 6000;
 
 /// Every controller in three ways, which come from one text: as it runs, as C, bit for bit the same, and as margins see
-/// it. What an impulse of a measurement makes of the command has the response of the linear view at a grid of frequencies;
-/// of a controller that is not linear an impulse small enough does, from rest.
+/// it. What an impulse of a measurement makes of the command has the response of the linear view at a grid of
+/// frequencies; of a controller that is not linear an impulse small enough does, from rest.
 #[test]
 fn a_controller_that_runs_is_its_program_and_its_margins() {
     if !are_there(&["gcc"]) {

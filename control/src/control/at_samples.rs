@@ -1,7 +1,7 @@
-//! A move as it is at the samples of its controller: figures without what is between, for a search that runs thousands.
+//! Figures of a move from the samples of its controller alone, for a search that runs thousands of moves.
 //!
-//! Nobody observes the motion, which takes a third of the time. What is between samples is missing: a peak by about
-//! (ω T)²/8 of itself at a frequency ω and a sample time T, 1e-3 at 14 Hz and 1 kHz.
+//! The motion is not observed, which takes a third of the time. Motion between samples is missing: a peak at a
+//! frequency ω and a sample time T is too low by about (ω T)²/8, 1e-3 at 14 Hz and 1 kHz.
 
 use super::figures::{Deviation, DriveFigures, Figures, LoadFigures, is_made};
 use super::outcome::{at_rest, each, unrecorded};
@@ -14,9 +14,8 @@ use crate::metrics::{Meter, Peak};
 use crate::signal::profile::Profile;
 use crate::solve::{self, Solver};
 
-/// Runs a move and gathers the errors of what slides, settling and the root mean squares of the currents at samples
-/// alone, with straight lines between; the figures, and how the run ended. Motion and commands are those of
-/// [`closed_loop`](super::closed_loop).
+/// Runs a move and gathers the errors of the slides, settling and RMS currents from samples, interpolated linearly;
+/// returns the figures and the ending. Motion and commands are those of [`closed_loop`](super::closed_loop).
 pub(crate) fn closed_loop_at_samples(
     machine: &Machine,
     controllers: &mut [Standard],
@@ -44,7 +43,7 @@ struct Gathered<'a> {
     currents: Vec<Squared>,
 }
 
-/// Those of what slides.
+/// Figures of a slide.
 struct OfSlide<'a> {
     body: usize,
     profile: &'a Profile,
@@ -56,7 +55,7 @@ struct OfSlide<'a> {
     /// The error at the last sample, and the distance from the target, m.
     error: f64,
     away: f64,
-    /// When it entered its window for the last time after the profile, s.
+    /// Time of the last entry into its window after the profile, s.
     entered: Option<f64>,
 }
 
@@ -68,7 +67,7 @@ struct Squared {
 }
 
 impl Squared {
-    /// On to the next sample; `length` is the time since the last one, s, if there was one.
+    /// Adds the next sample; `length` is the time since the previous one, s, if any.
     fn see(&mut self, value: f64, length: Option<f64>) {
         let square = value * value;
         if let Some(length) = length {

@@ -1,14 +1,14 @@
-//! Two spectra side by side: belts A and B, or before and after a change.
+//! Comparison of two spectra: belts A and B, or before and after a change.
 
 use super::spectrum::{Axis, LOWEST, Spectrum};
 
-/// Peaks so near each other, by frequency, are taken for the same one.
+/// Relative difference of frequency up to which two peaks are paired.
 const NEAR: f64 = 0.25;
 
 /// Frequencies in files are rounded to this, Hz.
 const ROUNDING: f64 = 0.1;
 
-/// A peak of the first spectrum and its like in the second.
+/// A peak of the first spectrum and the matching one of the second.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pair {
     /// Frequency (Hz) and density in the first.
@@ -18,7 +18,7 @@ pub struct Pair {
 }
 
 impl Pair {
-    /// Stiffness over mass of the second, of that of the first, if this is one mode: f = √(k/m) / 2π.
+    /// Stiffness over mass of the second relative to the first, if both are the same mode: f = √(k/m) / 2π.
     pub fn stiffness_per_mass(&self) -> f64 {
         (self.second.0 / self.first.0).powi(2)
     }
@@ -27,13 +27,13 @@ impl Pair {
 /// The comparison of two spectra.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Comparison {
-    /// 1 for the same form, 0 for nothing in common: Σ ab / √(Σ a² Σ b²).
+    /// 1 for equal shape, 0 for no common content: Σ ab / √(Σ a² Σ b²).
     pub similarity: f64,
-    /// All vibration of the second, of that of the first: Σ b / Σ a.
+    /// Total vibration of the second relative to the first: Σ b / Σ a.
     pub level: f64,
     /// The highest peaks of both.
     pub main: Option<Pair>,
-    /// The axes along which those peaks vibrate most, where the spectra sum all axes.
+    /// Axes of strongest vibration at those peaks, if the spectra sum all axes.
     pub main_axes: Option<(Axis, Axis)>,
     /// Peaks that are in both, by frequency.
     pub pairs: Vec<Pair>,
@@ -41,11 +41,11 @@ pub struct Comparison {
     pub only_first: Vec<(f64, f64)>,
     /// Peaks of the second alone.
     pub only_second: Vec<(f64, f64)>,
-    /// How far apart frequencies must be to be told apart, Hz: the coarser step of both.
+    /// Frequency resolution, Hz: the coarser step of both.
     pub resolution: f64,
 }
 
-/// Compares two spectra, from 5 Hz to where the shorter one ends.
+/// Compares two spectra, from 5 Hz to the end of the shorter one.
 pub fn compare(first: &Spectrum, second: &Spectrum) -> Comparison {
     let end = |spectrum: &Spectrum| spectrum.frequency.last().copied().unwrap_or_default();
     let resolution = step(first).max(step(second));
@@ -70,7 +70,7 @@ pub fn compare(first: &Spectrum, second: &Spectrum) -> Comparison {
         let near = peaks.iter().copied().min_by(|a, b| far(a).total_cmp(&far(b)))?;
         (far(&near) < NEAR).then_some(near)
     };
-    // Each the nearest of the other.
+    // Each is the nearest of the other.
     let pair = |peak: &(f64, f64)| {
         let second = nearest(peak.0, &theirs)?;
         (nearest(second.0, &mine)? == *peak).then_some(Pair { first: *peak, second })

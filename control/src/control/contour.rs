@@ -9,14 +9,14 @@ use crate::signal::profile::{Passage, Profile};
 use crate::solve::{Curve, Polynomial, TERMS};
 use std::f64::consts::TAU;
 
-/// Most legs before the present one that may be the nearest: what slides is behind its reference.
+/// Maximum number of earlier legs that may be the nearest, since the slides lag their references.
 const LEGS_BEHIND: usize = 16;
 
 /// The path that two profiles on one clock describe, leg by leg.
 #[derive(Debug, Clone)]
 pub(super) struct Contour {
     legs: Vec<Course>,
-    /// Where it begins, m.
+    /// Its start, m.
     start: [f64; 2],
 }
 
@@ -28,13 +28,13 @@ struct Course {
     /// m
     from: [f64; 2],
     to: [f64; 2],
-    /// Its first coordinate, of an arc, and the second one's centre.
+    /// For an arc, its first coordinate and the centre of the second.
     arc: Option<(Turn, f64)>,
 }
 
 impl Course {
-    /// Share of it at which it is nearest to a point, within 0..1 where that is none of its ends, and the point's
-    /// distance from the whole line or circle, m, above zero to the left.
+    /// Fraction of the leg nearest to a point, within 0..1 unless that is an end, and the point's distance from the
+    /// complete line or circle, m, positive to the left.
     fn beside(&self, point: [f64; 2]) -> (f64, f64) {
         let Some((turn, center)) = &self.arc else {
             let away = |point: [f64; 2]| [point[0] - self.from[0], point[1] - self.from[1]];
@@ -67,8 +67,8 @@ impl Contour {
         Some(Self { legs, start: [x.start(), y.start()] })
     }
 
-    /// The distance of a point from the path at `time`, s, above zero to the left of it; the nearest leg's number, and
-    /// whether the nearest point of it is none of its ends.
+    /// Distance of a point from the path at `time`, s, positive to the left; the index of the nearest leg, and true if
+    /// its nearest point is not an end.
     pub fn nearest(&self, time: f64, point: [f64; 2]) -> (f64, Option<usize>, bool) {
         let now = self.legs.partition_point(|leg| leg.begin <= time);
         let legs = now.saturating_sub(LEGS_BEHIND)..(now + 1).min(self.legs.len());
@@ -93,7 +93,7 @@ impl Contour {
         }
     }
 
-    /// The distance from a straight leg of a point that moves on these polynomials; none from an arc.
+    /// Distance from a straight leg of a point that moves along these polynomials; none for an arc.
     fn beside(&self, leg: usize, places: &[Polynomial]) -> Option<Polynomial> {
         let Course { from, to, arc: None, .. } = self.legs[leg] else { return None };
         let along = [to[0] - from[0], to[1] - from[1]];
@@ -117,10 +117,10 @@ pub(super) struct ContourGauge {
     square: f64,
 }
 
-/// Places on 0..1 at which the nearest leg is asked for.
+/// Number of points on 0..1 at which the nearest leg is determined.
 const PLACES: usize = 9;
 
-/// A place as near the largest distance so far, as a share of it, may hide a larger one beside it.
+/// A point within this fraction of the largest distance so far may hide a larger one beside it.
 const NEAR: f64 = 0.05;
 
 /// Steps of the golden section.
@@ -131,7 +131,7 @@ impl ContourGauge {
         Self { path, seen: Deviation::default(), square: 0.0 }
     }
 
-    /// Adds the motion on a part of a curve: exactly where one straight leg is the nearest on all of it.
+    /// Adds the motion on a part of a curve; exact if one straight leg is the nearest on all of it.
     pub fn track(&mut self, curve: &Curve, part: (f64, f64), places: &[Polynomial]) {
         let time = |s: f64| curve.begin + s * curve.length;
         let at = |s: f64| self.path.nearest(time(s), [places[0].at(s), places[1].at(s)]);
@@ -204,7 +204,7 @@ mod tests {
         assert!(Contour::along(&[still]).is_none());
     }
 
-    /// Against the nearest of many points of the path.
+    /// Compares with the nearest of many points of the path.
     #[test]
     fn distances_from_arcs_are_those_of_the_nearest_point() {
         let limits = Limits { speed: 0.5, acceleration: 5.0, jerk: None, snap: None };

@@ -8,10 +8,10 @@ use crate::reach::resonance::Resonance;
 
 /// Steps of a shaper's frequency within one hertz.
 const STEPS: f64 = 5.0;
-/// Smoothing that is not too much, m: what the greatest acceleration is suggested for.
+/// Allowed smoothing, m, for which the maximum acceleration is suggested.
 pub const ALLOWED_SMOOTHING: f64 = 0.12e-3;
 
-/// Where within the uncertainty of its frequency a mode is looked at.
+/// Fractions of the frequency uncertainty at which a mode is evaluated.
 const PARTS: [f64; 5] = [-1.0, -0.5, 0.0, 0.5, 1.0];
 
 /// The vibration that a shaper is chosen for.
@@ -19,42 +19,42 @@ const PARTS: [f64; 5] = [-1.0, -0.5, 0.0, 0.5, 1.0];
 pub enum Target<'a> {
     /// Density over frequency; damping is not known.
     Spectrum(&'a Spectrum),
-    /// Several of them: what remains of the one of which most does counts.
+    /// Several of them: the worst one counts.
     Spectra(&'a [Spectrum]),
-    /// Modes of known damping, each at its own time: the one that keeps the most counts.
+    /// Modes of known damping, each taken alone: the worst one counts.
     Modes {
-        /// At all places of the travel.
+        /// Modes at all positions of the travel.
         modes: &'a [Resonance],
-        /// By which part their true frequencies may be higher or lower.
+        /// Relative uncertainty of their frequencies.
         uncertainty: f64,
     },
 }
 
-/// By what shapers are chosen.
+/// Criterion for the choice of shapers.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Criterion {
     /// Damping ratio that shapers are designed for.
     pub damping: f64,
-    /// Damping ratios of the machine at which a spectrum's vibration is looked at; the worst counts.
+    /// Damping ratios of the machine at which a spectrum's vibration is evaluated; the worst counts.
     pub tested: Vec<f64>,
     /// The corner at which smoothing is compared.
     pub corner: Corner,
-    /// Most smoothing that is allowed, m.
+    /// Largest allowed smoothing, m.
     pub max_smoothing: Option<f64>,
-    /// Most vibration that is wanted, of that without a shaper.
+    /// Largest desired vibration relative to that without a shaper.
     pub max_vibrations: Option<f64>,
-    /// Whose definitions and rule.
+    /// Firmware whose definitions and rule apply.
     pub firmware: Firmware,
     /// Forms that are fitted.
     pub forms: Vec<Form>,
     /// The forms that may be recommended.
     pub candidates: Vec<Form>,
-    /// True if pairs of them, convolved, are looked at, too.
+    /// True if convolved pairs are also tried.
     pub pairs: bool,
 }
 
 impl Default for Criterion {
-    /// As Klipper's: designed for a damping ratio of 0.1, looked at from 0.075 to 0.15. ZVD is fitted, but not a
+    /// As in Klipper: designed for a damping ratio of 0.1, evaluated from 0.075 to 0.15. ZVD is fitted, but not a
     /// candidate: it is as long as EI and covers less.
     fn default() -> Self {
         let forms: Vec<Form> = Kind::ALL.map(Form::from).to_vec();
@@ -105,8 +105,8 @@ impl Criterion {
 }
 
 impl Target<'_> {
-    /// Vibration that a shaper leaves, of that without one: 0 to 1; of a spectrum what is above a twentieth of the
-    /// highest peak.
+    /// Remaining vibration relative to that without a shaper, 0 to 1; for a spectrum, above a twentieth of the highest
+    /// peak.
     pub fn remaining(&self, shaper: &Shaper, dampings: &[f64]) -> f64 {
         self.weighed(dampings, &mut |f, zeta| shaper.residual_vibration(f, zeta))
     }
@@ -118,7 +118,7 @@ impl Target<'_> {
             Target::Spectra(spectra) => {
                 spectra.iter().map(|spectrum| of_spectrum(spectrum, left, dampings)).fold(0.0, f64::max)
             }
-            // max V w / w_max over modes and over f (1 − u) to f (1 + u); nothing is taken off, as a model has no noise
+            // max V w / w_max over modes and over f (1 − u) to f (1 + u); no threshold, since a model has no noise
             Target::Modes { modes, uncertainty } => {
                 let most = modes.iter().map(|mode| mode.share).fold(0.0, f64::max);
                 let mut at = |mode: &Resonance, part: f64| {
@@ -131,13 +131,13 @@ impl Target<'_> {
         }
     }
 
-    /// The spectrum that is left behind a shaper, at the worst of the damping ratios.
+    /// Spectrum after a shaper, at the worst of the damping ratios.
     pub fn left(spectrum: &Spectrum, shaper: &Shaper, dampings: &[f64]) -> Vec<f64> {
         let worst = |f: f64| dampings.iter().map(|z| shaper.residual_vibration(f, *z)).fold(0.0, f64::max);
         spectrum.frequency.iter().zip(&spectrum.density).map(|(f, p)| worst(*f) * p).collect()
     }
 
-    /// Frequencies that are tried for a kind, ascending.
+    /// Frequencies tried for a kind, ascending.
     pub(super) fn grid(&self, kind: Kind, firmware: Firmware) -> Vec<f64> {
         match self {
             Target::Spectrum(_) | Target::Spectra(_) => {
@@ -166,7 +166,7 @@ fn of_spectrum(spectrum: &Spectrum, v: &mut dyn FnMut(f64, f64) -> f64, dampings
     dampings.iter().map(left).fold(0.0, f64::max) / whole
 }
 
-/// The frequencies that are tried on a spectrum end below this one, Hz.
+/// Upper limit of the frequencies tried on a spectrum, Hz.
 fn highest(firmware: Firmware) -> f64 {
     match firmware {
         Firmware::Klipper => 200.0,
@@ -174,7 +174,7 @@ fn highest(firmware: Firmware) -> f64 {
     }
 }
 
-/// The lowest frequency that is tried on a spectrum, Hz: below, hardly 1500 mm/s² would be left.
+/// Lowest frequency tried on a spectrum, Hz: a lower one would allow less than about 1500 mm/s².
 fn lowest(kind: Kind) -> f64 {
     match kind {
         Kind::Zv => 21.0,
@@ -185,7 +185,7 @@ fn lowest(kind: Kind) -> f64 {
     }
 }
 
-/// Smoothing in mm times (v^1.5 + 0.2 v + 0.01): with little vibration v left it is smoothing that counts.
+/// Smoothing in mm times (v^1.5 + 0.2 v + 0.01): with little remaining vibration v, smoothing decides.
 pub(super) fn score(smoothing: f64, v: f64) -> f64 {
     smoothing * 1e3 * (v.powf(1.5) + 0.2 * v + 0.01)
 }

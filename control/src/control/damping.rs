@@ -8,20 +8,20 @@
 //! K(δ) ∝ (sinh √(β² − π²δ²) / √(β² − π²δ²))²
 //! ```
 //!
-//! g is the acceleration of a mode whose frame is shaken ever harder with the frequency, divided by the frequency as
-//! the spectrum is. A and c follow from f₀ and ζ by least squares of relative errors, and those two are searched for.
-//! Without the window in it a light damping would be found too large: at 1.6 Hz between bins a mode of 47 Hz seems to
-//! have 0.02 more.
+//! g is the acceleration of a mode whose frame is shaken more strongly with increasing frequency, divided by the
+//! frequency as the spectrum is. A and c follow from f₀ and ζ by least squares of relative errors; f₀ and ζ are
+//! searched for. Without the window, a light damping would be estimated too large: at 1.6 Hz between bins a mode of 47
+//! Hz seems to have 0.02 more.
 
 use super::spectrum::Spectrum;
 use super::welch::BETA;
 use std::f64::consts::PI;
 
-/// Bins about the peak, as shares of its frequency; and the fewest of them.
+/// Range of bins around the peak, as a factor on its frequency, and their least number.
 const ABOUT: f64 = 1.3;
 const FEWEST: usize = 8;
 
-/// Points of a grid of one of both unknowns, and how often it is made finer.
+/// Points of the grid for each unknown, and the number of its refinements.
 const GRID: i32 = 12;
 const FINER: usize = 7;
 
@@ -33,7 +33,7 @@ const MOST: f64 = 0.5;
 const REACH: f64 = 3.0;
 const PARTS: i32 = 30;
 
-/// The mode that is fitted to a curve.
+/// A mode fitted to a spectrum.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FittedMode {
     /// Undamped natural frequency, Hz.
@@ -46,7 +46,7 @@ pub struct FittedMode {
     pub error: f64,
 }
 
-/// The curve through the highest peak; none where there are too few bins about it, or no mode is the better for.
+/// Mode fitted to the highest peak; none with too few bins around it, or if no mode fits.
 pub fn fitted(spectrum: &Spectrum) -> Option<FittedMode> {
     let (top, _) = spectrum.peaks().into_iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
     // Half way to the next peak on either side.
@@ -86,7 +86,7 @@ pub fn fitted(spectrum: &Spectrum) -> Option<FittedMode> {
     if !least.is_finite() {
         return None;
     }
-    // Where the squares, least over the frequency, pass what 95 % of such curves stay below.
+    // Limits where the least squares over the frequency exceed their 95 % threshold.
     let freedom = bins.len() as f64 - 4.0;
     let bound = least * (1.0 + 3.84 / freedom.max(1.0));
     let along = |zeta: f64| {
@@ -104,7 +104,7 @@ pub fn fitted(spectrum: &Spectrum) -> Option<FittedMode> {
     Some(FittedMode { frequency: best.0, damping: best.1, interval: [edge(-1.0), edge(1.0)], error })
 }
 
-/// Shares of the window at distances in bins.
+/// Weights of the window at distances in bins.
 fn kernel() -> Vec<(f64, f64)> {
     let at = |delta: f64| {
         let inside = BETA * BETA - (PI * delta).powi(2);

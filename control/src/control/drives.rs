@@ -1,20 +1,22 @@
-//! Feed-forward gains as drives and controllers of others take them, with their units.
+//! Feed-forward gains for drives and controllers of other makers, with their units.
 //!
 //! The axis is one mass along the belt, M ÿ + b ẏ + F sgn ẏ = κ η i with κ = n K_t/r, fed by V = R i + L di/dt + n K_e
 //! ẏ/r ([`Rigid`]). So, forward,
 //!
 //! | system | gain | unit | value |
 //! |---|---|---|---|
-//! | WPILib, `SimpleMotorFeedforward` in metres | kS, kV, kA | V, V/(m/s), V/(m/s²) | R F/(κ η), R b/(κ η) + n K_e/r, R M/(κ η) |
-//! | LinuxCNC, `pid`, command in mm, output in V | FF1, FF2, FF3 | V s/mm, V s²/mm, V s³/mm | kV, kA and L M/(κ η), over 1000 |
-//! | LinuxCNC, output in A | FF1, FF2 | A s/mm, A s²/mm | b and M over κ η, over 1000 |
-//! | ODrive | `config.inertia`; torque with the speed; torque against dry friction | N m/(turn/s²), N m/(turn/s), N m | 2π M (r/n)²/η, 2π b (r/n)²/η, F r/(n η) |
+//! | WPILib, in metres | kS, kV, kA | V, V/(m/s), V/(m/s²) | R F/(κ η), R b/(κ η) + n K_e/r, R M/(κ η) |
+//! | LinuxCNC, mm, output in V | FF1, FF2, FF3 | V s/mm, V s²/mm, V s³/mm | kV, kA and L M/(κ η), over 1000 |
+//! | LinuxCNC, mm, output in A | FF1, FF2 | A s/mm, A s²/mm | b and M over κ η, over 1000 |
+//! | ODrive | `config.inertia` | N m/(turn/s²) | 2π M (r/n)²/η |
+//! | ODrive | torque with the speed; against dry friction | N m/(turn/s), N m | 2π b (r/n)²/η, F r/(n η) |
 //! | Beckhoff AX8000 3140:07, TwinCAT CNC P-AXIS-00391 | load inertia | kg m² | M (r/n)² less the rotor's; with it |
 //!
-//! Sources: docs.wpilib.org, "Feedforward Control in WPILib": V = kS sgn v + kV v + kA a. LinuxCNC, pid(9): FF1, FF2,
-//! FF3 times the first three derivatives of the command. ODrive's firmware, velocity ramp of
-//! the controller: the torque is `inertia` times the change of the speed in turn/s per second, in N m. Beckhoff Information System, AX8xxx object 3140:07 "Load
-//! inertia/mass", TF5200 P-AXIS-00391 "Load inertia": the total at the motor shaft.
+//! Sources: docs.wpilib.org, "Feedforward Control in WPILib", `SimpleMotorFeedforward`: V = kS sgn v + kV v + kA a.
+//! LinuxCNC, pid(9): FF1, FF2, FF3 times the first three derivatives of the command. ODrive's firmware, velocity ramp
+//! of the controller: the torque is `inertia` times the change of the speed in turn/s per second, in N m. Beckhoff
+//! Information System, AX8xxx object 3140:07 "Load inertia/mass", TF5200 P-AXIS-00391 "Load inertia": the total at the
+//! motor shaft.
 
 use crate::machine::rigid::Rigid;
 use crate::machine::{AmplifierMode, Machine};
@@ -25,22 +27,22 @@ use std::f64::consts::PI;
 pub struct DriveGain {
     /// Whose.
     pub system: &'static str,
-    /// As it is called there.
+    /// Name in the manual of the drive.
     pub name: &'static str,
-    /// In the unit that is used there.
+    /// Value in `unit`.
     pub value: f64,
     /// Unit of the value.
     pub unit: &'static str,
 }
 
-/// The gains for an axis going forward; those in volts where a voltage is commanded.
+/// Gains for an axis moving forward; in volts in voltage mode.
 pub fn drive_gains(machine: &Machine) -> Vec<DriveGain> {
     if machine.drives.len() > 1 {
         return Vec::new();
     }
     let rigid = Rigid::of(machine);
     let motor = &machine.drives[0].motor;
-    // Before the amplifier's gain, which is the drive's own affair: the voltage or current at the motor.
+    // Voltage or current at the motor, without the amplifier's gain, which belongs to the drive.
     let gain = machine.drives[0].amplifier.gain;
     let friction = rigid.coulomb[0];
     let at_rest = |force: f64| rigid.command(force, 0.0, 0.0) * gain;
@@ -63,7 +65,7 @@ pub fn drive_gains(machine: &Machine) -> Vec<DriveGain> {
             vec![one("LinuxCNC", "FF1", 1e-3 * v, "A/(mm/s)"), one("LinuxCNC", "FF2", 1e-3 * a, "A/(mm/s^2)")]
         }
     };
-    // Of the motor's shaft: a way x is an angle n x/r.
+    // At the motor's shaft: a displacement x is an angle n x/r.
     let arm = machine.pulley_radius / motor.gear_ratio;
     let loss = motor.gear_efficiency;
     let total = rigid.mass * arm * arm;

@@ -1,10 +1,10 @@
-//! A controller with a known signal added to its command: what was learned for a repeated move.
+//! A controller with a known signal added to its command, such as one learned for a repeated move.
 
 use super::sampled::{Added, Controller, Observation};
 use super::standard::Standard;
 use crate::signal::profile::Reference;
 
-/// The controller of a drive whose command has a signal added at each sample, before delay and limit.
+/// Controller of a drive with a signal added to the command at each sample, before delay and limit.
 #[derive(Debug, Clone)]
 pub struct Fed<'a> {
     controller: Standard,

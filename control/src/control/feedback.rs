@@ -1,11 +1,11 @@
-//! A controller as a linear filter of what it measures, for margins and stability: within its limit, without reference
+//! A controller as a linear filter of its measurements, for margins and stability: within its limit, without reference
 //! and counts.
 //!
-//! The slopes of its text at rest, by dual numbers, are s⁺ = A s + B (y, x, i, u), and C s + D (y, x, i, u) for the
-//! command that it asks for, u being the command that the axis gets. States stand in the order in which they depend on
-//! each other; those that depend on each other in circles are turned so that A is lower triangular but for a pair of
-//! rows for each two complex poles (Schur's real form). An integral stays as it is: its A − 1 is exactly zero, and z −
-//! 1 is known without the loss of a difference.
+//! The derivatives of its law at rest, by dual numbers, are s⁺ = A s + B (y, x, i, u), and C s + D (y, x, i, u) for the
+//! requested command, where u is the command that the axis gets. States are ordered by dependence; those with mutual
+//! dependence are transformed so that A is lower triangular except for a pair of rows for each two complex poles (real
+//! Schur form). An integral stays as it is: its A − 1 is exactly zero, and z − 1 is known without the loss of a
+//! difference.
 
 use super::filter::Biquad;
 use super::law::Law;
@@ -19,10 +19,10 @@ use crate::machine::Machine;
 use crate::signal::profile::Reference;
 use nalgebra::{Complex, DMatrix, Schur};
 
-/// Steps of the QR algorithm that Schur's form of states in a circle may take: a few for each state do.
+/// Maximum number of QR steps for the Schur form of mutually dependent states; a few for each state suffice.
 const TURNS: usize = 1000;
 
-/// By how much a pole has to be outside of the unit circle to count.
+/// Least distance of a pole outside of the unit circle to count.
 const OUTSIDE: f64 = 1e-9;
 
 /// Inputs of a controller: encoder, scale, current, and the command that the axis gets.
@@ -31,8 +31,8 @@ const SCALE: usize = 1;
 const CURRENT: usize = 2;
 const COMMAND: usize = 3;
 
-/// The controller of a design as D u = −(N_y y + N_x x + N_i i), with y the measured position, x the cart on a scale
-/// beside that and i the measured current at a sample.
+/// The controller of a design as D u = −(N_y y + N_x x + N_i i), with the measured position y, the cart x on an
+/// additional scale and the measured current i at a sample.
 #[derive(Debug, Clone)]
 pub struct Feedback {
     every: f64,
@@ -47,8 +47,8 @@ pub struct Feedback {
     is_linear: bool,
 }
 
-/// The rows of A − I of one pole, or of two complex ones: the block on the diagonal, and the states before that it
-/// depends on, with how.
+/// Rows of A − I for one pole, or for two complex ones: the diagonal block, and the earlier states that it depends on,
+/// with their coefficients.
 #[derive(Debug, Clone)]
 enum Part {
     One { pole: f64, of: Vec<(usize, f64)> },
@@ -69,7 +69,7 @@ pub struct Terms {
     pub own: Complex<f64>,
 }
 
-/// A frequency as a sampled loop sees it.
+/// Precomputed terms of a frequency in a sampled loop.
 #[derive(Debug, Clone, Copy)]
 pub struct Turn {
     /// z = e^{jωT}.
@@ -111,7 +111,7 @@ impl Feedback {
         })
     }
 
-    /// True if it is linear but for its limit; what is told of another holds for small motions about rest.
+    /// True if it is linear except for its limit; otherwise results hold for small motions around rest.
     pub fn is_linear(&self) -> bool {
         self.is_linear
     }
@@ -134,7 +134,7 @@ impl Feedback {
         Terms { position: -position, scale: -scale, current: -current, own: -command + 1.0 }
     }
 
-    /// The row C (z I − A)⁻¹, state by state from the last one on; no numbers on a pole.
+    /// The row C (z I − A)⁻¹, state by state from the last one; NaN on a pole.
     fn resolve(&self, change: Complex<f64>, each: &mut impl FnMut(usize, Complex<f64>)) {
         const FEW: usize = 24;
         let mut few = [Complex::ZERO; FEW];
@@ -200,13 +200,13 @@ impl Feedback {
         self.direct[input] != 0.0 || self.inputs.iter().any(|inputs| inputs[input] != 0.0)
     }
 
-    /// Frequencies at which it changes quickly, rad/s.
+    /// Corner frequencies at which it changes quickly, rad/s.
     pub fn corners(&self) -> Vec<f64> {
         self.corners.clone()
     }
 }
 
-/// The slopes of a controller's text, with A − I.
+/// Linearised law of a controller, with A − I.
 struct System {
     a: DMatrix<f64>,
     b: DMatrix<f64>,
@@ -215,7 +215,7 @@ struct System {
 }
 
 impl System {
-    /// At rest, behind the first sample.
+    /// Linearises at rest, after the first sample.
     fn of(text: &Text, has_scale: bool) -> Self {
         let n = text.slots.count();
         let rest = text.at_rest(has_scale);
@@ -225,7 +225,7 @@ impl System {
         text.moved(run, 0.0, given);
         let zero = Dual::constant(0.0);
         let still = Reference { position: zero, speed: zero, acceleration: zero, jerk: zero, snap: zero };
-        // Along one of the states, or behind them along one of the inputs.
+        // Direction of one of the states or, after these, of the inputs.
         let along = |direction: usize| {
             let dual = |value: f64, place: usize| Dual { value, slope: f64::from(u8::from(place == direction)) };
             let mut slope = Slope { memory: memory.iter().enumerate().map(|(j, value)| dual(*value, j)).collect() };
@@ -238,7 +238,7 @@ impl System {
                 current: dual(rest.current, n + CURRENT),
             };
             let asked = text.step(&mut slope, &seen);
-            // Within the limit nothing is taken of the command; what the axis gets is an input.
+            // Within the limit the command is unchanged; the command that the axis gets is an input.
             text.moved(&mut slope, Dual::constant(0.0), dual(asked.value, n + COMMAND));
             (asked.slope, slope.memory)
         };
@@ -263,7 +263,7 @@ impl System {
         system
     }
 
-    /// Leaves out states that no input moves, and those that the command does not follow from.
+    /// Removes states that no input affects, and those that do not affect the command.
     fn reduce(&mut self) {
         let n = self.a.nrows();
         let mut moved: Vec<bool> = (0..n).map(|i| self.b.row(i).iter().any(|b| *b != 0.0)).collect();
@@ -275,14 +275,14 @@ impl System {
         self.take(&kept);
     }
 
-    /// These states alone, in this order.
+    /// Keeps these states only, in this order.
     fn take(&mut self, kept: &[usize]) {
         self.a = self.a.select_rows(kept).select_columns(kept);
         self.b = self.b.select_rows(kept);
         self.c = self.c.select_columns(kept);
     }
 
-    /// Puts states behind those that they depend on, and turns circles of them; the parts that are left.
+    /// Orders states after those that they depend on, transforms mutually dependent ones, and returns the parts.
     fn order(&mut self) -> Vec<Part> {
         let circles = circles(&self.a);
         self.take(&circles.concat());
@@ -312,15 +312,15 @@ impl System {
         parts
     }
 
-    /// Turns a circle of `size` states so that its block is lower triangular but for pairs: with S = D Q of powers of
-    /// two that balance it and of Schur's form (D⁻¹ A D)ᵀ = Q T Qᵀ, S⁻¹ A S = Tᵀ.
+    /// Transforms `size` mutually dependent states so that their block is lower triangular except for pairs: with S = D
+    /// Q, where D balances it by powers of two and (D⁻¹ A D)ᵀ = Q T Qᵀ is the Schur form, S⁻¹ A S = Tᵀ.
     fn turn(&mut self, begin: usize, size: usize) {
         let block = self.a.view((begin, begin), (size, size)).into_owned();
         let scales = balance(&block);
         let block = scaled(&block, &scales);
         let is_finite = block.iter().all(|v| v.is_finite());
         let schur = is_finite.then(|| Schur::try_new(block.transpose(), f64::EPSILON, TURNS)).flatten();
-        // What has no numbers answers with none.
+        // NaN if there is no Schur form.
         let none = || (DMatrix::identity(size, size), DMatrix::from_element(size, size, f64::NAN));
         let (q, t) = schur.map_or_else(none, Schur::unpack);
         let scale = DMatrix::from_fn(size, size, |i, j| if i == j { scales[i] } else { 0.0 });
@@ -331,7 +331,7 @@ impl System {
         let rows = &back * self.a.rows(begin, size);
         self.a.rows_mut(begin, size).copy_from(&rows);
         for (i, j) in (0..size).flat_map(|i| (0..size).map(move |j| (i, j))) {
-            // Above the diagonal there are pairs alone.
+            // Above the diagonal, only pairs are not zero.
             let is_part = j <= i || j == i + 1 && t[(j, i)] != 0.0;
             self.a[(begin + i, begin + j)] = if is_part { t[(j, i)] } else { 0.0 };
         }
@@ -342,7 +342,7 @@ impl System {
     }
 }
 
-/// Marks what can be reached from what is marked.
+/// Marks everything that can be reached from marked states.
 fn spread(marked: &mut [bool], leads: &dyn Fn(usize, usize) -> bool) {
     let mut waiting: Vec<usize> = (0..marked.len()).filter(|&i| marked[i]).collect();
     while let Some(from) = waiting.pop() {
@@ -355,7 +355,7 @@ fn spread(marked: &mut [bool], leads: &dyn Fn(usize, usize) -> bool) {
     }
 }
 
-/// States that depend on each other, circle by circle, behind those that they depend on.
+/// Groups of mutually dependent states, each after those that it depends on.
 fn circles(a: &DMatrix<f64>) -> Vec<Vec<usize>> {
     let n = a.nrows();
     let reached = |from: usize| {

@@ -1,13 +1,14 @@
-//! The key figures of a move.
+//! Key figures of a move.
 
 use crate::metrics::Peak;
 use crate::signal::profile::Profile;
 
-/// Share of the way out that a load has to go at least, or it has not made a move that returns.
+/// Least fraction of the outward stroke that a load has to reach in a move that returns to its start.
 const MADE: f64 = 0.5;
 
-/// True if a load that goes as far as `reached` from its start, m, makes the move of its reference. A move that returns to
-/// its start ends at its target without any motion, too: it is made by going half of the way out at least.
+/// True if a load that moves at most `reached` from its start, m, makes the move of its reference. A load that does not
+/// move also ends at the target of a move that returns to its start, so at least half of the outward stroke is
+/// required.
 pub(super) fn is_made(profile: &Profile, window: f64, reached: f64) -> bool {
     let out = profile.excursion();
     let returns = (profile.target() - profile.start()).abs() <= window;
@@ -21,23 +22,23 @@ pub struct Deviation {
     pub peak: Peak,
     /// Its root mean square over the time of the run, m.
     pub rms: f64,
-    /// At the end, m.
+    /// Final value, m.
     pub last: f64,
 }
 
-/// The key figures of a move, by the role of the parts: peaks over all instants and not only over rows, integrals over
-/// time.
+/// Key figures of a move, by the role of the parts: peaks over all instants, not only rows, and integrals over time.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Figures {
-    /// Of what slides: the cart of an axis, bridge and cart of a gantry.
+    /// Figures of the slides: the cart of an axis, bridge and cart of a gantry.
     pub loads: Vec<LoadFigures>,
-    /// Of the drives.
+    /// Figures of the drives.
     pub drives: Vec<DriveFigures>,
-    /// Distance from the path, to its left above zero, of a machine with two coordinates. Exact where the nearest leg is
-    /// the same for a while; about corners its peak is sought between nine places of each piece of the motion.
+    /// Contour error of a machine with two coordinates, positive to the left of the path. Exact while the nearest leg
+    /// does not change; near corners its peak is searched among nine points of each piece of the motion.
     pub contour: Option<Deviation>,
-    /// From the end of the profile, a shaper apart, until all that slides stays within the window around its target, s;
-    /// none if it does not, or if the move returns to its start and it does not go half of the way out.
+    /// Settling time from the end of the profile, without shaper, until all slides stay within the window around their
+    /// targets, s; none if one does not settle, or does not reach half of the outward stroke of a move that returns to
+    /// its start.
     pub settling: Option<f64>,
 }
 
@@ -54,7 +55,7 @@ impl Figures {
         self.loads.iter().copied().reduce(larger).unwrap_or_default()
     }
 
-    /// The largest root mean square of all motors' currents, A.
+    /// Largest RMS current of all motors, A.
     pub fn worst_current(&self) -> f64 {
         self.drives.iter().map(|drive| drive.current.1).fold(0.0, f64::max)
     }
@@ -65,31 +66,31 @@ impl Figures {
     }
 }
 
-/// Key figures of what slides.
+/// Key figures of a slide.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct LoadFigures {
-    /// x − y: its difference from its reference.
+    /// x − y: deviation from its reference.
     pub error: Deviation,
-    /// By how much it passes its target after the beginning of the last stroke, m.
+    /// Overshoot beyond its target after the start of the last stroke, m.
     pub overshoot: f64,
 }
 
 /// Key figures of a drive.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct DriveFigures {
-    /// r φ − y: its pulley from the reference of its part of the belt. A controller that makes up for the belt's stretch
-    /// means part of it.
+    /// r φ − y: deviation of its pulley from the reference of its part of the belt. A controller that compensates for
+    /// the belt's elongation causes part of it on purpose.
     pub following: Deviation,
-    /// Motor current: largest and root mean square, A.
+    /// Motor current: peak and RMS, A.
     pub current: (Peak, f64),
-    /// Motor voltage: largest and root mean square, V.
+    /// Motor voltage: peak and RMS, V.
     pub voltage: (Peak, f64),
-    /// Time during which the controller's own limit held its command back, s.
+    /// Time during which the controller's own limit was active, s.
     pub limited: f64,
-    /// Time during which the amplifier stood at its limit of voltage or current, s.
+    /// Time during which the amplifier's voltage or current limit was active, s.
     pub amplifier_limited: f64,
     /// Electrical energy taken in and given back, J.
     pub energy: (f64, f64),
-    /// Changes of direction of the command per second: what hunting sounds like.
+    /// Sign changes of the command's increments per second, a measure of audible hunting.
     pub restlessness: f64,
 }

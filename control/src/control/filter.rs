@@ -4,7 +4,7 @@ use crate::calculator::{Calculator, Slot, Slots};
 use crate::design::Filter;
 use std::f64::consts::PI;
 
-/// A filter of second order, stepped once a sample.
+/// A second-order filter, stepped once a sample.
 #[derive(Debug, Clone, Copy)]
 pub struct Biquad {
     b: [f64; 3],
@@ -19,7 +19,7 @@ impl Biquad {
             Filter::Notch { frequency, depth, damping } => (frequency, [1.0, 2.0 * depth, 1.0], damping),
             Filter::LowPass { frequency, damping } => (frequency, [0.0, 0.0, 1.0], damping),
         };
-        // s → ω/tan(ω T/2) (z − 1)/(z + 1); above half the sampling rate there is nothing to filter.
+        // s → ω/tan(ω T/2) (z − 1)/(z + 1); frequencies are clipped below half the sampling rate.
         let angle = (PI * frequency * every).min(0.49 * PI);
         let c = 1.0 / angle.tan();
         // With s̃ = s/ω = c (1 − q)/(1 + q), q = 1/z:  n₂ s̃² + n₁ s̃ + n₀ over s̃² + 2 ζ s̃ + 1
@@ -48,7 +48,7 @@ impl Biquad {
         output
     }
 
-    /// Where its poles turn, rad/s, sampled every `every` s.
+    /// Frequency of its poles, rad/s, sampled every `every` s.
     pub fn frequency(&self, every: f64) -> f64 {
         // z² + a₁ z + a₂ with |z|² = a₂ and Re z = −a₁/2
         (-0.5 * self.a[0] / self.a[1].abs().sqrt().max(f64::MIN_POSITIVE)).clamp(-1.0, 1.0).acos() / every

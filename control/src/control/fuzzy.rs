@@ -5,8 +5,7 @@ use super::law::{Law, Seen, Speed};
 use crate::calculator::{Calculator, Slot, Slots};
 use crate::design::Fuzzy;
 
-/// Triangular sets at equal distances that add up to 1, products of memberships, and the mean of the rules' values they
-/// weigh.
+/// Evenly spaced triangular sets that add up to 1, products of memberships, and the weighted mean of the rules' values.
 #[derive(Debug, Clone)]
 pub struct FuzzyLaw {
     rules: Fuzzy,
@@ -50,7 +49,7 @@ impl Law for FuzzyLaw {
         command
     }
 
-    /// An incremental command goes on from where the limit left it.
+    /// An incremental command continues from the limited value.
     fn limited<C: Calculator>(&self, c: &mut C, excess: C::N, _: C::N) {
         if self.rules.incremental {
             let command = c.memory(self.command) + excess;
@@ -61,7 +60,7 @@ impl Law for FuzzyLaw {
 
 /// The output of the rules for an error and its rate, both from −1 to 1; beyond that the outermost sets hold.
 pub fn infer<C: Calculator>(c: &mut C, rules: &[Vec<f64>], error: C::N, rate: C::N) -> C::N {
-    // Two sets overlap at any place: which is the lower, and how far the upper holds.
+    // Two sets overlap at any point: index of the lower one, and membership of the upper one.
     let size = rules.len();
     let mut place = |[value, set, share]: [&'static str; 3], of: C::N| {
         let of = c.name(value, of);

@@ -27,7 +27,7 @@ pub(super) struct Gauge<'a> {
     drives: Vec<DriveGauge>,
     contour: Option<ContourGauge>,
     end: f64,
-    /// True if the errors of what slides, settling and current are all that is asked for.
+    /// True if only the errors of the slides, settling and current are required.
     is_brief: bool,
 }
 
@@ -36,20 +36,19 @@ struct LoadGauge {
     body: usize,
     /// The reading of its position.
     position: usize,
-    /// Its largest speed, of a machine whose readings have none.
+    /// Its peak speed, if the readings do not contain its speed.
     peak_speed: Option<Peak>,
-    /// Where the drives have it minus where it is, as a sum of stretches: reading and weight.
+    /// Position by the drives minus true position as a sum of elongations: reading and weight.
     stretches: Vec<(usize, f64)>,
-    /// From when on (s) and in which direction a place is beyond the target; [`Passage::approach`] of the last leg that
-    /// moves it.
+    /// Time (s) and direction of overshoot: [`Passage::approach`] of the last leg that moves it.
     approach: (f64, f64),
     target: f64,
-    /// ∫ of the square of its error.
+    /// ∫ of its squared error.
     square: f64,
     /// The largest distance from its start at the end of any curve, m.
     reached: f64,
     start: f64,
-    /// When it was outside its window for the last time after the profile, and whether it is now.
+    /// Last time outside its window after the profile, and true if it is outside now.
     outside: Option<f64>,
     is_outside: bool,
     seen: LoadFigures,
@@ -65,7 +64,7 @@ struct DriveGauge {
     shares: &'static [f64],
     /// ∫ of the squares of following error, voltage and current.
     squares: [f64; 3],
-    /// True if its amplifier stands at a limit where it is now.
+    /// True if a limit of its amplifier is active now.
     saturated: bool,
     seen: DriveFigures,
 }
@@ -74,9 +73,9 @@ struct DriveGauge {
 enum Voltage {
     /// A reading.
     Read(usize),
-    /// R i + L di/dt + K_e n φ̇ of the reading of the shaft's speed behind the gear.
+    /// R i + L di/dt + K_e n φ̇ from the reading of the shaft's speed behind the gear.
     Computed { speed: usize, resistance: f64, inductance: f64, back_emf: f64 },
-    /// That of no single winding: a stepper's phases have one each.
+    /// None: each phase of a stepper has its own.
     OfPhases,
 }
 
@@ -118,7 +117,7 @@ impl LoadGauge {
         }
     }
 
-    /// Where it is from its target, once the last stroke and the profile, which ends at `end`, have passed.
+    /// Updates overshoot and settling after the last stroke and the profile, which ends at `end`.
     fn settle(&mut self, curve: &Curve, end: f64, window: f64) {
         let mut away = curve.of(self.position);
         away.0[0] -= self.target;
@@ -189,7 +188,7 @@ impl DriveGauge {
         let (volts, amperes) = (at_places(&v), at_places(&i));
         self.squares[1] += h * product(&volts, &volts);
         self.squares[2] += h * product(&amperes, &amperes);
-        // Energy that goes in and energy that comes back, parted where either changes its sign.
+        // Energy in and back, split at sign changes of the power.
         let mut count = |energy: f64| {
             if energy > 0.0 { self.seen.energy.0 += energy } else { self.seen.energy.1 -= energy }
         };
@@ -227,7 +226,7 @@ impl<'a> Gauge<'a> {
         }
     }
 
-    /// For the errors of what slides, settling and current alone.
+    /// Gathers only the errors of the slides, settling and current.
     pub(super) fn briefly(self) -> Self {
         Self { is_brief: true, ..self }
     }
@@ -253,7 +252,7 @@ impl<'a> Gauge<'a> {
             return;
         }
         for drive in &mut self.drives {
-            // r φ − y as a sum over x − y and the stretches between; r φ₁ − y = x − y + d₁ of an axis
+            // r φ − y as a sum of x − y and the elongations between; r φ₁ − y = x − y + d₁ of an axis
             let mut following = Polynomial([0.0; TERMS]);
             for ((load, error), share) in self.loads.iter().zip(&errors).zip(drive.shares) {
                 following.0.iter_mut().zip(error.0).for_each(|(sum, term)| *sum += share * term);
@@ -343,7 +342,7 @@ impl Observe for Gauge<'_> {
         for drive in &mut self.drives {
             drive.power(curve, self.is_brief);
         }
-        // A seam that is as near as rounding is behind.
+        // A seam within rounding counts as passed.
         let shortest = SHORTEST + 16.0 * f64::EPSILON * (curve.begin + curve.length) / curve.length;
         let mut from = 0.0;
         while from < 1.0 {
@@ -387,5 +386,5 @@ impl Observe for Gauge<'_> {
     }
 }
 
-/// Least share of a curve that a piece of the reference is looked at.
+/// Least fraction of a curve for a piece of the reference.
 const SHORTEST: f64 = 1e-9;

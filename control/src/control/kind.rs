@@ -2,10 +2,10 @@
 
 use std::f64::consts::SQRT_2;
 
-/// Vibration that the EI shapers leave where they are designed for, of that without a shaper.
+/// Relative vibration that EI shapers leave at their design frequency.
 pub const TOLERANCE: f64 = 0.05;
 
-/// Which shaper.
+/// Kind of shaper.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Kind {
     /// Zero vibration.
@@ -23,7 +23,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// All of them, the shorter ones first.
+    /// All kinds, the shorter ones first.
     pub const ALL: [Kind; 6] = [Kind::Zv, Kind::Mzv, Kind::Zvd, Kind::Ei, Kind::TwoHumpEi, Kind::ThreeHumpEi];
 
     /// Its name, as in Klipper's configuration.

@@ -1,7 +1,7 @@
-//! Laws of control: what all of them have in common.
+//! Control laws: their common interface.
 //!
-//! A law is written once, for any [`Calculator`]. From its text follow the running controller ([`super::Standard`]),
-//! its linear view ([`super::feedback`]) and the exported program.
+//! A law is written once, for any [`Calculator`]. From it follow the running controller ([`super::Standard`]), its
+//! linearisation ([`super::feedback`]) and the exported program.
 
 use crate::calculator::{Calculator, Slot, Slots, less};
 use crate::reach::compensation::Compensation;
@@ -10,42 +10,42 @@ use crate::signal::profile::Reference;
 /// Inputs of a law at a sample.
 #[derive(Debug, Clone, Copy)]
 pub struct Seen<'a, N> {
-    /// Where the cart should be.
+    /// Reference of the cart.
     pub reference: Reference<N>,
-    /// Where the encoder's side should be, so that the cart is there.
+    /// Reference of the encoder's side for which the cart is at its reference.
     pub target: Reference<N>,
     /// Measured position, m along the belt.
     pub position: N,
-    /// The cart on a scale beside that, m; none without a scale.
+    /// Cart position by an additional scale, m; none without a scale.
     pub scale: Option<N>,
     /// Measured motor current, A.
     pub current: N,
     /// Feed-forward added to a current that the law commands, A, if any.
     pub forward: Option<N>,
-    /// The demands of the reference on pulleys and motor.
+    /// Requirements of the reference on pulleys and motor.
     pub compensation: &'a Compensation,
 }
 
 /// A structure with its gains, made for an axis.
 pub trait Law {
-    /// A description for a remark in a program.
+    /// Description for a comment in an exported program.
     fn about(&self) -> &'static str;
 
-    /// True if it commands a current inside itself, into which feed-forward goes.
+    /// True if it has an inner current loop, to which feed-forward is added.
     fn commands_current(&self) -> bool;
 
-    /// True if it is linear, limits apart; slopes of another are those at rest.
+    /// True if it is linear except for limits; otherwise it is linearised at rest.
     fn is_linear(&self) -> bool;
 
-    /// The next command beside feed-forward.
+    /// The next command without feed-forward.
     fn step<C: Calculator>(&self, c: &mut C, seen: &Seen<C::N>) -> C::N;
 
-    /// Is told what the limit added to the command (`excess`), and what the axis gets beside what dry friction takes of
-    /// it.
+    /// Receives the change of the command by the limit (`excess`), and the command that the axis gets less dry
+    /// friction.
     fn limited<C: Calculator>(&self, c: &mut C, excess: C::N, effective: C::N);
 }
 
-/// A number at the last sample; at the first one that of now.
+/// A number at the previous sample; at the first one, the present number.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Last {
     has: Slot,
@@ -67,7 +67,7 @@ impl Last {
     }
 }
 
-/// Speed from a measured position: differences through a filter of first order.
+/// Speed from a measured position: differences through a first-order filter.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Speed {
     every: f64,

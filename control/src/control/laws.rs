@@ -1,4 +1,4 @@
-//! The laws of control, one for each structure of a design.
+//! Control laws, one for each structure of a design.
 
 use super::fuzzy::FuzzyLaw;
 use super::law::{Law, Seen};

@@ -1,8 +1,8 @@
-//! Control of a machine: controllers stepped in time around the exact plant, input shapers, and the spectra that these
-//! are chosen from.
+//! Control of a machine: controllers stepped in time around the exact plant, input shapers, and spectra for their
+//! choice.
 //!
-//! [`closed_loop`] runs a [`Design`] on each drive of a machine along a [`Profile`] for each coordinate; [`close`] does so
-//! with any [`Controller`]s, a user's own too.
+//! [`closed_loop`] runs a [`Design`] on each drive of a machine along a [`Profile`] for each coordinate; [`close`] does
+//! so with any [`Controller`]s, including user-defined ones.
 //!
 //! [`Design`]: crate::design::Design
 //! [`Profile`]: crate::signal::profile::Profile

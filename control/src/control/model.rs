@@ -1,4 +1,4 @@
-//! The axis as a sampled linear system, for observers and regulators: everything slides, dry friction apart.
+//! The axis as a sampled linear system for observers and regulators: everything slides, without dry friction.
 
 use super::measures_cart;
 use crate::machine::axis::{CART, DRIVE, SPANS};
@@ -18,7 +18,7 @@ pub struct Linear {
     pub e: DVector<f64>,
     /// Measured position, m along the belt.
     pub measured: RowDVector<f64>,
-    /// The cart on a scale beside that, m.
+    /// Cart position by an additional scale, m.
     pub scale: Option<RowDVector<f64>>,
     /// Position of the cart, m.
     pub cart: RowDVector<f64>,
@@ -31,7 +31,7 @@ pub struct Linear {
 /// A quantity that is a state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Quantity {
-    /// Way of a body.
+    /// Position of a body.
     Position(usize),
     /// Speed of a body.
     Speed(usize),
@@ -68,7 +68,7 @@ impl Linear {
         }
         states.extend(rotors.into_iter().flat_map(pair));
         let n = states.len();
-        // A form of the whole state as one of these: what follows goes with its leader.
+        // A form of the complete state as one of these; followers move with their leader.
         let row = |whole: &State| {
             let mut led = State { position: [0.0; BODIES], speed: [0.0; BODIES], ..*whole };
             for body in 0..mechanism.bodies.len() {
@@ -115,7 +115,7 @@ impl Linear {
     }
 }
 
-/// The way of a body as a form of the whole state.
+/// The position of a body as a form of the complete state.
 fn unit(body: usize) -> State {
     let mut state = State::default();
     state.position[body] = 1.0;

@@ -1,4 +1,4 @@
-//! An observer of the disturbance at the command.
+//! Disturbance observer.
 
 use crate::calculator::{Calculator, Slot, Slots, less};
 use crate::machine::rigid::Rigid;
@@ -16,7 +16,7 @@ pub struct DisturbanceObserver {
 }
 
 impl DisturbanceObserver {
-    /// With all poles at `bandwidth`, Hz; none where the axis cannot be observed so.
+    /// With all poles at `bandwidth`, Hz; none if the axis is not observable.
     pub fn new(slots: &mut Slots, bandwidth: f64, rigid: &Rigid, every: f64) -> Option<Self> {
         // v̇ = −(d/M) v + (g/M)(u + w), ẇ = 0, held inputs
         let (rate, push) = (rigid.drag() / rigid.mass, rigid.force_per_command() / rigid.mass);
@@ -45,12 +45,12 @@ impl DisturbanceObserver {
         Some(Self { a, b, gain, state, began })
     }
 
-    /// The disturbance, V or A, that acts along with the command.
+    /// Estimated disturbance at the command, V or A.
     pub fn disturbance<C: Calculator>(&self, c: &mut C) -> C::N {
         c.memory(self.state[2])
     }
 
-    /// Takes a measured position and the command that acts from there on.
+    /// Updates the estimate by a measured position and the command that acts from then on.
     pub fn step<C: Calculator>(&self, c: &mut C, position: C::N, command: C::N) {
         let one = c.number(1.0);
         let [first, speed, disturbance] = self.state.map(|slot| c.memory(slot));

@@ -1,4 +1,4 @@
-//! A move run in closed loop, and what it shows.
+//! A move in closed loop, and its results.
 
 use super::figures::Figures;
 use super::gauge::{Gauge, read};
@@ -18,7 +18,7 @@ use crate::signal::profile::Profile;
 use crate::solve::{self, Detail, Flow, Observe, Solver};
 use crate::trajectory::Trajectory;
 
-/// A move that was run.
+/// Result of a move.
 #[derive(Debug, Clone)]
 pub struct MoveRun {
     /// Its key figures.
@@ -27,21 +27,20 @@ pub struct MoveRun {
     pub metrics: Metrics,
     /// Events, ending and cost.
     pub outcome: solve::Outcome,
-    /// Samples taken by the controller, those held back by its limit, and the samples themselves where they were to be
-    /// kept.
+    /// Number of samples of the controller, and of those changed by its limit.
     pub samples: (u64, u64),
     /// The samples, if asked for.
     pub kept: Vec<Sample>,
-    /// The swing of each drive's command after the profile.
+    /// Oscillation of each drive's command after the profile.
     pub swings: Vec<Swing>,
 }
 
-/// Everything that a closed loop needs.
+/// Inputs of a closed loop.
 #[derive(Debug, Clone, Copy)]
 pub struct Setup<'a> {
     /// The machine.
     pub machine: &'a Machine,
-    /// The machine that the controller assumes; mostly the same.
+    /// The machine that the controller assumes; usually the same.
     pub model: &'a Machine,
     /// The controller of each drive.
     pub design: &'a Design,
@@ -51,11 +50,11 @@ pub struct Setup<'a> {
     pub until: f64,
     /// Half the width of the window in which the cart counts as settled, m.
     pub window: f64,
-    /// How the equations are solved.
+    /// Solver of the equations.
     pub solver: Solver,
 }
 
-/// Runs a design along a profile: pure, and as cheap as a run of the axis, so that a search can call it often.
+/// Runs a design along a profile: a pure function at the cost of a run of the axis, so that a search can call it often.
 pub fn closed_loop(setup: &Setup) -> Result<MoveRun> {
     let &Setup { machine, model, design, profiles, until, window, solver } = setup;
     let shaped = design.shaped(profiles);
@@ -68,9 +67,9 @@ pub fn each(controllers: &mut [Standard]) -> Vec<&mut dyn Controller> {
     controllers.iter_mut().map(|controller| controller as &mut dyn Controller).collect()
 }
 
-/// The same as [`closed_loop`] of a search that runs it a thousand times, with controllers and shaped profiles that are made once: of the
-/// figures the error of what slides, settling and the root mean square of the current, equal to those of [`closed_loop`]
-/// (root mean squares to rounding, the others to the last bit), and how it ended.
+/// [`closed_loop`] for a search that runs it a thousand times, with controllers and shaped profiles made once: errors
+/// of the slides, settling and RMS current, equal to those of [`closed_loop`] (RMS values to rounding, the others to
+/// the last bit), and the ending.
 pub fn closed_loop_briefly(
     machine: &Machine,
     controllers: &mut [&mut dyn Controller],
@@ -87,7 +86,7 @@ pub fn closed_loop_briefly(
     Ok((gauge.finish(&outcome.events).0, outcome.ending))
 }
 
-/// Runs controllers along their profiles without rows; `see` is shown its samples, as [`Sampled::drive`] says.
+/// Runs controllers along their profiles without rows; `see` gets the samples as in [`Sampled::drive`].
 pub(super) fn unrecorded(
     (machine, experiment): (&Machine, &Experiment),
     controllers: &mut [&mut dyn Controller],
@@ -104,7 +103,7 @@ pub(super) fn unrecorded(
     Ok(driven(run, machine, experiment, &mut sampled, see))
 }
 
-/// Runs to the end: steppers along their references, other motors as sampled controllers say.
+/// Runs to the end: steppers along their references, other motors by sampled controllers.
 fn driven(
     mut run: solve::Run,
     machine: &Machine,
@@ -119,7 +118,7 @@ fn driven(
     run.finish()
 }
 
-/// A run from rest at the start of the profiles; its inputs are the references of steppers, and none of other motors.
+/// A run from rest at the start of the profiles; its inputs are the references of steppers, none for other motors.
 pub(super) fn at_rest(machine: &Machine, profiles: &[Profile], until: f64, every: f64) -> Experiment {
     let starts: Vec<f64> = profiles.iter().map(Profile::start).collect();
     Experiment {
@@ -135,13 +134,13 @@ pub(super) fn at_rest(machine: &Machine, profiles: &[Profile], until: f64, every
     }
 }
 
-/// The position that a stepper is commanded, which is moved by each coordinate with its weight.
+/// Commanded position of a stepper, a weighted sum of the coordinates.
 fn commanded(profiles: &[Profile], weights: &[f64]) -> Signal {
     Signal::References { profiles: profiles.to_vec(), weights: weights.to_vec() }
 }
 
 /// Runs controllers, one for each drive, along profiles, one for each coordinate, from rest at their start, for `until`
-/// s; what slides has settled within `window` (m) of its target.
+/// s; a slide has settled within `window` (m) of its target.
 pub fn close(
     machine: &Machine,
     controllers: &mut [&mut dyn Controller],
@@ -155,7 +154,7 @@ pub fn close(
     run(machine, controllers, timing, profiles, &rows, solver, (Detail::None, false), &mut |_| Flow::Continue)
 }
 
-/// Which rows are put out, and the window.
+/// Output rows, and the window.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rows {
     /// End of the run, s.
@@ -166,9 +165,8 @@ pub struct Rows {
     pub window: f64,
 }
 
-/// The same, handing each block of rows on to `sink`, with columns of references and errors behind the others:
-/// `reference` and `cart_error` of an axis, `bridge_reference`, `cart_reference`, `bridge_error` and `cart_error` of a
-/// gantry.
+/// [`close`] that passes each block of rows to `sink`, with additional columns of references and errors: `reference`
+/// and `cart_error` of an axis, `bridge_reference`, `cart_reference`, `bridge_error` and `cart_error` of a gantry.
 #[allow(clippy::too_many_arguments)] // each is one thing, and the functions above leave most out
 pub fn stream(
     machine: &Machine,
@@ -221,9 +219,8 @@ fn run(
     Ok(MoveRun { figures, metrics, outcome, samples, kept: sampled.kept.unwrap_or_default(), swings })
 }
 
-/// Puts the controller of a design, made for `model`, through an experiment along a reference that is shaped already;
-/// its input is not asked for. Positions are read exactly: a count more or less at a sample would make what comes out
-/// jump as parameters change.
+/// Runs the controller of a design, made for `model`, through an experiment along a shaped reference; the experiment's
+/// input is ignored. Positions are read exactly, since counts would make the result jump as parameters change.
 pub fn follow(
     machine: &Machine,
     model: &Machine,

@@ -1,6 +1,6 @@
-//! Pairs of shapers: one behind the other, which convolves their impulses. What they leave of a vibration is the product
-//! of what each leaves, so that a pair takes two modes, or the two ends of what one mode goes through along the travel,
-//! where one shaper would have to be long to cover both.
+//! Pairs of shapers in series, which convolves their impulses. Their remaining vibrations multiply, so a pair
+//! suppresses two modes, or both ends of one mode's range along the travel, where a single shaper would have to be long
+//! to cover both.
 //!
 //! W. Singhose, E. Crain, W. Seering, "Convolved and simultaneous two-mode input shapers", *IEE Proceedings - Control
 //! Theory and Applications* 144 (1997) 515-520.
@@ -8,25 +8,25 @@
 use super::criterion::{ALLOWED_SMOOTHING, Criterion, Target, score};
 use super::shaper::{Form, Pattern, Shaper, max_acceleration, smoothing};
 
-/// Frequencies of each shaper that are tried, at equal ratios.
+/// Number of frequencies tried for each shaper, at equal ratios.
 const GRID: usize = 40;
 
-/// Halvings of the step by which the best pair is then moved.
+/// Halvings of the step in the refinement of the best pair.
 const HALVINGS: usize = 7;
 
-/// Vibration that is hardly more than the least: so many times as much, and so much more.
+/// Vibration that counts as near the least: relative and absolute excess.
 const MORE: f64 = 1.1;
 const HARDLY: f64 = 0.0005;
 
-/// Pairs that are kept.
+/// Number of pairs kept.
 const KEPT: usize = 3;
 
 /// Two shapers, convolved.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pair {
-    /// The one of the lower frequency first.
+    /// The shaper of the lower frequency first.
     pub parts: [Shaper; 2],
-    /// Vibration that remains, of that without a shaper: 0 to 1, see [`Target::remaining`].
+    /// Remaining vibration relative to that without a shaper, 0 to 1: see [`Target::remaining`].
     pub vibration: f64,
     /// Smoothing at the criterion's corner, m.
     pub smoothing: f64,
@@ -60,12 +60,12 @@ fn digits(value: f64) -> f64 {
     format!("{value:.9e}").parse().unwrap_or(value)
 }
 
-/// The impulses of one shaper behind another.
+/// Impulses of two shapers in series.
 fn convolved(one: &Shaper, other: &Shaper) -> Vec<(f64, f64)> {
     let of = |&(t, a): &(f64, f64)| other.impulses().iter().map(move |&(s, b)| (t + s, a * b));
     let mut all: Vec<(f64, f64)> = one.impulses().iter().flat_map(of).collect();
     all.sort_by(|a, b| a.0.total_cmp(&b.0));
-    // Of two shapers alike impulses meet.
+    // Impulses of two equal shapers coincide.
     let near = 1e-9 * all.last().map_or(0.0, |last| last.0);
     all.dedup_by(|next, before| {
         let is_same = next.0 - before.0 <= near;
@@ -77,13 +77,13 @@ fn convolved(one: &Shaper, other: &Shaper) -> Vec<(f64, f64)> {
     all
 }
 
-/// A form over its frequencies, with what it leaves wherever the target asks.
+/// A form over its frequencies, with its remaining vibration at all points of the target.
 struct Tabled {
     pattern: Pattern,
     shapers: Vec<(Shaper, Vec<f64>)>,
 }
 
-/// The best pair of each two forms, the best of all first.
+/// The best pair of any two forms, in descending order.
 pub(super) fn pairs(target: Target, criterion: &Criterion) -> Vec<Pair> {
     let tables: Vec<Tabled> = criterion.candidates.iter().filter_map(|form| table(target, criterion, *form)).collect();
     let mut found: Vec<Pair> = Vec::new();
@@ -95,7 +95,7 @@ pub(super) fn pairs(target: Target, criterion: &Criterion) -> Vec<Pair> {
     found
 }
 
-/// Its score; behind all others what leaves more than is wanted, by what it leaves.
+/// Its score; pairs with more than the desired vibration come last, ordered by vibration.
 fn rank(pair: &Pair, criterion: &Criterion) -> f64 {
     let beyond = criterion.max_vibrations.map_or(0.0, |most| (pair.vibration - most).max(0.0));
     pair.score + if beyond > 0.0 { 1e6 * (1.0 + beyond) } else { 0.0 }
@@ -118,7 +118,7 @@ fn table(target: Target, criterion: &Criterion, form: Form) -> Option<Tabled> {
     Some(Tabled { pattern, shapers })
 }
 
-/// Two shapers as a pair that leaves `vibration`; none if it smooths too much.
+/// Two shapers as a pair with this remaining `vibration`; none with too much smoothing.
 fn pair(one: &Shaper, other: &Shaper, vibration: f64, criterion: &Criterion) -> Option<Pair> {
     let impulses = convolved(one, other);
     let smoothing = smoothing(&impulses, &criterion.corner);
@@ -131,8 +131,8 @@ fn pair(one: &Shaper, other: &Shaper, vibration: f64, criterion: &Criterion) -> 
     Some(Pair { parts, vibration, smoothing, max_acceleration, score: score(smoothing, vibration) })
 }
 
-/// The best pair of two forms, by the rule for single ones: of those that leave hardly more than the least vibration the
-/// one with the best score. Each is looked for on a grid, and moved from there.
+/// The best pair of two forms, by the rule for single ones: the best score among those near the least vibration. Found
+/// on a grid, then refined.
 fn best(target: Target, criterion: &Criterion, one: &Tabled, other: &Tabled) -> Option<Pair> {
     let mut on_grid: Vec<Pair> = Vec::new();
     for (a, left) in &one.shapers {
@@ -162,14 +162,14 @@ fn best(target: Target, criterion: &Criterion, one: &Tabled, other: &Tabled) -> 
     Some(moved(first, (one, other), &look, &score))
 }
 
-/// From a pair on to where `value` is smaller, along each frequency by steps that are halved.
+/// Minimises `value` from a pair along each frequency by steps that are halved.
 fn moved(
     from: Pair,
     (one, other): (&Tabled, &Tabled),
     look: &dyn Fn([f64; 2]) -> Option<Pair>,
     value: &dyn Fn(&Pair) -> f64,
 ) -> Pair {
-    // The parts stand in the order of their frequencies.
+    // The parts are in the order of their frequencies.
     let is_turned = from.parts[0].form != one.pattern.form;
     let mut at = from.parts.each_ref().map(|part| part.frequency);
     if is_turned {

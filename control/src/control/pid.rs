@@ -1,6 +1,6 @@
 //! PID, and cascades of P and PI.
 //!
-//! With the weight c of the reference's speed: c = 1 differentiates the error, c = 0 the measurement alone.
+//! With the weight c of the reference speed: c = 1 differentiates the error, c = 0 the measurement alone.
 
 use super::law::{Last, Law, Seen, Speed};
 use crate::calculator::{Calculator, Slot, Slots};
@@ -56,8 +56,7 @@ impl Law for PidLaw {
         error * proportional + sum + slope * derivative
     }
 
-    /// Back-calculation: the integral follows what the limit leaves. Without a gain there is none: nothing would ever
-    /// empty it again.
+    /// Back-calculation of the integral. None with zero gain, since nothing would ever discharge it.
     fn limited<C: Calculator>(&self, c: &mut C, excess: C::N, _: C::N) {
         if self.gains.integral != 0.0 {
             let sum = c.memory(self.integral) + excess * (self.every / self.gains.tracking).min(1.0);
@@ -88,7 +87,7 @@ impl CascadeLaw {
         }
     }
 
-    /// Adds to the speed loop's integral, if it has one: of a gain of zero nothing would ever empty it again.
+    /// Adds to the speed loop's integral, unless its gain is zero, since nothing would ever discharge it.
     fn push_speed<C: Calculator>(&self, c: &mut C, change: C::N) {
         if self.gains.speed_integral != 0.0 {
             let sum = c.memory(self.speed_integral) + change;
@@ -116,7 +115,7 @@ impl Law for CascadeLaw {
 
     fn step<C: Calculator>(&self, c: &mut C, seen: &Seen<C::N>) -> C::N {
         let gains = &self.gains;
-        // With a scale the position loop is closed at the cart, which is to be where the reference is.
+        // With a scale, the position loop is closed at the cart with the cart's reference.
         let (aim, load) = match seen.scale {
             None => (&seen.target, seen.position),
             Some(scale) => (&seen.reference, scale),

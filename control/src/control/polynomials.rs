@@ -2,7 +2,7 @@
 //!
 //! Singhose and others publish fits to the solutions of the equations that define these shapers (zero vibration between
 //! the humps, the tolerance V with zero slope at each hump); Klipper has evaluated them since 2025-09-16. The numbers
-//! are those that Klipper executes, read in its `shaper_defs.py`; `tests/shape.rs` measures how well they keep the
+//! are those that Klipper executes, read in its `shaper_defs.py`; `tests/shape.rs` measures how well they satisfy the
 //! equations. The amplitudes of two humps add up to 1.0005 without damping: they are divided by their sum.
 //!
 //! W. Singhose, L. Porter, T. Tuttle, N. Singer, "Vibration reduction using multi-hump input shapers", *J. Dynamic
@@ -36,8 +36,8 @@ fn at(coefficients: &[f64], x: f64) -> f64 {
 }
 
 /// Impulses (time in undamped periods, amplitude) of an extra-insensitive shaper of tolerance V (of EI; the others have
-/// 5 %) for a damping ratio ζ; the amplitudes sum to 1. None if an amplitude is not positive or the order is lost, and
-/// for the kinds that are no extra-insensitive shapers.
+/// 5 %) for a damping ratio ζ; the amplitudes sum to 1. None if an amplitude is not positive or the times are not in
+/// order, and for other kinds.
 pub(super) fn impulses(kind: Kind, tolerance: f64, damping: f64) -> Option<Vec<(f64, f64)>> {
     let (v, zeta) = (tolerance, damping);
     let of = |table: &[(Cubic, Cubic)]| table.iter().map(|(t, a)| (at(t, zeta), at(a, zeta))).collect::<Vec<_>>();
@@ -46,7 +46,7 @@ pub(super) fn impulses(kind: Kind, tolerance: f64, damping: f64) -> Option<Vec<(
         Kind::Ei => {
             let a1 = at(&[0.24968 + 0.24961 * v, 0.80008 + 1.23328 * v, 0.49599 + 3.17316 * v], zeta);
             let a3 = at(&[0.25149 + 0.21474 * v, -0.83249 + 1.41498 * v, 0.85181 - 4.90094 * v], zeta);
-            // t₂ is in damped periods; the last impulse stands after one.
+            // t₂ is in damped periods; the last impulse is after one period.
             let [linear, square, cube] =
                 [[0.46159, 8.57843], [4.26169, -108.644], [1.75601, 336.989]].map(|[one, two]| one * v + two * v * v);
             let t2 = at(&[0.4999, linear, square, cube], zeta);

@@ -1,9 +1,9 @@
-//! Integrals and peaks of what is a polynomial for a while.
+//! Integrals and peaks of piecewise polynomials.
 
 use crate::metrics::Peak;
 use crate::solve::{Curve, Polynomial, TERMS};
 
-/// The derivative by time of a quantity on a curve of this length, s.
+/// Time derivative of a quantity on a curve of this length, s.
 pub(super) fn slope(quantity: &Polynomial, length: f64) -> Polynomial {
     let term = |k: usize| if k + 1 < TERMS { (k + 1) as f64 * quantity.0[k + 1] / length } else { 0.0 };
     Polynomial(std::array::from_fn(term))
@@ -29,7 +29,7 @@ pub(super) fn shifted(coefficients: &[f64; 5], from: f64, length: f64) -> Polyno
         *term *= power;
         power *= length;
     }
-    // Horner, again and again: in powers of s instead of s − from.
+    // Repeated Horner's rule: in powers of s instead of s − from.
     if from != 0.0 {
         for i in 0..4 {
             for j in (i..4).rev() {
@@ -40,7 +40,7 @@ pub(super) fn shifted(coefficients: &[f64; 5], from: f64, length: f64) -> Polyno
     Polynomial(terms)
 }
 
-/// Takes the largest magnitude on a part of a curve, if it is news.
+/// Updates a peak by the largest magnitude on a part of a curve.
 pub(super) fn larger(peak: &mut Peak, quantity: &Polynomial, part: (f64, f64), curve: &Curve) {
     if quantity.bound() > peak.value.abs() {
         let (s, value) = quantity.largest(part.0, part.1);
@@ -50,8 +50,8 @@ pub(super) fn larger(peak: &mut Peak, quantity: &Polynomial, part: (f64, f64), c
     }
 }
 
-/// Places and weights of Gauss and Legendre's rule of eight places on −1..1, one half of them: exact for polynomials of
-/// degree 15, and products of two [`Polynomial`]s have degree 14.
+/// Nodes and weights of the Gauss-Legendre rule with eight nodes on −1..1, one half of them: exact to degree 15, while
+/// products of two [`Polynomial`]s have degree 14.
 const GAUSS: [(f64, f64); 4] = [
     (0.183_434_642_495_649_8, 0.362_683_783_378_362),
     (0.525_532_409_916_329, 0.313_706_645_877_887_3),
@@ -59,7 +59,7 @@ const GAUSS: [(f64, f64); 4] = [
     (0.960_289_856_497_536_3, 0.101_228_536_290_376_26),
 ];
 
-/// Powers of the places of that rule on 0..1, by powers and places; and the weights.
+/// Powers of the nodes of that rule on 0..1, by power and node; and the weights.
 const POWERS: [[f64; PLACES]; TERMS] = {
     let (mut powers, mut k) = ([[1.0; PLACES]; TERMS], 1);
     while k < TERMS {
@@ -77,7 +77,7 @@ const POWERS: [[f64; PLACES]; TERMS] = {
 
 const PLACES: usize = 2 * GAUSS.len();
 
-/// The values of a polynomial at the places on 0..1.
+/// Values of a polynomial at the nodes on 0..1.
 pub(super) fn at_places(polynomial: &Polynomial) -> [f64; PLACES] {
     let mut values = [0.0; PLACES];
     for (c, powers) in polynomial.0.iter().zip(&POWERS) {
@@ -86,7 +86,7 @@ pub(super) fn at_places(polynomial: &Polynomial) -> [f64; PLACES] {
     values
 }
 
-/// The integral over 0..1 of the product of two polynomials, of which these are the values.
+/// Integral over 0..1 of the product of two polynomials with these values.
 pub(super) fn product(a: &[f64; PLACES], b: &[f64; PLACES]) -> f64 {
     let weighted = |(j, (_, w)): (usize, &(f64, f64))| w * (a[2 * j] * b[2 * j] + a[2 * j + 1] * b[2 * j + 1]);
     0.5 * GAUSS.iter().enumerate().map(weighted).sum::<f64>()

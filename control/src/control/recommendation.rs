@@ -13,7 +13,7 @@ use crate::mechanism::Label;
 use crate::reach::resonance::{Drive, Reach, Resonance, reaches, resonances};
 use std::path::{Path, PathBuf};
 
-/// By how much a model's frequencies may be wrong where the user does not say: masses are known to some 20 %.
+/// Default relative uncertainty of a model's frequencies: masses are known to about 20 %.
 const UNCERTAINTY: f64 = 0.1;
 
 /// The vibration that a shaper is chosen for.
@@ -25,13 +25,13 @@ pub enum Source {
     Spectra(Vec<(PathBuf, Spectrum)>),
     /// The modes of a case along its travel.
     Model {
-        /// The case's.
+        /// Title of the case.
         title: String,
-        /// The coordinate that is to rest, of a machine with several.
+        /// The coordinate to come to rest, for a machine with several.
         coordinate: Option<Coordinate>,
-        /// The motor meanwhile.
+        /// State of the motor.
         drive: Drive,
-        /// At all places.
+        /// Modes at all positions.
         modes: Vec<Resonance>,
     },
 }
@@ -50,9 +50,9 @@ pub struct Coordinate {
 pub struct Found {
     /// The file.
     pub file: PathBuf,
-    /// Further files that are read with it.
+    /// Further files read with it.
     pub also: Vec<PathBuf>,
-    /// Share by which a model's frequencies may be off.
+    /// Relative uncertainty of a model's frequencies.
     pub uncertainty: f64,
     /// Its vibration.
     pub source: Source,
@@ -67,38 +67,38 @@ pub struct Found {
 /// The shapers of each file, and the comparison of two spectra.
 #[derive(Debug, Clone)]
 pub struct Findings {
-    /// By file.
+    /// Result for each file.
     pub each: Vec<Found>,
-    /// Of two spectra.
+    /// Comparison of two spectra.
     pub comparison: Option<Comparison>,
 }
 
-/// The questions to files of vibration; see the options of `taut shape`.
+/// Options of a recommendation; see `taut shape`.
 #[derive(Debug, Clone, Default)]
 pub struct Question {
     /// Changes of a case, each as `KEY=VALUE`.
     pub changes: Vec<String>,
     /// One shaper for all files.
     pub together: bool,
-    /// Whose shapers, rule and parameters.
+    /// Firmware whose shapers, rule and parameters apply.
     pub firmware: Firmware,
-    /// The axis of the accelerometer; all of them unless said.
+    /// The axis of the accelerometer; all by default.
     pub axis: Option<Axis>,
     /// The damping ratio that shapers are designed for.
     pub damping: Option<Damping>,
-    /// Most smoothing, m.
+    /// Largest smoothing, m.
     pub max_smoothing: Option<f64>,
-    /// Most vibration, as a share.
+    /// Largest vibration, as a fraction.
     pub max_vibrations: Option<f64>,
     /// Speed at corners, m/s.
     pub corner_speed: Option<f64>,
-    /// The shapers to choose among; those of the firmware unless said.
+    /// The shapers to choose among; those of the firmware by default.
     pub forms: Option<Vec<Form>>,
-    /// Share by which a model's frequencies may be off.
+    /// Relative uncertainty of a model's frequencies.
     pub uncertainty: Option<f64>,
     /// The motor while the cart vibrates.
     pub drive: Option<Drive>,
-    /// True if pairs of shapers, convolved, are looked at, too.
+    /// True if convolved pairs of shapers are also tried.
     pub pairs: bool,
 }
 
@@ -107,7 +107,7 @@ pub struct Question {
 pub enum Damping {
     /// As given.
     Ratio(f64),
-    /// Of the curve of one mode through the highest peak.
+    /// Fitted to the highest peak.
     Fitted,
 }
 
@@ -196,7 +196,7 @@ fn chosen(args: &Question, file: &Path, source: Source, also: Vec<PathBuf>) -> R
         }
         Source::Model { .. } => None,
     };
-    // What the model knows is better than a guess; what the user says, better still.
+    // A user's value precedes that of the model, which precedes the default.
     let known = match (&source, args.damping) {
         (_, Some(Damping::Ratio(damping))) => Some(damping),
         (Source::Model { modes, .. }, _) => Some(damping(modes)),
@@ -277,14 +277,14 @@ fn measured(args: &Question, files: &[PathBuf], file: &Path) -> Result<Source> {
     Ok(Source::Spectrum(spectrum))
 }
 
-/// A mode of a model along the travel, and what is left of it at worst.
+/// A mode of a model along the travel, and its worst remaining vibration.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Left {
     /// Its frequencies, without uncertainty.
     pub reach: Reach,
-    /// Behind each shaper, in the order of the choice, of what the mode does without one.
+    /// With each shaper, in the order of the choice, relative to that without one.
     pub shapers: Vec<f64>,
-    /// Behind each pair.
+    /// With each pair.
     pub pairs: Vec<f64>,
 }
 
@@ -306,7 +306,7 @@ impl Found {
         reaches(modes).into_iter().map(one).collect()
     }
 
-    /// The verdict on pairs, in a sentence; none where they were not asked for.
+    /// The verdict on pairs, in a sentence; none if pairs were not tried.
     pub fn pair_told(&self) -> Option<String> {
         let Some(pair) = self.choice.pairs.first() else {
             return self.criterion.pairs.then(|| "no pair of shapers smooths as little as is allowed".into());
@@ -339,7 +339,7 @@ impl Found {
         ))
     }
 
-    /// Lines for Klipper's configuration, of the axis that the option or the file's name says.
+    /// Lines for Klipper's configuration, for the axis given by the option or the file's name.
     pub fn lines(&self) -> Vec<String> {
         let name = self.name();
         let named = ["x", "y", "z"].into_iter().find(|axis| name.contains(&format!("_{axis}_")));

@@ -1,15 +1,15 @@
 //! The command after the profile.
 
-/// Half of what the command goes to and fro after the profile.
+/// Amplitude of the command's oscillation after the profile.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Swing {
     /// In the first half of the rest, V or A.
     pub early: f64,
-    /// In the second.
+    /// In the second half.
     pub late: f64,
-    /// In the second, Hz; 0 where it does not go to and fro.
+    /// In the second half, Hz; 0 without oscillation.
     pub frequency: f64,
-    /// How often it does so there.
+    /// Number of cycles in the second half.
     pub cycles: f64,
 }
 
@@ -41,7 +41,7 @@ impl Rest {
             return;
         }
         self.late = wider(self.late);
-        // Upward through the middle of what it went through before, with a band about it.
+        // Upward crossing of the middle of its earlier range, with a hysteresis band.
         let (low, high) = self.early;
         let (level, band) = (0.5 * (low + high), 0.2 * 0.5 * (high - low));
         if given < level - band {

@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::linear::eigen::{balance, scaled as balanced};
 use nalgebra::{DMatrix, DVector};
 
-/// Residual, relative to the largest of the equation's terms, up to which a solution counts.
+/// Largest residual of a solution, relative to the largest term of the equation.
 pub const ACCURACY: f64 = 1e-10;
 
 /// The stabilising solution of a Riccati equation.
@@ -71,7 +71,7 @@ pub fn discrete(a: &DMatrix<f64>, b: &DMatrix<f64>, q: &DMatrix<f64>, r: &DMatri
     accepted(best)
 }
 
-/// The continuous equation, G being B R⁻¹ Bᵀ; the gain is that of `b` and `r`.
+/// The continuous equation with G = B R⁻¹ Bᵀ; the gain is that of `b` and `r`.
 pub fn continuous(a: &DMatrix<f64>, b: &DMatrix<f64>, q: &DMatrix<f64>, r: &DMatrix<f64>) -> Result<Solution> {
     let n = a.nrows();
     fits(a, b, q)?;
@@ -83,7 +83,7 @@ pub fn continuous(a: &DMatrix<f64>, b: &DMatrix<f64>, q: &DMatrix<f64>, r: &DMat
     for _ in 0..MOST_SCALINGS {
         let (sa, sb, sq) = scaled(a, b, q, &scale);
         let g = &sb * &inverse * sb.transpose();
-        // The transform's γ: a little faster than anything in the system, so that A − γ I can be inverted.
+        // The transform's γ: slightly above all rates of the system, so that A − γ I is regular.
         let gamma = 1.5 * sa.norm().max((g.norm() * sq.norm()).sqrt()).max(f64::MIN_POSITIVE);
         let identity = DMatrix::identity(n, n);
         let shifted = &sa - &identity * gamma;
@@ -164,7 +164,7 @@ fn symmetric(x: DMatrix<f64>) -> DMatrix<f64> {
     (&x + x.transpose()) * 0.5
 }
 
-/// The limit H of the doubling; none where it does not come to one.
+/// The limit H of the doubling; none if it does not converge.
 fn doubled(mut a: DMatrix<f64>, mut g: DMatrix<f64>, mut h: DMatrix<f64>) -> Option<DMatrix<f64>> {
     let n = a.nrows();
     for _ in 0..MOST_DOUBLINGS {
@@ -185,7 +185,7 @@ fn doubled(mut a: DMatrix<f64>, mut g: DMatrix<f64>, mut h: DMatrix<f64>) -> Opt
     None
 }
 
-/// X = Aᵀ X A + Q by squaring; none where A is not stable.
+/// X = Aᵀ X A + Q by squaring; none if A is not stable.
 fn stein(a: &DMatrix<f64>, q: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let (mut a, mut x) = (a.clone(), symmetric(q.clone()));
     for _ in 0..MOST_DOUBLINGS {

@@ -1,4 +1,4 @@
-//! The loop closed: samples, counts, delay and limit between a controller and the axis.
+//! Closed loop: samples, counts, delay and limit between a controller and the axis.
 
 use crate::design::Design;
 use crate::error::{Error, Result};
@@ -8,27 +8,27 @@ use crate::mechanism::State;
 use crate::quantity::rounded;
 use crate::signal::profile::Reference;
 
-/// Most coordinates of a machine.
+/// Maximum number of coordinates of a machine.
 pub(super) const SLIDES: usize = 2;
 
-/// Measurements and references that a controller has at a sample.
+/// Measurements and references of a controller at a sample.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Observation<N = f64> {
     /// Time of the sample, s.
     pub time: f64,
-    /// Where the cart should be now; of a drive of a gantry where its part of the belt should be.
+    /// Present reference of the cart; for a drive of a gantry, of its part of the belt.
     pub reference: Reference<N>,
-    /// Where that should be when the command acts, or as far ahead as the controller asked to look.
+    /// That reference when the command acts, or at the lead of the controller.
     pub ahead: Reference<N>,
     /// Measured position, m along the belt: whole counts.
     pub position: N,
-    /// The cart's position on a scale beside that encoder, m: whole counts; none without a scale.
+    /// Cart position by an additional scale, m: whole counts; none without a scale.
     pub scale: Option<N>,
     /// Measured motor current, A.
     pub current: N,
 }
 
-/// The controller of one drive, stepped once a sample. A user's own implements this.
+/// The controller of one drive, stepped once a sample. User-defined controllers implement this trait.
 ///
 /// ```
 /// use taut::case::{Case, TEMPLATE};
@@ -53,19 +53,18 @@ pub struct Observation<N = f64> {
 /// # Ok::<(), taut::Error>(())
 /// ```
 pub trait Controller {
-    /// The command that follows from what is seen, V or A.
+    /// Command from the observation, V or A.
     fn step(&mut self, seen: &Observation) -> f64;
 
-    /// The command that is fed forward beside that, V or A, from the references of all that slides when it acts: of a
-    /// machine with several drives, whose references belong together.
+    /// Feed-forward command, V or A, from the references of all slides when it acts, for a machine with several drives.
     fn forward(&self, _slides: &[Reference]) -> f64 {
         0.0
     }
 
-    /// Is told what the limit left of the command just asked for, beside what was fed forward.
+    /// Receives the last command after the limit, without feed-forward.
     fn limited(&mut self, _given: f64) {}
 
-    /// Forgets all it has seen.
+    /// Resets the controller's memory.
     fn reset(&mut self);
 }
 
@@ -76,13 +75,13 @@ pub struct Loop {
     pub every: f64,
     /// Time from a sample to its command, s.
     pub delay: f64,
-    /// Largest command either way, V or A.
+    /// Largest magnitude of the command, V or A.
     pub limit: Option<f64>,
-    /// How far ahead of a sample [`Observation::ahead`] is, s.
+    /// Lead of [`Observation::ahead`] over a sample, s.
     pub lead: f64,
 }
 
-/// A controller's sample, kept.
+/// A stored sample of a controller.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sample {
     /// s.
@@ -99,7 +98,7 @@ pub struct Sample {
     pub given: f64,
 }
 
-/// A known input that is added to what a controller commands, held between its times.
+/// A known input that is added to a controller's command, held between its times.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Added {
     /// s, increasing.
@@ -109,12 +108,12 @@ pub struct Added {
 }
 
 impl Added {
-    /// Values every so often from time zero on, s.
+    /// Values at this interval, s, from time zero.
     pub fn new(every: f64, values: Vec<f64>) -> Self {
         Self { times: (0..values.len()).map(|k| k as f64 * every).collect(), values }
     }
 
-    /// The value at `time`, and when the next one comes.
+    /// The value at `time`, and the time of the next one.
     pub(crate) fn at(&self, time: f64) -> (f64, f64) {
         let next = self.times.partition_point(|t| *t <= time);
         let value = next.checked_sub(1).and_then(|k| self.values.get(k)).copied().unwrap_or(0.0);
@@ -122,7 +121,7 @@ impl Added {
     }
 }
 
-/// All that the controller of a drive reads of a machine.
+/// The sensors of the controller of a drive.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sensors {
     encoder: Sensor,
@@ -146,17 +145,17 @@ impl Sensors {
         self.encoder.read(state)
     }
 
-    /// The cart on the scale, m.
+    /// Cart position by the scale, m.
     pub(super) fn scale(&self, state: &State) -> Option<f64> {
         self.scale.map(|scale| scale.read(state))
     }
 }
 
-/// The encoder as a controller reads it, m along the belt; exact where the stage has none.
+/// Encoder as a controller reads it, m along the belt; exact for a machine without one.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sensor {
     body: usize,
-    /// m per unit of what it watches.
+    /// m per unit of the measured quantity.
     length: f64,
     /// Counts per unit of that.
     counts: Option<f64>,
@@ -193,26 +192,26 @@ impl Sensor {
     }
 }
 
-/// True if the encoder of this stage sits at the cart.
+/// True if the encoder of this machine is at the cart.
 pub fn measures_cart(machine: &Machine) -> bool {
     machine.encoder.is_some_and(|encoder| encoder.at == EncoderPlace::Cart)
 }
 
-/// True if a controller on this stage reads the scale beside the encoder: a cascade, state feedback and a disturbance
-/// observer do.
+/// True if a controller on this machine uses the scale beside the encoder: cascades, state feedback and disturbance
+/// observers do.
 pub fn reads_scale(design: &Design, machine: &Machine) -> bool {
     let structure = design.structure.tunable().reads_scale();
     machine.scale.is_some() && (structure || design.disturbance_observer.is_some())
 }
 
-/// Most samples that a command may wait for.
+/// Maximum delay of a command, in samples.
 const MOST_DELAY: f64 = 1000.0;
 
-/// Most samples of a run.
+/// Maximum number of samples of a run.
 const MOST_SAMPLES: f64 = 1e9;
 
 impl Loop {
-    /// Refuses what is no timing of a run that ends at `until`, s.
+    /// Rejects an invalid timing for a run that ends at `until`, s.
     pub(super) fn check(&self, until: f64) -> Result<()> {
         let &Self { every, delay, limit, lead } = self;
         let wrong = |what: String, allowed: &str| Err(Error::new(what).allowed(allowed));
@@ -240,10 +239,10 @@ impl Loop {
         Ok(())
     }
 
-    /// The delay in whole samples, and what is left of it, s.
+    /// The delay in whole samples, and its remainder, s.
     pub(super) fn samples_late(&self) -> (usize, f64) {
         let ratio = self.delay / self.every;
-        // A delay of whole samples is one, whatever rounding says.
+        // A delay within rounding of whole samples is one.
         let near = ratio.round();
         if (ratio - near).abs() < 1e-9 * near.max(1.0) {
             (near as usize, 0.0)

@@ -8,10 +8,10 @@ use crate::mechanism::{DRIVES, State};
 use crate::signal::profile::{Profile, Reference};
 use crate::solve::Run;
 
-/// Decides the inputs: samples, asks the controllers, limits, and hands on when the delay is over.
+/// Determines the inputs: samples, evaluates the controllers, limits the commands, and applies them after the delay.
 pub(super) struct Sampled<'a, 'c> {
     controllers: &'a mut [&'c mut dyn Controller],
-    /// Of each coordinate.
+    /// Profile of each coordinate.
     profiles: &'a [Profile],
     /// Weights of the coordinates in the position of each drive along the belt.
     shares: Vec<&'static [f64]>,
@@ -20,7 +20,7 @@ pub(super) struct Sampled<'a, 'c> {
     pub(super) told: [Told; DRIVES],
     /// End of the run, s.
     until: f64,
-    /// Samples, and those at which a command was limited.
+    /// Number of samples, and of those with a limited command.
     pub(super) samples: u64,
     pub(super) limited: u64,
     pub(super) kept: Option<Vec<Sample>>,
@@ -31,9 +31,9 @@ pub(super) struct Sampled<'a, 'c> {
 /// The commands of a drive.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Told {
-    /// For how long limited commands were held, s.
+    /// Duration of limited commands, s.
     pub held_back: f64,
-    /// Changes of direction of what acts, and the last change of it that was none of zero.
+    /// Sign changes of the increments of the acting command, and its last non-zero increment.
     pub turns: u64,
     way: f64,
     /// The command after the profile.
@@ -41,7 +41,7 @@ pub(super) struct Told {
 }
 
 impl Told {
-    /// Nothing yet, of a profile that ends at `end`, s, and a run that does at `until`.
+    /// Initial state, for a profile that ends at `end`, s, and a run that ends at `until`.
     fn new(end: f64, until: f64) -> Self {
         Self { held_back: 0.0, turns: 0, way: 0.0, at_rest: Rest::new(end, until) }
     }
@@ -69,7 +69,7 @@ impl<'a, 'c> Sampled<'a, 'c> {
         }
     }
 
-    /// For a run that ends there: what is held then is held no longer.
+    /// For a run that ends there, which ends the holding of commands.
     pub(super) fn until(mut self, until: f64) -> Self {
         self.until = until;
         self.told = [Told::new(self.profiles.first().map_or(0.0, Profile::end), until); DRIVES];
@@ -82,7 +82,7 @@ impl<'a, 'c> Sampled<'a, 'c> {
         self
     }
 
-    /// With positions read exactly and not in counts.
+    /// With exact positions instead of counts.
     pub(super) fn exactly(mut self) -> Self {
         self.clocked = self.clocked.exactly();
         self
@@ -107,11 +107,11 @@ impl Sampled<'_, '_> {
         }
     }
 
-    /// Holds commands, with what is added to them, until `end`, s; false where the run ends.
+    /// Holds commands, with signals added to them, until `end`, s; false if the run ends.
     fn hold(&self, run: &mut Run, commands: &[f64], end: f64) -> bool {
         let Some(added) = self.added else { return run.hold(commands, end) };
         loop {
-            // A hundredth of a sample is what clocks of logs are off by.
+            // Clocks of logs are off by up to a hundredth of a sample.
             let near = 1e-2 * self.clocked.timing.every;
             let (value, next) = added.at(run.time() + near);
             let next = if next < end - near { next } else { end };
@@ -124,7 +124,8 @@ impl Sampled<'_, '_> {
         }
     }
 
-    /// References at `time`, s: of each drive along the belt, now and one lead later; and of all that slides, later.
+    /// References at `time`, s: of each drive along the belt, now and one lead later; and of all slides, one lead
+    /// later.
     fn references(&self, time: f64) -> (References, [Reference; SLIDES]) {
         let lead = self.clocked.timing.lead;
         let at = |time: f64| {
@@ -144,11 +145,11 @@ impl Sampled<'_, '_> {
         (references, ahead)
     }
 
-    /// The inputs from now on and until when they are held, s, told the state and the motors' currents, A, just before.
+    /// Inputs from now on and the end of their hold, s, from the state and the motors' currents, A, just before.
     fn decide(&mut self, state: &State, currents: &Commands) -> (Commands, f64) {
         let every = self.clocked.timing.every;
         let (time, before) = (self.clocked.next(), self.clocked.acting());
-        // A command that was delayed needs no reference.
+        // A delayed command needs no reference.
         let (references, slides) = match self.clocked.is_at_sample() {
             false => Default::default(),
             true => self.references(time),

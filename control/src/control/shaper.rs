@@ -1,4 +1,4 @@
-//! Input shapers: a command is sent as several smaller ones, so timed that the vibrations they excite cancel.
+//! Input shapers: a command is split into several smaller ones, timed so that the vibrations they excite cancel.
 //!
 //! Sources: ZV and ZVD by N. Singer, W. Seering, "Preshaping command inputs to reduce system vibration", *J. Dynamic
 //! Systems, Measurement, and Control* 112, 1990; EI by W. Singhose, W. Seering, N. Singer, "Residual vibration
@@ -13,10 +13,10 @@ use crate::error::{Error, Result};
 use nalgebra::Complex;
 use std::f64::consts::{PI, SQRT_2};
 
-/// The damping ratio that is assumed where none is known.
+/// Default damping ratio.
 pub const USUAL_DAMPING: f64 = 0.1;
 
-/// Whose definitions of shapers, and whose rule to choose one.
+/// Firmware whose definitions and rule of choice apply.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Firmware {
     /// Klipper of 2026 (commit 034cb673): extra-insensitive shapers for a damped mode (2025-09-16), choice (2025-10),
@@ -40,12 +40,12 @@ impl Firmware {
     }
 }
 
-/// A kind with its parameters, as Klipper's configuration has it: `ei`, `mzv(n=4,t=0.9)`, `ei(v_tol=0.1)`.
+/// A kind with its parameters, in the notation of Klipper's configuration: `ei`, `mzv(n=4,t=0.9)`, `ei(v_tol=0.1)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Form {
     /// With the usual parameters.
     Usual(Kind),
-    /// Zero vibration with so many impulses at equal distances, the last after so many damped periods.
+    /// Zero vibration with equidistant impulses, the last after a number of damped periods.
     Mzv {
         /// 3 to 20.
         pulses: usize,
@@ -54,7 +54,7 @@ pub enum Form {
     },
     /// Extra-insensitive with another tolerance.
     Ei {
-        /// Vibration at the design frequency, of that without a shaper.
+        /// Relative vibration at the design frequency.
         tolerance: f64,
     },
 }
@@ -195,9 +195,8 @@ impl Pattern {
     }
 }
 
-/// Impulses (time in undamped periods, amplitude) at distances of so many damped periods: A_i = a_i e^{−ζ ω t_i} / Σ.
-/// At the last impulse all vibrations then weigh as they do without damping, so that those which cancel without it
-/// cancel with it.
+/// Impulses (time in undamped periods, amplitude) at this spacing in damped periods: A_i = a_i e^{−ζ ω t_i} / Σ. At the
+/// last impulse all vibrations then have the same weights as without damping, so that they cancel likewise.
 fn weighted(amplitudes: &[f64], spacing: f64, zeta: f64) -> Vec<(f64, f64)> {
     let root = (1.0 - zeta * zeta).sqrt();
     let weight = |i: usize| (-2.0 * PI * zeta / root * spacing * i as f64).exp();
@@ -207,7 +206,7 @@ fn weighted(amplitudes: &[f64], spacing: f64, zeta: f64) -> Vec<(f64, f64)> {
     all.map(|(i, a)| (i as f64 * spacing / root, a / sum)).collect()
 }
 
-/// An EI shaper of today's Klipper.
+/// An EI shaper of present Klipper.
 fn extra_insensitive(form: Form, tolerance: f64, damping: f64) -> Result<Vec<(f64, f64)>> {
     let kind = form.kind();
     let known = (1e-4..=0.3).contains(&tolerance);
@@ -219,9 +218,9 @@ fn extra_insensitive(form: Form, tolerance: f64, damping: f64) -> Result<Vec<(f6
     })
 }
 
-/// Amplitudes without damping of n impulses over t periods that vanish at the frequency itself and at as many others at
-/// equal distances as they can: Σ A_i z^i = Π (z − e^{jθ_k}), θ_k = 2π/(n − 1) (t + k (n − 1 − 2t)/(n − 2)), k = 0 … n
-/// − 2. None if one is negative.
+/// Undamped amplitudes of n impulses over t periods with zeros at the design frequency and at as many evenly spaced
+/// others as possible: Σ A_i z^i = Π (z − e^{jθ_k}), θ_k = 2π/(n − 1) (t + k (n − 1 − 2t)/(n − 2)), k = 0 … n − 2. None
+/// if one is negative.
 fn modified(pulses: usize, duration: f64) -> Option<Vec<f64>> {
     let (n, t) = (pulses as f64, duration);
     if !(t >= 0.5 - 1e-9 && 2.0 * t < n - 1.0 - 1e-7) {
@@ -239,7 +238,7 @@ fn modified(pulses: usize, duration: f64) -> Option<Vec<f64>> {
         product = next;
     }
     let sum: f64 = product.iter().map(|a| a.re).sum();
-    // What is nothing but rounding is no impulse.
+    // An amplitude of rounding size is zero.
     let sure = |a: f64| if a.abs() < 1e-12 { 0.0 } else { a };
     let amplitudes: Vec<f64> = product.iter().map(|a| sure(a.re / sum)).collect();
     amplitudes.iter().all(|a| *a >= 0.0).then_some(amplitudes)
@@ -250,7 +249,7 @@ fn modified(pulses: usize, duration: f64) -> Option<Vec<f64>> {
 pub struct Shaper {
     /// Which.
     pub kind: Kind,
-    /// With which parameters.
+    /// Kind and parameters.
     pub form: Form,
     /// Undamped natural frequency of the mode it is designed for, Hz.
     pub frequency: f64,
@@ -280,23 +279,23 @@ impl Shaper {
         &self.impulses
     }
 
-    /// How much later a shaped move ends, s.
+    /// Delay of the end of a shaped move, s.
     pub fn duration(&self) -> f64 {
         self.impulses.last().map_or(0.0, |impulse| impulse.0)
     }
 
-    /// The amplitude-weighted middle of its impulses, s: by how much it delays a slow command.
+    /// Amplitude-weighted mean time of its impulses, s: its delay of a slow command.
     pub fn delay(&self) -> f64 {
         middle(&self.impulses)
     }
 
-    /// Vibration that is left of a mode of that undamped natural `frequency` (Hz) and `damping` ratio, as part of what
-    /// an unshaped step leaves, both after the last impulse: see [`residual_vibration`].
+    /// Residual vibration of a mode of this undamped natural `frequency` (Hz) and `damping` ratio relative to an
+    /// unshaped step, both after the last impulse: see [`residual_vibration`].
     pub fn residual_vibration(&self, frequency: f64, damping: f64) -> f64 {
         residual_vibration(&self.impulses, frequency, damping)
     }
 
-    /// How far a shaped path leaves a corner, m: see [`Corner`].
+    /// Distance of a shaped path from a corner, m: see [`Corner`].
     pub fn smoothing(&self, corner: &Corner) -> f64 {
         smoothing(&self.impulses, corner)
     }
@@ -307,8 +306,8 @@ impl Shaper {
         max_acceleration(&self.impulses, limit, corner_speed)
     }
 
-    /// The frequencies about the shaper's own at which no mode with one of these damping ratios keeps more than `level`
-    /// of its vibration, as parts of the shaper's frequency; none if its own is not among them.
+    /// Range of relative frequencies around the shaper's own within which no mode with one of these damping ratios
+    /// keeps more than `level` of its vibration; none if its own exceeds it.
     pub fn insensitivity(&self, level: f64, dampings: &[f64]) -> Option<(f64, f64)> {
         const STEP: f64 = 1e-3;
         let f = self.frequency;
@@ -331,13 +330,12 @@ impl Shaper {
     }
 }
 
-/// A corner of a path, by which shapers are compared: how fast it is taken, and how hard the axis accelerates before
-/// and after.
+/// A corner of a path for the comparison of shapers: its speed, and the acceleration before and after it.
 ///
-/// A shaper replaces a motion x(t) by Σ A_i x(t − u_i), u_i counted from the middle of its impulses; where x(t) is
-/// straight that changes nothing, at a corner it cuts. At a right angle each axis has come with v t + a t²/2, and the
-/// way from the tip is √2 of one axis'; at a reversal the axis turns back with a t²/2. The greater of both is called
-/// smoothing. It compares shapers; what a workpiece shows depends on its real path.
+/// A shaper replaces a motion x(t) by Σ A_i x(t − u_i), u_i counted from the mean time of its impulses; this does not
+/// change a straight x(t), but cuts corners. At a right angle each axis moves by v t + a t²/2, and the distance from
+/// the tip is √2 times that of one axis; at a reversal the axis returns with a t²/2. The larger of both is called
+/// smoothing. It compares shapers; the effect on a workpiece depends on its real path.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Corner {
     /// m/s².
@@ -347,19 +345,19 @@ pub struct Corner {
 }
 
 impl Default for Corner {
-    /// 5 m/s² and 5 mm/s, as Klipper compares.
+    /// 5 m/s² and 5 mm/s, as in Klipper.
     fn default() -> Self {
         Self { acceleration: 5.0, speed: 5e-3 }
     }
 }
 
-/// The amplitude-weighted middle of impulses, s.
+/// Amplitude-weighted mean time of impulses, s.
 fn middle(impulses: &[(f64, f64)]) -> f64 {
     // Σ A_i t_i
     impulses.iter().map(|(t, a)| a * t).sum()
 }
 
-/// How far a path behind these impulses leaves a corner, m: see [`Corner`].
+/// Distance of a path after these impulses from a corner, m: see [`Corner`].
 pub fn smoothing(impulses: &[(f64, f64)], corner: &Corner) -> f64 {
     let (quarter, half) = corner_moments(impulses);
     // 90°: the way √2 Σ A_i (v u_i + a u_i²/2) over impulses later than the middle.  180°: Σ A_i a u_i²/2 over all
@@ -367,15 +365,15 @@ pub fn smoothing(impulses: &[(f64, f64)], corner: &Corner) -> f64 {
     right.max(0.5 * corner.acceleration * half)
 }
 
-/// The greatest acceleration, m/s², at which [`smoothing`] stays within `limit` (m) at a corner speed in m/s; 0 if there
-/// is none.
+/// Largest acceleration, m/s², for which [`smoothing`] stays within `limit` (m) at a corner speed in m/s; 0 if none
+/// does.
 pub fn max_acceleration(impulses: &[(f64, f64)], limit: f64, corner_speed: f64) -> f64 {
     let (quarter, half) = corner_moments(impulses);
     let right = 2.0 * (limit / SQRT_2 - corner_speed * quarter.0) / quarter.1;
     right.min(2.0 * limit / half).max(0.0)
 }
 
-/// Σ A u and Σ A u² over impulses later than the middle, and Σ A u² over all; u is the time from the middle.
+/// Σ A u and Σ A u² over impulses later than the mean time, and Σ A u² over all; u is the time from the mean.
 fn corner_moments(impulses: &[(f64, f64)]) -> ((f64, f64), f64) {
     let middle = middle(impulses);
     let (mut later, mut all) = ((0.0, 0.0), 0.0);
@@ -389,8 +387,8 @@ fn corner_moments(impulses: &[(f64, f64)]) -> ((f64, f64), f64) {
     (later, all)
 }
 
-/// Vibration of a mode after a sequence of impulses (time in s, amplitude), as part of that after one impulse of their
-/// sum at the time of the last: undamped natural frequency in Hz, damping ratio from 0 to below 1.
+/// Residual vibration of a mode after a sequence of impulses (time in s, amplitude) relative to one impulse of their
+/// sum at the time of the last; undamped natural frequency in Hz, damping ratio from 0 to below 1.
 pub fn residual_vibration(impulses: &[(f64, f64)], frequency: f64, damping: f64) -> f64 {
     let (omega, zeta) = (2.0 * PI * frequency, damping);
     let omega_d = omega * (1.0 - zeta * zeta).sqrt();

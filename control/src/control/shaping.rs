@@ -1,9 +1,8 @@
-//! Which shaper, and at which frequency: the criterion by which Klipper chooses, on a spectrum or on the modes of a
-//! model.
+//! Choice of a shaper and its frequency by Klipper's criterion, on a spectrum or on the modes of a model.
 //!
-//! For every frequency of a grid a shaper leaves some vibration and costs some smoothing. Of each kind the frequency is
-//! taken that leaves the least vibration or hardly more, with the best score; and of all kinds the one with the clearly
-//! best score.
+//! At every frequency of a grid a shaper leaves some vibration and costs some smoothing. For each kind the frequency
+//! with the best score among those near the least vibration is chosen, and of all kinds the one with a clearly better
+//! score.
 
 use super::criterion::score;
 pub use super::criterion::{ALLOWED_SMOOTHING, Criterion, Target};
@@ -17,38 +16,38 @@ use crate::quantity::rounded;
 pub struct Fitted {
     /// The shaper.
     pub shaper: Shaper,
-    /// Vibration that remains, of that without a shaper: 0 to 1, see [`Target::remaining`].
+    /// Remaining vibration relative to that without a shaper, 0 to 1: see [`Target::remaining`].
     pub vibration: f64,
     /// Smoothing at the criterion's corner, m.
     pub smoothing: f64,
     /// Greatest acceleration with at most [`ALLOWED_SMOOTHING`], m/s².
     pub max_acceleration: f64,
-    /// The score that is compared, smaller is better: smoothing in mm times a measure of the vibration.
+    /// Score, smaller is better: smoothing in mm times a measure of the vibration.
     pub score: f64,
     /// True if it may be recommended.
     pub is_candidate: bool,
-    /// True if its frequency is the lowest that is tried: a lower one might leave less, and would smooth more.
+    /// True if its frequency is the lowest tried; a lower one might leave less vibration with more smoothing.
     pub is_lowest: bool,
 }
 
-/// All kinds at their best, and the one to take.
+/// All kinds at their best frequency, and the recommended one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Choice {
-    /// In the order of the criterion's forms, without those that `max_smoothing` excludes and those that there are not
-    /// for its damping ratio.
+    /// In the order of the criterion's forms, without those that `max_smoothing` excludes or that do not exist for its
+    /// damping ratio.
     pub fitted: Vec<Fitted>,
-    /// The place of the recommended one among them.
+    /// Index of the recommended one.
     pub recommended: usize,
-    /// Why that one.
+    /// Reason for it.
     pub reason: String,
-    /// Pairs of shapers, convolved, the best first; empty unless they were asked for.
+    /// Convolved pairs of shapers, the best first; empty if not requested.
     pub pairs: Vec<Pair>,
     /// True if the first of them is clearly better than the recommended shaper.
     pub is_pair_better: bool,
 }
 
 impl Choice {
-    /// The recommended one.
+    /// The recommended shaper.
     pub fn best(&self) -> &Fitted {
         &self.fitted[self.recommended]
     }
@@ -113,7 +112,7 @@ impl Point {
     }
 }
 
-/// A form at all frequencies, ascending, and the one that is taken.
+/// A form at all frequencies, ascending, and the chosen one.
 struct Tried {
     pattern: Pattern,
     points: Vec<Point>,
@@ -127,10 +126,10 @@ fn is_clearly_better(one: (f64, f64), other: (f64, f64)) -> bool {
     1.2 * one.0 < other.0 || 1.05 * one.0 < other.0 && 1.1 * one.1 < other.1
 }
 
-/// The rule since 2025-10: as before from shorter to longer; a longer one, too, where the best so far leaves more than
-/// is wanted and it leaves less; each is moved to where it leaves less and smooths less than the best so far, if there
-/// is such a frequency; and a ZV gives way to the first that leaves a tenth less, unless what vibrates is known from a
-/// model.
+/// The rule since 2025-10: as before from shorter to longer; a longer one is also taken if the best so far exceeds the
+/// desired vibration and it leaves less; each is moved to a frequency with less vibration and smoothing than the best
+/// so far, if one exists; and a ZV is replaced by the first that leaves a tenth less, unless the vibration is known
+/// from a model.
 fn recommended(fitted: &mut [Tried], candidates: &[usize], wanted: Option<f64>, is_measured: bool) -> usize {
     let mut best = candidates[0];
     for &i in candidates {
@@ -160,7 +159,7 @@ fn recommended(fitted: &mut [Tried], candidates: &[usize], wanted: Option<f64>, 
 }
 
 impl Tried {
-    /// A form at every frequency; none if it always smooths too much.
+    /// A form at every frequency; none if smoothing is always too large.
     fn all(target: Target<'_>, pattern: &Pattern, criterion: &Criterion) -> Option<Self> {
         let grid = target.grid(pattern.form.kind(), criterion.firmware);
         let point = |frequency: f64| {
@@ -174,16 +173,16 @@ impl Tried {
             Some(Point { shaper, vibration: v, smoothing, score })
         };
         let points: Vec<Point> = grid.iter().copied().filter_map(point).collect();
-        // The least vibration; of equals the highest frequency, which smooths least.
+        // The least vibration; among equals the highest frequency, which has the least smoothing.
         let (mut taken, least) =
             points.iter().enumerate().rev().min_by(|a, b| a.1.vibration.total_cmp(&b.1.vibration))?;
         let least = least.vibration;
-        // What leaves hardly more is as good, and may have the better score.
+        // Slightly more vibration is acceptable with a better score.
         let (more, is_loud) = match criterion.firmware {
             Firmware::Klipper202508 => (0.0, false),
             Firmware::Klipper => (0.0005, criterion.max_vibrations.is_some_and(|most| least > most)),
         };
-        // Where too much was left out to smooth less, the least vibration is what is wanted.
+        // If frequencies were excluded by smoothing, the least vibration is chosen.
         let is_cut = criterion.firmware == Firmware::Klipper && points.len() < grid.len();
         if !is_cut {
             for (place, point) in points.iter().enumerate() {

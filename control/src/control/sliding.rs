@@ -1,11 +1,11 @@
-//! Sliding mode with a boundary layer, and the condition under which it reaches its surface.
+//! Sliding mode with a boundary layer, and its reaching condition.
 
 use super::law::{Law, Seen, Speed};
 use crate::calculator::{Calculator, Slot, Slots};
 use crate::design::SlidingMode;
 use crate::machine::rigid::Rigid;
 
-/// A sliding-mode controller on the side of the encoder: σ = ė + λ e + κ ∫e dt (A. Hace et al., "Robust motion control
+/// Sliding-mode controller on the side of the encoder: σ = ė + λ e + κ ∫e dt (A. Hace et al., "Robust motion control
 /// and trajectory planning for planar laser cutting system", 2005, for belts).
 ///
 /// With V = σ²/2 and M σ̇ = −M K sat(σ/Φ) + Δ the surface is reached, σ σ̇ < 0 for |σ| ≥ Φ, if K > |Δ|/M: [`required`].
@@ -64,7 +64,7 @@ impl Law for SlidingLaw {
         (acceleration + layer * reaching) * self.mass / self.force_per_command
     }
 
-    /// Without effect of its own the integral does not grow.
+    /// The integral does not grow without an effect.
     fn limited<C: Calculator>(&self, c: &mut C, excess: C::N, _: C::N) {
         let SlidingMode { bandwidth, reaching, boundary, integral, .. } = self.gains;
         if integral > 0.0 {
@@ -76,8 +76,8 @@ impl Law for SlidingLaw {
     }
 }
 
-/// The reaching gain K, m/s², that Lyapunov's condition needs while mass and friction of the axis are known to a share
-/// `spread` each, at up to this speed (m/s) and acceleration (m/s²) of the reference.
+/// Reaching gain K, m/s², by Lyapunov's condition, for mass and friction known within a relative `spread`, up to this
+/// speed (m/s) and acceleration (m/s²) of the reference.
 ///
 /// |Δ| ≤ s (M (a + λ Φ) + b v + F_c) with λ Φ for the motion within the layer, and K > |Δ|/M.
 pub fn required(gains: &SlidingMode, rigid: &Rigid, spread: f64, speed: f64, acceleration: f64) -> f64 {

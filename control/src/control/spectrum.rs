@@ -4,13 +4,13 @@ use super::shaper::Firmware;
 use super::welch::power_spectral_density;
 use crate::log::Accelerometer;
 
-/// Frequencies below this are left out, Hz: they are the test's own motion.
+/// Frequencies below this are omitted, Hz: they belong to the motion of the test.
 pub const LOWEST: f64 = 5.0;
-/// Frequencies above this are left out, Hz.
+/// Frequencies above this are omitted, Hz.
 pub const HIGHEST: f64 = 200.0;
-/// A segment of samples lasts at least so long, s: frequencies are 2 Hz apart, or less.
+/// Minimum length of a segment of samples, s: frequencies are at most 2 Hz apart.
 const SEGMENT: f64 = 0.5;
-/// The least height of a peak over what parts it from a higher one, of the highest peak.
+/// Least prominence of a peak, relative to the highest peak.
 const PROMINENCE: f64 = 0.1;
 
 /// An axis of the accelerometer.
@@ -36,29 +36,29 @@ impl Axis {
 
 /// Power spectral density over frequency, divided by frequency.
 ///
-/// A resonance test shakes the harder the higher the frequency; divided by the frequency, the density tells better what
-/// a move excites. This is the scale by which Klipper chooses shapers.
+/// A resonance test shakes more strongly at higher frequencies; divided by the frequency, the density represents better
+/// what a move excites. Klipper chooses shapers on this scale.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Spectrum {
     /// Hz, ascending, at most [`HIGHEST`].
     pub frequency: Vec<f64>,
-    /// Of the axis that was asked for; small or 0 below [`LOWEST`].
+    /// Density of the selected axis; small or 0 below [`LOWEST`].
     pub density: Vec<f64>,
-    /// Of x, y and z, to be shown.
+    /// Densities of x, y and z, for plots.
     pub axes: [Vec<f64>; 3],
-    /// Which axis `density` is of.
+    /// The axis of `density`.
     pub axis: Axis,
-    /// Where it comes from, in a few words.
+    /// Its origin, in a few words.
     pub origin: String,
 }
 
 impl Spectrum {
-    /// The spectrum of what was read, divided by frequency as Klipper did until 2025-08.
+    /// Spectrum of the data, divided by frequency as in Klipper until 2025-08.
     pub fn new(data: &Accelerometer, axis: Axis) -> Self {
         Self::by(data, axis, Firmware::Klipper202508)
     }
 
-    /// Spectrum divided by frequency as a firmware does.
+    /// Spectrum divided by frequency as in a firmware.
     pub fn by(data: &Accelerometer, axis: Axis, firmware: Firmware) -> Self {
         match data {
             Accelerometer::Spectrum { frequency, density: [x, y, z, all], per_frequency } => {
@@ -102,13 +102,12 @@ impl Spectrum {
         self.density.iter().copied().fold(0.0, f64::max)
     }
 
-    /// Where it has its peaks: frequency (Hz) and density, by frequency. A peak stands out by a tenth of the highest at
-    /// least.
+    /// Peaks: frequency (Hz) and density, by frequency, with a prominence of at least a tenth of the highest.
     pub fn peaks(&self) -> Vec<(f64, f64)> {
         let d = &self.density;
         let wanted = PROMINENCE * self.greatest();
         let least = |values: &mut dyn Iterator<Item = &f64>, top: f64| {
-            // The lowest value on the way to one that is higher, or to the end.
+            // Lowest value before a higher one, or up to the end.
             let mut low = top;
             for value in values {
                 if *value > top {
@@ -130,7 +129,7 @@ impl Spectrum {
         (0..d.len()).filter(is_peak).map(|k| (self.frequency[k], d[k])).collect()
     }
 
-    /// The axis of the accelerometer that vibrates most at one of the spectrum's frequencies, and its part of the
+    /// The axis of the accelerometer that vibrates most at one of the spectrum's frequencies, and its fraction of all
     /// three.
     pub fn main_axis(&self, frequency: f64) -> Option<(Axis, f64)> {
         let k = self.frequency.iter().position(|f| *f == frequency)?;
@@ -161,8 +160,8 @@ impl Spectrum {
     }
 }
 
-/// P(f) / f; a tenth of a hertz keeps it from infinity. Until 2025-08 without the lowest frequencies, today with what
-/// is below twice of them let down softly.
+/// P(f) / f; a tenth of a hertz keeps it from infinity. Until 2025-08 without the lowest frequencies; today those below
+/// twice [`LOWEST`] are attenuated.
 fn scaled(frequency: &[f64], density: &[f64], is_already: bool, firmware: Firmware) -> Vec<f64> {
     let one = |(f, p): (&f64, &f64)| match (*f, firmware) {
         (_, Firmware::Klipper) if is_already => *p,

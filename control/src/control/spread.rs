@@ -1,4 +1,4 @@
-//! The axis with each of its parameters wrong by some share.
+//! Variations of an axis, each with one parameter changed.
 
 use super::{Deviation, Figures, Loop, Rows, Standard, each, stream};
 use crate::case::Move;
@@ -9,8 +9,8 @@ use crate::parameter::{Free, kinds};
 use crate::solve::{Ending, Flow, Solver};
 use crate::trajectory::Trajectory;
 
-/// `stage` with one thing at a time that may be off, and all that is tied to it by nature, times 1 + `share` and times
-/// 1 − `share`; and what that is.
+/// `machine` with one uncertain parameter at a time, and everything physically linked to it, times 1 + `share` and
+/// times 1 − `share`; with a description.
 pub fn spread(machine: &Machine, share: f64) -> Vec<(String, Machine)> {
     let axis = |kind: &Free, word: &str, factor: f64| {
         let mut other = machine.clone();
@@ -21,23 +21,23 @@ pub fn spread(machine: &Machine, share: f64) -> Vec<(String, Machine)> {
     kinds(machine).iter().flat_map(both).collect()
 }
 
-/// The worst of axes whose parameters are off.
+/// Worst case over varied axes.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Worst {
-    /// Largest |x − y|, m; infinite where a run does not reach its end.
+    /// Largest |x − y|, m; infinite if a run ends early.
     pub error: f64,
-    /// The parameter that is off on that axis, and by how much.
+    /// The parameter changed on that axis, and its change.
     pub axis: String,
     /// Largest |x − y| at the end, m.
     pub last: f64,
     /// Axes on which the cart settles.
     pub settled: usize,
-    /// All of them.
+    /// Number of axes.
     pub axes: usize,
 }
 
-/// The same controller, made for `stage`, on axes of which each parameter is off by a `share`. None where `stop` said
-/// so, which is asked with every block of rows.
+/// The controller made for `machine` on axes with each parameter changed by a relative `share`. None if `stop`, called
+/// with every block of rows, ends it.
 pub fn worst(
     machine: &Machine,
     design: &Design,
@@ -76,7 +76,7 @@ pub fn worst(
     Ok(Some(worst))
 }
 
-/// The largest magnitude of an error of what slides.
+/// Largest magnitude of an error of the slides.
 fn largest(figures: &Figures, of: fn(&Deviation) -> f64) -> f64 {
     figures.loads.iter().map(|load| of(&load.error).abs()).fold(0.0, f64::max)
 }

@@ -1,4 +1,4 @@
-//! A controller from its design: structure, feed-forward, observer and filters put together.
+//! A controller from its design: structure, feed-forward, observer and filters combined.
 
 use super::filter::Biquad;
 use super::law::{Law, Seen};
@@ -14,7 +14,7 @@ use crate::reach::compensation::Compensation;
 use crate::reach::forward::Forward;
 use crate::signal::profile::Reference;
 
-/// A controller that a [`Design`] describes, made with a model of the axis: the stage itself, or what one takes it for.
+/// The controller of a [`Design`], made with a model of the axis: the machine itself, or an assumed one.
 #[derive(Debug, Clone)]
 pub struct Standard {
     text: Text,
@@ -29,10 +29,10 @@ pub struct Text {
     compensation: Compensation,
     observer: Option<DisturbanceObserver>,
     pub(crate) filters: Vec<Biquad>,
-    /// Weights of encoder and scale in the position that the observer is given.
+    /// Weights of encoder and scale in the position for the observer.
     weights: [f64; 2],
-    /// Its memory; of that the last command before limits, and the position for the observer and dry friction
-    /// there.
+    /// Its memory, with the last command before limits, and the position for the observer and dry friction at that
+    /// time.
     pub slots: Slots,
     asked: Slot,
     position: Slot,
@@ -44,7 +44,7 @@ impl Text {
     pub fn new(design: &Design, model: &Machine) -> Result<Self> {
         check(design, model)?;
         let every = design.every;
-        // Several drives are fed forward together: `Forward`.
+        // Several drives have a joint feed-forward: `Forward`.
         let own = if model.drives.len() == 1 { design.feed_forward } else { FeedForward::NONE };
         let compensation = Compensation::new(model, &own);
         let rigid = compensation.rigid;
@@ -70,7 +70,7 @@ impl Text {
         Ok(Self { law, compensation, observer, filters, weights, slots: std::mem::take(slots), asked, position, dry })
     }
 
-    /// The command that is asked for.
+    /// The command before the limit.
     pub fn step<C: Calculator>(&self, c: &mut C, seen: &Observation<C::N>) -> C::N {
         let compensation = &self.compensation;
         c.remark("where the encoder should be, and what the reference asks for by itself");
@@ -78,7 +78,7 @@ impl Text {
         let mut added = compensation.command(c, &seen.ahead);
         let mut forward = None;
         if let (Some(whole), true) = (added, self.law.commands_current()) {
-            // As a current into the inner loop; what the voltage needs beyond it is left outside.
+            // A current for the inner loop; the rest of the voltage is added outside.
             (forward, added) = split(c, compensation, &seen.ahead, whole);
         }
         c.remark(self.law.about());
@@ -102,7 +102,7 @@ impl Text {
         asked
     }
 
-    /// Takes the command that the limit left.
+    /// Receives the command after the limit.
     pub fn limited<C: Calculator>(&self, c: &mut C, given: C::N) {
         c.remark("what the limit has left");
         let excess = given - c.memory(self.asked);
@@ -110,9 +110,9 @@ impl Text {
         self.moved(c, excess, given);
     }
 
-    /// Takes what the limit added to the command, and the command that the axis gets.
+    /// Receives the change of the command by the limit, and the command that the axis gets.
     pub fn moved<C: Calculator>(&self, c: &mut C, excess: C::N, given: C::N) {
-        // What a linear model of the axis is moved by.
+        // The command that acts in a linear model of the axis.
         let effective = given - c.memory(self.dry);
         let effective = c.name("effective", effective);
         self.law.limited(c, excess, effective);
@@ -131,7 +131,7 @@ impl Text {
     }
 }
 
-/// The part of a voltage fed forward that goes into the current loop, A; and the rest of it, for the back-EMF, V.
+/// The part of a feed-forward voltage for the current loop, A; and the rest for the back-EMF, V.
 fn split<C: Calculator>(
     c: &mut C,
     compensation: &Compensation,
@@ -140,7 +140,7 @@ fn split<C: Calculator>(
 ) -> (Option<C::N>, Option<C::N>) {
     let (rigid, zero) = (&compensation.rigid, c.number(0.0));
     let back = rigid.command_by(c, zero, zero, ahead.speed);
-    // Feed-forward of nothing has no part for the speed.
+    // Zero feed-forward has no part for the speed.
     let nothing = c.choose(less(forward, 0.0), back, zero);
     let back = c.choose(more(forward, 0.0), back, nothing);
     let back = c.name("back_emf", back);
@@ -190,8 +190,8 @@ impl Controller for Standard {
     }
 }
 
-/// Weights of encoder and scale in the position that a disturbance observer is given: the share of the mass that moves
-/// with each, so that it sees the common motion, in which the belt does not swing. All of the encoder without a scale.
+/// Weights of encoder and scale in the position for a disturbance observer: the share of the mass that moves with each,
+/// so that it observes the common motion without the belt's oscillation. The encoder alone without a scale.
 fn observed(model: &Machine, rigid: &Rigid) -> [f64; 2] {
     match model.scale {
         None => [1.0, 0.0],
@@ -199,7 +199,7 @@ fn observed(model: &Machine, rigid: &Rigid) -> [f64; 2] {
     }
 }
 
-/// Refuses what no controller can be.
+/// Rejects an invalid design.
 fn check(design: &Design, model: &Machine) -> Result<()> {
     let Design { every, delay, limit, .. } = *design;
     if let Some(part) = design.needs_axis().filter(|_| model.drives.len() > 1) {

@@ -13,7 +13,7 @@ use crate::machine::axis::{CART, IDLER};
 use crate::machine::rigid::Rigid;
 use nalgebra::{DMatrix, DVector};
 
-/// Most states that an axis has.
+/// Maximum number of states of an axis.
 const STATES: usize = 2 * crate::mechanism::BODIES + crate::mechanism::DRIVES;
 
 /// A linear-quadratic regulator on the states that a Kalman filter estimates, both for the sampled axis with its delay.
@@ -22,20 +22,20 @@ pub struct StateFeedbackLaw {
     every: f64,
     /// Φ, row by row, without zeros.
     phi: Vec<Vec<(usize, f64)>>,
-    /// Effect over a sample of the command that takes over within it, and of the one before.
+    /// Effect over a sample of the command that begins within it, and of the previous one.
     now: Vec<f64>,
     before: Vec<f64>,
-    /// The encoder; behind it the scale, if there is one. Each corrects the estimate that the one before has left.
+    /// The encoder, then the scale, if any. Each corrects the estimate of the previous one.
     sensors: Vec<Corrected>,
-    /// u = −K (x − x*), then of commands under way, then of the integral.
+    /// u = −K (x − x*): for states, pending commands, and the integral.
     gain: Vec<f64>,
     pending: usize,
     radius: f64,
     states: Vec<Quantity>,
-    /// Where all of it is remembered.
+    /// Stored values.
     started: Slot,
     estimate: Vec<Slot>,
-    /// The last commands beside feed-forward, latest first, and as the axis got them.
+    /// The last commands without feed-forward, latest first, and as the axis got them.
     own: Vec<Slot>,
     given: Vec<Slot>,
     /// Integral of the measured error, and its last part.
@@ -82,7 +82,7 @@ impl StateFeedbackLaw {
         let before = if rest > 0.0 { &late * early.column(0) } else { DVector::zeros(n) };
         let pending = whole + usize::from(rest > 0.0);
 
-        // States of the regulator: those of the axis, commands under way, the integral.
+        // States of the regulator: those of the axis, pending commands, the integral.
         let integral = weights.integral.is_some();
         let size = n + pending + usize::from(integral);
         let (mut a, mut b) = (DMatrix::zeros(size, size), DMatrix::zeros(size, 1));
@@ -115,7 +115,7 @@ impl StateFeedbackLaw {
         if let Some(scale) = weights.integral {
             let last = size - 1;
             a[(last, last)] = 1.0;
-            // Of the scale, if there is one: it is the cart that is to come to rest where it should.
+            // The position by the scale, if any, since the cart has to reach its target.
             let measured = linear.scale.as_ref().unwrap_or(&linear.measured);
             for j in 0..n {
                 a[(last, j)] = every * measured[j];
@@ -125,8 +125,7 @@ impl StateFeedbackLaw {
         let r = DMatrix::from_element(1, 1, 1.0 / (weights.command * weights.command));
         let regulator = riccati::discrete(&a, &b, &q, &r)?;
 
-        // The filter is the same problem transposed; what is unknown acts at the command, and as the same force at the
-        // cart.
+        // The filter is the transposed problem; the disturbance acts at the command, and as the same force at the cart.
         let force = Rigid::of(machine).force_per_command();
         let mut noise = DMatrix::zeros(n, n);
         for (column, scale) in [(0, weights.disturbance), (1, weights.disturbance * force)] {
@@ -157,7 +156,7 @@ impl StateFeedbackLaw {
         })
     }
 
-    /// Samples from a command to the one that takes over within a sample.
+    /// Number of samples from a command to its effect.
     fn lag(&self) -> usize {
         if self.before.iter().any(|v| *v != 0.0) { self.pending - 1 } else { self.pending }
     }
@@ -184,7 +183,7 @@ impl StateFeedbackLaw {
         wanted
     }
 
-    /// The estimate before a sample: at the first one at rest where it is measured.
+    /// The estimate before a sample; at the first one, at rest at the measured position.
     fn estimated<C: Calculator>(&self, c: &mut C, position: C::N) -> [C::N; STATES] {
         let (zero, one, started) = (c.number(0.0), c.number(1.0), c.memory(self.started));
         c.keep(self.started, one);
@@ -252,7 +251,7 @@ impl Law for StateFeedbackLaw {
 
     fn limited<C: Calculator>(&self, c: &mut C, excess: C::N, effective: C::N) {
         if let Some([sum, part]) = self.integral {
-            // What has no effect is not gathered.
+            // The integral is held while it has no effect.
             let (integral, integrated) = (c.memory(sum), c.memory(part));
             let back = integral - integrated;
             let kept = c.choose(less(excess, 0.0), back, integral);
@@ -287,9 +286,8 @@ impl Law for StateFeedbackLaw {
     }
 }
 
-/// The sensors of the Kalman filter with their gains. Their noise is
-/// independent, so that they may correct one after another: L = P mᵀ/(m P mᵀ + V), P ← P − L m P, before the
-/// prediction.
+/// The sensors of the Kalman filter with their gains. Their noise is independent, so they may correct sequentially: L =
+/// P mᵀ/(m P mᵀ + V), P ← P − L m P, before the prediction.
 fn filter(
     linear: &Linear,
     phi: &DMatrix<f64>,

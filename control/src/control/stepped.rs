@@ -1,4 +1,4 @@
-//! A controller stepped from outside: whoever asks gives it the reference, and the machine at its samples.
+//! A controller stepped from outside: the caller provides the reference, and the state of the machine at its samples.
 
 use super::sampled::{Controller, Loop, Observation, Sensors};
 use super::standard::Standard;
@@ -15,12 +15,12 @@ use std::collections::VecDeque;
 pub(super) struct Clocked {
     pub timing: Loop,
     clock: Interval,
-    /// Of each drive.
+    /// Sensors of each drive.
     sensors: Vec<Sensors>,
-    /// Next sample, and the place in it: at the sample, or where a delayed command takes over.
+    /// Next sample, and the next decision in it: the sample itself, or the start of a delayed command.
     k: u64,
     halfway: bool,
-    /// Rest of the delay beyond whole samples, s.
+    /// Remainder of the delay beyond whole samples, s.
     rest: f64,
     waiting: VecDeque<Commands>,
     acting: Commands,
@@ -58,35 +58,35 @@ impl Clocked {
         }
     }
 
-    /// With positions read exactly and not in counts.
+    /// With exact positions instead of counts.
     pub fn exactly(mut self) -> Self {
         self.sensors = self.sensors.into_iter().map(Sensors::exactly).collect();
         self
     }
 
-    /// When it decides next, s.
+    /// Time of the next decision, s.
     pub fn next(&self) -> f64 {
         self.clock.times(self.k) + if self.halfway { self.rest } else { 0.0 }
     }
 
-    /// True if it is at a sample, and not where a delayed command takes over.
+    /// True at a sample, false at the start of a delayed command.
     pub fn is_at_sample(&self) -> bool {
         !self.halfway
     }
 
-    /// The commands that act now.
+    /// The present commands.
     pub fn acting(&self) -> Commands {
         self.acting
     }
 
-    /// The next commands take over.
+    /// Starts the next commands.
     fn take_over(&mut self) {
         self.k += 1;
         self.acting = self.waiting.pop_front().unwrap_or_default();
     }
 
-    /// Decides at [`Clocked::next`] for each drive, `slides` being the references of all that slides one lead later;
-    /// returns the decisions if that is a sample. A delayed command needs nothing else.
+    /// Decides at [`Clocked::next`] for each drive; `slides` are the references of all slides one lead later. Returns
+    /// the decisions if that is a sample. A delayed command needs nothing else.
     pub fn decide(
         &mut self,
         controllers: &mut [&mut dyn Controller],
@@ -112,7 +112,7 @@ impl Clocked {
             };
             let forward = controller.forward(slides);
             let asked = controller.step(&seen) + forward;
-            // What is no number asks for nothing.
+            // NaN and infinity count as zero.
             let asked = if asked.is_finite() { asked } else { 0.0 };
             let given = self.timing.limit.map_or(asked, |limit| asked.clamp(-limit, limit));
             controller.limited(given - forward);
@@ -127,8 +127,8 @@ impl Clocked {
     }
 }
 
-/// The controller of an axis with its clock, its delay and its limit, between two of its decisions. A clone of it goes
-/// on in the same way.
+/// The controller of an axis with its clock, its delay and its limit, between two of its decisions. A clone continues
+/// identically.
 #[derive(Debug, Clone)]
 pub struct Stepped {
     controller: Standard,
@@ -136,14 +136,14 @@ pub struct Stepped {
 }
 
 impl Stepped {
-    /// The controller of `design` on `stage`, its first sample at time zero.
+    /// The controller of `design` on `machine`, its first sample at time zero.
     pub fn new(design: &Design, machine: &Machine) -> Result<Self> {
         let timing = Loop::of(design);
         timing.check(timing.every)?;
         Ok(Self { controller: Standard::new(design, machine)?, clocked: Clocked::new(machine, timing) })
     }
 
-    /// When it decides next, s.
+    /// Time of the next decision, s.
     pub fn next(&self) -> f64 {
         self.clocked.next()
     }
@@ -156,8 +156,8 @@ impl Stepped {
     /// Decides at [`Stepped::next`] from the state, the motor's current, A, and the reference at that time.
     ///
     /// `ahead` is the reference one lead later ([`Loop::lead`]). Without it the reference is extrapolated by its
-    /// derivatives with constant snap, which is wrong where the snap of a profile jumps within the lead. The command acts
-    /// until the next decision.
+    /// derivatives with constant snap, which is wrong where the snap of a profile jumps within the lead. The command
+    /// acts until the next decision.
     pub fn decide(&mut self, state: &State, current: f64, reference: &Reference, ahead: Option<&Reference>) -> f64 {
         let ahead = ahead.copied().unwrap_or_else(|| after(reference, self.clocked.timing.lead));
         let (mut currents, mut references) = (Commands::default(), References::default());
@@ -168,8 +168,8 @@ impl Stepped {
 }
 
 impl Stepped {
-    /// All that it needs to go on, as plain numbers: whether it is between a sample and where its command takes over,
-    /// commands that wait and that act, what its text remembers, and the number of the sample.
+    /// Its complete state as plain numbers: whether a delayed command is due within the sample, pending and acting
+    /// commands, the memory of its law, and the sample number.
     pub fn save(&self) -> Vec<u64> {
         let Clocked { k, halfway, waiting, acting, .. } = &self.clocked;
         let halfway = f64::from(u8::from(*halfway));
@@ -177,8 +177,8 @@ impl Stepped {
         numbers.chain(self.controller.memory().iter().copied()).map(f64::to_bits).chain([*k]).collect()
     }
 
-    /// Goes on from what [`Stepped::save`] gave, bit for bit, of a controller of the same design. None, and nothing has
-    /// changed, where `saved` is not of such a one.
+    /// Continues bit for bit from the result of [`Stepped::save`] of a controller of the same design. Returns `None`,
+    /// and changes nothing, if `saved` does not belong to one.
     pub fn restore(&mut self, saved: &[u64]) -> Option<()> {
         let (k, numbers) = saved.split_last()?;
         let (halfway, numbers) = numbers.split_first()?;
@@ -187,7 +187,7 @@ impl Stepped {
             1.0 => true,
             _ => return None,
         };
-        // Between a sample and where its command takes over, that command waits with the others.
+        // Between a sample and the start of its command, that command waits with the others.
         let waiting = self.clocked.timing.samples_late().0 + usize::from(halfway);
         let memory = self.controller.memory_mut();
         if numbers.len() != waiting + 1 + memory.len() {
@@ -203,7 +203,7 @@ impl Stepped {
     }
 }
 
-/// A reference `lead` later, s, if its highest derivative stays.
+/// A reference `lead` later, s, with a constant highest derivative.
 fn after(reference: &Reference, lead: f64) -> Reference {
     if lead == 0.0 {
         return *reference;

@@ -9,9 +9,9 @@ pub(super) const BETA: f64 = 6.0;
 /// One-sided power spectral density of `values`, sampled `rate` times a second, in their unit squared per Hz:
 /// frequencies (Hz) and densities.
 ///
-/// Segments of `length` samples that overlap by half, each less its mean and under a Kaiser window, are transformed,
-/// and their periodograms averaged. The densities times the distance of the frequencies sum to the variance, but for
-/// what the ends of the record lose. Empty if there is not one whole segment.
+/// Segments of `length` samples with 50 % overlap, less their mean and with a Kaiser window, are transformed, and their
+/// periodograms averaged. The densities times the frequency step sum to the variance, except for losses at the ends of
+/// the record. Empty without a complete segment.
 ///
 /// P. Welch, "The use of fast Fourier transform for the estimation of power spectra", *IEEE Trans. Audio and
 /// Electroacoustics* 15, 1967.
@@ -35,7 +35,7 @@ pub fn power_spectral_density(values: &[f64], rate: f64, length: usize) -> (Vec<
         }
         segments += 1.0;
     }
-    // P(f) = 2 |X(f)|² / (f_s Σ w²), but for f = 0 and f_s/2, which stand for themselves alone
+    // P(f) = 2 |X(f)|² / (f_s Σ w²), without the factor 2 for f = 0 and f_s/2
     let power: f64 = window.iter().map(|w| w * w).sum();
     let alone = |k: usize| k == 0 || 2 * k == length;
     for (k, value) in density.iter_mut().enumerate() {

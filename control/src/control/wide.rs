@@ -1,11 +1,11 @@
-//! Rows of a move, with where everything should be.
+//! Rows of a move with references and errors.
 
 use super::contour::Contour;
 use crate::machine::{Machine, SlideAt};
 use crate::signal::profile::Profile;
 use crate::trajectory::{Column, Trajectory};
 
-/// Blocks of rows with references and errors behind their own columns.
+/// Blocks of rows with references and errors after their own columns.
 pub(super) struct Wide {
     block: Trajectory,
     /// The path of a machine with two coordinates.

@@ -1,4 +1,5 @@
-//! Stiffness and damping of the belt and the delay of the loop from frequency responses, beside a model of all else.
+//! Stiffness and damping of the belt and the delay of the loop from frequency responses, with a model of everything
+//! else.
 //!
 //! With the model Ĝ of the sampled axis, gain g, stiffness k = s k₀, damping c = τ k and delay t_d,
 //!
@@ -6,11 +7,10 @@
 //! χ² = Σ |G − g Ĝ(s, τ, t_d)|² / E|ΔG|²  over coherent points
 //! ```
 //!
-//! is made least by Gauss and Newton's method, damped after Levenberg and Marquardt. One number τ stands for all spans,
-//! whose damping then is in proportion to their stiffness; g takes up what mass and friction of the model are off.
-//! Errors are those of the linearised problem, widened by the root of χ² per degree of freedom where the curves fit
-//! worse than noise allows. Noise at neighbouring lines is alike under a window, by ρ of [`ALIKE`], so that with the rows
-//! J_k of the residuals at line k
+//! is minimised by the Levenberg-Marquardt method. A single τ describes all spans, whose damping is proportional to
+//! their stiffness; g absorbs errors of the model's mass and friction. Errors are those of the linearised problem,
+//! widened by the root of χ² per degree of freedom if the curves fit worse than noise allows. Noise at neighbouring
+//! lines is correlated by the window, with ρ of [`ALIKE`], so with the rows J_k of the residuals at line k
 //!
 //! ```text
 //! cov x = (Σ J_kᵀ J_k)⁻¹ (Σ ρ(k − l) J_kᵀ J_l) (Σ J_kᵀ J_k)⁻¹
@@ -24,11 +24,11 @@ use crate::number::engineering;
 use nalgebra::{Complex, DMatrix, DVector};
 use std::f64::consts::PI;
 
-/// Most iterations, and the least change of the unknowns.
+/// Maximum number of iterations, and the least change of the unknowns.
 const ITERATIONS: usize = 60;
 const CHANGE: f64 = 1e-9;
 
-/// χ² per residual from which on no other start is tried.
+/// χ² per residual below which no other start is tried.
 const ENOUGH: f64 = 1.5;
 
 /// Fewest points.
@@ -41,35 +41,35 @@ pub struct Known {
     pub place: f64,
     /// Bridge position, m, of a machine that has one.
     pub bridge: f64,
-    /// Delay of the input where the model says, s.
+    /// Delay of the input in the model, s.
     pub delay: f64,
 }
 
-/// The result of a fit, each number with the end points of its central 95 %.
+/// Result of a fit, each number with the ends of its central 95 %.
 #[derive(Debug, Clone)]
 pub struct FrfFit {
     /// Factor on the stiffness of every span.
     pub stiffness: (f64, [f64; 2]),
-    /// Stiffness of each span at the place, N/m.
+    /// Stiffness of each span at the operating point, N/m.
     pub spans: Spans,
     /// Damping over stiffness, s.
     pub damping: (f64, [f64; 2]),
     /// Delay of the input, s.
     pub delay: (f64, [f64; 2]),
-    /// Factor on the whole response.
+    /// Factor on the complete response.
     pub gain: (f64, [f64; 2]),
     /// χ² per degree of freedom.
     pub chi: f64,
-    /// Points that were used.
+    /// Number of points used.
     pub points: usize,
-    /// The model's response with what was found, one for each frequency response, at all of its points.
+    /// Fitted response of the model, for each frequency response at all of its points.
     pub curves: Vec<Vec<Complex<f64>>>,
-    /// Damping ratio of the first mode that a command swings, and its frequency, Hz.
+    /// Damping ratio of the first mode excited by a command, and its frequency, Hz.
     pub mode: Option<(f64, f64)>,
 }
 
-/// Distances in lines, and what a spectrum is seen through: the power of Hann's window P(δ) = (sin πδ/(πδ (1 − δ²)))²
-/// without its second moment, (4/3) P(δ) − (P(δ − 1) + P(δ + 1))/6, to either side.
+/// Distances in lines, and the spectral window of the averages: the power of Hann's window P(δ) = (sin πδ/(πδ (1 −
+/// δ²)))² without its second moment, (4/3) P(δ) − (P(δ − 1) + P(δ + 1))/6, to either side.
 const WINDOW: [(f64, f64); 11] = [
     (-2.5, -0.0048),
     (-2.0, -0.0417),
@@ -84,9 +84,9 @@ const WINDOW: [(f64, f64); 11] = [
     (2.5, -0.0048),
 ];
 
-/// Correlation of the noise of a response with that one and two lines on. Under Hann's window products of two spectra
-/// are alike by ρ₀ = (2/3)² and (1/6)²; sums less a sixth of their second difference, w = (−1/6, 4/3, −1/6), by
-/// Σ w_i w_j ρ₀(d + i − j) over the same at d = 0, of which nothing is left at d = 3.
+/// Correlation of the noise of a response at distances of one and two lines. Under Hann's window, products of two
+/// spectra have the correlations ρ₀ = (2/3)² and (1/6)²; sums less a sixth of their second difference, w = (−1/6, 4/3,
+/// −1/6), have Σ w_i w_j ρ₀(d + i − j) relative to that at d = 0, which is negligible at d = 3.
 pub(super) const ALIKE: [f64; 2] = [0.25723, -0.08250];
 
 /// ln s, ln τ, t_d, ln g.
@@ -98,7 +98,7 @@ impl Known {
     }
 }
 
-/// The machine with its belts so many times as stiff, and damped.
+/// The machine with scaled stiffness and damping of its belts.
 fn changed(machine: &Machine, known: &Known, x: &[f64]) -> Result<Machine> {
     let mut machine = placed(machine, known.operation())?;
     (machine.belt.follows_cart, machine.belt.make) = (false, None);
@@ -114,7 +114,7 @@ pub(super) fn model(machine: &Machine, known: &Known, frf: &Frf) -> Result<Vec<C
     Ok(curves(machine, known, known.delay, &[(frf, &[(0.0, 1.0)])])?.remove(0))
 }
 
-/// The sampled model's responses at the points of these, each seen through a window as in the averages, Σ W Ĝ/Σ W about
+/// Responses of the sampled model at the points of these, smeared by the window as the averages are, Σ W Ĝ/Σ W around
 /// each line, for white inputs.
 fn curves(
     machine: &Machine,
@@ -162,7 +162,7 @@ impl Problem<'_> {
     fn curves(&self, x: &[f64]) -> Result<Vec<Vec<Complex<f64>>>> {
         let machine = changed(self.machine, self.known, x)?;
         let gain = x[3].exp();
-        // Of whole periods nothing is smeared.
+        // Whole periods are not smeared.
         let window = |frf: &Frf| if frf.periodic { &[(0.0, 1.0)][..] } else { &WINDOW[..] };
         let seen: Vec<(&Frf, &[(f64, f64)])> = self.frfs.iter().map(|frf| (frf, window(frf))).collect();
         let mut all = curves(&machine, self.known, x[2].max(0.0), &seen)?;
@@ -192,14 +192,14 @@ impl Problem<'_> {
                 moved[j] += by;
                 self.residuals(&moved)
             };
-            // A delay is never below zero.
+            // A delay is never negative.
             let low = if j == 2 && x[2] < h { 0.0 } else { h };
             jacobian.set_column(j, &((at(h)? - at(-low)?) / (h + low)));
         }
         Ok(jacobian)
     }
 
-    /// Covariance of the unknowns; the Jacobian has two rows for each point that is used.
+    /// Covariance of the unknowns; the Jacobian has two rows for each point used.
     fn covariance(&self, jacobian: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         let mut middle = jacobian.transpose() * jacobian;
         let inverse = middle.clone().try_inverse()?;
@@ -207,7 +207,7 @@ impl Problem<'_> {
         for frf in self.frfs {
             let lines: Vec<f64> = frf.points.iter().filter(|point| is_used(point)).map(|one| frf.line(one)).collect();
             for (k, line) in lines.iter().enumerate().filter(|_| !frf.periodic) {
-                // Points that are used need not be neighbours.
+                // Points used need not be adjacent.
                 for (l, other) in lines.iter().enumerate().skip(k + 1).take(ALIKE.len()) {
                     let Some(rho) = ALIKE.get((other - line).round() as usize - 1) else { continue };
                     for part in 0..2 {
@@ -226,7 +226,7 @@ fn is_used(point: &Point) -> bool {
     point.deviation > 0.0 && Frf::is_coherent(point)
 }
 
-/// Fits the belt and the delay of a stage to frequency responses.
+/// Fits the belt and the delay of a machine to frequency responses.
 pub fn fit(machine: &Machine, known: &Known, frfs: &[Frf]) -> Result<FrfFit> {
     if machine.belt.model == BeltModel::Rigid {
         return Err(Error::new("a rigid belt has no stiffness to be fitted").next("give belt.model = \"elastic\""));
@@ -241,8 +241,8 @@ pub fn fit(machine: &Machine, known: &Known, frfs: &[Frf]) -> Result<FrfFit> {
     let ratio = machine.belt.damping.iter().zip(&machine.belt.stiffness).map(|(c, k)| c / k).sum::<f64>();
     let ratio = ratio / machine.belt.stiffness.len() as f64;
     let mut best: Option<(f64, Vec<f64>)> = None;
-    // Resonances that are far off hide from each other: from several stiffnesses and dampings, until noise explains
-    // what is left.
+    // Distant resonances cause local minima, so several stiffnesses and dampings are tried until noise explains the
+    // residuals.
     for stiffness in [1.0, 0.6, 1.6, 0.35, 2.8] {
         if best.as_ref().is_some_and(|(least, _)| *least < ENOUGH * (2 * points) as f64) {
             break;
@@ -288,7 +288,7 @@ pub fn fit(machine: &Machine, known: &Known, frfs: &[Frf]) -> Result<FrfFit> {
     })
 }
 
-/// Σ r² and where it is least, from a start.
+/// Least Σ r² from a start, and its position.
 fn minimised(problem: &Problem, mut x: Vec<f64>) -> Result<(f64, Vec<f64>)> {
     let mut residuals = problem.residuals(&x)?;
     let mut squares = residuals.norm_squared();
@@ -324,7 +324,7 @@ fn minimised(problem: &Problem, mut x: Vec<f64>) -> Result<(f64, Vec<f64>)> {
 }
 
 impl FrfFit {
-    /// The numbers of the fit, each with its unit: name, value, end points.
+    /// Results of the fit with units: name, value, ends of the interval.
     pub fn rows(&self) -> Vec<(&'static str, String, [String; 2])> {
         let shown = |value: f64, unit: &str| engineering(value, unit, 4);
         let row = |name, unit: &str, (value, [low, high]): (f64, [f64; 2])| {

@@ -8,26 +8,26 @@ use crate::machine::Machine;
 use nalgebra::{Complex, DMatrix};
 use std::f64::consts::PI;
 
-/// Margins of L = N_y G/D with a measured G, over the frequencies at which it is coherent. Of several drives G is a
-/// matrix, with a row for each measured position and a column for each input, and N_y/D is the same for each.
+/// Margins of L = N_y G/D with a measured G, over the frequencies at which it is coherent. For several drives, G is a
+/// matrix with a row for each measured position and a column for each input, and N_y/D is equal for all.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Measured {
-    /// max |1/(1 + L)|, of several drives the largest singular value of (1 + L)⁻¹, and where, rad/s.
+    /// max |1/(1 + L)|, for several drives the largest singular value of (1 + L)⁻¹, and its frequency, rad/s.
     pub sensitivity: (f64, f64),
-    /// The most it may be: with G anywhere in its circle; infinite where a circle holds −1.
+    /// Its upper bound with G anywhere in its circle; infinite if a circle contains −1.
     pub sensitivity_at_most: f64,
-    /// Phase margin of the loop of one drive with the others closed, rad, and where |L| passes 1, rad/s.
+    /// Phase margin of the loop of one drive with the others closed, rad, and the frequency of |L| = 1, rad/s.
     pub phase: Option<(f64, f64)>,
-    /// Gain margin of that loop, and where L passes the negative real axis, rad/s.
+    /// Gain margin of that loop, and the frequency at which L crosses the negative real axis, rad/s.
     pub gain: Option<(f64, f64)>,
-    /// True if it holds for small motions about rest alone: the controller is not linear.
+    /// True if it holds for small motions around rest only, since the controller is not linear.
     pub is_at_rest: bool,
-    /// Lowest and highest frequency that was looked at, rad/s.
+    /// Lowest and highest frequency evaluated, rad/s.
     pub range: [f64; 2],
 }
 
-/// Margins of a design around the responses of the positions that its drives measure, one row of `matrix` for each;
-/// `length` is metres per unit of these. Gain and phase margin are of the loop of `drive`.
+/// Margins of a design with the responses of the positions measured by its drives, one row of `matrix` for each;
+/// `length` is metres per unit of these. Gain and phase margin belong to the loop of `drive`.
 pub fn measured(
     matrix: &[Vec<&Frf>],
     drive: usize,
@@ -99,8 +99,8 @@ pub fn measured(
     Ok(found)
 }
 
-/// G at a frequency and the root of the squares of all radii, where the response of each drive's own position is
-/// coherent. Of the others a small one need not be.
+/// G at a frequency and the root of the sum of squared radii, if the response of each drive's own position is coherent;
+/// the others may be small and incoherent.
 fn at(matrix: &[Vec<&Frf>], omega: f64) -> Option<(f64, DMatrix<Complex<f64>>, f64)> {
     let (mut g, mut squares) = (DMatrix::zeros(matrix.len(), matrix.len()), 0.0);
     for (i, row) in matrix.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! Spectra of the segments of logs, and what they say of the responses at each line.
+//! Spectra of the segments of logs, and responses at each line.
 
 use super::{Cut, Point};
 use crate::error::{Error, Result};
@@ -8,52 +8,52 @@ use nalgebra::{Complex, DMatrix};
 use rustfft::FftPlanner;
 use std::f64::consts::PI;
 
-/// Segments that a record is cut into where nothing is said.
+/// Default number of segments of a record.
 const SEGMENTS: f64 = 16.0;
 
-/// Fewest segments or periods of a single input; one more for each other input.
+/// Least number of segments or periods for a single input; one more for each further input.
 const FEWEST: usize = 4;
 
 /// Longest and shortest segment, samples.
 const LONGEST: usize = 1 << 16;
 const SHORTEST: usize = 16;
 
-/// Share of independent segments among those that overlap by half under Hann's window.
+/// Fraction of independent segments with 50 % overlap under Hann's window.
 const INDEPENDENT: f64 = 0.947;
 
-/// Share of their second difference over the lines that sums over segments are taken less of: half of the second moment
-/// of the power of Hann's window, 1/3 of a line squared.
+/// Fraction of the second difference over the lines that is subtracted from sums over segments: half of the second
+/// moment of the power of Hann's window, 1/3 of a line squared.
 const SMEARED: f64 = 1.0 / 6.0;
 
-/// Effect on the variance: neighbouring lines are alike by 4/9, the next by 1/36, so that
+/// Effect on the variance: the correlation of neighbouring lines is 4/9, of the next 1/36, so
 /// (1 + 2/6)² + 2/36 − 4 (4/3) (1/6) (4/9) + 2/36² = 1.44.
 const NOISIER: f64 = 1.44;
 
-/// Largest coherence β² of an input with the others at which its response is given: it makes the variance
-/// 1/(1 − β²) = 20 times that beside inputs that have nothing in common.
+/// Largest coherence β² of an input with the others at which its response is determined: the variance is then 1/(1 −
+/// β²) = 20 times that of independent inputs.
 pub const ALIKE: f64 = 0.95;
 
-/// An input rests if its power is at most this share of that of the strongest one: a thousandth of its amplitude.
+/// An input rests if its power is at most this fraction of that of the strongest one: a thousandth of its amplitude.
 const RESTS: f64 = 1e-6;
 
-/// Singular values of inputs in common below this share do not count as excitation.
+/// Relative singular values of the inputs below this do not count as excitation.
 const SINGULAR: f64 = 1e-9;
 
-/// Transforms of a signal, by segment, then by line.
+/// Transforms of a signal by segment and line.
 type Signal = Vec<Vec<Complex<f64>>>;
 
-/// The spectra of logs that are taken together.
+/// Spectra of combined logs.
 pub(super) struct Spectra {
     /// The names of the logs.
     pub name: String,
-    /// Between samples, s.
+    /// Sample interval, s.
     pub every: f64,
-    /// Samples in a segment.
+    /// Number of samples in a segment.
     pub length: usize,
     /// True if segments are periods.
     pub periodic: bool,
     inputs: Vec<Signal>,
-    /// Logged references in place of the inputs, where there are any.
+    /// Logged references that replace the inputs, if any.
     references: Option<Vec<Signal>>,
     outputs: Vec<(Quantity, Signal)>,
     lines: Vec<Line>,
@@ -61,11 +61,11 @@ pub(super) struct Spectra {
 
 /// The inputs at a line.
 struct Line {
-    /// Its number among the lines above zero.
+    /// Its index among the lines above zero.
     number: usize,
-    /// The inputs that are excited there.
+    /// The inputs excited there.
     excited: Vec<usize>,
-    /// S_rr⁻¹ of those, and S_ur⁻¹ without the second moment of the window.
+    /// S_rr⁻¹ of these, and S_ur⁻¹ without the second moment of the window.
     power: DMatrix<Complex<f64>>,
     cross: DMatrix<Complex<f64>>,
     /// [S_ur⁻ᴴ S_rr S_ur⁻¹]_jj of each.
@@ -84,7 +84,7 @@ pub(super) struct Row {
 }
 
 impl Spectra {
-    /// Of these logs together. Errors: uneven samples, missing values, too few segments, logs that differ.
+    /// Spectra of these logs combined. Errors: uneven samples, missing values, too few segments, logs that differ.
     pub fn of(logs: &[&Log], cut: &Cut) -> Result<Self> {
         let name = logs.iter().map(|log| log.name.as_str()).collect::<Vec<_>>().join(", ");
         let place = format!("log \"{name}\"");
@@ -104,7 +104,7 @@ impl Spectra {
         let shortest = logs.iter().map(|log| log.len()).min().unwrap_or_default();
         let (length, step) = segments(shortest, every, cut).map_err(|error| error.in_file(&place))?;
         let periodic = cut.period.is_some();
-        // Of periods the first is the machine taking up its swing.
+        // The first period contains the transient.
         let first = if periodic { length } else { 0 };
         let all = |values: &dyn Fn(&Log) -> Vec<f64>| -> Signal {
             let one = |log: &&Log| transforms(&differences(&values(log)), first, length, step, periodic);
@@ -155,7 +155,7 @@ impl Spectra {
         self.inputs.len()
     }
 
-    /// The first quantity that was measured.
+    /// The first measured quantity.
     pub fn first_output(&self) -> Quantity {
         self.outputs[0].0
     }
@@ -171,30 +171,30 @@ impl Spectra {
         self.lines.iter().filter_map(of_line).collect()
     }
 
-    /// True if there is a response to that input.
+    /// True if a response to that input exists.
     pub fn tells(&self, drive: usize) -> bool {
         self.alike(drive).into_iter().any(|alike| alike <= ALIKE)
     }
 
-    /// What excites: the references, or the inputs.
+    /// Excitation: the references, or the inputs.
     fn excitations(&self) -> &[Signal] {
         self.references.as_deref().unwrap_or(&self.inputs)
     }
 
-    /// The lines at which an input is excited.
+    /// Lines at which an input is excited.
     fn excited(&self) -> Vec<Line> {
         let (u, r) = (&self.inputs, self.excitations());
         let count = u[0].first().map_or(0, Vec::len);
-        // What a difference leaves of a line, |1 − e^{−jωT}|², is no lack of excitation.
+        // The attenuation of a line by differencing, |1 − e^{−jωT}|², is not a lack of excitation.
         let plain = |signal: &Signal, k: usize| {
             power(signal, k) / (2.0 * (PI * (k + 1) as f64 / self.length as f64).sin()).powi(2)
         };
         let most: Vec<f64> = r.iter().map(|one| (0..count).map(|k| plain(one, k)).fold(0.0, f64::max)).collect();
         let strongest = most.iter().copied().fold(0.0, f64::max);
-        // Lines of a multisine stand out; of noise every one is excited.
+        // Lines of a multisine stand out; noise excites every line.
         let share = if self.periodic { 1e-4 } else { 1e-12 };
         let cross = sharpened((0..count).map(|k| crossed(u, r, k)).collect(), self.periodic);
-        // Hann's window spreads the mean that is taken away into the first two lines.
+        // Hann's window spreads the removed mean over the first two lines.
         let first = if self.periodic { 0 } else { 2 };
         let line = |k: usize| {
             let is_excited = |j: &usize| {
@@ -216,7 +216,7 @@ impl Spectra {
         (first..count).filter_map(line).collect()
     }
 
-    /// The response to each input that can be told from the others, by input and output.
+    /// The response to each distinguishable input, by input and output.
     pub fn rows(&self) -> Vec<Row> {
         let of_output = |(quantity, y): &(Quantity, Signal)| {
             let rows = self.points(y).into_iter().enumerate();
@@ -249,7 +249,7 @@ impl Spectra {
                 line.excited.iter().zip(g.iter()).map(|(&drive, g)| g * u[drive][segment][k]).sum()
             };
             let left: f64 = y[0].iter().enumerate().map(|(segment, y)| (y[k] - explained(segment)).norm_sqr()).sum();
-            // H = S_yr S_rr⁻¹, and what it leaves of S_yy
+            // H = S_yr S_rr⁻¹, and the rest of S_yy
             let seen = raw[k].select_columns(&line.excited);
             let h = &seen * &line.power;
             let unseen = (power(&y[0], k) - (&h * seen.adjoint())[(0, 0)].re).max(0.0);
@@ -269,7 +269,7 @@ impl Spectra {
     }
 }
 
-/// Refuses samples that are not evenly spaced.
+/// Rejects samples that are not evenly spaced.
 fn even(log: &Log) -> Result<()> {
     let every = log.interval();
     let uneven = log.time.windows(2).find(|pair| ((pair[1] - pair[0]) / every - 1.0).abs() > 0.01);
@@ -289,7 +289,7 @@ fn crossed(a: &[Signal], b: &[Signal], k: usize) -> DMatrix<Complex<f64>> {
     DMatrix::from_fn(a.len(), b.len(), |i, j| a[i].iter().zip(&b[j]).map(|(a, b)| a[k] * b[k].conj()).sum())
 }
 
-/// The inverse of sums of products; of inputs that are alike, of what they have in common.
+/// Pseudo-inverse of sums of products; for dependent inputs, on their common part.
 fn inverse(sums: &DMatrix<Complex<f64>>) -> DMatrix<Complex<f64>> {
     if sums.nrows() == 1 {
         return sums.map(|sum| sum.inv());
@@ -312,7 +312,7 @@ fn alike(power: &DMatrix<Complex<f64>>, j: usize) -> f64 {
     (known / power[(j, j)].re).clamp(0.0, 1.0)
 }
 
-/// Samples of a segment, and from one to the next.
+/// Samples of a segment, and the step from one to the next.
 fn segments(samples: usize, every: f64, cut: &Cut) -> Result<(usize, usize)> {
     if let Some(period) = cut.period {
         let length = (period / every).round() as usize;
@@ -326,7 +326,7 @@ fn segments(samples: usize, every: f64, cut: &Cut) -> Result<(usize, usize)> {
     }
     let wanted = cut.segment.map_or(2.0 * samples as f64 / (SEGMENTS + 1.0), |segment| segment / every);
     let length = match cut.segment {
-        // The longest power of two that leaves as many segments.
+        // The longest power of two with at least this number of segments.
         None => 1 << (wanted.max(1.0).log2().floor() as usize),
         Some(_) => wanted.round() as usize,
     };
@@ -365,7 +365,7 @@ fn transforms(values: &[f64], first: usize, length: usize, step: usize, periodic
     all
 }
 
-/// Sums over segments without the second moment of the window; those of whole periods as they are.
+/// Sums over segments without the second moment of the window; unchanged for whole periods.
 fn sharpened(sums: Vec<DMatrix<Complex<f64>>>, periodic: bool) -> Vec<DMatrix<Complex<f64>>> {
     let mut sharp = sums.clone();
     for k in (1..sums.len().saturating_sub(1)).filter(|_| !periodic) {
@@ -406,7 +406,7 @@ mod tests {
         spectra
     }
 
-    /// Intervals of the delay held 92.5 % for 95 %: the fit took noise at neighbouring lines for independent.
+    /// 95 % intervals of the delay covered 92.5 %: the fit assumed independent noise at neighbouring lines.
     #[test]
     fn noise_at_neighbouring_lines_is_alike_by_what_the_fit_takes() {
         let mut random = Pcg64::seed_from_u64(6);
@@ -427,7 +427,8 @@ mod tests {
         }
     }
 
-    /// With y = 2 u₁ − 3 u₂ and noise, circles of both hold in 95 of 100 cases, whatever the inputs have in common.
+    /// With y = 2 u₁ − 3 u₂ and noise, circles of both contain the true value in 95 of 100 cases, for any correlation
+    /// of the inputs.
     #[test]
     fn circles_of_inputs_that_have_something_in_common_hold_the_truth() {
         let mut random = Pcg64::seed_from_u64(9);

@@ -1,5 +1,5 @@
-//! All that is told of a machine's linear equations at once: matrices, poles, zeros, responses, modes, resonances
-//! along the travel or over the working area.
+//! Complete linear analysis of a machine: matrices, poles, zeros, responses, modes, resonances along the travel or over
+//! the working area.
 
 use super::{Discrete, Hold, Natural, Operation, Place, Range, ResonanceMap, Response, StateSpace, System, Transfer};
 use super::{assumptions, place, places, sticks, travel};
@@ -10,74 +10,74 @@ use crate::mechanism::BODIES;
 use nalgebra::Complex;
 use std::f64::consts::PI;
 
-/// Places along the travel of an axis.
+/// Number of positions along the travel of an axis.
 const PLACES: usize = 61;
 
-/// The question of an analysis.
+/// Options of an analysis.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Question {
-    /// Speed at the belt at which everything slides, m/s; [`Operation::default`]'s if not said.
+    /// Speed at the belt at which everything slides, m/s; by default that of [`Operation::default`].
     pub speed: Option<f64>,
-    /// Where the cart is, m; at zero if not said.
+    /// Position of the cart, m; zero by default.
     pub at: Option<f64>,
-    /// Where the bridge is, m, of a machine that has one; at zero if not said.
+    /// Position of the bridge, m, if any; zero by default.
     pub bridge: Option<f64>,
-    /// Keys of the bodies that are held where they are.
+    /// Keys of held bodies.
     pub held: Vec<String>,
-    /// Of the discrete-time models, s; none is made if not said.
+    /// Sample time of the discrete-time models, s; none by default.
     pub sample_time: Option<f64>,
-    /// The inputs between samples.
+    /// Interpolation of the inputs between samples.
     pub hold: Hold,
-    /// By how much the inputs are late, s.
+    /// Delay of the inputs, s.
     pub delay: f64,
-    /// Lowest frequency of the responses, Hz; below the slowest pole or zero if not said.
+    /// Lowest frequency of the responses, Hz; by default below the slowest pole or zero.
     pub from: Option<f64>,
-    /// Highest frequency of the responses, Hz; above the fastest resonance if not said.
+    /// Highest frequency of the responses, Hz; by default above the fastest resonance.
     pub to: Option<f64>,
 }
 
-/// The answers.
+/// Results of an analysis.
 #[derive(Debug, Clone)]
 pub struct Analysis<'a> {
-    /// The case whose machine it is.
+    /// The case of the machine.
     pub case: &'a Case,
-    /// About what it was linearised.
+    /// Operating point of the linearisation.
     pub operation: Operation,
     /// Its equations.
     pub system: System,
-    /// The effect of each input alone, in the order of the drives.
+    /// Results for each input alone, in the order of the drives.
     pub inputs: Vec<ByInput>,
     /// Poles, 1/s, conjugates side by side, the slowest first.
     pub poles: Vec<Complex<f64>>,
-    /// Shapes and energies of the modes; none where a body is held.
+    /// Shapes and energies of the modes; none if a body is held.
     pub modes: Option<Natural>,
     /// The assumptions.
     pub words: Vec<String>,
     /// True if the machine sticks at rest.
     pub sticks: bool,
-    /// At the place that was asked for.
+    /// Resonances at the requested position.
     pub here: Place,
-    /// Along the travel of an axis, where the place makes a difference.
+    /// Resonances along the travel of an axis, if they depend on the position.
     pub travel: Option<Vec<Place>>,
-    /// Over the working area of a gantry, where the place makes a difference.
+    /// Resonances over the working area of a gantry, if they depend on the position.
     pub map: Option<ResonanceMap>,
 }
 
-/// The effect of one input.
+/// Results for one input.
 #[derive(Debug, Clone)]
 pub struct ByInput {
-    /// The system of this input, the others being zero.
+    /// The system of this input, with zero for the others.
     pub system: StateSpace,
-    /// By output.
+    /// Transfers by output.
     pub transfers: Vec<Transfer>,
-    /// By output, all inputs at the same frequencies.
+    /// Responses by output, for all inputs at the same frequencies.
     pub responses: Vec<Response>,
-    /// The discrete-time model, if asked for.
+    /// The discrete-time model, if requested.
     pub discrete: Option<Discrete>,
 }
 
 impl<'a> Analysis<'a> {
-    /// Linearises the machine of `case`. Mistakes in the question are told by the names of the command line's options.
+    /// Linearises the machine of `case`. Errors name the options of the command line.
     ///
     /// ```
     /// use taut::case::{Case, TEMPLATE};
@@ -139,7 +139,7 @@ impl<'a> Analysis<'a> {
     }
 }
 
-/// Refuses a question whose numbers are none.
+/// Rejects invalid numbers of a question.
 fn numbers(question: &Question) -> Result<()> {
     let &Question { speed, at, bridge, delay, from, to, .. } = question;
     let finite = |value: f64| value.is_finite();
@@ -157,7 +157,7 @@ fn numbers(question: &Question) -> Result<()> {
     found.map_or(Ok(()), Err)
 }
 
-/// Refuses a place of the cart or the bridge, m, outside the travel, and that of a bridge where there is none.
+/// Rejects a position of cart or bridge, m, outside the travel, and one of a missing bridge.
 pub fn within_travel(machine: &Machine, at: Option<f64>, bridge: Option<f64>) -> Result<()> {
     if bridge.is_some() && machine.bridge.is_none() {
         return Err(Error::new("this machine has no bridge").in_file("--bridge").next("leave it out, or give --at"));

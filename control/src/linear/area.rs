@@ -4,7 +4,7 @@ use super::Natural;
 use crate::error::Result;
 use crate::machine::{Machine, Travel};
 
-/// Places along either way of the map.
+/// Number of positions along each axis of the map.
 const PLACES: usize = 33;
 
 /// Undamped frequencies of the elastic modes over the working area.
@@ -19,7 +19,7 @@ pub struct ResonanceMap {
 }
 
 impl ResonanceMap {
-    /// The map of a machine with a bridge, where its spans follow bridge and cart and both have a travel.
+    /// Map of a machine with a bridge, if its spans follow bridge and cart and both have a travel.
     pub fn of(machine: &Machine) -> Result<Option<Self>> {
         let bridge = machine.bridge.as_ref().filter(|_| machine.belt.following().is_some());
         let (Some(bridge), Some(cart)) = (bridge.and_then(|bridge| bridge.travel), machine.cart.travel) else {
@@ -44,7 +44,7 @@ impl ResonanceMap {
         Ok(Some(Self { bridge, cart, hertz }))
     }
 
-    /// The least and the greatest frequency of a mode, Hz, each with its place (x, y), m.
+    /// Least and largest frequency of a mode, Hz, each with its position (x, y), m.
     pub fn range(&self, mode: usize) -> [(f64, (f64, f64)); 2] {
         let mut range = [(f64::INFINITY, (0.0, 0.0)), (f64::NEG_INFINITY, (0.0, 0.0))];
         for (x, row) in self.bridge.iter().zip(&self.hertz[mode]) {

@@ -1,4 +1,4 @@
-//! Discrete-time models: the stage as a controller with a sample time sees it.
+//! Discrete-time models of a machine for a sampled controller.
 
 use super::StateSpace;
 use super::eigen::norm;
@@ -10,17 +10,17 @@ use nalgebra::{Complex, DMatrix, DVector};
 /// The input between samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Hold {
-    /// It stands: what a converter puts out. Exact.
+    /// Zero-order hold, as of a converter. Exact.
     #[default]
     Zero,
-    /// It goes straight from sample to sample, the triangle hold; exact for such inputs.
+    /// First-order hold, linear between samples (triangle hold); exact for such inputs.
     First,
     /// The bilinear rule s = (2/T) (z − 1)/(z + 1): an approximation.
     Tustin,
 }
 
 impl Hold {
-    /// Its name, and whether it is exact.
+    /// Its name, and a remark if it is approximate.
     pub fn words(self) -> &'static str {
         match self {
             Hold::Zero => "zero-order hold, exact",
@@ -30,22 +30,22 @@ impl Hold {
     }
 }
 
-/// Most samples by which an input can be late.
+/// Maximum delay of an input, in samples.
 const MOST_DELAY: f64 = 100.0;
 
 /// `x[k+1] = A x[k] + b u[k]`, `y[k] = C x[k] + d u[k]`.
 ///
-/// With a first-order hold and with Tustin's rule x is not the state of the stage at the sample (it has a part of the
-/// input in it, or another scale); y is its output.
+/// With a first-order hold or Tustin's rule, x is not the state of the machine at the sample (it contains a part of the
+/// input, or has another scale); y is its output.
 #[derive(Debug, Clone)]
 pub struct Discrete {
     /// T, s.
     pub sample_time: f64,
-    /// The input between samples.
+    /// Interpolation of the input between samples.
     pub hold: Hold,
-    /// By how much the input is late, s.
+    /// Delay of the input, s.
     pub delay: f64,
-    /// Names of the states: those of the stage, then inputs that are on their way, the latest first.
+    /// Names of the states: those of the machine, then pending inputs, the latest first.
     pub states: Vec<String>,
     /// A.
     pub a: DMatrix<f64>,
@@ -61,11 +61,10 @@ pub struct Discrete {
 }
 
 impl StateSpace {
-    /// The model for a sample time T > 0, s, and an input that is late by `delay` ≥ 0, s, which needs a zero-order
-    /// hold.
+    /// Model for a sample time T > 0, s, and an input delay ≥ 0, s, which requires a zero-order hold.
     ///
-    /// With a zero-order hold A is e^{A T} and b is ∫ e^{A t} b dt, from one matrix exponential. A late input comes in
-    /// two parts: of u[k − l − 1] until the delay is over, of u[k − l] from then on.
+    /// With a zero-order hold A is e^{A T} and b is ∫ e^{A t} b dt, from one matrix exponential. A delayed input acts
+    /// in two parts: u[k − l − 1] until the delay is over, u[k − l] from then on.
     pub fn discrete(&self, sample_time: f64, hold: Hold, delay: f64) -> Result<Discrete> {
         let t = sample_time;
         let allowed = |what: String, allowed: &str| Err(Error::new(what).allowed(allowed));
@@ -155,7 +154,7 @@ impl StateSpace {
 /// e^{A t} − I, ∫₀ᵗ e^{A s} b ds and ∫₀ᵗ ∫₀ˢ e^{A q} b dq ds.
 fn held(a: &DMatrix<f64>, b: &DVector<f64>, t: f64) -> (DMatrix<f64>, DVector<f64>, DVector<f64>) {
     let n = a.nrows();
-    // ẋ = A x + b u, u̇ = w, ẇ = 0, with u and w in units that keep the entries of one size
+    // ẋ = A x + b u, u̇ = w, ẇ = 0, with u and w in units that give entries of similar size
     let size = norm(a).max(1.0 / t.max(f64::MIN_POSITIVE)).log2().round().exp2();
     let unit = if b.amax() > 0.0 { (b.amax() / size).log2().round().exp2() } else { 1.0 };
     let mut whole = DMatrix::zeros(n + 2, n + 2);
@@ -185,16 +184,16 @@ fn exponential(matrix: &DMatrix<f64>, t: f64) -> DMatrix<f64> {
 }
 
 impl Discrete {
-    /// Poles z = e^{s T} (by Tustin's rule another), then those at zero of a late input.
+    /// Poles z = e^{s T} (different for Tustin's rule), then those at zero of a delayed input.
     pub fn poles(&self) -> &[Complex<f64>] {
         &self.poles
     }
 
-    /// Zeros z of an output, and its gain; none for an output that there is not.
+    /// Zeros z of an output, and its gain; none for an unknown output.
     pub fn zeros(&self, output: usize) -> Option<Result<Zeros>> {
         let d = *self.d.get(output)?;
         let (change, input, rows) = &self.inner;
-        // Of z − 1, which is where A − I has its eigenvalues.
+        // In terms of z − 1, the eigenvalues of A − I.
         let row = rows.row(output).transpose();
         let found = zeros(change, input, &row, d, relative_degree(change, input, &row, d));
         Some(found.map(|found| Zeros { values: found.values.into_iter().map(|v| v + 1.0).collect(), gain: found.gain }))
@@ -209,8 +208,8 @@ impl Discrete {
         solve(change, input, rows, &self.d, shift)
     }
 
-    /// Makes the input late by `whole` samples, and one more in part where `parts` gives what the older and the newer
-    /// input do.
+    /// Delays the input by `whole` samples, and by a part of one more if `parts` gives the effects of the older and the
+    /// newer input.
     fn delayed(
         &mut self,
         whole: usize,
@@ -256,7 +255,7 @@ impl Discrete {
         let (a, b, c) = extended(&self.a, &self.b, &self.c, outer_ends, 0.0);
         (self.a, self.b, self.c) = (a, b, c);
         for output in 0..outputs {
-            // The output at a sample sees the input that is on by then.
+            // The output at a sample contains the input acting at that time.
             let direct = std::mem::take(&mut self.d[output]);
             self.c[(output, n + late - 1)] += direct;
             inner.2[(output, n + late - 1)] += direct;

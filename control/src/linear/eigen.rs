@@ -1,28 +1,28 @@
-//! Eigenvalues of small real matrices whose entries differ by many powers of ten.
+//! Eigenvalues of small, badly scaled real matrices.
 //!
-//! A matrix is first taken apart where it is block triangular by a single row or column, then balanced, then brought to
-//! real Schur form by a bounded iteration; each eigenvalue is at last improved by its own two eigenvectors.
+//! A matrix is first deflated by single rows or columns, then balanced, then reduced to real Schur form by a bounded
+//! iteration; finally each eigenvalue is refined by its left and right eigenvector.
 
 use crate::error::{Error, Result};
 use nalgebra::linalg::Schur;
 use nalgebra::{Complex, DMatrix, DVector};
 
-/// Steps that the iteration to the Schur form may take.
+/// Maximum number of steps of the Schur iteration.
 const MOST_STEPS: usize = 10_000;
 
-/// Copies of a matrix, each turned by another angle, that are tried where the iteration does not settle.
+/// Maximum number of rotated copies of a matrix that are tried if the iteration does not converge.
 const MOST_TURNS: u32 = 8;
 
-/// Eigenvalues that are smaller than this share of the matrix' norm are zero: rounding alone makes them that large.
+/// Eigenvalues below this fraction of the matrix norm are zero within rounding.
 pub(crate) const NOTHING: f64 = 1e-13;
 
-/// The diagonal D, of powers of two, for which rows and columns of D⁻¹ A D have norms of one size (Osborne 1960,
-/// Parlett and Reinsch 1969); scaling by powers of two rounds nothing.
+/// Diagonal D of powers of two for which rows and columns of D⁻¹ A D have similar norms (Osborne 1960, Parlett and
+/// Reinsch 1969); scaling by powers of two is exact.
 pub(crate) fn balance(matrix: &DMatrix<f64>) -> DVector<f64> {
     let n = matrix.nrows();
     let mut a = matrix.clone();
     let mut scale = DVector::from_element(n, 1.0);
-    // It ends by itself; the bound is for entries that are no numbers.
+    // It terminates by itself; the bound is for NaN entries.
     for _ in 0..100 {
         let mut done = true;
         for i in 0..n {
@@ -32,7 +32,7 @@ pub(crate) fn balance(matrix: &DMatrix<f64>) -> DVector<f64> {
             if column == 0.0 || row == 0.0 || !(column + row).is_finite() {
                 continue;
             }
-            // c f and r/f are as near to each other as a power of two can bring them.
+            // The power of two for which c f and r/f are closest.
             let factor = (0.5 * (row / column).log2()).round().clamp(-300.0, 300.0).exp2();
             if column * factor + row / factor < 0.95 * (column + row) {
                 done = false;
@@ -58,10 +58,9 @@ pub(crate) fn norm(matrix: &DMatrix<f64>) -> f64 {
     matrix.row_iter().map(|row| row.iter().map(|v| v.abs()).sum()).fold(0.0, f64::max)
 }
 
-/// The eigenvalues, conjugates side by side, the one of positive imaginary part first, those of least absolute value
-/// first.
+/// Eigenvalues in order of absolute value, conjugates side by side, the one with positive imaginary part first.
 ///
-/// Fails only if the matrix holds what is no number, or the iteration does not settle on any of its turned copies.
+/// Fails only if the matrix contains NaN, or the iteration does not converge for any of its rotated copies.
 pub(crate) fn eigenvalues(matrix: &DMatrix<f64>) -> Result<Vec<Complex<f64>>> {
     let (mut values, rest) = taken_apart(matrix);
     if rest.nrows() > 0 {
@@ -100,14 +99,14 @@ pub(crate) fn sort(values: &mut [Complex<f64>]) {
     values.sort_by(|p, q| p.norm().total_cmp(&q.norm()).then(q.im.total_cmp(&p.im)));
 }
 
-/// Distance to the nearest of the others.
+/// Distance to the nearest other eigenvalue.
 pub(crate) fn distance(values: &[Complex<f64>], of: usize) -> f64 {
     let others = values.iter().enumerate().filter(|(j, _)| *j != of);
     others.map(|(_, other)| (other - values[of]).norm()).fold(f64::INFINITY, f64::min)
 }
 
-/// Eigenvalues that stand on the diagonal, because all else in their row or column is zero, and the matrix without
-/// these rows and columns.
+/// Deflation: eigenvalues on the diagonal whose row or column is otherwise zero, and the matrix without these rows and
+/// columns.
 fn taken_apart(matrix: &DMatrix<f64>) -> (Vec<Complex<f64>>, DMatrix<f64>) {
     let (mut values, mut rest) = (Vec::new(), matrix.clone());
     loop {
@@ -122,7 +121,7 @@ fn taken_apart(matrix: &DMatrix<f64>) -> (Vec<Complex<f64>>, DMatrix<f64>) {
     }
 }
 
-/// The eigenvalues as the real Schur form has them.
+/// Eigenvalues from the real Schur form.
 fn schur(matrix: &DMatrix<f64>) -> Result<Vec<Complex<f64>>> {
     let n = matrix.nrows();
     let size = norm(matrix);
@@ -133,7 +132,7 @@ fn schur(matrix: &DMatrix<f64>) -> Result<Vec<Complex<f64>>> {
     for turn in 0..MOST_TURNS {
         let mut copy = matrix.clone();
         if turn > 0 && n > 1 {
-            // A turned copy has the same eigenvalues, and where the iteration went in circles it does not.
+            // A rotated copy has the same eigenvalues, and breaks a cycle of the iteration.
             let (s, c) = (0.1 + 0.37 * f64::from(turn)).sin_cos();
             let mut rotation = DMatrix::identity(n, n);
             let (i, j) = (turn as usize % n, (turn as usize + 1) % n);
@@ -148,11 +147,10 @@ fn schur(matrix: &DMatrix<f64>) -> Result<Vec<Complex<f64>>> {
         .next("change a value of the case a little"))
 }
 
-/// An eigenvalue s of M − s E, better than it is known; E is the unit matrix in its first `count` rows and zero in the
-/// others.
+/// Refines an eigenvalue s of M − s E; E is the unit matrix in its first `count` rows and zero in the others.
 ///
 /// By its right and left vectors: (M − s E) x ≈ 0, yᴴ (M − s E) ≈ 0, s ← s + yᴴ (M − s E) x / yᴴ E x. `apart` is the
-/// distance to the next one: what would move it by a tenth of that is not believed.
+/// distance to the next one: a correction above a tenth of it is rejected.
 pub(crate) fn polished(matrix: &DMatrix<f64>, count: usize, s: Complex<f64>, apart: f64) -> Complex<f64> {
     let whole = matrix.map(|v| Complex::new(v, 0.0));
     let n = whole.nrows();
@@ -218,7 +216,7 @@ mod tests {
         assert!((values[2].norm() - 1e5).abs() < 1e-7 && values[2].im > 0.0, "{values:?}");
     }
 
-    /// The swap of four coordinates in a circle, on which unshifted iterations go round for ever.
+    /// The cyclic permutation of four coordinates, on which unshifted iterations cycle for ever.
     #[test]
     fn a_circle_of_four() {
         let a = DMatrix::from_fn(4, 4, |i, j| f64::from(u8::from(j == (i + 1) % 4)));

@@ -1,4 +1,4 @@
-//! Coordinates: which quantities are the states, and what every stretch, speed and angle is in terms of them.
+//! Coordinates: the state variables, and every elongation, speed and angle in terms of them.
 
 use crate::friction::Law;
 use crate::machine::{Geometry, Machine};
@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector};
 /// A quantity with its unit.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Variable {
-    /// As the columns of a run are called.
+    /// Its name, as of a column of a run.
     pub name: String,
     /// Its unit.
     pub unit: &'static str,
@@ -38,24 +38,24 @@ impl Variable {
     }
 }
 
-/// States, and what is made of them.
+/// States, and quantities in terms of them.
 pub(super) struct Frame {
     pub(super) variables: Vec<Variable>,
-    /// Coefficients of the states in the length of each spring.
+    /// Coefficients of the states in each spring's length.
     stretch: Vec<DVector<f64>>,
-    /// In the speed of each body.
+    /// Coefficients in each body's speed.
     speed: Vec<DVector<f64>>,
-    /// In the angle or position of each body.
+    /// Coefficients in each body's angle or position.
     pub(super) angle: Vec<DVector<f64>>,
-    /// Places of the states that are ways, and their rates.
+    /// Indices of the states that are positions, and their rates.
     pub(super) ways: Vec<(usize, DVector<f64>)>,
-    /// Where the speeds stand that are states, by body.
+    /// Indices of the speeds that are states, by body.
     pub(super) speed_place: Vec<Option<usize>>,
-    /// By drive.
+    /// Indices of the currents, by drive.
     pub(super) current_place: Vec<Option<usize>>,
-    /// By body.
+    /// Indices of the bristles, by body.
     pub(super) bristle_place: Vec<Option<usize>>,
-    /// The kind of each state: the quantity whose coefficients in another frame are its own.
+    /// The quantity of each state, by which it is found in another frame.
     kinds: Vec<Kind>,
 }
 
@@ -68,7 +68,7 @@ enum Kind {
     Bristle(usize),
 }
 
-/// The spring between a pulley and its rotor, where that turns by itself.
+/// The springs between pulleys and independent rotors.
 pub(super) fn gears(plant: &Mechanism) -> impl Iterator<Item = usize> + '_ {
     let is_gear = |spring: &usize| {
         let part = &plant.springs[*spring];
@@ -77,7 +77,7 @@ pub(super) fn gears(plant: &Mechanism) -> impl Iterator<Item = usize> + '_ {
     (0..plant.springs.len()).filter(is_gear)
 }
 
-/// The pulleys, each with the first span that hangs on it and on what slides alone.
+/// The pulleys, each with the first span between it and slides only.
 fn pulleys(machine: &Machine, plant: &Mechanism) -> Vec<(usize, usize)> {
     let slides = |body: usize| plant.bodies[body].kind == mechanism::Kind::Linear;
     let turning = plant.held_bodies().filter(|body| !slides(*body));
@@ -92,7 +92,7 @@ fn pulleys(machine: &Machine, plant: &Mechanism) -> Vec<(usize, usize)> {
 }
 
 impl Frame {
-    /// Angles and speeds, body by body, of what moves by itself.
+    /// Outer frame: angles and speeds of the independent bodies.
     pub(super) fn outer(machine: &Machine, plant: &Mechanism, held: &[bool], speed: f64) -> Self {
         let moving: Vec<usize> = moving(plant, held);
         let is_rotor = |body: &&usize| plant.bodies[**body].is_rotor;
@@ -108,8 +108,8 @@ impl Frame {
         Self::new(machine, plant, kinds, false)
     }
 
-    /// Positions of what slides and stretches, so that what does not depend on where the machine is has coefficients
-    /// that are exactly zero. The outer frame where a body is held: then positions are stretches.
+    /// Inner frame: positions of slides and elongations, so that quantities independent of the position have
+    /// coefficients of exactly zero. The outer frame if a body is held, since positions are then elongations.
     pub(super) fn inner(machine: &Machine, plant: &Mechanism, held: &[bool], speed: f64) -> Self {
         if held.contains(&true) {
             return Self::outer(machine, plant, held, speed);
@@ -134,7 +134,7 @@ impl Frame {
             }
             row
         };
-        // What moves with another body goes its way times a ratio.
+        // A follower moves by its leader's displacement times a ratio.
         let led = |kind: fn(usize) -> Kind, j: usize| unit(kind(plant.leader(j)), plant.ratio(j));
         let bodies = 0..plant.bodies.len();
         let speed: Vec<DVector<f64>> = bodies.clone().map(|j| led(Kind::Speed, j)).collect();
@@ -147,7 +147,7 @@ impl Frame {
         if relative {
             let mut ways: Vec<DVector<f64>> = bodies.clone().map(|j| unit(Kind::Angle(j), 1.0)).collect();
             stretch = (0..plant.springs.len()).map(|spring| unit(Kind::Stretch(spring), 1.0)).collect();
-            // A pulley or a rotor is where its spring's length and the other bodies of that spring say.
+            // The position of a pulley or rotor follows from its spring's length and the other bodies of that spring.
             let solved = |ways: &[DVector<f64>], stretch: &DVector<f64>, spring: usize, body: usize| {
                 let arms = &plant.springs[spring].arms;
                 let own = arms.iter().find(|arm| arm.0 == body).map_or(1.0, |arm| arm.1);
@@ -157,7 +157,7 @@ impl Frame {
             let pulleys = pulleys(machine, plant);
             for &(body, span) in &pulleys {
                 if plant.leader(body) != body {
-                    // Both pulleys are one: what one span gains the other loses.
+                    // Both pulleys are one: the elongations of the two spans are opposite.
                     stretch[span] = -stretch[pulleys[0].1].clone();
                 }
                 ways[body] = solved(&ways, &stretch[span], span, body);
@@ -173,7 +173,7 @@ impl Frame {
                     ways[body] = solved(&ways, &stretch[gear], gear, body);
                 }
             }
-            // What stands at the ends of the travel, and forces along it.
+            // End stops, and forces along the travel.
             for (spring, own) in stretch.iter_mut().enumerate().skip(spans.len()) {
                 if !gears(plant).any(|gear| gear == spring) {
                     *own = along(&ways, spring);
@@ -234,7 +234,7 @@ impl Frame {
         (row, DVector::from_iterator(self.current_place.len(), form.input.into_iter().take(self.current_place.len())))
     }
 
-    /// This frame's states from those of another.
+    /// Matrix from another frame's states to those of this one.
     pub(super) fn from(&self, other: &Frame) -> DMatrix<f64> {
         let n = self.kinds.len();
         let mut matrix = DMatrix::zeros(n, n);
@@ -253,7 +253,7 @@ impl Frame {
     }
 }
 
-/// Bodies that move by themselves, rotors among them.
+/// Independent bodies, including rotors.
 fn moving(plant: &Mechanism, held: &[bool]) -> Vec<usize> {
     plant.leaders().filter(|&j| plant.bodies[j].is_rotor || !held[j]).collect()
 }

@@ -1,14 +1,14 @@
-//! Linear analysis: what a control engineer's tools say about a stage.
+//! Linear analysis of a machine.
 //!
-//! [`StateSpace::of`] writes the equations of a stage that slides as ẋ = A x + b u, y = C x + d u, from the same forms
-//! that the solvers use. From there: [poles](StateSpace::poles), [zeros](StateSpace::zeros), [`Response`] over
-//! frequency, resonance and anti-resonance [along the travel](travel), and [`Discrete`] models for a sample time.
+//! [`StateSpace::of`] gives the equations of a sliding machine as ẋ = A x + b u, y = C x + d u, from the forms that the
+//! solvers use. From these follow [poles](StateSpace::poles), [zeros](StateSpace::zeros), [`Response`] over frequency,
+//! resonance and anti-resonance [along the travel](travel), and [`Discrete`] models for a sample time.
 //!
-//! [`Natural`] has rigid and elastic modes of any mechanism, [`ResonanceMap`] those of a gantry over its working area.
-//! [`Analysis`] is all of it at once.
+//! [`Natural`] contains rigid and elastic modes of any mechanism, [`ResonanceMap`] those of a gantry over its working
+//! area, [`Analysis`] everything.
 //!
-//! Dry friction that does not change with speed drops out while everything slides; while a body sticks it does not move
-//! at all, and [`Operation::held`] says so.
+//! Dry friction that does not depend on speed drops out while everything slides; stuck bodies are named in
+//! [`Operation::held`].
 
 mod analysis;
 mod area;
@@ -38,13 +38,13 @@ use nalgebra::{Complex, DMatrix};
 use std::f64::consts::PI;
 
 impl StateSpace {
-    /// The poles: eigenvalues of A, 1/s, conjugates side by side, the slowest first. An integrator is exactly zero.
+    /// Poles: eigenvalues of A, 1/s, conjugates side by side, the slowest first. An integrator is exactly zero.
     pub fn poles(&self) -> Result<Vec<Complex<f64>>> {
         eigen::eigenvalues(&self.inner.a)
     }
 
-    /// Invariant zeros of an output, 1/s, and its gain. Where an output does not see the axis' position, one of its
-    /// zeros is 0 and takes the integrator away. None for an output that there is not.
+    /// Invariant zeros of an output, 1/s, and its gain. If an output does not depend on the axis' position, one of its
+    /// zeros is 0 and cancels the integrator. None for an unknown output.
     pub fn zeros(&self, output: usize) -> Option<Result<Zeros>> {
         let d = *self.d.get(output)?;
         let row = |c: &DMatrix<f64>| c.row(output).transpose();
@@ -53,7 +53,7 @@ impl StateSpace {
     }
 }
 
-/// A pole or a zero as an engineer reads it.
+/// A pole or a zero in engineering terms.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Root {
     /// At zero: an integrator, or as a zero a differentiator.
@@ -64,13 +64,13 @@ pub enum Root {
     Pair {
         /// Undamped natural frequency |s|, rad/s.
         frequency: f64,
-        /// Damping ratio −Re s/|s|; negative for what grows.
+        /// Damping ratio −Re s/|s|; negative for a growing mode.
         damping: f64,
     },
 }
 
 impl Root {
-    /// Of each real value and each pair, in the order given.
+    /// Roots for each real value and each pair, in the order given.
     pub fn of(values: &[Complex<f64>]) -> Vec<Root> {
         let one = |value: &Complex<f64>| match *value {
             v if v.im > 0.0 => Some(Root::Pair { frequency: v.norm(), damping: -v.re / v.norm() }),
@@ -81,7 +81,7 @@ impl Root {
         values.iter().filter_map(one).collect()
     }
 
-    /// Time in which it falls (or grows) by the factor e, s; infinite if it does neither.
+    /// Time in which it decays (or grows) by the factor e, s; infinite if it does neither.
     pub fn time_constant(self) -> f64 {
         match self {
             Root::Zero => f64::INFINITY,
@@ -99,7 +99,7 @@ impl Root {
         }
     }
 
-    /// Frequency at which it swings, Hz: |Im s|/2π.
+    /// Damped frequency, Hz: |Im s|/2π.
     pub fn damped_hertz(self) -> Option<f64> {
         match self {
             Root::Pair { frequency, damping } => Some(frequency * (1.0 - damping * damping).sqrt() / (2.0 * PI)),

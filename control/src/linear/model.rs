@@ -1,4 +1,4 @@
-//! The equations of a machine, linearised about steady sliding, as matrices.
+//! Equations of a machine, linearised about steady sliding, as matrices.
 
 use super::frame::{Frame, Variable, gears};
 use crate::error::{Error, Result};
@@ -7,23 +7,22 @@ use crate::machine::{BeltMake, BeltModel, Geometry, Machine};
 use crate::mechanism::{AmplifierMode, BODIES, Contact, Form, Mechanism, Mode, Over, SpringLaw};
 use nalgebra::{DMatrix, DVector};
 
-/// About what a machine is linearised.
+/// Operating point of a linearisation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Operation {
-    /// Speed at the belt, m/s, with which everything slides; negative is backward. Friction curves have their slope
-    /// there, and bristles are bent as they are in steady sliding.
+    /// Speed at the belt, m/s, with which everything slides; negative is backward. Friction curves contribute their
+    /// slope at this speed, and bristles have their steady deflection.
     pub speed: f64,
-    /// Where the cart is, m: spans that follow it are as stiff as there, friction that changes along the travel is as
-    /// there.
+    /// Position of the cart, m, which determines the stiffness of following spans and friction along the travel.
     pub position: f64,
-    /// Where the bridge is, m, of a machine that has one.
+    /// Position of the bridge, m, if any.
     pub bridge: f64,
-    /// Which bodies are held where they are, by their numbers.
+    /// True for held bodies, by their numbers.
     pub held: [bool; 6],
 }
 
 impl Operation {
-    /// Where what slides is at `slides`, m, in the order of the geometry, and all slides forward.
+    /// Slides at these positions, m, in the order of the geometry, with everything sliding forward.
     pub fn at(slides: &[f64]) -> Self {
         let own = Self::default();
         match slides {
@@ -33,21 +32,21 @@ impl Operation {
         }
     }
 
-    /// Where each sliding part of `machine` is, m, in the order of its geometry.
+    /// Position of each sliding part of `machine`, m, in the order of its geometry.
     pub(super) fn coordinates(&self, machine: &Machine) -> Vec<f64> {
         machine.bridge.iter().map(|_| self.bridge).chain([self.position]).collect()
     }
 }
 
 impl Default for Operation {
-    /// Everything slides forward at 0.1 m/s, what slides at zero.
+    /// Everything slides forward at 0.1 m/s, with all slides at position zero.
     fn default() -> Self {
         Self { speed: 0.1, position: 0.0, bridge: 0.0, held: [false; 6] }
     }
 }
 
-// A place for each body. With `[bool; BODIES]` in the struct the compiler fails where a closure of another crate copies
-// it.
+// One element for each body. With `[bool; BODIES]` in the struct the compiler fails where a closure of another crate
+// copies it.
 const _: () = assert!(BODIES == 6);
 
 /// ẋ = A x + B u, y = C x + D u: small motions on top of steady sliding, with an input for each drive.
@@ -98,13 +97,14 @@ pub(super) struct Inner<B> {
     pub(super) a: DMatrix<f64>,
     pub(super) b: B,
     pub(super) c: DMatrix<f64>,
-    /// The states of the outer system from these, and these from those.
+    /// Transformations to and from the states of the outer system.
     pub(super) outward: DMatrix<f64>,
     pub(super) inward: DMatrix<f64>,
 }
 
 impl System {
-    /// The linear equations of `machine` about `operation`, as [`StateSpace::of`] has them for the first input alone.
+    /// Linear equations of `machine` about `operation`, for all inputs; [`StateSpace::of`] has those of the first input
+    /// alone.
     ///
     /// ```
     /// use taut::case::Case;
@@ -156,11 +156,11 @@ impl System {
         })
     }
 
-    /// The system of one input, the others being zero.
+    /// The system of one input, with zero for the others.
     ///
     /// # Panics
     ///
-    /// Where there is no input of this number.
+    /// If there is no input of this number.
     pub fn input(&self, input: usize) -> StateSpace {
         self.clone().into_input(input)
     }
@@ -185,10 +185,10 @@ impl System {
 impl StateSpace {
     /// The linear equations of `machine` about `operation`, with its first drive's input.
     ///
-    /// Parts that work piece by piece are taken as they are in undisturbed motion: amplifier within its limits, spans
-    /// taut, end stops apart, the driving flank of a gear with play in contact. A gear with losses is driven by the
-    /// motor. How stiffness and friction change with the cart's place is not followed: they are what they are at the
-    /// place. Fails for a place where no span can be.
+    /// Piecewise linear parts have their case in undisturbed motion: amplifier within its limits, spans taut, end stops
+    /// open, the driving flank of a gear with play in contact. A lossy gear is driven by the motor. Stiffness and
+    /// friction have their values at the operating point; their derivatives along the travel are not included. Errors:
+    /// a position at which a span would have no length.
     ///
     /// ```
     /// use taut::case::{Case, TEMPLATE};
@@ -207,14 +207,13 @@ impl StateSpace {
         Ok(System::of(machine, operation)?.into_input(0))
     }
 
-    /// Where an output of this name stands.
+    /// Index of the output with this name.
     pub fn output(&self, name: &str) -> Option<usize> {
         self.outputs.iter().position(|output| output.name == name)
     }
 }
 
-/// The machine with its spans held as they are with what slides at its place. Errors: a place where a span would have
-/// no length.
+/// The machine with the span lengths of the operating point. Errors: a position at which a span would have no length.
 pub fn placed(machine: &Machine, operation: Operation) -> Result<Machine> {
     let slides = machine.geometry().slides;
     let at = operation.coordinates(machine);
@@ -235,7 +234,7 @@ pub fn placed(machine: &Machine, operation: Operation) -> Result<Machine> {
     Ok(machine.with_spans_held(&at))
 }
 
-/// Where the one sliding part can be, in words: no span shorter than nothing.
+/// Possible positions of the only slide, in words, for positive span lengths.
 fn within(geometry: &Geometry, make: &BeltMake) -> String {
     let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
     for (length, span) in make.spans.into_iter().zip(geometry.spans) {
@@ -260,7 +259,7 @@ fn mode(plant: &Mechanism, held: &[bool], speed: f64) -> Mode {
         (_, _, false) => Motion::Backward,
     });
     let mut mode = Mode::of(motion).with_torque(forward);
-    // A force that is a line over the speed is followed, one over the way stays as it is.
+    // A piecewise linear force over speed is linearised, one over position stays constant.
     for (index, spring) in plant.springs.iter().enumerate() {
         if let SpringLaw::Line { over: Over::Rate, line } = &spring.law {
             mode.piece[index] = line.piece_at(speed) as u8;
@@ -278,7 +277,7 @@ fn mode(plant: &Mechanism, held: &[bool], speed: f64) -> Mode {
     mode
 }
 
-/// The equations to be written out in a frame.
+/// Equations to be expressed in a frame.
 struct Linear<'a> {
     machine: &'a Machine,
     plant: &'a Mechanism,
@@ -314,7 +313,7 @@ impl Linear<'_> {
                 continue;
             }
             let mass = plant.mass(body, &equations.inertia);
-            // M v̇ = what is linear − Σ ρ (what friction adds to it), of all that moves with it at ρ v
+            // M v̇ = linear forces − Σ ρ (friction beyond them) of all followers, which move at ρ v
             for member in plant.followers(body) {
                 let ratio = plant.ratio(member);
                 let (on_speed, on_bristle) = self.friction(member);
@@ -335,13 +334,12 @@ impl Linear<'_> {
         self.operation.speed / self.plant.bodies[body].kind.lever()
     }
 
-    /// By what the dry friction of a body is multiplied where the cart is.
+    /// Factor on the dry friction of a body at the position of the cart.
     fn factor(&self, body: usize) -> f64 {
         self.plant.bodies[body].along.as_ref().map_or(1.0, |along| along.value(self.operation.position))
     }
 
-    /// ∂F_f/∂v of a body's own friction beyond the viscous friction that stands in the equations, and ∂F_f/∂z of a
-    /// bristle.
+    /// ∂F_f/∂v of a body's own friction beyond the viscous friction in the equations, and ∂F_f/∂z of a bristle.
     fn friction(&self, body: usize) -> (f64, f64) {
         let friction = &self.plant.bodies[body].friction;
         let v = self.speed(body);

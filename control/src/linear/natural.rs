@@ -1,12 +1,11 @@
-//! How any mechanism swings by itself while everything slides: rigid and elastic modes, their damping, and how the
-//! place changes them.
+//! Natural modes of any sliding mechanism: rigid and elastic modes, their damping, and their dependence on position.
 //!
 //! ```text
 //! M q̈ + C q̇ + K q = 0,   K = Aᵀ diag(k) A,   C = Aᵀ diag(c) A + B + n² K_t K_e / R
 //! ```
 //!
-//! over the bodies that move by themselves. Undamped modes are the eigenvectors of M^(−½) K M^(−½); as many of them are
-//! rigid as A leaves motions free, and of these the frequency is zero by construction.
+//! over the independent bodies. Undamped modes are the eigenvectors of M^(−½) K M^(−½); the number of rigid ones, whose
+//! frequency is zero by construction, is the dimension of the null space of A.
 
 use super::{Root, eigen};
 use crate::error::{Error, Result};
@@ -15,41 +14,41 @@ use crate::mechanism::{AmplifierMode, BODIES, Kind, Mechanism, Mode, SpringLaw};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use std::f64::consts::PI;
 
-/// Singular values of the spans' lever arms up to this share of the largest are zero.
+/// Singular values of the spans' lever arms up to this fraction of the largest are zero.
 const NOTHING: f64 = 1e-12;
 
-/// Rigid and elastic modes of a mechanism at one place.
+/// Rigid and elastic modes of a mechanism at one position.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Natural {
-    /// The bodies that move by themselves, by their numbers; shapes are in their order.
+    /// The independent bodies, by their numbers; shapes are in their order.
     pub bodies: Vec<usize>,
-    /// Motions that stretch nothing, one for each body that slides freely where there are such.
+    /// Rigid modes, one for each freely sliding body if any.
     pub rigid: Vec<RigidMode>,
-    /// Motions that swing, the slowest first.
+    /// Elastic modes, the slowest first.
     pub elastic: Vec<ElasticMode>,
-    /// Of the damped mechanism, an integrator for each rigid mode first.
+    /// Poles of the damped mechanism, beginning with an integrator for each rigid mode.
     pub poles: Vec<Root>,
 }
 
-/// A motion that stretches nothing.
+/// A rigid mode: a motion without elongation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RigidMode {
-    /// The body that it moves by one unit, of the others that are chosen so none.
+    /// The chosen body, which it moves by one unit; other chosen bodies do not move.
     pub body: usize,
-    /// The way of each body, in its own unit, rad or m.
+    /// Displacement of each body, in its own unit, rad or m.
     pub shape: Vec<f64>,
 }
 
-/// A motion that swings.
+/// An elastic mode.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ElasticMode {
     /// Frequency without damping, rad/s.
     pub frequency: f64,
-    /// Its pair of poles with damping; none where not every mode has one.
+    /// Its pair of damped poles; none unless every mode has one.
     pub damped: Option<Root>,
-    /// The way of each body at the belt, the largest being 1: r φ of what turns.
+    /// Displacement of each body at the belt (r φ if rotary), normalised to a maximum of 1.
     pub shape: Vec<f64>,
-    /// Share of the motion's energy that each body has.
+    /// Fraction of the kinetic energy of each body.
     pub energy: Vec<f64>,
 }
 
@@ -68,19 +67,19 @@ impl ElasticMode {
     }
 }
 
-/// The matrices of a mechanism in which everything slides, over the bodies that move by themselves.
+/// Matrices of a mechanism in which everything slides, over the independent bodies.
 struct Matrices {
     bodies: Vec<usize>,
     /// Diagonal of M.
     mass: DVector<f64>,
     stiffness: DMatrix<f64>,
     damping: DMatrix<f64>,
-    /// Motions that no spring holds.
+    /// Number of motions that no spring restrains.
     free: usize,
 }
 
 impl Natural {
-    /// The modes with the bodies at `position`, which matters to what follows them.
+    /// Modes with the bodies at `position`, which determines the stiffness of following spans.
     ///
     /// ```
     /// use taut::case::{Case, TEMPLATE};
@@ -96,7 +95,7 @@ impl Natural {
         let matrices = Matrices::of(mechanism, position);
         let (values, vectors) = matrices.modes()?;
         let Matrices { bodies, mass, damping, free, .. } = matrices;
-        // q = Φ η with Φᵀ M Φ = 1: the rigid ones are the first.
+        // q = Φ η with Φᵀ M Φ = 1, rigid modes first.
         let shapes = DMatrix::from_fn(bodies.len(), bodies.len(), |i, j| vectors[(i, j)] / mass[i].sqrt());
         let poles = poles(&values, &(shapes.transpose() * damping * &shapes), free)?;
         let pairs: Vec<Root> = poles.iter().filter(|root| matches!(root, Root::Pair { .. })).copied().collect();
@@ -106,7 +105,7 @@ impl Natural {
                 let shape = shapes.column(k);
                 let lever = |i: usize| mechanism.bodies[bodies[i]].kind.lever();
                 let ways: Vec<f64> = (0..bodies.len()).map(|i| lever(i) * shape[i]).collect();
-                // The first of those that go farthest, so that alike bodies do not change places by rounding.
+                // The first of the largest displacements, so that rounding does not exchange equal bodies.
                 let farther = |most: f64, way: f64| if way.abs() > most.abs() * (1.0 + 1e-9) { way } else { most };
                 let largest = ways.iter().copied().fold(0.0, farther);
                 let share = |way: &f64| if way.abs() <= NOTHING * largest.abs() { 0.0 } else { way / largest };
@@ -151,7 +150,7 @@ impl Matrices {
             if drive.amplifier.mode == AmplifierMode::Voltage && motor.inductance == 0.0 {
                 let i = bodies.iter().position(|body| *body == mechanism.leader(drive.shaft)).unwrap_or(0);
                 let way = motor.gear_ratio * mechanism.ratio(drive.shaft);
-                // Of a stiff gear with losses its share is passed on.
+                // A lossy stiff gear transmits this fraction.
                 let passed = if drive.has_rotor() { 1.0 } else { motor.gear_efficiency };
                 let emf = motor.torque_constant * motor.back_emf_constant / motor.resistance;
                 damping[(i, i)] += passed * way * way * emf;
@@ -162,7 +161,7 @@ impl Matrices {
         for (spring, part) in mechanism.springs.iter().enumerate() {
             let holds = match part.law {
                 SpringLaw::TwoSided | SpringLaw::Tension { .. } => true,
-                // The flank of a gear that carries; an end stop is not touched.
+                // The flank of a gear is in contact; an end stop is not.
                 SpringLaw::Gap { .. } => part.arms.len() > 1,
                 SpringLaw::Line { .. } | SpringLaw::Bounds { .. } | SpringLaw::Angle { .. } | SpringLaw::None => false,
             };
@@ -177,7 +176,7 @@ impl Matrices {
             rows.push(row);
         }
         let mass = DVector::from_iterator(n, bodies.iter().map(mass));
-        // How many of the rows say something of their own, each body's way measured at the belt.
+        // Number of independent rows, with displacements measured at the belt.
         let rank = if rows.is_empty() {
             0
         } else {
@@ -189,7 +188,7 @@ impl Matrices {
         Self { free: n - rank, bodies, mass, stiffness, damping }
     }
 
-    /// Eigenvalues of M^(−½) K M^(−½), the least first, those of rigid modes zero, and its eigenvectors.
+    /// Eigenvalues of M^(−½) K M^(−½) in ascending order, zero for rigid modes, and its eigenvectors.
     fn modes(&self) -> Result<(Vec<f64>, DMatrix<f64>)> {
         let n = self.bodies.len();
         let root = self.mass.map(f64::sqrt);
@@ -210,8 +209,8 @@ impl Matrices {
 fn poles(values: &[f64], damping: &DMatrix<f64>, free: usize) -> Result<Vec<Root>> {
     let n = values.len();
     let elastic = n - free;
-    // States: speeds of all modes, then ways of the elastic ones. A rigid way is an integrator, and nothing asks for
-    // it.
+    // States: speeds of all modes, then displacements of the elastic ones. Rigid displacements are integrators on which
+    // nothing depends.
     let a = DMatrix::from_fn(n + elastic, n + elastic, |i, j| match (i < n, j < n) {
         (true, true) => -damping[(i, j)],
         (true, false) => {
@@ -229,15 +228,15 @@ fn poles(values: &[f64], damping: &DMatrix<f64>, free: usize) -> Result<Vec<Root
     Ok(poles)
 }
 
-/// Rigid motions as sums of `shapes`, each of which moves one chosen body by one and the other chosen ones not at
-/// all; bodies that slide are chosen first.
+/// Rigid modes as sums of `shapes`, each of which moves one chosen body by one unit and the other chosen ones not at
+/// all; sliding bodies are chosen first.
 fn rigid(shapes: &DMatrix<f64>, slides: &dyn Fn(usize) -> bool) -> Vec<(usize, Vec<f64>)> {
     let mut left = shapes.clone();
     let count = left.ncols();
     let mut chosen = Vec::new();
     for k in 0..count {
         let rest = left.columns(k, count - k).into_owned();
-        // The body that the motions left over move most, among those that slide if they move any.
+        // The body with the largest motion in the remaining shapes, among slides if any of these moves.
         let size = |i: &usize| rest.row(*i).norm();
         let most = |only: bool| {
             let bodies = (0..left.nrows()).filter(|i| !chosen.contains(i) && (!only || slides(*i)));

@@ -1,4 +1,4 @@
-//! Frequency response, with phases that run on from the lowest frequency to the highest.
+//! Frequency response with continuous phase.
 
 use super::eigen::{balance, scaled};
 use super::zeros::Zeros;
@@ -7,7 +7,7 @@ use crate::error::Result;
 use nalgebra::{Complex, DMatrix, DVector};
 use std::f64::consts::PI;
 
-/// One output over frequency.
+/// Frequency response of one output.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Response {
     /// Angular frequency, rad/s.
@@ -65,21 +65,20 @@ impl Transfer {
         }
     }
 
-    /// The phase at ω > 0, rad, followed from ω = 0 on: every zero of the left half plane turns by +π/2, every pole by
-    /// −π/2.
+    /// Phase at ω > 0, rad, continued from ω = 0: every zero of the left half plane turns by +π/2, every pole by −π/2.
     pub fn phase(&self, omega: f64) -> f64 {
         let turned = |omega: f64| -> f64 {
             let sum = |values: &[Complex<f64>]| -> f64 { values.iter().map(|v| turn(*v, omega)).sum() };
             sum(&self.zeros.values) - sum(&self.poles) + if self.zeros.gain < 0.0 { PI } else { 0.0 }
         };
         let start = turned(0.0);
-        // From −2π, exclusive, to 0; a limit that is 0 but for rounding is 0.
+        // From −2π, exclusive, to 0; a limit that is 0 within rounding is 0.
         let whole = (start / (2.0 * PI) - 1e-9).ceil();
         turned(omega) - 2.0 * PI * whole
     }
 }
 
-/// The angle of jω − v, continuous in ω ≥ 0; a root on the imaginary axis counts as one of the left half plane.
+/// Angle of jω − v, continuous in ω ≥ 0; a root on the imaginary axis counts as in the left half plane.
 fn turn(v: Complex<f64>, omega: f64) -> f64 {
     if v.norm() == 0.0 {
         return 0.5 * PI;
@@ -91,14 +90,14 @@ fn turn(v: Complex<f64>, omega: f64) -> f64 {
     }
 }
 
-/// Frequencies from the lowest to the highest.
+/// A range of frequencies.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Range {
     /// Lowest, rad/s.
     pub from: f64,
     /// Highest, rad/s.
     pub to: f64,
-    /// Points spread evenly on a logarithmic scale; more are added about resonances.
+    /// Number of points on a logarithmic scale; more are added around resonances.
     pub points: usize,
 }
 
@@ -106,7 +105,7 @@ impl Range {
     /// From a third of the slowest to three times the fastest of poles and zeros, to the full decade.
     pub fn of(poles: &[Complex<f64>], zeros: &[Zeros]) -> Self {
         let all = || poles.iter().chain(zeros.iter().flat_map(|z| &z.values)).map(|v| v.norm()).filter(|v| *v > 0.0);
-        // Zeros far out, of a belt damped a little, and poles of a bristle are left to who asks for them.
+        // Distant zeros of a lightly damped belt and poles of bristles are not included by default.
         let swings = Root::of(poles).into_iter().filter_map(|root| match root {
             Root::Pair { frequency, .. } => Some(frequency),
             _ => None,
@@ -132,14 +131,14 @@ impl Range {
         (Self::of(poles, &zeros), roots)
     }
 
-    /// The frequencies, rad/s, rising; each pair among `roots` has points of its own, so that its peak or dip is drawn
-    /// to its end.
+    /// The frequencies, rad/s, ascending; each pair among `roots` has additional points, so that its peak or dip is
+    /// resolved.
     pub fn frequencies(&self, roots: &[Complex<f64>]) -> Vec<f64> {
         let (low, high) = (self.from.ln(), self.to.ln());
         let count = self.points.max(2);
         let mut all: Vec<f64> =
             (0..count).map(|i| (low + (high - low) * i as f64 / (count - 1) as f64).exp()).collect();
-        // The ends as they were asked for, and not as rounding has them.
+        // The requested ends, without rounding.
         (all[0], all[count - 1]) = (self.from, self.to);
         for root in roots.iter().filter(|root| root.im > 0.0) {
             let width = (root.re.abs() / root.im).clamp(1e-9, 1.0);
@@ -170,7 +169,7 @@ impl StateSpace {
         let response = |(output, transfer): (usize, &Transfer)| {
             let value: Vec<Complex<f64>> = values.iter().map(|all| all[output]).collect();
             let phase = value.iter().zip(frequencies).map(|(g, omega)| {
-                // The angle itself, on the turn that the roots say.
+                // The angle itself, on the branch determined by the roots.
                 let turn = 2.0 * PI;
                 g.arg() + turn * ((transfer.phase(*omega) - g.arg()) / turn).round()
             });
@@ -186,7 +185,7 @@ impl StateSpace {
         each.map(|zeros| Ok(Transfer { poles: poles.clone(), zeros: zeros? })).collect()
     }
 
-    /// The inner system, balanced: A, b, C, and by what each state was divided.
+    /// The balanced inner system: A, b, C, and the scale of each state.
     pub(super) fn balanced(&self) -> (DMatrix<f64>, DVector<f64>, DMatrix<f64>, DVector<f64>) {
         let scale = balance(&self.inner.a);
         let c = DMatrix::from_fn(self.inner.c.nrows(), self.inner.c.ncols(), |i, j| self.inner.c[(i, j)] * scale[j]);
@@ -194,11 +193,11 @@ impl StateSpace {
     }
 }
 
-/// Most states of a system that is solved without memory of its own: one is asked at some hundred thousand frequencies.
+/// Maximum number of states of a system solved without allocation, since it is evaluated at hundreds of thousands of
+/// frequencies.
 const SMALL: usize = 12;
 
-/// Puts (s I − A)⁻¹ x in the place of x, by elimination with partial pivoting; false on a pole. For up to [`SMALL`]
-/// states.
+/// Replaces x by (s I − A)⁻¹ x by elimination with partial pivoting; false on a pole. For up to [`SMALL`] states.
 fn solve_shifted(a: &DMatrix<f64>, s: Complex<f64>, x: &mut [Complex<f64>]) -> bool {
     let n = a.nrows();
     let mut rows = [[Complex::ZERO; SMALL]; SMALL];
@@ -214,7 +213,7 @@ fn solve_shifted(a: &DMatrix<f64>, s: Complex<f64>, x: &mut [Complex<f64>]) -> b
         rows.swap(k, pivot);
         x.swap(k, pivot);
         let lead = rows[k][k];
-        // Nor is what is no number a pivot.
+        // NaN is not a pivot either.
         if lead.norm_sqr().partial_cmp(&0.0) != Some(std::cmp::Ordering::Greater) {
             return false;
         }
@@ -241,7 +240,7 @@ fn solve_shifted(a: &DMatrix<f64>, s: Complex<f64>, x: &mut [Complex<f64>]) -> b
     true
 }
 
-/// C (s I − A)⁻¹ b + d; no number on a pole.
+/// C (s I − A)⁻¹ b + d; NaN on a pole.
 pub(super) fn solve(
     a: &DMatrix<f64>,
     b: &DVector<f64>,

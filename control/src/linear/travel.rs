@@ -1,4 +1,4 @@
-//! Resonance and anti-resonance along the travel.
+//! Resonances and anti-resonances along the travel.
 
 use super::model::placed;
 use super::{Operation, Root, StateSpace};
@@ -7,16 +7,16 @@ use crate::friction::{Friction, Law, Side};
 use crate::machine::{Amplifier, AmplifierMode, BeltModel, Machine, SlideAt, SlideForces, Spans};
 use nalgebra::{DMatrix, DVector};
 
-/// The resonances at one place. All frequencies in Hz, the lowest first.
+/// Resonances at one position. All frequencies in Hz, the lowest first.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Place {
     /// Position of the cart, m.
     pub position: f64,
-    /// Position of the bridge, m, of a machine that has one.
+    /// Position of the bridge, m, if any.
     pub bridge: Option<f64>,
     /// Stiffness of each span there, N/m.
     pub stiffness: Spans,
-    /// By how much each slide gives way per force on it, the drive pulleys held, m/N.
+    /// Compliance of each slide with held drive pulleys, m/N.
     pub compliance: Vec<f64>,
     /// Resonances: the pairs among the poles.
     pub resonances: Vec<Root>,
@@ -24,12 +24,12 @@ pub struct Place {
     pub antiresonances: Vec<Root>,
     /// Resonances of the same masses and springs without friction, damping and back-EMF.
     pub undamped_resonances: Vec<f64>,
-    /// Anti-resonances of those.
+    /// Anti-resonances without losses.
     pub undamped_antiresonances: Vec<f64>,
 }
 
-/// Places spread evenly over the travel, or, where none is given, from a twentieth of span 2 before the idler pulley to
-/// a twentieth of span 1 before the drive pulley; none where the stiffness does not depend on the cart's place alone.
+/// Evenly spaced positions over the travel, or without a travel from a twentieth of span 2 before the idler pulley to a
+/// twentieth of span 1 before the drive pulley; none if the stiffness does not depend on the cart's position alone.
 pub fn places(machine: &Machine, count: usize) -> Option<Vec<f64>> {
     let make = machine.belt.following().filter(|_| machine.bridge.is_none())?;
     let [l1, l2, _] = make.spans.three();
@@ -41,7 +41,7 @@ pub fn places(machine: &Machine, count: usize) -> Option<Vec<f64>> {
     Some((0..=steps).map(|i| low + (high - low) * i as f64 / steps as f64).collect())
 }
 
-/// The machine with the cart at each of `positions`, m; all else as `operation` says.
+/// Resonances with the cart at each of `positions`, m, otherwise at `operation`.
 pub fn travel(machine: &Machine, operation: Operation, positions: &[f64]) -> Result<Vec<Place>> {
     let bare = undamped(machine);
     let mut drives_held = operation;
@@ -67,8 +67,8 @@ pub fn travel(machine: &Machine, operation: Operation, positions: &[f64]) -> Res
     positions.iter().map(place).collect()
 }
 
-/// The diagonal of K⁻¹ at the slides, m/N: K = Σ k a aᵀ over the spans, a being their arms on the bodies that neither
-/// are drive pulleys nor move with one.
+/// The diagonal of K⁻¹ at the slides, m/N: K = Σ k a aᵀ over the spans, with their arms a on the bodies that neither
+/// are drive pulleys nor follow one.
 fn compliance(machine: &Machine) -> Vec<f64> {
     let (geometry, mechanism) = (machine.geometry(), machine.mechanism());
     if machine.belt.model == BeltModel::Rigid {
@@ -91,13 +91,12 @@ fn compliance(machine: &Machine) -> Vec<f64> {
     geometry.slides.iter().map(|slide| of_slide(slide).unwrap_or(f64::INFINITY)).collect()
 }
 
-/// The machine at the place of `operation`.
+/// Resonances at the position of `operation`.
 pub fn place(machine: &Machine, operation: Operation) -> Result<Place> {
     Ok(travel(machine, operation, &[operation.position])?.swap_remove(0))
 }
 
-/// The machine with its masses and springs but without losses: no friction, no damping, no back-EMF, motors that are
-/// given their current.
+/// The machine without losses: no friction, damping or back-EMF, and commanded motor currents.
 pub fn undamped(machine: &Machine) -> Machine {
     let mut bare = machine.clone();
     let none = Friction { forward: Side::default(), backward: Side::default(), law: Law::Coulomb };

@@ -6,7 +6,7 @@ use crate::machine::{BeltModel, DriveUnit, Machine};
 use crate::mechanism::{AmplifierMode, Kind, Mechanism};
 use crate::number::engineering_typed;
 
-/// The operating point and the assumptions: a sentence for each part that makes the machine more than a linear system.
+/// Operating point and assumptions: a sentence for each nonlinear part of the machine.
 pub fn assumptions(machine: &Machine, operation: Operation) -> Vec<String> {
     let plant = machine.mechanism();
     let held = |body: usize| operation.held[body] || operation.held[plant.leader(body)];
@@ -123,13 +123,13 @@ fn drives(machine: &Machine, plant: &Mechanism) -> Vec<String> {
     words
 }
 
-/// True if dry friction can hold a body that moves in this model at rest.
+/// True if dry friction can hold a moving body of this model at rest.
 pub fn sticks(machine: &Machine, operation: Operation) -> bool {
     let plant = machine.mechanism();
     leaders(&plant).any(|body| !operation.held[body] && plant.friction(body).breakaway(true) > 0.0)
 }
 
-/// Bodies that move by themselves, rotors apart.
+/// Independent bodies without rotors.
 fn leaders(mechanism: &Mechanism) -> impl Iterator<Item = usize> + '_ {
     mechanism.leaders().filter(|&body| !mechanism.bodies[body].is_rotor)
 }

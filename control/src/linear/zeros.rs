@@ -1,31 +1,29 @@
 //! Invariant zeros of a system with one input and one output.
 //!
 //! The reduction of A. Emami-Naeini, P. Van Dooren, "Computation of zeros of linear multivariable systems", Automatica
-//! 18 (1982), which for one input and one output is: hold the output at zero, which costs one state, and look whether
-//! the input now decides what is left of the output; if not, again.
+//! 18 (1982), which for one input and one output is: hold the output at zero, which removes one state, and check if the
+//! input determines the remaining output; otherwise repeat.
 
 use super::eigen::{NOTHING, balance, distance, norm, polished, rough, scaled, sort};
 use crate::error::Result;
 use nalgebra::{Complex, DMatrix, DVector};
 
-/// Markov parameters that are smaller than this share of what they are summed from are zero.
+/// Markov parameters below this fraction of their largest terms are zero.
 const CANCELLED: f64 = 1e-11;
 
 /// The zeros of an output, and its gain.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Zeros {
-    /// Where the output stays at zero though the state moves, rad/s (for a discrete-time system, 1); conjugates side by
-    /// side.
+    /// Zeros, at which the output stays zero although the state moves, rad/s (for a discrete-time system, 1);
+    /// conjugates side by side.
     pub values: Vec<Complex<f64>>,
-    /// Gain k in G(s) = k ∏ (s − z) / ∏ (s − p); zero where the input does not reach the output.
+    /// Gain k in G(s) = k ∏ (s − z) / ∏ (s − p); zero if the input does not affect the output.
     pub gain: f64,
 }
 
-/// How many times y = c x + d u has to be differentiated until u shows in it, and by which factor it then does: d, c b,
-/// c A b, … until one is not zero; none if none is.
+/// Relative degree of y = c x + d u, and the first Markov parameter d, c b, c A b, … that is not zero; none if all are.
 ///
-/// Best asked of a system whose coefficients are single numbers and no differences, so that what is zero is exactly
-/// that.
+/// Most reliable for a system whose coefficients are single numbers, not differences, so that zeros are exact.
 pub(crate) fn relative_degree(a: &DMatrix<f64>, b: &DVector<f64>, c: &DVector<f64>, d: f64) -> Option<(usize, f64)> {
     if d != 0.0 {
         return Some((0, d));
@@ -57,7 +55,7 @@ pub(crate) fn zeros(
     let a = scaled(&a, &scale);
     let mut b = b.component_div(&scale);
     let mut c = c.component_mul(&scale);
-    // Input and output in units that make the entries of b and c as large as those of A.
+    // Input and output in units that scale the entries of b and c to those of A.
     let size = norm(&a).max(f64::MIN_POSITIVE);
     let [unit_b, unit_c] = [b.amax(), c.amax()].map(|m| if m > 0.0 { (m / size).log2().round().exp2() } else { 1.0 });
     b.unscale_mut(unit_b);
@@ -69,19 +67,19 @@ pub(crate) fn zeros(
         let n = a.nrows();
         let single = |v: &DVector<f64>| v.iter().filter(|v| **v != 0.0).count() == 1;
         if single(&b) && !single(&c) {
-            // The transposed system has the same zeros, and input and output in each other's place.
+            // The transposed system has the same zeros, with input and output exchanged.
             a = a.transpose();
             std::mem::swap(&mut b, &mut c);
         }
-        // With y = γ x_n = 0 what is left of the output is ẋ_n. Where one state alone is the output it only has to be
-        // put last, which rounds nothing.
+        // With y = γ x_n = 0 the remaining output is ẋ_n. An output that is a single state only has to be moved to the
+        // end, without rounding.
         if single(&c) {
             let place = c.iamax();
             a.swap_rows(place, n - 1);
             a.swap_columns(place, n - 1);
             b.swap_rows(place, n - 1);
         } else {
-            // A reflection that turns c into (0, …, 0, γ)
+            // A reflection that maps c to (0, …, 0, γ)
             let mut v = c.clone();
             v[n - 1] += c.norm().copysign(c[n - 1]);
             let reflect = DMatrix::identity(n, n) - &v * v.transpose() * (2.0 / v.norm_squared());
@@ -109,8 +107,8 @@ pub(crate) fn zeros(
     Ok(Zeros { values, gain })
 }
 
-/// A system without the states that the output does not see or the input does not reach and that nothing else depends
-/// on; each of them is a zero that takes a pole away.
+/// A system without unobservable and uncontrollable states on which nothing else depends; each of them is a zero that
+/// cancels a pole.
 fn seen(
     mut a: DMatrix<f64>,
     mut b: DVector<f64>,

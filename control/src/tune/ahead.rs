@@ -1,4 +1,4 @@
-//! Feed-forward beside the gains that were found: it often adds more than any gains.
+//! Feed-forward with the tuned gains, which often improves more than any gains.
 
 use super::judged::Verdict;
 use super::work::Work;
@@ -6,10 +6,10 @@ use crate::design::{Design, FeedForward, FeedForwardModel};
 use crate::error::Result;
 use crate::machine::{BeltModel, EncoderPlace, Machine};
 
-/// Share of the largest error that has to remain at most, so that feed-forward is advised.
+/// Largest remaining fraction of the largest error for which feed-forward is recommended.
 const PAYS: f64 = 0.9;
 
-/// Feed-forward that makes the moves better than the gains alone.
+/// Feed-forward that improves the moves beyond the gains alone.
 #[derive(Debug, Clone)]
 pub struct Ahead {
     /// The verdict on the gains with it.
@@ -17,7 +17,7 @@ pub struct Ahead {
 }
 
 impl Ahead {
-    /// The value of `controller.feed_forward`, as a case file has it.
+    /// Value of `controller.feed_forward` in a case file.
     pub fn text(&self) -> String {
         let FeedForward { model, compensate_stretch, .. } = self.verdict.design.feed_forward;
         let stretch = if compensate_stretch { ", compensate_stretch = true" } else { "" };
@@ -25,10 +25,10 @@ impl Ahead {
     }
 }
 
-/// The forms of feed-forward that go beyond a design's own on this stage.
+/// Forms of feed-forward beyond a design's own on this machine.
 fn forms(machine: &Machine, design: &Design) -> Vec<FeedForward> {
     let own = &design.feed_forward;
-    // State feedback and sliding mode have their model already.
+    // State feedback and sliding mode already have a model.
     if design.structure.tunable().feed_forward() != FeedForwardModel::None {
         return Vec::new();
     }
@@ -55,8 +55,8 @@ fn forms(machine: &Machine, design: &Design) -> Vec<FeedForward> {
 }
 
 impl Work<'_> {
-    /// The feed-forward that pays most beside the gains of `after`: J is smaller with it, and the largest error by a tenth
-    /// or more; none where none does.
+    /// The feed-forward that improves most on the gains of `after`: it reduces J, and the largest error by a tenth or
+    /// more; none if no feed-forward does.
     pub fn ahead(&self, after: &Verdict) -> Result<Option<Ahead>> {
         let mut best: Option<Verdict> = None;
         for feed_forward in forms(&self.case.machine, &after.design) {
@@ -64,7 +64,7 @@ impl Work<'_> {
                 return Ok(None);
             }
             let verdict = self.verdict(&Design { feed_forward, ..after.design.clone() })?;
-            // A J that is no number is not smaller.
+            // A J of NaN is not smaller.
             if verdict.objective < best.as_ref().unwrap_or(after).objective {
                 best = Some(verdict);
             }

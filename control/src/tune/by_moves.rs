@@ -1,5 +1,5 @@
-//! The search by moves, on the axes that are worst for what it finds and at the samples of the controller; whatever is
-//! told of a design comes from whole runs on all axes.
+//! Search by moves, on the machines that are worst for its designs and at the samples of the controller; reported
+//! results come from complete runs on all machines.
 
 use super::edge::Edge;
 use super::evolution::evolve;
@@ -18,22 +18,22 @@ use crate::signal::profile::Profile;
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
 
-/// Values that a simplex may ask for.
+/// Maximum number of evaluations of a simplex.
 const MOVES: usize = 60;
 
-/// Designs of a rough search that are run on all axes that are watched.
+/// Number of designs of a rough search that are run on all watched machines.
 const ROUGH: usize = 3;
 
-/// Edge of the simplex at first and where it goes on.
+/// Edge of the first simplex, and of later ones.
 const FIRST: f64 = 0.3;
 const FURTHER: f64 = 0.12;
 
-/// Members of differential evolution, and how often it is done again with an axis more.
+/// Members of differential evolution, and its repetitions with further machines.
 const MEMBERS: usize = 12;
 const EVOLVED: u64 = 2;
 
-/// A differential evolution: generations, how far members are scattered about the best (natural logarithm of gains),
-/// the limits as it takes them, and its seed.
+/// A differential evolution: generations, scatter of the members about the best (natural logarithm of gains), its
+/// treatment of limits, and its seed.
 #[derive(Clone, Copy)]
 pub(super) struct Spread {
     generations: usize,
@@ -42,34 +42,35 @@ pub(super) struct Spread {
     seed: u64,
 }
 
-/// The first one, and those that follow where no other axis is worst for what was found.
+/// The first one, and later ones if no other machine is worst for the result.
 pub(super) const WIDE: Spread = Spread { generations: 12, scatter: 0.4, edge: Edge::Beyond(0.0), seed: 15 };
 const NARROW: Spread = Spread { generations: 8, scatter: 0.3, edge: Edge::Eased, seed: 16 };
 
-/// How far beyond the limits the first simplex may go: it goes along their edge.
+/// Excess over the limits allowed for the first simplex, which moves along their boundary.
 const SLACK: f64 = 0.05;
 
 /// Largest ln J excess over the best at which a finalist is refined.
 const NEAR: f64 = 0.3;
 
-/// Samples of moves that a search of usual effort may simulate, each design that it looks at counted as some more: a few
-/// seconds of a processor.
+/// Samples of moves that a search of default effort may simulate, plus a fixed charge per evaluated design: a few
+/// processor seconds.
 const SAMPLES: u64 = 6_000_000;
 
-/// How often a search goes on with the axes that are worst for what it found.
+/// Maximum number of continuations with the machines that are worst for the result.
 const POLISHED: usize = 8;
 
-/// Share of a figure before by which one at samples has to be less: a peak between them may be that much higher.
+/// Relative margin of a figure from samples below its previous value, since a peak between samples may be higher by
+/// that.
 const BETWEEN: f64 = 2e-3;
 
-/// Designs of each balance that are looked at before none is taken.
+/// Maximum number of designs checked for each balance.
 const TRIES: usize = 20;
 
-/// Weight of an axis on which the cart settles no more, as a share of that of an error.
+/// Weight of a machine on which the cart no longer settles, relative to that of an error.
 const LOST: f64 = 0.2;
 
 impl Work<'_> {
-    /// The figures of all moves on one axis.
+    /// Figures of all moves on one machine.
     pub fn looked(&self, runner: &mut Runner, design: &Design, machine: &Machine) -> Result<Vec<MoveFigures>> {
         let one = |(motion, shaped): (&Move, &Vec<Profile>)| {
             self.spend(design, motion);
@@ -78,7 +79,7 @@ impl Work<'_> {
         self.moves.iter().zip(&self.shaped).map(one).collect()
     }
 
-    /// The figures of each move on all axes, at samples.
+    /// Figures of each move on all machines, from samples.
     pub fn glanced(&self, design: &Design) -> Result<Vec<Vec<MoveFigures>>> {
         let mut runner = Runner::new(&self.case.machine, design)?;
         let mut of_move = |(motion, shaped): (&Move, &Vec<Profile>)| {
@@ -91,9 +92,8 @@ impl Work<'_> {
         self.moves.iter().zip(&self.shaped).map(&mut of_move).collect()
     }
 
-    /// The figures at worst of a design on the axes that are watched, at samples, and ln J by the balance of the
-    /// search; as soon as it is at least `bar` those of what was run until then: another axis makes no figure at worst
-    /// smaller.
+    /// Worst-case figures of a design on the watched machines, from samples, and ln J by the balance of the search.
+    /// Stops as soon as ln J reaches `bar`, since further machines cannot reduce a worst-case figure.
     pub fn run(&self, design: &Design, watch: &Watch, weighed: &Weighed, bar: f64) -> (Vec<AtWorst>, f64) {
         let nothing = (Vec::new(), f64::INFINITY);
         let Ok(mut runner) = Runner::new(&self.case.machine, design) else { return nothing };
@@ -125,8 +125,8 @@ impl Work<'_> {
     }
 
     /// Searches by moves: roughly with the simplex from each of the best finalists, then with differential evolution
-    /// about the best, and on with the simplex as long as other axes are worst for what is found. All that was run and
-    /// keeps the limits on the set, and the axes that are watched.
+    /// about the best, then again with the simplex as long as other machines are worst for the result. Returns all
+    /// designs run that keep the limits on the set, and the watched machines.
     pub fn by_moves(&mut self, finalists: &[Finalist], weighed: &Weighed) -> Result<(Vec<Tried>, Watch)> {
         self.grant();
         let mut watch = Watch::default();
@@ -137,7 +137,7 @@ impl Work<'_> {
         let mut ranked: Vec<(f64, usize)> = Vec::new();
         for (layout, finalist) in finalists.iter().enumerate() {
             let (worst, _) = self.run(&finalist.design, &watch, weighed, f64::INFINITY);
-            // Where a search begins need not be good in every figure.
+            // The start of a search may be worse in some figure.
             ranked.push((self.valued(weighed.cost, &BALANCES[1], &worst, None), layout));
             archive.push(Tried { design: finalist.design.clone(), worst, layout, powers: finalist.powers.clone() });
         }
@@ -178,7 +178,8 @@ impl Work<'_> {
         Ok((archive, watch))
     }
 
-    /// The best designs of a simplex along the edge of the limits, on few axes, as they are on those that are watched.
+    /// Best designs of a simplex along the boundary of the limits on few machines, with their figures on the watched
+    /// ones.
     fn roughly(
         &mut self,
         finalists: &[Finalist],
@@ -197,7 +198,7 @@ impl Work<'_> {
         Ok(found)
     }
 
-    /// Joins the axes that are worst for a design to those that are watched; whether any is new.
+    /// Adds the machines that are worst for a design to the watched ones; true if any is new.
     fn watched_by(&self, design: &Design, watch: &mut Watch) -> Result<bool> {
         let seen = self.glanced(design)?;
         Ok(watch.join(&Watch::of(&seen, self.family.left_out(self.stages.len()))))
@@ -208,27 +209,27 @@ impl Work<'_> {
         self.spent.set(self.spent.get() + (motion.until / design.every) as u64);
     }
 
-    /// Lets a search ask for as much as one may from now on.
+    /// Renews the budget of a search.
     pub fn grant(&mut self) {
         self.most = self.charged() + (self.tuning.effort * SAMPLES as f64) as u64;
     }
 
-    /// True if the samples of moves that a search may ask for are used up.
+    /// True if the budget of samples of moves is spent.
     pub fn is_spent(&self) -> bool {
         self.charged() >= self.most
     }
 
-    /// Samples that were simulated, and those that the designs which were looked at are worth.
+    /// Simulated samples, plus the charge for evaluated designs.
     fn charged(&self) -> u64 {
         self.spent.get() + self.tried as u64 * self.design_costs()
     }
 
-    /// Samples that take as long as the limits of one design on the set.
+    /// Charge of a design: samples that take as long as its limits on the set.
     fn design_costs(&self) -> u64 {
         self.case.controller.as_ref().map_or(0, |design| design.structure.tunable().costs())
     }
 
-    /// One search with the simplex; its value.
+    /// One search with the simplex; returns its value.
     fn moved(
         &mut self,
         finalists: &[Finalist],
@@ -252,8 +253,8 @@ impl Work<'_> {
         Ok(value)
     }
 
-    /// Differential evolution about the best designs of a layout that were run, once more where what it finds passes a
-    /// limit on an axis that was not looked at.
+    /// Differential evolution about the best designs of a layout, repeated if its result exceeds a limit on a machine
+    /// outside the set.
     pub fn evolved(
         &mut self,
         finalists: &[Finalist],
@@ -284,7 +285,7 @@ impl Work<'_> {
             let found = evolve(members, spread.generations, seed, &mut value);
             let Some(best) = found.first() else { break };
             let design = rounded(&shaped(&finalist.start, finalist.own, &best.x));
-            // What was eased keeps the limits.
+            // An eased design keeps the limits.
             if spread.edge == Edge::Eased || (self.stop)() || !self.passes(&design)? {
                 break;
             }
@@ -292,12 +293,12 @@ impl Work<'_> {
         Ok(())
     }
 
-    /// ln J of a design that was run, by what a search weighs.
+    /// ln J of a design that was run, by the weights of a search.
     fn worth(&self, tried: &Tried, weighed: &Weighed) -> f64 {
         self.valued(weighed.cost, &BALANCES[1], &tried.worst, weighed.bars)
     }
 
-    /// With the simplex from the best design that was run, of a layout if one is named.
+    /// Continues with the simplex from the best design that was run, of a layout if one is named.
     pub fn onward(
         &mut self,
         finalists: &[Finalist],
@@ -314,7 +315,7 @@ impl Work<'_> {
         Ok(())
     }
 
-    /// The two layouts with a design that is best by what a search weighs.
+    /// The two layouts with the best designs by the weights of a search.
     pub fn nearest(&self, archive: &[Tried], weighed: &Weighed) -> Vec<usize> {
         let mut ranked: Vec<(f64, usize)> =
             archive.iter().map(|tried| (self.worth(tried, weighed), tried.layout)).collect();
@@ -328,7 +329,8 @@ impl Work<'_> {
         layouts
     }
 
-    /// Runs the best designs of a layout, as many as a population begins with, again, on other axes, and forgets the rest of it.
+    /// Reruns the best designs of a layout, the initial population size of them, on other machines and discards the
+    /// rest.
     pub fn again(&self, archive: &mut Vec<Tried>, layout: usize, watch: &Watch, weighed: &Weighed) {
         let (mut own, other): (Vec<Tried>, Vec<Tried>) = archive.drain(..).partition(|tried| tried.layout == layout);
         own.sort_by(|a, b| self.worth(a, weighed).total_cmp(&self.worth(b, weighed)));
@@ -340,7 +342,7 @@ impl Work<'_> {
         archive.extend(own);
     }
 
-    /// ln J, and what figures are worse than before.
+    /// ln J, with penalties for figures that are worse than before.
     pub fn valued(&self, cost: Cost, balance: &Balance, worst: &[AtWorst], bars: Option<Bars>) -> f64 {
         if worst.len() != self.moves.len() {
             return f64::INFINITY;
@@ -349,7 +351,7 @@ impl Work<'_> {
         let (figures, steep) = bars.map_or((&[][..], 0.0), |bars| (bars.figures, bars.steep));
         for ((is, was), motion) in worst.iter().zip(figures).zip(self.moves) {
             value += steep * (is.error.0 / (was.error.0 * (1.0 - BETWEEN))).ln().max(0.0);
-            // As a share of the profile's duration, as J counts it.
+            // Relative to the profile's duration, as in J.
             let duration = motion.profile().end().max(f64::MIN_POSITIVE);
             value += steep * was.later(is.settles.0) / duration;
             value += steep * LOST * is.unsettled.saturating_sub(was.unsettled) as f64;
@@ -357,7 +359,7 @@ impl Work<'_> {
         if value.is_nan() { f64::INFINITY } else { value }
     }
 
-    /// The design of an archive that is best by a balance and keeps the limits; a few are looked at.
+    /// The best design of an archive by a balance that keeps the limits; a few are checked.
     pub fn best_of(
         &mut self,
         archive: &[Tried],

@@ -1,4 +1,4 @@
-//! Questions of a search by moves to one design at the edge of the limits.
+//! Evaluation of one design at the boundary of the limits in a search by moves.
 
 use super::gains::{rounded, shaped};
 use super::objective::{AtWorst, BALANCES};
@@ -7,22 +7,22 @@ use super::watch::Watch;
 use super::work::{Finalist, STEEP, Work, slowing};
 use super::{HARD, SOFT};
 
-/// The limits to a search: it may go so far beyond them, which costs, or a loop that passes them is made slower.
+/// Treatment of limits in a search: an excess is penalised, or the loop is slowed down until they hold.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum Edge {
     Beyond(f64),
     Eased,
 }
 
-/// ln of the slowest loop that limits make of one that passes them, halvings on the way to the fastest that does not,
-/// and how often that is done for axes that were not looked at.
+/// ln of the slowest factor on the speed of a loop, halvings in the search for the fastest loop within the limits, and
+/// repetitions with further machines.
 const SLOWEST: f64 = -0.7;
 const HALVINGS: usize = 5;
 const EASED: usize = 3;
 
 impl Work<'_> {
-    /// ln J of a finalist with these powers, by moves on the axes that are watched; what keeps the limits on the set
-    /// and is below the bar joins the archive. Infinite once the search is to end.
+    /// ln J of a finalist with these powers, by moves on the watched machines; designs below the bar that keep the
+    /// limits on the set join the archive. Infinite once the search has to end.
     pub fn of_moves(
         &mut self,
         (finalist, layout, powers): (&Finalist, usize, &[f64]),
@@ -76,7 +76,7 @@ impl Work<'_> {
             if !self.is_best_by_any(&worst, archive, weighed) {
                 return value;
             }
-            // What is worth keeping has to keep the limits on all axes; one on which it does not joins the set.
+            // A design worth keeping has to keep the limits on all machines; one that violates them joins the set.
             match self.passes(&design) {
                 Ok(false) => {
                     archive.push(Tried { design, worst, layout, powers });
@@ -89,7 +89,7 @@ impl Work<'_> {
         f64::INFINITY
     }
 
-    /// True if no design that was run is better by what a search weighs, or by a balance that designs are chosen by.
+    /// True if no design run so far is better by the weights of the search, or by one of the balances.
     fn is_best_by_any(&self, worst: &[AtWorst], archive: &[Tried], weighed: &Weighed) -> bool {
         let [strict, soft] = [HARD, SOFT].map(|steep| weighed.bars.map(|bars| Bars { steep, ..bars }));
         [(1, strict), (1, soft), (1, None), (0, None), (2, None)].into_iter().any(|(place, bars)| {
@@ -98,8 +98,8 @@ impl Work<'_> {
         })
     }
 
-    /// These powers with the loop as much slower as the limits make it on the set; where half as fast is not enough,
-    /// how far it is beyond them.
+    /// These powers with the loop slowed down until the limits hold on the set; if half the speed is not slow enough,
+    /// the excess over the limits.
     fn eased(&mut self, finalist: &Finalist, powers: &[f64]) -> std::result::Result<Vec<f64>, f64> {
         let slowing = slowing(&finalist.start, finalist.own, &self.case.machine);
         let at = |log: f64| -> Vec<f64> { powers.iter().zip(&slowing).map(|(x, slow)| x + log * slow).collect() };

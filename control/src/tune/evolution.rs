@@ -1,6 +1,6 @@
-//! A search over a whole region by differential evolution (R. Storn, K. Price, "Differential evolution – a simple and
-//! efficient heuristic for global optimization over continuous spaces", Journal of Global Optimization 11, 1997), with
-//! the mutation "current to p-best" of J. Zhang, A. C. Sanderson, "JADE: adaptive differential evolution with optional
+//! Global search by differential evolution (R. Storn, K. Price, "Differential evolution – a simple and efficient
+//! heuristic for global optimization over continuous spaces", Journal of Global Optimization 11, 1997), with the
+//! mutation "current to p-best" of J. Zhang, A. C. Sanderson, "JADE: adaptive differential evolution with optional
 //! external archive", IEEE Trans. Evolutionary Computation 13, 2009.
 
 use super::search::Found;
@@ -8,15 +8,15 @@ use crate::chance::uniform;
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
 
-/// Share of the best that a mutation may lead to, p, and the chance that a coordinate is taken from the mutant, CR.
+/// Fraction p of best members as targets of a mutation, and crossover probability CR.
 const BEST: f64 = 0.2;
 const CROSSOVER: f64 = 0.9;
 
-/// Least and most of the factor of a mutation, F.
+/// Range of the mutation factor F.
 const FACTORS: [f64; 2] = [0.4, 0.9];
 
-/// The members after so many generations, the best first. `function` is asked for the value at a point and told the one
-/// to beat: what is no better may be given as any value that is not below it.
+/// Returns the members after this number of generations, the best first. `function` gets a point and the value to beat;
+/// if it is not better, it may return any value that is not below that.
 pub fn evolve(
     mut members: Vec<Found>,
     generations: usize,
@@ -68,7 +68,7 @@ mod tests {
 
     #[test]
     fn leaves_the_nearest_valley_for_one_of_the_deepest() {
-        // Rastrigin's function, 0 at the origin, with a valley at every whole number.
+        // Rastrigin's function, 0 at the origin, with a local minimum at every integer.
         let mut hills = |x: &[f64], _: f64| -> f64 {
             x.iter().map(|x| x * x + 10.0 * (1.0 - (2.0 * std::f64::consts::PI * x).cos())).sum()
         };
@@ -76,7 +76,7 @@ mod tests {
             .map(|k| vec![3.0 + 0.5 * f64::from(k % 5), -4.0 + 0.4 * f64::from(k / 3)])
             .map(|x| Found { value: hills(&x, f64::INFINITY), x });
         let start: Vec<Found> = start.collect();
-        // The nearest valley has a value of 25, those beside the deepest have 1 and 2.
+        // The nearest minimum has a value of 25, those beside the deepest have 1 and 2.
         let found = (1..=20).map(|seed| evolve(start.clone(), 120, seed, &mut hills)[0].value);
         let found: Vec<f64> = found.collect();
         assert!(found.iter().all(|value| *value < 5.0), "{found:?}");

@@ -1,4 +1,4 @@
-//! All the axes that a controller may meet: parameters that are off, loads, places along the travel; and the worst of
+//! Family of machines for a controller: uncertain parameters, loads and positions along the travel; and the worst of
 //! them.
 
 use super::margins::Margins;
@@ -19,76 +19,77 @@ use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
 use std::path::Path;
 
-/// Axes that are drawn, beside the axis of the file with each load.
+/// Number of drawn machines, in addition to the nominal machine with each load.
 pub const MACHINES: usize = 40;
 
-/// Share of the axes that a figure at worst leaves out at its bad end: the other end of the central 95 %.
+/// Fraction of the machines that a worst-case figure excludes: the end of the central 95 %.
 const LEFT_OUT: f64 = 0.025;
 
 /// Rounds of the search for the worst axis.
 const ROUNDS: usize = 6;
 
-/// Corners that are drawn to begin another search from.
+/// Number of random corners as starts of further searches.
 const DRAWS: usize = 16;
 
 /// A change of a corner.
 type Step<'a> = Box<dyn Fn(&Corner) -> Corner + 'a>;
 
-/// One of the axes.
+/// One machine of the family.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Corner {
-    /// Where the cart is, m.
+    /// Position of the cart, m.
     pub place: f64,
-    /// Where the bridge is, m, of a machine that has one.
+    /// Position of the bridge, m, if any.
     pub bridge: f64,
     /// Mass added to it, kg.
     pub load: f64,
-    /// How far each unknown is off, from −1 to 1.
+    /// Deviation of each unknown, from −1 to 1.
     pub off: Vec<f64>,
 }
 
 impl Corner {
-    /// The machine sliding there.
+    /// Operating point of sliding there.
     pub fn operation(&self) -> Operation {
         Operation { position: self.place, bridge: self.bridge, ..Operation::default() }
     }
 }
 
-/// All of them.
+/// A family of machines.
 #[derive(Debug, Clone)]
 pub struct Family {
-    /// The axis as it is taken for.
+    /// The nominal machine.
     pub machine: Machine,
-    /// The parameters that can be off.
+    /// The uncertain parameters.
     pub unknowns: Vec<Unknown>,
-    /// Where that is from.
+    /// Source of the uncertainty.
     pub source: Source,
-    /// Places along the travel, m; a single one where nothing changes along it.
+    /// Positions along the travel, m; a single one if nothing changes along it.
     pub places: Vec<f64>,
-    /// Places of the bridge, m.
+    /// Positions of the bridge, m.
     pub bridges: Vec<f64>,
     /// Loads, kg.
     pub loads: Vec<f64>,
-    /// The axis of the file with each load, and a Latin hypercube of axes that can be.
+    /// The nominal machine with each load, and a Latin hypercube of machines.
     pub machines: Vec<Corner>,
-    /// True if all parameters may be at their ends at once.
+    /// True if all parameters may be at their ends simultaneously.
     pub corners: bool,
 }
 
-/// Where the uncertainty is from.
+/// Source of the uncertainty.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Source {
     /// The intervals of a fit.
     Fit,
-    /// So many draws from the posterior of a fit.
+    /// Number of draws from the posterior of a fit.
     Posterior(usize),
-    /// A share of each parameter.
+    /// A relative spread of each parameter.
     Spread(f64),
 }
 
 impl Family {
-    /// Family of a case. Its machines are a Latin hypercube: within a spread all values are as likely, within the
-    /// interval of a fit they are normal; what was never fitted is off by the default spread. With `tuning.corners` the worst corner of all intervals joins them.
+    /// Family of a case. Its machines are a Latin hypercube: values are uniform within a spread, normal within the
+    /// interval of a fit; parameters that were not fitted have the default spread. With `tuning.corners` the worst
+    /// corner of all intervals joins them.
     pub fn of(case: &Case, tuning: &Tuning) -> Result<Self> {
         if let Some(file) = &tuning.draws {
             return Self::of_draws(case, tuning, file);
@@ -98,13 +99,13 @@ impl Family {
         let (mut unknowns, source) = match tuning.spread {
             None if !case.known.is_empty() => {
                 let mut unknowns = Vec::new();
-                // What is fitted along with a log has no key.
+                // Nuisance parameters of a log have no key.
                 for known in case.known.iter().filter(|known| known.name.contains('.')) {
                     let free = Free::new(&machine, &known.name, &keys, &[])?;
                     let least = if free.start > 0.0 { 1e-3 * free.start } else { f64::NEG_INFINITY };
                     unknowns.push(match known.interval {
                         Some(interval) => Unknown::fitted(free, interval.map(|end| end.max(least))),
-                        // What the fit knows nothing of is off by a share.
+                        // Parameters that the fit does not determine have a relative spread.
                         None => Unknown::spread(free, SPREAD),
                     });
                 }
@@ -122,8 +123,8 @@ impl Family {
         Ok(family)
     }
 
-    /// Family from the draws of a posterior: machines that the logs allow, with what they say of parameters together,
-    /// at places and with loads that are drawn.
+    /// Family from the draws of a posterior: machines compatible with the logs, including correlations of parameters,
+    /// at random positions and loads.
     fn of_draws(case: &Case, tuning: &Tuning, file: &Path) -> Result<Self> {
         let plan = case.fit.as_ref().ok_or_else(|| {
             Error::new("draws belong to the parameters of a fit, and this case has no [fit]")
@@ -135,7 +136,7 @@ impl Family {
         let unknown = |(free, column): (Free, &Vec<f64>)| {
             let mut sorted = column.clone();
             sorted.sort_by(f64::total_cmp);
-            // The machine of the file lies between, if only just.
+            // The nominal machine lies within, if only just.
             let least = 1e-6 * free.start.abs().max(f64::MIN_POSITIVE);
             let low = quantile(&sorted, 0.025).min(free.start - least);
             let high = quantile(&sorted, 0.975).max(free.start + least);
@@ -145,7 +146,7 @@ impl Family {
         let count = drawn.len();
         let mut unknowns = with_the_rest(drawn, &case.machine);
         tie(&mut unknowns);
-        // What the draws have they have together.
+        // Parameters of the draws vary jointly.
         unknowns.iter_mut().take(count).enumerate().for_each(|(place, unknown)| unknown.with = place);
         let mut family = Self::without_machines(case, tuning, unknowns, Source::Posterior(rows));
         let count = MACHINES.min(rows);
@@ -168,12 +169,13 @@ impl Family {
         Self { places, bridges, loads, machine, unknowns, source, machines: Vec::new(), corners: tuning.corners }
     }
 
-    /// The axis of the file with each load, and `count` axes of a Latin hypercube over what is off, loads and places.
+    /// The nominal machine with each load, and `count` machines of a Latin hypercube over unknowns, loads and
+    /// positions.
     fn drawn(&self, count: usize) -> Vec<Corner> {
         let nominal = self.nominal();
         let mut all: Vec<Corner> = self.loads.iter().map(|&load| Corner { load, ..nominal.clone() }).collect();
         let mut random = Pcg64::seed_from_u64(15);
-        // A share of each stratum in an order of its own.
+        // A random point of each stratum in a random order.
         let mut column = || -> Vec<f64> {
             let mut order: Vec<usize> = (0..count).collect();
             for i in (1..count).rev() {
@@ -197,12 +199,12 @@ impl Family {
         all
     }
 
-    /// How many axes of so many a figure at worst leaves out: none with corners.
+    /// Number of machines that a worst-case figure excludes: none with corners.
     pub fn left_out(&self, of: usize) -> usize {
         if self.corners { 0 } else { (LEFT_OUT * of as f64) as usize }
     }
 
-    /// Sets what is off of an unknown and of all that vary with it.
+    /// Sets the deviation of an unknown and of all that vary with it.
     fn put(&self, corner: &mut Corner, unknown: usize, off: f64) {
         for (other, value) in self.unknowns.iter().zip(&mut corner.off) {
             if other.with == unknown {
@@ -211,12 +213,12 @@ impl Family {
         }
     }
 
-    /// The unknowns that vary by themselves.
+    /// The independent unknowns.
     fn leading(&self) -> impl Iterator<Item = usize> {
         self.unknowns.iter().enumerate().filter(|(place, unknown)| unknown.with == *place).map(|(place, _)| place)
     }
 
-    /// The axis as it is taken for, in the middle of its places, with the least load.
+    /// The nominal machine in the middle of its positions, with the least load.
     pub fn nominal(&self) -> Corner {
         let middle = |places: &[f64]| places.get(places.len() / 2).copied().unwrap_or_default();
         let least = self.loads.iter().copied().fold(f64::INFINITY, f64::min);
@@ -228,7 +230,7 @@ impl Family {
         }
     }
 
-    /// The axis as it is taken for with each unknown by itself at either end.
+    /// The nominal machine with each unknown alone at either end.
     pub fn ends(&self) -> Vec<Corner> {
         let end = |(unknown, end): (usize, f64)| {
             let mut corner = self.nominal();
@@ -247,12 +249,12 @@ impl Family {
         machine
     }
 
-    /// Its response, as the controller of `design` sees it.
+    /// Its response, as sampled by the controller of `design`.
     pub fn plant(&self, corner: &Corner, design: &Design, corners: &[f64]) -> Result<Plant> {
         Plant::of(&following(self.stage_at(corner)), corner.operation(), design, corners)
     }
 
-    /// Steps to these ends of each unknown, to these places of cart and bridge, and loads.
+    /// Steps to these ends of each unknown, to these positions of cart and bridge, and to the loads.
     fn steps<'a>(&'a self, ends: &[f64], [places, bridges]: [&[f64]; 2], loads: &[f64]) -> Vec<Step<'a>> {
         let mut steps: Vec<Step<'a>> = Vec::new();
         steps.extend(places.iter().map(|&place| moved(move |corner| corner.place = place)));
@@ -264,7 +266,7 @@ impl Family {
         steps
     }
 
-    /// The corner in words: what is off, the load, the place.
+    /// The corner in words: deviations, load, position.
     pub fn words(&self, corner: &Corner) -> String {
         let off = |(unknown, &off): (&Unknown, &f64)| (off != 0.0).then(|| unknown.words(off));
         let mut words: Vec<String> = self.unknowns.iter().zip(&corner.off).filter_map(off).collect();
@@ -280,8 +282,8 @@ impl Family {
         if words.is_empty() { "as the file has it".into() } else { words.join(", ") }
     }
 
-    /// The corner at which `badness` is largest, and its margins: from the axis as it is taken for and from what each
-    /// unknown does by itself, and from the worst of some draws, one coordinate after another as long as it gets worse.
+    /// The corner with the largest `badness`, and its margins: coordinate search from the nominal machine, from the
+    /// effect of each unknown alone, and from the worst of some draws.
     pub fn worst(
         &self,
         design: &Design,
@@ -298,7 +300,7 @@ impl Family {
         let start_bridge = nominal.bridge;
         let mut best = (nominal.clone(), look(&nominal)?);
         let start = best.1.0;
-        // What each unknown does by itself.
+        // Effect of each unknown alone.
         let mut signs = nominal;
         for unknown in self.leading() {
             let mut most = start;
@@ -317,7 +319,7 @@ impl Family {
         if found.0 > best.1.0 {
             best = (signs, found);
         }
-        // And what is found by chance, for what no single unknown says.
+        // Random starts, for combined effects.
         let mut random = Pcg64::seed_from_u64(1);
         let mut share = || uniform(&mut random);
         let mut other: Option<(Corner, (f64, Margins))> = None;
@@ -341,7 +343,7 @@ impl Family {
                 other = Some((corner, found));
             }
         }
-        // A notch makes the worst one lie between the ends: there a drawn axis is nearer to it.
+        // With a notch the worst case lies between the ends, where a drawn machine is closer to it.
         let mut inner: Option<(Corner, (f64, Margins))> = None;
         for corner in &self.machines {
             let found = look(corner)?;
@@ -357,7 +359,7 @@ impl Family {
                 best = other;
             }
         }
-        // Seldom the worst lies between the ends.
+        // The worst case rarely lies between the ends.
         let between = self.steps(
             &[-0.75, -0.5, -0.25, 0.25, 0.5, 0.75],
             [&halves(&self.places), &halves(&self.bridges)],
@@ -378,7 +380,7 @@ impl Family {
 
 type Look<'a> = &'a dyn Fn(&Corner) -> Result<(f64, Margins)>;
 
-/// From a corner to worse ones, one step after another, as long as it gets worse or for so many rounds.
+/// Moves from a corner to worse ones, step by step, as long as it gets worse, up to a number of rounds.
 fn climb(
     mut best: (Corner, (f64, Margins)),
     steps: &[Step],
@@ -407,12 +409,12 @@ fn climb(
     Ok(best)
 }
 
-/// The middles between neighbours.
+/// Midpoints between neighbours.
 fn halves(values: &[f64]) -> Vec<f64> {
     values.windows(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect()
 }
 
-/// A corner with one thing changed.
+/// A corner with one change.
 fn moved<'a>(change: impl Fn(&mut Corner) + 'a) -> Step<'a> {
     Box::new(move |corner| {
         let mut other = corner.clone();
@@ -421,18 +423,18 @@ fn moved<'a>(change: impl Fn(&mut Corner) + 'a) -> Step<'a> {
     })
 }
 
-/// The stage with spans that are as long as they are along the travel, whatever the runs assume.
+/// The machine with span lengths that follow the cart, even if the runs assume fixed ones.
 fn following(mut machine: Machine) -> Machine {
     machine.belt.follows_cart |= machine.belt.make.is_some();
     machine
 }
 
-/// Resonance and anti-resonance of a machine at these places of its cart, the bridge being at `bridge`, m.
+/// Resonance and anti-resonance of a machine at these positions of its cart, with the bridge at `bridge`, m.
 pub(super) fn modes_along(machine: &Machine, bridge: f64, places: &[f64]) -> Result<Vec<Place>> {
     travel(&following(machine.clone()), Operation { bridge, ..Operation::default() }, places)
 }
 
-/// Places of the bridge, where there is one, and of the cart along their travel: of `[travel]`, or where the moves lead.
+/// Positions of the bridge, if any, and of the cart along their travel: from `[travel]` or else the range of the moves.
 fn along(case: &Case, count: usize) -> [Vec<f64>; 2] {
     let machine = following(case.machine.clone());
     let steps = count.max(2) - 1;
@@ -459,7 +461,7 @@ mod tests {
     use super::*;
     use crate::case::Template;
 
-    /// Counts of values in so many equal strata of an interval; those at its ends or outside count in none.
+    /// Numbers of values in equal strata of an interval; those at its ends or outside are not counted.
     fn strata(values: impl Iterator<Item = f64>, [from, to]: [f64; 2], count: usize) -> Vec<usize> {
         let mut counts = vec![0; count];
         for value in values {
@@ -484,7 +486,7 @@ mod tests {
             if family.bridges.len() > 1 {
                 assert_eq!(strata(drawn.iter().map(|one| one.bridge), ends(&family.bridges), MACHINES), one_each);
             }
-            // Within a spread all values are as likely.
+            // Values within a spread are uniform.
             for (k, unknown) in family.unknowns.iter().enumerate().filter(|(k, unknown)| unknown.with == *k) {
                 let offs = drawn.iter().map(|one| one.off[k]);
                 assert_eq!(strata(offs, [-1.0, 1.0], MACHINES), one_each, "{}", unknown.name);

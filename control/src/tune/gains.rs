@@ -5,13 +5,13 @@ use crate::design::{Design, Filter};
 use crate::machine::Machine;
 use crate::parameter::{self, Parameter, Tuned, find, unit_for};
 
-/// Digits that a gain is given with behind its first one.
+/// Digits of a gain after the first one.
 const DIGITS: usize = 3;
 
-/// Highest frequency of a filter that is searched for, in samples per second.
+/// Highest frequency of a filter in a search, relative to the sampling rate.
 const HIGHEST: f64 = 0.45;
 
-/// The damping of a notch that is searched for, where its depth allows.
+/// Range of the damping of a notch in a search, if its depth allows.
 const NARROWEST: f64 = 0.05;
 const WIDEST: f64 = 2.0;
 
@@ -28,13 +28,13 @@ pub struct Gain {
     pub searched: bool,
 }
 
-/// Where the gains of structures sit, in the order of the case file.
+/// Locations of the gains in structures, in the order of the case file.
 fn places() -> impl Iterator<Item = (&'static str, parameter::InStructure)> {
     let place = |row: &'static Parameter| row.gain.map(|gain| (row.key, gain));
     parameter::all().filter_map(place).filter(|(_, gain)| gain.tuned != Tuned::No)
 }
 
-/// True if a search changes a gain of this design: not what is zero, nor the corner of what is.
+/// True if a search changes a gain of this design: not if it, or the gain whose corner it is, is zero.
 fn is_searched(design: &Design, gain: &parameter::InStructure) -> bool {
     let is_there = |gain: &parameter::InStructure| (gain.get)(&design.structure).is_some_and(|value| value != 0.0);
     is_there(gain)
@@ -56,8 +56,8 @@ pub fn gains(design: &Design, machine: &Machine) -> Vec<Gain> {
     places().filter_map(gain).collect()
 }
 
-/// The design with its searched gains multiplied, in the order of [`gains`], by e to these powers. A corner that is
-/// changed ends below half the sampling rate.
+/// The design with its searched gains multiplied, in the order of [`gains`], by e to these powers. Changed corners are
+/// limited below half the sampling rate.
 pub fn scaled(design: &Design, powers: &[f64]) -> Design {
     let mut other = design.clone();
     let highest = HIGHEST / design.every;
@@ -86,7 +86,7 @@ pub fn shaped(design: &Design, own: usize, powers: &[f64]) -> Design {
         match filter {
             Filter::Notch { frequency, depth, damping } => {
                 times(frequency, f64::MIN_POSITIVE, most);
-                // Its gain there is depth/damping: above 1 it would amplify.
+                // Its gain at the notch is depth/damping; above 1 it would amplify.
                 times(damping, NARROWEST.max(*depth), WIDEST.max(*depth));
             }
             Filter::LowPass { frequency, .. } => times(frequency, f64::MIN_POSITIVE, most),
@@ -95,7 +95,7 @@ pub fn shaped(design: &Design, own: usize, powers: &[f64]) -> Design {
     other
 }
 
-/// How many powers [`shaped`] takes.
+/// Number of powers for [`shaped`].
 pub fn searched(design: &Design, own: usize) -> usize {
     places().filter(|(_, gain)| is_searched(design, gain)).count() + filter_knobs(design, own)
 }
@@ -108,7 +108,7 @@ fn filter_knobs(design: &Design, own: usize) -> usize {
     design.filters.iter().skip(own).map(knobs).sum()
 }
 
-/// The design with gains and filters of four digits, as they are written.
+/// The design with gains and filters rounded to four digits, as written.
 pub fn rounded(design: &Design) -> Design {
     let mut other = design.clone();
     for (_, gain) in places() {
@@ -127,12 +127,12 @@ pub fn rounded(design: &Design) -> Design {
     other
 }
 
-/// With four digits; through text, so that it is the number that will be read.
+/// Rounds to four digits; through text, so that it is the number that will be read.
 fn four(value: f64) -> f64 {
     if value.is_finite() { format!("{value:.DIGITS$e}").parse().unwrap_or(value) } else { value }
 }
 
-/// The filters as the case file has them.
+/// The filters in the notation of the case file.
 pub fn filters_text(filters: &[Filter]) -> String {
     let one = |filter: &Filter| match filter {
         Filter::Notch { frequency, depth, damping } => {
@@ -150,8 +150,8 @@ mod tests {
     use crate::design::Structure;
     use std::path::Path;
 
-    /// A search ended with a notch of damping 0.05 and depth 0.1, which amplifies by 6 dB, and with a corner of 15 kHz at
-    /// 4 kHz.
+    /// A search ended with a notch of damping 0.05 and depth 0.1, which amplifies by 6 dB, and with a corner of 15 kHz
+    /// at 4 kHz.
     #[test]
     fn a_searched_filter_neither_amplifies_nor_passes_half_the_sampling_rate() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../stages/sollmann-jouaneh/controllers");

@@ -1,9 +1,10 @@
-//! Limit cycles at rest: an integral against sticking friction and counts.
+//! Limit cycles at rest (hunting), by integral action with sticking friction and encoder counts.
 //!
-//! They are found by simulation. Between two slips of a stuck axis the command is a ramp, the integral of an error that
-//! stays, and the next slip is known in closed form: with the slope u̇ of the command and its force g per command it
-//! comes where g u reaches the breakaway of cart and pulleys. That says how long to watch where slips are rare, and
-//! when the next one comes where no watch is long enough. Machines with several drives are watched without that.
+//! They are found by simulation. Between two slips of a stuck axis the command is a ramp, the integral of a constant
+//! error, and the next slip follows in closed form: with the slope u̇ of the command and the force g per command it
+//! occurs when g u reaches the breakaway of cart and pulleys. This determines the observation time if slips are rare,
+//! and the time of the next slip if no observation is long enough. Machines with several drives are observed without
+//! it.
 
 use crate::control::{Loop, Rows, Standard, each, stream};
 use crate::design::Design;
@@ -15,59 +16,61 @@ use crate::signal::profile::{Leg, Limits, Profile};
 use crate::solve::{Flow, Solver};
 use crate::trajectory::Trajectory;
 
-/// Way out before the slow reversal, m, half of which it goes back; enough to break away. Less on a short travel.
+/// Outward stroke before the slow reversal, m, half of which is the return; enough to break away. Less on a short
+/// travel.
 const WAY: f64 = 10e-3;
 
 /// Its speed, m/s.
 const SPEED: f64 = 20e-3;
 
-/// Shares of that way which are gone in turn until an axis does not come to rest: whether an error stays depends on
-/// where between two counts the target is.
+/// Fractions of that stroke tried in turn until an axis does not come to rest: a remaining error depends on the
+/// position of the target between two counts.
 const STARTS: [f64; 3] = [1.0, 0.8713, 0.9361];
 
-/// Standard deviation of the intervals between swings, as a share of their mean, from which on they are irregular.
+/// Relative standard deviation of the intervals between oscillations above which they are irregular.
 const IRREGULAR: f64 = 0.25;
 
-/// Longest watch of an axis of which nothing is known yet, s.
+/// Longest first observation of an axis, s.
 const LONGEST: f64 = 60.0;
 
-/// Slips that a longer watch waits for, its most samples, and how far ahead a slip is foreseen, s.
+/// Number of slips that a longer observation covers, its maximum number of samples, and the largest prediction time of
+/// a slip, s.
 const SLIPS: f64 = 4.0;
 const MOST: f64 = 1e6;
 const FORESEEN: f64 = 3600.0;
 
-/// Factor by which the slopes of both halves of a ramp may differ.
+/// Largest ratio of the slopes of both halves of a ramp.
 const STEADY: f64 = 3.0;
 
-/// Share of the samples at which a cart stands that slips now and then, share of its whole way that it moves less by
-/// from one sample to the next, and s without motion between two slips.
+/// For a cart that slips occasionally: fraction of samples at rest, motion between samples at rest relative to its
+/// total motion, and time without motion between two slips, s.
 const STANDS: f64 = 0.7;
 const STILL: f64 = 1e-4;
 const APART: f64 = 0.05;
 
-/// Share by which a cart has to swing wider to hunt more.
+/// Relative increase of the amplitude that counts as more hunting.
 const WIDER: f64 = 0.1;
 
 /// An axis that does not come to rest.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Hunt {
-    /// Half of what the cart goes to and fro, m; not a number where no slip was waited for.
+    /// Amplitude of the cart's oscillation, m; NaN if no slip was observed.
     pub amplitude: f64,
-    /// s; not a number where no slip was waited for.
+    /// Period, s; NaN if no slip was observed.
     pub period: f64,
-    /// Time from one slip, or burst of slips, to the next of an axis that is stuck between them, s: half of the time it
-    /// stands in spells of at least that length. Infinite where it swings all the time.
+    /// Time between slips, or bursts of slips, of an axis that is stuck between them, s: half of its time at rest is in
+    /// intervals of at least that length. Infinite if it always oscillates.
     pub slips_every: f64,
-    /// True if intervals from one swing to the next differ by more than a quarter of their mean.
+    /// True if the intervals between oscillations vary by more than a quarter of their mean.
     pub irregular: bool,
-    /// Without each of these it comes to rest.
+    /// Necessary causes: without each of these it comes to rest.
     pub needs: Vec<&'static str>,
-    /// How long it was watched at rest, s.
+    /// Observation time at rest, s.
     pub watched: f64,
 }
 
-/// Watches the closed loop after a slow reversal; none if the cart comes to rest. A loop that is not stable hunts as
-/// well, and needs nothing of what is listed.
+/// Observes the closed loop after a slow reversal; none if the cart comes to rest. An unstable loop hunts as well,
+/// without any of the listed causes.
 pub fn hunting(machine: &Machine, design: &Design) -> Result<Option<Hunt>> {
     let Some((hunt, start)) = hunts_from(machine, design)? else { return Ok(None) };
     let watched = watch(machine, design);
@@ -103,12 +106,12 @@ pub fn hunting(machine: &Machine, design: &Design) -> Result<Option<Hunt>> {
     Ok(Some(Hunt { needs, ..hunt }))
 }
 
-/// The limit cycle alone, without what it needs.
+/// The limit cycle without its causes.
 pub(super) fn hunts(machine: &Machine, design: &Design) -> Result<Option<Hunt>> {
     Ok(hunts_from(machine, design)?.map(|(hunt, _)| hunt))
 }
 
-/// The limit cycle, and the share of the way from which it was seen.
+/// The limit cycle, and the fraction of the stroke at which it was observed.
 fn hunts_from(machine: &Machine, design: &Design) -> Result<Option<(Hunt, f64)>> {
     for start in STARTS {
         if let Some(hunt) = hunts_at(machine, design, start)? {
@@ -118,7 +121,7 @@ fn hunts_from(machine: &Machine, design: &Design) -> Result<Option<(Hunt, f64)>>
     Ok(None)
 }
 
-/// The limit cycle after this share of the way.
+/// The limit cycle after this fraction of the stroke.
 fn hunts_at(machine: &Machine, design: &Design, start: f64) -> Result<Option<Hunt>> {
     let short = watch(machine, design);
     let first = seen(machine, design, machine, start, (short, 0.25 * short))?;
@@ -146,16 +149,16 @@ fn hunts_at(machine: &Machine, design: &Design, start: f64) -> Result<Option<Hun
     let second = seen(machine, design, machine, start, (watched, 0.25 * short))?;
     Ok(match (second.swing.or_else(|| widest(&second.slides, rare)), second.next(machine)) {
         (Some(swing), _) => Some(hunt(swing, watched)),
-        // It slips, though not often enough for a swing to be seen.
+        // It slips, but not often enough to observe an oscillation.
         (None, Some((next, _))) => Some(unseen(next, watched)),
         (None, None) => None,
     })
 }
 
 impl Hunt {
-    /// True if it hunts more than the other: where that one rests, or wider. Slips of the other that were not waited for
-    /// have an unknown size: a swing is more than these where it leaves the `window` (m) of a move, rarer slips never
-    /// are.
+    /// True if it hunts more than the other: if that one rests, or with a larger amplitude. Predicted slips of the
+    /// other have an unknown size: an oscillation counts as more if it leaves the `window` (m) of a move, rarer slips
+    /// never do.
     pub(super) fn is_more_than(&self, other: Option<&Hunt>, window: f64) -> bool {
         let Some(other) = other else { return true };
         match (self.amplitude.is_finite(), other.amplitude.is_finite()) {
@@ -165,7 +168,7 @@ impl Hunt {
         }
     }
 
-    /// Time from one slip to the next, or the period where the cart never stands, s.
+    /// Time between slips, or the period if the cart never rests, s.
     fn interval(&self) -> f64 {
         if self.slips_every.is_finite() { self.slips_every } else { self.period }
     }
@@ -182,13 +185,13 @@ fn friction(machine: &Machine, change: fn(&mut Side)) -> Machine {
     other
 }
 
-/// The design with its integral action times `factor`, none with 0; none without integral action.
+/// The design with its integral action multiplied by `factor`, removed if 0; none without integral action.
 pub(super) fn integral_times(design: &Design, factor: f64) -> Option<Design> {
     let structure = design.structure.tunable().integral_times(factor)?;
     Some(Design { structure, ..design.clone() })
 }
 
-/// How long to watch, s: some of the times in which the integral takes the command from one breakaway to the other.
+/// Observation time, s: a multiple of the time in which the integral moves the command from one breakaway to the other.
 fn watch(machine: &Machine, design: &Design) -> f64 {
     let rigid = Rigid::of(machine);
     let dry: f64 = rigid.coulomb.iter().sum();
@@ -196,7 +199,7 @@ fn watch(machine: &Machine, design: &Design) -> f64 {
         let length = if crate::control::measures_cart(machine) { 1.0 } else { machine.pulley_radius };
         length / encoder.counts_per_unit(machine.drives[0].motor.gear_ratio)
     });
-    // Force per second and metre of error that stays.
+    // Force per second and metre of constant error.
     let structure = design.structure.tunable();
     let force = if structure.commands_current() { rigid.force_per_ampere } else { rigid.force_per_command() };
     let rate = structure.ramp() * force;
@@ -204,8 +207,8 @@ fn watch(machine: &Machine, design: &Design) -> f64 {
     if ramp.is_finite() { (20.0 * ramp).clamp(4.0, LONGEST) } else { 10.0 }
 }
 
-/// A swing at rest: half of what the cart goes to and fro, m, how long that takes, s, and whether not always as long;
-/// and the time between slips of a cart that stands between them, s.
+/// An oscillation at rest: amplitude of the cart, m, period, s, true if irregular; and the time between slips of a cart
+/// that rests between them, s.
 #[derive(Clone, Copy)]
 struct Swing {
     amplitude: f64,
@@ -214,8 +217,8 @@ struct Swing {
     slips_every: f64,
 }
 
-/// A watched swing of what slides, its places (m) over time (s), and the command where it ended, with its slope where it
-/// is a ramp.
+/// A recorded oscillation of a sliding part, its positions (m) over time (s), and the final command, with its slope if
+/// it is a ramp.
 struct Seen {
     swing: Option<Swing>,
     slides: Vec<Vec<(f64, f64)>>,
@@ -224,8 +227,8 @@ struct Seen {
 }
 
 impl Seen {
-    /// How long it is until the command of a stuck axis has reached its breakaway, and how long it is from one
-    /// breakaway to the other, s; none where the command does not go there, and with several drives.
+    /// Time until the command of a stuck axis reaches its breakaway, and time from one breakaway to the other, s; none
+    /// if the command does not move towards it, or with several drives.
     fn next(&self, machine: &Machine) -> Option<(f64, f64)> {
         if machine.drives.len() > 1 {
             return None;
@@ -244,7 +247,7 @@ impl Seen {
     }
 }
 
-/// The slope of a command over time where it is a ramp: about the same in both halves.
+/// Slope of a command over time if it is a ramp, with similar slopes in both halves.
 fn slope(command: &[(f64, f64)]) -> Option<f64> {
     let [(t0, u0), (t1, u1), (t2, u2)] = [*command.first()?, *command.get(command.len() / 2)?, *command.last()?];
     let (early, late) = ((u1 - u0) / (t1 - t0), (u2 - u1) / (t2 - t1));
@@ -252,7 +255,7 @@ fn slope(command: &[(f64, f64)]) -> Option<f64> {
     ((1.0 / STEADY..=STEADY).contains(&ratio) && late.is_finite()).then_some(late)
 }
 
-/// Motion of the cart at rest after this share of the way, watched for this time, beginning this long after the
+/// Motion of the cart at rest after this fraction of the stroke, observed for this time, starting this long after the
 /// reversal, s.
 fn seen(
     machine: &Machine,
@@ -262,7 +265,7 @@ fn seen(
     (watched, skipped): (f64, f64),
 ) -> Result<Seen> {
     let limits = Limits { speed: SPEED, acceleration: 0.2, jerk: None, snap: None };
-    // From 0, to the side that has more room.
+    // From 0, towards the longer side of the travel.
     let reversal = |slide: &Slide| {
         let way = start
             * slide.travel.map_or(WAY, |travel| match travel.max >= -travel.min {
@@ -290,19 +293,19 @@ fn seen(
     };
     let (timing, solver) = (Loop::of(design), Solver::of(machine));
     let run = stream(machine, &mut each(&mut controllers), &timing, &profiles, &rows, solver, true, &mut take)?;
-    // The last eighth of the watch.
+    // The last eighth of the observation.
     let late = run.kept.iter().filter(|sample| sample.drive == 0 && sample.time >= until - 0.125 * watched);
     let command: Vec<(f64, f64)> = late.map(|sample| (sample.time, sample.given)).collect();
     let command_now = command.last().map_or(0.0, |(_, given)| *given);
     Ok(Seen { swing: widest(&slides, swung), slides, command: command_now, slope: slope(&command) })
 }
 
-/// The widest swing of what slides.
+/// The largest oscillation of the slides.
 fn widest(slides: &[Vec<(f64, f64)>], swing: fn(&[(f64, f64)]) -> Option<Swing>) -> Option<Swing> {
     slides.iter().filter_map(|places| swing(places)).max_by(|a, b| a.amplitude.total_cmp(&b.amplitude))
 }
 
-/// The swing of a cart of which place (m) over time (s) is known from a time on at which it should rest.
+/// Oscillation of a cart from its position (m) over time (s) after the time at which it should rest.
 fn swung(cart: &[(f64, f64)]) -> Option<Swing> {
     let (early, late) = cart.split_at(cart.len() / 2);
     let ends = |part: &[(f64, f64)]| {
@@ -310,11 +313,11 @@ fn swung(cart: &[(f64, f64)]) -> Option<Swing> {
     };
     let ((low, high), (early_low, early_high)) = (ends(late), ends(early));
     let (size, before) = (high - low, early_high - early_low);
-    // What trembles in the last digits rests, and what halves dies out.
+    // Motion in the last digits counts as rest, and motion that halves as decaying.
     if !(size > 1e-9 && size > 0.5 * before) {
         return None;
     }
-    // Crossings of the middle upward, with a band of a quarter each way.
+    // Upward crossings of the middle, with a hysteresis of a quarter to each side.
     let (mean, band) = (0.5 * (low + high), 0.25 * size);
     let mut below = false;
     let mut upward = Vec::new();
@@ -337,8 +340,8 @@ fn swung(cart: &[(f64, f64)]) -> Option<Swing> {
     }
 }
 
-/// The slips of a cart that now and then does not stay where it is, however long it stands between; none of one that
-/// moves twice at most, for that may be its way to rest.
+/// Slips of a cart that moves occasionally, with rests of any length between; none if it moves at most twice, since it
+/// may be coming to rest.
 fn rare(cart: &[(f64, f64)]) -> Option<Swing> {
     let (low, high) =
         cart.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), (_, x)| (low.min(*x), high.max(*x)));
@@ -347,8 +350,8 @@ fn rare(cart: &[(f64, f64)]) -> Option<Swing> {
     slips_every.is_finite().then_some(swing)
 }
 
-/// Time between the slips of a cart that stands most of the time, s: the median over the moments of the watch, so that
-/// slips which come in bursts are as far apart as the bursts. Infinite for a cart that does not stand.
+/// Time between the slips of a cart that is mostly at rest, s: median over the instants of the observation, so that
+/// bursts of slips count as one. Infinite for a cart that does not rest.
 fn slips(cart: &[(f64, f64)], size: f64) -> f64 {
     let moves = |pair: &&[(f64, f64)]| (pair[1].1 - pair[0].1).abs() > STILL * size;
     let moving: Vec<f64> = cart.windows(2).filter(moves).map(|pair| pair[1].0).collect();
@@ -376,7 +379,7 @@ mod tests {
     use super::*;
     use std::f64::consts::PI;
 
-    /// A cart that swings by `size(t)` to either side, a period after `lasts(k)` s.
+    /// A cart that oscillates with the amplitude `size(t)` and periods of `lasts(k)` s.
     fn cart(lasts: impl Fn(usize) -> f64, size: impl Fn(f64) -> f64) -> Vec<(f64, f64)> {
         let (mut all, mut begin) = (Vec::new(), 0.0);
         for k in 0..40 {
@@ -392,7 +395,7 @@ mod tests {
         all
     }
 
-    /// An axis that jumps now after half a second, now after three was told to swing every 1.7 s.
+    /// An axis that jumped after half a second or after three seconds was reported to oscillate every 1.7 s.
     #[test]
     fn swings_of_unequal_length_are_irregular() {
         let regular = swung(&cart(|k| 0.5 + 0.02 * (k % 3) as f64, |_| 1e-5)).unwrap();
@@ -402,7 +405,7 @@ mod tests {
         assert!(unequal.irregular, "{}", unequal.period);
     }
 
-    /// An axis that stood for a minute and more between bursts of slips was said to rest.
+    /// An axis that rested for more than a minute between bursts of slips was reported to be at rest.
     #[test]
     fn slips_far_apart_are_seen() {
         let place = |t: f64| if ((t / 25.0) as u64).is_multiple_of(2) { 4e-4 } else { -4e-4 };
@@ -418,9 +421,9 @@ mod tests {
         let bursts: Vec<(f64, f64)> = cart.iter().map(|(t, _)| (*t, 4e-4 * (step(*t) % 2.0))).collect();
         let every = slips(&bursts, 8e-4);
         assert!((every - 23.5).abs() < 0.4, "{every}");
-        // Two slips may be the way to rest.
+        // After two slips it may come to rest.
         assert!(rare(&cart[..7400]).is_none() && rare(&cart[..2000]).is_none());
-        // A ramp goes on, what levels off or chatters does not.
+        // A ramp continues; a command that levels off or chatters does not.
         let ramp =
             |of: &dyn Fn(f64) -> f64| slope(&(0..100).map(|k| (f64::from(k), of(f64::from(k)))).collect::<Vec<_>>());
         assert!(ramp(&|t| 0.5 - 1e-3 * t).is_some_and(|slope| (slope + 1e-3).abs() < 1e-12));

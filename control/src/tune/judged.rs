@@ -8,19 +8,18 @@ use super::objective::{AtWorst, MoveFigures};
 use crate::control::Deviation;
 use crate::design::Design;
 
-/// The verdict on a controller: on the axis of the file, and at worst over the family.
+/// The verdict on a controller: on the nominal machine, and in the worst case over the family.
 #[derive(Debug, Clone)]
 pub struct Verdict {
     /// The controller.
     pub design: Design,
-    /// Its margins on the nominal axis.
+    /// Its margins on the nominal machine.
     pub nominal: Margins,
-    /// The axis on which its sensitivity is furthest beyond its limits, or nearest to them, once the bad end is left
-    /// out.
+    /// The machine with the largest sensitivity relative to the limits, without the excluded ones.
     pub corner: Corner,
-    /// The margins there.
+    /// Margins on that machine.
     pub worst: Margins,
-    /// Axes on which it is not stable, and all of them.
+    /// Number of unstable machines, and of all machines.
     pub unstable: (usize, usize),
     /// ln J.
     pub objective: f64,
@@ -37,17 +36,17 @@ pub struct MoveVerdict {
     pub name: String,
     /// Distance from the target within which the cart counts as settled, m.
     pub window: f64,
-    /// x − y on the nominal axis.
+    /// x − y on the nominal machine.
     pub cart: Deviation,
-    /// Until the cart settles, s, if it does.
+    /// Settling time, s, if the cart settles.
     pub settling: Option<f64>,
-    /// Root mean square of the current, A.
+    /// RMS current, A.
     pub current: f64,
-    /// |x − y| at worst, m; and on which axis.
+    /// Worst-case |x − y|, m, and its machine.
     pub worst: (f64, String),
-    /// Axes on which it settles, and all of them.
+    /// Number of machines on which it settles, and of all machines.
     pub settled: (usize, usize),
-    /// All figures at worst.
+    /// All worst-case figures.
     pub at_worst: AtWorst,
     pub(super) seen: Vec<MoveFigures>,
 }
@@ -59,7 +58,7 @@ pub enum Judgement {
     Better,
     /// It is the same.
     Unchanged,
-    /// It settles on fewer axes, later, or errs more, in some move.
+    /// It settles on fewer machines, later, or with a larger error in some move.
     Worse,
 }
 
@@ -81,7 +80,7 @@ pub enum Limit {
     Sensitivity,
     /// M_t.
     Complementary,
-    /// The bandwidth that gains are placed for, without a search.
+    /// The bandwidth of the pole placement, without a search.
     Bandwidth,
 }
 
@@ -96,16 +95,16 @@ impl Limit {
     }
 }
 
-/// A figure of a move at worst over the family.
+/// A worst-case figure of a move over the family.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Figure {
     /// |x − y|, m.
     Error,
-    /// Until the cart settles, s.
+    /// Settling time, s.
     Settling,
-    /// Axes on which it settles.
+    /// Number of machines on which it settles.
     Settled,
-    /// Half of what the cart goes to and fro at rest, m; no figure of a move.
+    /// Amplitude of the cart's oscillation at rest, m; not a figure of a move.
     Hunting,
 }
 
@@ -121,24 +120,24 @@ impl Figure {
     }
 }
 
-/// The figure of all moves that is worse by most than before.
+/// The figure of all moves with the largest deterioration.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Worse {
-    /// The place of the move in the list; none of hunting.
+    /// Index of the move; none for hunting.
     pub motion: Option<usize>,
-    /// Which figure.
+    /// The figure.
     pub figure: Figure,
-    /// It, m, s or axes; 0 of an axis that rests, not a number of a slip that was not waited for.
+    /// Its value before, m, s or machines; 0 for an axis at rest, NaN for a slip that was not observed.
     pub before: f64,
-    /// It, m, s or axes; not a number of a slip that was not waited for.
+    /// Its value after, m, s or machines; NaN for a slip that was not observed.
     pub after: f64,
-    /// By what share of what it was, of a settling below 50 ms of these, of the axes those on which it settles no more;
-    /// infinite of hunting where it rested.
+    /// Relative deterioration; of a settling time below 50 ms relative to 50 ms, of machines the lost ones; infinite
+    /// for hunting after rest.
     pub by: f64,
 }
 
-/// Of all controllers within the limits that were judged on the whole family, that one whose worst figure is worse by
-/// least than before: what the limits cost at least, as far as the search has seen.
+/// The controller within the limits, among those judged on the complete family, whose worst figure deteriorates least:
+/// the least cost of the limits found by the search.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Least {
     /// It.
@@ -149,12 +148,12 @@ pub struct Least {
     pub objective: f64,
 }
 
-/// At which gains a limit stands that makes others worse than those of the file.
+/// Gains at which a limit that forces a deterioration is active.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Standing {
-    /// Where the way from what was found back to the file ends.
+    /// At the end of the path from the result back to the gains of the file.
     WayBack,
-    /// At the gains of the file themselves, which break it.
+    /// At the gains of the file themselves, which violate it.
     File,
 }
 
@@ -168,16 +167,16 @@ impl Standing {
     }
 }
 
-/// The limit that forces gains that are worse than those before.
+/// The limit that forces gains worse than before.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Forced {
     /// The limit.
     pub limit: Limit,
-    /// Where it stands.
+    /// Gains at which it is active.
     pub standing: Standing,
-    /// Where the loop is broken for it.
+    /// Its loop break.
     pub at: Break,
-    /// Where, Hz: the mode of the axis that stands there, or the top itself.
+    /// Its frequency, Hz: of the mode there, or of the peak itself.
     pub mode: f64,
     /// Cart position, m.
     pub place: f64,

@@ -1,8 +1,8 @@
-//! The loops of a controller at one frequency, each broken at another place.
+//! Loops of a controller at one frequency, broken at different points.
 //!
-//! With the commands u and what is measured, the positions y, a scale x beside them and the currents i, the controllers
-//! of all drives, which are alike, are D u = −(N_y y + N_x x + N_i i) and the machine y = G_y u, x = G_x u, i = G_i u:
-//! numbers for one drive, matrices for several. With P_k = N_k G_k,
+//! With the commands u, the measured positions y, a scale x and the currents i, the equal controllers of all drives are
+//! D u = −(N_y y + N_x x + N_i i) and the machine y = G_y u, x = G_x u, i = G_i u: numbers for one drive, matrices for
+//! several. With P_k = N_k G_k,
 //!
 //! ```text
 //! Δ = D + Σ P_k
@@ -10,21 +10,21 @@
 //! broken at measurements k:     L = P_k (Δ − P_k)⁻¹,      S = (Δ − P_k) Δ⁻¹
 //! ```
 //!
-//! All have the same closed loop, det Δ = 0, and margins of their own. With a single measurement of a single drive both
-//! are the same loop. Of several drives |S| and |T| are the largest singular values, and the loop of one drive with
-//! those of the others closed is L_j = T_jj/S_jj.
+//! All have the same closed loop, det Δ = 0, but different margins. With a single measurement of a single drive both
+//! are the same loop. For several drives |S| and |T| are the largest singular values, and the loop of one drive with
+//! the others closed is L_j = T_jj/S_jj.
 
 use super::plant::{Answer, Plant, Sampled, Square, by_drives};
 use crate::control::feedback::{Feedback, Turn};
 use crate::mechanism::DRIVES;
 use nalgebra::{Complex, SMatrix};
 
-/// Where a loop is broken.
+/// Point at which a loop is broken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Break {
-    /// Where the command enters the axis.
+    /// At the command.
     Command,
-    /// At the measured position: of the encoder.
+    /// At the position measured by the encoder.
     Position,
     /// At the scale beside the encoder.
     Scale,
@@ -44,8 +44,8 @@ impl Break {
     }
 }
 
-/// The places at which the loop of a controller differs: the command and every measurement that it uses; the command
-/// alone where it uses one.
+/// The points at which the loop of a controller differs: the command and every measurement that it uses; the command
+/// alone for a single measurement.
 pub fn breaks(feedback: &Feedback) -> &'static [Break] {
     match (feedback.uses_scale(), feedback.uses_current()) {
         (false, false) => &[Break::Command],
@@ -67,7 +67,7 @@ pub(super) struct Open<const N: usize> {
     pub difference: Complex<f64>,
     /// True if the position loop is closed at a scale.
     has_scale: bool,
-    /// The positions of what slides per position that follows the reference, and per step beside the command.
+    /// Slide positions per position that follows the reference, and per disturbance at the command.
     slides: Square<N>,
     pub pushed: Square<N>,
     /// Travel of each drive's part of the belt per travel of each sliding part.
@@ -82,17 +82,17 @@ impl<const N: usize> Open<N> {
         // Δ = D + P_y + P_x + P_i
         let whole = diagonal(own) + parts[0] + parts[1] + parts[2];
         let (adjugate, difference) = inverse(&whole);
-        // x = G_x D Δ⁻¹ v for a step v beside the command
+        // x = G_x D Δ⁻¹ v for a disturbance v at the command
         let pushed = over(&(answer.slides * own), &adjugate, difference);
         let has_scale = feedback.uses_scale();
-        // What follows the reference is the cart itself where it is measured.
+        // With a scale, the cart itself follows the reference.
         let follows = if has_scale { answer.slides } else { answer.position };
         let (turned, size) = inverse(&follows);
         let slides = over(&answer.slides, &turned, size);
         Self { own, parts, adjugate, difference, has_scale, slides, pushed, shares: sampled.shares }
     }
 
-    /// The two parts of Δ: what is closed inside the loop broken there, and the loop itself.
+    /// The two parts of Δ: the loops closed inside the broken one, and the broken loop itself.
     fn parted(&self, at: Break) -> [Square<N>; 2] {
         let (own, [y, x, i]) = (diagonal(self.own), self.parts);
         match at {
@@ -113,7 +113,7 @@ impl<const N: usize> Open<N> {
         if self.has_scale { Break::Scale } else { Break::Position }
     }
 
-    /// L of a drive broken there, the loops of the others being closed.
+    /// L of a drive broken there, with the loops of the others closed.
     pub fn broken_at(&self, at: Break, drive: usize) -> Complex<f64> {
         let [inner, outer] = self.closed(at);
         outer[(drive, drive)] / inner[(drive, drive)]
@@ -129,7 +129,7 @@ impl<const N: usize> Open<N> {
         largest(&(self.closed(at)[1] / self.difference))
     }
 
-    /// |S|² and |T|², of the worst of these breaks each.
+    /// |S|² and |T|², each at the worst of these breaks.
     pub fn squares(&self, breaks: &[Break]) -> [f64; 2] {
         let least = self.difference.norm_sqr().recip();
         let mut most = [0.0_f64; 2];
@@ -146,8 +146,8 @@ impl<const N: usize> Open<N> {
         self.sensitivity(self.outer())
     }
 
-    /// T x/y: from the references of the sliding parts to their positions, without feed-forward. Of parts that a machine
-    /// with more drives than these does not have it is 1.
+    /// T x/y: from the references of the sliding parts to their positions, without feed-forward. 1 for parts that the
+    /// machine does not have.
     pub fn reference_to_slides(&self) -> Square<N> {
         let mut all = self.slides * (self.closed(self.outer())[1] / self.difference) * self.shares;
         for slide in (0..N).filter(|&slide| self.shares.column(slide).iter().all(|share| *share == Complex::ZERO)) {
@@ -156,7 +156,7 @@ impl<const N: usize> Open<N> {
         all
     }
 
-    /// True if `other` is turned by more than `most` from this in any of the loops.
+    /// True if the phase of `other` differs by more than `most` from this in any of the loops.
     pub fn turns(&self, other: &Self, breaks: &[Break], most: f64) -> bool {
         let turns = |a: Complex<f64>, b: Complex<f64>| (b / a).arg().abs() > most;
         turns(self.difference, other.difference)
@@ -206,7 +206,7 @@ pub(crate) fn largest<const N: usize>(a: &Square<N>) -> f64 {
     if N == 1 { a[(0, 0)].norm() } else { largest_square(a).sqrt() }
 }
 
-/// Its square: of two rows (‖A‖² + √(‖A‖⁴ − 4 |det A|²))/2 with the sum ‖A‖² of all squares.
+/// Its square: for two rows (‖A‖² + √(‖A‖⁴ − 4 |det A|²))/2 with the sum ‖A‖² of all squares.
 fn largest_square<const N: usize>(a: &Square<N>) -> f64 {
     if N == 1 {
         return a[(0, 0)].norm_sqr();
@@ -217,18 +217,18 @@ fn largest_square<const N: usize>(a: &Square<N>) -> f64 {
     let sum: f64 = a.iter().map(Complex::norm_sqr).sum();
     let [first, second] = [0, 1].map(|row| a[(row, 0)].norm_sqr() + a[(row, 1)].norm_sqr());
     let inner = a[(0, 0)] * a[(1, 0)].conj() + a[(0, 1)] * a[(1, 1)].conj();
-    // The same root without the loss of a difference.
+    // The same root without cancellation.
     0.5 * (sum + ((first - second).powi(2) + 4.0 * inner.norm_sqr()).sqrt())
 }
 
-/// The largest eigenvalue of H = A Aᴴ of three rows: with q = tr H/3, p² = tr (H − q)²/6 and r = det ((H − q)/p)/2 it is
-/// q + 2 p cos (acos(r)/3).
+/// The largest eigenvalue of H = A Aᴴ of three rows: with q = tr H/3, p² = tr (H − q)²/6 and r = det ((H − q)/p)/2 it
+/// is q + 2 p cos (acos(r)/3).
 fn largest_of_three(a: &Square<3>) -> f64 {
     let mut h = a * a.adjoint();
     let q = h.trace().re / 3.0;
     (0..3).for_each(|k| h[(k, k)] -= q);
     let p = (h.iter().map(Complex::norm_sqr).sum::<f64>() / 6.0).sqrt();
-    // Three that are alike, or no numbers.
+    // Three equal ones, or NaN.
     if p.is_nan() || p <= f64::MIN_POSITIVE {
         return q + p;
     }
@@ -245,7 +245,7 @@ pub(crate) fn smallest<const N: usize>(a: &Square<N>) -> f64 {
     determinant.norm() / largest(&adjugate)
 }
 
-/// The loops broken at one place, at one frequency.
+/// The loops broken at one point, at one frequency.
 #[derive(Debug, Clone, Copy)]
 pub struct Broken {
     /// Where.
@@ -254,12 +254,12 @@ pub struct Broken {
     pub sensitivity: f64,
     /// |T|.
     pub complementary: f64,
-    /// L of each drive, the loops of the others being closed.
+    /// L of each drive, with the loops of the others closed.
     pub drives: [Complex<f64>; DRIVES],
 }
 
-/// The loops at one frequency: at each of [`breaks`], and from the reference of each part that slides to that part,
-/// without feed-forward.
+/// The loops at one frequency: at each of [`breaks`], and from the reference of each slide to its position, without
+/// feed-forward.
 #[derive(Debug, Clone)]
 pub struct Loops {
     /// In the order of [`breaks`].
@@ -269,11 +269,11 @@ pub struct Loops {
 }
 
 impl Loops {
-    /// L of a drive broken there, the loops of the others being closed.
+    /// L of a drive broken there, with the loops of the others closed.
     ///
     /// # Panics
     ///
-    /// Where the controller's loop is not broken.
+    /// If the controller's loop is not broken there.
     pub fn broken_at(&self, at: Break, drive: usize) -> Complex<f64> {
         self.broken.iter().find(|broken| broken.at == at).expect("a break of this controller").drives[drive]
     }
@@ -289,9 +289,9 @@ impl Loops {
     }
 }
 
-/// Motion per value beside the commands, m per V or A, at ω, rad/s: responses of the closed loop. A column for the
-/// commands of all drives in proportion to the travel of their belts when one part alone slides; rows of the positions
-/// of all that slides, and of where the drives' measurements have it. There are M such parts.
+/// Closed-loop response to disturbances at the commands, m per V or A, at ω, rad/s. A column for the commands of all
+/// drives in proportion to the travel of their belts when one slide moves alone; rows for the positions of all slides,
+/// true and by the drives' measurements. M is the number of slides.
 pub fn from_commands<const M: usize>(
     plant: &Plant,
     feedback: &Feedback,

@@ -1,17 +1,17 @@
-//! Margins of a sampled loop: what its sensitivity is over all frequencies, and whether it is stable.
+//! Margins of a sampled loop: sensitivity over all frequencies, and stability.
 //!
-//! The loop is broken where the command enters the axis and, where the controller uses more than one measurement, at
-//! each of them, the others being closed (`loops.rs`); of every figure the worst break counts. Held commands, delay and
-//! filters are in it exactly.
+//! The loop is broken at the command and, if the controller uses more than one measurement, at each of them, with the
+//! others closed (`loops.rs`); the worst break counts for every figure. Held commands, delay and filters are included
+//! exactly.
 //!
-//! The loops of several drives are one: they are stable if det (1 + L) says so, and |S| and |T| are largest singular
-//! values. Gain and phase margin are those of one drive's loop with the others closed, as one measures them, the worst
-//! of all.
+//! The loops of several drives form one loop: it is stable if det (1 + L) satisfies Nyquist's criterion, and |S| and
+//! |T| are largest singular values. Gain and phase margin are the worst of one drive's loop with the others closed, as
+//! in a measurement.
 //!
-//! The peaks of |S| and |T| stand at poles of the closed loop, which no grid knows beforehand. So a grid that is dense
-//! about the poles of the axis is first divided wherever one L or 1 + L turns by much from one point to the next, which
-//! it does about every lightly damped pole of the closed loop; then every local maximum is followed to its top, and every
-//! crossing to where it is.
+//! The peaks of |S| and |T| are at poles of the closed loop, which are unknown to the grid. So a grid that is dense
+//! around the poles of the axis is first refined wherever the phase of one L or 1 + L changes much from one point to
+//! the next, as it does around every lightly damped pole of the closed loop; then every local maximum and every
+//! crossing is located exactly.
 
 use super::loops::{Break, Open, breaks, smallest};
 use super::plant::{Plant, Sampled, Square, by_drives};
@@ -21,90 +21,90 @@ use crate::machine::Kind;
 use nalgebra::Complex;
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
-/// Angle by which L or 1 + L may turn from one point to the next, rad.
+/// Largest phase change of L or 1 + L from one point to the next, rad.
 const TURN: f64 = 0.4;
 
-/// Points that are added at most, and the least share of a frequency by which two differ.
+/// Maximum number of added points, and the least relative distance of two frequencies.
 const ADDED: usize = 4000;
 const NEAREST: f64 = 1e-12;
 
-/// From where on a disturbance counts, Hz.
+/// Lowest frequency of a disturbance, Hz.
 const SLOWEST: f64 = 0.1;
 
-/// Steps of a search for a top or a crossing.
+/// Steps of a search for a maximum or a crossing.
 const STEPS: usize = 60;
 
-/// Imaginary part of an L that counts as real, relative, and how far |L| may differ between the lowest two frequencies
-/// and be level towards zero, relative.
+/// Relative imaginary part of an L that counts as real, and relative difference of |L| between the lowest two
+/// frequencies that counts as constant towards zero.
 const REAL: f64 = 1e-6;
 const LEVEL: f64 = 1e-6;
 
-/// Local maxima below this share of the highest one are left as the grid has them.
+/// Local maxima below this fraction of the highest one are not refined.
 const HIGH: f64 = 0.7;
 
 /// The break at which each margin is worst.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Breaks {
-    /// Of M_s.
+    /// Break of M_s.
     pub sensitivity: Break,
-    /// Of M_t.
+    /// Break of M_t.
     pub complementary: Break,
-    /// Of the gain margin.
+    /// Break of the gain margin.
     pub gain: Break,
-    /// Of the phase margin.
+    /// Break of the phase margin.
     pub phase: Break,
-    /// The drive whose gain margin is the least, by number.
+    /// Index of the drive with the smallest gain margin.
     pub gain_drive: usize,
-    /// The drive whose phase margin is the least.
+    /// Index of the drive with the smallest phase margin.
     pub phase_drive: usize,
 }
 
-/// The margins of a sampled loop, each at the break at which it is worst.
+/// Margins of a sampled loop, each at its worst break.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Margins {
     /// True if every pole of the closed loop lies within the unit circle, by Nyquist's criterion.
     pub stable: bool,
     /// M_s = max |S|, S = 1/(1 + L); infinite if it is not stable.
     pub sensitivity: f64,
-    /// Where, rad/s; where |S| is largest in a loop that is not stable, too: there it swings.
+    /// Its frequency, rad/s; also the frequency of the largest |S| of an unstable loop, at which it oscillates.
     pub at: f64,
     /// M_t = max |T|, T = L/(1 + L).
     pub complementary: f64,
-    /// Where, rad/s.
+    /// Its frequency, rad/s.
     pub complementary_at: f64,
-    /// Factor by which the gain can grow until the loop swings.
+    /// Gain margin: factor on the gain at the stability limit.
     pub gain: f64,
-    /// Angle between L and −1 where |L| = 1, rad.
+    /// Phase margin: angle between L and −1 at |L| = 1, rad.
     pub phase: f64,
-    /// Where these are worst.
+    /// Breaks at which these are worst.
     pub breaks: Breaks,
-    /// True if the loop is the same wherever it is broken: the controller of a drive uses a single measurement.
+    /// True if the loop is the same at every break, since the controller of a drive uses a single measurement.
     pub has_one_loop: bool,
     /// The kind of machine, whose drives these are.
     pub kind: Kind,
-    /// Where |L| of the loop that follows the reference falls below 1, the first time, rad/s.
+    /// First frequency at which |L| of the loop that follows the reference falls below 1, rad/s.
     pub crossover: f64,
-    /// Where |S| of that loop rises above 1/√2, the first time, rad/s.
+    /// First frequency at which |S| of that loop rises above 1/√2, rad/s.
     pub bandwidth: f64,
-    /// Where the way from the reference to the cart, T x/y without feed-forward, falls below 1/√2, the first time,
+    /// First frequency at which the response from reference to cart, T x/y without feed-forward, falls below 1/√2,
     /// rad/s.
     pub tracking: f64,
     /// √(1/π ∫ |S G/ω|² dω) from 2π 0.1 Hz on: root of the integral over time of the squared cart position, m √s, after
     /// a step of 1 V or 1 A at the command.
     pub disturbance: f64,
-    /// √(1/π ∫ |S/ω|² dω) from 2π 0.1 Hz on, √s: the same of the error after a step of 1 m of the reference, per metre,
+    /// √(1/π ∫ |S/ω|² dω) from 2π 0.1 Hz on, √s: the same for the error after a reference step of 1 m, per metre,
     /// without feed-forward.
     pub following: f64,
 }
 
 impl Margins {
-    /// The name of a drive, where there are several.
+    /// Name of a drive, if there are several.
     pub fn drive_name(&self, drive: usize) -> Option<&'static str> {
         let drives = self.kind.geometry().drives;
         if drives.len() > 1 { Some(drives[drive].label.name) } else { None }
     }
 
-    /// Of a controller on an axis; peaks and crossings where they are, not where a grid has a point.
+    /// Margins of a controller on an axis, with exact peaks and crossings.
     pub fn of(plant: &Plant, feedback: &Feedback) -> Self {
         let mut margins = by_drives!(plant, |sampled| {
             let mut curve = Curve::on_grid(plant, sampled, feedback);
@@ -125,19 +125,19 @@ impl Margins {
         (self.bandwidth, self.tracking) = (f64::NAN, f64::NAN);
     }
 
-    /// How far it is beyond its limits: above 1 it passes one. What is no number passes them by far.
+    /// Largest figure relative to its limit: above 1 a limit is exceeded. NaN counts as far beyond.
     pub fn excess(&self, sensitivity: f64, complementary: f64) -> f64 {
         beyond([self.sensitivity, self.complementary], [sensitivity, complementary])
     }
 }
 
-/// The larger of two peaks, each as part of its limit.
+/// The larger of two peaks, each relative to its limit.
 fn beyond(peaks: [f64; 2], limits: [f64; 2]) -> f64 {
     let excess = (peaks[0] / limits[0]).max(peaks[1] / limits[1]);
     if excess.is_nan() { f64::INFINITY } else { excess }
 }
 
-/// M_s and M_t of a loop, both infinite if it is not stable: all of [`Margins`] that limits are asked of.
+/// M_s and M_t of a loop, both infinite if it is unstable: the part of [`Margins`] that has limits.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Peaks {
     /// M_s and M_t.
@@ -145,7 +145,7 @@ pub struct Peaks {
 }
 
 impl Peaks {
-    /// Of a controller on an axis, the same as those of [`Margins::of`].
+    /// Peaks of a controller on an axis, equal to those of [`Margins::of`].
     pub fn of(plant: &Plant, feedback: &Feedback) -> Self {
         let (peaks, is_stable) = by_drives!(plant, |sampled| {
             let mut curve = Curve::on_grid(plant, sampled, feedback);
@@ -161,16 +161,16 @@ impl Peaks {
         self.peaks[0].is_finite()
     }
 
-    /// How far they are beyond their limits: above 1 one passes.
+    /// Largest peak relative to its limit: above 1 a limit is exceeded.
     pub fn excess(&self, sensitivity: f64, complementary: f64) -> f64 {
         beyond(self.peaks, [sensitivity, complementary])
     }
 }
 
-/// A loop on the grid alone, in one pass: its peaks may be higher by some per cent.
+/// A loop on the grid alone, in one pass: true peaks may be higher by some per cent.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rough {
-    /// M_s and M_t; infinite if it is not stable.
+    /// M_s and M_t; infinite if it is unstable.
     pub peaks: Peaks,
     /// As of [`Margins`].
     pub disturbance: f64,
@@ -179,7 +179,7 @@ pub struct Rough {
 }
 
 impl Rough {
-    /// Of a controller on an axis.
+    /// Rough margins of a controller on an axis.
     pub fn of(plant: &Plant, feedback: &Feedback) -> Self {
         by_drives!(plant, |sampled| Self::of_sampled(plant, sampled, feedback))
     }
@@ -223,7 +223,7 @@ struct Curve<'a, const N: usize> {
     points: Vec<(f64, Open<N>)>,
 }
 
-/// A top of |S| or |T|.
+/// A maximum of |S| or |T|.
 #[derive(Clone, Copy)]
 struct Top {
     value: f64,
@@ -232,7 +232,7 @@ struct Top {
     at: Break,
 }
 
-/// Value of a loop broken at one place.
+/// Value of a loop broken at one point.
 type Of<const N: usize> = fn(&Open<N>, Break) -> f64;
 
 /// Σ |a|² over a matrix.
@@ -251,7 +251,7 @@ impl<'a, const N: usize> Curve<'a, N> {
         Open::of(self.sampled, &self.sampled.at(omega), self.feedback, &Turn::of(omega, self.plant.every))
     }
 
-    /// Puts points between those from one of which to the next one L or 1 + L turns by more than [`TURN`].
+    /// Adds points between those whose L or 1 + L differ in phase by more than [`TURN`].
     fn divide(&mut self) {
         let turns = |a: &Open<N>, b: &Open<N>| a.turns(b, self.breaks, TURN);
         let mut done: Vec<(f64, Open<N>)> = Vec::with_capacity(2 * self.points.len());
@@ -279,7 +279,7 @@ impl<'a, const N: usize> Curve<'a, N> {
         winding.is_stable()
     }
 
-    /// The margins of the curve, with every top and crossing followed to where it is.
+    /// Margins of the curve, with every maximum and crossing located exactly.
     fn margins(&self) -> Margins {
         let stable = self.is_stable();
         let (top, complementary) = (self.highest(Open::sensitivity), self.highest(Open::complementary));
@@ -333,7 +333,7 @@ impl<'a, const N: usize> Curve<'a, N> {
         margins
     }
 
-    /// Gain and phase margin of a drive's loop broken there, where they are less than those of other breaks and drives.
+    /// Updates gain and phase margin by a drive's loop broken there, if they are smaller.
     fn cross(&self, at: Break, drive: usize, margins: &mut Margins) {
         let of = |open: &Open<N>| open.broken_at(at, drive);
         // −L on the positive real axis
@@ -356,7 +356,7 @@ impl<'a, const N: usize> Curve<'a, N> {
                 }
             }
         }
-        // At half the sampling rate L is real; so it is at zero frequency where it neither grows nor falls towards it.
+        // L is real at half the sampling rate, and at zero frequency if it is constant towards it.
         let is_real = |l: Complex<f64>| l.im.abs() <= REAL * l.norm();
         if let Some(last) = self.points.last().map(|(_, open)| of(open)).filter(|l| is_real(*l)) {
             grow(-last.re);
@@ -396,7 +396,7 @@ impl<'a, const N: usize> Curve<'a, N> {
         best
     }
 
-    /// The top between two frequencies, by the golden section.
+    /// Maximum between two frequencies, by golden section.
     fn top(&self, mut low: f64, mut high: f64, value: &dyn Fn(&Open<N>) -> f64) -> (f64, f64) {
         let share = 0.5 * (5f64.sqrt() - 1.0);
         let look = |omega: f64| (value(&self.at(omega)), omega);
@@ -416,11 +416,11 @@ impl<'a, const N: usize> Curve<'a, N> {
         if left.0 > right.0 { left } else { right }
     }
 
-    /// Where a quantity passes zero between two points.
+    /// Zero of a quantity between two points.
     fn crossing(&self, pair: &[(f64, Open<N>)], of: &dyn Fn(&Open<N>) -> f64) -> (f64, Open<N>) {
         let (mut low, mut high) = ((pair[0], of(&pair[0].1)), (pair[1], of(&pair[1].1)));
         for step in 0..STEPS {
-            // The straight line, and every other time the middle.
+            // Linear interpolation, alternating with bisection.
             let line = (low.1 / (low.1 - high.1)).clamp(0.0, 1.0);
             let share = if step % 2 == 1 || !line.is_finite() { 0.5 } else { line };
             let omega = low.0.0 + share * (high.0.0 - low.0.0);

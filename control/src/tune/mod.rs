@@ -1,8 +1,8 @@
-//! Gains and filters for a structure, by the moves they make: settling, error and current at worst over a family of
-//! machines that can be, while the sensitivity of the sampled loop stays within its limits there.
+//! Tuning of gains and filters of a structure by simulated moves: worst-case settling, error and current over a family
+//! of machines, subject to limits on the sensitivity of the sampled loop.
 //!
-//! The recipe is [`tune`]; [`evaluate`] judges without a search. What is found is rounded to four digits, and
-//! everything that is said holds for the rounded gains.
+//! The procedure is [`tune`]; [`evaluate`] judges without a search. Gains are rounded to four digits, and all results
+//! hold for the rounded gains.
 
 mod ahead;
 mod by_moves;
@@ -61,7 +61,7 @@ use work::{Finalist, Work};
 /// Maximum rounds of the constrained search, in which no figure may be worse.
 const KEPT: usize = 6;
 
-/// Of these, how many look nearby with the simplex before differential evolution does.
+/// Number of these that search nearby with the simplex before differential evolution.
 const NEARBY: usize = 2;
 
 /// Penalty slopes d ln J / d ln(error/error_before), and with respect to a later settling relative to the duration of
@@ -70,49 +70,49 @@ const NEARBY: usize = 2;
 const SOFT: f64 = 3.0;
 const HARD: f64 = 30.0;
 
-/// Factor by which integral action is made less where a loop hunts more than before, and least of it.
+/// Factor on the integral action of a loop that hunts more than before, and its lower bound.
 const CALMER: f64 = 0.4;
 const CALMEST: f64 = 0.01;
 
-/// The name of what was taken where no balance chose it.
+/// Name of the chosen design if no balance selected it.
 const CHOSEN: &str = "chosen";
 
 /// The result of a tuning.
 #[derive(Debug, Clone)]
 pub struct Tuned {
-    /// The loop as the file has it.
+    /// The loop with the gains of the file.
     pub before: Verdict,
-    /// As it was tuned.
+    /// The tuned loop.
     pub after: Verdict,
     /// The judgement.
     pub judgement: Judgement,
-    /// Advice if it is worse, where there is any.
+    /// Advice if it is worse, if any.
     pub advice: Option<String>,
-    /// The feed-forward that makes the moves better than the gains alone, if one does.
+    /// Feed-forward that improves the moves beyond the gains alone, if any.
     pub ahead: Option<Ahead>,
-    /// The limit that makes it worse; some wherever it is worse.
+    /// The limit that forces it to be worse; always present if it is worse.
     pub forced: Option<Forced>,
-    /// Where it is worse: what comes nearest to being no worse.
+    /// If it is worse, the gains that deteriorate least.
     pub least: Option<Least>,
-    /// The choices between stiff and gentle, what was chosen among them.
+    /// Choices between stiff and gentle, with the selected one among them.
     pub choices: Vec<Choice>,
-    /// Bandwidth that the search began with, Hz; none where it began with weights, or did not search.
+    /// Bandwidth at the start of the search, Hz; none if it began with weights, or without a search.
     pub placed: Option<f64>,
-    /// The axes that were looked at.
+    /// The family of machines.
     pub family: Family,
     /// The moves, those of the file or a standard set.
     pub moves: Vec<Move>,
-    /// True if the limits of sensitivity hold at worst.
+    /// True if the limits of sensitivity hold in the worst case.
     pub holds: bool,
-    /// Rounds, and designs that were tried; none of an evaluation.
+    /// Number of rounds, and of tried designs; zero for an evaluation.
     pub work: (usize, usize),
-    /// Samples of moves that the search simulated.
+    /// Samples of moves simulated by the search.
     pub samples: u64,
-    /// The first mode of a belt that has no damping at all, Hz.
+    /// First mode of a belt without any damping, Hz.
     pub undamped: Option<f64>,
-    /// Modes of the axis that a command swings, each in the middle of where it goes along the travel, Hz.
+    /// Modes excited by a command, each at the middle of its range along the travel, Hz.
     pub modes: Vec<f64>,
-    /// True if gains were looked for, and not judged alone.
+    /// True if gains were searched for, not only judged.
     pub searched: bool,
 }
 
@@ -125,9 +125,9 @@ pub struct Choice {
     pub design: Design,
     /// ln J by the balance of the search.
     pub objective: f64,
-    /// Its moves at worst.
+    /// Worst case of its moves.
     pub worst: Vec<AtWorst>,
-    /// True if this is what was chosen.
+    /// True for the selected design.
     pub chosen: bool,
 }
 
@@ -139,7 +139,7 @@ pub fn evaluate(case: &Case, tuning: &Tuning) -> Result<Tuned> {
     Ok(Tuned { searched: false, ..ended(&work, before.clone(), (before, None), Vec::new(), None)? })
 }
 
-/// Tunes the controller of a case; `stop` is asked now and then, and ends a search early with the best so far.
+/// Tunes the controller of a case; `stop` is called occasionally, and ends a search early with the best so far.
 ///
 /// ```no_run
 /// use taut::case::Case;
@@ -199,7 +199,7 @@ pub fn tune(case: &Case, tuning: &Tuning, stop: &dyn Fn() -> bool) -> Result<Tun
             (after.clone(), forced, marked(choices, &after))
         }
     };
-    // What is no better stays as it was.
+    // Keeps the gains of the file unless the result is better.
     let after = if is_good && compare(&before, &after) != Judgement::Better { before.clone() } else { after };
     let tuned = ended(&work, before, (after, forced), choices, placed)?;
     Ok(Tuned { ahead: work.ahead(&tuned.after)?, ..tuned })
@@ -222,8 +222,8 @@ fn beginning<'a>(case: &'a Case, tuning: &Tuning) -> Result<(&'a Design, Family,
 }
 
 impl Work<'_> {
-    /// The design that is best by the objective over all machines, one that makes no move worse before any other; and
-    /// what other balances choose.
+    /// The best design by the objective over all machines, preferring one that makes no move worse; and the choices of
+    /// other balances.
     fn chosen(
         &mut self,
         archive: &[Tried],
@@ -258,7 +258,7 @@ impl Work<'_> {
             };
             choices.push(Choice { name: balance.name, design, objective: value, worst, chosen: false });
         }
-        // Of each balance the last: that without bars.
+        // The last choice of each balance, without bars.
         choices.reverse();
         let mut names = Vec::new();
         choices.retain(|choice| {
@@ -270,7 +270,7 @@ impl Work<'_> {
         let own = before.design.filters.len();
         let whole = after.design.clone();
         let after = self.pruned(after, own, &|was, is| !rank(is).0 || rank(was).0)?;
-        // What added filters were taken from stands as it is now.
+        // Adopts the design without superfluous filters.
         if whole != after.design {
             choices.retain(|choice| choice.design != whole);
         }
@@ -280,8 +280,8 @@ impl Work<'_> {
 }
 
 impl Work<'_> {
-    /// The best design with no figure worse than before, by differential evolution in the layouts of filters that came
-    /// nearest to that; each time on the machines, too, on which a figure was worse.
+    /// The best design with no figure worse than before, by differential evolution in the nearest filter layouts; each
+    /// round also uses the machines on which a figure was worse.
     fn kept(
         &mut self,
         finalists: &[Finalist],
@@ -295,7 +295,7 @@ impl Work<'_> {
         let bars = Some(Bars { figures: &figures, steep: HARD });
         let weighed = Weighed { cost, bars };
         let mut latest = after.clone();
-        // What makes no figure worse may cost once more as much.
+        // This search gets the budget once more.
         self.grant();
         for round in 0..KEPT {
             if (self.stop)() || self.is_spent() {
@@ -326,7 +326,7 @@ impl Work<'_> {
     }
 }
 
-/// Addition for a PID controller without a derivative whose gains are not sufficient.
+/// Advice for a PID controller without derivative whose gains do not suffice.
 fn without_derivative(case: &Case, design: &Design) -> Option<String> {
     if !design.structure.tunable().lacks_damping() {
         return None;
@@ -336,7 +336,7 @@ fn without_derivative(case: &Case, design: &Design) -> Option<String> {
 }
 
 impl Work<'_> {
-    /// Where gains are worse by hunting alone, the same with less integral action, if no figure is worse with that.
+    /// If gains are worse by hunting alone, the same gains with less integral action, if no figure is worse with them.
     fn calmer(&mut self, before: &Verdict, after: Verdict) -> Result<Verdict> {
         let is_calm = worse(before, &after).is_none_or(|worse| worse.figure != Figure::Hunting);
         let mut factor = CALMER;
@@ -355,7 +355,7 @@ impl Work<'_> {
     }
 }
 
-/// The choices with that one marked which was taken, and with a row of its own if it is none of them.
+/// The choices with the selected one marked, which gets its own row if it is none of them.
 fn marked(mut choices: Vec<Choice>, after: &Verdict) -> Vec<Choice> {
     for choice in &mut choices {
         choice.chosen = choice.design == after.design;
@@ -368,7 +368,7 @@ fn marked(mut choices: Vec<Choice>, after: &Verdict) -> Vec<Choice> {
     choices
 }
 
-/// All of it, told; with the limit that forces it to be worse, where one does.
+/// The complete result, with the limit that forces it to be worse, if any.
 fn ended(
     work: &Work,
     before: Verdict,
@@ -415,13 +415,13 @@ impl Tuned {
         gains(&self.before.design, &self.family.machine).into_iter().map(|gain| (gain.clone(), now(gain.key))).collect()
     }
 
-    /// The filters of the command as the case file has them, before and after, where they are not the same.
+    /// Filters of the command in the notation of the case file, before and after, if they differ.
     pub fn filters(&self) -> Option<[String; 2]> {
         let [before, after] = [&self.before, &self.after].map(|verdict| &verdict.design.filters);
         (before != after).then(|| [before, after].map(|filters| gains::filters_text(filters)))
     }
 
-    /// The text of the case with the tuned gains, its remarks left alone; `name` stands in messages.
+    /// The case text with the tuned gains, comments unchanged; `name` is used in messages.
     pub fn case_text(&self, case: &Case, name: &Path) -> Result<String> {
         let mut changes: Vec<String> =
             self.changes().into_iter().map(|(gain, value)| format!("{}={value} {}", gain.key, gain.unit)).collect();

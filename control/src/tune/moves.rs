@@ -1,4 +1,4 @@
-//! The moves that a controller is judged by, and the current that they ask for.
+//! Moves for the judgement of a controller, and the current that they require.
 
 use crate::case::{Case, Move};
 use crate::control::measures_cart;
@@ -10,15 +10,15 @@ use crate::reach::compensation::Compensation;
 use crate::reach::forward::Forward;
 use crate::signal::profile::{Leg, Limits, Profile, Reference};
 
-/// Share of what the command's limit allows of speed and of force that a standard move takes.
+/// Fractions of the speed and the force allowed by the command limit that a standard move uses.
 const SPEED: f64 = 0.5;
 const FORCE: f64 = 0.5;
 
-/// Speed (m/s) and acceleration (m/s²) of standard moves where nothing is limited, and at most.
+/// Largest speed (m/s) and acceleration (m/s²) of standard moves, also without limits.
 const MODEST: (f64, f64) = (0.2, 2.0);
 const MOST: (f64, f64) = (5.0, 50.0);
 
-/// Distance of the short move where there is no travel, m, and shares of a travel.
+/// Distance of the short move without a travel, m, and fractions of a travel.
 const SHORT: f64 = 0.02;
 const SHARES: [f64; 2] = [0.1, 0.7];
 
@@ -26,8 +26,8 @@ const SHARES: [f64; 2] = [0.1, 0.7];
 const COUNTS: f64 = 5.0;
 const WINDOW: f64 = 50e-6;
 
-/// The moves of a case; where it has none a standard set: a short and a long move as quick as travel and limits allow,
-/// a slow reversal, and for a machine of several coordinates the long move of each of them alone.
+/// The moves of a case, or a standard set: a short and a long move as quick as travel and limits allow, a slow
+/// reversal, and for a machine with several coordinates the long move of each alone.
 pub fn of(case: &Case, design: &Design) -> Result<Vec<Move>> {
     if case.moves.is_empty() { standard(&case.machine, design) } else { Ok(case.moves.clone()) }
 }
@@ -37,7 +37,7 @@ fn standard(machine: &Machine, design: &Design) -> Result<Vec<Move>> {
     let (jerk, quick) = (60.0 * acceleration, 8000.0 * acceleration);
     let limits = Limits { speed, acceleration, jerk: Some(jerk), snap: Some(quick) };
     let slow = Limits { speed: 0.04 * speed, acceleration: 0.04 * acceleration, jerk: Some(0.04 * jerk), snap: None };
-    // Where each coordinate starts, and its short and long distance.
+    // Start of each coordinate, and its short and long distance.
     let (from, distances): (Vec<f64>, Vec<[f64; 2]>) = machine
         .travels()
         .map(|(_, travel)| match travel {
@@ -82,7 +82,7 @@ fn standard(machine: &Machine, design: &Design) -> Result<Vec<Move>> {
     legs.into_iter().map(one).collect()
 }
 
-/// Speed (m/s) and acceleration (m/s²) that leave room below the limits of controller and amplifier.
+/// Speed (m/s) and acceleration (m/s²) with a reserve below the limits of controller and amplifier.
 fn limits(machine: &Machine, design: &Design) -> (f64, f64) {
     let rigid = Rigid::of(machine);
     let amplifier = match machine.drives[0].amplifier.mode {
@@ -96,7 +96,7 @@ fn limits(machine: &Machine, design: &Design) -> (f64, f64) {
     let Some(limit) = [design.limit, amplifier].into_iter().flatten().reduce(f64::min) else { return MODEST };
     let dry = rigid.coulomb[0];
     let push = |speed: f64| rigid.command(dry + rigid.viscous[0] * speed, 0.0, speed).abs();
-    // The command grows in a straight line with speed.
+    // The command is linear in speed.
     let per_speed = push(1.0) - push(0.0);
     let speed = (SPEED * limit - push(0.0)) / per_speed.max(f64::MIN_POSITIVE);
     let speed = if speed > 0.0 { speed.min(MOST.0) } else { 0.1 * MODEST.0 };
@@ -105,8 +105,7 @@ fn limits(machine: &Machine, design: &Design) -> (f64, f64) {
     (speed, if acceleration > 0.0 { acceleration } else { 0.1 * MODEST.1 })
 }
 
-/// Root mean square over the run of the current that a move asks of the machine as the file has it, A; the largest of
-/// all motors.
+/// RMS current over the run that a move requires on the nominal machine, A; the largest of all motors.
 pub fn asked(machine: &Machine, motion: &Move) -> f64 {
     let whole = FeedForward { model: FeedForwardModel::Rigid, ..FeedForward::NONE };
     let of_drive = |drive: usize| {
@@ -126,7 +125,7 @@ pub fn asked(machine: &Machine, motion: &Move) -> f64 {
     (0..machine.drives.len()).map(of_drive).fold(0.0, f64::max)
 }
 
-/// The mean square over the run of what a move asks for until its end.
+/// Mean square over the run of a requirement of a move until its end.
 fn mean_square(motion: &Move, value: impl Fn(f64) -> f64) -> f64 {
     let (count, end) = (1000, motion.end());
     let square = |k: i32| value(end * (f64::from(k) + 0.5) / f64::from(count)).powi(2);

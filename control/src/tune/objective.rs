@@ -1,18 +1,16 @@
-//! How good a controller is: its moves on all axes of the family, in one number.
+//! Objective: the moves of a controller on all machines of the family, in one number.
 //!
-//! Of each move three figures count, each on the axis that is the worst one for it once the bad end of the central 95 %
-//! is left out: the largest error E of the cart, the time S from the end of the profile until the cart stays within its
-//! window w, and the root mean square I of the current. Of several parts that slide, and of several motors, the worst
-//! counts. With the duration D of the profile, the current I₀ that it asks
-//! of the axis as the file has it, and M moves
+//! Each move contributes three figures, each in the worst case of the central 95 % of the machines: the largest error E
+//! of the cart, the time S from the end of the profile until the cart stays within its window w, and the RMS current I.
+//! Of several slides or motors, the worst counts. With the duration D of the profile, the current I₀ that it requires
+//! on the nominal machine, and M moves
 //!
 //! ```text
 //! ln J = 1/M Σ [ a_e ln(1 + E/w) + a_s ln(1 + S/D) + a_i ln(I/I₀) ]
 //! ```
 //!
-//! An axis on which the cart is not within its window at the end of the run, t_end, but away by e, has S = (t_end −
-//! D)(1 + ln(1 + e/w)). Where it is within its window, and yet has not made the move (a reversal during which it
-//! sticks), e is its largest error.
+//! If the cart is outside its window by e at the end of the run, t_end, S = (t_end − D)(1 + ln(1 + e/w)). If it is
+//! within its window without having made the move (stuck during a reversal), e is its largest error.
 
 use crate::case::{Cost, Move};
 use crate::control::{Figures, LoadFigures, Loop, Standard, closed_loop_at_samples, closed_loop_briefly, each};
@@ -22,16 +20,16 @@ use crate::machine::Machine;
 use crate::signal::profile::Profile;
 use crate::solve::{Ending, Solver};
 
-/// How much each figure counts: a_e, a_s, a_i.
+/// Weights of the figures: a_e, a_s, a_i.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Balance {
     /// In a word.
     pub name: &'static str,
-    /// Of the largest error.
+    /// Weight of the largest error.
     pub error: f64,
-    /// Of the time until the cart settles.
+    /// Weight of the settling time.
     pub settling: f64,
-    /// Of the current.
+    /// Weight of the current.
     pub current: f64,
 }
 
@@ -42,27 +40,27 @@ pub const BALANCES: [Balance; 3] = [
     Balance { name: "gentle", error: 1.0, settling: 1.0, current: 10.0 },
 ];
 
-/// The figures of a move on one axis.
+/// Figures of a move on one machine.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MoveFigures {
-    /// Largest |x − y|, m, of all that slides; infinite where the run does not reach its end.
+    /// Largest |x − y| of all slides, m; infinite if the run ends early.
     pub error: f64,
-    /// Root mean square of x − y, m, the largest of all that slides.
+    /// RMS of x − y, m, largest of all slides.
     pub rms: f64,
-    /// From the end of the profile until the cart settles, s.
+    /// Settling time from the end of the profile, s.
     pub settling: Option<f64>,
     /// S, s.
     pub settles: f64,
-    /// Root mean square of the current, A, the largest of all motors.
+    /// RMS current, A, largest of all motors.
     pub current: f64,
 }
 
-/// A move on one axis.
+/// A move on one machine.
 pub fn look(machine: &Machine, model: &Machine, design: &Design, motion: &Move) -> Result<MoveFigures> {
     Runner::new(model, design)?.look(machine, motion, &motion.references(design))
 }
 
-/// A controller that is made once and run through many moves.
+/// A controller made once and run through many moves.
 pub(super) struct Runner {
     controllers: Vec<Standard>,
     timing: Loop,
@@ -74,7 +72,7 @@ impl Runner {
         Ok(Self { controllers: Standard::of_drives(design, model)?, timing: Loop::of(design) })
     }
 
-    /// A move on one axis, its profile being shaped already.
+    /// A move on one machine with a shaped profile.
     pub fn look(&mut self, machine: &Machine, motion: &Move, shaped: &[Profile]) -> Result<MoveFigures> {
         let seen = (motion.until, motion.window);
         let controllers = &mut each(&mut self.controllers);
@@ -116,36 +114,36 @@ fn figures_of(figures: &Figures, ending: Ending, motion: &Move) -> MoveFigures {
     }
 }
 
-/// A move on several axes at worst.
+/// Worst case of a move over several machines.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AtWorst {
-    /// E, m, and the place of its axis in the list.
+    /// E, m, and the index of its machine.
     pub error: (f64, usize),
-    /// Root mean square of the error, m.
+    /// RMS error, m.
     pub rms: f64,
-    /// S, s; and whether the cart settles on that axis.
+    /// S, s; and true if the cart settles on that machine.
     pub settles: (f64, bool),
     /// I, A.
     pub current: f64,
-    /// Axes on which the cart settles.
+    /// Number of machines on which the cart settles.
     pub settled: usize,
-    /// Axes on which it does not.
+    /// Number of machines on which it does not.
     pub unsettled: usize,
 }
 
 impl AtWorst {
-    /// Figures that nothing with this current, A, falls below.
+    /// Lower bound of all figures with this current, A.
     pub(super) fn at_least(current: f64) -> Self {
         Self { error: (0.0, 0), rms: 0.0, settles: (0.0, true), current, settled: 0, unsettled: 0 }
     }
 
-    /// Time by which S is later than here, s; zero where the cart settles on no axis here: S then depends on where it
-    /// happens to be when the run ends, and no settling is later than none.
+    /// Time by which S is later than here, s; zero if the cart settles on no machine here, since S then depends on its
+    /// position at the end of the run.
     pub(super) fn later(&self, settles: f64) -> f64 {
         if self.settled > 0 { (settles - self.settles.0).max(0.0) } else { 0.0 }
     }
 
-    /// With so many axes left out of each figure.
+    /// With this number of machines excluded from each figure.
     pub fn of(seen: &[MoveFigures], left_out: usize) -> Self {
         let worst = |of: &dyn Fn(&MoveFigures) -> f64| {
             let mut all: Vec<(f64, usize)> = seen.iter().map(of).enumerate().map(|(i, v)| (sure(v), i)).collect();
@@ -164,12 +162,12 @@ impl AtWorst {
     }
 }
 
-/// A value that is no number is as bad as can be.
+/// NaN counts as infinite.
 fn sure(value: f64) -> f64 {
     if value.is_nan() { f64::INFINITY } else { value }
 }
 
-/// ln J of moves whose currents I₀ are `asked`.
+/// ln J of moves with the currents I₀ in `asked`.
 pub fn objective(cost: Cost, balance: &Balance, moves: &[Move], asked: &[f64], worst: &[AtWorst]) -> f64 {
     let of = |((motion, asked), worst): ((&Move, &f64), &AtWorst)| {
         let error = (worst.error.0 / motion.window).ln_1p();
@@ -194,7 +192,7 @@ mod tests {
     use crate::case::Case;
     use std::path::Path;
 
-    /// A search glances at moves at samples; a figure that is not nearly that of the whole run would lead it astray.
+    /// A search evaluates moves at samples; figures far from those of the complete run would mislead it.
     #[test]
     fn a_glance_is_nearly_a_whole_run() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../stages/sollmann-jouaneh/controllers");

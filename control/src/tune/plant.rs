@@ -1,4 +1,4 @@
-//! The sampled machine over frequency: what its controllers measure per command.
+//! Frequency response of the sampled machine from commands to measurements.
 
 use crate::control::feedback::Turn;
 use crate::control::measures_cart;
@@ -9,27 +9,27 @@ use crate::machine::{EncoderPlace, Kind, Machine};
 use nalgebra::{Complex, SMatrix};
 use std::f64::consts::PI;
 
-/// Points of the grid on each of its decades, those about resonances apart.
+/// Points per decade of the grid, without those around resonances.
 const POINTS: f64 = 90.0;
-/// Lowest frequency, as a share of half the sampling rate, and points on each decade of where nothing turns.
+/// Lowest frequency relative to half the sampling rate, and points per decade below all dynamics.
 const LOWEST: f64 = 1e-8;
 const SPARSE: f64 = 12.0;
 
-/// A matrix over frequency with a row for each measurement, or part that slides, and a column for each drive.
+/// A matrix over frequency with a row for each measurement or slide, and a column for each drive.
 pub(super) type Square<const N: usize> = SMatrix<Complex<f64>, N, N>;
 
-/// The answers to commands at one frequency.
+/// Responses to commands at one frequency.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Answer<const N: usize> {
     /// Measured positions, m per V or A.
     pub position: Square<N>,
-    /// Motor currents, A per V or A, as they are when they are sampled.
+    /// Motor currents when sampled, A per V or A.
     pub current: Square<N>,
     /// Positions of the sliding parts, m per V or A.
     pub slides: Square<N>,
 }
 
-/// A sampled machine over frequency: what the controllers of its drives measure per command.
+/// Frequency response of a sampled machine from commands to measurements.
 #[derive(Debug, Clone)]
 pub struct Plant {
     /// ω, rad/s, up to half the sampling rate.
@@ -43,7 +43,7 @@ pub struct Plant {
     pub(super) of: ByDrives,
 }
 
-/// The answers of a machine with one drive, with two or with three.
+/// Responses of a machine with one, two or three drives.
 #[derive(Debug, Clone)]
 pub(super) enum ByDrives {
     One(Box<Sampled<1>>),
@@ -72,23 +72,23 @@ macro_rules! by_drives {
 }
 pub(super) use by_drives;
 
-/// The sampled model of each command, and the answers on the grid.
+/// The sampled model of each command, and the responses on the grid.
 #[derive(Debug, Clone)]
 pub(super) struct Sampled<const N: usize> {
     answers: Vec<Answer<N>>,
     models: [Discrete; N],
-    /// Outputs of the models: what is measured, what slides, the currents; and metres per unit of the first.
+    /// Outputs of the models: measurements, slides and currents; and metres per unit of the first.
     measured: [usize; N],
     slides: [Option<usize>; N],
     currents: [usize; N],
     length: f64,
-    /// Travel of each drive's part of the belt per travel of each sliding part; zero of those that a machine with more
-    /// drives than sliding parts does not have.
+    /// Travel of each drive's part of the belt per travel of each slide; zero for missing slides of a machine with more
+    /// drives than slides.
     pub shares: Square<N>,
 }
 
 impl Plant {
-    /// Samples `machine` about `operation` as the controllers of `design` do.
+    /// Samples `machine` about `operation` with the timing of `design`.
     pub fn of(machine: &Machine, operation: Operation, design: &Design, corners: &[f64]) -> Result<Self> {
         let system = System::of(machine, operation)?;
         let model = |drive: usize| system.input(drive).discrete(design.every, Hold::Zero, design.delay);
@@ -151,7 +151,7 @@ impl Plant {
         Ok(Self { frequency, turns, every: t, unstable, kind: machine.kind, of: of(sampled) })
     }
 
-    /// Frequencies, the answers to commands there, and the frequencies as a sampled loop sees them.
+    /// Frequencies, the responses to commands there, and the frequencies in terms of the sampled loop.
     pub(super) fn seen<'a, const N: usize>(
         &'a self,
         sampled: &'a Sampled<N>,
@@ -162,10 +162,10 @@ impl Plant {
 }
 
 impl<const N: usize> Sampled<N> {
-    /// The answers to commands at ω, rad/s.
+    /// Responses to commands at ω, rad/s.
     pub fn at(&self, omega: f64) -> Answer<N> {
         let all: [Vec<Complex<f64>>; N] = std::array::from_fn(|input| self.models[input].at(omega));
-        // What is sampled is the current of the command before.
+        // The sampled current belongs to the previous command.
         let lag = Complex::new(0.0, -omega * self.models[0].sample_time).exp() - 1.0;
         Answer {
             position: Square::from_fn(|row, input| all[input][self.measured[row]] * self.length),
@@ -177,22 +177,22 @@ impl<const N: usize> Sampled<N> {
         }
     }
 }
-/// Frequencies up to half the sampling rate, dense about the poles of the axis and the controller's corners.
+/// Frequencies up to half the sampling rate, dense around the poles of the axis and the controller's corners.
 fn grid(model: &Discrete, t: f64, corners: &[f64]) -> Vec<f64> {
     let most = PI / t;
-    // Where poles turn, folded to below half the sampling rate.
+    // Frequencies of poles, folded below half the sampling rate.
     let mut roots: Vec<Complex<f64>> = model.poles().iter().filter(|z| z.norm() > 0.0).map(|z| z.ln() / t).collect();
     roots.extend(corners.iter().map(|omega| Complex::new(-0.3 * omega, *omega)));
     let slowest = roots.iter().map(|s| s.norm()).filter(|w| *w > 1e-9 * most).fold(most, f64::min);
     let from = (0.01 * slowest).clamp(10.0 * LOWEST * most, 1e-3 * most);
     let points = (POINTS * (most / from).log10()) as usize;
-    // Far below a slow integral, so that what it does to the phase is seen whole.
+    // Far below a slow integral, so that its phase is covered completely.
     let below = (LOWEST * most / from).log10().abs();
     let count = (SPARSE * below).ceil();
     let mut frequency: Vec<f64> =
         (0..count as usize).map(|k| LOWEST * most * 10f64.powf(below * k as f64 / count)).collect();
     frequency.extend(Range { from, to: most, points }.frequencies(&roots));
-    // Where L is real, whatever rounding makes of the highest point.
+    // At half the sampling rate, L is real regardless of rounding.
     frequency.retain(|omega| *omega < most * (1.0 - 1e-12));
     frequency.push(most);
     frequency

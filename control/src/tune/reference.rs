@@ -1,5 +1,4 @@
-//! How far a tuning is from what a long differential evolution of the same objective finds: for tables, and for those
-//! who doubt it.
+//! Comparison of a tuning with a long differential evolution of the same objective.
 
 use super::edge::Edge;
 use super::evolution::evolve;
@@ -15,16 +14,16 @@ use crate::error::Result;
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
 
-/// Members, and how far they are scattered (natural logarithm of gains and frequencies).
+/// Number of members, and their scatter (natural logarithm of gains and frequencies).
 const MEMBERS: usize = 20;
 const SCATTER: f64 = 1.0;
 
-/// Rounds, each with the axes that were worst for the best of the one before.
+/// Rounds, each with the machines that were worst for the best of the previous one.
 const ROUNDS: usize = 3;
 
-/// The best verdict of a differential evolution over the gains and filters that a tuning chose, begun without it: on
-/// the same family, moves, limits and objective; one with no figure worse than before goes before any other, and the
-/// judgement says whether it is one. `None` where nothing keeps the limits.
+/// Best verdict of a differential evolution over the gains and filters that a tuning chose, started independently of
+/// it, on the same family, moves, limits and objective. A design with no figure worse than before is preferred, as the
+/// judgement shows. `None` if no design keeps the limits.
 pub fn evolved(
     case: &Case,
     tuning: &Tuning,

@@ -1,20 +1,20 @@
-//! Gains to begin a search with, by several rules, and filters that may pay.
+//! Starting gains of a search by several rules, and filters to try.
 
 use crate::design::placement::{first, place};
 use crate::design::{Design, Filter};
 use crate::machine::Machine;
 
-/// Damping ratios of placements beside that of the file.
+/// Further damping ratios of placements.
 const DAMPINGS: [f64; 2] = [0.6, 1.0];
 
-/// A notch that is added: its depth and width.
+/// Depth and width of an added notch.
 const DEPTH: f64 = 0.1;
 const WIDTH: f64 = 0.7;
 
-/// Most notches, those of the file with them.
+/// Maximum number of notches, including those of the file.
 const NOTCHES: usize = 2;
 
-/// Starts for a design: placements about `bandwidth` (Hz), and what its structure begins with besides.
+/// Starts for a design: placements about `bandwidth` (Hz), and further starts of its structure.
 pub fn starts(
     design: &Design,
     machine: &Machine,
@@ -31,8 +31,8 @@ pub fn starts(
     all
 }
 
-/// The design with filters added in the ways that are tried, the plain one first: `modes` are frequencies of the axis
-/// below half the sampling rate, Hz, the lowest first.
+/// Filter layouts to try, the design without added filters first: `modes` are frequencies of the axis below half the
+/// sampling rate, Hz, the lowest first.
 pub fn layouts(design: &Design, modes: &[f64]) -> Vec<Design> {
     let mut all = vec![design.clone()];
     let notch = |frequency: f64| Filter::Notch { frequency, depth: DEPTH, damping: WIDTH };

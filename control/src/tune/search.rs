@@ -1,5 +1,5 @@
-//! A search without derivatives (J. A. Nelder, R. Mead, "A simplex method for function minimization", The Computer
-//! Journal 7, 1965).
+//! Derivative-free search (J. A. Nelder, R. Mead, "A simplex method for function minimization", The Computer Journal 7,
+//! 1965).
 
 /// The result of a search.
 #[derive(Debug, Clone, PartialEq)]
@@ -10,8 +10,8 @@ pub struct Found {
     pub value: f64,
 }
 
-/// From a point, with a simplex of edge `step`, until it is smaller than `accuracy` or `most` values were asked for.
-/// NaN is as bad as can be.
+/// Minimises from a point, with a simplex of edge `step`, until it is smaller than `accuracy` or after `most`
+/// evaluations. NaN counts as infinite.
 pub fn minimise(
     start: &[f64],
     step: f64,
@@ -22,8 +22,8 @@ pub fn minimise(
     minimise_below(start, step, accuracy, most, &mut |x, _| function(x))
 }
 
-/// Minimises a function that receives the value to beat: what is no better may be given as any value that is not below
-/// it, and the search takes the same way.
+/// Minimises a function that receives the value to beat: if it is not better, it may return any value that is not below
+/// that, without changing the course of the search.
 pub fn minimise_below(
     start: &[f64],
     step: f64,
@@ -105,7 +105,7 @@ mod tests {
     fn what_is_no_better_need_not_be_known() {
         let valley = |x: &[f64]| (1.0 - x[0]).powi(2) + 100.0 * (x[1] - x[0] * x[0]).powi(2);
         let whole = minimise(&[-1.2, 1.0], 0.3, 1e-8, 500, &mut |x| valley(x));
-        // Of what is not below the bar only that it is not.
+        // Above the bar, only the fact is returned.
         let mut short = |x: &[f64], bar: f64| if valley(x) < bar { valley(x) } else { bar + 1e3 };
         assert_eq!(minimise_below(&[-1.2, 1.0], 0.3, 1e-8, 500, &mut short), whole);
     }

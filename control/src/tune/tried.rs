@@ -1,4 +1,4 @@
-//! Designs that a search by moves has run, and by what it weighs them.
+//! Designs run by a search by moves, and their weights.
 
 use super::objective::AtWorst;
 use crate::case::Cost;
@@ -9,19 +9,19 @@ use crate::design::Design;
 pub(super) struct Tried {
     pub design: Design,
     pub worst: Vec<AtWorst>,
-    /// The finalist that it was made from, and the powers that lead to it.
+    /// The finalist that it was made from, and its powers.
     pub layout: usize,
     pub powers: Vec<f64>,
 }
 
-/// By what a search by moves weighs a design.
+/// Weights of a design in a search by moves.
 pub(super) struct Weighed<'a> {
     pub cost: Cost,
-    /// Figures that none may be worse than.
+    /// Bars that no figure may exceed.
     pub bars: Option<Bars<'a>>,
 }
 
-/// Figures before, and how steeply ln J grows with what a figure is worse.
+/// Figures before, and the penalty slopes of ln J.
 #[derive(Clone, Copy)]
 pub(super) struct Bars<'a> {
     pub figures: &'a [AtWorst],

@@ -1,4 +1,4 @@
-//! Troubles of a move, as the model of its loop and its run show them: not stable, at its limit, howling; steps lost.
+//! Problems of a move by the model of its loop and its run: unstable, saturated, howling, lost steps.
 
 use super::margins::Margins;
 use super::plant::Plant;
@@ -13,29 +13,29 @@ use crate::quantity::show;
 use crate::signal::profile::Profile;
 use std::f64::consts::PI;
 
-/// Share of the samples at the limit from which on a command counts as saturated.
+/// Fraction of samples at the limit above which a command counts as saturated.
 const SATURATED: f64 = 0.5;
 
-/// Share of the limit by which the command of a howling loop swings to either side at rest, and cycles that it does so.
+/// Amplitude of the command of a howling loop at rest relative to the limit, and its least number of cycles.
 const LOUD: f64 = 0.25;
 const CYCLES: f64 = 4.0;
 
-/// Growth of that swing from the first half of the rest to the second from which on it grows, and the least share of
-/// the limit.
+/// Ratio of that amplitude between both halves of the rest above which it grows, and its least value relative to the
+/// limit.
 const GROWS: f64 = 1.5;
 const LEAST: f64 = 0.1;
 
-/// Distance of a frequency from a mode's, as a share, within which it is that mode's.
+/// Relative distance of a frequency from a mode that belongs to it.
 const NEAR: f64 = 0.2;
 
-/// The kind of trouble.
+/// Kind of problem.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
-    /// The sampled loop has poles outside the unit circle, or its swing grows.
+    /// The sampled loop has poles outside the unit circle, or its oscillation grows.
     Unstable,
-    /// The command stands at its limit most of the time.
+    /// The command is at its limit most of the time.
     Saturated,
-    /// The command swings at rest.
+    /// The command oscillates at rest.
     Howling,
     /// A stepper lost steps.
     LostSteps,
@@ -53,20 +53,20 @@ impl Kind {
     }
 }
 
-/// A move that is not to be relied on.
+/// Problem of an unreliable move.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trouble {
     /// The kind.
     pub kind: Kind,
-    /// At which frequency it swings, Hz, where it does.
+    /// Frequency of its oscillation, Hz, if any.
     pub frequency: Option<f64>,
-    /// Why, in words.
+    /// Cause, in words.
     pub cause: String,
-    /// All of it in a sentence.
+    /// Complete description in a sentence.
     pub words: String,
 }
 
-/// The trouble of a move as it was run; none if it has none.
+/// The problem of a run move, if any.
 pub fn trouble(machine: &Machine, design: &Design, run: &MoveRun, motion: &Move) -> Option<Trouble> {
     if machine.stepper().is_some() {
         return lost_steps(machine, run);
@@ -82,7 +82,8 @@ pub fn trouble(machine: &Machine, design: &Design, run: &MoveRun, motion: &Move)
     let grows = swing.late > GROWS * swing.early && cycles && (swing.late > LEAST * limit || limit.is_infinite());
     let is_saturated = samples > 0 && limited as f64 > SATURATED * samples as f64;
     let seen = (swing.frequency > 0.0).then_some(swing.frequency);
-    // Dry friction can hold a loop that would swing if everything slid: only what the run shows is told.
+    // Dry friction can stop a loop that would oscillate if everything slid, so only problems visible in the run are
+    // reported.
     let swings = is_saturated || grows || swing.late > LEAST * limit && cycles;
     let (kind, frequency) = match model {
         Some(hertz) if swings => (Kind::Unstable, Some(hertz)),
@@ -120,7 +121,7 @@ fn lost_steps(machine: &Machine, run: &MoveRun) -> Option<Trouble> {
     (!lost.is_empty()).then_some(Trouble { kind: Kind::LostSteps, frequency: None, words, cause })
 }
 
-/// Where the sampled loop swings, Hz, if it is not stable; none too for structures that are not linear.
+/// Frequency of oscillation of an unstable sampled loop, Hz; none also for nonlinear structures.
 fn unstable(machine: &Machine, design: &Design, at: Operation) -> Option<f64> {
     let feedback = Feedback::new(design, machine).ok().filter(Feedback::is_linear)?;
     let plant = Plant::of(machine, at, design, &feedback.corners()).ok()?;
@@ -152,7 +153,7 @@ fn cause(machine: &Machine, design: &Design, kind: Kind, frequency: Option<f64>,
         );
     }
     let late = design.delay + 0.5 * design.every;
-    // Delay and hold turn the phase by 360° f late.
+    // Delay and hold shift the phase by 360° f `late`.
     if 360.0 * hertz * late > 20.0 {
         return format!("too much gain for a delay of {:.2} ms, half a sample with it", 1e3 * late);
     }

@@ -5,7 +5,7 @@ use crate::machine::Machine;
 use crate::number::engineering;
 use crate::parameter::{Free, kinds_without};
 
-/// Share by which parameters are off where nothing else is said.
+/// Default relative spread of parameters.
 pub const SPREAD: f64 = 0.2;
 
 /// A parameter that is not known exactly.
@@ -13,20 +13,19 @@ pub const SPREAD: f64 = 0.2;
 pub struct Unknown {
     /// Its name.
     pub name: String,
-    /// The least and the most: factors where it was never fitted, values in SI units where it was.
+    /// Lower end: a factor if it was not fitted, a value in SI units if it was.
     pub low: f64,
-    /// The most.
+    /// Upper end, likewise.
     pub high: f64,
-    /// True if its interval is that of a fit or its draws, where it is normal; within a spread all values are as
-    /// likely.
+    /// True if its interval is that of a fit or its draws, with a normal distribution; uniform within a spread.
     pub is_fitted: bool,
     pub(super) free: Free,
-    /// The first of those that it varies with: the two constants of one motor, both pulleys.
+    /// The first unknown that it varies with: the two constants of one motor, both pulleys.
     pub(super) with: usize,
 }
 
 impl Unknown {
-    /// A parameter that is off by a share to either side.
+    /// A parameter with a relative spread to either side.
     pub fn spread(free: Free, share: f64) -> Self {
         let [low, high] = [1.0 - share, 1.0 + share].map(|factor| factor * free.start);
         Self { name: free.name.clone(), low, high, is_fitted: false, free, with: 0 }
@@ -37,26 +36,26 @@ impl Unknown {
         Self { name: free.name.clone(), low, high, is_fitted: true, free, with: 0 }
     }
 
-    /// Its unit, SI; none of a factor.
+    /// Its SI unit; empty for a factor.
     pub fn unit(&self) -> &'static str {
         self.free.unit
     }
 
-    /// Its value: `low` for −1, `high` for 1, what it is taken for at 0.
+    /// Its value: `low` at −1, `high` at 1, the nominal value at 0.
     pub(super) fn value(&self, off: f64) -> f64 {
         let end = if off < 0.0 { self.low } else { self.high };
         let value = self.free.start + off.abs() * (end - self.free.start);
-        // Draws of a fit go beyond the ends of its interval, but never through zero.
+        // Draws of a fit exceed the ends of its interval, but do not change sign.
         if self.free.start > 0.0 { value.max(1e-3 * self.free.start) } else { value }
     }
 
-    /// How far off it is with this value: what [`Unknown::value`] takes.
+    /// Deviation for this value, the argument of [`Unknown::value`].
     pub(super) fn off(&self, value: f64) -> f64 {
         let from = value - self.free.start;
         if from < 0.0 { from / (self.free.start - self.low) } else { from / (self.high - self.free.start) }
     }
 
-    /// How far off it is at this quantile.
+    /// Deviation at this quantile.
     pub(super) fn quantile(&self, u: f64) -> f64 {
         match self.is_fitted {
             true => normal_quantile(u) / normal_quantile(0.975),
@@ -64,7 +63,7 @@ impl Unknown {
         }
     }
 
-    /// How far off it is, in words: its value where it was fitted, else a share.
+    /// Deviation in words: its value if it was fitted, otherwise a percentage.
     pub(super) fn words(&self, off: f64) -> String {
         let value = self.value(off);
         match self.is_fitted {
@@ -74,14 +73,14 @@ impl Unknown {
     }
 }
 
-/// The name of what a parameter varies with: K_t and K_e of one motor are one number in SI units, and pulleys of one
-/// make are alike.
+/// Name of the group that a parameter varies with: K_t and K_e of one motor are one number in SI units, and pulleys of
+/// one make are equal.
 fn kin(name: &str) -> String {
     let first = name.split(" = ").next().unwrap_or(name);
     first.replace("back_emf_constant", "torque_constant").replace("idler_pulley.", "drive_pulley.")
 }
 
-/// Lets those vary together that are alike.
+/// Ties unknowns of one group.
 pub(super) fn tie(unknowns: &mut [Unknown]) {
     let names: Vec<String> = unknowns.iter().map(|unknown| kin(&unknown.name)).collect();
     for (unknown, name) in unknowns.iter_mut().zip(&names) {
@@ -89,8 +88,8 @@ pub(super) fn tie(unknowns: &mut [Unknown]) {
     }
 }
 
-/// Parameters that no fit has estimated keep their default spread. Of the two constants of a motor, which are one
-/// number, the one that was not fitted is off by as large a share as the other.
+/// Parameters that no fit has estimated keep their default spread. If one of a motor's two constants was not fitted, it
+/// has the relative deviation of the other.
 pub(super) fn with_the_rest(mut fitted: Vec<Unknown>, machine: &Machine) -> Vec<Unknown> {
     let frees: Vec<&Free> = fitted.iter().map(|unknown| &unknown.free).collect();
     let rest = kinds_without(machine, &frees).into_iter().map(|free| {

@@ -1,4 +1,4 @@
-//! The verdict on a controller over the family, and whether one is better than another.
+//! Verdict on a controller over the family, and comparison of two verdicts.
 
 use super::family::{Corner, Family, modes_along};
 use super::hunting::{hunting, hunts};
@@ -13,19 +13,19 @@ use crate::design::Design;
 use crate::error::Result;
 use crate::solve::{Ending, Solver};
 
-/// By what share a figure may differ and be the same.
+/// Relative difference of equal figures.
 const SAME: f64 = 1e-6;
 
-/// A settling time below which a later one is counted as a share of this, s.
+/// Smallest reference value for the relative increase of a settling time, s.
 const SHORT: f64 = 0.05;
 
 impl Verdict {
-    /// Its moves at worst.
+    /// Worst case of its moves.
     pub(super) fn at_worst(&self) -> Vec<AtWorst> {
         self.moves.iter().map(|one| one.at_worst).collect()
     }
 
-    /// Its machines, those first that are worst in some figure.
+    /// Its machines, those that are worst in some figure first.
     pub(super) fn badness(&self) -> Vec<usize> {
         let mut ranked: Vec<(usize, usize)> = Vec::new();
         for one in &self.moves {
@@ -46,15 +46,15 @@ impl Verdict {
         all
     }
 
-    /// The axes that are worst in a figure, a corner that is none of the machines apart.
+    /// Machines that are worst in a figure, without a corner outside the list.
     pub(super) fn watch(&self, work: &Work) -> Watch {
         let count = work.stages.len();
         let seen: Vec<Vec<MoveFigures>> = self.moves.iter().map(|one| one.seen[..count].to_vec()).collect();
         Watch::of(&seen, work.family.left_out(count))
     }
 
-    /// Axes on which a figure is worse than it was at worst, of each move the two that are worst and one more for each
-    /// that a figure leaves out; of so many, a corner that is none of them apart.
+    /// Machines on which a figure exceeds its previous worst case: for each move the two worst, and one more for each
+    /// excluded one; among `count` machines, without a corner outside the list.
     pub(super) fn worse_on(&self, before: &Verdict, count: usize) -> Watch {
         let of_move = |(is, was): (&MoveVerdict, &MoveVerdict)| {
             let beyond = |seen: &MoveFigures| {
@@ -73,14 +73,14 @@ impl Verdict {
 }
 
 impl Work<'_> {
-    /// A verdict with its limit cycle at rest, and with what that needs.
+    /// A verdict with its limit cycle at rest and the causes of it.
     pub fn watched(&self, verdict: Verdict) -> Result<Verdict> {
         let hunt =
             if verdict.nominal.stable && !(self.stop)() { hunting(&self.case.machine, &verdict.design)? } else { None };
         Ok(Verdict { hunt, ..verdict })
     }
 
-    /// The verdict on a design, given once.
+    /// The verdict on a design, computed once.
     pub fn verdict(&self, design: &Design) -> Result<Verdict> {
         if let Some(known) = self.known.borrow().iter().find(|known| known.design == *design) {
             return Ok(known.clone());
@@ -92,8 +92,8 @@ impl Work<'_> {
         Ok(verdict)
     }
 
-    /// The verdict on a design whose ln J is at most `bar`; none for another, which is told as soon as the machines that
-    /// were run until then, in this order, say so.
+    /// The verdict on a design whose ln J is at most `bar`; none otherwise, which is reported as soon as the machines
+    /// run so far, in this order, show it.
     pub fn verdict_below(&self, design: &Design, bar: f64, order: &[usize]) -> Result<Option<Verdict>> {
         if let Some(known) = self.known.borrow().iter().find(|known| known.design == *design) {
             return Ok(Some(known.clone()).filter(|known| known.objective <= bar));
@@ -103,7 +103,7 @@ impl Work<'_> {
         Ok(verdict)
     }
 
-    /// A verdict with its limit cycle at rest, which is looked for where no figure is worse than of the first one.
+    /// A verdict with its limit cycle at rest, which is computed if no figure is worse than in the first verdict.
     fn hunted(&self, verdict: Verdict) -> Result<Verdict> {
         let is_worse = self.known.borrow().first().is_some_and(|first| worse(first, &verdict).is_some());
         if is_worse || !verdict.nominal.stable || (self.stop)() {
@@ -154,8 +154,8 @@ impl Work<'_> {
         Ok(Some(Verdict { design, nominal, corner, worst, unstable, objective: value, moves, hunt: None }))
     }
 
-    /// The figures of each move on all machines; none as soon as ln J is above the bar: another machine makes no figure
-    /// at worst smaller.
+    /// Figures of each move on all machines; none as soon as ln J exceeds the bar, since further machines cannot reduce
+    /// a worst-case figure.
     fn seen(
         &self,
         design: &Design,
@@ -169,7 +169,7 @@ impl Work<'_> {
             found.iter().map(|(_, figures)| figures[k]).collect()
         };
         for place in order.iter().copied().filter(|place| *place < machines.len()) {
-            // A corner that is none of the machines has no axis made ready.
+            // A corner outside the list of machines is not prepared.
             let corner;
             let machine = match self.stages.get(place) {
                 Some(machine) => machine,
@@ -211,7 +211,7 @@ pub(super) fn compare(before: &Verdict, after: &Verdict) -> Judgement {
     if after.objective < before.objective - SAME || holds_more { Judgement::Better } else { Judgement::Unchanged }
 }
 
-/// The figure that is worse by most than before; none if none is.
+/// The figure with the largest deterioration, if any.
 pub(super) fn worse(before: &Verdict, after: &Verdict) -> Option<Worse> {
     let of_move = |(motion, (was, is)): (usize, (&MoveVerdict, &MoveVerdict))| {
         let axes = is.settled.1 as f64;
@@ -239,7 +239,7 @@ pub(super) fn worse(before: &Verdict, after: &Verdict) -> Option<Worse> {
             .collect::<Vec<_>>()
     };
     let all = before.moves.iter().zip(&after.moves).enumerate().flat_map(of_move);
-    // A cart that came to rest at no target hunts about none.
+    // A cart that never reached a target cannot hunt about one.
     let came_to_rest = before.moves.iter().any(|one| one.at_worst.settled > 0);
     let window = after.moves.iter().map(|one| one.window).fold(f64::INFINITY, f64::min);
     let hunts = after.hunt.as_ref().filter(|hunt| came_to_rest && hunt.is_more_than(before.hunt.as_ref(), window));
@@ -252,8 +252,7 @@ pub(super) fn worse(before: &Verdict, after: &Verdict) -> Option<Worse> {
 }
 
 impl Work<'_> {
-    /// Of all designs within the limits that were judged on the whole family, that one whose worst figure is worse by
-    /// least.
+    /// The design within the limits, among those judged on the complete family, whose worst figure deteriorates least.
     pub fn least(&self, before: &Verdict) -> Option<Least> {
         let known = self.known.borrow();
         let within = known.iter().filter(|one| one.design != before.design && self.excess(&one.worst) <= 1.0);
@@ -263,17 +262,17 @@ impl Work<'_> {
     }
 }
 
-/// Share of a limit from which on it is active: gains are rounded, and a search on the grid keeps 2 % away.
+/// Fraction of a limit above which it is active: gains are rounded, and a search on the grid keeps 2 % away.
 const ACTIVE: f64 = 0.96;
 
-/// The limit that is active at a design, if one is: a search that only failed to find better gains proves nothing.
+/// The active limit at a design, if any: a search that merely failed to find better gains proves nothing.
 pub(super) fn forced(family: &Family, after: &Verdict, tuning: &Tuning) -> Option<Forced> {
     let is_active = after.worst.excess(tuning.sensitivity, tuning.complementary) >= ACTIVE;
     is_active.then(|| limiting(family, after, tuning, Standing::WayBack))
 }
 
-/// The limit that forces gains to be worse where no other is active: the one that the gains of the file break, and the
-/// bandwidth that was asked for where they break none.
+/// The limit that forces gains to be worse if none is active: the one that the gains of the file violate, or the
+/// requested bandwidth if they violate none.
 pub(super) fn forced_by_file(family: &Family, before: &Verdict, tuning: &Tuning, placed: Option<f64>) -> Forced {
     let own = limiting(family, before, tuning, Standing::File);
     match before.worst.excess(tuning.sensitivity, tuning.complementary) <= 1.0 {
@@ -282,7 +281,7 @@ pub(super) fn forced_by_file(family: &Family, before: &Verdict, tuning: &Tuning,
     }
 }
 
-/// The limit that is nearest at a design.
+/// The nearest limit at a design.
 fn limiting(family: &Family, after: &Verdict, tuning: &Tuning, standing: Standing) -> Forced {
     let worst = &after.worst;
     let is_sensitivity = worst.sensitivity / tuning.sensitivity >= worst.complementary / tuning.complementary;

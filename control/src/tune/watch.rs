@@ -1,26 +1,26 @@
-//! The axes on which a search runs its moves: those that are worst for what it finds.
+//! Machines on which a search runs its moves: those that are worst for its designs.
 
 use super::objective::MoveFigures;
 
-/// Axes that are watched for each figure, beside those that a figure at worst leaves out.
+/// Number of watched machines for each figure, in addition to the excluded ones.
 const WATCHED: usize = 2;
 
-/// Of each move the axes on which a search runs it, the worst first.
+/// For each move, the machines on which a search runs it, the worst first.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Watch {
     pub axes: Vec<Vec<usize>>,
-    /// How many of them each figure leaves out.
+    /// Number of machines excluded from each figure.
     pub left_out: usize,
 }
 
-/// The axes by a figure, the worst first.
+/// Machines by a figure, the worst first.
 fn order(seen: &[MoveFigures], figure: fn(&MoveFigures) -> f64) -> Vec<usize> {
     let mut order: Vec<usize> = (0..seen.len()).collect();
     order.sort_by(|&a, &b| figure(&seen[b]).total_cmp(&figure(&seen[a])));
     order
 }
 
-/// The figures that choose the axes on which a search runs a move.
+/// Figures that select the machines on which a search runs a move.
 const FIGURES: [fn(&MoveFigures) -> f64; 2] = [|seen| seen.error, |seen| seen.settles];
 
 impl Watch {
@@ -41,7 +41,7 @@ impl Watch {
         Self { axes: seen.iter().map(of_move).collect(), left_out }
     }
 
-    /// Of each figure the axis alone that makes it what it is at worst, which a rough search takes for all.
+    /// For each figure only the worst-case machine, on which a rough search runs.
     pub fn roughly(seen: &[Vec<MoveFigures>], left_out: usize) -> Self {
         let of_move = |seen: &Vec<MoveFigures>| {
             let mut axes: Vec<usize> =

@@ -1,9 +1,9 @@
-//! The straight way from gains that were found back to those of the file, which break the limits.
+//! Straight path from tuned gains back to those of the file, which violate the limits.
 //!
-//! With the powers p_j = ln(k_j/K_j) that lead from the gains K that were found to the gains k of the file, filters
-//! that were added left as they are, the way is K_j e^(t p_j) for t from 0 to 1. Its last design that keeps the limits
-//! is the nearest there is on it to the controller of the file; where that is worse than the file, too, the limits
-//! stand between the two: no design of this way that is nearer to the file keeps them.
+//! With the powers p_j = ln(k_j/K_j) from the tuned gains K to the gains k of the file, with added filters unchanged,
+//! the path is K_j e^(t p_j) for t from 0 to 1. Its last design that keeps the limits is the closest one on it to the
+//! controller of the file; if that is also worse than the file, the limits force it: no design on this path closer to
+//! the file keeps them.
 
 use super::Judgement;
 use super::gains::{gains, rounded, shaped};
@@ -14,13 +14,13 @@ use crate::design::Design;
 use crate::error::Result;
 use crate::machine::Machine;
 
-/// Stretches of the way that are looked at from the file on, and halvings of the last of them.
+/// Intervals of the path checked from the file on, and halvings of the last one.
 const STRETCHES: usize = 16;
 const HALVINGS: usize = 8;
 
 impl Work<'_> {
-    /// The verdict that is best of what was found and of what stands on its way back to the file; and the limit that
-    /// forces it to be worse, where one does.
+    /// The best verdict of the tuned gains and of the end of their path back to the file; and the limit that forces it
+    /// to be worse, if any.
     pub fn way_back(&mut self, before: &Verdict, after: Verdict) -> Result<(Verdict, Option<Forced>)> {
         let is_kept = self.excess(&before.worst) <= 1.0 || self.excess(&after.worst) > 1.0;
         if compare(before, &after) != Judgement::Worse || is_kept || (self.stop)() {
@@ -31,7 +31,7 @@ impl Work<'_> {
             let powers: Vec<f64> = powers.iter().map(|power| part * power).collect();
             rounded(&shaped(&after.design, after.design.filters.len(), &powers))
         };
-        // Of the file's gains with the filters that were added, too, for these may keep the limits.
+        // Includes the file's gains with the added filters, which may keep the limits.
         let Some(first) = self.first_kept(&at)? else { return Ok((after, None)) };
         let edge = self.edge(&at, first)?;
         let edge = self.verdict(&at(edge))?;
@@ -42,7 +42,7 @@ impl Work<'_> {
         Ok((if edge.objective < after.objective { edge } else { after }, limit))
     }
 
-    /// The last of the ends of stretches, from the file on, that keeps the limits.
+    /// The first end of an interval, from the file on, that keeps the limits.
     fn first_kept(&mut self, at: &dyn Fn(f64) -> Design) -> Result<Option<usize>> {
         for stretch in (0..=STRETCHES).rev() {
             if !self.passes(&at(stretch as f64 / STRETCHES as f64))? {
@@ -52,7 +52,7 @@ impl Work<'_> {
         Ok(None)
     }
 
-    /// How far the limits are kept within the stretch that begins there.
+    /// Boundary of the limits within the interval that begins there.
     fn edge(&mut self, at: &dyn Fn(f64) -> Design, first: usize) -> Result<f64> {
         let mut near = first as f64 / STRETCHES as f64;
         if first == STRETCHES {
@@ -67,7 +67,7 @@ impl Work<'_> {
     }
 }
 
-/// The factors from the gains of a design to those of another; none where one of them is zero in one of the two.
+/// Factors from the gains of a design to those of another; none if a gain is zero in only one of them.
 fn powers(from: &Design, to: &Design, machine: &Machine) -> Option<Vec<f64>> {
     let [from, to] = [from, to].map(|design| gains(design, machine));
     let pairs = from.iter().zip(&to).filter(|(from, _)| from.searched);
@@ -103,14 +103,14 @@ mod tests {
         let powers = powers(&calmer(&file), &file, &case.machine).unwrap();
         assert_eq!(rounded(&shaped(&calmer(&file), file.filters.len(), &powers)), rounded(&file));
         assert!((powers[1] - 2f64.ln()).abs() < 1e-12 && powers[0] == 0.0, "{powers:?}");
-        // There is no way in logarithms to a gain that is zero.
+        // A zero gain cannot be reached in logarithms.
         let mut without = file.clone();
         let Structure::Pid(pid) = &mut without.structure else { panic!("not a PID") };
         pid.integral = 0.0;
         assert_eq!(super::powers(&file, &without, &case.machine), None);
     }
 
-    /// The design taken from the path keeps the limits, and a little nearer to the file they are broken.
+    /// The design on the path keeps the limits, and slightly closer to the file they are violated.
     #[test]
     fn its_edge_is_where_the_limits_begin_to_hold() {
         let case = pid();

@@ -5,14 +5,14 @@ use crate::control::feedback::{Feedback, Turn};
 use nalgebra::Complex;
 use std::f64::consts::PI;
 
-/// Nyquist's criterion: F(z) = det (1 + L)(1 − 1/z)^m, with m poles at z = 1, turns by π (P − Z) from θ = 0 to π, P poles
-/// of the machine and its controllers and Z of the closed loop being outside.
+/// Nyquist's criterion: F(z) = det (1 + L)(1 − 1/z)^m, with m poles at z = 1, turns by π (P − Z) from θ = 0 to π, for P
+/// poles of machine and controllers and Z poles of the closed loop outside.
 pub(super) struct Winding {
     unstable: f64,
-    /// The first two of ω and det (1 + L), of which m is known.
+    /// The first two values of ω and det (1 + L), from which m follows.
     first: Option<(f64, Complex<f64>, Turn)>,
     poles: i32,
-    /// F where it begins and where it is, whole turns between, and whether all were numbers.
+    /// First and present F, complete turns between them, and true if all values are finite.
     start: Complex<f64>,
     now: Complex<f64>,
     turns: f64,
@@ -26,7 +26,7 @@ impl Winding {
         Self { unstable, first: None, poles: 0, start: zero, now: zero, turns: 0.0, is_number: true }
     }
 
-    /// On to the next frequency.
+    /// Continues with the next frequency.
     pub fn go_on(&mut self, omega: f64, difference: Complex<f64>, turn: &Turn) {
         self.is_number &= difference.re.is_finite() && difference.im.is_finite() && difference != Complex::ZERO;
         let Some((w0, begin, at)) = self.first else {
@@ -40,8 +40,8 @@ impl Winding {
             self.now = self.start;
         }
         let (was, is) = (self.now, difference * turn.lag().powi(self.poles));
-        // The way from one to the next crosses the negative real axis where both are on other sides of the axis and
-        // their cross product tells that zero is to the right.
+        // The segment crosses the negative real axis if its ends are on opposite sides of the real axis and by their
+        // cross product zero is to the right.
         let cross = was.re * is.im - is.re * was.im;
         match (was.im < 0.0, is.im < 0.0) {
             (false, true) if cross > 0.0 => self.turns += 1.0,

@@ -1,4 +1,4 @@
-//! The search: many designs by what steps of command and reference do within the limits, which needs no run; the best
+//! The search: many designs by the response to steps of command and reference within the limits, without runs; the best
 //! of them by moves.
 
 use super::family::{Family, modes_along};
@@ -17,30 +17,31 @@ use crate::signal::profile::Profile;
 use std::cell::{Cell, RefCell};
 use std::f64::consts::PI;
 
-/// Share of the limits that a search on the grid keeps to: tops between its points and rounding are in the rest.
+/// Fraction of the limits for a search on the grid; the rest covers maxima between its points and rounding.
 const WITHIN: f64 = 0.98;
 
-/// Rounds of a search, each with the axis that passed a limit in the one before.
+/// Rounds of a search, each with the machine that exceeded a limit in the previous one.
 const ROUNDS: usize = 5;
 
-/// Values that a search without moves may ask for, and more for each gain.
+/// Evaluations of a search without moves, plus a number for each gain.
 const VALUES: usize = 40;
 const MORE: usize = 24;
 
-/// Designs that are looked at by moves before any is searched from.
+/// Number of designs evaluated by moves as starts of the search.
 pub(super) const FINALISTS: usize = 3;
 
-/// Share by which filters that are added have to make the cost smaller.
+/// Least relative reduction of the cost by added filters.
 const PAYS: f64 = 0.02;
 
-/// Step in the logarithm of a gain of the file that is changed alone until the limits hold, and most of them.
+/// Step in the logarithm of a single gain of the file that is changed until the limits hold, and the maximum number of
+/// steps.
 const ALONE: f64 = 0.25;
 const ALONE_STEPS: u8 = 16;
 
-/// Weight of what is beyond a limit, in ln J.
+/// Weight of an excess over a limit in ln J.
 pub(super) const STEEP: f64 = 30.0;
 
-/// A tuning on its way.
+/// A tuning in progress.
 pub(super) struct Work<'a> {
     pub case: &'a Case,
     pub family: &'a Family,
@@ -48,41 +49,41 @@ pub(super) struct Work<'a> {
     pub moves: &'a [Move],
     /// I₀ of each move, A.
     pub asked: Vec<f64>,
-    /// The moves as the shaper of the controller makes them, which no search changes.
+    /// The shaped moves; a search does not change the shaper.
     pub shaped: Vec<Vec<Profile>>,
-    /// The axes of all machines of the family, and what a controller sees of them over frequency.
+    /// All machines of the family, and their frequency responses for a controller.
     pub stages: Vec<Machine>,
     pub plants: Vec<Plant>,
-    /// Machines on which the limits have to hold while searching.
+    /// Machines on which the limits have to hold during the search.
     set: Vec<usize>,
-    /// Of a corner that is none of the machines.
+    /// Responses of a corner outside the list of machines.
     more: Vec<Plant>,
     pub tried: usize,
     pub rounds: usize,
-    /// Samples of moves that were simulated, and most that a search may ask for.
+    /// Simulated samples of moves, and the budget of a search.
     pub spent: Cell<u64>,
     pub most: u64,
-    /// The least current of each move that was seen at worst, A.
+    /// The least worst-case current of each move so far, A.
     pub least: RefCell<Vec<f64>>,
-    /// Verdicts that were given.
+    /// Computed verdicts.
     pub known: RefCell<Vec<Verdict>>,
     pub stop: &'a dyn Fn() -> bool,
 }
 
-/// A design that keeps the limits, as it is found.
+/// A design found that keeps the limits.
 #[derive(Debug, Clone)]
 pub(super) struct Finalist {
     pub design: Design,
-    /// The design that it was made from, the number of its filters, and the powers that lead to it.
+    /// The design that it was made from, the number of its filters, and its powers.
     pub start: Design,
     pub own: usize,
     pub powers: Vec<f64>,
-    /// ln of what steps do.
+    /// ln of the step response cost.
     value: f64,
 }
 
 impl Finalist {
-    /// A design as it is, with `own` filters that are not searched.
+    /// A design unchanged, with `own` filters that are not searched.
     pub fn at(design: &Design, own: usize) -> Self {
         let powers = vec![0.0; searched(design, own)];
         Self { design: design.clone(), start: design.clone(), own, powers, value: f64::INFINITY }
@@ -131,8 +132,8 @@ impl<'a> Work<'a> {
         margins.excess(self.tuning.sensitivity, self.tuning.complementary)
     }
 
-    /// The machine on which a design is worst, once the bad end is left out, how far it is beyond its limits there, and
-    /// how many machines are not stable.
+    /// The worst machine for a design, without the excluded ones, its excess over the limits, and the number of
+    /// unstable machines.
     fn worst(&self, feedback: &Feedback) -> (usize, f64, usize) {
         let (ms, mt) = (self.tuning.sensitivity, self.tuning.complementary);
         let peaks = self.plants.iter().map(|plant| Peaks::of(plant, feedback));
@@ -143,15 +144,14 @@ impl<'a> Work<'a> {
         (place, excess, unstable)
     }
 
-    /// The machine on which a design is worst, once the bad end is left out, and its margins; and how many are not
-    /// stable.
+    /// The worst machine for a design, without the excluded ones, and its margins; and the number of unstable machines.
     pub fn limits(&self, design: &Design) -> Result<(usize, Margins, usize)> {
         let feedback = self.feedback(design)?;
         let (place, _, unstable) = self.worst(&feedback);
         Ok((place, Margins::of(&self.plants[place], &feedback), unstable))
     }
 
-    /// Where a design passes a limit, if it does; what is worst joins the set.
+    /// True if a design exceeds a limit on some machine; the worst one then joins the set.
     pub fn passes(&mut self, design: &Design) -> Result<bool> {
         let feedback = self.feedback(design)?;
         let (place, excess, _) = self.worst(&feedback);
@@ -171,7 +171,7 @@ impl<'a> Work<'a> {
         Ok(false)
     }
 
-    /// How far a design is beyond the limits on the set, and what steps of command and reference do there at worst.
+    /// Excess of a design over the limits on the set, and its worst-case response to steps of command and reference.
     pub fn on_set(&mut self, design: &Design) -> (f64, f64) {
         self.tried += 1;
         let Ok(feedback) = self.feedback(design) else { return (f64::INFINITY, f64::INFINITY) };
@@ -179,15 +179,13 @@ impl<'a> Work<'a> {
         for plant in self.set.iter().map(|&place| &self.plants[place]).chain(&self.more) {
             let rough = Rough::of(plant, &feedback);
             most = most.max(rough.peaks.excess(self.tuning.sensitivity, self.tuning.complementary));
-            // What a step at the command does, and a step of the reference: the one alone would do without a position
-            // gain.
+            // Responses to steps of command and reference: the first alone could be optimised without a position gain.
             slow = slow.max(rough.disturbance * rough.following);
         }
         ((most / WITHIN - 1.0).max(0.0), slow)
     }
 
-    /// Modes of the axis that a command swings, each in the middle of where it goes along the travel, Hz; and the first
-    /// anti-resonance.
+    /// Modes excited by a command, each at the middle of its range along the travel, Hz; and the first anti-resonance.
     pub fn modes(&self) -> Result<(Vec<f64>, Option<f64>)> {
         let places = modes_along(&self.case.machine, self.family.nominal().bridge, &self.family.places)?;
         let swing = places.iter().filter_map(|place| place.undamped_antiresonances.first().copied()).reduce(f64::min);
@@ -212,7 +210,7 @@ impl<'a> Work<'a> {
         self.case.controller.as_ref().expect("a tuning has a controller")
     }
 
-    /// The best designs without a run, the best first: of each layout of filters the best of its starts.
+    /// The best designs without a run, in order: for each filter layout the best of its starts.
     pub fn screened(&mut self, given: &Design, is_given_good: bool) -> Result<(Vec<Finalist>, Option<f64>)> {
         let (modes, swing) = self.modes()?;
         let mut found: Vec<Finalist> = Vec::new();
@@ -221,7 +219,7 @@ impl<'a> Work<'a> {
             let mut best: Option<(f64, Design)> = None;
             let mut all = starts(&layout, &self.case.machine, swing, self.tuning.bandwidth, self.tuning.damping);
             all.push((layout.clone(), None));
-            // With the gains that were best with fewer filters, too.
+            // Also starts from the best gains with fewer filters.
             let least = found.iter().min_by(|a, b| a.value.total_cmp(&b.value));
             all.extend(least.map(|one| (Design { structure: one.design.structure.clone(), ..layout.clone() }, None)));
             for (start, hertz) in all {
@@ -242,7 +240,7 @@ impl<'a> Work<'a> {
                 break;
             }
         }
-        // Filters stay where they pay.
+        // Filters are kept if they reduce the cost.
         let plain = found.iter().find(|one| one.design.filters.len() == given.filters.len()).map(|one| one.value);
         if let Some(plain) = plain {
             let pays = |one: &Finalist| one.design.filters.len() == given.filters.len() || one.value < plain - PAYS;
@@ -254,7 +252,7 @@ impl<'a> Work<'a> {
         Ok((found, placed))
     }
 
-    /// The gains of the file; where they do not keep the limits, all of them slower until they do, and each alone.
+    /// The gains of the file; if they violate the limits, all slowed down until they hold, and each gain changed alone.
     fn of_file(&mut self, given: &Design, is_good: bool) -> Result<Vec<Finalist>> {
         let own = given.filters.len();
         let mut found = Vec::new();
@@ -268,7 +266,7 @@ impl<'a> Work<'a> {
         }
         let slowing = slowing(given, own, &self.case.machine);
         for (j, power) in slowing.iter().enumerate() {
-            // Weights of state feedback grow where a loop is to be slower, gains become less.
+            // For a slower loop, weights of state feedback grow and gains decrease.
             let step = if *power < 0.0 { ALONE } else { -ALONE };
             for count in 1..=ALONE_STEPS {
                 let powers: Vec<f64> =
@@ -287,8 +285,7 @@ impl<'a> Work<'a> {
         Ok(found)
     }
 
-    /// A start that keeps the limits on all machines: with its loop made slower as long as it does not. And the share
-    /// of its speed.
+    /// A start slowed down until it keeps the limits on all machines, and the factor on its speed.
     fn softened(&mut self, start: &Design, own: usize) -> Result<Option<(Design, f64)>> {
         let mut factor = 1.0;
         while factor > 1e-3 && !(self.stop)() {
@@ -301,7 +298,7 @@ impl<'a> Work<'a> {
         Ok(None)
     }
 
-    /// The best design from a start that keeps the limits, by what steps of command and reference do.
+    /// The best design from a start within the limits, by the response to steps of command and reference.
     fn improved(&mut self, start: Design, own: usize) -> Result<Option<Finalist>> {
         let count = searched(&start, own);
         let mut powers = vec![0.0; count];
@@ -329,7 +326,7 @@ impl<'a> Work<'a> {
         Ok(Some(Finalist { design, start, own, powers, value }))
     }
 
-    /// As far from what keeps the limits towards what does not as they allow.
+    /// Moves from a design that keeps the limits towards one that does not, as far as they allow.
     pub fn pulled(&mut self, start: &Design, own: usize, from: &[f64], to: &[f64]) -> Result<Vec<f64>> {
         let between = |part: f64| -> Vec<f64> { from.iter().zip(to).map(|(a, b)| a + part * (b - a)).collect() };
         let (mut near, mut far) = (0.0, 1.0);
@@ -340,8 +337,8 @@ impl<'a> Work<'a> {
         Ok(between(near))
     }
 
-    /// A design without those of its added filters, from number `own` on, without which the limits hold and it is as
-    /// good: `is_as_good` is asked with what it was and is.
+    /// A design without added filters, from number `own` on, that are not needed for the limits and do not improve it;
+    /// `is_as_good` compares before and after.
     pub fn pruned(
         &mut self,
         mut verdict: Verdict,
@@ -375,8 +372,8 @@ fn slower(design: &Design, own: usize, stage: &Machine, factor: f64) -> Design {
     shaped(design, own, &powers)
 }
 
-/// The power of the speed of a loop that each gain, and each number of filters from number `own` on, is to be multiplied
-/// by: of a PID or a cascade as if time went by more slowly, of state feedback by its weights.
+/// Exponents of the loop speed for each gain, and each number of filters from number `own` on: time scaling for a PID
+/// or a cascade, weights for state feedback.
 pub(super) fn slowing(design: &Design, own: usize, stage: &Machine) -> Vec<f64> {
     let power = |key: &str| match key {
         "controller.pid.proportional" => 2.0,
@@ -384,7 +381,7 @@ pub(super) fn slowing(design: &Design, own: usize, stage: &Machine) -> Vec<f64> 
         "controller.pid.derivative" | "controller.cascade.position" | "controller.cascade.speed" => 1.0,
         "controller.cascade.speed_integral" => 2.0,
         "controller.cascade.current.proportional" | "controller.cascade.current.integral" => 0.5,
-        // About the square root of what the bandwidth is; more so of the integral, which has a time in it.
+        // About the square root of the bandwidth; a higher power for the integral, which contains a time.
         key if key.ends_with(".integral") => -2.0,
         "controller.state_feedback.position" | "controller.state_feedback.speed" => -1.0,
         _ => 0.0,
@@ -395,7 +392,7 @@ pub(super) fn slowing(design: &Design, own: usize, stage: &Machine) -> Vec<f64> 
     all
 }
 
-/// Frequency of a top in Hz: of the mode of the axis that is within a fifth of it, or its own.
+/// Frequency of a peak in Hz: that of the mode within a fifth of it, or its own.
 pub(super) fn mode_at(omega: f64, modes: &[f64]) -> f64 {
     let hertz = omega / (2.0 * PI);
     let near = modes.iter().copied().min_by(|a, b| (a / hertz).ln().abs().total_cmp(&(b / hertz).ln().abs()));

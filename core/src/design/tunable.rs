@@ -1,5 +1,5 @@
-//! Questions of tuning, hunting, the reader of case files and reports to a structure. No answer has a default, so that
-//! the compiler lists them all for a new structure.
+//! Properties of a structure that tuning, limit cycles, the case reader and reports require. None has a default, so
+//! that the compiler lists them all for a new structure.
 
 use super::placement::{CASCADE, least};
 use super::{
@@ -12,7 +12,7 @@ use std::f64::consts::PI;
 /// Method by which gains of a structure are found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TunedBy {
-    /// They follow from bandwidth and damping, and a search begins there.
+    /// They follow from bandwidth and damping, where a search begins.
     Bandwidth,
     /// They follow from weights, at which a search begins.
     Weights,
@@ -20,7 +20,7 @@ pub enum TunedBy {
     Nothing,
 }
 
-/// Answers that every structure gives.
+/// Properties of every structure.
 pub trait Tunable {
     /// Its key in the case file.
     fn word(&self) -> &'static str;
@@ -31,56 +31,54 @@ pub trait Tunable {
     /// True if it uses a scale beside the encoder.
     fn reads_scale(&self) -> bool;
 
-    /// True if its position loop is closed at that scale, where no stretch is seen.
+    /// True if its position loop is closed at the scale, which does not measure stretch.
     fn follows_scale(&self) -> bool;
 
-    /// True if it commands a current inside itself.
+    /// True if it has an inner current loop.
     fn commands_current(&self) -> bool;
 
-    /// Feed-forward where the case file says nothing.
+    /// Default feed-forward.
     fn feed_forward(&self) -> FeedForwardModel;
 
     /// Method by which its gains are found.
     fn tuned_by(&self) -> TunedBy;
 
-    /// With gains for this bandwidth (Hz) and damping, as [`super::placement::place`] says; none where it has no such
-    /// gains.
+    /// With gains for this bandwidth (Hz) and damping by [`super::placement::place`]; none without such gains.
     fn placed(&self, design: &Design, machine: &Machine, bandwidth: f64, damping: f64) -> Option<Structure>;
 
-    /// Other gains to begin a search with.
+    /// Further starting gains of a search.
     fn starts(&self, design: &Design, machine: &Machine) -> Vec<Structure>;
 
-    /// With its integral action times `factor`, none with 0; none without integral action.
+    /// With its integral action multiplied by `factor`, without it if that is 0; none without integral action.
     fn integral_times(&self, factor: f64) -> Option<Structure>;
 
-    /// By how much the command that it gives grows per second and metre of an error that stays, V or A; zero where that
-    /// is not known from its gains alone.
+    /// Growth of the command under a constant error, V/(m s) or A/(m s); zero if it does not follow from the gains
+    /// alone.
     fn ramp(&self) -> f64;
 
-    /// True if nothing in it damps, so that it wants a derivative.
+    /// True if it has no damping and needs a derivative.
     fn lacks_damping(&self) -> bool;
 
-    /// Samples of a run that take as long as its margins on a set of axes.
+    /// Cost of its margins on a set of axes, as a number of samples of a run.
     fn costs(&self) -> u64;
 
-    /// Its gains as drives have them; those that are not in use are left out.
+    /// Its gains in the form of industrial drives, without those not in use.
     fn in_drives(&self) -> Vec<InDrives>;
 }
 
-/// A gain as drives have it.
+/// A gain in the form of industrial drives.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InDrives {
-    /// As it is called there.
+    /// Name in manuals of drives.
     pub name: &'static str,
-    /// In the unit that is used there.
+    /// Value in `unit`.
     pub value: f64,
     /// Unit of the value.
     pub unit: &'static str,
 }
 
 impl Filter {
-    /// Its numbers as drives have them: frequency, width between the points at −3 dB of a notch that goes to zero, and
-    /// depth.
+    /// Its parameters in the form of industrial drives: frequency, −3 dB width of a notch that goes to zero, and depth.
     pub fn in_drives(&self) -> Vec<InDrives> {
         match *self {
             Self::Notch { frequency, depth, damping } => vec![
@@ -97,14 +95,14 @@ impl Filter {
 }
 
 impl Design {
-    /// Gains and filters as drives have them.
+    /// Gains and filters in the form of industrial drives.
     pub fn in_drives(&self) -> Vec<InDrives> {
         let filters = self.filters.iter().flat_map(Filter::in_drives);
         self.structure.tunable().in_drives().into_iter().chain(filters).collect()
     }
 }
 
-/// Margins of gains that need nothing solved before, and those behind two Riccati equations.
+/// Cost without and with the solution of two Riccati equations.
 const QUICK: u64 = 500;
 const SOLVED: u64 = 2000;
 
@@ -253,7 +251,7 @@ impl Tunable for Cascade {
                 ..inner
             }
         });
-        // Around a current the axis has no back-EMF.
+        // With a current loop, back-EMF does not damp the axis.
         let (drag, push) = match current {
             Some(_) => (rigid.viscous[0], rigid.force_per_ampere),
             None => (rigid.drag(), rigid.force_per_command()),
@@ -327,7 +325,7 @@ impl Tunable for StateFeedback {
         false
     }
 
-    /// It has its states from the model.
+    /// Its reference states come from the model.
     fn feed_forward(&self) -> FeedForwardModel {
         FeedForwardModel::Elastic
     }
@@ -352,7 +350,7 @@ impl Tunable for StateFeedback {
         Some(Structure::StateFeedback(Self { integral, ..*self }))
     }
 
-    /// It follows from the weights by an equation.
+    /// It follows from the weights by a Riccati equation.
     fn ramp(&self) -> f64 {
         0.0
     }
@@ -414,7 +412,7 @@ impl Tunable for SlidingMode {
         (self.integral != 0.0).then_some(Structure::SlidingMode(Self { integral, ..*self }))
     }
 
-    /// It ends at the boundary of its layer, and depends on the mass of the axis.
+    /// It is bounded by the boundary layer, and depends on the mass of the axis.
     fn ramp(&self) -> f64 {
         0.0
     }
@@ -475,7 +473,7 @@ impl Tunable for Fuzzy {
         None
     }
 
-    /// It is not the same for all errors.
+    /// It depends on the error.
     fn ramp(&self) -> f64 {
         0.0
     }

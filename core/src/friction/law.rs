@@ -43,7 +43,7 @@ pub enum Law {
 }
 
 impl Law {
-    /// True if a body under it is never at rest for good: it creeps, or hangs on its bristles.
+    /// True if a body never sticks: it creeps, or hangs on its bristles.
     pub fn never_sticks(self) -> bool {
         match self {
             Law::Coulomb | Law::Stribeck { .. } => false,
@@ -51,7 +51,7 @@ impl Law {
         }
     }
 
-    /// The speed on whose scale friction changes, where it is a curve.
+    /// Characteristic speed of a friction curve; none for Coulomb friction.
     pub fn velocity(self) -> Option<f64> {
         match self {
             Law::Coulomb => None,
@@ -71,7 +71,7 @@ pub enum Shape {
     Exponential,
 }
 
-/// The Stribeck velocity v_s that the paper's F_τ (s²/m² or s²/rad²) stands for: e^{−F_τ v²} = e^{−(v/v_s)²}.
+/// Stribeck velocity v_s for the paper's F_τ (s²/m² or s²/rad²): e^{−F_τ v²} = e^{−(v/v_s)²}.
 pub fn velocity_of_decay(decay: f64) -> f64 {
     // v_s = 1/√F_τ                                                             (14)
     1.0 / decay.sqrt()
@@ -91,10 +91,10 @@ impl Shape {
         }
     }
 
-    /// The share of F_b − F_c that is left at q = v/v_s, q counted in the direction of motion.
+    /// Remaining fraction of F_b − F_c at q = v/v_s, with q positive in the direction of motion.
     ///
-    /// A trial step may end beyond zero speed, q < 0, before its event is found. There the exponential goes on as it
-    /// is, so that the step is smooth, and from q = −1 on along its tangent, so that it does not overflow.
+    /// A trial step may end beyond zero speed, q < 0, before its event is found. There the exponential is continued, so
+    /// that the step is smooth, and beyond q = −1 its tangent, so that it does not overflow.
     #[inline(always)]
     pub(crate) fn share(self, q: f64) -> f64 {
         match self {
@@ -113,7 +113,7 @@ impl Shape {
 pub(crate) fn exp(x: f64) -> f64 {
     /// ln 2 in two parts, the first of them short enough for k times it to be exact.
     const LN_2: [f64; 2] = [0.693_147_180_369_123_8, 1.908_214_929_270_587_7e-10];
-    /// 1.5 · 2⁵²: what is added to it is rounded to a whole number, which stands in its last bits.
+    /// 1.5 · 2⁵²: adding it rounds a number to an integer in its last bits.
     const WHOLE: f64 = 6_755_399_441_055_744.0;
     const REST: [f64; 12] = {
         let (mut table, mut factorial, mut k) = ([0.0; 12], 1.0, 2);
@@ -124,7 +124,7 @@ pub(crate) fn exp(x: f64) -> f64 {
         }
         table
     };
-    // What is beyond is nothing, or too large to be told. No number stays none.
+    // Beyond these limits the result is 0 or overflows. NaN stays NaN.
     let x = if x < -708.0 { -708.0 } else { x };
     let x = if x > 709.0 { 709.0 } else { x };
     let shifted = x * std::f64::consts::LOG2_E + WHOLE;
@@ -142,7 +142,7 @@ pub(crate) fn exp(x: f64) -> f64 {
 }
 
 impl Friction {
-    /// Friction while sliding steadily at `velocity`; at zero, what it tends to from above. Not for a body at rest.
+    /// Friction while sliding steadily at `velocity`; at zero, the limit from above. Not for a body at rest.
     ///
     /// ```
     /// use taut::friction::{Friction, Law, Shape};
@@ -158,7 +158,7 @@ impl Friction {
         side.viscous * velocity + self.dry(forward, sign * velocity) * sign
     }
 
-    /// The part of it that is not viscous, at the speed `v` ≥ 0 in the given direction.
+    /// Dry friction, without the viscous part, at the speed `v` ≥ 0 in the given direction.
     #[inline(always)]
     pub fn dry(&self, forward: bool, v: f64) -> f64 {
         self.dry_at(forward, [v])[0]
@@ -169,13 +169,13 @@ impl Friction {
     pub(crate) fn dry_at<const N: usize>(&self, forward: bool, v: [f64; N]) -> [f64; N] {
         let side = self.side(forward);
         let (coulomb, above) = (side.coulomb, side.breakaway - side.coulomb);
-        // Written into place: several of them are one operation where the processor has such.
+        // Written in place, so that the compiler can vectorise it.
         let mut dry = [coulomb; N];
         match self.law {
             Law::Coulomb => {}
             // F_c + F_s e^{−F_τ v²}                                              (14)
             Law::Stribeck { velocity, shape: Shape::Gaussian } | Law::LuGre { velocity, .. } => {
-                // Of bristles: what they carry in steady sliding, g(v).
+                // For bristles: their force in steady sliding, g(v).
                 dry.iter_mut().zip(v).for_each(|(dry, v)| *dry += above * Shape::Gaussian.share(v / velocity));
             }
             Law::Stribeck { velocity, shape: Shape::Exponential } => {
@@ -213,7 +213,7 @@ impl Friction {
             }
     }
 
-    /// The friction that a body at rest overcomes before it slides this way: zero for laws that never stick.
+    /// Breakaway of a body at rest in this direction; zero for laws that never stick.
     pub fn breakaway(&self, forward: bool) -> f64 {
         match self.law {
             Law::Coulomb | Law::Stribeck { .. } => self.side(forward).breakaway,

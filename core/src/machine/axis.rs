@@ -21,7 +21,7 @@ pub const DRIVE: usize = 0;
 pub const CART: usize = 1;
 /// Number of the idler pulley.
 pub const IDLER: usize = 2;
-/// Number of the rotor, where the gear is compliant.
+/// Number of the rotor, if the gear is compliant.
 pub const ROTOR: usize = 3;
 /// Number of bodies with friction of their own.
 pub const BODIES: usize = 3;

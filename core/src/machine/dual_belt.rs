@@ -1,10 +1,10 @@
 //! Geometry of a gantry with a belt on either side of its bridge, and one along it for the cart: three motors.
 //!
 //! Coordinates are φ₁, φ₂ of the drive pulleys on the left and on the right, φ₃ of the cart's, x of the bridge and y of
-//! the cart on it. The left and right motor are fixed in front; each belt runs from its motor to an idler at the far end
-//! and back, and the bridge is clamped to the strand that comes back. The cart's motor is mounted on the left end of the
-//! bridge and moves with it, so that its belt is strained by motion of the cart alone, and `bridge.mass` contains it.
-//! Idlers have neither inertia nor friction, and the bridge does not yaw. Rows of A, one a span:
+//! the cart on it. The left and right motor are fixed in front; each belt runs from its motor to an idler at the far
+//! end and back, and the bridge is clamped to the strand that comes back. The cart's motor is mounted on the left end
+//! of the bridge and moves with it, so only motion of the cart strains its belt, and `bridge.mass` contains it. Idlers
+//! have neither inertia nor friction, and the bridge does not yaw. Rows of A, one a span:
 //!
 //! ```text
 //!              φ₁   φ₂   φ₃   x    y
@@ -16,12 +16,13 @@
 //!  cart back (           −r         1 )
 //! ```
 //!
-//! T = ½ J₁ φ̇₁² + ½ J₂ φ̇₂² + ½ J₃ φ̇₃² + ½ (m_bridge + m_cart) ẋ² + ½ m_cart ẏ². A pulley turns about a vertical axis, so
-//! that what φ̇₃ stores does not depend on ẋ.
+//! T = ½ J₁ φ̇₁² + ½ J₂ φ̇₂² + ½ J₃ φ̇₃² + ½ (m_bridge + m_cart) ẋ² + ½ m_cart ẏ². A pulley turns about a vertical
+//! axis, so the energy of φ̇₃ does not depend on ẋ.
 //!
-//! With belts without strain r φ₁ = r φ₂ = x and r φ₃ = y. Two drives move the bridge: by the drives it is at the mean of
-//! both, r (φ₁ + φ₂)/2 − x = (s_left out + s_right out)/2, and r φ₃ − y = s_cart out. Of five degrees of freedom two are
-//! rigid and three elastic, in one of which both pulleys swing against each other while the bridge stands still.
+//! With belts without strain r φ₁ = r φ₂ = x and r φ₃ = y. Two drives move the bridge; its position by the drives is
+//! their mean, r (φ₁ + φ₂)/2 − x = (s_left out + s_right out)/2, and r φ₃ − y = s_cart out. Of five degrees of freedom,
+//! two are rigid and three elastic; in one of these both pulleys oscillate in opposite directions while the bridge is
+//! at rest.
 
 use super::gantry::{LEFT, LEFT_DRIVE, RIGHT, RIGHT_DRIVE, bridge, cart};
 use super::geometry::Lever::{One, Radius};
@@ -35,8 +36,8 @@ const CART: usize = 4;
 
 const CART_DRIVE: DriveAt = drive!("cart", CART_PULLEY);
 
-/// A span of the belt on this side, between its drive pulley and what slides. `sign` is 1 where the pulley stretches it
-/// forward; `out` is the number of the span that runs out.
+/// A span of the belt on this side, between its drive pulley and the slide. `sign` is 1 if forward motion of the pulley
+/// stretches it; `out` is the number of the outgoing span.
 macro_rules! span {
     ($side:literal, $way:literal, ($pulley:expr, $slide:expr), sign = $sign:literal, out = $out:literal) => {
         SpanAt {

@@ -14,9 +14,9 @@
 //! T = ½ J₁ φ̇₁² + ½ J₂ φ̇₂² + ½ (m_bridge + m_cart) ẋ² + ½ m_cart ẏ²: the cart rides along with the bridge.
 //! Sollmann, Jouaneh and Lavender, IEEE/ASME Transactions on Mechatronics 15(2), 2010, eq. (12)-(20), for the H-frame.
 //!
-//! With the belt without strain r φ₁ = −x − y and r φ₂ = x − y of the H-frame, r φ_A = x + y and r φ_B = x − y of
-//! CoreXY. What the drives say is off by r (φ₂ − φ₁)/2 − x = −(s_left + s_right)/2 and −r (φ₁ + φ₂)/2 − y =
-//! (s_right − s_left)/2 of the H-frame, r (φ_A ± φ_B)/2 − (x or y) = (s_A out ± s_B out)/2 of CoreXY.
+//! Without strain, r φ₁ = −x − y and r φ₂ = x − y for the H-frame, r φ_A = x + y and r φ_B = x − y for CoreXY.
+//! Positions by the drives have the errors r (φ₂ − φ₁)/2 − x = −(s_left + s_right)/2 and −r (φ₁ + φ₂)/2 − y = (s_right
+//! − s_left)/2 of the H-frame, r (φ_A ± φ_B)/2 − (x or y) = (s_A out ± s_B out)/2 of CoreXY.
 
 use super::geometry::Lever::{One, Radius};
 use super::geometry::{BodyAt, DriveAt, Geometry, Part, SlideAt, SpanAt, drive};
@@ -39,7 +39,7 @@ pub(super) const RIGHT_DRIVE: DriveAt = drive!("right", RIGHT);
 
 const DRIVES: [DriveAt; 2] = [LEFT_DRIVE, RIGHT_DRIVE];
 
-/// Bodies, with where the pulleys are by x and y.
+/// Bodies, with the positions of the pulleys by x and y.
 const fn bodies(left: &'static [f64; 2]) -> [BodyAt; BODIES] {
     [
         BodyAt { label: Label { key: "left", name: "left pulley" }, part: Part::DrivePulley, by_slides: left },
@@ -53,7 +53,7 @@ const fn bodies(left: &'static [f64; 2]) -> [BodyAt; BODIES] {
     ]
 }
 
-/// The sliding parts, with their positions by the drives and the errors of those.
+/// The sliding parts, with their positions by the drives and the errors of these.
 const fn slides(by_drives: [&'static [f64]; 2], errors: [&'static [(usize, f64)]; 2]) -> [SlideAt; 2] {
     [bridge(BRIDGE, by_drives[0], errors[0]), cart(CART, by_drives[1], errors[1])]
 }

@@ -1,4 +1,4 @@
-//! The geometry of a machine: which bodies there are, how the belt runs between them, and what the drives move.
+//! Geometry of a machine: its bodies, the course of the belt, and the motion by the drives.
 
 use crate::mechanism::Label;
 
@@ -7,7 +7,7 @@ use crate::mechanism::Label;
 pub struct Geometry {
     /// Its name in the case file.
     pub word: &'static str,
-    /// For people.
+    /// Name in messages.
     pub name: &'static str,
     /// Its belts, in words.
     pub belts: &'static str,
@@ -34,13 +34,13 @@ pub struct DriveAt {
     pub current_column: &'static str,
     /// The body that its gear turns.
     pub pulley: usize,
-    /// Its gear, where that is compliant.
+    /// Its gear, if compliant.
     pub gear: Label,
-    /// Its rotor there.
+    /// Its rotor, if the gear is compliant.
     pub rotor: Label,
-    /// Prefix of an axis' key: `left_drive.`.
+    /// Prefix of its keys: `left_drive.`.
     pub key: &'static str,
-    /// Prefix of an axis' column: `left_`. Without the line it is its input's name.
+    /// Prefix of its columns: `left_`; without the underscore, the name of its input.
     pub prefix: &'static str,
     /// Key of the column of its input in a log.
     pub input: &'static str,
@@ -70,9 +70,9 @@ pub(super) use drive;
 pub struct BodyAt {
     /// Its name.
     pub label: Label,
-    /// The part of a machine that it is.
+    /// Its part of a machine.
     pub part: Part,
-    /// Where it is with the belt without strain, as a sum over the slides' positions: divided by the radius, an angle.
+    /// Its position without strain as a weighted sum over the slides' positions; divided by the radius, an angle.
     pub by_slides: &'static [f64],
 }
 
@@ -96,20 +96,20 @@ pub struct SpanAt {
     pub label: Label,
     /// Prefix of the columns of its force and slack.
     pub column: &'static str,
-    /// By how much it gets longer per way of each body.
+    /// Elongation per displacement of each body.
     pub arms: &'static [(usize, Lever)],
-    /// By how much its own length, from end to end, changes per way of what slides; nothing where it does not.
+    /// Change of its length from end to end per displacement of each slide; empty if its ends are fixed.
     pub follows: &'static [(usize, f64)],
-    /// Its stretch as a sum over the stretches of [`Geometry::telling_spans`]: the spans of a belt add up to nothing.
+    /// Its elongation as a sum over those of [`Geometry::telling_spans`]: the spans of a belt add up to zero.
     pub by_others: &'static [(usize, f64)],
 }
 
 /// A lever arm.
 #[derive(Debug, Clone, Copy)]
 pub enum Lever {
-    /// So many times the pulleys' radius.
+    /// A multiple of the pulleys' radius.
     Radius(f64),
-    /// This number.
+    /// A number.
     One(f64),
 }
 
@@ -123,37 +123,37 @@ impl Lever {
     }
 }
 
-/// Something that slides, and so a coordinate of the machine.
+/// A slide: a coordinate of the machine.
 #[derive(Debug)]
 pub struct SlideAt {
     /// Its body.
     pub body: usize,
     /// Its end stops.
     pub stop: Label,
-    /// The column of a force on it along its travel, and what that is.
+    /// Column and name of a force along its travel.
     pub force_along: Label,
     /// Column of a force that depends on its speed.
     pub force_by_speed: Label,
-    /// Where the drives have it, as a sum over the angles of their pulleys, times the radius.
+    /// Its position by the drives as a weighted sum over r φ of their pulleys.
     pub by_drives: &'static [f64],
     /// Position by the drives minus true position, as a sum over span elongations: (span, weight).
     pub error: &'static [(usize, f64)],
 }
 
 impl DriveAt {
-    /// Its side, as inputs and commands are named: `left`. Without the line it has the name of its only input.
+    /// Its side, as in names of inputs and commands: `left`, or the name of the only input of an axis.
     pub fn side(&self) -> &'static str {
         self.prefix.strip_suffix('_').unwrap_or(self.prefix)
     }
 }
 
 impl Geometry {
-    /// The names of the drives' sides, as inputs and commands are named.
+    /// Sides of the drives, as in names of inputs and commands.
     pub fn sides(&self) -> impl Iterator<Item = &'static str> {
         self.drives.iter().map(DriveAt::side)
     }
 
-    /// The key of a drive in results: its side, or its pulley's where it is the only one.
+    /// Key of a drive in results: its side, or its pulley if it is the only drive.
     pub fn drive_key(&self, drive: &DriveAt) -> &'static str {
         if drive.side().is_empty() { self.label(drive.pulley).key } else { drive.side() }
     }
@@ -173,7 +173,7 @@ impl Geometry {
         self.slides[self.slides.len() - 1].body
     }
 
-    /// The spans that only this drive pulls at: those of its own belt, or of its side of a common one.
+    /// Spans pulled by this drive alone: of its own belt, or of its side of a common one.
     pub fn spans_of(&self, drive: usize) -> impl Iterator<Item = usize> {
         let is_pulley = |body: usize| self.drives.iter().any(|drive| drive.pulley == body);
         let own = self.drives[drive].pulley;
@@ -184,7 +184,7 @@ impl Geometry {
         self.spans.iter().enumerate().filter(move |(_, span)| is_own(span)).map(|(index, _)| index)
     }
 
-    /// The spans whose stretches tell by how much all drives are off, and from which those of all spans follow.
+    /// Spans whose elongations determine the position errors of all drives and the elongations of all other spans.
     pub fn telling_spans(&self) -> impl Iterator<Item = usize> {
         let tells = |span: &usize| self.slides.iter().any(|slide| slide.error.iter().any(|(own, _)| own == span));
         (0..self.spans.len()).filter(tells)

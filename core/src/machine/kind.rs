@@ -35,7 +35,7 @@ impl Kind {
         self.geometry().word
     }
 
-    /// For people.
+    /// Name in messages.
     pub fn name(self) -> &'static str {
         self.geometry().name
     }
@@ -58,7 +58,7 @@ mod tests {
         for kind in Kind::ALL {
             let geometry = kind.geometry();
             let turns = |body: usize| matches!(geometry.bodies[body].part, Part::DrivePulley | Part::IdlerPulley);
-            // Without strain no span is stretched, and the drives have everything where it is.
+            // Without strain no span is stretched, and positions by the drives are exact.
             for (number, slide) in geometry.slides.iter().enumerate() {
                 let mut at = [0.0; BODIES];
                 for (body, place) in geometry.bodies.iter().enumerate() {
@@ -71,7 +71,7 @@ mod tests {
                     assert!(length(span, r, &at).abs() < 1e-12, "{} {}", geometry.word, span.label.key);
                 }
             }
-            // Any position: errors and stretches are what the arms say.
+            // Any position: errors and elongations follow from the arms.
             let at: [f64; BODIES] = std::array::from_fn(|body| {
                 if body < geometry.bodies.len() { (1.0 + body as f64).sqrt() - 0.3 * body as f64 } else { 0.0 }
             });

@@ -1,8 +1,8 @@
-//! What can be measured of a machine: the quantities, and how positions go with the slides of a geometry.
+//! Measurable quantities of a machine, and positions from the slide coordinates of a geometry.
 
 use super::{EncoderPlace, Geometry, Kind, Machine, Part};
 
-/// Quantities that can be measured; the recorder of an axis takes those up to [`Quantity::CartSpeed`].
+/// Measurable quantities; the recorder of an axis supports those up to [`Quantity::CartSpeed`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Quantity {
     /// Current of the armature, A.
@@ -55,7 +55,7 @@ pub enum Quantity {
     RightRotorAngle,
     /// Its speed, rad/s.
     RightRotorSpeed,
-    /// Acceleration of the bridge along x, m/s²: what an accelerometer at the cart shows of it, too.
+    /// Acceleration of the bridge along x, m/s², also measured by an accelerometer at the cart.
     BridgeAcceleration,
     /// Current of the motor of a cart that has one of its own, A.
     CartCurrent,
@@ -69,7 +69,7 @@ pub enum Quantity {
 
 use Quantity::*;
 
-/// Of an axis, in the order of a log.
+/// Quantities of an axis, in the order of a log.
 const OF_AXIS: [Quantity; 11] = [
     MotorCurrent,
     MotorVoltage,
@@ -84,7 +84,7 @@ const OF_AXIS: [Quantity; 11] = [
     CartAcceleration,
 ];
 
-/// Of a gantry.
+/// Quantities of a gantry.
 const OF_GANTRY: [Quantity; 18] = [
     LeftCurrent,
     RightCurrent,
@@ -106,7 +106,7 @@ const OF_GANTRY: [Quantity; 18] = [
     CartAcceleration,
 ];
 
-/// Of a gantry whose cart has a motor of its own, and whose gears are stiff.
+/// Quantities of a gantry with a motor for the cart and stiff gears.
 const OF_DUAL_BELT: [Quantity; 18] = [
     LeftCurrent,
     RightCurrent,
@@ -129,7 +129,7 @@ const OF_DUAL_BELT: [Quantity; 18] = [
 ];
 
 impl Quantity {
-    /// Those that a kind of machine has, in the order of a log.
+    /// Quantities of a kind of machine, in the order of a log.
     pub const fn of(kind: Kind) -> &'static [Quantity] {
         match kind {
             Kind::Axis => &OF_AXIS,
@@ -138,7 +138,7 @@ impl Quantity {
         }
     }
 
-    /// Those of every kind of machine, each once.
+    /// Quantities of all kinds of machines, each once.
     pub fn all() -> impl Iterator<Item = Quantity> {
         let gantries = OF_GANTRY.into_iter().filter(|quantity| !OF_AXIS.contains(quantity));
         let known = |quantity: &Quantity| OF_AXIS.contains(quantity) || OF_GANTRY.contains(quantity);
@@ -191,7 +191,7 @@ impl Quantity {
         }
     }
 
-    /// True if it is a position or an angle, so that a constant added to it changes nothing else.
+    /// True for a position or an angle, whose origin is arbitrary.
     pub fn is_position(self) -> bool {
         matches!(self.unit(), "m" | "rad")
     }
@@ -201,12 +201,12 @@ impl Quantity {
         matches!(self.unit(), "m/s" | "rad/s")
     }
 
-    /// True if it is measured along the travel of a slide, m and its derivatives, and not around a pulley.
+    /// True if it is linear (m and derivatives), not angular.
     pub fn is_linear(self) -> bool {
         matches!(self.unit(), "m" | "m/s" | "m/s^2")
     }
 
-    /// True if it is of a rotor behind a gear.
+    /// True for a quantity of a rotor behind a gear.
     pub fn is_of_rotor(self) -> bool {
         self.name().contains("rotor_")
     }
@@ -216,7 +216,7 @@ impl Quantity {
         self.unit() == "m/s^2"
     }
 
-    /// The speed that belongs to a position, among the bodies with a column for each of both.
+    /// The speed for a position, for bodies that have columns of both.
     pub fn speed(self) -> Option<Quantity> {
         match self {
             DriveAngle => Some(DriveSpeed),
@@ -229,7 +229,7 @@ impl Quantity {
         }
     }
 
-    /// The name of the body or rotor whose motion it is: `cart` of `cart_position`; none if it is no motion.
+    /// Name of the body or rotor that it measures: `cart` for `cart_position`; none if it is not a motion.
     pub fn body(self) -> Option<&'static str> {
         let is_motion = self.is_linear() || self.is_position() || self.is_speed();
         self.name().rsplit_once('_').map(|(body, _)| body).filter(|_| is_motion)
@@ -237,8 +237,8 @@ impl Quantity {
 }
 
 impl Geometry {
-    /// Change of a position or angle per metre of each slide where the belt has no strain and pulleys the radius `r`;
-    /// no values for any other quantity.
+    /// Change of a position or angle per metre of each slide without strain, for the pulley radius `r`; empty for other
+    /// quantities.
     pub fn by_slides(&self, quantity: Quantity, r: f64) -> Vec<f64> {
         let Some(name) = quantity.body().filter(|_| quantity.is_position()) else { return Vec::new() };
         let rotor = self.drives.iter().find(|drive| drive.rotor.key == name).map(|drive| drive.pulley);
@@ -250,12 +250,12 @@ impl Geometry {
 }
 
 impl Machine {
-    /// The quantities that a log of it can have.
+    /// Quantities that its logs can contain.
     pub fn quantities(&self) -> &'static [Quantity] {
         Quantity::of(self.kind)
     }
 
-    /// The quantities that its encoder counts, one for each drive, or that of the cart; before a gear the rotor's, too.
+    /// Quantities counted by its encoder: one for each drive, or the cart's; before a gear also the rotor's.
     pub fn counted(&self) -> impl Iterator<Item = Quantity> {
         let geometry = self.geometry();
         let at = self.encoder.map(|encoder| encoder.at);
@@ -272,13 +272,13 @@ impl Machine {
         self.quantities().iter().copied().filter(is_counted)
     }
 
-    /// True if it has one coordinate, so that it can be taken for a single mass along a belt.
+    /// True if it has one coordinate, so that it can be modelled as a single mass.
     pub fn has_one_coordinate(&self) -> bool {
         self.geometry().slides.len() == 1
     }
 
-    /// True if the torque of its motor follows from the input, so that the forces on it balance as on a single mass: it
-    /// has one coordinate, and no stepper.
+    /// True if its motor torque follows from the input, so that a force balance of a single mass exists: one
+    /// coordinate, and no stepper.
     pub fn has_torque_balance(&self) -> bool {
         self.has_one_coordinate() && self.stepper().is_none()
     }

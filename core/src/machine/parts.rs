@@ -1,4 +1,4 @@
-//! A machine as a mechanism: its bodies, springs and drives by its geometry, what is shown of them, and the state
+//! A machine as a mechanism: bodies, springs and drives by its geometry, their columns and readings, and the state
 //! without strain.
 
 use super::{
@@ -132,7 +132,7 @@ impl Machine {
         self.geometry().spans.iter().enumerate().map(span).collect()
     }
 
-    /// The span that span `index` does alike, if any: itself, but span 3 of a two-mass model carries what span 2 does.
+    /// The span that carries the force of span `index`, if any: itself, but span 2 for span 3 of a two-mass model.
     pub fn span_alike(&self, index: usize) -> Option<usize> {
         match (self.belt.model, index) {
             (BeltModel::Rigid, _) => None,
@@ -141,8 +141,8 @@ impl Machine {
         }
     }
 
-    /// How a span's length follows what slides. Spans 2 and 3 in series are one of their lengths together; their damping
-    /// stays as it is at x = 0.
+    /// Dependence of a span's length on the sliding parts. Spans 2 and 3 in series are one span of their total length;
+    /// their damping keeps its value at x = 0.
     fn follows(&self, index: usize, at: &SpanAt) -> Option<Follows> {
         let mut make = self.belt.following()?;
         match self.belt.model {
@@ -154,9 +154,9 @@ impl Machine {
         (!at.follows.is_empty()).then_some(follows)
     }
 
-    /// Of one drive in the order of [`crate::solve::reading`]. Of several speeds of what slides, currents, forces of
-    /// the spans, the stretches that tell what the drives do not see and from which those of all spans follow, and the
-    /// speeds of the motors: of rotors that turn by themselves, or of their pulleys.
+    /// For one drive, in the order of [`crate::solve::reading`]. For several: speeds of the slides, currents, span
+    /// forces, the elongations that determine the drives' position errors and all other elongations, and the speeds of
+    /// the motors (independent rotors, or their pulleys).
     fn readings(&self, mechanism: &Mechanism) -> Vec<Shown> {
         let geometry = self.geometry();
         let spans = 0..geometry.spans.len();
@@ -164,7 +164,7 @@ impl Machine {
         let loads = geometry.slides.iter().map(|slide| Shown::Speed(slide.body, 1.0));
         let currents = (0..mechanism.drives.len()).map(Shown::Current);
         let shafts = mechanism.drives.iter().map(|drive| Shown::Speed(drive.shaft, 1.0));
-        // A stepper's phases have voltages of their own: there is its command.
+        // A stepper has two phase voltages, so its command is read instead.
         let supply = |drive: &Drive| if drive.motor.stepper.is_some() { Shown::Input(0) } else { Shown::Voltage(0) };
         match &mechanism.drives[..] {
             [drive] => loads
@@ -182,8 +182,8 @@ impl Machine {
         }
     }
 
-    /// Readings for the observer of a move: of several drives with the positions of what slides in place of its speeds,
-    /// as there is no room for both.
+    /// Readings for the observer of a move; with several drives, positions of the slides replace their speeds, since
+    /// the capacity does not suffice for both.
     pub fn readings_of_move(&self, mechanism: &Mechanism) -> Vec<Shown> {
         let mut readings = mechanism.readings.clone();
         if self.drives.len() > 1 {
@@ -279,13 +279,13 @@ impl Machine {
         self.without_strain(&[x], &[])
     }
 
-    /// The state with what slides at these positions, m, with these speeds, m/s (zero where there is none), and the
-    /// belt without strain; rotors stand in the middle of their play.
+    /// The state without strain for these positions of the slides, m, and speeds, m/s (zero if missing); rotors are in
+    /// the middle of their play.
     pub fn without_strain(&self, positions: &[f64], speeds: &[f64]) -> State {
         State { position: self.ways(positions), speed: self.ways(speeds), ..State::default() }
     }
 
-    /// The ways of all bodies that go with these of what slides.
+    /// Displacements of all bodies for these of the slides.
     fn ways(&self, slides: &[f64]) -> [f64; BODIES] {
         let geometry = self.geometry();
         let mut ways = [0.0; BODIES];
@@ -303,20 +303,19 @@ impl Machine {
         ways
     }
 
-    /// The names of what slides, and its travel where it has one.
+    /// Names of the slides, and their travel if limited.
     pub fn travels(&self) -> impl Iterator<Item = (Label, Option<Travel>)> {
         let geometry = self.geometry();
         geometry.slides.iter().zip(self.slides()).map(|(at, slide)| (geometry.label(at.body), slide.travel))
     }
 
-    /// Weights of the positions of what slides in that of each drive's part of the belt, r φ of its pulley without
-    /// strain.
+    /// Weights of the slides' positions in r φ of each drive's pulley without strain.
     pub fn belt_shares(&self) -> Vec<&'static [f64]> {
         let geometry = self.geometry();
         geometry.drives.iter().map(|drive| geometry.bodies[drive.pulley].by_slides).collect()
     }
 
-    /// Where the drives have what slides, m, by the angles of all bodies.
+    /// Positions of the slides by the drives, m, from the angles of all bodies.
     pub fn by_drives(&self, angles: &[f64; BODIES]) -> Vec<f64> {
         let geometry = self.geometry();
         let of_slide = |slide: &SlideAt| {
@@ -326,7 +325,7 @@ impl Machine {
         geometry.slides.iter().map(of_slide).collect()
     }
 
-    /// Lengths of the spans with what slides at these positions, m, where they follow it.
+    /// Lengths of the spans for these positions of the slides, m, if they follow them.
     pub fn span_lengths(&self, slides: &[f64]) -> Option<Spans> {
         let BeltMake { spans, .. } = self.belt.following()?;
         let geometry = self.geometry();
@@ -340,8 +339,8 @@ impl Machine {
         Some(spans.into_iter().zip(geometry.spans).map(length).collect())
     }
 
-    /// The machine with spans that do not follow what slides, but have the lengths that they have with it at these
-    /// positions, m. As it is where they do not follow.
+    /// The machine with fixed span lengths, those for these positions of the slides, m; unchanged if its spans do not
+    /// follow the slides.
     pub fn with_spans_held(&self, slides: &[f64]) -> Self {
         let mut held = self.clone();
         if let (Some(lengths), Some(make)) = (self.span_lengths(slides), &mut held.belt.make) {
@@ -352,7 +351,7 @@ impl Machine {
         held
     }
 
-    /// Refuses compliant gears where the solvers have no room for the bodies and springs that these are.
+    /// Rejects compliant gears if their bodies and springs exceed the capacity of the solvers.
     pub fn check_gears(&self) -> Result<()> {
         let geometry = self.geometry();
         let gears = self.drives.iter().filter(|unit| unit.motor.gear_play.is_some()).count();
@@ -366,7 +365,7 @@ impl Machine {
         }
     }
 
-    /// Refuses what is no gantry.
+    /// Rejects keys and parts that a gantry does not support.
     pub fn check_gantry(&self) -> Result<()> {
         let geometry = self.geometry();
         let spans = geometry.spans.len();
@@ -437,7 +436,7 @@ impl Machine {
     }
 }
 
-/// Forces on what slides that are lines.
+/// Piecewise linear forces on a slide.
 fn lines(at: &SlideAt, slide: &Slide) -> impl Iterator<Item = Spring> {
     let body = at.body;
     let lines =
@@ -449,7 +448,7 @@ fn lines(at: &SlideAt, slide: &Slide) -> impl Iterator<Item = Spring> {
     })
 }
 
-/// Where something slides, and what stands at the ends of its travel.
+/// Travel of a slide with its end stops.
 fn way(at: &SlideAt, slide: &Slide) -> Spring {
     let stop = slide.travel.and_then(|travel| travel.stop);
     let (stiffness, damping) = stop.map_or((0.0, 0.0), |stop| (stop.stiffness, stop.damping));

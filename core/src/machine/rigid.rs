@@ -1,4 +1,4 @@
-//! An axis as one mass along its belt.
+//! Rigid model: an axis as one mass along its belt.
 
 use super::{AmplifierMode, DriveUnit, Machine, SlideAt};
 use crate::calculator::{Calculator, Run, at_least, less, more};
@@ -14,7 +14,7 @@ pub const REST_ACCELERATION: f64 = 1e-3;
 pub struct Rigid {
     /// M + (J₁ + n² J_r + J₂)/r², kg.
     pub mass: f64,
-    /// Of that (J₁ + n² J_r)/r², what moves before the belt, kg.
+    /// (J₁ + n² J_r)/r², the share of the drive side, kg.
     pub driving: f64,
     /// b + (B₁ + B₂)/r², N s/m, forward and backward.
     pub viscous: [f64; 2],
@@ -34,8 +34,7 @@ pub struct Rigid {
 }
 
 impl Rigid {
-    /// Lumps an axis; of a machine with several drives what each of them moves where all move what is heaviest to
-    /// move.
+    /// Rigid model of an axis; for several drives, the share of each one when all move the heaviest slide.
     pub fn of(machine: &Machine) -> Self {
         if machine.drives.len() == 1 {
             return Self::of_drive(machine, 0);
@@ -87,8 +86,8 @@ impl Rigid {
         }
     }
 
-    /// A drive of a machine with several, alone with its pulley and what turns with it: its motor, and as mass and friction
-    /// those of its pulley.
+    /// One drive of a machine with several drives, without the load: its motor, with the mass and friction of its
+    /// pulley.
     pub fn of_pulley(machine: &Machine, drive: usize) -> Self {
         let (whole, r) = (Self::of_drive(machine, drive), machine.pulley_radius);
         let sides = [true, false].map(|forward| machine.drive_pulley.friction.side(forward));
@@ -116,7 +115,7 @@ impl Rigid {
         })
     }
 
-    /// Motor current, A, and voltage at its terminals, V, that push with `force` (N, changing at `rate`, N/s) at `speed`.
+    /// Motor current, A, and terminal voltage, V, that give `force` (N, changing at `rate`, N/s) at `speed`.
     pub fn electrical(&self, force: f64, rate: f64, speed: f64) -> (f64, f64) {
         self.electrical_by(&mut Run::plain(), force, rate, speed)
     }
@@ -134,7 +133,8 @@ impl Rigid {
         (current, voltage + speed * self.brake)
     }
 
-    /// Force per ampere. What drives through the gear loses, what is driven holds more; at rest it is taken to drive.
+    /// Force per ampere: reduced by the gear's loss if the motor drives, increased if it is driven; at rest it is taken
+    /// to drive.
     fn per_ampere<C: Calculator>(&self, c: &mut C, force: C::N, speed: C::N) -> C::N {
         let [drives, driven] = [self.efficiency, 1.0 / self.efficiency].map(|e| c.number(self.force_per_ampere * e));
         if self.efficiency == 1.0 {
@@ -146,7 +146,7 @@ impl Rigid {
         c.name("per_ampere", per_ampere)
     }
 
-    /// The command that makes the motor push with `force` (N, changing at `rate`, N/s) at `speed`, V or A.
+    /// Command, V or A, for `force` (N, changing at `rate`, N/s) at `speed`.
     pub fn command(&self, force: f64, rate: f64, speed: f64) -> f64 {
         self.command_by(&mut Run::plain(), force, rate, speed)
     }
@@ -155,7 +155,7 @@ impl Rigid {
     pub fn command_by<C: Calculator>(&self, c: &mut C, force: C::N, rate: C::N, speed: C::N) -> C::N {
         let (current, voltage) = self.electrical_by(c, force, rate, speed);
         match self.mode {
-            // Whoever commands forces takes no stepper: this is never asked of one.
+            // Steppers have no force command, so this is never evaluated for one.
             AmplifierMode::Current | AmplifierMode::Position => current / self.gain,
             AmplifierMode::Voltage => voltage / self.gain,
         }
@@ -166,7 +166,7 @@ impl Rigid {
         1.0 / self.command(1.0, 0.0, 0.0)
     }
 
-    /// Resistance to speed of axis and motor together, N s/m: b, and of a commanded voltage also n² K_t K_e/(R r²).
+    /// Viscous drag of axis and motor, N s/m: b, in voltage mode plus n² K_t K_e/(R r²).
     pub fn drag(&self) -> f64 {
         self.viscous[0]
             + match self.mode {
@@ -175,7 +175,7 @@ impl Rigid {
             }
     }
 
-    /// Friction of the axis at this speed, N; its viscous part and its dry part, which goes the way of `sign`.
+    /// Viscous and dry friction of the axis at this speed, N; `sign` is the direction of the dry part.
     pub fn friction(&self, speed: f64, sign: f64) -> (f64, f64) {
         self.friction_by(&mut Run::plain(), speed, sign)
     }
@@ -186,9 +186,9 @@ impl Rigid {
         (speed * viscous, sign * coulomb)
     }
 
-    /// The least time in which the axis as one mass gets from rest to rest over a distance (m, of either sign), with at
-    /// most these volts and amperes: full force, then full braking, s. Breakaway and inductance count for nothing, so
-    /// that no axis is faster. Accurate to 1e-6 of itself; none where nothing is limited, or where it does not move.
+    /// Minimum time of the rigid axis from rest to rest over a distance (m, of either sign) within these volts and
+    /// amperes: full force, then full braking, s. Without breakaway and inductance, so that no axis is faster. Relative
+    /// accuracy 1e-6; none if nothing is limited, or if it does not move.
     ///
     /// ```
     /// use taut::{case::Case, machine::rigid::Rigid};
@@ -217,7 +217,7 @@ impl Rigid {
         if !(gains(0.0) > 0.0 && loses(0.0) > 0.0) {
             return None;
         }
-        // No faster than without any resistance, and than where the force ends.
+        // No faster than without resistance, and no faster than the speed at which the force ends.
         let unhindered = (2.0 * distance.abs() * gains(0.0).max(loses(0.0))).sqrt();
         let mut top = unhindered;
         if gains(top) <= 0.0 {
@@ -256,12 +256,12 @@ impl Rigid {
             ends[usize::from(up_to(middle).0 > distance.abs())] = middle;
         }
         let (way, time) = up_to(ends[0]);
-        // What is left of the way is gone at the top speed.
+        // The remaining distance is covered at the top speed.
         Some(time + (distance.abs() - way).max(0.0) / top)
     }
 }
 
-/// A number for each direction, forward and backward; none counts as forward.
+/// Selects the number for a direction, forward or backward; zero counts as forward.
 pub fn side<C: Calculator>(c: &mut C, sign: C::N, [forward, backward]: [f64; 2]) -> C::N {
     let [forward, backward] = [forward, backward].map(|value| c.number(value));
     c.choose(less(sign, 0.0), backward, forward)

@@ -1,12 +1,12 @@
 //! Data sheets: timing belts by their type, motors by their rating, a drive by its force.
 //!
-//! Every number of the table of belts stands in a catalogue, a data sheet or a published measurement, named beside it.
-//! Facts that none of these gives are left out.
+//! Every number of the table of belts comes from a catalogue, a data sheet or a published measurement, named beside it.
+//! Missing numbers are left out.
 
 use super::Motor;
 use std::f64::consts::PI;
 
-/// Peripheral teeth that carry at most, however many are in mesh (z_e max of the catalogue).
+/// Largest number of teeth in mesh that counts (z_e max of the catalogue).
 const MOST_TEETH: f64 = 12.0;
 
 /// A timing belt as its maker sells it.
@@ -14,15 +14,15 @@ const MOST_TEETH: f64 = 12.0;
 pub struct BeltType {
     /// Its name in the case file.
     pub name: &'static str,
-    /// Distance from tooth to tooth, m.
+    /// Tooth pitch, m.
     pub pitch: f64,
-    /// Belts of the catalogue, by width; no rows where no source has a stiffness.
+    /// Belts of the catalogue, by width; empty if no source gives a stiffness.
     pub widths: &'static [Width],
-    /// Allowed tension per width, N/m, where a source has it for all widths alike.
+    /// Allowed tension per width, N/m, if a source gives it for all widths.
     pub tension_per_width: Option<f64>,
     /// Force that one tooth carries per width at rest, N/m.
     pub tooth_strength: Option<f64>,
-    /// Where the numbers are from.
+    /// Source of the numbers.
     pub source: &'static str,
 }
 
@@ -53,7 +53,7 @@ const INCH: f64 = 0.0254;
 /// 38 lbf stretch a belt of 9 mm by 0.58 %: E A = 29.1 kN.
 const GT2: &[Width] = &[Width { width: 9e-3, stiffness: 38.0 * LBF / 0.0058, tension: None, mass: None }];
 
-/// The belts that there are numbers for.
+/// Table of belts.
 pub const BELTS: &[BeltType] = &[
     BeltType {
         name: "GT2",
@@ -174,8 +174,8 @@ const ELATECH_ATL5: &str =
     "Elatech polyurethane belts with steel cords, catalogue of Goodyear Rubber Products 2012, p. 20";
 
 impl BeltSheet {
-    /// Teeth in mesh at a pulley of this radius, m, and the force that they carry at rest, N; of a belt of known type and
-    /// width.
+    /// Teeth in mesh at a pulley of this radius, m, and the force that they carry at rest, N; for a belt of known type
+    /// and width.
     pub fn mesh(&self, radius: f64) -> Option<(f64, Option<f64>)> {
         let (kind, width) = (self.kind?, self.width?);
         let teeth = 2.0 * PI * radius / kind.pitch;
@@ -186,7 +186,7 @@ impl BeltSheet {
 }
 
 impl BeltType {
-    /// The type of this name, however it is written: `HTD 5M` is `HTD-5M`.
+    /// The type of this name in any spelling: `HTD 5M` is `HTD-5M`.
     pub fn named(name: &str) -> Option<&'static BeltType> {
         let plain = |name: &str| name.to_lowercase().replace([' ', '-', '_'], "");
         BELTS.iter().find(|belt| plain(belt.name) == plain(name))
@@ -207,12 +207,12 @@ impl BeltType {
         self.at(width, |row| row.tension).or(self.tension_per_width.map(|tension| tension * width))
     }
 
-    /// Force that the teeth carry with so many of them in mesh, N.
+    /// Force that the teeth carry with this number in mesh, N.
     pub fn teeth(&self, width: f64, in_mesh: f64) -> Option<f64> {
         self.tooth_strength.map(|strength| strength * width * in_mesh.min(MOST_TEETH))
     }
 
-    /// Between the widths of the catalogue on a straight line, beyond them in proportion.
+    /// Linear interpolation between the widths of the catalogue, proportional beyond them.
     fn at(&self, width: f64, value: impl Fn(&Width) -> Option<f64>) -> Option<f64> {
         let (first, last) = (self.widths.first()?, self.widths.last()?);
         let above = self.widths.iter().position(|row| row.width >= width);
@@ -228,10 +228,10 @@ impl BeltType {
     }
 }
 
-/// The data sheet of a belt: all beside its stiffness and damping.
+/// Data sheet of a belt, without stiffness and damping.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct BeltSheet {
-    /// Its type, where it has one of the table.
+    /// Its type, if it is in the table.
     pub kind: Option<&'static BeltType>,
     /// Width b, m.
     pub width: Option<f64>,
@@ -239,11 +239,11 @@ pub struct BeltSheet {
     pub mass_per_length: Option<f64>,
     /// Allowed tension, N.
     pub allowed_tension: Option<f64>,
-    /// True if its make is E A itself: a modulus over a section of 1 m².
+    /// True if E A was given itself: a modulus with a section of 1 m².
     pub is_specific: bool,
 }
 
-/// A motor's rating, all at once: what it does at its nominal voltage under its nominal load.
+/// Rating of a motor at nominal voltage and load.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rating {
     /// V_n, V.
@@ -259,7 +259,7 @@ pub struct Rating {
 }
 
 impl Rating {
-    /// K_t = M_n / (I_n − I_0): what the idle current makes turns the motor itself.
+    /// K_t = M_n / (I_n − I_0): the no-load current covers the motor's own losses.
     pub fn torque_constant(&self) -> f64 {
         self.torque / (self.current - self.no_load_current)
     }
@@ -275,7 +275,7 @@ impl Rating {
     }
 }
 
-/// A drive of which nothing is known but what it does at the belt: F = k_F u − d v.
+/// A drive that is known only by its force at the belt: F = k_F u − d v.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SimpleDrive {
     /// Force per input k_F, N/V.
@@ -285,8 +285,8 @@ pub struct SimpleDrive {
 }
 
 impl SimpleDrive {
-    /// The motor that does the same at a pulley of radius `r`: of 1 ohm, so that its current is the voltage that is
-    /// left.
+    /// The equivalent motor at a pulley of radius `r`, with 1 ohm, so that its current equals the voltage less
+    /// back-EMF.
     ///
     /// With R = 1 ohm, K_t = k_F r and K_e = d r / k_F, the force K_t (u − K_e v / r) / (R r) is k_F u − d v.
     pub fn motor(self, r: f64) -> Motor {
@@ -304,7 +304,7 @@ impl SimpleDrive {
         }
     }
 
-    /// The simple drive that `motor` stands for, where it stands for one.
+    /// The simple drive that `motor` represents, if any.
     pub fn of(motor: &Motor, r: f64) -> Option<Self> {
         let force = motor.torque_constant / r;
         motor.is_simple.then(|| Self { force, drag: motor.back_emf_constant * force / r })

@@ -1,12 +1,12 @@
-//! A number of each span of a belt.
+//! One number for each span of a belt.
 
 use std::fmt;
 use std::ops::{Deref, DerefMut};
 
-/// Room for spans.
+/// Maximum number of spans.
 const ROOM: usize = 6;
 
-/// A number of each span, in the order of the geometry: a slice of them, but one that is copied.
+/// One number for each span, in the order of the geometry: a `Copy` list that derefs to a slice.
 #[derive(Clone, Copy, PartialEq)]
 pub struct Spans {
     /// Values behind `count` are zero.
@@ -20,7 +20,7 @@ impl Spans {
         std::iter::repeat_n(value, count).collect()
     }
 
-    /// The numbers that `change` makes of them.
+    /// Applies `change` to each number.
     pub fn map(self, change: impl FnMut(f64) -> f64) -> Self {
         self.into_iter().map(change).collect()
     }
@@ -40,7 +40,7 @@ impl<const N: usize> From<[f64; N]> for Spans {
 }
 
 impl FromIterator<f64> for Spans {
-    /// Panics where there are more than a belt has.
+    /// Panics if there are more than the maximum.
     fn from_iter<I: IntoIterator<Item = f64>>(given: I) -> Self {
         let (mut values, mut count) = ([0.0; ROOM], 0);
         for value in given {

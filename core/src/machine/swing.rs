@@ -1,10 +1,10 @@
-//! The slowest swing of a machine on its belt, which a damping ratio and a loss factor are told of.
+//! Slowest elastic mode of a machine on its belt, to which a damping ratio or a loss factor refers.
 
 use crate::friction::Motion;
 use crate::mechanism::{BODIES, Mechanism, Mode};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
-/// Eigenvalues up to this share of the largest are zero.
+/// Eigenvalues up to this fraction of the largest count as zero.
 const NOTHING: f64 = 1e-9;
 
 /// Frequency of the slowest elastic mode on the spans of the belt, rad/s, at the origin and without damping; rotors

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, SQRT_2};
 
-/// A brushed DC motor with a gear, eq. (4) and beyond; or a stepper, whose numbers are those of one of its phases.
+/// A brushed DC motor with a gear, eq. (4) and beyond; or a stepper, with the parameters of one phase.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Motor {
     /// Torque constant K_t, N m/A.
@@ -17,13 +17,13 @@ pub struct Motor {
     pub rotor_inertia: f64,
     /// Gear ratio n: motor turns per turn of the drive pulley.
     pub gear_ratio: f64,
-    /// Gear efficiency η: the part of the power that passes, whichever side drives.
+    /// Gear efficiency η: transmitted fraction of the power in either direction.
     pub gear_efficiency: f64,
-    /// A compliant gear, so that the rotor is an inertia of its own; none for one that is stiff and without play.
+    /// A compliant gear, which makes the rotor a body of its own; none for a stiff gear without play.
     pub gear_play: Option<GearPlay>,
-    /// True if it only stands for a drive that is given by force and drag, so that its own numbers mean nothing.
+    /// True if it represents a drive given by force and drag, so that its own parameters have no meaning.
     pub is_simple: bool,
-    /// The two phases of a stepper, which is commanded a position; none for a brushed motor.
+    /// The two phases of a stepper, whose command is a position; none for a brushed motor.
     pub stepper: Option<Stepper>,
 }
 
@@ -49,8 +49,8 @@ impl Motor {
 
 /// The phases of a hybrid stepper with its driver, beyond what [`Motor`] and [`Amplifier`] have.
 ///
-/// Two phases, a quarter of a tooth pitch apart; N = `steps_per_turn`/4 rotor teeth. The angle is zero where both phases
-/// carry the rated current, a full step.
+/// Two phases, a quarter of a tooth pitch apart; N = `steps_per_turn`/4 rotor teeth. The angle is zero where both
+/// phases carry the rated current, a full step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stepper {
     /// Full steps per turn, 4 N.
@@ -91,7 +91,7 @@ impl Stepper {
 /// A gear with play and stiffness, seen from the drive pulley.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GearPlay {
-    /// Backlash 2α, rad: by how much the drive pulley can turn while the rotor stands.
+    /// Backlash 2α, rad: angle by which the drive pulley can turn while the rotor is at rest.
     pub backlash: f64,
     /// Stiffness of a flank in contact k_g, N m/rad.
     pub stiffness: f64,
@@ -110,7 +110,7 @@ pub struct Amplifier {
     pub voltage_limit: Option<f64>,
     /// Largest current I_max, A, either way.
     pub current_limit: Option<f64>,
-    /// Bandwidth f_b of the current loop, Hz; none for one that is faster than anything else.
+    /// Bandwidth f_b of the current loop, Hz; none for an ideal loop.
     pub bandwidth: Option<f64>,
 }
 

@@ -1,6 +1,5 @@
-//! Parts that work piece by piece beside the bodies: amplifiers with limits, springs that only pull or only push,
-//! forces that are lines. Each is linear in each of its states; the conditions that lead from one to the other are
-//! linear forms.
+//! Piecewise linear parts other than bodies: amplifiers with limits, springs that only pull or only push, piecewise
+//! linear forces. Each is linear within a case; the conditions of a change are linear forms.
 
 use super::{
     AmplifierMode, Cause, Contact, DRIVES, Drive, Form, Guard, Limit, Mechanism, Mode, Over, SPRINGS, Spring,
@@ -40,7 +39,7 @@ impl Mechanism {
         }
     }
 
-    /// Armature current, A; of a stepper that of its first phase.
+    /// Armature current, A; for a stepper, the current of the first phase.
     pub fn current(&self, drive: usize, mode: &Mode) -> Form {
         let Drive { motor, amplifier, .. } = &self.drives[drive];
         if self.drives[drive].has_current_state() {
@@ -71,7 +70,7 @@ impl Mechanism {
         (self.commanded(drive, mode) - Form::current(self.first_current(drive))) * (2.0 * PI * bandwidth)
     }
 
-    /// di/dt of a current by its number, A/s; zero where it is no state. Of a stepper's phase what is linear of it.
+    /// di/dt of a current by its number, A/s; zero if it is not a state. For a stepper's phase, its linear part.
     pub(super) fn current_rate(&self, number: usize, mode: &Mode) -> Form {
         let Some(drive) = self.drive_of_current(number) else { return Form::ZERO };
         let Drive { motor, amplifier, .. } = &self.drives[drive];
@@ -80,7 +79,7 @@ impl Mechanism {
             (AmplifierMode::Voltage, _, Limit::Inside) => {
                 self.left_for_inductance(drive, self.commanded(drive, mode)) * (1.0 / motor.inductance)
             }
-            // At its limit the current stands.
+            // At its limit the current is constant.
             (AmplifierMode::Voltage, ..) => Form::ZERO,
             (AmplifierMode::Current, Limit::Inside, _) => self.loop_rate(drive, mode),
             (AmplifierMode::Current, side, _) => {
@@ -91,8 +90,8 @@ impl Mechanism {
         }
     }
 
-    /// Voltage at the motor's terminals, V: R i + L di/dt + K_e n φ̇, or what the amplifier puts there. Zero of a stepper,
-    /// the voltages of whose phases are no linear forms.
+    /// Voltage at the motor's terminals, V: R i + L di/dt + K_e n φ̇, or what the amplifier puts there. Zero for a
+    /// stepper, whose phase voltages are not linear in the state.
     pub fn voltage(&self, drive: usize, mode: &Mode) -> Form {
         let Drive { motor, amplifier, .. } = &self.drives[drive];
         let now = &mode.drive[drive];
@@ -113,9 +112,8 @@ impl Mechanism {
 
     // --- springs ----------------------------------------------------------------------------------------------------
 
-    /// Force of a spring in `mode`, N or N m: f = k s + c ṡ of one that pushes and pulls. One that only pulls carries
-    /// T₀ more than that, and nothing where it is slack: f = −T₀. One that only pushes has passed the side that it
-    /// touches: f = k (s − s_side) + c ṡ.
+    /// Force of a spring in `mode`, N or N m. Two-sided: f = k s + c ṡ. Pulling only: the same relative to T₀, and f =
+    /// −T₀ if slack. Pushing only: f = k (s − s_side) + c ṡ at the side in contact.
     pub fn spring_force(&self, spring: usize, mode: &Mode) -> Form {
         let part = &self.springs[spring];
         let whole = || self.pull(spring);
@@ -162,7 +160,7 @@ impl Mechanism {
         pieces
     }
 
-    /// Stiffness and damping of the piece that a spring's line is on; either is below zero where the force falls.
+    /// Stiffness and damping of the active piece of a spring's line; negative if the force falls.
     pub(crate) fn slopes_of_line(&self, spring: usize, mode: &Mode) -> (f64, f64) {
         match &self.springs[spring].law {
             SpringLaw::Line { over, line } => {
@@ -185,7 +183,7 @@ impl Mechanism {
         pull
     }
 
-    /// How far a spring's length is beyond each of `[high, low]`, and what the flank there then pushes with.
+    /// Length of a spring beyond each of `[high, low]`, and the force of the flank there.
     fn sides(&self, spring: usize, [high, low]: [f64; 2]) -> [(Form, Form); 2] {
         let (length, rate) = (Form::stretch(spring), self.stretch_rate(spring));
         let (k, c) = (self.springs[spring].stiffness, self.springs[spring].damping);
@@ -210,7 +208,7 @@ impl Mechanism {
 
     // --- what ends a state ------------------------------------------------------------------------------------------
 
-    /// The conditions under which limits and springs stay as they are in `mode`.
+    /// Guards of limits and springs in `mode`.
     pub(super) fn watch_elements(&self, mode: &Mode, guards: &mut Vec<Guard>) {
         let mut watch =
             |form: Form, cause: Cause| guards.push(Guard { form, transition: self.transition(cause, mode) });
@@ -264,7 +262,7 @@ impl Mechanism {
                             let own = Form::current(self.first_current(drive));
                             watch_limit(Limit::Inside, own, bound, current, watch);
                         }
-                        // At the limit, the current stands as long as the voltage would drive it further.
+                        // At the limit, the current is constant while the voltage would drive it further.
                         side => watch(
                             self.left_for_inductance(drive, self.commanded(drive, mode)) * side.sign(),
                             current(Limit::Inside),
@@ -324,7 +322,7 @@ fn watch_contact(now: Contact, &[high, low]: &[(Form, Form); 2], damped: bool, w
     };
     watch(beyond, Contact::Apart);
     if damped {
-        // A flank only pushes: pulled away faster than it can follow, it carries nothing.
+        // A flank only pushes: if its damper delays it, it carries no force.
         if now == carries { watch(push, loose) } else { watch(-push, carries) }
     }
 }

@@ -1,27 +1,27 @@
-//! The equations of motion of each mode, and what ends it.
+//! Equations of motion of each mode, and its guards.
 
 use super::{BODIES, CURRENTS, Cause, Contact, Drive, Form, Guard, Mechanism, Mode, SPRINGS, SpringLaw, State};
 use crate::friction::{Motion, Side};
 
-/// The equations in one mode: accelerations, rates of currents, and what must stay true.
+/// The equations in one mode: accelerations, rates of currents, and guards.
 #[derive(Debug, Clone)]
 pub struct Equations {
     /// q̈ of each body.
     pub acceleration: [Form; BODIES],
-    /// di/dt of each current; zero where it is no state.
+    /// di/dt of each current; zero if it is not a state.
     pub current_rate: [Form; CURRENTS],
-    /// Inertia of each body, with what is geared to it.
+    /// Inertia of each body, with its rotor behind a stiff gear.
     pub inertia: [f64; BODIES],
     /// Stiffness of each spring that stores energy in this mode.
     pub stiffness: [f64; SPRINGS],
     /// Conditions under which these equations hold.
     pub guards: Vec<Guard>,
-    /// All that acts on each body that moves by itself, and on those that move with it, but friction: N or N m.
+    /// Load, the sum of all forces except friction, on each independent body and those that move with it, N or N m.
     pub load: [Form; BODIES],
 }
 
 impl Mechanism {
-    /// The mode in which `state` is looked at first: each body moves as its speed says, all else is in order.
+    /// Initial mode for `state`: bodies move according to their speeds, and all other parts are in their ordinary case.
     pub fn first_mode(&self, state: &State) -> Mode {
         let motion = (0..self.bodies.len()).map(|body| match state.speed[self.leader(body)] {
             _ if !self.has_modes(body) => Motion::Free,
@@ -32,8 +32,8 @@ impl Mechanism {
         Mode { piece: self.pieces(state), ..Mode::of(motion) }
     }
 
-    /// Takes a machine over from another of the same parts but other numbers: a body that did not have modes and now does,
-    /// or the other way round, moves as its speed says; a part that is no more is in order.
+    /// Adapts a mode to a machine with the same parts but other parameters: a body that gains or loses dry friction
+    /// moves according to its speed; a removed part returns to its ordinary case.
     pub(crate) fn take_over(&self, from: &Mechanism, mode: &mut Mode, speed: impl Fn(usize) -> f64) {
         let mut state = State::default();
         for (body, own) in state.speed.iter_mut().enumerate().take(self.bodies.len()) {
@@ -45,15 +45,15 @@ impl Mechanism {
         }
     }
 
-    /// The part of the torque that a gear passes on: η if the motor drives, 1/η if it is driven.
+    /// Torque factor of a gear: η if the motor drives, 1/η if it is driven.
     ///
-    /// Whatever side drives loses the share 1 − η of its power, so that the gear never adds any.
+    /// The driving side loses the fraction 1 − η of its power, so the gear never adds any.
     pub(super) fn gear_factor(&self, drive: usize, forward: bool, torque_positive: bool) -> f64 {
         let eta = self.drives[drive].motor.gear_efficiency;
         if forward == torque_positive { eta } else { 1.0 / eta }
     }
 
-    /// The spring that a drive's gear is, where it is compliant.
+    /// The spring that represents a drive's compliant gear.
     pub(super) fn gear_spring(&self, drive: usize) -> Option<usize> {
         let drive = &self.drives[drive];
         let is_gear = |arms: &[(usize, f64)]| arms.iter().any(|&(body, _)| body == drive.shaft);
@@ -117,8 +117,8 @@ impl Mechanism {
         load
     }
 
-    /// The sizes of the constant forces on each body that moves by itself, and on those that move with it, before they
-    /// are added up, N or N m: what their sum is rounded by, however little of it is left.
+    /// Magnitude of the constant forces on each independent body and those that move with it before summation, N or N
+    /// m: it determines the rounding error even if they cancel.
     pub(crate) fn sizes_of_forces(&self, mode: &Mode) -> [f64; BODIES] {
         let mut sizes = [0.0; BODIES];
         for body in 0..self.bodies.len() {
@@ -143,7 +143,7 @@ impl Mechanism {
         sizes
     }
 
-    /// The size of what the constant part of a spring's force is a difference of.
+    /// Magnitude of the terms whose difference is the constant part of a spring's force.
     fn size_of_constant(&self, spring: usize, mode: &Mode) -> f64 {
         match &self.springs[spring].law {
             SpringLaw::Line { line, .. } => line.size_of_constant(usize::from(mode.piece[spring])),
@@ -151,8 +151,7 @@ impl Mechanism {
         }
     }
 
-    /// By what the torque of a spring on a body is multiplied: 1, but 1/e for a rotor behind a compliant gear and loses
-    /// power.
+    /// Factor on the torque of a spring on a body: 1, but 1/e for a rotor behind a lossy compliant gear.
     fn gear_share(&self, body: usize, spring: usize, forward: bool, mode: &Mode) -> f64 {
         let is_behind = |drive: &usize| {
             let part = &self.drives[*drive];
@@ -164,8 +163,8 @@ impl Mechanism {
         }
     }
 
-    /// The torque whose sign tells how a gear with losses counts as carrying: T = K_t i − J_r n φ̈₁, what the motor
-    /// hands to a stiff gear, or that of a gear which gives way; nothing where the flanks tell it.
+    /// Torque whose sign determines the driving side of a lossy gear: T = K_t i − J_r n φ̈₁ for a stiff gear, or the
+    /// torque of a compliant one; none if the flanks determine it.
     fn gear_torque(&self, drive: usize, mode: &Mode, acceleration: &[Form; BODIES]) -> Option<Form> {
         let part = &self.drives[drive];
         if !part.loses() {
@@ -183,7 +182,7 @@ impl Mechanism {
         }
     }
 
-    /// The torque of each gear with the bodies at rest: what tells its sign before a body moves.
+    /// Torque of each gear with the bodies at rest, which determines its sign before a body moves.
     pub fn torque_at_rest(&self, drive: usize, mode: &Mode) -> Form {
         match self.gear_spring(drive) {
             None => self.current(drive, mode),
@@ -191,8 +190,7 @@ impl Mechanism {
         }
     }
 
-    /// Inertia of each body in `mode`, with what is geared to it: J₁ + e n² J_r, for the rotor turns n times as fast,
-    /// behind the gear.
+    /// Inertia of each body in `mode`, with its rotor: J₁ + e n² J_r, since the rotor turns n times as fast.
     fn inertia(&self, mode: &Mode) -> [f64; BODIES] {
         let mut inertia = [0.0; BODIES];
         for (inertia, body) in inertia.iter_mut().zip(&self.bodies) {
@@ -206,12 +204,12 @@ impl Mechanism {
         inertia
     }
 
-    /// Inertias by which springs give to one body what they take from another. A gear that gives way and loses power
-    /// puts 1/e of its torque on the rotor, J_r φ̈_r = τ − T/e, which is e J_r φ̈_r = e τ − T.
+    /// Inertias with which springs conserve momentum between bodies. A lossy compliant gear puts 1/e of its torque on
+    /// the rotor, J_r φ̈_r = τ − T/e, which is e J_r φ̈_r = e τ − T.
     pub(crate) fn balanced_inertia(&self, equations: &Equations, mode: &Mode) -> [f64; BODIES] {
         let mut inertia = equations.inertia;
         for (index, drive) in self.drives.iter().enumerate().filter(|(_, drive)| drive.loses()) {
-            // Flanks that are apart, and rotors that stand, pass nothing on.
+            // Flanks that are apart, and rotors at rest, transmit nothing.
             let passes =
                 |spring: &usize| equations.stiffness[*spring] > 0.0 && mode.motion[drive.shaft] != Motion::Stuck;
             if let Some(spring) = self.gear_spring(index).filter(passes) {
@@ -222,7 +220,7 @@ impl Mechanism {
         inertia
     }
 
-    /// Inertia that moves with a body, itself included, per unit of its own way.
+    /// Inertia that moves with a body, itself included, referred to its own coordinate.
     pub fn mass(&self, leader: usize, inertia: &[f64; BODIES]) -> f64 {
         self.followers(leader).map(|b| self.ratio(b) * self.ratio(b) * inertia[b]).sum()
     }
@@ -233,7 +231,7 @@ impl Mechanism {
         let inertia = self.inertia(&mode);
         let mut guards = Vec::with_capacity(8);
         let guard = |form: Form, cause: Cause| Guard { form, transition: self.transition(cause, &mode) };
-        // Where no gear loses power, what acts on a body at rest is the same whichever way it would go.
+        // Without gear losses, the load on a body at rest does not depend on its direction of motion.
         let loses = self.drives.iter().any(Drive::loses);
         let (forces, mut loads) = (self.forces(&mode), [Form::ZERO; BODIES]);
         for body in self.leaders() {
@@ -277,7 +275,7 @@ impl Mechanism {
         for drive in (0..self.drives.len()).rev() {
             if let Some(torque) = self.gear_torque(drive, &mode, &acceleration) {
                 let sign = if mode.drive[drive].torque_positive { 1.0 } else { -1.0 };
-                // First, because the loads that the others watch depend on it.
+                // First, because the loads in the other guards depend on it.
                 guards.insert(0, guard(torque * sign, Cause::GearTorque(drive)));
             }
         }
@@ -289,11 +287,10 @@ impl Mechanism {
         Equations { acceleration, current_rate, inertia, stiffness: self.stiffness_in(&mode), guards, load: loads }
     }
 
-    /// Friction force (N) or torque (N m) on a body: what its law gives while it slides, what holds it while it is
-    /// stuck.
+    /// Friction force (N) or torque (N m) on a body: by its law while it slides, the holding force while it is stuck.
     ///
-    /// `load` is all else that acts on the body: the least and the most of it, which differ only where a gear with
-    /// losses holds a share of its own.
+    /// `load` is the least and the largest sum of all other forces on the body; these differ only if a lossy gear holds
+    /// a part.
     pub fn friction_value(&self, body: usize, motion: Motion, speed: f64, load: (f64, f64)) -> f64 {
         let law = self.friction(body);
         match motion {
@@ -301,13 +298,13 @@ impl Mechanism {
             Motion::Free => law.forward.viscous * speed,
             Motion::Forward => law.forward.viscous * speed + law.forward.coulomb,
             Motion::Backward => law.backward.viscous * speed - law.backward.coulomb,
-            // The gear holds what it can, friction the rest; what moves with another body leaves it to that one.
+            // The gear holds what it can, friction the rest; for a follower, the leader holds all of it.
             Motion::Stuck if self.leader(body) != body => 0.0,
             Motion::Stuck => load.0.max(0.0) + load.1.min(0.0),
         }
     }
 
-    /// The least and the most torque that motor and gear put on a stuck drive pulley at this current, N m.
+    /// Least and largest torque of motor and gear on a stuck drive pulley at this current, N m.
     pub fn holding_torque(&self, drive: usize, current: f64) -> (f64, f64) {
         let motor = &self.drives[drive].motor;
         let torque = motor.gear_ratio * motor.torque_constant * current;

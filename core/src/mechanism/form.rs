@@ -1,5 +1,4 @@
-//! Linear forms of the state: forces written as the paper writes them, and evaluated, differentiated and bounded by
-//! machine.
+//! Linear forms of the state: forces in the notation of the paper that can be evaluated, differentiated and bounded.
 
 use super::{BODIES, CURRENTS, DRIVES, Layout, Mechanism, SPRINGS, State};
 use std::ops::{Add, Mul, Neg, Sub};
@@ -11,7 +10,7 @@ pub struct Form {
     pub stretch: [f64; SPRINGS],
     /// Coefficients of the bodies' speeds.
     pub speed: [f64; BODIES],
-    /// Coefficients of the armature currents, where they are states.
+    /// Coefficients of the armature currents that are states.
     pub current: [f64; CURRENTS],
     /// Coefficients of the inputs.
     pub input: [f64; DRIVES],
@@ -62,7 +61,7 @@ impl Form {
         Form { constant: value, ..Form::ZERO }
     }
 
-    /// Takes `factor` times another one off.
+    /// Subtracts `factor` times another form.
     pub(super) fn subtract(&mut self, factor: f64, other: &Form) {
         fn off<const N: usize>(own: &mut [f64; N], factor: f64, other: &[f64; N]) {
             own.iter_mut().zip(other).for_each(|(own, other)| *own -= other * factor);
@@ -74,7 +73,7 @@ impl Form {
         self.constant -= other.constant * factor;
     }
 
-    /// Its coefficients with respect to ways, speeds and currents of a whole state.
+    /// Its coefficients with respect to positions, speeds and currents of a complete state.
     pub fn on_state(&self, mechanism: &Mechanism) -> State {
         let mut row = State { position: [0.0; BODIES], speed: self.speed, current: self.current };
         for (spring, factor) in mechanism.springs.iter().zip(self.stretch) {
@@ -85,7 +84,7 @@ impl Form {
         row
     }
 
-    /// Its value, from lengths rather than from large positions, so that little is lost to cancellation.
+    /// Its value, from elongations rather than large positions, to avoid cancellation.
     pub fn value(&self, mechanism: &Mechanism, state: &State, input: &[f64; DRIVES]) -> f64 {
         let mut stretch = [0.0; SPRINGS];
         for (index, stretch) in stretch.iter_mut().enumerate().take(mechanism.springs.len()) {
@@ -94,7 +93,7 @@ impl Form {
         self.value_at(&stretch, state, input)
     }
 
-    /// Its value at these lengths; speeds and currents from `state`, in whichever coordinates.
+    /// Its value at these lengths, with speeds and currents from `state` in any coordinates.
     #[inline]
     pub(crate) fn value_at(&self, stretch: &[f64; SPRINGS], state: &State, input: &[f64; DRIVES]) -> f64 {
         fn add(sum: f64, coefficients: &[f64], values: &[f64]) -> f64 {
@@ -120,7 +119,7 @@ impl Form {
     }
 }
 
-/// The rounding error of the value of a form, as a share of its largest parts.
+/// Rounding error of the value of a form relative to its largest terms.
 pub const ROUNDING: f64 = 5e-15;
 
 impl Add for Form {
@@ -188,7 +187,7 @@ mod tests {
         Mechanism::new(vec![body(0), body(1)], vec![spring], Vec::new())
     }
 
-    /// The remainder of parts that cancel is rounding, at most the noise, whichever of them takes off the others.
+    /// The remainder of terms that cancel is rounding, at most the noise, for any order of the terms.
     #[test]
     fn noise_is_at_least_the_remainder_of_parts_that_cancel() {
         let layout = Layout::new(&mechanism());
@@ -206,7 +205,7 @@ mod tests {
             form.stretch[0] = number();
             form.speed[..2].copy_from_slice(&[number(), number()]);
             (form.current[0], form.input[0], form.constant) = (number(), number(), number());
-            // One part takes off what the others add up to.
+            // One term cancels the sum of the others.
             let (place, value): (fn(&mut Form) -> &mut f64, f64) = match part {
                 0 => (|form| &mut form.stretch[0], layout.stretches(&inner)[0]),
                 1 => (|form| &mut form.speed[0], inner.speed[0]),

@@ -1,9 +1,9 @@
-//! Which quantities are the states of the solvers, and where what stands among them.
+//! State variables of the solvers, and their indices.
 //!
-//! A force of k (r φ₁ − x) computed from positions carries the rounding of those positions times k. With the stretch as
-//! a state it carries the rounding of the stretch, however far from the origin the machine is. So the lengths of
-//! springs that hang a pulley on other bodies stand in the places of the pulleys' angles, as long as they are
-//! independent; ways of bodies that slide are counted from where the run begins. For the axis, c = A′ q:
+//! A force of k (r φ₁ − x) computed from positions carries the rounding of those positions times k. With the elongation
+//! as a state it carries only the rounding of the elongation, at any distance from the origin. So the lengths of
+//! springs between a pulley and other bodies replace the pulleys' angles, as long as they are independent; positions of
+//! sliding bodies count from the start of the run. For the axis, c = A′ q:
 //!
 //! ```text
 //! c = (r φ₁ − x,  x − x₀,  x − r φ₃,  φ_r − φ₁)
@@ -11,10 +11,10 @@
 
 use super::{BODIES, CURRENTS, DRIVES, Form, Kind, Mechanism, SPRINGS, SpringLaw, State};
 
-/// Coefficients up to this share of those they come from are zero but for rounding.
+/// Coefficients up to this fraction of those they come from are zero except for rounding.
 const NOTHING: f64 = 1e-12;
 
-/// A spring's length in the place of a body's way.
+/// A spring's length that replaces a body's position.
 #[derive(Debug, Clone)]
 pub struct Replaced {
     /// The body.
@@ -27,21 +27,21 @@ pub struct Replaced {
     pub on_replaced: bool,
 }
 
-/// Where what stands in the solvers' state.
+/// Indices of the quantities in the solvers' state.
 #[derive(Debug, Clone)]
 pub struct Layout {
     bodies: usize,
-    /// Lengths that stand in the places of ways, each behind those that it needs.
+    /// Lengths that replace positions, each after those that it needs.
     pub replaced: Vec<Replaced>,
-    /// Every spring's length from the coordinates: (spring, body in whose place the coordinate stands, weight).
+    /// Every spring's length from the coordinates: (spring, body of the coordinate, weight).
     terms: Vec<(usize, usize, f64)>,
-    /// Place of each body's coordinate, and of its speed.
+    /// Index of each body's coordinate.
     pub coordinate: [usize; BODIES],
-    /// Place of each body's speed.
+    /// Index of each body's speed.
     pub speed: [usize; BODIES],
-    /// Place of each current that is a state.
+    /// Index of each current that is a state.
     pub current: [Option<usize>; CURRENTS],
-    /// Number of places.
+    /// Number of states.
     pub states: usize,
     /// Number of inputs.
     pub inputs: usize,
@@ -71,7 +71,7 @@ impl Layout {
             states: 2 * bodies + currents,
             inputs: mechanism.drives.len(),
         };
-        // Rows that are taken as coordinates, by the body in whose place they stand.
+        // Rows used as coordinates, by the body that they replace.
         let mut taken: [Option<[f64; BODIES]>; BODIES] = [None; BODIES];
         let mut weights = Vec::new();
         for spring in &mechanism.springs {
@@ -81,7 +81,7 @@ impl Layout {
             }
             let size: f64 = row.iter().map(|arm| arm.abs()).sum();
             let (mut left, mut weight) = (row, [0.0; BODIES]);
-            // What is left of the row when the lengths taken so far are subtracted, weight by weight.
+            // Remainder of the row after subtraction of the lengths used so far, by their weights.
             while let Some((body, by)) = (0..bodies).find_map(|b| taken[b].filter(|_| left[b] != 0.0).map(|by| (b, by)))
             {
                 let factor = left[body] / by[body];
@@ -96,7 +96,7 @@ impl Layout {
             }
             let turns = |&b: &usize| left[b] != 0.0 && matches!(mechanism.bodies[b].kind, Kind::Rotary { .. });
             match (0..bodies).find(turns) {
-                // The row as it is becomes a coordinate, in the place of a pulley that hangs on it.
+                // The row becomes a coordinate and replaces a pulley that hangs on it.
                 Some(body) if spring.arms.len() > 1 => {
                     taken[body] = Some(row);
                     let others = spring.arms.iter().copied().filter(|&(other, _)| other != body).collect::<Vec<_>>();
@@ -110,7 +110,8 @@ impl Layout {
             weights.push(weight);
         }
         for (spring, weight) in weights.iter().enumerate() {
-            // A stepper's angle hangs on all that its belt moves; the exact solver, which has none, counts on two.
+            // A stepper's angle depends on everything that its belt moves; the exact solver, which has no steppers,
+            // assumes two.
             let most = if matches!(mechanism.springs[spring].law, SpringLaw::Angle { .. }) { BODIES } else { 2 };
             let count = weight.iter().filter(|weight| **weight != 0.0).count();
             assert!(count <= most, "a length of {most} coordinates at most");
@@ -165,22 +166,22 @@ impl Layout {
         }
     }
 
-    /// By how much each spring gets longer per unit of each coordinate: (body in whose place it stands, weight).
+    /// Elongation of a spring per unit of each coordinate: (body of the coordinate, weight).
     pub fn weights(&self, spring: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
         self.terms.iter().filter(move |term| term.0 == spring).map(|&(_, body, weight)| (body, weight))
     }
 
-    /// True if a length stands in the place of this body's way.
+    /// True if a length replaces this body's position.
     pub fn is_replaced(&self, body: usize) -> bool {
         self.replaced.iter().any(|replaced| replaced.body == body)
     }
 
-    /// Where ways are counted from in a run that begins in `start`.
+    /// Origin of the positions in a run that begins in `start`.
     pub fn origin(&self, start: &State) -> [f64; BODIES] {
         std::array::from_fn(|b| if b < self.bodies && !self.is_replaced(b) { start.position[b] } else { 0.0 })
     }
 
-    /// By how much a spring is longer than what its coordinates say, ways being counted from `origin`.
+    /// Difference between a spring's length and that from its coordinates, for positions counted from `origin`.
     pub fn shift(&self, spring: usize, origin: &[f64; BODIES]) -> f64 {
         self.weights(spring).map(|(body, weight)| weight * origin[body]).sum()
     }

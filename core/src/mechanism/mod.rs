@@ -1,13 +1,13 @@
-//! A machine as data: bodies, springs between them, drives on them, and what is shown of it.
+//! A machine as data: bodies, springs between them, drives on them, and columns of results.
 //!
-//! With the bodies' ways q, a spring's length is a row of lever arms on them, and everything else follows:
+//! With the bodies' coordinates q, each spring's length is a row of lever arms times q, and everything else follows:
 //!
 //! ```text
 //! s = A q,   f = K s + C ṡ,   M q̈ = −Aᵀ f + G i − F_f(q̇) + F
 //! ```
 //!
 //! Friction, limits, slack and play make this piecewise linear; within one [`Mode`] it is linear, and
-//! [`Mechanism::equations`] gives it. Which bodies there are, and what they are called, is [`crate::machine`]'s to say.
+//! [`Mechanism::equations`] gives it. [`crate::machine`] defines the bodies and their names.
 
 mod drive;
 mod elements;
@@ -35,25 +35,25 @@ use crate::polyline::Polyline;
 use std::borrow::Cow;
 use std::sync::Arc;
 
-/// Room for bodies.
+/// Maximum number of bodies.
 pub const BODIES: usize = 6;
-/// Room for springs.
+/// Maximum number of springs.
 pub const SPRINGS: usize = 8;
-/// Room for drives.
+/// Maximum number of drives.
 pub const DRIVES: usize = 3;
-/// Room for both together: three drives leave room for one body fewer than two.
+/// Maximum of both together: three drives allow one body less than two drives.
 pub const BODIES_AND_DRIVES: usize = BODIES + 2;
-/// Room for currents that are states: one of each brushed motor, both of each of two steppers.
+/// Maximum number of currents that are states: one for each brushed motor, two for each of two steppers.
 pub const CURRENTS: usize = 4;
-/// Most steppers of a machine, each with two currents.
+/// Maximum number of steppers of a machine, each with two currents.
 pub const STEPPERS: usize = CURRENTS / 2;
 
-/// Names of a part: for programs and for people.
+/// Names of a part, as a key and in messages.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Label {
     /// In column headings and keys.
     pub key: &'static str,
-    /// For people.
+    /// In messages.
     pub name: &'static str,
 }
 
@@ -64,7 +64,7 @@ pub struct Body {
     pub label: Label,
     /// Rotary (rad) or linear (m).
     pub kind: Kind,
-    /// Moment of inertia, kg m², or mass, kg; without what is geared to it.
+    /// Moment of inertia, kg m², or mass, kg, without the rotor.
     pub inertia: f64,
     /// Its friction, N m over rad/s or N over m/s.
     pub friction: Friction,
@@ -72,9 +72,9 @@ pub struct Body {
     pub force: f64,
     /// Factor on its dry friction over its coordinate, if it varies.
     pub along: Option<Polyline>,
-    /// The body that it moves with, and its way per way of that one; itself and 1, unless something makes both one.
+    /// The body that it moves with, and the ratio of their displacements; itself and 1 if it moves independently.
     pub leader: (usize, f64),
-    /// True if it is the rotor of a drive, which nothing but the gear holds.
+    /// True if it is the rotor of a drive, connected by the gear alone.
     pub is_rotor: bool,
 }
 
@@ -91,7 +91,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// Way at the belt per way of the body: its pitch radius, or 1.
+    /// Displacement at the belt per displacement of the body: its pitch radius, or 1.
     pub fn lever(self) -> f64 {
         match self {
             Kind::Rotary { radius } => radius,
@@ -99,7 +99,7 @@ impl Kind {
         }
     }
 
-    /// Unit of a way, of a speed, and of what acts on the body.
+    /// Units of position, speed and force (or torque) of the body.
     pub fn units(self) -> [&'static str; 3] {
         match self {
             Kind::Rotary { .. } => ["rad", "rad/s", "N m"],
@@ -113,29 +113,29 @@ impl Kind {
 pub struct Spring {
     /// Its name.
     pub label: Label,
-    /// A row of A: by how much it gets longer per way of each body.
+    /// A row of A: elongation per displacement of each body.
     pub arms: Vec<(usize, f64)>,
     /// Stiffness, N/m or N m/rad.
     pub stiffness: f64,
     /// Damping, N s/m or N m s/rad.
     pub damping: f64,
-    /// When it pushes and pulls.
+    /// Its force law.
     pub law: SpringLaw,
     /// Dependence of its stiffness on coordinates, if there is one.
     pub follows: Option<Follows>,
 }
 
-/// When a spring pushes and pulls.
+/// Force law of a spring.
 #[derive(Debug, Clone, PartialEq)]
 pub enum SpringLaw {
     /// Always.
     TwoSided,
-    /// It only pulls: its force is counted from a tension T₀, N, and it goes slack where that is used up.
+    /// It only pulls: its force counts from a tension T₀, N, and it goes slack when its tension is zero.
     Tension {
         /// T₀, N
         pretension: f64,
     },
-    /// It only pushes, beyond either end of a play: the flanks of a gear, end stops.
+    /// It only pushes, beyond either end of a gap: flanks of a gear, end stops.
     Gap {
         /// Length at which the negative side begins to push.
         low: f64,
@@ -150,19 +150,19 @@ pub enum SpringLaw {
         /// Force, N or N m.
         line: Polyline,
     },
-    /// Never; a run ends where its length leaves these bounds.
+    /// No force; a run ends when its length leaves these bounds.
     Bounds {
         /// Least length.
         low: f64,
         /// Greatest length.
         high: f64,
     },
-    /// Never: its length is the angle of a stepper's rotor, rad.
+    /// No force: its length is the angle of a stepper's rotor, rad.
     Angle {
         /// The angle where the length is zero.
         at: f64,
     },
-    /// Never: its length is only looked at.
+    /// No force: its length is only observed.
     None,
 }
 
@@ -185,14 +185,14 @@ pub enum Over {
     Rate,
 }
 
-/// A span whose length, and so its stiffness, changes with the ways of bodies: k = E A/(l + Σ a_j q_j).
+/// A span whose length, and so its stiffness, changes with the positions of bodies: k = E A/(l + Σ a_j q_j).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Follows {
     /// E A, N.
     pub rigidity: f64,
     /// l: its length at the origin, m.
     pub length: f64,
-    /// a_j: by how much it gets longer per way of each body.
+    /// a_j: change of its length per displacement of each body.
     pub arms: Vec<(usize, f64)>,
 }
 
@@ -209,13 +209,13 @@ impl Follows {
 pub struct Drive {
     /// Its name.
     pub label: Label,
-    /// The name of its limits.
+    /// The name of its voltage limit.
     pub voltage: Label,
-    /// The same.
+    /// The name of its current limit.
     pub current: Label,
     /// The body behind the gear.
     pub pulley: usize,
-    /// The body that the motor's shaft turns with: the pulley, or a rotor of its own where the gear is compliant.
+    /// The body that the motor's shaft turns with: the pulley, or the rotor if the gear is compliant.
     pub shaft: usize,
     /// The motor.
     pub motor: Motor,
@@ -243,12 +243,12 @@ impl Drive {
         }
     }
 
-    /// How many windings carry currents of their own.
+    /// Number of windings with currents of their own.
     pub fn windings(&self) -> usize {
         if self.motor.stepper.is_some() { 2 } else { 1 }
     }
 
-    /// True if its input differs from the voltage at its terminals, and is worth a column of its own.
+    /// True if its input differs from its terminal voltage and so has a column.
     pub fn shows_input(&self) -> bool {
         let amplifier = &self.amplifier;
         amplifier.gain != 1.0
@@ -258,7 +258,7 @@ impl Drive {
     }
 }
 
-/// A quantity that is shown.
+/// A quantity in a column.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Shown {
     /// Time, s.
@@ -267,27 +267,27 @@ pub enum Shown {
     Input(usize),
     /// Voltage at a motor's terminals, V.
     Voltage(usize),
-    /// Current of a motor, A; of a stepper that of its first phase.
+    /// Current of a motor, A; of the first phase of a stepper.
     Current(usize),
     /// Current of a stepper's second phase, A.
     SecondPhase(usize),
-    /// Way of a body, times a factor.
+    /// Position of a body, times a factor.
     Position(usize, f64),
     /// Speed of a body, times a factor.
     Speed(usize, f64),
-    /// Length of a spring; nothing where one body carries both its ends.
+    /// Length of a spring; zero if both its ends are on one body.
     Stretch(usize),
     /// Force of a spring, times a factor.
     Force(usize, f64),
     /// Friction on a body.
     Friction(usize),
-    /// The motion of a body, as [`Status::code`] has it.
+    /// The motion of a body, by [`Status::code`].
     Motion(usize),
     /// Deflection of the bristles of a body.
     Bristle(usize),
     /// State of a one-sided spring: slack, or the side that pushes.
     Contact(usize),
-    /// Whole counts of an encoder on a body, so many per unit of its way.
+    /// Encoder counts of a body, with the counts per unit of its position.
     Counts(usize, f64),
 }
 
@@ -300,18 +300,18 @@ pub struct Heading {
     pub unit: &'static str,
     /// The quantity in it.
     pub shown: Shown,
-    /// True if it is there also where only what a controller or a comparison needs is asked for.
+    /// True if it is also part of a lean run, for controllers and comparisons.
     pub lean: bool,
 }
 
-/// Ways and speeds of the bodies and currents of the drives, by their numbers; what is not there is zero.
+/// Positions and speeds of the bodies and currents of the drives, by their numbers; missing ones are zero.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct State {
     /// rad or m
     pub position: [f64; BODIES],
     /// rad/s or m/s
     pub speed: [f64; BODIES],
-    /// A; only where the current is a state of its own. In the order of the drives, both of a stepper one after the other.
+    /// A; only if the current is a state. In the order of the drives; a stepper has two in a row.
     pub current: [f64; CURRENTS],
 }
 
@@ -319,7 +319,7 @@ pub struct State {
 /// the labels.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Roles {
-    /// Bodies that it is there to move.
+    /// Loads: bodies that the machine is meant to move.
     pub loads: Vec<usize>,
     /// Springs that carry the drives' motion to them.
     pub spans: Vec<usize>,
@@ -328,11 +328,11 @@ pub struct Roles {
 /// Bodies, springs and drives.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mechanism {
-    /// The inertias; rotors behind all others.
+    /// The inertias; rotors come last.
     pub bodies: Vec<Body>,
     /// The springs between them.
     pub springs: Vec<Spring>,
-    /// The drives that move them. The inputs are one for each.
+    /// The drives, each with one input.
     pub drives: Vec<Drive>,
     /// The columns of a run.
     pub columns: Vec<Heading>,
@@ -342,13 +342,12 @@ pub struct Mechanism {
     pub roles: Roles,
     /// Coordinates of the origin, for parts that depend on them.
     pub origin: [f64; BODIES],
-    /// Friction of each body and of those that move with it, as far as it is straight, and whether it sticks.
+    /// Linear part of the friction of each body and its followers, and whether it sticks.
     friction: Vec<(Friction, bool)>,
 }
 
 impl Mechanism {
-    /// The mechanism of these parts. Rotors stand behind all other bodies, and no list is longer than there is room
-    /// for.
+    /// The mechanism of these parts. Rotors come last, and no list exceeds its maximum.
     pub fn new(bodies: Vec<Body>, springs: Vec<Spring>, drives: Vec<Drive>) -> Self {
         assert!(bodies.len() <= BODIES && springs.len() <= SPRINGS && drives.len() <= DRIVES);
         assert!(bodies.len() + drives.len() <= BODIES_AND_DRIVES);
@@ -359,7 +358,7 @@ impl Mechanism {
             let ((leader, ratio), mut own) = (part.leader, part.friction);
             let (all, sticking) = &mut friction[leader];
             if own.law.never_sticks() {
-                // What is not b v is no part of the straight equations.
+                // Only b v belongs to the linear equations.
                 for side in [&mut own.forward, &mut own.backward] {
                     (side.coulomb, side.breakaway) = (0.0, 0.0);
                 }
@@ -373,8 +372,8 @@ impl Mechanism {
         Self { bodies, springs, drives, columns, readings, roles, origin: [0.0; BODIES], friction }
     }
 
-    /// The state in which a run begins that is given this one: rotors in the middle of their play, and no current where
-    /// that is no state of its own.
+    /// Initial state of a run for a given one: rotors in the middle of their play, and zero for currents that are not
+    /// states.
     pub fn begun(&self, given: &State) -> State {
         let mut state = *given;
         for drive in &self.drives {
@@ -393,7 +392,7 @@ impl Mechanism {
         self.drives[..drive].iter().map(Drive::windings).sum()
     }
 
-    /// The drive whose winding carries the current of this number, if that current is a state of its own.
+    /// The drive whose winding carries the current of this number, if that is a state.
     pub fn drive_of_current(&self, number: usize) -> Option<usize> {
         let ends = self.drives.iter().scan(0, |end, drive| {
             *end += drive.windings();
@@ -403,17 +402,17 @@ impl Mechanism {
         (drive < self.drives.len() && self.drives[drive].has_current_state()).then_some(drive)
     }
 
-    /// The body that this one moves with: itself, unless something makes several bodies one.
+    /// The body that this one moves with; itself if it is independent.
     pub fn leader(&self, body: usize) -> usize {
         self.bodies[body].leader.0
     }
 
-    /// Way of this body per way of its leader.
+    /// Displacement of this body per displacement of its leader.
     pub fn ratio(&self, body: usize) -> f64 {
         self.bodies[body].leader.1
     }
 
-    /// Bodies that move by themselves.
+    /// Independent bodies.
     pub fn leaders(&self) -> impl Iterator<Item = usize> + '_ {
         (0..self.bodies.len()).filter(|&body| self.leader(body) == body)
     }
@@ -428,9 +427,8 @@ impl Mechanism {
         0..self.bodies.iter().take_while(|body| !body.is_rotor).count()
     }
 
-    /// Friction of a body and of those that move with it, as far as it is b v ± F_c and a breakaway: what the equations
-    /// of a mode have. The friction of a body: one that never sticks has nothing but b v. None for a body that another
-    /// leads.
+    /// Friction of a body and its followers in the equations of a mode: b v ± F_c and a breakaway, or only b v for one
+    /// that never sticks. Zero for a follower.
     pub fn friction(&self, body: usize) -> &Friction {
         &self.friction[body].0
     }
@@ -442,7 +440,7 @@ impl Mechanism {
         self.friction[leader].1 || self.drives.iter().any(by_gear)
     }
 
-    /// True if its equations are linear but for changes of mode: what the exact solver takes.
+    /// True if its equations are linear except for changes of mode, as the exact solver requires.
     pub fn is_piecewise_linear(&self) -> bool {
         let straight = |body: &Body| body.friction.is_piecewise_linear() && body.along.is_none();
         self.bodies.iter().all(straight)
@@ -455,8 +453,7 @@ impl Mechanism {
         self.springs[spring].arms.iter().map(|&(body, arm)| arm * position[body]).sum()
     }
 
-    /// How the length of a spring changes per way of each body that moves by itself; nothing where one body carries all
-    /// its ends.
+    /// Change of a spring's length per displacement of each independent body; zero if one body carries both its ends.
     pub fn leading_arms(&self, spring: usize) -> [f64; BODIES] {
         let (mut arms, mut size) = ([0.0; BODIES], 0.0);
         for &(body, arm) in &self.springs[spring].arms {
@@ -464,7 +461,7 @@ impl Mechanism {
             arms[self.leader(body)] += arm;
             size += arm.abs();
         }
-        // r · (1/r) is 1 but for rounding.
+        // r · (1/r) is 1 except for rounding.
         arms.map(|arm| if arm.abs() <= 1e-12 * size { 0.0 } else { arm })
     }
 
@@ -482,8 +479,7 @@ impl Mechanism {
         if layout.origin(start) == self.origin { Arc::clone(self) } else { Arc::new(self.seen_from(layout, start)) }
     }
 
-    /// The same with ways counted from where `start` is: ends and bounds move there, before anything is multiplied with
-    /// them.
+    /// This mechanism with positions counted from `start`: ends and bounds are shifted before any multiplication.
     pub(crate) fn seen_from(&self, layout: &Layout, start: &State) -> Self {
         let mut seen = self.clone();
         seen.origin = layout.origin(start);

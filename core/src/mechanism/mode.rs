@@ -1,4 +1,4 @@
-//! Modes: which linear equations hold, what ends them, and what follows.
+//! Modes: the linear equations in force, their guards, and the next mode.
 
 use super::{BODIES, DRIVES, Form, Label, Mechanism, SPRINGS, Transition};
 use crate::friction::Motion;
@@ -21,7 +21,7 @@ pub struct Mode {
 /// The states of the parts of a drive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct DriveMode {
-    /// True if the torque through the gear is positive; matters only where the gear loses power.
+    /// True if the torque through the gear is positive; matters only for a lossy gear.
     pub torque_positive: bool,
     /// State of the voltage limit.
     pub voltage: Limit,
@@ -38,7 +38,8 @@ impl DriveMode {
 }
 
 impl Mode {
-    /// Bodies that move so, in their order, and nothing else out of the ordinary; those that are not named are free.
+    /// Mode with these motions of the bodies, in order, and all other parts in their ordinary case; further bodies are
+    /// free.
     pub fn of(motion: impl IntoIterator<Item = Motion>) -> Self {
         let mut mode = Self {
             motion: [Motion::Free; BODIES],
@@ -53,7 +54,7 @@ impl Mode {
         mode
     }
 
-    /// The same with all gears carrying this way.
+    /// The same mode with this sign of all gear torques.
     pub fn with_torque(mut self, positive: bool) -> Self {
         self.drive.iter_mut().for_each(|drive| drive.torque_positive = positive);
         self
@@ -72,7 +73,7 @@ impl Mode {
         }
     }
 
-    /// Makes a part other than a body do something else.
+    /// Switches a part other than a body.
     pub(crate) fn switch(&mut self, to: Switch) {
         match to {
             Switch::Span(spring, slack) => self.slack[spring] = slack,
@@ -108,18 +109,18 @@ impl Limit {
     }
 }
 
-/// State of two elastic flanks. A flank only pushes: one that its damper holds back from
-/// following carries nothing, though it has not left.
+/// State of two elastic flanks. A flank only pushes: one that its damper delays carries no force, although it has not
+/// separated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Contact {
     /// The negative side carries.
     Low,
-    /// The negative side is within reach and carries nothing.
+    /// The negative side is in contact without force.
     LowLoose,
     /// Neither side.
     #[default]
     Apart,
-    /// The positive side is within reach and carries nothing.
+    /// The positive side is in contact without force.
     HighLoose,
     /// The positive side carries.
     High,
@@ -155,7 +156,7 @@ pub enum What {
     Field(usize),
 }
 
-/// A part of a mechanism that can change what it does.
+/// A part of a mechanism that changes between modes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Part {
     /// Which.
@@ -191,23 +192,23 @@ impl Part {
 /// The state of a part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Status {
-    /// Of a body.
+    /// State of a body.
     Motion(Motion),
-    /// Of a span: whether it is slack.
+    /// State of a span: true if slack.
     Slack(bool),
-    /// Of a limit.
+    /// State of a limit.
     Limit(Limit),
-    /// Of gear and end stops.
+    /// State of a gear or an end stop.
     Contact(Contact),
-    /// Of a line: which piece.
+    /// State of a line: index of its piece.
     Piece(u8),
-    /// Of a stepper: by how many tooth pitches, four full steps each, its rotor is behind.
+    /// State of a stepper: tooth pitches, four full steps each, by which its rotor is behind.
     Slipped(i32),
 }
 
 impl Status {
     /// As in the result files: a body −1 backward, 0 stuck, 1 forward, 2 free; a span 1 if slack; a limit, gear or stop
-    /// the side that binds or carries, or 0; a line always 0, for from piece to piece its force does not jump.
+    /// the side that binds or carries, or 0; a line always 0, since its force is continuous between pieces.
     pub fn code(self) -> i8 {
         match self {
             Status::Motion(motion) => motion.code(),
@@ -219,7 +220,7 @@ impl Status {
         }
     }
 
-    /// Whether nothing that shows differs.
+    /// True if both have the same code in results.
     pub fn shows_as(self, other: Status) -> bool {
         match (self, other) {
             (Status::Slipped(own), Status::Slipped(other)) => own == other,
@@ -256,34 +257,34 @@ impl PartialEq<Motion> for Status {
 pub struct Guard {
     /// The form that must not become negative.
     pub form: Form,
-    /// The consequence of its fall.
+    /// Consequence of its sign change.
     pub transition: Transition,
 }
 
-/// Why a mode ends.
+/// Cause of the end of a mode.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Cause {
-    /// A sliding body comes to zero speed.
+    /// A sliding body reaches zero speed.
     Stop(usize),
-    /// The load on a stuck body passes its breakaway forward.
+    /// The load on a stuck body exceeds its forward breakaway.
     BreakForward(usize),
-    /// The load on a stuck body passes its breakaway backward.
+    /// The load on a stuck body exceeds its backward breakaway.
     BreakBackward(usize),
     /// The torque through the gear of a drive changes sign.
     GearTorque(usize),
-    /// Another part begins to do something else.
+    /// Another part switches.
     Switch(Switch),
     /// The length of a spring leaves its bounds.
     Leave(usize),
 }
 
 impl Cause {
-    /// Room for the kinds that [`Cause::kind`] tells apart: two for each body, one for each gear, three each for a
+    /// Number of kinds that [`Cause::kind`] distinguishes: two for each body, one for each gear, three each for a
     /// drive's limits and for a spring, two for a stepper's field.
     pub(crate) const KINDS: usize = 2 * BODIES + 9 * DRIVES + 3 * SPRINGS;
 
-    /// Which condition it belongs to; breakaway forward stands with the body, breakaway backward, which may be of quite
-    /// another size, by itself.
+    /// Index of its condition; forward breakaway shares that of the body, backward breakaway, which may have a very
+    /// different size, has its own.
     pub fn kind(self) -> usize {
         const GEAR: usize = 2 * BODIES;
         const LIMITS: usize = GEAR + DRIVES;
@@ -309,14 +310,13 @@ impl Cause {
             Cause::Switch(Switch::Gap(spring, to)) => SPRING + 3 * spring + contact(to),
             // The neighbours of a number differ by two.
             Cause::Switch(Switch::Field(drive, to)) => FIELD + 2 * drive + usize::from(to.rem_euclid(4) >= 2),
-            // The piece before, this one, the one behind: no two of them alike.
+            // The previous, this and the next piece have different indices.
             Cause::Switch(Switch::Line(spring, to)) => SPRING + 3 * spring + usize::from(to % 3),
         }
     }
 
-    /// Which of several conditions that have fallen at one instant is settled first: limits, flanks, spans and stops,
-    /// which follow from the state and the input alone; then the gears' torques, which follow from them; then bodies,
-    /// which break away with the load that all of these leave.
+    /// Order in which simultaneous events are settled: limits, flanks, spans and stops, which depend on state and input
+    /// alone; then gear torques, which depend on these; then bodies, whose breakaway depends on all of them.
     pub fn rank(self) -> u8 {
         match self {
             Cause::Leave(_) => 0,
@@ -326,7 +326,7 @@ impl Cause {
         }
     }
 
-    /// True if both are of the same part, and it is no body.
+    /// True if both belong to the same part and it is not a body.
     pub(crate) fn is_of_same_part(self, other: Cause) -> bool {
         match (self, other) {
             (Cause::GearTorque(a), Cause::GearTorque(b)) => a == b,
@@ -341,15 +341,15 @@ impl Cause {
 pub enum Switch {
     /// A spring that only pulls goes slack, or is taut again.
     Span(usize, bool),
-    /// A spring that only pushes is touched, or left.
+    /// A spring that only pushes makes or loses contact.
     Gap(usize, Contact),
-    /// A spring whose force is a line comes to another piece of it.
+    /// A piecewise linear spring changes its piece.
     Line(usize, u8),
     /// The voltage limit of a drive.
     Voltage(usize, Limit),
     /// The current limit of a drive.
     Current(usize, Limit),
-    /// The rotor of a stepper falls to another tooth: so many pitches behind.
+    /// The rotor of a stepper falls to another tooth; pitches behind the field.
     Field(usize, i32),
 }
 

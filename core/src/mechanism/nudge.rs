@@ -1,13 +1,13 @@
-//! The same machine with numbers that are off by a few roundings: what shows how far a run depends on them.
+//! Perturbed machine: parameters changed by a few roundings, to estimate the sensitivity of a run.
 
 use super::{Mechanism, SpringLaw};
 
-/// Relative changes: what some tens of roundings do to a number.
+/// Relative perturbation: a few tens of roundings.
 const NUDGE: f64 = 16.0 * f64::EPSILON;
 
 impl Mechanism {
-    /// The same with inertias, constant forces and force lines that are off by 16 ε of themselves, neighbours in opposite
-    /// directions, so that forces which balance do so no longer.
+    /// This machine with inertias, constant forces and force lines changed by a relative 16 ε, with alternating signs,
+    /// so that exact balances are lost.
     pub(crate) fn nudged(&self) -> Self {
         let mut nudged = self.clone();
         for (number, body) in nudged.bodies.iter_mut().enumerate() {

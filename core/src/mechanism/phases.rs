@@ -1,7 +1,7 @@
-//! The phases of a stepper: two windings whose torque goes with the sine of the rotor's angle.
+//! Phases of a stepper: two windings with sinusoidal torque over the rotor angle.
 //!
-//! With N rotor teeth, the rotor's angle φ counted from a full step, ε = N φ + π/4, and the field that the driver is told,
-//! ψ = N x*/r + π/4 (Kuo and Kelemen 1979; Kenjo and Sugawara 1994):
+//! With N rotor teeth, the rotor's angle φ counted from a full step, ε = N φ + π/4, and the angle ψ = N x*/r + π/4 of
+//! the commanded field (Kuo and Kelemen 1979; Kenjo and Sugawara 1994):
 //!
 //! ```text
 //! L di_a/dt = v_a − R i_a + K_m φ̇ sin ε
@@ -9,13 +9,13 @@
 //! τ = K_m (−i_a sin ε + i_b cos ε) − T_d sin 4ε
 //! ```
 //!
-//! Phase b is phase a a quarter of a tooth pitch on: with σ_a = 0 and σ_b = π/2 both are one formula. The rate −R i/L is
-//! in the linear equations of a mode; the rest is not linear and stands here.
+//! Phase b is phase a shifted by a quarter of a tooth pitch: with σ_a = 0 and σ_b = π/2 both have one formula. The rate
+//! −R i/L is in the linear equations of a mode; the nonlinear rest is here.
 
 use super::{Amplifier, Cause, Drive, Form, Mechanism, Mode, Motor, SpringLaw, State, Switch};
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
-/// A stepper's phases, made ready to be evaluated.
+/// A stepper's phases, prepared for evaluation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Phases {
     /// N
@@ -32,26 +32,26 @@ pub struct Phases {
     pub supply: f64,
     /// √2 I, A.
     pub amplitude: f64,
-    /// 2π f_b of the chopper's regulator, 1/s; none where the driver sets the voltage.
+    /// 2π f_b of the chopper's regulator, 1/s; none if the driver sets the voltage.
     pub regulator: Option<f64>,
 }
 
-/// A rate of a phase current, A/s, and how it changes.
+/// Rate of a phase current, A/s, with its derivatives.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PhaseRate {
     /// di/dt + R i/L, A/s.
     pub value: f64,
-    /// By the rotor's angle, its speed and the current.
+    /// Derivatives with respect to rotor angle, speed and current.
     pub slopes: [f64; 3],
 }
 
 impl Phases {
-    /// Those of a drive; none of a brushed motor.
+    /// Phases of a drive; none for a brushed motor.
     pub fn of(drive: &Drive) -> Option<Self> {
         Self::of_motor(&drive.motor, &drive.amplifier)
     }
 
-    /// The same of a motor and its driver.
+    /// Phases of a motor and its driver.
     pub fn of_motor(motor: &Motor, amplifier: &Amplifier) -> Option<Self> {
         let stepper = motor.stepper?;
         Some(Self {
@@ -71,7 +71,7 @@ impl Phases {
         self.teeth * angle + FRAC_PI_4
     }
 
-    /// Torque on the rotor, N m, at an angle, rad, and currents, A; and how it changes with the angle and each current.
+    /// Torque on the rotor, N m, at an angle, rad, and currents, A, with its derivatives.
     #[inline(always)]
     pub fn torque(&self, angle: f64, [a, b]: [f64; 2]) -> (f64, [f64; 3]) {
         let (sin, cos) = self.electrical(angle).sin_cos();
@@ -85,7 +85,7 @@ impl Phases {
         (torque, [-k * n * (a * cos + b * sin) - detent_slope, -k * sin, k * cos])
     }
 
-    /// The part of a phase current's rate beyond −R i/L, at the commanded angle `told`, rad.
+    /// Rate of a phase current without −R i/L, at the commanded angle `told`, rad.
     #[inline(always)]
     pub fn rate(&self, phase: usize, angle: f64, speed: f64, current: f64, told: f64) -> PhaseRate {
         let (sin, cos) = (self.electrical(angle) - FRAC_PI_2 * phase as f64).sin_cos();
@@ -115,8 +115,8 @@ impl Phases {
         self.resistance * current + emf + self.inductance * regulator * (self.amplitude * along - current)
     }
 
-    /// The voltage that the regulator of a phase wants beyond V and beyond −V, V: where it is zero, a limit begins or
-    /// ceases to bind. None without a regulator.
+    /// Excess of a phase regulator's voltage over V and −V, V; a limit begins or ceases to bind at its zeros. None
+    /// without a regulator.
     #[inline(always)]
     pub fn excess(&self, phase: usize, angle: f64, speed: f64, current: f64, told: f64) -> Option<[f64; 2]> {
         let sin = (self.electrical(angle) - FRAC_PI_2 * phase as f64).sin();
@@ -134,7 +134,7 @@ impl Phases {
 }
 
 impl Mechanism {
-    /// The spring whose length is the angle of a stepper's rotor, and the angle where that is zero.
+    /// The spring whose length is the angle of a stepper's rotor, and the angle at zero length.
     pub fn angle_of(&self, drive: usize) -> Option<(usize, f64)> {
         let shaft = self.drives[drive].shaft;
         self.springs.iter().enumerate().find_map(|(index, spring)| match spring.law {
@@ -148,18 +148,18 @@ impl Mechanism {
         self.drives[drive].amplifier.gain / self.bodies[self.drives[drive].pulley].kind.lever()
     }
 
-    /// The input of a microstep, m; none of a brushed motor, and where the driver interpolates.
+    /// Input of a microstep, m; none for a brushed motor or an interpolating driver.
     pub fn microstep(&self, drive: usize) -> Option<f64> {
         let stepper = self.drives[drive].motor.stepper.filter(|stepper| !stepper.interpolate)?;
         Some(stepper.microstep() / self.angle_per_input(drive))
     }
 
-    /// True if the command of a drive goes in microsteps.
+    /// True if the command of a drive advances in microsteps.
     pub fn is_stepped(&self) -> bool {
         (0..self.drives.len()).any(|drive| self.microstep(drive).is_some())
     }
 
-    /// The farthest that the command of a stepper may jump, m: two full steps, half a tooth pitch.
+    /// Largest allowed jump of a stepper's command, m: two full steps, half a tooth pitch.
     pub fn farthest_jump(&self, drive: usize) -> Option<f64> {
         let stepper = self.drives[drive].motor.stepper?;
         Some(PI / stepper.teeth() / self.angle_per_input(drive).abs())
@@ -174,8 +174,8 @@ impl Mechanism {
         Some(lag)
     }
 
-    /// The conditions under which a rotor stays within half a tooth pitch of the field: beyond it, it falls to the next
-    /// tooth, four full steps on.
+    /// Guards of a rotor within half a tooth pitch of the field; beyond that it falls to the next tooth, four full
+    /// steps away.
     pub(super) fn watch_steps(&self, drive: usize, mode: &Mode, watch: &mut impl FnMut(Form, Cause)) {
         let Some((lag, stepper)) = self.lag(drive).zip(self.drives[drive].motor.stepper) else { return };
         let (slipped, pitch) = (mode.drive[drive].slipped, 2.0 * PI / stepper.teeth());
@@ -185,7 +185,7 @@ impl Mechanism {
         watch(half + middle, Cause::Switch(Switch::Field(drive, slipped - 1)));
     }
 
-    /// Has the phases of steppers carry the currents that hold the rotor where it is.
+    /// Sets the phase currents of steppers that hold the rotor in its position.
     pub(super) fn energise(&self, state: &mut State) {
         for (number, drive) in self.drives.iter().enumerate() {
             if let Some(phases) = Phases::of(drive) {

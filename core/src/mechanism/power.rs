@@ -2,12 +2,12 @@
 
 use super::{AmplifierMode, BODIES, DRIVES, Limit, Mechanism, Mode, SPRINGS, SpringLaw, State};
 
-/// Power at one instant, W. What comes in goes into heat or is stored: `input` + `load` = losses + `stored`.
+/// Power balance at one instant, W: `input` + `load` = losses + `stored`.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Power {
     /// Electrical power at the motors' terminals, v i.
     pub input: f64,
-    /// Power of forces on bodies from outside: constant ones, and those that are lines.
+    /// Power of external forces on bodies: constant and piecewise linear ones.
     pub load: f64,
     /// Copper loss R i².
     pub copper: f64,
@@ -24,7 +24,7 @@ pub struct Power {
 }
 
 impl Power {
-    /// The imbalance; zero but for rounding.
+    /// The imbalance; zero except for rounding.
     pub fn imbalance(&self) -> f64 {
         self.input + self.load
             - self.copper
@@ -35,7 +35,7 @@ impl Power {
             - self.stored
     }
 
-    /// The largest of the powers involved, to measure the imbalance against.
+    /// Largest of the powers, as the scale of the imbalance.
     pub fn scale(&self) -> f64 {
         [self.input, self.load, self.copper, self.gear, self.conversion, self.stored]
             .iter()
@@ -48,23 +48,22 @@ impl Power {
 /// The strain of a spring.
 #[derive(Debug, Clone, Copy, Default)]
 struct Strain {
-    /// The way that its force follows.
+    /// Elongation that determines its force.
     way: f64,
-    /// The strain that its energy follows: nothing where one that is not straight yet is pulled tight against its
-    /// damping.
+    /// Elongation that determines its energy: zero for a slack spring that is pulled tight against its damping.
     strain: f64,
     rate: f64,
 }
 
 impl Mechanism {
-    /// Inertia with the whole of what is geared to it, n² J_r of a rotor.
+    /// Inertia including that of the rotor, n² J_r.
     fn whole_inertia(&self, body: usize) -> f64 {
         let rotors = self.drives.iter().filter(|drive| !drive.has_rotor() && drive.pulley == body);
         self.bodies[body].inertia
             + rotors.map(|drive| drive.motor.gear_ratio.powi(2) * drive.motor.rotor_inertia).sum::<f64>()
     }
 
-    /// Energy stored at `state`, J: ½ Σ J q̇² + ½ L i², and what the springs hold.
+    /// Energy stored at `state`, J: ½ Σ J q̇² + ½ L i² and that of the springs.
     ///
     /// A spring that pushes and pulls holds ½ k s², one that only pulls t²/2k, t being its tension without damping, and
     /// nothing if slack; one that only pushes what it is pressed.
@@ -80,7 +79,7 @@ impl Mechanism {
         0.5 * (kinetic + elastic + magnetic)
     }
 
-    /// The strain of a spring, counted from where it begins to push or pull.
+    /// Elongation of a spring, counted from the onset of its force.
     fn strain(&self, spring: usize, state: &State) -> Strain {
         let part = &self.springs[spring];
         let sum = |values: &[f64; BODIES]| part.arms.iter().map(|&(body, arm)| arm * values[body]).sum::<f64>();
@@ -113,8 +112,8 @@ impl Mechanism {
             power.stored += self.whole_inertia(body) * speed * acceleration[body];
         }
         for (index, spring) in self.springs.iter().enumerate() {
-            // Whatever a spring takes up and does not keep is lost in its damper; so is all that one holds that lets go
-            // early.
+            // Energy that a spring receives and does not store is lost in its damper, as is the energy of one that
+            // separates early.
             let s = self.strain(index, state);
             let kept = spring.stiffness * s.strain;
             let force = if stiffness[index] > 0.0 { spring.stiffness * s.way + spring.damping * s.rate } else { 0.0 };

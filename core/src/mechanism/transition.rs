@@ -1,33 +1,33 @@
-//! The consequence of a condition that falls: the rule of events, as data that is made with the conditions.
+//! Transition rules of events, as data made with their guards.
 //!
-//! Solvers and exports read it, and none of them decides by itself what follows.
+//! Solvers and exports read them; none decides by itself.
 
 use super::{AmplifierMode, Cause, Drive, Form, Limit, Mechanism, Mode, Switch, What};
 use crate::friction::Motion;
 
-/// The consequence of a condition of a mode that falls.
+/// Transition of a guard that becomes negative.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Transition {
     /// The condition.
     pub cause: Cause,
-    /// Which of several conditions that have fallen at one instant is settled first: the one of least rank.
+    /// Rank among simultaneous events; the lowest is settled first.
     pub rank: u8,
     /// The next state.
     pub then: Then,
-    /// Quantities of the state that the change sets.
+    /// States that the event sets.
     pub resets: Resets,
     /// Tolerance for rounding after it.
     pub after: After,
-    /// The part that events name; none for the torque of a gear and for a rotor, which only its gear holds.
+    /// The part named in the event; none for gear torque and for a rotor, which only its gear holds.
     pub told: Option<What>,
 }
 
 /// The next state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Then {
-    /// A part does something else.
+    /// A part switches.
     Become(Next),
-    /// A body that has stopped goes on in the direction in which its load passes the breakaway; otherwise it rests.
+    /// A stopped body continues in the direction in which its load exceeds the breakaway; otherwise it sticks.
     Decide(usize),
     /// The run ends.
     Leave,
@@ -44,14 +44,14 @@ pub enum Next {
     Switch(Switch),
 }
 
-/// Quantities that a change sets.
+/// States that an event sets.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Resets {
     /// None.
     None,
     /// The speeds of a body and of those that move with it become zero.
     Speeds(usize),
-    /// The current of a drive stands at its limit, A.
+    /// The current of a drive is set to its limit, A.
     Current(usize, f64),
 }
 
@@ -64,18 +64,18 @@ pub enum Place {
     Current(usize),
 }
 
-/// Tolerance for rounding after a change.
+/// Tolerance for rounding after an event.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum After {
     /// Nothing.
     Nothing,
-    /// The conditions on the part hold where they are zero but for rounding.
+    /// Guards of the part that are zero within rounding count as satisfied.
     PartHolds {
-        /// The condition whose value starts from zero with a slope of zero, where the motion, and not an edge of the
-        /// input, has let the part go: of a current that leaves its limit.
+        /// The guard that starts from zero with zero slope if the motion, not a jump of the input, has released the
+        /// part: for a current that leaves its limit.
         gently: Option<Cause>,
     },
-    /// The load on the body may pass its breakaways by its rounding.
+    /// The load on the body may exceed its breakaways by its rounding.
     BreakawaysWiden,
 }
 
@@ -93,7 +93,7 @@ impl Resets {
 }
 
 impl Mechanism {
-    /// The consequence of the fall of this condition of `mode`.
+    /// Transition for this guard of `mode`.
     pub(super) fn transition(&self, cause: Cause, mode: &Mode) -> Transition {
         let widen = |body, then, resets| (then, resets, After::BreakawaysWiden, self.told(body));
         let breaks = |body, motion| widen(body, Then::Become(Next::Moves(body, motion)), Resets::None);
@@ -114,7 +114,7 @@ impl Mechanism {
         Transition { cause, rank: cause.rank(), then, resets, after, told }
     }
 
-    /// The part that events of a body name.
+    /// The part named in events of a body.
     fn told(&self, body: usize) -> Option<What> {
         (!self.bodies[body].is_rotor).then_some(What::Body(body))
     }
@@ -129,12 +129,12 @@ impl Mechanism {
         let left = mode.drive[drive].current;
         match side {
             Limit::Inside => (Resets::None, Some(Cause::Switch(Switch::Current(drive, left)))),
-            // It stands at its limit, to the last bit.
+            // It is at its limit, to the last bit.
             side => (Resets::Current(drive, side.sign() * part.amplifier.current_limit.unwrap_or(0.0)), None),
         }
     }
 
-    /// Makes a part do something else.
+    /// Switches a part to its next state.
     pub(crate) fn put_next(&self, mode: &mut Mode, next: Next) {
         match next {
             Next::Moves(body, motion) => self.followers(body).for_each(|body| mode.motion[body] = motion),
@@ -143,8 +143,8 @@ impl Mechanism {
         }
     }
 
-    /// The mode in which loads on bodies at rest are told: gears that lose power carry as they do while bodies rest.
-    /// `value` evaluates a form in the present state.
+    /// The mode for loads on bodies at rest: lossy gears have the torque sign that holds at rest. `value` evaluates a
+    /// form in the present state.
     pub(crate) fn resting_mode(&self, mode: &Mode, value: impl Fn(&Form) -> f64) -> Mode {
         let mut resting = *mode;
         let losing = |(_, drive): &(usize, &Drive)| drive.loses();

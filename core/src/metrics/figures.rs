@@ -1,5 +1,5 @@
-//! The list of key figures, by the role of the part that each belongs to. Columns of sweeps, keys of results, tables of
-//! reports and views of the studio are made from it: a new figure is one row here.
+//! Table of key figures, by the role of their part. Columns of sweeps, keys of results, tables of reports and views of
+//! the studio are made from it: a new figure is one row here.
 
 use super::{Metrics, Peak};
 use crate::machine::{DriveAt, Geometry, Kind};
@@ -29,17 +29,17 @@ pub enum Role {
 pub enum Worth {
     /// A number; NaN where a run has none.
     Number(f64),
-    /// The value of largest magnitude, with its sign, and when that was.
+    /// Value of largest magnitude, with its sign and time.
     Peak(Peak),
-    /// When a peak is, which that peak tells, too.
+    /// Time of a peak, which the peak itself also contains.
     TimeOfPeak(f64),
-    /// A yes or no.
+    /// A truth value.
     Flag(bool),
 }
 
 impl Worth {
-    /// As a number. Peaks are magnitudes: of a motion there and back the sign of the larger peak is chance, and shares
-    /// of signed ones would mean nothing.
+    /// As a number. Peaks are magnitudes: after a motion there and back the sign of the larger peak is arbitrary, and
+    /// quantiles of signed peaks would be meaningless.
     pub fn number(self) -> f64 {
         match self {
             Worth::Number(value) | Worth::TimeOfPeak(value) => value,
@@ -100,15 +100,15 @@ pub struct FigureRow {
     pub words: &'static str,
     /// Its name as a column and for people on an axis, where that has names of its own for it.
     pub of_axis: Option<[&'static str; 2]>,
-    /// True if it is another figure in other words on an axis, so that its sweeps leave it out.
+    /// True if it repeats another figure on an axis, so that sweeps of axes omit it.
     pub again_on_an_axis: bool,
-    /// True if only a machine with one drive has it.
+    /// True if it exists for machines with one drive only.
     pub one_drive: bool,
-    /// Whether only a machine with a stepper has it.
+    /// True if it exists for machines with steppers only.
     pub stepper: bool,
-    /// Its value for the part of this place.
+    /// Its value for the part with this index.
     pub of: fn(&Metrics, usize) -> Worth,
-    /// The quantity to follow for it; for a row of the whole machine, of all parts.
+    /// Quantity that a meter follows for it; for a figure of the whole machine, of all parts.
     pub seek: Option<Seek>,
 }
 
@@ -184,17 +184,17 @@ pub static FIGURES: &[FigureRow] = &[
 pub struct Figure {
     /// Its name as a column.
     pub name: String,
-    /// Its name by role where that is another one.
+    /// Its name by role, if different.
     pub by_role: String,
     /// Its SI unit; empty for a pure number.
     pub unit: &'static str,
-    /// Its name for people.
+    /// Its name in messages.
     pub words: String,
-    /// The place of its part among those of the role.
+    /// Index of its part among those of the role.
     pub place: usize,
     /// The key of its part.
     pub part: &'static str,
-    /// The row that it is of.
+    /// Its row of the table.
     pub row: &'static FigureRow,
 }
 
@@ -204,25 +204,25 @@ impl Figure {
         (self.row.of)(metrics, self.place)
     }
 
-    /// The quantity to follow for it, and the part's place.
+    /// Quantity that a meter follows for it, and the part's index.
     pub fn seek(&self) -> Option<(super::Seek, Option<usize>)> {
         self.row.seek.map(|seek| (seek, (self.row.role != Role::Whole).then_some(self.place)))
     }
 }
 
-/// The name of a motor, as its current's column begins.
+/// Name of a motor, by the prefix of its current's column.
 fn motor(drive: &DriveAt) -> Label {
     Label { key: drive.current_column.trim_end_matches("_current"), name: drive.label.name }
 }
 
-/// The parts of a role: their keys as columns have them, and their names.
+/// Parts of a role: their keys in columns, and their names.
 fn parts(geometry: &Geometry, role: Role) -> Vec<(&'static str, String)> {
     let labels: Vec<Label> = match role {
         Role::Load => geometry.slides.iter().map(|slide| geometry.label(slide.body)).collect(),
         Role::Pulley => geometry.drives.iter().map(|drive| geometry.label(drive.pulley)).collect(),
         Role::Motor => geometry.drives.iter().map(motor).collect(),
         Role::Shaft => {
-            // What slides has a speed, too.
+            // Slides also have a speed.
             let slides = |key: &str| geometry.slides.iter().any(|slide| geometry.label(slide.body).key == key);
             let label = |drive: &DriveAt| if slides(motor(drive).key) { drive.label } else { motor(drive) };
             geometry.drives.iter().map(label).collect()
@@ -231,7 +231,7 @@ fn parts(geometry: &Geometry, role: Role) -> Vec<(&'static str, String)> {
         Role::Body => geometry.bodies.iter().map(|body| body.label).collect(),
         Role::Whole => vec![Label { key: "", name: "" }],
     };
-    // The span 1, but the left span.
+    // "span 1" without, "the left span" with an article.
     let article = |name: &str| role == Role::Span && !name.starts_with("span");
     let named = |name: &str| if article(name) { format!("the {name}") } else { name.to_string() };
     labels.into_iter().map(|label| (label.key, named(label.name))).collect()
@@ -264,7 +264,7 @@ pub fn figures(kind: Kind, has_stepper: bool) -> Vec<Figure> {
 mod tests {
     use super::*;
 
-    /// The cart of a dual belt and its motor have a peak speed each, which were both `peak_cart_speed`.
+    /// The cart of a dual belt and its motor each have a peak speed; both were named `peak_cart_speed`.
     #[test]
     fn no_two_figures_of_a_kind_share_a_name() {
         for kind in Kind::ALL {

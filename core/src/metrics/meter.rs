@@ -11,33 +11,33 @@ use crate::signal::Signal;
 use crate::solve::{Closer, Curve, Event, Gap, Gaps, Observe, Polynomial, QUANTITIES, Reading, Stretch};
 use std::sync::Arc;
 
-/// Where the peak of a quantity is sought: in a reading, or in a sum of readings.
+/// Source of a peak: a reading, or a sum of readings.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Place {
-    /// The number of a reading, and the factor that makes the quantity of it.
+    /// Index of a reading, and the factor to the quantity.
     Reading(usize, f64),
-    /// The number of a sum.
+    /// Index of a sum.
     Sum(usize),
 }
 
 /// A sum of readings by their numbers, each with its weight.
 type Sum = Vec<(usize, f64)>;
 
-/// Where a machine's readings hold what the figures are made from: the same for all machines of a structure.
+/// Readings from which the figures are made: the same for all machines of a structure.
 #[derive(Debug, Clone, PartialEq, Default)]
 struct Places {
     /// Bodies other than rotors.
     bodies: usize,
     load_speeds: Vec<Place>,
     load_errors: Vec<Place>,
-    /// Of the drive pulleys at the pitch circle; of a machine with one drive.
+    /// Speeds of the drive pulleys at the pitch circle; only for a machine with one drive.
     belt_speeds: Vec<Place>,
     shaft_speeds: Vec<Place>,
     currents: Vec<Place>,
     stretches: Vec<Place>,
     forces: Vec<Place>,
     sums: Vec<Sum>,
-    /// Rotors that turn by themselves, and the readings of their speeds.
+    /// Independent rotors, and the readings of their speeds.
     rotors: Vec<(usize, usize)>,
     /// The bodies that the motors' shafts turn with.
     shafts: Vec<usize>,
@@ -49,7 +49,7 @@ impl Places {
         let find = |wanted: Shown| mechanism.readings.iter().position(|shown| *shown == wanted);
         let place = |wanted: Shown| find(wanted).map_or(Place::Sum(usize::MAX), |q| Place::Reading(q, 1.0));
         let mut sums: Vec<Sum> = Vec::new();
-        // A stretch that is no reading is a sum of those that are.
+        // An elongation without a reading is a sum of those with one.
         let mut summed = |terms: &[(usize, f64)]| match terms {
             &[(span, 1.0)] if find(Shown::Stretch(span)).is_some() => place(Shown::Stretch(span)),
             _ => {
@@ -69,7 +69,7 @@ impl Places {
             _ => Vec::new(),
         };
         let shafts = mechanism.drives.iter().enumerate().map(|(number, drive)| match belt_speeds.get(number) {
-            // Without play the shaft turns with the pulley, whose speed is followed already.
+            // Behind a stiff gear the shaft turns with the pulley, whose speed is already followed.
             Some(&Place::Reading(q, _)) if drive.shaft == drive.pulley => {
                 Place::Reading(q, 1.0 / machine.pulley_radius)
             }
@@ -95,7 +95,7 @@ impl Places {
         }
     }
 
-    /// The places of what a figure is made from, of all parts of its role.
+    /// Sources of a figure, for all parts of its role.
     fn sought(&self, seek: Seek) -> &[Place] {
         match seek {
             Seek::LoadSpeed => &self.load_speeds,
@@ -122,13 +122,13 @@ pub struct Sought {
 }
 
 impl Sought {
-    /// All that a machine has figures of.
+    /// All quantities with figures.
     pub fn all(machine: &Machine, mechanism: &Mechanism) -> Self {
         Self::of(machine, mechanism, &Seek::ALL.map(|seek| (seek, None)))
     }
 
-    /// These alone, each of one part of its role or of all of them, and what is known at the end: other peaks and
-    /// speeds stay as they are where nothing has moved, and cost nothing.
+    /// Only these quantities, each for one or all parts of its role, and values at the end: other peaks and speeds keep
+    /// their initial values and cost nothing.
     pub fn of(machine: &Machine, mechanism: &Mechanism, seeks: &[(Seek, Option<usize>)]) -> Self {
         let places = Places::of(machine, mechanism);
         let (mut readings, mut sums) = ([false; QUANTITIES], false);
@@ -147,7 +147,7 @@ impl Sought {
     }
 }
 
-/// Gathers [`Metrics`] from a run that it observes: peaks between rows, too, and not of rows.
+/// Gathers [`Metrics`] from a run that it observes, with peaks of the motion itself, not of rows.
 ///
 /// ```
 /// use taut::case::Case;
@@ -177,13 +177,13 @@ impl Sought {
 pub struct Meter {
     machine: Machine,
     sought: Sought,
-    /// By readings.
+    /// Peaks of readings.
     peaks: [Peak; QUANTITIES],
-    /// By sums of readings.
+    /// Peaks of sums of readings.
     sums: Vec<Peak>,
     plateau: Option<Plateau>,
     rotors: Vec<(usize, Rotor)>,
-    /// Positions commanded of steppers; empty of other motors.
+    /// Commanded positions of steppers; empty for other motors.
     commands: Vec<Signal>,
     /// True if any body slid or was free.
     moved: bool,
@@ -199,7 +199,7 @@ impl Meter {
         Self::with(machine, &sought, Held::last(experiment), &experiment.inputs)
     }
 
-    /// A meter for these figures of a run with these inputs, where their last stretch of a constant value is known.
+    /// A meter for these figures of a run with these inputs, whose last constant interval is known.
     pub fn with(machine: &Machine, sought: &Sought, held: Option<Held>, inputs: &[Signal]) -> Self {
         let sums = if sought.sums { sought.places.sums.len() } else { 0 };
         Self {
@@ -222,7 +222,7 @@ impl Meter {
         &self.machine
     }
 
-    /// The magnitudes above which there is a peak of each reading.
+    /// Magnitude above which each reading has a new peak.
     #[inline]
     fn heights(&self) -> Reading {
         let mut heights = [f64::INFINITY; QUANTITIES];
@@ -232,7 +232,7 @@ impl Meter {
         heights
     }
 
-    /// The peaks of the readings that are sought, with their numbers.
+    /// Peaks of the required readings, with their indices.
     fn sought(&mut self) -> impl Iterator<Item = (usize, &mut Peak)> {
         let readings = self.sought.readings;
         self.peaks.iter_mut().enumerate().filter(move |(q, _)| readings[*q])
@@ -243,7 +243,7 @@ impl Meter {
         mode.motion[..self.sought.places.bodies].iter().any(|motion| *motion != Motion::Stuck)
     }
 
-    /// Positions of what slides that the commands of steppers ask for at the end, without stretch, m.
+    /// Final commanded positions of the slides with steppers, without stretch, m.
     fn commanded(&self) -> Vec<f64> {
         if self.commands.is_empty() {
             return Vec::new();
@@ -257,7 +257,7 @@ impl Meter {
         self.machine.by_drives(&state.position)
     }
 
-    /// The metrics of the run that was observed and whose events these are.
+    /// Metrics of the observed run with these events.
     pub fn finish(self, events: &[Event]) -> Metrics {
         let (places, machine, state) = (&*self.sought.places, &self.machine, &self.state);
         let geometry = machine.geometry();
@@ -316,7 +316,7 @@ impl Meter {
     }
 }
 
-/// Steps that a drive lost in these events.
+/// Steps lost by a drive in these events.
 fn lost_steps(events: &[Event], drive: usize) -> LostSteps {
     let mut own = LostSteps::default();
     for event in events.iter().filter(|event| event.part.what == What::Field(drive)) {
@@ -329,13 +329,13 @@ fn lost_steps(events: &[Event], drive: usize) -> LostSteps {
     own
 }
 
-/// A sum of what is read.
+/// A sum of readings.
 #[inline]
 fn weighed(sum: &[(usize, f64)], reading: &Reading) -> f64 {
     sum.iter().map(|&(q, weight)| weight * reading[q]).sum()
 }
 
-/// By how much a sum can be off a straight line, where each reading can be off by its own bow.
+/// Bound of a sum's deviation from a straight line, from those of its readings.
 #[inline]
 fn bowed(sum: &[(usize, f64)], bow: &Reading) -> f64 {
     sum.iter().map(|&(q, weight)| weight.abs() * bow[q]).sum()
@@ -343,7 +343,7 @@ fn bowed(sum: &[(usize, f64)], bow: &Reading) -> f64 {
 
 impl Observe for Meter {
     fn stretch(&mut self, stretch: &Stretch) -> Closer {
-        // When a rotor was last fast depends on how fast it had been by then.
+        // The stop time of a rotor depends on its largest speed so far.
         if !self.rotors.is_empty() {
             return Closer::Now;
         }
@@ -351,7 +351,7 @@ impl Observe for Meter {
         for (q, peak) in self.sought() {
             if stretch.most[q] > peak.value.abs() * (1.0 - NEWS) {
                 let (value, time) = stretch.largest(q, NEWS);
-                // What it begins with is what the last one ended with.
+                // Its initial value is the final value of the previous one.
                 if time > stretch.begin { peak.come_to(value, time) } else { peak.take(value, time) }
             }
         }
@@ -383,7 +383,7 @@ impl Observe for Meter {
             for (q, peak) in self.sought() {
                 peak.pass([gap.from[q], gap.to[q]], (gap.begin, end), gap.holds(q));
             }
-            // What its ends have told is no reason to look between them, where a bound says what is there.
+            // Values at its ends need no search between them if a bound covers the interval.
             closer = gap.rises_above(&self.heights(), [1.0, 1.0 + NEWS]).1;
         }
         for (sum, peak) in self.sought.places.sums.iter().zip(&mut self.sums) {

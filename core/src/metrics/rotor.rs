@@ -1,19 +1,19 @@
-//! When a rotor that turns by itself comes to rest.
+//! Time at which an independent rotor comes to rest.
 
 use super::NEWS;
 use crate::solve::{Curve, Gap};
 
-/// Share of its largest speed up to which a rotor that turns by itself counts as resting.
+/// Fraction of its largest speed below which an independent rotor counts as resting.
 const RESTING: f64 = 1e-6;
 
-/// A rotor that is an inertia of its own: nothing holds it, so it comes to rest as what swings does, by and by.
+/// An independent rotor: without friction it comes to rest only asymptotically.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Rotor {
-    /// Its speed's number among the readings.
+    /// Index of its speed among the readings.
     reading: usize,
     /// Its largest speed so far, rad/s.
     fastest: f64,
-    /// When it last turned faster than a share [`RESTING`] of that, s.
+    /// Last time at which it turned faster than [`RESTING`] times that, s.
     pub turned: f64,
     pub rests: bool,
 }

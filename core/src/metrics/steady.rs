@@ -5,29 +5,28 @@ use crate::mechanism::AmplifierMode;
 use crate::plan::Experiment;
 use crate::solve::{Curve, Gap, Stretch, reading};
 
-/// Share of the run that a stretch of constant input has to last before a steady speed is sought in it.
+/// Shortest interval of constant input with a steady speed, as a fraction of the run.
 const SHORTEST: f64 = 0.02;
 
-/// The last part of such a stretch, in which the speed must have become steady.
+/// Last fraction of such an interval, in which the speed must be steady.
 const LATE: f64 = 0.1;
 
-/// The change of a steady speed that is allowed, relative to itself.
+/// Allowed relative change of a steady speed.
 const STEADY: f64 = 0.01;
 
-/// The share of that by which it may be off.
+/// Relative error of that change.
 const NEGLIGIBLE: f64 = 1e-7;
 
-/// The cart's speed at the end of the last stretch of time on which the input was constant and not zero, and that
-/// lasted at least a fiftieth of the run.
+/// Cart speed at the end of the last interval of at least a fiftieth of the run with a constant input other than zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SteadySpeed {
-    /// Its speed at the end of that stretch, m/s.
+    /// Speed at the end of that interval, m/s.
     pub value: f64,
-    /// The difference of largest and least speed within the last tenth of that stretch, m/s.
+    /// Range of the speed within the last tenth of that interval, m/s.
     pub change: f64,
-    /// True if that change is at most 1 % of the speed; if not, there was no time to become steady.
+    /// True if that change is at most 1 % of the speed; otherwise the interval was too short.
     pub reached: bool,
-    /// The speed at which all forces balance under that input, with everything sliding its way: [`balanced_speed`].
+    /// Speed of steady sliding under that input, [`balanced_speed`].
     pub analytic: Balance,
     /// The input, V or A.
     pub input: f64,
@@ -35,7 +34,7 @@ pub struct SteadySpeed {
     pub stretch: (f64, f64),
 }
 
-/// A stretch of time on which the input is constant.
+/// An interval of constant input.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Held {
     input: f64,
@@ -44,7 +43,7 @@ pub struct Held {
 }
 
 impl Held {
-    /// The last one of an experiment that is not zero and no shorter than a fiftieth of the run.
+    /// The last interval of an experiment with a non-zero input and at least a fiftieth of the run.
     pub fn last(experiment: &Experiment) -> Option<Self> {
         let until = experiment.until;
         let long = |held: &Held| held.input != 0.0 && held.end - held.begin >= SHORTEST * until * (1.0 - 1e-9);
@@ -63,17 +62,17 @@ impl Held {
     }
 }
 
-/// The cart's speed at the end of a stretch of constant input.
+/// Cart speed at the end of an interval of constant input.
 #[derive(Debug, Clone)]
 pub(super) struct Plateau {
     held: Held,
-    /// Where its last part begins.
+    /// Start of its last fraction.
     late: f64,
-    /// Times as near as this are one.
+    /// Times closer than this are equal.
     near: f64,
-    /// The least and greatest speed there.
+    /// Least and largest speed there.
     range: (f64, f64),
-    /// The speed at its end, where that was reached.
+    /// Speed at its end, if reached.
     last: Option<f64>,
 }
 
@@ -139,14 +138,14 @@ impl Plateau {
     }
 }
 
-/// At which speed of the cart all forces balance under a constant input.
+/// Cart speed at which all forces balance under a constant input.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Balance {
-    /// At this one, m/s; zero where that input cannot keep the axis sliding.
+    /// This speed, m/s; zero if the input cannot keep the axis sliding.
     At(f64),
-    /// At none: nothing limits the speed (a commanded current, and no viscous friction).
+    /// No speed: nothing limits it (commanded current without viscous friction).
     Never,
-    /// At no single one: friction, the belt or a force changes along the travel, or a force with the speed.
+    /// No single speed: friction, belt or a force changes along the travel, or a force with speed.
     Changing,
 }
 
@@ -160,11 +159,10 @@ impl Balance {
     }
 }
 
-/// The cart's speed at which a constant `input` (V or A) just makes up for all losses; the belt's stretch is constant
-/// then.
+/// Cart speed at which a constant `input` (V or A) balances all losses, with constant elongation of the belt.
 ///
-/// Everything slides in the direction of the input, by its friction law, and limits of voltage and current hold. Where
-/// a law's curve lets the forces balance at several speeds, it is the one that the axis comes to from `near`, m/s.
+/// Everything slides in the direction of the input, by its friction law, and limits of voltage and current hold. If a
+/// friction curve allows several such speeds, it is the one that the axis reaches from `near`, m/s.
 pub fn balanced_speed(machine: &Machine, input: f64, near: f64) -> Balance {
     let is_stepper = machine.drives[0].motor.stepper.is_some();
     if machine.changes_along_travel() || machine.cart.forces.by_speed.is_some() || is_stepper {
@@ -176,7 +174,7 @@ pub fn balanced_speed(machine: &Machine, input: f64, near: f64) -> Balance {
     let forward = output >= 0.0;
     let direction = if forward { 1.0 } else { -1.0 };
 
-    // What drives, as lines τ = a − s φ̇ of which the least counts: the command, and the limit on the other quantity.
+    // Motor torque as lines τ = a − s φ̇ of which the least counts: the command, and the limit of the other quantity.
     let least = |a: f64, b: Option<f64>| b.map_or(a, |b| a.min(b));
     // τ_M = η n K_t i
     let at_current = |current: f64| (eta * n * motor.torque_constant * current, 0.0);
@@ -206,7 +204,7 @@ pub fn balanced_speed(machine: &Machine, input: f64, near: f64) -> Balance {
         drive.fold(f64::INFINITY, f64::min) + load - viscous * v / r - dry(v)
     };
 
-    // Without dry friction it would go this fast, and with it no faster.
+    // Upper bound: the speed without dry friction.
     let fastest = |(a, s): (f64, f64)| if s + viscous > 0.0 { r * (a + load) / (s + viscous) } else { f64::INFINITY };
     let fastest = bound.map_or(f64::INFINITY, fastest).min(fastest(command));
     let scales: Vec<f64> = bodies.iter().filter_map(|(law, radius)| law.law.velocity().map(|v| radius * v)).collect();
@@ -214,7 +212,7 @@ pub fn balanced_speed(machine: &Machine, input: f64, near: f64) -> Balance {
     let past = scales.iter().copied().fold(0.0, f64::max) * FASTER;
     let top = if fastest.is_finite() { 2.0 * fastest.max(0.0) } else { past.max(direction * near) };
 
-    // Between neighbours of these speeds the excess changes its sign no more than once.
+    // Between adjacent speeds the excess changes its sign at most once.
     let curve = std::iter::successors(Some(slowest), |v| Some(v * FINER)).take_while(|v| *v < past.min(top));
     let near = (direction * near).clamp(0.0, top);
     let mut speeds: Vec<f64> = curve.chain([0.0, near, top]).collect();
@@ -237,8 +235,7 @@ pub fn balanced_speed(machine: &Machine, input: f64, near: f64) -> Balance {
     }
 }
 
-/// Speeds at which a friction curve is looked at: from this share of its own speed, to this many times it, each so many
-/// times the last.
+/// Speeds at which a friction curve is evaluated: from this fraction to this multiple of its own speed, in this ratio.
 const SLOWER: f64 = 1e4;
 const FASTER: f64 = 50.0;
 const FINER: f64 = 1.05;

@@ -6,46 +6,46 @@ use crate::machine::{Amplifier, AmplifierMode, Belt, BeltModel, Kind, Machine, M
 /// Location of a parameter in a machine.
 #[derive(Debug, Clone, Copy)]
 pub enum Field {
-    /// In no machine: it is a number of a run, a recorder, a controller or a method.
+    /// In no machine: a number of a run, recorder, controller or method.
     Elsewhere,
     /// In a machine.
     Machine(Accessor),
-    /// In a machine, where it is another form of the number with this key.
+    /// In a machine, as another form of the number with this key.
     Form(&'static str, Accessor),
-    /// The number with this key is computed from it and from others, and the machine keeps the result alone.
+    /// Used to compute the number with this key; the machine stores the result only.
     PartOf(&'static str),
 }
 
-/// Reads and sets a number of a machine, or of each of its parts of a kind.
+/// Getter and setter of a number of a machine, or of each of its parts of a kind.
 #[derive(Debug, Clone, Copy)]
 pub struct Accessor {
-    /// Whose number it is.
+    /// Owner of the number.
     pub(super) of: Of,
-    /// The value of a part; none where the machine has no such part, or computes it from others.
+    /// Value for a part; none if the machine lacks the part, or computes the value from others.
     pub(super) get: fn(&Machine, usize) -> Option<f64>,
-    /// Sets it, and what is computed from it; does nothing where the machine has no such part.
+    /// Sets it and everything computed from it; does nothing if the machine lacks the part.
     pub(super) set: fn(&mut Machine, usize, f64),
 }
 
-/// Whose number a parameter is.
+/// Owner of a parameter.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Of {
-    /// The machine's: there is one.
+    /// The machine: a single number.
     Machine,
-    /// The same of a machine with one drive and one slide alone: others have a row of each slide, or no such part.
+    /// A machine with one drive and one slide: others have one row for each slide, or lack the part.
     Axis,
-    /// Each drive's.
+    /// Each drive.
     Drive,
-    /// Each slide's, of a machine with more than one.
+    /// Each slide of a machine with several.
     Slide,
-    /// Each span's.
+    /// Each span.
     Span,
-    /// Each point's of a line of an axis, of which there are so many.
+    /// Each point of a line of an axis; the function gives their number.
     Point(fn(&Machine) -> usize),
 }
 
 impl Accessor {
-    /// How its elements are named in this machine, and how many there are; none where it has no such number.
+    /// Naming and number of its elements in this machine; none if the machine lacks it.
     pub(super) fn listed(&self, machine: &Machine) -> Option<(List, usize)> {
         let (drives, slides) = (machine.drives.len(), machine.slides().count());
         match self.of {
@@ -69,17 +69,17 @@ pub enum List {
     Numbers,
     /// `cart.friction.along.0.factor`: a list of points.
     Points,
-    /// `left_drive.motor.resistance`, `right_drive.motor.resistance`: one of each drive. `motor.resistance` is all.
+    /// `left_drive.motor.resistance`, `right_drive.motor.resistance`: one for each drive. `motor.resistance` sets all.
     Drives(Kind),
-    /// `bridge.mass`, `cart.mass`: one of each thing that slides, with the key of the bridge's in the table.
+    /// `bridge.mass`, `cart.mass`: one for each slide, with the bridge's key in the table.
     Slides,
 }
 
-/// The sliding bodies of a gantry, as keys begin.
+/// Sliding bodies of a gantry, as prefixes of keys.
 pub(super) const SLIDES: [&str; 2] = ["bridge.", "cart."];
 
 impl List {
-    /// The key of an element, as `--set` names it, of the parameter with this key.
+    /// Key of an element for `--set`, of the parameter with this key.
     pub(super) fn key(self, key: &str, index: usize) -> String {
         match self {
             List::None => key.to_string(),
@@ -98,19 +98,19 @@ impl List {
         }
     }
 
-    /// True if the parameter's own key names all elements together.
+    /// True if the parameter's own key sets all elements together.
     pub(super) fn has_whole(self) -> bool {
         self != List::Slides
     }
 }
 
 impl Field {
-    /// A number of the machine that it may have.
+    /// An optional number of the machine.
     pub(super) const fn number(get: fn(&Machine, usize) -> Option<f64>, set: fn(&mut Machine, usize, f64)) -> Self {
         Self::of(Of::Machine, get, set)
     }
 
-    /// A number of each of these.
+    /// A number of each of these owners.
     pub(super) const fn of(of: Of, get: fn(&Machine, usize) -> Option<f64>, set: fn(&mut Machine, usize, f64)) -> Self {
         Self::Machine(Accessor { of, get, set })
     }
@@ -124,7 +124,7 @@ impl Field {
         }
     }
 
-    /// How a machine's number is read and set.
+    /// Its getter and setter in a machine.
     pub(super) fn accessor(&self) -> Option<&Accessor> {
         match self {
             Self::Machine(accessor) | Self::Form(_, accessor) => Some(accessor),
@@ -133,14 +133,14 @@ impl Field {
     }
 }
 
-/// A number in this place of every machine, or of every axis.
+/// A number that every machine, or every axis, has.
 macro_rules! always {
     ($of:ident, |$machine:ident| $($place:tt)*) => {
         Field::of(Of::$of, |$machine, _| Some($($place)*), |$machine, _, value| $($place)* = value)
     };
 }
 
-/// A number of a part that stands in an `Option`.
+/// A number of an optional part.
 macro_rules! part {
     ($of:ident, |$machine:ident| $part:expr, $reach:expr => $name:ident) => {
         Field::of(
@@ -155,8 +155,8 @@ macro_rules! part {
     };
 }
 
-/// A number of the belt's make, from which its stiffness is computed: of one that is given by E A where `specific` is
-/// true, or by E and A.
+/// A number of the belt's make, from which its stiffness is computed; `specific` is true if E A is given instead of E
+/// and A.
 macro_rules! make {
     ($of:ident, |$belt:ident| $applies:expr, |$make:ident, $span:pat_param| $($place:tt)*) => {
         Field::of(
@@ -215,7 +215,7 @@ macro_rules! motor {
     };
 }
 
-/// A number of each stepper: one of its motor's, or one that only steppers have.
+/// A number of each stepper: of its motor, or for steppers only.
 macro_rules! stepper {
     ($name:ident) => {
         of_drive!(motor, |motor| motor.stepper.map(|stepper| stepper.$name), |motor, value| {
@@ -244,7 +244,7 @@ macro_rules! of_simple {
     };
 }
 
-/// A number of each amplifier that it need not have.
+/// An optional number of each amplifier.
 macro_rules! amplifier {
     ($name:ident) => {
         of_drive!(amplifier, |amplifier| amplifier.$name.filter(|_| is_amplifier(amplifier)), |amplifier, value| {
@@ -322,7 +322,7 @@ macro_rules! of_friction {
     };
 }
 
-/// A number of the friction law that `$law` stands for.
+/// A number of the friction law `$law`.
 macro_rules! of_law {
     ($body:ident, $law:ident, $name:ident) => {
         of_friction!(
@@ -342,17 +342,17 @@ macro_rules! of_law {
 
 pub(super) use {always, amplifier, make, motor, of_drive, of_friction, of_law, of_simple, of_slide, part, stepper};
 
-/// Whether a motor has the numbers of `[motor]`.
+/// True if a motor has the numbers of `[motor]`.
 pub(super) fn is_brushed(motor: &Motor) -> bool {
     !motor.is_simple && motor.stepper.is_none()
 }
 
-/// Whether an amplifier has the numbers of `[amplifier]`: the driver of a stepper has its own.
+/// True if an amplifier has the numbers of `[amplifier]`; the driver of a stepper has its own.
 pub(super) fn is_amplifier(amplifier: &Amplifier) -> bool {
     amplifier.mode != AmplifierMode::Position
 }
 
-/// Sets the rated current of a stepper, which has its holding torque at that.
+/// Sets the rated current of a stepper and keeps its holding torque at that current.
 pub(super) fn set_rated_current(motor: &mut Motor, value: f64) {
     let torque = motor.holding_torque();
     if let (Some(stepper), Some(torque)) = (&mut motor.stepper, torque) {
@@ -361,12 +361,12 @@ pub(super) fn set_rated_current(motor: &mut Motor, value: f64) {
     }
 }
 
-/// The drive of an axis that is given by force and drag, if it is.
+/// The drive of an axis given by force and drag, if any.
 pub(super) fn simple(machine: &Machine) -> Option<SimpleDrive> {
     SimpleDrive::of(&machine.drives.first()?.motor, machine.pulley_radius)
 }
 
-/// Sets the radius; a drive that is given by its force keeps it.
+/// Sets the radius; a drive given by its force keeps that force.
 pub(super) fn set_radius(machine: &mut Machine, radius: f64) {
     let drive = simple(machine);
     machine.pulley_radius = radius;
@@ -382,14 +382,14 @@ pub(super) fn set_simple(machine: &mut Machine, change: impl FnOnce(&mut SimpleD
     }
 }
 
-/// The stiffness of a span, where it is given as such.
+/// The stiffness of a span, if given directly.
 pub(super) fn stiffness(belt: &Belt, span: usize) -> Option<f64> {
     let stiffness = belt.stiffness.get(span).copied()?;
     let left_out = belt.model == BeltModel::Rigid && stiffness == f64::INFINITY;
     (belt.make.is_none() && !left_out).then_some(stiffness)
 }
 
-/// Sets Coulomb friction of one direction. Of a Stribeck curve the force is kept, by which the breakaway exceeds it.
+/// Sets Coulomb friction of one direction. A Stribeck curve keeps the excess of its breakaway.
 pub(super) fn set_coulomb(friction: &mut Friction, forward: bool, coulomb: f64) {
     let law = friction.law;
     let side = if forward { &mut friction.forward } else { &mut friction.backward };
@@ -400,13 +400,13 @@ pub(super) fn set_coulomb(friction: &mut Friction, forward: bool, coulomb: f64) 
     side.coulomb = coulomb;
 }
 
-/// The breakaway of one direction, where it is not that of a Stribeck curve.
+/// The breakaway of one direction, unless it belongs to a Stribeck curve.
 pub(super) fn breakaway(friction: &Friction, forward: bool) -> Option<f64> {
     let stribeck = matches!(friction.law, Law::Stribeck { .. });
     (!stribeck).then_some(friction.side(forward).breakaway)
 }
 
-/// By how much the breakaway of a Stribeck curve exceeds Coulomb friction.
+/// Excess of the breakaway of a Stribeck curve over Coulomb friction.
 pub(super) fn stribeck_force(friction: &Friction) -> Option<f64> {
     let stribeck = matches!(friction.law, Law::Stribeck { .. });
     stribeck.then_some(friction.forward.breakaway - friction.forward.coulomb)
@@ -443,7 +443,7 @@ pub(super) fn set_stribeck_decay(friction: &mut Friction, decay: f64) {
     set_stribeck_velocity(friction, velocity_of_decay(decay));
 }
 
-/// A number of each point of a line of the cart: 0 for what it is over, 1 for the value.
+/// A number of each point of a line of the cart: 0 for the argument, 1 for the value.
 macro_rules! points {
     ($part:literal, |$machine:ident| $($line:tt)*) => {
         Field::of(

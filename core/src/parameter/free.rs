@@ -1,5 +1,5 @@
-//! Free parameters: numbers of a machine that a fit searches for, a sweep varies or that are off, with all that goes
-//! along.
+//! Free parameters: numbers of a machine that a fit estimates, a sweep varies or a family perturbs, with all that
+//! depends on them.
 
 use super::field::List;
 use super::{Field, Off, Parameter, Sits, Sum, all, at_pulley};
@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 use crate::friction::Friction;
 use crate::machine::Machine;
 
-/// A number of a machine: a row of the table, and its place where that is a list.
+/// A number of a machine: a row of the table, and its index in a list.
 #[derive(Debug, Clone, Copy)]
 struct Number {
     row: &'static Parameter,
@@ -15,7 +15,7 @@ struct Number {
 }
 
 impl PartialEq for Number {
-    /// Two forms of one number are the same.
+    /// Two forms of one number are equal.
     fn eq(&self, other: &Self) -> bool {
         let own = |row: &Parameter| match row.field {
             Field::Form(of, _) => of,
@@ -30,16 +30,16 @@ impl Number {
         machine.get(self.row, self.index)
     }
 
-    /// Its key, as `--set` names it.
+    /// Its key for `--set`.
     fn key(self, machine: &Machine) -> String {
         machine.sits(self.row).key(self.row, self.index)
     }
 }
 
-/// A parameter that is free to have other values, and all that goes along with it.
+/// A free parameter with everything that depends on it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Free {
-    /// Its key, those of what is tied joined by ` = `, the name of a sum, or of a kind.
+    /// Its key, keys of tied numbers joined by ` = `, or the name of a sum or a kind.
     pub name: String,
     /// SI unit.
     pub unit: &'static str,
@@ -47,24 +47,24 @@ pub struct Free {
     pub start: f64,
     /// Bounds.
     pub low: f64,
-    /// The other end of it.
+    /// Upper end.
     pub high: f64,
-    /// Keys of the case file that it sets, with their value per unit of it.
+    /// Keys of the case file that it sets, with their factors.
     pub keys: Vec<(String, f64)>,
-    /// The numbers that it sets, with their value per unit of it.
+    /// Numbers that it sets, with their factors.
     members: Vec<(Number, f64)>,
 }
 
-/// Bounds of a parameter that are given, by name.
+/// Given bounds of parameters by name.
 pub type GivenBounds = [(String, [f64; 2])];
 
 /// Default bounds: factor from the start value.
 const FAR: f64 = 100.0;
 
 impl Free {
-    /// The numbers that `name` stands for: a key of the case file, several joined by ` = `, which keep their present
-    /// ratio (equal, where one of them is zero), or a sum such as `total.viscous`, whose parts keep theirs. What goes
-    /// along with a key is set by itself if it is among `free`, the keys of all free parameters.
+    /// The parameter for `name`: a key of the case file, several joined by ` = `, which keep their present ratio (equal
+    /// if one of them is zero), or a sum such as `total.viscous`, whose parts keep theirs. A number that follows a key
+    /// is independent if it is among `free`, the keys of all free parameters.
     ///
     /// ```
     /// use taut::case::{Case, TEMPLATE};
@@ -93,7 +93,7 @@ impl Free {
         let mut members = Vec::new();
         for ((key, (numbers, _)), ratio) in keys.iter().zip(&sets).zip(&ratios) {
             for &number in numbers {
-                // The elements of a list keep their ratios among each other.
+                // The elements of a list keep their ratios.
                 let present = number.value(machine).unwrap_or(0.0);
                 let listed = numbers.len() > 1 && first != 0.0 && present != 0.0;
                 members.push((number, if listed { present / first } else { *ratio }));
@@ -154,12 +154,12 @@ impl Free {
         Ok(Self { name: name.to_string(), unit: sum.unit(), start: total, low, high, keys, members })
     }
 
-    /// Puts `value` into a machine. Of several free parameters that is for [`set`].
+    /// Sets `value` in a machine. For several free parameters use [`set`].
     pub fn set(&self, machine: &mut Machine, value: f64) {
         set(machine, [(self, value)]);
     }
 
-    /// The value that it has in a machine: another than was put in where that cannot be, as a breakaway below Coulomb
+    /// Its value in a machine; it differs from the value set if that is impossible, as a breakaway below Coulomb
     /// friction.
     pub fn value_in(&self, machine: &Machine) -> Option<f64> {
         let (number, factor) = self.members.first()?;
@@ -171,32 +171,33 @@ impl Free {
         self.members.iter().any(|(number, _)| other.members.iter().any(|(its, _)| its == number))
     }
 
-    /// True if it is searched for on a logarithmic scale: what is above zero by nature, over more than a factor of two.
+    /// True if it is searched for on a logarithmic scale: positive by nature, with bounds more than a factor of two
+    /// apart.
     pub fn logarithmic(&self) -> bool {
         self.low > 0.0 && self.high > 2.0 * self.low
     }
 }
 
-/// Puts values of free parameters into a machine, in whatever order.
+/// Sets values of free parameters in a machine, independent of their order.
 pub fn set<'a>(machine: &mut Machine, values: impl IntoIterator<Item = (&'a Free, f64)>) {
     for (free, value) in values {
         for (number, factor) in &free.members {
             machine.set(number.row, number.index, value * factor);
         }
     }
-    // At rest a body holds at least what it resists with in motion.
+    // Breakaway is at least Coulomb friction.
     for Friction { forward, backward, .. } in machine.frictions() {
         forward.breakaway = forward.breakaway.max(forward.coulomb);
         backward.breakaway = backward.breakaway.max(backward.coulomb);
     }
 }
 
-/// The present value of a parameter, of a list the first one.
+/// Present value of a parameter; for a list, of its first element.
 pub fn value(machine: &Machine, key: &str) -> Option<f64> {
     numbers(machine, key, &[]).ok()?.0.first()?.value(machine)
 }
 
-/// All numbers of a machine by their keys, of every form.
+/// All numbers of a machine by their keys, in every form.
 pub fn values(machine: &Machine) -> Vec<(String, f64)> {
     let of = |row: &'static Parameter| {
         let sits = machine.sits(row);
@@ -207,8 +208,8 @@ pub fn values(machine: &Machine) -> Vec<(String, f64)> {
     all().filter_map(of).flatten().collect()
 }
 
-/// The numbers of a machine by their keys, with their rows: each in one form, and without those that go along with
-/// another as long as they have its value.
+/// The numbers of a machine by their keys, with their rows: each in one form, without those that follow another number
+/// with an equal value.
 pub fn own(machine: &Machine) -> Vec<(String, &'static Parameter)> {
     let of = |row: &'static Parameter| {
         let is_one = matches!(machine.sits(row), Sits::Machine(..));
@@ -219,8 +220,8 @@ pub fn own(machine: &Machine) -> Vec<(String, &'static Parameter)> {
     all().flat_map(of).collect()
 }
 
-/// The keys of everything of a machine that may be off and is not zero. Directions and breakaways that have the same
-/// value, and drives that are alike, count once.
+/// Keys of all numbers of a machine that may vary and are not zero. Equal directions and breakaways, and equal drives,
+/// count once.
 pub fn every(machine: &Machine) -> Vec<String> {
     let mut keys = Vec::new();
     for row in all().filter(|row| row.off != Off::No) {
@@ -232,7 +233,7 @@ pub fn every(machine: &Machine) -> Vec<String> {
         let leads = there.into_iter().filter(|(number, _)| !follows_any(machine, *number));
         keys.extend(leads.map(|(number, _)| number.key(machine)));
     }
-    // Body by body, as the paper counts them, friction last: the order in which a seed draws them.
+    // Body by body, in the paper's order, friction last: the order of drawing by a seed.
     let rank = |key: &String| match key.split_once(".friction.") {
         None if key.starts_with("idler_pulley.") => 1,
         None if key.starts_with("cart.") => 2,
@@ -246,7 +247,7 @@ pub fn every(machine: &Machine) -> Vec<String> {
     keys
 }
 
-/// The numbers of a machine that may be off, each as a factor on all numbers that are tied by nature.
+/// Numbers of a machine that may vary, each as a factor on all physically linked numbers.
 pub fn kinds(machine: &Machine) -> Vec<Free> {
     let mut kinds: Vec<Free> = Vec::new();
     for row in all() {
@@ -270,7 +271,7 @@ pub fn kinds(machine: &Machine) -> Vec<Free> {
     kinds
 }
 
-/// The same without the numbers that others set; what is left of a kind has the keys of that as its name.
+/// The same without the numbers that `others` set; a reduced kind is named by its keys.
 pub fn kinds_without(machine: &Machine, others: &[&Free]) -> Vec<Free> {
     let is_set = |number: &Number| others.iter().any(|other| other.members.iter().any(|(set, _)| set == number));
     let mut kinds = kinds(machine);
@@ -286,7 +287,7 @@ pub fn kinds_without(machine: &Machine, others: &[&Free]) -> Vec<Free> {
     kinds
 }
 
-/// The numbers of a row that a machine has, with their finite values.
+/// Numbers of a row in a machine, with finite values.
 fn present<'a>(machine: &'a Machine, row: &'static Parameter) -> impl Iterator<Item = (Number, f64)> + 'a {
     let count = machine.sits(row).listed().map_or(0, |(_, count)| count);
     (0..count).filter_map(move |index| {
@@ -302,13 +303,12 @@ fn are_alike_drives(machine: &Machine, row: &'static Parameter) -> bool {
     first.is_some() && (1..count).all(|index| machine.get(row, index) == first)
 }
 
-/// True if it has the value of something that it follows.
+/// True if it equals a number that it follows.
 fn follows_any(machine: &Machine, number: Number) -> bool {
     leads(machine, number).next().is_some()
 }
 
-/// The numbers that a number follows, as far as it has the same value: of the same body, the one that is asked first
-/// first.
+/// Numbers of the same body that a number follows and equals, in order of precedence.
 fn leads<'a>(machine: &'a Machine, number: Number) -> impl Iterator<Item = Number> + 'a {
     let Number { row, index } = number;
     let own = number.value(machine);
@@ -316,7 +316,7 @@ fn leads<'a>(machine: &'a Machine, number: Number) -> impl Iterator<Item = Numbe
     followed.filter(move |lead| own.is_some() && own == lead.value(machine))
 }
 
-/// The numbers that go along with `number` where `is_free` are set by themselves.
+/// Numbers that follow `number`, where those that `is_free` names are independent.
 fn followers<'a>(
     machine: &'a Machine,
     number: Number,
@@ -331,7 +331,7 @@ fn followers<'a>(
     all().map(of_row).filter(goes_along)
 }
 
-/// The number that another goes with: itself if that is free, or what it follows, directly or by way of another one.
+/// Leader of a number: itself if free, otherwise the number that it follows, directly or indirectly.
 fn leader(machine: &Machine, number: Number, is_free: &dyn Fn(&str) -> bool) -> Option<Number> {
     let is_free_itself = |number: &Number| is_free(&number.key(machine));
     if is_free_itself(&number) {
@@ -341,8 +341,8 @@ fn leader(machine: &Machine, number: Number, is_free: &dyn Fn(&str) -> bool) -> 
     leads(machine, number).find(is_free_itself).or_else(further)
 }
 
-/// The numbers that a key names, without those of a drive that are among `free` by themselves, and its row. Errors: a
-/// key that names none, or one that this machine has not.
+/// Numbers that a key names, without those of a drive that are in `free` separately, and its row. Errors: an unknown
+/// key, or one that this machine lacks.
 fn numbers(machine: &Machine, key: &str, free: &[&str]) -> Result<(Vec<Number>, &'static Parameter)> {
     let row = machine.row(key).ok_or_else(|| unknown(machine, key))?;
     let sits = machine.sits(row);
@@ -375,7 +375,7 @@ fn numbers(machine: &Machine, key: &str, free: &[&str]) -> Result<(Vec<Number>, 
     let named = |index: &usize| whole || list.key(row.key, *index) == key;
     let mut numbers: Vec<Number> = (0..count).filter(named).map(|index| Number { row, index }).collect();
     if numbers.is_empty() && count > 0 {
-        // Of a number there are no elements, of a list not that many.
+        // A single number has no elements, or a list not as many.
         return Err(match list {
             List::None | List::Drives(_) | List::Slides => unknown(machine, key),
             List::Numbers | List::Points => Error::new(format!("`{key}` does not exist: there are {count}"))
@@ -400,8 +400,7 @@ fn numbers(machine: &Machine, key: &str, free: &[&str]) -> Result<(Vec<Number>, 
     }
 }
 
-/// The least and the greatest value: as given for the name, or for any of the keys, which are so many times as large;
-/// else far from the start and within the range.
+/// Bounds: as given for the name or, scaled, for one of its keys; otherwise far from the start and within the range.
 fn limits(
     name: &str,
     keys: &[(String, f64)],
@@ -417,7 +416,7 @@ fn limits(
     let given = ends.reduce(|one, other| [one[0].max(other[0]), one[1].min(other[1])]);
     let (low, high) = match given {
         Some([low, high]) => (low, high),
-        // What may be zero may become zero.
+        // A parameter that may be zero can reach zero.
         None if start > 0.0 && least == 0.0 => (0.0, (start * FAR).min(most)),
         None if start > 0.0 && least > 0.0 => ((start / FAR).max(least), (start * FAR).min(most)),
         None => (least, most),
@@ -445,13 +444,13 @@ fn unknown(machine: &Machine, key: &str) -> Error {
     }
 }
 
-/// The keys that a gantry has instead.
+/// Adds the corresponding keys of a gantry.
 fn of_gantries(machine: &Machine, error: Error) -> Error {
     let keys = keys_there(machine).join(", ");
     error.allowed(keys).next("of one drive alone write for example left_drive.motor.resistance")
 }
 
-/// The keys of the numbers that a machine has, lists and all drives together where they have a key of their own.
+/// Keys of a machine's numbers; lists and equal drives by their common key if they have one.
 fn keys_there(machine: &Machine) -> Vec<String> {
     let keys = |row: &'static Parameter| -> Vec<String> {
         let sits = machine.sits(row);
@@ -463,7 +462,7 @@ fn keys_there(machine: &Machine) -> Vec<String> {
     all().flat_map(keys).collect()
 }
 
-/// Of a parameter that this machine has not: what it has in the same table, and what to do.
+/// Error for a parameter that this machine lacks, with those in the same table and the next step.
 fn not_there(machine: &Machine, key: &str, row: &Parameter) -> Error {
     let table = match key.split_once(".friction.") {
         Some((body, _)) => format!("{body}.friction."),
@@ -476,7 +475,7 @@ fn not_there(machine: &Machine, key: &str, row: &Parameter) -> Error {
     let (parent, name) = row.key.rsplit_once('.').unwrap_or_default();
     let has = |key: &str| super::find(key).is_some_and(|row| machine.get(row, 0).is_some());
     let (is_made, is_specific) = (has("belt.modulus"), has("belt.specific_stiffness"));
-    // Of a gantry's cart the row is the bridge's.
+    // A gantry's cart uses the row of the bridge.
     let parent = key.rsplit_once('.').filter(|(_, last)| *last == name).map_or(parent, |(parent, _)| parent);
     let form = match machine.sits(row) {
         Sits::Form(of, list, count) => {

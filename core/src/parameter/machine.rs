@@ -1,25 +1,25 @@
-//! Machines by the table of parameters: numbers that are read and set by row.
+//! Access to a machine's numbers by rows of the parameter table.
 
 use super::field::{List, SLIDES};
 use super::{Field, Parameter, find, named};
 use crate::friction::Friction;
 use crate::machine::Machine;
 
-/// Where a machine has the number of a row.
+/// Location of a row's number in a machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sits {
     /// Nowhere.
     Elsewhere,
-    /// In it, so many times.
+    /// In it, this number of times.
     Machine(List, usize),
     /// In it, as another form of the number with this key.
     Form(&'static str, List, usize),
-    /// The number with this key is computed from it and from others, and the machine keeps the result alone.
+    /// Used to compute the number with this key; the machine stores the result only.
     PartOf(&'static str),
 }
 
 impl Sits {
-    /// How its elements are named and how many there are; none where the machine has no such number.
+    /// Naming and number of its elements; none if the machine lacks it.
     pub(super) fn listed(self) -> Option<(List, usize)> {
         match self {
             Self::Machine(list, count) | Self::Form(_, list, count) => Some((list, count)),
@@ -27,14 +27,14 @@ impl Sits {
         }
     }
 
-    /// The key of an element, as `--set` names it.
+    /// Key of an element for `--set`.
     pub(super) fn key(self, row: &Parameter, index: usize) -> String {
         self.listed().map_or(List::None, |(list, _)| list).key(row.key, index)
     }
 }
 
 impl Machine {
-    /// Where it has the number of a row.
+    /// Location of the number of a row.
     pub fn sits(&self, row: &Parameter) -> Sits {
         let listed = |accessor: &super::Accessor| accessor.listed(self);
         match &row.field {
@@ -52,22 +52,21 @@ impl Machine {
         }
     }
 
-    /// The value of a row, at a place where that is a list; none where the machine has no such part, or computes it
-    /// from others.
+    /// Value of a row, at an index for a list; none if the machine lacks the part, or computes the value from others.
     pub fn get(&self, row: &Parameter, index: usize) -> Option<f64> {
         let accessor = row.field.accessor()?;
         let (_, count) = accessor.listed(self)?;
         if index < count { (accessor.get)(self, index) } else { None }
     }
 
-    /// Sets it, and what is computed from it; does nothing where the machine has no such part.
+    /// Sets it and everything computed from it; does nothing if the machine lacks the part.
     pub fn set(&mut self, row: &Parameter, index: usize, value: f64) {
         if let Some(accessor) = row.field.accessor() {
             (accessor.set)(self, index, value);
         }
     }
 
-    /// The row that a key of its case file names, with or without places in lists.
+    /// Row of a key of its case file, with or without list indices.
     pub fn row(&self, key: &str) -> Option<&'static Parameter> {
         if self.slides().count() == 1 {
             return named(key);
@@ -77,7 +76,7 @@ impl Machine {
         let of_drive = self.geometry().drives.iter().find_map(|drive| key.strip_prefix(drive.key));
         let row = named(of_cart.as_deref().or(of_drive).unwrap_or(key))?;
         let list = self.sits(row).listed().map(|(list, _)| list);
-        // Nothing but the parts of a drive stands below one.
+        // A drive contains only keys of its own parts.
         (of_drive.is_none() || matches!(list, Some(List::Drives(_)))).then_some(row)
     }
 

@@ -1,7 +1,7 @@
-//! The one table of parameters: every number a case file can hold, with its symbol, unit, default, range and meaning,
-//! where it sits in a machine, whether it may be off, and what it is tied to.
+//! Table of parameters: every number of a case file, with its symbol, unit, default, range and meaning, its location in
+//! a machine, its variation, and its links to others.
 //!
-//! Reading, range checks, free parameters of fits and sweeps, what `--spread` and `taut tune` take to be off, and
+//! Reading, range checks, free parameters of fits and sweeps, the variation by `--spread` and `taut tune`, and
 //! documentation derive from it.
 
 mod field;
@@ -24,15 +24,15 @@ use table::SECTIONS;
 /// One number of the case file.
 #[derive(Debug, Clone, Copy)]
 pub struct Parameter {
-    /// Where it stands: `cart.mass`. An experiment's own number is left out: `experiment.until`.
+    /// Its key: `cart.mass`. Without the index of an experiment: `experiment.until`.
     pub key: &'static str,
-    /// Its symbol in the equations; empty where it has none.
+    /// Its symbol in the equations; empty without one.
     pub symbol: &'static str,
-    /// Its SI unit; empty for a pure number, [`INPUT`] for what the amplifier takes.
+    /// Its SI unit; empty for a pure number, [`INPUT`] for the amplifier's input.
     pub unit: &'static str,
     /// The default.
     pub default: Fallback,
-    /// The values it may take, in SI.
+    /// Allowed values, in SI.
     pub range: Range,
     /// Its meaning.
     pub sentence: &'static str,
@@ -42,23 +42,22 @@ pub struct Parameter {
     pub field: Field,
     /// Its variation with `--spread`.
     pub off: Off,
-    /// The keys that it goes with as long as it has the same value and is not named itself, the one that is asked first
-    /// first.
+    /// Keys that it follows while it has an equal value and is not named itself, in order of precedence.
     pub follows: &'static [&'static str],
-    /// The sum over the bodies that it is a part of.
+    /// The sum over the bodies that contains it.
     pub part: Option<(Sum, Arm)>,
     /// Location in a controller's structure.
     pub gain: Option<InStructure>,
 }
 
-/// Where a number sits in a structure, and whether a search changes it.
+/// Location of a number in a structure, and its role in a search.
 #[derive(Debug, Clone, Copy)]
 pub struct InStructure {
-    /// Its value; none in a structure that has none.
+    /// Its value; none in a structure without it.
     pub get: fn(&Structure) -> Option<f64>,
-    /// Sets it, in a structure that has a place for it.
+    /// Sets it in a structure that has it.
     pub set: fn(&mut Structure, f64),
-    /// How a search for gains changes it.
+    /// Its role in a search for gains.
     pub tuned: Tuned,
 }
 
@@ -69,19 +68,19 @@ pub enum Tuned {
     No,
     /// As a gain.
     Gain,
-    /// As a corner, below half the sampling rate; where the number with this key, whose corner it is, is not zero.
+    /// As a corner frequency, below half the sampling rate, if the filtered gain with this key is not zero.
     Corner(&'static str),
 }
 
-/// How a parameter varies with `--spread` without being named.
+/// Variation of a parameter by `--spread` without being named.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Off {
-    /// No: it is counted, chosen or set.
+    /// Not varied: it is counted, chosen or set.
     No,
-    /// By itself, and only where everything is varied: positions are measured with it.
+    /// Separately, and only if everything is varied, since positions are measured with it.
     Alone,
-    /// Together with all others of this name, which are tied to it by nature: one motor has one constant, and pulleys
-    /// are of one kind. `--vary all` varies each of them by itself.
+    /// Together with all others of this name, to which it is physically linked: a motor has one constant, and pulleys
+    /// are of one kind. `--vary all` varies each separately.
     With(&'static str),
 }
 
@@ -99,7 +98,7 @@ pub enum Sum {
 }
 
 impl Sum {
-    /// All of them.
+    /// All sums.
     pub const ALL: [Sum; 4] = [Sum::Viscous, Sum::Coulomb, Sum::Inertia, Sum::Stiffness];
 
     /// Its name in the case file.
@@ -127,7 +126,7 @@ impl Sum {
         Self::ALL.into_iter().find(|sum| sum.name() == name)
     }
 
-    /// Its parts: of friction those of the positive direction, or of the negative one.
+    /// Its parts; for friction, of the positive or the negative direction.
     pub fn parts(self, forward: bool) -> impl Iterator<Item = &'static Parameter> {
         let is_part = move |row: &&Parameter| row.part.is_some_and(|(sum, _)| sum == self);
         all().filter(is_part).filter(move |row| row.follows.is_empty() == forward)
@@ -137,11 +136,11 @@ impl Sum {
 /// The weight of a number in a sum at the drive pulley.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Arm {
-    /// As much.
+    /// Factor 1.
     One,
-    /// Its force or motion goes over the pulley's radius: this power of r.
+    /// Referred by the pulley radius: this power of r.
     Radius(i32),
-    /// It goes through the gear: this power of n.
+    /// Referred by the gear ratio: this power of n.
     Gear(i32),
 }
 
@@ -170,11 +169,11 @@ impl Arm {
     }
 }
 
-/// The unit of what is fed into the amplifier: V in voltage mode, A in current mode. A stepper takes m.
+/// Unit of the amplifier's input: V in voltage mode, A in current mode; m for a stepper.
 pub const INPUT: &str = "V or A";
 
-/// The unit that a parameter has where the amplifier takes `input` (V or A): its own, or the one of two that fits, the
-/// first in volts.
+/// Unit of a parameter for an amplifier input in `input` (V or A): its own, or the matching one of two, the first in
+/// volts.
 pub fn unit_for(unit: &'static str, input: &str) -> &'static str {
     match unit.split_once(" or ") {
         Some(_) if unit == INPUT && input == "m" => "m",
@@ -192,26 +191,26 @@ pub fn unit_for(unit: &'static str, input: &str) -> &'static str {
 /// The default of a parameter that is not given.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Fallback {
-    /// It has to be given, at least where its table is.
+    /// Required, at least if its table exists.
     Required,
     /// This value, in SI.
     Value(f64),
-    /// As the words say, mostly the value of another parameter.
+    /// Described in words, usually the value of another parameter.
     Words(&'static str),
 }
 
-/// The values that make sense.
+/// Range of allowed values.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Range {
-    /// The least value.
+    /// Lower end.
     pub low: f64,
-    /// The greatest value.
+    /// Upper end.
     pub high: f64,
     /// True if `low` itself is excluded.
     pub above: bool,
     /// True if `high` itself is excluded.
     pub below: bool,
-    /// True if only whole numbers will do.
+    /// True for integers only.
     pub whole: bool,
 }
 
@@ -221,7 +220,7 @@ impl Range {
         Self { low, high, above: false, below: false, whole: false }
     }
 
-    /// Above zero, and within what a computer can tell apart.
+    /// Positive, within a numerically safe range.
     const POSITIVE: Self = Self::new(1e-15, 1e15);
     /// Zero or above.
     const NOT_NEGATIVE: Self = Self::new(0.0, 1e15);
@@ -240,7 +239,7 @@ impl Range {
         low && high && (!self.whole || value.fract() == 0.0)
     }
 
-    /// True if it goes as far as a seed may.
+    /// True for the range of a seed.
     fn is_seed(&self) -> bool {
         self.whole && self.high == i64::MAX as f64
     }
@@ -264,7 +263,7 @@ impl Range {
         }
     }
 
-    /// As short as a table wants it: `> 0`, `≥ 0`, `0 … 1`.
+    /// Short form for tables: `> 0`, `≥ 0`, `0 … 1`.
     fn short(&self) -> String {
         const FAR: f64 = 1e8;
         let text = match (self.low, self.high) {
@@ -294,7 +293,7 @@ pub fn find(key: &str) -> Option<&'static Parameter> {
     all().find(|p| p.key == key)
 }
 
-/// The parameter that a key with places in lists names: `belt.stiffness.0` and `cart.friction.along.1.factor` are of
+/// The parameter of a key with list indices: `belt.stiffness.0` and `cart.friction.along.1.factor` are of
 /// `belt.stiffness` and `cart.friction.along.factor`.
 pub fn named(key: &str) -> Option<&'static Parameter> {
     let is_place = |part: &&str| part.bytes().all(|byte| byte.is_ascii_digit());
@@ -329,7 +328,7 @@ pub fn at_pulley(stage: &Machine, key: &str) -> f64 {
     named(key).and_then(|row| row.part).map_or(1.0, |(_, arm)| arm.of(stage))
 }
 
-/// Refuses a machine with a number out of its range.
+/// Rejects a machine with a number out of its range.
 pub fn check(machine: &Machine) -> Result<()> {
     for row in all() {
         let Field::Machine(accessor) = &row.field else { continue };

@@ -24,43 +24,43 @@ const fn row(
 }
 
 impl Parameter {
-    /// A number that stands in no table of its own.
+    /// A number without a table of its own.
     pub const fn unwritten(unit: &'static str, range: Range, example: &'static str) -> Self {
         row("", "", unit, Fallback::Required, range, example, "")
     }
 
-    /// It sits there in machines.
+    /// Sets its location in machines.
     const fn at(self, field: Field) -> Self {
         Self { field, ..self }
     }
 
-    /// It sits there in a structure.
+    /// Sets its location in a structure.
     const fn held(self, gain: InStructure) -> Self {
         Self { gain: Some(gain), ..self }
     }
 
-    /// It may be off, with all others of that name.
+    /// Lets it vary with all others of that name.
     const fn off(self, with: &'static str) -> Self {
         Self { off: Off::With(with), ..self }
     }
 
-    /// It may be off by itself, and only where everything is varied.
+    /// Lets it vary separately, and only if everything is varied.
     const fn alone(self) -> Self {
         Self { off: Off::Alone, ..self }
     }
 
-    /// It goes with the first of these that has the same value.
+    /// Makes it follow the first of these with an equal value.
     const fn follows(self, keys: &'static [&'static str]) -> Self {
         Self { follows: keys, ..self }
     }
 
-    /// It is part of that sum, with that arm.
+    /// Makes it part of that sum, with that arm.
     const fn part(self, sum: Sum, arm: Arm) -> Self {
         Self { part: Some((sum, arm)), ..self }
     }
 }
 
-/// The same rows as parts of no sum: those sums are an axis's.
+/// The same rows outside of sums, which exist for axes only.
 const fn alone<const N: usize>(mut rows: [Parameter; N]) -> [Parameter; N] {
     let mut i = 0;
     while i < N {
@@ -80,7 +80,7 @@ const NOT_NEGATIVE: Range = Range::NOT_NEGATIVE;
 const TIME: Range = Range::new(0.0, 1e9);
 const DURATION: Range = Range::new(1e-12, 1e9);
 const FREQUENCY: Range = Range::new(1e-9, 1e9);
-/// Whole numbers that TOML has, 0 to 2⁶³ − 1: read by their digits, as a double does not hold all of them.
+/// Integers of TOML, 0 to 2⁶³ − 1: read by their digits, since a double does not represent all of them.
 const SEED: Range = Range { below: true, ..Range::whole(0.0, i64::MAX as f64) };
 const RESERVE: Range = Range::new(0.0, 0.9);
 const UP_TO_ONE: Range = Range { above: true, ..Range::new(0.0, 1.0) };
@@ -111,7 +111,7 @@ impl Held for Option<f64> {
     }
 }
 
-/// The place of a number in a structure, or in a part of it that may be absent; of another structure there is none.
+/// Location of a number in a structure, or in an optional part of it; none for other structures.
 macro_rules! gain {
     ($structure:ident.$field:ident, $tuned:expr) => {
         InStructure {

@@ -1,11 +1,11 @@
-//! A walk through the characters of a quantity.
+//! Cursor over the characters of a quantity.
 
 use crate::error::{Error, Result};
 
-/// Longest text that is tried.
+/// Longest text that is parsed.
 const LONGEST: usize = 200;
 
-/// Walks through the characters of a quantity.
+/// Cursor over the characters of a quantity.
 pub(super) struct Cursor<'a> {
     pub text: &'a str,
     pub chars: Vec<char>,

@@ -1,11 +1,11 @@
-//! Dimensions: exponents of kilogram, metre, second, ampere and angle, and the names people have for them.
+//! Dimensions: exponents of kilogram, metre, second, ampere and angle, with common names.
 
 use std::fmt;
 
 /// The dimension of a quantity, whatever unit it is given in.
 ///
 /// The angle is kept as a fifth dimension, so that `deg` and `rev` convert and `rpm` differs from `Hz`; see
-/// [`read`](super::read) for where it may be left out.
+/// [`read`](super::read) for cases in which it may be omitted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct Dimension {
     /// Exponent of the kilogram.
@@ -20,7 +20,7 @@ pub struct Dimension {
     pub angle: i8,
 }
 
-/// Largest exponent in a dimension; far beyond what physics needs, and far below what overflows.
+/// Largest exponent in a dimension: more than physics needs, less than would overflow.
 const LARGEST_EXPONENT: i8 = 30;
 
 impl Dimension {
@@ -32,7 +32,7 @@ impl Dimension {
         Self { mass, length, time, current, angle }
     }
 
-    /// `self` · `other`ⁿ, or nothing when an exponent grows beyond all sense.
+    /// `self` · `other`ⁿ, or none if an exponent becomes too large.
     pub fn times(self, other: Self, n: i8) -> Option<Self> {
         let add = |a: i8, b: i8| {
             let sum = a.checked_add(b.checked_mul(n)?)?;
@@ -47,12 +47,12 @@ impl Dimension {
         })
     }
 
-    /// The same without its angle.
+    /// The dimension without its angle.
     pub fn without_angle(self) -> Self {
         Self { angle: 0, ..self }
     }
 
-    /// Its name for people, with its unit: `a mass (kg)`.
+    /// Its name in messages, with its unit: `a mass (kg)`.
     pub fn describe(self) -> String {
         let exact = NAMES.iter().find(|(d, ..)| *d == self);
         let name = exact.or_else(|| NAMES.iter().find(|(d, ..)| d.without_angle() == self && self != Self::NONE));
@@ -83,7 +83,7 @@ impl fmt::Display for Dimension {
     }
 }
 
-/// Dimensions that have a name in the workshop, with the unit to quote beside it.
+/// Dimensions with common names, and the unit quoted beside each.
 const NAMES: &[(Dimension, &str, &str)] = &[
     (Dimension::NONE, "a pure number", ""),
     (Dimension::new(1, 0, 0, 0, 0), "a mass", "kg"),

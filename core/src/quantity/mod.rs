@@ -3,12 +3,10 @@
 //! This is the only place where units are converted. A quantity is a number and a unit expression:
 //!
 //! - numbers: `19.4`, `1.5e-3`, `5.5626×10^-6`, `2/3`; the decimal point is a point;
-//! - units with SI prefixes: `mm`, `kN`, `µH`, `GPa`, and those of the workshop: `in`, `lbf`, `ozf`, `rpm`, `deg`,
-//!   `psi`;
+//! - units with SI prefixes: `mm`, `kN`, `µH`, `GPa`, and workshop units: `in`, `lbf`, `ozf`, `rpm`, `deg`, `psi`;
 //! - products by a space, `*`, `·`, `.` or `-`; powers as `m^2`, `m²`, `m2` or `s^-1`;
-//! - a `/` divides by the one factor that follows it, so `N m/rad/s` is N m rad⁻¹ s⁻¹; after a `/` a product has to
-//!   stand in brackets: `V/(rad s)`. Whether `V/rad s` means `V/(rad s)` or `V s/rad` nobody can tell, so it is
-//!   refused.
+//! - a `/` divides by the one factor that follows it, so `N m/rad/s` is N m rad⁻¹ s⁻¹; after a `/` a product must be in
+//!   brackets: `V/(rad s)`. `V/rad s` is ambiguous between `V/(rad s)` and `V s/rad`, so it is rejected.
 //!
 //! Powers of ten are applied to the digits of the number itself: `"19.4 mm"` gives the same bits as the literal
 //! `0.0194`.
@@ -27,7 +25,7 @@ use numeral::Number;
 use product::Product;
 use std::f64::consts::PI;
 
-/// The advice for a text that is no quantity at all.
+/// Advice for a text that is not a quantity.
 pub const SUCH_AS: &str = "write a number with its unit, such as \"19.4 mm\"";
 
 /// A number with its unit, in SI.
@@ -37,7 +35,7 @@ pub struct Quantity {
     pub value: f64,
     /// Its dimension.
     pub dimension: Dimension,
-    /// The unit as it was typed; empty for a pure number.
+    /// The unit as typed; empty for a pure number.
     pub unit: String,
     /// Power of `Hz` in that unit: a frequency counts turns, an angular speed radians.
     pub hertz: i8,
@@ -63,10 +61,10 @@ pub fn parse(text: &str) -> Result<Quantity> {
     Ok(Quantity { value, dimension: unit.dimension, unit: typed.trim().to_string(), hertz: unit.hertz })
 }
 
-/// Reads a quantity that is wanted in `unit` or anything convertible to it; the result is in SI.
+/// Reads a quantity in `unit` or a convertible unit; the result is in SI.
 ///
-/// Radians may be left out, as they usually are: where `N m s/rad` is wanted, `N m s` will do. What counts turns is
-/// kept apart from what counts radians: 5 Hz is not accepted as an angular speed, nor 31.4 rad/s as a frequency.
+/// Radians may be omitted, as usual: `N m s` is accepted for `N m s/rad`. Turns and radians are distinguished: 5 Hz is
+/// not accepted as an angular speed, nor 31.4 rad/s as a frequency.
 ///
 /// ```
 /// use taut::quantity::read;
@@ -105,7 +103,7 @@ pub fn read(text: &str, unit: &str) -> Result<f64> {
             .next("add the unit, or leave the quotes away if the number is in SI units"));
     }
     let error = Error::new(format!("\"{text}\" is {}; expected {}", is.describe(), expected(want)));
-    // Pounds and kilograms of force: what is missing is exactly one acceleration of gravity.
+    // Pounds and kilograms as forces: the dimension lacks exactly one acceleration.
     let as_force = is.times(Dimension::new(0, 1, -2, 0, 0), 1).map(Dimension::without_angle);
     if as_force == Some(want.without_angle()) {
         return Err(error.next("a weight as a force is lbf, ozf, kgf or gf; lb, oz, kg and g are masses"));
@@ -137,13 +135,13 @@ pub fn show(value: f64, unit: &str) -> String {
     }
 }
 
-/// An SI value as text that [`read`] turns back into the same bits; `unit` must be an SI unit without prefix.
+/// An SI value as text that [`read`] converts back to the same bits; `unit` must be an SI unit without prefix.
 pub fn write(value: f64, unit: &str) -> String {
     let number = shortest(value);
     if unit.is_empty() { number } else { format!("{number} {unit}") }
 }
 
-/// The dimension of a unit expression, and the factor that turns a number in it into SI.
+/// Dimension of a unit expression, and its factor to SI.
 pub fn conversion(unit: &str) -> Result<(Dimension, f64)> {
     let parsed = parse_unit(unit)?;
     Ok((parsed.dimension, Number::ONE.in_si(parsed.factor, unit)?))

@@ -1,4 +1,4 @@
-//! Numbers as people type them, with nothing rounded before all of it is known.
+//! Numbers as typed, rounded only once at the end.
 
 use super::cursor::Cursor;
 use super::units::Factor;
@@ -16,7 +16,7 @@ pub(super) struct Number {
 impl Number {
     pub const ONE: Self = Self { negative: false, digits: String::new(), exponent: 0, divisor: 1 };
 
-    /// Its value times `factor`, rounded once where the factor is decimal.
+    /// Its value times `factor`, rounded once if the factor is decimal.
     pub fn in_si(&self, factor: Factor, text: &str) -> Result<f64> {
         let digits = if self.digits.is_empty() { "1" } else { &self.digits };
         let mut factor = factor;
@@ -34,7 +34,7 @@ impl Number {
             Some(0) => 0.0,
             Some(numerator) => {
                 let mut f = Factor { numerator, ..factor }.reduced();
-                // Long division: as many digits as fit, and a last one that says whether anything is left.
+                // Long division: as many digits as fit, and a last one for a non-zero remainder.
                 while f.denominator > 1
                     && let Some(longer) = f.numerator.checked_mul(10)
                 {
@@ -127,7 +127,7 @@ impl Cursor<'_> {
         Ok(number)
     }
 
-    /// Digits with a point and an exponent, as (digits, power of ten); nothing if there is no digit.
+    /// Digits with a point and an exponent, as (digits, power of ten); none without digits.
     fn decimal(&mut self) -> Result<Option<(String, i64)>> {
         let mut digits = String::new();
         let mut exponent = 0_i64;
@@ -188,7 +188,7 @@ impl Cursor<'_> {
         Ok(None)
     }
 
-    /// Errors for what looks like a number but goes on strangely.
+    /// Errors for text after a number that is neither a unit nor an operator.
     fn check_what_follows(&mut self) -> Result<()> {
         let digit_at = |cursor: &Self, n: usize| cursor.ahead(n).is_some_and(|c| c.is_ascii_digit());
         match self.peek() {

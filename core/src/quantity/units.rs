@@ -1,4 +1,4 @@
-//! The units and prefixes that are understood, each exact.
+//! Known units and prefixes with exact factors.
 
 use super::Dimension;
 
@@ -9,7 +9,7 @@ pub(super) struct Factor {
     pub denominator: u128,
     pub exponent: i32,
     pub pi: i32,
-    /// The rest of the factor that did not fit the integers; 1 for every unit anybody types.
+    /// Remaining factor that does not fit the integers; 1 for all common units.
     pub rest: f64,
 }
 
@@ -76,12 +76,12 @@ impl Factor {
     }
 }
 
-/// A unit under all its spellings, the first being the one to suggest.
+/// A unit with all its spellings, the preferred one first.
 pub(super) struct Unit {
     pub names: &'static [&'static str],
     pub dimension: Dimension,
     pub factor: Factor,
-    /// True if `k`, `m`, `µ` and their kind may stand before it.
+    /// True if SI prefixes are allowed.
     pub prefixes: bool,
 }
 
@@ -126,7 +126,7 @@ pub(super) const UNITS: &[Unit] = &[
     unit(&["min", "minute", "minutes"], TIME, F::decimal(60, 0), false),
     unit(&["h", "hour", "hours"], TIME, F::decimal(3600, 0), false),
     unit(&["t", "tonne", "tonnes"], MASS, F::decimal(1, 3), false),
-    // Written together so often that they count as units.
+    // Common combinations that count as units.
     unit(&["Nm"], TORQUE, F::ONE, true),
     unit(&["Ncm"], TORQUE, F::decimal(1, -2), false),
     unit(&["Nmm"], TORQUE, F::decimal(1, -3), false),
@@ -149,7 +149,7 @@ pub(super) const UNITS: &[Unit] = &[
     unit(&["%", "percent"], D::NONE, F::decimal(1, -2), false),
 ];
 
-/// The SI prefixes with their powers of ten; the ones that workshops use first.
+/// SI prefixes with their powers of ten, the most common first.
 pub(super) const PREFIXES: &[(&str, i32)] = &[
     ("k", 3),
     ("m", -3),
@@ -179,7 +179,7 @@ pub(super) const PREFIXES: &[(&str, i32)] = &[
     ("q", -30),
 ];
 
-/// How many of [`PREFIXES`] are guessed at when a name has to be taken apart.
+/// Number of [`PREFIXES`] tried when a name is split into units.
 const COMMON_PREFIXES: usize = 9;
 
 /// The unit called `name`, with the power of ten of its prefix.
@@ -197,7 +197,7 @@ fn find_among(name: &str, prefixes: &[(&str, i32)]) -> Option<(&'static Unit, i3
     })
 }
 
-/// A unit that somebody who typed `name` may have meant.
+/// A unit that may have been meant by `name`.
 pub(super) fn suggest(name: &str) -> Option<String> {
     const LONGEST: usize = 24;
     if name.chars().count() > LONGEST {
@@ -226,7 +226,7 @@ pub(super) fn suggest(name: &str) -> Option<String> {
         .map(|(_, k)| k)
 }
 
-/// All ways to read `name` as two to four units written together.
+/// All splits of `name` into two to four units.
 fn split<'a>(name: &'a str, before: &mut Vec<&'a str>, found: &mut Vec<Vec<&'a str>>) {
     const MOST_PARTS: usize = 4;
     if name.is_empty() {

@@ -1,4 +1,4 @@
-//! Feed-forward from the reference alone: the command for an axis of one mass, and for one whose belt stretches.
+//! Feed-forward from the reference alone, for a rigid axis and for one with an elastic belt.
 
 use crate::calculator::{Calculator, Run, less, more};
 use crate::design::{FeedForward, FeedForwardModel};
@@ -23,21 +23,21 @@ pub fn direction_by<C: Calculator>(c: &mut C, reference: &Reference<C::N>) -> C:
     c.name("way", way)
 }
 
-/// Feed-forward, and the reference for what the encoder sees.
+/// Feed-forward, and the reference for the encoder's position.
 #[derive(Debug, Clone)]
 pub struct Compensation {
     settings: FeedForward,
     machine: Machine,
     /// The axis as one mass.
     pub rigid: Rigid,
-    /// True if the encoder sits before the belt.
+    /// True if the encoder is at motor or drive pulley.
     before_belt: bool,
-    /// True if it sits before the gear.
+    /// True if it is before the gear.
     before_gear: bool,
 }
 
-/// Pulleys that make the cart follow its reference: y₁ = r φ₁ and y₃ = r φ₃, and the force that the motor needs at the
-/// belt.
+/// Motion of the pulleys for which the cart follows its reference, y₁ = r φ₁ and y₃ = r φ₃, and the required motor
+/// force at the belt.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Needed<N = f64> {
     /// Drive pulley.
@@ -46,7 +46,7 @@ pub struct Needed<N = f64> {
     pub idler: [N; 2],
     /// N; and its rate, N/s.
     pub force: [N; 2],
-    /// Forces in the three spans of an elastic belt, counted from the pretension, N; zero for other belts.
+    /// Forces in the three spans of an elastic belt relative to the pretension, N; zero for other belts.
     pub spans: [N; 3],
 }
 
@@ -63,8 +63,7 @@ impl Compensation {
         }
     }
 
-    /// The motion of the pulleys with which the cart follows `y`: quasi-static in the idler's own swing, exact
-    /// otherwise.
+    /// Motion of the pulleys for which the cart follows `y`: quasi-static for the idler's own mode, exact otherwise.
     pub fn needed(&self, y: &Reference) -> Needed {
         self.needed_by(&mut Run::plain(), y)
     }
@@ -146,7 +145,7 @@ impl Compensation {
         Needed { drive, idler: [position + behind[0], speed + behind[1]], force, spans }
     }
 
-    /// Reference of the encoder for which the cart follows its own.
+    /// Reference of the encoder for which the cart follows `y`.
     pub fn target<C: Calculator>(&self, c: &mut C, y: &Reference<C::N>) -> Reference<C::N> {
         if !(self.settings.compensate_stretch && self.before_belt) {
             return *y;
@@ -169,7 +168,7 @@ impl Compensation {
         acceleration * (n * n * self.machine.drives[0].motor.rotor_inertia) / self.machine.pulley_radius
     }
 
-    /// The command that the reference asks for, V or A; none without feed-forward.
+    /// Feed-forward command, V or A; none without feed-forward.
     pub fn command<C: Calculator>(&self, c: &mut C, y: &Reference<C::N>) -> Option<C::N> {
         let (rigid, settings) = (&self.rigid, &self.settings);
         match settings.model {
@@ -195,7 +194,7 @@ impl Compensation {
         }
     }
 
-    /// Friction of the axis on its way, its viscous and its dry part, N.
+    /// Viscous and dry friction of the axis along the reference, N.
     fn friction<C: Calculator>(&self, c: &mut C, y: &Reference<C::N>) -> (C::N, C::N) {
         let sign = direction_by(c, y);
         self.rigid.friction_by(c, y.speed, sign)
@@ -208,8 +207,7 @@ impl Compensation {
         Some(c.name("along", along))
     }
 
-    /// The part of friction that does not grow with speed, and a force along the travel that is fed forward, as a
-    /// command, V or A: what a linear model does not know.
+    /// Dry friction and force along the travel as a command, V or A: the parts that a linear model lacks.
     pub fn dry<C: Calculator>(&self, c: &mut C, y: &Reference<C::N>) -> C::N {
         let (_, dry) = self.friction(c, y);
         let mut held = dry - self.rigid.constant;

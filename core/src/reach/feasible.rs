@@ -9,17 +9,17 @@ use crate::machine::{AmplifierMode, Machine};
 use crate::number::engineering;
 use crate::signal::profile::{Profile, Reference};
 
-/// Instants of a reference that are looked at.
+/// Number of instants at which a reference is evaluated.
 const INSTANTS: usize = 4000;
 
-/// A limit that a reference needs more than.
+/// A limit that a reference exceeds.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Shortfall {
     /// `voltage`, `current`, `pull_out`, `breakaway`, `travel`, `slack`, `tension` or `teeth`.
     pub limit: &'static str,
-    /// When most is needed, s.
+    /// Time of the largest requirement, s.
     pub time: f64,
-    /// Where the reference is then, m; of a machine with several drives that of the drive's part of the belt.
+    /// Reference position at that time, m; with several drives, along the belt of the drive.
     pub position: f64,
     /// Requirement, in `unit`.
     pub needed: f64,
@@ -27,7 +27,7 @@ pub struct Shortfall {
     pub allowed: f64,
     /// V, A, N, N m or m.
     pub unit: &'static str,
-    /// All of it in a sentence.
+    /// Complete description in a sentence.
     pub words: String,
 }
 
@@ -37,21 +37,22 @@ struct Instant {
     y: Reference,
 }
 
-/// The need at one instant of a reference.
+/// Requirements at one instant of a reference.
 struct Need {
     at: Instant,
     /// Force of the motor at the belt, N; motor current, A; voltage at its terminals, V.
     force: f64,
     current: f64,
     voltage: f64,
-    /// Forces in the spans, counted from the pretension, N.
+    /// Forces in the spans relative to the pretension, N.
     spans: [f64; 3],
 }
 
 /// A quantity at one instant of a reference.
 type AtInstant = Box<dyn Fn(&Need) -> f64>;
 
-/// A limit of the machine and the need that it bounds, with the words before, behind and after what is needed.
+/// A limit of the machine and the requirement that it bounds, with the words of its message before, between and after
+/// the values.
 struct Demand {
     limit: &'static str,
     unit: &'static str,
@@ -61,10 +62,10 @@ struct Demand {
 }
 
 impl Demand {
-    /// The instant that takes the largest share of the limit, what it needs, and what is allowed there.
+    /// Instant with the largest use of the limit, its requirement, and the allowed value there.
     fn most<'a>(&self, needs: &'a [Need]) -> Option<(&'a Need, [f64; 2])> {
         let both = needs.iter().map(|need| (need, [(self.needed)(need), (self.allowed)(need)]));
-        // a/of_a against b/of_b, where a limit may be zero.
+        // Compares a/of_a with b/of_b; a limit may be zero.
         both.max_by(|(_, [a, of_a]), (_, [b, of_b])| match of_a == of_b {
             true => a.total_cmp(b),
             false => (a * of_b).total_cmp(&(b * of_a)),
@@ -72,7 +73,7 @@ impl Demand {
     }
 }
 
-/// Most that a reference needs of something limited, and the limit, both in `unit`.
+/// Largest requirement of a reference, and its limit, both in `unit`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Load {
     /// `voltage`, `current`, `pull_out`, `slack`, `tension` or `teeth`.
@@ -91,7 +92,7 @@ impl Load {
         self.needed / self.allowed
     }
 
-    /// Adds it to loads of which each limit has one: the one that takes the larger share.
+    /// Adds it to loads with one entry per limit, keeping the larger use.
     pub fn join(self, all: &mut Vec<Self>) {
         match all.iter_mut().find(|known| known.limit == self.limit) {
             Some(known) if self.share() > known.share() => *known = self,
@@ -100,13 +101,13 @@ impl Load {
         }
     }
 
-    /// True if the motor or its supply bounds it: a loop needs some of that for itself, and a stepper for its swinging.
+    /// True for limits of the motor or its supply, of which a loop, or the oscillation of a stepper, needs a reserve.
     pub fn is_of_motor(&self) -> bool {
         ["voltage", "current", "pull_out"].contains(&self.limit)
     }
 }
 
-/// The limits of this machine under a controller with this limit of its command (V or A).
+/// Limits of this machine under a controller with this command limit (V or A).
 fn demands(machine: &Machine, limit: Option<f64>) -> Vec<Demand> {
     let belt = &machine.belt;
     let pretension = belt.pretension.unwrap_or(0.0);
@@ -139,13 +140,13 @@ fn demands(machine: &Machine, limit: Option<f64>) -> Vec<Demand> {
     of_motor(machine, 0, limit).into_iter().chain(all.into_iter().flatten()).collect()
 }
 
-/// The demands on a motor under a controller with this limit of its command (V or A).
+/// Demands on a motor under a controller with this command limit (V or A).
 fn of_motor(machine: &Machine, drive: usize, limit: Option<f64>) -> Vec<Demand> {
     let (volts, amperes) = limits_of(machine, drive, limit);
     electrical(volts, amperes).into_iter().chain(pull_out(machine, drive)).collect()
 }
 
-/// The demand on a stepper; none on another motor.
+/// Demand on a stepper; none for other motors.
 fn pull_out(machine: &Machine, drive: usize) -> Option<Demand> {
     let (curve, r) = (Curve::of(&machine.drives[drive])?, machine.pulley_radius);
     Some(Demand {
@@ -171,8 +172,7 @@ fn electrical(volts: Option<f64>, amperes: Option<f64>) -> Vec<Demand> {
     voltage.into_iter().chain(current).collect()
 }
 
-/// How much of each limit references need at most, looked at `instants` times along their way; of several drives that of
-/// the one that needs most of it.
+/// Largest use of each limit by references, evaluated at `instants` times; of several drives, the most loaded one.
 pub fn loads(machine: &Machine, limit: Option<f64>, profiles: &[Profile], instants: usize) -> Vec<Load> {
     let load = |needs: &[Need], demand: Demand| {
         let [needed, allowed] = demand.most(needs).map_or([0.0, 1.0], |(_, both)| both);
@@ -190,11 +190,11 @@ pub fn loads(machine: &Machine, limit: Option<f64>, profiles: &[Profile], instan
     all
 }
 
-/// The limits that `profile`, shaper included, exceeds on this machine under a controller with this limit of its command
-/// (V or A); none if the reference can be followed. Friction counts as viscous and Coulomb friction, the idler's own
-/// swing as quasi-static.
+/// Limits that `profile`, shaper included, exceeds on this machine under a controller with this command limit (V or A);
+/// none if the reference can be followed. Friction is taken as viscous plus Coulomb, the idler's own mode as
+/// quasi-static.
 ///
-/// Of a machine with several drives voltage and current of each are looked at, the belts taken for rigid.
+/// With several drives, voltage and current of each are checked with rigid belts.
 pub fn shortfalls(machine: &Machine, limit: Option<f64>, profiles: &[Profile]) -> Vec<Shortfall> {
     let of_drives: Vec<Shortfall> = match profiles {
         [profile] => of_axis(machine, limit, profile),
@@ -205,7 +205,7 @@ pub fn shortfalls(machine: &Machine, limit: Option<f64>, profiles: &[Profile]) -
     of_drives.into_iter().chain(of_slides).collect()
 }
 
-/// The limits that the references of a machine with several drives exceed at one of these.
+/// Limits exceeded at one drive of a machine with several.
 fn of_drive(machine: &Machine, limit: Option<f64>, drive: usize, profiles: &[Profile]) -> Vec<Shortfall> {
     let needs = needs_of_drive(machine, drive, profiles, INSTANTS);
     let name = machine.geometry().drives[drive].label.name;
@@ -213,7 +213,7 @@ fn of_drive(machine: &Machine, limit: Option<f64>, drive: usize, profiles: &[Pro
     exceeded.map(|short| Shortfall { words: format!("{name}: {}", short.words), ..short }).collect()
 }
 
-/// Needs of one of several drives, with rigid belts.
+/// Requirements of one of several drives, with rigid belts.
 fn needs_of_drive(machine: &Machine, drive: usize, profiles: &[Profile], instants: usize) -> Vec<Need> {
     let all = FeedForward { model: FeedForwardModel::Rigid, ..FeedForward::NONE };
     let Some(forward) = Forward::of(all, machine, drive) else { return Vec::new() };
@@ -239,13 +239,13 @@ fn of_axis(machine: &Machine, limit: Option<f64>, profile: &Profile) -> Vec<Shor
     found
 }
 
-/// A value in a sentence.
+/// A value for a sentence.
 fn told(value: f64, unit: &str) -> String {
     engineering(value, unit, 3)
 }
 
 impl Instant {
-    /// Time and place, in a sentence.
+    /// Time and position, for a sentence.
     fn when(&self) -> String {
         format!("at {}, {}", told(self.time, "s"), told(self.y.position, "m"))
     }
@@ -256,13 +256,13 @@ impl Instant {
     }
 }
 
-/// The instant at which most is needed, where that is more than there is.
+/// Instant of the largest requirement, if it exceeds the limit.
 fn most<T>(instants: &[T], allowed: f64, needed: impl Fn(&T) -> f64) -> Option<&T> {
     let most = instants.iter().max_by(|a, b| needed(a).total_cmp(&needed(b)))?;
     (needed(most) - allowed > 1e-9 * allowed.abs().max(1.0)).then_some(most)
 }
 
-/// The limit where the motion exceeds it.
+/// The limit, if the motion exceeds it.
 fn exceeded(needs: &[Need], demand: &Demand) -> Option<Shortfall> {
     let &Demand { limit, unit, words: [comes_by, behind, there], .. } = demand;
     let (need, [needed, allowed]) = demand.most(needs)?;
@@ -279,7 +279,7 @@ fn exceeded(needs: &[Need], demand: &Demand) -> Option<Shortfall> {
     Some(need.at.beyond(limit, [needed, allowed], unit, words))
 }
 
-/// The voltage, where the largest speed needs too much of it without any acceleration.
+/// The voltage limit, if the largest speed alone exceeds it without acceleration.
 fn of_speed(machine: &Machine, volts: Option<f64>, needs: &[Need]) -> Option<Shortfall> {
     let (volts, rigid) = (volts?, Rigid::of(machine));
     most(needs, volts, |need| need.voltage.abs())?;
@@ -293,7 +293,7 @@ fn of_speed(machine: &Machine, volts: Option<f64>, needs: &[Need]) -> Option<Sho
     if needed <= volts {
         return None;
     }
-    // Voltage is a straight line of the speed.
+    // Voltage is linear in speed.
     let reached = speed.abs() * ((volts - at_rest) / (needed - at_rest)).max(0.0);
     let words = format!(
         "{} needs {} ({}); {} reach {}",
@@ -306,7 +306,7 @@ fn of_speed(machine: &Machine, volts: Option<f64>, needs: &[Need]) -> Option<Sho
     Some(fastest.at.beyond("voltage", [needed, volts], "V", words))
 }
 
-/// The limits that the reference of one slide exceeds; with several slides they name it.
+/// Limits that the reference of one slide exceeds; with several slides the message names it.
 fn of_slide(machine: &Machine, limit: Option<f64>, number: usize, profile: &Profile) -> Vec<Shortfall> {
     let end = profile.rest();
     let at = |time: f64| Instant { time, y: profile.at(time) };
@@ -321,7 +321,7 @@ fn of_slide(machine: &Machine, limit: Option<f64>, number: usize, profile: &Prof
     found.into_iter().flatten().map(named).collect()
 }
 
-/// The force that moves a slide from rest with all that turns then, where the motors give less at standstill.
+/// Breakaway force of a slide with everything that turns with it, if the motors give less at standstill.
 fn of_breakaway(machine: &Machine, limit: Option<f64>, number: usize, instants: &[Instant]) -> Option<Shortfall> {
     let at_standstill = |drive: usize| {
         if let Some(curve) = Curve::of(&machine.drives[drive]) {
@@ -342,7 +342,7 @@ fn of_breakaway(machine: &Machine, limit: Option<f64>, number: usize, instants: 
     })
 }
 
-/// The end of the travel of a slide, where its reference goes beyond it.
+/// The end of a slide's travel, if its reference exceeds it.
 fn of_travel(machine: &Machine, number: usize, instants: &[Instant]) -> Option<Shortfall> {
     let travel = machine.slide(number)?.travel?;
     let beyond = |at: &Instant| (at.y.position - travel.max).max(travel.min - at.y.position);
@@ -358,7 +358,7 @@ fn of_travel(machine: &Machine, number: usize, instants: &[Instant]) -> Option<S
     Some(at.beyond("travel", [position, end], "m", words))
 }
 
-/// In a sentence, all of a move's.
+/// All limits exceeded by a move, in a sentence.
 pub fn sentence(name: &str, short: &[Shortfall]) -> String {
     let words: Vec<&str> = short.iter().map(|short| &*short.words).collect();
     format!("the move \"{name}\" cannot be followed: {}", words.join("; "))
@@ -369,7 +369,7 @@ pub fn limits(machine: &Machine, limit: Option<f64>) -> (Option<f64>, Option<f64
     limits_of(machine, 0, limit)
 }
 
-/// The same of any drive.
+/// Tightest limits of voltage and current of any drive, V and A.
 fn limits_of(machine: &Machine, drive: usize, limit: Option<f64>) -> (Option<f64>, Option<f64>) {
     let amplifier = &machine.drives[drive].amplifier;
     let commanded = limit.map(|limit| limit * amplifier.gain.abs());
@@ -386,7 +386,7 @@ fn needs(machine: &Machine, profile: &Profile, instants: usize) -> Vec<Need> {
     let compensation = Compensation::new(machine, &FeedForward::NONE);
     let need = |time: f64| {
         let y = profile.at(time);
-        // A force along the travel is in it; one by the speed is not.
+        // It contains a force along the travel, but not one by speed.
         let needed = compensation.needed(&y);
         let by_speed = machine.cart.forces.by_speed.as_ref().map_or(0.0, |line| line.value(y.speed));
         let force = needed.force[0] - by_speed;

@@ -1,15 +1,16 @@
-//! The torque at which a stepper loses its field, over its speed, and the acceleration that this leaves.
+//! Pull-out torque of a stepper over speed, and the acceleration that it allows.
 //!
-//! At a constant speed ω the phase currents become periodic. Where the rotor is behind the field by the electrical angle
-//! δ, ψ = ε + δ, each phase gives the same mean torque, and the detents give none:
+//! At a constant speed ω the phase currents become periodic. With the rotor behind the field by the electrical angle δ,
+//! ψ = ε + δ, both phases give the same mean torque, and the detents none:
 //!
 //! ```text
 //! T(δ) = 2 · mean over a period of −K_m i_a sin ε,   pull-out torque = max over δ of T(δ)
 //! ```
 //!
-//! That is the torque in steady motion: a rotor that swings in its field is lost earlier.
+//! This is the torque in steady motion: an oscillating rotor loses its field earlier.
 //!
-//! Below a speed the chopper's regulator has voltage left, and the currents lag by the same angle at any δ: then
+//! Up to a certain speed the chopper's regulator has voltage to spare, and the currents lag by the same angle at any δ;
+//! then
 //!
 //! ```text
 //! T = T_h / √(1 + (N ω/ω_c)²)   while   (R A + K_m ω)² + (N ω L A)² ≤ V²,   A = √2 I / √(1 + (N ω/ω_c)²)
@@ -22,25 +23,25 @@ use crate::mechanism::Phases;
 use std::f64::consts::{FRAC_PI_4, PI};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Steps of a period at least, and the longest one as a share of the fastest time constant.
+/// Least number of steps in a period, and the longest step as a fraction of the fastest time constant.
 const STEPS: f64 = 240.0;
 const FINE: f64 = 0.5;
 
-/// Angles at which the largest torque is looked for at first, and golden sections between them.
+/// Initial grid of angles in the search for the largest torque, and golden sections between them.
 const ANGLES: usize = 12;
 const SECTIONS: usize = 16;
 
-/// Periods at most until the current repeats itself, and the share of its amplitude that it may miss by.
+/// Maximum number of periods until the current is periodic, and its tolerance relative to the amplitude.
 const PERIODS: usize = 400;
 const REPEATS: f64 = 1e-7;
 
 /// Below this number of full steps per second it is taken to be at rest.
 const SLOW: f64 = 4.0;
 
-/// Speeds between rest and the largest at which an acceleration is checked.
+/// Number of speeds from rest to the largest one at which an acceleration is checked.
 const SPEEDS: usize = 24;
 
-/// Number of speeds of a [`Curve`] beyond the one to which the regulator has voltage left, and the largest as a
+/// Number of speeds of a [`Curve`] beyond the one up to which the regulator has voltage to spare, and the largest as a
 /// multiple of that.
 const KEPT: usize = 16;
 const FASTEST: f64 = 32.0;
@@ -55,12 +56,12 @@ pub struct Curve {
     torques: Vec<f64>,
 }
 
-/// Curves that were made last: a search asks again and again for those of the same motors.
+/// Latest curves, since a search needs those of the same motors repeatedly.
 static KNOWN: Mutex<Vec<Arc<Curve>>> = Mutex::new(Vec::new());
 const REMEMBERED: usize = 64;
 
 impl Curve {
-    /// Curve of a motor with its driver; none of a motor that is no stepper.
+    /// Curve of a motor with its driver; none unless it is a stepper.
     pub fn of(unit: &DriveUnit) -> Option<Arc<Self>> {
         let phases = Phases::of_motor(&unit.motor, &unit.amplifier)?;
         let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
@@ -76,13 +77,14 @@ impl Curve {
     }
 
     fn new(phases: Phases) -> Self {
-        // Where the back-EMF alone is the supply, no voltage is left.
+        // At the speed where the back-EMF equals the supply, no voltage is left.
         let (mut low, mut high) = (0.0, phases.supply / phases.torque_constant);
         for _ in 0..50 {
             let middle = 0.5 * (low + high);
             if regulated(&phases, middle).is_some() { low = middle } else { high = middle }
         }
-        // A driver that sets the voltage has no such speed: there the resistance is as large as the reactance.
+        // A driver that sets the voltage has no such speed; the speed at which resistance equals reactance is used
+        // instead.
         let corner = match phases.regulator {
             Some(_) => high,
             None => phases.resistance / phases.inductance / phases.teeth,
@@ -93,7 +95,7 @@ impl Curve {
         Self { phases, speeds, torques }
     }
 
-    /// The torque at a speed, rad/s, N m: beyond the last speed zero.
+    /// Torque, N m, at a speed, rad/s; zero beyond the last speed.
     pub fn torque(&self, speed: f64) -> f64 {
         let speed = speed.abs();
         if let Some(torque) = regulated(&self.phases, speed) {
@@ -106,7 +108,7 @@ impl Curve {
     }
 }
 
-/// A stepper and all that it moves, as one mass.
+/// A stepper and its load as one mass.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PullOut {
     phases: Phases,
@@ -114,13 +116,13 @@ pub struct PullOut {
 }
 
 impl PullOut {
-    /// That of an axis with a stepper.
+    /// The model of an axis with a stepper.
     pub fn of(machine: &Machine) -> Option<Self> {
         let unit = &machine.drives[0];
         Some(Self { phases: Phases::of_motor(&unit.motor, &unit.amplifier)?, rigid: Rigid::of(machine) })
     }
 
-    /// All that moves, at the belt, kg.
+    /// Total moving mass at the belt, kg.
     pub fn mass(&self) -> f64 {
         self.rigid.mass
     }
@@ -135,8 +137,8 @@ impl PullOut {
         torque(&self.phases, speed)
     }
 
-    /// The largest constant acceleration, m/s², with which it goes over this way, m: half of it up and half of it down,
-    /// the motor within its pull-out torque at every speed; zero where friction alone is too much.
+    /// Largest constant acceleration, m/s², for a move over this distance, m, accelerating over one half and braking
+    /// over the other, with the motor within its pull-out torque at every speed; zero if friction alone exceeds it.
     pub fn largest_acceleration(&self, machine: &Machine, way: f64) -> f64 {
         let r = machine.pulley_radius;
         let at_rest = (self.torque(0.0) / r - self.rigid.friction(0.0, 1.0).1) / self.rigid.mass;
@@ -150,12 +152,12 @@ impl PullOut {
             (self.torque(speed / r) / r - viscous - dry - self.rigid.constant.abs()) / self.rigid.mass
         };
         let all: Vec<f64> = speeds.iter().map(|speed| left(*speed)).collect();
-        // The speed v is reached with a = v²/way, if every speed up to it leaves as much.
+        // The speed v is reached with a = v²/way, if all lower speeds allow this acceleration.
         let mut least = f64::INFINITY;
         for (k, (speed, own)) in speeds.iter().zip(&all).enumerate() {
             let wanted = speed * speed / way;
             if least.min(*own) < wanted {
-                // Between this speed and the one before, both as straight lines.
+                // Interpolates linearly between this speed and the previous one.
                 let before = speeds[k.saturating_sub(1)];
                 let (mut low, mut high) = (before, *speed);
                 for _ in 0..50 {
@@ -178,7 +180,7 @@ fn torque(phases: &Phases, speed: f64) -> f64 {
         return torque;
     }
     let at = |k: usize| PI * k as f64 / ANGLES as f64;
-    // The current of one angle is near that of the next.
+    // The current at one angle is a good start for the next.
     let mut current = 0.0;
     let mut torque = |lead: f64| mean_torque(phases, speed, lead, &mut current);
     let torques: Vec<f64> = (0..=ANGLES).map(|k| torque(at(k))).collect();
@@ -188,7 +190,7 @@ fn torque(phases: &Phases, speed: f64) -> f64 {
     torque(lead).max(torques[best]).max(0.0)
 }
 
-/// The pull-out torque at a speed, rad/s, to which the regulator of a chopper has voltage left, N m; none beyond.
+/// Pull-out torque, N m, at a speed, rad/s, up to which the regulator of a chopper has voltage to spare; none beyond.
 fn regulated(phases: &Phases, speed: f64) -> Option<f64> {
     let electrical = phases.teeth * speed.abs();
     let falls = (1.0 + (electrical / phases.regulator?).powi(2)).sqrt();
@@ -198,10 +200,10 @@ fn regulated(phases: &Phases, speed: f64) -> Option<f64> {
     (voltage <= phases.supply).then_some(phases.torque_constant * amplitude)
 }
 
-/// T(δ) at this speed, N m, and the phase current at the end of a period, A, to begin another with.
+/// T(δ) at this speed, N m; the phase current at the end of the last period, A, is the start of the next call.
 fn mean_torque(phases: &Phases, speed: f64, lead: f64, begin: &mut f64) -> f64 {
     if steps_per_second(phases, speed) < SLOW {
-        // At rest τ = K_m (−i_a sin ε + i_b cos ε), and nothing of it changes with ε.
+        // At rest τ = K_m (−i_a sin ε + i_b cos ε) does not depend on ε.
         let angle = -FRAC_PI_4 / phases.teeth;
         let [a, b] = phases.at_rest(angle + lead / phases.teeth);
         let free = Phases { detent_torque: 0.0, ..*phases };
@@ -212,7 +214,7 @@ fn mean_torque(phases: &Phases, speed: f64, lead: f64, begin: &mut f64) -> f64 {
     let steps = STEPS.max((period * fastest / FINE).ceil());
     let h = period / steps;
     let rate = |time: f64, current: f64| {
-        // ε is zero where time is.
+        // ε is zero at time zero.
         let angle = speed * time - FRAC_PI_4 / phases.teeth;
         let beyond = phases.rate(0, angle, speed, current, angle + lead / phases.teeth).value;
         beyond - phases.resistance / phases.inductance * current

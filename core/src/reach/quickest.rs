@@ -1,5 +1,5 @@
-//! The quickest moves that a machine can make: speed, acceleration, jerk and snap within its limits, of a gantry along
-//! its path, with jerk and snap times on the zeros of the belt's modes.
+//! Quickest moves of a machine: speed, acceleration, jerk and snap within its limits, for a gantry along its path, with
+//! jerk and snap times at the zeros of the belt's modes.
 
 use super::feasible::{limits, loads, shortfalls};
 use super::resonance::{Drive, reaches, resonances};
@@ -15,24 +15,24 @@ pub const INSTANTS: usize = 160;
 /// Number of instants at which a plan is checked.
 pub const CLOSELY: usize = 4000;
 
-/// Cruising speeds that are tried, by a grid and then by golden section, and bisections of the acceleration.
+/// Number of cruising speeds on the grid, steps of golden section after it, and bisections of the acceleration.
 const SPEEDS: usize = 10;
 const NARROWED: usize = 8;
 const BISECTIONS: usize = 14;
 
-/// Jerk and snap time that are on no mode, in samples of the controller.
+/// Jerk and snap time without a mode, in samples of the controller.
 const SHORTEST: [f64; 2] = [4.0, 1.0];
 
-/// Times that a plan is made slower because an axis of the family needs more than there is.
+/// Maximum number of times that a plan is slowed down because a machine of the family exceeds a limit.
 const CORRECTIONS: usize = 6;
 
-/// Share by which two frequencies differ that are one mode.
+/// Relative difference up to which two frequencies are one mode.
 const SAME: f64 = 1e-6;
 
-/// Smallest cruising speed that is tried, as a share of the largest that the way allows.
+/// Smallest cruising speed tried, as a fraction of the largest for the path.
 const SLOWEST: f64 = 0.02;
 
-/// Limits of a plan besides those of the machine, and the share of voltage and current that it leaves to the loop.
+/// Limits of a plan besides those of the machine, and the reserve of voltage and current for the loop.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Wanted {
     /// m/s
@@ -46,7 +46,7 @@ pub struct Wanted {
 }
 
 impl Wanted {
-    /// Each limit is above zero and finite, and the reserve a share up to 90 %.
+    /// Errors: a limit that is not positive and finite, or a reserve above 90 %.
     pub fn check(&self) -> Result<()> {
         let limits = [("speed", self.speed), ("acceleration", self.acceleration), ("jerk", self.jerk)];
         for (name, value) in limits {
@@ -61,8 +61,8 @@ impl Wanted {
     }
 }
 
-/// Lowest frequencies along the travel of the modes with the drive pulleys held, Hz, the lowest first; of a gantry those
-/// that move the bridge and those that move the cart. None of a rigid belt, or of one that does not swing.
+/// Lowest frequencies along the travel of the modes with held drive pulleys, Hz, in ascending order; for a gantry,
+/// those that move the bridge or the cart. Empty for a rigid belt, or without oscillation.
 pub fn modes(machine: &Machine) -> Vec<f64> {
     if machine.belt.model == BeltModel::Rigid {
         return Vec::new();
@@ -75,23 +75,23 @@ pub fn modes(machine: &Machine) -> Vec<f64> {
     lowest
 }
 
-/// A move from leg to leg, without its limits.
+/// Path of a move from leg to leg, without its limits.
 #[derive(Debug, Clone)]
 pub struct Way {
     /// Start position of each coordinate, m.
     pub start: Vec<f64>,
-    /// Its legs; those that move with any limits.
+    /// Its legs, with arbitrary limits.
     pub legs: Vec<Leg<Vec<f64>>>,
     /// The shortest and the longest leg, m.
     shortest: f64,
     longest: f64,
 }
 
-/// Limits of a leg that has none yet.
+/// Placeholder limits of a leg.
 const ANY: Limits = Limits { speed: 1.0, acceleration: 1.0, jerk: None, snap: None };
 
 impl Way {
-    /// The legs of references on one clock; none of references that do not move.
+    /// Legs of references on one clock; none if the references do not move.
     pub fn of(profiles: &[Profile]) -> Option<Self> {
         let mut rested = 0.0;
         let (mut legs, mut lengths) = (Vec::new(), Vec::new());
@@ -104,7 +104,7 @@ impl Way {
                 continue;
             }
             let begin = leg.iter().map(|passage| passage.begin).fold(0.0, f64::max);
-            // What rounding leaves of the clock is no rest.
+            // Rounding of the clock is not a rest.
             if begin - rested > 1e-12 {
                 legs.push(Leg::Wait(begin - rested));
             }
@@ -136,16 +136,16 @@ impl Way {
 pub struct Quickest<'a> {
     /// The axis.
     pub machine: &'a Machine,
-    /// The controller: its limit, its sample time and its shaper count.
+    /// The controller, of which limit, sample time and shaper are used.
     pub design: &'a Design,
-    /// Frequencies of the modes, as [`modes`] has them, Hz.
+    /// Frequencies of the modes by [`modes`], Hz.
     pub modes: &'a [f64],
     /// Further limits.
     pub wanted: &'a Wanted,
 }
 
 impl Quickest<'_> {
-    /// Refuses a way that no speed and no acceleration make possible, and one that nothing limits.
+    /// Errors: a path that is infeasible at any speed and acceleration, and one that nothing limits.
     pub fn check(&self, way: &Way) -> Result<()> {
         let slow = Limits { speed: 1e-3, acceleration: 1e-2, jerk: None, snap: None };
         let references = self.design.shaped(&way.within(&slow)?);
@@ -161,7 +161,7 @@ impl Quickest<'_> {
         Ok(())
     }
 
-    /// Jerk and snap time, s; none where the belt has no such mode.
+    /// Jerk and snap time, s; none if the belt has no such mode.
     fn times(&self, periods: [u8; 2]) -> Option<[f64; 2]> {
         let mut times = SHORTEST.map(|samples| samples * self.design.every);
         for (k, (time, periods)) in times.iter_mut().zip(periods).enumerate() {
@@ -172,7 +172,7 @@ impl Quickest<'_> {
         (times[1] <= times[0]).then_some(times)
     }
 
-    /// Limits with these averaging times, the shortest jerk time grown where a limit of jerk asks for it.
+    /// Limits with these averaging times; the shortest jerk time is increased if a limit of jerk requires it.
     fn limits(&self, speed: f64, acceleration: f64, periods: [u8; 2], times: [f64; 2]) -> Limits {
         let mut jerk_time = times[0];
         if let (0, Some(jerk)) = (periods[0], self.wanted.jerk) {
@@ -182,9 +182,9 @@ impl Quickest<'_> {
         Limits { speed, acceleration, jerk: Some(jerk), snap: Some(jerk / times[1]) }
     }
 
-    /// The limits of the quickest move that takes no more than this share of what is left of voltage and current; none
-    /// where there is none. `others` is the largest share of a limit that a reference, shaper included, takes of other
-    /// machines, of which 1 is allowed.
+    /// Limits of the quickest move within this fraction of voltage and current after the reserve; none if no move is.
+    /// `others` returns the largest use of a limit by a reference, shaper included, on other machines, where 1 is
+    /// allowed.
     pub fn limits_for(
         &self,
         way: &Way,
@@ -197,7 +197,7 @@ impl Quickest<'_> {
         for _ in 0..CORRECTIONS {
             let Some(limits) = self.searched(way, periods, share) else { return Ok(None) };
             let profiles = self.design.shaped(&way.within(&limits)?);
-            // Looked at more closely, the axis needs a little more than during the search.
+            // On the finer grid of instants, the axis needs slightly more than during the search.
             let closely = loads(self.machine, self.design.limit, &profiles, CLOSELY);
             let most = closely.iter().map(|load| load.share() / if load.is_of_motor() { wanted } else { 1.0 });
             let most = most.fold(others(&profiles), f64::max);
@@ -209,8 +209,8 @@ impl Quickest<'_> {
         Ok(None)
     }
 
-    /// The limits of the quickest move with these averaging times that takes no more than a share of the machine's; none
-    /// where there is none.
+    /// Limits of the quickest move with these averaging times within a share of the machine's capability; none if no
+    /// move is.
     fn searched(&self, way: &Way, periods: [u8; 2], share: f64) -> Option<Limits> {
         let times = self.times(periods)?;
         let both: f64 = times.iter().sum();
@@ -241,7 +241,7 @@ impl Quickest<'_> {
             let limits = self.limits(speed, a, periods, times);
             (way.within(&limits).map_or(f64::INFINITY, |profiles| profiles[0].end()), Some(limits))
         };
-        // No faster than a way without any cruise reaches.
+        // At most the speed reached without cruising.
         let fastest = (way.longest * most).sqrt().min(self.wanted.speed.unwrap_or(f64::INFINITY));
         let grid = |k: usize| fastest * SLOWEST.powf(k as f64 / (SPEEDS - 1) as f64);
         let found: Vec<(f64, f64, Option<Limits>)> = (0..SPEEDS)
@@ -261,7 +261,7 @@ impl Quickest<'_> {
             -time
         });
         let limits = best_yet.1?;
-        // Where no stroke cruises, the largest speed of the longest.
+        // If no stroke cruises, the largest speed of the longest one.
         let profiles = way.within(&limits).ok()?;
         let middles = profiles[0].passages().iter().map(|passage| passage.begin + 0.5 * passage.duration());
         let speed_at = |time: f64| match &profiles[..] {
@@ -273,7 +273,7 @@ impl Quickest<'_> {
         Some(Limits { speed, ..limits })
     }
 
-    /// True if a move within these limits takes no more than this share of each limit of the machine.
+    /// True if a move within these limits uses at most this fraction of each limit of the machine.
     fn is_within(&self, way: &Way, limits: &Limits, share: f64) -> bool {
         let Ok(profiles) = way.within(limits) else { return false };
         let loads = loads(self.machine, self.design.limit, &self.design.shaped(&profiles), INSTANTS);

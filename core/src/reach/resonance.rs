@@ -1,4 +1,4 @@
-//! The frequencies at which a machine vibrates, along its travel, from its masses and springs.
+//! Natural frequencies of a machine along its travel, from its masses and springs.
 
 use crate::error::{Error, Result};
 use crate::machine::{AmplifierMode, BeltModel, DriveAt, DriveUnit, Machine, Travel};
@@ -6,25 +6,25 @@ use crate::mechanism::Body;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use std::f64::consts::PI;
 
-/// Places along the travel at which modes are looked for.
+/// Number of positions along the travel at which modes are computed.
 const PLACES: usize = 21;
-/// Places along the travel of another coordinate.
+/// Number of positions of another coordinate.
 const OTHERS: usize = 5;
-/// Modes that move the cart less than this part of the strongest are left out.
+/// Modes that move the cart less than this fraction of the strongest are omitted.
 const LEAST: f64 = 1e-3;
 
 /// The state of the drive pulley.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Drive {
-    /// A position loop makes it follow its command: what vibrates is the cart on its belt. A stepper holds it by the
-    /// stiffness of its field, so that its rotor vibrates, too.
+    /// A position loop makes it follow its command: the cart vibrates on its belt. A stepper holds it by the stiffness
+    /// of its field, so its rotor also vibrates.
     #[default]
     Held,
-    /// The motor's torque is commanded and the pulley gives way: the resonance of the open loop.
+    /// The motor's torque is commanded and the pulley moves: resonance of the open loop.
     Free,
 }
 
-/// A mode of vibration at one place.
+/// A mode of vibration at one position.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Resonance {
     /// Position of the coordinate, m: of the cart of an axis.
@@ -33,7 +33,7 @@ pub struct Resonance {
     pub frequency: f64,
     /// Damping ratio.
     pub damping: f64,
-    /// How far it moves the coordinate after a step of the command, of what the strongest mode at that place does: 0 to 1.
+    /// Displacement of the coordinate after a command step, relative to the strongest mode at that position: 0 to 1.
     pub share: f64,
 }
 
@@ -42,18 +42,18 @@ pub struct Resonance {
 pub struct Reach {
     /// Its lowest and highest frequency, Hz.
     pub frequency: [f64; 2],
-    /// Its least and most damping ratio.
+    /// Its smallest and largest damping ratio.
     pub damping: [f64; 2],
-    /// The most of its shares.
+    /// Its largest share.
     pub share: f64,
-    /// Its frequency at the last place, Hz.
+    /// Its frequency at the last position, Hz.
     last: f64,
 }
 
-/// Step of a mode's frequency from one place to the next up to which it is the same mode, as part of it.
+/// Largest relative step of a mode's frequency from one position to the next.
 const SAME: f64 = 0.2;
 
-/// Each mode over all places, the strongest first: from place to place a mode is the one of the nearest frequency.
+/// Each mode over all positions, the strongest first: between positions, modes are matched by the nearest frequency.
 pub fn reaches(modes: &[Resonance]) -> Vec<Reach> {
     let mut all: Vec<Reach> = Vec::new();
     for mode in modes {
@@ -80,19 +80,18 @@ pub fn reaches(modes: &[Resonance]) -> Vec<Reach> {
 }
 
 impl Reach {
-    /// True if a mode at some place is this one.
+    /// True if this mode contains a mode at one position.
     pub fn has(&self, mode: &Resonance) -> bool {
         (self.frequency[0]..=self.frequency[1]).contains(&mode.frequency)
     }
 }
 
-/// The modes of a machine that move one of its coordinates: the cart of an axis, bridge or cart of a gantry. They are
-/// those at every place along the travel if the spans follow what slides, else at one.
+/// Modes of a machine that move one of its coordinates: the cart of an axis, bridge or cart of a gantry; at every
+/// position along the travel if the spans follow the slides, otherwise at one.
 ///
-/// The masses, springs and dampers are those of the sliding machine: M q̈ + C q̇ + K q = 0 with the viscous friction, the
-/// belt's damping and, where a free motor is fed by a voltage, its back-EMF. Frequencies are of K and M alone; damping
-/// ratios ζ = φᵀ C φ / (2 ω φᵀ M φ) hold for light damping. Modes that are damped so much that they do not vibrate are
-/// left out.
+/// For the sliding machine, M q̈ + C q̇ + K q = 0 with viscous friction, belt damping and, for a free motor in voltage
+/// mode, back-EMF. Frequencies follow from K and M alone; damping ratios ζ = φᵀ C φ / (2 ω φᵀ M φ) hold for light
+/// damping. Overdamped modes are left out.
 pub fn resonances(machine: &Machine, drive: Drive, coordinate: usize) -> Result<Vec<Resonance>> {
     if machine.belt.model == BeltModel::Rigid {
         let error = Error::new("a rigid belt has no resonance").allowed("belt.model = \"elastic\" or \"two-mass\"");
@@ -115,7 +114,7 @@ pub fn resonances(machine: &Machine, drive: Drive, coordinate: usize) -> Result<
     Ok(all)
 }
 
-/// Positions of what slides, m: along the travel of the coordinate, to and fro over a few places of another.
+/// Positions of the slides, m: along the travel of the coordinate, back and forth at a few positions of another.
 fn places(machine: &Machine, coordinate: usize) -> Vec<Vec<f64>> {
     let travels: Vec<Option<Travel>> = machine.travels().map(|(_, travel)| travel).collect();
     let along = |travel: &Option<Travel>, count: usize| -> Vec<f64> {
@@ -134,7 +133,7 @@ fn places(machine: &Machine, coordinate: usize) -> Vec<Vec<f64>> {
     let own = along(&travels[coordinate], PLACES);
     let line = |(turn, at): (usize, &Vec<f64>)| -> Vec<Vec<f64>> {
         let one = |place: &f64| with(at, coordinate, *place);
-        // From where the last line ended, so that a mode changes little from place to place.
+        // Starts where the last line ended, so that modes change little between positions.
         if turn.is_multiple_of(2) { own.iter().map(one).collect() } else { own.iter().rev().map(one).collect() }
     };
     all.iter().enumerate().flat_map(line).collect()
@@ -147,12 +146,11 @@ fn with(at: &[f64], number: usize, place: f64) -> Vec<f64> {
     all
 }
 
-/// The modes with everything at one place; `share` is not yet relative.
+/// Modes at one position; `share` is not yet relative.
 fn at(machine: &Machine, (drive, coordinate): (Drive, usize), slides: &[f64]) -> Vec<Resonance> {
     let geometry = machine.geometry();
     let (m, c, k) = matrices(machine, drive, slides);
-    // Drive pulleys that are held, the first bodies, are no coordinates, but what they do is felt through their columns
-    // of K.
+    // Held drive pulleys, the first bodies, are not coordinates, but act through their columns of K.
     let drives = geometry.drives.len();
     let fields: Option<Vec<f64>> = machine.drives.iter().map(|unit| unit.motor.field_stiffness()).collect();
     let first = if drive == Drive::Held && fields.is_none() { drives } else { 0 };
@@ -164,7 +162,7 @@ fn at(machine: &Machine, (drive, coordinate): (Drive, usize), slides: &[f64]) ->
     let eigen = SymmetricEigen::new(scaled);
     let slide = &geometry.slides[coordinate];
     let force = match (drive, fields) {
-        // A step of the commands pulls on the rotors with the stiffness of their fields.
+        // A command step acts on the rotors by the stiffness of their fields.
         (Drive::Held, Some(fields)) => {
             let mut force = DVector::zeros(size);
             for (at, field) in geometry.drives.iter().zip(fields) {
@@ -172,7 +170,7 @@ fn at(machine: &Machine, (drive, coordinate): (Drive, usize), slides: &[f64]) ->
             }
             force
         }
-        // A step of the drives, as much as the coordinate's own asks for, pulls with their columns of −K.
+        // A step of the drives for a unit step of the coordinate acts by their columns of −K.
         (Drive::Held, None) => {
             let share = |at: &DriveAt| geometry.bodies[at.pulley].by_slides[coordinate];
             let column = |at: &DriveAt| -k.view((first, at.pulley), (size, 1)).column(0) * share(at);
@@ -188,7 +186,7 @@ fn at(machine: &Machine, (drive, coordinate): (Drive, usize), slides: &[f64]) ->
     let stiffest = eigen.eigenvalues.max();
     let mode = |i: usize| {
         let squared = eigen.eigenvalues[i];
-        // Moving as a whole is no vibration.
+        // A rigid-body mode is not a vibration.
         if squared <= 1e-12 * stiffest {
             return None;
         }
@@ -204,7 +202,7 @@ fn at(machine: &Machine, (drive, coordinate): (Drive, usize), slides: &[f64]) ->
     modes
 }
 
-/// M, C and K over the bodies other than rotors; over φ₁ and x of an axis where both pulleys are one.
+/// M, C and K over the bodies other than rotors; over φ₁ and x for a two-mass axis.
 fn matrices(machine: &Machine, drive: Drive, slides: &[f64]) -> (DMatrix<f64>, DMatrix<f64>, DMatrix<f64>) {
     let (geometry, mechanism) = (machine.geometry(), machine.mechanism());
     let count = geometry.bodies.len();
@@ -248,7 +246,7 @@ fn matrices(machine: &Machine, drive: Drive, slides: &[f64]) -> (DMatrix<f64>, D
         let two = |values: &[f64]| diagonal(&[values[0] + values[2], values[1]]);
         return (two(&masses), both(c) + two(&resisting), both(k) + two(&held));
     }
-    // A pulley without inertia follows at once; the smallest weight keeps the matrix of masses regular.
+    // A pulley without inertia follows at once; a tiny inertia keeps the mass matrix regular.
     let tiny = 1e-9 * machine.cart.mass * machine.pulley_radius * machine.pulley_radius;
     masses.iter_mut().for_each(|mass| *mass = mass.max(tiny));
     (diagonal(&masses), sum(&damping) + diagonal(&resisting), sum(&stiffness) + diagonal(&held))

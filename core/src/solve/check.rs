@@ -1,4 +1,4 @@
-//! Checks of a stage and an experiment before anything is computed.
+//! Checks of a machine and an experiment before a run.
 //!
 //! The case reader checks files and reports the line; this module checks machines built by a program.
 
@@ -14,17 +14,17 @@ use crate::polyline::MOST_POINTS;
 use crate::signal::Signal;
 use std::f64::consts::PI;
 
-/// The range of anything that has to be above zero, as in a case file.
+/// Range of positive numbers, as in a case file.
 const LEAST: f64 = 1e-15;
 const MOST: f64 = 1e15;
 
-/// Fastest rate, 1/s, that a stage may have: beyond it, what rounding does to the rates of change hides the motion.
+/// Largest rate, 1/s, of a machine: beyond it, rounding of the derivatives hides the motion.
 const FASTEST: f64 = 1e13;
 
-/// Most rows.
+/// Maximum number of rows.
 const MOST_ROWS: f64 = 1e12;
 
-/// Refuses what is no machine.
+/// Rejects an invalid machine.
 pub fn machine(machine: &Machine) -> Result<()> {
     if machine.kind != Kind::Axis {
         parameter::check(machine)?;
@@ -36,7 +36,7 @@ pub fn machine(machine: &Machine) -> Result<()> {
     let laws = [machine.drive_pulley.friction, machine.cart.friction, machine.idler_pulley.friction];
 
     parameter::check(machine)?;
-    // `Err` for whatever is not above zero; a value that is no number is never.
+    // Rejects a number that is not positive, and NaN.
     let positive =
         |what: &str, values: &[f64]| match values.iter().find(|value| !(LEAST..=MOST).contains(*value)) {
             Some(value) => Err(Error::new(format!("{what} cannot be {value:e}"))
@@ -102,7 +102,7 @@ pub fn machine(machine: &Machine) -> Result<()> {
         }
     }
 
-    // Whatever is by itself this fast: the current, and each body against its springs, dampers, friction and the motor.
+    // Rates of the parts alone: the current, and each body against its springs, dampers, friction and the motor.
     if let Some(bandwidth) = amplifier.bandwidth.filter(|bandwidth| 2.0 * PI * bandwidth > FASTEST) {
         return Err(too_fast("the current", 2.0 * PI * bandwidth).next("leave the bandwidth out: it does not show"));
     }
@@ -132,7 +132,7 @@ pub fn machine(machine: &Machine) -> Result<()> {
     Ok(())
 }
 
-/// Refuses what is not linear between its changes of mode.
+/// Rejects a mechanism that is not linear between changes of mode.
 pub(super) fn piecewise_linear(mechanism: &Mechanism) -> Result<()> {
     let mut bodies = mechanism.bodies.iter();
     let what = if let Some(body) = bodies.find(|body| !body.friction.is_piecewise_linear()) {
@@ -150,8 +150,7 @@ pub(super) fn piecewise_linear(mechanism: &Mechanism) -> Result<()> {
         .next("leave --solver out, or write --solver general: it takes all of these"))
 }
 
-/// The fastest rate, 1/s, that is known beforehand: of the currents, and of each body against all that holds or damps
-/// it.
+/// Fastest rate, 1/s, known beforehand: of the currents, and of each body against its springs and dampers.
 pub(super) fn fastest_rate(mechanism: &Mechanism) -> f64 {
     let mut fastest: f64 = 0.0;
     for drive in &mechanism.drives {
@@ -177,7 +176,7 @@ pub(super) fn fastest_rate(mechanism: &Mechanism) -> f64 {
     for (index, body) in mechanism.bodies.iter().enumerate() {
         let (mut stiffness, mut damping) = (0.0, 0.0);
         for spring in &mechanism.springs {
-            // Stops and flanks by themselves: they are hardly ever touched together with the rest.
+            // Stops and flanks are taken alone, since they rarely act together with the rest.
             let alone = matches!(spring.law, SpringLaw::Gap { .. });
             let arm: f64 = spring.arms.iter().filter(|(b, _)| *b == index).map(|(_, arm)| arm * arm).sum();
             let (steepest, strongest) = spring.law.steepest();
@@ -206,7 +205,7 @@ fn too_fast(what: &str, rate: f64) -> Error {
         .allowed(format!("{:e} s and longer", 1.0 / FASTEST))
 }
 
-/// Refuses a run of a mechanism that has no rows, no input for each drive, or no state to begin with.
+/// Rejects a run of a mechanism without rows, with a wrong number of inputs, or with an invalid initial state.
 pub(super) fn course(mechanism: &Mechanism, course: &Course) -> Result<()> {
     times(course.until, course.every)?;
     if course.inputs.len() != mechanism.drives.len() {
@@ -216,7 +215,7 @@ pub(super) fn course(mechanism: &Mechanism, course: &Course) -> Result<()> {
     state(&course.start)
 }
 
-/// A jump of the command of a stepper that is farther than its rotor follows.
+/// A jump of a stepper's command that its rotor cannot follow.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Jump {
     /// Number of the drive.
@@ -225,11 +224,11 @@ pub struct Jump {
     pub time: f64,
     /// m
     pub by: f64,
-    /// Farthest jump that the rotor follows, m.
+    /// Largest jump that the rotor follows, m.
     pub most: f64,
 }
 
-/// The first such jump of these commands of a machine that begins in `start`, before `until`, s.
+/// First such jump of these commands before `until`, s, for a machine that begins in `start`.
 pub fn first_jump(mechanism: &Mechanism, inputs: &[Signal], start: &State, until: f64) -> Option<Jump> {
     inputs.iter().enumerate().find_map(|(drive, input)| {
         let most = mechanism.farthest_jump(drive)?;
@@ -239,7 +238,7 @@ pub fn first_jump(mechanism: &Mechanism, inputs: &[Signal], start: &State, until
     })
 }
 
-/// Refuses commands of steppers that jump farther than a rotor follows, from where it begins on.
+/// Rejects commands of steppers with jumps that a rotor cannot follow, including one from its initial position.
 fn commands(mechanism: &Mechanism, course: &Course) -> Result<()> {
     match first_jump(mechanism, &course.inputs, &course.start, course.until) {
         None => Ok(()),
@@ -261,7 +260,7 @@ pub(super) fn state(start: &State) -> Result<()> {
     }
 }
 
-/// Refuses a run that has no rows.
+/// Rejects a run without rows.
 fn times(until: f64, every: f64) -> Result<()> {
     if !(until.is_finite() && every.is_finite() && until > 0.0 && every > 0.0) {
         return Err(Error::new(format!("a run of {until:e} s with a row every {every:e} s cannot be"))
@@ -274,13 +273,13 @@ fn times(until: f64, every: f64) -> Result<()> {
     Ok(())
 }
 
-/// Refuses a run that has no rows, or no state to begin with.
+/// Rejects a run without rows or with an invalid initial state.
 pub(super) fn experiment(mechanism: &Mechanism, experiment: &Experiment) -> Result<()> {
     state(&experiment.initial)?;
     let begun = Course::of(mechanism, experiment);
     course(mechanism, &begun)?;
     commands(mechanism, &begun)?;
-    // Joined bodies begin at one speed and position.
+    // Joined bodies start with equal speed and position.
     let state = begun.start;
     for body in 0..mechanism.bodies.len() {
         let leader = mechanism.leader(body);

@@ -1,7 +1,7 @@
-//! From the solvers' coordinates to angles and positions: where a run begins, and what stands still.
+//! From the solvers' coordinates to angles and positions, with the origin of a run and the angles of stuck pulleys.
 //!
 //! ```text
-//! q_b = q_b0 + (c_b − c_b0 − Σ a_j (q_j − q_j0))/a_b        c_b = Σ a_j q_j, the length that stands in the place of q_b
+//! q_b = q_b0 + (c_b − c_b0 − Σ a_j (q_j − q_j0))/a_b        c_b = Σ a_j q_j, the length in place of q_b
 //! ```
 
 use super::saved::{Pass, Passed};
@@ -47,7 +47,7 @@ impl Coordinates {
         (Self { start: *start, origin, strain, held: [None; BODIES] }, inner)
     }
 
-    /// These coordinates with the angles of `state`, whatever the lengths.
+    /// These coordinates with the angles of `state` and any lengths.
     pub(crate) fn at(&self, state: &State) -> Self {
         Self { held: state.position.map(Some), ..self.clone() }
     }
@@ -99,7 +99,7 @@ impl Coordinates {
         state
     }
 
-    /// Position of a body that is not held, as weights of the positions in the solvers' coordinates and a constant.
+    /// Position of a body that is not held, as weights on the solvers' coordinates and a constant.
     pub(super) fn way(&self, layout: &Layout, body: usize) -> ([f64; BODIES], f64) {
         let mut weights = [0.0; BODIES];
         let Some(replaced) = layout.replaced.iter().find(|replaced| replaced.body == body) else {
@@ -145,7 +145,7 @@ impl Coordinates {
         own.iter_mut().for_each(|change| *change = start + *change / replaced.own);
     }
 
-    /// Remembers the angles of pulleys that have come to rest in `mode`, and forgets those of pulleys that move.
+    /// Stores the angles of pulleys that have come to rest in `mode`, and drops those of moving pulleys.
     pub(crate) fn hold(&mut self, layout: &Layout, mode: &Mode, inner: &State) {
         let is_stuck = |body: usize| mode.motion[body] == Motion::Stuck;
         if layout.replaced.iter().any(|replaced| is_stuck(replaced.body) != self.held[replaced.body].is_some()) {

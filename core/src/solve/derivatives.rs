@@ -12,7 +12,7 @@ use crate::friction::Motion;
 use crate::mechanism::{DRIVES, Equations, Form, SPRINGS, Shown, State};
 use crate::signal::DEGREE;
 
-/// The derivatives of one order of all that columns are made of; of order zero the values themselves.
+/// Derivatives of one order of all quantities in columns; of order zero, the values.
 #[derive(Clone, Copy)]
 struct Level {
     order: usize,
@@ -23,7 +23,7 @@ struct Level {
 }
 
 impl Level {
-    /// Derivative of a form; that of its constant is zero.
+    /// Derivative of a form, whose constant has none.
     fn of(&self, form: &Form) -> f64 {
         let form = if self.order == 0 { *form } else { Form { constant: 0.0, ..*form } };
         form.value_at(&self.stretch, &self.state, &self.input)
@@ -99,7 +99,7 @@ impl Simulator {
         next
     }
 
-    /// Derivative of the friction on a body: at rest that of the load that its gear does not hold.
+    /// Derivative of the friction on a body; at rest, of the load that its gear does not hold.
     fn friction_rate(&self, body: usize, now: &Level, level: &Level) -> f64 {
         let (mechanism, mode) = (self.mechanism(), self.engine().mode());
         let law = mechanism.friction(body);

@@ -17,16 +17,16 @@ pub(super) trait Engine: Send + Sync {
     /// Present time, s.
     fn time(&self) -> f64;
 
-    /// The highest degree of the inputs that it takes.
+    /// Highest degree of its inputs.
     fn degree(&self) -> usize;
 
     /// A solver for inputs of this degree in the same state.
     fn raised(&self, degree: usize) -> Box<dyn Engine>;
 
-    /// Takes up new inputs, and what they bring about at once.
+    /// Sets new inputs and settles the mode changes that they cause at once.
     fn take_input(&mut self, pieces: &Pieces);
 
-    /// Bounds how fast the inputs change until `until`.
+    /// Bounds the rates of the inputs until `until`.
     fn bound_input(&mut self, pieces: &Pieces, until: f64);
 
     /// Advances to `until` and appends the events to `events`.

@@ -19,17 +19,18 @@ const MOST_ROWS: u64 = 1000;
 /// The tolerance of the second run, as a multiple of the first one's.
 const FACTOR: f64 = 100.0;
 
-/// Rows of the second run for each that is compared, to choose from. Steps are halves and doubles of a run's output
-/// interval: where the two intervals differ by a power of two, both runs take the same steps.
+/// Candidates for the rows of the second run per compared row. Steps are halves and doubles of a run's output interval:
+/// if the intervals differ by a power of two, both runs take the same steps.
 const ROWS: [u64; 3] = [3, 2, 5];
 
-/// The estimate as a multiple of the difference of the two runs, and its least value as a share of the tolerance: if
-/// the tolerance limits the steps of neither run (corners of a friction curve, or of a line along the travel), both
-/// have about the same error.
+/// The estimate as a multiple of the difference of the two runs, and its least value relative to the tolerance: if the
+/// tolerance limits the steps of neither run (corners of a friction curve, or of a line along the travel), both have
+/// about the same error.
 const SAFETY: f64 = 10.0;
 const LEAST: f64 = 0.1;
 
-/// Relative change of the start in the second run: the last digits of a start can decide where a line feeds the motion.
+/// Relative change of the start in the second run, since its last digits can decide the motion if a force line feeds
+/// it.
 const OF_START: f64 = 4.0 * f64::EPSILON;
 
 /// Relative changes of speeds by which the second run shows the growth of rounding errors: 64 times their rounding.
@@ -79,13 +80,13 @@ pub struct ErrorEstimate {
 }
 
 impl ErrorEstimate {
-    /// For a run of this experiment on this stage.
+    /// For a run of this experiment on this machine.
     pub fn new(machine: &Machine, experiment: &Experiment) -> Self {
         let mechanism = machine.mechanism();
         Self::of_mechanism(&mechanism, &Course::of(&mechanism, experiment))
     }
 
-    /// For a run of a mechanism that is no stage of an axis: of every body but the rotors.
+    /// For a run of any mechanism: positions of all bodies except rotors.
     pub fn of_mechanism(mechanism: &Mechanism, course: &Course) -> Self {
         let way = |heading: &crate::mechanism::Heading| match heading.shown {
             Shown::Position(body, 1.0) if heading.lean && !mechanism.bodies[body].is_rotor => {
@@ -195,7 +196,7 @@ impl ErrorEstimate {
 }
 
 /// Rows of the second run per compared row, if the first run has `stride`: log₂ of the ratio of the two numbers is as
-/// far as possible from a whole number.
+/// far as possible from an integer.
 fn rows_between(stride: u64) -> u64 {
     let off = |rows: &u64| ((stride as f64 / *rows as f64).log2().rem_euclid(1.0) - 0.5).abs();
     ROWS.into_iter().min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(ROWS[0])
@@ -214,7 +215,7 @@ struct Way<'a> {
 }
 
 impl Way<'_> {
-    /// At the belt, m; not a number in a row that it does not have.
+    /// At the belt, m; NaN for a missing row.
     fn at(&self, row: usize) -> f64 {
         self.values.get(row).map_or(f64::NAN, |value| self.lever * value)
     }

@@ -4,7 +4,7 @@ use crate::mechanism::{Mechanism, Shown, State};
 use crate::plan::Experiment;
 use std::sync::Arc;
 
-/// A machine, and the state it begins in.
+/// A machine with its initial state.
 #[derive(Debug, Clone)]
 pub struct Begun {
     /// The machine.
@@ -13,19 +13,19 @@ pub struct Begun {
     pub start: State,
 }
 
-/// A variable that a run is differentiated by.
+/// A variable of differentiation.
 #[derive(Debug, Clone)]
 pub enum Variable {
-    /// A number of the machine, or of its start. Derivatives of the equations by it are differences of the equations:
-    /// w₀ · those of the run's own machine + w₁ · those of the first one here + w₂ · those of the second.
+    /// A number of the machine, or of its start. Derivatives of the equations are differences: w₀ · those of the run's
+    /// own machine + w₁ · those of the first one here + w₂ · those of the second.
     Machine {
         /// The machine and its start at two other values of it.
         points: Box<[Begun; 2]>,
         /// w₀, w₁, w₂
         weights: [f64; 3],
     },
-    /// Delay of all changes of all inputs, s per unit of the variable. The derivative at a row on such a change is that
-    /// towards later changes.
+    /// Delay of all changes of all inputs, s per unit of the variable. At a row on such a change, the derivative is
+    /// one-sided, towards later changes.
     Delay(f64),
     /// Offset of the input of a drive per unit of the variable, from the time, s, at which the input begins.
     Offset {
@@ -33,14 +33,13 @@ pub enum Variable {
         drive: usize,
         /// Change of the input per unit of the variable.
         unit: f64,
-        /// From then on, s.
+        /// Its start, s.
         from: f64,
     },
 }
 
 impl Variable {
-    /// A number of the machine by central differences of its equations, `machine` being given the distance from where
-    /// it is.
+    /// A number of the machine by central differences of its equations; `machine` gets the change of the number.
     pub fn central(h: f64, machine: impl Fn(f64) -> Begun) -> Self {
         Self::Machine { points: Box::new([machine(h), machine(-h)]), weights: [0.0, 0.5 / h, -0.5 / h] }
     }
@@ -55,7 +54,7 @@ pub enum Differentiated {
     Acceleration(usize),
 }
 
-/// Derivatives of columns: of each output by each variable, row by row.
+/// Derivatives of each output with respect to each variable, row by row.
 #[derive(Debug, Clone, Default)]
 pub struct Sensitivities {
     /// The outputs themselves.
@@ -66,7 +65,7 @@ pub struct Sensitivities {
     pub events: u64,
 }
 
-/// Quantities, and the variables that they are differentiated by.
+/// Quantities and variables of differentiation.
 #[derive(Clone, Copy)]
 pub(super) struct Task<'t> {
     pub(super) mechanism: &'t Arc<Mechanism>,

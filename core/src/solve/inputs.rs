@@ -1,10 +1,10 @@
-//! The inputs of all drives at once: stretches of time on which each is one polynomial.
+//! Inputs of all drives: intervals on which each is one polynomial.
 
 use super::roots::first_fall;
 use crate::mechanism::{DRIVES, Mechanism};
 use crate::signal::{DEGREE, Piece, Signal, shifted};
 
-/// One polynomial for each input, from `start` to `end`; what is not there is zero.
+/// One polynomial for each input, from `start` to `end`; missing inputs are zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Pieces {
     /// Begin of the pieces, s; powers count from here.
@@ -27,7 +27,7 @@ impl Pieces {
         pieces
     }
 
-    /// These values, held from `start` to `end`; those that would not end after they begin have no end.
+    /// These values, held from `start` to `end`; without an end unless `end` is after `start`.
     pub fn held(values: &[f64], start: f64, end: f64) -> Self {
         let end = if end > start { end } else { f64::INFINITY };
         let mut pieces = Self { start, end, coefficients: [[0.0; DEGREE + 1]; DRIVES] };
@@ -48,11 +48,11 @@ impl Pieces {
     }
 
     /// These pieces with one input rounded to a multiple of `step`, as by a driver of microsteps, up to the time at
-    /// which another multiple becomes the nearest, or to `until`.
+    /// which the nearest multiple changes, or to `until`.
     fn stepped(&self, input: usize, step: f64, until: f64) -> Self {
         let powers = &self.coefficients[input];
         let at = |tau: f64| powers.iter().rev().fold(0.0, |sum, c| sum * tau + c);
-        // On the very edge between two steps it is known by what comes next.
+        // On the edge between two steps, its direction of motion decides.
         let begin = AHEAD + 16.0 * f64::EPSILON * self.start;
         let whole = (at(begin) / step).round();
         let mut pieces = *self;
@@ -66,7 +66,7 @@ impl Pieces {
         pieces
     }
 
-    /// These pieces as the drives of a mechanism apply them: a stepper's goes to the nearest microstep.
+    /// These pieces as the drives of a mechanism apply them: rounded to microsteps for a stepper.
     pub fn applied(self, mechanism: &Mechanism, until: f64) -> Self {
         (0..mechanism.drives.len()).fold(self, |pieces, drive| match mechanism.microstep(drive) {
             Some(step) => pieces.stepped(drive, step, until),
@@ -79,7 +79,7 @@ impl Pieces {
         self.pieces().map(|piece| piece.degree()).max().unwrap_or(0)
     }
 
-    /// The inputs at `tau` after the start, no power of time being above `degree`.
+    /// The inputs at `tau` after the start, of at most this `degree`.
     #[inline]
     pub fn values(&self, tau: f64, degree: usize) -> [f64; DRIVES] {
         let mut values = [0.0; DRIVES];
@@ -95,11 +95,11 @@ impl Pieces {
     }
 }
 
-/// Time ahead at which a command is evaluated to find its microstep, s: much less than a microstep takes.
+/// Time ahead at which a command is evaluated to find its microstep, s; much less than the duration of a microstep.
 const AHEAD: f64 = 1e-9;
 
-/// The first time at which a polynomial is beyond `level`, above it or below it by `side`: where `within` begins, if it
-/// is so already there.
+/// First time in `within` at which a polynomial is beyond `level`, above or below it by `side`; its start if it is
+/// beyond there.
 fn first_beyond(powers: &[f64; DEGREE + 1], level: f64, side: f64, within: std::ops::Range<f64>) -> Option<f64> {
     let length = within.end - within.start;
     if length <= 0.0 {

@@ -2,12 +2,12 @@
 
 use std::any::Any;
 
-/// The modes that were made ready, by kernels: what runs of one machine can share.
+/// Prepared modes by kernel, shared by runs of one machine.
 #[derive(Default)]
 pub(super) struct Known(Vec<Box<dyn Any + Send>>);
 
 impl Known {
-    /// Forgets all of them: another machine.
+    /// Drops all of them, for another machine.
     pub(super) fn clear(&mut self) {
         self.0.clear();
     }

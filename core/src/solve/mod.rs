@@ -1,4 +1,4 @@
-//! Runs an experiment on a stage: the choice of solver, the events, how it ended and what it cost.
+//! Runs an experiment on a machine: choice of solver, events, ending and cost.
 
 mod check;
 mod choice;
@@ -54,7 +54,7 @@ pub enum Solver {
     /// Modes and matrix exponentials: exact to rounding.
     #[default]
     Exact,
-    /// Collocation with steps by their error between located events: any friction law, spans that follow the cart.
+    /// Collocation with error-controlled steps between located events: any friction law, spans that follow the cart.
     General {
         /// Approximate error of positions at the belt, m.
         tolerance: f64,
@@ -72,7 +72,7 @@ impl Solver {
     /// The general solver with the default tolerance, a nanometre; [`ErrorEstimate`] estimates the error of a run.
     pub const GENERAL: Self = Self::General { tolerance: 1e-9 };
 
-    /// The solver for this stage: the exact one where it can be.
+    /// The solver for this machine: the exact one if possible.
     pub fn of(machine: &Machine) -> Self {
         if machine.is_piecewise_linear() { Self::Exact } else { Self::GENERAL }
     }
@@ -96,7 +96,7 @@ pub enum Method {
 /// A change of mode: a body that starts to slide, stops or reverses, or another part that changes its state.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Event {
-    /// When, s.
+    /// Time, s.
     pub time: f64,
     /// The part.
     pub part: Part,
@@ -104,10 +104,10 @@ pub struct Event {
     pub from: Status,
     /// The state after.
     pub to: Status,
-    /// The force (N) or torque (N m) on a body at that moment, friction apart; 0 for other parts.
+    /// Force (N) or torque (N m) on a body at that instant without friction; 0 for other parts.
     pub load: f64,
-    /// True if rounding decided when it happened: a stop of a body whose speed tends to zero and in exact numbers never
-    /// gets there.
+    /// True if rounding decided its time: a stop of a body whose speed decays asymptotically and would never reach zero
+    /// exactly.
     pub by_rounding: bool,
 }
 
@@ -120,8 +120,8 @@ impl Event {
         }
     }
 
-    /// Adds it to `events`, unless nothing that shows has changed. A part other than a body that passes through a state
-    /// without staying there goes straight.
+    /// Adds it to `events`, unless the visible state is unchanged. A transient state of a part other than a body is
+    /// skipped.
     fn note(mut self, events: &mut Vec<Event>) {
         // A body that returns to its state at once has not changed; one that stops and starts at once has reversed.
         let at_once = |e: &Event| self.time - e.time <= 4.0 * f64::EPSILON * self.time;
@@ -150,17 +150,17 @@ impl Event {
 /// repeatedly. Parameters that differ in their last bit may lead to the other decision.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tie {
-    /// When, s.
+    /// Time, s.
     pub time: f64,
     /// The body.
     pub part: Part,
 }
 
 impl Tie {
-    /// Ties that are kept.
+    /// Maximum number of stored ties.
     const MOST: usize = 1000;
 
-    /// Adds it to `ties`, unless the same body lies there since an earlier one.
+    /// Adds it to `ties`, unless the same body is at rest since an earlier one.
     fn note(self, ties: &mut Vec<Tie>, events: &[Event]) {
         let is_new = match ties.iter().rfind(|tie| tie.part == self.part) {
             Some(tie) => events.iter().rev().any(|e| e.part == self.part && e.time > tie.time && e.time <= self.time),
@@ -207,7 +207,7 @@ pub enum Ending {
 }
 
 impl Ending {
-    /// The time reached, s, where it was not the end of the experiment.
+    /// The time reached, s; none at the end of the experiment.
     pub fn time(&self) -> Option<f64> {
         match *self {
             Ending::Complete => None,
@@ -240,7 +240,7 @@ impl fmt::Display for Ending {
 /// The error of [`Simulator::advance`] and [`Dynamics::settle`] if they cannot continue.
 impl std::error::Error for Ending {}
 
-/// The cost of a run, in pieces of work rather than seconds.
+/// Cost of a run in operations, not seconds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Cost {
     /// Number of rows.
@@ -261,7 +261,7 @@ pub struct Cost {
     pub evaluations: u64,
 }
 
-/// Everything about a run but its rows.
+/// Everything about a run except its rows.
 #[derive(Debug, Clone)]
 pub struct Outcome {
     /// Every stick, slip and reversal, in order.
@@ -272,12 +272,11 @@ pub struct Outcome {
     pub ending: Ending,
     /// Its cost.
     pub cost: Cost,
-    /// Bound of the position error: for the exact solver that of rounding, for given inputs; for the general solver
-    /// estimated by [`ErrorEstimate`]. `None` for Table 3, and for a run without rows of a machine in which errors can
-    /// grow.
+    /// Bound of the position error: by rounding for the exact solver with given inputs, by [`ErrorEstimate`] for the
+    /// general solver. `None` for Table 3, and for a run without rows of a machine in which errors can grow.
     pub error: Option<PositionError>,
-    /// Events of the general solver whose own condition (a speed of zero, a load at its breakaway, a limit at its
-    /// level) does not hold at their time: found too late to be located. A run that has any is not to be relied on.
+    /// Number of events of the general solver whose condition (a speed of zero, a load at its breakaway, a limit at its
+    /// level) does not hold at their time, since they were found too late. A run with any of these is unreliable.
     pub unmet: u64,
 }
 
@@ -291,7 +290,7 @@ pub struct PositionError {
 }
 
 impl PositionError {
-    /// Up to here a result is called exact, m.
+    /// Largest error of a result that is called exact, m.
     pub const EXACT: f64 = 1e-9;
 
     /// True if it is small enough for the result to be called exact.
@@ -299,18 +298,18 @@ impl PositionError {
         self.value <= Self::EXACT
     }
 
-    /// True if it is more than a thousandth of the motion, so that the result is not to be relied on.
+    /// True if it exceeds a thousandth of the motion, so that the result is unreliable.
     pub fn hides_motion(self) -> bool {
         !self.is_exact() && self.value > 1e-3 * self.way
     }
 
-    /// True if it is as large as the motion: nothing of it is determined by numbers of 64 bits.
+    /// True if it is as large as the motion, which 64-bit numbers then do not determine.
     pub fn is_undetermined(self) -> bool {
         self.hides_motion() && self.value >= self.way
     }
 }
 
-/// A whole run in memory.
+/// A complete run in memory.
 #[derive(Debug, Clone)]
 pub struct Solution {
     /// The columns of every quantity.
@@ -324,7 +323,7 @@ pub struct Solution {
 pub enum Flow {
     /// More.
     Continue,
-    /// No more.
+    /// Stop the run.
     Stop,
 }
 
@@ -334,14 +333,13 @@ pub enum Detail {
     /// All of them.
     #[default]
     Full,
-    /// Position, speeds, voltage, current, forces and states, without friction, encoder and what the stage adds.
+    /// Position, speeds, voltage, current, forces and states, without friction, encoder and columns of optional parts.
     Lean,
     /// No rows at all: for an observer.
     None,
 }
 
-/// Runs one experiment after another on one stage after another, and keeps what can be used again: bit for bit what
-/// [`stream`] gives, sooner.
+/// Runs experiments on one or several machines and reuses matrices: the same bits as [`stream`] in less time.
 #[derive(Default)]
 pub struct Bench {
     mounted: Option<(Machine, Arc<Mechanism>)>,
@@ -349,7 +347,7 @@ pub struct Bench {
 }
 
 impl Bench {
-    /// Takes up a stage, unless it is there already. Errors: what makes no sense as a machine.
+    /// Mounts a machine, unless it is mounted already. Errors: an invalid machine.
     pub fn mount(&mut self, machine: &Machine) -> Result<()> {
         if self.mounted.as_ref().is_some_and(|(mounted, _)| mounted == machine) {
             return Ok(());
@@ -361,7 +359,7 @@ impl Bench {
         Ok(())
     }
 
-    /// Runs an experiment on it by the solver for that stage.
+    /// Runs an experiment on it with the solver for that machine.
     pub fn run(
         &mut self,
         experiment: &Experiment,
@@ -391,7 +389,7 @@ fn nothing_mounted() -> Error {
     Error::new("there is no stage to run").next("take one up with Bench::mount")
 }
 
-/// Runs `experiment` on `stage` and keeps everything in memory.
+/// Runs `experiment` on `machine` and keeps everything in memory.
 ///
 /// ```
 /// use taut::case::{Case, TEMPLATE};
@@ -417,8 +415,7 @@ pub fn simulate(machine: &Machine, experiment: &Experiment, solver: Solver) -> R
     Ok(Solution { trajectory, outcome })
 }
 
-/// Runs `experiment` on `stage` and hands its rows to `sink` in blocks, so that memory stays bounded however long it
-/// is.
+/// Runs `experiment` on a machine and passes its rows to `sink` in blocks, so that memory stays bounded.
 ///
 /// ```
 /// use taut::case::{Case, TEMPLATE};
@@ -444,8 +441,8 @@ pub fn stream(
     run(machine, experiment, solver, Output { detail: Detail::Full, sink, observer: None })
 }
 
-/// Streams a run to a sink and to an observer of the motion between the rows: a [`crate::metrics::Meter`], or one's
-/// own.
+/// Streams a run to a sink and to an observer of the motion between the rows: a [`crate::metrics::Meter`], or a
+/// user-defined one.
 ///
 /// ```
 /// use taut::case::{Case, TEMPLATE};
@@ -479,8 +476,8 @@ fn run(machine: &Machine, experiment: &Experiment, solver: Solver, output: Outpu
     Ok(go(&mechanism, experiment, solver, known::Known::default(), output)?.0)
 }
 
-/// Runs a mechanism along its inputs, and hands rows to `sink` and all that is between them to `observer`: what
-/// [`stream_observed`] does, for a machine that is no axis.
+/// Runs a mechanism along its inputs, and passes rows to `sink` and the motion between them to `observer`:
+/// [`stream_observed`] for any mechanism.
 pub fn stream_mechanism(
     mechanism: &Mechanism,
     course: &Course,
@@ -501,7 +498,7 @@ fn go(
     known: known::Known,
     output: Output,
 ) -> Result<(Outcome, known::Known)> {
-    // Smooth inputs carry their derivatives along.
+    // Smooth inputs have their derivatives in the state.
     let degree = experiment.inputs.iter().map(|input| input.degree()).max().unwrap_or(0);
     let start = experiment.start(mechanism);
     let run = Run::of(mechanism, &start, (solver, degree), known, output)?;

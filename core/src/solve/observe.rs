@@ -11,25 +11,25 @@ pub const QUANTITIES: usize = 20;
 /// Number of readings that suffices for most machines; the remaining ones are zero and not computed.
 pub(super) const FEW: usize = 12;
 
-/// The readings of a run at one instant, in the order of [`Mechanism::readings`], which of an axis is that of
-/// [`reading`]. SI units.
+/// Readings of a run at one instant, in the order of [`Mechanism::readings`], for an axis that of [`reading`]. SI
+/// units.
 pub type Reading = [f64; QUANTITIES];
 
-/// Places in a [`Reading`] of an axis.
+/// Indices in a [`Reading`] of an axis.
 pub mod reading {
     /// ẋ, m/s.
     pub const CART_SPEED: usize = 0;
     /// r φ̇₁, m/s.
     pub const DRIVE_SPEED: usize = 1;
-    /// Stretch of span 1, m; those of spans 2 and 3 behind it.
+    /// Elongation of span 1, m; those of spans 2 and 3 follow.
     pub const STRETCH: usize = 2;
-    /// Force in span 1, N; those in spans 2 and 3 behind it.
+    /// Force in span 1, N; those in spans 2 and 3 follow.
     pub const FORCE: usize = 5;
     /// Motor current, A.
     pub const CURRENT: usize = 8;
     /// φ̇_r, rad/s: speed of the rotor behind the gear.
     pub const ROTOR_SPEED: usize = 9;
-    /// Voltage at the motor's terminals, V; of a stepper the commanded position, m.
+    /// Voltage at the motor's terminals, V; for a stepper, the commanded position, m.
     pub const VOLTAGE: usize = 10;
     /// x, m.
     pub const CART_POSITION: usize = 11;
@@ -50,9 +50,9 @@ pub(super) fn reading_of(few: bool, mut value: impl FnMut(usize) -> f64) -> Read
 /// A part of a run with one mode and no jump of the input, described by its ends.
 #[derive(Debug, Clone, Copy)]
 pub struct Gap<'a> {
-    /// Where it begins, s.
+    /// Its start, s.
     pub begin: f64,
-    /// How long it is, s; 0 for a single instant.
+    /// Its length, s; 0 for a single instant.
     pub length: f64,
     /// The reading at its beginning.
     pub from: &'a Reading,
@@ -62,7 +62,7 @@ pub struct Gap<'a> {
     pub bow: &'a Reading,
     /// The states of all parts.
     pub mode: &'a Mode,
-    /// True if all that is read is among the first [`FEW`] quantities.
+    /// True if all readings are among the first [`FEW`] quantities.
     pub(super) few: bool,
 }
 
@@ -81,8 +81,8 @@ impl Gap<'_> {
     }
 
     widest! {
-        /// True if the magnitude of any quantity exceeds the first of `factors` times its height at either end; true if
-        /// it can exceed the second times that within.
+        /// For any quantity: true if its magnitude at either end exceeds the first of `factors` times its height, and
+        /// true if it can exceed the second within.
         pub fn rises_above(&self, heights: &Reading, factors: [f64; 2]) -> (bool, bool)
             = rises_above_by_any, rises_above_by_avx2;
     }
@@ -145,7 +145,7 @@ impl Gaps {
         self.0 >> gap & 1 == 1
     }
 
-    /// The number behind the last of them.
+    /// One more than the largest number.
     pub fn end(self) -> usize {
         64 - self.0.leading_zeros() as usize
     }
@@ -154,7 +154,7 @@ impl Gaps {
 /// A part of a run with one mode and no jump of the input, described by readings at even intervals.
 #[derive(Debug, Clone, Copy)]
 pub struct Stretch<'a> {
-    /// Where it begins, s.
+    /// Its start, s.
     pub begin: f64,
     /// Interval between readings, s; 0 for a single instant.
     pub interval: f64,
@@ -181,18 +181,18 @@ impl<'a> Stretch<'a> {
         Self { begin, interval, readings, most, bow, mode, few }
     }
 
-    /// When it ends, s.
+    /// Its end, s.
     pub fn end(&self) -> f64 {
         self.time(self.readings.len() - 1)
     }
 
-    /// When a reading was taken, s.
+    /// Time of a reading, s.
     pub fn time(&self, reading: usize) -> f64 {
         self.begin + reading as f64 * self.interval
     }
 
-    /// The reading of a quantity with its largest magnitude, and when that was: of those that are as large to within
-    /// `share` the last, and of those that a limit holds the first.
+    /// The reading of a quantity with the largest magnitude, and its time: the last of those equal within `share`, the
+    /// first of those at a limit.
     pub fn largest(&self, q: usize, share: f64) -> (f64, f64) {
         let height = self.most[q];
         let (mut place, mut value) = (0, 0.0);
@@ -238,9 +238,9 @@ fn most_of<const Q: usize>(readings: &[Reading]) -> Reading {
 /// The gaps of a stretch that an observer examines more closely.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Closer {
-    /// Every gap, at once, if [`Observe::pass`] says so.
+    /// Every gap, at once, as [`Observe::pass`] decides.
     Now,
-    /// These gaps, later, if [`Observe::pass`] says so: it searches extremes, and greater ones may be known by then.
+    /// These gaps, later, as [`Observe::pass`] decides: in a search for extremes, greater ones may be known by then.
     Later(Gaps),
 }
 
@@ -254,16 +254,16 @@ fn rise(half: f64, bow: f64) -> f64 {
 /// Number of coefficients of a [`Curve`].
 pub const TERMS: usize = 8;
 
-/// A part of a run on which every quantity is a polynomial of time, as near as makes no difference.
+/// A part of a run on which every quantity is accurately a polynomial of time.
 #[derive(Debug, Clone, Copy)]
 pub struct Curve {
-    /// Where it begins, s.
+    /// Its start, s.
     pub begin: f64,
-    /// How long it is, s.
+    /// Its length, s.
     pub length: f64,
-    /// Coefficients of the powers of s, the share of the length: what is read is Σ terms_k sᵏ.
+    /// Coefficients of the powers of s, the fraction of the length: readings are Σ terms_k sᵏ.
     pub terms: [Reading; TERMS],
-    /// True if all that is read is among the first [`FEW`] quantities.
+    /// True if all readings are among the first [`FEW`] quantities.
     pub(super) few: bool,
 }
 
@@ -337,7 +337,7 @@ impl Curve {
         (low, high)
     }
 
-    /// The reading at the share `s` of the length.
+    /// The reading at the fraction `s` of the length.
     pub fn at(&self, s: f64) -> Reading {
         if self.few { self.at_of::<FEW>(s) } else { self.at_of::<QUANTITIES>(s) }
     }
@@ -361,7 +361,7 @@ pub struct Polynomial(pub [f64; TERMS]);
 /// C(7, k)
 const BINOMIAL: [f64; TERMS] = [1.0, 7.0, 21.0, 35.0, 35.0, 21.0, 7.0, 1.0];
 
-/// Number of places at which a polynomial is evaluated first; it does not oscillate faster than these resolve.
+/// Number of points at which a polynomial is evaluated first; they resolve its oscillation.
 const LOOKS: usize = 8;
 
 impl Polynomial {
@@ -415,7 +415,7 @@ impl Polynomial {
                 best = (place(k), value);
             }
         }
-        // A maximum lies between two places at which the slope has different signs.
+        // A maximum lies between two points with different signs of the slope.
         let slopes: [f64; LOOKS + 1] = std::array::from_fn(|k| self.slope(place(k)));
         let mut top = best;
         for k in (0..LOOKS).filter(|&k| slopes[k] > 0.0 && slopes[k + 1] < 0.0) {
@@ -465,7 +465,7 @@ impl Polynomial {
         Self(self.0.map(|c| -c))
     }
 
-    /// Places between `from` and `to` where its sign changes, in order.
+    /// Positions between `from` and `to` of its sign changes, in order.
     pub fn zeros(&self, from: f64, to: f64) -> Vec<f64> {
         let place = |k: usize| if k == LOOKS { to } else { from + (to - from) * k as f64 / LOOKS as f64 };
         let mut zeros = Vec::new();
@@ -490,7 +490,7 @@ impl Polynomial {
             } else {
                 high = s
             }
-            // Newton's step where it stays between, else the middle.
+            // Newton's step if it stays inside, otherwise bisection.
             let newton = s - value / self.slope(s);
             let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
             if (next - s).abs() <= 1e-15 || high - low <= 1e-15 {
@@ -540,7 +540,7 @@ pub(super) struct Readout {
     pub(super) forms: [Form; QUANTITIES],
     /// Readings of positions relative to the origin: the quantity, the body, its factor.
     ways: Vec<(usize, usize, f64)>,
-    /// Limits of voltages and currents: what they hold is not beyond them by one bit.
+    /// Limits of voltages and currents, which limited values do not exceed by a single bit.
     limits: Vec<(usize, f64)>,
     /// True if all readings are among the first [`FEW`] quantities.
     pub(super) few: bool,
@@ -561,7 +561,7 @@ impl Readout {
                         None => Form::ZERO,
                     }
                 }
-                // Between bodies that move as one nothing stretches.
+                // A spring between bodies that move as one has no elongation.
                 Shown::Stretch(spring) if mechanism.leading_arms(spring) == [0.0; BODIES] => Form::ZERO,
                 Shown::Stretch(spring) => Form::stretch(spring),
                 Shown::Force(spring, factor) => mechanism.spring_force(spring, mode) * factor,
@@ -650,8 +650,8 @@ mod tests {
         Polynomial(c)
     }
 
-    /// If the best of nine places was on a bend that opens upwards, Newton's method gave up there, and the peak was too
-    /// low by a relative 9e-8.
+    /// If the best of nine points was on a convex part, Newton's method gave up there, and the peak was too low by a
+    /// relative 9e-8.
     #[test]
     fn a_top_beside_an_upward_bend_was_missed() {
         let mut random = Pcg64::new(5, 1);
@@ -666,11 +666,11 @@ mod tests {
             let course = Polynomial(c);
             let (place, value) = course.greatest(0.0, 1.0);
             assert!((0.0..=1.0).contains(&place) && course.at(place) == value);
-            // A top is at a root of the slope, or at an end.
+            // A maximum is at a root of the slope, or at an end.
             let inside = roots.iter().copied().filter(|root| (0.0..=1.0).contains(root));
             let known = inside.chain([0.0, 1.0]).map(|s| course.at(s)).fold(f64::NEG_INFINITY, f64::max);
             let size = c.iter().map(|c| c.abs()).sum::<f64>();
-            // Two roots of the slope between neighbouring places may hide a top that is no higher than this.
+            // Two roots of the slope between adjacent points may hide a maximum of at most this height.
             let near = (0..roots.len()).any(|i| (0..i).any(|j| (roots[i] - roots[j]).abs() < 1.0 / LOOKS as f64));
             if !near {
                 assert!(

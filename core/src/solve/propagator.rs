@@ -1,8 +1,8 @@
 //! Matrix exponentials: propagators of linear systems.
 //!
-//! A vector holds `R` quantities that move and, behind them, constants, `C` in all. A matrix has `R` rows and `C`
-//! columns and is kept by columns, so that its product with a vector is a chain of scaled vector additions that the
-//! compiler turns into vector instructions. Products are never fused (no FMA): the same bits on every machine.
+//! A vector holds `R` states followed by constants, `C` elements in total. A matrix has `R` rows and `C` columns and is
+//! kept by columns, so that its product with a vector is a chain of scaled vector additions that the compiler turns
+//! into vector instructions. Products are never fused (no FMA): the same bits on every machine.
 //!
 //! The long loops are compiled twice, for any processor and for those with AVX2, and the right one is chosen at run
 //! time: wider vectors do the same operations in the same order.
@@ -28,7 +28,7 @@ const EXPONENTIAL_ORDER: usize = 12;
 /// Largest ‖A‖ d for which the state is expanded into a Taylor series over d.
 pub(crate) const SERIES_REACH: f64 = SERIES[SERIES.len() - 1].0;
 
-/// Orders of that series, and the largest ‖A‖ d of each: what is left out is less than 3e-17 of the leading term.
+/// Orders of that series, and the largest ‖A‖ d of each: the truncation error is below 3e-17 of the leading term.
 const SERIES: [(f64, usize); 4] = [(0.25, 12), (0.55, 15), (1.15, 19), (2.0, 23)];
 
 /// Most terms of it.
@@ -47,7 +47,7 @@ pub(crate) struct Series<const C: usize> {
 }
 
 impl<const C: usize> Series<C> {
-    /// Room for one.
+    /// An empty buffer.
     pub(crate) fn room() -> Self {
         Self { terms: [[0.0; C]; SERIES_TERMS], order: 0 }
     }
@@ -96,7 +96,7 @@ impl<const R: usize, const C: usize> Matrix<R, C> {
         self.column[column][row] = value;
     }
 
-    /// The Taylor series over `distance` of what moves by this rate.
+    /// Taylor series over `distance` of ż = A z.
     pub(crate) fn series(&self, z: &[f64; C], distance: f64, order: usize, series: &mut Series<C>) {
         series.order = order;
         #[cfg(target_arch = "x86_64")]
@@ -173,7 +173,7 @@ impl<const R: usize, const C: usize> Matrix<R, C> {
     }
 
     widest! {
-        /// z ← z + P z for each of `rows`, which take what z is then; `largest` takes the largest magnitudes.
+        /// z ← z + P z for each of `rows`, which receive z; `largest` receives the largest magnitudes.
         pub(crate) fn advance_rows(&self, z: &mut [f64; C], largest: &mut [f64; C], rows: &mut [[f64; C]])
             = advance_rows_by_any, advance_rows_by_avx2;
     }
@@ -223,7 +223,7 @@ impl<const R: usize, const C: usize> Matrix<R, C> {
     }
 
     widest! {
-        /// e^{A h} − I for ‖A‖ h ≤ [`EXPONENTIAL_REACH`], A being `self`.
+        /// e^{A h} − I for ‖A‖ h ≤ [`EXPONENTIAL_REACH`], with A = `self`.
         pub(crate) fn exponential(&self, h: f64) -> Self = exponential_by_any, exponential_by_avx2;
     }
 
@@ -240,7 +240,7 @@ impl<const R: usize, const C: usize> Matrix<R, C> {
         Self::gathered(powers, 1, Some(&second))
     }
 
-    /// X/k! + X²/(k + 1)! + X³/(k + 2)! + X³ · rest, of the powers X, X² and X³.
+    /// X/k! + X²/(k + 1)! + X³/(k + 2)! + X³ · rest, from the powers X, X² and X³.
     #[inline(always)]
     fn gathered([x, x2, x3]: [&Self; 3], k: usize, rest: Option<&Self>) -> Self {
         let mut out = match rest {

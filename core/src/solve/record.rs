@@ -16,7 +16,7 @@ use std::sync::Arc;
 /// Rows passed on at a time; small enough to stay in the processor's cache.
 const BLOCK: usize = 256;
 
-/// Room for a state with the inputs behind it, whatever the mechanism; a multiple of four.
+/// Size of a state followed by the inputs, for any mechanism; a multiple of four.
 pub(crate) const STATE: usize = (2 * BODIES + 2 * DRIVES).next_multiple_of(4);
 
 /// The values of a row that do not follow from its state by the linear equations.
@@ -33,15 +33,15 @@ pub(crate) struct Extra {
 /// Rows in one mode.
 #[derive(Clone)]
 struct Segment {
-    /// The first of them, in the block.
+    /// Index of the first row in the block.
     start: usize,
-    /// The number of its mode among the sheets.
+    /// Index of its sheet.
     sheet: usize,
-    /// The coordinates that angles follow from.
+    /// The coordinates from which angles follow.
     coordinates: Coordinates,
 }
 
-/// Collects rows of states and hands them on as blocks of columns.
+/// Collects rows of states and passes them on as blocks of columns.
 pub(crate) struct Recorder<'a> {
     mechanism: Arc<Mechanism>,
     layout: Layout,
@@ -56,7 +56,7 @@ pub(crate) struct Recorder<'a> {
     /// Index of the last row of the previous block.
     last: usize,
     segments: Vec<Segment>,
-    /// Which mode the last one is of.
+    /// Mode of the last segment.
     taken: Option<u64>,
     /// One for each row; empty if the linear equations determine everything.
     extra: Vec<Extra>,
@@ -127,7 +127,7 @@ impl<'a> Recorder<'a> {
         }
     }
 
-    /// Adds the next row: a state in the solver's coordinates, in the places of the layout, with the inputs.
+    /// Adds the next row: a state in the solver's coordinates by the indices of the layout, with the inputs.
     #[inline]
     pub(crate) fn push<const N: usize>(&mut self, row: &[f64; N]) {
         if self.detail == Detail::None {
@@ -138,7 +138,7 @@ impl<'a> Recorder<'a> {
         self.take(1);
     }
 
-    /// Room for rows up to the end of the block, at least one; [`Recorder::take`] takes those that were put there.
+    /// Buffer for rows up to the end of the block, at least one; [`Recorder::take`] accepts the rows written there.
     #[inline]
     pub(crate) fn room<const N: usize>(&mut self) -> &mut [[f64; N]] {
         if self.written != self.count {
@@ -157,7 +157,7 @@ impl<'a> Recorder<'a> {
         }
     }
 
-    /// Writes out rows that are like the one before.
+    /// Outputs repetitions of the last row.
     #[cold]
     fn write_out(&mut self) {
         self.columns.repeat(self.written, self.count);
@@ -188,7 +188,7 @@ impl<'a> Recorder<'a> {
         times - left
     }
 
-    /// Adds the next row: a whole state, of a recorder of rows of [`STATE`] numbers.
+    /// Adds the next row: a complete state, for a recorder of rows of [`STATE`] numbers.
     pub(crate) fn push_state(&mut self, inner: &State, input: &[f64; DRIVES], extra: Option<Extra>) {
         if self.detail != Detail::None {
             if self.written != self.count {
@@ -225,7 +225,7 @@ impl<'a> Recorder<'a> {
         }
     }
 
-    /// Hands on what is left.
+    /// Passes on the remaining rows.
     pub(crate) fn finish(&mut self) {
         if self.count > 0 {
             self.hand_on();

@@ -8,7 +8,7 @@
 use super::propagator::SERIES_TERMS;
 use crate::solve::widest::widest;
 
-/// Value and derivative of Σ c_k sᵏ = E(s²) + s O(s²): the chains of even and odd powers do not wait for each other.
+/// Value and derivative of Σ c_k sᵏ = E(s²) + s O(s²), with independent chains of even and odd powers.
 #[inline(always)]
 fn value_and_slope(c: &[f64], s: f64) -> (f64, f64) {
     let q = s * s;
@@ -125,7 +125,7 @@ static RATIOS_16: [[f64; 16]; 16] = ratios();
 static RATIOS_20: [[f64; 20]; 20] = ratios();
 static RATIOS_24: [[f64; SERIES_TERMS]; SERIES_TERMS] = ratios();
 
-/// C(i,k)/C(n,k), by k and i; zero for k above i. A polynomial of fewer coefficients is one of N, too.
+/// C(i,k)/C(n,k), by k and i; zero for k above i. A shorter polynomial is padded with zeros to N.
 const fn ratios<const N: usize>() -> [[f64; N]; N] {
     let (n, mut table, mut i) = (N - 1, [[0.0; N]; N], 0);
     while i < N {
@@ -164,7 +164,7 @@ fn bernstein<const N: usize>(c: &[f64], ratios: &[[f64; N]; N]) -> [f64; N] {
     b
 }
 
-/// Halvings after which a touch is as good as a point: 2⁻⁴⁰ of an interval that is itself a fraction of a swing.
+/// Length at which a contact counts as a point: 2⁻⁴⁰ of an interval that is itself a fraction of an oscillation.
 const NARROWEST: f64 = 1e-12;
 
 /// The first fall within [low, high], on which the Bernstein coefficients are `b`.
@@ -203,12 +203,12 @@ fn halves_by_any<const N: usize>(b: &[f64; N]) -> ([f64; N], [f64; N]) {
             right[j] = 0.5 * (right[j] + right[j + 1]);
         }
     }
-    // The left part runs from the middle outwards.
+    // The left part is in order from the middle outwards.
     (left, right)
 }
 
-/// Newton's method kept within a bracket whose upper end is negative; halving where it would leave it. It begins where
-/// a straight line between the ends' values falls.
+/// Newton's method within a bracket whose upper end is negative; bisection if it would leave the bracket. It begins at
+/// the zero of the straight line between the ends.
 fn polish(c: &[f64], (mut low, above): (f64, f64), (mut high, below): (f64, f64)) -> f64 {
     let line = low + (high - low) * (above / (above - below));
     let mut s = if line > low && line < high { line } else { 0.5 * (low + high) };
@@ -239,7 +239,8 @@ mod tests {
         assert!((root - 0.3).abs() < 1e-14, "{root}");
     }
 
-    /// Swings with a slow part, as guards are: the steps find what the hulls of Bernstein coefficients find.
+    /// Oscillations with a slow part, like guards: the steps find the same zeros as the hulls of Bernstein
+    /// coefficients.
     #[test]
     fn steps_find_the_same_falls_as_hulls() {
         let mut random = rand_pcg::Pcg64::new(7, 1);
@@ -326,7 +327,7 @@ mod tests {
                     falls += 1;
                 }
                 (None, None) => stays += 1,
-                // A dip between the places of the grid.
+                // A dip between the points of the grid.
                 (Some(root), None) => assert!(value_and_slope(&c, root).0.abs() < 1e-9, "{c:?}: {root}"),
                 (None, Some(below)) => panic!("{c:?}: it falls before {below}"),
             }

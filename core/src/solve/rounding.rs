@@ -1,22 +1,22 @@
-//! A bound of what rounding does to a run of the exact solver.
+//! Bound of the rounding error of a run of the exact solver.
 //!
 //! A step z ← z + P z is off by a few units in the last place of its parts, and P, made by doubling, by one such unit
-//! for each radian of the fastest swing that it spans. Within a mode errors do not grow in the norm of the energy:
-//! friction, resistance and damping only take out of it. So after N steps and Φ radians speeds are off by at most about
+//! for each radian of the fastest mode that it spans. Within a mode errors do not grow in the energy norm, since
+//! friction, resistance and damping only remove energy. So after N steps and Φ radians speeds are off by at most about
 //! c ε (N + Φ) of the largest, and positions, which are their integrals, by
 //!
 //! ```text
 //! c ε (N + Φ) (v_max T + |x − x₀|_max) + 2 ε |x|_max
 //! ```
 //!
-//! The effect of an error on a decision (whether a body sticks, which flank touches first) is not in it: where that is
-//! uncertain the model's own answer is as uncertain, for parameters that differ in their last bit.
+//! It does not include the effect of an error on a decision (whether a body sticks, which flank touches first): such a
+//! decision is equally uncertain for parameters that differ in their last bit.
 
 use super::PositionError;
 use super::saved::{Pass, Passed};
 use crate::mechanism::{Body, Layout, Mechanism};
 
-/// c: units in the last place of one step. The largest that independent solutions of random stages have shown is below
+/// c: units in the last place of one step. The largest value found by independent solutions of random machines is below
 /// one.
 const UNITS: f64 = 8.0;
 
@@ -38,7 +38,7 @@ impl Rounding {
     /// The bound for a machine.
     pub(super) fn new(layout: &Layout, mechanism: &Mechanism) -> Self {
         let place = |(body, part): (usize, &Body)| {
-            // A length of the belt is what it is.
+            // An elongation is a length at the belt already.
             let lever = if layout.is_replaced(body) { 1.0 } else { part.kind.lever() };
             [(layout.speed[body], part.kind.lever()), (layout.coordinate[body], lever)]
         };
@@ -46,7 +46,7 @@ impl Rounding {
         Self { places: bodies.map(place).collect(), ..Self::default() }
     }
 
-    /// Takes a state of the solver, or the largest magnitudes that each of its places has had.
+    /// Updates the largest values by a state of the solver, or by the largest magnitudes of its elements.
     pub(super) fn see(&mut self, z: &[f64]) {
         for &[(speed, lever), (way, length)] in &self.places {
             self.speed = self.speed.max(lever * z[speed].abs());
@@ -64,7 +64,7 @@ impl Rounding {
         [&mut self.phase, &mut self.since, &mut self.speed, &mut self.way].into_iter().try_for_each(|n| pass.number(n))
     }
 
-    /// The fastest swing has been this fast, rad/s, until `time`.
+    /// The fastest mode had this frequency, rad/s, until `time`.
     pub(super) fn swing(&mut self, swing: f64, time: f64) {
         self.phase += swing * (time - self.since);
         self.since = time;

@@ -1,8 +1,8 @@
-//! The rules of events: the succession of modes at one instant, for every solver.
+//! Rules of events for every solver: the succession of modes at one instant.
 //!
-//! The mechanism defines the consequence of a condition that falls ([`Transition`]). This module defines the order in
-//! which conditions are settled, the tolerance for rounding after a change, and the largest number of changes. A solver
-//! provides its conditions by [`Between`].
+//! The mechanism defines the [`Transition`] of each guard. This module defines the order in which conditions are
+//! settled, the tolerance for rounding after a change, and the largest number of changes. A solver provides its
+//! conditions by [`Between`].
 
 use super::pace::most_events;
 use super::saved::{Pass, Passed};
@@ -14,7 +14,7 @@ use std::sync::Arc;
 /// The rank of conditions on bodies.
 const BODIES: u8 = 3;
 
-/// The length of one instant, as a share of the time in which the fastest of the machine changes.
+/// Length of one instant relative to the fastest time constant of the machine.
 pub(super) const MOMENT: f64 = 1e-12;
 
 /// Mode changes allowed at one instant.
@@ -23,13 +23,13 @@ const CHANGES_AT_ONCE: usize = 100;
 /// Changes of a part at one instant after which they are attributed to rounding, and the part keeps its state.
 const TURNS_AT_ONCE: usize = 20;
 
-/// A value is zero but for rounding if it is within this multiple of its noise: when it is evaluated, when its
-/// condition has just begun to hold, and as the tolerance below zero of a part that rounding moves back and forth.
+/// A value is zero within rounding if it is within this multiple of its noise: when it is evaluated, when its condition
+/// has just begun to hold, and as the tolerance below zero of a part that rounding moves back and forth.
 pub(super) const NEAR: f64 = 2.0;
 pub(super) const BEGUN: f64 = 20.0;
 const BACK_AND_FORTH: f64 = 40.0;
 
-/// The present mode, how it came about, and what it forgives.
+/// The present mode, its recent changes, and its tolerances.
 #[derive(Debug, Clone)]
 pub(super) struct Rules {
     pub(super) mode: Mode,
@@ -40,11 +40,11 @@ pub(super) struct Rules {
     pub(super) is_fresh: bool,
     /// Tolerance, from rounding of the load, by which the load on a stuck body may exceed its breakaway; without it a
     /// body that comes to rest just at its limit would chatter on the last bit. Likewise for all other guards that are
-    /// zero but for rounding, and would be violated in either state. The last entry stays zero.
+    /// zero within rounding and would be violated in either state. The last entry stays zero.
     pub(super) tolerance: [f64; Cause::KINDS + 1],
-    /// True after a change of the input, when the rounding of loads on stuck bodies has to be evaluated anew.
+    /// True after a change of the input, when the rounding of loads on stuck bodies has to be evaluated again.
     pub(super) at_edge: bool,
-    /// Time since the last mode change, s, and how many there have been there.
+    /// Time of the last mode change, s, and the number of changes at that time.
     pub(super) since_change: f64,
     pub(super) changes: usize,
     pub(super) events: Vec<Event>,
@@ -54,14 +54,14 @@ pub(super) struct Rules {
     pub(super) trouble: Option<Ending>,
 }
 
-/// A value of a condition, and the rounding error of it.
+/// Value of a guard, and its rounding error.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Known {
     pub(super) value: f64,
     pub(super) noise: f64,
 }
 
-/// The load on a body at rest that would go forward, or backward, friction apart.
+/// The load without friction on a body at rest, for forward or backward motion.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Load {
     pub(super) value: f64,
@@ -72,7 +72,7 @@ pub(super) struct Load {
     pub(super) noise: f64,
 }
 
-/// The interface of the rules to a solver: answers for the present mode and state.
+/// The interface of the rules to a solver, for the present mode and state.
 pub(super) trait Between {
     fn rules(&self) -> &Rules;
     fn rules_mut(&mut self) -> &mut Rules;
@@ -82,7 +82,7 @@ pub(super) trait Between {
     fn instant(&self) -> f64;
     /// Number of conditions of the mode.
     fn conditions(&self) -> usize;
-    /// The consequence of the fall of the condition of this number.
+    /// The transition of this condition.
     fn transition(&self, index: usize) -> &Transition;
     /// Its value.
     fn known(&self, index: usize) -> Known;
@@ -91,17 +91,17 @@ pub(super) trait Between {
     /// Further tolerance for a condition that has just begun to hold: zero for a solver whose series show which
     /// conditions rise from zero.
     fn margin(&self, index: usize) -> f64;
-    /// Looks at all conditions; false if each of them holds for certain.
+    /// Evaluates all conditions; false if each of them certainly holds.
     fn look(&mut self) -> bool;
     /// True if a condition falls here, by the last evaluation.
     fn falls(&mut self, index: usize) -> bool;
-    /// The load on a body at rest that would go forward, or backward; gears carry as they do at rest.
+    /// The load on a body at rest for forward or backward motion, with the gear torques at rest.
     fn load(&self, body: usize, forward: bool) -> Load;
-    /// True if the speed of a body tends to zero for ever, and rounding decides when it gets there.
+    /// True if the speed of a body decays asymptotically, so that rounding decides when it reaches zero.
     fn dies_out(&mut self, body: usize) -> bool;
     /// Sets a quantity of the state.
     fn put(&mut self, place: Place, value: f64);
-    /// Takes up the equations of the present mode.
+    /// Switches to the equations of the present mode.
     fn take_up_mode(&mut self);
 }
 
@@ -152,20 +152,20 @@ impl Rules {
         (self.fresh[cause.kind()], self.is_fresh) = (order, true);
     }
 
-    /// Nothing is fresh any more.
+    /// Clears the information on fresh conditions.
     pub(super) fn refreshed(&mut self) {
         if self.is_fresh {
             (self.fresh, self.is_fresh) = ([0; Cause::KINDS], false);
         }
     }
 
-    /// Hands the events on.
+    /// Passes the events on.
     pub(super) fn hand_on(&mut self, events: &mut Vec<Event>) {
         self.handed_on += self.events.len();
         events.append(&mut self.events);
     }
 
-    /// Ends a run that has had more events than it may have up to `time`.
+    /// Ends a run with more events than allowed up to `time`.
     pub(super) fn check_events(&mut self, time: f64) {
         if (self.handed_on + self.events.len()) as f64 > most_events(time) {
             self.trouble = Some(Ending::TooManyEvents { time });
@@ -178,7 +178,7 @@ impl Rules {
     }
 }
 
-/// Changes modes, without time passing, until every condition holds.
+/// Changes modes at the present instant until every condition holds.
 pub(super) fn settle<B: Between>(solver: &mut B) {
     for _ in 0..CHANGES_AT_ONCE {
         let fallen = fallen(solver);
@@ -204,7 +204,7 @@ pub(super) fn settle<B: Between>(solver: &mut B) {
     solver.rules_mut().trouble = Some(Ending::TooManyEvents { time: solver.time() });
 }
 
-/// The condition that does not hold here; of several, that which is settled first.
+/// The condition that is violated here; of several, the one that is settled first.
 fn fallen<B: Between>(solver: &mut B) -> Option<Transition> {
     if !solver.look() {
         return None;
@@ -221,7 +221,7 @@ fn fallen<B: Between>(solver: &mut B) -> Option<Transition> {
     fallen
 }
 
-/// Enters the mode that follows the fall of a condition.
+/// Enters the mode after a condition has become negative.
 pub(super) fn change<B: Between>(solver: &mut B, fallen: Transition) {
     let (time, instant) = (solver.time(), solver.instant());
     let rules = solver.rules_mut();
@@ -261,7 +261,7 @@ fn move_on<B: Between>(solver: &mut B, fallen: &Transition, body: usize, to: Opt
     let order = match to {
         Motion::Stuck | Motion::Free => 0,
         _ if stops => 1,
-        // If breakaway equals Coulomb friction, the acceleration starts from zero but for rounding.
+        // If breakaway equals Coulomb friction, the acceleration starts from zero within rounding.
         _ if (load.value - load.sliding).abs() <= NEAR * load.noise => 2,
         _ => 1,
     };
@@ -291,12 +291,12 @@ fn decide<B: Between>(solver: &B, body: usize) -> Motion {
     if backward.value < -backward.breakaway - backward.noise { Motion::Backward } else { Motion::Stuck }
 }
 
-/// Lets a part other than a body do something else.
+/// Switches a part other than a body.
 fn switch<B: Between>(solver: &mut B, fallen: &Transition, next: Next) {
     let mechanism = Arc::clone(solver.mechanism());
     let time = solver.time();
     let After::PartHolds { gently } = fallen.after else { return };
-    // Let go by the motion and not by an edge of the input, a current leaves its limit with no rate of its own.
+    // A current released by the motion, not by a jump of the input, leaves its limit with zero rate.
     let begun = |index: &usize| {
         let Known { value, noise } = solver.known(*index);
         solver.transition(*index).cause == fallen.cause && value.abs() <= BEGUN * noise
@@ -317,7 +317,7 @@ fn switch<B: Between>(solver: &mut B, fallen: &Transition, next: Next) {
     }
 }
 
-/// Takes what has just become a condition on a part for zero where it is that but for rounding.
+/// Sets a new condition on a part to zero if it is zero within rounding.
 fn hold_part<B: Between>(solver: &mut B, cause: Cause) {
     for index in 0..solver.conditions() {
         let own = solver.transition(index).cause;
@@ -339,7 +339,7 @@ fn hold_part<B: Between>(solver: &mut B, cause: Cause) {
     }
 }
 
-/// A load that passes a breakaway by rounding alone does not break it.
+/// A load that exceeds a breakaway by rounding alone does not start motion.
 fn widen_all_breakaways<B: Between>(solver: &mut B) {
     for index in 0..solver.conditions() {
         if let cause @ (Cause::BreakForward(_) | Cause::BreakBackward(_)) = solver.transition(index).cause {
@@ -350,7 +350,7 @@ fn widen_all_breakaways<B: Between>(solver: &mut B) {
     }
 }
 
-/// A torque that starts from zero does so in either case of the gear.
+/// A torque that starts from zero does so for either sign of the gear torque.
 fn start_gears<B: Between>(solver: &mut B) {
     for index in 0..solver.conditions() {
         if let cause @ Cause::GearTorque(_) = solver.transition(index).cause {
@@ -362,7 +362,7 @@ fn start_gears<B: Between>(solver: &mut B) {
     }
 }
 
-/// Notes that rounding decides what a body does.
+/// Records that rounding decides the motion of a body.
 pub(super) fn note_tie<B: Between>(solver: &mut B, body: usize) {
     let tie = Tie { time: solver.time(), part: Part::of(solver.mechanism(), What::Body(body)) };
     let rules = solver.rules_mut();

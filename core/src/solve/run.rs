@@ -87,9 +87,9 @@ pub struct Run<'a> {
 }
 
 impl<'a> Run<'a> {
-    /// A run of `experiment` on `stage`; the experiment's own input counts for nothing, unless it is
-    /// [followed](Self::follow). Rows go to `sink` in blocks, all that is between them to `observer`. Not for the paper's
-    /// Table 3.
+    /// A run of `experiment` on a machine; the experiment's own input is ignored, unless it is
+    /// [followed](Self::follow). Rows go to `sink` in blocks, everything between rows to `observer`. Not for the
+    /// paper's Table 3.
     pub fn new(
         machine: &Machine,
         experiment: &Experiment,
@@ -145,7 +145,7 @@ impl<'a> Run<'a> {
         Ok(Self { running, time: 0.0, end })
     }
 
-    /// A run of a mechanism that is no stage of an axis. Errors: what the solver does not take.
+    /// A run of any mechanism. Errors: a mechanism that the solver does not support.
     pub fn of_mechanism(
         mechanism: &Mechanism,
         course: &Course,
@@ -160,14 +160,14 @@ impl<'a> Run<'a> {
         Self::of(&Arc::new(mechanism.clone()), &start, (solver, degree), Known::default(), output)
     }
 
-    /// Holds these inputs, one for each drive, from now until `until`, s, or to the end of the run; false if something
-    /// ended it before.
+    /// Holds these inputs, one for each drive, from now until `until`, s, or to the end of the run; false if the run
+    /// ended early.
     pub fn hold(&mut self, inputs: &[f64], until: f64) -> bool {
         self.running.set_input(&Pieces::held(inputs, self.time, until));
         self.advance(until)
     }
 
-    /// Advances to `until`, s, or to the end of the run; false if something ended it before.
+    /// Advances to `until`, s, or to the end of the run; false if the run ended early.
     fn advance(&mut self, until: f64) -> bool {
         let goes_on = self.time >= self.end || self.running.advance(until);
         if goes_on {

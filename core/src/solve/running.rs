@@ -19,10 +19,10 @@ pub(super) struct Start {
 
 /// A run of one of the solvers.
 pub(super) trait Running {
-    /// Takes up new inputs, now.
+    /// Sets new inputs now.
     fn set_input(&mut self, pieces: &Pieces);
 
-    /// The inputs as drives apply them: that of a stepper goes to the nearest microstep.
+    /// The inputs as drives apply them: rounded to microsteps for a stepper.
     fn told(&self, pieces: Pieces) -> Pieces {
         pieces
     }
@@ -44,7 +44,7 @@ pub(super) trait Running {
     /// Ends the run: at its end, with the last row, or before.
     fn finish(&mut self, is_at_end: bool) -> Outcome;
 
-    /// The modes that it has made ready.
+    /// The modes that it has prepared.
     fn known(&mut self) -> Known {
         Known::default()
     }

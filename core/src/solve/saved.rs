@@ -59,7 +59,7 @@ impl Pass<'_> {
         Some(())
     }
 
-    /// One of a closed set, by its place in it.
+    /// One of a closed set, by its index.
     fn choice<T: Copy + PartialEq, const N: usize>(&mut self, all: [T; N], value: &mut T) -> Passed {
         let mut bits = all.iter().position(|other| other == value)? as u64;
         self.bits(&mut bits)?;

@@ -1,8 +1,9 @@
-//! Sensitivities: how the columns of a run change with parameters of the machine, its start and its input.
+//! Sensitivities: derivatives of the columns of a run with respect to parameters of the machine, its start and its
+//! input.
 //!
-//! Within a mode ∂z/∂p obeys the linear equations of that mode, and where the mode changes it jumps, because the change
-//! comes sooner or later: see [`super::exact`]'s `sensitivity`. One run gives the derivatives by all variables, exact but
-//! for rounding, where differences take two runs for each and are as good as their step.
+//! Within a mode ∂z/∂p obeys the linear equations of that mode, and jumps at mode changes, because their times change:
+//! see [`super::exact`]'s `sensitivity`. One run gives the derivatives with respect to all variables, exact except for
+//! rounding; differences would take two runs for each variable, with errors by their step.
 
 use super::exact::{Following, in_kernel};
 use super::followed::Task;

@@ -11,7 +11,7 @@ use crate::mechanism::{DRIVES, Heading, Layout, Mechanism, Mode, State};
 use crate::signal::{DEGREE, Piece, shifted};
 use std::sync::Arc;
 
-/// Default interval for which steps are computed fastest, s, as are its halves, quarters and so on.
+/// Default interval, s, for which steps are computed fastest; likewise its halves, quarters and so on.
 const INTERVAL: f64 = 1e-3;
 
 /// A running machine that owns all its data, and can be stepped, inspected, copied and sent to another thread. A clone
@@ -67,14 +67,14 @@ impl Make for Exact<'_> {
 }
 
 impl Simulator {
-    /// An axis at rest at the origin, its inputs zero. Errors: what makes no sense as a machine, or what the solver
-    /// does not take.
+    /// An axis at rest at the origin with zero inputs. Errors: an invalid machine, or one that the solver does not
+    /// support.
     pub fn new(machine: &Machine, solver: Solver) -> Result<Self> {
         check::machine(machine)?;
         Self::of_mechanism(&machine.mechanism(), &State::default(), solver, INTERVAL)
     }
 
-    /// Any mechanism in `start` at time zero, its inputs zero. Steps of `interval`, s, and of its halves, quarters and
+    /// Any mechanism in `start` at time zero with zero inputs. Steps of `interval`, s, and of its halves, quarters and
     /// so on are computed fastest by the exact solver; others are as exact.
     pub fn of_mechanism(mechanism: &Mechanism, start: &State, solver: Solver, interval: f64) -> Result<Self> {
         if !(interval.is_finite() && interval > 0.0) {
@@ -112,8 +112,8 @@ impl Simulator {
         self.engine.time()
     }
 
-    /// The input of a drive from now on, until another is set: a polynomial that has begun, or begins now. Inputs of
-    /// several drives that are set at one time act at once.
+    /// Sets the input of a drive from now on: a polynomial that has begun, or begins now. Inputs of several drives that
+    /// are set at one time act simultaneously.
     pub fn set_input(&mut self, drive: usize, piece: &Piece) -> Result<()> {
         let drives = self.mechanism().drives.len();
         if drive >= drives {
@@ -152,7 +152,7 @@ impl Simulator {
         self.engine.go_to(until, events)
     }
 
-    /// The same of steppers: from edge to edge of their microsteps.
+    /// Advances steppers from edge to edge of their microsteps.
     fn advance_in_microsteps(&mut self, until: f64, events: &mut Vec<Event>) -> std::result::Result<(), Ending> {
         self.is_set = false;
         while self.time() < until {
@@ -178,7 +178,7 @@ impl Simulator {
         &*self.engine
     }
 
-    /// The polynomials of its inputs, powers counted from now.
+    /// Polynomials of its inputs in powers of the time from now.
     pub(super) fn input_coefficients(&self) -> [[f64; DEGREE + 1]; DRIVES] {
         self.inputs.since(self.time()).coefficients
     }
@@ -188,12 +188,12 @@ impl Simulator {
         self.engine.error()
     }
 
-    /// The columns that [`Simulator::outputs`] gives: those of a run.
+    /// Columns of [`Simulator::outputs`], as in a run.
     pub fn columns(&self) -> &[Heading] {
         &self.mechanism().columns
     }
 
-    /// The value of each of [`Simulator::columns`] now, in SI units; `into` has a place for each.
+    /// Present value of each of [`Simulator::columns`], in SI units; `into` has an element for each.
     pub fn outputs(&self, into: &mut [f64]) {
         shown(&*self.engine, into);
     }

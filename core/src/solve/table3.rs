@@ -1,7 +1,7 @@
 //! The paper's own solver: the friction function of its Table 3 with a fixed step.
 //!
-//! Kept to reproduce the paper and to show what it does: any speed inside a band of ±0.01 is frozen rather than brought
-//! to rest, so the stage creeps after it has stopped, by an amount that depends on the step.
+//! Kept to reproduce the paper and its effect: any speed inside a band of ±0.01 is frozen rather than brought to rest,
+//! so the stage creeps after a stop by an amount that depends on the step.
 
 use super::coordinates::Coordinates;
 use super::observe::{Gap, Output, QUANTITIES, Reading, Readout};
@@ -58,14 +58,14 @@ pub(crate) fn run(
         }
         let input = experiment.inputs[0].value(time);
         let motion = model.motion(&state, input);
-        // A row shows the state itself: angles of its own, held as they are.
+        // A row shows the state itself, with its own angles.
         recorder.segment(row, &coordinates.at(&state), &Mode::of(motion));
         recorder.push_state(&inner_of(&layout, mechanism, &state), &[input, 0.0, 0.0], None);
         if recorder.flow == Flow::Stop {
             ending = Ending::Interrupted { time };
             break;
         }
-        // Nothing is known but its steps, and an edge of the input counts from the next one on.
+        // Only its steps are known, and a jump of the input acts from the next one on.
         let mode = Mode::of(motion);
         let mut show = |begin: f64, length: f64, from: &Reading, to: &Reading| {
             if let Some(observer) = &mut recorder.observer {
@@ -111,7 +111,7 @@ pub(crate) fn run(
     Ok(Outcome { events: Vec::new(), ties: Vec::new(), ending, cost, error: None, unmet: 0 })
 }
 
-/// A state with lengths in the places of angles, as readings are made from.
+/// A state with elongations that replace angles, as readings require.
 fn inner_of(layout: &Layout, mechanism: &Mechanism, state: &State) -> State {
     let mut inner = *state;
     for replaced in &layout.replaced {
@@ -122,7 +122,7 @@ fn inner_of(layout: &Layout, mechanism: &Mechanism, state: &State) -> State {
     inner
 }
 
-/// All that a state is made of.
+/// All elements of a state.
 fn values(state: &State) -> impl Iterator<Item = f64> + '_ {
     state.position.iter().chain(&state.speed).chain(&state.current).copied()
 }
@@ -242,7 +242,7 @@ struct Step<'a> {
 }
 
 impl Step<'_> {
-    /// Rates at the share `c` of the step.
+    /// Rates at the fraction `c` of the step.
     fn rate(&self, c: f64, state: &State) -> State {
         self.model.rate(self.input.value(self.input.start + c * self.h), state)
     }

@@ -1,8 +1,8 @@
 //! Functions in two versions, for any processor and for one with AVX2: the same source, compiled twice.
 
-/// Makes a function that calls the second one named, or the third where the processor has AVX2; and that third, which
-/// is the second compiled for AVX2. The second has to be `#[inline(always)]`. Both versions compute the same bits,
-/// since wider vectors change the order of no sum.
+/// Defines a function that calls the second one named, or, if the processor has AVX2, the third, which is the second
+/// compiled for AVX2. The second has to be `#[inline(always)]`. Both versions compute the same bits, since wider
+/// vectors do not change the order of any sum.
 ///
 /// ```text
 /// widest! { fn sum(values: &[f64]) -> f64 = sum_by_any, sum_by_avx2; }

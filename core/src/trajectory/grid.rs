@@ -1,10 +1,9 @@
-//! The times at which rows are put out, as a person would write them.
+//! Output times, rounded to the numbers that a person would write.
 
-/// The times at which rows are put out: 0, `every`, 2 `every`, … and `until`, which a last, shorter interval may lead
-/// to.
+/// Output times: 0, `every`, 2 `every`, … and `until`, possibly after a shorter last interval.
 ///
 /// A time is the number nearest to k times the interval as it was written: with 1 ms row 3 is at 0.003, where 3 × 0.001
-/// in floating point is 0.003 only by luck, and with 1/3 s row 3 is at 1.
+/// in floating point need not be 0.003, and with 1/3 s row 3 is at 1.
 ///
 /// ```
 /// use taut::trajectory::Grid;
@@ -22,11 +21,11 @@ pub struct Grid {
     interval: Interval,
 }
 
-/// Share of an interval that `until` may be off a row without a row of its own.
+/// Largest distance of `until` from a row without a row of its own, relative to the interval.
 const NEAR: f64 = 1e-6;
 
 impl Grid {
-    /// Rows from zero to `until`, an interval `every` apart; both in s and above zero.
+    /// Rows from zero to `until` at the interval `every`; both in s and positive.
     pub fn new(every: f64, until: f64) -> Self {
         let interval = Interval::of(every);
         let ratio = until / every;
@@ -52,7 +51,7 @@ impl Grid {
             (first..).zip(out).for_each(|(k, time)| *time = self.time(k));
             return;
         }
-        // The numbers of rows are whole, and far below 2⁵³.
+        // Row numbers are integers far below 2⁵³.
         let first = first as f64;
         out.iter_mut().enumerate().for_each(|(j, time)| *time = (first + f64::from(j as u32)) * over / under);
     }
@@ -62,22 +61,22 @@ impl Grid {
         self.intervals
     }
 
-    /// Length of an interval, s; the last may be another.
+    /// Length of an interval, s; the last may differ.
     pub fn interval(&self) -> f64 {
         self.interval.length
     }
 
-    /// The row up to which all intervals are of one length: the last, or the one before it.
+    /// The row up to which all intervals have equal length: the last, or the one before it.
     pub fn even(&self) -> u64 {
         self.even
     }
 
-    /// Length of the last interval where it is not that of the others, else 0, s.
+    /// Length of the last interval if it differs, otherwise 0, s.
     pub fn rest(&self) -> f64 {
         if self.even < self.intervals { self.until - self.interval.times(self.even) } else { 0.0 }
     }
 
-    /// Time of the last row, s: where the run ends.
+    /// Time of the last row, the end of the run, s.
     pub fn end(&self) -> f64 {
         self.until
     }
@@ -99,16 +98,16 @@ pub struct Interval {
     /// The fraction p/q.
     over: f64,
     under: f64,
-    /// Up to which k the product k p is exact.
+    /// Largest k for which k p is exact.
     exact: u64,
     /// p/q − length.
     rest: f64,
 }
 
-/// 2⁵³: whole numbers up to there are exact.
+/// 2⁵³: integers up to it are exact.
 const WHOLE: f64 = 9_007_199_254_740_992.0;
 
-/// Largest number above and below the line of a fraction that somebody might have meant.
+/// Largest numerator and denominator of a fraction that may have been meant.
 const LARGEST: f64 = 1e6;
 
 impl Interval {
@@ -125,7 +124,7 @@ impl Interval {
         if k <= self.exact {
             return k as f64 * self.over / self.under;
         }
-        // k·length, the error of that product, and what the length itself is off by.
+        // k·length, the error of that product, and the error of the length.
         let (k, h) = (k as f64, self.length);
         let product = k * h;
         product + (k.mul_add(h, -product) + k * self.rest)
@@ -176,7 +175,7 @@ mod tests {
             let p: u64 = whole.trim_start_matches('0').parse().unwrap();
             let grid = Grid::new(every, 5000.0 * every);
             for k in 0..5000 {
-                // k p as a decimal number of so many digits, read as any program reads it.
+                // k p as a decimal number with this number of digits, parsed as by any program.
                 let number = k * p;
                 let scale = 10_u64.pow(digits as u32);
                 let written: f64 = format!("{}.{:0digits$}", number / scale, number % scale).parse().unwrap();
@@ -198,7 +197,7 @@ mod tests {
         assert_eq!(times(2.0 / 3.0, 2.0), [0.0, 2.0 / 3.0, 4.0 / 3.0, 2.0]);
     }
 
-    /// A run of 1 s with rows every 0.3 s ended at 0.9 s without a word.
+    /// A run of 1 s with rows every 0.3 s ended silently at 0.9 s.
     #[test]
     fn the_last_row_is_at_the_end() {
         assert_eq!(times(0.3, 1.0), [0.0, 0.3, 0.6, 0.9, 1.0]);

@@ -1,4 +1,4 @@
-//! Named, unit-bearing columns over time: what a simulation computes and what a log records.
+//! Named columns with units over time, of simulations and logs.
 
 mod grid;
 
@@ -34,8 +34,7 @@ impl Column {
 
 /// Columns of equal length; the first is `time` in seconds.
 ///
-/// A trajectory is also the unit in which long results are handed on: a block of rows is a trajectory,
-/// and the whole is its blocks one after another.
+/// Long results are passed on in blocks of rows, each of which is a trajectory.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Trajectory {
     /// The columns, time first.
@@ -43,7 +42,7 @@ pub struct Trajectory {
 }
 
 impl Trajectory {
-    /// No rows yet, the headings of `columns`, and room for so many rows.
+    /// No rows, the headings of `columns`, and capacity for this number of rows.
     pub fn with_capacity(columns: &[Column], rows: usize) -> Self {
         let room = |column: &Column| Column {
             name: column.name.clone(),
@@ -68,7 +67,7 @@ impl Trajectory {
         self.columns.iter().find(|c| c.name == name).map(|c| c.values.as_slice())
     }
 
-    /// Appends the rows of `block`, which has the same columns. An empty trajectory takes the columns over.
+    /// Appends the rows of `block`, which has the same columns. An empty trajectory adopts the columns.
     pub fn append(&mut self, block: &Trajectory) {
         if self.columns.is_empty() {
             self.columns.clone_from(&block.columns);

@@ -116,7 +116,8 @@ impl<'t> Plant<'t> {
         of(None) + self.tables.elements.iter().enumerate().map(element).sum::<usize>()
     }
 
-    /// Products and quotients, and sums and differences, of one step at most, from the bounds of the loops in `plant.c`.
+    /// Products and quotients, and sums and differences, of one step at most, from the bounds of the loops in
+    /// `plant.c`.
     fn work(&self) -> Work {
         let (n, z, o, g) = (self.tables.rates.len(), self.tables.size(), self.order, self.active());
         let gears = self.tables.resting_torque.iter().flatten().count();

@@ -147,8 +147,8 @@ impl Model {
         self.mechanism(&self.defaults()).is_ok_and(|mechanism| mechanism.is_piecewise_linear())
     }
 
-    /// The place of the force on a load among the inputs of the mechanism, behind those of the drives. None for a gantry,
-    /// where that force is a number of a body.
+    /// Index of the load force among the inputs of the mechanism, after those of the drives. None for a gantry, whose
+    /// load force belongs to a body.
     pub fn force_input(&self, load: usize) -> Option<usize> {
         (self.drives() == 1).then_some(self.drives() + load)
     }

@@ -45,7 +45,7 @@ impl Draw {
                 format!(", smooth = {{ breakaway_velocity = {velocity:e} }}")
             }
             Some(Feature::LuGre) => {
-                // Bristles that bend in about a thousandth to a tenth of the way, and settle no faster than the machine.
+                // Bristles that bend within about 0.001 to 0.1 of the travel and settle no faster than the machine.
                 let bend = sizes.way * self.random.decades(1e-3, 0.1) / arm;
                 let stiffness = (coulomb / bend).min(30.0 * self.fastest * coulomb * arm / speed);
                 let stiffness = self.digits(stiffness.min(10.0 * self.fastest * self.fastest * mass * arm * arm));

@@ -46,13 +46,14 @@ impl Fit {
         };
         let mut fitted = read(&changes, false);
         let damping = fitted.as_ref().ok().and_then(|fitted| damping_share(case, &fitted.machine, machine));
-        // A damping ratio is that of all digits of mass and stiffness.
+        // A damping ratio refers to mass and stiffness with all digits.
         let is_rounded = damping.is_none();
         if let Some(change) = damping {
             changes.push(change);
             fitted = read(&changes, false);
         }
-        // The other direction, or the breakaway, went with what was fitted: where the text has it, or else anyway.
+        // The other direction, or the breakaway, followed a fitted number: change it where the text has it, or else
+        // anyway.
         for is_anywhere in [false, true] {
             if !is_another(&fitted) {
                 break;
@@ -67,7 +68,7 @@ impl Fit {
             }
             fitted = read(&changes, false);
         }
-        // The stated errors are wrong for a file with another machine than the fit's.
+        // The stated errors are wrong for a file whose machine is not that of the fit.
         if let Some((key, is, read)) = differs(machine, &fitted?.machine, DIGITS_READ) {
             return Err(Error::new(format!("the fit cannot be written: `{key}` would be read as {read}, and is {is}"))
                 .in_file(name)
@@ -123,8 +124,8 @@ impl Fit {
     }
 }
 
-/// The damping ratio or loss factor that gives the belt of `stage` its damping: it belongs to the slowest swing, which a
-/// fitted mass or stiffness changes. None where the text gives neither, or `read` has that damping.
+/// Damping ratio or loss factor that gives the belt of `machine` its damping; it refers to the slowest mode, which a
+/// fitted mass or stiffness changes. None if the text has neither, or if `read` has that damping.
 ///
 /// c = 2 ζ k / ω₀
 fn damping_share(case: &Case, read: &Machine, machine: &Machine) -> Option<Change> {
@@ -142,10 +143,10 @@ fn damping_share(case: &Case, read: &Machine, machine: &Machine) -> Option<Chang
 /// A change of the text of a case.
 struct Change {
     key: String,
-    /// Each value with the unit that the text has for it.
+    /// Each value with its unit in the text.
     values: Vec<(Option<String>, f64)>,
     is_list: bool,
-    /// The share of itself to which a value is known.
+    /// Relative accuracy of a value.
     share: f64,
 }
 
@@ -154,7 +155,7 @@ impl Change {
         Self { values: vec![(unit_at(document, &key), value)], key, is_list: false, share }
     }
 
-    /// As `--set` reads it.
+    /// In the notation of `--set`.
     fn text(&self, is_rounded: bool) -> String {
         let share = if is_rounded { self.share } else { 0.0 };
         let values: Vec<String> =
@@ -164,7 +165,7 @@ impl Change {
     }
 }
 
-/// Digits of the estimates that are known: a relative step for each, zero where all digits are written.
+/// Known digits of the estimates: a relative step for each, zero for all digits.
 struct Digits(Vec<f64>);
 
 impl Digits {
@@ -208,7 +209,7 @@ fn rounded_to(value: f64, step: f64) -> f64 {
     text.parse().unwrap_or(value)
 }
 
-/// The unit of the quantity at a key, where the text gives one.
+/// Unit of the quantity at a key, if the text has one.
 fn unit_at(document: &toml_edit::DocumentMut, key: &str) -> Option<String> {
     let mut item = document.as_item();
     for step in key.split('.') {
@@ -221,7 +222,7 @@ fn unit_at(document: &toml_edit::DocumentMut, key: &str) -> Option<String> {
     (!unit.is_empty()).then_some(unit)
 }
 
-/// A value as it stands in a file: in this unit, rounded to a share of itself.
+/// A value in the notation of a file: in this unit, rounded to a relative accuracy.
 fn literal(unit: Option<&str>, value: f64, share: f64) -> String {
     let one = unit.and_then(|unit| Some((unit, quantity::parse(&format!("1 {unit}")).ok()?.value)));
     match one.filter(|(_, factor)| *factor > 0.0) {
@@ -233,7 +234,7 @@ fn literal(unit: Option<&str>, value: f64, share: f64) -> String {
     }
 }
 
-/// The changes of the text with which `key` is a value that is known to a share of itself.
+/// Changes of the text that give `key` a value of a relative accuracy.
 fn changes_of(
     machine: &Machine,
     case: &Case,
@@ -249,7 +250,7 @@ fn changes_of(
     let is_element = row.key != key;
     let (listed, given) = (own.len() > 1 || is_element, matches!(case.value(row.key), Ok(Given::List(_))));
     match key.starts_with("belt.") {
-        // All spans at once, or one of a list that is not there.
+        // All spans at once, or an element of a missing list.
         true if listed && !(is_element && given) => {
             let unit = |k: usize| unit_at(document, &format!("{}.{k}", row.key)).or_else(|| unit_at(document, row.key));
             let values = own.iter().enumerate().map(|(k, (_, value))| (unit(k), *value)).collect();
@@ -262,7 +263,7 @@ fn changes_of(
     }
 }
 
-/// The text without what says the same as these keys in another form: teeth and pitch beside a radius that was fitted.
+/// The text without other forms of these keys, such as teeth and pitch for a fitted radius.
 fn without_other_forms<'a>(text: &str, keys: impl Iterator<Item = &'a str>) -> String {
     let Ok(mut document) = text.parse::<toml_edit::DocumentMut>() else { return text.to_string() };
     let fitted: Vec<&str> = keys.filter_map(|key| Some(named(key)?.key)).collect();
@@ -286,8 +287,8 @@ fn without_other_forms<'a>(text: &str, keys: impl Iterator<Item = &'a str>) -> S
     if changed { document.to_string() } else { text.to_string() }
 }
 
-/// A number that two machines do not share but for rounding in text, relative, and what it is in each; NaN where it is
-/// not there.
+/// A number that differs between two machines by more than a relative rounding of text, and its value in each; NaN if
+/// missing.
 fn differs(a: &Machine, b: &Machine, rounding: f64) -> Option<(String, f64, f64)> {
     let near = |a: f64, b: f64| a == b || (a - b).abs() <= rounding * a.abs().max(b.abs());
     let (a, b) = (values(a), values(b));

@@ -1,4 +1,4 @@
-//! Before a fit: what the logs show, what they determine, and what one more experiment would.
+//! Check before a fit: contents of the logs, identifiable parameters, and proposals of experiments.
 
 use crate::case::{Case, Plan};
 use crate::error::Result;
@@ -23,29 +23,29 @@ pub struct Check {
     pub identifiability: Option<Identifiability>,
     /// Advice for each group that is not determined.
     pub choices: Vec<Vec<String>>,
-    /// Which errors that is for.
+    /// Noise for which this holds.
     pub noise_words: String,
     /// Proposals of one more experiment, the best first.
     pub experiments: Vec<Proposal>,
-    /// The fit that says so.
+    /// The fit on which this is based.
     pub fit: Fit,
 }
 
 impl Check {
-    /// True if the logs determine a parameter or a combination of some, or nothing is searched for.
+    /// True if the logs determine a parameter or a combination, or if nothing is free.
     pub fn tells(&self) -> bool {
         let is_known = |estimate: &Estimate| !estimate.at_bound && estimate.is_determined();
         let estimates = &self.fit.estimates;
         estimates.is_empty() || estimates.iter().any(is_known) || self.fit.combinations().next().is_some()
     }
 
-    /// Groups of parameters that are not determined, and what to do about each.
+    /// Groups of undetermined parameters, with advice for each.
     pub fn groups(&self) -> impl Iterator<Item = (&Group, &Vec<String>)> {
         self.identifiability.iter().flat_map(|known| &known.groups).zip(&self.choices)
     }
 }
 
-/// Looks at the logs of a case: by a fit, whose verdict it gives.
+/// Checks the logs of a case by a fit.
 pub fn check(case: &Case, plan: &Plan) -> Result<Check> {
     check_watched(case, plan, None, &mut |_, _| Flow::Continue)
 }

@@ -26,7 +26,7 @@ pub fn head(found: &ForceMap) -> String {
     format!("a force along the travel from {} to {}", shown(low, "N"), shown(high, "N"))
 }
 
-/// What belongs to the map, with names.
+/// Properties of the map, by name.
 pub fn lines(found: &ForceMap) -> Vec<(String, String)> {
     let [forward, backward] = found.passes;
     let (first, last) = (found.points.first(), found.points.last());
@@ -70,7 +70,7 @@ fn component(one: &Component) -> String {
     )
 }
 
-/// What a reader has to know beside it.
+/// Remarks on the map.
 pub fn notes(found: &ForceMap) -> Vec<String> {
     let mut notes = Vec::new();
     if found.may_be_eccentric() {

@@ -191,8 +191,8 @@ pub fn figures(machine: &Machine, done: &Done) -> Vec<Named> {
     vec![("motion", motion), ("speed", speed), ("effort", effort)]
 }
 
-/// The path of the cart in the plane, its distance from the path that was asked for magnified; none of an axis, or where
-/// curves were not kept.
+/// Path of the cart in the plane, with its distance from the requested path magnified; none for an axis, or without
+/// curves.
 pub fn path(done: &Done) -> Option<Plane> {
     let [asked, gone] = done.curves.as_ref()?.paths.as_ref()?;
     let (asked, gone) = (asked.points(), gone.points());

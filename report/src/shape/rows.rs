@@ -32,8 +32,8 @@ pub fn pair_words(pair: &Pair) -> [String; 3] {
     ]
 }
 
-/// A mode along the travel: frequencies in Hz, damping ratios, motion of the cart of that of the strongest, and in % what
-/// the recommended shaper and the best pair leave of it at worst.
+/// A mode along the travel: frequencies in Hz, damping ratios, motion of the cart of that of the strongest, and in %
+/// what the recommended shaper and the best pair leave of it at worst.
 pub fn mode_words(left: &Left, recommended: usize) -> [String; 5] {
     let span = |[low, high]: [f64; 2], digits: usize| match format!("{low:.digits$}") {
         low if low == format!("{high:.digits$}") => low,

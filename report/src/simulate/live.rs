@@ -10,8 +10,8 @@ use taut::machine::{Kind, Machine, Travel};
 /// Rows of a curve that a page holds for its machine. A screen shows fewer pictures in 8 s, the time of a first look.
 const ROWS: usize = 2000;
 
-/// What `live.js` reads: the scene, the end of the run in s, and the curves that `stage.js` asks for, at most [`ROWS`] of
-/// each. None if the run has no rows.
+/// Data for `live.js`: the scene, the end of the run in s, and the curves that `stage.js` needs, each with at most
+/// [`ROWS`] rows. None if the run has no rows.
 pub(super) fn live(case: &Case, curves: &Curves) -> Option<String> {
     let (times, _) = curves.get(if case.is_axis() { "cart" } else { "cart_position" })?;
     let mut arrays = Arrays::default();
@@ -34,7 +34,7 @@ fn chosen((x, y): (Vec<f64>, Vec<f64>)) -> (Vec<f64>, Vec<f64>) {
     (kept(x), kept(y))
 }
 
-/// What the drawing asks for, from which curve of a report it is, and times what.
+/// Quantities of the drawing, each with the curve of the report that gives it and a factor.
 fn moved(machine: &Machine) -> Vec<(String, String, f64)> {
     let own = |key: String| (key.clone(), key, 1.0);
     if machine.kind != Kind::Axis {

@@ -58,8 +58,7 @@ pub fn hertz(omega: f64) -> String {
     if omega.is_finite() { format!("{:.2} Hz", omega / (2.0 * PI)) } else { "none".into() }
 }
 
-/// Where the loop is broken for a margin, and of which drive; nothing where it is the same loop everywhere, and where it
-/// is not stable.
+/// Point and drive at which the loop is broken for a margin; empty if the loop is the same everywhere or unstable.
 fn broken(margins: &Margins, at: Break, drive: Option<usize>) -> String {
     let at = (!margins.has_one_loop).then(|| told(at));
     let parts = [at, drive.and_then(|drive| margins.drive_name(drive))];

@@ -80,8 +80,7 @@ fn case_of(language: &str, lines: &[&str]) -> Option<(String, String)> {
     }
 }
 
-/// What stands behind the page's address, as `studio/page/link.js` writes it: JSON in the format of zlib, in the letters
-/// of base64 for addresses.
+/// Fragment of the page's address as `studio/page/link.js` writes it: JSON, compressed by zlib, in URL-safe base64.
 fn fragment(name: &str, case: &str) -> Result<String, String> {
     let name = if name.ends_with(".toml") { name } else { "example.toml" };
     let state = json!({ "text": case, "name": name, "view": "motion" }).to_string();

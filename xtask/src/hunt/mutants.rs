@@ -1,8 +1,9 @@
 //! The tests themselves: 100 small changes of the source, drawn by seed, each of which a test should notice.
 //!
-//! All of them are built into one copy of the repository, each behind a switch that a variable of the environment turns,
-//! so the tests are built once. Each test then runs by itself and lists the changes that it reaches. A change is tried
-//! with the tests that reach it, the quickest first, until one fails. A change that does not compile is drawn again.
+//! All of them are built into one copy of the repository, each behind a switch that a variable of the environment
+//! turns, so the tests are built once. Each test then runs by itself and lists the changes that it reaches. A change is
+//! tried with the tests that reach it, the quickest first, until one fails. A change that does not compile is drawn
+//! again.
 
 mod change;
 mod copy;

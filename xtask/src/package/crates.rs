@@ -68,8 +68,8 @@ pub fn make(places: &Places, claims: &mut Claims) -> Result<Program, String> {
     Ok(program)
 }
 
-/// Names and hashes of the files of an unpacked crate, a line each, without what depends on the name of the commit alone:
-/// that name, and the hashes of our own packages in `Cargo.lock`.
+/// Names and hashes of the files of an unpacked crate, a line each, without what depends on the name of the commit
+/// alone: that name, and the hashes of our own packages in `Cargo.lock`.
 fn content_of(folder: &Path) -> Result<String, String> {
     let mut lines = String::new();
     for path in crate::book::files(folder)? {

@@ -2,12 +2,12 @@
 //!
 //! - The crates as they would be published. They are installed from a registry that has nothing but them and the
 //!   packages that they need, into an empty folder, by a cargo without a configuration.
-//! - The program for a glibc of 2.17 and later, with completions, manual pages, the licences of all packages in it and a
-//!   bill of materials (CycloneDX), in one archive.
+//! - The program for a glibc of 2.17 and later, with completions, manual pages, the licences of all packages in it and
+//!   a bill of materials (CycloneDX), in one archive.
 //! - The Python wheel, for the same C library, installed into empty environments.
 //!
 //! The two programs and the wheel must give equal results. A run that failed can be repeated: what was built from the
-//! same source is kept in `target/package-work`. The run ends with all that it has shown, each with its figure, and with
+//! same source is kept in `target/package-work`. The run ends with a list of its results, each with its figure, and of
 //! the targets that it did not build.
 
 mod crates;
@@ -59,15 +59,15 @@ enum Part {
 
 /// Folders of the work.
 struct Places {
-    /// What is handed out.
+    /// Output folder of the release.
     out: PathBuf,
-    /// What it is built and tried in.
+    /// Folder for builds and trials.
     work: PathBuf,
     /// Tools of Python.
     tools: PathBuf,
 }
 
-/// What a run has shown: claims with their figures, in order.
+/// Claims shown by a run with their figures, in order.
 #[derive(Default)]
 struct Claims(Vec<(String, String)>);
 
@@ -187,7 +187,7 @@ fn must(command: Command) -> Result<(), String> {
     }
 }
 
-/// What cargo says of the members of the workspace.
+/// Members of the workspace according to `cargo metadata`.
 fn members() -> Result<Vec<Value>, String> {
     let listed = output(crate::cargo(&["metadata", "--no-deps", "--format-version", "1"]))?;
     let mut listed: Value = serde_json::from_slice(&listed).map_err(|e| format!("cargo metadata: {e}"))?;

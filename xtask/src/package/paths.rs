@@ -27,7 +27,7 @@ fn held(bytes: &[u8], paths: &[PathBuf]) -> Vec<String> {
     paths.iter().map(|path| path.display().to_string()).filter(is_in).collect()
 }
 
-/// Folders of this machine that may be in a program, and what stands for them; of several that fit, the last one counts.
+/// Folders of this machine that may be in a program, and their replacements; the last one that matches counts.
 fn folders(source: &Path) -> Result<Vec<(PathBuf, &'static str)>, String> {
     let home = std::env::var_os(if cfg!(windows) { "USERPROFILE" } else { "HOME" }).map(PathBuf::from);
     let home = home.ok_or("the home folder is not known; set HOME")?;

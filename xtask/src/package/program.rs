@@ -236,7 +236,7 @@ fn materials(places: &Places, triple: &str) -> Result<Vec<u8>, String> {
     found.ok_or_else(|| "cargo-cyclonedx wrote no bill of materials".into())
 }
 
-/// What a bill of materials lists, in words. Errors: it is none, or lacks a package of `licences`.
+/// Summary of a bill of materials. Errors: it is invalid, or lacks a package of `licences`.
 fn listed(materials: &[u8], licences: &Licences) -> Result<String, String> {
     let bill: Value = serde_json::from_slice(materials).map_err(|e| format!("the bill of materials: {e}"))?;
     let components = bill["components"].as_array().map(Vec::as_slice).unwrap_or_default();

@@ -8,7 +8,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// What `taut simulate --json` printed in the folder of a trial.
+/// Output of `taut simulate --json` in the folder of a trial.
 const RESULTS: &str = "simulate.json";
 
 /// The FMU of a trial.
@@ -19,7 +19,7 @@ const SAME: f64 = 1e-12;
 
 /// A built program that was tried.
 pub struct Program {
-    /// What it is called here.
+    /// Name used here.
     pub name: &'static str,
     pub path: PathBuf,
     /// The folder of its trial.
@@ -49,7 +49,7 @@ impl Program {
         Ok(program)
     }
 
-    /// What it prints in the folder of its trial.
+    /// Runs it in the folder of its trial and returns its output.
     pub fn output(&self, words: &[&str]) -> Result<Vec<u8>, String> {
         let mut before = self.runner.iter().map(String::as_ref).chain([self.path.as_os_str()]);
         let mut command = Command::new(before.next().unwrap_or_default());
@@ -77,8 +77,8 @@ impl Program {
     }
 }
 
-/// Returns the number of files that two programs wrote alike in their trials. The object of the FMU and the archive that
-/// contains it are not compared: they depend on the linker. Errors: files differ.
+/// Returns the number of files that two programs wrote alike in their trials. The object of the FMU and the archive
+/// that contains it are not compared: they depend on the linker. Errors: files differ.
 pub fn same(first: &Program, second: &Program) -> Result<usize, String> {
     let [one, other] = [files(&first.folder)?, files(&second.folder)?];
     let names: BTreeSet<&String> = one.keys().chain(other.keys()).collect();

@@ -93,7 +93,7 @@ fn built(build: &Build, claims: &mut Claims) -> Result<PathBuf, String> {
     Ok(wheel)
 }
 
-/// What auditwheel says of the wheel. Errors: it does not run wherever its name says.
+/// Report of auditwheel on the wheel. Errors: the wheel does not run on every platform that its name claims.
 fn audited(build: &Build, wheel: &Path) -> Result<String, String> {
     let mut show = Command::new(crate::python::program(&build.places.tools, "auditwheel"));
     show.arg("show").arg(wheel).env("PATH", super::program::with_tools(build.places)?);

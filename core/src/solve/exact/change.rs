@@ -1,5 +1,5 @@
-//! The exact solver's answers to the rules of events: values and noises of its conditions, loads, the equations of a
-//! mode.
+//! Events of the exact solver: values and rounding of guards, loads, and the equations of a mode for the transition
+//! rules.
 
 use super::matrices::Room;
 use super::{Core, ModeMatrices};
@@ -68,7 +68,7 @@ impl<const N: usize> Between for Core<N> {
         let (g, cause) = (self.room.value[index], self.matrices.guards[index].transition.cause);
         match g != 0.0 || self.common.rules.fresh_order(cause) > 0 {
             true => g < 0.0,
-            // On the edge: the first term of its series that is more than rounding decides.
+            // On the boundary: the first term of its series above rounding decides.
             false => self.falls_from_zero(index),
         }
     }
@@ -89,7 +89,7 @@ impl<const N: usize> Between for Core<N> {
         self.common.rounding.see(&self.largest);
         let place = self.common.space.layout.speed[body];
         let slows = self.matrices.rate(&self.z)[place].abs();
-        // Its own speed is known to the rounding of the speeds that it had.
+        // Its own speed has the rounding of its earlier speeds.
         let mut sizes = self.z;
         sizes[place] = self.common.rounding.largest_speed(&self.common.mechanism.bodies[body]);
         slows <= BEGUN * self.matrices.noise_of_rate(&sizes)[place]
@@ -119,12 +119,12 @@ impl<const N: usize> Between for Core<N> {
 }
 
 impl<const N: usize> Core<N> {
-    /// Enters the mode that follows the fall of a condition.
+    /// Enters the mode after a guard has become negative.
     pub(super) fn change(&mut self, fallen: Transition) {
         rules::change(self, fallen);
     }
 
-    /// Changes modes, without time passing, until every guard holds.
+    /// Changes modes at the present instant until every guard holds.
     pub(super) fn resolve(&mut self) {
         rules::settle(self);
     }
@@ -140,8 +140,8 @@ impl<const N: usize> Core<N> {
         coefficients.get(first).is_some_and(|&term| term < 0.0)
     }
 
-    /// Notes bodies at rest whose load is their breakaway but for rounding, where that holds more than they have once
-    /// they slide: what sets in gently makes no difference.
+    /// Records bodies at rest whose load equals their breakaway within rounding, if sliding friction is lower;
+    /// otherwise the decision makes no difference.
     pub(super) fn note_ties(&mut self) {
         let law = Arc::clone(&self.matrices);
         for guard in &law.guards {

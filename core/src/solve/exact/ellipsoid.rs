@@ -51,7 +51,7 @@ pub(super) struct Ellipsoid<const N: usize> {
     states: usize,
     /// The largest magnitudes of the state so far.
     size: [f64; N],
-    /// Until when errors are accounted for, s, and how many steps until then.
+    /// Time up to which errors are accounted for, s, and the number of steps until then.
     since: f64,
     steps: u64,
     /// The largest error of a position at the belt so far, m.
@@ -114,11 +114,11 @@ impl<const N: usize> Ellipsoid<N> {
         self.size.map(|size| if size > 0.0 { 1.0 / (size * size) } else { 0.0 })
     }
 
-    /// Takes note of the errors of positions.
+    /// Updates the largest error of positions.
     fn evaluate(&mut self, positions: &[[f64; N]]) {
         for row in positions {
             let square = self.variance(row);
-            // NaN has grown beyond all bounds.
+            // NaN means that it has overflowed.
             self.largest = self.largest.max(if square.is_nan() { f64::INFINITY } else { square.sqrt() });
         }
     }
@@ -167,7 +167,7 @@ fn carried<const N: usize>(step: &Matrix<N, N>, c: &[[f64; N]; N], states: usize
     for row in out.iter_mut().take(states) {
         step.advance(row);
     }
-    // As symmetric as rounding lets it be, and not beyond.
+    // Averaged with its transpose, so that rounding does not make it asymmetric.
     let other = transposed(&out, states);
     for (row, column) in out.iter_mut().zip(&other).take(states) {
         row.iter_mut().zip(column).for_each(|(a, b)| *a = 0.5 * (*a + b));
@@ -281,7 +281,7 @@ impl<const N: usize> Core<N> {
         }
         if jump != [0.0; N] {
             let error = errors.variance(&guard).sqrt() + rounding;
-            // The guard leaves its rounding by its slope, or by its bend.
+            // The guard leaves its rounding by its slope or its curvature.
             let slope = fall.abs().max((0.5 * bend.abs() * error).sqrt());
             if slope > 0.0 {
                 // δz⁺ = δz⁻ + (f⁻ − f⁺) δt,   δt = w·δz/|w·f⁻|
@@ -305,7 +305,7 @@ impl<const N: usize> Core<N> {
         self.errors = Some(errors);
     }
 
-    /// Ends the present mode where a condition has fallen, and takes up what follows.
+    /// Ends the present mode at a negative guard and enters the next.
     pub(super) fn go_through(&mut self, fallen: Transition) {
         let crossing = self.crossing(fallen);
         self.change(fallen);
@@ -344,7 +344,7 @@ mod tests {
         Core::new(Arc::new(mechanism), space, &start, (1e-3, f64::INFINITY), Vec::new())
     }
 
-    /// The speed that falls to zero was taken to be known to a rounding of zero.
+    /// The speed that falls to zero was assumed to have no rounding error.
     #[test]
     fn a_stop_is_as_uncertain_as_the_speeds_before_it() {
         let mut core = sliding();

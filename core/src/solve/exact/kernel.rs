@@ -1,28 +1,28 @@
-//! The kernels: what is compiled for vectors of one size each, and which of them a machine takes.
+//! Kernels: code compiled for vectors of a fixed size, and the choice of one for a machine.
 //!
-//! A page for somebody who has never seen vector instructions. What the exact solver does all day is to multiply a
-//! matrix with a vector: the state z after an interval is z + P z, its rate is A z, the values of all guards are G z. A
-//! processor can add or multiply four numbers at once, if they lie side by side in memory and the program says so. The
-//! compiler says so by itself where three things hold:
+//! An introduction for readers without knowledge of vector instructions. The exact solver mainly multiplies a matrix by
+//! a vector: the state z after an interval is z + P z, its rate is A z, the values of all guards are G z. A processor
+//! can add or multiply four numbers at once, if they lie side by side in memory and the program says so. The compiler
+//! does so by itself under three conditions:
 //!
 //! - **The length is known when it compiles.** A vector here has `N` places, `N` being 8, 12, 16, 20 or 40 and never
 //!   just "some". So every function of the solver exists five times, and [`in_kernel`] picks the smallest that has room
 //!   for a machine: 8 for an axis of three bodies with its input held (six states, u, and a one for what is constant).
-//!   What is left over is zero, and costs as much as anything else.
-//! - **What is summed lies apart.** A sum of eight numbers waits for itself seven times. So matrices are kept by
-//!   columns: to the vector of sums is added first column times z₁, then second column times z₂; the eight sums of a
-//!   vector are eight chains that do not wait for each other. The guards of a mode stand side by side in the same way,
-//!   eight to a group, and so do the forms whose squares make up the energy.
-//! - **Nobody asks on the way.** A condition in the innermost loop keeps the compiler from it. Zeros are multiplied
-//!   like other numbers; what is rare (a guard below zero, an event) is looked for afterwards.
+//!   The remaining places are zero, at the same cost.
+//! - **Terms of a sum lie apart.** A sum of eight numbers is a chain of seven dependent additions. So matrices are kept
+//!   by columns: to the vector of sums is added first column times z₁, then second column times z₂; the eight sums of a
+//!   vector are eight independent chains. The guards of a mode lie side by side in the same way, eight to a group, as
+//!   do the forms whose squares make up the energy.
+//! - **No branches inside.** A condition in the innermost loop prevents vectorisation. Zeros are multiplied like other
+//!   numbers; rare cases (a guard below zero, an event) are detected afterwards.
 //!
 //! The same source is compiled twice, for any processor (two numbers at once) and for those with AVX2 (four), and the
-//! choice is made where the program runs. Both do the same operations in the same order, and multiply and add are two
-//! roundings in both (no FMA), so that they give the same bits. Where this can be seen: [`crate::solve::propagator`]
-//! (the products), `matrices.rs` (guards and energy), [`crate::solve::record`] (columns).
+//! choice is made at run time. Both do the same operations in the same order, and multiply and add are two roundings in
+//! both (no FMA), so that they give the same bits. Examples: [`crate::solve::propagator`] (the products), `matrices.rs`
+//! (guards and energy), [`crate::solve::record`] (columns).
 //!
-//! How a vector is laid out is the mechanism's to say ([`crate::mechanism::Layout`] and [`super::Space`]): nothing here
-//! knows an axis from a gantry.
+//! The mechanism defines the layout of a vector ([`crate::mechanism::Layout`] and [`super::Space`]), so kernels do not
+//! distinguish an axis from a gantry.
 
 use super::ModeMatrices;
 use crate::mechanism::{BODIES, BODIES_AND_DRIVES, DRIVES};
@@ -41,7 +41,7 @@ pub(in crate::solve) trait Make {
 /// Writes [`in_kernel`] from the list of kernels: places of a vector, four or a multiple of it.
 macro_rules! kernels {
     ($([$places:literal])* else [$most:literal]) => {
-        /// Makes something for the smallest kernel that has room for a machine's vector: see [`super::Space::size`].
+        /// Makes something for the smallest kernel that holds a machine's vector: see [`super::Space::size`].
         pub(in crate::solve) fn in_kernel<M: Make>(size: usize, what: M) -> M::Made {
             match () {
                 $(() if size <= $places => what.make::<$places>(),)*
@@ -49,7 +49,7 @@ macro_rules! kernels {
             }
         }
 
-        // The last one has room for every mechanism, however many of its parts are drives.
+        // The last one holds every mechanism.
         const _: () = assert!($most > 2 * BODIES + (BODIES_AND_DRIVES - BODIES) * (DEGREE + 2));
         const _: () = assert!($most > 2 * (BODIES_AND_DRIVES - DRIVES) + DRIVES * (DEGREE + 2));
     };
@@ -58,9 +58,9 @@ macro_rules! kernels {
 kernels! {
     // One drive, three bodies, held inputs
     [8]
-    // The same with inductance or a rotor of its own, with straight inputs, or with two drives
+    // The same with inductance or an independent rotor, with linear inputs, or with two drives
     [12]
-    // One drive and smooth inputs, which carry their derivatives along
+    // One drive and smooth inputs with their derivatives
     [16]
     // The same with inductance or a rotor
     [20]
@@ -68,5 +68,5 @@ kernels! {
     else [40]
 }
 
-/// The modes of one machine that are ready, in one kernel.
+/// The computed modes of one machine, in one kernel.
 pub(super) type Modes<const N: usize> = Vec<Arc<ModeMatrices<N>>>;

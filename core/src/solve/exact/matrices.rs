@@ -1,4 +1,4 @@
-//! One mode made ready: its matrices, its guards, and how fast anything in it can change.
+//! A prepared mode: its matrices, its guards, and bounds of its rates.
 
 mod guards;
 mod shown;
@@ -18,8 +18,7 @@ use std::sync::{Arc, OnceLock};
 #[derive(Debug, Clone)]
 pub(in crate::solve) struct Space {
     pub(in crate::solve) layout: Layout,
-    /// Order of the highest derivative of an input that is carried along: 0 for held inputs, 1 for straight ones,
-    /// [`DEGREE`] for smooth ones.
+    /// Order of the highest input derivative in z: 0 for held inputs, 1 for linear ones, [`DEGREE`] for smooth ones.
     pub(in crate::solve) highest: usize,
 }
 
@@ -29,7 +28,7 @@ impl Space {
         Self { layout: Layout::new(mechanism), highest: if degree > 1 { DEGREE } else { degree } }
     }
 
-    /// Places that there have to be: states, inputs with their derivatives, and a one.
+    /// Required size: states, inputs with their derivatives, and a one.
     pub(in crate::solve) fn size(&self) -> usize {
         self.layout.states + self.layout.inputs * (self.highest + 1) + 1
     }
@@ -96,15 +95,15 @@ fn square(x: f64) -> f64 {
     x * x
 }
 
-/// Growth rate, 1/s, that is put up with where a part that stores no energy has to be bounded: at least this, and about
-/// this share of an output interval.
+/// Accepted growth rate, 1/s, for bounds of a part that stores no energy: at least this, and about this fraction per
+/// output interval.
 const GROWTH: f64 = 20.0;
 const GROWTH_PER_INTERVAL: f64 = 0.05;
 
 /// Growth rate for a current without back-EMF.
 const GROWTH_OF_CURRENT: f64 = 1e-2;
 
-/// The size of a rate of change: √(2V), or per unit of it, of the mechanical and of the magnetic energy.
+/// Norm of ż: √(2V), or per unit of it, of the mechanical and the magnetic energy.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::solve) struct Size {
     mechanical: f64,
@@ -114,7 +113,7 @@ pub(in crate::solve) struct Size {
 impl Size {
     pub(super) const ZERO: Size = Size { mechanical: 0.0, magnetic: 0.0 };
 
-    /// The size of both parts together.
+    /// Norm of both parts together.
     fn whole(self) -> f64 {
         (self.mechanical * self.mechanical + self.magnetic * self.magnetic).sqrt()
     }
@@ -133,8 +132,8 @@ fn at_rest(mechanism: &Mechanism, stuck: &[bool; BODIES]) -> [bool; SPRINGS] {
 pub(super) fn straight<const N: usize>(mechanism: &Mechanism, space: &Space, mode: &Mode) -> (Equations, Matrix<N, N>) {
     let layout = &space.layout;
     let mut equations = mechanism.equations(*mode);
-    // Stuck bodies have no speed, and spans between them do not change: without both in the conditions, the bounds are
-    // tighter.
+    // Stuck bodies have no speed, and spans between them do not change; removing both from the guards tightens the
+    // bounds.
     let stuck = mode.motion.map(|motion| motion == Motion::Stuck);
     let without_stuck = |form: &mut Form| {
         for (speed, stuck) in form.speed.iter_mut().zip(stuck) {
@@ -171,7 +170,7 @@ pub(super) fn straight<const N: usize>(mechanism: &Mechanism, space: &Space, mod
     (equations, rate)
 }
 
-/// True if errors can grow in a machine of these parts.
+/// True if errors can grow in a machine with these parts.
 pub(super) fn can_grow(mechanism: &Mechanism) -> bool {
     mechanism.springs.iter().any(|spring| match spring.law {
         SpringLaw::Gap { .. } | SpringLaw::Tension { .. } | SpringLaw::Line { .. } => true,
@@ -179,7 +178,7 @@ pub(super) fn can_grow(mechanism: &Mechanism) -> bool {
     })
 }
 
-/// The size of what the constant parts of accelerations are added up from, where errors can grow.
+/// Magnitude of the terms of the constant accelerations, if errors can grow.
 fn crude<const N: usize>(mechanism: &Mechanism, layout: &Layout, mode: &Mode, inertia: &[f64; BODIES]) -> [f64; N] {
     let mut crude = [0.0; N];
     if !can_grow(mechanism) {
@@ -201,7 +200,7 @@ pub(in crate::solve) struct ModeMatrices<const N: usize> {
     beside: Vec<Beside<N>>,
     /// The load on each body without its friction; `None` if a gear with losses changes it at rest.
     load: Option<[Row<N>; BODIES]>,
-    /// |b|: how fast √(2V) of ż can grow per unit of |u̇|.
+    /// |b|: growth rate of √(2V) of ż per unit of |u̇|.
     pub(super) forcing: [f64; DRIVES],
     /// A bound of ‖A‖, 1/s.
     speed: f64,
@@ -209,9 +208,9 @@ pub(in crate::solve) struct ModeMatrices<const N: usize> {
     pub(super) coarsest: usize,
     pub(super) finest: usize,
     h: f64,
-    /// A bound of the fastest undamped swing, rad/s.
+    /// A bound of the fastest undamped mode, rad/s.
     pub(super) swing: f64,
-    /// The size of what the constant part of ż is added up from; nothing where errors do not grow.
+    /// Magnitude of the terms of the constant part of ż; zero if errors cannot grow.
     pub(super) crude: [f64; N],
     /// Coordinates of the origin.
     origin: [f64; BODIES],
@@ -223,12 +222,12 @@ pub(in crate::solve) struct ModeMatrices<const N: usize> {
     stiffness: [f64; SPRINGS],
     /// Forms whose squared rates sum to the mechanical part of 2V.
     energy: Vec<Lanes<N>>,
-    /// Weight of each (di/dt)² in 2V, by the places of the currents; and whether there is any.
+    /// Weight of each (di/dt)² in 2V, by the indices of the currents; and true if there is any.
     magnetic: [(usize, f64); DRIVES],
     is_magnetic: bool,
     /// Weight of the current of each drive.
     weight_of_current: [f64; DRIVES],
-    /// True if a current moves anything, and the motion that current.
+    /// True if a current and the motion affect each other.
     coupled: bool,
     /// Currents of the drives.
     current: [OnceLock<Row<N>>; DRIVES],
@@ -302,13 +301,13 @@ impl<const N: usize> ModeMatrices<N> {
             if stiffness[j] == 0.0 && watched {
                 let own = GROWTH.max(GROWTH_PER_INTERVAL / h);
                 stiffness[j] = f64::max(4.0 * own * own / lightness, slope.abs());
-                // ½ √(κ/m) where nothing of it is there
+                // ½ √(κ/m) without own stiffness
                 growth += 0.5 * (stiffness[j] - slope).abs() * (lightness / stiffness[j]).sqrt();
             }
             growth += f64::max(-damping, 0.0) * lightness;
         }
 
-        // A little more, for the rounding of all that is compared with it.
+        // Slightly more, for the rounding of everything compared with it.
         let dual = |form: &Form| {
             let mut sum = 0.0;
             for j in 0..SPRINGS {
@@ -330,7 +329,7 @@ impl<const N: usize> ModeMatrices<N> {
             guards.push(Watch::new(&row, guard.transition));
             let (dual, beside, lane) = (dual(&guard.form), &mut beside[index / LANES], index % LANES);
             beside.rows.iter_mut().zip(&row).for_each(|(place, weight)| place[lane] = *weight);
-            // Motion and current pass energy to each other: only their sum is bounded.
+            // Motion and current exchange energy: only their sum is bounded.
             (beside.mechanical[lane], beside.magnetic[lane]) = match coupled {
                 true => (dual.whole(), 0.0),
                 false => (dual.mechanical, dual.magnetic),
@@ -433,7 +432,7 @@ impl<const N: usize> ModeMatrices<N> {
     }
 
     widest! {
-        /// Evaluates ż, its size, and the guards into `value` at z; with ż for z, one derivative higher.
+        /// Evaluates ż, its norm, and the guards into `value` at z; with ż for z, one derivative higher.
         pub(super) fn look(&self, z: &[f64; N], value: &mut Values) -> ([f64; N], Size) = look_by_any, look_by_avx2;
     }
 
@@ -482,7 +481,7 @@ impl<const N: usize> ModeMatrices<N> {
         self.forcing.iter().zip(rate).fold(0.0, |sum, (forcing, rate)| sum + forcing * rate)
     }
 
-    /// A size and what the inputs add to it, as the weights of forms part them.
+    /// A norm and the contribution of the inputs, split as the weights of forms are.
     #[inline(always)]
     fn parted(&self, size: Size, push: f64) -> (f64, f64) {
         match (self.coupled, self.is_magnetic) {
@@ -492,8 +491,8 @@ impl<const N: usize> ModeMatrices<N> {
         }
     }
 
-    /// Largest rates of the guards while ż has at most this size times `grow`, the inputs add at most `push` to it, and
-    /// have at most this rate.
+    /// Largest rates of the guards while ż has at most this norm times `grow`, and the inputs add at most `push` to it
+    /// and have at most this rate.
     #[inline]
     pub(super) fn steepness(&self, (size, push): (Size, f64), grow: f64, rate: &[f64; DRIVES], steepness: &mut Values) {
         let (mechanical, magnetic) = self.parted(size, push);
@@ -510,12 +509,12 @@ impl<const N: usize> ModeMatrices<N> {
         }
     }
 
-    /// The load on a body without its friction, where no gear loses power.
+    /// The load on a body without its friction; none with a lossy gear.
     pub(super) fn load(&self, body: usize) -> Option<&Row<N>> {
         self.load.as_ref().map(|load| &load[body])
     }
 
-    /// Current of a drive, made ready when it is first wanted.
+    /// Current of a drive, prepared at its first use.
     pub(super) fn current(&self, mechanism: &Mechanism, space: &Space, drive: usize) -> &Row<N> {
         self.current[drive].get_or_init(|| Row::new(&space.row(&mechanism.current(drive, &self.mode))))
     }
@@ -527,7 +526,7 @@ impl<const N: usize> ModeMatrices<N> {
         self.h * power
     }
 
-    /// The reach of a short Taylor series: what instants and moments are measured by.
+    /// Range of a short Taylor series, the unit of short times.
     pub(super) fn reach(&self) -> f64 {
         self.length(self.finest)
     }
@@ -537,7 +536,7 @@ impl<const N: usize> ModeMatrices<N> {
         self.length(self.coarsest)
     }
 
-    /// e^{A h/2^level} − I, computed when it is first wanted.
+    /// e^{A h/2^level} − I, computed at its first use.
     pub(super) fn step(&self, level: usize) -> &Matrix<N, N> {
         if self.steps[level].get().is_none() {
             let known = (level..=self.finest).find(|&l| self.steps[l].get().is_some());
@@ -568,9 +567,8 @@ impl<const N: usize> ModeMatrices<N> {
         self.rate.absolute().rate(&z.map(f64::abs)).map(|size| ROUNDING * size)
     }
 
-    /// The first coefficient of a guard along the series from z over `distance`, from `first` on, that is more than
-    /// rounding; those before it count as zero, however many there are. The terms of the series are sums of parts of
-    /// the size |A|ᵏ |z| dᵏ/k!.
+    /// First coefficient, from `first` on, of a guard along the series from z over `distance` that exceeds rounding;
+    /// those before it count as zero. The terms of the series are sums of terms of magnitude |A|ᵏ |z| dᵏ/k!.
     pub(super) fn first_term(
         &self,
         guard: &Watch<N>,

@@ -37,7 +37,7 @@ pub(super) use run::Run;
 pub(super) use sensitivity::Following;
 use std::sync::Arc;
 
-/// Halvings of an interval that are met exactly: eighths, where a delay ends in the midst of a sample.
+/// Halvings of an interval with exact matrices: eighths, for a delay that ends within a sample.
 const HALVES: usize = 3;
 
 /// Fraction of the series radius below which the sign of a speed leaving zero is taken from the series.
@@ -66,7 +66,7 @@ pub(super) struct Common {
     pub(super) mechanism: Arc<Mechanism>,
     pub(super) space: Arc<Space>,
     pub(super) coordinates: Coordinates,
-    /// The interval whose halves there are matrices for, s.
+    /// Interval whose halves have matrices, s.
     h: f64,
     pub(super) rules: Rules,
     /// Bounds of |u̇| and |ü| on the present pieces.
@@ -79,11 +79,11 @@ pub(super) struct Common {
     taken: u64,
     pub(super) cost: Cost,
     rounding: Rounding,
-    /// Intervals crossed or halved, how fast the run gets on by them, and to where it is to go.
+    /// Number of intervals crossed or halved, the progress per interval, and the target time.
     questions: u64,
     pace: Pace,
     end: f64,
-    /// True if the receiver is to be asked to continue.
+    /// True if the receiver has to be asked to continue.
     pub(super) asks: bool,
 }
 
@@ -91,7 +91,7 @@ pub(super) struct Common {
 enum Bound<const N: usize> {
     /// No guard falls; here is the end, if it was computed.
     Safe(Option<[f64; N]>),
-    /// Look closer at these.
+    /// These guards need a closer check.
     Unsure(Lanes),
 }
 
@@ -179,7 +179,7 @@ impl<const N: usize> Core<N> {
         let near = (8.0 * f64::EPSILON * until.abs()).min(1e-9 * self.common.h);
         while length - self.common.offset > near && self.common.rules.trouble.is_none() {
             self.check();
-            // Halves, quarters and eighths of the interval, for which there are matrices, are hit to the last bit.
+            // Halves, quarters and eighths of the interval, which have matrices, are met to the last bit.
             let (left, eighth) = (length - self.common.offset, 0.125 * self.common.h);
             let snapped = (left / eighth).round() * eighth;
             let left = if (left - snapped).abs() <= near { snapped } else { left };
@@ -215,7 +215,7 @@ impl<const N: usize> Core<N> {
         }
     }
 
-    /// Takes up new inputs.
+    /// Sets new inputs.
     pub(super) fn set_input(&mut self, pieces: &Pieces) {
         self.common.cost.pieces += 1;
         self.common.rules.refreshed();
@@ -225,7 +225,7 @@ impl<const N: usize> Core<N> {
         }
     }
 
-    /// Puts an input's value and derivatives where the state has them.
+    /// Sets an input's value and derivatives in z.
     fn take_up(&mut self, drive: usize, coefficients: &[f64], length: f64) {
         let highest = self.common.space.highest;
         if coefficients[1..].iter().all(|&c| c == 0.0) {
@@ -244,13 +244,13 @@ impl<const N: usize> Core<N> {
         (self.common.input_rate[drive], self.common.input_curvature[drive]) = change_rates(coefficients, length);
     }
 
-    /// True if the state is made of numbers.
+    /// True if the state is finite.
     #[inline]
     fn is_finite(&self) -> bool {
         self.z.iter().sum::<f64>().is_finite()
     }
 
-    /// Keeps in mind how large what moves is here.
+    /// Updates the largest magnitudes by the present state.
     #[inline]
     fn see(&mut self) {
         for (largest, z) in self.largest.iter_mut().zip(&self.z) {
@@ -258,19 +258,19 @@ impl<const N: usize> Core<N> {
         }
     }
 
-    /// Notices a state that is no number any more.
+    /// Detects a state that is no longer finite.
     fn check(&mut self) {
         if !self.is_finite() {
             self.common.rules.trouble = Some(Ending::Diverged { time: self.time() });
         }
     }
 
-    /// Counts from `base`, where it is, on.
+    /// Sets the present time as `base`.
     fn count_from(&mut self, base: f64) {
         (self.common.base, self.common.offset) = (base, 0.0);
     }
 
-    /// Number of whole intervals, up to `most`, on which no guard can fall; and true if nothing moves.
+    /// Number of complete intervals, up to `most`, on which no guard can become negative; and true if nothing moves.
     fn safe_intervals(&mut self, law: &ModeMatrices<N>, most: u64) -> (u64, bool) {
         self.look(law);
         let resting = self.room.rate == [0.0; N];
@@ -318,7 +318,7 @@ impl<const N: usize> Core<N> {
         self.stand(law);
     }
 
-    /// Forgives the values of the guards what rounding alone may have made negative.
+    /// Sets guards to zero that may be negative by rounding alone.
     #[inline]
     fn stand(&mut self, law: &ModeMatrices<N>) {
         for (value, guard) in self.room.value.iter_mut().zip(&law.guards) {
@@ -354,7 +354,7 @@ impl<const N: usize> Core<N> {
         if !(distance > 0.0 && self.goes()) {
             return None;
         }
-        // Half an interval and the like is met again and again: there is a matrix for it.
+        // Fractions such as half an interval occur repeatedly and have a matrix.
         let exact = (law.coarsest + 1..=law.finest.min(HALVES)).find(|&level| distance == law.length(level));
         match exact {
             Some(level) => self.cross_interval(&law, level, looked),
@@ -393,7 +393,7 @@ impl<const N: usize> Core<N> {
         self.common.rules.trouble.is_none() && !self.common.asks
     }
 
-    /// Requests a question to the receiver from time to time, and checks the progress; false if the run will not end.
+    /// Has the receiver asked from time to time, and checks the progress; false if the run will not end.
     fn goes_on(&mut self) -> bool {
         self.common.questions += 1;
         if self.common.questions.is_multiple_of(STEPS_BETWEEN_QUESTIONS) && self.common.rules.trouble.is_none() {

@@ -38,8 +38,8 @@ impl<'a, const N: usize> Run<'a, N> {
         let inputs = |drive| space.chain(drive, 0);
         let recorder = Recorder::new(&seen, &space.layout, (N, &inputs), grid, output);
         let mut core = Core::new(seen, Arc::new(space), &start.state, (grid.interval(), grid.end()), list);
-        // A run without rows needs no error bound, only whether it is determined, which a force line that feeds the
-        // motion alone can prevent.
+        // A run without rows needs no error bound, only a check that it is determined, which only a force line that
+        // feeds the motion can prevent.
         let feeds = |law: &SpringLaw| matches!(law, SpringLaw::Line { .. });
         if recorder.detail == Detail::None && !core.common.mechanism.springs.iter().any(|spring| feeds(&spring.law)) {
             core.errors = None;
@@ -68,7 +68,7 @@ impl<'a, const N: usize> Run<'a, N> {
                     self.core.go_through(fallen);
                     self.jumped();
                 }
-                // Paused in the midst of an interval: it is taken up where it was left.
+                // Paused within an interval: it continues there.
                 None if self.core.common.asks => self.ask_receiver(),
                 None if !self.goes() => {}
                 None if self.row < row => self.go_to(self.row + 1),
@@ -119,7 +119,8 @@ impl<'a, const N: usize> Run<'a, N> {
         self.heed();
     }
 
-    /// Moves as many whole intervals, up to `most`, as no guard can fall on; false if not even one.
+    /// Advances by the number of complete intervals, up to `most`, on which no guard can become negative; false if
+    /// there is none.
     fn take_safe_intervals(&mut self, most: u64) -> bool {
         let law = Arc::clone(&self.core.matrices);
         let (safe, resting) = self.core.safe_intervals(&law, most);
@@ -138,7 +139,7 @@ impl<'a, const N: usize> Run<'a, N> {
             return true;
         }
         if resting {
-            // One row, again and again.
+            // The same row repeatedly.
             self.row += self.recorder.repeat(safe - 1);
             self.heed();
             if self.goes() {
@@ -168,7 +169,7 @@ impl<'a, const N: usize> Run<'a, N> {
             let (begin, largest) = (core.z, core.largest);
             step.advance_rows(&mut core.z, &mut core.largest, &mut room[..rows]);
             if !core.is_finite() {
-                // The last row that is made of numbers.
+                // The last finite row.
                 let good = room.iter().take_while(|row| row.iter().sum::<f64>().is_finite()).count();
                 (core.z, core.largest) = (begin, largest);
                 step.advance_rows(&mut core.z, &mut core.largest, &mut room[..good]);
@@ -272,14 +273,14 @@ impl<const N: usize> Running for Run<'_, N> {
     }
 }
 
-/// The row of `grid` at or before `time` and how far behind it, from row `now` on; next to a row means on it.
+/// The row of `grid` at or before `time`, from row `now` on, and the offset from it; an offset within rounding is zero.
 pub(super) fn locate(grid: &Grid, now: u64, time: f64) -> (u64, f64) {
     let (last, h) = (grid.even(), grid.interval());
-    // The next row, as where samples fall on rows.
+    // The next row, as for samples that coincide with rows.
     if now < last && grid.time(now + 1) == time {
         return (now + 1, 0.0);
     }
-    // Right but for rounding.
+    // Correct except for rounding.
     let mut row = ((time / h) as u64).min(last);
     if row > 0 && grid.time(row) > time {
         row -= 1;
@@ -289,14 +290,14 @@ pub(super) fn locate(grid: &Grid, now: u64, time: f64) -> (u64, f64) {
     let offset = time - grid.time(row);
     // Rounding of a sum of decimal times; not a fraction of the interval, which may be long.
     let near = (8.0 * f64::EPSILON * time).min(1e-9 * h);
-    // The last interval may be shorter: what is left of the run behind the last row at this distance.
+    // The last interval may be shorter: the rest of the run after the last complete one.
     let length = if row < last { h } else { grid.rest() };
     match (row < last, length - offset <= near) {
         _ if offset <= near => (row, 0.0),
         (true, true) => (row + 1, 0.0),
         (false, true) => (row, length),
         (_, false) => {
-            // Halves, quarters and eighths of the interval, for which there are matrices, are hit to the last bit.
+            // Halves, quarters and eighths of the interval, which have matrices, are met to the last bit.
             let eighth = 0.125 * h;
             let snapped = (offset / eighth).round() * eighth;
             (row, if (offset - snapped).abs() <= near { snapped } else { offset })

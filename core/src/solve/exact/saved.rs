@@ -1,4 +1,4 @@
-//! The exact solver's machine as plain numbers, and with other numbers of its mechanism.
+//! Saved states of the exact solver, and a change of the mechanism's parameters.
 
 use super::{Core, ModeMatrices};
 use crate::mechanism::Mechanism;

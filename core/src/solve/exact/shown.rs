@@ -1,4 +1,4 @@
-//! The view of an observer on a run: every interval, and closer where something may happen within.
+//! Observation of a run: every interval, and more closely if a peak may lie within.
 
 use super::matrices::Shown;
 use super::{ModeMatrices, Run};
@@ -12,16 +12,16 @@ const OFF: f64 = 1e-9;
 /// Largest number of curves of a run; faster oscillations between rows are not resolved completely.
 const MOST_CURVES: u64 = 2_000_000;
 
-/// Largest number of rows of a stretch: an observer has a bit for each gap, and oscillations decay within it.
+/// Largest number of rows of a block: an observer has one bit for each interval, and oscillations decay within a block.
 pub(super) const ROWS: usize = 32;
 
-/// Stretches that are put off at most.
+/// Maximum number of postponed blocks.
 const LATER: usize = 256;
 
-/// Lengths that differ by less than this share are one.
+/// Relative difference of equal lengths.
 const SAME: f64 = 1e-10;
 
-/// Curves in a row that are right before longer ones are tried.
+/// Number of successive accurate curves before longer ones are tried.
 const RIGHT: u32 = 32;
 
 /// An instant for an observer; rates are computed when first needed.
@@ -29,7 +29,7 @@ const RIGHT: u32 = 32;
 struct Sight<const N: usize> {
     z: [f64; N],
     value: Reading,
-    /// ż, and what is read of it.
+    /// ż, and its reading.
     slope: Option<([f64; N], Reading)>,
     /// z̈ and z⃛.
     higher: Option<[[f64; N]; 2]>,
@@ -49,10 +49,10 @@ struct Part {
     level: usize,
 }
 
-/// A stretch of which an observer examines some gaps more closely.
+/// A block in which an observer examines some intervals more closely.
 struct Later<const N: usize> {
     law: Arc<ModeMatrices<N>>,
-    /// The states at both ends of its first gap, the readings there, and the origin of positions.
+    /// The states at both ends of its first interval, the readings there, and the origin of positions.
     z: [[f64; N]; 2],
     ends: [Reading; 2],
     origin: [f64; BODIES],
@@ -66,7 +66,7 @@ pub(super) struct Watching<const N: usize> {
     /// True if there is an observer of the motion; and true if it examines all of it closely.
     follows: bool,
     sees_all: bool,
-    /// Readings at the beginning of a stretch and at its rows; the last one is the present.
+    /// Readings at the start of a block and at its rows; the last one is the present.
     readings: Vec<Reading>,
     /// True if nothing has jumped since the present was read.
     is_read: bool,
@@ -77,7 +77,7 @@ pub(super) struct Watching<const N: usize> {
     scale: Reading,
     /// Curves tried.
     curves: u64,
-    /// Halvings of the output interval after which curves were right lately, and how many in a row.
+    /// Halvings of the output interval for recent accurate curves, and the number of these in a row.
     level: usize,
     right: u32,
 }
@@ -100,7 +100,7 @@ impl<const N: usize> Watching<N> {
         }
     }
 
-    /// Reads a stretch that begins in `z` and comes by these rows.
+    /// Reads a block that begins in `z` with these rows.
     pub(super) fn read(&mut self, shown: &Shown<N>, origin: &[f64; BODIES], z: &[f64; N], rows: &[[f64; N]]) {
         self.origin = *origin;
         let first = match self.readings.last() {
@@ -115,12 +115,12 @@ impl<const N: usize> Watching<N> {
 }
 
 impl<const N: usize> Run<'_, N> {
-    /// True if somebody follows the motion.
+    /// True if an observer follows the motion.
     pub(super) fn is_observed(&self) -> bool {
         self.watching.follows
     }
 
-    /// Input or mode may have jumped: what is read now has to be read anew.
+    /// Input or mode may have jumped: the present has to be read again.
     pub(super) fn jumped(&mut self) {
         self.watching.is_read = false;
     }
@@ -138,7 +138,7 @@ impl<const N: usize> Run<'_, N> {
         }
     }
 
-    /// Shows a stretch of the run in the present mode, that has begun in `z` and come by these rows.
+    /// Shows a block of the run in the present mode that began in `z`, with these rows.
     pub(super) fn show_way(
         &mut self,
         law: &Arc<ModeMatrices<N>>,
@@ -152,7 +152,7 @@ impl<const N: usize> Run<'_, N> {
         self.show_stretch(law, [z, rows.first().copied().unwrap_or(z)], (begin, interval));
     }
 
-    /// Shows the stretch that has just been read, whose first gap has these ends.
+    /// Shows the block that has just been read, whose first interval has these ends.
     pub(super) fn show_stretch(&mut self, law: &Arc<ModeMatrices<N>>, z: [[f64; N]; 2], (begin, interval): (f64, f64)) {
         let readings = std::mem::take(&mut self.watching.readings);
         let bow = self.bow(law, &z[0], interval, interval * (readings.len() - 1) as f64);
@@ -180,7 +180,7 @@ impl<const N: usize> Run<'_, N> {
         }
     }
 
-    /// Shows gaps of a stretch more closely, if the observer still needs them.
+    /// Shows intervals of a block more closely, if the observer still needs them.
     fn show_gaps(&mut self, later: &Later<N>) {
         let Later { law, begin, interval, wanted, .. } = later;
         let count = wanted.end();
@@ -206,7 +206,7 @@ impl<const N: usize> Run<'_, N> {
         }
     }
 
-    /// Shows what was put off.
+    /// Shows postponed blocks.
     fn show_later(&mut self) {
         let mut all = std::mem::take(&mut self.watching.later);
         let here = self.watching.origin;
@@ -240,8 +240,8 @@ impl<const N: usize> Run<'_, N> {
         self.recorder.observer.as_mut().is_some_and(|observer| observer.pass(&gap))
     }
 
-    /// Shows a gap of any length more closely: whole if there are matrices for its length, else in parts with matrices,
-    /// and the rest by a series.
+    /// Shows an interval of any length more closely: as a whole if its length has matrices, otherwise in parts with
+    /// matrices and the rest by a series.
     fn show_closer(
         &mut self,
         law: &ModeMatrices<N>,
@@ -272,7 +272,7 @@ impl<const N: usize> Run<'_, N> {
         }
     }
 
-    /// The sight of where h/2^level leads to.
+    /// The instant h/2^level later.
     fn after(&self, law: &ModeMatrices<N>, from: &Sight<N>, level: usize) -> Sight<N> {
         let mut z = from.z;
         law.step(level).advance(&mut z);
@@ -305,7 +305,7 @@ impl<const N: usize> Run<'_, N> {
         self.show_part(law, from, to, part, bends);
     }
 
-    /// Shows a part as a curve, or two halves of it where a curve is not right.
+    /// Shows a part as a curve, or as two halves if the curve is not accurate.
     fn show_part(
         &mut self,
         law: &ModeMatrices<N>,
@@ -364,7 +364,7 @@ impl<const N: usize> Run<'_, N> {
         })
     }
 
-    /// Bounds of the fourth derivatives of what is read, within `length` from a state on.
+    /// Bounds of the fourth derivatives of the readings within `length` from a state on.
     fn bends(&self, law: &ModeMatrices<N>, z: &[f64; N], length: f64) -> Reading {
         if self.watching.sees_all {
             return [f64::INFINITY; QUANTITIES];
@@ -375,12 +375,12 @@ impl<const N: usize> Run<'_, N> {
         law.change_of(law.shown(&self.core.common.mechanism, space), &third, (&input(3), &input(4)), length)
     }
 
-    /// True if no more is read than the first quantities.
+    /// True if only the first quantities are read.
     fn is_few(&self, law: &ModeMatrices<N>) -> bool {
         law.shown(&self.core.common.mechanism, &self.core.common.space).readout.few
     }
 
-    /// ż, and what is read of it.
+    /// ż, and its reading.
     fn rate<'s>(&self, law: &ModeMatrices<N>, sight: &'s mut Sight<N>) -> &'s ([f64; N], Reading) {
         sight.slope.get_or_insert_with(|| {
             let rate = law.rate(&sight.z);
@@ -397,7 +397,7 @@ impl<const N: usize> Run<'_, N> {
         })
     }
 
-    /// Rates of what is read, `rate` being that of z.
+    /// Rates of the readings; `rate` is that of z.
     fn rates(&self, law: &ModeMatrices<N>, rate: &[f64; N]) -> Reading {
         law.shown(&self.core.common.mechanism, &self.core.common.space).change(rate)
     }
@@ -421,7 +421,7 @@ impl<const N: usize> Run<'_, N> {
         times(third, length * length * length / 6.0);
     }
 
-    /// The curve between two sights.
+    /// The curve between two instants.
     fn curve(&self, law: &ModeMatrices<N>, from: &mut Sight<N>, to: &mut Sight<N>, begin: f64, length: f64) -> Curve {
         let mut ends = [[[0.0; QUANTITIES]; 4]; 2];
         self.terms(law, from, length, &mut ends[0]);

@@ -53,7 +53,7 @@ impl<const N: usize> Matrix<N, N> {
         self.column[column][row]
     }
 
-    /// e^{A d} − I, A being `self`, and its derivatives where those of A are `slopes`; `speed` is a bound of ‖A‖.
+    /// e^{A d} − I with A = `self`, and its derivatives for the derivatives `slopes` of A; `speed` is a bound of ‖A‖.
     pub(crate) fn sloped_step(&self, slopes: &[Columns<N>], d: f64, speed: f64) -> SlopedStep<N> {
         let halvings = (speed * d / EXPONENTIAL_REACH).log2().ceil().clamp(0.0, 60.0) as i32;
         #[cfg(target_arch = "x86_64")]
@@ -105,7 +105,7 @@ impl<const N: usize> Matrix<N, N> {
     }
 
     widest! {
-        /// Advances each of `s` along `series` of length `distance`, up to its share `part`, with the derivatives
+        /// Advances each of `s` along `series` of length `distance`, up to its fraction `part`, with the derivatives
         /// `slopes` of A, which are zero beyond the last: T_k = d/k (A T_{k−1} + A_p z_{k−1}).
         pub(crate) fn add_slopes(&self, slopes: &[Columns<N>], along: (&Series<N>, f64, f64), s: &mut [[f64; N]])
             = add_slopes_by_any, add_slopes_by_avx2;
@@ -120,7 +120,7 @@ impl<const N: usize> Matrix<N, N> {
     ) {
         for (j, s) in s.iter_mut().enumerate() {
             let mut term = *s;
-            // z_{k−1} partᵏ⁻¹, by and by
+            // z_{k−1} partᵏ⁻¹, updated in each step
             let (mut power, d) = (1.0, distance * part);
             for (k, z) in series.terms[..=series.order].iter().enumerate() {
                 let mut next = self.times(&term);
@@ -157,10 +157,10 @@ impl<const N: usize> SlopedStep<N> {
     }
 }
 
-/// X, X² and X³ of a matrix with ‖X‖ ≤ [`EXPONENTIAL_REACH`], and what e^X − I is gathered from.
+/// X, X² and X³ of a matrix with ‖X‖ ≤ [`EXPONENTIAL_REACH`], and partial sums of e^X − I.
 struct Powers<const N: usize> {
     powers: [Matrix<N, N>; 3],
-    /// Σ of the series from X¹⁰, X⁷ and X⁴ on, each over that power but one: what X³ is multiplied with.
+    /// Sums of the series from X¹⁰, X⁷ and X⁴ on, each divided by the power before: the factors of X³.
     rests: [Matrix<N, N>; 3],
 }
 
@@ -182,7 +182,7 @@ impl<const N: usize> Powers<N> {
         Matrix::gathered(self.powers.each_ref(), 1, Some(&self.rests[2]))
     }
 
-    /// The derivative of e^X along E: that of each product is two, X′Y + X Y′.
+    /// Derivative of e^X along E, by the product rule X′Y + X Y′.
     #[inline(always)]
     fn slope(&self, e: &Matrix<N, N>) -> Matrix<N, N> {
         let [x, x2, x3] = &self.powers;
@@ -198,7 +198,7 @@ impl<const N: usize> Powers<N> {
         slope
     }
 
-    /// Change behind the last of the steps by a constant rate `e` over the first: Σ Xᵏ⁻¹ e/k!, doubled.
+    /// Change after the last of the steps by a constant rate `e` over the first: Σ Xᵏ⁻¹ e/k!, doubled.
     #[inline(always)]
     fn constant(&self, e: &[f64; N], steps: &[Matrix<N, N>]) -> [f64; N] {
         let x = &self.powers[0];
@@ -259,8 +259,8 @@ mod tests {
         moved
     }
 
-    /// Central differences of the exponential, of two step widths by Richardson, of matrices with and without constant
-    /// columns alone.
+    /// Compares with central differences of the exponential, extrapolated by Richardson, for all columns and for
+    /// constant columns only.
     #[test]
     fn slopes_are_what_differences_tend_to() {
         for seed in 1..30 {
@@ -290,7 +290,7 @@ mod tests {
             let mut now = z;
             for _ in 0..8 {
                 a.series(&now, d / 4.0, 23, &mut series);
-                // Half of what the series reaches.
+                // Half of the series' range.
                 a.add_slopes(std::slice::from_ref(&slope), (&series, d / 4.0, 0.5), &mut by_series);
                 series.add_to(&mut now, 0.5);
             }

@@ -1,8 +1,7 @@
-//! A block of rows, column by column: states as they come, and all that follows from them.
+//! A block of rows, column by column: states as received, and everything that follows from them.
 //!
-//! Every column is a form of columns before it, and is computed for all rows of one mode at once, so that the loops
-//! become vector instructions; they are compiled twice, as those of [`crate::solve::propagator`] are, and give the same
-//! bits.
+//! Every column is a form of earlier columns and is computed for all rows of one mode at once, so that the loops become
+//! vector instructions; like those of [`crate::solve::propagator`], they are compiled twice and give the same bits.
 
 use super::sheet::{Elements, Held, Sheets};
 use super::sum::{Places, Sum, Values};
@@ -13,12 +12,12 @@ use crate::solve::widest::widest;
 use crate::trajectory::{Grid, Trajectory};
 use std::ops::Range;
 
-/// Rows one after another with the same [`Elements`], and their number.
+/// Consecutive rows with the same [`Elements`], and the index of these.
 pub(super) type Stretch = (Range<usize>, usize);
 
 /// The columns of a block.
 pub(super) struct Columns {
-    /// The rows as they come.
+    /// The rows as received.
     raw: Vec<f64>,
     values: Vec<Values>,
     pub(super) places: Places,
@@ -67,7 +66,7 @@ impl Columns {
         Self { raw, values, detail, stretches, places }
     }
 
-    /// The rows from `first` on: room for them up to the end of the block.
+    /// Buffer for rows from `first` to the end of the block.
     #[inline]
     pub(super) fn rows<const N: usize>(&mut self, first: usize) -> &mut [[f64; N]] {
         debug_assert_eq!(N, self.places.stride);
@@ -86,7 +85,7 @@ impl Columns {
         self.raw.copy_within(row * stride..(row + 1) * stride, 0);
     }
 
-    /// Puts the numbers of the rows into columns, four by four. −0 + 0 is 0.
+    /// Transposes the rows into columns, four by four. −0 + 0 is 0.
     #[inline(always)]
     fn turn(&mut self, rows: usize) {
         let groups = self.places.stride / 4;
@@ -103,7 +102,7 @@ impl Columns {
     }
 
     widest! {
-        /// Computes all columns, and puts into `out` those that are shown.
+        /// Computes all columns, and writes those that are shown to `out`.
         pub(super) fn fill(&mut self, block: &Block, out: &mut Trajectory) = fill_by_any, fill_by_avx2;
     }
 
@@ -184,7 +183,7 @@ impl Columns {
             out.iter_mut().zip(column(place)).for_each(|(out, value)| *out = value * factor + 0.0);
         };
         match heading.shown {
-            // Time alone changes in repeated rows.
+            // In repeated rows, only time changes.
             Shown::Time => {}
             Shown::Input(drive) => out.copy_from_slice(column(places.input(drive))),
             Shown::Voltage(drive) => {
@@ -225,7 +224,7 @@ impl Columns {
         }
     }
 
-    /// Friction on a body: what its law gives while it slides, what holds it while it is stuck.
+    /// Friction on a body: by its law while it slides, the holding force while it is stuck.
     #[inline(always)]
     fn friction(&self, block: &Block, body: usize, out: &mut [f64]) {
         for (rows, segment) in block.segments() {
@@ -245,7 +244,7 @@ impl Columns {
         out.iter_mut().zip(block.extra).for_each(|(value, extra)| *value += extra.friction[body]);
     }
 
-    /// The load on a body at rest in a row beside friction, the least and the most of it.
+    /// The least and the largest load without friction on a body at rest in a row.
     fn load(&self, mechanism: &Mechanism, leader: usize, row: usize) -> (f64, f64) {
         let mut load = (0.0, 0.0);
         for body in mechanism.followers(leader) {
@@ -285,14 +284,14 @@ impl Block<'_> {
     }
 }
 
-/// The rows of each segment, `written` being all of them.
+/// The rows of each segment; `written` is the total number.
 #[inline(always)]
 fn rows_of(segments: &[Segment], written: usize) -> impl Iterator<Item = (Range<usize>, &Segment)> {
     let ends = segments.iter().skip(1).map(move |segment| segment.start.min(written)).chain([written]);
     segments.iter().zip(ends).map(|(segment, end)| (segment.start.min(end)..end, segment))
 }
 
-/// Rows one after another in which amplifiers, gears, belt and stops do the same.
+/// Consecutive rows with the same case of amplifiers, gears, belt and stops.
 pub(super) fn stretches(segments: &[Segment], sheets: &Sheets, written: usize) -> Vec<Stretch> {
     let mut stretches: Vec<Stretch> = Vec::new();
     for (rows, segment) in rows_of(segments, written) {

@@ -1,12 +1,11 @@
-//! The columns of rows of one mode, prepared once: the forms of forces, currents and voltages, and the constant
-//! quantities.
+//! Columns of one mode, prepared once: forms of forces, currents and voltages, and constant quantities.
 
 use super::sum::{Places, Sum};
 use crate::friction::Motion;
 use crate::mechanism::{Drive, DriveMode, Mechanism, Mode, SpringLaw, What};
 
-/// Forces of springs, currents and voltages of drives: the same in all modes in which amplifiers, gears, belt and stops
-/// do the same.
+/// Forces of springs, currents and voltages of drives: equal in all modes with the same case of amplifiers, gears, belt
+/// and stops.
 pub(super) struct Elements {
     mode: Mode,
     pub(super) force: Vec<Sum>,
@@ -16,12 +15,12 @@ pub(super) struct Elements {
     pub(super) contact: Vec<f64>,
 }
 
-/// A mode that rows were in.
+/// A mode of recorded rows.
 pub(super) struct Sheet {
     pub(super) mode: Mode,
     /// Number of its [`Elements`].
     pub(super) elements: usize,
-    /// Friction on each body from its speed, or from what acts on it.
+    /// Friction on each body from its speed, or from its load.
     pub(super) friction: Vec<Held>,
 }
 
@@ -29,11 +28,11 @@ pub(super) struct Sheet {
 pub(super) enum Held {
     /// One form.
     Form(Box<Sum>),
-    /// The load on it at rest, where gears with losses hold a share of their own: the least and the most of it.
+    /// The load at rest, of which a lossy gear holds a part: between its least and its largest value.
     Between,
 }
 
-/// All modes that rows were in.
+/// All modes of recorded rows.
 #[derive(Default)]
 pub(super) struct Sheets {
     pub(super) sheets: Vec<Sheet>,
@@ -41,7 +40,7 @@ pub(super) struct Sheets {
 }
 
 impl Sheets {
-    /// The number of the sheet of a mode, made ready if it is new.
+    /// Index of the sheet of a mode, which is prepared if new.
     pub(super) fn of(&mut self, mechanism: &Mechanism, places: &Places, mode: &Mode) -> usize {
         if let Some(known) = self.sheets.iter().position(|sheet| sheet.mode == *mode) {
             return known;
@@ -112,7 +111,7 @@ impl Held {
     }
 }
 
-/// The load on a body at rest beside friction: the inner brackets of (16)-(18).
+/// The load without friction on a body at rest: the inner brackets of (16)-(18).
 fn load(mechanism: &Mechanism, places: &Places, leader: usize) -> Sum {
     let mut sum = Sum::constant(0.0);
     for body in mechanism.followers(leader) {

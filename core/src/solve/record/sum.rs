@@ -7,10 +7,11 @@ use std::ops::Range;
 /// Values of one quantity in the rows of a block.
 pub(super) type Values = [f64; BLOCK];
 
-/// Room for the terms of a sum: the load on bodies that move as one has every spring on each of them, and the currents.
+/// Maximum number of terms of a sum: the load on bodies that move as one contains every spring on each body, and the
+/// currents.
 const TERMS: usize = SPRINGS * BODIES + DRIVES;
 
-/// A linear form of columns: places and weights, added in this order, and a constant.
+/// A linear form of columns: indices and weights, added in this order, and a constant.
 #[derive(Debug, Clone)]
 pub(super) struct Sum {
     places: [u8; TERMS],
@@ -20,7 +21,7 @@ pub(super) struct Sum {
 }
 
 impl Sum {
-    /// One that is always the same.
+    /// A constant.
     pub(super) fn constant(constant: f64) -> Self {
         Self { places: [0; TERMS], weights: [0.0; TERMS], count: 0, constant }
     }
@@ -71,7 +72,7 @@ pub(super) struct Places {
 }
 
 impl Places {
-    /// A body's coordinate: its position relative to the origin, or the elongation in its place.
+    /// A body's coordinate: its position relative to the origin, or the elongation that replaces it.
     pub(super) fn coordinate(&self, body: usize) -> usize {
         self.layout.coordinate[body]
     }

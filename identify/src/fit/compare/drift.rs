@@ -1,9 +1,9 @@
-//! Which single change of a machine explains logs that it does not meet: those of another day, after a repair, with
-//! another load.
+//! Drift: the single change of a machine that explains logs that it does not fit, such as those of another day, after a
+//! repair, or with another load.
 //!
 //! Numbers of one cause change together: friction in both directions of one surface, both pulleys of one make, the two
-//! constants of one motor. Each such pair is a change beside those of its members. Otherwise a smaller pulley may
-//! explain more than Coulomb friction in one direction where it fell in both.
+//! constants of one motor. Each such pair is a change in addition to those of its members. Otherwise a smaller pulley
+//! might explain more than Coulomb friction in one direction if it fell in both.
 
 use crate::case::{Case, Nuisances, Plan, Scope};
 use crate::error::{Error, Result};
@@ -24,7 +24,7 @@ use crate::solve::Flow;
 /// The effect of single changes on the errors of a machine.
 #[derive(Debug, Clone)]
 pub struct Drift {
-    /// The errors of the machine as it is.
+    /// Errors of the unchanged machine.
     pub unchanged: Vec<Together>,
     /// Single changes: first those that the logs cannot distinguish from the one that explains most, ordered by
     /// likelihood of their causes; then the others, ordered by their explained share.
@@ -42,17 +42,17 @@ pub struct Change {
     pub estimate: Estimate,
     /// The errors with it.
     pub errors: Vec<Together>,
-    /// The share of the sum of squares that is left; of several quantities, the mean.
+    /// Remaining fraction of the sum of squares; mean over several quantities.
     pub left: f64,
 }
 
 impl Drift {
-    /// The quantities that the logs hold.
+    /// Quantities in the logs.
     pub fn quantities(&self) -> Vec<Quantity> {
         self.unchanged.iter().filter(|one| !one.held_out).map(|one| one.quantity).collect()
     }
 
-    /// The changes that leave as little as the best one, those of machines that wear first.
+    /// The changes that are indistinguishable from the best one, the most likely causes first.
     pub fn best(&self) -> impl Iterator<Item = &Change> {
         self.changes.iter().take(self.alike)
     }
@@ -77,7 +77,7 @@ enum Cause {
     Load,
     /// The belt: age, tension.
     Belt,
-    /// The motor and what feeds it: temperature, supply.
+    /// The motor and its supply: temperature, voltage.
     Drive,
     /// The wiring and timing of the input.
     Input,
@@ -114,7 +114,7 @@ fn pairs(machine: &Machine) -> Vec<Vec<String>> {
     let pulleys = of_pulleys.map(|number| ["drive_pulley", "idler_pulley"].map(|body| format!("{body}.{number}")));
     let motor = ["motor.torque_constant", "motor.back_emf_constant"].map(String::from);
     let is_there = |key: &String| parameter::value(machine, key).is_some_and(|value| value != 0.0);
-    // A direction that is not given by itself goes along with the other one.
+    // A direction that is not given separately follows the other one.
     let are_two = |[one, other]: &[String; 2]| {
         let free = |key: &str| Free::new(machine, key, &[], &[]).ok();
         free(one).zip(free(other)).is_some_and(|(one, other)| !one.overlaps(&other))
@@ -123,8 +123,8 @@ fn pairs(machine: &Machine) -> Vec<Vec<String>> {
     all.filter(|pair| pair.iter().all(is_there) && are_two(pair)).map(|pair| pair.to_vec()).collect()
 }
 
-/// Changes one parameter of the machine after the other, each by itself, to meet the logs of `case`: what `plan`
-/// searches for, whatever else may be off, pairs that change together, and delay, gain and offset of the input.
+/// Changes the parameters of the machine one at a time to fit the logs of `case`: those of `plan`, all others that may
+/// vary, pairs that change together, and delay, gain and offset of the input.
 pub fn drift(case: &Case, plan: &Plan, stop: Option<Stop>, watch: &mut dyn FnMut(&str) -> Flow) -> Result<Drift> {
     crate::case::needs_motors(&case.machine)?;
     if !case.machine.has_one_coordinate() {
@@ -209,7 +209,7 @@ fn singles(case: &Case, plan: &Plan, none: &Plan) -> Vec<Plan> {
     plans
 }
 
-/// The share of the sum of squares that is left, in the mean over quantities.
+/// Remaining fraction of the sum of squares, mean over quantities.
 fn left(before: &[Together], after: &[Together]) -> f64 {
     let of = |one: &Together| {
         let own = after.iter().find(|other| other.quantity == one.quantity && other.held_out == one.held_out);

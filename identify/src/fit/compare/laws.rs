@@ -1,4 +1,4 @@
-//! The friction laws that are compared: what each makes of the text of a case, and what is searched for then.
+//! Friction laws for a comparison: the case text with each law, and its free parameters.
 
 use crate::case::{Case, Files, Plan};
 use crate::error::{Error, Result};
@@ -18,21 +18,21 @@ pub enum FrictionLaw {
     Coulomb,
     /// Each direction with its own values.
     Asymmetric,
-    /// A Stribeck curve above the better one of the two before.
+    /// A Stribeck curve added to the better one of the first laws.
     Stribeck,
     /// The better one of these, with a factor on dry friction that changes along the travel.
     Along,
-    /// Bristles in place of a Stribeck curve.
+    /// Bristles instead of a Stribeck curve.
     LuGre,
     /// The better one of the straight laws, with a force that changes along the travel and is the same in both
     /// directions.
     ForceAlong,
-    /// A force that depends on speed, above another law.
+    /// A force that depends on speed, added to another law.
     ForceBySpeed,
 }
 
 impl FrictionLaw {
-    /// All of them, the simplest first.
+    /// All laws, the simplest first.
     pub const ALL: [Self; 8] = [
         Self::Viscous,
         Self::Coulomb,
@@ -69,7 +69,7 @@ impl FrictionLaw {
         })
     }
 
-    /// True if it stands above one of the laws of straight lines.
+    /// True if it is added to one of the piecewise linear laws.
     pub(super) fn is_above(self) -> bool {
         match self {
             Self::Viscous | Self::Coulomb | Self::Asymmetric => false,
@@ -78,7 +78,7 @@ impl FrictionLaw {
     }
 }
 
-/// The body whose friction is compared: the one with most free parameters, or else the cart.
+/// The body whose friction is compared: the one with the most free parameters, or else the cart.
 pub(super) fn body(plan: &Plan) -> &'static str {
     let count = |body: &str| {
         let own = plan.free.iter().chain(plan.tied.iter().flatten());
@@ -87,8 +87,8 @@ pub(super) fn body(plan: &Plan) -> &'static str {
     if count("drive_pulley") > count("cart") { "drive_pulley" } else { "cart" }
 }
 
-/// The case with this law above `sided` friction or not, beginning at the machine `from`, and what is searched for in
-/// it.
+/// The case with this law, with direction-dependent friction if `sided`, starting from the machine `from`, and its free
+/// parameters.
 pub(super) fn with(
     case: &Case,
     name: &Path,
@@ -126,7 +126,7 @@ pub(super) fn with(
     };
     let offset = sided && loaded;
     if offset {
-        // Both directions hold it.
+        // Both directions contain it.
         put(&mut document, "cart", "load", Value::from(0.0));
     }
     let kept = plan.free.iter().filter(|key| !(is_own(key) || offset && *key == "cart.load"));
@@ -137,7 +137,7 @@ pub(super) fn with(
     let mut bounds: Vec<(String, [f64; 2])> =
         plan.bounds.iter().filter(|(key, _)| free.contains(key) || !is_own(key)).cloned().collect();
     let near = near.map(|(key, ends)| (format!("{body}.friction.{key}"), ends));
-    // Bounds that are given stand alone.
+    // Given bounds have precedence.
     let near = near.filter(|(key, _)| !bounds.iter().any(|(given, _)| given == key));
     bounds.extend(near.clone());
     let priors = plan.priors.iter().filter(|(key, _)| free.contains(key) || !is_own(key)).cloned().collect();
@@ -149,23 +149,23 @@ pub(super) fn with(
     {
         bounds.entry(&key).or_insert(Item::Value(Value::Array(Array::from_iter(ends))));
     }
-    // The logs are those that are there already.
+    // The logs are reused.
     let read = Case::from_text_for(name, &document.to_string(), &[], Files::Nothing)?;
     let own = Case { experiments: case.experiments.clone(), unread: Vec::new(), ..read };
     Ok((own, Plan { free, tied, lumped, separate, bounds, priors, ..plan.clone() }))
 }
 
-/// A force beside the friction that is a line over the travel or the speed, zero to start from.
+/// A piecewise linear force in addition to friction over travel or speed, initially zero.
 struct Line {
     /// Under `[cart]`.
     key: &'static str,
     /// m or m/s, of its points.
     over: Vec<f64>,
-    /// The numbers of the points whose force is searched for.
+    /// Indices of the points with a free force.
     free: Vec<usize>,
 }
 
-/// The force that a law has beside the friction. `is_held` says that something else has a constant part, so that one
+/// The force of a law in addition to friction. `is_held` is true if something else has a constant part, so that one
 /// point stays at zero.
 fn line(case: &Case, law: FrictionLaw, is_held: bool) -> Option<Line> {
     match law {
@@ -184,7 +184,7 @@ fn line(case: &Case, law: FrictionLaw, is_held: bool) -> Option<Line> {
     }
 }
 
-/// The table of the friction, and the keys in it that are searched for.
+/// The table of the friction, and its free keys.
 fn table(
     case: &Case,
     law: FrictionLaw,
@@ -228,7 +228,7 @@ fn table(
         FrictionLaw::Along => {
             let point = |x: f64| Value::Array(Array::from_iter([x, 1.0]));
             table.insert("along", Value::Array(over_travel(case).map(point).collect()));
-            // One of them is 1: Coulomb friction is what the factors are of.
+            // One of them is 1, since the factors refer to Coulomb friction.
             let others = (0..TRAVEL_POINTS).filter(|k| *k != TRAVEL_POINTS / 2);
             keys.extend(others.map(|k| format!("along.{k}.factor")));
         }
@@ -247,7 +247,7 @@ fn table(
     (table, keys)
 }
 
-/// Puts a value into a table of the document, in place of what is there.
+/// Sets a value in a table of the document.
 fn put(document: &mut DocumentMut, table: &str, key: &str, value: Value) {
     if let Some(table) = document.get_mut(table).and_then(Item::as_table_like_mut) {
         table.remove(key);
@@ -255,7 +255,7 @@ fn put(document: &mut DocumentMut, table: &str, key: &str, value: Value) {
     }
 }
 
-/// Puts what is searched for into the table of the fit.
+/// Sets the free parameters in the table of the fit.
 fn rewrite(
     document: &mut DocumentMut,
     free: &[String],
@@ -291,7 +291,7 @@ fn rewrite(
     }
 }
 
-/// The greatest speed of the cart that the logs show, m/s, roughly.
+/// Approximate largest speed of the cart in the logs, m/s.
 fn fastest(case: &Case) -> f64 {
     let r = case.machine.pulley_radius;
     let logs = case.experiments.iter().filter_map(|experiment| experiment.log.as_ref());
@@ -338,8 +338,8 @@ mod tests {
     use crate::case::TEMPLATE;
     use crate::parameter::Free;
 
-    /// On EMPS a breakaway of 11 kN beside 21 N of Coulomb friction met three quarters of the record, which never rest,
-    /// and held the fourth for ever.
+    /// On EMPS a breakaway of 11 kN with 21 N of Coulomb friction fitted three quarters of the record, which never
+    /// rest, and held the fourth for ever.
     #[test]
     fn a_breakaway_stays_near_coulomb_friction() {
         let text = format!("{TEMPLATE}\n[fit]\nfree = [\"cart.friction.coulomb\"]\n");
@@ -355,7 +355,7 @@ mod tests {
             let free = Free::new(&own.machine, key, &[], &plan.bounds).unwrap();
             assert_eq!([free.low, free.high], ends.map(|end| end * coulomb));
         }
-        // Bounds that are given stand alone.
+        // Given bounds have precedence.
         let key = "cart.friction.static".to_string();
         let given = Plan { bounds: vec![(key.clone(), [0.0, 9.0 * coulomb])], ..plan };
         let (own, plan) = with(&case, "axis.toml".as_ref(), &given, FrictionLaw::LuGre, false, &case.machine).unwrap();

@@ -1,10 +1,9 @@
-//! Which friction law and which windows: those whose fit to some of the records predicts the others best.
+//! Comparison of friction laws and windows by cross-validation: the best one predicts held-out records best.
 //!
-//! A law with more parameters meets the records that it is fitted to better, and others worse once it fits what does
-//! not come again. So each candidate is fitted with a part of the records left out, and judged by its error there. With
-//! e_cf the squared error of candidate c in part f, the fewest parameters are chosen with which a mean error
-//! exceeds that of the best by no more than a standard error of the differences e_cf − e_bf (the rule of one standard
-//! error, L. Breiman and others 1984).
+//! A law with more parameters fits its own records better, and others worse once it fits noise. So each candidate is
+//! fitted with a part of the records held out, and judged by its error there. With e_cf the squared error of candidate
+//! c in part f, the fewest parameters are chosen with which a mean error exceeds that of the best by no more than a
+//! standard error of the differences e_cf − e_bf (the rule of one standard error, L. Breiman and others 1984).
 
 pub(crate) mod drift;
 mod laws;
@@ -54,22 +53,22 @@ impl Setting {
     }
 }
 
-/// Candidates beside each other.
+/// Result of a comparison.
 #[derive(Debug, Clone)]
 pub struct Comparison {
-    /// All of them, the one that predicts best first.
+    /// All candidates, the best prediction first.
     pub candidates: Vec<Candidate>,
-    /// The one that is chosen.
+    /// Index of the chosen one.
     pub chosen: usize,
-    /// The one with the least training error.
+    /// Index of the one with the least training error.
     pub by_training: usize,
     /// The parts that were held out, in words.
     pub held_out: String,
     /// The body whose friction is compared.
     pub body: &'static str,
-    /// The quantities that errors are of; where there are several, errors are shares of the least of each.
+    /// The quantities of the errors; with several, errors are relative to the least of each.
     pub quantities: Vec<Quantity>,
-    /// The case with the chosen law, what is searched for in it, and the fit to all logs.
+    /// The case with the chosen law.
     pub case: Case,
     /// The free parameters.
     pub plan: Plan,
@@ -88,17 +87,17 @@ pub struct Candidate {
     pub sided: bool,
     /// Length of windows, s; `None` for whole logs.
     pub window: Option<f64>,
-    /// How many parameters of the machine are searched for.
+    /// Number of free parameters of the machine.
     pub parameters: usize,
-    /// Root mean square over whole logs that it was fitted to; NaN where it has none.
+    /// RMS over the complete fitted logs; NaN without a result.
     pub training: f64,
     /// Error on held-out data; infinite if a simulation or the fit failed.
     pub held_out: f64,
-    /// Standard error of the difference of its squared error to that of the best, as one of `held_out`.
+    /// Standard error of the difference of its squared error to that of the best, converted to an error of `held_out`.
     pub error: f64,
-    /// Mean square of each part that was held out.
+    /// Mean square of each held-out part.
     pub squares: Vec<f64>,
-    /// Why there is no result; `None` if there is one.
+    /// Reason for a missing result; `None` with a result.
     pub failed: Option<String>,
 }
 
@@ -171,7 +170,7 @@ pub fn compare(
             }
             let found = course.try_one(&own, &searched, told, &start);
             if let Some(machine) = found {
-                // A law without dry friction leads where a cart with it stands still.
+                // A law without dry friction makes progress where a cart with it stands still.
                 if window == setting.windows[0] && !law.is_above() && law != FrictionLaw::Viscous {
                     from = machine.clone();
                 }
@@ -238,7 +237,7 @@ impl Course<'_> {
         machine
     }
 
-    /// The fit to all logs, and its errors over whole logs with their starts fitted.
+    /// The fit to all logs, and its errors over complete logs with fitted starts.
     fn whole(&mut self, case: &Case, plan: &Plan) -> Result<(Machine, Vec<(Quantity, f64)>)> {
         let found = search_as_far(case, plan, self.stop, &Effort::compared(), &mut |_, _| Flow::Continue)?;
         self.work.add(&found.work);
@@ -262,14 +261,14 @@ impl Course<'_> {
         Ok(found)
     }
 
-    /// The windows with which the laws of straight lines predict best; `None` if none was tried yet.
+    /// The best windows of the piecewise linear laws; `None` if none was tried yet.
     fn best_window(&self) -> Option<Option<f64>> {
         let is_simple = |tried: &&Tried| tried.candidate.failed.is_none() && !tried.candidate.law.is_above();
         let tried = self.tried.iter().filter(is_simple);
         tried.min_by(|a, b| a.squares().total_cmp(&b.squares())).map(|tried| tried.candidate.window)
     }
 
-    /// True if friction with a value for each direction predicts better than without, and both were tried.
+    /// True if direction-dependent friction predicts better, and both were tried.
     fn is_sided_better(&self) -> bool {
         let of = |law: FrictionLaw| {
             let own = self.tried.iter().filter(|tried| tried.candidate.law == law && tried.candidate.failed.is_none());
@@ -282,7 +281,7 @@ impl Course<'_> {
         }
     }
 
-    /// Mean square of a candidate by part; of several quantities, each over the least that any candidate has of it.
+    /// Mean square of a candidate by part; with several quantities, each relative to the least of all candidates.
     fn rank(&mut self) -> Vec<Quantity> {
         let mut quantities: Vec<Quantity> = Vec::new();
         for (quantity, ..) in self.tried.iter().flat_map(|tried| tried.errors.iter().flatten()) {
@@ -382,7 +381,7 @@ impl Candidate {
 }
 
 impl Comparison {
-    /// Why the chosen one is chosen, and what training errors would have chosen, in sentences.
+    /// Reason for the choice, and the choice by training errors, in sentences.
     pub fn words(&self) -> Vec<String> {
         let shown = |candidate: &Candidate| {
             let error = |value: f64| self.shown(value);
@@ -416,7 +415,7 @@ impl Comparison {
         vec![why, training]
     }
 
-    /// An error with its unit; a multiple of the least where there are several quantities.
+    /// An error with its unit; with several quantities, a multiple of the least.
     pub fn shown(&self, value: f64) -> String {
         match self.quantities[..] {
             [quantity] if value.is_finite() => {

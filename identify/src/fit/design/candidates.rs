@@ -1,4 +1,4 @@
-//! The inputs to choose among, each a few numbers.
+//! Candidate inputs, each described by a few numbers.
 
 use crate::fit::limits::{MOST_BITS, MOST_CYCLES, MULTISINE_TONES, REST_AT_END, SWEEP_SINES};
 use crate::signal::{Signal, Slot, Tone};
@@ -7,11 +7,11 @@ use std::f64::consts::PI;
 /// A kind of input.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Kind {
-    /// There and back in trapezoids, every other one smaller.
+    /// Trapezoids there and back, every second one smaller.
     Trapezoid,
-    /// Sines one after another, whole periods of each.
+    /// Sines in succession, whole periods of each.
     Sweep,
-    /// A sine whose frequency rises or falls steadily.
+    /// A sine whose frequency changes linearly.
     Chirp,
     /// A sum of sines.
     Multisine,
@@ -20,7 +20,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// All of them.
+    /// All kinds.
     pub const ALL: [Kind; 5] = [Kind::Trapezoid, Kind::Sweep, Kind::Chirp, Kind::Multisine, Kind::Prbs];
 
     /// In a word.
@@ -34,7 +34,7 @@ impl Kind {
         }
     }
 
-    /// Numbers that a search varies, the amplitude first.
+    /// Number of variables of a search, the amplitude first.
     pub(super) fn numbers(self) -> usize {
         match self {
             Self::Trapezoid | Self::Sweep => 5,
@@ -44,7 +44,7 @@ impl Kind {
     }
 }
 
-/// The room that a search has.
+/// Limits of a search.
 pub(super) struct Room {
     /// Greatest input, V or A.
     pub input: f64,
@@ -54,7 +54,7 @@ pub(super) struct Room {
     pub frequencies: [f64; 2],
 }
 
-/// An input of a kind, its numbers rounded to what is written.
+/// An input of a kind, with its numbers rounded as written.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Shape {
     /// From zero in `ramp` to ± `amplitude`, held for `hold`, back in `ramp`, zero for `rest`; forward, then backward,
@@ -70,10 +70,10 @@ pub enum Shape {
         rest: f64,
         /// Amplitude of every second repetition, relative to the first.
         ratio: f64,
-        /// Times there and back.
+        /// Number of repetitions there and back.
         cycles: usize,
     },
-    /// Sines from one frequency to the other, equally far apart in their logarithm.
+    /// Sines from one frequency to the other, evenly spaced logarithmically.
     Sweep {
         /// Amplitude of the greatest sine.
         amplitude: f64,
@@ -85,10 +85,10 @@ pub enum Shape {
         sines: usize,
         /// Amplitude ∝ frequency to this power.
         tilt: f64,
-        /// About how long each lasts, s.
+        /// Approximate duration of each, s.
         each: f64,
     },
-    /// A sine whose frequency changes steadily.
+    /// A sine whose frequency changes linearly.
     Chirp {
         /// Peak.
         amplitude: f64,
@@ -118,14 +118,14 @@ pub enum Shape {
         amplitude: f64,
         /// Length of a bit, s.
         bit: f64,
-        /// Which sequence.
+        /// Seed of the sequence.
         seed: u64,
         /// s.
         lasts: f64,
     },
 }
 
-/// To four digits.
+/// Rounds to four digits.
 fn round(value: f64) -> f64 {
     format!("{value:.3e}").parse().unwrap_or(value)
 }
@@ -216,7 +216,7 @@ impl Shape {
         points
     }
 
-    /// The sines of a sweep: amplitude, frequency, how long.
+    /// The sines of a sweep: amplitude, frequency, duration.
     pub(super) fn sines(&self) -> Vec<[f64; 3]> {
         let &Self::Sweep { amplitude, from, to, sines, tilt, each } = self else { return Vec::new() };
         let most = from.max(to);
@@ -228,7 +228,7 @@ impl Shape {
         };
         let mut left = each * sines as f64 * 1.02;
         let mut all = (0..sines).map(one).collect::<Vec<_>>();
-        // Slow sines that last longer than their share push the last ones out.
+        // Slow sines that last longer than their share displace the last ones.
         all.retain(|[_, _, lasts]| {
             left -= lasts;
             left >= 0.0
@@ -268,7 +268,7 @@ impl Shape {
         }
     }
 
-    /// As the case file has it; `unit` is that of the amplifier's input.
+    /// In the notation of the case file; `unit` is that of the amplifier's input.
     pub fn toml(&self, unit: &str) -> String {
         match *self {
             Self::Trapezoid { .. } => {

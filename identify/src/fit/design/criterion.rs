@@ -1,4 +1,4 @@
-//! The knowledge that a fit would have, as one number.
+//! Criterion: the expected accuracy of a fit, in one number.
 
 use super::Criterion;
 use crate::fit::asked::problem::Problem;
@@ -6,12 +6,12 @@ use crate::fit::trust::directions::Directions;
 use crate::fit::trust::identify::Identifiability;
 use nalgebra::{Cholesky, DMatrix};
 
-/// The derivatives of a problem, and what follows from them.
+/// Derivatives of a problem, and the resulting information.
 pub(super) struct Information {
     pub problem: Problem<'static>,
     pub x: Vec<f64>,
     pub known: Identifiability,
-    /// Covariance of the relative changes of the parameters that count, what is known beforehand in it.
+    /// Covariance of the relative changes of the parameters in the criterion, including the prior.
     covariance: DMatrix<f64>,
     whole: Vec<f64>,
 }
@@ -31,7 +31,7 @@ impl Information {
         Some(Self { problem, x, known, covariance, whole })
     }
 
-    /// The mean relative error by a criterion: 1 where nothing is known.
+    /// Mean relative error by a criterion: 1 without information.
     pub fn score(&self, criterion: Criterion) -> f64 {
         let k = self.covariance.nrows() as f64;
         match criterion {
@@ -50,7 +50,7 @@ impl Information {
         self.whole[j] * self.problem.slope(j, value).abs()
     }
 
-    /// About a standard error of variable `j`.
+    /// Approximate standard error of variable `j`.
     pub fn step(&self, j: usize) -> f64 {
         let own = self.known.error.get(j).map_or(0.0, |error| error * self.whole[j]);
         if own.is_finite() { own.min(0.3) } else { 0.1 }

@@ -1,14 +1,14 @@
-//! Which drives an input goes to.
+//! Assignment of an input to drives.
 
 use super::candidates::Shape;
 use crate::error::{Error, Result};
 use crate::machine::Machine;
 use crate::signal::Signal;
 
-/// The drives that an input goes to.
+/// The drives that get an input.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Driven {
-    /// The side of a motor that is driven alone, what slides if that is moved alone, or `all`; nothing with one drive.
+    /// The side of a motor driven alone, a slide moved alone, or `all`; empty with one drive.
     pub name: &'static str,
     /// In words.
     words: String,
@@ -17,7 +17,7 @@ pub struct Driven {
 }
 
 impl Driven {
-    /// Each motor alone, each sliding part alone, and all motors alike: each once.
+    /// Each motor alone, each slide alone, and all motors alike, without duplicates.
     pub fn all(machine: &Machine) -> Vec<Self> {
         let geometry = machine.geometry();
         let count = geometry.drives.len();
@@ -71,7 +71,7 @@ impl Driven {
         self.signs.iter().map(input).collect()
     }
 
-    /// The inputs as the case file has them; `unit` is that of the amplifiers' inputs.
+    /// The inputs in the notation of the case file; `unit` is that of the amplifiers' inputs.
     pub(super) fn toml(&self, machine: &Machine, shape: &Shape, unit: &str) -> String {
         if self.name.is_empty() {
             return shape.toml(unit);

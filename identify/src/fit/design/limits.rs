@@ -15,7 +15,7 @@ pub enum Origin {
     Asked,
     /// The machine of the case.
     Machine,
-    /// The greatest value in the case's own experiments.
+    /// The largest value in the case's own experiments.
     Experiments,
 }
 
@@ -39,9 +39,9 @@ pub struct Limits {
     pub current: Option<(f64, Origin)>,
     /// Travel available to each sliding part, m.
     pub travel: Vec<(f64, Origin)>,
-    /// Its middle, where the case says where the travel is.
+    /// Middle of the travel, if the case defines it.
     pub middle: Vec<Option<f64>>,
-    /// Share of each that is left free.
+    /// Fraction of each that is kept free.
     pub margin: f64,
 }
 

@@ -1,16 +1,14 @@
 //! The experiment that determines parameters best: an input within travel, input and current that makes their standard
 //! errors small.
 //!
-//! With J the derivatives of the weighted outputs with respect to relative changes of the parameters, what else is
-//! fitted along projected out, and what is known beforehand of each parameter taken as its value give or take 100 %,
-//! the covariance of the relative changes is
+//! With the derivatives J of the weighted outputs with respect to relative changes of the parameters, nuisance
+//! parameters projected out, and a prior of 100 % on each parameter, the covariance of the relative changes is
 //!
 //! ```text
 //! C = (JᵀJ + I)⁻¹        D-optimal: least det C^(1/2k)        A-optimal: least (tr C / k)^(1/2)
 //! ```
 //!
-//! for the k parameters that count; the others are free, too. J is that of a fit: the same problem is posed with a log
-//! that the model makes.
+//! for the k parameters in the criterion; the others are also free. J is that of a fit to a log simulated by the model.
 
 mod candidates;
 mod criterion;
@@ -36,7 +34,7 @@ use crate::fit::trust::identify::Group;
 use crate::log::Quantity;
 use crate::machine::{Channel, Machine, Measurement};
 
-/// The measure that is made small.
+/// The measure that is minimised.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Criterion {
     /// The volume of the confidence ellipsoid: the geometric mean of the errors along its axes.
@@ -56,7 +54,7 @@ impl Criterion {
     }
 }
 
-/// The experiment that is wanted; what is not said follows from the case.
+/// A request for an experiment; defaults follow from the case.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Request {
     /// The parameters of the criterion; if empty, the free ones of `[fit]`.
@@ -65,27 +63,27 @@ pub struct Request {
     pub kinds: Vec<Kind>,
     /// The driven motors to choose from, by the names of [`Driven::all`]; all if empty.
     pub driven: Vec<String>,
-    /// The measure that is made small.
+    /// The measure that is minimised.
     pub criterion: Criterion,
     /// Length, s.
     pub duration: f64,
-    /// Between samples, s.
+    /// Sample interval, s.
     pub every: Option<f64>,
-    /// Share of each limit that is left free.
+    /// Fraction of each limit that is kept free.
     pub margin: f64,
     /// Relative error of each free parameter within which the limits must still hold.
     pub doubt: f64,
-    /// Relative error of the model: no promise is better.
+    /// Relative error of the model, a lower bound of each predicted error.
     pub model_error: f64,
     /// Greatest input, V or A.
     pub input: Option<f64>,
     /// Greatest current, A.
     pub current: Option<f64>,
-    /// Length of the travel, m; of a gantry that of bridge and cart.
+    /// Length of the travel, m; for a gantry, of bridge and cart.
     pub travel: Option<f64>,
-    /// Outputs that are measured; the case's encoder and recorder where nothing is named.
+    /// Measured outputs; by default those of the case's encoder and recorder.
     pub measured: Vec<Channel>,
-    /// Which search, and which noise.
+    /// Seed of the search and the noise.
     pub seed: u64,
 }
 
@@ -134,11 +132,11 @@ impl Request {
     }
 }
 
-/// A request with all that follows from the case.
+/// A request completed by the case.
 pub(super) struct Task<'a> {
     pub case: Case,
     pub plan: Plan,
-    /// Places of the parameters that count, among the problem's.
+    /// Indices of the parameters in the criterion, among those of the problem.
     pub wanted: Vec<usize>,
     pub names: Vec<String>,
     pub driven: Vec<Driven>,
@@ -244,8 +242,8 @@ impl<'a> Task<'a> {
     }
 }
 
-/// The plan of the fit that the experiment is for: that of the case with the named parameters free, too, and nothing of
-/// logs that are there.
+/// Plan of the fit that the experiment is for: that of the case with the named parameters also free, without existing
+/// logs.
 fn plan_of(case: &Case, request: &Request) -> Result<Plan> {
     let mut plan = case.fit.clone().unwrap_or_default();
     let known: Vec<String> =
@@ -270,7 +268,7 @@ fn plan_of(case: &Case, request: &Request) -> Result<Plan> {
     })
 }
 
-/// The recorder's interval, else the shortest of the experiments.
+/// The recorder's interval, otherwise the shortest of the experiments.
 fn usual_interval(case: &Case) -> f64 {
     let recorder = case.measurement.as_ref().and_then(|measurement| measurement.every);
     // The interval of a log is a difference of its times, with their rounding.

@@ -1,4 +1,4 @@
-//! The search: points spread over what each kind of input can be, then an evolution strategy from the best of them.
+//! The search: points spread over the variables of each kind of input, then an evolution strategy from the best ones.
 
 use super::candidates::{Kind, Room, Shape};
 use super::criterion::Information;
@@ -20,22 +20,22 @@ use crate::mechanism::State;
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
 
-/// Promise of an experiment for a parameter.
+/// Predicted accuracy of a parameter.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Promise {
     /// Its name.
     pub name: String,
     /// SI unit.
     pub unit: &'static str,
-    /// The value that it is promised for, that of the case.
+    /// The value of the case, for which it is predicted.
     pub value: f64,
-    /// Standard error, the error of the model included; infinite where it is not determined.
+    /// Standard error including the error of the model; infinite if not determined.
     pub error: f64,
     /// Standard error relative to the value, or to a typical one if the value may be zero.
     pub relative: f64,
-    /// Standard error of an exact model, from the noise and steps of what is measured alone.
+    /// Standard error of an exact model, from noise and resolution of the measurement alone.
     pub random: f64,
-    /// True if it is one of those that count.
+    /// True if it is in the criterion.
     pub wanted: bool,
 }
 
@@ -68,11 +68,11 @@ pub struct Own {
     pub duration: f64,
     /// The mean relative error.
     pub score: f64,
-    /// Parameters that count and that it determines.
+    /// Number of parameters in the criterion that it determines.
     pub determined: usize,
 }
 
-/// The experiment that was found.
+/// The designed experiment.
 #[derive(Debug, Clone)]
 pub struct Designed {
     /// The input.
@@ -85,7 +85,7 @@ pub struct Designed {
     pub unit: &'static str,
     /// Length, s.
     pub duration: f64,
-    /// Between samples, s.
+    /// Sample interval, s.
     pub every: f64,
     /// Initial state.
     pub initial: State,
@@ -97,13 +97,13 @@ pub struct Designed {
     pub doubt: f64,
     /// Relative error of the model, in every promise.
     pub model_error: f64,
-    /// Outputs that are measured, and how well.
+    /// Measured outputs with their noise.
     pub measured: Vec<Channel>,
     /// Its promise for every free parameter.
     pub promises: Vec<Promise>,
-    /// The measure that was made small, and the mean relative error by it.
+    /// The minimised measure.
     pub criterion: Criterion,
-    /// The same.
+    /// Mean relative error by it.
     pub score: f64,
     /// Parameters that it cannot distinguish, with remedies.
     pub undetermined: Undetermined,
@@ -204,7 +204,7 @@ fn look(task: &Task, kind: Kind, driven: &Driven, point: &[f64], tried: &mut usi
     score.is_finite().then_some((shape, score))
 }
 
-/// The best of points that are spread evenly along each number, in random order.
+/// The best of points spread evenly along each variable, in random order (Latin hypercube).
 fn screened(task: &Task, kind: Kind, driven: &Driven, tried: &mut usize) -> Option<(Shape, Vec<f64>, f64)> {
     let n = kind.numbers();
     let mut random = Pcg64::seed_from_u64(task.seed);
@@ -232,7 +232,7 @@ fn shuffled(count: usize, random: &mut Pcg64) -> Vec<usize> {
     all
 }
 
-/// The best that an evolution strategy finds from a point, if that is better.
+/// The best result of an evolution strategy from a point, if better.
 fn refined(
     task: &Task,
     kind: Kind,
@@ -258,7 +258,7 @@ fn refined(
     best
 }
 
-/// The machine with each free parameter off to either side.
+/// The machine with each free parameter changed to either side.
 fn doubtful(task: &Task) -> Result<Vec<Machine>> {
     if task.doubt == 0.0 {
         return Ok(Vec::new());
@@ -275,7 +275,7 @@ fn doubtful(task: &Task) -> Result<Vec<Machine>> {
 }
 
 impl Task<'_> {
-    /// An input that keeps the limits on all of these machines, too, with its information.
+    /// An input that also keeps the limits on all of these machines, with its information.
     fn finally(&self, shape: Shape, driven: &Driven, doubtful: &[Machine]) -> Option<Judged> {
         let (shape, initial, reached) = self.fitted(shape, driven, doubtful)?;
         // An input that does not break the machine away contains no information.

@@ -1,4 +1,4 @@
-//! The experiment as the case file has it.
+//! The experiment in the notation of the case file.
 
 use super::Designed;
 use crate::case::{Case, Experiment};
@@ -50,7 +50,7 @@ impl Designed {
         all.join(", ")
     }
 
-    /// The text of the case with the experiment behind all else; `name` stands in messages.
+    /// The text of the case with the experiment at its end; `name` is used in messages.
     pub fn case_text(&self, case: &Case, name: &Path) -> Result<String> {
         let whole = format!("{}\n\n{}", case.text.trim_end(), self.toml(&case.machine));
         let read = Case::from_text(name, &whole).map_err(|error| {

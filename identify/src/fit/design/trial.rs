@@ -61,7 +61,7 @@ impl Task<'_> {
         None
     }
 
-    /// The experiment with the log that the model makes of it; `noise` is which one.
+    /// The experiment with a log simulated by the model; `noise` selects the noise.
     pub(super) fn experiment(&self, name: &str, inputs: &[Signal], initial: State, noise: u64) -> Option<Experiment> {
         let time: Vec<f64> = {
             let grid = Grid::new(self.every, self.duration);
@@ -109,12 +109,12 @@ impl Task<'_> {
         Some(experiment)
     }
 
-    /// The standard deviation of what is recorded, rounding in it.
+    /// Standard deviation of a recorded value, including rounding.
     pub(super) fn deviation(channel: &Channel) -> f64 {
         channel.noise.hypot(channel.step.unwrap_or(0.0) / 12f64.sqrt())
     }
 
-    /// The problem that a fit of this experiment is, in its weights.
+    /// The least-squares problem of a fit to this experiment, with its weights.
     pub(super) fn problem(&self, experiment: Experiment) -> Option<Problem<'static>> {
         let case = crate::case::Case { experiments: vec![experiment], ..self.case.clone() };
         let mut problem = Problem::new(&case, &self.plan).ok()?;
@@ -128,7 +128,7 @@ impl Task<'_> {
         Some(problem)
     }
 
-    /// Knowledge of a fit of a log of these inputs, by such derivatives.
+    /// Information of a fit to a log of these inputs, by such derivatives.
     pub(super) fn information(&self, inputs: &[Signal], initial: State, how: &Differences) -> Option<Information> {
         let mut problem = self.problem(self.experiment("designed", inputs, initial, self.seed)?)?;
         let x = problem.start();
@@ -152,13 +152,13 @@ impl Task<'_> {
         let bounds = problem.bounds();
         let coarse: DMatrix<f64> = problem.jacobian(&x, &residuals, &bounds, &Differences::Coarse(steps))?;
         let coarse = Information::new(information.problem.clone(), coarse, x, &self.wanted)?;
-        // The one that promises less.
+        // The one with the larger predicted error.
         let worse = |one: &Information| one.score(self.criterion);
         Some(if worse(&coarse) > worse(&information) { coarse } else { information })
     }
 }
 
-/// To a tenth of a millimetre, as it is written.
+/// Rounds to a tenth of a millimetre, as written.
 fn round(position: f64) -> f64 {
     (position * 1e4).round() / 1e4 + 0.0
 }
@@ -166,7 +166,7 @@ fn round(position: f64) -> f64 {
 /// The column of a run with that quantity.
 fn source(block: &Trajectory, quantity: Quantity) -> &[f64] {
     let name = quantity.name();
-    // A rotor without play is where its pulley is.
+    // Behind a stiff gear, the rotor moves with its pulley.
     let other = match name {
         "motor_voltage" => "voltage".into(),
         "rotor_angle" => "drive_angle".into(),
@@ -176,7 +176,7 @@ fn source(block: &Trajectory, quantity: Quantity) -> &[f64] {
     block.get(name).or_else(|| block.get(&other)).unwrap_or(&[])
 }
 
-/// A value as a converter gives it.
+/// A value as recorded by a converter.
 fn recorded(value: f64, channel: &Channel, random: &mut Pcg64) -> f64 {
     let noisy = if channel.noise > 0.0 { value + channel.noise * normal(random) } else { value };
     channel.step.map_or(noisy, |step| (noisy / step).round() * step)

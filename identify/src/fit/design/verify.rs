@@ -19,19 +19,19 @@ use rand_pcg::rand_core::SeedableRng;
 pub struct Verified {
     /// Its name.
     pub name: String,
-    /// Root mean square of estimate − truth, over the standard error that was promised of an exact model.
+    /// RMS of estimate − truth, relative to the predicted standard error of an exact model.
     pub ratio: f64,
-    /// Mean of estimate − truth, over the same.
+    /// Mean of estimate − truth, relative to the same.
     pub bias: f64,
-    /// Share of the fits whose own 95 % interval holds the truth.
+    /// Fraction of the fits whose own 95 % interval contains the truth.
     pub coverage: f64,
-    /// Fits that determined it.
+    /// Number of fits that determined it.
     pub fits: usize,
 }
 
-/// Simulates a log of a designed experiment on each of `logs` machines and fits it; of every parameter that it
-/// determines, how far the estimates are from the truth. The first machine is that of the case; of the others each free
-/// parameter is off by up to `request.doubt`.
+/// Simulates a log of a designed experiment on each of `logs` machines and fits it; returns the errors of the estimates
+/// for every determined parameter. The first machine is that of the case; on the others each free parameter is changed
+/// by up to `request.doubt`.
 pub fn verify(case: &Case, request: &Request, found: &Designed, logs: usize, stop: Stop) -> Result<Vec<Verified>> {
     let task = Task::new(case, request, stop)?;
     let frees = parameters(&case.machine, &task.plan, &[])?;
@@ -41,7 +41,7 @@ pub fn verify(case: &Case, request: &Request, found: &Designed, logs: usize, sto
         if stop() {
             break;
         }
-        // Somewhere within a step of a converter, so that rounding is another each time.
+        // A random position within a step of a converter, so that rounding differs each time.
         let mut initial = found.initial;
         let off: Vec<f64> = found.reached.positions.iter().map(|_| uniform(&mut random) * step(&task)).collect();
         let moved = case.machine.without_strain(&off, &[]).position;
@@ -89,7 +89,7 @@ pub fn verify(case: &Case, request: &Request, found: &Designed, logs: usize, sto
     Ok(frees.iter().zip(seen).map(told).filter(|one| one.fits > 0).collect())
 }
 
-/// The coarsest step of a position that is recorded, m along the belt.
+/// The coarsest step of a recorded position, m along the belt.
 fn step(task: &Task) -> f64 {
     let arm = |quantity: Quantity| if quantity.is_linear() { 1.0 } else { task.case.machine.pulley_radius };
     let positions = task.measured.iter().filter(|channel| channel.quantity.is_position());

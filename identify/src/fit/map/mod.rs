@@ -1,4 +1,5 @@
-//! The force that depends on the position of the cart, from logs of slow motion over the travel in both directions.
+//! Force map: the force that depends on the position of the cart, from logs of slow motion over the travel in both
+//! directions.
 //!
 //! Each pass in one direction gives the force that the model lacks along the travel,
 //!
@@ -6,14 +7,15 @@
 //! ΔF = M ẍ + b ẋ + F_c sgn ẋ − F₀ − F_x(x) − f_M,        all smoothed by the same Gaussian,
 //! ```
 //!
-//! as a line through points. What is the same in both directions is the map, what changes its sign is friction:
+//! as a line through points. The part that is equal in both directions is the map, the part that changes its sign is
+//! friction:
 //!
 //! ```text
 //! F = (F⁺ + F⁻)/2,   D = (F⁺ − F⁻)/2
 //! ```
 //!
-//! with means F⁺, F⁻ over the passes in each direction. What differs between passes beside the mean of D is noise: the
-//! uncertainty of the map. This includes friction that changes along the travel, unless the model has it.
+//! with means F⁺, F⁻ over the passes in each direction. Other differences between passes are noise, which determines
+//! the uncertainty of the map. This includes friction that changes along the travel, unless the model has it.
 
 mod passes;
 mod waves;
@@ -34,7 +36,7 @@ use waves::{Noise, Wave, search};
 /// A force along the travel.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ForceMap {
-    /// The points, in order; the values beside what the case has already.
+    /// The points, in order; values in addition to those of the case.
     pub points: Vec<Point>,
     /// Passes forward and backward.
     pub passes: [usize; 2],
@@ -48,13 +50,13 @@ pub struct ForceMap {
     pub friction: f64,
     /// The periodic components, the largest first.
     pub components: Vec<Component>,
-    /// Amplitude that a periodic component needs to be found, N.
+    /// Least detectable amplitude of a periodic component, N.
     pub visible: f64,
-    /// Periods of the machine that the travel is too short for.
+    /// Periods of the machine for which the travel is too short.
     pub too_long: Vec<Origin>,
     /// Shortest period that is resolved, m: less than 10 % of its amplitude are lost.
     pub resolution: f64,
-    /// What limits it.
+    /// Cause of the resolution limit.
     pub limit: Limit,
     /// `cart.force_along` of the case with the map added; none if it is not significant.
     pub line: Option<Polyline>,
@@ -80,23 +82,23 @@ pub struct Component {
     pub period: [f64; 2],
     /// Amplitude and its standard error, N.
     pub amplitude: [f64; 2],
-    /// Chance that noise shows it anywhere.
+    /// Probability that noise causes such a component anywhere.
     pub chance: f64,
-    /// What on the machine has this period; empty if nothing known has.
+    /// Parts of the machine with this period; empty if none is known.
     pub origins: Vec<Origin>,
 }
 
-/// What has a period along the travel.
+/// Source of a period along the travel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Origin {
-    /// So many periods per turn of the pulleys, which have one radius: one of an eccentric pulley.
+    /// Number of periods per turn of the pulleys, which have one radius: 1 for an eccentric pulley.
     Pulley {
         /// Periods per turn.
         count: u32,
         /// m
         period: f64,
     },
-    /// So many periods per turn of the motor, as of its poles or slots.
+    /// Number of periods per turn of the motor, as of its poles or slots.
     Motor {
         /// Periods per turn.
         count: u32,
@@ -130,7 +132,7 @@ impl Origin {
     }
 }
 
-/// What limits the resolution of a map.
+/// Cause of a map's resolution limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Limit {
     /// The smoothing of the log at its speed.
@@ -174,7 +176,7 @@ pub fn map(case: &Case) -> Result<ForceMap> {
     }
     let finest = (ends[1] - ends[0]) / (MOST_POINTS - 1) as f64;
     let mut all = Vec::new();
-    // Derivatives of a constant are rounding, which has a direction.
+    // Derivatives of a constant are rounding, which would have a direction.
     for log in logs.iter().filter(|_| finest > 0.0) {
         all.extend(passes(machine, log, finest)?);
     }
@@ -198,7 +200,7 @@ fn of_passes(case: &Case, mut all: Vec<Pass>) -> Result<ForceMap> {
     }
     let low = all.iter().map(|pass| pass.ends()[0]).fold(f64::NEG_INFINITY, f64::max);
     let high = all.iter().map(|pass| pass.ends()[1]).fold(f64::INFINITY, f64::min);
-    // Points that the case has outside stay.
+    // Points of the case outside are kept.
     let own = machine.cart.forces.along.as_ref();
     let outside = |line: &&Polyline| line.points().iter().filter(|point| point[0] < low || point[0] > high).count();
     let fewest = all.iter().map(|pass| pass.rows.len()).min().unwrap_or(0) / MAP_ROWS;
@@ -242,7 +244,7 @@ fn of_passes(case: &Case, mut all: Vec<Pass>) -> Result<ForceMap> {
     let factor = student((MAP_FREEDOM * freedom * count as f64) as usize);
     let point = |j: usize| {
         let local = variance(j.saturating_sub(MAP_LOCAL)..(j + MAP_LOCAL + 1).min(count));
-        // A straight line between points is off by h² F″/12 at most in the mean, and a Gaussian by σ² F″/2.
+        // A straight line between points has a mean error of at most h² F″/12, a Gaussian of σ² F″/2.
         let bend = if j == 0 || j + 1 == count { 0.0 } else { values[j + 1] - 2.0 * values[j] + values[j - 1] };
         let cut = bend.abs() * (1.0 / 12.0 + 0.5 * (smoothing / step).powi(2));
         let half = factor * (overall.max(local) * weight).sqrt() + cut;
@@ -286,7 +288,7 @@ fn of_passes(case: &Case, mut all: Vec<Pass>) -> Result<ForceMap> {
     })
 }
 
-/// The line of the case with a map added, which goes on outside with its first and last value.
+/// The line of the case with a map added, constant outside with its first and last value.
 fn added(own: Option<&Polyline>, points: &[Point]) -> Option<Polyline> {
     let at = |x: f64| own.map_or(0.0, |line| line.value(x));
     let [low, high] = [points.first()?, points.last()?];
@@ -300,7 +302,7 @@ fn added(own: Option<&Polyline>, points: &[Point]) -> Option<Polyline> {
     Polyline::new(before.chain(inside).chain(behind).collect())
 }
 
-/// The shortest period that keeps its amplitude, and why.
+/// The shortest period that keeps its amplitude, and the cause of this limit.
 ///
 /// A Gaussian of deviation σ leaves exp(−(2πσ/λ)²/2), a line through points h apart 1 − (2πh/λ)²/12, and a motor before
 /// a belt of the frequency f₁ reports the force on the cart at the speed v times 1/(1 − (v/(λ f₁))²).
@@ -338,7 +340,7 @@ fn origins(case: &Case, resolution: f64) -> Vec<Origin> {
 
 impl ForceMap {
     /// The text of the case with the map in `cart.force_along`; none if it is not significant. Paths in it are those of
-    /// `case`; `name` stands in messages.
+    /// `case`; `name` is used in messages.
     pub fn case_text(&self, case: &Case, name: &Path) -> Result<Option<String>> {
         let Some(line) = &self.line else { return Ok(None) };
         let digits = |value: f64, digits: usize| format!("{value:.digits$}");
@@ -348,7 +350,7 @@ impl ForceMap {
         Ok(Some(Case::from_text_for(name, &case.text, &[&change], Files::Nothing)?.text))
     }
 
-    /// True if a component has the period of a turn of the pulley, which an eccentric pulley has, too.
+    /// True if a component has the period of a turn of the pulley, as an eccentric pulley would cause.
     pub fn may_be_eccentric(&self) -> bool {
         let is_turn = |origin: &Origin| matches!(origin, Origin::Pulley { count: 1, .. });
         self.components.iter().any(|component| component.origins.iter().any(is_turn))

@@ -34,8 +34,7 @@ impl Pass {
         high - low
     }
 
-    /// The line through `count` points from `low` on, `step` apart, with the least squares of the rows; none where
-    /// points have too few rows.
+    /// Least-squares line through `count` points from `low`, at intervals of `step`; none if points have too few rows.
     ///
     /// With the hat functions φ_i of the points the equations Σ_k φ_i φ_j y_j = Σ_k φ_i f_k are tridiagonal.
     pub fn line(&self, low: f64, step: f64, count: usize) -> Option<Vec<f64>> {
@@ -81,7 +80,7 @@ pub(super) fn passes(machine: &Machine, log: &Log, step: f64) -> Result<Vec<Pass
     let too_short = || {
         Error::new(format!("{n} rows are too few for a map")).in_key(log).next("log slow motion over the whole travel")
     };
-    // A first look with few rows tells the speed, and that the width of the final one.
+    // A first estimate with few rows gives the speed, and the speed the final width.
     let first = derived(&way, WIDTHS[6], h).ok_or_else(too_short)?;
     let usual = usual(first.iter().map(|[speed, _]| speed.abs()));
     let wanted = MAP_SMOOTHING * step / (usual * h);
@@ -91,7 +90,7 @@ pub(super) fn passes(machine: &Machine, log: &Log, step: f64) -> Result<Vec<Pass
     let (rigid, r) = (Rigid::of(machine), machine.pulley_radius);
     let motor: Vec<f64> = (0..n)
         .map(|k| {
-            // Speeds at the ends are those of the nearest row that has one.
+            // Speeds at the ends are those of the nearest row with a speed.
             let [speed, _] = motion[k.saturating_sub(margin).min(motion.len() - 1)];
             torque(machine, log.inputs[0][k], speed / r) / r
         })
@@ -134,7 +133,7 @@ pub(super) fn passes(machine: &Machine, log: &Log, step: f64) -> Result<Vec<Pass
     Ok(all)
 }
 
-/// The interval that a log goes over, m.
+/// Interval covered by a log, m.
 pub(super) fn travelled(machine: &Machine, log: &Log) -> Result<[f64; 2]> {
     let way = way(machine, log)?;
     Ok([way.iter().copied().fold(f64::INFINITY, f64::min), way.iter().copied().fold(f64::NEG_INFINITY, f64::max)])
@@ -173,7 +172,7 @@ fn middle(values: impl Iterator<Item = f64>) -> f64 {
     median(&mut values.collect::<Vec<f64>>())
 }
 
-/// Median of what is above a tenth of the largest.
+/// Median of the values above a tenth of the largest.
 fn usual(values: impl Iterator<Item = f64> + Clone) -> f64 {
     let most = values.clone().fold(f64::MIN_POSITIVE, f64::max);
     middle(values.filter(|value| *value > 0.1 * most)).max(f64::MIN_POSITIVE)

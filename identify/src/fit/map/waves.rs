@@ -1,5 +1,5 @@
-//! Periodic components of a force along the travel, and whether it changes at all, judged by what differs between
-//! passes.
+//! Periodic components of a force along the travel, and the significance of its variation, judged by differences
+//! between passes.
 //!
 //! With c_p(f) the Fourier coefficient of pass p at the wave number f, and A(f) that of the map, their mean over both
 //! directions, the noise is the mean over passes and neighbouring wave numbers
@@ -8,7 +8,7 @@
 //! S(f) = Σ |c_p − A|²/(ν B)
 //! ```
 //!
-//! whatever its colour. Without a force |A|²/(S w) has the F distribution with 2 and 2 ν B degrees of freedom,
+//! for any spectrum. Without a force |A|²/(S w) has the F distribution with 2 and 2 ν B degrees of freedom,
 //! P(> x) = (1 + x/(ν B))^(−ν B), and N wave numbers are tried.
 
 use crate::fit::limits::{
@@ -26,13 +26,13 @@ pub(super) struct Wave {
     pub number: [f64; 2],
     /// N, and its standard error.
     pub amplitude: [f64; 2],
-    /// Chance of so large an amplitude without a force, over all wave numbers that are tried.
+    /// Probability of such an amplitude without a force, over all tried wave numbers.
     pub chance: f64,
 }
 
-/// What differs between passes.
+/// Differences between passes.
 pub(super) struct Noise<'a> {
-    /// What each pass has beside the map, N.
+    /// Residuals of each pass against the map, N.
     pub residuals: &'a [Vec<f64>],
     /// ν: degrees of freedom of a point.
     pub freedom: f64,
@@ -42,13 +42,13 @@ pub(super) struct Noise<'a> {
     pub step: f64,
 }
 
-/// What the search found.
+/// Result of the search.
 pub(super) struct Found {
     /// True if the force changes along the travel.
     pub changes: bool,
     /// The periodic components, the largest first.
     pub waves: Vec<Wave>,
-    /// Amplitude that a sine needs to be found, N.
+    /// Least detectable amplitude of a sine, N.
     pub visible: f64,
 }
 
@@ -57,7 +57,7 @@ impl Noise<'_> {
         self.residuals[0].len()
     }
 
-    /// Length of the travel that the points stand for, m.
+    /// Length of the travel that the points represent, m.
     fn length(&self) -> f64 {
         self.step * self.count() as f64
     }
@@ -77,7 +77,7 @@ pub(super) fn search(values: &[f64], noise: &Noise, highest: f64) -> Found {
     let (length, step) = (noise.length(), 1.0 / (MAP_RASTER * noise.length()));
     let raster: Vec<f64> = (MAP_RASTER as usize..).map(|k| k as f64 * step).take_while(|f| *f <= highest).collect();
     let tried = raster.len().max(1) as f64;
-    // Chance that |A|² is so large without a force.
+    // Probability of such an |A|² without a force.
     let chance = |f: f64, square: f64| {
         let [power, freedom] = noise.at(f);
         let x = square / (power * noise.weight).max(f64::MIN_POSITIVE);
@@ -103,7 +103,7 @@ pub(super) fn search(values: &[f64], noise: &Noise, highest: f64) -> Found {
         if numbers.iter().any(|other| (other - number).abs() < 0.5 / length) {
             break;
         }
-        // What is in one half alone is no period.
+        // A component in only one half is not periodic.
         let size = coefficient(&left, number * noise.step).norm();
         let is_periodic = left
             .chunks(left.len().div_ceil(2))
@@ -131,7 +131,7 @@ pub(super) fn search(values: &[f64], noise: &Noise, highest: f64) -> Found {
     Found { changes, waves, visible: raster.iter().map(needed).fold(0.0, f64::max) }
 }
 
-/// Moves each wave number to where all of them together leave least of the values: a sine alone is displaced by the
+/// Refines each wave number to the least residual of all sines together, since a single sine is displaced by the
 /// others.
 fn refine(values: &[f64], numbers: &mut [f64], step: f64, raster: f64) {
     for _ in 0..MAP_ROUNDS {
@@ -155,7 +155,7 @@ fn coefficient(values: &[f64], number: f64) -> Complex<f64> {
     sum * (2.0 / values.len() as f64)
 }
 
-/// What a cubic and sines of these wave numbers leave of the values by least squares, and the amplitudes of the sines.
+/// Residuals of a least-squares fit of a cubic and sines with these wave numbers, and the amplitudes of the sines.
 fn without(values: &[f64], numbers: &[f64], step: f64) -> Option<(Vec<f64>, Vec<f64>)> {
     let n = values.len();
     let matrix = DMatrix::from_fn(n, 4 + 2 * numbers.len(), |j, column| match column {

@@ -1,5 +1,4 @@
-//! A Kalman filter that takes all columns of a series along: what is left of each when slow noises of first order are
-//! taken out.
+//! Kalman filter for all columns of a series: innovations of each with slow first-order noises removed.
 //!
 //! ```text
 //! x ← e^{−Δ/τ} x + fresh noise of variance σ² (1 − e^{−2Δ/τ})
@@ -52,7 +51,8 @@ pub(super) fn innovations(
     }
 }
 
-/// [`innovations`] of a noise that swings: an oscillator with x and w = ẋ/ω₀ that white noise drives, of which x shows.
+/// [`innovations`] of narrow-band noise: an oscillator with x and w = ẋ/ω₀ driven by white noise, of which x is
+/// observed.
 ///
 /// ```text
 /// γ = 1/τ      ω₀² = ω² + γ²

@@ -46,7 +46,7 @@ pub(super) struct Slow {
     pub frequency: f64,
 }
 
-/// An error that comes again at the same place.
+/// An error that repeats with position.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Wave {
     /// The quantity with the error.
@@ -57,14 +57,14 @@ pub struct Wave {
     pub amplitude: f64,
 }
 
-/// Noise of a quantity as one of the grid has it.
+/// Noise of a quantity at one point of the grid.
 struct Told {
-    /// Logarithm of the likelihood and of what it counted for before.
+    /// Logarithm of likelihood times prior weight.
     weight: f64,
     /// s², the variance of the white noise.
     white: f64,
     slow: Vec<Slow>,
-    /// Freedom of s².
+    /// Degrees of freedom of s².
     freedom: f64,
 }
 
@@ -82,23 +82,24 @@ struct Normal {
 /// The spread of the parameters from noise of one quantity.
 #[derive(Debug, Clone)]
 pub(super) struct Spread {
-    /// Weights and covariances of the globals; and those of noise that is larger in some places, where it is.
+    /// Weights and covariances of the globals; with those for heteroscedastic noise, if any.
     parts: Vec<(f64, DMatrix<f64>, Option<DMatrix<f64>>)>,
     freedom: f64,
-    /// Shift of the globals by errors that recur at the same place.
+    /// Shift of the globals by errors that repeat with position.
     shift: DVector<f64>,
     /// Mean covariance, with the square of the shift.
     pub covariance: DMatrix<f64>,
     /// The most likely slow noises.
     pub slow: Vec<Slow>,
-    /// Errors that come again at the same place.
+    /// Errors that repeat with position.
     pub waves: Vec<Wave>,
     /// Ratio of the largest to the smallest noise.
     pub unevenness: f64,
 }
 
 impl Spread {
-    /// Half of the 95 % interval of Σ c_j δ_j: what all kinds of noise leave with 5 % together, beside the shift.
+    /// Half-width of the 95 % interval of Σ c_j δ_j: exceeded with 5 % over the mixture of all kinds of noise,
+    /// including the shift.
     pub fn half_width(&self, combination: &DVector<f64>) -> f64 {
         let variance = |own: &DMatrix<f64>| (own * combination).dot(combination).max(0.0);
         let greater = |even, uneven: &Option<DMatrix<f64>>| uneven.as_ref().map_or(0.0, variance).max(variance(even));
@@ -126,8 +127,8 @@ impl Spread {
     }
 }
 
-/// Zero of a function between two points at which it has opposite signs, to twelve digits of the greater one (T. R.
-/// Chandrupatla 1997: inverse quadratic interpolation if that is known to help, else bisection).
+/// Zero of a function between two points with opposite signs, to twelve digits of the larger one (T. R. Chandrupatla
+/// 1997: inverse quadratic interpolation if that is known to help, else bisection).
 fn zero(of: &dyn Fn(f64) -> f64, low: f64, high: f64) -> f64 {
     let (mut a, mut b) = ((low, of(low)), (high, of(high)));
     let mut part = 0.5;
@@ -155,13 +156,13 @@ fn zero(of: &dyn Fn(f64) -> f64, low: f64, high: f64) -> f64 {
     0.5 * (a.0 + b.0)
 }
 
-/// Half of the 95 % interval of a combination for the noise of all quantities.
+/// Half-width of the 95 % interval of a combination for the noise of all quantities.
 pub(super) fn half_width(spreads: &[Spread], combination: &DVector<f64>) -> f64 {
     spreads.iter().map(|spread| spread.half_width(combination).powi(2)).sum::<f64>().sqrt()
 }
 
-/// The spread that the noise of each quantity makes of the first columns of a Jacobian, which concern all runs; the
-/// others concern one.
+/// Spread by the noise of each quantity of the variables of the first columns of a Jacobian, which concern all runs;
+/// the others concern one.
 pub(super) fn spreads(
     problem: &Problem,
     residuals: &[f64],
@@ -181,7 +182,7 @@ pub(super) fn spreads(
         })
         .filter(|estimate| estimate.blocks() >= 4)
         .collect();
-    // (JᵀJ)⁻¹ is what white noise makes of all quantities, and what is known beforehand, and what blocks leave out.
+    // (JᵀJ)⁻¹ is the covariance for white noise, including priors and everything outside blocks.
     let mut rest = inverse.view((0, 0), (globals, globals)).into_owned();
     for estimate in &estimates {
         rest -= estimate.white_part(None);
@@ -208,7 +209,7 @@ impl Estimate {
         self.series.iter().map(|series| series.time.len()).sum()
     }
 
-    /// The spread, `rest` being the covariance that white noise makes of what no block shows.
+    /// The spread; `rest` is the covariance by white noise of everything outside blocks.
     fn spread(mut self, rest: &DMatrix<f64>) -> Option<Spread> {
         let mut told = self.told();
         let slow = best(&told)?.slow.clone();
@@ -237,7 +238,7 @@ impl Estimate {
         Some(Spread { parts, freedom, shift, covariance, slow, waves, unevenness })
     }
 
-    /// The covariances of the globals that these kinds of noise make, of these sizes along the series.
+    /// Covariances of the globals by these kinds of noise, with these sizes along the series.
     fn parts(
         &self,
         told: &[Told],
@@ -262,7 +263,7 @@ impl Estimate {
         told.iter().map(of).collect()
     }
 
-    /// All kinds of noise that are tried, with their likelihoods.
+    /// All tried kinds of noise, with their likelihoods.
     fn told(&self) -> Vec<Told> {
         let long = |series: &Series| series.time.last().unwrap_or(&0.0) - series.time.first().unwrap_or(&0.0);
         let longest = self.series.iter().map(long).fold(0.0, f64::max);
@@ -280,7 +281,7 @@ impl Estimate {
         // Power at low frequencies over that of white noise: 2 τ σ² g²/Δ
         let powers: Vec<f64> = (0..MOST_POWERS).map(|k| LEAST_POWER * POWER_RATIO.powi(k as i32)).collect();
         let variance = |power: f64, time: f64| power * interval / (2.0 * time * gain);
-        // One slow noise after the other, alone or beside another whose time is not much the same.
+        // Each slow noise alone, or with another of a clearly different time constant.
         let along = |beside: Option<Slow>| {
             let mut told = Vec::new();
             let apart = |time: &&f64| beside.is_none_or(|other| (*time / other.time).ln().abs() > TIMES_APART);
@@ -319,7 +320,7 @@ impl Estimate {
             first = top.slow[0];
             turns.push(two);
         }
-        // The best of one stands for all of its kind that are about as good: Σ e^{L − L*} of them.
+        // The best of one kind represents all similar ones: Σ e^{L − L*} of them.
         all.extend(self.swinging([interval, longest], gain));
         let (Some(a), Some(b)) = (turns.pop(), turns.pop()) else { return all };
         let top = best(&a).map_or(0.0, |one| one.weight);
@@ -373,7 +374,7 @@ impl Estimate {
             }
             steps = steps.map(|step| SWING_SHRINKS * step);
         }
-        // On a grid around it, each as likely before as one that was tried at first.
+        // A grid around it, each point with the prior weight of a first one.
         let shares = [-1.0, 0.0, 1.0];
         let mut all = Vec::new();
         for i in shares {
@@ -422,8 +423,8 @@ impl Estimate {
         })
     }
 
-    /// The normal equations of the globals, the waves and the residuals under these slow noises, without what columns
-    /// of one run can do.
+    /// Normal equations of the globals, the waves and the residuals under these slow noises, with the columns of single
+    /// runs eliminated.
     fn normal(&self, slow: &[Slow]) -> Normal {
         let g = self.globals;
         let n = g + self.series.first().map_or(0, |series| series.more);
@@ -471,8 +472,8 @@ impl Estimate {
         Some((amplitudes, inverse.view((waves, waves), (more, more)) * noise.white))
     }
 
-    /// Finds errors that come again at the same place, and the noise beside them. At a steady speed such an error swings
-    /// as noise may: the likelier of both counts.
+    /// Finds errors that repeat with position, and the noise beside them. At a steady speed such an error oscillates
+    /// like noise: the likelier of both counts.
     fn waves_beside(&mut self, told: &mut Vec<Told>) -> Option<Vec<f64>> {
         let top = best(told)?;
         let swings = |one: &Told| one.slow.iter().any(|slow| slow.frequency > 0.0);
@@ -495,8 +496,7 @@ impl Estimate {
         Some(lengths)
     }
 
-    /// Finds errors that come again at the same place beside this noise, and puts them into the rows: the lengths of
-    /// their waves.
+    /// Finds errors that repeat with position beside this noise, and adds them to the rows; returns their wavelengths.
     fn find_waves(&mut self, noise: &Told) -> Vec<f64> {
         let mut lengths = Vec::new();
         let mut amplitudes = DVector::zeros(0);
@@ -516,7 +516,7 @@ impl Estimate {
         lengths
     }
 
-    /// The waves in the rows under this noise, what they have moved the globals by, and the covariance of that.
+    /// The waves in the rows under this noise, the shift of the globals by them, and its covariance.
     fn waves(&self, noise: &Told, lengths: &[f64]) -> (Vec<Wave>, DVector<f64>, DMatrix<f64>) {
         let g = self.globals;
         let nothing = (Vec::new(), DVector::zeros(g), DMatrix::zeros(g, g));
@@ -545,7 +545,7 @@ impl Estimate {
         (waves, &moves * &amplitudes, &moves * covariance * moves.transpose())
     }
 
-    /// Σ W d² Wᵀ for white noise of one: what it makes of the globals.
+    /// Σ W d² Wᵀ: covariance of the globals for white noise of variance one.
     fn white_part(&self, scales: Option<&[Vec<f64>]>) -> DMatrix<f64> {
         let g = self.globals;
         let mut sum = DMatrix::zeros(g, g);
@@ -597,12 +597,12 @@ impl Estimate {
     }
 }
 
-/// The most likely of them.
+/// The most likely noise.
 fn best(told: &[Told]) -> Option<&Told> {
     told.iter().max_by(|a, b| a.weight.total_cmp(&b.weight)).filter(|one| one.weight.is_finite())
 }
 
-/// W = J (JᵀJ)⁻¹: by how much each block moves each global, by series.
+/// W = J (JᵀJ)⁻¹: influence of each block on each global, by series.
 fn influence(all: &[Series], globals: usize, inverse: &DMatrix<f64>) -> Vec<Vec<f64>> {
     let of = |series: &Series| {
         let mut own = vec![0.0; series.time.len() * globals];

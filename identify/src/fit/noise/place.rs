@@ -1,12 +1,11 @@
-//! Errors that come again at the same place, forward and backward: a pulley or an encoder out of centre, teeth, a motor
-//! that cogs.
+//! Errors that repeat with position in both directions: eccentric pulleys or encoders, teeth, cogging of a motor.
 //!
 //! ```text
 //! r(t) = J(t) δ + a cos κ ŷ(t) + b sin κ ŷ(t) + noise
 //! ```
 //!
-//! They are no noise: what they move the estimates by is as long as the logs are, and comes again with the same input.
-//! The wave numbers κ of two waves in the travel to one in two blocks are tried.
+//! They are not noise: they shift the estimates regardless of the length of the logs, and repeat with the same input.
+//! Wave numbers κ from two waves in the travel to one in two blocks are tried.
 
 use super::Slow;
 use super::filter::innovations;
@@ -18,18 +17,16 @@ use std::f64::consts::TAU;
 pub(super) struct Found {
     /// Its wave number, rad in the quantity's unit.
     pub kappa: f64,
-    /// Least increase of the logarithm of the likelihood by it.
+    /// Least increase of the log-likelihood by it.
     pub gain: f64,
-    /// Its amplitude, in standard deviations of a value with the greatest weight; and how far the quantity ranges, in its
-    /// unit.
+    /// Amplitude, in standard deviations of the value with the largest weight, and range of the quantity in its unit.
     pub amplitude: f64,
     pub travel: f64,
     /// Number of wave numbers tried.
     pub tried: usize,
 }
 
-/// The wave that takes most off the residuals, those without the waves that the rows have already with these
-/// amplitudes.
+/// The wave that reduces the residuals most, after subtraction of the waves in the rows with these amplitudes.
 pub(super) fn wave(all: &[Series], amplitudes: &[f64], slow: &[Slow], white: f64) -> Option<Found> {
     let values = || all.iter().flat_map(|series| &series.value).copied();
     let (low, high) = values().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
@@ -67,7 +64,7 @@ pub(super) fn wave(all: &[Series], amplitudes: &[f64], slow: &[Slow], white: f64
     Some(Found { kappa, gain: most.0 / white, amplitude: most.1, travel, tried: count })
 }
 
-/// Increase of the logarithm of the likelihood by a wave, times the variance of white noise; and its amplitude.
+/// Increase of the log-likelihood by a wave, times the variance of white noise; and its amplitude.
 fn gain(all: &[Series], amplitudes: &[f64], slow: &[Slow], kappa: f64) -> (f64, f64) {
     // Σ c c, c s, s s, c r, s r of the innovations.
     let mut sums = [0.0; 5];
@@ -95,7 +92,7 @@ fn gain(all: &[Series], amplitudes: &[f64], slow: &[Slow], kappa: f64) -> (f64, 
     (0.5 * (a * cr + b * sr), f64::hypot(a, b))
 }
 
-/// cos κ ŷ and sin κ ŷ as they stand in rows.
+/// cos κ ŷ and sin κ ŷ as columns of rows.
 pub(super) fn columns(series: &Series, kappa: f64) -> [Vec<f64>; 2] {
     let of = |wave: fn(f64) -> f64| {
         series.value.iter().zip(&series.gain).map(|(value, gain)| gain * wave(kappa * value)).collect()

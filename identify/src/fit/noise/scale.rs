@@ -10,7 +10,7 @@
 //!
 //! If that is enough, D Σ D with the s_k/s on the diagonal of D is a second covariance of the noise beside Σ. The
 //! larger of both variances counts: errors of a wrong model are also small at rest and large in motion, which does not
-//! make a parameter that rest determines better known.
+//! improve the accuracy of a parameter that is determined at rest.
 
 use super::Slow;
 use super::filter::innovations;
@@ -33,7 +33,7 @@ pub(super) fn scales(all: &[Series], slow: &[Slow]) -> Option<Vec<Vec<f64>>> {
             sums[class] += square;
             counts[class] += 1.0;
         }
-        // Values that are exact at rest have a least noise.
+        // Values that are exact at rest get a minimum noise.
         sums.iter_mut().zip(counts).for_each(|(sum, count)| *sum = sum.max(LEAST_SIZE * LEAST_SIZE * mean * count));
         let there = (0..SPEED_CLASSES).filter(|&k| counts[k] > 0.0);
         let gain: f64 = there.clone().map(|k| 0.5 * counts[k] * (mean * counts[k] / sums[k]).ln()).sum();
@@ -56,7 +56,7 @@ pub(super) fn scales(all: &[Series], slow: &[Slow]) -> Option<Vec<Vec<f64>>> {
     Some(all.iter().map(|series| sizes.by_ref().take(series.time.len()).collect()).collect())
 }
 
-/// Classes of speed: at rest, and the rest in equal numbers; `None` if too few blocks are in one.
+/// Classes of speed: blocks at rest, and the others in equal numbers; `None` if a class has too few blocks.
 fn by_speed(all: &[Series]) -> Option<Vec<usize>> {
     let speeds: Vec<f64> = all.iter().flat_map(|series| &series.speed).copied().collect();
     let rest = BLOCK_AT_REST * speeds.iter().copied().fold(0.0, f64::max);

@@ -1,12 +1,12 @@
-//! The rows of a quantity, taken together where they are many or share an error of rounding.
+//! Rows of a quantity, combined into blocks if they are many or share a rounding error.
 
 use crate::fit::asked::problem::Problem;
 use crate::fit::limits::BLOCKS;
 use crate::log::Quantity;
 use nalgebra::DMatrix;
 
-/// Rows taken together, of one output of one run. A block of n equally good rows is their sum over √n, so that white
-/// noise is as large in it as in a row.
+/// Blocks of rows of one output of one run. A block of n equally accurate rows is their sum over √n, so that white
+/// noise has the same variance as in a row.
 pub(super) struct Series {
     /// Columns of the Jacobian that are not zero here: those of the run alone first.
     pub moved: Vec<usize>,
@@ -16,23 +16,23 @@ pub(super) struct Series {
     pub more: usize,
     /// Block by block the moved columns, those that are not of the Jacobian, and the residual.
     pub rows: Vec<f64>,
-    /// The answer of each to a slow noise of one, √n.
+    /// Gain of each block for a unit slow noise, √n.
     pub gain: Vec<f64>,
     /// Times, s.
     pub time: Vec<f64>,
     /// The value of the model.
     pub value: Vec<f64>,
-    /// Its speed if it is a position, else its size.
+    /// Its speed if it is a position, otherwise its magnitude.
     pub speed: Vec<f64>,
 }
 
 impl Series {
-    /// Columns, the residual's included.
+    /// Number of columns, including the residual.
     pub fn wide(&self) -> usize {
         self.moved.len() + self.more + 1
     }
 
-    /// Takes the columns out that are not of the Jacobian.
+    /// Removes the columns that are not of the Jacobian.
     pub fn take_back(&mut self) {
         let (wide, more) = (self.wide(), self.more);
         let mut place = 0;
@@ -44,7 +44,7 @@ impl Series {
         self.more = 0;
     }
 
-    /// Puts further columns before the residual.
+    /// Inserts further columns before the residual.
     pub fn append(&mut self, columns: &[Vec<f64>]) {
         let wide = self.wide();
         let mut rows = Vec::with_capacity(self.rows.len() + columns.len() * self.time.len());

@@ -2,8 +2,8 @@
 
 use crate::fit::limits::NORMAL;
 
-/// The share of Student's t beyond ± `t`: by the normal distribution of a t that is made normal (D. L. Wallace 1959),
-/// to about 1e-3 of itself from three degrees of freedom on.
+/// Two-sided tail probability of Student's t beyond ± `t`, by a normalising transformation (D. L. Wallace 1959),
+/// relative accuracy about 1e-3 from three degrees of freedom on.
 pub(crate) fn student_share(t: f64, freedom: f64) -> f64 {
     let n = freedom.max(1.0);
     let z = (8.0 * n + 1.0) / (8.0 * n + 3.0) * (n * (t * t / n).ln_1p()).sqrt();

@@ -1,4 +1,4 @@
-//! The posterior density of a least-squares problem, on variables without bounds that are all about as wide as one.
+//! Posterior density of a least-squares problem, on unbounded variables of about unit width.
 //!
 //! With ψ the residuals after the loss, T the inflation that the covariance has, π the priors and x(u) the change of
 //! variables:
@@ -8,15 +8,15 @@
 //! ```
 //!
 //! x = l + eᵘ above a bound, h − eᵘ below one, l + (h − l)/(1 + e⁻ᵘ) between two, and u without any; S Sᵀ is the
-//! covariance at the fit, so that z is nearly standard normal. A path is a leapfrog along a slope; any slope that
-//! depends on the place alone leaves the draws right (Neal 2011, "MCMC using Hamiltonian dynamics", section 5.5), since
-//! they are taken by the density itself. So slopes are Jᵀψ with J = J₀ + Σ zₖ ∂J/∂zₖ about the fit, one simulation
-//! each, where that is near enough.
+//! covariance at the fit, so that z is nearly standard normal. A path is a leapfrog along gradients; any gradient that
+//! depends on the position alone leaves the draws unbiased (Neal 2011, "MCMC using Hamiltonian dynamics", section 5.5),
+//! since they are accepted by the density itself. So gradients are Jᵀψ with J = J₀ + Σ zₖ ∂J/∂zₖ around the fit, one
+//! simulation each, if that is accurate enough.
 //!
-//! Otherwise a random walk draws from the density alone, in x itself, and a step over a bound is not taken. Costs may
-//! have kinks, where sticks and slips change their order, at which paths along slopes are turned about; and parameters
-//! that go together, a delay that may be zero with a gain say, have a ridge that is straight in x and long and narrow:
-//! the logarithm of the distance to a bound bends it, and no step fits it then.
+//! Otherwise a random walk draws from the density alone, in x itself, and rejects steps beyond a bound. The cost may
+//! have kinks, where sticks and slips change their order, at which paths along gradients turn back; and correlated
+//! parameters, such as a delay that may be zero and a gain, have a long, narrow ridge that is straight in x: the
+//! logarithm of the distance to a bound curves it, so that no step length suits it.
 
 use super::nuts::{Draws, Effort, LogDensity, Watch, sample, walk};
 use crate::chance::normal;
@@ -27,7 +27,7 @@ use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
 use std::sync::Mutex;
 
-/// The logarithm of a variable's prior density, and its slope.
+/// Logarithm of a variable's prior density, and its derivative.
 pub type Prior<'a> = Box<dyn Fn(f64) -> (f64, f64) + Sync + 'a>;
 
 /// The parts of the density.
@@ -52,7 +52,7 @@ pub struct Ingredients<'a, R> {
 pub struct Sampled {
     /// Values of the variables.
     pub draws: Draws,
-    /// True if slopes, those of the fit, were followed; a random walk otherwise.
+    /// True if gradients by the Jacobian of the fit were used; a random walk otherwise.
     pub fixed: bool,
 }
 
@@ -66,7 +66,7 @@ enum Change {
 }
 
 impl Change {
-    /// For a variable that is at `x`, give or take `deviation`.
+    /// For a variable at `x` ± `deviation`.
     fn of(x: f64, deviation: f64, low: f64, high: f64) -> Self {
         match (x - low < FELT * deviation, high - x < FELT * deviation) {
             (false, false) => Change::None,
@@ -103,7 +103,7 @@ impl Change {
 
 /// The density, shared by the chains.
 struct Density<'a, R> {
-    /// A problem for each chain that is at work.
+    /// A problem for each running chain.
     pool: Mutex<Vec<R>>,
     ingredients: &'a Ingredients<'a, R>,
     changes: Vec<Change>,
@@ -134,7 +134,7 @@ pub fn draw<R: Residuals + Clone + Send + Sync>(
 }
 
 impl<R: Residuals + Clone + Send + Sync> Density<'_, R> {
-    /// Draws along slopes, or by a walk.
+    /// Draws along gradients, or by a walk.
     fn draws(&self, random: &mut Pcg64, effort: Effort, watch: &Watch) -> crate::error::Result<Sampled> {
         let starts: Vec<Vec<f64>> = (0..effort.chains.max(1)).map(|_| self.start(random)).collect();
         let log: &LogDensity = &|z, gradient| self.log(z, Some(gradient));
@@ -153,7 +153,7 @@ impl<'a, R: Residuals + Clone + Send> Density<'a, R> {
     fn new(ingredients: &'a Ingredients<'a, R>) -> Self {
         let Ingredients { bounds, at, .. } = ingredients;
         let n = at.len();
-        // Standard errors, then the Jacobian over about as much, then all again with that one.
+        // Standard errors, then the Jacobian over about one of them, then both again with that Jacobian.
         let errors = deviations(&covariance(ingredients, &ingredients.jacobian));
         let inside: Vec<f64> = (0..n)
             .map(|j| {
@@ -190,13 +190,13 @@ impl<'a, R: Residuals + Clone + Send> Density<'a, R> {
         density
     }
 
-    /// Has it draw by a walk, in the variables themselves.
+    /// Switches to a walk in the variables themselves.
     fn walk(&mut self) {
         self.fixed = None;
         self.change(vec![Change::None; self.inside.len()]);
     }
 
-    /// Takes these changes of variables.
+    /// Sets these changes of variables.
     fn change(&mut self, changes: Vec<Change>) {
         self.centre = DVector::from_fn(changes.len(), |j, _| changes[j].variable(self.inside[j]));
         self.spread = self.correlation.clone();
@@ -209,8 +209,7 @@ impl<'a, R: Residuals + Clone + Send> Density<'a, R> {
         self.changes = changes;
     }
 
-    /// The Jacobian about the fit and, if they can be had, its derivatives along each z, over a standard error to each
-    /// side.
+    /// The Jacobian at the fit and, if available, its derivatives along each z, over a standard error to each side.
     fn bent(&self, jacobian: DMatrix<f64>) -> Vec<DMatrix<f64>> {
         let n = self.errors.len();
         let mut problem = self.ingredients.problem.clone();
@@ -267,7 +266,7 @@ impl<'a, R: Residuals + Clone + Send> Density<'a, R> {
         let Ingredients { bounds, priors, inflation, huber, .. } = self.ingredients;
         let places = self.place(z);
         let x: Vec<f64> = places.iter().map(|place| place[0]).collect();
-        // Rounding may put it onto a bound, and bounds that were not felt are still there.
+        // Rounding may put it onto a bound, and inactive bounds still hold.
         if x.iter().zip(bounds.low.iter().zip(&bounds.high)).any(|(x, (low, high))| !(low <= x && x <= high)) {
             return None;
         }
@@ -309,7 +308,7 @@ impl<'a, R: Residuals + Clone + Send> Density<'a, R> {
         Some(log).filter(|log| log.is_finite() && gradient.iter().all(|slope| slope.is_finite()))
     }
 
-    /// True if slopes with the Jacobian at the fit are near those that are measured, where draws will be.
+    /// True if gradients with the Jacobian at the fit are close to measured ones in the region of the draws.
     fn is_straight(&self, random: &mut Pcg64) -> bool {
         let n = self.errors.len();
         let (mut squares, mut count) = (0.0, 0);
@@ -324,7 +323,7 @@ impl<'a, R: Residuals + Clone + Send> Density<'a, R> {
         count > 0 && squares <= SLOPES_OFF * SLOPES_OFF * count as f64
     }
 
-    /// Somewhere to begin, drawn from the covariance at the fit.
+    /// A random start, drawn from the covariance at the fit.
     fn start(&self, random: &mut Pcg64) -> Vec<f64> {
         let n = self.errors.len();
         for attempt in 0..20 {
@@ -349,7 +348,7 @@ fn covariance<R>(ingredients: &Ingredients<R>, jacobian: &DMatrix<f64>) -> DMatr
         precision[(j, j)] += curvature + (12.0 / (wide * wide)).max(1e-20);
     }
     let n = precision.nrows();
-    // On variables of equal size, for the sake of rounding.
+    // In variables of equal magnitude, to reduce rounding.
     let sizes: Vec<f64> = (0..n).map(|j| precision[(j, j)].sqrt()).collect();
     let scaled = DMatrix::from_fn(n, n, |i, j| precision[(i, j)] / (sizes[i] * sizes[j]));
     let inverse = scaled.cholesky().map_or_else(|| DMatrix::identity(n, n), |found| found.inverse());
@@ -437,8 +436,7 @@ mod tests {
         }
     }
 
-    /// A bound through the middle of it leaves half of it: the quantiles are those of the truncated normal
-    /// distribution.
+    /// With a bound through its middle, the quantiles are those of the truncated normal distribution.
     #[test]
     fn a_bound_cuts_the_posterior_off() {
         let free = ingredients(f64::NEG_INFINITY, vec![None, None], 1.0);
@@ -453,8 +451,8 @@ mod tests {
         assert!(draws.divergences < 30, "{}", draws.divergences);
     }
 
-    /// A delay that may be zero and a gain that goes along with it, 300 times more closely than either is known; the
-    /// slope along both has a kink at 0.7.
+    /// A delay that may be zero and a correlated gain, 300 times more closely correlated than either is known; the
+    /// gradient along both has a kink at 0.7.
     #[derive(Clone)]
     struct Ridge;
 
@@ -475,8 +473,8 @@ mod tests {
         }
     }
 
-    /// No draw of a delay and a gain came in four minutes: in the logarithm of the delay their ridge was bent, and steps
-    /// as short as it was narrow led nowhere.
+    /// Sampling a delay and a gain gave no draw in four minutes: in the logarithm of the delay their ridge was curved,
+    /// and steps as short as it was narrow made no progress.
     #[test]
     fn a_narrow_ridge_that_ends_at_a_bound_is_drawn_from() {
         let ingredients = Ingredients {
@@ -493,7 +491,7 @@ mod tests {
         density.walk();
         let Sampled { draws, .. } = density.draws(&mut Pcg64::seed_from_u64(1), effort, &|_| true).unwrap();
         assert!(draws.evaluations < 100_000, "{}", draws.evaluations);
-        // The gain has no say in how likely a delay is.
+        // The gain does not affect the probability of a delay.
         let density = |delay: f64| (-0.5 * Ridge::along(delay).powi(2)).exp();
         let points: Vec<f64> = (0..40_000).map(|k| 1e-4 * (f64::from(k) + 0.5)).collect();
         let all: f64 = points.iter().map(|d| density(*d)).sum();

@@ -1,4 +1,4 @@
-//! A least-squares problem without the variables that only shift the outputs of a run, its start and offsets.
+//! Marginal least-squares problem, without the variables that only shift the outputs of a run: its start and offsets.
 //!
 //! With the columns C of the shifts y of a run, which do not depend on y, a factorisation C = Q R, and the divisor T of
 //! the sum of squares
@@ -8,8 +8,8 @@
 //! y given x is normal with mean ŷ = −R⁻¹ Qᵀ r(x, 0) and covariance T R⁻¹ R⁻ᵀ
 //! ```
 //!
-//! so draws of x are those of a problem with the residuals P r, and y is drawn beside each of them. A run with one
-//! shift between near bounds l and h, where s = √T/R, has one residual more:
+//! so draws of x are those of a problem with the residuals P r, and y is drawn for each of them. A run with one shift
+//! between near bounds l and h, with s = √T/R, has an additional residual:
 //!
 //! ```text
 //! ∫ₗʰ e^{−|r|²/2T} dy ∝ e^{−|P r|²/2T} ΔΦ,   ΔΦ = Φ((h − ŷ)/s) − Φ((l − ŷ)/s)        ρ = √(−2 T ln ΔΦ)
@@ -39,11 +39,11 @@ pub(crate) struct Marginal<'a> {
     kept: Vec<usize>,
     /// Variables that only shift an output, by run.
     shifts: Vec<Shifts>,
-    /// Their columns, where no pulley radius is searched for that they go with.
+    /// Their columns, if no free pulley radius scales them.
     fixed: Option<Vec<Columns>>,
 }
 
-/// The nuisances of a run that are integrated out: where its residuals begin, the variables, and whether a bound is
+/// Nuisance variables of a run that are integrated out: start of its residuals, the variables, and true if a bound is
 /// near.
 #[derive(Clone)]
 struct Shifts {
@@ -136,7 +136,7 @@ impl<'a> Marginal<'a> {
         Cow::Owned(self.shifts.iter().map(of).collect())
     }
 
-    /// Takes residuals at a point in all variables to those of what stays, and their derivatives by it with them.
+    /// Projects residuals at a point in all variables, and their derivatives, to those of the remaining variables.
     fn project(&self, all: &[f64], residuals: &mut [f64], mut jacobian: Option<&mut DMatrix<f64>>) {
         let mut more = self.problem.rows();
         for (shifts, columns) in self.shifts.iter().zip(self.columns(all).iter()) {
@@ -165,7 +165,7 @@ impl<'a> Marginal<'a> {
         }
     }
 
-    /// The one shift of a run between its bounds, in standard deviations from its mean.
+    /// The only shift of a run between its bounds, in standard deviations from its mean.
     fn between(&self, shifts: &Shifts, columns: &Columns, along: &DVector<f64>) -> Between {
         let j = shifts.own[0];
         let deviation = self.variance.sqrt() / columns.r[(0, 0)].abs();
@@ -174,8 +174,8 @@ impl<'a> Marginal<'a> {
         Between { low: of(self.bounds.low[j]), high: of(self.bounds.high[j]), mean, deviation }
     }
 
-    /// All variables beside these, the shifts drawn from what they are given the others; those of the fit where the
-    /// model does not get through.
+    /// All variables for these, with shifts drawn from their conditional distribution; those of the fit if the
+    /// simulation fails.
     pub fn completed(&mut self, x: &[f64], random: &mut Pcg64) -> Vec<f64> {
         let mut all = self.whole(x);
         let mut residuals = vec![0.0; self.problem.rows()];
@@ -216,7 +216,7 @@ impl Columns {
     }
 }
 
-/// A normal variable between bounds, these in standard deviations from its mean.
+/// A normal variable between bounds in standard deviations from its mean.
 #[derive(Debug, Clone, Copy)]
 struct Between {
     low: f64,
@@ -303,7 +303,7 @@ impl Residuals for Marginal<'_> {
         let rows = self.problem.rows();
         let jacobian = self.problem.linearised(&all, &mut r[..rows], &wide, &how)?;
         let mut jacobian = jacobian.select_columns(&self.kept).resize_vertically(self.rows(), 0.0);
-        // P changes with nothing but a pulley radius that is searched for; slopes go without that.
+        // P depends on a free pulley radius only; gradients neglect this.
         self.project(&all, r, Some(&mut jacobian));
         Some(jacobian)
     }
@@ -325,7 +325,7 @@ mod tests {
 
     const T: f64 = 1.7;
 
-    /// A pulse of the template with a log that is off, its angle and position with or without an offset.
+    /// A pulse of the template with a deviating log, its angle and position with or without an offset.
     fn case(is_off: bool) -> (Case, Plan) {
         let rows = ["experiment.0.every=10ms", "experiment.0.until=0.5s"];
         let mut case = Case::from_text_with("axis.toml", TEMPLATE, &rows).unwrap();
@@ -359,7 +359,7 @@ mod tests {
         0.5 * r.iter().map(|r| r * r).sum::<f64>() / T
     }
 
-    /// Bounds of a start between which it is, and between which most of it is not.
+    /// Bounds of a start that contain it, and bounds that exclude most of its distribution.
     #[test]
     fn what_stays_has_the_density_of_quadrature() {
         let (case, plan) = case(false);
@@ -392,7 +392,7 @@ mod tests {
                 assert!((found - mean).abs() < 5.0 * (square / 2000.0).sqrt(), "{found} {mean}");
                 (all * h).ln() - least + cost(&mut marginal, &[x])
             });
-            // Up to a factor that is one for all.
+            // Up to a common factor.
             assert!(offset.iter().all(|o| (o - offset[0]).abs() < 1e-4), "{low} {high}: {offset:?}");
         }
     }
@@ -419,7 +419,7 @@ mod tests {
         }
     }
 
-    /// A start and an offset of the same run: what is integrated over is least where both are best.
+    /// A start and an offset of the same run: the integrand is least where both are best.
     #[test]
     fn several_shifts_of_a_run_go_together() {
         let (case, plan) = case(true);

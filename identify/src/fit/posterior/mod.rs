@@ -27,7 +27,7 @@ use nuts::{Draws, Effort, Watch};
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
 
-/// The draws, and whether to believe them.
+/// Draws with diagnostics.
 #[derive(Debug, Clone)]
 pub struct Posterior {
     /// The variables: parameters, nuisances that all logs share, then those of each log.
@@ -38,14 +38,14 @@ pub struct Posterior {
     pub draws: Draws,
     /// The divisor of the logarithm of the likelihood, for autocorrelated residuals.
     pub inflation: f64,
-    /// True if paths followed the slopes at the fit; it was a random walk otherwise.
+    /// True if paths used gradients by the Jacobian at the fit; a random walk otherwise.
     pub fixed_slopes: bool,
 }
 
 /// The posterior of one number.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Credible {
-    /// Its name; with the log's before it, where it is the log's own.
+    /// Its name, preceded by that of its log if it belongs to one.
     pub name: String,
     /// SI unit.
     pub unit: &'static str,
@@ -134,7 +134,7 @@ pub fn posterior(case: &Case, plan: &Plan, fit: &Fit, effort: Effort, watch: &Wa
     Ok(Posterior { variables, globals: problem.globals(), draws, inflation, fixed_slopes: fixed })
 }
 
-/// Draws the shifts that were integrated over beside each draw; if that is ended early, as many of each chain are left.
+/// Draws the marginalised shifts for each draw; if that is interrupted, all chains keep the same number.
 fn complete(draws: &mut Draws, marginal: &Marginal, effort: Effort, watch: &Watch) {
     let made = effort.chains * (effort.tune + effort.draws);
     // Draws before an interruption are completed, with one simulation each.
@@ -157,7 +157,7 @@ fn complete(draws: &mut Draws, marginal: &Marginal, effort: Effort, watch: &Watc
     draws.chains.iter_mut().for_each(|chain| chain.truncate(shortest));
 }
 
-/// Draws of what the logs do not determine would wander between its bounds for as long as one waits.
+/// Draws of undetermined parameters would wander between their bounds without converging.
 fn refuse_undetermined(fit: &Fit) -> Result<()> {
     let undetermined = |estimate: &&Estimate| estimate.error.is_some_and(f64::is_infinite);
     let names: Vec<&str> = fit.estimates.iter().filter(undetermined).map(|estimate| &*estimate.name).collect();
@@ -170,7 +170,7 @@ fn refuse_undetermined(fit: &Fit) -> Result<()> {
 }
 
 impl Posterior {
-    /// Why it does not count as converged; empty if it does.
+    /// Reasons why it has not converged; empty if it has.
     pub fn doubts(&self) -> Vec<String> {
         let mut doubts = Vec::new();
         if self.draws.interrupted {
@@ -219,7 +219,7 @@ impl Posterior {
     }
 }
 
-/// The factor by which autocorrelated residuals widen the covariance of the fit, at most, and the variance of weighted
+/// Largest factor by which autocorrelated residuals widen the covariance of the fit, and the variance of weighted
 /// residuals.
 fn inflation(problem: &Problem, residuals: &[f64], jacobian: &DMatrix<f64>, at: &[f64], bounds: &Bounds) -> (f64, f64) {
     let held: Vec<bool> = (0..at.len()).map(|j| at[j] <= bounds.low[j] || at[j] >= bounds.high[j]).collect();
@@ -238,7 +238,7 @@ fn inflation(problem: &Problem, residuals: &[f64], jacobian: &DMatrix<f64>, at: 
 struct Scale<'a> {
     name: String,
     unit: &'static str,
-    /// The names that a prior may have, and what their number is per unit of this one: all keys of a tie.
+    /// Possible names for a prior, all keys of a tie, with their value per unit of this variable.
     known_as: Vec<(String, f64)>,
     value: Box<dyn Fn(f64) -> f64 + Sync + 'a>,
     variable: Box<dyn Fn(f64) -> f64 + Sync + 'a>,
@@ -320,7 +320,7 @@ fn priors<'a>(scales: &'a [Scale<'a>], plan: &Plan, bounds: &mut Bounds) -> Resu
             Prior::LogNormal { .. } => ((scale.variable)(0.0), f64::INFINITY),
             Prior::Uniform { low, high } => ((scale.variable)(low / factor), (scale.variable)(high / factor)),
         };
-        // ln 0 and what is below have no place on a logarithmic scale: no bound there.
+        // Zero and negative bounds do not exist on a logarithmic scale.
         bounds.low[j] = bounds.low[j].max(if low.is_nan() { f64::NEG_INFINITY } else { low });
         bounds.high[j] = bounds.high[j].min(high);
         if bounds.low[j] >= bounds.high[j] {

@@ -1,19 +1,19 @@
-//! Descent past kinks by a proximal bundle method (C. Lemaréchal 1975; K. C. Kiwiel 1990; for costs that are not
+//! Descent across kinks by a proximal bundle method (C. Lemaréchal 1975; K. C. Kiwiel 1990; for costs that are not
 //! convex, M. M. Mäkelä and P. Neittaanmäki 1992).
 //!
 //! Between two changes in the order of sticks and slips the cost is smooth, and its gradient exact; across them it has
 //! a kink. At a minimum on kinks no gradient is zero: those of the pieces that meet there balance. So the gradients gₖ
-//! at points yₖ around are kept, in coordinates u with the standard error for their unit, in which each smooth piece
-//! has the second derivative I, and each is continued to where the search is:
+//! at nearby points yₖ are kept, in coordinates u in units of the standard error, in which each smooth piece has the
+//! second derivative I, and each piece is extrapolated to the present point:
 //!
 //! ```text
 //! φₖ(d) = φ − αₖ + g̃ₖ·d + ½ ‖d‖²       g̃ₖ = gₖ − (yₖ − u)       αₖ = φ − φ(yₖ) − gₖ·(u − yₖ) − ½ ‖u − yₖ‖²
 //! min over d of max over k of φₖ(d):     d = −Σ λₖ g̃ₖ with min ½ ‖Σ λₖ g̃ₖ‖² + Σ λₖ αₖ, λ ≥ 0, Σ λₖ = 1
 //! ```
 //!
-//! A step that keeps a part of that promise is taken; of one that does not, the gradient where it led says more about
-//! the kink. Where the promise is next to nothing, the pieces balance: that is the minimum, and Σ λₖ Jₖ the Jacobian
-//! with Jᵀr ≈ 0 there.
+//! A step that achieves a part of the predicted gain is accepted; otherwise the gradient at its end adds information
+//! about the kink. If the predicted gain is negligible, the pieces balance: this is the minimum, and Σ λₖ Jₖ the
+//! Jacobian with Jᵀr ≈ 0 there.
 
 use super::point::{Minimum, Point, Strategy, cost_of};
 use super::rung::{Climb, Rung, Watch};
@@ -54,7 +54,7 @@ impl Rung for Bundle {
 
 /// End of a descent.
 struct Balanced {
-    /// The gain that the next step promises, in standard errors.
+    /// Predicted gain of the next step, in standard errors.
     promise: f64,
     /// Σ λₖ Jₖ
     jacobian: DMatrix<f64>,
@@ -91,7 +91,7 @@ impl Piece {
     }
 }
 
-/// The step that all pieces together promise most for.
+/// The step with the largest predicted gain for all pieces together.
 struct Promise {
     weights: Vec<f64>,
     /// −d
@@ -113,7 +113,7 @@ impl Promise {
         Self { weights, mean, fall }
     }
 
-    /// True if a piece says otherwise of that step.
+    /// True if a piece contradicts the prediction for that step.
     fn is_contradicted(&self, (g, alpha): &(DVector<f64>, f64)) -> bool {
         -alpha - g.dot(&self.mean) + 0.5 * self.mean.norm_squared() >= -CONTRADICTS * self.fall
     }
@@ -175,7 +175,7 @@ fn descend(
     }
 }
 
-/// Keeps the pieces that stand nearest to the cost, and those that made the last step.
+/// Keeps the pieces closest to the cost, and those that determined the last step.
 fn forget(pieces: &mut Vec<Piece>, u: &DVector<f64>, cost: f64, weights: &[f64]) {
     let most = u.len() + SPARE_PIECES;
     if pieces.len() <= most {
@@ -238,7 +238,7 @@ impl<'a> Coordinates<'a> {
         Some(Piece { x: at.x.clone(), y: &self.r * moved / self.deviation, cost, gradient })
     }
 
-    /// Σ λₖ Jₖ, with the gain that is still promised.
+    /// Σ λₖ Jₖ, with the remaining predicted gain.
     fn mean_jacobian(
         &self,
         problem: &mut dyn Residuals,
@@ -261,7 +261,7 @@ fn balance(seen: &[(DVector<f64>, f64)]) -> Vec<f64> {
     let n = seen.len();
     let products = DMatrix::from_fn(n, n, |i, j| seen[i].0.dot(&seen[j].0));
     let mut weights = vec![0.0; n];
-    // The best one alone to begin with.
+    // Starts with the best one alone.
     let alone = |k: usize| 0.5 * products[(k, k)] + seen[k].1;
     let first = (0..n).min_by(|&a, &b| alone(a).total_cmp(&alone(b))).unwrap_or(0);
     weights[first] = 1.0;

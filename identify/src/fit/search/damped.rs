@@ -11,19 +11,19 @@ use crate::fit::limits::{KINK, NEAR, PAST_KINKS, SHARP, SHOWS};
 use crate::solve::Flow;
 use nalgebra::{DMatrix, DVector};
 
-/// Damped steps as long as they lower the cost.
+/// Damped steps while they lower the cost.
 pub(crate) struct Damped {
-    /// Derivatives that were measured last.
+    /// Kind of the last derivatives.
     how: Differences,
     /// λ; `None` before the first step.
     lambda: Option<f64>,
     /// Factor by which λ grows when a step is refused.
     growth: f64,
-    /// The Jacobian at the trial point that was taken, where it came with the residuals.
+    /// The Jacobian at the accepted trial point, if it came with the residuals.
     ahead: Option<DMatrix<f64>>,
-    /// True if the last trial point was taken.
+    /// True if the last trial point was accepted.
     is_likely: bool,
-    /// Steps in a row that gained less than shows.
+    /// Number of successive steps with an insignificant gain.
     slow: usize,
     trial: Vec<f64>,
 }
@@ -63,7 +63,7 @@ impl Damped {
             }
             (self.slow, self.ahead) = (0, None);
             if how != Differences::Central && !at.is_exact {
-                // The cheap derivatives may be to blame.
+                // Cheap derivatives may be the cause.
                 (how, self.lambda) = (Differences::Central, None);
                 continue;
             }
@@ -107,10 +107,10 @@ impl Damped {
             self.is_likely = cost < best.cost && gain > 1e-4;
             if self.is_likely {
                 self.ahead = with.filter(|_| problem.is_exact());
-                // λ shrinks the better the linear model was (Nielsen 1999).
+                // λ decreases with the accuracy of the linear model (Nielsen 1999).
                 damping *= f64::max(1.0 / 5.0, 1.0 - (2.0 * gain - 1.0).powi(3));
                 self.growth = 2.0;
-                // Less than shows, far less than was promised: a kink is near.
+                // An insignificant gain, far below the prediction, indicates a kink.
                 let is_slow = best.cost - cost < shows && (gain < 0.25 || best.decrement > 2.0 * SHOWS);
                 self.slow = if is_slow { self.slow + 1 } else { 0 };
                 best.x = x;
@@ -154,7 +154,7 @@ fn sharpen(how: &mut Differences, at: &Point) {
     }
 }
 
-/// The step that keeps within the box: what would leave it is put on its edge, and the rest solved anew.
+/// Step within the box: variables that would leave it are set to its edge, and the others solved again.
 fn within(
     model: &Linear,
     x: &[f64],

@@ -1,4 +1,4 @@
-//! Evolution around a kink, for costs whose derivatives do not lead on.
+//! Evolution strategy around a kink, for costs whose derivatives make no progress.
 
 use super::cmaes;
 use super::point::{Point, Strategy, cost_of};
@@ -7,8 +7,8 @@ use crate::fit::asked::residuals::Residuals;
 use crate::fit::limits::{BARREN, MOST_EVOLVED};
 use nalgebra::DMatrix;
 
-/// CMA-ES in coordinates in which the smooth part of the cost is a sphere with the standard error for its unit, at most
-/// this number of times in a search.
+/// CMA-ES in coordinates in which the smooth part of the cost is a sphere in units of the standard error, at most this
+/// number of times in a search.
 pub(crate) struct Evolved {
     pub most: usize,
 }
@@ -31,7 +31,7 @@ impl Rung for Evolved {
     }
 }
 
-/// Searches around the point; whether that lowered the cost by more than rounding.
+/// Searches around the point; true if that lowered the cost by more than rounding.
 fn evolve(at: &mut Point, problem: &mut dyn Residuals) -> bool {
     let (free, shows) = (at.free(), at.shows());
     let n = free.len();

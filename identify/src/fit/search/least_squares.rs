@@ -12,7 +12,7 @@
 //!
 //! With dry friction the cost has kinks where the order of sticks and slips changes. The search is therefore a ladder
 //! of strategies. If no damped step helps (`damped.rs`) and the test is not passed, a bundle of exact gradients
-//! continues (`bundle.rs`), which detects a minimum on kinks. If there are no gradients, or they do not lead there, an
+//! continues (`bundle.rs`), which detects a minimum on kinks. If there are no gradients, or they make no progress, an
 //! evolution strategy without gradients is tried (`evolved.rs`) before the search counts as stalled.
 
 use super::bundle::Bundle;
@@ -188,7 +188,7 @@ mod tests {
         }
     }
 
-    /// A smooth valley, with how its derivatives were measured.
+    /// A smooth valley that records the kind of its derivatives.
     struct Recorded(Vec<Differences>);
 
     impl Residuals for Recorded {
@@ -219,8 +219,8 @@ mod tests {
         }
     }
 
-    /// A search to a tenth of a standard error measured central derivatives, which cost twice as much, from ten standard
-    /// errors on.
+    /// A search to a tenth of a standard error measured central derivatives, which cost twice as much, from ten
+    /// standard errors on.
     #[test]
     fn a_rough_search_measures_central_derivatives_at_its_end_only() {
         let (bounds, options) = (Bounds::none(2), Options { tolerance: 0.1, ..Options::default() });
@@ -271,7 +271,7 @@ mod tests {
             let end = search(&mut ladder, &mut at, toy, &mut |_, _| Flow::Continue);
             (end, climbed.take())
         };
-        // The second one does not apply any more where the first one passes again.
+        // The second one no longer applies when the first one passes again.
         let (end, order) = ended([vec![Passed, Passed], vec![Lowered], vec![Lowered, Converged]]);
         assert_eq!((end, order), ((Ending::Converged, Evolution), vec![Damped, Bundle, Damped, Evolution, Evolution]));
         let (end, order) = ended([vec![Passed], vec![Passed], vec![Converged]]);

@@ -68,8 +68,7 @@ impl Linear {
         let mut wanted = DVector::zeros(rows + free.len());
         wanted.rows_mut(0, rows).copy_from(&right);
         for (column, &j) in free.iter().enumerate() {
-            // In units of D the columns are of like size. A little damping keeps what the rows do not determine at
-            // rest.
+            // In units of D the columns have similar norms. A little damping keeps undetermined variables at rest.
             let unit = if scale[j] > 0.0 { 1.0 / scale[j] } else { 1.0 };
             matrix.view_mut((0, column), (rows, 1)).copy_from(&(self.r.column(j) * unit));
             matrix[(rows + column, column)] = f64::max(damping.sqrt(), 1e-11);
@@ -102,8 +101,8 @@ impl Linear {
         -(moved.dot(&self.qtr) + 0.5 * moved.norm_squared())
     }
 
-    /// Standard errors of the variables that are free, for residuals of this deviation; of one alone where they are not
-    /// determined together.
+    /// Standard errors of the free variables for residuals of this deviation; each alone if they are not jointly
+    /// determined.
     pub fn errors(&self, held: &[bool], deviation: f64) -> Vec<f64> {
         (0..held.len()).map(|j| if held[j] || self.norm(j) == 0.0 { 0.0 } else { deviation / self.norm(j) }).collect()
     }

@@ -1,4 +1,4 @@
-//! A point of a search: how far to go, where it is, and where it ended.
+//! Options, points and results of a search.
 
 use super::linear::Linear;
 use crate::fit::asked::residuals::{Bounds, Differences, Residuals};
@@ -8,9 +8,9 @@ use nalgebra::{DMatrix, DVector};
 /// Options of a search.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Options {
-    /// Standard errors that the last step may promise.
+    /// Largest predicted gain of the last step, in standard errors.
     pub tolerance: f64,
-    /// Most Jacobians.
+    /// Maximum number of Jacobians.
     pub iterations: usize,
     /// Beyond this many units a residual counts linearly (Huber 1964); infinite for squares.
     pub huber: f64,
@@ -18,7 +18,7 @@ pub struct Options {
     pub frugal: bool,
     /// Largest number of uses of an evolution strategy.
     pub evolutions: usize,
-    /// Residuals up to this size are taken for rounding, and do not set the accuracy of a step.
+    /// Residuals up to this size count as rounding, and do not determine the accuracy of a step.
     pub rounding: f64,
 }
 
@@ -35,16 +35,16 @@ pub enum Ending {
     Converged,
     /// No step lowers the cost, but the projected gradient is not zero: a kink.
     Stalled,
-    /// The iterations were used up.
+    /// The maximum number of iterations was reached.
     OutOfIterations,
     /// It was stopped.
     Interrupted,
-    /// The residuals could not be computed where it started.
+    /// The residuals could not be computed at its start.
     Failed,
 }
 
 impl Ending {
-    /// For files.
+    /// Its name in files.
     pub fn word(self) -> &'static str {
         match self {
             Ending::Converged => "converged",
@@ -76,9 +76,9 @@ pub struct Minimum {
     pub residuals: Vec<f64>,
     /// ½ Σ ρ(r).
     pub cost: f64,
-    /// The Jacobian there, by central differences where the search converged.
+    /// The Jacobian there, by central differences if the search converged.
     pub jacobian: DMatrix<f64>,
-    /// The gain that the next step promised, in standard errors.
+    /// Predicted gain of the next step, in standard errors.
     pub decrement: f64,
     /// Variables held at a bound.
     pub at_bound: Vec<bool>,
@@ -104,7 +104,7 @@ pub(crate) fn cost_of(r: &[f64], k: f64) -> f64 {
 /// A point of a search, with the linear model of the residuals at its last Jacobian.
 #[derive(Debug, Clone)]
 pub(crate) struct Point<'a> {
-    /// The best point so far, and what it took.
+    /// The best point so far, with its effort.
     pub best: Minimum,
     pub bounds: &'a Bounds,
     pub options: &'a Options,
@@ -116,7 +116,7 @@ pub(crate) struct Point<'a> {
     pub deviation: f64,
     /// True if the Jacobian is exact.
     pub is_exact: bool,
-    /// True if the Gauss-Newton step changes no digit that counts.
+    /// True if the Gauss-Newton step is within rounding.
     is_still: bool,
 }
 
@@ -151,8 +151,7 @@ impl<'a> Point<'a> {
         Ok(Self { best, bounds, options, model, scale, deviation: 0.0, is_exact: false, is_still: false })
     }
 
-    /// Measures the Jacobian as `how` says, unless it is `ahead` already, and what the linear model says of the point;
-    /// false where there is no Jacobian.
+    /// Measures the Jacobian by `how`, unless it is in `ahead`, and updates the linear model; false without a Jacobian.
     pub fn linearise(&mut self, problem: &mut dyn Residuals, how: &Differences, ahead: Option<DMatrix<f64>>) -> bool {
         let (bounds, best) = (self.bounds, &mut self.best);
         let own = ahead.or_else(|| problem.jacobian(&best.x, &best.residuals, bounds, how));
@@ -174,7 +173,7 @@ impl<'a> Point<'a> {
         let newton = model.step(&best.at_bound, &self.scale, 0.0);
         let freedom = (best.residuals.len().saturating_sub(n)).max(1) as f64;
         let spread = (2.0 * best.cost / freedom).sqrt();
-        // The residuals of logs that a model made are rounding errors.
+        // Residuals of simulated logs are rounding errors.
         let rounding = self.options.rounding;
         let is_rounding = spread <= rounding;
         self.deviation = if is_rounding { rounding } else { spread * inflation(&best.residuals, n) };
@@ -189,18 +188,18 @@ impl<'a> Point<'a> {
         self.best.decrement <= self.options.tolerance || self.is_still
     }
 
-    /// Variables that are not held at a bound and show.
+    /// Variables that are not held at a bound and have an effect.
     pub fn free(&self) -> Vec<usize> {
         (0..self.best.x.len()).filter(|&j| !self.best.at_bound[j] && self.model.norm(j) > 0.0).collect()
     }
 
-    /// Differences over this part of a standard error of each variable by itself.
+    /// Differences over this fraction of each variable's own standard error.
     pub fn differences_over(&self, part: f64) -> Differences {
         let errors = self.model.errors(&self.best.at_bound, self.deviation);
         Differences::Coarse(errors.iter().map(|error| part * error).collect())
     }
 
-    /// The gain in cost that shows.
+    /// Least significant gain in cost.
     pub fn shows(&self) -> f64 {
         0.5 * (SHOWS * self.deviation).powi(2)
     }

@@ -1,4 +1,4 @@
-//! A first guess without simulation: the balance of torques of a rigid axis, as a linear regression.
+//! First guess without simulation: torque balance of a rigid axis by linear regression.
 //!
 //! ```text
 //! τ_M = J φ̈ + B φ̇ + C sgn φ̇ + T₀                at the drive pulley, everything moving together
@@ -6,7 +6,7 @@
 //!
 //! τ_M follows from the logged input, φ̇ and φ̈ from the logged positions by derivatives of a Gaussian that weighs a
 //! few rows. This is the method of the inverse dynamic model (M. Gautier, W. Khalil 1990); noise in positions biases
-//! it, so it only says where a search may begin.
+//! it, so it is only a start for a search.
 
 use super::triangle::inverse_of_square;
 use crate::fit::asked::problem::Problem;
@@ -21,20 +21,20 @@ use crate::parameter::{Free, Sum, at_pulley, value};
 use nalgebra::{DMatrix, DVector};
 use std::ops::RangeInclusive;
 
-/// The balance of torques of a rigid axis, at the drive pulley.
+/// Torque balance of a rigid axis, at the drive pulley.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Balance {
     /// Total inertia J, kg m².
     pub inertia: f64,
-    /// Total viscous friction B, N m s/rad, without what the back-EMF brakes.
+    /// Total viscous friction B, N m s/rad, without back-EMF.
     pub viscous: f64,
     /// Total Coulomb friction C, N m.
     pub coulomb: f64,
-    /// Constant torque T₀ that the motor has to bring up, N m.
+    /// Constant torque T₀ of the motor, N m.
     pub load: f64,
     /// Standard errors of the four, as if the equations were independent.
     pub errors: [f64; 4],
-    /// Root mean square of what is left, as a part of that of the torque.
+    /// RMS of the residual relative to that of the torque.
     pub unexplained: f64,
     /// Equations.
     pub equations: usize,
@@ -63,8 +63,8 @@ pub(crate) fn suspected_delay(problem: &Problem) -> Option<f64> {
     (late.abs() >= SHORTEST_DELAY).then(|| late as f64 * problem.runs[0].interval())
 }
 
-/// Rows by which the input of the log of this name is logged too early, beyond what a delay comes to; negative if too
-/// late. None where no shift leaves far less of the torque.
+/// Rows by which the input of the log of this name was logged too early, beyond a plausible delay; negative if too
+/// late. None if no shift leaves far less unexplained torque.
 pub(crate) fn suspected_shift(problem: &Problem, name: &str) -> Option<isize> {
     let mut logs = smoothed(problem);
     logs.retain(|log| log.run.name == name);
@@ -91,7 +91,7 @@ fn least_left(logs: &[Smoothed], rows: RangeInclusive<isize>, apart: isize, most
 pub(crate) fn smoothed<'a>(problem: &'a Problem) -> Vec<Smoothed<'a>> {
     let noise = problem.noise();
     let mut all = Vec::new();
-    // One balance of torques is that of one coordinate.
+    // A single torque balance requires a single coordinate.
     if !problem.machine.has_torque_balance() {
         return all;
     }
@@ -197,7 +197,7 @@ pub(crate) fn torque(machine: &Machine, input: f64, speed: f64) -> f64 {
     motor.gear_efficiency * n * motor.torque_constant * clipped(current, amplifier.current_limit)
 }
 
-/// Rows to each side that a Gaussian of this width weighs.
+/// Number of rows to each side within a Gaussian of this width.
 pub(crate) fn reach(width: f64) -> usize {
     (5.0 * width).ceil() as usize
 }
@@ -239,8 +239,7 @@ pub(crate) fn derived(values: &[f64], width: f64, h: f64) -> Option<Vec<[f64; 2]
 }
 
 impl Balance {
-    /// The values of the free parameters that make the machine's totals those of the balance, where that is a machine
-    /// of its kind.
+    /// Values of the free parameters for which the machine's totals match the balance, if plausible.
     pub fn guess(&self, problem: &Problem) -> Vec<f64> {
         let mut values: Vec<f64> = problem.parameters.iter().map(|parameter| parameter.start).collect();
         let totals = [(Sum::Inertia, self.inertia), (Sum::Viscous, self.viscous), (Sum::Coulomb, self.coulomb)];
@@ -252,7 +251,7 @@ impl Balance {
                 free.keys.iter().map(|(key, factor)| factor * free.start * at_pulley(machine, key)).sum()
             };
             let total: f64 = keys.iter().map(|key| value(machine, key).unwrap_or(0.0) * at_pulley(machine, key)).sum();
-            // Of parameters of single campaigns, the first campaign's.
+            // For parameters of single campaigns, that of the first campaign.
             let first = |(_, of): &(&Free, &Option<usize>)| of.is_none_or(|of| of == 0);
             let counted = problem.parameters.iter().zip(&problem.of).filter(first).map(|(free, _)| free);
             let searched: f64 = counted.filter(|free| own(free)).map(part).sum();

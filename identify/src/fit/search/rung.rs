@@ -4,7 +4,7 @@ use super::point::{Ending, Point, Strategy};
 use crate::fit::asked::residuals::Residuals;
 use crate::solve::Flow;
 
-/// Sees the best point and its cost after each step, and may end the search.
+/// Receives the best point and its cost after each step, and may end the search.
 pub(crate) type Watch<'a> = dyn FnMut(&[f64], f64) -> Flow + 'a;
 
 /// End of a rung.
@@ -12,11 +12,11 @@ pub(crate) type Watch<'a> = dyn FnMut(&[f64], f64) -> Flow + 'a;
 pub(crate) enum Climb {
     /// At a minimum.
     Converged,
-    /// The rung cannot go on, but the cost is lower or its pieces are known: the rung below goes on from here.
+    /// The rung cannot continue, but the cost is lower or its pieces are known: the previous rung continues from here.
     Lowered,
     /// The rung does not lower the cost: the next one is tried.
     Passed,
-    /// Reasons that end a search anywhere: it was stopped, its iterations are used up, or there is no Jacobian.
+    /// Ends the search: it was stopped, its iterations are used up, or there is no Jacobian.
     Ended(Ending),
 }
 

@@ -1,4 +1,4 @@
-//! The search: starts, and weights from what the residuals are.
+//! The search: starts, and weights from the residuals.
 
 use super::least_squares::minimise;
 use super::point::{Ending, Minimum, Options};
@@ -34,7 +34,7 @@ pub struct Work {
 }
 
 impl Work {
-    /// Adds what else was done.
+    /// Adds further effort.
     pub(crate) fn add(&mut self, other: &Work) {
         self.iterations += other.iterations;
         self.evaluations += other.evaluations;
@@ -56,14 +56,14 @@ pub(crate) struct Searched<'a> {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Effort {
     pub options: Options,
-    /// True if curves of friction are simulated as straight lines.
+    /// True if friction curves are simulated as piecewise linear.
     pub is_straight: bool,
     /// True if a search by differences whose iterations are used up does not begin again with new weights.
     pub is_short: bool,
 }
 
 impl Effort {
-    /// Effort of a fit for comparison: another step would change it by far less than models differ on held-out records.
+    /// Effort of a fit for comparison: a further step would change it far less than models differ on held-out records.
     pub fn compared() -> Self {
         let options = Options { tolerance: ROUGH_TOLERANCE, iterations: STEPS, evolutions: 0, ..Options::default() };
         Self { options, is_straight: true, is_short: false }
@@ -125,7 +125,7 @@ pub(crate) fn search_as_far<'a>(
         }
     }
 
-    // Weights from what the residuals are, until they stay.
+    // Weights from the residuals, iterated until they are constant.
     let mut noise: Vec<(Quantity, f64)> = Vec::new();
     for round in 0..WEIGHT_ROUNDS {
         if problem.is_stopped() || best.ending == Ending::Interrupted {
@@ -187,7 +187,7 @@ fn as_it_is(problem: &mut Problem) -> Minimum {
     }
 }
 
-/// The first weight of an output that counts.
+/// The first weight of a counted output.
 fn first_weight(problem: &Problem) -> Option<f64> {
     problem.runs.iter().flat_map(|run| &run.seen).flat_map(|seen| &seen.weights).copied().find(|w| *w > 0.0)
 }
@@ -198,7 +198,7 @@ fn rescale(minimum: &mut Minimum, factor: f64) {
     minimum.cost *= factor * factor;
 }
 
-/// True if all that counts has the same weight.
+/// True if all counted values have the same weight.
 fn uniform(problem: &Problem) -> bool {
     let mut weights =
         problem.runs.iter().flat_map(|run| &run.seen).flat_map(|seen| &seen.weights).filter(|w| **w > 0.0);
@@ -206,8 +206,8 @@ fn uniform(problem: &Problem) -> bool {
     weights.all(|w| (w / first - 1.0).abs() < 1e-3)
 }
 
-/// True if the residuals of positions go to and fro all along: they change their sign often, and never keep it for
-/// long, as those of a model that is wrong do.
+/// True if the residuals of positions oscillate throughout: they change sign often and never keep it for long, unlike
+/// those of a wrong model.
 fn swings(problem: &Problem, at: &Minimum) -> bool {
     let all = problem.runs.iter().enumerate().flat_map(|(index, run)| {
         let (first, n) = (problem.first_row(index), run.time.len());
@@ -232,8 +232,7 @@ fn swings(problem: &Problem, at: &Minimum) -> bool {
     }) && any
 }
 
-/// True if what is known beforehand of the start could be as wrong as the residuals are: then it depends on their
-/// weight.
+/// True if the prior of the start may have errors like the residuals, so that it depends on their weight.
 fn told_beforehand(problem: &Problem, noise: &[(Quantity, f64)]) -> bool {
     let most = noise.iter().map(|(_, deviation)| *deviation).fold(0.0, f64::max);
     let arm = problem.machine.pulley_radius.min(1.0);
@@ -243,8 +242,8 @@ fn told_beforehand(problem: &Problem, noise: &[(Quantity, f64)]) -> bool {
 /// A search of a problem from a point.
 type Descend<'d> = dyn FnMut(&mut Problem, &[f64], &Options) -> Minimum + 'd;
 
-/// The start values of the case or those of a regression, for a stepper of fits of the beginnings of its logs, for a
-/// machine with several coordinates of fits in short windows: whichever fits the logs better.
+/// Start values of the case or of a regression; for a stepper, of fits to the beginnings of its logs; for several
+/// coordinates, of fits in short windows: whichever fits the logs better.
 fn first_guess(case: &Case, plan: &Plan, problem: &mut Problem, descend: &mut Descend) -> Result<Vec<f64>> {
     let start = problem.start();
     let guess = match &problem.machine {
@@ -260,10 +259,11 @@ fn first_guess(case: &Case, plan: &Plan, problem: &mut Problem, descend: &mut De
     Ok(if cost(&guess) < cost(&start) { guess } else { start })
 }
 
-/// The start with what fits of the beginnings of the logs find, each longer than the one before.
+/// Start from fits to successively longer beginnings of the logs.
 ///
-/// A rotor swings on its field, with the cart on its belt, at a frequency by holding torque and mass: with a wrong one it
-/// is soon out of phase with the log, and there is a minimum for each cycle. In a beginning of a cycle there is one.
+/// A rotor oscillates on its field, with the cart on its belt, at a frequency that depends on holding torque and mass:
+/// a wrong one is soon out of phase with the log, with a local minimum for each cycle. Within the first cycle there is
+/// a single minimum.
 fn by_beginnings(
     case: &Case,
     plan: &Plan,
@@ -290,8 +290,8 @@ fn rough() -> Options {
     Options { iterations: TRIAL_ITERATIONS, tolerance: ROUGH_TOLERANCE, evolutions: 0, ..Options::default() }
 }
 
-/// Takes what concerns all runs of `guess` from a rough search for another case or plan, which begins at it; false, and
-/// nothing has changed, if that fails.
+/// Updates the shared variables of `guess` by a rough search for another case or plan, which begins at it; false,
+/// without changes, if that fails.
 fn improve(case: &Case, plan: &Plan, problem: &mut Problem, guess: &mut [f64], descend: &mut Descend) -> Result<bool> {
     let globals = problem.globals();
     let mut other = Problem::new(case, plan)?.stopped_by(problem.stop());
@@ -362,7 +362,7 @@ fn in_windows(
             }
         }
         let found = descend(problem, &guess, &rough());
-        // Two starts that lead to one minimum say that there is no other near.
+        // Two starts that lead to one minimum indicate that no other is near.
         let agrees = best.as_ref().is_some_and(|best: &Minimum| (found.cost / best.cost - 1.0).abs() < SAME_MINIMUM);
         let is_better = best.as_ref().is_none_or(|best: &Minimum| found.cost < best.cost);
         if found.ending != Ending::Failed && is_better {
@@ -375,7 +375,7 @@ fn in_windows(
     Ok(best.map(|best| best.x))
 }
 
-/// True if residuals are no more than the noise of the logs. That is by third differences, which motion only adds to.
+/// True if residuals are within the noise of the logs, estimated by third differences, which motion only increases.
 fn is_noise(problem: &Problem, at: &Minimum) -> bool {
     let noise = problem.noise();
     let is_own = |(index, run): (usize, &Run)| {
@@ -390,8 +390,8 @@ fn is_noise(problem: &Problem, at: &Minimum) -> bool {
     problem.runs.iter().enumerate().all(is_own)
 }
 
-/// A point within the bounds, near enough to the start to be a machine of its kind: within a factor of ten, or for what
-/// may be zero, between zero and three times its start.
+/// A random point within the bounds and near the start: within a factor of ten, or between zero and three times its
+/// start for variables that may be zero.
 fn elsewhere(problem: &Problem, random: &mut Pcg64) -> Vec<f64> {
     let mut x = problem.start();
     let bounds = problem.bounds();
@@ -429,7 +429,7 @@ fn noise_of(problem: &Problem, at: &Minimum, robust: bool) -> Vec<(Quantity, f64
                     let w = seen.weights[k];
                     if w > 0.0 {
                         let r = at.residuals[first + output * n + k] / w;
-                        // Equal values in a row are one, unless they tremble.
+                        // Successive equal values count as one, unless the signal dithers.
                         let equal = seen.step > 0.0 && seen.alike[k] <= 1.0;
                         let share = if equal { 1.0 / seen.repeats[k].max(1.0) } else { 1.0 };
                         squares += share * r * r;

@@ -1,4 +1,4 @@
-//! Reduction of tall matrices to as many rows as the same products of columns need.
+//! Reduction of tall matrices to the number of rows needed for the same products of columns.
 //!
 //! A Jacobian has a row for each value of each log, and a log's own variables affect its rows alone. QR of successive
 //! blocks of rows, with their nonzero columns, leaves a triangle of each: M = Q M′ with QᵀQ = I, so that MᵀM = M′ᵀM′
@@ -7,8 +7,7 @@
 use crate::fit::limits::STRETCH;
 use nalgebra::DMatrix;
 
-/// A matrix of no more rows and at least as many as columns, unless there are fewer, that is the same but for a
-/// rotation of its rows.
+/// A matrix with at most as many rows that differs only by an orthogonal transformation of its rows.
 pub(crate) fn shortened(matrix: &DMatrix<f64>) -> DMatrix<f64> {
     let (rows, columns) = matrix.shape();
     if rows <= 2 * STRETCH.max(columns) {
@@ -56,7 +55,7 @@ pub fn inverse_of_square(jacobian: &DMatrix<f64>) -> Option<DMatrix<f64>> {
 mod tests {
     use super::*;
 
-    /// Five logs of 700 rows with two shared variables and one each: products of columns stay, and rows become few.
+    /// Five logs of 700 rows with two shared variables and one each: products of columns are kept with few rows.
     #[test]
     fn products_of_columns_stay() {
         let mut number = 0.37_f64;

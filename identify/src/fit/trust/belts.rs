@@ -1,8 +1,8 @@
-//! The belts of two drives compared: which one is less stiff, and by how much.
+//! Comparison of the belts of two drives: the looser one, and the ratio of stiffness.
 //!
-//! With K_d the sum of the stiffnesses of the spans that only drive d pulls at, ln(K₂/K₁) is a function of the free
-//! parameters as any estimate is. With g its slopes by relative changes of them, its standard error is that of g along
-//! the directions that the logs determine; where g goes along others, it is not determined.
+//! With the sum K_d of the stiffnesses of the spans pulled by drive d alone, ln(K₂/K₁) is a function of the free
+//! parameters. With its derivatives g with respect to their relative changes, its standard error is that of g along the
+//! determined directions; if g has a component along others, it is not determined.
 
 use super::directions::Directions;
 use crate::fit::asked::problem::Problem;
@@ -18,9 +18,9 @@ pub struct Belts {
     pub drives: [&'static str; 2],
     /// K₂/K₁
     pub ratio: f64,
-    /// Standard error of ln(K₂/K₁); infinite where the logs do not determine it.
+    /// Standard error of ln(K₂/K₁); infinite if the logs do not determine it.
     pub error: f64,
-    /// Slopes of ln(K₂/K₁) by the variables of the search.
+    /// Derivatives of ln(K₂/K₁) with respect to the variables of the search.
     slopes: Vec<f64>,
 }
 
@@ -71,7 +71,7 @@ impl Belts {
         })
     }
 
-    /// Takes what is added to the covariance of the variables into the error.
+    /// Adds an addition to the covariance of the variables to the error.
     pub(super) fn widen(&mut self, added: &DMatrix<f64>) {
         let n = added.nrows().min(self.slopes.len());
         let sum: f64 = (0..n)
@@ -81,13 +81,13 @@ impl Belts {
         self.error = self.error.hypot(sum.max(0.0).sqrt());
     }
 
-    /// 95 % interval of the ratio; from zero to infinity where it is not determined.
+    /// 95 % interval of the ratio; from zero to infinity if it is not determined.
     pub fn interval(&self) -> [f64; 2] {
         let reach = (NORMAL * self.error).exp();
         [self.ratio / reach, self.ratio * reach]
     }
 
-    /// Number of the drive whose spans are less stiff; `None` if the interval leaves that open.
+    /// Index of the drive with less stiff spans; `None` if the interval does not decide.
     pub fn looser(&self) -> Option<usize> {
         match self.interval() {
             [_, high] if high < 1.0 => Some(1),

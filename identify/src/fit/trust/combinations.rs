@@ -1,5 +1,4 @@
-//! Combinations of undetermined parameters that are determined: their sums, ratios and products, with names and
-//! intervals.
+//! Determined combinations of undetermined parameters: their sums, ratios and products, with names and intervals.
 
 use super::directions::Directions;
 use crate::fit::asked::problem::Problem;
@@ -21,8 +20,8 @@ pub struct Combination {
     pub interval: [f64; 2],
 }
 
-/// The determined combinations of `members`, of which `lost` directions are not determined: each of them with the one
-/// that moves most along what is lost, or where two directions are lost, with the two that do.
+/// Determined combinations of `members`, of which `lost` directions are not determined: each of them with the one that
+/// moves most along the lost direction, or with the two that do for two lost directions.
 pub(crate) fn of(
     problem: &Problem,
     directions: &Directions,
@@ -34,7 +33,7 @@ pub(crate) fn of(
 ) -> Vec<Combination> {
     let v = &directions.v;
     let n = v.nrows();
-    // Relative changes along what is lost, the members alone.
+    // Relative changes of the members along the lost directions.
     let hidden = DMatrix::from_fn(members.len(), lost.len(), |a, d| v[(members[a], lost[d])]);
     let kept: Vec<usize> = (0..directions.alive).filter(|i| !lost.contains(i)).collect();
     let mut found: Vec<Combination> = Vec::new();
@@ -43,7 +42,7 @@ pub(crate) fn of(
             if a == b {
                 continue;
             }
-            // c_a, c_b with c · h = 0 along all that is lost.
+            // c_a, c_b with c · h = 0 along all lost directions.
             let (ha, hb) = (hidden.row(a), hidden.row(b));
             let (size_a, size_b) = (ha.norm(), hb.norm());
             if size_a < 1e-3 || size_b < 1e-3 || ha.dot(&hb).abs() < 0.999 * size_a * size_b {
@@ -55,7 +54,7 @@ pub(crate) fn of(
             if found.iter().any(|other| other.name == name) {
                 continue;
             }
-            // In the directions, those that are kept.
+            // In terms of the determined directions.
             let mut c = DVector::zeros(n);
             (c[ja], c[jb]) = (wa, wb);
             let mut along = vec![0.0; directions.alive];
@@ -73,7 +72,7 @@ pub(crate) fn of(
 }
 
 /// The combination of two parameters that does not change when the second changes by 1 % and the first by `ratio` times
-/// that: its name, unit, value, and the relative change that a relative change of each makes of it.
+/// that: its name, unit, value, and its relative change per relative change of each.
 fn named(
     problem: &Problem,
     names: &[String],
@@ -90,7 +89,7 @@ fn named(
     let (va, vb) = (problem.value(a, x[a]), problem.value(b, x[b]));
     let (ua, ub) = (problem.parameters[a].unit, problem.parameters[b].unit);
     let machine = problem.stage_at(x);
-    // Relative changes are by `whole`, which is more than the value of what is small.
+    // Relative changes refer to `whole`, which exceeds the value of small parameters.
     let relative = |j: usize, value: f64| problem.slope(j, value) * problem.whole(&machine, j, x[j]) / value;
     let (ra, rb) = (relative(a, va), relative(b, vb));
     if va == 0.0 || vb == 0.0 || !ra.is_finite() || !rb.is_finite() {
@@ -100,7 +99,7 @@ fn named(
     let power = ratio * ra / rb;
     let near = |to: f64| (power / to - 1.0).abs() < WHOLE_POWER;
     if near(1.0) {
-        // The gain of an amplifier, or what drives, below the line.
+        // The gain of an amplifier, or the drive, in the denominator.
         let below = |j: usize| names[j].starts_with("amplifier") || names[j].starts_with("motor");
         if below(a) && !below(b) || (below(a) == below(b) && !first) {
             return None;

@@ -1,11 +1,11 @@
-//! The directions in which the parameters of a problem move, by how much the logs show of each.
+//! Directions in parameter space, ordered by their effect on the outputs.
 
 use crate::fit::asked::problem::Problem;
 use crate::fit::limits::{MOST_SWEEPS, SHARE_LOST, SINGULAR_ROUNDING, UNDETERMINED};
 use crate::fit::search::triangle::shortened;
 use nalgebra::{DMatrix, SVD};
 
-/// The directions in which the parameters move, by how much they show.
+/// Directions in parameter space, ordered by their effect on the outputs.
 pub(crate) struct Directions {
     /// Each a column, in relative changes.
     pub v: DMatrix<f64>,
@@ -17,7 +17,7 @@ pub(crate) struct Directions {
     pub alive: usize,
     /// A change by 100 %, in the variable of each.
     pub whole: Vec<f64>,
-    /// Values that count.
+    /// Number of counted values.
     pub rows: f64,
 }
 
@@ -61,8 +61,8 @@ impl Directions {
 }
 
 impl Directions {
-    /// Root mean square by which a change by 100 % along the strongest of the lost directions of these members moves
-    /// the values, if noise alone would leave all of them determined.
+    /// RMS change of the values by 100 % along the strongest of the lost directions of these members, if noise alone
+    /// would leave all of them determined.
     pub fn told_by_noise(&self, lost: &[usize], members: &[usize], off: &[f64]) -> Option<f64> {
         let goes = |i: &&usize| members.iter().map(|&j| self.v[(j, **i)].powi(2)).sum::<f64>() > SHARE_LOST;
         let own: Vec<usize> = lost.iter().filter(goes).copied().collect();
@@ -72,14 +72,14 @@ impl Directions {
     }
 }
 
-/// Columns of the first `n` variables without what the others can do.
+/// Columns of the first `n` variables, with those of the others projected out.
 fn projected(jacobian: &DMatrix<f64>, n: usize) -> Option<DMatrix<f64>> {
     let all = jacobian.ncols();
     if all == n {
         let rows = jacobian.nrows();
         return if rows > n { Some(shortened(jacobian).qr().unpack_r()) } else { Some(jacobian.clone()) };
     }
-    // Others first: the last block of R is what they leave of the rest.
+    // Others first: the last block of R is the projected rest.
     let order: Vec<usize> = (n..all).chain(0..n).collect();
     let ordered = jacobian.select_columns(&order);
     if ordered.nrows() < all {

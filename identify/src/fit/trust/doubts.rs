@@ -1,12 +1,12 @@
-//! Reasons to widen intervals beyond noise: parts of the logs that disagree, another friction law, and an element that
-//! the model lacks.
+//! Reasons to widen intervals beyond noise: parts of the logs that disagree, another friction law, and a missing
+//! element.
 
 use nalgebra::DMatrix;
 
 /// Parts of the logs that disagree with the whole.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Disagreement {
-    /// Windows that were compared.
+    /// Number of compared windows.
     pub windows: usize,
     /// Their length, s.
     pub length: f64,
@@ -21,15 +21,15 @@ pub struct Disagreement {
 pub struct OtherLaw {
     /// Its key: `stribeck`, `sided`, `drift`, `sway`.
     pub key: &'static str,
-    /// The body, as the case file has it.
+    /// The key of the body in the case file.
     pub body: &'static str,
     /// In words, with its size.
     pub words: String,
-    /// The share of the sum of squared residuals that it explains.
+    /// Explained fraction of the sum of squared residuals.
     pub explained: f64,
     /// Its amplitude in standard errors.
     pub standard_errors: f64,
-    /// Amount that it takes off the sum of the squared residuals.
+    /// Reduction of the sum of squared residuals.
     pub(crate) gain: f64,
     /// Change of each parameter, in standard errors.
     pub off: Vec<f64>,
@@ -44,7 +44,7 @@ pub struct Cause {
     pub key: &'static str,
     /// In words, with its size.
     pub words: String,
-    /// The share of the sum of squared residuals that it explains.
+    /// Explained fraction of the sum of squared residuals.
     pub explained: f64,
     /// Its size in standard errors.
     pub standard_errors: f64,
@@ -54,7 +54,7 @@ pub struct Cause {
     pub estimates: Vec<Option<Size>>,
     /// The change of the case file that adds it.
     pub add: String,
-    /// Parts of the logs that were held out, and in how many of them it predicts better.
+    /// Number of held-out parts of the logs that it predicts better, and of all parts.
     pub better: [usize; 2],
     /// The addition to the covariance of the variables that concern all runs.
     pub(crate) added: DMatrix<f64>,
@@ -73,7 +73,7 @@ pub struct Size {
     pub error: f64,
 }
 
-/// Friction of a body that falls by a force or torque as it picks up this speed, in words.
+/// Friction of a body that falls by a force or torque up to this speed, in words.
 pub(super) fn falling(body: &str, force: &str, speed: &str) -> String {
     format!("friction of the {} that falls by {force} within some {speed}", body.replace('_', " "))
 }

@@ -5,7 +5,7 @@
 pub enum Grade {
     /// Information.
     Note,
-    /// The result is not to be relied on.
+    /// The result is unreliable.
     Warning,
 }
 
@@ -19,7 +19,7 @@ impl Grade {
     }
 }
 
-/// Something to be known.
+/// A finding.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Finding {
     /// Its severity.

@@ -21,7 +21,7 @@ use crate::machine::{AmplifierMode, DriveAt, DriveUnit, Motor};
 use crate::number::{engineering, significant};
 use crate::solve::Bench;
 
-/// All there is to say, warnings first.
+/// All findings, warnings first.
 pub(crate) fn findings(case: &Case, plan: &Plan, found: &Searched, fit: &Fit, surveys: &[Survey]) -> Vec<Finding> {
     let mut all = of_logs(case, plan, found, surveys);
     all.extend(of_controller(case, plan));
@@ -67,7 +67,7 @@ fn of_logs(case: &Case, plan: &Plan, found: &Searched, surveys: &[Survey]) -> Ve
     all
 }
 
-/// True if nothing that slides ends at a stop.
+/// True if no slide ends at a stop.
 fn is_free(case: &Case) -> bool {
     case.machine.slides().all(|slide| slide.travel.is_none())
 }
@@ -83,7 +83,7 @@ fn grade(note: &Note, case: &Case, plan: &Plan) -> Grade {
     }
 }
 
-/// True if a log moves against what the model does at the start.
+/// True if a log moves opposite to the model at the start.
 fn is_opposite(problem: &Problem, name: &str) -> bool {
     let (x, mut worst) = (problem.start(), None);
     for (index, run) in problem.runs.iter().enumerate().filter(|(_, run)| run.name == name) {
@@ -126,8 +126,8 @@ fn of_controller(case: &Case, plan: &Plan) -> Vec<Finding> {
     told.collect()
 }
 
-/// Residuals of a machine with several coordinates, or with a stepper, that are more than the noise of its logs: its
-/// elastic modes make many minima.
+/// Residuals above the noise of the logs for a machine with several coordinates or a stepper, whose elastic modes cause
+/// local minima.
 fn of_noise(found: &Searched) -> Option<Finding> {
     let problem = &found.problem;
     if problem.machine.has_torque_balance() || problem.parameters.is_empty() {
@@ -218,7 +218,7 @@ fn of_search(fit: &Fit) -> Vec<Finding> {
         let grade = if found.explained >= CAUSE_WARNS { Grade::Warning } else { Grade::Note };
         all.push(finding(grade, "other_law", text));
     }
-    // a²/2 of a wave against σ² of the residuals. Where an element explains them, its waves are a part of that.
+    // a²/2 of a wave compared with σ² of the residuals. If an element explains them, its waves are included.
     let share = |wave: &Wave| {
         let noise = fit.noise.iter().find(|(quantity, _)| *quantity == wave.quantity);
         noise.map_or(1.0, |(_, deviation)| 0.5 * (wave.amplitude / deviation).powi(2))
@@ -236,7 +236,7 @@ fn of_search(fit: &Fit) -> Vec<Finding> {
     all
 }
 
-/// The element that the model lacks, as a fit with it found it.
+/// The missing element, from a fit with it.
 fn of_cause(fit: &Fit) -> Option<Finding> {
     let found = fit.cause.as_ref()?;
     let moved = fit.estimates.iter().zip(&found.estimates).filter_map(|(estimate, with)| {
@@ -336,7 +336,7 @@ fn plain(value: f64, unit: &str) -> String {
 }
 
 impl Balance {
-    /// The judgement on the share of torque that is left.
+    /// The judgement on the unexplained torque.
     pub fn words(&self) -> &'static str {
         match self.unexplained {
             left if left < 0.1 => "a rigid axis with viscous and Coulomb friction explains these logs",

@@ -1,4 +1,4 @@
-//! The result of a fit, and how well it is known.
+//! Result of a fit with its uncertainty.
 
 use super::belts::Belts;
 use super::combinations::Combination;
@@ -15,10 +15,10 @@ use crate::machine::Machine;
 /// The result of a fit.
 #[derive(Debug, Clone)]
 pub struct Fit {
-    /// The machine with the estimates. Of the machines that meet the logs alike, it is the nearest to that of the case.
+    /// The machine with the estimates; among machines that fit the logs equally well, the nearest to that of the case.
     pub machine: Machine,
-    /// The machine of each campaign, or log, that has parameters for itself: `stage` is the first. Empty where nothing
-    /// is separate.
+    /// The machine of each campaign, or log, with separate parameters, of which `machine` is the first. Empty without
+    /// separate parameters.
     pub parts: Vec<(String, Machine)>,
     /// The estimates: free parameters, then what all logs share.
     pub estimates: Vec<Estimate>,
@@ -32,13 +32,13 @@ pub struct Fit {
     pub identifiability: Option<Identifiability>,
     /// Advice for each group of parameters that is not determined.
     pub choices: Vec<Vec<String>>,
-    /// Parts of the logs that say otherwise than the whole, by more than noise would make of it.
+    /// Parts of the logs that disagree with the whole by more than noise.
     pub disagreement: Option<Disagreement>,
     /// A friction law that the case does not have and the residuals suggest.
     pub other_law: Option<OtherLaw>,
-    /// An element that the model lacks and the logs show, as a fit with it found it.
+    /// A missing element that the logs show, from a fit with it.
     pub cause: Option<Cause>,
-    /// Errors of an output that come again at the same place.
+    /// Errors of an output that repeat with position.
     pub waves: Vec<Wave>,
     /// Findings on logs and search, warnings first.
     pub findings: Vec<Finding>,
@@ -48,20 +48,20 @@ pub struct Fit {
     pub ending: Ending,
     /// Its last strategy; `None` without a search.
     pub strategy: Option<Strategy>,
-    /// The gain that the last step promised, in standard errors.
+    /// Predicted gain of the last step, in standard errors.
     pub decrement: f64,
     /// ½ Σ r² of the weighted residuals.
     pub cost: f64,
-    /// The cost that each start led to, in the first weights; the first start is that of the case, or what a regression
-    /// makes of it if that is nearer.
+    /// Final cost of each start, in the first weights; the first start is that of the case, or that of a regression if
+    /// better.
     pub starts: Vec<f64>,
     /// Number of gradients around the estimates that balance; more than one at a kink.
     pub pieces: usize,
     /// Number of uses of an evolution strategy.
     pub evolved: usize,
-    /// Values that count.
+    /// Number of counted values.
     pub values: usize,
-    /// Variables, what is fitted along included.
+    /// Number of variables, including nuisance parameters.
     pub variables: usize,
     /// The effort.
     pub work: Work,
@@ -87,7 +87,7 @@ pub struct Estimate {
     pub bounds: [f64; 2],
     /// True if it ended at one of them.
     pub at_bound: bool,
-    /// The part of the logs that it is for, by its index among the fit's; `None` if it is for all of them.
+    /// Index of the part of the logs that it belongs to; `None` for all logs.
     pub part: Option<usize>,
     /// The keys that it sets in the case file, with their values.
     pub sets: Vec<(String, f64)>,
@@ -101,22 +101,22 @@ impl Estimate {
 }
 
 impl Fit {
-    /// True if all that is searched for is determined and nothing warns.
+    /// True if all free parameters are determined and there is no warning.
     pub fn is_reliable(&self) -> bool {
         self.is_complete() && self.warnings().next().is_none()
     }
 
-    /// True if all that is searched for is determined.
+    /// True if all free parameters are determined.
     pub fn is_complete(&self) -> bool {
         self.estimates.iter().all(Estimate::is_determined)
     }
 
-    /// The findings that make the result not to be relied on.
+    /// The findings that make the result unreliable.
     pub fn warnings(&self) -> impl Iterator<Item = &Finding> {
         self.findings.iter().filter(|finding| finding.grade == Grade::Warning)
     }
 
-    /// True if the search ended at a minimum within the bounds, and nothing warns.
+    /// True if the search ended at a minimum within the bounds without warnings.
     pub fn is_converged(&self) -> bool {
         self.ending == Ending::Converged
             && !self.estimates.iter().any(|estimate| estimate.at_bound)

@@ -1,4 +1,4 @@
-//! Logs that are only compared: where they start is fitted to them, and nothing else.
+//! Held-out logs: only their starts are fitted.
 
 use super::scores::{LogFit, compared};
 use crate::case::Plan;
@@ -11,18 +11,18 @@ use crate::log::Quantity;
 use crate::machine::Machine;
 use crate::solve::Flow;
 
-/// Results of the fitted logs beside parameters.
+/// Results of the fitted logs other than parameters.
 pub(crate) struct Known<'a> {
     /// Deviation of each quantity's residuals.
     pub noise: &'a [(Quantity, f64)],
-    /// Delays, gains and offsets of single logs, in the mean.
+    /// Mean delays, gains and offsets of single logs.
     pub means: Vec<(Nuisance, f64)>,
     /// Nuisances that all logs share, and their values.
     pub shared: Vec<(Extra, f64)>,
 }
 
-/// A log beside `stage`: delay, gain and offsets are what the fitted logs say. Where it starts is fitted to the first
-/// `share` of its rows.
+/// A log compared with the machine: delay, gain and offsets are those of the fitted logs. Its start is fitted to the
+/// first `share` of its rows.
 pub(crate) fn met(run: &Run, machine: &Machine, known: &Known, share: f64) -> LogFit {
     let mut alone = run.clone();
     for extra in alone.extras.iter_mut().filter(|extra| !extra.what.is_start()) {
@@ -55,7 +55,7 @@ pub(crate) fn met(run: &Run, machine: &Machine, known: &Known, share: f64) -> Lo
     compared(&shown, machine, &extras, told)
 }
 
-/// An extra that has this value.
+/// An extra fixed at this value.
 fn held(extra: &Extra, value: f64) -> Extra {
     Extra { start: value, low: value, high: value, known: None, ..*extra }
 }

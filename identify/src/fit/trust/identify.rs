@@ -1,10 +1,10 @@
 //! Identifiability: the sensitivity of all outputs to each parameter, and the combinations that change nothing.
 //!
-//! With J the derivatives of the weighted outputs with respect to relative changes of the parameters, and what else is
-//! fitted along projected out, J = U S Vᵀ: along vᵢ the outputs change by sᵢ standard deviations of white noise. How
-//! far off that combination may be, the noise that the residuals show says ([`crate::fit::noise`]); where that is more
-//! than [`UNDETERMINED`], or where the outputs move by less than a machine shows ([`LEAST_SHOWN`], [`MODEL_ERROR`]), it
-//! is not determined.
+//! With the derivatives J of the weighted outputs with respect to relative changes of the parameters, nuisance
+//! parameters projected out, J = U S Vᵀ: along vᵢ the outputs change by sᵢ standard deviations of white noise. The
+//! noise of the residuals determines the error of that combination ([`crate::fit::noise`]); if this exceeds
+//! [`UNDETERMINED`], or if the outputs change by less than a machine can show ([`LEAST_SHOWN`], [`MODEL_ERROR`]), it is
+//! not determined.
 
 use super::belts::Belts;
 use super::combinations::{self, Combination};
@@ -20,25 +20,25 @@ use nalgebra::DMatrix;
 pub struct Identifiability {
     /// Names of the free parameters, those of the machine first, then what is shared.
     pub names: Vec<String>,
-    /// Root mean square of each parameter's column: by how many standard deviations a change by 100 % moves a value.
+    /// RMS of each parameter's column: change of a value by 100 %, in standard deviations.
     pub sensitivity: Vec<f64>,
     /// Singular values, falling.
     pub singular: Vec<f64>,
-    /// Relative standard error of each parameter with all others free; infinite where it is not determined.
+    /// Relative standard error of each parameter with all others free; infinite if it is not determined.
     pub error: Vec<f64>,
-    /// Groups of parameters of which only fewer combinations are determined.
+    /// Groups of parameters with fewer determined combinations than members.
     pub groups: Vec<Group>,
     /// The directions that are not determined, a column each: orthonormal, in relative changes of what concerns all
     /// runs.
     pub lost: DMatrix<f64>,
-    /// The belts of two drives compared, where a free parameter changes them.
+    /// Comparison of the belts of two drives, if a free parameter changes them.
     pub belts: Option<Belts>,
 }
 
 /// Parameters that the logs cannot distinguish.
 #[derive(Debug, Clone)]
 pub struct Group {
-    /// Places among the names.
+    /// Indices among the names.
     pub members: Vec<usize>,
     /// Number of their determined combinations.
     pub determined: usize,
@@ -49,7 +49,7 @@ pub struct Group {
 }
 
 impl Identifiability {
-    /// True if all is determined.
+    /// True if everything is determined.
     pub fn complete(&self) -> bool {
         self.groups.is_empty()
     }
@@ -64,7 +64,7 @@ impl Identifiability {
         Some(Self::told(problem, &directions, x, deviation, &off, &of))
     }
 
-    /// For the noise that the residuals show: `off` is the relative standard error along each direction, `of` that of a
+    /// For the noise of the residuals: `off` is the relative standard error along each direction, `of` that of a
     /// combination of directions.
     pub(crate) fn told(
         problem: &Problem,
@@ -85,7 +85,7 @@ impl Identifiability {
         let goes_with = |j: usize| lost.iter().map(|&i| v[(j, i)].powi(2)).sum::<f64>().sqrt();
         let error = (0..n)
             .map(|j| {
-                // Along what is lost no further than by all of it.
+                // Along lost directions at most by 100 %.
                 let row: Vec<f64> = (0..*alive)
                     .map(|i| if lost.contains(&i) { v[(j, i)] * (UNDETERMINED / off[i]).min(1.0) } else { v[(j, i)] })
                     .collect();
@@ -100,7 +100,7 @@ impl Identifiability {
         result
     }
 
-    /// Parameters connected by lost directions, each group with what is left of it.
+    /// Parameters connected by lost directions, each group with its determined combinations.
     fn grouped(
         &self,
         problem: &Problem,
@@ -187,7 +187,7 @@ impl Identifiability {
         }
         let parameters = members.iter().all(|&j| j < problem.parameters.len());
         if determined == 1 && parameters {
-            // The direction that is left, by powers of what is not hidden.
+            // The remaining direction, in powers of the visible parameters.
             let m = members.len();
             let mut left = DMatrix::from_fn(m, m, |a, b| f64::from(a == b) - hidden(members[a], members[b]));
             for _ in 0..6 {
@@ -199,7 +199,7 @@ impl Identifiability {
             }
             let best = (0..m).max_by(|&a, &b| left[(a, a)].total_cmp(&left[(b, b)])).unwrap_or(0);
             let machine = problem.stage_at(x);
-            // ∂/∂p of what is determined
+            // ∂/∂p of the determined combination
             let weights: Vec<f64> = members
                 .iter()
                 .enumerate()
@@ -271,13 +271,13 @@ fn tie(problem: &Problem, members: &[usize]) -> Option<String> {
     Some(format!("tie them: tied = [[{}]]", keys.join(", ")))
 }
 
-/// The least change of a value that a machine shows, and how far the values range: in their weights.
+/// Least visible change of a value, and the range of the values, in their weights.
 struct Least {
     least: f64,
     range: f64,
 }
 
-/// The least root mean square of a value's change that a machine shows.
+/// Least visible RMS change of a value.
 fn shows(problem: &Problem) -> Least {
     let seen = problem.runs.iter().flat_map(|run| &run.seen);
     let of = |seen: &MeasuredOutput| {
@@ -294,7 +294,7 @@ fn sum_with(key: &str) -> Option<Sum> {
     named(key)?.part.map(|(sum, _)| sum).filter(|sum| *sum != Sum::Stiffness)
 }
 
-/// A sum over the bodies that these weights are, in symbols and numbers.
+/// The sum over the bodies with these weights, in symbols and numbers.
 pub(crate) fn sum_of(machine: &crate::machine::Machine, parameters: &[&Free], weights: &[f64]) -> Option<String> {
     // Each one's keys must be parts of one sum.
     let sum = sum_with(&parameters.first()?.keys.first()?.0)?;

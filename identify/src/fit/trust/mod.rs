@@ -1,4 +1,4 @@
-//! Reliability of a minimum: which parameters are determined, how well, and possible errors.
+//! Reliability of a minimum: determined parameters, their accuracy, and possible errors.
 
 pub(crate) mod belts;
 pub(crate) mod causes;

@@ -28,7 +28,7 @@ use nalgebra::{DMatrix, DVector};
 /// A search that has settled on the point nearest to the values of the case.
 pub(crate) struct Settled<'a> {
     pub searched: Searched<'a>,
-    /// The information of the logs at the best point with no variable left out, where it is known already.
+    /// The information of the logs at the best point with all variables, if known already.
     seen: Option<Judged>,
 }
 
@@ -87,7 +87,7 @@ pub(crate) fn search_near<'a>(
     Ok(Settled { searched, seen })
 }
 
-/// A problem whose variables are drawn to where they began, along some directions.
+/// A problem whose variables are pulled towards their start along some directions.
 struct Anchored<'p, 'a> {
     problem: &'p mut Problem<'a>,
     /// ρ Vᵀ D⁻¹
@@ -150,8 +150,8 @@ impl Residuals for Anchored<'_, '_> {
     }
 }
 
-/// Moves a minimum along what is not determined to the point that is nearest to `given`, and optimises the rest again.
-/// The information of the logs where everything is determined.
+/// Moves a minimum along undetermined directions to the point nearest to `given`, and optimises the rest again. Returns
+/// the information of the logs if everything is determined.
 fn nearest(
     problem: &mut Problem,
     best: &mut Minimum,
@@ -214,7 +214,8 @@ fn round(
         let value = given[j].clamp(open.low[j], open.high[j]);
         (held.low[j], held.high[j], kept[j]) = (value, value, value);
     }
-    // Hidden variables as given; else drawn towards their values like the rest; else from the start of the case.
+    // Tries hidden variables as given, then pulled towards their values like the others, then from the start of the
+    // case.
     let mut tries = vec![(kept, &held), (best.x.clone(), &open), (given.to_vec(), &open)];
     if hidden.is_empty() {
         tries.remove(0);

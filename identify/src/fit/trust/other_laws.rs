@@ -75,9 +75,9 @@ enum Kind {
     Stribeck(f64),
     /// More Coulomb friction forward, and as much less backward.
     Sided,
-    /// All friction less at the begin of each log, and as much more at its end, as a share of it.
+    /// All friction less at the start of each log, and equally more at its end, relative.
     Drift,
-    /// All friction by one sine along each log, as a share of it.
+    /// All friction by one sine along each log, relative.
     Sway,
 }
 
@@ -107,12 +107,12 @@ struct Candidate {
 }
 
 impl Candidate {
-    /// The amplitude that is tried first.
+    /// The amplitude tried first.
     fn first(self) -> f64 {
         LAW_FIRST * if self.kind.is_along() { 1.0 } else { self.coulomb }
     }
 
-    /// Puts so much of the law into a machine, at this share of a log.
+    /// Adds the law with this amplitude to a machine, at this fraction of a log.
     fn put(self, machine: &mut Machine, amplitude: f64, share: f64) {
         let friction = self.body.friction(machine);
         match self.kind {
@@ -140,7 +140,7 @@ impl Candidate {
         }
     }
 
-    /// Amplitudes that the law may have.
+    /// Range of the law's amplitude.
     fn range(self) -> (f64, f64) {
         match self.kind {
             Kind::Stribeck(_) => (LAW_LEAST * self.coulomb, LAW_MOST * self.coulomb),
@@ -183,7 +183,7 @@ fn percent(value: f64) -> String {
     }
 }
 
-/// A candidate with its column and what comes of it.
+/// A candidate with its column and its effect.
 struct Tried {
     candidate: Candidate,
     amplitude: f64,
@@ -191,7 +191,7 @@ struct Tried {
     column: DVector<f64>,
     /// A Jᵀ j
     along: DVector<f64>,
-    /// Amount that it takes off Σ r².
+    /// Reduction of Σ r².
     gain: f64,
 }
 
@@ -228,7 +228,7 @@ pub(crate) fn other_law(found: &Searched, judged: &Judged) -> Option<OtherLaw> {
     let place = Place { problem, x: &best.x, free, residuals, jacobian, inverse };
     let tried = candidates.into_iter().filter_map(|candidate| place.attempt(candidate, candidate.first()));
     let mut tried = tried.max_by(|a, b| a.gain.total_cmp(&b.gain))?;
-    // Independent residuals would have to show it, too.
+    // Independent residuals must show it, too.
     if tried.gain.sqrt() < LAW_SHOWN * judged.covariance.deviation {
         return None;
     }
@@ -238,7 +238,7 @@ pub(crate) fn other_law(found: &Searched, judged: &Judged) -> Option<OtherLaw> {
     place.judged(&tried, judged)
 }
 
-/// The laws to be tried: of bodies whose friction is free, and only of Coulomb's law.
+/// Laws to try: for bodies with free friction of Coulomb's law.
 fn candidates(problem: &Problem, x: &[f64]) -> Vec<Candidate> {
     let mut machine = problem.stage_at(x);
     let mut all = Vec::new();
@@ -263,7 +263,7 @@ fn candidates(problem: &Problem, x: &[f64]) -> Vec<Candidate> {
     all
 }
 
-/// The greatest speed of a body along the logs, as the model has it.
+/// Largest speed of a body in the logs by the model.
 fn fastest(problem: &Problem, x: &[f64], body: Body) -> f64 {
     let quantity = if body == Body::Cart { Quantity::CartSpeed } else { Quantity::DriveSpeed };
     let mut bench = Bench::default();

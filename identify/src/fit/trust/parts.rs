@@ -20,7 +20,7 @@ pub(crate) struct Fold {
     pub held_out: Vec<Experiment>,
 }
 
-/// The records in parts: each is held out once. The flag says that logs were cut, so that their parts have starts of
+/// The records in parts: each is held out once. The flag is true if logs were cut, so that their parts have starts of
 /// their own.
 pub(crate) struct Parts {
     pub folds: Vec<Fold>,
@@ -78,7 +78,7 @@ pub(crate) fn errors(
     Ok((errors.collect(), found.work))
 }
 
-/// Interleaved logs, so that the parts are alike.
+/// Interleaved logs, so that the parts are similar.
 fn by_log(logs: &[&Experiment]) -> Vec<Fold> {
     let count = FOLDS.min(logs.len());
     let fold = |part: usize| {
@@ -91,7 +91,7 @@ fn by_log(logs: &[&Experiment]) -> Vec<Fold> {
     (0..count).map(fold).collect()
 }
 
-/// Blocks of each log; what is left of it before and behind the block is fitted.
+/// Blocks of each log; the rest before and after the block is fitted.
 fn by_block(logs: &[&Experiment]) -> Vec<Fold> {
     let mut folds = Vec::new();
     for (index, experiment) in logs.iter().enumerate() {

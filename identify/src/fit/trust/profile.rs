@@ -123,8 +123,8 @@ impl Bottom {
                     return None;
                 }
                 start = found.x;
-                // A linear model's cost grows by ½ (Δx/unit)², Δx = errors × off: in errors, whatever the residuals are
-                // autocorrelated.
+                // A linear model's cost grows by ½ (Δx/unit)², Δx = errors × off: in errors, independent of the
+                // autocorrelation of the residuals.
                 let grown = (2.0 * (found.cost - self.cost)).max(0.0).sqrt() * unit / off;
                 points.push((problem.value(j, x), grown, errors.abs()));
             }

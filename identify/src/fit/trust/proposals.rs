@@ -1,4 +1,4 @@
-//! Proposals of one more experiment: the sensitivities of its outputs beside those of the logs.
+//! Proposals of a further experiment: the sensitivities of its outputs in addition to those of the logs.
 
 use super::identify::Identifiability;
 use super::uncertainty::Judged;
@@ -11,14 +11,14 @@ use crate::machine::{AmplifierMode, BeltModel, Machine};
 use crate::solve::Bench;
 use nalgebra::DMatrix;
 
-/// One more experiment.
+/// A further experiment.
 #[derive(Debug, Clone)]
 pub struct Proposal {
     /// The action or the measurement.
     pub name: &'static str,
-    /// Its promise, in words.
+    /// Its predicted effect, in words.
     pub told: String,
-    /// Parameters determined with it.
+    /// Number of parameters determined with it.
     pub determined: usize,
     /// Sum of the logarithms of the relative errors, those that are not determined counted as [`UNDETERMINED`].
     score: f64,
@@ -30,13 +30,13 @@ type Measured = fn(&Problem, &[(Quantity, f64)]) -> Vec<(Quantity, f64)>;
 /// An experiment to repeat, with a change.
 struct Idea {
     name: &'static str,
-    /// The quantities to measure beside those of the logs; a deviation for each.
+    /// Further quantities to measure, each with a deviation.
     measured: Measured,
     /// The change of the machine.
     change: fn(&mut Machine),
-    /// True if the input is turned round.
+    /// True if the input is reversed.
     reversed: bool,
-    /// True if the logs have that already, or the model says nothing of it.
+    /// True if the logs have that already, or the model lacks it.
     is_there: fn(&Problem) -> bool,
 }
 
@@ -50,7 +50,7 @@ fn with(noise: &[(Quantity, f64)], quantity: Quantity, deviation: f64) -> Vec<(Q
     noise.iter().copied().chain([(quantity, deviation)]).collect()
 }
 
-/// The deviation of a position of the cart, if an encoder like that of the logs were there.
+/// Deviation of a position of the cart by an encoder like that of the logs.
 fn cart_noise(problem: &Problem, noise: &[(Quantity, f64)]) -> f64 {
     let r = problem.machine.pulley_radius;
     let known = noise.iter().find(|(quantity, _)| quantity.is_position());
@@ -96,7 +96,7 @@ const IDEAS: &[Idea] = &[
             machine.belt.stiffness = [1e-6; 3].into();
             machine.belt.damping = [0.0; 3].into();
             machine.belt.model = BeltModel::Elastic;
-            // Spans that follow the cart have a stiffness by their make.
+            // Spans that follow the cart derive their stiffness from their make.
             machine.belt.follows_cart = false;
             machine.belt.pretension = None;
         },
@@ -126,14 +126,14 @@ fn peak_current(problem: &Problem) -> f64 {
     }
 }
 
-/// The gain of each idea, ranked; only those that gain something and are not in the logs already. They are of an axis: no
-/// ideas for a machine with more coordinates.
+/// Proposals ranked by gain; only those that gain something and are not in the logs already. For an axis only: machines
+/// with more coordinates get none.
 pub(crate) fn proposals(found: &Searched, judged: &Judged) -> Vec<Proposal> {
     let Searched { problem, best, noise, .. } = found;
     if !problem.machine.has_torque_balance() {
         return Vec::new();
     }
-    // White noise that is as bad as what the residuals show.
+    // White noise with the effect of the residuals.
     let deviation = judged.covariance.deviation * judged.inflation;
     let unexplained = unexplained(problem, noise);
     let Some(now) = Identifiability::new(problem, &best.jacobian, &best.x, deviation) else { return Vec::new() };
@@ -156,8 +156,8 @@ pub(crate) fn proposals(found: &Searched, judged: &Judged) -> Vec<Proposal> {
     proposals
 }
 
-/// The least share of any measured signal that the residuals are: what the model does not explain of what is measured,
-/// it does not explain of another quantity either.
+/// Least ratio of residuals to any measured signal: what the model does not explain in the measured signals, it does
+/// not explain in another quantity either.
 fn unexplained(problem: &Problem, noise: &[(Quantity, f64)]) -> f64 {
     let share = |(quantity, deviation): &(Quantity, f64)| {
         let seen = problem.runs.iter().flat_map(|run| &run.seen).filter(|seen| seen.quantity == *quantity);
@@ -167,7 +167,7 @@ fn unexplained(problem: &Problem, noise: &[(Quantity, f64)]) -> f64 {
     noise.iter().map(share).fold(1.0, f64::min)
 }
 
-/// Standard deviation of the values that are there.
+/// Standard deviation of the existing values.
 fn spread(values: &[f64]) -> f64 {
     let there: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();
     let n = there.len().max(1) as f64;
@@ -196,7 +196,7 @@ fn told(now: &Identifiability, found: &Identifiability) -> String {
     told.join("; ")
 }
 
-/// The Jacobian with the rows that an idea adds: every log again, each with an unknown start, delay and offsets.
+/// The Jacobian with the rows of an idea: every log again, each with an unknown start, delay and offsets.
 fn with_rows(
     problem: &Problem,
     idea: &Idea,
@@ -296,7 +296,7 @@ fn has(problem: &Problem, quantity: Quantity) -> bool {
     problem.quantities().contains(&quantity)
 }
 
-/// True if the current is measured, or is what is fed in.
+/// True if the current is measured, or is the input.
 fn knows_current(problem: &Problem) -> bool {
     has(problem, Quantity::MotorCurrent) || problem.machine.drives[0].amplifier.mode == AmplifierMode::Current
 }

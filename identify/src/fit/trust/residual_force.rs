@@ -1,4 +1,4 @@
-//! The force that a model lacks: the additional force on the cart with which it would follow the log.
+//! Residual force: the additional force on the cart with which the model would follow the log.
 //!
 //! With the position error e of the cart, log minus model, the total mass M and the total viscous friction b at the
 //! cart,
@@ -17,7 +17,7 @@ use crate::log::Quantity;
 use crate::machine::{AmplifierMode, Machine};
 use crate::parameter::{Sum, at_pulley, value};
 
-/// A force that is missing along a log.
+/// Residual force along a log.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ResidualForce {
     /// s.
@@ -33,7 +33,7 @@ pub struct ResidualForce {
 }
 
 impl ResidualForce {
-    /// Adds what another log lacks.
+    /// Adds the residual force of another log.
     pub fn join(&mut self, other: &Self) {
         let pairs = [
             (&mut self.time, &other.time),
@@ -48,7 +48,7 @@ impl ResidualForce {
     }
 }
 
-/// The force that `stage` lacks for a log of an axis; `None` without an evenly sampled position, or if the model does
+/// The force that `machine` lacks for a log of an axis; `None` without an evenly sampled position, or if the model does
 /// not reach the end.
 pub fn residual_force(machine: &Machine, log: &LogFit) -> Option<ResidualForce> {
     let is_known = log.complete && machine.has_torque_balance();

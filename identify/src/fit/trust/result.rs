@@ -1,4 +1,4 @@
-//! A minimum as a result: estimates with their intervals, and how each log is met.
+//! Result at a minimum: estimates with their intervals, and the agreement with each log.
 
 use super::findings::findings;
 use super::found::{Estimate, Fit};
@@ -35,7 +35,7 @@ pub(crate) fn result(found: &Searched, judged: Option<&Judged>) -> Fit {
         _ if best.at_bound[j] => None,
         _ => Some(f64::INFINITY),
     };
-    // All variables without their bounds, where one is at its bound.
+    // All variables without their bounds, if one is at its bound.
     let beyond = if best.at_bound.contains(&true) {
         let free = vec![false; best.at_bound.len()];
         let free = Judged::new(problem, &best.residuals, &best.jacobian, &best.x, &free);
@@ -145,7 +145,7 @@ pub(crate) fn result(found: &Searched, judged: Option<&Judged>) -> Fit {
     }
 }
 
-/// Results of the fitted logs beside parameters, for those that are held out.
+/// Results of the fitted logs other than parameters, for held-out logs.
 pub(crate) fn known<'a>(found: &'a Searched) -> Known<'a> {
     let Searched { problem, best, noise, .. } = found;
     let mut sums: Vec<(Nuisance, f64, usize)> = Vec::new();

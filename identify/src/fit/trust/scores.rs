@@ -1,4 +1,4 @@
-//! Model and log side by side.
+//! Comparison of model and log.
 
 use super::uncertainty;
 use crate::case::Experiment;
@@ -12,7 +12,7 @@ use crate::solve::Bench;
 pub struct LogFit {
     /// The experiment.
     pub name: String,
-    /// Which window of it.
+    /// Index of its window.
     pub window: usize,
     /// True if none of it was fitted.
     pub held_out: bool,
@@ -39,16 +39,16 @@ pub struct OutputFit {
     pub seen: Vec<f64>,
     /// The model's values.
     pub model: Vec<f64>,
-    /// Over the rows that were fitted.
+    /// Score over the fitted rows.
     pub fitted: Option<Score>,
-    /// Over those that were not.
+    /// Score over the held-out rows.
     pub held_out: Option<Score>,
 }
 
 /// Deviation of model and log.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Score {
-    /// Values compared.
+    /// Number of compared values.
     pub count: usize,
     /// Root mean square of the residuals.
     pub rmse: f64,
@@ -60,15 +60,15 @@ pub struct Score {
     pub memory: f64,
 }
 
-/// A run beside the log of its experiment, with nothing fitted: it starts where the experiment does, and sensors have
-/// no offset. None where the experiment has no log.
+/// A run compared with the log of its experiment without a fit: it starts as the experiment does, and sensors have no
+/// offset. None if the experiment has no log.
 pub fn beside_log(machine: &Machine, experiment: &Experiment) -> Option<LogFit> {
     let log = experiment.log.as_ref()?;
     let run = Run::all(experiment, log, &Setting::default()).pop()?;
     Some(compared(&run, machine, &[], Vec::new()))
 }
 
-/// Model and log side by side.
+/// Compares model and log.
 pub(crate) fn compared(
     run: &Run,
     machine: &Machine,
@@ -134,17 +134,17 @@ fn score(seen: &[f64], model: &[f64], rows: std::ops::Range<usize>) -> Option<Sc
 /// Agreement with several logs together.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Together {
-    /// The name that they share; empty where it is all of them.
+    /// The name that they share; empty for all logs.
     pub name: String,
     /// Number of logs and windows.
     pub logs: usize,
     /// The measured values.
     pub quantity: Quantity,
-    /// True if this is what was not fitted.
+    /// True for held-out rows.
     pub held_out: bool,
-    /// Values compared.
+    /// Number of compared values.
     pub count: usize,
-    /// Root mean square of the residuals; infinite where the model does not reach the end of one.
+    /// RMS of the residuals; infinite if the model does not reach the end of a log.
     pub rmse: f64,
 }
 
@@ -180,7 +180,7 @@ pub fn together(logs: &[LogFit], name: impl Fn(&LogFit) -> String) -> Vec<Togeth
 }
 
 impl LogFit {
-    /// The experiment that the log is of: of a log that is split into runs, what these have in common.
+    /// Experiment of the log; for a log split into runs, the common part of their names.
     pub fn experiment(&self) -> &str {
         self.name.split_once('/').map_or(&self.name, |(experiment, _)| experiment)
     }

@@ -53,12 +53,12 @@ pub(crate) fn disagreement(case: &Case, plan: &Plan, found: &Searched, judged: &
     if matches!(best.ending, Ending::Failed | Ending::Interrupted) || best.at_bound[..g].contains(&true) {
         return None;
     }
-    // Windows with starts of their own can do what the whole can: where they do not, the search was not at its end.
+    // Windows with starts of their own fit at least as well as the whole; otherwise the search has not converged.
     if best.cost > found.best.cost {
         return None;
     }
     let noise = Judged::new(&problem, &best.residuals, &best.jacobian, &best.x, &best.at_bound)?;
-    // A window in which the cart rests shows nothing of the speed with which it starts.
+    // A window in which the cart rests contains no information on its initial speed.
     let shows = |j: usize| best.jacobian.column(j).iter().any(|v| *v != 0.0);
     let free: Vec<usize> = (0..best.x.len()).filter(|&j| !best.at_bound[j] && (j < g || shows(j))).collect();
     let inverse = inverse_of_square(&best.jacobian.select_columns(&free))?;

@@ -1,8 +1,8 @@
-//! Suspicions put to the test: the model is fitted to the logs once more as a suspicion would have them, and what the
-//! logs do not bear out is not said.
+//! Tests of suspicions: the model is fitted once more to the logs corrected by a suspicion; unconfirmed suspicions are
+//! not reported.
 //!
 //! Correlations and regressions are quick, and are wrong where noise is narrow-band, where a belt is elastic or where
-//! parameters are far off. A log that is mended has to leave markedly less.
+//! parameters are far off. A corrected log has to leave clearly smaller residuals.
 
 use super::scores::beside_log;
 use crate::case::{Case, Plan};
@@ -17,7 +17,7 @@ use crate::number::engineering_typed;
 use crate::solve::Flow;
 use std::sync::Arc;
 
-/// The surveys of all logs, without what a fit to the log as it is said to be refutes.
+/// Surveys of all logs, without suspicions that a fit to the corrected log refutes.
 pub(crate) fn surveys(case: &Case, plan: &Plan, found: &Searched) -> Vec<Survey> {
     let logs = case.experiments.iter().filter_map(|experiment| experiment.log.as_ref());
     let tested = |log: &Arc<Log>| {
@@ -34,7 +34,7 @@ pub(crate) fn surveys(case: &Case, plan: &Plan, found: &Searched) -> Vec<Survey>
     logs.map(tested).collect()
 }
 
-/// An input that is logged earlier or later than it acted, by more than a delay comes to.
+/// An input logged earlier or later than it acted, by more than a plausible delay.
 fn shift(case: &Case, plan: &Plan, found: &Searched, name: &str) -> Option<Note> {
     if plan.closed_loop || found.problem.is_stopped() {
         return None;
@@ -59,8 +59,8 @@ fn shift(case: &Case, plan: &Plan, found: &Searched, name: &str) -> Option<Note>
     })
 }
 
-/// Leaves out of a note on jumps those that are motion: the fitted model makes them too, as an axis does that slips
-/// between two samples.
+/// Removes jumps that are motion from a note: the fitted model has them, too, as an axis that slips between two
+/// samples.
 fn leave_motion(case: &Case, found: &Searched, log: &Log, note: &mut Note) {
     let Some(Remedy::Step(quantity, jumps)) = &mut note.remedy else { return };
     let Some(experiment) = case.experiments.iter().find(|experiment| experiment.name == log.name) else { return };
@@ -76,7 +76,7 @@ fn leave_motion(case: &Case, found: &Searched, log: &Log, note: &mut Note) {
     note.text = jumps_text(jumps, quantity.unit());
 }
 
-/// True if the logs are met better with the log of this name as `remedy` has it; true where that cannot be said.
+/// True if the fit improves with the log of this name corrected by `remedy`, or if that cannot be determined.
 pub(crate) fn is_borne_out(case: &Case, plan: &Plan, found: &Searched, name: &str, remedy: &Remedy) -> bool {
     // An incomplete fit, or a log that was not fitted, does not count.
     if found.problem.is_stopped() || !found.problem.runs.iter().any(|run| run.name == name) {
@@ -84,7 +84,7 @@ pub(crate) fn is_borne_out(case: &Case, plan: &Plan, found: &Searched, name: &st
     }
     let most = |before: usize, after: usize| match remedy {
         Remedy::Unit(..) => UNIT_WORSE,
-        // C n = C₁ k + s C₁ (n − k), k values that are kept
+        // C n = C₁ k + s C₁ (n − k), with k kept values
         Remedy::Leave(..) => {
             let (n, kept) = (before.max(1) as f64, after as f64);
             n / (kept + STAND_OUT * (n - kept))
@@ -108,11 +108,11 @@ pub(crate) fn is_borne_out(case: &Case, plan: &Plan, found: &Searched, name: &st
 
 /// Agreement with corrected logs.
 pub(crate) struct Mended {
-    /// Cost of a value, as a part of that with the logs as they are.
+    /// Cost of a value relative to that with the unchanged logs.
     pub left: f64,
-    /// The least such part of any quantity.
+    /// The least such ratio of any quantity.
     least: f64,
-    /// Number of values that count.
+    /// Number of counted values.
     counted: usize,
 }
 
@@ -152,7 +152,7 @@ pub(crate) fn mended(
     let mut problem = Problem::new(&own, plan).ok()?.stopped_by(found.problem.stop());
     problem.weigh_by(&found.noise);
     if let Remedy::Scale(quantity, factor) | Remedy::Unit(quantity, factor) = remedy {
-        // Residuals in the unit that they had.
+        // Residuals in their original unit.
         let runs = problem.runs.iter_mut().filter(|run| is_named(&run.name));
         for seen in runs.flat_map(|run| &mut run.seen).filter(|seen| seen.quantity == *quantity) {
             seen.weights.iter_mut().for_each(|weight| *weight /= factor.abs());

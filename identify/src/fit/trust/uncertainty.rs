@@ -27,20 +27,20 @@ pub struct Covariance {
     pub reach: f64,
 }
 
-/// The information of the logs at a point: which parameters are determined, and how well.
+/// Information of the logs at a point: determined parameters and their accuracy.
 #[derive(Debug, Clone)]
 pub(crate) struct Judged {
     pub identifiability: Identifiability,
     pub covariance: Covariance,
     /// Ratio of the errors to those with white noise of the same size.
     pub inflation: f64,
-    /// The slow noises of each quantity, by its place among the problem's.
+    /// The slow noises of each quantity, by its index in the problem.
     pub spreads: Vec<Spread>,
-    /// Parts of the logs that say otherwise.
+    /// Parts of the logs that disagree.
     pub disagreement: Option<Disagreement>,
     /// The law that the residuals suggest.
     pub other_law: Option<OtherLaw>,
-    /// The element that the model lacks.
+    /// The missing element.
     pub cause: Option<Cause>,
 }
 
@@ -63,7 +63,7 @@ impl Judged {
         let squares: f64 = residuals.iter().map(|r| r * r).sum();
         let deviation = (squares / freedom).sqrt();
 
-        // In terms of the directions, each of whose columns can be inverted for any logs.
+        // In terms of the directions, whose columns can be inverted for any logs.
         let mut turned = DMatrix::zeros(globals, alive);
         for i in 0..alive {
             for j in 0..globals {
@@ -120,7 +120,7 @@ impl Judged {
 }
 
 impl Judged {
-    /// Adds what parts of the logs say otherwise, what another law would change, and what an element that is not there.
+    /// Adds the disagreement of parts of the logs, and the effects of another law and of a missing element.
     pub fn widen(&mut self, disagreement: Option<Disagreement>, other_law: Option<OtherLaw>, cause: Option<Cause>) {
         let added = disagreement.iter().map(|found| &found.added).chain(other_law.iter().map(|found| &found.added));
         let added = added.chain(cause.iter().map(|found| &found.added));
@@ -181,7 +181,7 @@ impl Covariance {
     pub fn new(problem: &Problem, residuals: &[f64], jacobian: &DMatrix<f64>, at_bound: &[bool]) -> Option<Self> {
         let free: Vec<usize> = (0..at_bound.len()).filter(|&j| !at_bound[j]).collect();
         inverse_of_square(&jacobian.select_columns(&free))?;
-        // The directions do not depend on where the point is but for the sizes of what may be zero.
+        // The directions do not depend on the point, except for the sizes of parameters that may be zero.
         let x = problem.start();
         Some(Judged::new(problem, residuals, jacobian, &x, at_bound)?.covariance)
     }

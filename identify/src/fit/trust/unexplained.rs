@@ -44,7 +44,7 @@ fn windows(case: &Case, plan: &Plan, found: &Searched, quantity: Quantity) -> Op
     let lengths = runs.iter().filter_map(|run| Some((run.time.len(), *run.time.last()?)));
     let (rows, longest) = lengths.max_by(|a, b| a.1.total_cmp(&b.1))?;
     for parts in UNEXPLAINED_WINDOWS {
-        // To two digits, as it would stand in the file.
+        // To two digits, as in the file.
         let unit = 10f64.powf((longest / parts).log10().floor() - 1.0);
         let length = (longest / parts / unit).round() * unit;
         if (rows as f64) < parts * WINDOW_SAMPLES {
@@ -83,7 +83,7 @@ fn windows(case: &Case, plan: &Plan, found: &Searched, quantity: Quantity) -> Op
     None
 }
 
-/// Share of a quantity that residuals leave explained, beyond a straight line in each run.
+/// Explained fraction of a quantity, beyond a straight line in each run.
 ///
 /// 1 − √(Σ e²/Σ l²), e the residuals of the model, and l those of the lines
 fn explained(problem: &Problem, residuals: &[f64], quantity: Quantity) -> f64 {
@@ -104,7 +104,7 @@ fn explained(problem: &Problem, residuals: &[f64], quantity: Quantity) -> f64 {
     1.0 - (ours / lines.max(f64::MIN_POSITIVE)).sqrt()
 }
 
-/// Another output of the same kind with which it has changed places: the two motors of a gantry.
+/// Another output of the same kind with which it was exchanged: the two motors of a gantry.
 fn exchange(case: &Case, plan: &Plan, found: &Searched, quantity: Quantity, names: &[&str]) -> Option<String> {
     let is_alike = |other: &Quantity| {
         *other != quantity
@@ -134,10 +134,10 @@ fn factor(case: &Case, plan: &Plan, found: &Searched, quantity: Quantity, names:
     let gears = [gear, 1.0 / gear].into_iter().filter(|_| gear != 1.0);
     let factors: Vec<f64> = gears.chain(FACTORS).collect();
     let outputs = factors.iter().map(|&factor| (quantity.name(), factor, Remedy::Scale(quantity, factor)));
-    // Which of several inputs it is, a factor on all of them would not say.
+    // A factor on all inputs would not show which of several is wrong.
     let drives = found.problem.machine.drives.len();
     let inputs = factors.iter().filter(|_| drives == 1).map(|&factor| ("input", factor, Remedy::Drive(factor)));
-    // A few steps rank them; the best are fitted whole.
+    // A few steps rank them; the best are fitted completely.
     let left = |remedy: &Remedy, steps| Some(mended(case, plan, found, names, remedy, steps)?.left);
     let mut ranked: Vec<_> =
         outputs.chain(inputs).filter_map(|own| left(&own.2, FACTOR_STEPS).map(|left| (own, left))).collect();

@@ -1,4 +1,4 @@
-//! The guards of a mode: one by one, as rows of a few weights, and side by side, for all of them at once.
+//! Guards of a mode: individually as sparse rows, and side by side for vector instructions.
 
 use super::Size;
 use crate::mechanism::{BODIES, Cause, DRIVES, ROUNDING, SPRINGS, Transition};
@@ -34,7 +34,7 @@ impl<const N: usize> Row<N> {
         self.terms().fold(0.0, |sum, (place, weight)| sum + weight * z[place])
     }
 
-    /// The rounding error of its value, the parts of z being of these sizes.
+    /// Rounding error of its value for these magnitudes of z.
     pub(in crate::solve::exact) fn noise(&self, sizes: &[f64; N]) -> f64 {
         ROUNDING * self.size(sizes)
     }
@@ -51,7 +51,7 @@ impl<const N: usize> Row<N> {
         row
     }
 
-    /// Its coefficients along a series, as many as it has terms.
+    /// Its coefficients along a series, one for each term.
     pub(in crate::solve::exact) fn along<'c>(
         &self,
         series: &Series<N>,
@@ -87,7 +87,7 @@ impl<const N: usize> Watch<N> {
         self.row.value(z)
     }
 
-    /// True if its value is zero but for rounding.
+    /// True if its value is zero within rounding.
     pub(in crate::solve::exact) fn is_zero(&self, z: &[f64; N]) -> bool {
         self.value(z).abs() <= 2.0 * self.noise(z)
     }
@@ -97,7 +97,7 @@ impl<const N: usize> Watch<N> {
         self.row.noise(z)
     }
 
-    /// The size of its terms, the parts of z being of these sizes.
+    /// Magnitude of its terms for these magnitudes of z.
     pub(in crate::solve::exact) fn size(&self, sizes: &[f64; N]) -> f64 {
         self.row.size(sizes)
     }
@@ -109,7 +109,7 @@ pub(super) type Lanes<const N: usize> = [[f64; LANES]; N];
 /// Forms that are computed side by side.
 pub(super) const LANES: usize = 8;
 
-/// Room for the guards of a mode: two for each body, five for each drive, two for each spring.
+/// Maximum number of guards of a mode: two for each body, five for each drive, two for each spring.
 const GUARDS: usize = (2 * BODIES + 5 * DRIVES + 2 * SPRINGS).next_multiple_of(LANES);
 
 /// One number for each guard of a mode.

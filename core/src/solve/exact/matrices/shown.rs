@@ -10,19 +10,19 @@ use crate::solve::widest::widest;
 /// Readings behind the first ones.
 const MORE: usize = QUANTITIES - FEW;
 
-/// The least size of a rate: nothing next to any other.
+/// Smallest norm of a rate, negligible beside any other.
 const STILL: f64 = 1e-250;
 
 /// Readings of one mode, and the norms of their forms.
 pub(in crate::solve) struct Shown<const N: usize> {
     pub(in crate::solve) readout: Readout,
-    /// The weight of each place of z in each of the first readings, and in those behind them where there are any.
+    /// Weight of each element of z in each of the first readings, and in further ones.
     matrix: Matrix<FEW, N>,
     more: Option<Box<Matrix<MORE, N>>>,
-    /// The norm dual to the energy, of what springs hold and speeds, and of currents.
+    /// Norm dual to the energy, of elongations held by springs and speeds, and of currents.
     mechanical: Reading,
     magnetic: Reading,
-    /// Dual norms of elongations that no spring holds, per unit of √(2V) of ż: these move as the masses do.
+    /// Dual norms of elongations without a spring, per unit of √(2V) of ż, which follow from the masses.
     unsprung: Reading,
     /// Magnitudes of the coefficients of the inputs.
     input: [Reading; DRIVES],
@@ -91,7 +91,7 @@ impl<const N: usize> Shown<N> {
 
     #[inline(always)]
     fn read_rows_by_any(&self, rows: &[[f64; N]], origin: &[f64; BODIES], readings: &mut Vec<Reading>) {
-        // Not by an iterator's closure, which would not be compiled for the wider vectors.
+        // Not with an iterator's closure, which would not be compiled for the wider vectors.
         for z in rows {
             let more = self.more.as_ref().map(|more| more.times(z));
             readings.push(self.readout.placed(joined(&self.matrix.times(z), more), origin));
@@ -105,7 +105,7 @@ impl<const N: usize> Shown<N> {
     }
 }
 
-/// The first readings, and those behind them.
+/// The first readings, and further ones.
 #[inline(always)]
 fn joined(first: &[f64; FEW], more: Option<[f64; MORE]>) -> Reading {
     let mut all = [0.0; QUANTITIES];
@@ -117,7 +117,7 @@ fn joined(first: &[f64; FEW], more: Option<[f64; MORE]>) -> Reading {
 }
 
 impl<const N: usize> ModeMatrices<N> {
-    /// The readings of an observer, made ready when they are first wanted.
+    /// Readings of an observer, prepared at their first use.
     pub(in crate::solve) fn shown(&self, mechanism: &Mechanism, space: &Space) -> &Shown<N> {
         self.shown.get_or_init(|| Box::new(Shown::new(self, mechanism, space)))
     }

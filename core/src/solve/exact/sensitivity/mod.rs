@@ -11,9 +11,9 @@
 //! an output y = c·z    ∂y/∂p = c·S + c_p·z
 //! ```
 //!
-//! The state is continuous where modes change: what stops has no speed already, a current that is held at its limit is
-//! there already. So the jump of S needs no other term. In w·f⁻ the input counts with its own rate, since z has the
-//! inputs in it.
+//! The state is continuous at mode changes: a stopping body already has zero speed, and a limited current is already at
+//! its limit. So the jump of S needs no other term. In w·f⁻ the input counts with its own rate, since z has the inputs
+//! in it.
 
 mod tangent;
 
@@ -30,7 +30,7 @@ use std::sync::Arc;
 pub(super) use tangent::Sloped;
 use tangent::{Seen, Tangent, Varied, are_alike};
 
-/// A guard that falls at no more than this multiple of the rounding of its rate only grazes.
+/// A guard whose rate is at most this multiple of its rounding only grazes.
 const GRAZES: f64 = 1e5;
 
 /// Change of a rate, in roundings, that does not count as a jump.
@@ -68,12 +68,12 @@ struct Follower<'t, const N: usize> {
     seen: Seen,
     /// By variable; `None` for a variable of the input.
     varied: Vec<Option<Varied>>,
-    /// The places of the variables in `s`: those that change the equations first.
+    /// Indices of the variables in `s`, those that change the equations first.
     places: Vec<usize>,
     s: Vec<[f64; N]>,
     /// Jumps of S by later changes of the input, if one falls on the next row.
     pending: Option<[f64; N]>,
-    /// The modes of this machine, with their derivatives, and what this run needs of them besides.
+    /// Modes of this machine with their derivatives, and the tangents of this run.
     slopes: Vec<Sloped<N>>,
     tangents: Vec<Tangent>,
     /// The number of the present mode among them.
@@ -163,7 +163,7 @@ impl<'t, const N: usize> Follower<'t, N> {
         Some(())
     }
 
-    /// Takes up new inputs, and what follows from them at once.
+    /// Sets new inputs and settles the mode changes that they cause at once.
     fn seam(&mut self, pieces: &Pieces) -> Option<()> {
         let is_start = self.row == 0 && self.core.common.offset == 0.0;
         let is_moved = self.task.variables.iter().any(|variable| matches!(variable, Variable::Delay(_)));
@@ -171,7 +171,7 @@ impl<'t, const N: usize> Follower<'t, N> {
             (false, _) => [0.0; N],
             (true, false) => self.core.matrices.rate(&self.core.z),
             (true, true) => {
-                // An input that begins at once would begin later; until then it is zero.
+                // With a delay, an input that begins at once is zero at first.
                 let mut idle = self.core.clone();
                 idle.set_input(&Pieces::held(&[0.0; DRIVES], 0.0, f64::INFINITY));
                 idle.resolve();
@@ -202,7 +202,7 @@ impl<'t, const N: usize> Follower<'t, N> {
         Some(())
     }
 
-    /// ∂u/∂p of what is added to the input.
+    /// ∂u/∂p of an offset of the input.
     fn offset(&mut self, time: f64) {
         let space = &self.core.common.space;
         for (variable, &place) in self.task.variables.iter().zip(&self.places) {
@@ -231,7 +231,7 @@ impl<'t, const N: usize> Follower<'t, N> {
         rest(&self.core, &mut self.s);
     }
 
-    /// Takes up the present mode.
+    /// Switches to the derivatives of the present mode.
     fn take_up(&mut self) -> Option<()> {
         if self.core.common.rules.trouble.is_some() {
             return None;
@@ -294,7 +294,7 @@ impl<'t, const N: usize> Follower<'t, N> {
         self.core.count_from(self.grid.time(row));
     }
 
-    /// Crosses a whole interval on which nothing happens.
+    /// Crosses a complete interval without an event.
     fn cross_row(&mut self) {
         self.put_out();
         let begin = self.core.z;

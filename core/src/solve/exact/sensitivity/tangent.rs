@@ -1,4 +1,4 @@
-//! One mode as its sensitivities need it: how its equations, guards and outputs change with each variable.
+//! Tangent of a mode: derivatives of its equations, guards and outputs with respect to each variable.
 
 use super::super::ModeMatrices;
 use super::super::matrices::{Space, straight};
@@ -12,14 +12,14 @@ use std::sync::Arc;
 /// Differences up to this multiple of the rounding of their terms count as zero.
 const ROUNDINGS: f64 = 16.0;
 
-/// Distances between rows and changes of the input that have matrices of their own; where there are more, the changes
-/// fall anywhere.
+/// Maximum number of distances between rows and input changes that have matrices; with more of them, the changes are
+/// irregular.
 const DISTANCES: usize = 6;
 
-/// Distances are the same up to this share of themselves.
+/// Relative difference of equal distances.
 const SAME: f64 = 1e-11;
 
-/// A machine counted from where its run begins.
+/// A machine with positions counted from the start of its run.
 pub(super) struct Seen {
     pub(super) mechanism: Arc<Mechanism>,
     pub(super) space: Space,
@@ -45,7 +45,7 @@ pub(super) struct Varied {
 }
 
 impl Varied {
-    /// Σ wᵢ · the same number of each machine; nothing where it differs by rounding alone.
+    /// Σ wᵢ times the same number of each machine; zero if it differs by rounding alone.
     pub(super) fn slope(&self, here: f64, first: f64, second: f64) -> f64 {
         let [a, b, c] = self.weights;
         let terms = [a * here, b * first, c * second];
@@ -63,7 +63,7 @@ impl Varied {
     }
 }
 
-/// Places of z with weights.
+/// A sparse row: indices of z with weights.
 pub(super) struct Sparse(Vec<(usize, f64)>);
 
 impl Sparse {
@@ -87,7 +87,7 @@ pub(in crate::solve::exact) struct Sloped<const N: usize> {
     pub(super) slopes: Vec<Columns<N>>,
     /// g_p by variable and guard.
     guards: Vec<Vec<Sparse>>,
-    /// Steps that are made again and again, and how often they were before there were matrices for them.
+    /// Repeated steps, the number of their uses before they got matrices, and the matrices.
     steps: Vec<(f64, u32, Option<SlopedStep<N>>)>,
 }
 
@@ -139,7 +139,7 @@ impl<const N: usize> Sloped<N> {
         self.guards.get(variable).map_or(0.0, |guards| guards[guard].times(z))
     }
 
-    /// The matrices for this distance, if it comes again and again.
+    /// The matrices for this distance, if it occurs repeatedly.
     pub(super) fn step(&mut self, distance: f64) -> Option<&SlopedStep<N>> {
         let same = |(own, ..): &(f64, u32, _)| (own - distance).abs() <= SAME * distance;
         let index = self.steps.iter().position(same).or_else(|| {
@@ -159,11 +159,11 @@ impl<const N: usize> Sloped<N> {
 
 /// Outputs of one run as forms of z in one mode, with their derivatives with respect to the variables.
 pub(super) struct Tangent {
-    /// The number of the mode among those that are known.
+    /// Index of the mode among the known ones.
     pub(super) sloped: usize,
     /// The rows of the outputs.
     pub(super) outputs: Vec<Sparse>,
-    /// Their derivatives, with output and variable, where there are any.
+    /// Their derivatives that are not zero, with output and variable.
     pub(super) output_slopes: Vec<(usize, usize, Sparse)>,
 }
 
@@ -247,7 +247,7 @@ fn row<const N: usize>(seen: &Seen, mode: &Mode, output: Differentiated) -> Opti
     })
 }
 
-/// True if two machines have the same parts, so that one has a derivative by what makes it the other.
+/// True if two machines have the same parts, so that differences between them are derivatives.
 pub(super) fn are_alike(a: &Seen, b: &Seen) -> bool {
     use std::mem::discriminant;
     let (own, other) = (&a.mechanism, &b.mechanism);

@@ -4,11 +4,11 @@ use crate::fit::limits::ACCEPTANCE;
 use libm::{exp, log, pow, sqrt};
 use nalgebra::DMatrix;
 
-/// The step by dual averaging (Hoffman & Gelman 2014, section 3.2, with their constants).
+/// Step size by dual averaging (Hoffman & Gelman 2014, section 3.2, with their constants).
 pub struct Steps {
-    /// ln of ten times the step that it began with, to which it is drawn.
+    /// ln of ten times the initial step, towards which it is shrunk.
     mu: f64,
-    /// H̄: mean of what acceptance lacks.
+    /// H̄: mean deficit of the acceptance.
     lack: f64,
     /// ln ε̄
     mean: f64,
@@ -37,17 +37,16 @@ impl Steps {
         exp(next)
     }
 
-    /// ε̄: the step to stay with.
+    /// ε̄: the final step.
     pub fn last(&self) -> f64 {
         exp(self.mean)
     }
 }
 
-/// After which draws the covariance is estimated from those since the last time: Stan's windows (Stan Reference Manual,
-/// "Automatic parameter tuning"): a start whose draws count nowhere, windows that double in length, an end for the step
-/// alone.
+/// Windows after which the covariance is estimated from their draws, as in Stan (Stan Reference Manual, "Automatic
+/// parameter tuning"): a start without estimates, windows that double in length, and an end for the step alone.
 pub struct Windows {
-    /// Draws before which nothing is learnt.
+    /// Number of first draws that are not used.
     pub begin: usize,
     /// Ends of the windows.
     pub ends: Vec<usize>,
@@ -66,7 +65,7 @@ impl Windows {
         while end < until {
             end += length;
             length *= 2;
-            // A rest that would be shorter than the next window belongs to this one.
+            // A remainder shorter than the next window belongs to this one.
             if end + length > until {
                 end = until;
             }

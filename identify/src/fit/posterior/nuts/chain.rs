@@ -37,7 +37,7 @@ impl Point {
     }
 }
 
-/// A stretch of a path.
+/// A segment of a path.
 struct Stretch {
     /// Its first and its last point in time.
     ends: [Point; 2],
@@ -56,7 +56,7 @@ enum Way {
     Forth,
 }
 
-/// The path is not to be extended: it turned back, diverged, or was interrupted.
+/// The path must not be extended: it turned back, diverged, or was interrupted.
 struct Ended;
 
 /// A chain at its present draw.
@@ -113,7 +113,7 @@ impl<'a> Chain<'a> {
         self.at.position.as_slice()
     }
 
-    /// Takes L, whose L Lᵀ is an estimate of the density's covariance.
+    /// Sets L, where L Lᵀ is an estimate of the density's covariance.
     pub fn set_factor(&mut self, factor: DMatrix<f64>) {
         self.factor = factor;
         self.at = self.point(self.at.position.clone());
@@ -148,8 +148,7 @@ impl<'a> Chain<'a> {
         self.at.momentum.iter_mut().for_each(|r| *r = normal(random));
     }
 
-    /// Halves or doubles ε until one step changes the energy by about as much as is wanted of all (Hoffman & Gelman,
-    /// algorithm 4).
+    /// Halves or doubles ε until one step changes the energy by about the target (Hoffman & Gelman, algorithm 4).
     pub fn find_step(&mut self) {
         let mut grows = None;
         for _ in 0..50 {
@@ -222,7 +221,7 @@ impl Stretch {
         let momenta = &first.momenta + &last.momenta;
         let [begin, end] = [&first.ends[0].momentum, &last.ends[1].momentum];
         let [seam_before, seam_after] = [&first.ends[1].momentum, &last.ends[0].momentum];
-        // A path goes on as long as p♯·Σp > 0 at both ends, where p♯ = M⁻¹ p (Betancourt, A.4.2); so must each half
+        // A path continues as long as p♯·Σp > 0 at both ends, where p♯ = M⁻¹ p (Betancourt, A.4.2); so must each half
         // with the point beyond the seam. In r: rᵀ Σr.
         let goes_on = |a: &DVector<f64>, b: &DVector<f64>, sum: &DVector<f64>| a.dot(sum) > 0.0 && b.dot(sum) > 0.0;
         let turned = !(goes_on(begin, end, &momenta)

@@ -13,7 +13,7 @@ impl Draws {
         values
     }
 
-    /// The value below which this share of the draws lies; NaN without draws.
+    /// Quantile of the draws; NaN without draws.
     pub fn quantile(&self, parameter: usize, share: f64) -> f64 {
         chance::quantile(&self.sorted(parameter), share.clamp(0.0, 1.0))
     }

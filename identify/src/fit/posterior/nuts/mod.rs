@@ -1,8 +1,8 @@
-//! Draws from a density that is known up to a factor, by the No-U-Turn sampler or a random walk, and what says whether
-//! to believe them.
-//!
-//! `chain.rs` has the sampler, `walk.rs` the walk, `adaptation.rs` what both learn before draws count, `mixing.rs` the
+//! Draws from a density that is known up to a factor, by the No-U-Turn sampler or a random walk, with convergence
 //! diagnostics.
+//!
+//! `chain.rs` has the sampler, `walk.rs` the walk, `adaptation.rs` the adaptation of both before draws are kept,
+//! `mixing.rs` the diagnostics.
 
 mod adaptation;
 mod chain;
@@ -37,7 +37,7 @@ impl Default for Effort {
 }
 
 impl Effort {
-    /// Refuses what no sampler can do.
+    /// Rejects invalid numbers.
     pub fn check(&self) -> Result<()> {
         let &Self { chains, tune, draws, .. } = self;
         if !(1..=MOST_CHAINS).contains(&chains) {
@@ -72,8 +72,8 @@ pub type LogDensity<'a> = dyn Fn(&[f64], &mut [f64]) -> Option<f64> + Sync + 'a;
 /// The logarithm of the density at a point alone; `None` if the density is zero.
 pub type Plain<'a> = dyn Fn(&[f64]) -> Option<f64> + Sync + 'a;
 
-/// Told how many draws all chains have made so far, those for tuning included, at each evaluation of the density; says
-/// whether to go on.
+/// Called at each evaluation of the density with the number of draws of all chains so far, including tuning; returns
+/// true to continue.
 pub type Watch<'a> = dyn Fn(usize) -> bool + Sync + 'a;
 
 /// Draws from `log`, with a thread for each chain, which begins at one of `starts` in turn. `watch` receives the
@@ -92,7 +92,7 @@ pub fn walk(log: &Plain, starts: &[Vec<f64>], effort: Effort, watch: &Watch) -> 
 /// A chain from a start, with random numbers of its own.
 type MakeChain<'a> = dyn Fn(&Job, &[f64], Pcg64) -> Result<Drawn> + Sync + 'a;
 
-/// All chains beside each other.
+/// Runs all chains in parallel.
 fn chains(starts: &[Vec<f64>], effort: Effort, watch: &Watch, chain: &MakeChain) -> Result<Draws> {
     effort.check()?;
     let dimension = starts.first().map_or(0, Vec::len);
@@ -104,7 +104,7 @@ fn chains(starts: &[Vec<f64>], effort: Effort, watch: &Watch, chain: &MakeChain)
         // Each chain has a stream of its own.
         let own = effort.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(number as u64);
         let drawn = chain(&job, &starts[number % starts.len()], Pcg64::seed_from_u64(own));
-        // The observer receives the end, too.
+        // The observer is also notified of the end.
         job.goes_on();
         drawn
     };
@@ -146,7 +146,7 @@ struct Drawn {
 }
 
 impl Job<'_> {
-    /// True if to go on.
+    /// True to continue.
     fn goes_on(&self) -> bool {
         let goes_on = !self.stopped.load(Ordering::Relaxed) && (self.watch)(self.made.load(Ordering::Relaxed));
         if !goes_on {
@@ -187,7 +187,7 @@ impl Job<'_> {
         Ok(drawn)
     }
 
-    /// Makes draws for step and covariance; whether it was not interrupted.
+    /// Makes draws for step and covariance; false if interrupted.
     fn tune(&self, chain: &mut Chain, tune: usize) -> bool {
         let Windows { begin, ends } = Windows::new(tune);
         chain.find_step();
@@ -310,14 +310,14 @@ mod tests {
         assert!(draws.r_hat(1) < 1.01 && effective > 1000.0, "{} {effective}", draws.r_hat(1));
         for share in [0.05, 0.25, 0.5, 0.75, 0.95] {
             let want = below(draws.quantile(1, share));
-            // Five standard errors of a share, and what the sums are off by.
+            // Five standard errors of a fraction, plus the error of the sums.
             let allowed = 5.0 * (share * (1.0 - share) / effective).sqrt() + 0.005;
             assert!((want - share).abs() < allowed, "{share}: {want}, {effective} effective");
         }
         assert!((draws.mean(0)).abs() < 5.0 / draws.effective(0).sqrt());
     }
 
-    /// A funnel is too narrow at its neck for one step: that is said, not passed over.
+    /// A funnel is too narrow at its neck for one step, which is reported.
     #[test]
     fn a_funnel_shows_divergent_transitions() {
         // v normal with deviation 3, nine x with deviation e^(v/2)
@@ -348,7 +348,7 @@ mod tests {
         assert_ne!(one.chains[0], one.chains[1]);
     }
 
-    /// A path of the sampler may have a thousand steps, and each take a second: it is not waited for.
+    /// A path of the sampler may have a thousand steps of a second each, so it can be interrupted.
     #[test]
     fn an_interruption_ends_a_path() {
         let (calls, stop) = (AtomicUsize::new(0), AtomicUsize::new(usize::MAX));
@@ -378,7 +378,7 @@ mod tests {
         assert_eq!(told, "the density is zero where a chain would start\n  next: start from a fit that has converged");
     }
 
-    /// A half-normal distribution ends at zero: its interval does not.
+    /// A half-normal distribution ends at zero, its interval does not.
     #[test]
     fn a_density_that_ends_is_not_left() {
         // In y = ln x, with the change of variables in the density.

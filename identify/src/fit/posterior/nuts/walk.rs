@@ -1,5 +1,5 @@
-//! A random walk, for densities that have kinks and no slopes worth following: N. Metropolis and others (1953), with
-//! the covariance and the length of its steps learnt before draws count (H. Haario, E. Saksman, J. Tamminen 2001).
+//! Random walk for densities with kinks or without useful gradients: N. Metropolis and others (1953), with the
+//! covariance and the length of its steps adapted before draws are kept (H. Haario, E. Saksman, J. Tamminen 2001).
 //!
 //! With Σ = L Lᵀ an estimate of the covariance and n variables
 //!
@@ -8,7 +8,7 @@
 //! s = 2.38/√n to begin with                    (A. Gelman, G. O. Roberts, W. R. Gilks 1996)
 //! ```
 //!
-//! A step is worth 0.33/n of an independent draw, so a draw is what [`WALK_STEPS`] n of them come to.
+//! A step is worth 0.33/n of an independent draw, so a draw consists of [`WALK_STEPS`] n steps.
 
 use super::adaptation::{Windows, factor};
 use super::{Drawn, Job, Plain};
@@ -58,7 +58,7 @@ impl Walk<'_> {
         Some(f64::from(taken) / steps as f64)
     }
 
-    /// Learns steps and covariance; whether it was not interrupted.
+    /// Adapts step length and covariance; false if interrupted.
     fn tune(&mut self, job: &Job) -> bool {
         let n = self.position.len() as f64;
         let wanted = WALK_TAKEN + WALK_TAKEN_OF_ONE / n;
@@ -117,8 +117,8 @@ pub(super) fn nowhere() -> Error {
 mod tests {
     use crate::fit::posterior::nuts::{Effort, walk};
 
-    /// |x| + |y − x|/3 in place of a bowl: no slope says where its middle is. Laplace's distribution has the variance
-    /// 2, and y that of x and 18 more.
+    /// |x| + |y − x|/3 instead of a bowl: no gradient points to its middle. Laplace's distribution has the variance 2,
+    /// and y that of x and 18 more.
     #[test]
     fn a_density_of_kinks_has_its_moments() {
         let density = |q: &[f64]| Some(-q[0].abs() - (q[1] - q[0]).abs() / 3.0);

@@ -26,22 +26,22 @@ pub(super) struct Extension {
     pub without: fn(&Site, Machine) -> Machine,
 }
 
-/// A case with one element more, where the search for it starts.
+/// A case with one additional element, at the start of its search.
 pub(super) struct Extended {
     pub case: Case,
     pub plan: Plan,
     pub telling: Telling,
-    /// The size of the element, where its parameter is not that by itself.
+    /// The size of the element, if its parameter is not the size itself.
     pub size: Option<Measure>,
-    /// True if the sensor is taken to be at the motor.
+    /// True if the sensor is assumed at the motor.
     pub at_motor: bool,
 }
 
 /// Evidence for an element.
 pub(super) enum Telling {
-    /// The parameter of this name, which is zero, or stiff, where the element is not there.
+    /// The parameter of this name, which is zero, or stiff, without the element.
     Parameter(String),
-    /// The last of the nuisances that all logs share, and where its search starts, SI.
+    /// The last nuisance parameter that all logs share, and the start of its search, SI.
     Nuisance(f64),
 }
 
@@ -85,7 +85,7 @@ impl<'s, 'a> Site<'s, 'a> {
         Case { machine, ..self.case.clone() }
     }
 
-    /// The standard deviation of the residuals of a quantity; of one that stands for another, as that has.
+    /// Standard deviation of the residuals of a quantity, or of the quantity that it represents.
     pub fn deviation(&self, quantity: Quantity) -> f64 {
         let r = self.machine.pulley_radius;
         let of = |own: Quantity| self.found.noise.iter().find(|(other, _)| *other == own).map(|(_, sigma)| *sigma);
@@ -107,7 +107,7 @@ impl<'s, 'a> Site<'s, 'a> {
         })
     }
 
-    /// True if a key of the case file is searched for, by itself or with others.
+    /// True if a key of the case file is free, alone or with others.
     pub fn is_free(&self, key: &str) -> bool {
         self.found.problem.parameters.iter().flat_map(|own| &own.keys).any(|(own, _)| own == key)
     }

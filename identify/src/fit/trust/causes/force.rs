@@ -1,4 +1,4 @@
-//! Forces on the cart, beside viscous and Coulomb friction.
+//! Forces on the cart in addition to viscous and Coulomb friction.
 //!
 //! Drag and falling friction are lines through points, `force_by_speed`, whose forces keep their ratios: one amplitude
 //! each, with exact derivatives.
@@ -35,7 +35,7 @@ fn parameter(points: &[[f64; 2]]) -> f64 {
     points.iter().map(|point| point[1]).find(|force| *force != 0.0).unwrap_or(1.0)
 }
 
-/// The greatest speed of the cart along the logs, as the model has it, m/s.
+/// Largest speed of the cart in the logs by the model, m/s.
 fn fastest(site: &Site) -> f64 {
     let (problem, x): (&Problem, _) = (&site.found.problem, &site.found.best.x);
     let (mut bench, mut speeds, mut most) = (Bench::default(), [Vec::new()], 0.0);
@@ -83,13 +83,13 @@ pub(super) fn drag_words(_: &Site, extended: &Extended, found: &Fitted) -> Said 
     Said { words, add: format!("add force_by_speed = [{}] to [cart]", points.join(", ")) }
 }
 
-/// Friction that falls by A as the cart picks up speed. What is fitted as Coulomb friction is that at rest, and
+/// Friction that falls by A with increasing speed. The fitted Coulomb friction is that at rest, and
 ///
 /// ```text
 /// F = A (1 − e^{−(v/v_s)²}) sgn v
 /// ```
 ///
-/// is taken off it.
+/// is subtracted from it.
 pub(super) fn falls(site: &Site) -> Vec<Extended> {
     if body(site).is_none() {
         return Vec::new();
@@ -137,7 +137,7 @@ pub(super) fn fall_words(site: &Site, extended: &Extended, found: &Fitted) -> Sa
     Said { words, add }
 }
 
-/// The machine with the Coulomb friction that the line leaves at speed.
+/// The machine with the Coulomb friction that remains at speed.
 pub(super) fn without_fall(site: &Site, machine: Machine) -> Machine {
     let line = machine.cart.forces.by_speed.as_ref();
     let fall = line.and_then(|line| line.points().last()).map_or(0.0, |point| point[1]);

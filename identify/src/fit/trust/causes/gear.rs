@@ -17,7 +17,7 @@ impl Site<'_, '_> {
         rotor(&self.machine)
     }
 
-    /// J₁ + J₃ + r² M + n² J_r, all that moves at the drive pulley, kg m².
+    /// J₁ + J₃ + r² M + n² J_r, total inertia at the drive pulley, kg m².
     fn inertia(&self) -> f64 {
         let Machine { pulley_radius: r, drive_pulley, idler_pulley, cart, .. } = &self.machine;
         drive_pulley.inertia + idler_pulley.inertia + r * r * cart.mass + self.rotor()
@@ -40,7 +40,7 @@ impl Site<'_, '_> {
             .then_some((machine, true))
     }
 
-    /// True if a rotor of its own can stand behind a gear: the case has neither that nor a belt that stretches.
+    /// True if an independent rotor can be added: the case has neither one nor an elastic belt.
     fn is_stiff(&self) -> bool {
         self.machine.drives[0].motor.gear_play.is_none() && self.machine.belt.model == BeltModel::Rigid
     }
@@ -51,7 +51,7 @@ impl Site<'_, '_> {
         machine.drives[0].motor.gear_play = Some(play);
         let mut plan: Plan = self.plan.clone();
         plan.free.extend(keys.iter().map(|key| key.to_string()));
-        // A distant value takes long to simulate, and differs from the one tried.
+        // A distant value takes long to simulate, and is another than the one tried.
         let n = machine.drives[0].motor.gear_ratio;
         let around = |key: &str| match key {
             "motor.rotor_inertia" => KNOWN_SHARES.map(|share| share * self.inertia() / (n * n)),
@@ -70,7 +70,7 @@ impl Site<'_, '_> {
     }
 }
 
-/// The case with positions and speeds taken as those of the motor; `None` if no log has one.
+/// The case with positions and speeds assumed at the motor; `None` if no log has one.
 fn at_motor(case: &Case) -> Option<Case> {
     let mut case = case.clone();
     let (r, mut any) = (case.machine.pulley_radius, false);
@@ -139,7 +139,7 @@ fn flank(site: &Site, machine: &Machine, frequency: f64, ratio: f64) -> [f64; 2]
     [stiffness, 2.0 * ratio * (stiffness * reduced).sqrt()]
 }
 
-/// The machine without spring and play, all of its inertia where the case has it.
+/// The machine without spring and play, with the inertia assigned as in the case.
 pub(super) fn without(site: &Site, mut machine: Machine) -> Machine {
     let r = machine.pulley_radius;
     let motor = &mut machine.drives[0].motor;

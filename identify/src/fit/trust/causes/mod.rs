@@ -1,15 +1,15 @@
-//! Causes of what the model leaves: the model is fitted once more with one element that it lacks.
+//! Missing elements: the model is fitted once more with one additional element.
 //!
-//! Each [`Extension`] is a row of a table. All of them take a few damped Gauss-Newton steps from where the fit ended,
-//! which ranks them; the best are fitted whole. With the costs C of the fit and C′ of the fit with the element, it
+//! Each [`Extension`] is a row of a table. All of them take a few damped Gauss-Newton steps from the end of the fit,
+//! which ranks them; the best are fitted completely. With the costs C of the fit and C′ of the fit with the element, it
 //! explains
 //!
 //! ```text
 //! 1 − C′/C
 //! ```
 //!
-//! of what is left. An element is accepted if its size differs from zero by more than noise makes of it, and if the fit
-//! with it to parts of the logs predicts the other parts better. The estimates are then d away from those with it, and
+//! of the residuals. An element is accepted if its size differs significantly from zero, and if the fit with it to
+//! parts of the logs predicts the other parts better. With the distance d of the estimates from those with it,
 //! intervals of half-width h become √(h² + 2 (d² + h′²)) ≥ d + h′, h′ that of the fit with the element.
 
 mod extension;
@@ -34,7 +34,7 @@ use extension::{Extended, Extension, Fitted, Said, Site};
 use nalgebra::{DMatrix, DVector};
 use tried::Tried;
 
-/// All of them.
+/// All elements.
 const EXTENSIONS: &[Extension] = &[
     row("spring", gear::springs, gear::spring_words, gear::without),
     row("play", gear::plays, gear::play_words, gear::without),
@@ -141,7 +141,7 @@ fn predicts(site: &Site, tried: &Tried, stop: Option<Stop>) -> Option<[usize; 2]
             Some(squares / count.max(1) as f64)
         };
         let (without, with) = (mean(&without, &plan, one)?, mean(&with, &own, other)?);
-        // ln of the ratio: a part in which a start is missed has errors of another size.
+        // ln of the ratio, since a part in which a start fails has errors of another magnitude.
         gains.push((without / with).ln());
     }
     let n = gains.len() as f64;

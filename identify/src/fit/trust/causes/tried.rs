@@ -1,4 +1,4 @@
-//! A fit with one element more.
+//! A fit with one additional element.
 
 use super::extension::{Extended, Extension, Fitted, Measure, Said, Site, Telling};
 use super::{stamp, widened};
@@ -13,7 +13,7 @@ use crate::fit::trust::uncertainty::Judged;
 use crate::machine::Machine;
 use crate::solve::Flow;
 
-/// A model with one element more, and where its search is.
+/// A model with one additional element, and the state of its search.
 pub(super) struct Tried<'a> {
     row: &'static Extension,
     extended: Extended,
@@ -59,7 +59,7 @@ impl<'a> Tried<'a> {
         (self.row.key, self.extended.at_motor)
     }
 
-    /// The information of the logs on it.
+    /// Information of the logs on it.
     pub fn judged(&self) -> Option<Judged> {
         let Minimum { residuals, jacobian, x, at_bound, .. } = &self.best;
         Judged::new(&self.problem, residuals, jacobian, x, at_bound)
@@ -70,7 +70,7 @@ impl<'a> Tried<'a> {
         self.problem.stage_at(x)
     }
 
-    /// The place of the variable whose size says whether the element is there.
+    /// Index of the variable whose size shows the element.
     fn telling(&self) -> Option<usize> {
         match &self.extended.telling {
             Telling::Parameter(key) => self.problem.parameters.iter().position(|own| own.name == *key),
@@ -86,7 +86,7 @@ impl<'a> Tried<'a> {
         }
     }
 
-    /// The size of the element in standard errors: of what is searched for by its logarithm, 1 over the error of that.
+    /// Size of the element in standard errors; for a logarithmic variable, the inverse of its error.
     pub fn standard_errors(&self, judged: &Judged) -> f64 {
         let Some(j) = self.telling() else { return 0.0 };
         let Some(error) = judged.covariance.error(j).filter(|error| *error > 0.0) else { return 0.0 };
@@ -97,7 +97,7 @@ impl<'a> Tried<'a> {
         }
     }
 
-    /// The case with the element, its machine as fitted, and what is searched for in it.
+    /// The case with the element, its fitted machine, and its free parameters.
     pub fn case_and_plan(&self) -> (Case, Plan) {
         let case = Case { machine: self.machine(&self.best.x), ..self.extended.case.clone() };
         (case, self.extended.plan.clone())
