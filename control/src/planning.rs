@@ -109,8 +109,7 @@ pub fn plan(case: &Case, places: &[usize], wanted: &Wanted, stop: &dyn Fn() -> b
             None => machines.push((machine, 1)),
         }
     }
-    let machines = Machines { own: family.machine.clone(), all: machines };
-    let planner = Planner { design, family: &family, smooth: machines.smooth(), machines, modes: &modes, wanted, stop };
+    let planner = Planner { design, family: &family, machines, modes: &modes, wanted, stop };
     let moves: Result<Vec<_>> = places.iter().map(|&place| planner.planned(&case.moves[place], place)).collect();
     let moves = moves?;
     Ok(Plans { family, modes, moves })
@@ -142,35 +141,32 @@ impl Plans {
     }
 }
 
-/// A machine and its family.
-#[derive(Clone, PartialEq)]
-struct Machines {
+/// The machines that a plan is run on.
+#[derive(Clone, Copy, PartialEq)]
+enum Runs {
     /// The machine of the file.
-    own: Machine,
-    /// The machines of the family that differ, and how many there are of each.
-    all: Vec<(Machine, usize)>,
+    Own,
+    /// Its whole family.
+    Family,
+    /// The family; of steppers, the machine of the file and the slowest one in microsteps.
+    Stepped,
 }
 
-impl Machines {
-    /// With drivers of steppers that interpolate: the edges of microsteps take most of the time of a search.
-    fn smooth(&self) -> Self {
-        let mut smooth = self.clone();
-        for machine in smooth.all.iter_mut().map(|(machine, _)| machine).chain([&mut smooth.own]) {
-            for unit in &mut machine.drives {
-                unit.motor.stepper.iter_mut().for_each(|stepper| stepper.interpolate = true);
-            }
-        }
-        smooth
+/// The machine with drivers that interpolate: the edges of microsteps take most of the time of a run.
+fn smooth(machine: &Machine) -> Machine {
+    let mut smooth = machine.clone();
+    for unit in &mut smooth.drives {
+        unit.motor.stepper.iter_mut().for_each(|stepper| stepper.interpolate = true);
     }
+    smooth
 }
 
 /// Data shared by the plans of a case.
 struct Planner<'a> {
     design: &'a Design,
     family: &'a Family,
-    machines: Machines,
-    /// The same as they are searched with.
-    smooth: Machines,
+    /// The distinct machines of the family, and the number of each.
+    machines: Vec<(Machine, usize)>,
     modes: &'a [f64],
     wanted: &'a Wanted,
     stop: &'a dyn Fn() -> bool,
@@ -198,16 +194,16 @@ impl Planner<'_> {
             if (self.stop)() || is_run && best.rank() <= one.rank() {
                 break;
             }
-            one.arrival = self.arrival(motion, &way.within(&one.limits)?, &self.smooth, true)?;
+            one.arrival = self.arrival(motion, &way.within(&one.limits)?, Runs::Family)?;
             if !is_run || one.rank() < best.rank() {
                 (best, is_run) = (one.clone(), true);
             }
         }
         let profiles = way.within(&best.limits)?;
-        if self.smooth != self.machines {
-            best.arrival = self.arrival(motion, &profiles, &self.machines, true)?;
+        if self.family.machine.mechanism().is_stepped() {
+            best.arrival = self.arrival(motion, &profiles, Runs::Stepped)?;
         }
-        let given = self.arrival(motion, &motion.profiles, &self.machines, true)?;
+        let given = self.arrival(motion, &motion.profiles, Runs::Stepped)?;
         let is_sooner = short.is_empty() && Tried::rank_of(&given) <= best.rank();
         Ok(Planned {
             is_kept: is_sooner,
@@ -236,7 +232,7 @@ impl Planner<'_> {
                 let all =
                     |profiles: &[Profile]| self.loads(profiles, INSTANTS).iter().map(Load::share).fold(0.0, f64::max);
                 let Some(limits) = quickest.limits_for(way, periods, share, &all)? else { continue };
-                let arrival = self.arrival(motion, &way.within(&limits)?, &self.smooth, false)?;
+                let arrival = self.arrival(motion, &way.within(&limits)?, Runs::Own)?;
                 tried.push(Tried { limits, periods, share, arrival });
             }
         }
@@ -246,15 +242,15 @@ impl Planner<'_> {
     /// Largest use of each limit by references with their shaper, over the family.
     fn loads(&self, profiles: &[Profile], instants: usize) -> Vec<Load> {
         let mut all: Vec<Load> = Vec::new();
-        for (machine, _) in &self.machines.all {
+        for (machine, _) in &self.machines {
             let own = loads(machine, self.design.limit, profiles, instants);
             own.into_iter().for_each(|load| load.join(&mut all));
         }
         all
     }
 
-    /// When the cart arrives on the machine of the file, and if `whole` on all of its family.
-    fn arrival(&self, motion: &Move, profiles: &[Profile], machines: &Machines, whole: bool) -> Result<Arrival> {
+    /// Arrival of the cart in closed loop, or as steppers take it there.
+    fn arrival(&self, motion: &Move, profiles: &[Profile], runs: Runs) -> Result<Arrival> {
         let watched = (motion.until - motion.end()).max(WATCHED);
         let rest = Profile::last_rest(&self.design.shaped(profiles));
         let run = |machine: &Machine| -> Result<MoveRun> {
@@ -269,31 +265,43 @@ impl Planner<'_> {
             })
         };
         let end = Profile::last_end(profiles);
-        let time = |run: &MoveRun| run.figures.settling.filter(|_| run.outcome.ending == Ending::Complete);
-        let own = run(&machines.own)?;
-        let nominal = time(&own).map(|settling| end + settling);
+        let time = |run: &MoveRun| {
+            let settling = run.figures.settling.filter(|_| run.outcome.ending == Ending::Complete);
+            settling.map(|settling| end + settling)
+        };
+        let own = &self.family.machine;
+        let nominal = run(&if runs == Runs::Stepped { own.clone() } else { smooth(own) })?;
         let mut arrival = Arrival {
             duration: end,
-            nominal,
+            nominal: time(&nominal),
             worst: None,
-            settled: usize::from(nominal.is_some()),
+            settled: usize::from(time(&nominal).is_some()),
             axes: 1,
-            cart_error: own.figures.worst_load().error.peak.value.abs(),
+            cart_error: nominal.figures.worst_load().error.peak.value.abs(),
         };
-        if whole {
-            let mut worst = Some(0.0_f64);
-            (arrival.settled, arrival.axes) = (0, 0);
-            for (machine, count) in &machines.all {
-                if (self.stop)() {
-                    worst = None;
-                    break;
-                }
-                let one = time(&run(machine)?).map(|settling| end + settling);
-                worst = worst.zip(one).map(|(worst, one)| worst.max(one));
-                arrival.settled += if one.is_some() { *count } else { 0 };
-                arrival.axes += count;
+        if runs == Runs::Own {
+            return Ok(arrival);
+        }
+        let mut slowest: Option<(f64, &Machine)> = None;
+        (arrival.settled, arrival.axes) = (0, 0);
+        for (machine, count) in &self.machines {
+            if (self.stop)() {
+                return Ok(arrival);
             }
-            arrival.worst = worst;
+            let one = time(&run(&smooth(machine))?);
+            arrival.settled += if one.is_some() { *count } else { 0 };
+            arrival.axes += count;
+            let late = one.unwrap_or(f64::INFINITY);
+            if slowest.is_none_or(|(latest, _)| late > latest) {
+                slowest = Some((late, machine));
+            }
+        }
+        arrival.worst = slowest.map(|(latest, _)| latest).filter(|latest| latest.is_finite());
+        if let (Some(worst), Some((_, machine))) = (arrival.worst, slowest)
+            && runs == Runs::Stepped
+            && own.mechanism().is_stepped()
+        {
+            arrival.worst = time(&run(machine)?).map(|stepped| worst.max(stepped));
         }
         Ok(arrival)
     }
