@@ -21,9 +21,9 @@ pub struct Links<'a> {
 }
 
 impl<'a> Links<'a> {
-    /// With a program that tries cases.
-    pub fn new(program: &'a Path) -> Self {
-        Self { program, tried: crate::python::target().join("book/tried"), known: BTreeMap::new() }
+    /// With a program that tries cases in a folder.
+    pub fn new(program: &'a Path, tried: PathBuf) -> Self {
+        Self { program, tried, known: BTreeMap::new() }
     }
 
     /// A page with a link below each block that is a whole case, or whose commands name a case of `stages`.
