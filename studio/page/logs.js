@@ -48,8 +48,9 @@ class Logs {
     this.costs = {x: [], y: []};
     /** @type {Map<string, Picture>} */
     this.pictures = new Map();
-    this.trouble = element("p", {class: "mistake", role: "alert", hidden: true});
+    this.trouble = element("p", {class: "mistake", id: "fit-trouble", role: "alert", hidden: true});
     this.list = element("div", {class: "log-files"});
+    this.unread = element("div", {class: "mistake", id: "unread", role: "alert"});
     this.own = element(
       "p",
       {class: "quiet", hidden: true},
@@ -82,13 +83,14 @@ class Logs {
       element("h3", {}, "1. Logs"),
       dropPlace({
         id: "log-file",
-        words: "CSV, MATLAB or Parquet files of a recorder",
+        words: `${app.wire.carrier.words.logs} files of a recorder`,
         accept: ".csv,.txt,.tsv,.mat,.parquet,.log,.gz",
         many: true,
         take: files => this.take(files),
-        failed: error => this.tell(error),
+        failed: error => this.unread.replaceChildren(element("p", {}, wordsOf(error))),
         wire: app.wire,
       }),
+      this.unread,
       this.own,
       this.list,
       element("h3", {}, "2. What is searched for"),
@@ -134,6 +136,7 @@ class Logs {
 
   async take(files) {
     this.tell(null);
+    this.unread.replaceChildren();
     for (const file of files) {
       try {
         const {head} = await this.app.wire.ask("columns", {path: file.path});
@@ -145,18 +148,19 @@ class Logs {
         this.list.append(one.element);
         this.app.say(`${file.name}: ${head.rows} rows of ${head.found.length} columns`);
       } catch (error) {
-        this.tell(error);
+        this.unread.append(element("p", {}, `${file.name}: ${wordsOf(error)}`));
       }
     }
   }
 
   // ---- The plan
 
+  /** Another case was opened: what the logs told of the one before is none of it. */
   reset() {
+    if (this.work !== null) this.app.wire.cancel(this.work);
+    this.end("");
     this.shape = "";
-    this.checked.replaceChildren();
-    this.done.hidden = true;
-    this.live.hidden = true;
+    this.close();
     this.tell(null);
     if (this.app.view === key) this.refresh();
   }
@@ -276,6 +280,13 @@ class Logs {
     if (words) this.app.say(words);
   }
 
+  close() {
+    this.done.hidden = true;
+    this.live.hidden = true;
+    this.checked.replaceChildren();
+    this.status.textContent = "";
+  }
+
   stop() {
     if (this.work !== null) this.app.wire.cancel(this.work);
     this.status.textContent = "Stopping…";
@@ -285,15 +296,18 @@ class Logs {
     this.begin("Looking at the logs…");
     this.live.hidden = true;
     const asked = this.app.wire.ask("check", this.body(), step => {
-      if (step.step) this.status.textContent = `Looking at the logs: step ${step.step}, cost ${number(step.cost, 4)}`;
+      if (step.step && this.work === asked.id)
+        this.status.textContent = `Looking at the logs: step ${step.step}, cost ${number(step.cost, 4)}`;
     });
     this.work = asked.id;
     try {
       const {head} = await asked;
+      if (this.work !== asked.id) return;
       showReport(this.checked, head.html);
       this.checked.dataset.of = "check";
       this.end(`Looked at in ${this.seconds()} s.`);
     } catch (error) {
+      if (this.work !== asked.id) return;
       this.tell(error);
       this.end("");
     }
@@ -311,13 +325,17 @@ class Logs {
     this.pictures = new Map();
     this.overlays.replaceChildren();
     this.moving.replaceChildren();
-    const asked = this.app.wire.ask("fit", this.body(), step => this.step(step));
+    const asked = this.app.wire.ask("fit", this.body(), step => {
+      if (this.work === asked.id) this.step(step);
+    });
     this.work = asked.id;
     try {
       const {head} = await asked;
+      if (this.work !== asked.id) return;
       this.show(head);
       this.end(`${head.ending}. ${this.seconds()} s.`);
     } catch (error) {
+      if (this.work !== asked.id) return;
       this.live.hidden = true;
       this.tell(error);
       this.end("");
@@ -401,12 +419,6 @@ class Logs {
     const notes = warned.length
       ? element("ul", {class: "warnings"}, ...warned.map(one => element("li", {}, one.text)))
       : null;
-    const close = () => {
-      this.done.hidden = true;
-      this.live.hidden = true;
-      this.checked.replaceChildren();
-      this.status.textContent = "";
-    };
     const keep = element(
       "button",
       {
@@ -420,7 +432,7 @@ class Logs {
       },
       "Keep: put the estimates into the case",
     );
-    const discard = element("button", {type: "button", id: "fit-discard", onclick: close}, "Discard");
+    const discard = element("button", {type: "button", id: "fit-discard", onclick: () => this.close()}, "Discard");
     const json = element(
       "button",
       {type: "button", onclick: () => download("fit.json", JSON.stringify(result, null, 2) + "\n", "application/json")},

@@ -278,14 +278,29 @@ async function begin() {
   if (kept) {
     if (own.path && kept.path !== own.path) app.open(head.text, own);
     app.open(kept.base, kept);
-    app.show("motion");
+    app.show(app.view);
     app.notify(`Your changes to ${kept.name} are back. “Reset” returns to the case as it was opened.`);
   } else if (!(await follow())) {
     app.open(head.text, own);
-    app.show("motion");
+    app.show(app.view);
   }
+}
+
+/** Says that the page is not ready yet, if that takes long. */
+async function wait() {
+  const {ready, words} = app.wire.carrier,
+    place = find("notice");
+  const late = setTimeout(() => {
+    place.textContent = words.loading;
+    place.hidden = false;
+  }, 500);
+  // `changed` tells what failed.
+  await ready.catch(() => {});
+  clearTimeout(late);
+  if (place.textContent === words.loading) place.hidden = true;
 }
 addEventListener("hashchange", () => {
   follow();
 });
+wait();
 begin().catch(error => app.notify(String(error.message || error), true));
