@@ -7,7 +7,8 @@
 import {spawnSync} from "node:child_process";
 import {mkdirSync, mkdtempSync, readFileSync, writeFileSync} from "node:fs";
 import {tmpdir} from "node:os";
-import {join} from "node:path";
+import {join, resolve} from "node:path";
+import {pathToFileURL} from "node:url";
 import {Harness, UNDER, expect, quiet, row, seen, settled, value} from "./harness.mjs";
 
 const [program, taut, folder, shots, only] = process.argv.slice(2);
@@ -378,6 +379,11 @@ await test("a folder without its module, or its worker, says what is missing", a
     await says(page, "#notice", /cannot be loaded/);
     await page.close();
   }
+  // Browsers run no modules of files, and the page was empty.
+  const page = await context.newPage();
+  await page.goto(pathToFileURL(resolve(folder, "index.html")).href);
+  await page.getByText("They need a server").waitFor({timeout: 20_000});
+  await page.close();
 });
 
 await test("as long as the module is loaded, the page says so, and a view that was chosen stays", async open => {
@@ -475,6 +481,10 @@ for (const [width, height] of [
     await settled(page);
     await page.screenshot({path: join(shots, `web-${width}.png`)});
     expect((await page.evaluate(() => document.documentElement.scrollWidth)) <= width, "it scrolls sideways");
+    await page.click("#menu > summary");
+    const menu = await page.locator("#menu > div").boundingBox();
+    expect(menu.x >= 0 && menu.x + menu.width <= width, `the menu is at ${menu.x}, ${menu.width} wide`);
+    await page.click("#menu > summary");
     // The plots came last, below the controls and behind the sheet.
     for (const selector of [".stage-box svg", "[data-panel=position] .area", ".row input[type=range]"])
       expect((await seen(page, selector)) >= 2, `${selector} is not seen when the page is opened`);

@@ -18,6 +18,7 @@ import * as tour from "./tour.js";
 /** Each view has a key, a name, and a function that makes it once; it listens to the app for the rest. */
 const VIEWS = [motion, modes, logs, tune, shape, sweep, gallery, tour];
 
+/** @type {HTMLElement} */ (document.getElementById("unstarted")).remove();
 const app = new App();
 /** For tests, and for the curious. */
 /** @type {any} */ (window).studio = app;
@@ -222,6 +223,8 @@ document.addEventListener("keydown", event => {
 // ---- Themes
 
 const theme = find("theme");
+/** The address may be that of a site with names of its own. */
+const THEME = "taut-theme";
 const setTheme = value => {
   if (value) document.documentElement.dataset.theme = value;
   else delete document.documentElement.dataset.theme;
@@ -230,14 +233,15 @@ const setTheme = value => {
 };
 theme.addEventListener("change", () => {
   setTheme(theme.value);
+  if (window !== window.top) return;
   try {
-    localStorage.setItem("theme", theme.value);
+    localStorage.setItem(THEME, theme.value);
   } catch {
     /* private windows */
   }
 });
 try {
-  setTheme(localStorage.getItem("theme") || "");
+  setTheme(localStorage.getItem(THEME) || "");
 } catch {
   setTheme("");
 }
