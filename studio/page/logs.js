@@ -69,6 +69,9 @@ class Logs {
       "Stop, keep the best",
     );
     this.status = element("p", {class: "quiet", role: "status", id: "fit-status"});
+    /** Seconds, which nobody wants read out. */
+    this.clock = element("span", {class: "quiet", "aria-hidden": "true"});
+    this.ticking = 0;
     this.live = element("div", {class: "live", hidden: true});
     this.done = element("div", {class: "fit-done", id: "fit-done", hidden: true});
     this.checked = element("div", {class: "report page"});
@@ -96,7 +99,7 @@ class Logs {
       element("h3", {}, "2. What is searched for"),
       this.plan,
       element("h3", {}, "3. Check and fit"),
-      element("p", {class: "buttons"}, this.checkButton, this.fitButton, this.stopButton),
+      element("p", {class: "buttons"}, this.checkButton, this.fitButton, this.stopButton, this.clock),
       this.status,
       this.trouble,
       this.live,
@@ -270,10 +273,18 @@ class Logs {
     this.checkButton.disabled = this.fitButton.disabled = true;
     this.stopButton.hidden = false;
     this.begun = performance.now();
+    const tick = () => {
+      const seconds = Math.floor((performance.now() - this.begun) / 1000);
+      this.clock.textContent = `${seconds} s. After its last step the result is judged, which can take longer.`;
+    };
+    clearInterval(this.ticking);
+    this.ticking = setInterval(tick, 1000);
   }
 
   end(words) {
     this.work = null;
+    clearInterval(this.ticking);
+    this.clock.textContent = "";
     this.checkButton.disabled = this.fitButton.disabled = false;
     this.stopButton.hidden = true;
     this.status.textContent = words;

@@ -380,11 +380,7 @@ class Tune {
       },
       "Keep: put the gains into the case",
     );
-    const discard = element(
-      "button",
-      {type: "button", id: "tune-discard", onclick: () => this.close()},
-      "Discard",
-    );
+    const discard = element("button", {type: "button", id: "tune-discard", onclick: () => this.close()}, "Discard");
     const rows = head.result.gains.map(one => [
       rowHead(one.key.replace(/^controller\./, "")),
       number(one.before),
