@@ -170,12 +170,12 @@ await test("the panels have the sizes that they were given, also after a reload"
   expect(Math.abs((await tall()) - drawn + 64) < 2, `after a reload the drawing has ${await tall()}`);
   for (const name of ["side", "stage"]) await page.locator(`#size-${name}`).dblclick();
   expect(Math.abs((await wide()) - before) < 2, `a double click leaves ${await wide()}`);
-  expect((await page.evaluate(() => localStorage.getItem("layout"))) === null, "the browser keeps what was reset");
+  expect((await page.evaluate(() => localStorage.getItem("taut-layout"))) === null, "the browser keeps what was reset");
 });
 
 /** Keys of the plots as they stand in the page. */
 const order = page => page.evaluate(() => [...document.querySelectorAll("#plots>*")].map(plot => plot.dataset.panel));
-const layout = page => page.evaluate(() => localStorage.getItem("layout"));
+const layout = page => page.evaluate(() => localStorage.getItem("taut-layout"));
 
 async function again(page) {
   await page.reload();
@@ -290,7 +290,7 @@ await test("what is no layout in the browser's storage harms nothing", async ope
   const mixed = ["state", 3, "nothing"],
     panels = {order: mixed, wide: {position: "x", speed: 400}, tall: {position: -1e9, error: null}};
   for (const kept of ["null", "[]", "7", "{", JSON.stringify({panels: 3, side: "x"}), JSON.stringify({panels})]) {
-    await page.evaluate(kept => localStorage.setItem("layout", kept), kept);
+    await page.evaluate(kept => localStorage.setItem("taut-layout", kept), kept);
     await again(page);
     expect((await order(page)).length === first.length, `${kept}: ${await order(page)}`);
     expect((await page.evaluate(() => document.documentElement.scrollWidth)) <= 1440, `${kept}: it scrolls sideways`);
@@ -346,7 +346,7 @@ await test("favourites stand first, and the browser remembers them", async open 
   expect(shown === (await first.locator("input[type=text]").inputValue()), "its two rows differ");
   await first.locator(".star").click();
   expect((await first.count()) === 0, "it stays a favourite");
-  expect((await page.evaluate(() => localStorage.getItem("layout"))) === null, "the browser keeps it");
+  expect((await page.evaluate(() => localStorage.getItem("taut-layout"))) === null, "the browser keeps it");
 });
 
 await test("a parameter goes back to its value, and its slider reaches what was chosen", async open => {

@@ -267,16 +267,14 @@ await test("a file that is no log is told where it is wrong", async open => {
   await go(page, "fit");
   writeFileSync(join(folder, "empty.csv"), "");
   await page.setInputFiles("#log-file", join(folder, "empty.csv"));
-  await page.waitForFunction(() => !document.querySelector("#view-fit .mistake").hidden);
-  expect(
-    /no line of this file has numbers/.test(await page.locator("#view-fit .mistake").innerText()),
-    await page.locator("#view-fit .mistake").innerText(),
-  );
+  await page.waitForSelector("#unread p");
+  const told = await page.locator("#unread").innerText();
+  expect(/^empty.csv: no line of this file has numbers/.test(told), told);
   writeFileSync(join(folder, "short.csv"), "t,u,x\n0,1,0\n0.1,1,0.001\n");
   await page.setInputFiles("#log-file", join(folder, "short.csv"));
   await page.waitForSelector(".log-file");
   await page.click("#fit");
-  await page.waitForFunction(() => !document.querySelector("#view-fit .mistake").hidden, null, {timeout: 30_000});
+  await page.waitForFunction(() => !document.querySelector("#fit-trouble").hidden, null, {timeout: 30_000});
 });
 
 await test("gains are dragged, and error, margins and Nyquist's curve follow", async open => {

@@ -703,7 +703,7 @@ await test("the theme is remembered, and in its tab what is unsaved", async open
     Object.keys(sessionStorage).length,
     document.cookie,
   ]);
-  expect(stored[0] === "theme" && stored[1] === 0 && stored[2] === "", JSON.stringify(stored));
+  expect(stored[0] === "taut-theme" && stored[1] === 0 && stored[2] === "", JSON.stringify(stored));
   const {cookies} = await context.storageState();
   expect(cookies.length === 1 && cookies[0].httpOnly && cookies[0].sameSite === "Strict", JSON.stringify(cookies));
 });

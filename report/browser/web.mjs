@@ -7,8 +7,9 @@
 import {spawnSync} from "node:child_process";
 import {mkdirSync, mkdtempSync, readFileSync, writeFileSync} from "node:fs";
 import {tmpdir} from "node:os";
-import {join} from "node:path";
-import {Harness, UNDER, expect, quiet, row, settled, value} from "./harness.mjs";
+import {join, resolve} from "node:path";
+import {pathToFileURL} from "node:url";
+import {Harness, UNDER, expect, quiet, row, seen, settled, value} from "./harness.mjs";
 
 const [program, taut, folder, shots, only] = process.argv.slice(2);
 mkdirSync(shots, {recursive: true});
@@ -333,6 +334,8 @@ await test("what a page without a server cannot do is told", async open => {
   expect(/was not sent/.test(await what("columns", {path: "/etc/passwd"})), "it looks for files");
   expect(/nothing called/.test(await what("fly", {})), "it flies");
   expect((await page.locator("#save").isVisible()) === false, "Save is offered");
+  const offered = await page.locator("#view-fit .drop").first().textContent();
+  expect(/CSV or MATLAB/.test(offered) && !/Parquet/.test(offered), offered);
   const text = readFileSync(LINEAR, "utf8");
   const fit = await ask(page, "fit", {text});
   expect(fit.error && /dropped on it/.test(fit.error.text), JSON.stringify(fit));
@@ -376,6 +379,59 @@ await test("a folder without its module, or its worker, says what is missing", a
     await says(page, "#notice", /cannot be loaded/);
     await page.close();
   }
+  // Browsers run no modules of files, and the page was empty.
+  const page = await context.newPage();
+  await page.goto(pathToFileURL(resolve(folder, "index.html")).href);
+  await page.getByText("They need a server").waitFor({timeout: 20_000});
+  await page.close();
+});
+
+await test("as long as the module is loaded, the page says so, and a view that was chosen stays", async open => {
+  const {context} = await open(),
+    page = await context.newPage();
+  let load;
+  const loaded = new Promise(done => (load = done));
+  await page.route("**/taut.wasm", route => loaded.then(() => route.continue()));
+  await page.goto(address);
+  await says(page, "#notice", /^Loading the module/);
+  await page.click("#go-gallery");
+  load();
+  await page.waitForFunction(() => window.studio.run, null, {timeout: 20_000});
+  await page.waitForSelector("#view-gallery .gallery button");
+  expect(await page.locator("#view-gallery").isVisible(), "the page shows another view than the one that was chosen");
+  expect(!(await page.locator("#notice").isVisible()), "the page still says that it loads");
+});
+
+// A result of the case before could be kept in the next one, which then was another machine.
+await test("what is computed of a case ends when another one is opened", async open => {
+  const {page, trouble} = await open();
+  const {stages} = await ask(page, "gallery", {});
+  const opened = async end => {
+    const {text} = stages.find(stage => stage.path.endsWith(end));
+    await page.evaluate(text => window.studio.open(text, {name: "other.toml"}), text);
+    await quiet(page);
+  };
+  await page.click("#go-sweep");
+  await page.locator("#runs").fill("20000");
+  await page.click("#sweep");
+  await says(page, "#sweep-status", / of 20000 runs/);
+  await opened("controllers/pid.toml");
+  expect(!(await page.locator("#sweep-status").innerText()), "the sweep of the case before still counts");
+  expect(await page.locator("#sweep").isEnabled(), "no sweep can be begun");
+  await page.click("#go-tune");
+  await page.click("#tune");
+  await says(page, "#tune-status", /looks at designs/);
+  await opened("table4.toml");
+  expect(!(await page.locator("#tune-keep").isVisible()), "gains of the case before are offered");
+  await page.click("#go-fit");
+  await page.setInputFiles("#log-file", LOGS);
+  await page.waitForFunction(() => document.querySelectorAll(".log-file").length === 2);
+  await page.click("#fit");
+  await page.waitForSelector("#fit-keep", {timeout: 120_000});
+  await opened("table1.toml");
+  expect(!(await page.locator("#fit-keep").isVisible()), "estimates of the case before are offered");
+  expect(!(await page.locator("#fit-status").innerText()), "the fit of the case before is still told");
+  forgive(trouble);
 });
 
 await test("a lesson contains machines, each with its own case", async open => {
@@ -412,14 +468,26 @@ await test("a lesson contains machines, each with its own case", async open => {
   expect(!trouble.length, trouble.join("; "));
 });
 
-for (const width of [390, 1280]) {
+for (const [width, height] of [
+  [320, 700],
+  [390, 844],
+  [800, 1100],
+  [1440, 900],
+]) {
   await test(`pictures at ${width} px`, async open => {
-    const {page} = await open({viewport: {width, height: 850}});
+    const {page} = await open({viewport: {width, height}, hasTouch: width < 500});
     await page.evaluate(text => window.studio.open(text, {name: "table4.toml"}), readFileSync(TABLE4, "utf8"));
     await quiet(page);
     await settled(page);
     await page.screenshot({path: join(shots, `web-${width}.png`)});
     expect((await page.evaluate(() => document.documentElement.scrollWidth)) <= width, "it scrolls sideways");
+    await page.click("#menu > summary");
+    const menu = await page.locator("#menu > div").boundingBox();
+    expect(menu.x >= 0 && menu.x + menu.width <= width, `the menu is at ${menu.x}, ${menu.width} wide`);
+    await page.click("#menu > summary");
+    // The plots came last, below the controls and behind the sheet.
+    for (const selector of [".stage-box svg", "[data-panel=position] .area", ".row input[type=range]"])
+      expect((await seen(page, selector)) >= 2, `${selector} is not seen when the page is opened`);
   });
 }
 

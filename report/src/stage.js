@@ -334,8 +334,10 @@ function gantry(scene) {
       "stroke-width": 1.4,
     }),
   );
-  const bridgeState = svg("text", {x: RAILS[0] - 22, y: 5, "text-anchor": "end", class: "f-grey small"});
-  bridge.append(bridgeState);
+  // On two lines: beside the rails there is no room for the large letters of a narrow screen.
+  const bridgeState = svg("tspan", {x: RAILS[0] - 22, dy: "1.2em"}),
+    beside = {x: RAILS[0] - 22, y: -3, "text-anchor": "end", class: "f-grey small"};
+  bridge.append(svg("text", beside, "bridge:", bridgeState));
   root.append(bridge);
   const spans = scene.spans.map(() => belt(root));
   const idlers = svg("g", {});
@@ -385,7 +387,7 @@ function gantry(scene) {
         by = bridgeAt(x),
         cx = cartAt(y);
       put(bridge, {transform: `translate(0 ${by})`});
-      tell(bridgeState, `bridge: ${WORDS.get(stateOf("bridge_state")) || ""}`);
+      tell(bridgeState, WORDS.get(stateOf("bridge_state")) || "");
       place(cart, cx, by);
       put(cart, {class: `f-paper s-${COLOUR.get(stateOf("cart_state")) || "ink"}`});
       place(ghost, cx - factor * value("y_error") * k, by + factor * value("x_error") * k);

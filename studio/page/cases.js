@@ -6,7 +6,7 @@ import {element} from "./format.js";
 /** @typedef {import("./app.js").App} App */
 /** @typedef {import("./app.js").Case} Case */
 
-const KEY = "cases";
+const KEY = "taut-cases";
 /** Time between a change and its being kept, ms: a drag changes the text with every picture. */
 const LATER = 300;
 /** True in a frame: several frames of a tab would take each other's cases. */

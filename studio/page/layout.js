@@ -3,7 +3,7 @@
 import {element, fold, put} from "./format.js";
 import {limited} from "./pen.js";
 
-const KEY = "layout";
+const KEY = "taut-layout";
 /** Columns of the grid that plots stand in. */
 const COLUMNS = 12;
 /** Heights of curves, pixels, and the fewest columns of a plot. */

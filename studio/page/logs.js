@@ -48,8 +48,9 @@ class Logs {
     this.costs = {x: [], y: []};
     /** @type {Map<string, Picture>} */
     this.pictures = new Map();
-    this.trouble = element("p", {class: "mistake", role: "alert", hidden: true});
+    this.trouble = element("p", {class: "mistake", id: "fit-trouble", role: "alert", hidden: true});
     this.list = element("div", {class: "log-files"});
+    this.unread = element("div", {class: "mistake", id: "unread", role: "alert"});
     this.own = element(
       "p",
       {class: "quiet", hidden: true},
@@ -68,6 +69,9 @@ class Logs {
       "Stop, keep the best",
     );
     this.status = element("p", {class: "quiet", role: "status", id: "fit-status"});
+    /** Seconds, which nobody wants read out. */
+    this.clock = element("span", {class: "quiet", "aria-hidden": "true"});
+    this.ticking = 0;
     this.live = element("div", {class: "live", hidden: true});
     this.done = element("div", {class: "fit-done", id: "fit-done", hidden: true});
     this.checked = element("div", {class: "report page"});
@@ -82,19 +86,20 @@ class Logs {
       element("h3", {}, "1. Logs"),
       dropPlace({
         id: "log-file",
-        words: "CSV, MATLAB or Parquet files of a recorder",
+        words: `${app.wire.carrier.words.logs} files of a recorder`,
         accept: ".csv,.txt,.tsv,.mat,.parquet,.log,.gz",
         many: true,
         take: files => this.take(files),
-        failed: error => this.tell(error),
+        failed: error => this.unread.replaceChildren(element("p", {}, wordsOf(error))),
         wire: app.wire,
       }),
+      this.unread,
       this.own,
       this.list,
       element("h3", {}, "2. What is searched for"),
       this.plan,
       element("h3", {}, "3. Check and fit"),
-      element("p", {class: "buttons"}, this.checkButton, this.fitButton, this.stopButton),
+      element("p", {class: "buttons"}, this.checkButton, this.fitButton, this.stopButton, this.clock),
       this.status,
       this.trouble,
       this.live,
@@ -134,6 +139,7 @@ class Logs {
 
   async take(files) {
     this.tell(null);
+    this.unread.replaceChildren();
     for (const file of files) {
       try {
         const {head} = await this.app.wire.ask("columns", {path: file.path});
@@ -145,18 +151,19 @@ class Logs {
         this.list.append(one.element);
         this.app.say(`${file.name}: ${head.rows} rows of ${head.found.length} columns`);
       } catch (error) {
-        this.tell(error);
+        this.unread.append(element("p", {}, `${file.name}: ${wordsOf(error)}`));
       }
     }
   }
 
   // ---- The plan
 
+  /** Another case was opened: what the logs told of the one before is none of it. */
   reset() {
+    if (this.work !== null) this.app.wire.cancel(this.work);
+    this.end("");
     this.shape = "";
-    this.checked.replaceChildren();
-    this.done.hidden = true;
-    this.live.hidden = true;
+    this.close();
     this.tell(null);
     if (this.app.view === key) this.refresh();
   }
@@ -266,14 +273,29 @@ class Logs {
     this.checkButton.disabled = this.fitButton.disabled = true;
     this.stopButton.hidden = false;
     this.begun = performance.now();
+    const tick = () => {
+      const seconds = Math.floor((performance.now() - this.begun) / 1000);
+      this.clock.textContent = `${seconds} s. After its last step the result is judged, which can take longer.`;
+    };
+    clearInterval(this.ticking);
+    this.ticking = setInterval(tick, 1000);
   }
 
   end(words) {
     this.work = null;
+    clearInterval(this.ticking);
+    this.clock.textContent = "";
     this.checkButton.disabled = this.fitButton.disabled = false;
     this.stopButton.hidden = true;
     this.status.textContent = words;
     if (words) this.app.say(words);
+  }
+
+  close() {
+    this.done.hidden = true;
+    this.live.hidden = true;
+    this.checked.replaceChildren();
+    this.status.textContent = "";
   }
 
   stop() {
@@ -285,15 +307,18 @@ class Logs {
     this.begin("Looking at the logs…");
     this.live.hidden = true;
     const asked = this.app.wire.ask("check", this.body(), step => {
-      if (step.step) this.status.textContent = `Looking at the logs: step ${step.step}, cost ${number(step.cost, 4)}`;
+      if (step.step && this.work === asked.id)
+        this.status.textContent = `Looking at the logs: step ${step.step}, cost ${number(step.cost, 4)}`;
     });
     this.work = asked.id;
     try {
       const {head} = await asked;
+      if (this.work !== asked.id) return;
       showReport(this.checked, head.html);
       this.checked.dataset.of = "check";
       this.end(`Looked at in ${this.seconds()} s.`);
     } catch (error) {
+      if (this.work !== asked.id) return;
       this.tell(error);
       this.end("");
     }
@@ -311,13 +336,17 @@ class Logs {
     this.pictures = new Map();
     this.overlays.replaceChildren();
     this.moving.replaceChildren();
-    const asked = this.app.wire.ask("fit", this.body(), step => this.step(step));
+    const asked = this.app.wire.ask("fit", this.body(), step => {
+      if (this.work === asked.id) this.step(step);
+    });
     this.work = asked.id;
     try {
       const {head} = await asked;
+      if (this.work !== asked.id) return;
       this.show(head);
       this.end(`${head.ending}. ${this.seconds()} s.`);
     } catch (error) {
+      if (this.work !== asked.id) return;
       this.live.hidden = true;
       this.tell(error);
       this.end("");
@@ -401,12 +430,6 @@ class Logs {
     const notes = warned.length
       ? element("ul", {class: "warnings"}, ...warned.map(one => element("li", {}, one.text)))
       : null;
-    const close = () => {
-      this.done.hidden = true;
-      this.live.hidden = true;
-      this.checked.replaceChildren();
-      this.status.textContent = "";
-    };
     const keep = element(
       "button",
       {
@@ -420,7 +443,7 @@ class Logs {
       },
       "Keep: put the estimates into the case",
     );
-    const discard = element("button", {type: "button", id: "fit-discard", onclick: close}, "Discard");
+    const discard = element("button", {type: "button", id: "fit-discard", onclick: () => this.close()}, "Discard");
     const json = element(
       "button",
       {type: "button", onclick: () => download("fit.json", JSON.stringify(result, null, 2) + "\n", "application/json")},

@@ -18,6 +18,7 @@ import * as tour from "./tour.js";
 /** Each view has a key, a name, and a function that makes it once; it listens to the app for the rest. */
 const VIEWS = [motion, modes, logs, tune, shape, sweep, gallery, tour];
 
+/** @type {HTMLElement} */ (document.getElementById("unstarted")).remove();
 const app = new App();
 /** For tests, and for the curious. */
 /** @type {any} */ (window).studio = app;
@@ -222,6 +223,8 @@ document.addEventListener("keydown", event => {
 // ---- Themes
 
 const theme = find("theme");
+/** The address may be that of a site with names of its own. */
+const THEME = "taut-theme";
 const setTheme = value => {
   if (value) document.documentElement.dataset.theme = value;
   else delete document.documentElement.dataset.theme;
@@ -230,14 +233,15 @@ const setTheme = value => {
 };
 theme.addEventListener("change", () => {
   setTheme(theme.value);
+  if (window !== window.top) return;
   try {
-    localStorage.setItem("theme", theme.value);
+    localStorage.setItem(THEME, theme.value);
   } catch {
     /* private windows */
   }
 });
 try {
-  setTheme(localStorage.getItem("theme") || "");
+  setTheme(localStorage.getItem(THEME) || "");
 } catch {
   setTheme("");
 }
@@ -278,14 +282,29 @@ async function begin() {
   if (kept) {
     if (own.path && kept.path !== own.path) app.open(head.text, own);
     app.open(kept.base, kept);
-    app.show("motion");
+    app.show(app.view);
     app.notify(`Your changes to ${kept.name} are back. “Reset” returns to the case as it was opened.`);
   } else if (!(await follow())) {
     app.open(head.text, own);
-    app.show("motion");
+    app.show(app.view);
   }
+}
+
+/** Says that the page is not ready yet, if that takes long. */
+async function wait() {
+  const {ready, words} = app.wire.carrier,
+    place = find("notice");
+  const late = setTimeout(() => {
+    place.textContent = words.loading;
+    place.hidden = false;
+  }, 500);
+  // `changed` tells what failed.
+  await ready.catch(() => {});
+  clearTimeout(late);
+  if (place.textContent === words.loading) place.hidden = true;
 }
 addEventListener("hashchange", () => {
   follow();
 });
+wait();
 begin().catch(error => app.notify(String(error.message || error), true));

@@ -1,6 +1,6 @@
 // @ts-check
 // How the machine swings: the page of `taut modes`, made by the library, brought to life by the reports' own script.
-import {element} from "./format.js";
+import {element, put} from "./format.js";
 import {bring} from "./plot.js";
 
 /** @typedef {import("./app.js").App} App */
@@ -46,4 +46,10 @@ export function mount(root, app) {
 export function showReport(body, html) {
   body.innerHTML = html;
   bring(body);
+  // What is wider than the page scrolls, by keys too.
+  for (const place of body.querySelectorAll(".scroll")) {
+    if (place.scrollWidth <= place.clientWidth) continue;
+    const table = place.querySelector("table[aria-label]");
+    put(place, {tabindex: "0", role: "group", "aria-label": table ? table.getAttribute("aria-label") : "Figure"});
+  }
 }

@@ -4,7 +4,7 @@
 const ENDED = "the server has ended";
 
 /** What the page says of a carrier.
- * @typedef {{gone: string, link: string}} Words */
+ * @typedef {{gone: string, link: string, loading: string, logs: string}} Words */
 /** What a carrier does: `ready` when it can send.
  * @typedef {{ready: Promise<void>, send: (request: {id: number}) => void,
  *   upload: (file: File) => Promise<string>, words: Words}} Carrier */
@@ -25,6 +25,8 @@ export class Socket {
         "The server does not answer any more: start taut studio again. The text of this page is "
         + "still here to be downloaded.",
       link: "The address of this page holds this state now. Open it elsewhere with: taut studio LINK",
+      loading: "Connecting to the server…",
+      logs: "CSV, MATLAB or Parquet",
     };
     /** @type {Promise<void>} */
     this.ready = this.connect();

@@ -26,6 +26,7 @@ export function mount(root, app) {
     if (app.view === key) view.refresh();
   });
   app.on("opened", () => {
+    view.leave();
     view.shape = "";
     if (app.view === key) view.refresh();
   });
@@ -205,6 +206,7 @@ class Sweep {
     this.status.textContent = "Running…";
     const begun = performance.now();
     const asked = app.wire.ask("sweep", this.asked, step => {
+      if (this.work !== asked.id) return;
       if (step.headings) this.begin(step.headings);
       for (const row of step.rows) this.rows.push(row.map(value => (value >= 1e299 ? NaN : value)));
       this.status.textContent = `${this.rows.length} of ${step.runs} runs`;
@@ -213,6 +215,7 @@ class Sweep {
     this.work = asked.id;
     try {
       const {head, columns} = await asked;
+      if (this.work !== asked.id) return;
       if (!this.headings.length) this.begin(head.headings);
       this.experiments = head.experiments;
       // Moves have no trajectories here.
@@ -226,12 +229,26 @@ class Sweep {
       this.draw();
       this.traces();
     } catch (error) {
+      if (this.work !== asked.id) return;
       this.status.textContent = "";
       this.tell(error);
     }
+    this.end();
+  }
+
+  end() {
     this.work = null;
     this.go.disabled = false;
     this.stopButton.hidden = true;
+  }
+
+  /** Another case was opened: what was computed of the one before says nothing of it. */
+  leave() {
+    if (this.work !== null) this.app.wire.cancel(this.work);
+    this.end();
+    this.shown.hidden = true;
+    this.status.textContent = "";
+    this.tell(null);
   }
 
   // ---- Figures

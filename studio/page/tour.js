@@ -83,6 +83,7 @@ class Tour {
         element(
           "div",
           {class: "tour-show"},
+          element("h2", {class: "unseen"}, "The machine"),
           stage,
           element("div", {class: "transport", role: "toolbar", "aria-label": "Time"}, play, scrub, clock),
           this.plots,

@@ -21,6 +21,7 @@ export function mount(root, app) {
   app.on("text", () => view.ask());
   app.on("run", () => view.ask());
   app.on("mistake", () => view.ask());
+  app.on("opened", () => view.leave());
 }
 
 class Tune {
@@ -325,22 +326,43 @@ class Tune {
     this.status.textContent = "Searching…";
     const spread = this.spread.value === "" ? {} : {spread: Number(this.spread.value) / 100};
     const asked = app.wire.ask("tune", {...app.body(), ...spread}, step => {
-      this.status.textContent = `${step.designs} looks at designs, ${number(step.took_s, 3)} s`;
+      if (this.work === asked.id)
+        this.status.textContent = `${step.designs} looks at designs, ${number(step.took_s, 3)} s`;
     });
     this.work = asked.id;
     try {
       const {head} = await asked;
+      if (this.work !== asked.id) return;
       this.tuned(head);
       this.status.textContent =
         `${head.stopped ? "Stopped: the best so far. " : ""}`
         + `${head.result.designs} designs in ${number(head.took_s, 3)} s.`;
     } catch (error) {
+      if (this.work !== asked.id) return;
       this.status.textContent = "";
       this.tell(error);
     }
+    this.end();
+  }
+
+  end() {
     this.work = null;
     this.tuneButton.disabled = false;
     this.stopButton.hidden = true;
+  }
+
+  close() {
+    this.result.hidden = true;
+    this.report.replaceChildren();
+    this.status.textContent = "";
+  }
+
+  /** Another case was opened: gains of the one before are none of it. */
+  leave() {
+    if (this.work !== null) this.app.wire.cancel(this.work);
+    this.end();
+    this.close();
+    this.tell(null);
   }
 
   tuned(head) {
@@ -358,19 +380,7 @@ class Tune {
       },
       "Keep: put the gains into the case",
     );
-    const discard = element(
-      "button",
-      {
-        type: "button",
-        id: "tune-discard",
-        onclick: () => {
-          this.result.hidden = true;
-          this.report.replaceChildren();
-          this.status.textContent = "";
-        },
-      },
-      "Discard",
-    );
+    const discard = element("button", {type: "button", id: "tune-discard", onclick: () => this.close()}, "Discard");
     const rows = head.result.gains.map(one => [
       rowHead(one.key.replace(/^controller\./, "")),
       number(one.before),

@@ -17,6 +17,8 @@ export class Workers {
     this.words = {
       gone: "The module of this page cannot be loaded. Load the page again; its folder needs taut.wasm and worker.js.",
       link: "The address of this page holds this state now: whoever opens it sees the same.",
+      loading: "Loading the module that computes…",
+      logs: "CSV or MATLAB",
     };
     /** @type {Dropped[]} */
     this.files = [];

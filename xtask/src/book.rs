@@ -21,7 +21,7 @@ const VERSION: &str = "0.5.4";
 /// Builds the book and checks its links.
 pub fn run(words: &[&str]) -> Result<(), String> {
     let program = match words {
-        [] => built(&crate::python::target())?,
+        [] => built()?,
         ["--program", program] => std::path::absolute(program).map_err(|error| format!("{program}: {error}"))?,
         _ => return Err(format!("usage: {USAGE}")),
     };
@@ -31,8 +31,8 @@ pub fn run(words: &[&str]) -> Result<(), String> {
 }
 
 /// Builds the book for a folder of the studio, in which its examples can be opened; its folder.
-pub fn beside_studio() -> Result<PathBuf, String> {
-    make(&built(&crate::python::target())?, true)
+pub fn beside_studio(program: &Path) -> Result<PathBuf, String> {
+    make(program, true)
 }
 
 fn make(program: &Path, has_studio: bool) -> Result<PathBuf, String> {
@@ -42,13 +42,9 @@ fn make(program: &Path, has_studio: bool) -> Result<PathBuf, String> {
     let pages = folder.join("docs");
     copy(Path::new("docs"), &pages)?;
     write(&folder.join("book.toml"), &read(Path::new("book.toml"))?)?;
-    let mut examples = studio::Links::new(program);
+    let mut examples = has_studio.then(|| studio::Links::new(program, folder.join("tried")));
     for page in files(&pages)?.iter().filter(|path| path.extension().is_some_and(|e| e == "md")) {
-        let mut text = generated::filled(&read(page)?, program)?;
-        if has_studio {
-            text = examples.below(&text)?;
-        }
-        write(page, &links::within(&text, &pages)?)?;
+        write(page, linked(&generated::filled(&read(page)?, program)?, &pages, examples.as_mut())?)?;
     }
     let html = folder.join("html");
     let built = Command::new(&mdbook).arg("build").arg(&folder).arg("--dest-dir").arg(&html).status();
@@ -65,12 +61,20 @@ fn make(program: &Path, has_studio: bool) -> Result<PathBuf, String> {
     Ok(html)
 }
 
+/// A page whose links lead to copies of files of the repository and, from its examples, to the studio.
+fn linked(text: &str, pages: &Path, examples: Option<&mut studio::Links>) -> Result<String, String> {
+    // In this order: the studio is no file of the repository.
+    let text = links::within(text, pages)?;
+    match examples {
+        Some(examples) => examples.below(&text),
+        None => Ok(text),
+    }
+}
+
 /// Path of the program `taut`, which is built first.
-fn built(target: &Path) -> Result<PathBuf, String> {
+fn built() -> Result<PathBuf, String> {
     match crate::cargo(&["build", "--quiet", "--package", "taut-cli", "--bin", "taut"]).status() {
-        Ok(status) if status.success() => {
-            Ok(target.join("debug").join(format!("taut{}", std::env::consts::EXE_SUFFIX)))
-        }
+        Ok(status) if status.success() => Ok(crate::program()),
         Ok(_) => Err("the program taut could not be built".into()),
         Err(error) => Err(format!("cargo cannot be started: {error}")),
     }
@@ -126,4 +130,23 @@ pub fn copy(from: &Path, to: &Path) -> Result<(), String> {
 fn copy_file(from: &Path, to: &Path) -> Result<(), String> {
     let copied = to.parent().map_or(Ok(()), fs::create_dir_all).and_then(|()| fs::copy(from, to).map(drop));
     copied.map_err(|error| format!("{} cannot be copied to {}: {error}", from.display(), to.display()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The link to the studio was taken for one to a file of the repository, and `cargo xtask web` failed.
+    #[test]
+    #[cfg(unix)]
+    fn a_page_leads_to_copies_of_files_and_to_the_studio() {
+        let pages = std::env::temp_dir().join(format!("taut-xtask-book-{}", std::process::id()));
+        let page = "[manifest](../Cargo.toml)\n```toml\n[motor]\n[cart]\n```\n";
+        // The program `true` opens every case.
+        let mut examples = studio::Links::new(Path::new("true"), pages.join("tried"));
+        let linked = linked(page, &pages, Some(&mut examples)).unwrap();
+        assert!(linked.starts_with("[manifest](repository/Cargo.toml)"), "{linked}");
+        assert!(linked.contains(&format!("[Open this case in the studio]({}#state=", studio::PAGE)), "{linked}");
+        fs::remove_dir_all(pages).unwrap();
+    }
 }

@@ -258,7 +258,12 @@ fn build_program(counts: &mut Counts) -> Result<Option<PathBuf>, String> {
     if !run(cargo(&["test", "--workspace", "--no-run", "--test", "all"]), counts)? {
         return Ok(None);
     }
-    Ok(Some(python::target().join("debug").join(format!("taut{}", std::env::consts::EXE_SUFFIX))))
+    Ok(Some(program()))
+}
+
+/// Where a debug build puts the program `taut`.
+fn program() -> PathBuf {
+    python::target().join("debug").join(format!("taut{}", std::env::consts::EXE_SUFFIX))
 }
 
 /// Tests that ran, summed over all programs of tests.

@@ -25,7 +25,7 @@ pub fn run(words: &[&str]) -> Result<(), String> {
     };
     let compiler = compiler::find(TARGET).map_err(|needs| format!("the module needs {needs}"))?;
     let bytes = make(&folder, &compiler)?;
-    book::copy(&book::beside_studio()?, &folder.join("book"))?;
+    book::copy(&book::beside_studio(&crate::program())?, &folder.join("book"))?;
     println!("{}: serve it by any server of static files; {MODULE} has {bytes} bytes", folder.display());
     Ok(())
 }
@@ -35,14 +35,15 @@ pub fn default_folder() -> PathBuf {
     python::target().join("web").join("page")
 }
 
-/// Makes the folder, and returns the size of the module, bytes.
+/// Makes the folder, and with it the program `taut`, and returns the size of the module, bytes.
 pub fn make(folder: &Path, compiler: &Compiler) -> Result<u64, String> {
     let failed = |error: std::io::Error| format!("{} cannot be written: {error}", folder.display());
     fs::create_dir_all(folder).map_err(failed)?;
     let module = module(compiler)?;
     // Of the whole workspace, as the tests build it: of one package alone, the library is built with other features.
-    if !succeeds(&mut crate::cargo(&["build", "--quiet", "--workspace", "--example", "folder"]))? {
-        return Err("the program that writes the page was not built".into());
+    let all = ["build", "--quiet", "--workspace", "--example", "folder", "--bin", "taut"];
+    if !succeeds(&mut crate::cargo(&all))? {
+        return Err("the programs that write page and book were not built".into());
     }
     let example = python::target().join("debug/examples").join(format!("folder{}", std::env::consts::EXE_SUFFIX));
     if !succeeds(Command::new(example).arg(folder))? {
