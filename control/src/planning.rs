@@ -2,7 +2,7 @@
 //! belt's modes, chosen by the arrival in the window over a family of machines. [`Quickest`] defines the limits.
 
 use crate::case::{Case, Files, Move};
-use crate::control::{MoveRun, Setup, closed_loop};
+use crate::control::{Setup, closed_loop};
 use crate::design::Design;
 use crate::error::{Error, Result};
 use crate::machine::Machine;
@@ -141,17 +141,6 @@ impl Plans {
     }
 }
 
-/// The machines that a plan is run on.
-#[derive(Clone, Copy, PartialEq)]
-enum Runs {
-    /// The machine of the file.
-    Own,
-    /// Its whole family.
-    Family,
-    /// The family; of steppers, the machine of the file and the slowest one in microsteps.
-    Stepped,
-}
-
 /// The machine with drivers that interpolate: the edges of microsteps take most of the time of a run.
 fn smooth(machine: &Machine) -> Machine {
     let mut smooth = machine.clone();
@@ -187,23 +176,23 @@ impl Planner<'_> {
             return Err(impossible("after the reserve, voltage and current accelerate no axis of the family".into()));
         }
         tried.sort_by(|a, b| a.rank().total_cmp(&b.rank()));
-        let mut best = tried[0].clone();
-        let mut is_run = false;
+        let (mut best, mut slowest, mut is_run) = (tried[0].clone(), None, false);
         for one in &mut tried {
             // The slowest machine of a family does not arrive before any of its members.
             if (self.stop)() || is_run && best.rank() <= one.rank() {
                 break;
             }
-            one.arrival = self.arrival(motion, &way.within(&one.limits)?, Runs::Family)?;
+            let late;
+            (one.arrival, late) = self.of_family(motion, &way.within(&one.limits)?, &one.arrival)?;
             if !is_run || one.rank() < best.rank() {
-                (best, is_run) = (one.clone(), true);
+                (best, slowest, is_run) = (one.clone(), late, true);
             }
         }
         let profiles = way.within(&best.limits)?;
-        if self.family.machine.mechanism().is_stepped() {
-            best.arrival = self.arrival(motion, &profiles, Runs::Stepped)?;
-        }
-        let given = self.arrival(motion, &motion.profiles, Runs::Stepped)?;
+        best.arrival = self.in_microsteps(motion, &profiles, best.arrival, slowest)?;
+        let given = self.arrival(motion, &motion.profiles)?;
+        let (given, slowest) = self.of_family(motion, &motion.profiles, &given)?;
+        let given = self.in_microsteps(motion, &motion.profiles, given, slowest)?;
         let is_sooner = short.is_empty() && Tried::rank_of(&given) <= best.rank();
         Ok(Planned {
             is_kept: is_sooner,
@@ -232,7 +221,7 @@ impl Planner<'_> {
                 let all =
                     |profiles: &[Profile]| self.loads(profiles, INSTANTS).iter().map(Load::share).fold(0.0, f64::max);
                 let Some(limits) = quickest.limits_for(way, periods, share, &all)? else { continue };
-                let arrival = self.arrival(motion, &way.within(&limits)?, Runs::Own)?;
+                let arrival = self.arrival(motion, &way.within(&limits)?)?;
                 tried.push(Tried { limits, periods, share, arrival });
             }
         }
@@ -249,59 +238,72 @@ impl Planner<'_> {
         all
     }
 
-    /// Arrival of the cart in closed loop, or as steppers take it there.
-    fn arrival(&self, motion: &Move, profiles: &[Profile], runs: Runs) -> Result<Arrival> {
+    /// Time of arrival of the cart, s, and the largest error of a sliding part, m: in closed loop, or as steppers take
+    /// it there.
+    fn run(&self, motion: &Move, profiles: &[Profile], machine: &Machine) -> Result<(Option<f64>, f64)> {
         let watched = (motion.until - motion.end()).max(WATCHED);
-        let rest = Profile::last_rest(&self.design.shaped(profiles));
-        let run = |machine: &Machine| -> Result<MoveRun> {
-            closed_loop(&Setup {
-                machine,
-                model: &self.family.machine,
-                design: self.design,
-                profiles,
-                until: rest + watched,
-                window: motion.window,
-                solver: Solver::of(machine),
-            })
-        };
-        let end = Profile::last_end(profiles);
-        let time = |run: &MoveRun| {
-            let settling = run.figures.settling.filter(|_| run.outcome.ending == Ending::Complete);
-            settling.map(|settling| end + settling)
-        };
-        let own = &self.family.machine;
-        let nominal = run(&if runs == Runs::Stepped { own.clone() } else { smooth(own) })?;
-        let mut arrival = Arrival {
-            duration: end,
-            nominal: time(&nominal),
+        let run = closed_loop(&Setup {
+            machine,
+            model: &self.family.machine,
+            design: self.design,
+            profiles,
+            until: Profile::last_rest(&self.design.shaped(profiles)) + watched,
+            window: motion.window,
+            solver: Solver::of(machine),
+        })?;
+        let settling = run.figures.settling.filter(|_| run.outcome.ending == Ending::Complete);
+        let error = run.figures.worst_load().error.peak.value.abs();
+        Ok((settling.map(|settling| Profile::last_end(profiles) + settling), error))
+    }
+
+    /// Arrival on the machine of the file alone.
+    fn arrival(&self, motion: &Move, profiles: &[Profile]) -> Result<Arrival> {
+        let (nominal, cart_error) = self.run(motion, profiles, &smooth(&self.family.machine))?;
+        Ok(Arrival {
+            duration: Profile::last_end(profiles),
+            nominal,
             worst: None,
-            settled: usize::from(time(&nominal).is_some()),
+            settled: usize::from(nominal.is_some()),
             axes: 1,
-            cart_error: nominal.figures.worst_load().error.peak.value.abs(),
-        };
-        if runs == Runs::Own {
-            return Ok(arrival);
-        }
+            cart_error,
+        })
+    }
+
+    /// The same with the whole family, and the machine that arrives last.
+    fn of_family(&self, motion: &Move, profiles: &[Profile], own: &Arrival) -> Result<(Arrival, Option<&Machine>)> {
+        let mut arrival = Arrival { settled: 0, axes: 0, ..own.clone() };
         let mut slowest: Option<(f64, &Machine)> = None;
-        (arrival.settled, arrival.axes) = (0, 0);
         for (machine, count) in &self.machines {
             if (self.stop)() {
-                return Ok(arrival);
+                return Ok((arrival, None));
             }
-            let one = time(&run(&smooth(machine))?);
-            arrival.settled += if one.is_some() { *count } else { 0 };
+            let (time, _) = self.run(motion, profiles, &smooth(machine))?;
+            arrival.settled += if time.is_some() { *count } else { 0 };
             arrival.axes += count;
-            let late = one.unwrap_or(f64::INFINITY);
+            let late = time.unwrap_or(f64::INFINITY);
             if slowest.is_none_or(|(latest, _)| late > latest) {
                 slowest = Some((late, machine));
             }
         }
         arrival.worst = slowest.map(|(latest, _)| latest).filter(|latest| latest.is_finite());
-        if let (Some(worst), Some((_, machine))) = (arrival.worst, slowest)
-            && runs == Runs::Stepped
-            && own.mechanism().is_stepped()
-        {
-            arrival.worst = time(&run(machine)?).map(|stepped| worst.max(stepped));
+        Ok((arrival, slowest.map(|(_, machine)| machine)))
+    }
+
+    /// The same where steppers move the machine of the file and the slowest one in microsteps.
+    fn in_microsteps(
+        &self,
+        motion: &Move,
+        profiles: &[Profile],
+        mut arrival: Arrival,
+        slowest: Option<&Machine>,
+    ) -> Result<Arrival> {
+        if !self.family.machine.mechanism().is_stepped() {
+            return Ok(arrival);
+        }
+        (arrival.nominal, arrival.cart_error) = self.run(motion, profiles, &self.family.machine)?;
+        if let (Some(worst), Some(machine)) = (arrival.worst, slowest) {
+            let (stepped, _) = self.run(motion, profiles, machine)?;
+            arrival.worst = stepped.map(|stepped| worst.max(stepped));
         }
         Ok(arrival)
     }

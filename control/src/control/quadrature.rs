@@ -1,6 +1,7 @@
 //! Integrals and peaks of piecewise polynomials.
 
 use crate::metrics::Peak;
+use crate::signal;
 use crate::solve::{Curve, Polynomial, TERMS};
 
 /// Time derivative of a quantity on a curve of this length, s.
@@ -22,21 +23,15 @@ pub(super) fn square(quantity: &Polynomial, part: (f64, f64)) -> f64 {
 
 /// Σ c_k τᵏ, τ = (s − `from`) · `length`, in powers of s.
 pub(super) fn shifted(coefficients: &[f64; 5], from: f64, length: f64) -> Polynomial {
-    let mut terms = [0.0; TERMS];
-    terms[..5].copy_from_slice(coefficients);
     let mut power = 1.0;
-    for term in &mut terms {
-        *term *= power;
+    let scaled = coefficients.map(|coefficient| {
+        let term = coefficient * power;
         power *= length;
-    }
-    // Repeated Horner's rule: in powers of s instead of s − from.
-    if from != 0.0 {
-        for i in 0..4 {
-            for j in (i..4).rev() {
-                terms[j] -= from * terms[j + 1];
-            }
-        }
-    }
+        term
+    });
+    let mut terms = [0.0; TERMS];
+    // In powers of s instead of s − from.
+    terms[..5].copy_from_slice(&signal::shifted(&scaled, -from));
     Polynomial(terms)
 }
 

@@ -1,6 +1,5 @@
 //! When two times are one instant, which cell of a lattice of seams a time lies in, and whose turn it is.
 
-use super::profile::Profile;
 use super::{Signal, Slot};
 
 /// A moment on some signal's clock.
@@ -9,7 +8,7 @@ pub(super) struct Now {
     /// Time on this clock, s.
     pub t: f64,
     /// Seams up to this much later count as reached, s. Comes from the outermost clock, whose rounding it covers.
-    slack: f64,
+    pub slack: f64,
 }
 
 impl Now {
@@ -26,11 +25,6 @@ impl Now {
     /// True if it is `seam` or later.
     pub fn reached(self, seam: f64) -> bool {
         seam <= self.t + self.slack
-    }
-
-    /// The polynomial of a profile that holds now, and until when.
-    pub fn piece_of(self, profile: &Profile) -> ([f64; 5], f64) {
-        profile.piece_beyond(self.t, self.slack)
     }
 
     /// True if seams `spacing` apart can be told apart; false also for a spacing that is not a positive number.

@@ -55,7 +55,8 @@ impl Piece {
 }
 
 /// Coefficients in powers of (τ − `by`) of Σ c_k τᵏ: Horner's rule, again and again.
-pub(crate) fn shifted<const POWERS: usize>(coefficients: &[f64; POWERS], by: f64) -> [f64; POWERS] {
+#[doc(hidden)]
+pub fn shifted<const POWERS: usize>(coefficients: &[f64; POWERS], by: f64) -> [f64; POWERS] {
     let mut shifted = *coefficients;
     if by != 0.0 && coefficients[1..].iter().any(|&c| c != 0.0) {
         for i in 0..POWERS - 1 {
@@ -309,7 +310,7 @@ impl Signal {
             Self::References { profiles, weights } => {
                 let mut sum = Part::held(0.0, f64::INFINITY);
                 for (profile, weight) in profiles.iter().zip(weights) {
-                    let (powers, end) = now.piece_of(profile);
+                    let (powers, end) = profile.piece_beyond(now.t, now.slack);
                     sum.end = sum.end.min(end);
                     sum.coefficients.iter_mut().zip(powers).for_each(|(sum, power)| *sum += weight * power);
                 }

@@ -488,8 +488,8 @@ impl Profile {
             if until > t + slack {
                 return (shifted(&coefficients, -late), until);
             }
-            // A seam is a sum and may lie before the time at which its piece is found: look farther, however small t is.
-            late = (until - t).max(2.0 * late).max(f64::EPSILON * t.abs()).max(slack).max(f64::MIN_POSITIVE);
+            // A seam is a sum and may lie before the time at which its piece is found: look farther, also where t is 0.
+            late = (2.0 * late).max(slack).max(f64::MIN_POSITIVE);
         }
     }
 

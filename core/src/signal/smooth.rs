@@ -4,7 +4,7 @@
 //! most (ωτ/2)⁸ / (2⁷ 8!); 26 stretches to a period make that 1.0e-14.
 
 use super::clock::Now;
-use super::{DEGREE, Part, Tone};
+use super::{DEGREE, Part, Tone, shifted};
 use std::f64::consts::{PI, TAU};
 use std::sync::OnceLock;
 
@@ -185,14 +185,9 @@ fn nodes() -> &'static Nodes {
 /// The polynomial through `values` at the nodes of −`half`..`half`, in powers of the time since `origin` in there.
 fn polynomial(values: &[f64; N], half: f64, origin: f64) -> [f64; N] {
     let powers = &nodes().powers;
-    let mut c: [f64; N] = std::array::from_fn(|i| powers[i].iter().zip(values).map(|(p, v)| p * v).sum());
-    // Σ c_i xⁱ in powers of x − x₀: Horner, again and again.
-    let x0 = origin / half;
-    for i in 0..DEGREE {
-        for j in (i..DEGREE).rev() {
-            c[j] += x0 * c[j + 1];
-        }
-    }
+    let c: [f64; N] = std::array::from_fn(|i| powers[i].iter().zip(values).map(|(p, v)| p * v).sum());
+    // Σ c_i xⁱ in powers of x − x₀
+    let mut c = shifted(&c, origin / half);
     let mut scale = 1.0;
     for c in &mut c {
         *c *= scale;
