@@ -578,7 +578,8 @@ fn gains_for_drives_make_the_same_command() {
     let value = |name: &str| gains.iter().find(|gain| gain.name == name).unwrap().value;
     let (speed, acceleration) = (0.3, 4.0);
     let force = rigid.mass * acceleration + rigid.viscous[0] * speed + rigid.coulomb[0];
-    let wanted = rigid.command(force, 0.0, speed) * machine.drives[0].amplifier.gain;
+    let wanted = rigid.command(force, 0.0, &Reference { speed, acceleration, ..Reference::default() })
+        * machine.drives[0].amplifier.gain;
     let wpilib = value("kS") + value("kV") * speed + value("kA") * acceleration;
     assert!((wpilib - wanted).abs() < 1e-12 * wanted, "{wpilib} {wanted}");
     let linuxcnc = value("FF1") * 1e3 * speed + value("FF2") * 1e3 * acceleration + value("kS");

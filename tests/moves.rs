@@ -1,8 +1,8 @@
 //! The figures of moves in closed loop, against dense quadratures, and whatever their rows.
 
 use taut::case::{Case, Move};
-use taut::control::{Loop, MoveRun, Rows, Standard, each, stream};
-use taut::solve::{Ending, Flow, Solver};
+use taut::control::{Accuracy, Loop, MoveRun, Rows, Standard, each, stream};
+use taut::solve::{Ending, Flow, PositionError, Solver};
 use taut::trajectory::Trajectory;
 
 /// A move of a controller's case with a row every `every`, and these rows.
@@ -172,4 +172,64 @@ fn a_cart_outside_its_window_at_the_end_has_not_settled() {
     // With a window that the end is just inside of it has, at the last crossing.
     let wider = Move { window: last * 1.001, ..motion.clone() };
     assert!(moved(&case, &wider, 1e-3).0.figures.settling.is_some());
+}
+
+/// A move with a row every millisecond by this solver: the positions of its cart, and what it states of them.
+fn stated(case: &Case, solver: Solver) -> (Vec<f64>, PositionError) {
+    let (design, motion) = (case.controller.as_ref().unwrap(), &case.moves[0]);
+    let (machine, profiles, timing) = (&case.machine, motion.references(design), Loop::of(design));
+    let rows = Rows { until: motion.until, every: 1e-3, window: motion.window };
+    let mut own = Standard::of_drives(design, machine).unwrap();
+    let controllers = &mut each(&mut own);
+    let mut accuracy = Accuracy::new(machine, &timing, &profiles, &rows, solver);
+    let mut cart = Vec::new();
+    let run = stream(machine, controllers, &timing, &profiles, &rows, solver, false, &mut |block| {
+        cart.extend_from_slice(block.get("cart_position").unwrap());
+        accuracy.take(block);
+        Flow::Continue
+    })
+    .unwrap();
+    assert!(run.outcome.error.is_none(), "a bound for given inputs is none in closed loop");
+    (cart, accuracy.finish(&run, controllers, &mut || Flow::Continue).unwrap().unwrap())
+}
+
+/// Positions of a move are off by no more than it states, by both solvers, and where a tolerance is coarse: against a
+/// run at the finest tolerance. No move stated anything.
+#[test]
+fn a_move_states_by_how_much_it_may_be_off() {
+    let curve = "cart.friction.stribeck={ force = \"0.3 N\", velocity = \"5 mm/s\" }";
+    for (name, changes) in [
+        ("pid", vec![]),
+        ("cascade", vec![]),
+        ("state-feedback", vec![]),
+        ("pid", vec![curve]),
+        ("cascade", vec![curve]),
+    ] {
+        let case = case(name, &changes);
+        let (best, _) = stated(&case, Solver::General { tolerance: 1e-13 });
+        let mut solvers = [1e-6, 1e-9].map(|tolerance| Solver::General { tolerance }).to_vec();
+        solvers.extend(changes.is_empty().then_some(Solver::Exact));
+        for solver in solvers {
+            let (cart, error) = stated(&case, solver);
+            let off = cart.iter().zip(&best).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            println!("{name} {changes:?} {solver:?}: off by {off:.1e} m, {:.1e} m stated", error.value);
+            assert!(off <= error.value + 1e-12, "{name} {changes:?} {solver:?}: {off:e} m, {error:?}");
+            assert!(error.way > 0.01 && error.value < 1e-3 * error.way, "{name} {changes:?} {solver:?}: {error:?}");
+        }
+    }
+}
+
+/// Rounding of an unstable loop grows as the loop does: its positions are not determined.
+#[test]
+fn a_loop_that_amplifies_rounding_says_so() {
+    let wild = case(
+        "pid",
+        &[
+            "controller.pid.proportional=200 V/mm",
+            "controller.limit=\"1e9 V\"",
+            "encoder={ at = \"motor\", lines = 1000000000 }",
+        ],
+    );
+    let (_, error) = stated(&wild, Solver::Exact);
+    assert!(!error.is_exact() && error.value > 1e-9, "{error:?}");
 }

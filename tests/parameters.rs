@@ -355,7 +355,6 @@ fn keys_that_cannot_be_free_say_what_can() {
         (&whole, "cart.force_by_speed.2.force", "allowed: cart.force_by_speed.0.force to cart.force_by_speed.1.force"),
         (&whole, "cart.friction.along.factor.1", "allowed: cart.friction.along.0.factor to"),
         (&whole, "drive_pulley.friction.static", "next: it follows from coulomb and stribeck.force: name one of these"),
-        (&whole, "motor.gear_efficiency", "next: a compliant gear has none: name gear_damping"),
         (&plain, "belt.spans.1", "next: name one of these, or give modulus, section and spans instead of stiffness"),
         (&plain, "travel.max", "next: give it one to start from, such as max = \"0.3 m\" in travel"),
     ] {

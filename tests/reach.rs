@@ -1,18 +1,22 @@
 //! Needs of a reference, and the limits of the machine that they exceed; feed-forward at rest.
 
+use crate::common;
+use crate::common::chance::Chance;
 use std::path::Path;
 use taut::case::Case;
 use taut::control::{Setup, closed_loop};
 use taut::design::{FeedForward, FeedForwardModel};
+use taut::machine::axis::{CART, DRIVE, IDLER};
 use taut::machine::rigid::{REST_ACCELERATION, REST_SPEED, Rigid};
-use taut::machine::{Machine, Travel};
+use taut::machine::{AmplifierMode, BeltModel, Machine, Travel};
 use taut::metrics::{Balance, balanced_speed};
 use taut::number::engineering;
 use taut::polyline::Polyline;
 use taut::reach::compensation::{Compensation, direction};
 use taut::reach::feasible::{loads, shortfalls};
+use taut::signal::Signal;
 use taut::signal::profile::{Profile, Reference};
-use taut::solve::Solver;
+use taut::solve::{Solver, simulate};
 use taut_core::calculator::Run;
 
 /// Most that a reference needs of one of a machine's limits, counted from a pretension of zero.
@@ -170,7 +174,7 @@ fn what_rounding_leaves_of_a_reference_at_rest_commands_no_friction() {
                 assert_eq!(direction(&y), 0.0);
                 assert_eq!(compensation.dry(run, &y), dry);
                 // The noise itself goes through inertia and viscous friction, a few grams and N s/m.
-                let most = size * 1e-2 * compensation.rigid.command(1.0, 0.0, 0.0);
+                let most = size * 1e-2 * compensation.rigid.command(1.0, 0.0, &Reference::default());
                 assert!((compensation.command(run, &y).unwrap() - command).abs() <= most + 1e-12, "{y:?}");
                 assert!((compensation.target(run, &y).position - target).abs() <= size * 1e-6 + 1e-15, "{y:?}");
             }
@@ -184,4 +188,41 @@ fn what_rounding_leaves_of_a_reference_at_rest_commands_no_friction() {
             assert!((compensation.dry(run, &leaving) - dry).abs() > 0.01);
         }
     }
+}
+
+/// What the rotor takes does not pass through the gear: the current for a force accelerates the axis of the solver like
+/// the reference, whichever side drives.
+#[test]
+fn a_gear_with_losses_needs_what_the_solver_says() {
+    let mut chance = Chance::new(11);
+    let mut draw = |low: f64, high: f64| low + (high - low) * chance.uniform();
+    let (mut driving, mut driven) = (0, 0);
+    for number in 0..300 {
+        let mut machine = common::table4();
+        machine.belt.model = BeltModel::Rigid;
+        machine.drives[0].amplifier.mode = AmplifierMode::Current;
+        let motor = &mut machine.drives[0].motor;
+        (motor.gear_efficiency, motor.gear_ratio) = (draw(0.3, 1.0), draw(0.5, 6.0));
+        motor.rotor_inertia = draw(0.0, 1e-4);
+        let (speed, acceleration) = (draw(-1.0, 1.0), draw(-20.0, 20.0));
+        let rigid = Rigid::of(&machine);
+        let (viscous, dry) = rigid.friction(speed, speed.signum());
+        let force = rigid.mass * acceleration + viscous + dry;
+        let y = Reference { speed, acceleration, ..Reference::default() };
+        let current = rigid.electrical(force, 0.0, &y).0;
+
+        let until = 1e-6;
+        let mut experiment = common::experiment(Signal::Step { value: current, at: 0.0 }, until);
+        experiment.every = until;
+        for (body, arm) in [(DRIVE, machine.pulley_radius), (CART, 1.0), (IDLER, machine.pulley_radius)] {
+            experiment.initial.speed[body] = speed / arm;
+        }
+        let run = simulate(&machine, &experiment, Solver::Exact).unwrap();
+        let speeds = run.trajectory.get("cart_speed").unwrap();
+        let got = (speeds[speeds.len() - 1] - speeds[0]) / until;
+        // The drag of friction changes it within the microsecond by some 1e-4.
+        assert!((got - acceleration).abs() < 1e-3, "{number}: {got} for {acceleration} m/s²\n{machine:?}");
+        if (force - rigid.rotor * acceleration) * speed > 0.0 { driving += 1 } else { driven += 1 }
+    }
+    assert!(driving > 50 && driven > 50, "{driving} {driven}");
 }

@@ -543,3 +543,18 @@ fn draws_of_a_posterior_are_the_family() {
     let none = Family::of(&case("pid.toml", &[]), &tuning).unwrap_err().to_string();
     assert!(none.contains("this case has no [fit]"), "{none}");
 }
+
+/// Each margin "at worst" is the worst of its own: of a file's axis that has a smaller gain margin than the axis with
+/// the largest peaks, the larger margin was told.
+#[test]
+fn each_margin_at_worst_is_worst_by_itself() {
+    for name in ["pid-shaped", "cascade", "pid"] {
+        let case = case(&format!("{name}.toml"), &[]);
+        let tuned = evaluate(&case, &Tuning::default()).unwrap();
+        let (worst, nominal) = (&tuned.before.worst, &tuned.before.nominal);
+        assert!(worst.gain <= nominal.gain && worst.phase <= nominal.phase, "{name}: {worst:?}\n{nominal:?}");
+        let peaks = [worst.sensitivity - nominal.sensitivity, worst.complementary - nominal.complementary];
+        assert!(peaks.iter().all(|more| *more >= 0.0), "{name}: {worst:?}\n{nominal:?}");
+        assert!(worst.disturbance >= nominal.disturbance && worst.following >= nominal.following, "{name}");
+    }
+}

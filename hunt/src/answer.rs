@@ -10,7 +10,7 @@ use crate::steps;
 use crate::subject::{Fed, Subject};
 use crate::swept;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use taut::control::{self, Loop, Rows, Standard};
+use taut::control::{self, Accuracy, Controller, Loop, Rows, Standard};
 use taut::mechanism::Mechanism;
 use taut::solve::{Course, Detail, Ending, ErrorEstimate, Flow, Outcome, Solver, stream, stream_mechanism};
 use taut::trajectory::Trajectory;
@@ -172,19 +172,18 @@ pub(crate) fn solved(subject: &Subject, solver: Solver) -> Result<Answer, String
             let lead = design.feed_forward.lead.unwrap_or(design.delay + 0.5 * design.every);
             let timing = Loop { every: design.every, delay: design.delay, limit: design.limit, lead };
             let rows = Rows { until: motion.until, every: motion.every, window: motion.window };
-            let profiles = motion.references(design);
-            let run = control::stream(
-                &case.machine,
-                &mut [&mut controller],
-                &timing,
-                &profiles,
-                &rows,
-                solver,
-                false,
-                &mut keep,
-            )
-            .map_err(told)?;
-            let stated = run.outcome.error.map(|error| error.value);
+            let (machine, profiles) = (&case.machine, motion.references(design));
+            let mut accuracy = Accuracy::new(machine, &timing, &profiles, &rows, solver);
+            let mut keep = |block: &Trajectory| {
+                accuracy.take(block);
+                keep(block)
+            };
+            let controllers: &mut [&mut dyn Controller] = &mut [&mut controller];
+            let run = control::stream(machine, controllers, &timing, &profiles, &rows, solver, false, &mut keep);
+            let mut run = run.map_err(told)?;
+            let error = accuracy.finish(&run, controllers, &mut || Flow::Continue).map_err(told)?;
+            run.outcome.error = error;
+            let stated = error.map(|error| error.value);
             (run.outcome, stated)
         }
     };
@@ -200,11 +199,6 @@ pub(crate) fn solved(subject: &Subject, solver: Solver) -> Result<Answer, String
     let grid = taut::solve::Grid::new(every, until);
     // A run that ends early has fewer rows than there are.
     times.extend((times.len() as u64..=grid.intervals()).map(|k| grid.time(k)));
-    let floor = match (subject, solver) {
-        // Nothing is stated of a move by the general solver.
-        (Subject::Loop(_), Solver::General { .. }) => 1e-8,
-        _ => LEAST,
-    };
     Ok(Answer {
         subject: None,
         fed: Fed::AsGiven,
@@ -212,7 +206,7 @@ pub(crate) fn solved(subject: &Subject, solver: Solver) -> Result<Answer, String
         rows: (0..count).map(row).collect(),
         events: Some(body_events(&outcome)),
         end: end_of(outcome.ending),
-        allowed: stated.unwrap_or(floor).max(floor),
+        allowed: stated.unwrap_or(LEAST).max(LEAST),
         is_stated: stated.is_some(),
         ties: outcome.ties.len(),
     })

@@ -414,17 +414,22 @@ impl Rigid {
         let force = self.inertia * self.mass * y.acceleration + self.dry * resists - self.load - self.along(y.position);
         let rate = self.inertia * self.mass * y.jerk;
         let (eta, n) = (motor.gear_efficiency, motor.gear_ratio);
+        // The rotor's own torque does not pass through the gear: J_r n y″/r is added to the gear's, behind the loss.
+        let rotor = self.inertia * n * n * motor.rotor_inertia / (r * r);
+        let ([force, of_rotor], [rate, rate_of_rotor]) =
+            ([force - rotor * y.acceleration, rotor * y.acceleration], [rate - rotor * y.jerk, rotor * y.jerk]);
+        let lossless = r / (n * motor.torque_constant);
         let per_force = match force * y.speed < 0.0 && y.speed.abs() > 1e-6 {
             true => eta * r / (n * motor.torque_constant),
             false => r / (eta * n * motor.torque_constant),
         };
         let command = match amplifier.mode {
             AmplifierMode::Voltage => {
-                motor.resistance * per_force * force
-                    + motor.inductance * per_force * rate
+                motor.resistance * (per_force * force + lossless * of_rotor)
+                    + motor.inductance * (per_force * rate + lossless * rate_of_rotor)
                     + n * motor.back_emf_constant * y.speed / r
             }
-            AmplifierMode::Current | AmplifierMode::Position => per_force * force,
+            AmplifierMode::Current | AmplifierMode::Position => per_force * force + lossless * of_rotor,
         };
         command / amplifier.gain
     }

@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 use taut::case::{Case, Experiment};
-use taut::control::{Controller, Loop, MoveRun, Rows, Standard, Worst, each, stream, worst};
+use taut::control::{Accuracy, Controller, Loop, MoveRun, Rows, Standard, Worst, each, stream, worst};
 use taut::files::Inputs;
 use taut::json::{self, Moved, Simulated, Simulation};
 use taut::metrics::{Meter, Metrics};
@@ -92,11 +92,10 @@ impl Run {
         json::ending(self.outcome().ending, end)
     }
 
-    /// By how much positions may be off, m, where it is known: not in closed loop, where a controller answers to it.
+    /// By how much positions may be off, m, where it is known.
     #[getter]
     fn position_error(&self) -> Option<f64> {
-        let is_closed = matches!(self.what, What::Move { .. });
-        self.outcome().error.filter(|_| !is_closed).map(|error| error.value)
+        self.outcome().error.map(|error| error.value)
     }
 
     /// When what a body does was decided within rounding, s, and which body.
@@ -295,8 +294,17 @@ pub fn motion(
                 guarded(|| stream(machine, controllers, &timing, &profiles, &rows, solver, false, &mut take))
             }
             None => unlocked(py, || {
-                let mut controllers = Standard::of_drives(design, machine)?;
-                stream(machine, &mut each(&mut controllers), &timing, &profiles, &rows, solver, false, &mut take)
+                let mut own = Standard::of_drives(design, machine)?;
+                let controllers = &mut each(&mut own);
+                let mut accuracy = Accuracy::new(machine, &timing, &profiles, &rows, solver);
+                let mut take = |block: &Trajectory| {
+                    accuracy.take(block);
+                    take(block)
+                };
+                let mut run = stream(machine, controllers, &timing, &profiles, &rows, solver, false, &mut take)?;
+                let mut go_on = || if interrupt.stop() { Flow::Stop } else { Flow::Continue };
+                run.outcome.error = accuracy.finish(&run, controllers, &mut go_on)?;
+                Ok(run)
             }),
         };
         interrupt.finish()?;

@@ -1,9 +1,10 @@
 //! Moves in closed loop: `taut move --json`, `summary.json`.
 
+use super::simulation::{TieTold, is_determined};
 use super::{ending, peak};
 use crate::case::Move;
 use crate::control::drives::{DriveGain, drive_gains};
-use crate::control::{Deviation, DriveFigures, Loop, MoveRun, Worst};
+use crate::control::{Accuracy, Deviation, DriveFigures, Loop, MoveRun, Worst};
 use crate::machine::Machine;
 use crate::metrics::LostSteps;
 use crate::reach::feasible::Shortfall;
@@ -113,6 +114,10 @@ pub fn motion(done: &Moved) -> Value {
         "samples": run.samples.0,
         "limited_samples": run.samples.1,
         "events": run.outcome.events.len(),
+        "position_error_m": run.outcome.error.map(|error| error.value),
+        "position_error_basis": run.outcome.error.map(|_| Accuracy::basis(done.machine)),
+        "is_determined": is_determined(&run.outcome),
+        "decided_within_rounding": TieTold::of(&run.outcome),
         "trouble": done.trouble.map(|trouble| json!({
             "kind": trouble.kind.word(), "frequency_Hz": trouble.frequency, "cause": trouble.cause, "words": trouble.words,
         })),

@@ -9,7 +9,7 @@ use crate::metrics::{
     self, EventCount, Figure, Metrics, OfDrive, OfLoad, OfSpan, Peak, Role, Seek, SteadySpeed, Worth,
 };
 use crate::reduction::Reduction;
-use crate::solve::{self, Method, Outcome, Solver};
+use crate::solve::{self, ErrorEstimate, Method, Outcome, Solver};
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
@@ -337,11 +337,7 @@ pub(super) fn is_determined(outcome: &Outcome) -> Option<bool> {
 
 /// The basis of the error of a run's positions.
 pub(super) fn error_basis(outcome: &Outcome, solver: Solver) -> Option<&'static str> {
-    match (solver, outcome.error) {
-        (_, None) => None,
-        (Solver::Exact, _) => Some("bound of rounding"),
-        _ => Some("a second run with a hundred times the tolerance"),
-    }
+    outcome.error.map(|_| ErrorEstimate::basis(solver, false))
 }
 
 impl CostTold {

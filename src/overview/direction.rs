@@ -12,6 +12,8 @@ pub(super) struct Direction {
     pub sliding: f64,
     /// That of the pulleys and rotors that turn then, at the belt, kg.
     pub turning: f64,
+    /// What a gear's loss leaves out of the rotors, at the belt, kg.
+    unfelt: f64,
     /// `_x` or `_y` at the end of keys; empty where there is one direction.
     suffix: &'static str,
     /// ` along x` or ` along y` at the end of names.
@@ -40,9 +42,20 @@ impl Direction {
             let movers: Vec<usize> = machine.movers(number).map(|(drive, _)| drive).collect();
             let rotors: f64 = movers.iter().map(|drive| rotor(&machine.drives[*drive])).sum();
             let pulleys = movers.len() as f64 * machine.drive_pulley.inertia + machine.idler_pulley.inertia;
+            let unfelt = |unit: &DriveUnit| (1.0 - unit.motor.gear_efficiency) * rotor(unit);
+            let unfelt: f64 = movers.iter().map(|drive| unfelt(&machine.drives[*drive])).sum();
             // (Σ J + n² J_r)/r²
             let turning = (pulleys + rotors) / (r * r);
-            Self { number, movers, sliding: machine.sliding_mass(number), turning, suffix, words, name }
+            Self {
+                number,
+                movers,
+                sliding: machine.sliding_mass(number),
+                turning,
+                unfelt: unfelt / (r * r),
+                suffix,
+                words,
+                name,
+            }
         };
         words.iter().enumerate().map(direction).collect()
     }
@@ -60,6 +73,11 @@ impl Direction {
     /// All that moves, at what slides, kg.
     pub fn mass(&self) -> f64 {
         self.sliding + self.turning
+    }
+
+    /// The mass that the motors' force, less the loss of their gears, accelerates, at what slides, kg.
+    pub fn accelerated(&self) -> f64 {
+        self.mass() - self.unfelt
     }
 
     /// Friction of all that moves, at what slides; `side` is the sign of its speed.

@@ -90,7 +90,6 @@ fn motor_rows(group: &mut Group, prefix: &str, motor: &Motor) {
 fn drive_at_belt(motor: &Motor, amplifier: (AmplifierMode, f64), r: f64) -> (f64, f64) {
     let (mode, gain) = amplifier;
     let n = motor.gear_ratio;
-    // A compliant gear has no efficiency in its equations; its losses are those of the flanks.
     let per_ampere = motor.gear_efficiency * n * motor.torque_constant / r;
     match mode {
         AmplifierMode::Current => (gain.abs() * per_ampere, 0.0),

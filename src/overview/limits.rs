@@ -61,12 +61,19 @@ fn reached(
     let (end, words) = if side > 0.0 { ("", "") } else { ("_backward", " backward") };
     let Resistance { coulomb, viscous } = direction.resistance(machine, side);
     let against = -side * machine.constant_force(direction.number);
-    let left = (power.force - coulomb - against) / direction.mass();
+    let left = (power.force - coulomb - against) / direction.accelerated();
     let name = format!("{}{words}", direction.words("largest acceleration"));
     group
         .add(direction.key("largest_acceleration") + end, name, left.max(0.0), "m/s^2")
         .how("at low speed, against friction");
-    match power.speed(coulomb, viscous, against) {
+    let by_speed = machine.slide(direction.number).and_then(|slide| slide.forces.by_speed.as_ref());
+    let speed = match by_speed {
+        Some(line) => {
+            power.speed_against(|speed| coulomb + viscous * speed + against - side * line.value(side * speed))
+        }
+        None => power.speed(coulomb, viscous, against),
+    };
+    match speed {
         Some(speed) => {
             let name = format!("{}{words}", direction.words("largest speed"));
             group.add(direction.key("largest_speed") + end, name, speed, "m/s").how("at steady state");
@@ -86,6 +93,11 @@ fn reached(
         notes.push(Note { code: "does-not-move", text });
     }
 }
+
+/// Speeds between which the largest one is looked for, m/s, and the part by which they grow.
+const LEAST_SPEED: f64 = 1e-6;
+const MOST_SPEED: f64 = 1e4;
+const HUNDREDTH: f64 = 0.01;
 
 /// The power of a drive: at the belt, per direction alike.
 #[derive(Debug, Clone, Copy)]
@@ -183,6 +195,30 @@ impl Power {
             per_volt: drives.iter().map(|power| power.per_volt).sum(),
             brake: drives.iter().map(|power| power.brake).sum(),
         }
+    }
+
+    /// The lowest speed at which the force is used up by what resists at that speed, m/s.
+    fn speed_against(&self, resists: impl Fn(f64) -> f64) -> Option<f64> {
+        let left = |speed: f64| {
+            let by_voltage = self.voltage.map_or(f64::INFINITY, |v| self.per_volt * v - self.brake * speed);
+            by_voltage.min(self.force) - resists(speed)
+        };
+        if left(0.0) <= 0.0 {
+            return Some(0.0);
+        }
+        let step = 1.0 + HUNDREDTH;
+        let mut ends = [0.0, LEAST_SPEED];
+        while left(ends[1]) > 0.0 {
+            ends = [ends[1], ends[1] * step];
+            if ends[1] > MOST_SPEED {
+                return None;
+            }
+        }
+        for _ in 0..60 {
+            let middle = 0.5 * (ends[0] + ends[1]);
+            ends[usize::from(left(middle) <= 0.0)] = middle;
+        }
+        Some(ends[1])
     }
 
     /// The speed at which the force is used up by Coulomb friction, viscous friction and a constant load against it,

@@ -11,7 +11,7 @@ use std::fmt::Write;
 use std::path::Path;
 use taut::case::{Case, Files, Move, needs_motors};
 use taut::control::fed::Fed;
-use taut::control::{Added, Controller, Loop, MoveRun, Rows, Standard, each, stream, worst};
+use taut::control::{Accuracy, Added, Controller, Loop, MoveRun, Rows, Standard, each, stream, worst};
 use taut::design::Design;
 use taut::files::write_atomically;
 use taut::json::{self, Moved};
@@ -21,7 +21,7 @@ use taut::trajectory::{CsvWriter, Trajectory};
 use taut::tune::trouble;
 use taut::{Error, Result};
 use taut_report::motion::{Curves, Done, Tried, page};
-use taut_report::simulate::{ended_early, time};
+use taut_report::simulate::{ended_early, hidden, time};
 
 /// Reads the cases, runs their moves, reports.
 pub fn run(args: &Args) -> Outcome {
@@ -126,7 +126,7 @@ fn one<'a>(
     interrupt: &Interrupt,
 ) -> std::result::Result<Done<'a>, Failure> {
     let machine = &case.machine;
-    let mut controllers = Standard::of_drives(design, machine)?;
+    let mut own = Standard::of_drives(design, machine)?;
     let profiles = motion.references(design);
     let rows = Rows { until: motion.until, every: motion.every, window: motion.window };
     let name = motion.file_name();
@@ -134,8 +134,10 @@ fn one<'a>(
     let mut writer = writer.map_err(Failure::work)?;
     let mut curves = folder.is_some().then(|| Curves::new(machine)).filter(|_| !args.common.no_report);
     let mut trouble = None;
-    let solver = Solver::of(machine);
+    let (timing, solver) = (Loop::of(design), Solver::of(machine));
+    let mut accuracy = Accuracy::new(machine, &timing, &profiles, &rows, solver);
     let mut take = |block: &Trajectory| {
+        accuracy.take(block);
         if let Some(curves) = &mut curves {
             curves.take(block);
         }
@@ -143,19 +145,20 @@ fn one<'a>(
         if trouble.is_some() || interrupt.signal().is_some() { Flow::Stop } else { Flow::Continue }
     };
     let keep = folder.is_some();
-    let timing = Loop::of(design);
-    let run = match added {
+    let mut fed: Vec<Fed>;
+    let mut controllers: Vec<&mut dyn Controller> = match added {
         Some(added) => {
-            let mut fed: Vec<Fed> =
-                controllers.into_iter().zip(added).map(|(own, added)| Fed::new(own, added)).collect();
-            let mut each: Vec<&mut dyn Controller> = fed.iter_mut().map(|fed| fed as &mut dyn Controller).collect();
-            stream(machine, &mut each, &timing, &profiles, &rows, solver, keep, &mut take)?
+            fed = own.into_iter().zip(added).map(|(own, added)| Fed::new(own, added)).collect();
+            fed.iter_mut().map(|fed| fed as &mut dyn Controller).collect()
         }
-        None => stream(machine, &mut each(&mut controllers), &timing, &profiles, &rows, solver, keep, &mut take)?,
+        None => each(&mut own),
     };
+    let mut run = stream(machine, &mut controllers, &timing, &profiles, &rows, solver, keep, &mut take)?;
     if let Some(trouble) = trouble {
         return Err(Failure::work(trouble));
     }
+    let mut go_on = || if interrupt.signal().is_some() { Flow::Stop } else { Flow::Continue };
+    run.outcome.error = accuracy.finish(&run, &mut controllers, &mut go_on)?;
     let mut files = Vec::new();
     if let (Some(writer), Some(folder)) = (writer, folder) {
         writer.finish().map_err(Failure::work)?;
@@ -212,9 +215,13 @@ fn status(tried: &[Tried], interrupt: &Interrupt) -> (Status, Vec<Remark>) {
         let saturated = saturated(done).filter(|_| done.trouble.is_none())?;
         Some(Remark::Warning(format!("the move \"{name}\" saturates, though its reference needs less: {saturated}")))
     };
+    let unsure = |done: &Done| {
+        let plain = done.trouble.is_none() && ended_early(&done.run.outcome.ending, "cart").is_none();
+        hidden("move", &done.motion.name, &done.run.outcome).filter(|_| plain).map(Remark::Warning)
+    };
     let all = || tried.iter().flat_map(|tried| &tried.done);
     let remarks: Vec<Remark> =
-        all().filter_map(early).chain(all().filter_map(beyond)).chain(all().filter_map(unwell)).collect();
+        all().flat_map(|done| [early(done), beyond(done), unwell(done), unsure(done)]).flatten().collect();
     let status = match interrupt.signal() {
         Some(signal) => Status::Interrupted(signal),
         None if remarks.is_empty() => Status::Done,

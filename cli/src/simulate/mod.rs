@@ -205,9 +205,9 @@ fn status(runs: &[Ended], solver: Solver, interrupt: &Interrupt) -> (Status, Vec
             };
             remarks.push(Remark::Error(format!("the run \"{name}\" {told}{advice}")));
         }
-        remarks.extend(hidden(name, outcome).map(Remark::Warning));
+        remarks.extend(hidden("run", name, outcome).map(Remark::Warning));
     }
-    let relied = |run: &Ended| run.outcome.ending == Ending::Complete && hidden(run.name, run.outcome).is_none();
+    let relied = |run: &Ended| run.outcome.ending == Ending::Complete && hidden("run", run.name, run.outcome).is_none();
     let status = match interrupt.signal() {
         Some(signal) => Status::Interrupted(signal),
         None if runs.iter().all(relied) => Status::Done,

@@ -20,6 +20,7 @@
 
 use crate::machine::rigid::Rigid;
 use crate::machine::{AmplifierMode, Machine};
+use crate::signal::profile::Reference;
 use std::f64::consts::PI;
 
 /// A gain of a drive.
@@ -45,13 +46,13 @@ pub fn drive_gains(machine: &Machine) -> Vec<DriveGain> {
     // Voltage or current at the motor, without the amplifier's gain, which belongs to the drive.
     let gain = machine.drives[0].amplifier.gain;
     let friction = rigid.coulomb[0];
-    let at_rest = |force: f64| rigid.command(force, 0.0, 0.0) * gain;
-    let moving = |force: f64| rigid.command(force, 0.0, 1.0) * gain;
-    let (s, v, a) = (at_rest(friction), moving(rigid.viscous[0]), at_rest(rigid.mass));
+    let command = |force: f64, rate: f64, motion: Reference| rigid.command(force, rate, &motion) * gain;
+    let (s, v) = (command(friction, 0.0, Reference::default()), command(rigid.viscous[0], 0.0, Reference::steady(1.0)));
+    let a = command(rigid.mass, 0.0, Reference { acceleration: 1.0, ..Reference::default() });
     let one = |system, name, value, unit| DriveGain { system, name, value, unit };
     let mut all = match machine.drives[0].amplifier.mode {
         AmplifierMode::Voltage => {
-            let jerk = motor.inductance * rigid.mass / (rigid.force_per_ampere * motor.gear_efficiency);
+            let jerk = command(0.0, rigid.mass, Reference { jerk: 1.0, ..Reference::default() });
             vec![
                 one("WPILib", "kS", s, "V"),
                 one("WPILib", "kV", v, "V/(m/s)"),
@@ -70,7 +71,13 @@ pub fn drive_gains(machine: &Machine) -> Vec<DriveGain> {
     let loss = motor.gear_efficiency;
     let total = rigid.mass * arm * arm;
     all.extend([
-        one("ODrive", "config.inertia", 2.0 * PI * total / loss, "Nm/(turn/s^2)"),
+        // What the rotor takes does not pass through the gear.
+        one(
+            "ODrive",
+            "config.inertia",
+            2.0 * PI * ((total - motor.rotor_inertia) / loss + motor.rotor_inertia),
+            "Nm/(turn/s^2)",
+        ),
         one("ODrive", "input_torque per input_vel", 2.0 * PI * rigid.viscous[0] * arm * arm / loss, "Nm/(turn/s)"),
         one("ODrive", "input_torque against dry friction", friction * arm / loss, "Nm"),
         one("Beckhoff", "3140:07 load inertia", total - motor.rotor_inertia, "kg m^2"),

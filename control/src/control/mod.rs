@@ -7,6 +7,7 @@
 //! [`Design`]: crate::design::Design
 //! [`Profile`]: crate::signal::profile::Profile
 
+mod accuracy;
 mod at_samples;
 pub mod compare;
 mod contour;
@@ -45,6 +46,7 @@ mod stepped;
 mod welch;
 mod wide;
 
+pub use accuracy::Accuracy;
 pub(crate) use at_samples::closed_loop_at_samples;
 pub use figures::{Deviation, DriveFigures, Figures, LoadFigures};
 pub use outcome::{MoveRun, Rows, Setup, close, closed_loop, each, stream};

@@ -15,7 +15,7 @@ use crate::mechanism::State;
 use crate::metrics::Metrics;
 use crate::signal::Signal;
 use crate::signal::profile::Profile;
-use crate::solve::{self, Detail, Flow, Observe, Solver};
+use crate::solve::{self, Detail, Flow, Observe, PositionError, Solver};
 use crate::trajectory::Trajectory;
 
 /// Result of a move.
@@ -25,8 +25,10 @@ pub struct MoveRun {
     pub figures: Figures,
     /// The key figures of any run.
     pub metrics: Metrics,
-    /// Events, ending and cost.
+    /// Events, ending and cost. Its error is that of [`super::Accuracy`], if that has been asked.
     pub outcome: solve::Outcome,
+    /// The bound of rounding for given inputs.
+    pub(super) rounding: Option<PositionError>,
     /// Number of samples of the controller, and of those changed by its limit.
     pub samples: (u64, u64),
     /// The samples, if asked for.
@@ -104,7 +106,7 @@ pub(super) fn unrecorded(
 }
 
 /// Runs to the end: steppers along their references, other motors by sampled controllers.
-fn driven(
+pub(super) fn driven(
     mut run: solve::Run,
     machine: &Machine,
     experiment: &Experiment,
@@ -208,7 +210,9 @@ fn run(
     let mut sampled = Sampled::new(machine, controllers, *timing, profiles, keep).until(rows.until);
     let mut gauge = Gauge::new(machine, &experiment, profiles, rows.window);
     let run = solve::Run::reading(read(machine), &experiment, solver, detail, Some(&mut gauge), sink)?;
-    let outcome = driven(run, machine, &experiment, &mut sampled, |_, _, _| {});
+    let mut outcome = driven(run, machine, &experiment, &mut sampled, |_, _, _| {});
+    // It holds without a controller, which answers to what rounding does.
+    let rounding = outcome.error.take();
     let (mut figures, metrics) = gauge.finish(&outcome.events);
     for (drive, told) in figures.drives.iter_mut().zip(&sampled.told) {
         drive.limited = told.held_back;
@@ -216,7 +220,7 @@ fn run(
     }
     let samples = (sampled.samples, sampled.limited);
     let swings = sampled.told.iter().take(drives).map(|told| told.at_rest.swing()).collect();
-    Ok(MoveRun { figures, metrics, outcome, samples, kept: sampled.kept.unwrap_or_default(), swings })
+    Ok(MoveRun { figures, metrics, outcome, rounding, samples, kept: sampled.kept.unwrap_or_default(), swings })
 }
 
 /// Runs the controller of a design, made for `model`, through an experiment along a shaped reference; the experiment's

@@ -139,7 +139,8 @@ fn split<C: Calculator>(
     forward: C::N,
 ) -> (Option<C::N>, Option<C::N>) {
     let (rigid, zero) = (&compensation.rigid, c.number(0.0));
-    let back = rigid.command_by(c, zero, zero, ahead.speed);
+    let steady = Reference { position: zero, acceleration: zero, jerk: zero, snap: zero, ..*ahead };
+    let back = rigid.command_by(c, zero, zero, &steady);
     // Zero feed-forward has no part for the speed.
     let nothing = c.choose(less(forward, 0.0), back, zero);
     let back = c.choose(more(forward, 0.0), back, nothing);

@@ -125,6 +125,41 @@ impl Margins {
         (self.bandwidth, self.tracking) = (f64::NAN, f64::NAN);
     }
 
+    /// Each figure where it is worst among `all`, the worst `left_out` of it excluded.
+    pub(super) fn at_worst(all: &[Self], left_out: usize) -> Option<Self> {
+        // What is no number belongs to an unstable loop.
+        let worst = |bad: fn(&Self) -> f64| {
+            let mut order: Vec<&Self> = all.iter().collect();
+            let bad = |margins: &Self| if bad(margins).is_nan() { f64::INFINITY } else { bad(margins) };
+            order.sort_by(|a, b| bad(b).total_cmp(&bad(a)));
+            order.get(left_out.min(order.len().saturating_sub(1))).copied()
+        };
+        let (peak, complementary) = (worst(|m| m.sensitivity)?, worst(|m| m.complementary)?);
+        let (gain, phase) = (worst(|m| -m.gain)?, worst(|m| -m.phase)?);
+        Some(Self {
+            sensitivity: peak.sensitivity,
+            at: peak.at,
+            complementary: complementary.complementary,
+            complementary_at: complementary.complementary_at,
+            gain: gain.gain,
+            phase: phase.phase,
+            breaks: Breaks {
+                sensitivity: peak.breaks.sensitivity,
+                complementary: complementary.breaks.complementary,
+                gain: gain.breaks.gain,
+                phase: phase.breaks.phase,
+                gain_drive: gain.breaks.gain_drive,
+                phase_drive: phase.breaks.phase_drive,
+            },
+            crossover: worst(|m| -m.crossover)?.crossover,
+            bandwidth: worst(|m| -m.bandwidth)?.bandwidth,
+            tracking: worst(|m| -m.tracking)?.tracking,
+            disturbance: worst(|m| m.disturbance)?.disturbance,
+            following: worst(|m| m.following)?.following,
+            ..*peak
+        })
+    }
+
     /// Largest figure relative to its limit: above 1 a limit is exceeded. NaN counts as far beyond.
     pub fn excess(&self, sensitivity: f64, complementary: f64) -> f64 {
         beyond([self.sensitivity, self.complementary], [sensitivity, complementary])

@@ -95,13 +95,13 @@ fn limits(machine: &Machine, design: &Design) -> (f64, f64) {
     };
     let Some(limit) = [design.limit, amplifier].into_iter().flatten().reduce(f64::min) else { return MODEST };
     let dry = rigid.coulomb[0];
-    let push = |speed: f64| rigid.command(dry + rigid.viscous[0] * speed, 0.0, speed).abs();
+    let push = |speed: f64| rigid.command(dry + rigid.viscous[0] * speed, 0.0, &Reference::steady(speed)).abs();
     // The command is linear in speed.
     let per_speed = push(1.0) - push(0.0);
     let speed = (SPEED * limit - push(0.0)) / per_speed.max(f64::MIN_POSITIVE);
     let speed = if speed > 0.0 { speed.min(MOST.0) } else { 0.1 * MODEST.0 };
     let force = FORCE * (limit * rigid.force_per_command().abs() - dry - rigid.viscous[0] * speed);
-    let acceleration = (force / rigid.mass).min(MOST.1);
+    let acceleration = (force / rigid.accelerated()).min(MOST.1);
     (speed, if acceleration > 0.0 { acceleration } else { 0.1 * MODEST.1 })
 }
 

@@ -116,18 +116,21 @@ impl Work<'_> {
         let feedback = self.feedback(design)?;
         let corners = feedback.corners();
         let nominal = Margins::of(&self.family.plant(&self.family.nominal(), design, &corners)?, &feedback);
-        let (place, mut worst, unstable) = self.limits(design)?;
+        let (place, worst, unstable) = self.limits(&feedback);
+        let mut at_corner = None;
         let mut machines = self.family.machines.clone();
         let mut corner = machines[place].clone();
         if self.family.corners {
             let (found, margins) = self.family.worst(design, &feedback, &|margins| self.excess(margins))?;
             if self.excess(&margins) >= self.excess(&worst) {
-                (corner, worst) = (found.clone(), margins);
+                corner = found.clone();
             }
+            at_corner = Some(margins);
             machines.push(found);
         }
         let left_out = self.family.left_out(machines.len());
         let Some(all) = self.seen(design, &machines, (bar, order, left_out))? else { return Ok(None) };
+        let worst = self.margins_at_worst(&feedback, at_corner).unwrap_or(worst);
         let mut moves = Vec::new();
         for (motion, seen) in self.moves.iter().zip(all) {
             let (machine, until, window) = (&self.case.machine, motion.until, motion.window);

@@ -144,11 +144,19 @@ impl<'a> Work<'a> {
         (place, excess, unstable)
     }
 
-    /// The worst machine for a design, without the excluded ones, and its margins; and the number of unstable machines.
-    pub fn limits(&self, design: &Design) -> Result<(usize, Margins, usize)> {
-        let feedback = self.feedback(design)?;
-        let (place, _, unstable) = self.worst(&feedback);
-        Ok((place, Margins::of(&self.plants[place], &feedback), unstable))
+    /// The worst machine for a controller, without the excluded ones, and its margins; and the number of unstable
+    /// machines.
+    pub fn limits(&self, feedback: &Feedback) -> (usize, Margins, usize) {
+        let (place, _, unstable) = self.worst(feedback);
+        (place, Margins::of(&self.plants[place], feedback), unstable)
+    }
+
+    /// Each margin of a controller at its worst: without the excluded machines, and on the worst corner, if that is
+    /// known.
+    pub fn margins_at_worst(&self, feedback: &Feedback, corner: Option<Margins>) -> Option<Margins> {
+        let all: Vec<Margins> = self.plants.iter().map(|plant| Margins::of(plant, feedback)).collect();
+        let drawn = Margins::at_worst(&all, self.family.left_out(all.len()))?;
+        Margins::at_worst(&[Some(drawn), corner].into_iter().flatten().collect::<Vec<_>>(), 0)
     }
 
     /// True if a design exceeds a limit on some machine; the worst one then joins the set.

@@ -2,6 +2,7 @@
 
 use super::{AmplifierMode, DriveUnit, Machine, SlideAt};
 use crate::calculator::{Calculator, Run, at_least, less, more};
+use crate::signal::profile::Reference;
 
 /// Largest speed of a reference that counts as rest, m/s, and largest acceleration that counts as none, m/s²: what
 /// rounding leaves of a generated trajectory, in single precision too, has no direction.
@@ -16,6 +17,8 @@ pub struct Rigid {
     pub mass: f64,
     /// (J₁ + n² J_r)/r², the share of the drive side, kg.
     pub driving: f64,
+    /// n² J_r/r², the share of the rotor, whose own torque does not pass through the gear, kg.
+    pub rotor: f64,
     /// b + (B₁ + B₂)/r², N s/m, forward and backward.
     pub viscous: [f64; 2],
     /// F_c + (τ_c1 + τ_c2)/r, N, forward and backward.
@@ -63,12 +66,14 @@ impl Rigid {
     fn of_drive(machine: &Machine, drive: usize) -> Self {
         let DriveUnit { motor, amplifier } = &machine.drives[drive];
         let (r, n) = (machine.pulley_radius, motor.gear_ratio);
-        let pulleys = machine.drive_pulley.inertia + n * n * motor.rotor_inertia + machine.idler_pulley.inertia;
+        let rotor = n * n * motor.rotor_inertia;
+        let pulleys = machine.drive_pulley.inertia + rotor + machine.idler_pulley.inertia;
         let [drive, cart, idler] =
             [machine.drive_pulley.friction, machine.cart.friction, machine.idler_pulley.friction];
         Self {
             mass: machine.cart.mass + pulleys / (r * r),
-            driving: (machine.drive_pulley.inertia + n * n * motor.rotor_inertia) / (r * r),
+            driving: (machine.drive_pulley.inertia + rotor) / (r * r),
+            rotor: rotor / (r * r),
             viscous: [true, false].map(|forward| {
                 cart.side(forward).viscous + (drive.side(forward).viscous + idler.side(forward).viscous) / (r * r)
             }),
@@ -108,6 +113,7 @@ impl Rigid {
         Some(Self {
             mass: body.inertia,
             driving: 0.0,
+            rotor: 0.0,
             viscous: sides.map(|side| side.viscous),
             coulomb: sides.map(|side| side.coulomb),
             constant: body.force,
@@ -115,22 +121,41 @@ impl Rigid {
         })
     }
 
-    /// Motor current, A, and terminal voltage, V, that give `force` (N, changing at `rate`, N/s) at `speed`.
-    pub fn electrical(&self, force: f64, rate: f64, speed: f64) -> (f64, f64) {
-        self.electrical_by(&mut Run::plain(), force, rate, speed)
+    /// Motor current, A, and terminal voltage, V, that give `force` (N, changing at `rate`, N/s), the rotor's own
+    /// included, while the drive pulley moves like this.
+    pub fn electrical(&self, force: f64, rate: f64, drive: &Reference) -> (f64, f64) {
+        self.electrical_by(&mut Run::plain(), force, rate, drive)
     }
 
     /// As the function without `_by`, for any calculator.
-    pub fn electrical_by<C: Calculator>(&self, c: &mut C, force: C::N, rate: C::N, speed: C::N) -> (C::N, C::N) {
+    pub fn electrical_by<C: Calculator>(
+        &self,
+        c: &mut C,
+        force: C::N,
+        rate: C::N,
+        drive: &Reference<C::N>,
+    ) -> (C::N, C::N) {
         let force = c.name("force", force);
-        let per_ampere = self.per_ampere(c, force, speed);
-        let current = c.name("amperes", force / per_ampere);
+        // n K_t i/r = n² J_r a/r² + (F − n² J_r a/r²)/e: what the rotor takes does not pass through the gear
+        let rotor = (self.efficiency < 1.0 && self.rotor > 0.0).then_some(self.rotor);
+        let passed = |c: &mut C, whole: C::N, change: C::N| match rotor {
+            Some(rotor) => c.name("passed", whole - change * rotor),
+            None => whole,
+        };
+        let gear = passed(c, force, drive.acceleration);
+        let per_ampere = self.per_ampere(c, gear, drive.speed);
+        let amperes = |gear: C::N, change: C::N| match rotor {
+            Some(rotor) => gear / per_ampere + change * (rotor / self.force_per_ampere),
+            None => gear / per_ampere,
+        };
+        let current = c.name("amperes", amperes(gear, drive.acceleration));
         // v = R i + L di/dt + K_e n φ̇                                        (4) with an inductance
         let mut voltage = current * self.resistance;
         if self.inductance != 0.0 {
-            voltage = voltage + rate * self.inductance / per_ampere;
+            let gear = passed(c, rate, drive.jerk);
+            voltage = voltage + amperes(gear * self.inductance, drive.jerk * self.inductance);
         }
-        (current, voltage + speed * self.brake)
+        (current, voltage + drive.speed * self.brake)
     }
 
     /// Force per ampere: reduced by the gear's loss if the motor drives, increased if it is driven; at rest it is taken
@@ -146,14 +171,15 @@ impl Rigid {
         c.name("per_ampere", per_ampere)
     }
 
-    /// Command, V or A, for `force` (N, changing at `rate`, N/s) at `speed`.
-    pub fn command(&self, force: f64, rate: f64, speed: f64) -> f64 {
-        self.command_by(&mut Run::plain(), force, rate, speed)
+    /// Command, V or A, for `force` (N, changing at `rate`, N/s), the rotor's own included, while the drive pulley moves
+    /// like this.
+    pub fn command(&self, force: f64, rate: f64, drive: &Reference) -> f64 {
+        self.command_by(&mut Run::plain(), force, rate, drive)
     }
 
     /// As the function without `_by`, for any calculator.
-    pub fn command_by<C: Calculator>(&self, c: &mut C, force: C::N, rate: C::N, speed: C::N) -> C::N {
-        let (current, voltage) = self.electrical_by(c, force, rate, speed);
+    pub fn command_by<C: Calculator>(&self, c: &mut C, force: C::N, rate: C::N, drive: &Reference<C::N>) -> C::N {
+        let (current, voltage) = self.electrical_by(c, force, rate, drive);
         match self.mode {
             // Steppers have no force command, so this is never evaluated for one.
             AmplifierMode::Current | AmplifierMode::Position => current / self.gain,
@@ -163,7 +189,12 @@ impl Rigid {
 
     /// Force per command at rest, N/V or N/A.
     pub fn force_per_command(&self) -> f64 {
-        1.0 / self.command(1.0, 0.0, 0.0)
+        1.0 / self.command(1.0, 0.0, &Reference::default())
+    }
+
+    /// Mass that the motor's force, less the loss of its gear, accelerates: with η n² J_r/r² of the rotor, kg.
+    pub fn accelerated(&self) -> f64 {
+        self.mass - (1.0 - self.efficiency) * self.rotor
     }
 
     /// Viscous drag of axis and motor, N s/m: b, in voltage mode plus n² K_t K_e/(R r²).
@@ -212,8 +243,11 @@ impl Rigid {
             sign * (viscous + dry - self.constant)
         };
         // m v′ = n K_t i η/r − b v − F_c + F, and braking the other way round, through the gear the easier
-        let gains = |speed: f64| (self.force_per_ampere * self.efficiency * most(speed) - against(speed)) / self.mass;
-        let loses = |speed: f64| (self.force_per_ampere / self.efficiency * most(-speed) + against(speed)) / self.mass;
+        // with e n² J_r of the rotor, e = η or 1/η
+        let [driving, driven] = [self.efficiency, 1.0 / self.efficiency];
+        let mass = |e: f64| self.mass + (e - 1.0) * self.rotor;
+        let gains = |speed: f64| (self.force_per_ampere * driving * most(speed) - against(speed)) / mass(driving);
+        let loses = |speed: f64| (self.force_per_ampere * driven * most(-speed) + against(speed)) / mass(driven);
         if !(gains(0.0) > 0.0 && loses(0.0) > 0.0) {
             return None;
         }

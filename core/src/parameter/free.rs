@@ -499,7 +499,6 @@ fn not_there(machine: &Machine, key: &str, row: &Parameter) -> Error {
             "name one of these, or give modulus, section and spans instead of stiffness".into()
         }
         _ if name.starts_with("static") => "it follows from coulomb and stribeck.force: name one of these".into(),
-        _ if row.key == "motor.gear_efficiency" => "a compliant gear has none: name gear_damping".into(),
         _ if row.key.starts_with("cart.friction.along.") => {
             "give along to start from, such as along = [[\"0 m\", 1], [\"0.1 m\", 1.5]]".into()
         }

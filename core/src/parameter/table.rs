@@ -404,7 +404,7 @@ const MOTOR: &[Parameter] = &[
     row("motor.gear_ratio", "n", "", Value(1.0), Range::new(1e-6, 1e6), "5.9", "Motor turns per turn of the drive pulley.")
         .at(motor!(gear_ratio)),
     row("motor.gear_efficiency", "η", "", Value(1.0), UP_TO_ONE, "0.73", "Share of the power that the gear transmits, whichever side drives.")
-        .at(of_drive!(motor, |m| (m.gear_play.is_none() && is_brushed(m)).then_some(m.gear_efficiency), |m, value| m.gear_efficiency = value)),
+        .at(of_drive!(motor, |m| is_brushed(m).then_some(m.gear_efficiency), |m, value| m.gear_efficiency = value)),
     row("motor.backlash", "2α", "rad", Value(0.0), Range { below: true, ..Range::new(0.0, 6.3) }, "0.5 deg", "Backlash of the gear: angle by which the drive pulley can turn while the rotor stands still. Needs `gear_stiffness`.")
         .at(motor!(play backlash)).off("gear's backlash"),
     row("motor.gear_stiffness", "k_g", "N m/rad", Words("stiff"), POSITIVE, "300 N m/rad", "Stiffness of the gear between rotor and drive pulley, at the pulley; makes the rotor an inertia of its own.")

@@ -179,7 +179,7 @@ impl Compensation {
                 let mass = settings.inertia * rigid.mass;
                 let force = y.acceleration * mass + (viscous + dry) * settings.friction - rigid.constant;
                 let force = self.force_along(c, y.position).map_or(force, |along| force - along);
-                let command = rigid.command_by(c, force, y.jerk * mass, y.speed);
+                let command = rigid.command_by(c, force, y.jerk * mass, &self.accelerated(y));
                 Some(c.name("forward", command))
             }
             FeedForwardModel::Elastic => {
@@ -188,10 +188,19 @@ impl Compensation {
                 let (viscous, dry) = self.friction(c, y);
                 let less = (viscous + dry) * (1.0 - settings.friction)
                     + needed.drive.acceleration * ((1.0 - settings.inertia) * rigid.mass);
-                let command = rigid.command_by(c, force - less, rate, needed.drive.speed);
+                let command = rigid.command_by(c, force - less, rate, &self.accelerated(&needed.drive));
                 Some(c.name("forward", command))
             }
         }
+    }
+
+    /// A motion whose inertial forces have the share that is fed forward.
+    fn accelerated<N: crate::calculator::Number>(&self, y: &Reference<N>) -> Reference<N> {
+        let share = self.settings.inertia;
+        if share == 1.0 {
+            return *y;
+        }
+        Reference { acceleration: y.acceleration * share, jerk: y.jerk * share, ..*y }
     }
 
     /// Viscous and dry friction of the axis along the reference, N.

@@ -285,7 +285,7 @@ fn of_speed(machine: &Machine, volts: Option<f64>, needs: &[Need]) -> Option<Sho
     most(needs, volts, |need| need.voltage.abs())?;
     let steady = |speed: f64| {
         let (viscous, dry) = rigid.friction(speed, speed.signum());
-        rigid.electrical(viscous + dry - rigid.constant, 0.0, speed).1.abs()
+        rigid.electrical(viscous + dry - rigid.constant, 0.0, &Reference::steady(speed)).1.abs()
     };
     let fastest = needs.iter().max_by(|a, b| a.at.y.speed.abs().total_cmp(&b.at.y.speed.abs()))?;
     let speed = fastest.at.y.speed;
@@ -328,7 +328,7 @@ fn of_breakaway(machine: &Machine, limit: Option<f64>, number: usize, instants: 
             return Some(curve.torque(0.0) / machine.pulley_radius);
         }
         let (volts, amperes) = limits_of(machine, drive, limit);
-        let (current, voltage) = Rigid::of_pulley(machine, drive).electrical(1.0, 0.0, 0.0);
+        let (current, voltage) = Rigid::of_pulley(machine, drive).electrical(1.0, 0.0, &Reference::default());
         let force = [volts.map(|volts| volts / voltage), amperes.map(|amperes| amperes / current)];
         force.into_iter().flatten().reduce(f64::min)
     };
@@ -390,7 +390,7 @@ fn needs(machine: &Machine, profile: &Profile, instants: usize) -> Vec<Need> {
         let needed = compensation.needed(&y);
         let by_speed = machine.cart.forces.by_speed.as_ref().map_or(0.0, |line| line.value(y.speed));
         let force = needed.force[0] - by_speed;
-        let (current, voltage) = compensation.rigid.electrical(force, needed.force[1], needed.drive.speed);
+        let (current, voltage) = compensation.rigid.electrical(force, needed.force[1], &needed.drive);
         Need { at: Instant { time, y }, force, current, voltage, spans: needed.spans }
     };
     let end = profile.rest();

@@ -55,13 +55,19 @@ impl Forward {
     /// Command for this force, V or A.
     pub fn command(&self, slides: &[Reference]) -> f64 {
         let [force, rate] = self.force(slides);
-        self.pulley.command(force, rate, self.along(slides).speed)
+        self.pulley.command(force, rate, &self.drive(slides))
     }
 
     /// Motor current, A, and terminal voltage, V, for this force.
     pub fn electrical(&self, slides: &[Reference]) -> (f64, f64) {
         let [force, rate] = self.force(slides);
-        self.pulley.electrical(force, rate, self.along(slides).speed)
+        self.pulley.electrical(force, rate, &self.drive(slides))
+    }
+
+    /// The motion of its pulley, with the share of the inertia that is fed forward.
+    fn drive(&self, slides: &[Reference]) -> Reference {
+        let (y, share) = (self.along(slides), self.settings.inertia);
+        Reference { acceleration: y.acceleration * share, jerk: y.jerk * share, ..y }
     }
 
     /// F = M y″ + b y′ + F_c sgn y′ − F₀, and the rate of its inertial part, N and N/s.

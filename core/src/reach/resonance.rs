@@ -225,10 +225,12 @@ fn matrices(machine: &Machine, drive: Drive, slides: &[f64]) -> (DMatrix<f64>, D
     let mut resisting: Vec<f64> = bodies.iter().map(viscous).collect();
     for (at, DriveUnit { motor, amplifier }) in geometry.drives.iter().zip(&machine.drives) {
         let n = motor.gear_ratio;
-        masses[at.pulley] += n * n * motor.rotor_inertia;
+        // J₁ + η n² J_r while the motor drives
+        masses[at.pulley] += motor.gear_efficiency * n * n * motor.rotor_inertia;
         if drive == Drive::Free && amplifier.mode == AmplifierMode::Voltage {
-            // n² K_t K_e / R, of an armature without inductance
-            resisting[at.pulley] += n * n * motor.torque_constant * motor.back_emf_constant / motor.resistance;
+            // η n² K_t K_e / R, of an armature without inductance
+            let passed = motor.gear_efficiency * motor.torque_constant;
+            resisting[at.pulley] += n * n * passed * motor.back_emf_constant / motor.resistance;
         }
     }
     let diagonal = |values: &[f64]| DMatrix::from_diagonal(&DVector::from_column_slice(values));

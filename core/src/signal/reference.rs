@@ -34,6 +34,11 @@ impl Reference {
         Self { position, ..Self::default() }
     }
 
+    /// At this speed, m/s.
+    pub fn steady(speed: f64) -> Self {
+        Self { speed, ..Self::default() }
+    }
+
     /// Itself and `weight` times another.
     pub fn plus(self, weight: f64, other: Self) -> Self {
         Self {

@@ -4,7 +4,7 @@ use super::known::Known;
 use super::observe::Output;
 use super::run::Run;
 use super::running::Start;
-use super::{Course, Detail, Ending, Flow, Outcome, PositionError, Solver};
+use super::{Course, Detail, Ending, Flow, Outcome, PositionError, Solver, general};
 use crate::error::Result;
 use crate::machine::Machine;
 use crate::mechanism::{Mechanism, Shown};
@@ -80,6 +80,31 @@ pub struct ErrorEstimate {
 }
 
 impl ErrorEstimate {
+    /// The solver of the second run. A sampled controller answers to the counts of an encoder, which a coarser run would
+    /// read differently far more often than the first one: its second run has a hundredth of the tolerance.
+    pub fn second(first: Solver, is_sampled: bool) -> Solver {
+        match first {
+            Solver::General { tolerance } if is_sampled => {
+                Solver::General { tolerance: f64::max(tolerance / FACTOR, *general::TOLERANCES.start()) }
+            }
+            Solver::General { tolerance } if FACTOR * tolerance <= 1e-2 => {
+                Solver::General { tolerance: FACTOR * tolerance }
+            }
+            Solver::General { tolerance } => Solver::General { tolerance: tolerance / FACTOR },
+            other => other,
+        }
+    }
+
+    /// What the error of a run is based on, in words: a bound for the exact solver with given inputs, else a second run.
+    pub fn basis(first: Solver, is_sampled: bool) -> &'static str {
+        match first {
+            Solver::General { .. } if is_sampled => "a second run with a hundredth of the tolerance",
+            Solver::General { .. } => "a second run with a hundred times the tolerance",
+            _ if is_sampled => "a second run with other roundings",
+            _ => "bound of rounding",
+        }
+    }
+
     /// For a run of this experiment on this machine.
     pub fn new(machine: &Machine, experiment: &Experiment) -> Self {
         let mechanism = machine.mechanism();
@@ -137,16 +162,32 @@ impl ErrorEstimate {
         outcome: &Outcome,
         flow: &mut dyn FnMut() -> Flow,
     ) -> Result<Option<PositionError>> {
+        let first = Solver::General { tolerance };
+        let solvers = [first, Self::second(first, false)];
+        self.finish_driven(mechanism, course, solvers, (outcome, flow), &mut |run| run.follow(&course.inputs))
+    }
+
+    /// Finishes the estimate for a run whose inputs are set from outside, or are those of the course. `solvers` are
+    /// those of the first and of the second run; `drive` runs the second one to its end.
+    pub fn finish_driven(
+        self,
+        mechanism: &Mechanism,
+        course: &Course,
+        [first, second]: [Solver; 2],
+        (outcome, flow): (&Outcome, &mut dyn FnMut() -> Flow),
+        drive: &mut dyn FnMut(Run) -> Outcome,
+    ) -> Result<Option<PositionError>> {
         let every = course.every * self.stride as f64 / rows_between(self.stride) as f64;
         let mut start = Start { state: course.start, until: course.until, every, noise: NOISE };
         let state = &mut start.state;
         let values = state.position.iter_mut().chain(&mut state.speed).chain(&mut state.current);
         values.for_each(|value| *value *= 1.0 + OF_START);
-        let (solver, degree) = (coarser(tolerance), course.inputs.iter().map(Signal::degree).max().unwrap_or(0));
+        let degree = course.inputs.iter().map(Signal::degree).max().unwrap_or(0);
         let mechanism = Arc::new(mechanism.nudged());
+        let tolerance = if let Solver::General { tolerance } = first { tolerance } else { 0.0 };
         self.compare((outcome, tolerance), flow, &mut |sink| {
             let output = Output { detail: Detail::Lean, sink, observer: None };
-            Ok(Run::of(&mechanism, &start, (solver, degree), Known::default(), output)?.along(&course.inputs).0)
+            Ok(drive(Run::of(&mechanism, &start, (second, degree), Known::default(), output)?))
         })
     }
 
@@ -224,11 +265,6 @@ impl Way<'_> {
 /// The columns of these positions.
 fn columns<'a>(ways: &[(String, f64)], block: &'a Trajectory) -> Vec<Way<'a>> {
     ways.iter().map(|(name, lever)| Way { values: block.get(name).unwrap_or(&[]), lever: *lever }).collect()
-}
-
-fn coarser(tolerance: f64) -> Solver {
-    let coarse = if FACTOR * tolerance <= 1e-2 { FACTOR * tolerance } else { tolerance / FACTOR };
-    Solver::General { tolerance: coarse }
 }
 
 #[cfg(test)]

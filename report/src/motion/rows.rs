@@ -1,9 +1,9 @@
 //! A move in words.
 
 use super::{Done, Tried};
-use crate::simulate::rows::{lost_steps, ties};
-use crate::simulate::{plain, time, value};
-use taut::control::{Deviation, DriveFigures, LoadFigures, MoveRun, sliding};
+use crate::simulate::rows::lost_steps;
+use crate::simulate::{accuracy, plain, time, value};
+use taut::control::{Accuracy, Deviation, DriveFigures, LoadFigures, MoveRun, sliding};
 use taut::design::{Design, FeedForwardModel, Structure};
 use taut::machine::rigid::Rigid;
 use taut::machine::{DriveUnit, EncoderPlace, Machine};
@@ -95,10 +95,10 @@ pub fn lines(tried: &Tried, done: &Done) -> Vec<(&'static str, String)> {
         ("peak force", format!("{} in {} at {}", value(force.value, "N"), span(force_place), time(force.time))),
         ("current", of_drives(&|drive| largest(drive.current, "A"))),
     ];
-    let accuracy = |whose: &str| format!("not stated {whose}{}", ties(&run.outcome.ties));
+    let accuracy = ("accuracy", accuracy(&run.outcome, Accuracy::basis(machine)));
     // A stepper has no samples, and its phases have voltages of their own.
     match lost_steps(&run.metrics, geometry) {
-        Some(lost) => lines.extend([("accuracy", accuracy("for a move")), ("lost steps", lost)]),
+        Some(lost) => lines.extend([accuracy, ("lost steps", lost)]),
         None => lines.extend([
             ("voltage", of_drives(&|drive| largest(drive.voltage, "V"))),
             ("saturated", saturated(machine, run, &of_drives(&|drive| time(drive.amplifier_limited)))),
@@ -106,8 +106,7 @@ pub fn lines(tried: &Tried, done: &Done) -> Vec<(&'static str, String)> {
                 "energy",
                 of_drives(&|drive| format!("{} in, {} back", value(drive.energy.0, "J"), value(drive.energy.1, "J"))),
             ),
-            // The bound of a run holds without a controller, which answers to what rounding does.
-            ("accuracy", accuracy("in closed loop")),
+            accuracy,
         ]),
     }
     if let Some(contour) = &figures.contour {

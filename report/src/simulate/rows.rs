@@ -8,7 +8,7 @@ use taut::mechanism::Part;
 use taut::metrics::{Balance, LostSteps, Metrics, OfLoad, Peak};
 use taut::number;
 use taut::reduction::Reduction;
-use taut::solve::{Cost, Ending, Event, Method, Outcome, PositionError, Solver, Tie};
+use taut::solve::{Cost, Ending, ErrorEstimate, Event, Method, Outcome, PositionError, Solver, Tie};
 
 /// A value with its unit for people, spaces and signs as a terminal and `grep` like them.
 pub fn value(value: f64, unit: &str) -> String {
@@ -152,7 +152,7 @@ pub fn lines(run: &Run, machine: &Machine, solver: Solver) -> Vec<(&'static str,
         lines.push((if one_drive { "r φ₁ - x" } else { "drives' error" }, errors(metrics, &labels)));
     }
     if !matches!(solver, Solver::Table3 { .. }) {
-        lines.push(("accuracy", accuracy(&run.outcome, solver)));
+        lines.push(("accuracy", accuracy(&run.outcome, ErrorEstimate::basis(solver, false))));
     }
     if let Some(log) = &run.log {
         lines.push(("against its log", outputs(log)));
@@ -232,14 +232,14 @@ fn errors(metrics: &Metrics, labels: &[&str]) -> String {
         .join("; ")
 }
 
-/// By how much positions may be off.
-pub fn accuracy(outcome: &Outcome, solver: Solver) -> String {
+/// By how much positions may be off; `basis` is what that is based on.
+pub fn accuracy(outcome: &Outcome, basis: &str) -> String {
     let Some(error) = outcome.error else { return "not estimated".into() };
     let rounded = number::engineering_typed(error.value, "m", 2);
-    let positions = match solver {
+    let positions = match basis {
         _ if error.is_undetermined() => "not determined: errors of rounding grow to more than the motion".into(),
-        Solver::Exact => format!("positions within {rounded}, by a bound of rounding"),
-        _ => format!("positions within some {rounded}, by a second run with a hundred times the tolerance"),
+        _ if basis.starts_with("bound") => format!("positions within {rounded}, by a {basis}"),
+        _ => format!("positions within some {rounded}, by {basis}"),
     };
     positions + &ties(&outcome.ties)
 }
@@ -248,7 +248,7 @@ pub fn accuracy(outcome: &Outcome, solver: Solver) -> String {
 const TIES: usize = 3;
 
 /// When what a body does was decided within rounding.
-pub(crate) fn ties(ties: &[Tie]) -> String {
+fn ties(ties: &[Tie]) -> String {
     if ties.is_empty() {
         return String::new();
     }
@@ -260,18 +260,18 @@ pub(crate) fn ties(ties: &[Tie]) -> String {
     format!("; decided within rounding at {}{more}", each.collect::<Vec<_>>().join(", "))
 }
 
-/// The word for a result that its error hides.
-pub fn hidden(name: &str, outcome: &Outcome) -> Option<String> {
+/// The word for a result of a "run" or a "move" that its error hides.
+pub fn hidden(what: &str, name: &str, outcome: &Outcome) -> Option<String> {
     let error = outcome.error.filter(|error| error.hides_motion())?;
     // Errors that have grown beyond the motion itself are no lengths any more.
     let off = match error.is_undetermined() {
         true => format!(
-            "numbers of 64 bits do not determine the positions of the run \"{name}\", which moves by {}",
+            "numbers of 64 bits do not determine the positions of the {what} \"{name}\", which moves by {}",
             value(error.way, "m")
         ),
         false => {
             let [off, way] = [error.value, error.way].map(|length| value(length, "m"));
-            format!("positions of the run \"{name}\" may be wrong by {off}, and its motion is at most {way}")
+            format!("positions of the {what} \"{name}\" may be wrong by {off}, and its motion is at most {way}")
         }
     };
     Some(format!(

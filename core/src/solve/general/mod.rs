@@ -43,6 +43,7 @@ use field::Field;
 use linear::Set;
 use model::{MOST, MOST_GUARDS, Model, Vector};
 pub(super) use run::Run;
+use std::ops::RangeInclusive;
 use std::sync::Arc;
 use step::Room;
 use stretch::Stretch;
@@ -53,9 +54,12 @@ const MOST_STEPS: f64 = 1e10;
 /// Most modes that are kept ready.
 const MOST_KNOWN: usize = 256;
 
+/// Valid tolerances, m.
+pub(super) const TOLERANCES: RangeInclusive<f64> = 1e-14..=1e-2;
+
 /// Rejects an invalid tolerance, and a run of too many steps.
 pub(super) fn check(fastest: f64, until: f64, tolerance: f64) -> Result<()> {
-    if !(1e-14..=1e-2).contains(&tolerance) {
+    if !TOLERANCES.contains(&tolerance) {
         return Err(Error::new(format!("a tolerance of {tolerance:e} is invalid"))
             .allowed("from 1e-14 to 0.01")
             .next("take 1e-9, the default"));
