@@ -30,6 +30,7 @@ pub use crate::trajectory::Grid;
 pub use choice::{Choice, Kind};
 pub use estimate::ErrorEstimate;
 pub use general::{Dynamics, Quantity};
+pub(crate) use inputs::applied;
 use observe::Output;
 pub use observe::{Closer, Curve, Gap, Gaps, Observe, Polynomial, QUANTITIES, Reading, Stretch, TERMS, reading};
 pub use run::{Course, Run};
