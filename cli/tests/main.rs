@@ -2,6 +2,7 @@
 //! those of `fit.rs`.
 
 mod commands;
+mod common;
 mod common_options;
 mod design;
 mod documents;
