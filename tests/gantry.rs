@@ -6,7 +6,7 @@ use taut::case::Case;
 use taut::linear::{Analysis, Natural, Question, Root};
 use taut::machine::Kind;
 use taut::metrics::{Meter, Metrics, Peak};
-use taut::solve::{Course, Detail, Ending, ErrorEstimate, Event, Flow, Solver, stream_mechanism};
+use taut::solve::{Course, Detail, ErrorEstimate, Event, Flow, Solver, stream_mechanism};
 use taut::trajectory::Trajectory;
 
 fn cases() -> Value {

@@ -331,8 +331,8 @@ fn spans_that_follow_the_cart_are_as_stiff_as_they_are_long() {
     let following = common::complete(&follows, Solver::GENERAL);
     assert!(apart(&exact, &following, "cart_position") > 1e-7);
     // k = E A / l, with l_left + x + y: the force per stretch in every row.
-    let [x, y, phi, force] =
-        ["bridge_position", "cart_position", "left_angle", "left_span_force"].map(|c| following.trajectory.get(c).unwrap());
+    let [x, y, phi, force] = ["bridge_position", "cart_position", "left_angle", "left_span_force"]
+        .map(|c| following.trajectory.get(c).unwrap());
     for row in (0..x.len()).step_by(10) {
         let stiffness = 8e9 * 6e-6 / (0.5 + x[row] + y[row]);
         let stretch = 0.01 * phi[row] + x[row] + y[row];

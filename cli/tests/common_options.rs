@@ -90,7 +90,9 @@ fn the_version_says_what_it_was_built_from() {
 #[test]
 fn no_line_is_wider_than_the_environment_says() {
     let folder = TempDir::new().unwrap();
-    for (name, text) in [("pid.toml", stage_text("sollmann-jouaneh/controllers/pid.toml")), ("table4.toml", stage_text(TABLE4))] {
+    for (name, text) in
+        [("pid.toml", stage_text("sollmann-jouaneh/controllers/pid.toml")), ("table4.toml", stage_text(TABLE4))]
+    {
         fs::write(folder.path().join(name), text).unwrap();
     }
     let commands: [&[&str]; 4] = [

@@ -221,7 +221,8 @@ fn modes_of_a_gantry_answer_every_question() {
     let case = stage("core-xy/follows.toml");
     let asked = |options: &[&str]| {
         let folder = TempDir::new().unwrap();
-        let run = taut_in(folder.path()).arg("modes").arg(&case).args(options).args(["--out", "out", "--json"]).assert();
+        let run =
+            taut_in(folder.path()).arg("modes").arg(&case).args(options).args(["--out", "out", "--json"]).assert();
         let told = json(&run.success().get_output().stdout);
         (told, fs::read_to_string(folder.path().join("out/frequency-response.csv")).unwrap())
     };
@@ -392,9 +393,7 @@ fn a_sweep_that_was_interrupted_goes_on() {
     let folder = TempDir::new().unwrap();
     let run = |out: &str| {
         let mut run = Program::new(env!("CARGO_BIN_EXE_taut"));
-        run.arg("sweep")
-            .arg(stage("core-xy/core-xy.toml"))
-            .args(["--runs", "1200", "--vary", "all=20%", "--out", out]);
+        run.arg("sweep").arg(stage("core-xy/core-xy.toml")).args(["--runs", "1200", "--vary", "all=20%", "--out", out]);
         run.current_dir(folder.path()).stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::null());
         crate::faults::by_default(&mut run);
         run

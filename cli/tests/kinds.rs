@@ -89,7 +89,11 @@ fn trial(case: &str, options: &[&str], folder: &Path) -> String {
     let name = if options.contains(&"square") { "square" } else { "short fast" };
     let changes =
         options.iter().filter(|option| option.contains("controller.pid")).flat_map(|option| ["--set", option]);
-    let _ = taut_in(root()).args(["move", case, "--move", name, "--no-report", "--out", &out]).args(changes).output().unwrap();
+    let _ = taut_in(root())
+        .args(["move", case, "--move", name, "--no-report", "--out", &out])
+        .args(changes)
+        .output()
+        .unwrap();
     format!("{out}/{}.csv", name.replace(' ', "-"))
 }
 

@@ -3,6 +3,7 @@
 
 use crate::answer::{Answer, End, LEAST, mechanism, rows};
 use crate::double::Double;
+use crate::folder::Folder;
 use crate::subject::{Fed, Subject};
 use std::fmt::Write;
 use std::path::Path;
