@@ -4,9 +4,9 @@ Within a mode everything is linear: ż = A z for
 
     z = (φ₁ φ₂ x y | their speeds | i₁ i₂ | 1 | U₁ U̇₁ S₁ C₁ | U₂ U̇₂ S₂ C₂)        u = U + S,   S' = ω C,   C' = −ω S
 
-with the lever arms as a matrix: s = B q, M q̈ = −Bᵀ (k s + c ṡ) + motors − friction. A step is a polynomial; every guard is looked
-at 24 times a step with value and slope, and its root is bisected on the polynomial. The same run in 64-bit numbers shows how
-sensitive a case is to rounding.
+with the lever arms as a matrix: s = B q, M q̈ = −Bᵀ (k s + c ṡ) + motors − friction. A step is a polynomial; every
+guard is looked at 24 times a step with value and slope, and its root is bisected on the polynomial. The same run in
+64-bit numbers shows how sensitive a case is to rounding.
 """
 
 from __future__ import annotations

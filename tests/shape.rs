@@ -387,8 +387,8 @@ fn what_klipper_printed() {
     }
 }
 
-/// Every digit that today's Klipper prints, of 64 drawn spectra and with its options: frequency, vibration, smoothing and
-/// acceleration of each shaper, and the recommendation. The authority is its rule written out again with NumPy.
+/// Every digit that today's Klipper prints, of 64 drawn spectra and with its options: frequency, vibration, smoothing
+/// and acceleration of each shaper, and the recommendation. The authority is its rule written out again with NumPy.
 #[test]
 fn every_digit_of_todays_klipper() {
     let text = fs::read_to_string("tests/authorities/klipper.json").unwrap();
@@ -634,8 +634,8 @@ fn a_stage_without_a_measurement() {
     assert!(resonances(&rigid, Drive::Held, 0).unwrap_err().what.contains("rigid"));
 }
 
-/// The modes of a gantry are those of its equations of motion: with free motors those of `paper/h-frame.md`, with motors
-/// held of bridge and cart on all spans, K = Σ k dᵀd over both.
+/// The modes of a gantry are those of its equations of motion: with free motors those of `paper/h-frame.md`, with
+/// motors held of bridge and cart on all spans, K = Σ k dᵀd over both.
 #[test]
 fn a_gantry_has_modes_of_each_coordinate() {
     let k = [132_760.0, 132_760.0, 58_885.0];
