@@ -47,11 +47,13 @@ mod wide;
 
 pub(crate) use at_samples::closed_loop_at_samples;
 pub use figures::{Deviation, DriveFigures, Figures, LoadFigures};
+pub(crate) use outcome::closed_loop_briefly;
+pub use outcome::follow;
 pub use outcome::{MoveRun, Rows, Setup, close, closed_loop, each, stream};
-pub use outcome::{closed_loop_briefly, follow};
 pub use rest::Swing;
 pub use sampled::Added;
-pub use sampled::{Controller, Loop, Observation, Sample, measures_cart, reads_scale};
+pub(crate) use sampled::measures_cart;
+pub use sampled::{Controller, Loop, Observation, Sample, reads_scale};
 pub use spread::{Worst, spread, worst};
 pub use standard::{Standard, Text};
 pub use stepped::Stepped;

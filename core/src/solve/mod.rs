@@ -292,7 +292,7 @@ pub struct PositionError {
 
 impl PositionError {
     /// Largest error of a result that is called exact, m.
-    pub const EXACT: f64 = 1e-9;
+    pub(crate) const EXACT: f64 = 1e-9;
 
     /// True if it is small enough for the result to be called exact.
     pub fn is_exact(self) -> bool {
