@@ -14,6 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from elements_rules import NEAR, Doubt
+from elements_taylor import bisect, horner
 from gantry_case import BODIES, STUCK, Run, margins
 from model import Line
 
@@ -74,25 +75,6 @@ class Mode:
             powers.append(powers[-1] @ a / (k * self.rate))
         self.powers = np.array(powers)
         self.watch = np.einsum("gi,kij->kgj", self.guards, self.powers)
-
-
-def horner(polynomial, s):
-    value = polynomial[-1]
-    for coefficient in polynomial[-2::-1]:
-        value = value * s + coefficient
-    return value
-
-
-def bisect(polynomial, low, high):
-    """The root of a polynomial of different signs at low and high."""
-    rises = horner(polynomial, high) > 0
-    for _ in range(75):
-        middle = (low + high) / 2
-        if (horner(polynomial, middle) > 0) == rises:
-            high = middle
-        else:
-            low = middle
-    return high
 
 
 class Solver:

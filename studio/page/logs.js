@@ -2,7 +2,7 @@
 // From a log to a model: drop files, say what their columns are, see what they determine, fit, keep.
 import {download, element, fileName, fold, number, rowHead, svg, table} from "./format.js";
 import {Picture} from "./picture.js";
-import {dropPlace, wordsOf} from "./drop.js";
+import {dropPlace, errorPlace, wordsOf} from "./drop.js";
 import {LongWork} from "./long-work.js";
 import {showReport} from "./modes.js";
 
@@ -47,7 +47,7 @@ class Logs {
     this.costs = {x: [], y: []};
     /** @type {Map<string, Picture>} */
     this.pictures = new Map();
-    this.trouble = element("p", {class: "mistake", id: "fit-trouble", role: "alert", hidden: true});
+    this.trouble = errorPlace({id: "fit-trouble"});
     this.list = element("div", {class: "log-files"});
     this.unread = element("div", {class: "mistake", id: "unread", role: "alert"});
     this.own = element(
@@ -127,15 +127,10 @@ class Logs {
     );
   }
 
-  tell(error) {
-    this.trouble.hidden = !error;
-    this.trouble.textContent = error ? wordsOf(error) : "";
-  }
-
   // ---- Logs
 
   async take(files) {
-    this.tell(null);
+    this.trouble.tell(null);
     this.unread.replaceChildren();
     for (const file of files) {
       try {
@@ -161,7 +156,7 @@ class Logs {
     this.end("");
     this.shape = "";
     this.close();
-    this.tell(null);
+    this.trouble.tell(null);
     if (this.app.view === key) this.refresh();
   }
 
@@ -265,7 +260,7 @@ class Logs {
   // ---- Works
 
   begin(words) {
-    this.tell(null);
+    this.trouble.tell(null);
     this.status.textContent = words;
     this.begun = performance.now();
     const tick = () => {
@@ -301,7 +296,7 @@ class Logs {
       this.checked.dataset.of = "check";
       this.end(`Looked at in ${this.seconds()} s.`);
     } catch (error) {
-      this.tell(error);
+      this.trouble.tell(error);
       this.end("");
     }
   }
@@ -324,7 +319,7 @@ class Logs {
       this.end(`${head.ending}. ${this.seconds()} s.`);
     } catch (error) {
       this.live.hidden = true;
-      this.tell(error);
+      this.trouble.tell(error);
       this.end("");
     }
   }

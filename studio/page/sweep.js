@@ -3,7 +3,7 @@
 // in all, with its trajectories and parameters.
 import {element, number, rowHead, table} from "./format.js";
 import {Picture, histogram} from "./picture.js";
-import {wordsOf} from "./drop.js";
+import {errorPlace} from "./drop.js";
 import {LongWork} from "./long-work.js";
 
 /** @typedef {import("./app.js").App} App */
@@ -55,7 +55,7 @@ class Sweep {
     this.go = element("button", {type: "button", id: "sweep", class: "strong", onclick: () => this.sweep()}, "Sweep");
     this.work = new LongWork(app.wire, [this.go], {id: "sweep-stop", words: "Stop, keep what is done"});
     this.status = element("p", {class: "quiet", role: "status", id: "sweep-status"});
-    this.trouble = element("p", {class: "mistake", role: "alert", hidden: true});
+    this.trouble = errorPlace();
     this.group = element("select", {id: "sweep-group", onchange: () => this.figures()});
     this.figure = element("select", {
       id: "sweep-figure",
@@ -175,14 +175,9 @@ class Sweep {
     };
   }
 
-  tell(error) {
-    this.trouble.hidden = !error;
-    this.trouble.textContent = error ? wordsOf(error) : "";
-  }
-
   async sweep() {
     const {app} = this;
-    this.tell(null);
+    this.trouble.tell(null);
     this.rows = [];
     this.headings = [];
     this.brushes.clear();
@@ -213,7 +208,7 @@ class Sweep {
       this.traces();
     } catch (error) {
       this.status.textContent = "";
-      this.tell(error);
+      this.trouble.tell(error);
     }
   }
 
@@ -222,7 +217,7 @@ class Sweep {
     this.work.leave();
     this.shown.hidden = true;
     this.status.textContent = "";
-    this.tell(null);
+    this.trouble.tell(null);
   }
 
   // ---- Figures
@@ -361,7 +356,7 @@ class Sweep {
       },
       (answer, error) => {
         if (!answer) {
-          this.tell(error);
+          this.trouble.tell(error);
           return;
         }
         const {panels} = answer.head,

@@ -2,7 +2,7 @@
 // A controller and its moves: gains under sliders, the cart's error and Nyquist's curve with them, and the tuning.
 import {element, number, rowHead, table} from "./format.js";
 import {Picture} from "./picture.js";
-import {wordsOf} from "./drop.js";
+import {errorPlace} from "./drop.js";
 import {showReport} from "./modes.js";
 import {Row} from "./parameters.js";
 import {LongWork} from "./long-work.js";
@@ -34,7 +34,7 @@ class Tune {
     /** @type {any[]} */
     this.controllers = [];
     this.told = element("p", {class: "quiet", role: "status", id: "loop-status"});
-    this.trouble = element("p", {class: "mistake", role: "alert", hidden: true});
+    this.trouble = errorPlace();
     this.choice = element(
       "select",
       {id: "controller", onchange: () => this.take()},
@@ -184,11 +184,8 @@ class Tune {
   }
 
   tell(error) {
-    this.trouble.hidden = !error;
     const hasController = this.app.run && this.app.run.head.has_controller;
-    this.trouble.textContent = error
-      ? (hasController ? "" : "Choose a controller above, or write one. As the case stands, ") + wordsOf(error)
-      : "";
+    this.trouble.tell(error, hasController ? "" : "Choose a controller above, or write one. As the case stands, ");
   }
 
   // ---- The loop
