@@ -14,9 +14,14 @@ pub fn stage(name: &str) -> PathBuf {
     root().join("stages").join(name)
 }
 
+/// The text of a file of the project.
+pub fn read(name: &str) -> String {
+    std::fs::read_to_string(root().join(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
+}
+
 /// The text of a file of `stages`.
 pub fn stage_text(name: &str) -> String {
-    std::fs::read_to_string(stage(name)).unwrap()
+    read(&format!("stages/{name}"))
 }
 
 /// The program in this folder.

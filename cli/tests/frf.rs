@@ -1,6 +1,6 @@
 //! `taut frf` as a user runs it, on logs that `taut simulate --as-measured` wrote.
 
-use crate::common::{root, taut};
+use crate::common::{read, taut};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
@@ -17,7 +17,7 @@ fn measured(folder: &Path) -> String {
     let args = ["simulate", TABLE4, "--as-measured", "--no-report", "--quiet"];
     let told = taut(&[&args[..], &["--set", EXPERIMENT, "--set", change, "--out", out]].concat());
     assert!(told.status.success(), "{told:?}");
-    let text = fs::read_to_string(root().join(TABLE4)).unwrap();
+    let text = read(TABLE4);
     let machine = &text[..text.find("[[experiment]]").unwrap()];
     let log = "[[experiment]]\nname = \"noise\"\n\
                log = { file = \"sim/noise.measured.csv\", time = \"time_s\", input = \"voltage_V\", drive_angle = \"drive_angle_rad\" }\n";

@@ -27,6 +27,7 @@ mod shape;
 mod show;
 mod structure;
 mod studio;
+mod studio_client;
 mod studio_work;
 mod sweep;
 

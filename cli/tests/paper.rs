@@ -1,6 +1,6 @@
 //! `taut paper` as its reader gets it: golden numbers, documented ids, every figure, nothing from a network.
 
-use crate::common::{root, taut_in};
+use crate::common::{self, taut_in};
 use serde_json::Value;
 use std::path::PathBuf;
 use std::process::Output;
@@ -94,7 +94,7 @@ fn misprints_are_told_and_references_are_met() {
 
 #[test]
 fn the_ids_are_those_of_the_documentation() {
-    let document = std::fs::read_to_string(root().join("docs/paper.md")).unwrap();
+    let document = common::read("docs/paper.md");
     let (_, list) = document.split_once("## The claims").unwrap();
     let items = list.split("\n\n").find(|paragraph| paragraph.starts_with("- **")).unwrap();
     let documented: Vec<&str> = items.split('`').skip(1).step_by(2).collect();

@@ -1,6 +1,6 @@
 //! `taut schema`: what it says of results and case files is what the program writes and reads.
 
-use crate::common::{root, taut};
+use crate::common::{read, root, taut};
 use serde_json::{Map, Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -370,7 +370,7 @@ fn every_case_file_of_the_project_follows_the_schema() {
 #[test]
 fn what_is_wrong_by_its_form_does_not_follow_the_schema() {
     let schema = json_of(&["schema", "case"]);
-    let text = std::fs::read_to_string(root().join(TABLE4)).unwrap();
+    let text = read(TABLE4);
     let right = case(&text);
     let changes: [(&str, Value); 8] = [
         ("/cart/mas", json!(1)),

@@ -1,6 +1,6 @@
 //! `taut show`: what follows from the numbers, and files that begin with data sheets.
 
-use crate::common::{root, taut, taut_in};
+use crate::common::{read, root, taut, taut_in};
 use serde_json::Value;
 use std::f64::consts::PI;
 use tempfile::TempDir;
@@ -119,7 +119,7 @@ fn the_template_of_a_printer_has_a_stepper_and_goes_through_its_commands() {
 #[test]
 fn what_nothing_bounds_is_said() {
     let torque = "stages/laser-gantry/laser-gantry.toml";
-    let text = std::fs::read_to_string(root().join(torque)).unwrap();
+    let text = read(torque);
     let text = text.replace("[[experiment]]", "[[other]]");
     let begin = text.find("[[other]]").unwrap();
     let text = format!("{}[controller]\nevery = \"1 ms\"\npid = {{ proportional = 1 }}\n", &text[..begin]);
