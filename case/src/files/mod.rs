@@ -51,7 +51,7 @@ pub fn write_atomically(path: impl AsRef<Path>, bytes: impl AsRef<[u8]>) -> Resu
 /// The temporary name is `.NAME.K.taut.tmp`, with K from 0. It is locked as long as its program runs: the next draft of
 /// the same file removes those that a killed program left, and no others.
 #[derive(Debug)]
-pub(crate) struct Draft {
+pub struct Draft {
     path: PathBuf,
     /// The file itself, where `path` is a link.
     target: PathBuf,
