@@ -1,7 +1,7 @@
 """Sampled closed loops on the paper's machine, by SciPy's DOP853 between samples with events for stick and slip.
 
-The equations are written out again from the paper, (1)-(4) and (15)-(18), and so are trapezoid, encoder, delay, limit and the
-controllers; nothing is shared with taut or with the other scripts. Writes tests/authorities/closed_loop.json.
+The equations are written out again from the paper, (1)-(4) and (15)-(18), and so are trapezoid, encoder, delay, limit
+and the controllers; nothing is shared with taut or with the other scripts. Writes tests/authorities/closed_loop.json.
 """
 
 import json

@@ -1,7 +1,7 @@
 """Curved friction and stretching spans: tests/authorities/curves.json.
 
-Stribeck curves in their three shapes, Simscape's smooth law, LuGre, friction along the travel and a belt that follows the
-cart, on the stage of Table 4. Solved and judged as in elements.py.
+Stribeck curves in their three shapes, Simscape's smooth law, LuGre, friction along the travel and a belt that follows
+the cart, on the stage of Table 4. Solved and judged as in elements.py.
 """
 
 from __future__ import annotations

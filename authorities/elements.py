@@ -1,8 +1,8 @@
 """Random stages with limits, backlash, slack spans, stops, loads and reduced belts: tests/authorities/elements.json.
 
-Each case is a case file's text, solved by Taylor series in 80-bit numbers (B), the same in 64-bit numbers, and DOP853 (A). It is
-kept if all see the same changes and agree to 1e-10 m, 1e-9 rad and 1e-9 s, if nothing is nearly undecided, and if the element
-in question comes into play.
+Each case is a case file's text, solved by Taylor series in 80-bit numbers (B), the same in 64-bit numbers, and DOP853
+(A). It is kept if all see the same changes and agree to 1e-10 m, 1e-9 rad and 1e-9 s, if nothing is nearly undecided,
+and if the element in question comes into play.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
-"""What may change in an axis with limits, backlash, slack, stops and dry friction, and when: the rules, without mechanics.
+"""What may change in an axis with limits, backlash, slack, stops and dry friction, and when: the rules, without
+mechanics.
 
 A *part* has a state, and the states of all parts make a mode. An authority supplies the values of the quantities named
-here; the rules say which quantity ends which state. A guard is a list of terms (sign, quantity, offset): its part leaves its
-state when the smallest of sign · quantity − offset rises above zero.
+here; the rules say which quantity ends which state. A guard is a list of terms (sign, quantity, offset): its part
+leaves its state when the smallest of sign · quantity − offset rises above zero.
 
 | part | states | quantity |
 |---|---|---|

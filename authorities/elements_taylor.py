@@ -5,9 +5,10 @@ Within a mode everything piecewise linear is a row of a matrix on the vector
     Z = (φ₁ w₁ x v φ₃ w₃ i φ_r w_r z₁ z₂ z₃ | 1 u u̇ S C | s₁ s₂ …)
 
 with the input's line (u, u̇) or wave (S, C) as states of their own. Smooth nonlinear terms s_k are built as series of
-products, quotients, exponentials (tanh by its differential equation), coefficient by coefficient. Each step is a polynomial;
-every guard is looked at twelve times a step with value and slope, and its root is bisected on the polynomial. The numbers are
-`numpy.longdouble` unless told otherwise: the same run in 64-bit numbers shows how sensitive a case is to rounding.
+products, quotients, exponentials (tanh by its differential equation), coefficient by coefficient. Each step is a
+polynomial; every guard is looked at twelve times a step with value and slope, and its root is bisected on the
+polynomial. The numbers are `numpy.longdouble` unless told otherwise: the same run in 64-bit numbers shows how sensitive
+a case is to rounding.
 """
 
 from __future__ import annotations

@@ -7,8 +7,8 @@ Within a mode, on one piece of the input, everything is linear in the augmented 
 so ż = A z and z(t) = exp(A t) z(0), exact to rounding. Every function that can end the mode is a row g z. All rows are
 looked at 50 times per period of the fastest motion, together with their slopes g A z, so that a double crossing between
 two looks is seen as well; a root is then bisected on the row's own Taylor polynomial. Numbers are 80-bit
-(`numpy.longdouble` on x86-64: 64-bit mantissa) unless told otherwise: the same run in 64-bit numbers shows how sensitive
-a case is to rounding.
+(`numpy.longdouble` on x86-64: 64-bit mantissa) unless told otherwise: the same run in 64-bit numbers shows how
+sensitive a case is to rounding.
 """
 
 from __future__ import annotations
@@ -93,7 +93,8 @@ class Mode:
                 load = {1: belt, 2: cart_load, 3: idler_load}[body]
                 forward, backward = number(friction.breakaway_forward) * one, number(friction.breakaway_backward) * one
                 scale = max(friction.breakaway_forward, friction.breakaway_backward, 1e-30)
-                # A lossy gear makes two half-planes of each side: K_t i η and K_t i / η, the lesser (forward) or greater.
+                # A lossy gear makes two half-planes of each side: K_t i η and K_t i / η, the lesser (forward) or
+                # greater.
                 motors = (
                     [(0 * one, None)]
                     if body != 1

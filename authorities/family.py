@@ -1,5 +1,6 @@
-"""The family of the paper's machine: waves with many stick-slip transitions, steps beside each breakaway, the stiffness of
-Table 1 with dry friction, other voltages. Solved and judged as in random_stages.py; writes tests/authorities/family.json.
+"""The family of the paper's machine: waves with many stick-slip transitions, steps beside each breakaway, the stiffness
+of Table 1 with dry friction, other voltages. Solved and judged as in random_stages.py; writes
+tests/authorities/family.json.
 """
 
 from __future__ import annotations

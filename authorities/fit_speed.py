@@ -1,15 +1,18 @@
-"""The same fit by several solvers, side by side: taut, and SciPy's `least_squares` over SUNDIALS CVODE in C and over `solve_ivp`.
+"""The same fit by several solvers, side by side: taut, and SciPy's `least_squares` over SUNDIALS CVODE in C and over
+`solve_ivp`.
 
-Four friction parameters of the paper's machine (Table 4 with the rest of Table 2): viscous and Coulomb friction of the two pulleys, which
-are equal, and of the cart, from logs of the pulses of 5 V and 10 V (0.25 s long, 1 s each, 1 kHz, 2002 rows), all from the same start.
-A row holds the drive pulley's angle and the cart's position: the angle alone tells little more than two sums. The logs are made here,
-by LSODA at a tolerance of 1e-11: once exact, and once with normal noise of 0.2 mrad and 4 um (NumPy's generator, seed 1).
+Four friction parameters of the paper's machine (Table 4 with the rest of Table 2): viscous and Coulomb friction of the
+two pulleys, which are equal, and of the cart, from logs of the pulses of 5 V and 10 V (0.25 s long, 1 s each, 1 kHz,
+2002 rows), all from the same start. A row holds the drive pulley's angle and the cart's position: the angle alone tells
+little more than two sums. The logs are made here, by LSODA at a tolerance of 1e-11: once exact, and once with normal
+noise of 0.2 mrad and 4 um (NumPy's generator, seed 1).
 
-Residuals are model minus log in standard deviations (without noise: hundredths of the range); taut, which estimates the deviations itself,
-also does what belongs to its `fit`: what the logs determine, beforehand, and covariance and intervals, afterwards. The others have
-a fixed tolerance and differences of one side with the step that goes with it. Seconds are those of the processor, of both processes where there
-are two, so that what else the computer does counts little. taut also fits where the position starts, which the others take for zero. `cost` is half the sum of the squares at the estimates, by LSODA at 1e-11 and
-with the same deviations for all.
+Residuals are model minus log in standard deviations (without noise: hundredths of the range); taut, which estimates the
+deviations itself, also does what belongs to its `fit`: what the logs determine, beforehand, and covariance and
+intervals, afterwards. The others have a fixed tolerance and differences of one side with the step that goes with it.
+Seconds are those of the processor, of both processes where there are two, so that what else the computer does counts
+little. taut also fits where the position starts, which the others take for zero. `cost` is half the sum of the squares
+at the estimates, by LSODA at 1e-11 and with the same deviations for all.
 """
 
 from __future__ import annotations

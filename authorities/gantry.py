@@ -1,8 +1,8 @@
 """Random H-frames and CoreXY gantries, and elastic modes in 60 digits: tests/authorities/gantry.json.
 
-Each case is a case file's text, solved by Taylor series in 80-bit numbers (B), the same in 64-bit numbers, and DOP853 (A). It is
-kept if all see the same changes and agree to 1e-11 m at the belt and 1e-9 s, if nothing is nearly undecided, and if enough
-sticks and slips. All numbers are chosen: of the H-frame's paper no parameter values were recovered.
+Each case is a case file's text, solved by Taylor series in 80-bit numbers (B), the same in 64-bit numbers, and DOP853
+(A). It is kept if all see the same changes and agree to 1e-11 m at the belt and 1e-9 s, if nothing is nearly undecided,
+and if enough sticks and slips. All numbers are chosen: of the H-frame's paper no parameter values were recovered.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ MACHINES = [
 ]
 
 
-# --- drawing ------------------------------------------------------------------------------------------------------------
+# --- drawing ----------------------------------------------------------------------------------------------------------
 
 
 class Draw:
@@ -150,7 +150,7 @@ def draw(number, seed):
     return name, toml(tables)
 
 
-# --- judging ------------------------------------------------------------------------------------------------------------
+# --- judging ----------------------------------------------------------------------------------------------------------
 
 
 def differences(case, run, other):
@@ -206,7 +206,7 @@ def judge(name, seed, text):
     return record, None
 
 
-# --- elastic modes ------------------------------------------------------------------------------------------------------
+# --- elastic modes ----------------------------------------------------------------------------------------------------
 
 
 def energy(kind, k, r, q):
@@ -287,7 +287,7 @@ def facts():
         print(f"{kind}: force along x and y per N m of left and right, rigid:", [[round(float(v), 9) for v in q[:2]] for q in motions])
 
 
-# --- all of it ----------------------------------------------------------------------------------------------------------
+# --- all of it --------------------------------------------------------------------------------------------------------
 
 
 def main():

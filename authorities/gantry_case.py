@@ -18,7 +18,8 @@ STUCK = 0
 
 @dataclass
 class Run:
-    """Rows (angle and speed of left and right, position and speed of bridge and cart) and events (time, body, from, to)."""
+    """Rows (angle and speed of left and right, position and speed of bridge and cart) and events (time, body, from,
+    to)."""
 
     rows: list
     events: list

@@ -1,7 +1,8 @@
-"""Authority A for gantries: SciPy's DOP853, restarted at every edge, row and change of mode; equations written out in plain numbers.
+"""Authority A for gantries: SciPy's DOP853, restarted at every edge, row and change of mode; equations written out in
+plain numbers.
 
-Forces are the derivatives of the energy V, span by span. Every guard is looked at eight times within each step, on the step's own
-interpolant; an event found there is refined by integrating up to it again, with Newton's rule.
+Forces are the derivatives of the energy V, span by span. Every guard is looked at eight times within each step, on the
+step's own interpolant; an event found there is refined by integrating up to it again, with Newton's rule.
 """
 
 from __future__ import annotations

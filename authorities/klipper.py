@@ -1,4 +1,5 @@
-"""Klipper's calibration of input shapers, written out again with NumPy from the formulae; writes tests/authorities/klipper.json.
+"""Klipper's calibration of input shapers, written out again with NumPy from the formulae; writes
+tests/authorities/klipper.json.
 
 Rule and constants are those of Klipper's `shaper_calibrate.py` and `shaper_defs.py` at commit 034cb673 (2026), whose
 source was read; no line of it is here. Everything is evaluated as matrices over (frequency of the shaper, bin of the

@@ -1,8 +1,9 @@
 """Poles, zeros, gains and responses of 200 random stages: by python-control with SLICOT, and in 60-digit numbers.
 
-The matrices are written here from eq. (1)-(4) and (16)-(18), with what the paper does not have (inductance, rotor, a compliant gear,
-a current loop, belt damping, reduced belts, a Stribeck curve) added by hand; nothing of taut is used. mpmath takes numerators and
-denominators as polynomials; python-control gets the same system in 64-bit numbers, in stretches and balanced, which is what it needs.
+The matrices are written here from eq. (1)-(4) and (16)-(18), with what the paper does not have (inductance, rotor, a
+compliant gear, a current loop, belt damping, reduced belts, a Stribeck curve) added by hand; nothing of taut is used.
+mpmath takes numerators and denominators as polynomials; python-control gets the same system in 64-bit numbers, in
+stretches and balanced, which is what it needs.
 
 Writes ../tests/authorities/linear.json and output/linear.txt.
 """
@@ -242,7 +243,8 @@ def polynomials(a, b, c, d):
 
 
 def roots(coefficients, size):
-    """Roots, those that are zero exactly; leading coefficients that are rounding are dropped. `size` is a typical rate."""
+    """Roots, those that are zero exactly; leading coefficients that are rounding are dropped. `size` is a typical
+    rate."""
     weight = [abs(value) * size ** (len(coefficients) - 1 - k) for k, value in enumerate(coefficients)]
     largest = max(weight)
     if largest == 0:
@@ -260,7 +262,8 @@ def roots(coefficients, size):
 
 
 def respond(system, s, output=0):
-    """C (s I - A)^-1 B + D with LAPACK's LU; SLICOT's TB05AD, which python-control would call, is coarser where the response is small."""
+    """C (s I - A)^-1 B + D with LAPACK's LU; SLICOT's TB05AD, which python-control would call, is coarser where the
+    response is small."""
     return complex((system.C @ np.linalg.solve(s * np.eye(len(system.A)) - system.A, system.B) + system.D)[output, 0])
 
 

@@ -1,13 +1,13 @@
 """The classical experiments with the LuGre law, as cases of a stage: tests/authorities/lugre_experiments.json.
 
-C. Canudas de Wit, H. Olsson, K. J. Åström, P. Lischinsky, "A new model for control of systems with friction", IEEE Transactions
-on Automatic Control 40(3), 1995: presliding displacement, break-away force over force rate, stick-slip. Its parameters, a unit mass:
-σ₀ = 1e5 N/m, σ₁ = √1e5 N s/m, σ₂ = 0.4 N s/m, F_C = 1 N, F_S = 1.5 N, v_s = 0.001 m/s. The paper itself was not to hand: the
-experiments follow their description in a public reconstruction (github.com/auralius/LuGre), the ramps' and holds' lengths are ours,
-and no curve has been compared with a printed one.
+C. Canudas de Wit, H. Olsson, K. J. Åström, P. Lischinsky, "A new model for control of systems with friction", IEEE
+Transactions on Automatic Control 40(3), 1995: presliding displacement, break-away force over force rate, stick-slip.
+Its parameters, a unit mass: σ₀ = 1e5 N/m, σ₁ = √1e5 N s/m, σ₂ = 0.4 N s/m, F_C = 1 N, F_S = 1.5 N, v_s = 0.001 m/s. The
+paper itself was not to hand: the experiments follow their description in a public reconstruction
+(github.com/auralius/LuGre), the ramps' and holds' lengths are ours, and no curve has been compared with a printed one.
 
-Each is solved three times: as a case by elements_taylor.py and elements_dop853.py, and as the bare equations of the mass by
-SciPy's implicit Radau.
+Each is solved three times: as a case by elements_taylor.py and elements_dop853.py, and as the bare equations of the
+mass by SciPy's implicit Radau.
 
     m x'' = u − F,   F = σ₀ z + σ₁ z' + σ₂ x',   z' = x' − σ₀ |x'| z / g(x'),   g(v) = F_C + (F_S − F_C) exp(−(v/v_s)²)
 """
@@ -63,7 +63,8 @@ def law():
 
 
 def pulled_case(until, every):
-    """A unit mass behind a spring whose end moves evenly: the spring is span 1, its end a drive pulley too heavy to be slowed."""
+    """A unit mass behind a spring whose end moves evenly: the spring is span 1, its end a drive pulley too heavy to be
+    slowed."""
     return toml(
         {
             "title": "LuGre: stick-slip of a mass pulled through a spring",

@@ -1,9 +1,11 @@
-"""Peaks of |S| and |T| of 200 random sampled loops on 400,000 frequencies each, whether they are stable, and their gain margins.
+"""Peaks of |S| and |T| of 200 random sampled loops on 400,000 frequencies each, whether they are stable, and their gain
+margins.
 
-The axis is written here from eq. (1)-(4) and (16)-(18); its input is held and late, by scipy's matrix exponential. Controllers are
-written as their difference equations in z (PID, and a cascade of P and PI), with notch and low-pass by Tustin's rule. Stability is that
-of the eigenvalues of the closed loop, put together by python-control (`feedback`), whose responses are compared with the ones used here
-on 300 frequencies of each loop. About each of the tops the grid is refined four times. Nothing of taut is used.
+The axis is written here from eq. (1)-(4) and (16)-(18); its input is held and late, by scipy's matrix exponential.
+Controllers are written as their difference equations in z (PID, and a cascade of P and PI), with notch and low-pass by
+Tustin's rule. Stability is that of the eigenvalues of the closed loop, put together by python-control (`feedback`),
+whose responses are compared with the ones used here on 300 frequencies of each loop. About each of the tops the grid is
+refined four times. Nothing of taut is used.
 
 Writes ../tests/authorities/margins.json and output/margins.txt.
 """

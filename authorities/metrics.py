@@ -1,9 +1,10 @@
 """The key figures of a sweep, each computed here from whole trajectories: `tests/authorities/metrics.json`.
 
-A few machines of a sweep (`SWEEPS`) are run again one by one by `taut simulate`, with their parameters as numbers on its command line and rows `EVERY`
-apart, a fiftieth of the sweep's; what it writes (every quantity at every row, and the events) is looked at with NumPy, by the definitions in
-`FIGURES` and nothing else. Rows miss the top of a peak by at most (ω h)²/8 of what swings, 2e-4 at 2000 rad/s: figures that are peaks of the motion have
-to agree to `PEAK`, times of peaks to `TIME`, all others to the last digits. The program `taut` is taken from target/, or from where TAUT says.
+A few machines of a sweep (`SWEEPS`) are run again one by one by `taut simulate`, with their parameters as numbers on
+its command line and rows `EVERY` apart, a fiftieth of the sweep's; what it writes (every quantity at every row, and the
+events) is looked at with NumPy, by the definitions in `FIGURES` and nothing else. Rows miss the top of a peak by at
+most (ω h)²/8 of what swings, 2e-4 at 2000 rad/s: figures that are peaks of the motion have to agree to `PEAK`, times of
+peaks to `TIME`, all others to the last digits. The program `taut` is taken from target/, or from where TAUT says.
 """
 
 from __future__ import annotations
@@ -77,7 +78,8 @@ class Run:
         return all(value == 0 for value in states + speeds)
 
     def steady(self):
-        """The speed at the end of the last stretch on which the input keeps one value other than zero, no shorter than a fiftieth of the run."""
+        """The speed at the end of the last stretch on which the input keeps one value other than zero, no shorter than
+        a fiftieth of the run."""
         u, t, last = self.input(), self.time_s, np.nan
         edges = [0, *(np.flatnonzero(np.diff(u)) + 1), len(u) - 1]
         for begin, end in zip(edges, edges[1:]):

@@ -176,7 +176,8 @@ PERIOD = 2**20 - 1
 
 
 def prbs_bits(seed, count):
-    """The bits of b_k = b_{k-3} xor b_{k-20}, entered where the seed says (SplitMix64's finaliser, modulo the period)."""
+    """The bits of b_k = b_{k-3} xor b_{k-20}, entered where the seed says (SplitMix64's finaliser, modulo the
+    period)."""
     mask = 2**64 - 1
     z = (seed + 0x9E3779B97F4A7C15) & mask
     z = ((z ^ (z >> 30)) * 0xBF58476D1CE4E5B9) & mask

@@ -1,7 +1,8 @@
 """What a call costs in Python, over the time that the library itself takes for the run.
 
-The run is the 5 V pulse of Table 4, one second with 1001 rows. `run.took` is measured in Rust around solver and key figures; what is left
-of a call is the way there and back: arguments, arrays, the object. The package is the release wheel, installed where this runs.
+The run is the 5 V pulse of Table 4, one second with 1001 rows. `run.took` is measured in Rust around solver and key
+figures; what is left of a call is the way there and back: arguments, arrays, the object. The package is the release
+wheel, installed where this runs.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """200 random stages and inputs, solved by both authorities, written to tests/authorities/random_stages.json.
 
 A case is kept only if it is sure: matrix exponentials in 80-bit numbers, the same in 64-bit numbers, and SciPy's DOP853
-agree on every mode change and, within the limits below, on every time and position, and no decision was a close one. The
-others are listed with the reason and replaced. States are those of the 80-bit run.
+agree on every mode change and, within the limits below, on every time and position, and no decision was a close one.
+The others are listed with the reason and replaced. States are those of the 80-bit run.
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
 """Riccati equations by SciPy, discrete and continuous; some in units that differ by up to ten powers of ten.
 
-Writes tests/authorities/riccati.json. SciPy solves each in its well-scaled form; the ill-scaled one follows by the change of units.
+Writes tests/authorities/riccati.json. SciPy solves each in its well-scaled form; the ill-scaled one follows by the
+change of units.
 """
 
 import json

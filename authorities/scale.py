@@ -1,9 +1,10 @@
 """What many runs cost on Dask, and what ten thousand million of them would take: measured, then worked out.
 
-A machine is Table 4 with every parameter within 20 %; a row is its 5 V and 10 V pulses, one second each, figures from rows 1 ms apart.
-Measured: rows per second of processor time of one thread; two threads and two worker processes of Dask on loopback, in turns, by the
-wall clock and in processor time, which other work on the machine touches less; bytes of a row in memory, on the wire and in
-Parquet; what scheduler and client, and a worker, compute for a task, with tasks that have nothing to do. The package is the release wheel, installed where this runs, with distributed and pyarrow.
+A machine is Table 4 with every parameter within 20 %; a row is its 5 V and 10 V pulses, one second each, figures from
+rows 1 ms apart. Measured: rows per second of processor time of one thread; two threads and two worker processes of Dask
+on loopback, in turns, by the wall clock and in processor time, which other work on the machine touches less; bytes of a
+row in memory, on the wire and in Parquet; what scheduler and client, and a worker, compute for a task, with tasks that
+have nothing to do. The package is the release wheel, installed where this runs, with distributed and pyarrow.
 """
 
 from __future__ import annotations
@@ -81,7 +82,8 @@ def idle(client: Client) -> float:
 
 
 def cost_of_a_task(client: Client) -> tuple[float, float]:
-    """Seconds of processor time of scheduler and client for a task, and of a worker: tasks of no run, handed out as a sweep does."""
+    """Seconds of processor time of scheduler and client for a task, and of a worker: tasks of no run, handed out as a
+    sweep does."""
     case = planned(1000)
     none = pyarrow.table({"run": pyarrow.array([], pyarrow.uint64())})
     client.submit(kernel, case.text, case.path, none, pure=False).result()

@@ -1,8 +1,9 @@
-"""Input shapers, Welch's densities and the modes of stages, by other ways than taut's; writes tests/authorities/shapers.json.
+"""Input shapers, Welch's densities and the modes of stages, by other ways than taut's; writes
+tests/authorities/shapers.json.
 
-Vibration: each shaper's impulses, from its definition as an equation that is solved here, drive an oscillator that SciPy's
-DOP853 integrates. Densities: scipy.signal.welch. Modes: scipy.linalg.eigh of stages written out here, and beside them the
-eigenvalues of the damped system, which show what the rule for light damping leaves out.
+Vibration: each shaper's impulses, from its definition as an equation that is solved here, drive an oscillator that
+SciPy's DOP853 integrates. Densities: scipy.signal.welch. Modes: scipy.linalg.eigh of stages written out here, and
+beside them the eigenvalues of the damped system, which show what the rule for light damping leaves out.
 """
 
 from __future__ import annotations

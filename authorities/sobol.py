@@ -1,6 +1,8 @@
-"""Points of the Sobol' sequence by SciPy, which has Joe and Kuo's direction numbers from their own table: `tests/authorities/sobol.json`.
+"""Points of the Sobol' sequence by SciPy, which has Joe and Kuo's direction numbers from their own table:
+`tests/authorities/sobol.json`.
 
-64 dimensions, unscrambled: points 0 to 31, and some far ones. A coordinate is a multiple of 2^-32, and written as that whole number.
+64 dimensions, unscrambled: points 0 to 31, and some far ones. A coordinate is a multiple of 2^-32, and written as that
+whole number.
 """
 
 from __future__ import annotations

@@ -1,14 +1,15 @@
 """The same work by several solvers, side by side: SciPy, SUNDIALS CVODE in C, and taut, exact and general.
 
-Five problems, each of 1 s with 1000 output samples, stick and slip by events: the paper's machine (Table 4 friction with the rest of
-Table 2, 5 V for 0.25 s); the same with a Stribeck curve on top of each Coulomb friction, F_s = 0.3 F_c and v_s = 0.05 m/s at the
-belt; with bristles (LuGre) under the cart, sigma0 = 1e4 and 1e7 N/m, sigma1 = 60 N s/m, F_s = 0.3 F_c, v_s = 0.01 m/s; with spans 1
-and 2 that follow the cart. Each solver has the loosest tolerance, on a ladder of half decades, whose positions keep a stated error
-against authority B (`elements_taylor.py`). The solvers take turns, round after round, so that what else the computer does falls on
-all of them alike; a time is that of the best run, of SciPy and CVODE in processor seconds.
+Five problems, each of 1 s with 1000 output samples, stick and slip by events: the paper's machine (Table 4 friction
+with the rest of Table 2, 5 V for 0.25 s); the same with a Stribeck curve on top of each Coulomb friction, F_s = 0.3 F_c
+and v_s = 0.05 m/s at the belt; with bristles (LuGre) under the cart, sigma0 = 1e4 and 1e7 N/m, sigma1 = 60 N s/m, F_s =
+0.3 F_c, v_s = 0.01 m/s; with spans 1 and 2 that follow the cart. Each solver has the loosest tolerance, on a ladder of
+half decades, whose positions keep a stated error against authority B (`elements_taylor.py`). The solvers take turns,
+round after round, so that what else the computer does falls on all of them alike; a time is that of the best run, of
+SciPy and CVODE in processor seconds.
 
-`python speed.py [--update] [PROBLEM ...]` prints the tables; with `--update` it writes them into output/speed.txt, too, and a summary into
-docs/general-solver.md.
+`python speed.py [--update] [PROBLEM ...]` prints the tables; with `--update` it writes them into output/speed.txt, too,
+and a summary into docs/general-solver.md.
 """
 
 from __future__ import annotations
@@ -437,7 +438,8 @@ def milliseconds(seconds):
 
 
 def summary(tables, target=1e-9):
-    """Milliseconds a run of each solver on each problem where the error at every row is at most `target`, as Markdown."""
+    """Milliseconds a run of each solver on each problem where the error at every row is at most `target`, as
+    Markdown."""
     names = [name for name, *_ in tables[-1][1] if name != "taut exact"]
     lines = ["| solver | " + " | ".join(problem.name for problem, _ in tables) + " |", "|---" * (len(tables) + 1) + "|"]
     for name in ["taut exact", *dict.fromkeys(names)]:

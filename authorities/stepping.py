@@ -1,8 +1,8 @@
 """A third opinion on the random stages: plain time stepping that shares no code with the two authorities.
 
 Semi-implicit Euler with tiny steps, the stage and its friction written out again from the equations, the gear decided
-anew at every step. It has no events and no matrices, and is good only to its step: what it shows is that its distance from the
-authorities falls in proportion to the step, that is, that they solve the same model.
+anew at every step. It has no events and no matrices, and is good only to its step: what it shows is that its distance
+from the authorities falls in proportion to the step, that is, that they solve the same model.
 """
 
 from __future__ import annotations

@@ -1,24 +1,29 @@
 """Simulations a second, side by side in one run: many machines, each its own parameters, metrics out.
 
-The problem of `taut sweep`: the paper's machine (Table 4 with the rest of Table 2), all parameters by +-20 %, pulses of 5 V and 10 V for 0.25 s,
-1 s each with a row every millisecond; out come where the cart ends, its peak speed and the peak force in span 1. All on all processors.
+The problem of `taut sweep`: the paper's machine (Table 4 with the rest of Table 2), all parameters by +-20 %, pulses of
+5 V and 10 V for 0.25 s, 1 s each with a row every millisecond; out come where the cart ends, its peak speed and the
+peak force in span 1. All on all processors.
 
-- taut: `examples/sweep.rs` on as many threads as there are processors, all 24 figures of a sweep, and three of them (`--figures`).
-- C in lanes (lanes.c): the same plain Runge-Kutta of fourth order as under Numba, written by hand for vectors: eight machines in the lanes of
-  AVX-512, or four in those of AVX2, ways along the belt, a batch ends when all of its machines rest; one process for each processor. It knows this
-  one axis with this one law of friction, has no events, takes the three figures from rows and nothing else, and its error is that of its step.
+- taut: `examples/sweep.rs` on as many threads as there are processors, all 24 figures of a sweep, and three of them
+  (`--figures`).
+- C in lanes (lanes.c): the same plain Runge-Kutta of fourth order as under Numba, written by hand for vectors: eight
+  machines in the lanes of AVX-512, or four in those of AVX2, ways along the belt, a batch ends when all of its machines
+  rest; one process for each processor. It knows this one axis with this one law of friction, has no events, takes the
+  three figures from rows and nothing else, and its error is that of its step.
 - SciPy: `solve_ivp` with events (speed.py's own loop), multiprocessing.
-- CVODE in C (cvode.c) with root finding, one process for each processor, each the nominal machine at 5 V again and again: its parameters are
-  constants of the program.
-- Numba: a plain fixed-step Runge-Kutta of fourth order, compiled, with friction in the plainest way that sticks: a body at zero speed whose load
-  is within its Coulomb friction stays there, and a step that turns a speed round ends at zero. Its step is halved until the error is that stated.
-- MuJoCo: three sliding masses with friction loss, spans as tendons, its `rollout` on as many threads as there are processors.
-- diffrax: Tsit5 with steps of its own, batches of 128 machines at once (`vmap`), dry friction smoothed, as stick and slip of each machine have events
-  of their own.
+- CVODE in C (cvode.c) with root finding, one process for each processor, each the nominal machine at 5 V again and
+  again: its parameters are constants of the program.
+- Numba: a plain fixed-step Runge-Kutta of fourth order, compiled, with friction in the plainest way that sticks: a body
+  at zero speed whose load is within its Coulomb friction stays there, and a step that turns a speed round ends at zero.
+  Its step is halved until the error is that stated.
+- MuJoCo: three sliding masses with friction loss, spans as tendons, its `rollout` on as many threads as there are
+  processors.
+- diffrax: Tsit5 with steps of its own, batches of 128 machines at once (`vmap`), dry friction smoothed, as stick and
+  slip of each machine have events of their own.
 
-The error is the largest distance of drive pulley, cart and idler positions at any row from those of authority B, for the nominal machine at
-5 V; taut's own is in speed.py's output. SciPy and CVODE have the loosest tolerance whose error is below 1e-6 m. Rates are those of
-wall time, a few seconds each, and vary with what else the computer does.
+The error is the largest distance of drive pulley, cart and idler positions at any row from those of authority B, for
+the nominal machine at 5 V; taut's own is in speed.py's output. SciPy and CVODE have the loosest tolerance whose error
+is below 1e-6 m. Rates are those of wall time, a few seconds each, and vary with what else the computer does.
 """
 
 from __future__ import annotations
@@ -177,7 +182,8 @@ def by_lanes(truth, folder):
 
 
 def in_turns(truth):
-    """Taut with all figures and with three, and C in lanes: one after another, again and again; the middle of each one's rates."""
+    """Taut with all figures and with three, and C in lanes: one after another, again and again; the middle of each
+    one's rates."""
     with tempfile.TemporaryDirectory() as folder:
         lanes = by_lanes(truth, folder)
         works = [("taut sweep, 24 figures", None, by_taut), ("taut sweep, 3 figures", None, lambda seconds: by_taut(FIGURES, seconds=seconds))]
@@ -385,7 +391,8 @@ except ImportError:
 
 
 def by_diffrax(truth):
-    """Batches of machines at once (vmap), Tsit5 with steps of its own; dry friction as F_c tanh(v/v0), which never sticks."""
+    """Batches of machines at once (vmap), Tsit5 with steps of its own; dry friction as F_c tanh(v/v0), which never
+    sticks."""
     if diffrax is None:
         return []
     np_, times = jax.numpy, jax.numpy.linspace(0.0, 1.0, 1001)

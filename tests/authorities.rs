@@ -5,11 +5,11 @@
 //! Positions within 1e-9 m and rad, speeds within 1e-7 m/s and 1e-5 rad/s, event times within 1e-9 s, or four times the
 //! authority's own uncertainty where that is more; the same modes in the same order.
 
+use crate::common;
 use serde_json::Value;
 use taut::case::Experiment;
 use taut::friction::{Friction, Side};
 use taut::machine::{Amplifier, AmplifierMode, Belt, DriveUnit, Kind, Machine, Motor, Pulley, Slide};
-use taut::mechanism::State;
 use taut::signal::Signal;
 use taut::solve::{Ending, Solver, simulate};
 
@@ -109,14 +109,9 @@ fn compare(text: &str) -> usize {
     let (mut worst, mut events, mut faults) = ([0.0_f64; 5], 0, Vec::new());
     for case in cases {
         let name = case["name"].as_str().unwrap();
-        let experiment = Experiment {
-            name: name.into(),
-            inputs: vec![input(&case["input"])],
-            until: number(case, "until"),
-            every: number(case, "every"),
-            initial: State::default(),
-            log: None,
-        };
+        let until = number(case, "until");
+        let experiment =
+            Experiment { every: number(case, "every"), ..common::experiment(input(&case["input"]), until) };
         let solution = simulate(&machine(&case["stage"]), &experiment, Solver::Exact).unwrap();
         if solution.outcome.ending != Ending::Complete {
             faults.push(format!("{name}: ended with {:?}", solution.outcome.ending));

@@ -1,34 +1,13 @@
 //! Gantries against independent solvers (`authorities/gantry.py`), and laws that hold for any of them.
 
+use crate::common;
 use serde_json::Value;
 use taut::case::Case;
 use taut::linear::{Analysis, Natural, Question, Root};
 use taut::machine::Kind;
 use taut::metrics::{Meter, Metrics, Peak};
-use taut::solve::{Course, Detail, Ending, ErrorEstimate, Event, Flow, Solver, stream_mechanism};
+use taut::solve::{Course, Detail, ErrorEstimate, Event, Flow, Solver, stream_mechanism};
 use taut::trajectory::Trajectory;
-
-/// The result of the first experiment of a case.
-struct Run {
-    rows: Trajectory,
-    events: Vec<Event>,
-}
-
-fn run(case: &Case, solver: Solver) -> Run {
-    let mechanism = case.machine.mechanism();
-    let mut rows = Trajectory::default();
-    let sink = &mut |block: &Trajectory| {
-        if rows.is_empty() {
-            rows = Trajectory::with_capacity(&block.columns, 1024);
-        }
-        rows.append(block);
-        Flow::Continue
-    };
-    let course = Course::of(&mechanism, &case.experiments[0]);
-    let outcome = stream_mechanism(&mechanism, &course, solver, (Detail::Full, None), sink).unwrap();
-    assert_eq!(outcome.ending, Ending::Complete);
-    Run { rows, events: outcome.events }
-}
 
 fn cases() -> Value {
     serde_json::from_str(include_str!("authorities/gantry.json")).unwrap()
@@ -50,13 +29,13 @@ fn compare(solver: Solver, (length, speed, time): (f64, f64, f64)) {
     for told_case in cases {
         let name = told_case["name"].as_str().unwrap();
         let case = Case::from_text_with("gantry.toml", told_case["case"].as_str().unwrap(), &[]).unwrap();
-        let run = run(&case, solver);
+        let run = common::complete(&case, solver);
         let r = case.machine.pulley_radius;
         let doubt = |key: &str| 4.0 * told_case["methods_differ_by"][key].as_f64().unwrap();
         for (row, want) in told_case["rows"].as_array().unwrap().iter().zip(told_case["states"].as_array().unwrap()) {
             let row = row.as_u64().unwrap() as usize;
             for (column, want) in columns.iter().zip(want.as_array().unwrap()).skip(1) {
-                let have = run.rows.get(column).unwrap()[row];
+                let have = run.trajectory.get(column).unwrap()[row];
                 let lever = if column.starts_with("left") || column.starts_with("right") { r } else { 1.0 };
                 let off = lever * (have - want.as_f64().unwrap()).abs();
                 let (index, limit, key) = match column.ends_with("speed") {
@@ -69,7 +48,7 @@ fn compare(solver: Solver, (length, speed, time): (f64, f64, f64)) {
                 }
             }
         }
-        let (have, want) = (told(&run.events), told_case["events"].as_array().unwrap());
+        let (have, want) = (told(&run.outcome.events), told_case["events"].as_array().unwrap());
         if have.len() != want.len() {
             faults.push(format!("{name}: {} events instead of {}", have.len(), want.len()));
             continue;
@@ -339,7 +318,7 @@ fn a_swing_of_a_gantry_dies_out_with_its_damping_ratio() {
     for (body, shape) in last.shape.iter().enumerate() {
         case.experiments[0].initial.position[body] = 1e-4 * shape / if body < 2 { r } else { 1.0 };
     }
-    let rows = run(&case, Solver::Exact).rows;
+    let rows = common::complete(&case, Solver::Exact).trajectory;
     let energy = |row: usize| {
         let at = |name: &str| rows.get(name).unwrap()[row];
         let [x, y] = place(&case, [at("left_angle"), at("right_angle")]);

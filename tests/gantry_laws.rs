@@ -8,39 +8,7 @@ use taut::linear::{Natural, Operation, Root, System};
 use taut::machine::{Belt, DriveUnit, Kind, Machine, Pulley, Slide, Spans};
 use taut::mechanism::{Amplifier, AmplifierMode, Motor, State};
 use taut::signal::Signal;
-use taut::solve::{Course, Detail, Ending, Event, Flow, Solver, stream_mechanism};
-use taut::trajectory::Trajectory;
-
-/// The result of the first experiment of a case.
-struct Run {
-    rows: Trajectory,
-    events: Vec<Event>,
-}
-
-fn course(experiment: &Experiment) -> Course {
-    Course {
-        inputs: experiment.inputs.to_vec(),
-        start: experiment.initial,
-        until: experiment.until,
-        every: experiment.every,
-    }
-}
-
-fn run(case: &Case, solver: Solver) -> Run {
-    let mechanism = case.machine.mechanism();
-    let mut rows = Trajectory::default();
-    let sink = &mut |block: &Trajectory| {
-        if rows.is_empty() {
-            rows = Trajectory::with_capacity(&block.columns, 1024);
-        }
-        rows.append(block);
-        Flow::Continue
-    };
-    let course = course(&case.experiments[0]);
-    let outcome = stream_mechanism(&mechanism, &course, solver, (Detail::Full, None), sink).unwrap();
-    assert_eq!(outcome.ending, Ending::Complete);
-    Run { rows, events: outcome.events }
-}
+use taut::solve::{Ending, Solution, Solver, simulate};
 
 /// A motor without gear play, and its amplifier.
 fn motor() -> impl Strategy<Value = Motor> {
@@ -111,24 +79,21 @@ fn inputs() -> impl Strategy<Value = [Signal; 2]> {
     (pulse(), pulse()).prop_map(|(left, right)| [left, right])
 }
 
-fn follow(gantry: &Machine, inputs: &[Signal; 2]) -> Run {
-    let mechanism = gantry.mechanism();
+fn follow(gantry: &Machine, inputs: &[Signal; 2]) -> Solution {
     // A third drive, which moves the cart alone, gets half of the second one's input.
     let third = || {
         let Signal::Pulse { value, duration, at } = inputs[1] else { unreachable!("only pulses are drawn") };
         Signal::Pulse { value: 0.5 * value, duration, at }
     };
     let inputs = inputs.iter().cloned().chain([third()]).take(gantry.drives.len()).collect();
-    let course = Course { inputs, start: State::default(), until: 0.15, every: 1e-3 };
-    let mut rows = Trajectory::default();
-    let sink = &mut |block: &Trajectory| {
-        rows.columns.is_empty().then(|| rows = Trajectory::with_capacity(&block.columns, 256));
-        rows.append(block);
-        Flow::Continue
-    };
-    let outcome = stream_mechanism(&mechanism, &course, Solver::Exact, (Detail::Full, None), sink).unwrap();
-    assert_eq!(outcome.ending, Ending::Complete);
-    Run { rows, events: outcome.events }
+    let solution = simulate(gantry, &experiment(inputs, 0.15), Solver::Exact).unwrap();
+    assert_eq!(solution.outcome.ending, Ending::Complete);
+    solution
+}
+
+/// From rest, with a row every millisecond.
+fn experiment(inputs: Vec<Signal>, until: f64) -> Experiment {
+    Experiment { inputs, ..common::experiment(Signal::Step { value: 0.0, at: 0.0 }, until) }
 }
 
 fn negative(signal: &Signal) -> Signal {
@@ -137,8 +102,8 @@ fn negative(signal: &Signal) -> Signal {
 }
 
 /// Every value of a column of one run is `factor` times that of a column of the other.
-fn proportional(a: (&Run, &str), b: (&Run, &str), factor: f64, tolerance: f64) -> Result<(), TestCaseError> {
-    let (a, b) = (a.0.rows.get(a.1).unwrap(), b.0.rows.get(b.1).unwrap());
+fn proportional(a: (&Solution, &str), b: (&Solution, &str), factor: f64, tolerance: f64) -> Result<(), TestCaseError> {
+    let (a, b) = (a.0.trajectory.get(a.1).unwrap(), b.0.trajectory.get(b.1).unwrap());
     prop_assert_eq!(a.len(), b.len());
     for (row, (a, b)) in a.iter().zip(b).enumerate() {
         prop_assert!((a - factor * b).abs() <= tolerance, "row {row}: {a} and {b}");
@@ -217,12 +182,8 @@ proptest! {
         let y = &system.c * x.column(0) + &system.d * &u;
         let mechanism = gantry.mechanism();
         let inputs = volts.iter().map(|value| Signal::Step { value: *value, at: 0.0 }).collect();
-        let course = Course { inputs, start: State::default(), until, every: until / 200.0 };
-        let mut rows = Trajectory::default();
-        let outcome = stream_mechanism(&mechanism, &course, Solver::Exact, (Detail::Full, None), &mut |block| {
-            rows.append(block);
-            Flow::Continue
-        }).unwrap();
+        let experiment = Experiment { every: until / 200.0, ..experiment(inputs, until) };
+        let Solution { trajectory: rows, outcome } = simulate(&gantry, &experiment, Solver::Exact).unwrap();
         prop_assert_eq!(outcome.ending, Ending::Complete);
         for (output, y) in system.outputs.iter().zip(y.iter()) {
             let column = rows.get(&output.name).unwrap_or_else(|| panic!("no column {}", output.name));
@@ -249,7 +210,7 @@ proptest! {
         for column in ["left_angle", "right_angle", "bridge_position", "cart_position", "cart_speed"] {
             proportional((&there, column), (&back, column), -1.0, 0.0)?;
         }
-        prop_assert_eq!(there.events.len(), back.events.len());
+        prop_assert_eq!(there.outcome.events.len(), back.outcome.events.len());
     }
 
     /// Left and right are each other's mirror: with springs and inputs exchanged, y turns around and x does not.
@@ -318,7 +279,7 @@ proptest! {
         for column in ["bridge_position", "cart_position"] {
             proportional((&a, column), (&b, column), 1.0, 1e-11)?;
         }
-        prop_assert_eq!(a.events.len(), b.events.len());
+        prop_assert_eq!(a.outcome.events.len(), b.outcome.events.len());
     }
 
     /// x and y of an H-frame are coupled through k_l − k_r alone, where nothing sticks.
@@ -334,7 +295,7 @@ proptest! {
         let step = |value: f64| Signal::Pulse { value, duration: 0.1, at: 0.0 };
         let across = follow(&gantry, &[step(-volts), step(volts)]);
         proportional((&across, "cart_position"), (&across, "cart_position"), 0.0, 1e-12)?;
-        prop_assert!(across.rows.get("bridge_position").unwrap().last().unwrap().abs() > 1e-4);
+        prop_assert!(across.trajectory.get("bridge_position").unwrap().last().unwrap().abs() > 1e-4);
         let along = follow(&gantry, &[step(-volts), step(-volts)]);
         proportional((&along, "bridge_position"), (&along, "bridge_position"), 0.0, 1e-12)?;
     }
@@ -361,17 +322,17 @@ fn spans_that_follow_the_cart_are_as_stiff_as_they_are_long() {
     let make = "modulus = \"8 GPa\", section = \"6 mm^2\", spans = [0.5, 0.6, 1.3]";
     let (fixed, follows) = (read(make), read(&format!("{make}, follows_cart = true")));
     assert!(fixed.machine.mechanism().is_piecewise_linear() && !follows.machine.mechanism().is_piecewise_linear());
-    let (exact, general) = (run(&fixed, Solver::Exact), run(&fixed, Solver::GENERAL));
-    let apart = |a: &Run, b: &Run, column: &str| {
-        let pairs = a.rows.get(column).unwrap().iter().zip(b.rows.get(column).unwrap());
+    let (exact, general) = (common::complete(&fixed, Solver::Exact), common::complete(&fixed, Solver::GENERAL));
+    let apart = |a: &Solution, b: &Solution, column: &str| {
+        let pairs = a.trajectory.get(column).unwrap().iter().zip(b.trajectory.get(column).unwrap());
         pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
     };
     assert!(apart(&exact, &general, "cart_position") < 1e-9);
-    let following = run(&follows, Solver::GENERAL);
+    let following = common::complete(&follows, Solver::GENERAL);
     assert!(apart(&exact, &following, "cart_position") > 1e-7);
     // k = E A / l, with l_left + x + y: the force per stretch in every row.
-    let [x, y, phi, force] =
-        ["bridge_position", "cart_position", "left_angle", "left_span_force"].map(|c| following.rows.get(c).unwrap());
+    let [x, y, phi, force] = ["bridge_position", "cart_position", "left_angle", "left_span_force"]
+        .map(|c| following.trajectory.get(c).unwrap());
     for row in (0..x.len()).step_by(10) {
         let stiffness = 8e9 * 6e-6 / (0.5 + x[row] + y[row]);
         let stretch = 0.01 * phi[row] + x[row] + y[row];

@@ -12,14 +12,7 @@ use taut::signal::Signal;
 use taut::solve::{Dynamics, Ending, Solution, Solver, simulate};
 
 fn experiment(input: &Signal, until: f64, every: f64) -> Experiment {
-    Experiment {
-        name: "general".into(),
-        inputs: vec![input.clone()],
-        until,
-        every,
-        initial: State::default(),
-        log: None,
-    }
+    Experiment { every, ..common::experiment(input.clone(), until) }
 }
 
 fn run(machine: &Machine, experiment: &Experiment, solver: Solver) -> Solution {

@@ -3,11 +3,10 @@
 use crate::common;
 use common::random::{self, Dry};
 use proptest::prelude::*;
-use taut::case::{Case, Experiment};
+use taut::case::Case;
 use taut::friction::Motion;
 use taut::machine::axis::{CART, DRIVE};
 use taut::machine::{AmplifierMode, BeltModel, Machine};
-use taut::mechanism::State;
 use taut::signal::Signal;
 use taut::solve::{Ending, Event, Solution, Solver, simulate};
 
@@ -45,14 +44,7 @@ fn clipped(changes: &[&str]) -> Case {
 }
 
 fn run(machine: &Machine, input: &Signal, until: f64, solver: Solver) -> Solution {
-    let experiment = Experiment {
-        name: "instant".into(),
-        inputs: vec![input.clone()],
-        until,
-        every: 1e-3,
-        initial: State::default(),
-        log: None,
-    };
+    let experiment = common::experiment(input.clone(), until);
     simulate(machine, &experiment, solver).unwrap()
 }
 

@@ -15,14 +15,7 @@ use taut::trajectory::Trajectory;
 const STATES: [&str; 6] = ["drive_angle", "drive_speed", "cart_position", "cart_speed", "idler_angle", "idler_speed"];
 
 fn run(machine: &Machine, input: &Signal, until: f64, every: f64) -> Solution {
-    let experiment = Experiment {
-        name: "law".into(),
-        inputs: vec![input.clone()],
-        until,
-        every,
-        initial: State::default(),
-        log: None,
-    };
+    let experiment = Experiment { every, ..common::experiment(input.clone(), until) };
     let solution = simulate(machine, &experiment, Solver::Exact).unwrap();
     assert_eq!(solution.outcome.ending, Ending::Complete);
     solution

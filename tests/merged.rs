@@ -13,7 +13,6 @@ use taut::case::{Case, Experiment};
 use taut::friction::{Friction, Law, Shape, Side};
 use taut::linear::{Operation, StateSpace};
 use taut::machine::{BeltModel, Machine};
-use taut::mechanism::State;
 use taut::polyline::Polyline;
 use taut::signal::Signal;
 use taut::solve::{Ending, Solution, Solver, simulate};
@@ -49,14 +48,7 @@ fn axis() -> Machine {
 }
 
 fn run(machine: &Machine, input: &Signal, until: f64, tolerance: f64) -> Solution {
-    let experiment = Experiment {
-        name: "merged".into(),
-        inputs: vec![input.clone()],
-        until,
-        every: 1e-3,
-        initial: State::default(),
-        log: None,
-    };
+    let experiment = common::experiment(input.clone(), until);
     let solution =
         simulate(machine, &experiment, Solver::General { tolerance }).unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(solution.outcome.ending, Ending::Complete);
@@ -423,14 +415,7 @@ proptest! {
         let mut machine = machine;
         machine.belt.model = BeltModel::Rigid;
         machine.drives[0].motor.gear_efficiency = 1.0;
-        let experiment = Experiment {
-            name: "power".into(),
-            inputs: vec![input.clone()],
-            until: 0.08,
-            every: 2e-6,
-            initial: State::default(),
-            log: None,
-        };
+        let experiment = Experiment { every: 2e-6, ..common::experiment(input.clone(), 0.08) };
         let solution = simulate(&machine, &experiment, Solver::General { tolerance: 1e-10 }).unwrap();
         let [current, speed, friction] = ["motor_current", "cart_speed", "cart_friction"].map(|name| column(&solution, name));
         let (r, motor) = (machine.pulley_radius, &machine.drives[0].motor);
@@ -493,14 +478,7 @@ fn a_flat_curve_is_coulomb_friction() {
         machine.drive_pulley.friction = Friction::symmetric(1e-4, 0.4 * r);
         machine.cart.friction = Friction::symmetric(3.0, 0.5);
         machine.idler_pulley.friction = Friction::symmetric(0.0, 0.3 * r);
-        let experiment = Experiment {
-            name: "flat".into(),
-            inputs: vec![input.clone()],
-            until: 0.2,
-            every: 1e-3,
-            initial: State::default(),
-            log: None,
-        };
+        let experiment = common::experiment(input.clone(), 0.2);
         let exact = simulate(&machine, &experiment, Solver::Exact).unwrap();
         machine.idler_pulley.friction.law = Law::Stribeck { velocity: 1.0, shape: Shape::Gaussian };
         let general = run(&machine, &input, 0.2, 1e-11);

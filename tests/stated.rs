@@ -83,14 +83,7 @@ fn curved() -> impl Strategy<Value = Machine> {
 
 /// A run, and the accuracy that it states.
 fn run(stage: &Machine, input: &Signal, (until, every): (f64, f64), solver: Solver) -> (Solution, PositionError) {
-    let experiment = Experiment {
-        name: "run".into(),
-        inputs: vec![input.clone()],
-        until,
-        every,
-        initial: taut::mechanism::State::default(),
-        log: None,
-    };
+    let experiment = Experiment { every, ..common::experiment(input.clone(), until) };
     let solution = simulate(stage, &experiment, solver).unwrap();
     let Solver::General { tolerance } = solver else {
         let error = solution.outcome.error.unwrap();

@@ -4,7 +4,7 @@ use crate::common;
 use common::random::{self, Dry};
 use proptest::prelude::*;
 
-use taut::case::{Case, Experiment};
+use taut::case::Case;
 use taut::machine::Machine;
 use taut::mechanism::{Mechanism, State};
 use taut::signal::Signal;
@@ -15,14 +15,7 @@ const UNTIL: f64 = 0.2;
 
 /// The last row of one run, by the names of its columns, and its events.
 fn in_one_go(stage: &Machine, input: &Signal, solver: Solver) -> (Vec<(String, f64)>, Vec<Event>) {
-    let experiment = Experiment {
-        name: "all".into(),
-        inputs: vec![input.clone()],
-        until: UNTIL,
-        every: 1e-3,
-        initial: State::default(),
-        log: None,
-    };
+    let experiment = common::experiment(input.clone(), UNTIL);
     let solution = simulate(stage, &experiment, solver).unwrap();
     let last = |column: &taut::trajectory::Column| (column.name.clone(), *column.values.last().unwrap());
     (solution.trajectory.columns.iter().map(last).collect(), solution.outcome.events)

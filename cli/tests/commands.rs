@@ -1,56 +1,38 @@
 //! The commands as a user types them.
 
-use assert_cmd::Command;
+use crate::common::{names, stage, taut_in, text};
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
-fn taut(folder: &Path) -> Command {
-    let mut command = Command::cargo_bin("taut").unwrap();
-    command.current_dir(folder);
-    command
-}
-
 fn table4() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../stages/sollmann-jouaneh/table4.toml")
-}
-
-fn text(bytes: &[u8]) -> &str {
-    std::str::from_utf8(bytes).unwrap()
+    stage("sollmann-jouaneh/table4.toml")
 }
 
 fn json(path: &Path) -> Value {
     serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap()
 }
 
-/// Names of everything in a folder, sorted.
-fn names(folder: &Path) -> Vec<String> {
-    let mut names: Vec<String> =
-        fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
-    names.sort();
-    names
-}
-
 /// The two pulses of Table 4, simulated into a fresh folder.
 fn simulated(more: &[&str]) -> TempDir {
     let folder = TempDir::new().unwrap();
-    taut(folder.path()).arg("simulate").arg(table4()).args(["--out", "out"]).args(more).assert().success();
+    taut_in(folder.path()).arg("simulate").arg(table4()).args(["--out", "out"]).args(more).assert().success();
     folder
 }
 
 #[test]
 fn init_then_simulate() {
     let folder = TempDir::new().unwrap();
-    let first = taut(folder.path()).args(["init", "axis.toml"]).assert().success();
+    let first = taut_in(folder.path()).args(["init", "axis.toml"]).assert().success();
     assert_eq!(text(&first.get_output().stdout), "wrote axis.toml\nnext: taut simulate axis.toml --out results\n");
-    let again = taut(folder.path()).args(["init", "axis.toml"]).assert().code(2);
+    let again = taut_in(folder.path()).args(["init", "axis.toml"]).assert().code(2);
     assert_eq!(
         text(&again.get_output().stderr),
         "error: axis.toml: this file exists already, and nothing was written\n  next: choose another name, or replace it with --force\n"
     );
-    taut(folder.path()).args(["init", "axis.toml", "--force"]).assert().success();
-    let run = taut(folder.path()).args(["simulate", "axis.toml", "--out", "results"]).assert().success();
+    taut_in(folder.path()).args(["init", "axis.toml", "--force"]).assert().success();
+    let run = taut_in(folder.path()).args(["simulate", "axis.toml", "--out", "results"]).assert().success();
     let out = text(&run.get_output().stdout);
     for word in
         ["My axis", "final position", "steady speed", "peak stretch", "stop time", "events", "cost", "report.html"]
@@ -143,8 +125,8 @@ fn the_table_reads_back_to_the_bits_that_were_computed() {
 fn the_written_case_repeats_the_run() {
     let folder = TempDir::new().unwrap();
     let first = ["--set", "cart.mass=0.5 kg", "--set", "experiment.0.until=0.3 s", "--no-report", "--out", "one"];
-    taut(folder.path()).arg("simulate").arg(table4()).args(first).assert().success();
-    taut(folder.path()).args(["simulate", "one/case.toml", "--no-report", "--out", "two"]).assert().success();
+    taut_in(folder.path()).arg("simulate").arg(table4()).args(first).assert().success();
+    taut_in(folder.path()).args(["simulate", "one/case.toml", "--no-report", "--out", "two"]).assert().success();
     for name in names(&folder.path().join("one")) {
         let read = |run: &str| fs::read(folder.path().join(run).join(&name)).unwrap();
         assert!(read("one") == read("two"), "{name} differs");
@@ -165,9 +147,9 @@ fn the_written_case_brings_its_input_files_along() {
     let case =
         case.replace("{ pulse = \"5 V\", for = \"0.25 s\" }", "{ file = \"../u.csv\", time = \"t\", column = \"u\" }");
     fs::write(here.join("machine/axis.toml"), case).unwrap();
-    taut(here).args(["simulate", "machine/axis.toml", "--no-report", "--out", "results/one"]).assert().success();
+    taut_in(here).args(["simulate", "machine/axis.toml", "--no-report", "--out", "results/one"]).assert().success();
     fs::remove_file(here.join("u.csv")).unwrap();
-    taut(here).args(["simulate", "results/one/case.toml", "--no-report", "--out", "two"]).assert().success();
+    taut_in(here).args(["simulate", "results/one/case.toml", "--no-report", "--out", "two"]).assert().success();
     let read = |run: &str| fs::read(here.join(run).join("5-v-pulse.csv")).unwrap();
     assert!(read("results/one") == read("two"));
 }
@@ -177,10 +159,10 @@ fn the_written_case_brings_its_input_files_along() {
 fn a_run_as_measured() {
     let folder = TempDir::new().unwrap();
     let here = folder.path();
-    taut(here).args(["init", "axis.toml"]).assert().success();
+    taut_in(here).args(["init", "axis.toml"]).assert().success();
     let noisy = "measurement.motor_current={ step = \"10 mA\", noise = \"20 mA\" }";
     let args = ["simulate", "axis.toml", "--experiment", "5 V pulse", "--set", noisy, "--as-measured", "--out", "out"];
-    taut(here).args(args).args(["--set", "measurement.delay=2ms"]).assert().success();
+    taut_in(here).args(args).args(["--set", "measurement.delay=2ms"]).assert().success();
     let out = here.join("out");
     assert!(names(&out).contains(&"5-v-pulse.measured.csv".to_string()));
     assert_eq!(json(&out.join("summary.json"))["experiments"][0]["files"][2], "5-v-pulse.measured.csv");
@@ -201,7 +183,7 @@ fn a_run_as_measured() {
     let input =
         "experiment.0.input={ file = \"out/5-v-pulse.measured.csv\", time = \"time_s\", column = \"voltage_V\" }";
     let again = ["simulate", "axis.toml", "--experiment", "5 V pulse", "--set", input, "--no-report", "--out", "two"];
-    taut(here).args(again).assert().success();
+    taut_in(here).args(again).assert().success();
     let cart = |run: &str| {
         let file = here.join(run).join("5-v-pulse.csv");
         taut::log::read_columns(&file, &["cart_position_m"]).unwrap().remove(0)
@@ -216,8 +198,8 @@ fn a_run_as_measured() {
 fn the_machine_moves_in_a_report() {
     let folder = TempDir::new().unwrap();
     let report = |case: &str, more: &[&str]| {
-        let case = Path::new(env!("CARGO_MANIFEST_DIR")).join("../stages").join(case);
-        taut(folder.path()).arg("simulate").arg(case).args(["--out", "out"]).args(more).assert().success();
+        let case = stage(case);
+        taut_in(folder.path()).arg("simulate").arg(case).args(["--out", "out"]).args(more).assert().success();
         fs::read_to_string(folder.path().join("out/report.html")).unwrap()
     };
     let machines = |html: &str| -> Vec<serde_json::Value> {
@@ -261,19 +243,19 @@ fn the_machine_moves_in_a_report() {
 fn a_run_beside_its_log() {
     let folder = TempDir::new().unwrap();
     let here = folder.path();
-    taut(here).args(["init", "axis.toml"]).assert().success();
+    taut_in(here).args(["init", "axis.toml"]).assert().success();
     let measured =
         ["simulate", "axis.toml", "--experiment", "5 V pulse", "--as-measured", "--no-report", "--out", "made"];
-    taut(here).args(measured).assert().success();
+    taut_in(here).args(measured).assert().success();
     let log = "experiment.0.log={ file = \"made/5-v-pulse.measured.csv\", time = \"time_s\", \
                drive_angle = \"drive_angle_rad\" }";
     let beside = |more: &[&str]| {
         let mut args = vec!["simulate", "axis.toml", "--experiment", "5 V pulse"];
         args.extend(["--set", log]);
         args.extend(more);
-        let text = taut(here).args(&args).assert().success().get_output().stdout.clone();
+        let text = taut_in(here).args(&args).assert().success().get_output().stdout.clone();
         let text = String::from_utf8(text).unwrap();
-        let told = taut(here).args(&args).arg("--json").assert().success().get_output().stdout.clone();
+        let told = taut_in(here).args(&args).arg("--json").assert().success().get_output().stdout.clone();
         let told: serde_json::Value = serde_json::from_slice(&told).unwrap();
         let log = &told["experiments"][0]["log"];
         assert_eq!(log["complete"], true);
@@ -287,14 +269,14 @@ fn a_run_beside_its_log() {
     assert!(beside(&[]) < 0.6 * count);
     assert!(beside(&["--set", "cart.friction.coulomb=12"]) > 10.0 * count);
     // Without a log there is nothing to be told.
-    let plain = taut(here).args(["simulate", "axis.toml", "--json"]).assert().success().get_output().stdout.clone();
+    let plain = taut_in(here).args(["simulate", "axis.toml", "--json"]).assert().success().get_output().stdout.clone();
     assert!(serde_json::from_slice::<serde_json::Value>(&plain).unwrap()["experiments"][0]["log"].is_null());
 }
 
 #[test]
 fn json_on_the_terminal_is_the_summary_in_the_folder() {
     let folder = TempDir::new().unwrap();
-    let run = taut(folder.path())
+    let run = taut_in(folder.path())
         .arg("simulate")
         .arg(table4())
         .args(["--json", "--no-report", "--out", "out", "--experiment", "10 V pulse"])
@@ -306,7 +288,7 @@ fn json_on_the_terminal_is_the_summary_in_the_folder() {
     assert_eq!(summary["experiments"].as_array().unwrap().len(), 1);
     assert_eq!(summary["solver"]["name"], "exact");
     assert_eq!(summary["experiments"][0]["files"][0], "10-v-pulse.csv");
-    let quiet = taut(folder.path()).arg("simulate").arg(table4()).arg("--quiet").assert().success();
+    let quiet = taut_in(folder.path()).arg("simulate").arg(table4()).arg("--quiet").assert().success();
     assert!(quiet.get_output().stdout.is_empty() && quiet.get_output().stderr.is_empty());
 }
 
@@ -348,7 +330,7 @@ fn wrong_input_is_told_on_stderr_with_status_2() {
         ),
     ];
     for (args, message) in wrong {
-        let run = taut(folder.path()).args(args).assert().code(2);
+        let run = taut_in(folder.path()).args(args).assert().code(2);
         let (out, err) = (text(&run.get_output().stdout), text(&run.get_output().stderr));
         assert!(err.starts_with("error: ") && err.contains(message), "{args:?} says\n{err}");
         assert!(out.is_empty() && !err.contains('\u{1b}'), "{args:?}");
@@ -359,18 +341,18 @@ fn wrong_input_is_told_on_stderr_with_status_2() {
 #[test]
 fn help_and_version_are_answers() {
     let folder = TempDir::new().unwrap();
-    let help = taut(folder.path()).args(["simulate", "--help"]).assert().success();
+    let help = taut_in(folder.path()).args(["simulate", "--help"]).assert().success();
     let help = text(&help.get_output().stdout);
     assert!(help.contains("Examples:") && help.contains("--set") && !help.contains('\u{1b}'));
-    taut(folder.path()).arg("--version").assert().success();
-    taut(folder.path()).assert().code(2);
+    taut_in(folder.path()).arg("--version").assert().success();
+    taut_in(folder.path()).assert().code(2);
 }
 
 #[test]
 fn a_run_that_diverges_says_how_far_it_came() {
     let folder = TempDir::new().unwrap();
     let far = ["--set", "experiment.0.until=9s", "--set", "experiment.0.every=10ms", "--experiment", "5 V pulse"];
-    let run = taut(folder.path())
+    let run = taut_in(folder.path())
         .arg("simulate")
         .arg(table4())
         .args(["--solver", "table3", "--step", "10ms", "--out", "out", "--no-report"])
@@ -385,14 +367,14 @@ fn a_run_that_diverges_says_how_far_it_came() {
 }
 
 fn controllers() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../stages/sollmann-jouaneh/controllers")
+    stage("sollmann-jouaneh/controllers")
 }
 
 #[test]
 fn moves_in_closed_loop() {
     let folder = TempDir::new().unwrap();
     let case = controllers().join("pid-elastic.toml");
-    let output = taut(folder.path())
+    let output = taut_in(folder.path())
         .args(["move", "--move", "short fast", "--out", "moved", "--json"])
         .arg(&case)
         .output()
@@ -411,7 +393,7 @@ fn moves_in_closed_loop() {
     assert!(moved.join("report.html").exists() && moved.join("plots/short-fast-motion.svg").exists());
     // The case that was written repeats the move.
     let again =
-        taut(folder.path()).args(["move", "moved/case.toml", "--move", "short fast", "--json"]).output().unwrap();
+        taut_in(folder.path()).args(["move", "moved/case.toml", "--move", "short fast", "--json"]).output().unwrap();
     let again: Value = serde_json::from_slice(&again.stdout).unwrap();
     assert_eq!(again["moves"][0]["cart_error"], told["moves"][0]["cart_error"]);
 }
@@ -420,13 +402,13 @@ fn moves_in_closed_loop() {
 fn moves_that_cannot_be() {
     let folder = TempDir::new().unwrap();
     let case = controllers().join("pid.toml");
-    let output = taut(folder.path()).arg("simulate").arg(&case).output().unwrap();
+    let output = taut_in(folder.path()).arg("simulate").arg(&case).output().unwrap();
     assert_eq!(output.status.code(), Some(2));
     assert!(text(&output.stderr).contains("run its moves with `taut move`"), "{}", text(&output.stderr));
-    let output = taut(folder.path()).arg("move").arg(table4()).output().unwrap();
+    let output = taut_in(folder.path()).arg("move").arg(table4()).output().unwrap();
     assert_eq!(output.status.code(), Some(2));
     assert!(text(&output.stderr).contains("no move and no controller"), "{}", text(&output.stderr));
-    let output = taut(folder.path()).arg("move").arg(&case).args(["--spread", "150%"]).output().unwrap();
+    let output = taut_in(folder.path()).arg("move").arg(&case).args(["--spread", "150%"]).output().unwrap();
     assert_eq!(output.status.code(), Some(2));
 }
 
@@ -437,7 +419,7 @@ fn modes_of_the_papers_machine() {
     let case = table4();
     let file = case.to_str().unwrap();
     let args = ["modes", file, "--out", "out", "--sample-time", "1ms", "--json"];
-    let run = taut(folder.path()).args(args).assert().success();
+    let run = taut_in(folder.path()).args(args).assert().success();
     let found: Value = serde_json::from_slice(&run.get_output().stdout).unwrap();
     assert_eq!(found, json(&folder.path().join("out/modes.json")));
     let poles = found["poles"].as_array().unwrap();
@@ -453,7 +435,7 @@ fn modes_of_the_papers_machine() {
         names(&folder.path().join("out")),
         ["files.json", "frequency-response.csv", "modes.json", "plots", "report.html"]
     );
-    let rest = taut(folder.path()).args(["modes", file, "--speed", "0"]).assert().success();
+    let rest = taut_in(folder.path()).args(["modes", file, "--speed", "0"]).assert().success();
     assert!(text(&rest.get_output().stdout).contains("at rest this stage sticks"));
     for (wrong, told) in [
         (["--from", "10", "--to", "5"], "before it begins"),
@@ -461,7 +443,7 @@ fn modes_of_the_papers_machine() {
         (["--stuck", "rotor", "--speed", "0"], "this machine has no body \"rotor\"\n  allowed: drive, cart, idler"),
         (["--bridge", "1mm", "--speed", "0"], "this machine has no bridge"),
     ] {
-        let run = taut(folder.path()).args(["modes", file]).args(wrong).assert().code(2);
+        let run = taut_in(folder.path()).args(["modes", file]).args(wrong).assert().code(2);
         assert!(text(&run.get_output().stderr).contains(told), "{wrong:?}");
     }
 }
@@ -469,10 +451,9 @@ fn modes_of_the_papers_machine() {
 #[test]
 fn several_cases_are_simulated_one_after_the_other() {
     let folder = TempDir::new().unwrap();
-    let stages = Path::new(env!("CARGO_MANIFEST_DIR")).join("../stages");
     let cases = ["h-frame/h-frame.toml", "core-xy/core-xy.toml", "printer-axis/printer-axis.toml"];
-    let cases: Vec<String> = cases.iter().map(|case| stages.join(case).display().to_string()).collect();
-    let run = |more: &[&str]| taut(folder.path()).arg("simulate").args(&cases).args(more).output().unwrap();
+    let cases: Vec<String> = cases.iter().map(|case| stage(case).display().to_string()).collect();
+    let run = |more: &[&str]| taut_in(folder.path()).arg("simulate").args(&cases).args(more).output().unwrap();
     let done = run(&["--out", "out", "--no-report"]);
     assert!(done.status.success(), "{done:?}");
     for name in ["h-frame", "core-xy", "printer-axis"] {
@@ -481,6 +462,6 @@ fn several_cases_are_simulated_one_after_the_other() {
     let refused = run(&["--json"]);
     assert_eq!(refused.status.code(), Some(2));
     assert!(text(&refused.stderr).contains("name one case"));
-    let same = taut(folder.path()).args(["simulate", &cases[0], &cases[0], "--out", "out"]).output().unwrap();
+    let same = taut_in(folder.path()).args(["simulate", &cases[0], &cases[0], "--out", "out"]).output().unwrap();
     assert!(text(&same.stderr).contains("another case has the same name"), "{same:?}");
 }

@@ -1,19 +1,10 @@
 //! `taut design` as a user runs it.
 
+use crate::common::taut;
 use serde_json::Value;
 use std::fs;
-use std::path::Path;
-use std::process::{Command, Output};
 
 const TABLE4: &str = "stages/sollmann-jouaneh/table4.toml";
-
-fn taut(args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_taut"))
-        .args(args)
-        .current_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join(".."))
-        .output()
-        .unwrap()
-}
 
 const QUICK: [&str; 4] = ["--input", "trapezoid", "--duration", "1s"];
 const ANGLE: [&str; 2] = ["--measure", "drive_angle=1mrad"];

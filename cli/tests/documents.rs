@@ -1,18 +1,11 @@
 //! The documents tell the truth: what they show of the program is what it prints, and what they name is there.
 #![cfg(unix)]
 
+use crate::common::{read, root};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use tempfile::TempDir;
-
-fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("..").canonicalize().unwrap()
-}
-
-fn read(name: &str) -> String {
-    fs::read_to_string(root().join(name)).unwrap_or_else(|e| panic!("{name}: {e}"))
-}
 
 /// A folder in which the repository's machines can be named as from its root.
 fn workplace() -> TempDir {

@@ -1,6 +1,7 @@
 //! Runs that somebody ends: Ctrl-C, and a reader who has seen enough; and results that are not to be relied on.
 #![cfg(unix)]
 
+use crate::common::{names, stage};
 use crate::faults::by_default;
 use std::fs;
 use std::io::Read;
@@ -11,7 +12,7 @@ use tempfile::TempDir;
 
 /// A case whose run takes a minute and more.
 fn long(folder: &Path) -> PathBuf {
-    let case = Path::new(env!("CARGO_MANIFEST_DIR")).join("../stages/sollmann-jouaneh/table4.toml");
+    let case = stage("sollmann-jouaneh/table4.toml");
     let text = fs::read_to_string(case).unwrap();
     let path = folder.join("long.toml");
     fs::write(&path, text.replacen("until = \"1 s\"\nevery = \"1 ms\"", "until = \"900 s\"\nevery = \"1 us\"", 1))
@@ -24,13 +25,6 @@ fn taut(folder: &Path) -> Command {
     command.current_dir(folder).stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
     by_default(&mut command);
     command
-}
-
-fn names(folder: &Path) -> Vec<String> {
-    let entries = fs::read_dir(folder).map(|entries| entries.flatten().collect()).unwrap_or_else(|_| Vec::new());
-    let mut names: Vec<String> = entries.into_iter().map(|entry| entry.file_name().into_string().unwrap()).collect();
-    names.sort();
-    names
 }
 
 #[test]
@@ -65,7 +59,7 @@ fn ctrl_c_keeps_what_there_is_and_leaves_nothing_half_written() {
 #[test]
 fn a_closed_pipe_is_no_error() {
     let folder = TempDir::new().unwrap();
-    let case = Path::new(env!("CARGO_MANIFEST_DIR")).join("../stages/sollmann-jouaneh/table4.toml");
+    let case = stage("sollmann-jouaneh/table4.toml");
     for args in [vec!["--json"], vec![], vec!["--help"]] {
         let mut child = taut(folder.path()).arg("simulate").arg(&case).args(&args).spawn().unwrap();
         drop(child.stdout.take());
@@ -76,7 +70,7 @@ fn a_closed_pipe_is_no_error() {
 }
 
 fn bundled(folder: &Path, name: &str) -> PathBuf {
-    let case = Path::new(env!("CARGO_MANIFEST_DIR")).join("../stages/sollmann-jouaneh/controllers").join(name);
+    let case = stage("sollmann-jouaneh/controllers").join(name);
     fs::copy(case, folder.join(name)).unwrap();
     folder.join(name)
 }

@@ -402,9 +402,10 @@ fn tune_into_a_file_is_killed() {
 /// A file saved by the page is the whole new text or the whole old one, and a studio that is started again can save.
 #[test]
 fn saving_in_the_studio_is_killed() {
-    use crate::studio::{Studio, text};
+    use crate::common::read;
+    use crate::studio_client::Studio;
     let mut random = Pcg64::seed_from_u64(number("TAUT_SEED").unwrap_or(1) << 8 | 20);
-    let old = text("stages/sollmann-jouaneh/table4.toml");
+    let old = read("stages/sollmann-jouaneh/table4.toml");
     let new = old.replace("0.362 kg", "0.5 kg") + &"# a long file\n".repeat(20_000);
     let mut saved = 0;
     for k in 0..number("TAUT_KILLS").unwrap_or(KILLS) {

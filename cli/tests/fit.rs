@@ -1,22 +1,16 @@
 //! `taut check`, `taut fit` and the band of `taut simulate` as a user runs them, on a log that was simulated.
 
-use assert_cmd::Command;
+use crate::common::taut_in;
 use serde_json::Value;
 use std::path::Path;
 use tempfile::TempDir;
 
-fn taut(folder: &Path) -> Command {
-    let mut command = Command::new(assert_cmd::cargo::cargo_bin("taut"));
-    command.current_dir(folder);
-    command
-}
-
 /// A folder with `mine.toml`: the template, and the log that its encoder makes of the pulse.
 fn with_a_log() -> TempDir {
     let folder = TempDir::new().unwrap();
-    taut(folder.path()).args(["init", "axis.toml"]).assert().success();
+    taut_in(folder.path()).args(["init", "axis.toml"]).assert().success();
     let arguments = ["simulate", "axis.toml", "--experiment", "5 V pulse", "--as-measured", "--out", "made", "--quiet"];
-    taut(folder.path()).args(arguments).assert().success();
+    taut_in(folder.path()).args(arguments).assert().success();
     let mut text = std::fs::read_to_string(folder.path().join("axis.toml")).unwrap();
     text += "\n[[experiment]]\nname = \"log\"\nlog = { file = \"made/5-v-pulse.measured.csv\", time = \"time_s\", input = \"voltage_V\", drive_angle = \"drive_angle_rad\" }\n";
     text += "\n[fit]\nfree = [\"cart.friction.viscous\", \"cart.friction.coulomb\"]\n";
@@ -32,7 +26,7 @@ fn json(folder: &Path, file: &str) -> Value {
 fn a_fit_its_posterior_and_the_band_of_its_machines() {
     let folder = with_a_log();
     let at = folder.path();
-    let output = taut(at)
+    let output = taut_in(at)
         .args(["fit", "mine.toml", "--posterior", "--draws", "100", "--chains", "2", "--out", "found", "--json"])
         .args(["--set", "cart.friction.viscous=10"])
         .output()
@@ -54,10 +48,10 @@ fn a_fit_its_posterior_and_the_band_of_its_machines() {
     assert!(page.contains("Profiles") && page.contains("Posterior") && page.contains("fitted.toml"));
 
     // What was written is a case that simulates, with its own draws as a band.
-    taut(at).args(["simulate", "found/fitted.toml", "--experiment", "5 V pulse", "--quiet"]).assert().success();
+    taut_in(at).args(["simulate", "found/fitted.toml", "--experiment", "5 V pulse", "--quiet"]).assert().success();
     let arguments = ["simulate", "found/fitted.toml", "--experiment", "5 V pulse", "--draws", "found/posterior.csv"];
-    taut(at).args(arguments).args(["--bands", "20", "--out", "band", "--quiet"]).assert().code(2);
-    taut(at).args(arguments).args(["--machines", "20", "--out", "band", "--quiet"]).assert().success();
+    taut_in(at).args(arguments).args(["--bands", "20", "--out", "band", "--quiet"]).assert().code(2);
+    taut_in(at).args(arguments).args(["--machines", "20", "--out", "band", "--quiet"]).assert().success();
     let names: Vec<String> = std::fs::read_dir(at.join("band"))
         .unwrap()
         .map(|entry| entry.unwrap().file_name().into_string().unwrap())
@@ -70,7 +64,7 @@ fn a_fit_its_posterior_and_the_band_of_its_machines() {
 fn what_is_not_determined_ends_with_status_1_and_keeps_its_value() {
     let folder = with_a_log();
     let free = "fit.free=[\"drive_pulley.friction.viscous\", \"cart.friction.viscous\"]";
-    let output = taut(folder.path())
+    let output = taut_in(folder.path())
         .env("COLUMNS", "1000")
         .args(["fit", "mine.toml", "--out", "found", "--set", free])
         .output()
@@ -84,7 +78,7 @@ fn what_is_not_determined_ends_with_status_1_and_keeps_its_value() {
     assert_eq!(fit["not_determined"][0]["combinations"].as_array().unwrap().len(), 1, "{fit}");
     let text = std::fs::read_to_string(folder.path().join("found/fitted.toml")).unwrap();
     assert!(text.contains("known = \"not determined\""), "{text}");
-    let output = taut(folder.path()).args(["check", "mine.toml", "--json", "--set", free]).output().unwrap();
+    let output = taut_in(folder.path()).args(["check", "mine.toml", "--json", "--set", free]).output().unwrap();
     assert_eq!(output.status.code(), Some(0));
     let value: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(value["complete"], false);
@@ -102,7 +96,7 @@ fn a_fit_that_warns_writes_nothing_unless_told() {
     let flipped = "experiment.2.log.scale={ drive_angle = -1 }";
     let run = |more: &[&str]| {
         let arguments = ["fit", "mine.toml", "--out", "found", "--no-report", "--set", flipped];
-        taut(folder.path()).args(arguments).args(more).output().unwrap()
+        taut_in(folder.path()).args(arguments).args(more).output().unwrap()
     };
     let output = run(&[]);
     assert_eq!(output.status.code(), Some(1), "{}", String::from_utf8_lossy(&output.stderr));
@@ -117,7 +111,7 @@ fn a_fit_that_warns_writes_nothing_unless_told() {
 
 /// The standard error of a command, and its exit status.
 fn told(folder: &Path, args: &[&str]) -> (Option<i32>, String) {
-    let output = taut(folder).args(args).output().unwrap();
+    let output = taut_in(folder).args(args).output().unwrap();
     (output.status.code(), String::from_utf8(output.stderr).unwrap())
 }
 
@@ -153,13 +147,13 @@ fn each_campaign_has_its_file() {
     let again = "\n[[experiment]]\nname = \"again\"\ncampaign = \"april\"\nlog = { file = \"made/5-v-pulse.measured.csv\", time = \"time_s\", input = \"voltage_V\", drive_angle = \"drive_angle_rad\" }\n";
     text = text.replace("\n[fit]\n", &format!("{again}\n[fit]\nseparate = [\"cart.friction.coulomb\"]\n"));
     std::fs::write(at.join("two.toml"), &text).unwrap();
-    taut(at).args(["fit", "two.toml", "--out", "found", "--anyway", "--no-report", "--quiet"]).output().unwrap();
+    taut_in(at).args(["fit", "two.toml", "--out", "found", "--anyway", "--no-report", "--quiet"]).output().unwrap();
     let value = json(at, "found/fit.json");
     let names: Vec<&str> =
         value["parameters"].as_array().unwrap().iter().map(|row| row["name"].as_str().unwrap()).collect();
     assert_eq!(names, ["cart.friction.viscous", "cart.friction.coulomb [february]", "cart.friction.coulomb [april]"]);
     for file in ["found/fitted.toml", "found/fitted-april.toml"] {
-        taut(at).args(["simulate", file, "--experiment", "5 V pulse", "--quiet"]).assert().success();
+        taut_in(at).args(["simulate", file, "--experiment", "5 V pulse", "--quiet"]).assert().success();
     }
     let (status, text) = told(at, &["fit", "two.toml", "--posterior"]);
     assert_eq!(status, Some(2), "{text}");
@@ -177,7 +171,7 @@ fn each_campaign_has_its_file() {
 #[test]
 fn nothing_to_search_for_gives_errors_alone() {
     let folder = with_a_log();
-    let output = taut(folder.path()).args(["fit", "mine.toml", "--set", "fit.free=[]"]).output().unwrap();
+    let output = taut_in(folder.path()).args(["fit", "mine.toml", "--set", "fit.free=[]"]).output().unwrap();
     let text = String::from_utf8(output.stdout).unwrap();
     assert!(text.contains("no search: errors of the case as it is"), "{text}");
     assert!(text.contains("log  drive_angle: RMSE") && !text.contains("Parameters"), "{text}");
@@ -189,7 +183,7 @@ fn nothing_to_search_for_gives_errors_alone() {
 #[test]
 fn a_drift_is_a_table_that_begins_with_what_explains_most() {
     let folder = with_a_log();
-    let output = taut(folder.path())
+    let output = taut_in(folder.path())
         .args(["fit", "mine.toml", "--drift", "--set", "cart.mass=0.8", "--out", "drift", "--json"])
         .output()
         .unwrap();

@@ -1,5 +1,6 @@
 //! `taut export fmu`: the archive, and what cannot be exported. What is in it is simulated by `py/tests/test_fmu.py`.
 
+use crate::common::{root, taut_in};
 use assert_cmd::Command;
 use serde_json::Value;
 use std::fs;
@@ -9,15 +10,15 @@ use tempfile::TempDir;
 
 const TABLE4: &str = "stages/sollmann-jouaneh/table4.toml";
 
-fn taut(args: &[&str]) -> Command {
-    let mut command = Command::new(assert_cmd::cargo::cargo_bin("taut"));
-    command.current_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("..")).args(["export", "fmu"]).args(args);
+fn fmu(args: &[&str]) -> Command {
+    let mut command = taut_in(root());
+    command.args(["export", "fmu"]).args(args);
     command
 }
 
 /// Exit status and message of a request that is refused.
 fn refused(args: &[&str]) -> (i32, String) {
-    let output = taut(args).output().unwrap();
+    let output = fmu(args).output().unwrap();
     assert!(output.stdout.is_empty(), "{}", String::from_utf8_lossy(&output.stdout));
     (output.status.code().unwrap(), String::from_utf8_lossy(&output.stderr).into_owned())
 }
@@ -57,7 +58,7 @@ fn the_archive_has_all_that_an_importer_looks_for() {
     for (fmi, version, icon) in [("3", Version::Three, "terminalsAndIcons/icon.png"), ("2", Version::Two, "model.png")]
     {
         let out = folder.path().join(format!("axis-{fmi}.fmu"));
-        let output = taut(&[TABLE4, "--fmi", fmi, "--json", "--out", out.to_str().unwrap()]).output().unwrap();
+        let output = fmu(&[TABLE4, "--fmi", fmi, "--json", "--out", out.to_str().unwrap()]).output().unwrap();
         assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
         let told: Value = serde_json::from_slice(&output.stdout).unwrap();
         assert_eq!((told["target"].as_str(), told["facts"][0]["value"].as_str()), (Some("fmu"), Some(version.word())));
@@ -86,7 +87,7 @@ fn the_archive_has_all_that_an_importer_looks_for() {
         assert!(String::from_utf8_lossy(told).contains(compiled));
         // One case is one file, to the bit.
         let again = folder.path().join("again.fmu");
-        taut(&[TABLE4, "--fmi", fmi, "--out", again.to_str().unwrap()]).assert().success();
+        fmu(&[TABLE4, "--fmi", fmi, "--out", again.to_str().unwrap()]).assert().success();
         assert_eq!(fs::read(&out).unwrap(), fs::read(again).unwrap());
     }
 }
@@ -104,7 +105,7 @@ fn what_c_does_not_cover_has_no_sources() {
         ),
     ] {
         let out = folder.path().join("one.fmu");
-        let output = taut(&[case, "--out", out.to_str().unwrap(), "--json"]).args(more).output().unwrap();
+        let output = fmu(&[case, "--out", out.to_str().unwrap(), "--json"]).args(more).output().unwrap();
         assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
         let told: Value = serde_json::from_slice(&output.stdout).unwrap();
         let note = told["notes"][0].as_str().unwrap();

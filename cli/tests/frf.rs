@@ -1,21 +1,13 @@
 //! `taut frf` as a user runs it, on logs that `taut simulate --as-measured` wrote.
 
+use crate::common::{read, taut};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output};
 
 const TABLE4: &str = "stages/sollmann-jouaneh/table4.toml";
 const EXPERIMENT: &str = "experiment=[{ name = \"noise\", input = { sum = [{ step = \"5 V\" }, { prbs = \"3 V\", bit = \"1 ms\", seed = 1 }] }, \
                           until = \"10 s\", every = \"1 ms\" }]";
-
-fn taut(args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_taut"))
-        .args(args)
-        .current_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join(".."))
-        .output()
-        .unwrap()
-}
 
 /// A case with a log of the paper's machine, sliding under noise.
 fn measured(folder: &Path) -> String {
@@ -25,7 +17,7 @@ fn measured(folder: &Path) -> String {
     let args = ["simulate", TABLE4, "--as-measured", "--no-report", "--quiet"];
     let told = taut(&[&args[..], &["--set", EXPERIMENT, "--set", change, "--out", out]].concat());
     assert!(told.status.success(), "{told:?}");
-    let text = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(TABLE4)).unwrap();
+    let text = read(TABLE4);
     let machine = &text[..text.find("[[experiment]]").unwrap()];
     let log = "[[experiment]]\nname = \"noise\"\n\
                log = { file = \"sim/noise.measured.csv\", time = \"time_s\", input = \"voltage_V\", drive_angle = \"drive_angle_rad\" }\n";

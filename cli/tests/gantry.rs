@@ -1,24 +1,10 @@
 //! Gantries as a user meets them: what the commands print and write of them, and what they say of what is not there.
 
-use assert_cmd::Command;
+use crate::common::{stage, taut_in, text};
 use serde_json::Value;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use tempfile::TempDir;
-
-fn taut(folder: &Path) -> Command {
-    let mut command = Command::cargo_bin("taut").unwrap();
-    command.current_dir(folder);
-    command
-}
-
-fn machine(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../stages").join(name)
-}
-
-fn text(bytes: &[u8]) -> &str {
-    std::str::from_utf8(bytes).unwrap()
-}
 
 fn json(bytes: &[u8]) -> Value {
     serde_json::from_slice(bytes).unwrap()
@@ -27,7 +13,7 @@ fn json(bytes: &[u8]) -> Value {
 /// Runs a command that is refused; what it says, without the folder of the stages.
 fn refused(args: &[&str], case: &Path) -> String {
     let folder = TempDir::new().unwrap();
-    let run = taut(folder.path()).arg(args[0]).arg(case).args(&args[1..]).assert().code(2);
+    let run = taut_in(folder.path()).arg(args[0]).arg(case).args(&args[1..]).assert().code(2);
     let output = run.get_output();
     assert!(output.stdout.is_empty());
     text(&output.stderr).replace(&case.parent().unwrap().display().to_string(), "stages")
@@ -36,8 +22,8 @@ fn refused(args: &[&str], case: &Path) -> String {
 #[test]
 fn simulate_writes_a_whole_folder() {
     let folder = TempDir::new().unwrap();
-    let case = machine("h-frame/h-frame.toml");
-    let run = taut(folder.path()).arg("simulate").arg(&case).args(["--out", "out"]).assert().success();
+    let case = stage("h-frame/h-frame.toml");
+    let run = taut_in(folder.path()).arg("simulate").arg(&case).args(["--out", "out"]).assert().success();
     let out = text(&run.get_output().stdout);
     for word in [
         "H-frame, one belt round both drives: bridge 0.838 kg, cart 0.362 kg",
@@ -65,7 +51,7 @@ fn simulate_writes_a_whole_folder() {
     }
     // What repeats the run does so bit for bit.
     let again =
-        taut(folder.path()).args(["simulate", "out/case.toml", "--out", "again", "--quiet", "--no-report"]).assert();
+        taut_in(folder.path()).args(["simulate", "out/case.toml", "--out", "again", "--quiet", "--no-report"]).assert();
     assert!(again.success().get_output().stdout.is_empty());
     for name in ["one-motor.csv", "along-x.csv", "along-y.events.csv", "case.toml"] {
         assert!(fs::read(folder.path().join("again").join(name)).unwrap() == read(name).as_bytes(), "{name}");
@@ -83,9 +69,9 @@ fn simulate_writes_a_whole_folder() {
 #[test]
 fn the_summary_is_data() {
     let folder = TempDir::new().unwrap();
-    let case = machine("core-xy/core-xy.toml");
+    let case = stage("core-xy/core-xy.toml");
     let more = ["--json", "--experiment", "along x", "--set", "bridge.mass=1 kg"];
-    let run = taut(folder.path()).arg("simulate").arg(&case).args(more).assert().success();
+    let run = taut_in(folder.path()).arg("simulate").arg(&case).args(more).assert().success();
     let told = json(&run.get_output().stdout);
     assert_eq!((told["kind"].as_str(), told["solver"]["name"].as_str()), (Some("core-xy"), Some("exact")));
     assert_eq!(told["machine"]["bridge_mass_kg"], 1.0);
@@ -115,7 +101,7 @@ fn spans_that_follow_are_solved_in_general_with_an_error_that_is_estimated() {
     for name in ["h-frame/follows.toml", "core-xy/follows.toml"] {
         let told = |more: &[&str]| {
             let run =
-                taut(folder.path()).arg("simulate").arg(machine(name)).arg("--json").args(more).assert().success();
+                taut_in(folder.path()).arg("simulate").arg(stage(name)).arg("--json").args(more).assert().success();
             json(&run.get_output().stdout)
         };
         let (usual, fine) = (told(&[]), told(&["--solver", "general", "--tolerance", "1e-12"]));
@@ -128,7 +114,7 @@ fn spans_that_follow_are_solved_in_general_with_an_error_that_is_estimated() {
             assert!((at(&usual, key) - at(&fine, key)).abs() <= error && error < 2e-9, "{name}: {key}");
         }
     }
-    let told = refused(&["simulate", "--solver", "exact"], &machine("h-frame/follows.toml"));
+    let told = refused(&["simulate", "--solver", "exact"], &stage("h-frame/follows.toml"));
     assert_eq!(
         told,
         "error: the belt's spans follow the cart: this solver does not support it\n  \
@@ -140,7 +126,7 @@ fn spans_that_follow_are_solved_in_general_with_an_error_that_is_estimated() {
 fn who_leaves_the_travel_is_named() {
     let folder = TempDir::new().unwrap();
     let short = ["--set", "cart.travel.min=-20mm"];
-    let run = taut(folder.path()).arg("simulate").arg(machine("h-frame/h-frame.toml")).args(short).assert().code(1);
+    let run = taut_in(folder.path()).arg("simulate").arg(stage("h-frame/h-frame.toml")).args(short).assert().code(1);
     let output = run.get_output();
     assert!(text(&output.stdout).contains("the cart leaves its travel there, and nothing stops it"));
     assert!(text(&output.stderr).starts_with("error: the run \"one motor\" ended at "), "{}", text(&output.stderr));
@@ -148,7 +134,7 @@ fn who_leaves_the_travel_is_named() {
 
 #[test]
 fn options_of_an_axis_are_refused() {
-    let case = machine("h-frame/h-frame.toml");
+    let case = stage("h-frame/h-frame.toml");
     for (args, told) in [
         (
             &["simulate", "--as-measured", "--out", "out"][..],
@@ -189,8 +175,8 @@ fn options_of_an_axis_are_refused() {
 #[test]
 fn modes_tells_rigid_and_elastic_ones_and_maps_the_area() {
     let folder = TempDir::new().unwrap();
-    let case = machine("core-xy/follows.toml");
-    let run = taut(folder.path()).arg("modes").arg(&case).args(["--out", "out"]).assert().success();
+    let case = stage("core-xy/follows.toml");
+    let run = taut_in(folder.path()).arg("modes").arg(&case).args(["--out", "out"]).assert().success();
     let out = text(&run.get_output().stdout);
     for word in [
         "Rigid modes",
@@ -223,7 +209,7 @@ fn modes_tells_rigid_and_elastic_ones_and_maps_the_area() {
     assert_eq!([row[2], row[3]], [0, 1].map(|mode: usize| grid[mode][0][1].as_f64().unwrap()));
     assert!(read("report.html").contains("Elastic mode 2") && folder.path().join("out/plots/elastic-1.svg").exists());
 
-    let same = taut(folder.path()).arg("modes").arg(machine("h-frame/h-frame.toml")).arg("--json").assert().success();
+    let same = taut_in(folder.path()).arg("modes").arg(stage("h-frame/h-frame.toml")).arg("--json").assert().success();
     let told = json(&same.get_output().stdout);
     assert_eq!((&told["stiffness_depends_on_position"], &told["map"]), (&Value::Bool(false), &Value::Null));
     assert!((told["elastic"][0]["frequency_Hz"].as_f64().unwrap() - 196.643946994).abs() < 1e-9);
@@ -232,10 +218,11 @@ fn modes_tells_rigid_and_elastic_ones_and_maps_the_area() {
 /// A gantry is asked what an axis is: a place, a speed, bodies held, a sample time, a range of frequencies.
 #[test]
 fn modes_of_a_gantry_answer_every_question() {
-    let case = machine("core-xy/follows.toml");
+    let case = stage("core-xy/follows.toml");
     let asked = |options: &[&str]| {
         let folder = TempDir::new().unwrap();
-        let run = taut(folder.path()).arg("modes").arg(&case).args(options).args(["--out", "out", "--json"]).assert();
+        let run =
+            taut_in(folder.path()).arg("modes").arg(&case).args(options).args(["--out", "out", "--json"]).assert();
         let told = json(&run.success().get_output().stdout);
         (told, fs::read_to_string(folder.path().join("out/frequency-response.csv")).unwrap())
     };
@@ -281,7 +268,7 @@ fn a_sweep_writes_a_whole_folder_that_repeats_it() {
     let folder = TempDir::new().unwrap();
     let plan =
         ["--runs", "24", "--design", "sobol", "--vary", "all=20%", "--trajectories", "--threads", "2", "--out", "out"];
-    let run = taut(folder.path()).arg("sweep").arg(machine("h-frame/h-frame.toml")).args(plan).assert().success();
+    let run = taut_in(folder.path()).arg("sweep").arg(stage("h-frame/h-frame.toml")).args(plan).assert().success();
     let told = text(&run.get_output().stdout);
     for word in [
         "24 runs of 3 simulations each: 21 parameters, sobol",
@@ -312,7 +299,7 @@ fn a_sweep_writes_a_whole_folder_that_repeats_it() {
     assert_eq!((trajectories[0][last], trajectories[2][last], trajectories[3][last]), (23.0, 1.0, rows[2][23]));
     // The case of the folder repeats it, on another number of threads.
     let again = ["sweep", "case.toml", "--threads", "1", "--out", "again.parquet", "--json"];
-    let run = taut(&out).args(again).assert().success();
+    let run = taut_in(&out).args(again).assert().success();
     assert_eq!(json(&run.get_output().stdout), summary);
     assert_eq!(fs::read(out.join("again.parquet")).unwrap(), fs::read(out.join("runs.parquet")).unwrap());
 }
@@ -320,7 +307,7 @@ fn a_sweep_writes_a_whole_folder_that_repeats_it() {
 #[test]
 fn a_sweep_of_a_case_file_has_its_designs() {
     let folder = TempDir::new().unwrap();
-    let whole = fs::read_to_string(machine("core-xy/core-xy.toml")).unwrap();
+    let whole = fs::read_to_string(stage("core-xy/core-xy.toml")).unwrap();
     for (design, runs) in [
         ("design = \"one-at-a-time\"\n[sweep.vary]\nall = \"factors(2, 0.5)\"\n", "47 runs"),
         (
@@ -333,7 +320,7 @@ fn a_sweep_of_a_case_file_has_its_designs() {
         ),
     ] {
         fs::write(folder.path().join("case.toml"), format!("{whole}\n[sweep]\n{design}")).unwrap();
-        let run = taut(folder.path()).args(["sweep", "case.toml"]).assert().success();
+        let run = taut_in(folder.path()).args(["sweep", "case.toml"]).assert().success();
         let told = text(&run.get_output().stdout);
         assert!(told.contains(runs), "{runs}: {told}");
     }
@@ -341,7 +328,7 @@ fn a_sweep_of_a_case_file_has_its_designs() {
 
 #[test]
 fn a_sweep_that_a_gantry_cannot_have_is_told() {
-    let case = machine("h-frame/h-frame.toml");
+    let case = stage("h-frame/h-frame.toml");
     let told =
         |vary: &str, more: &[&str]| refused(&[&["sweep", "--runs", "4", "--vary", vary][..], more].concat(), &case);
     for (vary, message) in [
@@ -406,9 +393,7 @@ fn a_sweep_that_was_interrupted_goes_on() {
     let folder = TempDir::new().unwrap();
     let run = |out: &str| {
         let mut run = Program::new(env!("CARGO_BIN_EXE_taut"));
-        run.arg("sweep")
-            .arg(machine("core-xy/core-xy.toml"))
-            .args(["--runs", "1200", "--vary", "all=20%", "--out", out]);
+        run.arg("sweep").arg(stage("core-xy/core-xy.toml")).args(["--runs", "1200", "--vary", "all=20%", "--out", out]);
         run.current_dir(folder.path()).stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::null());
         crate::faults::by_default(&mut run);
         run
@@ -439,8 +424,8 @@ fn init_writes_gantries_that_run_as_they_stand() {
     let folder = TempDir::new().unwrap();
     for (kind, title) in [("h-frame", "H-frame, one belt"), ("core-xy", "CoreXY, a belt for each drive")] {
         let file = format!("{kind}.toml");
-        taut(folder.path()).args(["init", "--kind", kind, &file]).assert().success();
-        let run = taut(folder.path()).args(["simulate", &file]).assert().success();
+        taut_in(folder.path()).args(["init", "--kind", kind, &file]).assert().success();
+        let run = taut_in(folder.path()).args(["simulate", &file]).assert().success();
         let out = text(&run.get_output().stdout);
         assert!(out.contains(title) && out.contains("along x\n  final position  bridge 1"), "{out}");
         // Every remark that names a key names one that there is.
@@ -463,7 +448,7 @@ fn init_writes_gantries_that_run_as_they_stand() {
         let shown =
             shown.replace("# resistance = \"0.8 ohm\"", "resistance = \"0.8 ohm\"").replace("# gain = -1", "gain = -1");
         fs::write(folder.path().join("all.toml"), &shown).unwrap();
-        let all = taut(folder.path()).args(["simulate", "all.toml", "--experiment", "along x"]).assert();
+        let all = taut_in(folder.path()).args(["simulate", "all.toml", "--experiment", "along x"]).assert();
         let output = all.get_output();
         assert!(text(&output.stdout).contains("following bridge and cart"), "{}\n{shown}", text(&output.stderr));
     }

@@ -1,6 +1,6 @@
 //! Every kind of machine through every command: each pair runs, or is refused by one sentence that is known here.
 
-use assert_cmd::Command;
+use crate::common::{root, taut_in};
 use std::path::Path;
 use tempfile::TempDir;
 
@@ -89,19 +89,17 @@ fn trial(case: &str, options: &[&str], folder: &Path) -> String {
     let name = if options.contains(&"square") { "square" } else { "short fast" };
     let changes =
         options.iter().filter(|option| option.contains("controller.pid")).flat_map(|option| ["--set", option]);
-    let _ = taut().args(["move", case, "--move", name, "--no-report", "--out", &out]).args(changes).output().unwrap();
+    let _ = taut_in(root())
+        .args(["move", case, "--move", name, "--no-report", "--out", &out])
+        .args(changes)
+        .output()
+        .unwrap();
     format!("{out}/{}.csv", name.replace(' ', "-"))
-}
-
-fn taut() -> Command {
-    let mut command = Command::cargo_bin("taut").unwrap();
-    command.current_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join(".."));
-    command
 }
 
 #[test]
 fn every_command_is_in_the_table() {
-    let output = taut().arg("--help").output().unwrap();
+    let output = taut_in(root()).arg("--help").output().unwrap();
     let help = String::from_utf8(output.stdout).unwrap();
     let listed = help.lines().skip_while(|line| *line != "Commands:").skip(1).take_while(|line| !line.is_empty());
     let names = listed.filter(|line| line.starts_with("  ") && !line.starts_with("   "));
@@ -109,7 +107,7 @@ fn every_command_is_in_the_table() {
         let has = TABLE.iter().any(|(command, ..)| command.split(' ').next() == Some(name));
         assert!(has != OTHERS.contains(&name), "{name}");
     }
-    let targets = String::from_utf8(taut().args(["export", "--help"]).output().unwrap().stdout).unwrap();
+    let targets = String::from_utf8(taut_in(root()).args(["export", "--help"]).output().unwrap().stdout).unwrap();
     for target in ["fmu", "c", "st", "matlab", "python", "json"] {
         assert!(targets.contains(target) && TABLE.iter().any(|row| row.0 == format!("export {target}")), "{target}");
     }
@@ -141,7 +139,7 @@ fn every_kind_goes_through_every_command() {
                 true => &["--set", "stepper.microsteps=1"],
                 false => &[],
             };
-            let output = taut().args(&words).arg(case).args(options).args(coarse).output().unwrap();
+            let output = taut_in(root()).args(&words).arg(case).args(options).args(coarse).output().unwrap();
             let [told, said] =
                 [&output.stdout, &output.stderr].map(|bytes| String::from_utf8_lossy(bytes).into_owned());
             match ends {
@@ -186,7 +184,7 @@ fn what_a_fit_tries_on_an_axis_alone_is_refused_for_a_gantry() {
         ("--compare", "friction laws are compared on a single axis"),
     ];
     for ((option, words), case) in tried.into_iter().flat_map(|one| WITH_LOGS.map(|case| (one, case))) {
-        let output = taut().args(["fit", option, case]).output().unwrap();
+        let output = taut_in(root()).args(["fit", option, case]).output().unwrap();
         let said = String::from_utf8_lossy(&output.stderr).into_owned();
         assert_eq!(output.status.code(), Some(2), "{option} {case}: {said}");
         assert!(

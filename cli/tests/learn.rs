@@ -1,18 +1,13 @@
 //! `taut learn` as a user runs it.
 
+use crate::common::{root, taut};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output};
 use tempfile::TempDir;
 
 /// A loop that is stable on the whole family.
 const SHAPED: &str = "stages/sollmann-jouaneh/controllers/pid-shaped.toml";
-
-fn taut(args: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_taut"));
-    command.args(args).current_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("..")).output().unwrap()
-}
 
 /// The error of the cart, rms, of a move that was run with what was learned on a machine that the case does not know.
 #[test]
@@ -92,7 +87,7 @@ fn a_force_along_the_travel_is_mapped() {
     let folder = TempDir::new().unwrap();
     let at = |name: &str| folder.path().join(name).display().to_string();
     let (axis, out) = (at("axis.toml"), at("mapped"));
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let root = root();
     let text = fs::read_to_string(root.join(SHAPED)).unwrap();
     let log = r#"{ file = "slow/slow.csv", time = "time_s", input = "voltage_V", drive_angle = "drive_angle_rad" }"#;
     fs::write(&axis, format!("{text}\n[[experiment]]\nname = \"slow\"\nlog = {log}\n")).unwrap();

@@ -2,6 +2,7 @@
 //! those of `fit.rs`.
 
 mod commands;
+mod common;
 mod common_options;
 mod design;
 mod documents;
@@ -26,6 +27,7 @@ mod shape;
 mod show;
 mod structure;
 mod studio;
+mod studio_client;
 mod studio_work;
 mod sweep;
 

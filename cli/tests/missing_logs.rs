@@ -1,14 +1,12 @@
 //! A case of which a log is missing: who needs the log is told its line, and everybody else works.
 
-use assert_cmd::Command;
+use crate::common::taut_in;
 use std::path::Path;
 use tempfile::TempDir;
 
 /// `taut` in a folder: exit status, standard output, standard error.
 pub fn run(folder: &Path, arguments: &[&str]) -> (Option<i32>, String, String) {
-    let mut command = Command::new(assert_cmd::cargo::cargo_bin("taut"));
-    let output =
-        command.current_dir(folder).args(arguments).timeout(std::time::Duration::from_secs(120)).output().unwrap();
+    let output = taut_in(folder).args(arguments).timeout(std::time::Duration::from_secs(120)).output().unwrap();
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
     (output.status.code(), text(&output.stdout), text(&output.stderr))
 }

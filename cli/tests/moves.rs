@@ -1,11 +1,11 @@
 //! Moves that the machine cannot make.
 
+use crate::common::root;
 use serde_json::Value;
-use std::path::Path;
 
 /// `taut` in the repository: exit status, standard output, standard error.
 fn run(arguments: &[&str]) -> (Option<i32>, String, String) {
-    crate::missing_logs::run(&Path::new(env!("CARGO_MANIFEST_DIR")).join(".."), arguments)
+    crate::missing_logs::run(&root(), arguments)
 }
 
 const PID: &str = "stages/sollmann-jouaneh/controllers/pid-elastic.toml";

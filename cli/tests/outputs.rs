@@ -1,22 +1,11 @@
 //! Output of the commands: never over a file that they read, whole folders or none, and under every name that a user
 //! may choose.
 
-use assert_cmd::Command;
+use crate::common::{stage_text, taut_in};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
-
-fn taut(folder: &Path) -> Command {
-    let mut command = Command::new(assert_cmd::cargo::cargo_bin("taut"));
-    command.current_dir(folder);
-    command
-}
-
-fn machine(name: &str) -> String {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../stages").join(name);
-    fs::read_to_string(path).unwrap()
-}
 
 /// Everything in a folder: paths and contents.
 fn contents(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
@@ -39,7 +28,7 @@ fn contents(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
 /// Runs a command that must be refused, name the file that is read, and leave everything as it was.
 fn refused(folder: &Path, args: &[&str], read: &str) {
     let before = contents(folder);
-    let output = taut(folder).args(args).output().unwrap();
+    let output = taut_in(folder).args(args).output().unwrap();
     let told = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(2), "{args:?}: {told}");
     assert!(told.contains("made from, and nothing was written"), "{args:?}: {told}");
@@ -52,7 +41,7 @@ fn with_a_log(log: &str) -> TempDir {
     let folder = TempDir::new().unwrap();
     let rows: String = (0..200).map(|k| format!("{},{},{}\n", 0.001 * f64::from(k), 5, 1e-4 * f64::from(k))).collect();
     fs::write(folder.path().join(log), format!("time_s,voltage_V,angle_rad\n{rows}")).unwrap();
-    let mut text = machine("sollmann-jouaneh/table4.toml");
+    let mut text = stage_text("sollmann-jouaneh/table4.toml");
     text = text[..text.find("[[experiment]]").unwrap()].to_string();
     text += &format!(
         r#"
@@ -98,7 +87,7 @@ fn a_simulation_does_not_replace_its_log() {
     fs::write(at.join("rig.toml"), text).unwrap();
     refused(at, &["simulate", "rig.toml", "--out", "."], "5-v-pulse.events.csv");
     // Elsewhere it may.
-    taut(at).args(["simulate", "rig.toml", "--out", "out", "--no-report"]).assert().success();
+    taut_in(at).args(["simulate", "rig.toml", "--out", "out", "--no-report"]).assert().success();
     // A result folder simulated into itself would replace its case and its inputs.
     refused(at, &["simulate", "out/case.toml", "--out", "out"], "case.toml");
 }
@@ -195,7 +184,7 @@ fn a_sweep_does_not_remove_its_case_with_its_parts() {
     fs::create_dir(at.join("runs.csv.parts")).unwrap();
     fs::rename(at.join("rig.toml"), at.join("runs.csv.parts/rig.toml")).unwrap();
     fs::rename(at.join("log.csv"), at.join("runs.csv.parts/log.csv")).unwrap();
-    let output = taut(at).args(["sweep", "runs.csv.parts/rig.toml", "--out", "runs.csv"]).output().unwrap();
+    let output = taut_in(at).args(["sweep", "runs.csv.parts/rig.toml", "--out", "runs.csv"]).output().unwrap();
     assert_eq!(output.status.code(), Some(2));
     assert_eq!(
         String::from_utf8_lossy(&output.stderr),
@@ -234,7 +223,7 @@ fn a_folder_whose_name_is_not_utf_8_is_written_whole() {
         ("tune", b"t\xff", "tuned.toml"),
     ] {
         let out = odd(name);
-        let mut run = taut(at);
+        let mut run = taut_in(at);
         run.arg(command).arg("rig.toml").arg("--out").arg(&out);
         if command == "fit" {
             run.arg("--anyway");
@@ -248,7 +237,7 @@ fn a_folder_whose_name_is_not_utf_8_is_written_whole() {
         assert!(!contents(at).keys().any(|path| path.to_string_lossy().contains(".taut.tmp")));
     }
     let rows = odd(b"rows\xff.csv");
-    taut(at).args(["sweep", "rig.toml", "--trajectories", "--quiet", "--out"]).arg(&rows).assert().success();
+    taut_in(at).args(["sweep", "rig.toml", "--trajectories", "--quiet", "--out"]).arg(&rows).assert().success();
     assert!(at.join(odd(b"rows\xff-trajectories.csv")).exists());
     // A path in a case file is UTF-8: what cannot be said is refused before it is computed.
     let inner = at.join(odd(b"in\xff"));
@@ -256,7 +245,7 @@ fn a_folder_whose_name_is_not_utf_8_is_written_whole() {
     for file in ["rig.toml", "log.csv"] {
         fs::copy(at.join(file), inner.join(file)).unwrap();
     }
-    let output = taut(at).arg("fit").arg(inner.join("rig.toml")).args(["--out", "found"]).output().unwrap();
+    let output = taut_in(at).arg("fit").arg(inner.join("rig.toml")).args(["--out", "found"]).output().unwrap();
     assert_eq!(output.status.code(), Some(2));
     let told = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(told.contains("the path of this file is not UTF-8, so a case file cannot name it"), "{told}");
@@ -269,10 +258,10 @@ fn long_names_of_many_bytes_have_files() {
     let folder = TempDir::new().unwrap();
     let at = folder.path();
     let long = "轴".repeat(100);
-    let text = machine("sollmann-jouaneh/table4.toml").replacen("5 V pulse", &long, 1);
+    let text = stage_text("sollmann-jouaneh/table4.toml").replacen("5 V pulse", &long, 1);
     let text = text.replacen("10 V pulse", &format!("{}带", "轴".repeat(99)), 1);
     fs::write(at.join("case.toml"), text).unwrap();
-    taut(at)
+    taut_in(at)
         .args(["simulate", "case.toml", "--out", "out", "--as-measured", "--set", "encoder.at=\"motor\""])
         .args(["--set", "encoder.lines=512"])
         .assert()
@@ -288,7 +277,7 @@ fn long_names_of_many_bytes_have_files() {
 fn a_folder_that_was_left_half_replaced_says_so() {
     let folder = with_a_log("log.csv");
     let at = folder.path();
-    let run = || taut(at).args(["simulate", "rig.toml", "--out", "out", "--no-report"]).output().unwrap();
+    let run = || taut_in(at).args(["simulate", "rig.toml", "--out", "out", "--no-report"]).output().unwrap();
     assert!(run().stderr.is_empty());
     // What a kill within the replacement leaves; see the test of `taut::files::Batch`.
     fs::write(at.join("out/unfinished.txt"), "").unwrap();
@@ -308,12 +297,12 @@ fn a_folder_that_was_left_half_replaced_says_so() {
 fn a_run_that_fails_leaves_the_results_as_they_were() {
     let folder = with_a_log("log.csv");
     let at = folder.path();
-    taut(at).args(["simulate", "rig.toml", "--out", "out"]).assert().success();
+    taut_in(at).args(["simulate", "rig.toml", "--out", "out"]).assert().success();
     let report = at.join("out/report.html");
     fs::remove_file(&report).unwrap();
     fs::create_dir_all(report.join("taken")).unwrap();
     let before = contents(at);
-    let output = taut(at).args(["simulate", "rig.toml", "--out", "out", "--set", "cart.mass=1"]).output().unwrap();
+    let output = taut_in(at).args(["simulate", "rig.toml", "--out", "out", "--set", "cart.mass=1"]).output().unwrap();
     assert_eq!(output.status.code(), Some(1));
     let told = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(told.starts_with("error: out/report.html: "), "{told}");
@@ -354,7 +343,7 @@ fn a_later_run_takes_away_what_it_wrote_before_and_nothing_else() {
     let at = folder.path();
     let out = at.join("out");
     let run = |args: &[&str]| {
-        let done = taut(at).args(args).args(["--out", "out"]).output().unwrap();
+        let done = taut_in(at).args(args).args(["--out", "out"]).output().unwrap();
         assert!(matches!(done.status.code(), Some(0..=2)), "{done:?}");
         String::from_utf8(done.stderr).unwrap()
     };

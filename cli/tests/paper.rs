@@ -1,8 +1,9 @@
 //! `taut paper` as its reader gets it: golden numbers, documented ids, every figure, nothing from a network.
 
+use crate::common::{self, taut_in};
 use serde_json::Value;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::path::PathBuf;
+use std::process::Output;
 use std::sync::LazyLock;
 
 /// One run for all tests, in a folder that does not exist before.
@@ -16,7 +17,7 @@ static FOLDER: LazyLock<PathBuf> = LazyLock::new(|| {
 });
 
 fn taut(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_taut")).args(arguments).current_dir(env!("CARGO_TARGET_TMPDIR")).output().unwrap()
+    taut_in(env!("CARGO_TARGET_TMPDIR")).args(arguments).output().unwrap()
 }
 
 fn read(name: &str) -> String {
@@ -93,7 +94,7 @@ fn misprints_are_told_and_references_are_met() {
 
 #[test]
 fn the_ids_are_those_of_the_documentation() {
-    let document = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/paper.md")).unwrap();
+    let document = common::read("docs/paper.md");
     let (_, list) = document.split_once("## The claims").unwrap();
     let items = list.split("\n\n").find(|paragraph| paragraph.starts_with("- **")).unwrap();
     let documented: Vec<&str> = items.split('`').skip(1).step_by(2).collect();

@@ -1,19 +1,13 @@
 //! `taut plan` as a user runs it.
 
+use crate::common::taut;
 use serde_json::Value;
 use std::fs;
-use std::path::Path;
-use std::process::{Command, Output};
 use tempfile::TempDir;
 
 /// The same with feed-forward, which follows a plan without saturation.
 const ELASTIC: &str = "stages/sollmann-jouaneh/controllers/pid-elastic.toml";
 const PID: &str = "stages/sollmann-jouaneh/controllers/pid.toml";
-
-fn taut(args: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_taut"));
-    command.args(args).current_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("..")).output().unwrap()
-}
 
 #[test]
 fn a_plan_is_written_and_moves() {

@@ -1,14 +1,9 @@
 //! `taut schema`: what it says of results and case files is what the program writes and reads.
 
+use crate::common::{read, root, taut};
 use serde_json::{Map, Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
-
-fn taut(args: &[&str]) -> Output {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    Command::new(assert_cmd::cargo::cargo_bin("taut")).current_dir(root).args(args).output().unwrap()
-}
 
 fn json_of(args: &[&str]) -> Value {
     let output = taut(args);
@@ -221,7 +216,7 @@ const SEARCHES: [&str; 9] = [
 /// schema that it names, be it an error. Returns how many printed a result.
 fn follow_on_every_case(commands: &[&str], one_in: usize) -> usize {
     use rayon::prelude::*;
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let root = root();
     let mut files = Vec::new();
     cases(&root.join("stages"), &mut files);
     let calls: Vec<(&str, &PathBuf)> =
@@ -362,7 +357,7 @@ fn cases(folder: &Path, found: &mut Vec<PathBuf>) {
 
 #[test]
 fn every_case_file_of_the_project_follows_the_schema() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let root = root();
     let mut files = Vec::new();
     cases(&root.join("stages"), &mut files);
     assert!(files.len() > 25, "{}", files.len());
@@ -375,7 +370,7 @@ fn every_case_file_of_the_project_follows_the_schema() {
 #[test]
 fn what_is_wrong_by_its_form_does_not_follow_the_schema() {
     let schema = json_of(&["schema", "case"]);
-    let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(TABLE4)).unwrap();
+    let text = read(TABLE4);
     let right = case(&text);
     let changes: [(&str, Value); 8] = [
         ("/cart/mas", json!(1)),

@@ -1,17 +1,11 @@
 //! `taut shape` as a user runs it.
 
-use assert_cmd::Command;
+use crate::common::{root, taut_in};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
-fn taut() -> Command {
-    let mut command = Command::new(assert_cmd::cargo::cargo_bin("taut"));
-    command.current_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join(".."));
-    command
-}
-
 fn json(arguments: &[&str]) -> Value {
-    let output = taut().arg("shape").args(arguments).arg("--json").output().unwrap();
+    let output = taut_in(root()).arg("shape").args(arguments).arg("--json").output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     serde_json::from_slice(&output.stdout).unwrap()
 }
@@ -48,7 +42,7 @@ fn a_spectrum_a_second_one_and_their_files() {
     assert_eq!(written, value);
     // One axis alone, which has everything; the others have nothing.
     assert_eq!(json(&[a, "--axis", "x"])["recommended"], json(&[a])["recommended"]);
-    taut().args(["shape", a, "--axis", "z"]).assert().code(2);
+    taut_in(root()).args(["shape", a, "--axis", "z"]).assert().code(2);
 }
 
 #[test]
@@ -85,7 +79,7 @@ fn pairs_of_shapers() {
         along.iter().map(of).fold(0.0, f64::max)
     };
     assert!((worst("pairs", 0) - pairs[0]["vibration"].as_f64().unwrap()).abs() < 1e-9);
-    let told = taut().args(["shape", case, "--pairs"]).output().unwrap();
+    let told = taut_in(root()).args(["shape", case, "--pairs"]).output().unwrap();
     let told = String::from_utf8(told.stdout).unwrap();
     assert!(told.contains("\nPairs\n") && told.contains("mode along the travel"), "{told}");
 }
@@ -105,7 +99,7 @@ fn mistakes_with_pairs_have_their_messages() {
             "error: stages/emps/emps.toml: a rigid belt has no resonance\n  allowed: belt.model = \"elastic\" or \"two-mass\"\n",
         ),
     ] {
-        let output = taut().arg("shape").args(&arguments).output().unwrap();
+        let output = taut_in(root()).arg("shape").args(&arguments).output().unwrap();
         let told = String::from_utf8(output.stderr).unwrap();
         assert_eq!(output.status.code(), Some(2), "{arguments:?}: {told}");
         assert!(output.stdout.is_empty() && told.starts_with(message), "{arguments:?}: {told}");
@@ -129,7 +123,7 @@ fn mistakes_end_with_status_2() {
         vec![case, "--uncertainty", "10"],
         vec![bad, "--motor", "free"],
     ] {
-        let output = taut().arg("shape").args(&arguments).output().unwrap();
+        let output = taut_in(root()).arg("shape").args(&arguments).output().unwrap();
         assert_eq!(output.status.code(), Some(2), "{arguments:?}");
         assert!(output.stdout.is_empty() && output.stderr.starts_with(b"error: "), "{arguments:?}");
     }

@@ -1,19 +1,12 @@
 //! `taut show`: what follows from the numbers, and files that begin with data sheets.
 
-use assert_cmd::Command;
+use crate::common::{read, root, taut, taut_in};
 use serde_json::Value;
 use std::f64::consts::PI;
-use std::path::Path;
 use tempfile::TempDir;
 
-fn taut(args: &[&str]) -> Command {
-    let mut command = Command::new(assert_cmd::cargo::cargo_bin("taut"));
-    command.current_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("..")).args(args);
-    command
-}
-
 fn shown(args: &[&str]) -> Value {
-    let output = taut(&[&["show"], args, &["--json"]].concat()).output().unwrap();
+    let output = taut(&[&["show"], args, &["--json"]].concat());
     assert_eq!(output.status.code(), Some(0), "{args:?}: {}", String::from_utf8_lossy(&output.stderr));
     serde_json::from_slice(&output.stdout).unwrap()
 }
@@ -67,7 +60,7 @@ fn the_papers_machine_as_one_computes_it_by_hand() {
 fn frequencies_are_those_of_the_modes() {
     for machine in ["stages/laser-gantry/laser-gantry.toml", "stages/h-frame/h-frame.toml"] {
         let shown = shown(&[machine]);
-        let output = taut(&["modes", machine, "--json"]).output().unwrap();
+        let output = taut(&["modes", machine, "--json"]);
         let modes: Value = serde_json::from_slice(&output.stdout).unwrap();
         let first = match modes.get("elastic") {
             Some(elastic) => elastic[0]["frequency_Hz"].as_f64().unwrap(),
@@ -83,7 +76,7 @@ fn templates_begin_with_data_sheets_and_run_as_they_stand() {
     for name in ["stage", "printer-servo", "gantry"] {
         let file = folder.path().join(format!("{name}.toml"));
         let file = file.to_str().unwrap();
-        let told = taut(&["init", "--template", name, file]).output().unwrap();
+        let told = taut(&["init", "--template", name, file]);
         assert_eq!(String::from_utf8(told.stdout).unwrap(), format!("wrote {file}\nnext: taut show {file}\n"));
         let found = shown(&[file]);
         for key in ["largest_force", "tension_safety", "teeth_in_mesh"] {
@@ -94,13 +87,13 @@ fn templates_begin_with_data_sheets_and_run_as_they_stand() {
         // The ratio that the file asks for is that of the slowest mode, and friction and motor add to it.
         assert!(value(&found, "resonance1_damping") > 0.0199, "{name}");
         let out = folder.path().join(name);
-        taut(&["show", file, "--out", out.to_str().unwrap(), "--quiet"]).assert().success().stdout("");
+        taut_in(root()).args(["show", file, "--out", out.to_str().unwrap(), "--quiet"]).assert().success().stdout("");
         for file in ["show.json", "report.html", "files.json"] {
             assert!(out.join(file).exists(), "{name}: {file}");
         }
-        taut(&["simulate", file, "--quiet"]).assert().success();
+        taut_in(root()).args(["simulate", file, "--quiet"]).assert().success();
     }
-    let refused = taut(&["init", "--template", "stage", "--kind", "h-frame", "x.toml"]).output().unwrap();
+    let refused = taut(&["init", "--template", "stage", "--kind", "h-frame", "x.toml"]);
     assert_eq!(refused.status.code(), Some(2));
 }
 
@@ -109,15 +102,15 @@ fn the_template_of_a_printer_has_a_stepper_and_goes_through_its_commands() {
     let folder = TempDir::new().unwrap();
     let file = folder.path().join("printer.toml");
     let file = file.to_str().unwrap();
-    taut(&["init", "--template", "printer", file]).assert().success();
+    taut_in(root()).args(["init", "--template", "printer", file]).assert().success();
     let found = shown(&[file]);
     assert_eq!(value(&found, "holding_torque"), 0.45);
     for command in ["simulate", "move", "shape"] {
-        taut(&[command, file, "--quiet"]).assert().success();
+        taut_in(root()).args([command, file, "--quiet"]).assert().success();
     }
     // Learned signals are voltages or currents.
     for command in [&["tune"][..], &["move", "--move", "80 mm", "--added", "learned.csv"]] {
-        let refused = taut(&[command, &[file]].concat()).output().unwrap();
+        let refused = taut(&[command, &[file]].concat());
         let said = String::from_utf8(refused.stderr).unwrap();
         assert!(refused.status.code() == Some(2) && said.contains("this needs a motor"), "{said}");
     }
@@ -126,7 +119,7 @@ fn the_template_of_a_printer_has_a_stepper_and_goes_through_its_commands() {
 #[test]
 fn what_nothing_bounds_is_said() {
     let torque = "stages/laser-gantry/laser-gantry.toml";
-    let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(torque)).unwrap();
+    let text = read(torque);
     let text = text.replace("[[experiment]]", "[[other]]");
     let begin = text.find("[[other]]").unwrap();
     let text = format!("{}[controller]\nevery = \"1 ms\"\npid = {{ proportional = 1 }}\n", &text[..begin]);
@@ -161,7 +154,7 @@ fn a_belt_that_is_too_weak_is_told_with_both_forces() {
     let folder = TempDir::new().unwrap();
     let file = folder.path().join("printer.toml");
     let file = file.to_str().unwrap();
-    taut(&["init", "--template", "printer-servo", file]).assert().success();
+    taut_in(root()).args(["init", "--template", "printer-servo", file]).assert().success();
     let found = shown(&[file, "--set", "motor.speed_constant=60 rpm/V", "--set", "belt.width=3 mm"]);
     assert!(codes(&found).contains(&"belt-overloaded"), "{:?}", codes(&found));
     assert!(value(&found, "tension_safety") < 1.0);
@@ -170,7 +163,7 @@ fn a_belt_that_is_too_weak_is_told_with_both_forces() {
 #[test]
 fn wrong_input_is_told_with_its_place() {
     let told = |args: &[&str]| {
-        let output = taut(&[&["show"], args].concat()).output().unwrap();
+        let output = taut(&[&["show"], args].concat());
         (output.status.code(), String::from_utf8(output.stderr).unwrap())
     };
     assert_eq!(
@@ -193,7 +186,7 @@ fn wrong_input_is_told_with_its_place() {
 #[test]
 fn details_are_printed_only_if_asked_for() {
     let printed = |args: &[&str]| {
-        let output = taut(args).output().unwrap();
+        let output = taut(args);
         assert_eq!(output.stderr, b"", "{args:?}");
         String::from_utf8(output.stdout).unwrap()
     };
@@ -209,7 +202,7 @@ fn details_are_printed_only_if_asked_for() {
     let pid = "stages/sollmann-jouaneh/controllers/pid.toml";
     let judged = ["tune", pid, "--evaluate"];
     let run = |more: &[&str]| {
-        let output = taut(&[&judged[..], more].concat()).output().unwrap();
+        let output = taut(&[&judged[..], more].concat());
         String::from_utf8(output.stdout).unwrap()
     };
     let (short, long) = (run(&[]), run(&["--verbose"]));
@@ -219,7 +212,7 @@ fn details_are_printed_only_if_asked_for() {
     for heading in ["Gains", "At worst", "Moves"] {
         assert!(short.contains(heading) && long.contains(heading), "{heading}: {short}\n{long}");
     }
-    let output = taut(&["show", TABLE4, "--verbose", "--quiet"]).output().unwrap();
+    let output = taut(&["show", TABLE4, "--verbose", "--quiet"]);
     assert_eq!(output.status.code(), Some(2));
     assert!(String::from_utf8(output.stderr).unwrap().contains("cannot be used with"));
 }

@@ -1,9 +1,10 @@
 //! The structure of the code is the one that ARCHITECTURE.md describes: which crates use which, and that no two files
 //! or folders of one folder import each other.
 
+use crate::common::root;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// The crates of the library, each with those that it may use, as in ARCHITECTURE.md.
 const CRATES: [(&str, &[&str]); 6] = [
@@ -14,10 +15,6 @@ const CRATES: [(&str, &[&str]); 6] = [
     ("export", &["core", "case", "control"]),
     (".", &["core", "case", "control", "identify", "export"]),
 ];
-
-fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("..").canonicalize().unwrap()
-}
 
 /// Words of a path of modules, such as `solve`, `exact`, `change`.
 type Module = Vec<String>;

@@ -1,194 +1,16 @@
 //! The studio as a server: who is let in, what is refused or bounded, and how it ends. The page itself is tried in a
 //! browser by `cargo xtask browser`.
 
+use crate::common::{read, root};
+use crate::studio_client::{Page, Studio, handshake};
 use serde_json::{Value, json};
 use std::fs;
-use std::io::{BufRead, BufReader, Read, Write};
+use std::io::{Read, Write};
 use std::net::TcpStream;
-use std::process::{Child, Command, Stdio};
+use std::process::Command;
 use std::time::{Duration, Instant};
 
-/// A server that runs, and ends with the test.
-pub(crate) struct Studio {
-    child: Child,
-    port: u16,
-    token: String,
-}
-
-impl Drop for Studio {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
-}
-
-impl Studio {
-    pub(crate) fn start(words: &[&str]) -> Self {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_taut"));
-        command.current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/.."));
-        #[cfg(unix)]
-        crate::faults::by_default(&mut command);
-        let mut child = command.arg("studio").args(words).arg("--no-open").stdout(Stdio::piped()).spawn().unwrap();
-        let mut line = String::new();
-        BufReader::new(child.stdout.as_mut().unwrap()).read_line(&mut line).unwrap();
-        let rest = line.strip_prefix("http://127.0.0.1:").unwrap_or_else(|| panic!("the first line is {line}"));
-        let (port, token) = rest.trim().split_once("/?token=").unwrap();
-        Self { child, port: port.parse().unwrap(), token: token.to_string() }
-    }
-
-    /// Kills it.
-    pub(crate) fn kill(&mut self) {
-        self.child.kill().unwrap();
-        self.child.wait().unwrap();
-    }
-
-    pub(crate) fn connect(&self) -> TcpStream {
-        let stream = TcpStream::connect(("127.0.0.1", self.port)).unwrap();
-        // Each request goes at once: a head comes in pieces.
-        stream.set_nodelay(true).unwrap();
-        stream.set_read_timeout(Some(Duration::from_secs(45))).unwrap();
-        stream
-    }
-
-    pub(crate) fn host(&self) -> String {
-        format!("Host: 127.0.0.1:{}", self.port)
-    }
-
-    pub(crate) fn origin(&self) -> String {
-        format!("Origin: http://127.0.0.1:{}", self.port)
-    }
-
-    /// The answer to a request with these lines of head.
-    fn ask(&self, first: &str, lines: &[&str]) -> String {
-        let mut stream = self.connect();
-        // A head that is too long is refused while it is still on its way.
-        let _ = write!(stream, "{first} HTTP/1.1\r\n{}\r\nConnection: close\r\n\r\n", lines.join("\r\n"));
-        let mut answer = Vec::new();
-        let _ = stream.read_to_end(&mut answer);
-        String::from_utf8_lossy(&answer).into_owned()
-    }
-
-    /// The cookie that the token is exchanged for.
-    pub(crate) fn cookie(&self) -> String {
-        let answer = self.ask(&format!("GET /?token={}", self.token), &[&self.host()]);
-        let cookie = answer.lines().find_map(|line| line.strip_prefix("set-cookie: ")).unwrap();
-        format!("Cookie: {}", cookie.split(';').next().unwrap())
-    }
-
-    pub(crate) fn page(&self) -> Page {
-        let mut stream = self.connect();
-        let status = handshake(&mut stream, &[&self.host(), &self.origin(), &self.cookie()]);
-        assert_eq!(status, 101);
-        Page { stream, last: 0 }
-    }
-}
-
-/// Asks for a socket; the status of the answer.
-fn handshake(stream: &mut TcpStream, lines: &[&str]) -> u16 {
-    write!(
-        stream,
-        "GET /socket HTTP/1.1\r\n{}\r\nConnection: Upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Version: 13\r\n\
-         Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n",
-        lines.join("\r\n")
-    )
-    .unwrap();
-    let mut head = Vec::new();
-    let mut byte = [0];
-    while !head.ends_with(b"\r\n\r\n") && stream.read(&mut byte).is_ok_and(|n| n == 1) {
-        head.push(byte[0]);
-    }
-    String::from_utf8_lossy(&head).split(' ').nth(1).and_then(|status| status.parse().ok()).unwrap_or(0)
-}
-
-/// A page's socket.
-pub(crate) struct Page {
-    stream: TcpStream,
-    last: u64,
-}
-
-impl Page {
-    /// Sends a masked text frame.
-    fn send_text(&mut self, text: &str) {
-        let mut frame = vec![0x81];
-        match text.len() {
-            n @ 0..126 => frame.push(0x80 | n as u8),
-            n if n < 65536 => frame.extend([0x80 | 126, (n >> 8) as u8, n as u8]),
-            n => {
-                frame.push(0x80 | 127);
-                frame.extend((n as u64).to_be_bytes());
-            }
-        }
-        // A mask of zeros leaves the text as it is.
-        frame.extend([0; 4]);
-        frame.extend(text.bytes());
-        let _ = self.stream.write_all(&frame);
-    }
-
-    /// Asks for something; returns the number of the request.
-    pub(crate) fn ask(&mut self, act: &str, mut body: Value) -> u64 {
-        self.last += 1;
-        body["id"] = json!(self.last);
-        body["do"] = json!(act);
-        self.send_text(&body.to_string());
-        self.last
-    }
-
-    /// The next answer: its head, and its columns.
-    pub(crate) fn answer(&mut self) -> Option<(Value, Vec<Vec<f64>>)> {
-        let (kind, frame) = self.frame()?;
-        if kind != 2 {
-            return None;
-        }
-        let length = u32::from_le_bytes(frame[..4].try_into().unwrap()) as usize;
-        assert_eq!((4 + length) % 8, 0, "columns begin at a multiple of eight bytes");
-        let head: Value = serde_json::from_slice(&frame[4..4 + length]).unwrap();
-        let mut at = 4 + length;
-        let mut columns = Vec::new();
-        for column in head["columns"].as_array().into_iter().flatten() {
-            let rows = column["rows"].as_u64().unwrap() as usize;
-            let bytes = &frame[at..at + 8 * rows];
-            columns.push(bytes.chunks(8).map(|b| f64::from_le_bytes(b.try_into().unwrap())).collect());
-            at += 8 * rows;
-        }
-        assert_eq!(at, frame.len());
-        Some((head, columns))
-    }
-
-    /// Kind and content of the next frame of the server.
-    fn frame(&mut self) -> Option<(u8, Vec<u8>)> {
-        let mut head = [0; 2];
-        self.stream.read_exact(&mut head).ok()?;
-        let length = match head[1] & 0x7f {
-            126 => {
-                let mut more = [0; 2];
-                self.stream.read_exact(&mut more).ok()?;
-                u64::from(u16::from_be_bytes(more))
-            }
-            127 => {
-                let mut more = [0; 8];
-                self.stream.read_exact(&mut more).ok()?;
-                u64::from_be_bytes(more)
-            }
-            n => u64::from(n),
-        };
-        let mut content = vec![0; length as usize];
-        self.stream.read_exact(&mut content).ok()?;
-        Some((head[0] & 0x0f, content))
-    }
-
-    pub(crate) fn result(&mut self, act: &str, body: Value) -> Value {
-        let id = self.ask(act, body);
-        let (head, _) = self.answer().unwrap();
-        assert_eq!(head["id"], json!(id));
-        head
-    }
-}
-
 const TABLE4: &str = "stages/sollmann-jouaneh/table4.toml";
-
-pub(crate) fn text(path: &str) -> String {
-    fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../").to_string() + path).unwrap()
-}
 
 fn status(answer: &str) -> u16 {
     answer.split(' ').nth(1).and_then(|status| status.parse().ok()).unwrap_or(0)
@@ -418,13 +240,13 @@ fn a_run_has_the_json_of_the_command_and_its_columns() {
     let studio = Studio::start(&[TABLE4]);
     let mut page = studio.page();
     let opened = page.result("open", json!({}));
-    assert_eq!(opened["text"].as_str().unwrap(), text(TABLE4));
+    assert_eq!(opened["text"].as_str().unwrap(), read(TABLE4));
     page.ask("run", json!({ "text": opened["text"], "set": [["cart.mass", 0.5]], "describe": true }));
     let (head, columns) = page.answer().unwrap();
     assert!(head["text"].as_str().unwrap().contains("mass     = \"0.5 kg\""));
     assert_eq!(columns[0].len(), 1001);
     let command = Command::new(env!("CARGO_BIN_EXE_taut"))
-        .current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
+        .current_dir(root())
         .args(["simulate", TABLE4, "--set", "cart.mass=0.5 kg", "--experiment", "5 V pulse", "--json"])
         .output()
         .unwrap();
@@ -433,7 +255,7 @@ fn a_run_has_the_json_of_the_command_and_its_columns() {
     let mass = head["parameters"].as_array().unwrap().iter().find(|one| one["key"] == "cart.mass").unwrap();
     assert_eq!((&mass["value"], &mass["unit"], &mass["written"]), (&json!(0.5), &json!("kg"), &json!("0.5 kg")));
     // What is wrong has its line.
-    let wrong = text(TABLE4).replace("mass     =", "masss    =");
+    let wrong = read(TABLE4).replace("mass     =", "masss    =");
     let error = page.result("run", json!({ "text": wrong }))["error"].clone();
     assert_eq!((&error["line"], &error["column"]), (&json!(24), &json!(1)), "{error}");
     assert_eq!(error["next"], "did you mean `mass`?");
@@ -449,14 +271,14 @@ fn a_refused_change_names_its_key_and_no_line() {
         (json!("3 mm"), "cart.mass: \"3 mm\" is a length (m); expected a mass (kg)"),
         (json!("heavy"), "cart.mass: \"heavy\" does not begin with a number"),
     ] {
-        let error = page.result("run", json!({ "text": text(TABLE4), "set": [["cart.mass", value]] }))["error"].clone();
+        let error = page.result("run", json!({ "text": read(TABLE4), "set": [["cart.mass", value]] }))["error"].clone();
         assert_eq!(
             (&error["key"], &error["line"], &error["column"]),
             (&json!("cart.mass"), &Value::Null, &Value::Null)
         );
         assert_eq!(error["what"], what);
     }
-    let body = json!({ "text": text(TABLE4), "set": [["cart.mass", "400 g"]], "describe": true });
+    let body = json!({ "text": read(TABLE4), "set": [["cart.mass", "400 g"]], "describe": true });
     let head = page.result("run", body);
     let number = |key: &str| head["parameters"].as_array().unwrap().iter().find(|one| one["key"] == key).unwrap();
     assert_eq!((&number("cart.mass")["value"], &number("cart.mass")["written"]), (&json!(0.4), &json!("400 g")));
@@ -478,12 +300,12 @@ fn a_section_goes_through_the_rows_of_the_run() {
         "stages/printer-core-xy/printer.toml",
     ];
     for case in cases {
-        page.ask("run", json!({ "text": text(case) }));
+        page.ask("run", json!({ "text": read(case) }));
         let (run, rows) = page.answer().unwrap();
         let last = rows[0].len() / 2;
         let first = last / 2;
         let points = 2 * (last - first) + 1;
-        let body = json!({ "text": text(case), "from": rows[0][first], "to": rows[0][last], "points": points });
+        let body = json!({ "text": read(case), "from": rows[0][first], "to": rows[0][last], "points": points });
         page.ask("section", body);
         let (section, fine) = page.answer().unwrap();
         assert_eq!(fine.first().map(Vec::len), Some(points), "{case}: {section}");
@@ -502,7 +324,7 @@ fn a_section_goes_through_the_rows_of_the_run() {
 fn the_newest_of_what_waits_is_done_and_each_request_is_answered() {
     let studio = Studio::start(&[]);
     let mut page = studio.page();
-    let case = text(TABLE4);
+    let case = read(TABLE4);
     for k in 1..=100 {
         page.ask("run", json!({ "text": case, "set": [["cart.mass", 0.01 * f64::from(k)]] }));
     }
@@ -522,7 +344,7 @@ fn the_newest_of_what_waits_is_done_and_each_request_is_answered() {
 fn the_work_of_a_closed_page_stops() {
     let studio = Studio::start(&[]);
     let long =
-        text(TABLE4).replace("{ pulse = \"5 V\", for = \"0.25 s\" }", "{ sine = \"5 V\", frequency = \"50 Hz\" }");
+        read(TABLE4).replace("{ pulse = \"5 V\", for = \"0.25 s\" }", "{ sine = \"5 V\", frequency = \"50 Hz\" }");
     let long = long.replace("until = \"1 s\"", "until = \"1e7 s\"").replace("every = \"1 ms\"", "every = \"0.1 s\"");
     for _ in 0..10 {
         let mut page = studio.page();
@@ -531,7 +353,7 @@ fn the_work_of_a_closed_page_stops() {
     }
     let begun = Instant::now();
     let mut page = studio.page();
-    assert!(page.result("run", json!({ "text": text(TABLE4) }))["error"].is_null());
+    assert!(page.result("run", json!({ "text": read(TABLE4) }))["error"].is_null());
     assert!(begun.elapsed() < Duration::from_secs(8), "the threads were free after {:?}", begun.elapsed());
 }
 
@@ -578,7 +400,7 @@ fn it_ends_within_two_seconds_with_sockets_open_and_work_under_way() {
     for signal in ["-INT", "-TERM"] {
         let mut studio = Studio::start(&[TABLE4]);
         let mut pages: Vec<Page> = (0..5).map(|_| studio.page()).collect();
-        let long = text(TABLE4).replace("until = \"1 s\"", "until = \"1e7 s\"");
+        let long = read(TABLE4).replace("until = \"1 s\"", "until = \"1e7 s\"");
         for page in &mut pages {
             page.ask("run", json!({ "text": long }));
         }
@@ -595,10 +417,10 @@ fn it_ends_within_two_seconds_with_sockets_open_and_work_under_way() {
 fn the_case_is_saved_whole_and_never_over_what_somebody_else_wrote() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("axis.toml");
-    fs::write(&path, text(TABLE4)).unwrap();
+    fs::write(&path, read(TABLE4)).unwrap();
     let studio = Studio::start(&[path.to_str().unwrap()]);
     let mut page = studio.page();
-    let heavier = text(TABLE4).replace("0.362 kg", "0.5 kg");
+    let heavier = read(TABLE4).replace("0.362 kg", "0.5 kg");
     assert!(page.result("save", json!({ "text": heavier }))["saved"].is_string());
     assert_eq!(fs::read_to_string(&path).unwrap(), heavier);
     fs::write(&path, "# mine\n").unwrap();
@@ -661,7 +483,7 @@ fn fifty_pages_drag_at_once_and_memory_stays() {
     let studio = Studio::start(&[TABLE4]);
     let minutes = std::env::var("TAUT_STUDIO_MINUTES").ok().and_then(|minutes| minutes.parse::<f64>().ok());
     let until = minutes.map(|minutes| Instant::now() + Duration::from_secs_f64(60.0 * minutes));
-    let case = text(TABLE4);
+    let case = read(TABLE4);
     let drag = |page: &mut Page, k: u32| {
         let mass = 0.1 + 0.001 * f64::from(k % 1000);
         let head = page.result("run", json!({ "text": case, "set": [["cart.mass", mass]] }));

@@ -1,6 +1,7 @@
 //! The long works of a studio, asked for as its page asks: logs, fits, loops, shapers and sweeps.
 
-use crate::studio::{Page, Studio, text};
+use crate::common::read;
+use crate::studio_client::{Page, Studio};
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::io::{Read, Write};
@@ -42,7 +43,7 @@ fn long(page: &mut Page, act: &str, body: Value) -> (Vec<Value>, Value, Vec<Vec<
 
 /// A log of the paper's stage as the program simulates it: 5 V for a quarter of a second, friction as in Table 4.
 fn simulated(page: &mut Page) -> String {
-    let id = page.ask("run", json!({ "text": text(TABLE4), "experiment": 0 }));
+    let id = page.ask("run", json!({ "text": read(TABLE4), "experiment": 0 }));
     let (head, columns) = page.answer().unwrap();
     assert_eq!(head["id"], json!(id));
     let column = |name: &str| {
@@ -69,7 +70,7 @@ fn a_log_is_looked_at_checked_and_fitted_and_gives_back_what_made_it() {
     assert_eq!(looked["rows"], 1001);
     let log = json!({ "file": path, "time": "time_ms", "input": "volts", "cart_position": "cart_position", "units": { "time": "ms" } });
     let asked = json!({
-        "text": text(TABLE4),
+        "text": read(TABLE4),
         // Another machine than the one that made the log.
         "set": [["cart.friction.viscous", 12.0]],
         "logs": [{ "name": "pulse", "log": log }],
@@ -106,7 +107,7 @@ fn a_loop_has_its_margins_and_its_move_and_a_case_without_one_says_what_to_add()
     let studio = Studio::start(&[]);
     let mut page = studio.page();
     let id =
-        page.ask("loop", json!({ "text": text(PID), "set": [["controller.pid.proportional", 2000.0]], "move": 1 }));
+        page.ask("loop", json!({ "text": read(PID), "set": [["controller.pid.proportional", 2000.0]], "move": 1 }));
     let (head, columns) = page.answer().unwrap();
     assert_eq!((&head["id"], &head["move"]), (&json!(id), &json!(1)));
     assert_eq!(head["moves"][1]["name"], "long");
@@ -114,13 +115,13 @@ fn a_loop_has_its_margins_and_its_move_and_a_case_without_one_says_what_to_add()
     assert_eq!(head["margins"]["stable"], true);
     assert_eq!(head["columns"].as_array().unwrap().len(), columns.len());
     assert!(columns.iter().all(|column| column.len() > 50));
-    let head = page.result("loop", json!({ "text": text(TABLE4) }));
+    let head = page.result("loop", json!({ "text": read(TABLE4) }));
     assert_eq!(head["error"]["what"], "this case has no move and no controller to run it");
     let listed = page.result("controllers", json!({}));
     let one = &listed["controllers"][0];
     let changes =
         ["controller", "moves"].map(|key| format!("{}={}", key.trim_end_matches('s'), one[key].as_str().unwrap()));
-    let head = page.result("loop", json!({ "text": text(TABLE4), "changes": changes }));
+    let head = page.result("loop", json!({ "text": read(TABLE4), "changes": changes }));
     assert_eq!(head["moves"].as_array().unwrap().len(), 3, "{head}");
 }
 
@@ -129,11 +130,11 @@ fn a_sweep_sends_its_rows_and_the_trajectories_of_chosen_runs() {
     let studio = Studio::start(&[]);
     let mut page = studio.page();
     let plan = json!({ "design": "sobol", "runs": 64, "vary": { "cart.mass": "20 %", "belt.stiffness": "10 %" } });
-    let (steps, head, columns) = long(&mut page, "sweep", json!({ "text": text(TABLE4), "plan": plan }));
+    let (steps, head, columns) = long(&mut page, "sweep", json!({ "text": read(TABLE4), "plan": plan }));
     assert_eq!(steps[0]["runs"], 64);
     assert_eq!((head["done"].as_u64(), columns[0].len()), (Some(64), 64));
     assert!(columns[0].iter().enumerate().all(|(k, run)| *run == k as f64), "rows are not in order");
-    let asked = json!({ "text": text(TABLE4), "plan": plan, "runs": [3, 5, 64, -1, "x"], "experiment": 0 });
+    let asked = json!({ "text": read(TABLE4), "plan": plan, "runs": [3, 5, 64, -1, "x"], "experiment": 0 });
     let id = page.ask("traces", asked);
     // A step of the sweep may come behind its result.
     let (head, columns) = std::iter::from_fn(|| page.answer()).find(|(head, _)| head["id"] == json!(id)).unwrap();
@@ -142,7 +143,7 @@ fn a_sweep_sends_its_rows_and_the_trajectories_of_chosen_runs() {
     assert!(names.iter().all(|name| name.starts_with("3:") || name.starts_with("5:")), "{names:?}");
     assert!(columns.iter().all(|column| (300..=400).contains(&column.len())));
     let plan = json!({ "design": "random", "runs": 20_001, "vary": { "cart.mass": "20 %" } });
-    let head = page.result("sweep", json!({ "text": text(TABLE4), "plan": plan }));
+    let head = page.result("sweep", json!({ "text": read(TABLE4), "plan": plan }));
     assert_eq!(
         head["error"]["text"],
         "20001 runs are too many for a page\n  allowed: up to 20000\n  next: use `taut sweep` for more"
@@ -154,7 +155,7 @@ fn a_long_work_that_is_stopped_keeps_what_there_is() {
     let studio = Studio::start(&[]);
     let mut page = studio.page();
     let plan = json!({ "design": "random", "runs": 20_000, "vary": { "all": "20 %" } });
-    let id = page.ask("sweep", json!({ "text": text(TABLE4), "plan": plan }));
+    let id = page.ask("sweep", json!({ "text": read(TABLE4), "plan": plan }));
     // Its first step, then the word.
     assert!(page.answer().unwrap().0.get("progress").is_some());
     let stop = page.ask("cancel", json!({ "of": id }));
@@ -173,7 +174,7 @@ fn a_long_work_that_is_stopped_keeps_what_there_is() {
 fn a_case_of_moves_alone_is_run_as_its_first_move() {
     let studio = Studio::start(&[PID]);
     let mut page = studio.page();
-    let head = page.result("run", json!({ "text": text(PID), "describe": true }));
+    let head = page.result("run", json!({ "text": read(PID), "describe": true }));
     assert_eq!(head["experiments"][0]["name"], "short fast", "{head}");
     let keys = head["parameters"].as_array().unwrap();
     assert!(keys.iter().any(|one| one["key"] == "controller.pid.proportional"));
@@ -185,9 +186,9 @@ fn a_missing_log_blocks_only_what_needs_it() {
     let studio = Studio::start(&[]);
     let mut page = studio.page();
     let gone = "\n[[experiment]]\nname = \"gone\"\nlog = { file = \"gone.csv\", time = \"t\", input = \"u\", cart_position = \"x\" }\n";
-    let mine = format!("{}{gone}\n[fit]\nfree = [\"cart.friction.viscous\"]\n", text(TABLE4));
+    let mine = format!("{}{gone}\n[fit]\nfree = [\"cart.friction.viscous\"]\n", read(TABLE4));
     let line = 1 + mine.lines().position(|line| line.contains("gone.csv")).unwrap();
-    let whole = page.result("run", json!({ "text": text(TABLE4), "set": [["cart.mass", 0.5]] }));
+    let whole = page.result("run", json!({ "text": read(TABLE4), "set": [["cart.mass", 0.5]] }));
     let run = page.result("run", json!({ "text": mine, "set": [["cart.mass", 0.5]] }));
     assert_eq!(run["experiments"], whole["experiments"]);
     assert_eq!(run["result"]["experiments"], whole["result"]["experiments"]);
@@ -195,12 +196,12 @@ fn a_missing_log_blocks_only_what_needs_it() {
     assert!(notes.contains("gone") && notes.contains(&format!("line {line}")), "{notes}");
     assert_eq!(
         page.result("modes", json!({ "text": mine }))["result"],
-        page.result("modes", json!({ "text": text(TABLE4) }))["result"]
+        page.result("modes", json!({ "text": read(TABLE4) }))["result"]
     );
-    let moved = format!("{}{gone}", text(PID));
+    let moved = format!("{}{gone}", read(PID));
     assert_eq!(
         page.result("loop", json!({ "text": moved }))["result"],
-        page.result("loop", json!({ "text": text(PID) }))["result"]
+        page.result("loop", json!({ "text": read(PID) }))["result"]
     );
     for act in ["check", "fit"] {
         let (_, answer, _) = long(&mut page, act, json!({ "text": mine }));

@@ -2,7 +2,8 @@
 
 mod law;
 
-pub use law::{Law, Shape, decay_of_velocity, velocity_of_decay};
+pub(crate) use law::decay_of_velocity;
+pub use law::{Law, Shape, velocity_of_decay};
 
 /// Friction with breakaway, separate values for each direction, and the law between breakaway and Coulomb friction.
 ///

@@ -111,7 +111,7 @@ impl Machine {
     }
 
     /// Mutable access to a slide.
-    pub fn slide_mut(&mut self, index: usize) -> Option<&mut Slide> {
+    pub(crate) fn slide_mut(&mut self, index: usize) -> Option<&mut Slide> {
         self.bridge.iter_mut().chain(std::iter::once(&mut self.cart)).nth(index)
     }
 
@@ -133,7 +133,7 @@ impl Machine {
     }
 
     /// The first of its parts that the paper's equations lack, in words.
-    pub fn beyond_the_paper(&self) -> Option<&'static str> {
+    pub(crate) fn beyond_the_paper(&self) -> Option<&'static str> {
         let DriveUnit { motor, amplifier } = &self.drives[0];
         let parts = [
             (self.kind != Kind::Axis, "a second drive"),
@@ -206,7 +206,7 @@ impl Slide {
     }
 
     /// The constant force on it, N, for a total `mass`, kg: F_L − M g sin θ.
-    pub fn constant_force_with(&self, mass: f64) -> f64 {
+    pub(crate) fn constant_force_with(&self, mass: f64) -> f64 {
         self.load - mass * GRAVITY * self.inclination.sin()
     }
 }
@@ -240,7 +240,7 @@ impl Belt {
     }
 
     /// Updates the stiffness after a change of `make`.
-    pub fn follow_make(&mut self) {
+    pub(crate) fn follow_make(&mut self) {
         if let Some(make) = &self.make {
             self.stiffness = make.stiffness();
         }

@@ -43,7 +43,7 @@ impl Polyline {
     }
 
     /// As [`Polyline::value`], for any calculator.
-    pub fn value_by<C: Calculator>(&self, c: &mut C, x: C::N) -> C::N {
+    pub(crate) fn value_by<C: Calculator>(&self, c: &mut C, x: C::N) -> C::N {
         let first = c.number(self.piece(0)[0]);
         let numbered = self.points.iter().enumerate();
         numbered.fold(first, |before, (number, point)| {

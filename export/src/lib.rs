@@ -68,12 +68,12 @@ pub enum Part {
 
 impl Part {
     /// True if the plant is in it.
-    pub fn has_plant(self) -> bool {
+    pub(crate) fn has_plant(self) -> bool {
         self != Part::Controller
     }
 
     /// True if the controller is in it.
-    pub fn has_controller(self) -> bool {
+    pub(crate) fn has_controller(self) -> bool {
         self != Part::Plant
     }
 }
@@ -118,7 +118,7 @@ pub struct Exported {
 }
 
 /// A name as C, Structured Text, MATLAB and Python take it: letters, digits and `_`, a letter first.
-pub fn identifier(name: &str) -> String {
+pub(crate) fn identifier(name: &str) -> String {
     let mut plain = String::new();
     for c in name.chars() {
         match c {

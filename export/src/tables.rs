@@ -361,7 +361,8 @@ impl ElementKind {
         }
     }
 
-    fn what(self) -> Option<What> {
+    /// The part that events name; none for the torque of a gear.
+    pub fn what(self) -> Option<What> {
         match self {
             ElementKind::Body(body) => Some(What::Body(body)),
             ElementKind::GearTorque(_) => None,

@@ -159,17 +159,18 @@ pub struct Instance {
 impl Instance {
     /// A new one.
     pub fn new(model: Arc<Model>, purpose: Use) -> Self {
-        let mut instance = Self {
+        let count = model.variables.iter().filter(|variable| place(&model, variable.role).is_some()).count();
+        Self {
             purpose,
             phase: Phase::Instantiated,
             time: 0.0,
             begin: 0.0,
             stop: None,
-            parameters: Vec::new(),
-            quantities: Vec::new(),
-            start: Vec::new(),
-            inputs: Vec::new(),
-            forces: Vec::new(),
+            parameters: model.defaults(),
+            quantities: model.quantities.iter().map(|(_, start)| *start).collect(),
+            start: vec![0.0; model.quantities.len()],
+            inputs: vec![Input { since: 0.0, coefficients: [0.0; DEGREE + 1] }; count],
+            forces: vec![0.0; model.loads.len()],
             plant: Plant::None,
             control: None,
             sees_ahead: false,
@@ -177,9 +178,7 @@ impl Instance {
             columns: None,
             is_over: false,
             model,
-        };
-        instance.renew();
-        instance
+        }
     }
 
     /// The machine and its variables.
@@ -204,27 +203,7 @@ impl Instance {
 
     /// As it was made.
     fn renew(&mut self) {
-        let model = Arc::clone(&self.model);
-        let count = model.variables.iter().filter(|variable| place(&model, variable.role).is_some()).count();
-        *self = Self {
-            purpose: self.purpose,
-            phase: Phase::Instantiated,
-            time: 0.0,
-            begin: 0.0,
-            stop: None,
-            parameters: model.defaults(),
-            quantities: model.quantities.iter().map(|(_, start)| *start).collect(),
-            start: vec![0.0; model.quantities.len()],
-            inputs: vec![Input { since: 0.0, coefficients: [0.0; DEGREE + 1] }; count],
-            forces: vec![0.0; model.loads.len()],
-            plant: Plant::None,
-            control: None,
-            sees_ahead: false,
-            is_set: true,
-            columns: None,
-            is_over: false,
-            model,
-        };
+        *self = Self::new(Arc::clone(&self.model), self.purpose);
     }
 
     /// Refuses a function outside of its phases.

@@ -3,35 +3,16 @@
 
 use crate::answer::{Answer, End, LEAST, mechanism, rows};
 use crate::double::Double;
+use crate::folder::Folder;
 use crate::subject::{Fed, Subject};
 use std::fmt::Write;
-use std::path::PathBuf;
+use std::path::Path;
 use std::process::Command;
-use std::sync::atomic::{AtomicU64, Ordering};
 use taut::export::{self, Options, Part, Real, Target};
 use taut::signal::profile::Reference;
 
 /// Steps between two rows that are tried, fewest first.
 const STEPS: [usize; 10] = [1, 2, 4, 8, 16, 32, 64, 128, 512, 2048];
-
-/// A folder of its own that is removed at the end.
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new() -> Result<Self, String> {
-        static NEXT: AtomicU64 = AtomicU64::new(0);
-        let number = NEXT.fetch_add(1, Ordering::Relaxed);
-        let path = std::env::temp_dir().join(format!("taut-hunt-{}-{number}", std::process::id()));
-        std::fs::create_dir_all(&path).map_err(|error| format!("no folder for C: {error}"))?;
-        Ok(Self(path))
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_dir_all(&self.0);
-    }
-}
 
 /// True if there is a compiler.
 pub fn has_compiler() -> bool {
@@ -79,7 +60,7 @@ fn stepped(subject: &Subject, fewest: usize) -> Result<Answer, String> {
     let exported = exported.map_err(|error| format!("the export is refused: {error}"))?;
     let folder = Folder::new()?;
     for (name, content) in &exported.files {
-        std::fs::write(folder.0.join(name), content).map_err(|error| format!("{name}: {error}"))?;
+        folder.write(name, content)?;
     }
     let ticks = (until / tick * (1.0 + 1e-12)).floor() as usize;
     let (fed, main) = match subject {
@@ -90,16 +71,9 @@ fn stepped(subject: &Subject, fewest: usize) -> Result<Answer, String> {
             (fed, main)
         }
     };
-    std::fs::write(folder.0.join("main.c"), main).map_err(|error| error.to_string())?;
-    let build = Command::new("gcc")
-        .args(["-std=c99", "-O1", "-ffp-contract=off", "-o", "axis", "axis.c", "main.c"])
-        .current_dir(&folder.0)
-        .output()
-        .map_err(|error| format!("gcc: {error}"))?;
-    if !build.status.success() {
-        return Err(format!("gcc refuses it: {}", String::from_utf8_lossy(&build.stderr)));
-    }
-    let output = Command::new(folder.0.join("axis")).output().map_err(|error| format!("the program: {error}"))?;
+    folder.write("main.c", main)?;
+    folder.run(Path::new("gcc"), &["-std=c99", "-O1", "-ffp-contract=off", "-o", "axis", "axis.c", "main.c"])?;
+    let output = Command::new(folder.join("axis")).output().map_err(|error| format!("the program: {error}"))?;
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
     let mut positions: Vec<Vec<f64>> = Vec::new();
     let mut end = End::Complete;

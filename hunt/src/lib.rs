@@ -13,6 +13,7 @@ pub mod double;
 pub mod draw;
 pub mod events;
 pub mod exchange;
+mod folder;
 pub mod gantry;
 pub mod input;
 pub mod law;

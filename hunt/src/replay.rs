@@ -5,14 +5,13 @@
 //! same where the commands are changed by as little as the other way may be off.
 
 use crate::draw::{self, Random};
+use crate::folder::Folder;
 use crate::subject::{Fed, Subject};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
-use std::process::Command;
-use std::sync::atomic::{AtomicU64, Ordering};
 use taut::case::Case;
-use taut::export::{self, ElementKind, Options, Part, Real, Tables, Target};
-use taut::mechanism::{Mechanism, SpringLaw, State, What};
+use taut::export::{self, Options, Part, Real, Tables, Target};
+use taut::mechanism::{Mechanism, SpringLaw, State};
 use taut::signal::Signal;
 use taut::solve::{Ending, Simulator, Solver};
 
@@ -177,7 +176,7 @@ impl Drawn {
         // Where rounding decides when something happens nothing is to be compared.
         end = events.iter().filter(|event| event.by_rounding).fold(end, |end, event| end.min(event.time));
         let changes = self.tables.elements.iter().map(|element| {
-            let own = events.iter().filter(|event| what(element.kind) == Some(event.part.what));
+            let own = events.iter().filter(|event| element.kind.what() == Some(event.part.what));
             own.map(|event| Change { time: event.time, code: event.to.code() }).collect()
         });
         Some(Told { changes: changes.collect(), end })
@@ -214,7 +213,7 @@ impl Drawn {
     /// The first time at which two lists are not the same: which element.
     fn parting(&self, a: &Told, b: &Told) -> Option<(f64, usize)> {
         let (end, near) = (a.end.min(b.end), NEAR * self.until());
-        let shown = |&element: &usize| what(self.tables.elements[element].kind).is_some();
+        let shown = |&element: &usize| self.tables.elements[element].kind.what().is_some();
         let of_element = |element: usize| {
             let (own, other) = (self.lasting(a, element, f64::MAX), self.lasting(b, element, f64::MAX));
             let same = |(a, b): (&Change, &Change)| a.code == b.code && (a.time - b.time).abs() <= near;
@@ -239,7 +238,7 @@ impl Drawn {
     fn compare(&self, tool: Tool, own: &Told, other: Told, result: &mut Replayed) {
         let end = self.determined(own, tool.error());
         let own = Told { end, ..own.clone() };
-        let shown = (0..self.tables.elements.len()).filter(|&e| what(self.tables.elements[e].kind).is_some());
+        let shown = (0..self.tables.elements.len()).filter(|&e| self.tables.elements[e].kind.what().is_some());
         for element in shown {
             result.compared += self.lasting(&own, element, end).len();
             result.all += self.lasting(&own, element, f64::MAX).len();
@@ -279,52 +278,6 @@ fn held(values: &[f64], random: &mut Random) -> Vec<f64> {
         now
     };
     (0..STEPS).map(|_| next()).collect()
-}
-
-/// The part that events name; none of the torque of a gear.
-fn what(kind: ElementKind) -> Option<What> {
-    match kind {
-        ElementKind::Body(body) => Some(What::Body(body)),
-        ElementKind::GearTorque(_) => None,
-        ElementKind::Voltage(drive) => Some(What::Voltage(drive)),
-        ElementKind::Current(drive) => Some(What::Current(drive)),
-        ElementKind::Span(spring) => Some(What::Span(spring)),
-        ElementKind::Gap(spring) => Some(What::Gap(spring)),
-        ElementKind::Line(spring) => Some(What::Line(spring)),
-    }
-}
-
-/// A folder of its own that is removed at the end.
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new() -> Result<Self, String> {
-        static NEXT: AtomicU64 = AtomicU64::new(0);
-        let number = NEXT.fetch_add(1, Ordering::Relaxed);
-        let path = std::env::temp_dir().join(format!("taut-replay-{}-{number}", std::process::id()));
-        std::fs::create_dir_all(&path).map_err(|error| format!("no folder: {error}"))?;
-        Ok(Self(path))
-    }
-
-    fn write(&self, name: &str, content: impl AsRef<[u8]>) -> Result<(), String> {
-        std::fs::write(self.0.join(name), content).map_err(|error| format!("{name}: {error}"))
-    }
-
-    fn run(&self, program: &Path, words: &[&str]) -> Result<String, String> {
-        let mut command = Command::new(program);
-        command.current_dir(&self.0).args(words).env("PYTHONDONTWRITEBYTECODE", "1");
-        let output = command.output().map_err(|error| format!("{}: {error}", program.display()))?;
-        match output.status.success() {
-            true => Ok(String::from_utf8_lossy(&output.stdout).into_owned()),
-            false => Err(format!("{}: {}", program.display(), String::from_utf8_lossy(&output.stderr))),
-        }
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_dir_all(&self.0);
-    }
 }
 
 /// Replays the machines by a tool. Errors: a tool that does not run at all.
@@ -395,7 +348,7 @@ fn in_c(folder: &Folder, gcc: &Path, machine: &Drawn) -> Result<Raw, String> {
     );
     folder.write("main.c", main)?;
     folder.run(gcc, &["-std=c99", "-O0", "-ffp-contract=off", "-o", "axis", "main.c"])?;
-    let told = folder.run(&folder.0.join("axis"), &[])?;
+    let told = folder.run(&folder.join("axis"), &[])?;
     // Left its travel: the same as taut, or told by what came before.
     let is_refused = told.lines().any(|line| line.starts_with("status") && line != "status 2");
     Ok((!is_refused).then(|| told.lines().filter_map(line).collect()))

@@ -271,7 +271,10 @@ for (const by of ["mouse", "touch", "keys"]) {
     expect(Math.abs(now.width - wide) < 2, `${before.width} pixels became ${now.width}, not ${wide}`);
     expect(Math.abs(now.height - before.height - 48) < 2, `${before.height} pixels became ${now.height}`);
     expect((await bar("wide").getAttribute("aria-valuetext")) === "9 of 12 columns", "the width is not told");
-    const drawn = await page.locator("[data-panel=position] canvas").first().evaluate(canvas => canvas.clientHeight);
+    const drawn = await page
+      .locator("[data-panel=position] canvas")
+      .first()
+      .evaluate(canvas => canvas.clientHeight);
     expect(Math.abs(drawn - now.height) < 2, `curves are drawn ${drawn} high`);
     await again(page);
     const then = await box();

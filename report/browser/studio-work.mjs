@@ -424,6 +424,30 @@ await test("a sweep is stopped, and keeps what is done", async open => {
   expect((await page.evaluate(() => window.studio.view)) === "sweep", "");
 });
 
+await test("of a sweep whose case is left nothing arrives, and the next one starts at once", async open => {
+  const {page} = await open((await harness.serve([TABLE4])).address);
+  await go(page, "sweep");
+  await page.locator("#runs").fill("20000");
+  await page.click("#sweep");
+  await page.waitForFunction(() => / of 20000 runs/.test(document.querySelector("#sweep-status").textContent));
+  await page.evaluate(() => window.studio.open(window.studio.text));
+  await quiet(page);
+  // The server sent the rows that it had, and the answer.
+  await page.waitForTimeout(1000);
+  const left = await page.evaluate(() => ({
+    status: document.querySelector("#sweep-status").textContent,
+    trouble: document.querySelector("#view-sweep .mistake").textContent,
+    figures: document.querySelector("[data-picture=Histogram]").checkVisibility(),
+    stop: document.querySelector("#sweep-stop").checkVisibility(),
+  }));
+  expect(!left.status && !left.trouble && !left.figures && !left.stop, JSON.stringify(left));
+  await page.locator("#runs").fill("8");
+  await page.click("#sweep");
+  await page.waitForFunction(() => /^8 runs in/.test(document.querySelector("#sweep-status").textContent));
+  const listed = await page.evaluate(() => document.querySelectorAll("#view-sweep .card tbody tr").length);
+  expect(listed === 8, `${listed} runs are listed`);
+});
+
 for (const [width, height, colorScheme] of [
   [820, 1100, "light"],
   [390, 844, "light"],

@@ -453,7 +453,10 @@ await test("the report, the rows and a plot can be kept", async open => {
   const keep = page.locator("[data-panel=position] .keep");
   await keep.locator("summary").click();
   const svg = await kept(() => keep.locator("button", {hasText: "SVG"}).click());
-  const curves = svg.split("<svg x=").at(-1).match(/<path stroke="#\w+" d="M[^"]{20,}" stroke-width="1.8"/g);
+  const curves = svg
+    .split("<svg x=")
+    .at(-1)
+    .match(/<path stroke="#\w+" d="M[^"]{20,}" stroke-width="1.8"/g);
   expect(svg.startsWith("<svg") && svg.endsWith("</svg>\n") && curves.length >= 2, svg.slice(0, 400));
   // The menu closes behind what is kept.
   await keep.locator("summary").click();

@@ -4,6 +4,17 @@ import {element} from "./format.js";
 
 const MOST = 64 << 20;
 
+/** A paragraph for an error: `tell` shows it, with words before it, and hides the paragraph where there is none.
+ * @param {Object} [attributes] @returns {any} */
+export function errorPlace(attributes = {}) {
+  const place = element("p", {class: "mistake", role: "alert", hidden: true, ...attributes});
+  place.tell = (error, before = "") => {
+    place.hidden = !error;
+    place.textContent = error ? before + wordsOf(error) : "";
+  };
+  return place;
+}
+
 /**
  * @param {{id: string, words: string, accept: string, many?: boolean,
  * take: (files: {name: string, path: string}[]) => void, failed: (error: Error) => void,

@@ -2,7 +2,8 @@
 // From a log to a model: drop files, say what their columns are, see what they determine, fit, keep.
 import {download, element, fileName, fold, number, rowHead, svg, table} from "./format.js";
 import {Picture} from "./picture.js";
-import {dropPlace, wordsOf} from "./drop.js";
+import {dropPlace, errorPlace, wordsOf} from "./drop.js";
+import {LongWork} from "./long-work.js";
 import {showReport} from "./modes.js";
 
 /** @typedef {import("./app.js").App} App */
@@ -40,15 +41,13 @@ class Logs {
     this.app = app;
     /** @type {LogFile[]} */
     this.files = [];
-    /** @type {number | null} the work under way */
-    this.work = null;
     this.result = null;
     this.begun = 0;
     /** @type {{x: number[], y: number[]}} */
     this.costs = {x: [], y: []};
     /** @type {Map<string, Picture>} */
     this.pictures = new Map();
-    this.trouble = element("p", {class: "mistake", id: "fit-trouble", role: "alert", hidden: true});
+    this.trouble = errorPlace({id: "fit-trouble"});
     this.list = element("div", {class: "log-files"});
     this.unread = element("div", {class: "mistake", id: "unread", role: "alert"});
     this.own = element(
@@ -63,12 +62,10 @@ class Logs {
       "What do the logs determine?",
     );
     this.fitButton = element("button", {type: "button", id: "fit", class: "strong", onclick: () => this.fit()}, "Fit");
-    this.stopButton = element(
-      "button",
-      {type: "button", id: "fit-stop", hidden: true, onclick: () => this.stop()},
-      "Stop, keep the best",
-    );
+    const stop = {id: "fit-stop", words: "Stop, keep the best"};
+    this.work = new LongWork(app.wire, [this.checkButton, this.fitButton], stop);
     this.status = element("p", {class: "quiet", role: "status", id: "fit-status"});
+    this.work.stopButton.addEventListener("click", () => (this.status.textContent = "Stopping…"));
     /** Seconds, which nobody wants read out. */
     this.clock = element("span", {class: "quiet", "aria-hidden": "true"});
     this.ticking = 0;
@@ -99,7 +96,7 @@ class Logs {
       element("h3", {}, "2. What is searched for"),
       this.plan,
       element("h3", {}, "3. Check and fit"),
-      element("p", {class: "buttons"}, this.checkButton, this.fitButton, this.stopButton, this.clock),
+      element("p", {class: "buttons"}, this.checkButton, this.fitButton, this.work.stopButton, this.clock),
       this.status,
       this.trouble,
       this.live,
@@ -130,15 +127,10 @@ class Logs {
     );
   }
 
-  tell(error) {
-    this.trouble.hidden = !error;
-    this.trouble.textContent = error ? wordsOf(error) : "";
-  }
-
   // ---- Logs
 
   async take(files) {
-    this.tell(null);
+    this.trouble.tell(null);
     this.unread.replaceChildren();
     for (const file of files) {
       try {
@@ -160,11 +152,11 @@ class Logs {
 
   /** Another case was opened: what the logs told of the one before is none of it. */
   reset() {
-    if (this.work !== null) this.app.wire.cancel(this.work);
+    this.work.leave();
     this.end("");
     this.shape = "";
     this.close();
-    this.tell(null);
+    this.trouble.tell(null);
     if (this.app.view === key) this.refresh();
   }
 
@@ -268,10 +260,8 @@ class Logs {
   // ---- Works
 
   begin(words) {
-    this.tell(null);
+    this.trouble.tell(null);
     this.status.textContent = words;
-    this.checkButton.disabled = this.fitButton.disabled = true;
-    this.stopButton.hidden = false;
     this.begun = performance.now();
     const tick = () => {
       const seconds = Math.floor((performance.now() - this.begun) / 1000);
@@ -282,11 +272,8 @@ class Logs {
   }
 
   end(words) {
-    this.work = null;
     clearInterval(this.ticking);
     this.clock.textContent = "";
-    this.checkButton.disabled = this.fitButton.disabled = false;
-    this.stopButton.hidden = true;
     this.status.textContent = words;
     if (words) this.app.say(words);
   }
@@ -298,28 +285,18 @@ class Logs {
     this.status.textContent = "";
   }
 
-  stop() {
-    if (this.work !== null) this.app.wire.cancel(this.work);
-    this.status.textContent = "Stopping…";
-  }
-
   async check() {
     this.begin("Looking at the logs…");
     this.live.hidden = true;
-    const asked = this.app.wire.ask("check", this.body(), step => {
-      if (step.step && this.work === asked.id)
-        this.status.textContent = `Looking at the logs: step ${step.step}, cost ${number(step.cost, 4)}`;
-    });
-    this.work = asked.id;
     try {
-      const {head} = await asked;
-      if (this.work !== asked.id) return;
+      const {head} = await this.work.ask("check", this.body(), ({step, cost}) => {
+        if (step) this.status.textContent = `Looking at the logs: step ${step}, cost ${number(cost, 4)}`;
+      });
       showReport(this.checked, head.html);
       this.checked.dataset.of = "check";
       this.end(`Looked at in ${this.seconds()} s.`);
     } catch (error) {
-      if (this.work !== asked.id) return;
-      this.tell(error);
+      this.trouble.tell(error);
       this.end("");
     }
   }
@@ -336,19 +313,13 @@ class Logs {
     this.pictures = new Map();
     this.overlays.replaceChildren();
     this.moving.replaceChildren();
-    const asked = this.app.wire.ask("fit", this.body(), step => {
-      if (this.work === asked.id) this.step(step);
-    });
-    this.work = asked.id;
     try {
-      const {head} = await asked;
-      if (this.work !== asked.id) return;
+      const {head} = await this.work.ask("fit", this.body(), step => this.step(step));
       this.show(head);
       this.end(`${head.ending}. ${this.seconds()} s.`);
     } catch (error) {
-      if (this.work !== asked.id) return;
       this.live.hidden = true;
-      this.tell(error);
+      this.trouble.tell(error);
       this.end("");
     }
   }

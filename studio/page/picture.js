@@ -339,11 +339,13 @@ export class Picture {
       return;
     }
     const [s, i] = this.cursor || [rows[0], -1];
-    const go = (/** @type {number} */ by, curves = 0) => () => {
-      const at = rows[(rows.indexOf(s) + curves + rows.length) % rows.length];
-      this.cursor = [at, limited(i + by, 0, this.series[at].x.length - 1)];
-      this.followed(event.shiftKey);
-    };
+    const go =
+      (/** @type {number} */ by, curves = 0) =>
+      () => {
+        const at = rows[(rows.indexOf(s) + curves + rows.length) % rows.length];
+        this.cursor = [at, limited(i + by, 0, this.series[at].x.length - 1)];
+        this.followed(event.shiftKey);
+      };
     const steps = {ArrowRight: 1, ArrowLeft: -1, PageDown: 10, PageUp: -10, Home: -Infinity, End: Infinity};
     const acts = Object.entries(steps).map(([key, by]) => [key, go(by)]);
     obey(event, {...Object.fromEntries(acts), ArrowDown: go(0, 1), ArrowUp: go(0, -1)});

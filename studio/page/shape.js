@@ -1,7 +1,7 @@
 // @ts-check
 // Input shapers: drop a spectrum, or samples of an accelerometer, and see shapers over it.
 import {element} from "./format.js";
-import {dropPlace, wordsOf} from "./drop.js";
+import {dropPlace, errorPlace} from "./drop.js";
 import {showReport} from "./modes.js";
 
 /** @typedef {import("./app.js").App} App */
@@ -13,7 +13,7 @@ export const key = "shape",
 export function mount(root, app) {
   const told = element("p", {class: "quiet", role: "status", id: "shape-status"}),
     body = element("div", {class: "report page"});
-  const trouble = element("p", {class: "mistake", role: "alert", hidden: true});
+  const trouble = errorPlace();
   const axis = element(
     "select",
     {id: "shape-axis", onchange: () => again()},
@@ -43,7 +43,7 @@ export function mount(root, app) {
         files = sent.slice(0, 2);
         again();
       },
-      failed: error => tell(error),
+      failed: error => trouble.tell(error),
       wire: app.wire,
     }),
     element("p", {class: "fields"}, element("label", {for: "shape-axis"}, "Axis of the accelerometer: ", axis)),
@@ -52,14 +52,9 @@ export function mount(root, app) {
     body,
   );
 
-  function tell(error) {
-    trouble.hidden = !error;
-    trouble.textContent = error ? wordsOf(error) : "";
-  }
-
   async function again() {
     if (!files.length) return;
-    tell(null);
+    trouble.tell(null);
     told.textContent = "Choosing…";
     try {
       const {head} = await app.wire.ask("shape", {paths: files.map(file => file.path), axis: axis.value || null});
@@ -68,7 +63,7 @@ export function mount(root, app) {
     } catch (error) {
       body.replaceChildren();
       told.textContent = "";
-      tell(error);
+      trouble.tell(error);
     }
   }
 }

@@ -3,7 +3,8 @@
 // in all, with its trajectories and parameters.
 import {element, number, rowHead, table} from "./format.js";
 import {Picture, histogram} from "./picture.js";
-import {wordsOf} from "./drop.js";
+import {errorPlace} from "./drop.js";
+import {LongWork} from "./long-work.js";
 
 /** @typedef {import("./app.js").App} App */
 
@@ -37,7 +38,6 @@ class Sweep {
   constructor(root, app) {
     this.app = app;
     this.shape = "";
-    this.work = null;
     /** @type {any[]} */
     this.headings = [];
     /** Rows of all columns, in the order in which they came. @type {number[][]} */
@@ -53,20 +53,9 @@ class Sweep {
       ...DESIGNS.map(([value, words]) => element("option", {value}, words)),
     );
     this.go = element("button", {type: "button", id: "sweep", class: "strong", onclick: () => this.sweep()}, "Sweep");
-    this.stopButton = element(
-      "button",
-      {
-        type: "button",
-        id: "sweep-stop",
-        hidden: true,
-        onclick: () => {
-          if (this.work !== null) app.wire.cancel(this.work);
-        },
-      },
-      "Stop, keep what is done",
-    );
+    this.work = new LongWork(app.wire, [this.go], {id: "sweep-stop", words: "Stop, keep what is done"});
     this.status = element("p", {class: "quiet", role: "status", id: "sweep-status"});
-    this.trouble = element("p", {class: "mistake", role: "alert", hidden: true});
+    this.trouble = errorPlace();
     this.group = element("select", {id: "sweep-group", onchange: () => this.figures()});
     this.figure = element("select", {
       id: "sweep-figure",
@@ -141,7 +130,7 @@ class Sweep {
         element("label", {for: "runs"}, "Runs: ", this.runs),
         element("label", {for: "design"}, "Points: ", this.design),
       ),
-      element("p", {class: "buttons"}, this.go, this.stopButton),
+      element("p", {class: "buttons"}, this.go, this.work.stopButton),
       this.status,
       this.trouble,
       this.shown,
@@ -186,14 +175,9 @@ class Sweep {
     };
   }
 
-  tell(error) {
-    this.trouble.hidden = !error;
-    this.trouble.textContent = error ? wordsOf(error) : "";
-  }
-
   async sweep() {
     const {app} = this;
-    this.tell(null);
+    this.trouble.tell(null);
     this.rows = [];
     this.headings = [];
     this.brushes.clear();
@@ -201,21 +185,15 @@ class Sweep {
     this.paths.show([]);
     this.table.replaceChildren();
     this.asked = this.body();
-    this.go.disabled = true;
-    this.stopButton.hidden = false;
     this.status.textContent = "Running…";
     const begun = performance.now();
-    const asked = app.wire.ask("sweep", this.asked, step => {
-      if (this.work !== asked.id) return;
-      if (step.headings) this.begin(step.headings);
-      for (const row of step.rows) this.rows.push(row.map(value => (value >= 1e299 ? NaN : value)));
-      this.status.textContent = `${this.rows.length} of ${step.runs} runs`;
-      if (step.rows.length) this.draw();
-    });
-    this.work = asked.id;
     try {
-      const {head, columns} = await asked;
-      if (this.work !== asked.id) return;
+      const {head, columns} = await this.work.ask("sweep", this.asked, step => {
+        if (step.headings) this.begin(step.headings);
+        for (const row of step.rows) this.rows.push(row.map(value => (value >= 1e299 ? NaN : value)));
+        this.status.textContent = `${this.rows.length} of ${step.runs} runs`;
+        if (step.rows.length) this.draw();
+      });
       if (!this.headings.length) this.begin(head.headings);
       this.experiments = head.experiments;
       // Moves have no trajectories here.
@@ -229,26 +207,17 @@ class Sweep {
       this.draw();
       this.traces();
     } catch (error) {
-      if (this.work !== asked.id) return;
       this.status.textContent = "";
-      this.tell(error);
+      this.trouble.tell(error);
     }
-    this.end();
-  }
-
-  end() {
-    this.work = null;
-    this.go.disabled = false;
-    this.stopButton.hidden = true;
   }
 
   /** Another case was opened: what was computed of the one before says nothing of it. */
   leave() {
-    if (this.work !== null) this.app.wire.cancel(this.work);
-    this.end();
+    this.work.leave();
     this.shown.hidden = true;
     this.status.textContent = "";
-    this.tell(null);
+    this.trouble.tell(null);
   }
 
   // ---- Figures
@@ -272,7 +241,7 @@ class Sweep {
     if (own.some(([, k]) => String(k) === before)) this.figure.value = before;
     this.brushes.clear();
     this.draw();
-    if (this.rows.length && this.work === null) this.traces();
+    if (this.rows.length && !this.work.isRunning) this.traces();
   }
 
   /** The runs that every brush holds. */
@@ -356,7 +325,7 @@ class Sweep {
     this.chosen.textContent = isAll
       ? `${this.rows.length} runs, none chosen.`
       : `${chosen.length} of ${this.rows.length} runs chosen.`;
-    if (this.work === null) this.list(chosen, figure, f);
+    if (!this.work.isRunning) this.list(chosen, figure, f);
   }
 
   /** The chosen runs with their parameters. */
@@ -387,10 +356,9 @@ class Sweep {
       },
       (answer, error) => {
         if (!answer) {
-          this.tell(error);
+          this.trouble.tell(error);
           return;
         }
-        if (answer.head.replaced) return;
         const {panels} = answer.head,
           curves = panels.flatMap(panel => panel.curves.map(curve => ({panel, curve})));
         const names = curves.map(({panel, curve}) => `${panel.title}: ${curve.name}`),

@@ -2,9 +2,10 @@
 // A controller and its moves: gains under sliders, the cart's error and Nyquist's curve with them, and the tuning.
 import {element, number, rowHead, table} from "./format.js";
 import {Picture} from "./picture.js";
-import {wordsOf} from "./drop.js";
+import {errorPlace} from "./drop.js";
 import {showReport} from "./modes.js";
 import {Row} from "./parameters.js";
+import {LongWork} from "./long-work.js";
 
 /** @typedef {import("./app.js").App} App */
 
@@ -30,11 +31,10 @@ class Tune {
     this.app = app;
     this.move = 0;
     this.sent = "";
-    this.work = null;
     /** @type {any[]} */
     this.controllers = [];
     this.told = element("p", {class: "quiet", role: "status", id: "loop-status"});
-    this.trouble = element("p", {class: "mistake", role: "alert", hidden: true});
+    this.trouble = errorPlace();
     this.choice = element(
       "select",
       {id: "controller", onchange: () => this.take()},
@@ -91,18 +91,7 @@ class Tune {
       {type: "button", id: "tune", class: "strong", onclick: () => this.tune()},
       "Tune",
     );
-    this.stopButton = element(
-      "button",
-      {
-        type: "button",
-        id: "tune-stop",
-        hidden: true,
-        onclick: () => {
-          if (this.work !== null) app.wire.cancel(this.work);
-        },
-      },
-      "Stop, keep the best",
-    );
+    this.work = new LongWork(app.wire, [this.tuneButton], {id: "tune-stop", words: "Stop, keep the best"});
     this.spread = element("input", {
       type: "number",
       id: "spread",
@@ -159,7 +148,7 @@ class Tune {
         "p",
         {class: "buttons"},
         this.tuneButton,
-        this.stopButton,
+        this.work.stopButton,
         element("label", {for: "spread"}, "Parameters may be off by ", this.spread, " %"),
       ),
       this.status,
@@ -195,11 +184,8 @@ class Tune {
   }
 
   tell(error) {
-    this.trouble.hidden = !error;
     const hasController = this.app.run && this.app.run.head.has_controller;
-    this.trouble.textContent = error
-      ? (hasController ? "" : "Choose a controller above, or write one. As the case stands, ") + wordsOf(error)
-      : "";
+    this.trouble.tell(error, hasController ? "" : "Choose a controller above, or write one. As the case stands, ");
   }
 
   // ---- The loop
@@ -221,7 +207,6 @@ class Tune {
           this.tell(error);
           return;
         }
-        if (answer.head.replaced) return;
         this.tell(null);
         this.show(answer);
       },
@@ -321,34 +306,20 @@ class Tune {
     this.tell(null);
     this.result.hidden = true;
     this.report.replaceChildren();
-    this.tuneButton.disabled = true;
-    this.stopButton.hidden = false;
     this.status.textContent = "Searching…";
     const spread = this.spread.value === "" ? {} : {spread: Number(this.spread.value) / 100};
-    const asked = app.wire.ask("tune", {...app.body(), ...spread}, step => {
-      if (this.work === asked.id)
-        this.status.textContent = `${step.designs} looks at designs, ${number(step.took_s, 3)} s`;
-    });
-    this.work = asked.id;
     try {
-      const {head} = await asked;
-      if (this.work !== asked.id) return;
+      const {head} = await this.work.ask("tune", {...app.body(), ...spread}, step => {
+        this.status.textContent = `${step.designs} looks at designs, ${number(step.took_s, 3)} s`;
+      });
       this.tuned(head);
       this.status.textContent =
         `${head.stopped ? "Stopped: the best so far. " : ""}`
         + `${head.result.designs} designs in ${number(head.took_s, 3)} s.`;
     } catch (error) {
-      if (this.work !== asked.id) return;
       this.status.textContent = "";
       this.tell(error);
     }
-    this.end();
-  }
-
-  end() {
-    this.work = null;
-    this.tuneButton.disabled = false;
-    this.stopButton.hidden = true;
   }
 
   close() {
@@ -359,8 +330,7 @@ class Tune {
 
   /** Another case was opened: gains of the one before are none of it. */
   leave() {
-    if (this.work !== null) this.app.wire.cancel(this.work);
-    this.end();
+    this.work.leave();
     this.close();
     this.tell(null);
   }

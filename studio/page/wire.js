@@ -95,19 +95,27 @@ export class Wire {
    * @returns {Promise<Answer> & {id: number}} */
   ask(act, body = {}, progress = undefined) {
     const id = ++this.last;
-    const answer = this.carrier.ready.then(
-      () =>
-        new Promise((done, failed) => {
-          this.open.set(id, {done, failed, progress});
-          this.carrier.send({id, do: act, ...body});
-        }),
-    );
+    const answer = new Promise((done, failed) => {
+      this.open.set(id, {done, failed, progress});
+      const send = () => this.open.has(id) && this.carrier.send({id, do: act, ...body});
+      this.carrier.ready.then(send).catch(error => {
+        this.open.delete(id);
+        failed(error);
+      });
+    });
     return Object.assign(answer, {id});
   }
 
-  /** Stops long work. @param {number} id */
+  /** Stops long work; its answer is still to come. @param {number} id */
   cancel(id) {
     return this.ask("cancel", {of: id});
+  }
+
+  /** Stops long work and ends the wait for it: what arrives of it is dropped here, and its promise is never settled.
+   * @param {number} id */
+  leave(id) {
+    this.open.delete(id);
+    return this.cancel(id);
   }
 
   /** Sends a file. @param {File} file @returns {Promise<string>} the path that acts know it by */
@@ -116,7 +124,8 @@ export class Wire {
   }
 
   /** Asks for the newest of a kind alone: what is asked for while another of its kind is under way waits, and only the
-   * last that waits is asked for. So the last picture is always of the last value.
+   * last that waits is asked for. So the last picture is always of the last value. What the server replaced by a newer
+   * request of this kind has no answer to take.
    * @param {string} act
    * @param {() => Object} body made when it is sent
    * @param {(answer: Answer | null, error: Error | null) => void} take */
@@ -128,7 +137,7 @@ export class Wire {
       lane.next = null;
       this.ask(act, body())
         .then(
-          answer => take(answer, null),
+          answer => answer.head.replaced || take(answer, null),
           error => take(null, error),
         )
         .finally(() => {

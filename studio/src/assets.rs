@@ -36,6 +36,7 @@ const ASSETS: &[Asset] = page![
     "layout.js": SCRIPT,
     "link.js": SCRIPT,
     "logs.js": SCRIPT,
+    "long-work.js": SCRIPT,
     "main.js": SCRIPT,
     "modes.js": SCRIPT,
     "motion.js": SCRIPT,

@@ -12,13 +12,14 @@ pub mod stability;
 pub mod truths;
 pub mod wrong;
 
-use taut::case::Experiment;
+use taut::case::{Case, Experiment};
 use taut::friction::{Friction, Law, Shape};
 use taut::machine::{
     Amplifier, AmplifierMode, Belt, BeltMake, DriveUnit, Kind, Machine, Motor, Pulley, Slide, Spans, Travel,
 };
 use taut::mechanism::State;
 use taut::signal::Signal;
+use taut::solve::{Ending, Solution, Solver, simulate};
 
 /// A stage with the paper's motor and radius.
 pub fn paper_stage(stiffness: impl Into<Spans>, inertia: f64, pulley: Friction, cart: Friction) -> Machine {
@@ -72,6 +73,13 @@ pub fn table4() -> Machine {
 /// An experiment from rest with an output every millisecond.
 pub fn experiment(input: Signal, until: f64) -> Experiment {
     Experiment { name: "test".into(), inputs: vec![input], until, every: 1e-3, initial: State::default(), log: None }
+}
+
+/// The result of the first experiment of a case, which runs to its end.
+pub fn complete(case: &Case, solver: Solver) -> Solution {
+    let solution = simulate(&case.machine, &case.experiments[0], solver).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(solution.outcome.ending, Ending::Complete);
+    solution
 }
 
 /// F_s = 0.3 F_c on top of each body's Coulomb friction, v_s = 0.05 m/s at the belt.

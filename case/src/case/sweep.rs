@@ -87,7 +87,7 @@ impl Sampling {
     }
 
     /// True if the runs are drawn, as many as one wants.
-    pub fn is_drawn(self) -> bool {
+    pub(crate) fn is_drawn(self) -> bool {
         !matches!(self, Sampling::Grid | Sampling::OneAtATime)
     }
 }

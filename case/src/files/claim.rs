@@ -277,21 +277,14 @@ fn is_name_wrong(e: &io::Error) -> bool {
 
 #[cfg(all(test, unix))]
 mod tests {
+    use super::super::tests::{self as in_tests, names};
     use super::*;
     use std::os::unix::fs::symlink;
 
     fn folder(name: &str) -> PathBuf {
-        let folder = std::env::temp_dir().join(format!("taut-claim-{name}-{}", std::process::id()));
-        let _ = fs::remove_dir_all(&folder);
-        fs::create_dir_all(folder.join("far")).unwrap();
+        let folder = in_tests::folder(&format!("claim-{name}"));
+        fs::create_dir(folder.join("far")).unwrap();
         folder
-    }
-
-    fn names(folder: &Path) -> Vec<String> {
-        let mut names: Vec<String> =
-            fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().to_string_lossy().into_owned()).collect();
-        names.sort();
-        names
     }
 
     /// Two sweeps into one file mixed their rows.

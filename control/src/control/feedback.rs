@@ -122,7 +122,7 @@ impl Feedback {
     }
 
     /// Terms of the feedback for the precomputed terms of a frequency.
-    pub fn at_turn(&self, turn: &Turn) -> Terms {
+    pub(crate) fn at_turn(&self, turn: &Turn) -> Terms {
         let mut sums = self.direct.map(|direct| Complex::new(direct, 0.0));
         self.resolve(turn.change, &mut |state, value| {
             for (sum, input) in sums.iter_mut().zip(&self.inputs[state]) {
@@ -187,7 +187,7 @@ impl Feedback {
     }
 
     /// True if it uses the scale beside the encoder: N_x is not zero.
-    pub fn uses_scale(&self) -> bool {
+    pub(crate) fn uses_scale(&self) -> bool {
         self.uses(SCALE)
     }
 

@@ -49,14 +49,14 @@ impl Figures {
     }
 
     /// Figures of the sliding part with the largest error.
-    pub fn worst_load(&self) -> LoadFigures {
+    pub(crate) fn worst_load(&self) -> LoadFigures {
         let size = |load: &LoadFigures| load.error.peak.value.abs();
         let larger = |a: LoadFigures, b: LoadFigures| if size(&b) > size(&a) { b } else { a };
         self.loads.iter().copied().reduce(larger).unwrap_or_default()
     }
 
     /// Largest RMS current of all motors, A.
-    pub fn worst_current(&self) -> f64 {
+    pub(crate) fn worst_current(&self) -> f64 {
         self.drives.iter().map(|drive| drive.current.1).fold(0.0, f64::max)
     }
 

@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 
 /// A second-order filter, stepped once a sample.
 #[derive(Debug, Clone, Copy)]
-pub struct Biquad {
+pub(crate) struct Biquad {
     b: [f64; 3],
     a: [f64; 2],
     state: [Slot; 2],

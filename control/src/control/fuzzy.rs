@@ -7,7 +7,7 @@ use crate::design::Fuzzy;
 
 /// Evenly spaced triangular sets that add up to 1, products of memberships, and the weighted mean of the rules' values.
 #[derive(Debug, Clone)]
-pub struct FuzzyLaw {
+pub(crate) struct FuzzyLaw {
     rules: Fuzzy,
     every: f64,
     speed: Speed,
@@ -59,7 +59,7 @@ impl Law for FuzzyLaw {
 }
 
 /// The output of the rules for an error and its rate, both from −1 to 1; beyond that the outermost sets hold.
-pub fn infer<C: Calculator>(c: &mut C, rules: &[Vec<f64>], error: C::N, rate: C::N) -> C::N {
+pub(crate) fn infer<C: Calculator>(c: &mut C, rules: &[Vec<f64>], error: C::N, rate: C::N) -> C::N {
     // Two sets overlap at any point: index of the lower one, and membership of the upper one.
     let size = rules.len();
     let mut place = |[value, set, share]: [&'static str; 3], of: C::N| {

@@ -342,20 +342,17 @@ impl Observe for Gauge<'_> {
         for drive in &mut self.drives {
             drive.power(curve, self.is_brief);
         }
-        // A seam within rounding counts as passed.
-        let shortest = SHORTEST + 16.0 * f64::EPSILON * (curve.begin + curve.length) / curve.length;
-        let mut from = 0.0;
+        let (mut begin, mut from) = (curve.begin, 0.0);
         while from < 1.0 {
-            let begin = curve.begin + from * curve.length;
             let (mut references, mut seam) = ([Polynomial([0.0; TERMS]); SLIDES], f64::INFINITY);
             for (reference, profile) in references.iter_mut().zip(self.profiles) {
                 let (coefficients, until) = profile.piece(begin);
                 *reference = shifted(&coefficients, from, curve.length);
                 seam = seam.min(until);
             }
-            let to = ((seam - curve.begin) / curve.length).max(from + shortest).min(1.0);
+            let to = ((seam - curve.begin) / curve.length).min(1.0);
             self.track(curve, (from, to), &references);
-            from = to;
+            (begin, from) = (seam, to);
         }
         let end = self.profiles.first().map_or(0.0, Profile::end);
         for load in &mut self.loads {
@@ -385,6 +382,3 @@ impl Observe for Gauge<'_> {
         }
     }
 }
-
-/// Least fraction of a curve for a piece of the reference.
-const SHORTEST: f64 = 1e-9;

@@ -39,7 +39,7 @@ impl Kind {
     }
 
     /// Time between impulses, in damped periods.
-    pub fn spacing(self) -> f64 {
+    pub(crate) fn spacing(self) -> f64 {
         if self == Kind::Mzv { 0.375 } else { 0.5 }
     }
 

@@ -72,7 +72,7 @@ pub fn each(controllers: &mut [Standard]) -> Vec<&mut dyn Controller> {
 /// [`closed_loop`] for a search that runs it a thousand times, with controllers and shaped profiles made once: errors
 /// of the slides, settling and RMS current, equal to those of [`closed_loop`] (RMS values to rounding, the others to
 /// the last bit), and the ending.
-pub fn closed_loop_briefly(
+pub(crate) fn closed_loop_briefly(
     machine: &Machine,
     controllers: &mut [&mut dyn Controller],
     timing: &Loop,

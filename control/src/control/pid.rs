@@ -8,7 +8,7 @@ use crate::design::{Cascade, Pid};
 
 /// A PID controller: u = K_p e + K_i ∫e dt + K_d (c ẏ* − ẏ).
 #[derive(Debug, Clone)]
-pub struct PidLaw {
+pub(crate) struct PidLaw {
     gains: Pid,
     every: f64,
     integral: Slot,
@@ -67,7 +67,7 @@ impl Law for PidLaw {
 
 /// A position loop around a speed loop, around a current loop if there is one.
 #[derive(Debug, Clone)]
-pub struct CascadeLaw {
+pub(crate) struct CascadeLaw {
     gains: Cascade,
     every: f64,
     speed: Speed,

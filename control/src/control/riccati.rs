@@ -11,7 +11,7 @@ use crate::linear::eigen::{balance, scaled as balanced};
 use nalgebra::{DMatrix, DVector};
 
 /// Largest residual of a solution, relative to the largest term of the equation.
-pub const ACCURACY: f64 = 1e-10;
+pub(crate) const ACCURACY: f64 = 1e-10;
 
 /// The stabilising solution of a Riccati equation.
 #[derive(Debug, Clone)]

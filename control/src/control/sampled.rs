@@ -193,7 +193,7 @@ impl Sensor {
 }
 
 /// True if the encoder of this machine is at the cart.
-pub fn measures_cart(machine: &Machine) -> bool {
+pub(crate) fn measures_cart(machine: &Machine) -> bool {
     machine.encoder.is_some_and(|encoder| encoder.at == EncoderPlace::Cart)
 }
 

@@ -14,7 +14,7 @@ use nalgebra::Complex;
 use std::f64::consts::{PI, SQRT_2};
 
 /// Default damping ratio.
-pub const USUAL_DAMPING: f64 = 0.1;
+pub(crate) const USUAL_DAMPING: f64 = 0.1;
 
 /// Firmware whose definitions and rule of choice apply.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -404,7 +404,7 @@ pub fn residual_vibration(impulses: &[(f64, f64)], frequency: f64, damping: f64)
 }
 
 /// Checks that a damping ratio is at least 0 and below 1.
-pub fn check_damping(damping: f64) -> Result<()> {
+pub(crate) fn check_damping(damping: f64) -> Result<()> {
     if (0.0..1.0).contains(&damping) {
         return Ok(());
     }

@@ -10,7 +10,7 @@ use crate::machine::rigid::Rigid;
 ///
 /// With V = σ²/2 and M σ̇ = −M K sat(σ/Φ) + Δ the surface is reached, σ σ̇ < 0 for |σ| ≥ Φ, if K > |Δ|/M: [`required`].
 #[derive(Debug, Clone)]
-pub struct SlidingLaw {
+pub(crate) struct SlidingLaw {
     gains: SlidingMode,
     mass: f64,
     force_per_command: f64,

@@ -18,7 +18,7 @@ const STATES: usize = 2 * crate::mechanism::BODIES + crate::mechanism::DRIVES;
 
 /// A linear-quadratic regulator on the states that a Kalman filter estimates, both for the sampled axis with its delay.
 #[derive(Debug, Clone)]
-pub struct StateFeedbackLaw {
+pub(crate) struct StateFeedbackLaw {
     every: f64,
     /// Φ, row by row, without zeros.
     phi: Vec<Vec<(usize, f64)>>,

@@ -59,7 +59,7 @@ impl Clocked {
     }
 
     /// With exact positions instead of counts.
-    pub fn exactly(mut self) -> Self {
+    pub(crate) fn exactly(mut self) -> Self {
         self.sensors = self.sensors.into_iter().map(Sensors::exactly).collect();
         self
     }
@@ -70,12 +70,12 @@ impl Clocked {
     }
 
     /// True at a sample, false at the start of a delayed command.
-    pub fn is_at_sample(&self) -> bool {
+    pub(crate) fn is_at_sample(&self) -> bool {
         !self.halfway
     }
 
     /// The present commands.
-    pub fn acting(&self) -> Commands {
+    pub(crate) fn acting(&self) -> Commands {
         self.acting
     }
 

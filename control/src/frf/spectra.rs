@@ -156,7 +156,7 @@ impl Spectra {
     }
 
     /// The first measured quantity.
-    pub fn first_output(&self) -> Quantity {
+    pub(crate) fn first_output(&self) -> Quantity {
         self.outputs[0].0
     }
 

@@ -14,7 +14,7 @@ const MOST_STEPS: usize = 10_000;
 const MOST_TURNS: u32 = 8;
 
 /// Eigenvalues below this fraction of the matrix norm are zero within rounding.
-pub(crate) const NOTHING: f64 = 1e-13;
+const NOTHING: f64 = 1e-13;
 
 /// Diagonal D of powers of two for which rows and columns of D⁻¹ A D have similar norms (Osborne 1960, Parlett and
 /// Reinsch 1969); scaling by powers of two is exact.
@@ -65,21 +65,7 @@ pub(crate) fn eigenvalues(matrix: &DMatrix<f64>) -> Result<Vec<Complex<f64>>> {
     let (mut values, rest) = taken_apart(matrix);
     if rest.nrows() > 0 {
         let balanced = scaled(&rest, &balance(&rest));
-        let size = norm(&balanced);
-        let rough = schur(&balanced)?;
-        for (i, &value) in rough.iter().enumerate() {
-            if value.im < 0.0 {
-                continue;
-            }
-            let mut value = polished(&balanced, balanced.nrows(), value, distance(&rough, i));
-            if value.norm() <= NOTHING * size {
-                value = Complex::new(0.0, 0.0);
-            }
-            values.push(value);
-            if rough[i].im > 0.0 {
-                values.push(value.conj());
-            }
-        }
+        values.extend(polished(&balanced, balanced.nrows(), &schur(&balanced)?, norm(&balanced)));
     }
     sort(&mut values);
     Ok(values)
@@ -100,7 +86,7 @@ pub(crate) fn sort(values: &mut [Complex<f64>]) {
 }
 
 /// Distance to the nearest other eigenvalue.
-pub(crate) fn distance(values: &[Complex<f64>], of: usize) -> f64 {
+fn distance(values: &[Complex<f64>], of: usize) -> f64 {
     let others = values.iter().enumerate().filter(|(j, _)| *j != of);
     others.map(|(_, other)| (other - values[of]).norm()).fold(f64::INFINITY, f64::min)
 }
@@ -147,11 +133,26 @@ fn schur(matrix: &DMatrix<f64>) -> Result<Vec<Complex<f64>>> {
         .next("change a value of the case a little"))
 }
 
-/// Refines an eigenvalue s of M − s E; E is the unit matrix in its first `count` rows and zero in the others.
+/// Refines the approximate eigenvalues of M − s E, conjugates side by side; E is the unit matrix in its first `count`
+/// rows and zero in the others. Values that are zero within rounding of `size` become zero.
+pub(crate) fn polished(matrix: &DMatrix<f64>, count: usize, rough: &[Complex<f64>], size: f64) -> Vec<Complex<f64>> {
+    let mut values = Vec::with_capacity(rough.len());
+    for (i, &value) in rough.iter().enumerate().filter(|(_, value)| value.im >= 0.0) {
+        let better = refined(matrix, count, value, distance(rough, i));
+        let better = if better.norm() <= NOTHING * size { Complex::new(0.0, 0.0) } else { better };
+        values.push(better);
+        if value.im > 0.0 {
+            values.push(better.conj());
+        }
+    }
+    values
+}
+
+/// Refines one of them, s.
 ///
 /// By its right and left vectors: (M − s E) x ≈ 0, yᴴ (M − s E) ≈ 0, s ← s + yᴴ (M − s E) x / yᴴ E x. `apart` is the
 /// distance to the next one: a correction above a tenth of it is rejected.
-pub(crate) fn polished(matrix: &DMatrix<f64>, count: usize, s: Complex<f64>, apart: f64) -> Complex<f64> {
+fn refined(matrix: &DMatrix<f64>, count: usize, s: Complex<f64>, apart: f64) -> Complex<f64> {
     let whole = matrix.map(|v| Complex::new(v, 0.0));
     let n = whole.nrows();
     let shifted = |s: Complex<f64>| {

@@ -30,7 +30,8 @@ pub use model::{Operation, StateSpace, System, placed};
 pub use natural::{ElasticMode, Natural, RigidMode};
 pub use response::{Range, Response, Transfer};
 pub use travel::{Place, place, places, travel, undamped};
-pub use words::{assumptions, sticks};
+pub(crate) use words::assumptions;
+pub use words::sticks;
 pub use zeros::Zeros;
 
 use crate::error::Result;

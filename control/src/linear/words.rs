@@ -7,7 +7,7 @@ use crate::mechanism::{AmplifierMode, Kind, Mechanism};
 use crate::number::engineering_typed;
 
 /// Operating point and assumptions: a sentence for each nonlinear part of the machine.
-pub fn assumptions(machine: &Machine, operation: Operation) -> Vec<String> {
+pub(crate) fn assumptions(machine: &Machine, operation: Operation) -> Vec<String> {
     let plant = machine.mechanism();
     let held = |body: usize| operation.held[body] || operation.held[plant.leader(body)];
     let moving: Vec<usize> = leaders(&plant).filter(|body| !held(*body)).collect();

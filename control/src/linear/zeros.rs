@@ -4,7 +4,7 @@
 //! 18 (1982), which for one input and one output is: hold the output at zero, which removes one state, and check if the
 //! input determines the remaining output; otherwise repeat.
 
-use super::eigen::{NOTHING, balance, distance, norm, polished, rough, scaled, sort};
+use super::eigen::{balance, norm, polished, rough, scaled, sort};
 use crate::error::Result;
 use nalgebra::{Complex, DMatrix, DVector};
 
@@ -93,16 +93,7 @@ pub(crate) fn zeros(
     }
     // u = −c x/d holds it at zero.
     let rough = rough(&(&a - &b * c.transpose() / d))?;
-    for (i, &value) in rough.iter().enumerate().filter(|(_, value)| value.im >= 0.0) {
-        let mut value = polished(&whole, n, value, distance(&rough, i));
-        if value.norm() <= NOTHING * size {
-            value = Complex::new(0.0, 0.0);
-        }
-        values.push(value);
-        if rough[i].im > 0.0 {
-            values.push(value.conj());
-        }
-    }
+    values.extend(polished(&whole, n, &rough, size));
     sort(&mut values);
     Ok(Zeros { values, gain })
 }

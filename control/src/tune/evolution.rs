@@ -17,7 +17,7 @@ const FACTORS: [f64; 2] = [0.4, 0.9];
 
 /// Returns the members after this number of generations, the best first. `function` gets a point and the value to beat;
 /// if it is not better, it may return any value that is not below that.
-pub fn evolve(
+pub(crate) fn evolve(
     mut members: Vec<Found>,
     generations: usize,
     seed: u64,

@@ -133,7 +133,7 @@ fn four(value: f64) -> f64 {
 }
 
 /// The filters in the notation of the case file.
-pub fn filters_text(filters: &[Filter]) -> String {
+pub(crate) fn filters_text(filters: &[Filter]) -> String {
     let one = |filter: &Filter| match filter {
         Filter::Notch { frequency, depth, damping } => {
             format!("{{ notch = \"{frequency} Hz\", depth = {depth}, damping = {damping} }}")

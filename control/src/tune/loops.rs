@@ -292,7 +292,7 @@ impl Loops {
 /// Closed-loop response to disturbances at the commands, m per V or A, at ω, rad/s. A column for the commands of all
 /// drives in proportion to the travel of their belts when one slide moves alone; rows for the positions of all slides,
 /// true and by the drives' measurements. M is the number of slides.
-pub fn from_commands<const M: usize>(
+pub(crate) fn from_commands<const M: usize>(
     plant: &Plant,
     feedback: &Feedback,
     omega: f64,

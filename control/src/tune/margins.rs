@@ -192,7 +192,7 @@ impl Peaks {
     }
 
     /// True if the loop is stable.
-    pub fn is_stable(&self) -> bool {
+    pub(crate) fn is_stable(&self) -> bool {
         self.peaks[0].is_finite()
     }
 

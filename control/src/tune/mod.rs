@@ -31,18 +31,18 @@ mod work;
 
 pub use crate::design::placement::{first, place};
 pub use ahead::Ahead;
-pub use evolution::evolve;
 pub use family::{Corner, Family, MACHINES, Source};
 pub use gains::{Gain, gains};
 pub use hunting::{Hunt, hunting};
 pub use judged::{Figure, Forced, Judgement, Least, Limit, MoveVerdict, Standing, Verdict, Worse};
-pub use loops::{Break, Broken, Loops, breaks, from_commands, loops};
-pub(crate) use loops::{inverse, largest, over, smallest};
+pub use loops::{Break, Broken, Loops, breaks, loops};
+pub(crate) use loops::{from_commands, inverse, largest, over, smallest};
 pub use margins::{Breaks, Margins, Peaks, Rough};
-pub use objective::{AtWorst, BALANCES, Balance, MoveFigures, look, objective};
+pub(crate) use objective::BALANCES;
+pub use objective::{AtWorst, Balance, MoveFigures, look, objective};
 pub use plant::Plant;
 pub use reference::evolved;
-pub use search::{Found, minimise, minimise_below};
+pub use search::{Found, minimise};
 pub use unknown::SPREAD;
 pub use unknown::Unknown;
 

@@ -34,7 +34,7 @@ pub struct Balance {
 }
 
 /// The balances of the table of choices; the second is the objective.
-pub const BALANCES: [Balance; 3] = [
+pub(crate) const BALANCES: [Balance; 3] = [
     Balance { name: "stiff", error: 1.0, settling: 1.0, current: 0.1 },
     Balance { name: "balanced", error: 1.0, settling: 1.0, current: 1.0 },
     Balance { name: "gentle", error: 1.0, settling: 1.0, current: 10.0 },
@@ -82,7 +82,7 @@ impl Runner {
     }
 
     /// Figures of a move at samples only, in a third of the time.
-    pub fn glance(&mut self, machine: &Machine, motion: &Move, shaped: &[Profile]) -> Result<MoveFigures> {
+    pub(crate) fn glance(&mut self, machine: &Machine, motion: &Move, shaped: &[Profile]) -> Result<MoveFigures> {
         let seen = (motion.until, motion.window);
         let (figures, ending) =
             closed_loop_at_samples(machine, &mut self.controllers, &self.timing, shaped, seen, Solver::of(machine))?;

@@ -24,7 +24,7 @@ pub fn minimise(
 
 /// Minimises a function that receives the value to beat: if it is not better, it may return any value that is not below
 /// that, without changing the course of the search.
-pub fn minimise_below(
+pub(crate) fn minimise_below(
     start: &[f64],
     step: f64,
     accuracy: f64,

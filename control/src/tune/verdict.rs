@@ -94,7 +94,7 @@ impl Work<'_> {
 
     /// The verdict on a design whose ln J is at most `bar`; none otherwise, which is reported as soon as the machines
     /// run so far, in this order, show it.
-    pub fn verdict_below(&self, design: &Design, bar: f64, order: &[usize]) -> Result<Option<Verdict>> {
+    pub(crate) fn verdict_below(&self, design: &Design, bar: f64, order: &[usize]) -> Result<Option<Verdict>> {
         if let Some(known) = self.known.borrow().iter().find(|known| known.design == *design) {
             return Ok(Some(known.clone()).filter(|known| known.objective <= bar));
         }

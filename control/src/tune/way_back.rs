@@ -21,7 +21,7 @@ const HALVINGS: usize = 8;
 impl Work<'_> {
     /// The best verdict of the tuned gains and of the end of their path back to the file; and the limit that forces it
     /// to be worse, if any.
-    pub fn way_back(&mut self, before: &Verdict, after: Verdict) -> Result<(Verdict, Option<Forced>)> {
+    pub(crate) fn way_back(&mut self, before: &Verdict, after: Verdict) -> Result<(Verdict, Option<Forced>)> {
         let is_kept = self.excess(&before.worst) <= 1.0 || self.excess(&after.worst) > 1.0;
         if compare(before, &after) != Judgement::Worse || is_kept || (self.stop)() {
             return Ok((after, None));

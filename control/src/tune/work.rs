@@ -180,7 +180,7 @@ impl<'a> Work<'a> {
     }
 
     /// Excess of a design over the limits on the set, and its worst-case response to steps of command and reference.
-    pub fn on_set(&mut self, design: &Design) -> (f64, f64) {
+    pub(crate) fn on_set(&mut self, design: &Design) -> (f64, f64) {
         self.tried += 1;
         let Ok(feedback) = self.feedback(design) else { return (f64::INFINITY, f64::INFINITY) };
         let (mut most, mut slow) = (0.0_f64, 0.0_f64);
@@ -347,7 +347,7 @@ impl<'a> Work<'a> {
 
     /// A design without added filters, from number `own` on, that are not needed for the limits and do not improve it;
     /// `is_as_good` compares before and after.
-    pub fn pruned(
+    pub(crate) fn pruned(
         &mut self,
         mut verdict: Verdict,
         own: usize,

@@ -5,7 +5,7 @@ use crate::machine::{AmplifierMode, Machine};
 use std::f64::consts::PI;
 
 /// Bandwidth of each inner loop of a cascade relative to the loop around it.
-pub const CASCADE: f64 = 4.0;
+pub(crate) const CASCADE: f64 = 4.0;
 
 /// The design with gains that place the poles of M ẍ + d ẋ = g u by `bandwidth` (Hz) and `damping` ζ, without delay and
 /// sampling; none for a structure without such gains. A gain that is zero in the design stays zero.

@@ -78,7 +78,7 @@ pub fn velocity_of_decay(decay: f64) -> f64 {
 }
 
 /// The paper's F_τ for a Stribeck velocity v_s.
-pub fn decay_of_velocity(velocity: f64) -> f64 {
+pub(crate) fn decay_of_velocity(velocity: f64) -> f64 {
     1.0 / (velocity * velocity)
 }
 

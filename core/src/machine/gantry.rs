@@ -23,11 +23,11 @@ use super::geometry::{BodyAt, DriveAt, Geometry, Part, SlideAt, SpanAt, drive};
 use crate::mechanism::Label;
 
 /// Number of the left drive pulley (A) among the bodies.
-pub const LEFT: usize = 0;
+pub(crate) const LEFT: usize = 0;
 /// Number of the right drive pulley (B).
 pub const RIGHT: usize = 1;
 /// Number of the bridge.
-pub const BRIDGE: usize = 2;
+pub(crate) const BRIDGE: usize = 2;
 /// Number of the cart.
 pub const CART: usize = 3;
 /// Number of bodies with friction of their own.

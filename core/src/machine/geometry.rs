@@ -100,7 +100,7 @@ pub struct SpanAt {
     pub arms: &'static [(usize, Lever)],
     /// Change of its length from end to end per displacement of each slide; empty if its ends are fixed.
     pub follows: &'static [(usize, f64)],
-    /// Its elongation as a sum over those of [`Geometry::telling_spans`]: the spans of a belt add up to zero.
+    /// Its elongation as a sum over those of `Geometry::telling_spans`: the spans of a belt add up to zero.
     pub by_others: &'static [(usize, f64)],
 }
 
@@ -185,7 +185,7 @@ impl Geometry {
     }
 
     /// Spans whose elongations determine the position errors of all drives and the elongations of all other spans.
-    pub fn telling_spans(&self) -> impl Iterator<Item = usize> {
+    pub(crate) fn telling_spans(&self) -> impl Iterator<Item = usize> {
         let tells = |span: &usize| self.slides.iter().any(|slide| slide.error.iter().any(|(own, _)| own == span));
         (0..self.spans.len()).filter(tells)
     }

@@ -93,7 +93,7 @@ impl Rigid {
 
     /// One drive of a machine with several drives, without the load: its motor, with the mass and friction of its
     /// pulley.
-    pub fn of_pulley(machine: &Machine, drive: usize) -> Self {
+    pub(crate) fn of_pulley(machine: &Machine, drive: usize) -> Self {
         let (whole, r) = (Self::of_drive(machine, drive), machine.pulley_radius);
         let sides = [true, false].map(|forward| machine.drive_pulley.friction.side(forward));
         Self {
@@ -106,7 +106,7 @@ impl Rigid {
     }
 
     /// A slide as a mass with its friction and constant force, without a motor.
-    pub fn of_slide(machine: &Machine, number: usize) -> Option<Self> {
+    pub(crate) fn of_slide(machine: &Machine, number: usize) -> Option<Self> {
         let (slide, at) = machine.slides().zip(machine.geometry().slides).nth(number)?;
         let sides = [true, false].map(|forward| slide.friction.side(forward));
         let body = &machine.mechanism().bodies[at.body];
@@ -128,7 +128,7 @@ impl Rigid {
     }
 
     /// As the function without `_by`, for any calculator.
-    pub fn electrical_by<C: Calculator>(
+    pub(crate) fn electrical_by<C: Calculator>(
         &self,
         c: &mut C,
         force: C::N,
@@ -212,7 +212,7 @@ impl Rigid {
     }
 
     /// As the function without `_by`, for any calculator.
-    pub fn friction_by<C: Calculator>(&self, c: &mut C, speed: C::N, sign: C::N) -> (C::N, C::N) {
+    pub(crate) fn friction_by<C: Calculator>(&self, c: &mut C, speed: C::N, sign: C::N) -> (C::N, C::N) {
         let [viscous, coulomb] = [self.viscous, self.coulomb].map(|both| side(c, sign, both));
         (speed * viscous, sign * coulomb)
     }

@@ -291,7 +291,7 @@ impl Mechanism {
     ///
     /// `load` is the least and the largest sum of all other forces on the body; these differ only if a lossy gear holds
     /// a part.
-    pub fn friction_value(&self, body: usize, motion: Motion, speed: f64, load: (f64, f64)) -> f64 {
+    pub(crate) fn friction_value(&self, body: usize, motion: Motion, speed: f64, load: (f64, f64)) -> f64 {
         let law = self.friction(body);
         match motion {
             // F_f = b v ± F_c                                                   (15)

@@ -142,7 +142,7 @@ impl Layout {
     }
 
     /// Coefficients of a form in these coordinates.
-    pub fn on_coordinates(&self, form: &Form) -> State {
+    pub(crate) fn on_coordinates(&self, form: &Form) -> State {
         let mut row = State { position: [0.0; BODIES], speed: form.speed, current: form.current };
         for &(spring, body, weight) in &self.terms {
             row.position[body] += form.stretch[spring] * weight;

@@ -38,13 +38,13 @@ use std::sync::Arc;
 /// Maximum number of bodies.
 pub const BODIES: usize = 6;
 /// Maximum number of springs.
-pub const SPRINGS: usize = 8;
+pub(crate) const SPRINGS: usize = 8;
 /// Maximum number of drives.
 pub const DRIVES: usize = 3;
 /// Maximum of both together: three drives allow one body less than two drives.
-pub const BODIES_AND_DRIVES: usize = BODIES + 2;
+pub(crate) const BODIES_AND_DRIVES: usize = BODIES + 2;
 /// Maximum number of currents that are states: one for each brushed motor, two for each of two steppers.
-pub const CURRENTS: usize = 4;
+pub(crate) const CURRENTS: usize = 4;
 /// Maximum number of steppers of a machine, each with two currents.
 pub const STEPPERS: usize = CURRENTS / 2;
 
@@ -244,12 +244,12 @@ impl Drive {
     }
 
     /// Number of windings with currents of their own.
-    pub fn windings(&self) -> usize {
+    pub(crate) fn windings(&self) -> usize {
         if self.motor.stepper.is_some() { 2 } else { 1 }
     }
 
     /// True if its input differs from its terminal voltage and so has a column.
-    pub fn shows_input(&self) -> bool {
+    pub(crate) fn shows_input(&self) -> bool {
         let amplifier = &self.amplifier;
         amplifier.gain != 1.0
             || amplifier.mode != AmplifierMode::Voltage
@@ -466,7 +466,7 @@ impl Mechanism {
     }
 
     /// The rate of a spring's length.
-    pub fn stretch_rate(&self, spring: usize) -> Form {
+    pub(crate) fn stretch_rate(&self, spring: usize) -> Form {
         let mut rate = Form::ZERO;
         for &(body, arm) in &self.springs[spring].arms {
             rate.speed[body] += arm;

@@ -33,7 +33,7 @@ pub struct DriveMode {
 
 impl DriveMode {
     /// Drive within its limits, with positive gear torque.
-    pub const ORDINARY: Self =
+    pub(crate) const ORDINARY: Self =
         Self { torque_positive: true, voltage: Limit::Inside, current: Limit::Inside, slipped: 0 };
 }
 
@@ -221,7 +221,7 @@ impl Status {
     }
 
     /// True if both have the same code in results.
-    pub fn shows_as(self, other: Status) -> bool {
+    pub(crate) fn shows_as(self, other: Status) -> bool {
         match (self, other) {
             (Status::Slipped(own), Status::Slipped(other)) => own == other,
             _ => self.code() == other.code(),

@@ -8,7 +8,7 @@ use crate::machine::{Machine, Stepper};
 use crate::mechanism::{Mechanism, Mode, Shown, State, Status, What};
 use crate::plan::Experiment;
 use crate::signal::Signal;
-use crate::solve::{Closer, Curve, Event, Gap, Gaps, Observe, Polynomial, QUANTITIES, Reading, Stretch};
+use crate::solve::{Closer, Curve, Event, Gap, Gaps, Observe, Polynomial, QUANTITIES, Reading, Stretch, applied};
 use std::sync::Arc;
 
 /// Source of a peak: a reading, or a sum of readings.
@@ -249,9 +249,8 @@ impl Meter {
             return Vec::new();
         }
         let (mechanism, mut state) = (self.machine.mechanism(), State::default());
-        for (drive, command) in self.commands.iter().enumerate() {
-            let command = command.value(self.end);
-            let input = mechanism.microstep(drive).map_or(command, |step| (command / step).round() * step);
+        let inputs = applied(&self.commands, &mechanism, self.end);
+        for (drive, input) in inputs.into_iter().enumerate().take(self.commands.len()) {
             state.position[mechanism.drives[drive].pulley] = input * mechanism.angle_per_input(drive);
         }
         self.machine.by_drives(&state.position)

@@ -12,7 +12,7 @@ pub fn direction(reference: &Reference) -> f64 {
 }
 
 /// As the function without `_by`, for any calculator.
-pub fn direction_by<C: Calculator>(c: &mut C, reference: &Reference<C::N>) -> C::N {
+pub(crate) fn direction_by<C: Calculator>(c: &mut C, reference: &Reference<C::N>) -> C::N {
     let [forward, backward, none] = [1.0, -1.0, 0.0].map(|sign| c.number(sign));
     let mut sign = |of: C::N, rest: f64, or: C::N| {
         let or = c.choose(less(of, -rest), backward, or);

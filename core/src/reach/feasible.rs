@@ -102,7 +102,7 @@ impl Load {
     }
 
     /// True for limits of the motor or its supply, of which a loop, or the oscillation of a stepper, needs a reserve.
-    pub fn is_of_motor(&self) -> bool {
+    pub(crate) fn is_of_motor(&self) -> bool {
         ["voltage", "current", "pull_out"].contains(&self.limit)
     }
 }

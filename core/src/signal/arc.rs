@@ -23,7 +23,8 @@ pub struct Arc {
     pub clockwise: bool,
 }
 
-/// Largest difference of the radii at both ends, m, or as a share of them: what a file with three or four digits leaves.
+/// Largest difference of the radii at both ends, m, or as a share of them: what a file with three or four digits
+/// leaves.
 const UNLIKE: (f64, f64) = (1e-5, 1e-3);
 
 /// Error of the polynomials that an arc is taken for between two seams, m.

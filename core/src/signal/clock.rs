@@ -28,7 +28,7 @@ impl Now {
     }
 
     /// True if seams `spacing` apart can be told apart; false also for a spacing that is not a positive number.
-    pub fn resolves(self, spacing: f64) -> bool {
+    pub(crate) fn resolves(self, spacing: f64) -> bool {
         spacing > 1e-30 && spacing > 16.0 * self.slack
     }
 

@@ -8,8 +8,8 @@
 //! speed along the path. Comments stand after `;` or in brackets. Every block stops exactly (G61): no corner is passed
 //! at speed.
 //!
-//! The list of a machine in a plane may be that of a printer: its words E and Z, its M and T codes, and G28, G92 of other
-//! letters move neither coordinate and are passed over.
+//! The list of a machine in a plane may be that of a printer: its words E and Z, its M and T codes, and G28, G92 of
+//! other letters move neither coordinate and are passed over.
 
 use super::arc::Arc;
 use super::profile::{Leg, Limits};

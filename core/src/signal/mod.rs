@@ -70,7 +70,7 @@ pub fn shifted<const POWERS: usize>(coefficients: &[f64; POWERS], by: f64) -> [f
 
 impl Signal {
     /// The first jump, s and by how much, that is farther than `most` from `begin` on and before `until`.
-    pub fn first_jump(&self, begin: f64, most: f64, until: f64) -> Option<(f64, f64)> {
+    pub(crate) fn first_jump(&self, begin: f64, most: f64, until: f64) -> Option<(f64, f64)> {
         let (mut time, mut before) = (0.0, begin);
         while time < until {
             let piece = self.piece(time);

@@ -24,8 +24,9 @@ pub struct Stroke {
 }
 
 impl Stroke {
-    /// True in the first half, the time from the nearer end, and the piece there; `later` is true if a seam belongs to the
-    /// piece that begins there, false if one of the second half, which mirrors the first, belongs to the piece before.
+    /// True in the first half, the time from the nearer end, and the piece there; `later` is true if a seam belongs to
+    /// the piece that begins there, false if one of the second half, which mirrors the first, belongs to the piece
+    /// before.
     fn found(&self, t: f64, later: bool) -> (bool, f64, usize) {
         let middle = 0.5 * self.duration;
         let first = if later { t < middle } else { t <= middle };
@@ -275,8 +276,8 @@ impl Passage {
         [low.min(ends[0]), high.max(ends[1])]
     }
 
-    /// The direction in which it comes to its end, ±1, and from when on (s) a place beyond the end has been passed over; 0
-    /// of one that does not move.
+    /// The direction in which it comes to its end, ±1, and from when on (s) a place beyond the end has been passed
+    /// over; 0 of one that does not move.
     pub fn approach(&self) -> (f64, f64) {
         let Some(turn) = &self.turn else {
             let way = self.to - self.from;
@@ -339,8 +340,8 @@ impl Profile {
         Ok(Self { passages, start, end: time, shaper: Vec::new(), samples: Vec::new() })
     }
 
-    /// The chain of `legs` from `start` (m): a profile for each coordinate, all on one clock. Limits hold along the path,
-    /// and across an arc too, whose speed they lower; legs meet at rest.
+    /// The chain of `legs` from `start` (m): a profile for each coordinate, all on one clock. Limits hold along the
+    /// path, and across an arc too, whose speed they lower; legs meet at rest.
     ///
     /// ```
     /// use taut::signal::profile::{Leg, Limits, Profile};
@@ -474,8 +475,8 @@ impl Profile {
         }
     }
 
-    /// The position from `t` on as a polynomial Σ c_k (time − t)ᵏ, m, and until when it holds, s: later than `t` by more
-    /// than rounding.
+    /// The position from `t` on as a polynomial Σ c_k (time − t)ᵏ, m, and until when it holds, s: later than `t` by
+    /// more than rounding.
     pub fn piece(&self, t: f64) -> ([f64; 5], f64) {
         self.piece_beyond(t, 8.0 * f64::EPSILON * t.abs())
     }

@@ -4,6 +4,11 @@ use super::roots::first_fall;
 use crate::mechanism::{DRIVES, Mechanism};
 use crate::signal::{DEGREE, Piece, Signal, shifted};
 
+/// Inputs of all drives at `time` (s) as they apply them: rounded to microsteps for a stepper.
+pub(crate) fn applied(signals: &[Signal], mechanism: &Mechanism, time: f64) -> [f64; DRIVES] {
+    Pieces::of(signals, time).applied(mechanism, time).values(0.0, 0)
+}
+
 /// One polynomial for each input, from `start` to `end`; missing inputs are zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Pieces {

@@ -30,6 +30,7 @@ pub use crate::trajectory::Grid;
 pub use choice::{Choice, Kind};
 pub use estimate::ErrorEstimate;
 pub use general::{Dynamics, Quantity};
+pub(crate) use inputs::applied;
 use observe::Output;
 pub use observe::{Closer, Curve, Gap, Gaps, Observe, Polynomial, QUANTITIES, Reading, Stretch, TERMS, reading};
 pub use run::{Course, Run};
@@ -291,7 +292,7 @@ pub struct PositionError {
 
 impl PositionError {
     /// Largest error of a result that is called exact, m.
-    pub const EXACT: f64 = 1e-9;
+    pub(crate) const EXACT: f64 = 1e-9;
 
     /// True if it is small enough for the result to be called exact.
     pub fn is_exact(self) -> bool {

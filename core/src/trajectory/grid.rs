@@ -82,7 +82,7 @@ impl Grid {
     }
 
     /// This grid without a last, shorter interval.
-    pub fn beats(&self) -> Self {
+    pub(crate) fn beats(&self) -> Self {
         let near = (self.rest() / self.interval() - 1.0).abs() <= 2.0 * NEAR;
         if near || self.even == self.intervals {
             return *self;

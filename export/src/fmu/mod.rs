@@ -20,13 +20,13 @@ pub use sources::sources;
 pub use variable::{Causality, Kind, Role, Variability, Variable};
 
 /// Where the machine stands in the archive.
-pub const MACHINE: &str = "resources/machine.toml";
+pub(crate) const MACHINE: &str = "resources/machine.toml";
 
 /// Inputs that a controller inside has for the cart's reference: position and its first four derivatives.
 pub const REFERENCES: usize = 5;
 
 /// How the shared object is called in the archive, without its ending.
-pub const BINARY: &str = "taut_fmu";
+pub(crate) const BINARY: &str = "taut_fmu";
 
 /// The folder of binaries for the platform of this build and its ending: of FMI 3.0 and 2.0. None where the standard
 /// has no name for it.

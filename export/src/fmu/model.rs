@@ -7,8 +7,8 @@ use crate::chance::hash;
 use crate::control::Loop;
 use crate::design::{Design, FeedForwardModel};
 use crate::error::{Error, Result};
-use crate::machine::Machine;
-use crate::mechanism::{Amplifier, AmplifierMode, Drive, Heading, Label, Mechanism, Motor, Shown, State};
+use crate::machine::{Machine, SimpleDrive};
+use crate::mechanism::{Amplifier, AmplifierMode, Drive, Heading, Label, Mechanism, Shown, State};
 use crate::parameter::{self, Free, Parameter, unit_for};
 use crate::quantity::shortest;
 use crate::solve::{Dynamics, Quantity, check_stage};
@@ -395,18 +395,7 @@ fn is_tunable(machine: &Machine, key: &str) -> bool {
 /// A drive that is nothing but a force: u in N is its current, K_t = 1 N/A.
 fn push(body: usize) -> Drive {
     let label = Label { key: "force", name: "force" };
-    let motor = Motor {
-        torque_constant: 1.0,
-        back_emf_constant: 0.0,
-        resistance: 1.0,
-        inductance: 0.0,
-        rotor_inertia: 0.0,
-        gear_ratio: 1.0,
-        gear_efficiency: 1.0,
-        gear_play: None,
-        is_simple: true,
-        stepper: None,
-    };
+    let motor = SimpleDrive { force: 1.0, drag: 0.0 }.motor(1.0);
     let amplifier = Amplifier::ideal(AmplifierMode::Current, 1.0);
     Drive { label, voltage: label, current: label, pulley: body, shaft: body, motor, amplifier }
 }

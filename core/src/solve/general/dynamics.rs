@@ -12,8 +12,8 @@ use std::sync::Arc;
 /// Allowance for rounding and for a stranger's integrator, as a share of a quantity.
 const TOLERANCE: f64 = 1e-9;
 
-/// Every condition is shown as larger by this, in its SI unit. FMI counts a condition of zero as fallen: one that is zero
-/// where a mode begins, as the speed of a body that breaks away, has to be above zero.
+/// Every condition is shown as larger by this, in its SI unit. FMI counts a condition of zero as fallen: one that is
+/// zero where a mode begins, as the speed of a body that breaks away, has to be above zero.
 const SHIFT: f64 = 1.0 / (1_u64 << 40) as f64;
 
 /// A quantity that is integrated.

@@ -349,8 +349,8 @@ pub(super) struct Set {
     full: OnceLock<Full>,
 }
 
-/// The results of a step by all that it depends on, column by column: states, one, inputs and their powers, then the values
-/// of the forces at the points.
+/// The results of a step by all that it depends on, column by column: states, one, inputs and their powers, then the
+/// values of the forces at the points.
 pub(super) struct Full {
     /// Rows of the guards: `[guard][column]`.
     guards: Vec<Lane>,

@@ -17,8 +17,8 @@ pub(super) fn polynomial(powers: &[f64; POINTS], s: f64) -> f64 {
     powers.iter().rev().fold(0.0, |sum, power| sum * s + power)
 }
 
-/// True if a speed with these values at the points of a step can be slowest between two of them: it does not grow or fall
-/// all the way, nor at its ends.
+/// True if a speed with these values at the points of a step can be slowest between two of them: it does not grow or
+/// fall all the way, nor at its ends.
 #[inline(always)]
 pub(super) fn has_slowest(speeds: &[f64; POINTS]) -> bool {
     let slope = |weights: &[f64; POINTS]| weights.iter().zip(speeds).fold(0.0, |sum, (weight, v)| sum + weight * v);

@@ -56,8 +56,8 @@ pub(super) const SLOPES: [[f64; POINTS]; 2] = {
     slopes
 };
 
-/// Coefficients of ω(s) = s ∏ (s − c_i), by powers of s: the shape of what a quartic through the points leaves of a force
-/// whose fifth derivative does not change.
+/// Coefficients of ω(s) = s ∏ (s − c_i), by powers of s: the shape of what a quartic through the points leaves of a
+/// force whose fifth derivative does not change.
 const REST: [f64; POINTS + 1] = {
     let (mut product, mut p) = ([0.0; POINTS + 1], 0);
     product[0] = 1.0;

@@ -48,8 +48,8 @@ pub(super) struct Phasing {
     pub(super) told: usize,
 }
 
-/// Deviations of a force below this share of it are rounding, and so near to a node ω counts as this much: a tenth of its
-/// largest value between the first two.
+/// Deviations of a force below this share of it are rounding, and so near to a node ω counts as this much: a tenth of
+/// its largest value between the first two.
 const ROUNDING: f64 = 1e-13;
 const LEAST_REST: f64 = 5e-5;
 
@@ -157,8 +157,8 @@ impl Source {
     }
 
     /// Deviation of a friction force from the quartic through its points at a place between them, and by it D of the
-    /// deviation D ω(s). The nodes can miss a curve that is passed within a part of the step: its peak where the body is
-    /// slowest, and that of bristles, which zero speed hides, where the body is as fast as the curve is wide.
+    /// deviation D ω(s). The nodes can miss a curve that is passed within a part of the step: its peak where the body
+    /// is slowest, and that of bristles, which zero speed hides, where the body is as fast as the curve is wide.
     #[inline(always)]
     pub(super) fn missed(
         &self,

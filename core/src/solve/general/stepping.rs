@@ -50,8 +50,8 @@ struct Fall {
     slack: f64,
 }
 
-/// A step up to an event: the error of the step that ends there, as a multiple of the allowed one, infinite if that step
-/// has no solution; and true if the condition of the event does not hold at its time.
+/// A step up to an event: the error of the step that ends there, as a multiple of the allowed one, infinite if that
+/// step has no solution; and true if the condition of the event does not hold at its time.
 struct Part {
     hit: Hit,
     error: f64,
@@ -259,8 +259,8 @@ impl Core {
         (set, false)
     }
 
-    /// Takes a solved step up to the first guard that falls. Errors: the part up to there has a larger error than allowed,
-    /// and nothing was taken; the smallest step is taken all the same.
+    /// Takes a solved step up to the first guard that falls. Errors: the part up to there has a larger error than
+    /// allowed, and nothing was taken; the smallest step is taken all the same.
     fn take(
         &mut self,
         room: &mut Room,
@@ -416,8 +416,8 @@ impl Core {
         }
     }
 
-    /// Locates an event again whose condition is not at its limit there: by halving, between a time of the step at which
-    /// the condition holds and one at which it does not.
+    /// Locates an event again whose condition is not at its limit there: by halving, between a time of the step at
+    /// which the condition holds and one at which it does not.
     fn locate(
         &self,
         room: &mut Room,
@@ -495,8 +495,8 @@ struct Dense<'a> {
 }
 
 impl Dense<'_> {
-    /// Solves it again from the same beginning over `h` alone, and its series with the inputs of that length. Returns its
-    /// error as a multiple of the allowed one; infinity, and nothing has changed, if there is no solution.
+    /// Solves it again from the same beginning over `h` alone, and its series with the inputs of that length. Returns
+    /// its error as a multiple of the allowed one; infinity, and nothing has changed, if there is no solution.
     fn shorten(&mut self, room: &mut Room, stretch: &Stretch, number: u64, (from, h): (f64, f64)) -> f64 {
         let field = self.field;
         let before = room.clone();
