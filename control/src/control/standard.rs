@@ -145,7 +145,7 @@ fn split<C: Calculator>(
     let nothing = c.choose(less(forward, 0.0), back, zero);
     let back = c.choose(more(forward, 0.0), back, nothing);
     let back = c.name("back_emf", back);
-    let inner = (forward - back) * rigid.force_per_command() / rigid.force_per_ampere;
+    let inner = (forward - back) * rigid.amperes_per_command();
     (Some(c.name("inner", inner)), Some(back))
 }
 

@@ -165,7 +165,7 @@ impl StateFeedbackLaw {
     fn wanted<C: Calculator>(&self, c: &mut C, seen: &Seen<C::N>) -> [C::N; STATES] {
         let (r, reference) = (self.radius, &seen.reference);
         let needed = seen.compensation.needed_by(c, reference);
-        let current = needed.force[0] / seen.compensation.rigid.force_per_ampere;
+        let (current, _) = seen.compensation.rigid.current_by(c, needed.force[0], &needed.drive);
         let mut wanted = [c.number(0.0); STATES];
         for (i, (wanted, &state)) in wanted.iter_mut().zip(&self.states).enumerate() {
             let value = match state {

@@ -201,7 +201,7 @@ fn watch(machine: &Machine, design: &Design) -> f64 {
     });
     // Force per second and metre of constant error.
     let structure = design.structure.tunable();
-    let force = if structure.commands_current() { rigid.force_per_ampere } else { rigid.force_per_command() };
+    let force = if structure.commands_current() { rigid.driving_force_per_ampere() } else { rigid.force_per_command() };
     let rate = structure.ramp() * force;
     let ramp = dry / (rate.abs() * count);
     if ramp.is_finite() { (20.0 * ramp).clamp(4.0, LONGEST) } else { 10.0 }

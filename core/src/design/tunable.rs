@@ -253,7 +253,7 @@ impl Tunable for Cascade {
         });
         // With a current loop, back-EMF does not damp the axis.
         let (drag, push) = match current {
-            Some(_) => (rigid.viscous[0], rigid.force_per_ampere),
+            Some(_) => (rigid.viscous[0], rigid.driving_force_per_ampere()),
             None => (rigid.drag(), rigid.force_per_command()),
         };
         let (sign, push) = (push.signum(), push.abs());

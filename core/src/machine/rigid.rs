@@ -135,27 +135,44 @@ impl Rigid {
         rate: C::N,
         drive: &Reference<C::N>,
     ) -> (C::N, C::N) {
-        let force = c.name("force", force);
-        // n K_t i/r = n² J_r a/r² + (F − n² J_r a/r²)/e: what the rotor takes does not pass through the gear
-        let rotor = (self.efficiency < 1.0 && self.rotor > 0.0).then_some(self.rotor);
-        let passed = |c: &mut C, whole: C::N, change: C::N| match rotor {
-            Some(rotor) => c.name("passed", whole - change * rotor),
-            None => whole,
-        };
-        let gear = passed(c, force, drive.acceleration);
-        let per_ampere = self.per_ampere(c, gear, drive.speed);
-        let amperes = |gear: C::N, change: C::N| match rotor {
-            Some(rotor) => gear / per_ampere + change * (rotor / self.force_per_ampere),
-            None => gear / per_ampere,
-        };
-        let current = c.name("amperes", amperes(gear, drive.acceleration));
+        let (current, per_ampere) = self.current_by(c, force, drive);
         // v = R i + L di/dt + K_e n φ̇                                        (4) with an inductance
         let mut voltage = current * self.resistance;
         if self.inductance != 0.0 {
-            let gear = passed(c, rate, drive.jerk);
-            voltage = voltage + amperes(gear * self.inductance, drive.jerk * self.inductance);
+            voltage = voltage + self.amperes(c, rate * self.inductance, drive.jerk * self.inductance, per_ampere);
         }
         (current, voltage + drive.speed * self.brake)
+    }
+
+    /// Motor current, A, and the force that an ampere gives through the gear then.
+    pub fn current_by<C: Calculator>(&self, c: &mut C, force: C::N, drive: &Reference<C::N>) -> (C::N, C::N) {
+        let force = c.name("force", force);
+        let passed = self.passed(c, force, drive.acceleration);
+        let per_ampere = self.per_ampere(c, passed, drive.speed);
+        let current = self.amperes(c, force, drive.acceleration, per_ampere);
+        (c.name("amperes", current), per_ampere)
+    }
+
+    /// What of a force passes through a gear with losses: not what the rotor itself takes.
+    fn passed<C: Calculator>(&self, c: &mut C, force: C::N, acceleration: C::N) -> C::N {
+        match self.is_shared() {
+            true => c.name("passed", force - acceleration * self.rotor),
+            false => force,
+        }
+    }
+
+    /// i = (F − n² J_r a/r²)/(e n K_t/r) + (n² J_r a/r²)/(n K_t/r)
+    fn amperes<C: Calculator>(&self, c: &mut C, force: C::N, acceleration: C::N, per_ampere: C::N) -> C::N {
+        let passed = self.passed(c, force, acceleration);
+        match self.is_shared() {
+            true => passed / per_ampere + acceleration * (self.rotor / self.force_per_ampere),
+            false => passed / per_ampere,
+        }
+    }
+
+    /// True if the gear's loss applies to a part of the force only.
+    fn is_shared(&self) -> bool {
+        self.efficiency < 1.0 && self.rotor > 0.0
     }
 
     /// Force per ampere: reduced by the gear's loss if the motor drives, increased if it is driven; at rest it is taken
@@ -190,6 +207,16 @@ impl Rigid {
     /// Force per command at rest, N/V or N/A.
     pub fn force_per_command(&self) -> f64 {
         1.0 / self.command(1.0, 0.0, &Reference::default())
+    }
+
+    /// n η K_t/r, N/A: the force of an ampere while the motor drives.
+    pub fn driving_force_per_ampere(&self) -> f64 {
+        self.force_per_ampere * self.efficiency
+    }
+
+    /// Current per command at standstill in voltage mode, A/V.
+    pub fn amperes_per_command(&self) -> f64 {
+        self.force_per_command() / self.driving_force_per_ampere()
     }
 
     /// Mass that the motor's force, less the loss of its gear, accelerates: with η n² J_r/r² of the rotor, kg.

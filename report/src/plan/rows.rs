@@ -11,9 +11,13 @@ pub fn belt(plans: &Plans) -> String {
         count => format!("{count} axes"),
     };
     let modes: Vec<String> = plans.modes.iter().map(|mode| value(*mode, "Hz")).collect();
+    let held = match plans.family.machine.stepper() {
+        Some(_) => "rotor held by its field",
+        None => "drive pulley held",
+    };
     match modes.is_empty() {
         true => format!("over {axes}; no mode of the belt"),
-        false => format!("over {axes}; modes with the drive pulley held: {}", modes.join(", ")),
+        false => format!("over {axes}; modes with the {held}: {}", modes.join(", ")),
     }
 }
 
