@@ -6,6 +6,7 @@ use std::f64::consts::{FRAC_1_SQRT_2, PI};
 use taut::case::{Case, Move};
 use taut::control::{Loop, Rows, Setup, Standard, closed_loop, each, stream};
 use taut::fit::fit;
+use taut::linear::{Analysis, Hold, Operation, Question, Root, System};
 use taut::measure::measure;
 use taut::mechanism::{Status, What};
 use taut::reach::pull_out::PullOut;
@@ -334,6 +335,141 @@ fn drawn_steppers_go_where_the_two_phases_take_them_and_lose_the_same_steps() {
         if slips.is_empty() { kept += 1 } else { lost += 1 }
     }
     assert!(lost > 0 && kept > 0, "{lost} lose steps, {kept} do not");
+}
+
+/// Largest distance between a run after small steps of the commands, m, and the linear model sampled with a zero-order
+/// hold, relative to the largest step: of these outputs at the belt, and of the torque-producing currents relative to
+/// those of a standing rotor.
+fn apart_from_linear(case: &Case, steps: &[f64], outputs: &[(&str, f64)], currents: &[[&str; 2]]) -> f64 {
+    let run = simulate(&case.machine, &case.experiments[0], Solver::General { tolerance: 1e-13 }).unwrap();
+    assert_eq!(run.outcome.ending, Ending::Complete);
+    let system = System::of(&case.machine, Operation::default()).unwrap();
+    let every = case.experiments[0].every;
+    let models: Vec<_> = (0..steps.len()).map(|k| system.input(k).discrete(every, Hold::Zero, 0.0).unwrap()).collect();
+    let mut states: Vec<_> = models.iter().map(|model| nalgebra::DVector::zeros(model.a.nrows())).collect();
+    let place = |name: &str| system.outputs.iter().position(|output| output.name == name).unwrap();
+    let column = |name: &str| run.trajectory.get(name).unwrap();
+    let largest = steps.iter().fold(0.0_f64, |most, step| most.max(step.abs()));
+    let (motor, r) = (&case.machine.drives[0].motor, case.machine.pulley_radius);
+    let teeth = motor.stepper.unwrap().teeth();
+    let standing = column(currents[0][0])[0] * 2.0 * teeth * largest / r;
+    let mut most: f64 = 0.0;
+    for row in 0..run.trajectory.len() {
+        let answers = models.iter().zip(&states).zip(steps).map(|((model, x), u)| &model.c * x + &model.d * *u);
+        let answer = answers.fold(nalgebra::DVector::zeros(system.outputs.len()), |sum, own| sum + own);
+        for (name, lever) in outputs {
+            most = most.max((column(name)[row] - answer[place(name)]).abs() * lever / largest);
+        }
+        for [first, second] in currents {
+            // Of phases a and b on a full step, i_b − i_a produces torque.
+            let own = column(second)[row] - column(first)[row];
+            most = most.max((own - (answer[place(second)] - answer[place(first)])).abs() / standing);
+        }
+        for ((model, x), u) in models.iter().zip(&mut states).zip(steps) {
+            *x = &model.a * &*x + &model.b * *u;
+        }
+    }
+    most
+}
+
+#[test]
+fn small_commands_move_drawn_steppers_as_the_linear_model_says() {
+    let (mut choppers, mut voltages) = (0, 0);
+    for seed in 0..2 * machines() {
+        let mut axis = Axis::drawn(&mut Chance::new(7700 + seed));
+        (axis.coulomb, axis.motor.interpolate) = ([0.0; 3], true);
+        if axis.motor.chopper { choppers += 1 } else { voltages += 1 }
+        let text = axis.case();
+        let begin = text.find("[[experiment]]").unwrap();
+        for step in [1e-6, -2.5e-7] {
+            let text = format!(
+                "{}[[experiment]]\nname = \"step\"\ninput = {{ step = {step:e} }}\nuntil = 0.02\nevery = 1e-4\n",
+                &text[..begin]
+            );
+            let case = Case::from_text("drawn.toml", &text).unwrap_or_else(|error| panic!("{error}\n{text}"));
+            let outputs = [("drive_angle", axis.radius), ("cart_position", 1.0), ("idler_angle", axis.radius)];
+            let off = apart_from_linear(&case, &[step], &outputs, &[["motor_current", "second_phase_current"]]);
+            // N δ of the step: what is left out is of second order in it.
+            let small = axis.motor.teeth() * step / axis.radius;
+            assert!(off < 3.0 * small * small, "{seed}: {off:.1e} of the step {step:e} m, ({small:.1e})²\n{text}");
+        }
+    }
+    assert!(choppers > 0 && voltages > 0, "{choppers} choppers, {voltages} by voltage");
+}
+
+#[test]
+fn small_commands_move_drawn_plotters_as_the_linear_model_says() {
+    for seed in 0..machines() {
+        let mut plotter = Plotter::drawn(&mut Chance::new(7800 + seed));
+        plotter.motor.interpolate = true;
+        if seed % 2 == 1 {
+            let motor = &mut plotter.motor;
+            (motor.chopper, motor.supply) = (false, 2.0_f64.sqrt() * motor.rated * motor.resistance * 0.999);
+        }
+        let text = plotter.case();
+        let begin = text.find("[[move]]").unwrap();
+        for steps in [[1e-6, 0.0], [-1e-7, 3e-7]] {
+            let text = format!(
+                "{}[[experiment]]\nname = \"step\"\ninput = {{ left = {{ step = {:e} }}, right = {{ step = {:e} }} }}\n\
+                 until = 0.02\nevery = 1e-4\n",
+                &text[..begin],
+                steps[0],
+                steps[1]
+            );
+            let case = Case::from_text("plotter.toml", &text).unwrap_or_else(|error| panic!("{error}\n{text}"));
+            let r = plotter.radius;
+            let outputs = [("left_angle", r), ("right_angle", r), ("bridge_position", 1.0), ("cart_position", 1.0)];
+            let currents =
+                [["left_current", "left_second_phase_current"], ["right_current", "right_second_phase_current"]];
+            let off = apart_from_linear(&case, &steps, &outputs, &currents);
+            let small = plotter.motor.teeth() * steps[0].abs().max(steps[1].abs()) / r;
+            assert!(off < 3.0 * small * small, "{seed}: {off:.1e} of the steps {steps:?} m, ({small:.1e})²\n{text}");
+        }
+    }
+}
+
+#[test]
+fn a_rotor_alone_swings_on_the_stiffness_of_its_field() {
+    // N (T_h − 4 T_d) over the inertia of rotor, pulleys and cart, whose belt is far stiffer; with a voltage on the
+    // phases, back-EMF damps it.
+    let (holding, detent, radius, n) = (0.45, 15e-3, 6.4e-3, 50.0);
+    let text = plain(holding, radius, 16, "[cart]\nmass = 0.4\n")
+        .replace("rotor_inertia", "detent_torque = 15e-3\nrotor_inertia")
+        .replace("stiffness = [6e4, 6e4, 3e4]", "stiffness = [6e9, 6e9, 3e9]")
+        + "friction = { viscous = 0 }\n";
+    let inertia = 5.4e-6 + 2e-6 + 0.4 * radius * radius;
+    let hertz = (n * (holding - 4.0 * detent) / inertia).sqrt() / (2.0 * PI);
+    for voltage in [false, true] {
+        let text = match voltage {
+            true => text.replace("supply = 24", "supply = 3.9597979\ndrive = \"voltage\""),
+            false => text.clone(),
+        };
+        let case = Case::from_text("alone.toml", &text).unwrap();
+        let analysis = Analysis::of(&case, &Question::default()).unwrap();
+        let modes = analysis.modes.as_ref().unwrap();
+        assert!(modes.rigid.is_empty());
+        assert!((modes.elastic[0].hertz() / hertz - 1.0).abs() < 1e-4, "{} Hz, {hertz} Hz", modes.elastic[0].hertz());
+        assert!((analysis.here.undamped_resonances[0] / hertz - 1.0).abs() < 1e-4);
+        let Root::Pair { frequency, damping } = analysis.here.resonances[0] else { panic!() };
+        match voltage {
+            true => assert!(damping > 0.01, "{damping}"),
+            false => assert!(damping.abs() < 1e-4 && (frequency / (2.0 * PI * hertz) - 1.0).abs() < 1e-4),
+        }
+        // In the long run the cart is where it is told to be, whatever the detents say of the way there.
+        let [one] = &analysis.inputs[..] else { panic!() };
+        let cart = one.system.output("cart_position").unwrap();
+        let (integrators, gain) = one.transfers[cart].low_frequency();
+        let share = holding / (holding - 4.0 * detent);
+        assert!(integrators == 0 && (gain / share - 1.0).abs() < 1e-6, "{gain}, {share}");
+    }
+}
+
+#[test]
+fn a_supply_that_does_not_carry_the_rated_current_has_no_linear_model() {
+    let text = plain(0.45, 6.4e-3, 16, "[cart]\nmass = 0.4\n").replace("supply = 24", "supply = 2.7");
+    let case = Case::from_text("low.toml", &text).unwrap();
+    let error = Analysis::of(&case, &Question::default()).unwrap_err().to_string();
+    assert!(error.contains("stepper.supply") && error.contains("above 2.8 V") && error.contains("next: "), "{error}");
 }
 
 /// A stepper axis for limit laws: no dry friction, and these keys of its own.

@@ -52,7 +52,9 @@ pub fn text(analysis: &Analysis) -> String {
 /// Mode shapes and energies.
 fn shapes(text: &mut String, analysis: &Analysis, modes: &Natural) {
     let mechanism = analysis.case.machine.mechanism();
-    let _ = write!(text, "\n{}\n", bold("Rigid modes"));
+    if !modes.rigid.is_empty() {
+        let _ = write!(text, "\n{}\n", bold("Rigid modes"));
+    }
     for mode in &modes.rigid {
         let (name, ways) = rigid(&mechanism, modes, mode);
         let _ = writeln!(text, "  {name:<12}{}", typed(&ways));

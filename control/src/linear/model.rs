@@ -4,7 +4,8 @@ use super::frame::{Frame, Variable, gears};
 use crate::error::{Error, Result};
 use crate::friction::{Law, Motion};
 use crate::machine::{BeltMake, BeltModel, Geometry, Machine};
-use crate::mechanism::{AmplifierMode, BODIES, Contact, Form, Mechanism, Mode, Over, SpringLaw};
+use crate::mechanism::{AmplifierMode, BODIES, Contact, Drive, Form, Mechanism, Mode, Over, Phases, SpringLaw};
+use crate::number::engineering;
 use nalgebra::{DMatrix, DVector};
 
 /// Operating point of a linearisation.
@@ -118,9 +119,9 @@ impl System {
     /// # Ok::<(), taut::Error>(())
     /// ```
     pub fn of(machine: &Machine, operation: Operation) -> Result<Self> {
-        crate::case::needs_motors(machine)?;
         let machine = placed(machine, operation)?;
         let plant = machine.mechanism();
+        follow(&plant)?;
         let bodies = plant.held_bodies();
         let is_held =
             |body: usize| plant.followers(plant.leader(body)).any(|b| bodies.contains(&b) && operation.held[b]);
@@ -186,8 +187,8 @@ impl StateSpace {
     /// The linear equations of `machine` about `operation`, with its first drive's input.
     ///
     /// Piecewise linear parts have their case in undisturbed motion: amplifier within its limits, spans taut, end stops
-    /// open, the driving flank of a gear with play in contact. A lossy gear is driven by the motor. Stiffness and
-    /// friction have their values at the operating point; their derivatives along the travel are not included. Errors:
+    /// open, the driving flank of a gear with play in contact. A lossy gear is driven by the motor. Steppers are at rest
+    /// on a full step, without load. Stiffness and friction have their values at the operating point; their derivatives along the travel are not included. Errors:
     /// a position at which a span would have no length.
     ///
     /// ```
@@ -211,6 +212,20 @@ impl StateSpace {
     pub fn output(&self, name: &str) -> Option<usize> {
         self.outputs.iter().position(|output| output.name == name)
     }
+}
+
+/// Rejects a stepper whose currents the supply limits at rest: its field then ignores small commands.
+fn follow(plant: &Mechanism) -> Result<()> {
+    let limited = plant.drives.iter().filter(|drive| Phases::of(drive).is_some_and(|phases| !phases.follows()));
+    let error = |drive: &Drive| {
+        let needed = drive.motor.resistance * drive.motor.stepper.map_or(0.0, |stepper| stepper.rated_current);
+        let what = "the supply does not carry the rated current at rest: the field does not follow small commands";
+        Error::new(what)
+            .in_file("stepper.supply")
+            .allowed(format!("above {}, rated current times resistance", engineering(needed, "V", 4)))
+            .next("raise the supply, or lower the rated current together with the holding torque")
+    };
+    limited.map(error).next().map_or(Ok(()), Err)
 }
 
 /// The machine with the span lengths of the operating point. Errors: a position at which a span would have no length.
@@ -292,7 +307,18 @@ impl Linear<'_> {
         let plant = self.plant;
         let n = frame.variables.len();
         let (mut a, mut b) = (DMatrix::zeros(n, n), DMatrix::zeros(n, plant.drives.len()));
-        let equations = plant.equations(self.mode);
+        let mut equations = plant.equations(self.mode);
+        for (drive, part) in plant.drives.iter().enumerate() {
+            let Some(step) = plant.full_step(drive) else { continue };
+            let (leader, first) = (plant.leader(part.shaft), plant.first_current(drive));
+            // M v̇ = … + ρ τ
+            let mass = plant.mass(leader, &equations.inertia);
+            let own = equations.acceleration[leader];
+            equations.acceleration[leader] = own + step.torque * (plant.ratio(part.shaft) / mass);
+            for (rate, more) in equations.current_rate[first..].iter_mut().zip(step.rates) {
+                *rate = *rate + more;
+            }
+        }
         for (place, rate) in &frame.ways {
             a.row_mut(*place).copy_from(&rate.transpose());
         }
@@ -300,9 +326,9 @@ impl Linear<'_> {
             a.row_mut(place).copy_from(&row.transpose());
             b.row_mut(place).copy_from(&input.transpose());
         };
-        for (drive, place) in frame.current_place.iter().enumerate() {
+        for (number, place) in frame.current_place.iter().enumerate() {
             if let Some(place) = place {
-                put(&mut a, *place, frame.row(&equations.current_rate[drive]));
+                put(&mut a, *place, frame.row(&equations.current_rate[number]));
             }
         }
         for body in plant.leaders().filter(|body| plant.bodies[*body].is_rotor || !self.held[*body]) {
@@ -401,7 +427,11 @@ impl Linear<'_> {
             add(torque, frame.row(&plant.spring_force(gear, &self.mode)));
         }
         for drive in 0..drives {
-            add(Variable::current(geometry, drive), frame.row(&plant.current(drive, &self.mode)));
+            add(Variable::current(geometry, drive, 0), frame.row(&plant.current(drive, &self.mode)));
+        }
+        for drive in (0..drives).filter(|drive| plant.drives[*drive].windings() > 1) {
+            let second = Form::current(plant.first_current(drive) + 1);
+            add(Variable::current(geometry, drive, 1), frame.row(&second));
         }
         let c = DMatrix::from_fn(all.len(), frame.variables.len(), |i, j| all[i].1[j]);
         let d = DMatrix::from_fn(all.len(), drives, |i, j| all[i].2[j]);

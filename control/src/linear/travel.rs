@@ -4,7 +4,8 @@ use super::model::placed;
 use super::{Operation, Root, StateSpace};
 use crate::error::Result;
 use crate::friction::{Friction, Law, Side};
-use crate::machine::{Amplifier, AmplifierMode, BeltModel, Machine, SlideAt, SlideForces, Spans};
+use crate::machine::{Amplifier, AmplifierMode, BeltModel, Machine, SlideAt, SlideForces, Spans, Stepper};
+use crate::mechanism::Phases;
 use nalgebra::{DMatrix, DVector};
 
 /// Resonances at one position. All frequencies in Hz, the lowest first.
@@ -96,7 +97,8 @@ pub fn place(machine: &Machine, operation: Operation) -> Result<Place> {
     Ok(travel(machine, operation, &[operation.position])?.swap_remove(0))
 }
 
-/// The machine without losses: no friction, damping or back-EMF, and commanded motor currents.
+/// The machine without losses: no friction, damping or back-EMF, and commanded motor currents; of steppers, regulated
+/// phase currents.
 pub fn undamped(machine: &Machine) -> Machine {
     let mut bare = machine.clone();
     let none = Friction { forward: Side::default(), backward: Side::default(), law: Law::Coulomb };
@@ -110,7 +112,17 @@ pub fn undamped(machine: &Machine) -> Machine {
             play.damping = 0.0;
         }
         unit.motor.gear_efficiency = 1.0;
-        unit.amplifier = Amplifier::ideal(AmplifierMode::Current, unit.amplifier.gain);
+        let gain = unit.amplifier.gain;
+        let phases = Phases::of_motor(&unit.motor, &unit.amplifier);
+        unit.amplifier = match (phases, &mut unit.motor.stepper) {
+            (Some(phases), Some(stepper)) => {
+                // The same currents at rest, from regulators with voltage to spare.
+                stepper.rated_current = phases.at_rest(0.0)[0];
+                let bandwidth = Some(Stepper::CHOPPER_BANDWIDTH);
+                Amplifier { bandwidth, ..Amplifier::ideal(AmplifierMode::Position, gain) }
+            }
+            _ => Amplifier::ideal(AmplifierMode::Current, gain),
+        };
     }
     bare
 }

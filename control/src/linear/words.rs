@@ -3,7 +3,7 @@
 use super::Operation;
 use crate::friction::Law;
 use crate::machine::{BeltModel, DriveUnit, Machine};
-use crate::mechanism::{AmplifierMode, Kind, Mechanism};
+use crate::mechanism::{AmplifierMode, Kind, Mechanism, Phases};
 use crate::number::engineering_typed;
 
 /// Operating point and assumptions: a sentence for each nonlinear part of the machine.
@@ -20,6 +20,7 @@ pub fn assumptions(machine: &Machine, operation: Operation) -> Vec<String> {
     words.extend(curves(&plant, operation, &moving));
     words.extend(forces(machine, &plant, operation, &moving));
     words.extend(drives(machine, &plant));
+    words.extend(steppers(machine, &plant));
     if machine.belt.pretension.is_some() {
         words.push("the spans are taken taut; forces are those beyond pretension".into());
     }
@@ -53,6 +54,9 @@ fn damping_of_modes(machine: &Machine, plant: &Mechanism) -> Vec<String> {
     if machine.drives.iter().any(is_sluggish) {
         words.push("the damping of the modes does not include motors with an inductance; the poles do".into());
     }
+    if plant.drives.iter().filter_map(Phases::of).any(|phases| phases.regulator.is_none()) {
+        words.push("the damping of the modes does not include the phases of the motor; the poles do".into());
+    }
     words
 }
 
@@ -85,15 +89,40 @@ fn forces(machine: &Machine, plant: &Mechanism, operation: Operation, moving: &[
     }
     if machine.slides().any(|slide| slide.constant_force() != 0.0) {
         let who = if machine.bridge.is_some() { "bridge or cart" } else { "the cart" };
-        words.push(format!("the constant force on {who} changes the position of the machine, not its vibration"));
+        words.push(match machine.stepper() {
+            Some(_) => format!("the constant force on {who}, which makes a field softer, is left out"),
+            None => format!("the constant force on {who} changes the position of the machine, not its vibration"),
+        });
     }
     words
+}
+
+/// Assumptions about steppers, one sentence for all.
+fn steppers(machine: &Machine, plant: &Mechanism) -> Option<String> {
+    let (phases, stepper) = plant.drives.iter().find_map(|drive| Phases::of(drive).zip(drive.motor.stepper))?;
+    let stiffness = engineering_typed(phases.stiffness(), "N m/rad", 4);
+    let detent = 4.0 * stepper.teeth() * stepper.detent_torque;
+    let more = match detent > 0.0 {
+        true => format!(
+            "; its detents make it {} stiffer on half steps",
+            engineering_typed(2.0 * detent, "N m/rad", 4)
+        ),
+        false => String::new(),
+    };
+    let whose = if machine.drives.len() > 1 { "each field" } else { "the field" };
+    Some(format!(
+        "{whose} holds its rotor like a spring of {stiffness} on a full step at rest, without load{more}; commands are \
+         taken small against a full step and not rounded to microsteps"
+    ))
 }
 
 /// Assumptions about amplifiers and gears: one sentence for all drives.
 fn drives(machine: &Machine, plant: &Mechanism) -> Vec<String> {
     let mut words = Vec::new();
-    let limited = |unit: &DriveUnit| unit.amplifier.voltage_limit.is_some() || unit.amplifier.current_limit.is_some();
+    let limited = |unit: &DriveUnit| {
+        let has_limit = unit.amplifier.voltage_limit.is_some() || unit.amplifier.current_limit.is_some();
+        has_limit && unit.motor.stepper.is_none()
+    };
     let (amplifier, gear) = match machine.drives.len() {
         1 => (
             "the amplifier is taken within its limits",

@@ -45,6 +45,15 @@ pub struct PhaseRate {
     pub slopes: [f64; 3],
 }
 
+/// Small motions of a rotor at rest on a full step, without load: what the phases add to the linear equations.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FullStep {
+    /// Torque on the rotor, N m.
+    pub torque: Form,
+    /// Rates of both phase currents, A/s.
+    pub rates: [Form; 2],
+}
+
 impl Phases {
     /// Phases of a drive; none for a brushed motor.
     pub fn of(drive: &Drive) -> Option<Self> {
@@ -125,6 +134,26 @@ impl Phases {
         Some([wanted - self.supply, wanted + self.supply])
     }
 
+    /// Derivative of the rate of a phase current with respect to the commanded angle, A/s per rad, within the supply.
+    fn rate_by_command(&self, phase: usize, told: f64) -> f64 {
+        let sin = (self.electrical(told) - FRAC_PI_2 * phase as f64).sin();
+        // ∂/∂φ* of V cos(ψ − σ)/L or of ω_c √2 I cos(ψ − σ)
+        let size = self.regulator.map_or(self.supply / self.inductance, |rate| rate * self.amplitude);
+        -self.teeth * size * sin
+    }
+
+    /// Stiffness of the field at rest on a full step without load, N m/rad: N T_h − 4 N T_d, where T_h is that of the
+    /// currents at rest.
+    pub fn stiffness(&self) -> f64 {
+        let (_, [by_angle, ..]) = self.torque(0.0, self.at_rest(0.0));
+        -by_angle
+    }
+
+    /// True if the supply carries the rated currents on a full step, so that they follow small commands.
+    pub fn follows(&self) -> bool {
+        self.regulator.is_none() || self.amplitude * FRAC_PI_4.cos() * self.resistance < self.supply
+    }
+
     /// Currents at rest at this commanded angle of the field, A.
     pub fn at_rest(&self, told: f64) -> [f64; 2] {
         let most = self.supply / self.resistance;
@@ -163,6 +192,26 @@ impl Mechanism {
     pub fn farthest_jump(&self, drive: usize) -> Option<f64> {
         let stepper = self.drives[drive].motor.stepper?;
         Some(PI / stepper.teeth() / self.angle_per_input(drive).abs())
+    }
+
+    /// Linear part of what the phases of a stepper add to the equations about rest on a full step; none for a brushed
+    /// motor. The position of a full step is zero.
+    pub fn full_step(&self, drive: usize) -> Option<FullStep> {
+        let (phases, (spring, _)) = Phases::of(&self.drives[drive]).zip(self.angle_of(drive))?;
+        let (shaft, first) = (self.drives[drive].shaft, self.first_current(drive));
+        let currents = phases.at_rest(0.0);
+        let (angle, speed) = (Form::stretch(spring), Form::speed(shaft));
+        let (_, [by_angle, by_a, by_b]) = phases.torque(0.0, currents);
+        let torque = angle * by_angle + Form::current(first) * by_a + Form::current(first + 1) * by_b;
+        let rate = |phase: usize| {
+            let [by_angle, by_speed, by_current] = phases.rate(phase, 0.0, 0.0, currents[phase], 0.0).slopes;
+            let by_input = phases.rate_by_command(phase, 0.0) * self.angle_per_input(drive);
+            angle * by_angle
+                + speed * by_speed
+                + Form::current(first + phase) * by_current
+                + Form::input(drive) * by_input
+        };
+        Some(FullStep { torque, rates: [rate(0), rate(1)] })
     }
 
     /// Lag of a stepper's rotor behind its command, rad.
