@@ -12,7 +12,8 @@ use crate::solve::{Jump, first_jump};
 const NO_MOTOR: [&str; 3] = [
     "this needs a motor that is commanded by voltage or current, and the case describes a stepper",
     "[motor] and [amplifier]",
-    "steppers are supported by `taut show`, `simulate`, `move`, `plan`, `shape`, `sweep`, `fit` and `export fmu`",
+    "steppers are supported by `taut show`, `simulate`, `modes`, `move`, `plan`, `shape`, `sweep`, `check`, `fit`, `frf`, \
+     `export fmu` and `export json`",
 ];
 
 /// Refuses a stepper where a motor that is commanded by voltage or current is needed.

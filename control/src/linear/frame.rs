@@ -32,12 +32,14 @@ impl Variable {
         Self::new(format!("{}_speed", part.label.key), part.kind.units()[1])
     }
 
-    /// A current, by its drive and its winding: a stepper has two.
-    pub(super) fn current(geometry: &Geometry, drive: usize, winding: usize) -> Self {
+    /// A current of a drive: of a stepper i_d and i_q, which turn with its rotor.
+    pub(super) fn current(geometry: &Geometry, plant: &Mechanism, number: usize) -> Self {
+        let drive = (0..plant.drives.len()).rfind(|drive| plant.first_current(*drive) <= number).unwrap_or_default();
         let at = &geometry.drives[drive];
-        match winding {
-            0 => Self::new(at.current_column, "A"),
-            _ => Self::new(format!("{}second_phase_current", at.prefix), "A"),
+        match (plant.drives[drive].motor.stepper, number - plant.first_current(drive)) {
+            (None, _) => Self::new(at.current_column, "A"),
+            (Some(_), 0) => Self::new(format!("{}direct_current", at.prefix), "A"),
+            (Some(_), _) => Self::new(format!("{}quadrature_current", at.prefix), "A"),
         }
     }
 }
@@ -202,10 +204,7 @@ impl Frame {
         let variables = kinds.iter().map(|kind| match *kind {
             Kind::Angle(j) => Variable::angle(plant, j),
             Kind::Speed(j) => Variable::speed(plant, j),
-            Kind::Current(number) => {
-                let drive = plant.drive_of_current(number).unwrap_or_default();
-                Variable::current(machine.geometry(), drive, number - plant.first_current(drive))
-            }
+            Kind::Current(number) => Variable::current(machine.geometry(), plant, number),
             Kind::Bristle(j) => {
                 let part = &plant.bodies[j];
                 Variable::new(format!("{}_bristle", part.label.key), part.kind.units()[0])

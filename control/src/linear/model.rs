@@ -121,7 +121,7 @@ impl System {
     pub fn of(machine: &Machine, operation: Operation) -> Result<Self> {
         let machine = placed(machine, operation)?;
         let plant = machine.mechanism();
-        follow(&plant)?;
+        within_supply(&machine, &plant, operation.speed)?;
         let bodies = plant.held_bodies();
         let is_held =
             |body: usize| plant.followers(plant.leader(body)).any(|b| bodies.contains(&b) && operation.held[b]);
@@ -187,8 +187,8 @@ impl StateSpace {
     /// The linear equations of `machine` about `operation`, with its first drive's input.
     ///
     /// Piecewise linear parts have their case in undisturbed motion: amplifier within its limits, spans taut, end stops
-    /// open, the driving flank of a gear with play in contact. A lossy gear is driven by the motor. Steppers are at rest
-    /// on a full step, without load. Stiffness and friction have their values at the operating point; their derivatives along the travel are not included. Errors:
+    /// open, the driving flank of a gear with play in contact. A lossy gear is driven by the motor. Steppers turn
+    /// at the steady speed without load ([`Steady`](crate::mechanism::Steady)). Stiffness and friction have their values at the operating point; their derivatives along the travel are not included. Errors:
     /// a position at which a span would have no length.
     ///
     /// ```
@@ -214,18 +214,21 @@ impl StateSpace {
     }
 }
 
-/// Rejects a stepper whose currents the supply limits at rest: its field then ignores small commands.
-fn follow(plant: &Mechanism) -> Result<()> {
-    let limited = plant.drives.iter().filter(|drive| Phases::of(drive).is_some_and(|phases| !phases.follows()));
-    let error = |drive: &Drive| {
-        let needed = drive.motor.resistance * drive.motor.stepper.map_or(0.0, |stepper| stepper.rated_current);
-        let what = "the supply does not carry the rated current at rest: the field does not follow small commands";
-        Error::new(what)
-            .in_file("stepper.supply")
-            .allowed(format!("above {}, rated current times resistance", engineering(needed, "V", 4)))
-            .next("raise the supply, or lower the rated current together with the holding torque")
+/// Rejects a speed at which the supply of a stepper limits its currents.
+fn within_supply(machine: &Machine, plant: &Mechanism, speed: f64) -> Result<()> {
+    let is_limited = |drive: &Drive| {
+        let turning = speed / plant.bodies[drive.shaft].kind.lever();
+        Phases::of(drive).is_some_and(|phases| phases.without_load(turning).is_none())
     };
-    limited.map(error).next().map_or(Ok(()), Err)
+    if !plant.drives.iter().any(is_limited) {
+        return Ok(());
+    }
+    let supply = machine.drives[0].amplifier.voltage_limit.unwrap_or(f64::INFINITY);
+    let [supply, speed] = [engineering(supply, "V", 4), engineering(speed, "m/s", 4)];
+    Err(Error::new(format!("at {speed} the supply of {supply} limits the currents of the stepper, which is not linear"))
+        .in_file("--speed")
+        .allowed("a speed at which the supply suffices; 0 for small commands at rest")
+        .next("choose a lower --speed, or raise stepper.supply"))
 }
 
 /// The machine with the span lengths of the operating point. Errors: a position at which a span would have no length.
@@ -309,15 +312,14 @@ impl Linear<'_> {
         let (mut a, mut b) = (DMatrix::zeros(n, n), DMatrix::zeros(n, plant.drives.len()));
         let mut equations = plant.equations(self.mode);
         for (drive, part) in plant.drives.iter().enumerate() {
-            let Some(step) = plant.full_step(drive) else { continue };
+            let speed = if self.holds(part.shaft) { 0.0 } else { self.speed(part.shaft) };
+            let Some(steady) = plant.steady(drive, speed) else { continue };
             let (leader, first) = (plant.leader(part.shaft), plant.first_current(drive));
             // M v̇ = … + ρ τ
             let mass = plant.mass(leader, &equations.inertia);
             let own = equations.acceleration[leader];
-            equations.acceleration[leader] = own + step.torque * (plant.ratio(part.shaft) / mass);
-            for (rate, more) in equations.current_rate[first..].iter_mut().zip(step.rates) {
-                *rate = *rate + more;
-            }
+            equations.acceleration[leader] = own + steady.torque * (plant.ratio(part.shaft) / mass);
+            equations.current_rate[first..first + 2].copy_from_slice(&steady.rates);
         }
         for (place, rate) in &frame.ways {
             a.row_mut(*place).copy_from(&rate.transpose());
@@ -353,6 +355,11 @@ impl Linear<'_> {
             put(&mut a, place, (row, input));
         }
         (a, b)
+    }
+
+    /// True if a body is held.
+    fn holds(&self, body: usize) -> bool {
+        self.held.get(body).is_some_and(|held| *held)
     }
 
     /// Speed of a body, in its own unit.
@@ -427,11 +434,11 @@ impl Linear<'_> {
             add(torque, frame.row(&plant.spring_force(gear, &self.mode)));
         }
         for drive in 0..drives {
-            add(Variable::current(geometry, drive, 0), frame.row(&plant.current(drive, &self.mode)));
-        }
-        for drive in (0..drives).filter(|drive| plant.drives[*drive].windings() > 1) {
-            let second = Form::current(plant.first_current(drive) + 1);
-            add(Variable::current(geometry, drive, 1), frame.row(&second));
+            let first = plant.first_current(drive);
+            add(Variable::current(geometry, plant, first), frame.row(&plant.current(drive, &self.mode)));
+            if plant.drives[drive].windings() > 1 {
+                add(Variable::current(geometry, plant, first + 1), frame.row(&Form::current(first + 1)));
+            }
         }
         let c = DMatrix::from_fn(all.len(), frame.variables.len(), |i, j| all[i].1[j]);
         let d = DMatrix::from_fn(all.len(), drives, |i, j| all[i].2[j]);

@@ -20,7 +20,7 @@ pub fn assumptions(machine: &Machine, operation: Operation) -> Vec<String> {
     words.extend(curves(&plant, operation, &moving));
     words.extend(forces(machine, &plant, operation, &moving));
     words.extend(drives(machine, &plant));
-    words.extend(steppers(machine, &plant));
+    words.extend(steppers(machine, &plant, operation));
     if machine.belt.pretension.is_some() {
         words.push("the spans are taken taut; forces are those beyond pretension".into());
     }
@@ -33,12 +33,12 @@ pub fn assumptions(machine: &Machine, operation: Operation) -> Vec<String> {
         let who = if machine.bridge.is_some() { "bridge and cart are" } else { "the cart is" };
         words.push(format!("{who} taken between the end stops"));
     }
-    words.extend(damping_of_modes(machine, &plant));
+    words.extend(differences_of_modes(machine, &plant, operation));
     words
 }
 
-/// Damping that the poles include and [`Natural`](super::Natural) modes do not.
-fn damping_of_modes(machine: &Machine, plant: &Mechanism) -> Vec<String> {
+/// What the poles include and [`Natural`](super::Natural) modes do not.
+fn differences_of_modes(machine: &Machine, plant: &Mechanism, operation: Operation) -> Vec<String> {
     let mut words = Vec::new();
     let is_curved = |body: usize| {
         let friction = &plant.bodies[body].friction;
@@ -56,6 +56,9 @@ fn damping_of_modes(machine: &Machine, plant: &Mechanism) -> Vec<String> {
     }
     if plant.drives.iter().filter_map(Phases::of).any(|phases| phases.regulator.is_none()) {
         words.push("the damping of the modes does not include the phases of the motor; the poles do".into());
+    }
+    if operation.speed == 0.0 && machine.stepper().is_some_and(|stepper| stepper.detent_torque > 0.0) {
+        words.push("the modes have the mean stiffness of the field over its detents; the poles that of a full step".into());
     }
     words
 }
@@ -97,22 +100,20 @@ fn forces(machine: &Machine, plant: &Mechanism, operation: Operation, moving: &[
     words
 }
 
-/// Assumptions about steppers, one sentence for all.
-fn steppers(machine: &Machine, plant: &Mechanism) -> Option<String> {
+/// Assumptions about steppers, in one sentence for all.
+fn steppers(machine: &Machine, plant: &Mechanism, operation: Operation) -> Option<String> {
     let (phases, stepper) = plant.drives.iter().find_map(|drive| Phases::of(drive).zip(drive.motor.stepper))?;
-    let stiffness = engineering_typed(phases.stiffness(), "N m/rad", 4);
-    let detent = 4.0 * stepper.teeth() * stepper.detent_torque;
-    let more = match detent > 0.0 {
-        true => format!(
-            "; its detents make it {} stiffer on half steps",
-            engineering_typed(2.0 * detent, "N m/rad", 4)
-        ),
-        false => String::new(),
-    };
+    let detent = if operation.speed == 0.0 { 4.0 * stepper.teeth() * stepper.detent_torque } else { 0.0 };
+    let stiffness = engineering_typed(phases.stiffness() - detent, "N m/rad", 4);
     let whose = if machine.drives.len() > 1 { "each field" } else { "the field" };
+    let place = match (operation.speed == 0.0, stepper.detent_torque > 0.0) {
+        (true, _) => "at rest on a full step",
+        (false, true) => "while it turns over its detents, whose mean is zero",
+        (false, false) => "while it turns",
+    };
     Some(format!(
-        "{whose} holds its rotor like a spring of {stiffness} on a full step at rest, without load{more}; commands are \
-         taken small against a full step and not rounded to microsteps"
+        "{whose} holds its rotor like a spring of {stiffness} {place}; without load, commands small against a full step \
+         and not rounded to microsteps"
     ))
 }
 

@@ -26,7 +26,7 @@ pub use form::Form;
 pub use form::ROUNDING;
 pub use layout::{Layout, Replaced};
 pub use mode::{Cause, Contact, DriveMode, Guard, Limit, Mode, Part, Status, Switch, What};
-pub use phases::{FullStep, PhaseRate, Phases};
+pub use phases::{PhaseRate, Phases, Steady};
 pub use power::Power;
 pub use transition::{After, Next, Place, Resets, Then, Transition};
 
