@@ -362,7 +362,7 @@ fn apart_from_linear(case: &Case, steps: &[f64], outputs: &[(&str, f64)], motors
             let (sin, cos) = (teeth * column(angle)[row] + PI / 4.0).sin_cos();
             let (i_a, i_b) = (column(a)[row], column(b)[row]);
             // That along the rotor changes by the square of what is small.
-            let off = i_b * cos - i_a * sin - answer[place(&format!("{prefix}quadrature_current"))];
+            let off = i_b * cos - i_a * sin - answer[place(&format!("{prefix}quadrature_axis_current"))];
             let along = column(a)[0].hypot(column(b)[0]);
             most = most.max(off.abs() / (along * teeth * largest / case.machine.pulley_radius));
         }

@@ -38,8 +38,8 @@ impl Variable {
         let at = &geometry.drives[drive];
         match (plant.drives[drive].motor.stepper, number - plant.first_current(drive)) {
             (None, _) => Self::new(at.current_column, "A"),
-            (Some(_), 0) => Self::new(format!("{}direct_current", at.prefix), "A"),
-            (Some(_), _) => Self::new(format!("{}quadrature_current", at.prefix), "A"),
+            (Some(_), 0) => Self::new(format!("{}direct_axis_current", at.prefix), "A"),
+            (Some(_), _) => Self::new(format!("{}quadrature_axis_current", at.prefix), "A"),
         }
     }
 }

@@ -214,7 +214,7 @@ impl StateSpace {
     }
 }
 
-/// Rejects a speed at which the supply of a stepper limits its currents.
+/// Rejects a speed at which the supply of a stepper does not suffice for its currents.
 fn within_supply(machine: &Machine, plant: &Mechanism, speed: f64) -> Result<()> {
     let is_limited = |drive: &Drive| {
         let turning = speed / plant.bodies[drive.shaft].kind.lever();
@@ -225,10 +225,11 @@ fn within_supply(machine: &Machine, plant: &Mechanism, speed: f64) -> Result<()>
     }
     let supply = machine.drives[0].amplifier.voltage_limit.unwrap_or(f64::INFINITY);
     let [supply, speed] = [engineering(supply, "V", 4), engineering(speed, "m/s", 4)];
-    Err(Error::new(format!("at {speed} the supply of {supply} limits the currents of the stepper, which is not linear"))
+    let what = format!("at {speed} the supply of {supply} does not suffice for the currents of the stepper");
+    Err(Error::new(what)
         .in_file("--speed")
-        .allowed("a speed at which the supply suffices; 0 for small commands at rest")
-        .next("choose a lower --speed, or raise stepper.supply"))
+        .allowed("a speed at which it does: beyond that there is no linear model")
+        .next("choose a lower --speed, or 0 for rest on a full step; or raise stepper.supply"))
 }
 
 /// The machine with the span lengths of the operating point. Errors: a position at which a span would have no length.

@@ -8,6 +8,9 @@ use crate::machine::{Amplifier, AmplifierMode, BeltModel, Machine, SlideAt, Slid
 use crate::mechanism::Phases;
 use nalgebra::{DMatrix, DVector};
 
+/// Damping ratio above which a pair of poles of a stepper is not a resonance.
+const STILL: f64 = 0.98;
+
 /// Resonances at one position. All frequencies in Hz, the lowest first.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Place {
@@ -19,7 +22,7 @@ pub struct Place {
     pub stiffness: Spans,
     /// Compliance of each slide with held drive pulleys, m/N.
     pub compliance: Vec<f64>,
-    /// Resonances: the pairs among the poles.
+    /// Resonances: the pairs among the poles, without those of regulated currents of a stepper.
     pub resonances: Vec<Root>,
     /// Resonances with the drive pulleys held: the anti-resonances of the drive angle of an axis.
     pub antiresonances: Vec<Root>,
@@ -47,10 +50,13 @@ pub fn travel(machine: &Machine, operation: Operation, positions: &[f64]) -> Res
     let bare = undamped(machine);
     let mut drives_held = operation;
     machine.geometry().drives.iter().for_each(|drive| drives_held.held[drive.pulley] = true);
+    // Regulated currents that turn with a rotor decay in a hundredth of a period or less.
+    let has_stepper = machine.stepper().is_some();
+    let is_of_currents = |root: &Root| matches!(root, Root::Pair { damping, .. } if has_stepper && *damping > STILL);
     let place = |&position: &f64| {
         let pairs = |machine: &Machine, about: Operation| -> Result<Vec<Root>> {
             let poles = StateSpace::of(machine, Operation { position, ..about })?.poles()?;
-            Ok(Root::of(&poles).into_iter().filter(|root| root.hertz().is_some()).collect())
+            Ok(Root::of(&poles).into_iter().filter(|root| root.hertz().is_some() && !is_of_currents(root)).collect())
         };
         let hertz = |roots: Vec<Root>| roots.into_iter().filter_map(Root::hertz).collect();
         let held = placed(machine, Operation { position, ..operation })?;
