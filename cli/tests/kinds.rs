@@ -113,13 +113,16 @@ fn logged(case: &str, folder: &Path) -> String {
         ],
     };
     let path = folder.join("logged.toml").display().to_string();
-    let run = format!("{machine}[[experiment]]\nname = \"noise\"\ninput = {input}\nuntil = \"0.42 s\"\nevery = \"1 ms\"\n");
+    let run = format!(
+        "{machine}[[experiment]]\nname = \"noise\"\ninput = {input}\nuntil = \"0.42 s\"\nevery = \"1 ms\"\n"
+    );
     std::fs::write(&path, run).unwrap();
     let out = folder.display().to_string();
     let smooth = "stepper.interpolate=true";
     taut().args(["simulate", &path, "--no-report", "--out", &out, "--set", smooth]).assert().success();
     let log = format!(
-        "{machine}[[experiment]]\nname = \"noise\"\nlog = {{ file = \"noise.csv\", time = \"time_s\", hold = \"linear\", {columns}, {outputs} }}\n\
+        "{machine}[[experiment]]\nname = \"noise\"\n\
+         log = {{ file = \"noise.csv\", time = \"time_s\", hold = \"linear\", {columns}, {outputs} }}\n\
          [fit]\nfree = [\"stepper.holding_torque\"]\n"
     );
     std::fs::write(&path, log).unwrap();
