@@ -187,9 +187,10 @@ impl StateSpace {
     /// The linear equations of `machine` about `operation`, with its first drive's input.
     ///
     /// Piecewise linear parts have their case in undisturbed motion: amplifier within its limits, spans taut, end stops
-    /// open, the driving flank of a gear with play in contact. A lossy gear is driven by the motor. Steppers turn
-    /// at the steady speed without load ([`Steady`](crate::mechanism::Steady)). Stiffness and friction have their values at the operating point; their derivatives along the travel are not included. Errors:
-    /// a position at which a span would have no length.
+    /// open, the driving flank of a gear with play in contact. A lossy gear is driven by the motor. Steppers turn at
+    /// the steady speed without load ([`Steady`](crate::mechanism::Steady)). Stiffness and friction have their values
+    /// at the operating point; their derivatives along the travel are not included. Errors: a position at which a span
+    /// would have no length.
     ///
     /// ```
     /// use taut::case::{Case, TEMPLATE};

@@ -4,8 +4,9 @@
 //! M q̈ + C q̇ + K q = 0,   K = Aᵀ diag(k) A,   C = Aᵀ diag(c) A + B + n² K_t K_e / R
 //! ```
 //!
-//! over the independent bodies; A has a row for each stepper, whose field is a spring to its commanded angle. Undamped modes are the eigenvectors of M^(−½) K M^(−½); the number of rigid ones, whose
-//! frequency is zero by construction, is the dimension of the null space of A.
+//! over the independent bodies; A has a row for each stepper, whose field is a spring to its commanded angle. Undamped
+//! modes are the eigenvectors of M^(−½) K M^(−½); the number of rigid ones, whose frequency is zero by construction, is
+//! the dimension of the null space of A.
 
 use super::{Root, eigen};
 use crate::error::{Error, Result};

@@ -58,7 +58,9 @@ fn differences_of_modes(machine: &Machine, plant: &Mechanism, operation: Operati
         words.push("the damping of the modes does not include the phases of the motor; the poles do".into());
     }
     if operation.speed == 0.0 && machine.stepper().is_some_and(|stepper| stepper.detent_torque > 0.0) {
-        words.push("the modes have the mean stiffness of the field over its detents; the poles that of a full step".into());
+        words.push(
+            "the modes have the mean stiffness of the field over its detents; the poles that of a full step".into(),
+        );
     }
     words
 }

@@ -45,8 +45,8 @@ pub struct PhaseRate {
     pub slopes: [f64; 3],
 }
 
-/// Small motions of a stepper without load about a constant speed, with currents that turn with the rotor: i_d along its
-/// field and i_q across it, in the places of the two phases.
+/// Small motions of a stepper without load about a constant speed, with currents that turn with the rotor: i_d along
+/// its field and i_q across it, in the places of the two phases.
 ///
 /// ```text
 /// i_d = i_a cos ε + i_b sin ε          di_d/dt = u cos δ − λ i_d + N φ̇ i_q
@@ -54,8 +54,8 @@ pub struct PhaseRate {
 /// δ = ψ − ε                            τ = K_m i_q − T_d sin 4ε
 /// ```
 ///
-/// For a voltage u = V/L, λ = R/L and κ = K_m/L; for a chopper within its supply u = ω_c √2 I, λ = ω_c and κ = 0. Detents
-/// count at rest, where the rotor is on a full step; at a speed their mean is zero.
+/// For a voltage u = V/L, λ = R/L and κ = K_m/L; for a chopper within its supply u = ω_c √2 I, λ = ω_c and κ = 0.
+/// Detents count at rest, where the rotor is on a full step; at a speed their mean is zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Steady {
     /// Torque on the rotor, N m.
@@ -159,8 +159,8 @@ impl Phases {
         self.teeth * self.torque_constant * (u / rate).min(self.supply / self.resistance)
     }
 
-    /// i_d, A, and the angle δ by which the rotor is behind its field, rad, at this speed, rad/s, without load. None where
-    /// the supply does not suffice for it, or limits the currents of a chopper.
+    /// i_d, A, and the angle δ by which the rotor is behind its field, rad, at this speed, rad/s, without load. None
+    /// where the supply does not suffice for it, or limits the currents of a chopper.
     pub fn without_load(&self, speed: f64) -> Option<(f64, f64)> {
         let ([u, rate, emf], turning) = (self.turning(), self.teeth * speed);
         // u cos δ = λ i_d and u sin δ = ω (N i_d + κ), so u² = λ² i_d² + ω² (N i_d + κ)²
@@ -216,8 +216,8 @@ impl Mechanism {
         Some(PI / stepper.teeth() / self.angle_per_input(drive).abs())
     }
 
-    /// Equations of a stepper for small motions about this speed of its shaft, rad/s; none for a brushed motor, and where
-    /// [`Phases::without_load`] has no current.
+    /// Equations of a stepper for small motions about this speed of its shaft, rad/s; none for a brushed motor, and
+    /// where [`Phases::without_load`] has no current.
     pub fn steady(&self, drive: usize, speed: f64) -> Option<Steady> {
         let (phases, (spring, _)) = Phases::of(&self.drives[drive]).zip(self.angle_of(drive))?;
         let (first, shaft) = (self.first_current(drive), Form::speed(self.drives[drive].shaft));
