@@ -113,9 +113,8 @@ fn logged(case: &str, folder: &Path) -> String {
         ],
     };
     let path = folder.join("logged.toml").display().to_string();
-    let run = format!(
-        "{machine}[[experiment]]\nname = \"noise\"\ninput = {input}\nuntil = \"0.42 s\"\nevery = \"1 ms\"\n"
-    );
+    let run =
+        format!("{machine}[[experiment]]\nname = \"noise\"\ninput = {input}\nuntil = \"0.42 s\"\nevery = \"1 ms\"\n");
     std::fs::write(&path, run).unwrap();
     let out = folder.display().to_string();
     let smooth = "stepper.interpolate=true";
