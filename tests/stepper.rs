@@ -6,6 +6,7 @@ use std::f64::consts::{FRAC_1_SQRT_2, PI};
 use taut::case::{Case, Move};
 use taut::control::{Loop, Rows, Setup, Standard, closed_loop, each, stream};
 use taut::fit::fit;
+use taut::linear::{Analysis, Hold, Operation, Question, Root, StateSpace, System};
 use taut::measure::measure;
 use taut::mechanism::{Status, What};
 use taut::reach::pull_out::PullOut;
@@ -334,6 +335,186 @@ fn drawn_steppers_go_where_the_two_phases_take_them_and_lose_the_same_steps() {
         if slips.is_empty() { kept += 1 } else { lost += 1 }
     }
     assert!(lost > 0 && kept > 0, "{lost} lose steps, {kept} do not");
+}
+
+impl Motor {
+    /// This motor on a driver that interpolates: a chopper with voltage for steps of a micrometre, or a voltage.
+    fn smooth(&self, chopper: bool) -> Self {
+        let supply = if chopper { 48.0 } else { 2.0_f64.sqrt() * self.rated * self.resistance * 0.999 };
+        Self { interpolate: true, chopper, supply, ..self.clone() }
+    }
+}
+
+/// Largest distance between a run after small steps of the commands, m, and the linear model of rest, sampled with a
+/// zero-order hold: of these outputs at the belt relative to the largest step, and of the current across each rotor, by
+/// prefix, angle and phases, relative to that of a rotor that does not move.
+fn apart_from_linear(case: &Case, steps: &[f64], outputs: &[(&str, f64)], motors: &[(&str, [&str; 3])]) -> f64 {
+    let run = simulate(&case.machine, &case.experiments[0], Solver::General { tolerance: 1e-13 }).unwrap();
+    assert_eq!(run.outcome.ending, Ending::Complete);
+    let system = System::of(&case.machine, Operation { speed: 0.0, ..Operation::default() }).unwrap();
+    let every = case.experiments[0].every;
+    let models: Vec<_> = (0..steps.len()).map(|k| system.input(k).discrete(every, Hold::Zero, 0.0).unwrap()).collect();
+    let mut states: Vec<_> = models.iter().map(|model| &model.b * 0.0).collect();
+    let place = |name: &str| system.outputs.iter().position(|output| output.name == name).unwrap();
+    let column = |name: &str| run.trajectory.get(name).unwrap();
+    let largest = steps.iter().fold(0.0_f64, |most, step| most.max(step.abs()));
+    let teeth = case.machine.stepper().unwrap().teeth();
+    let mut most: f64 = 0.0;
+    for row in 0..run.trajectory.len() {
+        let answers = models.iter().zip(&states).zip(steps).map(|((model, x), u)| &model.c * x + &model.d * *u);
+        let answer = answers.reduce(|sum, own| sum + own).unwrap();
+        for (name, lever) in outputs {
+            most = most.max((column(name)[row] - answer[place(name)]).abs() * lever / largest);
+        }
+        for (prefix, [angle, a, b]) in motors {
+            let (sin, cos) = (teeth * column(angle)[row] + PI / 4.0).sin_cos();
+            let (i_a, i_b) = (column(a)[row], column(b)[row]);
+            // That along the rotor changes by the square of what is small.
+            let off = i_b * cos - i_a * sin - answer[place(&format!("{prefix}quadrature_axis_current"))];
+            let along = column(a)[0].hypot(column(b)[0]);
+            most = most.max(off.abs() / (along * teeth * largest / case.machine.pulley_radius));
+        }
+        for ((model, x), u) in models.iter().zip(&mut states).zip(steps) {
+            *x = &model.a * &*x + &model.b * *u;
+        }
+    }
+    most
+}
+
+#[test]
+fn small_commands_move_drawn_steppers_as_the_linear_model_says() {
+    for seed in 0..machines() {
+        let mut axis = Axis::drawn(&mut Chance::new(7700 + seed));
+        (axis.coulomb, axis.motor) = ([0.0; 3], axis.motor.smooth(seed % 2 == 0));
+        let text = axis.case();
+        let begin = text.find("[[experiment]]").unwrap();
+        for step in [1e-6, -2.5e-7] {
+            let text = format!(
+                "{}[[experiment]]\nname = \"step\"\ninput = {{ step = {step:e} }}\nuntil = 0.01\nevery = 1e-4\n",
+                &text[..begin]
+            );
+            let case = Case::from_text("drawn.toml", &text).unwrap_or_else(|error| panic!("{error}\n{text}"));
+            let outputs = [("drive_angle", axis.radius), ("cart_position", 1.0), ("idler_angle", axis.radius)];
+            let motor = ("", ["drive_angle", "motor_current", "second_phase_current"]);
+            let off = apart_from_linear(&case, &[step], &outputs, &[motor]);
+            // N δ of the step: what is left out is of second order in it.
+            let small = axis.motor.teeth() * step / axis.radius;
+            assert!(off < 60.0 * small * small, "{seed}: {off:.1e} of the step {step:e} m, ({small:.1e})²\n{text}");
+        }
+    }
+}
+
+#[test]
+fn small_commands_move_drawn_plotters_as_the_linear_model_says() {
+    for seed in 0..machines() {
+        let mut plotter = Plotter::drawn(&mut Chance::new(7800 + seed));
+        plotter.motor = plotter.motor.smooth(seed % 2 == 0);
+        let text = plotter.case();
+        let begin = text.find("[[move]]").unwrap();
+        for steps in [[1e-6, 0.0], [-1e-7, 3e-7]] {
+            let text = format!(
+                "{}[[experiment]]\nname = \"step\"\ninput = {{ left = {{ step = {:e} }}, right = {{ step = {:e} }} }}\n\
+                 until = 0.01\nevery = 1e-4\n",
+                &text[..begin],
+                steps[0],
+                steps[1]
+            );
+            let case = Case::from_text("plotter.toml", &text).unwrap_or_else(|error| panic!("{error}\n{text}"));
+            let r = plotter.radius;
+            let outputs = [("left_angle", r), ("right_angle", r), ("bridge_position", 1.0), ("cart_position", 1.0)];
+            let motors = [
+                ("left_", ["left_angle", "left_current", "left_second_phase_current"]),
+                ("right_", ["right_angle", "right_current", "right_second_phase_current"]),
+            ];
+            let off = apart_from_linear(&case, &steps, &outputs, &motors);
+            let small = plotter.motor.teeth() * steps[0].abs().max(steps[1].abs()) / r;
+            assert!(off < 60.0 * small * small, "{seed}: {off:.1e} of the steps {steps:?} m, ({small:.1e})²\n{text}");
+        }
+    }
+}
+
+/// Largest distance between what a step on top of a ramp changes in a run, and what it does in the linear model of that
+/// speed, relative to the step; the ramp begins half a second before, so that its own transients are over.
+fn apart_at_speed(text: &str, speed: f64, step: f64) -> f64 {
+    let run = |step: f64| {
+        let text = format!(
+            "{text}[[experiment]]\nname = \"ramp\"\ninput = {{ sum = [{{ ramp = {:e}, over = 0.6 }}, \
+             {{ step = {step:e}, at = 0.5 }}] }}\ninitial = {{ drive_speed = {1:e}, cart_speed = {speed:e}, \
+             idler_speed = {1:e} }}\nuntil = 0.52\nevery = 1e-3\n",
+            0.6 * speed,
+            speed / 6.4e-3,
+        );
+        let case = Case::from_text("ramp.toml", &text).unwrap_or_else(|error| panic!("{error}\n{text}"));
+        let run = simulate(&case.machine, &case.experiments[0], Solver::General { tolerance: 1e-12 }).unwrap();
+        (run.trajectory.get("cart_position").unwrap().to_vec(), case)
+    };
+    let ((without, case), (with, _)) = (run(0.0), run(step));
+    let system = StateSpace::of(&case.machine, Operation { speed, ..Operation::default() }).unwrap();
+    let model = system.discrete(1e-3, Hold::Zero, 0.0).unwrap();
+    let (row, mut x, mut most) = (system.output("cart_position").unwrap(), &model.b * 0.0, 0.0_f64);
+    for k in 500..=520 {
+        let answer = (model.c.row(row) * &x)[0] * step;
+        most = most.max((with[k] - without[k] - answer).abs() / step);
+        x = &model.a * &x + &model.b;
+    }
+    most
+}
+
+#[test]
+fn a_small_command_at_a_speed_moves_the_cart_as_the_linear_model_of_that_speed_says() {
+    // Without friction, load and detents, so that the rotor is where it would be without load.
+    let chopper = plain(0.45, 6.4e-3, 16, "[cart]\nmass = 0.2\n").replace("supply", "interpolate = true\nsupply");
+    let voltage = chopper.replace("supply = 24", "supply = 3.9597979\ndrive = \"voltage\"");
+    for (text, speed) in [(&chopper, 0.1), (&voltage, 5e-3), (&voltage, 0.03), (&voltage, 0.1)] {
+        let off = apart_at_speed(text, speed, 1e-5);
+        assert!(off < 0.03, "{speed} m/s: {off:.1e}\n{text}");
+    }
+}
+
+#[test]
+fn all_that_a_stepper_moves_swings_on_the_stiffness_of_its_field() {
+    // As one mass on N T_h, and on a full step at rest N (T_h − 4 T_d); with a voltage on the phases, back-EMF damps it.
+    let (holding, detent, radius, n) = (0.45, 15e-3, 6.4e-3, 50.0);
+    let text = plain(holding, radius, 16, "[cart]\nmass = 0.4\n")
+        .replace("rotor_inertia", "detent_torque = 15e-3\nrotor_inertia")
+        .replace("stiffness = [6e4, 6e4, 3e4]", "stiffness = [6e9, 6e9, 3e9]");
+    let inertia = 5.4e-6 + 2e-6 + 0.4 * radius * radius;
+    let hertz = |torque: f64| (n * torque / inertia).sqrt() / (2.0 * PI);
+    for voltage in [false, true] {
+        let text = match voltage {
+            true => text.replace("supply = 24", "supply = 3.9597979\ndrive = \"voltage\""),
+            false => text.clone(),
+        };
+        let case = Case::from_text("alone.toml", &text).unwrap();
+        for (speed, torque) in [(1e-4, holding), (0.0, holding - 4.0 * detent)] {
+            let analysis = Analysis::of(&case, &Question { speed: Some(speed), ..Question::default() }).unwrap();
+            let modes = analysis.modes.as_ref().unwrap();
+            assert!(modes.rigid.is_empty());
+            assert!((modes.elastic[0].hertz() / hertz(holding) - 1.0).abs() < 1e-4);
+            let undamped = analysis.here.undamped_resonances[0];
+            assert!((undamped / hertz(torque) - 1.0).abs() < 1e-4, "{undamped} Hz, {} Hz", hertz(torque));
+            let Root::Pair { damping, .. } = analysis.here.resonances[0] else { panic!() };
+            assert!(if voltage { damping > 0.01 } else { damping.abs() < 1e-3 }, "{damping}");
+            // On a full step detents push the rotor farther than it is told to go.
+            let [one] = &analysis.inputs[..] else { panic!() };
+            let cart = one.system.output("cart_position").unwrap();
+            let (integrators, gain) = one.transfers[cart].low_frequency();
+            assert!(integrators == 0 && (gain / (holding / torque) - 1.0).abs() < 1e-3, "{gain}");
+        }
+    }
+}
+
+#[test]
+fn a_supply_that_limits_the_currents_has_no_linear_model() {
+    let low = plain(0.45, 6.4e-3, 16, "[cart]\nmass = 0.4\n").replace("supply = 24", "supply = 2.7");
+    let fast = plain(0.45, 6.4e-3, 16, "[cart]\nmass = 0.4\n");
+    for (text, speed) in [(&low, 0.0), (&fast, 3.0)] {
+        let case = Case::from_text("low.toml", text).unwrap();
+        let question = Question { speed: Some(speed), ..Question::default() };
+        let error = Analysis::of(&case, &question).unwrap_err().to_string();
+        assert!(error.starts_with("--speed: ") && error.contains("the supply of"), "{error}");
+        assert!(error.contains("allowed: ") && error.contains("next: "), "{error}");
+    }
 }
 
 /// A stepper axis for limit laws: no dry friction, and these keys of its own.

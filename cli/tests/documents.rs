@@ -193,6 +193,11 @@ fn the_page_on_modes_shows_what_the_program_prints() {
 }
 
 #[test]
+fn the_page_on_steppers_shows_what_the_program_prints() {
+    check("docs/stepper.md");
+}
+
+#[test]
 fn the_page_on_gantries_shows_what_the_program_prints() {
     check("docs/gantry.md");
 }

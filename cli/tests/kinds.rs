@@ -30,7 +30,8 @@ const WITH_LOGS: [&str; 2] = ["stages/h-frame/belts.toml", "stages/core-xy/belts
 const STEPPERS: [&str; 2] = ["stages/stepper-axis/stepper-axis.toml", "stages/printer-core-xy/printer.toml"];
 
 /// Commands that take a stepper; all others refuse it.
-const WITH_STEPPER: [&str; 7] = ["show", "simulate", "sweep", "move", "plan", "shape", "export fmu"];
+const WITH_STEPPER: [&str; 11] =
+    ["show", "simulate", "modes", "sweep", "move", "plan", "check", "shape", "frf", "export json", "export fmu"];
 
 /// Of whatever does not.
 const NO_MOTOR: Ends = Refused("this needs a motor that is commanded by voltage or current");
@@ -97,6 +98,40 @@ fn trial(case: &str, options: &[&str], folder: &Path) -> String {
     format!("{out}/{}.csv", name.replace(' ', "-"))
 }
 
+/// The machine of a stepper's case with a log of it, in this folder: it slides, with noise on each command.
+fn logged(case: &str, folder: &Path) -> String {
+    let whole = std::fs::read_to_string(Path::new("..").join(case)).unwrap();
+    let machine = whole.split("[[experiment]]").next().unwrap();
+    let sliding = |way: f64, seed: u32| {
+        format!(
+            "{{ sum = [{{ ramp = \"{way} mm\", over = \"0.42 s\" }}, \
+             {{ prbs = \"5 um\", bit = \"2 ms\", seed = {seed} }}] }}"
+        )
+    };
+    let [input, columns, outputs] = match case == STEPPERS[0] {
+        true => [sliding(20.0, 1), "input = \"input_m\"".into(), "cart_position = \"cart_position_m\"".into()],
+        false => [
+            format!("{{ left = {}, right = {} }}", sliding(30.0, 1), sliding(10.0, 2)),
+            "left_input = \"left_input_m\", right_input = \"right_input_m\"".into(),
+            "left_angle = \"left_angle_rad\", cart_position = \"cart_position_m\"".into(),
+        ],
+    };
+    let path = folder.join("logged.toml").display().to_string();
+    let run =
+        format!("{machine}[[experiment]]\nname = \"noise\"\ninput = {input}\nuntil = \"0.42 s\"\nevery = \"1 ms\"\n");
+    std::fs::write(&path, run).unwrap();
+    let out = folder.display().to_string();
+    let smooth = "stepper.interpolate=true";
+    taut_in(root()).args(["simulate", &path, "--no-report", "--out", &out, "--set", smooth]).assert().success();
+    let log = format!(
+        "{machine}[[experiment]]\nname = \"noise\"\n\
+         log = {{ file = \"noise.csv\", time = \"time_s\", hold = \"linear\", {columns}, {outputs} }}\n\
+         [fit]\nfree = [\"stepper.holding_torque\"]\n"
+    );
+    std::fs::write(&path, log).unwrap();
+    path
+}
+
 #[test]
 fn every_command_is_in_the_table() {
     let output = taut_in(root()).arg("--help").output().unwrap();
@@ -133,9 +168,13 @@ fn every_kind_goes_through_every_command() {
                 .collect();
             let log = if own.contains(&"trial.csv") { trial(case, &own, folder.path()) } else { String::new() };
             let options = own.iter().map(|option| if *option == "trial.csv" { &log } else { *option });
+            let has_stepper = STEPPERS.contains(&case) && WITH_STEPPER.contains(command);
+            let of_log = has_stepper && ["check", "frf"].contains(command);
+            let case = if of_log { &logged(case, folder.path()) } else { case };
             // Fine microsteps and a whole family of machines cost time here, and show nothing more.
-            let coarse: &[&str] = match STEPPERS.contains(&case) && WITH_STEPPER.contains(command) {
+            let coarse: &[&str] = match has_stepper {
                 true if *command == "plan" => &["--set", "stepper.microsteps=1", "--set", "tune={ spread = 0 }"],
+                true if of_log => &["--set", "stepper.interpolate=true"],
                 true => &["--set", "stepper.microsteps=1"],
                 false => &[],
             };

@@ -149,6 +149,18 @@ def test_a_case_is_exported_as_the_program_does(case, tmp_path):
         taut.export(case, "c", tmp_path, real="half")
 
 
+def test_a_stepper_at_rest_and_at_a_speed_has_modes(root):
+    case = taut.read(root / "stages/stepper-axis/stepper-axis.toml")
+    for speed, gain in [(0.1, 1.0), (0.0, 0.45 / (0.45 - 4 * 0.015))]:
+        found = case.modes(speed=speed).data
+        [command] = found["inputs"]
+        assert (command["name"], command["unit"], found["rigid"]) == ("position_command", "m", [])
+        [cart] = [output for output in command["outputs"] if output["name"] == "cart_position"]
+        assert cart["low_frequency_gain"] == pytest.approx(gain)
+    with pytest.raises(taut.Error, match="the supply of 24 V does not suffice"):
+        case.modes(speed=3.0)
+
+
 def test_a_missing_log_is_told_to_those_who_need_it(case, tmp_path):
     """One log that was not there blocked the whole case: its modes, its export, the simulation of other experiments."""
     text = case.text + """

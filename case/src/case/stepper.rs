@@ -12,7 +12,8 @@ use crate::solve::{Jump, first_jump};
 const NO_MOTOR: [&str; 3] = [
     "this needs a motor that is commanded by voltage or current, and the case describes a stepper",
     "[motor] and [amplifier]",
-    "steppers are supported by `taut show`, `simulate`, `move`, `plan`, `shape`, `sweep`, `fit` and `export fmu`",
+    "choose the moves of a stepper with `taut plan` and `taut shape`, since it has no controller; see what logs of \
+     moves determine with `taut check` and `taut fit`; export it with `taut export fmu` or `taut export json`",
 ];
 
 /// Refuses a stepper where a motor that is commanded by voltage or current is needed.

@@ -18,7 +18,7 @@ use taut_report::fit::value;
 /// Reads the case, looks, tells.
 pub fn run(args: &Args) -> Outcome {
     let common = &args.common;
-    let case = common.open_motors(&args.case)?;
+    let case = common.open(&args.case)?;
     let plan = case.fit_plan(&args.case)?;
     let folder = Folder::wanted(common, || folder::inputs(&args.case, &case.files), ["check.json", "report.html"])?;
     let found = watched(&case, &plan, common.quiet)?;

@@ -15,7 +15,7 @@ use taut_report::frf::{figures, page};
 /// Reads the case and its logs, measures, writes, tells.
 pub fn run(args: &Args) -> Outcome {
     let common = &args.common;
-    let case = common.open_motors(&args.case)?;
+    let case = common.open(&args.case)?;
     let folder =
         Folder::wanted(common, || folder::inputs(&args.case, &case.files), ["frf.json", "frf.csv", "report.html"])?;
     let known = Known::of(&case, args.at, args.bridge, args.delay)?;

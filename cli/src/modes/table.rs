@@ -52,7 +52,9 @@ pub fn text(analysis: &Analysis) -> String {
 /// Mode shapes and energies.
 fn shapes(text: &mut String, analysis: &Analysis, modes: &Natural) {
     let mechanism = analysis.case.machine.mechanism();
-    let _ = write!(text, "\n{}\n", bold("Rigid modes"));
+    if !modes.rigid.is_empty() {
+        let _ = write!(text, "\n{}\n", bold("Rigid modes"));
+    }
     for mode in &modes.rigid {
         let (name, ways) = rigid(&mechanism, modes, mode);
         let _ = writeln!(text, "  {name:<12}{}", typed(&ways));
@@ -75,16 +77,17 @@ fn outputs(text: &mut String, one: &ByInput, several: bool) {
     let heading = if several { format!("Outputs: {}", words(&input.name)) } else { "Outputs".into() };
     let _ = write!(text, "\n{}\n", bold(&heading));
     let is_shown = |unit: &str| !several || ["rad", "m"].contains(&unit);
-    let each = one.system.outputs.iter().zip(&one.transfers);
-    for (output, transfer) in each.filter(|(output, _)| is_shown(output.unit)) {
-        let _ = writeln!(text, "  {:<18}{}", words(&output.name), gain(transfer, output.unit, input.unit));
+    let shown = || one.system.outputs.iter().zip(&one.transfers).filter(|(output, _)| is_shown(output.unit));
+    let wide = shown().map(|(output, _)| output.name.len() + 1).fold(18, usize::max);
+    for (output, transfer) in shown() {
+        let _ = writeln!(text, "  {:<wide$}{}", words(&output.name), gain(transfer, output.unit, input.unit));
         let zeros = zeros(transfer);
         if !zeros.is_empty() {
-            let _ = writeln!(text, "  {:<18}zeros: {zeros}", "");
+            let _ = writeln!(text, "  {:<wide$}zeros: {zeros}", "");
         }
     }
     if several {
-        let _ = writeln!(text, "  {:<18}--out or --json has speeds, forces and currents", "");
+        let _ = writeln!(text, "  {:<wide$}--out or --json has speeds, forces and currents", "");
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::friction::Law;
 use crate::machine::{Geometry, Machine};
-use crate::mechanism::{self, Form, Mechanism};
+use crate::mechanism::{self, CURRENTS, Form, Mechanism};
 use nalgebra::{DMatrix, DVector};
 
 /// A quantity with its unit.
@@ -32,9 +32,15 @@ impl Variable {
         Self::new(format!("{}_speed", part.label.key), part.kind.units()[1])
     }
 
-    /// The current of a drive.
-    pub(super) fn current(geometry: &Geometry, drive: usize) -> Self {
-        Self::new(geometry.drives[drive].current_column, "A")
+    /// A current of a drive: of a stepper i_d and i_q, which turn with its rotor.
+    pub(super) fn current(geometry: &Geometry, plant: &Mechanism, number: usize) -> Self {
+        let drive = (0..plant.drives.len()).rfind(|drive| plant.first_current(*drive) <= number).unwrap_or_default();
+        let at = &geometry.drives[drive];
+        match (plant.drives[drive].motor.stepper, number - plant.first_current(drive)) {
+            (None, _) => Self::new(at.current_column, "A"),
+            (Some(_), 0) => Self::new(format!("{}direct_axis_current", at.prefix), "A"),
+            (Some(_), _) => Self::new(format!("{}quadrature_axis_current", at.prefix), "A"),
+        }
     }
 }
 
@@ -51,10 +57,12 @@ pub(super) struct Frame {
     pub(super) ways: Vec<(usize, DVector<f64>)>,
     /// Indices of the speeds that are states, by body.
     pub(super) speed_place: Vec<Option<usize>>,
-    /// Indices of the currents, by drive.
+    /// Indices of the currents that are states, by their numbers.
     pub(super) current_place: Vec<Option<usize>>,
     /// Indices of the bristles, by body.
     pub(super) bristle_place: Vec<Option<usize>>,
+    /// Number of inputs.
+    inputs: usize,
     /// The quantity of each state, by which it is found in another frame.
     kinds: Vec<Kind>,
 }
@@ -196,7 +204,7 @@ impl Frame {
         let variables = kinds.iter().map(|kind| match *kind {
             Kind::Angle(j) => Variable::angle(plant, j),
             Kind::Speed(j) => Variable::speed(plant, j),
-            Kind::Current(drive) => Variable::current(machine.geometry(), drive),
+            Kind::Current(number) => Variable::current(machine.geometry(), plant, number),
             Kind::Bristle(j) => {
                 let part = &plant.bodies[j];
                 Variable::new(format!("{}_bristle", part.label.key), part.kind.units()[0])
@@ -207,12 +215,13 @@ impl Frame {
         Self {
             variables: variables.collect(),
             speed_place: (0..plant.bodies.len()).map(|j| place(Kind::Speed(j))).collect(),
-            current_place: (0..plant.drives.len()).map(|drive| place(Kind::Current(drive))).collect(),
+            current_place: (0..CURRENTS).map(|number| place(Kind::Current(number))).collect(),
             bristle_place: (0..plant.bodies.len()).map(|j| place(Kind::Bristle(j))).collect(),
             stretch,
             speed,
             angle,
             ways,
+            inputs: plant.drives.len(),
             kinds,
         }
     }
@@ -231,7 +240,7 @@ impl Frame {
                 row[*place] += factor;
             }
         }
-        (row, DVector::from_iterator(self.current_place.len(), form.input.into_iter().take(self.current_place.len())))
+        (row, DVector::from_iterator(self.inputs, form.input.into_iter().take(self.inputs)))
     }
 
     /// Matrix from another frame's states to those of this one.
@@ -260,8 +269,7 @@ fn moving(plant: &Mechanism, held: &[bool]) -> Vec<usize> {
 
 /// Currents that are states.
 fn currents(plant: &Mechanism) -> impl Iterator<Item = Kind> + '_ {
-    let drives = plant.drives.iter().enumerate();
-    drives.filter(|(_, drive)| drive.has_current_state()).map(|(number, _)| Kind::Current(number))
+    (0..CURRENTS).filter(|number| plant.drive_of_current(*number).is_some()).map(Kind::Current)
 }
 
 /// Bristles that are states.

@@ -4,7 +4,8 @@ use super::frame::{Frame, Variable, gears};
 use crate::error::{Error, Result};
 use crate::friction::{Law, Motion};
 use crate::machine::{BeltMake, BeltModel, Geometry, Machine};
-use crate::mechanism::{AmplifierMode, BODIES, Contact, Form, Mechanism, Mode, Over, SpringLaw};
+use crate::mechanism::{AmplifierMode, BODIES, Contact, Drive, Form, Mechanism, Mode, Over, Phases, SpringLaw};
+use crate::number::engineering;
 use nalgebra::{DMatrix, DVector};
 
 /// Operating point of a linearisation.
@@ -118,9 +119,9 @@ impl System {
     /// # Ok::<(), taut::Error>(())
     /// ```
     pub fn of(machine: &Machine, operation: Operation) -> Result<Self> {
-        crate::case::needs_motors(machine)?;
         let machine = placed(machine, operation)?;
         let plant = machine.mechanism();
+        within_supply(&machine, &plant, operation.speed)?;
         let bodies = plant.held_bodies();
         let is_held =
             |body: usize| plant.followers(plant.leader(body)).any(|b| bodies.contains(&b) && operation.held[b]);
@@ -186,9 +187,10 @@ impl StateSpace {
     /// The linear equations of `machine` about `operation`, with its first drive's input.
     ///
     /// Piecewise linear parts have their case in undisturbed motion: amplifier within its limits, spans taut, end stops
-    /// open, the driving flank of a gear with play in contact. A lossy gear is driven by the motor. Stiffness and
-    /// friction have their values at the operating point; their derivatives along the travel are not included. Errors:
-    /// a position at which a span would have no length.
+    /// open, the driving flank of a gear with play in contact. A lossy gear is driven by the motor. Steppers turn at
+    /// the steady speed without load ([`Steady`](crate::mechanism::Steady)). Stiffness and friction have their values
+    /// at the operating point; their derivatives along the travel are not included. Errors: a position at which a span
+    /// would have no length.
     ///
     /// ```
     /// use taut::case::{Case, TEMPLATE};
@@ -211,6 +213,24 @@ impl StateSpace {
     pub fn output(&self, name: &str) -> Option<usize> {
         self.outputs.iter().position(|output| output.name == name)
     }
+}
+
+/// Rejects a speed at which the supply of a stepper does not suffice for its currents.
+fn within_supply(machine: &Machine, plant: &Mechanism, speed: f64) -> Result<()> {
+    let is_limited = |drive: &Drive| {
+        let turning = speed / plant.bodies[drive.shaft].kind.lever();
+        Phases::of(drive).is_some_and(|phases| phases.without_load(turning).is_none())
+    };
+    if !plant.drives.iter().any(is_limited) {
+        return Ok(());
+    }
+    let supply = machine.drives[0].amplifier.voltage_limit.unwrap_or(f64::INFINITY);
+    let [supply, speed] = [engineering(supply, "V", 4), engineering(speed, "m/s", 4)];
+    let what = format!("at {speed} the supply of {supply} does not suffice for the currents of the stepper");
+    Err(Error::new(what)
+        .in_file("--speed")
+        .allowed("a speed at which it does: beyond that there is no linear model")
+        .next("choose a lower --speed, or 0 for rest on a full step; or raise stepper.supply"))
 }
 
 /// The machine with the span lengths of the operating point. Errors: a position at which a span would have no length.
@@ -292,7 +312,17 @@ impl Linear<'_> {
         let plant = self.plant;
         let n = frame.variables.len();
         let (mut a, mut b) = (DMatrix::zeros(n, n), DMatrix::zeros(n, plant.drives.len()));
-        let equations = plant.equations(self.mode);
+        let mut equations = plant.equations(self.mode);
+        for (drive, part) in plant.drives.iter().enumerate() {
+            let speed = if self.holds(part.shaft) { 0.0 } else { self.speed(part.shaft) };
+            let Some(steady) = plant.steady(drive, speed) else { continue };
+            let (leader, first) = (plant.leader(part.shaft), plant.first_current(drive));
+            // M v̇ = … + ρ τ
+            let mass = plant.mass(leader, &equations.inertia);
+            let own = equations.acceleration[leader];
+            equations.acceleration[leader] = own + steady.torque * (plant.ratio(part.shaft) / mass);
+            equations.current_rate[first..first + 2].copy_from_slice(&steady.rates);
+        }
         for (place, rate) in &frame.ways {
             a.row_mut(*place).copy_from(&rate.transpose());
         }
@@ -300,9 +330,9 @@ impl Linear<'_> {
             a.row_mut(place).copy_from(&row.transpose());
             b.row_mut(place).copy_from(&input.transpose());
         };
-        for (drive, place) in frame.current_place.iter().enumerate() {
+        for (number, place) in frame.current_place.iter().enumerate() {
             if let Some(place) = place {
-                put(&mut a, *place, frame.row(&equations.current_rate[drive]));
+                put(&mut a, *place, frame.row(&equations.current_rate[number]));
             }
         }
         for body in plant.leaders().filter(|body| plant.bodies[*body].is_rotor || !self.held[*body]) {
@@ -327,6 +357,11 @@ impl Linear<'_> {
             put(&mut a, place, (row, input));
         }
         (a, b)
+    }
+
+    /// True if a body is held.
+    fn holds(&self, body: usize) -> bool {
+        self.held.get(body).is_some_and(|held| *held)
     }
 
     /// Speed of a body, in its own unit.
@@ -401,7 +436,11 @@ impl Linear<'_> {
             add(torque, frame.row(&plant.spring_force(gear, &self.mode)));
         }
         for drive in 0..drives {
-            add(Variable::current(geometry, drive), frame.row(&plant.current(drive, &self.mode)));
+            let first = plant.first_current(drive);
+            add(Variable::current(geometry, plant, first), frame.row(&plant.current(drive, &self.mode)));
+            if plant.drives[drive].windings() > 1 {
+                add(Variable::current(geometry, plant, first + 1), frame.row(&Form::current(first + 1)));
+            }
         }
         let c = DMatrix::from_fn(all.len(), frame.variables.len(), |i, j| all[i].1[j]);
         let d = DMatrix::from_fn(all.len(), drives, |i, j| all[i].2[j]);

@@ -4,13 +4,14 @@
 //! M q̈ + C q̇ + K q = 0,   K = Aᵀ diag(k) A,   C = Aᵀ diag(c) A + B + n² K_t K_e / R
 //! ```
 //!
-//! over the independent bodies. Undamped modes are the eigenvectors of M^(−½) K M^(−½); the number of rigid ones, whose
-//! frequency is zero by construction, is the dimension of the null space of A.
+//! over the independent bodies; A has a row for each stepper, whose field is a spring to its commanded angle. Undamped
+//! modes are the eigenvectors of M^(−½) K M^(−½); the number of rigid ones, whose frequency is zero by construction, is
+//! the dimension of the null space of A.
 
 use super::{Root, eigen};
 use crate::error::{Error, Result};
 use crate::friction::Motion;
-use crate::mechanism::{AmplifierMode, BODIES, Kind, Mechanism, Mode, SpringLaw};
+use crate::mechanism::{AmplifierMode, BODIES, Kind, Mechanism, Mode, Phases, SpringLaw};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use std::f64::consts::PI;
 
@@ -156,6 +157,11 @@ impl Matrices {
                 damping[(i, i)] += passed * way * way * emf;
             }
         }
+        let field = |drive: usize| {
+            let (angle, _) = mechanism.angle_of(drive)?;
+            Some((angle, Phases::of(&mechanism.drives[drive])?.stiffness()))
+        };
+        let fields: Vec<(usize, f64)> = (0..mechanism.drives.len()).filter_map(field).collect();
         let mut stiffness = DMatrix::zeros(n, n);
         let mut rows = Vec::new();
         for (spring, part) in mechanism.springs.iter().enumerate() {
@@ -163,14 +169,17 @@ impl Matrices {
                 SpringLaw::TwoSided | SpringLaw::Tension { .. } => true,
                 // The flank of a gear is in contact; an end stop is not.
                 SpringLaw::Gap { .. } => part.arms.len() > 1,
-                SpringLaw::Line { .. } | SpringLaw::Bounds { .. } | SpringLaw::Angle { .. } | SpringLaw::None => false,
+                // The field of a stepper holds its rotor.
+                SpringLaw::Angle { .. } => true,
+                SpringLaw::Line { .. } | SpringLaw::Bounds { .. } | SpringLaw::None => false,
             };
             let arms = mechanism.leading_arms(spring);
             let row = DVector::from_fn(n, |i, _| arms[bodies[i]]);
             if !holds || row.amax() == 0.0 {
                 continue;
             }
-            let k = part.follows.as_ref().map_or(part.stiffness, |follows| follows.stiffness(|body| position[body]));
+            let own = fields.iter().find(|(angle, _)| *angle == spring).map_or(part.stiffness, |(_, field)| *field);
+            let k = part.follows.as_ref().map_or(own, |follows| follows.stiffness(|body| position[body]));
             stiffness += &row * row.transpose() * k;
             damping += &row * row.transpose() * part.damping;
             rows.push(row);

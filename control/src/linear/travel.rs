@@ -4,8 +4,12 @@ use super::model::placed;
 use super::{Operation, Root, StateSpace};
 use crate::error::Result;
 use crate::friction::{Friction, Law, Side};
-use crate::machine::{Amplifier, AmplifierMode, BeltModel, Machine, SlideAt, SlideForces, Spans};
+use crate::machine::{Amplifier, AmplifierMode, BeltModel, Machine, SlideAt, SlideForces, Spans, Stepper};
+use crate::mechanism::Phases;
 use nalgebra::{DMatrix, DVector};
+
+/// Damping ratio above which a pair of poles of a stepper is not a resonance.
+const STILL: f64 = 0.98;
 
 /// Resonances at one position. All frequencies in Hz, the lowest first.
 #[derive(Debug, Clone, PartialEq)]
@@ -18,7 +22,7 @@ pub struct Place {
     pub stiffness: Spans,
     /// Compliance of each slide with held drive pulleys, m/N.
     pub compliance: Vec<f64>,
-    /// Resonances: the pairs among the poles.
+    /// Resonances: the pairs among the poles, without those of regulated currents of a stepper.
     pub resonances: Vec<Root>,
     /// Resonances with the drive pulleys held: the anti-resonances of the drive angle of an axis.
     pub antiresonances: Vec<Root>,
@@ -46,10 +50,13 @@ pub fn travel(machine: &Machine, operation: Operation, positions: &[f64]) -> Res
     let bare = undamped(machine);
     let mut drives_held = operation;
     machine.geometry().drives.iter().for_each(|drive| drives_held.held[drive.pulley] = true);
+    // Regulated currents that turn with a rotor decay in a hundredth of a period or less.
+    let has_stepper = machine.stepper().is_some();
+    let is_of_currents = |root: &Root| matches!(root, Root::Pair { damping, .. } if has_stepper && *damping > STILL);
     let place = |&position: &f64| {
         let pairs = |machine: &Machine, about: Operation| -> Result<Vec<Root>> {
             let poles = StateSpace::of(machine, Operation { position, ..about })?.poles()?;
-            Ok(Root::of(&poles).into_iter().filter(|root| root.hertz().is_some()).collect())
+            Ok(Root::of(&poles).into_iter().filter(|root| root.hertz().is_some() && !is_of_currents(root)).collect())
         };
         let hertz = |roots: Vec<Root>| roots.into_iter().filter_map(Root::hertz).collect();
         let held = placed(machine, Operation { position, ..operation })?;
@@ -96,7 +103,8 @@ pub fn place(machine: &Machine, operation: Operation) -> Result<Place> {
     Ok(travel(machine, operation, &[operation.position])?.swap_remove(0))
 }
 
-/// The machine without losses: no friction, damping or back-EMF, and commanded motor currents.
+/// The machine without losses: no friction, damping or back-EMF, and commanded motor currents; of steppers, regulated
+/// phase currents.
 pub fn undamped(machine: &Machine) -> Machine {
     let mut bare = machine.clone();
     let none = Friction { forward: Side::default(), backward: Side::default(), law: Law::Coulomb };
@@ -110,7 +118,17 @@ pub fn undamped(machine: &Machine) -> Machine {
             play.damping = 0.0;
         }
         unit.motor.gear_efficiency = 1.0;
-        unit.amplifier = Amplifier::ideal(AmplifierMode::Current, unit.amplifier.gain);
+        let gain = unit.amplifier.gain;
+        let phases = Phases::of_motor(&unit.motor, &unit.amplifier);
+        unit.amplifier = match (phases, &mut unit.motor.stepper) {
+            (Some(phases), Some(stepper)) => {
+                // The same currents at rest, from regulators with voltage to spare.
+                stepper.rated_current = phases.at_rest(0.0)[0];
+                let bandwidth = Some(Stepper::CHOPPER_BANDWIDTH);
+                Amplifier { bandwidth, ..Amplifier::ideal(AmplifierMode::Position, gain) }
+            }
+            _ => Amplifier::ideal(AmplifierMode::Current, gain),
+        };
     }
     bare
 }

@@ -3,7 +3,7 @@
 use super::Operation;
 use crate::friction::Law;
 use crate::machine::{BeltModel, DriveUnit, Machine};
-use crate::mechanism::{AmplifierMode, Kind, Mechanism};
+use crate::mechanism::{AmplifierMode, Kind, Mechanism, Phases};
 use crate::number::engineering_typed;
 
 /// Operating point and assumptions: a sentence for each nonlinear part of the machine.
@@ -20,6 +20,7 @@ pub(crate) fn assumptions(machine: &Machine, operation: Operation) -> Vec<String
     words.extend(curves(&plant, operation, &moving));
     words.extend(forces(machine, &plant, operation, &moving));
     words.extend(drives(machine, &plant));
+    words.extend(steppers(machine, &plant, operation));
     if machine.belt.pretension.is_some() {
         words.push("the spans are taken taut; forces are those beyond pretension".into());
     }
@@ -32,12 +33,12 @@ pub(crate) fn assumptions(machine: &Machine, operation: Operation) -> Vec<String
         let who = if machine.bridge.is_some() { "bridge and cart are" } else { "the cart is" };
         words.push(format!("{who} taken between the end stops"));
     }
-    words.extend(damping_of_modes(machine, &plant));
+    words.extend(differences_of_modes(machine, &plant, operation));
     words
 }
 
-/// Damping that the poles include and [`Natural`](super::Natural) modes do not.
-fn damping_of_modes(machine: &Machine, plant: &Mechanism) -> Vec<String> {
+/// What the poles include and [`Natural`](super::Natural) modes do not.
+fn differences_of_modes(machine: &Machine, plant: &Mechanism, operation: Operation) -> Vec<String> {
     let mut words = Vec::new();
     let is_curved = |body: usize| {
         let friction = &plant.bodies[body].friction;
@@ -52,6 +53,14 @@ fn damping_of_modes(machine: &Machine, plant: &Mechanism) -> Vec<String> {
     let is_sluggish = |unit: &DriveUnit| unit.amplifier.mode == AmplifierMode::Voltage && unit.motor.inductance != 0.0;
     if machine.drives.iter().any(is_sluggish) {
         words.push("the damping of the modes does not include motors with an inductance; the poles do".into());
+    }
+    if plant.drives.iter().filter_map(Phases::of).any(|phases| phases.regulator.is_none()) {
+        words.push("the damping of the modes does not include the phases of the motor; the poles do".into());
+    }
+    if operation.speed == 0.0 && machine.stepper().is_some_and(|stepper| stepper.detent_torque > 0.0) {
+        words.push(
+            "the modes have the mean stiffness of the field over its detents; the poles that of a full step".into(),
+        );
     }
     words
 }
@@ -85,15 +94,38 @@ fn forces(machine: &Machine, plant: &Mechanism, operation: Operation, moving: &[
     }
     if machine.slides().any(|slide| slide.constant_force() != 0.0) {
         let who = if machine.bridge.is_some() { "bridge or cart" } else { "the cart" };
-        words.push(format!("the constant force on {who} changes the position of the machine, not its vibration"));
+        words.push(match machine.stepper() {
+            Some(_) => format!("the constant force on {who}, which makes a field softer, is left out"),
+            None => format!("the constant force on {who} changes the position of the machine, not its vibration"),
+        });
     }
     words
+}
+
+/// Assumptions about steppers, in one sentence for all.
+fn steppers(machine: &Machine, plant: &Mechanism, operation: Operation) -> Option<String> {
+    let (phases, stepper) = plant.drives.iter().find_map(|drive| Phases::of(drive).zip(drive.motor.stepper))?;
+    let detent = if operation.speed == 0.0 { 4.0 * stepper.teeth() * stepper.detent_torque } else { 0.0 };
+    let stiffness = engineering_typed(phases.stiffness() - detent, "N m/rad", 4);
+    let whose = if machine.drives.len() > 1 { "each field" } else { "the field" };
+    let place = match (operation.speed == 0.0, stepper.detent_torque > 0.0) {
+        (true, _) => "at rest on a full step",
+        (false, true) => "while it turns over its detents, whose mean is zero",
+        (false, false) => "while it turns",
+    };
+    Some(format!(
+        "{whose} holds its rotor like a spring of {stiffness} {place}; without load, commands small against a full step \
+         and not rounded to microsteps"
+    ))
 }
 
 /// Assumptions about amplifiers and gears: one sentence for all drives.
 fn drives(machine: &Machine, plant: &Mechanism) -> Vec<String> {
     let mut words = Vec::new();
-    let limited = |unit: &DriveUnit| unit.amplifier.voltage_limit.is_some() || unit.amplifier.current_limit.is_some();
+    let limited = |unit: &DriveUnit| {
+        let has_limit = unit.amplifier.voltage_limit.is_some() || unit.amplifier.current_limit.is_some();
+        has_limit && unit.motor.stepper.is_none()
+    };
     let (amplifier, gear) = match machine.drives.len() {
         1 => (
             "the amplifier is taken within its limits",

@@ -33,11 +33,6 @@ impl Motor {
         self.stepper.map(|stepper| self.torque_constant * stepper.amplitude())
     }
 
-    /// Stiffness of the field of a stepper at rest, N m/rad: N T_h, the mean over the steps of its detents.
-    pub fn field_stiffness(&self) -> Option<f64> {
-        Some(self.stepper?.teeth() * self.holding_torque()?)
-    }
-
     /// Sets K_m = T_h/(√2 I), the torque and the back-EMF constant of each phase of a stepper.
     pub fn set_holding_torque(&mut self, torque: f64) {
         if let Some(stepper) = self.stepper {

@@ -26,7 +26,7 @@ pub use form::Form;
 pub use form::ROUNDING;
 pub use layout::{Layout, Replaced};
 pub use mode::{Cause, Contact, DriveMode, Guard, Limit, Mode, Part, Status, Switch, What};
-pub use phases::{PhaseRate, Phases};
+pub use phases::{PhaseRate, Phases, Steady};
 pub use power::Power;
 pub use transition::{After, Next, Place, Resets, Then, Transition};
 
@@ -44,7 +44,7 @@ pub const DRIVES: usize = 3;
 /// Maximum of both together: three drives allow one body less than two drives.
 pub(crate) const BODIES_AND_DRIVES: usize = BODIES + 2;
 /// Maximum number of currents that are states: one for each brushed motor, two for each of two steppers.
-pub(crate) const CURRENTS: usize = 4;
+pub const CURRENTS: usize = 4;
 /// Maximum number of steppers of a machine, each with two currents.
 pub const STEPPERS: usize = CURRENTS / 2;
 
@@ -244,7 +244,7 @@ impl Drive {
     }
 
     /// Number of windings with currents of their own.
-    pub(crate) fn windings(&self) -> usize {
+    pub fn windings(&self) -> usize {
         if self.motor.stepper.is_some() { 2 } else { 1 }
     }
 

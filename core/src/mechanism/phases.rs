@@ -45,6 +45,25 @@ pub struct PhaseRate {
     pub slopes: [f64; 3],
 }
 
+/// Small motions of a stepper without load about a constant speed, with currents that turn with the rotor: i_d along
+/// its field and i_q across it, in the places of the two phases.
+///
+/// ```text
+/// i_d = i_a cos ε + i_b sin ε          di_d/dt = u cos δ − λ i_d + N φ̇ i_q
+/// i_q = −i_a sin ε + i_b cos ε         di_q/dt = u sin δ − λ i_q − N φ̇ i_d − κ φ̇
+/// δ = ψ − ε                            τ = K_m i_q − T_d sin 4ε
+/// ```
+///
+/// For a voltage u = V/L, λ = R/L and κ = K_m/L; for a chopper within its supply u = ω_c √2 I, λ = ω_c and κ = 0.
+/// Detents count at rest, where the rotor is on a full step; at a speed their mean is zero.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Steady {
+    /// Torque on the rotor, N m.
+    pub torque: Form,
+    /// Rates of i_d and i_q, A/s.
+    pub rates: [Form; 2],
+}
+
 impl Phases {
     /// Phases of a drive; none for a brushed motor.
     pub fn of(drive: &Drive) -> Option<Self> {
@@ -125,6 +144,38 @@ impl Phases {
         Some([wanted - self.supply, wanted + self.supply])
     }
 
+    /// u, λ and κ of [`Steady`].
+    fn turning(&self) -> [f64; 3] {
+        match self.regulator {
+            Some(rate) => [rate * self.amplitude, rate, 0.0],
+            None => [self.supply, self.resistance, self.torque_constant].map(|value| value / self.inductance),
+        }
+    }
+
+    /// Stiffness of the field at rest, N m/rad: N T_h, the mean over the steps of its detents, where T_h is the holding
+    /// torque with the currents at rest.
+    pub fn stiffness(&self) -> f64 {
+        let [u, rate, _] = self.turning();
+        self.teeth * self.torque_constant * (u / rate).min(self.supply / self.resistance)
+    }
+
+    /// i_d, A, and the angle δ by which the rotor is behind its field, rad, at this speed, rad/s, without load. None
+    /// where the supply does not suffice for it, or limits the currents of a chopper.
+    pub fn without_load(&self, speed: f64) -> Option<(f64, f64)> {
+        let ([u, rate, emf], turning) = (self.turning(), self.teeth * speed);
+        // u cos δ = λ i_d and u sin δ = ω (N i_d + κ), so u² = λ² i_d² + ω² (N i_d + κ)²
+        let (square, half) = (rate * rate + turning * turning, turning * speed * emf);
+        let current = ((half * half + square * (u * u - (speed * emf).powi(2))).sqrt() - half) / square;
+        // v_d = R i_d and v_q = N ω L i_d + K_m ω; at rest on a full step each phase has v_d/√2
+        let across = turning * self.inductance * current + self.torque_constant * speed;
+        let needed = match speed == 0.0 {
+            true => self.resistance * current * FRAC_PI_4.cos(),
+            false => (self.resistance * current).hypot(across),
+        };
+        let suffices = self.regulator.is_none() || needed < self.supply;
+        (current > 0.0 && suffices).then(|| (current, (speed * (self.teeth * current + emf)).atan2(rate * current)))
+    }
+
     /// Currents at rest at this commanded angle of the field, A.
     pub fn at_rest(&self, told: f64) -> [f64; 2] {
         let most = self.supply / self.resistance;
@@ -163,6 +214,27 @@ impl Mechanism {
     pub fn farthest_jump(&self, drive: usize) -> Option<f64> {
         let stepper = self.drives[drive].motor.stepper?;
         Some(PI / stepper.teeth() / self.angle_per_input(drive).abs())
+    }
+
+    /// Equations of a stepper for small motions about this speed of its shaft, rad/s; none for a brushed motor, and
+    /// where [`Phases::without_load`] has no current.
+    pub fn steady(&self, drive: usize, speed: f64) -> Option<Steady> {
+        let (phases, (spring, _)) = Phases::of(&self.drives[drive]).zip(self.angle_of(drive))?;
+        let (first, shaft) = (self.first_current(drive), Form::speed(self.drives[drive].shaft));
+        let ([u, rate, emf], n, k) = (phases.turning(), phases.teeth, phases.torque_constant);
+        let (along, behind) = phases.without_load(speed)?;
+        let (angle, direct, across) = (Form::stretch(spring), Form::current(first), Form::current(first + 1));
+        // δ = N (φ* − φ) beyond its steady value
+        let lag = (Form::input(drive) * self.angle_per_input(drive) - angle) * n;
+        // sin 4ε = −sin 4Nφ about a full step
+        let detent = if speed == 0.0 { 4.0 * n * phases.detent_torque } else { 0.0 };
+        Some(Steady {
+            torque: across * k + angle * detent,
+            rates: [
+                lag * (-u * behind.sin()) - direct * rate + across * (n * speed),
+                lag * (u * behind.cos()) - across * rate - direct * (n * speed) - shaft * (n * along + emf),
+            ],
+        })
     }
 
     /// Lag of a stepper's rotor behind its command, rad.

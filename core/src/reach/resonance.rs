@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::machine::{AmplifierMode, BeltModel, DriveAt, DriveUnit, Machine, Travel};
-use crate::mechanism::Body;
+use crate::mechanism::{Body, Phases};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use std::f64::consts::PI;
 
@@ -152,7 +152,7 @@ fn at(machine: &Machine, (drive, coordinate): (Drive, usize), slides: &[f64]) ->
     let (m, c, k) = matrices(machine, drive, slides);
     // Held drive pulleys, the first bodies, are not coordinates, but act through their columns of K.
     let drives = geometry.drives.len();
-    let fields: Option<Vec<f64>> = machine.drives.iter().map(|unit| unit.motor.field_stiffness()).collect();
+    let fields: Option<Vec<f64>> = machine.drives.iter().map(field).collect();
     let first = if drive == Drive::Held && fields.is_none() { drives } else { 0 };
     let size = m.nrows() - first;
     let part = |a: &DMatrix<f64>| a.view((first, first), (size, size)).into_owned();
@@ -202,6 +202,11 @@ fn at(machine: &Machine, (drive, coordinate): (Drive, usize), slides: &[f64]) ->
     modes
 }
 
+/// Stiffness of the field of a stepper, N m/rad.
+fn field(unit: &DriveUnit) -> Option<f64> {
+    Phases::of_motor(&unit.motor, &unit.amplifier).map(|phases| phases.stiffness())
+}
+
 /// M, C and K over the bodies other than rotors; over φ₁ and x for a two-mass axis.
 fn matrices(machine: &Machine, drive: Drive, slides: &[f64]) -> (DMatrix<f64>, DMatrix<f64>, DMatrix<f64>) {
     let (geometry, mechanism) = (machine.geometry(), machine.mechanism());
@@ -237,7 +242,7 @@ fn matrices(machine: &Machine, drive: Drive, slides: &[f64]) -> (DMatrix<f64>, D
     let mut held = vec![0.0; count];
     if drive == Drive::Held {
         for (at, unit) in geometry.drives.iter().zip(&machine.drives) {
-            held[at.pulley] = unit.motor.field_stiffness().unwrap_or(0.0);
+            held[at.pulley] = field(unit).unwrap_or(0.0);
         }
     }
     if let (BeltModel::TwoMass, [k1, k2, k3], [c1, c2, c3]) = (machine.belt.model, &stiffness[..], &damping[..]) {

@@ -52,13 +52,15 @@ pub fn page(analysis: &Analysis, pictures: &Pictures) -> Page {
 fn shapes(page: &mut Page, analysis: &Analysis, modes: &Natural) {
     let mechanism = analysis.case.machine.mechanism();
     page.section("Modes");
-    page.prose("Rigid modes stretch nothing: one part by itself, and how the others go with it.");
-    let mut rows = Table::new("").column("Moves", "").column("With it", "");
-    for mode in &modes.rigid {
-        let (name, ways) = rigid(&mechanism, modes, mode);
-        rows.row([Cell::from(name), Cell::from(printed(&ways))]);
+    if !modes.rigid.is_empty() {
+        page.prose("Rigid modes stretch nothing: one part by itself, and how the others go with it.");
+        let mut rows = Table::new("").column("Moves", "").column("With it", "");
+        for mode in &modes.rigid {
+            let (name, ways) = rigid(&mechanism, modes, mode);
+            rows.row([Cell::from(name), Cell::from(printed(&ways))]);
+        }
+        page.table(&rows);
     }
-    page.table(&rows);
     if modes.elastic.is_empty() {
         return;
     }
