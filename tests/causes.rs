@@ -75,7 +75,7 @@ fn a_drag_is_named_with_its_size() {
     assert!(named == 5, "{named} of 5");
 }
 
-/// LuGre friction was taken for a spring, falling friction or a constant force in 61 of 100 machines, and named in none.
+/// LuGre friction was taken for falling friction, a spring or a constant force.
 #[test]
 fn bristles_are_named_with_their_stiffness() {
     for seed in 1..=3 {

@@ -2,8 +2,8 @@
 //! solvers.
 //!
 //! Two masses with a spring or play between them, in steps of [`STEP`]; a position moves by the mean of the speeds
-//! before and behind a step. A step in which a speed changes its sign is cut there: an error of a step in the time of each
-//! turn would be as large as the noise of an average over the log.
+//! before and behind a step. A step in which a speed changes its sign is cut there: an error of a step in the time
+//! of each turn would be as large as the noise of an average over the log.
 
 use super::chance::Chance;
 use super::logged::{columns, output};
