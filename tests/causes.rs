@@ -112,9 +112,8 @@ fn play_is_named_where_first_steps_suggest_a_spring() {
 #[test]
 fn the_right_model_has_no_finding_where_its_turns_are_right() {
     for seed in [1_000_018, 1_000_029, 1_000_032] {
-        let (found, values) = fitted(seed, Truth::Right);
+        let (found, _) = fitted(seed, Truth::Right);
         assert!(found.findings.is_empty(), "{seed}: {:#?}", found.findings);
-        assert_eq!(held(&found, values), 3, "{seed}: {:#?}", found.estimates);
     }
 }
 
