@@ -458,7 +458,7 @@ impl Truth {
             Truth::Spring | Truth::SpringAtMotor => &["spring"],
             Truth::Play => &["play"],
             Truth::Late => &["delay"],
-            Truth::LuGre => &["stribeck"],
+            Truth::LuGre => &["lugre"],
             Truth::Drag => &["drag"],
             Truth::Drift => &["drift", "sway"],
         }
@@ -478,7 +478,7 @@ fn named(truth: Truth, seed: u64, is_told: bool, sum: &Mutex<Named>) {
     };
     (0..3).filter(|&j| inside(j)).for_each(|j| sum.held[j] += 1);
     sum.wide.extend(fitted.estimates[0].interval.map(|[low, high]| 0.5 * (high - low) / values[0]));
-    let codes = ["spring", "play", "delay", "drag", "stribeck", "load", "other_law", "place"];
+    let codes = ["spring", "play", "delay", "drag", "stribeck", "lugre", "load", "other_law", "place"];
     let is_right = |code: &str| truth.causes().contains(&code);
     if is_told {
         let off = |j: usize| if inside(j) { "holds" } else { "does not hold" };

@@ -75,6 +75,48 @@ fn a_drag_is_named_with_its_size() {
     assert!(named == 5, "{named} of 5");
 }
 
+/// LuGre friction was taken for falling friction, a spring or a constant force.
+#[test]
+fn bristles_are_named_with_their_stiffness() {
+    for seed in 1..=3 {
+        let (found, values) = fitted(seed, Truth::LuGre);
+        let cause = found.cause.as_ref().unwrap_or_else(|| panic!("{seed}: {:#?}", found.findings));
+        assert!(cause.key == "lugre" && warns(&found, "lugre"), "{seed}: {}", cause.words);
+        // They bend by 0.1 mm under the Coulomb friction.
+        let stiffness = values[2] / 0.1e-3;
+        let size = cause.parameters.iter().find(|own| own.name == "cart.friction.lugre.stiffness").unwrap();
+        assert!((size.value / stiffness - 1.0).abs() < 0.05, "{seed}: {} for {stiffness}", size.value);
+        for (one, truth) in cause.estimates.iter().zip(values) {
+            let one = one.as_ref().unwrap();
+            assert!((one.value / truth - 1.0).abs() < 2e-3, "{seed}: {} {} for {truth}", one.name, one.value);
+        }
+        assert_eq!(held(&found, values), 3, "{seed}: {:#?}", found.estimates);
+    }
+}
+
+/// Flanks of a fixed stiffness, and the choice of starts by their first steps, left the play of 20 of 100 machines
+/// without a name: for the second of these a spring was named. In the first, a start in a held-out part fails.
+#[test]
+fn play_is_named_where_first_steps_suggest_a_spring() {
+    for seed in [1_000_011, 1_000_012, 1_000_014] {
+        let (found, _) = fitted(seed, Truth::Play);
+        let cause = found.cause.as_ref().unwrap_or_else(|| panic!("{seed}: {:#?}", found.findings));
+        assert!(cause.key == "play" && warns(&found, "play"), "{seed}: {}", cause.words);
+        let size = cause.parameters.iter().find(|own| own.name == "motor.backlash").unwrap();
+        assert!((size.value / 0.3e-3 - 1.0).abs() < 0.35, "{seed}: {}", cause.words);
+    }
+}
+
+/// Turns that were late by up to a step of the simulated truth were told as friction that differs between the
+/// directions.
+#[test]
+fn the_right_model_has_no_finding_where_its_turns_are_right() {
+    for seed in [1_000_018, 1_000_029, 1_000_032] {
+        let (found, _) = fitted(seed, Truth::Right);
+        assert!(found.findings.is_empty(), "{seed}: {:#?}", found.findings);
+    }
+}
+
 /// The case with the log of another machine of its kind, which taut simulates.
 fn simulated(seed: u64, changes: &[&str], truth: &[&str]) -> Fit {
     let mut case = Case::from_text_with("axis.toml", AXIS, changes).unwrap();

@@ -992,15 +992,15 @@ pub(crate) const START_OFF: f64 = 0.1;
 /// Unit: steps. Source: chosen: the price of a few runs. Test: `a_missing_spring_is_named`.
 pub(crate) const CAUSE_STEPS: usize = 4;
 
-/// Starts that are fitted whole, the best of those that were ranked.
+/// Starts that are fitted whole: the best of each element, then others.
 ///
-/// Unit: starts. Source: chosen.
-pub(crate) const CAUSES_FITTED: usize = 6;
+/// Unit: starts. Source: chosen: all elements and three more. Test: `play_is_named_where_first_steps_suggest_a_spring`.
+pub(crate) const CAUSES_FITTED: usize = 12;
 
 /// Starts of one element that are fitted whole.
 ///
 /// Unit: starts. Source: chosen: the nearest does not always lead to the least.
-pub(crate) const STARTS_FITTED: usize = 2;
+pub(crate) const STARTS_FITTED: usize = 3;
 
 /// Share of the squared residuals that an element must explain.
 ///
@@ -1023,6 +1023,17 @@ pub(crate) const CAUSE_WARNS: f64 = 0.36;
 /// Unit: values. Source: chosen: bounds the time.
 pub(crate) const CAUSE_MOST_VALUES: usize = 100_000;
 
+/// Most values of logs for which bristles are tried, whose runs have no exact derivatives.
+///
+/// Unit: values. Source: chosen: bounds the time.
+pub(crate) const CAUSE_MOST_CURVED: usize = 20_000;
+
+/// Median logarithmic gain of held-out parts from which on one part in which a start fails does not refute an element.
+///
+/// Unit: the logarithmic gain of the whole logs. Source: chosen. Test:
+/// `play_is_named_where_first_steps_suggest_a_spring`.
+pub(crate) const HELD_OUT_SHOWS: f64 = 0.5;
+
 /// Step of the variables over which estimates with an element are differentiated.
 ///
 /// Unit: 1. Source: the third root of rounding.
@@ -1040,8 +1051,14 @@ pub(crate) const SPRING_DAMPING: f64 = 0.05;
 
 /// Sizes of play that are tried.
 ///
-/// Unit: standard deviations of the residuals. Source: steps of 4.
-pub(crate) const CAUSE_GAPS: [f64; 3] = [1.0, 4.0, 16.0];
+/// Unit: standard deviations of the residuals. Source: steps of 2: other starts end in other minima.
+pub(crate) const CAUSE_GAPS: [f64; 5] = [1.0, 2.0, 4.0, 8.0, 16.0];
+
+/// Lengths by which bristles bend that are tried.
+///
+/// Unit: standard deviations of the residuals. Source: steps of 4; what is bent adds up over a log. Test:
+/// `bristles_are_named_with_their_stiffness`.
+pub(crate) const CAUSE_BENDS: [f64; 3] = [0.06, 0.25, 1.0];
 
 /// Frequency and damping ratio of the flanks of play.
 ///

@@ -1,10 +1,13 @@
 //! The elements that a model may lack, one row each.
 
 use crate::case::{Case, Plan};
+use crate::fit::asked::problem::Problem;
 use crate::fit::search::starts::Searched;
+use crate::friction::Friction;
 use crate::log::Quantity;
 use crate::machine::{AmplifierMode, Machine};
 use crate::number::engineering;
+use crate::solve::Bench;
 
 /// End of the fit without the element.
 pub(super) struct Site<'s, 'a> {
@@ -27,6 +30,7 @@ pub(super) struct Extension {
 }
 
 /// A case with one additional element, at the start of its search.
+#[derive(Clone)]
 pub(super) struct Extended {
     pub case: Case,
     pub plan: Plan,
@@ -35,9 +39,12 @@ pub(super) struct Extended {
     pub size: Option<Measure>,
     /// True if the sensor is assumed at the motor.
     pub at_motor: bool,
+    /// Parameters that are free only when the others have been fitted, with their bounds.
+    pub later: Vec<(String, [f64; 2])>,
 }
 
 /// Evidence for an element.
+#[derive(Clone)]
 pub(super) enum Telling {
     /// The parameter of this name, which is zero, or stiff, without the element.
     Parameter(String),
@@ -63,6 +70,14 @@ pub(super) struct Fitted {
     pub scatter: Option<f64>,
 }
 
+/// A body whose Coulomb friction is free.
+pub(super) struct Rubs {
+    pub key: &'static str,
+    /// Its torque per N at the cart.
+    pub arm: f64,
+    pub friction: Friction,
+}
+
 /// An element in words, with its size, and the change of the case file that adds it.
 pub(super) struct Said {
     pub words: String,
@@ -71,7 +86,7 @@ pub(super) struct Said {
 
 impl Extended {
     pub fn new(case: Case, plan: Plan, telling: Telling) -> Self {
-        Self { case, plan: Plan { starts: 1, ..plan }, telling, size: None, at_motor: false }
+        Self { case, plan: Plan { starts: 1, ..plan }, telling, size: None, at_motor: false, later: Vec::new() }
     }
 }
 
@@ -107,6 +122,40 @@ impl<'s, 'a> Site<'s, 'a> {
         })
     }
 
+    /// Largest speed of the cart in the logs by the model, m/s.
+    pub fn fastest(&self) -> f64 {
+        let (problem, x): (&Problem, _) = (&self.found.problem, &self.found.best.x);
+        let (mut bench, mut speeds, mut most) = (Bench::default(), [Vec::new()], 0.0);
+        for (index, run) in problem.runs.iter().enumerate() {
+            let extras = problem.extras_of(index, x);
+            if run.predict(&mut bench, &self.machine, &extras, &[Quantity::CartSpeed], &mut speeds) {
+                most = speeds[0].iter().fold(most, |most: f64, v| most.max(v.abs()));
+            }
+        }
+        most
+    }
+
+    /// J₁ + J₃ + r² M + n² J_r, total inertia at the drive pulley, kg m².
+    pub fn inertia(&self) -> f64 {
+        let Machine { pulley_radius: r, drive_pulley, idler_pulley, cart, drives, .. } = &self.machine;
+        let motor = &drives[0].motor;
+        let rotor = motor.gear_ratio * motor.gear_ratio * motor.rotor_inertia;
+        drive_pulley.inertia + idler_pulley.inertia + r * r * cart.mass + rotor
+    }
+
+    /// The body whose Coulomb friction is free; `None` if there is no such body, or if it follows another law.
+    pub fn rubs(&self) -> Option<Rubs> {
+        let Machine { pulley_radius: r, cart, drive_pulley, idler_pulley, .. } = &self.machine;
+        let bodies = [
+            ("cart", 1.0, cart.friction),
+            ("drive_pulley", *r, drive_pulley.friction),
+            ("idler_pulley", *r, idler_pulley.friction),
+        ];
+        let is_free = |key: &str| self.is_free(&format!("{key}.friction.coulomb")) || self.is_free("total.coulomb");
+        let own = bodies.into_iter().find(|(key, _, friction)| is_free(key) && friction.forward.coulomb > 0.0);
+        own.map(|(key, arm, friction)| Rubs { key, arm, friction })
+    }
+
     /// True if a key of the case file is free, alone or with others.
     pub fn is_free(&self, key: &str) -> bool {
         self.found.problem.parameters.iter().flat_map(|own| &own.keys).any(|(own, _)| own == key)
@@ -122,6 +171,15 @@ impl<'s, 'a> Site<'s, 'a> {
         let per_unit = motor.gear_ratio * motor.torque_constant * drive.amplifier.gain / self.machine.pulley_radius;
         let resistance = if drive.amplifier.mode == AmplifierMode::Voltage { motor.resistance } else { 1.0 };
         (per_unit / resistance * most).abs()
+    }
+}
+
+/// The friction of the body with this key.
+pub(super) fn friction_of<'m>(machine: &'m mut Machine, key: &str) -> &'m mut Friction {
+    match key {
+        "cart" => &mut machine.cart.friction,
+        "drive_pulley" => &mut machine.drive_pulley.friction,
+        _ => &mut machine.idler_pulley.friction,
     }
 }
 

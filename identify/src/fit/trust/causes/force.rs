@@ -3,14 +3,11 @@
 //! Drag and falling friction are lines through points, `force_by_speed`, whose forces keep their ratios: one amplitude
 //! each, with exact derivatives.
 
-use super::extension::{Extended, Fitted, Measure, Said, Site, Telling, shown};
-use crate::fit::asked::problem::Problem;
+use super::extension::{Extended, Fitted, Measure, Rubs, Said, Site, Telling, friction_of, shown};
 use crate::fit::limits::{DRAG_POINTS, FORCE_FIRST, FORCE_MOST, STRIBECK_POINTS, STRIBECK_SHARES};
 use crate::fit::trust::doubts::falling;
-use crate::log::Quantity;
 use crate::machine::Machine;
 use crate::polyline::Polyline;
-use crate::solve::Bench;
 
 /// The case with a force of this shape over the speed, in N, on the cart, which keeps its sign; `None` if it has such a
 /// line.
@@ -35,19 +32,6 @@ fn parameter(points: &[[f64; 2]]) -> f64 {
     points.iter().map(|point| point[1]).find(|force| *force != 0.0).unwrap_or(1.0)
 }
 
-/// Largest speed of the cart in the logs by the model, m/s.
-fn fastest(site: &Site) -> f64 {
-    let (problem, x): (&Problem, _) = (&site.found.problem, &site.found.best.x);
-    let (mut bench, mut speeds, mut most) = (Bench::default(), [Vec::new()], 0.0);
-    for (index, run) in problem.runs.iter().enumerate() {
-        let extras = problem.extras_of(index, x);
-        if run.predict(&mut bench, &site.machine, &extras, &[Quantity::CartSpeed], &mut speeds) {
-            most = speeds[0].iter().fold(most, |most: f64, v| most.max(v.abs()));
-        }
-    }
-    most
-}
-
 /// The machine without such lines.
 pub(super) fn without(site: &Site, mut machine: Machine) -> Machine {
     machine.cart.forces = site.machine.cart.forces.clone();
@@ -56,7 +40,7 @@ pub(super) fn without(site: &Site, mut machine: Machine) -> Machine {
 
 /// F = −c v |v|
 pub(super) fn drags(site: &Site) -> Vec<Extended> {
-    let fastest = fastest(site);
+    let fastest = site.fastest();
     if fastest <= 0.0 {
         return Vec::new();
     }
@@ -91,10 +75,10 @@ pub(super) fn drag_words(_: &Site, extended: &Extended, found: &Fitted) -> Said 
 ///
 /// is subtracted from it.
 pub(super) fn falls(site: &Site) -> Vec<Extended> {
-    if body(site).is_none() {
+    if site.rubs().is_none() {
         return Vec::new();
     }
-    let fastest = fastest(site);
+    let fastest = site.fastest();
     let amplitude = FORCE_FIRST * site.force();
     let of = |share: &f64| {
         let velocity = share * fastest;
@@ -108,26 +92,12 @@ pub(super) fn falls(site: &Site) -> Vec<Extended> {
     STRIBECK_SHARES.iter().filter_map(of).collect()
 }
 
-/// Key of the body whose Coulomb friction is free, with its torque per N at the cart; `None` if there is no such body,
-/// or if it follows another law.
-fn body(site: &Site) -> Option<(&'static str, f64)> {
-    let Machine { pulley_radius: r, cart, drive_pulley, idler_pulley, .. } = &site.machine;
-    let bodies = [
-        ("cart", 1.0, cart.friction),
-        ("drive_pulley", *r, drive_pulley.friction),
-        ("idler_pulley", *r, idler_pulley.friction),
-    ];
-    let is_free = |key: &str| site.is_free(&format!("{key}.friction.coulomb")) || site.is_free("total.coulomb");
-    let own = bodies.into_iter().find(|(key, _, friction)| is_free(key) && friction.forward.coulomb > 0.0);
-    own.map(|(key, arm, _)| (key, arm))
-}
-
 pub(super) fn fall_words(site: &Site, extended: &Extended, found: &Fitted) -> Said {
     let fall = extended.size.map_or(0.0, |size| size.per) * found.value;
     let line = found.machine.cart.forces.by_speed.as_ref();
     let last = line.and_then(|line| line.points().last()).map_or(0.0, |point| point[0]);
     let velocity = last / STRIBECK_POINTS[STRIBECK_POINTS.len() - 1];
-    let whose = body(site).map_or("cart", |(key, _)| key);
+    let whose = site.rubs().map_or("cart", |body| body.key);
     let words = falling(whose, &shown(fall, "N"), &shown(velocity, "m/s"));
     let add = format!(
         "add stribeck = {{ force = \"{}\", velocity = \"{}\" }} to cart.friction",
@@ -142,12 +112,8 @@ pub(super) fn without_fall(site: &Site, machine: Machine) -> Machine {
     let line = machine.cart.forces.by_speed.as_ref();
     let fall = line.and_then(|line| line.points().last()).map_or(0.0, |point| point[1]);
     let mut machine = without(site, machine);
-    let Some((key, arm)) = body(site) else { return machine };
-    let friction = match key {
-        "cart" => &mut machine.cart.friction,
-        "drive_pulley" => &mut machine.drive_pulley.friction,
-        _ => &mut machine.idler_pulley.friction,
-    };
+    let Some(Rubs { key, arm, .. }) = site.rubs() else { return machine };
+    let friction = friction_of(&mut machine, key);
     for side in [&mut friction.forward, &mut friction.backward] {
         side.coulomb -= arm * fall;
         side.breakaway = side.breakaway.max(side.coulomb);

@@ -17,12 +17,6 @@ impl Site<'_, '_> {
         rotor(&self.machine)
     }
 
-    /// J₁ + J₃ + r² M + n² J_r, total inertia at the drive pulley, kg m².
-    fn inertia(&self) -> f64 {
-        let Machine { pulley_radius: r, drive_pulley, idler_pulley, cart, .. } = &self.machine;
-        drive_pulley.inertia + idler_pulley.inertia + r * r * cart.mass + self.rotor()
-    }
-
     /// The machine with a rotor behind a gear, and true if its inertia was taken from the cart; `None` if there is
     /// nothing to split, or no rotor.
     fn split(&self) -> Option<(Machine, bool)> {
@@ -51,15 +45,7 @@ impl Site<'_, '_> {
         machine.drives[0].motor.gear_play = Some(play);
         let mut plan: Plan = self.plan.clone();
         plan.free.extend(keys.iter().map(|key| key.to_string()));
-        // A distant value takes long to simulate, and is another than the one tried.
-        let n = machine.drives[0].motor.gear_ratio;
-        let around = |key: &str| match key {
-            "motor.rotor_inertia" => KNOWN_SHARES.map(|share| share * self.inertia() / (n * n)),
-            "motor.gear_stiffness" => CAUSE_AROUND.map(|factor| factor * play.stiffness),
-            "motor.gear_damping" => [0.0, CAUSE_AROUND[1] * play.damping],
-            _ => [0.0, CAUSE_AROUND[1] * play.backlash],
-        };
-        plan.bounds.extend(keys.iter().map(|key| (key.to_string(), around(key))));
+        plan.bounds.extend(keys.iter().map(|key| (key.to_string(), around(self, &machine, play, key))));
         let case = self.with(machine);
         let extended = |case: Case, at_motor: bool| Extended {
             at_motor,
@@ -67,6 +53,17 @@ impl Site<'_, '_> {
         };
         let other = at_motor(&case);
         std::iter::once(extended(case, false)).chain(other.map(|case| extended(case, true))).collect()
+    }
+}
+
+/// Bounds of a parameter of the gear: a distant value takes long to simulate, and is another than the one tried.
+fn around(site: &Site, machine: &Machine, play: GearPlay, key: &str) -> [f64; 2] {
+    let n = machine.drives[0].motor.gear_ratio;
+    match key {
+        "motor.rotor_inertia" => KNOWN_SHARES.map(|share| share * site.inertia() / (n * n)),
+        "motor.gear_stiffness" => CAUSE_AROUND.map(|factor| factor * play.stiffness),
+        "motor.gear_damping" => [0.0, CAUSE_AROUND[1] * play.damping],
+        _ => [0.0, CAUSE_AROUND[1] * play.backlash],
     }
 }
 
@@ -125,7 +122,15 @@ pub(super) fn plays(site: &Site) -> Vec<Extended> {
     let of = |gap: &f64| {
         let [stiffness, damping] = flank(site, &machine, FLANK_FREQUENCY, FLANK_DAMPING);
         let play = GearPlay { backlash: gap * angle, stiffness, damping };
-        site.geared(&machine, play, &keys, "motor.backlash")
+        // Flanks that are too stiff or too soft leave residuals behind each crossing of the gap; free from the start
+        // they end in other minima.
+        let mut all = site.geared(&machine, play, &keys, "motor.backlash");
+        for extended in &mut all {
+            extended.later = ["motor.gear_stiffness", "motor.gear_damping"]
+                .map(|key| (key.to_string(), around(site, &machine, play, key)))
+                .to_vec();
+        }
+        all
     };
     CAUSE_GAPS.iter().flat_map(of).collect()
 }

@@ -12,6 +12,7 @@
 //! parts of the logs predicts the other parts better. With the distance d of the estimates from those with it,
 //! intervals of half-width h become √(h² + 2 (d² + h′²)) ≥ d + h′, h′ that of the fit with the element.
 
+mod bristles;
 mod extension;
 mod force;
 mod gear;
@@ -25,8 +26,8 @@ use crate::case::{Case, Plan};
 use crate::fit::asked::problem::Stop;
 use crate::fit::asked::run::Run;
 use crate::fit::limits::{
-    CAUSE_ERRORS, CAUSE_EXPLAINS, CAUSE_MOST_VALUES, CAUSE_NEAR, CAUSE_STEPS, CAUSES_FITTED, COLOURED, NORMAL,
-    STARTS_FITTED,
+    CAUSE_ERRORS, CAUSE_EXPLAINS, CAUSE_MOST_VALUES, CAUSE_NEAR, CAUSE_STEPS, CAUSES_FITTED, COLOURED, HELD_OUT_SHOWS,
+    NORMAL, SAME_MINIMUM, STARTS_FITTED,
 };
 use crate::fit::search::starts::{Effort, Searched};
 use crate::machine::Machine;
@@ -41,6 +42,7 @@ const EXTENSIONS: &[Extension] = &[
     row("delay", stamp::delays, stamp::words, as_it_is),
     row("drag", force::drags, force::drag_words, force::without),
     row("stribeck", force::falls, force::fall_words, force::without_fall),
+    row("lugre", bristles::bend, bristles::words, bristles::without),
     row("load", force::loads, force::load_words, as_it_is),
 ];
 
@@ -78,13 +80,25 @@ pub(crate) fn cause(
     };
     let mut ranked: Vec<Tried> = EXTENSIONS.iter().flat_map(begun).collect();
     ranked.sort_by(|a, b| a.cost().total_cmp(&b.cost()));
-    let mut kinds = Vec::new();
-    ranked.retain(|tried| {
-        kinds.push(tried.kind());
-        kinds.iter().filter(|kind| **kind == tried.kind()).count() <= STARTS_FITTED
-    });
-    ranked.truncate(CAUSES_FITTED);
-    let mut whole: Vec<Tried> = ranked.into_iter().filter_map(Tried::fitted).collect();
+    // The best start of each kind, and those that lead elsewhere and explain something already; runs of curved friction
+    // take long.
+    let most = (1.0 - CAUSE_EXPLAINS) * before;
+    let mut starts: Vec<(usize, Tried)> = Vec::new();
+    for tried in ranked {
+        let own = starts.iter().filter(|(_, other)| other.kind() == tried.kind());
+        let is_new = own.clone().all(|(_, other)| tried.cost() > (1.0 + SAME_MINIMUM) * other.cost());
+        let count = own.count();
+        let is_asked = match tried.is_curved() {
+            true => count == 0 && tried.cost() < most,
+            false => count == 0 || is_new && count < STARTS_FITTED && tried.cost() < most,
+        };
+        if is_asked {
+            starts.push((count, tried));
+        }
+    }
+    starts.sort_by_key(|(count, _)| *count);
+    starts.truncate(CAUSES_FITTED);
+    let mut whole: Vec<Tried> = starts.into_iter().filter_map(|(_, tried)| tried.fitted(&site)).collect();
     whole.sort_by(|a, b| a.cost().total_cmp(&b.cost()));
     for tried in whole {
         let gain = 2.0 * (before - tried.cost());
@@ -144,11 +158,20 @@ fn predicts(site: &Site, tried: &Tried, stop: Option<Stop>) -> Option<[usize; 2]
         // ln of the ratio, since a part in which a start fails has errors of another magnitude.
         gains.push((without / with).ln());
     }
+    if gains.len() < 2 {
+        return None;
+    }
     let n = gains.len() as f64;
     let mean = gains.iter().sum::<f64>() / n;
     let variance = gains.iter().map(|gain| (gain - mean).powi(2)).sum::<f64>() / (n - 1.0) / n;
     let better = gains.iter().filter(|gain| **gain > 0.0).count();
-    let is_clear = gains.len() >= 2 && better + 1 >= gains.len() && mean > variance.sqrt();
+    // A part in which a start fails has errors of another magnitude: the others are then compared with what the element
+    // explains of the whole, ln C/C′.
+    gains.sort_by(f64::total_cmp);
+    let median = gains[(gains.len() - 1) / 2];
+    let whole = (site.found.best.cost / tried.cost()).ln();
+    let is_much = mean > variance.sqrt() || median > HELD_OUT_SHOWS * whole;
+    let is_clear = better + 1 >= gains.len() && is_much;
     is_clear.then_some([better, gains.len()])
 }
 

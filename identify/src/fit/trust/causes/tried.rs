@@ -5,7 +5,7 @@ use super::{stamp, widened};
 use crate::case::{Case, Plan};
 use crate::fit::asked::problem::Problem;
 use crate::fit::asked::residuals::Residuals;
-use crate::fit::limits::{CAUSE_DIFFERENCE, ROUGH_TOLERANCE, TRIAL_FIT_ITERATIONS};
+use crate::fit::limits::{CAUSE_DIFFERENCE, CAUSE_EXPLAINS, ROUGH_TOLERANCE, TRIAL_FIT_ITERATIONS};
 use crate::fit::search::least_squares::minimise;
 use crate::fit::search::point::{Ending, Minimum, Options};
 use crate::fit::trust::doubts::{Cause, Size};
@@ -25,13 +25,24 @@ impl<'a> Tried<'a> {
     /// The result of `steps` steps from the end of the fit without the element; `None` if the model cannot simulate the
     /// logs.
     pub fn begun(site: &Site<'_, 'a>, row: &'static Extension, extended: Extended, steps: usize) -> Option<Self> {
+        let own = &site.found.best.x[site.found.problem.globals()..];
+        Self::from(site, row, extended, own, steps)
+    }
+
+    /// The result of `steps` steps from the machine of a case with the element, and these variables of single runs.
+    fn from(
+        site: &Site<'_, 'a>,
+        row: &'static Extension,
+        extended: Extended,
+        own: &[f64],
+        steps: usize,
+    ) -> Option<Self> {
         let mut problem = Problem::new(&extended.case, &extended.plan).ok()?.stopped_by(site.found.problem.stop());
         let noise: Vec<_> = problem.quantities().iter().map(|&own| (own, site.deviation(own))).collect();
         problem.swings = site.found.problem.swings;
         problem.weigh_by(&noise);
         let mut start = problem.start();
-        let (g, old) = (problem.globals(), site.found.problem.globals());
-        let own = &site.found.best.x[old..];
+        let g = problem.globals();
         if own.len() == start.len() - g {
             start[g..].copy_from_slice(own);
         }
@@ -42,11 +53,23 @@ impl<'a> Tried<'a> {
         Some(Self { row, extended, problem, best })
     }
 
-    /// Continues the fit to convergence.
-    pub fn fitted(mut self) -> Option<Self> {
+    /// Continues the fit to convergence, and then with the parameters that are free later.
+    pub fn fitted(mut self, site: &Site<'_, 'a>) -> Option<Self> {
         let from = self.best.x.clone();
         self.best = descend(&mut self.problem, &from, TRIAL_FIT_ITERATIONS)?;
-        Some(self)
+        let later = std::mem::take(&mut self.extended.later);
+        if later.is_empty() || self.cost() > (1.0 - CAUSE_EXPLAINS) * site.found.best.cost {
+            return Some(self);
+        }
+        let (case, mut plan) = self.case_and_plan();
+        plan.free.extend(later.iter().map(|(key, _)| key.clone()));
+        plan.bounds.extend(later);
+        let extended = Extended { case, plan, later: Vec::new(), ..self.extended.clone() };
+        let own = &self.best.x[self.problem.globals()..];
+        match Self::from(site, self.row, extended, own, TRIAL_FIT_ITERATIONS) {
+            Some(further) if further.cost() < self.cost() => Some(further),
+            _ => Some(self),
+        }
     }
 
     /// ½ Σ r²
@@ -57,6 +80,11 @@ impl<'a> Tried<'a> {
     /// The row of the table, and the side on which the sensor is.
     pub fn kind(&self) -> (&'static str, bool) {
         (self.row.key, self.extended.at_motor)
+    }
+
+    /// True if its runs have no exact derivatives.
+    pub fn is_curved(&self) -> bool {
+        !self.extended.case.machine.is_piecewise_linear()
     }
 
     /// Information of the logs on it.
