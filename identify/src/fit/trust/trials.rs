@@ -7,14 +7,17 @@
 use super::scores::beside_log;
 use crate::case::{Case, Plan};
 use crate::fit::asked::problem::Problem;
-use crate::fit::limits::{HUBER, JUMP, MENDED, NO_WORSE, ROUGH_TOLERANCE, STAND_OUT, TRIAL_FIT_ITERATIONS, UNIT_WORSE};
+use crate::fit::limits::{
+    FACTOR_LEAVES, HUBER, JUMP, MENDED, NO_WORSE, OPPOSITE, ROUGH_TOLERANCE, STAND_OUT, TRIAL_FIT_ITERATIONS,
+    UNIT_WORSE,
+};
 use crate::fit::search::least_squares::minimise;
 use crate::fit::search::point::{Ending, Minimum, Options};
 use crate::fit::search::regression::suspected_shift;
 use crate::fit::search::starts::Searched;
 use crate::log::{Log, Note, Quantity, Remedy, Severity, Survey, jumps_text};
 use crate::number::engineering_typed;
-use crate::solve::Flow;
+use crate::solve::{Bench, Flow};
 use std::sync::Arc;
 
 /// Surveys of all logs, without suspicions that a fit to the corrected log refutes.
@@ -104,6 +107,41 @@ pub(crate) fn is_borne_out(case: &Case, plan: &Plan, found: &Searched, name: &st
         _ => one.left < NO_WORSE && one.least < most(before, one.counted),
     };
     tried.is_empty() || tried.iter().any(is_better)
+}
+
+/// True if a log moves opposite to the model at the start.
+pub(crate) fn is_opposite(problem: &Problem, name: &str) -> bool {
+    let (x, mut worst) = (problem.start(), None);
+    for (index, run) in problem.runs.iter().enumerate().filter(|(_, run)| run.name == name) {
+        let Some(seen) = run.seen.iter().find(|seen| seen.quantity.is_position() && !seen.absolute) else { continue };
+        let mut column = vec![Vec::new()];
+        let extras = problem.extras_of(index, &x);
+        if !run.predict(&mut Bench::default(), &problem.stage_at(&x), &extras, &[seen.quantity], &mut column) {
+            continue;
+        }
+        let far = (run.time.len() / 50).max(1);
+        let (mut aa, mut ab, mut bb) = (0.0, 0.0, 0.0);
+        for k in far..run.time.len() {
+            let (a, b) = (column[0][k] - column[0][k - far], seen.values[k] - seen.values[k - far]);
+            if b.is_finite() {
+                (aa, ab, bb) = (aa + a * a, ab + a * b, bb + b * b);
+            }
+        }
+        let correlation = ab / (aa * bb).sqrt();
+        if correlation.is_finite() {
+            worst = Some(worst.map_or(correlation, |worst: f64| worst.min(correlation)));
+        }
+    }
+    worst.is_some_and(|correlation| correlation < OPPOSITE)
+}
+
+/// True if a log moves opposite to the model, and the model explains it with its sign reversed.
+pub(crate) fn is_reversed(case: &Case, plan: &Plan, found: &Searched) -> bool {
+    let mut names: Vec<&str> = found.problem.runs.iter().map(|run| run.name.as_str()).collect();
+    names.dedup();
+    names.retain(|name| is_opposite(&found.problem, name));
+    let mended = || mended(case, plan, found, &names, &Remedy::Reverse, TRIAL_FIT_ITERATIONS);
+    !names.is_empty() && mended().is_some_and(|mended| mended.left <= FACTOR_LEAVES)
 }
 
 /// Agreement with corrected logs.

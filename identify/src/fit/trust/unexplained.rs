@@ -30,7 +30,6 @@ pub(super) fn reason(case: &Case, plan: &Plan, found: &Searched, quantity: Quant
     }
     let told = |code| move |text| Reason { code, text };
     exchange(case, plan, found, quantity, names)
-        .map(told("swapped"))
         .or_else(|| windows(case, plan, found, quantity).map(told("unexplained")))
         .or_else(|| factor(case, plan, found, quantity, names).map(told("unexplained")))
 }
@@ -105,7 +104,13 @@ fn explained(problem: &Problem, residuals: &[f64], quantity: Quantity) -> f64 {
 }
 
 /// Another output of the same kind with which it was exchanged: the two motors of a gantry.
-fn exchange(case: &Case, plan: &Plan, found: &Searched, quantity: Quantity, names: &[&str]) -> Option<String> {
+pub(super) fn exchange(
+    case: &Case,
+    plan: &Plan,
+    found: &Searched,
+    quantity: Quantity,
+    names: &[&str],
+) -> Option<Reason> {
     let is_alike = |other: &Quantity| {
         *other != quantity
             && other.unit() == quantity.unit()
@@ -116,14 +121,15 @@ fn exchange(case: &Case, plan: &Plan, found: &Searched, quantity: Quantity, name
     others.into_iter().find_map(|other| {
         let remedy = Remedy::Exchange(quantity, other);
         let left = mended(case, plan, found, names, &remedy, TRIAL_FIT_ITERATIONS)?.left;
-        (left <= FACTOR_LEAVES).then(|| {
-            format!(
+        (left <= FACTOR_LEAVES).then(|| Reason {
+            code: "swapped",
+            text: format!(
                 "with the columns of {} and {} exchanged {:.1} % of the squared residuals are left: exchange them, or \
                  those of their inputs",
                 quantity.name(),
                 other.name(),
                 100.0 * left
-            )
+            ),
         })
     })
 }
