@@ -316,6 +316,23 @@ fn driven(seed: u64, change: impl FnOnce(&mut Log)) -> Case {
     case
 }
 
+/// With mass and friction free, a factor on the input imitates any on the output: a pulley of twice the size was
+/// answered with "input times 10". The factor that leaves the values nearest to those of the case is named, and none
+/// where they would be far from them.
+#[test]
+fn a_factor_that_others_imitate_is_named() {
+    for (factor, words) in [
+        (2.0, "cart_position times 0.5 "),
+        (3.0, "cart_position times 0.333"),
+        (10.0, "cart_position times 0.1 "),
+        (6.0, "a factor on it or on the input explains that"),
+    ] {
+        let found = fitted(&driven(971, |log| log.outputs[0].values.iter_mut().for_each(|value| *value *= factor)));
+        let told: Vec<String> = found.warnings().map(ToString::to_string).collect();
+        assert!(told.iter().any(|one| one.contains(words)), "{factor}: {told:#?}");
+    }
+}
+
 /// Elements, windows and factors were tried on a log that moves against its model, for minutes, and "neither" was said
 /// of them beside the sign.
 #[test]

@@ -636,11 +636,22 @@ pub(crate) const WINDOWS_EXPLAIN: f64 = 0.8;
 /// Unit: values. Source: chosen: 160 MB.
 pub(crate) const WINDOWS_MOST: usize = 20_000_000;
 
-/// Powers of ten that are tried as factors on a column where the model explains little, and the units of angles and
-/// lengths: degrees and inches.
+/// Factors that are tried on a column where the model explains little: powers of ten, those of wrong pulleys, counts and
+/// pairs, and the units of angles and lengths, degrees and inches.
 ///
 /// Unit: 1. Source: chosen; SI. Test: `a_factor_on_a_column_is_named`.
-pub(crate) const FACTORS: [f64; 8] = [0.1, 0.01, 0.001, 10.0, 100.0, 1000.0, std::f64::consts::PI / 180.0, 0.0254];
+pub(crate) const FACTORS: [f64; 14] =
+    [0.1, 0.01, 0.001, 10.0, 100.0, 1000.0, 0.5, 2.0, 1.0 / 3.0, 3.0, 0.25, 4.0, std::f64::consts::PI / 180.0, 0.0254];
+
+/// Cost with a factor, relative to that without, below which factors are alike; above within √e of each other.
+///
+/// Unit: 1. Source: chosen: what belts and pulleys of the case leave. Test: `a_factor_that_others_imitate_is_named`.
+pub(crate) const FACTOR_ALIKE: f64 = 0.01;
+
+/// Ratio of a free value to that of the case, or the other way round, up to which a factor is named.
+///
+/// Unit: 1. Source: chosen: a case is nearer to its machine. Test: `a_factor_that_others_imitate_is_named`.
+pub(crate) const FACTOR_MOVES: f64 = 3.0;
 
 /// Cost with a factor on a column, relative to that without, below which the factor explains it.
 ///
@@ -655,7 +666,7 @@ pub(crate) const FACTOR_STEPS: usize = 4;
 /// Factors that are fitted whole, the best of those that were ranked.
 ///
 /// Unit: factors. Source: chosen. Test: `a_factor_on_a_column_is_named`.
-pub(crate) const FACTORS_FITTED: usize = 2;
+pub(crate) const FACTORS_FITTED: usize = 3;
 
 /// Share of the logged input that the controller of a case must explain.
 ///

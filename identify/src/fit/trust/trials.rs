@@ -152,6 +152,8 @@ pub(crate) struct Mended {
     least: f64,
     /// Number of counted values.
     counted: usize,
+    /// Greatest ratio of a free value to that of the case, or the other way round; infinite where one is zero.
+    pub moved: f64,
 }
 
 /// Mean square of the weighted residuals of each quantity.
@@ -207,7 +209,12 @@ pub(crate) fn mended(
         Some(square / own.max(f64::MIN_POSITIVE))
     };
     let least = squares(&problem, &end.residuals).into_iter().filter_map(part).fold(f64::INFINITY, f64::min);
-    Some(Mended { left: cost / counted.max(1) as f64 / before.max(f64::MIN_POSITIVE), least, counted })
+    let parameters = problem.parameters.iter().enumerate().filter(|(_, parameter)| parameter.start != 0.0);
+    let moved = parameters
+        .map(|(j, parameter)| (problem.value(j, end.x[j]) / parameter.start).max(0.0))
+        .map(|ratio| ratio.max(1.0 / ratio))
+        .fold(1.0, f64::max);
+    Some(Mended { left: cost / counted.max(1) as f64 / before.max(f64::MIN_POSITIVE), least, counted, moved })
 }
 
 /// Result of a short search from `start`, and its cost.
