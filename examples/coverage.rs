@@ -53,7 +53,7 @@ enum Fault {
     First(f64, f64, f64),
     /// Two of them: rad, s, rad, s; and white noise.
     Two(f64, f64, f64, f64, f64),
-    /// Swings: rad, Hz, s; and white noise.
+    /// Swings: rad, Hz, s, infinite for a tone; and white noise.
     Swinging(f64, f64, f64, f64),
     /// A random walk of so much in a second, rad; and white noise.
     Walk(f64, f64),
@@ -124,6 +124,16 @@ const CELLS: &[Cell] = &[
         name: "swings at 8 Hz, 5 mrad, 100 ms + white 5 mrad; 4 s",
         logs: LONG,
         fault: Fault::Swinging(5e-3, 8.0, 0.1, 5e-3),
+    },
+    Cell {
+        name: "a tone of 50 Hz, 10 mrad + white 0.1 mrad; 4 s",
+        logs: LONG,
+        fault: Fault::Swinging(10e-3, 50.0, f64::INFINITY, 1e-4),
+    },
+    Cell {
+        name: "a tone of 17.3 Hz, 10 mrad + white 0.1 mrad; 4 s",
+        logs: LONG,
+        fault: Fault::Swinging(10e-3, 17.3, f64::INFINITY, 1e-4),
     },
     Cell { name: "random walk 5 mrad in 1 s + white 5 mrad; 4 s", logs: LONG, fault: Fault::Walk(5e-3, 5e-3) },
     Cell { name: "mean of 20, 5 mrad; 4 s", logs: LONG, fault: Fault::Mean(20, 5e-3) },

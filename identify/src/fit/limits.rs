@@ -245,8 +245,8 @@ pub(crate) const SWINGS_IN_LOG: f64 = 5.0;
 
 /// Greatest frequency of noise that swings.
 ///
-/// Unit: rad between two blocks. Source: chosen: four blocks in a period.
-pub(crate) const SWING_FASTEST: f64 = 1.6;
+/// Unit: rad between two blocks. Source: chosen: little below two blocks in a period.
+pub(crate) const SWING_FASTEST: f64 = 3.0;
 
 /// Ratio of neighbouring frequencies that are tried.
 ///
@@ -263,20 +263,42 @@ pub(crate) const SWING_DAMPING: f64 = 0.1;
 /// Unit: 1. Source: chosen.
 pub(crate) const SWING_POWERS: [f64; 3] = [1.0, 30.0, 1000.0];
 
-/// First steps from the best frequency, time and variance.
+/// Ways from the best frequency, time and variance: each alone, and time with variance, since a noise that keeps its
+/// phase through the log shows neither alone.
+///
+/// Unit: of their logarithms. Source: 2 σ²/τ, the power that drives it.
+pub(crate) const SWING_WAYS: [[f64; 3]; 4] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
+
+/// First and greatest steps along them.
 ///
 /// Unit: of their logarithms. Source: chosen: as far as those that were tried are apart.
-pub(crate) const SWING_STEPS: [f64; 3] = [0.08, 1.0, 1.5];
+pub(crate) const SWING_STEPS: [f64; 4] = [0.08, 2.0, 1.5, 1.0];
 
-/// Rounds of steps, and the factor on the steps after each.
+/// Greatest number of rounds of steps.
 ///
-/// Unit: rounds. Source: chosen.
-pub(crate) const SWING_ROUNDS: usize = 10;
+/// Unit: rounds. Source: chosen. Test: `intervals_hold_beside_a_tone`.
+pub(crate) const SWING_ROUNDS: usize = 60;
 
-/// Factor on the steps after each round.
+/// Factor on a step that improves nothing; one that does grows by its inverse.
 ///
 /// Unit: 1. Source: chosen.
-pub(crate) const SWING_SHRINKS: f64 = 0.7;
+pub(crate) const SWING_SHRINKS: f64 = 0.5;
+
+/// Steps, relative to the first, below which the search ends.
+///
+/// Unit: 1. Source: chosen: of the frequency, a tenth of a radian along [`BLOCKS`]. Test: `intervals_hold_beside_a_tone`.
+pub(crate) const SWING_FINE: f64 = 1e-3;
+
+/// Longest time constant of noise that swings: a tone.
+///
+/// Unit: lengths of the longest log. Source: chosen: ten thousand values of a tone 100 times as large as other noise
+/// determine its variance relative to that to 1/10⁸. Test: `intervals_hold_beside_a_tone`.
+pub(crate) const SWING_LONGEST: f64 = 1e9;
+
+/// Greatest variance of noise that swings.
+///
+/// Unit: mean squares of the residuals. Source: chosen: more would be there by chance.
+pub(crate) const SWING_MOST: f64 = 2.0;
 
 /// Grid around the most likely noise that swings.
 ///
@@ -614,11 +636,22 @@ pub(crate) const WINDOWS_EXPLAIN: f64 = 0.8;
 /// Unit: values. Source: chosen: 160 MB.
 pub(crate) const WINDOWS_MOST: usize = 20_000_000;
 
-/// Powers of ten that are tried as factors on a column where the model explains little, and the units of angles and
-/// lengths: degrees and inches.
+/// Factors that are tried on a column where the model explains little: powers of ten, those of wrong pulleys, counts and
+/// pairs, and the units of angles and lengths, degrees and inches.
 ///
 /// Unit: 1. Source: chosen; SI. Test: `a_factor_on_a_column_is_named`.
-pub(crate) const FACTORS: [f64; 8] = [0.1, 0.01, 0.001, 10.0, 100.0, 1000.0, std::f64::consts::PI / 180.0, 0.0254];
+pub(crate) const FACTORS: [f64; 14] =
+    [0.1, 0.01, 0.001, 10.0, 100.0, 1000.0, 0.5, 2.0, 1.0 / 3.0, 3.0, 0.25, 4.0, std::f64::consts::PI / 180.0, 0.0254];
+
+/// Cost with a factor, relative to that without, below which factors are alike; above within √e of each other.
+///
+/// Unit: 1. Source: chosen: what belts and pulleys of the case leave. Test: `a_factor_that_others_imitate_is_named`.
+pub(crate) const FACTOR_ALIKE: f64 = 0.01;
+
+/// Ratio of a free value to that of the case, or the other way round, up to which a factor is named.
+///
+/// Unit: 1. Source: chosen: a case is nearer to its machine. Test: `a_factor_that_others_imitate_is_named`.
+pub(crate) const FACTOR_MOVES: f64 = 3.0;
 
 /// Cost with a factor on a column, relative to that without, below which the factor explains it.
 ///
@@ -633,7 +666,7 @@ pub(crate) const FACTOR_STEPS: usize = 4;
 /// Factors that are fitted whole, the best of those that were ranked.
 ///
 /// Unit: factors. Source: chosen. Test: `a_factor_on_a_column_is_named`.
-pub(crate) const FACTORS_FITTED: usize = 2;
+pub(crate) const FACTORS_FITTED: usize = 3;
 
 /// Share of the logged input that the controller of a case must explain.
 ///

@@ -26,8 +26,9 @@ pub(crate) mod student;
 use crate::fit::asked::problem::Problem;
 use crate::fit::limits::{
     LEAST_POWER, MOST_POWERS, NOISE_TURNS, NOTHING, POWER_RATIO, ROUNDED, SWING_AROUND, SWING_BEFOREHAND,
-    SWING_DAMPING, SWING_FASTEST, SWING_POWERS, SWING_RATIO, SWING_ROUNDS, SWING_SHRINKS, SWING_STEPS, SWINGS_IN_LOG,
-    TIME_RATIO, TIMES_APART, TWO_BEFOREHAND, WAVE_CLEAR, WAVES, WHITE_BEFOREHAND,
+    SWING_DAMPING, SWING_FASTEST, SWING_FINE, SWING_LONGEST, SWING_MOST, SWING_POWERS, SWING_RATIO, SWING_ROUNDS,
+    SWING_SHRINKS, SWING_STEPS, SWING_WAYS, SWINGS_IN_LOG, TIME_RATIO, TIMES_APART, TWO_BEFOREHAND, WAVE_CLEAR, WAVES,
+    WHITE_BEFOREHAND,
 };
 use crate::log::Quantity;
 use nalgebra::{DMatrix, DVector};
@@ -337,13 +338,21 @@ impl Estimate {
     /// Narrow-band noises: the most likely one and its neighbours, with their prior weights.
     ///
     /// Frequencies are tried one after the other with a usual damping; from the best, frequency, time constant and
-    /// variance are improved alternately by steps that are halved.
+    /// variance are improved alternately by steps that grow while they improve, and are halved where they do not: up to
+    /// a pure tone. Its variance is that of its amplitude only where its own noise, σ² 2T/τ in a log of length T, is
+    /// below the error with which the log determines it.
     fn swinging(&self, [interval, longest]: [f64; 2], gain: f64) -> Vec<Told> {
         let of = |[frequency, time, variance]: [f64; 3]| {
             let [frequency, time, variance] = [frequency.exp(), time.exp(), variance.exp()];
             self.likelihood(&[Slow { variance, time, frequency }])
         };
-        let weight = |told: &Option<Told>| told.as_ref().map_or(f64::NEG_INFINITY, |told| told.weight);
+        // Mean square of the blocks, of which noise makes no more than a part by chance.
+        let rows = self.series.iter().flat_map(|series| series.rows.chunks(series.wide()));
+        let most_noise =
+            SWING_MOST * rows.filter_map(|row| row.last()).map(|r| r * r).sum::<f64>() / self.blocks() as f64;
+        let is_possible = |told: &&Told| told.slow[0].variance * gain * told.white <= most_noise;
+        let weight =
+            |told: &Option<Told>| told.as_ref().filter(is_possible).map_or(f64::NEG_INFINITY, |told| told.weight);
         let mut best: Option<([f64; 3], f64)> = None;
         let (mut frequency, mut tried) = (SWINGS_IN_LOG * TAU / longest, 0);
         while frequency * interval < SWING_FASTEST {
@@ -359,30 +368,32 @@ impl Estimate {
             frequency *= SWING_RATIO;
         }
         let Some((mut at, mut most)) = best else { return Vec::new() };
+        let longest_time = (SWING_LONGEST * longest).ln();
         let mut steps = SWING_STEPS;
         for _ in 0..SWING_ROUNDS {
-            for j in 0..3 {
-                for sign in [1.0, -1.0] {
-                    let mut next = at;
-                    next[j] += sign * steps[j];
-                    let own = weight(&of(next));
-                    if own > most {
-                        (at, most) = (next, own);
-                        break;
-                    }
+            for ((step, first), way) in steps.iter_mut().zip(SWING_STEPS).zip(SWING_WAYS) {
+                let near = [*step, -*step].map(|step| std::array::from_fn(|j| at[j] + step * way[j]));
+                let near = near.into_iter().filter(|next: &[f64; 3]| next[1] <= longest_time);
+                let better = near.map(|next| (next, weight(&of(next)))).find(|(_, own)| *own > most);
+                match better {
+                    Some(next) => ((at, most), *step) = (next, first.min(*step / SWING_SHRINKS)),
+                    None => *step *= SWING_SHRINKS,
                 }
             }
-            steps = steps.map(|step| SWING_SHRINKS * step);
+            if steps.iter().zip(SWING_STEPS).all(|(step, first)| *step < SWING_FINE * first) {
+                break;
+            }
         }
         // A grid around it, each point with the prior weight of a first one.
         let shares = [-1.0, 0.0, 1.0];
+        // The width of its peak is 1/τ, and at least that of a line in the log.
+        let width = 1.0 / (at[0].exp() * at[1].exp().min(longest));
+        let apart = [width.min(SWING_AROUND[0]), SWING_AROUND[1], SWING_AROUND[2]];
         let mut all = Vec::new();
         for i in shares {
             for j in shares {
                 for k in shares {
-                    let around =
-                        [at[0] + i * SWING_AROUND[0], at[1] + j * SWING_AROUND[1], at[2] + k * SWING_AROUND[2]];
-                    all.extend(of(around));
+                    all.extend(of([at[0] + i * apart[0], at[1] + j * apart[1], at[2] + k * apart[2]]));
                 }
             }
         }

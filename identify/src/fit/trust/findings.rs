@@ -3,14 +3,13 @@
 use super::finding::{Finding, Grade};
 use super::found::Fit;
 use super::scores::LogFit;
-use super::trials::is_borne_out;
+use super::trials::{is_borne_out, is_opposite};
 use super::unexplained::{self, Reason};
 use crate::case::{Case, Plan};
 use crate::fit::asked::controller::reproduced;
-use crate::fit::asked::problem::Problem;
 use crate::fit::limits::{
     CAUSE_EXPLAINS, CAUSE_MOVES, CAUSE_WARNS, FACTOR_LEAVES, KINK_PROMISE, MORE_THAN_NOISE, MOTOR_CONSTANTS, NORMAL,
-    OPPOSITE, POOR_FIT, REPRODUCED,
+    POOR_FIT, REPRODUCED,
 };
 use crate::fit::noise::Wave;
 use crate::fit::search::point::Ending;
@@ -19,7 +18,6 @@ use crate::fit::search::starts::Searched;
 use crate::log::{Note, Quantity, Remedy, Severity, Survey};
 use crate::machine::{AmplifierMode, DriveAt, DriveUnit, Motor};
 use crate::number::{engineering, significant};
-use crate::solve::Bench;
 
 /// All findings, warnings first.
 pub(crate) fn findings(case: &Case, plan: &Plan, found: &Searched, fit: &Fit, surveys: &[Survey]) -> Vec<Finding> {
@@ -81,32 +79,6 @@ fn grade(note: &Note, case: &Case, plan: &Plan) -> Grade {
         (_, "outliers") if !plan.huber => Grade::Warning,
         _ => Grade::Note,
     }
-}
-
-/// True if a log moves opposite to the model at the start.
-fn is_opposite(problem: &Problem, name: &str) -> bool {
-    let (x, mut worst) = (problem.start(), None);
-    for (index, run) in problem.runs.iter().enumerate().filter(|(_, run)| run.name == name) {
-        let Some(seen) = run.seen.iter().find(|seen| seen.quantity.is_position() && !seen.absolute) else { continue };
-        let mut column = vec![Vec::new()];
-        let extras = problem.extras_of(index, &x);
-        if !run.predict(&mut Bench::default(), &problem.stage_at(&x), &extras, &[seen.quantity], &mut column) {
-            continue;
-        }
-        let far = (run.time.len() / 50).max(1);
-        let (mut aa, mut ab, mut bb) = (0.0, 0.0, 0.0);
-        for k in far..run.time.len() {
-            let (a, b) = (column[0][k] - column[0][k - far], seen.values[k] - seen.values[k - far]);
-            if b.is_finite() {
-                (aa, ab, bb) = (aa + a * a, ab + a * b, bb + b * b);
-            }
-        }
-        let correlation = ab / (aa * bb).sqrt();
-        if correlation.is_finite() {
-            worst = Some(worst.map_or(correlation, |worst: f64| worst.min(correlation)));
-        }
-    }
-    worst.is_some_and(|correlation| correlation < OPPOSITE)
 }
 
 /// Findings about the controller: its output for the logged positions, compared with the logged input.
@@ -314,14 +286,23 @@ fn of_residuals(case: &Case, plan: &Plan, found: &Searched, fit: &Fit, others: &
         if names.is_empty() {
             continue;
         }
-        let reason = unexplained::reason(case, plan, found, quantity, &names).unwrap_or_else(|| Reason {
+        let is_reversed =
+            |name: &&str| others.iter().any(|one| one.code == "sign" && one.log.as_deref() == Some(*name));
+        // Where the sign is the reason, no other is looked for, but that two columns have changed places.
+        let reason = match names.iter().all(is_reversed) {
+            true => match unexplained::exchange(case, plan, found, quantity, &names) {
+                Some(exchanged) => Some(exchanged),
+                None => continue,
+            },
+            false => unexplained::reason(case, plan, found, quantity, &names),
+        };
+        let Reason { code, text } = reason.unwrap_or_else(|| Reason {
             code: "unexplained",
             text:
                 "neither windows nor exchanged columns nor a factor on it or on the input explains that: check signs, \
                    columns and units of this log, and missing parts of the model"
                     .into(),
         });
-        let Reason { code, text } = reason;
         all.extend(own.into_iter().map(|(name, score)| {
             let text =
                 format!("{}: the model explains only {:.0} % of it: {text}", quantity.name(), score.percent.max(0.0));

@@ -12,7 +12,7 @@
 //! A curved set is approached in rounds, each with the directions at its starting point.
 
 use super::uncertainty::Judged;
-use super::{causes, other_laws, sub_records};
+use super::{causes, other_laws, sub_records, trials};
 use crate::case::{Case, Plan};
 use crate::error::Result;
 use crate::fit::asked::problem::{Problem, Stop};
@@ -43,7 +43,11 @@ impl Settled<'_> {
         };
         let disagreement = sub_records::disagreement(case, plan, &self.searched, &judged);
         let other_law = other_laws::other_law(&self.searched, &judged);
-        let cause = causes::cause(case, plan, &self.searched, &judged, other_law.as_ref());
+        // No element reverses a motion.
+        let cause = match trials::is_reversed(case, plan, &self.searched) {
+            true => None,
+            false => causes::cause(case, plan, &self.searched, &judged, other_law.as_ref()),
+        };
         let other_law = other_law.filter(|_| cause.is_none());
         judged.widen(disagreement, other_law, cause);
         Some(judged)

@@ -7,14 +7,17 @@
 use super::scores::beside_log;
 use crate::case::{Case, Plan};
 use crate::fit::asked::problem::Problem;
-use crate::fit::limits::{HUBER, JUMP, MENDED, NO_WORSE, ROUGH_TOLERANCE, STAND_OUT, TRIAL_FIT_ITERATIONS, UNIT_WORSE};
+use crate::fit::limits::{
+    FACTOR_LEAVES, HUBER, JUMP, MENDED, NO_WORSE, OPPOSITE, ROUGH_TOLERANCE, STAND_OUT, TRIAL_FIT_ITERATIONS,
+    UNIT_WORSE,
+};
 use crate::fit::search::least_squares::minimise;
 use crate::fit::search::point::{Ending, Minimum, Options};
 use crate::fit::search::regression::suspected_shift;
 use crate::fit::search::starts::Searched;
 use crate::log::{Log, Note, Quantity, Remedy, Severity, Survey, jumps_text};
 use crate::number::engineering_typed;
-use crate::solve::Flow;
+use crate::solve::{Bench, Flow};
 use std::sync::Arc;
 
 /// Surveys of all logs, without suspicions that a fit to the corrected log refutes.
@@ -106,6 +109,41 @@ pub(crate) fn is_borne_out(case: &Case, plan: &Plan, found: &Searched, name: &st
     tried.is_empty() || tried.iter().any(is_better)
 }
 
+/// True if a log moves opposite to the model at the start.
+pub(crate) fn is_opposite(problem: &Problem, name: &str) -> bool {
+    let (x, mut worst) = (problem.start(), None);
+    for (index, run) in problem.runs.iter().enumerate().filter(|(_, run)| run.name == name) {
+        let Some(seen) = run.seen.iter().find(|seen| seen.quantity.is_position() && !seen.absolute) else { continue };
+        let mut column = vec![Vec::new()];
+        let extras = problem.extras_of(index, &x);
+        if !run.predict(&mut Bench::default(), &problem.stage_at(&x), &extras, &[seen.quantity], &mut column) {
+            continue;
+        }
+        let far = (run.time.len() / 50).max(1);
+        let (mut aa, mut ab, mut bb) = (0.0, 0.0, 0.0);
+        for k in far..run.time.len() {
+            let (a, b) = (column[0][k] - column[0][k - far], seen.values[k] - seen.values[k - far]);
+            if b.is_finite() {
+                (aa, ab, bb) = (aa + a * a, ab + a * b, bb + b * b);
+            }
+        }
+        let correlation = ab / (aa * bb).sqrt();
+        if correlation.is_finite() {
+            worst = Some(worst.map_or(correlation, |worst: f64| worst.min(correlation)));
+        }
+    }
+    worst.is_some_and(|correlation| correlation < OPPOSITE)
+}
+
+/// True if a log moves opposite to the model, and the model explains it with its sign reversed.
+pub(crate) fn is_reversed(case: &Case, plan: &Plan, found: &Searched) -> bool {
+    let mut names: Vec<&str> = found.problem.runs.iter().map(|run| run.name.as_str()).collect();
+    names.dedup();
+    names.retain(|name| is_opposite(&found.problem, name));
+    let mended = || mended(case, plan, found, &names, &Remedy::Reverse, TRIAL_FIT_ITERATIONS);
+    !names.is_empty() && mended().is_some_and(|mended| mended.left <= FACTOR_LEAVES)
+}
+
 /// Agreement with corrected logs.
 pub(crate) struct Mended {
     /// Cost of a value relative to that with the unchanged logs.
@@ -114,6 +152,8 @@ pub(crate) struct Mended {
     least: f64,
     /// Number of counted values.
     counted: usize,
+    /// Greatest ratio of a free value to that of the case, or the other way round; infinite where one is zero.
+    pub moved: f64,
 }
 
 /// Mean square of the weighted residuals of each quantity.
@@ -169,7 +209,12 @@ pub(crate) fn mended(
         Some(square / own.max(f64::MIN_POSITIVE))
     };
     let least = squares(&problem, &end.residuals).into_iter().filter_map(part).fold(f64::INFINITY, f64::min);
-    Some(Mended { left: cost / counted.max(1) as f64 / before.max(f64::MIN_POSITIVE), least, counted })
+    let parameters = problem.parameters.iter().enumerate().filter(|(_, parameter)| parameter.start != 0.0);
+    let moved = parameters
+        .map(|(j, parameter)| (problem.value(j, end.x[j]) / parameter.start).max(0.0))
+        .map(|ratio| ratio.max(1.0 / ratio))
+        .fold(1.0, f64::max);
+    Some(Mended { left: cost / counted.max(1) as f64 / before.max(f64::MIN_POSITIVE), least, counted, moved })
 }
 
 /// Result of a short search from `start`, and its cost.

@@ -1,12 +1,12 @@
 //! Reasons why a model explains little of an output: windows, exchanged columns and factors, each tried by a fit.
 
-use super::trials::mended;
+use super::trials::{Mended, mended};
 use crate::case::{Case, Plan};
 use crate::fit::asked::problem::Problem;
 use crate::fit::asked::residuals::Residuals;
 use crate::fit::limits::{
-    FACTOR_LEAVES, FACTOR_STEPS, FACTORS, FACTORS_FITTED, REFIT_TOLERANCE, TRIAL_FIT_ITERATIONS, UNEXPLAINED_WINDOWS,
-    WINDOW_SAMPLES, WINDOWS_EXPLAIN, WINDOWS_MOST,
+    FACTOR_ALIKE, FACTOR_LEAVES, FACTOR_MOVES, FACTOR_STEPS, FACTORS, FACTORS_FITTED, REFIT_TOLERANCE,
+    TRIAL_FIT_ITERATIONS, UNEXPLAINED_WINDOWS, WINDOW_SAMPLES, WINDOWS_EXPLAIN, WINDOWS_MOST,
 };
 use crate::fit::search::least_squares::minimise;
 use crate::fit::search::point::{Ending, Options};
@@ -15,6 +15,7 @@ use crate::log::{Quantity, Remedy};
 use crate::number::engineering_typed;
 use crate::quantity::rounded;
 use crate::solve::Flow;
+use std::cmp::Ordering;
 
 /// A reason, in words with what to do, and the code of its finding.
 pub(super) struct Reason {
@@ -30,7 +31,6 @@ pub(super) fn reason(case: &Case, plan: &Plan, found: &Searched, quantity: Quant
     }
     let told = |code| move |text| Reason { code, text };
     exchange(case, plan, found, quantity, names)
-        .map(told("swapped"))
         .or_else(|| windows(case, plan, found, quantity).map(told("unexplained")))
         .or_else(|| factor(case, plan, found, quantity, names).map(told("unexplained")))
 }
@@ -105,7 +105,13 @@ fn explained(problem: &Problem, residuals: &[f64], quantity: Quantity) -> f64 {
 }
 
 /// Another output of the same kind with which it was exchanged: the two motors of a gantry.
-fn exchange(case: &Case, plan: &Plan, found: &Searched, quantity: Quantity, names: &[&str]) -> Option<String> {
+pub(super) fn exchange(
+    case: &Case,
+    plan: &Plan,
+    found: &Searched,
+    quantity: Quantity,
+    names: &[&str],
+) -> Option<Reason> {
     let is_alike = |other: &Quantity| {
         *other != quantity
             && other.unit() == quantity.unit()
@@ -116,16 +122,36 @@ fn exchange(case: &Case, plan: &Plan, found: &Searched, quantity: Quantity, name
     others.into_iter().find_map(|other| {
         let remedy = Remedy::Exchange(quantity, other);
         let left = mended(case, plan, found, names, &remedy, TRIAL_FIT_ITERATIONS)?.left;
-        (left <= FACTOR_LEAVES).then(|| {
-            format!(
+        (left <= FACTOR_LEAVES).then(|| Reason {
+            code: "swapped",
+            text: format!(
                 "with the columns of {} and {} exchanged {:.1} % of the squared residuals are left: exchange them, or \
                  those of their inputs",
                 quantity.name(),
                 other.name(),
                 100.0 * left
-            )
+            ),
         })
     })
+}
+
+/// A factor on one column, and what the fit with it leaves.
+struct Factor {
+    column: &'static str,
+    factor: f64,
+    remedy: Remedy,
+    mended: Mended,
+}
+
+impl Factor {
+    /// The model with one factor and other free values may resemble that with another: among factors that leave nearly
+    /// nothing, the one with the values nearest to those of the case comes first.
+    fn order(&self, other: &Self) -> Ordering {
+        let alike = |own: &Self| (own.mended.left / FACTOR_ALIKE).max(1.0).ln().round();
+        let key = |own: &Self| [alike(own), own.mended.moved, own.mended.left];
+        let pairs = key(self).into_iter().zip(key(other));
+        pairs.map(|(a, b)| a.total_cmp(&b)).find(|order| order.is_ne()).unwrap_or(Ordering::Equal)
+    }
 }
 
 /// A factor on the output or on the input with which the model explains the logs.
@@ -138,16 +164,25 @@ fn factor(case: &Case, plan: &Plan, found: &Searched, quantity: Quantity, names:
     let drives = found.problem.machine.drives.len();
     let inputs = factors.iter().filter(|_| drives == 1).map(|&factor| ("input", factor, Remedy::Drive(factor)));
     // A few steps rank them; the best are fitted completely.
-    let left = |remedy: &Remedy, steps| Some(mended(case, plan, found, names, remedy, steps)?.left);
-    let mut ranked: Vec<_> =
-        outputs.chain(inputs).filter_map(|own| left(&own.2, FACTOR_STEPS).map(|left| (own, left))).collect();
-    ranked.sort_by(|a, b| a.1.total_cmp(&b.1));
-    let best = ranked.into_iter().take(FACTORS_FITTED);
-    let fitted =
-        best.filter_map(|((column, factor, remedy), _)| Some((column, factor, left(&remedy, TRIAL_FIT_ITERATIONS)?)));
-    let (column, factor, left) = fitted.min_by(|a, b| a.2.total_cmp(&b.2))?;
-    if left > FACTOR_LEAVES {
+    let tried = |(column, factor, remedy): (&'static str, f64, Remedy), steps| {
+        let mended = mended(case, plan, found, names, &remedy, steps)?;
+        Some(Factor { column, factor, remedy, mended })
+    };
+    let mut ranked: Vec<Factor> = outputs.chain(inputs).filter_map(|own| tried(own, FACTOR_STEPS)).collect();
+    ranked.sort_by(Factor::order);
+    ranked.truncate(FACTORS_FITTED);
+    let again = |own: Factor| tried((own.column, own.factor, own.remedy), TRIAL_FIT_ITERATIONS);
+    let Factor { column, factor, mended, .. } = ranked.into_iter().filter_map(again).min_by(Factor::order)?;
+    if mended.left > FACTOR_LEAVES {
         return None;
+    }
+    let left = format!("{:.1} % of the squared residuals are left", 100.0 * mended.left);
+    // A single free value also takes up what those that are kept are off by.
+    if mended.moved > FACTOR_MOVES && found.problem.parameters.len() > 1 {
+        return Some(format!(
+            "a factor on it or on the input explains that ({left}), but with each that is usual a free value differs \
+             from that of the case by more than {FACTOR_MOVES} times: check the units of both and the gear ratio"
+        ));
     }
     let what = match factor {
         own if own == gear => ", the gear ratio,".to_string(),
@@ -155,9 +190,5 @@ fn factor(case: &Case, plan: &Plan, found: &Searched, quantity: Quantity, names:
         _ => String::new(),
     };
     let factor = rounded(factor);
-    Some(format!(
-        "with {column} times {factor}{what} {:.1} % of the squared residuals are left: set its unit, or \
-         scale = {{ {column} = {factor} }}",
-        100.0 * left
-    ))
+    Some(format!("with {column} times {factor}{what} {left}: set its unit, or scale = {{ {column} = {factor} }}"))
 }
