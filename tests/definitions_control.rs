@@ -199,12 +199,12 @@ fn cascades_are_those_of_the_document() {
         },
     );
     let split = |case: &Case, y: &Reference| {
-        let (machine, one) = (&case.machine, Mass::of(case));
+        let machine = &case.machine;
         let motor = &machine.drives[0].motor;
         let r = machine.pulley_radius;
         let voltage = motor.gear_ratio * motor.back_emf_constant * y.speed / (r * machine.drives[0].amplifier.gain);
         let rest = rigid_command(case, y) - voltage;
-        [voltage, rest * one.push * r / (motor.gear_ratio * motor.torque_constant)]
+        [voltage, rest * machine.drives[0].amplifier.gain / motor.resistance]
     };
     let inner = "current = { proportional = 0.3, integral = 200, limit = 8 }";
     let cascade = cascade.replace(" }", &format!(", {inner} }}"));
@@ -301,14 +301,18 @@ fn sign(y: &Reference) -> f64 {
     }
 }
 
-/// The command for a force and its rate at a speed, in voltage mode.
-fn command(case: &Case, force: f64, rate: f64, speed: f64) -> f64 {
+/// The command for a force and its rate while the drive moves like this, in voltage mode; p = 0.9. What the rotor takes
+/// does not pass through the gear.
+fn command(case: &Case, force: f64, rate: f64, drive: &Reference) -> f64 {
     let (s, motor) = (&case.machine, &case.machine.drives[0].motor);
-    let n = motor.gear_ratio;
-    let eta = if force * speed < 0.0 { 1.0 / motor.gear_efficiency } else { motor.gear_efficiency };
-    let current = |f: f64| f * s.pulley_radius / (eta * n * motor.torque_constant);
-    let back = n * motor.back_emf_constant * speed / s.pulley_radius;
-    (motor.resistance * current(force) + motor.inductance * current(rate) + back) / s.drives[0].amplifier.gain
+    let (r, n) = (s.pulley_radius, motor.gear_ratio);
+    let rotor = |change: f64| 0.9 * n * n * motor.rotor_inertia * change / (r * r);
+    let driven = (force - rotor(drive.acceleration)) * drive.speed < 0.0;
+    let e = if driven { 1.0 / motor.gear_efficiency } else { motor.gear_efficiency };
+    let current = |f: f64, change: f64| (rotor(change) + (f - rotor(change)) / e) * r / (n * motor.torque_constant);
+    let back = n * motor.back_emf_constant * drive.speed / r;
+    let (i, rate) = (current(force, drive.acceleration), current(rate, drive.jerk));
+    (motor.resistance * i + motor.inductance * rate + back) / s.drives[0].amplifier.gain
 }
 
 /// p = 0.9, q = 0.7.
@@ -317,7 +321,7 @@ fn rigid_command(case: &Case, y: &Reference) -> f64 {
     let side = usize::from(s < 0.0);
     let friction = one.viscous[side] * y.speed + s * one.coulomb[side];
     let force = 0.9 * one.mass * y.acceleration + 0.7 * friction - case.machine.cart.load;
-    command(case, force, 0.9 * one.mass * y.jerk, y.speed)
+    command(case, force, 0.9 * one.mass * y.jerk, y)
 }
 
 /// y₁ with two derivatives, and F and Ḟ with all of inertia and friction.
@@ -360,7 +364,7 @@ fn elastic_command(case: &Case, y: &Reference) -> f64 {
     let side = usize::from(s < 0.0);
     let friction = one.viscous[side] * y.speed + s * one.coulomb[side];
     let less = (1.0 - 0.7) * friction + (1.0 - 0.9) * one.mass * first.acceleration;
-    command(case, force - less, rate, first.speed)
+    command(case, force - less, rate, &first)
 }
 
 #[test]

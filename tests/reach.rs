@@ -204,7 +204,7 @@ fn a_gear_with_losses_needs_what_the_solver_says() {
         let motor = &mut machine.drives[0].motor;
         (motor.gear_efficiency, motor.gear_ratio) = (draw(0.3, 1.0), draw(0.5, 6.0));
         motor.rotor_inertia = draw(0.0, 1e-4);
-        let (speed, acceleration) = (draw(-1.0, 1.0), draw(-20.0, 20.0));
+        let (speed, acceleration) = (draw(-1.0, 1.0), draw(-100.0, 100.0));
         let rigid = Rigid::of(&machine);
         let (viscous, dry) = rigid.friction(speed, speed.signum());
         let force = rigid.mass * acceleration + viscous + dry;

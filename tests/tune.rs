@@ -548,7 +548,7 @@ fn draws_of_a_posterior_are_the_family() {
 /// the largest peaks, the larger margin was told.
 #[test]
 fn each_margin_at_worst_is_worst_by_itself() {
-    for name in ["pid-shaped", "cascade", "pid"] {
+    for name in ["pid-shaped", "pid-elastic", "pid"] {
         let case = case(&format!("{name}.toml"), &[]);
         let tuned = evaluate(&case, &Tuning::default()).unwrap();
         let (worst, nominal) = (&tuned.before.worst, &tuned.before.nominal);
