@@ -92,14 +92,25 @@ fn bristles_that_slip_ever_faster_are_followed_in_model_exchange() {
     assert!(farthest > 100.0 && apart < 1e-9 * farthest, "{apart:e} of {farthest:e} m");
 }
 
-/// Cases of pairs that amplify what an answer may be off by: the tolerance of an integrator (2638, 3083, 3544), the
+/// Cases of pairs that amplify what an answer may be off by: the tolerance of an integrator (2638, 3083), the
 /// delay of each condition in model exchange (3560, 4830), a controller's clock at an edge of the profile (5736, 8548).
 #[test]
 fn what_amplifies_a_tolerance_is_ill_conditioned() {
-    for number in [2638, 3083, 3544, 3560, 4830, 5736, 8548] {
+    for number in [2638, 3083, 3560, 4830, 5736, 8548] {
         let outcome = stages::pair(1, number);
         let known = outcome.compared.iter().all(|one| matches!(one.verdict, Verdict::IllConditioned(_)));
         assert!(known && !outcome.compared.is_empty(), "{}", stages::told(1, &[outcome], true));
+    }
+}
+
+/// Moves by the general solver in which an encoder's count is read differently: they state by how much they may be off.
+/// They stated nothing; the second one, which leaves its travel 96 µs later, was unexplained.
+#[test]
+fn a_move_that_reads_another_count_states_it() {
+    for (seed, number) in [(1, 3544), (2, 628)] {
+        let outcome = stages::pair(seed, number);
+        let stated = outcome.compared.iter().all(|one| matches!(one.verdict, Verdict::Agrees) && one.allowed > 1e-9);
+        assert!(stated && !outcome.compared.is_empty(), "{}", stages::told(seed, &[outcome], true));
     }
 }
 
