@@ -157,7 +157,7 @@ def test_a_stepper_at_rest_and_at_a_speed_has_modes(root):
         assert (command["name"], command["unit"], found["rigid"]) == ("position_command", "m", [])
         [cart] = [output for output in command["outputs"] if output["name"] == "cart_position"]
         assert cart["low_frequency_gain"] == pytest.approx(gain)
-    with pytest.raises(taut.Error, match="the supply of 24 V does not suffice"):
+    with pytest.raises(taut.Error, match=r"the supply of 24.V does not suffice"):
         case.modes(speed=3.0)
 
 
