@@ -190,6 +190,9 @@ await test("shows the bits of the program for 100 random machines", async open =
     const own = here.head.result[kind][0],
       wanted = printed(words)[kind][experiment];
     if (own.cost && own.cost.samples !== wanted.cost.samples) continue;
+    // The page does not run a move a second time for its accuracy.
+    if (kind === "moves")
+      for (const key of ["position_error_m", "position_error_basis", "is_determined"]) wanted[key] = own[key] = null;
     expect(sorted(own) === sorted(wanted), both(own, wanted));
     printedToo++;
   }
