@@ -39,6 +39,13 @@ class Peak(TypedDict):
     time_s: float
 
 
+class Tie(TypedDict):
+    """When rounding decided about a body, s."""
+
+    time_s: float
+    part: str
+
+
 class EventCount(TypedDict):
     """How often a body stopped, started and reversed."""
 
@@ -103,7 +110,7 @@ class DriveOfMove(TypedDict):
 
 class Metrics(TypedDict, total=False):
     """The key figures of a run. Which there are depends on the machine: ``bridge`` stands for the bridge of a gantry,
-    ``left``, ``right`` and ``cart`` for its drives. Those from ``samples`` on are of moves."""
+    ``left``, ``right`` and ``cart`` for its drives. Those from ``position_error_m`` on are of moves."""
 
     end_time_s: float
     event_counts: list[EventCount]
@@ -141,6 +148,10 @@ class Metrics(TypedDict, total=False):
     peak_belt_force_N: Peak
     peak_span_force_N: dict[str, Peak]
     peak_span_stretch_m: dict[str, Peak]
+    position_error_m: float | None
+    position_error_basis: str | None
+    is_determined: bool | None
+    decided_within_rounding: list[Tie]
     samples: int
     limited_samples: int
     limited_s: float
