@@ -221,7 +221,10 @@ fn a_gear_with_losses_needs_what_the_solver_says() {
         let speeds = run.trajectory.get("cart_speed").unwrap();
         let got = (speeds[speeds.len() - 1] - speeds[0]) / until;
         // The drag of friction changes it within the microsecond by some 1e-5 of itself.
-        assert!((got - acceleration).abs() < 1e-4 * (1.0 + acceleration.abs()), "{number}: {got} for {acceleration} m/s²\n{machine:?}");
+        assert!(
+            (got - acceleration).abs() < 1e-4 * (1.0 + acceleration.abs()),
+            "{number}: {got} for {acceleration} m/s²\n{machine:?}"
+        );
         if (force - rigid.rotor * acceleration) * speed > 0.0 { driving += 1 } else { driven += 1 }
     }
     assert!(driving > 50 && driven > 50, "{driving} {driven}");
