@@ -94,10 +94,10 @@ fn reached(
     }
 }
 
-/// Speeds between which the largest one is looked for, m/s, and the part by which they grow.
+/// Speeds between which the largest one is looked for, m/s, and the ratio of adjacent ones.
 const LEAST_SPEED: f64 = 1e-6;
 const MOST_SPEED: f64 = 1e4;
-const HUNDREDTH: f64 = 0.01;
+const RATIO: f64 = 1.01;
 
 /// The power of a drive: at the belt, per direction alike.
 #[derive(Debug, Clone, Copy)]
@@ -206,10 +206,9 @@ impl Power {
         if left(0.0) <= 0.0 {
             return Some(0.0);
         }
-        let step = 1.0 + HUNDREDTH;
         let mut ends = [0.0, LEAST_SPEED];
         while left(ends[1]) > 0.0 {
-            ends = [ends[1], ends[1] * step];
+            ends = [ends[1], ends[1] * RATIO];
             if ends[1] > MOST_SPEED {
                 return None;
             }

@@ -116,13 +116,13 @@ impl Work<'_> {
         let feedback = self.feedback(design)?;
         let corners = feedback.corners();
         let nominal = Margins::of(&self.family.plant(&self.family.nominal(), design, &corners)?, &feedback);
-        let (place, worst, unstable) = self.limits(&feedback);
+        let (place, excess, unstable) = self.worst(&feedback);
         let mut at_corner = None;
         let mut machines = self.family.machines.clone();
         let mut corner = machines[place].clone();
         if self.family.corners {
             let (found, margins) = self.family.worst(design, &feedback, &|margins| self.excess(margins))?;
-            if self.excess(&margins) >= self.excess(&worst) {
+            if self.excess(&margins) >= excess {
                 corner = found.clone();
             }
             at_corner = Some(margins);
@@ -130,7 +130,7 @@ impl Work<'_> {
         }
         let left_out = self.family.left_out(machines.len());
         let Some(all) = self.seen(design, &machines, (bar, order, left_out))? else { return Ok(None) };
-        let worst = self.margins_at_worst(&feedback, at_corner).unwrap_or(worst);
+        let Some(worst) = self.margins_at_worst(&feedback, at_corner) else { return Ok(None) };
         let mut moves = Vec::new();
         for (motion, seen) in self.moves.iter().zip(all) {
             let (machine, until, window) = (&self.case.machine, motion.until, motion.window);

@@ -134,7 +134,7 @@ impl<'a> Work<'a> {
 
     /// The worst machine for a design, without the excluded ones, its excess over the limits, and the number of
     /// unstable machines.
-    fn worst(&self, feedback: &Feedback) -> (usize, f64, usize) {
+    pub fn worst(&self, feedback: &Feedback) -> (usize, f64, usize) {
         let (ms, mt) = (self.tuning.sensitivity, self.tuning.complementary);
         let peaks = self.plants.iter().map(|plant| Peaks::of(plant, feedback));
         let mut all: Vec<(usize, f64)> = peaks.map(|peaks| peaks.excess(ms, mt)).enumerate().collect();
@@ -142,13 +142,6 @@ impl<'a> Work<'a> {
         all.sort_by(|a, b| b.1.total_cmp(&a.1));
         let (place, excess) = all[self.family.left_out(all.len())];
         (place, excess, unstable)
-    }
-
-    /// The worst machine for a controller, without the excluded ones, and its margins; and the number of unstable
-    /// machines.
-    pub fn limits(&self, feedback: &Feedback) -> (usize, Margins, usize) {
-        let (place, _, unstable) = self.worst(feedback);
-        (place, Margins::of(&self.plants[place], feedback), unstable)
     }
 
     /// Each margin of a controller at its worst: without the excluded machines, and on the worst corner, if that is

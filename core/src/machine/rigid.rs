@@ -1,7 +1,7 @@
 //! Rigid model: an axis as one mass along its belt.
 
 use super::{AmplifierMode, DriveUnit, Machine, SlideAt};
-use crate::calculator::{Calculator, Run, at_least, less, more};
+use crate::calculator::{Calculator, Number, Run, at_least, less, more};
 use crate::signal::profile::Reference;
 
 /// Largest speed of a reference that counts as rest, m/s, and largest acceleration that counts as none, m/s²: what
@@ -139,7 +139,9 @@ impl Rigid {
         // v = R i + L di/dt + K_e n φ̇                                        (4) with an inductance
         let mut voltage = current * self.resistance;
         if self.inductance != 0.0 {
-            voltage = voltage + self.amperes(c, rate * self.inductance, drive.jerk * self.inductance, per_ampere);
+            let change = drive.jerk * self.inductance;
+            let passed = self.passed(c, rate * self.inductance, change);
+            voltage = voltage + self.amperes(passed, change, per_ampere);
         }
         (current, voltage + drive.speed * self.brake)
     }
@@ -149,7 +151,7 @@ impl Rigid {
         let force = c.name("force", force);
         let passed = self.passed(c, force, drive.acceleration);
         let per_ampere = self.per_ampere(c, passed, drive.speed);
-        let current = self.amperes(c, force, drive.acceleration, per_ampere);
+        let current = self.amperes(passed, drive.acceleration, per_ampere);
         (c.name("amperes", current), per_ampere)
     }
 
@@ -161,9 +163,8 @@ impl Rigid {
         }
     }
 
-    /// i = (F − n² J_r a/r²)/(e n K_t/r) + (n² J_r a/r²)/(n K_t/r)
-    fn amperes<C: Calculator>(&self, c: &mut C, force: C::N, acceleration: C::N, per_ampere: C::N) -> C::N {
-        let passed = self.passed(c, force, acceleration);
+    /// i = (F − n² J_r a/r²)/(e n K_t/r) + (n² J_r a/r²)/(n K_t/r), from what passes through the gear
+    fn amperes<N: Number>(&self, passed: N, acceleration: N, per_ampere: N) -> N {
         match self.is_shared() {
             true => passed / per_ampere + acceleration * (self.rotor / self.force_per_ampere),
             false => passed / per_ampere,
