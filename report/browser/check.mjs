@@ -81,6 +81,18 @@ const cutTexts = page =>
     }),
   );
 
+// The height of a picture in pixels: browsers fail on pictures of pages that are much taller.
+const TALL = 8000;
+
+// Pictures of the whole page, top to bottom; those after the first end in their number.
+async function pictures(page, width, name) {
+  const height = await page.evaluate(() => document.documentElement.scrollHeight);
+  for (let k = 0; k * TALL < height; k++) {
+    const clip = {x: 0, y: k * TALL, width, height: Math.min(TALL, height - k * TALL)};
+    await page.screenshot({path: join(shots, `${name}${k ? `-${k + 1}` : ""}.png`), fullPage: true, clip});
+  }
+}
+
 async function looks(name, width, colorScheme) {
   const {page, trouble, done} = await open(name, {viewport: {width, height: 900}, colorScheme});
   try {
@@ -88,7 +100,7 @@ async function looks(name, width, colorScheme) {
       const {scrollWidth: scroll, clientWidth: wide} = document.documentElement;
       return {scroll, wide};
     });
-    await page.screenshot({path: join(shots, `${name}-${width}-${colorScheme}.png`), fullPage: true});
+    await pictures(page, width, `${name}-${width}-${colorScheme}`);
     expect(!trouble.length, trouble.join("; "));
     expect(scroll <= wide, `scrolls sideways: ${scroll} pixels on ${wide}`);
     const cut = await cutTexts(page);
