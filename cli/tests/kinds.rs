@@ -215,20 +215,3 @@ fn every_kind_goes_through_every_command() {
         gantries.iter().for_each(|case| run(case, of_gantry));
     }
 }
-
-#[test]
-fn what_a_fit_tries_on_an_axis_alone_is_refused_for_a_gantry() {
-    let tried = [
-        ("--drift", "single changes are searched for on a single axis"),
-        ("--compare", "friction laws are compared on a single axis"),
-    ];
-    for ((option, words), case) in tried.into_iter().flat_map(|one| WITH_LOGS.map(|case| (one, case))) {
-        let output = taut_in(root()).args(["fit", option, case]).output().unwrap();
-        let said = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert_eq!(output.status.code(), Some(2), "{option} {case}: {said}");
-        assert!(
-            said.starts_with("error: ") && said.contains(words) && said.contains("next: "),
-            "{option} {case}: {said}"
-        );
-    }
-}

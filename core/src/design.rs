@@ -55,16 +55,8 @@ impl Design {
     /// Key of the first part that needs the model of a single axis, which a machine with several drives does not have;
     /// none without such a part.
     pub fn needs_axis(&self) -> Option<&'static str> {
-        let FeedForward { model, compensate_stretch, .. } = self.feed_forward;
-        let commands_current = self.structure.tunable().commands_current();
-        let is_coupled = match model {
-            FeedForwardModel::None => false,
-            FeedForwardModel::Rigid => commands_current,
-            FeedForwardModel::Elastic => true,
-        };
         match self.structure {
             Structure::StateFeedback(_) | Structure::SlidingMode(_) => Some(self.structure.tunable().word()),
-            _ if is_coupled || compensate_stretch => Some("feed_forward"),
             _ => self.disturbance_observer.map(|_| "disturbance_observer"),
         }
     }

@@ -50,9 +50,7 @@ pub(super) fn controller(root: &Table, machine: &Machine) -> Result<Option<Desig
         let field = table.optional(part).unwrap_or_else(|| table.field.clone());
         return Err(field
             .fail(format!("`{part}` needs a single axis, and the case describes a gantry ({})", machine.kind.name()))
-            .next(
-                "leave it out: a gantry takes pid, cascade or fuzzy, with feed_forward = { model = \"rigid\" } at most",
-            ));
+            .next("leave it out: a gantry takes pid, cascade or fuzzy, with feed_forward and filters"));
     }
     Ok(Some(design))
 }

@@ -28,8 +28,12 @@ impl Controller for Fed<'_> {
         self.controller.step(seen) + self.last
     }
 
-    fn forward(&self, slides: &[Reference]) -> f64 {
+    fn forward(&mut self, slides: &[Reference]) -> f64 {
         self.controller.forward(slides)
+    }
+
+    fn target(&self, along: Reference, slides: &[Reference]) -> Reference {
+        self.controller.target(along, slides)
     }
 
     fn limited(&mut self, given: f64) {

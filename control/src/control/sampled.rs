@@ -56,9 +56,16 @@ pub trait Controller {
     /// Command from the observation, V or A.
     fn step(&mut self, seen: &Observation) -> f64;
 
-    /// Feed-forward command, V or A, from the references of all slides when it acts, for a machine with several drives.
-    fn forward(&self, _slides: &[Reference]) -> f64 {
+    /// Feed-forward command outside the loop, V or A, from the references of all slides when it acts, for a machine with
+    /// several drives. Called before [`Controller::step`].
+    fn forward(&mut self, _slides: &[Reference]) -> f64 {
         0.0
+    }
+
+    /// Reference of the encoder, from that of its part of the belt and those of all slides, for a machine with several
+    /// drives.
+    fn target(&self, along: Reference, _slides: &[Reference]) -> Reference {
+        along
     }
 
     /// Receives the last command after the limit, without feed-forward.

@@ -124,9 +124,8 @@ impl Sampled<'_, '_> {
         }
     }
 
-    /// References at `time`, s: of each drive along the belt, now and one lead later; and of all slides, one lead
-    /// later.
-    fn references(&self, time: f64) -> (References, [Reference; SLIDES]) {
+    /// References at `time`, s, now and one lead later: of each drive along the belt, and of all slides.
+    fn references(&self, time: f64) -> (References, [[Reference; SLIDES]; 2]) {
         let lead = self.clocked.timing.lead;
         let at = |time: f64| {
             let mut slides = [Reference::default(); SLIDES];
@@ -142,7 +141,7 @@ impl Sampled<'_, '_> {
                 weighed.fold(Reference::default(), |sum, (weight, slide)| sum.plus(*weight, *slide))
             });
         }
-        (references, ahead)
+        (references, [now, ahead])
     }
 
     /// Inputs from now on and the end of their hold, s, from the state and the motors' currents, A, just before.
@@ -155,7 +154,8 @@ impl Sampled<'_, '_> {
             true => self.references(time),
         };
         let drives = self.controllers.len();
-        if let Some(decisions) = self.clocked.decide(self.controllers, (state, currents), (&references, &slides)) {
+        let slides = slides.each_ref().map(<[_; SLIDES]>::as_slice);
+        if let Some(decisions) = self.clocked.decide(self.controllers, (state, currents), (&references, slides)) {
             self.samples += 1;
             let mut is_limited = false;
             for (drive, Decision { seen, asked, given }) in decisions.into_iter().take(drives).enumerate() {

@@ -19,7 +19,9 @@ use crate::signal::profile::Reference;
 pub struct Standard {
     text: Text,
     memory: Vec<f64>,
+    /// Feed-forward of one of several drives; and its part for the current loop, A, until the next step.
     forward: Option<Forward>,
+    inner: Option<f64>,
 }
 
 /// One sample of such a controller, for any calculator.
@@ -72,11 +74,16 @@ impl Text {
 
     /// The command before the limit.
     pub fn step<C: Calculator>(&self, c: &mut C, seen: &Observation<C::N>) -> C::N {
+        self.step_with(c, seen, None)
+    }
+
+    /// The command before the limit, with this feed-forward for the current loop, A, from outside.
+    fn step_with<C: Calculator>(&self, c: &mut C, seen: &Observation<C::N>, inner: Option<C::N>) -> C::N {
         let compensation = &self.compensation;
         c.remark("where the encoder should be, and what the reference asks for by itself");
         let target = compensation.target(c, &seen.reference);
         let mut added = compensation.command(c, &seen.ahead);
-        let mut forward = None;
+        let mut forward = inner;
         if let (Some(whole), true) = (added, self.law.commands_current()) {
             // A current for the inner loop; the rest of the voltage is added outside.
             (forward, added) = split(c, compensation, &seen.ahead, whole);
@@ -153,7 +160,7 @@ impl Standard {
     /// The controller of `design` for a `model` of the axis.
     pub fn new(design: &Design, model: &Machine) -> Result<Self> {
         let text = Text::new(design, model)?;
-        Ok(Self { memory: vec![0.0; text.slots.count()], text, forward: None })
+        Ok(Self { memory: vec![0.0; text.slots.count()], text, forward: None, inner: None })
     }
 
     /// A controller for each drive of a machine.
@@ -175,11 +182,21 @@ impl Standard {
 
 impl Controller for Standard {
     fn step(&mut self, seen: &Observation) -> f64 {
-        self.text.step(&mut Run::on(&mut self.memory), seen)
+        self.text.step_with(&mut Run::on(&mut self.memory), seen, self.inner)
     }
 
-    fn forward(&self, slides: &[Reference]) -> f64 {
-        self.forward.as_ref().map_or(0.0, |forward| forward.command(slides))
+    fn forward(&mut self, slides: &[Reference]) -> f64 {
+        let Some(forward) = &self.forward else { return 0.0 };
+        if !self.text.law.commands_current() {
+            return forward.command(slides);
+        }
+        let (inner, outside) = forward.split(slides);
+        self.inner = Some(inner);
+        outside
+    }
+
+    fn target(&self, along: Reference, slides: &[Reference]) -> Reference {
+        self.forward.as_ref().map_or(along, |forward| forward.target(slides))
     }
 
     fn limited(&mut self, given: f64) {
@@ -205,7 +222,7 @@ fn check(design: &Design, model: &Machine) -> Result<()> {
     let Design { every, delay, limit, .. } = *design;
     if let Some(part) = design.needs_axis().filter(|_| model.drives.len() > 1) {
         return Err(Error::new(format!("`{part}` needs a single axis, and this machine has several drives"))
-            .next("leave it out: such a machine takes pid, cascade or fuzzy, with rigid feed-forward at most"));
+            .next("leave it out: such a machine takes pid, cascade or fuzzy, without an observer"));
     }
     if !((1e-9..=1e9).contains(&every) && (0.0..=1000.0 * every).contains(&delay)) {
         return Err(Error::new(format!("a controller cannot be sampled every {every} s with a delay of {delay} s"))

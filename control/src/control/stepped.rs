@@ -85,13 +85,13 @@ impl Clocked {
         self.acting = self.waiting.pop_front().unwrap_or_default();
     }
 
-    /// Decides at [`Clocked::next`] for each drive; `slides` are the references of all slides one lead later. Returns
-    /// the decisions if that is a sample. A delayed command needs nothing else.
+    /// Decides at [`Clocked::next`] for each drive; `slides` are the references of all slides, now and one lead later.
+    /// Returns the decisions if that is a sample. A delayed command needs nothing else.
     pub fn decide(
         &mut self,
         controllers: &mut [&mut dyn Controller],
         (state, currents): (&State, &Commands),
-        (references, slides): (&References, &[Reference]),
+        (references, [slides, later]): (&References, [&[Reference]; 2]),
     ) -> Option<[Decision; DRIVES]> {
         if self.halfway {
             self.halfway = false;
@@ -110,8 +110,9 @@ impl Clocked {
                 scale: sensors.scale(state),
                 current: currents[drive],
             };
-            let forward = controller.forward(slides);
-            let asked = controller.step(&seen) + forward;
+            let forward = controller.forward(later);
+            let target = controller.target(reference, slides);
+            let asked = controller.step(&Observation { reference: target, ..seen }) + forward;
             // NaN and infinity count as zero.
             let asked = if asked.is_finite() { asked } else { 0.0 };
             let given = self.timing.limit.map_or(asked, |limit| asked.clamp(-limit, limit));
@@ -162,7 +163,7 @@ impl Stepped {
         let ahead = ahead.copied().unwrap_or_else(|| after(reference, self.clocked.timing.lead));
         let (mut currents, mut references) = (Commands::default(), References::default());
         (currents[0], references[0]) = (current, [*reference, ahead]);
-        self.clocked.decide(&mut [&mut self.controller], (state, &currents), (&references, &[ahead]));
+        self.clocked.decide(&mut [&mut self.controller], (state, &currents), (&references, [&[*reference], &[ahead]]));
         self.command()
     }
 }

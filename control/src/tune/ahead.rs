@@ -44,8 +44,7 @@ fn forms(machine: &Machine, design: &Design) -> Vec<FeedForward> {
     for &model in models.iter().filter(|model| is_elastic || **model != FeedForwardModel::Elastic) {
         for compensate_stretch in [own.compensate_stretch, true] {
             let form = FeedForward { model, compensate_stretch, ..FeedForward::NONE };
-            let is_for_axis = Design { feed_forward: form, ..design.clone() }.needs_axis().is_some();
-            let cannot = compensate_stretch && (sees_stretch || !is_elastic) || is_for_axis && machine.drives.len() > 1;
+            let cannot = compensate_stretch && (sees_stretch || !is_elastic);
             if !cannot && !forms.contains(&form) {
                 forms.push(form);
             }

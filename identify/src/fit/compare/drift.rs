@@ -6,7 +6,7 @@
 //! might explain more than Coulomb friction in one direction if it fell in both.
 
 use crate::case::{Case, Nuisances, Plan, Scope};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::fit::asked::problem::Stop;
 use crate::fit::limits::CHANGE_ALIKE;
 use crate::fit::search::starts::{Searched, Work};
@@ -94,14 +94,24 @@ impl Cause {
             () if has(&["friction", "total.viscous", "total.coulomb", "efficiency"]) => Self::Friction,
             () if has(&["mass", "inertia", "load"]) => Self::Load,
             () if name.starts_with("belt.") => Self::Belt,
-            () if name.starts_with("motor.") => Self::Drive,
+            () if name.contains("motor.") => Self::Drive,
             () if has(&["amplifier", "input", "delay"]) => Self::Input,
             () => Self::Make,
         }
     }
 }
 
-/// Pairs that change together, if the machine has both and neither is zero.
+/// Keys of the numbers of each of several drives, which the keys of all drives vary together.
+fn of_drives(machine: &Machine) -> Vec<String> {
+    let drives = &machine.geometry().drives;
+    if drives.len() == 1 {
+        return Vec::new();
+    }
+    let keys = ["motor.torque_constant", "motor.back_emf_constant", "motor.resistance", "amplifier.gain"];
+    drives.iter().flat_map(|drive| keys.map(|key| format!("{}{key}", drive.key))).collect()
+}
+
+/// Pairs that change together, if the machine has both and neither is zero; and the spans of each drive of several.
 fn pairs(machine: &Machine) -> Vec<Vec<String>> {
     let bodies = ["drive_pulley", "cart", "idler_pulley", "bridge"];
     let kinds = ["viscous", "coulomb", "static"];
@@ -112,25 +122,28 @@ fn pairs(machine: &Machine) -> Vec<Vec<String>> {
     });
     let of_pulleys = ["inertia".to_string()].into_iter().chain(kinds.map(|kind| format!("friction.{kind}")));
     let pulleys = of_pulleys.map(|number| ["drive_pulley", "idler_pulley"].map(|body| format!("{body}.{number}")));
-    let motor = ["motor.torque_constant", "motor.back_emf_constant"].map(String::from);
+    let constants = ["motor.torque_constant", "motor.back_emf_constant"];
+    let drives = &machine.geometry().drives;
+    let motors = drives.iter().map(|drive| constants.map(|key| format!("{}{key}", drive.key)));
+    // The keys of all drives, too.
+    let motors = motors.chain((drives.len() > 1).then(|| constants.map(String::from)));
     let is_there = |key: &String| parameter::value(machine, key).is_some_and(|value| value != 0.0);
     // A direction that is not given separately follows the other one.
     let are_two = |[one, other]: &[String; 2]| {
         let free = |key: &str| Free::new(machine, key, &[], &[]).ok();
         free(one).zip(free(other)).is_some_and(|(one, other)| !one.overlaps(&other))
     };
-    let all = sides.chain(pulleys).chain([motor]);
-    all.filter(|pair| pair.iter().all(is_there) && are_two(pair)).map(|pair| pair.to_vec()).collect()
+    let all = sides.chain(pulleys).chain(motors);
+    let pairs = all.filter(|pair| pair.iter().all(is_there) && are_two(pair)).map(|pair| pair.to_vec());
+    let belts = (0..if drives.len() > 1 { drives.len() } else { 0 })
+        .map(|drive| machine.geometry().spans_of(drive).map(|span| format!("belt.stiffness.{span}")).collect());
+    pairs.chain(belts.filter(|spans: &Vec<String>| spans.len() > 1)).collect()
 }
 
 /// Changes the parameters of the machine one at a time to fit the logs of `case`: those of `plan`, all others that may
 /// vary, pairs that change together, and delay, gain and offset of the input.
 pub fn drift(case: &Case, plan: &Plan, stop: Option<Stop>, watch: &mut dyn FnMut(&str) -> Flow) -> Result<Drift> {
     crate::case::needs_motors(&case.machine)?;
-    if !case.machine.has_one_coordinate() {
-        return Err(Error::new("single changes are searched for on a single axis, and the case describes a gantry")
-            .next("free the parameters that may have changed in [fit], and use `taut fit`"));
-    }
     let none = nothing(plan);
     let quiet = &mut |_: &[f64], _| Flow::Continue;
     watch("the machine as it is");
@@ -185,7 +198,7 @@ fn singles(case: &Case, plan: &Plan, none: &Plan) -> Vec<Plan> {
             });
         }
     };
-    for key in plan.free.iter().cloned().chain(parameter::every(machine)).chain(["cart.load".to_string()]) {
+    for key in plan.free.iter().cloned().chain(parameter::every(machine)).chain(of_drives(machine)).chain(["cart.load".to_string()]) {
         single(Plan { free: vec![key], ..none.clone() });
     }
     for keys in plan.tied.iter().cloned().chain(pairs(machine)) {
@@ -195,15 +208,17 @@ fn singles(case: &Case, plan: &Plan, none: &Plan) -> Vec<Plan> {
         single(Plan { lumped: vec![name.clone()], ..none.clone() });
     }
     let nuisance = none.nuisance;
+    // Each of several drives has its own offset and gain, and the gain of its amplifier.
+    let has_one_input = machine.drives.len() == 1;
     if !plan.closed_loop {
         if nuisance.delay == Scope::Off {
             plans.push(Plan { nuisance: Nuisances { delay: Scope::Shared, ..nuisance }, ..none.clone() });
         }
-        if nuisance.input_offset == Scope::Off {
+        if has_one_input && nuisance.input_offset == Scope::Off {
             plans.push(Plan { nuisance: Nuisances { input_offset: Scope::Shared, ..nuisance }, ..none.clone() });
         }
     }
-    if nuisance.input_gain == Scope::Off {
+    if has_one_input && nuisance.input_gain == Scope::Off {
         plans.push(Plan { nuisance: Nuisances { input_gain: Scope::Shared, ..nuisance }, ..none.clone() });
     }
     plans

@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use crate::fit::limits::{BRISTLE_BEND, MOST_BREAKAWAY, SPEED_POINTS, STRIBECK_ABOVE, STRIBECK_FALL, TRAVEL_POINTS};
 use crate::friction::Friction;
 use crate::log::Quantity;
-use crate::machine::Machine;
+use crate::machine::{DriveAt, Machine};
 use std::path::Path;
 use toml_edit::{Array, DocumentMut, InlineTable, Item, Value};
 
@@ -79,12 +79,13 @@ impl FrictionLaw {
 }
 
 /// The body whose friction is compared: the one with the most free parameters, or else the cart.
-pub(super) fn body(plan: &Plan) -> &'static str {
+pub(super) fn body(machine: &Machine, plan: &Plan) -> &'static str {
     let count = |body: &str| {
         let own = plan.free.iter().chain(plan.tied.iter().flatten());
         own.filter(|key| key.starts_with(&format!("{body}.friction."))).count()
     };
-    if count("drive_pulley") > count("cart") { "drive_pulley" } else { "cart" }
+    let others: &[&str] = if machine.has_one_coordinate() { &["drive_pulley"] } else { &["bridge", "drive_pulley"] };
+    others.iter().fold("cart", |most, other| if count(other) > count(most) { other } else { most })
 }
 
 /// The case with this law, with direction-dependent friction if `sided`, starting from the machine `from`, and its free
@@ -97,12 +98,17 @@ pub(super) fn with(
     sided: bool,
     from: &Machine,
 ) -> Result<(Case, Plan)> {
-    let body = body(plan);
-    let friction = if body == "cart" { from.cart.friction } else { from.drive_pulley.friction };
+    let body = body(&case.machine, plan);
+    // Forces act on a slide.
+    let (friction, slide) = match body {
+        "drive_pulley" => (from.drive_pulley.friction, "cart"),
+        "bridge" => (from.first_slide().friction, body),
+        _ => (from.cart.friction, body),
+    };
     let mut document: DocumentMut = case.text.parse().map_err(|_| Error::new("this is not TOML").in_file(name))?;
-    let fastest = fastest(case) / if body == "cart" { 1.0 } else { from.pulley_radius };
+    let fastest = fastest(case) / if body == slide { 1.0 } else { from.pulley_radius };
     let sided = sided || law == FrictionLaw::Asymmetric;
-    let (table, keys) = table(case, law, sided, &friction, fastest, body);
+    let (table, keys) = table(case, law, sided, &friction, fastest, (body, slide));
     let coulomb = table.get("coulomb").and_then(Value::as_float).unwrap_or_default();
     let near = match law {
         FrictionLaw::Stribeck => Some(("stribeck.force", [0.0, (MOST_BREAKAWAY - 1.0) * coulomb])),
@@ -113,16 +119,16 @@ pub(super) fn with(
     let mut free: Vec<String> = keys.iter().map(|key| format!("{body}.friction.{key}")).collect();
     put(&mut document, body, "friction", Value::InlineTable(table));
     let loaded = plan.free.iter().any(|key| key == "cart.load");
-    let line = line(case, law, sided || loaded);
+    let line = line(case, law, sided || loaded, slide);
     if let Some(Line { key, over, free: numbers }) = &line {
         let point = |x: &f64| Value::Array(Array::from_iter([*x, 0.0]));
-        put(&mut document, "cart", key, Value::Array(over.iter().map(point).collect()));
-        free.extend(numbers.iter().map(|number| format!("cart.{key}.{number}.force")));
+        put(&mut document, slide, key, Value::Array(over.iter().map(point).collect()));
+        free.extend(numbers.iter().map(|number| format!("{slide}.{key}.{number}.force")));
     }
     let is_own = |key: &str| {
         key.starts_with(&format!("{body}.friction."))
             || matches!(key, "total.viscous" | "total.coulomb")
-            || line.as_ref().is_some_and(|line| key.starts_with(&format!("cart.{}.", line.key)))
+            || line.as_ref().is_some_and(|line| key.starts_with(&format!("{slide}.{}.", line.key)))
     };
     let offset = sided && loaded;
     if offset {
@@ -157,7 +163,7 @@ pub(super) fn with(
 
 /// A piecewise linear force in addition to friction over travel or speed, initially zero.
 struct Line {
-    /// Under `[cart]`.
+    /// In the table of the slide.
     key: &'static str,
     /// m or m/s, of its points.
     over: Vec<f64>,
@@ -167,11 +173,11 @@ struct Line {
 
 /// The force of a law in addition to friction. `is_held` is true if something else has a constant part, so that one
 /// point stays at zero.
-fn line(case: &Case, law: FrictionLaw, is_held: bool) -> Option<Line> {
+fn line(case: &Case, law: FrictionLaw, is_held: bool, slide: &str) -> Option<Line> {
     match law {
         FrictionLaw::ForceAlong => {
             let free = (0..TRAVEL_POINTS).filter(|k| !(is_held && *k == TRAVEL_POINTS / 2)).collect();
-            Some(Line { key: "force_along", over: over_travel(case).collect(), free })
+            Some(Line { key: "force_along", over: over_travel(case, slide).collect(), free })
         }
         FrictionLaw::ForceBySpeed => {
             // The part proportional to speed is viscous friction, the part with its sign Coulomb friction.
@@ -191,7 +197,7 @@ fn table(
     sided: bool,
     from: &Friction,
     fastest: f64,
-    body: &str,
+    (body, slide): (&str, &str),
 ) -> (InlineTable, Vec<String>) {
     let mut table = InlineTable::new();
     let mut keys = Vec::new();
@@ -227,14 +233,18 @@ fn table(
         }
         FrictionLaw::Along => {
             let point = |x: f64| Value::Array(Array::from_iter([x, 1.0]));
-            table.insert("along", Value::Array(over_travel(case).map(point).collect()));
+            table.insert("along", Value::Array(over_travel(case, slide).map(point).collect()));
             // One of them is 1, since the factors refer to Coulomb friction.
             let others = (0..TRAVEL_POINTS).filter(|k| *k != TRAVEL_POINTS / 2);
             keys.extend(others.map(|k| format!("along.{k}.factor")));
         }
         FrictionLaw::LuGre => {
-            let stiffness = coulomb / BRISTLE_BEND * if body == "cart" { 1.0 } else { case.machine.pulley_radius };
-            let mass = if body == "cart" { case.machine.cart.mass } else { case.machine.drive_pulley.inertia };
+            let stiffness = coulomb / BRISTLE_BEND * if body == slide { 1.0 } else { case.machine.pulley_radius };
+            let mass = match body {
+                "drive_pulley" => case.machine.drive_pulley.inertia,
+                "bridge" => case.machine.first_slide().mass,
+                _ => case.machine.cart.mass,
+            };
             let mut own = InlineTable::new();
             own.insert("stiffness", Value::from(stiffness));
             own.insert("damping", Value::from((stiffness * mass).sqrt()));
@@ -291,13 +301,13 @@ fn rewrite(
     }
 }
 
-/// Approximate largest speed of the cart in the logs, m/s.
+/// Approximate largest speed of a slide in the logs, m/s.
 fn fastest(case: &Case) -> f64 {
     let r = case.machine.pulley_radius;
     let logs = case.experiments.iter().filter_map(|experiment| experiment.log.as_ref());
     let speeds = logs.flat_map(|log| {
         log.outputs.iter().map(move |output| {
-            let arm = if output.quantity.name().starts_with("cart") { 1.0 } else { r };
+            let arm = if is_linear(output.quantity) { 1.0 } else { r };
             let values = &output.values;
             if !output.quantity.is_position() {
                 return arm * values.iter().filter(|v| v.is_finite()).fold(0.0, |most: f64, v| most.max(v.abs()));
@@ -311,22 +321,48 @@ fn fastest(case: &Case) -> f64 {
     speeds.fold(1e-3, f64::max)
 }
 
-/// Positions along the travel in the logs, m.
-fn over_travel(case: &Case) -> impl Iterator<Item = f64> {
-    let (low, high) = travel(case);
+/// True if a quantity is of a sliding part.
+fn is_linear(quantity: Quantity) -> bool {
+    ["cart", "bridge"].iter().any(|slide| quantity.name().starts_with(slide) && !quantity.name().contains("pulley"))
+}
+
+/// Positions along the travel of a slide in the logs, m.
+fn over_travel(case: &Case, slide: &str) -> impl Iterator<Item = f64> {
+    let (low, high) = travel(case, slide);
     (0..TRAVEL_POINTS).map(move |k| low + (high - low) * k as f64 / (TRAVEL_POINTS - 1) as f64)
 }
 
-/// Range of cart positions in the logs, m.
-fn travel(case: &Case) -> (f64, f64) {
-    let r = case.machine.pulley_radius;
+/// Range of positions of a slide in the logs, m: as logged, and by the drives.
+fn travel(case: &Case, slide: &str) -> (f64, f64) {
+    let (machine, geometry) = (&case.machine, case.machine.geometry());
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+    let mut see = |values: &mut dyn Iterator<Item = f64>| {
+        values.filter(|value| value.is_finite()).for_each(|value| (low, high) = (low.min(value), high.max(value)));
+    };
+    let at = geometry.slides.iter().find(|at| geometry.label(at.body).key == slide);
     for log in case.experiments.iter().filter_map(|experiment| experiment.log.as_ref()) {
-        for output in log.outputs.iter().filter(|output| output.quantity.is_position()) {
-            let arm = if output.quantity == Quantity::CartPosition { 1.0 } else { r };
-            for value in output.values.iter().filter(|value| value.is_finite()) {
-                (low, high) = (low.min(arm * value), high.max(arm * value));
-            }
+        let positions = || log.outputs.iter().filter(|output| output.quantity.is_position());
+        for output in positions().filter(|output| output.quantity.name() == format!("{slide}_position")) {
+            see(&mut output.values.iter().copied());
+        }
+        if machine.has_one_coordinate() {
+            let angles = positions().filter(|output| !is_linear(output.quantity));
+            angles.for_each(|angle| see(&mut angle.values.iter().map(|value| machine.pulley_radius * value)));
+            continue;
+        }
+        // Angles of all drives that move it.
+        let drives = geometry.drives.iter().zip(at.map_or(&[][..], |at| at.by_drives));
+        let moving: Vec<_> = drives.filter(|(_, weight)| **weight != 0.0).collect();
+        for is_rotor in [false, true] {
+            let of_drive = |(drive, weight): &(&DriveAt, &f64)| {
+                let label = if is_rotor { drive.rotor } else { geometry.label(drive.pulley) };
+                let name = format!("{}_angle", label.key);
+                positions().find(|output| output.quantity.name() == name).map(|output| (**weight, &output.values))
+            };
+            let Some(parts) = moving.iter().map(of_drive).collect::<Option<Vec<_>>>() else { continue };
+            let rows = parts.iter().map(|(_, values)| values.len()).min().unwrap_or_default();
+            let place = |row: usize| parts.iter().map(|(weight, values)| weight * values[row]).sum::<f64>();
+            see(&mut (0..rows).map(|row| machine.pulley_radius * place(row)));
         }
     }
     if high > low { (low, high) } else { (-1.0, 1.0) }

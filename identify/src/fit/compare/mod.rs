@@ -126,10 +126,6 @@ pub fn compare(
 ) -> Result<Comparison> {
     case.complete()?;
     crate::case::needs_motors(&case.machine)?;
-    if !case.machine.has_one_coordinate() {
-        return Err(Error::new("friction laws are compared on a single axis, and the case describes a gantry")
-            .next("fit each law with `taut fit`, and compare the errors of the logs that [fit] holds out"));
-    }
     if setting.laws.is_empty() || setting.windows.is_empty() {
         return Err(
             Error::new("there is nothing to compare").next("name a law and a length of windows, or leave both out")
@@ -362,7 +358,7 @@ impl Course<'_> {
             chosen,
             by_training,
             held_out: self.parts.words(),
-            body: laws::body(self.plan),
+            body: laws::body(&self.case.machine, self.plan),
             quantities,
             candidates: self.tried.into_iter().map(|tried| tried.candidate).collect(),
             case,
