@@ -4,7 +4,8 @@
 use crate::common::chance::Chance;
 use std::sync::Arc;
 use taut::case::{Case, Plan};
-use taut::fit::{Fit, check, fit};
+use taut::fit::compare::{FrictionLaw, Setting, compare};
+use taut::fit::{Fit, check, drift, fit};
 use taut::log::{Log, Output, Quantity};
 use taut::machine::Kind;
 use taut::signal::Hold;
@@ -307,4 +308,51 @@ fn a_log_that_begins_elsewhere_and_inputs_with_offsets_are_fitted() {
     for (estimate, value) in found.estimates.iter().zip([0.362, -0.05, 0.08]) {
         assert!((estimate.value - value).abs() < 4.0 * estimate.error.unwrap(), "{estimate:?}");
     }
+}
+
+/// A belt that has become looser, and a motor that has become weak.
+#[test]
+fn a_single_change_of_a_gantry_is_named() {
+    let short = "experiment.0.until=0.15";
+    for (kind, changes, name, factor) in [
+        (Kind::CoreXy, "belt.stiffness=[132760, 132760, 106208, 106208]", "belt.stiffness.2 = belt.stiffness.3", 0.8),
+        (
+            Kind::DualBelt,
+            "left_drive.motor={ torque_constant = 0.0207, back_emf_constant = 0.0207 }",
+            "left_drive.motor.torque_constant = left_drive.motor.back_emf_constant",
+            0.9,
+        ),
+    ] {
+        let nominal = match kind {
+            Kind::CoreXy => vec![short, "belt.stiffness=[132760, 132760, 132760, 132760]"],
+            _ => vec![short],
+        };
+        let truth = case(kind, &[&nominal[..], &[changes]].concat());
+        let case = with_log(case(kind, &nominal), &truth, None, 5);
+        let plan = Plan { free: vec!["bridge.mass".into()], ..Plan::default() };
+        let found = drift(&case, &plan, None, &mut |_| Flow::Continue).unwrap();
+        let told: Vec<String> = found
+            .best()
+            .map(|one| format!("{} {:.4}", one.estimate.name, one.estimate.value / one.estimate.start))
+            .collect();
+        let own = found.changes.first().map(|one| &one.estimate).filter(|own| own.name == name);
+        let own = own.unwrap_or_else(|| panic!("{name} by {factor}: {told:?}"));
+        assert!((own.value / own.start / factor - 1.0).abs() < 0.03, "{name} by {factor}: {told:?}");
+    }
+}
+
+/// The friction of a bridge with its own value in each direction.
+#[test]
+fn friction_laws_of_a_bridge_are_compared() {
+    let rows = ["experiment.0.until=0.4"];
+    let sided = "bridge.friction={ viscous = 12, coulomb = 1.0, viscous_backward = 16, coulomb_backward = 1.6 }";
+    let truth = case(Kind::CoreXy, &[&rows[..], &[sided]].concat());
+    let case = with_log(case(Kind::CoreXy, &rows), &truth, None, 9);
+    let free = ["bridge.friction.viscous", "bridge.friction.coulomb"];
+    let plan = Plan { free: free.map(String::from).to_vec(), ..Plan::default() };
+    let laws = vec![FrictionLaw::Coulomb, FrictionLaw::Asymmetric];
+    let setting = Setting { laws, windows: vec![None] };
+    let found = compare(&case, "core-xy.toml".as_ref(), &plan, &setting, None, &mut |_| Flow::Continue).unwrap();
+    assert_eq!(found.body, "bridge");
+    assert_eq!(found.candidates[found.chosen].law, FrictionLaw::Asymmetric, "{:?}", found.words());
 }

@@ -192,10 +192,8 @@ def test_logs_of_both_motors_are_checked_and_fitted(root):
     ratio = (105 + 90) / (120 + 100)
     low, high = found.data["belts"]["interval_95"]
     assert found.data["belts"]["looser"] == "right drive" and low < ratio < high < 0.92
-    with pytest.raises(taut.Error, match="friction laws are compared on a single axis"):
-        case.compare()
-    with pytest.raises(taut.Error, match="single changes are searched for on a single axis"):
-        case.drift()
+    compared = case.compare(laws=["viscous", "coulomb"], windows=[None])
+    assert compared.data["body"] == "cart" and len(compared.data["candidates"]) == 2
 
 
 def test_responses_of_every_output_to_every_motor(root):
