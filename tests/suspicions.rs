@@ -280,6 +280,27 @@ fn an_input_that_is_logged_early_or_late_is_found() {
     assert!(warned(&late, "delay") && !warned(&late, "shift"), "{:?}", late.findings);
 }
 
+/// A motor that was off for 0.2 s of the logged input bent the estimates, without a word. The part is named; logs
+/// without one, and with noise that swells, are left alone.
+#[test]
+fn a_part_in_which_the_motor_is_off_is_found() {
+    for seed in 1..=2 {
+        let from = 150 * (seed as usize + 2);
+        let off = changed(1200 + seed, |log| log.inputs[0][from..from + 200].fill(0.0));
+        let found = fitted(&off);
+        let told: Vec<&str> =
+            found.warnings().filter(|one| one.code == "interruption").map(|one| one.text.as_str()).collect();
+        // The windows around it.
+        let at = from as f64 * EVERY;
+        let ends: Vec<f64> = told.iter().flat_map(|text| text.split(' ').filter_map(|word| word.parse().ok())).collect();
+        assert!(told.len() == 1 && ends[0] <= at && ends[1] >= at + 0.2 && ends[1] - ends[0] < 0.7, "{seed}: {:#?}", found.findings);
+        let good = fitted(&changed(1200 + seed, |_| {}));
+        assert!(!warned(&good, "interruption"), "{seed}: {:#?}", good.findings);
+        let narrow = fitted(&drawn(1200 + seed, 1e-3, 0));
+        assert!(!warned(&narrow, "interruption"), "{seed}: {:#?}", narrow.findings);
+    }
+}
+
 /// With mass and viscous friction known, a column in another unit was answered with "check units". The factor is tried:
 /// powers of ten on output and input, and the gear ratio of the case.
 #[test]

@@ -92,6 +92,12 @@ impl Direction {
         Resistance { coulomb: slide.0 + coulomb / r, viscous: slide.1 + viscous / (r * r) }
     }
 
+    /// True if its drives must pull alike, since each also moves something else.
+    pub fn is_alike(&self, machine: &Machine) -> bool {
+        let others = machine.geometry().slides.iter().enumerate().filter(|(number, _)| *number != self.number);
+        others.flat_map(|(_, slide)| self.movers.iter().map(|drive| slide.by_drives[*drive])).any(|weight| weight != 0.0)
+    }
+
     /// True if backward it moves otherwise than forward.
     pub fn is_one_sided(&self, machine: &Machine) -> bool {
         machine.constant_force(self.number) != 0.0 || self.resistance(machine, 1.0) != self.resistance(machine, -1.0)

@@ -26,18 +26,19 @@ pub(super) fn limits(case: &Case, directions: &[Direction], origin: &Place, note
         Group::new("limits", if powers.len() == 2 { "Limits, both drives pulling alike" } else { "Limits" });
     let name = format!("largest force of {} motor at the belt", if powers.len() == 1 { "the" } else { "a" });
     group.add("largest_force", name, least, "N").how(format!("by {}", powers[0].1));
-    let together = |direction: &Direction| {
-        Power::together(&direction.movers.iter().map(|drive| powers[*drive].0).collect::<Vec<_>>())
+    let together = |direction: &Direction| Together {
+        drives: direction.movers.iter().map(|drive| powers[*drive].0).collect(),
+        is_alike: direction.is_alike(machine),
     };
     for direction in directions {
         let sides = if direction.is_one_sided(machine) { &[1.0, -1.0][..] } else { &[1.0] };
         for side in sides {
-            reached(&mut group, machine, direction, (together(direction), *side), notes);
+            reached(&mut group, machine, direction, (&together(direction), *side), notes);
         }
     }
     if machine.belt.model != BeltModel::Rigid {
         for (direction, stretch) in directions.iter().zip(&origin.stretch) {
-            let stretch = together(direction).force * stretch;
+            let stretch = together(direction).force(0.0) * stretch;
             let [name, how] = match directions {
                 [_] => ["stretch of the belt under this force", "at the cart, the drive held"],
                 _ => ["largest stretch", "all pulling, the drive pulleys held"],
@@ -55,24 +56,21 @@ fn reached(
     group: &mut Group,
     machine: &Machine,
     direction: &Direction,
-    (power, side): (Power, f64),
+    (together, side): (&Together, f64),
     notes: &mut Vec<Note>,
 ) {
     let (end, words) = if side > 0.0 { ("", "") } else { ("_backward", " backward") };
     let Resistance { coulomb, viscous } = direction.resistance(machine, side);
     let against = -side * machine.constant_force(direction.number);
-    let left = (power.force - coulomb - against) / direction.accelerated();
+    let force = together.force(0.0);
+    let left = (force - coulomb - against) / direction.accelerated();
     let name = format!("{}{words}", direction.words("largest acceleration"));
     group
         .add(direction.key("largest_acceleration") + end, name, left.max(0.0), "m/s^2")
         .how("at low speed, against friction");
-    let by_speed = machine.slide(direction.number).and_then(|slide| slide.forces.by_speed.as_ref());
-    let speed = match by_speed {
-        Some(line) => {
-            power.speed_against(|speed| coulomb + viscous * speed + against - side * line.value(side * speed))
-        }
-        None => power.speed(coulomb, viscous, against),
-    };
+    let line = machine.slide(direction.number).and_then(|slide| slide.forces.by_speed.as_ref());
+    let by_speed = |speed: f64| line.map_or(0.0, |line| side * line.value(side * speed));
+    let speed = together.speed_against(|speed| coulomb + viscous * speed + against - by_speed(speed));
     match speed {
         Some(speed) => {
             let name = format!("{}{words}", direction.words("largest speed"));
@@ -87,7 +85,7 @@ fn reached(
         let whose = if direction.movers.len() == 1 { "the motor" } else { "the motors" };
         let text = format!(
             "the largest force of {whose}, {}, does not move {}{words}",
-            told(power.force, "N"),
+            told(force, "N"),
             direction.name
         );
         notes.push(Note { code: "does-not-move", text });
@@ -186,23 +184,33 @@ impl Power {
         Some((Self { force, voltage: volts, per_volt, brake }, words.join(" and ")))
     }
 
-    /// Of drives that pull alike, none harder than the weakest can.
-    fn together(drives: &[Self]) -> Self {
-        let count = drives.len() as f64;
-        Self {
-            force: count * drives.iter().map(|power| power.force).fold(f64::INFINITY, f64::min),
-            voltage: drives.iter().filter_map(|power| power.voltage).reduce(f64::min),
-            per_volt: drives.iter().map(|power| power.per_volt).sum(),
-            brake: drives.iter().map(|power| power.brake).sum(),
+    /// Largest force at a speed, N.
+    fn at(&self, speed: f64) -> f64 {
+        // k (V − K_e n v / r), within the force at standstill
+        self.voltage.map_or(self.force, |volts| (self.per_volt * volts - self.brake * speed).min(self.force))
+    }
+}
+
+/// The drives of a direction.
+struct Together {
+    drives: Vec<Power>,
+    /// True if they pull alike, none harder than the weakest can; otherwise their forces add up.
+    is_alike: bool,
+}
+
+impl Together {
+    /// Their largest force at a speed, N.
+    fn force(&self, speed: f64) -> f64 {
+        let all = self.drives.iter().map(|power| power.at(speed));
+        match self.is_alike {
+            true => self.drives.len() as f64 * all.fold(f64::INFINITY, f64::min),
+            false => all.sum(),
         }
     }
 
-    /// The lowest speed at which the force is used up by what resists at that speed, m/s.
+    /// The lowest speed at which the force is used up by what resists at that speed, m/s; none below [`MOST_SPEED`].
     fn speed_against(&self, resists: impl Fn(f64) -> f64) -> Option<f64> {
-        let left = |speed: f64| {
-            let by_voltage = self.voltage.map_or(f64::INFINITY, |v| self.per_volt * v - self.brake * speed);
-            by_voltage.min(self.force) - resists(speed)
-        };
+        let left = |speed: f64| self.force(speed) - resists(speed);
         if left(0.0) <= 0.0 {
             return Some(0.0);
         }
@@ -218,21 +226,6 @@ impl Power {
             ends[usize::from(left(middle) <= 0.0)] = middle;
         }
         Some(ends[1])
-    }
-
-    /// The speed at which the force is used up by Coulomb friction, viscous friction and a constant load against it,
-    /// m/s.
-    pub fn speed(&self, coulomb: f64, viscous: f64, against: f64) -> Option<f64> {
-        let left = self.force - coulomb - against;
-        if left <= 0.0 {
-            return Some(0.0);
-        }
-        // k (V − K_e n v / r) = F_c + b v
-        let by_voltage = self.voltage.map(|v| (self.per_volt * v - coulomb - against) / (self.brake + viscous));
-        // F = F_c + b v, where the current is the limit
-        let by_force = left / viscous;
-        let speed = by_voltage.map_or(by_force, |speed| speed.min(by_force.max(0.0)));
-        speed.is_finite().then_some(speed)
     }
 }
 

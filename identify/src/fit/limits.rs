@@ -636,6 +636,37 @@ pub(crate) const WINDOWS_EXPLAIN: f64 = 0.8;
 /// Unit: values. Source: chosen: 160 MB.
 pub(crate) const WINDOWS_MOST: usize = 20_000_000;
 
+/// Residuals relative to the noise of the logs up to which no part of a log is looked for that the machine does not
+/// follow.
+///
+/// Unit: 1. Source: chosen. Test: `a_part_in_which_the_motor_is_off_is_found`.
+pub(crate) const UNEXPLAINED_NOISE: f64 = 3.0;
+
+/// Windows that the longest log is cut into to find a part in which the machine does not follow its input.
+///
+/// Unit: windows. Source: chosen: a part of a few hundredths of a log fills one.
+pub(crate) const INTERRUPTED_WINDOWS: f64 = 24.0;
+
+/// Residuals of a window relative to the usual ones from which on it is such a part.
+///
+/// Unit: 1. Source: chosen. Test: `a_part_in_which_the_motor_is_off_is_found`.
+pub(crate) const INTERRUPTED: f64 = 6.0;
+
+/// Residuals of all other windows relative to the usual ones: with more, windows differ in general.
+///
+/// Unit: 1. Source: chosen: half of [`INTERRUPTED`].
+pub(crate) const UNINTERRUPTED: f64 = 3.0;
+
+/// Share of the windows that such a part may have.
+///
+/// Unit: 1. Source: chosen.
+pub(crate) const INTERRUPTED_SHARE: f64 = 0.25;
+
+/// Least size of usual residuals, relative to the noise of the logs.
+///
+/// Unit: 1. Source: chosen: noise by third differences is not known better.
+pub(crate) const LEAST_INTERRUPTED: f64 = 1.5;
+
 /// Factors that are tried on a column where the model explains little: powers of ten, those of wrong pulleys, counts and
 /// pairs, and the units of angles and lengths, degrees and inches.
 ///

@@ -272,7 +272,7 @@ impl Channel {
         (1..values.len() - 1).filter(far).map(outlier).collect()
     }
 
-    /// The longest run at each extreme that was reached abruptly.
+    /// The longest run at each extreme that was reached abruptly: by counts, and without slowing down before it.
     fn find_clipped(&self, values: &[f64], time: &[f64]) -> Vec<Clipped> {
         const REACH: usize = 5;
         if self.is_input() {
@@ -284,9 +284,15 @@ impl Channel {
         let slope = |k: usize| (values[k] - values[k - REACH]).abs();
         let steepest = quantile(&(REACH..values.len()).map(slope).collect::<Vec<_>>(), 0.95);
         let tolerance = 1e-9 * self.span();
+        let count = self.step.unwrap_or_default().max(self.resolution());
+        // The step to the extreme itself may be a part of one; the step before it is as long as those before.
+        let is_sudden = |first: usize| {
+            let last = (values[first - 1] - values[first - 2]).abs();
+            last > 0.0 && last + count >= 0.7 * slope(first - 1) / REACH as f64
+        };
         let at = |value: f64| {
             let (samples, first) = longest_run(values, |x| (x - value).abs() <= tolerance);
-            let abrupt = first >= REACH && slope(first) > (0.3 * steepest).max(6.0 * self.resolution());
+            let abrupt = first > REACH && slope(first) > (0.3 * steepest).max(6.0 * count) && is_sudden(first);
             (samples >= CLIPPED && abrupt).then(|| Clipped { value, at: time[first], samples })
         };
         [self.least, self.greatest].into_iter().filter_map(at).collect()

@@ -2,6 +2,7 @@
 
 use super::finding::{Finding, Grade};
 use super::found::Fit;
+use super::interruption::interruptions;
 use super::scores::LogFit;
 use super::trials::{is_borne_out, is_opposite};
 use super::unexplained::{self, Reason};
@@ -26,6 +27,7 @@ pub(crate) fn findings(case: &Case, plan: &Plan, found: &Searched, fit: &Fit, su
     all.extend(of_cause(fit));
     all.extend(of_search(fit));
     all.extend(of_noise(found));
+    all.extend(interruptions(case, plan, found));
     all.extend(of_motor(case, fit));
     let unexplained = of_residuals(case, plan, found, fit, &all);
     // Each of two exchanged columns may move against the model, but a change of sign corrects neither.

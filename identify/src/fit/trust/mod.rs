@@ -10,6 +10,7 @@ pub(crate) mod findings;
 pub(crate) mod found;
 pub(crate) mod held_out;
 pub(crate) mod identify;
+pub(crate) mod interruption;
 pub(crate) mod nearest;
 pub(crate) mod other_laws;
 pub(crate) mod parts;
