@@ -47,7 +47,7 @@ free = ["cart.mass", "cart.friction.viscous", "cart.friction.coulomb"]
 "#;
 
 /// The element that the model lacks.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Truth {
     /// Nothing.
     Right,

@@ -1164,6 +1164,23 @@ pub(crate) const SWINGS_KEEP: f64 = 0.1;
 /// Unit: 1. Source: chosen: what is further off does not get there.
 pub(crate) const CAUSE_NEAR: f64 = 3.0;
 
+/// Most that a fit with an element may gain, in whole steps of the linear model: beyond its first steps, or, with curved
+/// friction, beyond the fit without it.
+///
+/// Unit: 1. Source: chosen: of some 300 starts on 27 machines of `cargo xtask coverage --causes` none that ended lowest
+/// gained more. Test: `bristles_are_named_with_their_stiffness`.
+pub(crate) const CAUSE_REACH: f64 = 2.0;
+
+/// Decrease of the cost in [`CAUSE_SLOW_STEPS`] below which a fit of play that explains nothing yet is given up.
+///
+/// Unit: relative to the cost. Source: chosen.
+pub(crate) const CAUSE_SLOW: f64 = 0.01;
+
+/// Steps in which a fit has to progress.
+///
+/// Unit: steps. Source: chosen.
+pub(crate) const CAUSE_SLOW_STEPS: usize = 4;
+
 /// Bounds of the size of an element, relative to its start.
 ///
 /// Unit: 1. Source: chosen: starts are 2 to 4 times apart.

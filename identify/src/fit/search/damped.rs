@@ -29,10 +29,10 @@ pub(crate) struct Damped {
 }
 
 impl Damped {
-    /// Begins with cheap derivatives, if requested.
-    pub fn new(options: &Options) -> Self {
+    /// Begins with cheap derivatives, if requested, or with those that are known at the start.
+    pub fn new(options: &Options, known: Option<DMatrix<f64>>) -> Self {
         let how = if options.frugal { Differences::Forward } else { Differences::Central };
-        Self { how, lambda: None, growth: 2.0, ahead: None, is_likely: true, slow: 0, trial: Vec::new() }
+        Self { how, lambda: None, growth: 2.0, ahead: known, is_likely: true, slow: 0, trial: Vec::new() }
     }
 
     /// Descends from `at`, beginning with the last kind of derivatives.
@@ -46,7 +46,7 @@ impl Damped {
             if !at.linearise(problem, &how, self.ahead.take()) {
                 break Climb::Ended(Ending::Stalled);
             }
-            let is_sharp = how == Differences::Central || at.is_exact;
+            let is_sharp = how == Differences::Central || at.is_exact || !at.options.sharp;
             if at.is_at_minimum() {
                 if is_sharp {
                     break Climb::Converged;
@@ -54,7 +54,9 @@ impl Damped {
                 how = Differences::Central;
                 continue;
             }
-            sharpen(&mut how, at);
+            if at.options.sharp {
+                sharpen(&mut how, at);
+            }
             if at.best.iterations >= at.options.iterations {
                 break Climb::Ended(Ending::OutOfIterations);
             }
@@ -62,7 +64,7 @@ impl Damped {
                 continue;
             }
             (self.slow, self.ahead) = (0, None);
-            if how != Differences::Central && !at.is_exact {
+            if !is_sharp {
                 // Cheap derivatives may be the cause.
                 (how, self.lambda) = (Differences::Central, None);
                 continue;

@@ -22,6 +22,7 @@ use super::point::{Ending, Minimum, Options, Point, Strategy};
 use super::rung::{Climb, Rung, Watch};
 use crate::fit::asked::residuals::{Bounds, Residuals};
 use crate::solve::Flow;
+use nalgebra::DMatrix;
 
 /// Minimises the cost from `start`. `watch` receives the best point and its cost after each step, and may end the
 /// search.
@@ -36,13 +37,30 @@ pub fn minimise(
         Ok(point) => point,
         Err(failed) => return *failed,
     };
-    let (ending, strategy) = search(&mut ladder(options), &mut at, problem, watch);
+    let (ending, strategy) = search(&mut ladder(options, None), &mut at, problem, watch);
     Minimum { ending, strategy: Some(strategy), ..at.best }
 }
 
-/// The strategies, the first one tried first.
-fn ladder(options: &Options) -> Vec<Box<dyn Rung>> {
-    let mut rungs: Vec<Box<dyn Rung>> = vec![Box::new(Damped::new(options)), Box::new(Bundle::default())];
+/// Continues a search of `problem` where an earlier one ended, or at a start that is linearised: its residuals and
+/// derivatives are not computed again. `options.iterations` counts the Jacobians from there on, with that one.
+pub(crate) fn resume(
+    problem: &mut dyn Residuals,
+    mut from: Minimum,
+    bounds: &Bounds,
+    options: &Options,
+    watch: &mut dyn FnMut(&[f64], f64) -> Flow,
+) -> Minimum {
+    let rows = from.jacobian.nrows();
+    let known = std::mem::replace(&mut from.jacobian, DMatrix::zeros(rows, 0));
+    from.iterations = 0;
+    let mut at = Point::at(from, bounds, options);
+    let (ending, strategy) = search(&mut ladder(options, Some(known)), &mut at, problem, watch);
+    Minimum { ending, strategy: Some(strategy), ..at.best }
+}
+
+/// The strategies, the first one tried first; with the Jacobian at the start, if it is known.
+fn ladder(options: &Options, known: Option<DMatrix<f64>>) -> Vec<Box<dyn Rung>> {
+    let mut rungs: Vec<Box<dyn Rung>> = vec![Box::new(Damped::new(options, known)), Box::new(Bundle::default())];
     rungs.push(Box::new(Evolved { most: options.evolutions }));
     rungs
 }
@@ -77,7 +95,6 @@ mod tests {
     use super::*;
     use crate::fit::asked::residuals::Differences;
     use crate::fit::limits::KINK;
-    use nalgebra::DMatrix;
     use std::cell::RefCell;
     use std::rc::Rc;
 
@@ -145,7 +162,7 @@ mod tests {
 
     #[test]
     fn damped_steps_are_stuck_on_a_kink() {
-        let (end, found) = alone(&mut Damped::new(&Options::default()), &START, true);
+        let (end, found) = alone(&mut Damped::new(&Options::default(), None), &START, true);
         assert_eq!(end, Climb::Passed);
         let aside = found.x[1] - found.x[0] * found.x[0];
         assert!(found.cost < cost(&START) && aside.abs() < 0.1 && found.decrement > KINK, "{found:?}");
@@ -154,7 +171,7 @@ mod tests {
     #[test]
     fn a_bundle_goes_along_a_kink_to_its_minimum_once() {
         // On the kink, where damped steps are stuck.
-        let (_, stuck) = alone(&mut Damped::new(&Options::default()), &START, true);
+        let (_, stuck) = alone(&mut Damped::new(&Options::default(), None), &START, true);
         let mut bundle = Bundle::default();
         let (end, found) = alone(&mut bundle, &stuck.x, true);
         assert_eq!(end, Climb::Converged);

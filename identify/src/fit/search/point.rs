@@ -16,6 +16,8 @@ pub struct Options {
     pub huber: f64,
     /// One-sided differences until the last few steps.
     pub frugal: bool,
+    /// True if differences become central in the last few steps.
+    pub sharp: bool,
     /// Largest number of uses of an evolution strategy.
     pub evolutions: usize,
     /// Residuals up to this size count as rounding, and do not determine the accuracy of a step.
@@ -24,7 +26,15 @@ pub struct Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Self { tolerance: 1e-3, iterations: 100, huber: f64::INFINITY, frugal: true, evolutions: 2, rounding: 0.0 }
+        Self {
+            tolerance: 1e-3,
+            iterations: 100,
+            huber: f64::INFINITY,
+            frugal: true,
+            sharp: true,
+            evolutions: 2,
+            rounding: 0.0,
+        }
     }
 }
 
@@ -96,6 +106,42 @@ pub struct Minimum {
     pub evaluations: usize,
 }
 
+impl Minimum {
+    /// A start within the bounds, whose residuals are not known yet.
+    fn unknown(start: &[f64], rows: usize, bounds: &Bounds) -> Self {
+        let n = start.len();
+        Self {
+            x: start.iter().enumerate().map(|(j, x)| x.clamp(bounds.low[j], bounds.high[j])).collect(),
+            residuals: vec![0.0; rows],
+            cost: f64::INFINITY,
+            jacobian: DMatrix::zeros(rows, n),
+            decrement: f64::INFINITY,
+            at_bound: vec![false; n],
+            ending: Ending::Failed,
+            strategy: None,
+            pieces: 1,
+            evolved: 0,
+            iterations: 0,
+            evaluations: 1,
+        }
+    }
+
+    /// A start with its residuals and derivatives, in one run where these are exact; `None` if they cannot be computed.
+    pub(crate) fn linearised(problem: &mut dyn Residuals, start: &[f64], bounds: &Bounds) -> Option<Self> {
+        let mut own = Self::unknown(start, problem.rows(), bounds);
+        own.jacobian = problem.linearised(&own.x, &mut own.residuals, bounds, &Differences::Forward)?;
+        own.cost = cost_of(&own.residuals, f64::INFINITY);
+        own.cost.is_finite().then_some(own)
+    }
+
+    /// The decrease of the cost that the linear model predicts for the whole step from here.
+    pub(crate) fn promise(&self) -> f64 {
+        let model = Linear::new(&self.jacobian, &self.residuals, f64::INFINITY);
+        let scale = DVector::from_fn(self.x.len(), |j, _| model.norm(j));
+        model.promise(&model.step(&self.at_bound, &scale, 0.0))
+    }
+}
+
 /// ½ Σ ρ(r), ρ = r² up to the threshold and 2 k |r| − k² beyond.
 pub(crate) fn cost_of(r: &[f64], k: f64) -> f64 {
     r.iter().map(|&r| if r.abs() <= k { 0.5 * r * r } else { k * r.abs() - 0.5 * k * k }).sum()
@@ -128,27 +174,19 @@ impl<'a> Point<'a> {
         bounds: &'a Bounds,
         options: &'a Options,
     ) -> Result<Self, Box<Minimum>> {
-        let (n, rows) = (start.len(), problem.rows());
-        let mut best = Minimum {
-            x: start.iter().enumerate().map(|(j, x)| x.clamp(bounds.low[j], bounds.high[j])).collect(),
-            residuals: vec![0.0; rows],
-            cost: f64::INFINITY,
-            jacobian: DMatrix::zeros(rows, n),
-            decrement: f64::INFINITY,
-            at_bound: vec![false; n],
-            ending: Ending::Failed,
-            strategy: None,
-            pieces: 1,
-            evolved: 0,
-            iterations: 0,
-            evaluations: 1,
-        };
+        let mut best = Minimum::unknown(start, problem.rows(), bounds);
         if !problem.evaluate(&best.x, &mut best.residuals) || !best.residuals.iter().all(|r| r.is_finite()) {
             return Err(Box::new(best));
         }
         best.cost = cost_of(&best.residuals, options.huber);
+        Ok(Self::at(best, bounds, options))
+    }
+
+    /// A point whose residuals are known.
+    pub fn at(best: Minimum, bounds: &'a Bounds, options: &'a Options) -> Self {
+        let n = best.x.len();
         let (model, scale) = (Linear::none(n), DVector::zeros(n));
-        Ok(Self { best, bounds, options, model, scale, deviation: 0.0, is_exact: false, is_still: false })
+        Self { best, bounds, options, model, scale, deviation: 0.0, is_exact: false, is_still: false }
     }
 
     /// Measures the Jacobian by `how`, unless it is in `ahead`, and updates the linear model; false without a Jacobian.

@@ -376,7 +376,7 @@ fn in_windows(
 }
 
 /// True if residuals are within the noise of the logs, estimated by third differences, which motion only increases.
-fn is_noise(problem: &Problem, at: &Minimum) -> bool {
+pub(crate) fn is_noise(problem: &Problem, at: &Minimum) -> bool {
     let noise = problem.noise();
     let is_own = |(index, run): (usize, &Run)| {
         let (first, n) = (problem.first_row(index), run.time.len());

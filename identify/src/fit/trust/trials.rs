@@ -37,6 +37,11 @@ pub(crate) fn surveys(case: &Case, plan: &Plan, found: &Searched) -> Vec<Survey>
     logs.map(tested).collect()
 }
 
+/// True if the input of a log was logged earlier or later than it acted.
+pub(crate) fn is_shifted(case: &Case, plan: &Plan, found: &Searched) -> bool {
+    found.problem.runs.iter().any(|run| shift(case, plan, found, &run.name).is_some())
+}
+
 /// An input logged earlier or later than it acted, by more than a plausible delay.
 fn shift(case: &Case, plan: &Plan, found: &Searched, name: &str) -> Option<Note> {
     if plan.closed_loop || found.problem.is_stopped() {

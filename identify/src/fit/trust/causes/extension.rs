@@ -8,6 +8,7 @@ use crate::log::Quantity;
 use crate::machine::{AmplifierMode, Machine};
 use crate::number::engineering;
 use crate::solve::Bench;
+use std::cell::OnceCell;
 
 /// End of the fit without the element.
 pub(super) struct Site<'s, 'a> {
@@ -16,11 +17,14 @@ pub(super) struct Site<'s, 'a> {
     pub found: &'s Searched<'a>,
     /// The machine with the estimates.
     pub machine: Machine,
+    fastest: OnceCell<f64>,
 }
 
 /// One element.
 pub(super) struct Extension {
     pub key: &'static str,
+    /// True if its runs have no exact derivatives.
+    pub is_curved: bool,
     /// The case and the plan with it, once for each start; empty if the case has it already.
     pub tries: fn(&Site) -> Vec<Extended>,
     /// The element in words.
@@ -92,7 +96,7 @@ impl Extended {
 
 impl<'s, 'a> Site<'s, 'a> {
     pub fn new(case: &'s Case, plan: &'s Plan, found: &'s Searched<'a>) -> Self {
-        Self { case, plan, found, machine: found.problem.stage_at(&found.best.x) }
+        Self { case, plan, found, machine: found.problem.stage_at(&found.best.x), fastest: OnceCell::new() }
     }
 
     /// The case with another machine.
@@ -124,6 +128,10 @@ impl<'s, 'a> Site<'s, 'a> {
 
     /// Largest speed of the cart in the logs by the model, m/s.
     pub fn fastest(&self) -> f64 {
+        *self.fastest.get_or_init(|| self.run_fastest())
+    }
+
+    fn run_fastest(&self) -> f64 {
         let (problem, x): (&Problem, _) = (&self.found.problem, &self.found.best.x);
         let (mut bench, mut speeds, mut most) = (Bench::default(), [Vec::new()], 0.0);
         for (index, run) in problem.runs.iter().enumerate() {

@@ -1,8 +1,8 @@
 //! Missing elements: the model is fitted once more with one additional element.
 //!
 //! Each [`Extension`] is a row of a table. All of them take a few damped Gauss-Newton steps from the end of the fit,
-//! which ranks them; the best are fitted completely. With the costs C of the fit and C′ of the fit with the element, it
-//! explains
+//! which ranks them. The best are then fitted completely, the lowest cost first, until one leaves white residuals or no
+//! other can end lower. With the costs C of the fit and C′ of the fit with the element, it explains
 //!
 //! ```text
 //! 1 − C′/C
@@ -20,14 +20,13 @@ mod stamp;
 mod tried;
 
 use super::doubts::{Cause, OtherLaw};
-use super::parts::{Parts, errors};
+use super::parts::{Fold, Parts, errors};
 use super::uncertainty::Judged;
 use crate::case::{Case, Plan};
-use crate::fit::asked::problem::Stop;
 use crate::fit::asked::run::Run;
 use crate::fit::limits::{
-    CAUSE_ERRORS, CAUSE_EXPLAINS, CAUSE_MOST_VALUES, CAUSE_NEAR, CAUSE_STEPS, CAUSES_FITTED, COLOURED, HELD_OUT_SHOWS,
-    NORMAL, SAME_MINIMUM, STARTS_FITTED,
+    CAUSE_ERRORS, CAUSE_EXPLAINS, CAUSE_MOST_VALUES, CAUSE_NEAR, CAUSES_FITTED, COLOURED, HELD_OUT_SHOWS, NORMAL,
+    SAME_MINIMUM, STARTS_FITTED,
 };
 use crate::fit::search::starts::{Effort, Searched};
 use crate::machine::Machine;
@@ -42,7 +41,7 @@ const EXTENSIONS: &[Extension] = &[
     row("delay", stamp::delays, stamp::words, as_it_is),
     row("drag", force::drags, force::drag_words, force::without),
     row("stribeck", force::falls, force::fall_words, force::without_fall),
-    row("lugre", bristles::bend, bristles::words, bristles::without),
+    Extension { is_curved: true, ..row("lugre", bristles::bend, bristles::words, bristles::without) },
     row("load", force::loads, force::load_words, as_it_is),
 ];
 
@@ -52,7 +51,7 @@ const fn row(
     words: fn(&Site, &Extended, &Fitted) -> Said,
     without: fn(&Site, Machine) -> Machine,
 ) -> Extension {
-    Extension { key, tries, words, without }
+    Extension { key, is_curved: false, tries, words, without }
 }
 
 fn as_it_is(_: &Site, machine: Machine) -> Machine {
@@ -61,34 +60,71 @@ fn as_it_is(_: &Site, machine: Machine) -> Machine {
 
 /// The element that explains most of the residuals; `None` if none is accepted, or if the friction law `law` explains
 /// more.
-pub(crate) fn cause(
-    case: &Case,
-    plan: &Plan,
-    found: &Searched,
-    judged: &Judged,
-    law: Option<&OtherLaw>,
-) -> Option<Cause> {
-    if !is_asked(case, plan, found, judged) {
-        return None;
-    }
+pub(crate) fn cause(case: &Case, plan: &Plan, found: &Searched, law: Option<&OtherLaw>) -> Option<Cause> {
     let site = Site::new(case, plan, found);
     let before = found.best.cost;
-    let begun = |row: &'static Extension| {
-        let tries = (row.tries)(&site).into_iter();
-        let begun = tries.filter_map(|extended| Tried::begun(&site, row, extended, CAUSE_STEPS));
+    // The gain of a law is of Σ r², and the cost is half of that.
+    let most = ((1.0 - CAUSE_EXPLAINS) * before).min(before - 0.5 * law.map_or(0.0, |law| law.gain));
+    let mut folds = Folds::new(&site);
+    let mut open = begun(&site, false, most);
+    // The cost below which curved friction was looked for.
+    let mut curved = f64::NEG_INFINITY;
+    loop {
+        let whole = open.iter().filter(|tried| tried.is_whole()).map(Tried::cost).fold(most, f64::min);
+        open.sort_by(|a, b| a.cost().total_cmp(&b.cost()));
+        let best = open.iter().find(|tried| tried.is_whole()).filter(|tried| tried.cost() <= most);
+        let is_settled = best.is_some_and(Tried::leaves_noise);
+        // What explains all but noise needs no rival; otherwise those that may end lower are fitted, too. Runs of curved
+        // friction take long, and come last.
+        let rival = open.iter().position(|tried| !tried.is_whole() && tried.least() < whole);
+        if let Some(k) = rival.filter(|_| !is_settled) {
+            let further = open.remove(k).advanced(&site);
+            open.extend(further);
+            continue;
+        }
+        if !is_settled && curved < whole {
+            let found = begun(&site, true, whole);
+            curved = if found.is_empty() { whole } else { f64::INFINITY };
+            open.extend(found);
+            continue;
+        }
+        best?;
+        let first = open.iter().position(Tried::is_whole)?;
+        let tried = open.remove(first);
+        let explained = 1.0 - tried.cost() / before;
+        let known = tried.judged();
+        let standard_errors = known.map_or(0.0, |known| tried.standard_errors(known));
+        let better = if standard_errors < CAUSE_ERRORS { None } else { folds.predicts(&tried) };
+        if let (Some(known), Some(better)) = (known, better) {
+            return tried.told(&site, known, [explained, standard_errors], better);
+        }
+        // Other starts that led to this minimum are refused with it.
+        let is_there =
+            |other: &Tried| other.kind() == tried.kind() && other.cost() < (1.0 + SAME_MINIMUM) * tried.cost();
+        open.retain(|other| !(other.is_whole() && is_there(other)));
+    }
+}
+
+/// The starts that are fitted completely, after their first steps: the best of each kind, and those that lead elsewhere
+/// and explain something already; of those with curved friction the best one if it does. `is_curved`: these, or all
+/// others. `goal` is the cost that they have to fall below.
+fn begun<'a>(site: &Site<'_, 'a>, is_curved: bool, goal: f64) -> Vec<Tried<'a>> {
+    let before = site.found.best.cost;
+    let rows = EXTENSIONS.iter().filter(|row| row.is_curved == is_curved);
+    let of = |row: &'static Extension| {
+        let tries = (row.tries)(site).into_iter();
+        let begun = tries.filter_map(|extended| Tried::begun(site, row, extended, goal));
         begun.filter(|tried| tried.cost() < CAUSE_NEAR * before).collect::<Vec<_>>()
     };
-    let mut ranked: Vec<Tried> = EXTENSIONS.iter().flat_map(begun).collect();
+    let mut ranked: Vec<Tried> = rows.flat_map(of).collect();
     ranked.sort_by(|a, b| a.cost().total_cmp(&b.cost()));
-    // The best start of each kind, and those that lead elsewhere and explain something already; runs of curved friction
-    // take long.
     let most = (1.0 - CAUSE_EXPLAINS) * before;
     let mut starts: Vec<(usize, Tried)> = Vec::new();
     for tried in ranked {
         let own = starts.iter().filter(|(_, other)| other.kind() == tried.kind());
         let is_new = own.clone().all(|(_, other)| tried.cost() > (1.0 + SAME_MINIMUM) * other.cost());
         let count = own.count();
-        let is_asked = match tried.is_curved() {
+        let is_asked = match is_curved {
             true => count == 0 && tried.cost() < most,
             false => count == 0 || is_new && count < STARTS_FITTED && tried.cost() < most,
         };
@@ -98,27 +134,11 @@ pub(crate) fn cause(
     }
     starts.sort_by_key(|(count, _)| *count);
     starts.truncate(CAUSES_FITTED);
-    let mut whole: Vec<Tried> = starts.into_iter().filter_map(|(_, tried)| tried.fitted(&site)).collect();
-    whole.sort_by(|a, b| a.cost().total_cmp(&b.cost()));
-    for tried in whole {
-        let gain = 2.0 * (before - tried.cost());
-        let explained = 1.0 - tried.cost() / before;
-        if explained < CAUSE_EXPLAINS || law.is_some_and(|law| law.gain > gain) {
-            return None;
-        }
-        let Some(known) = tried.judged() else { continue };
-        let standard_errors = tried.standard_errors(&known);
-        if standard_errors < CAUSE_ERRORS {
-            continue;
-        }
-        let Some(better) = predicts(&site, &tried, found.problem.stop()) else { continue };
-        return tried.told(&site, &known, [explained, standard_errors], better);
-    }
-    None
+    starts.into_iter().map(|(_, tried)| tried).collect()
 }
 
 /// True if missing elements are searched for: the residuals are not white, and the fit supports it.
-fn is_asked(case: &Case, plan: &Plan, found: &Searched, judged: &Judged) -> bool {
+pub(crate) fn is_asked(case: &Case, plan: &Plan, found: &Searched, judged: &Judged) -> bool {
     let problem = &found.problem;
     judged.inflation >= COLOURED
         && case.machine.has_torque_balance()
@@ -133,46 +153,73 @@ fn is_asked(case: &Case, plan: &Plan, found: &Searched, judged: &Judged) -> bool
         && !problem.parameters.is_empty()
 }
 
-/// Number of parts of the logs that a fit with an element to the other parts predicts better, and number of parts;
-/// `None` if the prediction is not clearly better.
-fn predicts(site: &Site, tried: &Tried, stop: Option<Stop>) -> Option<[usize; 2]> {
-    let without = Case { machine: site.machine.clone(), ..site.case.clone() };
-    let plan = Plan { starts: 1, ..site.plan.clone() };
-    let (with, own) = tried.case_and_plan();
-    let parts = [Parts::new(&without, &plan), Parts::new(&with, &own)];
-    let effort = Effort::of_part();
-    let [before, after] = &parts;
-    let mut gains = Vec::new();
-    for (one, other) in before.folds.iter().zip(&after.folds) {
-        let mean = |case: &Case, plan: &Plan, fold| {
-            let (found, _) = errors(case, plan, fold, (before.is_cut, &effort), stop).ok()?;
-            // Quantities in units of their residuals.
-            let own = found.iter().map(|(quantity, squares, count)| {
-                let deviation = site.deviation(*quantity);
-                (squares / (deviation * deviation), *count)
-            });
-            let (squares, count) = own.fold((0.0, 0), |(s, n), (squares, count)| (s + squares, n + count));
-            Some(squares / count.max(1) as f64)
-        };
-        let (without, with) = (mean(&without, &plan, one)?, mean(&with, &own, other)?);
-        // ln of the ratio, since a part in which a start fails has errors of another magnitude.
-        gains.push((without / with).ln());
+/// Parts of the logs that are held out in turn, and what the case without an element makes of them.
+struct Folds<'s, 'a> {
+    site: &'s Site<'s, 'a>,
+    case: Case,
+    plan: Plan,
+    parts: Parts,
+    /// Mean squared errors of the parts without an element, as far as they are known.
+    without: Vec<Option<f64>>,
+}
+
+impl<'s, 'a> Folds<'s, 'a> {
+    fn new(site: &'s Site<'s, 'a>) -> Self {
+        let case = Case { machine: site.machine.clone(), ..site.case.clone() };
+        let plan = Plan { starts: 1, ..site.plan.clone() };
+        Self { site, parts: Parts::new(&case, &plan), case, plan, without: Vec::new() }
     }
-    if gains.len() < 2 {
-        return None;
+
+    /// Mean squared error of a part by a fit to the others, in units of the residuals; `None` if it fails.
+    fn mean(&self, case: &Case, plan: &Plan, fold: &Fold) -> Option<f64> {
+        let mut effort = Effort::of_part();
+        // Predictions need no exact end.
+        effort.options.sharp = false;
+        let stop = self.site.found.problem.stop();
+        let (found, _) = errors(case, plan, fold, (self.parts.is_cut, &effort), stop).ok()?;
+        let own = found.iter().map(|(quantity, squares, count)| {
+            let deviation = self.site.deviation(*quantity);
+            (squares / (deviation * deviation), *count)
+        });
+        let (squares, count) = own.fold((0.0, 0), |(s, n), (squares, count)| (s + squares, n + count));
+        Some(squares / count.max(1) as f64)
     }
-    let n = gains.len() as f64;
-    let mean = gains.iter().sum::<f64>() / n;
-    let variance = gains.iter().map(|gain| (gain - mean).powi(2)).sum::<f64>() / (n - 1.0) / n;
-    let better = gains.iter().filter(|gain| **gain > 0.0).count();
-    // A part in which a start fails has errors of another magnitude: the others are then compared with what the element
-    // explains of the whole, ln C/C′.
-    gains.sort_by(f64::total_cmp);
-    let median = gains[(gains.len() - 1) / 2];
-    let whole = (site.found.best.cost / tried.cost()).ln();
-    let is_much = mean > variance.sqrt() || median > HELD_OUT_SHOWS * whole;
-    let is_clear = better + 1 >= gains.len() && is_much;
-    is_clear.then_some([better, gains.len()])
+
+    /// Number of parts of the logs that a fit with an element to the other parts predicts better, and number of parts;
+    /// `None` if the prediction is not clearly better.
+    fn predicts(&mut self, tried: &Tried) -> Option<[usize; 2]> {
+        let (with, own) = tried.case_and_plan();
+        let parts = Parts::new(&with, &own);
+        let count = self.parts.folds.len().min(parts.folds.len());
+        if count < 2 {
+            return None;
+        }
+        let mut gains = Vec::new();
+        for k in 0..count {
+            if self.without.len() == k {
+                let mean = self.mean(&self.case, &self.plan, &self.parts.folds[k]);
+                self.without.push(mean);
+            }
+            let (without, with) = (self.without[k]?, self.mean(&with, &own, &parts.folds[k])?);
+            // ln of the ratio, since a part in which a start fails has errors of another magnitude.
+            gains.push((without / with).ln());
+            if gains.iter().filter(|gain| **gain <= 0.0).count() > 1 {
+                return None;
+            }
+        }
+        let n = gains.len() as f64;
+        let mean = gains.iter().sum::<f64>() / n;
+        let variance = gains.iter().map(|gain| (gain - mean).powi(2)).sum::<f64>() / (n - 1.0) / n;
+        let better = gains.iter().filter(|gain| **gain > 0.0).count();
+        // A part in which a start fails has errors of another magnitude: the others are then compared with what the
+        // element explains of the whole, ln C/C′.
+        gains.sort_by(f64::total_cmp);
+        let median = gains[(gains.len() - 1) / 2];
+        let whole = (self.site.found.best.cost / tried.cost()).ln();
+        let is_much = mean > variance.sqrt() || median > HELD_OUT_SHOWS * whole;
+        let is_clear = better + 1 >= gains.len() && is_much;
+        is_clear.then_some([better, gains.len()])
+    }
 }
 
 /// Covariance to add so that intervals contain estimates shifted by `shift` with these errors.

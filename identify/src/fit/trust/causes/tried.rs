@@ -5,13 +5,18 @@ use super::{stamp, widened};
 use crate::case::{Case, Plan};
 use crate::fit::asked::problem::Problem;
 use crate::fit::asked::residuals::Residuals;
-use crate::fit::limits::{CAUSE_DIFFERENCE, CAUSE_EXPLAINS, ROUGH_TOLERANCE, TRIAL_FIT_ITERATIONS};
-use crate::fit::search::least_squares::minimise;
+use crate::fit::limits::{
+    CAUSE_DIFFERENCE, CAUSE_EXPLAINS, CAUSE_REACH, CAUSE_SLOW, CAUSE_SLOW_STEPS, CAUSE_STEPS, COLOURED,
+    ROUGH_TOLERANCE, TRIAL_FIT_ITERATIONS,
+};
+use crate::fit::search::least_squares::{minimise, resume};
 use crate::fit::search::point::{Ending, Minimum, Options};
+use crate::fit::search::starts::is_noise;
 use crate::fit::trust::doubts::{Cause, Size};
 use crate::fit::trust::uncertainty::Judged;
 use crate::machine::Machine;
 use crate::solve::Flow;
+use std::cell::OnceCell;
 
 /// A model with one additional element, and the state of its search.
 pub(super) struct Tried<'a> {
@@ -19,24 +24,31 @@ pub(super) struct Tried<'a> {
     extended: Extended,
     problem: Problem<'a>,
     best: Minimum,
+    /// The fit with fewer free parameters, from whose end this one begins.
+    before: Option<Box<Self>>,
+    is_whole: bool,
+    promise: OnceCell<f64>,
+    judged: OnceCell<Option<Judged>>,
 }
 
 impl<'a> Tried<'a> {
-    /// The result of `steps` steps from the end of the fit without the element; `None` if the model cannot simulate the
-    /// logs.
-    pub fn begun(site: &Site<'_, 'a>, row: &'static Extension, extended: Extended, steps: usize) -> Option<Self> {
+    /// The result of the first steps from the end of the fit without the element; `None` if the model cannot simulate
+    /// the logs. Steps of curved friction, which take long, are not taken where the linear model at the start shows
+    /// that they will not fall below `goal`.
+    pub fn begun(site: &Site<'_, 'a>, row: &'static Extension, extended: Extended, goal: f64) -> Option<Self> {
         let own = &site.found.best.x[site.found.problem.globals()..];
-        Self::from(site, row, extended, own, steps)
+        let mut begun = Self::from(site, row, extended, own)?;
+        let before = site.found.best.cost;
+        let gain = before - (begun.cost() - begun.best.promise());
+        if row.is_curved && before - CAUSE_REACH * gain > goal {
+            return None;
+        }
+        begun.best = descend(&mut begun.problem, begun.best, CAUSE_STEPS, f64::INFINITY)?;
+        Some(begun)
     }
 
-    /// The result of `steps` steps from the machine of a case with the element, and these variables of single runs.
-    fn from(
-        site: &Site<'_, 'a>,
-        row: &'static Extension,
-        extended: Extended,
-        own: &[f64],
-        steps: usize,
-    ) -> Option<Self> {
+    /// The start of a fit of the machine of a case with the element, and these variables of single runs.
+    fn from(site: &Site<'_, 'a>, row: &'static Extension, extended: Extended, own: &[f64]) -> Option<Self> {
         let mut problem = Problem::new(&extended.case, &extended.plan).ok()?.stopped_by(site.found.problem.stop());
         let noise: Vec<_> = problem.quantities().iter().map(|&own| (own, site.deviation(own))).collect();
         problem.swings = site.found.problem.swings;
@@ -49,16 +61,36 @@ impl<'a> Tried<'a> {
         if let (Telling::Nuisance(value), Some(last)) = (&extended.telling, problem.shared.last()) {
             start[g - 1] = (value - last.start) / last.unit;
         }
-        let best = descend(&mut problem, &start, steps)?;
-        Some(Self { row, extended, problem, best })
+        if start.len() != problem.variables() || problem.is_stopped() {
+            return None;
+        }
+        let bounds = problem.bounds();
+        let best = Minimum::linearised(&mut problem, &start, &bounds)?;
+        Some(Self {
+            row,
+            extended,
+            problem,
+            best,
+            before: None,
+            is_whole: false,
+            promise: OnceCell::new(),
+            judged: OnceCell::new(),
+        })
     }
 
-    /// Continues the fit to convergence, and then with the parameters that are free later.
-    pub fn fitted(mut self, site: &Site<'_, 'a>) -> Option<Self> {
-        let from = self.best.x.clone();
-        self.best = descend(&mut self.problem, &from, TRIAL_FIT_ITERATIONS)?;
+    /// Continues the fit: to convergence, or, where parameters are free later, to the start of the fit with them, and
+    /// then to its end. `None` if the model fails.
+    pub fn advanced(mut self, site: &Site<'_, 'a>) -> Option<Self> {
+        // It is continued with the parameters that are free later only if it explains something by then.
+        let most = (1.0 - CAUSE_EXPLAINS) * site.found.best.cost;
+        let goal = if self.extended.later.is_empty() { f64::INFINITY } else { most };
+        self.best = descend(&mut self.problem, self.best, TRIAL_FIT_ITERATIONS, goal)?;
+        self.is_whole = true;
+        if let Some(before) = self.before.take() {
+            return Some(if before.cost() <= self.cost() { *before } else { self });
+        }
         let later = std::mem::take(&mut self.extended.later);
-        if later.is_empty() || self.cost() > (1.0 - CAUSE_EXPLAINS) * site.found.best.cost {
+        if later.is_empty() || self.cost() > most {
             return Some(self);
         }
         let (case, mut plan) = self.case_and_plan();
@@ -66,9 +98,25 @@ impl<'a> Tried<'a> {
         plan.bounds.extend(later);
         let extended = Extended { case, plan, later: Vec::new(), ..self.extended.clone() };
         let own = &self.best.x[self.problem.globals()..];
-        match Self::from(site, self.row, extended, own, TRIAL_FIT_ITERATIONS) {
-            Some(further) if further.cost() < self.cost() => Some(further),
-            _ => Some(self),
+        match Self::from(site, self.row, extended, own) {
+            Some(further) => Some(Self { before: Some(Box::new(self)), ..further }),
+            None => Some(self),
+        }
+    }
+
+    /// True if the fit has ended.
+    pub fn is_whole(&self) -> bool {
+        self.is_whole
+    }
+
+    /// The least cost that the fit may end with: with parameters that are free later, anything.
+    pub fn least(&self) -> f64 {
+        match self.is_whole {
+            true => self.cost(),
+            false if self.extended.later.is_empty() => {
+                self.cost() - CAUSE_REACH * self.promise.get_or_init(|| self.best.promise())
+            }
+            false => 0.0,
         }
     }
 
@@ -82,15 +130,16 @@ impl<'a> Tried<'a> {
         (self.row.key, self.extended.at_motor)
     }
 
-    /// True if its runs have no exact derivatives.
-    pub fn is_curved(&self) -> bool {
-        !self.extended.case.machine.is_piecewise_linear()
+    /// Information of the logs on it.
+    pub fn judged(&self) -> Option<&Judged> {
+        let Minimum { residuals, jacobian, x, at_bound, .. } = &self.best;
+        let judged = || Judged::new(&self.problem, residuals, jacobian, x, at_bound);
+        self.judged.get_or_init(judged).as_ref()
     }
 
-    /// Information of the logs on it.
-    pub fn judged(&self) -> Option<Judged> {
-        let Minimum { residuals, jacobian, x, at_bound, .. } = &self.best;
-        Judged::new(&self.problem, residuals, jacobian, x, at_bound)
+    /// True if its residuals are noise: no larger than that of the logs, or white.
+    pub fn leaves_noise(&self) -> bool {
+        is_noise(&self.problem, &self.best) || self.judged().is_some_and(|judged| judged.inflation < COLOURED)
     }
 
     /// The machine with the element.
@@ -214,11 +263,8 @@ impl<'a> Tried<'a> {
     }
 }
 
-/// Result of a short search from `start`.
-fn descend(problem: &mut Problem, start: &[f64], iterations: usize) -> Option<Minimum> {
-    if start.len() != problem.variables() || problem.is_stopped() {
-        return None;
-    }
+/// The end of a short search that continues from a point. It ends early where it creeps above the cost `goal`.
+fn descend(problem: &mut Problem, from: Minimum, iterations: usize, goal: f64) -> Option<Minimum> {
     let options = Options {
         iterations,
         tolerance: ROUGH_TOLERANCE,
@@ -227,7 +273,20 @@ fn descend(problem: &mut Problem, start: &[f64], iterations: usize) -> Option<Mi
         ..Options::default()
     };
     let bounds = problem.bounds();
-    let found = minimise(problem, start, &bounds, &options, &mut |_, _| Flow::Continue);
+    let mut costs = Vec::new();
+    let mut watch = |_: &[f64], cost: f64| {
+        costs.push(cost);
+        let earlier = costs.len().checked_sub(1 + CAUSE_SLOW_STEPS).map(|k| costs[k]);
+        let creeps = earlier.is_some_and(|earlier| earlier - cost < CAUSE_SLOW * cost);
+        if creeps && cost > goal { Flow::Stop } else { Flow::Continue }
+    };
+    let found = match from.ending {
+        // Where iterations were used up, its derivatives are those at the point.
+        Ending::Failed | Ending::OutOfIterations => resume(problem, from, &bounds, &options, &mut watch),
+        Ending::Converged if from.pieces == 1 && from.decrement <= ROUGH_TOLERANCE => return Some(from),
+        _ => minimise(problem, &from.x, &bounds, &options, &mut watch),
+    };
     let is_there = found.jacobian.nrows() == problem.rows() && found.cost.is_finite();
-    (is_there && !matches!(found.ending, Ending::Failed | Ending::Interrupted)).then_some(found)
+    let is_stopped = found.ending == Ending::Failed || problem.is_stopped();
+    (is_there && !is_stopped).then_some(found)
 }
