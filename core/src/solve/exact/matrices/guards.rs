@@ -25,7 +25,7 @@ impl<const N: usize> Row<N> {
         Self { places, weights, count }
     }
 
-    fn terms(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
+    pub(in crate::solve::exact) fn terms(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
         self.places.iter().zip(&self.weights).take(self.count).map(|(place, weight)| (usize::from(*place), *weight))
     }
 
