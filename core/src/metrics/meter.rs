@@ -124,6 +124,8 @@ enum Followed {
 pub struct Sought {
     places: Arc<Places>,
     followed: Arc<[Followed]>,
+    /// Their sums, and that of the steady speed.
+    quantities: Arc<[Sum]>,
     readings: [bool; QUANTITIES],
     sums: bool,
     steady_speed: bool,
@@ -155,8 +157,13 @@ impl Sought {
         let follows = !seeks.is_empty() || !places.rotors.is_empty();
         let of_readings = (0..QUANTITIES).filter(|q| readings[*q]).map(Followed::Reading);
         let of_sums = (0..if sums { places.sums.len() } else { 0 }).map(Followed::Sum);
-        let followed = of_readings.chain(of_sums).collect();
-        Self { places: Arc::new(places), followed, readings, sums, steady_speed, follows }
+        let followed: Arc<[Followed]> = of_readings.chain(of_sums).collect();
+        let sum = |followed: &Followed| match *followed {
+            Followed::Reading(q) => vec![(q, 1.0)],
+            Followed::Sum(sum) => places.sums[sum].clone(),
+        };
+        let quantities = followed.iter().map(sum).chain([vec![(reading::CART_SPEED, 1.0)]]).collect();
+        Self { places: Arc::new(places), followed, quantities, readings, sums, steady_speed, follows }
     }
 }
 
@@ -470,12 +477,8 @@ impl Meter {
 }
 
 impl Extremes for Meter {
-    fn quantities(&self) -> Vec<Sum> {
-        let sum = |followed: &Followed| match *followed {
-            Followed::Reading(q) => vec![(q, 1.0)],
-            Followed::Sum(sum) => self.sought.places.sums[sum].clone(),
-        };
-        self.sought.followed.iter().map(sum).chain([vec![(reading::CART_SPEED, 1.0)]]).collect()
+    fn quantities(&self) -> &[Sum] {
+        &self.sought.quantities
     }
 
     fn height(&self, quantity: usize) -> f64 {

@@ -400,26 +400,26 @@ fn degree(experiments: &[Experiment]) -> usize {
     experiments.iter().flat_map(|experiment| &experiment.inputs).map(|input| input.degree()).max().unwrap_or(0)
 }
 
-/// The checked mechanism of a machine, for [`run_beside`]. Errors: an invalid machine.
-pub fn mechanism_of(machine: &Machine) -> Result<Arc<Mechanism>> {
+/// The mechanism of a machine for [`run_beside`]. Errors: an invalid machine, an experiment that it cannot run.
+pub fn mechanism_for(machine: &Machine, experiments: &[Experiment]) -> Result<Arc<Mechanism>> {
     check::machine(machine)?;
-    Ok(Arc::new(machine.mechanism()))
+    let mechanism = machine.mechanism();
+    experiments.iter().try_for_each(|experiment| check::experiment(&mechanism, experiment))?;
+    Ok(Arc::new(mechanism))
 }
 
-/// Runs machines of one structure side by side, in lanes of vectors, each through its experiments, and passes every run
-/// to `receive`. Errors: an experiment that the first machine cannot run.
+/// Runs machines of the structure of `mechanism` side by side, in lanes of vectors, each through its experiments, and
+/// passes every run to `receive`.
 ///
 /// Events and peaks are those of single runs, positions to 1e-12 m; the bits of a run depend on its machine and its
 /// experiment alone. Runs that are better left to the exact solver come back without a result.
 pub fn run_beside<'a, 'j, E: Extremes>(
-    mechanism: &Arc<Mechanism>,
+    mechanism: &Mechanism,
     experiments: &[Experiment],
     jobs: &mut dyn Iterator<Item = Job<'a, E>>,
     receive: &'j mut Receive<'j, E>,
-) -> Result<()> {
-    experiments.iter().try_for_each(|experiment| check::experiment(mechanism, experiment))?;
+) {
     exact::run_beside(mechanism, degree(experiments), jobs, receive);
-    Ok(())
 }
 
 fn nothing_mounted() -> Error {

@@ -427,7 +427,7 @@ impl<const T: usize> Polynomial<T> {
         let slopes: [f64; LOOKS + 1] = std::array::from_fn(|k| self.slope(place(k)));
         let mut top = best;
         for k in (0..LOOKS).filter(|&k| slopes[k] > 0.0 && slopes[k + 1] < 0.0) {
-            let found = self.extreme([place(k), place(k + 1)], 0.5 * (place(k) + place(k + 1)), 1.0);
+            let found = self.top([place(k), place(k + 1)]);
             if found.1 > top.1 {
                 top = found;
             }
@@ -435,12 +435,13 @@ impl<const T: usize> Polynomial<T> {
         top
     }
 
-    /// Maximum between two points, with a positive slope at the lower and a negative one at the higher, or, for a
-    /// negative `side`, minimum: bracketed Newton's method on the slope from `s`.
-    pub(super) fn extreme(&self, [mut low, mut high]: [f64; 2], mut s: f64, side: f64) -> (f64, f64) {
+    /// Maximum between two points, with a positive slope at the lower and a negative one at the higher: bracketed
+    /// Newton's method on the slope.
+    fn top(&self, [mut low, mut high]: [f64; 2]) -> (f64, f64) {
+        let mut s = 0.5 * (low + high);
         for _ in 0..60 {
             let slope = self.slope(s);
-            if side * slope > 0.0 {
+            if slope > 0.0 {
                 low = s;
             } else {
                 high = s;
@@ -555,7 +556,7 @@ pub(crate) const NEWS: f64 = 1e-12;
 /// for.
 pub trait Extremes {
     /// The quantities: sums of readings by their numbers, each with its weight; and a last one that becomes steady.
-    fn quantities(&self) -> Vec<Vec<(usize, f64)>>;
+    fn quantities(&self) -> &[Vec<(usize, f64)>];
 
     /// The largest magnitude of a quantity so far; infinite for one whose extremes are not sought.
     fn height(&self, quantity: usize) -> f64;

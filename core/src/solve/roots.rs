@@ -207,6 +207,20 @@ fn halves_by_any<const N: usize>(b: &[f64; N]) -> ([f64; N], [f64; N]) {
     (left, right)
 }
 
+/// The only extremum of Σ c_k sᵏ in (0, 1), where the slope times `side` falls from positive to negative, and the value
+/// there. `ends` are the slopes at 0 and 1.
+pub(super) fn only_extremum(c: &[f64; EXTREMUM], side: f64, ends: [f64; 2]) -> (f64, f64) {
+    let mut slope = [0.0; EXTREMUM];
+    for k in 1..EXTREMUM {
+        slope[k - 1] = side * k as f64 * c[k];
+    }
+    let s = polish(&slope, (0.0, side * ends[0]), (1.0, side * ends[1]));
+    (s, value_and_slope(c, s).0)
+}
+
+/// Terms of a polynomial for [`only_extremum`].
+pub(super) const EXTREMUM: usize = 20;
+
 /// Newton's method within a bracket whose upper end is negative; bisection if it would leave the bracket. It begins at
 /// the zero of the straight line between the ends.
 fn polish(c: &[f64], (mut low, above): (f64, f64), (mut high, below): (f64, f64)) -> f64 {

@@ -251,7 +251,7 @@ pub(in crate::solve) struct ModeMatrices<const N: usize> {
     /// Coordinates of the origin.
     origin: [f64; BODIES],
     rate: Matrix<N, N>,
-    steps: Vec<OnceLock<Matrix<N, N>>>,
+    steps: Vec<OnceLock<Box<Matrix<N, N>>>>,
     /// Rate at which √V may grow by itself; zero for most machines.
     growth: f64,
     inertia: [f64; BODIES],
@@ -602,12 +602,12 @@ impl<const N: usize> ModeMatrices<N> {
         if self.steps[level].get().is_none() {
             let known = (level..=self.finest).find(|&l| self.steps[l].get().is_some());
             let from = known.unwrap_or_else(|| {
-                let _ = self.steps[self.finest].set(self.rate.exponential(self.reach()));
+                let _ = self.steps[self.finest].set(Box::new(self.rate.exponential(self.reach())));
                 self.finest
             });
             for l in (level..from).rev() {
                 let doubled = self.steps[l + 1].get().expect("just computed").doubled();
-                let _ = self.steps[l].set(doubled);
+                let _ = self.steps[l].set(Box::new(doubled));
             }
         }
         self.steps[level].get().expect("just computed")

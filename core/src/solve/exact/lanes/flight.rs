@@ -453,6 +453,23 @@ impl<const S: usize, const D: usize> Flight<S, D> {
         self.quantities.iter().zip(quantities).for_each(|(quantity, pair)| put(&quantity.form, pair));
     }
 
+    /// Whether the form of a guard may fall below zero, or rise above its upper bound, within the present step of a lane.
+    pub(super) fn unsafe_sides(&self, slot: usize, lane: usize) -> [bool; 2] {
+        if self.margins[slot].0[lane] >= 0.0 {
+            return [false; 2];
+        }
+        let guard = &self.guards[slot];
+        if guard.fresh.0[lane] > 0.0 {
+            return [true; 2];
+        }
+        let [from, to] = [&self.from, &self.to].map(|side| side.guards[slot].map(|numbers| numbers.0[lane]));
+        let (third, rest) = (self.h.0[lane] * THIRD, self.rest.0[lane] * guard.dual.0[lane]);
+        let (one, two) = (from[0] + third * from[1], to[0] - third * to[1]);
+        let least = from[0].min(to[0]).min(one.min(two) - rest);
+        let most = from[0].max(to[0]).max(one.max(two) + rest);
+        [!(least >= 0.0), !(most <= guard.top.0[lane])]
+    }
+
     /// A quantity within the step that a lane has just taken, over `h`, with this rest per unit of its dual.
     pub(super) fn part(&self, slot: usize, lane: usize, (h, rest): (f64, f64)) -> Part {
         let [from, to] = [&self.to, &self.from].map(|side| side.quantities[slot].map(|numbers| numbers.0[lane]));

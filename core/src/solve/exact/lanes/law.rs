@@ -9,17 +9,16 @@ use crate::solve::observe::QUANTITIES;
 use std::sync::Arc;
 
 /// Places of z by their part in a flight.
-pub(super) struct Plan<const N: usize> {
+#[derive(Debug, PartialEq)]
+pub(super) struct Parts {
     /// Speeds and currents; lengths and straight inputs; ways, each with the number of its speed.
     pub(super) s: Vec<usize>,
     pub(super) d: Vec<usize>,
     pub(super) ways: Vec<(usize, usize)>,
-    /// Everything else, which is constant between changes of the inputs.
-    fixed: Vec<usize>,
 }
 
-impl<const N: usize> Plan<N> {
-    pub(super) fn new(mechanism: &Mechanism, space: &Space) -> Self {
+impl Parts {
+    pub(super) fn of(mechanism: &Mechanism, space: &Space) -> Self {
         let layout = &space.layout;
         let bodies = layout.bodies();
         let mut s: Vec<usize> = (0..bodies).map(|body| layout.speed[body]).collect();
@@ -38,18 +37,33 @@ impl<const N: usize> Plan<N> {
         if space.highest > 0 {
             d.extend((0..layout.inputs).map(|drive| space.chain(drive, 0)));
         }
-        let moves = |place: &usize| {
-            s.contains(place) || d.contains(place) || ways.iter().any(|(own, _)| own == place)
-        };
-        let fixed = (0..N).filter(|place| !moves(place)).collect();
-        Self { s, d, ways, fixed }
+        Self { s, d, ways }
+    }
+}
+
+/// The same for vectors of `N` places.
+pub(super) struct Plan<const N: usize> {
+    pub(super) parts: Parts,
+    /// Everything else, which is constant between changes of the inputs.
+    fixed: Vec<usize>,
+    is_fixed: [bool; N],
+}
+
+impl<const N: usize> Plan<N> {
+    pub(super) fn new(parts: Parts) -> Self {
+        let mut is_fixed = [true; N];
+        let Parts { s, d, ways } = &parts;
+        let moving = s.iter().chain(d).chain(ways.iter().map(|(place, _)| place));
+        moving.for_each(|place| is_fixed[*place] = false);
+        let fixed = (0..N).filter(|place| is_fixed[*place]).collect();
+        Self { parts, fixed, is_fixed }
     }
 
     /// A row of weights on z, without the part that is constant.
     fn moving<const S: usize, const D: usize>(&self, weight: impl Fn(usize) -> f64) -> Moving<f64, S, D> {
         let mut moving = Moving::all(0.0);
-        self.s.iter().zip(&mut moving.s).for_each(|(place, own)| *own = weight(*place));
-        self.d.iter().zip(&mut moving.d).for_each(|(place, own)| *own = weight(*place));
+        self.parts.s.iter().zip(&mut moving.s).for_each(|(place, own)| *own = weight(*place));
+        self.parts.d.iter().zip(&mut moving.d).for_each(|(place, own)| *own = weight(*place));
         moving
     }
 
@@ -60,8 +74,8 @@ impl<const N: usize> Plan<N> {
 
     /// Puts the moving part back.
     pub(super) fn put<const S: usize, const D: usize>(&self, moving: &Moving<f64, S, D>, z: &mut [f64; N]) {
-        self.s.iter().zip(&moving.s).for_each(|(place, own)| z[*place] = *own);
-        self.d.iter().zip(&moving.d).for_each(|(place, own)| z[*place] = *own);
+        self.parts.s.iter().zip(&moving.s).for_each(|(place, own)| z[*place] = *own);
+        self.parts.d.iter().zip(&moving.d).for_each(|(place, own)| z[*place] = *own);
     }
 
     /// The weights of what is constant.
@@ -112,7 +126,7 @@ impl<const S: usize, const D: usize> Readings<S, D> {
                 row.iter_mut().zip(shown.row(q)).for_each(|(row, own)| *row += weight * own);
                 dual += weight.abs() * shown.dual(q);
             }
-            if plan.ways.iter().any(|(place, _)| row[*place] != 0.0) || dual == f64::INFINITY {
+            if plan.parts.ways.iter().any(|(place, _)| row[*place] != 0.0) || dual == f64::INFINITY {
                 return None;
             }
             let limits = shown.readout.limits.iter().filter(|(q, _)| sum[..] == [(*q, 1.0)]);
@@ -205,11 +219,11 @@ impl<const N: usize, const S: usize, const D: usize> Law<N, S, D> {
                 fixed.push((number as u8, place as u8, matrix.at(row, place)));
             }
         };
-        for (i, &row) in plan.s.iter().enumerate() {
+        for (i, &row) in plan.parts.s.iter().enumerate() {
             rates.s[i].of = plan.moving(|place| matrix.at(row, place));
             put_fixed(i, row);
         }
-        for (i, &row) in plan.d.iter().enumerate() {
+        for (i, &row) in plan.parts.d.iter().enumerate() {
             rates.d[i].0 = plan.moving::<S, D>(|place| matrix.at(row, place)).s;
             put_fixed(S + i, row);
         }
@@ -260,7 +274,7 @@ impl<const N: usize, const S: usize, const D: usize> Law<N, S, D> {
         let rules = &core.common.rules;
         let fixed_part = |index: usize| {
             let guard = &self.matrices.guards[index];
-            let terms = guard.row.terms().filter(|(place, _)| plan.fixed.contains(place));
+            let terms = guard.row.terms().filter(|(place, _)| plan.is_fixed[*place]);
             let constant = terms.fold(0.0, |sum, (place, weight)| sum + weight * core.z[place]);
             constant + rules.tolerance[guard.tolerance]
         };
@@ -277,10 +291,12 @@ impl<const N: usize, const S: usize, const D: usize> Law<N, S, D> {
         })
     }
 
-    /// The guards of the slots for which this is true.
-    pub(super) fn open(&self, is_open: impl Fn(usize) -> bool) -> impl Iterator<Item = usize> {
-        let open = self.bounds.iter().filter(move |bound| is_open(bound.slot));
-        open.flat_map(|bound| [Some(bound.low), bound.high].into_iter().flatten())
+    /// The guards for which these are true, by their slots: the form itself, and its upper bound.
+    pub(super) fn open(&self, are_open: impl Fn(usize) -> [bool; 2]) -> impl Iterator<Item = usize> {
+        self.bounds.iter().flat_map(move |bound| {
+            let [low, high] = are_open(bound.slot);
+            [Some(bound.low).filter(|_| low), bound.high.filter(|_| high)].into_iter().flatten()
+        })
     }
 
     /// The moving weights of a guard.

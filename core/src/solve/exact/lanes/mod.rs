@@ -29,7 +29,7 @@ mod law;
 mod peak;
 mod wide;
 
-use super::kernel::{Make, Modes, in_kernel};
+use super::kernel::Modes;
 use super::matrices::can_grow;
 use super::{Core, ModeMatrices, SOON, Space};
 use crate::mechanism::{AmplifierMode, Mechanism, SpringLaw};
@@ -38,7 +38,7 @@ use crate::solve::inputs::Pieces;
 use crate::solve::observe::{Extremes, NEWS, Polynomial};
 use crate::solve::{Ending, Grid, Outcome, check};
 use flight::{Flight, INNER, Moving, TERMS, Width, numbers};
-use law::{Law, Plan, Readings, Seen, Slots, all_slide, reads_alike};
+use law::{Law, Parts, Plan, Readings, Seen, Slots, all_slide, reads_alike};
 use peak::{Later, Part};
 use std::cell::RefCell;
 use std::sync::Arc;
@@ -109,29 +109,6 @@ pub(in crate::solve) fn takes(mechanism: &Mechanism, degree: usize) -> bool {
         && !can_grow(mechanism)
 }
 
-/// Makes a fleet for a kernel of the exact solver, and runs it.
-struct OfFleet<'a, 'j> {
-    jobs: &'j mut dyn Iterator<Item = Queued<'a>>,
-    mechanism: &'j Mechanism,
-    space: Space,
-    degree: usize,
-    width: Width,
-}
-
-impl Make for OfFleet<'_, '_> {
-    type Made = ();
-
-    fn make<const N: usize>(self) {
-        let plan = Plan::<N>::new(self.mechanism, &self.space);
-        match (plan.s.len(), plan.d.len()) {
-            (..=3, ..=2) => Fleet::<N, 3, 2>::run(self, plan),
-            (..=4, ..=4) => Fleet::<N, 4, 4>::run(self, plan),
-            (..=6, ..=8) => Fleet::<N, 6, 8>::run(self, plan),
-            _ => self.jobs.for_each(|(_, runs)| runs.into_iter().for_each(|(_, watcher)| watcher.receive(None))),
-        }
-    }
-}
-
 /// Runs machines of the structure of `mechanism` side by side, with inputs of at most this degree.
 pub(in crate::solve) fn run_beside<'a, 'j, E: Extremes>(
     mechanism: &Mechanism,
@@ -150,8 +127,16 @@ pub(in crate::solve) fn run_beside<'a, 'j, E: Extremes>(
 }
 
 fn run_queue<'a>(mechanism: &Mechanism, degree: usize, jobs: &mut dyn Iterator<Item = Queued<'a>>) {
-    let (space, width) = (Space::new(mechanism, degree), Width::widest());
-    in_kernel(space.size(), OfFleet { jobs, mechanism, space, degree, width });
+    let space = Space::new(mechanism, degree);
+    let parts = Parts::of(mechanism, &space);
+    // For a vector of the exact solver, speeds and currents, lengths and straight inputs: an axis; one with ramps,
+    // inductance or ends, or a gantry; anything else.
+    match (space.size(), parts.s.len(), parts.d.len()) {
+        (..=8, ..=3, ..=2) => Fleet::<8, 3, 2>::run(jobs, degree, parts),
+        (..=12, ..=4, ..=4) => Fleet::<12, 4, 4>::run(jobs, degree, parts),
+        (..=40, ..=6, ..=8) => Fleet::<40, 6, 8>::run(jobs, degree, parts),
+        _ => jobs.for_each(|(_, runs)| runs.into_iter().for_each(|(_, watcher)| watcher.receive(None))),
+    }
 }
 
 /// What is kept between the runs of a machine.
@@ -177,6 +162,8 @@ struct Seat<'a, const N: usize, const S: usize, const D: usize> {
     next: Vec<RunOf<'a>>,
     /// Number of the law of the present mode, if the lane has it.
     law: Option<usize>,
+    /// True if the lane has the readings, which no mode changes.
+    reads: bool,
     /// The constant parts of z by the pieces of the inputs, the last one being the present.
     held: Vec<[f64; N]>,
     later: Vec<Later<S, D>>,
@@ -208,13 +195,14 @@ type Columns<const S: usize, const D: usize> = [Moving<f64, S, D>; TERMS];
 
 impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S, D> {
     /// Runs all jobs.
-    fn run(of: OfFleet<'a, 'j>, plan: Plan<N>) {
-        let ways: Vec<usize> = plan.ways.iter().map(|(_, speed)| *speed).collect();
+    fn run(jobs: &'j mut dyn Iterator<Item = Queued<'a>>, degree: usize, parts: Parts) {
+        let plan = Plan::new(parts);
+        let ways: Vec<usize> = plan.parts.ways.iter().map(|(_, speed)| *speed).collect();
         let mut fleet = Self {
-            jobs: of.jobs,
+            jobs,
             plan: Arc::new(plan),
-            degree: of.degree,
-            width: of.width,
+            degree,
+            width: Width::widest(),
             slots: Slots::new(),
             flight: Box::new(Flight::new(&ways)),
             seats: [const { None }; LANES],
@@ -264,9 +252,13 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
     fn load(&mut self, lane: usize) {
         self.seats[lane] = None;
         while let Some((mechanism, mut next)) = self.jobs.next() {
-            next.reverse();
             // Lengths of springs weigh angles by the radii of this machine.
             let space = Arc::new(Space::new(&mechanism, self.degree));
+            if !takes(&mechanism, self.degree) || Parts::of(&mechanism, &space) != self.plan.parts {
+                next.into_iter().for_each(|(_, watcher)| watcher.receive(None));
+                continue;
+            }
+            next.reverse();
             let (known, laws, seen) = (Vec::new(), Vec::new(), Vec::new());
             let kept = Kept { mechanism, space, known, laws, seen, readings: None };
             if self.begin(lane, kept, next) {
@@ -305,6 +297,7 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
             watcher,
             next,
             law,
+            reads: false,
             held,
             later,
             pieces,
@@ -326,7 +319,7 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
         let (matrices, _) = ModeMatrices::of(&mut core.known, mechanism, space, &mode, core.common.h);
         let alike = reads_alike(mechanism);
         let shown = matrices.shown(mechanism, space);
-        let (readings, seen) = Readings::of(shown, &observer.quantities(), &self.plan, alike)?;
+        let (readings, seen) = Readings::of(shown, observer.quantities(), &self.plan, alike)?;
         kept.readings = alike.then(|| Arc::new(readings));
         kept.seen = seen;
         Some(matrices.norm() / flight::REACH)
@@ -347,7 +340,7 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
         seat.core.resolve();
         seat.core.note_ties();
         seat.held.push(seat.core.z);
-        seat.law = None;
+        (seat.law, seat.reads) = (None, false);
     }
 
     /// Brings a machine to where its lane can go on, or to the end of its runs.
@@ -381,10 +374,11 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
     }
 
     /// Sets the numbers of the present mode in a lane.
+    #[inline(never)]
     fn take_up(&mut self, lane: usize) {
         let Self { seats, plan, slots, flight, .. } = self;
         let Some(seat) = &mut seats[lane] else { return };
-        let Seat { core, kept, watcher, law: present, .. } = &mut **seat;
+        let Seat { core, kept, watcher, law: present, reads, .. } = &mut **seat;
         let laws = &mut kept.laws;
         let number = match laws.iter().position(|law| Arc::ptr_eq(&law.matrices, &core.matrices)) {
             Some(number) => number,
@@ -393,7 +387,7 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
                     Some(readings) => Arc::clone(readings),
                     None => {
                         let shown = core.matrices.shown(&core.common.mechanism, &core.common.space);
-                        let own = Readings::of(shown, &watcher.observed().quantities(), plan, false);
+                        let own = Readings::of(shown, watcher.observed().quantities(), plan, false);
                         Arc::new(own.expect("as in the mode in which all slide").0)
                     }
                 };
@@ -408,8 +402,10 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
             let none = Moving::all(0.0);
             let energy = law.energy.iter().chain(std::iter::repeat(&none));
             flight.energy.iter_mut().zip(energy).for_each(|(own, form)| own.put(lane, form));
-            for (slot, own) in flight.quantities.iter_mut().enumerate().take(law.readings.slots()) {
-                own.put(lane, &law.readings.with(slot, &core.z));
+            if !std::mem::replace(reads, kept.readings.is_some()) {
+                for (slot, own) in flight.quantities.iter_mut().enumerate().take(law.readings.slots()) {
+                    own.put(lane, &law.readings.with(slot, &core.z));
+                }
             }
             (flight.longest.0[lane], flight.grow.0[lane]) = (law.longest, law.grow);
             watcher.observer().moves(&law.matrices.mode);
@@ -447,6 +443,7 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
     }
 
     /// The lane goes on from where its machine stands.
+    #[inline(never)]
     fn take_off(&mut self, lane: usize, length: f64) {
         let Self { seats, plan, flight, .. } = self;
         let Some(seat) = &mut seats[lane] else { return };
@@ -455,7 +452,7 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
         let (z, now) = (plan.of(&core.z), core.common.base + core.common.offset);
         let rate = law.rates(&core.z).rate(&z);
         flight.set(lane, &z, &rate);
-        for (way, (place, _)) in flight.ways.iter_mut().zip(&plan.ways) {
+        for (way, (place, _)) in flight.ways.iter_mut().zip(&plan.parts.ways) {
             way.1.0[lane] = core.z[*place];
         }
         flight.time.0[lane] = core.common.offset;
@@ -474,12 +471,13 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
     }
 
     /// The state of a lane goes to its machine, its peaks to the observer.
+    #[inline(never)]
     fn hand_over(&mut self, lane: usize) {
         let Self { seats, plan, flight, clock, .. } = self;
         let Some(seat) = &mut seats[lane] else { return };
         let core = &mut seat.core;
         plan.put(&flight.from.z.lane(lane), &mut core.z);
-        for (way, (place, _)) in flight.ways.iter().zip(&plan.ways) {
+        for (way, (place, _)) in flight.ways.iter().zip(&plan.parts.ways) {
             core.z[*place] = way.1.0[lane];
         }
         let moved = flight.time.0[lane] - core.common.offset;
@@ -488,7 +486,7 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
         }
         let mut largest = core.largest;
         plan.put(&flight.largest.lane(lane), &mut largest);
-        for (farthest, (place, _)) in flight.farthest.iter().zip(&plan.ways) {
+        for (farthest, (place, _)) in flight.farthest.iter().zip(&plan.parts.ways) {
             largest[*place] = farthest.0[lane];
         }
         core.largest.iter_mut().zip(largest).for_each(|(own, other)| *own = own.max(other));
@@ -513,6 +511,7 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
 
     /// Looks for the first guard that falls within the present step, and passes through the event; false if there is
     /// none.
+    #[inline(never)]
     fn look(&mut self, lane: usize) -> bool {
         if !self.flight.to.z.lane(lane).iter().sum::<f64>().is_finite() {
             // No lane is loaded before the others have landed.
@@ -530,7 +529,7 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
         plan.put(&columns[0], &mut core.z);
         core.look(matrices);
         let mut open = super::Lanes::NONE;
-        law.open(|slot| flight.margins[slot].0[lane] < 0.0).for_each(|index| open.set(index, true));
+        law.open(|slot| flight.unsafe_sides(slot, lane)).for_each(|index| open.set(index, true));
         if flight.time.0[lane] - core.common.offset > SOON * matrices.reach() {
             core.common.rules.refreshed();
         }
@@ -557,7 +556,7 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
         }
         end.each().zip(columns[0].iter()).for_each(|(end, begin)| *end += begin);
         plan.put(&end, &mut core.z);
-        for (place, speed) in &plan.ways {
+        for (place, speed) in &plan.parts.ways {
             // ∫ Σ w_k sᵏ h ds
             let sum = columns.iter().enumerate().rev().fold(0.0, |sum, (k, terms)| {
                 sum * s + terms.s[*speed] * flight::RECIPROCAL[k + 1]
@@ -580,6 +579,7 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
     }
 
     /// Keeps the step that a lane has just taken: quantities may have a peak in it.
+    #[inline(never)]
     fn keep_for_later(&mut self, lane: usize) {
         let Self { seats, flight, clock, .. } = self;
         let Some(seat) = &mut seats[lane] else { return };
@@ -599,6 +599,7 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
 
     /// Shows the step that a lane has just taken, and that began at `begin` within the piece, to an observer of what
     /// becomes steady.
+    #[inline(never)]
     fn watch_step(&mut self, lane: usize, begin: f64) {
         let Self { seats, flight, clock, .. } = self;
         let Some(seat) = &mut seats[lane] else { return };
@@ -667,6 +668,7 @@ impl<const N: usize, const S: usize, const D: usize> Seat<'_, N, S, D> {
     }
 
     /// Takes the part of a step up to an event.
+    #[inline(never)]
     fn see_part(
         &mut self,
         from: &Moving<f64, S, D>,
@@ -728,13 +730,17 @@ impl<const N: usize, const S: usize, const D: usize> Seat<'_, N, S, D> {
         let mut terms = [Moving::all(0.0); TERMS];
         rates.series(length, (z, &rates.rate(z)), &mut terms);
         let form = law.readings.with(slot, held).form;
-        let mut course = Polynomial(terms.map(|terms| form.change(&terms)));
+        let mut course = Polynomial::default();
+        for (c, terms) in course.0.iter_mut().zip(&terms) {
+            *c = form.of.dot(terms);
+        }
         course.0[0] += form.constant;
         course
     }
 
     /// Settles the peaks that were kept: the cubics tell how high they are at least, and steps that may be higher are
     /// expanded again, the highest first.
+    #[inline(never)]
     fn settle(&mut self) {
         let mut later = std::mem::take(&mut self.later);
         let slots = later.iter().map(|later| later.slot + 1).max().unwrap_or(0);

@@ -2,6 +2,9 @@
 
 use super::flight::{Moving, TERMS};
 use crate::solve::observe::Polynomial;
+use crate::solve::roots::{EXTREMUM, only_extremum};
+
+const _: () = assert!(TERMS == EXTREMUM);
 
 /// A step within which a quantity may have its peak.
 pub(super) struct Later<const S: usize, const D: usize> {
@@ -71,7 +74,7 @@ impl Part {
         let side = if left < 0.0 { 1.0 } else { -1.0 };
         if f64::max(side * left, side * right) < -32.0 * self.rest {
             let [s, t] = self.slopes.map(|slope| side * slope);
-            return (s > 0.0 && t < 0.0).then(|| course.extreme([0.0, 1.0], s / (s - t), side));
+            return (s > 0.0 && t < 0.0).then(|| only_extremum(&course.0, side, self.slopes));
         }
         Some(course.largest(0.0, 1.0))
     }
