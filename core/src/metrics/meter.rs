@@ -9,7 +9,8 @@ use crate::mechanism::{Mechanism, Mode, Shown, State, Status, What};
 use crate::plan::Experiment;
 use crate::signal::Signal;
 use crate::solve::{
-    Closer, Curve, Event, Extremes, Gap, Gaps, NEWS, Observe, Polynomial, QUANTITIES, Reading, Stretch, applied, reading,
+    Closer, Curve, Event, Extremes, Gap, Gaps, NEWS, Observe, Polynomial, QUANTITIES, Reading, Stretch, applied,
+    reading,
 };
 use std::sync::Arc;
 
@@ -481,12 +482,8 @@ impl Extremes for Meter {
         &self.sought.quantities
     }
 
-    fn height(&self, quantity: usize) -> f64 {
-        match self.sought.followed.get(quantity) {
-            Some(&Followed::Reading(q)) => self.peaks[q].value.abs(),
-            Some(&Followed::Sum(sum)) => self.sums[sum].value.abs(),
-            None => f64::INFINITY,
-        }
+    fn sought(&self) -> usize {
+        self.sought.followed.len()
     }
 
     fn come_to(&mut self, quantity: usize, value: f64, time: f64) {

@@ -32,8 +32,8 @@ pub use estimate::ErrorEstimate;
 pub use exact::{Job, Receive};
 pub use general::{Dynamics, Quantity};
 pub(crate) use inputs::applied;
-use observe::Output;
 pub(crate) use observe::NEWS;
+use observe::Output;
 pub use observe::{
     Closer, Curve, Extremes, Gap, Gaps, Observe, Polynomial, QUANTITIES, Reading, Stretch, TERMS, reading,
 };

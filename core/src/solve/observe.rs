@@ -558,8 +558,8 @@ pub trait Extremes {
     /// The quantities: sums of readings by their numbers, each with its weight; and a last one that becomes steady.
     fn quantities(&self) -> &[Vec<(usize, f64)>];
 
-    /// The largest magnitude of a quantity so far; infinite for one whose extremes are not sought.
-    fn height(&self, quantity: usize) -> f64;
+    /// Number of those whose extremes are sought: all but the last, or all.
+    fn sought(&self) -> usize;
 
     /// Takes the largest value that a quantity has come to, and when it was there last.
     fn come_to(&mut self, quantity: usize, value: f64, time: f64);

@@ -218,6 +218,11 @@ pub(super) fn only_extremum(c: &[f64; EXTREMUM], side: f64, ends: [f64; 2]) -> (
     (s, value_and_slope(c, s).0)
 }
 
+/// The only fall of Σ c_k sᵏ in (0, 1], positive at 0 and negative at 1.
+pub(super) fn only_fall(c: &[f64]) -> f64 {
+    polish(c, (0.0, c[0]), (1.0, c.iter().sum()))
+}
+
 /// Terms of a polynomial for [`only_extremum`].
 pub(super) const EXTREMUM: usize = 20;
 

@@ -481,11 +481,13 @@ impl<const N: usize> Core<N> {
         self.common.cost.series += 1;
         law.series(&self.z, distance, &mut self.room.series);
         let Room { value, series, coefficients, .. } = &mut *self.room;
-        let first = first_fallen(&self.common.rules, law, (&self.z, distance), open, coefficients, |index, room| {
+        let along = |index: usize, room: &mut [f64; SERIES_TERMS]| {
             let coefficients = law.guards[index].row.along(series, room);
             coefficients[0] = value[index];
             coefficients.len()
-        });
+        };
+        let fall = |_, coefficients: &[f64]| roots::first_fall(coefficients);
+        let first = first_fallen(&self.common.rules, law, (&self.z, distance), open, coefficients, (along, fall));
         let s = first.map_or(1.0, |(s, _)| s);
         series.add_to(&mut self.z, s);
         self.move_on(s * distance);
@@ -633,14 +635,14 @@ impl<const N: usize> Engine for Core<N> {
 }
 
 /// The first of the `open` guards that falls along a series of z over `distance`, and the fraction of the distance;
-/// `along` gives the coefficients of a guard and their number.
+/// `along` gives the coefficients of a guard and their number, `fall` its first fall if none of them is left out.
 fn first_fallen<const N: usize>(
     rules: &Rules,
     law: &ModeMatrices<N>,
     (z, distance): (&[f64; N], f64),
     open: Lanes,
     room: &mut [f64; SERIES_TERMS],
-    mut along: impl FnMut(usize, &mut [f64; SERIES_TERMS]) -> usize,
+    (mut along, fall): (impl FnMut(usize, &mut [f64; SERIES_TERMS]) -> usize, impl Fn(usize, &[f64]) -> Option<f64>),
 ) -> Option<(f64, Transition)> {
     let mut first: Option<(f64, Transition)> = None;
     for index in open.numbers() {
@@ -652,11 +654,13 @@ fn first_fallen<const N: usize>(
             order = law.first_term(guard, coefficients, (z, distance), order.max(1));
         }
         let sooner = |s: f64| {
-            first.is_none_or(|(earliest, other)| {
-                s < earliest || (s == earliest && guard.transition.rank < other.rank)
-            })
+            first.is_none_or(|(earliest, other)| s < earliest || (s == earliest && guard.transition.rank < other.rank))
         };
-        if let Some(s) = roots::first_fall(&coefficients[order..])
+        let found = match order {
+            0 => fall(index, coefficients),
+            order => roots::first_fall(&coefficients[order..]),
+        };
+        if let Some(s) = found
             && sooner(s)
         {
             first = Some((s, guard.transition));

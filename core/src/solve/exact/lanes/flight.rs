@@ -1,9 +1,9 @@
 //! One step of all lanes at once: Taylor series, and what guards and quantities do within the step.
 
+use super::peak::Part;
 #[cfg(target_arch = "x86_64")]
 use super::wide::{Avx2, Avx512};
 use super::wide::{LANES, Lanes, Plain, Wide};
-use super::peak::Part;
 use crate::solve::observe::NEWS;
 
 /// Terms of a series, and ‖A‖ h that it reaches: 1.3²⁰/20! is 8e-17.
@@ -71,8 +71,8 @@ impl<T: Copy, const S: usize, const D: usize> Moving<T, S, D> {
         Self { s: [value; S], d: [value; D] }
     }
 
-    /// Every number, in order.
-    pub(super) fn each(&mut self) -> impl Iterator<Item = &mut T> {
+    #[cfg(test)]
+    fn each(&mut self) -> impl Iterator<Item = &mut T> {
         self.s.iter_mut().chain(&mut self.d)
     }
 
@@ -120,6 +120,13 @@ impl<const S: usize, const D: usize> Moving<Lanes, S, D> {
 }
 
 impl<const S: usize, const D: usize> Moving<f64, S, D> {
+    /// (self + other) s
+    #[inline]
+    pub(super) fn add_scaled(&mut self, other: &Self, s: f64) {
+        self.s.iter_mut().zip(&other.s).for_each(|(own, other)| *own = (*own + other) * s);
+        self.d.iter_mut().zip(&other.d).for_each(|(own, other)| *own = (*own + other) * s);
+    }
+
     /// Σ w z
     #[inline]
     pub(super) fn dot(&self, z: &Self) -> f64 {
@@ -175,10 +182,7 @@ impl<const S: usize, const D: usize> Rates<Lanes, S, D> {
 
 /// Σ w z, its two parts side by side.
 #[inline(always)]
-fn dot<W: Wide, const S: usize, const D: usize>(
-    weights: &Moving<W::Kept, S, D>,
-    z: &Moving<W, S, D>,
-) -> W {
+fn dot<W: Wide, const S: usize, const D: usize>(weights: &Moving<W::Kept, S, D>, z: &Moving<W, S, D>) -> W {
     let mut sum = W::of(&weights.s[0]).times(z.s[0]);
     for i in 1..S {
         sum = sum.plus(W::of(&weights.s[i]).times(z.s[i]));
@@ -470,6 +474,19 @@ impl<const S: usize, const D: usize> Flight<S, D> {
         [!(least >= 0.0), !(most <= guard.top.0[lane])]
     }
 
+    /// A guard within the present step of a lane: the form itself for a positive side, otherwise what is left of its upper
+    /// bound.
+    pub(super) fn guard(&self, slot: usize, lane: usize, side: f64) -> Part {
+        let [from, to] = [&self.from, &self.to].map(|sides| sides.guards[slot].map(|numbers| numbers.0[lane]));
+        let (h, dual) = (self.h.0[lane], self.guards[slot].dual.0[lane]);
+        let top = if side > 0.0 { 0.0 } else { self.guards[slot].top.0[lane] };
+        Part {
+            values: [top + side * from[0], top + side * to[0]],
+            slopes: [side * h * from[1], side * h * to[1]],
+            rest: self.rest.0[lane] * (1.0 / INNER) * dual,
+        }
+    }
+
     /// A quantity within the step that a lane has just taken, over `h`, with this rest per unit of its dual.
     pub(super) fn part(&self, slot: usize, lane: usize, (h, rest): (f64, f64)) -> Part {
         let [from, to] = [&self.to, &self.from].map(|side| side.quantities[slot].map(|numbers| numbers.0[lane]));
@@ -665,5 +682,98 @@ impl<const S: usize, const D: usize> Flight<S, D> {
             *steps += u64::from(ended >> lane & 1 == 0);
         }
         any
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::chance::uniform;
+    use rand_pcg::Pcg64;
+
+    /// Lanes with any numbers, of the size of those of an axis.
+    fn flight<const S: usize, const D: usize>(seed: u64) -> Flight<S, D> {
+        let mut random = Pcg64::new(u128::from(seed), 1);
+        let mut even = |size: f64| size * (2.0 * uniform(&mut random) - 1.0);
+        let mut flight = Flight::new(&[1]);
+        flight.make_room(3, 4, 5);
+        for lane in 0..LANES {
+            let mut moving = |size: f64| {
+                let mut all = Moving::all(0.0);
+                all.each().for_each(|number: &mut f64| *number = even(size));
+                all
+            };
+            let mut rates = Rates::all(0.0);
+            for row in &mut rates.s {
+                *row = Form { of: moving(300.0), constant: moving(1.0).s[0] };
+            }
+            rates.d.iter_mut().for_each(|row| *row = (moving(1.0).s, 0.0));
+            flight.rates.put(lane, &rates);
+            flight.energy.iter_mut().for_each(|form| form.put(lane, &moving(1.0)));
+            for (slot, guard) in flight.guards.iter_mut().enumerate() {
+                let form = Form { of: moving(1.0), constant: moving(1.0).s[0].abs() };
+                let (top, fresh) = (1.0 + slot as f64, [0.0, 1.0, 2.0][(lane + slot) % 3]);
+                guard.put(lane, &Guard { form, top, dual: 0.1, fresh });
+            }
+            for quantity in &mut flight.quantities {
+                let form = Form { of: moving(1.0), constant: moving(1.0).s[0] };
+                quantity.put(lane, &Quantity { form, dual: 0.1 });
+            }
+            for heights in &mut flight.heights {
+                heights.peak.0[lane] = moving(2.0).s[0];
+            }
+            let (z, rate) = (moving(1.0), moving(10.0));
+            flight.set(lane, &z, &rate);
+            (flight.longest.0[lane], flight.grow.0[lane]) = (1e-3 + 1e-4 * lane as f64, 1.0);
+            flight.length.0[lane] = if lane == 3 { 1e-4 } else { 1.0 };
+        }
+        flight.is_fresh = true;
+        flight
+    }
+
+    fn bits<const S: usize, const D: usize>(flight: &Flight<S, D>) -> Vec<u64> {
+        let pairs = [&flight.from, &flight.to].into_iter().flat_map(|side| {
+            let pairs = side.guards.iter().chain(&side.quantities).flatten();
+            side.z.iter().chain(side.rate.iter()).chain(pairs).copied().collect::<Vec<_>>()
+        });
+        let heights = flight.heights.iter().flat_map(|heights| [heights.peak, heights.when]);
+        let others = [flight.time, flight.h, flight.rest, flight.ways[0].1];
+        let all = pairs.chain(flight.margins.iter().copied()).chain(heights).chain(others);
+        all.flat_map(|lanes| lanes.0).map(f64::to_bits).collect()
+    }
+
+    /// A machine has the same bits on every processor.
+    #[test]
+    fn every_width_gives_the_same_bits() {
+        let widths = match Width::widest() {
+            Width::Plain => return,
+            #[cfg(target_arch = "x86_64")]
+            Width::Avx2 => vec![Width::Plain, Width::Avx2],
+            #[cfg(target_arch = "x86_64")]
+            Width::Avx512 => vec![Width::Plain, Width::Avx2, Width::Avx512],
+        };
+        let mut called = [0; 3];
+        for seed in 0..50 {
+            let told = widths.iter().map(|&width| {
+                let (mut small, mut large) = (flight::<3, 2>(seed), flight::<4, 4>(seed));
+                let mut all = Vec::new();
+                for _ in 0..3 {
+                    let calls = small.fly(width);
+                    let within = small.land(width, calls.look & 1);
+                    all.push((calls.look, calls.over, within));
+                    let calls = large.fly(width);
+                    all.push((calls.look, calls.over, large.land(width, 0)));
+                }
+                (all, bits(&small), bits(&large))
+            });
+            let told: Vec<_> = told.collect();
+            for (look, over, within) in &told[0].0 {
+                called[0] += look.count_ones();
+                called[1] += over.count_ones();
+                called[2] += within.count_ones();
+            }
+            assert!(told.iter().all(|other| *other == told[0]), "{seed}");
+        }
+        assert!(called.iter().all(|count| *count > 50), "{called:?}");
     }
 }

@@ -90,7 +90,7 @@ fn constant<const N: usize>(weights: &[(u8, f64)], z: &[f64; N]) -> f64 {
     weights.iter().fold(0.0, |sum, &(place, weight)| sum + weight * z[usize::from(place)])
 }
 
-/// The quantities of one machine, those that are proportional to each other once.
+/// The quantities of one machine, proportional ones once.
 pub(super) struct Readings<const S: usize, const D: usize> {
     forms: Vec<(Quantity<f64, S, D>, Vec<(u8, f64)>)>,
 }
@@ -131,13 +131,12 @@ impl<const S: usize, const D: usize> Readings<S, D> {
             }
             let limits = shown.readout.limits.iter().filter(|(q, _)| sum[..] == [(*q, 1.0)]);
             let limit = limits.map(|(_, limit)| *limit).fold(f64::INFINITY, f64::min);
-            let same = |other: &[f64; N]| factor(&row, other).filter(|_| alike);
-            let known = rows.iter().enumerate().find_map(|(slot, other)| Some((slot, same(other)?)));
-            let (slot, factor) = known.unwrap_or_else(|| {
+            let factor = if alike { scale(&mut row) } else { 1.0 };
+            let slot = rows.iter().position(|other| alike && *other == row).unwrap_or_else(|| {
                 let form = Form { of: plan.moving(|place| row[place]), constant: 0.0 };
-                forms.push((Quantity { form, dual }, plan.fixed(|place| row[place])));
+                forms.push((Quantity { form, dual: dual / factor.abs() }, plan.fixed(|place| row[place])));
                 rows.push(row);
-                (rows.len() - 1, 1.0)
+                rows.len() - 1
             });
             seen.push(Seen { slot, factor, limit });
         }
@@ -156,12 +155,16 @@ impl<const S: usize, const D: usize> Readings<S, D> {
     }
 }
 
-/// The factor of a row to another one if it is a multiple of it.
-fn factor<const N: usize>(row: &[f64; N], other: &[f64; N]) -> Option<f64> {
-    let place = (0..N).max_by(|a, b| other[*a].abs().total_cmp(&other[*b].abs()))?;
-    let factor = row[place] / other[place];
-    let near = |(a, b): (&f64, &f64)| (a - factor * b).abs() <= 4.0 * f64::EPSILON * a.abs();
-    (factor != 0.0 && factor.is_finite() && row.iter().zip(other).all(near)).then_some(factor)
+/// Divides a row by the first of its largest weights, which is returned: proportional rows become equal, whichever of
+/// them are sought.
+fn scale<const N: usize>(row: &mut [f64; N]) -> f64 {
+    let largest =
+        row.iter().fold(0.0, |largest: f64, weight| if weight.abs() > largest.abs() { *weight } else { largest });
+    if largest == 0.0 {
+        return 1.0;
+    }
+    row.iter_mut().for_each(|weight| *weight /= largest);
+    largest
 }
 
 /// One or two guards of a part as one form between two bounds.
@@ -185,6 +188,8 @@ pub(super) struct Law<const N: usize, const S: usize, const D: usize> {
     fixed: Vec<(u8, u8, f64)>,
     pub(super) energy: Vec<Moving<f64, S, D>>,
     bounds: Vec<Bound<S, D>>,
+    /// By the numbers of guards.
+    weights: Vec<Moving<f64, S, D>>,
     pub(super) readings: Arc<Readings<S, D>>,
     pub(super) is_still: bool,
 }
@@ -229,8 +234,10 @@ impl<const N: usize, const S: usize, const D: usize> Law<N, S, D> {
         }
         let mut bounds: Vec<Bound<S, D>> = Vec::with_capacity(matrices.guards.len());
         let mut rows: Vec<[f64; N]> = Vec::with_capacity(matrices.guards.len());
+        let mut weights = Vec::with_capacity(matrices.guards.len());
         for (index, guard) in matrices.guards.iter().enumerate() {
             let row = guard.row.whole();
+            weights.push(plan.moving(|place| row[place]));
             let opposite = |other: &[f64; N]| (0..N - 1).all(|place| row[place] == -other[place]);
             let own = part(guard.transition.cause);
             if let Some(place) = rows.iter().position(opposite)
@@ -246,7 +253,7 @@ impl<const N: usize, const S: usize, const D: usize> Law<N, S, D> {
                 slots.push(own);
                 slots.len() - 1
             });
-            let (of, dual) = (plan.moving(|place| row[place]), matrices.dual(index));
+            let (of, dual) = (weights[index], matrices.dual(index));
             bounds.push(Bound { slot, of, dual, low: index, high: None });
             rows.push(row);
         }
@@ -255,7 +262,7 @@ impl<const N: usize, const S: usize, const D: usize> Law<N, S, D> {
         let energy = matrices.energy_forms().map(|form| plan.moving(|place| form[place])).collect();
         let bodies = core.common.mechanism.bodies.len();
         let is_still = matrices.mode.motion[..bodies].iter().all(|motion| *motion == Motion::Stuck);
-        Self { longest, grow, rates, fixed, energy, bounds, readings, is_still, matrices }
+        Self { longest, grow, rates, fixed, energy, bounds, weights, readings, is_still, matrices }
     }
 
     /// The rates while what is constant has the values in z.
@@ -299,11 +306,16 @@ impl<const N: usize, const S: usize, const D: usize> Law<N, S, D> {
         })
     }
 
+    /// The slot of a guard: 1 if it is the form there, −1 if it is what is left of the upper bound.
+    pub(super) fn slot(&self, index: usize) -> (usize, f64) {
+        let of = |bound: &&Bound<S, D>| bound.low == index || bound.high == Some(index);
+        let bound = self.bounds.iter().find(of).expect("every guard has a slot");
+        (bound.slot, if bound.low == index { 1.0 } else { -1.0 })
+    }
+
     /// The moving weights of a guard.
-    pub(super) fn weights(&self, index: usize, plan: &Plan<N>) -> Moving<f64, S, D> {
-        let mut row = [0.0; N];
-        self.matrices.guards[index].row.terms().for_each(|(place, weight)| row[place] = weight);
-        plan.moving(|place| row[place])
+    pub(super) fn weights(&self, index: usize) -> &Moving<f64, S, D> {
+        &self.weights[index]
     }
 }
 

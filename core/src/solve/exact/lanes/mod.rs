@@ -36,10 +36,11 @@ use crate::mechanism::{AmplifierMode, Mechanism, SpringLaw};
 use crate::plan::Experiment;
 use crate::solve::inputs::Pieces;
 use crate::solve::observe::{Extremes, NEWS, Polynomial};
-use crate::solve::{Ending, Grid, Outcome, check};
+use crate::solve::propagator::SERIES_TERMS;
+use crate::solve::{Ending, Grid, Outcome, check, roots};
 use flight::{Flight, INNER, Moving, TERMS, Width, numbers};
 use law::{Law, Parts, Plan, Readings, Seen, Slots, all_slide, reads_alike};
-use peak::{Later, Part};
+use peak::{Later, Part, Start};
 use std::cell::RefCell;
 use std::sync::Arc;
 use wide::LANES;
@@ -166,7 +167,10 @@ struct Seat<'a, const N: usize, const S: usize, const D: usize> {
     reads: bool,
     /// The constant parts of z by the pieces of the inputs, the last one being the present.
     held: Vec<[f64; N]>,
-    later: Vec<Later<S, D>>,
+    starts: Vec<Start<S, D>>,
+    later: Vec<Later>,
+    /// The largest magnitudes so far, by the slots of quantities.
+    tops: Vec<f64>,
     pieces: Pieces,
     /// Ends of the present piece of the inputs and of the run, s.
     piece_end: f64,
@@ -288,7 +292,13 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
         }
         let pieces = Pieces::of(&experiment.inputs, 0.0);
         let (piece_end, end) = (pieces.end.min(grid.end()), grid.end());
-        let (law, held, later, steps) = (None, Vec::with_capacity(4), Vec::with_capacity(128), 0.0);
+        let (law, held, steps) = (None, Vec::with_capacity(4), 0.0);
+        let (starts, later) = (Vec::with_capacity(128), Vec::with_capacity(128));
+        let slots = kept.seen.iter().map(|seen| seen.slot + 1).max().unwrap_or(0);
+        let mut tops = vec![f64::INFINITY; slots];
+        for seen in &kept.seen[..watcher.observed().sought()] {
+            tops[seen.slot] = 0.0;
+        }
         let seat = Seat {
             core,
             plan: Arc::clone(&self.plan),
@@ -299,7 +309,9 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
             law,
             reads: false,
             held,
+            starts,
             later,
+            tops,
             pieces,
             piece_end,
             end,
@@ -432,7 +444,11 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
         seat.core.common.rules.since_change += length - begin;
         seat.core.common.offset = length;
         // Values that are held have no peaks but those at the beginning.
-        seat.see_values(base + begin);
+        for slot in 0..seat.tops.len() {
+            let quantity = seat.law().readings.with(slot, &seat.core.z);
+            let value = quantity.form.value(&seat.plan.of(&seat.core.z));
+            seat.see_value(slot, value, base + begin);
+        }
         if seat.watcher.observed().steady().is_some() {
             let seen = *seat.kept.seen.last().expect("a last quantity");
             let quantity = seat.law().readings.with(seen.slot, &seat.core.z);
@@ -462,11 +478,14 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
             Some((late, over)) => (late - core.common.base, over - core.common.base),
             None => (f64::INFINITY, 0.0),
         };
-        seat.see_values(now);
-        for slot in 0..flight.heights.len() {
+        for slot in 0..seat.tops.len() {
+            seat.see_value(slot, flight.from.quantities[slot][0].0[lane], now);
             let heights = &mut flight.heights[slot];
-            heights.peak.0[lane] = seat.height(slot);
+            heights.peak.0[lane] = seat.tops[slot];
             heights.when.0[lane] = f64::NEG_INFINITY;
+        }
+        for heights in &mut flight.heights[seat.tops.len()..] {
+            heights.peak.0[lane] = f64::INFINITY;
         }
     }
 
@@ -498,11 +517,10 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
         if moved > SOON * core.matrices.reach() {
             core.common.rules.refreshed();
         }
-        for (quantity, seen) in seat.kept.seen.iter().enumerate() {
-            let heights = &flight.heights[seen.slot];
-            if heights.when.0[lane] > f64::NEG_INFINITY {
-                let value = seen.of(heights.peak.0[lane]);
-                seat.watcher.observer().come_to(quantity, value, clock[lane] + heights.when.0[lane]);
+        for (slot, heights) in flight.heights.iter_mut().enumerate().take(seat.tops.len()) {
+            let when = std::mem::replace(&mut heights.when.0[lane], f64::NEG_INFINITY);
+            if when > f64::NEG_INFINITY {
+                seat.come_to(slot, heights.peak.0[lane], clock[lane] + when);
             }
         }
     }
@@ -536,14 +554,22 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
         let values = &core.room.value;
         let coefficients = &mut core.room.coefficients;
         let rules = &core.common.rules;
-        let first = super::first_fallen(rules, matrices, (&core.z, h), open, coefficients, |index, room| {
-            let weights = law.weights(index, plan);
+        let along = |index: usize, room: &mut [f64; SERIES_TERMS]| {
+            let weights = law.weights(index);
             for (coefficient, terms) in room.iter_mut().zip(columns.iter()) {
                 *coefficient = weights.dot(terms);
             }
             room[0] = values[index];
             TERMS
-        });
+        };
+        let fall = |index: usize, coefficients: &[f64]| {
+            let (slot, side) = law.slot(index);
+            match coefficients[0] > 0.0 && flight.guard(slot, lane, side).falls_once() {
+                true => Some(roots::only_fall(coefficients)),
+                false => roots::first_fall(coefficients),
+            }
+        };
+        let first = super::first_fallen(rules, matrices, (&core.z, h), open, coefficients, (along, fall));
         let Some((s, fallen)) = first else { return false };
 
         self.hand_over(lane);
@@ -551,16 +577,16 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
         let Some(seat) = &mut seats[lane] else { return false };
         let core = &mut seat.core;
         let mut end = Moving::all(0.0);
-        for terms in columns[1..].iter().rev() {
-            end.each().zip(terms.iter()).for_each(|(end, term)| *end = (*end + term) * s);
-        }
-        end.each().zip(columns[0].iter()).for_each(|(end, begin)| *end += begin);
+        columns[1..].iter().rev().for_each(|terms| end.add_scaled(terms, s));
+        end.add_scaled(&columns[0], 1.0);
         plan.put(&end, &mut core.z);
         for (place, speed) in &plan.parts.ways {
             // ∫ Σ w_k sᵏ h ds
-            let sum = columns.iter().enumerate().rev().fold(0.0, |sum, (k, terms)| {
-                sum * s + terms.s[*speed] * flight::RECIPROCAL[k + 1]
-            });
+            let sum = columns
+                .iter()
+                .enumerate()
+                .rev()
+                .fold(0.0, |sum, (k, terms)| sum * s + terms.s[*speed] * flight::RECIPROCAL[k + 1]);
             core.z[*place] += sum * (s * h);
         }
         core.common.cost.series += 1;
@@ -572,7 +598,7 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
         core.see();
         if s > 0.0 {
             let rest = flight.rest.0[lane] * (1.0 / INNER) * (s * s) * (s * s);
-            seat.see_part(&columns[0], &end, (clock[lane] + flight.time.0[lane], s * h), rest);
+            seat.see_part(flight, lane, (&columns[0], &end), (clock[lane] + flight.time.0[lane], s * h), rest);
         }
         seat.core.go_through(fallen);
         true
@@ -585,14 +611,19 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
         let Some(seat) = &mut seats[lane] else { return };
         let Some(law) = seat.law else { return };
         let (h, rest) = (flight.h.0[lane], flight.rest.0[lane] * (1.0 / INNER));
-        let z = flight.to.z.lane(lane);
-        let begin = clock[lane] + flight.time.0[lane] - h;
+        let mut start = None;
         for (slot, heights) in flight.heights.iter().enumerate() {
             if heights.within >> lane & 1 == 1 {
                 let part = flight.part(slot, lane, (h, rest));
-                let upper = part.bound();
-                let held = seat.held.len() - 1;
-                seat.later.push(Later { law, held, slot, z, begin, length: h, part, upper });
+                if part.is_monotone() {
+                    continue;
+                }
+                let start = *start.get_or_insert_with(|| {
+                    let (held, begin) = (seat.held.len() - 1, clock[lane] + flight.time.0[lane] - h);
+                    seat.starts.push(Start { law, held, z: flight.to.z.lane(lane), begin, length: h });
+                    seat.starts.len() - 1
+                });
+                seat.later.push(Later { start, slot, upper: part.bound(), part });
             }
         }
     }
@@ -649,57 +680,63 @@ impl<const N: usize, const S: usize, const D: usize> Seat<'_, N, S, D> {
         &self.kept.laws[self.law.expect("taken up")]
     }
 
-    /// The largest magnitude of a slot so far, of the first quantity that is seen there.
-    fn height(&self, slot: usize) -> f64 {
-        let first = self.kept.seen.iter().position(|seen| seen.slot == slot);
-        first.map_or(f64::INFINITY, |quantity| self.watcher.observed().height(quantity))
-    }
-
-    /// Takes the values of all quantities now.
-    fn see_values(&mut self, now: f64) {
-        let law = &self.kept.laws[self.law.expect("taken up")];
-        let z = self.plan.of(&self.core.z);
-        for (quantity, seen) in self.kept.seen.iter().enumerate() {
-            let value = seen.of(law.readings.with(seen.slot, &self.core.z).form.value(&z));
-            if value.abs() > self.watcher.observed().height(quantity) {
-                self.watcher.observer().take(quantity, value, now);
-            }
+    /// Takes the value of a slot now, if it is the largest so far.
+    fn see_value(&mut self, slot: usize, value: f64, now: f64) {
+        if value.abs() > self.tops[slot] {
+            self.each((slot, value), |observer, quantity, value| observer.take(quantity, value, now));
         }
     }
 
-    /// Takes the part of a step up to an event.
+    /// Takes the largest value that a slot has come to, and its time.
+    fn come_to(&mut self, slot: usize, value: f64, time: f64) {
+        self.each((slot, value), |observer, quantity, value| observer.come_to(quantity, value, time));
+    }
+
+    /// Tells the observer of each quantity in a slot.
+    fn each(&mut self, (slot, value): (usize, f64), mut tell: impl FnMut(&mut dyn Extremes, usize, f64)) {
+        self.tops[slot] = self.tops[slot].max(value.abs());
+        let observer = self.watcher.observer();
+        let sought = observer.sought();
+        for (quantity, seen) in self.kept.seen.iter().enumerate().take(sought).filter(|(_, seen)| seen.slot == slot) {
+            tell(observer, quantity, seen.of(value));
+        }
+    }
+
+    /// Takes the part of a step of its lane up to an event.
     #[inline(never)]
     fn see_part(
         &mut self,
-        from: &Moving<f64, S, D>,
-        to: &Moving<f64, S, D>,
+        flight: &Flight<S, D>,
+        lane: usize,
+        (from, to): (&Moving<f64, S, D>, &Moving<f64, S, D>),
         (begin, length): (f64, f64),
         rest: f64,
     ) {
         let (law, held) = (self.law.expect("taken up"), self.held.len() - 1);
-        let rates = self.law().rates(&self.core.z);
-        let ends = [from, to];
-        let slopes = ends.map(|z| rates.rate(z));
-        let last = self.kept.seen.len() - 1;
-        for slot in 0..self.law().readings.slots() {
+        let rate = self.law().rates(&self.core.z).rate(to);
+        let mut start = None;
+        let steady = self.kept.seen.last().expect("a last quantity").slot;
+        for slot in 0..self.tops.len() {
             let quantity = self.law().readings.with(slot, &self.core.z);
+            let [value, slope] = flight.from.quantities[slot].map(|numbers| numbers.0[lane]);
             let part = Part {
-                values: ends.map(|z| quantity.form.value(z)),
-                slopes: [0, 1].map(|end| length * quantity.form.change(&slopes[end])),
+                values: [value, quantity.form.value(to)],
+                slopes: [length * slope, length * quantity.form.change(&rate)],
                 rest: rest * quantity.dual,
             };
             let is_held = part.values[0] == part.values[1] && part.slopes == [0.0; 2];
-            for (number, seen) in self.kept.seen.iter().enumerate().filter(|(_, seen)| seen.slot == slot) {
-                let value = seen.of(part.values[1]);
-                if !is_held && value.abs() >= self.watcher.observed().height(number) * (1.0 - NEWS) {
-                    self.watcher.observer().come_to(number, value, begin + length);
-                }
+            if !is_held && part.values[1].abs() >= self.tops[slot] * (1.0 - NEWS) {
+                self.come_to(slot, part.values[1], begin + length);
             }
             let upper = part.bound();
-            if upper > self.height(slot) * (1.0 + NEWS) {
-                self.later.push(Later { law, held, slot, z: *from, begin, length, part, upper });
+            if upper > self.tops[slot] * (1.0 + NEWS) && !part.is_monotone() {
+                let start = *start.get_or_insert_with(|| {
+                    self.starts.push(Start { law, held, z: *from, begin, length });
+                    self.starts.len() - 1
+                });
+                self.later.push(Later { start, slot, part, upper });
             }
-            if self.kept.seen[last].slot == slot {
+            if steady == slot {
                 self.watch((begin, begin + length), from, part);
             }
         }
@@ -717,18 +754,19 @@ impl<const N: usize, const S: usize, const D: usize> Seat<'_, N, S, D> {
         let values = part.values.map(|value| seen.of(value));
         if self.watcher.observer().pass_steady(times, values, (low.min(high), low.max(high))) {
             let (law, held) = (self.law.expect("taken up"), self.held.len() - 1);
-            let mut course = self.course(law, held, seen.slot, z, times.1 - times.0);
+            let start = Start { law, held, z: *z, begin: times.0, length: times.1 - times.0 };
+            let mut course = self.course(seen.slot, &start);
             course.0.iter_mut().for_each(|c| *c *= seen.factor);
             self.watcher.observer().see_steady(times, &|from| course.extremes(from, 1.0));
         }
     }
 
-    /// The course of a slot over `length` from z on.
-    fn course(&self, law: usize, held: usize, slot: usize, z: &Moving<f64, S, D>, length: f64) -> Polynomial<TERMS> {
-        let (law, held) = (&self.kept.laws[law], &self.held[held]);
+    /// The course of a slot from a start on.
+    fn course(&self, slot: usize, start: &Start<S, D>) -> Polynomial<TERMS> {
+        let (law, held) = (&self.kept.laws[start.law], &self.held[start.held]);
         let rates = law.rates(held);
         let mut terms = [Moving::all(0.0); TERMS];
-        rates.series(length, (z, &rates.rate(z)), &mut terms);
+        rates.series(start.length, (&start.z, &rates.rate(&start.z)), &mut terms);
         let form = law.readings.with(slot, held).form;
         let mut course = Polynomial::default();
         for (c, terms) in course.0.iter_mut().zip(&terms) {
@@ -743,8 +781,7 @@ impl<const N: usize, const S: usize, const D: usize> Seat<'_, N, S, D> {
     #[inline(never)]
     fn settle(&mut self) {
         let mut later = std::mem::take(&mut self.later);
-        let slots = later.iter().map(|later| later.slot + 1).max().unwrap_or(0);
-        let mut least: Vec<f64> = (0..slots).map(|slot| self.height(slot)).collect();
+        let mut least = self.tops.clone();
         for Later { slot, part, upper, .. } in &mut later {
             if *upper > least[*slot] {
                 let highest = part.highest();
@@ -754,15 +791,14 @@ impl<const N: usize, const S: usize, const D: usize> Seat<'_, N, S, D> {
         }
         later.retain(|later| later.upper >= least[later.slot]);
         later.sort_by(|a, b| b.upper.total_cmp(&a.upper));
-        for Later { law, held, slot, z, begin, length, part, upper } in &later {
-            if *upper <= self.height(*slot) * (1.0 + NEWS) {
+        for Later { start, slot, part, upper } in &later {
+            if *upper <= self.tops[*slot] * (1.0 + NEWS) {
                 continue;
             }
-            let course = self.course(*law, *held, *slot, z, *length);
-            if let Some((s, value)) = part.peak(&course) {
-                for (quantity, seen) in self.kept.seen.iter().enumerate().filter(|(_, seen)| seen.slot == *slot) {
-                    self.watcher.observer().take(quantity, seen.of(value), begin + s * length);
-                }
+            let start = &self.starts[*start];
+            let (begin, length) = (start.begin, start.length);
+            if let Some((s, value)) = part.peak(&self.course(*slot, start)) {
+                self.see_value(*slot, value, begin + s * length);
             }
         }
     }

@@ -6,18 +6,20 @@ use crate::solve::roots::{EXTREMUM, only_extremum};
 
 const _: () = assert!(TERMS == EXTREMUM);
 
-/// A step within which a quantity may have its peak.
-pub(super) struct Later<const S: usize, const D: usize> {
-    /// Numbers of the law and of the inputs, and the slot of the quantity.
+/// Where a kept step begins: numbers of the law and of the inputs, the state, the time, and its length, s.
+pub(super) struct Start<const S: usize, const D: usize> {
     pub(super) law: usize,
     pub(super) held: usize,
-    pub(super) slot: usize,
-    /// Where it begins, and its length, s.
     pub(super) z: Moving<f64, S, D>,
     pub(super) begin: f64,
     pub(super) length: f64,
+}
+
+/// A step within which a quantity may have its peak: its start and slot, the quantity, and a bound of its magnitude.
+pub(super) struct Later {
+    pub(super) start: usize,
+    pub(super) slot: usize,
     pub(super) part: Part,
-    /// A bound of the magnitude.
     pub(super) upper: f64,
 }
 
@@ -41,38 +43,74 @@ impl Part {
         a.abs().max(b.abs()) + super::flight::INNER * self.rest
     }
 
-    /// Bounds of its values.
-    pub(super) fn range(&self) -> (f64, f64) {
-        let ([a, b], [from, to], rest) = (self.inner(), self.values, super::flight::INNER * self.rest);
-        (from.min(to).min(a.min(b) - rest), from.max(to).max(a.max(b) + rest))
-    }
-
     fn cubic(&self) -> [f64; 4] {
         let ([a, b], [s, t]) = (self.values, self.slopes);
         [a, s, 3.0 * (b - a) - 2.0 * s - t, s + t - 2.0 * (b - a)]
     }
 
+    /// The least and the greatest value of the cubic.
+    fn extremes(&self) -> (f64, f64) {
+        let [a, s, c2, c3] = self.cubic();
+        let [from, to] = self.values;
+        let (mut least, mut greatest) = (from.min(to), from.max(to));
+        let square = c2 * c2 - 3.0 * c3 * s;
+        if square > 0.0 {
+            let q = -(c2 + square.sqrt().copysign(c2));
+            for x in [s / q, q / (3.0 * c3)] {
+                if x > 0.0 && x < 1.0 {
+                    let value = a + x * (s + x * (c2 + x * c3));
+                    (least, greatest) = (least.min(value), greatest.max(value));
+                }
+            }
+        }
+        (least, greatest)
+    }
+
     /// The largest magnitude of the cubic.
     pub(super) fn highest(&self) -> f64 {
-        let [a, s, c2, c3] = self.cubic();
-        let at = |x: f64| if x > 0.0 && x < 1.0 { (a + x * (s + x * (c2 + x * c3))).abs() } else { 0.0 };
-        let most = self.values[0].abs().max(self.values[1].abs());
-        let square = c2 * c2 - 3.0 * c3 * s;
-        if square <= 0.0 {
-            return most;
+        let (least, greatest) = self.extremes();
+        greatest.max(-least)
+    }
+
+    /// True if it certainly rises or falls throughout: its slope is off that of the cubic by 3.1 `rest` at most.
+    pub(super) fn is_monotone(&self) -> bool {
+        let ([a, b], [s, t]) = (self.values, self.slopes);
+        let middle = 3.0 * (b - a) - s - t;
+        let (least, greatest) = (s.min(t).min(middle), s.max(t).max(middle));
+        least > 3.2 * self.rest || greatest < -3.2 * self.rest
+    }
+
+    /// The sign of its curvature, which is off that of the cubic by 32 `rest` at most; zero if that is not certain.
+    fn bends(&self) -> f64 {
+        let [_, _, c2, c3] = self.cubic();
+        let (left, right) = (2.0 * c2, 2.0 * c2 + 6.0 * c3);
+        match () {
+            () if left.min(right) > 32.0 * self.rest => 1.0,
+            () if left.max(right) < -32.0 * self.rest => -1.0,
+            () => 0.0,
         }
-        let q = -(c2 + square.sqrt().copysign(c2));
-        let (first, second) = (at(s / q), at(q / (3.0 * c3)));
-        most.max(first).max(second)
+    }
+
+    /// True if it certainly passes zero once, from above.
+    pub(super) fn falls_once(&self) -> bool {
+        self.values[0] > 0.0 && self.values[1] < 0.0 && (self.is_monotone() || self.bends() != 0.0)
+    }
+
+    /// Bounds of its values.
+    pub(super) fn range(&self) -> (f64, f64) {
+        if self.is_monotone() {
+            let [from, to] = self.values;
+            return (from.min(to), from.max(to));
+        }
+        let (least, greatest) = self.extremes();
+        (least - self.rest, greatest + self.rest)
     }
 
     /// Where the course has its largest magnitude within, and the value there; none if that is at an end.
     pub(super) fn peak(&self, course: &Polynomial<TERMS>) -> Option<(f64, f64)> {
-        let [_, _, c2, c3] = self.cubic();
-        let (left, right) = (2.0 * c2, 2.0 * c2 + 6.0 * c3);
-        // The curvature is off that of the cubic by 32 `rest` at most: of one sign, there is one top.
-        let side = if left < 0.0 { 1.0 } else { -1.0 };
-        if f64::max(side * left, side * right) < -32.0 * self.rest {
+        // With a curvature of one sign, there is one top.
+        let side = -self.bends();
+        if side != 0.0 {
             let [s, t] = self.slopes.map(|slope| side * slope);
             return (s > 0.0 && t < 0.0).then(|| only_extremum(&course.0, side, self.slopes));
         }
