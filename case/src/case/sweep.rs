@@ -107,6 +107,11 @@ pub enum Running {
 impl Running {
     /// All of them, with their words.
     pub const ALL: [(&str, Running); 2] = [("lanes", Running::Beside), ("exact", Running::Exact)];
+
+    /// Its name in the case file.
+    pub fn word(self) -> &'static str {
+        Self::ALL.iter().find(|(_, running)| *running == self).map_or("", |(word, _)| word)
+    }
 }
 
 /// How a parameter varies; SI.
