@@ -17,7 +17,7 @@ const MACHINES: &[(&str, usize, &[&str])] = &[
     (TABLE4, 40, &["sweep.vary.all=60 %"]),
     (TABLE4, 12, &["sweep.vary.all=20 %", "belt.stiffness=[1.3e6, 1.3e6, 6e5]"]),
     (TABLE4, 24, &["sweep.vary.all=20 %", "cart.friction.static=0.5 N", "drive_pulley.friction.static=0.03 N m"]),
-    (TABLE4, 24, &["sweep.vary.all=20 %", "belt.damping=30 N s/m"]),
+    (TABLE4, 24, &["sweep.vary.all=20 %", "belt.damping=[30, 30, 20]"]),
     (TABLE4, 24, &["sweep.vary.all=20 %", "motor.inductance=0.5 mH"]),
     (TABLE4, 24, &["sweep.vary.all=20 %", "amplifier.voltage_limit=6 V"]),
     (TABLE4, 24, &["sweep.vary.all=20 %", "amplifier.current_limit=4 A"]),

@@ -192,41 +192,6 @@ fn crude<const N: usize>(mechanism: &Mechanism, layout: &Layout, mode: &Mode, in
     crude
 }
 
-/// A bound of ‖A‖ in the energy norm without inductance, 1/s: the fastest oscillation, from λ ≤ ‖S⁴‖^¼ of the largest
-/// eigenvalue of S = M^−½ K M^−½, plus the Frobenius norm of the damping; infinite where bodies move together.
-fn norm(mechanism: &Mechanism, equations: &Equations, inertia: &[f64; BODIES]) -> f64 {
-    let bodies = mechanism.bodies.len();
-    if (0..bodies).any(|body| mechanism.leader(body) != body) {
-        return f64::INFINITY;
-    }
-    let mut stiffness = [[0.0; BODIES]; BODIES];
-    let mut damping = 0.0;
-    for (i, row) in stiffness.iter_mut().enumerate().take(bodies) {
-        let Form { stretch, speed, .. } = &equations.acceleration[i];
-        for (stretch, spring) in stretch.iter().zip(&mechanism.springs).filter(|(stretch, _)| **stretch != 0.0) {
-            for &(j, arm) in &spring.arms {
-                row[j] += stretch * arm * (inertia[i] / inertia[j]).sqrt();
-            }
-        }
-        for (j, speed) in speed.iter().enumerate().take(bodies) {
-            damping += speed * speed * inertia[i] / inertia[j];
-        }
-    }
-    let squared = |of: &[[f64; BODIES]; BODIES]| {
-        let mut product = [[0.0; BODIES]; BODIES];
-        for (row, of_row) in product.iter_mut().zip(of).take(bodies) {
-            for (factor, other) in of_row.iter().zip(of).take(bodies) {
-                row.iter_mut().zip(other).take(bodies).for_each(|(sum, other)| *sum += factor * other);
-            }
-        }
-        product
-    };
-    let fourth = squared(&squared(&stiffness));
-    let size: f64 = fourth.as_flattened().iter().map(|entry| entry * entry).sum();
-    // ‖S⁴‖^⅛ is a frequency.
-    size.sqrt().sqrt().sqrt().sqrt() + damping.sqrt()
-}
-
 /// The equations of one mode, ż = A z, and what follows from them.
 pub(in crate::solve) struct ModeMatrices<const N: usize> {
     pub(super) mode: Mode,
@@ -237,9 +202,9 @@ pub(in crate::solve) struct ModeMatrices<const N: usize> {
     load: Option<[Row<N>; BODIES]>,
     /// |b|: growth rate of √(2V) of ż per unit of |u̇|.
     pub(super) forcing: [f64; DRIVES],
-    /// A bound of ‖A‖, 1/s, and a closer one.
+    /// A bound of ‖A‖, 1/s, and the part of it that is not mechanical.
     speed: f64,
-    norm: f64,
+    other_speed: f64,
     /// Halvings of the interval until a Taylor series gives the state, and until one gives the matrix exponential.
     pub(super) coarsest: usize,
     pub(super) finest: usize,
@@ -394,10 +359,9 @@ impl<const N: usize> ModeMatrices<N> {
             }
             damp += form.speed[i].abs();
         }
-        let damp = damp + decays;
+        damp += decays;
         let swing = f64::sqrt(swing);
         let speed: f64 = swing + damp;
-        let norm = speed.min(norm(mechanism, &equations, &inertia) + growth + decays);
         let halvings = |reach: f64| (speed * h / reach).log2().ceil().clamp(0.0, 1000.0) as usize;
         let (coarsest, finest) = (halvings(SERIES_REACH), halvings(EXPONENTIAL_REACH));
 
@@ -432,7 +396,7 @@ impl<const N: usize> ModeMatrices<N> {
             load,
             forcing,
             speed,
-            norm,
+            other_speed: growth + decays,
             coarsest,
             finest,
             h,
@@ -469,9 +433,39 @@ impl<const N: usize> ModeMatrices<N> {
         self.speed
     }
 
-    /// A closer bound of ‖A‖, 1/s.
-    pub(super) fn norm(&self) -> f64 {
-        self.norm
+    /// A closer bound of ‖A‖ in the energy norm, 1/s: the fastest oscillation, from λ ≤ ‖S⁴‖^¼ of the largest eigenvalue
+    /// of S = M^−½ K M^−½, plus the Frobenius norm of the damping.
+    pub(super) fn norm(&self, mechanism: &Mechanism, layout: &Layout) -> f64 {
+        let bodies = mechanism.bodies.len();
+        if (0..bodies).any(|body| mechanism.leader(body) != body) {
+            return self.speed;
+        }
+        let (mut stiffness, mut damping) = ([[0.0; BODIES]; BODIES], 0.0);
+        let moving = (0..bodies).filter(|&body| self.mode.motion[body] != Motion::Stuck);
+        for i in moving.clone() {
+            for j in moving.clone() {
+                let scale = self.inertia[i] / self.inertia[j];
+                let between = |c: usize| {
+                    let place = layout.coordinate[c];
+                    self.rate.at(layout.speed[i], place) * self.rate.at(place, layout.speed[j])
+                };
+                stiffness[i][j] = (0..bodies).map(between).sum::<f64>() * scale.sqrt();
+                damping += square(self.rate.at(layout.speed[i], layout.speed[j])) * scale;
+            }
+        }
+        let squared = |of: &[[f64; BODIES]; BODIES]| {
+            let mut product = [[0.0; BODIES]; BODIES];
+            for (row, of_row) in product.iter_mut().zip(of).take(bodies) {
+                for (factor, other) in of_row.iter().zip(of).take(bodies) {
+                    row.iter_mut().zip(other).take(bodies).for_each(|(sum, other)| *sum += factor * other);
+                }
+            }
+            product
+        };
+        let fourth = squared(&squared(&stiffness));
+        let size: f64 = fourth.as_flattened().iter().map(|entry| entry * entry).sum();
+        // ‖S⁴‖^⅛ is a frequency.
+        self.speed.min(size.sqrt().sqrt().sqrt().sqrt() + damping.sqrt() + self.other_speed)
     }
 
     /// Forms whose squared rates sum to 2V.

@@ -650,7 +650,17 @@ impl<const S: usize, const D: usize> Flight<S, D> {
             let signed = W::pick(W::below(value, zero), zero.minus(most), most);
             W::pick(stays, peak, signed).keep(&mut heights.peak);
             W::pick(stays, W::of(&heights.when), next).keep(&mut heights.when);
-            let inner = one.larger(two).plus(rest.times(W::of(&quantity.dual)));
+            let rest = rest.times(W::of(&quantity.dual));
+            let inner = one.larger(two).plus(rest);
+            // Between its ends a course is highest only if its slope changes sign; that is off the slope of the cubic by
+            // 3.1 times the rest at most.
+            let (s, t) = (h.times(steep), h.times(slope));
+            let middle = value.minus(begin).times(W::all(3.0)).minus(s.plus(t));
+            let (least, greatest) = (s.smaller(t).smaller(middle), s.larger(t).larger(middle));
+            let sure = rest.times(W::all(3.2 / INNER));
+            let straight = W::pick(W::below(least, sure), zero, W::all(1.0));
+            let straight = W::pick(W::below(greatest, zero.minus(sure)), W::all(1.0), straight);
+            let inner = W::pick(W::below(zero, straight), zero, inner);
             heights.within = W::bits(W::below(most.times(W::all(1.0 + NEWS)), inner)) & !ended;
             any |= heights.within;
         }

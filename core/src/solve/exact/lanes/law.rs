@@ -257,10 +257,11 @@ impl<const N: usize, const S: usize, const D: usize> Law<N, S, D> {
             bounds.push(Bound { slot, of, dual, low: index, high: None });
             rows.push(row);
         }
-        let longest = REACH / matrices.norm();
+        let (mechanism, layout) = (&core.common.mechanism, &core.common.space.layout);
+        let longest = REACH / matrices.norm(mechanism, layout);
         let grow = matrices.growth_over(longest.min(1.0));
         let energy = matrices.energy_forms().map(|form| plan.moving(|place| form[place])).collect();
-        let bodies = core.common.mechanism.bodies.len();
+        let bodies = mechanism.bodies.len();
         let is_still = matrices.mode.motion[..bodies].iter().all(|motion| *motion == Motion::Stuck);
         Self { longest, grow, rates, fixed, energy, bounds, weights, readings, is_still, matrices }
     }

@@ -334,7 +334,7 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
         let (readings, seen) = Readings::of(shown, observer.quantities(), &self.plan, alike)?;
         kept.readings = alike.then(|| Arc::new(readings));
         kept.seen = seen;
-        Some(matrices.norm() / flight::REACH)
+        Some(matrices.norm(mechanism, &space.layout) / flight::REACH)
     }
 
     /// Leaves this run and all further ones of a machine to the exact solver.
@@ -564,8 +564,9 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
         };
         let fall = |index: usize, coefficients: &[f64]| {
             let (slot, side) = law.slot(index);
-            match coefficients[0] > 0.0 && flight.guard(slot, lane, side).falls_once() {
-                true => Some(roots::only_fall(coefficients)),
+            let part = flight.guard(slot, lane, side);
+            match coefficients[0] > 0.0 && part.falls_once() {
+                true => Some(roots::only_fall(coefficients, part.values[1])),
                 false => roots::first_fall(coefficients),
             }
         };
@@ -615,9 +616,6 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
         for (slot, heights) in flight.heights.iter().enumerate() {
             if heights.within >> lane & 1 == 1 {
                 let part = flight.part(slot, lane, (h, rest));
-                if part.is_monotone() {
-                    continue;
-                }
                 let start = *start.get_or_insert_with(|| {
                     let (held, begin) = (seat.held.len() - 1, clock[lane] + flight.time.0[lane] - h);
                     seat.starts.push(Start { law, held, z: flight.to.z.lane(lane), begin, length: h });
@@ -755,9 +753,12 @@ impl<const N: usize, const S: usize, const D: usize> Seat<'_, N, S, D> {
         if self.watcher.observer().pass_steady(times, values, (low.min(high), low.max(high))) {
             let (law, held) = (self.law.expect("taken up"), self.held.len() - 1);
             let start = Start { law, held, z: *z, begin: times.0, length: times.1 - times.0 };
-            let mut course = self.course(seen.slot, &start);
-            course.0.iter_mut().for_each(|c| *c *= seen.factor);
-            self.watcher.observer().see_steady(times, &|from| course.extremes(from, 1.0));
+            let course = self.course(seen.slot, &start);
+            self.watcher.observer().see_steady(times, &|from| {
+                let (least, greatest) = part.extremes_from(&course, from);
+                let [a, b] = [seen.of(least), seen.of(greatest)];
+                (a.min(b), a.max(b))
+            });
         }
     }
 

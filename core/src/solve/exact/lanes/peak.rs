@@ -2,9 +2,7 @@
 
 use super::flight::{Moving, TERMS};
 use crate::solve::observe::Polynomial;
-use crate::solve::roots::{EXTREMUM, only_extremum};
-
-const _: () = assert!(TERMS == EXTREMUM);
+use crate::solve::roots::only_extremum;
 
 /// Where a kept step begins: numbers of the law and of the inputs, the state, the time, and its length, s.
 pub(super) struct Start<const S: usize, const D: usize> {
@@ -115,5 +113,23 @@ impl Part {
             return (s > 0.0 && t < 0.0).then(|| only_extremum(&course.0, side, self.slopes));
         }
         Some(course.largest(0.0, 1.0))
+    }
+
+    /// The least and the greatest value of the course from a fraction of the part on.
+    pub(super) fn extremes_from(&self, course: &Polynomial<TERMS>, from: f64) -> (f64, f64) {
+        let side = -self.bends();
+        if side == 0.0 && !self.is_monotone() {
+            return course.extremes(from, 1.0);
+        }
+        let (begin, end) = (if from > 0.0 { course.at(from) } else { self.values[0] }, self.values[1]);
+        let (least, greatest) = (begin.min(end), begin.max(end));
+        let [s, t] = self.slopes.map(|slope| side * slope);
+        if !(s > 0.0 && t < 0.0) {
+            return (least, greatest);
+        }
+        match only_extremum(&course.0, side, self.slopes) {
+            (place, top) if place > from => (least.min(top), greatest.max(top)),
+            _ => (least, greatest),
+        }
     }
 }
