@@ -233,18 +233,18 @@ impl<const N: usize, const S: usize, const D: usize> Law<N, S, D> {
             put_fixed(S + i, row);
         }
         let mut bounds: Vec<Bound<S, D>> = Vec::with_capacity(matrices.guards.len());
-        let mut rows: Vec<[f64; N]> = Vec::with_capacity(matrices.guards.len());
         let mut weights = Vec::with_capacity(matrices.guards.len());
         for (index, guard) in matrices.guards.iter().enumerate() {
-            let row = guard.row.whole();
-            weights.push(plan.moving(|place| row[place]));
-            let opposite = |other: &[f64; N]| (0..N - 1).all(|place| row[place] == -other[place]);
+            let mut row = [0.0; N];
+            guard.row.terms().for_each(|(place, weight)| row[place] = weight);
+            let of = plan.moving(|place| row[place]);
+            weights.push(of);
             let own = part(guard.transition.cause);
-            if let Some(place) = rows.iter().position(opposite)
-                && bounds[place].high.is_none()
-                && slots[bounds[place].slot] == own
-            {
-                bounds[place].high = Some(index);
+            let opposite = |low: usize| matrices.guards[low].row.is_opposite(&guard.row);
+            let same =
+                |bound: &&mut Bound<S, D>| bound.high.is_none() && slots[bound.slot] == own && opposite(bound.low);
+            if let Some(bound) = bounds.iter_mut().find(same) {
+                bound.high = Some(index);
                 continue;
             }
             let taken = |slot: usize| bounds.iter().any(|bound| bound.slot == slot);
@@ -253,14 +253,13 @@ impl<const N: usize, const S: usize, const D: usize> Law<N, S, D> {
                 slots.push(own);
                 slots.len() - 1
             });
-            let (of, dual) = (weights[index], matrices.dual(index));
-            bounds.push(Bound { slot, of, dual, low: index, high: None });
-            rows.push(row);
+            bounds.push(Bound { slot, of, dual: matrices.dual(index), low: index, high: None });
         }
         let (mechanism, layout) = (&core.common.mechanism, &core.common.space.layout);
         let longest = REACH / matrices.norm(mechanism, layout);
         let grow = matrices.growth_over(longest.min(1.0));
-        let energy = matrices.energy_forms().map(|form| plan.moving(|place| form[place])).collect();
+        let mut energy = Vec::with_capacity(S + D + 3);
+        energy.extend(matrices.energy_forms().map(|form| plan.moving(|place| form[place])));
         let bodies = mechanism.bodies.len();
         let is_still = matrices.mode.motion[..bodies].iter().all(|motion| *motion == Motion::Stuck);
         Self { longest, grow, rates, fixed, energy, bounds, weights, readings, is_still, matrices }

@@ -192,6 +192,8 @@ struct Fleet<'a, 'j, const N: usize, const S: usize, const D: usize> {
     /// Times within the piece between which a lane's last quantity is followed, s.
     watched: [(f64, f64); LANES],
     columns: Columns<S, D>,
+    /// Room of runs that have ended.
+    spare: Vec<(Vec<Start<S, D>>, Vec<Later>)>,
 }
 
 /// The series of one lane.
@@ -213,6 +215,7 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
             clock: [0.0; LANES],
             watched: [(f64::INFINITY, 0.0); LANES],
             columns: [Moving::all(0.0); TERMS],
+            spare: Vec::with_capacity(LANES),
         };
         (0..LANES).for_each(|lane| fleet.load(lane));
         while fleet.seats.iter().any(Option::is_some) {
@@ -293,7 +296,7 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
         let pieces = Pieces::of(&experiment.inputs, 0.0);
         let (piece_end, end) = (pieces.end.min(grid.end()), grid.end());
         let (law, held, steps) = (None, Vec::with_capacity(4), 0.0);
-        let (starts, later) = (Vec::with_capacity(128), Vec::with_capacity(128));
+        let (starts, later) = self.spare.pop().unwrap_or_default();
         let slots = kept.seen.iter().map(|seen| seen.slot + 1).max().unwrap_or(0);
         let mut tops = vec![f64::INFINITY; slots];
         for seen in &kept.seen[..watcher.observed().sought()] {
@@ -652,7 +655,7 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
     /// A run has ended: its peaks are settled, and the next one begins.
     fn end_run(&mut self, lane: usize) {
         let Some(mut seat) = self.seats[lane].take() else { return };
-        seat.settle();
+        self.spare.push(seat.settle());
         let Seat { mut core, mut kept, mut watcher, next, .. } = *seat;
         core.note_ties();
         watcher.observer().end(core.time(), &core.state(), &core.common.rules.mode);
@@ -777,10 +780,10 @@ impl<const N: usize, const S: usize, const D: usize> Seat<'_, N, S, D> {
         course
     }
 
-    /// Settles the peaks that were kept: the cubics tell how high they are at least, and steps that may be higher are
+    /// Settles the peaks that were kept, and returns their room: the cubics tell how high they are at least, and steps that may be higher are
     /// expanded again, the highest first.
     #[inline(never)]
-    fn settle(&mut self) {
+    fn settle(&mut self) -> (Vec<Start<S, D>>, Vec<Later>) {
         let mut later = std::mem::take(&mut self.later);
         let mut least = self.tops.clone();
         for Later { slot, part, upper, .. } in &mut later {
@@ -802,5 +805,8 @@ impl<const N: usize, const S: usize, const D: usize> Seat<'_, N, S, D> {
                 self.see_value(*slot, value, begin + s * length);
             }
         }
+        let mut starts = std::mem::take(&mut self.starts);
+        (starts.clear(), later.clear());
+        (starts, later)
     }
 }

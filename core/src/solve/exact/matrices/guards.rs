@@ -29,6 +29,17 @@ impl<const N: usize> Row<N> {
         self.places.iter().zip(&self.weights).take(self.count).map(|(place, weight)| (usize::from(*place), *weight))
     }
 
+    /// True if this is the negative of another one but for the last place, that of constants.
+    pub(in crate::solve::exact) fn is_opposite(&self, other: &Self) -> bool {
+        let moving =
+            |row: &'_ Self| row.count - usize::from(row.count > 0 && usize::from(row.places[row.count - 1]) == N - 1);
+        let count = moving(self);
+        let opposite = |(a, b): (&f64, &f64)| *a == -*b;
+        count == moving(other)
+            && self.places[..count] == other.places[..count]
+            && self.weights[..count].iter().zip(&other.weights[..count]).all(opposite)
+    }
+
     /// Σ w_j z_j, in the order of the places.
     pub(in crate::solve::exact) fn value(&self, z: &[f64; N]) -> f64 {
         self.terms().fold(0.0, |sum, (place, weight)| sum + weight * z[place])
