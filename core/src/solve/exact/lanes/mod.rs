@@ -45,8 +45,10 @@ use std::cell::RefCell;
 use std::sync::Arc;
 use wide::LANES;
 
-/// Steps of a run beyond which it is left to the exact solver, whose steps are as long as the rows are apart.
+/// Steps of a run, in all and for each row, beyond which it is left to the exact solver, whose steps are as long as the
+/// rows are apart.
 const MOST_STEPS: f64 = 20_000.0;
+const STEPS_PER_ROW: f64 = 10.0;
 
 /// A machine, and its experiments, each with its observer.
 pub struct Job<'a, E> {
@@ -146,6 +148,8 @@ struct Kept<const N: usize, const S: usize, const D: usize> {
     space: Arc<Space>,
     known: Modes<N>,
     laws: Vec<Law<N, S, D>>,
+    /// Steps in a second of the fastest mode.
+    fastest: f64,
     /// By the quantities of the observer.
     seen: Vec<Seen>,
     /// Readings for every mode, if none depends on it.
@@ -267,7 +271,7 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
             }
             next.reverse();
             let (known, laws, seen) = (Vec::new(), Vec::new(), Vec::new());
-            let kept = Kept { mechanism, space, known, laws, seen, readings: None };
+            let kept = Kept { mechanism, space, known, laws, fastest: 0.0, seen, readings: None };
             if self.begin(lane, kept, next) {
                 return;
             }
@@ -285,13 +289,14 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
         let known = std::mem::take(&mut kept.known);
         let mut core = Core::new(seen, Arc::clone(&kept.space), &start.state, (grid.interval(), grid.end()), known);
         core.errors = None;
-        if kept.seen.is_empty() {
-            let Some(fastest) = self.prepare(&mut core, &mut kept, watcher.observed()) else {
-                return Self::leave(watcher, next);
-            };
-            if fastest * grid.end() > MOST_STEPS {
-                return Self::leave(watcher, next);
-            }
+        if kept.seen.is_empty() && self.prepare(&mut core, &mut kept, watcher.observed()).is_none() {
+            return Self::leave(watcher, next);
+        }
+        let steps = kept.fastest * grid.end();
+        if steps > MOST_STEPS || steps > STEPS_PER_ROW * grid.intervals() as f64 {
+            watcher.receive(None);
+            kept.known = core.known;
+            return self.begin(lane, kept, next);
         }
         let pieces = Pieces::of(&experiment.inputs, 0.0);
         let (piece_end, end) = (pieces.end.min(grid.end()), grid.end());
@@ -327,8 +332,8 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
         true
     }
 
-    /// Prepares what all runs of a machine need; the steps in a second of its fastest mode, none if it is not for lanes.
-    fn prepare(&self, core: &mut Core<N>, kept: &mut Kept<N, S, D>, observer: &dyn Extremes) -> Option<f64> {
+    /// Prepares what all runs of a machine need; none if it is not for lanes.
+    fn prepare(&self, core: &mut Core<N>, kept: &mut Kept<N, S, D>, observer: &dyn Extremes) -> Option<()> {
         let (mechanism, space) = (&core.common.mechanism, &core.common.space);
         let mode = all_slide(&core.common.rules.mode, mechanism);
         let (matrices, _) = ModeMatrices::of(&mut core.known, mechanism, space, &mode, core.common.h);
@@ -337,7 +342,8 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
         let (readings, seen) = Readings::of(shown, observer.quantities(), &self.plan, alike)?;
         kept.readings = alike.then(|| Arc::new(readings));
         kept.seen = seen;
-        Some(matrices.norm(mechanism, &space.layout) / flight::REACH)
+        kept.fastest = matrices.norm(mechanism, &space.layout) / flight::REACH;
+        Some(())
     }
 
     /// Leaves this run and all further ones of a machine to the exact solver.
