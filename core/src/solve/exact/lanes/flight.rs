@@ -471,7 +471,7 @@ impl<const S: usize, const D: usize> Flight<S, D> {
         let (one, two) = (from[0] + third * from[1], to[0] - third * to[1]);
         let least = from[0].min(to[0]).min(one.min(two) - rest);
         let most = from[0].max(to[0]).max(one.max(two) + rest);
-        [!(least >= 0.0), !(most <= guard.top.0[lane])]
+        [least < 0.0, most > guard.top.0[lane]]
     }
 
     /// A guard within the present step of a lane: the form itself for a positive side, otherwise what is left of its upper

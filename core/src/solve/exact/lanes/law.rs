@@ -79,7 +79,7 @@ impl<const N: usize> Plan<N> {
     }
 
     /// The weights of what is constant.
-    fn fixed(&self, weight: impl Fn(usize) -> f64) -> Vec<(u8, f64)> {
+    fn fixed(&self, weight: impl Fn(usize) -> f64) -> Fixed {
         let weights = self.fixed.iter().map(|&place| (place as u8, weight(place)));
         weights.filter(|(_, weight)| *weight != 0.0).collect()
     }
@@ -92,8 +92,11 @@ fn constant<const N: usize>(weights: &[(u8, f64)], z: &[f64; N]) -> f64 {
 
 /// The quantities of one machine, proportional ones once.
 pub(super) struct Readings<const S: usize, const D: usize> {
-    forms: Vec<(Quantity<f64, S, D>, Vec<(u8, f64)>)>,
+    forms: Vec<(Quantity<f64, S, D>, Fixed)>,
 }
+
+/// Weights of what is constant, by their places in z.
+type Fixed = Vec<(u8, f64)>;
 
 /// Where a quantity is found: its slot, its factor to the form there, and a limit of its magnitude.
 #[derive(Debug, Clone, Copy)]

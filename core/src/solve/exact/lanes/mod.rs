@@ -812,7 +812,8 @@ impl<const N: usize, const S: usize, const D: usize> Seat<'_, N, S, D> {
             }
         }
         let mut starts = std::mem::take(&mut self.starts);
-        (starts.clear(), later.clear());
+        starts.clear();
+        later.clear();
         (starts, later)
     }
 }
