@@ -1,19 +1,16 @@
 //! One step of all lanes at once: Taylor series, and what guards and quantities do within the step.
 
-use super::peak::Part;
+use super::part::{INNER, Part, TERMS};
 #[cfg(target_arch = "x86_64")]
 use super::wide::{Avx2, Avx512};
 use super::wide::{LANES, Lanes, Plain, Wide};
 use crate::solve::observe::NEWS;
 
-/// Terms of a series, and ‖A‖ h that it reaches: 1.3²⁰/20! is 8e-17.
-pub(super) const TERMS: usize = 20;
+/// ‖A‖ h that the terms of a series reach: 1.3²⁰/20! is 8e-17.
 pub(super) const REACH: f64 = 1.3;
 
-/// 16 s² (1 − s)² ≤ 4/3 (B₁ + B₂) ≤ 16/3 B₂ with Bernstein's cubics: by how much a rest moves inner control points, in
-/// units of it; and 24/384 of the rest of a cubic by the term of order four.
-pub(super) const INNER: f64 = 4.0 / 3.0;
-pub(super) const FOURTH: f64 = 1.0 / 16.0;
+/// The rest of a cubic, 1/384 of the fourth derivative, by the term of order four, a 24th of it.
+const FOURTH: f64 = 1.0 / 16.0;
 const THIRD: f64 = 1.0 / 3.0;
 
 /// 1/k

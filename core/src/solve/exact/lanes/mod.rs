@@ -4,7 +4,7 @@
 //! number is a row of [`wide::Lanes`], one for each machine, and an operation is one vector instruction. Each lane has
 //! its own time, step, mode and machine; one whose run has come to its end takes the next from the queue.
 //!
-//! A step ([`flight`]) is a Taylor series of [`flight::TERMS`] terms over at most h = 1.3/‖A‖. What happens within it
+//! A step ([`flight`]) is a Taylor series of [`part::TERMS`] terms over at most h = 1.3/‖A‖. What happens within it
 //! follows from its ends:
 //!
 //! - A guard, or a quantity whose peak is sought, deviates from the cubic of its values and slopes at both ends by at
@@ -26,6 +26,7 @@
 
 mod flight;
 mod law;
+mod part;
 mod peak;
 mod wide;
 
@@ -38,9 +39,10 @@ use crate::solve::inputs::Pieces;
 use crate::solve::observe::{Extremes, NEWS, Polynomial};
 use crate::solve::propagator::SERIES_TERMS;
 use crate::solve::{Ending, Grid, Outcome, check, roots};
-use flight::{Flight, INNER, Moving, TERMS, Width, numbers};
+use flight::{Flight, Moving, Width, numbers};
 use law::{Law, Parts, Plan, Readings, Seen, Slots, all_slide, reads_alike};
-use peak::{Later, Part, Start};
+use part::{INNER, Part, TERMS};
+use peak::{Later, Start};
 use std::cell::RefCell;
 use std::sync::Arc;
 use wide::LANES;
