@@ -1,8 +1,8 @@
 //! Times the kernel of a sweep: the Table 4 machine, all of its parameters by ±20 %, 5 V and 10 V for 0.25 s, one
 //! simulated second at 1 kHz; prints JSON.
 //!
-//! `cargo run --release --package taut --example sweep [-- RUNS [THREADS [FIGURES]]]`, FIGURES as in `taut sweep
-//! --figures`
+//! `cargo run --release --package taut --example sweep [-- RUNS [THREADS [FIGURES] [KEY=VALUE ...]]]`, FIGURES as in
+//! `taut sweep --figures`, KEY=VALUE as in `--set`: `sweep.solver=exact`, say
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
@@ -21,8 +21,11 @@ fn main() -> Result<()> {
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/stages/sollmann-jouaneh/table4.toml");
     let count = format!("sweep.runs={runs}");
     let mut plan = vec![count, "sweep.design=sobol".to_string(), "sweep.vary.all=20 %".to_string()];
-    if let Some(figures) = std::env::args().nth(3) {
-        plan.push(format!("sweep.figures={:?}", figures.split(',').collect::<Vec<_>>()));
+    for more in std::env::args().skip(3) {
+        plan.push(match more.contains('=') {
+            true => more,
+            false => format!("sweep.figures={:?}", more.split(',').collect::<Vec<_>>()),
+        });
     }
     let case = Case::read_with(file, &plan.iter().map(String::as_str).collect::<Vec<_>>())?;
     let sweep = Sweep::new(&case)?;

@@ -2,6 +2,8 @@
 
 #[path = "sweep/gantry.rs"]
 mod gantry;
+#[path = "sweep/lanes.rs"]
+mod lanes;
 
 use crate::common;
 use taut::case::{Case, Sampling};

@@ -15,7 +15,7 @@ pub use meter::{Meter, Sought};
 pub use steady::{Balance, Held, SteadySpeed, balanced_speed};
 
 use crate::friction::Motion;
-use crate::solve::Event;
+use crate::solve::{Event, NEWS};
 
 /// The key figures of one run, by the role of the parts. SI units; r is the pulleys' pitch radius, φ the angle of a
 /// drive pulley.
@@ -201,11 +201,6 @@ impl Peak {
         }
     }
 }
-
-/// Relative excess of a bound over a peak that needs no closer search, and relative difference of equal values. The
-/// peak itself is the maximum of a polynomial with a relative accuracy of 1e-9, the stated accuracy of peaks; the
-/// relative error of its time, on the time scale of the curvature, is the square root of that.
-const NEWS: f64 = 1e-12;
 
 /// Largest of these peaks, with its index; the first of equal ones.
 fn largest(peaks: impl Iterator<Item = Peak>) -> (usize, Peak) {

@@ -72,7 +72,7 @@ def test_the_kernel_takes_any_runs_in_any_order(case):
     arrow = pytest.importorskip("pyarrow")
     from taut.sweeps import _planned, kernel
 
-    planned = _planned(case, 50, VARY, None, None, False, None, None)
+    planned = _planned(case, 50, VARY, None, None, False, None, None, None)
     whole = taut.sweep(planned).to_arrow()
     numbers = [7, 8, 9, 3, 49, 0]
     some = kernel(planned.text, "axis.toml", arrow.table({"run": numbers}))

@@ -386,6 +386,7 @@ fn sweep() -> Value {
             ("from", json!({ "type": "string" })),
             ("indices", json!({ "type": "boolean" })),
             ("figures", json!({ "type": "array", "items": { "type": "string" }, "minItems": 1 })),
+            ("solver", words(["lanes", "exact"])),
         ],
     )
 }

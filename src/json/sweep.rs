@@ -13,6 +13,7 @@ pub fn sweep(case: &Case, sweep: &Sweep, summary: &Summary) -> Value {
         "runs": sweep.runs(),
         "design": sweep.sampling().word(),
         "seed": case.sweep.as_ref().map(|sweep| sweep.seed),
+        "solver": case.sweep.as_ref().map(|sweep| sweep.solver.word()),
         "indices": sweep.indices(),
         "shares_of_every": summary.every,
         "columns": sweep.columns().iter().map(|column| column.heading()).collect::<Vec<_>>(),

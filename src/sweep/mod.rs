@@ -212,13 +212,19 @@ impl Sweep {
         let mut table = Trajectory::with_capacity(&self.headings, count);
         let mut values = Vec::with_capacity(self.headings.len());
         let mut worker = Worker::new(&self.subject);
-        for run in self.range(first, count) {
+        let runs = self.range(first, count);
+        let drawn: Vec<Vec<f64>> = runs.clone().map(|run| self.drawn(run)).collect();
+        let set = |machine: &mut Machine, run: u64| self.set(machine, run, &drawn[(run - runs.start) as usize]);
+        let beside = worker.run_beside(runs.clone(), set, stop)?;
+        for (run, drawn) in runs.clone().zip(&drawn) {
             if stop() {
                 return None;
             }
-            self.put_values(run, &mut values);
-            self.set(worker.reset(), run, &values);
-            worker.run(&mut values);
+            values.clone_from(drawn);
+            if !worker.put(run, &beside, &mut values) {
+                set(worker.reset(), run);
+                worker.run(run, &beside, &mut values);
+            }
             push(&mut table, &values);
         }
         Some(table)
@@ -236,6 +242,13 @@ impl Sweep {
     }
 
     /// The number of a run and its parameters.
+    fn drawn(&self, run: u64) -> Vec<f64> {
+        let mut values = Vec::with_capacity(self.inputs());
+        self.put_values(run, &mut values);
+        values
+    }
+
+    /// The number of a run and its parameters, into `values`.
     fn put_values(&self, run: u64, values: &mut Vec<f64>) {
         values.clear();
         values.push(run as f64);

@@ -2,14 +2,15 @@
 
 use super::measures::{self, Figure, Measure};
 use super::{Group, put_figures, status};
-use crate::case::{Case, Experiment, Move, Sweeping};
+use crate::case::{Case, Experiment, Move, Running, Sweeping};
 use crate::control::{self, MoveRun, Setup};
 use crate::design::Design;
 use crate::error::{Error, Result};
 use crate::machine::Machine;
 use crate::metrics::{self, Held, Meter, Sought};
-use crate::solve::{self, Bench, Flow, Outcome, Solver};
+use crate::solve::{self, Bench, Flow, Job, Outcome, Solver};
 use crate::trajectory::Trajectory;
+use std::ops::Range;
 
 /// A machine as the case has it, and what each of those that are made of it does.
 #[derive(Debug, Clone)]
@@ -22,6 +23,8 @@ pub(super) struct Subject {
     of_experiment: Vec<metrics::Figure>,
     of_move: Vec<Measure>,
     sought: Sought,
+    /// True if machines are run side by side.
+    beside: bool,
 }
 
 impl Subject {
@@ -40,7 +43,8 @@ impl Subject {
         of_move.retain(|measure| plan.tells(&measure.name));
         let seeks: Vec<_> = of_experiment.iter().filter_map(metrics::Figure::seek).collect();
         let sought = Sought::of(&machine, &machine.mechanism(), &seeks);
-        Self { machine, experiments, moves, controller, of_experiment, of_move, sought }
+        let beside = plan.solver == Running::Beside && solve::runs_beside(&machine.mechanism(), &experiments);
+        Self { machine, experiments, moves, controller, of_experiment, of_move, sought, beside }
     }
 
     /// The experiments and moves of each machine, and their figures.
@@ -82,6 +86,12 @@ impl Subject {
         solve::stream(machine, experiment, Solver::of(machine), sink)
     }
 
+    /// Adds status and figures of an experiment.
+    fn tell(&self, run: Result<(Outcome, Meter)>, values: &mut Vec<f64>) {
+        let told = run.map(|(outcome, meter)| (status(&outcome), meter.finish(&outcome.events)));
+        put_figures(told, &self.of_experiment, |figure, metrics| figure.of(metrics).number(), values);
+    }
+
     /// A move in closed loop; the controller takes every machine for the one of the case.
     fn close(&self, machine: &Machine, motion: &Move) -> Result<MoveRun> {
         let Some(design) = &self.controller else { return Err(Error::new("there is no controller")) };
@@ -95,6 +105,32 @@ impl Subject {
             solver: Solver::of(machine),
         };
         control::closed_loop(&setup)
+    }
+}
+
+/// Status and figures of experiments that were run side by side.
+pub(super) struct Beside {
+    first: u64,
+    experiments: usize,
+    /// By machine and experiment; none for a run that is left to the exact solver.
+    told: Vec<Option<Vec<f64>>>,
+}
+
+impl Beside {
+    /// Adds those of an experiment of a run, if they are there.
+    fn put(&self, run: u64, experiment: usize, values: &mut Vec<f64>) -> bool {
+        let place = (run - self.first) as usize * self.experiments + experiment;
+        let told = self.told.get(place).and_then(Option::as_ref);
+        values.extend(told.into_iter().flatten());
+        told.is_some()
+    }
+
+    /// Adds those of all experiments of a run, if all are there.
+    fn put_all(&self, run: u64, values: &mut Vec<f64>) -> bool {
+        let place = (run - self.first) as usize * self.experiments;
+        let all = self.told.get(place..place + self.experiments).filter(|all| all.iter().all(Option::is_some));
+        values.extend(all.into_iter().flatten().flatten().flatten());
+        all.is_some()
     }
 }
 
@@ -118,15 +154,63 @@ impl<'a> Worker<'a> {
         &mut self.machine
     }
 
-    /// Adds status and figures of all that the machine does.
-    pub fn run(&mut self, values: &mut Vec<f64>) {
+    /// Runs the machines with these numbers side by side, as `set` makes them; none if `stop` says so.
+    pub fn run_beside(
+        &mut self,
+        runs: Range<u64>,
+        set: impl Fn(&mut Machine, u64),
+        stop: &dyn Fn() -> bool,
+    ) -> Option<Beside> {
+        let Self { subject, machine, held, .. } = self;
+        let mut rows = Beside { first: runs.start, experiments: subject.experiments.len(), told: Vec::new() };
+        if !subject.beside {
+            return Some(rows);
+        }
+        rows.told.resize(rows.experiments * (runs.end - runs.start) as usize, None);
+        let mut stopped = false;
+        let first = runs.start;
+        let mut jobs = runs.map_while(|run| {
+            stopped |= stop();
+            (!stopped).then_some(run)
+        });
+        let mut jobs = jobs.by_ref().filter_map(|run| {
+            machine.clone_from(&subject.machine);
+            set(machine, run);
+            // A machine that cannot be run is refused when its turn comes.
+            let mechanism = solve::mechanism_for(machine, &subject.experiments).ok()?;
+            let meter = |(experiment, held): (&'a Experiment, &Option<Held>)| {
+                (experiment, Meter::with(machine, &subject.sought, *held, &experiment.inputs))
+            };
+            let runs = subject.experiments.iter().zip(&*held).map(meter).collect();
+            Some(Job { number: (run - first) as usize, mechanism, runs })
+        });
+        let receive = &mut |number: usize, run: usize, told: Option<(Outcome, Meter)>| {
+            rows.told[number * rows.experiments + run] = told.map(|(outcome, meter)| {
+                let mut values = Vec::with_capacity(subject.of_experiment.len() + 1);
+                subject.tell(Ok((outcome, meter)), &mut values);
+                values
+            });
+        };
+        solve::run_beside(&subject.machine.mechanism(), &subject.experiments, &mut jobs, receive);
+        (!stopped).then_some(rows)
+    }
+
+    /// Adds status and figures of all that the machine of a run does, if all of it was run side by side.
+    pub fn put(&self, run: u64, beside: &Beside, values: &mut Vec<f64>) -> bool {
+        self.subject.moves.is_empty() && beside.put_all(run, values)
+    }
+
+    /// Adds status and figures of all that the machine does, but for runs that are told already.
+    pub fn run(&mut self, run: u64, beside: &Beside, values: &mut Vec<f64>) {
         let Self { subject, machine, bench, held } = self;
         let mounted = bench.mount(machine);
-        for (experiment, held) in subject.experiments.iter().zip(held) {
+        for (number, (experiment, held)) in subject.experiments.iter().zip(held).enumerate() {
+            if beside.put(run, number, values) {
+                continue;
+            }
             let mut meter = Meter::with(machine, &subject.sought, *held, &experiment.inputs);
             let outcome = mounted.clone().and_then(|()| bench.observe(experiment, &mut meter));
-            let told = outcome.map(|outcome| (status(&outcome), meter.finish(&outcome.events)));
-            put_figures(told, &subject.of_experiment, |figure, metrics| figure.of(metrics).number(), values);
+            subject.tell(outcome.map(|outcome| (outcome, meter)), values);
         }
         for motion in &subject.moves {
             let told =

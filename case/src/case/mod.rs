@@ -33,7 +33,7 @@ pub use fit::{Nuisances, Per, Plan, Prior, Scope, matches};
 pub use get::{Given, Number};
 pub use motion::Move;
 pub use stepper::needs_motors;
-pub use sweep::{Kinds, Origin, Sampling, Sweeping, Variation};
+pub use sweep::{Kinds, Origin, Running, Sampling, Sweeping, Variation};
 pub use template::{TEMPLATE, Template, gantry_template};
 pub use tune::{Cost, EFFORTS, Known, Tuning};
 

@@ -31,6 +31,8 @@ pub struct Sweeping {
     pub indices: bool,
     /// The figures that are told, by name; all where nothing is said.
     pub figures: Option<Vec<String>>,
+    /// How machines are run.
+    pub solver: Running,
 }
 
 impl Sweeping {
@@ -52,6 +54,7 @@ impl Default for Sweeping {
             from: None,
             indices: false,
             figures: None,
+            solver: Running::Beside,
         }
     }
 }
@@ -89,6 +92,25 @@ impl Sampling {
     /// True if the runs are drawn, as many as one wants.
     pub(crate) fn is_drawn(self) -> bool {
         !matches!(self, Sampling::Grid | Sampling::OneAtATime)
+    }
+}
+
+/// How the machines of a sweep are run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Running {
+    /// Side by side where that is faster, the others one by one.
+    Beside,
+    /// One by one, with the same bits as a single run.
+    Exact,
+}
+
+impl Running {
+    /// All of them, with their words.
+    pub const ALL: [(&str, Running); 2] = [("lanes", Running::Beside), ("exact", Running::Exact)];
+
+    /// Its name in the case file.
+    pub fn word(self) -> &'static str {
+        Self::ALL.iter().find(|(_, running)| *running == self).map_or("", |(word, _)| word)
     }
 }
 
@@ -136,7 +158,7 @@ pub(super) struct Context<'a> {
 pub(super) fn sweeping(root: &Table, context: &Context) -> Result<Option<Sweeping>> {
     let Some(field) = root.optional("sweep") else { return Ok(None) };
     let table = field.table()?;
-    table.check_keys(&["design", "vary", "from", "indices", "figures"], &[])?;
+    table.check_keys(&["design", "vary", "from", "indices", "figures", "solver"], &[])?;
     let design = table.optional("design").map_or(Ok(Sampling::Random), |field| field.choice(&Sampling::ALL))?;
     let indices = table.optional("indices").map_or(Ok(false), |field| field.truth())?;
     let runs = table.number_if_given("runs")?.map(|runs| runs as u64);
@@ -186,7 +208,8 @@ pub(super) fn sweeping(root: &Table, context: &Context) -> Result<Option<Sweepin
     let name = |field: &Field| field.text().map(str::to_string);
     let names = |field: Field| field.filled_list()?.iter().map(name).collect::<Result<_>>();
     let figures = table.optional("figures").map(names).transpose()?;
-    Ok(Some(Sweeping { runs, design, seed: table.seed()?, interval, vary, from, indices, figures }))
+    let solver = table.optional("solver").map_or(Ok(Running::Beside), |field| field.choice(&Running::ALL))?;
+    Ok(Some(Sweeping { runs, design, seed: table.seed()?, interval, vary, from, indices, figures, solver }))
 }
 
 fn origin(field: &Field, context: &Context) -> Result<Origin> {

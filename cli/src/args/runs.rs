@@ -133,6 +133,9 @@ pub struct Sweep {
     /// Figures to compute, by the names of their columns, separated by commas [default: all]
     #[arg(long, value_name = "A,B,...", value_delimiter = ',')]
     pub figures: Vec<String>,
+    /// Solver: lanes, many machines side by side where that is faster, or exact, one by one [default: lanes]
+    #[arg(long, value_name = "SOLVER")]
+    pub solver: Option<String>,
     /// Interval between the rows of --trajectories; figures do not depend on it [default: the experiment's]
     #[arg(long, value_name = "TIME")]
     pub interval: Option<String>,

@@ -20,6 +20,7 @@ pub fn with_changes(args: &Args) -> Result<Common> {
     put("runs", args.runs.clone());
     put("design", args.design.clone().map(|design| format!("\"{design}\"")));
     put("seed", args.seed.map(|seed| seed.to_string()));
+    put("solver", args.solver.clone().map(|solver| format!("\"{solver}\"")));
     put("interval", args.interval.clone());
     put("indices", args.indices.then(|| "true".to_string()));
     let figures = args.figures.iter().map(|name| format!("{:?}", name.trim())).collect::<Vec<_>>().join(", ");

@@ -2,13 +2,16 @@
 
 use super::rotor::Rotor;
 use super::steady::{Held, Plateau};
-use super::{EventCount, LostSteps, Metrics, NEWS, OfDrive, OfLoad, OfSpan, Peak, Seek};
+use super::{EventCount, LostSteps, Metrics, OfDrive, OfLoad, OfSpan, Peak, Seek};
 use crate::friction::Motion;
 use crate::machine::{Machine, Stepper};
 use crate::mechanism::{Mechanism, Mode, Shown, State, Status, What};
 use crate::plan::Experiment;
 use crate::signal::Signal;
-use crate::solve::{Closer, Curve, Event, Gap, Gaps, Observe, Polynomial, QUANTITIES, Reading, Stretch, applied};
+use crate::solve::{
+    Closer, Curve, Event, Extremes, Gap, Gaps, NEWS, Observe, Polynomial, QUANTITIES, Reading, Stretch, applied,
+    reading,
+};
 use std::sync::Arc;
 
 /// Source of a peak: a reading, or a sum of readings.
@@ -110,10 +113,20 @@ impl Places {
     }
 }
 
+/// A quantity whose peak is sought: a reading, or a sum of readings, by its number.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Followed {
+    Reading(usize),
+    Sum(usize),
+}
+
 /// The quantities that a meter follows, made once for many machines of a structure.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sought {
     places: Arc<Places>,
+    followed: Arc<[Followed]>,
+    /// Their sums, and that of the steady speed.
+    quantities: Arc<[Sum]>,
     readings: [bool; QUANTITIES],
     sums: bool,
     steady_speed: bool,
@@ -143,7 +156,15 @@ impl Sought {
         }
         let steady_speed = seeks.iter().any(|(seek, _)| *seek == Seek::SteadySpeed) && mechanism.drives.len() == 1;
         let follows = !seeks.is_empty() || !places.rotors.is_empty();
-        Self { places: Arc::new(places), readings, sums, steady_speed, follows }
+        let of_readings = (0..QUANTITIES).filter(|q| readings[*q]).map(Followed::Reading);
+        let of_sums = (0..if sums { places.sums.len() } else { 0 }).map(Followed::Sum);
+        let followed: Arc<[Followed]> = of_readings.chain(of_sums).collect();
+        let sum = |followed: &Followed| match *followed {
+            Followed::Reading(q) => vec![(q, 1.0)],
+            Followed::Sum(sum) => places.sums[sum].clone(),
+        };
+        let quantities = followed.iter().map(sum).chain([vec![(reading::CART_SPEED, 1.0)]]).collect();
+        Self { places: Arc::new(places), followed, quantities, readings, sums, steady_speed, follows }
     }
 }
 
@@ -392,7 +413,8 @@ impl Observe for Meter {
             closer |= Gap::bound_of(from, to, bow) > peak.value.abs() * (1.0 + NEWS);
         }
         if let Some(plateau) = &mut self.plateau {
-            closer |= plateau.pass(gap);
+            let speed = reading::CART_SPEED;
+            closer |= plateau.pass((gap.begin, end), [gap.from[speed], gap.to[speed]], gap.range(speed));
         }
         for (_, rotor) in &mut self.rotors {
             closer |= rotor.pass(gap);
@@ -424,7 +446,8 @@ impl Observe for Meter {
             }
         }
         if let Some(plateau) = &mut self.plateau {
-            plateau.see(curve);
+            let speed = curve.of(reading::CART_SPEED);
+            plateau.see((curve.begin, curve.begin + curve.length), &|from| speed.extremes(from, 1.0));
         }
         for (_, rotor) in &mut self.rotors {
             rotor.see(curve);
@@ -442,5 +465,58 @@ impl Observe for Meter {
         for (body, rotor) in &mut self.rotors {
             rotor.end(state.speed[*body]);
         }
+    }
+}
+
+impl Meter {
+    fn peak(&mut self, quantity: usize) -> Option<&mut Peak> {
+        match *self.sought.followed.get(quantity)? {
+            Followed::Reading(q) => Some(&mut self.peaks[q]),
+            Followed::Sum(sum) => Some(&mut self.sums[sum]),
+        }
+    }
+}
+
+impl Extremes for Meter {
+    fn quantities(&self) -> &[Sum] {
+        &self.sought.quantities
+    }
+
+    fn sought(&self) -> usize {
+        self.sought.followed.len()
+    }
+
+    fn come_to(&mut self, quantity: usize, value: f64, time: f64) {
+        if let Some(peak) = self.peak(quantity) {
+            peak.come_to(value, time);
+        }
+    }
+
+    fn take(&mut self, quantity: usize, value: f64, time: f64) {
+        if let Some(peak) = self.peak(quantity) {
+            peak.take(value, time);
+        }
+    }
+
+    fn steady(&self) -> Option<(f64, f64)> {
+        Some(self.plateau.as_ref()?.watched())
+    }
+
+    fn pass_steady(&mut self, times: (f64, f64), ends: [f64; 2], range: (f64, f64)) -> bool {
+        self.plateau.as_mut().is_some_and(|plateau| plateau.pass(times, ends, range))
+    }
+
+    fn see_steady(&mut self, times: (f64, f64), range: &dyn Fn(f64) -> (f64, f64)) {
+        if let Some(plateau) = &mut self.plateau {
+            plateau.see(times, range);
+        }
+    }
+
+    fn moves(&mut self, mode: &Mode) {
+        self.moved |= self.slides(mode);
+    }
+
+    fn end(&mut self, time: f64, state: &State, mode: &Mode) {
+        Observe::end(self, time, state, mode);
     }
 }

@@ -3,7 +3,7 @@
 use crate::machine::Machine;
 use crate::mechanism::AmplifierMode;
 use crate::plan::Experiment;
-use crate::solve::{Curve, Gap, Stretch, reading};
+use crate::solve::Stretch;
 
 /// Shortest interval of constant input with a steady speed, as a fraction of the run.
 const SHORTEST: f64 = 0.02;
@@ -96,12 +96,16 @@ impl Plateau {
         stretch.end() >= self.late - self.near && stretch.begin <= self.held.end + self.near
     }
 
-    pub fn pass(&mut self, gap: &Gap) -> bool {
-        let (begin, end) = (gap.begin, gap.begin + gap.length);
+    /// Where it is watched, s.
+    pub fn watched(&self) -> (f64, f64) {
+        (self.late - self.near, self.held.end + self.near)
+    }
+
+    /// Takes an interval: its ends, the speeds there, and bounds of those between; says whether it wants to see closer.
+    pub fn pass(&mut self, (begin, end): (f64, f64), [from, to]: [f64; 2], (low, high): (f64, f64)) -> bool {
         if end < self.late - self.near || end > self.held.end + self.near {
             return false;
         }
-        let (from, to) = (gap.from[reading::CART_SPEED], gap.to[reading::CART_SPEED]);
         self.take(to);
         if begin >= self.late - self.near {
             self.take(from);
@@ -109,20 +113,18 @@ impl Plateau {
         if end >= self.held.end - self.near {
             self.last = Some(to);
         }
-        let (low, high) = gap.range(reading::CART_SPEED);
         let news = STEADY * NEGLIGIBLE * low.abs().max(high.abs());
         begin < self.late - self.near || low < self.range.0 - news || high > self.range.1 + news
     }
 
-    pub fn see(&mut self, curve: &Curve) {
-        let end = curve.begin + curve.length;
+    /// Takes the course of the speed in an interval: the least and the greatest one from a fraction of it on.
+    pub fn see(&mut self, (begin, end): (f64, f64), range: &dyn Fn(f64) -> (f64, f64)) {
         if end < self.late || end > self.held.end + self.near {
             return;
         }
-        let speed = curve.of(reading::CART_SPEED);
-        let from = ((self.late - curve.begin) / curve.length).clamp(0.0, 1.0);
-        self.take(speed.greatest(from, 1.0).1);
-        self.take(-speed.negative().greatest(from, 1.0).1);
+        let (least, greatest) = range(((self.late - begin) / (end - begin)).clamp(0.0, 1.0));
+        self.take(greatest);
+        self.take(least);
     }
 
     pub fn steady_speed(&self, machine: &Machine) -> Option<SteadySpeed> {

@@ -29,10 +29,14 @@ mod widest;
 pub use crate::trajectory::Grid;
 pub use choice::{Choice, Kind};
 pub use estimate::ErrorEstimate;
+pub use exact::{Job, Receive};
 pub use general::{Dynamics, Quantity};
 pub(crate) use inputs::applied;
+pub(crate) use observe::NEWS;
 use observe::Output;
-pub use observe::{Closer, Curve, Gap, Gaps, Observe, Polynomial, QUANTITIES, Reading, Stretch, TERMS, reading};
+pub use observe::{
+    Closer, Curve, Extremes, Gap, Gaps, Observe, Polynomial, QUANTITIES, Reading, Stretch, TERMS, reading,
+};
 pub use run::{Course, Run};
 pub use sensitivity::{Begun, Differentiated, Sensitivities, Variable};
 pub use simulator::Simulator;
@@ -384,6 +388,38 @@ impl Bench {
         self.known = known;
         Ok(outcome)
     }
+}
+
+/// True if machines of this mechanism can run side by side with these inputs: see [`run_beside`].
+pub fn runs_beside(mechanism: &Mechanism, experiments: &[Experiment]) -> bool {
+    exact::takes(mechanism, degree(experiments))
+}
+
+/// The highest power of time in the inputs.
+fn degree(experiments: &[Experiment]) -> usize {
+    experiments.iter().flat_map(|experiment| &experiment.inputs).map(|input| input.degree()).max().unwrap_or(0)
+}
+
+/// The mechanism of a machine for [`run_beside`]. Errors: an invalid machine, an experiment that it cannot run.
+pub fn mechanism_for(machine: &Machine, experiments: &[Experiment]) -> Result<Arc<Mechanism>> {
+    check::machine(machine)?;
+    let mechanism = machine.mechanism();
+    experiments.iter().try_for_each(|experiment| check::experiment(&mechanism, experiment))?;
+    Ok(Arc::new(mechanism))
+}
+
+/// Runs machines of the structure of `mechanism` side by side, in lanes of vectors, each through its experiments, and
+/// passes every run to `receive`.
+///
+/// Events and peaks are those of single runs, positions to 1e-12 m; the bits of a run depend on its machine and its
+/// experiment alone. Runs that are better left to the exact solver come back without a result.
+pub fn run_beside<'a, 'j, E: Extremes>(
+    mechanism: &Mechanism,
+    experiments: &[Experiment],
+    jobs: &mut dyn Iterator<Item = Job<'a, E>>,
+    receive: &'j mut Receive<'j, E>,
+) {
+    exact::run_beside(mechanism, degree(experiments), jobs, receive);
 }
 
 fn nothing_mounted() -> Error {

@@ -355,8 +355,14 @@ impl Curve {
 }
 
 /// Σ c_k sᵏ on 0..1.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Polynomial(pub [f64; TERMS]);
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Polynomial<const T: usize = TERMS>(pub [f64; T]);
+
+impl<const T: usize> Default for Polynomial<T> {
+    fn default() -> Self {
+        Self([0.0; T])
+    }
+}
 
 /// C(7, k)
 const BINOMIAL: [f64; TERMS] = [1.0, 7.0, 21.0, 35.0, 35.0, 21.0, 7.0, 1.0];
@@ -365,20 +371,6 @@ const BINOMIAL: [f64; TERMS] = [1.0, 7.0, 21.0, 35.0, 35.0, 21.0, 7.0, 1.0];
 const LOOKS: usize = 8;
 
 impl Polynomial {
-    /// The value at `s`.
-    #[inline(always)]
-    pub fn at(&self, s: f64) -> f64 {
-        self.0.iter().rev().fold(0.0, |sum, c| sum * s + c)
-    }
-
-    fn slope(&self, s: f64) -> f64 {
-        (1..TERMS).rev().fold(0.0, |sum, k| sum * s + k as f64 * self.0[k])
-    }
-
-    fn bend(&self, s: f64) -> f64 {
-        (2..TERMS).rev().fold(0.0, |sum, k| sum * s + (k * (k - 1)) as f64 * self.0[k])
-    }
-
     /// A bound of its magnitude on 0..1: the largest of its coefficients in Bernstein's form, b_k = Σ_j C(k, j)/C(n, j)
     /// c_j.
     #[inline]
@@ -398,6 +390,22 @@ impl Polynomial {
             }
         }
         b.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &b| (low.min(b), high.max(b)))
+    }
+}
+
+impl<const T: usize> Polynomial<T> {
+    /// The value at `s`.
+    #[inline(always)]
+    pub fn at(&self, s: f64) -> f64 {
+        self.0.iter().rev().fold(0.0, |sum, c| sum * s + c)
+    }
+
+    fn slope(&self, s: f64) -> f64 {
+        (1..T).rev().fold(0.0, |sum, k| sum * s + k as f64 * self.0[k])
+    }
+
+    fn bend(&self, s: f64) -> f64 {
+        (2..T).rev().fold(0.0, |sum, k| sum * s + (k * (k - 1)) as f64 * self.0[k])
     }
 
     /// True if it certainly has no zero.
@@ -453,6 +461,11 @@ impl Polynomial {
     pub fn largest(&self, from: f64, to: f64) -> (f64, f64) {
         let (high, low) = (self.greatest(from, to), self.negative().greatest(from, to));
         if low.1 > high.1 { (low.0, -low.1) } else { high }
+    }
+
+    /// The least and the greatest value between `from` and `to`.
+    pub fn extremes(&self, from: f64, to: f64) -> (f64, f64) {
+        (-self.negative().greatest(from, to).1, self.greatest(from, to).1)
     }
 
     /// Adds another one, times `weight`.
@@ -534,6 +547,44 @@ pub trait Observe {
     fn end(&mut self, time: f64, state: &State, mode: &Mode);
 }
 
+/// Relative excess of a bound over a peak that needs no closer search, and relative difference of equal values. The
+/// peak itself is the maximum of a polynomial with a relative accuracy of 1e-9, the stated accuracy of peaks; the
+/// relative error of its time, on the time scale of the curvature, is the square root of that.
+pub(crate) const NEWS: f64 = 1e-12;
+
+/// An observer of the extremes of some quantities, and of one that becomes steady: what runs side by side are followed
+/// for.
+pub trait Extremes {
+    /// The quantities: sums of readings by their numbers, each with its weight; and a last one that becomes steady.
+    fn quantities(&self) -> &[Vec<(usize, f64)>];
+
+    /// Number of those whose extremes are sought: all but the last, or all.
+    fn sought(&self) -> usize;
+
+    /// Takes the largest value that a quantity has come to, and when it was there last.
+    fn come_to(&mut self, quantity: usize, value: f64, time: f64);
+
+    /// Takes a value that may be larger than those before.
+    fn take(&mut self, quantity: usize, value: f64, time: f64);
+
+    /// The interval in which the last quantity is followed, s, if it is.
+    fn steady(&self) -> Option<(f64, f64)>;
+
+    /// Takes an interval of it: its ends, the values there, and bounds of what is between. Says whether it wants to see
+    /// closer.
+    fn pass_steady(&mut self, times: (f64, f64), ends: [f64; 2], range: (f64, f64)) -> bool;
+
+    /// Takes the course of it in an interval that it wanted to see closer.
+    /// `range` gives the least and the greatest value from a fraction of it on.
+    fn see_steady(&mut self, times: (f64, f64), range: &dyn Fn(f64) -> (f64, f64));
+
+    /// Parts have moved in this mode.
+    fn moves(&mut self, mode: &Mode);
+
+    /// The run has ended, in this state.
+    fn end(&mut self, time: f64, state: &State, mode: &Mode);
+}
+
 /// The readings of a machine in one mode, as linear forms.
 #[derive(Debug, Clone)]
 pub(super) struct Readout {
@@ -541,7 +592,7 @@ pub(super) struct Readout {
     /// Readings of positions relative to the origin: the quantity, the body, its factor.
     ways: Vec<(usize, usize, f64)>,
     /// Limits of voltages and currents, which limited values do not exceed by a single bit.
-    limits: Vec<(usize, f64)>,
+    pub(super) limits: Vec<(usize, f64)>,
     /// True if all readings are among the first [`FEW`] quantities.
     pub(super) few: bool,
 }

@@ -96,6 +96,11 @@ impl<const R: usize, const C: usize> Matrix<R, C> {
         self.column[column][row] = value;
     }
 
+    /// The entry in this row and column.
+    pub(crate) fn at(&self, row: usize, column: usize) -> f64 {
+        self.column[column][row]
+    }
+
     /// Taylor series over `distance` of ż = A z.
     pub(crate) fn series(&self, z: &[f64; C], distance: f64, order: usize, series: &mut Series<C>) {
         series.order = order;

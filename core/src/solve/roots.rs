@@ -207,6 +207,45 @@ fn halves_by_any<const N: usize>(b: &[f64; N]) -> ([f64; N], [f64; N]) {
     (left, right)
 }
 
+/// The only extremum of Σ c_k sᵏ in (0, 1), where the slope times `side` falls from positive to negative, and the value
+/// there. `ends` are the slopes at 0 and 1.
+pub(super) fn only_extremum<const T: usize>(c: &[f64; T], side: f64, ends: [f64; 2]) -> (f64, f64) {
+    let mut slope = [0.0; T];
+    for k in 1..T {
+        slope[k - 1] = side * k as f64 * c[k];
+    }
+    let s = only_zero(&slope, ends[0] / (ends[0] - ends[1]));
+    (s, value_and_slope(c, s).0)
+}
+
+/// The only fall of Σ c_k sᵏ in (0, 1], positive at 0 and negative, `end`, at 1.
+pub(super) fn only_fall(c: &[f64], end: f64) -> f64 {
+    only_zero(c, c[0] / (c[0] - end))
+}
+
+/// The only zero in (0, 1) of Σ c_k sᵏ, which is positive before it, by Newton's method from `s` within a bracket.
+fn only_zero(c: &[f64], mut s: f64) -> f64 {
+    let (mut low, mut high) = (0.0, 1.0);
+    for _ in 0..100 {
+        let (p, slope) = value_and_slope(c, s);
+        if p < 0.0 {
+            high = s;
+        } else {
+            low = s;
+        }
+        let newton = s - p / slope;
+        // The next step would be the square of this one: less than the last bit.
+        if (newton - s).abs() <= 1e-9 * s {
+            return newton.clamp(low, high);
+        }
+        s = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
+        if high - low <= f64::EPSILON * s {
+            break;
+        }
+    }
+    s
+}
+
 /// Newton's method within a bracket whose upper end is negative; bisection if it would leave the bracket. It begins at
 /// the zero of the straight line between the ends.
 fn polish(c: &[f64], (mut low, above): (f64, f64), (mut high, below): (f64, f64)) -> f64 {

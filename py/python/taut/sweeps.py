@@ -8,7 +8,7 @@ import time
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from . import _checks, _native
 from ._optional import needed
@@ -39,6 +39,7 @@ def sweep(
     indices: bool = False,
     interval: str | float | None = None,
     figures: Sequence[str] | None = None,
+    solver: Literal["lanes", "exact"] | None = None,
     threads: int = 0,
     client: Client | None = None,
     chunk: int | None = None,
@@ -51,12 +52,13 @@ def sweep(
     ``latin-hypercube``, ``sobol``, ``grid`` or ``one-at-a-time``, ``seed`` says which draws, ``interval`` (s) how far
     apart the rows are that figures are taken from, ``indices`` makes the runs those that Sobol' indices need.
     ``figures`` are the names of those that are told, ``["peak_cart_speed", "stop_time"]``: others are not sought.
+    ``solver="exact"`` runs the machines one by one instead of side by side.
 
     Row ``i`` depends on the case and ``i`` alone: the result is the same to the last bit with any number of ``threads``
     (0: one for each processor), and on the workers of a ``client`` of Dask, in tasks of ``chunk`` runs. A worker that
     is lost costs time, and no row.
     """
-    changed = _planned(case, n, vary, design, seed, indices, interval, figures)
+    changed = _planned(case, n, vary, design, seed, indices, interval, figures, solver)
     threads = _checks.whole("threads", threads, 0)
     if client is None:
         if chunk is not None:
@@ -79,12 +81,13 @@ def sweep_tables(
     indices: bool = False,
     interval: str | float | None = None,
     figures: Sequence[str] | None = None,
+    solver: Literal["lanes", "exact"] | None = None,
     client: Client,
     chunk: int | None = None,
 ) -> Iterator[pyarrow.Table]:
     """The same rows piece by piece in their order, as tables of Arrow: memory stays flat however many runs there
     are."""
-    return _tables(_planned(case, n, vary, design, seed, indices, interval, figures), client, chunk)
+    return _tables(_planned(case, n, vary, design, seed, indices, interval, figures, solver), client, chunk)
 
 
 def kernel(text: str, path: str, runs: pyarrow.Table) -> pyarrow.Table:
@@ -126,13 +129,15 @@ def _planned(
     indices: bool,
     interval: str | float | None,
     figures: Sequence[str] | None,
+    solver: str | None,
 ) -> Case:
     """The case with all of it in its text, as the command line does."""
     if not isinstance(getattr(case, "_native", None), _native.Case):
         raise TypeError(f"case: expected a taut.Case, found {type(case).__name__}")
     if not isinstance(vary, (Mapping, type(None))):
         raise TypeError(f"vary: expected a dictionary, found {type(vary).__name__}")
-    given = {"runs": n, "design": design, "seed": seed, "interval": interval, "indices": True if indices else None}
+    given = {"runs": n, "design": design, "seed": seed, "interval": interval, "solver": solver}
+    given["indices"] = True if indices else None
     changes: dict[str, Any] = {f"sweep.{key}": value for key, value in given.items() if value is not None}
     if figures is not None:
         if isinstance(figures, str) or not isinstance(figures, Sequence):

@@ -202,8 +202,9 @@ pub(in crate::solve) struct ModeMatrices<const N: usize> {
     load: Option<[Row<N>; BODIES]>,
     /// |b|: growth rate of √(2V) of ż per unit of |u̇|.
     pub(super) forcing: [f64; DRIVES],
-    /// A bound of ‖A‖, 1/s.
+    /// A bound of ‖A‖, 1/s, and the part of it that is not mechanical.
     speed: f64,
+    other_speed: f64,
     /// Halvings of the interval until a Taylor series gives the state, and until one gives the matrix exponential.
     pub(super) coarsest: usize,
     pub(super) finest: usize,
@@ -215,7 +216,7 @@ pub(in crate::solve) struct ModeMatrices<const N: usize> {
     /// Coordinates of the origin.
     origin: [f64; BODIES],
     rate: Matrix<N, N>,
-    steps: Vec<OnceLock<Matrix<N, N>>>,
+    steps: Vec<OnceLock<Box<Matrix<N, N>>>>,
     /// Rate at which √V may grow by itself; zero for most machines.
     growth: f64,
     inertia: [f64; BODIES],
@@ -395,6 +396,7 @@ impl<const N: usize> ModeMatrices<N> {
             load,
             forcing,
             speed,
+            other_speed: growth + decays,
             coarsest,
             finest,
             h,
@@ -429,6 +431,59 @@ impl<const N: usize> ModeMatrices<N> {
     /// A bound of ‖A‖, 1/s.
     pub(super) fn speed(&self) -> f64 {
         self.speed
+    }
+
+    /// A closer bound of ‖A‖ in the energy norm, 1/s: the fastest oscillation, from λ ≤ ‖S⁴‖^¼ of the largest eigenvalue
+    /// of S = M^−½ K M^−½, plus the Frobenius norm of the damping.
+    pub(super) fn norm(&self, mechanism: &Mechanism, layout: &Layout) -> f64 {
+        let bodies = mechanism.bodies.len();
+        if (0..bodies).any(|body| mechanism.leader(body) != body) {
+            return self.speed;
+        }
+        let (mut stiffness, mut damping) = ([[0.0; BODIES]; BODIES], 0.0);
+        let moving = (0..bodies).filter(|&body| self.mode.motion[body] != Motion::Stuck);
+        for i in moving.clone() {
+            for j in moving.clone() {
+                let scale = self.inertia[i] / self.inertia[j];
+                let between = |c: usize| {
+                    let place = layout.coordinate[c];
+                    self.rate.at(layout.speed[i], place) * self.rate.at(place, layout.speed[j])
+                };
+                stiffness[i][j] = (0..bodies).map(between).sum::<f64>() * scale.sqrt();
+                damping += square(self.rate.at(layout.speed[i], layout.speed[j])) * scale;
+            }
+        }
+        let squared = |of: &[[f64; BODIES]; BODIES]| {
+            let mut product = [[0.0; BODIES]; BODIES];
+            for (row, of_row) in product.iter_mut().zip(of).take(bodies) {
+                for (factor, other) in of_row.iter().zip(of).take(bodies) {
+                    row.iter_mut().zip(other).take(bodies).for_each(|(sum, other)| *sum += factor * other);
+                }
+            }
+            product
+        };
+        let fourth = squared(&squared(&stiffness));
+        let size: f64 = fourth.as_flattened().iter().map(|entry| entry * entry).sum();
+        // ‖S⁴‖^⅛ is a frequency.
+        self.speed.min(size.sqrt().sqrt().sqrt().sqrt() + damping.sqrt() + self.other_speed)
+    }
+
+    /// Forms whose squared rates sum to 2V.
+    pub(super) fn energy_forms(&self) -> impl Iterator<Item = [f64; N]> + '_ {
+        let column = |lanes: &Lanes<N>, lane: usize| lanes.map(|weights| weights[lane]);
+        let mechanical = self.energy.iter().flat_map(move |lanes| (0..LANES).map(move |lane| column(lanes, lane)));
+        let magnetic = self.magnetic.iter().filter(|(_, weight)| *weight > 0.0).map(|&(place, weight)| {
+            let mut form = [0.0; N];
+            form[place] = weight.sqrt();
+            form
+        });
+        mechanical.filter(|form| *form != [0.0; N]).chain(magnetic)
+    }
+
+    /// Largest rate of a guard per unit of √(2V) of ż with constant inputs.
+    pub(super) fn dual(&self, guard: usize) -> f64 {
+        let beside = &self.beside[guard / LANES];
+        beside.mechanical[guard % LANES].hypot(beside.magnetic[guard % LANES])
     }
 
     widest! {
@@ -541,12 +596,12 @@ impl<const N: usize> ModeMatrices<N> {
         if self.steps[level].get().is_none() {
             let known = (level..=self.finest).find(|&l| self.steps[l].get().is_some());
             let from = known.unwrap_or_else(|| {
-                let _ = self.steps[self.finest].set(self.rate.exponential(self.reach()));
+                let _ = self.steps[self.finest].set(Box::new(self.rate.exponential(self.reach())));
                 self.finest
             });
             for l in (level..from).rev() {
                 let doubled = self.steps[l + 1].get().expect("just computed").doubled();
-                let _ = self.steps[l].set(doubled);
+                let _ = self.steps[l].set(Box::new(doubled));
             }
         }
         self.steps[level].get().expect("just computed")

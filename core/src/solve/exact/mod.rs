@@ -11,6 +11,7 @@
 mod change;
 mod ellipsoid;
 mod kernel;
+mod lanes;
 mod matrices;
 mod run;
 mod saved;
@@ -21,6 +22,7 @@ use super::coordinates::Coordinates;
 use super::engine::Engine;
 use super::inputs::Pieces;
 use super::pace::{Pace, STEPS_BETWEEN_QUESTIONS};
+use super::propagator::SERIES_TERMS;
 use super::record::Extra;
 use super::roots;
 use super::rounding::Rounding;
@@ -31,6 +33,8 @@ use crate::mechanism::{DRIVES, Form, Layout, Mechanism, Mode, State, Transition}
 use ellipsoid::Ellipsoid;
 use kernel::Modes;
 pub(super) use kernel::{Make, in_kernel};
+pub use lanes::{Job, Receive};
+pub(super) use lanes::{run_beside, takes};
 pub(super) use matrices::Space;
 use matrices::{ModeMatrices, Room, Size};
 pub(super) use run::Run;
@@ -476,27 +480,14 @@ impl<const N: usize> Core<N> {
     fn advance_by_series_of(&mut self, law: &ModeMatrices<N>, distance: f64, open: Lanes) -> Option<Transition> {
         self.common.cost.series += 1;
         law.series(&self.z, distance, &mut self.room.series);
-        let mut first: Option<(f64, Transition)> = None;
         let Room { value, series, coefficients, .. } = &mut *self.room;
-        for lane in open.numbers() {
-            let guard = &law.guards[lane];
-            let coefficients = guard.row.along(series, coefficients);
-            coefficients[0] = value[lane];
-            let mut order = self.common.rules.fresh_order(guard.transition.cause);
-            if order > 0 || coefficients[0] == 0.0 {
-                order = law.first_term(guard, coefficients, (&self.z, distance), order.max(1));
-            }
-            let sooner = |s: f64| {
-                first.is_none_or(|(earliest, other)| {
-                    s < earliest || (s == earliest && guard.transition.rank < other.rank)
-                })
-            };
-            if let Some(s) = roots::first_fall(&coefficients[order..])
-                && sooner(s)
-            {
-                first = Some((s, guard.transition));
-            }
-        }
+        let along = |index: usize, room: &mut [f64; SERIES_TERMS]| {
+            let coefficients = law.guards[index].row.along(series, room);
+            coefficients[0] = value[index];
+            coefficients.len()
+        };
+        let fall = |_, coefficients: &[f64]| roots::first_fall(coefficients);
+        let first = first_fallen(&self.common.rules, law, (&self.z, distance), open, coefficients, (along, fall));
         let s = first.map_or(1.0, |(s, _)| s);
         series.add_to(&mut self.z, s);
         self.move_on(s * distance);
@@ -641,6 +632,41 @@ impl<const N: usize> Engine for Core<N> {
     fn error(&self) -> Option<PositionError> {
         Some(self.clone().bound_of_rounding())
     }
+}
+
+/// The first of the `open` guards that falls along a series of z over `distance`, and the fraction of the distance;
+/// `along` gives the coefficients of a guard and their number, `fall` its first fall if none of them is left out.
+fn first_fallen<const N: usize>(
+    rules: &Rules,
+    law: &ModeMatrices<N>,
+    (z, distance): (&[f64; N], f64),
+    open: Lanes,
+    room: &mut [f64; SERIES_TERMS],
+    (mut along, fall): (impl FnMut(usize, &mut [f64; SERIES_TERMS]) -> usize, impl Fn(usize, &[f64]) -> Option<f64>),
+) -> Option<(f64, Transition)> {
+    let mut first: Option<(f64, Transition)> = None;
+    for index in open.numbers() {
+        let guard = &law.guards[index];
+        let count = along(index, room);
+        let coefficients = &room[..count];
+        let mut order = rules.fresh_order(guard.transition.cause);
+        if order > 0 || coefficients[0] == 0.0 {
+            order = law.first_term(guard, coefficients, (z, distance), order.max(1));
+        }
+        let sooner = |s: f64| {
+            first.is_none_or(|(earliest, other)| s < earliest || (s == earliest && guard.transition.rank < other.rank))
+        };
+        let found = match order {
+            0 => fall(index, coefficients),
+            order => roots::first_fall(&coefficients[order..]),
+        };
+        if let Some(s) = found
+            && sooner(s)
+        {
+            first = Some((s, guard.transition));
+        }
+    }
+    first
 }
 
 /// The vector z of a state in the solver's coordinates, its inputs zero.

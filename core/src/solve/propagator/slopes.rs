@@ -48,11 +48,6 @@ pub(crate) struct SlopedStep<const N: usize> {
 }
 
 impl<const N: usize> Matrix<N, N> {
-    /// The entry in this row and column.
-    pub(crate) fn at(&self, row: usize, column: usize) -> f64 {
-        self.column[column][row]
-    }
-
     /// e^{A d} − I with A = `self`, and its derivatives for the derivatives `slopes` of A; `speed` is a bound of ‖A‖.
     pub(crate) fn sloped_step(&self, slopes: &[Columns<N>], d: f64, speed: f64) -> SlopedStep<N> {
         let halvings = (speed * d / EXPONENTIAL_REACH).log2().ceil().clamp(0.0, 60.0) as i32;

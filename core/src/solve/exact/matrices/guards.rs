@@ -25,8 +25,19 @@ impl<const N: usize> Row<N> {
         Self { places, weights, count }
     }
 
-    fn terms(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
+    pub(in crate::solve::exact) fn terms(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
         self.places.iter().zip(&self.weights).take(self.count).map(|(place, weight)| (usize::from(*place), *weight))
+    }
+
+    /// True if this is the negative of another one but for the last place, that of constants.
+    pub(in crate::solve::exact) fn is_opposite(&self, other: &Self) -> bool {
+        let moving =
+            |row: &'_ Self| row.count - usize::from(row.count > 0 && usize::from(row.places[row.count - 1]) == N - 1);
+        let count = moving(self);
+        let opposite = |(a, b): (&f64, &f64)| *a == -*b;
+        count == moving(other)
+            && self.places[..count] == other.places[..count]
+            && self.weights[..count].iter().zip(&other.weights[..count]).all(opposite)
     }
 
     /// Σ w_j z_j, in the order of the places.

@@ -98,6 +98,20 @@ impl<const N: usize> Shown<N> {
         }
     }
 
+    /// A quantity as weights of the places of z.
+    pub(in crate::solve::exact) fn row(&self, q: usize) -> [f64; N] {
+        std::array::from_fn(|place| match (q.checked_sub(FEW), &self.more) {
+            (None, _) => self.matrix.at(q, place),
+            (Some(q), Some(more)) => more.at(q, place),
+            (Some(_), None) => 0.0,
+        })
+    }
+
+    /// Largest rate of a quantity per unit of √(2V) of ż with constant inputs; infinite if no spring holds it.
+    pub(in crate::solve::exact) fn dual(&self, q: usize) -> f64 {
+        if self.unsprung[q] > 0.0 { f64::INFINITY } else { self.mechanical[q].hypot(self.magnetic[q]) }
+    }
+
     /// Reading of a change of z.
     #[inline]
     pub(in crate::solve) fn change(&self, change: &[f64; N]) -> Reading {
