@@ -307,7 +307,9 @@ fn elastic_feed_forward_of_a_gantry_leaves_what_sampling_leaves() {
         let compensated = error("{ model = \"rigid\", compensate_stretch = true }");
         let whole = error(elastic);
         let has_gear = number % 2 == 0 && number % 3 != 2;
-        println!("{number}: rigid {rigid:.2e} m, compensated {compensated:.2e} m, elastic {whole:.2e} m, gear {has_gear}");
+        println!(
+            "{number}: rigid {rigid:.2e} m, compensated {compensated:.2e} m, elastic {whole:.2e} m, gear {has_gear}"
+        );
         assert!(compensated < 0.2 * rigid && whole < if has_gear { 0.2 } else { 2e-3 } * rigid, "{number}");
     }
 }

@@ -292,8 +292,13 @@ fn a_part_in_which_the_motor_is_off_is_found() {
             found.warnings().filter(|one| one.code == "interruption").map(|one| one.text.as_str()).collect();
         // The windows around it.
         let at = from as f64 * EVERY;
-        let ends: Vec<f64> = told.iter().flat_map(|text| text.split(' ').filter_map(|word| word.parse().ok())).collect();
-        assert!(told.len() == 1 && ends[0] <= at && ends[1] >= at + 0.2 && ends[1] - ends[0] < 0.7, "{seed}: {:#?}", found.findings);
+        let ends: Vec<f64> =
+            told.iter().flat_map(|text| text.split(' ').filter_map(|word| word.parse().ok())).collect();
+        assert!(
+            told.len() == 1 && ends[0] <= at && ends[1] >= at + 0.2 && ends[1] - ends[0] < 0.7,
+            "{seed}: {:#?}",
+            found.findings
+        );
         let good = fitted(&changed(1200 + seed, |_| {}));
         assert!(!warned(&good, "interruption"), "{seed}: {:#?}", good.findings);
         let narrow = fitted(&drawn(1200 + seed, 1e-3, 0));

@@ -95,7 +95,9 @@ impl Direction {
     /// True if its drives must pull alike, since each also moves something else.
     pub fn is_alike(&self, machine: &Machine) -> bool {
         let others = machine.geometry().slides.iter().enumerate().filter(|(number, _)| *number != self.number);
-        others.flat_map(|(_, slide)| self.movers.iter().map(|drive| slide.by_drives[*drive])).any(|weight| weight != 0.0)
+        others
+            .flat_map(|(_, slide)| self.movers.iter().map(|drive| slide.by_drives[*drive]))
+            .any(|weight| weight != 0.0)
     }
 
     /// True if backward it moves otherwise than forward.

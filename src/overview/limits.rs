@@ -83,11 +83,8 @@ fn reached(
     }
     if left <= 0.0 {
         let whose = if direction.movers.len() == 1 { "the motor" } else { "the motors" };
-        let text = format!(
-            "the largest force of {whose}, {}, does not move {}{words}",
-            told(force, "N"),
-            direction.name
-        );
+        let text =
+            format!("the largest force of {whose}, {}, does not move {}{words}", told(force, "N"), direction.name);
         notes.push(Note { code: "does-not-move", text });
     }
 }

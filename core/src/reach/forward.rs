@@ -137,9 +137,11 @@ impl Forward {
         };
         // F = M y″ + b y′ + F_c sgn y′ − F₀ − F_x(y); the rates without F_x′ y′
         let loads: Vec<[f64; 3]> = self.slides.iter().zip(slides).map(|(slide, y)| slide.load(y)).collect();
-        let ahead: [DVector<f64>; 3] =
-            std::array::from_fn(|j| &compliance * DVector::from_iterator(loads.len(), loads.iter().map(|load| load[j])));
-        let lead = |j: usize| -> f64 { self.slides.iter().zip(ahead[j].iter()).map(|(slide, d)| slide.share * d).sum() };
+        let ahead: [DVector<f64>; 3] = std::array::from_fn(|j| {
+            &compliance * DVector::from_iterator(loads.len(), loads.iter().map(|load| load[j]))
+        });
+        let lead =
+            |j: usize| -> f64 { self.slides.iter().zip(ahead[j].iter()).map(|(slide, d)| slide.share * d).sum() };
         let y = self.along(slides);
         let drive = Reference {
             position: y.position + lead(0),

@@ -198,7 +198,14 @@ fn singles(case: &Case, plan: &Plan, none: &Plan) -> Vec<Plan> {
             });
         }
     };
-    for key in plan.free.iter().cloned().chain(parameter::every(machine)).chain(of_drives(machine)).chain(["cart.load".to_string()]) {
+    for key in plan
+        .free
+        .iter()
+        .cloned()
+        .chain(parameter::every(machine))
+        .chain(of_drives(machine))
+        .chain(["cart.load".to_string()])
+    {
         single(Plan { free: vec![key], ..none.clone() });
     }
     for keys in plan.tied.iter().cloned().chain(pairs(machine)) {
