@@ -277,7 +277,7 @@ fn largest_error(number: u64, structure: &str, feed_forward: &str) -> f64 {
             .into(),
     ];
     // A dual belt has no compliant gears.
-    if number % 2 == 0 && kind != "dual-belt" {
+    if number.is_multiple_of(2) && kind != "dual-belt" {
         changes.push(format!("motor.gear_stiffness={}", between(100.0, 1000.0)));
         changes.push("motor.gear_damping=0.05".into());
     }

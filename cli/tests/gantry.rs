@@ -296,7 +296,9 @@ fn a_sweep_writes_a_whole_folder_that_repeats_it() {
     let trajectories = read(&out.join("runs-trajectories.parquet"), &names);
     assert_eq!(trajectories[0].len(), 24 * 3 * 1001);
     let last = (0..trajectories[0].len()).rfind(|row| trajectories[1][*row] == 1.0).unwrap();
-    assert_eq!((trajectories[0][last], trajectories[2][last], trajectories[3][last]), (23.0, 1.0, rows[2][23]));
+    assert_eq!((trajectories[0][last], trajectories[2][last]), (23.0, 1.0));
+    // Trajectories are of the exact solver, figures of machines side by side.
+    assert!((trajectories[3][last] - rows[2][23]).abs() < 1e-12);
     // The case of the folder repeats it, on another number of threads.
     let again = ["sweep", "case.toml", "--threads", "1", "--out", "again.parquet", "--json"];
     let run = taut_in(&out).args(again).assert().success();
