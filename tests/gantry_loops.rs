@@ -295,8 +295,8 @@ fn largest_error(number: u64, structure: &str, feed_forward: &str) -> f64 {
     run.figures.loads.iter().map(|load| load.error.peak.value.abs()).fold(0.0, f64::max)
 }
 
-/// Without dry friction, belt damping and counts a gantry with elastic feed-forward and compensated stretch errs by what
-/// sampling leaves. The compliant gear of a rotor is compensated in position, not in the command.
+/// Without dry friction, belt damping and counts a gantry with elastic feed-forward and compensated stretch errs by
+/// what sampling leaves. The compliant gear of a rotor is compensated in position, not in the command.
 #[test]
 fn elastic_feed_forward_of_a_gantry_leaves_what_sampling_leaves() {
     let pid = "pid = { proportional = 2000, integral = 10000, derivative = 20 }";

@@ -169,11 +169,11 @@ impl<'a> Worker<'a> {
         rows.told.resize(rows.experiments * (runs.end - runs.start) as usize, None);
         let mut stopped = false;
         let first = runs.start;
-        let mut jobs = runs.map_while(|run| {
+        let going_on = runs.take_while(|_| {
             stopped |= stop();
-            (!stopped).then_some(run)
+            !stopped
         });
-        let mut jobs = jobs.by_ref().filter_map(|run| {
+        let mut jobs = going_on.filter_map(|run| {
             machine.clone_from(&subject.machine);
             set(machine, run);
             // A machine that cannot be run is refused when its turn comes.

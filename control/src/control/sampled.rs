@@ -56,8 +56,8 @@ pub trait Controller {
     /// Command from the observation, V or A.
     fn step(&mut self, seen: &Observation) -> f64;
 
-    /// Feed-forward command outside the loop, V or A, from the references of all slides when it acts, for a machine with
-    /// several drives. Called before [`Controller::step`].
+    /// Feed-forward command outside the loop, V or A, from the references of all slides when it acts, for a machine
+    /// with several drives. Called before [`Controller::step`].
     fn forward(&mut self, _slides: &[Reference]) -> f64 {
         0.0
     }

@@ -196,7 +196,7 @@ impl Controller for Standard {
     }
 
     fn target(&self, along: Reference, slides: &[Reference]) -> Reference {
-        self.forward.as_ref().map_or(along, |forward| forward.target(slides))
+        self.forward.as_ref().map_or(along, |forward| forward.target(along, slides))
     }
 
     fn limited(&mut self, given: f64) {

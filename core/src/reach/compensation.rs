@@ -1,9 +1,9 @@
 //! Feed-forward from the reference alone, for a rigid axis and for one with an elastic belt.
 
-use crate::calculator::{Calculator, Run, less, more};
+use crate::calculator::{Calculator, Number, Run, less, more};
 use crate::design::{FeedForward, FeedForwardModel};
 use crate::machine::rigid::{REST_ACCELERATION, REST_SPEED, Rigid, side};
-use crate::machine::{BeltModel, EncoderPlace, Machine};
+use crate::machine::{BeltModel, EncoderPlace, GearPlay, Machine};
 use crate::signal::profile::Reference;
 
 /// Direction in which the axis moves, or is about to move: 1, −1 or 0.
@@ -21,6 +21,11 @@ pub(crate) fn direction_by<C: Calculator>(c: &mut C, reference: &Reference<C::N>
     let leaving = sign(reference.acceleration, REST_ACCELERATION, none);
     let way = sign(reference.speed, REST_SPEED, leaving);
     c.name("way", way)
+}
+
+/// The twist of a compliant gear, rad: T/k_g, and half the play.
+pub(super) fn twist<N: Number>(gear: &GearPlay, torque: N, way: N) -> N {
+    torque / gear.stiffness + way * (0.5 * gear.backlash)
 }
 
 /// Feed-forward, and the reference for the encoder's position.
@@ -153,17 +158,15 @@ impl Compensation {
         let needed = self.needed_by(c, y);
         let mut target = needed.drive;
         if let Some(play) = self.machine.drives[0].motor.gear_play.filter(|_| self.before_gear) {
-            // The twist of the gear: T/k_g, and half the play.
             let (r, sign) = (self.machine.pulley_radius, direction_by(c, y));
             let torque = needed.force[0] * r - self.rotor(needed.drive.acceleration);
-            let twist = (torque / play.stiffness + sign * (0.5 * play.backlash)) * r;
-            target.position = c.name("target", target.position + twist);
+            target.position = c.name("target", target.position + twist(&play, torque, sign) * r);
         }
         target
     }
 
     /// Torque that the rotor itself takes at the pulley, N m.
-    fn rotor<N: crate::calculator::Number>(&self, acceleration: N) -> N {
+    fn rotor<N: Number>(&self, acceleration: N) -> N {
         let n = self.machine.drives[0].motor.gear_ratio;
         acceleration * (n * n * self.machine.drives[0].motor.rotor_inertia) / self.machine.pulley_radius
     }
@@ -195,7 +198,7 @@ impl Compensation {
     }
 
     /// A motion whose inertial forces have the share that is fed forward.
-    fn accelerated<N: crate::calculator::Number>(&self, y: &Reference<N>) -> Reference<N> {
+    fn accelerated<N: Number>(&self, y: &Reference<N>) -> Reference<N> {
         let share = self.settings.inertia;
         if share == 1.0 {
             return *y;

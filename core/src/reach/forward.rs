@@ -1,9 +1,9 @@
 //! Feed-forward for each drive of a machine with several, from the references of all sliding parts.
 
-use super::compensation::direction;
+use super::compensation::{direction, twist};
 use crate::design::{FeedForward, FeedForwardModel};
 use crate::machine::rigid::Rigid;
-use crate::machine::{EncoderPlace, Machine, SlideAt};
+use crate::machine::{EncoderPlace, Machine};
 use crate::mechanism::{GearPlay, Spring};
 use crate::polyline::Polyline;
 use crate::signal::profile::Reference;
@@ -57,26 +57,24 @@ impl Forward {
     /// Feed-forward of `drive` with these factors on inertia and friction; none without feed-forward and compensated
     /// stretch, or for an axis, which has [`Compensation`](super::compensation::Compensation).
     pub fn of(settings: FeedForward, machine: &Machine, drive: usize) -> Option<Self> {
-        let is_elastic = settings.model == FeedForwardModel::Elastic || settings.compensate_stretch;
-        if machine.drives.len() == 1 || settings.model == FeedForwardModel::None && !is_elastic {
+        if machine.drives.len() == 1 || settings.model == FeedForwardModel::None && !settings.compensate_stretch {
             return None;
         }
+        let is_elastic = settings.model == FeedForwardModel::Elastic || settings.compensate_stretch;
         let shares = machine.belt_shares()[drive];
-        let slides = machine.slides().zip(machine.geometry().slides).enumerate();
-        let slide = |(number, (slide, at)): (usize, (_, &SlideAt))| {
-            let slide: &crate::machine::Slide = slide;
+        let slides = machine.slides().zip(machine.geometry().slides).enumerate().filter_map(|(number, (slide, at))| {
             Some(Slide {
                 share: shares[number],
                 lever: at.by_drives[drive],
                 part: Rigid::of_slide(machine, number)?,
                 along: slide.forces.along.clone(),
             })
-        };
+        });
         let at_motor = machine.encoder.is_none_or(|encoder| encoder.at == EncoderPlace::Motor);
         Some(Self {
             settings,
             pulley: Rigid::of_pulley(machine, drive),
-            slides: slides.filter_map(slide).collect(),
+            slides: slides.collect(),
             belt: is_elastic.then(|| Belt::of(machine, drive)),
             gear: machine.drives[drive].motor.gear_play.filter(|_| at_motor),
             radius: machine.pulley_radius,
@@ -89,17 +87,14 @@ impl Forward {
         shares.fold(Reference::default(), |sum, (slide, reference)| sum.plus(slide.share, *reference))
     }
 
-    /// The reference of its encoder along the belt, for which the slides follow theirs.
-    pub fn target(&self, slides: &[Reference]) -> Reference {
-        let Some(belt) = self.belt.as_ref().filter(|_| self.settings.compensate_stretch) else {
-            return self.along(slides);
-        };
+    /// The reference of its encoder, for which the slides follow theirs, from that of its part of the belt.
+    pub fn target(&self, along: Reference, slides: &[Reference]) -> Reference {
+        let Some(belt) = self.belt.as_ref().filter(|_| self.settings.compensate_stretch) else { return along };
         let Needed { drive: mut target, force } = self.stretched(belt, slides);
         if let Some(gear) = self.gear {
-            // The twist of the gear: T/k_g, and half the play. The rotor's own torque does not pass through it.
+            // The rotor's own torque does not pass through the gear.
             let torque = self.radius * (force[0] - self.pulley.rotor * target.acceleration);
-            let way = direction(&self.along(slides));
-            target.position += self.radius * (torque / gear.stiffness + 0.5 * way * gear.backlash);
+            target.position += self.radius * twist(&gear, torque, direction(&along));
         }
         target
     }
@@ -117,9 +112,8 @@ impl Forward {
     fn share_of_force(&self, slides: &[Reference], shares: [f64; 2]) -> [f64; 2] {
         let [mut force, mut rate] = of_part(&self.pulley, &self.along(slides), shares);
         for (slide, reference) in self.slides.iter().zip(slides) {
-            let [push, change] = of_part(&slide.part, reference, shares);
-            let along = slide.along.as_ref().map_or(0.0, |line| line.value(reference.position));
-            (force, rate) = (force + slide.lever * (push - along), rate + slide.lever * change);
+            let [push, change] = slide.push(reference, shares);
+            (force, rate) = (force + slide.lever * push, rate + slide.lever * change);
         }
         [force, rate]
     }
@@ -127,8 +121,8 @@ impl Forward {
     /// The motion of the drive for which the slides follow their references on an elastic belt: quasi-static for the
     /// belt, without its damping.
     ///
-    /// With pulleys that lead by S d, y = S (q + d), the spans stretch by s = −A_q d, since rigid motion stretches none.
-    /// The slides need F = −A_qᵀ K s, so that d = (A_qᵀ K A_q)⁻¹ F; the belt pulls the pulley back by a_φᵀ K s.
+    /// With pulleys that lead by S d, y = S (q + d), the spans stretch by s = −A_q d, since rigid motion stretches
+    /// none. The slides need F = −A_qᵀ K s, so that d = (A_qᵀ K A_q)⁻¹ F; the belt pulls the pulley back by a_φᵀ K s.
     fn stretched(&self, belt: &Belt, slides: &[Reference]) -> Needed {
         let stiffness = belt.stiffness(slides);
         let of_slides = belt.slides.transpose() * &stiffness * &belt.slides;
@@ -207,17 +201,19 @@ fn of_part(part: &Rigid, y: &Reference, [inertia, friction]: [f64; 2]) -> [f64; 
 }
 
 impl Slide {
-    /// The force that it needs from the belt, N, with its first and second rate, N/s and N/s².
+    /// The force that it needs from the belt, N, with these factors on inertia and friction, and the rate of its
+    /// inertial part, N/s.
+    fn push(&self, y: &Reference, shares: [f64; 2]) -> [f64; 2] {
+        let [force, rate] = of_part(&self.part, y, shares);
+        [force - self.along.as_ref().map_or(0.0, |line| line.value(y.position)), rate]
+    }
+
+    /// The whole force, N, with its first and second rate, N/s and N/s².
     fn load(&self, y: &Reference) -> [f64; 3] {
-        let (part, way) = (&self.part, direction(y));
-        let (viscous, dry) = part.friction(y.speed, way);
-        let drag = |speed: f64| part.friction(speed, way).0;
-        let along = self.along.as_ref().map_or(0.0, |line| line.value(y.position));
-        [
-            part.mass * y.acceleration + viscous + dry - part.constant - along,
-            part.mass * y.jerk + drag(y.acceleration),
-            part.mass * y.snap + drag(y.jerk),
-        ]
+        let way = direction(y);
+        let drag = |speed: f64| self.part.friction(speed, way).0;
+        let [force, rate] = self.push(y, [1.0; 2]);
+        [force, rate + drag(y.acceleration), self.part.mass * y.snap + drag(y.jerk)]
     }
 }
 

@@ -225,21 +225,15 @@ pub(super) fn only_fall(c: &[f64], end: f64) -> f64 {
 
 /// The only zero in (0, 1) of Σ c_k sᵏ, which is positive before it, by Newton's method from `s` within a bracket.
 fn only_zero(c: &[f64], mut s: f64) -> f64 {
-    let (mut low, mut high) = (0.0, 1.0);
+    let mut bracket = Bracket { low: 0.0, high: 1.0 };
     for _ in 0..100 {
-        let (p, slope) = value_and_slope(c, s);
-        if p < 0.0 {
-            high = s;
-        } else {
-            low = s;
-        }
-        let newton = s - p / slope;
+        let newton = bracket.newton(c, s);
         // The next step would be the square of this one: less than the last bit.
         if (newton - s).abs() <= 1e-9 * s {
-            return newton.clamp(low, high);
+            return newton.clamp(bracket.low, bracket.high);
         }
-        s = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
-        if high - low <= f64::EPSILON * s {
+        s = bracket.inside(newton);
+        if bracket.high - bracket.low <= f64::EPSILON * s {
             break;
         }
     }
@@ -248,23 +242,41 @@ fn only_zero(c: &[f64], mut s: f64) -> f64 {
 
 /// Newton's method within a bracket whose upper end is negative; bisection if it would leave the bracket. It begins at
 /// the zero of the straight line between the ends.
-fn polish(c: &[f64], (mut low, above): (f64, f64), (mut high, below): (f64, f64)) -> f64 {
-    let line = low + (high - low) * (above / (above - below));
-    let mut s = if line > low && line < high { line } else { 0.5 * (low + high) };
+fn polish(c: &[f64], (low, above): (f64, f64), (high, below): (f64, f64)) -> f64 {
+    let mut bracket = Bracket { low, high };
+    let mut s = bracket.inside(low + (high - low) * (above / (above - below)));
     for _ in 0..100 {
-        let (p, slope) = value_and_slope(c, s);
-        if p < 0.0 {
-            high = s;
-        } else {
-            low = s;
-        }
-        let newton = s - p / slope;
+        let newton = bracket.newton(c, s);
         if (newton - s).abs() <= f64::EPSILON * s {
             return newton.clamp(0.0, 1.0);
         }
-        s = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
+        s = bracket.inside(newton);
     }
     s
+}
+
+/// Places between which Σ c_k sᵏ falls below zero.
+struct Bracket {
+    low: f64,
+    high: f64,
+}
+
+impl Bracket {
+    /// Newton's step from `s`, which becomes an end of the bracket.
+    fn newton(&mut self, c: &[f64], s: f64) -> f64 {
+        let (p, slope) = value_and_slope(c, s);
+        if p < 0.0 {
+            self.high = s;
+        } else {
+            self.low = s;
+        }
+        s - p / slope
+    }
+
+    /// This place, or the middle of the bracket if it lies outside.
+    fn inside(&self, s: f64) -> f64 {
+        if s > self.low && s < self.high { s } else { 0.5 * (self.low + self.high) }
+    }
 }
 
 #[cfg(test)]

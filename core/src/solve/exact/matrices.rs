@@ -433,8 +433,8 @@ impl<const N: usize> ModeMatrices<N> {
         self.speed
     }
 
-    /// A closer bound of ‖A‖ in the energy norm, 1/s: the fastest oscillation, from λ ≤ ‖S⁴‖^¼ of the largest eigenvalue
-    /// of S = M^−½ K M^−½, plus the Frobenius norm of the damping.
+    /// A closer bound of ‖A‖ in the energy norm, 1/s: the fastest oscillation, from λ ≤ ‖S⁴‖^¼ of the largest
+    /// eigenvalue of S = M^−½ K M^−½, plus the Frobenius norm of the damping.
     pub(super) fn norm(&self, mechanism: &Mechanism, layout: &Layout) -> f64 {
         let bodies = mechanism.bodies.len();
         if (0..bodies).any(|body| mechanism.leader(body) != body) {

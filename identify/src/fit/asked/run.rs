@@ -166,6 +166,11 @@ pub struct Setting {
 }
 
 impl Run {
+    /// Time of its last row, s.
+    pub fn length(&self) -> f64 {
+        self.time.last().copied().unwrap_or(0.0)
+    }
+
     /// The runs of an experiment's log: one, or one for each window.
     pub fn all(experiment: &Experiment, log: &Log, setting: &Setting) -> Vec<Self> {
         let end = log.time.last().copied().unwrap_or(0.0);

@@ -103,7 +103,7 @@ impl Cause {
 
 /// Keys of the numbers of each of several drives, which the keys of all drives vary together.
 fn of_drives(machine: &Machine) -> Vec<String> {
-    let drives = &machine.geometry().drives;
+    let drives = machine.geometry().drives;
     if drives.len() == 1 {
         return Vec::new();
     }
@@ -122,11 +122,10 @@ fn pairs(machine: &Machine) -> Vec<Vec<String>> {
     });
     let of_pulleys = ["inertia".to_string()].into_iter().chain(kinds.map(|kind| format!("friction.{kind}")));
     let pulleys = of_pulleys.map(|number| ["drive_pulley", "idler_pulley"].map(|body| format!("{body}.{number}")));
-    let constants = ["motor.torque_constant", "motor.back_emf_constant"];
-    let drives = &machine.geometry().drives;
-    let motors = drives.iter().map(|drive| constants.map(|key| format!("{}{key}", drive.key)));
-    // The keys of all drives, too.
-    let motors = motors.chain((drives.len() > 1).then(|| constants.map(String::from)));
+    let (geometry, has_several) = (machine.geometry(), machine.drives.len() > 1);
+    // Of each drive, and of all of several.
+    let of_motors = geometry.drives.iter().map(|drive| drive.key).chain(has_several.then_some(""));
+    let motors = of_motors.map(|of| ["torque_constant", "back_emf_constant"].map(|key| format!("{of}motor.{key}")));
     let is_there = |key: &String| parameter::value(machine, key).is_some_and(|value| value != 0.0);
     // A direction that is not given separately follows the other one.
     let are_two = |[one, other]: &[String; 2]| {
@@ -135,8 +134,8 @@ fn pairs(machine: &Machine) -> Vec<Vec<String>> {
     };
     let all = sides.chain(pulleys).chain(motors);
     let pairs = all.filter(|pair| pair.iter().all(is_there) && are_two(pair)).map(|pair| pair.to_vec());
-    let belts = (0..if drives.len() > 1 { drives.len() } else { 0 })
-        .map(|drive| machine.geometry().spans_of(drive).map(|span| format!("belt.stiffness.{span}")).collect());
+    let spans = |drive: usize| geometry.spans_of(drive).map(|span| format!("belt.stiffness.{span}")).collect();
+    let belts = (0..machine.drives.len()).filter(|_| has_several).map(spans);
     pairs.chain(belts.filter(|spans: &Vec<String>| spans.len() > 1)).collect()
 }
 
@@ -198,14 +197,8 @@ fn singles(case: &Case, plan: &Plan, none: &Plan) -> Vec<Plan> {
             });
         }
     };
-    for key in plan
-        .free
-        .iter()
-        .cloned()
-        .chain(parameter::every(machine))
-        .chain(of_drives(machine))
-        .chain(["cart.load".to_string()])
-    {
+    let others = parameter::every(machine).into_iter().chain(of_drives(machine)).chain(["cart.load".to_string()]);
+    for key in plan.free.iter().cloned().chain(others) {
         single(Plan { free: vec![key], ..none.clone() });
     }
     for keys in plan.tied.iter().cloned().chain(pairs(machine)) {

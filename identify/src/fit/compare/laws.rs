@@ -4,7 +4,6 @@ use crate::case::{Case, Files, Plan};
 use crate::error::{Error, Result};
 use crate::fit::limits::{BRISTLE_BEND, MOST_BREAKAWAY, SPEED_POINTS, STRIBECK_ABOVE, STRIBECK_FALL, TRAVEL_POINTS};
 use crate::friction::Friction;
-use crate::log::Quantity;
 use crate::machine::{DriveAt, Machine};
 use std::path::Path;
 use toml_edit::{Array, DocumentMut, InlineTable, Item, Value};
@@ -307,7 +306,7 @@ fn fastest(case: &Case) -> f64 {
     let logs = case.experiments.iter().filter_map(|experiment| experiment.log.as_ref());
     let speeds = logs.flat_map(|log| {
         log.outputs.iter().map(move |output| {
-            let arm = if is_linear(output.quantity) { 1.0 } else { r };
+            let arm = if output.quantity.is_linear() { 1.0 } else { r };
             let values = &output.values;
             if !output.quantity.is_position() {
                 return arm * values.iter().filter(|v| v.is_finite()).fold(0.0, |most: f64, v| most.max(v.abs()));
@@ -319,11 +318,6 @@ fn fastest(case: &Case) -> f64 {
         })
     });
     speeds.fold(1e-3, f64::max)
-}
-
-/// True if a quantity is of a sliding part.
-fn is_linear(quantity: Quantity) -> bool {
-    ["cart", "bridge"].iter().any(|slide| quantity.name().starts_with(slide) && !quantity.name().contains("pulley"))
 }
 
 /// Positions along the travel of a slide in the logs, m.
@@ -342,11 +336,12 @@ fn travel(case: &Case, slide: &str) -> (f64, f64) {
     let at = geometry.slides.iter().find(|at| geometry.label(at.body).key == slide);
     for log in case.experiments.iter().filter_map(|experiment| experiment.log.as_ref()) {
         let positions = || log.outputs.iter().filter(|output| output.quantity.is_position());
-        for output in positions().filter(|output| output.quantity.name() == format!("{slide}_position")) {
+        let of_body = |body: &str| positions().find(|output| output.quantity.body() == Some(body));
+        if let Some(output) = of_body(slide) {
             see(&mut output.values.iter().copied());
         }
         if machine.has_one_coordinate() {
-            let angles = positions().filter(|output| !is_linear(output.quantity));
+            let angles = positions().filter(|output| !output.quantity.is_linear());
             angles.for_each(|angle| see(&mut angle.values.iter().map(|value| machine.pulley_radius * value)));
             continue;
         }
@@ -356,8 +351,7 @@ fn travel(case: &Case, slide: &str) -> (f64, f64) {
         for is_rotor in [false, true] {
             let of_drive = |(drive, weight): &(&DriveAt, &f64)| {
                 let label = if is_rotor { drive.rotor } else { geometry.label(drive.pulley) };
-                let name = format!("{}_angle", label.key);
-                positions().find(|output| output.quantity.name() == name).map(|output| (**weight, &output.values))
+                of_body(label.key).map(|output| (**weight, &output.values))
             };
             let Some(parts) = moving.iter().map(of_drive).collect::<Option<Vec<_>>>() else { continue };
             let rows = parts.iter().map(|(_, values)| values.len()).min().unwrap_or_default();

@@ -52,6 +52,14 @@ pub(crate) struct Searched<'a> {
     pub work: Work,
 }
 
+impl Searched<'_> {
+    /// Deviations of the residuals relative to the noise of the logs.
+    pub fn times_noise(&self) -> impl Iterator<Item = (Quantity, f64)> {
+        let noise = self.problem.noise();
+        self.noise.iter().map(move |(quantity, deviation)| (*quantity, deviation / noise.of(*quantity)))
+    }
+}
+
 /// Effort of a search.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Effort {
@@ -272,7 +280,7 @@ fn by_beginnings(
     descend: &mut Descend,
 ) -> Result<Vec<f64>> {
     let (plan, mut guess) = (Plan { until: None, ..plan.clone() }, start.to_vec());
-    let end = problem.runs.iter().map(|run| run.time.last().copied().unwrap_or(0.0)).fold(0.0, f64::max);
+    let end = problem.runs.iter().map(Run::length).fold(0.0, f64::max);
     let modes = resonances(&problem.machine, Drive::Held, 0).unwrap_or_default();
     let slowest = modes.iter().map(|mode| mode.frequency).fold(f64::INFINITY, f64::min);
     let first = (FIRST_BEGINNING / slowest).max(end * SHORTEST_BEGINNING);
@@ -350,7 +358,7 @@ fn in_windows(
     if plan.windows.is_some() || plan.closed_loop || globals == 0 {
         return Ok(None);
     }
-    let total: f64 = problem.runs.iter().map(|run| run.time.last().copied().unwrap_or(0.0)).sum();
+    let total: f64 = problem.runs.iter().map(Run::length).sum();
     let rows: usize = problem.runs.iter().map(|run| run.time.len()).sum();
     let (mut guess, mut best) = (start.to_vec(), None);
     for length in std::iter::once(None).chain(START_WINDOWS.map(Some)) {

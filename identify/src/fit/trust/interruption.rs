@@ -7,18 +7,16 @@
 //! leaves some in many windows.
 
 use super::finding::{Finding, Grade};
+use super::sub_records::in_windows;
 use crate::case::{Case, Plan};
-use crate::fit::asked::problem::Problem;
+use crate::fit::asked::run::Run;
 use crate::fit::asked::straight::has_exact_derivatives;
 use crate::fit::limits::{
-    HUBER, INTERRUPTED, INTERRUPTED_SHARE, INTERRUPTED_WINDOWS, LEAST_INTERRUPTED, REFIT_TOLERANCE, UNEXPLAINED_NOISE,
-    UNINTERRUPTED, WINDOW_SAMPLES,
+    HUBER, INTERRUPTED, INTERRUPTED_SHARE, INTERRUPTED_WINDOWS, LEAST_INTERRUPTED, UNEXPLAINED_NOISE, UNINTERRUPTED,
+    WINDOW_SAMPLES,
 };
-use crate::fit::search::least_squares::minimise;
-use crate::fit::search::point::{Ending, Options};
 use crate::fit::search::starts::Searched;
-use crate::number::{engineering, significant};
-use crate::solve::Flow;
+use crate::number::{engineering_typed, significant};
 
 /// A warning for each log with such a part.
 pub(super) fn interruptions(case: &Case, plan: &Plan, found: &Searched) -> Vec<Finding> {
@@ -28,40 +26,22 @@ pub(super) fn interruptions(case: &Case, plan: &Plan, found: &Searched) -> Vec<F
         return Vec::new();
     }
     // A model that explains the logs to their noise has no such part.
-    let noise = found.problem.noise();
-    if found.noise.iter().all(|(quantity, deviation)| *deviation <= UNEXPLAINED_NOISE * noise.of(*quantity)) {
+    if found.times_noise().all(|(_, times)| times <= UNEXPLAINED_NOISE) {
         return Vec::new();
     }
     let runs = &found.problem.runs;
-    let total: f64 = runs.iter().map(length).sum();
+    let total: f64 = runs.iter().map(Run::length).sum();
     let samples = runs.iter().map(|run| run.time.len()).sum::<usize>() as f64;
-    let longest = runs.iter().map(length).fold(0.0, f64::max);
+    let longest = runs.iter().map(Run::length).fold(0.0, f64::max);
     let window = (longest / INTERRUPTED_WINDOWS).max(WINDOW_SAMPLES * total / samples);
-    in_windows(case, plan, found, window).unwrap_or_default()
-}
-
-fn length(run: &crate::fit::asked::run::Run) -> f64 {
-    run.time.last().copied().unwrap_or(0.0)
+    by_windows(case, plan, found, window).unwrap_or_default()
 }
 
 /// Residuals in windows of this length, s, and what stands out.
-fn in_windows(case: &Case, plan: &Plan, found: &Searched, window: f64) -> Option<Vec<Finding>> {
-    let mut problem = Problem::new(case, &Plan { windows: Some(window), ..plan.clone() }).ok()?;
-    problem.swings = found.problem.swings;
-    let noise = problem.noise();
-    let noises: Vec<_> = problem.quantities().into_iter().map(|quantity| (quantity, noise.of(quantity))).collect();
-    for &(quantity, deviation) in &noises {
-        problem.weigh(quantity, deviation, true);
-    }
-    problem.doubt_starts(&noises);
-    let (mut start, bounds, g) = (problem.start(), problem.bounds(), found.problem.globals());
-    start[..g].copy_from_slice(&found.best.x[..g]);
-    let rounding = problem.rounding();
-    let options = Options { iterations: 30, tolerance: REFIT_TOLERANCE, huber: HUBER, rounding, ..Options::default() };
-    let best = minimise(&mut problem, &start, &bounds, &options, &mut |_, _| Flow::Continue);
-    if matches!(best.ending, Ending::Failed | Ending::Interrupted) {
-        return None;
-    }
+fn by_windows(case: &Case, plan: &Plan, found: &Searched, window: f64) -> Option<Vec<Finding>> {
+    let noise = found.problem.noise();
+    let noise: Vec<_> = found.problem.quantities().into_iter().map(|quantity| (quantity, noise.of(quantity))).collect();
+    let (problem, best) = in_windows(case, plan, found, window, (&noise, HUBER))?;
     // Root mean square of each window's residuals, log by log.
     let mut logs: Vec<(&str, Vec<(f64, f64)>)> = Vec::new();
     let mut from = 0.0;
@@ -76,7 +56,7 @@ fn in_windows(case: &Case, plan: &Plan, found: &Searched, window: f64) -> Option
                 logs.push((&run.name, vec![(from, size)]));
             }
         }
-        from += length(run);
+        from += run.length();
     }
     Some(logs.iter().filter_map(|(name, windows)| interruption(name, windows, window)).collect())
 }
@@ -95,7 +75,7 @@ fn interruption(name: &str, windows: &[(f64, f64)], length: f64) -> Option<Findi
         return None;
     }
     let largest = part.iter().map(|(_, size)| *size).fold(0.0, f64::max);
-    let at = |time: f64| engineering(time, "s", 3).replace(['\u{a0}', '\u{202f}'], " ").replace('−', "-");
+    let at = |time: f64| engineering_typed(time, "s", 3);
     let text = format!(
         "from {} to {} the outputs differ from the model {} times as much as elsewhere, the start of that part being \
          fitted: the machine does not follow its input there (a motor that is off or limited, something in the way, a \

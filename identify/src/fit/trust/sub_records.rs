@@ -15,12 +15,14 @@ use super::doubts::Disagreement;
 use super::uncertainty::Judged;
 use crate::case::{Case, Plan};
 use crate::fit::asked::problem::Problem;
+use crate::fit::asked::run::Run;
 use crate::fit::limits::{COLOURED, FEWEST_WINDOWS, REFIT_TOLERANCE, WINDOW_SAMPLES, WINDOWS_OFF};
 use crate::fit::noise::student::student;
 use crate::fit::search::least_squares::minimise;
-use crate::fit::search::point::{Ending, Options};
+use crate::fit::search::point::{Ending, Minimum, Options};
 use crate::fit::search::starts::Searched;
 use crate::fit::search::triangle::inverse_of_square;
+use crate::log::Quantity;
 use crate::solve::Flow;
 use nalgebra::{DMatrix, DVector};
 
@@ -32,25 +34,13 @@ pub(crate) fn disagreement(case: &Case, plan: &Plan, found: &Searched, judged: &
     if skipped || whole.is_stopped() || !judged.identifiability.complete() || found.best.at_bound[..g].contains(&true) {
         return None;
     }
-    let lengths = whole.runs.iter().map(|run| run.time.last().copied().unwrap_or(0.0));
+    let lengths = whole.runs.iter().map(Run::length);
     let total: f64 = lengths.clone().sum();
     let shortest = lengths.fold(f64::INFINITY, f64::min);
     let samples = whole.runs.iter().map(|run| run.time.len()).sum::<usize>() as f64;
     let length = (total / FEWEST_WINDOWS).min(0.5 * shortest).max(WINDOW_SAMPLES * total / samples);
-    let windowed = Plan { windows: Some(length), ..plan.clone() };
-    let mut problem = Problem::new(case, &windowed).ok()?;
-    problem.swings = whole.swings;
-    for &(quantity, deviation) in &found.noise {
-        problem.weigh(quantity, deviation, true);
-    }
-    problem.doubt_starts(&found.noise);
-    let mut start = problem.start();
-    start[..g].copy_from_slice(&found.best.x[..g]);
-    let bounds = problem.bounds();
-    let options =
-        Options { iterations: 30, tolerance: REFIT_TOLERANCE, rounding: problem.rounding(), ..Options::default() };
-    let best = minimise(&mut problem, &start, &bounds, &options, &mut |_, _| Flow::Continue);
-    if matches!(best.ending, Ending::Failed | Ending::Interrupted) || best.at_bound[..g].contains(&true) {
+    let (problem, best) = in_windows(case, plan, found, length, (&found.noise, f64::INFINITY))?;
+    if best.at_bound[..g].contains(&true) {
         return None;
     }
     // Windows with starts of their own fit at least as well as the whole; otherwise the search has not converged.
@@ -95,4 +85,24 @@ pub(crate) fn disagreement(case: &Case, plan: &Plan, found: &Searched, judged: &
     // times that.
     let added = (&shift * shift.transpose() / student(1_000_000).powi(2) + between * wider) * 3.0;
     Some(Disagreement { windows, length, off, added })
+}
+
+/// The search continued from the end of another one, in windows of this length, s, each with a start of its own: with
+/// these deviations of the quantities, and this threshold of Huber's loss. `None` if it fails.
+pub(super) fn in_windows<'a>(
+    case: &Case,
+    plan: &Plan,
+    found: &Searched<'a>,
+    length: f64,
+    (noise, huber): (&[(Quantity, f64)], f64),
+) -> Option<(Problem<'a>, Minimum)> {
+    let mut problem = Problem::new(case, &Plan { windows: Some(length), ..plan.clone() }).ok()?;
+    problem.swings = found.problem.swings;
+    problem.weigh_by(noise);
+    let (mut start, bounds, g) = (problem.start(), problem.bounds(), found.problem.globals());
+    start[..g].copy_from_slice(&found.best.x[..g]);
+    let rounding = problem.rounding();
+    let options = Options { iterations: 30, tolerance: REFIT_TOLERANCE, huber, rounding, ..Options::default() };
+    let best = minimise(&mut problem, &start, &bounds, &options, &mut |_, _| Flow::Continue);
+    (!matches!(best.ending, Ending::Failed | Ending::Interrupted)).then_some((problem, best))
 }

@@ -23,8 +23,8 @@ pub(super) const RECIPROCAL: [f64; TERMS + 1] = {
     table
 };
 
-/// Something for all that moves in a machine: for speeds and currents, whose rates depend on everything, and for lengths
-/// and straight inputs, whose rates depend on speeds alone.
+/// Something for all that moves in a machine: for speeds and currents, whose rates depend on everything, and for
+/// lengths and straight inputs, whose rates depend on speeds alone.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Moving<T, const S: usize, const D: usize> {
     pub(super) s: [T; S],
@@ -454,7 +454,8 @@ impl<const S: usize, const D: usize> Flight<S, D> {
         self.quantities.iter().zip(quantities).for_each(|(quantity, pair)| put(&quantity.form, pair));
     }
 
-    /// Whether the form of a guard may fall below zero, or rise above its upper bound, within the present step of a lane.
+    /// Whether the form of a guard may fall below zero, or rise above its upper bound, within the present step of a
+    /// lane.
     pub(super) fn unsafe_sides(&self, slot: usize, lane: usize) -> [bool; 2] {
         if self.margins[slot].0[lane] >= 0.0 {
             return [false; 2];
@@ -471,8 +472,8 @@ impl<const S: usize, const D: usize> Flight<S, D> {
         [least < 0.0, most > guard.top.0[lane]]
     }
 
-    /// A guard within the present step of a lane: the form itself for a positive side, otherwise what is left of its upper
-    /// bound.
+    /// A guard within the present step of a lane: the form itself for a positive side, otherwise what is left of its
+    /// upper bound.
     pub(super) fn guard(&self, slot: usize, lane: usize, side: f64) -> Part {
         let [from, to] = [&self.from, &self.to].map(|sides| sides.guards[slot].map(|numbers| numbers.0[lane]));
         let (h, dual) = (self.h.0[lane], self.guards[slot].dual.0[lane]);
@@ -649,8 +650,8 @@ impl<const S: usize, const D: usize> Flight<S, D> {
             W::pick(stays, W::of(&heights.when), next).keep(&mut heights.when);
             let rest = rest.times(W::of(&quantity.dual));
             let inner = one.larger(two).plus(rest);
-            // Between its ends a course is highest only if its slope changes sign; that is off the slope of the cubic by
-            // 3.1 times the rest at most.
+            // Between its ends a course is highest only if its slope changes sign; that is off the slope of the cubic
+            // by 3.1 times the rest at most.
             let (s, t) = (h.times(steep), h.times(slope));
             let middle = value.minus(begin).times(W::all(3.0)).minus(s.plus(t));
             let (least, greatest) = (s.smaller(t).smaller(middle), s.larger(t).larger(middle));

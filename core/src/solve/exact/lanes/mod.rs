@@ -1,8 +1,8 @@
 //! Machines side by side: many runs of one structure at once, one in each lane of a vector.
 //!
-//! A sweep runs thousands of machines that differ in their numbers alone. Here eight of them are stepped together: every
-//! number is a row of [`wide::Lanes`], one for each machine, and an operation is one vector instruction. Each lane has
-//! its own time, step, mode and machine; one whose run has come to its end takes the next from the queue.
+//! A sweep runs thousands of machines that differ in their numbers alone. Here eight of them are stepped together:
+//! every number is a row of [`wide::Lanes`], one for each machine, and an operation is one vector instruction. Each
+//! lane has its own time, step, mode and machine; one whose run has come to its end takes the next from the queue.
 //!
 //! A step ([`flight`]) is a Taylor series of [`part::TERMS`] terms over at most h = 1.3/‖A‖. What happens within it
 //! follows from its ends:
@@ -14,15 +14,15 @@
 //! - In a lane whose guards are not safe by that, the first fall is found along its series. The machine then passes
 //!   through the event by the exact solver's own rules ([`crate::solve::rules`]): events are settled and told there, by
 //!   no second text.
-//! - A step that may have a peak is kept ([`peak`]). At the end of a run the cubics tell how high the peaks are at least;
-//!   the few steps that may be higher are expanded again.
+//! - A step that may have a peak is kept ([`peak`]). At the end of a run the cubics tell how high the peaks are at
+//!   least; the few steps that may be higher are expanded again.
 //!
-//! Every machine has its state, mode and rules in a [`Core`] of the exact solver, to which its lane returns the state at
-//! events and ends. All lanes do the same operations in the same order, without fused products, and none depends on
+//! Every machine has its state, mode and rules in a [`Core`] of the exact solver, to which its lane returns the state
+//! at events and ends. All lanes do the same operations in the same order, without fused products, and none depends on
 //! another: the same bits for any vectors, neighbours and order of the queue.
 //!
-//! Left to the exact solver are machines that [`takes`] refuses, runs of more than [`MOST_STEPS`] steps, and states that
-//! are no longer finite.
+//! Left to the exact solver are machines that [`takes`] refuses, runs of more than [`MOST_STEPS`] steps, and states
+//! that are no longer finite.
 
 mod flight;
 mod law;
@@ -788,8 +788,8 @@ impl<const N: usize, const S: usize, const D: usize> Seat<'_, N, S, D> {
         course
     }
 
-    /// Settles the peaks that were kept, and returns their room: the cubics tell how high they are at least, and steps that may be higher are
-    /// expanded again, the highest first.
+    /// Settles the peaks that were kept, and returns their room: the cubics tell how high they are at least, and steps
+    /// that may be higher are expanded again, the highest first.
     #[inline(never)]
     fn settle(&mut self) -> (Vec<Start<S, D>>, Vec<Later>) {
         let mut later = std::mem::take(&mut self.later);

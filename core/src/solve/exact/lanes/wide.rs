@@ -1,10 +1,10 @@
 //! Numbers side by side, one for each machine, and arithmetic on them in the widest vectors of the processor.
 //!
 //! Vector instructions are named, not left to the compiler: it gives up on long chains of operations, and then code for
-//! vectors is slower than code for single numbers; and what is computed in closures, those of `array::from_fn` too, is not
-//! compiled for the vectors of the function around them. Every implementation does the same operations in the same order,
-//! products and sums are rounded separately (no FMA), and no operation mixes lanes, so that a machine's bits depend
-//! neither on the processor nor on its neighbours.
+//! vectors is slower than code for single numbers; and what is computed in closures, those of `array::from_fn` too, is
+//! not compiled for the vectors of the function around them. Every implementation does the same operations in the same
+//! order, products and sums are rounded separately (no FMA), and no operation mixes lanes, so that a machine's bits
+//! depend neither on the processor nor on its neighbours.
 
 /// Machines side by side: as many 64-bit numbers as the widest vectors hold.
 pub(super) const LANES: usize = 8;
