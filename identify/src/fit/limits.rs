@@ -430,6 +430,12 @@ pub(crate) const WHOLE_POWER: f64 = 0.03;
 /// Unit: 1. Source: chosen: the noise is by third differences, and is not known to a few per cent.
 pub(crate) const MORE_THAN_NOISE: f64 = 1.2;
 
+/// Residuals of an axis beyond this multiple of the noise are reported where no missing element explains them.
+///
+/// Unit: 1. Source: chosen: fits of real logs leave 2 to 20 times the noise. Test:
+/// `residuals_far_above_the_noise_are_reported`.
+pub(crate) const FAR_BEYOND_NOISE: f64 = 20.0;
+
 /// Costs that differ by less are taken for those of one minimum.
 ///
 /// Unit: 1. Source: chosen: a rough search ends within a few per mille of its minimum. Test:
@@ -1059,7 +1065,7 @@ pub(crate) const CAUSE_STEPS: usize = 4;
 /// Starts that are fitted whole: the best of each element, then others.
 ///
 /// Unit: starts. Source: chosen: all elements and three more. Test: `play_is_named_where_first_steps_suggest_a_spring`.
-pub(crate) const CAUSES_FITTED: usize = 12;
+pub(crate) const CAUSES_FITTED: usize = 15;
 
 /// Starts of one element that are fitted whole.
 ///
@@ -1081,6 +1087,11 @@ pub(crate) const CAUSE_ERRORS: f64 = 4.0;
 /// Unit: 1. Source: chosen: 0.8 of the residuals are left. Tests: `a_missing_spring_is_named` and
 /// `what_a_gantry_lacks_is_a_warning`.
 pub(crate) const CAUSE_WARNS: f64 = 0.36;
+
+/// Share of the squared residuals from which on an element explains parts of a log that stand out.
+///
+/// Unit: 1. Source: chosen. Test: `a_limit_is_named`.
+pub(crate) const CAUSE_SETTLES: f64 = 0.9;
 
 /// Most values of logs for which elements are tried.
 ///
@@ -1139,6 +1150,26 @@ pub(crate) const FLANK_DAMPING: f64 = 0.5;
 /// Unit: intervals between samples. Source: chosen: one of either sign.
 pub(crate) const CAUSE_DELAYS: [f64; 2] = [0.5, -0.5];
 
+/// Limits of the amplifier that are tried.
+///
+/// Unit: the greatest voltage or current that the logs ask for. Source: chosen. Test: `a_limit_is_named`.
+pub(crate) const CAUSE_LIMITS: [f64; 3] = [0.5, 0.7, 0.9];
+
+/// Lower bound of such a limit.
+///
+/// Unit: as there. Source: chosen: an amplifier that gives less is another cause.
+pub(crate) const CAUSE_LEAST_LIMIT: f64 = 0.1;
+
+/// Electrical time constants that are tried.
+///
+/// Unit: s. Source: from a small to a large motor. Test: `an_inductance_is_named`.
+pub(crate) const CAUSE_LAGS: [f64; 2] = [1e-3, 1e-2];
+
+/// Most logs for which values of their own are tried.
+///
+/// Unit: logs. Source: chosen: bounds the time. Test: `a_log_of_another_machine_is_named`.
+pub(crate) const APART_MOST: usize = 8;
+
 /// Share of the inertia with which a part before a spring or play begins.
 ///
 /// Unit: 1. Source: chosen.
@@ -1164,8 +1195,8 @@ pub(crate) const SWINGS_KEEP: f64 = 0.1;
 /// Unit: 1. Source: chosen: what is further off does not get there.
 pub(crate) const CAUSE_NEAR: f64 = 3.0;
 
-/// Most that a fit with an element may gain, in whole steps of the linear model: beyond its first steps, or, with curved
-/// friction, beyond the fit without it.
+/// Most that a fit with an element may gain, in whole steps of the linear model: beyond its first steps, or, with
+/// curved friction, beyond the fit without it.
 ///
 /// Unit: 1. Source: chosen: of some 300 starts on 27 machines of `cargo xtask coverage --causes` none that ended lowest
 /// gained more. Test: `bristles_are_named_with_their_stiffness`.

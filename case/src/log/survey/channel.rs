@@ -249,7 +249,7 @@ impl Channel {
         found.map(|(k, size, _)| Jump { sample: k + 1, time: time[k + 1], size }).collect()
     }
 
-    /// Single samples that are far from both neighbours, on the same side.
+    /// Single samples that are far from both neighbours, on the same side; at an end of the log, from the only one.
     fn find_outliers(&self, values: &[f64], time: &[f64]) -> Vec<Outlier> {
         if self.is_input() || self.unit == ACCELERATION || values.len() < 10 {
             return Vec::new();
@@ -263,13 +263,19 @@ impl Channel {
             let (before, after) = (values[k - 1] - values[*k], values[k + 1] - values[*k]);
             before * after > 0.0 && before.abs().min(after.abs()) > least
         };
-        let outlier = |sample: usize| Outlier {
-            sample,
-            time: time[sample],
-            value: values[sample],
-            expected: values[sample] - off(sample),
+        let outlier =
+            |sample: usize, expected: f64| Outlier { sample, time: time[sample], value: values[sample], expected };
+        // The first or last value, where the step to it is far beyond those that follow, or came before.
+        let end = |sample: usize, beside: [usize; 3]| {
+            let [a, b, c] = beside.map(|k| values[k]);
+            let usual = (a - b).abs().max((b - c).abs());
+            let off = (values[sample] - a).abs();
+            (off > least.max(OUTLYING * usual)).then(|| outlier(sample, a))
         };
-        (1..values.len() - 1).filter(far).map(outlier).collect()
+        let last = values.len() - 1;
+        let first = end(0, [1, 2, 3]).into_iter();
+        let inner = (1..last).filter(far).map(|k| outlier(k, values[k] - off(k)));
+        first.chain(inner).chain(end(last, [last - 1, last - 2, last - 3])).collect()
     }
 
     /// The longest run at each extreme that was reached abruptly: by counts, and without slowing down before it.
@@ -423,7 +429,7 @@ impl Channel {
             note(
                 "outliers",
                 Severity::Warning,
-                format!("{text}; a robust fit (loss = \"huber\") is less sensitive to them"),
+                format!("{text}; leave such cells empty, or make the fit less sensitive to them (loss = \"huber\")"),
             );
         }
         if let Some(step) = self.step

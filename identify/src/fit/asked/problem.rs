@@ -457,6 +457,11 @@ impl<'a> Problem<'a> {
         machine
     }
 
+    /// Index of the part of the logs with this name.
+    pub(crate) fn part(&self, name: &str) -> Option<usize> {
+        self.parts.iter().position(|own| own == name)
+    }
+
     /// The machines of all parts of the logs.
     pub(crate) fn stages(&self, x: &[f64]) -> Vec<Machine> {
         (0..self.parts.len().max(1)).map(|part| self.stage_of(part, x)).collect()
@@ -689,6 +694,9 @@ fn separated(case: &Case, plan: &Plan, all: Vec<Free>) -> Result<Separated> {
         for (place, part) in parts.iter().enumerate() {
             let mut own = parameter.clone();
             own.name = format!("{} [{part}]", parameter.name);
+            if let Some((_, [low, high])) = plan.bounds.iter().find(|(name, _)| *name == own.name) {
+                (own.low, own.high) = (*low, *high);
+            }
             parameters.push(own);
             of.push(Some(place));
         }

@@ -9,14 +9,14 @@ use super::unexplained::{self, Reason};
 use crate::case::{Case, Plan};
 use crate::fit::asked::controller::reproduced;
 use crate::fit::limits::{
-    CAUSE_EXPLAINS, CAUSE_MOVES, CAUSE_WARNS, FACTOR_LEAVES, KINK_PROMISE, MORE_THAN_NOISE, MOTOR_CONSTANTS, NORMAL,
-    POOR_FIT, REPRODUCED,
+    CAUSE_EXPLAINS, CAUSE_MOVES, CAUSE_SETTLES, CAUSE_WARNS, FACTOR_LEAVES, FAR_BEYOND_NOISE, KINK_PROMISE,
+    MORE_THAN_NOISE, MOTOR_CONSTANTS, NORMAL, POOR_FIT, REPRODUCED,
 };
 use crate::fit::noise::Wave;
 use crate::fit::search::point::Ending;
 use crate::fit::search::regression::Balance;
 use crate::fit::search::starts::Searched;
-use crate::log::{Note, Quantity, Remedy, Severity, Survey};
+use crate::log::{Channel, Note, Quantity, Remedy, Severity, Survey};
 use crate::machine::{AmplifierMode, DriveAt, DriveUnit, Motor};
 use crate::number::{engineering, significant};
 
@@ -26,16 +26,31 @@ pub(crate) fn findings(case: &Case, plan: &Plan, found: &Searched, fit: &Fit, su
     all.extend(of_controller(case, plan));
     all.extend(of_cause(fit));
     all.extend(of_search(fit));
-    all.extend(of_noise(found));
-    all.extend(interruptions(case, plan, found));
+    let is_explained = fit.cause.as_ref().is_some_and(|cause| cause.explained >= CAUSE_SETTLES);
+    all.extend(interruptions(case, plan, found).into_iter().filter(|_| !is_explained));
     all.extend(of_motor(case, fit));
     let unexplained = of_residuals(case, plan, found, fit, &all);
     // Each of two exchanged columns may move against the model, but a change of sign corrects neither.
     let is_swapped = |log: &Option<String>| unexplained.iter().any(|one| one.code == "swapped" && one.log == *log);
     all.retain(|one| !(one.code == "sign" && is_swapped(&one.log)));
     all.extend(unexplained);
+    let astray = astray(surveys, &all);
+    let follows = ["time-unit", "interruption", "unexplained"];
+    all.retain(|one| !(follows.contains(&one.code) && one.log.as_ref().is_some_and(|log| astray.contains(log))));
+    let is_named = all.iter().any(|one| one.grade == Grade::Warning || one.code == "other_law") || fit.cause.is_some();
+    all.extend(of_noise(found, is_named));
     all.sort_by_key(|finding| std::cmp::Reverse(finding.grade));
     all
+}
+
+/// The logs whose first value is reported as an outlier: a run from there agrees with nothing.
+fn astray(surveys: &[Survey], all: &[Finding]) -> Vec<String> {
+    let is_first = |channel: &Channel| channel.outliers.first().is_some_and(|outlier| outlier.sample == 0);
+    let is_astray = |survey: &&Survey| {
+        let is_told = all.iter().any(|one| one.code == "outliers" && one.log.as_ref() == Some(&survey.log));
+        is_told && survey.channels.iter().any(is_first)
+    };
+    surveys.iter().filter(is_astray).map(|survey| survey.log.clone()).collect()
 }
 
 fn finding(grade: Grade, code: &'static str, text: String) -> Finding {
@@ -100,25 +115,30 @@ fn of_controller(case: &Case, plan: &Plan) -> Vec<Finding> {
     told.collect()
 }
 
-/// Residuals above the noise of the logs for a machine with several coordinates or a stepper, whose elastic modes cause
-/// local minima.
-fn of_noise(found: &Searched) -> Option<Finding> {
+/// Residuals above the noise of the logs. With several coordinates or a stepper, elastic modes cause local minima; with
+/// one coordinate the missing elements have been tried, and `is_named` if one of them, or another reason, is reported.
+fn of_noise(found: &Searched, is_named: bool) -> Option<Finding> {
     let problem = &found.problem;
-    if problem.machine.has_torque_balance() || problem.parameters.is_empty() {
+    let is_searched = problem.machine.has_torque_balance();
+    if problem.parameters.is_empty() || is_searched && is_named {
         return None;
     }
-    let noise = problem.noise();
-    let times = |(quantity, deviation): &(Quantity, f64)| (*quantity, deviation / noise.of(*quantity));
-    let beyond: Vec<(Quantity, f64)> = found.noise.iter().map(times).filter(|(_, t)| *t > MORE_THAN_NOISE).collect();
+    let most = if is_searched { FAR_BEYOND_NOISE } else { MORE_THAN_NOISE };
+    let beyond: Vec<(Quantity, f64)> = found.times_noise().filter(|(_, times)| *times > most).collect();
     let named = |(quantity, times): &(Quantity, f64)| format!("{} {} times", quantity.name(), significant(*times, 2));
-    let text = format!(
-        "residuals exceed the noise of the logs ({}): the model lacks something, or the search ended in one of \
-         several minima; try starts = 8 in [fit], or begin with values nearer to the machine's",
-        beyond.iter().map(named).collect::<Vec<_>>().join(", ")
-    );
+    let next = if is_searched {
+        "the model lacks something that none of the tried elements explains, and the intervals hold only as far as what \
+         is missing resembles noise"
+    } else {
+        "the model lacks something, or the search ended in one of several minima; try starts = 8 in [fit], or begin \
+         with values nearer to the machine's"
+    };
+    let names = beyond.iter().map(named).collect::<Vec<_>>().join(", ");
+    let text = format!("residuals exceed the noise of the logs ({names}): {next}");
     // The share of the squared residuals that noise does not explain: 1 − σ²/σ_e².
     let unexplained = beyond.iter().map(|(_, times)| 1.0 - times.powi(-2)).fold(0.0, f64::max);
-    let grade = if unexplained >= CAUSE_WARNS { Grade::Warning } else { Grade::Note };
+    let is_warned = unexplained >= CAUSE_WARNS && !is_searched;
+    let grade = if is_warned { Grade::Warning } else { Grade::Note };
     (!beyond.is_empty()).then(|| finding(grade, "noise", text))
 }
 

@@ -3,8 +3,7 @@
 use super::held_out::{met, nothing};
 use super::result::known;
 use super::scores::together;
-use crate::case::Plan;
-use crate::case::{Case, Experiment, matches};
+use crate::case::{Case, Experiment, Per, Plan, matches};
 use crate::error::Result;
 use crate::fit::asked::problem::{Problem, Stop};
 use crate::fit::limits::{BLOCK_SAMPLES, FEWEST_LOGS, FOLDS, LOG_BLOCKS, START_SHARE};
@@ -30,12 +29,16 @@ pub(crate) struct Parts {
 impl Parts {
     /// The parts of the logs of a case that its plan fits.
     pub fn new(case: &Case, plan: &Plan) -> Self {
-        let is_held = |name: &str| plan.held_out.iter().any(|pattern| matches(name, pattern));
-        let logs: Vec<&Experiment> = case.experiments.iter().filter(|e| e.log.is_some() && !is_held(&e.name)).collect();
-        if logs.len() >= FEWEST_LOGS {
-            return Self { folds: by_log(&logs), is_cut: false };
+        let logs = fitted(case, plan);
+        match logs.len() >= FEWEST_LOGS {
+            true => Self { folds: by_log(&logs), is_cut: false },
+            false => Self::blocks(case, plan),
         }
-        Self { folds: by_block(&logs), is_cut: true }
+    }
+
+    /// Blocks of each log, however many there are.
+    pub fn blocks(case: &Case, plan: &Plan) -> Self {
+        Self { folds: by_block(&fitted(case, plan)), is_cut: true }
     }
 
     /// The parts that are held out, in words.
@@ -50,11 +53,18 @@ impl Parts {
     }
 }
 
+/// The experiments whose logs are fitted.
+fn fitted<'c>(case: &'c Case, plan: &Plan) -> Vec<&'c Experiment> {
+    let is_held = |name: &str| plan.held_out.iter().any(|pattern| matches(name, pattern));
+    case.experiments.iter().filter(|e| e.log.is_some() && !is_held(&e.name)).collect()
+}
+
 /// Sum of squares and number of values of each quantity.
 pub(crate) type Errors = Vec<(Quantity, f64, usize)>;
 
 /// Sums of squares of a part that is not fitted, by quantity, with the number of values; from a fit to the other parts
-/// that begins at the machine of `case`. `is_cut`: the parts are blocks of logs, with starts of their own.
+/// that begins at the machine of `case`. `is_cut`: the parts are blocks of logs, with starts of their own. Values of a
+/// campaign predict its blocks.
 pub(crate) fn errors(
     case: &Case,
     plan: &Plan,
@@ -63,16 +73,23 @@ pub(crate) fn errors(
     stop: Option<Stop>,
 ) -> Result<(Errors, Work)> {
     let Fold { fitted, held_out } = fold;
-    let mut plan = Plan { held_out: Vec::new(), separate: Vec::new(), ..plan.clone() };
+    let mut plan = Plan { held_out: Vec::new(), ..plan.clone() };
+    let is_known = |experiment: &Experiment| !plan.part(&experiment.name).is_empty();
+    if plan.per == Per::Log || !fitted.iter().chain(held_out).all(is_known) {
+        plan.separate.clear();
+    }
     plan.nuisance.initial_state |= is_cut;
     let own = Case { experiments: fitted.clone(), ..case.clone() };
     let found = search_as_far(&own, &plan, stop, effort, &mut |_, _| Flow::Continue)?;
-    let machine = found.problem.simulated(0, &found.best.x);
+    let machine = |name: &str| {
+        let part = found.problem.part(plan.part(name));
+        found.problem.simulated(part.unwrap_or(0), &found.best.x)
+    };
     let known = known(&found);
     let held = Case { experiments: held_out.clone(), ..case.clone() };
     let scored = Plan { windows: None, nuisance: plan.nuisance, ..nothing(&plan) };
-    let logs: Vec<_> =
-        Problem::new(&held, &scored)?.runs.iter().map(|run| met(run, &machine, &known, START_SHARE)).collect();
+    let runs = Problem::new(&held, &scored)?.runs;
+    let logs: Vec<_> = runs.iter().map(|run| met(run, &machine(&run.name), &known, START_SHARE)).collect();
     let errors = together(&logs, |_| String::new());
     let errors = errors.iter().map(|one| (one.quantity, one.rmse.powi(2) * one.count as f64, one.count));
     Ok((errors.collect(), found.work))

@@ -3,6 +3,7 @@
 use crate::case::{Case, Plan};
 use crate::fit::asked::problem::Problem;
 use crate::fit::search::starts::Searched;
+use crate::fit::trust::doubts::Size;
 use crate::friction::Friction;
 use crate::log::Quantity;
 use crate::machine::{AmplifierMode, Machine};
@@ -54,6 +55,8 @@ pub(super) enum Telling {
     Parameter(String),
     /// The last nuisance parameter that all logs share, and the start of its search, SI.
     Nuisance(f64),
+    /// The parameters of these names, which are equal without the element.
+    Apart(Vec<String>),
 }
 
 /// A quantity that is a multiple of a parameter.
@@ -66,8 +69,11 @@ pub(super) struct Measure {
 }
 
 /// A fit with the element.
-pub(super) struct Fitted {
+pub(super) struct Fitted<'t> {
+    /// The machine, for the first log if logs have values of their own.
     pub machine: Machine,
+    /// The parameters that the fit without it does not have.
+    pub sizes: &'t [Size],
     /// The size of the element, SI.
     pub value: f64,
     /// Standard deviation of the sampling times, s, if the residuals show it.
@@ -169,11 +175,15 @@ impl<'s, 'a> Site<'s, 'a> {
         self.found.problem.parameters.iter().flat_map(|own| &own.keys).any(|(own, _)| own == key)
     }
 
+    /// The greatest logged input, either way.
+    pub fn greatest_input(&self) -> f64 {
+        let inputs = self.found.problem.runs.iter().flat_map(|run| &run.logged[0]);
+        inputs.fold(0.0, |most: f64, input| most.max(input.abs()))
+    }
+
     /// The motor's force on the cart at the greatest input, N.
     pub fn force(&self) -> f64 {
-        let drive = &self.machine.drives[0];
-        let inputs = self.found.problem.runs.iter().flat_map(|run| &run.logged[0]);
-        let most = inputs.fold(0.0, |most: f64, input| most.max(input.abs()));
+        let (drive, most) = (&self.machine.drives[0], self.greatest_input());
         let motor = &drive.motor;
         // F = n K_t g u/r, or over R
         let per_unit = motor.gear_ratio * motor.torque_constant * drive.amplifier.gain / self.machine.pulley_radius;

@@ -12,6 +12,8 @@
 //! parts of the logs predicts the other parts better. With the distance d of the estimates from those with it,
 //! intervals of half-width h become √(h² + 2 (d² + h′²)) ≥ d + h′, h′ that of the fit with the element.
 
+mod amplifier;
+mod apart;
 mod bristles;
 mod extension;
 mod force;
@@ -39,10 +41,13 @@ const EXTENSIONS: &[Extension] = &[
     row("spring", gear::springs, gear::spring_words, gear::without),
     row("play", gear::plays, gear::play_words, gear::without),
     row("delay", stamp::delays, stamp::words, as_it_is),
+    row("limit", amplifier::limits, amplifier::limit_words, amplifier::without_limit),
+    row("inductance", amplifier::inductances, amplifier::inductance_words, amplifier::without_inductance),
     row("drag", force::drags, force::drag_words, force::without),
     row("stribeck", force::falls, force::fall_words, force::without_fall),
     Extension { is_curved: true, ..row("lugre", bristles::bend, bristles::words, bristles::without) },
     row("load", force::loads, force::load_words, as_it_is),
+    row("apart", apart::apart, apart::words, as_it_is),
 ];
 
 const fn row(
@@ -74,8 +79,8 @@ pub(crate) fn cause(case: &Case, plan: &Plan, found: &Searched, law: Option<&Oth
         open.sort_by(|a, b| a.cost().total_cmp(&b.cost()));
         let best = open.iter().find(|tried| tried.is_whole()).filter(|tried| tried.cost() <= most);
         let is_settled = best.is_some_and(Tried::leaves_noise);
-        // What explains all but noise needs no rival; otherwise those that may end lower are fitted, too. Runs of curved
-        // friction take long, and come last.
+        // What explains all but noise needs no rival; otherwise those that may end lower are fitted, too. Runs of
+        // curved friction take long, and come last.
         let rival = open.iter().position(|tried| !tried.is_whole() && tried.least() < whole);
         if let Some(k) = rival.filter(|_| !is_settled) {
             let further = open.remove(k).advanced(&site);
@@ -158,25 +163,32 @@ struct Folds<'s, 'a> {
     site: &'s Site<'s, 'a>,
     case: Case,
     plan: Plan,
+    /// The parts that [`compare`](crate::fit::compare) has, and blocks of every log, which values of single logs need.
+    sets: [Without; 2],
+}
+
+/// Parts, and the mean squared errors of those without an element, as far as they are known.
+struct Without {
     parts: Parts,
-    /// Mean squared errors of the parts without an element, as far as they are known.
-    without: Vec<Option<f64>>,
+    means: Vec<Option<f64>>,
 }
 
 impl<'s, 'a> Folds<'s, 'a> {
     fn new(site: &'s Site<'s, 'a>) -> Self {
         let case = Case { machine: site.machine.clone(), ..site.case.clone() };
         let plan = Plan { starts: 1, ..site.plan.clone() };
-        Self { site, parts: Parts::new(&case, &plan), case, plan, without: Vec::new() }
+        let of = |parts| Without { parts, means: Vec::new() };
+        let sets = [of(Parts::new(&case, &plan)), of(Parts::blocks(&case, &plan))];
+        Self { site, sets, case, plan }
     }
 
     /// Mean squared error of a part by a fit to the others, in units of the residuals; `None` if it fails.
-    fn mean(&self, case: &Case, plan: &Plan, fold: &Fold) -> Option<f64> {
+    fn mean(&self, case: &Case, plan: &Plan, (fold, is_cut): (&Fold, bool)) -> Option<f64> {
         let mut effort = Effort::of_part();
         // Predictions need no exact end.
         effort.options.sharp = false;
         let stop = self.site.found.problem.stop();
-        let (found, _) = errors(case, plan, fold, (self.parts.is_cut, &effort), stop).ok()?;
+        let (found, _) = errors(case, plan, fold, (is_cut, &effort), stop).ok()?;
         let own = found.iter().map(|(quantity, squares, count)| {
             let deviation = self.site.deviation(*quantity);
             (squares / (deviation * deviation), *count)
@@ -189,18 +201,21 @@ impl<'s, 'a> Folds<'s, 'a> {
     /// `None` if the prediction is not clearly better.
     fn predicts(&mut self, tried: &Tried) -> Option<[usize; 2]> {
         let (with, own) = tried.case_and_plan();
-        let parts = Parts::new(&with, &own);
-        let count = self.parts.folds.len().min(parts.folds.len());
+        let set = usize::from(tried.is_apart());
+        let parts = if tried.is_apart() { Parts::blocks(&with, &own) } else { Parts::new(&with, &own) };
+        let count = self.sets[set].parts.folds.len().min(parts.folds.len());
         if count < 2 {
             return None;
         }
         let mut gains = Vec::new();
         for k in 0..count {
-            if self.without.len() == k {
-                let mean = self.mean(&self.case, &self.plan, &self.parts.folds[k]);
-                self.without.push(mean);
+            let Without { parts: before, means } = &self.sets[set];
+            if means.len() == k {
+                let mean = self.mean(&self.case, &self.plan, (&before.folds[k], before.is_cut));
+                self.sets[set].means.push(mean);
             }
-            let (without, with) = (self.without[k]?, self.mean(&with, &own, &parts.folds[k])?);
+            let with = self.mean(&with, &own, (&parts.folds[k], parts.is_cut))?;
+            let without = self.sets[set].means[k]?;
             // ln of the ratio, since a part in which a start fails has errors of another magnitude.
             gains.push((without / with).ln());
             if gains.iter().filter(|gain| **gain <= 0.0).count() > 1 {

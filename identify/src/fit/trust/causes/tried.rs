@@ -152,6 +152,7 @@ impl<'a> Tried<'a> {
         match &self.extended.telling {
             Telling::Parameter(key) => self.problem.parameters.iter().position(|own| own.name == *key),
             Telling::Nuisance(_) => self.problem.globals().checked_sub(1),
+            Telling::Apart(_) => None,
         }
     }
 
@@ -165,6 +166,9 @@ impl<'a> Tried<'a> {
 
     /// Size of the element in standard errors; for a logarithmic variable, the inverse of its error.
     pub fn standard_errors(&self, judged: &Judged) -> f64 {
+        if let Telling::Apart(names) = &self.extended.telling {
+            return self.apart(judged, names);
+        }
         let Some(j) = self.telling() else { return 0.0 };
         let Some(error) = judged.covariance.error(j).filter(|error| *error > 0.0) else { return 0.0 };
         match self.problem.shared.get(j.wrapping_sub(self.problem.parameters.len())) {
@@ -172,6 +176,28 @@ impl<'a> Tried<'a> {
             None => self.best.x[j].abs() / error,
             Some(extra) => self.value(j).abs() / (error * extra.unit),
         }
+    }
+
+    /// The largest difference of one of these parameters from the first, in standard errors.
+    fn apart(&self, judged: &Judged, names: &[String]) -> f64 {
+        let place = |name: &String| self.problem.parameters.iter().position(|own| own.name == *name);
+        let Some(places) = names.iter().map(place).collect::<Option<Vec<usize>>>() else { return 0.0 };
+        // A parameter that is held is known.
+        let error = |j: usize| judged.covariance.error(j).unwrap_or(0.0);
+        let of = |j: usize| {
+            let first = places[0];
+            let (a, b) = (error(j), error(first));
+            // σ² = σ_a² + σ_b² − 2 ρ σ_a σ_b
+            let variance = a * a + b * b - 2.0 * judged.covariance.correlation(j, first).unwrap_or(0.0) * a * b;
+            let apart = (self.best.x[j] - self.best.x[first]).abs();
+            if variance > 0.0 { apart / variance.sqrt() } else { 0.0 }
+        };
+        places[1..].iter().map(|&j| of(j)).fold(0.0, f64::max)
+    }
+
+    /// True if logs have values of their own.
+    pub fn is_apart(&self) -> bool {
+        !self.extended.plan.separate.is_empty()
     }
 
     /// The case with the element, its fitted machine, and its free parameters.
@@ -230,7 +256,12 @@ impl<'a> Tried<'a> {
         }
         let added = widened(&shift, &errors);
         let value = self.telling().map_or(0.0, |j| self.value(j));
-        let fitted = Fitted { machine: self.machine(x), value, scatter: scatter.map(|[deviation, _]| deviation) };
+        let fitted = Fitted {
+            machine: self.machine(x),
+            sizes: &parameters,
+            value,
+            scatter: scatter.map(|[deviation, _]| deviation),
+        };
         let Said { words, add } = (self.row.words)(site, &self.extended, &fitted);
         let key = self.row.key;
         Some(Cause { key, words, explained, standard_errors, parameters, estimates, add, better, added })
