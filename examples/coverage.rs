@@ -470,6 +470,7 @@ impl Truth {
             Truth::Late => &["delay"],
             Truth::LuGre => &["lugre"],
             Truth::Drag => &["drag"],
+            Truth::Limited => &["limit"],
             Truth::Drift => &["drift", "sway"],
         }
     }
@@ -488,7 +489,20 @@ fn named(truth: Truth, seed: u64, is_told: bool, sum: &Mutex<Named>) {
     };
     (0..3).filter(|&j| inside(j)).for_each(|j| sum.held[j] += 1);
     sum.wide.extend(fitted.estimates[0].interval.map(|[low, high]| 0.5 * (high - low) / values[0]));
-    let codes = ["spring", "play", "delay", "drag", "stribeck", "lugre", "load", "other_law", "place"];
+    let codes = [
+        "spring",
+        "play",
+        "delay",
+        "limit",
+        "inductance",
+        "drag",
+        "stribeck",
+        "lugre",
+        "load",
+        "apart",
+        "other_law",
+        "place",
+    ];
     let is_right = |code: &str| truth.causes().contains(&code);
     if is_told {
         let off = |j: usize| if inside(j) { "holds" } else { "does not hold" };

@@ -6,9 +6,10 @@ use crate::common::truths::{AXIS, COUNT, EVERY, Truth, drawn, forces};
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use std::sync::{Arc, Mutex, OnceLock};
-use taut::case::Case;
+use taut::case::{Case, Experiment};
 use taut::fit::{Fit, Grade, check, fit};
 use taut::log::Quantity;
+use taut::machine::Machine;
 use taut::signal::{Hold, Signal};
 use taut::solve::{Flow, Solver, simulate};
 
@@ -131,20 +132,115 @@ fn the_right_model_has_no_finding_where_its_turns_are_right() {
     }
 }
 
-/// The case with the log of another machine of its kind, which taut simulates.
-fn simulated(seed: u64, changes: &[&str], truth: &[&str]) -> Fit {
-    let mut case = Case::from_text_with("axis.toml", AXIS, changes).unwrap();
-    let other = Case::from_text_with("axis.toml", AXIS, &[changes, truth].concat()).unwrap().machine;
+/// The experiment of a case with the log of another machine of its kind, which taut simulates.
+fn logged(seed: u64, case: &Case, other: &Machine, name: &str) -> Experiment {
     let mut chance = Chance::new(seed);
     let input = forces(&mut chance);
     let time: Vec<f64> = (0..COUNT).map(|k| k as f64 * EVERY).collect();
-    let experiment = &mut case.experiments[0];
+    let mut experiment = case.experiments[0].clone();
     (experiment.until, experiment.every) = ((COUNT - 1) as f64 * EVERY, EVERY);
     experiment.inputs[0] = Signal::Sampled { times: time.clone(), values: input.clone(), hold: Hold::Zero };
-    let run = simulate(&other, experiment, Solver::of(&other)).unwrap().trajectory;
+    let run = simulate(other, &experiment, Solver::of(other)).unwrap().trajectory;
     let position = run.get("cart_position").unwrap().iter().map(|x| x + 1e-5 * chance.normal()).collect();
-    experiment.log = Some(columns("log", time, input, vec![output(Quantity::CartPosition, position)]));
+    experiment.name = name.into();
+    experiment.log = Some(columns(name, time, input, vec![output(Quantity::CartPosition, position)]));
+    experiment
+}
+
+/// The machine in voltage mode.
+const VOLTAGE: &[&str] = &["amplifier.mode=voltage", "experiment.0.input.step=1 V"];
+
+/// The fit of the case with `changes` to the log of another machine, which has those of `truth`, too.
+fn simulated(seed: u64, changes: &[&str], truth: &[&str]) -> Fit {
+    apart(&[seed], changes, &[truth])
+}
+
+/// The same with a log of each of several machines.
+fn apart(seeds: &[u64], changes: &[&str], truths: &[&[&str]]) -> Fit {
+    let mut case = Case::from_text_with("axis.toml", AXIS, changes).unwrap();
+    let of = |(k, truth): (usize, &&[&str])| {
+        let other = Case::from_text_with("axis.toml", AXIS, &[changes, truth].concat()).unwrap().machine;
+        logged(seeds[k], &case, &other, &format!("log {k}"))
+    };
+    case.experiments = truths.iter().enumerate().map(of).collect();
     fit(&case, case.fit.as_ref().unwrap(), None, &mut |_| Flow::Continue).unwrap()
+}
+
+/// An amplifier that gave 75 % of what the log says was called a drag, or was not reported.
+#[test]
+fn a_limit_is_named() {
+    for seed in 1..=4 {
+        let (found, values) = fitted(seed, Truth::Limited);
+        let cause = found.cause.as_ref().unwrap_or_else(|| panic!("{seed}: {:#?}", found.findings));
+        assert!(cause.key == "limit" && warns(&found, "limit"), "{seed}: {}", cause.words);
+        assert!((cause.parameters[0].value / 8.0 - 1.0).abs() < 1e-3, "{seed}: {}", cause.words);
+        assert!(!warns(&found, "interruption"), "{seed}: {:#?}", found.findings);
+        for (one, truth) in cause.estimates.iter().zip(values) {
+            let one = one.as_ref().unwrap();
+            assert!((one.value / truth - 1.0).abs() < 5e-3, "{seed}: {} {} for {truth}", one.name, one.value);
+        }
+    }
+}
+
+/// A current that lags was called a spring.
+#[test]
+fn an_inductance_is_named() {
+    for seed in 1..=3 {
+        let found = simulated(seed, VOLTAGE, &["motor.inductance=5e-3"]);
+        let cause = found.cause.as_ref().unwrap_or_else(|| panic!("{seed}: {:#?}", found.findings));
+        assert!(cause.key == "inductance" && warns(&found, "inductance"), "{seed}: {}", cause.words);
+        assert!((cause.parameters[0].value / 5e-3 - 1.0).abs() < 0.02, "{seed}: {}", cause.words);
+    }
+}
+
+/// A log of a machine with another mass, or whose input has another scale, was fitted with the others in silence, or
+/// with a play of 26 mm.
+#[test]
+fn a_log_of_another_machine_is_named() {
+    for (change, name, factor) in [("cart.mass=1.4", "cart.mass", 1.4), ("amplifier.gain=1.25", "amplifier.gain", 1.25)]
+    {
+        // Four logs and more are held out whole by other elements.
+        for count in [2, 5] {
+            let seeds: Vec<u64> = (1..=count).collect();
+            let changed = [change];
+            let truth = |k: u64| if k == count { &changed[..] } else { &[] };
+            let truths: Vec<&[&str]> = (1..=count).map(truth).collect();
+            let found = apart(&seeds, VOLTAGE, &truths);
+            let cause = found.cause.as_ref().unwrap_or_else(|| panic!("{name} {count}: {:#?}", found.findings));
+            assert!(cause.key == "apart" && warns(&found, "apart"), "{name} {count}: {}", cause.words);
+            let last = format!("{name} [log {}]", count - 1);
+            let size = cause.parameters.iter().find(|own| own.name == last).unwrap();
+            assert!((size.value / factor - 1.0).abs() < 5e-3, "{name} {count}: {}", cause.words);
+        }
+    }
+}
+
+/// What no element explains is said: friction that is greater along a part of the travel.
+#[test]
+fn residuals_far_above_the_noise_are_reported() {
+    for seed in 1..=2 {
+        let along = "cart.force_along=[[-10, 0], [-0.05, 0], [0, 3], [0.05, 0], [10, 0]]";
+        let found = simulated(seed, &[], &[along]);
+        let said = found.findings.iter().any(|one| one.code == "noise" || one.grade == Grade::Warning);
+        assert!(said, "{seed}: {:#?}", found.findings);
+    }
+}
+
+/// A first value that stands out, such as that of a sensor which was not ready, turned the fit into nonsense: other
+/// warnings spoke of the time unit, or of an interruption.
+#[test]
+fn a_first_value_that_stands_out_is_named() {
+    let mut case = Case::from_text("axis.toml", AXIS).unwrap();
+    let mut experiment = logged(1, &case, &case.machine, "log");
+    let log = Arc::make_mut(experiment.log.as_mut().unwrap());
+    log.outputs[0].values[0] += 0.05;
+    case.experiments = vec![experiment];
+    let found = fit(&case, case.fit.as_ref().unwrap(), None, &mut |_| Flow::Continue).unwrap();
+    let warnings: Vec<&str> = found.warnings().map(|one| one.code).collect();
+    assert!(warnings.contains(&"outliers"), "{:#?}", found.findings);
+    for code in ["time-unit", "interruption"] {
+        assert!(!warnings.contains(&code), "{:#?}", found.findings);
+    }
 }
 
 /// A constant force is named with its size.

@@ -215,6 +215,12 @@ fn faults_of_single_columns() {
     values(&mut position, Quantity::CartPosition)[700] += 0.05;
     values(&mut position, Quantity::CartPosition)[900] -= 0.04;
     says(&position, "outliers", "2 samples stand out from their neighbours; the first is");
+    for end in [0, 1] {
+        let mut position = only(&log, Quantity::CartPosition);
+        let at = end * (position.time.len() - 1);
+        values(&mut position, Quantity::CartPosition)[at] += 0.05;
+        says(&position, "outliers", "one sample stands out");
+    }
     let mut clipped = only(&log, Quantity::MotorCurrent);
     values(&mut clipped, Quantity::MotorCurrent).iter_mut().for_each(|i| *i = i.clamp(-3.0, 3.0));
     says(&clipped, "no-motion", "electrical");

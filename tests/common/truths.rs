@@ -63,6 +63,8 @@ pub enum Truth {
     LuGre,
     /// A drag of 0.3 b v² beside the friction.
     Drag,
+    /// An amplifier that gives at most 8 A where up to 15 A are asked for.
+    Limited,
     /// All friction goes by one sine of ±10 % along the log.
     Drift,
     /// Nothing; noise of second order at 15 Hz, ζ = 0.05, of 1 mm.
@@ -70,7 +72,7 @@ pub enum Truth {
 }
 
 impl Truth {
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Right,
         Self::Spring,
         Self::SpringAtMotor,
@@ -78,6 +80,7 @@ impl Truth {
         Self::Late,
         Self::LuGre,
         Self::Drag,
+        Self::Limited,
         Self::Drift,
         Self::NarrowBand,
     ];
@@ -92,6 +95,7 @@ impl Truth {
             Self::Late => "samples taken 0 to 0.8 ms after their stamps",
             Self::LuGre => "LuGre",
             Self::Drag => "a drag of 0.3 b v²",
+            Self::Limited => "an amplifier that gives 8 A of up to 15 A",
             Self::Drift => "friction drifts by one sine of ±10 %",
             Self::NarrowBand => "nothing; noise at 15 Hz, ζ = 0.05",
         }
@@ -133,7 +137,8 @@ fn positions(truth: Truth, [mass, viscous, coulomb]: Values, input: &[f64], shar
             Truth::Drift => 1.0 + 0.1 * (TAU * time / (COUNT as f64 * EVERY)).sin(),
             _ => 1.0,
         };
-        let force = input[(k / STEPS).min(input.len() - 1)];
+        let asked = input[(k / STEPS).min(input.len() - 1)];
+        let force = if truth == Truth::Limited { asked.clamp(-8.0, 8.0) } else { asked };
         let pull = if before > 0.0 {
             let stretch = xm - x;
             let beyond = stretch.signum() * (stretch.abs() - half).max(0.0);

@@ -1153,7 +1153,7 @@ pub(crate) const CAUSE_DELAYS: [f64; 2] = [0.5, -0.5];
 /// Limits of the amplifier that are tried.
 ///
 /// Unit: the greatest voltage or current that the logs ask for. Source: chosen. Test: `a_limit_is_named`.
-pub(crate) const CAUSE_LIMITS: [f64; 3] = [0.5, 0.7, 0.9];
+pub(crate) const CAUSE_LIMITS: [f64; 5] = [0.4, 0.52, 0.64, 0.76, 0.88];
 
 /// Lower bound of such a limit.
 ///

@@ -265,12 +265,14 @@ impl Channel {
         };
         let outlier =
             |sample: usize, expected: f64| Outlier { sample, time: time[sample], value: values[sample], expected };
-        // The first or last value, where the step to it is far beyond those that follow, or came before.
+        // The first or last position, where the step to it is far beyond those that follow, or came before. Currents
+        // and speeds may begin with a step.
+        let is_position = matches!(self.unit, "m" | "rad");
         let end = |sample: usize, beside: [usize; 3]| {
             let [a, b, c] = beside.map(|k| values[k]);
             let usual = (a - b).abs().max((b - c).abs());
             let off = (values[sample] - a).abs();
-            (off > least.max(OUTLYING * usual)).then(|| outlier(sample, a))
+            (is_position && off > least.max(OUTLYING * usual)).then(|| outlier(sample, a))
         };
         let last = values.len() - 1;
         let first = end(0, [1, 2, 3]).into_iter();
